@@ -1,0 +1,284 @@
+//! Geometry of a bottom-level structure: checked and converted once, for the size query and for the build.
+
+use std::sync::Arc;
+
+use ash::vk;
+use bitflags::bitflags;
+
+use crate::error::{Error, Result, check_limit};
+use crate::format::{IndexFormat, VertexFormat};
+use crate::gpu::Gpu;
+use crate::gpu::caps::Limits;
+use crate::handle::BufferHandle;
+use crate::resource::Buffer;
+use crate::resource::buffer::BufferUsage;
+
+bitflags! {
+    /// How rays treat a geometry.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+    pub struct GeometryFlags: u32 {
+        /// Never runs an any-hit shader: every hit counts.
+        const OPAQUE = 1;
+        /// Runs the any-hit shader at most once for each primitive.
+        const NO_DUPLICATE_ANY_HIT = 1 << 1;
+    }
+}
+
+/// Indices of triangles, three for each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Indices {
+    /// A buffer with [`BufferUsage::ACCEL_INPUT`].
+    pub buffer: BufferHandle,
+    /// Where the first index lies, in bytes; a multiple of the index size.
+    pub offset: u64,
+    /// Format of an index.
+    pub format: IndexFormat,
+}
+
+/// Triangles of a bottom-level structure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Triangles {
+    /// A buffer with [`BufferUsage::ACCEL_INPUT`] that holds the positions.
+    pub vertex_buffer: BufferHandle,
+    /// Where the first vertex lies, in bytes.
+    pub vertex_offset: u64,
+    /// From one vertex to the next, in bytes; 0 is tightly packed positions.
+    pub vertex_stride: u64,
+    /// Format of a position.
+    pub vertex_format: VertexFormat,
+    /// Number of vertices.
+    pub vertex_count: u32,
+    /// Indices; without them every three vertices are a triangle.
+    pub indices: Option<Indices>,
+    /// Number of triangles.
+    pub triangle_count: u32,
+    /// Moves the vertices before the build: 3 rows of 4 columns, row by row.
+    pub transform: Option<[f32; 12]>,
+    /// How rays treat the triangles.
+    pub flags: GeometryFlags,
+}
+
+impl Triangles {
+    /// Opaque triangles of packed [`VertexFormat::F32x3`] positions, three for each.
+    pub fn packed(vertex_buffer: BufferHandle, vertex_count: u32) -> Self {
+        Self {
+            vertex_buffer,
+            vertex_offset: 0,
+            vertex_stride: 0,
+            vertex_format: VertexFormat::F32x3,
+            vertex_count,
+            indices: None,
+            triangle_count: vertex_count / 3,
+            transform: None,
+            flags: GeometryFlags::OPAQUE,
+        }
+    }
+
+    /// As [`packed`](Self::packed), with [`IndexFormat::U32`] indices, three for each triangle.
+    pub fn indexed(
+        vertex_buffer: BufferHandle,
+        vertex_count: u32,
+        index_buffer: BufferHandle,
+        triangle_count: u32,
+    ) -> Self {
+        let indices = Indices { buffer: index_buffer, offset: 0, format: IndexFormat::U32 };
+        Self { indices: Some(indices), triangle_count, ..Self::packed(vertex_buffer, vertex_count) }
+    }
+}
+
+/// Axis-aligned boxes, each `[f32; 6]`: smallest corner, largest corner. An intersection shader decides what is in them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Aabbs {
+    /// A buffer with [`BufferUsage::ACCEL_INPUT`].
+    pub buffer: BufferHandle,
+    /// Where the first box lies, in bytes; a multiple of 8.
+    pub offset: u64,
+    /// From one box to the next, in bytes; a multiple of 8, 0 is tightly packed (24).
+    pub stride: u64,
+    /// Number of boxes.
+    pub count: u32,
+    /// How rays treat the boxes.
+    pub flags: GeometryFlags,
+}
+
+/// One geometry of a bottom-level structure. All geometries of a structure are of the same kind.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum BlasGeometry {
+    /// Triangles.
+    Triangles(Triangles),
+    /// Boxes.
+    Aabbs(Aabbs),
+}
+
+/// A geometry as Vulkan takes it, with its number of primitives.
+#[derive(Clone, Copy)]
+pub(crate) struct Converted {
+    pub(crate) raw: vk::AccelerationStructureGeometryKHR<'static>,
+    pub(crate) primitive_count: u32,
+}
+
+impl BlasGeometry {
+    /// Buffers the build reads.
+    pub(crate) fn buffers(&self) -> impl Iterator<Item = BufferHandle> {
+        let (first, second) = match self {
+            Self::Triangles(t) => (t.vertex_buffer, t.indices.map(|indices| indices.buffer)),
+            Self::Aabbs(aabbs) => (aabbs.buffer, None),
+        };
+        [Some(first), second].into_iter().flatten()
+    }
+
+    pub(crate) fn transform(&self) -> Option<[f32; 12]> {
+        match self {
+            Self::Triangles(triangles) => triangles.transform,
+            Self::Aabbs(_) => None,
+        }
+    }
+
+    pub(crate) fn primitive_count(&self) -> u32 {
+        match self {
+            Self::Triangles(triangles) => triangles.triangle_count,
+            Self::Aabbs(aabbs) => aabbs.count,
+        }
+    }
+
+    /// Checks the geometry and converts it. `transform` is the address of its matrix, or 0.
+    pub(crate) fn convert(
+        &self,
+        gpu: &Gpu,
+        name: &str,
+        find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>,
+        transform: u64,
+    ) -> Result<Converted> {
+        match self {
+            Self::Triangles(triangles) => convert_triangles(triangles, gpu, name, find, transform),
+            Self::Aabbs(aabbs) => convert_aabbs(aabbs, find),
+        }
+    }
+}
+
+/// Checks what concerns the list as a whole.
+pub(crate) fn check_list(name: &str, geometries: &[BlasGeometry], limits: &Limits) -> Result<()> {
+    if geometries.is_empty() {
+        return Err(Error::usage(name, "a bottom-level structure needs at least one geometry"));
+    }
+    let boxes = |geometry: &BlasGeometry| matches!(geometry, BlasGeometry::Aabbs(_));
+    if geometries.iter().any(|geometry| boxes(geometry) != boxes(&geometries[0])) {
+        return Err(Error::usage(name, "triangles and boxes cannot share a structure; make two"));
+    }
+    check_limit(name, "geometry count", geometries.len() as u64, limits.max_blas_geometries)?;
+    let primitives = geometries.iter().map(|geometry| u64::from(geometry.primitive_count())).sum();
+    check_limit(name, "primitive count", primitives, limits.max_blas_primitives)
+}
+
+fn convert_triangles(
+    triangles: &Triangles,
+    gpu: &Gpu,
+    name: &str,
+    find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>,
+    transform: u64,
+) -> Result<Converted> {
+    let format = triangles.vertex_format;
+    let vertex_features = vk::FormatFeatureFlags::ACCELERATION_STRUCTURE_VERTEX_BUFFER_KHR;
+    if !gpu.buffer_features(format.raw()).contains(vertex_features) {
+        let what = format!("vertex format {format:?} in acceleration structure '{name}'");
+        return Err(Error::unsupported(what, "the device cannot build from it; F32x3 always works"));
+    }
+    let vertices = find(triangles.vertex_buffer)?;
+    vertices.check_usage(BufferUsage::ACCEL_INPUT)?;
+    let packed = u64::from(format.size_bytes());
+    let stride = if triangles.vertex_stride == 0 { packed } else { triangles.vertex_stride };
+    let unit = u64::from(format.component_bytes());
+    check_multiple(name, "vertex offset", triangles.vertex_offset, unit)?;
+    check_multiple(name, "vertex stride", stride, unit)?;
+    check_limit(name, "vertex stride in bytes", stride, u32::MAX.into())?;
+    check_elements(&vertices, triangles.vertex_offset, triangles.vertex_count, stride, packed)?;
+    let mut data = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+        .vertex_format(format.raw())
+        .vertex_data(address(vertices.address + triangles.vertex_offset))
+        .vertex_stride(stride)
+        .max_vertex(triangles.vertex_count.saturating_sub(1))
+        .index_type(vk::IndexType::NONE_KHR)
+        .transform_data(address(transform));
+    match triangles.indices {
+        Some(indices) => {
+            data = data
+                .index_type(indices.format.raw())
+                .index_data(index_address(name, triangles, indices, find)?);
+        }
+        None if u64::from(triangles.triangle_count) * 3 > u64::from(triangles.vertex_count) => {
+            let message = format!("{} triangles need three vertices each", triangles.triangle_count);
+            return Err(Error::usage(name, message));
+        }
+        None => {}
+    }
+    let raw = geometry(vk::GeometryTypeKHR::TRIANGLES, triangles.flags)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { triangles: data });
+    Ok(Converted { raw, primitive_count: triangles.triangle_count })
+}
+
+fn index_address(
+    name: &str,
+    triangles: &Triangles,
+    indices: Indices,
+    find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>,
+) -> Result<vk::DeviceOrHostAddressConstKHR> {
+    let buffer = find(indices.buffer)?;
+    buffer.check_usage(BufferUsage::ACCEL_INPUT)?;
+    let size = u64::from(indices.format.size_bytes());
+    check_multiple(name, "index offset", indices.offset, size)?;
+    buffer.check_range(indices.offset, u64::from(triangles.triangle_count) * 3 * size)?;
+    Ok(address(buffer.address + indices.offset))
+}
+
+fn convert_aabbs(aabbs: &Aabbs, find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>) -> Result<Converted> {
+    const BOX_BYTES: u64 = 24;
+    let buffer = find(aabbs.buffer)?;
+    buffer.check_usage(BufferUsage::ACCEL_INPUT)?;
+    let stride = if aabbs.stride == 0 { BOX_BYTES } else { aabbs.stride };
+    check_multiple(&buffer.name, "box offset", aabbs.offset, 8)?;
+    check_multiple(&buffer.name, "box stride", stride, 8)?;
+    check_limit(&buffer.name, "box stride in bytes", stride, u32::MAX.into())?;
+    check_elements(&buffer, aabbs.offset, aabbs.count, stride, BOX_BYTES)?;
+    let data = vk::AccelerationStructureGeometryAabbsDataKHR::default()
+        .data(address(buffer.address + aabbs.offset))
+        .stride(stride);
+    let raw = geometry(vk::GeometryTypeKHR::AABBS, aabbs.flags)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { aabbs: data });
+    Ok(Converted { raw, primitive_count: aabbs.count })
+}
+
+fn geometry(
+    kind: vk::GeometryTypeKHR,
+    flags: GeometryFlags,
+) -> vk::AccelerationStructureGeometryKHR<'static> {
+    let pairs = [
+        (GeometryFlags::OPAQUE, vk::GeometryFlagsKHR::OPAQUE),
+        (GeometryFlags::NO_DUPLICATE_ANY_HIT, vk::GeometryFlagsKHR::NO_DUPLICATE_ANY_HIT_INVOCATION),
+    ];
+    let none = vk::GeometryFlagsKHR::empty();
+    let raw = pairs.iter().filter(|(bit, _)| flags.contains(*bit)).fold(none, |all, (_, raw)| all | *raw);
+    vk::AccelerationStructureGeometryKHR::default().geometry_type(kind).flags(raw)
+}
+
+pub(crate) fn address(device_address: u64) -> vk::DeviceOrHostAddressConstKHR {
+    vk::DeviceOrHostAddressConstKHR { device_address }
+}
+
+fn check_multiple(name: &str, what: &str, value: u64, unit: u64) -> Result<()> {
+    if value.is_multiple_of(unit) {
+        return Ok(());
+    }
+    Err(Error::usage(name, format!("{what} is {value}, it must be a multiple of {unit} bytes")))
+}
+
+/// Fails unless `count` elements of `size` bytes, `stride` apart, lie inside the buffer.
+fn check_elements(buffer: &Buffer, offset: u64, count: u32, stride: u64, size: u64) -> Result<()> {
+    let before_last = stride.checked_mul(u64::from(count).saturating_sub(1));
+    let bytes = match (count, before_last) {
+        (0, _) => Some(0),
+        (_, Some(before)) => before.checked_add(size),
+        (_, None) => None,
+    };
+    let too_large = || Error::usage(&buffer.name, "stride times count overflows");
+    buffer.check_range(offset, bytes.ok_or_else(too_large)?)
+}

@@ -1,0 +1,41 @@
+//! The scratch memory of builds: one buffer for all of them, as large as the largest batch so far.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::scratch::scratch_buffer_bytes;
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::resource::Buffer;
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
+
+/// The pooled scratch buffer. Builds that share it are kept apart by the tracker like any other writes.
+#[derive(Default)]
+pub(crate) struct ScratchBuffer {
+    current: Mutex<Option<Arc<Buffer>>>,
+}
+
+impl ScratchBuffer {
+    /// A buffer with room for `bytes` at an aligned address, and the smaller one it replaces, to be retired.
+    pub(crate) fn get(&self, gpu: &Arc<Gpu>, bytes: u64) -> Result<(Arc<Buffer>, Option<Arc<Buffer>>)> {
+        let needed = scratch_buffer_bytes(bytes, gpu.caps.limits.scratch_alignment.into());
+        let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*current {
+            Some(buffer) if buffer.size_bytes >= needed => Ok((Arc::clone(buffer), None)),
+            _ => {
+                let buffer = Arc::new(new_buffer(gpu, needed)?);
+                let replaced = current.replace(Arc::clone(&buffer));
+                Ok((buffer, replaced))
+            }
+        }
+    }
+}
+
+fn new_buffer(gpu: &Arc<Gpu>, bytes: u64) -> Result<Buffer> {
+    let desc = BufferDesc {
+        size_bytes: bytes.max(1),
+        usage: BufferUsage::STORAGE,
+        debug_name: "acceleration structure scratch",
+        ..Default::default()
+    };
+    Buffer::new(gpu, &desc, InternalUsage::NONE)
+}

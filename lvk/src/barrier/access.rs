@@ -1,0 +1,348 @@
+//! How a command touches a resource: pipeline stages, kinds of memory access and the image layout it asks for.
+
+use bitflags::bitflags;
+
+bitflags! {
+    /// Groups of Vulkan pipeline stages, as coarse as hazards of this library need them.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+    pub(crate) struct Stages: u16 {
+        /// Reads and writes through a mapped pointer.
+        const HOST = 1 << 0;
+        /// Copies, blits, clears, fills and resolves.
+        const TRANSFER = 1 << 1;
+        /// Fetch of indirect parameters, of draws, dispatches and traces.
+        const DRAW_INDIRECT = 1 << 2;
+        /// Index and vertex fetch.
+        const VERTEX_INPUT = 1 << 3;
+        /// Every shader stage before rasterisation: vertex, tessellation, geometry, task and mesh.
+        const PRE_RASTER = 1 << 4;
+        /// Fragment shader.
+        const FRAGMENT = 1 << 5;
+        /// Early and late depth and stencil tests.
+        const DEPTH = 1 << 6;
+        /// Color attachment output.
+        const COLOR = 1 << 7;
+        /// Compute shader.
+        const COMPUTE = 1 << 8;
+        /// All shaders of a ray tracing pipeline.
+        const RAY_TRACING = 1 << 9;
+        /// Builds, refits and copies of acceleration structures.
+        const ACCEL_BUILD = 1 << 10;
+
+        /// Every stage that runs shaders.
+        const SHADERS = Self::PRE_RASTER.bits() | Self::FRAGMENT.bits() | Self::COMPUTE.bits()
+            | Self::RAY_TRACING.bits();
+    }
+}
+
+bitflags! {
+    /// Kinds of memory access.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+    pub(crate) struct Access: u16 {
+        /// Indirect parameters.
+        const INDIRECT_READ = 1 << 0;
+        /// Indices of a draw.
+        const INDEX_READ = 1 << 1;
+        /// Vertex attributes.
+        const VERTEX_READ = 1 << 2;
+        /// Sampled and storage reads of shaders; input geometry of acceleration structure builds.
+        const SHADER_READ = 1 << 3;
+        /// Storage writes of shaders.
+        const SHADER_WRITE = 1 << 4;
+        /// Load, blend and logic operations.
+        const COLOR_READ = 1 << 5;
+        /// Color attachment stores.
+        const COLOR_WRITE = 1 << 6;
+        /// Depth tests.
+        const DEPTH_READ = 1 << 7;
+        /// Depth stores.
+        const DEPTH_WRITE = 1 << 8;
+        /// Source of a copy.
+        const TRANSFER_READ = 1 << 9;
+        /// Destination of a copy, fill or clear.
+        const TRANSFER_WRITE = 1 << 10;
+        /// Traversal, and structures a build reads.
+        const ACCEL_READ = 1 << 11;
+        /// Structures a build writes, and its scratch memory.
+        const ACCEL_WRITE = 1 << 12;
+        /// Reads through a mapped pointer.
+        const HOST_READ = 1 << 13;
+        /// Writes through a mapped pointer.
+        const HOST_WRITE = 1 << 14;
+
+        /// Every access that changes memory.
+        const WRITES = Self::SHADER_WRITE.bits() | Self::COLOR_WRITE.bits() | Self::DEPTH_WRITE.bits()
+            | Self::TRANSFER_WRITE.bits() | Self::ACCEL_WRITE.bits() | Self::HOST_WRITE.bits();
+    }
+}
+
+impl Stages {
+    /// How many single stages there are.
+    pub(crate) const COUNT: usize = 11;
+
+    /// The accesses that a single stage can perform; Vulkan forbids masks that name any other.
+    pub(crate) fn possible_access(self) -> Access {
+        const SHADER: Access = Access::SHADER_READ.union(Access::SHADER_WRITE).union(Access::ACCEL_READ);
+        match self {
+            Self::HOST => Access::HOST_READ | Access::HOST_WRITE,
+            Self::TRANSFER => Access::TRANSFER_READ | Access::TRANSFER_WRITE,
+            Self::DRAW_INDIRECT => Access::INDIRECT_READ,
+            Self::VERTEX_INPUT => Access::INDEX_READ | Access::VERTEX_READ,
+            Self::PRE_RASTER | Self::FRAGMENT | Self::COMPUTE | Self::RAY_TRACING => SHADER,
+            Self::DEPTH => Access::DEPTH_READ | Access::DEPTH_WRITE,
+            Self::COLOR => Access::COLOR_READ | Access::COLOR_WRITE,
+            Self::ACCEL_BUILD => {
+                Access::SHADER_READ | Access::INDIRECT_READ | Access::ACCEL_READ | Access::ACCEL_WRITE
+            }
+            _ => Access::empty(),
+        }
+    }
+
+    /// Position of a single stage in a table of [`Stages::COUNT`] rows.
+    fn row(self) -> usize {
+        (self.bits().trailing_zeros() as usize).min(Self::COUNT - 1)
+    }
+}
+
+/// Image layouts that the library uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub(crate) enum Layout {
+    /// Contents are unknown; also stands for "no layout" where the resource is a buffer.
+    #[default]
+    Undefined,
+    /// Storage images, and images that are read and written at once.
+    General,
+    /// Sampled images.
+    ShaderRead,
+    /// Color attachment.
+    ColorTarget,
+    /// Depth or depth-stencil attachment.
+    DepthTarget,
+    /// Source of a copy or blit.
+    TransferSrc,
+    /// Destination of a copy, blit or clear.
+    TransferDst,
+    /// Handed to the presentation engine.
+    Present,
+}
+
+/// One way in which a command touches a resource.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) struct Use {
+    /// Where in the pipeline.
+    pub(crate) stages: Stages,
+    /// What is done to the memory; each stage performs those that it can.
+    pub(crate) access: Access,
+    /// The layout an image must have; buffers have none.
+    pub(crate) layout: Layout,
+}
+
+impl Use {
+    const fn new(stages: Stages, access: Access, layout: Layout) -> Self {
+        Self { stages, access, layout }
+    }
+
+    /// Source of a copy or blit.
+    pub(crate) const fn transfer_read() -> Self {
+        Self::new(Stages::TRANSFER, Access::TRANSFER_READ, Layout::TransferSrc)
+    }
+
+    /// Destination of a copy, blit, fill, clear or resolve.
+    pub(crate) const fn transfer_write() -> Self {
+        Self::new(Stages::TRANSFER, Access::TRANSFER_WRITE, Layout::TransferDst)
+    }
+
+    /// Sampled image, or buffer read by address, in `stages`.
+    pub(crate) const fn shader_read(stages: Stages) -> Self {
+        Self::new(stages, Access::SHADER_READ, Layout::ShaderRead)
+    }
+
+    /// Storage image or buffer that shaders of `stages` read and write.
+    pub(crate) const fn shader_write(stages: Stages) -> Self {
+        Self::new(stages, Access::SHADER_READ.union(Access::SHADER_WRITE), Layout::General)
+    }
+
+    /// Index buffer of a draw.
+    pub(crate) const fn index() -> Self {
+        Self::new(Stages::VERTEX_INPUT, Access::INDEX_READ, Layout::Undefined)
+    }
+
+    /// Vertex buffer of a draw.
+    pub(crate) const fn vertex() -> Self {
+        Self::new(Stages::VERTEX_INPUT, Access::VERTEX_READ, Layout::Undefined)
+    }
+
+    /// Parameters or count of an indirect command.
+    pub(crate) const fn indirect() -> Self {
+        Self::new(Stages::DRAW_INDIRECT, Access::INDIRECT_READ, Layout::Undefined)
+    }
+
+    /// Color attachment; `load` when earlier contents are loaded or blended with.
+    pub(crate) const fn color_target(load: bool) -> Self {
+        let read = if load { Access::COLOR_READ } else { Access::empty() };
+        Self::new(Stages::COLOR, Access::COLOR_WRITE.union(read), Layout::ColorTarget)
+    }
+
+    /// Depth attachment, tested and written.
+    pub(crate) const fn depth_target() -> Self {
+        Self::new(Stages::DEPTH, Access::DEPTH_READ.union(Access::DEPTH_WRITE), Layout::DepthTarget)
+    }
+
+    /// Destination of an acceleration structure build, refit or copy, or its scratch memory.
+    pub(crate) const fn accel_build_write() -> Self {
+        Self::new(Stages::ACCEL_BUILD, Access::ACCEL_READ.union(Access::ACCEL_WRITE), Layout::Undefined)
+    }
+
+    /// Geometry, transforms or instances that a build reads.
+    pub(crate) const fn accel_build_input() -> Self {
+        Self::new(Stages::ACCEL_BUILD, Access::SHADER_READ, Layout::Undefined)
+    }
+
+    /// Acceleration structure that `stages` traverse, or that a build in [`Stages::ACCEL_BUILD`] refers to.
+    pub(crate) const fn accel_read(stages: Stages) -> Self {
+        Self::new(stages, Access::ACCEL_READ, Layout::Undefined)
+    }
+
+    /// Reads through a mapped pointer once the GPU is done.
+    pub(crate) const fn host_read() -> Self {
+        Self::new(Stages::HOST, Access::HOST_READ, Layout::General)
+    }
+
+    /// Image handed to the presentation engine; the semaphore signalled for it covers all stages.
+    pub(crate) const fn present() -> Self {
+        Self::new(Stages::empty(), Access::empty(), Layout::Present)
+    }
+
+    /// Every read a device stage can make of a buffer: what a command may do that declares nothing.
+    pub(crate) fn everything_read() -> Self {
+        let stages = Stages::SHADERS
+            | Stages::TRANSFER
+            | Stages::DRAW_INDIRECT
+            | Stages::VERTEX_INPUT
+            | Stages::ACCEL_BUILD;
+        let attachments = Access::COLOR_READ | Access::DEPTH_READ;
+        Self::new(stages, !Access::WRITES - attachments - Access::HOST_READ, Layout::Undefined)
+    }
+
+    /// Whether memory changes.
+    pub(crate) fn is_write(self) -> bool {
+        self.access.intersects(Access::WRITES)
+    }
+
+    /// The same accesses in another layout.
+    pub(crate) const fn with_layout(self, layout: Layout) -> Self {
+        Self { layout, ..self }
+    }
+
+    /// Both uses at once, by one command. `None` where no layout serves both, for example an attachment that is
+    /// sampled in the same pass.
+    pub(crate) fn merge(self, other: Self) -> Option<Self> {
+        let layout = match (self.layout, other.layout) {
+            (a, b) if a == b => a,
+            (Layout::Undefined, layout) | (layout, Layout::Undefined) => layout,
+            (Layout::ShaderRead, Layout::General) | (Layout::General, Layout::ShaderRead) => Layout::General,
+            _ => return None,
+        };
+        Some(Self { stages: self.stages | other.stages, access: self.access | other.access, layout })
+    }
+}
+
+/// Which accesses of which single stages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct StageAccess([Access; Stages::COUNT]);
+
+impl StageAccess {
+    /// Adds what `touch` does at each of its stages.
+    pub(crate) fn insert(&mut self, touch: Use) {
+        for stage in touch.stages.iter() {
+            self.0[stage.row()] |= touch.access & stage.possible_access();
+        }
+    }
+
+    /// What `other` has and this lacks.
+    pub(crate) fn missing(&self, other: &Self) -> Self {
+        Self(std::array::from_fn(|row| other.0[row] - self.0[row]))
+    }
+
+    /// Accesses of a single stage.
+    pub(crate) fn at(&self, stage: Stages) -> Access {
+        self.0[stage.row()]
+    }
+
+    /// Stages with at least one access.
+    pub(crate) fn stages(&self) -> Stages {
+        Stages::all().iter().filter(|stage| !self.at(*stage).is_empty()).collect()
+    }
+
+    /// Accesses of all stages together.
+    pub(crate) fn access(&self) -> Access {
+        self.0.iter().fold(Access::empty(), |all, access| all | *access)
+    }
+}
+
+impl From<Use> for StageAccess {
+    fn from(touch: Use) -> Self {
+        let mut table = Self::default();
+        table.insert(touch);
+        table
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_single_stage_has_a_row_and_an_access() {
+        let rows: Vec<usize> = Stages::all().iter().map(Stages::row).collect();
+        assert_eq!(rows, (0..Stages::COUNT).collect::<Vec<_>>());
+        assert!(Stages::all().iter().all(|stage| !stage.possible_access().is_empty()));
+    }
+
+    #[test]
+    fn constructors_only_name_accesses_that_each_stage_can_perform() {
+        let uses = [
+            Use::transfer_read(),
+            Use::transfer_write(),
+            Use::shader_read(Stages::SHADERS),
+            Use::shader_write(Stages::SHADERS),
+            Use::index(),
+            Use::vertex(),
+            Use::indirect(),
+            Use::color_target(true),
+            Use::depth_target(),
+            Use::accel_build_write(),
+            Use::accel_build_input(),
+            Use::accel_read(Stages::SHADERS | Stages::ACCEL_BUILD),
+            Use::host_read(),
+            Use::everything_read(),
+        ];
+        for touch in uses {
+            let table = StageAccess::from(touch);
+            assert_eq!(table.stages(), touch.stages, "{touch:?}");
+            assert_eq!(table.access(), touch.access, "{touch:?}");
+        }
+    }
+
+    #[test]
+    fn only_uses_that_change_memory_are_writes() {
+        assert!(Use::shader_write(Stages::COMPUTE).is_write());
+        assert!(Use::color_target(false).is_write());
+        assert!(!Use::everything_read().is_write());
+        assert!(!Use::present().is_write());
+    }
+
+    #[test]
+    fn sampled_and_stored_at_once_is_general_with_both_accesses() {
+        let both = Use::shader_read(Stages::FRAGMENT).merge(Use::shader_write(Stages::COMPUTE)).unwrap();
+        assert_eq!(both.layout, Layout::General);
+        assert_eq!(both.stages, Stages::FRAGMENT | Stages::COMPUTE);
+        assert_eq!(both.access, Access::SHADER_READ | Access::SHADER_WRITE);
+    }
+
+    #[test]
+    fn feedback_loops_do_not_merge() {
+        assert_eq!(Use::color_target(true).merge(Use::shader_read(Stages::FRAGMENT)), None);
+        assert_eq!(Use::transfer_read().merge(Use::transfer_write()), None);
+    }
+}

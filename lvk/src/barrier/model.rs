@@ -1,0 +1,274 @@
+//! A naive model of Vulkan's rules for barriers, which knows nothing of states and prefixes.
+//!
+//! It walks the barriers between every pair of conflicting accesses of a queue and follows the chains of stages that
+//! they form, the flushes, and what becomes visible where.
+
+use std::collections::BTreeSet;
+
+use super::access::StageAccess;
+use super::*;
+
+/// One use of one resource by one command.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Op {
+    pub(super) id: ResourceId,
+    /// `None` for buffers.
+    pub(super) texture: Option<(TextureShape, Subresources)>,
+    pub(super) touch: Use,
+    /// Whether it does not conflict with other accumulated writes.
+    pub(super) accumulated: bool,
+}
+
+impl Op {
+    pub(super) fn covers(&self, cell: Cell) -> bool {
+        let inside = self.texture.is_none_or(|(_, range)| contains(range, cell));
+        self.id == cell.id && inside
+    }
+}
+
+/// One buffer, or one subresource of a texture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) struct Cell {
+    pub(super) id: ResourceId,
+    pub(super) mip: u32,
+    pub(super) layer: u32,
+}
+
+/// What one command does, at most one thing to a resource.
+pub(super) type Command = Vec<Op>;
+
+/// What the queue executes.
+#[derive(Debug, Clone)]
+pub(super) enum Event {
+    Barriers(Barriers),
+    Command(Command),
+}
+
+/// One dependency, as far as it concerns one cell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Edge {
+    src_stages: Stages,
+    src_access: Access,
+    dst_stages: Stages,
+    dst_access: Access,
+    pub(super) relayout: Option<(Layout, Layout)>,
+}
+
+fn contains(range: Subresources, cell: Cell) -> bool {
+    (range.base_mip..range.base_mip + range.mip_count).contains(&cell.mip)
+        && (range.base_layer..range.base_layer + range.layer_count).contains(&cell.layer)
+}
+
+/// Dependencies that reach one cell.
+pub(super) fn edges(barriers: &Barriers, cell: Cell) -> Vec<Edge> {
+    let memory = barriers.memory.iter().map(|m| Edge {
+        src_stages: m.src_stages,
+        src_access: m.src_access,
+        dst_stages: m.dst_stages,
+        dst_access: m.dst_access,
+        relayout: None,
+    });
+    let of_cell = |image: &&ImageBarrier| image.id == cell.id && contains(image.subresources, cell);
+    let images = barriers.images.iter().filter(of_cell).map(|image| Edge {
+        src_stages: image.scopes.src_stages,
+        src_access: image.scopes.src_access,
+        dst_stages: image.scopes.dst_stages,
+        dst_access: image.scopes.dst_access,
+        relayout: Some((image.scopes.old_layout, image.scopes.new_layout)),
+    });
+    memory.chain(images).collect()
+}
+
+/// What happens to one cell, in the order of the queue.
+#[derive(Debug, Clone)]
+enum Step {
+    Barrier(Vec<Edge>),
+    Access { touch: Use, accumulated: bool },
+}
+
+fn steps(log: &[Event], cell: Cell) -> Vec<Step> {
+    let mut steps = Vec::new();
+    for event in log {
+        match event {
+            Event::Barriers(barriers) => steps.push(Step::Barrier(edges(barriers, cell))),
+            Event::Command(command) => {
+                let touching = command.iter().filter(|op| op.covers(cell));
+                steps
+                    .extend(touching.map(|op| Step::Access { touch: op.touch, accumulated: op.accumulated }));
+            }
+        }
+    }
+    steps
+}
+
+/// How far one earlier access, at one of its stages, has been waited for.
+#[derive(Debug, Clone)]
+struct Wait {
+    origin: Stages,
+    /// What the access wrote; a stage has only one way to write.
+    written: Access,
+    /// Stages that start after it.
+    chain: Stages,
+    /// Stages that start after its writes were flushed.
+    flushed: Stages,
+    visible: StageAccess,
+}
+
+impl Wait {
+    fn for_access(origin: Stages, access: Access) -> Self {
+        Self {
+            origin,
+            written: access & origin.possible_access() & Access::WRITES,
+            chain: Stages::empty(),
+            flushed: Stages::empty(),
+            visible: StageAccess::default(),
+        }
+    }
+
+    /// A transition is flushed by the barrier that performs it.
+    fn for_transition(edge: &Edge) -> Self {
+        let mut wait = Self::for_access(Stages::empty(), Access::empty());
+        wait.chain = edge.dst_stages;
+        wait.see(edge);
+        wait
+    }
+
+    fn see(&mut self, edge: &Edge) {
+        self.flushed |= edge.dst_stages;
+        self.visible.insert(Use {
+            stages: edge.dst_stages,
+            access: edge.dst_access,
+            layout: Layout::Undefined,
+        });
+    }
+
+    fn is_waited_by(&self, edge: &Edge) -> bool {
+        edge.src_stages.intersects(self.origin | self.chain)
+    }
+
+    fn is_flushed_by(&self, edge: &Edge) -> bool {
+        let here = edge.src_stages.intersects(self.origin) && edge.src_access.contains(self.written);
+        here || edge.src_stages.intersects(self.flushed)
+    }
+
+    /// Passes one place with barriers: they run side by side and do not chain with each other.
+    fn pass(&mut self, edges: &[Edge]) {
+        let before = self.clone();
+        for edge in edges.iter().filter(|edge| before.is_waited_by(edge)) {
+            self.chain |= edge.dst_stages;
+            if before.is_flushed_by(edge) {
+                self.see(edge);
+            }
+        }
+    }
+
+    /// A layout transition may follow.
+    fn allows_transition(&self, edge: &Edge) -> bool {
+        self.is_waited_by(edge) && (self.written.is_empty() || self.is_flushed_by(edge))
+    }
+
+    /// An access at `stage` may follow without looking at the values.
+    fn ordered_before(&self, stage: Stages) -> bool {
+        self.chain.contains(stage)
+    }
+
+    fn visible_to(&self, stage: Stages, access: Access) -> bool {
+        let wanted = access & stage.possible_access();
+        self.flushed.contains(stage) && self.visible.at(stage).contains(wanted)
+    }
+}
+
+/// The first violation of Vulkan's rules in what happens to one cell.
+fn violation(steps: &[Step]) -> Option<String> {
+    wrong_layout(steps).or_else(|| (0..steps.len()).find_map(|at| violation_after(steps, at)))
+}
+
+fn wrong_layout(steps: &[Step]) -> Option<String> {
+    let mut layout = Layout::Undefined;
+    for (at, step) in steps.iter().enumerate() {
+        match step {
+            Step::Barrier(edges) => {
+                for (old, new) in edges.iter().filter_map(|edge| edge.relayout) {
+                    if old != layout || old == new {
+                        return Some(format!("{at}: transition {old:?} to {new:?} finds {layout:?}"));
+                    }
+                    layout = new;
+                }
+            }
+            Step::Access { touch, .. } if touch.layout != Layout::Undefined && touch.layout != layout => {
+                return Some(format!("{at}: {touch:?} finds {layout:?}"));
+            }
+            Step::Access { .. } => {}
+        }
+    }
+    None
+}
+
+fn violation_after(steps: &[Step], at: usize) -> Option<String> {
+    match &steps[at] {
+        Step::Access { touch, accumulated } => touch.stages.iter().find_map(|origin| {
+            let wait = Wait::for_access(origin, touch.access);
+            let writes = !wait.written.is_empty();
+            first_unordered(&steps[at + 1..], wait, *accumulated, writes)
+                .map(|later| format!("{touch:?} at {at} conflicts with {}", at + 1 + later))
+        }),
+        Step::Barrier(edges) => edges.iter().filter(|edge| edge.relayout.is_some()).find_map(|edge| {
+            first_unordered(&steps[at + 1..], Wait::for_transition(edge), false, true)
+                .map(|later| format!("transition at {at} conflicts with {}", at + 1 + later))
+        }),
+    }
+}
+
+fn first_unordered(steps: &[Step], mut wait: Wait, independent: bool, writes: bool) -> Option<usize> {
+    for (at, step) in steps.iter().enumerate() {
+        match step {
+            Step::Barrier(edges) => {
+                let mut transitions = edges.iter().filter(|edge| edge.relayout.is_some());
+                if transitions.any(|edge| !wait.allows_transition(edge)) {
+                    return Some(at);
+                }
+                wait.pass(edges);
+            }
+            Step::Access { accumulated: true, .. } if independent => {}
+            Step::Access { touch, .. } => {
+                if touch.stages.iter().any(|stage| !may_follow(&wait, writes, stage, touch.access)) {
+                    return Some(at);
+                }
+            }
+        }
+    }
+    None
+}
+
+fn may_follow(wait: &Wait, earlier_writes: bool, stage: Stages, access: Access) -> bool {
+    let later_writes = access.intersects(stage.possible_access() & Access::WRITES);
+    if earlier_writes {
+        wait.ordered_before(stage) && wait.visible_to(stage, access)
+    } else {
+        !later_writes || wait.ordered_before(stage)
+    }
+}
+
+fn cells_of(log: &[Event]) -> Vec<Cell> {
+    let mut cells = BTreeSet::new();
+    let commands = log.iter().filter_map(|event| match event {
+        Event::Command(command) => Some(command),
+        Event::Barriers(_) => None,
+    });
+    for op in commands.flatten() {
+        let shape = op.texture.map_or(TextureShape { mips: 1, layers: 1 }, |(shape, _)| shape);
+        for layer in 0..shape.layers {
+            for mip in 0..shape.mips {
+                cells.insert(Cell { id: op.id, mip, layer });
+            }
+        }
+    }
+    cells.into_iter().collect()
+}
+
+/// The first violation in a queue's log, with what happens to the cell concerned.
+pub(super) fn any_violation(log: &[Event]) -> Option<String> {
+    cells_of(log).into_iter().find_map(|cell| {
+        violation(&steps(log, cell)).map(|what| format!("{cell:?}: {what}\n{:#?}", steps(log, cell)))
+    })
+}

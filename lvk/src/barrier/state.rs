@@ -1,0 +1,308 @@
+//! What is known about one resource, or one subresource of an image, and the barrier its next use needs.
+
+use super::access::{Access, Layout, StageAccess, Stages, Use};
+
+/// Both sides of one barrier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Scopes {
+    /// Stages that must have finished.
+    pub(crate) src_stages: Stages,
+    /// Writes of those stages that must be flushed.
+    pub(crate) src_access: Access,
+    /// Stages that must not start before.
+    pub(crate) dst_stages: Stages,
+    /// Accesses of those stages that must see the writes.
+    pub(crate) dst_access: Access,
+    /// Layout before; equal to `new_layout` where no transition is needed.
+    pub(crate) old_layout: Layout,
+    /// Layout after.
+    pub(crate) new_layout: Layout,
+}
+
+/// Stages together with their accesses: one side of a barrier.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct Scope {
+    stages: Stages,
+    access: Access,
+}
+
+impl Scope {
+    fn of(table: &StageAccess) -> Self {
+        Self { stages: table.stages(), access: table.access() }
+    }
+
+    /// Stages alone, where nothing has to be flushed or seen.
+    fn waiting(stages: Stages) -> Self {
+        Self { stages, access: Access::empty() }
+    }
+
+    /// A barrier reaches every access of every stage it names.
+    fn as_use(self) -> Use {
+        Use { stages: self.stages, access: self.access, layout: Layout::Undefined }
+    }
+}
+
+/// Writers that do not wait for each other.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Epoch {
+    /// What every one of them waits for.
+    before: Scope,
+    /// Which of them already do.
+    waited: StageAccess,
+}
+
+/// Everything later uses of one (sub)resource may have to wait for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct State {
+    layout: Layout,
+    /// The last write, or the last layout transition: then the stages that waited for it, and no access, since Vulkan
+    /// flushes its own transitions.
+    write: Scope,
+    /// Stages that read since, less those that another reading stage has waited for.
+    readers: Stages,
+    /// Reads that already see the last write.
+    visible: StageAccess,
+    /// Present while the last write is an accumulated one.
+    epoch: Option<Epoch>,
+}
+
+impl State {
+    /// Contents unknown, and the next use must wait for `stages`.
+    pub(crate) fn discarded_after(stages: Stages) -> Self {
+        Self { readers: stages, ..Self::default() }
+    }
+
+    /// Untouched so far, with the layout that the first use will find.
+    pub(crate) fn untouched_in(layout: Layout) -> Self {
+        Self { layout, ..Self::default() }
+    }
+
+    /// Layout after the last use.
+    pub(crate) fn layout(&self) -> Layout {
+        self.layout
+    }
+
+    /// Whether something has read since the last write.
+    pub(crate) fn is_read(&self) -> bool {
+        !self.readers.is_empty()
+    }
+
+    /// Whether waiting for `stages` and `access` includes the last write.
+    pub(crate) fn write_is_within(&self, stages: Stages, access: Access) -> bool {
+        stages.contains(self.write.stages) && access.contains(self.write.access)
+    }
+
+    /// Adds reads in the current layout; a barrier is needed for those that do not see the last write yet.
+    pub(crate) fn read(&mut self, reads: &StageAccess) -> Option<Scopes> {
+        let src = self.flushed_write();
+        let dst = Scope::of(&self.visible.missing(reads));
+        let needed = !src.stages.is_empty() && !dst.stages.is_empty();
+        if needed {
+            self.visible.insert(dst.as_use());
+            // Earlier readers in these stages are now waited for by the new ones.
+            self.readers -= src.stages;
+        }
+        self.readers |= reads.stages();
+        needed.then(|| self.scopes(src, dst, self.layout))
+    }
+
+    /// Reads in the current layout that a write follows which waits for them alone: chains to them those earlier
+    /// readers whom the write would miss.
+    pub(crate) fn read_for_all(&mut self, reads: &StageAccess) -> Option<Scopes> {
+        let loose = self.readers - reads.stages();
+        if loose.is_empty() {
+            return self.read(reads);
+        }
+        let unseen = Scope::of(&self.visible.missing(reads));
+        let nothing_new = self.write.stages.is_empty() || unseen.stages.is_empty();
+        let dst = if nothing_new { Scope::waiting(last_of(reads.stages())) } else { unseen };
+        let src = self.through_readers(loose);
+        self.readers = reads.stages();
+        self.visible.insert(dst.as_use());
+        Some(self.scopes(src, dst, self.layout))
+    }
+
+    /// What a read has to wait for. Where a stage that wrote has also read since, it has waited for the whole write and
+    /// its flush: then that stage is enough.
+    fn flushed_write(&self) -> Scope {
+        let seen = last_of(self.write.stages & self.visible.stages());
+        if seen.is_empty() { self.write } else { Scope::waiting(seen) }
+    }
+
+    fn overwrite(&mut self, next: Use) -> Option<Scopes> {
+        let src = self.unfinished();
+        let new_layout = if next.layout == Layout::Undefined { self.layout } else { next.layout };
+        let needed = !src.stages.is_empty() || new_layout != self.layout;
+        let dst = Scope { stages: next.stages, access: next.access };
+        let scopes = self.scopes(src, dst, new_layout);
+        let write = Scope { stages: next.stages, access: next.access & Access::WRITES };
+        *self = Self { write, ..Self::untouched_in(new_layout) };
+        if !next.is_write() {
+            self.readers = next.stages;
+            self.visible = next.into();
+        }
+        needed.then_some(scopes)
+    }
+
+    fn start_epoch(&mut self, writes: &StageAccess) -> Option<Scopes> {
+        let before = self.unfinished();
+        let scopes = self.overwrite(Scope::of(writes).as_use());
+        self.epoch = Some(Epoch { before, waited: *writes });
+        scopes
+    }
+
+    fn continue_epoch(&mut self, mut epoch: Epoch, writes: &StageAccess) -> Option<Scopes> {
+        let dst = Scope::of(&epoch.waited.missing(writes));
+        epoch.waited.insert(dst.as_use());
+        self.write.stages |= writes.stages();
+        self.write.access |= writes.access() & Access::WRITES;
+        self.epoch = Some(epoch);
+        let needed = !epoch.before.stages.is_empty() && !dst.stages.is_empty();
+        needed.then(|| self.scopes(epoch.before, dst, self.layout))
+    }
+
+    /// What a write has to wait for.
+    fn unfinished(&self) -> Scope {
+        if self.readers.is_empty() { self.write } else { self.through_readers(self.readers) }
+    }
+
+    /// Waits for `readers`, who have waited for the last write and its flush, so that waiting for them is enough. The
+    /// host is the exception: no stage of the device waits for it.
+    fn through_readers(&self, readers: Stages) -> Scope {
+        if readers.contains(Stages::HOST) {
+            return Scope { stages: readers | self.write.stages, access: self.write.access };
+        }
+        Scope::waiting(readers)
+    }
+
+    fn scopes(&self, src: Scope, dst: Scope, new_layout: Layout) -> Scopes {
+        Scopes {
+            src_stages: src.stages,
+            src_access: src.access,
+            dst_stages: dst.stages,
+            dst_access: dst.access,
+            old_layout: self.layout,
+            new_layout,
+        }
+    }
+}
+
+/// Advances `state` by `next` and returns the barrier to be recorded in front of it, if one is needed.
+///
+/// * A read waits for the last write, unless exactly those accesses of those stages already see it.
+/// * A write waits for all readers since the last write, or for that write where nothing has read it.
+/// * A layout change is a write by the barrier itself, which later readers in other stages chain from.
+///
+/// `next.layout` of [`Layout::Undefined`] asks for no layout.
+pub(crate) fn transition(state: &mut State, next: Use) -> Option<Scopes> {
+    let relayout = next.layout != Layout::Undefined && next.layout != state.layout;
+    if relayout || next.is_write() { state.overwrite(next) } else { state.read(&next.into()) }
+}
+
+/// Advances `state` by some of several writes that touch disjoint parts of the resource, so that they need not wait for
+/// each other, only for what came before the first of them: readers, or an ordinary write.
+pub(crate) fn accumulate(state: &mut State, writes: &StageAccess) -> Option<Scopes> {
+    match state.epoch {
+        Some(epoch) if state.readers.is_empty() => state.continue_epoch(epoch, writes),
+        _ => state.start_epoch(writes),
+    }
+}
+
+/// Where one stage is enough to wait for or to chain through, the last one holds up the least.
+fn last_of(stages: Stages) -> Stages {
+    stages.iter().last().unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COMPUTE_WRITE: Use = on_buffer(Use::shader_write(Stages::COMPUTE));
+    const FRAGMENT_READ: Use = on_buffer(Use::shader_read(Stages::FRAGMENT));
+
+    const fn on_buffer(touch: Use) -> Use {
+        touch.with_layout(Layout::Undefined)
+    }
+
+    #[test]
+    fn fresh_buffer_needs_no_barrier() {
+        assert_eq!(transition(&mut State::default(), FRAGMENT_READ), None);
+        assert_eq!(transition(&mut State::default(), COMPUTE_WRITE), None);
+    }
+
+    #[test]
+    fn fresh_texture_waits_for_nothing_but_changes_its_layout() {
+        let scopes = transition(&mut State::default(), Use::color_target(false)).unwrap();
+        assert_eq!((scopes.src_stages, scopes.src_access), (Stages::empty(), Access::empty()));
+        assert_eq!((scopes.old_layout, scopes.new_layout), (Layout::Undefined, Layout::ColorTarget));
+    }
+
+    #[test]
+    fn second_reader_of_another_stage_only_waits_for_itself() {
+        let mut state = State::default();
+        transition(&mut state, COMPUTE_WRITE);
+        transition(&mut state, FRAGMENT_READ);
+        let both = on_buffer(Use::shader_read(Stages::FRAGMENT | Stages::RAY_TRACING));
+        let scopes = transition(&mut state, both).unwrap();
+        assert_eq!((scopes.src_stages, scopes.src_access), (Stages::COMPUTE, Access::SHADER_WRITE));
+        assert_eq!((scopes.dst_stages, scopes.dst_access), (Stages::RAY_TRACING, Access::SHADER_READ));
+        assert_eq!(transition(&mut state, both), None);
+    }
+
+    #[test]
+    fn write_after_reads_waits_for_all_readers_without_a_flush() {
+        let mut state = State::default();
+        transition(&mut state, COMPUTE_WRITE);
+        transition(&mut state, FRAGMENT_READ);
+        transition(&mut state, Use::index());
+        let scopes = transition(&mut state, on_buffer(Use::transfer_write())).unwrap();
+        assert_eq!(scopes.src_stages, Stages::FRAGMENT | Stages::VERTEX_INPUT);
+        assert_eq!(scopes.src_access, Access::empty());
+    }
+
+    #[test]
+    fn write_only_waits_for_the_last_of_readers_that_waited_for_each_other() {
+        let mut state = State::default();
+        transition(&mut state, on_buffer(Use::transfer_write()));
+        transition(&mut state, on_buffer(Use::transfer_read()));
+        let scopes = transition(&mut state, FRAGMENT_READ).unwrap();
+        assert_eq!((scopes.src_stages, scopes.src_access), (Stages::TRANSFER, Access::empty()));
+        assert_eq!(transition(&mut state, COMPUTE_WRITE).unwrap().src_stages, Stages::FRAGMENT);
+    }
+
+    #[test]
+    fn write_after_a_host_read_still_waits_for_the_device() {
+        let mut state = State::default();
+        transition(&mut state, COMPUTE_WRITE);
+        transition(&mut state, on_buffer(Use::host_read()));
+        let scopes = transition(&mut state, COMPUTE_WRITE).unwrap();
+        assert!(scopes.src_stages.contains(Stages::COMPUTE) && scopes.src_access == Access::SHADER_WRITE);
+    }
+
+    #[test]
+    fn reader_after_a_layout_change_chains_from_the_stages_that_waited_for_it() {
+        let mut state = State::default();
+        transition(&mut state, Use::color_target(false));
+        transition(&mut state, Use::shader_read(Stages::FRAGMENT));
+        let scopes = transition(&mut state, Use::shader_read(Stages::COMPUTE)).unwrap();
+        assert_eq!((scopes.src_stages, scopes.dst_stages), (Stages::FRAGMENT, Stages::COMPUTE));
+        assert_eq!(scopes.old_layout, scopes.new_layout);
+    }
+
+    #[test]
+    fn accumulated_writers_wait_for_readers_once_per_stage_and_never_for_each_other() {
+        let mut state = State::default();
+        let build = &Use::accel_build_write().into();
+        assert_eq!(accumulate(&mut state, build), None);
+        assert_eq!(accumulate(&mut state, build), None);
+        transition(&mut state, Use::accel_read(Stages::RAY_TRACING));
+        let scopes = accumulate(&mut state, build).unwrap();
+        assert_eq!((scopes.src_stages, scopes.dst_stages), (Stages::RAY_TRACING, Stages::ACCEL_BUILD));
+        assert_eq!(accumulate(&mut state, build), None);
+        let scopes = accumulate(&mut state, &Use::transfer_write().into()).unwrap();
+        assert_eq!((scopes.src_stages, scopes.dst_stages), (Stages::RAY_TRACING, Stages::TRANSFER));
+        let scopes = transition(&mut state, Use::accel_read(Stages::RAY_TRACING)).unwrap();
+        assert_eq!(scopes.src_stages, Stages::ACCEL_BUILD | Stages::TRANSFER);
+        assert_eq!(scopes.src_access, Access::ACCEL_WRITE | Access::TRANSFER_WRITE);
+    }
+}

@@ -1,0 +1,81 @@
+//! What the queue will have done to every resource, and the barriers between it and the next command buffer.
+
+use super::access::{Layout, StageAccess, Stages, Use};
+use super::batch::Barriers;
+use super::state::{Scopes, State, accumulate, transition};
+use super::subresource::{Cells, Subresources, TextureShape};
+use super::tracker::{IdMap, Local, Prefix, ResourceId, Tracker};
+
+/// State of every resource after everything submitted to one queue so far.
+#[derive(Debug, Default)]
+pub(crate) struct States {
+    buffers: IdMap<State>,
+    textures: IdMap<Cells<State>>,
+}
+
+impl States {
+    /// Appends a recorded command buffer. The barriers returned must be recorded in front of it, after everything
+    /// submitted before.
+    pub(crate) fn submit(&mut self, local: &Tracker) -> Barriers {
+        let mut out = Barriers::default();
+        for (id, local) in local.buffers() {
+            if let Some(scopes) = settle(self.buffers.entry(*id).or_default(), local) {
+                out.push_memory(&scopes);
+            }
+        }
+        for (id, local) in local.textures() {
+            let fresh = || Cells::new(local.shape(), State::default());
+            let queue = self.textures.entry(*id).or_insert_with(fresh);
+            for (range, scopes) in settle_texture(queue, local) {
+                out.push_image(*id, range, scopes);
+            }
+        }
+        out
+    }
+
+    /// Drops what is known about a destroyed resource.
+    pub(crate) fn forget(&mut self, id: ResourceId) {
+        self.buffers.remove(&id);
+        self.textures.remove(&id);
+    }
+
+    /// A texture comes from outside the queue with unknown contents, and its first use must wait for `stages`: those
+    /// which the submission's semaphore holds back, for an image acquired from a swapchain.
+    pub(crate) fn acquire_texture(&mut self, id: ResourceId, shape: TextureShape, stages: Stages) {
+        self.textures.insert(id, Cells::new(shape, State::discarded_after(stages)));
+    }
+}
+
+fn settle_texture(queue: &mut Cells<State>, local: &Cells<Local>) -> Vec<(Subresources, Scopes)> {
+    let whole = local.shape().whole();
+    match local.uniform() {
+        Some(local) => queue.step(whole, |state| settle(state, local)),
+        None => queue.step_each(whole, |state, mip, layer| settle(state, local.at(mip, layer))),
+    }
+}
+
+/// Advances `queue` by all that a command buffer does, and returns the barrier in front of the command buffer.
+fn settle(queue: &mut State, local: &Local) -> Option<Scopes> {
+    let scopes = match &local.prefix {
+        Prefix::Unused => return None,
+        Prefix::Write(write) => transition(queue, *write),
+        Prefix::Accumulated(writes) => settle_accumulated(queue, writes, local.past_prefix),
+        Prefix::Reads(layout, reads) if *layout != queue.layout() => {
+            transition(queue, Use { stages: reads.stages(), access: reads.access(), layout: *layout })
+        }
+        Prefix::Reads(_, reads) if local.past_prefix => queue.read_for_all(reads),
+        Prefix::Reads(_, reads) => queue.read(reads),
+    };
+    if local.past_prefix {
+        *queue = local.state;
+    }
+    scopes
+}
+
+/// What follows inside the command buffer waits for these writes only, but with them for the same scope of everything
+/// submitted before. An earlier accumulated write outside that scope must be chained to these.
+fn settle_accumulated(queue: &mut State, writes: &StageAccess, past_prefix: bool) -> Option<Scopes> {
+    let all = Use { stages: writes.stages(), access: writes.access(), layout: Layout::Undefined };
+    let chained = queue.is_read() || queue.write_is_within(all.stages, all.access);
+    if past_prefix && !chained { transition(queue, all) } else { accumulate(queue, writes) }
+}

@@ -1,0 +1,191 @@
+//! Values kept for each mip level and array layer of a texture, stored once while they are all equal.
+
+use super::state::Scopes;
+
+/// Mip levels and array layers of a texture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct TextureShape {
+    /// Mip levels, at least 1.
+    pub(crate) mips: u32,
+    /// Array layers, at least 1 (cube maps: 6 for each cube).
+    pub(crate) layers: u32,
+}
+
+impl TextureShape {
+    /// All mips of all layers.
+    pub(crate) fn whole(self) -> Subresources {
+        Subresources { base_mip: 0, mip_count: self.mips, base_layer: 0, layer_count: self.layers }
+    }
+
+    fn clamp(self, range: Subresources) -> Subresources {
+        let base_mip = range.base_mip.min(self.mips);
+        let base_layer = range.base_layer.min(self.layers);
+        Subresources {
+            base_mip,
+            mip_count: range.mip_count.min(self.mips - base_mip),
+            base_layer,
+            layer_count: range.layer_count.min(self.layers - base_layer),
+        }
+    }
+}
+
+/// A range of mip levels of a range of array layers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Subresources {
+    /// First mip level.
+    pub(crate) base_mip: u32,
+    /// Number of mip levels.
+    pub(crate) mip_count: u32,
+    /// First array layer.
+    pub(crate) base_layer: u32,
+    /// Number of array layers.
+    pub(crate) layer_count: u32,
+}
+
+impl Subresources {
+    fn is_empty(self) -> bool {
+        self.mip_count == 0 || self.layer_count == 0
+    }
+
+    /// Makes `self` one mip longer if `scopes` goes on at `mip` of the same single layer.
+    fn extend_mips(&mut self, mip: u32, layer: u32) -> bool {
+        let follows = self.base_mip + self.mip_count == mip;
+        let extends = follows && self.base_layer == layer && self.layer_count == 1;
+        self.mip_count += u32::from(extends);
+        extends
+    }
+
+    /// Joins `next` where it has the same mips and starts at the layer after the last.
+    fn extend_layers(&mut self, next: Self) -> bool {
+        let same_mips = self.base_mip == next.base_mip && self.mip_count == next.mip_count;
+        let extends = same_mips && self.base_layer + self.layer_count == next.base_layer;
+        self.layer_count += if extends { next.layer_count } else { 0 };
+        extends
+    }
+}
+
+/// One `T` for each subresource.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Cells<T> {
+    shape: TextureShape,
+    /// One value for all, or one for each subresource, layer by layer.
+    values: Vec<T>,
+}
+
+impl<T: Copy + PartialEq> Cells<T> {
+    /// The same value everywhere. A shape of zero counts as one.
+    pub(crate) fn new(shape: TextureShape, value: T) -> Self {
+        let shape = TextureShape { mips: shape.mips.max(1), layers: shape.layers.max(1) };
+        Self { shape, values: vec![value] }
+    }
+
+    /// Mips and layers.
+    pub(crate) fn shape(&self) -> TextureShape {
+        self.shape
+    }
+
+    /// The value all subresources share, if they do.
+    pub(crate) fn uniform(&self) -> Option<&T> {
+        if self.values.len() == 1 { self.values.first() } else { None }
+    }
+
+    /// Value of one subresource; positions outside the texture read its last one.
+    pub(crate) fn at(&self, mip: u32, layer: u32) -> &T {
+        &self.values[self.index(mip, layer)]
+    }
+
+    /// Whether `test` holds for any subresource in `range`.
+    pub(crate) fn any(&self, range: Subresources, mut test: impl FnMut(&T) -> bool) -> bool {
+        let range = self.shape.clamp(range);
+        match self.uniform() {
+            Some(value) => !range.is_empty() && test(value),
+            None => positions(range).any(|(mip, layer)| test(self.at(mip, layer))),
+        }
+    }
+
+    /// Steps all subresources of `range` alike and returns the barriers, those of neighbours joined where they are
+    /// equal.
+    pub(crate) fn step(
+        &mut self,
+        range: Subresources,
+        mut step: impl FnMut(&mut T) -> Option<Scopes>,
+    ) -> Vec<(Subresources, Scopes)> {
+        let whole = self.shape.whole();
+        match self.values.as_mut_slice() {
+            [value] if self.shape.clamp(range) == whole => {
+                step(value).map(|scopes| (whole, scopes)).into_iter().collect()
+            }
+            _ => self.step_each(range, |value, _, _| step(value)),
+        }
+    }
+
+    /// Like [`Cells::step`], where a step also depends on the mip and the layer.
+    pub(crate) fn step_each(
+        &mut self,
+        range: Subresources,
+        mut step: impl FnMut(&mut T, u32, u32) -> Option<Scopes>,
+    ) -> Vec<(Subresources, Scopes)> {
+        let range = self.shape.clamp(range);
+        if range.is_empty() {
+            return Vec::new();
+        }
+        self.split();
+        let mut runs = Vec::new();
+        for (mip, layer) in positions(range) {
+            let index = self.index(mip, layer);
+            if let Some(scopes) = step(&mut self.values[index], mip, layer) {
+                push_single(&mut runs, mip, layer, scopes);
+            }
+        }
+        self.join();
+        join_layers(runs)
+    }
+
+    /// Gives every subresource a value of its own.
+    fn split(&mut self) {
+        if let Some(&value) = self.uniform() {
+            let count = self.shape.mips as usize * self.shape.layers as usize;
+            self.values = vec![value; count];
+        }
+    }
+
+    fn join(&mut self) {
+        if self.values.windows(2).all(|pair| pair[0] == pair[1]) {
+            self.values.truncate(1);
+        }
+    }
+
+    fn index(&self, mip: u32, layer: u32) -> usize {
+        let index = layer as usize * self.shape.mips as usize + mip as usize;
+        index.min(self.values.len() - 1)
+    }
+}
+
+fn positions(range: Subresources) -> impl Iterator<Item = (u32, u32)> {
+    let layers = range.base_layer..range.base_layer + range.layer_count;
+    let mips = range.base_mip..range.base_mip + range.mip_count;
+    layers.flat_map(move |layer| mips.clone().map(move |mip| (mip, layer)))
+}
+
+fn push_single(runs: &mut Vec<(Subresources, Scopes)>, mip: u32, layer: u32, scopes: Scopes) {
+    if let Some((run, last)) = runs.last_mut()
+        && *last == scopes
+        && run.extend_mips(mip, layer)
+    {
+        return;
+    }
+    let single = Subresources { base_mip: mip, mip_count: 1, base_layer: layer, layer_count: 1 };
+    runs.push((single, scopes));
+}
+
+fn join_layers(runs: Vec<(Subresources, Scopes)>) -> Vec<(Subresources, Scopes)> {
+    let mut joined: Vec<(Subresources, Scopes)> = Vec::with_capacity(runs.len());
+    for (run, scopes) in runs {
+        let extended =
+            joined.iter_mut().rev().any(|(range, same)| *same == scopes && range.extend_layers(run));
+        if !extended {
+            joined.push((run, scopes));
+        }
+    }
+    joined
+}

@@ -1,0 +1,227 @@
+//! Barriers inside one command buffer, recorded without knowing what the queue did before.
+
+use std::collections::HashMap;
+use std::hash::{BuildHasherDefault, Hasher};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::access::{Layout, StageAccess, Use};
+use super::batch::Barriers;
+use super::state::{Scopes, State, accumulate, transition};
+use super::subresource::{Cells, Subresources, TextureShape};
+
+/// Identity of a buffer, a texture or a group of resources that is tracked as one; never reused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct ResourceId(pub(crate) u64);
+
+impl ResourceId {
+    /// An id nobody else has, and nobody gets again.
+    pub(crate) fn next() -> Self {
+        static LAST: AtomicU64 = AtomicU64::new(0);
+        Self(LAST.fetch_add(1, Ordering::Relaxed) + 1)
+    }
+}
+
+/// A map keyed by [`ResourceId`].
+pub(crate) type IdMap<T> = HashMap<ResourceId, T, BuildHasherDefault<IdHasher>>;
+
+/// Spreads ids, which are consecutive numbers chosen by the library itself, so that no defence against crafted keys is
+/// needed.
+#[derive(Default)]
+pub(crate) struct IdHasher(u64);
+
+impl Hasher for IdHasher {
+    fn write(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.write_u64(u64::from(byte) ^ self.0);
+        }
+    }
+
+    fn write_u64(&mut self, id: u64) {
+        self.0 = id.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    }
+
+    fn finish(&self) -> u64 {
+        self.0
+    }
+}
+
+/// How a command buffer uses a (sub)resource before anything in it must wait for anything else in it.
+///
+/// This is all that the queue has to prepare; see [`States::submit`](super::states::States::submit).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum Prefix {
+    /// Not used at all.
+    #[default]
+    Unused,
+    /// Reads in one layout.
+    Reads(Layout, StageAccess),
+    /// A write.
+    Write(Use),
+    /// Writes that do not wait for each other.
+    Accumulated(StageAccess),
+}
+
+/// One (sub)resource inside one command buffer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Local {
+    pub(super) prefix: Prefix,
+    /// Whether the command buffer has used it beyond the prefix, so that `state` depends on nothing before it.
+    pub(super) past_prefix: bool,
+    pub(super) state: State,
+}
+
+impl Local {
+    fn step(&mut self, next: Use) -> Option<Scopes> {
+        match &mut self.prefix {
+            Prefix::Unused => self.begin(next),
+            Prefix::Reads(layout, reads)
+                if !self.past_prefix && !next.is_write() && *layout == next.layout =>
+            {
+                reads.insert(next);
+            }
+            _ => self.past_prefix = true,
+        }
+        transition(&mut self.state, next)
+    }
+
+    fn begin(&mut self, next: Use) {
+        self.state = State::untouched_in(next.layout);
+        self.past_prefix = next.is_write();
+        self.prefix =
+            if next.is_write() { Prefix::Write(next) } else { Prefix::Reads(next.layout, next.into()) };
+    }
+
+    fn accumulate(&mut self, write: Use) -> Option<Scopes> {
+        match &mut self.prefix {
+            Prefix::Unused => self.prefix = Prefix::Accumulated(write.into()),
+            Prefix::Accumulated(all) if !self.past_prefix => {
+                all.insert(write);
+            }
+            _ => self.past_prefix = true,
+        }
+        accumulate(&mut self.state, &write.into())
+    }
+}
+
+/// Values in the order of their first use, found by id.
+#[derive(Debug, Clone)]
+struct Table<T> {
+    rows: IdMap<usize>,
+    values: Vec<(ResourceId, T)>,
+}
+
+impl<T> Table<T> {
+    fn get(&self, id: ResourceId) -> Option<&T> {
+        self.rows.get(&id).map(|&row| &self.values[row].1)
+    }
+
+    fn entry(&mut self, id: ResourceId, fresh: impl FnOnce() -> T) -> &mut T {
+        let row = *self.rows.entry(id).or_insert_with(|| {
+            self.values.push((id, fresh()));
+            self.values.len() - 1
+        });
+        &mut self.values[row].1
+    }
+
+    fn clear(&mut self) {
+        self.rows.clear();
+        self.values.clear();
+    }
+}
+
+impl<T> Default for Table<T> {
+    fn default() -> Self {
+        Self { rows: IdMap::default(), values: Vec::new() }
+    }
+}
+
+/// The uses of all resources by one command buffer, while it is recorded.
+///
+/// Barriers returned here only concern what the same command buffer did earlier. What it needs from the queue is kept
+/// for [`States::submit`](super::states::States::submit), so that command buffers can be recorded side by side and
+/// submitted in any order.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Tracker {
+    buffers: Table<Local>,
+    textures: Table<Cells<Local>>,
+}
+
+impl Tracker {
+    /// Forgets everything, for the next command buffer; keeps its memory.
+    pub(crate) fn clear(&mut self) {
+        self.buffers.clear();
+        self.textures.clear();
+    }
+
+    /// A command uses a buffer; adds the barrier that must stand in front of the command to `out`.
+    pub(crate) fn use_buffer(&mut self, id: ResourceId, next: Use, out: &mut Barriers) {
+        let next = next.with_layout(Layout::Undefined);
+        if let Some(scopes) = self.buffers.entry(id, Local::default).step(next) {
+            out.push_memory(&scopes);
+        }
+    }
+
+    /// A command writes a part of a resource that no other such command writes without a use in between, for example
+    /// builds of different acceleration structures, which are tracked as one resource.
+    pub(crate) fn accumulate_buffer(&mut self, id: ResourceId, write: Use, out: &mut Barriers) {
+        let write = write.with_layout(Layout::Undefined);
+        if let Some(scopes) = self.buffers.entry(id, Local::default).accumulate(write) {
+            out.push_memory(&scopes);
+        }
+    }
+
+    /// A command uses a part of a texture; adds the barriers that must stand in front of the command to `out`.
+    ///
+    /// `shape` is the same in every call for one texture; `subresources` outside of it are ignored.
+    pub(crate) fn use_texture(
+        &mut self,
+        id: ResourceId,
+        shape: TextureShape,
+        subresources: Subresources,
+        next: Use,
+        out: &mut Barriers,
+    ) {
+        let next = with_some_layout(next);
+        let cells = self.textures.entry(id, || Cells::new(shape, Local::default()));
+        for (range, scopes) in cells.step(subresources, |local| local.step(next)) {
+            out.push_image(id, range, scopes);
+        }
+    }
+
+    /// Whether [`use_buffer`](Self::use_buffer) would need a barrier, which cannot be recorded inside a render pass.
+    pub(crate) fn needs_barrier_buffer(&self, id: ResourceId, next: Use) -> bool {
+        let next = next.with_layout(Layout::Undefined);
+        self.buffers.get(id).is_some_and(|local| would_wait(local, next))
+    }
+
+    /// Whether [`use_texture`](Self::use_texture) would need a barrier, which cannot be recorded inside a render pass.
+    pub(crate) fn needs_barrier_texture(
+        &self,
+        id: ResourceId,
+        subresources: Subresources,
+        next: Use,
+    ) -> bool {
+        let next = with_some_layout(next);
+        self.textures.get(id).is_some_and(|cells| cells.any(subresources, |local| would_wait(local, next)))
+    }
+
+    /// Buffers in the order of their first use.
+    pub(super) fn buffers(&self) -> &[(ResourceId, Local)] {
+        &self.buffers.values
+    }
+
+    /// Textures in the order of their first use.
+    pub(super) fn textures(&self) -> &[(ResourceId, Cells<Local>)] {
+        &self.textures.values
+    }
+}
+
+fn would_wait(local: &Local, next: Use) -> bool {
+    let mut after = *local;
+    after.step(next).is_some()
+}
+
+/// A texture always needs a layout; one that every access allows stands in for none.
+fn with_some_layout(next: Use) -> Use {
+    if next.layout == Layout::Undefined { next.with_layout(Layout::General) } else { next }
+}

@@ -1,0 +1,25 @@
+//! The binding numbers of the one descriptor set, for Rust and for GLSL.
+//!
+//! The shader preamble and the check of foreign SPIR-V are both generated from these constants.
+
+/// The descriptor set that holds everything.
+pub(crate) const SET: u32 = 0;
+/// Sampled images: every texture, seen as 2D, array, 3D or cube through aliased declarations.
+pub(crate) const SAMPLED_IMAGES: u32 = 0;
+/// Samplers, with and without depth comparison.
+pub(crate) const SAMPLERS: u32 = 1;
+/// Storage images; a texture has the same index here as in [`SAMPLED_IMAGES`].
+pub(crate) const STORAGE_IMAGES: u32 = 2;
+/// Combined Y'CbCr image samplers; the number is reserved.
+pub(crate) const YCBCR: u32 = 3;
+/// Top-level acceleration structures.
+pub(crate) const ACCEL_STRUCTS: u32 = 4;
+
+/// Each binding with the words an error message and the preamble use for it.
+pub(crate) const BINDINGS: [(u32, &str, &str); 5] = [
+    (SAMPLED_IMAGES, "LVK_BINDING_SAMPLED_IMAGES", "sampled images"),
+    (SAMPLERS, "LVK_BINDING_SAMPLERS", "samplers"),
+    (STORAGE_IMAGES, "LVK_BINDING_STORAGE_IMAGES", "storage images"),
+    (YCBCR, "LVK_BINDING_YCBCR", "combined Y'CbCr samplers"),
+    (ACCEL_STRUCTS, "LVK_BINDING_ACCEL_STRUCTS", "top-level acceleration structures"),
+];

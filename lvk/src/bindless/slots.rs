@@ -1,0 +1,178 @@
+//! Places in one bindless descriptor array, and which of them have to be written.
+
+/// Whether a slot is taken, and whether it is already on the list of slots to write.
+#[derive(Debug, Clone, Copy, Default)]
+struct Mark {
+    taken: bool,
+    dirty: bool,
+}
+
+/// Slots of one descriptor array. Slot 0 is the dummy that shaders see in place of nothing; it is never handed out.
+#[derive(Debug)]
+pub(crate) struct Slots {
+    capacity: u32,
+    /// One for each slot ever used, the dummy first.
+    marks: Vec<Mark>,
+    free: Vec<u32>,
+    dirty: Vec<u32>,
+}
+
+impl Slots {
+    /// Slots `0..capacity`; the dummy is to be written first.
+    pub(crate) fn new(capacity: u32) -> Self {
+        let mut slots = Self { capacity, marks: Vec::new(), free: Vec::new(), dirty: Vec::new() };
+        if capacity > 0 {
+            slots.marks.push(Mark { taken: true, dirty: false });
+            slots.dirty(0);
+        }
+        slots
+    }
+
+    /// A slot that nobody uses, to be written; `None` if all are taken.
+    pub(crate) fn alloc(&mut self) -> Option<u32> {
+        let slot = match self.free.pop() {
+            Some(slot) => slot,
+            None => self.grow()?,
+        };
+        self.marks[slot as usize].taken = true;
+        self.dirty(slot);
+        Some(slot)
+    }
+
+    /// Gives a slot back, which is then to be written with the dummy. The caller has waited until the GPU no longer
+    /// reads it. A slot that is not taken, and the dummy, are left alone.
+    pub(crate) fn free(&mut self, slot: u32) {
+        if slot == 0 || !self.is_taken(slot) {
+            return;
+        }
+        self.dirty(slot);
+        self.marks[slot as usize].taken = false;
+        self.free.push(slot);
+    }
+
+    /// Notes that a taken slot has to be written again.
+    pub(crate) fn dirty(&mut self, slot: u32) {
+        match self.marks.get_mut(slot as usize) {
+            Some(mark) if mark.taken && !mark.dirty => mark.dirty = true,
+            _ => return,
+        }
+        self.dirty.push(slot);
+    }
+
+    /// The slots to write, in ascending order, each once; they count as written from now on.
+    pub(crate) fn take_dirty(&mut self) -> Vec<u32> {
+        let mut dirty = std::mem::take(&mut self.dirty);
+        dirty.sort_unstable();
+        for &slot in &dirty {
+            self.marks[slot as usize].dirty = false;
+        }
+        dirty
+    }
+
+    /// Whether somebody uses the slot; the dummy is always taken.
+    pub(crate) fn is_taken(&self, slot: u32) -> bool {
+        self.marks.get(slot as usize).is_some_and(|mark| mark.taken)
+    }
+
+    /// Number of slots taken, without the dummy.
+    pub(crate) fn len(&self) -> u32 {
+        (self.marks.len().saturating_sub(1) - self.free.len()) as u32
+    }
+
+    /// Number of slots, with the dummy.
+    pub(crate) fn capacity(&self) -> u32 {
+        self.capacity
+    }
+
+    fn grow(&mut self) -> Option<u32> {
+        let slot = u32::try_from(self.marks.len()).ok().filter(|slot| *slot < self.capacity)?;
+        self.marks.push(Mark::default());
+        Some(slot)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[derive(Debug, Clone)]
+    enum Op {
+        Alloc,
+        Free(u32),
+        Dirty(u32),
+        Take,
+    }
+
+    fn op() -> impl Strategy<Value = Op> {
+        let slot = || prop_oneof![9 => 0..14_u32, 1 => Just(u32::MAX)];
+        prop_oneof![
+            4 => Just(Op::Alloc),
+            2 => slot().prop_map(Op::Free),
+            2 => slot().prop_map(Op::Dirty),
+            1 => Just(Op::Take),
+        ]
+    }
+
+    proptest! {
+        #[test]
+        fn slots_behave_like_two_sets(
+            capacity in 0..12_u32, ops in prop::collection::vec(op(), 0..80)
+        ) {
+            let mut slots = Slots::new(capacity);
+            let mut taken: BTreeSet<u32> = BTreeSet::new();
+            let mut dirty: BTreeSet<u32> = (0..capacity.min(1)).collect();
+            for op in ops {
+                match op {
+                    Op::Alloc => match slots.alloc() {
+                        Some(slot) => {
+                            prop_assert!(slot > 0 && slot < capacity);
+                            prop_assert!(taken.insert(slot), "slot {} handed out twice", slot);
+                            dirty.insert(slot);
+                        }
+                        None => prop_assert_eq!(taken.len() as u32, capacity.saturating_sub(1)),
+                    },
+                    Op::Free(slot) => {
+                        slots.free(slot);
+                        if taken.remove(&slot) {
+                            dirty.insert(slot);
+                        }
+                    }
+                    Op::Dirty(slot) => {
+                        slots.dirty(slot);
+                        if taken.contains(&slot) || (slot == 0 && capacity > 0) {
+                            dirty.insert(slot);
+                        }
+                    }
+                    Op::Take => {
+                        prop_assert_eq!(slots.take_dirty(), dirty.iter().copied().collect::<Vec<_>>());
+                        dirty.clear();
+                    }
+                }
+                prop_assert_eq!(slots.len(), taken.len() as u32);
+                prop_assert!((0..14).all(|slot| slot == 0 || slots.is_taken(slot) == taken.contains(&slot)));
+            }
+        }
+    }
+
+    #[test]
+    fn dummy_is_written_first_and_never_given_away() {
+        let mut slots = Slots::new(3);
+        assert_eq!(slots.take_dirty(), [0]);
+        slots.free(0);
+        assert_eq!([slots.alloc(), slots.alloc(), slots.alloc()], [Some(1), Some(2), None]);
+        assert_eq!((slots.len(), slots.capacity()), (2, 3));
+    }
+
+    #[test]
+    fn slot_freed_twice_is_handed_out_once() {
+        let mut slots = Slots::new(3);
+        let slot = slots.alloc().unwrap();
+        slots.free(slot);
+        slots.free(slot);
+        assert_ne!(slots.alloc(), slots.alloc());
+    }
+}

@@ -1,0 +1,336 @@
+//! The one descriptor set: who sits in which slot, and which slots must be written before the next submission.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ash::vk;
+
+use super::layout;
+use super::slots::Slots;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+
+/// What a texture's slot shows to shaders.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct TextureViews {
+    pub(crate) sampled: Option<vk::ImageView>,
+    pub(crate) storage: Option<vk::ImageView>,
+}
+
+/// Objects that stand in every slot nobody owns.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Dummies {
+    pub(crate) sampled: vk::ImageView,
+    pub(crate) storage: vk::ImageView,
+    pub(crate) sampler: vk::Sampler,
+    pub(crate) tlas: Option<vk::AccelerationStructureKHR>,
+}
+
+/// The bindless descriptor set with its layout and pool.
+pub(crate) struct Bindless {
+    pub(crate) set_layout: vk::DescriptorSetLayout,
+    pub(crate) set: vk::DescriptorSet,
+    pool: vk::DescriptorPool,
+    entries: Mutex<Entries>,
+    gpu: Arc<Gpu>,
+}
+
+struct Entries {
+    dummies: Option<Dummies>,
+    textures: Array<TextureViews>,
+    samplers: Array<vk::Sampler>,
+    tlas: Array<vk::AccelerationStructureKHR>,
+}
+
+/// Slots of one kind and who owns them.
+struct Array<T> {
+    kind: &'static str,
+    slots: Slots,
+    owners: Vec<Option<T>>,
+}
+
+impl<T: Copy> Array<T> {
+    fn new(kind: &'static str, capacity: u32) -> Self {
+        Self { kind, slots: Slots::new(capacity), owners: vec![None; capacity as usize] }
+    }
+
+    fn reserve(&mut self, object: &str) -> Result<u32> {
+        let limit = u64::from(self.slots.capacity()).saturating_sub(1);
+        self.slots.alloc().ok_or_else(|| Error::LimitExceeded {
+            object: object.to_owned(),
+            what: self.kind,
+            requested: limit + 1,
+            limit,
+        })
+    }
+
+    fn set(&mut self, slot: u32, owner: Option<T>) {
+        if let Some(entry) = self.owners.get_mut(slot as usize) {
+            *entry = owner;
+            self.slots.dirty(slot);
+        }
+    }
+
+    fn take_dirty(&mut self) -> Vec<(u32, Option<T>)> {
+        let dirty = self.slots.take_dirty();
+        dirty.into_iter().map(|slot| (slot, self.owners.get(slot as usize).copied().flatten())).collect()
+    }
+}
+
+impl Bindless {
+    pub(crate) fn new(gpu: &Arc<Gpu>, max_textures: u32) -> Result<Self> {
+        let limits = &gpu.caps.limits;
+        let textures = max_textures.clamp(2, limits.max_bindless_textures.max(2));
+        let counts = [
+            (layout::SAMPLED_IMAGES, vk::DescriptorType::SAMPLED_IMAGE, textures),
+            (layout::SAMPLERS, vk::DescriptorType::SAMPLER, limits.max_bindless_samplers),
+            (layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE, textures),
+            (layout::ACCEL_STRUCTS, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, tlas_count(gpu)),
+        ];
+        let set_layout = create_layout(gpu, &counts)?;
+        let (pool, set) = match create_set(gpu, set_layout, &counts) {
+            Ok(made) => made,
+            Err(error) => {
+                // SAFETY: the layout was just created and nothing uses it.
+                unsafe { gpu.device.destroy_descriptor_set_layout(set_layout, None) };
+                return Err(error);
+            }
+        };
+        let entries = Entries {
+            dummies: None,
+            textures: Array::new("number of textures", textures),
+            samplers: Array::new("number of samplers", limits.max_bindless_samplers),
+            tlas: Array::new("number of top-level acceleration structures", tlas_count(gpu)),
+        };
+        Ok(Self { set_layout, set, pool, entries: Mutex::new(entries), gpu: Arc::clone(gpu) })
+    }
+
+    /// Puts the dummies into every slot.
+    pub(crate) fn fill(&self, dummies: Dummies) {
+        let mut entries = self.lock();
+        entries.dummies = Some(dummies);
+        for slot in 0..entries.textures.owners.len() {
+            entries.textures.slots.dirty(slot as u32);
+        }
+        for slot in 0..entries.samplers.owners.len() {
+            entries.samplers.slots.dirty(slot as u32);
+        }
+        for slot in 0..entries.tlas.owners.len() {
+            entries.tlas.slots.dirty(slot as u32);
+        }
+    }
+
+    pub(crate) fn reserve_texture(&self, name: &str) -> Result<u32> {
+        self.lock().textures.reserve(name)
+    }
+
+    pub(crate) fn reserve_sampler(&self, name: &str) -> Result<u32> {
+        self.lock().samplers.reserve(name)
+    }
+
+    pub(crate) fn reserve_tlas(&self, name: &str) -> Result<u32> {
+        self.lock().tlas.reserve(name)
+    }
+
+    pub(crate) fn set_texture(&self, slot: u32, views: TextureViews) {
+        self.lock().textures.set(slot, Some(views));
+    }
+
+    pub(crate) fn set_sampler(&self, slot: u32, sampler: vk::Sampler) {
+        self.lock().samplers.set(slot, Some(sampler));
+    }
+
+    pub(crate) fn set_tlas(&self, slot: u32, tlas: vk::AccelerationStructureKHR) {
+        self.lock().tlas.set(slot, Some(tlas));
+    }
+
+    /// Puts the dummy back into a slot whose owner the GPU is done with, and lets the slot be taken again.
+    pub(crate) fn free_texture(&self, slot: u32) {
+        let mut entries = self.lock();
+        entries.textures.set(slot, None);
+        entries.textures.slots.free(slot);
+    }
+
+    /// As [`free_texture`](Self::free_texture).
+    pub(crate) fn free_sampler(&self, slot: u32) {
+        let mut entries = self.lock();
+        entries.samplers.set(slot, None);
+        entries.samplers.slots.free(slot);
+    }
+
+    /// As [`free_texture`](Self::free_texture).
+    pub(crate) fn free_tlas(&self, slot: u32) {
+        let mut entries = self.lock();
+        entries.tlas.set(slot, None);
+        entries.tlas.slots.free(slot);
+    }
+
+    /// Writes the dirty slots. Called before every submission.
+    pub(crate) fn flush(&self) {
+        let mut entries = self.lock();
+        let Some(dummies) = entries.dummies else { return };
+        let (mut sampled, mut storage) = (Runs::default(), Runs::default());
+        for (slot, views) in entries.textures.take_dirty() {
+            let views = views.unwrap_or(TextureViews { sampled: None, storage: None });
+            let read = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+            sampled.push(slot, image(views.sampled.unwrap_or(dummies.sampled), read));
+            storage.push(slot, image(views.storage.unwrap_or(dummies.storage), vk::ImageLayout::GENERAL));
+        }
+        let mut samplers = Runs::default();
+        for (slot, owner) in entries.samplers.take_dirty() {
+            let sampler = owner.unwrap_or(dummies.sampler);
+            samplers.push(slot, vk::DescriptorImageInfo::default().sampler(sampler));
+        }
+        let mut tlas = Runs::default();
+        for (slot, owner) in entries.tlas.take_dirty() {
+            if let Some(raw) = owner.or(dummies.tlas) {
+                tlas.push(slot, raw);
+            }
+        }
+        self.write(&sampled, layout::SAMPLED_IMAGES, vk::DescriptorType::SAMPLED_IMAGE);
+        self.write(&storage, layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE);
+        self.write(&samplers, layout::SAMPLERS, vk::DescriptorType::SAMPLER);
+        self.write_tlas(&tlas);
+    }
+
+    fn write(&self, runs: &Runs<vk::DescriptorImageInfo>, binding: u32, ty: vk::DescriptorType) {
+        let writes: Vec<_> = runs
+            .iter()
+            .map(|(first, infos)| self.write_at(binding, first).descriptor_type(ty).image_info(infos))
+            .collect();
+        if !writes.is_empty() {
+            // SAFETY: the views and samplers are alive; slots in use by the GPU are not among the dirty ones, as
+            // slots are only rewritten when the timeline has passed their last use. The lock serialises updates.
+            unsafe { self.gpu.device.update_descriptor_sets(&writes, &[]) };
+        }
+    }
+
+    fn write_tlas(&self, runs: &Runs<vk::AccelerationStructureKHR>) {
+        for (first, raw) in runs.iter() {
+            let mut structures =
+                vk::WriteDescriptorSetAccelerationStructureKHR::default().acceleration_structures(raw);
+            let mut write = self
+                .write_at(layout::ACCEL_STRUCTS, first)
+                .descriptor_type(vk::DescriptorType::ACCELERATION_STRUCTURE_KHR)
+                .push_next(&mut structures);
+            write.descriptor_count = raw.len() as u32;
+            // SAFETY: as in `write`.
+            unsafe { self.gpu.device.update_descriptor_sets(&[write], &[]) };
+        }
+    }
+
+    fn write_at<'a>(&self, binding: u32, first: u32) -> vk::WriteDescriptorSet<'a> {
+        vk::WriteDescriptorSet::default().dst_set(self.set).dst_binding(binding).dst_array_element(first)
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Entries> {
+        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Bindless {
+    fn drop(&mut self) {
+        // SAFETY: the context has waited for the GPU before its parts are dropped.
+        unsafe {
+            self.gpu.device.destroy_descriptor_pool(self.pool, None);
+            self.gpu.device.destroy_descriptor_set_layout(self.set_layout, None);
+        }
+    }
+}
+
+/// Descriptors of neighbouring slots, so that one write covers many.
+struct Runs<T> {
+    infos: Vec<T>,
+    starts: Vec<(u32, usize)>,
+    next: u32,
+}
+
+impl<T> Default for Runs<T> {
+    fn default() -> Self {
+        Self { infos: Vec::new(), starts: Vec::new(), next: 0 }
+    }
+}
+
+impl<T> Runs<T> {
+    /// Adds a slot; slots come in rising order.
+    fn push(&mut self, slot: u32, info: T) {
+        if self.starts.is_empty() || slot != self.next {
+            self.starts.push((slot, self.infos.len()));
+        }
+        self.infos.push(info);
+        self.next = slot + 1;
+    }
+
+    fn iter(&self) -> impl Iterator<Item = (u32, &[T])> {
+        let ends = self.starts.iter().skip(1).map(|(_, start)| *start).chain([self.infos.len()]);
+        self.starts.iter().zip(ends).map(|((slot, start), end)| (*slot, &self.infos[*start..end]))
+    }
+}
+
+fn image(view: vk::ImageView, layout: vk::ImageLayout) -> vk::DescriptorImageInfo {
+    vk::DescriptorImageInfo::default().image_view(view).image_layout(layout)
+}
+
+fn tlas_count(gpu: &Gpu) -> u32 {
+    if gpu.accel.is_some() { gpu.caps.limits.max_bindless_tlas } else { 0 }
+}
+
+type Count = (u32, vk::DescriptorType, u32);
+
+fn create_layout(gpu: &Gpu, counts: &[Count]) -> Result<vk::DescriptorSetLayout> {
+    let used: Vec<_> = counts.iter().filter(|(_, _, count)| *count > 0).collect();
+    let bindings: Vec<_> = used
+        .iter()
+        .map(|(binding, ty, count)| {
+            vk::DescriptorSetLayoutBinding::default()
+                .binding(*binding)
+                .descriptor_type(*ty)
+                .descriptor_count(*count)
+                .stage_flags(vk::ShaderStageFlags::ALL)
+        })
+        .collect();
+    let flags = vk::DescriptorBindingFlags::UPDATE_AFTER_BIND
+        | vk::DescriptorBindingFlags::UPDATE_UNUSED_WHILE_PENDING
+        | vk::DescriptorBindingFlags::PARTIALLY_BOUND;
+    let flags = vec![flags; bindings.len()];
+    let mut flags = vk::DescriptorSetLayoutBindingFlagsCreateInfo::default().binding_flags(&flags);
+    let info = vk::DescriptorSetLayoutCreateInfo::default()
+        .flags(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)
+        .bindings(&bindings)
+        .push_next(&mut flags);
+    // SAFETY: the counts are within the device's limits.
+    unsafe { gpu.device.create_descriptor_set_layout(&info, None) }
+        .map_err(Error::vulkan("vkCreateDescriptorSetLayout"))
+}
+
+fn create_set(
+    gpu: &Gpu,
+    layout: vk::DescriptorSetLayout,
+    counts: &[Count],
+) -> Result<(vk::DescriptorPool, vk::DescriptorSet)> {
+    let sizes: Vec<_> = counts
+        .iter()
+        .filter(|(_, _, count)| *count > 0)
+        .map(|(_, ty, count)| vk::DescriptorPoolSize::default().ty(*ty).descriptor_count(*count))
+        .collect();
+    let info = vk::DescriptorPoolCreateInfo::default()
+        .flags(vk::DescriptorPoolCreateFlags::UPDATE_AFTER_BIND)
+        .max_sets(1)
+        .pool_sizes(&sizes);
+    // SAFETY: the description is valid.
+    let pool = unsafe { gpu.device.create_descriptor_pool(&info, None) }
+        .map_err(Error::vulkan("vkCreateDescriptorPool"))?;
+    let layouts = [layout];
+    let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
+    // SAFETY: the pool is new and has room for this one set.
+    match unsafe { gpu.device.allocate_descriptor_sets(&info) } {
+        Ok(sets) => {
+            gpu.name(sets[0], "bindless set");
+            Ok((pool, sets[0]))
+        }
+        Err(result) => {
+            // SAFETY: nothing was allocated from the pool.
+            unsafe { gpu.device.destroy_descriptor_pool(pool, None) };
+            Err(Error::vulkan("vkAllocateDescriptorSets")(result))
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Builds of acceleration structures.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::CommandBuffer;
+use crate::accel::AccelStruct;
+use crate::accel::build::{BuildInput, instance_bytes};
+use crate::accel::instance::{Instances, TlasInstance};
+use crate::accel::scratch::{ScratchBatch, aligned_scratch_address, plan_scratch};
+use crate::accel::structure::{AccelKind, BuildMode};
+use crate::barrier::{Stages, Use};
+use crate::error::{Error, Result, check_limit};
+use crate::handle::AccelStructHandle;
+use crate::resource::Buffer;
+use crate::shared::Garbage;
+
+/// Addresses of instances must be a multiple of this.
+const INSTANCE_ALIGNMENT: u64 = 16;
+
+/// One build to record.
+struct Build {
+    target: Arc<AccelStruct>,
+    input: BuildInput,
+    mode: BuildMode,
+    scratch_bytes: u64,
+    reads: Vec<Arc<Buffer>>,
+}
+
+impl CommandBuffer {
+    /// Builds bottom-level structures again from their buffers, or refits them
+    /// (`vkCmdBuildAccelerationStructuresKHR`). Contents may have changed, counts may not.
+    ///
+    /// Rays traced later in the same command buffer, or in later submissions, see the result.
+    pub fn build_blas(&mut self, structures: &[AccelStructHandle], mode: BuildMode) -> Result<()> {
+        let found: Result<Vec<_>> =
+            structures.iter().map(|handle| self.shared.store.accel_structs.get(*handle)).collect();
+        let found = found?;
+        for (index, target) in found.iter().enumerate() {
+            if found[..index].iter().any(|other| other.id == target.id) {
+                return Err(Error::usage(&target.name, "the structure is listed twice in one build"));
+            }
+        }
+        self.build_all(&found, mode)
+    }
+
+    /// As [`build_blas`](Self::build_blas), by object.
+    pub(crate) fn build_all(&mut self, structures: &[Arc<AccelStruct>], mode: BuildMode) -> Result<()> {
+        let builds: Result<Vec<_>> = structures.iter().map(|target| self.plan_blas(target, mode)).collect();
+        self.record_builds(&builds?)
+    }
+
+    /// Shows other instances in a top-level structure: at most its capacity, and for a refit as many as before.
+    pub fn update_tlas(
+        &mut self,
+        tlas: AccelStructHandle,
+        instances: &[TlasInstance],
+        mode: BuildMode,
+    ) -> Result<()> {
+        let target = self.shared.store.accel_structs.get(tlas)?;
+        self.update_tlas_object(&target, instances, mode)
+    }
+
+    /// As [`update_tlas`](Self::update_tlas), by object.
+    pub(crate) fn update_tlas_object(
+        &mut self,
+        target: &Arc<AccelStruct>,
+        instances: &[TlasInstance],
+        mode: BuildMode,
+    ) -> Result<()> {
+        let tlas = target.tlas()?;
+        let count = instances.len() as u64;
+        check_limit(&target.name, "instance count", count, tlas.capacity.into())?;
+        let count = count as u32;
+        if mode == BuildMode::Refit && tlas.contents().instance_count != Some(count) {
+            let message = format!("a refit keeps the number of instances; {count} are new, so rebuild");
+            return Err(Error::usage(&target.name, message));
+        }
+        let scratch_bytes = target.scratch_bytes(mode)?;
+        let shared = Arc::clone(&self.shared);
+        let converted =
+            Instances::convert(&target.name, instances, |handle| shared.store.accel_structs.get(handle))?;
+        let bytes = instance_bytes(count.max(1));
+        let region =
+            shared.staging.write_with(bytes, INSTANCE_ALIGNMENT, self.recording.sequence, |staged| {
+                let raw: &[u8] = bytemuck::cast_slice(&converted.raw);
+                staged[..raw.len()].copy_from_slice(raw);
+            })?;
+        self.retire_temporary(region.temporary);
+        let input = BuildInput::tlas(target.flags, region.address, count);
+        let build = Build { target: Arc::clone(target), input, mode, scratch_bytes, reads: Vec::new() };
+        self.record_builds(&[build])?;
+        let mut contents = tlas.contents();
+        contents.instance_count = Some(count);
+        let before = std::mem::replace(&mut contents.blas, converted.blas);
+        before.into_iter().for_each(|blas| shared.retire(Garbage::Kept(blas)));
+        Ok(())
+    }
+
+    /// Keeps a buffer of its own that the staging ring had no room for until the GPU is done with it.
+    pub(super) fn retire_temporary(&self, temporary: Option<Arc<Buffer>>) {
+        if let Some(buffer) = temporary {
+            self.shared.retire(Garbage::Buffer(buffer));
+        }
+    }
+
+    fn plan_blas(&self, target: &Arc<AccelStruct>, mode: BuildMode) -> Result<Build> {
+        let blas = target.blas()?;
+        let scratch_bytes = target.scratch_bytes(mode)?;
+        let find = |handle| self.shared.store.buffers.get(handle);
+        let transforms = blas.transforms.as_ref().map(|buffer| buffer.address);
+        let input = BuildInput::blas(
+            &self.shared.gpu,
+            &target.name,
+            &blas.geometries,
+            target.flags,
+            &find,
+            transforms,
+        )?;
+        let reads: Result<Vec<_>> =
+            blas.geometries.iter().flat_map(|geometry| geometry.buffers()).map(find).collect();
+        Ok(Build { target: Arc::clone(target), input, mode, scratch_bytes, reads: reads? })
+    }
+
+    fn record_builds(&mut self, builds: &[Build]) -> Result<()> {
+        let alignment = self.shared.gpu.caps.limits.scratch_alignment.into();
+        let sizes: Vec<_> = builds.iter().map(|build| build.scratch_bytes).collect();
+        for batch in plan_scratch(&sizes, alignment, self.shared.scratch_budget_bytes) {
+            self.record_batch(&builds[batch.builds.clone()], &batch, alignment)?;
+        }
+        Ok(())
+    }
+
+    /// Records builds that share the scratch buffer without overlapping in it.
+    fn record_batch(&mut self, builds: &[Build], batch: &ScratchBatch, alignment: u64) -> Result<()> {
+        let shared = Arc::clone(&self.shared);
+        let (scratch, replaced) = shared.scratch.get(&shared.gpu, batch.bytes)?;
+        self.retire_temporary(replaced);
+        self.use_buffer(&scratch, Use::accel_build_write());
+        builds.iter().for_each(|build| self.use_build(build));
+        self.flush();
+        let base = aligned_scratch_address(scratch.address, alignment);
+        let infos: Vec<_> = builds
+            .iter()
+            .zip(&batch.offsets)
+            .map(|(build, offset)| build.input.build(&build.target, build.mode, base + offset))
+            .collect();
+        let ranges: Vec<&[vk::AccelerationStructureBuildRangeInfoKHR]> =
+            builds.iter().map(|build| &build.input.ranges[..]).collect();
+        let ext = shared.gpu.accel()?;
+        // SAFETY: inputs, structures and scratch memory are alive, checked, aligned and large enough; barriers keep
+        // them apart from other commands.
+        unsafe { ext.cmd_build_acceleration_structures(self.raw(), &infos, &ranges) };
+        Ok(())
+    }
+
+    fn use_build(&mut self, build: &Build) {
+        let (all_blas, all_tlas) = (self.shared.all_blas, self.shared.all_tlas);
+        self.uses.id(build.target.id, Use::accel_build_write());
+        match build.target.kind {
+            AccelKind::Blas(_) => {
+                self.uses.accumulate(all_blas, Use::accel_build_write());
+            }
+            AccelKind::Tlas(_) => {
+                self.uses.id(all_blas, Use::accel_read(Stages::ACCEL_BUILD));
+                self.uses.accumulate(all_tlas, Use::accel_build_write());
+            }
+        }
+        for buffer in &build.reads {
+            self.use_buffer(buffer, Use::accel_build_input());
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! The bindless set, pipelines and push constants of a command buffer.
+
+use ash::vk;
+
+use super::CommandBuffer;
+use crate::error::{Error, Result};
+
+/// What is known of the push constants: how many bytes were pushed, and what the last bound pipeline wants.
+#[derive(Debug, Default)]
+pub(super) struct PushConstants {
+    pushed_bytes: u32,
+    wanted: Option<(String, u32)>,
+}
+
+impl PushConstants {
+    /// Rust structs end on their alignment, GLSL blocks on their last member; 16 bytes is the largest alignment.
+    const TAIL_BYTES: u32 = 16;
+
+    fn check(&self, offset: u32, size: u32) -> Result<()> {
+        let Some((pipeline, expected)) = &self.wanted else {
+            return Err(Error::usage("push_constants", "bind a pipeline first"));
+        };
+        let aligned = offset.is_multiple_of(4) && size.is_multiple_of(4) && size > 0;
+        let end = offset.checked_add(size);
+        let fits = end.is_some_and(|end| end <= expected.next_multiple_of(Self::TAIL_BYTES));
+        let whole = offset > 0 || size >= *expected;
+        if aligned && fits && whole && *expected > 0 {
+            return Ok(());
+        }
+        Err(Error::PushConstants { pipeline: pipeline.clone(), expected: *expected, offset, size })
+    }
+
+    /// Fails if the pipeline reads bytes that were never pushed.
+    fn check_pushed(&self, pipeline: &str, expected: u32) -> Result<()> {
+        if self.pushed_bytes >= expected {
+            return Ok(());
+        }
+        let message = format!(
+            "its shaders read {expected} bytes of push constants, but {} were pushed",
+            self.pushed_bytes
+        );
+        Err(Error::usage(pipeline, message))
+    }
+}
+
+impl CommandBuffer {
+    /// Sets the push constants of the pipeline bound last, for this and later pipelines.
+    ///
+    /// `constants` must match the shader's block, up to padding at the end (`vkCmdPushConstants`).
+    pub fn push_constants<T: bytemuck::NoUninit>(&mut self, constants: &T) -> Result<()> {
+        self.push_constant_bytes(0, bytemuck::bytes_of(constants))
+    }
+
+    /// Sets part of the push constants: `bytes` from `offset` on, both multiples of 4.
+    pub fn push_constant_bytes(&mut self, offset: u32, bytes: &[u8]) -> Result<()> {
+        let size = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
+        self.push_constants.check(offset, size)?;
+        let limit = self.shared.layout.push_constant_bytes;
+        let bytes = &bytes[..bytes.len().min(limit.saturating_sub(offset) as usize)];
+        let shared = &self.shared;
+        // SAFETY: the layout is alive and the range lies inside its push constants.
+        unsafe {
+            let stages = vk::ShaderStageFlags::ALL;
+            shared.gpu.device.cmd_push_constants(self.raw(), shared.layout.raw, stages, offset, bytes);
+        }
+        let pushed = &mut self.push_constants.pushed_bytes;
+        *pushed = (*pushed).max(offset + size);
+        Ok(())
+    }
+
+    /// Binds a pipeline, and the bindless set the first time at its bind point.
+    pub(super) fn bind(
+        &mut self,
+        point: vk::PipelineBindPoint,
+        pipeline: vk::Pipeline,
+        name: &str,
+        push_constant_bytes: u32,
+    ) {
+        let (shared, raw) = (&self.shared, self.raw());
+        // SAFETY: the pipeline and the set are alive and share one layout.
+        unsafe {
+            shared.gpu.device.cmd_bind_pipeline(raw, point, pipeline);
+            if !self.sets_bound.contains(&point) {
+                let sets = [shared.bindless.set];
+                shared.gpu.device.cmd_bind_descriptor_sets(raw, point, shared.layout.raw, 0, &sets, &[]);
+                self.sets_bound.push(point);
+            }
+        }
+        self.push_constants.wanted = Some((name.to_owned(), push_constant_bytes));
+    }
+
+    /// Fails if a pipeline about to run reads bytes that were never pushed.
+    pub(super) fn check_pushed(&self, pipeline: &str, expected: u32) -> Result<()> {
+        self.push_constants.check_pushed(pipeline, expected)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bound(expected: u32) -> PushConstants {
+        PushConstants { pushed_bytes: 0, wanted: Some(("p".to_owned(), expected)) }
+    }
+
+    #[test]
+    fn a_push_must_match_the_block_up_to_padding() {
+        assert!(bound(40).check(0, 40).is_ok());
+        assert!(bound(40).check(0, 48).is_ok());
+        assert!(bound(40).check(36, 4).is_ok());
+        assert!(matches!(bound(40).check(0, 36), Err(Error::PushConstants { expected: 40, .. })));
+        assert!(bound(40).check(0, 52).is_err());
+        assert!(bound(40).check(48, 4).is_err());
+        assert!(bound(40).check(0, 42).is_err());
+        assert!(bound(40).check(u32::MAX - 3, 4).is_err());
+        assert!(bound(0).check(0, 4).is_err());
+        assert!(PushConstants::default().check(0, 4).is_err());
+    }
+
+    #[test]
+    fn a_pipeline_does_not_run_on_constants_nobody_pushed() {
+        let pushed = PushConstants { pushed_bytes: 16, wanted: None };
+        assert!(pushed.check_pushed("p", 16).is_ok());
+        assert!(pushed.check_pushed("p", 20).is_err());
+    }
+}

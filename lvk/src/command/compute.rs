@@ -1,0 +1,85 @@
+//! Dispatches.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::CommandBuffer;
+use super::dependencies::Dependencies;
+use crate::barrier::{Stages, Use};
+use crate::error::{Error, Result, check_limit};
+use crate::handle::{BufferHandle, ComputePipelineHandle};
+use crate::pipeline::ComputePipeline;
+use crate::resource::buffer::BufferUsage;
+
+impl CommandBuffer {
+    /// Binds a compute pipeline for the dispatches that follow (`vkCmdBindPipeline`).
+    pub fn bind_compute_pipeline(&mut self, pipeline: ComputePipelineHandle) -> Result<()> {
+        let pipeline = self.shared.store.compute_pipelines.get(pipeline)?;
+        let point = vk::PipelineBindPoint::COMPUTE;
+        self.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
+        self.compute = Some(pipeline);
+        Ok(())
+    }
+
+    /// Runs `groups` workgroups along x, y and z (`vkCmdDispatch`).
+    pub fn dispatch(&mut self, groups: [u32; 3], dependencies: &Dependencies<'_>) -> Result<()> {
+        let pipeline = self.ready_compute()?;
+        let limits = self.shared.gpu.caps.limits.max_dispatch_groups;
+        for (count, limit) in groups.into_iter().zip(limits) {
+            check_limit(&pipeline.name, "workgroup count", count.into(), limit.into())?;
+        }
+        self.flush_after(|cmd| cmd.use_compute(&pipeline, dependencies))?;
+        // SAFETY: a compute pipeline is bound and the counts are within the limits.
+        unsafe { self.shared.gpu.device.cmd_dispatch(self.raw(), groups[0], groups[1], groups[2]) };
+        Ok(())
+    }
+
+    /// Runs as many workgroups as three `u32` at `offset` in `arguments` say (`vkCmdDispatchIndirect`).
+    ///
+    /// `arguments` needs [`BufferUsage::INDIRECT`]; `offset` is a multiple of 4.
+    pub fn dispatch_indirect(
+        &mut self,
+        arguments: BufferHandle,
+        offset: u64,
+        dependencies: &Dependencies<'_>,
+    ) -> Result<()> {
+        const ARGUMENT_BYTES: u64 = 12;
+        let pipeline = self.ready_compute()?;
+        let buffer = self.shared.store.buffers.get(arguments)?;
+        check_arguments(&buffer, offset, ARGUMENT_BYTES)?;
+        self.flush_after(|cmd| {
+            cmd.use_buffer(&buffer, Use::indirect());
+            cmd.use_compute(&pipeline, dependencies)
+        })?;
+        // SAFETY: a compute pipeline is bound and the arguments lie inside the buffer.
+        unsafe { self.shared.gpu.device.cmd_dispatch_indirect(self.raw(), buffer.raw, offset) };
+        Ok(())
+    }
+
+    fn ready_compute(&self) -> Result<Arc<ComputePipeline>> {
+        let pipeline = self.compute.clone();
+        let pipeline = pipeline.ok_or_else(|| Error::usage("dispatch", "bind a compute pipeline first"))?;
+        self.check_pushed(&pipeline.name, pipeline.push_constant_bytes)?;
+        Ok(pipeline)
+    }
+
+    fn use_compute(&mut self, pipeline: &ComputePipeline, dependencies: &Dependencies<'_>) -> Result<()> {
+        if pipeline.ray_query {
+            self.use_structures(Stages::COMPUTE);
+        }
+        self.use_dependencies(dependencies, Stages::COMPUTE)
+    }
+}
+
+/// Fails unless indirect arguments of `bytes` lie at `offset`.
+pub(super) fn check_arguments(buffer: &crate::resource::Buffer, offset: u64, bytes: u64) -> Result<()> {
+    buffer.check_usage(BufferUsage::INDIRECT)?;
+    if !offset.is_multiple_of(4) {
+        return Err(Error::usage(
+            &buffer.name,
+            format!("the offset {offset} of the arguments is no multiple of 4"),
+        ));
+    }
+    buffer.check_range(offset, bytes)
+}

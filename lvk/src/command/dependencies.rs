@@ -1,0 +1,24 @@
+//! What a command reaches through the bindless set or by address, beyond what its arguments say.
+
+use crate::handle::{AccelStructHandle, BufferHandle, TextureHandle};
+
+/// Names resources a draw, dispatch or trace reaches bindlessly, so that the library can place barriers.
+///
+/// Nothing needs to be declared for resources that were only uploaded: they are readable everywhere. Declare what an
+/// earlier command wrote (storage images, buffers, render targets now sampled) and what this command writes.
+/// Acceleration structures need no declaration in dispatches and traces: the library reads from the shaders whether
+/// they trace rays.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Dependencies<'a> {
+    /// Textures that are sampled or fetched.
+    pub sampled_images: &'a [TextureHandle],
+    /// Textures that are written or read as storage images.
+    pub storage_images: &'a [TextureHandle],
+    /// Buffers that are written, or both read and written.
+    pub buffers: &'a [BufferHandle],
+    /// Buffers that are only read.
+    pub read_buffers: &'a [BufferHandle],
+    /// Acceleration structures that a render pass's shaders query although they were built earlier in the same
+    /// command buffer.
+    pub acceleration_structures: &'a [AccelStructHandle],
+}

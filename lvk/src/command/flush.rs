@@ -1,0 +1,90 @@
+//! From declared uses to recorded barriers.
+
+use std::sync::Arc;
+
+use super::CommandBuffer;
+use super::dependencies::Dependencies;
+use crate::barrier::{Stages, Subresources, Use};
+use crate::error::Result;
+use crate::resource::texture::TextureUsage;
+use crate::resource::{Buffer, Texture};
+use crate::submit::emit::emit;
+
+impl CommandBuffer {
+    /// The next command uses a buffer.
+    pub(super) fn use_buffer(&mut self, buffer: &Buffer, next: Use) {
+        self.uses.buffer(buffer, next);
+        if next.is_write() && buffer.memory.mapped() && !self.host_reads.contains(&buffer.id) {
+            self.host_reads.push(buffer.id);
+        }
+    }
+
+    /// The next command uses part of a texture.
+    pub(super) fn use_texture(
+        &mut self,
+        texture: &Arc<Texture>,
+        part: Subresources,
+        next: Use,
+    ) -> Result<()> {
+        self.uses.texture(Arc::clone(texture), part, next)
+    }
+
+    /// The next command's shaders trace rays in these stages.
+    pub(super) fn use_structures(&mut self, stages: Stages) {
+        let (blas, tlas) = (self.shared.all_blas, self.shared.all_tlas);
+        self.uses.id(blas, Use::accel_read(stages));
+        self.uses.id(tlas, Use::accel_read(stages));
+    }
+
+    /// The next command's shaders reach these in `stages`.
+    pub(super) fn use_dependencies(&mut self, deps: &Dependencies<'_>, stages: Stages) -> Result<()> {
+        let shared = Arc::clone(&self.shared);
+        for handle in deps.sampled_images {
+            let texture = shared.store.textures.get(*handle)?;
+            texture.check_usage(TextureUsage::SAMPLED)?;
+            self.use_texture(&texture, texture.all(), Use::shader_read(stages))?;
+        }
+        for handle in deps.storage_images {
+            let texture = shared.store.textures.get(*handle)?;
+            texture.check_usage(TextureUsage::STORAGE)?;
+            self.use_texture(&texture, texture.all(), Use::shader_write(stages))?;
+        }
+        for handle in deps.buffers {
+            let buffer = shared.store.buffers.get(*handle)?;
+            self.use_buffer(&buffer, Use::shader_write(stages));
+        }
+        for handle in deps.read_buffers {
+            let buffer = shared.store.buffers.get(*handle)?;
+            self.use_buffer(&buffer, Use::shader_read(stages));
+        }
+        for handle in deps.acceleration_structures {
+            shared.store.accel_structs.get(*handle)?;
+            self.use_structures(stages);
+        }
+        Ok(())
+    }
+
+    /// Records the barriers in front of the next command.
+    pub(super) fn flush(&mut self) {
+        let recording = &mut *self.recording;
+        self.barriers.clear();
+        self.uses.track(&mut recording.tracker, &mut recording.images, &mut self.barriers);
+        emit(&self.shared.gpu, recording.commands, &self.barriers, &recording.images);
+    }
+
+    /// In front of a command that runs shaders: makes what copies wrote readable, runs `gather`, then records the
+    /// barriers; forgets the uses if gathering fails.
+    pub(super) fn flush_after(&mut self, gather: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
+        self.settle();
+        match gather(self) {
+            Ok(()) => {
+                self.flush();
+                Ok(())
+            }
+            Err(error) => {
+                self.uses.clear();
+                Err(error)
+            }
+        }
+    }
+}

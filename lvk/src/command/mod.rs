@@ -1,0 +1,128 @@
+//! Command buffers. Every command checks its arguments, places the barriers it needs and records itself.
+
+pub(crate) mod accel;
+pub(crate) mod bind;
+pub(crate) mod compute;
+pub(crate) mod dependencies;
+pub(crate) mod flush;
+pub(crate) mod query;
+pub(crate) mod render;
+pub(crate) mod render_pass;
+pub(crate) mod trace;
+pub(crate) mod transfer;
+pub(crate) mod uses;
+
+use std::mem::ManuallyDrop;
+use std::sync::Arc;
+
+use ash::vk;
+
+use crate::barrier::{Barriers, ResourceId, Use};
+use crate::error::Result;
+use crate::pipeline::{ComputePipeline, RayTracingPipeline};
+use crate::shared::Shared;
+use crate::submit::Recording;
+
+use bind::PushConstants;
+use transfer::Settle;
+use uses::Uses;
+
+/// Records commands for one submission.
+///
+/// Take one from [`Context::acquire_command_buffer`](crate::Context::acquire_command_buffer) and hand it to
+/// [`Context::submit`](crate::Context::submit). Several may be recorded side by side on different threads; the GPU
+/// sees them in the order of submission. Barriers, descriptor sets and the lifetime of everything used are the
+/// library's business. A command that answers an error has recorded nothing; the command buffer stays usable.
+/// Dropping a command buffer gives it up.
+pub struct CommandBuffer {
+    shared: Arc<Shared>,
+    recording: ManuallyDrop<Recording>,
+    finished: bool,
+    uses: Uses,
+    barriers: Barriers,
+    compute: Option<Arc<ComputePipeline>>,
+    ray_tracing: Option<Arc<RayTracingPipeline>>,
+    sets_bound: Vec<vk::PipelineBindPoint>,
+    push_constants: PushConstants,
+    host_reads: Vec<ResourceId>,
+    open_labels: u32,
+    settle: Vec<Settle>,
+}
+
+impl CommandBuffer {
+    pub(crate) fn new(shared: &Arc<Shared>) -> Result<Self> {
+        Ok(Self {
+            recording: ManuallyDrop::new(shared.submitter.acquire()?),
+            shared: Arc::clone(shared),
+            finished: false,
+            uses: Uses::default(),
+            barriers: Barriers::default(),
+            compute: None,
+            ray_tracing: None,
+            sets_bound: Vec::new(),
+            push_constants: PushConstants::default(),
+            host_reads: Vec::new(),
+            open_labels: 0,
+            settle: Vec::new(),
+        })
+    }
+
+    /// Opens a labelled range that debuggers and profilers show.
+    pub fn push_label(&mut self, name: &str) {
+        self.shared.gpu.begin_label(self.raw(), name);
+        self.open_labels += 1;
+    }
+
+    /// Closes the innermost labelled range; does nothing where none is open.
+    pub fn pop_label(&mut self) {
+        if self.open_labels > 0 {
+            self.shared.gpu.end_label(self.raw());
+            self.open_labels -= 1;
+        }
+    }
+
+    /// The Vulkan command buffer, for commands the library does not have.
+    ///
+    /// What is recorded this way is not tracked: the caller places its barriers, and leaves images in the layout it
+    /// found them in. Pipelines and push constants must be bound again afterwards.
+    pub fn raw(&self) -> vk::CommandBuffer {
+        self.recording.commands
+    }
+
+    /// Whether the command buffer was made by the context with these parts.
+    pub(crate) fn belongs_to(&self, shared: &Arc<Shared>) -> bool {
+        Arc::ptr_eq(&self.shared, shared)
+    }
+
+    /// Ends the recording.
+    pub(crate) fn finish(mut self) -> Recording {
+        while self.open_labels > 0 {
+            self.pop_label();
+        }
+        self.settle();
+        for id in std::mem::take(&mut self.host_reads) {
+            self.uses.id(id, Use::host_read());
+        }
+        self.flush();
+        self.finished = true;
+        // SAFETY: `finished` keeps `drop` from taking the recording again.
+        unsafe { ManuallyDrop::take(&mut self.recording) }
+    }
+}
+
+impl Drop for CommandBuffer {
+    fn drop(&mut self) {
+        if !self.finished {
+            // SAFETY: only `finish` takes the recording too, and it sets `finished`.
+            let recording = unsafe { ManuallyDrop::take(&mut self.recording) };
+            self.shared.staging.release(recording.sequence);
+            self.shared.submitter.discard(recording);
+        }
+    }
+}
+
+impl std::fmt::Debug for CommandBuffer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("CommandBuffer").field("sequence", &self.recording.sequence).finish()
+    }
+}

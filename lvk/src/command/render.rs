@@ -1,0 +1,332 @@
+//! Draws inside a render pass.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::CommandBuffer;
+use super::compute::check_arguments;
+use super::render_pass::Targets;
+use crate::barrier::{Stages, Use};
+use crate::error::{Error, Result};
+use crate::format::IndexFormat;
+use crate::handle::{BufferHandle, RenderPipelineHandle};
+use crate::pipeline::RenderPipeline;
+use crate::resource::Buffer;
+use crate::resource::buffer::BufferUsage;
+
+/// How draws read buffers, by the usage that allows it.
+pub(super) const DRAW_INPUTS: [(BufferUsage, fn() -> Use); 3] = [
+    (BufferUsage::INDEX, Use::index),
+    (BufferUsage::VERTEX, Use::vertex),
+    (BufferUsage::INDIRECT, Use::indirect),
+];
+
+/// A render pass being recorded. It borrows the command buffer, so nothing but draws can be recorded until it is
+/// dropped, which ends the pass (`vkCmdEndRendering`).
+pub struct RenderPass<'a> {
+    cmd: &'a mut CommandBuffer,
+    targets: Targets,
+    labelled: bool,
+    pipeline: Option<Arc<RenderPipeline>>,
+    indices: Option<BoundIndices>,
+    vertex_slots: u32,
+}
+
+/// The index buffer bound last.
+struct BoundIndices {
+    buffer: Arc<Buffer>,
+    count: u64,
+}
+
+impl<'a> RenderPass<'a> {
+    pub(super) fn new(cmd: &'a mut CommandBuffer, targets: Targets, labelled: bool) -> Self {
+        let [width, height] = targets.extent;
+        let pass = Self { cmd, targets, labelled, pipeline: None, indices: None, vertex_slots: 0 };
+        pass.set_viewport([0.0, 0.0, width as f32, height as f32], [0.0, 1.0]);
+        pass.set_scissor([0, 0], [width, height]);
+        pass
+    }
+
+    /// Width and height of the targets in pixels.
+    pub fn extent(&self) -> [u32; 2] {
+        self.targets.extent
+    }
+
+    /// Binds a graphics pipeline for the draws that follow. Its formats must be those of the targets.
+    pub fn bind_render_pipeline(&mut self, pipeline: RenderPipelineHandle) -> Result<()> {
+        let pipeline = self.cmd.shared.store.render_pipelines.get(pipeline)?;
+        let targets = &self.targets;
+        if pipeline.color_formats != targets.color_formats || pipeline.depth_format != targets.depth_format {
+            let message = format!(
+                "it draws to {:?} and depth {:?}, but the pass has {:?} and depth {:?}",
+                pipeline.color_formats, pipeline.depth_format, targets.color_formats, targets.depth_format
+            );
+            return Err(Error::usage(&pipeline.name, message));
+        }
+        if pipeline.ray_query {
+            self.cmd.use_structures(Stages::PRE_RASTER | Stages::FRAGMENT);
+            self.track_inside("acceleration structures", &pipeline.name)?;
+        }
+        let point = vk::PipelineBindPoint::GRAPHICS;
+        self.cmd.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
+        self.pipeline = Some(pipeline);
+        Ok(())
+    }
+
+    /// Sets the push constants; see [`CommandBuffer::push_constants`].
+    pub fn push_constants<T: bytemuck::NoUninit>(&mut self, constants: &T) -> Result<()> {
+        self.cmd.push_constants(constants)
+    }
+
+    /// Maps clip space to pixels: x, y, width, height, and the depth range. Heights may be negative to flip y.
+    pub fn viewport(&mut self, rectangle: [f32; 4], depth: [f32; 2]) -> Result<()> {
+        let finite = rectangle.iter().all(|side| side.is_finite());
+        let depths = depth.iter().all(|end| (0.0..=1.0).contains(end));
+        if !finite || !depths || rectangle[2] <= 0.0 {
+            let message = "a viewport needs finite numbers, a positive width, and depths from 0 to 1";
+            return Err(Error::usage("viewport", message));
+        }
+        self.set_viewport(rectangle, depth);
+        Ok(())
+    }
+
+    /// Draws only inside of a rectangle: offset and extent in pixels, inside the targets.
+    pub fn scissor(&mut self, offset: [u32; 2], extent: [u32; 2]) -> Result<()> {
+        let inside = (0..2).all(|axis| {
+            offset[axis].checked_add(extent[axis]).is_some_and(|end| end <= self.targets.extent[axis])
+        });
+        if !inside {
+            let message = format!("{offset:?} + {extent:?} is outside of {:?}", self.targets.extent);
+            return Err(Error::usage("scissor", message));
+        }
+        self.set_scissor(offset, extent);
+        Ok(())
+    }
+
+    /// Binds a buffer to a vertex binding of the pipeline, from `offset` bytes on (`vkCmdBindVertexBuffers`).
+    pub fn bind_vertex_buffer(&mut self, slot: u32, buffer: BufferHandle, offset: u64) -> Result<()> {
+        const SLOTS: u32 = 16;
+        let buffer = self.cmd.shared.store.buffers.get(buffer)?;
+        buffer.check_usage(BufferUsage::VERTEX)?;
+        buffer.check_range(offset, 1)?;
+        if slot >= SLOTS {
+            return Err(Error::usage(
+                &buffer.name,
+                format!("vertex slot {slot} does not exist, there are {SLOTS}"),
+            ));
+        }
+        self.read_inside(&buffer, Use::vertex())?;
+        // SAFETY: the buffer has the usage and the offset lies inside of it.
+        unsafe {
+            let device = &self.cmd.shared.gpu.device;
+            device.cmd_bind_vertex_buffers(self.cmd.raw(), slot, &[buffer.raw], &[offset]);
+        }
+        self.vertex_slots |= 1 << slot;
+        Ok(())
+    }
+
+    /// Binds indices, from `offset` bytes on (`vkCmdBindIndexBuffer`).
+    pub fn bind_index_buffer(
+        &mut self,
+        buffer: BufferHandle,
+        offset: u64,
+        format: IndexFormat,
+    ) -> Result<()> {
+        let buffer = self.cmd.shared.store.buffers.get(buffer)?;
+        buffer.check_usage(BufferUsage::INDEX)?;
+        let size = u64::from(format.size_bytes());
+        if !offset.is_multiple_of(size) {
+            return Err(Error::usage(
+                &buffer.name,
+                format!("the index offset {offset} is no multiple of {size}"),
+            ));
+        }
+        buffer.check_range(offset, size)?;
+        self.read_inside(&buffer, Use::index())?;
+        // SAFETY: the buffer has the usage and the offset is aligned and inside of it.
+        unsafe {
+            let device = &self.cmd.shared.gpu.device;
+            device.cmd_bind_index_buffer(self.cmd.raw(), buffer.raw, offset, format.raw());
+        }
+        self.indices = Some(BoundIndices { count: (buffer.size_bytes - offset) / size, buffer });
+        Ok(())
+    }
+
+    /// Draws vertices (`vkCmdDraw`).
+    pub fn draw(&mut self, vertices: Range<u32>, instances: Range<u32>) -> Result<()> {
+        self.check_ready()?;
+        let (count, instance_count) = (length(&vertices), length(&instances));
+        // SAFETY: a pipeline is bound with all its vertex buffers and push constants.
+        unsafe {
+            let device = &self.cmd.shared.gpu.device;
+            device.cmd_draw(self.cmd.raw(), count, instance_count, vertices.start, instances.start);
+        }
+        Ok(())
+    }
+
+    /// Draws vertices by index; `base_vertex` is added to each (`vkCmdDrawIndexed`).
+    pub fn draw_indexed(
+        &mut self,
+        indices: Range<u32>,
+        base_vertex: i32,
+        instances: Range<u32>,
+    ) -> Result<()> {
+        self.check_ready()?;
+        let bound = self.bound_indices()?;
+        if u64::from(indices.end) > bound.count {
+            let message = format!("indices {indices:?} are drawn, but {} are bound", bound.count);
+            return Err(Error::usage(&bound.buffer.name, message));
+        }
+        let (count, instance_count) = (length(&indices), length(&instances));
+        // SAFETY: as in `draw`, and the indices lie inside the bound buffer.
+        unsafe {
+            let device = &self.cmd.shared.gpu.device;
+            let raw = self.cmd.raw();
+            device.cmd_draw_indexed(raw, count, instance_count, indices.start, base_vertex, instances.start);
+        }
+        Ok(())
+    }
+
+    /// Draws `draw_count` times with arguments (`VkDrawIndirectCommand`) from a buffer with
+    /// [`BufferUsage::INDIRECT`], `stride` bytes apart (`vkCmdDrawIndirect`).
+    pub fn draw_indirect(
+        &mut self,
+        arguments: BufferHandle,
+        offset: u64,
+        draw_count: u32,
+        stride: u32,
+    ) -> Result<()> {
+        self.check_ready()?;
+        let size = size_of::<vk::DrawIndirectCommand>() as u64;
+        let buffer = self.indirect(arguments, offset, draw_count, stride, size)?;
+        let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
+        for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
+            // SAFETY: as in `draw`, and the arguments lie inside the buffer.
+            unsafe { device.cmd_draw_indirect(raw, buffer.raw, offset, count, stride) };
+        }
+        Ok(())
+    }
+
+    /// Draws by index `draw_count` times with arguments (`VkDrawIndexedIndirectCommand`) from a buffer with
+    /// [`BufferUsage::INDIRECT`], `stride` bytes apart (`vkCmdDrawIndexedIndirect`).
+    pub fn draw_indexed_indirect(
+        &mut self,
+        arguments: BufferHandle,
+        offset: u64,
+        draw_count: u32,
+        stride: u32,
+    ) -> Result<()> {
+        self.check_ready()?;
+        self.bound_indices()?;
+        let size = size_of::<vk::DrawIndexedIndirectCommand>() as u64;
+        let buffer = self.indirect(arguments, offset, draw_count, stride, size)?;
+        let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
+        for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
+            // SAFETY: as in `draw`, and the arguments lie inside the buffer.
+            unsafe { device.cmd_draw_indexed_indirect(raw, buffer.raw, offset, count, stride) };
+        }
+        Ok(())
+    }
+
+    /// One call for all draws, or one for each where the device takes no more.
+    fn indirect_calls(
+        &self,
+        offset: u64,
+        draw_count: u32,
+        stride: u32,
+    ) -> impl Iterator<Item = (u64, u32)> + use<> {
+        let multi = self.cmd.shared.gpu.caps.multi_draw_indirect;
+        let (calls, draws) = if multi { (draw_count.min(1), draw_count) } else { (draw_count, 1) };
+        (0..calls).map(move |call| (offset + u64::from(call) * u64::from(stride), draws))
+    }
+
+    fn indirect(
+        &mut self,
+        arguments: BufferHandle,
+        offset: u64,
+        draw_count: u32,
+        stride: u32,
+        size: u64,
+    ) -> Result<Arc<Buffer>> {
+        let buffer = self.cmd.shared.store.buffers.get(arguments)?;
+        if u64::from(stride) < size || !stride.is_multiple_of(4) {
+            let message = format!("the stride {stride} must be a multiple of 4 and at least {size} bytes");
+            return Err(Error::usage(&buffer.name, message));
+        }
+        let bytes = u64::from(draw_count.saturating_sub(1)) * u64::from(stride) + size;
+        check_arguments(&buffer, offset, bytes)?;
+        self.read_inside(&buffer, Use::indirect())?;
+        Ok(buffer)
+    }
+
+    fn bound_indices(&self) -> Result<&BoundIndices> {
+        self.indices.as_ref().ok_or_else(|| Error::usage("draw_indexed", "bind an index buffer first"))
+    }
+
+    fn check_ready(&self) -> Result<()> {
+        let Some(pipeline) = &self.pipeline else {
+            return Err(Error::usage("draw", "bind a render pipeline first"));
+        };
+        let needed = (1_u32 << pipeline.vertex_binding_count) - 1;
+        if self.vertex_slots & needed != needed {
+            let message = format!("it reads {} vertex buffers; bind them all", pipeline.vertex_binding_count);
+            return Err(Error::usage(&pipeline.name, message));
+        }
+        self.cmd.check_pushed(&pipeline.name, pipeline.push_constant_bytes)
+    }
+
+    /// The pass reads a buffer; no barrier can be placed any more.
+    fn read_inside(&mut self, buffer: &Buffer, next: Use) -> Result<()> {
+        self.cmd.use_buffer(buffer, next);
+        self.track_inside("the buffer", &buffer.name)
+    }
+
+    fn track_inside(&mut self, what: &str, name: &str) -> Result<()> {
+        let recording = &mut *self.cmd.recording;
+        if self.cmd.uses.need_barriers(&recording.tracker) {
+            self.cmd.uses.clear();
+            let message = format!(
+                "{what} was written earlier in this command buffer; list it in the pass's dependencies"
+            );
+            return Err(Error::usage(name, message));
+        }
+        self.cmd.barriers.clear();
+        self.cmd.uses.track(&mut recording.tracker, &mut recording.images, &mut self.cmd.barriers);
+        Ok(())
+    }
+
+    fn set_viewport(&self, [x, y, width, height]: [f32; 4], [min_depth, max_depth]: [f32; 2]) {
+        let viewport = vk::Viewport { x, y, width, height, min_depth, max_depth };
+        // SAFETY: the numbers are checked and a pass is open.
+        unsafe { self.cmd.shared.gpu.device.cmd_set_viewport(self.cmd.raw(), 0, &[viewport]) };
+    }
+
+    fn set_scissor(&self, [x, y]: [u32; 2], [width, height]: [u32; 2]) {
+        let offset = vk::Offset2D { x: x as i32, y: y as i32 };
+        let scissor = vk::Rect2D { offset, extent: vk::Extent2D { width, height } };
+        // SAFETY: the rectangle lies inside the targets and a pass is open.
+        unsafe { self.cmd.shared.gpu.device.cmd_set_scissor(self.cmd.raw(), 0, &[scissor]) };
+    }
+}
+
+impl Drop for RenderPass<'_> {
+    fn drop(&mut self) {
+        // SAFETY: the pass was begun when the value was made, and ends once.
+        unsafe { self.cmd.shared.gpu.device.cmd_end_rendering(self.cmd.raw()) };
+        if self.labelled {
+            self.cmd.pop_label();
+        }
+    }
+}
+
+impl std::fmt::Debug for RenderPass<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("RenderPass").field("extent", &self.targets.extent).finish()
+    }
+}
+
+fn length(range: &Range<u32>) -> u32 {
+    range.end.saturating_sub(range.start)
+}

@@ -1,0 +1,407 @@
+//! Copies, fills, clears, blits and mips.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::CommandBuffer;
+use crate::barrier::{Stages, Use};
+use crate::error::{Error, Result};
+use crate::format::Format;
+use crate::handle::{BufferHandle, TextureHandle};
+use crate::resource::sampler::Filter;
+use crate::resource::texture::{TextureRegion, TextureUsage, layers_of, one};
+use crate::resource::{Buffer, Texture};
+
+/// Layout of an image that is copied from.
+const SOURCE: vk::ImageLayout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+/// Layout of an image that is copied to.
+const TARGET: vk::ImageLayout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+
+/// A resource written by a copy, to be made readable everywhere before shaders run.
+pub(super) enum Settle {
+    Buffer(Arc<Buffer>),
+    Texture(Arc<Texture>),
+}
+
+impl CommandBuffer {
+    /// Copies `size` bytes between buffers (`vkCmdCopyBuffer2`).
+    pub fn copy_buffer(
+        &mut self,
+        source: BufferHandle,
+        source_offset: u64,
+        target: BufferHandle,
+        target_offset: u64,
+        size: u64,
+    ) -> Result<()> {
+        let source = self.shared.store.buffers.get(source)?;
+        let target = self.shared.store.buffers.get(target)?;
+        self.copy_buffer_objects(&source, source_offset, &target, target_offset, size)
+    }
+
+    /// As [`copy_buffer`](Self::copy_buffer), by object.
+    pub(crate) fn copy_buffer_objects(
+        &mut self,
+        source: &Arc<Buffer>,
+        source_offset: u64,
+        target: &Arc<Buffer>,
+        target_offset: u64,
+        size: u64,
+    ) -> Result<()> {
+        source.check_range(source_offset, size)?;
+        target.check_range(target_offset, size)?;
+        if source.id == target.id && source_offset.abs_diff(target_offset) < size {
+            return Err(Error::usage(&source.name, "source and target of the copy overlap"));
+        }
+        if size == 0 {
+            return Ok(());
+        }
+        self.use_buffer(source, Use::transfer_read());
+        self.use_buffer(target, Use::transfer_write());
+        self.flush();
+        self.settle.push(Settle::Buffer(Arc::clone(target)));
+        let region = vk::BufferCopy { src_offset: source_offset, dst_offset: target_offset, size };
+        // SAFETY: both ranges lie inside their buffers and do not overlap.
+        unsafe { self.shared.gpu.device.cmd_copy_buffer(self.raw(), source.raw, target.raw, &[region]) };
+        Ok(())
+    }
+
+    /// Fills bytes with a repeated 32-bit value; offset and size are multiples of 4 (`vkCmdFillBuffer`).
+    pub fn fill_buffer(&mut self, buffer: BufferHandle, offset: u64, size: u64, value: u32) -> Result<()> {
+        let buffer = self.shared.store.buffers.get(buffer)?;
+        buffer.check_range(offset, size)?;
+        if !offset.is_multiple_of(4) || !size.is_multiple_of(4) {
+            return Err(Error::usage(&buffer.name, "offset and size of a fill are multiples of 4"));
+        }
+        if size == 0 {
+            return Ok(());
+        }
+        self.use_buffer(&buffer, Use::transfer_write());
+        self.flush();
+        // SAFETY: the range lies inside the buffer and is aligned.
+        unsafe { self.shared.gpu.device.cmd_fill_buffer(self.raw(), buffer.raw, offset, size, value) };
+        self.settle.push(Settle::Buffer(buffer));
+        Ok(())
+    }
+
+    /// Copies bytes, rows tightly packed, into a region of a texture (`vkCmdCopyBufferToImage`).
+    pub fn copy_buffer_to_texture(
+        &mut self,
+        source: BufferHandle,
+        offset: u64,
+        target: TextureHandle,
+        region: &TextureRegion,
+    ) -> Result<()> {
+        let source = self.shared.store.buffers.get(source)?;
+        let target = self.shared.store.textures.get(target)?;
+        let region = self.check_packed(&source, offset, &target, region)?;
+        self.use_buffer(&source, Use::transfer_read());
+        self.record_fill_texture(source.raw, offset, &target, &region)
+    }
+
+    /// Copies a region of a texture into a buffer, rows tightly packed (`vkCmdCopyImageToBuffer`).
+    pub fn copy_texture_to_buffer(
+        &mut self,
+        source: TextureHandle,
+        region: &TextureRegion,
+        target: BufferHandle,
+        offset: u64,
+    ) -> Result<()> {
+        let source = self.shared.store.textures.get(source)?;
+        let target = self.shared.store.buffers.get(target)?;
+        self.copy_texture_objects_to_buffer(&source, region, &target, offset)
+    }
+
+    /// As [`copy_texture_to_buffer`](Self::copy_texture_to_buffer), by object.
+    pub(crate) fn copy_texture_objects_to_buffer(
+        &mut self,
+        source: &Arc<Texture>,
+        region: &TextureRegion,
+        target: &Arc<Buffer>,
+        offset: u64,
+    ) -> Result<()> {
+        let region = self.check_packed(target, offset, source, region)?;
+        self.use_texture(source, one(region.mip, region.layer), Use::transfer_read())?;
+        self.use_buffer(target, Use::transfer_write());
+        self.flush();
+        let copy = region.buffer_copy(source.format, offset);
+        // SAFETY: the region lies inside the image and its bytes inside the buffer.
+        unsafe {
+            let device = &self.shared.gpu.device;
+            device.cmd_copy_image_to_buffer(self.raw(), source.raw, SOURCE, target.raw, &[copy]);
+        }
+        self.settle.push(Settle::Buffer(Arc::clone(target)));
+        Ok(())
+    }
+
+    /// Copies texels between textures of texels of the same size (`vkCmdCopyImage`). Both regions have the extent of
+    /// the first.
+    pub fn copy_texture(
+        &mut self,
+        source: TextureHandle,
+        from: &TextureRegion,
+        target: TextureHandle,
+        to: &TextureRegion,
+    ) -> Result<()> {
+        let source = self.shared.store.textures.get(source)?;
+        let target = self.shared.store.textures.get(target)?;
+        let from = source.resolve_region(from)?;
+        let to = target.resolve_region(&TextureRegion { extent: from.extent, ..*to })?;
+        check_copyable(&source, &target)?;
+        self.use_texture_pair(&source, &from, &target, &to)?;
+        let copy = vk::ImageCopy {
+            src_subresource: layers_of(source.format, from.mip, from.layer),
+            src_offset: corner(from.offset),
+            dst_subresource: layers_of(target.format, to.mip, to.layer),
+            dst_offset: corner(to.offset),
+            extent: vk::Extent3D { width: from.extent[0], height: from.extent[1], depth: 1 },
+        };
+        // SAFETY: both regions lie inside their images, whose texels are equally large.
+        unsafe {
+            let device = &self.shared.gpu.device;
+            device.cmd_copy_image(self.raw(), source.raw, SOURCE, target.raw, TARGET, &[copy]);
+        }
+        self.settle.push(Settle::Texture(target));
+        Ok(())
+    }
+
+    /// Copies and scales a region, converting the format (`vkCmdBlitImage`).
+    pub fn blit_texture(
+        &mut self,
+        source: TextureHandle,
+        from: &TextureRegion,
+        target: TextureHandle,
+        to: &TextureRegion,
+        filter: Filter,
+    ) -> Result<()> {
+        let source = self.shared.store.textures.get(source)?;
+        let target = self.shared.store.textures.get(target)?;
+        let from = source.resolve_region(from)?;
+        let to = target.resolve_region(to)?;
+        self.check_blit(&source, &target, filter)?;
+        self.use_texture_pair(&source, &from, &target, &to)?;
+        self.record_blit(&source, &from, &target, &to, filter);
+        self.settle.push(Settle::Texture(target));
+        Ok(())
+    }
+
+    /// Fills every mip but the first by halving the one before, for all layers.
+    pub fn generate_mipmaps(&mut self, texture: TextureHandle) -> Result<()> {
+        let texture = self.shared.store.textures.get(texture)?;
+        self.generate_mipmaps_object(&texture)
+    }
+
+    /// As [`generate_mipmaps`](Self::generate_mipmaps), by object.
+    pub(crate) fn generate_mipmaps_object(&mut self, texture: &Arc<Texture>) -> Result<()> {
+        self.check_blit(texture, texture, Filter::Linear)?;
+        for mip in 1..texture.shape.mips {
+            for layer in 0..texture.shape.layers {
+                let from =
+                    texture.resolve_region(&TextureRegion { mip: mip - 1, layer, ..Default::default() })?;
+                let to = texture.resolve_region(&TextureRegion { mip, layer, ..Default::default() })?;
+                self.use_texture_pair(texture, &from, texture, &to)?;
+                self.record_blit(texture, &from, texture, &to, Filter::Linear);
+            }
+        }
+        self.settle.push(Settle::Texture(Arc::clone(texture)));
+        Ok(())
+    }
+
+    /// Fills all mips and layers of a colour texture with one colour (`vkCmdClearColorImage`).
+    pub fn clear_texture(&mut self, texture: TextureHandle, color: [f32; 4]) -> Result<()> {
+        let texture = self.shared.store.textures.get(texture)?;
+        if texture.format.is_depth() || texture.format.is_uint() {
+            return Err(Error::usage(&texture.name, "only textures of colours are cleared to a colour"));
+        }
+        self.use_texture(&texture, texture.all(), Use::transfer_write())?;
+        self.flush();
+        let range = vk::ImageSubresourceRange {
+            aspect_mask: vk::ImageAspectFlags::COLOR,
+            base_mip_level: 0,
+            level_count: texture.shape.mips,
+            base_array_layer: 0,
+            layer_count: texture.shape.layers,
+        };
+        let color = vk::ClearColorValue { float32: color };
+        // SAFETY: the range is the whole image.
+        unsafe {
+            let device = &self.shared.gpu.device;
+            device.cmd_clear_color_image(self.raw(), texture.raw, TARGET, &color, &[range]);
+        }
+        self.settle.push(Settle::Texture(texture));
+        Ok(())
+    }
+
+    /// Copies host bytes into a buffer through the staging ring.
+    pub(crate) fn upload_buffer(&mut self, target: &Arc<Buffer>, offset: u64, bytes: &[u8]) -> Result<()> {
+        target.check_range(offset, bytes.len() as u64)?;
+        if bytes.is_empty() {
+            return Ok(());
+        }
+        let region = self.shared.staging.write(bytes, 16, self.recording.sequence)?;
+        self.retire_temporary(region.temporary);
+        self.use_buffer(target, Use::transfer_write());
+        self.flush();
+        let copy = vk::BufferCopy { src_offset: region.offset, dst_offset: offset, size: bytes.len() as u64 };
+        // SAFETY: both ranges lie inside their buffers.
+        unsafe { self.shared.gpu.device.cmd_copy_buffer(self.raw(), region.buffer, target.raw, &[copy]) };
+        self.settle.push(Settle::Buffer(Arc::clone(target)));
+        Ok(())
+    }
+
+    /// Copies host bytes, rows tightly packed, into a texture through the staging ring.
+    pub(crate) fn upload_texture(
+        &mut self,
+        target: &Arc<Texture>,
+        region: &TextureRegion,
+        bytes: &[u8],
+    ) -> Result<()> {
+        let region = target.resolve_region(region)?;
+        let expected = region.texels() * u64::from(target.format.texel_bytes());
+        if bytes.len() as u64 != expected {
+            let message = format!("{} bytes were given for texels of {expected} bytes", bytes.len());
+            return Err(Error::usage(&target.name, message));
+        }
+        let staged = self.shared.staging.write(bytes, 16, self.recording.sequence)?;
+        self.retire_temporary(staged.temporary);
+        self.record_fill_texture(staged.buffer, staged.offset, target, &region)
+    }
+
+    fn record_fill_texture(
+        &mut self,
+        source: vk::Buffer,
+        offset: u64,
+        target: &Arc<Texture>,
+        region: &TextureRegion,
+    ) -> Result<()> {
+        self.use_texture(target, one(region.mip, region.layer), Use::transfer_write())?;
+        self.flush();
+        let copy = region.buffer_copy(target.format, offset);
+        // SAFETY: the bytes lie inside the buffer and the region inside the image.
+        unsafe {
+            let device = &self.shared.gpu.device;
+            device.cmd_copy_buffer_to_image(self.raw(), source, target.raw, TARGET, &[copy]);
+        }
+        self.settle.push(Settle::Texture(Arc::clone(target)));
+        Ok(())
+    }
+
+    /// Checks that the packed bytes of a region lie inside a buffer, and resolves the region.
+    fn check_packed(
+        &self,
+        buffer: &Buffer,
+        offset: u64,
+        texture: &Texture,
+        region: &TextureRegion,
+    ) -> Result<TextureRegion> {
+        let region = texture.resolve_region(region)?;
+        let texel = u64::from(texture.format.texel_bytes());
+        if !offset.is_multiple_of(texel.max(4)) {
+            let message = format!("the offset {offset} is no multiple of {} bytes", texel.max(4));
+            return Err(Error::usage(&buffer.name, message));
+        }
+        buffer.check_range(offset, region.texels() * texel)?;
+        Ok(region)
+    }
+
+    fn use_texture_pair(
+        &mut self,
+        source: &Arc<Texture>,
+        from: &TextureRegion,
+        target: &Arc<Texture>,
+        to: &TextureRegion,
+    ) -> Result<()> {
+        self.uses.clear();
+        self.use_texture(source, one(from.mip, from.layer), Use::transfer_read())?;
+        if let Err(error) = self.use_texture(target, one(to.mip, to.layer), Use::transfer_write()) {
+            self.uses.clear();
+            return Err(error);
+        }
+        self.flush();
+        Ok(())
+    }
+
+    fn check_blit(&self, source: &Texture, target: &Texture, filter: Filter) -> Result<()> {
+        let gpu = &self.shared.gpu;
+        let linear = match filter {
+            Filter::Nearest => vk::FormatFeatureFlags::empty(),
+            Filter::Linear => vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR,
+        };
+        let from = vk::FormatFeatureFlags::BLIT_SRC | linear;
+        let compatible = !source.format.is_depth()
+            && !target.format.is_depth()
+            && source.format.is_uint() == target.format.is_uint()
+            && gpu.image_features(source.format.raw()).contains(from)
+            && gpu.image_features(target.format.raw()).contains(vk::FormatFeatureFlags::BLIT_DST);
+        if compatible {
+            return Ok(());
+        }
+        let what = format!("a {filter:?} blit from '{}' to '{}'", source.name, target.name);
+        let formats = format!("{:?} and {:?}", source.format, target.format);
+        Err(Error::unsupported(what, format!("the device cannot scale between {formats}; use a shader")))
+    }
+
+    fn record_blit(
+        &self,
+        source: &Texture,
+        from: &TextureRegion,
+        target: &Texture,
+        to: &TextureRegion,
+        filter: Filter,
+    ) {
+        let blit = vk::ImageBlit {
+            src_subresource: layers_of(source.format, from.mip, from.layer),
+            src_offsets: corners(from),
+            dst_subresource: layers_of(target.format, to.mip, to.layer),
+            dst_offsets: corners(to),
+        };
+        let filter = match filter {
+            Filter::Nearest => vk::Filter::NEAREST,
+            Filter::Linear => vk::Filter::LINEAR,
+        };
+        // SAFETY: both regions lie inside their images, and the formats can be blitted.
+        unsafe {
+            let device = &self.shared.gpu.device;
+            device.cmd_blit_image(self.raw(), source.raw, SOURCE, target.raw, TARGET, &[blit], filter);
+        }
+    }
+
+    /// Makes what copies wrote readable by every shader and every input, with one barrier for all.
+    pub(super) fn settle(&mut self) {
+        if self.settle.is_empty() {
+            return;
+        }
+        for written in std::mem::take(&mut self.settle) {
+            match written {
+                Settle::Buffer(buffer) => self.use_buffer(&buffer, Use::everything_read()),
+                Settle::Texture(texture) if texture.usage.contains(TextureUsage::SAMPLED) => {
+                    // A texture written twice is listed twice; the same use always merges.
+                    let _ = self.use_texture(&texture, texture.all(), Use::shader_read(Stages::SHADERS));
+                }
+                Settle::Texture(_) => {}
+            }
+        }
+        self.flush();
+    }
+}
+
+fn check_copyable(source: &Texture, target: &Texture) -> Result<()> {
+    let depth = |format: Format| format.is_depth();
+    let (from, to) = (source.format, target.format);
+    let same_bits = from.texel_bytes() == to.texel_bytes() && !depth(from) && !depth(to);
+    if from == to || same_bits {
+        return Ok(());
+    }
+    let message = format!("texels of {from:?} cannot be copied to {to:?}; blit, or use a shader");
+    Err(Error::usage(&target.name, message))
+}
+
+fn corner([x, y]: [u32; 2]) -> vk::Offset3D {
+    vk::Offset3D { x: x as i32, y: y as i32, z: 0 }
+}
+
+fn corners(region: &TextureRegion) -> [vk::Offset3D; 2] {
+    let [x, y] = region.offset;
+    let end = [x + region.extent[0], y + region.extent[1]];
+    [corner(region.offset), vk::Offset3D { z: 1, ..corner(end) }]
+}

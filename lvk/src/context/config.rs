@@ -1,0 +1,52 @@
+//! How a context is made.
+
+use std::path::Path;
+
+use crate::gpu::caps::FeatureRequest;
+use crate::gpu::debug::{Validation, ValidationSink};
+
+/// Describes a context.
+#[derive(Debug, Clone)]
+pub struct ContextDesc<'a> {
+    /// Name of the application, for drivers and tools.
+    pub application_name: &'a str,
+    /// The Vulkan loader to open instead of the system's `libvulkan.so.1`.
+    pub vulkan_library: Option<&'a Path>,
+    /// The device to use: its number in [`Context::devices`](crate::Context::devices) or part of its name. The
+    /// environment variable `LVK_DEVICE` goes before it. Without either the best device that has what is required.
+    pub device: Option<&'a str>,
+    /// How much the validation layer checks.
+    pub validation: Validation,
+    /// Where messages of the layer go; all go to the `log` crate too.
+    pub validation_sink: Option<ValidationSink>,
+    /// Ray tracing pipelines.
+    pub ray_tracing_pipeline: FeatureRequest,
+    /// Ray queries in any shader stage.
+    pub ray_query: FeatureRequest,
+    /// Frames the CPU may be ahead of the GPU; see [`Context::next_frame`](crate::Context::next_frame). 1 to 8.
+    pub frames_in_flight: u32,
+    /// Size of the staging ring in bytes. Larger uploads get memory of their own.
+    pub staging_bytes: u64,
+    /// Most scratch memory for the builds of acceleration structures, in bytes. One build that needs more gets it.
+    pub scratch_budget_bytes: u64,
+    /// Room for textures in the bindless set; clamped to what the device allows.
+    pub max_textures: u32,
+}
+
+impl Default for ContextDesc<'_> {
+    fn default() -> Self {
+        Self {
+            application_name: "lvk",
+            vulkan_library: None,
+            device: None,
+            validation: Validation::Off,
+            validation_sink: None,
+            ray_tracing_pipeline: FeatureRequest::Optional,
+            ray_query: FeatureRequest::Optional,
+            frames_in_flight: 2,
+            staging_bytes: 16 << 20,
+            scratch_budget_bytes: 64 << 20,
+            max_textures: 16_384,
+        }
+    }
+}

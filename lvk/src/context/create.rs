@@ -1,0 +1,162 @@
+//! Creates objects.
+
+use std::sync::Arc;
+
+use super::Context;
+use super::holder::Holder;
+use crate::bindless::TextureViews;
+use crate::error::{Error, Result};
+use crate::handle::{
+    BufferHandle, ComputePipelineHandle, QueryPoolHandle, RayTracingPipelineHandle, RenderPipelineHandle,
+    SamplerHandle, ShaderModuleHandle, TextureHandle,
+};
+use crate::pipeline::compute::ComputePipelineDesc;
+use crate::pipeline::graphics::RenderPipelineDesc;
+use crate::pipeline::ray_tracing::RayTracingPipelineDesc;
+use crate::pipeline::{ComputePipeline, RayTracingPipeline, RenderPipeline, ShaderModule};
+use crate::resource::buffer::{BufferDesc, InternalUsage};
+use crate::resource::query::QueryPoolDesc;
+use crate::resource::sampler::SamplerDesc;
+use crate::resource::texture::{TextureDesc, TextureRegion, TextureUsage};
+use crate::resource::{Buffer, QueryPool, Sampler, Texture};
+use crate::shader::ShaderModuleDesc;
+
+/// Objects that take no bindless slot.
+const NO_SLOT: u32 = 0;
+
+impl Context {
+    /// Creates a buffer (`vkCreateBuffer`). Its first contents are there for every command submitted afterwards.
+    pub fn create_buffer(&self, desc: &BufferDesc<'_>) -> Result<Holder<BufferHandle>> {
+        let buffer = Buffer::new(&self.shared().gpu, desc, InternalUsage::NONE)?;
+        let handle = self.shared().store.buffers.insert(buffer);
+        let holder = Holder::new(self, handle, NO_SLOT);
+        if let Some(data) = desc.data {
+            self.upload_buffer(handle, 0, data)?;
+        }
+        Ok(holder)
+    }
+
+    /// Creates a texture (`vkCreateImage`). [`Holder::index`] is its element of `kTextures2D[]`, `kTexturesCube[]`
+    /// and the storage images. Its first contents are there for every command submitted afterwards.
+    pub fn create_texture(&self, desc: &TextureDesc<'_>) -> Result<Holder<TextureHandle>> {
+        let shared = self.shared();
+        let slot = shared.bindless.reserve_texture(desc.debug_name)?;
+        let made = Texture::new(&shared.gpu, desc, slot).and_then(|texture| {
+            let views = views(&texture)?;
+            Ok((texture, views))
+        });
+        let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
+        shared.bindless.set_texture(slot, views);
+        let holder = Holder::new(self, shared.store.textures.insert(texture), slot);
+        if let Some(data) = desc.data {
+            self.fill_texture(holder.handle(), desc, data)?;
+        }
+        Ok(holder)
+    }
+
+    fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>, data: &[u8]) -> Result<()> {
+        let texture = self.shared().store.textures.get(handle)?;
+        let layers = texture.shape.layers as usize;
+        let expected = u64::from(desc.extent[0])
+            * u64::from(desc.extent[1])
+            * u64::from(desc.format.texel_bytes())
+            * layers as u64;
+        if data.len() as u64 != expected {
+            let message = format!("mip 0 has {expected} bytes in all layers, but {} were given", data.len());
+            return Err(Error::usage(desc.debug_name, message));
+        }
+        self.before_next_submission(|cmd| {
+            for (layer, bytes) in (0..).zip(data.chunks(data.len() / layers)) {
+                let region = TextureRegion { layer, ..Default::default() };
+                cmd.upload_texture(&texture, &region, bytes)?;
+            }
+            if desc.generate_mips { cmd.generate_mipmaps_object(&texture) } else { Ok(()) }
+        })
+    }
+
+    /// Creates a sampler (`vkCreateSampler`). [`Holder::index`] is its element of `kSamplers[]`.
+    pub fn create_sampler(&self, desc: &SamplerDesc<'_>) -> Result<Holder<SamplerHandle>> {
+        let shared = self.shared();
+        let slot = shared.bindless.reserve_sampler(desc.debug_name)?;
+        let sampler =
+            Sampler::new(&shared.gpu, desc, slot).inspect_err(|_| shared.bindless.free_sampler(slot))?;
+        shared.bindless.set_sampler(slot, sampler.raw);
+        Ok(Holder::new(self, shared.store.samplers.insert(sampler), slot))
+    }
+
+    /// Compiles GLSL or takes SPIR-V (`vkCreateShaderModule`).
+    ///
+    /// # Errors
+    /// [`Shader`](Error::Shader) with the compiler's text and the caller's own line numbers.
+    pub fn create_shader_module(&self, desc: &ShaderModuleDesc<'_>) -> Result<Holder<ShaderModuleHandle>> {
+        let shared = self.shared();
+        let module = ShaderModule::new(&shared.gpu, desc, shared.layout.push_constant_bytes)?;
+        Ok(Holder::new(self, shared.store.shader_modules.insert(module), NO_SLOT))
+    }
+
+    /// Creates a graphics pipeline (`vkCreateGraphicsPipelines`).
+    pub fn create_render_pipeline(
+        &self,
+        desc: &RenderPipelineDesc<'_>,
+    ) -> Result<Holder<RenderPipelineHandle>> {
+        let shared = self.shared();
+        let vertex = self.required_module(desc.vertex, desc.debug_name, "vertex")?;
+        let fragment = match desc.fragment {
+            Some(handle) => Some(shared.store.shader_modules.get(handle)?),
+            None => None,
+        };
+        let layout = shared.layout.raw;
+        let pipeline = RenderPipeline::new(&shared.gpu, layout, desc, &vertex, fragment.as_deref())?;
+        Ok(Holder::new(self, shared.store.render_pipelines.insert(pipeline), NO_SLOT))
+    }
+
+    /// Creates a compute pipeline (`vkCreateComputePipelines`).
+    pub fn create_compute_pipeline(
+        &self,
+        desc: &ComputePipelineDesc<'_>,
+    ) -> Result<Holder<ComputePipelineHandle>> {
+        let shared = self.shared();
+        let module = self.required_module(desc.module, desc.debug_name, "compute")?;
+        let pipeline = ComputePipeline::new(&shared.gpu, shared.layout.raw, desc, &module)?;
+        Ok(Holder::new(self, shared.store.compute_pipelines.insert(pipeline), NO_SLOT))
+    }
+
+    /// Creates a ray tracing pipeline with its shader binding table (`vkCreateRayTracingPipelinesKHR`).
+    pub fn create_ray_tracing_pipeline(
+        &self,
+        desc: &RayTracingPipelineDesc<'_>,
+    ) -> Result<Holder<RayTracingPipelineHandle>> {
+        let shared = self.shared();
+        let find = |handle| shared.store.shader_modules.get(handle);
+        let (pipeline, table) = RayTracingPipeline::new(&shared.gpu, shared.layout.raw, desc, &find)?;
+        let target = Arc::clone(&pipeline.table);
+        let holder = Holder::new(self, shared.store.ray_tracing_pipelines.insert(pipeline), NO_SLOT);
+        self.before_next_submission(|cmd| cmd.upload_buffer(&target, table.offset, &table.bytes))?;
+        Ok(holder)
+    }
+
+    /// Creates a pool of timestamp queries (`vkCreateQueryPool`), all ready to be written.
+    pub fn create_query_pool(&self, desc: &QueryPoolDesc<'_>) -> Result<Holder<QueryPoolHandle>> {
+        let pool = QueryPool::new(&self.shared().gpu, desc)?;
+        Ok(Holder::new(self, self.shared().store.query_pools.insert(pool), NO_SLOT))
+    }
+
+    fn required_module(
+        &self,
+        handle: Option<ShaderModuleHandle>,
+        pipeline: &str,
+        stage: &str,
+    ) -> Result<Arc<ShaderModule>> {
+        let missing = || Error::usage(pipeline, format!("give the pipeline a {stage} shader"));
+        self.shared().store.shader_modules.get(handle.ok_or_else(missing)?)
+    }
+}
+
+fn views(texture: &Texture) -> Result<TextureViews> {
+    let sampled = texture.usage.contains(TextureUsage::SAMPLED);
+    let storage = texture.usage.contains(TextureUsage::STORAGE);
+    Ok(TextureViews {
+        sampled: if sampled { Some(texture.sampled_view()?) } else { None },
+        storage: if storage { Some(texture.storage_view()?) } else { None },
+    })
+}

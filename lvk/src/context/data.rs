@@ -1,0 +1,99 @@
+//! Moves data between host and GPU.
+
+use std::sync::Arc;
+
+use super::Context;
+use crate::error::Result;
+use crate::gpu::memory::MemoryKind;
+use crate::handle::{BufferHandle, QueryPoolHandle, TextureHandle};
+use crate::resource::Buffer;
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
+use crate::resource::texture::TextureRegion;
+
+impl Context {
+    /// The address by which shaders reach a buffer (`vkGetBufferDeviceAddress`).
+    pub fn buffer_address(&self, buffer: BufferHandle) -> Result<u64> {
+        Ok(self.shared().store.buffers.get(buffer)?.address)
+    }
+
+    /// Writes bytes into a buffer.
+    ///
+    /// Mapped memory is written at once: the caller sees to it that the GPU does not use these bytes meanwhile, for
+    /// instance with one buffer for each frame in flight. Device memory is written before the next submission, after
+    /// everything submitted so far.
+    pub fn upload_buffer(&self, buffer: BufferHandle, offset: u64, bytes: &[u8]) -> Result<()> {
+        let buffer = self.shared().store.buffers.get(buffer)?;
+        buffer.check_range(offset, bytes.len() as u64)?;
+        if buffer.write(offset, bytes) {
+            return Ok(());
+        }
+        self.before_next_submission(|cmd| cmd.upload_buffer(&buffer, offset, bytes))
+    }
+
+    /// Reads bytes of a buffer in any memory, after everything submitted so far. Waits for the GPU.
+    pub fn download_buffer(&self, buffer: BufferHandle, offset: u64, bytes: &mut [u8]) -> Result<()> {
+        let buffer = self.shared().store.buffers.get(buffer)?;
+        buffer.check_range(offset, bytes.len() as u64)?;
+        if buffer.mapped().is_some() {
+            self.flush()?;
+            self.wait_submitted()?;
+            buffer.read(offset, bytes);
+            return Ok(());
+        }
+        let size = bytes.len() as u64;
+        self.read_back(size, bytes, |cmd, target| cmd.copy_buffer_objects(&buffer, offset, target, 0, size))
+    }
+
+    /// Writes texels, rows tightly packed, before the next submission.
+    pub fn upload_texture(&self, texture: TextureHandle, region: &TextureRegion, bytes: &[u8]) -> Result<()> {
+        let texture = self.shared().store.textures.get(texture)?;
+        self.before_next_submission(|cmd| cmd.upload_texture(&texture, region, bytes))
+    }
+
+    /// Reads texels, rows tightly packed, after everything submitted so far. Waits for the GPU.
+    pub fn download_texture(&self, texture: TextureHandle, region: &TextureRegion) -> Result<Vec<u8>> {
+        let texture = self.shared().store.textures.get(texture)?;
+        let region = texture.resolve_region(region)?;
+        let size = region.texels() * u64::from(texture.format.texel_bytes());
+        let mut bytes = vec![0; size as usize];
+        self.read_back(size, &mut bytes, |cmd, target| {
+            cmd.copy_texture_objects_to_buffer(&texture, &region, target, 0)
+        })?;
+        Ok(bytes)
+    }
+
+    /// Milliseconds of `count` timestamps since an arbitrary start that all share; `None` where none was written yet
+    /// (`vkGetQueryPoolResults`). Does not wait.
+    pub fn timestamps_ms(&self, pool: QueryPoolHandle, first: u32, count: u32) -> Result<Vec<Option<f64>>> {
+        self.shared().store.query_pools.get(pool)?.milliseconds(first, count)
+    }
+
+    /// Runs a copy into a readback buffer, waits, and reads it.
+    fn read_back(
+        &self,
+        size: u64,
+        bytes: &mut [u8],
+        record: impl FnOnce(&mut crate::CommandBuffer, &Arc<Buffer>) -> Result<()>,
+    ) -> Result<()> {
+        if size == 0 {
+            return Ok(());
+        }
+        let desc = BufferDesc {
+            size_bytes: size,
+            usage: BufferUsage::empty(),
+            memory: MemoryKind::Readback,
+            data: None,
+            debug_name: "readback",
+        };
+        let target = Arc::new(Buffer::new(&self.shared().gpu, &desc, InternalUsage::NONE)?);
+        let mut cmd = self.acquire_command_buffer()?;
+        record(&mut cmd, &target)?;
+        let submitted = self.submit(cmd)?;
+        let waited = self.wait(submitted);
+        if waited.is_ok() {
+            target.read(0, bytes);
+        }
+        self.shared().retire(crate::shared::Garbage::Buffer(target));
+        waited
+    }
+}

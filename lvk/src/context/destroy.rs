@@ -1,0 +1,53 @@
+//! Destroys objects, once the GPU is done with them.
+
+use super::Context;
+use crate::handle::{
+    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle,
+    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
+};
+use crate::shared::{Garbage, Shared};
+
+/// Handles whose objects a context can destroy: all of them.
+pub trait Destroy: Handle {
+    #[doc(hidden)]
+    fn take_from(self, ctx: &Context);
+}
+
+impl Context {
+    /// Destroys an object. Its handle is stale from now on; its memory goes when the last command buffer that may use
+    /// it is done. Does nothing for a stale handle.
+    pub fn destroy<H: Destroy>(&self, handle: H) {
+        handle.take_from(self);
+    }
+}
+
+macro_rules! destroy {
+    ($($handle:ident: $pool:ident => $garbage:ident;)*) => {
+        $(impl Destroy for $handle {
+            fn take_from(self, ctx: &Context) {
+                let shared: &Shared = ctx.shared();
+                if let Ok(object) = shared.store.$pool.remove(self) {
+                    shared.retire(Garbage::$garbage(object));
+                }
+            }
+        })*
+    };
+}
+
+destroy! {
+    BufferHandle: buffers => Buffer;
+    TextureHandle: textures => Texture;
+    SamplerHandle: samplers => Sampler;
+    RenderPipelineHandle: render_pipelines => RenderPipeline;
+    ComputePipelineHandle: compute_pipelines => ComputePipeline;
+    RayTracingPipelineHandle: ray_tracing_pipelines => RayTracingPipeline;
+    QueryPoolHandle: query_pools => QueryPool;
+    AccelStructHandle: accel_structs => AccelStruct;
+}
+
+impl Destroy for ShaderModuleHandle {
+    /// Pipelines do not need their modules once they are created.
+    fn take_from(self, ctx: &Context) {
+        drop(ctx.shared().store.shader_modules.remove(self));
+    }
+}

@@ -1,0 +1,57 @@
+//! What stands in bindless slots that nobody owns: a texture that is seen at once, a sampler, an empty structure.
+
+use std::sync::Arc;
+
+use super::Context;
+use super::create_accel::new_tlas;
+use crate::accel::AccelStruct;
+use crate::accel::desc::TlasDesc;
+use crate::accel::structure::BuildMode;
+use crate::bindless::Dummies;
+use crate::error::Result;
+use crate::resource::sampler::SamplerDesc;
+use crate::resource::texture::{TextureDesc, TextureRegion, TextureUsage};
+use crate::resource::{Sampler, Texture};
+use crate::shared::DummyObjects;
+
+/// The slot of the dummies.
+const SLOT: u32 = 0;
+const MAGENTA: [u8; 4] = [255, 0, 255, 255];
+const BLACK: [u8; 4] = [0, 0, 0, 255];
+
+/// Makes the dummies and puts them into every slot. They live as long as the context.
+pub(super) fn fill_dummies(ctx: &Context) -> Result<()> {
+    let shared = ctx.shared();
+    let texture = Arc::new(checker(ctx)?);
+    let pixels = [MAGENTA, BLACK, BLACK, MAGENTA].concat();
+    ctx.before_next_submission(|cmd| cmd.upload_texture(&texture, &TextureRegion::default(), &pixels))?;
+    let sampler = SamplerDesc { debug_name: "dummy sampler", ..Default::default() };
+    let sampler = Sampler::new(&shared.gpu, &sampler, SLOT)?;
+    let tlas = if shared.gpu.accel.is_some() { Some(empty_tlas(ctx)?) } else { None };
+    shared.bindless.fill(Dummies {
+        sampled: texture.sampled_view()?,
+        storage: texture.storage_view()?,
+        sampler: sampler.raw,
+        tlas: tlas.as_ref().map(|tlas| tlas.raw),
+    });
+    // The cell is empty: this runs once, while the context is made.
+    let _ = shared.dummies.set(DummyObjects { _texture: texture, _sampler: sampler, _tlas: tlas });
+    Ok(())
+}
+
+fn checker(ctx: &Context) -> Result<Texture> {
+    let desc = TextureDesc {
+        extent: [2, 2],
+        usage: TextureUsage::SAMPLED | TextureUsage::STORAGE,
+        debug_name: "dummy texture",
+        ..Default::default()
+    };
+    Texture::new(&ctx.shared().gpu, &desc, SLOT)
+}
+
+fn empty_tlas(ctx: &Context) -> Result<Arc<AccelStruct>> {
+    let desc = TlasDesc { debug_name: "dummy tlas", ..Default::default() };
+    let tlas = Arc::new(new_tlas(ctx.shared(), &desc, SLOT)?);
+    ctx.before_next_submission(|cmd| cmd.update_tlas_object(&tlas, &[], BuildMode::Rebuild))?;
+    Ok(tlas)
+}

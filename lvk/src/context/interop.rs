@@ -1,0 +1,97 @@
+//! The Vulkan objects behind a context and its handles, for engines that mix in calls of their own.
+
+use ash::vk;
+
+use super::Context;
+use crate::error::Result;
+use crate::handle::{
+    AccelStructHandle, BufferHandle, ComputePipelineHandle, RayTracingPipelineHandle, RenderPipelineHandle,
+    SamplerHandle, TextureHandle,
+};
+
+impl Context {
+    /// The instance.
+    pub fn raw_instance(&self) -> &ash::Instance {
+        &self.shared().gpu.instance.raw
+    }
+
+    /// The loader's entry points.
+    pub fn raw_entry(&self) -> &ash::Entry {
+        &self.shared().gpu.instance.entry
+    }
+
+    /// The device. Destroying what the library owns, or using its queue while it submits, is the caller's fault.
+    pub fn raw_device(&self) -> &ash::Device {
+        &self.shared().gpu.device
+    }
+
+    /// The physical device.
+    pub fn raw_physical_device(&self) -> vk::PhysicalDevice {
+        self.shared().gpu.physical()
+    }
+
+    /// Family of the one queue.
+    pub fn raw_queue_family(&self) -> u32 {
+        self.shared().gpu.queue_family
+    }
+
+    /// Runs `call` with the queue locked, so that it may submit.
+    pub fn with_raw_queue<T>(&self, call: impl FnOnce(vk::Queue) -> T) -> T {
+        call(*self.shared().gpu.queue())
+    }
+
+    /// The layout all pipelines share: the bindless set and the push constants of every stage.
+    pub fn raw_pipeline_layout(&self) -> vk::PipelineLayout {
+        self.shared().layout.raw
+    }
+
+    /// The bindless set.
+    pub fn raw_descriptor_set(&self) -> vk::DescriptorSet {
+        self.shared().bindless.set
+    }
+
+    /// The buffer behind a handle.
+    pub fn raw_buffer(&self, buffer: BufferHandle) -> Result<vk::Buffer> {
+        Ok(self.shared().store.buffers.get(buffer)?.raw)
+    }
+
+    /// The image behind a handle.
+    pub fn raw_image(&self, texture: TextureHandle) -> Result<vk::Image> {
+        Ok(self.shared().store.textures.get(texture)?.raw)
+    }
+
+    /// The view shaders sample.
+    pub fn raw_image_view(&self, texture: TextureHandle) -> Result<vk::ImageView> {
+        self.shared().store.textures.get(texture)?.sampled_view()
+    }
+
+    /// The sampler behind a handle.
+    pub fn raw_sampler(&self, sampler: SamplerHandle) -> Result<vk::Sampler> {
+        Ok(self.shared().store.samplers.get(sampler)?.raw)
+    }
+
+    /// The graphics pipeline behind a handle.
+    pub fn raw_render_pipeline(&self, pipeline: RenderPipelineHandle) -> Result<vk::Pipeline> {
+        Ok(self.shared().store.render_pipelines.get(pipeline)?.raw)
+    }
+
+    /// The compute pipeline behind a handle.
+    pub fn raw_compute_pipeline(&self, pipeline: ComputePipelineHandle) -> Result<vk::Pipeline> {
+        Ok(self.shared().store.compute_pipelines.get(pipeline)?.raw)
+    }
+
+    /// The ray tracing pipeline behind a handle.
+    pub fn raw_ray_tracing_pipeline(&self, pipeline: RayTracingPipelineHandle) -> Result<vk::Pipeline> {
+        Ok(self.shared().store.ray_tracing_pipelines.get(pipeline)?.raw)
+    }
+
+    /// The acceleration structure behind a handle.
+    pub fn raw_accel_struct(&self, structure: AccelStructHandle) -> Result<vk::AccelerationStructureKHR> {
+        Ok(self.shared().store.accel_structs.get(structure)?.raw)
+    }
+
+    /// The device address of an acceleration structure, as instances hold it.
+    pub fn accel_struct_address(&self, structure: AccelStructHandle) -> Result<u64> {
+        Ok(self.shared().store.accel_structs.get(structure)?.address)
+    }
+}

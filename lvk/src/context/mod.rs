@@ -1,0 +1,78 @@
+//! The facade users hold: a context creates objects, moves data, hands out command buffers and submits them.
+
+pub(crate) mod config;
+mod create;
+mod create_accel;
+mod data;
+pub(crate) mod destroy;
+mod dummy;
+pub(crate) mod frame;
+pub(crate) mod holder;
+mod interop;
+mod start;
+mod submit;
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use crate::command::CommandBuffer;
+use crate::error::Result;
+use crate::gpu::caps::Capabilities;
+use crate::gpu::debug::ValidationSink;
+use crate::shared::Shared;
+
+use frame::FrameRing;
+
+/// A Vulkan device with everything made from it.
+///
+/// Cloning is cheap and gives the same context. All methods take `&self` and may be called from any thread. The
+/// device goes when the last clone, holder and command buffer are gone; objects still alive then are reported to the
+/// `log` crate by name.
+#[derive(Clone)]
+pub struct Context {
+    inner: Arc<Inner>,
+}
+
+struct Inner {
+    /// Uploads and builds that run before the next submission.
+    pending: Mutex<Option<CommandBuffer>>,
+    frames: Mutex<FrameRing>,
+    shared: Arc<Shared>,
+}
+
+impl Context {
+    /// What the device can do.
+    pub fn capabilities(&self) -> &Capabilities {
+        &self.shared().gpu.caps
+    }
+
+    /// The messages of the validation layer so far.
+    pub fn validation(&self) -> &ValidationSink {
+        self.shared().gpu.instance.sink()
+    }
+
+    fn shared(&self) -> &Arc<Shared> {
+        &self.inner.shared
+    }
+
+    /// Records into the command buffer that runs before the next submission.
+    fn before_next_submission<T>(&self, record: impl FnOnce(&mut CommandBuffer) -> Result<T>) -> Result<T> {
+        let mut pending = self.pending();
+        let mut cmd = match pending.take() {
+            Some(cmd) => cmd,
+            None => CommandBuffer::new(self.shared())?,
+        };
+        let result = record(&mut cmd);
+        *pending = Some(cmd);
+        result
+    }
+
+    fn pending(&self) -> MutexGuard<'_, Option<CommandBuffer>> {
+        self.inner.pending.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl std::fmt::Debug for Context {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Context").field("device", &self.capabilities().device_name).finish_non_exhaustive()
+    }
+}

@@ -1,0 +1,75 @@
+//! Makes a context.
+
+use std::path::Path;
+use std::sync::{Arc, Mutex, OnceLock};
+
+use super::config::ContextDesc;
+use super::dummy::fill_dummies;
+use super::frame::FrameRing;
+use super::{Context, Inner};
+use crate::accel::scratch_buffer::ScratchBuffer;
+use crate::barrier::ResourceId;
+use crate::bindless::Bindless;
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::gpu::caps::{Capabilities, PhysicalDevice};
+use crate::gpu::debug::{Validation, ValidationSink};
+use crate::gpu::device::RayTracing;
+use crate::gpu::instance::Instance;
+use crate::pipeline::PipelineLayout;
+use crate::shared::Shared;
+use crate::store::Store;
+use crate::submit::Submitter;
+use crate::upload::Staging;
+
+impl Context {
+    /// Opens Vulkan and makes a device that has what `desc` requires.
+    ///
+    /// # Errors
+    /// [`NoVulkan`](crate::Error::NoVulkan) without a loader or driver; [`NoDevice`](crate::Error::NoDevice) with the
+    /// reason for each device when none will do; [`Unsupported`](crate::Error::Unsupported) when validation is wanted
+    /// and its layer is missing.
+    pub fn new(desc: &ContextDesc<'_>) -> Result<Self> {
+        let sink = desc.validation_sink.clone().unwrap_or_default();
+        let instance = Instance::new(desc.application_name, desc.vulkan_library, desc.validation, sink)?;
+        let wish = std::env::var("LVK_DEVICE").ok().filter(|wish| !wish.is_empty());
+        let wish = wish.as_deref().or(desc.device);
+        let request = RayTracing { pipeline: desc.ray_tracing_pipeline, query: desc.ray_query };
+        let gpu = Arc::new(Gpu::new(instance, wish, request)?);
+        let shared = Arc::new(new_shared(gpu, desc)?);
+        let inner = Inner {
+            pending: Mutex::default(),
+            frames: Mutex::new(FrameRing::new(desc.frames_in_flight)),
+            shared,
+        };
+        let context = Self { inner: Arc::new(inner) };
+        fill_dummies(&context)?;
+        Ok(context)
+    }
+
+    /// What every device of the machine can do, in the order of their numbers.
+    ///
+    /// `vulkan_library` is the loader to open, the system's without one.
+    pub fn devices(vulkan_library: Option<&Path>) -> Result<Vec<Capabilities>> {
+        let instance = Instance::new("lvk", vulkan_library, Validation::Off, ValidationSink::default())?;
+        let devices = instance.physical_devices()?;
+        devices.into_iter().map(|raw| Ok(PhysicalDevice::query(&instance.raw, raw)?.capabilities)).collect()
+    }
+}
+
+fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
+    let bindless = Bindless::new(&gpu, desc.max_textures)?;
+    Ok(Shared {
+        dummies: OnceLock::new(),
+        store: Store::new(),
+        staging: Staging::new(&gpu, desc.staging_bytes)?,
+        scratch: ScratchBuffer::default(),
+        scratch_budget_bytes: desc.scratch_budget_bytes,
+        layout: PipelineLayout::new(&gpu, bindless.set_layout)?,
+        bindless,
+        submitter: Submitter::new(&gpu)?,
+        all_blas: ResourceId::next(),
+        all_tlas: ResourceId::next(),
+        gpu,
+    })
+}

@@ -1,0 +1,74 @@
+//! Hands command buffers to the GPU and waits for them.
+
+use super::Context;
+use crate::command::CommandBuffer;
+use crate::error::{Error, Result};
+use crate::submit::SubmitHandle;
+
+impl Context {
+    /// Starts recording a command buffer. Any number may be recorded at once, on any threads.
+    pub fn acquire_command_buffer(&self) -> Result<CommandBuffer> {
+        self.shared().collect()?;
+        CommandBuffer::new(self.shared())
+    }
+
+    /// Submits a command buffer, after uploads and builds made before (`vkQueueSubmit2`). Does not wait.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) if the command buffer belongs to another context.
+    pub fn submit(&self, cmd: CommandBuffer) -> Result<SubmitHandle> {
+        if !cmd.belongs_to(self.shared()) {
+            return Err(Error::usage("submit", "the command buffer belongs to another context"));
+        }
+        let mut pending = self.pending();
+        let recordings = pending.take().into_iter().chain([cmd]).map(CommandBuffer::finish).collect();
+        let value = self.shared().submitter.submit(recordings, || self.shared().bindless.flush())?;
+        drop(pending);
+        self.shared().collect()?;
+        Ok(SubmitHandle(value))
+    }
+
+    /// Submits uploads and builds that wait for the next submission, if there are any.
+    pub fn flush(&self) -> Result<SubmitHandle> {
+        let mut pending = self.pending();
+        let Some(cmd) = pending.take() else { return Ok(SubmitHandle(self.shared().submitter.submitted())) };
+        let recordings = vec![cmd.finish()];
+        let value = self.shared().submitter.submit(recordings, || self.shared().bindless.flush())?;
+        Ok(SubmitHandle(value))
+    }
+
+    /// Waits until a submission is done (`vkWaitSemaphores`).
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) if the handle is of a submission that this context never made.
+    pub fn wait(&self, submission: SubmitHandle) -> Result<()> {
+        self.check_submitted(submission)?;
+        self.shared().submitter.timeline.wait(submission.0)?;
+        self.shared().collect()
+    }
+
+    /// Whether a submission is done. Does not wait.
+    pub fn is_done(&self, submission: SubmitHandle) -> Result<bool> {
+        self.check_submitted(submission)?;
+        Ok(self.shared().submitter.timeline.completed()? >= submission.0)
+    }
+
+    /// Submits what waits for the next submission, and waits until the GPU has nothing left to do.
+    pub fn wait_idle(&self) -> Result<()> {
+        self.flush()?;
+        self.wait_submitted()
+    }
+
+    /// Waits for everything submitted so far.
+    pub(super) fn wait_submitted(&self) -> Result<()> {
+        self.wait(SubmitHandle(self.shared().submitter.submitted()))
+    }
+
+    fn check_submitted(&self, submission: SubmitHandle) -> Result<()> {
+        let last = self.shared().submitter.submitted();
+        if submission.0 <= last {
+            return Ok(());
+        }
+        Err(Error::usage("wait", "the submission belongs to another context"))
+    }
+}

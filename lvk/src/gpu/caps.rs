@@ -1,0 +1,389 @@
+//! What a physical device has, what of it the library turns on, and what callers may ask.
+
+use std::ffi::CStr;
+
+use ash::vk;
+
+use super::select::DeviceKind;
+use crate::error::{Error, Result};
+
+/// Whether the caller needs a feature.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum FeatureRequest {
+    /// Only devices that have it are considered.
+    Required,
+    /// Used where present.
+    #[default]
+    Optional,
+    /// Not used even where present.
+    Off,
+}
+
+impl FeatureRequest {
+    pub(crate) fn wants(self) -> bool {
+        self != Self::Off
+    }
+}
+
+/// What the device of a context can do.
+#[derive(Debug, Clone, Default)]
+pub struct Capabilities {
+    /// The device's own name.
+    pub device_name: String,
+    /// The driver's name, for instance `llvmpipe` or `NVIDIA`.
+    pub driver_name: String,
+    /// The driver's version text.
+    pub driver_info: String,
+    /// Vulkan version of the device as (major, minor, patch).
+    pub api_version: (u32, u32, u32),
+    /// Whether the device is a CPU: everything is traced and rasterised in software.
+    pub is_cpu: bool,
+    /// Ray tracing pipelines (`VK_KHR_ray_tracing_pipeline`) can be created and traced.
+    pub ray_tracing_pipeline: bool,
+    /// Shaders may use ray queries (`VK_KHR_ray_query`).
+    pub ray_query: bool,
+    /// Why ray tracing is off although the device offers it: device creation with it failed, and was repeated without.
+    pub ray_tracing_fallback: Option<String>,
+    /// `gl_PrimitiveID` may be read in fragment shaders (`geometryShader`).
+    pub primitive_id: bool,
+    /// Storage images may be read without a format in the shader (`shaderStorageImageReadWithoutFormat`).
+    pub formatless_storage_read: bool,
+    /// Shaders may use 64-bit integers (`shaderInt64`).
+    pub shader_int64: bool,
+    /// Several draws may come from one indirect call (`multiDrawIndirect`).
+    pub multi_draw_indirect: bool,
+    /// Largest sampler anisotropy; 1 where the device has none.
+    pub max_anisotropy: f32,
+    /// The driver's builder keeps the order of triangles it is given (lavapipe before 26): meshes should be ordered
+    /// spatially first.
+    pub prefers_spatial_order: bool,
+    /// The numbers behind the limits.
+    pub limits: Limits,
+}
+
+/// Limits of the device, in the unit of each name.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Limits {
+    /// Widest 2D texture, in texels a side (`maxImageDimension2D`).
+    pub max_texture_2d: u32,
+    /// Widest cube texture, in texels a side (`maxImageDimensionCube`).
+    pub max_texture_cube: u32,
+    /// Most layers of a texture (`maxImageArrayLayers`).
+    pub max_texture_layers: u32,
+    /// Largest buffer in bytes (`maxBufferSize`).
+    pub max_buffer_bytes: u64,
+    /// Push constants in bytes (`maxPushConstantsSize`).
+    pub max_push_constant_bytes: u32,
+    /// Most colour targets of a render pass (`maxColorAttachments`).
+    pub max_color_targets: u32,
+    /// Most workgroups of a dispatch for each axis (`maxComputeWorkGroupCount`).
+    pub max_dispatch_groups: [u32; 3],
+    /// Nanoseconds of one tick of a timestamp (`timestampPeriod`); 0 where the queue has none.
+    pub timestamp_period_ns: f32,
+    /// Bits of a timestamp that count (`timestampValidBits`).
+    pub timestamp_bits: u32,
+    /// Most elements of `kTextures2D[]` and the storage images.
+    pub max_bindless_textures: u32,
+    /// Most elements of `kSamplers[]`.
+    pub max_bindless_samplers: u32,
+    /// Most elements of `kTLAS[]`.
+    pub max_bindless_tlas: u32,
+    /// Alignment of scratch addresses in bytes (`minAccelerationStructureScratchOffsetAlignment`).
+    pub scratch_alignment: u32,
+    /// Most geometries in a BLAS (`maxGeometryCount`).
+    pub max_blas_geometries: u64,
+    /// Most primitives in a BLAS (`maxPrimitiveCount`).
+    pub max_blas_primitives: u64,
+    /// Most instances in a TLAS (`maxInstanceCount`).
+    pub max_tlas_instances: u64,
+    /// Deepest recursion of `traceRayEXT` (`maxRayRecursionDepth`).
+    pub max_ray_recursion: u32,
+    /// Most invocations of one trace (`maxRayDispatchInvocationCount`).
+    pub max_trace_invocations: u32,
+    /// Bytes of a shader group handle (`shaderGroupHandleSize`).
+    pub sbt_handle_bytes: u32,
+    /// Alignment of handles in bytes (`shaderGroupHandleAlignment`).
+    pub sbt_handle_alignment: u32,
+    /// Alignment of shader binding table regions in bytes (`shaderGroupBaseAlignment`).
+    pub sbt_base_alignment: u32,
+    /// Largest stride of a shader binding table in bytes (`maxShaderGroupStride`).
+    pub sbt_max_stride: u32,
+}
+
+/// One physical device as found, before any is chosen.
+pub(crate) struct PhysicalDevice {
+    pub(crate) raw: vk::PhysicalDevice,
+    pub(crate) capabilities: Capabilities,
+    pub(crate) kind: DeviceKind,
+    pub(crate) local_memory_bytes: u64,
+    pub(crate) queue_family: Option<u32>,
+    /// Core features the library cannot do without and the device lacks.
+    pub(crate) missing: Vec<String>,
+    pub(crate) features: vk::PhysicalDeviceFeatures,
+    pub(crate) deferred_host_operations: bool,
+}
+
+impl PhysicalDevice {
+    pub(crate) fn query(instance: &ash::Instance, raw: vk::PhysicalDevice) -> Result<Self> {
+        // SAFETY: `raw` was enumerated from `instance`.
+        let plain = unsafe { instance.get_physical_device_properties(raw) };
+        // SAFETY: as above.
+        let extensions = unsafe { instance.enumerate_device_extension_properties(raw) }
+            .map_err(Error::vulkan("vkEnumerateDeviceExtensionProperties"))?;
+        let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        let queue = queue_family(instance, raw);
+        let mut found = Self {
+            raw,
+            capabilities: Capabilities {
+                device_name: name_of(&plain),
+                api_version: version(plain.api_version),
+                is_cpu: plain.device_type == vk::PhysicalDeviceType::CPU,
+                ..Default::default()
+            },
+            kind: kind(plain.device_type),
+            local_memory_bytes: local_memory(instance, raw),
+            queue_family: queue.map(|(family, _)| family),
+            missing: Vec::new(),
+            features: vk::PhysicalDeviceFeatures::default(),
+            deferred_host_operations: has(ash::khr::deferred_host_operations::NAME),
+        };
+        if plain.api_version < vk::API_VERSION_1_3 {
+            found.missing.push("Vulkan 1.3".to_owned());
+            return Ok(found);
+        }
+        if queue.is_none() {
+            found.missing.push("a queue for graphics and compute".to_owned());
+        }
+        let ray_tracing = found.read_features(instance, &has);
+        found.read_properties(instance, &plain, ray_tracing);
+        found.capabilities.limits.timestamp_bits = queue.map_or(0, |(_, bits)| bits);
+        Ok(found)
+    }
+
+    /// Fills the features and what is missing; answers whether acceleration structures may be asked about.
+    fn read_features(&mut self, instance: &ash::Instance, has: &dyn Fn(&CStr) -> bool) -> bool {
+        let structures = has(ash::khr::acceleration_structure::NAME) && self.deferred_host_operations;
+        let mut accel = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
+        let mut pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default();
+        let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
+        let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
+        let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
+        let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12).push_next(&mut v13);
+        if structures {
+            all = all.push_next(&mut accel);
+        }
+        if has(ash::khr::ray_tracing_pipeline::NAME) {
+            all = all.push_next(&mut pipeline);
+        }
+        if has(ash::khr::ray_query::NAME) {
+            all = all.push_next(&mut query);
+        }
+        // SAFETY: the chain holds only structures the device knows, and lives until the call returns.
+        unsafe { instance.get_physical_device_features2(self.raw, &mut all) };
+        let core = all.features;
+        let caps = &mut self.capabilities;
+        let usable = accel.acceleration_structure
+            & accel.descriptor_binding_acceleration_structure_update_after_bind
+            == vk::TRUE;
+        caps.ray_tracing_pipeline = usable && pipeline.ray_tracing_pipeline == vk::TRUE;
+        caps.ray_query = usable && query.ray_query == vk::TRUE;
+        caps.primitive_id = core.geometry_shader == vk::TRUE;
+        caps.formatless_storage_read = core.shader_storage_image_read_without_format == vk::TRUE;
+        caps.shader_int64 = core.shader_int64 == vk::TRUE;
+        caps.multi_draw_indirect = core.multi_draw_indirect == vk::TRUE;
+        self.missing.extend(missing_core(&core, &v12, &v13));
+        self.features = wanted_core(&core);
+        usable
+    }
+
+    fn read_properties(
+        &mut self,
+        instance: &ash::Instance,
+        plain: &vk::PhysicalDeviceProperties,
+        ray_tracing: bool,
+    ) {
+        let mut accel = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
+        let mut pipeline = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
+        let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
+        let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
+        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut v12).push_next(&mut v13);
+        if ray_tracing {
+            all = all.push_next(&mut accel);
+        }
+        if self.capabilities.ray_tracing_pipeline {
+            all = all.push_next(&mut pipeline);
+        }
+        // SAFETY: the chain holds only structures the device knows, and lives until the call returns.
+        unsafe { instance.get_physical_device_properties2(self.raw, &mut all) };
+        let caps = &mut self.capabilities;
+        caps.driver_name = v12.driver_name_as_c_str().map(to_string).unwrap_or_default();
+        caps.driver_info = v12.driver_info_as_c_str().map(to_string).unwrap_or_default();
+        caps.max_anisotropy = if self.features.sampler_anisotropy == vk::TRUE {
+            plain.limits.max_sampler_anisotropy
+        } else {
+            1.0
+        };
+        caps.prefers_spatial_order = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
+        caps.limits = limits(&plain.limits, &v12, &v13, &accel, &pipeline);
+    }
+}
+
+/// A queue family for everything the library submits, with the bits of its timestamps.
+fn queue_family(instance: &ash::Instance, raw: vk::PhysicalDevice) -> Option<(u32, u32)> {
+    // SAFETY: `raw` was enumerated from `instance`.
+    let families = unsafe { instance.get_physical_device_queue_family_properties(raw) };
+    let needed = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+    let index = families.iter().position(|family| family.queue_flags.contains(needed))?;
+    Some((index as u32, families[index].timestamp_valid_bits))
+}
+
+fn local_memory(instance: &ash::Instance, raw: vk::PhysicalDevice) -> u64 {
+    // SAFETY: `raw` was enumerated from `instance`.
+    let memory = unsafe { instance.get_physical_device_memory_properties(raw) };
+    let heaps = memory.memory_heaps_as_slice().iter();
+    heaps.filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)).map(|heap| heap.size).sum()
+}
+
+fn missing_core(
+    core: &vk::PhysicalDeviceFeatures,
+    v12: &vk::PhysicalDeviceVulkan12Features<'_>,
+    v13: &vk::PhysicalDeviceVulkan13Features<'_>,
+) -> Vec<String> {
+    let needed = [
+        (core.shader_storage_image_write_without_format, "shaderStorageImageWriteWithoutFormat"),
+        (core.fragment_stores_and_atomics, "fragmentStoresAndAtomics"),
+        (core.independent_blend, "independentBlend"),
+        (v12.buffer_device_address, "bufferDeviceAddress"),
+        (v12.timeline_semaphore, "timelineSemaphore"),
+        (v12.host_query_reset, "hostQueryReset"),
+        (v12.scalar_block_layout, "scalarBlockLayout"),
+        (v12.runtime_descriptor_array, "runtimeDescriptorArray"),
+        (v12.descriptor_binding_partially_bound, "descriptorBindingPartiallyBound"),
+        (v12.descriptor_binding_update_unused_while_pending, "descriptorBindingUpdateUnusedWhilePending"),
+        (
+            v12.descriptor_binding_sampled_image_update_after_bind,
+            "descriptorBindingSampledImageUpdateAfterBind",
+        ),
+        (
+            v12.descriptor_binding_storage_image_update_after_bind,
+            "descriptorBindingStorageImageUpdateAfterBind",
+        ),
+        (v12.shader_sampled_image_array_non_uniform_indexing, "shaderSampledImageArrayNonUniformIndexing"),
+        (v12.shader_storage_image_array_non_uniform_indexing, "shaderStorageImageArrayNonUniformIndexing"),
+        (v13.synchronization2, "synchronization2"),
+        (v13.dynamic_rendering, "dynamicRendering"),
+        (v13.maintenance4, "maintenance4"),
+    ];
+    needed.iter().filter(|(on, _)| *on == vk::FALSE).map(|(_, name)| (*name).to_owned()).collect()
+}
+
+/// The core features turned on: what is needed, and what is useful where present.
+fn wanted_core(core: &vk::PhysicalDeviceFeatures) -> vk::PhysicalDeviceFeatures {
+    vk::PhysicalDeviceFeatures {
+        full_draw_index_uint32: core.full_draw_index_uint32,
+        image_cube_array: core.image_cube_array,
+        independent_blend: core.independent_blend,
+        geometry_shader: core.geometry_shader,
+        tessellation_shader: core.tessellation_shader,
+        dual_src_blend: core.dual_src_blend,
+        multi_draw_indirect: core.multi_draw_indirect,
+        draw_indirect_first_instance: core.draw_indirect_first_instance,
+        depth_clamp: core.depth_clamp,
+        fill_mode_non_solid: core.fill_mode_non_solid,
+        sampler_anisotropy: core.sampler_anisotropy,
+        texture_compression_bc: core.texture_compression_bc,
+        vertex_pipeline_stores_and_atomics: core.vertex_pipeline_stores_and_atomics,
+        fragment_stores_and_atomics: core.fragment_stores_and_atomics,
+        shader_storage_image_extended_formats: core.shader_storage_image_extended_formats,
+        shader_storage_image_read_without_format: core.shader_storage_image_read_without_format,
+        shader_storage_image_write_without_format: core.shader_storage_image_write_without_format,
+        shader_int64: core.shader_int64,
+        shader_int16: core.shader_int16,
+        ..Default::default()
+    }
+}
+
+/// Slots the library asks for where the device allows more; textures are bounded by the context's description.
+const WANTED_SAMPLERS: u32 = 1_024;
+const WANTED_TLAS: u32 = 256;
+
+fn limits(
+    plain: &vk::PhysicalDeviceLimits,
+    v12: &vk::PhysicalDeviceVulkan12Properties<'_>,
+    v13: &vk::PhysicalDeviceVulkan13Properties<'_>,
+    accel: &vk::PhysicalDeviceAccelerationStructurePropertiesKHR<'_>,
+    pipeline: &vk::PhysicalDeviceRayTracingPipelinePropertiesKHR<'_>,
+) -> Limits {
+    let mut limits = Limits {
+        max_texture_2d: plain.max_image_dimension2_d,
+        max_texture_cube: plain.max_image_dimension_cube,
+        max_texture_layers: plain.max_image_array_layers,
+        max_buffer_bytes: v13.max_buffer_size,
+        max_push_constant_bytes: plain.max_push_constants_size,
+        max_color_targets: plain.max_color_attachments.min(8),
+        max_dispatch_groups: plain.max_compute_work_group_count,
+        timestamp_period_ns: plain.timestamp_period,
+        timestamp_bits: 0,
+        max_bindless_textures: 0,
+        max_bindless_samplers: 0,
+        max_bindless_tlas: 0,
+        scratch_alignment: accel.min_acceleration_structure_scratch_offset_alignment.max(1),
+        max_blas_geometries: accel.max_geometry_count,
+        max_blas_primitives: accel.max_primitive_count,
+        max_tlas_instances: accel.max_instance_count,
+        max_ray_recursion: pipeline.max_ray_recursion_depth,
+        max_trace_invocations: pipeline.max_ray_dispatch_invocation_count,
+        sbt_handle_bytes: pipeline.shader_group_handle_size,
+        sbt_handle_alignment: pipeline.shader_group_handle_alignment.max(1),
+        sbt_base_alignment: pipeline.shader_group_base_alignment.max(1),
+        sbt_max_stride: pipeline.max_shader_group_stride,
+    };
+    size_bindless(&mut limits, v12, accel);
+    limits
+}
+
+/// Sizes the arrays of the one descriptor set. A texture takes a sampled and a storage slot, and all slots of a
+/// stage together have a limit of their own.
+fn size_bindless(
+    limits: &mut Limits,
+    v12: &vk::PhysicalDeviceVulkan12Properties<'_>,
+    accel: &vk::PhysicalDeviceAccelerationStructurePropertiesKHR<'_>,
+) {
+    limits.max_bindless_tlas = WANTED_TLAS
+        .min(accel.max_per_stage_descriptor_update_after_bind_acceleration_structures)
+        .min(accel.max_descriptor_set_update_after_bind_acceleration_structures);
+    limits.max_bindless_samplers = WANTED_SAMPLERS
+        .min(v12.max_per_stage_descriptor_update_after_bind_samplers)
+        .min(v12.max_descriptor_set_update_after_bind_samplers);
+    let left = v12
+        .max_per_stage_update_after_bind_resources
+        .saturating_sub(limits.max_bindless_tlas + limits.max_bindless_samplers + limits.max_color_targets);
+    limits.max_bindless_textures = v12
+        .max_per_stage_descriptor_update_after_bind_sampled_images
+        .min(v12.max_descriptor_set_update_after_bind_sampled_images)
+        .min(v12.max_per_stage_descriptor_update_after_bind_storage_images)
+        .min(v12.max_descriptor_set_update_after_bind_storage_images)
+        .min(left / 2);
+}
+
+fn name_of(properties: &vk::PhysicalDeviceProperties) -> String {
+    properties.device_name_as_c_str().map(to_string).unwrap_or_default()
+}
+
+fn to_string(text: &CStr) -> String {
+    text.to_string_lossy().into_owned()
+}
+
+fn version(packed: u32) -> (u32, u32, u32) {
+    (vk::api_version_major(packed), vk::api_version_minor(packed), vk::api_version_patch(packed))
+}
+
+fn kind(raw: vk::PhysicalDeviceType) -> DeviceKind {
+    match raw {
+        vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
+        vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
+        vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
+        vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
+        _ => DeviceKind::Other,
+    }
+}

@@ -1,0 +1,159 @@
+//! Validation messages, object names.
+
+use std::ffi::{CStr, CString, c_void};
+use std::fmt;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ash::vk;
+
+/// How much the validation layer checks. The layer must be installed; see [`Validation::Standard`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Validation {
+    /// No layer is loaded.
+    #[default]
+    Off,
+    /// Core checks, and synchronization validation with the shader-access heuristic.
+    Standard,
+    /// As [`Standard`](Validation::Standard), and shaders are instrumented to check their accesses on the GPU.
+    /// About half as slow again; meant as a run of its own.
+    GpuAssisted,
+}
+
+/// One message of the validation layer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ValidationMessage {
+    /// `true` for errors, `false` for warnings.
+    pub error: bool,
+    /// The layer's name of the rule, for instance `VUID-vkCmdDraw-None-02699`.
+    pub id: String,
+    /// The layer's text.
+    pub text: String,
+}
+
+impl fmt::Display for ValidationMessage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let severity = if self.error { "error" } else { "warning" };
+        write!(f, "validation {severity} {}: {}", self.id, self.text)
+    }
+}
+
+/// Collects the messages of the validation layer. A cheap clone shares the same messages, so a test can keep one
+/// and read it after the context is gone.
+#[derive(Debug, Clone, Default)]
+pub struct ValidationSink {
+    messages: Arc<Mutex<Vec<ValidationMessage>>>,
+}
+
+impl ValidationSink {
+    /// Messages kept; later ones are logged only.
+    const CAPACITY: usize = 1024;
+
+    /// The messages so far, oldest first.
+    pub fn messages(&self) -> Vec<ValidationMessage> {
+        self.lock().clone()
+    }
+
+    /// Takes the messages out.
+    pub fn take(&self) -> Vec<ValidationMessage> {
+        std::mem::take(&mut *self.lock())
+    }
+
+    /// Whether the layer has been silent.
+    pub fn is_empty(&self) -> bool {
+        self.lock().is_empty()
+    }
+
+    fn push(&self, message: ValidationMessage) {
+        let mut messages = self.lock();
+        if messages.len() < Self::CAPACITY {
+            messages.push(message);
+        }
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Vec<ValidationMessage>> {
+        self.messages.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The messenger of an instance; `sink` is boxed so that its address stays put while Vulkan holds it.
+pub(crate) struct Messenger {
+    sink: Box<ValidationSink>,
+    installed: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+}
+
+impl Messenger {
+    pub(crate) fn new(sink: ValidationSink) -> Self {
+        Self { sink: Box::new(sink), installed: None }
+    }
+
+    pub(crate) fn sink(&self) -> &ValidationSink {
+        &self.sink
+    }
+
+    /// What both instance creation and [`install`](Self::install) are given.
+    pub(crate) fn create_info(&self) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
+        let sink: *const ValidationSink = &*self.sink;
+        vk::DebugUtilsMessengerCreateInfoEXT::default()
+            .message_severity(
+                vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+            )
+            .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
+            .pfn_user_callback(Some(on_message))
+            .user_data(sink.cast_mut().cast())
+    }
+
+    pub(crate) fn install(&mut self, entry: &ash::Entry, instance: &ash::Instance) -> Result<(), vk::Result> {
+        let ext = ash::ext::debug_utils::Instance::new(entry, instance);
+        // SAFETY: the sink outlives the messenger: both are fields of `self`, and `remove` runs first.
+        let raw = unsafe { ext.create_debug_utils_messenger(&self.create_info(), None)? };
+        self.installed = Some((ext, raw));
+        Ok(())
+    }
+
+    /// Must be called before the instance is destroyed.
+    pub(crate) fn remove(&mut self) {
+        if let Some((ext, raw)) = self.installed.take() {
+            // SAFETY: created by `install` and removed once.
+            unsafe { ext.destroy_debug_utils_messenger(raw, None) };
+        }
+    }
+}
+
+unsafe extern "system" fn on_message(
+    severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    user: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: Vulkan passes a valid structure, and `user` is the sink of the `Messenger` that outlives the callback.
+    let (data, sink) = unsafe { (&*data, &*user.cast::<ValidationSink>()) };
+    let message = ValidationMessage {
+        error: severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR),
+        // SAFETY: both strings are null or NUL-terminated and live during the callback.
+        id: unsafe { text(data.p_message_id_name) },
+        // SAFETY: as above.
+        text: unsafe { text(data.p_message) },
+    };
+    if message.error {
+        log::error!("{message}");
+    } else {
+        log::warn!("{message}");
+    }
+    sink.push(message);
+    vk::FALSE
+}
+
+/// # Safety
+/// `ptr` is null or points to a NUL-terminated string.
+unsafe fn text(ptr: *const std::ffi::c_char) -> String {
+    if ptr.is_null() {
+        return String::new();
+    }
+    // SAFETY: by the caller.
+    unsafe { CStr::from_ptr(ptr) }.to_string_lossy().into_owned()
+}
+
+/// A C string of a debug name; interior NUL bytes are dropped.
+pub(crate) fn c_name(name: &str) -> CString {
+    CString::new(name.replace('\0', "")).unwrap_or_default()
+}

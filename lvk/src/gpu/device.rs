@@ -1,0 +1,321 @@
+//! Chooses a physical device and makes the logical one, with its queue and its memory allocator.
+
+use std::ffi::c_char;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use ash::vk;
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
+
+use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
+use super::debug::c_name;
+use super::instance::Instance;
+use super::select::{Candidate, choose};
+use crate::error::{Error, Result};
+
+/// Which optional features are turned on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct RayTracing {
+    pub(crate) pipeline: FeatureRequest,
+    pub(crate) query: FeatureRequest,
+}
+
+/// One logical device with everything made from it that is not a resource. It knows no resource.
+pub(crate) struct Gpu {
+    pub(crate) device: ash::Device,
+    pub(crate) caps: Capabilities,
+    pub(crate) queue_family: u32,
+    pub(crate) accel: Option<ash::khr::acceleration_structure::Device>,
+    pub(crate) ray_tracing: Option<ash::khr::ray_tracing_pipeline::Device>,
+    physical: vk::PhysicalDevice,
+    debug_utils: Option<ash::ext::debug_utils::Device>,
+    allocator: Mutex<Option<Allocator>>,
+    queue: Mutex<vk::Queue>,
+    /// Declared last: destroyed after the device.
+    pub(crate) instance: Instance,
+}
+
+impl Gpu {
+    pub(crate) fn new(instance: Instance, wish: Option<&str>, request: RayTracing) -> Result<Self> {
+        let chosen = choose_device(&instance, wish, request)?;
+        let (device, caps) = create_with_fallback(&instance, &chosen, request)?;
+        let queue_family = chosen.queue_family.unwrap_or_default();
+        let allocator = match new_allocator(&instance, &device, chosen.raw) {
+            Ok(allocator) => allocator,
+            Err(error) => {
+                // SAFETY: nothing was made from the device yet.
+                unsafe { device.destroy_device(None) };
+                return Err(error);
+            }
+        };
+        // SAFETY: the device was created with one queue of this family.
+        let queue = unsafe { device.get_device_queue(queue_family, 0) };
+        let raw = &instance.raw;
+        let structures = caps.ray_tracing_pipeline || caps.ray_query;
+        Ok(Self {
+            queue_family,
+            accel: structures.then(|| ash::khr::acceleration_structure::Device::new(raw, &device)),
+            ray_tracing: caps
+                .ray_tracing_pipeline
+                .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
+            debug_utils: instance.debug_utils.then(|| ash::ext::debug_utils::Device::new(raw, &device)),
+            allocator: Mutex::new(Some(allocator)),
+            queue: Mutex::new(queue),
+            physical: chosen.raw,
+            device,
+            caps,
+            instance,
+        })
+    }
+
+    /// The queue; Vulkan wants one thread at a time on it.
+    pub(crate) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The memory allocator, `None` only while the context is being torn down.
+    pub(crate) fn allocator(&self) -> MutexGuard<'_, Option<Allocator>> {
+        self.allocator.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The functions of `VK_KHR_acceleration_structure`, or the error that says what the device lacks.
+    pub(crate) fn accel(&self) -> Result<&ash::khr::acceleration_structure::Device> {
+        self.accel.as_ref().ok_or_else(|| self.lacks("acceleration structures"))
+    }
+
+    /// The functions of `VK_KHR_ray_tracing_pipeline`, or the error that says what the device lacks.
+    pub(crate) fn ray_tracing(&self) -> Result<&ash::khr::ray_tracing_pipeline::Device> {
+        self.ray_tracing.as_ref().ok_or_else(|| self.lacks("ray tracing pipelines"))
+    }
+
+    /// An [`Error::Unsupported`] that names the device.
+    pub(crate) fn lacks(&self, what: &str) -> Error {
+        let reason = self
+            .caps
+            .ray_tracing_fallback
+            .as_deref()
+            .unwrap_or("its driver does not offer it, or it was turned off");
+        Error::unsupported(what, format!("the device '{}' has none: {reason}", self.caps.device_name))
+    }
+
+    /// The physical device.
+    pub(crate) fn physical(&self) -> vk::PhysicalDevice {
+        self.physical
+    }
+
+    /// What the device allows for an image of this description, or the driver's refusal.
+    pub(crate) fn image_limits(
+        &self,
+        info: &vk::ImageCreateInfo<'_>,
+    ) -> Result<vk::ImageFormatProperties, vk::Result> {
+        let instance = &self.instance.raw;
+        // SAFETY: the physical device belongs to the instance.
+        unsafe {
+            instance.get_physical_device_image_format_properties(
+                self.physical,
+                info.format,
+                info.image_type,
+                info.tiling,
+                info.usage,
+                info.flags,
+            )
+        }
+    }
+
+    /// What the device can do with images of `format` in optimal tiling.
+    pub(crate) fn image_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
+        self.format_properties(format).optimal_tiling_features
+    }
+
+    /// What the device can do with buffers of `format`.
+    pub(crate) fn buffer_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
+        self.format_properties(format).buffer_features
+    }
+
+    fn format_properties(&self, format: vk::Format) -> vk::FormatProperties {
+        // SAFETY: the physical device belongs to the instance.
+        unsafe { self.instance.raw.get_physical_device_format_properties(self.physical, format) }
+    }
+
+    /// Names an object for the validation layer and debuggers.
+    pub(crate) fn name<H: vk::Handle>(&self, object: H, name: &str) {
+        let Some(ext) = &self.debug_utils else { return };
+        let name = c_name(name);
+        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
+        // SAFETY: the object is alive and belongs to this device. A failure loses a name only.
+        let _ = unsafe { ext.set_debug_utils_object_name(&info) };
+    }
+
+    /// Opens a labelled range in a command buffer.
+    pub(crate) fn begin_label(&self, commands: vk::CommandBuffer, name: &str) {
+        let Some(ext) = &self.debug_utils else { return };
+        let name = c_name(name);
+        let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
+        // SAFETY: the command buffer is being recorded.
+        unsafe { ext.cmd_begin_debug_utils_label(commands, &label) };
+    }
+
+    /// Closes the innermost labelled range.
+    pub(crate) fn end_label(&self, commands: vk::CommandBuffer) {
+        if let Some(ext) = &self.debug_utils {
+            // SAFETY: the command buffer is being recorded and the caller counts its labels.
+            unsafe { ext.cmd_end_debug_utils_label(commands) };
+        }
+    }
+}
+
+impl Drop for Gpu {
+    fn drop(&mut self) {
+        self.allocator().take();
+        // SAFETY: everything made from the device is gone: the context destroys its objects before its `Gpu`.
+        unsafe { self.device.destroy_device(None) };
+    }
+}
+
+fn choose_device(instance: &Instance, wish: Option<&str>, request: RayTracing) -> Result<PhysicalDevice> {
+    let mut devices = Vec::new();
+    for raw in instance.physical_devices()? {
+        devices.push(PhysicalDevice::query(&instance.raw, raw)?);
+    }
+    if devices.is_empty() {
+        return Err(Error::NoVulkan { reason: "the loader found no device".to_owned() });
+    }
+    let candidates: Vec<_> = devices.iter().map(|device| candidate(device, request)).collect();
+    let index = choose(&candidates, wish)?;
+    Ok(devices.swap_remove(index))
+}
+
+fn candidate(device: &PhysicalDevice, request: RayTracing) -> Candidate {
+    let caps = &device.capabilities;
+    let optional = [
+        (request.pipeline, caps.ray_tracing_pipeline, "ray tracing pipelines"),
+        (request.query, caps.ray_query, "ray queries"),
+    ];
+    let mut missing = device.missing.clone();
+    let lacks = optional.iter().filter(|(wanted, has, _)| *wanted == FeatureRequest::Required && !has);
+    missing.extend(lacks.map(|(_, _, name)| (*name).to_owned()));
+    Candidate {
+        name: caps.device_name.clone(),
+        kind: device.kind,
+        local_memory_bytes: device.local_memory_bytes,
+        missing,
+        optional_score: optional.iter().filter(|(wanted, has, _)| wanted.wants() && *has).count() as u32,
+    }
+}
+
+/// Makes the device; when that fails with optional ray tracing on, tries once more without and says why.
+fn create_with_fallback(
+    instance: &Instance,
+    chosen: &PhysicalDevice,
+    request: RayTracing,
+) -> Result<(ash::Device, Capabilities)> {
+    let mut caps = chosen.capabilities.clone();
+    caps.ray_tracing_pipeline &= request.pipeline.wants();
+    caps.ray_query &= request.query.wants();
+    let first = match create(instance, chosen, &caps) {
+        Ok(device) => return Ok((device, caps)),
+        Err(error) => error,
+    };
+    let optional = [request.pipeline, request.query].iter().all(|r| *r != FeatureRequest::Required);
+    if !optional || !(caps.ray_tracing_pipeline || caps.ray_query) {
+        return Err(Error::vulkan("vkCreateDevice")(first));
+    }
+    caps.ray_tracing_pipeline = false;
+    caps.ray_query = false;
+    caps.limits.max_bindless_tlas = 0;
+    caps.ray_tracing_fallback = Some(format!("vkCreateDevice with ray tracing answered {first}"));
+    log::warn!("{}: ray tracing is off: vkCreateDevice with it answered {first}", caps.device_name);
+    let device = create(instance, chosen, &caps).map_err(Error::vulkan("vkCreateDevice"))?;
+    Ok((device, caps))
+}
+
+fn create(
+    instance: &Instance,
+    chosen: &PhysicalDevice,
+    caps: &Capabilities,
+) -> Result<ash::Device, vk::Result> {
+    let structures = caps.ray_tracing_pipeline || caps.ray_query;
+    let mut accel = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default()
+        .acceleration_structure(true)
+        .descriptor_binding_acceleration_structure_update_after_bind(true);
+    let mut pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
+    let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+    let mut v12 = features_1_2();
+    let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
+        .synchronization2(true)
+        .dynamic_rendering(true)
+        .maintenance4(true);
+    let mut all = vk::PhysicalDeviceFeatures2::default()
+        .features(chosen.features)
+        .push_next(&mut v12)
+        .push_next(&mut v13);
+    if structures {
+        all = all.push_next(&mut accel);
+    }
+    if caps.ray_tracing_pipeline {
+        all = all.push_next(&mut pipeline);
+    }
+    if caps.ray_query {
+        all = all.push_next(&mut query);
+    }
+    let queue = vk::DeviceQueueCreateInfo::default()
+        .queue_family_index(chosen.queue_family.unwrap_or_default())
+        .queue_priorities(&[1.0]);
+    let extensions = extensions(caps);
+    let info = vk::DeviceCreateInfo::default()
+        .queue_create_infos(std::slice::from_ref(&queue))
+        .enabled_extension_names(&extensions)
+        .push_next(&mut all);
+    // SAFETY: every pointer in `info` lives until the end of this function.
+    unsafe { instance.raw.create_device(chosen.raw, &info, None) }
+}
+
+fn features_1_2() -> vk::PhysicalDeviceVulkan12Features<'static> {
+    vk::PhysicalDeviceVulkan12Features::default()
+        .buffer_device_address(true)
+        .timeline_semaphore(true)
+        .host_query_reset(true)
+        .scalar_block_layout(true)
+        .descriptor_indexing(true)
+        .runtime_descriptor_array(true)
+        .descriptor_binding_partially_bound(true)
+        .descriptor_binding_update_unused_while_pending(true)
+        .descriptor_binding_sampled_image_update_after_bind(true)
+        .descriptor_binding_storage_image_update_after_bind(true)
+        .shader_sampled_image_array_non_uniform_indexing(true)
+        .shader_storage_image_array_non_uniform_indexing(true)
+}
+
+fn extensions(caps: &Capabilities) -> Vec<*const c_char> {
+    let mut names = Vec::new();
+    if caps.ray_tracing_pipeline || caps.ray_query {
+        names.push(ash::khr::acceleration_structure::NAME.as_ptr());
+        names.push(ash::khr::deferred_host_operations::NAME.as_ptr());
+    }
+    if caps.ray_tracing_pipeline {
+        names.push(ash::khr::ray_tracing_pipeline::NAME.as_ptr());
+    }
+    if caps.ray_query {
+        names.push(ash::khr::ray_query::NAME.as_ptr());
+    }
+    names
+}
+
+fn new_allocator(
+    instance: &Instance,
+    device: &ash::Device,
+    physical: vk::PhysicalDevice,
+) -> Result<Allocator> {
+    let mut debug_settings = AllocatorDebugSettings::default();
+    // The context reports by name what is left over.
+    debug_settings.log_leaks_on_shutdown = false;
+    Allocator::new(&AllocatorCreateDesc {
+        instance: instance.raw.clone(),
+        device: device.clone(),
+        physical_device: physical,
+        debug_settings,
+        buffer_device_address: true,
+        allocation_sizes: AllocationSizes::default(),
+    })
+    .map_err(|error| Error::unsupported("memory allocation", error.to_string()))
+}

@@ -1,0 +1,191 @@
+//! Opens the Vulkan loader and makes an instance, with the validation layer if asked for.
+
+use std::ffi::{CStr, CString};
+use std::path::Path;
+
+use ash::vk;
+
+use super::debug::{Messenger, Validation, ValidationSink, c_name};
+use crate::error::{Error, Result};
+
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// An instance and its messenger, destroyed on drop.
+pub(crate) struct Instance {
+    pub(crate) entry: ash::Entry,
+    pub(crate) raw: ash::Instance,
+    pub(crate) debug_utils: bool,
+    messenger: Messenger,
+}
+
+impl Instance {
+    pub(crate) fn new(
+        application_name: &str,
+        library: Option<&Path>,
+        validation: Validation,
+        sink: ValidationSink,
+    ) -> Result<Self> {
+        let entry = load_entry(library)?;
+        check_version(&entry)?;
+        let layer = find_layer(&entry, validation)?;
+        let extensions = Extensions::of(&entry, layer)?;
+        let mut messenger = Messenger::new(sink);
+        let raw = create(&entry, application_name, validation, layer, &extensions, &messenger)?;
+        if extensions.debug_utils && layer.is_some() {
+            if let Err(result) = messenger.install(&entry, &raw) {
+                // SAFETY: the instance was created above and nothing uses it.
+                unsafe { raw.destroy_instance(None) };
+                return Err(Error::vulkan("vkCreateDebugUtilsMessengerEXT")(result));
+            }
+        }
+        Ok(Self { entry, raw, debug_utils: extensions.debug_utils, messenger })
+    }
+
+    /// The messages of the validation layer.
+    pub(crate) fn sink(&self) -> &ValidationSink {
+        self.messenger.sink()
+    }
+
+    pub(crate) fn physical_devices(&self) -> Result<Vec<vk::PhysicalDevice>> {
+        // SAFETY: the instance is alive.
+        unsafe { self.raw.enumerate_physical_devices() }.map_err(|result| Error::NoVulkan {
+            reason: format!("vkEnumeratePhysicalDevices answered {result}"),
+        })
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        self.messenger.remove();
+        // SAFETY: the device is destroyed before, as `Gpu` declares it first.
+        unsafe { self.raw.destroy_instance(None) };
+    }
+}
+
+fn load_entry(library: Option<&Path>) -> Result<ash::Entry> {
+    // SAFETY: the loader is a well-known system library; loading it runs its initialisers only.
+    let entry = unsafe {
+        match library {
+            Some(path) => ash::Entry::load_from(path),
+            None => ash::Entry::load(),
+        }
+    };
+    entry.map_err(|error| Error::NoVulkan { reason: error.to_string() })
+}
+
+fn check_version(entry: &ash::Entry) -> Result<()> {
+    // SAFETY: no preconditions.
+    let version = unsafe { entry.try_enumerate_instance_version() }
+        .map_err(Error::vulkan("vkEnumerateInstanceVersion"))?
+        .unwrap_or(vk::API_VERSION_1_0);
+    if version >= vk::API_VERSION_1_3 {
+        return Ok(());
+    }
+    let (major, minor) = (vk::api_version_major(version), vk::api_version_minor(version));
+    Err(Error::NoVulkan { reason: format!("the loader offers Vulkan {major}.{minor}, 1.3 is needed") })
+}
+
+fn find_layer(entry: &ash::Entry, validation: Validation) -> Result<Option<&'static CStr>> {
+    if validation == Validation::Off {
+        return Ok(None);
+    }
+    // SAFETY: no preconditions.
+    let layers = unsafe { entry.enumerate_instance_layer_properties() }
+        .map_err(Error::vulkan("vkEnumerateInstanceLayerProperties"))?;
+    if layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
+        return Ok(Some(VALIDATION_LAYER));
+    }
+    Err(Error::unsupported(
+        "validation",
+        "the layer VK_LAYER_KHRONOS_validation was not found; install the Vulkan validation layers or name their \
+         folder in VK_ADD_LAYER_PATH",
+    ))
+}
+
+struct Extensions {
+    debug_utils: bool,
+    layer_settings: bool,
+}
+
+impl Extensions {
+    fn of(entry: &ash::Entry, layer: Option<&CStr>) -> Result<Self> {
+        let mut found = Self { debug_utils: false, layer_settings: false };
+        for source in [None, layer].into_iter().take(if layer.is_some() { 2 } else { 1 }) {
+            // SAFETY: the layer, if any, was found above.
+            let list = unsafe { entry.enumerate_instance_extension_properties(source) }
+                .map_err(Error::vulkan("vkEnumerateInstanceExtensionProperties"))?;
+            let has = |name| list.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+            found.debug_utils |= has(ash::ext::debug_utils::NAME);
+            found.layer_settings |= has(ash::ext::layer_settings::NAME);
+        }
+        Ok(found)
+    }
+
+    fn names(&self) -> Vec<*const std::ffi::c_char> {
+        let debug_utils = self.debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr());
+        let layer_settings = self.layer_settings.then_some(ash::ext::layer_settings::NAME.as_ptr());
+        debug_utils.into_iter().chain(layer_settings).collect()
+    }
+}
+
+fn create(
+    entry: &ash::Entry,
+    application_name: &str,
+    validation: Validation,
+    layer: Option<&CStr>,
+    extensions: &Extensions,
+    messenger: &Messenger,
+) -> Result<ash::Instance> {
+    let name = c_name(application_name);
+    let application = vk::ApplicationInfo::default()
+        .application_name(&name)
+        .engine_name(c"lvk")
+        .api_version(vk::API_VERSION_1_3);
+    let layers: Vec<_> = layer.iter().map(|layer| layer.as_ptr()).collect();
+    let extension_names = extensions.names();
+    let switches = switches(validation);
+    let values: Vec<[vk::Bool32; 1]> = switches.iter().map(|(_, on)| [vk::Bool32::from(*on)]).collect();
+    let settings: Vec<_> =
+        switches.iter().zip(&values).map(|((key, _), value)| setting(key, value)).collect();
+    let mut settings = vk::LayerSettingsCreateInfoEXT::default().settings(&settings);
+    let mut messages = messenger.create_info();
+    let mut info = vk::InstanceCreateInfo::default()
+        .application_info(&application)
+        .enabled_layer_names(&layers)
+        .enabled_extension_names(&extension_names);
+    if layer.is_some() && extensions.debug_utils {
+        info = info.push_next(&mut messages);
+    }
+    if layer.is_some() && extensions.layer_settings {
+        info = info.push_next(&mut settings);
+    }
+    // SAFETY: every pointer in `info` lives until the end of this function.
+    unsafe { entry.create_instance(&info, None) }
+        .map_err(|result| Error::NoVulkan { reason: format!("vkCreateInstance answered {result}") })
+}
+
+/// The switches of the layer, by its own setting names.
+fn switches(validation: Validation) -> Vec<(CString, bool)> {
+    let gpu = validation == Validation::GpuAssisted;
+    [
+        ("validate_core", true),
+        ("validate_sync", true),
+        ("syncval_submit_time_validation", true),
+        ("syncval_shader_accesses_heuristic", true),
+        ("gpuav_enable", gpu),
+        ("enable_message_limit", false),
+    ]
+    .map(|(key, on)| (c_name(key), on))
+    .into()
+}
+
+fn setting<'a>(key: &'a CStr, value: &'a [vk::Bool32; 1]) -> vk::LayerSettingEXT<'a> {
+    let bytes = bytemuck::cast_slice(value);
+    let setting = vk::LayerSettingEXT::default()
+        .layer_name(VALIDATION_LAYER)
+        .setting_name(key)
+        .ty(vk::LayerSettingTypeEXT::BOOL32)
+        .values(bytes);
+    // ash counts bytes here, Vulkan counts values.
+    vk::LayerSettingEXT { value_count: 1, ..setting }
+}

@@ -1,0 +1,10 @@
+//! One logical device: instance, choice, features, memory, debugging. It knows no resource.
+
+pub(crate) mod caps;
+pub(crate) mod debug;
+pub(crate) mod device;
+pub(crate) mod instance;
+pub(crate) mod memory;
+pub(crate) mod select;
+
+pub(crate) use device::Gpu;

@@ -1,0 +1,65 @@
+//! Typed handles of the objects a context owns.
+
+use std::fmt;
+
+mod sealed {
+    pub trait Sealed {}
+}
+
+/// A handle: a typed, generational, 64-bit key. `Copy`, and harmless when stale or when it belongs to another
+/// context: using it is an [`Error::StaleHandle`](crate::Error::StaleHandle).
+pub trait Handle: sealed::Sealed + Copy + Eq + fmt::Debug + Send + Sync + 'static {
+    /// Which kind of object the handle names, as error messages say it.
+    const KIND: &'static str;
+
+    #[doc(hidden)]
+    fn from_bits(bits: u64) -> Self;
+
+    #[doc(hidden)]
+    fn bits(self) -> u64;
+}
+
+macro_rules! handles {
+    ($($(#[$doc:meta])* $name:ident, $kind:literal;)*) => {
+        $(
+            $(#[$doc])*
+            #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+            pub struct $name(u64);
+
+            impl sealed::Sealed for $name {}
+
+            impl Handle for $name {
+                const KIND: &'static str = $kind;
+
+                fn from_bits(bits: u64) -> Self {
+                    Self(bits)
+                }
+
+                fn bits(self) -> u64 {
+                    self.0
+                }
+            }
+        )*
+    };
+}
+
+handles! {
+    /// Names a buffer.
+    BufferHandle, "buffer";
+    /// Names a texture.
+    TextureHandle, "texture";
+    /// Names a sampler.
+    SamplerHandle, "sampler";
+    /// Names a shader module.
+    ShaderModuleHandle, "shader module";
+    /// Names a graphics pipeline.
+    RenderPipelineHandle, "render pipeline";
+    /// Names a compute pipeline.
+    ComputePipelineHandle, "compute pipeline";
+    /// Names a ray tracing pipeline with its shader binding table.
+    RayTracingPipelineHandle, "ray tracing pipeline";
+    /// Names a pool of timestamp queries.
+    QueryPoolHandle, "query pool";
+    /// Names a bottom- or top-level acceleration structure.
+    AccelStructHandle, "acceleration structure";
+}

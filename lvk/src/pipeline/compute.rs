@@ -1,0 +1,71 @@
+//! Compute pipelines.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::shader_module::ShaderModule;
+use super::stage::{Specialization, SpecializationConstant, stage};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::handle::ShaderModuleHandle;
+use crate::shader::ShaderStage;
+
+/// Describes a compute pipeline.
+#[derive(Debug, Clone, Copy)]
+pub struct ComputePipelineDesc<'a> {
+    /// The compute shader.
+    pub module: Option<ShaderModuleHandle>,
+    /// Values of specialization constants.
+    pub specialization: &'a [SpecializationConstant],
+    /// Name in error messages, validation messages and debuggers.
+    pub debug_name: &'a str,
+}
+
+impl Default for ComputePipelineDesc<'_> {
+    fn default() -> Self {
+        Self { module: None, specialization: &[], debug_name: "compute pipeline" }
+    }
+}
+
+/// A compute pipeline, destroyed on drop.
+pub(crate) struct ComputePipeline {
+    pub(crate) raw: vk::Pipeline,
+    pub(crate) push_constant_bytes: u32,
+    pub(crate) ray_query: bool,
+    pub(crate) name: String,
+    gpu: Arc<Gpu>,
+}
+
+impl ComputePipeline {
+    pub(crate) fn new(
+        gpu: &Arc<Gpu>,
+        layout: vk::PipelineLayout,
+        desc: &ComputePipelineDesc<'_>,
+        module: &ShaderModule,
+    ) -> Result<Self> {
+        module.check_stage(ShaderStage::Compute)?;
+        let name = desc.debug_name;
+        let constants = Specialization::new(name, desc.specialization, std::iter::once(module))?;
+        let constants = constants.info();
+        let info = vk::ComputePipelineCreateInfo::default().layout(layout).stage(stage(module, &constants));
+        // SAFETY: the module and the layout are alive and fit each other.
+        let made = unsafe { gpu.device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
+        let raw = made.map_err(|(_, result)| Error::vulkan("vkCreateComputePipelines")(result))?[0];
+        gpu.name(raw, name);
+        Ok(Self {
+            raw,
+            push_constant_bytes: module.reflection.push_constant_bytes,
+            ray_query: module.reflection.ray_query,
+            name: name.to_owned(),
+            gpu: Arc::clone(gpu),
+        })
+    }
+}
+
+impl Drop for ComputePipeline {
+    fn drop(&mut self) {
+        // SAFETY: the owner has waited until the GPU is done with the pipeline.
+        unsafe { self.gpu.device.destroy_pipeline(self.raw, None) };
+    }
+}

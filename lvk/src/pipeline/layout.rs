@@ -1,0 +1,42 @@
+//! The one pipeline layout: the bindless set, and push constants for every stage.
+//!
+//! Because all pipelines share it, the set is bound once for each bind point of a command buffer, and push constants
+//! survive a change of pipeline.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+
+/// The layout, destroyed on drop.
+pub(crate) struct PipelineLayout {
+    pub(crate) raw: vk::PipelineLayout,
+    pub(crate) push_constant_bytes: u32,
+    gpu: Arc<Gpu>,
+}
+
+impl PipelineLayout {
+    /// Vulkan promises 128 bytes of push constants; more than this is not used.
+    const MAX_PUSH_CONSTANT_BYTES: u32 = 256;
+
+    pub(crate) fn new(gpu: &Arc<Gpu>, set: vk::DescriptorSetLayout) -> Result<Self> {
+        let bytes = gpu.caps.limits.max_push_constant_bytes.min(Self::MAX_PUSH_CONSTANT_BYTES);
+        let sets = [set];
+        let ranges =
+            [vk::PushConstantRange { stage_flags: vk::ShaderStageFlags::ALL, offset: 0, size: bytes }];
+        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&ranges);
+        // SAFETY: the set layout is alive and the range is within the limit.
+        let raw = unsafe { gpu.device.create_pipeline_layout(&info, None) }
+            .map_err(Error::vulkan("vkCreatePipelineLayout"))?;
+        Ok(Self { raw, push_constant_bytes: bytes, gpu: Arc::clone(gpu) })
+    }
+}
+
+impl Drop for PipelineLayout {
+    fn drop(&mut self) {
+        // SAFETY: the context has waited for the GPU before its parts are dropped.
+        unsafe { self.gpu.device.destroy_pipeline_layout(self.raw, None) };
+    }
+}

@@ -1,0 +1,68 @@
+//! Shader modules as objects of a context.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::shader::{CompileOptions, Reflection, ShaderModuleDesc, ShaderStage, compile, reflect};
+
+/// A compiled module, destroyed on drop.
+pub(crate) struct ShaderModule {
+    pub(crate) raw: vk::ShaderModule,
+    pub(crate) stage: ShaderStage,
+    pub(crate) reflection: Reflection,
+    pub(crate) name: String,
+    gpu: Arc<Gpu>,
+}
+
+impl ShaderModule {
+    pub(crate) fn new(gpu: &Arc<Gpu>, desc: &ShaderModuleDesc<'_>, max_push_bytes: u32) -> Result<Self> {
+        let options = CompileOptions { formatless_read: gpu.caps.formatless_storage_read };
+        let words = compile(desc, &options)?;
+        let reflection = reflect(desc.debug_name, desc.stage, &words)?;
+        check_features(gpu, desc.debug_name, &reflection)?;
+        if reflection.push_constant_bytes > max_push_bytes {
+            return Err(Error::LimitExceeded {
+                object: desc.debug_name.to_owned(),
+                what: "push constants in bytes",
+                requested: reflection.push_constant_bytes.into(),
+                limit: max_push_bytes.into(),
+            });
+        }
+        let info = vk::ShaderModuleCreateInfo::default().code(&words);
+        // SAFETY: the words are a whole module for a stage and features of this device.
+        let raw = unsafe { gpu.device.create_shader_module(&info, None) }
+            .map_err(Error::vulkan("vkCreateShaderModule"))?;
+        gpu.name(raw, desc.debug_name);
+        let name = desc.debug_name.to_owned();
+        Ok(Self { raw, stage: desc.stage, reflection, name, gpu: Arc::clone(gpu) })
+    }
+
+    /// Fails unless the module is of `stage`.
+    pub(crate) fn check_stage(&self, stage: ShaderStage) -> Result<()> {
+        if self.stage == stage {
+            return Ok(());
+        }
+        let message = format!("a {stage:?} module is needed here, this is a {:?} module", self.stage);
+        Err(Error::usage(&self.name, message))
+    }
+}
+
+impl Drop for ShaderModule {
+    fn drop(&mut self) {
+        // SAFETY: pipelines do not need a module once they are created.
+        unsafe { self.gpu.device.destroy_shader_module(self.raw, None) };
+    }
+}
+
+fn check_features(gpu: &Gpu, name: &str, reflection: &Reflection) -> Result<()> {
+    if reflection.ray_query && !gpu.caps.ray_query {
+        return Err(gpu.lacks(&format!("shader '{name}' uses ray queries: they")));
+    }
+    if reflection.ray_tracing && !gpu.caps.ray_tracing_pipeline {
+        return Err(gpu.lacks(&format!("shader '{name}' is of a ray tracing stage: ray tracing pipelines")));
+    }
+    Ok(())
+}

@@ -1,0 +1,215 @@
+//! Buffers: every one has a device address, and shaders reach it by that alone.
+
+use std::ptr::NonNull;
+use std::sync::Arc;
+
+use ash::vk;
+use bitflags::bitflags;
+use gpu_allocator::vulkan::Allocation;
+
+use crate::barrier::ResourceId;
+use crate::error::{Error, Result, check_limit};
+use crate::gpu::Gpu;
+use crate::gpu::memory::MemoryKind;
+
+bitflags! {
+    /// What a buffer is used for, besides copies and access by address, which are always allowed.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+    pub struct BufferUsage: u32 {
+        /// Read and written by shaders through its address.
+        const STORAGE = 1;
+        /// Holds indices of indexed draws.
+        const INDEX = 1 << 1;
+        /// Holds vertex attributes.
+        const VERTEX = 1 << 2;
+        /// Holds arguments of indirect draws, dispatches and traces.
+        const INDIRECT = 1 << 3;
+        /// Holds vertices, indices, boxes, transforms or instances an acceleration structure is built from.
+        const ACCEL_INPUT = 1 << 4;
+    }
+}
+
+/// Describes a buffer.
+#[derive(Debug, Clone, Copy)]
+pub struct BufferDesc<'a> {
+    /// Size in bytes, at least 1. With `data` and 0, the size of the data.
+    pub size_bytes: u64,
+    /// What the buffer is used for.
+    pub usage: BufferUsage,
+    /// Where the buffer lives.
+    pub memory: MemoryKind,
+    /// First contents, at most `size_bytes`.
+    pub data: Option<&'a [u8]>,
+    /// Name in error messages, validation messages and debuggers.
+    pub debug_name: &'a str,
+}
+
+impl Default for BufferDesc<'_> {
+    fn default() -> Self {
+        Self {
+            size_bytes: 0,
+            usage: BufferUsage::STORAGE,
+            memory: MemoryKind::Device,
+            data: None,
+            debug_name: "buffer",
+        }
+    }
+}
+
+/// A buffer and its memory, destroyed on drop.
+pub(crate) struct Buffer {
+    pub(crate) raw: vk::Buffer,
+    pub(crate) id: ResourceId,
+    pub(crate) size_bytes: u64,
+    pub(crate) address: u64,
+    pub(crate) usage: BufferUsage,
+    pub(crate) memory: MemoryKind,
+    pub(crate) name: String,
+    allocation: Option<Allocation>,
+    gpu: Arc<Gpu>,
+}
+
+/// What only the library makes buffers for.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct InternalUsage {
+    pub(crate) raw: vk::BufferUsageFlags,
+}
+
+impl InternalUsage {
+    pub(crate) const NONE: Self = Self { raw: vk::BufferUsageFlags::empty() };
+    pub(crate) const ACCEL_STORAGE: Self =
+        Self { raw: vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR };
+    pub(crate) const SHADER_BINDING_TABLE: Self =
+        Self { raw: vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR };
+}
+
+impl Buffer {
+    pub(crate) fn new(gpu: &Arc<Gpu>, desc: &BufferDesc<'_>, internal: InternalUsage) -> Result<Self> {
+        let name = desc.debug_name;
+        let size = check_size(gpu, desc)?;
+        let usage = raw_usage(gpu, desc.usage, name)? | internal.raw;
+        let info = vk::BufferCreateInfo::default().size(size).usage(usage);
+        // SAFETY: the description is valid: the size is checked, the usage belongs to enabled features.
+        let raw =
+            unsafe { gpu.device.create_buffer(&info, None) }.map_err(Error::vulkan("vkCreateBuffer"))?;
+        let mut buffer = Self {
+            raw,
+            id: ResourceId::next(),
+            size_bytes: size,
+            address: 0,
+            usage: desc.usage,
+            memory: desc.memory,
+            name: name.to_owned(),
+            allocation: None,
+            gpu: Arc::clone(gpu),
+        };
+        buffer.bind_memory()?;
+        gpu.name(raw, name);
+        Ok(buffer)
+    }
+
+    fn bind_memory(&mut self) -> Result<()> {
+        let device = &self.gpu.device;
+        // SAFETY: the buffer was created by this device.
+        let requirements = unsafe { device.get_buffer_memory_requirements(self.raw) };
+        let allocation = self.gpu.allocate(&self.name, requirements, self.memory, true)?;
+        // SAFETY: the allocation was made for this buffer's requirements and is bound once.
+        let bound = unsafe { device.bind_buffer_memory(self.raw, allocation.memory(), allocation.offset()) };
+        self.allocation = Some(allocation);
+        bound.map_err(Error::vulkan("vkBindBufferMemory"))?;
+        let info = vk::BufferDeviceAddressInfo::default().buffer(self.raw);
+        // SAFETY: the buffer has memory and the device-address usage.
+        self.address = unsafe { device.get_buffer_device_address(&info) };
+        Ok(())
+    }
+
+    /// Fails unless `offset..offset + size` lies inside the buffer.
+    pub(crate) fn check_range(&self, offset: u64, size: u64) -> Result<()> {
+        if offset.checked_add(size).is_some_and(|end| end <= self.size_bytes) {
+            return Ok(());
+        }
+        Err(Error::usage(
+            &self.name,
+            format!("bytes {offset}..{offset}+{size} are outside of the buffer's {} bytes", self.size_bytes),
+        ))
+    }
+
+    /// Fails unless the buffer was created with `usage`.
+    pub(crate) fn check_usage(&self, usage: BufferUsage) -> Result<()> {
+        if self.usage.contains(usage) {
+            return Ok(());
+        }
+        Err(Error::usage(&self.name, format!("create the buffer with {usage:?} in its usage")))
+    }
+
+    /// Start of the mapped memory, `None` in device memory.
+    pub(crate) fn mapped(&self) -> Option<NonNull<u8>> {
+        if !self.memory.mapped() {
+            return None;
+        }
+        self.allocation.as_ref()?.mapped_ptr().map(NonNull::cast)
+    }
+
+    /// Writes mapped memory. `false` if the buffer is not mapped; the range must have been checked.
+    pub(crate) fn write(&self, offset: u64, bytes: &[u8]) -> bool {
+        let Some(start) = self.mapped() else { return false };
+        debug_assert!(offset + bytes.len() as u64 <= self.size_bytes);
+        // SAFETY: the range lies inside the mapping, which lives as long as `self`.
+        unsafe {
+            start.as_ptr().add(offset as usize).copy_from_nonoverlapping(bytes.as_ptr(), bytes.len());
+        }
+        true
+    }
+
+    /// Reads mapped memory. `false` if the buffer is not mapped; the range must have been checked.
+    pub(crate) fn read(&self, offset: u64, bytes: &mut [u8]) -> bool {
+        let Some(start) = self.mapped() else { return false };
+        debug_assert!(offset + bytes.len() as u64 <= self.size_bytes);
+        // SAFETY: the range lies inside the mapping, which lives as long as `self`.
+        unsafe {
+            start.as_ptr().add(offset as usize).copy_to_nonoverlapping(bytes.as_mut_ptr(), bytes.len());
+        }
+        true
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        // SAFETY: the owner has waited until the GPU is done with the buffer.
+        unsafe { self.gpu.device.destroy_buffer(self.raw, None) };
+        if let Some(allocation) = self.allocation.take() {
+            self.gpu.free(allocation);
+        }
+    }
+}
+
+fn check_size(gpu: &Gpu, desc: &BufferDesc<'_>) -> Result<u64> {
+    let data_bytes = desc.data.map_or(0, |data| data.len() as u64);
+    let size = if desc.size_bytes == 0 { data_bytes } else { desc.size_bytes };
+    if size == 0 {
+        return Err(Error::usage(desc.debug_name, "a buffer needs a size of at least one byte"));
+    }
+    if data_bytes > size {
+        let message = format!("{data_bytes} bytes of data do not fit the buffer's {size} bytes");
+        return Err(Error::usage(desc.debug_name, message));
+    }
+    check_limit(desc.debug_name, "buffer size in bytes", size, gpu.caps.limits.max_buffer_bytes)?;
+    Ok(size)
+}
+
+fn raw_usage(gpu: &Gpu, usage: BufferUsage, name: &str) -> Result<vk::BufferUsageFlags> {
+    if usage.contains(BufferUsage::ACCEL_INPUT) && gpu.accel.is_none() {
+        return Err(gpu.lacks(&format!("buffer '{name}' with ACCEL_INPUT: acceleration structures")));
+    }
+    let pairs = [
+        (BufferUsage::STORAGE, vk::BufferUsageFlags::STORAGE_BUFFER),
+        (BufferUsage::INDEX, vk::BufferUsageFlags::INDEX_BUFFER),
+        (BufferUsage::VERTEX, vk::BufferUsageFlags::VERTEX_BUFFER),
+        (BufferUsage::INDIRECT, vk::BufferUsageFlags::INDIRECT_BUFFER),
+        (BufferUsage::ACCEL_INPUT, vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR),
+    ];
+    let always = vk::BufferUsageFlags::TRANSFER_SRC
+        | vk::BufferUsageFlags::TRANSFER_DST
+        | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
+    Ok(pairs.iter().filter(|(bit, _)| usage.contains(*bit)).fold(always, |all, (_, raw)| all | *raw))
+}

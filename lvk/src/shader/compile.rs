@@ -1,0 +1,52 @@
+//! Gets SPIR-V words out of what the caller gave.
+
+#[cfg(feature = "glsl")]
+use super::front_end::glsl;
+use super::{ShaderModuleDesc, ShaderSource, spirv};
+use crate::error::{Error, Result};
+
+/// What the preamble must know of the device.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct CompileOptions {
+    /// The device loads from storage images without a format (`shaderStorageImageReadWithoutFormat`).
+    pub(crate) formatless_read: bool,
+}
+
+/// The module's SPIR-V: version 1.6 for GLSL, the caller's own words, checked for their structure, otherwise.
+pub(crate) fn compile(desc: &ShaderModuleDesc<'_>, options: &CompileOptions) -> Result<Vec<u32>> {
+    match desc.source {
+        ShaderSource::Glsl(text) => glsl(desc, text, options),
+        ShaderSource::Spirv(words) => {
+            spirv::check(words).map_err(|log| failed(desc.debug_name, log))?;
+            Ok(words.to_vec())
+        }
+    }
+}
+
+pub(super) fn failed(name: &str, log: impl Into<String>) -> Error {
+    Error::Shader { name: name.to_owned(), log: log.into() }
+}
+
+#[cfg(not(feature = "glsl"))]
+fn glsl(desc: &ShaderModuleDesc<'_>, _: &str, _: &CompileOptions) -> Result<Vec<u32>> {
+    let what = format!("GLSL source of shader '{}'", desc.debug_name);
+    Err(Error::unsupported(
+        what,
+        "lvk was built without its feature `glsl`; turn it on, or pass SPIR-V words",
+    ))
+}
+
+#[cfg(all(test, not(feature = "glsl")))]
+mod tests {
+    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+    use super::*;
+
+    #[test]
+    fn glsl_names_the_missing_feature() {
+        let desc = ShaderModuleDesc { source: ShaderSource::Glsl("void main() {}"), ..Default::default() };
+        match compile(&desc, &CompileOptions::default()) {
+            Err(Error::Unsupported { why, .. }) => assert!(why.contains("feature `glsl`")),
+            other => panic!("{other:?}"),
+        }
+    }
+}

@@ -1,0 +1,71 @@
+layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform texture2D kTextures2D[];
+layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform texture2DArray kTextures2DArray[];
+layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform texture3D kTextures3D[];
+layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform textureCube kTexturesCube[];
+layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform utexture2D kTexturesU2D[];
+layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform itexture2D kTexturesI2D[];
+#define kTextures2DShadow kTextures2D
+
+layout(set = LVK_SET, binding = LVK_BINDING_SAMPLERS) uniform sampler kSamplers[];
+layout(set = LVK_SET, binding = LVK_BINDING_SAMPLERS) uniform samplerShadow kSamplersShadow[];
+
+#ifdef LVK_FORMATLESS_READ
+#define LVK_IMAGE_ACCESS
+#else
+#define LVK_IMAGE_ACCESS writeonly
+#endif
+layout(set = LVK_SET, binding = LVK_BINDING_STORAGE_IMAGES) uniform LVK_IMAGE_ACCESS image2D kImages2D[];
+layout(set = LVK_SET, binding = LVK_BINDING_STORAGE_IMAGES) uniform LVK_IMAGE_ACCESS image2DArray kImages2DArray[];
+layout(set = LVK_SET, binding = LVK_BINDING_STORAGE_IMAGES) uniform LVK_IMAGE_ACCESS image3D kImages3D[];
+layout(set = LVK_SET, binding = LVK_BINDING_STORAGE_IMAGES) uniform LVK_IMAGE_ACCESS uimage2D kImagesU2D[];
+layout(set = LVK_SET, binding = LVK_BINDING_STORAGE_IMAGES) uniform LVK_IMAGE_ACCESS iimage2D kImagesI2D[];
+
+// A typed, readable and writable view of the storage images; `type` is image2D, uimage2D, image3D and so on.
+#define LVK_STORAGE_IMAGES(type, format, name) \
+    layout(set = LVK_SET, binding = LVK_BINDING_STORAGE_IMAGES, format) uniform type name[]
+#define LVK_STORAGE_IMAGES_2D(format, name) LVK_STORAGE_IMAGES(image2D, format, name)
+#define LVK_STORAGE_IMAGES_U2D(format, name) LVK_STORAGE_IMAGES(uimage2D, format, name)
+#define LVK_STORAGE_IMAGES_I2D(format, name) LVK_STORAGE_IMAGES(iimage2D, format, name)
+
+// Both the indices and the combination are marked: the first for drivers that look at the access, the second because
+// the rules of Vulkan look at the combined operand.
+#define LVK_SAMPLED(type, images, samplers, tex, smp) \
+    nonuniformEXT(type(images[nonuniformEXT(tex)], samplers[nonuniformEXT(smp)]))
+#define LVK_2D(tex, smp) LVK_SAMPLED(sampler2D, kTextures2D, kSamplers, tex, smp)
+#define LVK_2D_ARRAY(tex, smp) LVK_SAMPLED(sampler2DArray, kTextures2DArray, kSamplers, tex, smp)
+#define LVK_3D(tex, smp) LVK_SAMPLED(sampler3D, kTextures3D, kSamplers, tex, smp)
+#define LVK_CUBE(tex, smp) LVK_SAMPLED(samplerCube, kTexturesCube, kSamplers, tex, smp)
+#define LVK_2D_SHADOW(tex, smp) LVK_SAMPLED(sampler2DShadow, kTextures2D, kSamplersShadow, tex, smp)
+
+// Only fragment shaders have derivatives; elsewhere the same helper reads mip level 0.
+#ifdef LVK_STAGE_FRAGMENT
+#define LVK_SAMPLE(sampled, uv) texture(sampled, uv)
+#else
+#define LVK_SAMPLE(sampled, uv) textureLod(sampled, uv, 0.0)
+#endif
+
+vec4 textureBindless2D(uint tex, uint smp, vec2 uv) { return LVK_SAMPLE(LVK_2D(tex, smp), uv); }
+vec4 textureBindless2DLod(uint tex, uint smp, vec2 uv, float lod) { return textureLod(LVK_2D(tex, smp), uv, lod); }
+vec4 textureBindless2DGrad(uint tex, uint smp, vec2 uv, vec2 dx, vec2 dy) { return textureGrad(LVK_2D(tex, smp), uv, dx, dy); }
+vec4 textureBindless2DGather(uint tex, uint smp, vec2 uv) { return textureGather(LVK_2D(tex, smp), uv); }
+float textureBindless2DShadow(uint tex, uint smp, vec3 uvw) { return LVK_SAMPLE(LVK_2D_SHADOW(tex, smp), uvw); }
+
+vec4 textureBindless2DArray(uint tex, uint smp, vec3 uvLayer) { return LVK_SAMPLE(LVK_2D_ARRAY(tex, smp), uvLayer); }
+vec4 textureBindless2DArrayLod(uint tex, uint smp, vec3 uvLayer, float lod) { return textureLod(LVK_2D_ARRAY(tex, smp), uvLayer, lod); }
+
+vec4 textureBindless3D(uint tex, uint smp, vec3 uvw) { return LVK_SAMPLE(LVK_3D(tex, smp), uvw); }
+vec4 textureBindless3DLod(uint tex, uint smp, vec3 uvw, float lod) { return textureLod(LVK_3D(tex, smp), uvw, lod); }
+
+vec4 textureBindlessCube(uint tex, uint smp, vec3 dir) { return LVK_SAMPLE(LVK_CUBE(tex, smp), dir); }
+vec4 textureBindlessCubeLod(uint tex, uint smp, vec3 dir, float lod) { return textureLod(LVK_CUBE(tex, smp), dir, lod); }
+
+vec4 textureBindlessFetch2D(uint tex, ivec2 texel, int lod) { return texelFetch(kTextures2D[nonuniformEXT(tex)], texel, lod); }
+uvec4 textureBindlessFetchU2D(uint tex, ivec2 texel, int lod) { return texelFetch(kTexturesU2D[nonuniformEXT(tex)], texel, lod); }
+ivec4 textureBindlessFetchI2D(uint tex, ivec2 texel, int lod) { return texelFetch(kTexturesI2D[nonuniformEXT(tex)], texel, lod); }
+
+ivec2 textureBindlessSize2D(uint tex) { return textureSize(kTextures2D[nonuniformEXT(tex)], 0); }
+ivec3 textureBindlessSize2DArray(uint tex) { return textureSize(kTextures2DArray[nonuniformEXT(tex)], 0); }
+ivec3 textureBindlessSize3D(uint tex) { return textureSize(kTextures3D[nonuniformEXT(tex)], 0); }
+ivec2 textureBindlessSizeCube(uint tex) { return textureSize(kTexturesCube[nonuniformEXT(tex)], 0); }
+int textureBindlessQueryLevels2D(uint tex) { return textureQueryLevels(kTextures2D[nonuniformEXT(tex)]); }
+int textureBindlessQueryLevelsCube(uint tex) { return textureQueryLevels(kTexturesCube[nonuniformEXT(tex)]); }

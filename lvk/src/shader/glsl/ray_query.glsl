@@ -1,0 +1,65 @@
+#ifndef LVK_RAY_QUERY_GLSL
+#define LVK_RAY_QUERY_GLSL
+
+// Ray queries in any stage, under names that do not depend on who walks the tree.
+//
+//     LvkRayQuery rq;
+//     lvkRayQueryInitialize(rq, tlas, LVK_RAY_FLAG_OPAQUE, 0xFFu, origin, 0.0, direction, 100.0);
+//     while (lvkRayQueryProceed(rq)) {}
+//     if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_TRIANGLE) { float t = lvkRayQueryT(rq, LVK_COMMITTED); }
+//
+// A query is a local or global variable: declare it, hand it to the functions below, and neither assign nor copy it.
+// `which` is LVK_CANDIDATE (inside the loop) or LVK_COMMITTED (the closest hit so far), written as a constant.
+// `rq` and `which` may be evaluated more than once or not at all: pass plain names.
+
+#extension GL_EXT_ray_query : require
+#include <lvk/tlas.glsl>
+
+#define LvkRayQuery rayQueryEXT
+
+#define LVK_CANDIDATE false
+#define LVK_COMMITTED true
+
+// lvkRayQueryType(rq, LVK_CANDIDATE)
+#define LVK_CANDIDATE_TRIANGLE 0u
+#define LVK_CANDIDATE_AABB 1u
+// lvkRayQueryType(rq, LVK_COMMITTED)
+#define LVK_COMMITTED_NONE 0u
+#define LVK_COMMITTED_TRIANGLE 1u
+#define LVK_COMMITTED_GENERATED 2u
+
+// Starts a query: void (LvkRayQuery, uint tlasIndex, uint flags, uint cullMask, vec3 origin, float tMin, vec3 direction, float tMax).
+#define lvkRayQueryInitialize(rq, tlasIndex, flags, mask, origin, tMin, direction, tMax) \
+    rayQueryInitializeEXT(rq, kTLAS[nonuniformEXT(tlasIndex)], flags, mask, origin, tMin, direction, tMax)
+// Steps to the next candidate that the shader must judge; false when the walk is over.
+#define lvkRayQueryProceed(rq) rayQueryProceedEXT(rq)
+// Ends the walk; what was committed stays.
+#define lvkRayQueryTerminate(rq) rayQueryTerminateEXT(rq)
+// Commits the candidate box at distance `t`.
+#define lvkRayQueryGenerateIntersection(rq, t) rayQueryGenerateIntersectionEXT(rq, t)
+// Commits the candidate triangle.
+#define lvkRayQueryConfirmIntersection(rq) rayQueryConfirmIntersectionEXT(rq)
+
+// Of the ray.
+#define lvkRayQueryTMin(rq) rayQueryGetRayTMinEXT(rq)
+#define lvkRayQueryFlags(rq) uint(rayQueryGetRayFlagsEXT(rq))
+#define lvkRayQueryWorldRayOrigin(rq) rayQueryGetWorldRayOriginEXT(rq)
+#define lvkRayQueryWorldRayDirection(rq) rayQueryGetWorldRayDirectionEXT(rq)
+
+// Of an intersection.
+#define lvkRayQueryType(rq, which) rayQueryGetIntersectionTypeEXT(rq, which)
+#define lvkRayQueryT(rq, which) rayQueryGetIntersectionTEXT(rq, which)
+#define lvkRayQueryInstanceId(rq, which) rayQueryGetIntersectionInstanceIdEXT(rq, which)
+#define lvkRayQueryInstanceCustomIndex(rq, which) rayQueryGetIntersectionInstanceCustomIndexEXT(rq, which)
+#define lvkRayQuerySbtOffset(rq, which) rayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetEXT(rq, which)
+#define lvkRayQueryGeometryIndex(rq, which) rayQueryGetIntersectionGeometryIndexEXT(rq, which)
+#define lvkRayQueryPrimitiveIndex(rq, which) rayQueryGetIntersectionPrimitiveIndexEXT(rq, which)
+#define lvkRayQueryBarycentrics(rq, which) rayQueryGetIntersectionBarycentricsEXT(rq, which)
+#define lvkRayQueryFrontFace(rq, which) rayQueryGetIntersectionFrontFaceEXT(rq, which)
+#define lvkRayQueryCandidateAabbOpaque(rq) rayQueryGetIntersectionCandidateAABBOpaqueEXT(rq)
+#define lvkRayQueryObjectRayOrigin(rq, which) rayQueryGetIntersectionObjectRayOriginEXT(rq, which)
+#define lvkRayQueryObjectRayDirection(rq, which) rayQueryGetIntersectionObjectRayDirectionEXT(rq, which)
+#define lvkRayQueryObjectToWorld(rq, which) rayQueryGetIntersectionObjectToWorldEXT(rq, which)
+#define lvkRayQueryWorldToObject(rq, which) rayQueryGetIntersectionWorldToObjectEXT(rq, which)
+
+#endif

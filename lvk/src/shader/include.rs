@@ -1,0 +1,205 @@
+//! Finds what `#include` names.
+
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+use glslang::include::{IncludeHandler, IncludeResult, IncludeType};
+
+use super::{preamble, source};
+
+/// Deeper nesting is taken for a mistake; the compiler recurses on it.
+const MAX_DEPTH: usize = 64;
+
+/// Answers the compiler's `#include` directives from the caller's list, folders, and the library's own files.
+pub(super) struct Includes<'a> {
+    listed: &'a [(&'a str, &'a str)],
+    dirs: &'a [&'a Path],
+    open: Vec<Place>,
+    once: HashSet<Place>,
+    /// Why each directive failed, in the order the compiler met them.
+    failures: Vec<String>,
+    /// Depth and name of the directive that failed last, if it was written with quotes.
+    refused: Option<(usize, String)>,
+}
+
+/// Where an included text came from; equal for equal files.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+enum Place {
+    Library(&'static str),
+    Listed(String),
+    File(PathBuf),
+}
+
+impl<'a> Includes<'a> {
+    pub(super) fn new(listed: &'a [(&'a str, &'a str)], dirs: &'a [&'a Path]) -> Self {
+        Self { listed, dirs, open: Vec::new(), once: HashSet::new(), failures: Vec::new(), refused: None }
+    }
+
+    /// The reasons for the compiler's "could not process include" messages, in order.
+    pub(super) fn into_failures(self) -> Vec<String> {
+        self.failures
+    }
+
+    fn open(&mut self, local: bool, name: &str) -> Result<IncludeResult, String> {
+        if self.open.len() >= MAX_DEPTH {
+            return Err(format!("includes are nested deeper than {MAX_DEPTH} files"));
+        }
+        let (place, text) = self.find(local, name)?;
+        let shown = place.shown();
+        if self.once.contains(&place) {
+            self.open.push(place);
+            return Ok(IncludeResult { name: shown, data: String::new() });
+        }
+        let text = source::to_ascii(&text).map_err(|c| format!("{shown}:{}: {}", c.line, c.message))?;
+        let (data, once) = without_pragma_once(&text);
+        if once {
+            self.once.insert(place.clone());
+        }
+        // A file may include itself once over: its include guard makes the second text empty.
+        if self.open.iter().filter(|open| **open == place).count() > 1 {
+            return Err(format!("'{shown}' includes itself; put #pragma once into it"));
+        }
+        self.open.push(place);
+        Ok(IncludeResult { name: shown, data })
+    }
+
+    fn find(&self, local: bool, name: &str) -> Result<(Place, String), String> {
+        if let Some((name, text)) = preamble::LIBRARY.into_iter().find(|(known, _)| *known == name) {
+            return Ok((Place::Library(name), text.to_owned()));
+        }
+        if let Some(found) = self.find_listed(local, name) {
+            return Ok(found);
+        }
+        let beside = match self.open.last() {
+            Some(Place::File(path)) if local => path.parent(),
+            _ => None,
+        };
+        for dir in beside.into_iter().chain(self.dirs.iter().copied()) {
+            let path = dir.join(name);
+            if path.is_file() {
+                return read(&path).map(|text| (Place::File(canonical(path)), text));
+            }
+        }
+        Err(self.not_found(name, beside))
+    }
+
+    fn find_listed(&self, local: bool, name: &str) -> Option<(Place, String)> {
+        let beside = match self.open.last() {
+            Some(Place::Listed(includer)) if local => normal(&format!("{includer}/../{name}")),
+            _ => None,
+        };
+        [normal(name), beside].into_iter().flatten().find_map(|wanted| {
+            let same = |listed: &&(&str, &str)| normal(listed.0).as_deref() == Some(wanted.as_str());
+            let text = self.listed.iter().find(same)?.1.to_owned();
+            Some((Place::Listed(wanted), text))
+        })
+    }
+
+    fn not_found(&self, name: &str, beside: Option<&Path>) -> String {
+        if name.starts_with("lvk/") {
+            let known: Vec<_> = preamble::LIBRARY.iter().map(|(name, _)| format!("<{name}>")).collect();
+            return format!("the library has no <{name}>; it has {}", known.join(", "));
+        }
+        let mut places: Vec<String> = Vec::new();
+        if !self.listed.is_empty() {
+            let names: Vec<_> = self.listed.iter().map(|(name, _)| *name).collect();
+            places.push(format!("the listed includes ({})", names.join(", ")));
+        }
+        places.extend(
+            beside.into_iter().chain(self.dirs.iter().copied()).map(|dir| format!("'{}'", dir.display())),
+        );
+        if places.is_empty() {
+            return format!("include '{name}' not found: the module lists no includes and no include_dirs");
+        }
+        format!("include '{name}' not found in {}", places.join(", "))
+    }
+
+    /// ` (included by b.glsl, included by a.glsl)`, innermost first.
+    fn chain(&self) -> String {
+        if self.open.is_empty() {
+            return String::new();
+        }
+        let chain: Vec<_> =
+            self.open.iter().rev().map(|place| format!("included by {}", place.shown())).collect();
+        format!(" ({})", chain.join(", "))
+    }
+}
+
+impl IncludeHandler for Includes<'_> {
+    fn include(&mut self, ty: IncludeType, name: &str, _: &str, depth: usize) -> Option<IncludeResult> {
+        let local = ty == IncludeType::Local;
+        // What "" did not find the compiler asks for again with <>, under the same message.
+        if self.refused.take() == Some((depth, name.to_owned())) && !local {
+            return None;
+        }
+        self.open.truncate(depth.saturating_sub(1));
+        match self.open(local, name) {
+            Ok(result) => Some(result),
+            Err(reason) => {
+                self.failures.push(reason + &self.chain());
+                self.refused = local.then(|| (depth, name.to_owned()));
+                None
+            }
+        }
+    }
+}
+
+impl Place {
+    fn shown(&self) -> String {
+        match self {
+            Self::Library(name) => (*name).to_owned(),
+            Self::Listed(name) => name.clone(),
+            // The compiler quotes the name in a directive.
+            Self::File(path) => path
+                .display()
+                .to_string()
+                .chars()
+                .map(|c| if c.is_ascii() && !c.is_ascii_control() && c != '"' { c } else { '?' })
+                .collect(),
+        }
+    }
+}
+
+fn read(path: &Path) -> Result<String, String> {
+    std::fs::read_to_string(path)
+        .map_err(|error| format!("include '{}' cannot be read: {error}", path.display()))
+}
+
+fn canonical(path: PathBuf) -> PathBuf {
+    path.canonicalize().unwrap_or(path)
+}
+
+/// `a/./b/../c` as `a/c`; none if it leaves the root.
+fn normal(path: &str) -> Option<String> {
+    let mut parts: Vec<&str> = Vec::new();
+    for part in path.split('/') {
+        match part {
+            "" | "." => {}
+            ".." => _ = parts.pop()?,
+            part => parts.push(part),
+        }
+    }
+    Some(parts.join("/"))
+}
+
+/// The text with its `#pragma once` line emptied, and whether there was one; the compiler does not know the pragma.
+fn without_pragma_once(text: &str) -> (String, bool) {
+    let is_once = |line: &str| {
+        let directive = line.trim_start().strip_prefix('#').unwrap_or_default();
+        directive.split_whitespace().take(2).eq(["pragma", "once"])
+    };
+    let mut once = false;
+    let mut out = String::with_capacity(text.len());
+    for line in text.split_inclusive('\n') {
+        let here = is_once(line);
+        once |= here;
+        out.push_str(if !here {
+            line
+        } else if line.ends_with('\n') {
+            "\n"
+        } else {
+            ""
+        });
+    }
+    (out, once)
+}

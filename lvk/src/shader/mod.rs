@@ -1,0 +1,26 @@
+//! Shader modules: GLSL to SPIR-V, includes, and what a module tells about itself.
+
+mod compile;
+#[cfg(feature = "glsl")]
+mod diagnostics;
+#[cfg(feature = "glsl")]
+mod front_end;
+#[cfg(feature = "glsl")]
+mod include;
+mod module;
+#[cfg(feature = "glsl")]
+mod preamble;
+mod reflect;
+#[cfg(feature = "glsl")]
+mod source;
+mod spirv;
+mod stage;
+#[cfg(feature = "glsl")]
+mod unused;
+
+pub(crate) use compile::{CompileOptions, compile};
+pub(crate) use reflect::{Reflection, reflect};
+pub use stage::{ShaderModuleDesc, ShaderSource, ShaderStage};
+
+#[cfg(all(test, feature = "glsl"))]
+mod tests;

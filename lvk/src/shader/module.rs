@@ -1,0 +1,268 @@
+//! The declarations of a SPIR-V module, collected once.
+
+use std::collections::{HashMap, HashSet};
+
+use rspirv_reflect::spirv::{BuiltIn, Capability, Decoration, Dim, Op};
+
+use super::spirv::{self, Instruction};
+
+/// A buffer address in a push-constant block.
+const ADDRESS_BYTES: u64 = 8;
+/// Types nested deeper than this are taken for damage.
+const MAX_NESTING: u32 = 64;
+
+/// Declarations by id; ids may point anywhere, so every look-up can fail.
+#[derive(Debug, Default)]
+pub(super) struct Module {
+    version: u32,
+    capabilities: HashSet<u32>,
+    pub(super) entries: Vec<Entry>,
+    pub(super) modes: Vec<Mode>,
+    pub(super) names: HashMap<u32, String>,
+    pub(super) types: HashMap<u32, Type>,
+    pub(super) constants: HashMap<u32, Constant>,
+    composites: HashMap<u32, [u32; 3]>,
+    pub(super) variables: Vec<Variable>,
+    decorations: HashMap<(u32, u32), u32>,
+    member_decorations: HashMap<(u32, u32, u32), u32>,
+}
+
+/// An entry point.
+#[derive(Debug)]
+pub(super) struct Entry {
+    pub(super) model: u32,
+    pub(super) function: u32,
+    pub(super) name: String,
+    interface: HashSet<u32>,
+}
+
+/// An execution mode with up to three operands.
+#[derive(Debug)]
+pub(super) struct Mode {
+    pub(super) function: u32,
+    pub(super) mode: u32,
+    pub(super) operands: [u32; 3],
+}
+
+/// A type, as far as sizes and descriptor kinds need it.
+#[derive(Debug)]
+pub(super) enum Type {
+    Bool,
+    Number { bytes: u32 },
+    Vector { element: u32, count: u32 },
+    Matrix { column: u32, count: u32 },
+    Array { element: u32, length: u32 },
+    RuntimeArray { element: u32 },
+    Struct { members: Vec<u32> },
+    Pointer { target: u32 },
+    Image { storage: bool },
+    Opaque(Op),
+}
+
+/// A scalar constant; its low word.
+#[derive(Debug)]
+pub(super) struct Constant {
+    pub(super) ty: u32,
+    pub(super) value: u32,
+    pub(super) is_spec: bool,
+}
+
+/// A variable at global scope.
+#[derive(Debug)]
+pub(super) struct Variable {
+    pub(super) id: u32,
+    pub(super) ty: u32,
+    pub(super) storage: u32,
+}
+
+impl Module {
+    pub(super) fn read(words: &[u32]) -> Result<Self, String> {
+        let mut module = Self { version: spirv::version(words), ..Self::default() };
+        for instruction in spirv::instructions(words) {
+            let instruction = instruction?;
+            match instruction.op {
+                Some(Op::Function) => break,
+                Some(op) => module.collect(op, &instruction),
+                None => {}
+            }
+        }
+        Ok(module)
+    }
+
+    pub(super) fn has(&self, capability: Capability) -> bool {
+        self.capabilities.contains(&(capability as u32))
+    }
+
+    pub(super) fn decoration(&self, id: u32, decoration: Decoration) -> Option<u32> {
+        self.decorations.get(&(id, decoration as u32)).copied()
+    }
+
+    /// Whether `variable` belongs to the entry point; before SPIR-V 1.4 interfaces do not list resources.
+    pub(super) fn in_interface(&self, entry: usize, variable: &Variable) -> bool {
+        self.version < spirv::VERSION_1_4
+            || self.entries.get(entry).is_some_and(|entry| entry.interface.contains(&variable.id))
+    }
+
+    /// The three constants of the `WorkgroupSize` built-in.
+    pub(super) fn workgroup_size(&self) -> Option<[u32; 3]> {
+        let is_size =
+            |id: &u32| self.decoration(*id, Decoration::BuiltIn) == Some(BuiltIn::WorkgroupSize as u32);
+        self.composites.iter().find(|(id, _)| is_size(id)).map(|(_, parts)| *parts)
+    }
+
+    /// Bytes of a type laid out by its offset and stride decorations.
+    pub(super) fn size_of(&self, ty: u32) -> Result<u64, String> {
+        let mut known = HashMap::new();
+        self.size(ty, None, MAX_NESTING, &mut known)
+    }
+
+    /// `matrix_stride` is that of the member at hand, and whether its rows are contiguous.
+    fn size(
+        &self,
+        ty: u32,
+        matrix: Option<(u32, bool)>,
+        nesting: u32,
+        known: &mut HashMap<u32, u64>,
+    ) -> Result<u64, String> {
+        if let (Some(bytes), None) = (known.get(&ty), matrix) {
+            return Ok(*bytes);
+        }
+        let nesting = nesting.checked_sub(1).ok_or("the types are nested too deeply")?;
+        let bytes = match self.types.get(&ty).ok_or("a type is missing")? {
+            Type::Number { bytes } => u64::from(*bytes),
+            Type::Pointer { .. } => ADDRESS_BYTES,
+            Type::Vector { element, count } => {
+                self.size(*element, None, nesting, known)?.saturating_mul(u64::from(*count))
+            }
+            Type::Matrix { column, count } => self.matrix_size(*column, *count, matrix, nesting, known)?,
+            Type::Array { element, length } => {
+                let stride = match self.decoration(ty, Decoration::ArrayStride) {
+                    Some(stride) => u64::from(stride),
+                    None => self.size(*element, matrix, nesting, known)?,
+                };
+                stride.saturating_mul(self.length(*length)?)
+            }
+            Type::Struct { members } => self.struct_size(ty, members, nesting, known)?,
+            Type::RuntimeArray { .. } => return Err("an array has no length".to_owned()),
+            Type::Bool | Type::Image { .. } | Type::Opaque(_) => {
+                return Err("a member has no size".to_owned());
+            }
+        };
+        if matrix.is_none() {
+            known.insert(ty, bytes);
+        }
+        Ok(bytes)
+    }
+
+    fn matrix_size(
+        &self,
+        column: u32,
+        columns: u32,
+        layout: Option<(u32, bool)>,
+        nesting: u32,
+        known: &mut HashMap<u32, u64>,
+    ) -> Result<u64, String> {
+        let rows = match self.types.get(&column) {
+            Some(Type::Vector { count, .. }) => *count,
+            _ => return Err("a matrix has no vectors".to_owned()),
+        };
+        let Some((stride, row_major)) = layout else {
+            return Ok(self.size(column, None, nesting, known)?.saturating_mul(u64::from(columns)));
+        };
+        Ok(u64::from(stride) * u64::from(if row_major { rows } else { columns }))
+    }
+
+    /// The end of the member that ends last.
+    fn struct_size(
+        &self,
+        ty: u32,
+        members: &[u32],
+        nesting: u32,
+        known: &mut HashMap<u32, u64>,
+    ) -> Result<u64, String> {
+        let mut end = 0;
+        for (index, member) in (0..).zip(members) {
+            let get = |decoration: Decoration| {
+                self.member_decorations.get(&(ty, index, decoration as u32)).copied()
+            };
+            let offset = get(Decoration::Offset).ok_or("a member has no offset")?;
+            let matrix =
+                get(Decoration::MatrixStride).map(|stride| (stride, get(Decoration::RowMajor).is_some()));
+            let bytes = self.size(*member, matrix, nesting, known)?;
+            end = bytes.saturating_add(u64::from(offset)).max(end);
+        }
+        Ok(end)
+    }
+
+    fn length(&self, id: u32) -> Result<u64, String> {
+        let constant = self.constants.get(&id).ok_or("an array's length is not a plain constant")?;
+        Ok(u64::from(constant.value))
+    }
+
+    fn collect(&mut self, op: Op, i: &Instruction<'_>) {
+        match op {
+            Op::Capability => _ = self.capabilities.insert(i.operand(0)),
+            Op::EntryPoint => self.entries.push(entry(i)),
+            Op::ExecutionMode | Op::ExecutionModeId => self.modes.push(Mode {
+                function: i.operand(0),
+                mode: i.operand(1),
+                operands: [i.operand(2), i.operand(3), i.operand(4)],
+            }),
+            Op::Name => _ = self.names.insert(i.operand(0), i.string(1).0),
+            Op::Decorate => _ = self.decorations.insert((i.operand(0), i.operand(1)), i.operand(2)),
+            Op::MemberDecorate => {
+                let key = (i.operand(0), i.operand(1), i.operand(2));
+                self.member_decorations.insert(key, i.operand(3));
+            }
+            Op::Variable => {
+                self.variables.push(Variable { ty: i.operand(0), id: i.operand(1), storage: i.operand(2) });
+            }
+            Op::Constant | Op::ConstantTrue | Op::ConstantFalse => self.constant(i, false),
+            Op::SpecConstant | Op::SpecConstantTrue | Op::SpecConstantFalse => self.constant(i, true),
+            Op::ConstantComposite | Op::SpecConstantComposite => {
+                self.composites.insert(i.operand(1), [i.operand(2), i.operand(3), i.operand(4)]);
+            }
+            _ => self.collect_type(op, i),
+        }
+    }
+
+    fn constant(&mut self, i: &Instruction<'_>, is_spec: bool) {
+        self.constants.insert(i.operand(1), Constant { ty: i.operand(0), value: i.operand(2), is_spec });
+    }
+
+    fn collect_type(&mut self, op: Op, i: &Instruction<'_>) {
+        let ty = match op {
+            Op::TypeBool => Type::Bool,
+            Op::TypeInt | Op::TypeFloat => Type::Number { bytes: i.operand(1).div_ceil(8) },
+            Op::TypeVector => Type::Vector { element: i.operand(1), count: i.operand(2) },
+            Op::TypeMatrix => Type::Matrix { column: i.operand(1), count: i.operand(2) },
+            Op::TypeArray => Type::Array { element: i.operand(1), length: i.operand(2) },
+            Op::TypeRuntimeArray => Type::RuntimeArray { element: i.operand(1) },
+            Op::TypeStruct => Type::Struct { members: i.operands().get(1..).unwrap_or(&[]).to_vec() },
+            Op::TypePointer => Type::Pointer { target: i.operand(2) },
+            Op::TypeImage => image(i),
+            Op::TypeSampler | Op::TypeSampledImage | Op::TypeAccelerationStructureKHR => Type::Opaque(op),
+            _ => return,
+        };
+        self.types.insert(i.operand(0), ty);
+    }
+}
+
+fn entry(i: &Instruction<'_>) -> Entry {
+    let (name, name_words) = i.string(2);
+    let interface = i.operands().get(2 + name_words..).unwrap_or(&[]).iter().copied().collect();
+    Entry { model: i.operand(0), function: i.operand(1), name, interface }
+}
+
+/// Texel buffers and subpass inputs have no binding in the library.
+fn image(i: &Instruction<'_>) -> Type {
+    const SAMPLED: u32 = 1;
+    const STORAGE: u32 = 2;
+    let dim = i.operand(2);
+    match i.operand(6) {
+        _ if dim == Dim::DimBuffer as u32 || dim == Dim::DimSubpassData as u32 => Type::Opaque(Op::TypeImage),
+        SAMPLED => Type::Image { storage: false },
+        STORAGE => Type::Image { storage: true },
+        _ => Type::Opaque(Op::TypeImage),
+    }
+}

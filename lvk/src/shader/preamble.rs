@@ -1,0 +1,108 @@
+//! The text in front of every GLSL shader, generated from the binding numbers.
+
+use std::fmt::Write;
+
+use super::{CompileOptions, ShaderStage};
+use crate::bindless::layout;
+
+/// Helpers and resource arrays for every stage.
+const BINDLESS: &str = include_str!("glsl/bindless.glsl");
+
+/// The files behind `#include <lvk/..>`.
+pub(super) const LIBRARY: [(&str, &str); 3] = [
+    ("lvk/ray_query.glsl", include_str!("glsl/ray_query.glsl")),
+    ("lvk/ray_tracing.glsl", include_str!("glsl/ray_tracing.glsl")),
+    ("lvk/tlas.glsl", include_str!("glsl/tlas.glsl")),
+];
+
+/// On in every stage; an extension asks nothing of the device until its types or functions are used.
+const EXTENSIONS: [&str; 25] = [
+    "GL_GOOGLE_include_directive",
+    "GL_GOOGLE_cpp_style_line_directive",
+    "GL_EXT_buffer_reference",
+    "GL_EXT_buffer_reference2",
+    "GL_EXT_buffer_reference_uvec2",
+    "GL_EXT_scalar_block_layout",
+    "GL_EXT_nonuniform_qualifier",
+    "GL_EXT_samplerless_texture_functions",
+    "GL_EXT_control_flow_attributes",
+    "GL_EXT_debug_printf",
+    "GL_EXT_shader_8bit_storage",
+    "GL_EXT_shader_16bit_storage",
+    "GL_EXT_shader_explicit_arithmetic_types_int8",
+    "GL_EXT_shader_explicit_arithmetic_types_int16",
+    "GL_EXT_shader_explicit_arithmetic_types_int64",
+    "GL_EXT_shader_explicit_arithmetic_types_float16",
+    "GL_EXT_shader_atomic_int64",
+    "GL_EXT_shader_atomic_float",
+    "GL_KHR_shader_subgroup_basic",
+    "GL_KHR_shader_subgroup_vote",
+    "GL_KHR_shader_subgroup_ballot",
+    "GL_KHR_shader_subgroup_arithmetic",
+    "GL_KHR_shader_subgroup_shuffle",
+    "GL_KHR_shader_subgroup_shuffle_relative",
+    "GL_KHR_shader_subgroup_quad",
+];
+
+/// Everything in front of the caller's first line, which stays line 1.
+pub(super) fn preamble(stage: ShaderStage, options: &CompileOptions, defines: &[(&str, &str)]) -> String {
+    let mut text = String::from("#version 460\n");
+    for extension in EXTENSIONS.into_iter().chain(stage_extensions(stage)) {
+        require(&mut text, extension);
+    }
+    define(&mut text, stage_macro(stage), "1");
+    define(&mut text, "LVK_SET", &layout::SET.to_string());
+    for (binding, name, _) in layout::BINDINGS {
+        define(&mut text, name, &binding.to_string());
+    }
+    if options.formatless_read {
+        require(&mut text, "GL_EXT_shader_image_load_formatted");
+        define(&mut text, "LVK_FORMATLESS_READ", "1");
+    }
+    text.push_str(BINDLESS);
+    if stage.is_ray_tracing() {
+        define(&mut text, "LVK_STAGE_RAY_TRACING", "1");
+        text.push_str("#include <lvk/ray_tracing.glsl>\n");
+    }
+    for (name, value) in defines {
+        define(&mut text, name, value);
+    }
+    text.push_str("#line 1 0\n");
+    text
+}
+
+fn require(text: &mut String, extension: &str) {
+    // Writing to a String cannot fail.
+    let _ = writeln!(text, "#extension {extension} : require");
+}
+
+fn define(text: &mut String, name: &str, value: &str) {
+    let _ = writeln!(text, "#define {name} {value}");
+}
+
+fn stage_extensions(stage: ShaderStage) -> Option<&'static str> {
+    match stage {
+        ShaderStage::Task | ShaderStage::Mesh => Some("GL_EXT_mesh_shader"),
+        stage if stage.is_ray_tracing() => Some("GL_EXT_ray_tracing"),
+        _ => None,
+    }
+}
+
+fn stage_macro(stage: ShaderStage) -> &'static str {
+    match stage {
+        ShaderStage::Vertex => "LVK_STAGE_VERTEX",
+        ShaderStage::TessControl => "LVK_STAGE_TESS_CONTROL",
+        ShaderStage::TessEval => "LVK_STAGE_TESS_EVAL",
+        ShaderStage::Geometry => "LVK_STAGE_GEOMETRY",
+        ShaderStage::Fragment => "LVK_STAGE_FRAGMENT",
+        ShaderStage::Compute => "LVK_STAGE_COMPUTE",
+        ShaderStage::Task => "LVK_STAGE_TASK",
+        ShaderStage::Mesh => "LVK_STAGE_MESH",
+        ShaderStage::RayGen => "LVK_STAGE_RAY_GEN",
+        ShaderStage::Miss => "LVK_STAGE_MISS",
+        ShaderStage::ClosestHit => "LVK_STAGE_CLOSEST_HIT",
+        ShaderStage::AnyHit => "LVK_STAGE_ANY_HIT",
+        ShaderStage::Intersection => "LVK_STAGE_INTERSECTION",
+        ShaderStage::Callable => "LVK_STAGE_CALLABLE",
+    }
+}

@@ -1,0 +1,198 @@
+//! What a SPIR-V module tells about itself, and whether it fits the one descriptor set.
+
+use rspirv_reflect::spirv::{Capability, Decoration, ExecutionMode, ExecutionModel, Op, StorageClass};
+
+use super::module::{Module, Type, Variable};
+use super::{ShaderStage, spirv};
+use crate::bindless::layout;
+use crate::error::{Error, Result};
+
+/// Facts of one entry point that pipelines need.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub(crate) struct Reflection {
+    /// Bytes that must be pushed: the end of the block's last member, rounded up to 4; 0 without a block.
+    pub(crate) push_constant_bytes: u32,
+    /// The module uses ray queries.
+    pub(crate) ray_query: bool,
+    /// The module is for a ray tracing pipeline.
+    pub(crate) ray_tracing: bool,
+    /// Invocations of a work group (compute, task, mesh), with the defaults of specialization constants; else zeros.
+    pub(crate) local_size: [u32; 3],
+    /// For each axis, the specialization constant that overrides [`local_size`](Self::local_size).
+    pub(crate) local_size_ids: [Option<u32>; 3],
+    /// Specialization constants: id and bytes (1 to 8; booleans take 4), sorted by id.
+    pub(crate) specialization: Vec<(u32, u32)>,
+    /// Bindings that the module declares, sorted, each once.
+    pub(crate) bindings: Vec<u32>,
+}
+
+/// Reads `words`, made for `stage` with the entry point `main`; never trusts them.
+pub(crate) fn reflect(name: &str, stage: ShaderStage, words: &[u32]) -> Result<Reflection> {
+    read(stage, words).map_err(|log| Error::Shader { name: name.to_owned(), log })
+}
+
+fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
+    spirv::check(words)?;
+    let module = Module::read(words)?;
+    let entry = entry_point(&module, stage)?;
+    let (local_size, local_size_ids) = local_size(&module, module.entries[entry].function);
+    let mut bindings = Vec::new();
+    let mut push_constant_bytes = 0;
+    for variable in module.variables.iter().filter(|variable| module.in_interface(entry, variable)) {
+        if variable.storage == StorageClass::PushConstant as u32 {
+            push_constant_bytes = push_constant_bytes.max(block_bytes(&module, variable)?);
+        } else if is_descriptor(variable) {
+            bindings.push(binding(&module, variable)?);
+        }
+    }
+    bindings.sort_unstable();
+    bindings.dedup();
+    Ok(Reflection {
+        push_constant_bytes,
+        ray_query: module.has(Capability::RayQueryKHR),
+        ray_tracing: module.has(Capability::RayTracingKHR),
+        local_size,
+        local_size_ids,
+        specialization: specialization(&module),
+        bindings,
+    })
+}
+
+fn entry_point(module: &Module, stage: ShaderStage) -> Result<usize, String> {
+    let model = execution_model(stage) as u32;
+    let found = module.entries.iter().position(|entry| entry.name == "main" && entry.model == model);
+    found.ok_or_else(|| {
+        let there: Vec<String> =
+            module.entries.iter().map(|e| format!("'{}' ({})", e.name, model_name(e.model))).collect();
+        let there = if there.is_empty() { "none at all".to_owned() } else { there.join(", ") };
+        format!("no entry point 'main' for the {} stage; the module has {there}", stage.name())
+    })
+}
+
+fn execution_model(stage: ShaderStage) -> ExecutionModel {
+    match stage {
+        ShaderStage::Vertex => ExecutionModel::Vertex,
+        ShaderStage::TessControl => ExecutionModel::TessellationControl,
+        ShaderStage::TessEval => ExecutionModel::TessellationEvaluation,
+        ShaderStage::Geometry => ExecutionModel::Geometry,
+        ShaderStage::Fragment => ExecutionModel::Fragment,
+        ShaderStage::Compute => ExecutionModel::GLCompute,
+        ShaderStage::Task => ExecutionModel::TaskEXT,
+        ShaderStage::Mesh => ExecutionModel::MeshEXT,
+        ShaderStage::RayGen => ExecutionModel::RayGenerationNV,
+        ShaderStage::Miss => ExecutionModel::MissNV,
+        ShaderStage::ClosestHit => ExecutionModel::ClosestHitNV,
+        ShaderStage::AnyHit => ExecutionModel::AnyHitNV,
+        ShaderStage::Intersection => ExecutionModel::IntersectionNV,
+        ShaderStage::Callable => ExecutionModel::CallableNV,
+    }
+}
+
+fn model_name(model: u32) -> String {
+    let stage = ShaderStage::ALL.into_iter().find(|stage| execution_model(*stage) as u32 == model);
+    stage.map_or_else(|| format!("execution model {model}"), |stage| stage.name().to_owned())
+}
+
+/// The `WorkgroupSize` built-in outranks both execution modes.
+fn local_size(module: &Module, function: u32) -> ([u32; 3], [Option<u32>; 3]) {
+    if let Some(parts) = module.workgroup_size() {
+        return parts_of(module, parts);
+    }
+    for mode in module.modes.iter().filter(|mode| mode.function == function) {
+        let parts = [mode.operands[0], mode.operands[1], mode.operands[2]];
+        if mode.mode == ExecutionMode::LocalSizeId as u32 {
+            return parts_of(module, parts);
+        }
+        if mode.mode == ExecutionMode::LocalSize as u32 {
+            return (parts, [None; 3]);
+        }
+    }
+    ([0; 3], [None; 3])
+}
+
+fn parts_of(module: &Module, ids: [u32; 3]) -> ([u32; 3], [Option<u32>; 3]) {
+    let size = ids.map(|id| module.constants.get(&id).map_or(1, |constant| constant.value));
+    (size, ids.map(|id| module.decoration(id, Decoration::SpecId)))
+}
+
+fn specialization(module: &Module) -> Vec<(u32, u32)> {
+    let spec = module.constants.iter().filter(|(_, constant)| constant.is_spec);
+    let mut found: Vec<(u32, u32)> = spec
+        .filter_map(|(id, constant)| {
+            let bytes = match module.types.get(&constant.ty)? {
+                Type::Bool => 4,
+                Type::Number { bytes } => *bytes,
+                _ => return None,
+            };
+            Some((module.decoration(*id, Decoration::SpecId)?, bytes))
+        })
+        .collect();
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+fn block_bytes(module: &Module, variable: &Variable) -> Result<u32, String> {
+    let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else {
+        return Err("the push constants have no pointer type".to_owned());
+    };
+    let bytes = module.size_of(*target).map_err(|why| format!("push constants: {why}"))?;
+    u32::try_from(bytes).ok().and_then(|bytes| bytes.checked_next_multiple_of(4)).ok_or_else(|| {
+        format!("the push constants take {bytes} bytes; put the data into a buffer and push its address")
+    })
+}
+
+fn is_descriptor(variable: &Variable) -> bool {
+    use StorageClass::{StorageBuffer, Uniform, UniformConstant};
+    [UniformConstant, Uniform, StorageBuffer].iter().any(|class| *class as u32 == variable.storage)
+}
+
+/// The binding of a descriptor variable, if it is one of the library's and of its kind.
+fn binding(module: &Module, variable: &Variable) -> Result<u32, String> {
+    let what = module.names.get(&variable.id).map_or("a resource".to_owned(), |name| format!("'{name}'"));
+    let (Some(set), Some(binding)) = (
+        module.decoration(variable.id, Decoration::DescriptorSet),
+        module.decoration(variable.id, Decoration::Binding),
+    ) else {
+        return Err(format!("{what} has no descriptor set or no binding; {}", remedy()));
+    };
+    if variable.storage != StorageClass::UniformConstant as u32 {
+        return Err(format!(
+            "{what} (set {set}, binding {binding}) is a buffer descriptor; there are none: declare a buffer_reference \
+             and push the buffer's address"
+        ));
+    }
+    if set != layout::SET {
+        return Err(format!("{what} is in set {set}, binding {binding}; {}", remedy()));
+    }
+    let wanted = kind(module, variable.ty);
+    match layout::BINDINGS.iter().find(|known| known.0 == binding) {
+        Some(_) if wanted == Some(binding) => Ok(binding),
+        Some((_, _, holds)) => {
+            Err(format!("{what} is in set {set}, binding {binding}, which holds {holds}; {}", remedy()))
+        }
+        None => Err(format!("{what} is in set {set}, binding {binding}, which does not exist; {}", remedy())),
+    }
+}
+
+/// The binding that takes resources of this type.
+fn kind(module: &Module, pointer: u32) -> Option<u32> {
+    let Type::Pointer { target } = module.types.get(&pointer)? else { return None };
+    let element = match module.types.get(target)? {
+        Type::Array { element, .. } | Type::RuntimeArray { element } => element,
+        _ => target,
+    };
+    match module.types.get(element)? {
+        Type::Opaque(Op::TypeSampler) => Some(layout::SAMPLERS),
+        Type::Opaque(Op::TypeSampledImage) => Some(layout::YCBCR),
+        Type::Opaque(Op::TypeAccelerationStructureKHR) => Some(layout::ACCEL_STRUCTS),
+        Type::Image { storage: false } => Some(layout::SAMPLED_IMAGES),
+        Type::Image { storage: true } => Some(layout::STORAGE_IMAGES),
+        _ => None,
+    }
+}
+
+fn remedy() -> String {
+    let holds = layout::BINDINGS.map(|(binding, _, what)| format!("{binding} {what}")).join(", ");
+    format!("resources live in set {} at bindings {holds}; use the library's arrays and helpers", layout::SET)
+}

@@ -1,0 +1,84 @@
+//! Reads SPIR-V words. Knows lengths, not meanings, so that instructions newer than this library pass.
+
+use rspirv_reflect::spirv::{MAGIC_NUMBER, Op};
+
+const HEADER_WORDS: usize = 5;
+/// SPIR-V 1.6, what Vulkan 1.3 takes.
+const MAX_VERSION: u32 = 0x0001_0600;
+pub(super) const VERSION_1_4: u32 = 0x0001_0400;
+
+/// One instruction of a module.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Instruction<'a> {
+    /// None for an instruction that this library does not know.
+    pub(super) op: Option<Op>,
+    /// All words, the first included.
+    pub(super) words: &'a [u32],
+}
+
+impl<'a> Instruction<'a> {
+    /// Operand `index`, counted from the word after the opcode; zero, which is no id, where there is none.
+    pub(super) fn operand(&self, index: usize) -> u32 {
+        self.operands().get(index).copied().unwrap_or(0)
+    }
+
+    pub(super) fn operands(&self) -> &'a [u32] {
+        self.words.get(1..).unwrap_or(&[])
+    }
+
+    /// The string that starts at operand `index`, and how many words it takes.
+    pub(super) fn string(&self, index: usize) -> (String, usize) {
+        let words = self.operands().get(index..).unwrap_or(&[]);
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        let len = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
+        (String::from_utf8_lossy(&bytes[..len]).into_owned(), (len / 4 + 1).min(words.len()))
+    }
+}
+
+/// Checks the header and that whole instructions and functions fill `words`.
+pub(super) fn check(words: &[u32]) -> Result<(), String> {
+    match words.first() {
+        Some(&MAGIC_NUMBER) => {}
+        Some(&word) if word == MAGIC_NUMBER.swap_bytes() => {
+            return Err("the SPIR-V words are in the other byte order; read them as little endian".to_owned());
+        }
+        _ => return Err("not SPIR-V: the first word is not the magic number 0x07230203".to_owned()),
+    }
+    if words.len() < HEADER_WORDS {
+        return Err("the SPIR-V ends inside its header".to_owned());
+    }
+    if version(words) > MAX_VERSION {
+        return Err(format!("SPIR-V version word {:#x} is newer than 1.6; compile for Vulkan 1.3", words[1]));
+    }
+    let mut in_function = false;
+    for instruction in instructions(words) {
+        match instruction?.op {
+            Some(Op::Function) => in_function = true,
+            Some(Op::FunctionEnd) => in_function = false,
+            _ => {}
+        }
+    }
+    if in_function { Err("the SPIR-V ends inside a function".to_owned()) } else { Ok(()) }
+}
+
+/// The version word: `0x0001_0600` for 1.6.
+pub(super) fn version(words: &[u32]) -> u32 {
+    words.get(1).copied().unwrap_or(0)
+}
+
+/// The instructions behind the header; ends after the first error.
+pub(super) fn instructions(words: &[u32]) -> impl Iterator<Item = Result<Instruction<'_>, String>> {
+    let mut rest = words.get(HEADER_WORDS..).unwrap_or(&[]);
+    std::iter::from_fn(move || {
+        let first = *rest.first()?;
+        let len = (first >> 16) as usize;
+        if len == 0 || len > rest.len() {
+            let at = words.len() - rest.len();
+            rest = &[];
+            return Some(Err(format!("the SPIR-V is damaged or cut off at word {at}")));
+        }
+        let (head, tail) = rest.split_at(len);
+        rest = tail;
+        Some(Ok(Instruction { op: Op::from_u32(first & 0xFFFF), words: head }))
+    })
+}

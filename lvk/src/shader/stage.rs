@@ -1,0 +1,198 @@
+//! What a caller says about a shader module.
+
+use std::path::Path;
+
+use ash::vk;
+
+/// The pipeline stage a shader module is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ShaderStage {
+    /// Vertex stage of a render pipeline.
+    Vertex,
+    /// Tessellation control stage (hull).
+    TessControl,
+    /// Tessellation evaluation stage (domain).
+    TessEval,
+    /// Geometry stage.
+    Geometry,
+    /// Fragment stage; the only one with derivatives.
+    Fragment,
+    /// Compute pipeline.
+    Compute,
+    /// Task stage, in front of a mesh stage.
+    Task,
+    /// Mesh stage.
+    Mesh,
+    /// Ray generation: where a ray tracing pipeline starts.
+    RayGen,
+    /// Called when a ray hits nothing.
+    Miss,
+    /// Called for the closest hit of a ray.
+    ClosestHit,
+    /// Called for each hit of geometry that is not opaque, to accept or ignore it.
+    AnyHit,
+    /// Intersects a ray with what a box contains.
+    Intersection,
+    /// Called by index from other ray tracing stages.
+    Callable,
+}
+
+impl ShaderStage {
+    /// Whether the stage belongs to a ray tracing pipeline.
+    #[must_use]
+    pub fn is_ray_tracing(self) -> bool {
+        use ShaderStage::{AnyHit, Callable, ClosestHit, Intersection, Miss, RayGen};
+        matches!(self, RayGen | Miss | ClosestHit | AnyHit | Intersection | Callable)
+    }
+
+    /// The Vulkan stage bit.
+    #[must_use]
+    pub fn raw(self) -> vk::ShaderStageFlags {
+        match self {
+            Self::Vertex => vk::ShaderStageFlags::VERTEX,
+            Self::TessControl => vk::ShaderStageFlags::TESSELLATION_CONTROL,
+            Self::TessEval => vk::ShaderStageFlags::TESSELLATION_EVALUATION,
+            Self::Geometry => vk::ShaderStageFlags::GEOMETRY,
+            Self::Fragment => vk::ShaderStageFlags::FRAGMENT,
+            Self::Compute => vk::ShaderStageFlags::COMPUTE,
+            Self::Task => vk::ShaderStageFlags::TASK_EXT,
+            Self::Mesh => vk::ShaderStageFlags::MESH_EXT,
+            Self::RayGen => vk::ShaderStageFlags::RAYGEN_KHR,
+            Self::Miss => vk::ShaderStageFlags::MISS_KHR,
+            Self::ClosestHit => vk::ShaderStageFlags::CLOSEST_HIT_KHR,
+            Self::AnyHit => vk::ShaderStageFlags::ANY_HIT_KHR,
+            Self::Intersection => vk::ShaderStageFlags::INTERSECTION_KHR,
+            Self::Callable => vk::ShaderStageFlags::CALLABLE_KHR,
+        }
+    }
+
+    /// The stage's name in messages.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Vertex => "vertex",
+            Self::TessControl => "tessellation control",
+            Self::TessEval => "tessellation evaluation",
+            Self::Geometry => "geometry",
+            Self::Fragment => "fragment",
+            Self::Compute => "compute",
+            Self::Task => "task",
+            Self::Mesh => "mesh",
+            Self::RayGen => "ray generation",
+            Self::Miss => "miss",
+            Self::ClosestHit => "closest hit",
+            Self::AnyHit => "any hit",
+            Self::Intersection => "intersection",
+            Self::Callable => "callable",
+        }
+    }
+
+    /// Every stage.
+    pub(crate) const ALL: [Self; 14] = [
+        Self::Vertex,
+        Self::TessControl,
+        Self::TessEval,
+        Self::Geometry,
+        Self::Fragment,
+        Self::Compute,
+        Self::Task,
+        Self::Mesh,
+        Self::RayGen,
+        Self::Miss,
+        Self::ClosestHit,
+        Self::AnyHit,
+        Self::Intersection,
+        Self::Callable,
+    ];
+}
+
+/// The program text of a shader module.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ShaderSource<'a> {
+    /// GLSL 4.60 for Vulkan, compiled to SPIR-V 1.6 when the module is created; the entry point is `main`.
+    ///
+    /// Needs the feature `glsl` (on by default); without it, creating the module is
+    /// [`Error::Unsupported`](crate::Error::Unsupported). See [`ShaderModuleDesc`] for what the text may use.
+    Glsl(&'a str),
+    /// SPIR-V words up to version 1.6, in the byte order of the machine, with an entry point `main`.
+    ///
+    /// The structure is checked (header, instruction lengths, entry point, bindings), the semantics are not: run a
+    /// validator over SPIR-V of doubtful origin.
+    Spirv(&'a [u32]),
+}
+
+/// Describes a shader module.
+///
+/// # What GLSL text may use
+///
+/// The text needs no `#version` (450 and 460 are accepted) and declares no descriptors: a preamble does, in every stage.
+/// Line numbers in messages are those of the text.
+///
+/// ```glsl
+/// layout(local_size_x = 8, local_size_y = 8) in;
+/// layout(push_constant, scalar) uniform Push { uint colour; uint smp; uint target; vec2 texel; } push;
+///
+/// void main() {
+///     vec2 uv = (vec2(gl_GlobalInvocationID.xy) + 0.5) * push.texel;
+///     vec4 c = textureBindless2DLod(push.colour, push.smp, uv, 0.0);
+///     imageStore(kImages2D[push.target], ivec2(gl_GlobalInvocationID.xy), c);
+/// }
+/// ```
+///
+/// * Textures: arrays `kTextures2D`, `kTextures2DArray`, `kTextures3D`, `kTexturesCube`, `kTexturesU2D` and
+///   `kTexturesI2D` (integer texels), `kTextures2DShadow`; samplers `kSamplers`, `kSamplersShadow`. The helpers take
+///   the indices of a texture and a sampler, which need not be uniform: `textureBindless2D(tex, smp, uv)`, `..2DLod`,
+///   `..2DGrad`, `..2DGather`, `..2DShadow(tex, smp, vec3(uv, reference))`, `..2DArray[Lod]`, `..3D[Lod]`,
+///   `..Cube[Lod]`, `textureBindlessFetch2D(tex, texel, lod)` (`FetchU2D`, `FetchI2D`), `textureBindlessSize2D(tex)`
+///   (`Size2DArray`, `Size3D`, `SizeCube`), `textureBindlessQueryLevels2D(tex)` (`QueryLevelsCube`). Those without an
+///   explicit level use derivatives in fragment shaders and mip level 0 in every other stage.
+/// * Storage images: `kImages2D`, `kImages2DArray`, `kImages3D`, `kImagesU2D`, `kImagesI2D` take stores of any format
+///   (and loads where `LVK_FORMATLESS_READ` is defined, that is where the device can load without a format). To load
+///   elsewhere, or to use atomics, name the format once at global scope:
+///   `LVK_STORAGE_IMAGES_2D(rgba8, kImagesRgba8);`, `LVK_STORAGE_IMAGES_U2D(r32ui, kCounters);`,
+///   `LVK_STORAGE_IMAGES_I2D(..)`, or `LVK_STORAGE_IMAGES(image3D, r32f, kVolumes);` for the other shapes. Mark an
+///   index that differs between invocations: `kImages2D[nonuniformEXT(i)]`.
+/// * Buffers, by address: `layout(buffer_reference, scalar) readonly buffer Vertices { vec3 position[]; };` and a
+///   member `Vertices vertices;` in the push constants.
+/// * Ray tracing stages: `traceRayEXT(kTLAS[push.tlas], LVK_RAY_FLAG_OPAQUE, ..)`.
+/// * Any stage: `#include <lvk/ray_query.glsl>` for ray queries,
+///   `lvkRayQueryInitialize(rq, push.tlas, LVK_RAY_FLAG_OPAQUE, 0xFFu, origin, 0.0, direction, 100.0)` and so on.
+/// * `LVK_STAGE_FRAGMENT`, `LVK_STAGE_RAY_GEN` and so on are defined for the stage at hand, so that one file serves several.
+///
+/// Extensions for buffer references, scalar layout, non-uniform indexing, sized integer and float types, subgroup
+/// operations and `debugPrintfEXT` are on; what the text does not use costs nothing and asks nothing of the device.
+///
+/// # Includes
+///
+/// `#include "name"` is looked up in [`includes`](Self::includes), then beside the including file, then in
+/// [`include_dirs`](Self::include_dirs); `#include <name>` skips the place beside the including file. Names that start
+/// with `lvk/` are the library's. `#pragma once` and include guards both work.
+#[derive(Debug, Clone, Copy)]
+pub struct ShaderModuleDesc<'a> {
+    /// The stage the module is for.
+    pub stage: ShaderStage,
+    /// The program text.
+    pub source: ShaderSource<'a>,
+    /// Files that `#include` finds without a file system: name as written in the directive (with `/`), and text.
+    pub includes: &'a [(&'a str, &'a str)],
+    /// Folders that `#include` searches, in order.
+    pub include_dirs: &'a [&'a Path],
+    /// Macros defined in front of the text: name and replacement (may be empty). Ignored for SPIR-V.
+    pub defines: &'a [(&'a str, &'a str)],
+    /// Name shown in errors and by debugging tools.
+    pub debug_name: &'a str,
+}
+
+impl Default for ShaderModuleDesc<'_> {
+    /// An empty vertex shader text; set at least `stage` and `source`.
+    fn default() -> Self {
+        Self {
+            stage: ShaderStage::Vertex,
+            source: ShaderSource::Glsl(""),
+            includes: &[],
+            include_dirs: &[],
+            defines: &[],
+            debug_name: "",
+        }
+    }
+}

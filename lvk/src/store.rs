@@ -1,0 +1,123 @@
+//! All pools: handle to object, or [`Error::StaleHandle`].
+
+use std::marker::PhantomData;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, PoisonError, RwLock};
+
+use slotmap::{DefaultKey, Key, KeyData, SlotMap};
+
+use crate::accel::AccelStruct;
+use crate::error::{Error, Result};
+use crate::handle::{
+    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle,
+    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
+};
+use crate::pipeline::{ComputePipeline, RayTracingPipeline, RenderPipeline, ShaderModule};
+use crate::resource::{Buffer, QueryPool, Sampler, Texture};
+
+/// Every object of a context, by handle.
+pub(crate) struct Store {
+    pub(crate) buffers: Pool<BufferHandle, Buffer>,
+    pub(crate) textures: Pool<TextureHandle, Texture>,
+    pub(crate) samplers: Pool<SamplerHandle, Sampler>,
+    pub(crate) shader_modules: Pool<ShaderModuleHandle, ShaderModule>,
+    pub(crate) render_pipelines: Pool<RenderPipelineHandle, RenderPipeline>,
+    pub(crate) compute_pipelines: Pool<ComputePipelineHandle, ComputePipeline>,
+    pub(crate) ray_tracing_pipelines: Pool<RayTracingPipelineHandle, RayTracingPipeline>,
+    pub(crate) query_pools: Pool<QueryPoolHandle, QueryPool>,
+    pub(crate) accel_structs: Pool<AccelStructHandle, AccelStruct>,
+}
+
+impl Store {
+    pub(crate) fn new() -> Self {
+        let mask = next_mask();
+        Self {
+            buffers: Pool::new(mask),
+            textures: Pool::new(mask),
+            samplers: Pool::new(mask),
+            shader_modules: Pool::new(mask),
+            render_pipelines: Pool::new(mask),
+            compute_pipelines: Pool::new(mask),
+            ray_tracing_pipelines: Pool::new(mask),
+            query_pools: Pool::new(mask),
+            accel_structs: Pool::new(mask),
+        }
+    }
+}
+
+/// Objects of one kind.
+///
+/// Keys leave the pool combined with a mask of the context, so that a handle of another context finds nothing.
+pub(crate) struct Pool<H, T> {
+    objects: RwLock<SlotMap<DefaultKey, Arc<T>>>,
+    mask: u64,
+    handle: PhantomData<fn() -> H>,
+}
+
+impl<H: Handle, T> Pool<H, T> {
+    fn new(mask: u64) -> Self {
+        Self { objects: RwLock::default(), mask, handle: PhantomData }
+    }
+
+    pub(crate) fn insert(&self, object: T) -> H {
+        let mut objects = self.objects.write().unwrap_or_else(PoisonError::into_inner);
+        H::from_bits(objects.insert(Arc::new(object)).data().as_ffi() ^ self.mask)
+    }
+
+    pub(crate) fn get(&self, handle: H) -> Result<Arc<T>> {
+        let objects = self.objects.read().unwrap_or_else(PoisonError::into_inner);
+        objects.get(self.key(handle)).cloned().ok_or(Error::StaleHandle { kind: H::KIND })
+    }
+
+    pub(crate) fn remove(&self, handle: H) -> Result<Arc<T>> {
+        let mut objects = self.objects.write().unwrap_or_else(PoisonError::into_inner);
+        objects.remove(self.key(handle)).ok_or(Error::StaleHandle { kind: H::KIND })
+    }
+
+    /// Takes everything out.
+    pub(crate) fn drain(&self) -> Vec<Arc<T>> {
+        let mut objects = self.objects.write().unwrap_or_else(PoisonError::into_inner);
+        objects.drain().map(|(_, object)| object).collect()
+    }
+
+    fn key(&self, handle: H) -> DefaultKey {
+        KeyData::from_ffi(handle.bits() ^ self.mask).into()
+    }
+}
+
+/// A different mask for each context of the process: odd multiples spread over all bits.
+fn next_mask() -> u64 {
+    static CONTEXTS: AtomicU64 = AtomicU64::new(1);
+    CONTEXTS.fetch_add(1, Ordering::Relaxed).wrapping_mul(0x9e37_79b9_7f4a_7c15)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_removed_object_is_stale_even_when_its_place_is_taken_again() {
+        let pool = Pool::<BufferHandle, u32>::new(next_mask());
+        let first = pool.insert(1);
+        assert_eq!(*pool.remove(first).unwrap(), 1);
+        let second = pool.insert(2);
+        assert!(matches!(pool.get(first), Err(Error::StaleHandle { kind: "buffer" })));
+        assert!(pool.remove(first).is_err());
+        assert_eq!(*pool.get(second).unwrap(), 2);
+    }
+
+    #[test]
+    fn a_handle_of_another_context_finds_nothing() {
+        let pools: Vec<_> = (0..64).map(|_| Pool::<BufferHandle, usize>::new(next_mask())).collect();
+        let handles: Vec<Vec<_>> =
+            pools.iter().map(|pool| (0..100).map(|value| pool.insert(value)).collect()).collect();
+        for (owner, handles) in handles.iter().enumerate() {
+            for (other, pool) in pools.iter().enumerate() {
+                for (value, handle) in handles.iter().enumerate() {
+                    let found = pool.get(*handle).ok().map(|object| *object);
+                    assert_eq!(found, (owner == other).then_some(value));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! Command buffers that are recorded, run by the GPU and recorded again.
+
+use std::collections::{BTreeSet, VecDeque};
+
+use ash::vk;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+
+/// A command pool of its own for each command buffer, so that any thread may record without a lock.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CommandSlot {
+    pub(crate) pool: vk::CommandPool,
+    /// Runs before `main` and holds the barriers between the queue's state and the first uses in `main`.
+    pub(crate) prologue: vk::CommandBuffer,
+    /// What the caller records.
+    pub(crate) main: vk::CommandBuffer,
+}
+
+impl CommandSlot {
+    fn new(gpu: &Gpu) -> Result<Self> {
+        let info = vk::CommandPoolCreateInfo::default()
+            .flags(vk::CommandPoolCreateFlags::TRANSIENT)
+            .queue_family_index(gpu.queue_family);
+        // SAFETY: the queue family is the device's own.
+        let pool = unsafe { gpu.device.create_command_pool(&info, None) }
+            .map_err(Error::vulkan("vkCreateCommandPool"))?;
+        let info = vk::CommandBufferAllocateInfo::default()
+            .command_pool(pool)
+            .level(vk::CommandBufferLevel::PRIMARY)
+            .command_buffer_count(2);
+        // SAFETY: the pool was just created.
+        match unsafe { gpu.device.allocate_command_buffers(&info) } {
+            Ok(buffers) => Ok(Self { pool, prologue: buffers[0], main: buffers[1] }),
+            Err(result) => {
+                // SAFETY: the pool is unused.
+                unsafe { gpu.device.destroy_command_pool(pool, None) };
+                Err(Error::vulkan("vkAllocateCommandBuffers")(result))
+            }
+        }
+    }
+
+    fn reset(self, gpu: &Gpu) -> Result<()> {
+        // SAFETY: the GPU is done with the pool's command buffers, and nobody records them.
+        unsafe { gpu.device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
+            .map_err(Error::vulkan("vkResetCommandPool"))
+    }
+
+    fn destroy(self, gpu: &Gpu) {
+        // SAFETY: as in `reset`.
+        unsafe { gpu.device.destroy_command_pool(self.pool, None) };
+    }
+}
+
+/// Which command buffers are free, being recorded, or with the GPU.
+#[derive(Debug, Default)]
+pub(crate) struct CommandRing {
+    free: Vec<CommandSlot>,
+    open: BTreeSet<u64>,
+    in_flight: VecDeque<InFlight>,
+    last_sequence: u64,
+}
+
+#[derive(Debug)]
+struct InFlight {
+    value: u64,
+    sequence: u64,
+    slot: CommandSlot,
+}
+
+impl CommandRing {
+    /// Takes a command buffer to record, with its sequence number.
+    pub(crate) fn acquire(&mut self, gpu: &Gpu) -> Result<(u64, CommandSlot)> {
+        let slot = match self.free.pop() {
+            Some(slot) => slot,
+            None => CommandSlot::new(gpu)?,
+        };
+        self.last_sequence += 1;
+        self.open.insert(self.last_sequence);
+        Ok((self.last_sequence, slot))
+    }
+
+    /// The command buffer was submitted and is done when the timeline reaches `value`.
+    pub(crate) fn submitted(&mut self, sequence: u64, slot: CommandSlot, value: u64) {
+        self.open.remove(&sequence);
+        self.in_flight.push_back(InFlight { value, sequence, slot });
+    }
+
+    /// The command buffer was given up before submission.
+    pub(crate) fn discard(&mut self, gpu: &Gpu, sequence: u64, slot: CommandSlot) {
+        self.open.remove(&sequence);
+        self.recycle(gpu, slot);
+    }
+
+    /// Takes command buffers back that the GPU is done with and answers their sequence numbers.
+    pub(crate) fn collect(&mut self, gpu: &Gpu, completed: u64) -> Vec<u64> {
+        let mut done = Vec::new();
+        while let Some(oldest) = self.in_flight.front()
+            && oldest.value <= completed
+        {
+            let Some(oldest) = self.in_flight.pop_front() else { break };
+            done.push(oldest.sequence);
+            self.recycle(gpu, oldest.slot);
+        }
+        done
+    }
+
+    /// Sequence number of the oldest command buffer being recorded.
+    pub(crate) fn oldest_open(&self) -> Option<u64> {
+        self.open.first().copied()
+    }
+
+    /// Sequence number of the newest command buffer being recorded.
+    pub(crate) fn newest_open(&self) -> Option<u64> {
+        self.open.last().copied()
+    }
+
+    /// Destroys everything. The GPU is idle and nothing is being recorded.
+    pub(crate) fn destroy(&mut self, gpu: &Gpu) {
+        let in_flight = self.in_flight.drain(..).map(|entry| entry.slot);
+        self.free.drain(..).chain(in_flight).for_each(|slot| slot.destroy(gpu));
+    }
+
+    fn recycle(&mut self, gpu: &Gpu, slot: CommandSlot) {
+        match slot.reset(gpu) {
+            Ok(()) => self.free.push(slot),
+            Err(_) => slot.destroy(gpu),
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! Things to destroy once neither a command buffer being recorded nor the GPU can use them any more.
+
+use std::collections::VecDeque;
+
+/// A queue of things to destroy later.
+///
+/// A command buffer that was open when a thing was destroyed may use it, so the thing first waits until that command
+/// buffer is submitted or dropped. From then on nothing new can use it, and what was submitted so far bounds how long
+/// the GPU may.
+#[derive(Debug)]
+pub(crate) struct Deferred<T> {
+    /// Waiting for open command buffers, with the newest of them.
+    open: Vec<(T, Option<u64>)>,
+    /// Waiting for the GPU, with the timeline value it must reach; values never fall from front to back.
+    stamped: VecDeque<(T, u64)>,
+}
+
+impl<T> Default for Deferred<T> {
+    fn default() -> Self {
+        Self { open: Vec::new(), stamped: VecDeque::new() }
+    }
+}
+
+impl<T> Deferred<T> {
+    /// Queues `item`. `newest_open` is the newest sequence number handed out to a command buffer so far; `None` if no
+    /// command buffer can use the item.
+    pub(crate) fn push(&mut self, item: T, newest_open: Option<u64>) {
+        self.open.push((item, newest_open));
+    }
+
+    /// Takes what can be destroyed now.
+    ///
+    /// `oldest_open` is the sequence number of the oldest command buffer still being recorded, `submitted` the timeline
+    /// value of the last submission and `completed` the one the GPU has reached.
+    pub(crate) fn collect(&mut self, oldest_open: Option<u64>, submitted: u64, completed: u64) -> Vec<T> {
+        let blocked =
+            |newest: Option<u64>| newest.zip(oldest_open).is_some_and(|(newest, open)| open <= newest);
+        let stamp = self.stamped.back().map_or(submitted, |(_, last)| submitted.max(*last));
+        let unblocked = self.open.extract_if(.., |(_, newest)| !blocked(*newest));
+        self.stamped.extend(unblocked.map(|(item, _)| (item, stamp)));
+        let done = self.stamped.partition_point(|(_, stamp)| *stamp <= completed);
+        self.stamped.drain(..done).map(|(item, _)| item).collect()
+    }
+
+    /// Takes everything, for a device that is idle.
+    pub(crate) fn drain_all(&mut self) -> Vec<T> {
+        let stamped = self.stamped.drain(..).map(|(item, _)| item);
+        stamped.chain(self.open.drain(..).map(|(item, _)| item)).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[derive(Debug, Clone)]
+    enum Op {
+        Open,
+        /// Submits or drops one of the open command buffers.
+        Close {
+            which: prop::sample::Index,
+            submit: bool,
+        },
+        Destroy,
+        Complete,
+        Collect,
+    }
+
+    fn op() -> impl Strategy<Value = Op> {
+        prop_oneof![
+            Just(Op::Open),
+            (any::<prop::sample::Index>(), any::<bool>())
+                .prop_map(|(which, submit)| Op::Close { which, submit }),
+            Just(Op::Destroy),
+            Just(Op::Complete),
+            Just(Op::Collect),
+        ]
+    }
+
+    /// Which command buffers may use a destroyed item, and the last submission of any of them.
+    struct Item {
+        users: BTreeSet<u64>,
+        last_use: u64,
+    }
+
+    #[derive(Default)]
+    struct Model {
+        next: u64,
+        open: BTreeSet<u64>,
+        submitted: u64,
+        completed: u64,
+        items: Vec<Option<Item>>,
+    }
+
+    impl Model {
+        fn close(&mut self, which: &prop::sample::Index, submit: bool) {
+            if self.open.is_empty() {
+                return;
+            }
+            let list: Vec<u64> = self.open.iter().copied().collect();
+            let closed = *which.get(&list);
+            self.open.remove(&closed);
+            self.submitted += u64::from(submit);
+            for item in self.items.iter_mut().flatten() {
+                if item.users.remove(&closed) && submit {
+                    item.last_use = self.submitted;
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn nothing_in_use_is_returned_and_nothing_is_kept_or_lost(ops in prop::collection::vec(op(), 0..120)) {
+            let mut deferred = Deferred::default();
+            let mut model = Model::default();
+            for op in ops {
+                match op {
+                    Op::Open => {
+                        model.open.insert(model.next);
+                        model.next += 1;
+                    }
+                    Op::Close { which, submit } => model.close(&which, submit),
+                    Op::Destroy => {
+                        deferred.push(model.items.len(), model.next.checked_sub(1));
+                        let item = Item { users: model.open.clone(), last_use: model.submitted };
+                        model.items.push(Some(item));
+                    }
+                    Op::Complete => model.completed = (model.completed + 1).min(model.submitted),
+                    Op::Collect => {
+                        let oldest = model.open.first().copied();
+                        for index in deferred.collect(oldest, model.submitted, model.completed) {
+                            let item = model.items[index].take();
+                            prop_assert!(item.is_some(), "returned twice");
+                            let item = item.unwrap();
+                            prop_assert!(item.users.is_empty() && item.last_use <= model.completed);
+                        }
+                    }
+                }
+            }
+            model.submitted += 1;
+            deferred.collect(None, model.submitted, 0).into_iter().for_each(|index| model.items[index] = None);
+            let rest = deferred.collect(None, model.submitted, model.submitted);
+            let kept: Vec<usize> =
+                model.items.iter().enumerate().filter(|(_, item)| item.is_some()).map(|(at, _)| at).collect();
+            let mut sorted = rest;
+            sorted.sort_unstable();
+            prop_assert_eq!(sorted, kept);
+            prop_assert!(deferred.drain_all().is_empty());
+        }
+    }
+
+    #[test]
+    fn item_waits_for_the_command_buffer_and_then_for_the_gpu() {
+        let mut deferred = Deferred::default();
+        deferred.push("texture", Some(7));
+        assert!(deferred.collect(Some(7), 3, 3).is_empty());
+        assert!(deferred.collect(Some(8), 4, 3).is_empty());
+        assert!(deferred.collect(Some(8), 9, 3).is_empty());
+        assert_eq!(deferred.collect(Some(8), 9, 4), ["texture"]);
+    }
+
+    #[test]
+    fn unused_item_of_an_idle_queue_goes_at_once() {
+        let mut deferred = Deferred::default();
+        deferred.push("buffer", None);
+        assert_eq!(deferred.collect(Some(0), 0, 0), ["buffer"]);
+    }
+
+    #[test]
+    fn draining_returns_every_item() {
+        let mut deferred = Deferred::default();
+        deferred.push(1, Some(1));
+        deferred.push(2, None);
+        assert!(deferred.collect(Some(1), 5, 0).is_empty());
+        assert_eq!(deferred.drain_all(), [2, 1]);
+    }
+}

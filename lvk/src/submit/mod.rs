@@ -1,0 +1,10 @@
+//! Submission to the queue: command buffers, the timeline, barriers between command buffers, deferred destruction.
+
+pub(crate) mod command_ring;
+pub(crate) mod deferred;
+pub(crate) mod emit;
+pub(crate) mod queue;
+pub(crate) mod timeline;
+
+pub(crate) use queue::{Recording, Submitter};
+pub use timeline::SubmitHandle;

@@ -1,0 +1,69 @@
+//! The timeline semaphore of the queue: one rising number for everything submitted.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use ash::vk;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+
+/// Names a submission; compare, copy and wait for it with [`Context::wait`](crate::Context::wait).
+///
+/// The default value names "nothing submitted yet" and is always done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub struct SubmitHandle(pub(crate) u64);
+
+/// A timeline semaphore with the last value seen.
+pub(crate) struct Timeline {
+    pub(crate) raw: vk::Semaphore,
+    seen: AtomicU64,
+    gpu: Arc<Gpu>,
+}
+
+impl Timeline {
+    pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self> {
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        // SAFETY: timeline semaphores are turned on.
+        let raw = unsafe { gpu.device.create_semaphore(&info, None) }
+            .map_err(Error::vulkan("vkCreateSemaphore"))?;
+        gpu.name(raw, "queue timeline");
+        Ok(Self { raw, seen: AtomicU64::new(0), gpu: Arc::clone(gpu) })
+    }
+
+    /// The last value the GPU reached, as far as is known without asking.
+    pub(crate) fn seen(&self) -> u64 {
+        self.seen.load(Ordering::Acquire)
+    }
+
+    /// Asks how far the GPU is.
+    pub(crate) fn completed(&self) -> Result<u64> {
+        // SAFETY: the semaphore is alive and a timeline.
+        let value = unsafe { self.gpu.device.get_semaphore_counter_value(self.raw) }
+            .map_err(Error::vulkan("vkGetSemaphoreCounterValue"))?;
+        self.seen.fetch_max(value, Ordering::AcqRel);
+        Ok(value)
+    }
+
+    /// Blocks until the GPU reaches `value`.
+    pub(crate) fn wait(&self, value: u64) -> Result<()> {
+        if self.seen() >= value {
+            return Ok(());
+        }
+        let (semaphores, values) = ([self.raw], [value]);
+        let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        // SAFETY: the semaphore is alive and a timeline; `value` was submitted, so the wait ends.
+        unsafe { self.gpu.device.wait_semaphores(&info, u64::MAX) }
+            .map_err(Error::vulkan("vkWaitSemaphores"))?;
+        self.seen.fetch_max(value, Ordering::AcqRel);
+        Ok(())
+    }
+}
+
+impl Drop for Timeline {
+    fn drop(&mut self) {
+        // SAFETY: the context has waited for the GPU before its parts are dropped.
+        unsafe { self.gpu.device.destroy_semaphore(self.raw, None) };
+    }
+}

@@ -1,0 +1,146 @@
+//! Writes pictures so that a file is either complete or not there.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// Why a picture could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum PngError {
+    /// The folder does not exist, is no folder, or may not be written to.
+    #[error("cannot write {}: {source}; choose another --out", path.display())]
+    Unwritable {
+        /// The path of the picture.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The pixels do not fit the size.
+    #[error("{} pixels of 4 bytes were to be written to {}, but {bytes} bytes were given", width * height, path.display())]
+    WrongLength {
+        /// The path of the picture.
+        path: PathBuf,
+        /// Pixels in a row.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Bytes given.
+        bytes: usize,
+    },
+    /// The picture could not be encoded.
+    #[error("cannot encode {}: {source}", path.display())]
+    Encode {
+        /// The path of the picture.
+        path: PathBuf,
+        /// What the encoder said.
+        source: image::ImageError,
+    },
+}
+
+/// Checks that a picture can be written to `path` later, without leaving anything behind. An existing file at
+/// `path` is not touched.
+///
+/// # Errors
+/// [`PngError::Unwritable`].
+pub fn check_writable(path: &Path) -> Result<(), PngError> {
+    let unwritable = |source| PngError::Unwritable { path: path.into(), source };
+    if path.is_dir() || path.file_name().is_none() {
+        return Err(unwritable(std::io::ErrorKind::IsADirectory.into()));
+    }
+    Partial::create(path).map(drop).map_err(unwritable)
+}
+
+/// Writes `width` x `height` pixels of 4 bytes (RGBA, sRGB, rows from the top) as a PNG. An earlier file at `path` is
+/// replaced in one step; after an error it is unchanged.
+///
+/// # Errors
+/// [`PngError`].
+pub fn write(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<(), PngError> {
+    if rgba.len() as u64 != u64::from(width) * u64::from(height) * 4 {
+        return Err(PngError::WrongLength { path: path.into(), width, height, bytes: rgba.len() });
+    }
+    let mut encoded = std::io::Cursor::new(Vec::new());
+    image::write_buffer_with_format(
+        &mut encoded,
+        rgba,
+        width,
+        height,
+        image::ExtendedColorType::Rgba8,
+        image::ImageFormat::Png,
+    )
+    .map_err(|source| PngError::Encode { path: path.into(), source })?;
+    Partial::create(path)
+        .and_then(|partial| partial.complete(&encoded.into_inner(), path))
+        .map_err(|source| PngError::Unwritable { path: path.into(), source })
+}
+
+/// A file beside the final one, removed unless it is completed.
+struct Partial {
+    path: PathBuf,
+    file: std::fs::File,
+}
+
+impl Partial {
+    fn create(target: &Path) -> std::io::Result<Self> {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
+        let path = target.with_file_name(format!(".lvk-{}-{number}.partial", std::process::id()));
+        let file = std::fs::File::create(&path)?;
+        Ok(Self { path, file })
+    }
+
+    fn complete(mut self, content: &[u8], target: &Path) -> std::io::Result<()> {
+        self.file.write_all(content)?;
+        self.file.sync_all()?;
+        std::fs::rename(&self.path, target)
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        // After the renaming there is nothing left to remove.
+        let _ = std::fs::remove_file(&self.path);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn files(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> = std::fs::read_dir(folder)
+            .unwrap()
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_picture_comes_back_as_it_was() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        std::fs::write(&path, "older").unwrap();
+        check_writable(&path).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"older");
+        let pixels: Vec<u8> = (0..24).collect();
+        write(&path, 3, 2, &pixels).unwrap();
+        let read = image::open(&path).unwrap().into_rgba8();
+        assert_eq!((read.dimensions(), read.into_raw()), ((3, 2), pixels));
+        assert_eq!(files(folder.path()), ["a.png"]);
+    }
+
+    #[test]
+    fn an_error_names_the_path_and_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let lost = folder.path().join("absent/a.png");
+        for error in [check_writable(&lost).unwrap_err(), write(&lost, 1, 1, &[0; 4]).unwrap_err()] {
+            assert!(matches!(error, PngError::Unwritable { .. }));
+            assert!(error.to_string().contains("absent/a.png"), "{error}");
+        }
+        assert!(check_writable(folder.path()).is_err(), "a folder is no picture");
+        let path = folder.path().join("b.png");
+        assert!(matches!(write(&path, 2, 2, &[0; 15]), Err(PngError::WrongLength { bytes: 15, .. })));
+        assert_eq!(files(folder.path()), Vec::<String>::new());
+    }
+}

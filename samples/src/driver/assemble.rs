@@ -1,0 +1,147 @@
+//! From unpacked packages to a folder that holds just what is needed, under the names libraries ask for.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::elf;
+use super::error::FetchError;
+use super::layer_description;
+use super::prefix::{
+    DRIVER, DRIVER_JSON, LAYER, LAYER_FOLDER, LOADER, Manifest, Part, SWIFTSHADER, SWIFTSHADER_JSON,
+};
+
+const LIBRARY_FOLDERS: [&str; 3] = ["usr/lib/x86_64-linux-gnu", "lib/x86_64-linux-gnu", "usr/lib/chromium"];
+
+/// Moves the files of `part` out of the unpacked packages in `tree` into `folder` and writes what describes
+/// them, except for the manifest, which is returned.
+pub(super) fn assemble(part: Part, tree: &Path, folder: &Path) -> Result<Manifest, FetchError> {
+    for inner in ["lib", "icd.d", LAYER_FOLDER] {
+        let path = folder.join(inner);
+        fs::create_dir_all(&path).map_err(FetchError::file("create", &path))?;
+    }
+    match part {
+        Part::Driver => driver(tree, folder),
+        Part::Validation => validation(tree, folder),
+    }
+}
+
+fn driver(tree: &Path, folder: &Path) -> Result<Manifest, FetchError> {
+    take(tree, folder, LOADER)?;
+    let needed = |name: &str| match find(tree, name) {
+        Some(path) => read_needed(&path).map(Some),
+        None => Ok(None),
+    };
+    let mut order = elf::load_order(file_name(DRIVER), needed)?;
+    for name in &order {
+        take(tree, folder, &format!("lib/{name}"))?;
+    }
+    if order.pop().as_deref() != Some(file_name(DRIVER)) {
+        return Err(missing(DRIVER));
+    }
+    write(&folder.join(DRIVER_JSON), &driver_description(DRIVER, &driver_version(tree)))?;
+    Ok(Manifest { preload: order.iter().map(|name| format!("lib/{name}")).collect(), ..Manifest::default() })
+}
+
+fn validation(tree: &Path, folder: &Path) -> Result<Manifest, FetchError> {
+    take(tree, folder, LAYER)?;
+    take(tree, folder, SWIFTSHADER)?;
+    write(&folder.join(SWIFTSHADER_JSON), &driver_description(SWIFTSHADER, "1.3.0"))?;
+    let description = layer_description::of(&folder.join(LAYER), &format!("../{LAYER}"))?;
+    write(&folder.join(LAYER_FOLDER).join("VkLayer_khronos_validation.json"), &description)?;
+    Ok(Manifest::default())
+}
+
+/// Moves the library `to` (relative to `folder`) there. Packages hold most libraries as a link to a file with
+/// a longer name; the short one is what others ask for, so it is the one to keep.
+fn take(tree: &Path, folder: &Path, to: &str) -> Result<(), FetchError> {
+    let from = find(tree, file_name(to)).ok_or_else(|| missing(to))?;
+    fs::rename(&from, folder.join(to)).map_err(FetchError::file("move", &from))
+}
+
+/// The file behind the library `name`; `None` if the packages do not hold it, or its link leads out of them.
+fn find(tree: &Path, name: &str) -> Option<PathBuf> {
+    let tree = tree.canonicalize().ok()?;
+    let real = LIBRARY_FOLDERS.iter().find_map(|folder| tree.join(folder).join(name).canonicalize().ok())?;
+    real.starts_with(&tree).then_some(real)
+}
+
+fn read_needed(path: &Path) -> Result<Vec<String>, FetchError> {
+    let image = fs::read(path).map_err(FetchError::file("read", path))?;
+    let damaged = || FetchError::Content { reason: format!("{} is no x86-64 library", path.display()) };
+    elf::needed(&image).ok_or_else(damaged)
+}
+
+/// The Vulkan version in the driver's own description, which distributions name differently.
+fn driver_version(tree: &Path) -> String {
+    let entries = fs::read_dir(tree.join("usr/share/vulkan/icd.d")).into_iter().flatten().flatten();
+    let mut own = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with("lvp_icd"));
+    let text = own.next().and_then(|entry| fs::read_to_string(entry.path()).ok()).unwrap_or_default();
+    quoted_value(&text, "api_version").unwrap_or("1.3.0").to_owned()
+}
+
+/// The string value of `key` in a flat JSON text.
+fn quoted_value<'a>(text: &'a str, key: &str) -> Option<&'a str> {
+    let (_, rest) = text.split_once(&format!("\"{key}\""))?;
+    let value = rest.trim_start().strip_prefix(':')?.trim_start().strip_prefix('"')?;
+    value.split_once('"').map(|(value, _)| value)
+}
+
+/// A driver description; a library path with a slash is relative to the description's own folder.
+fn driver_description(library: &str, version: &str) -> String {
+    format!(
+        "{{\n  \"file_format_version\": \"1.0.0\",\n  \"ICD\": {{\n    \"library_path\": \"../{library}\",\n    \
+         \"api_version\": \"{version}\"\n  }}\n}}\n"
+    )
+}
+
+fn missing(library: &str) -> FetchError {
+    FetchError::Content { reason: format!("{} is not among them", file_name(library)) }
+}
+
+fn file_name(path: &str) -> &str {
+    path.rsplit('/').next().unwrap_or(path)
+}
+
+fn write(path: &Path, text: &str) -> Result<(), FetchError> {
+    fs::write(path, text).map_err(FetchError::file("write", path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_version_is_read_from_the_description() {
+        let text = "{ \"ICD\": { \"api_version\" : \"1.4.305\", \"library_path\": \"x.so\" } }";
+        assert_eq!(quoted_value(text, "api_version"), Some("1.4.305"));
+        assert_eq!(quoted_value(text, "version"), None);
+        assert_eq!(quoted_value("", "api_version"), None);
+    }
+
+    #[test]
+    fn a_description_points_from_its_folder_to_the_library() {
+        let text = driver_description(DRIVER, "1.4.305");
+        assert_eq!(quoted_value(&text, "library_path"), Some("../lib/libvulkan_lvp.so"));
+        assert_eq!(quoted_value(&text, "api_version"), Some("1.4.305"));
+    }
+
+    #[test]
+    fn links_are_followed_inside_the_packages_only() {
+        let folder = tempfile::tempdir().unwrap();
+        let libraries = folder.path().join(LIBRARY_FOLDERS[0]);
+        fs::create_dir_all(&libraries).unwrap();
+        fs::write(libraries.join("libx.so.1.2"), "x").unwrap();
+        std::os::unix::fs::symlink("libx.so.1.2", libraries.join("libx.so.1")).unwrap();
+        std::os::unix::fs::symlink("/etc/hostname", libraries.join("liby.so.1")).unwrap();
+        assert!(find(folder.path(), "libx.so.1").unwrap().ends_with("libx.so.1.2"));
+        assert_eq!(find(folder.path(), "liby.so.1"), None);
+        assert_eq!(find(folder.path(), "libz.so.1"), None);
+    }
+
+    #[test]
+    fn an_empty_package_is_an_error_that_names_the_library() {
+        let (tree, folder) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let message = assemble(Part::Driver, tree.path(), folder.path()).unwrap_err().to_string();
+        assert!(message.contains("libvulkan.so.1"), "{message}");
+    }
+}

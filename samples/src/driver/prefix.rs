@@ -1,0 +1,169 @@
+//! Layout of a folder with fetched libraries, and the manifest that makes it valid.
+//!
+//! ```text
+//! <folder>/driver/lib/*.so*                 loader, software driver and all it needs
+//! <folder>/driver/icd.d/lvp_icd.json        for VK_DRIVER_FILES
+//! <folder>/validation/lib/*.so              validation layer and SwiftShader
+//! <folder>/validation/explicit_layer.d/     for VK_ADD_LAYER_PATH
+//! <folder>/validation/icd.d/swiftshader_icd.json
+//! <folder>/*/manifest                       written last; without it the folder does not count
+//! ```
+//! Every path inside is relative, so the folder can be moved and copied.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::apt::{Order, Suite};
+
+/// The loader inside [`Part::Driver`].
+pub(super) const LOADER: &str = "lib/libvulkan.so.1";
+/// The software driver inside [`Part::Driver`].
+pub(super) const DRIVER: &str = "lib/libvulkan_lvp.so";
+/// The driver's description inside [`Part::Driver`].
+pub(super) const DRIVER_JSON: &str = "icd.d/lvp_icd.json";
+/// The validation layer inside [`Part::Validation`].
+pub(super) const LAYER: &str = "lib/libVkLayer_khronos_validation.so";
+/// Folder of layer descriptions inside [`Part::Validation`].
+pub(super) const LAYER_FOLDER: &str = "explicit_layer.d";
+/// A driver without ray tracing inside [`Part::Validation`].
+pub(super) const SWIFTSHADER: &str = "lib/libvk_swiftshader.so";
+/// Its description inside [`Part::Validation`].
+pub(super) const SWIFTSHADER_JSON: &str = "icd.d/swiftshader_icd.json";
+
+const MANIFEST: &str = "manifest";
+/// Counts layouts: a folder written for another one is fetched anew.
+const MANIFEST_HEAD: &str = "lvk vulkan folder 1";
+
+/// One of the two things that can be fetched.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    /// Loader and software driver with ray tracing.
+    Driver,
+    /// Validation layer, and a software driver without ray tracing.
+    Validation,
+}
+
+impl Part {
+    /// Where this part lives below the Vulkan folder `root`.
+    pub(super) fn folder(self, root: &Path) -> PathBuf {
+        root.join(match self {
+            Self::Driver => "driver",
+            Self::Validation => "validation",
+        })
+    }
+
+    /// Where it is put together before it is complete.
+    pub(super) fn partial_folder(self, root: &Path) -> PathBuf {
+        self.folder(root).with_extension("partial")
+    }
+
+    /// The packages it is made of.
+    pub(super) fn order(self) -> Order {
+        match self {
+            Self::Driver => Order {
+                packages: &["mesa-vulkan-drivers", "libvulkan1"],
+                with_dependencies: true,
+                suite: Suite::Backports,
+            },
+            Self::Validation => {
+                Order { packages: &["chromium-common"], with_dependencies: false, suite: Suite::Security }
+            }
+        }
+    }
+
+    /// What it is, for a person to read.
+    pub(super) fn title(self) -> &'static str {
+        match self {
+            Self::Driver => "software driver lavapipe",
+            Self::Validation => "validation layer",
+        }
+    }
+
+    /// The complete folder of this part, if one of `roots` has it.
+    pub(super) fn find(self, roots: &[PathBuf]) -> Option<PathBuf> {
+        roots.iter().map(|root| self.folder(root)).find(|folder| Manifest::read(folder).is_some())
+    }
+}
+
+/// What a complete folder says about itself.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Manifest {
+    /// Name and version of the packages it was made from.
+    pub(super) packages: Vec<(String, String)>,
+    /// Libraries to open before the loader starts, in this order, relative to the folder.
+    pub(super) preload: Vec<String>,
+}
+
+impl Manifest {
+    /// The manifest of `folder`; `None` if there is none or it is not for this layout.
+    pub(super) fn read(folder: &Path) -> Option<Self> {
+        Self::parse(&fs::read_to_string(folder.join(MANIFEST)).ok()?)
+    }
+
+    /// Writes it into `folder`, which completes the folder.
+    pub(super) fn write(&self, folder: &Path) -> std::io::Result<()> {
+        fs::write(folder.join(MANIFEST), self.to_text())
+    }
+
+    fn parse(text: &str) -> Option<Self> {
+        let mut lines = text.lines();
+        if lines.next()? != MANIFEST_HEAD {
+            return None;
+        }
+        let mut manifest = Self::default();
+        for line in lines {
+            match line.split_once(' ')? {
+                ("package", rest) => {
+                    let (name, version) = rest.split_once(' ')?;
+                    manifest.packages.push((name.to_owned(), version.to_owned()));
+                }
+                ("preload", path) => manifest.preload.push(path.to_owned()),
+                _ => return None,
+            }
+        }
+        Some(manifest)
+    }
+
+    fn to_text(&self) -> String {
+        let packages = self.packages.iter().map(|(name, version)| format!("package {name} {version}\n"));
+        let preload = self.preload.iter().map(|path| format!("preload {path}\n"));
+        format!("{MANIFEST_HEAD}\n{}", packages.chain(preload).collect::<String>())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example() -> Manifest {
+        Manifest {
+            packages: vec![("mesa-vulkan-drivers".into(), "25.0.7-2~bpo12+1".into())],
+            preload: vec!["lib/libz.so.1".into(), "lib/libLLVM-15.so.1".into()],
+        }
+    }
+
+    #[test]
+    fn a_manifest_reads_back_as_written() {
+        assert_eq!(Manifest::parse(&example().to_text()), Some(example()));
+        assert_eq!(Manifest::parse(&Manifest::default().to_text()), Some(Manifest::default()));
+    }
+
+    #[test]
+    fn other_layouts_do_not_count() {
+        assert_eq!(Manifest::parse(""), None);
+        assert_eq!(Manifest::parse("lvk vulkan folder 0\n"), None);
+        assert_eq!(Manifest::parse(&format!("{MANIFEST_HEAD}\nunknown word\n")), None);
+    }
+
+    #[test]
+    fn a_folder_counts_only_with_its_manifest() {
+        let (with, without) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        for root in [&with, &without] {
+            fs::create_dir(Part::Driver.folder(root.path())).unwrap();
+        }
+        example().write(&Part::Driver.folder(with.path())).unwrap();
+        let roots = [without.path().to_path_buf(), with.path().to_path_buf()];
+        assert_eq!(Part::Driver.find(&roots), Some(Part::Driver.folder(with.path())));
+        assert_eq!(Part::Validation.find(&roots), None);
+    }
+}

@@ -1,0 +1,37 @@
+//! How an image is cut into launches.
+
+use std::ops::Range;
+
+/// Rows of an image of `height` rows in bands of at most `rows` (0 counts as 1), from top to bottom.
+pub(super) fn bands(height: u32, rows: u32) -> Vec<Range<u32>> {
+    let rows = rows.max(1);
+    (0..height.div_ceil(rows))
+        .map(|band| {
+            let first = band * rows;
+            first..first.saturating_add(rows).min(height)
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn a_short_image_is_one_band() {
+        assert_eq!(bands(5, 64), [0..5]);
+        assert_eq!(bands(5, u32::MAX), [0..5]);
+    }
+
+    proptest! {
+        #[test]
+        fn bands_cover_every_row_once(height in 0_u32..5000, rows in 0_u32..400) {
+            let all = bands(height, rows);
+            let covered: Vec<u32> = all.iter().cloned().flatten().collect();
+            prop_assert_eq!(covered, (0..height).collect::<Vec<_>>());
+            prop_assert!(all.iter().all(|band| !band.is_empty() && band.len() as u32 <= rows.max(1)));
+        }
+    }
+}

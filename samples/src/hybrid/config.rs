@@ -1,0 +1,154 @@
+//! What to render, and by which means of the device.
+
+use lvk::Capabilities;
+
+use super::HybridError;
+use crate::app::args;
+
+/// How primary visibility is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Method {
+    /// Every pixel's ray is traced.
+    Standalone,
+    /// A geometry pass rasterises into a G-buffer; rays are traced from there.
+    #[default]
+    Hybrid,
+}
+
+/// By which part of Vulkan rays are traced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RayPath {
+    /// A ray tracing pipeline.
+    Pipeline,
+    /// Ray queries in a compute shader.
+    Query,
+}
+
+/// What to render.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HybridConfig {
+    /// How primary visibility is found.
+    pub method: Method,
+    /// By which part of Vulkan rays are traced.
+    pub path: RayPath,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// How often a ray may be reflected or refracted, 0 to [`HybridConfig::MAX_DEPTH`].
+    pub max_depth: u32,
+}
+
+impl HybridConfig {
+    /// The largest depth; every level costs a place on each pixel's stack of waiting rays.
+    pub const MAX_DEPTH: u32 = args::MAX_DEPTH;
+
+    /// Checks sizes and depth against what the device with `capabilities` can do.
+    pub(super) fn check(&self, capabilities: &Capabilities) -> Result<(), HybridError> {
+        let limit = capabilities.limits.max_texture_2d;
+        let (width, height) = (self.width, self.height);
+        if width == 0 || height == 0 || width > limit || height > limit {
+            return Err(HybridError::BadSize { width, height, limit });
+        }
+        if self.max_depth > Self::MAX_DEPTH {
+            return Err(HybridError::TooDeep { depth: self.max_depth, limit: Self::MAX_DEPTH });
+        }
+        if self.method == Method::Hybrid && !capabilities.primitive_id {
+            return Err(HybridError::NoPrimitiveId { device: capabilities.device_name.clone() });
+        }
+        self.path.check(capabilities)
+    }
+}
+
+impl RayPath {
+    /// The path to take: `wish`, or the pipeline where there is one, else the query.
+    ///
+    /// # Errors
+    /// [`HybridError::NoRayTracing`] and [`HybridError::PathMissing`] say what the device lacks.
+    pub fn choose(wish: Option<Self>, capabilities: &Capabilities) -> Result<Self, HybridError> {
+        let path = match wish {
+            Some(path) => path,
+            None if capabilities.ray_tracing_pipeline => Self::Pipeline,
+            None => Self::Query,
+        };
+        path.check(capabilities).map(|()| path)
+    }
+
+    fn check(self, capabilities: &Capabilities) -> Result<(), HybridError> {
+        let Capabilities { ray_tracing_pipeline: pipeline, ray_query: query, .. } = *capabilities;
+        let device = capabilities.device_name.clone();
+        match self {
+            Self::Pipeline if pipeline => Ok(()),
+            Self::Query if query => Ok(()),
+            _ if !pipeline && !query => {
+                let reason = capabilities.ray_tracing_fallback.as_ref();
+                let reason = reason.map_or_else(String::new, |reason| format!(" ({reason})"));
+                Err(HybridError::NoRayTracing { device, reason })
+            }
+            Self::Pipeline => {
+                Err(HybridError::PathMissing { device, lacks: "ray tracing pipelines", instead: "query" })
+            }
+            Self::Query => {
+                Err(HybridError::PathMissing { device, lacks: "ray queries", instead: "pipeline" })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn device(pipeline: bool, query: bool) -> Capabilities {
+        let mut capabilities = Capabilities::default();
+        capabilities.device_name = "Thing 3000".to_owned();
+        capabilities.ray_tracing_pipeline = pipeline;
+        capabilities.ray_query = query;
+        capabilities.primitive_id = true;
+        capabilities.limits.max_texture_2d = 4096;
+        capabilities
+    }
+
+    fn config() -> HybridConfig {
+        HybridConfig { method: Method::Hybrid, path: RayPath::Query, width: 64, height: 64, max_depth: 4 }
+    }
+
+    #[test]
+    fn auto_prefers_the_pipeline_and_falls_back() {
+        assert_eq!(RayPath::choose(None, &device(true, true)).unwrap(), RayPath::Pipeline);
+        assert_eq!(RayPath::choose(None, &device(false, true)).unwrap(), RayPath::Query);
+        assert!(matches!(
+            RayPath::choose(None, &device(false, false)),
+            Err(HybridError::NoRayTracing { .. })
+        ));
+    }
+
+    #[test]
+    fn a_forced_path_is_never_replaced() {
+        assert_eq!(RayPath::choose(Some(RayPath::Query), &device(true, true)).unwrap(), RayPath::Query);
+        let error = RayPath::choose(Some(RayPath::Query), &device(true, false)).unwrap_err();
+        assert_eq!(error.to_string(), "Thing 3000 has no ray queries; use --rt pipeline");
+        let error = RayPath::choose(Some(RayPath::Pipeline), &device(false, true)).unwrap_err();
+        assert_eq!(error.to_string(), "Thing 3000 has no ray tracing pipelines; use --rt query");
+    }
+
+    #[test]
+    fn impossible_pictures_are_refused() {
+        let capabilities = device(true, true);
+        assert!(config().check(&capabilities).is_ok());
+        for (width, height) in [(0, 64), (64, 0), (5000, 64), (64, u32::MAX)] {
+            let error = HybridConfig { width, height, ..config() }.check(&capabilities).unwrap_err();
+            assert!(matches!(error, HybridError::BadSize { .. }), "{error}");
+        }
+        let deep = HybridConfig { max_depth: HybridConfig::MAX_DEPTH + 1, ..config() };
+        assert!(matches!(deep.check(&capabilities), Err(HybridError::TooDeep { .. })));
+    }
+
+    #[test]
+    fn only_the_hybrid_method_needs_triangle_numbers() {
+        let mut capabilities = device(true, true);
+        capabilities.primitive_id = false;
+        assert!(matches!(config().check(&capabilities), Err(HybridError::NoPrimitiveId { .. })));
+        assert!(HybridConfig { method: Method::Standalone, ..config() }.check(&capabilities).is_ok());
+    }
+}

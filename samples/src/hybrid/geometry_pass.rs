@@ -1,0 +1,130 @@
+//! The geometry pass of the hybrid method: every triangle once through the rasteriser into a G-buffer
+//! (algorithms 4 and 5 of the paper).
+
+use lvk::{
+    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoad, ColorTarget, CommandBuffer, CompareOp,
+    Context, CullMode, DepthAttachment, DepthTest, Format, Holder, IndexFormat, RenderPassDesc,
+    RenderPipelineDesc, RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle, TextureUsage,
+};
+
+use super::frame::{Indices, Push};
+use super::gpu_scene::GpuScene;
+use super::shader_module::module;
+use crate::shaders::hybrid as texts;
+
+/// Triangle number of pixels that show the sky (`kNoTriangle` in `shaders/hybrid/hit.glsl`).
+const NO_TRIANGLE: u32 = u32::MAX;
+
+/// What the geometry pass leaves for the ray pass, a texel a pixel.
+pub(super) struct GBuffer {
+    /// Position in scene units, and distance from the eye.
+    position: Holder<TextureHandle>,
+    /// Shading and geometric normal, octahedral, 16 bits a coordinate.
+    normal: Holder<TextureHandle>,
+    /// Albedo, linear.
+    albedo: Holder<TextureHandle>,
+    /// Number of the triangle, which leads to its material.
+    triangle: Holder<TextureHandle>,
+    depth: Holder<TextureHandle>,
+}
+
+/// The pass: its pipeline, its targets and the one indirect draw.
+pub(super) struct GeometryPass {
+    pub(super) targets: GBuffer,
+    pipeline: Holder<RenderPipelineHandle>,
+    draw: Holder<BufferHandle>,
+    triangles: BufferHandle,
+}
+
+impl GBuffer {
+    const POSITION: Format = Format::Rgba32Float;
+    const NORMAL: Format = Format::Rg32Uint;
+    const ALBEDO: Format = Format::Rgba16Float;
+    const TRIANGLE: Format = Format::R32Uint;
+    const DEPTH: Format = Format::D32Float;
+
+    fn new(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Self> {
+        let target = |format, debug_name| {
+            let usage = TextureUsage::SAMPLED | TextureUsage::TARGET;
+            ctx.create_texture(&TextureDesc { format, extent, usage, debug_name, ..TextureDesc::default() })
+        };
+        Ok(Self {
+            position: target(Self::POSITION, "g-buffer position")?,
+            normal: target(Self::NORMAL, "g-buffer normal")?,
+            albedo: target(Self::ALBEDO, "g-buffer albedo")?,
+            triangle: target(Self::TRIANGLE, "g-buffer triangle")?,
+            depth: target(Self::DEPTH, "g-buffer depth")?,
+        })
+    }
+
+    /// What the ray pass reads.
+    pub(super) fn textures(&self) -> [TextureHandle; 4] {
+        [&self.position, &self.normal, &self.albedo, &self.triangle].map(Holder::handle)
+    }
+
+    /// Tells the shaders where the targets are.
+    pub(super) fn name_in(&self, indices: &mut Indices) {
+        indices.gbuffer_position = self.position.index();
+        indices.gbuffer_normal = self.normal.index();
+        indices.gbuffer_albedo = self.albedo.index();
+        indices.gbuffer_triangle = self.triangle.index();
+    }
+
+    fn attachments(&self) -> [ColorAttachment; 4] {
+        let target = |texture: &Holder<TextureHandle>, load| ColorAttachment {
+            texture: texture.handle(),
+            mip: 0,
+            layer: 0,
+            load,
+            store: true,
+        };
+        [
+            target(&self.position, ColorLoad::DontCare),
+            target(&self.normal, ColorLoad::DontCare),
+            target(&self.albedo, ColorLoad::DontCare),
+            target(&self.triangle, ColorLoad::ClearUint([NO_TRIANGLE; 4])),
+        ]
+    }
+}
+
+impl GeometryPass {
+    /// The pass over `scene` for a picture of `extent` pixels.
+    pub(super) fn new(ctx: &Context, scene: &GpuScene, extent: [u32; 2]) -> lvk::Result<Self> {
+        let vertex = module(ctx, ShaderStage::Vertex, texts::GEOMETRY_VERT, &[], "geometry.vert")?;
+        let fragment = module(ctx, ShaderStage::Fragment, texts::GEOMETRY_FRAG, &[], "geometry.frag")?;
+        let formats = [GBuffer::POSITION, GBuffer::NORMAL, GBuffer::ALBEDO, GBuffer::TRIANGLE];
+        let color = formats.map(ColorTarget::from);
+        let pipeline = ctx.create_render_pipeline(&RenderPipelineDesc {
+            vertex: Some(*vertex),
+            fragment: Some(*fragment),
+            cull: CullMode::None,
+            color: &color,
+            depth: Some(DepthTest { format: GBuffer::DEPTH, compare: CompareOp::Greater, write: true }),
+            debug_name: "geometry pass",
+            ..RenderPipelineDesc::default()
+        })?;
+        // index count, instance count, first index, vertex offset, first instance
+        let arguments = [3 * scene.triangle_count, 1, 0, 0, 0];
+        let draw = ctx.create_buffer(&BufferDesc {
+            usage: BufferUsage::INDIRECT,
+            data: Some(bytemuck::cast_slice(&arguments)),
+            debug_name: "geometry pass draw",
+            ..BufferDesc::default()
+        })?;
+        Ok(Self { targets: GBuffer::new(ctx, extent)?, pipeline, draw, triangles: scene.triangles() })
+    }
+
+    /// Records the pass.
+    pub(super) fn record(&self, cmd: &mut CommandBuffer, push: &Push) -> lvk::Result<()> {
+        let mut pass = cmd.begin_rendering(&RenderPassDesc {
+            color: &self.targets.attachments(),
+            depth: Some(DepthAttachment { store: false, ..DepthAttachment::clear(*self.targets.depth, 0.0) }),
+            debug_name: "geometry pass",
+            ..RenderPassDesc::default()
+        })?;
+        pass.bind_render_pipeline(*self.pipeline)?;
+        pass.bind_index_buffer(self.triangles, 0, IndexFormat::U32)?;
+        pass.push_constants(push)?;
+        pass.draw_indexed_indirect(*self.draw, 0, 1, size_of::<[u32; 5]>() as u32)
+    }
+}

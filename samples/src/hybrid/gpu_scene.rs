@@ -1,0 +1,268 @@
+//! A scene on the GPU: arrays, textures, sky and acceleration structures.
+
+use std::ops::Range;
+use std::time::Instant;
+
+use bytemuck::{Pod, Zeroable};
+use lvk::{
+    AccelStructHandle, AddressMode, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, Context,
+    Format, GeometryFlags, Holder, IndexFormat, Indices, SamplerDesc, SamplerHandle, TextureDesc,
+    TextureHandle, TextureKind, TextureUsage, TlasDesc, TlasInstance, Triangles, VertexFormat,
+};
+
+use super::HybridError;
+use super::frame::SceneAddresses;
+use super::half_float::half_bits;
+use super::texture_density::lod_constant;
+use super::triangle_order::upload_order;
+use crate::scene::{Material, Scene, Sky, Texture};
+
+/// Mask bit of instances that stop light (`kMaskOpaque` in `shaders/hybrid/hit.glsl`).
+const MASK_OPAQUE: u8 = 1;
+/// Mask bit of instances that light passes through.
+const MASK_REFRACTIVE: u8 = 2;
+/// Custom indices have 24 bits.
+const CUSTOM_INDEX_LIMIT: u32 = 1 << 24;
+/// Texels on an edge of the sky's cube map.
+const SKY_SIZE: u32 = 512;
+/// `kNoTexture` in `shaders/common/scene_buffers.glsl`.
+const NO_TEXTURE: u32 = u32::MAX;
+
+/// A scene on the GPU.
+pub(super) struct GpuScene {
+    pub(super) triangle_count: u32,
+    pub(super) sky: Holder<TextureHandle>,
+    pub(super) surface_sampler: Holder<SamplerHandle>,
+    pub(super) sky_sampler: Holder<SamplerHandle>,
+    pub(super) tlas: Holder<AccelStructHandle>,
+    /// Milliseconds that building the bottom-level structures took, submission and wait included.
+    pub(super) blas_build_ms: f64,
+    arrays: Arrays,
+    _textures: Vec<Holder<TextureHandle>>,
+    blas: Vec<Holder<AccelStructHandle>>,
+}
+
+/// What the shaders reach by address; some of it is only held for them.
+struct Arrays {
+    positions: Holder<BufferHandle>,
+    triangles: Holder<BufferHandle>,
+    _held: [Holder<BufferHandle>; 4],
+    addresses: SceneAddresses,
+}
+
+/// `Material` in `shaders/common/scene_buffers.glsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct GpuMaterial {
+    albedo: [f32; 3],
+    albedo_texture: u32,
+    specular: [f32; 3],
+    shininess: f32,
+    emission: [f32; 3],
+    reflectivity: f32,
+    tint: [f32; 3],
+    transmission: f32,
+    ior: f32,
+}
+
+/// `TriangleInfo` in `shaders/common/scene_buffers.glsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct TriangleInfo {
+    material: u32,
+    lod_constant: f32,
+}
+
+impl GpuScene {
+    /// Uploads `scene` and builds its acceleration structures.
+    pub(super) fn new(ctx: &Context, scene: &Scene) -> Result<Self, HybridError> {
+        check_count(scene)?;
+        let textures: Vec<_> =
+            scene.textures.iter().map(|texture| upload_texture(ctx, texture)).collect::<Result<_, _>>()?;
+        let arrays = Arrays::new(ctx, scene, &textures)?;
+        ctx.wait_idle()?;
+        let start = Instant::now();
+        let (blas, instances) = build_blas(ctx, scene, *arrays.positions, *arrays.triangles)?;
+        ctx.wait_idle()?;
+        let blas_build_ms = start.elapsed().as_secs_f64() * 1e3;
+        let debug_name = "scene tlas";
+        let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, debug_name, ..TlasDesc::default() })?;
+        Ok(Self {
+            triangle_count: scene.triangles.len() as u32,
+            sky: upload_sky(ctx, &scene.sky)?,
+            surface_sampler: sampler(ctx, "surface sampler", AddressMode::Repeat)?,
+            sky_sampler: sampler(ctx, "sky sampler", AddressMode::ClampToEdge)?,
+            tlas,
+            blas_build_ms,
+            arrays,
+            _textures: textures,
+            blas,
+        })
+    }
+
+    /// Where the shaders find the arrays.
+    pub(super) fn addresses(&self) -> SceneAddresses {
+        self.arrays.addresses
+    }
+
+    /// Vertex indices, three per triangle.
+    pub(super) fn triangles(&self) -> BufferHandle {
+        self.arrays.triangles.handle()
+    }
+
+    /// How many bottom-level structures there are: one for opaque and one for refractive triangles.
+    pub(super) fn blas_count(&self) -> usize {
+        self.blas.len()
+    }
+}
+
+impl Arrays {
+    fn new(ctx: &Context, scene: &Scene, textures: &[Holder<TextureHandle>]) -> lvk::Result<Self> {
+        let sorts = !ctx.capabilities().prefers_spatial_order;
+        let order = upload_order(&scene.source_triangles, scene.opaque_triangle_count, sorts);
+        let corners: Vec<[u32; 3]> = order.iter().map(|&i| scene.triangles[i as usize]).collect();
+        let infos: Vec<TriangleInfo> = order.iter().map(|&i| triangle_info(scene, i as usize)).collect();
+        let materials: Vec<_> = scene.materials.iter().map(|m| gpu_material(m, textures)).collect();
+
+        let read = BufferUsage::STORAGE;
+        let input = read | BufferUsage::ACCEL_INPUT;
+        let positions = array(ctx, "scene positions", input, &scene.positions)?;
+        let normals = array(ctx, "scene normals", read, &scene.normals)?;
+        let texcoords = array(ctx, "scene texture coordinates", read, &scene.texcoords)?;
+        let triangles = array(ctx, "scene triangles", input | BufferUsage::INDEX, &corners)?;
+        let triangle_infos = array(ctx, "scene triangle infos", read, &infos)?;
+        let materials = array(ctx, "scene materials", read, &materials)?;
+        let addresses = SceneAddresses {
+            positions: ctx.buffer_address(*positions)?,
+            normals: ctx.buffer_address(*normals)?,
+            texcoords: ctx.buffer_address(*texcoords)?,
+            triangles: ctx.buffer_address(*triangles)?,
+            triangle_infos: ctx.buffer_address(*triangle_infos)?,
+            materials: ctx.buffer_address(*materials)?,
+        };
+        Ok(Self { positions, triangles, _held: [normals, texcoords, triangle_infos, materials], addresses })
+    }
+}
+
+fn check_count(scene: &Scene) -> Result<(), HybridError> {
+    let count = scene.opaque_triangle_count;
+    if count < CUSTOM_INDEX_LIMIT {
+        return Ok(());
+    }
+    Err(HybridError::TooManyTriangles { count, limit: CUSTOM_INDEX_LIMIT })
+}
+
+fn triangle_info(scene: &Scene, triangle: usize) -> TriangleInfo {
+    let material = scene.triangle_materials[triangle];
+    let corner = scene.triangles[triangle].map(|vertex| vertex as usize);
+    let texture = scene.materials[material as usize].albedo_texture;
+    let size = texture.map_or([1, 1], |i| {
+        let texture = &scene.textures[i as usize];
+        [texture.width, texture.height]
+    });
+    let lod_constant =
+        lod_constant(corner.map(|v| scene.positions[v]), corner.map(|v| scene.texcoords[v]), size);
+    TriangleInfo { material, lod_constant }
+}
+
+fn gpu_material(material: &Material, textures: &[Holder<TextureHandle>]) -> GpuMaterial {
+    GpuMaterial {
+        albedo: material.albedo,
+        albedo_texture: material.albedo_texture.map_or(NO_TEXTURE, |i| textures[i as usize].index()),
+        specular: material.specular,
+        shininess: material.shininess,
+        emission: material.emission,
+        reflectivity: material.reflectivity,
+        tint: material.tint,
+        transmission: material.transmission,
+        ior: material.ior,
+    }
+}
+
+fn array<T: bytemuck::NoUninit>(
+    ctx: &Context,
+    debug_name: &str,
+    usage: BufferUsage,
+    elements: &[T],
+) -> lvk::Result<Holder<BufferHandle>> {
+    let data = bytemuck::cast_slice(elements);
+    ctx.create_buffer(&BufferDesc { usage, data: Some(data), debug_name, ..BufferDesc::default() })
+}
+
+fn sampler(ctx: &Context, debug_name: &str, address: AddressMode) -> lvk::Result<Holder<SamplerHandle>> {
+    ctx.create_sampler(&SamplerDesc { address: [address; 3], debug_name, ..SamplerDesc::default() })
+}
+
+fn upload_texture(ctx: &Context, texture: &Texture) -> lvk::Result<Holder<TextureHandle>> {
+    ctx.create_texture(&TextureDesc {
+        format: Format::Rgba8Srgb,
+        extent: [texture.width, texture.height],
+        mips: 0,
+        data: Some(&texture.pixels),
+        generate_mips: true,
+        debug_name: &texture.name,
+        ..TextureDesc::default()
+    })
+}
+
+fn upload_sky(ctx: &Context, sky: &Sky) -> lvk::Result<Holder<TextureHandle>> {
+    let faces = sky.bake_cube(SKY_SIZE);
+    let texels: Vec<u16> = faces.iter().flatten().flatten().map(|&c| half_bits(c)).collect();
+    ctx.create_texture(&TextureDesc {
+        kind: TextureKind::Cube,
+        format: Format::Rgba16Float,
+        extent: [SKY_SIZE, SKY_SIZE],
+        usage: TextureUsage::SAMPLED,
+        data: Some(bytemuck::cast_slice(&texels)),
+        debug_name: "sky",
+        ..TextureDesc::default()
+    })
+}
+
+/// One structure for the opaque and one for the refractive triangles, whichever there are, and their instances.
+fn build_blas(
+    ctx: &Context,
+    scene: &Scene,
+    positions: BufferHandle,
+    triangles: BufferHandle,
+) -> lvk::Result<(Vec<Holder<AccelStructHandle>>, Vec<TlasInstance>)> {
+    let total = scene.triangles.len() as u32;
+    let opaque = scene.opaque_triangle_count.min(total);
+    let groups =
+        [("opaque blas", 0..opaque, MASK_OPAQUE), ("refractive blas", opaque..total, MASK_REFRACTIVE)];
+    let groups: Vec<_> = groups.into_iter().filter(|(_, range, _)| !range.is_empty()).collect();
+    let vertex_count = scene.positions.len() as u32;
+    let geometries: Vec<[BlasGeometry; 1]> =
+        groups.iter().map(|(_, range, _)| [geometry(positions, vertex_count, triangles, range)]).collect();
+    let descs: Vec<BlasDesc<'_>> = groups
+        .iter()
+        .zip(&geometries)
+        .map(|((debug_name, ..), geometries)| BlasDesc { geometries, debug_name, ..BlasDesc::default() })
+        .collect();
+    let blas = ctx.create_blas_batch(&descs)?;
+    let instance = |(_, range, mask): &(&str, Range<u32>, u8), blas: &Holder<AccelStructHandle>| {
+        TlasInstance { custom_index: range.start, mask: *mask, ..TlasInstance::new(blas.handle()) }
+    };
+    let instances = groups.iter().zip(&blas).map(|(group, blas)| instance(group, blas)).collect();
+    Ok((blas, instances))
+}
+
+fn geometry(
+    vertex_buffer: BufferHandle,
+    vertex_count: u32,
+    triangles: BufferHandle,
+    range: &Range<u32>,
+) -> BlasGeometry {
+    let offset = u64::from(range.start) * size_of::<[u32; 3]>() as u64;
+    BlasGeometry::Triangles(Triangles {
+        vertex_buffer,
+        vertex_offset: 0,
+        vertex_stride: 0,
+        vertex_format: VertexFormat::F32x3,
+        vertex_count,
+        indices: Some(Indices { buffer: triangles, offset, format: IndexFormat::U32 }),
+        triangle_count: range.end - range.start,
+        transform: None,
+        flags: GeometryFlags::OPAQUE,
+    })
+}

@@ -1,0 +1,29 @@
+//! The `hybrid` sample: hard shadows, mirror reflections and refractions by ray tracing, after "A Hybrid Approach
+//! for Vulkan-Based Ray Tracing Implementations" by Kim and Baek.
+//!
+//! Two methods give the same picture: [`Method::Standalone`] traces every pixel's ray, [`Method::Hybrid`] finds
+//! what a pixel shows with the rasteriser and traces from there. Both run by a ray tracing pipeline and by ray
+//! queries ([`RayPath`]), from one text of shading code (`shaders/hybrid/integrator.glsl`).
+//!
+//! [`HybridRenderer`] is the sample for programs and tests, [`run`] the one for the command line.
+
+mod bands;
+mod config;
+mod error;
+mod frame;
+mod frame_timings;
+mod geometry_pass;
+mod gpu_scene;
+mod half_float;
+mod ray_pass;
+mod renderer;
+mod run;
+mod shader_module;
+mod texture_density;
+mod triangle_order;
+
+pub use config::{HybridConfig, Method, RayPath};
+pub use error::HybridError;
+pub use frame_timings::FrameTimings;
+pub use renderer::HybridRenderer;
+pub use run::run;

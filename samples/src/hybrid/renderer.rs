@@ -1,0 +1,197 @@
+//! The sample as a type: give it a scene and a camera, get a picture.
+
+use std::ops::Range;
+
+use lvk::{
+    BufferDesc, BufferHandle, CommandBuffer, Context, Format, Holder, TextureDesc, TextureHandle,
+    TextureRegion, TextureUsage,
+};
+
+use super::HybridError;
+use super::bands::bands;
+use super::config::{HybridConfig, Method};
+use super::frame::{FrameConstants, GpuCamera, Indices, Lighting, Push, near_plane};
+use super::frame_timings::{FrameTimings, Stamps};
+use super::geometry_pass::GeometryPass;
+use super::gpu_scene::GpuScene;
+use super::ray_pass::RayPass;
+use crate::scene::{Camera, Scene};
+
+/// Rows that a CPU renders in one go: short enough to show progress, long enough to keep every core busy.
+const CPU_BAND_ROWS: u32 = 48;
+
+/// Renders a scene by one method and one path of ray tracing.
+pub struct HybridRenderer {
+    ctx: Context,
+    config: HybridConfig,
+    scene: GpuScene,
+    geometry: Option<GeometryPass>,
+    rays: RayPass,
+    stamps: Option<Stamps>,
+    output: Holder<TextureHandle>,
+    frame_buffer: Holder<BufferHandle>,
+    frame_address: u64,
+    uploaded: Option<FrameConstants>,
+    lighting: Lighting,
+    indices: Indices,
+    near_plane: f32,
+    bands: Vec<Range<u32>>,
+}
+
+impl HybridRenderer {
+    /// Uploads `scene`, builds its acceleration structures and compiles the pipelines.
+    ///
+    /// # Errors
+    /// [`HybridError`] when the configuration or the scene is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Result<Self, HybridError> {
+        config.check(ctx.capabilities())?;
+        let extent = [config.width, config.height];
+        let gpu_scene = GpuScene::new(ctx, scene)?;
+        let frame_buffer = ctx.create_buffer(&BufferDesc {
+            size_bytes: size_of::<FrameConstants>() as u64,
+            debug_name: "frame constants",
+            ..BufferDesc::default()
+        })?;
+        let output = ctx.create_texture(&TextureDesc {
+            format: Format::Rgba8Unorm,
+            extent,
+            usage: TextureUsage::STORAGE,
+            debug_name: "picture",
+            ..TextureDesc::default()
+        })?;
+        let geometry = match config.method {
+            Method::Standalone => None,
+            Method::Hybrid => Some(GeometryPass::new(ctx, &gpu_scene, extent)?),
+        };
+        let gbuffer = geometry.iter().flat_map(|pass| pass.targets.textures()).collect();
+        let rays = RayPass::new(ctx, config, gbuffer, *output)?;
+        let rows = if ctx.capabilities().is_cpu { CPU_BAND_ROWS } else { config.height };
+        let bands = bands(config.height, rows);
+        let has_stamps = ctx.capabilities().limits.timestamp_bits > 0;
+        let stamps = has_stamps.then(|| Stamps::new(ctx, bands.len() as u32)).transpose()?;
+        Ok(Self {
+            indices: indices(&gpu_scene, geometry.as_ref(), output.index()),
+            frame_address: ctx.buffer_address(*frame_buffer)?,
+            uploaded: None,
+            lighting: Lighting::new(scene),
+            near_plane: near_plane(scene),
+            ctx: ctx.clone(),
+            config: *config,
+            scene: gpu_scene,
+            geometry,
+            rays,
+            stamps,
+            output,
+            frame_buffer,
+            bands,
+        })
+    }
+
+    /// Renders one frame and waits for it.
+    ///
+    /// # Errors
+    /// [`HybridError::Device`].
+    pub fn render(&mut self, camera: &Camera) -> Result<FrameTimings, HybridError> {
+        self.render_with(camera, &mut |_| {})
+    }
+
+    /// Renders one frame, a band of rows after the other, and calls `after_band` with the number of bands done.
+    ///
+    /// # Errors
+    /// [`HybridError::Device`].
+    pub fn render_with(
+        &mut self,
+        camera: &Camera,
+        after_band: &mut dyn FnMut(u64),
+    ) -> Result<FrameTimings, HybridError> {
+        self.upload_constants(camera)?;
+        for band in 0..self.bands.len() {
+            let mut cmd = self.ctx.acquire_command_buffer()?;
+            if band == 0 {
+                self.begin_frame(&mut cmd)?;
+            }
+            self.record_band(&mut cmd, band)?;
+            let submitted = self.ctx.submit(cmd)?;
+            self.ctx.wait(submitted)?;
+            after_band(band as u64 + 1);
+        }
+        let read = |stamps: &Stamps| stamps.read(&self.ctx, self.geometry.is_some());
+        Ok(self.stamps.as_ref().map(read).transpose()?.unwrap_or_default())
+    }
+
+    /// The last frame: red, green, blue and alpha of each pixel, 8 bits each, sRGB, rows from the top.
+    ///
+    /// # Errors
+    /// [`HybridError::Device`].
+    pub fn read_image(&self) -> Result<Vec<u8>, HybridError> {
+        Ok(self.ctx.download_texture(*self.output, &TextureRegion::default())?)
+    }
+
+    /// How many bands a frame is rendered in.
+    pub fn band_count(&self) -> u64 {
+        self.bands.len() as u64
+    }
+
+    /// Milliseconds that building the bottom-level acceleration structures took, submission and wait included.
+    pub fn blas_build_ms(&self) -> f64 {
+        self.scene.blas_build_ms
+    }
+
+    /// How many bottom-level acceleration structures the scene has.
+    pub fn blas_count(&self) -> usize {
+        self.scene.blas_count()
+    }
+
+    fn upload_constants(&mut self, camera: &Camera) -> lvk::Result<()> {
+        let constants = FrameConstants {
+            camera: GpuCamera::new(camera, self.config.width, self.config.height, self.near_plane),
+            scene: self.scene.addresses(),
+            lighting: self.lighting,
+            indices: self.indices,
+        };
+        if self.uploaded != Some(constants) {
+            self.ctx.upload_buffer(*self.frame_buffer, 0, bytemuck::bytes_of(&constants))?;
+            self.uploaded = Some(constants);
+        }
+        Ok(())
+    }
+
+    fn begin_frame(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+        if let Some(stamps) = &self.stamps {
+            stamps.reset(cmd)?;
+            stamps.geometry(cmd, false)?;
+        }
+        if let Some(geometry) = &self.geometry {
+            geometry.record(cmd, &self.push(0..self.config.height))?;
+        }
+        self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.geometry(cmd, true))
+    }
+
+    fn record_band(&self, cmd: &mut CommandBuffer, band: usize) -> lvk::Result<()> {
+        let stamp = |cmd: &mut CommandBuffer, end| {
+            self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.band(cmd, band as u32, end))
+        };
+        stamp(cmd, false)?;
+        self.rays.record(cmd, self.config.width, &self.push(self.bands[band].clone()))?;
+        stamp(cmd, true)
+    }
+
+    fn push(&self, rows: Range<u32>) -> Push {
+        Push { frame: self.frame_address, first_row: rows.start, end_row: rows.end }
+    }
+}
+
+fn indices(scene: &GpuScene, geometry: Option<&GeometryPass>, output: u32) -> Indices {
+    let mut indices = Indices {
+        tlas: scene.tlas.index(),
+        sky: scene.sky.index(),
+        surface_sampler: scene.surface_sampler.index(),
+        sky_sampler: scene.sky_sampler.index(),
+        output,
+        ..bytemuck::Zeroable::zeroed()
+    };
+    if let Some(pass) = geometry {
+        pass.targets.name_in(&mut indices);
+    }
+    indices
+}

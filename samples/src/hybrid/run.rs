@@ -1,0 +1,234 @@
+//! The sample on the command line: scene in, picture and timings out.
+
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+use lvk::{Context, ContextDesc, FeatureRequest, Validation, ValidationSink};
+
+use super::{HybridConfig, HybridError, HybridRenderer, Method, RayPath};
+use crate::app::args::{self, HybridArgs};
+use crate::app::png::{self, PngError};
+use crate::app::progress::Progress;
+use crate::app::timings::Timings;
+use crate::driver::{self, Driver, DriverError, DriverRequest};
+use crate::scene::{ObjOptions, Scene, SceneError};
+
+/// Frames to time where none are asked for, on a GPU.
+const GPU_FRAMES: u32 = 60;
+/// Frames that a GPU renders before any is timed, so that its clocks are up.
+const WARM_UP_FRAMES: u32 = 5;
+
+/// Why there is no picture.
+#[derive(Debug, thiserror::Error)]
+enum RunError {
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Png(#[from] PngError),
+    #[error(transparent)]
+    Driver(#[from] DriverError),
+    #[error(transparent)]
+    Hybrid(#[from] HybridError),
+    #[error("validation reported {0} messages")]
+    Validation(usize),
+}
+
+impl From<lvk::Error> for RunError {
+    fn from(error: lvk::Error) -> Self {
+        Self::Hybrid(error.into())
+    }
+}
+
+impl RunError {
+    /// 2 when the user can mend it by other arguments or input, 1 for trouble with the device.
+    fn status(&self) -> u8 {
+        match self {
+            Self::Scene(_) | Self::Png(_) => 2,
+            Self::Hybrid(
+                HybridError::BadSize { .. }
+                | HybridError::TooDeep { .. }
+                | HybridError::TooManyTriangles { .. },
+            ) => 2,
+            Self::Driver(_) | Self::Hybrid(_) | Self::Validation(_) => 1,
+        }
+    }
+}
+
+/// Does what the command line says. Prints to standard output, errors in one line to standard error; the status
+/// is 0 when the picture was written, 1 for trouble with the device, 2 for wrong input.
+#[must_use]
+pub fn run(args: &HybridArgs) -> ExitCode {
+    match attempt(args) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.status())
+        }
+    }
+}
+
+fn attempt(args: &HybridArgs) -> Result<(), RunError> {
+    if args.list_devices {
+        return list_devices();
+    }
+    png::check_writable(&args.out)?;
+    let mut progress = Progress::visible();
+    let scene = load(args, &mut progress)?;
+    drop(progress);
+    for warning in &scene.warnings {
+        eprintln!("warning: {warning}");
+    }
+    let driver = driver::prepare(&DriverRequest { validation: args.validate.is_some() })?;
+    let sink = ValidationSink::default();
+    let ctx = open(args, &driver, &sink)?;
+    let path = RayPath::choose(wished_path(args.rt), ctx.capabilities())?;
+    let config = config(args, path);
+    let mut renderer = HybridRenderer::new(&ctx, &scene, &config)?;
+    println!("{}", headline(&ctx, &scene, &config, &renderer));
+    let timings = render(args, &ctx, &scene, &mut renderer)?;
+    let image = renderer.read_image()?;
+    drop(renderer);
+    ctx.wait_idle()?;
+    drop(ctx);
+    if args.validate.is_some() {
+        report_validation(&sink)?;
+    }
+    png::write(&args.out, args.width, args.height, &image)?;
+    println!("{timings}\nwrote {}", args.out.display());
+    Ok(())
+}
+
+fn load(args: &HybridArgs, progress: &mut Progress) -> Result<Scene, SceneError> {
+    match &args.scene {
+        None => Ok(Scene::procedural()),
+        Some(path) => {
+            let options = ObjOptions { scale: args.scale, cameras: args.cameras.clone() };
+            Scene::from_obj(path, &options, progress)
+        }
+    }
+}
+
+/// Opens the device the user names, or the best one; a better one without ray tracing gives way to one with.
+fn open(args: &HybridArgs, driver: &Driver, sink: &ValidationSink) -> lvk::Result<Context> {
+    use FeatureRequest::{Optional, Required};
+    let with = |ray_tracing_pipeline, ray_query| {
+        Context::new(&ContextDesc {
+            application_name: "hybrid",
+            vulkan_library: driver.loader.as_deref(),
+            device: args.device.as_deref(),
+            validation: validation(args.validate),
+            validation_sink: args.validate.map(|_| sink.clone()),
+            ray_tracing_pipeline,
+            ray_query,
+            ..ContextDesc::default()
+        })
+    };
+    match args.rt {
+        args::RayTracing::Pipeline => with(Required, Optional),
+        args::RayTracing::Query => with(Optional, Required),
+        args::RayTracing::Auto => {
+            let best = with(Optional, Optional)?;
+            let capabilities = best.capabilities();
+            if capabilities.ray_tracing_pipeline || capabilities.ray_query {
+                return Ok(best);
+            }
+            Ok(with(Required, Optional).or_else(|_| with(Optional, Required)).unwrap_or(best))
+        }
+    }
+}
+
+fn validation(wish: Option<args::Validation>) -> Validation {
+    match wish {
+        None => Validation::Off,
+        Some(args::Validation::Core) => Validation::Standard,
+        Some(args::Validation::Gpu) => Validation::GpuAssisted,
+    }
+}
+
+fn wished_path(wish: args::RayTracing) -> Option<RayPath> {
+    match wish {
+        args::RayTracing::Auto => None,
+        args::RayTracing::Pipeline => Some(RayPath::Pipeline),
+        args::RayTracing::Query => Some(RayPath::Query),
+    }
+}
+
+fn config(args: &HybridArgs, path: RayPath) -> HybridConfig {
+    let method = match args.method {
+        args::Method::Standalone => Method::Standalone,
+        args::Method::Hybrid => Method::Hybrid,
+    };
+    HybridConfig { method, path, width: args.width, height: args.height, max_depth: args.depth }
+}
+
+fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &HybridRenderer) -> String {
+    let capabilities = ctx.capabilities();
+    let refractive = scene.triangles.len() - scene.opaque_triangle_count as usize;
+    let method = match config.method {
+        Method::Standalone => "stand-alone ray tracing",
+        Method::Hybrid => "hybrid: geometry pass, then rays",
+    };
+    let path = match config.path {
+        RayPath::Pipeline => "ray tracing pipeline",
+        RayPath::Query => "ray queries in a compute shader",
+    };
+    let mut text = format!("device    {} ({})\n", capabilities.device_name, driver_text(ctx));
+    let _ = writeln!(text, "method    {method}; {path}; depth {}", config.max_depth);
+    let _ = writeln!(
+        text,
+        "scene     {}: {} triangles, {refractive} of them refractive; {} materials, {} textures",
+        scene.name,
+        scene.triangles.len(),
+        scene.materials.len(),
+        scene.textures.len()
+    );
+    let _ = write!(text, "built     {} BLAS in {:.1} ms", renderer.blas_count(), renderer.blas_build_ms());
+    text
+}
+
+fn driver_text(ctx: &Context) -> String {
+    let capabilities = ctx.capabilities();
+    let (major, minor, patch) = capabilities.api_version;
+    format!("{} {}, Vulkan {major}.{minor}.{patch}", capabilities.driver_name, capabilities.driver_info)
+}
+
+/// Renders the frames and times all but those of the warm-up.
+fn render(
+    args: &HybridArgs,
+    ctx: &Context,
+    scene: &Scene,
+    renderer: &mut HybridRenderer,
+) -> Result<Timings, HybridError> {
+    let is_cpu = ctx.capabilities().is_cpu;
+    let frames = u64::from(args.frames.unwrap_or(if is_cpu { 1 } else { GPU_FRAMES }));
+    let warm_up = if is_cpu { 0 } else { u64::from(WARM_UP_FRAMES) };
+    let camera = &scene.cameras[(args.camera as usize).clamp(1, 5) - 1];
+    let bands = renderer.band_count();
+    let mut progress = Progress::visible();
+    progress.stage("rendering", (warm_up + frames) * bands);
+    let mut timings = Timings::new();
+    for frame in 0..warm_up + frames {
+        let times = renderer.render_with(camera, &mut |band| progress.set(frame * bands + band))?;
+        if let Some(counted) = frame.checked_sub(warm_up) {
+            times.add_to(&mut timings, counted);
+        }
+    }
+    Ok(timings)
+}
+
+fn report_validation(sink: &ValidationSink) -> Result<(), RunError> {
+    let messages = sink.messages();
+    for message in &messages {
+        eprintln!("validation: {message}");
+    }
+    println!("validation messages: {}", messages.len());
+    if messages.is_empty() { Ok(()) } else { Err(RunError::Validation(messages.len())) }
+}
+
+fn list_devices() -> Result<(), RunError> {
+    let driver = driver::prepare(&DriverRequest::default())?;
+    for (number, device) in Context::devices(driver.loader.as_deref())?.iter().enumerate() {
+        println!("[{number}] {device:?}");
+    }
+    Ok(())
+}

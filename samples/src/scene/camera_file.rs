@@ -1,0 +1,142 @@
+//! Reads camera files; [`SceneError::CameraFile`] documents the format.
+
+use std::path::Path;
+
+use super::{Camera, SceneError};
+
+/// Light and cameras of one scene.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Views {
+    /// The scene's name in the file.
+    pub name: String,
+    /// Position of the point light.
+    pub light: [f32; 3],
+    /// Up to five cameras.
+    pub cameras: Vec<Camera>,
+}
+
+/// Reads the views of the scene called `name`; in a file with a single scene any name will do.
+pub(super) fn read(path: &Path, name: &str) -> Result<Views, SceneError> {
+    let text = std::fs::read_to_string(path).map_err(|source| SceneError::from_io(path, source))?;
+    let mut all = parse(path, &text)?;
+    let found = match all.iter().position(|views| views.name == name) {
+        Some(i) => all.swap_remove(i),
+        None if all.len() == 1 => all.remove(0),
+        None => return Err(wrong(path, 0, format!("none of its {} scenes is called `{name}`", all.len()))),
+    };
+    match found.cameras.is_empty() {
+        true => Err(wrong(path, 0, format!("scene `{}` has no camera", found.name))),
+        false => Ok(found),
+    }
+}
+
+/// Parses the text of a camera file; `path` is for error messages.
+pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<Views>, SceneError> {
+    let mut all: Vec<Views> = Vec::new();
+    for (line, number) in text.lines().zip(1..) {
+        let mut words = line.split('#').next().unwrap_or("").split_whitespace();
+        let Some(keyword) = words.next() else { continue };
+        match keyword {
+            "scene" => {
+                let name = words.next().ok_or_else(|| wrong(path, number, "no scene name".to_owned()))?;
+                let light = numbers(words).map_err(|what| wrong(path, number, what))?;
+                all.push(Views { name: name.to_owned(), light, cameras: Vec::new() });
+            }
+            "at" | "dir" => {
+                let camera = camera(keyword == "dir", words).map_err(|what| wrong(path, number, what))?;
+                let views =
+                    all.last_mut().ok_or_else(|| wrong(path, number, "a camera before any scene".into()))?;
+                if views.cameras.len() == 5 {
+                    return Err(wrong(path, number, "more than five cameras in a scene".to_owned()));
+                }
+                views.cameras.push(camera);
+            }
+            _ => return Err(wrong(path, number, format!("`{keyword}` is unknown"))),
+        }
+    }
+    Ok(all)
+}
+
+fn camera<'a>(is_direction: bool, words: impl Iterator<Item = &'a str>) -> Result<Camera, String> {
+    let [ex, ey, ez, x, y, z, fov] = numbers(words)?;
+    if !(fov > 0.0 && fov < 180.0) {
+        return Err(format!("the field of view {fov} is not between 0 and 180 degrees"));
+    }
+    let camera = match is_direction {
+        true => Camera::looking_along([ex, ey, ez], [x, y, z], fov),
+        false => Camera::looking_at([ex, ey, ez], [x, y, z], fov),
+    };
+    match camera.eye == camera.target {
+        true => Err("the camera looks nowhere: eye and target are the same".to_owned()),
+        false => Ok(camera),
+    }
+}
+
+/// Exactly `N` finite numbers.
+fn numbers<'a, const N: usize>(words: impl Iterator<Item = &'a str>) -> Result<[f32; N], String> {
+    let parsed: Result<Vec<f32>, String> = words
+        .map(|word| match word.parse::<f32>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            _ => Err(format!("`{word}` is not a finite number")),
+        })
+        .collect();
+    parsed?.try_into().map_err(|found: Vec<f32>| format!("{N} numbers needed, found {}", found.len()))
+}
+
+fn wrong(path: &Path, line: usize, what: String) -> SceneError {
+    SceneError::CameraFile { path: path.into(), line, what }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(text: &str) -> Result<Vec<Views>, SceneError> {
+        parse(Path::new("c.txt"), text)
+    }
+
+    #[test]
+    fn both_kinds_of_camera_are_read() {
+        let all =
+            parsed("# mine\nscene a 1 2 3\nat 0 0 0 0 0 -2 60 # front\n\ndir 1 1 1 0 0 -2 75\n").unwrap();
+        let cameras = [
+            Camera::looking_at([0.0; 3], [0.0, 0.0, -2.0], 60.0),
+            Camera::looking_at([1.0; 3], [1.0, 1.0, -1.0], 75.0),
+        ];
+        assert_eq!(all, [Views { name: "a".to_owned(), light: [1.0, 2.0, 3.0], cameras: cameras.into() }]);
+    }
+
+    #[test]
+    fn mistakes_are_named_with_their_line() {
+        for (text, line) in [
+            ("at 0 0 0 0 0 1 60", 1),
+            ("scene a 1 2", 1),
+            ("scene", 1),
+            ("scene a 1 2 3\nat 0 0 0 0 0 1", 2),
+            ("scene a 1 2 3\nat 0 0 0 0 0 0 60", 2),
+            ("scene a 1 2 3\nat 0 0 0 0 0 1 180", 2),
+            ("scene a 1 2 3\n\ndir 0 0 0 nan 0 1 60", 3),
+            ("light 1 2 3", 1),
+        ] {
+            match parsed(text) {
+                Err(SceneError::CameraFile { line: found, .. }) => assert_eq!(found, line, "{text}"),
+                other => panic!("{text}: {other:?}"),
+            }
+        }
+        let six = format!("scene a 1 2 3\n{}", "at 0 0 0 0 0 1 60\n".repeat(6));
+        assert!(matches!(parsed(&six), Err(SceneError::CameraFile { line: 7, .. })));
+    }
+
+    #[test]
+    fn the_scene_is_chosen_by_name_or_because_it_is_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("c.txt");
+        std::fs::write(&path, "scene a 1 2 3\nat 0 0 0 0 0 1 60\n").unwrap();
+        assert_eq!(read(&path, "b").unwrap().name, "a");
+        std::fs::write(&path, "scene a 1 2 3\nat 0 0 0 0 0 1 60\nscene b 1 2 3\n").unwrap();
+        assert_eq!(read(&path, "a").unwrap().name, "a");
+        assert!(read(&path, "b").is_err(), "no cameras");
+        assert!(read(&path, "c").is_err(), "no such scene");
+        assert!(matches!(read(&folder.path().join("x"), "a"), Err(SceneError::NotFound { .. })));
+    }
+}

@@ -1,0 +1,114 @@
+//! Why a scene could not be loaded.
+
+use std::path::PathBuf;
+
+/// Why a scene could not be loaded. Every message names the file and says what to change.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// There is no such file.
+    #[error("no such file: {}", path.display())]
+    NotFound {
+        /// The path as given.
+        path: PathBuf,
+    },
+    /// The file exists but cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Unreadable {
+        /// The path as given.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The content is not a Wavefront OBJ.
+    #[error("{} is not a Wavefront OBJ: {why}", path.display())]
+    NotObj {
+        /// The path as given.
+        path: PathBuf,
+        /// What gives it away.
+        why: &'static str,
+    },
+    /// A line cannot be understood.
+    #[error("{}:{line}: {what}", path.display())]
+    BadLine {
+        /// The path as given.
+        path: PathBuf,
+        /// Line number, from 1.
+        line: usize,
+        /// What is wrong with it.
+        what: String,
+    },
+    /// A position is NaN or infinite, in the file or after scaling.
+    #[error("{}:{line}: the position is not finite (NaN or infinity); export the mesh again", path.display())]
+    NotFinite {
+        /// The path as given.
+        path: PathBuf,
+        /// Line number, from 1.
+        line: usize,
+    },
+    /// A face names a vertex, texture coordinate or normal that the file does not have.
+    #[error("{}:{line}: a face uses {what} {index}, but the file has {count}", path.display())]
+    IndexOutOfRange {
+        /// The path as given.
+        path: PathBuf,
+        /// Line number, from 1.
+        line: usize,
+        /// `vertex`, `texture coordinate` or `normal`.
+        what: &'static str,
+        /// The number in the file: from 1, or negative and relative.
+        index: i64,
+        /// How many the file has.
+        count: usize,
+    },
+    /// There is nothing to draw.
+    #[error("{} has no triangle with an area ({degenerate} without); nothing to draw", path.display())]
+    Empty {
+        /// The path as given.
+        path: PathBuf,
+        /// Triangles that were dropped because they have no area.
+        degenerate: usize,
+    },
+    /// More vertices or triangles than 32-bit indices reach.
+    #[error("{} has more than {limit} vertices or triangles; split it", path.display())]
+    TooLarge {
+        /// The path as given.
+        path: PathBuf,
+        /// The largest count.
+        limit: u32,
+    },
+    /// The scale is zero, negative or not finite.
+    #[error("the scale {scale} is not usable: give a positive number")]
+    BadScale {
+        /// The scale as given.
+        scale: f32,
+    },
+    /// The OBJ parser refused the file.
+    #[error("cannot parse {}: {source}", path.display())]
+    Parse {
+        /// The path as given.
+        path: PathBuf,
+        /// What the parser said.
+        source: tobj::LoadError,
+    },
+    /// A camera file is wrong. It consists of lines `scene NAME x y z` (the point light's position), each
+    /// followed by one to five lines `at ex ey ez tx ty tz fov` (eye, target, vertical field of view in
+    /// degrees) or `dir ex ey ez dx dy dz fov` (eye, direction); `#` starts a comment.
+    #[error("{}:{line}: {what} (expected `scene NAME x y z`, then `at` or `dir` with 7 numbers)", path.display())]
+    CameraFile {
+        /// The path as given.
+        path: PathBuf,
+        /// Line number, from 1; 0 when the whole file is meant.
+        line: usize,
+        /// What is wrong.
+        what: String,
+    },
+}
+
+impl SceneError {
+    /// Turns an error of opening or reading `path` into the matching variant.
+    pub(super) fn from_io(path: &std::path::Path, source: std::io::Error) -> Self {
+        match source.kind() {
+            std::io::ErrorKind::NotFound => SceneError::NotFound { path: path.into() },
+            _ => SceneError::Unreadable { path: path.into(), source },
+        }
+    }
+}

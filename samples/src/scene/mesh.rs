@@ -1,0 +1,164 @@
+//! Triangles while a scene is being put together.
+
+use glam::{DVec3, Vec3};
+
+use super::{Material, median_order};
+
+/// Triangles while a scene is being put together; the arrays are those of [`super::Scene`].
+#[derive(Debug, Clone, Default)]
+pub(super) struct Mesh {
+    pub positions: Vec<[f32; 3]>,
+    pub normals: Vec<[f32; 3]>,
+    pub texcoords: Vec<[f32; 2]>,
+    pub triangles: Vec<[u32; 3]>,
+    pub triangle_materials: Vec<u32>,
+    pub source_triangles: Vec<u32>,
+}
+
+impl Mesh {
+    /// Appends a vertex and returns its number.
+    pub fn add_vertex(&mut self, position: [f32; 3], normal: [f32; 3], texcoord: [f32; 2]) -> u32 {
+        self.positions.push(position);
+        self.normals.push(normal);
+        self.texcoords.push(texcoord);
+        (self.positions.len() - 1) as u32
+    }
+
+    /// Appends a triangle, numbered in the order of calls.
+    pub fn add_triangle(&mut self, vertices: [u32; 3], material: u32) {
+        self.source_triangles.push(self.triangles.len() as u32);
+        self.triangles.push(vertices);
+        self.triangle_materials.push(material);
+    }
+
+    /// The unit normal of a triangle by its winding, and its angle at a corner in radians.
+    pub fn face_normal_and_angle(&self, triangle: usize, corner: usize) -> (Vec3, f32) {
+        let vertices = self.triangles[triangle];
+        let [a, b, c] =
+            [0, 1, 2].map(|i| Vec3::from(self.positions[vertices[(corner + i) % 3] as usize]).as_dvec3());
+        let (to_b, to_c) = (b - a, c - a);
+        let normal = to_b.cross(to_c).normalize_or_zero();
+        (normal.as_vec3(), to_b.angle_between(to_c) as f32)
+    }
+
+    /// Takes out triangles without area; returns how many.
+    pub fn drop_degenerate(&mut self) -> usize {
+        let before = self.triangles.len();
+        let kept: Vec<usize> = (0..before).filter(|&i| self.has_area(i)).collect();
+        self.keep(&kept);
+        before - kept.len()
+    }
+
+    fn has_area(&self, triangle: usize) -> bool {
+        let [a, b, c] =
+            self.triangles[triangle].map(|v| DVec3::from(self.positions[v as usize].map(f64::from)));
+        (b - a).cross(c - a).length_squared() > 0.0
+    }
+
+    /// Puts opaque triangles first and each group in [`median_order`], then numbers the vertices by first use
+    /// and drops unused ones. Returns the number of opaque triangles.
+    pub fn arrange(&mut self, materials: &[Material]) -> u32 {
+        let is_opaque = |i: &usize| !materials[self.triangle_materials[*i] as usize].is_refractive();
+        let (opaque, refractive): (Vec<usize>, Vec<usize>) = (0..self.triangles.len()).partition(is_opaque);
+        let mut sequence = self.in_median_order(&opaque);
+        sequence.extend(self.in_median_order(&refractive));
+        self.keep(&sequence);
+        self.number_vertices_by_use();
+        opaque.len() as u32
+    }
+
+    fn in_median_order(&self, chosen: &[usize]) -> Vec<usize> {
+        let boxes: Vec<_> = chosen
+            .iter()
+            .map(|&i| {
+                let [a, b, c] = self.triangles[i].map(|v| Vec3::from(self.positions[v as usize]));
+                (a.min(b).min(c), a.max(b).max(c))
+            })
+            .collect();
+        median_order(&boxes).into_iter().map(|i| chosen[i as usize]).collect()
+    }
+
+    /// Leaves the triangles named in `sequence`, in that order.
+    fn keep(&mut self, sequence: &[usize]) {
+        self.triangles = sequence.iter().map(|&i| self.triangles[i]).collect();
+        self.triangle_materials = sequence.iter().map(|&i| self.triangle_materials[i]).collect();
+        self.source_triangles = sequence.iter().map(|&i| self.source_triangles[i]).collect();
+    }
+
+    fn number_vertices_by_use(&mut self) {
+        const UNUSED: u32 = u32::MAX;
+        let mut number = vec![UNUSED; self.positions.len()];
+        let mut used = Vec::with_capacity(self.positions.len());
+        for vertex in self.triangles.iter_mut().flatten() {
+            let old = *vertex as usize;
+            if number[old] == UNUSED {
+                number[old] = used.len() as u32;
+                used.push(old);
+            }
+            *vertex = number[old];
+        }
+        self.positions = used.iter().map(|&i| self.positions[i]).collect();
+        self.normals = used.iter().map(|&i| self.normals[i]).collect();
+        self.texcoords = used.iter().map(|&i| self.texcoords[i]).collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn only_triangles_without_area_are_dropped() {
+        let mut mesh = Mesh::default();
+        for position in [[0.0; 3], [1e-20, 0.0, 0.0], [0.0, 1e-20, 0.0], [2e-20, 0.0, 0.0]] {
+            mesh.add_vertex(position, [0.0; 3], [0.0; 2]);
+        }
+        mesh.add_triangle([0, 1, 3], 0);
+        mesh.add_triangle([0, 1, 2], 0);
+        mesh.add_triangle([0, 2, 2], 0);
+        assert_eq!(mesh.drop_degenerate(), 2);
+        assert_eq!(
+            (mesh.triangles.as_slice(), mesh.source_triangles.as_slice()),
+            (&[[0, 1, 2]][..], &[1][..])
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn arranging_moves_triangles_and_changes_none(
+            corners in proptest::collection::vec(prop::array::uniform3(-5i8..5), 3..40),
+            picks in proptest::collection::vec((any::<[u8; 3]>(), 0..3u32), 1..80),
+        ) {
+            let mut mesh = Mesh::default();
+            for corner in &corners {
+                mesh.add_vertex(corner.map(f32::from), [0.0, 1.0, 0.0], [f32::from(corner[0]), 0.0]);
+            }
+            for (vertices, material) in &picks {
+                mesh.add_triangle(vertices.map(|v| u32::from(v) % corners.len() as u32), *material);
+            }
+            let materials = [
+                Material::matte("a", [0.5; 3]), Material::glass("b", [1.0; 3], 1.5), Material::matte("c", [0.5; 3]),
+            ];
+            let before = mesh.clone();
+            let opaque_count = mesh.arrange(&materials) as usize;
+
+            prop_assert_eq!(mesh.triangles.len(), before.triangles.len());
+            let mut seen = vec![false; picks.len()];
+            for (i, &source) in mesh.source_triangles.iter().enumerate() {
+                let source = source as usize;
+                prop_assert!(!std::mem::replace(&mut seen[source], true));
+                let material = before.triangle_materials[source];
+                prop_assert_eq!(mesh.triangle_materials[i], material);
+                prop_assert_eq!(i < opaque_count, material != 1);
+                for corner in 0..3 {
+                    let (new, old) = (mesh.triangles[i][corner] as usize, before.triangles[source][corner] as usize);
+                    prop_assert_eq!(mesh.positions[new], before.positions[old]);
+                    prop_assert_eq!(mesh.texcoords[new], before.texcoords[old]);
+                }
+            }
+            let used = mesh.triangles.iter().flatten().max().map_or(0, |&m| m as usize + 1);
+            prop_assert_eq!(used, mesh.positions.len());
+        }
+    }
+}

@@ -1,0 +1,145 @@
+//! What a renderer draws: one list of triangles with materials, textures, lights, a sky and five cameras.
+//!
+//! A [`Scene`] comes from a Wavefront OBJ file ([`Scene::from_obj`]) or from code ([`Scene::procedural`]);
+//! nothing here knows Vulkan. All lengths are in scene units (metres in the scenes that ship), +y is up,
+//! coordinates are right-handed, colours are linear with Rec. 709 primaries unless a texture says sRGB.
+//!
+//! # The lighting model
+//!
+//! Both sources of scenes are lit for the following model, which the shaders of the `hybrid` sample implement
+//! (Phong's, extended by the paper's recursive reflection and refraction). With `n` the unit normal turned
+//! towards the viewer, `l` the unit vector to a light, `r` the direction of view mirrored at `n`:
+//!
+//! ```text
+//! base    = albedo * texture
+//! direct  = sum over lights that are seen: light(p) * (base * max(n.l, 0) + specular * max(r.l, 0)^shininess)
+//! phong   = emission + base * ambient.evaluate(n) + direct        (specular only where n.l > 0)
+//! glass   = fresnel * mirrored + (1 - fresnel) * refracted         (fresnel from `ior`)
+//! result  = phong * (1 - reflectivity - transmission)
+//!         + tint * (reflectivity * mirrored + transmission * glass)
+//! ```
+//!
+//! `light(p)` is [`PointLight::irradiance`] or [`DirectionalLight::color`]; a ray that leaves the scene sees
+//! [`Sky::radiance`]. The picture is `sRGB(1 - exp(-result))`, which [`display`] computes on the CPU.
+
+mod benchmark;
+mod camera;
+mod camera_file;
+mod error;
+mod framing;
+mod interior;
+mod light;
+mod material;
+mod mesh;
+mod mtl;
+mod noise;
+mod normals;
+mod obj;
+mod obj_text;
+mod order;
+mod procedural;
+mod setting;
+mod sky;
+mod texture;
+
+use std::path::PathBuf;
+
+use crate::app::progress::Progress;
+
+pub use camera::Camera;
+pub use error::SceneError;
+pub use light::{Ambient, DirectionalLight, PointLight, display};
+pub use material::Material;
+pub use order::median_order;
+pub use sky::Sky;
+pub use texture::Texture;
+
+/// Everything a renderer needs, in flat arrays.
+///
+/// Invariants, kept by every constructor: `positions`, `normals` and `texcoords` have the same length; every
+/// index is in range; every position and texture coordinate is finite; every normal has unit length;
+/// `triangle_materials` and `source_triangles` have one entry per triangle; there is at least one triangle.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// File stem, or `courtyard` for the procedural scene.
+    pub name: String,
+    /// Vertex positions in scene units.
+    pub positions: Vec<[f32; 3]>,
+    /// Unit vertex normals.
+    pub normals: Vec<[f32; 3]>,
+    /// Texture coordinates in images that repeat; (0, 0) is the image's first texel, so `v` runs down.
+    pub texcoords: Vec<[f32; 2]>,
+    /// Vertex indices; opaque triangles first, then refractive ones, each group in [`median_order`].
+    pub triangles: Vec<[u32; 3]>,
+    /// How many of `triangles` are opaque. Shadow rays pass through the rest.
+    pub opaque_triangle_count: u32,
+    /// Index into `materials`, one per triangle.
+    pub triangle_materials: Vec<u32>,
+    /// The triangle's number in its source (polygons count as fans), one per triangle.
+    pub source_triangles: Vec<u32>,
+    /// Materials; never empty.
+    pub materials: Vec<Material>,
+    /// Images, each once, however many materials use it.
+    pub textures: Vec<Texture>,
+    /// The lamp.
+    pub light: PointLight,
+    /// A second, directional light, where the scene has one.
+    pub sun: Option<DirectionalLight>,
+    /// Light that comes from everywhere and casts no shadow.
+    pub ambient: Ambient,
+    /// What rays see that leave the scene.
+    pub sky: Sky,
+    /// Five views of the scene, the first being the one to show.
+    pub cameras: [Camera; 5],
+    /// Triangles of the source without area, which were dropped.
+    pub degenerate_triangle_count: u32,
+    /// What was wrong with the source and how it was mended, one line each, for the user to read.
+    pub warnings: Vec<String>,
+}
+
+/// How an OBJ file is to be read.
+#[derive(Debug, Clone, Default)]
+pub struct ObjOptions {
+    /// Factor from file units to scene units; `None` takes the known scale of a benchmark scene, else 1.
+    pub scale: Option<f32>,
+    /// A camera file (see [`SceneError::CameraFile`]); `None` takes the built-in cameras of a benchmark scene,
+    /// else cameras computed from the geometry.
+    pub cameras: Option<PathBuf>,
+}
+
+impl Scene {
+    /// Loads a Wavefront OBJ file with its MTL and textures.
+    ///
+    /// Recoverable flaws (undefined materials, missing textures, missing normals) are mended and listed in
+    /// [`Scene::warnings`].
+    ///
+    /// # Errors
+    /// [`SceneError`] when the file cannot be read, is no OBJ, has no triangle with area, a position that is not
+    /// finite or an index out of range, or when the camera file is wrong.
+    pub fn from_obj(
+        path: &std::path::Path,
+        options: &ObjOptions,
+        progress: &mut Progress,
+    ) -> Result<Self, SceneError> {
+        obj::load(path, options, progress)
+    }
+
+    /// Builds the courtyard, the scene that needs no file: at least 100,000 triangles with opaque, mirror and
+    /// glass objects and painted textures. The same on every machine and every call.
+    pub fn procedural() -> Self {
+        procedural::courtyard()
+    }
+
+    /// Smallest box around all positions, as (minimum, maximum) in scene units.
+    pub fn bounds(&self) -> ([f32; 3], [f32; 3]) {
+        bounds_of(&self.positions)
+    }
+}
+
+/// Smallest box around `positions`; a point at the origin when there are none.
+fn bounds_of(positions: &[[f32; 3]]) -> ([f32; 3], [f32; 3]) {
+    let Some(&first) = positions.first() else { return ([0.0; 3], [0.0; 3]) };
+    positions.iter().fold((first, first), |(low, high), p| {
+        (std::array::from_fn(|i| low[i].min(p[i])), std::array::from_fn(|i| high[i].max(p[i])))
+    })
+}

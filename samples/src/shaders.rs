@@ -1,0 +1,38 @@
+//! The GLSL texts of the samples, inside the binary so that it needs no folder beside it.
+
+/// Names as `#include` writes them, and texts, for every sample.
+pub const INCLUDES: &[(&str, &str)] = &[
+    ("common/camera.glsl", include_str!("../../shaders/common/camera.glsl")),
+    ("common/fresnel.glsl", include_str!("../../shaders/common/fresnel.glsl")),
+    ("common/octahedral.glsl", include_str!("../../shaders/common/octahedral.glsl")),
+    ("common/phong.glsl", include_str!("../../shaders/common/phong.glsl")),
+    ("common/ray_offset.glsl", include_str!("../../shaders/common/ray_offset.glsl")),
+    ("common/scene_buffers.glsl", include_str!("../../shaders/common/scene_buffers.glsl")),
+    ("common/surface.glsl", include_str!("../../shaders/common/surface.glsl")),
+    ("common/texture_lod.glsl", include_str!("../../shaders/common/texture_lod.glsl")),
+    ("common/tonemap.glsl", include_str!("../../shaders/common/tonemap.glsl")),
+    ("hybrid/frame.glsl", include_str!("../../shaders/hybrid/frame.glsl")),
+    ("hybrid/hit.glsl", include_str!("../../shaders/hybrid/hit.glsl")),
+    ("hybrid/integrator.glsl", include_str!("../../shaders/hybrid/integrator.glsl")),
+    ("hybrid/pixel.glsl", include_str!("../../shaders/hybrid/pixel.glsl")),
+    ("hybrid/trace_pipeline.glsl", include_str!("../../shaders/hybrid/trace_pipeline.glsl")),
+    ("hybrid/trace_query.glsl", include_str!("../../shaders/hybrid/trace_query.glsl")),
+];
+
+/// Stages of the `hybrid` sample.
+pub mod hybrid {
+    /// Vertex stage of the geometry pass.
+    pub const GEOMETRY_VERT: &str = include_str!("../../shaders/hybrid/geometry.vert.glsl");
+    /// Fragment stage of the geometry pass.
+    pub const GEOMETRY_FRAG: &str = include_str!("../../shaders/hybrid/geometry.frag.glsl");
+    /// A pixel by the ray tracing pipeline.
+    pub const RENDER_RGEN: &str = include_str!("../../shaders/hybrid/render.rgen.glsl");
+    /// A pixel by ray queries.
+    pub const RENDER_COMP: &str = include_str!("../../shaders/hybrid/render.comp.glsl");
+    /// The nearest triangle of a ray.
+    pub const CLOSEST_RCHIT: &str = include_str!("../../shaders/hybrid/closest.rchit.glsl");
+    /// A ray that left the scene.
+    pub const CLOSEST_RMISS: &str = include_str!("../../shaders/hybrid/closest.rmiss.glsl");
+    /// A shadow ray that reached the light.
+    pub const SHADOW_RMISS: &str = include_str!("../../shaders/hybrid/shadow.rmiss.glsl");
+}

@@ -1,0 +1,67 @@
+// The point of a surface that a ray met or a pixel shows, and how it is interpolated from its triangle.
+#ifndef COMMON_SURFACE
+#define COMMON_SURFACE
+
+#include "common/scene_buffers.glsl"
+#include "common/texture_lod.glsl"
+
+struct SurfacePoint {
+    vec3 position;
+    float distance; // along the ray that found it
+    vec3 normal; // interpolated, unit length, on the outer side
+    vec3 geometricNormal; // of the triangle, unit length, on the outer side
+    vec3 albedo; // linear
+    uint triangle;
+};
+
+// Where a pixel's ray meets the plane of a triangle that covers it. The result is pulled into the triangle: a
+// rasteriser also covers pixels whose centre misses it by a rounding error.
+vec2 barycentricsAlong(vec3 origin, vec3 direction, vec3 p0, vec3 edge1, vec3 edge2) {
+    vec3 p = cross(direction, edge2);
+    float determinant = dot(edge1, p);
+    if (determinant == 0.0) {
+        return vec2(1.0 / 3.0);
+    }
+    vec3 toOrigin = origin - p0;
+    vec2 b = vec2(dot(toOrigin, p), dot(direction, cross(toOrigin, edge1))) / determinant;
+    b = clamp(b, vec2(0.0), vec2(1.0));
+    return b / max(b.x + b.y, 1.0);
+}
+
+vec3 sampleAlbedo(Scene scene, TriangleInfo info, uvec3 corner, vec2 b, float coneWidth, float cosine, uint smp) {
+    Material material = scene.materials.at[info.material];
+    if (material.albedoTexture == kNoTexture) {
+        return material.albedo;
+    }
+    vec2 uv0 = scene.texcoords.at[corner.x];
+    vec2 uv = uv0 + b.x * (scene.texcoords.at[corner.y] - uv0) + b.y * (scene.texcoords.at[corner.z] - uv0);
+    float lod = coneTextureLod(info.lodConstant, coneWidth, cosine);
+    return material.albedo * textureBindless2DLod(material.albedoTexture, smp, uv, lod).rgb;
+}
+
+// `coneWidth` is the footprint at the ray's origin, `spread` its growth per unit of distance.
+SurfacePoint surfaceAt(Scene scene, uint triangle, vec2 b, vec3 origin, vec3 direction, float coneWidth,
+                       float spread, uint smp) {
+    uvec3 corner = scene.triangles.at[triangle];
+    vec3 p0 = scene.positions.at[corner.x];
+    vec3 edge1 = scene.positions.at[corner.y] - p0;
+    vec3 edge2 = scene.positions.at[corner.z] - p0;
+    vec3 n0 = scene.normals.at[corner.x];
+    vec3 n = n0 + b.x * (scene.normals.at[corner.y] - n0) + b.y * (scene.normals.at[corner.z] - n0);
+
+    SurfacePoint point;
+    point.position = p0 + b.x * edge1 + b.y * edge2;
+    point.distance = dot(point.position - origin, direction);
+    vec3 geometricNormal = normalize(cross(edge1, edge2));
+    // The vertex normals, not the winding, say which side is outside: files in the wild mix windings.
+    point.geometricNormal = dot(geometricNormal, n) < 0.0 ? -geometricNormal : geometricNormal;
+    float squaredLength = dot(n, n);
+    point.normal = squaredLength > 1e-12 ? n * inversesqrt(squaredLength) : point.geometricNormal;
+    point.triangle = triangle;
+    float width = coneWidth + spread * point.distance;
+    float cosine = dot(direction, point.geometricNormal);
+    point.albedo = sampleAlbedo(scene, scene.triangleInfos.at[triangle], corner, b, width, cosine, smp);
+    return point;
+}
+
+#endif

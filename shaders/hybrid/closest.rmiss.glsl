@@ -1,0 +1,8 @@
+// A ray that left the scene.
+#include "hybrid/hit.glsl"
+
+layout(location = 0) rayPayloadInEXT Hit payload;
+
+void main() {
+    payload.triangle = kNoTriangle;
+}

@@ -1,0 +1,27 @@
+// Geometry pass: what the ray pass needs to know about a pixel's surface. The interpolation is the traced one,
+// from the triangle's vertices, so that both methods see the same surface point.
+#include "common/octahedral.glsl"
+#include "common/surface.glsl"
+#include "hybrid/frame.glsl"
+
+layout(location = 0) out vec4 outPosition; // w: distance from the eye
+layout(location = 1) out uvec2 outNormals; // shading, geometric
+layout(location = 2) out vec4 outAlbedo;
+layout(location = 3) out uint outTriangle;
+
+void main() {
+    uint triangle = uint(gl_PrimitiveID);
+    vec3 eye = frame.camera.eye;
+    vec3 direction = cameraDirection(frame.camera, uvec2(gl_FragCoord.xy));
+    uvec3 corner = frame.scene.triangles.at[triangle];
+    vec3 p0 = frame.scene.positions.at[corner.x];
+    vec3 edge1 = frame.scene.positions.at[corner.y] - p0;
+    vec3 edge2 = frame.scene.positions.at[corner.z] - p0;
+    vec2 b = barycentricsAlong(eye, direction, p0, edge1, edge2);
+    SurfacePoint point = surfaceAt(frame.scene, triangle, b, eye, direction, 0.0, frame.camera.pixelSpread,
+                                   frame.surfaceSampler);
+    outPosition = vec4(point.position, point.distance);
+    outNormals = uvec2(packUnitVector(point.normal), packUnitVector(point.geometricNormal));
+    outAlbedo = vec4(point.albedo, 1.0);
+    outTriangle = triangle;
+}

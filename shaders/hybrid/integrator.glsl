@@ -1,0 +1,164 @@
+// The light along a pixel's ray: Phong shading with shadow rays, mirror reflection and refraction to a depth,
+// the cube map where a ray leaves the scene (algorithms 2 and 3 of Kim and Baek). The recursion is a loop over
+// an explicit stack, so that a ray pipeline needs no recursion of its own and a ray query gives the same picture.
+// The including file provides traceClosest() and traceOccluded().
+#ifndef HYBRID_INTEGRATOR
+#define HYBRID_INTEGRATOR
+
+#include "common/fresnel.glsl"
+#include "common/phong.glsl"
+#include "common/ray_offset.glsl"
+#include "common/surface.glsl"
+#include "hybrid/frame.glsl"
+#include "hybrid/hit.glsl"
+
+// Reflections and refractions a ray may go through; deeper ones are black.
+layout(constant_id = 0) const uint kMaxDepth = 4u;
+
+// A hit pushes two rays at most and takes one back: one ray waits per level.
+const uint kStackSize = kMaxDepth + 1u;
+
+// What adds less than this to a pixel is not followed.
+const float kSmallestWeight = 1.0 / 512.0;
+const float kFar = 1e30;
+
+struct Ray {
+    vec3 origin;
+    float tmin;
+    vec3 direction;
+    float coneWidth; // footprint at the origin
+    vec3 weight; // share of the pixel's colour
+    uint depth;
+};
+
+// A surface point seen from one side.
+struct Facing {
+    vec3 normal; // on the ray's side
+    vec3 geometricNormal; // on the ray's side
+    bool entering; // the ray comes from outside
+};
+
+Facing faceRay(SurfacePoint point, vec3 direction) {
+    Facing facing;
+    facing.entering = dot(point.geometricNormal, direction) < 0.0;
+    float side = facing.entering ? 1.0 : -1.0;
+    facing.geometricNormal = side * point.geometricNormal;
+    vec3 n = side * point.normal;
+    // An interpolated normal may look away from the viewer near a silhouette: bend it until it is edge-on.
+    float away = dot(n, direction);
+    facing.normal = away > -1e-3 ? normalize(n - direction * (away + 1e-3)) : n;
+    return facing;
+}
+
+bool surfaceAlong(Ray ray, out SurfacePoint point) {
+    Hit hit = traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
+    if (hit.triangle == kNoTriangle) {
+        return false;
+    }
+    point = surfaceAt(frame.scene, hit.triangle, hit.barycentrics, ray.origin, ray.direction, ray.coneWidth,
+                      frame.camera.pixelSpread, frame.surfaceSampler);
+    return true;
+}
+
+vec3 skyColor(vec3 direction) {
+    return textureBindlessCubeLod(frame.sky, frame.skySampler, direction, 0.0).rgb;
+}
+
+// Light of one source at the point, were nothing in between; the way to it in `toLight` and `distance`.
+vec3 arrivingLight(Light light, vec3 position, out vec3 toLight, out float distance) {
+    if (light.isDistant != 0.0) {
+        toLight = light.position;
+        distance = kFar;
+        return light.color;
+    }
+    vec3 way = light.position - position;
+    distance = max(length(way), 1e-20);
+    toLight = way / distance;
+    float relative = distance / light.reach;
+    return light.color / (1.0 + relative * relative);
+}
+
+vec3 shadeLocally(SurfacePoint point, Facing facing, Material material, vec3 view) {
+    float above = 0.5 + 0.5 * facing.normal.y;
+    vec3 color = material.emission + point.albedo * mix(frame.ambientBelow, frame.ambientAbove, above);
+    vec3 origin = leaveSurface(point.position, facing.geometricNormal, frame.offsetExtent);
+    for (uint i = 0u; i < frame.lightCount; ++i) {
+        vec3 toLight;
+        float distance;
+        vec3 light = arrivingLight(frame.lights[i], origin, toLight, distance);
+        if (dot(toLight, facing.geometricNormal) <= 0.0 || dot(toLight, facing.normal) <= 0.0) {
+            continue;
+        }
+        if (!traceOccluded(origin, 0.0, toLight, distance * 0.9999)) {
+            color += light *
+                     phong(point.albedo, material.specular, material.shininess, facing.normal, view, toLight);
+        }
+    }
+    return color;
+}
+
+Ray reflectedRay(Ray ray, SurfacePoint point, Facing facing, vec3 weight) {
+    vec3 direction = reflect(ray.direction, facing.normal);
+    // A bent normal may mirror a ray into its own surface: keep it just above.
+    float below = dot(direction, facing.geometricNormal);
+    if (below < 1e-3) {
+        direction = direction + facing.geometricNormal * (1e-3 - below);
+    }
+    vec3 origin = leaveSurface(point.position, facing.geometricNormal, frame.offsetExtent);
+    float width = ray.coneWidth + frame.camera.pixelSpread * point.distance;
+    return Ray(origin, 0.0, normalize(direction), width, weight, ray.depth + 1u);
+}
+
+Ray refractedRay(Ray ray, SurfacePoint point, Facing facing, float eta, vec3 weight) {
+    vec3 direction = refract(ray.direction, facing.normal, eta);
+    float above = dot(direction, facing.geometricNormal);
+    if (above > -1e-3) {
+        direction = direction - facing.geometricNormal * (above + 1e-3);
+    }
+    vec3 origin = leaveSurface(point.position, -facing.geometricNormal, frame.offsetExtent);
+    float width = ray.coneWidth + frame.camera.pixelSpread * point.distance;
+    return Ray(origin, 0.0, normalize(direction), width, weight, ray.depth + 1u);
+}
+
+bool isNegligible(vec3 weight) {
+    return max(weight.x, max(weight.y, weight.z)) < kSmallestWeight;
+}
+
+// Light along `ray`, whose first surface is already known: `point` where `found`, else the sky.
+vec3 lightAlong(Ray ray, SurfacePoint point, bool found) {
+    Ray waiting[kStackSize];
+    uint count = 0u;
+    vec3 color = vec3(0.0);
+    for (;;) {
+        if (found) {
+            Material material = frame.scene.materials.at[frame.scene.triangleInfos.at[point.triangle].material];
+            Facing facing = faceRay(point, ray.direction);
+            float glass = material.transmission;
+            float local = max(1.0 - material.reflectivity - glass, 0.0);
+            if (local > 0.0) {
+                color += ray.weight * local * shadeLocally(point, facing, material, -ray.direction);
+            }
+
+            float eta = facing.entering ? 1.0 / material.ior : material.ior;
+            float fresnel = glass > 0.0 ? fresnelDielectric(dot(facing.normal, -ray.direction), eta) : 0.0;
+            vec3 reflected = ray.weight * material.tint * (material.reflectivity + glass * fresnel);
+            vec3 refracted = ray.weight * material.tint * (glass * (1.0 - fresnel));
+            bool mayContinue = ray.depth < kMaxDepth;
+            if (mayContinue && !isNegligible(reflected)) {
+                waiting[count++] = reflectedRay(ray, point, facing, reflected);
+            }
+            if (mayContinue && !isNegligible(refracted)) {
+                waiting[count++] = refractedRay(ray, point, facing, eta, refracted);
+            }
+        } else {
+            color += ray.weight * skyColor(ray.direction);
+        }
+        if (count == 0u) {
+            return color;
+        }
+        ray = waiting[--count];
+        found = surfaceAlong(ray, point);
+    }
+}
+
+#endif

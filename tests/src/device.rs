@@ -1,0 +1,101 @@
+//! A context for a test, whose end fails the test if the validation layer said anything.
+
+use std::ops::Deref;
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
+use lvk::{Context, ContextDesc, Validation, ValidationSink};
+use lvk_samples::driver::{DriverRequest, prepare};
+
+/// A context under core and synchronization validation. Dropping it fails the test on any message, those of the
+/// context's own end included.
+pub struct TestDevice {
+    context: Option<Context>,
+    sink: ValidationSink,
+}
+
+impl TestDevice {
+    /// Takes the messages a test provoked on purpose.
+    pub fn take_messages(&self) -> Vec<lvk::ValidationMessage> {
+        self.sink.take()
+    }
+}
+
+impl Deref for TestDevice {
+    type Target = Context;
+
+    fn deref(&self) -> &Context {
+        match &self.context {
+            Some(context) => context,
+            None => unreachable!("the context is only taken by drop"),
+        }
+    }
+}
+
+impl Drop for TestDevice {
+    fn drop(&mut self) {
+        if let Some(context) = self.context.take() {
+            let _ = context.wait_idle();
+        }
+        if std::thread::panicking() {
+            return;
+        }
+        let messages: Vec<String> = self.sink.take().iter().map(ToString::to_string).collect();
+        assert!(messages.is_empty(), "the validation layer is not silent:\n{}", messages.join("\n"));
+    }
+}
+
+/// A context with everything optional on. See [`device_with`].
+pub fn device() -> Option<TestDevice> {
+    device_with(|_| {})
+}
+
+/// A context whose description `adjust` has changed.
+///
+/// `None`, with a line on standard error, only when the user asked with `LVK_SKIP_GPU_TESTS=1` to go on without a
+/// device and there is none; `LVK_REQUIRE_GPU=1` forbids even that.
+///
+/// # Panics
+/// When there is no device, or the context cannot be made.
+pub fn device_with(adjust: impl FnOnce(&mut ContextDesc<'_>)) -> Option<TestDevice> {
+    let library = match loader() {
+        Ok(library) => library.as_deref(),
+        Err(reason) if is_set("LVK_SKIP_GPU_TESTS") && !is_set("LVK_REQUIRE_GPU") => {
+            eprintln!("SKIPPED, no Vulkan device: {reason}");
+            return None;
+        }
+        Err(reason) => unavailable(reason),
+    };
+    let sink = ValidationSink::default();
+    let mut desc = ContextDesc {
+        application_name: "lvk tests",
+        vulkan_library: library,
+        validation: if is_set("LVK_TEST_GPU_ASSISTED") { Validation::GpuAssisted } else { Validation::Standard },
+        validation_sink: Some(sink.clone()),
+        ..Default::default()
+    };
+    adjust(&mut desc);
+    match Context::new(&desc) {
+        Ok(context) => Some(TestDevice { context: Some(context), sink }),
+        Err(error) => unavailable(&error.to_string()),
+    }
+}
+
+/// The Vulkan loader to open, found or fetched once.
+pub fn loader() -> Result<&'static Option<PathBuf>, &'static str> {
+    static LOADER: OnceLock<Result<Option<PathBuf>, String>> = OnceLock::new();
+    let found = LOADER.get_or_init(|| {
+        let driver = prepare(&DriverRequest { validation: true }).map_err(|error| error.to_string())?;
+        Ok(driver.loader)
+    });
+    found.as_ref().map_err(String::as_str)
+}
+
+#[expect(clippy::panic, reason = "a test without its device has failed")]
+fn unavailable(reason: &str) -> ! {
+    panic!("this test needs a Vulkan device: {reason}");
+}
+
+fn is_set(variable: &str) -> bool {
+    std::env::var(variable).is_ok_and(|value| !value.is_empty() && value != "0")
+}
