@@ -1,4 +1,84 @@
-//! A bindless, handle-based, lightweight Vulkan library with ray tracing as its headline.
+//! `lvk` is a bindless, handle-based, lightweight Vulkan library with ray tracing as its headline.
+//!
+//! Objects are created from plain descriptions and named by handles. Shaders reach textures, samplers and
+//! acceleration structures by a number ([`Holder::index`]) and buffers by address ([`Context::buffer_address`]).
+//! Descriptor sets, shader binding tables, barriers, image layouts, scratch memory, staging memory and the lifetime of
+//! what the GPU still uses are the library's business.
+//!
+//! ```no_run
+//! use lvk::*;
+//!
+//! # fn main() -> lvk::Result<()> {
+//! let ctx = Context::new(&ContextDesc::default())?;
+//! let numbers = ctx.create_buffer(&BufferDesc { data: Some(&[0; 256]), ..Default::default() })?;
+//! let module = ctx.create_shader_module(&ShaderModuleDesc {
+//!     stage: ShaderStage::Compute,
+//!     source: ShaderSource::Glsl(
+//!         r"
+//!         layout(local_size_x = 64) in;
+//!         layout(buffer_reference, scalar) buffer Numbers { uint value[]; };
+//!         layout(push_constant, scalar) uniform Push { Numbers numbers; };
+//!         void main() { numbers.value[gl_GlobalInvocationID.x] = gl_GlobalInvocationID.x; }",
+//!     ),
+//!     ..Default::default()
+//! })?;
+//! let pipeline =
+//!     ctx.create_compute_pipeline(&ComputePipelineDesc { module: Some(*module), ..Default::default() })?;
+//! let mut cmd = ctx.acquire_command_buffer()?;
+//! cmd.bind_compute_pipeline(*pipeline)?;
+//! cmd.push_constants(&ctx.buffer_address(*numbers)?)?;
+//! cmd.dispatch([1, 1, 1], &Dependencies { buffers: &[*numbers], ..Default::default() })?;
+//! ctx.submit(cmd)?;
+//! let mut bytes = [0; 256];
+//! ctx.download_buffer(*numbers, 0, &mut bytes)?;
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Map
+//!
+//! | You want to | Start at |
+//! |---|---|
+//! | open a device, ask what it can do | [`Context::new`], [`ContextDesc`], [`Capabilities`] |
+//! | make objects | `Context::create_*`, each with its `*Desc` |
+//! | move data | [`Context::upload_buffer`], [`Context::download_texture`] and their kin |
+//! | record | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
+//! | draw | [`CommandBuffer::begin_rendering`], [`RenderPass`] |
+//! | compute | [`CommandBuffer::dispatch`] |
+//! | trace rays with a pipeline | [`RayTracingPipelineDesc`], [`CommandBuffer::trace_rays`] |
+//! | trace rays in any shader | [`ShaderModuleDesc`] with `#include <lvk/ray_query.glsl>` |
+//! | build what rays hit | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
+//! | say what a shader reaches | [`Dependencies`] |
+//! | submit, wait, keep frames apart | [`Context::submit`], [`Context::wait`], [`Context::next_frame`] |
+//! | measure | [`CommandBuffer::write_timestamp`], [`Context::timestamps_ms`] |
+//! | check | [`Validation`], [`ValidationSink`] |
+//! | mix in Vulkan calls of your own | `Context::raw_*`, [`CommandBuffer::raw`] |
+//!
+//! # Barriers
+//!
+//! The library tracks every buffer and every mip and layer of every texture. Attachments, copies, uploads, builds of
+//! acceleration structures, traces and ray queries in compute shaders need no word from the caller. What a shader
+//! reaches only by number or address is named in [`Dependencies`] when an earlier command *wrote* it, or when this one
+//! writes it; what was only uploaded is readable everywhere. A render pass cannot contain barriers, so what its draws
+//! read and the same command buffer wrote is named in the pass's dependencies; forgetting that is an error, not a
+//! hazard.
+//!
+//! # What is not checked
+//!
+//! Numbers and addresses inside shaders: a shader that indexes past the arrays, or reads through a wrong address, is
+//! undefined behaviour on the GPU, as in every bindless design. Slot 0 of each array and every free slot hold a
+//! visible dummy.
+//!
+//! # What `lvk` does not do (yet)
+//!
+//! Windows and swapchains, mesh and tessellation pipelines, multisampling, 3D textures, queues beside the main one,
+//! splitting and compaction of acceleration structures, a pipeline cache on disk. `lvk` is no scene graph and no
+//! renderer.
+//!
+//! # Features
+//!
+//! `glsl` (default): compile GLSL at run time; needs a C++17 compiler when the library is built. Without it modules
+//! take SPIR-V words.
 
 mod accel;
 mod barrier;

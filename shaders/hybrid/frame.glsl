@@ -19,9 +19,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint skySampler;
     uint outputImage;
     uint gbufferPosition;
-    uint gbufferNormal;
+    uint gbufferSurface;
     uint gbufferAlbedo;
-    uint gbufferTriangle;
 };
 
 layout(push_constant, scalar) uniform PushConstants {

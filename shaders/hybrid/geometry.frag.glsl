@@ -5,9 +5,8 @@
 #include "hybrid/frame.glsl"
 
 layout(location = 0) out vec4 outPosition; // w: distance from the eye
-layout(location = 1) out uvec2 outNormals; // shading, geometric
+layout(location = 1) out uvec4 outSurface; // shading normal (two floats), geometric normal, triangle
 layout(location = 2) out vec4 outAlbedo;
-layout(location = 3) out uint outTriangle;
 
 void main() {
     uint triangle = uint(gl_PrimitiveID);
@@ -21,7 +20,9 @@ void main() {
     SurfacePoint point = surfaceAt(frame.scene, triangle, b, eye, direction, 0.0, frame.camera.pixelSpread,
                                    frame.surfaceSampler);
     outPosition = vec4(point.position, point.distance);
-    outNormals = uvec2(packUnitVector(point.normal), packUnitVector(point.geometricNormal));
+    // Mirrors magnify what is lost of the shading normal, so it keeps all its bits.
+    uvec2 normal = floatBitsToUint(octahedralFromUnit(point.normal));
+    uint geometricNormal = packSnorm2x16(octahedralFromUnit(point.geometricNormal));
+    outSurface = uvec4(normal, geometricNormal, triangle);
     outAlbedo = vec4(point.albedo, 1.0);
-    outTriangle = triangle;
 }

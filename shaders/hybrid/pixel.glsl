@@ -16,16 +16,16 @@ Ray primaryRay(uvec2 pixel) {
 // The surface that the geometry pass left in the G-buffer.
 bool primarySurface(uvec2 pixel, Ray ray, out SurfacePoint point) {
     ivec2 texel = ivec2(pixel);
-    point.triangle = textureBindlessFetchU2D(frame.gbufferTriangle, texel, 0).x;
+    uvec4 surface = textureBindlessFetchU2D(frame.gbufferSurface, texel, 0);
+    point.triangle = surface.w;
     if (point.triangle == kNoTriangle) {
         return false;
     }
     vec4 position = textureBindlessFetch2D(frame.gbufferPosition, texel, 0);
-    uvec2 normals = textureBindlessFetchU2D(frame.gbufferNormal, texel, 0).xy;
     point.position = position.xyz;
     point.distance = position.w;
-    point.normal = unpackUnitVector(normals.x);
-    point.geometricNormal = unpackUnitVector(normals.y);
+    point.normal = unitFromOctahedral(uintBitsToFloat(surface.xy));
+    point.geometricNormal = unitFromOctahedral(unpackSnorm2x16(surface.z));
     point.albedo = textureBindlessFetch2D(frame.gbufferAlbedo, texel, 0).rgb;
     return true;
 }

@@ -122,8 +122,6 @@ pub(crate) enum Layout {
     TransferSrc,
     /// Destination of a copy, blit or clear.
     TransferDst,
-    /// Handed to the presentation engine.
-    Present,
 }
 
 /// One way in which a command touches a resource.
@@ -206,11 +204,6 @@ impl Use {
     /// Reads through a mapped pointer once the GPU is done.
     pub(crate) const fn host_read() -> Self {
         Self::new(Stages::HOST, Access::HOST_READ, Layout::General)
-    }
-
-    /// Image handed to the presentation engine; the semaphore signalled for it covers all stages.
-    pub(crate) const fn present() -> Self {
-        Self::new(Stages::empty(), Access::empty(), Layout::Present)
     }
 
     /// Every read a device stage can make of a buffer: what a command may do that declares nothing.
@@ -329,7 +322,6 @@ mod tests {
         assert!(Use::shader_write(Stages::COMPUTE).is_write());
         assert!(Use::color_target(false).is_write());
         assert!(!Use::everything_read().is_write());
-        assert!(!Use::present().is_write());
     }
 
     #[test]

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use proptest::prelude::*;
 
 use super::model::{Cell, Command, Event, Op, any_violation, edges};
+use super::state::Scopes;
 use super::*;
 
 const BUFFERS: u64 = 2;
@@ -382,23 +383,6 @@ fn ranges_outside_a_texture_are_ignored() {
     tracker.use_texture(ResourceId(1), shape, huge, Use::transfer_write(), &mut out);
     assert!(!tracker.needs_barrier_texture(ResourceId(1), huge, Use::transfer_read()));
     assert!(out.is_empty() && States::default().submit(&tracker).is_empty());
-}
-
-#[test]
-fn acquired_texture_waits_for_the_semaphore_and_drops_its_contents() {
-    let (id, shape) = (ResourceId(5), TextureShape { mips: 1, layers: 1 });
-    let mut states = States::default();
-    for _frame in 0..2 {
-        states.acquire_texture(id, shape, Stages::COLOR);
-        let mut tracker = Tracker::default();
-        let mut inside = Barriers::default();
-        tracker.use_texture(id, shape, shape.whole(), Use::color_target(false), &mut inside);
-        tracker.use_texture(id, shape, shape.whole(), Use::present(), &mut inside);
-        let scopes = states.submit(&tracker).images[0].scopes;
-        assert_eq!((scopes.src_stages, scopes.old_layout), (Stages::COLOR, Layout::Undefined));
-        assert_eq!(inside.images[0].scopes.new_layout, Layout::Present);
-        assert_eq!(inside.images[0].scopes.src_access, Access::COLOR_WRITE);
-    }
 }
 
 #[test]

@@ -67,11 +67,6 @@ pub(crate) struct State {
 }
 
 impl State {
-    /// Contents unknown, and the next use must wait for `stages`.
-    pub(crate) fn discarded_after(stages: Stages) -> Self {
-        Self { readers: stages, ..Self::default() }
-    }
-
     /// Untouched so far, with the layout that the first use will find.
     pub(crate) fn untouched_in(layout: Layout) -> Self {
         Self { layout, ..Self::default() }

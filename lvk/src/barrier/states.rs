@@ -1,9 +1,9 @@
 //! What the queue will have done to every resource, and the barriers between it and the next command buffer.
 
-use super::access::{Layout, StageAccess, Stages, Use};
+use super::access::{Layout, StageAccess, Use};
 use super::batch::Barriers;
 use super::state::{Scopes, State, accumulate, transition};
-use super::subresource::{Cells, Subresources, TextureShape};
+use super::subresource::{Cells, Subresources};
 use super::tracker::{IdMap, Local, Prefix, ResourceId, Tracker};
 
 /// State of every resource after everything submitted to one queue so far.
@@ -37,12 +37,6 @@ impl States {
     pub(crate) fn forget(&mut self, id: ResourceId) {
         self.buffers.remove(&id);
         self.textures.remove(&id);
-    }
-
-    /// A texture comes from outside the queue with unknown contents, and its first use must wait for `stages`: those
-    /// which the submission's semaphore holds back, for an image acquired from a swapchain.
-    pub(crate) fn acquire_texture(&mut self, id: ResourceId, shape: TextureShape, stages: Stages) {
-        self.textures.insert(id, Cells::new(shape, State::discarded_after(stages)));
     }
 }
 

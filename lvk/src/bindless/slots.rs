@@ -74,11 +74,6 @@ impl Slots {
         self.marks.get(slot as usize).is_some_and(|mark| mark.taken)
     }
 
-    /// Number of slots taken, without the dummy.
-    pub(crate) fn len(&self) -> u32 {
-        (self.marks.len().saturating_sub(1) - self.free.len()) as u32
-    }
-
     /// Number of slots, with the dummy.
     pub(crate) fn capacity(&self) -> u32 {
         self.capacity
@@ -152,7 +147,6 @@ mod tests {
                         dirty.clear();
                     }
                 }
-                prop_assert_eq!(slots.len(), taken.len() as u32);
                 prop_assert!((0..14).all(|slot| slot == 0 || slots.is_taken(slot) == taken.contains(&slot)));
             }
         }
@@ -164,7 +158,7 @@ mod tests {
         assert_eq!(slots.take_dirty(), [0]);
         slots.free(0);
         assert_eq!([slots.alloc(), slots.alloc(), slots.alloc()], [Some(1), Some(2), None]);
-        assert_eq!((slots.len(), slots.capacity()), (2, 3));
+        assert_eq!(slots.capacity(), 3);
     }
 
     #[test]

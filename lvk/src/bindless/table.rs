@@ -104,19 +104,16 @@ impl Bindless {
         Ok(Self { set_layout, set, pool, entries: Mutex::new(entries), gpu: Arc::clone(gpu) })
     }
 
-    /// Puts the dummies into every slot.
+    /// Puts the dummies into every slot. Nothing has been submitted yet.
     pub(crate) fn fill(&self, dummies: Dummies) {
         let mut entries = self.lock();
         entries.dummies = Some(dummies);
-        for slot in 0..entries.textures.owners.len() {
-            entries.textures.slots.dirty(slot as u32);
-        }
-        for slot in 0..entries.samplers.owners.len() {
-            entries.samplers.slots.dirty(slot as u32);
-        }
-        for slot in 0..entries.tlas.owners.len() {
-            entries.tlas.slots.dirty(slot as u32);
-        }
+        let textures = (0..entries.textures.owners.len() as u32).map(|slot| (slot, None));
+        self.write_textures(dummies, textures);
+        let samplers = (0..entries.samplers.owners.len() as u32).map(|slot| (slot, None));
+        self.write_samplers(dummies, samplers);
+        let tlas = (0..entries.tlas.owners.len() as u32).map(|slot| (slot, None));
+        self.write_tlas(dummies, tlas);
     }
 
     pub(crate) fn reserve_texture(&self, name: &str) -> Result<u32> {
@@ -168,28 +165,30 @@ impl Bindless {
     pub(crate) fn flush(&self) {
         let mut entries = self.lock();
         let Some(dummies) = entries.dummies else { return };
+        self.write_textures(dummies, entries.textures.take_dirty().into_iter());
+        self.write_samplers(dummies, entries.samplers.take_dirty().into_iter());
+        self.write_tlas(dummies, entries.tlas.take_dirty().into_iter());
+    }
+
+    fn write_textures(&self, dummies: Dummies, slots: impl Iterator<Item = (u32, Option<TextureViews>)>) {
         let (mut sampled, mut storage) = (Runs::default(), Runs::default());
-        for (slot, views) in entries.textures.take_dirty() {
-            let views = views.unwrap_or(TextureViews { sampled: None, storage: None });
-            let read = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
-            sampled.push(slot, image(views.sampled.unwrap_or(dummies.sampled), read));
-            storage.push(slot, image(views.storage.unwrap_or(dummies.storage), vk::ImageLayout::GENERAL));
-        }
-        let mut samplers = Runs::default();
-        for (slot, owner) in entries.samplers.take_dirty() {
-            let sampler = owner.unwrap_or(dummies.sampler);
-            samplers.push(slot, vk::DescriptorImageInfo::default().sampler(sampler));
-        }
-        let mut tlas = Runs::default();
-        for (slot, owner) in entries.tlas.take_dirty() {
-            if let Some(raw) = owner.or(dummies.tlas) {
-                tlas.push(slot, raw);
-            }
+        for (slot, views) in slots {
+            let (read, written) = views.map_or((None, None), |views| (views.sampled, views.storage));
+            let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+            sampled.push(slot, image(read.unwrap_or(dummies.sampled), layout));
+            storage.push(slot, image(written.unwrap_or(dummies.storage), vk::ImageLayout::GENERAL));
         }
         self.write(&sampled, layout::SAMPLED_IMAGES, vk::DescriptorType::SAMPLED_IMAGE);
         self.write(&storage, layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE);
+    }
+
+    fn write_samplers(&self, dummies: Dummies, slots: impl Iterator<Item = (u32, Option<vk::Sampler>)>) {
+        let mut samplers = Runs::default();
+        for (slot, owner) in slots {
+            let sampler = owner.unwrap_or(dummies.sampler);
+            samplers.push(slot, vk::DescriptorImageInfo::default().sampler(sampler));
+        }
         self.write(&samplers, layout::SAMPLERS, vk::DescriptorType::SAMPLER);
-        self.write_tlas(&tlas);
     }
 
     fn write(&self, runs: &Runs<vk::DescriptorImageInfo>, binding: u32, ty: vk::DescriptorType) {
@@ -204,7 +203,17 @@ impl Bindless {
         }
     }
 
-    fn write_tlas(&self, runs: &Runs<vk::AccelerationStructureKHR>) {
+    fn write_tlas(
+        &self,
+        dummies: Dummies,
+        slots: impl Iterator<Item = (u32, Option<vk::AccelerationStructureKHR>)>,
+    ) {
+        let mut runs = Runs::default();
+        for (slot, owner) in slots {
+            if let Some(raw) = owner.or(dummies.tlas) {
+                runs.push(slot, raw);
+            }
+        }
         for (first, raw) in runs.iter() {
             let mut structures =
                 vk::WriteDescriptorSetAccelerationStructureKHR::default().acceleration_structures(raw);

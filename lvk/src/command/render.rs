@@ -25,6 +25,14 @@ pub(super) const DRAW_INPUTS: [(BufferUsage, fn() -> Use); 3] = [
 
 /// A render pass being recorded. It borrows the command buffer, so nothing but draws can be recorded until it is
 /// dropped, which ends the pass (`vkCmdEndRendering`).
+///
+/// ```compile_fail,E0499
+/// fn no_dispatch_inside(cmd: &mut lvk::CommandBuffer, pass: &lvk::RenderPassDesc<'_>) -> lvk::Result<()> {
+///     let mut pass = cmd.begin_rendering(pass)?;
+///     cmd.dispatch([1, 1, 1], &lvk::Dependencies::default())?;
+///     pass.draw(0..3, 0..1)
+/// }
+/// ```
 pub struct RenderPass<'a> {
     cmd: &'a mut CommandBuffer,
     targets: Targets,

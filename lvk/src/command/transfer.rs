@@ -18,7 +18,7 @@ const SOURCE: vk::ImageLayout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
 /// Layout of an image that is copied to.
 const TARGET: vk::ImageLayout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
 
-/// A resource written by a copy, to be made readable everywhere before shaders run.
+/// A resource a copy wrote, or read in a layout of its own, to be made readable everywhere before shaders run.
 pub(super) enum Settle {
     Buffer(Arc<Buffer>),
     Texture(Arc<Texture>),
@@ -130,6 +130,7 @@ impl CommandBuffer {
             let device = &self.shared.gpu.device;
             device.cmd_copy_image_to_buffer(self.raw(), source.raw, SOURCE, target.raw, &[copy]);
         }
+        self.settle.push(Settle::Texture(Arc::clone(source)));
         self.settle.push(Settle::Buffer(Arc::clone(target)));
         Ok(())
     }
@@ -161,7 +162,7 @@ impl CommandBuffer {
             let device = &self.shared.gpu.device;
             device.cmd_copy_image(self.raw(), source.raw, SOURCE, target.raw, TARGET, &[copy]);
         }
-        self.settle.push(Settle::Texture(target));
+        self.settle.extend([source, target].map(Settle::Texture));
         Ok(())
     }
 
@@ -181,7 +182,7 @@ impl CommandBuffer {
         self.check_blit(&source, &target, filter)?;
         self.use_texture_pair(&source, &from, &target, &to)?;
         self.record_blit(&source, &from, &target, &to, filter);
-        self.settle.push(Settle::Texture(target));
+        self.settle.extend([source, target].map(Settle::Texture));
         Ok(())
     }
 
@@ -366,7 +367,7 @@ impl CommandBuffer {
         }
     }
 
-    /// Makes what copies wrote readable by every shader and every input, with one barrier for all.
+    /// Makes what copies touched readable by every shader and every input, with one barrier for all.
     pub(super) fn settle(&mut self) {
         if self.settle.is_empty() {
             return;

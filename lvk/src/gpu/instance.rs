@@ -31,12 +31,13 @@ impl Instance {
         let extensions = Extensions::of(&entry, layer)?;
         let mut messenger = Messenger::new(sink);
         let raw = create(&entry, application_name, validation, layer, &extensions, &messenger)?;
-        if extensions.debug_utils && layer.is_some() {
-            if let Err(result) = messenger.install(&entry, &raw) {
-                // SAFETY: the instance was created above and nothing uses it.
-                unsafe { raw.destroy_instance(None) };
-                return Err(Error::vulkan("vkCreateDebugUtilsMessengerEXT")(result));
-            }
+        if extensions.debug_utils
+            && layer.is_some()
+            && let Err(result) = messenger.install(&entry, &raw)
+        {
+            // SAFETY: the instance was created above and nothing uses it.
+            unsafe { raw.destroy_instance(None) };
+            return Err(Error::vulkan("vkCreateDebugUtilsMessengerEXT")(result));
         }
         Ok(Self { entry, raw, debug_utils: extensions.debug_utils, messenger })
     }
@@ -121,10 +122,9 @@ impl Extensions {
         Ok(found)
     }
 
+    /// The layer reads its settings without its extension being on, and loaders older than the extension refuse it.
     fn names(&self) -> Vec<*const std::ffi::c_char> {
-        let debug_utils = self.debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr());
-        let layer_settings = self.layer_settings.then_some(ash::ext::layer_settings::NAME.as_ptr());
-        debug_utils.into_iter().chain(layer_settings).collect()
+        self.debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr()).into_iter().collect()
     }
 }
 
@@ -170,7 +170,7 @@ fn switches(validation: Validation) -> Vec<(CString, bool)> {
     [
         ("validate_core", true),
         ("validate_sync", true),
-        ("syncval_submit_time_validation", true),
+        ("syncval_full_validation", true),
         ("syncval_shader_accesses_heuristic", true),
         ("gpuav_enable", gpu),
         ("enable_message_limit", false),

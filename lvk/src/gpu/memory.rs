@@ -62,10 +62,10 @@ impl Gpu {
 
     /// Gives memory back.
     pub(crate) fn free(&self, allocation: Allocation) {
-        if let Some(allocator) = self.allocator().as_mut() {
-            if let Err(error) = allocator.free(allocation) {
-                log::error!("freeing device memory failed: {error}");
-            }
+        if let Some(allocator) = self.allocator().as_mut()
+            && let Err(error) = allocator.free(allocation)
+        {
+            log::error!("freeing device memory failed: {error}");
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use rspirv_reflect::spirv::{BuiltIn, Capability, Decoration, Dim, Op};
+use ::spirv::{BuiltIn, Capability, Decoration, Dim, Op};
 
 use super::spirv::{self, Instruction};
 

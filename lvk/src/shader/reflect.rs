@@ -1,6 +1,6 @@
 //! What a SPIR-V module tells about itself, and whether it fits the one descriptor set.
 
-use rspirv_reflect::spirv::{Capability, Decoration, ExecutionMode, ExecutionModel, Op, StorageClass};
+use ::spirv::{Capability, Decoration, ExecutionMode, ExecutionModel, Op, StorageClass};
 
 use super::module::{Module, Type, Variable};
 use super::{ShaderStage, spirv};

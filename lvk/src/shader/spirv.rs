@@ -1,6 +1,6 @@
 //! Reads SPIR-V words. Knows lengths, not meanings, so that instructions newer than this library pass.
 
-use rspirv_reflect::spirv::{MAGIC_NUMBER, Op};
+use ::spirv::{MAGIC_NUMBER, Op};
 
 const HEADER_WORDS: usize = 5;
 /// SPIR-V 1.6, what Vulkan 1.3 takes.

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use proptest::prelude::*;
-use rspirv_reflect::spirv::{Capability, Decoration, Op};
+use ::spirv::{Capability, Decoration, Op};
 
 use super::*;
 use crate::error::{Error, Result};
@@ -523,7 +523,7 @@ proptest! {
     #[test]
     fn random_words_never_panic(mut words in prop::collection::vec(any::<u32>(), 0..64), small in any::<bool>()) {
         if let (Some(first), true) = (words.first_mut(), small) {
-            *first = rspirv_reflect::spirv::MAGIC_NUMBER;
+            *first = ::spirv::MAGIC_NUMBER;
         }
         for stage in ShaderStage::ALL {
             prop_assert!(reflect("test", stage, &words).is_err());

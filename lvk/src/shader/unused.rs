@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use rspirv_reflect::spirv::{Op, StorageClass};
+use ::spirv::{Op, StorageClass};
 
 use super::spirv::{Instruction, instructions};
 

@@ -116,6 +116,5 @@ pub(crate) fn layout(layout: Layout) -> vk::ImageLayout {
         Layout::DepthTarget => vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
         Layout::TransferSrc => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
         Layout::TransferDst => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
-        Layout::Present => vk::ImageLayout::PRESENT_SRC_KHR,
     }
 }

@@ -30,6 +30,8 @@ pub(crate) struct Submitter<T> {
 }
 
 struct Inner<T> {
+    /// Trackers of command buffers that were submitted, emptied for the next ones.
+    spare: Vec<(Tracker, Images)>,
     states: States,
     ring: CommandRing,
     deferred: Deferred<T>,
@@ -47,6 +49,7 @@ pub(crate) struct Finished<T> {
 impl<T> Submitter<T> {
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self> {
         let inner = Inner {
+            spare: Vec::new(),
             states: States::default(),
             ring: CommandRing::default(),
             deferred: Deferred::default(),
@@ -57,14 +60,11 @@ impl<T> Submitter<T> {
 
     /// Starts recording a command buffer.
     pub(crate) fn acquire(&self) -> Result<Recording> {
-        let (sequence, slot) = self.lock().ring.acquire(&self.gpu)?;
-        let recording = Recording {
-            sequence,
-            commands: slot.main,
-            tracker: Tracker::default(),
-            images: Images::default(),
-            slot,
-        };
+        let mut inner = self.lock();
+        let (sequence, slot) = inner.ring.acquire(&self.gpu)?;
+        let (tracker, images) = inner.spare.pop().unwrap_or_default();
+        drop(inner);
+        let recording = Recording { sequence, commands: slot.main, tracker, images, slot };
         match begin(&self.gpu, slot.main) {
             Ok(()) => Ok(recording),
             Err(error) => {
@@ -95,8 +95,11 @@ impl<T> Submitter<T> {
                 return Err(error);
             }
         }
-        for recording in recordings {
+        for mut recording in recordings {
             inner.ring.submitted(recording.sequence, recording.slot, value);
+            recording.tracker.clear();
+            recording.images.clear();
+            inner.spare.push((recording.tracker, recording.images));
         }
         Ok(value)
     }

@@ -54,11 +54,6 @@ impl Ring {
         }
     }
 
-    /// Bytes of the whole buffer.
-    pub(crate) fn size(&self) -> u64 {
-        self.size
-    }
-
     fn place(&self, size: u64, align: u64) -> Option<u64> {
         let next = self.head.checked_next_multiple_of(align)?;
         let wrapped = self.head < self.tail || (self.head == self.tail && !self.regions.is_empty());

@@ -110,10 +110,8 @@ pub(super) struct Indices {
     pub(super) sky_sampler: u32,
     pub(super) output: u32,
     pub(super) gbuffer_position: u32,
-    pub(super) gbuffer_normal: u32,
+    pub(super) gbuffer_surface: u32,
     pub(super) gbuffer_albedo: u32,
-    pub(super) gbuffer_triangle: u32,
-    pub(super) padding: u32,
 }
 
 /// The whole block (`Frame` in `shaders/hybrid/frame.glsl`).

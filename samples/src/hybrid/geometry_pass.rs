@@ -19,12 +19,11 @@ const NO_TRIANGLE: u32 = u32::MAX;
 pub(super) struct GBuffer {
     /// Position in scene units, and distance from the eye.
     position: Holder<TextureHandle>,
-    /// Shading and geometric normal, octahedral, 16 bits a coordinate.
-    normal: Holder<TextureHandle>,
+    /// Shading normal (octahedral, bits of two floats), geometric normal (octahedral, 16 bits a coordinate) and
+    /// number of the triangle, which leads to its material.
+    surface: Holder<TextureHandle>,
     /// Albedo, linear.
     albedo: Holder<TextureHandle>,
-    /// Number of the triangle, which leads to its material.
-    triangle: Holder<TextureHandle>,
     depth: Holder<TextureHandle>,
 }
 
@@ -38,9 +37,8 @@ pub(super) struct GeometryPass {
 
 impl GBuffer {
     const POSITION: Format = Format::Rgba32Float;
-    const NORMAL: Format = Format::Rg32Uint;
+    const SURFACE: Format = Format::Rgba32Uint;
     const ALBEDO: Format = Format::Rgba16Float;
-    const TRIANGLE: Format = Format::R32Uint;
     const DEPTH: Format = Format::D32Float;
 
     fn new(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Self> {
@@ -50,27 +48,25 @@ impl GBuffer {
         };
         Ok(Self {
             position: target(Self::POSITION, "g-buffer position")?,
-            normal: target(Self::NORMAL, "g-buffer normal")?,
+            surface: target(Self::SURFACE, "g-buffer surface")?,
             albedo: target(Self::ALBEDO, "g-buffer albedo")?,
-            triangle: target(Self::TRIANGLE, "g-buffer triangle")?,
             depth: target(Self::DEPTH, "g-buffer depth")?,
         })
     }
 
     /// What the ray pass reads.
-    pub(super) fn textures(&self) -> [TextureHandle; 4] {
-        [&self.position, &self.normal, &self.albedo, &self.triangle].map(Holder::handle)
+    pub(super) fn textures(&self) -> [TextureHandle; 3] {
+        [&self.position, &self.surface, &self.albedo].map(Holder::handle)
     }
 
     /// Tells the shaders where the targets are.
     pub(super) fn name_in(&self, indices: &mut Indices) {
         indices.gbuffer_position = self.position.index();
-        indices.gbuffer_normal = self.normal.index();
+        indices.gbuffer_surface = self.surface.index();
         indices.gbuffer_albedo = self.albedo.index();
-        indices.gbuffer_triangle = self.triangle.index();
     }
 
-    fn attachments(&self) -> [ColorAttachment; 4] {
+    fn attachments(&self) -> [ColorAttachment; 3] {
         let target = |texture: &Holder<TextureHandle>, load| ColorAttachment {
             texture: texture.handle(),
             mip: 0,
@@ -80,9 +76,8 @@ impl GBuffer {
         };
         [
             target(&self.position, ColorLoad::DontCare),
-            target(&self.normal, ColorLoad::DontCare),
+            target(&self.surface, ColorLoad::ClearUint([NO_TRIANGLE; 4])),
             target(&self.albedo, ColorLoad::DontCare),
-            target(&self.triangle, ColorLoad::ClearUint([NO_TRIANGLE; 4])),
         ]
     }
 }
@@ -92,7 +87,7 @@ impl GeometryPass {
     pub(super) fn new(ctx: &Context, scene: &GpuScene, extent: [u32; 2]) -> lvk::Result<Self> {
         let vertex = module(ctx, ShaderStage::Vertex, texts::GEOMETRY_VERT, &[], "geometry.vert")?;
         let fragment = module(ctx, ShaderStage::Fragment, texts::GEOMETRY_FRAG, &[], "geometry.frag")?;
-        let formats = [GBuffer::POSITION, GBuffer::NORMAL, GBuffer::ALBEDO, GBuffer::TRIANGLE];
+        let formats = [GBuffer::POSITION, GBuffer::SURFACE, GBuffer::ALBEDO];
         let color = formats.map(ColorTarget::from);
         let pipeline = ctx.create_render_pipeline(&RenderPipelineDesc {
             vertex: Some(*vertex),

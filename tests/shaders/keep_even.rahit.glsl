@@ -1,0 +1,6 @@
+// Looks through every second primitive.
+void main() {
+    if ((gl_PrimitiveID & 1) != 0) {
+        ignoreIntersectionEXT;
+    }
+}

@@ -1,0 +1,37 @@
+// The same records by ray query. KEEP_EVEN looks through every second primitive.
+#include <lvk/ray_query.glsl>
+#include "ray_records.glsl"
+
+layout(local_size_x = 64) in;
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= count) {
+        return;
+    }
+    Ray ray = rays.at[index];
+    LvkRayQuery rq;
+    lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
+    while (lvkRayQueryProceed(rq)) {
+        if (lvkRayQueryType(rq, LVK_CANDIDATE) != LVK_CANDIDATE_TRIANGLE) {
+            continue;
+        }
+#ifdef KEEP_EVEN
+        if ((lvkRayQueryPrimitiveIndex(rq, LVK_CANDIDATE) & 1) != 0) {
+            continue;
+        }
+#endif
+        lvkRayQueryConfirmIntersection(rq);
+    }
+    HitRecord record = kNoHit;
+    if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_TRIANGLE) {
+        record.t = lvkRayQueryT(rq, LVK_COMMITTED);
+        record.barycentrics = lvkRayQueryBarycentrics(rq, LVK_COMMITTED);
+        record.kind = lvkRayQueryFrontFace(rq, LVK_COMMITTED) ? kFront : kBack;
+        record.instance = lvkRayQueryInstanceId(rq, LVK_COMMITTED);
+        record.customIndex = lvkRayQueryInstanceCustomIndex(rq, LVK_COMMITTED);
+        record.geometry = lvkRayQueryGeometryIndex(rq, LVK_COMMITTED);
+        record.primitive = lvkRayQueryPrimitiveIndex(rq, LVK_COMMITTED);
+    }
+    hits.at[index] = record;
+}

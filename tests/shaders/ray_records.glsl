@@ -1,0 +1,45 @@
+// Rays in, hit records out.
+#ifndef RAY_RECORDS
+#define RAY_RECORDS
+
+const uint kMissed = 0;
+const uint kFront = 0xfe;
+const uint kBack = 0xff;
+
+struct Ray {
+    vec3 origin;
+    float tMin;
+    vec3 direction;
+    float tMax;
+};
+
+struct HitRecord {
+    float t;
+    vec2 barycentrics;
+    uint kind; // kMissed, kFront, kBack, or what an intersection shader reported
+    uint instance;
+    uint customIndex;
+    uint geometry;
+    uint primitive;
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Rays {
+    Ray at[];
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer HitRecords {
+    HitRecord at[];
+};
+
+layout(push_constant, scalar) uniform Push {
+    Rays rays;
+    HitRecords hits;
+    uint tlas;
+    uint count;
+    uint mask;
+    uint flags;
+};
+
+const HitRecord kNoHit = HitRecord(0.0, vec2(0.0), kMissed, 0u, 0u, 0u, 0u);
+
+#endif

@@ -1,0 +1,5 @@
+layout(location = 1) rayPayloadInEXT uint occluded;
+
+void main() {
+    occluded = 0;
+}

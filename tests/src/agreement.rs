@@ -1,0 +1,125 @@
+//! Whether hit records say what the reference says.
+
+use crate::ray_tracer::{BACK, FRONT, HitRecord, MISSED};
+use crate::rays::Ray;
+use crate::reference::{Answer, HitIds};
+
+/// Relative to the distance, or to 1 where that is larger.
+const DISTANCE: f64 = 1e-5;
+const BARYCENTRICS: f64 = 1e-4;
+/// Most of the rays may not be left out: one in so many.
+const EXCLUDED_SHARE: usize = 50;
+const SHOWN: usize = 5;
+
+/// The outcome of a comparison.
+#[derive(Debug, Clone, Default)]
+pub struct Agreement {
+    /// Rays compared or left out.
+    pub rays: usize,
+    /// Rays the reference is not certain about.
+    pub excluded: usize,
+    /// Compared rays that hit something, by the reference.
+    pub hits: usize,
+    /// What is wrong, a line each.
+    pub mistakes: Vec<String>,
+}
+
+impl Agreement {
+    /// Compares closest hits of triangles.
+    pub fn of_triangles(rays: &[Ray], records: &[HitRecord], answer: impl Fn(&Ray) -> Answer) -> Self {
+        Self::of(rays, records, |ray, record| {
+            let answer = answer(ray);
+            answer.is_certain.then(|| (answer.hit.is_some(), triangle_mistake(record, &answer)))
+        })
+    }
+
+    /// Compares closest hits by distance and ids only.
+    pub fn of_shapes(rays: &[Ray], records: &[HitRecord], answer: impl Fn(&Ray) -> Answer) -> Self {
+        Self::of(rays, records, |ray, record| {
+            let answer = answer(ray);
+            answer.is_certain.then(|| (answer.hit.is_some(), mistake(record, &answer)))
+        })
+    }
+
+    /// Compares whether there is a hit.
+    pub fn of_occlusion(
+        rays: &[Ray],
+        records: &[HitRecord],
+        occluded: impl Fn(&Ray) -> Option<bool>,
+    ) -> Self {
+        Self::of(rays, records, |ray, record| {
+            let expected = occluded(ray)?;
+            let found = record.kind != MISSED;
+            Some((expected, (found != expected).then(|| format!("occluded: {found}, must be {expected}"))))
+        })
+    }
+
+    fn of(
+        rays: &[Ray],
+        records: &[HitRecord],
+        judge: impl Fn(&Ray, &HitRecord) -> Option<(bool, Option<String>)>,
+    ) -> Self {
+        assert_eq!(rays.len(), records.len());
+        let mut agreement = Self { rays: rays.len(), ..Self::default() };
+        for (index, (ray, record)) in rays.iter().zip(records).enumerate() {
+            match judge(ray, record) {
+                None => agreement.excluded += 1,
+                Some((is_hit, mistake)) => {
+                    agreement.hits += usize::from(is_hit);
+                    let line = mistake.map(|mistake| format!("ray {index} {ray:?}: {mistake}"));
+                    agreement.mistakes.extend(line);
+                }
+            }
+        }
+        agreement
+    }
+
+    /// Fails the test unless nothing is wrong, few rays were left out, and at least a twentieth hit something.
+    ///
+    /// # Panics
+    /// As said.
+    pub fn assert(&self, what: &str) {
+        let shown = self.mistakes.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join("\n  ");
+        let (count, rays) = (self.mistakes.len(), self.rays);
+        assert!(count == 0, "{what}: {count} of {rays} rays are wrong:\n  {shown}");
+        let excluded = self.excluded;
+        assert!(excluded * EXCLUDED_SHARE < rays, "{what}: {excluded} of {rays} rays could not be compared");
+        let hits = self.hits;
+        assert!(hits * 20 >= rays, "{what}: only {hits} of {rays} rays hit anything, which tests nothing");
+        eprintln!("{what}: {rays} rays, {hits} hits, {excluded} left out");
+    }
+}
+
+fn mistake(record: &HitRecord, answer: &Answer) -> Option<String> {
+    let found = (record.kind != MISSED).then_some(HitIds {
+        instance: record.instance,
+        custom_index: record.custom_index,
+        geometry: record.geometry,
+        primitive: record.primitive,
+    });
+    let expected = answer.hit.map(|hit| hit.ids);
+    if found != expected {
+        return Some(format!("hit {found:?} at {}, must be {expected:?} ({:?})", record.t, answer.hit));
+    }
+    let t = answer.hit?.t;
+    let is_close = within(f64::from(record.t), t, DISTANCE * t.abs().max(1.0));
+    (!is_close).then(|| format!("distance {}, must be {t}", record.t))
+}
+
+fn triangle_mistake(record: &HitRecord, answer: &Answer) -> Option<String> {
+    if let Some(mistake) = mistake(record, answer) {
+        return Some(mistake);
+    }
+    let hit = answer.hit?;
+    let pairs = record.barycentrics.iter().zip(hit.barycentrics);
+    if !pairs.into_iter().all(|(found, expected)| within(f64::from(*found), expected, BARYCENTRICS)) {
+        return Some(format!("barycentrics {:?}, must be {:?}", record.barycentrics, hit.barycentrics));
+    }
+    let kind = if hit.is_front { FRONT } else { BACK };
+    (record.kind != kind).then(|| format!("hit kind {:#x}, must be {kind:#x}", record.kind))
+}
+
+/// `false` for anything that is not a number.
+fn within(found: f64, expected: f64, tolerance: f64) -> bool {
+    (found - expected).abs() <= tolerance
+}

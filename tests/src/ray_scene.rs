@@ -1,0 +1,244 @@
+//! A scene described once, for the GPU and for the reference.
+
+use lvk::glam::{Affine3A, DAffine3};
+use lvk::{
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, Context,
+    GeometryFlags, Holder, IndexFormat, Indices, InstanceFlags, Result, TlasDesc, TlasInstance, Triangles,
+    transform_rows,
+};
+
+use crate::meshes::Mesh;
+use crate::reference::{self, Reference};
+
+/// How the vertices and indices of a geometry lie in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Layout {
+    /// Three packed vertices for each triangle, no indices.
+    #[default]
+    Unshared,
+    /// Packed vertices with 16-bit indices.
+    Indexed16,
+    /// Packed vertices with 32-bit indices.
+    Indexed32,
+    /// Vertices behind 8 bytes of something else each, 16-bit indices behind 6 bytes of something else.
+    Interleaved,
+}
+
+/// One geometry of a model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part {
+    /// Its triangles.
+    pub mesh: Mesh,
+    /// How they lie in memory.
+    pub layout: Layout,
+    /// Moves the vertices before the build.
+    pub transform: Option<Affine3A>,
+    /// How rays treat it.
+    pub flags: GeometryFlags,
+}
+
+impl Part {
+    /// Opaque, and where the mesh says.
+    pub fn new(mesh: Mesh, layout: Layout) -> Self {
+        Self { mesh, layout, transform: None, flags: GeometryFlags::OPAQUE }
+    }
+}
+
+/// One instance of a model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Placed {
+    /// Which model.
+    pub model: usize,
+    /// Object to world.
+    pub transform: Affine3A,
+    /// What hits of it report.
+    pub custom_index: u32,
+    /// Rays see it if this and their mask have a bit in common.
+    pub mask: u8,
+    /// Added to the hit-group index.
+    pub hit_group_offset: u32,
+    /// How rays treat it.
+    pub flags: InstanceFlags,
+}
+
+impl Placed {
+    /// A model at a place; everything else as it is by default.
+    pub fn new(model: usize, transform: Affine3A) -> Self {
+        Self {
+            model,
+            transform,
+            custom_index: 0,
+            mask: 0xff,
+            hit_group_offset: 0,
+            flags: InstanceFlags::empty(),
+        }
+    }
+}
+
+/// Models and where they stand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RayScene {
+    /// Each the list of its geometries.
+    pub models: Vec<Vec<Part>>,
+    /// The instances.
+    pub placed: Vec<Placed>,
+}
+
+/// A scene on the GPU.
+pub struct GpuScene {
+    /// A structure for each model.
+    pub models: Vec<Holder<AccelStructHandle>>,
+    /// The structure that rays are traced in.
+    pub tlas: Holder<AccelStructHandle>,
+    /// The buffers of every part: vertices, indices.
+    pub buffers: Vec<PartBuffers>,
+}
+
+/// What a geometry is built from.
+pub struct PartBuffers {
+    /// Holds the positions.
+    pub vertices: Holder<BufferHandle>,
+    /// Holds the indices, if there are any.
+    pub indices: Option<Holder<BufferHandle>>,
+}
+
+impl RayScene {
+    /// One geometry at its own place.
+    pub fn single(mesh: Mesh, layout: Layout) -> Self {
+        let placed = vec![Placed::new(0, Affine3A::IDENTITY)];
+        Self { models: vec![vec![Part::new(mesh, layout)]], placed }
+    }
+
+    /// The scene for the CPU.
+    pub fn reference(&self) -> Reference {
+        let models: Vec<Vec<_>> =
+            self.models.iter().map(|parts| parts.iter().map(reference_geometry).collect()).collect();
+        let instance = |placed: &Placed| reference::Instance {
+            geometries: &models[placed.model],
+            transform: double(&placed.transform),
+            custom_index: placed.custom_index,
+            mask: placed.mask,
+            flip_facing: placed.flags.contains(InstanceFlags::FLIP_FACING),
+        };
+        Reference::new(&self.placed.iter().map(instance).collect::<Vec<_>>())
+    }
+
+    /// The scene for the GPU: all models in one batch, and a TLAS of all instances.
+    pub fn upload(&self, ctx: &Context) -> Result<GpuScene> {
+        self.upload_with(ctx, BuildFlags::default(), BuildFlags::default(), 0)
+    }
+
+    /// As [`upload`](Self::upload), with flags of the models and of the TLAS, and room for more instances.
+    pub fn upload_with(
+        &self,
+        ctx: &Context,
+        models: BuildFlags,
+        top: BuildFlags,
+        capacity: u32,
+    ) -> Result<GpuScene> {
+        let (models, buffers) = upload_models(ctx, &self.models, models)?;
+        let instances = instances(&self.placed, &models);
+        let desc = TlasDesc { instances: &instances, capacity, flags: top, ..Default::default() };
+        Ok(GpuScene { tlas: ctx.create_tlas(&desc)?, models, buffers })
+    }
+}
+
+/// Instances as the library takes them.
+pub fn instances(placed: &[Placed], models: &[Holder<AccelStructHandle>]) -> Vec<TlasInstance> {
+    let instance = |placed: &Placed| TlasInstance {
+        transform: transform_rows(&placed.transform),
+        blas: *models[placed.model],
+        custom_index: placed.custom_index,
+        mask: placed.mask,
+        hit_group_offset: placed.hit_group_offset,
+        flags: placed.flags,
+    };
+    placed.iter().map(instance).collect()
+}
+
+/// The bytes of positions, as `layout` wants them.
+pub fn vertex_bytes(mesh: &Mesh, layout: Layout) -> Vec<u8> {
+    let mesh = if layout == Layout::Unshared { mesh.unshared() } else { mesh.clone() };
+    match layout {
+        Layout::Interleaved => {
+            let floats = mesh.positions.iter().flat_map(|[x, y, z]| [f32::NAN, 1e9, *x, *y, *z]);
+            bytemuck::cast_slice(&floats.collect::<Vec<f32>>()).to_vec()
+        }
+        _ => bytemuck::cast_slice(&mesh.positions).to_vec(),
+    }
+}
+
+fn upload_models(
+    ctx: &Context,
+    models: &[Vec<Part>],
+    flags: BuildFlags,
+) -> Result<(Vec<Holder<AccelStructHandle>>, Vec<PartBuffers>)> {
+    let mut buffers = Vec::new();
+    let mut geometries = Vec::new();
+    for parts in models {
+        let mut of_model = Vec::new();
+        for part in parts {
+            let (uploaded, geometry) = upload_part(ctx, part)?;
+            buffers.push(uploaded);
+            of_model.push(BlasGeometry::Triangles(geometry));
+        }
+        geometries.push(of_model);
+    }
+    let desc = |geometries| BlasDesc { geometries, flags, debug_name: "model" };
+    let descs: Vec<_> = geometries.iter().map(|of_model| desc(&of_model[..])).collect();
+    Ok((ctx.create_blas_batch(&descs)?, buffers))
+}
+
+fn upload_part(ctx: &Context, part: &Part) -> Result<(PartBuffers, Triangles)> {
+    let input = |data: &[u8], debug_name| {
+        let usage = BufferUsage::ACCEL_INPUT | BufferUsage::STORAGE;
+        ctx.create_buffer(&BufferDesc { data: Some(data), usage, debug_name, ..Default::default() })
+    };
+    let vertices = input(&vertex_bytes(&part.mesh, part.layout), "vertices")?;
+    let triangle_count = part.mesh.triangles.len() as u32;
+    let (indices, offset, format) = index_bytes(part);
+    let indices = if indices.is_empty() { None } else { Some(input(&indices, "indices")?) };
+    let (vertex_offset, vertex_stride) = if part.layout == Layout::Interleaved { (8, 20) } else { (0, 0) };
+    let vertex_count = match part.layout {
+        Layout::Unshared => triangle_count * 3,
+        _ => part.mesh.positions.len() as u32,
+    };
+    let triangles = Triangles {
+        vertex_offset,
+        vertex_stride,
+        indices: indices.as_ref().map(|buffer| Indices { buffer: **buffer, offset, format }),
+        triangle_count,
+        transform: part.transform.as_ref().map(transform_rows),
+        flags: part.flags,
+        ..Triangles::packed(*vertices, vertex_count)
+    };
+    Ok((PartBuffers { vertices, indices }, triangles))
+}
+
+fn index_bytes(part: &Part) -> (Vec<u8>, u64, IndexFormat) {
+    let indices = part.mesh.triangles.iter().flatten().copied();
+    match part.layout {
+        Layout::Unshared => (Vec::new(), 0, IndexFormat::U32),
+        Layout::Indexed32 => {
+            (bytemuck::cast_slice(&indices.collect::<Vec<u32>>()).to_vec(), 0, IndexFormat::U32)
+        }
+        Layout::Indexed16 | Layout::Interleaved => {
+            let junk = if part.layout == Layout::Interleaved { 3 } else { 0 };
+            let junk_indices = std::iter::repeat_n(u16::MAX, junk);
+            let all: Vec<u16> = junk_indices.chain(indices.map(|index| index as u16)).collect();
+            (bytemuck::cast_slice(&all).to_vec(), junk as u64 * 2, IndexFormat::U16)
+        }
+    }
+}
+
+fn reference_geometry(part: &Part) -> reference::Geometry {
+    reference::Geometry {
+        positions: part.mesh.positions.iter().map(|position| position.map(f64::from).into()).collect(),
+        triangles: part.mesh.triangles.clone(),
+        transform: part.transform.as_ref().map_or(DAffine3::IDENTITY, double),
+    }
+}
+
+fn double(transform: &Affine3A) -> DAffine3 {
+    DAffine3::from_cols_array(&transform.to_cols_array().map(f64::from))
+}

@@ -1,0 +1,250 @@
+//! Traces an array of rays on the GPU and returns a hit record for each: by ray tracing pipeline or by ray query.
+
+use bytemuck::{NoUninit, Pod, Zeroable};
+use lvk::{
+    AccelStructHandle, BufferDesc, BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle,
+    Context, Dependencies, HitGroup, Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, Result,
+    ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage,
+};
+
+use crate::rays::Ray;
+
+/// [`HitRecord::kind`] of a ray that hit nothing.
+pub const MISSED: u32 = 0;
+/// [`HitRecord::kind`] of a hit from the front of a triangle.
+pub const FRONT: u32 = 0xfe;
+/// [`HitRecord::kind`] of a hit from the back of a triangle.
+pub const BACK: u32 = 0xff;
+
+/// Ray flag: every hit counts, without any-hit shader.
+pub const OPAQUE: u32 = 1;
+/// Ray flag: the first hit found ends the ray.
+pub const TERMINATE_ON_FIRST_HIT: u32 = 4;
+/// Ray flag: hits from behind do not count.
+pub const CULL_BACK: u32 = 0x10;
+/// Ray flag: hits from the front do not count.
+pub const CULL_FRONT: u32 = 0x20;
+
+/// The file that every shader here includes.
+pub const RECORDS: (&str, &str) = ("ray_records.glsl", include_str!("../shaders/ray_records.glsl"));
+
+const THREADS: u32 = 64;
+const LAUNCH_WIDTH: u32 = 48;
+
+/// What a ray hit, as the shaders write it.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub struct HitRecord {
+    /// Multiple of the ray's direction.
+    pub t: f32,
+    /// Weights of a triangle's second and third corner.
+    pub barycentrics: [f32; 2],
+    /// [`MISSED`], [`FRONT`], [`BACK`], or what an intersection shader reported.
+    pub kind: u32,
+    /// Place in the list of instances.
+    pub instance: u32,
+    /// The instance's custom index.
+    pub custom_index: u32,
+    /// Place in the list of geometries.
+    pub geometry: u32,
+    /// Place in the list of primitives.
+    pub primitive: u32,
+}
+
+/// Who walks the tree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Method {
+    /// A ray tracing pipeline.
+    Pipeline,
+    /// Ray queries in a compute shader.
+    Query,
+}
+
+impl Method {
+    /// What the device can do, never nothing. Says on standard error what it cannot.
+    ///
+    /// # Panics
+    /// If the device can do neither.
+    pub fn available(ctx: &Context) -> Vec<Self> {
+        let caps = ctx.capabilities();
+        let pairs = [(Self::Pipeline, caps.ray_tracing_pipeline), (Self::Query, caps.ray_query)];
+        for (method, _) in pairs.iter().filter(|(_, available)| !available) {
+            eprintln!("NOT TESTED, {} has no ray {method:?}", caps.device_name);
+        }
+        let found: Vec<_> = pairs.iter().filter(|(_, available)| *available).map(|(m, _)| *m).collect();
+        assert!(!found.is_empty(), "{} cannot trace rays", caps.device_name);
+        found
+    }
+}
+
+/// How rays are traced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct How {
+    /// Cull mask.
+    pub mask: u8,
+    /// Ray flags.
+    pub flags: u32,
+    /// Only asks whether there is a hit: the record has its `kind`, nothing else.
+    pub occlusion: bool,
+}
+
+impl Default for How {
+    fn default() -> Self {
+        Self { mask: 0xff, flags: 0, occlusion: false }
+    }
+}
+
+/// The pipeline of one method.
+pub struct RayTracer {
+    ctx: Context,
+    pipeline: AnyPipeline,
+}
+
+enum AnyPipeline {
+    RayTracing(Holder<RayTracingPipelineHandle>),
+    Compute(Holder<ComputePipelineHandle>),
+}
+
+/// Rays on the GPU and room for their records.
+pub struct Job {
+    rays: Holder<BufferHandle>,
+    hits: Holder<BufferHandle>,
+    count: u32,
+}
+
+#[repr(C)]
+#[derive(Clone, Copy, NoUninit)]
+struct Push {
+    rays: u64,
+    hits: u64,
+    tlas: u32,
+    count: u32,
+    mask: u32,
+    flags: u32,
+}
+
+impl RayTracer {
+    /// Hits count as the geometry and the ray say.
+    pub fn new(ctx: &Context, method: Method) -> Result<Self> {
+        Self::with(ctx, method, false)
+    }
+
+    /// Looks through triangles with odd numbers, where they are not opaque.
+    pub fn keeping_even(ctx: &Context, method: Method) -> Result<Self> {
+        Self::with(ctx, method, true)
+    }
+
+    fn with(ctx: &Context, method: Method, keep_even: bool) -> Result<Self> {
+        let pipeline = match method {
+            Method::Pipeline => AnyPipeline::RayTracing(ray_tracing(ctx, keep_even)?),
+            Method::Query => AnyPipeline::Compute(compute(ctx, keep_even)?),
+        };
+        Ok(Self { ctx: ctx.clone(), pipeline })
+    }
+
+    /// Uploads rays.
+    pub fn job(&self, rays: &[Ray]) -> Result<Job> {
+        let buffer = |size_bytes, data, debug_name| {
+            self.ctx.create_buffer(&BufferDesc { size_bytes, data, debug_name, ..Default::default() })
+        };
+        Ok(Job {
+            rays: buffer(0, Some(bytemuck::cast_slice(rays)), "rays")?,
+            hits: buffer((rays.len() * size_of::<HitRecord>()) as u64, None, "hit records")?,
+            count: rays.len() as u32,
+        })
+    }
+
+    /// Records the trace of a job.
+    pub fn record(
+        &self,
+        cmd: &mut CommandBuffer,
+        tlas: &Holder<AccelStructHandle>,
+        job: &Job,
+        how: How,
+    ) -> Result<()> {
+        let terminate = if how.occlusion { TERMINATE_ON_FIRST_HIT } else { 0 };
+        let push = Push {
+            rays: self.ctx.buffer_address(*job.rays)?,
+            hits: self.ctx.buffer_address(*job.hits)?,
+            tlas: tlas.index(),
+            count: job.count,
+            mask: how.mask.into(),
+            flags: how.flags | terminate,
+        };
+        let writes = Dependencies { buffers: &[*job.hits], ..Default::default() };
+        match &self.pipeline {
+            AnyPipeline::RayTracing(pipeline) => {
+                cmd.bind_ray_tracing_pipeline(**pipeline)?;
+                cmd.push_constants(&push)?;
+                let size = [LAUNCH_WIDTH, job.count.div_ceil(LAUNCH_WIDTH), 1];
+                cmd.trace_rays_from(how.occlusion.into(), size, &writes)
+            }
+            AnyPipeline::Compute(pipeline) => {
+                cmd.bind_compute_pipeline(**pipeline)?;
+                cmd.push_constants(&push)?;
+                cmd.dispatch([job.count.div_ceil(THREADS), 1, 1], &writes)
+            }
+        }
+    }
+
+    /// Waits, and reads the records of a job that was submitted.
+    pub fn read(&self, job: &Job) -> Result<Vec<HitRecord>> {
+        let mut records = vec![HitRecord::zeroed(); job.count as usize];
+        self.ctx.download_buffer(*job.hits, 0, bytemuck::cast_slice_mut(&mut records))?;
+        Ok(records)
+    }
+
+    /// Traces rays, waits, and reads the records.
+    pub fn trace(&self, tlas: &Holder<AccelStructHandle>, rays: &[Ray], how: How) -> Result<Vec<HitRecord>> {
+        let job = self.job(rays)?;
+        let mut cmd = self.ctx.acquire_command_buffer()?;
+        self.record(&mut cmd, tlas, &job, how)?;
+        self.ctx.submit(cmd)?;
+        self.read(&job)
+    }
+}
+
+/// Compiles a shader that may include [`RECORDS`].
+pub fn shader(ctx: &Context, stage: ShaderStage, text: &str) -> Result<Holder<ShaderModuleHandle>> {
+    shader_with(ctx, stage, text, &[])
+}
+
+/// As [`shader`], with macros.
+pub fn shader_with(
+    ctx: &Context,
+    stage: ShaderStage,
+    text: &str,
+    defines: &[(&str, &str)],
+) -> Result<Holder<ShaderModuleHandle>> {
+    let includes = &[RECORDS];
+    let source = ShaderSource::Glsl(text);
+    ctx.create_shader_module(&ShaderModuleDesc { stage, source, includes, defines, ..Default::default() })
+}
+
+fn ray_tracing(ctx: &Context, keep_even: bool) -> Result<Holder<RayTracingPipelineHandle>> {
+    let closest = shader(ctx, ShaderStage::RayGen, include_str!("../shaders/closest.rgen.glsl"))?;
+    let occluded = shader(ctx, ShaderStage::RayGen, include_str!("../shaders/occluded.rgen.glsl"))?;
+    let missed = shader(ctx, ShaderStage::Miss, include_str!("../shaders/record.rmiss.glsl"))?;
+    let seen = shader(ctx, ShaderStage::Miss, include_str!("../shaders/unoccluded.rmiss.glsl"))?;
+    let hit = shader(ctx, ShaderStage::ClosestHit, include_str!("../shaders/record.rchit.glsl"))?;
+    let any_hit = shader(ctx, ShaderStage::AnyHit, include_str!("../shaders/keep_even.rahit.glsl"))?;
+    let any_hit = keep_even.then_some(*any_hit);
+    ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+        ray_gen: &[*closest, *occluded],
+        miss: &[*missed, *seen],
+        hit_groups: &[HitGroup { closest_hit: Some(*hit), any_hit, ..Default::default() }],
+        debug_name: "hit records by pipeline",
+        ..Default::default()
+    })
+}
+
+fn compute(ctx: &Context, keep_even: bool) -> Result<Holder<ComputePipelineHandle>> {
+    let defines: &[_] = if keep_even { &[("KEEP_EVEN", "")] } else { &[] };
+    let text = include_str!("../shaders/query.comp.glsl");
+    let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
+    ctx.create_compute_pipeline(&ComputePipelineDesc {
+        module: Some(*module),
+        debug_name: "hit records by query",
+        ..Default::default()
+    })
+}

@@ -1,0 +1,14 @@
+//! What rays hit, computed on the CPU in f64 and without the library under test.
+//!
+//! A GPU computes in f32. Where that could honestly give another answer (a ray through an edge, along a surface, past
+//! a silhouette, two surfaces at one place, a hit at the very end of the ray) the reference says so, and the caller
+//! leaves the ray out and counts it.
+
+mod candidate;
+mod sphere;
+mod triangle;
+mod world;
+
+pub use candidate::{Answer, Hit, HitIds};
+pub use sphere::Sphere;
+pub use world::{Geometry, Instance, Reference};

@@ -1,0 +1,223 @@
+//! Instances flattened to world space, with a tree over their triangles.
+
+use std::time::Duration;
+
+use lvk::glam::{DAffine3, DVec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+
+use super::candidate::{Answer, Candidate, Hit, HitIds, any, closest};
+use super::triangle::cross;
+use crate::rays::Ray;
+
+/// Fewer triangles than this need no tree.
+const TREE_TRIANGLES: usize = 16;
+/// Boxes are larger than their triangles by this share, so that near hits are found and rounding does not matter.
+const BOX_SLACK: f64 = 2e-3;
+
+/// Triangles of one geometry.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Geometry {
+    /// Positions of the vertices.
+    pub positions: Vec<DVec3>,
+    /// Three vertices for each triangle.
+    pub triangles: Vec<[u32; 3]>,
+    /// Moves the vertices into object space; mirrored ones change their front.
+    pub transform: DAffine3,
+}
+
+/// Geometries placed in the world.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instance<'a> {
+    /// What is placed.
+    pub geometries: &'a [Geometry],
+    /// Object space to world.
+    pub transform: DAffine3,
+    /// What hits of it report.
+    pub custom_index: u32,
+    /// Rays see the instance if this and their mask have a bit in common.
+    pub mask: u8,
+    /// The other side is the front.
+    pub flip_facing: bool,
+}
+
+/// The triangles of all instances, ready for rays.
+pub struct Reference {
+    triangles: Vec<Triangle>,
+    tree: Option<Bvh2>,
+}
+
+struct Triangle {
+    corners: [DVec3; 3],
+    ids: HitIds,
+    mask: u8,
+    /// World space winds the other way round than object space, or the front is flipped, but not both.
+    mirrored: bool,
+}
+
+impl Reference {
+    /// Flattens instances; their order gives the instance indices.
+    pub fn new(instances: &[Instance<'_>]) -> Self {
+        let triangles: Vec<_> = (0..).zip(instances).flat_map(|(index, item)| flatten(index, item)).collect();
+        let boxes: Vec<_> = triangles.iter().map(Triangle::bounds).collect();
+        let tree = (boxes.len() >= TREE_TRIANGLES)
+            .then(|| build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut Duration::default()));
+        Self { triangles, tree }
+    }
+
+    /// Smallest and largest corner of everything.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let corners = self.triangles.iter().flat_map(|triangle| triangle.corners);
+        let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        corners.fold(empty, |(low, high), corner| (low.min(corner), high.max(corner)))
+    }
+
+    /// What a ray hits first, among instances that have a bit of `mask`.
+    pub fn closest(&self, ray: &Ray, mask: u8) -> Answer {
+        self.closest_where(ray, mask, |_| true)
+    }
+
+    /// As [`closest`](Self::closest), as if only the hits that `accept` likes existed.
+    pub fn closest_where(&self, ray: &Ray, mask: u8, accept: impl Fn(&Hit) -> bool) -> Answer {
+        let mut candidates = self.candidates(ray, mask);
+        candidates.retain(|candidate| accept(&candidate.hit));
+        closest(candidates.iter().copied())
+    }
+
+    /// Whether a ray hits anything; `None` where that is in doubt.
+    pub fn occluded(&self, ray: &Ray, mask: u8) -> Option<bool> {
+        any(self.candidates(ray, mask).iter().copied())
+    }
+
+    fn candidates(&self, ray: &Ray, mask: u8) -> Vec<Candidate> {
+        let Some(tree) = &self.tree else { return self.candidates_of_all(ray, mask) };
+        let mut found = Vec::new();
+        let walker = obvhs::ray::Ray::new(
+            Vec3A::from_array(ray.origin),
+            Vec3A::from_array(ray.direction),
+            0.0,
+            f32::INFINITY,
+        );
+        tree.ray_traverse_anyhit(walker, |_, place| {
+            let triangle = &self.triangles[tree.primitive_indices[place] as usize];
+            found.extend(triangle.candidate(ray, mask));
+        });
+        found
+    }
+
+    fn candidates_of_all(&self, ray: &Ray, mask: u8) -> Vec<Candidate> {
+        self.triangles.iter().filter_map(|triangle| triangle.candidate(ray, mask)).collect()
+    }
+}
+
+impl Triangle {
+    fn candidate(&self, ray: &Ray, mask: u8) -> Option<Candidate> {
+        if self.mask & mask == 0 {
+            return None;
+        }
+        let (origin, direction) = (ray.origin.map(f64::from).into(), ray.direction.map(f64::from).into());
+        let crossing = cross(origin, direction, &self.corners)?;
+        let range = (f64::from(ray.t_min), f64::from(ray.t_max));
+        Candidate::of_triangle(&crossing, self.ids, self.mirrored, range)
+    }
+
+    fn bounds(&self) -> Aabb {
+        let [a, b, c] = self.corners;
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let size = (high - low).max_element() + low.abs().max(high.abs()).max_element() * 1e-3;
+        let slack = DVec3::splat(size * BOX_SLACK);
+        Aabb::new((low - slack).as_vec3a(), (high + slack).as_vec3a())
+    }
+}
+
+fn flatten<'a>(index: u32, instance: &'a Instance<'_>) -> impl Iterator<Item = Triangle> + 'a {
+    let mirrored = (instance.transform.matrix3.determinant() < 0.0) != instance.flip_facing;
+    (0..).zip(instance.geometries).flat_map(move |(geometry, shape)| {
+        let transform = instance.transform * shape.transform;
+        (0..).zip(&shape.triangles).map(move |(primitive, triangle)| Triangle {
+            corners: triangle.map(|vertex| transform.transform_point3(shape.positions[vertex as usize])),
+            ids: HitIds { instance: index, custom_index: instance.custom_index, geometry, primitive },
+            mask: instance.mask,
+            mirrored,
+        })
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use lvk::glam::Vec3;
+
+    use super::*;
+    use crate::random::Random;
+    use crate::rays::random_rays;
+
+    fn soup(seed: u64, count: u32) -> Geometry {
+        let mut random = Random::new(seed);
+        let corner = |random: &mut Random, center: Vec3| {
+            (center + random.direction() * random.between(0.05, 0.6)).as_dvec3()
+        };
+        let mut positions = Vec::new();
+        for _ in 0..count {
+            let center = random.point(Vec3::NEG_ONE, Vec3::ONE);
+            positions.extend([(); 3].map(|()| corner(&mut random, center)));
+        }
+        let triangles = (0..count).map(|index| [index * 3, index * 3 + 1, index * 3 + 2]).collect();
+        Geometry { positions, triangles, transform: DAffine3::IDENTITY }
+    }
+
+    fn instance(geometries: &[Geometry]) -> Instance<'_> {
+        Instance {
+            geometries,
+            transform: DAffine3::IDENTITY,
+            custom_index: 0,
+            mask: 0xff,
+            flip_facing: false,
+        }
+    }
+
+    #[test]
+    fn the_tree_finds_what_trying_all_triangles_finds() {
+        for seed in 0..8 {
+            let geometry = [soup(seed, 20 + 60 * seed as u32)];
+            let reference = Reference::new(&[instance(&geometry)]);
+            assert!(reference.tree.is_some());
+            let mut hits = 0;
+            for ray in random_rays(seed, 500, Vec3::NEG_ONE, Vec3::ONE) {
+                let by_tree = reference.closest(&ray, 0xff);
+                assert_eq!(by_tree, closest(reference.candidates_of_all(&ray, 0xff).iter().copied()));
+                assert_eq!(
+                    reference.occluded(&ray, 0xff),
+                    any(reference.candidates_of_all(&ray, 0xff).iter().copied())
+                );
+                hits += usize::from(by_tree.hit.is_some());
+            }
+            assert!(hits > 50, "{hits} hits");
+        }
+    }
+
+    #[test]
+    fn instances_keep_their_numbers_masks_and_fronts() {
+        let square = [Geometry {
+            positions: vec![DVec3::NEG_ONE, DVec3::new(3.0, -1.0, -1.0), DVec3::new(-1.0, 3.0, -1.0)],
+            triangles: vec![[0, 1, 2]],
+            transform: DAffine3::from_translation(DVec3::Z),
+        }];
+        let near = Instance { custom_index: 7, mask: 1, ..instance(&square) };
+        let far = Instance {
+            transform: DAffine3::from_translation(DVec3::Z) * DAffine3::from_scale(DVec3::new(1.0, 1.0, -1.0)),
+            mask: 2,
+            ..instance(&square)
+        };
+        let reference = Reference::new(&[near, far]);
+        let ray = Ray::new(Vec3::new(0.1, 0.1, -2.0), Vec3::Z);
+        let first = reference.closest(&ray, 0xff).hit.unwrap();
+        assert_eq!((first.t, first.ids.instance, first.ids.custom_index, first.is_front), (2.0, 0, 7, false));
+        let second = reference.closest(&ray, 2).hit.unwrap();
+        assert_eq!((second.t, second.ids.instance, second.is_front), (3.0, 1, true));
+        assert_eq!(reference.closest(&ray, 4).hit, None);
+        let hidden = reference.closest_where(&ray, 0xff, |hit| hit.ids.instance == 1);
+        assert_eq!(hidden.hit, Some(second));
+    }
+}

@@ -1,0 +1,234 @@
+//! Structures that change: rebuilt, refitted, in the same command buffer and with frames in flight. No test places a
+//! barrier or waits before its last line.
+
+use bytemuck::NoUninit;
+use lvk::glam::{Affine3A, Vec3};
+use lvk::{
+    BufferHandle, BuildFlags, BuildMode, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context,
+    Dependencies, Holder, Result, ShaderStage,
+};
+use lvk_tests::agreement::Agreement;
+use lvk_tests::device;
+use lvk_tests::meshes::Mesh;
+use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances, vertex_bytes};
+use lvk_tests::ray_tracer::{How, Method, RayTracer, shader};
+use lvk_tests::rays::{Ray, random_rays};
+
+const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
+
+/// Moves every vertex by its own amount, which [`bent`] repeats.
+const BEND: &str = r"
+    layout(local_size_x = 64) in;
+    layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Positions { vec3 at[]; };
+    layout(push_constant, scalar) uniform Push { Positions positions; uint count; float amount; };
+    void main() {
+        uint index = gl_GlobalInvocationID.x;
+        if (index < count) {
+            vec3 p = positions.at[index];
+            positions.at[index] = p + vec3(amount * p.y, amount, 0.5 * amount * p.x);
+        }
+    }";
+
+#[repr(C)]
+#[derive(Clone, Copy, NoUninit)]
+struct BendPush {
+    positions: u64,
+    count: u32,
+    amount: f32,
+}
+
+fn bent(mesh: &Mesh, amount: f32) -> Mesh {
+    let positions =
+        mesh.positions.iter().map(|[x, y, z]| [x + amount * y, y + amount, z + 0.5 * amount * x]).collect();
+    Mesh { positions, triangles: mesh.triangles.clone() }
+}
+
+struct Bender {
+    ctx: Context,
+    pipeline: Holder<ComputePipelineHandle>,
+}
+
+impl Bender {
+    fn new(ctx: &Context) -> Result<Self> {
+        let module = shader(ctx, ShaderStage::Compute, BEND)?;
+        let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
+        Ok(Self { ctx: ctx.clone(), pipeline: ctx.create_compute_pipeline(&desc)? })
+    }
+
+    fn record(&self, cmd: &mut CommandBuffer, buffer: BufferHandle, mesh: &Mesh, amount: f32) -> Result<()> {
+        let count = mesh.positions.len() as u32;
+        cmd.bind_compute_pipeline(*self.pipeline)?;
+        cmd.push_constants(&BendPush { positions: self.ctx.buffer_address(buffer)?, count, amount })?;
+        let writes = Dependencies { buffers: &[buffer], ..Default::default() };
+        cmd.dispatch([count.div_ceil(64), 1, 1], &writes)
+    }
+}
+
+fn rays() -> Vec<Ray> {
+    random_rays(31, 1_200, Vec3::splat(-1.5), Vec3::splat(1.5))
+}
+
+fn check(what: &str, tracer: &RayTracer, gpu: &GpuScene, scene: &RayScene) -> Result<()> {
+    let rays = rays();
+    let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
+    agree(what, &rays, &records, scene);
+    Ok(())
+}
+
+fn agree(what: &str, rays: &[Ray], records: &[lvk_tests::ray_tracer::HitRecord], scene: &RayScene) {
+    let reference = scene.reference();
+    Agreement::of_triangles(rays, records, |ray| reference.closest(ray, 0xff)).assert(what);
+}
+
+/// `count` small models on a spiral that `turn` turns.
+fn spiral(count: u32, turn: f32) -> RayScene {
+    let place = |index: u32| {
+        let angle = index as f32 * 0.9 + turn;
+        let (x, z) = (angle.cos(), angle.sin());
+        let to = Vec3::new(x, index as f32 * 0.2 - 1.0, z);
+        let transform = Affine3A::from_translation(to) * Affine3A::from_scale(Vec3::new(0.6, 0.4, 0.5));
+        Placed { custom_index: 100 + index, ..Placed::new(index as usize % 2, transform) }
+    };
+    let models = [Mesh::sphere(7), Mesh::torus(7)];
+    let models = models.map(|mesh| vec![Part::new(mesh, Layout::Indexed16)]).to_vec();
+    RayScene { models, placed: (0..count).map(place).collect() }
+}
+
+fn deformable() -> RayScene {
+    RayScene::single(Mesh::torus(10), Layout::Indexed16)
+}
+
+fn update(ctx: &Context, gpu: &GpuScene, scene: &RayScene, mode: BuildMode) -> Result<()> {
+    let mut cmd = ctx.acquire_command_buffer()?;
+    cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
+    ctx.submit(cmd)?;
+    Ok(())
+}
+
+#[test]
+fn a_rebuild_takes_more_and_fewer_instances() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    for method in Method::available(&ctx) {
+        let tracer = RayTracer::new(&ctx, method)?;
+        let gpu = spiral(5, 0.0).upload_with(&ctx, BuildFlags::default(), BuildFlags::FAST_BUILD, 12)?;
+        for (count, turn) in [(5, 0.0), (12, 0.5), (2, 1.0), (9, 1.5)] {
+            let scene = spiral(count, turn);
+            update(&ctx, &gpu, &scene, BuildMode::Rebuild)?;
+            check(&format!("{count} instances by {method:?}"), &tracer, &gpu, &scene)?;
+        }
+        let none = RayScene { placed: Vec::new(), ..spiral(2, 0.0) };
+        update(&ctx, &gpu, &none, BuildMode::Rebuild)?;
+        let records = tracer.trace(&gpu.tlas, &rays(), How::default())?;
+        assert!(records.iter().all(|record| record.kind == 0), "there is nothing left to hit");
+    }
+    Ok(())
+}
+
+#[test]
+fn a_refit_moves_instances() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    for method in Method::available(&ctx) {
+        let tracer = RayTracer::new(&ctx, method)?;
+        let gpu = spiral(8, 0.0).upload_with(&ctx, BuildFlags::default(), UPDATABLE, 0)?;
+        for turn in [0.4, 1.9] {
+            let scene = spiral(8, turn);
+            update(&ctx, &gpu, &scene, BuildMode::Refit)?;
+            check(&format!("turned by {turn}, {method:?}"), &tracer, &gpu, &scene)?;
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_structure_is_refitted_to_vertices_written_by_a_dispatch() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let bender = Bender::new(&ctx)?;
+    for method in Method::available(&ctx) {
+        let tracer = RayTracer::new(&ctx, method)?;
+        let mut scene = deformable();
+        let gpu = scene.upload_with(&ctx, UPDATABLE, UPDATABLE, 0)?;
+        let rays = rays();
+        let job = tracer.job(&rays)?;
+        for (amount, mode) in [(0.3, BuildMode::Refit), (-0.5, BuildMode::Refit), (0.4, BuildMode::Rebuild)] {
+            let mesh = &scene.models[0][0].mesh;
+            let mut cmd = ctx.acquire_command_buffer()?;
+            bender.record(&mut cmd, *gpu.buffers[0].vertices, mesh, amount)?;
+            cmd.build_blas(&[*gpu.models[0]], mode)?;
+            cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
+            tracer.record(&mut cmd, &gpu.tlas, &job, How::default())?;
+            ctx.submit(cmd)?;
+            scene.models[0][0].mesh = bent(mesh, amount);
+            agree(&format!("bent by {amount}, {method:?}"), &rays, &tracer.read(&job)?, &scene);
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn a_structure_is_rebuilt_from_uploaded_vertices() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    for method in Method::available(&ctx) {
+        let tracer = RayTracer::new(&ctx, method)?;
+        let mut scene = deformable();
+        let gpu = scene.upload(&ctx)?;
+        check(&format!("before, by {method:?}"), &tracer, &gpu, &scene)?;
+        scene.models[0][0].mesh = bent(&scene.models[0][0].mesh, 0.6);
+        let bytes = vertex_bytes(&scene.models[0][0].mesh, Layout::Indexed16);
+        ctx.upload_buffer(*gpu.buffers[0].vertices, 0, &bytes)?;
+        let mut cmd = ctx.acquire_command_buffer()?;
+        cmd.build_blas(&[*gpu.models[0]], BuildMode::Rebuild)?;
+        cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
+        ctx.submit(cmd)?;
+        check(&format!("after, by {method:?}"), &tracer, &gpu, &scene)?;
+    }
+    Ok(())
+}
+
+/// One TLAS, one deforming BLAS and one vertex buffer for all frames, none of which waits for the frame before.
+#[test]
+fn every_frame_in_flight_sees_its_own_state() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let bender = Bender::new(&ctx)?;
+    for method in Method::available(&ctx) {
+        let tracer = RayTracer::new(&ctx, method)?;
+        let mut scene = deformable();
+        let gpu = scene.upload_with(&ctx, UPDATABLE, UPDATABLE, 0)?;
+        let rays = rays();
+        let mut frames = Vec::new();
+        for number in 0..6 {
+            ctx.next_frame()?;
+            let (amount, mode) = if number % 3 == 2 { (-0.35, BuildMode::Rebuild) } else { (0.2, BuildMode::Refit) };
+            let job = tracer.job(&rays)?;
+            let mut cmd = ctx.acquire_command_buffer()?;
+            bender.record(&mut cmd, *gpu.buffers[0].vertices, &scene.models[0][0].mesh, amount)?;
+            cmd.build_blas(&[*gpu.models[0]], mode)?;
+            scene.models[0][0].mesh = bent(&scene.models[0][0].mesh, amount);
+            scene.placed[0].transform = Affine3A::from_rotation_z(number as f32);
+            scene.placed[0].custom_index = number;
+            cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
+            tracer.record(&mut cmd, &gpu.tlas, &job, How::default())?;
+            ctx.submit(cmd)?;
+            frames.push((job, scene.clone()));
+        }
+        for (number, (job, scene)) in frames.iter().enumerate() {
+            agree(&format!("frame {number} by {method:?}"), &rays, &tracer.read(job)?, scene);
+        }
+    }
+    Ok(())
+}
+
+/// Structures that the top level still shows outlive their holders.
+#[test]
+fn a_destroyed_model_is_shown_until_the_next_update() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    for method in Method::available(&ctx) {
+        let tracer = RayTracer::new(&ctx, method)?;
+        let scene = spiral(6, 0.2);
+        let mut gpu = scene.upload(&ctx)?;
+        gpu.models.clear();
+        gpu.buffers.clear();
+        ctx.wait_idle()?;
+        check(&format!("destroyed models by {method:?}"), &tracer, &gpu, &scene)?;
+    }
+    Ok(())
+}
