@@ -9,7 +9,7 @@ void main() {
         return;
     }
     Ray ray = rays.at[index];
-    uint shadow = flags | LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT | LVK_RAY_FLAG_SKIP_CLOSEST_HIT_SHADER;
+    uint shadow = flags | LVK_RAY_FLAG_SKIP_CLOSEST_HIT_SHADER;
     occluded = 1;
     traceRayEXT(kTLAS[tlas], shadow, mask, 0, 0, 1, ray.origin, ray.tMin, ray.direction, ray.tMax, 1);
     HitRecord record = kNoHit;

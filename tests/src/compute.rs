@@ -2,8 +2,8 @@
 #![expect(clippy::expect_used, reason = "a test whose set-up fails has failed")]
 
 use lvk::{
-    BufferDesc, BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies,
-    Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage,
+    BufferDesc, BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context,
+    Dependencies, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage,
 };
 
 /// A module of GLSL text that must compile.
@@ -22,7 +22,8 @@ pub fn compute_pipeline(ctx: &Context, text: &str) -> Holder<ComputePipelineHand
 
 /// A buffer in device memory that holds `words`.
 pub fn words_buffer(ctx: &Context, words: &[u32]) -> Holder<BufferHandle> {
-    let desc = BufferDesc { data: Some(bytemuck::cast_slice(words)), debug_name: "words", ..Default::default() };
+    let desc =
+        BufferDesc { data: Some(bytemuck::cast_slice(words)), debug_name: "words", ..Default::default() };
     ctx.create_buffer(&desc).expect("a small buffer can be made")
 }
 

@@ -70,7 +70,11 @@ pub fn device_with(adjust: impl FnOnce(&mut ContextDesc<'_>)) -> Option<TestDevi
     let mut desc = ContextDesc {
         application_name: "lvk tests",
         vulkan_library: library,
-        validation: if is_set("LVK_TEST_GPU_ASSISTED") { Validation::GpuAssisted } else { Validation::Standard },
+        validation: if is_set("LVK_TEST_GPU_ASSISTED") {
+            Validation::GpuAssisted
+        } else {
+            Validation::Standard
+        },
         validation_sink: Some(sink.clone()),
         ..Default::default()
     };

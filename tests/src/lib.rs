@@ -1,11 +1,13 @@
 //! Harness of the tests: a device with silent validation, or a loud failure.
 
 pub mod agreement;
+pub mod child;
 pub mod compute;
 pub mod device;
 pub mod meshes;
 pub mod noise;
 pub mod random;
+pub mod raster;
 pub mod ray_scene;
 pub mod ray_tracer;
 pub mod rays;

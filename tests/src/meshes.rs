@@ -58,7 +58,8 @@ impl Mesh {
     /// Every triangle with three vertices of its own.
     pub fn unshared(&self) -> Self {
         let positions = self.triangles.iter().flatten().map(|index| self.positions[*index as usize]);
-        let triangles = (0..self.triangles.len() as u32).map(|index| [index * 3, index * 3 + 1, index * 3 + 2]);
+        let triangles =
+            (0..self.triangles.len() as u32).map(|index| [index * 3, index * 3 + 1, index * 3 + 2]);
         Self { positions: positions.collect(), triangles: triangles.collect() }
     }
 

@@ -25,8 +25,11 @@ pub const CULL_BACK: u32 = 0x10;
 /// Ray flag: hits from the front do not count.
 pub const CULL_FRONT: u32 = 0x20;
 
-/// The file that every shader here includes.
-pub const RECORDS: (&str, &str) = ("ray_records.glsl", include_str!("../shaders/ray_records.glsl"));
+/// The files that shaders may include; `ray_records.glsl` has the push constants.
+pub const INCLUDES: [(&str, &str); 2] = [
+    ("ray_records.glsl", include_str!("../shaders/ray_records.glsl")),
+    ("sphere_object.glsl", include_str!("../shaders/sphere_object.glsl")),
+];
 
 const THREADS: u32 = 64;
 const LAUNCH_WIDTH: u32 = 48;
@@ -84,13 +87,20 @@ pub struct How {
     pub mask: u8,
     /// Ray flags.
     pub flags: u32,
-    /// Only asks whether there is a hit: the record has its `kind`, nothing else.
-    pub occlusion: bool,
+    /// Place of the ray generation shader; queries have none.
+    pub ray_gen: u32,
+}
+
+impl How {
+    /// Asks whether there is any hit: of the record only `kind` means something.
+    pub fn shadows() -> Self {
+        Self { flags: TERMINATE_ON_FIRST_HIT, ray_gen: 1, ..Self::default() }
+    }
 }
 
 impl Default for How {
     fn default() -> Self {
-        Self { mask: 0xff, flags: 0, occlusion: false }
+        Self { mask: 0xff, flags: 0, ray_gen: 0 }
     }
 }
 
@@ -134,6 +144,17 @@ impl RayTracer {
         Self::with(ctx, method, true)
     }
 
+    /// Traces with a pipeline of the caller's own, whose ray generation shaders take the push constants of
+    /// `ray_records.glsl`.
+    pub fn of_pipeline(ctx: &Context, pipeline: Holder<RayTracingPipelineHandle>) -> Self {
+        Self { ctx: ctx.clone(), pipeline: AnyPipeline::RayTracing(pipeline) }
+    }
+
+    /// As [`of_pipeline`](Self::of_pipeline), with a compute shader of 64 threads that traces by query.
+    pub fn of_query(ctx: &Context, pipeline: Holder<ComputePipelineHandle>) -> Self {
+        Self { ctx: ctx.clone(), pipeline: AnyPipeline::Compute(pipeline) }
+    }
+
     fn with(ctx: &Context, method: Method, keep_even: bool) -> Result<Self> {
         let pipeline = match method {
             Method::Pipeline => AnyPipeline::RayTracing(ray_tracing(ctx, keep_even)?),
@@ -162,14 +183,13 @@ impl RayTracer {
         job: &Job,
         how: How,
     ) -> Result<()> {
-        let terminate = if how.occlusion { TERMINATE_ON_FIRST_HIT } else { 0 };
         let push = Push {
             rays: self.ctx.buffer_address(*job.rays)?,
             hits: self.ctx.buffer_address(*job.hits)?,
             tlas: tlas.index(),
             count: job.count,
             mask: how.mask.into(),
-            flags: how.flags | terminate,
+            flags: how.flags,
         };
         let writes = Dependencies { buffers: &[*job.hits], ..Default::default() };
         match &self.pipeline {
@@ -177,7 +197,7 @@ impl RayTracer {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
                 cmd.push_constants(&push)?;
                 let size = [LAUNCH_WIDTH, job.count.div_ceil(LAUNCH_WIDTH), 1];
-                cmd.trace_rays_from(how.occlusion.into(), size, &writes)
+                cmd.trace_rays_from(how.ray_gen, size, &writes)
             }
             AnyPipeline::Compute(pipeline) => {
                 cmd.bind_compute_pipeline(**pipeline)?;
@@ -204,7 +224,7 @@ impl RayTracer {
     }
 }
 
-/// Compiles a shader that may include [`RECORDS`].
+/// Compiles a shader that may include [`INCLUDES`].
 pub fn shader(ctx: &Context, stage: ShaderStage, text: &str) -> Result<Holder<ShaderModuleHandle>> {
     shader_with(ctx, stage, text, &[])
 }
@@ -216,7 +236,7 @@ pub fn shader_with(
     text: &str,
     defines: &[(&str, &str)],
 ) -> Result<Holder<ShaderModuleHandle>> {
-    let includes = &[RECORDS];
+    let includes = &INCLUDES;
     let source = ShaderSource::Glsl(text);
     ctx.create_shader_module(&ShaderModuleDesc { stage, source, includes, defines, ..Default::default() })
 }

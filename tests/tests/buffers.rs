@@ -25,7 +25,9 @@ fn ranges_of_any_size_round_trip_in_every_memory() {
     for memory in MEMORY {
         let mut expected = noise(1, 1003);
         let buffer = buffer(&ctx, memory, &expected);
-        for (step, (offset, size)) in [(0, 1), (1002, 1), (3, 77), (40, 501), (998, 5)].into_iter().enumerate() {
+        for (step, (offset, size)) in
+            [(0, 1), (1002, 1), (3, 77), (40, 501), (998, 5)].into_iter().enumerate()
+        {
             let bytes = noise(2 + step as u32, size);
             ctx.upload_buffer(*buffer, offset as u64, &bytes).unwrap();
             expected[offset..offset + size].copy_from_slice(&bytes);
@@ -116,13 +118,11 @@ fn copies_and_fills_in_one_command_buffer_see_each_other() {
 #[test]
 fn shaders_follow_addresses_of_addresses() {
     let Some(ctx) = device() else { return };
-    let rows: Vec<_> = (0..3_u32).map(|row| words_buffer(&ctx, &[row, 10 + row, 20 + row, 30 + row])).collect();
+    let rows: Vec<_> =
+        (0..3_u32).map(|row| words_buffer(&ctx, &[row, 10 + row, 20 + row, 30 + row])).collect();
     let skipped = [0, 1, 2];
-    let table: Vec<u64> = rows
-        .iter()
-        .zip(skipped)
-        .map(|(row, words)| ctx.buffer_address(**row).unwrap() + 4 * words)
-        .collect();
+    let table: Vec<u64> =
+        rows.iter().zip(skipped).map(|(row, words)| ctx.buffer_address(**row).unwrap() + 4 * words).collect();
     let table = buffer(&ctx, MemoryKind::HostVisible, bytemuck::cast_slice(&table));
     let result = words_buffer(&ctx, &[99; 6]);
     let pipeline = compute_pipeline(
@@ -173,7 +173,9 @@ fn impossible_sizes_are_typed_errors() {
     let limit = ctx.capabilities().limits.max_buffer_bytes;
     for size in [limit + 1, u64::MAX] {
         match sized(size, None) {
-            Error::LimitExceeded { requested, limit: found, .. } => assert_eq!((requested, found), (size, limit)),
+            Error::LimitExceeded { requested, limit: found, .. } => {
+                assert_eq!((requested, found), (size, limit))
+            }
             other => unreachable!("{other}"),
         }
     }

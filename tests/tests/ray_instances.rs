@@ -27,7 +27,11 @@ fn models() -> Vec<Vec<Part>> {
     vec![
         vec![
             Part::new(Mesh::sphere(8), Layout::Unshared),
-            moved(Mesh::cube_grid(2), Layout::Indexed16, Affine3A::from_translation(Vec3::new(0.0, 2.0, 0.0))),
+            moved(
+                Mesh::cube_grid(2),
+                Layout::Indexed16,
+                Affine3A::from_translation(Vec3::new(0.0, 2.0, 0.0)),
+            ),
             moved(Mesh::torus(7), Layout::Interleaved, turned(0.7, Vec3::new(1.0, 0.5, 1.5), Vec3::X)),
             moved(Mesh::terrain(6), Layout::Indexed32, turned(2.0, Vec3::new(1.5, -1.0, 1.0), Vec3::NEG_Y)),
         ],
@@ -90,7 +94,7 @@ fn masks_choose_instances() -> Result<()> {
             let what = format!("mask {mask:#b} by {method:?}");
             let records = tracer.trace(&gpu.tlas, &rays, How { mask, ..How::default() })?;
             Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, mask)).assert(&what);
-            let shadows = tracer.trace(&gpu.tlas, &rays, How { mask, occlusion: true, ..How::default() })?;
+            let shadows = tracer.trace(&gpu.tlas, &rays, How { mask, ..How::shadows() })?;
             Agreement::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, mask)).assert(&what);
         }
         let none = tracer.trace(&gpu.tlas, &rays, How { mask: 0b1111_0000, ..How::default() })?;
@@ -129,10 +133,8 @@ fn an_any_hit_shader_looks_through_what_is_not_opaque() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let see_through = |mesh| Part { flags: GeometryFlags::empty(), ..Part::new(mesh, Layout::Indexed16) };
     let solid = |mesh| Part::new(mesh, Layout::Indexed16);
-    let models = vec![
-        vec![see_through(Mesh::sphere(10)), solid(Mesh::cube_grid(1))],
-        vec![solid(Mesh::torus(9))],
-    ];
+    let models =
+        vec![vec![see_through(Mesh::sphere(10)), solid(Mesh::cube_grid(1))], vec![solid(Mesh::torus(9))]];
     let at = |x: f32, model, flags| {
         let transform = Affine3A::from_translation(Vec3::new(x, 0.0, 0.0));
         Placed { flags, ..Placed::new(model, transform) }
@@ -153,7 +155,7 @@ fn an_any_hit_shader_looks_through_what_is_not_opaque() -> Result<()> {
         let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
         let answer = |ray: &Ray| {
             reference.closest_where(ray, 0xff, |hit| {
-                hit.ids.primitive % 2 == 0 || !has_holes(hit.ids.instance, hit.ids.geometry)
+                hit.ids.primitive & 1 == 0 || !has_holes(hit.ids.instance, hit.ids.geometry)
             })
         };
         Agreement::of_triangles(&rays, &records, answer).assert(&format!("holes by {method:?}"));

@@ -35,7 +35,7 @@ fn check(name: &str, scene: &RayScene) -> Outcome {
         let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
         Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
             .assert(&format!("{name} by {method:?}"));
-        let shadows = tracer.trace(&gpu.tlas, &rays, How { occlusion: true, ..How::default() })?;
+        let shadows = tracer.trace(&gpu.tlas, &rays, How::shadows())?;
         Agreement::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, 0xff))
             .assert(&format!("{name}, shadows by {method:?}"));
     }
@@ -126,7 +126,8 @@ fn a_hit_lies_between_the_ends_of_a_ray() -> Outcome {
     let ray = Ray::new(Vec3::new(1.0, 2.0, -2.0), Vec3::Z * 0.5);
     let (before, after) = (4.0_f32.next_down(), 4.0_f32.next_up());
     let expected = [(0.0, 10.0, true), (before, after, true), (after, 10.0, false), (0.0, before, false)];
-    let rays: Vec<_> = expected.iter().map(|(t_min, t_max, _)| Ray { t_min: *t_min, t_max: *t_max, ..ray }).collect();
+    let rays: Vec<_> =
+        expected.iter().map(|(t_min, t_max, _)| Ray { t_min: *t_min, t_max: *t_max, ..ray }).collect();
     for method in Method::available(&ctx) {
         let records = RayTracer::new(&ctx, method)?.trace(&gpu.tlas, &rays, How::default())?;
         let hits: Vec<_> = records.iter().map(|record| record.kind != 0).collect();

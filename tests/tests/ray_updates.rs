@@ -197,7 +197,8 @@ fn every_frame_in_flight_sees_its_own_state() -> Result<()> {
         let mut frames = Vec::new();
         for number in 0..6 {
             ctx.next_frame()?;
-            let (amount, mode) = if number % 3 == 2 { (-0.35, BuildMode::Rebuild) } else { (0.2, BuildMode::Refit) };
+            let (amount, mode) =
+                if number % 3 == 2 { (-0.35, BuildMode::Rebuild) } else { (0.2, BuildMode::Refit) };
             let job = tracer.job(&rays)?;
             let mut cmd = ctx.acquire_command_buffer()?;
             bender.record(&mut cmd, *gpu.buffers[0].vertices, &scene.models[0][0].mesh, amount)?;
@@ -229,6 +230,39 @@ fn a_destroyed_model_is_shown_until_the_next_update() -> Result<()> {
         gpu.buffers.clear();
         ctx.wait_idle()?;
         check(&format!("destroyed models by {method:?}"), &tracer, &gpu, &scene)?;
+    }
+    Ok(())
+}
+
+/// What a dropped command buffer would have shown is not shown, and what is shown stays alive.
+#[test]
+fn a_command_buffer_given_up_changes_nothing() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    for method in Method::available(&ctx) {
+        let tracer = RayTracer::new(&ctx, method)?;
+        let scene = deformable();
+        let mut gpu = scene.upload_with(&ctx, BuildFlags::default(), UPDATABLE, 4)?;
+        ctx.wait_idle()?;
+        let other = spiral(3, 0.0);
+        let other_gpu = other.upload(&ctx)?;
+        let mut cmd = ctx.acquire_command_buffer()?;
+        let others = instances(&other.placed, &other_gpu.models);
+        cmd.update_tlas(*gpu.tlas, &others, BuildMode::Rebuild)?;
+        assert!(
+            cmd.update_tlas(*gpu.tlas, &others[..1], BuildMode::Refit).is_err(),
+            "three were recorded before"
+        );
+        cmd.update_tlas(*gpu.tlas, &others, BuildMode::Refit)?;
+        drop(cmd);
+        let one = instances(&scene.placed, &gpu.models);
+        let mut cmd = ctx.acquire_command_buffer()?;
+        assert!(cmd.update_tlas(*gpu.tlas, &others, BuildMode::Refit).is_err(), "three were never built");
+        cmd.update_tlas(*gpu.tlas, &one, BuildMode::Refit)?;
+        drop(cmd);
+        gpu.models.clear();
+        ctx.wait_idle()?;
+        let _takes_its_place = scene.upload(&ctx)?;
+        check(&format!("given up, {method:?}"), &tracer, &gpu, &scene)?;
     }
     Ok(())
 }

@@ -73,7 +73,10 @@ fn every_format_round_trips_or_is_unsupported() {
         }
     }
     let everywhere = |format: &&Format| {
-        !matches!(format, Format::D24UnormS8 | Format::D32FloatS8 | Format::Rgb10A2Unorm | Format::Rg11B10Float)
+        !matches!(
+            format,
+            Format::D24UnormS8 | Format::D32FloatS8 | Format::Rgb10A2Unorm | Format::Rg11B10Float
+        )
     };
     let surprising: Vec<_> = unsupported.iter().filter(everywhere).collect();
     assert!(surprising.is_empty(), "Vulkan promises to sample {surprising:?}");
@@ -87,7 +90,10 @@ fn every_usage_of_every_format_works_or_is_unsupported() {
             for kind in KINDS {
                 let desc = TextureDesc { format, usage, kind, extent: [8, 8], mips: 0, ..Default::default() };
                 let made = ctx.create_texture(&desc);
-                assert!(matches!(made, Ok(_) | Err(Error::Unsupported { .. })), "{format:?} {usage:?}: {made:?}");
+                assert!(
+                    matches!(made, Ok(_) | Err(Error::Unsupported { .. })),
+                    "{format:?} {usage:?}: {made:?}"
+                );
             }
         }
     }
@@ -101,7 +107,8 @@ fn every_mip_layer_and_region_is_a_place_of_its_own() {
     for kind in KINDS {
         let extent = if kind == TextureKind::Cube { [13, 13] } else { [13, 7] };
         let texture = texture(&ctx, &TextureDesc { kind, extent, mips: 0, ..Default::default() });
-        let places: Vec<_> = (0..kind.layers()).flat_map(|layer| (0..4).map(move |mip| (mip, layer))).collect();
+        let places: Vec<_> =
+            (0..kind.layers()).flat_map(|layer| (0..4).map(move |mip| (mip, layer))).collect();
         let size = |mip: u32| extent.map(|side| (side >> mip).max(1) as usize);
         let bytes_of = |seed: u32, mip| noise(seed, 4 * size(mip)[0] * size(mip)[1]);
         for (seed, (mip, layer)) in (0..).zip(&places) {
@@ -135,7 +142,11 @@ fn data_fills_mip_zero_of_every_layer() {
         let desc = TextureDesc { kind, extent: [4, 4], mips: 2, data: Some(&data), ..Default::default() };
         let texture = texture(&ctx, &desc);
         for (layer, expected) in (0..).zip(data.chunks(layer_bytes)) {
-            assert_eq!(ctx.download_texture(*texture, &whole(0, layer)).unwrap(), expected, "{kind:?} {layer}");
+            assert_eq!(
+                ctx.download_texture(*texture, &whole(0, layer)).unwrap(),
+                expected,
+                "{kind:?} {layer}"
+            );
         }
     }
 }
@@ -177,7 +188,10 @@ fn generated_mips_are_the_means_of_four_texels() {
                 let found = download_floats(&ctx, *texture, &whole(mip, layer));
                 assert_eq!(found.len(), expected.len());
                 for (found, expected) in found.iter().zip(&expected) {
-                    assert!((found - expected).abs() < 2e-2, "{kind:?} {mip} {layer}: {found} not {expected}");
+                    assert!(
+                        (found - expected).abs() < 2e-2,
+                        "{kind:?} {mip} {layer}: {found} not {expected}"
+                    );
                 }
             }
         }
@@ -208,12 +222,16 @@ fn shaders_see_every_kind_at_its_index() {
     let layered = |kind: TextureKind| {
         let values: Vec<f32> = (0..kind.layers()).flat_map(|layer| [10.0 + layer as f32; 4]).collect();
         let data = Some(bytemuck::cast_slice(&values));
-        texture(&ctx, &TextureDesc { kind, format: Format::R32Float, extent: [2, 2], data, ..Default::default() })
+        texture(
+            &ctx,
+            &TextureDesc { kind, format: Format::R32Float, extent: [2, 2], data, ..Default::default() },
+        )
     };
     let [plane, array, cube] = KINDS.map(layered);
     let none = Dependencies::default();
     let run = |expression: &str, texture: &Holder<TextureHandle>, count| {
-        let values = Evaluator::new(&ctx, expression).run(&ctx, [texture.index(), sampler.index(), 0], count, &none);
+        let values =
+            Evaluator::new(&ctx, expression).run(&ctx, [texture.index(), sampler.index(), 0], count, &none);
         values.into_iter().map(|value| value[0]).collect::<Vec<_>>()
     };
     assert_eq!(run("textureBindless2D(a, b, vec2(0.5))", &plane, 1), [10.0]);
@@ -295,7 +313,8 @@ fn what_a_shader_stores_is_sampled_and_downloaded() {
     let usage = TextureUsage::STORAGE | TextureUsage::SAMPLED;
     let desc = TextureDesc { format: Format::Rgba32Float, extent: [4, 4], usage, ..Default::default() };
     let texture = texture(&ctx, &desc);
-    let write = Evaluator::new(&ctx, "vec4(1); imageStore(kImages2D[a], ivec2(i % 4, i / 4), vec4(i, b, 2, 3))");
+    let write =
+        Evaluator::new(&ctx, "vec4(1); imageStore(kImages2D[a], ivec2(i % 4, i / 4), vec4(i, b, 2, 3))");
     let read = Evaluator::new(&ctx, "textureBindlessFetch2D(a, ivec2(i % 4, i / 4), 0)");
     let writes = Dependencies { storage_images: &[*texture], ..Default::default() };
     let reads = Dependencies { sampled_images: &[*texture], ..Default::default() };
@@ -318,7 +337,8 @@ fn layers_are_stored_through_an_array_view() {
     let Some(ctx) = device() else { return };
     for kind in [TextureKind::D2Array { layers: 6 }, TextureKind::Cube] {
         let usage = TextureUsage::STORAGE;
-        let desc = TextureDesc { kind, format: Format::R32Float, extent: [2, 2], usage, ..Default::default() };
+        let desc =
+            TextureDesc { kind, format: Format::R32Float, extent: [2, 2], usage, ..Default::default() };
         let texture = texture(&ctx, &desc);
         let write = Evaluator::new(
             &ctx,
@@ -366,30 +386,42 @@ fn copies_leave_sampled_textures_in_the_layout_that_shaders_read() {
     expect_shader_read(&ctx, &[*source, *target, *scaled]);
 }
 
-/// Submits a barrier from the layout of sampled textures to itself; the validation layer knows if it is another.
+/// Submits a barrier from the layout of sampled textures to another and back; the validation layer knows if they have
+/// yet another.
 fn expect_shader_read(ctx: &Context, textures: &[TextureHandle]) {
-    let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+    let read = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+    let cmd = ctx.acquire_command_buffer().unwrap();
+    for [from, to] in [[read, vk::ImageLayout::GENERAL], [vk::ImageLayout::GENERAL, read]] {
+        let images = textures.iter().map(|texture| ctx.raw_image(*texture).unwrap());
+        let barriers: Vec<_> = images.map(|image| relayout(image, from, to)).collect();
+        let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
+        // SAFETY: the command buffer is being recorded and the images are alive.
+        unsafe { ctx.raw_device().cmd_pipeline_barrier2(cmd.raw(), &info) };
+    }
+    ctx.submit(cmd).unwrap();
+}
+
+fn relayout(
+    image: vk::Image,
+    from: vk::ImageLayout,
+    to: vk::ImageLayout,
+) -> vk::ImageMemoryBarrier2<'static> {
     let range = vk::ImageSubresourceRange {
         aspect_mask: vk::ImageAspectFlags::COLOR,
         level_count: 1,
         layer_count: 1,
         ..Default::default()
     };
-    let barrier = |texture: &TextureHandle| {
-        vk::ImageMemoryBarrier2::default()
-            .src_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-            .dst_stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
-            .old_layout(layout)
-            .new_layout(layout)
-            .image(ctx.raw_image(*texture).unwrap())
-            .subresource_range(range)
-    };
-    let barriers: Vec<_> = textures.iter().map(barrier).collect();
-    let cmd = ctx.acquire_command_buffer().unwrap();
-    let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
-    // SAFETY: the command buffer is being recorded and the images are alive.
-    unsafe { ctx.raw_device().cmd_pipeline_barrier2(cmd.raw(), &info) };
-    ctx.submit(cmd).unwrap();
+    let (stages, access) = (vk::PipelineStageFlags2::ALL_COMMANDS, vk::AccessFlags2::MEMORY_WRITE);
+    vk::ImageMemoryBarrier2::default()
+        .src_stage_mask(stages)
+        .src_access_mask(access)
+        .dst_stage_mask(stages)
+        .dst_access_mask(access | vk::AccessFlags2::MEMORY_READ)
+        .old_layout(from)
+        .new_layout(to)
+        .image(image)
+        .subresource_range(range)
 }
 
 #[test]
@@ -425,7 +457,8 @@ fn regions_are_copied_between_textures_mips_and_buffers() {
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     cmd.copy_texture(*source, &from, *target, &to).unwrap();
     cmd.copy_texture_to_buffer(*target, &TextureRegion { extent: [2, 2], ..to }, *bytes, 16).unwrap();
-    cmd.copy_buffer_to_texture(*bytes, 16, *source, &TextureRegion { extent: [4, 1], ..Default::default() }).unwrap();
+    cmd.copy_buffer_to_texture(*bytes, 16, *source, &TextureRegion { extent: [4, 1], ..Default::default() })
+        .unwrap();
     ctx.submit(cmd).unwrap();
     let mut copied = [0.0_f32; 4];
     ctx.download_buffer(*bytes, 16, bytemuck::cast_slice_mut(&mut copied)).unwrap();
@@ -458,7 +491,9 @@ fn depth_texels_are_sampled_as_red() {
     let Some(ctx) = device() else { return };
     for format in [Format::D16Unorm, Format::D32Float] {
         let data: Vec<u8> = match format {
-            Format::D16Unorm => [0_u16, 0x4000, 0x8000, 0xffff].iter().flat_map(|d| d.to_le_bytes()).collect(),
+            Format::D16Unorm => {
+                [0_u16, 0x4000, 0x8000, 0xffff].iter().flat_map(|d| d.to_le_bytes()).collect()
+            }
             _ => [0.0_f32, 0.25, 0.5, 1.0].iter().flat_map(|d| d.to_le_bytes()).collect(),
         };
         let desc = TextureDesc { format, extent: [4, 1], data: Some(&data), ..Default::default() };
@@ -499,7 +534,10 @@ fn impossible_shapes_are_typed_errors() {
     ];
     for (index, desc) in wrong.into_iter().enumerate() {
         let error = make(desc);
-        assert!(matches!(&error, Error::InvalidUsage { object, .. } if object == "odd one"), "{index}: {error}");
+        assert!(
+            matches!(&error, Error::InvalidUsage { object, .. } if object == "odd one"),
+            "{index}: {error}"
+        );
     }
 }
 
@@ -510,7 +548,13 @@ fn impossible_regions_are_errors_and_record_nothing() {
     let other = texture_of_eight_bytes(&ctx);
     let buffer = ctx.create_buffer(&BufferDesc { size_bytes: 64, ..Default::default() }).unwrap();
     let region = |offset, extent| TextureRegion { offset, extent, ..Default::default() };
-    let bad = [region([4, 0], [0, 0]), region([0, 0], [5, 1]), region([u32::MAX, 0], [2, 1]), whole(1, 0), whole(0, 1)];
+    let bad = [
+        region([4, 0], [0, 0]),
+        region([0, 0], [5, 1]),
+        region([u32::MAX, 0], [2, 1]),
+        whole(1, 0),
+        whole(0, 1),
+    ];
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let good = TextureRegion::default();
     for bad in &bad {

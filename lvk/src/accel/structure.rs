@@ -110,10 +110,10 @@ pub(crate) struct Tlas {
     contents: Mutex<TlasContents>,
 }
 
-/// The instances of the last build recorded.
+/// The instances of the last build submitted.
 #[derive(Default)]
 pub(crate) struct TlasContents {
-    /// `None` before the first build.
+    /// `None` before the first build is submitted.
     pub(crate) instance_count: Option<u32>,
     /// The structures the instances refer to, kept alive as long as they are.
     pub(crate) blas: Vec<Arc<AccelStruct>>,

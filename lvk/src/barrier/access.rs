@@ -228,12 +228,11 @@ impl Use {
     }
 
     /// Both uses at once, by one command. `None` where no layout serves both, for example an attachment that is
-    /// sampled in the same pass.
+    /// sampled in the same pass, or a storage image that is sampled too: descriptors promise one layout for each.
     pub(crate) fn merge(self, other: Self) -> Option<Self> {
         let layout = match (self.layout, other.layout) {
             (a, b) if a == b => a,
             (Layout::Undefined, layout) | (layout, Layout::Undefined) => layout,
-            (Layout::ShaderRead, Layout::General) | (Layout::General, Layout::ShaderRead) => Layout::General,
             _ => return None,
         };
         Some(Self { stages: self.stages | other.stages, access: self.access | other.access, layout })
@@ -325,16 +324,15 @@ mod tests {
     }
 
     #[test]
-    fn sampled_and_stored_at_once_is_general_with_both_accesses() {
-        let both = Use::shader_read(Stages::FRAGMENT).merge(Use::shader_write(Stages::COMPUTE)).unwrap();
-        assert_eq!(both.layout, Layout::General);
-        assert_eq!(both.stages, Stages::FRAGMENT | Stages::COMPUTE);
-        assert_eq!(both.access, Access::SHADER_READ | Access::SHADER_WRITE);
+    fn reads_of_two_stages_merge() {
+        let both = Use::shader_read(Stages::FRAGMENT).merge(Use::shader_read(Stages::COMPUTE)).unwrap();
+        assert_eq!(both, Use::shader_read(Stages::FRAGMENT | Stages::COMPUTE));
     }
 
     #[test]
     fn feedback_loops_do_not_merge() {
         assert_eq!(Use::color_target(true).merge(Use::shader_read(Stages::FRAGMENT)), None);
         assert_eq!(Use::transfer_read().merge(Use::transfer_write()), None);
+        assert_eq!(Use::shader_read(Stages::COMPUTE).merge(Use::shader_write(Stages::COMPUTE)), None);
     }
 }

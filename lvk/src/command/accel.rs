@@ -9,15 +9,31 @@ use crate::accel::AccelStruct;
 use crate::accel::build::{BuildInput, instance_bytes};
 use crate::accel::instance::{Instances, TlasInstance};
 use crate::accel::scratch::{ScratchBatch, aligned_scratch_address, plan_scratch};
-use crate::accel::structure::{AccelKind, BuildMode};
+use crate::accel::structure::{AccelKind, BuildMode, Tlas, TlasContents};
 use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result, check_limit};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
-use crate::shared::Garbage;
+use crate::shared::{Garbage, Shared};
 
 /// Addresses of instances must be a multiple of this.
 const INSTANCE_ALIGNMENT: u64 = 16;
+
+/// What a top-level structure shows once the command buffer is submitted.
+pub(crate) struct TlasUpdate {
+    target: Arc<AccelStruct>,
+    contents: TlasContents,
+}
+
+impl TlasUpdate {
+    /// Makes it so. Structures shown before may go once the GPU is done with them.
+    pub(crate) fn apply(self, shared: &Shared) {
+        if let Ok(tlas) = self.target.tlas() {
+            let before = std::mem::replace(&mut *tlas.contents(), self.contents);
+            before.blas.into_iter().for_each(|blas| shared.retire(Garbage::Kept(blas)));
+        }
+    }
+}
 
 /// One build to record.
 struct Build {
@@ -73,7 +89,7 @@ impl CommandBuffer {
         let count = instances.len() as u64;
         check_limit(&target.name, "instance count", count, tlas.capacity.into())?;
         let count = count as u32;
-        if mode == BuildMode::Refit && tlas.contents().instance_count != Some(count) {
+        if mode == BuildMode::Refit && self.instance_count(target, tlas) != Some(count) {
             let message = format!("a refit keeps the number of instances; {count} are new, so rebuild");
             return Err(Error::usage(&target.name, message));
         }
@@ -91,11 +107,21 @@ impl CommandBuffer {
         let input = BuildInput::tlas(target.flags, region.address, count);
         let build = Build { target: Arc::clone(target), input, mode, scratch_bytes, reads: Vec::new() };
         self.record_builds(&[build])?;
-        let mut contents = tlas.contents();
-        contents.instance_count = Some(count);
-        let before = std::mem::replace(&mut contents.blas, converted.blas);
-        before.into_iter().for_each(|blas| shared.retire(Garbage::Kept(blas)));
+        let contents = TlasContents { instance_count: Some(count), blas: converted.blas };
+        self.tlas_updates.push(TlasUpdate { target: Arc::clone(target), contents });
         Ok(())
+    }
+
+    /// Takes the updates so far for submitted: for the command buffer that goes before every other one.
+    pub(crate) fn apply_tlas_updates(&mut self) {
+        let shared = Arc::clone(&self.shared);
+        std::mem::take(&mut self.tlas_updates).into_iter().for_each(|update| update.apply(&shared));
+    }
+
+    /// Instances shown by the last build before the next command.
+    fn instance_count(&self, target: &Arc<AccelStruct>, tlas: &Tlas) -> Option<u32> {
+        let own = self.tlas_updates.iter().rev().find(|update| update.target.id == target.id);
+        own.map_or_else(|| tlas.contents().instance_count, |update| update.contents.instance_count)
     }
 
     /// Keeps a buffer of its own that the staging ring had no room for until the GPU is done with it.

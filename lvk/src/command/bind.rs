@@ -1,5 +1,7 @@
 //! The bindless set, pipelines and push constants of a command buffer.
 
+use std::sync::Arc;
+
 use ash::vk;
 
 use super::CommandBuffer;
@@ -9,7 +11,7 @@ use crate::error::{Error, Result};
 #[derive(Debug, Default)]
 pub(super) struct PushConstants {
     pushed_bytes: u32,
-    wanted: Option<(String, u32)>,
+    wanted: Option<(Arc<str>, u32)>,
 }
 
 impl PushConstants {
@@ -27,7 +29,7 @@ impl PushConstants {
         if aligned && fits && whole && *expected > 0 {
             return Ok(());
         }
-        Err(Error::PushConstants { pipeline: pipeline.clone(), expected: *expected, offset, size })
+        Err(Error::PushConstants { pipeline: pipeline.to_string(), expected: *expected, offset, size })
     }
 
     /// Fails if the pipeline reads bytes that were never pushed.
@@ -73,7 +75,7 @@ impl CommandBuffer {
         &mut self,
         point: vk::PipelineBindPoint,
         pipeline: vk::Pipeline,
-        name: &str,
+        name: &Arc<str>,
         push_constant_bytes: u32,
     ) {
         let (shared, raw) = (&self.shared, self.raw());
@@ -86,7 +88,7 @@ impl CommandBuffer {
                 self.sets_bound.push(point);
             }
         }
-        self.push_constants.wanted = Some((name.to_owned(), push_constant_bytes));
+        self.push_constants.wanted = Some((Arc::clone(name), push_constant_bytes));
     }
 
     /// Fails if a pipeline about to run reads bytes that were never pushed.
@@ -100,7 +102,7 @@ mod tests {
     use super::*;
 
     fn bound(expected: u32) -> PushConstants {
-        PushConstants { pushed_bytes: 0, wanted: Some(("p".to_owned(), expected)) }
+        PushConstants { pushed_bytes: 0, wanted: Some(("p".into(), expected)) }
     }
 
     #[test]

@@ -23,6 +23,7 @@ use crate::pipeline::{ComputePipeline, RayTracingPipeline};
 use crate::shared::Shared;
 use crate::submit::Recording;
 
+use accel::TlasUpdate;
 use bind::PushConstants;
 use transfer::Settle;
 use uses::Uses;
@@ -47,6 +48,7 @@ pub struct CommandBuffer {
     host_reads: Vec<ResourceId>,
     open_labels: u32,
     settle: Vec<Settle>,
+    tlas_updates: Vec<TlasUpdate>,
 }
 
 impl CommandBuffer {
@@ -64,6 +66,7 @@ impl CommandBuffer {
             host_reads: Vec::new(),
             open_labels: 0,
             settle: Vec::new(),
+            tlas_updates: Vec::new(),
         })
     }
 
@@ -94,8 +97,8 @@ impl CommandBuffer {
         Arc::ptr_eq(&self.shared, shared)
     }
 
-    /// Ends the recording.
-    pub(crate) fn finish(mut self) -> Recording {
+    /// Ends the recording. Answers also what becomes true once it is submitted.
+    pub(crate) fn finish(mut self) -> (Recording, Vec<TlasUpdate>) {
         while self.open_labels > 0 {
             self.pop_label();
         }
@@ -106,7 +109,8 @@ impl CommandBuffer {
         self.flush();
         self.finished = true;
         // SAFETY: `finished` keeps `drop` from taking the recording again.
-        unsafe { ManuallyDrop::take(&mut self.recording) }
+        let recording = unsafe { ManuallyDrop::take(&mut self.recording) };
+        (recording, std::mem::take(&mut self.tlas_updates))
     }
 }
 

@@ -71,7 +71,7 @@ impl<'a> RenderPass<'a> {
                 "it draws to {:?} and depth {:?}, but the pass has {:?} and depth {:?}",
                 pipeline.color_formats, pipeline.depth_format, targets.color_formats, targets.depth_format
             );
-            return Err(Error::usage(&pipeline.name, message));
+            return Err(Error::usage(&*pipeline.name, message));
         }
         if pipeline.ray_query {
             self.cmd.use_structures(Stages::PRE_RASTER | Stages::FRAGMENT);
@@ -280,7 +280,7 @@ impl<'a> RenderPass<'a> {
         let needed = (1_u32 << pipeline.vertex_binding_count) - 1;
         if self.vertex_slots & needed != needed {
             let message = format!("it reads {} vertex buffers; bind them all", pipeline.vertex_binding_count);
-            return Err(Error::usage(&pipeline.name, message));
+            return Err(Error::usage(&*pipeline.name, message));
         }
         self.cmd.check_pushed(&pipeline.name, pipeline.push_constant_bytes)
     }

@@ -62,6 +62,8 @@ impl Context {
             None => CommandBuffer::new(self.shared())?,
         };
         let result = record(&mut cmd);
+        // It goes before whatever is submitted next, so commands recorded from now on may rely on it.
+        cmd.apply_tlas_updates();
         *pending = Some(cmd);
         result
     }

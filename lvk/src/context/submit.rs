@@ -21,10 +21,17 @@ impl Context {
             return Err(Error::usage("submit", "the command buffer belongs to another context"));
         }
         let mut pending = self.pending();
-        let recordings = pending.take().into_iter().chain([cmd]).map(CommandBuffer::finish).collect();
-        let value = self.shared().submitter.submit(recordings, || self.shared().bindless.flush())?;
+        let submitted = self.send(pending.take().into_iter().chain([cmd]))?;
         drop(pending);
         self.shared().collect()?;
+        Ok(submitted)
+    }
+
+    fn send(&self, commands: impl Iterator<Item = CommandBuffer>) -> Result<SubmitHandle> {
+        let (recordings, updates): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
+        let shared = self.shared();
+        let value = shared.submitter.submit(recordings, || shared.bindless.flush())?;
+        updates.into_iter().flatten().for_each(|update| update.apply(shared));
         Ok(SubmitHandle(value))
     }
 
@@ -32,9 +39,7 @@ impl Context {
     pub fn flush(&self) -> Result<SubmitHandle> {
         let mut pending = self.pending();
         let Some(cmd) = pending.take() else { return Ok(SubmitHandle(self.shared().submitter.submitted())) };
-        let recordings = vec![cmd.finish()];
-        let value = self.shared().submitter.submit(recordings, || self.shared().bindless.flush())?;
-        Ok(SubmitHandle(value))
+        self.send([cmd].into_iter())
     }
 
     /// Waits until a submission is done (`vkWaitSemaphores`).

@@ -119,6 +119,9 @@ impl Messenger {
     }
 }
 
+/// Warnings of the layer about its own settings, which say nothing about the program.
+const REMARKS: [&str; 2] = ["VALIDATION-SETTINGS", "WARNING-Setting-Limit-Adjusted"];
+
 unsafe extern "system" fn on_message(
     severity: vk::DebugUtilsMessageSeverityFlagsEXT,
     _: vk::DebugUtilsMessageTypeFlagsEXT,
@@ -139,7 +142,9 @@ unsafe extern "system" fn on_message(
     } else {
         log::warn!("{message}");
     }
-    sink.push(message);
+    if message.error || !REMARKS.contains(&message.id.as_str()) {
+        sink.push(message);
+    }
     vk::FALSE
 }
 

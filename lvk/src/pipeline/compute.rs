@@ -33,7 +33,7 @@ pub(crate) struct ComputePipeline {
     pub(crate) raw: vk::Pipeline,
     pub(crate) push_constant_bytes: u32,
     pub(crate) ray_query: bool,
-    pub(crate) name: String,
+    pub(crate) name: Arc<str>,
     gpu: Arc<Gpu>,
 }
 
@@ -57,7 +57,7 @@ impl ComputePipeline {
             raw,
             push_constant_bytes: module.reflection.push_constant_bytes,
             ray_query: module.reflection.ray_query,
-            name: name.to_owned(),
+            name: name.into(),
             gpu: Arc::clone(gpu),
         })
     }

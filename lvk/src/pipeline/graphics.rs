@@ -163,7 +163,7 @@ pub(crate) struct RenderPipeline {
     pub(crate) color_formats: Vec<Format>,
     pub(crate) depth_format: Option<Format>,
     pub(crate) vertex_binding_count: u32,
-    pub(crate) name: String,
+    pub(crate) name: Arc<str>,
     gpu: Arc<Gpu>,
 }
 
@@ -186,7 +186,7 @@ impl RenderPipeline {
             color_formats: desc.color.iter().map(|target| target.format).collect(),
             depth_format: desc.depth.map(|depth| depth.format),
             vertex_binding_count: desc.vertex_bindings.len() as u32,
-            name: desc.debug_name.to_owned(),
+            name: desc.debug_name.into(),
             gpu: Arc::clone(gpu),
         })
     }

@@ -66,7 +66,7 @@ impl Default for RayTracingPipelineDesc<'_> {
 pub(crate) struct RayTracingPipeline {
     pub(crate) raw: vk::Pipeline,
     pub(crate) push_constant_bytes: u32,
-    pub(crate) name: String,
+    pub(crate) name: Arc<str>,
     pub(crate) table: Arc<Buffer>,
     plan: SbtPlan,
     /// Address of the first region: the table's, rounded up.
@@ -129,7 +129,7 @@ impl RayTracingPipeline {
         let pipeline = Self {
             raw,
             push_constant_bytes: stages.push_constant_bytes(),
-            name: name.to_owned(),
+            name: name.into(),
             table: Arc::new(table),
             plan,
             base,
@@ -161,7 +161,7 @@ impl RayTracingPipeline {
         let Some(ray_gen) = self.plan.ray_gen.get(index as usize) else {
             let count = self.plan.ray_gen.len();
             let message = format!("ray generation shader {index} does not exist: the pipeline has {count}");
-            return Err(Error::usage(&self.name, message));
+            return Err(Error::usage(&*self.name, message));
         };
         Ok(TraceRegions {
             ray_gen: region(ray_gen),

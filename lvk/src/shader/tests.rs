@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use proptest::prelude::*;
 use ::spirv::{Capability, Decoration, Op};
+use proptest::prelude::*;
 
 use super::*;
 use crate::error::{Error, Result};

@@ -97,16 +97,19 @@ impl RayPath {
 
 #[cfg(test)]
 mod tests {
+    use lvk::Limits;
+
     use super::*;
 
     fn device(pipeline: bool, query: bool) -> Capabilities {
-        let mut capabilities = Capabilities::default();
-        capabilities.device_name = "Thing 3000".to_owned();
-        capabilities.ray_tracing_pipeline = pipeline;
-        capabilities.ray_query = query;
-        capabilities.primitive_id = true;
-        capabilities.limits.max_texture_2d = 4096;
-        capabilities
+        Capabilities {
+            device_name: "Thing 3000".to_owned(),
+            ray_tracing_pipeline: pipeline,
+            ray_query: query,
+            primitive_id: true,
+            limits: Limits { max_texture_2d: 4096, ..Limits::default() },
+            ..Capabilities::default()
+        }
     }
 
     fn config() -> HybridConfig {

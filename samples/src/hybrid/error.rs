@@ -51,6 +51,9 @@ pub enum HybridError {
         /// The largest depth.
         limit: u32,
     },
+    /// A scene made by hand breaks the invariants of [`Scene`](crate::scene::Scene).
+    #[error("the scene cannot be drawn: {0}")]
+    BrokenScene(&'static str),
     /// More opaque triangles than an instance's custom index counts.
     #[error("the scene has {count} opaque triangles; this sample takes fewer than {limit}")]
     TooManyTriangles {

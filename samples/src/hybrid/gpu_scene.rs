@@ -13,6 +13,7 @@ use lvk::{
 use super::HybridError;
 use super::frame::SceneAddresses;
 use super::half_float::half_bits;
+use super::scene_check::check;
 use super::texture_density::lod_constant;
 use super::triangle_order::upload_order;
 use crate::scene::{Material, Scene, Sky, Texture};
@@ -21,8 +22,6 @@ use crate::scene::{Material, Scene, Sky, Texture};
 const MASK_OPAQUE: u8 = 1;
 /// Mask bit of instances that light passes through.
 const MASK_REFRACTIVE: u8 = 2;
-/// Custom indices have 24 bits.
-const CUSTOM_INDEX_LIMIT: u32 = 1 << 24;
 /// Texels on an edge of the sky's cube map.
 const SKY_SIZE: u32 = 512;
 /// `kNoTexture` in `shaders/common/scene_buffers.glsl`.
@@ -76,7 +75,7 @@ struct TriangleInfo {
 impl GpuScene {
     /// Uploads `scene` and builds its acceleration structures.
     pub(super) fn new(ctx: &Context, scene: &Scene) -> Result<Self, HybridError> {
-        check_count(scene)?;
+        check(scene)?;
         let textures: Vec<_> =
             scene.textures.iter().map(|texture| upload_texture(ctx, texture)).collect::<Result<_, _>>()?;
         let arrays = Arrays::new(ctx, scene, &textures)?;
@@ -142,14 +141,6 @@ impl Arrays {
         };
         Ok(Self { positions, triangles, _held: [normals, texcoords, triangle_infos, materials], addresses })
     }
-}
-
-fn check_count(scene: &Scene) -> Result<(), HybridError> {
-    let count = scene.opaque_triangle_count;
-    if count < CUSTOM_INDEX_LIMIT {
-        return Ok(());
-    }
-    Err(HybridError::TooManyTriangles { count, limit: CUSTOM_INDEX_LIMIT })
 }
 
 fn triangle_info(scene: &Scene, triangle: usize) -> TriangleInfo {

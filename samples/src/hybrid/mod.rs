@@ -18,6 +18,7 @@ mod half_float;
 mod ray_pass;
 mod renderer;
 mod run;
+mod scene_check;
 mod shader_module;
 mod texture_density;
 mod triangle_order;

@@ -19,6 +19,8 @@ use crate::scene::{Camera, Scene};
 
 /// Rows that a CPU renders in one go: short enough to show progress, long enough to keep every core busy.
 const CPU_BAND_ROWS: u32 = 48;
+/// Pixels that a GPU renders in one go: so few that no driver takes it for hung.
+const GPU_BAND_PIXELS: u32 = 1 << 23;
 
 /// Renders a scene by one method and one path of ray tracing.
 pub struct HybridRenderer {
@@ -47,26 +49,15 @@ impl HybridRenderer {
         config.check(ctx.capabilities())?;
         let extent = [config.width, config.height];
         let gpu_scene = GpuScene::new(ctx, scene)?;
-        let frame_buffer = ctx.create_buffer(&BufferDesc {
-            size_bytes: size_of::<FrameConstants>() as u64,
-            debug_name: "frame constants",
-            ..BufferDesc::default()
-        })?;
-        let output = ctx.create_texture(&TextureDesc {
-            format: Format::Rgba8Unorm,
-            extent,
-            usage: TextureUsage::STORAGE,
-            debug_name: "picture",
-            ..TextureDesc::default()
-        })?;
+        let frame_buffer = frame_buffer(ctx)?;
+        let output = output(ctx, extent)?;
         let geometry = match config.method {
             Method::Standalone => None,
             Method::Hybrid => Some(GeometryPass::new(ctx, &gpu_scene, extent)?),
         };
         let gbuffer = geometry.iter().flat_map(|pass| pass.targets.textures()).collect();
         let rays = RayPass::new(ctx, config, gbuffer, *output)?;
-        let rows = if ctx.capabilities().is_cpu { CPU_BAND_ROWS } else { config.height };
-        let bands = bands(config.height, rows);
+        let bands = bands(config.height, band_rows(config, ctx.capabilities().is_cpu));
         let has_stamps = ctx.capabilities().limits.timestamp_bits > 0;
         let stamps = has_stamps.then(|| Stamps::new(ctx, bands.len() as u32)).transpose()?;
         Ok(Self {
@@ -179,6 +170,25 @@ impl HybridRenderer {
     fn push(&self, rows: Range<u32>) -> Push {
         Push { frame: self.frame_address, first_row: rows.start, end_row: rows.end }
     }
+}
+
+fn band_rows(config: &HybridConfig, is_cpu: bool) -> u32 {
+    if is_cpu { CPU_BAND_ROWS } else { GPU_BAND_PIXELS / config.width }
+}
+
+fn frame_buffer(ctx: &Context) -> lvk::Result<Holder<BufferHandle>> {
+    let size_bytes = size_of::<FrameConstants>() as u64;
+    ctx.create_buffer(&BufferDesc { size_bytes, debug_name: "frame constants", ..BufferDesc::default() })
+}
+
+fn output(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Holder<TextureHandle>> {
+    ctx.create_texture(&TextureDesc {
+        format: Format::Rgba8Unorm,
+        extent,
+        usage: TextureUsage::STORAGE,
+        debug_name: "picture",
+        ..TextureDesc::default()
+    })
 }
 
 fn indices(scene: &GpuScene, geometry: Option<&GeometryPass>, output: u32) -> Indices {

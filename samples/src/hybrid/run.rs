@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-use lvk::{Context, ContextDesc, FeatureRequest, Validation, ValidationSink};
+use lvk::{Capabilities, Context, ContextDesc, FeatureRequest, Validation, ValidationSink};
 
 use super::{HybridConfig, HybridError, HybridRenderer, Method, RayPath};
 use crate::app::args::{self, HybridArgs};
@@ -47,7 +47,8 @@ impl RunError {
             Self::Hybrid(
                 HybridError::BadSize { .. }
                 | HybridError::TooDeep { .. }
-                | HybridError::TooManyTriangles { .. },
+                | HybridError::TooManyTriangles { .. }
+                | HybridError::BrokenScene(_),
             ) => 2,
             Self::Driver(_) | Self::Hybrid(_) | Self::Validation(_) => 1,
         }
@@ -172,7 +173,7 @@ fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &Hybr
         RayPath::Pipeline => "ray tracing pipeline",
         RayPath::Query => "ray queries in a compute shader",
     };
-    let mut text = format!("device    {} ({})\n", capabilities.device_name, driver_text(ctx));
+    let mut text = format!("device    {} ({})\n", capabilities.device_name, driver_text(capabilities));
     let _ = writeln!(text, "method    {method}; {path}; depth {}", config.max_depth);
     let _ = writeln!(
         text,
@@ -186,10 +187,10 @@ fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &Hybr
     text
 }
 
-fn driver_text(ctx: &Context) -> String {
-    let capabilities = ctx.capabilities();
+fn driver_text(capabilities: &Capabilities) -> String {
     let (major, minor, patch) = capabilities.api_version;
-    format!("{} {}, Vulkan {major}.{minor}.{patch}", capabilities.driver_name, capabilities.driver_info)
+    let driver = format!("{} {}", capabilities.driver_name, capabilities.driver_info);
+    format!("{}, Vulkan {major}.{minor}.{patch}", driver.trim_end())
 }
 
 /// Renders the frames and times all but those of the warm-up.
@@ -228,7 +229,10 @@ fn report_validation(sink: &ValidationSink) -> Result<(), RunError> {
 fn list_devices() -> Result<(), RunError> {
     let driver = driver::prepare(&DriverRequest::default())?;
     for (number, device) in Context::devices(driver.loader.as_deref())?.iter().enumerate() {
-        println!("[{number}] {device:?}");
+        let has = |has: bool| if has { "yes" } else { "no" };
+        println!("[{number}] {} ({})", device.device_name, driver_text(device));
+        println!("    ray tracing pipelines: {}", has(device.ray_tracing_pipeline));
+        println!("    ray queries:           {}", has(device.ray_query));
     }
     Ok(())
 }

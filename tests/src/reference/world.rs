@@ -206,7 +206,8 @@ mod tests {
         }];
         let near = Instance { custom_index: 7, mask: 1, ..instance(&square) };
         let far = Instance {
-            transform: DAffine3::from_translation(DVec3::Z) * DAffine3::from_scale(DVec3::new(1.0, 1.0, -1.0)),
+            transform: DAffine3::from_translation(DVec3::Z)
+                * DAffine3::from_scale(DVec3::new(1.0, 1.0, -1.0)),
             mask: 2,
             ..instance(&square)
         };

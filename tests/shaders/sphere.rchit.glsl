@@ -1,0 +1,13 @@
+#include "ray_records.glsl"
+
+layout(shaderRecordEXT, scalar) buffer Record {
+    float radius;
+    uint tag;
+};
+
+layout(location = 0) rayPayloadInEXT HitRecord record;
+
+void main() {
+    record = HitRecord(gl_HitTEXT, vec2(radius, float(tag)), gl_HitKindEXT, gl_InstanceID, gl_InstanceCustomIndexEXT,
+                       gl_GeometryIndexEXT, gl_PrimitiveID);
+}

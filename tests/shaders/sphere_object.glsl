@@ -1,0 +1,20 @@
+// Spheres in object space, where the boxes of the test are.
+#ifndef SPHERE_OBJECT
+#define SPHERE_OBJECT
+
+vec3 sphereCenter(int geometry, int primitive) {
+    return vec3(primitive % 3, primitive / 3, geometry) * 2.0;
+}
+
+// Both places where a ray passes through the surface; false if it passes the sphere.
+bool crossSphere(vec3 center, float radius, vec3 origin, vec3 direction, out vec2 places) {
+    vec3 toCenter = center - origin;
+    float middle = dot(toCenter, direction) / dot(direction, direction);
+    vec3 passing = toCenter - direction * middle;
+    float room = radius * radius - dot(passing, passing);
+    float halfway = sqrt(max(room, 0.0) / dot(direction, direction));
+    places = vec2(middle - halfway, middle + halfway);
+    return room > 0.0;
+}
+
+#endif

@@ -1,0 +1,48 @@
+// The instance's offset into the shader binding table, which queries do not use otherwise, chooses the radius.
+#include <lvk/ray_query.glsl>
+#include "ray_records.glsl"
+#include "sphere_object.glsl"
+
+layout(local_size_x = 64) in;
+
+const float kRadius[2] = float[](0.9, 0.5);
+const uint kTag[2] = uint[](17, 99);
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= count) {
+        return;
+    }
+    Ray ray = rays.at[index];
+    LvkRayQuery rq;
+    lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
+    float end = ray.tMax;
+    while (lvkRayQueryProceed(rq)) {
+        if (lvkRayQueryType(rq, LVK_CANDIDATE) != LVK_CANDIDATE_AABB) {
+            continue;
+        }
+        vec2 places;
+        vec3 center = sphereCenter(lvkRayQueryGeometryIndex(rq, LVK_CANDIDATE),
+                                   lvkRayQueryPrimitiveIndex(rq, LVK_CANDIDATE));
+        vec3 origin = lvkRayQueryObjectRayOrigin(rq, LVK_CANDIDATE);
+        vec3 direction = lvkRayQueryObjectRayDirection(rq, LVK_CANDIDATE);
+        float radius = kRadius[lvkRayQuerySbtOffset(rq, LVK_CANDIDATE)];
+        if (crossSphere(center, radius, origin, direction, places)) {
+            float place = places.x >= ray.tMin ? places.x : places.y;
+            if (place >= ray.tMin && place <= end) {
+                lvkRayQueryGenerateIntersection(rq, place);
+                end = place;
+            }
+        }
+    }
+    HitRecord record = kNoHit;
+    if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_GENERATED) {
+        uint group = lvkRayQuerySbtOffset(rq, LVK_COMMITTED);
+        record = HitRecord(lvkRayQueryT(rq, LVK_COMMITTED), vec2(kRadius[group], float(kTag[group])), kTag[group],
+                           lvkRayQueryInstanceId(rq, LVK_COMMITTED),
+                           lvkRayQueryInstanceCustomIndex(rq, LVK_COMMITTED),
+                           lvkRayQueryGeometryIndex(rq, LVK_COMMITTED),
+                           lvkRayQueryPrimitiveIndex(rq, LVK_COMMITTED));
+    }
+    hits.at[index] = record;
+}

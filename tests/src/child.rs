@@ -1,0 +1,33 @@
+//! Runs a test in a process of its own, because environment variables count once for each process.
+#![expect(clippy::expect_used, reason = "a test whose process cannot be started has failed")]
+
+use std::ffi::OsStr;
+use std::process::Command;
+
+const MARK: &str = "LVK_TEST_CHILD";
+
+/// Runs `body` in a new process with `variables` set, or taken away where there is no value.
+///
+/// `test` is the path of the calling test inside its file: the new process runs that test alone, which calls this
+/// function again and gets to `body`.
+///
+/// # Panics
+/// When the process fails, with what it wrote.
+pub fn in_child(test: &str, variables: &[(&str, Option<&OsStr>)], body: impl FnOnce()) {
+    if std::env::var_os(MARK).is_some_and(|name| name == test) {
+        return body();
+    }
+    let program = std::env::current_exe().expect("the program of the test has a path");
+    let mut command = Command::new(program);
+    command.args([test, "--exact", "--nocapture"]).env(MARK, test);
+    for (name, value) in variables {
+        match value {
+            Some(value) => command.env(name, value),
+            None => command.env_remove(name),
+        };
+    }
+    let output = command.output().expect("the program of the test can be started again");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    let (out, err) = (text(&output.stdout), text(&output.stderr));
+    assert!(output.status.success() && out.contains("1 passed"), "in a process of its own:\n{out}\n{err}");
+}

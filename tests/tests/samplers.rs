@@ -1,0 +1,169 @@
+//! Samplers: filters, address modes, levels of detail and comparisons as shaders see them.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use lvk::{
+    AddressMode, CompareOp, Context, Dependencies, Error, Filter, Format, Holder, SamplerDesc, TextureDesc,
+    TextureHandle, TextureRegion,
+};
+use lvk_tests::compute::Evaluator;
+use lvk_tests::device;
+
+/// Four texels in a row: 1, 2, 3 and 4.
+fn row(ctx: &Context) -> Holder<TextureHandle> {
+    let data = [1.0_f32, 2.0, 3.0, 4.0];
+    let desc = TextureDesc {
+        format: Format::R32Float,
+        extent: [4, 1],
+        data: Some(bytemuck::cast_slice(&data)),
+        ..Default::default()
+    };
+    ctx.create_texture(&desc).unwrap()
+}
+
+/// Samples `texture` at the u that `u` says for each invocation `i`, as far as `count`.
+fn sample(ctx: &Context, texture: u32, desc: &SamplerDesc<'_>, u: &str, count: u32) -> Vec<f32> {
+    let sampler = ctx.create_sampler(desc).unwrap();
+    let expression = format!("textureBindless2DLod(a, b, vec2({u}, 0.5), 0.0)");
+    let words = [texture, sampler.index(), 0];
+    let found = Evaluator::new(ctx, &expression).run(ctx, words, count, &Dependencies::default());
+    found.into_iter().map(|value| value[0]).collect()
+}
+
+fn nearest(address: AddressMode) -> SamplerDesc<'static> {
+    SamplerDesc {
+        mag_filter: Filter::Nearest,
+        min_filter: Filter::Nearest,
+        mip_filter: Filter::Nearest,
+        address: [address; 3],
+        ..Default::default()
+    }
+}
+
+#[test]
+fn nearest_takes_a_texel_and_linear_a_mean() {
+    let Some(ctx) = device() else { return };
+    let texture = row(&ctx);
+    let between = "(0.8 + i) / 4.0";
+    let found = sample(&ctx, texture.index(), &nearest(AddressMode::ClampToEdge), between, 4);
+    assert_eq!(found, [1.0, 2.0, 3.0, 4.0]);
+    let linear = SamplerDesc { address: [AddressMode::ClampToEdge; 3], ..Default::default() };
+    let found = sample(&ctx, texture.index(), &linear, between, 4);
+    assert!(found.iter().zip([1.3, 2.3, 3.3, 4.0]).all(|(a, b)| (a - b).abs() < 0.01), "{found:?}");
+}
+
+#[test]
+fn address_modes_say_what_lies_outside() {
+    let Some(ctx) = device() else { return };
+    let texture = row(&ctx);
+    let expected = [
+        (AddressMode::Repeat, [3.0, 4.0, 1.0, 2.0, 3.0, 4.0, 1.0, 2.0]),
+        (AddressMode::MirroredRepeat, [2.0, 1.0, 1.0, 2.0, 3.0, 4.0, 4.0, 3.0]),
+        (AddressMode::ClampToEdge, [1.0, 1.0, 1.0, 2.0, 3.0, 4.0, 4.0, 4.0]),
+        (AddressMode::ClampToBorder, [0.0, 0.0, 1.0, 2.0, 3.0, 4.0, 0.0, 0.0]),
+    ];
+    for (mode, expected) in expected {
+        let found = sample(&ctx, texture.index(), &nearest(mode), "(float(i) - 1.5) / 4.0", 8);
+        assert_eq!(found, expected, "{mode:?}");
+    }
+}
+
+#[test]
+fn address_modes_differ_along_the_axes() {
+    let Some(ctx) = device() else { return };
+    let data = [1.0_f32, 2.0, 3.0, 4.0];
+    let data = Some(bytemuck::cast_slice(&data));
+    let desc = TextureDesc { format: Format::R32Float, extent: [2, 2], data, ..Default::default() };
+    let texture = ctx.create_texture(&desc).unwrap();
+    let address = [AddressMode::Repeat, AddressMode::ClampToEdge, AddressMode::Repeat];
+    let sampler = ctx.create_sampler(&SamplerDesc { address, ..nearest(AddressMode::Repeat) }).unwrap();
+    let outside = Evaluator::new(&ctx, "textureBindless2D(a, b, vec2(1.25, 1.25))");
+    let found = outside.run(&ctx, [texture.index(), sampler.index(), 0], 1, &Dependencies::default());
+    assert_eq!(found[0][0], 3.0);
+}
+
+#[test]
+fn levels_of_detail_are_biased_and_clamped() {
+    let Some(ctx) = device() else { return };
+    let desc = TextureDesc { format: Format::R32Float, extent: [8, 8], mips: 0, ..Default::default() };
+    let texture = ctx.create_texture(&desc).unwrap();
+    for mip in 0..4 {
+        let values = vec![mip as f32; 1 << (2 * (3 - mip))];
+        let region = TextureRegion { mip, ..Default::default() };
+        ctx.upload_texture(*texture, &region, bytemuck::cast_slice(&values)).unwrap();
+    }
+    let lods = |desc: SamplerDesc<'_>| {
+        let sampler = ctx.create_sampler(&desc).unwrap();
+        let expression = "textureBindless2DLod(a, b, vec2(0.5), 0.5 * i)";
+        let words = [texture.index(), sampler.index(), 0];
+        let found = Evaluator::new(&ctx, expression).run(&ctx, words, 7, &Dependencies::default());
+        found.into_iter().map(|value| value[0]).collect::<Vec<_>>()
+    };
+    let close =
+        |a: &[f32], b: &[f32]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 0.01);
+    let plain = lods(SamplerDesc::default());
+    assert!(close(&plain, &[0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0]), "{plain:?}");
+    let clamped = lods(SamplerDesc { lod_range: [1.0, 2.0], ..Default::default() });
+    assert!(close(&clamped, &[1.0, 1.0, 1.0, 1.5, 2.0, 2.0, 2.0]), "{clamped:?}");
+    let biased = lods(SamplerDesc { lod_bias: 1.0, ..Default::default() });
+    assert!(close(&biased, &[1.0, 1.5, 2.0, 2.5, 3.0, 3.0, 3.0]), "{biased:?}");
+}
+
+#[test]
+fn comparison_samplers_compare_the_reference_with_the_texel() {
+    let Some(ctx) = device() else { return };
+    let data = Some(bytemuck::cast_slice(&[0.5_f32]));
+    let depth = TextureDesc { format: Format::D32Float, data, ..Default::default() };
+    let depth = ctx.create_texture(&depth).unwrap();
+    let expected = [
+        (CompareOp::Never, [0.0, 0.0, 0.0]),
+        (CompareOp::Less, [1.0, 0.0, 0.0]),
+        (CompareOp::Equal, [0.0, 1.0, 0.0]),
+        (CompareOp::LessOrEqual, [1.0, 1.0, 0.0]),
+        (CompareOp::Greater, [0.0, 0.0, 1.0]),
+        (CompareOp::NotEqual, [1.0, 0.0, 1.0]),
+        (CompareOp::GreaterOrEqual, [0.0, 1.0, 1.0]),
+        (CompareOp::Always, [1.0, 1.0, 1.0]),
+    ];
+    let compare = Evaluator::new(&ctx, "vec4(textureBindless2DShadow(a, b, vec3(0.5, 0.5, 0.25 * (i + 1))))");
+    for (op, expected) in expected {
+        let sampler = SamplerDesc { compare: Some(op), ..nearest(AddressMode::ClampToEdge) };
+        let sampler = ctx.create_sampler(&sampler).unwrap();
+        let words = [depth.index(), sampler.index(), 0];
+        let found = compare.run(&ctx, words, 3, &Dependencies::default());
+        assert_eq!(found.iter().map(|value| value[0]).collect::<Vec<_>>(), expected, "{op:?}");
+    }
+}
+
+#[test]
+fn odd_numbers_are_errors_or_clamped() {
+    let Some(ctx) = device() else { return };
+    let wrong = [
+        SamplerDesc { lod_range: [2.0, 1.0], ..Default::default() },
+        SamplerDesc { lod_range: [f32::NAN, 1.0], ..Default::default() },
+        SamplerDesc { lod_bias: f32::NAN, ..Default::default() },
+        SamplerDesc { max_anisotropy: f32::NAN, ..Default::default() },
+    ];
+    for desc in wrong {
+        let made = ctx.create_sampler(&SamplerDesc { debug_name: "odd one", ..desc });
+        assert!(matches!(&made, Err(Error::InvalidUsage { object, .. }) if object == "odd one"), "{made:?}");
+    }
+    for max_anisotropy in [-1.0, 0.0, 1.0e9, f32::INFINITY] {
+        drop(ctx.create_sampler(&SamplerDesc { max_anisotropy, ..Default::default() }).unwrap());
+    }
+    drop(ctx.create_sampler(&SamplerDesc { lod_bias: f32::INFINITY, ..Default::default() }).unwrap());
+}
+
+#[test]
+fn samplers_run_out_and_come_back() {
+    let Some(ctx) = device() else { return };
+    let limit = ctx.capabilities().limits.max_bindless_samplers;
+    let mut samplers: Vec<_> =
+        (1..limit).map(|_| ctx.create_sampler(&SamplerDesc::default()).unwrap()).collect();
+    let error = ctx.create_sampler(&SamplerDesc::default()).unwrap_err();
+    assert!(matches!(error, Error::LimitExceeded { .. }), "{error}");
+    samplers.truncate(samplers.len() / 2);
+    ctx.wait_idle().unwrap();
+    let texture = row(&ctx);
+    let found = sample(&ctx, texture.index(), &nearest(AddressMode::Repeat), "(0.5 + i) / 4.0", 4);
+    assert_eq!(found, [1.0, 2.0, 3.0, 4.0]);
+}
