@@ -2,8 +2,8 @@
 #![expect(clippy::expect_used, reason = "a test whose set-up fails has failed")]
 
 use lvk::{
-    Context, Format, Holder, RenderPipelineDesc, RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle,
-    TextureRegion, TextureUsage,
+    Context, Format, Holder, RenderPipelineDesc, RenderPipelineHandle, ShaderStage, TextureDesc,
+    TextureHandle, TextureRegion, TextureUsage,
 };
 
 use crate::compute::module;
@@ -43,7 +43,10 @@ pub fn target(ctx: &Context, format: Format, extent: [u32; 2]) -> Holder<Texture
 }
 
 /// The texels of a target's first mip and layer.
-pub fn pixels<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(ctx: &Context, target: TextureHandle) -> Vec<T> {
+pub fn pixels<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
+    ctx: &Context,
+    target: TextureHandle,
+) -> Vec<T> {
     let bytes = ctx.download_texture(target, &TextureRegion::default()).expect("the target can be read");
     bytemuck::pod_collect_to_vec(&bytes)
 }
@@ -63,7 +66,10 @@ pub fn coverage(corners: [[f64; 2]; 3], [width, height]: [u32; 2]) -> Vec<bool> 
     centres
         .map(|centre| {
             let sides = sides(centre);
-            assert!(sides.iter().all(|side| side.abs() > 0.01), "move the triangle: {centre:?} is on an edge");
+            assert!(
+                sides.iter().all(|side| side.abs() > 0.01),
+                "move the triangle: {centre:?} is on an edge"
+            );
             sides.iter().all(|side| *side > 0.0) || sides.iter().all(|side| *side < 0.0)
         })
         .collect()

@@ -1,10 +1,11 @@
 //! Which shader runs: hit groups, miss shaders, callables, intersection shaders, ray generation shaders, and the bytes
 //! of their records.
 
-use lvk::glam::{Affine3A, DVec3, Quat, Vec3};
+use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
-    Aabbs, BlasDesc, BlasGeometry, BufferDesc, BufferUsage, ComputePipelineDesc, Context, GeometryFlags,
-    HitGroup, Holder, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderStage, TlasDesc,
+    Aabbs, AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferUsage, ComputePipelineDesc, Context,
+    GeometryFlags, HitGroup, Holder, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderStage,
+    TlasDesc,
 };
 use lvk_tests::agreement::Agreement;
 use lvk_tests::meshes::Mesh;
@@ -244,38 +245,14 @@ fn a_hit_shader_traces_a_ray_of_its_own() -> Result<()> {
     Ok(())
 }
 
+/// Radius in object space and tag of each hit group of spheres.
+const GROUPS: [(f32, u32); 2] = [(0.9, 17), (0.5, 99)];
+
 /// Five spheres each in two geometries of boxes; two instances with radii of their own.
 #[test]
 fn an_intersection_shader_hits_spheres_in_boxes() -> Result<()> {
-    const RADII: [(f32, u32); 2] = [(0.9, 17), (0.5, 99)];
     let Some(ctx) = device() else { return Ok(()) };
-    let center = |geometry: u32, primitive: u32| {
-        Vec3::new((primitive % 3) as f32, (primitive / 3) as f32, geometry as f32) * 2.0
-    };
-    let mut boxes = Vec::new();
-    let mut geometries = Vec::new();
-    for geometry in 0..2 {
-        // The second list starts late and has gaps.
-        let (start, gap): (u64, usize) = if geometry == 0 { (0, 0) } else { (16, 2) };
-        let mut floats = vec![f32::NAN; start as usize / 4];
-        for primitive in 0..5 {
-            let center = center(geometry, primitive);
-            floats.extend((center - 1.0).to_array());
-            floats.extend((center + 1.0).to_array());
-            floats.extend(std::iter::repeat_n(f32::NAN, gap));
-        }
-        let data = Some(bytemuck::cast_slice(&floats));
-        let usage = BufferUsage::ACCEL_INPUT;
-        boxes.push(ctx.create_buffer(&BufferDesc { data, usage, ..Default::default() })?);
-        geometries.push(BlasGeometry::Aabbs(Aabbs {
-            buffer: *boxes[geometry as usize],
-            offset: start,
-            stride: if gap == 0 { 0 } else { 32 },
-            count: 5,
-            flags: GeometryFlags::OPAQUE,
-        }));
-    }
-    let model = [ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?];
+    let model = [sphere_boxes(&ctx)?];
     let turn = Quat::from_rotation_y(0.7);
     let places = [
         Affine3A::from_scale_rotation_translation(Vec3::splat(0.8), turn, Vec3::new(-1.0, 0.5, 0.0)),
@@ -285,51 +262,76 @@ fn an_intersection_shader_hits_spheres_in_boxes() -> Result<()> {
             Vec3::new(5.0, 0.0, -1.0),
         ),
     ];
-    let placed: Vec<_> = (0..2)
-        .map(|index: u32| Placed {
-            hit_group_offset: 1 - index,
-            custom_index: 900 + index,
-            ..Placed::new(0, places[index as usize])
-        })
-        .collect();
+    let place = |(index, transform): (u32, &Affine3A)| Placed {
+        hit_group_offset: 1 - index,
+        custom_index: 900 + index,
+        ..Placed::new(0, *transform)
+    };
+    let placed: Vec<_> = (0..).zip(&places).map(place).collect();
     let tlas = ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
-    let mut spheres = Vec::new();
-    for (instance, place) in (0..).zip(&places) {
-        for (geometry, primitive) in (0..10).map(|index| (index / 5, index % 5)) {
-            let custom_index = 900 + instance;
-            let center: DVec3 = place.transform_point3(center(geometry, primitive)).as_dvec3();
-            let scale = f64::from(place.matrix3.x_axis.length());
-            let radius = f64::from(RADII[1 - instance as usize].0) * scale;
-            spheres.push(Sphere {
-                center,
-                radius,
-                ids: HitIds { instance, custom_index, geometry, primitive },
-            });
-        }
-    }
+    let spheres = spheres(&placed);
     let rays = random_rays(51, 2_000, Vec3::new(-2.0, -1.0, -4.0), Vec3::new(10.0, 5.0, 5.0));
     for method in Method::available(&ctx) {
         let tracer = match method {
-            Method::Pipeline => sphere_pipeline(&ctx, RADII)?,
+            Method::Pipeline => sphere_pipeline(&ctx)?,
             Method::Query => sphere_query(&ctx)?,
         };
         let records = tracer.trace(&tlas, &rays, How::default())?;
         Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&spheres, ray))
             .assert(&format!("spheres by {method:?}"));
         for hit in records.iter().filter(|record| record.kind != 0) {
-            let (radius, tag) = RADII[1 - hit.instance as usize];
+            let (radius, tag) = GROUPS[1 - hit.instance as usize];
             assert_eq!((hit.kind, hit.barycentrics), (tag, [radius, tag as f32]));
         }
     }
     Ok(())
 }
 
-fn sphere_pipeline(ctx: &Context, radii: [(f32, u32); 2]) -> Result<RayTracer> {
+/// Where the shaders look for a sphere, in object space.
+fn sphere_center(geometry: u32, primitive: u32) -> Vec3 {
+    Vec3::new((primitive % 3) as f32, (primitive / 3) as f32, geometry as f32) * 2.0
+}
+
+fn sphere_boxes(ctx: &Context) -> Result<Holder<AccelStructHandle>> {
+    let mut buffers = Vec::new();
+    let mut geometries = Vec::new();
+    // The second list starts late and has gaps.
+    for (geometry, offset, stride) in [(0, 0, 0), (1, 16, 32)] {
+        let mut floats = vec![f32::NAN; offset as usize / 4];
+        for center in (0..5).map(|primitive| sphere_center(geometry, primitive)) {
+            floats.extend([center - 1.0, center + 1.0].iter().flat_map(Vec3::to_array));
+            floats.extend(vec![f32::NAN; if stride == 0 { 0 } else { 2 }]);
+        }
+        let data = Some(bytemuck::cast_slice(&floats));
+        let usage = BufferUsage::ACCEL_INPUT;
+        let buffer = ctx.create_buffer(&BufferDesc { data, usage, ..Default::default() })?;
+        let flags = GeometryFlags::OPAQUE;
+        geometries.push(BlasGeometry::Aabbs(Aabbs { buffer: *buffer, offset, stride, count: 5, flags }));
+        buffers.push(buffer);
+    }
+    ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })
+}
+
+fn spheres(placed: &[Placed]) -> Vec<Sphere> {
+    let mut spheres = Vec::new();
+    for (instance, placed) in (0..).zip(placed) {
+        let scale = f64::from(placed.transform.matrix3.x_axis.length());
+        let radius = f64::from(GROUPS[placed.hit_group_offset as usize].0) * scale;
+        for (geometry, primitive) in (0..10).map(|index| (index / 5, index % 5)) {
+            let center = placed.transform.transform_point3(sphere_center(geometry, primitive)).as_dvec3();
+            let ids = HitIds { instance, custom_index: placed.custom_index, geometry, primitive };
+            spheres.push(Sphere { center, radius, ids });
+        }
+    }
+    spheres
+}
+
+fn sphere_pipeline(ctx: &Context) -> Result<RayTracer> {
     let ray_gen = shader(ctx, ShaderStage::RayGen, RAY_GEN)?;
     let miss = shader(ctx, ShaderStage::Miss, MISS)?;
     let hit = shader(ctx, ShaderStage::ClosestHit, include_str!("../shaders/sphere.rchit.glsl"))?;
     let sphere = shader(ctx, ShaderStage::Intersection, include_str!("../shaders/sphere.rint.glsl"))?;
-    let records = radii.map(|(radius, tag)| [radius.to_ne_bytes(), tag.to_ne_bytes()].concat());
+    let records = GROUPS.map(|(radius, tag)| [radius.to_ne_bytes(), tag.to_ne_bytes()].concat());
     let groups = records.each_ref().map(|record| HitGroup {
         closest_hit: Some(*hit),
         intersection: Some(*sphere),

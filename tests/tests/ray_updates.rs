@@ -266,3 +266,23 @@ fn a_command_buffer_given_up_changes_nothing() -> Result<()> {
     }
     Ok(())
 }
+
+/// Two command buffers are recorded side by side; the first submitted changes how many instances the second refits.
+#[test]
+fn a_refit_overtaken_by_a_rebuild_of_another_count_is_refused() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    for method in Method::available(&ctx) {
+        let tracer = RayTracer::new(&ctx, method)?;
+        let gpu = spiral(3, 0.0).upload_with(&ctx, BuildFlags::default(), UPDATABLE, 4)?;
+        let three = instances(&spiral(3, 0.0).placed, &gpu.models);
+        let two = spiral(2, 1.0);
+        let mut rebuild = ctx.acquire_command_buffer()?;
+        rebuild.update_tlas(*gpu.tlas, &instances(&two.placed, &gpu.models), BuildMode::Rebuild)?;
+        let mut refit = ctx.acquire_command_buffer()?;
+        refit.update_tlas(*gpu.tlas, &three, BuildMode::Refit)?;
+        ctx.submit(rebuild)?;
+        assert!(matches!(ctx.submit(refit), Err(lvk::Error::InvalidUsage { .. })));
+        check(&format!("two are shown, {method:?}"), &tracer, &gpu, &two)?;
+    }
+    Ok(())
+}

@@ -2,17 +2,18 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    Blend, BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoad, ColorTarget, CompareOp, Context,
-    CullMode, DepthAttachment, DepthLoad, DepthTest, Dependencies, Format, FrontFace, Holder, IndexFormat,
-    RenderPass, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, TextureDesc, TextureHandle, TextureKind,
-    TextureRegion, TextureUsage, Topology, VertexAttribute, VertexBinding, VertexFormat,
+    Blend, BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoad, ColorTarget, CompareOp,
+    Context, CullMode, Dependencies, DepthAttachment, DepthLoad, DepthTest, Format, FrontFace, Holder,
+    IndexFormat, RenderPass, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, TextureDesc,
+    TextureHandle, TextureKind, TextureRegion, TextureUsage, Topology, VertexAttribute, VertexBinding,
+    VertexFormat,
 };
 use lvk_tests::compute::Evaluator;
 use lvk_tests::device;
 use lvk_tests::raster::{COVER, PAINT, coverage, pixels, render_pipeline, target};
 
 const SIZE: [u32; 2] = [16, 16];
-const CORNERS: [[f64; 2]; 3] = [[1.3, 0.72], [14.63, 4.21], [5.14, 15.37]];
+const CORNERS: [[f64; 2]; 3] = [[1.43, 0.55], [14.06, 4.16], [5.05, 15.43]];
 const RED: [u8; 4] = [255, 0, 0, 255];
 const BLUE: [u8; 4] = [0, 0, 255, 255];
 const CLEAR_BLUE: ColorLoad = ColorLoad::Clear([0.0, 0.0, 1.0, 1.0]);
@@ -170,7 +171,12 @@ fn instances_step_their_own_binding() {
     let desc = RenderPipelineDesc {
         topology: Topology::TriangleStrip,
         vertex_bindings: &[VertexBinding { stride: 4, per_instance: true }],
-        vertex_attributes: &[VertexAttribute { location: 3, binding: 0, format: VertexFormat::F32, offset: 0 }],
+        vertex_attributes: &[VertexAttribute {
+            location: 3,
+            binding: 0,
+            format: VertexFormat::F32,
+            offset: 0,
+        }],
         color: &color(Format::R32Float),
         ..Default::default()
     };
@@ -242,7 +248,8 @@ fn several_targets_take_their_own_outputs_and_clears() {
     let desc = RenderPipelineDesc { color: &formats.map(ColorTarget::from), ..Default::default() };
     let pipeline = render_pipeline(&ctx, COVER, fragment, &desc);
     let targets = formats.map(|format| target(&ctx, format, [4, 2]));
-    let loads = [CLEAR_BLUE, ColorLoad::ClearUint([7, u32::MAX, 0, 0]), ColorLoad::Clear([0.25, -2.0, 0.0, 1.0])];
+    let loads =
+        [CLEAR_BLUE, ColorLoad::ClearUint([7, u32::MAX, 0, 0]), ColorLoad::Clear([0.25, -2.0, 0.0, 1.0])];
     let color = [0, 1, 2].map(|i| attachment(*targets[i], loads[i]));
     draw(&ctx, &color, None, |pass| {
         assert_eq!(pass.extent(), [4, 2]);
@@ -261,7 +268,11 @@ fn several_targets_take_their_own_outputs_and_clears() {
     }
     for (at, found) in pixels::<[f32; 4]>(&ctx, *targets[2]).into_iter().enumerate() {
         let id = (at % 4 + 10 * (at / 4)) as f32;
-        assert_eq!(found, if drawn(at % 4) { [-1.5, 1e9, id, 0.0] } else { [0.25, -2.0, 0.0, 1.0] }, "pixel {at}");
+        assert_eq!(
+            found,
+            if drawn(at % 4) { [-1.5, 1e9, id, 0.0] } else { [0.25, -2.0, 0.0, 1.0] },
+            "pixel {at}"
+        );
     }
 }
 
@@ -287,7 +298,8 @@ fn depth_decides_what_is_seen() {
         for (compare, expected) in expected {
             let pipeline = |compare| {
                 let depth = Some(DepthTest { format, compare, write: true });
-                let desc = RenderPipelineDesc { color: &color(Format::R32Float), depth, ..Default::default() };
+                let desc =
+                    RenderPipelineDesc { color: &color(Format::R32Float), depth, ..Default::default() };
                 render_pipeline(&ctx, COVER, PAINT, &desc)
             };
             let (first, second) = (pipeline(CompareOp::Less), pipeline(compare));
@@ -351,7 +363,8 @@ fn blending_combines_source_and_target() {
     ];
     for (blend, expected) in blends {
         let color = [ColorTarget { format: Format::Rgba32Float, blend }];
-        let pipeline = render_pipeline(&ctx, COVER, PAINT, &RenderPipelineDesc { color: &color, ..Default::default() });
+        let pipeline =
+            render_pipeline(&ctx, COVER, PAINT, &RenderPipelineDesc { color: &color, ..Default::default() });
         draw(&ctx, &[attachment(*target, ColorLoad::Clear(behind))], None, |pass| {
             pass.bind_render_pipeline(*pipeline)?;
             paint(pass, over, 0.0)
@@ -396,7 +409,11 @@ fn mips_layers_and_faces_are_drawn_to_and_sampled() {
     let sampler = ctx.create_sampler(&Default::default()).unwrap();
     let cases = [
         (TextureKind::D2, 1, "textureBindless2DLod(a, b, vec2(0.5), i)"),
-        (TextureKind::D2Array { layers: 3 }, 3, "textureBindless2DArrayLod(a, b, vec3(0.5, 0.5, i / 3), i % 3)"),
+        (
+            TextureKind::D2Array { layers: 3 },
+            3,
+            "textureBindless2DArrayLod(a, b, vec3(0.5, 0.5, i / 3), i % 3)",
+        ),
         (
             TextureKind::Cube,
             6,
@@ -405,7 +422,14 @@ fn mips_layers_and_faces_are_drawn_to_and_sampled() {
     ];
     for (kind, layers, expression) in cases {
         let usage = TextureUsage::TARGET | TextureUsage::SAMPLED;
-        let desc = TextureDesc { kind, format: Format::R32Float, extent: [4, 4], mips: 0, usage, ..Default::default() };
+        let desc = TextureDesc {
+            kind,
+            format: Format::R32Float,
+            extent: [4, 4],
+            mips: 0,
+            usage,
+            ..Default::default()
+        };
         let texture = ctx.create_texture(&desc).unwrap();
         for (layer, mip) in (0..layers).flat_map(|layer| (0..3).map(move |mip| (layer, mip))) {
             let load = ColorLoad::Clear([-1.0; 4]);
@@ -481,7 +505,8 @@ fn culling_follows_the_winding_on_screen() {
         (CullMode::Front, FrontFace::CounterClockwise, true),
     ];
     for (cull, front_face, seen) in cases {
-        let desc = RenderPipelineDesc { cull, front_face, color: &color(Format::Rgba8Unorm), ..Default::default() };
+        let desc =
+            RenderPipelineDesc { cull, front_face, color: &color(Format::Rgba8Unorm), ..Default::default() };
         let pipeline = render_pipeline(&ctx, pull, FLAT, &desc);
         let target = target(&ctx, Format::Rgba8Unorm, SIZE);
         draw(&ctx, &[attachment(*target, CLEAR_BLUE)], None, |pass| {

@@ -23,9 +23,22 @@ const INSTANCE_ALIGNMENT: u64 = 16;
 pub(crate) struct TlasUpdate {
     target: Arc<AccelStruct>,
     contents: TlasContents,
+    /// Moves what is shown when the command buffer is submitted, so that must have as many instances.
+    refits_submitted: bool,
 }
 
 impl TlasUpdate {
+    /// Fails if another submission changed the number of instances since the refit was recorded.
+    fn check(&self) -> Result<()> {
+        let now = self.target.tlas()?.contents().instance_count;
+        if !self.refits_submitted || now == self.contents.instance_count {
+            return Ok(());
+        }
+        let message =
+            "a refit was recorded, but a submission since then changed the number of instances; rebuild";
+        Err(Error::usage(&self.target.name, message))
+    }
+
     /// Makes it so. Structures shown before may go once the GPU is done with them.
     pub(crate) fn apply(self, shared: &Shared) {
         if let Ok(tlas) = self.target.tlas() {
@@ -108,7 +121,8 @@ impl CommandBuffer {
         let build = Build { target: Arc::clone(target), input, mode, scratch_bytes, reads: Vec::new() };
         self.record_builds(&[build])?;
         let contents = TlasContents { instance_count: Some(count), blas: converted.blas };
-        self.tlas_updates.push(TlasUpdate { target: Arc::clone(target), contents });
+        let refits_submitted = mode == BuildMode::Refit && self.own_update(target).is_none();
+        self.tlas_updates.push(TlasUpdate { target: Arc::clone(target), contents, refits_submitted });
         Ok(())
     }
 
@@ -120,8 +134,18 @@ impl CommandBuffer {
 
     /// Instances shown by the last build before the next command.
     fn instance_count(&self, target: &Arc<AccelStruct>, tlas: &Tlas) -> Option<u32> {
-        let own = self.tlas_updates.iter().rev().find(|update| update.target.id == target.id);
+        let own = self.own_update(target);
         own.map_or_else(|| tlas.contents().instance_count, |update| update.contents.instance_count)
+    }
+
+    /// The last update recorded in this command buffer.
+    fn own_update(&self, target: &AccelStruct) -> Option<&TlasUpdate> {
+        self.tlas_updates.iter().rev().find(|update| update.target.id == target.id)
+    }
+
+    /// Fails if what was recorded no longer fits what was submitted since.
+    pub(crate) fn check_tlas_updates(&self) -> Result<()> {
+        self.tlas_updates.iter().try_for_each(TlasUpdate::check)
     }
 
     /// Keeps a buffer of its own that the staging ring had no room for until the GPU is done with it.

@@ -15,12 +15,14 @@ impl Context {
     /// Submits a command buffer, after uploads and builds made before (`vkQueueSubmit2`). Does not wait.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) if the command buffer belongs to another context.
+    /// [`InvalidUsage`](Error::InvalidUsage) if the command buffer belongs to another context, or refits a top-level
+    /// structure whose number of instances another submission changed meanwhile.
     pub fn submit(&self, cmd: CommandBuffer) -> Result<SubmitHandle> {
         if !cmd.belongs_to(self.shared()) {
             return Err(Error::usage("submit", "the command buffer belongs to another context"));
         }
         let mut pending = self.pending();
+        cmd.check_tlas_updates()?;
         let submitted = self.send(pending.take().into_iter().chain([cmd]))?;
         drop(pending);
         self.shared().collect()?;

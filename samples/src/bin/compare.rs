@@ -1,0 +1,54 @@
+//! Compares two pictures: `compare FIRST.png SECOND.png` prints PSNR, SSIM and how many pixels differ.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use clap::Parser;
+use image::RgbaImage;
+use lvk_samples::app::metrics;
+
+/// Compares two pictures of the same size.
+#[derive(Parser)]
+#[command(version)]
+struct Args {
+    /// A picture
+    first: PathBuf,
+    /// The picture it is compared with
+    second: PathBuf,
+}
+
+fn main() -> ExitCode {
+    match compare(&Args::parse()) {
+        Ok(line) => {
+            println!("{line}");
+            ExitCode::SUCCESS
+        }
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn compare(args: &Args) -> Result<String, String> {
+    let (first, second) = (read(&args.first)?, read(&args.second)?);
+    if first.dimensions() != second.dimensions() {
+        let sizes = (first.dimensions(), second.dimensions());
+        return Err(format!("the pictures differ in size: {:?} and {:?}", sizes.0, sizes.1));
+    }
+    let (width, height) = first.dimensions();
+    let found = metrics::compare(first.as_raw(), second.as_raw(), width, height);
+    let found = found.map_err(|error| error.to_string())?;
+    Ok(format!(
+        "PSNR {:.2} dB, SSIM {:.5}, {:.4} % of pixels differ by more than 1/255, at most by {}/255",
+        found.psnr,
+        found.ssim,
+        found.differing_share * 100.0,
+        found.max_difference
+    ))
+}
+
+fn read(path: &Path) -> Result<RgbaImage, String> {
+    let picture = image::open(path).map_err(|error| format!("{}: {error}", path.display()))?;
+    Ok(picture.to_rgba8())
+}
