@@ -23,9 +23,9 @@ pub enum Error {
         reason: String,
     },
     /// Devices exist, but none has what the caller requires.
-    #[error("no Vulkan device has what was required:\n{reasons}")]
+    #[error("no Vulkan device has what was required: {reasons}")]
     NoDevice {
-        /// One line for each device: its name and what it lacks.
+        /// What was wrong with the wish, if anything, then each device with what it lacks, separated by `; `.
         reasons: String,
     },
     /// The device, its driver or a layer lacks what a call needs.

@@ -60,14 +60,15 @@
 //! acceleration structures, traces and ray queries in compute shaders need no word from the caller. What a shader
 //! reaches only by number or address is named in [`Dependencies`] when an earlier command *wrote* it, or when this one
 //! writes it; what was only uploaded is readable everywhere. A render pass cannot contain barriers, so what its draws
-//! read and the same command buffer wrote is named in the pass's dependencies; forgetting that is an error, not a
-//! hazard.
+//! read and the same command buffer wrote is named in the pass's dependencies; forgetting that is an error for indices,
+//! vertices, indirect arguments and acceleration structures, and a hazard for what shaders reach by number or address.
 //!
 //! # What is not checked
 //!
 //! Numbers and addresses inside shaders: a shader that indexes past the arrays, or reads through a wrong address, is
 //! undefined behaviour on the GPU, as in every bindless design. Slot 0 of each array and every free slot hold a
-//! visible dummy.
+//! visible dummy, a 2D one among the textures. Nor are vertices, which indices and draws may ask for beyond the end of
+//! a vertex buffer.
 //!
 //! # What `lvk` does not do (yet)
 //!

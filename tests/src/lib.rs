@@ -4,13 +4,16 @@ pub mod agreement;
 pub mod child;
 pub mod compute;
 pub mod device;
+pub mod hybrid;
 pub mod meshes;
 pub mod noise;
+pub mod picture;
 pub mod random;
 pub mod raster;
 pub mod ray_scene;
 pub mod ray_tracer;
 pub mod rays;
 pub mod reference;
+pub mod still_life;
 
 pub use device::{TestDevice, device, device_with};

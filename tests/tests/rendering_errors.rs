@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    BufferDesc, BufferUsage, ColorAttachment, ColorLoad, ColorTarget, CompareOp, Context, DepthAttachment, DepthLoad,
-    DepthTest, Dependencies, Error, Format, IndexFormat, RenderPassDesc, RenderPipelineDesc, ShaderStage,
-    TextureDesc, TextureUsage, VertexAttribute, VertexBinding, VertexFormat,
+    BufferDesc, BufferUsage, ColorAttachment, ColorLoad, ColorTarget, CompareOp, Context, Dependencies,
+    DepthAttachment, DepthLoad, DepthTest, Error, Format, IndexFormat, RenderPassDesc, RenderPipelineDesc,
+    ShaderStage, TextureDesc, TextureUsage, VertexAttribute, VertexBinding, VertexFormat,
 };
 use lvk_tests::compute::module;
 use lvk_tests::device;
@@ -44,9 +44,13 @@ fn passes_with_unfit_targets_are_refused() {
     begin(&[clear(*sampled)], None, "TARGET");
     begin(&[ColorAttachment { mip: 1, ..clear(*color) }], None, "mip 1");
     begin(&[ColorAttachment { layer: 1, ..clear(*color) }], None, "layer 1");
-    begin(&[clear(*color), clear(*color)], None, "two ways");
+    begin(&[clear(*color), clear(*color)], None, "twice");
     begin(&[], Some(DepthAttachment::clear(*depth, 1.5)), "1.5");
-    begin(&[], Some(DepthAttachment { load: DepthLoad::Clear(f32::NAN), ..DepthAttachment::clear(*depth, 0.0) }), "NaN");
+    begin(
+        &[],
+        Some(DepthAttachment { load: DepthLoad::Clear(f32::NAN), ..DepthAttachment::clear(*depth, 0.0) }),
+        "NaN",
+    );
     let reads = Dependencies { sampled_images: &[*color], ..Default::default() };
     let feedback = RenderPassDesc { color: &[clear(*color)], dependencies: reads, ..Default::default() };
     usage_error(cmd.begin_rendering(&feedback).map(drop), "two ways");
@@ -93,7 +97,8 @@ fn draws_without_their_inputs_are_refused() {
         layout(location = 0) in vec2 a;
         layout(location = 1) in vec2 b;
         void main() { gl_Position = vec4(a + b, depth, 1); }";
-    let attribute = |binding| VertexAttribute { location: binding, binding, format: VertexFormat::F32x2, offset: 0 };
+    let attribute =
+        |binding| VertexAttribute { location: binding, binding, format: VertexFormat::F32x2, offset: 0 };
     let desc = RenderPipelineDesc {
         vertex_bindings: &[VertexBinding { stride: 8, per_instance: false }; 2],
         vertex_attributes: &[attribute(0), attribute(1)],
@@ -102,8 +107,10 @@ fn draws_without_their_inputs_are_refused() {
         ..Default::default()
     };
     let pipeline = render_pipeline(&ctx, vertex, PAINT, &desc);
-    let with = |usage| ctx.create_buffer(&BufferDesc { size_bytes: 64, usage, ..Default::default() }).unwrap();
-    let (vertices, indices, plain) = (with(BufferUsage::VERTEX), with(BufferUsage::INDEX), with(BufferUsage::STORAGE));
+    let with =
+        |usage| ctx.create_buffer(&BufferDesc { size_bytes: 64, usage, ..Default::default() }).unwrap();
+    let (vertices, indices, plain) =
+        (with(BufferUsage::VERTEX), with(BufferUsage::INDEX), with(BufferUsage::STORAGE));
     let arguments = with(BufferUsage::INDIRECT);
     let target = target(&ctx, Format::Rgba8Unorm, [4, 4]);
     let mut cmd = ctx.acquire_command_buffer().unwrap();
@@ -149,7 +156,9 @@ fn viewports_and_scissors_outside_are_refused() {
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let color = [ColorAttachment::clear(*target, [0.0; 4])];
     let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
-    for rectangle in [[0.0, 0.0, f32::NAN, 1.0], [0.0, f32::INFINITY, 1.0, 1.0], [0.0; 4], [0.0, 0.0, -1.0, 1.0]] {
+    for rectangle in
+        [[0.0, 0.0, f32::NAN, 1.0], [0.0, f32::INFINITY, 1.0, 1.0], [0.0; 4], [0.0, 0.0, -1.0, 1.0]]
+    {
         usage_error(pass.viewport(rectangle, [0.0, 1.0]), "viewport");
     }
     for depth in [[-0.1, 1.0], [0.0, 1.1], [f32::NAN, 1.0]] {
@@ -169,7 +178,9 @@ fn viewports_beyond_the_device_are_refused() {
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let color = [ColorAttachment::clear(*target, [0.0; 4])];
     let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
-    for rectangle in [[0.0, 0.0, 1.0e9, 4.0], [-1.0e9, 0.0, 4.0, 4.0], [0.0, 1.0e9, 4.0, -4.0], [0.0, 0.0, 4.0, 1.0e9]] {
+    for rectangle in
+        [[0.0, 0.0, 1.0e9, 4.0], [-1.0e9, 0.0, 4.0, 4.0], [0.0, 1.0e9, 4.0, -4.0], [0.0, 0.0, 4.0, 1.0e9]]
+    {
         usage_error(pass.viewport(rectangle, [0.0, 1.0]), "viewport");
     }
 }
@@ -185,8 +196,14 @@ fn unfit_pipelines_are_refused() {
     };
     let none = RenderPipelineDesc { debug_name: "odd one", ..Default::default() };
     usage_error(ctx.create_render_pipeline(&none).map(drop), "odd one: give the pipeline a vertex shader");
-    usage_error(make(RenderPipelineDesc { vertex: Some(*fragment), ..Default::default() }), "a Vertex module");
-    usage_error(make(RenderPipelineDesc { fragment: Some(*vertex), ..Default::default() }), "a Fragment module");
+    usage_error(
+        make(RenderPipelineDesc { vertex: Some(*fragment), ..Default::default() }),
+        "a Vertex module",
+    );
+    usage_error(
+        make(RenderPipelineDesc { fragment: Some(*vertex), ..Default::default() }),
+        "a Fragment module",
+    );
     let attribute = VertexAttribute { location: 0, binding: 0, format: VertexFormat::F32x3, offset: 4 };
     let one = [attribute];
     usage_error(make(RenderPipelineDesc { vertex_attributes: &one, ..Default::default() }), "does not exist");

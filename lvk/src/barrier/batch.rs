@@ -1,9 +1,9 @@
 //! Barriers of one place in a command buffer, merged so that one Vulkan call records them all.
 
 use super::access::{Access, Stages};
+use super::resource_id::ResourceId;
 use super::state::Scopes;
 use super::subresource::Subresources;
-use super::tracker::ResourceId;
 
 /// A global memory barrier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -16,6 +16,20 @@ pub(crate) struct MemoryBarrier {
     pub(crate) dst_stages: Stages,
     /// Accesses that must see the writes.
     pub(crate) dst_access: Access,
+}
+
+impl MemoryBarrier {
+    /// The same in parts that never name traversal together with shader stages outside of ray tracing pipelines, which
+    /// Vulkan forbids where ray queries are off.
+    pub(crate) fn without_ray_queries(self) -> impl Iterator<Item = Self> {
+        let traversing = self.dst_stages & (Stages::RAY_TRACING | Stages::ACCEL_BUILD);
+        if self.dst_stages == traversing || !self.dst_access.contains(Access::ACCEL_READ) {
+            return [Some(self), None].into_iter().flatten();
+        }
+        let rest = Self { dst_access: self.dst_access - Access::ACCEL_READ, ..self };
+        let traversal = Self { dst_stages: traversing, dst_access: Access::ACCEL_READ, ..self };
+        [Some(rest), (!traversing.is_empty()).then_some(traversal)].into_iter().flatten()
+    }
 }
 
 /// A layout transition.
@@ -66,5 +80,30 @@ impl Barriers {
         } else {
             self.images.push(ImageBarrier { id, subresources, scopes });
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn traversal_is_kept_from_the_shaders_that_cannot_traverse() {
+        let merged = MemoryBarrier {
+            src_stages: Stages::ACCEL_BUILD,
+            src_access: Access::ACCEL_WRITE,
+            dst_stages: Stages::COMPUTE | Stages::RAY_TRACING,
+            dst_access: Access::SHADER_READ | Access::ACCEL_READ,
+        };
+        let parts: Vec<_> = merged.without_ray_queries().collect();
+        let rest = MemoryBarrier { dst_access: Access::SHADER_READ, ..merged };
+        let traversal =
+            MemoryBarrier { dst_stages: Stages::RAY_TRACING, dst_access: Access::ACCEL_READ, ..merged };
+        assert_eq!(parts, [rest, traversal]);
+        for whole in [rest, traversal] {
+            assert_eq!(whole.without_ray_queries().collect::<Vec<_>>(), [whole]);
+        }
+        let compute = MemoryBarrier { dst_stages: Stages::COMPUTE, ..merged };
+        assert_eq!(compute.without_ray_queries().count(), 1);
     }
 }

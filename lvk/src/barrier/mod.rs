@@ -5,6 +5,7 @@
 
 mod access;
 mod batch;
+mod resource_id;
 mod state;
 mod states;
 mod subresource;
@@ -17,6 +18,7 @@ mod model_tests;
 
 pub(crate) use access::{Access, Layout, Stages, Use};
 pub(crate) use batch::{Barriers, ImageBarrier, MemoryBarrier};
+pub(crate) use resource_id::ResourceId;
 pub(crate) use states::States;
 pub(crate) use subresource::{Subresources, TextureShape};
-pub(crate) use tracker::{ResourceId, Tracker};
+pub(crate) use tracker::Tracker;

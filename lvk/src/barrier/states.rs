@@ -2,9 +2,10 @@
 
 use super::access::{Layout, StageAccess, Use};
 use super::batch::Barriers;
+use super::resource_id::{IdMap, ResourceId};
 use super::state::{Scopes, State, accumulate, transition};
 use super::subresource::{Cells, Subresources};
-use super::tracker::{IdMap, Local, Prefix, ResourceId, Tracker};
+use super::tracker::{Local, Prefix, Tracker};
 
 /// State of every resource after everything submitted to one queue so far.
 #[derive(Debug, Default)]

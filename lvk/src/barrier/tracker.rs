@@ -1,49 +1,10 @@
 //! Barriers inside one command buffer, recorded without knowing what the queue did before.
 
-use std::collections::HashMap;
-use std::hash::{BuildHasherDefault, Hasher};
-use std::sync::atomic::{AtomicU64, Ordering};
-
 use super::access::{Layout, StageAccess, Use};
 use super::batch::Barriers;
+use super::resource_id::{IdMap, ResourceId};
 use super::state::{Scopes, State, accumulate, transition};
 use super::subresource::{Cells, Subresources, TextureShape};
-
-/// Identity of a buffer, a texture or a group of resources that is tracked as one; never reused.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(crate) struct ResourceId(pub(crate) u64);
-
-impl ResourceId {
-    /// An id nobody else has, and nobody gets again.
-    pub(crate) fn next() -> Self {
-        static LAST: AtomicU64 = AtomicU64::new(0);
-        Self(LAST.fetch_add(1, Ordering::Relaxed) + 1)
-    }
-}
-
-/// A map keyed by [`ResourceId`].
-pub(crate) type IdMap<T> = HashMap<ResourceId, T, BuildHasherDefault<IdHasher>>;
-
-/// Spreads ids, which are consecutive numbers chosen by the library itself, so that no defence against crafted keys is
-/// needed.
-#[derive(Default)]
-pub(crate) struct IdHasher(u64);
-
-impl Hasher for IdHasher {
-    fn write(&mut self, bytes: &[u8]) {
-        for &byte in bytes {
-            self.write_u64(u64::from(byte) ^ self.0);
-        }
-    }
-
-    fn write_u64(&mut self, id: u64) {
-        self.0 = id.wrapping_mul(0x9E37_79B9_7F4A_7C15);
-    }
-
-    fn finish(&self) -> u64 {
-        self.0
-    }
-}
 
 /// How a command buffer uses a (sub)resource before anything in it must wait for anything else in it.
 ///

@@ -174,9 +174,11 @@ impl CommandBuffer {
     }
 
     fn record_builds(&mut self, builds: &[Build]) -> Result<()> {
-        let alignment = self.shared.gpu.caps.limits.scratch_alignment.into();
+        let limits = &self.shared.gpu.caps.limits;
+        let alignment = limits.scratch_alignment.into();
+        let largest = limits.max_buffer_bytes.saturating_sub(alignment);
         let sizes: Vec<_> = builds.iter().map(|build| build.scratch_bytes).collect();
-        for batch in plan_scratch(&sizes, alignment, self.shared.scratch_budget_bytes) {
+        for batch in plan_scratch(&sizes, alignment, self.shared.scratch_budget_bytes.min(largest)) {
             self.record_batch(&builds[batch.builds.clone()], &batch, alignment)?;
         }
         Ok(())

@@ -7,10 +7,11 @@ use ash::vk;
 use super::CommandBuffer;
 use crate::error::{Error, Result};
 
-/// What is known of the push constants: how many bytes were pushed, and what the last bound pipeline wants.
+/// What is known of the push constants: which were pushed, and what the last bound pipeline wants.
 #[derive(Debug, Default)]
 pub(super) struct PushConstants {
-    pushed_bytes: u32,
+    /// A bit for each 4 bytes: enough, as the layout has at most 256 bytes.
+    pushed: u64,
     wanted: Option<(Arc<str>, u32)>,
 }
 
@@ -34,13 +35,12 @@ impl PushConstants {
 
     /// Fails if the pipeline reads bytes that were never pushed.
     fn check_pushed(&self, pipeline: &str, expected: u32) -> Result<()> {
-        if self.pushed_bytes >= expected {
+        let pushed = 4 * (self.pushed & words(0, expected)).count_ones();
+        if pushed >= expected {
             return Ok(());
         }
-        let message = format!(
-            "its shaders read {expected} bytes of push constants, but {} were pushed",
-            self.pushed_bytes
-        );
+        let message =
+            format!("its shaders read {expected} bytes of push constants, but {pushed} were pushed");
         Err(Error::usage(pipeline, message))
     }
 }
@@ -65,8 +65,7 @@ impl CommandBuffer {
             let stages = vk::ShaderStageFlags::ALL;
             shared.gpu.device.cmd_push_constants(self.raw(), shared.layout.raw, stages, offset, bytes);
         }
-        let pushed = &mut self.push_constants.pushed_bytes;
-        *pushed = (*pushed).max(offset + size);
+        self.push_constants.pushed |= words(offset, size);
         Ok(())
     }
 
@@ -97,12 +96,18 @@ impl CommandBuffer {
     }
 }
 
+/// The bits of `size` bytes from `offset` on, all multiples of 4.
+fn words(offset: u32, size: u32) -> u64 {
+    let below = |end: u32| u64::MAX.checked_shr(64_u32.saturating_sub(end / 4)).unwrap_or(0);
+    below(offset.saturating_add(size)) & !below(offset)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     fn bound(expected: u32) -> PushConstants {
-        PushConstants { pushed_bytes: 0, wanted: Some(("p".into(), expected)) }
+        PushConstants { pushed: 0, wanted: Some(("p".into(), expected)) }
     }
 
     #[test]
@@ -121,8 +126,12 @@ mod tests {
 
     #[test]
     fn a_pipeline_does_not_run_on_constants_nobody_pushed() {
-        let pushed = PushConstants { pushed_bytes: 16, wanted: None };
-        assert!(pushed.check_pushed("p", 16).is_ok());
-        assert!(pushed.check_pushed("p", 20).is_err());
+        let mut constants = PushConstants { pushed: words(0, 16), wanted: None };
+        assert!(constants.check_pushed("p", 16).is_ok());
+        assert!(constants.check_pushed("p", 20).is_err());
+        constants.pushed |= words(20, 236);
+        assert!(constants.check_pushed("p", 256).unwrap_err().to_string().contains("but 252 were"));
+        constants.pushed |= words(16, 4);
+        assert!(constants.check_pushed("p", 256).is_ok());
     }
 }

@@ -47,6 +47,8 @@ pub struct CommandBuffer {
     push_constants: PushConstants,
     host_reads: Vec<ResourceId>,
     open_labels: u32,
+    /// Whether a render pass is open; it stays so where its value was forgotten instead of dropped.
+    rendering: bool,
     settle: Vec<Settle>,
     tlas_updates: Vec<TlasUpdate>,
 }
@@ -65,6 +67,7 @@ impl CommandBuffer {
             push_constants: PushConstants::default(),
             host_reads: Vec::new(),
             open_labels: 0,
+            rendering: false,
             settle: Vec::new(),
             tlas_updates: Vec::new(),
         })
@@ -87,7 +90,8 @@ impl CommandBuffer {
     /// The Vulkan command buffer, for commands the library does not have.
     ///
     /// What is recorded this way is not tracked: the caller places its barriers, and leaves images in the layout it
-    /// found them in. Pipelines and push constants must be bound again afterwards.
+    /// found them in. Pipelines and push constants must be bound again afterwards, and so must the bindless set
+    /// ([`Context::raw_descriptor_set`](crate::Context::raw_descriptor_set)) where another set took its place.
     pub fn raw(&self) -> vk::CommandBuffer {
         self.recording.commands
     }
@@ -119,7 +123,6 @@ impl Drop for CommandBuffer {
         if !self.finished {
             // SAFETY: only `finish` takes the recording too, and it sets `finished`.
             let recording = unsafe { ManuallyDrop::take(&mut self.recording) };
-            self.shared.staging.release(recording.sequence);
             self.shared.submitter.discard(recording);
         }
     }

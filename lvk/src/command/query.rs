@@ -15,7 +15,8 @@ impl CommandBuffer {
         let count = queries.end.saturating_sub(queries.start);
         pool.check_range(queries.start, count)?;
         if count > 0 {
-            // SAFETY: the queries exist.
+            self.end_rendering();
+            // SAFETY: the queries exist, and no pass is open.
             unsafe {
                 self.shared.gpu.device.cmd_reset_query_pool(self.raw(), pool.raw, queries.start, count)
             };

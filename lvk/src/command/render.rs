@@ -11,6 +11,7 @@ use super::render_pass::Targets;
 use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result};
 use crate::format::IndexFormat;
+use crate::gpu::caps::Limits;
 use crate::handle::{BufferHandle, RenderPipelineHandle};
 use crate::pipeline::RenderPipeline;
 use crate::resource::Buffer;
@@ -90,10 +91,14 @@ impl<'a> RenderPass<'a> {
 
     /// Maps clip space to pixels: x, y, width, height, and the depth range. Heights may be negative to flip y.
     pub fn viewport(&mut self, rectangle: [f32; 4], depth: [f32; 2]) -> Result<()> {
-        let finite = rectangle.iter().all(|side| side.is_finite());
+        let limits = &self.cmd.shared.gpu.caps.limits;
         let depths = depth.iter().all(|end| (0.0..=1.0).contains(end));
-        if !finite || !depths || rectangle[2] <= 0.0 {
-            let message = "a viewport needs finite numbers, a positive width, and depths from 0 to 1";
+        if !depths || !viewport_fits(rectangle, limits) {
+            let message = format!(
+                "a viewport needs a width over 0, sides up to {:?}, corners between {:?}, and depths from 0 to 1, not \
+                 {rectangle:?} and {depth:?}",
+                limits.max_viewport, limits.viewport_bounds
+            );
             return Err(Error::usage("viewport", message));
         }
         self.set_viewport(rectangle, depth);
@@ -321,8 +326,7 @@ impl<'a> RenderPass<'a> {
 
 impl Drop for RenderPass<'_> {
     fn drop(&mut self) {
-        // SAFETY: the pass was begun when the value was made, and ends once.
-        unsafe { self.cmd.shared.gpu.device.cmd_end_rendering(self.cmd.raw()) };
+        self.cmd.end_rendering();
         if self.labelled {
             self.cmd.pop_label();
         }
@@ -333,6 +337,15 @@ impl std::fmt::Debug for RenderPass<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("RenderPass").field("extent", &self.targets.extent).finish()
     }
+}
+
+fn viewport_fits([x, y, width, height]: [f32; 4], limits: &Limits) -> bool {
+    let [low, high] = limits.viewport_bounds;
+    let sides = width > 0.0
+        && width <= limits.max_viewport[0] as f32
+        && height.abs() <= limits.max_viewport[1] as f32;
+    // Comparisons with what is no number are false.
+    sides && [x, x + width, y, y + height].iter().all(|at| (low..=high).contains(at))
 }
 
 fn length(range: &Range<u32>) -> u32 {

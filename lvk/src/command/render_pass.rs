@@ -141,6 +141,15 @@ impl CommandBuffer {
         }
         // SAFETY: the views are alive and in the layouts named; no other pass is open, as passes borrow `self`.
         unsafe { self.shared.gpu.device.cmd_begin_rendering(self.raw(), &info) };
+        self.rendering = true;
+    }
+
+    /// Ends the pass that is open, if any: everything but draws happens outside of passes.
+    pub(super) fn end_rendering(&mut self) {
+        if std::mem::take(&mut self.rendering) {
+            // SAFETY: a pass was begun and has not been ended.
+            unsafe { self.shared.gpu.device.cmd_end_rendering(self.raw()) };
+        }
     }
 
     /// Buffers the pass depends on may also be its indices, vertices and indirect arguments.
@@ -169,9 +178,13 @@ impl CommandBuffer {
             stencil: false,
         };
         let mut extent = None;
-        for attachment in desc.color {
+        for (index, attachment) in desc.color.iter().enumerate() {
+            let place = |other: &ColorAttachment| (other.texture, other.mip, other.layer);
             let texture = self.target(attachment.texture, attachment.mip, attachment.layer, &mut extent)?;
             check_color(&texture, attachment.load)?;
+            if desc.color[..index].iter().any(|other| place(other) == place(attachment)) {
+                return Err(Error::usage(&texture.name, "the pass lists the colour target twice"));
+            }
             let next = Use::color_target(attachment.load == ColorLoad::Load);
             self.use_texture(&texture, one(attachment.mip, attachment.layer), next)?;
             targets.colors.push(color_info(&texture, attachment)?);

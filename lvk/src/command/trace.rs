@@ -6,6 +6,7 @@ use super::CommandBuffer;
 use super::dependencies::Dependencies;
 use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result, check_limit};
+use crate::gpu::caps::Limits;
 use crate::handle::RayTracingPipelineHandle;
 
 impl CommandBuffer {
@@ -35,10 +36,8 @@ impl CommandBuffer {
             pipeline.ok_or_else(|| Error::usage("trace_rays", "bind a ray tracing pipeline first"))?;
         self.check_pushed(&pipeline.name, pipeline.push_constant_bytes)?;
         let regions = pipeline.regions(ray_gen)?;
-        let rays = size.iter().fold(1_u64, |all, side| all.saturating_mul((*side).into()));
-        let limits = &self.shared.gpu.caps.limits;
-        check_limit(&pipeline.name, "number of rays", rays, limits.max_trace_invocations.into())?;
-        if rays == 0 {
+        check_size(&self.shared.gpu.caps.limits, &pipeline.name, size)?;
+        if size.contains(&0) {
             return Ok(());
         }
         self.flush_after(|cmd| {
@@ -63,4 +62,14 @@ impl CommandBuffer {
         }
         Ok(())
     }
+}
+
+fn check_size(limits: &Limits, pipeline: &str, size: [u32; 3]) -> Result<()> {
+    for (axis, side) in size.into_iter().enumerate() {
+        let groups = u64::from(limits.max_dispatch_groups[axis]);
+        let most = groups * u64::from(limits.max_group_size[axis]);
+        check_limit(pipeline, "number of rays along an axis", side.into(), most)?;
+    }
+    let rays = size.iter().fold(1_u64, |all, side| all.saturating_mul((*side).into()));
+    check_limit(pipeline, "number of rays", rays, limits.max_trace_invocations.into())
 }

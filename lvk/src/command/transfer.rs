@@ -12,6 +12,8 @@ use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::sampler::Filter;
 use crate::resource::texture::{TextureRegion, TextureUsage, layers_of, one};
 use crate::resource::{Buffer, Texture};
+use crate::submit::Recording;
+use crate::submit::emit::emit;
 
 /// Layout of an image that is copied from.
 const SOURCE: vk::ImageLayout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
@@ -372,17 +374,23 @@ impl CommandBuffer {
         if self.settle.is_empty() {
             return;
         }
-        for written in std::mem::take(&mut self.settle) {
+        let Recording { tracker, images, commands, .. } = &mut *self.recording;
+        self.barriers.clear();
+        // What was written twice is listed twice; the second read needs no barrier any more.
+        for written in self.settle.drain(..) {
             match written {
-                Settle::Buffer(buffer) => self.use_buffer(&buffer, Use::everything_read()),
+                Settle::Buffer(buffer) => {
+                    tracker.use_buffer(buffer.id, Use::everything_read(), &mut self.barriers);
+                }
                 Settle::Texture(texture) if texture.usage.contains(TextureUsage::SAMPLED) => {
-                    // A texture written twice is listed twice; the same use always merges.
-                    let _ = self.use_texture(&texture, texture.all(), Use::shader_read(Stages::SHADERS));
+                    let read = Use::shader_read(Stages::SHADERS);
+                    images.insert(texture.id, (texture.raw, texture.format.aspects()));
+                    tracker.use_texture(texture.id, texture.shape, texture.all(), read, &mut self.barriers);
                 }
                 Settle::Texture(_) => {}
             }
         }
-        self.flush();
+        emit(&self.shared.gpu, *commands, &self.barriers, images);
     }
 }
 

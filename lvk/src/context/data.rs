@@ -22,12 +22,14 @@ impl Context {
     /// instance with one buffer for each frame in flight. Device memory is written before the next submission, after
     /// everything submitted so far.
     pub fn upload_buffer(&self, buffer: BufferHandle, offset: u64, bytes: &[u8]) -> Result<()> {
-        let buffer = self.shared().store.buffers.get(buffer)?;
-        buffer.check_range(offset, bytes.len() as u64)?;
-        if buffer.write(offset, bytes) {
+        let buffers = &self.shared().store.buffers;
+        let target = buffers.get(buffer)?;
+        target.check_range(offset, bytes.len() as u64)?;
+        if target.write(offset, bytes) {
             return Ok(());
         }
-        self.before_next_submission(|cmd| cmd.upload_buffer(&buffer, offset, bytes))
+        // Looked up again while a command buffer is open, which keeps what another thread destroys.
+        self.before_next_submission(|cmd| cmd.upload_buffer(&buffers.get(buffer)?, offset, bytes))
     }
 
     /// Reads bytes of a buffer in any memory, after everything submitted so far. Waits for the GPU.
@@ -46,8 +48,8 @@ impl Context {
 
     /// Writes texels, rows tightly packed, before the next submission.
     pub fn upload_texture(&self, texture: TextureHandle, region: &TextureRegion, bytes: &[u8]) -> Result<()> {
-        let texture = self.shared().store.textures.get(texture)?;
-        self.before_next_submission(|cmd| cmd.upload_texture(&texture, region, bytes))
+        let textures = &self.shared().store.textures;
+        self.before_next_submission(|cmd| cmd.upload_texture(&textures.get(texture)?, region, bytes))
     }
 
     /// Reads texels, rows tightly packed, after everything submitted so far. Waits for the GPU.

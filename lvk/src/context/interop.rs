@@ -35,7 +35,8 @@ impl Context {
         self.shared().gpu.queue_family
     }
 
-    /// Runs `call` with the queue locked, so that it may submit.
+    /// Runs `call` with the queue locked, so that it may submit. It must neither use the context nor drop holders or
+    /// command buffers: these wait for the queue.
     pub fn with_raw_queue<T>(&self, call: impl FnOnce(vk::Queue) -> T) -> T {
         call(*self.shared().gpu.queue())
     }

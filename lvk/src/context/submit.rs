@@ -23,10 +23,7 @@ impl Context {
         }
         let mut pending = self.pending();
         cmd.check_tlas_updates()?;
-        let submitted = self.send(pending.take().into_iter().chain([cmd]))?;
-        drop(pending);
-        self.shared().collect()?;
-        Ok(submitted)
+        self.send(pending.take().into_iter().chain([cmd]))
     }
 
     fn send(&self, commands: impl Iterator<Item = CommandBuffer>) -> Result<SubmitHandle> {
@@ -34,6 +31,7 @@ impl Context {
         let shared = self.shared();
         let value = shared.submitter.submit(recordings, || shared.bindless.flush())?;
         updates.into_iter().flatten().for_each(|update| update.apply(shared));
+        shared.collect()?;
         Ok(SubmitHandle(value))
     }
 
@@ -47,7 +45,8 @@ impl Context {
     /// Waits until a submission is done (`vkWaitSemaphores`).
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) if the handle is of a submission that this context never made.
+    /// [`InvalidUsage`](Error::InvalidUsage) if the handle is beyond the last submission of this context. Handles are
+    /// numbers that count up in each context: one of another context may pass for an older one of this.
     pub fn wait(&self, submission: SubmitHandle) -> Result<()> {
         self.check_submitted(submission)?;
         self.shared().submitter.timeline.wait(submission.0)?;

@@ -78,6 +78,14 @@ pub struct Limits {
     pub max_color_targets: u32,
     /// Most workgroups of a dispatch for each axis (`maxComputeWorkGroupCount`).
     pub max_dispatch_groups: [u32; 3],
+    /// Most invocations of a workgroup for each axis (`maxComputeWorkGroupSize`).
+    pub max_group_size: [u32; 3],
+    /// Most invocations of a workgroup altogether (`maxComputeWorkGroupInvocations`).
+    pub max_group_invocations: u32,
+    /// Largest width and height of a viewport in pixels (`maxViewportDimensions`).
+    pub max_viewport: [u32; 2],
+    /// Where viewports may begin and end in pixels, along both axes (`viewportBoundsRange`).
+    pub viewport_bounds: [f32; 2],
     /// Nanoseconds of one tick of a timestamp (`timestampPeriod`); 0 where the queue has none.
     pub timestamp_period_ns: f32,
     /// Bits of a timestamp that count (`timestampValidBits`).
@@ -251,6 +259,8 @@ fn missing_core(
 ) -> Vec<String> {
     let needed = [
         (core.shader_storage_image_write_without_format, "shaderStorageImageWriteWithoutFormat"),
+        (core.shader_sampled_image_array_dynamic_indexing, "shaderSampledImageArrayDynamicIndexing"),
+        (core.shader_storage_image_array_dynamic_indexing, "shaderStorageImageArrayDynamicIndexing"),
         (core.fragment_stores_and_atomics, "fragmentStoresAndAtomics"),
         (core.independent_blend, "independentBlend"),
         (v12.buffer_device_address, "bufferDeviceAddress"),
@@ -297,6 +307,8 @@ fn wanted_core(core: &vk::PhysicalDeviceFeatures) -> vk::PhysicalDeviceFeatures 
         shader_storage_image_extended_formats: core.shader_storage_image_extended_formats,
         shader_storage_image_read_without_format: core.shader_storage_image_read_without_format,
         shader_storage_image_write_without_format: core.shader_storage_image_write_without_format,
+        shader_sampled_image_array_dynamic_indexing: core.shader_sampled_image_array_dynamic_indexing,
+        shader_storage_image_array_dynamic_indexing: core.shader_storage_image_array_dynamic_indexing,
         shader_int64: core.shader_int64,
         shader_int16: core.shader_int16,
         ..Default::default()
@@ -322,6 +334,10 @@ fn limits(
         max_push_constant_bytes: plain.max_push_constants_size,
         max_color_targets: plain.max_color_attachments.min(8),
         max_dispatch_groups: plain.max_compute_work_group_count,
+        max_group_size: plain.max_compute_work_group_size,
+        max_group_invocations: plain.max_compute_work_group_invocations,
+        max_viewport: plain.max_viewport_dimensions,
+        viewport_bounds: plain.viewport_bounds_range,
         timestamp_period_ns: plain.timestamp_period,
         timestamp_bits: 0,
         max_bindless_textures: 0,

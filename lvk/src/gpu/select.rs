@@ -68,7 +68,7 @@ impl Candidate {
 /// features, then by memory, then the first.
 ///
 /// # Errors
-/// [`Error::NoDevice`], with one line for each device, if none is usable, or if the wish names no device, several
+/// [`Error::NoDevice`], which names every device, if none is usable, or if the wish names no device, several
 /// devices, or one that lacks something.
 pub(crate) fn choose(candidates: &[Candidate], wish: Option<&str>) -> Result<usize> {
     match wish.map(str::trim).filter(|wish| !wish.is_empty()) {
@@ -91,7 +91,7 @@ fn choose_named(candidates: &[Candidate], wish: &str) -> Result<usize> {
             Err(no_device(candidates, Some(format!("'{wish}' names device {index}, which cannot be used"))))
         }
         [] => Err(no_device(candidates, Some(format!("'{wish}' names no device")))),
-        _ => Err(no_device(candidates, Some(format!("'{wish}' names several devices; give an index")))),
+        _ => Err(no_device(candidates, Some(format!("'{wish}' names several devices, give an index")))),
     }
 }
 
@@ -109,7 +109,7 @@ fn no_device(candidates: &[Candidate], headline: Option<String>) -> Error {
     let none = candidates.is_empty().then(|| "the driver reports no device".to_owned());
     let lines = candidates.iter().enumerate().map(|(index, candidate)| candidate.line(index));
     let reasons: Vec<String> = headline.into_iter().chain(none).chain(lines).collect();
-    Error::NoDevice { reasons: reasons.join("\n") }
+    Error::NoDevice { reasons: reasons.join("; ") }
 }
 
 #[cfg(test)]
@@ -165,15 +165,15 @@ mod tests {
     fn wish_that_cannot_be_met_lists_every_device() {
         for (wish, headline) in [
             ("voodoo", "'voodoo' names no device"),
-            ("radeon", "'radeon' names several devices; give an index"),
+            ("radeon", "'radeon' names several devices, give an index"),
             ("2", "'2' names device 2, which cannot be used"),
             ("580", "'580' names device 2, which cannot be used"),
         ] {
             let text = reasons(choose(&machine(), Some(wish)));
-            let lines: Vec<&str> = text.lines().collect();
-            assert_eq!(lines[0], headline);
-            assert_eq!(lines[1], "[0] llvmpipe (CPU): usable");
-            assert_eq!(lines[3], "[2] Radeon RX 580 (discrete): lacks ray query, mesh shaders");
+            let parts: Vec<&str> = text.split("; ").collect();
+            assert_eq!(parts[0], headline);
+            assert_eq!(parts[1], "[0] llvmpipe (CPU): usable");
+            assert_eq!(parts[3], "[2] Radeon RX 580 (discrete): lacks ray query, mesh shaders");
         }
     }
 
@@ -210,6 +210,7 @@ mod tests {
                 }
                 Err(error) => {
                     let text = error.to_string();
+                    prop_assert!(!text.contains('\n'));
                     for (index, candidate) in list.iter().enumerate() {
                         prop_assert!(text.contains(&candidate.line(index)));
                     }

@@ -228,7 +228,25 @@ fn check(
             return Err(Error::unsupported(what, "choose D32Float or D16Unorm"));
         }
     }
-    check_vertex_input(name, desc)
+    check_vertex_input(name, desc)?;
+    check_locations(name, desc, &vertex.reflection.inputs)
+}
+
+/// Fails unless each location the vertex shader reads has an attribute, and no location has two.
+fn check_locations(name: &str, desc: &RenderPipelineDesc<'_>, inputs: &[u32]) -> Result<()> {
+    let mut given: Vec<u32> = desc.vertex_attributes.iter().map(|attribute| attribute.location).collect();
+    given.sort_unstable();
+    if let Some(pair) = given.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(Error::usage(name, format!("two vertex attributes have the location {}", pair[0])));
+    }
+    match inputs.iter().find(|location| !given.contains(location)) {
+        None => Ok(()),
+        Some(location) => {
+            let message =
+                format!("the vertex shader reads location {location}, which no vertex attribute has");
+            Err(Error::usage(name, message))
+        }
+    }
 }
 
 fn check_vertex_input(name: &str, desc: &RenderPipelineDesc<'_>) -> Result<()> {

@@ -34,12 +34,13 @@ pub enum SpecializationValue {
 }
 
 impl SpecializationValue {
-    fn bytes(self) -> [u8; CONSTANT_BYTES] {
+    /// The value as the shader gets it.
+    pub(super) fn bits(self) -> u32 {
         match self {
-            Self::U32(value) => value.to_ne_bytes(),
-            Self::I32(value) => value.to_ne_bytes(),
-            Self::F32(value) => value.to_ne_bytes(),
-            Self::Bool(value) => u32::from(value).to_ne_bytes(),
+            Self::U32(value) => value,
+            Self::I32(value) => value.cast_unsigned(),
+            Self::F32(value) => value.to_bits(),
+            Self::Bool(value) => value.into(),
         }
     }
 }
@@ -57,7 +58,11 @@ impl Specialization {
         constants: &[SpecializationConstant],
         modules: impl Iterator<Item = &'a ShaderModule> + Clone,
     ) -> Result<Self> {
-        for constant in constants {
+        for (index, constant) in constants.iter().enumerate() {
+            if constants[..index].iter().any(|other| other.id == constant.id) {
+                let message = format!("the specialization constant {} is given twice", constant.id);
+                return Err(Error::usage(pipeline, message));
+            }
             let declared = modules.clone().flat_map(|module| &module.reflection.specialization);
             let sizes: Vec<u32> =
                 declared.filter(|(id, _)| *id == constant.id).map(|(_, bytes)| *bytes).collect();
@@ -77,7 +82,7 @@ impl Specialization {
         };
         Ok(Self {
             entries: constants.iter().enumerate().map(entry).collect(),
-            data: constants.iter().flat_map(|constant| constant.value.bytes()).collect(),
+            data: constants.iter().flat_map(|constant| constant.value.bits().to_ne_bytes()).collect(),
         })
     }
 

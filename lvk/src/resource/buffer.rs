@@ -84,6 +84,9 @@ impl InternalUsage {
 }
 
 impl Buffer {
+    /// Matrices and instances of builds, and the largest texels, lie at multiples of this; drivers may ask for less.
+    const ALIGNMENT: u64 = 16;
+
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &BufferDesc<'_>, internal: InternalUsage) -> Result<Self> {
         let name = desc.debug_name;
         let size = check_size(gpu, desc)?;
@@ -111,7 +114,8 @@ impl Buffer {
     fn bind_memory(&mut self) -> Result<()> {
         let device = &self.gpu.device;
         // SAFETY: the buffer was created by this device.
-        let requirements = unsafe { device.get_buffer_memory_requirements(self.raw) };
+        let mut requirements = unsafe { device.get_buffer_memory_requirements(self.raw) };
+        requirements.alignment = requirements.alignment.max(Self::ALIGNMENT);
         let allocation = self.gpu.allocate(&self.name, requirements, self.memory, true)?;
         // SAFETY: the allocation was made for this buffer's requirements and is bound once.
         let bound = unsafe { device.bind_buffer_memory(self.raw, allocation.memory(), allocation.offset()) };

@@ -24,6 +24,8 @@ pub(crate) struct Reflection {
     pub(crate) specialization: Vec<(u32, u32)>,
     /// Bindings that the module declares, sorted, each once.
     pub(crate) bindings: Vec<u32>,
+    /// First locations of the inputs; those of a vertex stage are its attributes.
+    pub(crate) inputs: Vec<u32>,
 }
 
 /// Reads `words`, made for `stage` with the entry point `main`; never trusts them.
@@ -35,14 +37,17 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
     spirv::check(words)?;
     let module = Module::read(words)?;
     let entry = entry_point(&module, stage)?;
+    check_function(words, module.entries[entry].function)?;
     let (local_size, local_size_ids) = local_size(&module, module.entries[entry].function);
-    let mut bindings = Vec::new();
+    let (mut bindings, mut inputs) = (Vec::new(), Vec::new());
     let mut push_constant_bytes = 0;
     for variable in module.variables.iter().filter(|variable| module.in_interface(entry, variable)) {
         if variable.storage == StorageClass::PushConstant as u32 {
             push_constant_bytes = push_constant_bytes.max(block_bytes(&module, variable)?);
         } else if is_descriptor(variable) {
             bindings.push(binding(&module, variable)?);
+        } else if variable.storage == StorageClass::Input as u32 {
+            inputs.extend(module.decoration(variable.id, Decoration::Location));
         }
     }
     bindings.sort_unstable();
@@ -55,6 +60,7 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
         local_size_ids,
         specialization: specialization(&module),
         bindings,
+        inputs,
     })
 }
 
@@ -67,6 +73,17 @@ fn entry_point(module: &Module, stage: ShaderStage) -> Result<usize, String> {
         let there = if there.is_empty() { "none at all".to_owned() } else { there.join(", ") };
         format!("no entry point 'main' for the {} stage; the module has {there}", stage.name())
     })
+}
+
+/// Fails unless the entry point's function is there: drivers take it for granted.
+fn check_function(words: &[u32], function: u32) -> Result<(), String> {
+    for instruction in spirv::instructions(words) {
+        let instruction = instruction?;
+        if instruction.op == Some(Op::Function) && instruction.operand(1) == function {
+            return Ok(());
+        }
+    }
+    Err("the entry point 'main' names no function of the module".to_owned())
 }
 
 fn execution_model(stage: ShaderStage) -> ExecutionModel {

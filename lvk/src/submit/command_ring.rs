@@ -58,6 +58,8 @@ pub(crate) struct CommandRing {
     free: Vec<CommandSlot>,
     open: BTreeSet<u64>,
     in_flight: VecDeque<InFlight>,
+    /// Sequence numbers of command buffers that never reached the GPU, until the next collection.
+    given_up: Vec<u64>,
     last_sequence: u64,
 }
 
@@ -89,12 +91,13 @@ impl CommandRing {
     /// The command buffer was given up before submission.
     pub(crate) fn discard(&mut self, gpu: &Gpu, sequence: u64, slot: CommandSlot) {
         self.open.remove(&sequence);
+        self.given_up.push(sequence);
         self.recycle(gpu, slot);
     }
 
-    /// Takes command buffers back that the GPU is done with and answers their sequence numbers.
+    /// Takes command buffers back that the GPU is done with; answers their sequence numbers, and those given up.
     pub(crate) fn collect(&mut self, gpu: &Gpu, completed: u64) -> Vec<u64> {
-        let mut done = Vec::new();
+        let mut done = std::mem::take(&mut self.given_up);
         while let Some(oldest) = self.in_flight.front()
             && oldest.value <= completed
         {

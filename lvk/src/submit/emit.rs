@@ -12,7 +12,7 @@ pub(crate) type Images = HashMap<ResourceId, (vk::Image, vk::ImageAspectFlags)>;
 
 /// Records the barriers, if there are any.
 pub(crate) fn emit(gpu: &Gpu, commands: vk::CommandBuffer, barriers: &Barriers, images: &Images) {
-    let memory: Vec<_> = barriers.memory.iter().map(|barrier| memory_barrier(gpu, barrier)).collect();
+    let memory = memory_barriers(gpu, barriers.memory);
     let images: Vec<_> =
         barriers.images.iter().filter_map(|barrier| image_barrier(gpu, barrier, images)).collect();
     if memory.is_empty() && images.is_empty() {
@@ -21,6 +21,14 @@ pub(crate) fn emit(gpu: &Gpu, commands: vk::CommandBuffer, barriers: &Barriers, 
     let info = vk::DependencyInfo::default().memory_barriers(&memory).image_memory_barriers(&images);
     // SAFETY: the command buffer is being recorded outside of a render pass, and the images are alive.
     unsafe { gpu.device.cmd_pipeline_barrier2(commands, &info) };
+}
+
+fn memory_barriers(gpu: &Gpu, barrier: Option<MemoryBarrier>) -> Vec<vk::MemoryBarrier2<'static>> {
+    if gpu.caps.ray_query {
+        return barrier.iter().map(|barrier| memory_barrier(gpu, barrier)).collect();
+    }
+    let parts = barrier.into_iter().flat_map(MemoryBarrier::without_ray_queries);
+    parts.map(|barrier| memory_barrier(gpu, &barrier)).collect()
 }
 
 fn memory_barrier(gpu: &Gpu, barrier: &MemoryBarrier) -> vk::MemoryBarrier2<'static> {

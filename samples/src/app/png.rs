@@ -47,11 +47,14 @@ pub fn check_writable(path: &Path) -> Result<(), PngError> {
     if path.is_dir() || path.file_name().is_none() {
         return Err(unwritable(std::io::ErrorKind::IsADirectory.into()));
     }
+    if is_special(path) {
+        return Ok(());
+    }
     Partial::create(path).map(drop).map_err(unwritable)
 }
 
 /// Writes `width` x `height` pixels of 4 bytes (RGBA, sRGB, rows from the top) as a PNG. An earlier file at `path` is
-/// replaced in one step; after an error it is unchanged.
+/// replaced in one step; after an error it is unchanged. A device or pipe at `path` is written to and stays what it is.
 ///
 /// # Errors
 /// [`PngError`].
@@ -69,9 +72,17 @@ pub fn write(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<(), Pn
         image::ImageFormat::Png,
     )
     .map_err(|source| PngError::Encode { path: path.into(), source })?;
-    Partial::create(path)
-        .and_then(|partial| partial.complete(&encoded.into_inner(), path))
-        .map_err(|source| PngError::Unwritable { path: path.into(), source })
+    let encoded = encoded.into_inner();
+    let written = match is_special(path) {
+        true => std::fs::write(path, &encoded),
+        false => Partial::create(path).and_then(|partial| partial.complete(&encoded, path)),
+    };
+    written.map_err(|source| PngError::Unwritable { path: path.into(), source })
+}
+
+/// Whether `path` is there and neither a file nor a folder, such as `/dev/null`.
+fn is_special(path: &Path) -> bool {
+    std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
 /// A file beside the final one, removed unless it is completed.
@@ -128,6 +139,18 @@ mod tests {
         let read = image::open(&path).unwrap().into_rgba8();
         assert_eq!((read.dimensions(), read.into_raw()), ((3, 2), pixels));
         assert_eq!(files(folder.path()), ["a.png"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_device_stays_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("null");
+        std::os::unix::fs::symlink("/dev/null", &path).unwrap();
+        check_writable(&path).unwrap();
+        write(&path, 1, 1, &[0; 4]).unwrap();
+        assert!(path.is_symlink(), "the way to the device was replaced by a file");
+        assert_eq!(files(folder.path()), ["null"]);
     }
 
     #[test]

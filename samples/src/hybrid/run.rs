@@ -1,6 +1,7 @@
 //! The sample on the command line: scene in, picture and timings out.
 
 use std::fmt::Write as _;
+use std::io::Write as _;
 use std::process::ExitCode;
 
 use lvk::{Capabilities, Context, ContextDesc, FeatureRequest, Validation, ValidationSink};
@@ -85,7 +86,7 @@ fn attempt(args: &HybridArgs) -> Result<(), RunError> {
     let path = RayPath::choose(wished_path(args.rt), ctx.capabilities())?;
     let config = config(args, path);
     let mut renderer = HybridRenderer::new(&ctx, &scene, &config)?;
-    println!("{}", headline(&ctx, &scene, &config, &renderer));
+    say(&headline(&ctx, &scene, &config, &renderer));
     let timings = render(args, &ctx, &scene, &mut renderer)?;
     let image = renderer.read_image()?;
     drop(renderer);
@@ -95,7 +96,7 @@ fn attempt(args: &HybridArgs) -> Result<(), RunError> {
         report_validation(&sink)?;
     }
     png::write(&args.out, args.width, args.height, &image)?;
-    println!("{timings}\nwrote {}", args.out.display());
+    say(&format!("{timings}\nwrote {}", args.out.display()));
     Ok(())
 }
 
@@ -222,17 +223,26 @@ fn report_validation(sink: &ValidationSink) -> Result<(), RunError> {
     for message in &messages {
         eprintln!("validation: {message}");
     }
-    println!("validation messages: {}", messages.len());
+    say(&format!("validation messages: {}", messages.len()));
     if messages.is_empty() { Ok(()) } else { Err(RunError::Validation(messages.len())) }
+}
+
+/// Prints to standard output. A reader that has gone, as that of `hybrid | head -1`, does not cost the picture.
+fn say(text: &str) {
+    let _ = writeln!(std::io::stdout(), "{text}");
 }
 
 fn list_devices() -> Result<(), RunError> {
     let driver = driver::prepare(&DriverRequest::default())?;
     for (number, device) in Context::devices(driver.loader.as_deref())?.iter().enumerate() {
-        let has = |has: bool| if has { "yes" } else { "no" };
-        println!("[{number}] {} ({})", device.device_name, driver_text(device));
-        println!("    ray tracing pipelines: {}", has(device.ray_tracing_pipeline));
-        println!("    ray queries:           {}", has(device.ray_query));
+        say(&device_line(number, device));
     }
     Ok(())
+}
+
+fn device_line(number: usize, device: &Capabilities) -> String {
+    let has = |has: bool| if has { "yes" } else { "no" };
+    let Capabilities { device_name: name, ray_tracing_pipeline: pipeline, ray_query: query, .. } = device;
+    let (driver, pipeline, query) = (driver_text(device), has(*pipeline), has(*query));
+    format!("[{number}] {name} ({driver}): ray tracing pipeline {pipeline}, ray query {query}")
 }

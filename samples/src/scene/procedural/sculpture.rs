@@ -131,7 +131,10 @@ fn mirror_wall(solids: &mut Solids) {
 fn glasses(solids: &mut Solids) {
     plinth(solids, [3.3, 0.0, 2.3], 0.36, 0.5);
     solids.at([3.3, 0.96, 2.3], 0.0).of(of::GLASS).sphere(0.46, 96);
-    solids.at([0.62, 0.292, 4.25], 28.0).of(of::GREEN_GLASS).rounded_block(Vec3::new(0.22, 0.29, 0.22), 0.035);
+    solids
+        .at([0.62, 0.292, 4.25], 28.0)
+        .of(of::GREEN_GLASS)
+        .rounded_block(Vec3::new(0.22, 0.29, 0.22), 0.035);
     solids.at([-2.3, 0.282, 1.86], 0.0).of(of::AMBER_GLASS);
     let bowl = smooth_profile(
         &[

@@ -1,0 +1,361 @@
+//! The `hybrid` program as a user meets it: what it prints, what it writes and its exit status.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::fs;
+use std::path::PathBuf;
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+use lvk_samples::driver::{DriverRequest, prepare, swiftshader_icd};
+use tempfile::TempDir;
+
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+const WIDTH: u32 = 64;
+const HEIGHT: u32 = 36;
+
+/// A folder of input files and an empty one for output.
+struct Desk {
+    input: TempDir,
+    output: TempDir,
+}
+
+/// What a run of the program came to.
+struct Outcome {
+    status: Option<i32>,
+    out: String,
+    err: String,
+}
+
+impl Desk {
+    fn new() -> Self {
+        Self { input: tempfile::tempdir().unwrap(), output: tempfile::tempdir().unwrap() }
+    }
+
+    /// Writes an input file and returns its path.
+    fn file(&self, name: &str, content: impl AsRef<[u8]>) -> String {
+        let path = self.input.path().join(name);
+        fs::write(&path, content).unwrap();
+        path.display().to_string()
+    }
+
+    fn picture(&self) -> PathBuf {
+        self.output.path().join("picture.png")
+    }
+
+    /// The program with a small picture as its output.
+    fn command(&self, args: &[&str]) -> Command {
+        let mut command = hybrid(args);
+        command.arg("--out").arg(self.picture());
+        command.args(["--width", &WIDTH.to_string(), "--height", &HEIGHT.to_string()]);
+        command
+    }
+
+    fn run(&self, args: &[&str]) -> Outcome {
+        Outcome::of(self.command(args))
+    }
+
+    fn output_files(&self) -> Vec<String> {
+        let entries = fs::read_dir(self.output.path()).unwrap();
+        entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect()
+    }
+
+    /// The size of the picture, which is the only file that was written.
+    fn picture_size(&self) -> (u32, u32) {
+        assert_eq!(self.output_files(), ["picture.png"]);
+        image::open(self.picture()).unwrap().into_rgba8().dimensions()
+    }
+}
+
+impl Outcome {
+    fn of(mut command: Command) -> Self {
+        let Output { status, stdout, stderr } = command.output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        Self { status: status.code(), out: text(stdout), err: text(stderr) }
+    }
+
+    /// Fails unless the program ended with `status` and one line of error, which names all of `parts`.
+    fn assert_error(&self, status: i32, parts: &[&str]) {
+        let Self { out, err, .. } = self;
+        assert_eq!(self.status, Some(status), "{parts:?}: {out}{err}");
+        assert!(err.starts_with("error: ") && err.ends_with('\n') && err.lines().count() == 1, "{err}");
+        assert_names(err, parts);
+        assert!(err.len() > "error: ".len() + 20, "{err}");
+    }
+
+    /// As [`assert_error`](Self::assert_error), for mistakes in the command line itself, whose message goes on with a
+    /// hint.
+    fn assert_usage_error(&self, parts: &[&str]) {
+        assert_eq!(self.status, Some(2), "{}", self.err);
+        let first = self.err.lines().next().unwrap_or_default();
+        assert!(first.starts_with("error: "), "{}", self.err);
+        assert_names(&self.err, parts);
+    }
+
+    fn assert_success(&self) {
+        assert_eq!(self.status, Some(0), "{}{}", self.out, self.err);
+    }
+}
+
+fn assert_names(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "no `{part}` in: {text}");
+    }
+}
+
+fn hybrid(args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_hybrid"));
+    command.args(args).env_remove("LVK_DEVICE");
+    command
+}
+
+/// Whether the test can go on; `false`, with a line, only where the user allowed to go on without a device.
+fn has_device() -> bool {
+    let is_set = |name| std::env::var(name).is_ok_and(|value| !value.is_empty() && value != "0");
+    if !is_set("LVK_SKIP_GPU_TESTS") || is_set("LVK_REQUIRE_GPU") {
+        return true;
+    }
+    let found = prepare(&DriverRequest { validation: true });
+    if let Err(error) = &found {
+        eprintln!("SKIPPED, no Vulkan device: {error}");
+    }
+    found.is_ok()
+}
+
+#[test]
+fn a_scene_that_cannot_be_loaded_is_named_and_leaves_nothing() {
+    let desk = Desk::new();
+    let absent = desk.input.path().join("absent.obj").display().to_string();
+    let folder = desk.input.path().display().to_string();
+    for (path, parts) in [
+        (absent, ["absent.obj", "no such file"]),
+        (folder, ["cannot read", "directory"]),
+        (desk.file("letter.obj", "Dear Sir or Madam,\n"), ["letter.obj", "not a Wavefront OBJ"]),
+        (desk.file("binary.obj", [0x89, b'P', 0, 1, 2, 3, 255, 254]), ["binary.obj", "not a Wavefront OBJ"]),
+        (desk.file("nothing.obj", ""), ["nothing.obj", "not a Wavefront OBJ"]),
+        (desk.file("points.obj", "v 0 0 0\nv 1 0 0\n"), ["points.obj", "nothing to draw"]),
+        (desk.file("line.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n"), ["line.obj", "nothing to draw"]),
+        (desk.file("nan.obj", format!("{TRIANGLE}v 0 nan 0\n")), ["nan.obj:5", "not finite"]),
+        (desk.file("word.obj", format!("{TRIANGLE}v 0 zero 0\n")), ["word.obj:5", "zero"]),
+        (desk.file("range.obj", format!("{TRIANGLE}f 1 2 4\n")), ["range.obj:5", "vertex 4"]),
+        (desk.file("back.obj", format!("{TRIANGLE}f -1 -2 -4\n")), ["back.obj:5", "vertex -4"]),
+    ] {
+        desk.run(&["--scene", &path]).assert_error(2, &parts);
+    }
+    assert_eq!(desk.output_files(), Vec::<String>::new());
+}
+
+#[test]
+fn a_bad_camera_file_is_named_and_leaves_nothing() {
+    let desk = Desk::new();
+    let scene = desk.file("triangle.obj", TRIANGLE);
+    let absent = desk.input.path().join("absent.txt").display().to_string();
+    for (path, parts) in [
+        (absent, ["absent.txt", "no such file"]),
+        (desk.file("short.txt", "scene a 0 1 2\nat 1 2 3\n"), ["short.txt:2", "expected"]),
+        (desk.file("empty.txt", ""), ["empty.txt", "expected"]),
+        (desk.file("word.txt", "scene a 0 1 two\n"), ["word.txt:1", "expected"]),
+    ] {
+        desk.run(&["--scene", &scene, "--cameras", &path]).assert_error(2, &parts);
+    }
+    assert_eq!(desk.output_files(), Vec::<String>::new());
+}
+
+#[test]
+fn a_picture_that_cannot_be_written_is_refused_before_any_work() {
+    let desk = Desk::new();
+    let absent = desk.input.path().join("absent.obj");
+    for place in [desk.output.path().join("no/such/folder.png"), desk.output.path().to_path_buf()] {
+        let mut command = hybrid(&["--scene", &absent.display().to_string()]);
+        command.arg("--out").arg(&place);
+        Outcome::of(command).assert_error(2, &[&place.display().to_string()]);
+    }
+    assert_eq!(desk.output_files(), Vec::<String>::new());
+}
+
+#[test]
+fn an_earlier_picture_survives_an_error() {
+    let desk = Desk::new();
+    fs::write(desk.picture(), "earlier").unwrap();
+    desk.run(&["--scene", &desk.file("nothing.obj", "")]).assert_error(2, &["nothing.obj"]);
+    assert_eq!(fs::read(desk.picture()).unwrap(), b"earlier");
+    assert_eq!(desk.output_files(), ["picture.png"]);
+}
+
+#[test]
+fn wrong_arguments_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for (line, parts) in [
+        ("--width 0", ["--width", "1..=16384"]),
+        ("--width 1000000", ["--width", "1..=16384"]),
+        ("--height 0", ["--height", "1..=16384"]),
+        ("--width -5", ["-5", "Usage"]),
+        ("--depth 17", ["--depth", "0..=16"]),
+        ("--camera 0", ["--camera", "1..=5"]),
+        ("--camera 6", ["--camera", "1..=5"]),
+        ("--frames 0", ["--frames", "'0'"]),
+        ("--method raster", ["--method", "standalone, hybrid"]),
+        ("--rt mesh", ["--rt", "auto, pipeline, query"]),
+        ("--sceen a.obj", ["--sceen", "--scene"]),
+        ("a.obj", ["a.obj", "Usage"]),
+    ] {
+        let mut command = hybrid(&line.split(' ').collect::<Vec<_>>());
+        command.current_dir(folder.path());
+        Outcome::of(command).assert_usage_error(&parts);
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn the_help_tells_every_option() {
+    let help = Outcome::of(hybrid(&["--help"]));
+    help.assert_success();
+    assert_names(
+        &help.out,
+        &[
+            "--scene",
+            "--method",
+            "--rt",
+            "--width",
+            "--height",
+            "--frames",
+            "--camera",
+            "--depth",
+            "--out",
+            "--device",
+            "--validate",
+            "--list-devices",
+            "--cameras",
+            "--scale",
+            "Exit status",
+        ],
+    );
+}
+
+#[test]
+fn every_way_writes_the_picture_and_reports_its_times() {
+    if !has_device() {
+        return;
+    }
+    let files = Desk::new();
+    let scene = files.file("triangle.obj", TRIANGLE);
+    for (method, said) in [("standalone", "stand-alone"), ("hybrid", "hybrid:")] {
+        for (rt, path) in [("pipeline", "ray tracing pipeline"), ("query", "ray queries")] {
+            let desk = Desk::new();
+            let args = ["--scene", &scene, "--method", method, "--rt", rt, "--frames", "2", "--validate"];
+            let outcome = desk.run(&args);
+            outcome.assert_success();
+            assert_eq!(outcome.err, "", "{method} {rt}");
+            assert_names(&outcome.out, &["device  ", said, path, "1 triangles", "validation messages: 0"]);
+            assert_table(&outcome.out, method == "hybrid");
+            assert_names(&outcome.out, &["wrote ", &desk.picture().display().to_string()]);
+            assert_eq!(desk.picture_size(), (WIDTH, HEIGHT));
+        }
+    }
+}
+
+/// The table of GPU milliseconds: a head, then rows whose numbers grow from minimum to maximum.
+fn assert_table(out: &str, has_geometry_pass: bool) {
+    let words = |line: &str| line.split_whitespace().map(str::to_owned).collect::<Vec<_>>();
+    let mut lines = out.lines().skip_while(|line| !line.starts_with("GPU ms"));
+    assert_eq!(words(lines.next().unwrap()), ["GPU", "ms", "min", "median", "max"], "{out}");
+    let rows: Vec<_> = lines.take_while(|line| !line.starts_with("wrote")).map(words).collect();
+    assert_eq!(rows.len(), if has_geometry_pass { 3 } else { 2 }, "{out}");
+    assert_eq!(rows.last().unwrap()[0], "total", "{out}");
+    for row in rows {
+        let numbers: Vec<f64> = row[row.len() - 3..].iter().map(|word| word.parse().unwrap()).collect();
+        assert!(numbers.is_sorted() && numbers[2] > 0.0, "{out}");
+    }
+}
+
+#[test]
+fn missing_textures_and_materials_are_warnings_with_names() {
+    if !has_device() {
+        return;
+    }
+    let desk = Desk::new();
+    desk.file("a.mtl", "newmtl wood\nKd 1 1 1\nmap_Kd absent.png\n");
+    let text = format!("mtllib a.mtl\nusemtl wood\n{TRIANGLE}usemtl nowhere\nf 1 3 2\n");
+    let outcome = desk.run(&["--scene", &desk.file("a.obj", text)]);
+    outcome.assert_success();
+    assert_eq!(outcome.err.lines().count(), 2, "{}", outcome.err);
+    assert!(outcome.err.lines().all(|line| line.starts_with("warning: ")), "{}", outcome.err);
+    assert_names(&outcome.err, &["absent.png", "no such file", "`nowhere` is not defined"]);
+    assert_eq!(desk.picture_size(), (WIDTH, HEIGHT));
+}
+
+#[test]
+fn devices_are_listed_a_line_each() {
+    if !has_device() {
+        return;
+    }
+    let outcome = Outcome::of(hybrid(&["--list-devices"]));
+    outcome.assert_success();
+    assert!(!outcome.out.is_empty());
+    for (number, line) in outcome.out.lines().enumerate() {
+        assert!(line.starts_with(&format!("[{number}] ")), "{line}");
+        assert_names(line, &["Vulkan 1.", "): ray tracing pipeline ", ", ray query "]);
+    }
+}
+
+#[test]
+fn a_device_that_is_not_there_is_device_trouble() {
+    if !has_device() {
+        return;
+    }
+    let desk = Desk::new();
+    let scene = desk.file("triangle.obj", TRIANGLE);
+    desk.run(&["--scene", &scene, "--device", "voodoo"])
+        .assert_error(1, &["'voodoo' names no device", "[0] "]);
+    assert_eq!(desk.output_files(), Vec::<String>::new());
+}
+
+#[test]
+fn a_device_without_ray_tracing_is_told_what_it_lacks() {
+    if !has_device() {
+        return;
+    }
+    let desk = Desk::new();
+    let scene = desk.file("triangle.obj", TRIANGLE);
+    let icd = swiftshader_icd().unwrap();
+    for (rt, lack) in [
+        ("auto", "neither ray tracing pipelines nor ray queries"),
+        ("pipeline", "lacks ray tracing pipelines"),
+        ("query", "lacks ray queries"),
+    ] {
+        let mut command = desk.command(&["--scene", &scene, "--rt", rt]);
+        command.env("VK_DRIVER_FILES", &icd).env_remove("VK_ICD_FILENAMES").env_remove("LVK_DRIVER");
+        Outcome::of(command).assert_error(1, &["SwiftShader", lack]);
+    }
+    assert_eq!(desk.output_files(), Vec::<String>::new());
+}
+
+#[test]
+fn without_a_driver_and_a_way_to_one_the_user_learns_what_to_install() {
+    let desk = Desk::new();
+    let scene = desk.file("triangle.obj", TRIANGLE);
+    let empty = tempfile::tempdir().unwrap();
+    let mut command = desk.command(&["--scene", &scene]);
+    command.env("LVK_NO_DOWNLOAD", "1").env("LVK_VULKAN_DIR", empty.path()).env("LVK_DRIVER", "software");
+    command.env_remove("VK_DRIVER_FILES").env_remove("VK_ICD_FILENAMES");
+    let start = Instant::now();
+    Outcome::of(command).assert_error(1, &["LVK_NO_DOWNLOAD", "apt install mesa-vulkan-drivers"]);
+    assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
+    assert_eq!(desk.output_files(), Vec::<String>::new());
+    assert_eq!(fs::read_dir(empty.path()).unwrap().count(), 0, "nothing was begun");
+}
+
+/// `hybrid | head -1` must not keep the picture from being written.
+#[test]
+fn a_reader_that_goes_away_does_not_cost_the_picture() {
+    if !has_device() {
+        return;
+    }
+    let desk = Desk::new();
+    let scene = desk.file("triangle.obj", TRIANGLE);
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let mut command = desk.command(&["--scene", &scene]);
+    let status = command.stdout(writer).status().unwrap();
+    assert_eq!(status.code(), Some(0));
+    assert_eq!(desk.picture_size(), (WIDTH, HEIGHT));
+}

@@ -1,0 +1,41 @@
+//! Pictures by the `hybrid` sample.
+#![expect(clippy::expect_used, reason = "a test without its picture has failed")]
+
+use image::RgbaImage;
+use lvk::Context;
+use lvk_samples::hybrid::{HybridConfig, HybridRenderer, Method, RayPath};
+use lvk_samples::scene::{Camera, Scene};
+
+/// The sample with one configuration, ready to take pictures of a scene.
+pub struct Studio {
+    renderer: HybridRenderer,
+    size: [u32; 2],
+}
+
+impl Studio {
+    /// A studio for pictures of `size` pixels and rays of up to `max_depth` bounces.
+    ///
+    /// # Panics
+    /// When the sample refuses.
+    pub fn new(
+        ctx: &Context,
+        scene: &Scene,
+        (method, path): (Method, RayPath),
+        size: [u32; 2],
+        max_depth: u32,
+    ) -> Self {
+        let config = HybridConfig { method, path, width: size[0], height: size[1], max_depth };
+        let renderer = HybridRenderer::new(ctx, scene, &config).expect("the sample can be set up");
+        Self { renderer, size }
+    }
+
+    /// Takes a picture.
+    ///
+    /// # Panics
+    /// When rendering fails.
+    pub fn picture(&mut self, camera: &Camera) -> RgbaImage {
+        self.renderer.render(camera).expect("the sample renders");
+        let pixels = self.renderer.read_image().expect("the picture can be read");
+        RgbaImage::from_raw(self.size[0], self.size[1], pixels).expect("a picture has four bytes a pixel")
+    }
+}

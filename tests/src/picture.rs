@@ -1,0 +1,164 @@
+//! Pictures that tests render: how alike two are, and what to look at when they are not.
+#![expect(clippy::expect_used, reason = "a test that cannot compare pictures has failed")]
+
+use std::path::{Path, PathBuf};
+
+use image::RgbaImage;
+use lvk_samples::app::metrics::{self, Difference};
+use nv_flip::FlipImageRgb8;
+
+/// How much two pictures may differ; the defaults ask for nothing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerance {
+    /// Least peak signal-to-noise ratio in dB.
+    pub psnr: f64,
+    /// Least structural similarity.
+    pub ssim: f64,
+    /// Largest share of pixels that differ by more than 1 of 255, 0 to 1.
+    pub differing_share: f64,
+    /// Largest mean of NVIDIA's FLIP error, 0 to 1.
+    pub flip: f32,
+}
+
+impl Default for Tolerance {
+    fn default() -> Self {
+        Self { psnr: 0.0, ssim: -1.0, differing_share: 1.0, flip: 1.0 }
+    }
+}
+
+/// What was measured of two pictures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Likeness {
+    /// Pixel by pixel.
+    pub difference: Difference,
+    /// Mean of NVIDIA's FLIP error: 0 for pictures that look the same, 1 for black beside white.
+    pub flip: f32,
+}
+
+impl Likeness {
+    /// Measures two pictures.
+    ///
+    /// # Panics
+    /// When their sizes differ.
+    pub fn of(actual: &RgbaImage, expected: &RgbaImage) -> Self {
+        assert_eq!(actual.dimensions(), expected.dimensions(), "pictures of different sizes");
+        let (width, height) = actual.dimensions();
+        let difference = metrics::compare(actual.as_raw(), expected.as_raw(), width, height);
+        let difference = difference.expect("both pictures have four bytes a pixel");
+        let errors = flip_errors(actual, expected);
+        Self { difference, flip: errors.iter().sum::<f32>() / errors.len() as f32 }
+    }
+
+    /// Whether the pictures are as alike as `tolerance` asks.
+    pub fn is_within(&self, tolerance: &Tolerance) -> bool {
+        self.difference.psnr >= tolerance.psnr
+            && self.difference.ssim >= tolerance.ssim
+            && self.difference.differing_share <= tolerance.differing_share
+            && self.flip <= tolerance.flip
+    }
+}
+
+impl std::fmt::Display for Likeness {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}, mean FLIP error {:.5}", self.difference, self.flip)
+    }
+}
+
+/// Fails the test unless the pictures are as alike as `tolerance` asks. Both and their differences are then left in
+/// `target/test-images`, under names that begin with `what`.
+///
+/// # Panics
+/// As said.
+pub fn assert_alike(what: &str, actual: &RgbaImage, expected: &RgbaImage, tolerance: &Tolerance) {
+    let likeness = Likeness::of(actual, expected);
+    eprintln!("{what}: {likeness}");
+    if likeness.is_within(tolerance) {
+        return;
+    }
+    let files = [
+        keep(&format!("{what} actual"), actual),
+        keep(&format!("{what} expected"), expected),
+        keep(&format!("{what} difference"), &difference_picture(actual, expected)),
+    ];
+    let files = files.map(|path| path.display().to_string()).join("\n  ");
+    assert!(likeness.is_within(tolerance), "{what}: {likeness}; wanted {tolerance:?}; see\n  {files}");
+}
+
+/// Writes a picture to `target/test-images` and returns its path.
+///
+/// # Panics
+/// When it cannot be written.
+pub fn keep(name: &str, picture: &RgbaImage) -> PathBuf {
+    let project = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the package lies in the project");
+    let folder = project.join("target/test-images");
+    std::fs::create_dir_all(&folder).expect("the folder for test images can be made");
+    let path = folder.join(format!("{}.png", name.replace([' ', '/'], "_")));
+    picture.save(&path).expect("test images can be written");
+    path
+}
+
+/// FLIP's error of each pixel, from black over purple to light yellow.
+fn difference_picture(actual: &RgbaImage, expected: &RgbaImage) -> RgbaImage {
+    let (width, height) = actual.dimensions();
+    let colors = nv_flip::FlipImageFloat::with_data(width, height, &flip_errors(actual, expected))
+        .apply_color_lut(&nv_flip::magma_lut())
+        .to_vec();
+    let rgb = image::RgbImage::from_raw(width, height, colors).expect("FLIP keeps the size");
+    image::DynamicImage::from(rgb).into_rgba8()
+}
+
+fn flip_errors(actual: &RgbaImage, expected: &RgbaImage) -> Vec<f32> {
+    let [actual, expected] = [actual, expected].map(|picture| {
+        let rgb: Vec<u8> = picture.pixels().flat_map(|pixel| [pixel[0], pixel[1], pixel[2]]).collect();
+        FlipImageRgb8::with_data(picture.width(), picture.height(), &rgb)
+    });
+    nv_flip::flip(expected, actual, nv_flip::DEFAULT_PIXELS_PER_DEGREE).to_vec()
+}
+
+#[cfg(test)]
+mod tests {
+    use image::Rgba;
+
+    use super::*;
+
+    fn ramp(step: u8) -> RgbaImage {
+        RgbaImage::from_fn(32, 16, |x, y| Rgba([(x * 7) as u8, (y * 9) as u8, step, 255]))
+    }
+
+    #[test]
+    fn equal_pictures_are_as_alike_as_can_be() {
+        let likeness = Likeness::of(&ramp(9), &ramp(9));
+        assert_eq!((likeness.flip, likeness.difference.max_difference), (0.0, 0));
+        assert!(likeness.is_within(&Tolerance {
+            psnr: f64::INFINITY,
+            ssim: 0.9999,
+            differing_share: 0.0,
+            flip: 0.0
+        }));
+    }
+
+    #[test]
+    fn every_measure_can_refuse() {
+        let likeness = Likeness::of(&ramp(0), &ramp(200));
+        assert!(likeness.is_within(&Tolerance::default()), "{likeness}");
+        for tolerance in [
+            Tolerance { psnr: 30.0, ..Tolerance::default() },
+            Tolerance { ssim: 0.9999, ..Tolerance::default() },
+            Tolerance { differing_share: 0.5, ..Tolerance::default() },
+            Tolerance { flip: 0.1, ..Tolerance::default() },
+        ] {
+            assert!(!likeness.is_within(&tolerance), "{likeness} within {tolerance:?}");
+        }
+    }
+
+    #[test]
+    #[should_panic(expected = "test-images/a_test_of_the_harness_actual.png")]
+    fn pictures_that_differ_are_kept() {
+        assert_alike(
+            "a test of the harness",
+            &ramp(0),
+            &ramp(200),
+            &Tolerance { flip: 0.1, ..Tolerance::default() },
+        );
+    }
+}

@@ -1,0 +1,287 @@
+//! Handles and their owners: stale and foreign handles are errors, and nothing dies while it is in use.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::fmt::Debug;
+
+use lvk::{
+    ComputePipelineDesc, Context, Dependencies, Destroy, Error, Holder, QueryPoolDesc, RenderPassDesc,
+    RenderPipelineDesc, SamplerDesc, ShaderStage, TextureDesc, TextureRegion, ValidationSink,
+};
+use lvk_tests::compute::{
+    Evaluator, compute_pipeline, module, read_vec4, read_words, vec4_buffer, words_buffer,
+};
+use lvk_tests::{TestDevice, device, device_with};
+
+fn stale<T: Debug>(result: lvk::Result<T>, expected: &str) {
+    match result {
+        Err(Error::StaleHandle { kind }) => assert_eq!(kind, expected),
+        other => unreachable!("expected a stale {expected}, not {other:?}"),
+    }
+}
+
+/// Every call that takes a handle, with one of each kind that is not `ctx`'s or not alive.
+fn expect_all_stale(ctx: &Context, made: &Objects) {
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let Objects { buffer, texture, module, pipeline, pool, .. } = made;
+    let good = words_buffer(ctx, &[0; 4]);
+    stale(ctx.buffer_address(*buffer), "buffer");
+    stale(ctx.upload_buffer(*buffer, 0, &[0]), "buffer");
+    stale(ctx.download_buffer(*buffer, 0, &mut [0]), "buffer");
+    stale(cmd.copy_buffer(*buffer, 0, *good, 0, 4), "buffer");
+    stale(cmd.copy_buffer(*good, 0, *buffer, 0, 4), "buffer");
+    stale(cmd.fill_buffer(*buffer, 0, 4, 0), "buffer");
+    let whole = TextureRegion::default();
+    stale(ctx.upload_texture(*texture, &whole, &[0; 4]), "texture");
+    stale(ctx.download_texture(*texture, &whole), "texture");
+    stale(cmd.copy_texture_to_buffer(*texture, &whole, *good, 0), "texture");
+    stale(cmd.clear_texture(*texture, [0.0; 4]), "texture");
+    stale(cmd.generate_mipmaps(*texture), "texture");
+    let color = [lvk::ColorAttachment::clear(*texture, [0.0; 4])];
+    stale(cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).map(drop), "texture");
+    stale(cmd.bind_compute_pipeline(*pipeline), "compute pipeline");
+    let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
+    stale(ctx.create_compute_pipeline(&desc), "shader module");
+    let desc = RenderPipelineDesc { vertex: Some(*module), ..Default::default() };
+    stale(ctx.create_render_pipeline(&desc), "shader module");
+    stale(cmd.write_timestamp(*pool, 0), "query pool");
+    stale(cmd.reset_queries(*pool, 0..1), "query pool");
+    stale(ctx.timestamps_ms(*pool, 0, 1), "query pool");
+    let nothing = compute_pipeline(ctx, "layout(local_size_x = 1) in; void main() {}");
+    cmd.bind_compute_pipeline(*nothing).unwrap();
+    for dependencies in [
+        Dependencies { buffers: &[*good, *buffer], ..Default::default() },
+        Dependencies { read_buffers: &[*buffer], ..Default::default() },
+    ] {
+        stale(cmd.dispatch([1, 1, 1], &dependencies), "buffer");
+    }
+    for dependencies in [
+        Dependencies { sampled_images: &[*texture], ..Default::default() },
+        Dependencies { storage_images: &[*texture], ..Default::default() },
+    ] {
+        stale(cmd.dispatch([1, 1, 1], &dependencies), "texture");
+    }
+    stale(cmd.dispatch_indirect(*buffer, 0, &Dependencies::default()), "buffer");
+    ctx.submit(cmd).unwrap();
+}
+
+/// One handle of each kind.
+struct Objects {
+    buffer: lvk::BufferHandle,
+    texture: lvk::TextureHandle,
+    sampler: lvk::SamplerHandle,
+    module: lvk::ShaderModuleHandle,
+    pipeline: lvk::ComputePipelineHandle,
+    pool: lvk::QueryPoolHandle,
+}
+
+fn objects(ctx: &Context) -> Objects {
+    let text = "layout(local_size_x = 1) in; void main() {}";
+    Objects {
+        buffer: words_buffer(ctx, &[1, 2, 3]).release(),
+        texture: ctx
+            .create_texture(&TextureDesc { data: Some(&[1; 4]), ..Default::default() })
+            .unwrap()
+            .release(),
+        sampler: ctx.create_sampler(&SamplerDesc::default()).unwrap().release(),
+        module: module(ctx, ShaderStage::Compute, text).release(),
+        pipeline: compute_pipeline(ctx, text).release(),
+        pool: ctx.create_query_pool(&QueryPoolDesc::default()).unwrap().release(),
+    }
+}
+
+fn destroy(ctx: &Context, objects: &Objects) {
+    ctx.destroy(objects.buffer);
+    ctx.destroy(objects.texture);
+    ctx.destroy(objects.sampler);
+    ctx.destroy(objects.module);
+    ctx.destroy(objects.pipeline);
+    ctx.destroy(objects.pool);
+}
+
+#[test]
+fn destroyed_objects_leave_stale_handles() {
+    let Some(ctx) = device() else { return };
+    let made = objects(&ctx);
+    assert_eq!(read_words(&ctx, made.buffer, 3), [1, 2, 3]);
+    destroy(&ctx, &made);
+    expect_all_stale(&ctx, &made);
+    destroy(&ctx, &made);
+    let news = objects(&ctx);
+    destroy(&ctx, &made);
+    assert_eq!(read_words(&ctx, news.buffer, 3), [1, 2, 3], "the old handle must not destroy its successor");
+    expect_all_stale(&ctx, &made);
+    destroy(&ctx, &news);
+}
+
+#[test]
+fn handles_of_another_context_are_stale() {
+    let (Some(ctx), Some(other)) = (device(), device()) else { return };
+    let made = objects(&ctx);
+    let theirs = objects(&other);
+    expect_all_stale(&ctx, &theirs);
+    destroy(&ctx, &theirs);
+    assert_eq!(read_words(&other, theirs.buffer, 3), [1, 2, 3]);
+    assert_eq!(read_words(&ctx, made.buffer, 3), [1, 2, 3]);
+    destroy(&ctx, &made);
+    destroy(&other, &theirs);
+}
+
+#[test]
+fn command_buffers_of_another_context_are_refused() {
+    let (Some(ctx), Some(other)) = (device(), device()) else { return };
+    let buffer = words_buffer(&other, &[1]);
+    let mut cmd = other.acquire_command_buffer().unwrap();
+    cmd.fill_buffer(*buffer, 0, 4, 9).unwrap();
+    assert!(matches!(ctx.submit(cmd), Err(Error::InvalidUsage { .. })));
+    assert_eq!(read_words(&other, *buffer, 1), [1]);
+}
+
+#[test]
+fn a_released_object_outlives_its_holder() {
+    let Some(ctx) = device() else { return };
+    let holder = words_buffer(&ctx, &[5]);
+    let copy = *holder;
+    assert_eq!(holder.handle(), copy);
+    let kept = holder.release();
+    assert_eq!(kept, copy);
+    assert_eq!(read_words(&ctx, kept, 1), [5]);
+    ctx.destroy(kept);
+    stale(ctx.buffer_address(kept), "buffer");
+}
+
+fn drop_and_expect_stale<H: Destroy>(ctx: &Context, holder: Holder<H>, check: impl FnOnce(&Context, H)) {
+    let handle = *holder;
+    drop(holder);
+    check(ctx, handle);
+}
+
+#[test]
+fn dropping_a_holder_destroys() {
+    let Some(ctx) = device() else { return };
+    drop_and_expect_stale(&ctx, words_buffer(&ctx, &[1]), |ctx, handle| {
+        stale(ctx.buffer_address(handle), "buffer")
+    });
+    let texture = ctx.create_texture(&TextureDesc::default()).unwrap();
+    drop_and_expect_stale(&ctx, texture, |ctx, handle| stale(ctx.raw_image(handle), "texture"));
+    let sampler = ctx.create_sampler(&SamplerDesc::default()).unwrap();
+    drop_and_expect_stale(&ctx, sampler, |ctx, handle| stale(ctx.raw_sampler(handle), "sampler"));
+}
+
+#[test]
+fn objects_destroyed_in_flight_finish_their_work() {
+    let Some(ctx) = device() else { return };
+    let results: Vec<_> = (0..30)
+        .map(|value| {
+            let texels = [value as f32; 4];
+            let data = Some(bytemuck::cast_slice(&texels));
+            let desc =
+                TextureDesc { format: lvk::Format::R32Float, extent: [2, 2], data, ..Default::default() };
+            let texture = ctx.create_texture(&desc).unwrap();
+            let sampler = ctx.create_sampler(&SamplerDesc::default()).unwrap();
+            let sample = Evaluator::new(&ctx, "textureBindless2D(a, b, vec2(0.5)) + float(c)");
+            let result = vec4_buffer(&ctx, 1);
+            let mut cmd = ctx.acquire_command_buffer().unwrap();
+            let words = [texture.index(), sampler.index(), 100];
+            sample.record(&ctx, &mut cmd, words, (*result, 1), &Dependencies::default());
+            if value % 2 == 0 {
+                ctx.submit(cmd).unwrap();
+            } else {
+                drop((sampler, texture, sample));
+                ctx.submit(cmd).unwrap();
+            }
+            (value, result)
+        })
+        .collect();
+    for (value, result) in &results {
+        assert_eq!(read_vec4(&ctx, **result, 1)[0][0], *value as f32 + 100.0);
+    }
+}
+
+#[test]
+fn buffers_destroyed_before_their_submission_are_still_copied() {
+    let Some(ctx) = device() else { return };
+    let target = words_buffer(&ctx, &[0; 4]);
+    let source = words_buffer(&ctx, &[1, 2, 3, 4]);
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.copy_buffer(*source, 0, *target, 0, 16).unwrap();
+    drop(source);
+    for value in 0..4 {
+        drop(words_buffer(&ctx, &[value; 4]));
+        ctx.wait_idle().unwrap();
+    }
+    ctx.submit(cmd).unwrap();
+    assert_eq!(read_words(&ctx, *target, 4), [1, 2, 3, 4]);
+}
+
+#[test]
+fn dropped_command_buffers_do_nothing() {
+    let Some(ctx) = device() else { return };
+    let buffer = words_buffer(&ctx, &[1; 4]);
+    for _ in 0..20 {
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        cmd.fill_buffer(*buffer, 0, 16, 9).unwrap();
+        cmd.push_label("left open");
+    }
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.pop_label();
+    cmd.push_label("left open too");
+    ctx.submit(cmd).unwrap();
+    assert_eq!(read_words(&ctx, *buffer, 4), [1; 4]);
+}
+
+/// A device whose messages the test reads after everything is gone.
+fn watched() -> Option<(TestDevice, ValidationSink)> {
+    let sink = ValidationSink::default();
+    let device = device_with(|desc| desc.validation_sink = Some(sink.clone()))?;
+    Some((device, sink))
+}
+
+#[test]
+fn the_context_may_go_before_what_it_made() {
+    let Some((ctx, sink)) = watched() else { return };
+    let buffer = words_buffer(&ctx, &[1; 4]);
+    let texture = ctx.create_texture(&TextureDesc { data: Some(&[1; 4]), ..Default::default() }).unwrap();
+    let pipeline = compute_pipeline(&ctx, "layout(local_size_x = 1) in; void main() {}");
+    let mut submitted = ctx.acquire_command_buffer().unwrap();
+    submitted.fill_buffer(*buffer, 0, 16, 1).unwrap();
+    ctx.submit(submitted).unwrap();
+    let mut open = ctx.acquire_command_buffer().unwrap();
+    open.fill_buffer(*buffer, 0, 16, 2).unwrap();
+    open.bind_compute_pipeline(*pipeline).unwrap();
+    open.dispatch([1, 1, 1], &Dependencies { buffers: &[*buffer], ..Default::default() }).unwrap();
+    drop(ctx);
+    open.fill_buffer(*buffer, 0, 16, 3).unwrap();
+    drop((texture, pipeline));
+    open.fill_buffer(*buffer, 0, 16, 4).unwrap();
+    drop(buffer);
+    drop(open);
+    assert!(sink.is_empty(), "{:?}", sink.messages());
+}
+
+#[test]
+fn a_command_buffer_may_be_the_last_to_go() {
+    let Some((ctx, sink)) = watched() else { return };
+    let buffer = words_buffer(&ctx, &[1; 4]).release();
+    let texture =
+        ctx.create_texture(&TextureDesc { data: Some(&[1; 4]), ..Default::default() }).unwrap().release();
+    let mut open = ctx.acquire_command_buffer().unwrap();
+    open.clear_texture(texture, [0.0; 4]).unwrap();
+    drop(ctx);
+    open.fill_buffer(buffer, 0, 16, 2).unwrap();
+    drop(open);
+    assert!(sink.is_empty(), "{:?}", sink.messages());
+}
+
+#[test]
+fn a_context_ends_well_with_released_objects_and_uploads_that_never_ran() {
+    let Some((ctx, sink)) = watched() else { return };
+    let made = objects(&ctx);
+    let clone = Context::clone(&ctx);
+    ctx.wait_idle().unwrap();
+    drop(ctx);
+    clone.upload_buffer(made.buffer, 0, &[7; 12]).unwrap();
+    clone.upload_texture(made.texture, &TextureRegion::default(), &[7; 4]).unwrap();
+    clone.destroy(made.sampler);
+    drop(clone);
+    assert!(sink.is_empty(), "{:?}", sink.messages());
+}

@@ -1,0 +1,269 @@
+//! How a context starts: devices are listed, what is missing is named, and devices without ray tracing work.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::ffi::OsStr;
+use std::path::Path;
+
+use lvk::ash::vk;
+use lvk::{
+    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, ColorAttachment, Context, ContextDesc, Dependencies,
+    Error, FeatureRequest, Format, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc, ShaderSource,
+    ShaderStage, TlasDesc, Triangles, Validation,
+};
+use lvk_tests::child::in_child;
+use lvk_tests::compute::{Evaluator, words_buffer};
+use lvk_tests::device::loader;
+use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, target};
+use lvk_tests::{device, device_with};
+
+/// A context with the loader of the tests and nothing else asked for.
+fn start<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> lvk::Result<Context> {
+    let mut desc = ContextDesc { vulkan_library: loader().unwrap().as_deref(), ..Default::default() };
+    adjust(&mut desc);
+    Context::new(&desc)
+}
+
+#[test]
+fn devices_are_listed_with_what_they_can_do() {
+    let Some(ctx) = device() else { return };
+    let devices = Context::devices(loader().unwrap().as_deref()).unwrap();
+    let own = ctx.capabilities();
+    let listed = devices.iter().find(|device| device.device_name == own.device_name).unwrap();
+    assert_eq!(listed.ray_query, own.ray_query);
+    assert_eq!(listed.ray_tracing_pipeline, own.ray_tracing_pipeline);
+    assert!(own.api_version >= (1, 3, 0) && !own.driver_name.is_empty(), "{own:?}");
+    assert!(own.limits.max_texture_2d >= 4096 && own.limits.max_push_constant_bytes >= 128);
+    assert_eq!(own.ray_tracing_fallback, None);
+}
+
+#[test]
+fn a_wrong_library_is_no_vulkan() {
+    let nowhere = Path::new("/nowhere/libvulkan.so.1");
+    for result in [
+        start(|desc| desc.vulkan_library = Some(nowhere)).map(drop),
+        Context::devices(Some(nowhere)).map(drop),
+    ] {
+        match result {
+            Err(Error::NoVulkan { reason }) => assert!(reason.contains("/nowhere"), "{reason}"),
+            other => unreachable!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn the_device_can_be_chosen_by_number_and_name() {
+    in_child("the_device_can_be_chosen_by_number_and_name", &[("LVK_DEVICE", None)], || {
+        let Some(ctx) = device() else { return };
+        let name = ctx.capabilities().device_name.clone();
+        let chosen = start(|desc| desc.device = Some("0")).unwrap();
+        let first = Context::devices(loader().unwrap().as_deref()).unwrap().remove(0);
+        assert_eq!(chosen.capabilities().device_name, first.device_name);
+        let upper = name.to_uppercase();
+        match start(|desc| desc.device = Some(&upper)) {
+            Ok(chosen) => assert_eq!(chosen.capabilities().device_name, name),
+            Err(Error::NoDevice { reasons }) => assert!(reasons.contains("several"), "{reasons}"),
+            Err(other) => unreachable!("{other}"),
+        }
+        match start(|desc| desc.device = Some("no such device")) {
+            Err(Error::NoDevice { reasons }) => {
+                assert!(
+                    reasons.contains("'no such device' names no device") && reasons.contains(&name),
+                    "{reasons}"
+                );
+            }
+            other => unreachable!("{other:?}"),
+        }
+    });
+}
+
+#[test]
+fn the_environment_goes_before_the_description() {
+    let wish = Some(OsStr::new("somewhere else"));
+    in_child("the_environment_goes_before_the_description", &[("LVK_DEVICE", wish)], || {
+        match start(|desc| desc.device = Some("0")) {
+            Err(Error::NoDevice { reasons }) => assert!(reasons.contains("'somewhere else'"), "{reasons}"),
+            other => unreachable!("{other:?}"),
+        }
+    });
+}
+
+fn ray_query_shader(ctx: &Context) -> lvk::Result<()> {
+    let text = "
+        #include <lvk/ray_query.glsl>
+        layout(local_size_x = 1) in;
+        layout(push_constant, scalar) uniform Push { uint tlas; };
+        void main() {
+            LvkRayQuery query;
+            lvkRayQueryInitialize(query, tlas, LVK_RAY_FLAG_OPAQUE, 0xffu, vec3(0), 0.0, vec3(0, 0, 1), 1.0);
+        }";
+    let source = ShaderSource::Glsl(text);
+    ctx.create_shader_module(&ShaderModuleDesc { stage: ShaderStage::Compute, source, ..Default::default() })
+        .map(drop)
+}
+
+fn ray_gen_shader(ctx: &Context) -> lvk::Result<()> {
+    let source = ShaderSource::Glsl("void main() {}");
+    ctx.create_shader_module(&ShaderModuleDesc { stage: ShaderStage::RayGen, source, ..Default::default() })
+        .map(drop)
+}
+
+fn unsupported<T: std::fmt::Debug>(result: lvk::Result<T>) {
+    assert!(matches!(result, Err(Error::Unsupported { .. })), "{result:?}");
+}
+
+#[test]
+fn features_turned_off_are_missing() {
+    let Some(ctx) = device_with(|desc| desc.ray_query = FeatureRequest::Off) else { return };
+    assert!(!ctx.capabilities().ray_query);
+    unsupported(ray_query_shader(&ctx));
+    assert_eq!(ray_gen_shader(&ctx).is_ok(), ctx.capabilities().ray_tracing_pipeline);
+    drop(ctx);
+    let Some(ctx) = device_with(|desc| desc.ray_tracing_pipeline = FeatureRequest::Off) else { return };
+    assert!(!ctx.capabilities().ray_tracing_pipeline);
+    unsupported(ray_gen_shader(&ctx));
+    assert_eq!(ray_query_shader(&ctx).is_ok(), ctx.capabilities().ray_query);
+}
+
+/// What every context without ray tracing answers.
+fn expect_no_ray_tracing(ctx: &Context) {
+    assert!(!ctx.capabilities().ray_query && !ctx.capabilities().ray_tracing_pipeline);
+    unsupported(ray_query_shader(ctx));
+    unsupported(ray_gen_shader(ctx));
+    let input = BufferDesc { size_bytes: 36, usage: BufferUsage::ACCEL_INPUT, ..Default::default() };
+    unsupported(ctx.create_buffer(&input));
+    unsupported(ctx.create_tlas(&TlasDesc::default()));
+    let vertices = words_buffer(ctx, &[0; 9]);
+    let geometries = [BlasGeometry::Triangles(Triangles::packed(*vertices, 3))];
+    unsupported(ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() }));
+}
+
+/// Compute, textures and draws in one: a colour is drawn, sampled and read back.
+fn expect_drawing(ctx: &Context) {
+    let drawn = target(ctx, Format::Rgba8Unorm, [4, 4]);
+    let desc = RenderPipelineDesc { color: &[Format::Rgba8Unorm.into()], ..Default::default() };
+    let pipeline = render_pipeline(ctx, COVER, PAINT, &desc);
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
+    let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
+    pass.bind_render_pipeline(*pipeline).unwrap();
+    pass.push_constants(&[0.0, 1.0, 0.0, 1.0, 0.5_f32]).unwrap();
+    pass.draw(0..3, 0..1).unwrap();
+    drop(pass);
+    ctx.submit(cmd).unwrap();
+    assert_eq!(pixels::<[u8; 4]>(ctx, *drawn), [[0, 255, 0, 255]; 16]);
+    let sampler = ctx.create_sampler(&Default::default()).unwrap();
+    let sample = Evaluator::new(ctx, "textureBindless2D(a, b, vec2(0.5)) * float(i + 1)");
+    let reads = Dependencies { sampled_images: &[*drawn], ..Default::default() };
+    let found = sample.run(ctx, [drawn.index(), sampler.index(), 0], 2, &reads);
+    assert_eq!(found, [[0.0, 1.0, 0.0, 1.0], [0.0, 2.0, 0.0, 2.0]]);
+}
+
+#[test]
+fn everything_else_works_with_ray_tracing_turned_off() {
+    let Some(ctx) = device_with(|desc| {
+        desc.ray_query = FeatureRequest::Off;
+        desc.ray_tracing_pipeline = FeatureRequest::Off;
+    }) else {
+        return;
+    };
+    expect_no_ray_tracing(&ctx);
+    expect_drawing(&ctx);
+}
+
+#[test]
+fn a_device_without_ray_tracing_does_everything_else() {
+    let icd = lvk_samples::driver::swiftshader_icd().unwrap();
+    let variables = [
+        ("VK_DRIVER_FILES", Some(icd.as_os_str())),
+        ("VK_ICD_FILENAMES", None),
+        ("LVK_DRIVER", None),
+        ("LVK_DEVICE", None),
+    ];
+    in_child("a_device_without_ray_tracing_does_everything_else", &variables, || {
+        let Some(ctx) = device() else { return };
+        assert!(ctx.capabilities().device_name.contains("SwiftShader"), "{:?}", ctx.capabilities());
+        expect_no_ray_tracing(&ctx);
+        expect_drawing(&ctx);
+        for (pipeline, query, lack) in [
+            (FeatureRequest::Required, FeatureRequest::Optional, "lacks ray tracing pipelines"),
+            (FeatureRequest::Off, FeatureRequest::Required, "lacks ray queries"),
+        ] {
+            let required = start(|desc| (desc.ray_tracing_pipeline, desc.ray_query) = (pipeline, query));
+            match required {
+                Err(Error::NoDevice { reasons }) => {
+                    assert!(reasons.contains("SwiftShader") && reasons.contains(lack), "{reasons}");
+                }
+                other => unreachable!("{other:?}"),
+            }
+        }
+    });
+}
+
+/// Without this the silence of the other tests would mean nothing.
+#[test]
+fn validation_hears_a_missing_barrier_and_a_wrong_call() {
+    let Some(ctx) = device() else { return };
+    let buffer = words_buffer(&ctx, &[0; 16]);
+    ctx.wait_idle().unwrap();
+    let raw = ctx.raw_buffer(*buffer).unwrap();
+    let cmd = ctx.acquire_command_buffer().unwrap();
+    for value in [1, 2] {
+        // SAFETY: the command buffer is being recorded and the buffer is alive; that nothing orders the fills is the
+        // point.
+        unsafe { ctx.raw_device().cmd_fill_buffer(cmd.raw(), raw, 0, vk::WHOLE_SIZE, value) };
+    }
+    ctx.submit(cmd).unwrap();
+    ctx.wait_idle().unwrap();
+    let messages = ctx.take_messages();
+    assert!(
+        messages.iter().any(|message| message.error && message.id.contains("SYNC-HAZARD")),
+        "{messages:?}"
+    );
+    let info = vk::BufferCreateInfo::default().size(0).usage(vk::BufferUsageFlags::TRANSFER_SRC);
+    // SAFETY: the driver takes any size; the layer complains.
+    if let Ok(odd) = unsafe { ctx.raw_device().create_buffer(&info, None) } {
+        // SAFETY: created above and used by nobody.
+        unsafe { ctx.raw_device().destroy_buffer(odd, None) };
+    }
+    let messages = ctx.take_messages();
+    assert!(
+        messages.iter().any(|message| message.id.contains("VUID-VkBufferCreateInfo-size")),
+        "{messages:?}"
+    );
+}
+
+/// Two submissions by hand: the library asks how far the device is, which a fast device answers with "done".
+#[test]
+fn validation_hears_a_missing_barrier_between_submissions() {
+    let Some(ctx) = device() else { return };
+    let buffer = words_buffer(&ctx, &[0; 16]);
+    ctx.wait_idle().unwrap();
+    let (device, raw) = (ctx.raw_device(), ctx.raw_buffer(*buffer).unwrap());
+    let info = vk::CommandPoolCreateInfo::default().queue_family_index(ctx.raw_queue_family());
+    // SAFETY: the pool and its command buffers are this test's own and go when the device is idle; that nothing orders
+    // the fills is the point.
+    unsafe {
+        let pool = device.create_command_pool(&info, None).unwrap();
+        let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(2);
+        let commands = device.allocate_command_buffers(&info).unwrap();
+        for (commands, value) in commands.into_iter().zip([1, 2]) {
+            device.begin_command_buffer(commands, &vk::CommandBufferBeginInfo::default()).unwrap();
+            device.cmd_fill_buffer(commands, raw, 0, vk::WHOLE_SIZE, value);
+            device.end_command_buffer(commands).unwrap();
+            let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
+            let submit = [vk::SubmitInfo2::default().command_buffer_infos(&commands)];
+            ctx.with_raw_queue(|queue| device.queue_submit2(queue, &submit, vk::Fence::null())).unwrap();
+        }
+        device.device_wait_idle().unwrap();
+        device.destroy_command_pool(pool, None);
+    }
+    let messages = ctx.take_messages();
+    assert!(messages.iter().any(|message| message.id.contains("SYNC-HAZARD")), "{messages:?}");
+}
+
+#[test]
+fn a_context_without_validation_is_silent() {
+    let ctx = start(|desc| desc.validation = Validation::Off).unwrap();
+    expect_drawing(&ctx);
+    assert!(ctx.validation().is_empty());
+}

@@ -1,0 +1,89 @@
+//! Submission: waiting, asking whether something is done, and frames in flight.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use lvk::{Dependencies, Error, SubmitHandle};
+use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
+use lvk_tests::{device, device_with};
+
+#[test]
+fn a_submission_is_done_after_waiting_for_it() {
+    let Some(ctx) = device() else { return };
+    assert!(ctx.is_done(SubmitHandle::default()).unwrap());
+    let mut submissions = Vec::new();
+    for _ in 0..5 {
+        submissions.push(ctx.submit(ctx.acquire_command_buffer().unwrap()).unwrap());
+    }
+    assert!(submissions.windows(2).all(|pair| pair[0] < pair[1]));
+    ctx.wait(submissions[4]).unwrap();
+    for submission in submissions {
+        assert!(ctx.is_done(submission).unwrap());
+        ctx.wait(submission).unwrap();
+    }
+}
+
+#[test]
+fn submissions_that_were_never_made_are_errors() {
+    let (Some(ctx), Some(other)) = (device(), device()) else { return };
+    let mut far = SubmitHandle::default();
+    for _ in 0..9 {
+        far = other.submit(other.acquire_command_buffer().unwrap()).unwrap();
+    }
+    assert!(matches!(ctx.wait(far), Err(Error::InvalidUsage { .. })));
+    assert!(matches!(ctx.is_done(far), Err(Error::InvalidUsage { .. })));
+    other.wait(far).unwrap();
+}
+
+#[test]
+fn flushing_runs_uploads_and_is_idle_without_any() {
+    let Some(ctx) = device() else { return };
+    ctx.wait_idle().unwrap();
+    let idle = ctx.flush().unwrap();
+    assert_eq!(ctx.flush().unwrap(), idle);
+    let buffer = words_buffer(&ctx, &[3; 4]);
+    let flushed = ctx.flush().unwrap();
+    assert!(flushed > idle);
+    ctx.wait(flushed).unwrap();
+    assert_eq!(read_words(&ctx, *buffer, 4), [3; 4]);
+}
+
+#[test]
+fn frames_count_up_and_round() {
+    for (asked, in_flight) in [(0, 1), (1, 1), (3, 3), (100, 8)] {
+        let Some(ctx) = device_with(|desc| desc.frames_in_flight = asked) else { return };
+        assert_eq!(ctx.frames_in_flight(), in_flight);
+        for number in 0..20 {
+            let frame = ctx.next_frame().unwrap();
+            assert_eq!((frame.number, frame.index), (number, number as usize % in_flight));
+        }
+    }
+}
+
+#[test]
+fn a_frame_starts_when_the_gpu_is_done_with_the_last_of_its_index() {
+    let Some(ctx) = device_with(|desc| desc.frames_in_flight = 3) else { return };
+    let work = compute_pipeline(
+        &ctx,
+        "layout(local_size_x = 64) in;
+         layout(buffer_reference, scalar) buffer Words { uint at[]; };
+         layout(push_constant, scalar) uniform Push { Words words; };
+         void main() {
+             uint sum = gl_GlobalInvocationID.x;
+             for (uint i = 0; i < 20000; ++i) sum = sum * 1664525 + 1013904223;
+             words.at[gl_GlobalInvocationID.x] += 1 + (sum & 0);
+         }",
+    );
+    let words = words_buffer(&ctx, &[0; 64]);
+    let mut last = [SubmitHandle::default(); 3];
+    for _ in 0..30 {
+        let frame = ctx.next_frame().unwrap();
+        assert!(ctx.is_done(last[frame.index]).unwrap(), "frame {}", frame.number);
+        for _ in 0..2 {
+            let mut cmd = ctx.acquire_command_buffer().unwrap();
+            cmd.bind_compute_pipeline(*work).unwrap();
+            cmd.push_constants(&ctx.buffer_address(*words).unwrap()).unwrap();
+            cmd.dispatch([1, 1, 1], &Dependencies { buffers: &[*words], ..Default::default() }).unwrap();
+            last[frame.index] = ctx.submit(cmd).unwrap();
+        }
+    }
+    assert_eq!(read_words(&ctx, *words, 64), [60; 64]);
+}
