@@ -106,9 +106,10 @@ pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, Indices, Triangles
 pub use accel::instance::{InstanceFlags, TlasInstance, transform_rows};
 pub use accel::structure::{AccelStructSizes, BuildFlags, BuildMode};
 pub use command::CommandBuffer;
+pub use command::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad};
 pub use command::dependencies::Dependencies;
 pub use command::render::RenderPass;
-pub use command::render_pass::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, RenderPassDesc};
+pub use command::render_pass::RenderPassDesc;
 pub use context::Context;
 pub use context::config::ContextDesc;
 pub use context::destroy::Destroy;

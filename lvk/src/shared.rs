@@ -36,7 +36,7 @@ pub(crate) struct Shared {
 
 /// Objects behind the dummy slots.
 pub(crate) struct DummyObjects {
-    pub(crate) _texture: Arc<Texture>,
+    pub(crate) _textures: [Arc<Texture>; 2],
     pub(crate) _sampler: Sampler,
     pub(crate) _tlas: Option<Arc<AccelStruct>>,
 }
@@ -58,7 +58,21 @@ pub(crate) enum Garbage {
 impl Shared {
     /// Destroys an object later, once no command buffer can use it.
     pub(crate) fn retire(&self, garbage: Garbage) {
-        self.submitter.retire(garbage);
+        const OFTEN_ENOUGH: usize = 256;
+        let waiting = self.submitter.retire(garbage);
+        if waiting.is_multiple_of(OFTEN_ENOUGH)
+            && let Err(error) = self.collect()
+        {
+            log::error!("what was destroyed is not freed yet: {error}");
+        }
+    }
+
+    /// Takes a bindless slot; where none is free, takes back what the GPU has finished with and tries again.
+    pub(crate) fn reserve(&self, slot: impl Fn() -> Result<u32>) -> Result<u32> {
+        slot().or_else(|_| {
+            self.collect()?;
+            slot()
+        })
     }
 
     /// Takes back what the GPU has finished with.

@@ -17,6 +17,8 @@ use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 
 /// Every object of a context, by handle.
 pub(crate) struct Store {
+    /// A number no other context of the process has.
+    pub(crate) context_id: u64,
     pub(crate) buffers: Pool<BufferHandle, Buffer>,
     pub(crate) textures: Pool<TextureHandle, Texture>,
     pub(crate) samplers: Pool<SamplerHandle, Sampler>,
@@ -32,6 +34,7 @@ impl Store {
     pub(crate) fn new() -> Self {
         let mask = next_mask();
         Self {
+            context_id: mask,
             buffers: Pool::new(mask),
             textures: Pool::new(mask),
             samplers: Pool::new(mask),

@@ -70,11 +70,7 @@ pub fn device_with(adjust: impl FnOnce(&mut ContextDesc<'_>)) -> Option<TestDevi
     let mut desc = ContextDesc {
         application_name: "lvk tests",
         vulkan_library: library,
-        validation: if is_set("LVK_TEST_GPU_ASSISTED") {
-            Validation::GpuAssisted
-        } else {
-            Validation::Standard
-        },
+        validation: validation(),
         validation_sink: Some(sink.clone()),
         ..Default::default()
     };
@@ -82,6 +78,15 @@ pub fn device_with(adjust: impl FnOnce(&mut ContextDesc<'_>)) -> Option<TestDevi
     match Context::new(&desc) {
         Ok(context) => Some(TestDevice { context: Some(context), sink }),
         Err(error) => unavailable(&error.to_string()),
+    }
+}
+
+/// What `LVK_TEST_VALIDATION` says: `gpu`, `off`, or core and synchronization validation.
+fn validation() -> Validation {
+    match std::env::var("LVK_TEST_VALIDATION").as_deref() {
+        Ok("gpu") => Validation::GpuAssisted,
+        Ok("off") => Validation::Off,
+        _ => Validation::Standard,
     }
 }
 

@@ -75,9 +75,7 @@ fn pushes_that_do_not_fit_the_block_are_errors() {
         "{error}"
     );
     cmd.bind_compute_pipeline(*pipeline).unwrap();
-    for (offset, size) in
-        [(0, 16), (0, 36), (0, 400), (0, 18), (2, 4), (18, 4), (32, 4), (u32::MAX - 3, 4), (0, 0)]
-    {
+    for (offset, size) in [(0, 36), (0, 400), (0, 18), (2, 4), (18, 4), (32, 4), (u32::MAX - 3, 4), (0, 0)] {
         match cmd.push_constant_bytes(offset, &vec![0; size]) {
             Err(Error::PushConstants { pipeline, expected, offset: found, size: bytes }) => {
                 assert_eq!((expected, found, bytes as usize), (20, offset, size));
@@ -86,8 +84,12 @@ fn pushes_that_do_not_fit_the_block_are_errors() {
             other => unreachable!("{size} bytes at {offset}: {other:?}"),
         }
     }
+    assert!(matches!(cmd.push_constants(&[0_u32; 4]), Err(Error::PushConstants { expected: 20, .. })));
     let error = cmd.dispatch([1, 1, 1], &Dependencies::default()).unwrap_err();
     assert!(error.to_string().contains("20 bytes of push constants, but 0"), "{error}");
+    cmd.push_constant_bytes(0, &[0; 16]).unwrap();
+    let error = cmd.dispatch([1, 1, 1], &Dependencies::default()).unwrap_err();
+    assert!(error.to_string().contains("20 bytes of push constants, but 16"), "{error}");
     let without = compute_pipeline(&ctx, "layout(local_size_x = 1) in; void main() {}");
     cmd.bind_compute_pipeline(*without).unwrap();
     assert!(matches!(cmd.push_constants(&1_u32), Err(Error::PushConstants { expected: 0, .. })));

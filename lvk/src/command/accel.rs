@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use ash::khr::acceleration_structure::Device as ExtDevice;
 use ash::vk;
 
 use super::CommandBuffer;
@@ -178,21 +179,24 @@ impl CommandBuffer {
         let alignment = limits.scratch_alignment.into();
         let largest = limits.max_buffer_bytes.saturating_sub(alignment);
         let sizes: Vec<_> = builds.iter().map(|build| build.scratch_bytes).collect();
-        for batch in plan_scratch(&sizes, alignment, self.shared.scratch_budget_bytes.min(largest)) {
-            self.record_batch(&builds[batch.builds.clone()], &batch, alignment)?;
+        let batches = plan_scratch(&sizes, alignment, self.shared.scratch_budget_bytes.min(largest));
+        let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
+        let shared = Arc::clone(&self.shared);
+        let ext = shared.gpu.accel()?;
+        let (scratch, replaced) = shared.scratch.get(&shared.gpu, most)?;
+        self.retire_temporary(replaced);
+        for batch in batches {
+            self.use_buffer(&scratch, Use::accel_build_write());
+            let base = aligned_scratch_address(scratch.address, alignment);
+            self.record_batch(ext, &builds[batch.builds.clone()], &batch, base);
         }
         Ok(())
     }
 
     /// Records builds that share the scratch buffer without overlapping in it.
-    fn record_batch(&mut self, builds: &[Build], batch: &ScratchBatch, alignment: u64) -> Result<()> {
-        let shared = Arc::clone(&self.shared);
-        let (scratch, replaced) = shared.scratch.get(&shared.gpu, batch.bytes)?;
-        self.retire_temporary(replaced);
-        self.use_buffer(&scratch, Use::accel_build_write());
+    fn record_batch(&mut self, ext: &ExtDevice, builds: &[Build], batch: &ScratchBatch, base: u64) {
         builds.iter().for_each(|build| self.use_build(build));
         self.flush();
-        let base = aligned_scratch_address(scratch.address, alignment);
         let infos: Vec<_> = builds
             .iter()
             .zip(&batch.offsets)
@@ -200,11 +204,9 @@ impl CommandBuffer {
             .collect();
         let ranges: Vec<&[vk::AccelerationStructureBuildRangeInfoKHR]> =
             builds.iter().map(|build| &build.input.ranges[..]).collect();
-        let ext = shared.gpu.accel()?;
         // SAFETY: inputs, structures and scratch memory are alive, checked, aligned and large enough; barriers keep
         // them apart from other commands.
         unsafe { ext.cmd_build_acceleration_structures(self.raw(), &infos, &ranges) };
-        Ok(())
     }
 
     fn use_build(&mut self, build: &Build) {

@@ -26,11 +26,26 @@ impl PushConstants {
         let aligned = offset.is_multiple_of(4) && size.is_multiple_of(4) && size > 0;
         let end = offset.checked_add(size);
         let fits = end.is_some_and(|end| end <= expected.next_multiple_of(Self::TAIL_BYTES));
-        let whole = offset > 0 || size >= *expected;
-        if aligned && fits && whole && *expected > 0 {
+        if aligned && fits && *expected > 0 {
             return Ok(());
         }
         Err(Error::PushConstants { pipeline: pipeline.to_string(), expected: *expected, offset, size })
+    }
+
+    /// Fails if `bytes` are fewer than the bound pipeline's block.
+    fn check_whole(&self, bytes: usize) -> Result<()> {
+        match &self.wanted {
+            Some((pipeline, expected)) if bytes < *expected as usize => {
+                let size = bytes as u32;
+                Err(Error::PushConstants {
+                    pipeline: pipeline.to_string(),
+                    expected: *expected,
+                    offset: 0,
+                    size,
+                })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Fails if the pipeline reads bytes that were never pushed.
@@ -50,7 +65,9 @@ impl CommandBuffer {
     ///
     /// `constants` must match the shader's block, up to padding at the end (`vkCmdPushConstants`).
     pub fn push_constants<T: bytemuck::NoUninit>(&mut self, constants: &T) -> Result<()> {
-        self.push_constant_bytes(0, bytemuck::bytes_of(constants))
+        let bytes = bytemuck::bytes_of(constants);
+        self.push_constants.check_whole(bytes.len())?;
+        self.push_constant_bytes(0, bytes)
     }
 
     /// Sets part of the push constants: `bytes` from `offset` on, both multiples of 4.
@@ -115,7 +132,9 @@ mod tests {
         assert!(bound(40).check(0, 40).is_ok());
         assert!(bound(40).check(0, 48).is_ok());
         assert!(bound(40).check(36, 4).is_ok());
-        assert!(matches!(bound(40).check(0, 36), Err(Error::PushConstants { expected: 40, .. })));
+        assert!(bound(40).check(0, 36).is_ok());
+        assert!(matches!(bound(40).check_whole(36), Err(Error::PushConstants { expected: 40, .. })));
+        assert!(bound(40).check_whole(40).is_ok());
         assert!(bound(40).check(0, 52).is_err());
         assert!(bound(40).check(48, 4).is_err());
         assert!(bound(40).check(0, 42).is_err());

@@ -1,6 +1,7 @@
 //! Command buffers. Every command checks its arguments, places the barriers it needs and records itself.
 
 pub(crate) mod accel;
+pub(crate) mod attachment;
 pub(crate) mod bind;
 pub(crate) mod compute;
 pub(crate) mod dependencies;
@@ -8,6 +9,7 @@ pub(crate) mod flush;
 pub(crate) mod query;
 pub(crate) mod render;
 pub(crate) mod render_pass;
+mod targets;
 pub(crate) mod trace;
 pub(crate) mod transfer;
 pub(crate) mod uses;

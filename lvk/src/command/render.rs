@@ -7,7 +7,7 @@ use ash::vk;
 
 use super::CommandBuffer;
 use super::compute::check_arguments;
-use super::render_pass::Targets;
+use super::targets::Targets;
 use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result};
 use crate::format::IndexFormat;
@@ -16,13 +16,6 @@ use crate::handle::{BufferHandle, RenderPipelineHandle};
 use crate::pipeline::RenderPipeline;
 use crate::resource::Buffer;
 use crate::resource::buffer::BufferUsage;
-
-/// How draws read buffers, by the usage that allows it.
-pub(super) const DRAW_INPUTS: [(BufferUsage, fn() -> Use); 3] = [
-    (BufferUsage::INDEX, Use::index),
-    (BufferUsage::VERTEX, Use::vertex),
-    (BufferUsage::INDIRECT, Use::indirect),
-];
 
 /// A render pass being recorded. It borrows the command buffer, so nothing but draws can be recorded until it is
 /// dropped, which ends the pass (`vkCmdEndRendering`).

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use crate::barrier::{Stages, Use};
+use crate::barrier::{Layout, Stages, Use};
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::handle::{BufferHandle, TextureHandle};
@@ -369,6 +369,11 @@ impl CommandBuffer {
         }
     }
 
+    /// Gives a new texture the layout in which shaders read it.
+    pub(crate) fn settle_texture(&mut self, texture: &Arc<Texture>) {
+        self.settle.push(Settle::Texture(Arc::clone(texture)));
+    }
+
     /// Makes what copies touched readable by every shader and every input, with one barrier for all.
     pub(super) fn settle(&mut self) {
         if self.settle.is_empty() {
@@ -382,16 +387,24 @@ impl CommandBuffer {
                 Settle::Buffer(buffer) => {
                     tracker.use_buffer(buffer.id, Use::everything_read(), &mut self.barriers);
                 }
-                Settle::Texture(texture) if texture.usage.contains(TextureUsage::SAMPLED) => {
-                    let read = Use::shader_read(Stages::SHADERS);
+                Settle::Texture(texture) => {
+                    let Some(read) = resting_use(texture.usage) else { continue };
                     images.insert(texture.id, (texture.raw, texture.format.aspects()));
                     tracker.use_texture(texture.id, texture.shape, texture.all(), read, &mut self.barriers);
                 }
-                Settle::Texture(_) => {}
             }
         }
         emit(&self.shared.gpu, *commands, &self.barriers, images);
     }
+}
+
+/// How shaders read a texture that no command declares; `None` for textures they do not read.
+fn resting_use(usage: TextureUsage) -> Option<Use> {
+    let read = Use::shader_read(Stages::SHADERS);
+    if usage.contains(TextureUsage::SAMPLED) {
+        return Some(read);
+    }
+    usage.contains(TextureUsage::STORAGE).then_some(read.with_layout(Layout::General))
 }
 
 fn check_copyable(source: &Texture, target: &Texture) -> Result<()> {

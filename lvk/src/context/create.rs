@@ -40,7 +40,7 @@ impl Context {
     /// and the storage images. Its first contents are there for every command submitted afterwards.
     pub fn create_texture(&self, desc: &TextureDesc<'_>) -> Result<Holder<TextureHandle>> {
         let shared = self.shared();
-        let slot = shared.bindless.reserve_texture(desc.debug_name)?;
+        let slot = shared.reserve(|| shared.bindless.reserve_texture(desc.debug_name))?;
         let made = Texture::new(&shared.gpu, desc, slot).and_then(|texture| {
             let views = views(&texture)?;
             Ok((texture, views))
@@ -48,19 +48,22 @@ impl Context {
         let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
         shared.bindless.set_texture(slot, views);
         let holder = Holder::new(self, shared.store.textures.insert(texture), slot);
-        if let Some(data) = desc.data {
-            self.fill_texture(holder.handle(), desc, data)?;
-        }
+        self.fill_texture(holder.handle(), desc)?;
         Ok(holder)
     }
 
-    fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>, data: &[u8]) -> Result<()> {
+    /// Uploads the first contents; without any, shaders may still read what is there.
+    fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>) -> Result<()> {
         let texture = self.shared().store.textures.get(handle)?;
+        let Some(data) = desc.data else {
+            return self.before_next_submission(|cmd| {
+                cmd.settle_texture(&texture);
+                Ok(())
+            });
+        };
         let layers = texture.shape.layers as usize;
-        let expected = u64::from(desc.extent[0])
-            * u64::from(desc.extent[1])
-            * u64::from(desc.format.texel_bytes())
-            * layers as u64;
+        let texels = u64::from(desc.extent[0]) * u64::from(desc.extent[1]) * layers as u64;
+        let expected = texels * u64::from(desc.format.texel_bytes());
         if data.len() as u64 != expected {
             let message = format!("mip 0 has {expected} bytes in all layers, but {} were given", data.len());
             return Err(Error::usage(desc.debug_name, message));
@@ -77,7 +80,7 @@ impl Context {
     /// Creates a sampler (`vkCreateSampler`). [`Holder::index`] is its element of `kSamplers[]`.
     pub fn create_sampler(&self, desc: &SamplerDesc<'_>) -> Result<Holder<SamplerHandle>> {
         let shared = self.shared();
-        let slot = shared.bindless.reserve_sampler(desc.debug_name)?;
+        let slot = shared.reserve(|| shared.bindless.reserve_sampler(desc.debug_name))?;
         let sampler =
             Sampler::new(&shared.gpu, desc, slot).inspect_err(|_| shared.bindless.free_sampler(slot))?;
         shared.bindless.set_sampler(slot, sampler.raw);

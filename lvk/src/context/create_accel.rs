@@ -38,7 +38,7 @@ impl Context {
     pub fn create_tlas(&self, desc: &TlasDesc<'_>) -> Result<Holder<AccelStructHandle>> {
         let shared = self.shared();
         shared.gpu.accel()?;
-        let slot = shared.bindless.reserve_tlas(desc.debug_name)?;
+        let slot = shared.reserve(|| shared.bindless.reserve_tlas(desc.debug_name))?;
         let tlas = new_tlas(shared, desc, slot).inspect_err(|_| shared.bindless.free_tlas(slot))?;
         shared.bindless.set_tlas(slot, tlas.raw);
         let handle = shared.store.accel_structs.insert(tlas);

@@ -22,31 +22,30 @@ const BLACK: [u8; 4] = [0, 0, 0, 255];
 /// Makes the dummies and puts them into every slot. They live as long as the context.
 pub(super) fn fill_dummies(ctx: &Context) -> Result<()> {
     let shared = ctx.shared();
-    let texture = Arc::new(checker(ctx)?);
-    let pixels = [MAGENTA, BLACK, BLACK, MAGENTA].concat();
-    ctx.before_next_submission(|cmd| cmd.upload_texture(&texture, &TextureRegion::default(), &pixels))?;
+    let sampled = checker(ctx, TextureUsage::SAMPLED)?;
+    let storage = checker(ctx, TextureUsage::STORAGE)?;
     let sampler = SamplerDesc { debug_name: "dummy sampler", ..Default::default() };
     let sampler = Sampler::new(&shared.gpu, &sampler, SLOT)?;
     let tlas = if shared.gpu.accel.is_some() { Some(empty_tlas(ctx)?) } else { None };
     shared.bindless.fill(Dummies {
-        sampled: texture.sampled_view()?,
-        storage: texture.storage_view()?,
+        sampled: sampled.sampled_view()?,
+        storage: storage.storage_view()?,
         sampler: sampler.raw,
         tlas: tlas.as_ref().map(|tlas| tlas.raw),
     });
+    let objects = DummyObjects { _textures: [sampled, storage], _sampler: sampler, _tlas: tlas };
     // The cell is empty: this runs once, while the context is made.
-    let _ = shared.dummies.set(DummyObjects { _texture: texture, _sampler: sampler, _tlas: tlas });
+    let _ = shared.dummies.set(objects);
     Ok(())
 }
 
-fn checker(ctx: &Context) -> Result<Texture> {
-    let desc = TextureDesc {
-        extent: [2, 2],
-        usage: TextureUsage::SAMPLED | TextureUsage::STORAGE,
-        debug_name: "dummy texture",
-        ..Default::default()
-    };
-    Texture::new(&ctx.shared().gpu, &desc, SLOT)
+/// Two textures, so that what a shader stores into an empty slot is not seen by those who sample one.
+fn checker(ctx: &Context, usage: TextureUsage) -> Result<Arc<Texture>> {
+    let desc = TextureDesc { extent: [2, 2], usage, debug_name: "dummy texture", ..Default::default() };
+    let texture = Arc::new(Texture::new(&ctx.shared().gpu, &desc, SLOT)?);
+    let pixels = [MAGENTA, BLACK, BLACK, MAGENTA].concat();
+    ctx.before_next_submission(|cmd| cmd.upload_texture(&texture, &TextureRegion::default(), &pixels))?;
+    Ok(texture)
 }
 
 fn empty_tlas(ctx: &Context) -> Result<Arc<AccelStruct>> {

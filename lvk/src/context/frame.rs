@@ -5,7 +5,6 @@ use std::sync::PoisonError;
 
 use super::Context;
 use crate::error::Result;
-use crate::submit::SubmitHandle;
 
 /// A frame about to be recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -55,7 +54,7 @@ impl Context {
             let mut frames = self.inner.frames.lock().unwrap_or_else(PoisonError::into_inner);
             frames.start(submitted)
         };
-        self.wait(SubmitHandle(wait_for))?;
+        self.wait(self.submission(wait_for))?;
         Ok(frame)
     }
 

@@ -16,7 +16,8 @@ impl Context {
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) if the command buffer belongs to another context, or refits a top-level
-    /// structure whose number of instances another submission changed meanwhile.
+    /// structure whose number of instances another submission changed meanwhile. A failure of Vulkan itself leaves
+    /// the context without a known state: this and every later submission answers it, and a new context is needed.
     pub fn submit(&self, cmd: CommandBuffer) -> Result<SubmitHandle> {
         if !cmd.belongs_to(self.shared()) {
             return Err(Error::usage("submit", "the command buffer belongs to another context"));
@@ -32,31 +33,30 @@ impl Context {
         let value = shared.submitter.submit(recordings, || shared.bindless.flush())?;
         updates.into_iter().flatten().for_each(|update| update.apply(shared));
         shared.collect()?;
-        Ok(SubmitHandle(value))
+        Ok(self.submission(value))
     }
 
     /// Submits uploads and builds that wait for the next submission, if there are any.
     pub fn flush(&self) -> Result<SubmitHandle> {
         let mut pending = self.pending();
-        let Some(cmd) = pending.take() else { return Ok(SubmitHandle(self.shared().submitter.submitted())) };
+        let Some(cmd) = pending.take() else { return Ok(self.last_submission()) };
         self.send([cmd].into_iter())
     }
 
     /// Waits until a submission is done (`vkWaitSemaphores`).
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) if the handle is beyond the last submission of this context. Handles are
-    /// numbers that count up in each context: one of another context may pass for an older one of this.
+    /// [`InvalidUsage`](Error::InvalidUsage) if the handle belongs to another context.
     pub fn wait(&self, submission: SubmitHandle) -> Result<()> {
         self.check_submitted(submission)?;
-        self.shared().submitter.timeline.wait(submission.0)?;
+        self.shared().submitter.timeline.wait(submission.value)?;
         self.shared().collect()
     }
 
     /// Whether a submission is done. Does not wait.
     pub fn is_done(&self, submission: SubmitHandle) -> Result<bool> {
         self.check_submitted(submission)?;
-        Ok(self.shared().submitter.timeline.completed()? >= submission.0)
+        Ok(self.shared().submitter.timeline.completed()? >= submission.value)
     }
 
     /// Submits what waits for the next submission, and waits until the GPU has nothing left to do.
@@ -67,12 +67,20 @@ impl Context {
 
     /// Waits for everything submitted so far.
     pub(super) fn wait_submitted(&self) -> Result<()> {
-        self.wait(SubmitHandle(self.shared().submitter.submitted()))
+        self.wait(self.last_submission())
+    }
+
+    /// Names the submission with this value of the timeline.
+    pub(super) fn submission(&self, value: u64) -> SubmitHandle {
+        SubmitHandle { value, context: self.shared().store.context_id }
+    }
+
+    fn last_submission(&self) -> SubmitHandle {
+        self.submission(self.shared().submitter.submitted())
     }
 
     fn check_submitted(&self, submission: SubmitHandle) -> Result<()> {
-        let last = self.shared().submitter.submitted();
-        if submission.0 <= last {
+        if submission == SubmitHandle::default() || submission.context == self.shared().store.context_id {
             return Ok(());
         }
         Err(Error::usage("wait", "the submission belongs to another context"))

@@ -75,15 +75,15 @@ impl ValidationSink {
     }
 }
 
-/// The messenger of an instance; `sink` is boxed so that its address stays put while Vulkan holds it.
+/// The messenger of an instance; `sink` is shared so that its address stays put while Vulkan holds it.
 pub(crate) struct Messenger {
-    sink: Box<ValidationSink>,
+    sink: Arc<ValidationSink>,
     installed: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
 }
 
 impl Messenger {
     pub(crate) fn new(sink: ValidationSink) -> Self {
-        Self { sink: Box::new(sink), installed: None }
+        Self { sink: Arc::new(sink), installed: None }
     }
 
     pub(crate) fn sink(&self) -> &ValidationSink {
@@ -92,7 +92,7 @@ impl Messenger {
 
     /// What both instance creation and [`install`](Self::install) are given.
     pub(crate) fn create_info(&self) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
-        let sink: *const ValidationSink = &*self.sink;
+        let sink: *const ValidationSink = Arc::as_ptr(&self.sink);
         vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(
                 vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
@@ -119,8 +119,10 @@ impl Messenger {
     }
 }
 
-/// Warnings of the layer about its own settings, which say nothing about the program.
-const REMARKS: [&str; 2] = ["VALIDATION-SETTINGS", "WARNING-Setting-Limit-Adjusted"];
+/// Warnings that say nothing about the program: about the layer's own settings, and about names the
+/// loader itself asks for while it creates a device.
+const REMARKS: [&str; 3] =
+    ["VALIDATION-SETTINGS", "WARNING-Setting-Limit-Adjusted", "WARNING-vkGetDeviceProcAddr-device"];
 
 unsafe extern "system" fn on_message(
     severity: vk::DebugUtilsMessageSeverityFlagsEXT,

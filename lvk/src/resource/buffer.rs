@@ -1,7 +1,7 @@
 //! Buffers: every one has a device address, and shaders reach it by that alone.
 
 use std::ptr::NonNull;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::vk;
 use bitflags::bitflags;
@@ -66,6 +66,8 @@ pub(crate) struct Buffer {
     pub(crate) memory: MemoryKind,
     pub(crate) name: String,
     allocation: Option<Allocation>,
+    /// Held while the host copies to or from the mapping, so that threads do not race for the same bytes.
+    copying: Mutex<()>,
     gpu: Arc<Gpu>,
 }
 
@@ -104,6 +106,7 @@ impl Buffer {
             memory: desc.memory,
             name: name.to_owned(),
             allocation: None,
+            copying: Mutex::new(()),
             gpu: Arc::clone(gpu),
         };
         buffer.bind_memory()?;
@@ -158,7 +161,8 @@ impl Buffer {
     pub(crate) fn write(&self, offset: u64, bytes: &[u8]) -> bool {
         let Some(start) = self.mapped() else { return false };
         debug_assert!(offset + bytes.len() as u64 <= self.size_bytes);
-        // SAFETY: the range lies inside the mapping, which lives as long as `self`.
+        let _copying = self.copying.lock().unwrap_or_else(PoisonError::into_inner);
+        // SAFETY: the range lies inside the mapping, which lives as long as `self`; other threads wait.
         unsafe {
             start.as_ptr().add(offset as usize).copy_from_nonoverlapping(bytes.as_ptr(), bytes.len());
         }
@@ -169,7 +173,8 @@ impl Buffer {
     pub(crate) fn read(&self, offset: u64, bytes: &mut [u8]) -> bool {
         let Some(start) = self.mapped() else { return false };
         debug_assert!(offset + bytes.len() as u64 <= self.size_bytes);
-        // SAFETY: the range lies inside the mapping, which lives as long as `self`.
+        let _copying = self.copying.lock().unwrap_or_else(PoisonError::into_inner);
+        // SAFETY: the range lies inside the mapping, which lives as long as `self`; other threads wait.
         unsafe {
             start.as_ptr().add(offset as usize).copy_to_nonoverlapping(bytes.as_mut_ptr(), bytes.len());
         }

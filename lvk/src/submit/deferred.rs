@@ -28,6 +28,11 @@ impl<T> Deferred<T> {
         self.open.push((item, newest_open));
     }
 
+    /// How many things wait.
+    pub(crate) fn len(&self) -> usize {
+        self.open.len() + self.stamped.len()
+    }
+
     /// Takes what can be destroyed now.
     ///
     /// `oldest_open` is the sequence number of the oldest command buffer still being recorded, `submitted` the timeline

@@ -36,6 +36,8 @@ struct Inner<T> {
     ring: CommandRing,
     deferred: Deferred<T>,
     submitted: u64,
+    /// Why a submission failed: what the states say has not happened on the GPU, so nothing more is submitted.
+    broken: Option<Error>,
 }
 
 /// What the GPU has finished with.
@@ -54,6 +56,7 @@ impl<T> Submitter<T> {
             ring: CommandRing::default(),
             deferred: Deferred::default(),
             submitted: 0,
+            broken: None,
         };
         Ok(Self { timeline: Timeline::new(gpu)?, inner: Mutex::new(inner), gpu: Arc::clone(gpu) })
     }
@@ -82,19 +85,22 @@ impl<T> Submitter<T> {
     /// Submits command buffers in order. `prepare` runs under the lock, right before.
     pub(crate) fn submit(&self, recordings: Vec<Recording>, prepare: impl FnOnce()) -> Result<u64> {
         let mut inner = self.lock();
-        let recorded = self.finish(&mut inner.states, &recordings);
         let value = inner.submitted + 1;
-        prepare();
-        let sent = recorded.and_then(|raw| self.send(&raw, value));
-        match sent {
-            Ok(()) => inner.submitted = value,
-            Err(error) => {
-                for recording in recordings {
-                    inner.ring.discard(&self.gpu, recording.sequence, recording.slot);
-                }
-                return Err(error);
+        let sent = match inner.broken.clone() {
+            Some(error) => Err(error),
+            None => self.finish(&mut inner.states, &recordings).and_then(|raw| {
+                prepare();
+                self.send(&raw, value)
+            }),
+        };
+        if let Err(error) = sent {
+            inner.broken = Some(error.clone());
+            for recording in recordings {
+                inner.ring.discard(&self.gpu, recording.sequence, recording.slot);
             }
+            return Err(error);
         }
+        inner.submitted = value;
         for mut recording in recordings {
             inner.ring.submitted(recording.sequence, recording.slot, value);
             recording.tracker.clear();
@@ -141,11 +147,12 @@ impl<T> Submitter<T> {
         self.lock().submitted
     }
 
-    /// Destroys `item` once no command buffer can use it any more.
-    pub(crate) fn retire(&self, item: T) {
+    /// Destroys `item` once no command buffer can use it any more. Answers how many items wait.
+    pub(crate) fn retire(&self, item: T) -> usize {
         let mut inner = self.lock();
         let newest = inner.ring.newest_open();
         inner.deferred.push(item, newest);
+        inner.deferred.len()
     }
 
     /// Takes out what the GPU has finished with.

@@ -11,8 +11,14 @@ use crate::gpu::Gpu;
 /// Names a submission; compare, copy and wait for it with [`Context::wait`](crate::Context::wait).
 ///
 /// The default value names "nothing submitted yet" and is always done.
+/// Of one context, later submissions are greater.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
-pub struct SubmitHandle(pub(crate) u64);
+pub struct SubmitHandle {
+    /// Value of the timeline once the submission is done.
+    pub(crate) value: u64,
+    /// Which context submitted it.
+    pub(crate) context: u64,
+}
 
 /// A timeline semaphore with the last value seen.
 pub(crate) struct Timeline {
