@@ -39,3 +39,18 @@ impl Studio {
         RgbaImage::from_raw(self.size[0], self.size[1], pixels).expect("a picture has four bytes a pixel")
     }
 }
+
+/// The paths the device has; says loudly which one is not tested.
+///
+/// # Panics
+/// When it has none.
+pub fn paths(ctx: &Context) -> Vec<RayPath> {
+    let caps = ctx.capabilities();
+    let all = [(RayPath::Pipeline, caps.ray_tracing_pipeline), (RayPath::Query, caps.ray_query)];
+    for (path, _) in all.iter().filter(|(_, available)| !available) {
+        eprintln!("NOT TESTED, {} cannot trace by {path:?}", caps.device_name);
+    }
+    let found: Vec<_> = all.iter().filter(|(_, available)| *available).map(|(path, _)| *path).collect();
+    assert!(!found.is_empty(), "{} cannot trace rays", caps.device_name);
+    found
+}

@@ -2,10 +2,10 @@
 
 use image::RgbaImage;
 use lvk::glam::{DAffine3, DVec3, Vec3};
-use lvk_samples::hybrid::{Method, RayPath};
+use lvk_samples::hybrid::Method;
 use lvk_samples::scene::{Ambient, Camera, Scene, Sky};
 use lvk_tests::device;
-use lvk_tests::hybrid::Studio;
+use lvk_tests::hybrid::{Studio, paths};
 use lvk_tests::picture::keep;
 use lvk_tests::rays::Ray;
 use lvk_tests::reference::{Geometry, Instance, Reference};
@@ -19,13 +19,6 @@ const REFRACTIVE: u8 = 2;
 const GRAZE: f64 = 2e-3;
 /// Shadow rays of the reference start this far from the surface; so near there is no other one in the scene.
 const NEAR: f32 = 1e-3;
-
-const WAYS: [(Method, RayPath); 4] = [
-    (Method::Standalone, RayPath::Pipeline),
-    (Method::Standalone, RayPath::Query),
-    (Method::Hybrid, RayPath::Pipeline),
-    (Method::Hybrid, RayPath::Query),
-];
 
 /// The triangles of a scene for the reference: opaque ones are instance 0, refractive ones instance 1.
 fn reference(scene: &Scene) -> Reference {
@@ -102,12 +95,17 @@ fn facing(normal: DVec3, direction: DVec3) -> DVec3 {
 /// Compares the pixels that are not black with the ones that must not be, in the first three cameras and all ways.
 fn assert_mask(what: &str, scene: &Scene, expected: impl Fn(&Ray) -> Option<bool>) {
     let Some(ctx) = device() else { return };
-    let mut studios = WAYS.map(|way| Studio::new(&ctx, scene, way, SIZE, 0));
+    let methods = [Method::Standalone, Method::Hybrid];
+    let ways: Vec<_> = methods
+        .into_iter()
+        .flat_map(|method| paths(&ctx).into_iter().map(move |path| (method, path)))
+        .collect();
+    let mut studios: Vec<_> = ways.iter().map(|way| Studio::new(&ctx, scene, *way, SIZE, 0)).collect();
     for (number, camera) in scene.cameras.iter().enumerate().take(3) {
         let mask: Vec<_> = (0..SIZE[0] * SIZE[1])
             .map(|index| expected(&ray_through(camera, [index % SIZE[0], index / SIZE[0]])))
             .collect();
-        for (studio, (method, path)) in studios.iter_mut().zip(WAYS) {
+        for (studio, (method, path)) in studios.iter_mut().zip(ways.iter().copied()) {
             let what = format!("{what} camera {} {method:?} {path:?}", number + 1);
             // The rasteriser places vertices on a grid, and so moves edges a little.
             let allowed = if method == Method::Hybrid { SIZE[0] * SIZE[1] / 1000 } else { 0 };

