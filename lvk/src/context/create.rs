@@ -90,7 +90,9 @@ impl Context {
     /// Compiles GLSL or takes SPIR-V (`vkCreateShaderModule`).
     ///
     /// # Errors
-    /// [`Shader`](Error::Shader) with the compiler's text and the caller's own line numbers.
+    /// [`Shader`](Error::Shader) with the compiler's text and the caller's own line numbers;
+    /// [`Unsupported`](Error::Unsupported) when the module uses a capability whose feature the device lacks, and for
+    /// task and mesh stages.
     pub fn create_shader_module(&self, desc: &ShaderModuleDesc<'_>) -> Result<Holder<ShaderModuleHandle>> {
         let shared = self.shared();
         let module = ShaderModule::new(&shared.gpu, desc, shared.layout.push_constant_bytes)?;

@@ -4,6 +4,7 @@ use std::ffi::CStr;
 
 use ash::vk;
 
+use super::features::{Features, Subgroups, missing};
 use super::select::DeviceKind;
 use crate::error::{Error, Result};
 
@@ -127,7 +128,8 @@ pub(crate) struct PhysicalDevice {
     pub(crate) queue_family: Option<u32>,
     /// Core features the library cannot do without and the device lacks.
     pub(crate) missing: Vec<String>,
-    pub(crate) features: vk::PhysicalDeviceFeatures,
+    /// Those that the library turns on.
+    pub(crate) features: Features,
     pub(crate) deferred_host_operations: bool,
 }
 
@@ -152,7 +154,7 @@ impl PhysicalDevice {
             local_memory_bytes: local_memory(instance, raw),
             queue_family: queue.map(|(family, _)| family),
             missing: Vec::new(),
-            features: vk::PhysicalDeviceFeatures::default(),
+            features: Features::default(),
             deferred_host_operations: has(ash::khr::deferred_host_operations::NAME),
         };
         if plain.api_version < vk::API_VERSION_1_3 {
@@ -171,36 +173,17 @@ impl PhysicalDevice {
     /// Fills the features and what is missing; answers whether acceleration structures may be asked about.
     fn read_features(&mut self, instance: &ash::Instance, has: &dyn Fn(&CStr) -> bool) -> bool {
         let structures = has(ash::khr::acceleration_structure::NAME) && self.deferred_host_operations;
-        let mut accel = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
-        let mut pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default();
-        let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
-        let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
-        let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
-        let mut all = vk::PhysicalDeviceFeatures2::default().push_next(&mut v12).push_next(&mut v13);
-        if structures {
-            all = all.push_next(&mut accel);
-        }
-        if has(ash::khr::ray_tracing_pipeline::NAME) {
-            all = all.push_next(&mut pipeline);
-        }
-        if has(ash::khr::ray_query::NAME) {
-            all = all.push_next(&mut query);
-        }
-        // SAFETY: the chain holds only structures the device knows, and lives until the call returns.
-        unsafe { instance.get_physical_device_features2(self.raw, &mut all) };
-        let core = all.features;
+        let (mut found, usable) = found_features(instance, self.raw, has, structures);
+        found.limit_ray_tracing(usable, usable);
         let caps = &mut self.capabilities;
-        let usable = accel.acceleration_structure
-            & accel.descriptor_binding_acceleration_structure_update_after_bind
-            == vk::TRUE;
-        caps.ray_tracing_pipeline = usable && pipeline.ray_tracing_pipeline == vk::TRUE;
-        caps.ray_query = usable && query.ray_query == vk::TRUE;
-        caps.primitive_id = core.geometry_shader == vk::TRUE;
-        caps.formatless_storage_read = core.shader_storage_image_read_without_format == vk::TRUE;
-        caps.shader_int64 = core.shader_int64 == vk::TRUE;
-        caps.multi_draw_indirect = core.multi_draw_indirect == vk::TRUE;
-        self.missing.extend(missing_core(&core, &v12, &v13));
-        self.features = wanted_core(&core);
+        caps.ray_tracing_pipeline = found.ray_tracing_pipeline == vk::TRUE;
+        caps.ray_query = found.ray_query == vk::TRUE;
+        caps.primitive_id = found.core.geometry_shader == vk::TRUE;
+        caps.formatless_storage_read = found.core.shader_storage_image_read_without_format == vk::TRUE;
+        caps.shader_int64 = found.core.shader_int64 == vk::TRUE;
+        caps.multi_draw_indirect = found.core.multi_draw_indirect == vk::TRUE;
+        self.missing.extend(missing(&found));
+        self.features = Features::wanted(&found);
         usable
     }
 
@@ -212,9 +195,13 @@ impl PhysicalDevice {
     ) {
         let mut accel = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
         let mut pipeline = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
+        let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
         let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
         let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
-        let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut v12).push_next(&mut v13);
+        let mut all = vk::PhysicalDeviceProperties2::default()
+            .push_next(&mut v11)
+            .push_next(&mut v12)
+            .push_next(&mut v13);
         if ray_tracing {
             all = all.push_next(&mut accel);
         }
@@ -223,10 +210,15 @@ impl PhysicalDevice {
         }
         // SAFETY: the chain holds only structures the device knows, and lives until the call returns.
         unsafe { instance.get_physical_device_properties2(self.raw, &mut all) };
+        self.features.subgroups = Subgroups {
+            operations: v11.subgroup_supported_operations,
+            stages: v11.subgroup_supported_stages,
+            quads_everywhere: v11.subgroup_quad_operations_in_all_stages == vk::TRUE,
+        };
         let caps = &mut self.capabilities;
         caps.driver_name = v12.driver_name_as_c_str().map(to_string).unwrap_or_default();
         caps.driver_info = v12.driver_info_as_c_str().map(to_string).unwrap_or_default();
-        caps.max_anisotropy = if self.features.sampler_anisotropy == vk::TRUE {
+        caps.max_anisotropy = if self.features.core.sampler_anisotropy == vk::TRUE {
             plain.limits.max_sampler_anisotropy
         } else {
             1.0
@@ -234,6 +226,44 @@ impl PhysicalDevice {
         caps.prefers_spatial_order = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.limits = limits(&plain.limits, &v12, &v13, &accel, &pipeline);
     }
+}
+
+/// What the device offers, and whether its acceleration structures can be used.
+fn found_features(
+    instance: &ash::Instance,
+    raw: vk::PhysicalDevice,
+    has: &dyn Fn(&CStr) -> bool,
+    structures: bool,
+) -> (Features, bool) {
+    let mut found = Features::default();
+    let mut accel = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
+    let mut pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default();
+    let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
+    let mut all = vk::PhysicalDeviceFeatures2::default()
+        .push_next(&mut found.v11)
+        .push_next(&mut found.v12)
+        .push_next(&mut found.v13);
+    if structures {
+        all = all.push_next(&mut accel);
+    }
+    if has(ash::khr::ray_tracing_pipeline::NAME) {
+        all = all.push_next(&mut pipeline);
+    }
+    if has(ash::khr::ray_query::NAME) {
+        all = all.push_next(&mut query);
+    }
+    if has(ash::ext::shader_atomic_float::NAME) {
+        all = all.push_next(&mut found.float_atomics);
+    }
+    // SAFETY: the chain holds only structures the device knows, and lives until the call returns.
+    unsafe { instance.get_physical_device_features2(raw, &mut all) };
+    found.core = all.features;
+    found.ray_tracing_pipeline = pipeline.ray_tracing_pipeline;
+    found.primitive_culling = pipeline.ray_traversal_primitive_culling;
+    found.ray_query = query.ray_query;
+    let usable =
+        accel.acceleration_structure & accel.descriptor_binding_acceleration_structure_update_after_bind;
+    (found, usable == vk::TRUE)
 }
 
 /// A queue family for everything the library submits, with the bits of its timestamps.
@@ -250,69 +280,6 @@ fn local_memory(instance: &ash::Instance, raw: vk::PhysicalDevice) -> u64 {
     let memory = unsafe { instance.get_physical_device_memory_properties(raw) };
     let heaps = memory.memory_heaps_as_slice().iter();
     heaps.filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)).map(|heap| heap.size).sum()
-}
-
-fn missing_core(
-    core: &vk::PhysicalDeviceFeatures,
-    v12: &vk::PhysicalDeviceVulkan12Features<'_>,
-    v13: &vk::PhysicalDeviceVulkan13Features<'_>,
-) -> Vec<String> {
-    let needed = [
-        (core.shader_storage_image_write_without_format, "shaderStorageImageWriteWithoutFormat"),
-        (core.shader_sampled_image_array_dynamic_indexing, "shaderSampledImageArrayDynamicIndexing"),
-        (core.shader_storage_image_array_dynamic_indexing, "shaderStorageImageArrayDynamicIndexing"),
-        (core.fragment_stores_and_atomics, "fragmentStoresAndAtomics"),
-        (core.independent_blend, "independentBlend"),
-        (v12.buffer_device_address, "bufferDeviceAddress"),
-        (v12.timeline_semaphore, "timelineSemaphore"),
-        (v12.host_query_reset, "hostQueryReset"),
-        (v12.scalar_block_layout, "scalarBlockLayout"),
-        (v12.runtime_descriptor_array, "runtimeDescriptorArray"),
-        (v12.descriptor_binding_partially_bound, "descriptorBindingPartiallyBound"),
-        (v12.descriptor_binding_update_unused_while_pending, "descriptorBindingUpdateUnusedWhilePending"),
-        (
-            v12.descriptor_binding_sampled_image_update_after_bind,
-            "descriptorBindingSampledImageUpdateAfterBind",
-        ),
-        (
-            v12.descriptor_binding_storage_image_update_after_bind,
-            "descriptorBindingStorageImageUpdateAfterBind",
-        ),
-        (v12.shader_sampled_image_array_non_uniform_indexing, "shaderSampledImageArrayNonUniformIndexing"),
-        (v12.shader_storage_image_array_non_uniform_indexing, "shaderStorageImageArrayNonUniformIndexing"),
-        (v13.synchronization2, "synchronization2"),
-        (v13.dynamic_rendering, "dynamicRendering"),
-        (v13.maintenance4, "maintenance4"),
-    ];
-    needed.iter().filter(|(on, _)| *on == vk::FALSE).map(|(_, name)| (*name).to_owned()).collect()
-}
-
-/// The core features turned on: what is needed, and what is useful where present.
-fn wanted_core(core: &vk::PhysicalDeviceFeatures) -> vk::PhysicalDeviceFeatures {
-    vk::PhysicalDeviceFeatures {
-        full_draw_index_uint32: core.full_draw_index_uint32,
-        image_cube_array: core.image_cube_array,
-        independent_blend: core.independent_blend,
-        geometry_shader: core.geometry_shader,
-        tessellation_shader: core.tessellation_shader,
-        dual_src_blend: core.dual_src_blend,
-        multi_draw_indirect: core.multi_draw_indirect,
-        draw_indirect_first_instance: core.draw_indirect_first_instance,
-        depth_clamp: core.depth_clamp,
-        fill_mode_non_solid: core.fill_mode_non_solid,
-        sampler_anisotropy: core.sampler_anisotropy,
-        texture_compression_bc: core.texture_compression_bc,
-        vertex_pipeline_stores_and_atomics: core.vertex_pipeline_stores_and_atomics,
-        fragment_stores_and_atomics: core.fragment_stores_and_atomics,
-        shader_storage_image_extended_formats: core.shader_storage_image_extended_formats,
-        shader_storage_image_read_without_format: core.shader_storage_image_read_without_format,
-        shader_storage_image_write_without_format: core.shader_storage_image_write_without_format,
-        shader_sampled_image_array_dynamic_indexing: core.shader_sampled_image_array_dynamic_indexing,
-        shader_storage_image_array_dynamic_indexing: core.shader_storage_image_array_dynamic_indexing,
-        shader_int64: core.shader_int64,
-        shader_int16: core.shader_int16,
-        ..Default::default()
-    }
 }
 
 /// Slots the library asks for where the device allows more; textures are bounded by the context's description.

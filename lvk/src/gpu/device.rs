@@ -9,6 +9,7 @@ use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 
 use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
 use super::debug::c_name;
+use super::features::Features;
 use super::instance::Instance;
 use super::select::{Candidate, choose};
 use crate::error::{Error, Result};
@@ -24,6 +25,8 @@ pub(crate) struct RayTracing {
 pub(crate) struct Gpu {
     pub(crate) device: ash::Device,
     pub(crate) caps: Capabilities,
+    /// Those that are on.
+    pub(crate) features: Features,
     pub(crate) queue_family: u32,
     pub(crate) accel: Option<ash::khr::acceleration_structure::Device>,
     pub(crate) ray_tracing: Option<ash::khr::ray_tracing_pipeline::Device>,
@@ -38,7 +41,7 @@ pub(crate) struct Gpu {
 impl Gpu {
     pub(crate) fn new(instance: Instance, wish: Option<&str>, request: RayTracing) -> Result<Self> {
         let chosen = choose_device(&instance, wish, request)?;
-        let (device, caps) = create_with_fallback(&instance, &chosen, request)?;
+        let (device, caps, features) = create_with_fallback(&instance, &chosen, request)?;
         let queue_family = chosen.queue_family.unwrap_or_default();
         let allocator = match new_allocator(&instance, &device, chosen.raw) {
             Ok(allocator) => allocator,
@@ -64,6 +67,7 @@ impl Gpu {
             physical: chosen.raw,
             device,
             caps,
+            features,
             instance,
         })
     }
@@ -208,12 +212,12 @@ fn create_with_fallback(
     instance: &Instance,
     chosen: &PhysicalDevice,
     request: RayTracing,
-) -> Result<(ash::Device, Capabilities)> {
+) -> Result<(ash::Device, Capabilities, Features)> {
     let mut caps = chosen.capabilities.clone();
     caps.ray_tracing_pipeline &= request.pipeline.wants();
     caps.ray_query &= request.query.wants();
     let first = match create(instance, chosen, &caps) {
-        Ok(device) => return Ok((device, caps)),
+        Ok((device, features)) => return Ok((device, caps, features)),
         Err(error) => error,
     };
     let optional = [request.pipeline, request.query].iter().all(|r| *r != FeatureRequest::Required);
@@ -225,31 +229,30 @@ fn create_with_fallback(
     caps.limits.max_bindless_tlas = 0;
     caps.ray_tracing_fallback = Some(format!("vkCreateDevice with ray tracing answered {first}"));
     log::warn!("{}: ray tracing is off: vkCreateDevice with it answered {first}", caps.device_name);
-    let device = create(instance, chosen, &caps).map_err(Error::vulkan("vkCreateDevice"))?;
-    Ok((device, caps))
+    let (device, features) = create(instance, chosen, &caps).map_err(Error::vulkan("vkCreateDevice"))?;
+    Ok((device, caps, features))
 }
 
 fn create(
     instance: &Instance,
     chosen: &PhysicalDevice,
     caps: &Capabilities,
-) -> Result<ash::Device, vk::Result> {
-    let structures = caps.ray_tracing_pipeline || caps.ray_query;
+) -> Result<(ash::Device, Features), vk::Result> {
+    let features = enabled(instance, chosen, caps);
     let mut accel = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default()
         .acceleration_structure(true)
         .descriptor_binding_acceleration_structure_update_after_bind(true);
-    let mut pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
+    let mut pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default()
+        .ray_tracing_pipeline(true)
+        .ray_traversal_primitive_culling(features.primitive_culling == vk::TRUE);
     let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
-    let mut v12 = features_1_2();
-    let mut v13 = vk::PhysicalDeviceVulkan13Features::default()
-        .synchronization2(true)
-        .dynamic_rendering(true)
-        .maintenance4(true);
+    let mut chain = features;
     let mut all = vk::PhysicalDeviceFeatures2::default()
-        .features(chosen.features)
-        .push_next(&mut v12)
-        .push_next(&mut v13);
-    if structures {
+        .features(chain.core)
+        .push_next(&mut chain.v11)
+        .push_next(&mut chain.v12)
+        .push_next(&mut chain.v13);
+    if caps.ray_tracing_pipeline || caps.ray_query {
         all = all.push_next(&mut accel);
     }
     if caps.ray_tracing_pipeline {
@@ -258,35 +261,33 @@ fn create(
     if caps.ray_query {
         all = all.push_next(&mut query);
     }
+    if features.has_float_atomics() {
+        all = all.push_next(&mut chain.float_atomics);
+    }
     let queue = vk::DeviceQueueCreateInfo::default()
         .queue_family_index(chosen.queue_family.unwrap_or_default())
         .queue_priorities(&[1.0]);
-    let extensions = extensions(caps);
+    let extensions = extensions(&features, caps);
     let info = vk::DeviceCreateInfo::default()
         .queue_create_infos(std::slice::from_ref(&queue))
         .enabled_extension_names(&extensions)
         .push_next(&mut all);
     // SAFETY: every pointer in `info` lives until the end of this function.
-    unsafe { instance.raw.create_device(chosen.raw, &info, None) }
+    let device = unsafe { instance.raw.create_device(chosen.raw, &info, None) }?;
+    Ok((device, features))
 }
 
-fn features_1_2() -> vk::PhysicalDeviceVulkan12Features<'static> {
-    vk::PhysicalDeviceVulkan12Features::default()
-        .buffer_device_address(true)
-        .timeline_semaphore(true)
-        .host_query_reset(true)
-        .scalar_block_layout(true)
-        .descriptor_indexing(true)
-        .runtime_descriptor_array(true)
-        .descriptor_binding_partially_bound(true)
-        .descriptor_binding_update_unused_while_pending(true)
-        .descriptor_binding_sampled_image_update_after_bind(true)
-        .descriptor_binding_storage_image_update_after_bind(true)
-        .shader_sampled_image_array_non_uniform_indexing(true)
-        .shader_storage_image_array_non_uniform_indexing(true)
+/// GPU-assisted validation finds no access out of bounds where the driver has to make it harmless.
+fn enabled(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) -> Features {
+    let mut features = chosen.features;
+    features.limit_ray_tracing(caps.ray_tracing_pipeline, caps.ray_query);
+    if instance.gpu_assisted {
+        features.core.robust_buffer_access = vk::FALSE;
+    }
+    features
 }
 
-fn extensions(caps: &Capabilities) -> Vec<*const c_char> {
+fn extensions(features: &Features, caps: &Capabilities) -> Vec<*const c_char> {
     let mut names = Vec::new();
     if caps.ray_tracing_pipeline || caps.ray_query {
         names.push(ash::khr::acceleration_structure::NAME.as_ptr());
@@ -297,6 +298,9 @@ fn extensions(caps: &Capabilities) -> Vec<*const c_char> {
     }
     if caps.ray_query {
         names.push(ash::khr::ray_query::NAME.as_ptr());
+    }
+    if features.has_float_atomics() {
+        names.push(ash::ext::shader_atomic_float::NAME.as_ptr());
     }
     names
 }

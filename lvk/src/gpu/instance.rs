@@ -15,6 +15,8 @@ pub(crate) struct Instance {
     pub(crate) entry: ash::Entry,
     pub(crate) raw: ash::Instance,
     pub(crate) debug_utils: bool,
+    /// Shaders are instrumented by the validation layer.
+    pub(crate) gpu_assisted: bool,
     messenger: Messenger,
 }
 
@@ -39,7 +41,8 @@ impl Instance {
             unsafe { raw.destroy_instance(None) };
             return Err(Error::vulkan("vkCreateDebugUtilsMessengerEXT")(result));
         }
-        Ok(Self { entry, raw, debug_utils: extensions.debug_utils, messenger })
+        let gpu_assisted = validation == Validation::GpuAssisted;
+        Ok(Self { entry, raw, debug_utils: extensions.debug_utils, gpu_assisted, messenger })
     }
 
     /// The messages of the validation layer.

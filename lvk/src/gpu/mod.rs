@@ -3,6 +3,7 @@
 pub(crate) mod caps;
 pub(crate) mod debug;
 pub(crate) mod device;
+pub(crate) mod features;
 pub(crate) mod instance;
 pub(crate) mod memory;
 pub(crate) mod select;

@@ -6,7 +6,8 @@ use ash::vk;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::shader::{CompileOptions, Reflection, ShaderModuleDesc, ShaderStage, compile, reflect};
+use crate::shader::{CompileOptions, Reflection, ShaderModuleDesc, ShaderStage};
+use crate::shader::{check_capabilities, check_stage, compile, reflect};
 
 /// A compiled module, destroyed on drop.
 pub(crate) struct ShaderModule {
@@ -19,10 +20,12 @@ pub(crate) struct ShaderModule {
 
 impl ShaderModule {
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &ShaderModuleDesc<'_>, max_push_bytes: u32) -> Result<Self> {
+        check_stage(desc.debug_name, desc.stage)?;
         let options = CompileOptions { formatless_read: gpu.caps.formatless_storage_read };
         let words = compile(desc, &options)?;
         let reflection = reflect(desc.debug_name, desc.stage, &words)?;
         check_features(gpu, desc.debug_name, &reflection)?;
+        check_capabilities(desc.debug_name, desc.stage, &reflection, &gpu.features)?;
         if reflection.push_constant_bytes > max_push_bytes {
             return Err(Error::LimitExceeded {
                 object: desc.debug_name.to_owned(),

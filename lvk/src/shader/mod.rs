@@ -1,5 +1,7 @@
 //! Shader modules: GLSL to SPIR-V, includes, and what a module tells about itself.
 
+mod atomics;
+mod capability;
 mod compile;
 #[cfg(feature = "glsl")]
 mod diagnostics;
@@ -18,6 +20,7 @@ mod stage;
 #[cfg(feature = "glsl")]
 mod unused;
 
+pub(crate) use capability::{check_capabilities, check_stage};
 pub(crate) use compile::{CompileOptions, compile};
 pub(crate) use reflect::{Reflection, reflect};
 pub use stage::{ShaderModuleDesc, ShaderSource, ShaderStage};

@@ -93,6 +93,13 @@ impl Module {
         self.capabilities.contains(&(capability as u32))
     }
 
+    /// The numbers of all capabilities, sorted.
+    pub(super) fn capabilities(&self) -> Vec<u32> {
+        let mut all: Vec<u32> = self.capabilities.iter().copied().collect();
+        all.sort_unstable();
+        all
+    }
+
     pub(super) fn decoration(&self, id: u32, decoration: Decoration) -> Option<u32> {
         self.decorations.get(&(id, decoration as u32)).copied()
     }

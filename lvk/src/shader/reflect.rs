@@ -2,6 +2,7 @@
 
 use ::spirv::{Capability, Decoration, ExecutionMode, ExecutionModel, Op, StorageClass};
 
+use super::atomics::{Atomic, atomics};
 use super::module::{Module, Type, Variable};
 use super::{ShaderStage, spirv};
 use crate::bindless::layout;
@@ -24,6 +25,10 @@ pub(crate) struct Reflection {
     pub(crate) specialization: Vec<(u32, u32)>,
     /// Bindings that the module declares, sorted, each once.
     pub(crate) bindings: Vec<u32>,
+    /// SPIR-V capabilities by number, sorted.
+    pub(crate) capabilities: Vec<u32>,
+    /// Atomic operations that need a device feature.
+    pub(crate) atomics: Vec<Atomic>,
     /// First locations of the inputs; those of a vertex stage are its attributes.
     pub(crate) inputs: Vec<u32>,
 }
@@ -55,11 +60,13 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
     Ok(Reflection {
         push_constant_bytes,
         ray_query: module.has(Capability::RayQueryKHR),
-        ray_tracing: module.has(Capability::RayTracingKHR),
+        ray_tracing: stage.is_ray_tracing() || module.has(Capability::RayTracingKHR),
         local_size,
         local_size_ids,
         specialization: specialization(&module),
         bindings,
+        capabilities: module.capabilities(),
+        atomics: atomics(words)?,
         inputs,
     })
 }

@@ -1,0 +1,153 @@
+//! Which atomic operations a module has, by what they change and where it lies.
+
+use std::collections::{BTreeSet, HashMap};
+
+use ::spirv::{Op, StorageClass};
+
+use super::spirv::{Instruction, instructions};
+
+/// Atomic operations that a device feature of their own allows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct Atomic {
+    pub(crate) is_float: bool,
+    pub(crate) bits: u32,
+    /// An addition, not merely an exchange, a load or a store. Integers have only one feature for both.
+    pub(crate) is_add: bool,
+    pub(crate) place: Place,
+}
+
+/// Where the changed value lies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Place {
+    Buffer,
+    Shared,
+    Image,
+}
+
+/// The atomic operations on floats and on integers of other than 32 bits, each kind once.
+pub(super) fn atomics(words: &[u32]) -> Result<Vec<Atomic>, String> {
+    let mut ids = Ids::default();
+    let mut found = BTreeSet::new();
+    for instruction in instructions(words) {
+        let instruction = instruction?;
+        ids.collect(&instruction);
+        found.extend(ids.atomic(&instruction));
+    }
+    Ok(found.into_iter().collect())
+}
+
+/// What is known of ids so far; definitions come before uses wherever it matters here.
+#[derive(Default)]
+struct Ids {
+    /// Scalar types: whether they are floats, and their bits.
+    scalars: HashMap<u32, (bool, u32)>,
+    /// Pointer types: storage class and target type.
+    pointer_types: HashMap<u32, (u32, u32)>,
+    /// Values: their pointer types.
+    pointers: HashMap<u32, u32>,
+}
+
+impl Ids {
+    fn collect(&mut self, i: &Instruction<'_>) {
+        match i.op {
+            Some(Op::TypeInt) => _ = self.scalars.insert(i.operand(0), (false, i.operand(1))),
+            Some(Op::TypeFloat) => _ = self.scalars.insert(i.operand(0), (true, i.operand(1))),
+            Some(Op::TypePointer) => {
+                self.pointer_types.insert(i.operand(0), (i.operand(1), i.operand(2)));
+            }
+            Some(op) if makes_pointers(op) && self.pointer_types.contains_key(&i.operand(0)) => {
+                self.pointers.insert(i.operand(1), i.operand(0));
+            }
+            _ => {}
+        }
+    }
+
+    fn atomic(&self, i: &Instruction<'_>) -> Option<Atomic> {
+        let op = i.op.filter(|op| is_atomic(*op))?;
+        let pointer = if op == Op::AtomicStore { i.operand(0) } else { i.operand(2) };
+        let (storage, target) = self.pointer_types.get(self.pointers.get(&pointer)?)?;
+        let (is_float, bits) = *self.scalars.get(target)?;
+        let is_add = is_float && !matches!(op, Op::AtomicLoad | Op::AtomicStore | Op::AtomicExchange);
+        let place = place(*storage)?;
+        (is_float || bits != 32).then_some(Atomic { is_float, bits, is_add, place })
+    }
+}
+
+fn place(storage: u32) -> Option<Place> {
+    use StorageClass::{Image, PhysicalStorageBuffer, StorageBuffer, Workgroup};
+    let places = [
+        (StorageBuffer, Place::Buffer),
+        (PhysicalStorageBuffer, Place::Buffer),
+        (Workgroup, Place::Shared),
+        (Image, Place::Image),
+    ];
+    places.into_iter().find(|(class, _)| *class as u32 == storage).map(|(_, place)| place)
+}
+
+/// Result type first, then the result.
+fn makes_pointers(op: Op) -> bool {
+    use Op::{
+        AccessChain, Bitcast, ConvertUToPtr, CopyObject, FunctionCall, FunctionParameter, ImageTexelPointer,
+        InBoundsAccessChain, InBoundsPtrAccessChain, Load, Phi, PtrAccessChain, Select, Variable,
+    };
+    matches!(
+        op,
+        AccessChain
+            | Bitcast
+            | ConvertUToPtr
+            | CopyObject
+            | FunctionCall
+            | FunctionParameter
+            | ImageTexelPointer
+            | InBoundsAccessChain
+            | InBoundsPtrAccessChain
+            | Load
+            | Phi
+            | PtrAccessChain
+            | Select
+            | Variable
+    )
+}
+
+fn is_atomic(op: Op) -> bool {
+    (Op::AtomicLoad as u32..=Op::AtomicXor as u32).contains(&(op as u32))
+        || matches!(op, Op::AtomicFAddEXT | Op::AtomicFMinEXT | Op::AtomicFMaxEXT)
+}
+
+#[cfg(all(test, feature = "glsl"))]
+mod tests {
+    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+    use super::*;
+    use crate::shader::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile};
+
+    fn found(body: &str) -> Vec<Atomic> {
+        let text = format!(
+            "layout(local_size_x = 1) in;
+             layout(buffer_reference, scalar) buffer Data {{ uint u; float f; uint64_t l; double d; }};
+             layout(push_constant, scalar) uniform Push {{ Data data; }};
+             LVK_STORAGE_IMAGES_2D(r32f, kFloats);
+             shared float sf; shared uint64_t sl;
+             void main() {{ {body} }}"
+        );
+        let desc = ShaderModuleDesc {
+            stage: ShaderStage::Compute,
+            source: ShaderSource::Glsl(&text),
+            ..Default::default()
+        };
+        atomics(&compile(&desc, &CompileOptions::default()).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn atomics_are_told_by_value_and_place() {
+        let one = |is_float, bits, is_add, place| vec![Atomic { is_float, bits, is_add, place }];
+        assert_eq!(found("atomicAdd(data.u, 1u); data.f = 1.0;"), []);
+        assert_eq!(found("atomicMax(data.l, 1ul);"), one(false, 64, false, Place::Buffer));
+        assert_eq!(found("atomicExchange(sl, 1ul);"), one(false, 64, false, Place::Shared));
+        assert_eq!(found("atomicAdd(data.f, 1.0);"), one(true, 32, true, Place::Buffer));
+        assert_eq!(found("atomicExchange(data.f, 1.0);"), one(true, 32, false, Place::Buffer));
+        assert_eq!(found("atomicExchange(sf, 1.0);"), one(true, 32, false, Place::Shared));
+        assert_eq!(found("imageAtomicAdd(kFloats[0], ivec2(0), 1.0);"), one(true, 32, true, Place::Image));
+        assert_eq!(found("atomicAdd(data.d, 1.0);"), one(true, 64, true, Place::Buffer));
+        assert_eq!(found("atomicAdd(sf, 1.0); atomicAdd(sf, 2.0); atomicAdd(data.f, 1.0);").len(), 2);
+    }
+}
