@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct CompileOptions {
     /// The device loads from storage images without a format (`shaderStorageImageReadWithoutFormat`).
+    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) formatless_read: bool,
 }
 
