@@ -9,7 +9,7 @@ use super::CommandBuffer;
 use super::compute::check_arguments;
 use super::targets::Targets;
 use crate::barrier::{Stages, Use};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, check_limit};
 use crate::format::IndexFormat;
 use crate::gpu::caps::Limits;
 use crate::handle::{BufferHandle, RenderPipelineHandle};
@@ -260,6 +260,10 @@ impl<'a> RenderPass<'a> {
         if u64::from(stride) < size || !stride.is_multiple_of(4) {
             let message = format!("the stride {stride} must be a multiple of 4 and at least {size} bytes");
             return Err(Error::usage(&buffer.name, message));
+        }
+        let limits = &self.cmd.shared.gpu.caps.limits;
+        if self.cmd.shared.gpu.caps.multi_draw_indirect {
+            check_limit(&buffer.name, "draw count", draw_count.into(), limits.max_indirect_draws.into())?;
         }
         let bytes = u64::from(draw_count.saturating_sub(1)) * u64::from(stride) + size;
         check_arguments(&buffer, offset, bytes)?;

@@ -83,6 +83,8 @@ pub struct Limits {
     pub max_group_size: [u32; 3],
     /// Most invocations of a workgroup altogether (`maxComputeWorkGroupInvocations`).
     pub max_group_invocations: u32,
+    /// Most draws of one indirect call (`maxDrawIndirectCount`).
+    pub max_indirect_draws: u32,
     /// Largest width and height of a viewport in pixels (`maxViewportDimensions`).
     pub max_viewport: [u32; 2],
     /// Where viewports may begin and end in pixels, along both axes (`viewportBoundsRange`).
@@ -303,6 +305,7 @@ fn limits(
         max_dispatch_groups: plain.max_compute_work_group_count,
         max_group_size: plain.max_compute_work_group_size,
         max_group_invocations: plain.max_compute_work_group_invocations,
+        max_indirect_draws: plain.max_draw_indirect_count,
         max_viewport: plain.max_viewport_dimensions,
         viewport_bounds: plain.viewport_bounds_range,
         timestamp_period_ns: plain.timestamp_period,

@@ -10,6 +10,7 @@ use super::shader_module::ShaderModule;
 use super::stage::{Specialization, SpecializationConstant, stage};
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
+use crate::gpu::caps::Limits;
 use crate::handle::ShaderModuleHandle;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
@@ -107,21 +108,9 @@ impl RayTracingPipeline {
         }
         check_limit(name, "recursion depth", desc.max_recursion.into(), limits.max_ray_recursion.into())?;
         let stages = Stages::collect(desc, find)?;
-        let sbt_limits = SbtLimits {
-            handle_bytes: limits.sbt_handle_bytes,
-            handle_alignment: limits.sbt_handle_alignment,
-            base_alignment: limits.sbt_base_alignment,
-            max_stride: limits.sbt_max_stride,
-        };
+        let sbt_limits = sbt_limits(limits);
         let records: Vec<&[u8]> = desc.hit_groups.iter().map(|group| group.record).collect();
-        let record_bytes: Vec<usize> = records.iter().map(|record| record.len()).collect();
-        let groups = SbtGroups {
-            ray_gen: desc.ray_gen.len() as u32,
-            miss: desc.miss.len() as u32,
-            hit_records: &record_bytes,
-            callable: desc.callable.len() as u32,
-        };
-        let plan = plan_sbt(&sbt_limits, &groups)?;
+        let plan = plan_table(desc, &sbt_limits, &records)?;
         let table = new_table(gpu, name, sbt_buffer_bytes(&plan, sbt_limits.base_alignment))?;
         let base = table.address.next_multiple_of(sbt_limits.base_alignment.into());
         let raw = create(gpu, layout, desc, &stages)?;
@@ -257,6 +246,26 @@ fn group(kind: vk::RayTracingShaderGroupTypeKHR) -> vk::RayTracingShaderGroupCre
         .closest_hit_shader(vk::SHADER_UNUSED_KHR)
         .any_hit_shader(vk::SHADER_UNUSED_KHR)
         .intersection_shader(vk::SHADER_UNUSED_KHR)
+}
+
+fn sbt_limits(limits: &Limits) -> SbtLimits {
+    SbtLimits {
+        handle_bytes: limits.sbt_handle_bytes,
+        handle_alignment: limits.sbt_handle_alignment,
+        base_alignment: limits.sbt_base_alignment,
+        max_stride: limits.sbt_max_stride,
+    }
+}
+
+fn plan_table(desc: &RayTracingPipelineDesc<'_>, limits: &SbtLimits, records: &[&[u8]]) -> Result<SbtPlan> {
+    let record_bytes: Vec<usize> = records.iter().map(|record| record.len()).collect();
+    let groups = SbtGroups {
+        ray_gen: desc.ray_gen.len() as u32,
+        miss: desc.miss.len() as u32,
+        hit_records: &record_bytes,
+        callable: desc.callable.len() as u32,
+    };
+    plan_sbt(limits, &groups)
 }
 
 fn new_table(gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Buffer> {

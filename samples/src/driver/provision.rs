@@ -5,7 +5,6 @@ use std::path::Path;
 
 use indicatif::{ProgressBar, ProgressStyle};
 use rustix::fs::FlockOperation;
-use rustix::io::FdFlags;
 
 use super::apt::{Apt, Quote};
 use super::assemble::assemble;
@@ -16,7 +15,7 @@ use super::prefix::{Manifest, Part};
 /// one left behind is removed first.
 pub(super) fn provision(root: &Path, parts: &[Part]) -> Result<(), FetchError> {
     fs::create_dir_all(root).map_err(FetchError::file("create", root))?;
-    let _lock = lock(root)?;
+    let lock = lock(root)?;
     let missing: Vec<Part> =
         parts.iter().copied().filter(|part| Manifest::read(&part.folder(root)).is_none()).collect();
     if missing.is_empty() {
@@ -27,13 +26,13 @@ pub(super) fn provision(root: &Path, parts: &[Part]) -> Result<(), FetchError> {
         remove(&leftover)?;
     }
     fs::create_dir(&work).map_err(FetchError::file("create", &work))?;
-    let outcome = fetch(root, &work, &missing);
+    let outcome = fetch(root, &work, &lock, &missing);
     let removed = remove(&work);
     outcome.and(removed)
 }
 
-fn fetch(root: &Path, work: &Path, parts: &[Part]) -> Result<(), FetchError> {
-    let apt = with_progress("reading package lists", |progress| Apt::open(work, progress))?;
+fn fetch(root: &Path, work: &Path, lock: &File, parts: &[Part]) -> Result<(), FetchError> {
+    let apt = with_progress("reading package lists", |progress| Apt::open(work, lock, progress))?;
     let quotes = parts.iter().map(|part| apt.quote(part.order())).collect::<Result<Vec<_>, _>>()?;
     let items: Vec<_> = parts
         .iter()
@@ -95,18 +94,17 @@ fn with_progress<T>(message: &str, job: impl FnOnce(&dyn Fn(f64)) -> T) -> T {
     outcome
 }
 
-/// Takes the lock of `root`. It ends with the returned file and with all that inherited it, so that a package
-/// tool that outlives a killed process is waited for and cannot write into the next attempt.
+/// Takes the lock of `root`. It ends with the returned file and with the package tools that were handed it, so that one
+/// that outlives a killed process is waited for and cannot write into the next attempt.
 fn lock(root: &Path) -> Result<File, FetchError> {
     let path = root.join("lock");
-    let file = File::create(&path).map_err(FetchError::file("create", &path))?;
+    let options = File::options().read(true).write(true).create(true).truncate(false).open(&path);
+    let file = options.map_err(FetchError::file("create", &path))?;
     if rustix::fs::flock(&file, FlockOperation::NonBlockingLockExclusive).is_err() {
         eprintln!("lvk: another process is fetching into {}; waiting for it", root.display());
         let locked = rustix::io::retry_on_intr(|| rustix::fs::flock(&file, FlockOperation::LockExclusive));
         locked.map_err(|error| FetchError::file("lock", &path)(error.into()))?;
     }
-    let inherited = rustix::io::fcntl_setfd(&file, FdFlags::empty());
-    inherited.map_err(|error| FetchError::file("lock", &path)(error.into()))?;
     Ok(file)
 }
 
@@ -159,7 +157,11 @@ mod tests {
         let held = lock(root.path()).unwrap();
         let other = File::open(root.path().join("lock")).unwrap();
         assert!(rustix::fs::flock(&other, FlockOperation::NonBlockingLockExclusive).is_err());
+        let bystander = std::process::Command::new("sleep").arg("60").spawn();
         drop(held);
         assert!(rustix::fs::flock(&other, FlockOperation::NonBlockingLockExclusive).is_ok());
+        let mut bystander = bystander.unwrap();
+        bystander.kill().unwrap();
+        bystander.wait().unwrap();
     }
 }

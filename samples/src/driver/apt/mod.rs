@@ -5,7 +5,7 @@ mod output;
 mod sources;
 
 use std::ffi::OsStr;
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -14,7 +14,9 @@ use super::error::FetchError;
 use sources::Mirror;
 
 /// A private apt state with up-to-date package lists.
-pub(super) struct Apt {
+pub(super) struct Apt<'a> {
+    /// Held by every package tool that runs, even when this process is killed.
+    lock: &'a File,
     work: PathBuf,
     mirror: Mirror,
     index_size: Option<String>,
@@ -49,10 +51,14 @@ pub(super) struct Quote {
     pub(super) size_bytes: u64,
 }
 
-impl Apt {
+impl<'a> Apt<'a> {
     /// Makes the state in the empty folder `work` and reads the package lists of the machine's mirror, or of
     /// Debian's own network if that one does not serve. `progress` takes percent.
-    pub(super) fn open(work: &Path, mut progress: impl FnMut(f64)) -> Result<Self, FetchError> {
+    pub(super) fn open(
+        work: &Path,
+        lock: &'a File,
+        mut progress: impl FnMut(f64),
+    ) -> Result<Self, FetchError> {
         require_tools()?;
         for folder in ["state/lists/partial", "cache/archives/partial", "log", "download"] {
             let path = work.join(folder);
@@ -63,7 +69,7 @@ impl Apt {
         let mut refusal = FetchError::MissingTool { what: "a package source".to_owned() };
         for mirror in Mirror::candidates(Path::new("/etc/apt")) {
             write(&work.join("debian.sources"), &configuration::sources(&mirror))?;
-            let mut apt = Self { work: work.to_path_buf(), mirror, index_size: None };
+            let mut apt = Self { lock, work: work.to_path_buf(), mirror, index_size: None };
             match apt.run(&["update", "-q"], &mut progress) {
                 Ok(text) => {
                     apt.index_size = output::fetched(&text).map(str::to_owned);
@@ -112,7 +118,7 @@ impl Apt {
         let folder = self.work.join(if order.with_dependencies { "cache/archives" } else { "download" });
         let archives = debian_archives(&folder)?;
         for (index, archive) in archives.iter().enumerate() {
-            unpack(archive, tree)?;
+            unpack(archive, tree, self.lock)?;
             fs::remove_file(archive).map_err(FetchError::file("remove", archive))?;
             let unpacked = (index + 1) as f64 / archives.len() as f64;
             progress(100.0 * (DOWNLOAD_SHARE + (1.0 - DOWNLOAD_SHARE) * unpacked));
@@ -124,7 +130,7 @@ impl Apt {
     fn run(&self, arguments: &[&str], mut progress: impl FnMut(f64)) -> Result<String, FetchError> {
         let mut command = Command::new("apt-get");
         command.arg("-c").arg(self.work.join("apt.conf")).args(["-o", "APT::Status-Fd=1"]).args(arguments);
-        command.current_dir(self.work.join("download"));
+        command.current_dir(self.work.join("download")).stdin(holding(self.lock));
         let take = |line: &str| {
             if let Some(percent) = output::percent(line) {
                 progress(percent);
@@ -140,10 +146,16 @@ impl Order {
     }
 }
 
+/// A standard input that never says anything and keeps the lock as long as the tool runs. Other children of this
+/// process must not inherit the lock: they would wait for themselves.
+fn holding(lock: &File) -> Stdio {
+    lock.try_clone().map_or_else(|_| Stdio::null(), Stdio::from)
+}
+
 /// Runs `command`, hands each line of its output to `take`, and answers with the whole output.
 fn capture(mut command: Command, shown: &str, mut take: impl FnMut(&str)) -> Result<String, FetchError> {
     command.env("LC_ALL", "C").env_remove("APT_CONFIG");
-    command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
     let failed = |message: String| FetchError::PackageTool { command: shown.to_owned(), message };
     let mut child = command.spawn().map_err(|error| match error.kind() {
         io::ErrorKind::NotFound => {
@@ -191,13 +203,13 @@ fn require_tools() -> Result<(), FetchError> {
 
 fn libc_version() -> Result<String, FetchError> {
     let mut command = Command::new("dpkg-query");
-    command.args(["-W", "-f", "${Version}", "libc6:amd64"]);
+    command.args(["-W", "-f", "${Version}", "libc6:amd64"]).stdin(Stdio::null());
     capture(command, "dpkg-query -W libc6", |_| {}).map(|text| text.trim().to_owned())
 }
 
-fn unpack(archive: &Path, tree: &Path) -> Result<(), FetchError> {
+fn unpack(archive: &Path, tree: &Path, lock: &File) -> Result<(), FetchError> {
     let mut command = Command::new("dpkg-deb");
-    command.arg("--extract").arg(archive).arg(tree);
+    command.arg("--extract").arg(archive).arg(tree).stdin(holding(lock));
     capture(command, &format!("dpkg-deb --extract {}", archive.display()), |_| {}).map(drop)
 }
 
