@@ -8,6 +8,9 @@ use super::prefix::{DRIVER_JSON, LAYER_FOLDER, Part};
 use super::settings::Settings;
 use super::{Driver, DriverOrigin};
 
+/// Where Mesa keeps compiled shaders; without it, in the user's own cache folder.
+const MESA_CACHE: &str = "MESA_SHADER_CACHE_DIR";
+
 /// Sets the variables for `driver` and for layers, in one go and once per process.
 ///
 /// The layer folders are named whether or not they are there yet: the loader skips those that are not, and a
@@ -15,17 +18,21 @@ use super::{Driver, DriverOrigin};
 pub(super) fn publish(settings: &Settings, driver: &Driver) {
     let (name, value) =
         layer_variable(env::var_os("VK_LAYER_PATH"), env::var_os("VK_ADD_LAYER_PATH"), &settings.folders);
-    let files = match &driver.origin {
-        DriverOrigin::Provisioned { prefix } => Some(prefix.join(DRIVER_JSON)),
+    let prefix = match &driver.origin {
+        DriverOrigin::Provisioned { prefix } => Some(prefix),
         DriverOrigin::System => None,
     };
+    let keeps_shaders = env::var_os(MESA_CACHE).is_some();
     // SAFETY: changing the environment is unsound only while another thread reads it through the C library.
     // This runs once per process, under the lock of `prepare`, which is documented to come before the first
     // Vulkan call; other threads of this project read the environment through `std` only, which locks.
     unsafe {
         env::set_var(name, value);
-        if let Some(files) = files {
-            env::set_var("VK_DRIVER_FILES", files);
+        if let Some(prefix) = prefix {
+            env::set_var("VK_DRIVER_FILES", prefix.join(DRIVER_JSON));
+            if !keeps_shaders {
+                env::set_var(MESA_CACHE, prefix.with_file_name("shader_cache"));
+            }
         }
     }
 }
