@@ -326,7 +326,13 @@ fn a_device_without_ray_tracing_is_told_what_it_lacks() {
     }
     let desk = Desk::new();
     let scene = desk.file("triangle.obj", TRIANGLE);
-    let icd = swiftshader_icd().unwrap();
+    let icd = match swiftshader_icd() {
+        Ok(icd) => icd,
+        Err(error) => {
+            assert!(std::env::var_os("LVK_REQUIRE_GPU").is_none(), "{error}");
+            return eprintln!("SKIPPED, no device without ray tracing: {error}");
+        }
+    };
     for (rt, lack) in [
         ("auto", "neither ray tracing pipelines nor ray queries"),
         ("pipeline", "lacks ray tracing pipelines"),

@@ -1,11 +1,11 @@
 //! A context for a test, whose end fails the test if the validation layer said anything.
 
 use std::ops::Deref;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use lvk::{Context, ContextDesc, Validation, ValidationSink};
-use lvk_samples::driver::{DriverRequest, prepare};
+use lvk_samples::driver::{DriverRequest, prepare, swiftshader_icd};
 
 /// A context under core and synchronization validation. Dropping it fails the test on any message, those of the
 /// context's own end included.
@@ -58,14 +58,7 @@ pub fn device() -> Option<TestDevice> {
 /// # Panics
 /// When there is no device, or the context cannot be made.
 pub fn device_with(adjust: impl FnOnce(&mut ContextDesc<'_>)) -> Option<TestDevice> {
-    let library = match loader() {
-        Ok(library) => library.as_deref(),
-        Err(reason) if is_set("LVK_SKIP_GPU_TESTS") && !is_set("LVK_REQUIRE_GPU") => {
-            eprintln!("SKIPPED, no Vulkan device: {reason}");
-            return None;
-        }
-        Err(reason) => unavailable(reason),
-    };
+    let library = vulkan()?;
     let sink = ValidationSink::default();
     let mut desc = ContextDesc {
         application_name: "lvk tests",
@@ -90,8 +83,38 @@ fn validation() -> Validation {
     }
 }
 
+/// The Vulkan loader to open, `Some(None)` for the system's own; `None` as for [`device_with`].
+///
+/// # Panics
+/// When there is no driver.
+pub fn vulkan() -> Option<Option<&'static Path>> {
+    match loader() {
+        Ok(library) => Some(library.as_deref()),
+        Err(reason) if is_set("LVK_SKIP_GPU_TESTS") && !is_set("LVK_REQUIRE_GPU") => {
+            eprintln!("SKIPPED, no Vulkan device: {reason}");
+            None
+        }
+        Err(reason) => unavailable(reason),
+    }
+}
+
+/// The description file of the device without ray tracing; `None`, loudly, where it cannot be fetched.
+///
+/// # Panics
+/// When it cannot be fetched although `LVK_REQUIRE_GPU=1` demands every test.
+pub fn swiftshader() -> Option<PathBuf> {
+    match swiftshader_icd() {
+        Ok(icd) => Some(icd),
+        Err(error) if is_set("LVK_REQUIRE_GPU") => unavailable(&error.to_string()),
+        Err(error) => {
+            eprintln!("SKIPPED, no device without ray tracing: {error}");
+            None
+        }
+    }
+}
+
 /// The Vulkan loader to open, found or fetched once.
-pub fn loader() -> Result<&'static Option<PathBuf>, &'static str> {
+fn loader() -> Result<&'static Option<PathBuf>, &'static str> {
     static LOADER: OnceLock<Result<Option<PathBuf>, String>> = OnceLock::new();
     let found = LOADER.get_or_init(|| {
         let driver = prepare(&DriverRequest { validation: true }).map_err(|error| error.to_string())?;

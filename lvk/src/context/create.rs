@@ -56,6 +56,10 @@ impl Context {
     fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>) -> Result<()> {
         let texture = self.shared().store.textures.get(handle)?;
         let Some(data) = desc.data else {
+            if desc.generate_mips {
+                let message = "mips are generated from data; without it use CommandBuffer::generate_mipmaps";
+                return Err(Error::usage(desc.debug_name, message));
+            }
             return self.before_next_submission(|cmd| {
                 cmd.settle_texture(&texture);
                 Ok(())

@@ -106,6 +106,9 @@ impl RayTracingPipeline {
                 "a ray tracing pipeline needs at least one ray generation shader",
             ));
         }
+        if desc.max_recursion == 0 {
+            return Err(Error::usage(name, "a recursion depth of 0 traces no ray; 1 is the least"));
+        }
         check_limit(name, "recursion depth", desc.max_recursion.into(), limits.max_ray_recursion.into())?;
         let stages = Stages::collect(desc, find)?;
         let sbt_limits = sbt_limits(limits);

@@ -22,9 +22,9 @@ bitflags! {
         const INDEX = 1 << 1;
         /// Holds vertex attributes.
         const VERTEX = 1 << 2;
-        /// Holds arguments of indirect draws, dispatches and traces.
+        /// Holds arguments of indirect draws and dispatches.
         const INDIRECT = 1 << 3;
-        /// Holds vertices, indices, boxes, transforms or instances an acceleration structure is built from.
+        /// Holds vertices, indices or boxes an acceleration structure is built from.
         const ACCEL_INPUT = 1 << 4;
     }
 }

@@ -116,7 +116,7 @@ fn is_atomic(op: Op) -> bool {
 
 #[cfg(all(test, feature = "glsl"))]
 mod tests {
-    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
     use super::*;
     use crate::shader::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile};
 

@@ -251,7 +251,7 @@ fn float_add(features: &Features) -> vk::Bool32 {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
     use super::*;
 
     fn module(capabilities: &[C]) -> Reflection {

@@ -39,7 +39,7 @@ fn glsl(desc: &ShaderModuleDesc<'_>, _: &str, _: &CompileOptions) -> Result<Vec<
 
 #[cfg(all(test, not(feature = "glsl")))]
 mod tests {
-    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
     use super::*;
 
     #[test]

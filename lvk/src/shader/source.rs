@@ -108,7 +108,7 @@ fn version_directive(text: &str) -> Option<&str> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
     use proptest::prelude::*;
 
     use super::*;

@@ -192,7 +192,7 @@ impl Default for ShaderModuleDesc<'_> {
             includes: &[],
             include_dirs: &[],
             defines: &[],
-            debug_name: "",
+            debug_name: "shader module",
         }
     }
 }
