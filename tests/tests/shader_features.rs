@@ -102,7 +102,7 @@ const USES: [Use; 12] = [
     },
     Use {
         needs: &[INT64, ("shaderSharedInt64Atomics", |f| f.v12.shader_shared_int64_atomics)],
-        body: "sharedLong = 0ul; atomicAdd(sharedLong, 7ul); result.at = uint(sharedLong);",
+        body: "sharedLong = 0ul; barrier(); atomicAdd(sharedLong, 7ul); barrier(); result.at = uint(sharedLong);",
         expected: 7,
     },
     Use {

@@ -56,6 +56,12 @@ fn every_format_round_trips_or_is_unsupported() {
     let Some(ctx) = device() else { return };
     let mut unsupported = Vec::new();
     for (seed, format) in (0..).zip(Format::ALL.iter().copied()) {
+        // The GPU-assisted layer takes texels of depth alone for 5 bytes here, and reads depths where there are none.
+        if format == Format::D32FloatS8
+            && std::env::var("LVK_TEST_VALIDATION").is_ok_and(|kind| kind == "gpu")
+        {
+            continue;
+        }
         let data = texels(format, seed, 15);
         let desc = TextureDesc { format, extent: [5, 3], data: Some(&data), ..Default::default() };
         match ctx.create_texture(&desc) {
