@@ -183,6 +183,44 @@ fn a_picture_that_cannot_be_written_is_refused_before_any_work() {
 }
 
 #[test]
+fn a_picture_never_replaces_what_is_read() {
+    let desk = Desk::new();
+    let scene = desk.file("scene.png", TRIANGLE);
+    let cameras = desk.file("cameras.png", "scene a 0 1 2\n");
+    let detour = |name: &str| desk.input.path().join(".").join(name).display().to_string();
+    for (out, option) in [(&scene, "--scene"), (&detour("scene.png"), "--scene"), (&cameras, "--cameras")] {
+        let outcome = Outcome::of(hybrid(&["--scene", &scene, "--cameras", &cameras, "--out", out]));
+        outcome.assert_error(2, &["--out", option, "same file"]);
+    }
+    assert_eq!(fs::read_to_string(scene).unwrap(), TRIANGLE);
+    assert_eq!(fs::read_to_string(cameras).unwrap(), "scene a 0 1 2\n");
+}
+
+#[test]
+fn a_picture_that_is_not_named_as_a_png_is_refused() {
+    let desk = Desk::new();
+    for name in ["picture.jpg", "picture", "png"] {
+        let out = desk.output.path().join(name).display().to_string();
+        Outcome::of(hybrid(&["--out", &out])).assert_error(2, &[name, "the picture is a PNG", ".png"]);
+    }
+    // These names pass, so the scene is what is wrong.
+    let scene = desk.file("nothing.obj", "");
+    for out in [desk.output.path().join("PICTURE.PNG").display().to_string(), "/dev/null".to_owned()] {
+        Outcome::of(hybrid(&["--scene", &scene, "--out", &out])).assert_error(2, &["nothing.obj"]);
+    }
+    assert_eq!(desk.output_files(), Vec::<String>::new());
+}
+
+#[test]
+fn a_driver_wish_that_is_not_understood_is_wrong_input() {
+    let desk = Desk::new();
+    let mut command = desk.command(&["--scene", &desk.file("triangle.obj", TRIANGLE)]);
+    command.env("LVK_DRIVER", "fast");
+    Outcome::of(command).assert_error(2, &["LVK_DRIVER=fast", "`system` or `software`"]);
+    assert_eq!(desk.output_files(), Vec::<String>::new());
+}
+
+#[test]
 fn an_earlier_picture_survives_an_error() {
     let desk = Desk::new();
     fs::write(desk.picture(), "earlier").unwrap();

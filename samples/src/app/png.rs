@@ -15,6 +15,20 @@ pub enum PngError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The name says that the file is no PNG.
+    #[error("--out {}: the picture is a PNG; name it {}", path.display(), path.with_extension("png").display())]
+    NotPng {
+        /// The path of the picture.
+        path: PathBuf,
+    },
+    /// The picture would replace a file that is read.
+    #[error("--out and {option} are the same file, {}; choose another --out", path.display())]
+    IsInput {
+        /// The path of the picture.
+        path: PathBuf,
+        /// The option that names the file as input.
+        option: &'static str,
+    },
     /// The pixels do not fit the size.
     #[error("{} pixels of 4 bytes were to be written to {}, but {bytes} bytes were given", width * height, path.display())]
     WrongLength {
@@ -37,11 +51,24 @@ pub enum PngError {
     },
 }
 
+/// Checks that a picture at `path` would not replace the file `input`, which the option called `option` names, by
+/// whatever way the two paths lead there.
+///
+/// # Errors
+/// [`PngError::IsInput`].
+pub fn check_not_input(path: &Path, option: &'static str, input: &Path) -> Result<(), PngError> {
+    let is_same = match (path.canonicalize(), input.canonicalize()) {
+        (Ok(path), Ok(input)) => path == input && !is_special(&path),
+        _ => false,
+    };
+    if is_same { Err(PngError::IsInput { path: path.into(), option }) } else { Ok(()) }
+}
+
 /// Checks that a picture can be written to `path` later, without leaving anything behind. An existing file at
 /// `path` is not touched.
 ///
 /// # Errors
-/// [`PngError::Unwritable`].
+/// [`PngError::Unwritable`], and [`PngError::NotPng`] for a name that does not end in `.png`, in whatever case.
 pub fn check_writable(path: &Path) -> Result<(), PngError> {
     let unwritable = |source| PngError::Unwritable { path: path.into(), source };
     if path.is_dir() || path.file_name().is_none() {
@@ -49,6 +76,9 @@ pub fn check_writable(path: &Path) -> Result<(), PngError> {
     }
     if is_special(path) {
         return Ok(());
+    }
+    if !path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("png")) {
+        return Err(PngError::NotPng { path: path.into() });
     }
     Partial::create(path).map(drop).map_err(unwritable)
 }

@@ -1,68 +1,106 @@
 //! Shows that something long is under way.
 
 use std::io::IsTerminal;
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 /// How long work may take before anything is shown.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// Time between two looks at the clock, and two steps of the spinner.
+const TICK: Duration = Duration::from_millis(100);
 
-/// A progress bar on standard error, which appears when the work has taken more than two seconds, is gone when
-/// it ends, and is never drawn where standard error is no terminal.
+/// A progress bar on standard error, which appears when the work has taken more than two seconds, even amid a stage
+/// that says nothing, is gone when it ends, and is never drawn where standard error is no terminal.
 #[derive(Debug)]
 pub struct Progress {
+    timing: Timing,
+    is_seen: bool,
+    target: fn() -> ProgressDrawTarget,
+    shown: Option<Shown>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Timing {
     start: Instant,
-    bar: Option<ProgressBar>,
+    patience: Duration,
+    tick: Duration,
+}
+
+/// A bar, and the thread that keeps it moving.
+#[derive(Debug)]
+struct Shown {
+    bar: ProgressBar,
+    stop: Option<Sender<()>>,
+    ticker: Option<JoinHandle<()>>,
 }
 
 impl Progress {
     /// Progress that a person sees, if there is a terminal.
     pub fn visible() -> Self {
-        let bar = std::io::stderr().is_terminal().then(|| {
-            let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
-            bar.set_style(style(false));
-            bar
-        });
-        Self { start: Instant::now(), bar }
+        Self { is_seen: std::io::stderr().is_terminal(), ..Self::hidden() }
     }
 
     /// Progress that nobody sees.
     pub fn hidden() -> Self {
-        Self { start: Instant::now(), bar: None }
+        let timing = Timing { start: Instant::now(), patience: PATIENCE, tick: TICK };
+        Self { timing, is_seen: false, target: ProgressDrawTarget::stderr, shown: None }
     }
 
     /// Starts the next stage, called `name`, of `total` steps; 0 steps for a stage that cannot be counted.
     pub fn stage(&mut self, name: &str, total: u64) {
-        let Some(bar) = &self.bar else { return };
+        if !self.is_seen {
+            return;
+        }
+        let bar = &self.shown.get_or_insert_with(|| Shown::new(self.timing, self.target)).bar;
         bar.set_style(style(total > 0));
         bar.set_length(total);
         bar.set_position(0);
         bar.set_message(name.to_owned());
-        self.show_when_late();
     }
 
     /// Says how many steps of the stage are done.
     pub fn set(&mut self, done: u64) {
-        let Some(bar) = &self.bar else { return };
-        bar.set_position(done);
-        self.show_when_late();
+        if let Some(Shown { bar, .. }) = &self.shown {
+            bar.set_position(done);
+        }
     }
 
-    fn show_when_late(&self) {
-        let Some(bar) = self.bar.as_ref().filter(|bar| bar.is_hidden()) else { return };
-        if self.start.elapsed() > PATIENCE {
-            bar.set_draw_target(ProgressDrawTarget::stderr());
-            bar.tick();
-        }
+    /// Takes the bar away until the next stage, so that others can write to standard error. No thread of it is left
+    /// meanwhile.
+    pub fn pause(&mut self) {
+        self.shown = None;
     }
 }
 
-impl Drop for Progress {
+impl Shown {
+    fn new(timing: Timing, target: fn() -> ProgressDrawTarget) -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
+        let (stop, stopped) = mpsc::channel::<()>();
+        let ticked = bar.clone();
+        let tick = move || {
+            while stopped.recv_timeout(timing.tick) == Err(RecvTimeoutError::Timeout) {
+                if ticked.is_hidden() && timing.start.elapsed() > timing.patience {
+                    ticked.set_draw_target(target());
+                }
+                ticked.tick();
+            }
+        };
+        // Without a thread there is no bar, which is no reason to stop the work.
+        let ticker = thread::Builder::new().name("progress".to_owned()).spawn(tick).ok();
+        Self { bar, stop: Some(stop), ticker }
+    }
+}
+
+impl Drop for Shown {
     fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
+        drop(self.stop.take());
+        if let Some(ticker) = self.ticker.take() {
+            let _ = ticker.join();
         }
+        self.bar.finish_and_clear();
     }
 }
 
@@ -74,6 +112,51 @@ fn style(is_counted: bool) -> ProgressStyle {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io;
+
+    /// A terminal that takes everything.
+    #[derive(Debug)]
+    struct Terminal;
+
+    impl indicatif::TermLike for Terminal {
+        fn width(&self) -> u16 {
+            80
+        }
+        fn move_cursor_up(&self, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_down(&self, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_right(&self, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+        fn move_cursor_left(&self, _: usize) -> io::Result<()> {
+            Ok(())
+        }
+        fn write_line(&self, _: &str) -> io::Result<()> {
+            Ok(())
+        }
+        fn write_str(&self, _: &str) -> io::Result<()> {
+            Ok(())
+        }
+        fn clear_line(&self) -> io::Result<()> {
+            Ok(())
+        }
+        fn flush(&self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    fn progress(patience: Duration) -> Progress {
+        let timing = Timing { start: Instant::now(), patience, tick: Duration::from_millis(1) };
+        let target = || ProgressDrawTarget::term_like(Box::new(Terminal));
+        Progress { timing, is_seen: true, target, shown: None }
+    }
+
+    fn bar(progress: &Progress) -> ProgressBar {
+        progress.shown.as_ref().unwrap().bar.clone()
+    }
 
     #[test]
     fn both_templates_are_valid() {
@@ -84,14 +167,37 @@ mod tests {
 
     #[test]
     fn nothing_is_shown_before_the_patience_is_over() {
-        let mut progress = Progress {
-            start: Instant::now(),
-            bar: Some(ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden())),
-        };
+        let mut progress = progress(Duration::from_secs(3600));
         progress.stage("a", 10);
         progress.set(5);
-        let bar = progress.bar.clone().unwrap();
+        thread::sleep(Duration::from_millis(20));
+        let bar = bar(&progress);
         assert!(bar.is_hidden());
         assert_eq!((bar.position(), bar.length()), (5, Some(10)));
+    }
+
+    #[test]
+    fn a_silent_stage_is_shown_when_it_takes_long_and_again_after_a_pause() {
+        let mut progress = progress(Duration::from_millis(10));
+        for stage in ["textures", "pipelines"] {
+            progress.stage(stage, 0);
+            let bar = bar(&progress);
+            let deadline = Instant::now() + Duration::from_secs(10);
+            while bar.is_hidden() && Instant::now() < deadline {
+                thread::sleep(Duration::from_millis(1));
+            }
+            assert!(!bar.is_hidden(), "{stage}");
+            assert_eq!(bar.message(), stage);
+            progress.pause();
+            assert!(bar.is_finished());
+        }
+    }
+
+    #[test]
+    fn progress_that_nobody_sees_has_no_thread() {
+        let mut progress = Progress::hidden();
+        progress.stage("a", 10);
+        progress.set(5);
+        assert!(progress.shown.is_none());
     }
 }

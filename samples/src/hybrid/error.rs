@@ -62,4 +62,14 @@ pub enum HybridError {
         /// The first count that does not fit.
         limit: u32,
     },
+    /// More textures than the device has room for.
+    #[error(
+        "the scene has {count} textures, but the device has room for {limit}; use fewer, or another --device"
+    )]
+    TooManyTextures {
+        /// Textures of the scene.
+        count: usize,
+        /// The largest count that fits.
+        limit: u32,
+    },
 }

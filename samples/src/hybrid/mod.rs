@@ -21,6 +21,7 @@ mod run;
 mod scene_check;
 mod shader_module;
 mod texture_density;
+mod texture_fit;
 mod triangle_order;
 
 pub use config::{HybridConfig, Method, RayPath};

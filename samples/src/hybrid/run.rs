@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use lvk::{Capabilities, Context, ContextDesc, FeatureRequest, Validation, ValidationSink};
 
+use super::texture_fit::{fit_textures, textures_needed};
 use super::{HybridConfig, HybridError, HybridRenderer, Method, RayPath};
 use crate::app::args::{self, HybridArgs};
 use crate::app::png::{self, PngError};
@@ -44,11 +45,12 @@ impl RunError {
     /// 2 when the user can mend it by other arguments or input, 1 for trouble with the device.
     fn status(&self) -> u8 {
         match self {
-            Self::Scene(_) | Self::Png(_) => 2,
+            Self::Scene(_) | Self::Png(_) | Self::Driver(DriverError::Variable { .. }) => 2,
             Self::Hybrid(
                 HybridError::BadSize { .. }
                 | HybridError::TooDeep { .. }
                 | HybridError::TooManyTriangles { .. }
+                | HybridError::TooManyTextures { .. }
                 | HybridError::BrokenScene(_),
             ) => 2,
             Self::Driver(_) | Self::Hybrid(_) | Self::Validation(_) => 1,
@@ -73,19 +75,25 @@ fn attempt(args: &HybridArgs) -> Result<(), RunError> {
     if args.list_devices {
         return list_devices();
     }
-    png::check_writable(&args.out)?;
+    check_out(args)?;
     let mut progress = Progress::visible();
-    let scene = load(args, &mut progress)?;
-    drop(progress);
-    for warning in &scene.warnings {
-        eprintln!("warning: {warning}");
-    }
+    let mut scene = load(args, &mut progress)?;
+    progress.pause();
+    warn(&scene.warnings);
     let driver = driver::prepare(&DriverRequest { validation: args.validate.is_some() })?;
     let sink = ValidationSink::default();
-    let ctx = open(args, &driver, &sink)?;
+    progress.stage("opening the device", 0);
+    let ctx = open(args, &driver, &sink, textures_needed(&scene))?;
     let path = RayPath::choose(wished_path(args.rt), ctx.capabilities())?;
     let config = config(args, path);
+    let warnings = fit_textures(&mut scene, &ctx.capabilities().limits)?;
+    if !warnings.is_empty() {
+        progress.pause();
+        warn(&warnings);
+    }
+    progress.stage("uploading the scene and building acceleration structures", 0);
     let mut renderer = HybridRenderer::new(&ctx, &scene, &config)?;
+    drop(progress);
     say(&headline(&ctx, &scene, &config, &renderer));
     let timings = render(args, &ctx, &scene, &mut renderer)?;
     let image = renderer.read_image()?;
@@ -100,9 +108,28 @@ fn attempt(args: &HybridArgs) -> Result<(), RunError> {
     Ok(())
 }
 
+/// Refuses an output that is an input too or cannot be written.
+fn check_out(args: &HybridArgs) -> Result<(), PngError> {
+    for (option, input) in [("--scene", &args.scene), ("--cameras", &args.cameras)] {
+        if let Some(input) = input {
+            png::check_not_input(&args.out, option, input)?;
+        }
+    }
+    png::check_writable(&args.out)
+}
+
+fn warn(warnings: &[String]) {
+    for warning in warnings {
+        eprintln!("warning: {warning}");
+    }
+}
+
 fn load(args: &HybridArgs, progress: &mut Progress) -> Result<Scene, SceneError> {
     match &args.scene {
-        None => Ok(Scene::procedural()),
+        None => {
+            progress.stage("making the courtyard", 0);
+            Ok(Scene::procedural())
+        }
         Some(path) => {
             let options = ObjOptions { scale: args.scale, cameras: args.cameras.clone() };
             Scene::from_obj(path, &options, progress)
@@ -111,7 +138,7 @@ fn load(args: &HybridArgs, progress: &mut Progress) -> Result<Scene, SceneError>
 }
 
 /// Opens the device the user names, or the best one; a better one without ray tracing gives way to one with.
-fn open(args: &HybridArgs, driver: &Driver, sink: &ValidationSink) -> lvk::Result<Context> {
+fn open(args: &HybridArgs, driver: &Driver, sink: &ValidationSink, textures: u32) -> lvk::Result<Context> {
     use FeatureRequest::{Optional, Required};
     let with = |ray_tracing_pipeline, ray_query| {
         Context::new(&ContextDesc {
@@ -122,6 +149,7 @@ fn open(args: &HybridArgs, driver: &Driver, sink: &ValidationSink) -> lvk::Resul
             validation_sink: args.validate.map(|_| sink.clone()),
             ray_tracing_pipeline,
             ray_query,
+            max_textures: textures.max(ContextDesc::default().max_textures),
             ..ContextDesc::default()
         })
     };

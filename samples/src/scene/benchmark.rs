@@ -26,17 +26,26 @@ at 1.8 2.4 0.5 -1.5 0.9 0 70
 at 0.3 1.4 1.6 -0.3 0.9 0.2 60
 ";
 
-/// Factor from file units to metres of the benchmark scene called `name` (its file's stem).
-pub(super) fn scale(name: &str) -> Option<f32> {
-    match name {
-        "conference" => Some(0.003),
-        _ => views(name).map(|_| 1.0),
-    }
+/// Triangles of the scenes' published files, and the factor from file units to metres.
+const KNOWN: [(&str, usize, f32); 3] =
+    [("living_room", 601_209, 1.0), ("conference", 331_179, 0.003), ("kitchen", 1_021_815, 1.0)];
+
+/// Scale, light and cameras of a benchmark scene.
+pub(super) struct Benchmark {
+    /// Factor from file units to metres.
+    pub scale: f32,
+    /// Light and cameras, in metres.
+    pub views: Views,
 }
 
-/// Light and cameras of the benchmark scene called `name` (its file's stem).
-pub(super) fn views(name: &str) -> Option<Views> {
-    camera_file::parse(Path::new("built-in"), VIEWS).ok()?.into_iter().find(|views| views.name == name)
+/// The benchmark scene whose file has the stem `name` and about `triangle_count` triangles (5 % more or less:
+/// exporters differ). Another file of that name is no benchmark scene.
+pub(super) fn find(name: &str, triangle_count: usize) -> Option<Benchmark> {
+    let (_, _, scale) = KNOWN.into_iter().find(|&(known, count, _)| {
+        known == name && triangle_count.abs_diff(count).saturating_mul(20) <= count
+    })?;
+    let mut all = camera_file::parse(Path::new("built-in"), VIEWS).ok()?.into_iter();
+    all.find(|views| views.name == name).map(|views| Benchmark { scale, views })
 }
 
 #[cfg(test)]
@@ -45,10 +54,19 @@ mod tests {
 
     #[test]
     fn the_three_scenes_have_five_cameras_each() {
-        for name in ["living_room", "conference", "kitchen"] {
-            assert_eq!(views(name).unwrap().cameras.len(), 5, "{name}");
-            assert!(scale(name).is_some());
+        for (name, count, scale) in KNOWN {
+            let found = find(name, count).unwrap();
+            assert_eq!((found.views.cameras.len(), found.scale), (5, scale), "{name}");
+            assert!(find(name, count / 100 * 96).is_some() && find(name, count / 100 * 104).is_some());
         }
-        assert!(views("bunny").is_none() && scale("bunny").is_none());
+    }
+
+    #[test]
+    fn a_file_that_only_shares_the_name_is_no_benchmark_scene() {
+        for (name, count, _) in KNOWN {
+            assert!(find(name, 12).is_none() && find(name, 0).is_none() && find(name, usize::MAX).is_none());
+            assert!(find(name, count / 100 * 94).is_none() && find(name, count / 100 * 106).is_none());
+        }
+        assert!(find("bunny", 331_179).is_none());
     }
 }

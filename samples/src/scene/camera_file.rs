@@ -15,6 +15,16 @@ pub(super) struct Views {
     pub cameras: Vec<Camera>,
 }
 
+impl Views {
+    /// Moves the light and the cameras, in scene units.
+    pub(super) fn move_by(&mut self, offset: [f64; 3]) {
+        let eyes = self.cameras.iter_mut().flat_map(|camera| [&mut camera.eye, &mut camera.target]);
+        for point in eyes.chain([&mut self.light]) {
+            *point = std::array::from_fn(|i| (f64::from(point[i]) + offset[i]) as f32);
+        }
+    }
+}
+
 /// Reads the views of the scene called `name`; in a file with a single scene any name will do.
 pub(super) fn read(path: &Path, name: &str) -> Result<Views, SceneError> {
     let text = std::fs::read_to_string(path).map_err(|source| SceneError::from_io(path, source))?;
@@ -33,6 +43,7 @@ pub(super) fn read(path: &Path, name: &str) -> Result<Views, SceneError> {
 /// Parses the text of a camera file; `path` is for error messages.
 pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<Views>, SceneError> {
     let mut all: Vec<Views> = Vec::new();
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     for (line, number) in text.lines().zip(1..) {
         let mut words = line.split('#').next().unwrap_or("").split_whitespace();
         let Some(keyword) = words.next() else { continue };
@@ -90,6 +101,12 @@ fn wrong(path: &Path, line: usize, what: String) -> SceneError {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_byte_order_mark_is_skipped() {
+        let all = parse(Path::new("a"), "\u{feff}scene a 1 2 3\n").unwrap();
+        assert_eq!((all[0].name.as_str(), all[0].light), ("a", [1.0, 2.0, 3.0]));
+    }
 
     fn parsed(text: &str) -> Result<Vec<Views>, SceneError> {
         parse(Path::new("c.txt"), text)

@@ -37,10 +37,13 @@ mod normals;
 mod obj;
 mod obj_text;
 mod order;
+mod polygon;
 mod procedural;
+mod recentre;
 mod setting;
 mod sky;
 mod texture;
+mod warnings;
 
 use std::path::PathBuf;
 

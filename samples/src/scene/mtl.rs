@@ -3,19 +3,34 @@
 //! Like the OBJ text, the MTL text is rewritten before tobj parses it: one odd line (`Kd spectral ...`,
 //! `map_Kd -s 2 2 1 wood.png`) would otherwise cost the whole library.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use super::Material;
 use super::texture::{Texture, find_image};
+use super::warnings::Warnings;
 
 /// Materials by name, and the images they use.
 #[derive(Default)]
 pub(super) struct Library {
-    materials: HashMap<String, Material>,
+    materials: HashMap<String, Definition>,
     textures: Vec<Texture>,
     texture_numbers: HashMap<PathBuf, u32>,
-    warnings: Vec<String>,
+    warnings: Warnings,
+}
+
+/// A material and its image, which is read when a face turns out to need it.
+#[derive(Clone)]
+struct Definition {
+    material: Material,
+    image: Option<Image>,
+}
+
+/// An image as a library names it, and the folder of that library.
+#[derive(Clone)]
+struct Image {
+    folder: PathBuf,
+    name: String,
 }
 
 impl Library {
@@ -23,8 +38,9 @@ impl Library {
     pub(super) fn read(obj_path: &Path, names: &[String]) -> Self {
         let folder = obj_path.parent().unwrap_or(Path::new(""));
         let mut library = Self::default();
-        for name in names {
-            for file in library_files(folder, name) {
+        let mut seen = HashSet::new();
+        for file in names.iter().flat_map(|name| library_files(folder, name)) {
+            if seen.insert(file.clone()) {
                 library.read_file(&file);
             }
         }
@@ -35,16 +51,17 @@ impl Library {
         let content = match std::fs::read(path) {
             Ok(content) => content,
             Err(error) => {
-                let path = path.display();
-                return self
-                    .warnings
-                    .push(format!("material library {path}: {error}; materials are stand-ins"));
+                let line = format!("material library {}: {error}; materials are stand-ins", path.display());
+                return self.warnings.push("material libraries", line);
             }
         };
         let text = clean(&String::from_utf8_lossy(&content));
         match tobj::load_mtl_buf(&mut text.as_bytes()) {
             Ok((parsed, _)) => parsed.iter().for_each(|source| self.add(source, path)),
-            Err(error) => self.warnings.push(format!("material library {}: {error}", path.display())),
+            Err(error) => {
+                let line = format!("material library {}: {error}", path.display());
+                self.warnings.push("material libraries", line);
+            }
         }
     }
 
@@ -54,14 +71,12 @@ impl Library {
         }
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut material = convert(source);
-        if let Some(name) = &source.diffuse_texture {
-            material.albedo_texture = Some(self.texture(folder, name));
-            // Exporters often leave Kd black beside a texture, meaning the texture alone.
-            if material.albedo == [0.0; 3] && !material.is_refractive() {
-                material.albedo = [1.0; 3];
-            }
+        let image = source.diffuse_texture.clone().map(|name| Image { folder: folder.to_path_buf(), name });
+        // Exporters often leave Kd black beside a texture, meaning the texture alone.
+        if image.is_some() && material.albedo == [0.0; 3] && !material.is_refractive() {
+            material.albedo = [1.0; 3];
         }
-        self.materials.insert(source.name.clone(), material);
+        self.materials.insert(source.name.clone(), Definition { material, image });
     }
 
     /// Number of the image, which is read on first use; a stand-in and a warning when that fails.
@@ -77,7 +92,8 @@ impl Library {
             None => Err("no such file".to_owned()),
         };
         let texture = texture.unwrap_or_else(|why| {
-            self.warnings.push(format!("texture {}: {why}; magenta checks stand in", key.display()));
+            let line = format!("texture {}: {why}; magenta checks stand in", key.display());
+            self.warnings.push("textures", line);
             Texture::stand_in(name)
         });
         let number = self.textures.len() as u32;
@@ -87,7 +103,7 @@ impl Library {
     }
 
     /// The materials that `names` ask for, in that order, with stand-ins for undefined ones; then the images
-    /// and the warnings.
+    /// of these and the warnings.
     pub(super) fn select(mut self, names: &[Option<String>]) -> (Vec<Material>, Vec<Texture>, Vec<String>) {
         let mut selected = Vec::with_capacity(names.len());
         for name in names {
@@ -95,12 +111,19 @@ impl Library {
                 selected.push(Material::matte("(none)", [0.6; 3]));
                 continue;
             };
-            selected.push(self.materials.get(name).cloned().unwrap_or_else(|| {
-                self.warnings.push(format!("material `{name}` is not defined; glaring orange stands in"));
-                Material::stand_in(name)
-            }));
+            selected.push(self.material(name));
         }
-        (selected, self.textures, self.warnings)
+        (selected, self.textures, self.warnings.into_lines())
+    }
+
+    fn material(&mut self, name: &str) -> Material {
+        let Some(Definition { material, image }) = self.materials.get(name).cloned() else {
+            let line = format!("material `{name}` is not defined; glaring orange stands in");
+            self.warnings.push("materials", line);
+            return Material::stand_in(name);
+        };
+        let albedo_texture = image.map(|image| self.texture(&image.folder, &image.name));
+        Material { albedo_texture, ..material }
     }
 }
 
@@ -119,6 +142,7 @@ fn library_files(folder: &Path, argument: &str) -> Vec<PathBuf> {
 fn clean(text: &str) -> String {
     let mut cleaned = String::with_capacity(text.len());
     let mut inside = false;
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     for line in text.lines().map(str::trim) {
         let (keyword, rest) = line.split_once(|c: char| c.is_whitespace()).unwrap_or((line, ""));
         let rest = rest.trim();
@@ -319,6 +343,21 @@ mod tests {
         }
         assert_eq!(image_name("-s 1 1 1"), None);
         assert_eq!(image_name(""), None);
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_skipped() {
+        let (found, warnings) = materials("\u{feff}newmtl m\nKd 1 0 0\n");
+        assert_eq!((found[0].albedo, warnings.len()), ([1.0, 0.0, 0.0], 0));
+    }
+
+    #[test]
+    fn images_of_unused_materials_are_neither_read_nor_missed() {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("a.mtl"), "newmtl m\nnewmtl other\nmap_Kd absent.png\n").unwrap();
+        let library = Library::read(&folder.path().join("a.obj"), &["a.mtl".to_owned()]);
+        let (_, textures, warnings) = library.select(&[Some("m".to_owned())]);
+        assert_eq!((textures.len(), warnings.len()), (0, 0), "{warnings:?}");
     }
 
     #[test]

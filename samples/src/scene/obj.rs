@@ -13,26 +13,26 @@ use crate::app::progress::Progress;
 /// What [`Scene::from_obj`] does.
 pub(super) fn load(path: &Path, options: &ObjOptions, progress: &mut Progress) -> Result<Scene, SceneError> {
     let name = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    let scale = options.scale.or(benchmark::scale(&name)).unwrap_or(1.0);
-    if !(scale.is_finite() && scale > 0.0) {
+    if let Some(scale) = options.scale.filter(|scale| !(scale.is_finite() && *scale > 0.0)) {
         return Err(SceneError::BadScale { scale });
     }
-    let views = match &options.cameras {
-        Some(file) => Some(camera_file::read(file, &name)?),
-        None => benchmark::views(&name),
-    };
+    let mut own_views = options.cameras.as_ref().map(|file| camera_file::read(file, &name)).transpose()?;
     let mut obj = read_clean(path, &name, progress)?;
-    progress.stage(&format!("{name}: textures"), 0);
+    let benchmark = benchmark::find(&name, obj.triangle_count);
+    let scale = options.scale.or(benchmark.as_ref().map(|known| known.scale)).unwrap_or(1.0);
+    own_views.iter_mut().for_each(|views| views.move_by(obj.origin.map(|x| -x * f64::from(scale))));
+    let views = own_views.or(benchmark.map(|known| known.views));
     let library = Library::read(path, &obj.libraries);
     let mut mesh = parse(path, &obj, scale, &format!("{name}: parsing"), progress)?;
-    progress.stage(&format!("{name}: arranging triangles"), 0);
     let degenerate = mesh.drop_degenerate();
     if mesh.triangles.is_empty() {
         return Err(SceneError::Empty { path: path.into(), degenerate });
     }
     let names = names_in_use(&mut mesh, &obj.materials);
+    progress.stage(&format!("{name}: textures"), 0);
     let (materials, textures, warnings) = library.select(&names);
     obj.warnings.extend(warnings);
+    progress.stage(&format!("{name}: arranging triangles"), 0);
     let opaque_triangle_count = finish(&mut mesh, &materials, &mut obj.warnings, degenerate);
     let setting = Setting::of(&mesh, views);
     Ok(Scene {
@@ -214,6 +214,16 @@ mod tests {
     }
 
     #[test]
+    fn a_mesh_far_from_its_origin_keeps_its_shape() {
+        let text = "v 4000000.0 5e6 0\nv 4000000.25 5e6 0\nv 4000000.0 5000000.125 0\nf 1 2 3\n";
+        let scene = load_text(text, &[]).unwrap();
+        assert_consistent(&scene);
+        let (low, high) = scene.bounds();
+        assert_eq!((high[0] - low[0], high[1] - low[1]), (0.25, 0.125));
+        assert!(scene.warnings[0].contains("far from its origin"), "{:?}", scene.warnings);
+    }
+
+    #[test]
     fn texture_coordinates_run_down() {
         let scene = load_text(&format!("{TRIANGLE}vt 0.25 1\nf 1/1 2/1 3/1\n"), &[]).unwrap();
         assert!(scene.texcoords.iter().all(|&t| t == [0.25, 0.0]));
@@ -279,7 +289,7 @@ mod tests {
             load(&path, &options, &mut Progress::hidden()).map(|scene| scene.bounds().1[0])
         };
         assert_eq!(width(Some(2.0)).unwrap(), 2.0);
-        assert_eq!(width(None).unwrap(), 0.003, "a benchmark scene has a known scale");
+        assert_eq!(width(None).unwrap(), 1.0, "a namesake of a benchmark scene is not scaled");
         for bad in [0.0, -1.0, f32::NAN, f32::INFINITY] {
             assert!(matches!(width(Some(bad)), Err(SceneError::BadScale { .. })), "{bad}");
         }

@@ -3,14 +3,16 @@
 //! tobj reads clean files well, but it stops at Latin-1 comments, continued lines and one-component texture
 //! coordinates, mixes up normals when only some corners have them, and may overflow on wild indices. So the
 //! text is rewritten first: only `v`, `vt`, `vn`, `f` and `usemtl` are left, all vertices before all faces,
-//! every corner has all three indices, positive and checked. Index 1 of `vt` and `vn` is a placeholder (all
+//! every corner has all three indices, positive and checked, concave faces are triangles. Index 1 of `vt` and `vn` is a placeholder (all
 //! zero) for corners that have none. Materials are numbered.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::ops::Range;
 use std::path::Path;
 
-use super::SceneError;
+use super::recentre::{self, Extent};
+use super::{SceneError, polygon};
 use crate::app::progress::Progress;
 
 /// The rewritten file and what was taken out of it.
@@ -21,6 +23,10 @@ pub(super) struct CleanObj {
     pub materials: Vec<Option<String>>,
     /// Arguments of the `mtllib` lines, in order.
     pub libraries: Vec<String>,
+    /// Number of triangles that the faces make.
+    pub triangle_count: usize,
+    /// What was taken from every position: the centre of a mesh far from its origin, else 0.
+    pub origin: [f64; 3],
     /// What was mended, for the user.
     pub warnings: Vec<String>,
 }
@@ -34,7 +40,7 @@ pub(super) fn clean(path: &Path, content: &[u8], progress: &mut Progress) -> Res
         return Err(SceneError::NotObj { path: path.into(), why: "it holds binary data" });
     }
     let mut cleaner = Cleaner::new(path, content.len());
-    let mut rest = content;
+    let mut rest = content.strip_prefix(b"\xef\xbb\xbf").unwrap_or(content);
     while !rest.is_empty() {
         let (line, line_count, after) = next_logical_line(rest);
         cleaner.line_number += 1;
@@ -88,6 +94,10 @@ struct Cleaner<'a> {
     line_number: usize,
     vertices: String,
     faces: String,
+    positions: Vec<[f64; 3]>,
+    extent: Extent,
+    /// Where in `faces` those with more than three corners stand.
+    polygons: Vec<Range<usize>>,
     counts: [usize; 3],
     reach: [Reach; 3],
     materials: Vec<Option<String>>,
@@ -111,6 +121,9 @@ impl<'a> Cleaner<'a> {
             line_number: 0,
             vertices,
             faces,
+            positions: Vec::new(),
+            extent: Extent::new(),
+            polygons: Vec::new(),
             counts: [0; 3],
             reach: [Reach::default(); 3],
             materials: vec![None],
@@ -151,9 +164,13 @@ impl<'a> Cleaner<'a> {
     fn position(&mut self, rest: &str) -> Result<(), SceneError> {
         self.vertices.push('v');
         let mut found = 0;
+        let mut position = [0.0; 3];
         for word in rest.split_whitespace().take(3) {
             match word.parse::<f32>() {
-                Ok(value) if value.is_finite() => found += 1,
+                Ok(value) if value.is_finite() => {
+                    position[found] = word.parse().unwrap_or(f64::from(value));
+                    found += 1;
+                }
                 Ok(_) => {
                     return Err(SceneError::NotFinite { path: self.path.into(), line: self.line_number });
                 }
@@ -166,6 +183,8 @@ impl<'a> Cleaner<'a> {
             return Err(self.bad(format!("a position needs 3 numbers, found {found}")));
         }
         self.vertices.push('\n');
+        self.positions.push(position);
+        self.extent.add(position);
         self.counts[0] += 1;
         Ok(())
     }
@@ -202,6 +221,9 @@ impl<'a> Cleaner<'a> {
             return Ok(());
         }
         self.faces.push('\n');
+        if corner_count > 3 {
+            self.polygons.push(start..self.faces.len());
+        }
         self.triangle_count += corner_count - 2;
         Ok(())
     }
@@ -272,10 +294,46 @@ impl<'a> Cleaner<'a> {
         if self.triangle_count.max(self.counts[0]) > limit as usize {
             return Err(SceneError::TooLarge { path, limit });
         }
-        let warnings = self.warnings();
-        self.vertices.push_str(&self.faces);
-        let Self { vertices, materials, libraries, .. } = self;
-        Ok(CleanObj { text: vertices, materials, libraries, warnings })
+        let mut warnings = self.warnings();
+        let origin = self.recentre(&mut warnings);
+        self.append_faces();
+        let Self { vertices, materials, libraries, triangle_count, .. } = self;
+        Ok(CleanObj { text: vertices, materials, libraries, triangle_count, origin, warnings })
+    }
+
+    fn recentre(&mut self, warnings: &mut Vec<String>) -> [f64; 3] {
+        let Some(centre) = self.extent.far_centre() else {
+            return [0.0; 3];
+        };
+        self.vertices = recentre::moved(&self.vertices, centre);
+        let [x, y, z] = centre;
+        warnings.push(format!("the mesh lies far from its origin; ({x}, {y}, {z}) was taken from it"));
+        centre
+    }
+
+    /// Puts the faces behind the vertices, concave ones as triangles. Fans are left to the parser.
+    fn append_faces(&mut self) {
+        let mut copied = 0;
+        for range in &self.polygons {
+            let words: Vec<&str> = self.faces[range.clone()].split_whitespace().skip(1).collect();
+            let corners: Vec<[f64; 3]> = words.iter().filter_map(|word| self.position_of(word)).collect();
+            let Some(triangles) = polygon::split(&corners).filter(|_| corners.len() == words.len()) else {
+                continue;
+            };
+            self.vertices.push_str(&self.faces[copied..range.start]);
+            for [a, b, c] in triangles {
+                for part in ["f ", words[a], " ", words[b], " ", words[c], "\n"] {
+                    self.vertices.push_str(part);
+                }
+            }
+            copied = range.end;
+        }
+        self.vertices.push_str(&self.faces[copied..]);
+    }
+
+    fn position_of(&self, corner: &str) -> Option<[f64; 3]> {
+        let number: usize = corner.split('/').next()?.parse().ok()?;
+        self.positions.get(number.checked_sub(1)?).copied()
     }
 
     fn warnings(&self) -> Vec<String> {
@@ -400,6 +458,24 @@ mod tests {
         assert_eq!(clean.materials, [None, Some("b c".to_owned()), Some("a".to_owned())]);
         assert_eq!(clean.libraries, ["my file.mtl"]);
         assert!(clean.text.ends_with("usemtl 1\nusemtl 2\nusemtl 1\nf 1/1/1 2/1/1 3/1/1\n"));
+    }
+
+    #[test]
+    fn concave_faces_become_triangles_and_convex_ones_stay() {
+        let text = "v 0 0 0\nv 2 0 0\nv 0.5 0.5 0\nv 0 2 0\nv 2 2 0\n";
+        assert_eq!(faces(&format!("{text}f 1 2 5 4\n")), ["f 1/1/1 2/1/1 5/1/1 4/1/1"]);
+        for face in ["f 1 2 3 4", "f 2 3 4 1", "f 3 4 1 2", "f 4 1 2 3"] {
+            let found = faces(&format!("{face}\n{text}f 1 2 5\n"));
+            assert_eq!(found.len(), 3, "{face}: {found:?}");
+            assert_eq!(found[2], "f 1/1/1 2/1/1 5/1/1");
+            let across = |line: &String| !line.contains(" 1/") || !line.contains(" 3/");
+            assert!(!found[..2].iter().any(across), "{face}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn a_byte_order_mark_is_skipped() {
+        assert_eq!(faces(&format!("\u{feff}{CORNERS}f 1 2 3\n")), ["f 1/1/1 2/1/1 3/1/1"]);
     }
 
     #[test]
