@@ -29,7 +29,7 @@ pub enum DepthLoad {
 /// A colour target of a render pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColorAttachment {
-    /// A texture with [`TextureUsage::TARGET`].
+    /// A texture with [`TextureUsage::TARGET`](crate::TextureUsage::TARGET).
     pub texture: TextureHandle,
     /// Mip level drawn to.
     pub mip: u32,
@@ -51,7 +51,7 @@ impl ColorAttachment {
 /// The depth target of a render pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DepthAttachment {
-    /// A texture of a depth format with [`TextureUsage::TARGET`].
+    /// A texture of a depth format with [`TextureUsage::TARGET`](crate::TextureUsage::TARGET).
     pub texture: TextureHandle,
     /// Mip level drawn to.
     pub mip: u32,
