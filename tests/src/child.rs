@@ -4,6 +4,8 @@
 use std::ffi::OsStr;
 use std::process::Command;
 
+use crate::device::swiftshader;
+
 const MARK: &str = "LVK_TEST_CHILD";
 
 /// Runs `body` in a new process with `variables` set, or taken away where there is no value.
@@ -30,4 +32,19 @@ pub fn in_child(test: &str, variables: &[(&str, Option<&OsStr>)], body: impl FnO
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let (out, err) = (text(&output.stdout), text(&output.stderr));
     assert!(output.status.success() && out.contains("1 passed"), "in a process of its own:\n{out}\n{err}");
+}
+
+/// As [`in_child`], on the device without ray tracing; skipped loudly where that cannot be had.
+///
+/// # Panics
+/// As [`in_child`] and [`swiftshader`].
+pub fn without_ray_tracing(test: &str, body: impl FnOnce()) {
+    let Some(icd) = swiftshader() else { return };
+    let variables = [
+        ("VK_DRIVER_FILES", Some(icd.as_os_str())),
+        ("VK_ICD_FILENAMES", None),
+        ("LVK_DRIVER", None),
+        ("LVK_DEVICE", None),
+    ];
+    in_child(test, &variables, body);
 }

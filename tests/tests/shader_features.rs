@@ -6,10 +6,9 @@ use lvk::{
     ColorAttachment, ComputePipelineDesc, Context, Dependencies, Error, Format, Holder, RenderPassDesc,
     RenderPipelineDesc, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage,
 };
-use lvk_tests::child::in_child;
+use lvk_tests::child::without_ray_tracing;
 use lvk_tests::compute::{module, read_words, words_buffer};
 use lvk_tests::device;
-use lvk_tests::device::swiftshader;
 use lvk_tests::raster::{pixels, target};
 
 /// A device feature by name, and whether it was found.
@@ -241,14 +240,7 @@ fn features_work_or_are_refused_by_name() {
 /// SwiftShader lacks several of the features.
 #[test]
 fn features_that_are_missing_are_refused_by_name() {
-    let Some(icd) = swiftshader() else { return };
-    let variables = [
-        ("VK_DRIVER_FILES", Some(icd.as_os_str())),
-        ("VK_ICD_FILENAMES", None),
-        ("LVK_DRIVER", None),
-        ("LVK_DEVICE", None),
-    ];
-    in_child("features_that_are_missing_are_refused_by_name", &variables, || {
+    without_ray_tracing("features_that_are_missing_are_refused_by_name", || {
         let Some(ctx) = device() else { return };
         let found = Found::of(&ctx);
         let lacks = |shader: &&Use| !missing(&found, shader.needs).is_empty();

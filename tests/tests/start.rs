@@ -10,9 +10,9 @@ use lvk::{
     Error, FeatureRequest, Format, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc, ShaderSource,
     ShaderStage, TlasDesc, Triangles, Validation,
 };
-use lvk_tests::child::in_child;
+use lvk_tests::child::{in_child, without_ray_tracing};
 use lvk_tests::compute::{Evaluator, words_buffer};
-use lvk_tests::device::{swiftshader, vulkan};
+use lvk_tests::device::vulkan;
 use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, target};
 use lvk_tests::{device, device_with};
 
@@ -174,14 +174,7 @@ fn everything_else_works_with_ray_tracing_turned_off() {
 
 #[test]
 fn a_device_without_ray_tracing_does_everything_else() {
-    let Some(icd) = swiftshader() else { return };
-    let variables = [
-        ("VK_DRIVER_FILES", Some(icd.as_os_str())),
-        ("VK_ICD_FILENAMES", None),
-        ("LVK_DRIVER", None),
-        ("LVK_DEVICE", None),
-    ];
-    in_child("a_device_without_ray_tracing_does_everything_else", &variables, || {
+    without_ray_tracing("a_device_without_ray_tracing_does_everything_else", || {
         let Some(ctx) = device() else { return };
         assert!(ctx.capabilities().device_name.contains("SwiftShader"), "{:?}", ctx.capabilities());
         expect_no_ray_tracing(&ctx);
