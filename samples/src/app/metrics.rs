@@ -55,7 +55,8 @@ impl std::fmt::Display for Difference {
         let percent = 100.0 * differing_share;
         write!(
             f,
-            "PSNR {psnr:.2} dB, SSIM {ssim:.5}, {percent:.4} % of pixels differ, at most by {max_difference}"
+            "PSNR {psnr:.2} dB, SSIM {ssim:.5}, {percent:.4} % of pixels differ by more than 1/255, at most by \
+             {max_difference}/255"
         )
     }
 }

@@ -38,14 +38,7 @@ fn compare(args: &Args) -> Result<String, String> {
     }
     let (width, height) = first.dimensions();
     let found = metrics::compare(first.as_raw(), second.as_raw(), width, height);
-    let found = found.map_err(|error| error.to_string())?;
-    Ok(format!(
-        "PSNR {:.2} dB, SSIM {:.5}, {:.4} % of pixels differ by more than 1/255, at most by {}/255",
-        found.psnr,
-        found.ssim,
-        found.differing_share * 100.0,
-        found.max_difference
-    ))
+    found.map(|difference| difference.to_string()).map_err(|error| error.to_string())
 }
 
 fn read(path: &Path) -> Result<RgbaImage, String> {
