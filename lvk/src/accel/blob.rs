@@ -1,0 +1,331 @@
+//! A bottom-level structure as bytes, to be kept in a file: what the driver wrote of each part, and what the library
+//! must know to put the parts together again.
+//!
+//! All numbers are little-endian: magic (8 bytes), version (`u32`), length of the whole (`u64`), checksum of all that
+//! follows (`u64`); flags, then the number of geometries and each of them (three `u32`), then the number of parts and
+//! each of them: bytes of the driver's data (`u64`), words in the map plus one, or 0 without a map (`u64`), the data,
+//! the map.
+
+/// A serialised bottom-level structure.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Blob {
+    /// What it was built with, as the caller defines it.
+    pub(crate) flags: u32,
+    /// The geometries it was built from.
+    pub(crate) geometries: Vec<BlobGeometry>,
+    /// The structures it consists of.
+    pub(crate) parts: Vec<BlobPart>,
+}
+
+/// One geometry.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct BlobGeometry {
+    pub(crate) kind: BlobGeometryKind,
+    pub(crate) primitive_count: u32,
+    /// Flags of the geometry, as the caller defines them.
+    pub(crate) flags: u32,
+}
+
+/// What a geometry consists of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum BlobGeometryKind {
+    Triangles,
+    Boxes,
+}
+
+/// One structure.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct BlobPart {
+    /// What the driver wrote; at least [`VERSION_DATA_BYTES`].
+    pub(crate) driver: Vec<u8>,
+    /// The words of the part's table of primitives; `None` where they are in the user's own order.
+    pub(crate) map: Option<Vec<u32>>,
+}
+
+/// Bytes at the start of a driver's data that say which drivers can read it: its UUID and that of the format.
+pub(crate) const VERSION_DATA_BYTES: usize = 32;
+
+impl BlobPart {
+    /// What `vkGetDeviceAccelerationStructureCompatibilityKHR` is asked about.
+    pub(crate) fn version_data(&self) -> Option<&[u8; VERSION_DATA_BYTES]> {
+        self.driver.first_chunk()
+    }
+}
+
+/// Why bytes are not a structure that can be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum BlobError {
+    /// The magic is missing.
+    #[error("these bytes are not a serialised acceleration structure")]
+    NotABlob,
+    /// Another version of the library wrote it.
+    #[error(
+        "the acceleration structure was serialised in version {found} of the format, this is version {VERSION}"
+    )]
+    Version {
+        /// The version found.
+        found: u32,
+    },
+    /// The end is missing.
+    #[error("the serialised acceleration structure is cut off: {found} of {expected} bytes are there")]
+    Truncated {
+        /// Bytes found.
+        found: u64,
+        /// Bytes that were written, or that the header alone takes.
+        expected: u64,
+    },
+    /// The bytes were changed.
+    #[error("the serialised acceleration structure is damaged: its checksum is wrong")]
+    Checksum,
+    /// The contents contradict each other.
+    #[error("the serialised acceleration structure is damaged: {0}")]
+    Malformed(&'static str),
+}
+
+const MAGIC: [u8; 8] = *b"\x89lvkblas";
+const VERSION: u32 = 1;
+const HEADER_BYTES: usize = 28;
+
+/// Writes a structure as bytes.
+pub(crate) fn encode(blob: &Blob) -> Vec<u8> {
+    let mut body = Vec::with_capacity(encoded_bytes(blob));
+    body.extend(MAGIC);
+    body.extend(VERSION.to_le_bytes());
+    body.extend([0; HEADER_BYTES - 12]);
+    body.extend(blob.flags.to_le_bytes());
+    body.extend((blob.geometries.len() as u32).to_le_bytes());
+    for geometry in &blob.geometries {
+        let kind = match geometry.kind {
+            BlobGeometryKind::Triangles => 0,
+            BlobGeometryKind::Boxes => 1,
+        };
+        body.extend([kind, geometry.primitive_count, geometry.flags].into_iter().flat_map(u32::to_le_bytes));
+    }
+    body.extend((blob.parts.len() as u32).to_le_bytes());
+    for part in &blob.parts {
+        let map = part.map.as_ref().map_or(0, |map| map.len() as u64 + 1);
+        body.extend((part.driver.len() as u64).to_le_bytes());
+        body.extend(map.to_le_bytes());
+        body.extend_from_slice(&part.driver);
+        body.extend(part.map.iter().flatten().flat_map(|number| number.to_le_bytes()));
+    }
+    let (length, sum) = (body.len() as u64, checksum(&body[HEADER_BYTES..]));
+    body[12..20].copy_from_slice(&length.to_le_bytes());
+    body[20..28].copy_from_slice(&sum.to_le_bytes());
+    body
+}
+
+/// Reads what [`encode`] wrote. Any bytes are allowed; none but those are accepted.
+pub(crate) fn decode(bytes: &[u8]) -> Result<Blob, BlobError> {
+    let short = |expected| BlobError::Truncated { found: bytes.len() as u64, expected };
+    if !MAGIC.starts_with(&bytes[..bytes.len().min(MAGIC.len())]) {
+        return Err(BlobError::NotABlob);
+    }
+    let mut reader = Reader { rest: bytes.get(MAGIC.len()..).unwrap_or_default() };
+    let found = reader.u32().ok_or(short(HEADER_BYTES as u64))?;
+    if found != VERSION {
+        return Err(BlobError::Version { found });
+    }
+    let header = reader.u64().zip(reader.u64());
+    let (length, sum) = header.ok_or(short(HEADER_BYTES as u64))?;
+    match length.cmp(&(bytes.len() as u64)) {
+        std::cmp::Ordering::Greater => return Err(short(length)),
+        std::cmp::Ordering::Less => return Err(BlobError::Malformed("bytes follow its end")),
+        std::cmp::Ordering::Equal => {}
+    }
+    if sum != checksum(reader.rest) {
+        return Err(BlobError::Checksum);
+    }
+    reader.blob()
+}
+
+/// Takes numbers from the front of bytes.
+struct Reader<'a> {
+    rest: &'a [u8],
+}
+
+const SHORT: BlobError = BlobError::Malformed("it promises more than it holds");
+
+impl<'a> Reader<'a> {
+    fn blob(mut self) -> Result<Blob, BlobError> {
+        let flags = self.u32().ok_or(SHORT)?;
+        let count = self.count(12)?;
+        let geometries = (0..count).map(|_| self.geometry()).collect::<Result<_, _>>()?;
+        let count = self.count(16 + VERSION_DATA_BYTES)?;
+        let parts = (0..count).map(|_| self.part()).collect::<Result<_, _>>()?;
+        if !self.rest.is_empty() {
+            return Err(BlobError::Malformed("bytes follow its last part"));
+        }
+        Ok(Blob { flags, geometries, parts })
+    }
+
+    fn geometry(&mut self) -> Result<BlobGeometry, BlobError> {
+        let kind = match self.u32().ok_or(SHORT)? {
+            0 => BlobGeometryKind::Triangles,
+            1 => BlobGeometryKind::Boxes,
+            _ => return Err(BlobError::Malformed("it holds a geometry of an unknown kind")),
+        };
+        let primitive_count = self.u32().ok_or(SHORT)?;
+        Ok(BlobGeometry { kind, primitive_count, flags: self.u32().ok_or(SHORT)? })
+    }
+
+    fn part(&mut self) -> Result<BlobPart, BlobError> {
+        let (driver, map) = self.u64().zip(self.u64()).ok_or(SHORT)?;
+        let driver = self.take(driver).ok_or(SHORT)?.to_vec();
+        if driver.len() < VERSION_DATA_BYTES {
+            return Err(BlobError::Malformed("the driver's data of a part is shorter than its header"));
+        }
+        let map = match map.checked_sub(1) {
+            None => None,
+            Some(count) => {
+                let numbers = count.checked_mul(4).and_then(|bytes| self.take(bytes)).ok_or(SHORT)?;
+                Some(numbers.as_chunks().0.iter().map(|chunk| u32::from_le_bytes(*chunk)).collect())
+            }
+        };
+        Ok(BlobPart { driver, map })
+    }
+
+    /// A number of things of at least so many bytes each, that can really follow.
+    fn count(&mut self, least_bytes: usize) -> Result<u32, BlobError> {
+        let count = self.u32().ok_or(SHORT)?;
+        if count as usize > self.rest.len() / least_bytes { Err(SHORT) } else { Ok(count) }
+    }
+
+    fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
+    fn array<const COUNT: usize>(&mut self) -> Option<[u8; COUNT]> {
+        let (array, rest) = self.rest.split_first_chunk()?;
+        self.rest = rest;
+        Some(*array)
+    }
+
+    fn take(&mut self, count: u64) -> Option<&'a [u8]> {
+        let (taken, rest) = self.rest.split_at_checked(usize::try_from(count).ok()?)?;
+        self.rest = rest;
+        Some(taken)
+    }
+}
+
+fn encoded_bytes(blob: &Blob) -> usize {
+    let part = |part: &BlobPart| 16 + part.driver.len() + part.map.as_ref().map_or(0, |map| 4 * map.len());
+    HEADER_BYTES + 12 + 12 * blob.geometries.len() + blob.parts.iter().map(part).sum::<usize>()
+}
+
+/// FNV-1a, 64 bits: every step can be undone, so that a single changed byte always changes the sum.
+fn checksum(bytes: &[u8]) -> u64 {
+    bytes
+        .iter()
+        .fold(0xCBF2_9CE4_8422_2325, |sum, &byte| (sum ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn any_blob() -> impl Strategy<Value = Blob> {
+        let kind = prop_oneof![Just(BlobGeometryKind::Triangles), Just(BlobGeometryKind::Boxes)];
+        let geometry = (kind, any::<u32>(), any::<u32>())
+            .prop_map(|(kind, primitive_count, flags)| BlobGeometry { kind, primitive_count, flags });
+        let driver = prop::collection::vec(any::<u8>(), VERSION_DATA_BYTES..100);
+        let map = prop::option::of(prop::collection::vec(any::<u32>(), 0..20));
+        let part = (driver, map).prop_map(|(driver, map)| BlobPart { driver, map });
+        (any::<u32>(), prop::collection::vec(geometry, 0..4), prop::collection::vec(part, 0..4))
+            .prop_map(|(flags, geometries, parts)| Blob { flags, geometries, parts })
+    }
+
+    /// Bytes with a header that is right, around any body.
+    fn sealed(body: &[u8]) -> Vec<u8> {
+        let length = (HEADER_BYTES + body.len()) as u64;
+        let header =
+            [&MAGIC[..], &VERSION.to_le_bytes(), &length.to_le_bytes(), &checksum(body).to_le_bytes()];
+        [&header.concat(), body].concat()
+    }
+
+    fn words(words: &[u32]) -> Vec<u8> {
+        words.iter().flat_map(|word| word.to_le_bytes()).collect()
+    }
+
+    #[test]
+    fn the_checksum_is_the_published_one() {
+        assert_eq!(checksum(b""), 0xCBF2_9CE4_8422_2325);
+        assert_eq!(checksum(b"a"), 0xAF63_DC4C_8601_EC8C);
+        assert_eq!(checksum(b"foobar"), 0x8594_4171_F739_67E8);
+    }
+
+    #[test]
+    fn each_kind_of_damage_is_told_apart() {
+        let driver: Vec<u8> = (0..40).collect();
+        let part = BlobPart { driver, map: Some(vec![2, 0, 1]) };
+        assert_eq!(part.version_data().map(|data| data[31]), Some(31));
+        let geometry = BlobGeometry { kind: BlobGeometryKind::Boxes, primitive_count: 3, flags: 1 };
+        let good = encode(&Blob { flags: 5, geometries: vec![geometry], parts: vec![part] });
+        let changed = |at: usize| {
+            let mut bytes = good.clone();
+            bytes[at] ^= 1;
+            decode(&bytes)
+        };
+        assert_eq!(changed(0), Err(BlobError::NotABlob));
+        assert_eq!(changed(8), Err(BlobError::Version { found: 0 }));
+        assert_eq!(changed(good.len() - 1), Err(BlobError::Checksum));
+        assert_eq!(decode(b"not at all one"), Err(BlobError::NotABlob));
+        assert_eq!(
+            decode(b"\x89lvkb"),
+            Err(BlobError::Truncated { found: 5, expected: HEADER_BYTES as u64 })
+        );
+        let (found, expected) = (good.len() as u64 - 1, good.len() as u64);
+        assert_eq!(decode(&good[..good.len() - 1]), Err(BlobError::Truncated { found, expected }));
+        assert!(matches!(decode(&[&good[..], &[0]].concat()), Err(BlobError::Malformed(_))));
+    }
+
+    #[test]
+    fn sealed_nonsense_is_refused_without_large_allocations() {
+        let nonsense = [
+            words(&[0]),
+            words(&[0, u32::MAX, 0]),
+            words(&[0, 0, u32::MAX, 0]),
+            words(&[0, 1, 7, 0, 0, 0]),
+            words(&[0, 0, 1, u32::MAX, u32::MAX, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
+            [words(&[0, 0, 1, 32, 0, u32::MAX, u32::MAX]), vec![0; 32]].concat(),
+            [words(&[0, 0, 1, 31, 0, 0, 0]), vec![0; 31]].concat(),
+            words(&[0, 0, 0, 0]),
+        ];
+        for body in nonsense {
+            assert!(matches!(decode(&sealed(&body)), Err(BlobError::Malformed(_))), "{body:?}");
+        }
+        assert!(decode(&sealed(&words(&[0, 0, 0]))).is_ok());
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_written_is_read(blob in any_blob()) {
+            let bytes = encode(&blob);
+            prop_assert_eq!(bytes.len(), encoded_bytes(&blob));
+            prop_assert_eq!(decode(&bytes), Ok(blob));
+        }
+
+        #[test]
+        fn a_cut_or_a_changed_bit_is_an_error(blob in any_blob(), place in any::<prop::sample::Index>(), bit in 0..8_u32) {
+            let mut bytes = encode(&blob);
+            let place = place.index(bytes.len());
+            prop_assert!(decode(&bytes[..place]).is_err());
+            bytes[place] ^= 1_u8 << bit;
+            prop_assert!(decode(&bytes).is_err());
+        }
+
+        #[test]
+        fn arbitrary_bytes_are_read_or_refused(body in prop::collection::vec(prop_oneof![Just(0_u8), Just(1), any::<u8>()], 0..300)) {
+            let _ = decode(&body);
+            if let Ok(blob) = decode(&sealed(&body)) {
+                prop_assert_eq!(encode(&blob), sealed(&body));
+            }
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! An order of primitives that makes a good tree of a builder which does not sort.
+//!
+//! Some drivers (lavapipe up to 25.0) cut the list of primitives in the middle, each half in the middle again, and so
+//! on: the tree is as good as the order. So the order is made by that very tree, top down, each node by its cheapest
+//! cut. Builders that sort gain nothing.
+
+use super::bounds::Bounds;
+use super::cut::{Item, cut, items};
+
+/// Another order is worth its number map and its time if its tree costs this many times less than the given one.
+pub(crate) const WORTH_GAIN: f64 = 1.1;
+
+/// Nodes larger than this are worth a thread of their own.
+const PARALLEL_COUNT: usize = 1 << 16;
+
+/// Numbers of the boxes in an order whose tree of halves (the first `ceil(n / 2)` to the left, at every node) has a
+/// small surface. Deterministic; any values are allowed, but those that are not finite get a poor place.
+///
+/// Takes O(n log n) time.
+pub(crate) fn spatial_order(bounds: &[Bounds]) -> Vec<u32> {
+    let mut items = items(bounds);
+    let threads = std::thread::available_parallelism().map_or(1, usize::from);
+    arrange(&mut items, threads);
+    items.into_iter().map(|item| item.index).collect()
+}
+
+/// Whether building in this order instead of the given one lowers the cost of the tree of halves by more than
+/// [`WORTH_GAIN`].
+pub(crate) fn worth_ordering(bounds: &[Bounds], order: &[u32]) -> bool {
+    let given: Vec<u32> = (0..bounds.len() as u32).collect();
+    halves_area(bounds, &given) > WORTH_GAIN * halves_area(bounds, order)
+}
+
+/// Cost of the tree of halves of an order: the half areas of all its inner nodes together. Numbers without a box
+/// count as empty.
+pub(crate) fn halves_area(bounds: &[Bounds], order: &[u32]) -> f64 {
+    node_area(bounds, order).1
+}
+
+/// Box of a node, and the half areas of it and of all inner nodes below.
+fn node_area(bounds: &[Bounds], order: &[u32]) -> (Bounds, f64) {
+    match order {
+        [] => (Bounds::EMPTY, 0.0),
+        [one] => (bounds.get(*one as usize).copied().unwrap_or(Bounds::EMPTY), 0.0),
+        _ => {
+            let (left, right) = order.split_at(order.len().div_ceil(2));
+            let ((left, left_area), (right, right_area)) =
+                (node_area(bounds, left), node_area(bounds, right));
+            let node = left.union(right);
+            (node, f64::from(node.half_area()) + left_area + right_area)
+        }
+    }
+}
+
+/// Arranges `items`, splitting the work over up to `threads` threads.
+fn arrange(mut items: &mut [Item], threads: usize) {
+    while items.len() > 2 {
+        let middle = items.len().div_ceil(2);
+        cut(items, middle);
+        let (left, right) = items.split_at_mut(middle);
+        if threads > 1 && left.len() > PARALLEL_COUNT {
+            std::thread::scope(|scope| {
+                scope.spawn(|| arrange(left, threads / 2));
+                arrange(right, threads - threads / 2);
+            });
+            return;
+        }
+        arrange(left, 1);
+        items = right;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn scattered(count: u32) -> Vec<Bounds> {
+        let noise =
+            |i: u32, k: u32| (i.wrapping_mul(2_654_435_761).rotate_left(7 * k) >> 8) as f32 / 16_777_216.0;
+        (0..count)
+            .map(|i| {
+                let low = Vec3::new(noise(i, 0), noise(i, 1), noise(i, 2));
+                Bounds { low, high: low + 0.01 }
+            })
+            .collect()
+    }
+
+    fn line(places: &[f32]) -> Vec<Bounds> {
+        places.iter().map(|&x| Bounds { low: Vec3::X * x, high: Vec3::X * x + 1.0 }).collect()
+    }
+
+    #[test]
+    fn the_cost_is_that_of_the_tree_of_halves() {
+        // ((a b) (c)) : the half areas of [0, 3] and [0, 2], each 1 high and deep.
+        assert_eq!(halves_area(&line(&[0.0, 1.0, 2.0]), &[0, 1, 2]), 7.0 + 5.0);
+        assert_eq!(halves_area(&line(&[0.0, 1.0, 2.0]), &[0, 2, 1]), 7.0 + 7.0);
+        assert_eq!(halves_area(&line(&[0.0]), &[0]), 0.0);
+        assert_eq!(halves_area(&[], &[]), 0.0);
+        assert_eq!(halves_area(&line(&[0.0]), &[7, 9]), 0.0, "no such boxes");
+    }
+
+    #[test]
+    fn the_tree_is_many_times_smaller_than_unsorted() {
+        let bounds = scattered(4096);
+        let unsorted: Vec<u32> = (0..4096).collect();
+        let order = spatial_order(&bounds);
+        let gain = halves_area(&bounds, &unsorted) / halves_area(&bounds, &order);
+        assert!(gain > 8.0, "{gain}");
+        assert!(worth_ordering(&bounds, &order));
+    }
+
+    #[test]
+    fn a_good_order_is_not_worth_changing() {
+        let bounds = scattered(4096);
+        let sorted: Vec<Bounds> =
+            spatial_order(&bounds).into_iter().map(|index| bounds[index as usize]).collect();
+        assert!(!worth_ordering(&sorted, &spatial_order(&sorted)));
+        assert!(!worth_ordering(&[], &[]));
+        let same = [Bounds::ORIGIN; 9];
+        assert!(!worth_ordering(&same, &spatial_order(&same)));
+    }
+
+    #[test]
+    fn neighbours_on_a_line_stay_neighbours() {
+        let bounds = line(&[3.0, 0.0, 2.0, 1.0, 4.0]);
+        let order = spatial_order(&bounds);
+        let mut left = order[..3].to_vec();
+        left.sort_unstable();
+        assert_eq!(left, [1, 2, 3], "0, 2 and 1 stand left of 3 and 4");
+    }
+
+    #[test]
+    fn threads_do_not_change_the_result() {
+        let bounds = scattered(3 * PARALLEL_COUNT as u32);
+        let (mut alone, mut many) = (items(&bounds), items(&bounds));
+        arrange(&mut alone, 1);
+        arrange(&mut many, 5);
+        assert!(alone.iter().map(|item| item.index).eq(many.iter().map(|item| item.index)));
+    }
+
+    proptest! {
+        #[test]
+        fn every_box_appears_once_whatever_the_values(
+            corners in prop::collection::vec(prop::array::uniform6(prop::num::f32::ANY), 0..200), flat in any::<bool>()
+        ) {
+            let bounds: Vec<_> = corners
+                .iter()
+                .map(|&[a, b, c, d, e, f]| match flat { true => Bounds::ORIGIN, false => Bounds { low: Vec3::new(a, b, c), high: Vec3::new(d, e, f) } })
+                .collect();
+            let order = spatial_order(&bounds);
+            prop_assert_eq!(&order, &spatial_order(&bounds));
+            let area = halves_area(&bounds, &order);
+            prop_assert!(area.is_finite() && area >= 0.0);
+            let mut sorted = order;
+            sorted.sort_unstable();
+            prop_assert!(sorted.iter().copied().eq(0..bounds.len() as u32));
+        }
+    }
+}

@@ -1,0 +1,128 @@
+//! Which of the caller's primitives a part holds, and the inputs gathered for it.
+
+use std::sync::Arc;
+
+use crate::error::{Result, check_limit};
+use crate::gpu::Gpu;
+use crate::resource::Buffer;
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
+
+/// Bytes of three 32-bit indices.
+const TRIANGLE_BYTES: u64 = 12;
+/// Bytes of a box.
+const BOX_BYTES: u64 = 24;
+
+/// From the primitives of a part to those of the mesh, with indices or boxes of the part's own.
+///
+/// The table has a word for each geometry, the place of its first primitive in the table, and then the numbers of
+/// the mesh's primitives. Shaders read it to answer the caller's number, and the kernel that gathers inputs does too.
+pub(crate) struct PrimitiveMap {
+    pub(crate) table: Arc<Buffer>,
+    pub(crate) inputs: Arc<Buffer>,
+    /// First primitive of each geometry in `inputs`.
+    firsts: Vec<u32>,
+    primitive_bytes: u64,
+}
+
+impl PrimitiveMap {
+    /// Makes the buffers; the caller uploads [`table_words`] and gathers the inputs.
+    pub(crate) fn new(gpu: &Arc<Gpu>, name: &str, geometries: &[Vec<u32>], boxes: bool) -> Result<Self> {
+        let primitive_bytes = if boxes { BOX_BYTES } else { TRIANGLE_BYTES };
+        let total: u64 = geometries.iter().map(|list| list.len() as u64).sum();
+        let words = total + geometries.len() as u64;
+        check_limit(name, "primitives and geometries of a part", words, u32::MAX.into())?;
+        Ok(Self {
+            table: Arc::new(new_buffer(gpu, name, words * 4, BufferUsage::STORAGE)?),
+            inputs: Arc::new(new_buffer(gpu, name, total * primitive_bytes, BufferUsage::ACCEL_INPUT)?),
+            firsts: firsts(geometries),
+            primitive_bytes,
+        })
+    }
+
+    /// Address of the gathered inputs of a geometry.
+    pub(crate) fn input_address(&self, geometry: usize) -> u64 {
+        let first = self.firsts.get(geometry).copied().unwrap_or(0);
+        self.inputs.address + u64::from(first) * self.primitive_bytes
+    }
+
+    /// Address of the numbers of a geometry's primitives.
+    pub(crate) fn numbers_address(&self, geometry: usize) -> u64 {
+        let first = self.firsts.get(geometry).copied().unwrap_or(0);
+        self.table.address + (self.firsts.len() as u64 + u64::from(first)) * 4
+    }
+
+    /// Bytes of both buffers.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.table.size_bytes + self.inputs.size_bytes
+    }
+}
+
+/// The words of the table.
+pub(crate) fn table_words(geometries: &[Vec<u32>]) -> Vec<u32> {
+    let head = geometries.len() as u32;
+    let places = firsts(geometries).into_iter().map(|first| head + first);
+    places.chain(geometries.iter().flatten().copied()).collect()
+}
+
+/// The lists that [`table_words`] put into `words`, for a mesh with so many primitives in each geometry; `None` if it
+/// was not that.
+pub(crate) fn table_lists(words: &[u32], primitive_counts: &[u32]) -> Option<Vec<Vec<u32>>> {
+    let head = words.get(..primitive_counts.len())?;
+    let ends = head.iter().skip(1).map(|end| *end as usize).chain([words.len()]);
+    let list = |((start, end), count): ((&u32, usize), &u32)| {
+        let numbers = words.get(*start as usize..end)?;
+        numbers.iter().all(|number| number < count).then(|| numbers.to_vec())
+    };
+    let lists = head.iter().zip(ends).zip(primitive_counts).map(list).collect::<Option<Vec<_>>>()?;
+    (table_words(&lists) == words).then_some(lists)
+}
+
+fn firsts(geometries: &[Vec<u32>]) -> Vec<u32> {
+    let mut next = 0;
+    let mut place = |list: &Vec<u32>| {
+        let first = next;
+        next += list.len() as u32;
+        first
+    };
+    geometries.iter().map(&mut place).collect()
+}
+
+fn new_buffer(gpu: &Arc<Gpu>, name: &str, bytes: u64, usage: BufferUsage) -> Result<Buffer> {
+    let size_bytes = bytes.max(4);
+    let usage = usage | BufferUsage::STORAGE;
+    let desc = BufferDesc { size_bytes, usage, debug_name: name, ..Default::default() };
+    Buffer::new(gpu, &desc, InternalUsage::NONE)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_table_leads_from_geometry_and_primitive_to_the_mesh() {
+        let geometries = [vec![7, 3], vec![], vec![1]];
+        let words = table_words(&geometries);
+        for (geometry, list) in geometries.iter().enumerate() {
+            for (primitive, number) in list.iter().enumerate() {
+                assert_eq!(words[words[geometry] as usize + primitive], *number);
+            }
+        }
+        assert_eq!(words.len(), 6);
+    }
+
+    #[test]
+    fn lists_come_out_of_their_table_and_of_no_other() {
+        let geometries = vec![vec![7, 3], vec![], vec![1]];
+        let (words, counts) = (table_words(&geometries), [8, 0, 2]);
+        assert_eq!(table_lists(&words, &counts), Some(geometries));
+        assert_eq!(table_lists(&words, &[7, 0, 2]), None);
+        assert_eq!(table_lists(&words[..2], &counts), None);
+        for place in 0..3 {
+            for wrong in [0, 1, 4, 6, 7, u32::MAX] {
+                let mut broken = words.clone();
+                broken[place] = wrong;
+                assert!(broken == words || table_lists(&broken, &counts).is_none(), "{place} {wrong}");
+            }
+        }
+    }
+}

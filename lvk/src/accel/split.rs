@@ -1,0 +1,369 @@
+//! How a mesh too large for the device is cut into parts that each fit.
+
+use super::bounds::Bounds;
+use super::cut::{Item, cut, items};
+use crate::error::{Error, Result, check_limit};
+
+/// Most that one structure may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct PartLimits {
+    /// Bytes of the structure.
+    pub(crate) structure_bytes: u64,
+    /// Bytes of scratch memory of its builds.
+    pub(crate) scratch_bytes: u64,
+    /// Primitives of all its geometries together.
+    pub(crate) primitives: u64,
+}
+
+/// What a structure takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct PartSizes {
+    /// Bytes of the structure.
+    pub(crate) structure_bytes: u64,
+    /// Bytes of scratch memory, of a build or a refit, whichever is more.
+    pub(crate) scratch_bytes: u64,
+}
+
+/// One part of a mesh.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct PartPlan {
+    /// For each geometry of the mesh, the numbers of its primitives that are in the part, ascending; may be empty.
+    pub(crate) geometries: Vec<Vec<u32>>,
+}
+
+/// Cuts a mesh into the least number of equal, spatially compact parts that fit; parts that still do not fit, because
+/// their mixture of geometries takes more, are cut further. `bounds` holds the boxes of each geometry's primitives,
+/// `sizes` answers what a structure with so many primitives of each geometry takes. Deterministic.
+///
+/// Fails with [`Error::LimitExceeded`] if a single primitive does not fit.
+pub(crate) fn plan_split(
+    name: &str,
+    bounds: &[Vec<Bounds>],
+    limits: &PartLimits,
+    sizes: &mut dyn FnMut(&[u32]) -> Result<PartSizes>,
+) -> Result<Vec<PartPlan>> {
+    let mut starts = Vec::with_capacity(bounds.len());
+    let mut total = 0_u64;
+    for geometry in bounds {
+        starts.push(total);
+        total += geometry.len() as u64;
+    }
+    check_limit(name, "primitive count of all parts together", total, u32::MAX.into())?;
+    let mut planner = Planner { name, starts, limits, sizes, parts: Vec::new() };
+    planner.plan(&mut items(bounds.iter().flatten()))?;
+    Ok(planner.parts)
+}
+
+struct Planner<'a> {
+    name: &'a str,
+    /// Number of each geometry's first primitive when all are counted through.
+    starts: Vec<u64>,
+    limits: &'a PartLimits,
+    sizes: &'a mut dyn FnMut(&[u32]) -> Result<PartSizes>,
+    parts: Vec<PartPlan>,
+}
+
+impl Planner<'_> {
+    fn plan(&mut self, items: &mut [Item]) -> Result<()> {
+        let part = self.part(items);
+        let counts: Vec<u32> = part.geometries.iter().map(|geometry| geometry.len() as u32).collect();
+        let demand = self.demand(&counts)?;
+        if demand.parts <= 1 {
+            self.parts.push(part);
+            return Ok(());
+        }
+        drop(part);
+        if items.len() <= 1 {
+            return Err(Error::LimitExceeded {
+                object: self.name.to_owned(),
+                what: demand.what,
+                requested: demand.requested,
+                limit: demand.limit,
+            });
+        }
+        let parts = self.least_parts(&counts, demand.parts, items.len() as u64)?;
+        self.cut(items, parts)
+    }
+
+    /// Cuts into so many parts of equal counts and plans each of them.
+    fn cut(&mut self, items: &mut [Item], parts: u64) -> Result<()> {
+        if parts <= 1 {
+            return self.plan(items);
+        }
+        let left_parts = parts / 2;
+        let left = (items.len() as u128 * u128::from(left_parts) / u128::from(parts)) as usize;
+        cut(items, left);
+        let (left, right) = items.split_at_mut(left);
+        self.cut(left, left_parts)?;
+        self.cut(right, parts - left_parts)
+    }
+
+    /// Least number of parts, at least `lowest` and at most `highest`, of which an equal share of every geometry fits:
+    /// sizes have a fixed base, so the ratio of the whole's size to the limit may be too few.
+    fn least_parts(&mut self, counts: &[u32], lowest: u64, highest: u64) -> Result<u64> {
+        let mut too_few = lowest.min(highest) - 1;
+        let mut enough = too_few + 1;
+        while enough < highest && !self.share_fits(counts, enough)? {
+            (too_few, enough) = (enough, enough.saturating_mul(2).min(highest));
+        }
+        while enough - too_few > 1 {
+            let middle = too_few + (enough - too_few) / 2;
+            if self.share_fits(counts, middle)? {
+                enough = middle;
+            } else {
+                too_few = middle;
+            }
+        }
+        Ok(enough)
+    }
+
+    fn share_fits(&mut self, counts: &[u32], parts: u64) -> Result<bool> {
+        Ok(self.demand(&equal_share(counts, parts))?.parts <= 1)
+    }
+
+    /// The limit that so many primitives of each geometry exceed most, and how many times.
+    fn demand(&mut self, counts: &[u32]) -> Result<Demand> {
+        let sizes = (self.sizes)(counts)?;
+        let primitives = counts.iter().copied().map(u64::from).sum();
+        let limits = self.limits;
+        let demands = [
+            Demand::new("primitive count of one part", primitives, limits.primitives),
+            Demand::new("scratch size in bytes of one part", sizes.scratch_bytes, limits.scratch_bytes),
+            Demand::new("structure size in bytes of one part", sizes.structure_bytes, limits.structure_bytes),
+        ];
+        let [first, second, third] = demands;
+        let worst = if second.parts > first.parts { second } else { first };
+        Ok(if third.parts > worst.parts { third } else { worst })
+    }
+
+    fn part(&self, items: &[Item]) -> PartPlan {
+        let mut numbers: Vec<u32> = items.iter().map(|item| item.index).collect();
+        numbers.sort_unstable();
+        let mut geometries = Vec::with_capacity(self.starts.len());
+        let mut rest = &numbers[..];
+        for (geometry, &start) in self.starts.iter().enumerate() {
+            let end = self.starts.get(geometry + 1).copied().unwrap_or(u64::MAX);
+            let (here, behind) = rest.split_at(rest.partition_point(|&number| u64::from(number) < end));
+            geometries.push(here.iter().map(|&number| number - start as u32).collect());
+            rest = behind;
+        }
+        PartPlan { geometries }
+    }
+}
+
+/// How many primitives of each geometry an average one of so many parts holds: `ceil(total / parts)` together, as
+/// the geometries may be more than the primitives of a part.
+fn equal_share(counts: &[u32], parts: u64) -> Vec<u32> {
+    let total: u64 = counts.iter().copied().map(u64::from).sum();
+    let share = total.div_ceil(parts.max(1));
+    let (mut behind, mut given) = (0, 0);
+    let next = |&count: &u32| {
+        behind += u64::from(count);
+        let before = given;
+        given = behind * share / total.max(1);
+        (given - before) as u32
+    };
+    counts.iter().map(next).collect()
+}
+
+/// One limit, and into how many parts it asks to cut.
+#[derive(Clone, Copy)]
+struct Demand {
+    what: &'static str,
+    requested: u64,
+    limit: u64,
+    parts: u64,
+}
+
+impl Demand {
+    fn new(what: &'static str, requested: u64, limit: u64) -> Self {
+        let parts = if limit == 0 && requested > 0 { u64::MAX } else { requested.div_ceil(limit.max(1)) };
+        Self { what, requested, limit, parts }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const MIB: u64 = 1 << 20;
+
+    fn scattered(count: u32) -> Vec<Bounds> {
+        let noise =
+            |i: u32, k: u32| (i.wrapping_mul(2_654_435_761).rotate_left(7 * k) >> 8) as f32 / 16_777_216.0;
+        (0..count)
+            .map(|i| {
+                let low = Vec3::new(noise(i, 0), noise(i, 1), noise(i, 2));
+                Bounds { low, high: low + 0.001 }
+            })
+            .collect()
+    }
+
+    /// Sizes that grow by so many bytes of structure and scratch for each primitive, above a base.
+    fn linear(base: u64, structure: u64, scratch: u64) -> impl FnMut(&[u32]) -> Result<PartSizes> {
+        move |counts| {
+            let primitives: u64 = counts.iter().copied().map(u64::from).sum();
+            Ok(PartSizes {
+                structure_bytes: base + primitives * structure,
+                scratch_bytes: base + primitives * scratch,
+            })
+        }
+    }
+
+    fn limits(structure_bytes: u64, scratch_bytes: u64, primitives: u64) -> PartLimits {
+        PartLimits { structure_bytes, scratch_bytes, primitives }
+    }
+
+    fn part_count(part: &PartPlan) -> usize {
+        part.geometries.iter().map(Vec::len).sum()
+    }
+
+    fn part_area(bounds: &[Vec<Bounds>], part: &PartPlan) -> f64 {
+        let numbers = part.geometries.iter().zip(bounds);
+        let boxes =
+            numbers.flat_map(|(numbers, bounds)| numbers.iter().map(|&number| bounds[number as usize]));
+        f64::from(boxes.fold(Bounds::EMPTY, Bounds::union).half_area())
+    }
+
+    #[test]
+    fn what_fits_stays_whole() {
+        let bounds = [scattered(10), Vec::new(), scattered(3)];
+        let parts = plan_split("mesh", &bounds, &limits(1000, 1000, 13), &mut linear(0, 1, 1)).unwrap();
+        assert_eq!(parts, [PartPlan { geometries: vec![(0..10).collect(), Vec::new(), (0..3).collect()] }]);
+        let empty = plan_split("mesh", &[Vec::new()], &limits(0, 0, 0), &mut linear(0, 1, 1)).unwrap();
+        assert_eq!(empty, [PartPlan { geometries: vec![Vec::new()] }]);
+    }
+
+    /// The phone of the slides: 2.8 M triangles of 2,805 bytes of scratch each need 29.3 times 256 MiB.
+    #[test]
+    fn a_large_mesh_on_a_phone_is_thirty_equal_parts() {
+        let bounds = [scattered(2_800_000)];
+        let limits = limits(256 * MIB, 256 * MIB, 1 << 24);
+        let parts = plan_split("mesh", &bounds, &limits, &mut linear(0, 219, 2805)).unwrap();
+        assert_eq!(parts.len(), 30);
+        assert!(parts.iter().all(|part| part_count(part).abs_diff(2_800_000 / 30) <= 1));
+    }
+
+    #[test]
+    fn a_fixed_base_takes_no_more_parts_than_it_must() {
+        let bounds = [scattered(1000)];
+        // 1000 + 10 n <= 1500 holds for n <= 50, so 20 parts, though the whole is only 8 times too large.
+        let parts = plan_split("mesh", &bounds, &limits(1500, 1500, 1000), &mut linear(1000, 10, 1)).unwrap();
+        assert_eq!(parts.len(), 20);
+    }
+
+    #[test]
+    fn a_primitive_too_large_by_itself_is_an_error_that_names_the_limit() {
+        let check = |limits: PartLimits, what: &str| {
+            let error =
+                plan_split("statue", &[scattered(40)], &limits, &mut linear(100, 10, 20)).unwrap_err();
+            let text = error.to_string();
+            assert!(
+                matches!(error, Error::LimitExceeded { .. })
+                    && text.contains(what)
+                    && text.contains("statue"),
+                "{text}"
+            );
+        };
+        check(limits(109, 1 << 40, 100), "structure size");
+        check(limits(1 << 40, 119, 100), "scratch size");
+        check(limits(1 << 40, 1 << 40, 0), "primitive count");
+        let empty = plan_split("statue", &[Vec::new()], &limits(99, 99, 1), &mut linear(100, 10, 20));
+        assert!(matches!(empty, Err(Error::LimitExceeded { .. })));
+    }
+
+    #[test]
+    fn errors_of_the_size_query_come_through() {
+        let mut fails = |_: &[u32]| Err(Error::usage("mesh", "lost"));
+        assert!(plan_split("mesh", &[scattered(4)], &limits(1, 1, 1), &mut fails).is_err());
+    }
+
+    #[test]
+    fn a_costly_geometry_is_cut_further_than_a_cheap_one() {
+        // The first geometry, all on the left, costs 50 times what the second one does.
+        let shifted = scattered(500).into_iter();
+        let right = shifted
+            .map(|one| Bounds { low: one.low + Vec3::X * 9.0, high: one.high + Vec3::X * 9.0 })
+            .collect();
+        let mut sizes = |counts: &[u32]| {
+            let bytes = u64::from(counts[0]) * 50 + u64::from(counts[1]);
+            Ok(PartSizes { structure_bytes: bytes, scratch_bytes: 0 })
+        };
+        let parts = plan_split("mesh", &[scattered(500), right], &limits(5000, 1, 1000), &mut sizes).unwrap();
+        let largest = |geometry: usize| parts.iter().map(|part| part.geometries[geometry].len()).max();
+        assert!(largest(0) <= Some(100) && largest(1) > Some(150), "{:?} {:?}", largest(0), largest(1));
+    }
+
+    #[test]
+    fn many_small_geometries_take_no_more_parts_than_one_large_one() {
+        let bounds: Vec<_> = scattered(5000).chunks(10).map(<[Bounds]>::to_vec).collect();
+        let parts = plan_split("mesh", &bounds, &limits(MIB, MIB, 170), &mut linear(0, 1, 1)).unwrap();
+        assert_eq!(parts.len(), 30);
+    }
+
+    #[test]
+    fn primitives_in_one_place_are_cut_by_their_number() {
+        for one in [Bounds::ORIGIN, Bounds { low: Vec3::NAN, high: Vec3::NAN }] {
+            let parts =
+                plan_split("mesh", &[vec![one; 100]], &limits(MIB, MIB, 30), &mut linear(0, 1, 1)).unwrap();
+            let numbers: Vec<_> = parts.into_iter().flat_map(|mut part| part.geometries.remove(0)).collect();
+            assert!(numbers.into_iter().eq(0..100), "in order, as nothing else tells them apart");
+        }
+    }
+
+    #[test]
+    fn parts_are_compact() {
+        let bounds = [scattered(30_000), scattered(20_000)];
+        let parts =
+            plan_split("mesh", &bounds, &limits(MIB, MIB, 50_000 / 31), &mut linear(0, 1, 1)).unwrap();
+        let area: f64 = parts.iter().map(|part| part_area(&bounds, part)).sum();
+        // Parts of a random choice would all be as large as the whole, 3.
+        assert!(area < 0.15 * 3.0 * parts.len() as f64, "{area} in {} parts", parts.len());
+    }
+
+    proptest! {
+        #[test]
+        fn every_primitive_is_in_one_part_and_every_part_fits(
+            geometries in prop::collection::vec(
+                prop::collection::vec((prop::array::uniform3(prop::num::f32::ANY), any::<bool>()), 0..80), 1..5),
+            (base, structure, scratch) in (0..50_u64, 1..10_u64, 1..10_u64),
+            room in (10..200_u64, 10..200_u64, 1..40_u64),
+        ) {
+            let bounds: Vec<Vec<Bounds>> = geometries
+                .iter()
+                .map(|places| places.iter().map(|&(place, wild)| boxed(place, wild)).collect())
+                .collect();
+            let limits = limits(base + room.0, base + room.1, room.2);
+            let mut sizes = linear(base, structure, scratch);
+            let parts = plan_split("mesh", &bounds, &limits, &mut sizes).unwrap();
+            prop_assert_eq!(&parts, &plan_split("mesh", &bounds, &limits, &mut sizes).unwrap());
+            for part in &parts {
+                let counts: Vec<u32> = part.geometries.iter().map(|numbers| numbers.len() as u32).collect();
+                let sizes = sizes(&counts).unwrap();
+                prop_assert!(sizes.structure_bytes <= limits.structure_bytes);
+                prop_assert!(sizes.scratch_bytes <= limits.scratch_bytes);
+                prop_assert!(part_count(part) as u64 <= limits.primitives);
+                prop_assert!(part_count(part) > 0 || parts.len() == 1);
+                prop_assert!(part.geometries.iter().all(|numbers| numbers.is_sorted()));
+            }
+            for (geometry, bounds) in bounds.iter().enumerate() {
+                let mut all: Vec<u32> = parts.iter().flat_map(|part| part.geometries[geometry].clone()).collect();
+                all.sort_unstable();
+                prop_assert!(all.into_iter().eq(0..bounds.len() as u32));
+            }
+        }
+    }
+
+    /// A small box; a wild one has any corners, the same ones for all that are not numbers.
+    fn boxed(place: [f32; 3], wild: bool) -> Bounds {
+        let place = Vec3::from(place);
+        if wild {
+            Bounds { low: place, high: -place }
+        } else {
+            Bounds { low: place.clamp(Vec3::ZERO, Vec3::ONE), high: Vec3::ONE }
+        }
+    }
+}

@@ -1,0 +1,343 @@
+//! Phones and lesser devices rehearsed on a better one: what a device reports, made no looser and often tighter.
+
+use std::borrow::Cow;
+
+use super::caps::Capabilities;
+use super::mesh_limits::MeshLimits;
+use crate::error::{Error, Result};
+
+/// Clamps what the real device reports, so that the path of another one runs on it.
+///
+/// A profile hides and tightens, it never adds: on a device that is worse than the profile the device's own answers
+/// stay. The logical device is created without the extensions that are hidden. The default clamps nothing; a profile of
+/// one's own is made from it, or from a built-in one:
+///
+/// ```
+/// use lvk::DeviceProfile;
+///
+/// let small = DeviceProfile {
+///     name: "small scratch".into(),
+///     max_accel_scratch_bytes: 1 << 20,
+///     ..DeviceProfile::mali_g715()
+/// };
+/// assert!(!small.ray_tracing_pipeline);
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DeviceProfile {
+    /// For messages and [`Capabilities::profile`].
+    pub name: Cow<'static, str>,
+    /// Whether ray tracing pipelines may be used.
+    pub ray_tracing_pipeline: bool,
+    /// Whether ray queries may be used.
+    pub ray_query: bool,
+    /// Whether positions of hit triangles may be fetched.
+    pub position_fetch: bool,
+    /// Whether task and mesh shaders may be used.
+    pub mesh_shader: bool,
+    /// Least alignment of scratch addresses in bytes; rounded up to a power of two.
+    pub min_scratch_alignment: u32,
+    /// Most bytes of a storage buffer descriptor.
+    pub max_storage_buffer_range: u64,
+    /// Most bytes of one acceleration structure.
+    pub max_accel_structure_bytes: u64,
+    /// Most bytes of scratch for one build.
+    pub max_accel_scratch_bytes: u64,
+    /// Most primitives of one bottom-level structure.
+    pub max_blas_primitives: u64,
+    /// Bytes of a bottom-level structure for each primitive where the driver asks for fewer; 0 leaves the driver's
+    /// answer.
+    pub structure_bytes_per_primitive: u64,
+    /// Bytes of scratch for each primitive of a bottom-level build where the driver asks for fewer; 0 leaves the
+    /// driver's answer.
+    pub scratch_bytes_per_primitive: u64,
+}
+
+impl Default for DeviceProfile {
+    fn default() -> Self {
+        Self {
+            name: Cow::Borrowed("custom"),
+            ray_tracing_pipeline: true,
+            ray_query: true,
+            position_fetch: true,
+            mesh_shader: true,
+            min_scratch_alignment: 1,
+            max_storage_buffer_range: u64::MAX,
+            max_accel_structure_bytes: u64::MAX,
+            max_accel_scratch_bytes: u64::MAX,
+            max_blas_primitives: u64::MAX,
+            structure_bytes_per_primitive: 0,
+            scratch_bytes_per_primitive: 0,
+        }
+    }
+}
+
+type BuiltIn = (&'static str, fn() -> DeviceProfile);
+
+/// The built-in profiles by name.
+const BUILT_IN: [BuiltIn; 5] = [
+    ("mali-g715", DeviceProfile::mali_g715),
+    ("xclipse-940", DeviceProfile::xclipse_940),
+    ("no-rt-pipeline", DeviceProfile::no_rt_pipeline),
+    ("no-ray-query", DeviceProfile::no_ray_query),
+    ("no-ray-tracing", DeviceProfile::no_ray_tracing),
+];
+
+impl DeviceProfile {
+    /// `mali-g715`: Arm Mali-G715-Immortalis MC11 with driver r38p1. Ray queries only; neither a structure nor the
+    /// scratch of a build may exceed the 256 MiB range of a storage buffer; the driver asks for 7,852,992,128 bytes of
+    /// scratch and 612,837,208 of structure for a mesh of 2.8 million triangles, which makes 2,805 and 219 for each.
+    pub fn mali_g715() -> Self {
+        const RANGE: u64 = 256 << 20;
+        Self {
+            name: Cow::Borrowed("mali-g715"),
+            ray_tracing_pipeline: false,
+            position_fetch: false,
+            mesh_shader: false,
+            min_scratch_alignment: 256,
+            max_storage_buffer_range: RANGE,
+            max_accel_structure_bytes: RANGE,
+            max_accel_scratch_bytes: RANGE,
+            structure_bytes_per_primitive: 219,
+            scratch_bytes_per_primitive: 2_805,
+            ..Self::default()
+        }
+    }
+
+    /// `xclipse-940`: Samsung Xclipse 940. Pipelines and queries, no limit of the storage range; the driver asks for
+    /// 601,488,316 bytes of scratch and 461,519,536 of structure for the same mesh, which makes 215 and 165 for each.
+    pub fn xclipse_940() -> Self {
+        Self {
+            name: Cow::Borrowed("xclipse-940"),
+            structure_bytes_per_primitive: 165,
+            scratch_bytes_per_primitive: 215,
+            ..Self::default()
+        }
+    }
+
+    /// `no-rt-pipeline`: the device at hand with ray queries only.
+    pub fn no_rt_pipeline() -> Self {
+        Self { name: Cow::Borrowed("no-rt-pipeline"), ray_tracing_pipeline: false, ..Self::default() }
+    }
+
+    /// `no-ray-query`: the device at hand with ray tracing pipelines only.
+    pub fn no_ray_query() -> Self {
+        Self { name: Cow::Borrowed("no-ray-query"), ray_query: false, ..Self::default() }
+    }
+
+    /// `no-ray-tracing`: the device at hand with no hardware ray tracing at all.
+    pub fn no_ray_tracing() -> Self {
+        Self { name: Cow::Borrowed("no-ray-tracing"), ray_tracing_pipeline: false, ..Self::no_ray_query() }
+    }
+
+    /// The names of the built-in profiles.
+    pub fn names() -> impl ExactSizeIterator<Item = &'static str> {
+        BUILT_IN.iter().map(|(name, _)| *name)
+    }
+
+    /// The built-in profile of this name.
+    ///
+    /// # Errors
+    /// [`Error::InvalidUsage`] with the list of names.
+    pub fn named(name: &str) -> Result<Self> {
+        match BUILT_IN.iter().find(|(known, _)| *known == name) {
+            Some((_, profile)) => Ok(profile()),
+            None => {
+                let names: Vec<_> = Self::names().collect();
+                let message = format!("no built-in profile has this name; there are {}", names.join(", "));
+                Err(Error::usage(format!("device profile '{name}'"), message))
+            }
+        }
+    }
+
+    /// Whether anything may not be used.
+    pub(crate) fn hides(&self) -> bool {
+        !(self.ray_tracing_pipeline && self.ray_query && self.position_fetch && self.mesh_shader)
+    }
+
+    /// Takes from `capabilities` what the profile hides and tightens their limits.
+    pub fn apply(&self, capabilities: &mut Capabilities) {
+        capabilities.profile = Some(self.name.clone().into_owned());
+        capabilities.limit_ray_tracing(self.ray_tracing_pipeline, self.ray_query);
+        capabilities.position_fetch &= self.position_fetch;
+        capabilities.mesh_shader &= self.mesh_shader;
+        let limits = &mut capabilities.limits;
+        limits.scratch_alignment = stricter_alignment(limits.scratch_alignment, self.min_scratch_alignment);
+        for (limit, most) in [
+            (&mut limits.max_storage_buffer_range, self.max_storage_buffer_range),
+            (&mut limits.max_accel_structure_bytes, self.max_accel_structure_bytes),
+            (&mut limits.max_accel_scratch_bytes, self.max_accel_scratch_bytes),
+            (&mut limits.max_blas_primitives, self.max_blas_primitives),
+        ] {
+            *limit = most.min(*limit);
+        }
+        if !capabilities.mesh_shader {
+            capabilities.limits.mesh = MeshLimits::default();
+        }
+    }
+}
+
+/// A power of two that is enough for both.
+fn stricter_alignment(device: u32, profile: u32) -> u32 {
+    const LARGEST: u32 = 1 << 31;
+    device.max(profile).max(1).checked_next_power_of_two().unwrap_or(LARGEST)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::gpu::caps::Limits;
+
+    fn device() -> Capabilities {
+        Capabilities {
+            ray_tracing_pipeline: true,
+            ray_query: true,
+            position_fetch: true,
+            mesh_shader: true,
+            limits: Limits {
+                scratch_alignment: 8,
+                max_storage_buffer_range: 1 << 32,
+                max_accel_structure_bytes: 1 << 40,
+                max_accel_scratch_bytes: 1 << 40,
+                max_blas_primitives: 1 << 24,
+                ..Limits::default()
+            },
+            ..Capabilities::default()
+        }
+    }
+
+    fn under(profile: &DeviceProfile) -> Capabilities {
+        let mut capabilities = device();
+        profile.apply(&mut capabilities);
+        capabilities
+    }
+
+    #[test]
+    fn the_default_clamps_nothing() {
+        let clamped = under(&DeviceProfile::default());
+        assert_eq!(clamped.limits, device().limits);
+        assert!(clamped.ray_tracing_pipeline && clamped.ray_query);
+        assert!(clamped.position_fetch && clamped.mesh_shader);
+    }
+
+    #[test]
+    fn built_in_profiles_hide_what_their_names_say() {
+        for (name, pipeline, query) in [
+            ("mali-g715", false, true),
+            ("xclipse-940", true, true),
+            ("no-rt-pipeline", false, true),
+            ("no-ray-query", true, false),
+            ("no-ray-tracing", false, false),
+        ] {
+            let clamped = under(&DeviceProfile::named(name).unwrap());
+            assert_eq!((clamped.ray_tracing_pipeline, clamped.ray_query), (pipeline, query), "{name}");
+            assert_eq!(clamped.profile.as_deref(), Some(name));
+            assert!(!clamped.position_fetch || pipeline || query, "{name}");
+        }
+    }
+
+    #[test]
+    fn mali_has_its_limits() {
+        let limits = under(&DeviceProfile::mali_g715()).limits;
+        let range = 268_435_456;
+        assert_eq!(limits.scratch_alignment, 256);
+        assert_eq!(limits.max_storage_buffer_range, range);
+        assert_eq!((limits.max_accel_structure_bytes, limits.max_accel_scratch_bytes), (range, range));
+        assert_eq!(limits.max_blas_primitives, 1 << 24);
+    }
+
+    #[test]
+    fn an_unknown_name_is_answered_with_the_known_ones() {
+        let message = DeviceProfile::named("Mali-G715").unwrap_err().to_string();
+        assert!(message.contains("'Mali-G715'"), "{message}");
+        for name in DeviceProfile::names() {
+            assert!(message.contains(name), "{message}");
+        }
+    }
+
+    fn bytes() -> impl Strategy<Value = u64> {
+        prop_oneof![Just(0), Just(u64::MAX), any::<u64>(), 0..1_u64 << 34]
+    }
+
+    prop_compose! {
+        fn profile()(
+            on in any::<[bool; 4]>(), min_scratch_alignment in prop_oneof![any::<u32>(), 0..1025_u32],
+            limits in [bytes(), bytes(), bytes(), bytes()], factors in any::<[u16; 2]>(),
+        ) -> DeviceProfile {
+            DeviceProfile {
+                name: "random".into(),
+                ray_tracing_pipeline: on[0],
+                ray_query: on[1],
+                position_fetch: on[2],
+                mesh_shader: on[3],
+                min_scratch_alignment,
+                max_storage_buffer_range: limits[0],
+                max_accel_structure_bytes: limits[1],
+                max_accel_scratch_bytes: limits[2],
+                max_blas_primitives: limits[3],
+                structure_bytes_per_primitive: factors[0].into(),
+                scratch_bytes_per_primitive: factors[1].into(),
+            }
+        }
+    }
+
+    prop_compose! {
+        fn found()(
+            on in any::<[bool; 4]>(), alignment in 0..10_u32, limits in [bytes(), bytes(), bytes(), bytes()]
+        ) -> Capabilities {
+            let mut found = device();
+            found.ray_tracing_pipeline = on[0];
+            found.ray_query = on[1];
+            found.position_fetch = on[2] && (on[0] || on[1]);
+            found.mesh_shader = on[3];
+            found.limits.scratch_alignment = 1 << alignment;
+            found.limits.max_storage_buffer_range = limits[0];
+            found.limits.max_accel_structure_bytes = limits[1];
+            found.limits.max_accel_scratch_bytes = limits[2];
+            found.limits.max_blas_primitives = limits[3];
+            found
+        }
+    }
+
+    fn amounts(limits: &Limits) -> [u64; 4] {
+        [
+            limits.max_storage_buffer_range,
+            limits.max_accel_structure_bytes,
+            limits.max_accel_scratch_bytes,
+            limits.max_blas_primitives,
+        ]
+    }
+
+    fn switches(of: &Capabilities) -> [bool; 4] {
+        [of.ray_tracing_pipeline, of.ray_query, of.position_fetch, of.mesh_shader]
+    }
+
+    proptest! {
+        #[test]
+        fn nothing_is_ever_loosened(found in found(), profile in profile()) {
+            let mut clamped = found.clone();
+            profile.apply(&mut clamped);
+            for (before, after) in amounts(&found.limits).into_iter().zip(amounts(&clamped.limits)) {
+                prop_assert!(after <= before);
+            }
+            for (before, after) in switches(&found).into_iter().zip(switches(&clamped)) {
+                prop_assert!(before || !after);
+            }
+            prop_assert!(!clamped.position_fetch || clamped.ray_tracing_pipeline || clamped.ray_query);
+            let mut again = clamped.clone();
+            profile.apply(&mut again);
+            prop_assert_eq!(again.limits, clamped.limits);
+        }
+
+        #[test]
+        fn the_alignment_serves_device_and_profile(found in found(), profile in profile()) {
+            let mut clamped = found.clone();
+            profile.apply(&mut clamped);
+            let alignment = clamped.limits.scratch_alignment;
+            prop_assert!(alignment.is_power_of_two());
+            prop_assert_eq!(alignment % found.limits.scratch_alignment, 0);
+            prop_assert!(alignment >= profile.min_scratch_alignment.min(1 << 31));
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! The pipeline cache of a context: compiled shaders, kept in a file from one run to the next.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use ash::vk;
+
+use super::cache_file::{CacheOwner, checksum, read, replace, seal, unseal};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+
+/// The cache of a context that was given a file. Written and destroyed on drop.
+pub(crate) struct PipelineCache {
+    pub(crate) raw: vk::PipelineCache,
+    /// Bytes of compiled shaders the file had for this device and driver.
+    pub(crate) loaded_bytes: u64,
+    path: PathBuf,
+    owner: CacheOwner,
+    /// Checksum of the data in the file, as far as known. Held while the file is written.
+    on_disk: Mutex<Option<u64>>,
+    gpu: Arc<Gpu>,
+}
+
+impl PipelineCache {
+    /// Starts from the file. Where there is none, or it cannot be used, starts empty and says so to the `log` crate.
+    pub(crate) fn new(gpu: &Arc<Gpu>, path: &Path) -> Result<Self> {
+        let owner = owner(gpu);
+        let file = load(path);
+        let data = file.as_deref().and_then(|file| match unseal(&owner, file) {
+            Ok(data) => Some(data),
+            Err(refusal) => {
+                log::warn!("the pipeline cache '{}' is dropped: {refusal}", path.display());
+                None
+            }
+        });
+        let (raw, data) = create_from(gpu, path, data.unwrap_or_default())?;
+        gpu.name(raw, "pipeline cache");
+        Ok(Self {
+            raw,
+            loaded_bytes: data.len() as u64,
+            path: path.to_owned(),
+            owner,
+            on_disk: Mutex::new((!data.is_empty()).then(|| checksum(&[data]))),
+            gpu: Arc::clone(gpu),
+        })
+    }
+
+    /// Writes the file.
+    pub(crate) fn save(&self) -> Result<()> {
+        self.write(true)
+    }
+
+    /// Writes the file, unless it need not be and nothing is new.
+    fn write(&self, always: bool) -> Result<()> {
+        // SAFETY: the cache is alive.
+        let data = unsafe { self.gpu.device.get_pipeline_cache_data(self.raw) }
+            .map_err(Error::vulkan("vkGetPipelineCacheData"))?;
+        let sum = checksum(&[&data]);
+        let mut on_disk = self.on_disk.lock().unwrap_or_else(PoisonError::into_inner);
+        if !always && *on_disk == Some(sum) && self.path.exists() {
+            return Ok(());
+        }
+        replace(&self.path, &seal(&self.owner, &data)).map_err(|error| Error::File {
+            path: self.path.clone(),
+            message: format!("the pipeline cache cannot be written: {error}"),
+        })?;
+        *on_disk = Some(sum);
+        Ok(())
+    }
+}
+
+impl Drop for PipelineCache {
+    fn drop(&mut self) {
+        if let Err(error) = self.write(false) {
+            log::warn!("{error}");
+        }
+        // SAFETY: no pipeline is being created: everything that does holds the context.
+        unsafe { self.gpu.device.destroy_pipeline_cache(self.raw, None) };
+    }
+}
+
+/// The bytes of the file, if it can be read. A first run has none.
+fn load(path: &Path) -> Option<Vec<u8>> {
+    let error = match read(path) {
+        Ok(file) => return Some(file),
+        Err(error) => error,
+    };
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    if error.kind() != ErrorKind::NotFound {
+        log::warn!("the pipeline cache '{}' cannot be read: {error}", path.display());
+    } else if folder.is_some_and(|folder| !folder.is_dir()) {
+        log::warn!("the folder of the pipeline cache '{}' does not exist; create it", path.display());
+    }
+    None
+}
+
+/// A cache that starts from `data`, or empty where the driver does not take it.
+fn create_from<'a>(gpu: &Gpu, path: &Path, data: &'a [u8]) -> Result<(vk::PipelineCache, &'a [u8])> {
+    match create(gpu, data) {
+        Ok(raw) => Ok((raw, data)),
+        Err(result) if data.is_empty() => Err(Error::vulkan("vkCreatePipelineCache")(result)),
+        Err(result) => {
+            log::warn!("the pipeline cache '{}' is dropped: the driver answers {result}", path.display());
+            let raw = create(gpu, &[]).map_err(Error::vulkan("vkCreatePipelineCache"))?;
+            Ok((raw, &[]))
+        }
+    }
+}
+
+fn create(gpu: &Gpu, data: &[u8]) -> Result<vk::PipelineCache, vk::Result> {
+    let info = vk::PipelineCacheCreateInfo::default().initial_data(data);
+    // SAFETY: the data is empty, or was written by this driver for this device.
+    unsafe { gpu.device.create_pipeline_cache(&info, None) }
+}
+
+fn owner(gpu: &Gpu) -> CacheOwner {
+    let mut ids = vk::PhysicalDeviceIDProperties::default();
+    let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut ids);
+    // SAFETY: the physical device belongs to the instance.
+    unsafe { gpu.instance.raw.get_physical_device_properties2(gpu.physical(), &mut all) };
+    let plain = all.properties;
+    CacheOwner {
+        vendor: plain.vendor_id,
+        device: plain.device_id,
+        driver_version: plain.driver_version,
+        driver_uuid: ids.driver_uuid,
+        cache_uuid: plain.pipeline_cache_uuid,
+    }
+}

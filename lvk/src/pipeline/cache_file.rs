@@ -1,0 +1,235 @@
+//! The file that keeps compiled pipelines: who wrote it, whether it is whole, and how it is replaced.
+
+use std::fs::File;
+use std::io::{self, Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// The device and the driver whose compiled shaders a file holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct CacheOwner {
+    pub(crate) vendor: u32,
+    pub(crate) device: u32,
+    pub(crate) driver_version: u32,
+    pub(crate) driver_uuid: [u8; 16],
+    /// `pipelineCacheUUID`, which drivers change with the format of what they compile.
+    pub(crate) cache_uuid: [u8; 16],
+}
+
+/// Why a file is not used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum Refusal {
+    #[error("it is no pipeline cache")]
+    NoCache,
+    #[error("it was written by another version of the library")]
+    OtherFormat,
+    #[error("it is damaged or cut off")]
+    Damaged,
+    #[error("it was written by another version of the driver")]
+    OtherDriver,
+    #[error("it was written for another device or driver")]
+    OtherDevice,
+}
+
+const MAGIC: [u8; 8] = *b"lvkpipes";
+const FORMAT: u32 = 1;
+/// Magic, format, driver version, driver UUID, length of Vulkan's data, checksum of everything else.
+const HEADER_BYTES: usize = 48;
+const CHECKSUM_AT: usize = 40;
+/// `VkPipelineCacheHeaderVersionOne`: length, version, vendor, device, UUID.
+const VULKAN_HEADER_BYTES: usize = 32;
+const VULKAN_HEADER_VERSION: u32 = 1;
+/// Files beyond this are taken for damage.
+const MOST_BYTES: u64 = 1 << 30;
+
+/// The file for Vulkan's `data`.
+pub(crate) fn seal(owner: &CacheOwner, data: &[u8]) -> Vec<u8> {
+    let mut file = Vec::with_capacity(HEADER_BYTES + data.len());
+    file.extend(MAGIC);
+    file.extend(FORMAT.to_le_bytes());
+    file.extend(owner.driver_version.to_le_bytes());
+    file.extend(owner.driver_uuid);
+    file.extend((data.len() as u64).to_le_bytes());
+    let sum = checksum(&[&file, data]);
+    file.extend(sum.to_le_bytes());
+    file.extend(data);
+    file
+}
+
+/// Vulkan's data in a file that is whole and was written by `owner`.
+pub(crate) fn unseal<'a>(owner: &CacheOwner, file: &'a [u8]) -> Result<&'a [u8], Refusal> {
+    if !file.starts_with(&MAGIC) {
+        return Err(Refusal::NoCache);
+    }
+    if file.len() < HEADER_BYTES {
+        return Err(Refusal::Damaged);
+    }
+    let (header, data) = file.split_at(HEADER_BYTES);
+    if word(header, 8) != Some(FORMAT) {
+        return Err(Refusal::OtherFormat);
+    }
+    let (covered, sum) = header.split_at(CHECKSUM_AT);
+    if covered[32..] != (data.len() as u64).to_le_bytes() || *sum != checksum(&[covered, data]).to_le_bytes()
+    {
+        return Err(Refusal::Damaged);
+    }
+    if word(header, 12) != Some(owner.driver_version) || header[16..32] != owner.driver_uuid {
+        return Err(Refusal::OtherDriver);
+    }
+    check_vulkan_header(owner, data)?;
+    Ok(data)
+}
+
+/// Fails unless the driver would take the data. It has to ignore foreign data by itself; not every driver does.
+fn check_vulkan_header(owner: &CacheOwner, data: &[u8]) -> Result<(), Refusal> {
+    let Some(header) = data.get(..VULKAN_HEADER_BYTES) else { return Err(Refusal::Damaged) };
+    let length = word(header, 0).map_or(0, |length| length as usize);
+    if length < VULKAN_HEADER_BYTES || length > data.len() || word(header, 4) != Some(VULKAN_HEADER_VERSION) {
+        return Err(Refusal::Damaged);
+    }
+    let same = word(header, 8) == Some(owner.vendor)
+        && word(header, 12) == Some(owner.device)
+        && header[16..32] == owner.cache_uuid;
+    if same { Ok(()) } else { Err(Refusal::OtherDevice) }
+}
+
+fn word(bytes: &[u8], at: usize) -> Option<u32> {
+    let word = bytes.get(at..at + 4)?;
+    Some(u32::from_le_bytes(word.try_into().ok()?))
+}
+
+/// FNV-1a with 64 bits: tells damage, not malice.
+pub(crate) fn checksum(parts: &[&[u8]]) -> u64 {
+    const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+    const PRIME: u64 = 0x0000_0100_0000_01b3;
+    let bytes = parts.iter().copied().flatten();
+    bytes.fold(BASIS, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(PRIME))
+}
+
+/// Reads a file; of one that is too large to be a cache only the start, which is then refused as cut off.
+pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(MOST_BYTES).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+/// Replaces a file at once: whoever reads it, or starts after a crash, finds the old bytes or the new ones.
+pub(crate) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let temporary = temporary_name(path)?;
+    let written = write(&temporary, bytes).and_then(|()| std::fs::rename(&temporary, path));
+    if written.is_err() {
+        // What failed first is reported; a leftover is harmless.
+        let _ = std::fs::remove_file(&temporary);
+    }
+    written
+}
+
+fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    let mut file = File::create_new(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
+/// A name in the same folder that no other context uses.
+fn temporary_name(path: &Path) -> io::Result<PathBuf> {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let Some(name) = path.file_name() else {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"));
+    };
+    let mut name = name.to_owned();
+    name.push(format!(".{}-{}.tmp", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed)));
+    Ok(path.with_file_name(name))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const OWNER: CacheOwner = CacheOwner {
+        vendor: 0x10de,
+        device: 0x2684,
+        driver_version: 99,
+        driver_uuid: [7; 16],
+        cache_uuid: [9; 16],
+    };
+
+    /// What a driver of `owner` would give, with `body` behind its header.
+    fn data_of(owner: &CacheOwner, body: &[u8]) -> Vec<u8> {
+        let words = [32, VULKAN_HEADER_VERSION, owner.vendor, owner.device];
+        let header = words.iter().flat_map(|word| word.to_le_bytes()).chain(owner.cache_uuid);
+        header.chain(body.iter().copied()).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn what_was_sealed_is_found_again(body in prop::collection::vec(any::<u8>(), 0..300)) {
+            let data = data_of(&OWNER, &body);
+            let file = seal(&OWNER, &data);
+            prop_assert_eq!(unseal(&OWNER, &file), Ok(&data[..]));
+        }
+
+        #[test]
+        fn every_change_of_a_bit_is_seen(
+            body in prop::collection::vec(any::<u8>(), 0..100), at in any::<prop::sample::Index>(), bit in 0..8_u32
+        ) {
+            let mut file = seal(&OWNER, &data_of(&OWNER, &body));
+            let at = at.index(file.len());
+            file[at] ^= 1 << bit;
+            prop_assert!(unseal(&OWNER, &file).is_err());
+        }
+
+        #[test]
+        fn cut_off_and_lengthened_files_are_seen(
+            body in prop::collection::vec(any::<u8>(), 0..100),
+            more in prop::collection::vec(any::<u8>(), 1..50), cut in any::<prop::sample::Index>()
+        ) {
+            let file = seal(&OWNER, &data_of(&OWNER, &body));
+            prop_assert!(unseal(&OWNER, &file[..cut.index(file.len())]).is_err());
+            let longer = [&file[..], &more].concat();
+            prop_assert_eq!(unseal(&OWNER, &longer), Err(Refusal::Damaged));
+        }
+
+        #[test]
+        fn random_bytes_are_refused(mut bytes in prop::collection::vec(any::<u8>(), 0..200), named in any::<bool>()) {
+            if named {
+                bytes.splice(0..0, [&MAGIC[..], &FORMAT.to_le_bytes()].concat());
+            }
+            prop_assert!(unseal(&OWNER, &bytes).is_err());
+        }
+
+        #[test]
+        fn random_data_of_the_driver_is_refused(data in prop::collection::vec(any::<u8>(), 0..100)) {
+            prop_assert!(unseal(&OWNER, &seal(&OWNER, &data)).is_err());
+        }
+    }
+
+    #[test]
+    fn another_device_or_driver_is_named() {
+        let file = seal(&OWNER, &data_of(&OWNER, &[1; 40]));
+        let others = [
+            (CacheOwner { vendor: 1, ..OWNER }, Refusal::OtherDevice),
+            (CacheOwner { device: 1, ..OWNER }, Refusal::OtherDevice),
+            (CacheOwner { cache_uuid: [1; 16], ..OWNER }, Refusal::OtherDevice),
+            (CacheOwner { driver_version: 1, ..OWNER }, Refusal::OtherDriver),
+            (CacheOwner { driver_uuid: [1; 16], ..OWNER }, Refusal::OtherDriver),
+        ];
+        for (owner, refusal) in others {
+            assert_eq!(unseal(&owner, &file), Err(refusal), "{owner:?}");
+        }
+        assert_eq!(unseal(&OWNER, b"\x7fELF and so on"), Err(Refusal::NoCache));
+        let mut newer = file;
+        newer[8] = 2;
+        assert_eq!(unseal(&OWNER, &newer), Err(Refusal::OtherFormat));
+    }
+
+    #[test]
+    fn a_header_that_is_longer_than_the_data_is_damage() {
+        for length in [0_u32, 31, 73, u32::MAX] {
+            let mut data = data_of(&OWNER, &[1; 40]);
+            data[..4].copy_from_slice(&length.to_le_bytes());
+            assert_eq!(unseal(&OWNER, &seal(&OWNER, &data)), Err(Refusal::Damaged));
+        }
+    }
+}

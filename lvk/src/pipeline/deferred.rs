@@ -1,0 +1,196 @@
+//! Compiles a ray tracing pipeline on all cores, by a deferred host operation of Vulkan.
+
+use std::num::NonZero;
+use std::thread;
+
+use ash::khr::deferred_host_operations::Device;
+use ash::vk;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+
+/// Creates the pipeline (`vkCreateRayTracingPipelinesKHR`), with as many threads as the driver and the machine have
+/// use for.
+///
+/// # Safety
+/// `info` is valid for the device, and `cache` is a cache of it or null.
+pub(crate) unsafe fn compile(
+    gpu: &Gpu,
+    cache: vk::PipelineCache,
+    info: &vk::RayTracingPipelineCreateInfoKHR<'_>,
+) -> Result<vk::Pipeline> {
+    let ext = gpu.ray_tracing()?;
+    let operation = Operation::new(gpu)?;
+    let create = ext.fp().create_ray_tracing_pipelines_khr;
+    let mut raw = vk::Pipeline::null();
+    // SAFETY: the caller vouches for the description. It and `raw` stay where they are until the driver is done with
+    // them, since `finish` returns no sooner.
+    let started =
+        unsafe { create(ext.device(), operation.raw, cache, 1, info, std::ptr::null(), &raw mut raw) };
+    let result = match started {
+        vk::Result::OPERATION_DEFERRED_KHR => operation.finish(),
+        vk::Result::OPERATION_NOT_DEFERRED_KHR => vk::Result::SUCCESS,
+        result => result,
+    };
+    result.result().map_err(Error::vulkan("vkCreateRayTracingPipelinesKHR"))?;
+    Ok(raw)
+}
+
+/// A deferred operation, destroyed on drop. What was deferred to it must be finished by then.
+struct Operation {
+    raw: vk::DeferredOperationKHR,
+    ext: Device,
+}
+
+impl Operation {
+    fn new(gpu: &Gpu) -> Result<Self> {
+        let ext = Device::new(&gpu.instance.raw, &gpu.device);
+        // SAFETY: the extension is on wherever ray tracing is.
+        let raw = unsafe { ext.create_deferred_operation(None) }
+            .map_err(Error::vulkan("vkCreateDeferredOperationKHR"))?;
+        Ok(Self { raw, ext })
+    }
+
+    /// Does the work that was deferred, and answers what came of it.
+    fn finish(&self) -> vk::Result {
+        // SAFETY: the operation is alive until `self` is dropped.
+        let useful = unsafe { self.ext.get_deferred_operation_max_concurrency(self.raw) };
+        let cores = thread::available_parallelism().map_or(1, NonZero::get);
+        let join = || {
+            // SAFETY: as above; any number of threads may join.
+            code(unsafe { self.ext.deferred_operation_join(self.raw) })
+        };
+        let result = || {
+            // SAFETY: as above.
+            code(unsafe { self.ext.get_deferred_operation_result(self.raw) })
+        };
+        complete(cores.min(useful as usize), &join, &result)
+    }
+}
+
+impl Drop for Operation {
+    fn drop(&mut self) {
+        // SAFETY: nothing was deferred, or `finish` has seen its end.
+        unsafe { self.ext.destroy_deferred_operation(self.raw, None) };
+    }
+}
+
+fn code(outcome: Result<(), vk::Result>) -> vk::Result {
+    outcome.err().unwrap_or(vk::Result::SUCCESS)
+}
+
+/// Joins an operation from `threads` threads, this one among them, until `result` answers something final.
+///
+/// A thread that cannot be started is done without. A join that fails, for lack of memory, is tried again: the driver
+/// still holds what the operation was given, so there is no way back before its end.
+fn complete(
+    threads: usize,
+    join: &(impl Fn() -> vk::Result + Sync),
+    result: &impl Fn() -> vk::Result,
+) -> vk::Result {
+    thread::scope(|scope| {
+        for _ in 1..threads {
+            let worker = thread::Builder::new().name("lvk compile".to_owned());
+            if worker.spawn_scoped(scope, || work(join)).is_err() {
+                break;
+            }
+        }
+        work(join);
+    });
+    loop {
+        match result() {
+            vk::Result::NOT_READY => work(join),
+            result => return result,
+        }
+        thread::yield_now();
+    }
+}
+
+/// Works on an operation until nothing is left for this thread.
+fn work(join: &impl Fn() -> vk::Result) {
+    while join() == vk::Result::THREAD_IDLE_KHR {
+        thread::yield_now();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+    use std::sync::Mutex;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::thread::ThreadId;
+
+    use super::*;
+
+    /// A driver with `left` pieces of work, which hands out one for each join.
+    struct Driver {
+        left: AtomicUsize,
+        done: AtomicUsize,
+        all: usize,
+        workers: Mutex<HashSet<ThreadId>>,
+        outcome: vk::Result,
+        /// Joins that fail before the first one works.
+        failures: AtomicUsize,
+    }
+
+    impl Driver {
+        fn new(all: usize, outcome: vk::Result) -> Self {
+            Self {
+                left: all.into(),
+                done: 0.into(),
+                all,
+                workers: Mutex::default(),
+                outcome,
+                failures: 0.into(),
+            }
+        }
+
+        fn join(&self) -> vk::Result {
+            let fewer = |count: usize| count.checked_sub(1);
+            if self.failures.fetch_update(Ordering::SeqCst, Ordering::SeqCst, fewer).is_ok() {
+                return vk::Result::ERROR_OUT_OF_HOST_MEMORY;
+            }
+            self.workers.lock().unwrap().insert(thread::current().id());
+            let claimed = self.left.fetch_update(Ordering::SeqCst, Ordering::SeqCst, fewer);
+            if claimed.is_err() {
+                let complete = self.done.load(Ordering::SeqCst) == self.all;
+                return if complete { vk::Result::SUCCESS } else { vk::Result::THREAD_DONE_KHR };
+            }
+            self.done.fetch_add(1, Ordering::SeqCst);
+            vk::Result::THREAD_IDLE_KHR
+        }
+
+        fn result(&self) -> vk::Result {
+            if self.done.load(Ordering::SeqCst) < self.all { vk::Result::NOT_READY } else { self.outcome }
+        }
+
+        fn run(&self, threads: usize) -> vk::Result {
+            complete(threads, &|| self.join(), &|| self.result())
+        }
+    }
+
+    #[test]
+    fn all_work_is_done_whatever_the_number_of_threads() {
+        for threads in 0..6 {
+            let driver = Driver::new(50, vk::Result::SUCCESS);
+            assert_eq!(driver.run(threads), vk::Result::SUCCESS);
+            assert_eq!(driver.done.load(Ordering::SeqCst), 50);
+            assert_eq!(driver.workers.lock().unwrap().len(), threads.max(1));
+        }
+    }
+
+    #[test]
+    fn the_outcome_is_the_operations_own() {
+        let lost = vk::Result::ERROR_DEVICE_LOST;
+        assert_eq!(Driver::new(3, lost).run(2), lost);
+        assert_eq!(Driver::new(0, vk::Result::SUCCESS).run(4), vk::Result::SUCCESS);
+    }
+
+    #[test]
+    fn failed_joins_end_only_with_the_operation() {
+        let mut driver = Driver::new(5, vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+        driver.failures = 20.into();
+        assert_eq!(driver.run(3), vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+        assert_eq!(driver.done.load(Ordering::SeqCst), 5);
+    }
+}

@@ -1,0 +1,165 @@
+//! The shader groups of a pipeline or library, and the modules they are made of.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::ray_tracing::{HitGroup, RayTracingPipelineDesc};
+use super::shader_module::ShaderModule;
+use super::table_order::PerRegion;
+use crate::error::{Error, Result};
+use crate::handle::ShaderModuleHandle;
+use crate::shader::ShaderStage;
+
+/// Finds the module of a handle.
+pub(crate) type Find<'a> = &'a dyn Fn(ShaderModuleHandle) -> Result<Arc<ShaderModule>>;
+
+/// What a pipeline needs to know of shader groups once they are compiled, its own or a library's.
+#[derive(Debug, Default)]
+pub(crate) struct GroupList {
+    /// The user's bytes of each group.
+    pub(crate) records: PerRegion<Vec<Box<[u8]>>>,
+    /// Every shader of every group, with the group's number.
+    pub(crate) shaders: Vec<(u32, ShaderStage)>,
+    pub(crate) push_constant_bytes: u32,
+}
+
+impl GroupList {
+    /// Number of groups of each region.
+    pub(crate) fn counts(&self) -> PerRegion<usize> {
+        self.records.as_ref().map(Vec::len)
+    }
+
+    /// Number of groups.
+    pub(crate) fn len(&self) -> usize {
+        self.counts().into_array().into_iter().sum()
+    }
+}
+
+/// Shader groups about to be compiled.
+#[derive(Default)]
+pub(crate) struct Groups {
+    /// Each module once.
+    pub(crate) modules: Vec<Arc<ShaderModule>>,
+    pub(crate) infos: Vec<vk::RayTracingShaderGroupCreateInfoKHR<'static>>,
+    pub(crate) list: GroupList,
+    places: HashMap<ShaderModuleHandle, u32>,
+}
+
+impl Groups {
+    /// Groups in the order of a table: ray generation, miss, hit, callable.
+    pub(crate) fn collect(desc: &RayTracingPipelineDesc<'_>, find: Find<'_>) -> Result<Self> {
+        let mut groups = Self::default();
+        for handle in desc.ray_gen {
+            groups.general(*handle, ShaderStage::RayGen, find)?;
+        }
+        for handle in desc.miss {
+            groups.general(*handle, ShaderStage::Miss, find)?;
+        }
+        for group in desc.hit_groups {
+            groups.hit_group(group, find)?;
+        }
+        for handle in desc.callable {
+            groups.general(*handle, ShaderStage::Callable, find)?;
+        }
+        let bytes = groups.modules.iter().map(|module| module.reflection.push_constant_bytes);
+        groups.list.push_constant_bytes = bytes.max().unwrap_or(0);
+        groups.list.records = records(desc)?;
+        Ok(groups)
+    }
+
+    /// Fails if a payload or hit attributes are larger than the description says.
+    pub(crate) fn check_sizes(&self, desc: &RayTracingPipelineDesc<'_>) -> Result<()> {
+        for module in &self.modules {
+            let sizes = module.reflection.ray_interface;
+            let checked = [
+                ("payload", sizes.payload_bytes, "max_payload_bytes", desc.max_payload_bytes),
+                (
+                    "hit attributes",
+                    sizes.hit_attribute_bytes,
+                    "max_hit_attribute_bytes",
+                    desc.max_hit_attribute_bytes,
+                ),
+            ];
+            if let Some((what, bytes, field, most)) = checked.iter().find(|(_, bytes, _, most)| bytes > most)
+            {
+                let message = format!(
+                    "the {what} of shader '{}' has {bytes} bytes, more than {field}, which is {most}",
+                    module.name
+                );
+                return Err(Error::usage(desc.debug_name, message));
+            }
+        }
+        Ok(())
+    }
+
+    fn general(&mut self, handle: ShaderModuleHandle, stage: ShaderStage, find: Find<'_>) -> Result<()> {
+        let place = self.place(Some(handle), stage, find)?;
+        self.infos.push(group(vk::RayTracingShaderGroupTypeKHR::GENERAL).general_shader(place));
+        Ok(())
+    }
+
+    fn hit_group(&mut self, desc: &HitGroup<'_>, find: Find<'_>) -> Result<()> {
+        let kind = match desc.intersection {
+            Some(_) => vk::RayTracingShaderGroupTypeKHR::PROCEDURAL_HIT_GROUP,
+            None => vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP,
+        };
+        let hit = group(kind)
+            .closest_hit_shader(self.place(desc.closest_hit, ShaderStage::ClosestHit, find)?)
+            .any_hit_shader(self.place(desc.any_hit, ShaderStage::AnyHit, find)?)
+            .intersection_shader(self.place(desc.intersection, ShaderStage::Intersection, find)?);
+        self.infos.push(hit);
+        Ok(())
+    }
+
+    /// The place among the stages of a module of the group at hand; the same module takes one place.
+    fn place(
+        &mut self,
+        handle: Option<ShaderModuleHandle>,
+        stage: ShaderStage,
+        find: Find<'_>,
+    ) -> Result<u32> {
+        let Some(handle) = handle else { return Ok(vk::SHADER_UNUSED_KHR) };
+        let module = find(handle)?;
+        module.check_stage(stage)?;
+        self.list.shaders.push((self.infos.len() as u32, stage));
+        let next = self.modules.len() as u32;
+        let place = *self.places.entry(handle).or_insert(next);
+        if place == next {
+            self.modules.push(module);
+        }
+        Ok(place)
+    }
+}
+
+fn group(kind: vk::RayTracingShaderGroupTypeKHR) -> vk::RayTracingShaderGroupCreateInfoKHR<'static> {
+    vk::RayTracingShaderGroupCreateInfoKHR::default()
+        .ty(kind)
+        .general_shader(vk::SHADER_UNUSED_KHR)
+        .closest_hit_shader(vk::SHADER_UNUSED_KHR)
+        .any_hit_shader(vk::SHADER_UNUSED_KHR)
+        .intersection_shader(vk::SHADER_UNUSED_KHR)
+}
+
+fn records(desc: &RayTracingPipelineDesc<'_>) -> Result<PerRegion<Vec<Box<[u8]>>>> {
+    let name = desc.debug_name;
+    Ok(PerRegion {
+        ray_gen: padded(name, "ray generation", desc.ray_gen.len(), desc.ray_gen_records)?,
+        miss: padded(name, "miss", desc.miss.len(), desc.miss_records)?,
+        hit: desc.hit_groups.iter().map(|group| group.record.into()).collect(),
+        callable: padded(name, "callable", desc.callable.len(), desc.callable_records)?,
+    })
+}
+
+/// One record for each shader: those that are left out are empty.
+fn padded(pipeline: &str, kind: &str, shaders: usize, records: &[&[u8]]) -> Result<Vec<Box<[u8]>>> {
+    if records.len() > shaders {
+        let message =
+            format!("{} records for {shaders} {kind} shaders; give each at most one", records.len());
+        return Err(Error::usage(pipeline, message));
+    }
+    let mut all: Vec<Box<[u8]>> = records.iter().map(|record| (*record).into()).collect();
+    all.resize_with(shaders, Box::default);
+    Ok(all)
+}

@@ -1,0 +1,176 @@
+//! Libraries of compiled ray tracing shaders, from which pipelines are linked.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::groups::{Find, GroupList, Groups};
+use super::layout::PipelineBase;
+use super::ray_tracing::{HitGroup, RayTracingPipelineDesc, check_interface, compile_groups};
+use super::shader_module::ShaderModule;
+use super::stage::SpecializationConstant;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::handle::ShaderModuleHandle;
+use crate::shader::ShaderStage;
+
+/// Describes a library: shader groups that are compiled once and linked into any number of pipelines by
+/// [`RayTracingPipelineDesc::libraries`]. At least one shader or hit group.
+///
+/// `max_recursion`, `max_payload_bytes` and `max_hit_attribute_bytes` must be those of the pipelines.
+#[derive(Debug, Clone, Copy)]
+pub struct RayTracingLibraryDesc<'a> {
+    /// Ray generation shaders.
+    pub ray_gen: &'a [ShaderModuleHandle],
+    /// Miss shaders.
+    pub miss: &'a [ShaderModuleHandle],
+    /// Hit groups.
+    pub hit_groups: &'a [HitGroup<'a>],
+    /// Callable shaders.
+    pub callable: &'a [ShaderModuleHandle],
+    /// As [`RayTracingPipelineDesc::ray_gen_records`].
+    pub ray_gen_records: &'a [&'a [u8]],
+    /// As [`RayTracingPipelineDesc::miss_records`].
+    pub miss_records: &'a [&'a [u8]],
+    /// As [`RayTracingPipelineDesc::callable_records`].
+    pub callable_records: &'a [&'a [u8]],
+    /// As [`RayTracingPipelineDesc::max_recursion`].
+    pub max_recursion: u32,
+    /// As [`RayTracingPipelineDesc::max_payload_bytes`].
+    pub max_payload_bytes: u32,
+    /// As [`RayTracingPipelineDesc::max_hit_attribute_bytes`].
+    pub max_hit_attribute_bytes: u32,
+    /// Values of specialization constants.
+    pub specialization: &'a [SpecializationConstant],
+    /// Name in error messages, validation messages and debuggers.
+    pub debug_name: &'a str,
+}
+
+impl Default for RayTracingLibraryDesc<'_> {
+    fn default() -> Self {
+        let pipeline = RayTracingPipelineDesc::default();
+        Self {
+            ray_gen: &[],
+            miss: &[],
+            hit_groups: &[],
+            callable: &[],
+            ray_gen_records: &[],
+            miss_records: &[],
+            callable_records: &[],
+            max_recursion: pipeline.max_recursion,
+            max_payload_bytes: pipeline.max_payload_bytes,
+            max_hit_attribute_bytes: pipeline.max_hit_attribute_bytes,
+            specialization: &[],
+            debug_name: "ray tracing library",
+        }
+    }
+}
+
+impl<'a> RayTracingLibraryDesc<'a> {
+    /// The pipeline with these shaders.
+    fn as_pipeline(&self) -> RayTracingPipelineDesc<'a> {
+        RayTracingPipelineDesc {
+            ray_gen: self.ray_gen,
+            miss: self.miss,
+            hit_groups: self.hit_groups,
+            callable: self.callable,
+            ray_gen_records: self.ray_gen_records,
+            miss_records: self.miss_records,
+            callable_records: self.callable_records,
+            max_recursion: self.max_recursion,
+            max_payload_bytes: self.max_payload_bytes,
+            max_hit_attribute_bytes: self.max_hit_attribute_bytes,
+            specialization: self.specialization,
+            debug_name: self.debug_name,
+            ..Default::default()
+        }
+    }
+}
+
+/// A library, destroyed on drop.
+pub(crate) struct RayTracingLibrary {
+    pub(crate) raw: vk::Pipeline,
+    pub(crate) groups: GroupList,
+    /// One of its ray generation shaders.
+    pub(super) ray_gen: Option<Arc<ShaderModule>>,
+    pub(crate) name: Arc<str>,
+    interface: Interface,
+    gpu: Arc<Gpu>,
+}
+
+/// What libraries and the pipelines linked from them must have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Interface {
+    recursion: u32,
+    payload_bytes: u32,
+    hit_attribute_bytes: u32,
+}
+
+impl Interface {
+    fn of(desc: &RayTracingPipelineDesc<'_>) -> Self {
+        Self {
+            recursion: desc.max_recursion,
+            payload_bytes: desc.max_payload_bytes,
+            hit_attribute_bytes: desc.max_hit_attribute_bytes,
+        }
+    }
+
+    /// The first difference to the interface of a pipeline: the field, the pipeline's value and this one's.
+    fn difference(&self, pipeline: &Self) -> Option<(&'static str, u32, u32)> {
+        let fields = [
+            ("max_recursion", pipeline.recursion, self.recursion),
+            ("max_payload_bytes", pipeline.payload_bytes, self.payload_bytes),
+            ("max_hit_attribute_bytes", pipeline.hit_attribute_bytes, self.hit_attribute_bytes),
+        ];
+        fields.into_iter().find(|(_, wanted, own)| wanted != own)
+    }
+}
+
+impl RayTracingLibrary {
+    pub(crate) fn new(
+        gpu: &Arc<Gpu>,
+        base: PipelineBase,
+        desc: &RayTracingLibraryDesc<'_>,
+        find: Find<'_>,
+    ) -> Result<Self> {
+        let name = desc.debug_name;
+        gpu.ray_tracing()?;
+        if !gpu.caps.pipeline_libraries {
+            return Err(gpu.lacks(&format!("ray tracing library '{name}': pipeline libraries")));
+        }
+        let desc = &desc.as_pipeline();
+        check_interface(gpu, desc)?;
+        let groups = Groups::collect(desc, find)?;
+        if groups.infos.is_empty() {
+            return Err(Error::usage(name, "a library needs at least one shader or hit group"));
+        }
+        let raw = compile_groups(gpu, base, desc, &groups, &[], vk::PipelineCreateFlags::LIBRARY_KHR)?;
+        gpu.name(raw, name);
+        let ray_gen = groups.modules.iter().find(|module| module.stage == ShaderStage::RayGen).cloned();
+        Ok(Self {
+            raw,
+            groups: groups.list,
+            ray_gen,
+            name: name.into(),
+            interface: Interface::of(desc),
+            gpu: Arc::clone(gpu),
+        })
+    }
+
+    /// Fails unless the pipeline agrees with the library.
+    pub(crate) fn check(&self, pipeline: &RayTracingPipelineDesc<'_>) -> Result<()> {
+        let Some((field, wanted, own)) = self.interface.difference(&Interface::of(pipeline)) else {
+            return Ok(());
+        };
+        let message =
+            format!("{field} is {wanted}, but {own} in the library '{}'; make them equal", self.name);
+        Err(Error::usage(pipeline.debug_name, message))
+    }
+}
+
+impl Drop for RayTracingLibrary {
+    fn drop(&mut self) {
+        // SAFETY: pipelines linked from the library hold it.
+        unsafe { self.gpu.device.destroy_pipeline(self.raw, None) };
+    }
+}
