@@ -1,5 +1,7 @@
 //! The one error type of the library.
 
+use std::path::PathBuf;
+
 use ash::vk;
 
 /// Result of every fallible call of the library.
@@ -8,11 +10,11 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 /// What went wrong, separated by who can mend it.
 ///
 /// * the caller: [`StaleHandle`](Error::StaleHandle), [`InvalidUsage`](Error::InvalidUsage),
-///   [`Shader`](Error::Shader), [`PushConstants`](Error::PushConstants);
+///   [`Shader`](Error::Shader), [`PushConstants`](Error::PushConstants), [`Serialized`](Error::Serialized);
 /// * the device or its driver lacks something: [`NoVulkan`](Error::NoVulkan), [`NoDevice`](Error::NoDevice),
 ///   [`Unsupported`](Error::Unsupported), [`LimitExceeded`](Error::LimitExceeded);
 /// * bad luck: [`OutOfDeviceMemory`](Error::OutOfDeviceMemory), [`OutOfHostMemory`](Error::OutOfHostMemory),
-///   [`DeviceLost`](Error::DeviceLost), [`Vulkan`](Error::Vulkan).
+///   [`File`](Error::File),   [`DeviceLost`](Error::DeviceLost), [`Vulkan`](Error::Vulkan).
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -84,6 +86,22 @@ pub enum Error {
         name: String,
         /// The compiler's text, with the line numbers of the caller's own source.
         log: String,
+    },
+    /// A file could not be written.
+    #[error("file '{}': {message}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What failed and why.
+        message: String,
+    },
+    /// Serialised bytes of an acceleration structure cannot be used.
+    #[error("{object}: {reason}; build it anew and serialise that")]
+    Serialized {
+        /// Debug name of the structure that was to be.
+        object: String,
+        /// Whether they are damaged, of another mesh, or of another device or driver.
+        reason: String,
     },
     /// Device memory is exhausted.
     #[error("out of device memory while creating '{object}' ({bytes} bytes)")]

@@ -58,6 +58,8 @@ handles! {
     ComputePipelineHandle, "compute pipeline";
     /// Names a ray tracing pipeline with its shader binding table.
     RayTracingPipelineHandle, "ray tracing pipeline";
+    /// Names a library of compiled ray tracing shaders.
+    RayTracingLibraryHandle, "ray tracing library";
     /// Names a pool of timestamp queries.
     QueryPoolHandle, "query pool";
     /// Names a bottom- or top-level acceleration structure.

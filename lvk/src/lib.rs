@@ -44,8 +44,11 @@
 //! | move data | [`Context::upload_buffer`], [`Context::download_texture`] and their kin |
 //! | record | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
 //! | draw | [`CommandBuffer::begin_rendering`], [`RenderPass`] |
+//! | draw with task and mesh shaders | [`RenderPipelineDesc::mesh`], [`RenderPass::draw_mesh_tasks`] |
 //! | compute | [`CommandBuffer::dispatch`] |
 //! | trace rays with a pipeline | [`RayTracingPipelineDesc`], [`CommandBuffer::trace_rays`] |
+//! | link compiled shaders into several pipelines | [`RayTracingLibraryDesc`] |
+//! | keep compiled pipelines on disk | [`ContextDesc::pipeline_cache`] |
 //! | trace rays in any shader | [`ShaderModuleDesc`] with `#include <lvk/ray_query.glsl>` |
 //! | build what rays hit | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
 //! | say what a shader reaches | [`Dependencies`] |
@@ -56,12 +59,14 @@
 //!
 //! # Barriers
 //!
-//! The library tracks every buffer and every mip and layer of every texture. Attachments, copies, uploads, builds of
-//! acceleration structures, traces and ray queries in compute shaders need no word from the caller. What a shader
+//! The library tracks every buffer and every mip and layer of every texture. Attachments, copies, uploads, builds and
+//! refits of acceleration structures, traces, and ray queries in any stage need no word from the caller. What a shader
 //! reaches only by number or address is named in [`Dependencies`] when an earlier command *wrote* it, or when this one
 //! writes it; what was only uploaded is readable everywhere. A render pass cannot contain barriers, so what its draws
 //! read and the same command buffer wrote is named in the pass's dependencies; forgetting that is an error for indices,
-//! vertices, indirect arguments and acceleration structures, and a hazard for what shaders reach by number or address.
+//! vertices and indirect arguments, and a hazard for what shaders reach by number or address. Acceleration structures
+//! are the exception: where some graphics pipeline queries rays, a pass waits for the builds recorded before it. Make
+//! such pipelines before their pass begins.
 //!
 //! # What is not checked
 //!
@@ -72,8 +77,8 @@
 //!
 //! # What `lvk` does not do (yet)
 //!
-//! Windows and swapchains, mesh and tessellation pipelines, multisampling, 3D textures, queues beside the main one,
-//! splitting and compaction of acceleration structures, a pipeline cache on disk. `lvk` is no scene graph and no
+//! Windows and swapchains, tessellation pipelines, multisampling, 3D textures, queues beside the main one,
+//! splitting and compaction of acceleration structures. `lvk` is no scene graph and no
 //! renderer.
 //!
 //! # Features
@@ -90,6 +95,7 @@ mod error;
 mod format;
 mod gpu;
 mod handle;
+mod kernel;
 mod pipeline;
 mod resource;
 mod shader;
@@ -101,39 +107,47 @@ mod upload;
 pub use ash;
 pub use glam;
 
-pub use accel::desc::{BlasDesc, TlasDesc};
-pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, Indices, Triangles};
-pub use accel::instance::{InstanceFlags, TlasInstance, transform_rows};
-pub use accel::structure::{AccelStructSizes, BuildFlags, BuildMode};
+pub use accel::culling::InstanceCulling;
+pub use accel::desc::{BlasDesc, PrimitiveOrder, TlasDesc};
+pub use accel::flags::{AccelStructSizes, BuildFlags, BuildMode};
+pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, GeometryTransform, Indices, Triangles};
+pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, transform_rows};
 pub use command::CommandBuffer;
 pub use command::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad};
 pub use command::dependencies::Dependencies;
 pub use command::render::RenderPass;
 pub use command::render_pass::RenderPassDesc;
 pub use context::Context;
+pub use context::accel_info::{AccelMemory, AccelStructInfo, BuildProgress, Compaction};
 pub use context::config::ContextDesc;
 pub use context::destroy::Destroy;
 pub use context::frame::Frame;
 pub use context::holder::Holder;
+pub use context::serialize::LoadedBlas;
 pub use error::{Error, Result};
 pub use format::{Format, IndexFormat, VertexFormat};
 pub use gpu::caps::{Capabilities, FeatureRequest, Limits};
 pub use gpu::debug::{Validation, ValidationMessage, ValidationSink};
 pub use gpu::memory::MemoryKind;
+pub use gpu::mesh_limits::MeshLimits;
+pub use gpu::profile::DeviceProfile;
 pub use handle::{
-    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle,
+    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
 };
 pub use pipeline::compute::ComputePipelineDesc;
-pub use pipeline::graphics::{
+pub use pipeline::graphics_desc::{
     Blend, ColorTarget, CullMode, DepthTest, FrontFace, RenderPipelineDesc, Topology, VertexAttribute,
     VertexBinding,
 };
-pub use pipeline::ray_tracing::{HitGroup, RayTracingPipelineDesc};
+pub use pipeline::library::RayTracingLibraryDesc;
+pub use pipeline::ray_tracing::{HitGroup, RayTracingPipelineDesc, record_bytes};
 pub use pipeline::stage::{SpecializationConstant, SpecializationValue};
 pub use resource::buffer::{BufferDesc, BufferUsage};
 pub use resource::query::QueryPoolDesc;
 pub use resource::sampler::{AddressMode, CompareOp, Filter, SamplerDesc};
 pub use resource::texture::{TextureDesc, TextureKind, TextureRegion, TextureUsage};
+#[cfg(feature = "glsl")]
+pub use shader::compile_glsl;
 pub use shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
 pub use submit::SubmitHandle;

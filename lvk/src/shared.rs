@@ -1,15 +1,24 @@
 //! Everything a context and its command buffers share.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
+use ash::vk;
+
 use crate::accel::AccelStruct;
+use crate::accel::blas::BlasBody;
 use crate::accel::scratch_buffer::ScratchBuffer;
+use crate::accel::storage::AccelStorage;
 use crate::accel::structure::AccelKind;
-use crate::barrier::ResourceId;
+use crate::accel::tlas::TlasContents;
+use crate::barrier::{QueryStages, ResourceId};
 use crate::bindless::Bindless;
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::pipeline::{ComputePipeline, PipelineLayout, RayTracingPipeline, RenderPipeline};
+use crate::kernel::Kernels;
+use crate::pipeline::{
+    ComputePipeline, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline, RenderPipeline,
+};
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::store::Store;
 use crate::submit::Submitter;
@@ -23,14 +32,26 @@ pub(crate) struct Shared {
     pub(crate) staging: Staging,
     pub(crate) scratch: ScratchBuffer,
     pub(crate) scratch_budget_bytes: u64,
+    pub(crate) accel_storage: AccelStorage,
+    pub(crate) kernels: Kernels,
+    /// For each top-level structure where the rows of its instances lie; none without acceleration structures.
+    pub(crate) tlas_table: Option<Arc<Buffer>>,
     pub(crate) layout: PipelineLayout,
+    /// Where the context keeps compiled pipelines in a file.
+    pub(crate) pipeline_cache: Option<PipelineCache>,
     pub(crate) bindless: Bindless,
     pub(crate) submitter: Submitter<Garbage>,
+    /// Where graphics pipelines query rays.
+    pub(crate) graphics_queries: QueryStages,
     /// Stands for every bottom-level structure at once: their builds add to it; builds of top levels, traces and
     /// queries read it.
     pub(crate) all_blas: ResourceId,
     /// Stands for every top-level structure at once: their builds add to it, traces and queries read it.
     pub(crate) all_tlas: ResourceId,
+    /// Stands for the table of top-level structures and all rows.
+    pub(crate) tlas_tables: ResourceId,
+    /// Some top-level structure shows what compaction has replaced.
+    pub(crate) outdated_tlas: AtomicBool,
     pub(crate) gpu: Arc<Gpu>,
 }
 
@@ -51,11 +72,19 @@ pub(crate) enum Garbage {
     RayTracingPipeline(Arc<RayTracingPipeline>),
     QueryPool(#[expect(dead_code, reason = "held only to be dropped")] Arc<QueryPool>),
     AccelStruct(Arc<AccelStruct>),
-    /// A structure some top-level structure referred to; its handle may still be in use.
-    Kept(#[expect(dead_code, reason = "held only to be dropped")] Arc<AccelStruct>),
+    /// What a top-level structure showed; handles of it may still be in use.
+    Contents(Box<TlasContents>),
+    /// What a compacted structure took the place of.
+    Body(#[expect(dead_code, reason = "held only to be dropped")] Arc<BlasBody>),
 }
 
 impl Shared {
+    /// What pipelines are made with.
+    pub(crate) fn pipeline_base(&self) -> PipelineBase {
+        let cache = self.pipeline_cache.as_ref().map_or(vk::PipelineCache::null(), |cache| cache.raw);
+        PipelineBase { layout: self.layout.raw, cache }
+    }
+
     /// Destroys an object later, once no command buffer can use it.
     pub(crate) fn retire(&self, garbage: Garbage) {
         const OFTEN_ENOUGH: usize = 256;
@@ -96,10 +125,11 @@ impl Shared {
             Garbage::Sampler(sampler) => self.bindless.free_sampler(sampler.slot),
             Garbage::AccelStruct(object) => self.dispose_accel_struct(&object),
             Garbage::RayTracingPipeline(pipeline) => self.submitter.forget(pipeline.table.id),
+            Garbage::Contents(contents) => self.forget_source(&contents),
             Garbage::RenderPipeline(_)
             | Garbage::ComputePipeline(_)
             | Garbage::QueryPool(_)
-            | Garbage::Kept(_) => {}
+            | Garbage::Body(_) => {}
         }
     }
 
@@ -118,15 +148,54 @@ impl Shared {
             .drain()
             .iter()
             .for_each(|object| report("ray tracing pipeline", &object.name));
+        store
+            .ray_tracing_libraries
+            .drain()
+            .iter()
+            .for_each(|object| report("ray tracing library", &object.name));
         store.query_pools.drain().iter().for_each(|object| report("query pool", &object.name));
         store.accel_structs.drain().iter().for_each(|object| report("acceleration structure", &object.name));
     }
 
     fn dispose_accel_struct(&self, object: &AccelStruct) {
         self.submitter.forget(object.id);
-        if let AccelKind::Tlas(tlas) = &object.kind {
-            self.bindless.free_tlas(tlas.slot);
+        match &object.kind {
+            AccelKind::Tlas(tlas) => {
+                self.bindless.free_tlas(tlas.slot);
+                tlas.records.get().into_iter().for_each(|buffer| self.submitter.forget(buffer.id));
+            }
+            AccelKind::Blas(blas) => {
+                for map in blas.parts.iter().filter_map(|part| part.map.as_ref()) {
+                    self.submitter.forget(map.table.id);
+                    self.submitter.forget(map.inputs.id);
+                }
+            }
         }
+    }
+
+    /// A source that was kept lies in buffers of the library's own.
+    fn forget_source(&self, contents: &TlasContents) {
+        let Some(source) = &contents.source else { return };
+        let bytes = [Some(&source.instances), source.owners.as_ref()];
+        let buffers = bytes.into_iter().flatten().filter_map(|bytes| bytes.buffer.as_ref());
+        buffers.for_each(|buffer| self.submitter.forget(buffer.id));
+    }
+
+    /// Most scratch memory that builds side by side take, in bytes.
+    pub(crate) fn scratch_budget(&self) -> u64 {
+        let limits = &self.gpu.caps.limits;
+        let largest = limits.max_buffer_bytes.min(limits.max_accel_scratch_bytes);
+        self.scratch_budget_bytes.min(largest.saturating_sub(limits.scratch_alignment.into()))
+    }
+
+    /// Some top-level structure shows what compaction has replaced.
+    pub(crate) fn note_outdated_tlas(&self) {
+        self.outdated_tlas.store(true, Ordering::Release);
+    }
+
+    /// Whether that was noted since this was last asked.
+    pub(crate) fn take_outdated_tlas(&self) -> bool {
+        self.outdated_tlas.load(Ordering::Relaxed) && self.outdated_tlas.swap(false, Ordering::AcqRel)
     }
 }
 

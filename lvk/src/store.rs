@@ -9,10 +9,10 @@ use slotmap::{DefaultKey, Key, KeyData, SlotMap};
 use crate::accel::AccelStruct;
 use crate::error::{Error, Result};
 use crate::handle::{
-    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle,
+    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
 };
-use crate::pipeline::{ComputePipeline, RayTracingPipeline, RenderPipeline, ShaderModule};
+use crate::pipeline::{ComputePipeline, RayTracingLibrary, RayTracingPipeline, RenderPipeline, ShaderModule};
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 
 /// Every object of a context, by handle.
@@ -26,6 +26,7 @@ pub(crate) struct Store {
     pub(crate) render_pipelines: Pool<RenderPipelineHandle, RenderPipeline>,
     pub(crate) compute_pipelines: Pool<ComputePipelineHandle, ComputePipeline>,
     pub(crate) ray_tracing_pipelines: Pool<RayTracingPipelineHandle, RayTracingPipeline>,
+    pub(crate) ray_tracing_libraries: Pool<RayTracingLibraryHandle, RayTracingLibrary>,
     pub(crate) query_pools: Pool<QueryPoolHandle, QueryPool>,
     pub(crate) accel_structs: Pool<AccelStructHandle, AccelStruct>,
 }
@@ -42,6 +43,7 @@ impl Store {
             render_pipelines: Pool::new(mask),
             compute_pipelines: Pool::new(mask),
             ray_tracing_pipelines: Pool::new(mask),
+            ray_tracing_libraries: Pool::new(mask),
             query_pools: Pool::new(mask),
             accel_structs: Pool::new(mask),
         }
@@ -75,6 +77,12 @@ impl<H: Handle, T> Pool<H, T> {
     pub(crate) fn remove(&self, handle: H) -> Result<Arc<T>> {
         let mut objects = self.objects.write().unwrap_or_else(PoisonError::into_inner);
         objects.remove(self.key(handle)).ok_or(Error::StaleHandle { kind: H::KIND })
+    }
+
+    /// Everything there is.
+    pub(crate) fn all(&self) -> Vec<Arc<T>> {
+        let objects = self.objects.read().unwrap_or_else(PoisonError::into_inner);
+        objects.values().cloned().collect()
     }
 
     /// Takes everything out.

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::blas::PartShape;
+use super::flags::{AccelStructSizes, BuildFlags};
 use super::geometry::{BlasGeometry, Converted, address, check_list};
 use super::instance::INSTANCE_BYTES;
-use super::structure::{AccelStruct, AccelStructSizes, BuildFlags, BuildMode};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::handle::BufferHandle;
@@ -21,8 +22,8 @@ pub(crate) struct BuildInput {
 }
 
 impl BuildInput {
-    /// Checks and converts the geometries of a bottom-level structure. `transforms` is the address of their matrices,
-    /// 48 bytes for each geometry, or 0 while only sizes are asked.
+    /// Checks and converts the geometries of a bottom-level structure. `transforms` is the address of the matrices
+    /// that are given by value, 48 bytes for each geometry, or `None` where there are none.
     pub(crate) fn blas(
         gpu: &Gpu,
         name: &str,
@@ -34,13 +35,37 @@ impl BuildInput {
         check_list(name, geometries, &gpu.caps.limits)?;
         let mut converted = Vec::with_capacity(geometries.len());
         for (index, geometry) in geometries.iter().enumerate() {
-            let matrix = match (geometry.transform(), transforms) {
+            let matrix = match (geometry.transform_rows(), transforms) {
                 (Some(_), Some(start)) => start + index as u64 * TRANSFORM_BYTES,
                 _ => 0,
             };
             converted.push(geometry.convert(gpu, name, find, matrix)?);
         }
         Ok(Self::new(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, flags, &converted))
+    }
+
+    /// The same for one part of the mesh: its own primitives, from the inputs gathered for it.
+    pub(crate) fn into_part(mut self, part: &PartShape) -> Self {
+        let Some(map) = &part.map else { return self };
+        for (index, geometry) in self.geometries.iter_mut().enumerate() {
+            gather_inputs(geometry, map.input_address(index));
+        }
+        self.set_counts(&part.counts);
+        self
+    }
+
+    /// As [`into_part`](Self::into_part) for a part that is only planned: good for size queries.
+    pub(crate) fn gathered(mut self) -> Self {
+        const NO_ADDRESS: u64 = 0;
+        self.geometries.iter_mut().for_each(|geometry| gather_inputs(geometry, NO_ADDRESS));
+        self
+    }
+
+    /// Sets the number of primitives of each geometry.
+    pub(crate) fn set_counts(&mut self, counts: &[u32]) {
+        for (range, count) in self.ranges.iter_mut().zip(counts) {
+            range.primitive_count = *count;
+        }
     }
 
     /// The input of a top-level structure: `count` instances at `instances`, an address that is a multiple of 16.
@@ -75,40 +100,40 @@ impl BuildInput {
         unsafe {
             gpu.accel()?.get_acceleration_structure_build_sizes(
                 vk::AccelerationStructureBuildTypeKHR::DEVICE,
-                &self.info(BuildMode::Rebuild),
+                &self.info(false),
                 &counts,
                 &mut sizes,
             );
         }
         let updates = self.flags.contains(BuildFlags::ALLOW_UPDATE);
-        Ok(AccelStructSizes {
+        let sizes = AccelStructSizes {
             structure_bytes: sizes.acceleration_structure_size,
             build_scratch_bytes: sizes.build_scratch_size,
             update_scratch_bytes: if updates { sizes.update_scratch_size } else { 0 },
-        })
+        };
+        let bottom = self.ty == vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
+        let primitives = counts.iter().map(|count| u64::from(*count)).sum();
+        Ok(if bottom { gpu.profile.build_sizes(sizes, primitives) } else { sizes })
     }
 
     /// The build of `target` with scratch memory at this address.
     pub(crate) fn build(
         &self,
-        target: &AccelStruct,
-        mode: BuildMode,
+        target: vk::AccelerationStructureKHR,
+        refit: bool,
         scratch: u64,
     ) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
         let info = self
-            .info(mode)
-            .dst_acceleration_structure(target.raw)
+            .info(refit)
+            .dst_acceleration_structure(target)
             .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch });
-        match mode {
-            BuildMode::Rebuild => info,
-            BuildMode::Refit => info.src_acceleration_structure(target.raw),
-        }
+        if refit { info.src_acceleration_structure(target) } else { info }
     }
 
-    fn info(&self, mode: BuildMode) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
-        let mode = match mode {
-            BuildMode::Rebuild => vk::BuildAccelerationStructureModeKHR::BUILD,
-            BuildMode::Refit => vk::BuildAccelerationStructureModeKHR::UPDATE,
+    fn info(&self, refit: bool) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
+        let mode = match refit {
+            false => vk::BuildAccelerationStructureModeKHR::BUILD,
+            true => vk::BuildAccelerationStructureModeKHR::UPDATE,
         };
         vk::AccelerationStructureBuildGeometryInfoKHR::default()
             .ty(self.ty)
@@ -118,14 +143,35 @@ impl BuildInput {
     }
 }
 
+/// Makes a geometry read its indices, or its boxes, from where they were gathered.
+fn gather_inputs(geometry: &mut vk::AccelerationStructureGeometryKHR<'_>, inputs: u64) {
+    const BOX_BYTES: u64 = 24;
+    match geometry.geometry_type {
+        vk::GeometryTypeKHR::TRIANGLES => {
+            // SAFETY: the type says which field of the union is in use.
+            let triangles = unsafe { &mut geometry.geometry.triangles };
+            triangles.index_type = vk::IndexType::UINT32;
+            triangles.index_data = address(inputs);
+        }
+        _ => {
+            // SAFETY: as above; bottom levels hold triangles or boxes.
+            let boxes = unsafe { &mut geometry.geometry.aabbs };
+            boxes.data = address(inputs);
+            boxes.stride = BOX_BYTES;
+        }
+    }
+}
+
 /// Bytes of a 3 x 4 matrix.
 pub(crate) const TRANSFORM_BYTES: u64 = 48;
 
-/// The matrices of all geometries, identity where one has none; `None` if none has one.
+/// The matrices given by value, identity for other geometries; `None` if no geometry has one.
 pub(crate) fn transforms(geometries: &[BlasGeometry]) -> Option<Vec<f32>> {
     const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-    let any = geometries.iter().any(|geometry| geometry.transform().is_some());
-    any.then(|| geometries.iter().flat_map(|geometry| geometry.transform().unwrap_or(IDENTITY)).collect())
+    let any = geometries.iter().any(|geometry| geometry.transform_rows().is_some());
+    any.then(|| {
+        geometries.iter().flat_map(|geometry| geometry.transform_rows().unwrap_or(IDENTITY)).collect()
+    })
 }
 
 /// Bytes of `count` instances.

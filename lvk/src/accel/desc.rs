@@ -1,8 +1,24 @@
 //! Descriptions of acceleration structures.
 
+use super::flags::BuildFlags;
 use super::geometry::BlasGeometry;
 use super::instance::TlasInstance;
-use super::structure::BuildFlags;
+
+/// In which order the driver's builder gets the primitives of a mesh.
+///
+/// Shaders see the numbers of the caller's own order, through `lvkPrimitiveIndex` and `lvkRayQueryPrimitiveIndex`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum PrimitiveOrder {
+    /// As given, but [`Spatial`](Self::Spatial) for builds with [`BuildFlags::FAST_TRACE`] on drivers that keep the
+    /// order and trace unordered meshes slowly ([`Capabilities::prefers_spatial_order`](crate::Capabilities)).
+    #[default]
+    Auto,
+    /// As given.
+    Given,
+    /// Neighbours in the list are neighbours in space, by the leaves of a tree of small surface; where the given order
+    /// is already about as good it stays. Reads the inputs back, so creation waits for the GPU.
+    Spatial,
+}
 
 /// Describes a bottom-level structure.
 #[derive(Debug, Clone, Copy)]
@@ -11,13 +27,16 @@ pub struct BlasDesc<'a> {
     pub geometries: &'a [BlasGeometry],
     /// What the build is optimised for.
     pub flags: BuildFlags,
+    /// In which order the primitives are built, by the contents of the buffers at creation.
+    pub order: PrimitiveOrder,
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
 }
 
 impl Default for BlasDesc<'_> {
     fn default() -> Self {
-        Self { geometries: &[], flags: BuildFlags::default(), debug_name: "blas" }
+        let (flags, order) = (BuildFlags::default(), PrimitiveOrder::default());
+        Self { geometries: &[], flags, order, debug_name: "blas" }
     }
 }
 
@@ -28,6 +47,10 @@ pub struct TlasDesc<'a> {
     pub instances: &'a [TlasInstance],
     /// Room for instances in later updates; at least the number of the first ones.
     pub capacity: u32,
+    /// Most parts that a mesh shown may have been split into ([`AccelStructInfo::parts`](crate::AccelStructInfo)), on
+    /// the average of all instances. 1 unless phones' limits or [`DeviceProfile`](crate::DeviceProfile)s split meshes; the
+    /// average of the first instances where that is more.
+    pub parts_per_instance: u32,
     /// What the build is optimised for.
     pub flags: BuildFlags,
     /// Name in error messages, validation messages and debuggers.
@@ -36,6 +59,7 @@ pub struct TlasDesc<'a> {
 
 impl Default for TlasDesc<'_> {
     fn default() -> Self {
-        Self { instances: &[], capacity: 0, flags: BuildFlags::default(), debug_name: "tlas" }
+        let flags = BuildFlags::default();
+        Self { instances: &[], capacity: 0, parts_per_instance: 1, flags, debug_name: "tlas" }
     }
 }

@@ -52,8 +52,8 @@ pub struct Triangles {
     pub indices: Option<Indices>,
     /// Number of triangles.
     pub triangle_count: u32,
-    /// Moves the vertices before the build: 3 rows of 4 columns, row by row.
-    pub transform: Option<[f32; 12]>,
+    /// Moves the vertices before the build.
+    pub transform: Option<GeometryTransform>,
     /// How rays treat the triangles.
     pub flags: GeometryFlags,
 }
@@ -83,6 +83,26 @@ impl Triangles {
     ) -> Self {
         let indices = Indices { buffer: index_buffer, offset: 0, format: IndexFormat::U32 };
         Self { indices: Some(indices), triangle_count, ..Self::packed(vertex_buffer, vertex_count) }
+    }
+}
+
+/// A matrix of 3 rows of 4 columns, row by row (`VkTransformMatrixKHR`).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum GeometryTransform {
+    /// By value; see [`transform_rows`](crate::transform_rows).
+    Rows([f32; 12]),
+    /// 48 bytes in a buffer, read by every build.
+    Buffer {
+        /// A buffer with [`BufferUsage::ACCEL_INPUT`].
+        buffer: BufferHandle,
+        /// Where the matrix lies, in bytes; a multiple of 16.
+        offset: u64,
+    },
+}
+
+impl From<[f32; 12]> for GeometryTransform {
+    fn from(rows: [f32; 12]) -> Self {
+        Self::Rows(rows)
     }
 }
 
@@ -120,18 +140,42 @@ pub(crate) struct Converted {
 impl BlasGeometry {
     /// Buffers the build reads.
     pub(crate) fn buffers(&self) -> impl Iterator<Item = BufferHandle> {
-        let (first, second) = match self {
-            Self::Triangles(t) => (t.vertex_buffer, t.indices.map(|indices| indices.buffer)),
-            Self::Aabbs(aabbs) => (aabbs.buffer, None),
+        let all = match self {
+            Self::Triangles(t) => {
+                [Some(t.vertex_buffer), t.indices.map(|indices| indices.buffer), self.transform_buffer()]
+            }
+            Self::Aabbs(aabbs) => [Some(aabbs.buffer), None, None],
         };
-        [Some(first), second].into_iter().flatten()
+        all.into_iter().flatten()
     }
 
-    pub(crate) fn transform(&self) -> Option<[f32; 12]> {
+    /// The matrix, where it is given by value.
+    pub(crate) fn transform_rows(&self) -> Option<[f32; 12]> {
         match self {
-            Self::Triangles(triangles) => triangles.transform,
-            Self::Aabbs(_) => None,
+            Self::Triangles(Triangles { transform: Some(GeometryTransform::Rows(rows)), .. }) => Some(*rows),
+            _ => None,
         }
+    }
+
+    fn transform_buffer(&self) -> Option<BufferHandle> {
+        match self {
+            Self::Triangles(Triangles {
+                transform: Some(GeometryTransform::Buffer { buffer, .. }), ..
+            }) => Some(*buffer),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn flags(&self) -> GeometryFlags {
+        match self {
+            Self::Triangles(triangles) => triangles.flags,
+            Self::Aabbs(aabbs) => aabbs.flags,
+        }
+    }
+
+    /// Whether it holds boxes.
+    pub(crate) fn is_boxes(&self) -> bool {
+        matches!(self, Self::Aabbs(_))
     }
 
     pub(crate) fn primitive_count(&self) -> u32 {
@@ -141,16 +185,16 @@ impl BlasGeometry {
         }
     }
 
-    /// Checks the geometry and converts it. `transform` is the address of its matrix, or 0.
+    /// Checks the geometry and converts it. `matrix` is the address of its matrix if that is given by value, else 0.
     pub(crate) fn convert(
         &self,
         gpu: &Gpu,
         name: &str,
         find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>,
-        transform: u64,
+        matrix: u64,
     ) -> Result<Converted> {
         match self {
-            Self::Triangles(triangles) => convert_triangles(triangles, gpu, name, find, transform),
+            Self::Triangles(triangles) => convert_triangles(triangles, gpu, name, find, matrix),
             Self::Aabbs(aabbs) => convert_aabbs(aabbs, find),
         }
     }
@@ -161,13 +205,10 @@ pub(crate) fn check_list(name: &str, geometries: &[BlasGeometry], limits: &Limit
     if geometries.is_empty() {
         return Err(Error::usage(name, "a bottom-level structure needs at least one geometry"));
     }
-    let boxes = |geometry: &BlasGeometry| matches!(geometry, BlasGeometry::Aabbs(_));
-    if geometries.iter().any(|geometry| boxes(geometry) != boxes(&geometries[0])) {
+    if geometries.iter().any(|geometry| geometry.is_boxes() != geometries[0].is_boxes()) {
         return Err(Error::usage(name, "triangles and boxes cannot share a structure; make two"));
     }
-    check_limit(name, "geometry count", geometries.len() as u64, limits.max_blas_geometries)?;
-    let primitives = geometries.iter().map(|geometry| u64::from(geometry.primitive_count())).sum();
-    check_limit(name, "primitive count", primitives, limits.max_blas_primitives)
+    check_limit(name, "geometry count", geometries.len() as u64, limits.max_blas_geometries)
 }
 
 fn convert_triangles(
@@ -175,7 +216,7 @@ fn convert_triangles(
     gpu: &Gpu,
     name: &str,
     find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>,
-    transform: u64,
+    matrix: u64,
 ) -> Result<Converted> {
     let format = triangles.vertex_format;
     let vertex_features = vk::FormatFeatureFlags::ACCELERATION_STRUCTURE_VERTEX_BUFFER_KHR;
@@ -192,13 +233,17 @@ fn convert_triangles(
     check_multiple(name, "vertex stride", stride, unit)?;
     check_limit(name, "vertex stride in bytes", stride, u32::MAX.into())?;
     check_elements(&vertices, triangles.vertex_offset, triangles.vertex_count, stride, packed)?;
+    let matrix = match triangles.transform {
+        Some(GeometryTransform::Buffer { buffer, offset }) => transform_address(name, buffer, offset, find)?,
+        _ => matrix,
+    };
     let mut data = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
         .vertex_format(format.raw())
         .vertex_data(address(vertices.address + triangles.vertex_offset))
         .vertex_stride(stride)
         .max_vertex(triangles.vertex_count.saturating_sub(1))
         .index_type(vk::IndexType::NONE_KHR)
-        .transform_data(address(transform));
+        .transform_data(address(matrix));
     match triangles.indices {
         Some(indices) => {
             data = data
@@ -228,6 +273,20 @@ fn index_address(
     check_multiple(name, "index offset", indices.offset, size)?;
     buffer.check_range(indices.offset, u64::from(triangles.triangle_count) * 3 * size)?;
     Ok(address(buffer.address + indices.offset))
+}
+
+fn transform_address(
+    name: &str,
+    buffer: BufferHandle,
+    offset: u64,
+    find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>,
+) -> Result<u64> {
+    const MATRIX_BYTES: u64 = 48;
+    let buffer = find(buffer)?;
+    buffer.check_usage(BufferUsage::ACCEL_INPUT)?;
+    check_multiple(name, "transform offset", offset, 16)?;
+    buffer.check_range(offset, MATRIX_BYTES)?;
+    Ok(buffer.address + offset)
 }
 
 fn convert_aabbs(aabbs: &Aabbs, find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>) -> Result<Converted> {

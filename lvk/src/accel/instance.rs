@@ -1,14 +1,17 @@
 //! Instances of a top-level structure, from the host.
 
 use std::collections::HashMap;
+use std::hash::BuildHasherDefault;
 use std::sync::Arc;
 
 use bitflags::bitflags;
 use bytemuck::{Pod, Zeroable};
 
 use super::structure::AccelStruct;
-use crate::error::{Error, Result};
-use crate::handle::AccelStructHandle;
+use super::tlas::{Entry, Shown};
+use crate::barrier::IdHasher;
+use crate::error::{Error, Result, check_limit};
+use crate::handle::{AccelStructHandle, BufferHandle};
 
 bitflags! {
     /// How rays treat an instance.
@@ -76,38 +79,186 @@ pub(crate) struct RawInstance {
 /// Bytes of one instance.
 pub(crate) const INSTANCE_BYTES: usize = size_of::<RawInstance>();
 
-/// Instances as Vulkan reads them, with the structures they refer to.
-pub(crate) struct Instances {
-    pub(crate) raw: Vec<RawInstance>,
-    pub(crate) blas: Vec<Arc<AccelStruct>>,
+/// Fewer instances than this are converted on the calling thread alone.
+const PARALLEL_COUNT: usize = 1 << 14;
+
+/// Instances that the GPU wrote, or that lie in a buffer for another reason.
+#[derive(Debug, Clone, Copy)]
+pub struct DeviceInstances<'a> {
+    /// A buffer with [`BufferUsage::STORAGE`](crate::BufferUsage::STORAGE) that holds
+    /// `VkAccelerationStructureInstanceKHR` records of 64 bytes each: 3 rows of 4 floats; 24 bits custom index and 8
+    /// bits mask; 24 bits hit-group offset and 8 bits flags; and, in place of an address, the place of the structure in
+    /// `blas` as 64 bits. A place that does not exist makes an instance that no ray meets.
+    pub buffer: BufferHandle,
+    /// Where the first record lies, in bytes; a multiple of 16.
+    pub offset: u64,
+    /// Number of records.
+    pub count: u32,
+    /// The bottom-level structures that records may refer to.
+    pub blas: &'a [AccelStructHandle],
 }
 
-impl Instances {
-    /// Checks and converts `instances` for the structure `name`.
-    pub(crate) fn convert(
+/// What a list of instances refers to, and how many Vulkan is given.
+pub(crate) struct InstancePlan {
+    /// Each structure once.
+    pub(crate) shown: Vec<Shown>,
+    /// For each instance its place in `shown`.
+    refers: Vec<u32>,
+    /// Instances with those for further parts of split meshes.
+    pub(crate) built_count: u32,
+    /// Whether addresses are put in by the kernel: parts have maps, there are several, or they may move.
+    pub(crate) needs_kernel: bool,
+}
+
+/// Instances that name entries, see [`InstanceSource`](super::tlas::InstanceSource).
+pub(crate) struct EntryList {
+    /// One for each part of each structure.
+    pub(crate) entries: Vec<Entry>,
+    /// Of the instances behind the caller's: whose further parts they are.
+    pub(crate) owners: Vec<u32>,
+    /// Of the same: the entry.
+    further: Vec<u32>,
+    /// First entry of each structure.
+    firsts: Vec<u32>,
+}
+
+impl InstancePlan {
+    /// Finds the structures of `instances`, which are to be shown by the structure `name`.
+    pub(crate) fn new(
         name: &str,
         instances: &[TlasInstance],
         find: impl Fn(AccelStructHandle) -> Result<Arc<AccelStruct>>,
     ) -> Result<Self> {
-        let mut found: HashMap<AccelStructHandle, u64> = HashMap::new();
-        let mut blas = Vec::new();
-        let mut raw = Vec::with_capacity(instances.len());
-        for (index, instance) in instances.iter().enumerate() {
-            check(name, index, instance)?;
-            let address = match found.get(&instance.blas) {
-                Some(address) => *address,
-                None => {
-                    let object = find(instance.blas)?;
-                    object.blas()?;
-                    found.insert(instance.blas, object.address);
-                    blas.push(object);
-                    blas[blas.len() - 1].address
-                }
+        let mut known: HashMap<AccelStructHandle, u32, BuildHasherDefault<IdHasher>> = HashMap::default();
+        let mut shown: Vec<Shown> = Vec::new();
+        let mut refers = Vec::with_capacity(instances.len());
+        let mut last = None;
+        for instance in instances {
+            let place = match last {
+                Some((handle, place)) if handle == instance.blas => place,
+                _ => match known.get(&instance.blas) {
+                    Some(place) => *place,
+                    None => {
+                        let blas = find(instance.blas)?;
+                        let body = blas.blas()?.body();
+                        shown.push(Shown { blas, body });
+                        known.insert(instance.blas, shown.len() as u32 - 1);
+                        shown.len() as u32 - 1
+                    }
+                },
             };
-            raw.push(pack(instance, address));
+            last = Some((instance.blas, place));
+            refers.push(place);
         }
-        Ok(Self { raw, blas })
+        let parts: Vec<u64> = shown.iter().map(|shown| shown.body.structures.len() as u64).collect();
+        let built: u64 = if parts.iter().all(|count| *count == 1) {
+            refers.len() as u64
+        } else {
+            refers.iter().map(|place| parts[*place as usize]).sum()
+        };
+        check_limit(name, "number of instances, parts of split meshes included", built, u32::MAX.into())?;
+        let needs_kernel = shown.iter().any(|shown| shown.may_move() || shown.has_rows());
+        Ok(Self { shown, refers, built_count: built as u32, needs_kernel })
     }
+
+    /// Checks the instances and writes them with addresses. Good only if no kernel is needed.
+    pub(crate) fn write_addresses(
+        &self,
+        name: &str,
+        instances: &[TlasInstance],
+        out: &mut [u8],
+    ) -> Result<()> {
+        let addresses: Vec<u64> = self.shown.iter().map(|shown| shown.body.structures[0].address).collect();
+        write_all(name, instances, &self.refers, &addresses, out)
+    }
+
+    /// Numbers the parts of everything shown, and the instances behind the caller's own.
+    pub(crate) fn entries(&self) -> EntryList {
+        let mut list =
+            EntryList { entries: Vec::new(), owners: Vec::new(), further: Vec::new(), firsts: Vec::new() };
+        for (shown, of) in (0..).zip(&self.shown) {
+            list.firsts.push(list.entries.len() as u32);
+            let parts = 0..of.body.structures.len() as u32;
+            list.entries.extend(parts.map(|first| Entry { shown, first, count: 1 }));
+        }
+        for (owner, place) in (0..).zip(&self.refers) {
+            let first = list.firsts[*place as usize];
+            let parts = self.shown[*place as usize].body.structures.len() as u32;
+            for part in 1..parts {
+                list.owners.push(owner);
+                list.further.push(first + part);
+            }
+        }
+        list
+    }
+
+    /// Checks the instances and writes them with entry numbers, those of further parts behind the caller's.
+    pub(crate) fn write_entries(
+        &self,
+        name: &str,
+        instances: &[TlasInstance],
+        list: &EntryList,
+        out: &mut [u8],
+    ) -> Result<()> {
+        let firsts: Vec<u64> = list.firsts.iter().map(|first| u64::from(*first)).collect();
+        let (own, further) = out.split_at_mut(instances.len() * INSTANCE_BYTES);
+        write_all(name, instances, &self.refers, &firsts, own)?;
+        let places = list.owners.iter().zip(&list.further);
+        for ((owner, entry), out) in places.zip(further.chunks_exact_mut(INSTANCE_BYTES)) {
+            let raw = pack(&instances[*owner as usize], u64::from(*entry));
+            out.copy_from_slice(bytemuck::bytes_of(&raw));
+        }
+        Ok(())
+    }
+}
+
+/// Checks and writes `instances`, each with what `references` holds for the structure it refers to.
+fn write_all(
+    name: &str,
+    instances: &[TlasInstance],
+    refers: &[u32],
+    references: &[u64],
+    out: &mut [u8],
+) -> Result<()> {
+    if instances.len() < PARALLEL_COUNT {
+        return write_chunk(name, 0, instances, refers, references, out);
+    }
+    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(8);
+    let count = instances.len().div_ceil(threads);
+    std::thread::scope(|scope| {
+        let chunks = instances.chunks(count).zip(refers.chunks(count));
+        let workers: Vec<_> = chunks
+            .zip(out.chunks_mut(count * INSTANCE_BYTES))
+            .enumerate()
+            .map(|(index, ((instances, refers), out))| {
+                let first = index * count;
+                scope.spawn(move || write_chunk(name, first, instances, refers, references, out))
+            })
+            .collect();
+        let joined = workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err(lost(name))));
+        joined.collect::<Vec<_>>().into_iter().collect()
+    })
+}
+
+fn lost(name: &str) -> Error {
+    Error::usage(name, "a thread that converted instances ended early")
+}
+
+fn write_chunk(
+    name: &str,
+    first: usize,
+    instances: &[TlasInstance],
+    refers: &[u32],
+    references: &[u64],
+    out: &mut [u8],
+) -> Result<()> {
+    let records = instances.iter().zip(refers).zip(out.chunks_exact_mut(INSTANCE_BYTES));
+    for (index, ((instance, place), out)) in records.enumerate() {
+        check(name, first + index, instance)?;
+        let raw = pack(instance, references[*place as usize]);
+        out.copy_from_slice(bytemuck::bytes_of(&raw));
+    }
+    Ok(())
 }
 
 fn check(name: &str, index: usize, instance: &TlasInstance) -> Result<()> {

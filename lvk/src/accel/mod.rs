@@ -1,11 +1,26 @@
 //! Acceleration structures: checked, sized and planned here, recorded by the command layer.
 
+pub(crate) mod blas;
+pub(crate) mod blob;
+pub(crate) mod bounds;
 pub(crate) mod build;
+pub(crate) mod compaction;
+pub(crate) mod culling;
+pub(crate) mod cut;
 pub(crate) mod desc;
+pub(crate) mod flags;
 pub(crate) mod geometry;
 pub(crate) mod instance;
+pub(crate) mod order;
+pub(crate) mod primitive_map;
+pub(crate) mod ranges;
+pub(crate) mod raw_structure;
 pub(crate) mod scratch;
 pub(crate) mod scratch_buffer;
+mod size_model;
+pub(crate) mod split;
+pub(crate) mod storage;
 pub(crate) mod structure;
+pub(crate) mod tlas;
 
 pub(crate) use structure::AccelStruct;

@@ -28,6 +28,12 @@ impl ScratchBuffer {
             }
         }
     }
+
+    /// Bytes of the buffer at present.
+    pub(crate) fn bytes(&self) -> u64 {
+        let current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
+        current.as_ref().map_or(0, |buffer| buffer.size_bytes)
+    }
 }
 
 fn new_buffer(gpu: &Arc<Gpu>, bytes: u64) -> Result<Buffer> {

@@ -83,6 +83,12 @@ impl Stages {
     /// The accesses that a single stage can perform; Vulkan forbids masks that name any other.
     pub(crate) fn possible_access(self) -> Access {
         const SHADER: Access = Access::SHADER_READ.union(Access::SHADER_WRITE).union(Access::ACCEL_READ);
+        const ACCEL: Access = Access::SHADER_READ
+            .union(Access::INDIRECT_READ)
+            .union(Access::ACCEL_READ)
+            .union(Access::ACCEL_WRITE)
+            .union(Access::TRANSFER_READ)
+            .union(Access::TRANSFER_WRITE);
         match self {
             Self::HOST => Access::HOST_READ | Access::HOST_WRITE,
             Self::TRANSFER => Access::TRANSFER_READ | Access::TRANSFER_WRITE,
@@ -91,9 +97,7 @@ impl Stages {
             Self::PRE_RASTER | Self::FRAGMENT | Self::COMPUTE | Self::RAY_TRACING => SHADER,
             Self::DEPTH => Access::DEPTH_READ | Access::DEPTH_WRITE,
             Self::COLOR => Access::COLOR_READ | Access::COLOR_WRITE,
-            Self::ACCEL_BUILD => {
-                Access::SHADER_READ | Access::INDIRECT_READ | Access::ACCEL_READ | Access::ACCEL_WRITE
-            }
+            Self::ACCEL_BUILD => ACCEL,
             _ => Access::empty(),
         }
     }
@@ -189,6 +193,16 @@ impl Use {
     /// Destination of an acceleration structure build, refit or copy, or its scratch memory.
     pub(crate) const fn accel_build_write() -> Self {
         Self::new(Stages::ACCEL_BUILD, Access::ACCEL_READ.union(Access::ACCEL_WRITE), Layout::Undefined)
+    }
+
+    /// Buffer that a structure is written to as bytes.
+    pub(crate) const fn accel_to_memory() -> Self {
+        Self::new(Stages::ACCEL_BUILD, Access::TRANSFER_WRITE, Layout::Undefined)
+    }
+
+    /// Buffer that a structure is read from as bytes.
+    pub(crate) const fn accel_from_memory() -> Self {
+        Self::new(Stages::ACCEL_BUILD, Access::TRANSFER_READ, Layout::Undefined)
     }
 
     /// Geometry, transforms or instances that a build reads.
@@ -305,6 +319,8 @@ mod tests {
             Use::depth_target(),
             Use::accel_build_write(),
             Use::accel_build_input(),
+            Use::accel_to_memory(),
+            Use::accel_from_memory(),
             Use::accel_read(Stages::SHADERS | Stages::ACCEL_BUILD),
             Use::host_read(),
             Use::everything_read(),

@@ -5,6 +5,7 @@
 
 mod access;
 mod batch;
+mod query_stages;
 mod resource_id;
 mod state;
 mod states;
@@ -18,7 +19,8 @@ mod model_tests;
 
 pub(crate) use access::{Access, Layout, Stages, Use};
 pub(crate) use batch::{Barriers, ImageBarrier, MemoryBarrier};
-pub(crate) use resource_id::ResourceId;
+pub(crate) use query_stages::QueryStages;
+pub(crate) use resource_id::{IdHasher, ResourceId};
 pub(crate) use states::States;
 pub(crate) use subresource::{Subresources, TextureShape};
 pub(crate) use tracker::Tracker;

@@ -14,12 +14,19 @@ pub(crate) const STORAGE_IMAGES: u32 = 2;
 pub(crate) const YCBCR: u32 = 3;
 /// Top-level acceleration structures.
 pub(crate) const ACCEL_STRUCTS: u32 = 4;
+/// One storage buffer: for each top-level structure the address of the rows that lead from hits to the caller's
+/// instances and primitives.
+pub(crate) const TLAS_TABLE: u32 = 5;
+
+/// Bytes of an entry of the table of top-level structures.
+pub(crate) const TLAS_TABLE_ENTRY_BYTES: u64 = 8;
 
 /// Each binding with the words an error message and the preamble use for it.
-pub(crate) const BINDINGS: [(u32, &str, &str); 5] = [
+pub(crate) const BINDINGS: [(u32, &str, &str); 6] = [
     (SAMPLED_IMAGES, "LVK_BINDING_SAMPLED_IMAGES", "sampled images"),
     (SAMPLERS, "LVK_BINDING_SAMPLERS", "samplers"),
     (STORAGE_IMAGES, "LVK_BINDING_STORAGE_IMAGES", "storage images"),
     (YCBCR, "LVK_BINDING_YCBCR", "combined Y'CbCr samplers"),
     (ACCEL_STRUCTS, "LVK_BINDING_ACCEL_STRUCTS", "top-level acceleration structures"),
+    (TLAS_TABLE, "LVK_BINDING_TLAS_TABLE", "the table of top-level structures"),
 ];

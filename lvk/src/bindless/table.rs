@@ -23,6 +23,8 @@ pub(crate) struct Dummies {
     pub(crate) storage: vk::ImageView,
     pub(crate) sampler: vk::Sampler,
     pub(crate) tlas: Option<vk::AccelerationStructureKHR>,
+    /// Not a dummy: the table is the same for the whole life of the context.
+    pub(crate) tlas_table: Option<vk::Buffer>,
 }
 
 /// The bindless descriptor set with its layout and pool.
@@ -85,6 +87,7 @@ impl Bindless {
             (layout::SAMPLERS, vk::DescriptorType::SAMPLER, limits.max_bindless_samplers),
             (layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE, textures),
             (layout::ACCEL_STRUCTS, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, tlas_count(gpu)),
+            (layout::TLAS_TABLE, vk::DescriptorType::STORAGE_BUFFER, tlas_count(gpu).min(1)),
         ];
         let set_layout = create_layout(gpu, &counts)?;
         let (pool, set) = match create_set(gpu, set_layout, &counts) {
@@ -114,6 +117,9 @@ impl Bindless {
         self.write_samplers(dummies, samplers);
         let tlas = (0..entries.tlas.owners.len() as u32).map(|slot| (slot, None));
         self.write_tlas(dummies, tlas);
+        if let Some(table) = dummies.tlas_table {
+            self.write_tlas_table(table);
+        }
     }
 
     pub(crate) fn reserve_texture(&self, name: &str) -> Result<u32> {
@@ -227,6 +233,14 @@ impl Bindless {
         }
     }
 
+    fn write_tlas_table(&self, table: vk::Buffer) {
+        let info = [vk::DescriptorBufferInfo::default().buffer(table).range(vk::WHOLE_SIZE)];
+        let write = self.write_at(layout::TLAS_TABLE, 0);
+        let write = write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(&info);
+        // SAFETY: the buffer lives as long as the set, and nothing has been submitted yet.
+        unsafe { self.gpu.device.update_descriptor_sets(&[write], &[]) };
+    }
+
     fn write_at<'a>(&self, binding: u32, first: u32) -> vk::WriteDescriptorSet<'a> {
         vk::WriteDescriptorSet::default().dst_set(self.set).dst_binding(binding).dst_array_element(first)
     }
@@ -297,10 +311,7 @@ fn create_layout(gpu: &Gpu, counts: &[Count]) -> Result<vk::DescriptorSetLayout>
                 .stage_flags(vk::ShaderStageFlags::ALL)
         })
         .collect();
-    let flags = vk::DescriptorBindingFlags::UPDATE_AFTER_BIND
-        | vk::DescriptorBindingFlags::UPDATE_UNUSED_WHILE_PENDING
-        | vk::DescriptorBindingFlags::PARTIALLY_BOUND;
-    let flags = vec![flags; bindings.len()];
+    let flags: Vec<_> = used.iter().map(|(binding, _, _)| binding_flags(*binding)).collect();
     let mut flags = vk::DescriptorSetLayoutBindingFlagsCreateInfo::default().binding_flags(&flags);
     let info = vk::DescriptorSetLayoutCreateInfo::default()
         .flags(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)
@@ -309,6 +320,15 @@ fn create_layout(gpu: &Gpu, counts: &[Count]) -> Result<vk::DescriptorSetLayout>
     // SAFETY: the counts are within the device's limits.
     unsafe { gpu.device.create_descriptor_set_layout(&info, None) }
         .map_err(Error::vulkan("vkCreateDescriptorSetLayout"))
+}
+
+/// The table is written once; slots of everything else change while others are in use.
+fn binding_flags(binding: u32) -> vk::DescriptorBindingFlags {
+    use vk::DescriptorBindingFlags as Flags;
+    if binding == layout::TLAS_TABLE {
+        return Flags::PARTIALLY_BOUND;
+    }
+    Flags::UPDATE_AFTER_BIND | Flags::UPDATE_UNUSED_WHILE_PENDING | Flags::PARTIALLY_BOUND
 }
 
 fn create_set(

@@ -1,5 +1,6 @@
-//! Builds of acceleration structures.
+//! Builds and refits of acceleration structures.
 
+use std::collections::HashSet;
 use std::sync::Arc;
 
 use ash::khr::acceleration_structure::Device as ExtDevice;
@@ -7,181 +8,152 @@ use ash::vk;
 
 use super::CommandBuffer;
 use crate::accel::AccelStruct;
-use crate::accel::build::{BuildInput, instance_bytes};
-use crate::accel::instance::{Instances, TlasInstance};
+use crate::accel::blas::{Blas, BlasBody, PartShape};
+use crate::accel::build::BuildInput;
+use crate::accel::flags::BuildMode;
 use crate::accel::scratch::{ScratchBatch, aligned_scratch_address, plan_scratch};
-use crate::accel::structure::{AccelKind, BuildMode, Tlas, TlasContents};
+use crate::accel::structure::AccelKind;
 use crate::barrier::{Stages, Use};
-use crate::error::{Error, Result, check_limit};
+use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
-use crate::shared::{Garbage, Shared};
-
-/// Addresses of instances must be a multiple of this.
-const INSTANCE_ALIGNMENT: u64 = 16;
-
-/// What a top-level structure shows once the command buffer is submitted.
-pub(crate) struct TlasUpdate {
-    target: Arc<AccelStruct>,
-    contents: TlasContents,
-    /// Moves what is shown when the command buffer is submitted, so that must have as many instances.
-    refits_submitted: bool,
-}
-
-impl TlasUpdate {
-    /// Fails if another submission changed the number of instances since the refit was recorded.
-    fn check(&self) -> Result<()> {
-        let now = self.target.tlas()?.contents().instance_count;
-        if !self.refits_submitted || now == self.contents.instance_count {
-            return Ok(());
-        }
-        let message =
-            "a refit was recorded, but a submission since then changed the number of instances; rebuild";
-        Err(Error::usage(&self.target.name, message))
-    }
-
-    /// Makes it so. Structures shown before may go once the GPU is done with them.
-    pub(crate) fn apply(self, shared: &Shared) {
-        if let Ok(tlas) = self.target.tlas() {
-            let before = std::mem::replace(&mut *tlas.contents(), self.contents);
-            before.blas.into_iter().for_each(|blas| shared.retire(Garbage::Kept(blas)));
-        }
-    }
-}
+use crate::shared::Garbage;
 
 /// One build to record.
-struct Build {
+pub(super) struct Build {
+    pub(super) target: Arc<AccelStruct>,
+    /// The structure that is built, one of the target's.
+    pub(super) raw: vk::AccelerationStructureKHR,
+    pub(super) input: BuildInput,
+    pub(super) refit: bool,
+    pub(super) scratch_bytes: u64,
+    pub(super) reads: Vec<Arc<Buffer>>,
+}
+
+/// A build that is recorded; until it is submitted the body must not be replaced by a compacted one.
+pub(crate) struct OpenBuild {
     target: Arc<AccelStruct>,
-    input: BuildInput,
-    mode: BuildMode,
-    scratch_bytes: u64,
-    reads: Vec<Arc<Buffer>>,
+    refit: bool,
+    submitted: bool,
+}
+
+impl OpenBuild {
+    /// Keeps what stands for a bottom-level structure in place, and answers it.
+    fn of_blas(target: &Arc<AccelStruct>) -> Result<(Self, Arc<BlasBody>)> {
+        let body = target.blas()?.open_build();
+        Ok((Self { target: Arc::clone(target), refit: false, submitted: false }, body))
+    }
+
+    /// A top-level structure stays what it is.
+    pub(super) fn of_tlas(target: &Arc<AccelStruct>) -> Self {
+        Self { target: Arc::clone(target), refit: false, submitted: false }
+    }
+
+    /// It went to the GPU with this timeline value.
+    pub(crate) fn submit(mut self, value: u64) {
+        self.target.submitted(value);
+        self.submitted = true;
+    }
+}
+
+impl Drop for OpenBuild {
+    fn drop(&mut self) {
+        if let AccelKind::Blas(blas) = &self.target.kind {
+            blas.close_build(self.submitted && !self.refit);
+        }
+    }
 }
 
 impl CommandBuffer {
     /// Builds bottom-level structures again from their buffers, or refits them
-    /// (`vkCmdBuildAccelerationStructuresKHR`). Contents may have changed, counts may not.
+    /// (`vkCmdBuildAccelerationStructuresKHR`). Contents may have changed, counts may not; for a refit neither may
+    /// indices.
     ///
-    /// Rays traced later in the same command buffer, or in later submissions, see the result.
+    /// Rays traced later in the same command buffer, or in later submissions, see the result. Where the bounds of a
+    /// structure changed, top-level structures that show it need an update too.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) for a refit without
+    /// [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), a rebuild of a structure that was compacted or
+    /// loaded, and a structure listed twice.
     pub fn build_blas(&mut self, structures: &[AccelStructHandle], mode: BuildMode) -> Result<()> {
         let found: Result<Vec<_>> =
             structures.iter().map(|handle| self.shared.store.accel_structs.get(*handle)).collect();
         let found = found?;
-        for (index, target) in found.iter().enumerate() {
-            if found[..index].iter().any(|other| other.id == target.id) {
-                return Err(Error::usage(&target.name, "the structure is listed twice in one build"));
-            }
+        let mut seen = HashSet::with_capacity(found.len());
+        if let Some(twice) = found.iter().find(|target| !seen.insert(target.id.0)) {
+            return Err(Error::usage(&twice.name, "the structure is listed twice in one build"));
         }
         self.build_all(&found, mode)
     }
 
     /// As [`build_blas`](Self::build_blas), by object.
     pub(crate) fn build_all(&mut self, structures: &[Arc<AccelStruct>], mode: BuildMode) -> Result<()> {
-        let builds: Result<Vec<_>> = structures.iter().map(|target| self.plan_blas(target, mode)).collect();
-        self.record_builds(&builds?)
-    }
-
-    /// Shows other instances in a top-level structure: at most its capacity, and for a refit as many as before.
-    pub fn update_tlas(
-        &mut self,
-        tlas: AccelStructHandle,
-        instances: &[TlasInstance],
-        mode: BuildMode,
-    ) -> Result<()> {
-        let target = self.shared.store.accel_structs.get(tlas)?;
-        self.update_tlas_object(&target, instances, mode)
-    }
-
-    /// As [`update_tlas`](Self::update_tlas), by object.
-    pub(crate) fn update_tlas_object(
-        &mut self,
-        target: &Arc<AccelStruct>,
-        instances: &[TlasInstance],
-        mode: BuildMode,
-    ) -> Result<()> {
-        let tlas = target.tlas()?;
-        let count = instances.len() as u64;
-        check_limit(&target.name, "instance count", count, tlas.capacity.into())?;
-        let count = count as u32;
-        if mode == BuildMode::Refit && self.instance_count(target, tlas) != Some(count) {
-            let message = format!("a refit keeps the number of instances; {count} are new, so rebuild");
-            return Err(Error::usage(&target.name, message));
+        let mut open = Vec::with_capacity(structures.len());
+        let mut builds = Vec::with_capacity(structures.len());
+        let mut refits = Vec::with_capacity(structures.len());
+        for target in structures {
+            let (mut build, body) = OpenBuild::of_blas(target)?;
+            let refit = resolve_mode(target, &body, mode)?;
+            build.refit = refit;
+            open.push(build);
+            self.plan_blas(target, &body, refit, &mut builds)?;
+            refits.push(refit);
         }
-        let scratch_bytes = target.scratch_bytes(mode)?;
-        let shared = Arc::clone(&self.shared);
-        let converted =
-            Instances::convert(&target.name, instances, |handle| shared.store.accel_structs.get(handle))?;
-        let bytes = instance_bytes(count.max(1));
-        let region =
-            shared.staging.write_with(bytes, INSTANCE_ALIGNMENT, self.recording.sequence, |staged| {
-                let raw: &[u8] = bytemuck::cast_slice(&converted.raw);
-                staged[..raw.len()].copy_from_slice(raw);
-            })?;
-        self.retire_temporary(region.temporary);
-        let input = BuildInput::tlas(target.flags, region.address, count);
-        let build = Build { target: Arc::clone(target), input, mode, scratch_bytes, reads: Vec::new() };
-        self.record_builds(&[build])?;
-        let contents = TlasContents { instance_count: Some(count), blas: converted.blas };
-        let refits_submitted = mode == BuildMode::Refit && self.own_update(target).is_none();
-        self.tlas_updates.push(TlasUpdate { target: Arc::clone(target), contents, refits_submitted });
+        self.gather_inputs(structures, &refits)?;
+        self.record_builds(&builds)?;
+        self.open_builds.extend(open);
+        for (target, refit) in structures.iter().zip(refits) {
+            target.blas()?.count_refit(refit);
+        }
         Ok(())
     }
 
-    /// Takes the updates so far for submitted: for the command buffer that goes before every other one.
-    pub(crate) fn apply_tlas_updates(&mut self) {
-        let shared = Arc::clone(&self.shared);
-        std::mem::take(&mut self.tlas_updates).into_iter().for_each(|update| update.apply(&shared));
-    }
-
-    /// Instances shown by the last build before the next command.
-    fn instance_count(&self, target: &Arc<AccelStruct>, tlas: &Tlas) -> Option<u32> {
-        let own = self.own_update(target);
-        own.map_or_else(|| tlas.contents().instance_count, |update| update.contents.instance_count)
-    }
-
-    /// The last update recorded in this command buffer.
-    fn own_update(&self, target: &AccelStruct) -> Option<&TlasUpdate> {
-        self.tlas_updates.iter().rev().find(|update| update.target.id == target.id)
-    }
-
-    /// Fails if what was recorded no longer fits what was submitted since.
-    pub(crate) fn check_tlas_updates(&self) -> Result<()> {
-        self.tlas_updates.iter().try_for_each(TlasUpdate::check)
-    }
-
-    /// Keeps a buffer of its own that the staging ring had no room for until the GPU is done with it.
-    pub(super) fn retire_temporary(&self, temporary: Option<Arc<Buffer>>) {
-        if let Some(buffer) = temporary {
-            self.shared.retire(Garbage::Buffer(buffer));
-        }
-    }
-
-    fn plan_blas(&self, target: &Arc<AccelStruct>, mode: BuildMode) -> Result<Build> {
+    /// Adds a build for each part.
+    fn plan_blas(
+        &self,
+        target: &Arc<AccelStruct>,
+        body: &BlasBody,
+        refit: bool,
+        builds: &mut Vec<Build>,
+    ) -> Result<()> {
         let blas = target.blas()?;
-        let scratch_bytes = target.scratch_bytes(mode)?;
+        let reads = self.reads(blas)?;
+        for (part, structure) in blas.parts.iter().zip(&body.structures) {
+            let mut reads = reads.clone();
+            reads.extend(part.map.as_ref().map(|map| Arc::clone(&map.inputs)));
+            builds.push(Build {
+                target: Arc::clone(target),
+                raw: structure.raw,
+                input: self.part_input(target, blas, part)?,
+                refit,
+                scratch_bytes: scratch_bytes(part, refit),
+                reads,
+            });
+        }
+        Ok(())
+    }
+
+    fn part_input(&self, target: &AccelStruct, blas: &Blas, part: &PartShape) -> Result<BuildInput> {
         let find = |handle| self.shared.store.buffers.get(handle);
         let transforms = blas.transforms.as_ref().map(|buffer| buffer.address);
-        let input = BuildInput::blas(
-            &self.shared.gpu,
-            &target.name,
-            &blas.geometries,
-            target.flags,
-            &find,
-            transforms,
-        )?;
-        let reads: Result<Vec<_>> =
-            blas.geometries.iter().flat_map(|geometry| geometry.buffers()).map(find).collect();
-        Ok(Build { target: Arc::clone(target), input, mode, scratch_bytes, reads: reads? })
+        let (gpu, name) = (&self.shared.gpu, &target.name);
+        let whole = BuildInput::blas(gpu, name, &blas.geometries, target.flags, &find, transforms)?;
+        Ok(whole.into_part(part))
     }
 
-    fn record_builds(&mut self, builds: &[Build]) -> Result<()> {
-        let limits = &self.shared.gpu.caps.limits;
-        let alignment = limits.scratch_alignment.into();
-        let largest = limits.max_buffer_bytes.saturating_sub(alignment);
-        let sizes: Vec<_> = builds.iter().map(|build| build.scratch_bytes).collect();
-        let batches = plan_scratch(&sizes, alignment, self.shared.scratch_budget_bytes.min(largest));
-        let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
+    fn reads(&self, blas: &Blas) -> Result<Vec<Arc<Buffer>>> {
+        let buffers = blas.geometries.iter().flat_map(|geometry| geometry.buffers());
+        buffers.map(|handle| self.shared.store.buffers.get(handle)).collect()
+    }
+
+    /// Records builds in batches that share the scratch buffer.
+    pub(super) fn record_builds(&mut self, builds: &[Build]) -> Result<()> {
         let shared = Arc::clone(&self.shared);
+        let alignment = shared.gpu.caps.limits.scratch_alignment.into();
+        let sizes: Vec<_> = builds.iter().map(|build| build.scratch_bytes).collect();
+        let batches = plan_scratch(&sizes, alignment, shared.scratch_budget());
+        let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
         let ext = shared.gpu.accel()?;
         let (scratch, replaced) = shared.scratch.get(&shared.gpu, most)?;
         self.retire_temporary(replaced);
@@ -200,7 +172,7 @@ impl CommandBuffer {
         let infos: Vec<_> = builds
             .iter()
             .zip(&batch.offsets)
-            .map(|(build, offset)| build.input.build(&build.target, build.mode, base + offset))
+            .map(|(build, offset)| build.input.build(build.raw, build.refit, base + offset))
             .collect();
         let ranges: Vec<&[vk::AccelerationStructureBuildRangeInfoKHR]> =
             builds.iter().map(|build| &build.input.ranges[..]).collect();
@@ -225,4 +197,28 @@ impl CommandBuffer {
             self.use_buffer(buffer, Use::accel_build_input());
         }
     }
+
+    /// Keeps a buffer of its own that the staging ring had no room for until the GPU is done with it.
+    pub(super) fn retire_temporary(&self, temporary: Option<Arc<Buffer>>) {
+        if let Some(buffer) = temporary {
+            self.shared.retire(Garbage::Buffer(buffer));
+        }
+    }
+}
+
+/// Whether the build is a refit, or why it cannot be made.
+fn resolve_mode(target: &AccelStruct, body: &BlasBody, mode: BuildMode) -> Result<bool> {
+    let refit = mode.refits(target.check_refit().is_ok(), target.blas()?.refits());
+    if refit {
+        target.check_refit()?;
+    } else if !body.rebuildable {
+        let message =
+            "a compacted or loaded structure has no room for a rebuild: refit it, or create a new one";
+        return Err(Error::usage(&target.name, message));
+    }
+    Ok(refit)
+}
+
+fn scratch_bytes(part: &PartShape, refit: bool) -> u64 {
+    if refit { part.sizes.update_scratch_bytes } else { part.sizes.build_scratch_bytes }
 }

@@ -12,12 +12,26 @@ use crate::error::{Error, Result};
 pub(super) struct PushConstants {
     /// A bit for each 4 bytes: enough, as the layout has at most 256 bytes.
     pushed: u64,
+    /// The bytes themselves, for the library to push again what it overwrote.
+    bytes: Vec<u8>,
     wanted: Option<(Arc<str>, u32)>,
 }
 
 impl PushConstants {
     /// Rust structs end on their alignment, GLSL blocks on their last member; 16 bytes is the largest alignment.
     const TAIL_BYTES: u32 = 16;
+
+    /// Everything pushed so far, zero where nothing was.
+    pub(super) fn pushed_bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
+    fn keep(&mut self, offset: u32, bytes: &[u8]) {
+        let (start, end) = (offset as usize, offset as usize + bytes.len());
+        self.bytes.resize(self.bytes.len().max(end), 0);
+        self.bytes[start..end].copy_from_slice(bytes);
+        self.pushed |= words(offset, bytes.len() as u32);
+    }
 
     fn check(&self, offset: u32, size: u32) -> Result<()> {
         let Some((pipeline, expected)) = &self.wanted else {
@@ -82,7 +96,7 @@ impl CommandBuffer {
             let stages = vk::ShaderStageFlags::ALL;
             shared.gpu.device.cmd_push_constants(self.raw(), shared.layout.raw, stages, offset, bytes);
         }
-        self.push_constants.pushed |= words(offset, size);
+        self.push_constants.keep(offset, bytes);
         Ok(())
     }
 
@@ -124,7 +138,7 @@ mod tests {
     use super::*;
 
     fn bound(expected: u32) -> PushConstants {
-        PushConstants { pushed: 0, wanted: Some(("p".into(), expected)) }
+        PushConstants { wanted: Some(("p".into(), expected)), ..Default::default() }
     }
 
     #[test]
@@ -145,7 +159,7 @@ mod tests {
 
     #[test]
     fn a_pipeline_does_not_run_on_constants_nobody_pushed() {
-        let mut constants = PushConstants { pushed: words(0, 16), wanted: None };
+        let mut constants = PushConstants { pushed: words(0, 16), ..Default::default() };
         assert!(constants.check_pushed("p", 16).is_ok());
         assert!(constants.check_pushed("p", 20).is_err());
         constants.pushed |= words(20, 236);

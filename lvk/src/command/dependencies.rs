@@ -6,8 +6,8 @@ use crate::handle::{AccelStructHandle, BufferHandle, TextureHandle};
 ///
 /// Nothing needs to be declared for resources that were only uploaded: they are readable everywhere. Declare what an
 /// earlier command wrote (storage images, buffers, render targets now sampled) and what this command writes.
-/// Acceleration structures need no declaration in dispatches and traces: the library reads from the shaders whether
-/// they trace rays.
+/// Acceleration structures need no declaration: the library reads from the shaders whether they trace rays, and lets a
+/// render pass see what was built before it wherever a graphics pipeline queries rays.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Dependencies<'a> {
     /// Textures that are sampled or fetched.
@@ -18,7 +18,7 @@ pub struct Dependencies<'a> {
     pub buffers: &'a [BufferHandle],
     /// Buffers that are only read.
     pub read_buffers: &'a [BufferHandle],
-    /// Acceleration structures that a render pass's shaders query although they were built earlier in the same
-    /// command buffer.
+    /// Acceleration structures that shaders query. Needed only by a render pass, in the same command buffer as the
+    /// build, whose pipelines are made after it began.
     pub acceleration_structures: &'a [AccelStructHandle],
 }

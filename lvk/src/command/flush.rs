@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use super::CommandBuffer;
 use super::dependencies::Dependencies;
-use crate::barrier::{Stages, Subresources, Use};
+use crate::barrier::{ResourceId, Stages, Subresources, Use};
 use crate::error::Result;
 use crate::resource::texture::TextureUsage;
 use crate::resource::{Buffer, Texture};
+use crate::shared::Shared;
 use crate::submit::emit::emit;
 
 impl CommandBuffer {
@@ -31,9 +32,16 @@ impl CommandBuffer {
 
     /// The next command's shaders trace rays in these stages.
     pub(super) fn use_structures(&mut self, stages: Stages) {
-        let (blas, tlas) = (self.shared.all_blas, self.shared.all_tlas);
-        self.uses.id(blas, Use::accel_read(stages));
-        self.uses.id(tlas, Use::accel_read(stages));
+        structure_reads(&self.shared, stages).into_iter().for_each(|(id, read)| self.uses.id(id, read));
+    }
+
+    /// The pass that begins sees what this command buffer has built: no barrier can be placed once it is open, and only
+    /// then is a pipeline bound that may query rays.
+    pub(super) fn use_built_structures(&mut self) {
+        let reads = |stages| structure_reads(&self.shared, stages);
+        if let Some(stages) = self.shared.graphics_queries.waiting(&self.recording.tracker, reads) {
+            self.use_structures(stages);
+        }
     }
 
     /// The next command's shaders reach these in `stages`.
@@ -88,4 +96,13 @@ impl CommandBuffer {
             }
         }
     }
+}
+
+/// Everything that shaders of `stages` read when they trace rays.
+fn structure_reads(shared: &Shared, stages: Stages) -> [(ResourceId, Use); 3] {
+    [
+        (shared.all_blas, Use::accel_read(stages)),
+        (shared.all_tlas, Use::accel_read(stages)),
+        (shared.tlas_tables, Use::shader_read(stages)),
+    ]
 }

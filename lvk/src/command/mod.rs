@@ -1,15 +1,20 @@
 //! Command buffers. Every command checks its arguments, places the barriers it needs and records itself.
 
 pub(crate) mod accel;
+mod accel_copy;
 pub(crate) mod attachment;
 pub(crate) mod bind;
 pub(crate) mod compute;
 pub(crate) mod dependencies;
+mod draw_mesh;
 pub(crate) mod flush;
+mod instances;
+mod kernel;
 pub(crate) mod query;
 pub(crate) mod render;
 pub(crate) mod render_pass;
 mod targets;
+pub(crate) mod tlas;
 pub(crate) mod trace;
 pub(crate) mod transfer;
 pub(crate) mod uses;
@@ -19,14 +24,16 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use crate::accel::compaction::SizeQuery;
 use crate::barrier::{Barriers, ResourceId, Use};
 use crate::error::Result;
 use crate::pipeline::{ComputePipeline, RayTracingPipeline};
 use crate::shared::Shared;
 use crate::submit::Recording;
 
-use accel::TlasUpdate;
+use accel::OpenBuild;
 use bind::PushConstants;
+use tlas::TlasUpdate;
 use transfer::Settle;
 use uses::Uses;
 
@@ -53,6 +60,24 @@ pub struct CommandBuffer {
     rendering: bool,
     settle: Vec<Settle>,
     tlas_updates: Vec<TlasUpdate>,
+    open_builds: Vec<OpenBuild>,
+    size_queries: Vec<Arc<SizeQuery>>,
+}
+
+/// What becomes true once a command buffer is submitted.
+pub(crate) struct Outcome {
+    pub(crate) tlas_updates: Vec<TlasUpdate>,
+    pub(crate) builds: Vec<OpenBuild>,
+    pub(crate) size_queries: Vec<Arc<SizeQuery>>,
+}
+
+impl Outcome {
+    /// The command buffer went to the GPU with this timeline value.
+    pub(crate) fn submit(self, shared: &Shared, value: u64) {
+        self.tlas_updates.into_iter().for_each(|update| update.apply(shared));
+        self.builds.into_iter().for_each(|build| build.submit(value));
+        self.size_queries.iter().for_each(|query| query.submit());
+    }
 }
 
 impl CommandBuffer {
@@ -72,6 +97,8 @@ impl CommandBuffer {
             rendering: false,
             settle: Vec::new(),
             tlas_updates: Vec::new(),
+            open_builds: Vec::new(),
+            size_queries: Vec::new(),
         })
     }
 
@@ -104,7 +131,7 @@ impl CommandBuffer {
     }
 
     /// Ends the recording. Answers also what becomes true once it is submitted.
-    pub(crate) fn finish(mut self) -> (Recording, Vec<TlasUpdate>) {
+    pub(crate) fn finish(mut self) -> (Recording, Outcome) {
         while self.open_labels > 0 {
             self.pop_label();
         }
@@ -116,7 +143,12 @@ impl CommandBuffer {
         self.finished = true;
         // SAFETY: `finished` keeps `drop` from taking the recording again.
         let recording = unsafe { ManuallyDrop::take(&mut self.recording) };
-        (recording, std::mem::take(&mut self.tlas_updates))
+        let outcome = Outcome {
+            tlas_updates: std::mem::take(&mut self.tlas_updates),
+            builds: std::mem::take(&mut self.open_builds),
+            size_queries: std::mem::take(&mut self.size_queries),
+        };
+        (recording, outcome)
     }
 }
 

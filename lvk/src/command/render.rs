@@ -8,12 +8,12 @@ use ash::vk;
 use super::CommandBuffer;
 use super::compute::check_arguments;
 use super::targets::Targets;
-use crate::barrier::{Stages, Use};
+use crate::barrier::Use;
 use crate::error::{Error, Result, check_limit};
 use crate::format::IndexFormat;
 use crate::gpu::caps::Limits;
 use crate::handle::{BufferHandle, RenderPipelineHandle};
-use crate::pipeline::RenderPipeline;
+use crate::pipeline::{FrontEnd, RenderPipeline};
 use crate::resource::Buffer;
 use crate::resource::buffer::BufferUsage;
 
@@ -28,7 +28,7 @@ use crate::resource::buffer::BufferUsage;
 /// }
 /// ```
 pub struct RenderPass<'a> {
-    cmd: &'a mut CommandBuffer,
+    pub(super) cmd: &'a mut CommandBuffer,
     targets: Targets,
     labelled: bool,
     pipeline: Option<Arc<RenderPipeline>>,
@@ -67,9 +67,11 @@ impl<'a> RenderPass<'a> {
             );
             return Err(Error::usage(&*pipeline.name, message));
         }
-        if pipeline.ray_query {
-            self.cmd.use_structures(Stages::PRE_RASTER | Stages::FRAGMENT);
-            self.track_inside("acceleration structures", &pipeline.name)?;
+        if !pipeline.query_stages.is_empty() {
+            self.cmd.use_structures(pipeline.query_stages);
+            let remedy =
+                "create the pipeline before the pass begins, or list a structure in the pass's dependencies";
+            self.track_inside("what the pipeline's ray queries see", &pipeline.name, remedy)?;
         }
         let point = vk::PipelineBindPoint::GRAPHICS;
         self.cmd.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
@@ -162,7 +164,7 @@ impl<'a> RenderPass<'a> {
 
     /// Draws vertices (`vkCmdDraw`).
     pub fn draw(&mut self, vertices: Range<u32>, instances: Range<u32>) -> Result<()> {
-        self.check_ready()?;
+        self.check_draw()?;
         let (count, instance_count) = (length(&vertices), length(&instances));
         // SAFETY: a pipeline is bound with all its vertex buffers and push constants.
         unsafe {
@@ -179,7 +181,7 @@ impl<'a> RenderPass<'a> {
         base_vertex: i32,
         instances: Range<u32>,
     ) -> Result<()> {
-        self.check_ready()?;
+        self.check_draw()?;
         let bound = self.bound_indices()?;
         if u64::from(indices.end) > bound.count {
             let message = format!("indices {indices:?} are drawn, but {} are bound", bound.count);
@@ -204,7 +206,7 @@ impl<'a> RenderPass<'a> {
         draw_count: u32,
         stride: u32,
     ) -> Result<()> {
-        self.check_ready()?;
+        self.check_draw()?;
         let size = size_of::<vk::DrawIndirectCommand>() as u64;
         let buffer = self.indirect(arguments, offset, draw_count, stride, size)?;
         let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
@@ -224,7 +226,7 @@ impl<'a> RenderPass<'a> {
         draw_count: u32,
         stride: u32,
     ) -> Result<()> {
-        self.check_ready()?;
+        self.check_draw()?;
         self.bound_indices()?;
         let size = size_of::<vk::DrawIndexedIndirectCommand>() as u64;
         let buffer = self.indirect(arguments, offset, draw_count, stride, size)?;
@@ -237,7 +239,7 @@ impl<'a> RenderPass<'a> {
     }
 
     /// One call for all draws, or one for each where the device takes no more.
-    fn indirect_calls(
+    pub(super) fn indirect_calls(
         &self,
         offset: u64,
         draw_count: u32,
@@ -248,7 +250,7 @@ impl<'a> RenderPass<'a> {
         (0..calls).map(move |call| (offset + u64::from(call) * u64::from(stride), draws))
     }
 
-    fn indirect(
+    pub(super) fn indirect(
         &mut self,
         arguments: BufferHandle,
         offset: u64,
@@ -275,10 +277,13 @@ impl<'a> RenderPass<'a> {
         self.indices.as_ref().ok_or_else(|| Error::usage("draw_indexed", "bind an index buffer first"))
     }
 
-    fn check_ready(&self) -> Result<()> {
-        let Some(pipeline) = &self.pipeline else {
-            return Err(Error::usage("draw", "bind a render pipeline first"));
-        };
+    /// Fails unless a pipeline with a vertex shader is bound with all it reads.
+    fn check_draw(&self) -> Result<()> {
+        let pipeline = self.bound("draw")?;
+        if pipeline.front_end != FrontEnd::Vertex {
+            let message = "it has a mesh shader; draw with draw_mesh_tasks or draw_mesh_tasks_indirect";
+            return Err(Error::usage(&*pipeline.name, message));
+        }
         let needed = (1_u32 << pipeline.vertex_binding_count) - 1;
         if self.vertex_slots & needed != needed {
             let message = format!("it reads {} vertex buffers; bind them all", pipeline.vertex_binding_count);
@@ -287,19 +292,32 @@ impl<'a> RenderPass<'a> {
         self.cmd.check_pushed(&pipeline.name, pipeline.push_constant_bytes)
     }
 
+    /// The bound pipeline, which has a mesh shader and all it reads.
+    pub(super) fn ready_mesh(&self) -> Result<&RenderPipeline> {
+        let pipeline = self.bound("draw_mesh_tasks")?;
+        if pipeline.front_end == FrontEnd::Vertex {
+            let message = "it has no mesh shader; draw with draw, draw_indexed or their indirect forms";
+            return Err(Error::usage(&*pipeline.name, message));
+        }
+        self.cmd.check_pushed(&pipeline.name, pipeline.push_constant_bytes)?;
+        Ok(pipeline)
+    }
+
+    fn bound(&self, call: &str) -> Result<&RenderPipeline> {
+        self.pipeline.as_deref().ok_or_else(|| Error::usage(call, "bind a render pipeline first"))
+    }
+
     /// The pass reads a buffer; no barrier can be placed any more.
     fn read_inside(&mut self, buffer: &Buffer, next: Use) -> Result<()> {
         self.cmd.use_buffer(buffer, next);
-        self.track_inside("the buffer", &buffer.name)
+        self.track_inside("the buffer", &buffer.name, "list it in the pass's dependencies")
     }
 
-    fn track_inside(&mut self, what: &str, name: &str) -> Result<()> {
+    fn track_inside(&mut self, what: &str, name: &str, remedy: &str) -> Result<()> {
         let recording = &mut *self.cmd.recording;
         if self.cmd.uses.need_barriers(&recording.tracker) {
             self.cmd.uses.clear();
-            let message = format!(
-                "{what} was written earlier in this command buffer; list it in the pass's dependencies"
-            );
+            let message = format!("{what} was written earlier in this command buffer; {remedy}");
             return Err(Error::usage(name, message));
         }
         self.cmd.barriers.clear();

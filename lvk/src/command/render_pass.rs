@@ -28,7 +28,7 @@ pub struct RenderPassDesc<'a> {
     /// Depth target.
     pub depth: Option<DepthAttachment>,
     /// What the pass's shaders reach bindlessly, and what its draws read that was written earlier in the same command
-    /// buffer: no barrier can be placed inside a pass.
+    /// buffer: no barrier can be placed inside a pass. Acceleration structures need not be listed.
     pub dependencies: Dependencies<'a>,
     /// Name of the pass in debuggers; empty for none.
     pub debug_name: &'a str,
@@ -41,6 +41,7 @@ impl CommandBuffer {
         let mut targets = None;
         self.flush_after(|cmd| {
             targets = Some(cmd.use_targets(desc.color, desc.depth.as_ref())?);
+            cmd.use_built_structures();
             cmd.use_dependencies(&desc.dependencies, Stages::PRE_RASTER | Stages::FRAGMENT)?;
             cmd.use_draw_inputs(&desc.dependencies)
         })?;

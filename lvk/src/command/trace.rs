@@ -1,13 +1,18 @@
 //! Traces of ray tracing pipelines.
 
+use std::sync::Arc;
+
 use ash::vk;
 
 use super::CommandBuffer;
+use super::compute::check_arguments;
 use super::dependencies::Dependencies;
 use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::caps::Limits;
-use crate::handle::RayTracingPipelineHandle;
+use crate::handle::{BufferHandle, RayTracingPipelineHandle};
+use crate::pipeline::RayTracingPipeline;
+use crate::pipeline::ray_tracing::TraceRegions;
 
 impl CommandBuffer {
     /// Binds a ray tracing pipeline for the traces that follow (`vkCmdBindPipeline`).
@@ -15,6 +20,9 @@ impl CommandBuffer {
         let pipeline = self.shared.store.ray_tracing_pipelines.get(pipeline)?;
         let point = vk::PipelineBindPoint::RAY_TRACING_KHR;
         self.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
+        let ext = self.shared.gpu.ray_tracing()?;
+        // SAFETY: the command buffer is being recorded, and the size is that of the pipeline just bound.
+        unsafe { ext.cmd_set_ray_tracing_pipeline_stack_size(self.raw(), pipeline.stack_bytes) };
         self.ray_tracing = Some(pipeline);
         Ok(())
     }
@@ -31,26 +39,17 @@ impl CommandBuffer {
         size: [u32; 3],
         dependencies: &Dependencies<'_>,
     ) -> Result<()> {
-        let pipeline = self.ray_tracing.clone();
-        let pipeline =
-            pipeline.ok_or_else(|| Error::usage("trace_rays", "bind a ray tracing pipeline first"))?;
-        self.check_pushed(&pipeline.name, pipeline.push_constant_bytes)?;
-        let regions = pipeline.regions(ray_gen)?;
+        let (pipeline, regions) = self.ready_trace(ray_gen)?;
         check_size(&self.shared.gpu.caps.limits, &pipeline.name, size)?;
         if size.contains(&0) {
             return Ok(());
         }
-        self.flush_after(|cmd| {
-            cmd.use_structures(Stages::RAY_TRACING);
-            cmd.use_buffer(&pipeline.table, Use::shader_read(Stages::RAY_TRACING));
-            cmd.use_dependencies(dependencies, Stages::RAY_TRACING)
-        })?;
-        let raw = self.raw();
+        self.flush_after(|cmd| cmd.use_trace(&pipeline, dependencies))?;
         let ext = self.shared.gpu.ray_tracing()?;
         // SAFETY: a ray tracing pipeline is bound, the regions are its own, and the size is within the limit.
         unsafe {
             ext.cmd_trace_rays(
-                raw,
+                self.raw(),
                 &regions.ray_gen,
                 &regions.miss,
                 &regions.hit,
@@ -61,6 +60,64 @@ impl CommandBuffer {
             );
         }
         Ok(())
+    }
+
+    /// Runs the ray generation shader at place `ray_gen` as often as three `u32` at `offset` in `arguments` say: width,
+    /// height and depth, of which any may be 0 (`vkCmdTraceRaysIndirectKHR`).
+    ///
+    /// `arguments` needs [`BufferUsage::INDIRECT`]; `offset` is a multiple of 4. That the size is within the device's
+    /// limits is up to whoever writes it.
+    ///
+    /// # Errors
+    /// [`Unsupported`](Error::Unsupported) without
+    /// [`trace_rays_indirect`](crate::Capabilities::trace_rays_indirect).
+    pub fn trace_rays_indirect(
+        &mut self,
+        ray_gen: u32,
+        arguments: BufferHandle,
+        offset: u64,
+        dependencies: &Dependencies<'_>,
+    ) -> Result<()> {
+        const ARGUMENT_BYTES: u64 = 12;
+        if !self.shared.gpu.caps.trace_rays_indirect {
+            return Err(self.shared.gpu.lacks("trace_rays_indirect: indirect traces"));
+        }
+        let (pipeline, regions) = self.ready_trace(ray_gen)?;
+        let buffer = self.shared.store.buffers.get(arguments)?;
+        check_arguments(&buffer, offset, ARGUMENT_BYTES)?;
+        self.flush_after(|cmd| {
+            cmd.use_buffer(&buffer, Use::indirect());
+            cmd.use_trace(&pipeline, dependencies)
+        })?;
+        let ext = self.shared.gpu.ray_tracing()?;
+        // SAFETY: a ray tracing pipeline is bound, the regions are its own, and the arguments lie inside the buffer.
+        unsafe {
+            ext.cmd_trace_rays_indirect(
+                self.raw(),
+                &regions.ray_gen,
+                &regions.miss,
+                &regions.hit,
+                &regions.callable,
+                buffer.address + offset,
+            );
+        }
+        Ok(())
+    }
+
+    /// The bound pipeline and its table, if everything its shaders need was pushed.
+    fn ready_trace(&self, ray_gen: u32) -> Result<(Arc<RayTracingPipeline>, TraceRegions)> {
+        let pipeline = self.ray_tracing.clone();
+        let pipeline =
+            pipeline.ok_or_else(|| Error::usage("trace_rays", "bind a ray tracing pipeline first"))?;
+        self.check_pushed(&pipeline.name, pipeline.push_constant_bytes)?;
+        let regions = pipeline.regions(ray_gen)?;
+        Ok((pipeline, regions))
+    }
+
+    fn use_trace(&mut self, pipeline: &RayTracingPipeline, dependencies: &Dependencies<'_>) -> Result<()> {
+        self.use_structures(Stages::RAY_TRACING);
+        self.use_buffer(&pipeline.table, Use::shader_read(Stages::RAY_TRACING));
+        self.use_dependencies(dependencies, Stages::RAY_TRACING)
     }
 }
 

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::gpu::caps::FeatureRequest;
 use crate::gpu::debug::{Validation, ValidationSink};
+use crate::gpu::profile::DeviceProfile;
 
 /// Describes a context.
 #[derive(Debug, Clone)]
@@ -23,14 +24,25 @@ pub struct ContextDesc<'a> {
     pub ray_tracing_pipeline: FeatureRequest,
     /// Ray queries in any shader stage.
     pub ray_query: FeatureRequest,
+    /// Another device to rehearse on this one, also by the requirements above; none for the device as it is.
+    pub profile: Option<&'a DeviceProfile>,
     /// Frames the CPU may be ahead of the GPU; see [`Context::next_frame`](crate::Context::next_frame). 1 to 8.
     pub frames_in_flight: u32,
     /// Size of the staging ring in bytes. Larger uploads get memory of their own.
     pub staging_bytes: u64,
     /// Most scratch memory for the builds of acceleration structures, in bytes. One build that needs more gets it.
     pub scratch_budget_bytes: u64,
+    /// Most memory for acceleration structures, in bytes. A creation that would exceed it fails and leaves nothing
+    /// behind; compaction gives some back.
+    pub accel_budget_bytes: u64,
     /// Room for textures in the bindless set; clamped to what the device allows.
     pub max_textures: u32,
+    /// A file that keeps compiled pipelines from one run to the next (`VkPipelineCache`). It is read at the start,
+    /// replaced by [`Context::save_pipeline_cache`](crate::Context::save_pipeline_cache) and at the end of the context.
+    ///
+    /// A file that is damaged, or of another device or driver, is dropped with a warning to the `log` crate, never an
+    /// error. Drivers trust what is in it, so it belongs into a folder that nobody else can write.
+    pub pipeline_cache: Option<&'a Path>,
 }
 
 impl Default for ContextDesc<'_> {
@@ -43,10 +55,13 @@ impl Default for ContextDesc<'_> {
             validation_sink: None,
             ray_tracing_pipeline: FeatureRequest::Optional,
             ray_query: FeatureRequest::Optional,
+            profile: None,
             frames_in_flight: 2,
             staging_bytes: 16 << 20,
             scratch_budget_bytes: 64 << 20,
+            accel_budget_bytes: u64::MAX,
             max_textures: 16_384,
+            pipeline_cache: None,
         }
     }
 }

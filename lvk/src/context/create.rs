@@ -7,13 +7,12 @@ use super::holder::Holder;
 use crate::bindless::TextureViews;
 use crate::error::{Error, Result};
 use crate::handle::{
-    BufferHandle, ComputePipelineHandle, QueryPoolHandle, RayTracingPipelineHandle, RenderPipelineHandle,
-    SamplerHandle, ShaderModuleHandle, TextureHandle,
+    BufferHandle, ComputePipelineHandle, QueryPoolHandle, RenderPipelineHandle, SamplerHandle,
+    ShaderModuleHandle, TextureHandle,
 };
 use crate::pipeline::compute::ComputePipelineDesc;
-use crate::pipeline::graphics::RenderPipelineDesc;
-use crate::pipeline::ray_tracing::RayTracingPipelineDesc;
-use crate::pipeline::{ComputePipeline, RayTracingPipeline, RenderPipeline, ShaderModule};
+use crate::pipeline::graphics_desc::RenderPipelineDesc;
+use crate::pipeline::{ComputePipeline, RenderPipeline, ShaderModule};
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::resource::query::QueryPoolDesc;
 use crate::resource::sampler::SamplerDesc;
@@ -22,7 +21,7 @@ use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::shader::ShaderModuleDesc;
 
 /// Objects that take no bindless slot.
-const NO_SLOT: u32 = 0;
+pub(super) const NO_SLOT: u32 = 0;
 
 impl Context {
     /// Creates a buffer (`vkCreateBuffer`). Its first contents are there for every command submitted afterwards.
@@ -95,27 +94,29 @@ impl Context {
     ///
     /// # Errors
     /// [`Shader`](Error::Shader) with the compiler's text and the caller's own line numbers;
-    /// [`Unsupported`](Error::Unsupported) when the module uses a capability whose feature the device lacks, and for
-    /// task and mesh stages.
+    /// [`Unsupported`](Error::Unsupported) when the module uses a capability whose feature the device lacks, such as
+    /// those of the task and mesh stages.
     pub fn create_shader_module(&self, desc: &ShaderModuleDesc<'_>) -> Result<Holder<ShaderModuleHandle>> {
         let shared = self.shared();
         let module = ShaderModule::new(&shared.gpu, desc, shared.layout.push_constant_bytes)?;
         Ok(Holder::new(self, shared.store.shader_modules.insert(module), NO_SLOT))
     }
 
-    /// Creates a graphics pipeline (`vkCreateGraphicsPipelines`).
+    /// Creates a graphics pipeline (`vkCreateGraphicsPipelines`) of a vertex shader, or of a mesh shader with or without
+    /// a task shader.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) when the stages do not go together, or the shaders and the description
+    /// disagree; [`Unsupported`](Error::Unsupported) for mesh shaders and for formats that the device lacks;
+    /// [`LimitExceeded`](Error::LimitExceeded) for workgroups and outputs of mesh shaders, and for targets.
     pub fn create_render_pipeline(
         &self,
         desc: &RenderPipelineDesc<'_>,
     ) -> Result<Holder<RenderPipelineHandle>> {
         let shared = self.shared();
-        let vertex = self.required_module(desc.vertex, desc.debug_name, "vertex")?;
-        let fragment = match desc.fragment {
-            Some(handle) => Some(shared.store.shader_modules.get(handle)?),
-            None => None,
-        };
-        let layout = shared.layout.raw;
-        let pipeline = RenderPipeline::new(&shared.gpu, layout, desc, &vertex, fragment.as_deref())?;
+        let find = |handle| shared.store.shader_modules.get(handle);
+        let pipeline = RenderPipeline::new(&shared.gpu, shared.pipeline_base(), desc, &find)?;
+        shared.graphics_queries.insert(pipeline.query_stages);
         Ok(Holder::new(self, shared.store.render_pipelines.insert(pipeline), NO_SLOT))
     }
 
@@ -126,22 +127,8 @@ impl Context {
     ) -> Result<Holder<ComputePipelineHandle>> {
         let shared = self.shared();
         let module = self.required_module(desc.module, desc.debug_name, "compute")?;
-        let pipeline = ComputePipeline::new(&shared.gpu, shared.layout.raw, desc, &module)?;
+        let pipeline = ComputePipeline::new(&shared.gpu, shared.pipeline_base(), desc, &module)?;
         Ok(Holder::new(self, shared.store.compute_pipelines.insert(pipeline), NO_SLOT))
-    }
-
-    /// Creates a ray tracing pipeline with its shader binding table (`vkCreateRayTracingPipelinesKHR`).
-    pub fn create_ray_tracing_pipeline(
-        &self,
-        desc: &RayTracingPipelineDesc<'_>,
-    ) -> Result<Holder<RayTracingPipelineHandle>> {
-        let shared = self.shared();
-        let find = |handle| shared.store.shader_modules.get(handle);
-        let (pipeline, table) = RayTracingPipeline::new(&shared.gpu, shared.layout.raw, desc, &find)?;
-        let target = Arc::clone(&pipeline.table);
-        let holder = Holder::new(self, shared.store.ray_tracing_pipelines.insert(pipeline), NO_SLOT);
-        self.before_next_submission(|cmd| cmd.upload_buffer(&target, table.offset, &table.bytes))?;
-        Ok(holder)
     }
 
     /// Creates a pool of timestamp queries (`vkCreateQueryPool`), all ready to be written.

@@ -1,11 +1,20 @@
-//! Creates acceleration structures. Their builds run before the next submission; nothing waits.
+//! Creates acceleration structures. Their builds run before the next submission.
+
+use std::sync::Arc;
+
+use ash::vk;
 
 use super::Context;
 use super::holder::Holder;
 use crate::accel::AccelStruct;
+use crate::accel::blas::{Blas, BlasBody, PartShape};
 use crate::accel::build::{BuildInput, transforms};
 use crate::accel::desc::{BlasDesc, TlasDesc};
-use crate::accel::structure::{AccelKind, AccelStructSizes, Blas, BuildMode, Tlas};
+use crate::accel::flags::{AccelStructSizes, BuildMode};
+use crate::accel::instance::InstancePlan;
+use crate::accel::raw_structure::RawStructure;
+use crate::accel::structure::AccelKind;
+use crate::accel::tlas::Tlas;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::memory::MemoryKind;
 use crate::handle::AccelStructHandle;
@@ -15,68 +24,109 @@ use crate::shared::Shared;
 
 impl Context {
     /// Creates a bottom-level structure from geometries and builds it before the next submission.
+    ///
+    /// See [`create_blas_batch`](Self::create_blas_batch).
     pub fn create_blas(&self, desc: &BlasDesc<'_>) -> Result<Holder<AccelStructHandle>> {
         let mut made = self.create_blas_batch(std::slice::from_ref(desc))?;
         made.pop().ok_or_else(|| Error::usage(desc.debug_name, "nothing was built"))
     }
 
-    /// Creates many bottom-level structures, built together within the scratch budget before the next submission.
+    /// Creates many bottom-level structures and builds them together, within the scratch budget
+    /// ([`ContextDesc::scratch_budget_bytes`](crate::ContextDesc)).
+    ///
+    /// Nothing waits: a batch whose builds fill the scratch budget several times goes to the GPU in as many submissions
+    /// at once, the last of them before the next submission of the caller, who may use the handles in it.
+    /// [`build_progress`](Self::build_progress) says how far the GPU is. Small structures share buffers.
+    ///
+    /// A mesh that would exceed the device's limits for scratch memory, structure size or primitives is cut into
+    /// spatially compact parts behind its one handle; see [`PrimitiveOrder`](crate::PrimitiveOrder) for meshes that are
+    /// put into another order. Both read the inputs back once for the whole batch, and that does wait. Both go by the
+    /// contents of the buffers now; later contents may be anything.
+    ///
+    /// # Errors
+    /// Typed, and nothing of the batch is left behind: formats, index types and counts that the device does not take,
+    /// buffers that are too small or lack [`BufferUsage::ACCEL_INPUT`], a memory budget that is used up
+    /// ([`ContextDesc::accel_budget_bytes`](crate::ContextDesc)).
     pub fn create_blas_batch(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Holder<AccelStructHandle>>> {
+        let shapes = self.blas_shapes(descs)?;
         let mut holders = Vec::with_capacity(descs.len());
         let mut objects = Vec::with_capacity(descs.len());
-        for desc in descs {
-            let handle = self.shared().store.accel_structs.insert(new_blas(self.shared(), desc)?);
+        for (desc, parts) in descs.iter().zip(shapes) {
+            let handle = self.shared().store.accel_structs.insert(new_blas(self.shared(), desc, parts)?);
             holders.push(Holder::new(self, handle, 0));
             objects.push(self.shared().store.accel_structs.get(handle)?);
         }
-        self.before_next_submission(|cmd| cmd.build_all(&objects, BuildMode::Rebuild))?;
+        self.build_batch(&objects)?;
         Ok(holders)
+    }
+
+    /// Builds structures for the first time: one submission for each scratch budget that they fill.
+    fn build_batch(&self, objects: &[Arc<AccelStruct>]) -> Result<()> {
+        let budget = self.shared().scratch_budget();
+        let (mut first, mut scratch) = (0, 0_u64);
+        for (index, object) in objects.iter().enumerate() {
+            let next: u64 = object.blas()?.parts.iter().map(|part| part.sizes.build_scratch_bytes).sum();
+            if index > first && scratch.saturating_add(next) > budget {
+                let chunk = &objects[first..index];
+                self.before_next_submission(|cmd| cmd.build_all(chunk, BuildMode::Rebuild))?;
+                self.flush()?;
+                (first, scratch) = (index, 0);
+            }
+            scratch = scratch.saturating_add(next);
+        }
+        self.before_next_submission(|cmd| cmd.build_all(&objects[first..], BuildMode::Rebuild))
     }
 
     /// Creates a top-level structure and builds it before the next submission. [`Holder::index`] is its element of
     /// `kTLAS[]`.
+    ///
+    /// # Errors
+    /// As [`CommandBuffer::update_tlas`](crate::CommandBuffer::update_tlas), and
+    /// [`LimitExceeded`](Error::LimitExceeded) for more instances than the device takes.
     pub fn create_tlas(&self, desc: &TlasDesc<'_>) -> Result<Holder<AccelStructHandle>> {
         let shared = self.shared();
         shared.gpu.accel()?;
         let slot = shared.reserve(|| shared.bindless.reserve_tlas(desc.debug_name))?;
         let tlas = new_tlas(shared, desc, slot).inspect_err(|_| shared.bindless.free_tlas(slot))?;
-        shared.bindless.set_tlas(slot, tlas.raw);
+        if let AccelKind::Tlas(object) = &tlas.kind {
+            shared.bindless.set_tlas(slot, object.structure.raw);
+        }
         let handle = shared.store.accel_structs.insert(tlas);
         let holder = Holder::new(self, handle, slot);
         self.before_next_submission(|cmd| cmd.update_tlas(handle, desc.instances, BuildMode::Rebuild))?;
         Ok(holder)
     }
-
-    /// Bytes a bottom-level structure would take (`vkGetAccelerationStructureBuildSizesKHR`).
-    pub fn blas_sizes(&self, desc: &BlasDesc<'_>) -> Result<AccelStructSizes> {
-        sizes_of_blas(self.shared(), desc)
-    }
-
-    /// Bytes an acceleration structure takes.
-    pub fn accel_struct_sizes(&self, handle: AccelStructHandle) -> Result<AccelStructSizes> {
-        Ok(self.shared().store.accel_structs.get(handle)?.sizes)
-    }
 }
 
-fn sizes_of_blas(shared: &Shared, desc: &BlasDesc<'_>) -> Result<AccelStructSizes> {
-    desc.flags.check(desc.debug_name)?;
-    let find = |handle| shared.store.buffers.get(handle);
-    let has_transforms = desc.geometries.iter().any(|geometry| geometry.transform().is_some());
-    // A size query only looks at whether the address is null.
-    let transforms = has_transforms.then_some(16);
-    shared.gpu.accel()?;
-    BuildInput::blas(&shared.gpu, desc.debug_name, desc.geometries, desc.flags, &find, transforms)?
-        .sizes(&shared.gpu)
+/// Makes a bottom-level structure of these parts; nothing is built yet.
+fn new_blas(shared: &Shared, desc: &BlasDesc<'_>, parts: Vec<PartShape>) -> Result<AccelStruct> {
+    let name = desc.debug_name;
+    let structures: Result<Vec<_>> = parts
+        .iter()
+        .map(|part| {
+            let ty = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
+            let bytes = part.sizes.structure_bytes;
+            RawStructure::new(&shared.gpu, &shared.accel_storage, name, ty, bytes)
+        })
+        .collect();
+    let body = BlasBody { structures: structures?, compacted_from: None, rebuildable: true };
+    Ok(blas_object(shared, desc, parts, body)?)
 }
 
-fn new_blas(shared: &Shared, desc: &BlasDesc<'_>) -> Result<AccelStruct> {
-    let sizes = sizes_of_blas(shared, desc)?;
+/// The object behind the handle of a bottom-level structure.
+pub(super) fn blas_object(
+    shared: &Shared,
+    desc: &BlasDesc<'_>,
+    parts: Vec<PartShape>,
+    body: BlasBody,
+) -> Result<AccelStruct> {
     let transforms = match transforms(desc.geometries) {
         Some(matrices) => Some(new_transforms(shared, desc.debug_name, &matrices)?),
         None => None,
     };
-    let blas = Blas { geometries: desc.geometries.to_vec(), transforms };
-    AccelStruct::new(&shared.gpu, desc.debug_name, desc.flags, sizes, AccelKind::Blas(blas))
+    let sizes = parts.iter().map(|part| part.sizes).fold(AccelStructSizes::default(), AccelStructSizes::join);
+    let blas = Blas::new(desc.geometries.to_vec(), transforms, parts, body);
+    Ok(AccelStruct::new(desc.debug_name, desc.flags, sizes, AccelKind::Blas(blas)))
 }
 
 fn new_transforms(shared: &Shared, name: &str, matrices: &[f32]) -> Result<Buffer> {
@@ -96,10 +146,18 @@ fn new_transforms(shared: &Shared, name: &str, matrices: &[f32]) -> Result<Buffe
 /// Makes a top-level structure for a slot the caller reserved; nothing is built yet.
 pub(super) fn new_tlas(shared: &Shared, desc: &TlasDesc<'_>, slot: u32) -> Result<AccelStruct> {
     let name = desc.debug_name;
-    desc.flags.check(name)?;
+    desc.flags.check_tlas(name)?;
     let count = u32::try_from(desc.instances.len()).unwrap_or(u32::MAX);
     let capacity = desc.capacity.max(count);
-    check_limit(name, "instance capacity", capacity.into(), shared.gpu.caps.limits.max_tlas_instances)?;
-    let sizes = BuildInput::tlas(desc.flags, 0, capacity).sizes(&shared.gpu)?;
-    AccelStruct::new(&shared.gpu, name, desc.flags, sizes, AccelKind::Tlas(Tlas::new(slot, capacity)))
+    let plan = InstancePlan::new(name, desc.instances, |handle| shared.store.accel_structs.get(handle))?;
+    let average = u64::from(plan.built_count).div_ceil(u64::from(count.max(1)));
+    let room = u64::from(capacity) * average.max(desc.parts_per_instance.into());
+    check_limit(name, "instance capacity", room, shared.gpu.caps.limits.max_tlas_instances)?;
+    let room = u32::try_from(room).unwrap_or(u32::MAX);
+    let sizes = BuildInput::tlas(desc.flags, 0, room).sizes(&shared.gpu)?;
+    let ty = vk::AccelerationStructureTypeKHR::TOP_LEVEL;
+    let bytes = sizes.structure_bytes;
+    let structure = RawStructure::new(&shared.gpu, &shared.accel_storage, name, ty, bytes)?;
+    let tlas = Tlas::new(slot, capacity, room, structure);
+    Ok(AccelStruct::new(name, desc.flags, sizes, AccelKind::Tlas(tlas)))
 }

@@ -71,7 +71,7 @@ impl Context {
     }
 
     /// Runs a copy into a readback buffer, waits, and reads it.
-    fn read_back(
+    pub(super) fn read_back(
         &self,
         size: u64,
         bytes: &mut [u8],

@@ -2,7 +2,7 @@
 
 use super::Context;
 use crate::handle::{
-    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle,
+    AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
 };
 use crate::shared::{Garbage, Shared};
@@ -49,5 +49,12 @@ impl Destroy for ShaderModuleHandle {
     /// Pipelines do not need their modules once they are created.
     fn take_from(self, ctx: &Context) {
         drop(ctx.shared().store.shader_modules.remove(self));
+    }
+}
+
+impl Destroy for RayTracingLibraryHandle {
+    /// Pipelines linked from the library keep it.
+    fn take_from(self, ctx: &Context) {
+        drop(ctx.shared().store.ray_tracing_libraries.remove(self));
     }
 }

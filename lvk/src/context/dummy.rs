@@ -6,7 +6,7 @@ use super::Context;
 use super::create_accel::new_tlas;
 use crate::accel::AccelStruct;
 use crate::accel::desc::TlasDesc;
-use crate::accel::structure::BuildMode;
+use crate::accel::flags::BuildMode;
 use crate::bindless::Dummies;
 use crate::error::Result;
 use crate::resource::sampler::SamplerDesc;
@@ -26,12 +26,17 @@ pub(super) fn fill_dummies(ctx: &Context) -> Result<()> {
     let storage = checker(ctx, TextureUsage::STORAGE)?;
     let sampler = SamplerDesc { debug_name: "dummy sampler", ..Default::default() };
     let sampler = Sampler::new(&shared.gpu, &sampler, SLOT)?;
+    if let Some(table) = &shared.tlas_table {
+        let zeros = vec![0; table.size_bytes as usize];
+        ctx.before_next_submission(|cmd| cmd.upload_buffer(table, 0, &zeros))?;
+    }
     let tlas = if shared.gpu.accel.is_some() { Some(empty_tlas(ctx)?) } else { None };
     shared.bindless.fill(Dummies {
         sampled: sampled.sampled_view()?,
         storage: storage.storage_view()?,
         sampler: sampler.raw,
-        tlas: tlas.as_ref().map(|tlas| tlas.raw),
+        tlas: tlas.as_ref().and_then(|tlas| Some(tlas.tlas().ok()?.structure.raw)),
+        tlas_table: shared.tlas_table.as_ref().map(|table| table.raw),
     });
     let objects = DummyObjects { _textures: [sampled, storage], _sampler: sampler, _tlas: tlas };
     // The cell is empty: this runs once, while the context is made.

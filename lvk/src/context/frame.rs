@@ -55,6 +55,7 @@ impl Context {
             frames.start(submitted)
         };
         self.wait(self.submission(wait_for))?;
+        self.advance_compactions();
         Ok(frame)
     }
 

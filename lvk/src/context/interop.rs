@@ -3,6 +3,7 @@
 use ash::vk;
 
 use super::Context;
+use crate::accel::structure::AccelKind;
 use crate::error::Result;
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, RayTracingPipelineHandle, RenderPipelineHandle,
@@ -86,13 +87,30 @@ impl Context {
         Ok(self.shared().store.ray_tracing_pipelines.get(pipeline)?.raw)
     }
 
-    /// The acceleration structure behind a handle.
-    pub fn raw_accel_struct(&self, structure: AccelStructHandle) -> Result<vk::AccelerationStructureKHR> {
-        Ok(self.shared().store.accel_structs.get(structure)?.raw)
+    /// The acceleration structures behind a handle: one, or the parts of a split mesh. Compaction puts others in
+    /// their place, and destroys these once the GPU is done with them.
+    pub fn raw_accel_structs(
+        &self,
+        structure: AccelStructHandle,
+    ) -> Result<Vec<vk::AccelerationStructureKHR>> {
+        Ok(self.raw_structures(structure)?.into_iter().map(|(raw, _)| raw).collect())
     }
 
-    /// The device address of an acceleration structure, as instances hold it.
-    pub fn accel_struct_address(&self, structure: AccelStructHandle) -> Result<u64> {
-        Ok(self.shared().store.accel_structs.get(structure)?.address)
+    /// The device addresses of the same, as instances hold them.
+    pub fn accel_struct_addresses(&self, structure: AccelStructHandle) -> Result<Vec<u64>> {
+        Ok(self.raw_structures(structure)?.into_iter().map(|(_, address)| address).collect())
+    }
+
+    fn raw_structures(
+        &self,
+        structure: AccelStructHandle,
+    ) -> Result<Vec<(vk::AccelerationStructureKHR, u64)>> {
+        let object = self.shared().store.accel_structs.get(structure)?;
+        Ok(match &object.kind {
+            AccelKind::Tlas(tlas) => vec![(tlas.structure.raw, tlas.structure.address)],
+            AccelKind::Blas(blas) => {
+                blas.body().structures.iter().map(|part| (part.raw, part.address)).collect()
+            }
+        })
     }
 }

@@ -1,19 +1,26 @@
 //! The facade users hold: a context creates objects, moves data, hands out command buffers and submits them.
 
+pub(crate) mod accel_info;
+mod blas_shapes;
+mod compact;
 pub(crate) mod config;
 mod create;
 mod create_accel;
+mod create_ray_tracing;
 mod data;
 pub(crate) mod destroy;
 mod dummy;
 pub(crate) mod frame;
 pub(crate) mod holder;
 mod interop;
+mod read_bounds;
+pub(crate) mod serialize;
 mod start;
 mod submit;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use crate::accel::compaction::SizeQuery;
 use crate::command::CommandBuffer;
 use crate::error::Result;
 use crate::gpu::caps::Capabilities;
@@ -36,6 +43,8 @@ struct Inner {
     /// Uploads and builds that run before the next submission.
     pending: Mutex<Option<CommandBuffer>>,
     frames: Mutex<FrameRing>,
+    /// Compactions under way.
+    compactions: Mutex<Vec<Arc<SizeQuery>>>,
     shared: Arc<Shared>,
 }
 

@@ -1,6 +1,7 @@
 //! Makes a context.
 
 use std::path::Path;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, OnceLock};
 
 use super::config::ContextDesc;
@@ -8,15 +9,20 @@ use super::dummy::fill_dummies;
 use super::frame::FrameRing;
 use super::{Context, Inner};
 use crate::accel::scratch_buffer::ScratchBuffer;
-use crate::barrier::ResourceId;
+use crate::accel::storage::AccelStorage;
+use crate::barrier::{QueryStages, ResourceId};
 use crate::bindless::Bindless;
+use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::{Capabilities, PhysicalDevice};
 use crate::gpu::debug::{Validation, ValidationSink};
 use crate::gpu::device::RayTracing;
 use crate::gpu::instance::Instance;
-use crate::pipeline::PipelineLayout;
+use crate::kernel::Kernels;
+use crate::pipeline::{PipelineCache, PipelineLayout};
+use crate::resource::Buffer;
+use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::shared::Shared;
 use crate::store::Store;
 use crate::submit::Submitter;
@@ -35,10 +41,11 @@ impl Context {
         let wish = std::env::var("LVK_DEVICE").ok().filter(|wish| !wish.is_empty());
         let wish = wish.as_deref().or(desc.device);
         let request = RayTracing { pipeline: desc.ray_tracing_pipeline, query: desc.ray_query };
-        let gpu = Arc::new(Gpu::new(instance, wish, request)?);
+        let gpu = Arc::new(Gpu::new(instance, wish, request, desc.profile)?);
         let shared = Arc::new(new_shared(gpu, desc)?);
         let inner = Inner {
             pending: Mutex::default(),
+            compactions: Mutex::default(),
             frames: Mutex::new(FrameRing::new(desc.frames_in_flight)),
             shared,
         };
@@ -65,11 +72,31 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         staging: Staging::new(&gpu, desc.staging_bytes)?,
         scratch: ScratchBuffer::default(),
         scratch_budget_bytes: desc.scratch_budget_bytes,
+        accel_storage: AccelStorage::new(desc.accel_budget_bytes),
+        graphics_queries: QueryStages::default(),
+        kernels: Kernels::default(),
+        tlas_table: new_tlas_table(&gpu)?,
         layout: PipelineLayout::new(&gpu, bindless.set_layout)?,
+        pipeline_cache: desc.pipeline_cache.map(|path| PipelineCache::new(&gpu, path)).transpose()?,
         bindless,
         submitter: Submitter::new(&gpu)?,
         all_blas: ResourceId::next(),
         all_tlas: ResourceId::next(),
+        tlas_tables: ResourceId::next(),
+        outdated_tlas: AtomicBool::new(false),
         gpu,
     })
+}
+
+/// An entry for each element of `kTLAS[]`.
+fn new_tlas_table(gpu: &Arc<Gpu>) -> Result<Option<Arc<Buffer>>> {
+    if gpu.accel.is_none() {
+        return Ok(None);
+    }
+    let desc = BufferDesc {
+        size_bytes: u64::from(gpu.caps.limits.max_bindless_tlas.max(1)) * TLAS_TABLE_ENTRY_BYTES,
+        debug_name: "table of top-level structures",
+        ..Default::default()
+    };
+    Ok(Some(Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?)))
 }

@@ -22,22 +22,24 @@ impl Context {
         if !cmd.belongs_to(self.shared()) {
             return Err(Error::usage("submit", "the command buffer belongs to another context"));
         }
+        self.advance_compactions();
         let mut pending = self.pending();
         cmd.check_tlas_updates()?;
         self.send(pending.take().into_iter().chain([cmd]))
     }
 
     fn send(&self, commands: impl Iterator<Item = CommandBuffer>) -> Result<SubmitHandle> {
-        let (recordings, updates): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
+        let (recordings, outcomes): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
         let shared = self.shared();
         let value = shared.submitter.submit(recordings, || shared.bindless.flush())?;
-        updates.into_iter().flatten().for_each(|update| update.apply(shared));
+        outcomes.into_iter().for_each(|outcome| outcome.submit(shared, value));
         shared.collect()?;
         Ok(self.submission(value))
     }
 
     /// Submits uploads and builds that wait for the next submission, if there are any.
     pub fn flush(&self) -> Result<SubmitHandle> {
+        self.advance_compactions();
         let mut pending = self.pending();
         let Some(cmd) = pending.take() else { return Ok(self.last_submission()) };
         self.send([cmd].into_iter())

@@ -5,6 +5,7 @@ use std::ffi::CStr;
 use ash::vk;
 
 use super::features::{Features, Subgroups, missing};
+use super::mesh_limits::MeshLimits;
 use super::select::DeviceKind;
 use crate::error::{Error, Result};
 
@@ -41,8 +42,19 @@ pub struct Capabilities {
     pub is_cpu: bool,
     /// Ray tracing pipelines (`VK_KHR_ray_tracing_pipeline`) can be created and traced.
     pub ray_tracing_pipeline: bool,
+    /// Traces may take their size from a buffer (`rayTracingPipelineTraceRaysIndirect`).
+    pub trace_rays_indirect: bool,
+    /// Ray tracing pipelines may be linked from libraries (`VK_KHR_pipeline_library`).
+    pub pipeline_libraries: bool,
     /// Shaders may use ray queries (`VK_KHR_ray_query`).
     pub ray_query: bool,
+    /// Hit shaders and ray queries may read the corners of the triangle that was hit
+    /// (`VK_KHR_ray_tracing_position_fetch`).
+    pub position_fetch: bool,
+    /// Task and mesh shaders (`VK_EXT_mesh_shader`) can be drawn with.
+    pub mesh_shader: bool,
+    /// Name of the [`DeviceProfile`](crate::DeviceProfile) that was applied: what is said here is what it leaves.
+    pub profile: Option<String>,
     /// Why ray tracing is off although the device offers it: device creation with it failed, and was repeated without.
     pub ray_tracing_fallback: Option<String>,
     /// `gl_PrimitiveID` may be read in fragment shaders (`geometryShader`).
@@ -62,6 +74,17 @@ pub struct Capabilities {
     pub limits: Limits,
 }
 
+impl Capabilities {
+    /// Without the ray tracing that is not to be turned on.
+    pub(crate) fn limit_ray_tracing(&mut self, pipeline: bool, query: bool) {
+        self.ray_tracing_pipeline &= pipeline;
+        self.trace_rays_indirect &= pipeline;
+        self.pipeline_libraries &= pipeline;
+        self.ray_query &= query;
+        self.position_fetch &= self.ray_tracing_pipeline || self.ray_query;
+    }
+}
+
 /// Limits of the device, in the unit of each name.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Limits {
@@ -73,6 +96,8 @@ pub struct Limits {
     pub max_texture_layers: u32,
     /// Largest buffer in bytes (`maxBufferSize`).
     pub max_buffer_bytes: u64,
+    /// Most bytes a shader reaches through one storage buffer descriptor (`maxStorageBufferRange`).
+    pub max_storage_buffer_range: u64,
     /// Push constants in bytes (`maxPushConstantsSize`).
     pub max_push_constant_bytes: u32,
     /// Most colour targets of a render pass (`maxColorAttachments`).
@@ -105,12 +130,20 @@ pub struct Limits {
     pub max_blas_geometries: u64,
     /// Most primitives in a BLAS (`maxPrimitiveCount`).
     pub max_blas_primitives: u64,
+    /// Most bytes of one acceleration structure: `maxBufferSize`, or `maxStorageBufferRange` on drivers that are known
+    /// to fail beyond it.
+    pub max_accel_structure_bytes: u64,
+    /// Most bytes of scratch for the build of one acceleration structure; bounded as
+    /// [`max_accel_structure_bytes`](Self::max_accel_structure_bytes) is.
+    pub max_accel_scratch_bytes: u64,
     /// Most instances in a TLAS (`maxInstanceCount`).
     pub max_tlas_instances: u64,
     /// Deepest recursion of `traceRayEXT` (`maxRayRecursionDepth`).
     pub max_ray_recursion: u32,
     /// Most invocations of one trace (`maxRayDispatchInvocationCount`).
     pub max_trace_invocations: u32,
+    /// Largest hit attributes in bytes (`maxRayHitAttributeSize`).
+    pub max_hit_attribute_bytes: u32,
     /// Bytes of a shader group handle (`shaderGroupHandleSize`).
     pub sbt_handle_bytes: u32,
     /// Alignment of handles in bytes (`shaderGroupHandleAlignment`).
@@ -119,6 +152,8 @@ pub struct Limits {
     pub sbt_base_alignment: u32,
     /// Largest stride of a shader binding table in bytes (`maxShaderGroupStride`).
     pub sbt_max_stride: u32,
+    /// Of task and mesh shaders.
+    pub mesh: MeshLimits,
 }
 
 /// One physical device as found, before any is chosen.
@@ -179,7 +214,11 @@ impl PhysicalDevice {
         found.limit_ray_tracing(usable, usable);
         let caps = &mut self.capabilities;
         caps.ray_tracing_pipeline = found.ray_tracing_pipeline == vk::TRUE;
+        caps.trace_rays_indirect = found.trace_indirect == vk::TRUE;
+        caps.pipeline_libraries = caps.ray_tracing_pipeline && has(ash::khr::pipeline_library::NAME);
         caps.ray_query = found.ray_query == vk::TRUE;
+        caps.position_fetch = found.position_fetch == vk::TRUE;
+        caps.mesh_shader = found.mesh_shader == vk::TRUE;
         caps.primitive_id = found.core.geometry_shader == vk::TRUE;
         caps.formatless_storage_read = found.core.shader_storage_image_read_without_format == vk::TRUE;
         caps.shader_int64 = found.core.shader_int64 == vk::TRUE;
@@ -197,6 +236,7 @@ impl PhysicalDevice {
     ) {
         let mut accel = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
         let mut pipeline = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
+        let mut mesh = vk::PhysicalDeviceMeshShaderPropertiesEXT::default();
         let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
         let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
         let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
@@ -209,6 +249,9 @@ impl PhysicalDevice {
         }
         if self.capabilities.ray_tracing_pipeline {
             all = all.push_next(&mut pipeline);
+        }
+        if self.capabilities.mesh_shader {
+            all = all.push_next(&mut mesh);
         }
         // SAFETY: the chain holds only structures the device knows, and lives until the call returns.
         unsafe { instance.get_physical_device_properties2(self.raw, &mut all) };
@@ -227,6 +270,7 @@ impl PhysicalDevice {
         };
         caps.prefers_spatial_order = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.limits = limits(&plain.limits, &v12, &v13, &accel, &pipeline);
+        caps.limits.mesh = MeshLimits::of(&mesh);
     }
 }
 
@@ -241,6 +285,8 @@ fn found_features(
     let mut accel = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
     let mut pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default();
     let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
+    let mut positions = vk::PhysicalDeviceRayTracingPositionFetchFeaturesKHR::default();
+    let mut mesh = vk::PhysicalDeviceMeshShaderFeaturesEXT::default();
     let mut all = vk::PhysicalDeviceFeatures2::default()
         .push_next(&mut found.v11)
         .push_next(&mut found.v12)
@@ -254,6 +300,12 @@ fn found_features(
     if has(ash::khr::ray_query::NAME) {
         all = all.push_next(&mut query);
     }
+    if has(ash::khr::ray_tracing_position_fetch::NAME) {
+        all = all.push_next(&mut positions);
+    }
+    if has(ash::ext::mesh_shader::NAME) {
+        all = all.push_next(&mut mesh);
+    }
     if has(ash::ext::shader_atomic_float::NAME) {
         all = all.push_next(&mut found.float_atomics);
     }
@@ -261,8 +313,11 @@ fn found_features(
     unsafe { instance.get_physical_device_features2(raw, &mut all) };
     found.core = all.features;
     found.ray_tracing_pipeline = pipeline.ray_tracing_pipeline;
+    found.trace_indirect = pipeline.ray_tracing_pipeline_trace_rays_indirect;
     found.primitive_culling = pipeline.ray_traversal_primitive_culling;
     found.ray_query = query.ray_query;
+    found.position_fetch = positions.ray_tracing_position_fetch;
+    found.mesh_shader = mesh.mesh_shader & mesh.task_shader;
     let usable =
         accel.acceleration_structure & accel.descriptor_binding_acceleration_structure_update_after_bind;
     (found, usable == vk::TRUE)
@@ -295,11 +350,13 @@ fn limits(
     accel: &vk::PhysicalDeviceAccelerationStructurePropertiesKHR<'_>,
     pipeline: &vk::PhysicalDeviceRayTracingPipelinePropertiesKHR<'_>,
 ) -> Limits {
+    let accel_bytes = accel_bytes(v12.driver_id, plain.max_storage_buffer_range, v13.max_buffer_size);
     let mut limits = Limits {
         max_texture_2d: plain.max_image_dimension2_d,
         max_texture_cube: plain.max_image_dimension_cube,
         max_texture_layers: plain.max_image_array_layers,
         max_buffer_bytes: v13.max_buffer_size,
+        max_storage_buffer_range: plain.max_storage_buffer_range.into(),
         max_push_constant_bytes: plain.max_push_constants_size,
         max_color_targets: plain.max_color_attachments.min(8),
         max_dispatch_groups: plain.max_compute_work_group_count,
@@ -316,16 +373,30 @@ fn limits(
         scratch_alignment: accel.min_acceleration_structure_scratch_offset_alignment.max(1),
         max_blas_geometries: accel.max_geometry_count,
         max_blas_primitives: accel.max_primitive_count,
+        max_accel_structure_bytes: accel_bytes,
+        max_accel_scratch_bytes: accel_bytes,
         max_tlas_instances: accel.max_instance_count,
         max_ray_recursion: pipeline.max_ray_recursion_depth,
         max_trace_invocations: pipeline.max_ray_dispatch_invocation_count,
+        max_hit_attribute_bytes: pipeline.max_ray_hit_attribute_size,
         sbt_handle_bytes: pipeline.shader_group_handle_size,
         sbt_handle_alignment: pipeline.shader_group_handle_alignment.max(1),
         sbt_base_alignment: pipeline.shader_group_base_alignment.max(1),
         sbt_max_stride: pipeline.max_shader_group_stride,
+        mesh: MeshLimits::default(),
     };
     size_bindless(&mut limits, v12, accel);
     limits
+}
+
+/// Most bytes of an acceleration structure or of its scratch. Builds on Arm's own driver fail where either is beyond
+/// the range of a storage buffer, though Vulkan knows no such limit.
+fn accel_bytes(driver: vk::DriverId, storage_range: u32, buffer_bytes: u64) -> u64 {
+    if driver == vk::DriverId::ARM_PROPRIETARY {
+        buffer_bytes.min(storage_range.into())
+    } else {
+        buffer_bytes
+    }
 }
 
 /// Sizes the arrays of the one descriptor set. A texture takes a sampled and a storage slot, and all slots of a
@@ -371,5 +442,19 @@ fn kind(raw: vk::PhysicalDeviceType) -> DeviceKind {
         vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
         vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
         _ => DeviceKind::Other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_arms_driver_bounds_structures_by_the_storage_range() {
+        let (range, buffer) = (1 << 28, 1 << 40);
+        assert_eq!(accel_bytes(vk::DriverId::ARM_PROPRIETARY, range, buffer), 1 << 28);
+        assert_eq!(accel_bytes(vk::DriverId::ARM_PROPRIETARY, range, 1 << 20), 1 << 20);
+        assert_eq!(accel_bytes(vk::DriverId::NVIDIA_PROPRIETARY, range, buffer), buffer);
+        assert_eq!(accel_bytes(vk::DriverId::MESA_PANVK, range, buffer), buffer);
     }
 }

@@ -11,6 +11,7 @@ use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
 use super::debug::c_name;
 use super::features::Features;
 use super::instance::Instance;
+use super::profile::DeviceProfile;
 use super::select::{Candidate, choose};
 use crate::error::{Error, Result};
 
@@ -27,9 +28,12 @@ pub(crate) struct Gpu {
     pub(crate) caps: Capabilities,
     /// Those that are on.
     pub(crate) features: Features,
+    /// What was applied to `caps`; the default where the caller gave none.
+    pub(crate) profile: DeviceProfile,
     pub(crate) queue_family: u32,
     pub(crate) accel: Option<ash::khr::acceleration_structure::Device>,
     pub(crate) ray_tracing: Option<ash::khr::ray_tracing_pipeline::Device>,
+    pub(crate) mesh: Option<ash::ext::mesh_shader::Device>,
     physical: vk::PhysicalDevice,
     debug_utils: Option<ash::ext::debug_utils::Device>,
     allocator: Mutex<Option<Allocator>>,
@@ -39,8 +43,13 @@ pub(crate) struct Gpu {
 }
 
 impl Gpu {
-    pub(crate) fn new(instance: Instance, wish: Option<&str>, request: RayTracing) -> Result<Self> {
-        let chosen = choose_device(&instance, wish, request)?;
+    pub(crate) fn new(
+        instance: Instance,
+        wish: Option<&str>,
+        request: RayTracing,
+        profile: Option<&DeviceProfile>,
+    ) -> Result<Self> {
+        let chosen = choose_device(&instance, wish, request, profile)?;
         let (device, caps, features) = create_with_fallback(&instance, &chosen, request)?;
         let queue_family = chosen.queue_family.unwrap_or_default();
         let allocator = match new_allocator(&instance, &device, chosen.raw) {
@@ -61,6 +70,7 @@ impl Gpu {
             ray_tracing: caps
                 .ray_tracing_pipeline
                 .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
+            mesh: caps.mesh_shader.then(|| ash::ext::mesh_shader::Device::new(raw, &device)),
             debug_utils: instance.debug_utils.then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             allocator: Mutex::new(Some(allocator)),
             queue: Mutex::new(queue),
@@ -68,6 +78,7 @@ impl Gpu {
             device,
             caps,
             features,
+            profile: profile.cloned().unwrap_or_default(),
             instance,
         })
     }
@@ -92,13 +103,18 @@ impl Gpu {
         self.ray_tracing.as_ref().ok_or_else(|| self.lacks("ray tracing pipelines"))
     }
 
+    /// The functions of `VK_EXT_mesh_shader`, or the error that says what the device lacks.
+    pub(crate) fn mesh(&self) -> Result<&ash::ext::mesh_shader::Device> {
+        self.mesh.as_ref().ok_or_else(|| self.lacks("mesh shaders"))
+    }
+
     /// An [`Error::Unsupported`] that names the device.
     pub(crate) fn lacks(&self, what: &str) -> Error {
-        let reason = self
-            .caps
-            .ray_tracing_fallback
-            .as_deref()
-            .unwrap_or("its driver does not offer it, or it was turned off");
+        let profile = Some(&self.profile).filter(|profile| profile.hides());
+        let profile = profile.map(|profile| format!("the device profile '{}' hides it, ", profile.name));
+        let reason = self.caps.ray_tracing_fallback.clone().unwrap_or_else(|| {
+            format!("{}its driver does not offer it, or it was turned off", profile.unwrap_or_default())
+        });
         Error::unsupported(what, format!("the device '{}' has none: {reason}", self.caps.device_name))
     }
 
@@ -176,7 +192,12 @@ impl Drop for Gpu {
     }
 }
 
-fn choose_device(instance: &Instance, wish: Option<&str>, request: RayTracing) -> Result<PhysicalDevice> {
+fn choose_device(
+    instance: &Instance,
+    wish: Option<&str>,
+    request: RayTracing,
+    profile: Option<&DeviceProfile>,
+) -> Result<PhysicalDevice> {
     let mut devices = Vec::new();
     for raw in instance.physical_devices()? {
         devices.push(PhysicalDevice::query(&instance.raw, raw)?);
@@ -184,26 +205,40 @@ fn choose_device(instance: &Instance, wish: Option<&str>, request: RayTracing) -
     if devices.is_empty() {
         return Err(Error::NoVulkan { reason: "the loader found no device".to_owned() });
     }
-    let candidates: Vec<_> = devices.iter().map(|device| candidate(device, request)).collect();
+    let candidates: Vec<_> = devices.iter_mut().map(|device| candidate(device, request, profile)).collect();
     let index = choose(&candidates, wish)?;
     Ok(devices.swap_remove(index))
 }
 
-fn candidate(device: &PhysicalDevice, request: RayTracing) -> Candidate {
-    let caps = &device.capabilities;
-    let optional = [
-        (request.pipeline, caps.ray_tracing_pipeline, "ray tracing pipelines"),
-        (request.query, caps.ray_query, "ray queries"),
-    ];
+/// The device as the choice sees it, under the profile.
+fn candidate(device: &mut PhysicalDevice, request: RayTracing, profile: Option<&DeviceProfile>) -> Candidate {
+    let has = |caps: &Capabilities| [caps.ray_tracing_pipeline, caps.ray_query];
+    let found = has(&device.capabilities);
+    if let Some(profile) = profile {
+        profile.apply(&mut device.capabilities);
+    }
+    let (requests, left) = ([request.pipeline, request.query], has(&device.capabilities));
     let mut missing = device.missing.clone();
-    let lacks = optional.iter().filter(|(wanted, has, _)| *wanted == FeatureRequest::Required && !has);
-    missing.extend(lacks.map(|(_, _, name)| (*name).to_owned()));
+    for (index, name) in ["ray tracing pipelines", "ray queries"].into_iter().enumerate() {
+        if requests[index] == FeatureRequest::Required && !left[index] {
+            missing.push(lack(name, profile.filter(|_| found[index])));
+        }
+    }
+    let caps = &device.capabilities;
     Candidate {
         name: caps.device_name.clone(),
         kind: device.kind,
         local_memory_bytes: device.local_memory_bytes,
         missing,
-        optional_score: optional.iter().filter(|(wanted, has, _)| wanted.wants() && *has).count() as u32,
+        optional_score: requests.iter().zip(left).filter(|(wanted, has)| wanted.wants() && *has).count()
+            as u32,
+    }
+}
+
+fn lack(name: &str, hidden_by: Option<&DeviceProfile>) -> String {
+    match hidden_by {
+        Some(profile) => format!("{name} (hidden by the device profile '{}')", profile.name),
+        None => name.to_owned(),
     }
 }
 
@@ -214,8 +249,7 @@ fn create_with_fallback(
     request: RayTracing,
 ) -> Result<(ash::Device, Capabilities, Features)> {
     let mut caps = chosen.capabilities.clone();
-    caps.ray_tracing_pipeline &= request.pipeline.wants();
-    caps.ray_query &= request.query.wants();
+    caps.limit_ray_tracing(request.pipeline.wants(), request.query.wants());
     let first = match create(instance, chosen, &caps) {
         Ok((device, features)) => return Ok((device, caps, features)),
         Err(error) => error,
@@ -224,8 +258,7 @@ fn create_with_fallback(
     if !optional || !(caps.ray_tracing_pipeline || caps.ray_query) {
         return Err(Error::vulkan("vkCreateDevice")(first));
     }
-    caps.ray_tracing_pipeline = false;
-    caps.ray_query = false;
+    caps.limit_ray_tracing(false, false);
     caps.limits.max_bindless_tlas = 0;
     caps.ray_tracing_fallback = Some(format!("vkCreateDevice with ray tracing answered {first}"));
     log::warn!("{}: ray tracing is off: vkCreateDevice with it answered {first}", caps.device_name);
@@ -244,8 +277,12 @@ fn create(
         .descriptor_binding_acceleration_structure_update_after_bind(true);
     let mut pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default()
         .ray_tracing_pipeline(true)
+        .ray_tracing_pipeline_trace_rays_indirect(features.trace_indirect == vk::TRUE)
         .ray_traversal_primitive_culling(features.primitive_culling == vk::TRUE);
     let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+    let mut positions =
+        vk::PhysicalDeviceRayTracingPositionFetchFeaturesKHR::default().ray_tracing_position_fetch(true);
+    let mut mesh = vk::PhysicalDeviceMeshShaderFeaturesEXT::default().mesh_shader(true).task_shader(true);
     let mut chain = features;
     let mut all = vk::PhysicalDeviceFeatures2::default()
         .features(chain.core)
@@ -260,6 +297,12 @@ fn create(
     }
     if caps.ray_query {
         all = all.push_next(&mut query);
+    }
+    if caps.position_fetch {
+        all = all.push_next(&mut positions);
+    }
+    if caps.mesh_shader {
+        all = all.push_next(&mut mesh);
     }
     if features.has_float_atomics() {
         all = all.push_next(&mut chain.float_atomics);
@@ -281,6 +324,8 @@ fn create(
 fn enabled(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) -> Features {
     let mut features = chosen.features;
     features.limit_ray_tracing(caps.ray_tracing_pipeline, caps.ray_query);
+    features.position_fetch &= vk::Bool32::from(caps.position_fetch);
+    features.mesh_shader &= vk::Bool32::from(caps.mesh_shader);
     if instance.gpu_assisted {
         features.core.robust_buffer_access = vk::FALSE;
     }
@@ -296,8 +341,17 @@ fn extensions(features: &Features, caps: &Capabilities) -> Vec<*const c_char> {
     if caps.ray_tracing_pipeline {
         names.push(ash::khr::ray_tracing_pipeline::NAME.as_ptr());
     }
+    if caps.pipeline_libraries {
+        names.push(ash::khr::pipeline_library::NAME.as_ptr());
+    }
     if caps.ray_query {
         names.push(ash::khr::ray_query::NAME.as_ptr());
+    }
+    if caps.position_fetch {
+        names.push(ash::khr::ray_tracing_position_fetch::NAME.as_ptr());
+    }
+    if caps.mesh_shader {
+        names.push(ash::ext::mesh_shader::NAME.as_ptr());
     }
     if features.has_float_atomics() {
         names.push(ash::ext::shader_atomic_float::NAME.as_ptr());

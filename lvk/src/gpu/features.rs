@@ -12,8 +12,13 @@ pub(crate) struct Features {
     /// `VK_EXT_shader_atomic_float`; nothing is on where the device lacks the extension.
     pub(crate) float_atomics: vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'static>,
     pub(crate) ray_tracing_pipeline: vk::Bool32,
+    pub(crate) trace_indirect: vk::Bool32,
     pub(crate) primitive_culling: vk::Bool32,
     pub(crate) ray_query: vk::Bool32,
+    /// `VK_KHR_ray_tracing_position_fetch`.
+    pub(crate) position_fetch: vk::Bool32,
+    /// `VK_EXT_mesh_shader`, with both its stages.
+    pub(crate) mesh_shader: vk::Bool32,
     pub(crate) subgroups: Subgroups,
 }
 
@@ -42,8 +47,10 @@ impl Features {
     /// Without the ray tracing that is not to be turned on.
     pub(crate) fn limit_ray_tracing(&mut self, pipeline: bool, query: bool) {
         self.ray_tracing_pipeline &= vk::Bool32::from(pipeline);
+        self.trace_indirect &= vk::Bool32::from(pipeline);
         self.primitive_culling &= vk::Bool32::from(pipeline);
         self.ray_query &= vk::Bool32::from(query);
+        self.position_fetch &= vk::Bool32::from(pipeline || query);
     }
 
     /// Whether anything of `VK_EXT_shader_atomic_float` is on.
@@ -209,6 +216,15 @@ mod tests {
             (features.ray_tracing_pipeline, features.primitive_culling, features.ray_query),
             (0, 0, 1)
         );
+    }
+
+    #[test]
+    fn positions_are_fetched_by_either_kind_of_ray_tracing() {
+        for (pipeline, query) in [(false, false), (false, true), (true, false), (true, true)] {
+            let mut features = Features { position_fetch: vk::TRUE, ..Default::default() };
+            features.limit_ray_tracing(pipeline, query);
+            assert_eq!(features.position_fetch == vk::TRUE, pipeline || query);
+        }
     }
 
     #[test]

@@ -6,6 +6,8 @@ pub(crate) mod device;
 pub(crate) mod features;
 pub(crate) mod instance;
 pub(crate) mod memory;
+pub(crate) mod mesh_limits;
+pub(crate) mod profile;
 pub(crate) mod select;
 
 pub(crate) use device::Gpu;

@@ -4,9 +4,11 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::group_size::{GroupLimits, check_group_size};
+use super::layout::PipelineBase;
 use super::shader_module::ShaderModule;
 use super::stage::{Specialization, SpecializationConstant, stage};
-use crate::error::{Error, Result, check_limit};
+use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;
@@ -40,18 +42,21 @@ pub(crate) struct ComputePipeline {
 impl ComputePipeline {
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
-        layout: vk::PipelineLayout,
+        base: PipelineBase,
         desc: &ComputePipelineDesc<'_>,
         module: &ShaderModule,
     ) -> Result<Self> {
         module.check_stage(ShaderStage::Compute)?;
         let name = desc.debug_name;
-        check_group(gpu, desc, module)?;
+        let limits = &gpu.caps.limits;
+        let largest = GroupLimits { size: limits.max_group_size, invocations: limits.max_group_invocations };
+        check_group_size(name, module, desc.specialization, &largest)?;
         let constants = Specialization::new(name, desc.specialization, std::iter::once(module))?;
         let constants = constants.info();
-        let info = vk::ComputePipelineCreateInfo::default().layout(layout).stage(stage(module, &constants));
+        let info =
+            vk::ComputePipelineCreateInfo::default().layout(base.layout).stage(stage(module, &constants));
         // SAFETY: the module and the layout are alive and fit each other.
-        let made = unsafe { gpu.device.create_compute_pipelines(vk::PipelineCache::null(), &[info], None) };
+        let made = unsafe { gpu.device.create_compute_pipelines(base.cache, &[info], None) };
         let raw = made.map_err(|(_, result)| Error::vulkan("vkCreateComputePipelines")(result))?[0];
         gpu.name(raw, name);
         Ok(Self {
@@ -69,21 +74,4 @@ impl Drop for ComputePipeline {
         // SAFETY: the owner has waited until the GPU is done with the pipeline.
         unsafe { self.gpu.device.destroy_pipeline(self.raw, None) };
     }
-}
-
-/// Fails if a workgroup, with the specialization constants at hand, is larger than the device's.
-fn check_group(gpu: &Gpu, desc: &ComputePipelineDesc<'_>, module: &ShaderModule) -> Result<()> {
-    let (name, limits) = (desc.debug_name, &gpu.caps.limits);
-    let mut invocations = 1_u64;
-    for axis in 0..3 {
-        let id = module.reflection.local_size_ids[axis];
-        let given = desc.specialization.iter().find(|constant| Some(constant.id) == id);
-        let size = given.map_or(module.reflection.local_size[axis], |constant| constant.value.bits());
-        if size == 0 {
-            return Err(Error::usage(name, "a workgroup needs at least one invocation along each axis"));
-        }
-        check_limit(name, "workgroup size along an axis", size.into(), limits.max_group_size[axis].into())?;
-        invocations = invocations.saturating_mul(size.into());
-    }
-    check_limit(name, "invocations of a workgroup", invocations, limits.max_group_invocations.into())
 }

@@ -10,6 +10,14 @@ use ash::vk;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
+/// What every pipeline is made with.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct PipelineBase {
+    pub(crate) layout: vk::PipelineLayout,
+    /// Of compiled shaders; null where the context keeps none.
+    pub(crate) cache: vk::PipelineCache,
+}
+
 /// The layout, destroyed on drop.
 pub(crate) struct PipelineLayout {
     pub(crate) raw: vk::PipelineLayout,

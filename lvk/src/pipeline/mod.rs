@@ -1,15 +1,27 @@
 //! Shader modules and pipelines.
 
+pub(crate) mod cache;
+mod cache_file;
 pub(crate) mod compute;
+mod deferred;
 pub(crate) mod graphics;
+mod graphics_check;
+pub(crate) mod graphics_desc;
+mod group_size;
+mod groups;
 pub(crate) mod layout;
+pub(crate) mod library;
 pub(crate) mod ray_tracing;
-pub(crate) mod sbt;
+mod sbt;
 pub(crate) mod shader_module;
+mod stack;
 pub(crate) mod stage;
+mod table_order;
 
+pub(crate) use cache::PipelineCache;
 pub(crate) use compute::ComputePipeline;
-pub(crate) use graphics::RenderPipeline;
-pub(crate) use layout::PipelineLayout;
+pub(crate) use graphics::{FrontEnd, RenderPipeline};
+pub(crate) use layout::{PipelineBase, PipelineLayout};
+pub(crate) use library::RayTracingLibrary;
 pub(crate) use ray_tracing::RayTracingPipeline;
 pub(crate) use shader_module::ShaderModule;

@@ -1,17 +1,22 @@
 //! Ray tracing pipelines, each with its shader binding table.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use ash::vk;
 
-use super::sbt::{SbtGroups, SbtLimits, SbtPlan, plan_sbt, sbt_buffer_bytes, write_sbt};
+use super::deferred::compile;
+use super::groups::{Find, GroupList, Groups};
+use super::layout::PipelineBase;
+use super::library::RayTracingLibrary;
+use super::sbt::{GroupHandles, SbtLimits, SbtPlan, SbtRegion, plan_sbt, sbt_buffer_bytes, write_sbt};
 use super::shader_module::ShaderModule;
+use super::stack::StackSizes;
 use super::stage::{Specialization, SpecializationConstant, stage};
+use super::table_order::{PerRegion, table_order};
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::caps::Limits;
-use crate::handle::ShaderModuleHandle;
+use crate::handle::{RayTracingLibraryHandle, ShaderModuleHandle};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::shader::ShaderStage;
@@ -26,11 +31,22 @@ pub struct HitGroup<'a> {
     pub any_hit: Option<ShaderModuleHandle>,
     /// Decides whether a ray hits what is in a box.
     pub intersection: Option<ShaderModuleHandle>,
-    /// Bytes the group's shaders read through `shaderRecordEXT`.
+    /// Bytes the group's shaders read through `shaderRecordEXT`; see [`record_bytes`].
     pub record: &'a [u8],
 }
 
+/// The bytes of a shader record: what a shader reads as a block `layout(shaderRecordEXT, scalar) buffer`.
+///
+/// The struct must be laid out as the block: `#[repr(C)]` and `scalar` agree where every member is aligned to its
+/// largest scalar.
+pub fn record_bytes<T: bytemuck::NoUninit>(record: &T) -> &[u8] {
+    bytemuck::bytes_of(record)
+}
+
 /// Describes a ray tracing pipeline. The order of the lists is the order of the shader binding table.
+///
+/// The shaders of `libraries` stand behind the pipeline's own in each of the four lists, library by library: with two
+/// own miss shaders, the first miss shader of the first library has the miss index 2.
 #[derive(Debug, Clone, Copy)]
 pub struct RayTracingPipelineDesc<'a> {
     /// Ray generation shaders; traces name one by its place, the first by default. At least one.
@@ -41,9 +57,25 @@ pub struct RayTracingPipelineDesc<'a> {
     pub hit_groups: &'a [HitGroup<'a>],
     /// Callable shaders, by the index of `executeCallableEXT`.
     pub callable: &'a [ShaderModuleHandle],
+    /// Bytes the ray generation shaders read through `shaderRecordEXT`, in the order of `ray_gen`; see
+    /// [`record_bytes`]. Shaders beyond the end of the list have no record.
+    pub ray_gen_records: &'a [&'a [u8]],
+    /// As `ray_gen_records`, for `miss`.
+    pub miss_records: &'a [&'a [u8]],
+    /// As `ray_gen_records`, for `callable`.
+    pub callable_records: &'a [&'a [u8]],
+    /// Libraries whose shaders belong to the pipeline too. They may be destroyed before it.
+    pub libraries: &'a [RayTracingLibraryHandle],
     /// Deepest nesting of `traceRayEXT`; 1 if hit and miss shaders trace no rays.
     pub max_recursion: u32,
-    /// Values of specialization constants.
+    /// Deepest nesting of `executeCallableEXT`; 1 if callable shaders call no others.
+    pub max_callable_depth: u32,
+    /// Largest payload of any shader in bytes. Counts only with libraries: see
+    /// [`RayTracingLibraryDesc`](crate::RayTracingLibraryDesc).
+    pub max_payload_bytes: u32,
+    /// Largest hit attributes of any shader in bytes, as `max_payload_bytes`; those of triangles have 8.
+    pub max_hit_attribute_bytes: u32,
+    /// Values of specialization constants, of the pipeline's own shaders.
     pub specialization: &'a [SpecializationConstant],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
@@ -56,7 +88,14 @@ impl Default for RayTracingPipelineDesc<'_> {
             miss: &[],
             hit_groups: &[],
             callable: &[],
+            ray_gen_records: &[],
+            miss_records: &[],
+            callable_records: &[],
+            libraries: &[],
             max_recursion: 1,
+            max_callable_depth: 1,
+            max_payload_bytes: 64,
+            max_hit_attribute_bytes: 8,
             specialization: &[],
             debug_name: "ray tracing pipeline",
         }
@@ -67,8 +106,11 @@ impl Default for RayTracingPipelineDesc<'_> {
 pub(crate) struct RayTracingPipeline {
     pub(crate) raw: vk::Pipeline,
     pub(crate) push_constant_bytes: u32,
+    /// What a trace needs for each ray.
+    pub(crate) stack_bytes: u32,
     pub(crate) name: Arc<str>,
     pub(crate) table: Arc<Buffer>,
+    _libraries: Vec<Arc<RayTracingLibrary>>,
     plan: SbtPlan,
     /// Address of the first region: the table's, rounded up.
     base: u64,
@@ -93,44 +135,47 @@ impl RayTracingPipeline {
     /// Makes the pipeline; the caller uploads the table's contents.
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
-        layout: vk::PipelineLayout,
+        base: PipelineBase,
         desc: &RayTracingPipelineDesc<'_>,
-        find: &dyn Fn(ShaderModuleHandle) -> Result<Arc<ShaderModule>>,
+        find: Find<'_>,
+        libraries: &[Arc<RayTracingLibrary>],
     ) -> Result<(Self, TableContents)> {
         let name = desc.debug_name;
-        let limits = &gpu.caps.limits;
-        gpu.ray_tracing()?;
-        if desc.ray_gen.is_empty() {
-            return Err(Error::usage(
-                name,
-                "a ray tracing pipeline needs at least one ray generation shader",
-            ));
+        let ext = gpu.ray_tracing()?;
+        check_interface(gpu, desc)?;
+        libraries.iter().try_for_each(|library| library.check(desc))?;
+        let groups = Groups::collect(desc, find)?;
+        let parts: Vec<&GroupList> =
+            std::iter::once(&groups.list).chain(libraries.iter().map(|library| &library.groups)).collect();
+        let counts: Vec<PerRegion<usize>> = parts.iter().map(|part| part.counts()).collect();
+        if counts.iter().all(|counts| counts.ray_gen == 0) {
+            let message = "a ray tracing pipeline needs at least one ray generation shader";
+            return Err(Error::usage(name, message));
         }
-        if desc.max_recursion == 0 {
-            return Err(Error::usage(name, "a recursion depth of 0 traces no ray; 1 is the least"));
-        }
-        check_limit(name, "recursion depth", desc.max_recursion.into(), limits.max_ray_recursion.into())?;
-        let stages = Stages::collect(desc, find)?;
-        let sbt_limits = sbt_limits(limits);
-        let records: Vec<&[u8]> = desc.hit_groups.iter().map(|group| group.record).collect();
-        let plan = plan_table(desc, &sbt_limits, &records)?;
-        let table = new_table(gpu, name, sbt_buffer_bytes(&plan, sbt_limits.base_alignment))?;
-        let base = table.address.next_multiple_of(sbt_limits.base_alignment.into());
-        let raw = create(gpu, layout, desc, &stages)?;
+        let limits = sbt_limits(&gpu.caps.limits);
+        let records = linked_records(&parts);
+        let plan = plan_sbt(name, &limits, &records)?;
+        let table = new_table(gpu, name, sbt_buffer_bytes(&plan, limits.base_alignment))?;
+        let raw = compile_groups(gpu, base, desc, &groups, libraries, vk::PipelineCreateFlags::empty())?;
         gpu.name(raw, name);
         let pipeline = Self {
             raw,
-            push_constant_bytes: stages.push_constant_bytes(),
+            push_constant_bytes: parts.iter().map(|part| part.push_constant_bytes).max().unwrap_or(0),
+            stack_bytes: stack_sizes(ext, raw, &parts)
+                .pipeline_bytes(desc.max_recursion, desc.max_callable_depth),
             name: name.into(),
+            base: table.address.next_multiple_of(limits.base_alignment.into()),
             table: Arc::new(table),
             plan,
-            base,
             gpu: Arc::clone(gpu),
+            _libraries: libraries.to_vec(),
         };
-        let handles = pipeline.handles(stages.groups.len() as u32, limits.sbt_handle_bytes)?;
+        let order = table_order(&counts);
+        let handles = pipeline.handles(order.len() as u32, limits.handle_bytes)?;
         let mut bytes = vec![0; pipeline.plan.bytes as usize];
-        write_sbt(&pipeline.plan, &sbt_limits, &handles, &records, &mut bytes);
-        let offset = base - pipeline.table.address;
+        let handles = GroupHandles { bytes: &handles, order: &order };
+        write_sbt(&pipeline.plan, &limits, &handles, &records, &mut bytes);
+        let offset = pipeline.base - pipeline.table.address;
         Ok((pipeline, TableContents { offset, bytes }))
     }
 
@@ -145,7 +190,7 @@ impl RayTracingPipeline {
 
     /// The table as a trace from ray generation shader `index` sees it.
     pub(crate) fn regions(&self, index: u32) -> Result<TraceRegions> {
-        let region = |region: &super::sbt::SbtRegion| vk::StridedDeviceAddressRegionKHR {
+        let region = |region: &SbtRegion| vk::StridedDeviceAddressRegionKHR {
             device_address: if region.size == 0 { 0 } else { self.base + region.offset },
             stride: region.stride,
             size: region.size,
@@ -171,84 +216,101 @@ impl Drop for RayTracingPipeline {
     }
 }
 
-/// The modules of a pipeline, each once, and the groups made of them.
-#[derive(Default)]
-struct Stages {
-    modules: Vec<Arc<ShaderModule>>,
-    groups: Vec<vk::RayTracingShaderGroupCreateInfoKHR<'static>>,
-    places: HashMap<ShaderModuleHandle, u32>,
+/// Fails unless the device takes the depth of recursion, and what libraries have to agree on.
+pub(super) fn check_interface(gpu: &Gpu, desc: &RayTracingPipelineDesc<'_>) -> Result<()> {
+    let (name, limits) = (desc.debug_name, &gpu.caps.limits);
+    if desc.max_recursion == 0 {
+        return Err(Error::usage(name, "a recursion depth of 0 traces no ray; 1 is the least"));
+    }
+    check_limit(name, "recursion depth", desc.max_recursion.into(), limits.max_ray_recursion.into())?;
+    let attributes = desc.max_hit_attribute_bytes.into();
+    check_limit(name, "hit attributes in bytes", attributes, limits.max_hit_attribute_bytes.into())
 }
 
-type Find<'a> = &'a dyn Fn(ShaderModuleHandle) -> Result<Arc<ShaderModule>>;
-
-impl Stages {
-    /// Groups in the order of the table: ray generation, miss, hit, callable.
-    fn collect(desc: &RayTracingPipelineDesc<'_>, find: Find<'_>) -> Result<Self> {
-        let mut stages = Self::default();
-        for handle in desc.ray_gen {
-            stages.general(*handle, ShaderStage::RayGen, find)?;
-        }
-        for handle in desc.miss {
-            stages.general(*handle, ShaderStage::Miss, find)?;
-        }
-        for group in desc.hit_groups {
-            stages.hit_group(group, find)?;
-        }
-        for handle in desc.callable {
-            stages.general(*handle, ShaderStage::Callable, find)?;
-        }
-        Ok(stages)
+/// Compiles groups as a pipeline that is linked with `libraries`, or as a library, as `flags` say.
+pub(super) fn compile_groups(
+    gpu: &Gpu,
+    base: PipelineBase,
+    desc: &RayTracingPipelineDesc<'_>,
+    groups: &Groups,
+    libraries: &[Arc<RayTracingLibrary>],
+    flags: vk::PipelineCreateFlags,
+) -> Result<vk::Pipeline> {
+    let modules = groups.modules.iter().map(|module| &**module);
+    let constants = Specialization::new(desc.debug_name, desc.specialization, modules.clone())?;
+    let constants = constants.info();
+    let stand_in = stand_in(gpu, groups, libraries);
+    let modules = modules.chain(stand_in.as_deref());
+    let stages: Vec<_> = modules.map(|module| stage(module, &constants)).collect();
+    let dynamic = [vk::DynamicState::RAY_TRACING_PIPELINE_STACK_SIZE_KHR];
+    let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
+    let libraries: Vec<_> = libraries.iter().map(|library| library.raw).collect();
+    let linked = vk::PipelineLibraryCreateInfoKHR::default().libraries(&libraries);
+    let interface = vk::RayTracingPipelineInterfaceCreateInfoKHR::default()
+        .max_pipeline_ray_payload_size(desc.max_payload_bytes)
+        .max_pipeline_ray_hit_attribute_size(desc.max_hit_attribute_bytes);
+    let mut info = vk::RayTracingPipelineCreateInfoKHR::default()
+        .flags(flags)
+        .stages(&stages)
+        .groups(&groups.infos)
+        .max_pipeline_ray_recursion_depth(desc.max_recursion)
+        .dynamic_state(&dynamic)
+        .layout(base.layout);
+    if flags.contains(vk::PipelineCreateFlags::LIBRARY_KHR) || !libraries.is_empty() {
+        groups.check_sizes(desc)?;
+        info = info.library_info(&linked).library_interface(&interface);
     }
+    // SAFETY: modules, layout and libraries are alive, the recursion depth is within the limit, and the libraries
+    // were made with the same layout and agree on the interface.
+    unsafe { compile(gpu, base.cache, &info) }
+}
 
-    fn general(&mut self, handle: ShaderModuleHandle, stage: ShaderStage, find: Find<'_>) -> Result<()> {
-        let place = self.place(Some(handle), stage, find)?;
-        self.groups.push(group(vk::RayTracingShaderGroupTypeKHR::GENERAL).general_shader(place));
-        Ok(())
+/// A stage in no group, for lavapipe: it hands push constants only to pipelines that were given a ray generation shader
+/// outside of their libraries.
+fn stand_in(gpu: &Gpu, groups: &Groups, libraries: &[Arc<RayTracingLibrary>]) -> Option<Arc<ShaderModule>> {
+    if gpu.caps.driver_name != "llvmpipe" || groups.list.counts().ray_gen > 0 {
+        return None;
     }
+    libraries.iter().find_map(|library| library.ray_gen.clone())
+}
 
-    fn hit_group(&mut self, desc: &HitGroup<'_>, find: Find<'_>) -> Result<()> {
-        let kind = match desc.intersection {
-            Some(_) => vk::RayTracingShaderGroupTypeKHR::PROCEDURAL_HIT_GROUP,
-            None => vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP,
-        };
-        let hit = group(kind)
-            .closest_hit_shader(self.place(desc.closest_hit, ShaderStage::ClosestHit, find)?)
-            .any_hit_shader(self.place(desc.any_hit, ShaderStage::AnyHit, find)?)
-            .intersection_shader(self.place(desc.intersection, ShaderStage::Intersection, find)?);
-        self.groups.push(hit);
-        Ok(())
-    }
-
-    /// The place of a module among the stages; the same module takes one place.
-    fn place(
-        &mut self,
-        handle: Option<ShaderModuleHandle>,
-        stage: ShaderStage,
-        find: Find<'_>,
-    ) -> Result<u32> {
-        let Some(handle) = handle else { return Ok(vk::SHADER_UNUSED_KHR) };
-        let module = find(handle)?;
-        module.check_stage(stage)?;
-        let next = self.modules.len() as u32;
-        let place = *self.places.entry(handle).or_insert(next);
-        if place == next {
-            self.modules.push(module);
-        }
-        Ok(place)
-    }
-
-    fn push_constant_bytes(&self) -> u32 {
-        self.modules.iter().map(|module| module.reflection.push_constant_bytes).max().unwrap_or(0)
+/// The records of all parts of a pipeline, as its table has them.
+fn linked_records<'a>(parts: &[&'a GroupList]) -> PerRegion<Vec<&'a [u8]>> {
+    let of = |region: fn(&GroupList) -> &Vec<Box<[u8]>>| {
+        parts.iter().flat_map(|part| region(part)).map(|record| &**record).collect()
+    };
+    PerRegion {
+        ray_gen: of(|part| &part.records.ray_gen),
+        miss: of(|part| &part.records.miss),
+        hit: of(|part| &part.records.hit),
+        callable: of(|part| &part.records.callable),
     }
 }
 
-fn group(kind: vk::RayTracingShaderGroupTypeKHR) -> vk::RayTracingShaderGroupCreateInfoKHR<'static> {
-    vk::RayTracingShaderGroupCreateInfoKHR::default()
-        .ty(kind)
-        .general_shader(vk::SHADER_UNUSED_KHR)
-        .closest_hit_shader(vk::SHADER_UNUSED_KHR)
-        .any_hit_shader(vk::SHADER_UNUSED_KHR)
-        .intersection_shader(vk::SHADER_UNUSED_KHR)
+/// What every shader of the pipeline needs; asks of no shader that a group does not have.
+fn stack_sizes(
+    ext: &ash::khr::ray_tracing_pipeline::Device,
+    pipeline: vk::Pipeline,
+    parts: &[&GroupList],
+) -> StackSizes {
+    let mut sizes = StackSizes::default();
+    let mut first = 0;
+    for part in parts {
+        for (group, stage) in &part.shaders {
+            let shader = match stage {
+                ShaderStage::ClosestHit => vk::ShaderGroupShaderKHR::CLOSEST_HIT,
+                ShaderStage::AnyHit => vk::ShaderGroupShaderKHR::ANY_HIT,
+                ShaderStage::Intersection => vk::ShaderGroupShaderKHR::INTERSECTION,
+                _ => vk::ShaderGroupShaderKHR::GENERAL,
+            };
+            // SAFETY: the pipeline has the group, and the group has the shader.
+            let bytes =
+                unsafe { ext.get_ray_tracing_shader_group_stack_size(pipeline, first + group, shader) };
+            sizes.add(*stage, bytes);
+        }
+        first += part.len() as u32;
+    }
+    sizes
 }
 
 fn sbt_limits(limits: &Limits) -> SbtLimits {
@@ -260,17 +322,6 @@ fn sbt_limits(limits: &Limits) -> SbtLimits {
     }
 }
 
-fn plan_table(desc: &RayTracingPipelineDesc<'_>, limits: &SbtLimits, records: &[&[u8]]) -> Result<SbtPlan> {
-    let record_bytes: Vec<usize> = records.iter().map(|record| record.len()).collect();
-    let groups = SbtGroups {
-        ray_gen: desc.ray_gen.len() as u32,
-        miss: desc.miss.len() as u32,
-        hit_records: &record_bytes,
-        callable: desc.callable.len() as u32,
-    };
-    plan_sbt(limits, &groups)
-}
-
 fn new_table(gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Buffer> {
     let desc = BufferDesc {
         size_bytes: bytes.max(1),
@@ -279,31 +330,4 @@ fn new_table(gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Buffer> {
         ..Default::default()
     };
     Buffer::new(gpu, &desc, InternalUsage::SHADER_BINDING_TABLE)
-}
-
-fn create(
-    gpu: &Gpu,
-    layout: vk::PipelineLayout,
-    desc: &RayTracingPipelineDesc<'_>,
-    stages: &Stages,
-) -> Result<vk::Pipeline> {
-    let modules = stages.modules.iter().map(|module| &**module);
-    let constants = Specialization::new(desc.debug_name, desc.specialization, modules.clone())?;
-    let constants = constants.info();
-    let infos: Vec<_> = modules.map(|module| stage(module, &constants)).collect();
-    let info = vk::RayTracingPipelineCreateInfoKHR::default()
-        .stages(&infos)
-        .groups(&stages.groups)
-        .max_pipeline_ray_recursion_depth(desc.max_recursion)
-        .layout(layout);
-    // SAFETY: the modules and the layout are alive, and the recursion depth is within the limit.
-    let made = unsafe {
-        gpu.ray_tracing()?.create_ray_tracing_pipelines(
-            vk::DeferredOperationKHR::null(),
-            vk::PipelineCache::null(),
-            &[info],
-            None,
-        )
-    };
-    Ok(made.map_err(|(_, result)| Error::vulkan("vkCreateRayTracingPipelinesKHR")(result))?[0])
 }

@@ -1,5 +1,6 @@
 //! Layout of a shader binding table, as plain arithmetic.
 
+use super::table_order::PerRegion;
 use crate::error::{Result, check_limit};
 
 /// What a device asks of shader binding tables (`VkPhysicalDeviceRayTracingPipelinePropertiesKHR`), in bytes.
@@ -15,17 +16,12 @@ pub(crate) struct SbtLimits {
     pub(crate) max_stride: u32,
 }
 
-/// Shader groups of a pipeline, in the order of their handles.
+/// The handles of a pipeline's shader groups as Vulkan gives them, and which of them each place of the table takes.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct SbtGroups<'a> {
-    /// Number of ray generation shaders.
-    pub(crate) ray_gen: u32,
-    /// Number of miss shaders.
-    pub(crate) miss: u32,
-    /// Bytes of user data behind the handle, for each hit group.
-    pub(crate) hit_records: &'a [usize],
-    /// Number of callable shaders.
-    pub(crate) callable: u32,
+pub(crate) struct GroupHandles<'a> {
+    pub(crate) bytes: &'a [u8],
+    /// See [`table_order`](super::table_order::table_order).
+    pub(crate) order: &'a [usize],
 }
 
 /// One region, in bytes from the base-aligned start of the table; all zero where there is no such shader.
@@ -40,12 +36,10 @@ pub(crate) struct SbtRegion {
 }
 
 impl SbtRegion {
-    fn record_count(&self) -> u64 {
-        self.size.checked_div(self.stride).unwrap_or(0)
-    }
-
-    fn record(&self, index: u64) -> u64 {
-        self.offset + index * self.stride
+    /// The start of every record.
+    fn records(self) -> impl Iterator<Item = u64> {
+        let count = self.size.checked_div(self.stride).unwrap_or(0);
+        (0..count).map(move |index| self.offset + index * self.stride)
     }
 }
 
@@ -65,71 +59,80 @@ pub(crate) struct SbtPlan {
 }
 
 impl SbtPlan {
-    /// Start of every record, in the order of the group handles.
-    fn records(&self) -> impl Iterator<Item = u64> {
-        let tables = [self.miss, self.hit, self.callable];
-        let regions = self.ray_gen.iter().copied().chain(tables);
-        regions.flat_map(|region| (0..region.record_count()).map(move |index| region.record(index)))
+    /// Start and longest length of every record, in the order of the table.
+    fn records(&self) -> impl Iterator<Item = (u64, u64)> {
+        let regions = self.ray_gen.iter().copied().chain([self.miss, self.hit, self.callable]);
+        regions.flat_map(|region| region.records().map(move |start| (start, region.stride)))
     }
 }
 
 /// Places all records: strides are multiples of the handle alignment, regions start at multiples of the base alignment.
 ///
+/// `records` has the user's bytes behind the handle of each group.
+///
 /// # Errors
 /// [`Error::LimitExceeded`](crate::error::Error::LimitExceeded) if a record with its handle is longer than the
 /// device's largest stride.
-pub(crate) fn plan_sbt(limits: &SbtLimits, groups: &SbtGroups<'_>) -> Result<SbtPlan> {
-    let longest = groups.hit_records.iter().copied().max().unwrap_or(0);
-    let plain = stride(limits, 0);
-    let hit_stride = stride(limits, longest);
-    check_limit("shader binding table", "hit group record", hit_stride, u64::from(limits.max_stride))?;
+pub(crate) fn plan_sbt(
+    pipeline: &str,
+    limits: &SbtLimits,
+    records: &PerRegion<Vec<&[u8]>>,
+) -> Result<SbtPlan> {
+    let stride = |records: &Vec<&[u8]>| {
+        let longest = records.iter().map(|record| record.len()).max().unwrap_or(0) as u64;
+        align_up(longest.saturating_add(limits.handle_bytes.into()), limits.handle_alignment)
+    };
+    let strides = records.as_ref().map(stride);
+    let names =
+        ["ray generation shader record", "miss shader record", "hit group record", "callable shader record"];
+    for (what, stride) in names.into_iter().zip(strides.into_array()) {
+        check_limit(pipeline, what, stride, limits.max_stride.into())?;
+    }
     let mut end = 0;
-    let mut place = |count: u64, stride: u64| {
+    let mut place = |count: usize, stride: u64| {
         if count == 0 {
             return SbtRegion::default();
         }
         let offset = align_up(end, limits.base_alignment);
-        end = offset + count * stride;
-        SbtRegion { offset, stride, size: count * stride }
+        let size = count as u64 * stride;
+        end = offset + size;
+        SbtRegion { offset, stride, size }
     };
     Ok(SbtPlan {
-        ray_gen: (0..groups.ray_gen).map(|_| place(1, plain)).collect(),
-        miss: place(u64::from(groups.miss), plain),
-        hit: place(groups.hit_records.len() as u64, hit_stride),
-        callable: place(u64::from(groups.callable), plain),
+        ray_gen: records.ray_gen.iter().map(|_| place(1, strides.ray_gen)).collect(),
+        miss: place(records.miss.len(), strides.miss),
+        hit: place(records.hit.len(), strides.hit),
+        callable: place(records.callable.len(), strides.callable),
         bytes: end,
     })
 }
 
-/// Fills the table: `handles` holds the group handles one behind the other in the order ray generation, miss, hit,
-/// callable; `records` the user data of each hit group. Bytes that belong to no record become zero.
+/// Fills the table with the handle of each group and the user's bytes behind it. Bytes that belong to no record become
+/// zero.
 ///
 /// What does not fit into `out`, or is missing from `handles`, is left out.
 pub(crate) fn write_sbt(
     plan: &SbtPlan,
     limits: &SbtLimits,
-    handles: &[u8],
-    records: &[&[u8]],
+    handles: &GroupHandles<'_>,
+    records: &PerRegion<Vec<&[u8]>>,
     out: &mut [u8],
 ) {
     out.fill(0);
     let handle_bytes = limits.handle_bytes.max(1) as usize;
-    for (at, handle) in plan.records().zip(handles.chunks_exact(handle_bytes)) {
-        copy_at(out, at, handle);
-    }
-    for (index, record) in (0..plan.hit.record_count()).zip(records) {
-        let room = (plan.hit.stride as usize).saturating_sub(handle_bytes).min(record.len());
-        copy_at(out, plan.hit.record(index) + handle_bytes as u64, &record[..room]);
+    let records = records.as_ref().into_array().into_iter().flatten();
+    for (((start, stride), group), record) in plan.records().zip(handles.order).zip(records) {
+        let first = group.saturating_mul(handle_bytes);
+        let Some(handle) = handles.bytes.get(first..first.saturating_add(handle_bytes)) else { continue };
+        copy_at(out, start, handle);
+        let room = (stride as usize).saturating_sub(handle_bytes).min(record.len());
+        copy_at(out, start + handle_bytes as u64, &record[..room]);
     }
 }
 
 /// Bytes to allocate so that the table still fits once the buffer's address is rounded up to the base alignment.
 pub(crate) fn sbt_buffer_bytes(plan: &SbtPlan, base_alignment: u32) -> u64 {
     plan.bytes + u64::from(base_alignment.saturating_sub(1))
-}
-
-fn stride(limits: &SbtLimits, record_bytes: usize) -> u64 {
-    align_up((record_bytes as u64).saturating_add(u64::from(limits.handle_bytes)), limits.handle_alignment)
 }
 
 /// Saturates instead of wrapping: a size near the top of the range is over every limit anyway.
@@ -152,10 +155,9 @@ mod tests {
     use crate::error::Error;
 
     fn limits() -> impl Strategy<Value = SbtLimits> {
-        let bytes = prop::sample::select(vec![8_u32, 16, 24, 32, 48, 64]);
         let handle = prop::sample::select(vec![16_u32, 32, 64]);
         let base = prop::sample::select(vec![32_u32, 64, 128, 256]);
-        (bytes, handle, base).prop_map(|(handle_bytes, handle_alignment, base_alignment)| SbtLimits {
+        (8..=64_u32, handle, base).prop_map(|(handle_bytes, handle_alignment, base_alignment)| SbtLimits {
             handle_bytes,
             handle_alignment,
             base_alignment,
@@ -163,30 +165,44 @@ mod tests {
         })
     }
 
-    fn groups() -> impl Strategy<Value = (u32, u32, Vec<Vec<u8>>, u32)> {
-        let record = prop::collection::vec(1..=255_u8, 0..200);
-        (0..4_u32, 0..5_u32, prop::collection::vec(record, 0..6), 0..4_u32)
+    /// Records of the groups of all four regions; no byte is 0.
+    fn groups() -> impl Strategy<Value = PerRegion<Vec<Vec<u8>>>> {
+        let records = || prop::collection::vec(prop::collection::vec(1..=255_u8, 0..200), 0..5);
+        (records(), records(), records(), records()).prop_map(|(ray_gen, miss, hit, callable)| PerRegion {
+            ray_gen,
+            miss,
+            hit,
+            callable,
+        })
     }
 
+    fn slices(records: &PerRegion<Vec<Vec<u8>>>) -> PerRegion<Vec<&[u8]>> {
+        records.as_ref().map(|records| records.iter().map(Vec::as_slice).collect())
+    }
+
+    fn plain(counts: [usize; 4]) -> PerRegion<Vec<&'static [u8]>> {
+        let [ray_gen, miss, hit, callable] = counts.map(|count| vec![&[][..]; count]);
+        PerRegion { ray_gen, miss, hit, callable }
+    }
+
+    /// Handles that differ from each other in every byte; none is 0.
     fn handles(count: usize, limits: &SbtLimits) -> Vec<u8> {
         (0..count).flat_map(|index| vec![index as u8 + 1; limits.handle_bytes as usize]).collect()
     }
 
     proptest! {
         #[test]
-        fn every_record_is_aligned_complete_and_alone(
-            limits in limits(), (ray_gen, miss, records, callable) in groups()
-        ) {
-            let hit_records: Vec<usize> = records.iter().map(Vec::len).collect();
-            let groups = SbtGroups { ray_gen, miss, hit_records: &hit_records, callable };
-            let plan = plan_sbt(&limits, &groups).unwrap();
-            let count = (ray_gen + miss + callable) as usize + records.len();
-            let starts: Vec<u64> = plan.records().collect();
-            prop_assert_eq!(starts.len(), count);
-
+        fn regions_are_aligned_and_apart(limits in limits(), groups in groups()) {
+            let plan = plan_sbt("p", &limits, &slices(&groups)).unwrap();
             let mut regions = plan.ray_gen.clone();
             prop_assert!(regions.iter().all(|region| region.size == region.stride));
-            regions.extend([plan.miss, plan.hit, plan.callable]);
+            let counts = groups.as_ref().map(Vec::len);
+            prop_assert_eq!(regions.len(), counts.ray_gen);
+            for (region, count) in [(plan.miss, counts.miss), (plan.hit, counts.hit), (plan.callable, counts.callable)] {
+                prop_assert_eq!(region.size, count as u64 * region.stride);
+                prop_assert_eq!(region == SbtRegion::default(), count == 0);
+                regions.push(region);
+            }
             let mut end = 0;
             for region in regions.iter().filter(|region| region.size > 0) {
                 prop_assert_eq!(region.offset % u64::from(limits.base_alignment), 0);
@@ -195,27 +211,39 @@ mod tests {
                 end = region.offset + region.size;
             }
             prop_assert_eq!(end, plan.bytes);
+        }
 
+        #[test]
+        fn every_record_is_complete_and_alone(limits in limits(), groups in groups(), turn in 0..20_usize) {
+            let groups = slices(&groups);
+            let plan = plan_sbt("p", &limits, &groups).unwrap();
+            let all: Vec<&[u8]> = groups.clone().into_array().concat();
+            let mut order: Vec<usize> = (0..all.len()).collect();
+            order.rotate_left(turn.min(all.len()));
+            let bytes = handles(all.len(), &limits);
             let mut out = vec![0xEE; plan.bytes as usize];
-            let data: Vec<&[u8]> = records.iter().map(Vec::as_slice).collect();
-            write_sbt(&plan, &limits, &handles(count, &limits), &data, &mut out);
+            write_sbt(&plan, &limits, &GroupHandles { bytes: &bytes, order: &order }, &groups, &mut out);
+
+            let mut starts: Vec<u64> = plan.ray_gen.iter().map(|region| region.offset).collect();
+            let shared = [(plan.miss, groups.miss.len()), (plan.hit, groups.hit.len()),
+                          (plan.callable, groups.callable.len())];
+            for (region, count) in shared {
+                starts.extend((0..count as u64).map(|index| region.offset + index * region.stride));
+            }
             let mut expected = vec![0; plan.bytes as usize];
-            for (index, start) in starts.iter().enumerate() {
+            for ((start, record), group) in starts.iter().zip(&all).zip(&order) {
                 let start = *start as usize;
-                let mut record = handles(count, &limits)[index * limits.handle_bytes as usize..]
-                    [..limits.handle_bytes as usize].to_vec();
-                if let Some(hit) = index.checked_sub((ray_gen + miss) as usize) {
-                    record.extend(records.get(hit).into_iter().flatten());
-                }
-                expected[start..start + record.len()].copy_from_slice(&record);
+                let handle = vec![*group as u8 + 1; limits.handle_bytes as usize];
+                let whole = [&handle[..], *record].concat();
+                prop_assert!(expected[start..start + whole.len()].iter().all(|byte| *byte == 0));
+                expected[start..start + whole.len()].copy_from_slice(&whole);
             }
             prop_assert_eq!(out, expected);
         }
 
         #[test]
-        fn table_fits_behind_any_rounded_address(limits in limits(), miss in 1..9_u32, address in 0..100_000_u64) {
-            let groups = SbtGroups { ray_gen: 1, miss, hit_records: &[5], callable: 0 };
-            let plan = plan_sbt(&limits, &groups).unwrap();
+        fn table_fits_behind_any_rounded_address(limits in limits(), miss in 1..9_usize, address in 0..100_000_u64) {
+            let plan = plan_sbt("p", &limits, &plain([1, miss, 1, 0])).unwrap();
             let start = address.next_multiple_of(u64::from(limits.base_alignment));
             let end = address + sbt_buffer_bytes(&plan, limits.base_alignment);
             prop_assert!(start + plan.bytes <= end);
@@ -223,10 +251,14 @@ mod tests {
 
         #[test]
         fn short_inputs_are_left_out(limits in limits(), handle_bytes in 0..200_usize, room in 0..300_usize) {
-            let groups = SbtGroups { ray_gen: 1, miss: 2, hit_records: &[9, 0], callable: 1 };
-            let plan = plan_sbt(&limits, &groups).unwrap();
+            let mut groups = plain([1, 2, 2, 1]);
+            groups.hit[0] = &[9; 9];
+            let plan = plan_sbt("p", &limits, &groups).unwrap();
+            groups.miss[1] = &[9; 500];
             let mut out = vec![0xEE; room];
-            write_sbt(&plan, &limits, &vec![7; handle_bytes], &[&[9; 500]], &mut out);
+            let bytes = vec![7; handle_bytes];
+            let handles = GroupHandles { bytes: &bytes, order: &[0, usize::MAX, 1, 2, 9] };
+            write_sbt(&plan, &limits, &handles, &groups, &mut out);
             prop_assert!(out.iter().all(|byte| [0, 7, 9].contains(byte)));
         }
     }
@@ -235,8 +267,9 @@ mod tests {
     fn usual_desktop_limits() {
         let limits =
             SbtLimits { handle_bytes: 32, handle_alignment: 32, base_alignment: 64, max_stride: 4096 };
-        let groups = SbtGroups { ray_gen: 2, miss: 2, hit_records: &[0, 16], callable: 0 };
-        let plan = plan_sbt(&limits, &groups).unwrap();
+        let mut groups = plain([2, 2, 2, 0]);
+        groups.hit[1] = &[1; 16];
+        let plan = plan_sbt("p", &limits, &groups).unwrap();
         let region = |offset, stride, size| SbtRegion { offset, stride, size };
         assert_eq!(plan.ray_gen, [region(0, 32, 32), region(64, 32, 32)]);
         assert_eq!(plan.miss, region(128, 32, 64));
@@ -245,15 +278,28 @@ mod tests {
     }
 
     #[test]
-    fn too_long_a_record_names_the_limit() {
+    fn too_long_a_record_names_the_region_and_the_limit() {
         let limits =
             SbtLimits { handle_bytes: 32, handle_alignment: 32, base_alignment: 64, max_stride: 4096 };
-        for bytes in [4065, usize::MAX] {
-            let groups = SbtGroups { ray_gen: 1, miss: 0, hit_records: &[bytes], callable: 0 };
-            let error = plan_sbt(&limits, &groups).unwrap_err();
-            assert!(matches!(error, Error::LimitExceeded { what: "hit group record", limit: 4096, .. }));
+        let (fits, long) = ([0; 4064], [0; 4065]);
+        let with = |record| {
+            let none = plain([1, 1, 1, 1]);
+            [
+                ("ray generation shader record", PerRegion { ray_gen: vec![record], ..none.clone() }),
+                ("miss shader record", PerRegion { miss: vec![record], ..none.clone() }),
+                ("hit group record", PerRegion { hit: vec![record], ..none.clone() }),
+                ("callable shader record", PerRegion { callable: vec![record], ..none }),
+            ]
+        };
+        for (name, groups) in with(&long) {
+            let error = plan_sbt("p", &limits, &groups).unwrap_err();
+            assert!(
+                matches!(error, Error::LimitExceeded { what, limit: 4096, .. } if what == name),
+                "{error}"
+            );
         }
-        let groups = SbtGroups { ray_gen: 1, miss: 0, hit_records: &[4064], callable: 0 };
-        assert_eq!(plan_sbt(&limits, &groups).unwrap().hit.stride, 4096);
+        for (_, groups) in with(&fits) {
+            plan_sbt("p", &limits, &groups).unwrap();
+        }
     }
 }

@@ -20,9 +20,8 @@ pub(crate) struct ShaderModule {
 
 impl ShaderModule {
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &ShaderModuleDesc<'_>, max_push_bytes: u32) -> Result<Self> {
-        check_stage(desc.debug_name, desc.stage)?;
-        let options = CompileOptions { formatless_read: gpu.caps.formatless_storage_read };
-        let words = compile(desc, &options)?;
+        check_stage(desc.debug_name, desc.stage, &gpu.features)?;
+        let words = compile(desc, &CompileOptions::of(&gpu.caps))?;
         let reflection = reflect(desc.debug_name, desc.stage, &words)?;
         check_features(gpu, desc.debug_name, &reflection)?;
         check_capabilities(desc.debug_name, desc.stage, &reflection, &gpu.features)?;

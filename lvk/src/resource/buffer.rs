@@ -93,7 +93,8 @@ impl Buffer {
         let name = desc.debug_name;
         let size = check_size(gpu, desc)?;
         let usage = raw_usage(gpu, desc.usage, name)? | internal.raw;
-        let info = vk::BufferCreateInfo::default().size(size).usage(usage);
+        // Kernels read 16-bit indices by whole words.
+        let info = vk::BufferCreateInfo::default().size(size.next_multiple_of(4)).usage(usage);
         // SAFETY: the description is valid: the size is checked, the usage belongs to enabled features.
         let raw =
             unsafe { gpu.device.create_buffer(&info, None) }.map_err(Error::vulkan("vkCreateBuffer"))?;
@@ -155,6 +156,15 @@ impl Buffer {
             return None;
         }
         self.allocation.as_ref()?.mapped_ptr().map(NonNull::cast)
+    }
+
+    /// Has `fill` write all of the mapped memory. `false` if the buffer is not mapped.
+    pub(crate) fn fill(&self, fill: impl FnOnce(&mut [u8])) -> bool {
+        let Some(start) = self.mapped() else { return false };
+        let _copying = self.copying.lock().unwrap_or_else(PoisonError::into_inner);
+        // SAFETY: the mapping has the buffer's size and lives as long as `self`; other threads wait.
+        fill(unsafe { std::slice::from_raw_parts_mut(start.as_ptr(), self.size_bytes as usize) });
+        true
     }
 
     /// Writes mapped memory. `false` if the buffer is not mapped; the range must have been checked.

@@ -41,8 +41,12 @@ impl QueryPool {
             return Err(Error::usage(desc.debug_name, "a query pool needs at least one query"));
         }
         check_limit(desc.debug_name, "query count", desc.count.into(), Self::MAX_COUNT.into())?;
-        let info =
-            vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(desc.count);
+        Self::of(gpu, desc, vk::QueryType::TIMESTAMP)
+    }
+
+    /// A pool of any kind whose queries answer one number each.
+    pub(crate) fn of(gpu: &Arc<Gpu>, desc: &QueryPoolDesc<'_>, ty: vk::QueryType) -> Result<Self> {
+        let info = vk::QueryPoolCreateInfo::default().query_type(ty).query_count(desc.count);
         // SAFETY: the description is valid.
         let raw = unsafe { gpu.device.create_query_pool(&info, None) }
             .map_err(Error::vulkan("vkCreateQueryPool"))?;
@@ -63,6 +67,15 @@ impl QueryPool {
 
     /// Milliseconds of each timestamp since an arbitrary start; `None` where none was written yet.
     pub(crate) fn milliseconds(&self, first: u32, count: u32) -> Result<Vec<Option<f64>>> {
+        let limits = &self.gpu.caps.limits;
+        let mask = u64::MAX >> (64 - limits.timestamp_bits.clamp(1, 64));
+        let period = f64::from(limits.timestamp_period_ns) * 1e-6;
+        let milliseconds = |ticks: u64| (ticks & mask) as f64 * period;
+        Ok(self.values(first, count)?.into_iter().map(|ticks| ticks.map(milliseconds)).collect())
+    }
+
+    /// The number of each query; `None` where none was written yet (`vkGetQueryPoolResults`).
+    pub(crate) fn values(&self, first: u32, count: u32) -> Result<Vec<Option<u64>>> {
         self.check_range(first, count)?;
         let mut raw = vec![[0_u64; 2]; count as usize];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
@@ -74,11 +87,7 @@ impl QueryPool {
                 Err(result) => return Err(Error::vulkan("vkGetQueryPoolResults")(result)),
             }
         }
-        let limits = &self.gpu.caps.limits;
-        let mask = u64::MAX >> (64 - limits.timestamp_bits.clamp(1, 64));
-        let period = f64::from(limits.timestamp_period_ns) * 1e-6;
-        let milliseconds = |ticks: u64| (ticks & mask) as f64 * period;
-        Ok(raw.iter().map(|[ticks, ready]| (*ready != 0).then(|| milliseconds(*ticks))).collect())
+        Ok(raw.iter().map(|[value, ready]| (*ready != 0).then_some(*value)).collect())
     }
 }
 

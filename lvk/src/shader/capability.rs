@@ -33,7 +33,7 @@ const FREE: [C; 18] = [
 /// A capability, whether it is allowed, and the feature that allows it.
 type Row = (C, fn(&Features) -> vk::Bool32, &'static str);
 
-const BY_FEATURE: [Row; 41] = [
+const BY_FEATURE: [Row; 44] = [
     (C::Geometry, |f| f.core.geometry_shader, "geometryShader"),
     (C::Tessellation, |f| f.core.tessellation_shader, "tessellationShader"),
     (C::GeometryPointSize, point_size, "shaderTessellationAndGeometryPointSize"),
@@ -96,6 +96,9 @@ const BY_FEATURE: [Row; 41] = [
     (C::RayTracingKHR, |f| f.ray_tracing_pipeline, "rayTracingPipeline"),
     (C::RayQueryKHR, |f| f.ray_query, "rayQuery"),
     (C::RayTraversalPrimitiveCullingKHR, |f| f.primitive_culling, "rayTraversalPrimitiveCulling"),
+    (C::RayTracingPositionFetchKHR, |f| f.position_fetch, "rayTracingPositionFetch"),
+    (C::RayQueryPositionFetchKHR, |f| f.position_fetch, "rayTracingPositionFetch"),
+    (C::MeshShadingEXT, |f| f.mesh_shader, "meshShader"),
     (C::MinLod, |f| f.core.shader_resource_min_lod, "shaderResourceMinLod"),
     (C::VariablePointers, |f| f.v11.variable_pointers, "variablePointers"),
     (
@@ -115,11 +118,11 @@ const BY_SUBGROUP: [(C, vk::SubgroupFeatureFlags); 7] = [
     (C::GroupNonUniformQuad, vk::SubgroupFeatureFlags::QUAD),
 ];
 
-/// Fails unless pipelines of this stage exist.
-pub(crate) fn check_stage(name: &str, stage: ShaderStage) -> Result<()> {
-    if matches!(stage, ShaderStage::Task | ShaderStage::Mesh) {
+/// Fails unless the device has pipelines of this stage.
+pub(crate) fn check_stage(name: &str, stage: ShaderStage, features: &Features) -> Result<()> {
+    if matches!(stage, ShaderStage::Task | ShaderStage::Mesh) && features.mesh_shader == vk::FALSE {
         let what = format!("the {} stage of shader '{name}'", stage.name());
-        return Err(Error::unsupported(what, "lvk has no mesh pipelines yet; use a vertex stage"));
+        return Err(Error::unsupported(what, lacks_feature("meshShader")));
     }
     Ok(())
 }
@@ -316,7 +319,7 @@ mod tests {
         all.core.multi_viewport = vk::TRUE;
         all.core.shader_resource_residency = vk::TRUE;
         let features = Features::wanted(&all);
-        for capability in [C::Kernel, C::MultiViewport, C::SparseResidency, C::MeshShadingEXT, C::Linkage] {
+        for capability in [C::Kernel, C::MultiViewport, C::SparseResidency, C::Linkage] {
             let found = refusal(ShaderStage::Compute, &module(&[capability]), &features).unwrap();
             assert!(found.contains("lvk turns on no device feature"), "{found}");
         }
@@ -344,10 +347,12 @@ mod tests {
     }
 
     #[test]
-    fn mesh_stages_are_refused() {
+    fn mesh_stages_are_refused_where_the_feature_is_off() {
+        let with = Features { mesh_shader: vk::TRUE, ..Features::default() };
         for stage in ShaderStage::ALL {
-            let refused = matches!(check_stage("test", stage), Err(Error::Unsupported { .. }));
+            let refused = check_stage("test", stage, &Features::default()).is_err();
             assert_eq!(refused, matches!(stage, ShaderStage::Task | ShaderStage::Mesh), "{stage:?}");
+            assert!(check_stage("test", stage, &with).is_ok());
         }
     }
 

@@ -4,6 +4,7 @@
 use super::front_end::glsl;
 use super::{ShaderModuleDesc, ShaderSource, spirv};
 use crate::error::{Error, Result};
+use crate::gpu::caps::Capabilities;
 
 /// What the preamble must know of the device.
 #[derive(Debug, Clone, Copy, Default)]
@@ -11,6 +12,16 @@ pub(crate) struct CompileOptions {
     /// The device loads from storage images without a format (`shaderStorageImageReadWithoutFormat`).
     #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) formatless_read: bool,
+    /// The device fetches the corners of triangles that were hit (`VK_KHR_ray_tracing_position_fetch`).
+    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
+    pub(crate) position_fetch: bool,
+}
+
+impl CompileOptions {
+    /// For a device with these capabilities.
+    pub(crate) fn of(device: &Capabilities) -> Self {
+        Self { formatless_read: device.formatless_storage_read, position_fetch: device.position_fetch }
+    }
 }
 
 /// The module's SPIR-V: version 1.6 for GLSL, the caller's own words, checked for their structure, otherwise.

@@ -11,7 +11,10 @@ mod front_end;
 mod include;
 mod module;
 #[cfg(feature = "glsl")]
+mod offline;
+#[cfg(feature = "glsl")]
 mod preamble;
+mod ray_interface;
 mod reflect;
 #[cfg(feature = "glsl")]
 mod source;
@@ -22,6 +25,8 @@ mod unused;
 
 pub(crate) use capability::{check_capabilities, check_stage};
 pub(crate) use compile::{CompileOptions, compile};
+#[cfg(feature = "glsl")]
+pub use offline::compile_glsl;
 pub(crate) use reflect::{Reflection, reflect};
 pub use stage::{ShaderModuleDesc, ShaderSource, ShaderStage};
 

@@ -9,7 +9,7 @@ use super::spirv::{self, Instruction};
 /// A buffer address in a push-constant block.
 const ADDRESS_BYTES: u64 = 8;
 /// Types nested deeper than this are taken for damage.
-const MAX_NESTING: u32 = 64;
+pub(super) const MAX_NESTING: u32 = 64;
 
 /// Declarations by id; ids may point anywhere, so every look-up can fail.
 #[derive(Debug, Default)]

@@ -59,6 +59,12 @@ pub(super) fn preamble(stage: ShaderStage, options: &CompileOptions, defines: &[
         require(&mut text, "GL_EXT_shader_image_load_formatted");
         define(&mut text, "LVK_FORMATLESS_READ", "1");
     }
+    if options.position_fetch {
+        define(&mut text, "LVK_POSITION_FETCH", "1");
+        if stage.is_ray_tracing() {
+            require(&mut text, "GL_EXT_ray_tracing_position_fetch");
+        }
+    }
     text.push_str(BINDLESS);
     if stage.is_ray_tracing() {
         define(&mut text, "LVK_STAGE_RAY_TRACING", "1");

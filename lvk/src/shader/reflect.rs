@@ -3,7 +3,8 @@
 use ::spirv::{Capability, Decoration, ExecutionMode, ExecutionModel, Op, StorageClass};
 
 use super::atomics::{Atomic, atomics};
-use super::module::{Module, Type, Variable};
+use super::module::{Mode, Module, Type, Variable};
+use super::ray_interface::RayInterface;
 use super::{ShaderStage, spirv};
 use crate::bindless::layout;
 use crate::error::{Error, Result};
@@ -17,10 +18,14 @@ pub(crate) struct Reflection {
     pub(crate) ray_query: bool,
     /// The module is for a ray tracing pipeline.
     pub(crate) ray_tracing: bool,
+    /// Payloads and hit attributes.
+    pub(crate) ray_interface: RayInterface,
     /// Invocations of a work group (compute, task, mesh), with the defaults of specialization constants; else zeros.
     pub(crate) local_size: [u32; 3],
     /// For each axis, the specialization constant that overrides [`local_size`](Self::local_size).
     pub(crate) local_size_ids: [Option<u32>; 3],
+    /// Most vertices and primitives that a workgroup of a mesh stage puts out; else zeros.
+    pub(crate) mesh_outputs: [u32; 2],
     /// Specialization constants: id and bytes (1 to 8; booleans take 4), sorted by id.
     pub(crate) specialization: Vec<(u32, u32)>,
     /// Bindings that the module declares, sorted, each once.
@@ -42,8 +47,9 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
     spirv::check(words)?;
     let module = Module::read(words)?;
     let entry = entry_point(&module, stage)?;
-    check_function(words, module.entries[entry].function)?;
-    let (local_size, local_size_ids) = local_size(&module, module.entries[entry].function);
+    let function = module.entries[entry].function;
+    check_function(words, function)?;
+    let (local_size, local_size_ids) = local_size(&module, function);
     let (mut bindings, mut inputs) = (Vec::new(), Vec::new());
     let mut push_constant_bytes = 0;
     for variable in module.variables.iter().filter(|variable| module.in_interface(entry, variable)) {
@@ -61,8 +67,10 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
         push_constant_bytes,
         ray_query: module.has(Capability::RayQueryKHR),
         ray_tracing: stage.is_ray_tracing() || module.has(Capability::RayTracingKHR),
+        ray_interface: RayInterface::of(&module),
         local_size,
         local_size_ids,
+        mesh_outputs: if stage == ShaderStage::Mesh { mesh_outputs(&module, function) } else { [0; 2] },
         specialization: specialization(&module),
         bindings,
         capabilities: module.capabilities(),
@@ -134,6 +142,13 @@ fn local_size(module: &Module, function: u32) -> ([u32; 3], [Option<u32>; 3]) {
     ([0; 3], [None; 3])
 }
 
+fn mesh_outputs(module: &Module, function: u32) -> [u32; 2] {
+    [ExecutionMode::OutputVertices, ExecutionMode::OutputPrimitivesEXT].map(|wanted| {
+        let of_function = |mode: &&Mode| mode.function == function && mode.mode == wanted as u32;
+        module.modes.iter().find(of_function).map_or(0, |mode| mode.operands[0])
+    })
+}
+
 fn parts_of(module: &Module, ids: [u32; 3]) -> ([u32; 3], [Option<u32>; 3]) {
     let size = ids.map(|id| module.constants.get(&id).map_or(1, |constant| constant.value));
     (size, ids.map(|id| module.decoration(id, Decoration::SpecId)))
@@ -180,6 +195,9 @@ fn binding(module: &Module, variable: &Variable) -> Result<u32, String> {
     ) else {
         return Err(format!("{what} has no descriptor set or no binding; {}", remedy()));
     };
+    if variable.storage == StorageClass::StorageBuffer as u32 && (set, binding) == TLAS_TABLE {
+        return Ok(binding);
+    }
     if variable.storage != StorageClass::UniformConstant as u32 {
         return Err(format!(
             "{what} (set {set}, binding {binding}) is a buffer descriptor; there are none: declare a buffer_reference \
@@ -198,6 +216,9 @@ fn binding(module: &Module, variable: &Variable) -> Result<u32, String> {
         None => Err(format!("{what} is in set {set}, binding {binding}, which does not exist; {}", remedy())),
     }
 }
+
+/// The one buffer descriptor, which `<lvk/tlas.glsl>` declares.
+const TLAS_TABLE: (u32, u32) = (layout::SET, layout::TLAS_TABLE);
 
 /// The binding that takes resources of this type.
 fn kind(module: &Module, pointer: u32) -> Option<u32> {

@@ -157,6 +157,8 @@ pub enum ShaderSource<'a> {
 /// * Ray tracing stages: `traceRayEXT(kTLAS[push.tlas], LVK_RAY_FLAG_OPAQUE, ..)`.
 /// * Any stage: `#include <lvk/ray_query.glsl>` for ray queries,
 ///   `lvkRayQueryInitialize(rq, push.tlas, LVK_RAY_FLAG_OPAQUE, 0xFFu, origin, 0.0, direction, 100.0)` and so on.
+/// * Task and mesh stages: `GL_EXT_mesh_shader` is on, so `taskPayloadSharedEXT`, `EmitMeshTasksEXT(x, y, z)`,
+///   `SetMeshOutputsEXT(vertices, primitives)` and `gl_MeshVerticesEXT` are there.
 /// * `LVK_STAGE_FRAGMENT`, `LVK_STAGE_RAY_GEN` and so on are defined for the stage at hand, so that one file serves several.
 ///
 /// Extensions for buffer references, scalar layout, non-uniform indexing, sized integer and float types, subgroup

@@ -194,7 +194,7 @@ fn formatless_reads_follow_the_device() {
         "",
         "imageStore(kImages2D[1], ivec2(0), imageLoad(kImages2D[0], ivec2(0)));",
     );
-    let read = CompileOptions { formatless_read: true };
+    let read = CompileOptions { formatless_read: true, position_fetch: false };
     let words = compile(&desc(ShaderStage::Compute, &text), &read).unwrap();
     assert!(capabilities(&words).contains(&(Capability::StorageImageReadWithoutFormat as u32)));
     assert!(error(ShaderStage::Compute, &text).contains("writeonly"));
@@ -433,8 +433,10 @@ fn work_group_sizes_and_specialization_are_reported() {
     assert_eq!((found.local_size, found.local_size_ids), ([8, 1, 1], [Some(3), None, None]));
     assert_eq!(found.specialization, [(1, 4), (2, 4), (3, 4), (9, 8)]);
     let mesh = shader(ShaderStage::Mesh, "", "SetMeshOutputsEXT(0u, 0u);");
-    assert_eq!(facts(ShaderStage::Mesh, &mesh).local_size, [32, 1, 1]);
-    assert_eq!(facts(ShaderStage::Fragment, "void main() {}").local_size, [0; 3]);
+    let mesh = facts(ShaderStage::Mesh, &mesh);
+    assert_eq!((mesh.local_size, mesh.mesh_outputs), ([32, 1, 1], [3, 1]));
+    let fragment = facts(ShaderStage::Fragment, "void main() {}");
+    assert_eq!((fragment.local_size, fragment.mesh_outputs), ([0; 3], [0; 2]));
 }
 
 #[test]

@@ -13,6 +13,9 @@
 // `rq` and `which` may be evaluated more than once or not at all: pass plain names.
 
 #extension GL_EXT_ray_query : require
+#ifdef LVK_POSITION_FETCH
+#extension GL_EXT_ray_tracing_position_fetch : require
+#endif
 #include <lvk/tlas.glsl>
 
 #define LvkRayQuery rayQueryEXT
@@ -49,13 +52,20 @@
 // Of an intersection.
 #define lvkRayQueryType(rq, which) rayQueryGetIntersectionTypeEXT(rq, which)
 #define lvkRayQueryT(rq, which) rayQueryGetIntersectionTEXT(rq, which)
-#define lvkRayQueryInstanceId(rq, which) rayQueryGetIntersectionInstanceIdEXT(rq, which)
+// The application's own numbers of instance and primitive; `tlas` is the index the query was started with.
+#define lvkRayQueryInstanceId(rq, which, tlas) lvkMapInstance(tlas, rayQueryGetIntersectionInstanceIdEXT(rq, which))
+#define lvkRayQueryPrimitiveIndex(rq, which, tlas) \
+    lvkMapPrimitive(tlas, rayQueryGetIntersectionInstanceIdEXT(rq, which), \
+        rayQueryGetIntersectionGeometryIndexEXT(rq, which), rayQueryGetIntersectionPrimitiveIndexEXT(rq, which))
 #define lvkRayQueryInstanceCustomIndex(rq, which) rayQueryGetIntersectionInstanceCustomIndexEXT(rq, which)
 #define lvkRayQuerySbtOffset(rq, which) rayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetEXT(rq, which)
 #define lvkRayQueryGeometryIndex(rq, which) rayQueryGetIntersectionGeometryIndexEXT(rq, which)
-#define lvkRayQueryPrimitiveIndex(rq, which) rayQueryGetIntersectionPrimitiveIndexEXT(rq, which)
 #define lvkRayQueryBarycentrics(rq, which) rayQueryGetIntersectionBarycentricsEXT(rq, which)
 #define lvkRayQueryFrontFace(rq, which) rayQueryGetIntersectionFrontFaceEXT(rq, which)
+#ifdef LVK_POSITION_FETCH
+// The corners of the triangle, in object space: void (LvkRayQuery, which, out vec3[3]). Needs BuildFlags::POSITION_FETCH.
+#define lvkRayQueryTrianglePositions(rq, which, positions) rayQueryGetIntersectionTriangleVertexPositionsEXT(rq, which, positions)
+#endif
 #define lvkRayQueryCandidateAabbOpaque(rq) rayQueryGetIntersectionCandidateAABBOpaqueEXT(rq)
 #define lvkRayQueryObjectRayOrigin(rq, which) rayQueryGetIntersectionObjectRayOriginEXT(rq, which)
 #define lvkRayQueryObjectRayDirection(rq, which) rayQueryGetIntersectionObjectRayDirectionEXT(rq, which)

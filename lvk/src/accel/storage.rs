@@ -1,0 +1,134 @@
+//! The memory of acceleration structures: small ones share buffers, large ones have their own.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::ranges::Ranges;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::resource::Buffer;
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
+
+/// Size of a shared buffer.
+const BLOCK_BYTES: u64 = 4 << 20;
+/// Structures larger than this get a buffer of their own, which goes back to the allocator with them.
+const LARGEST_SHARED: u64 = BLOCK_BYTES / 8;
+/// Vulkan wants structures at multiples of this inside their buffer.
+const ALIGNMENT: u64 = 256;
+
+/// Hands out memory for structures and takes it back.
+pub(crate) struct AccelStorage {
+    pool: Arc<Pool>,
+    budget_bytes: u64,
+}
+
+#[derive(Default)]
+struct Pool {
+    blocks: Mutex<Vec<Block>>,
+    used_bytes: AtomicU64,
+}
+
+/// A buffer that several structures share.
+struct Block {
+    buffer: Arc<Buffer>,
+    ranges: Ranges,
+}
+
+/// The bytes of one structure, given back on drop.
+pub(crate) struct StorageRange {
+    pub(crate) buffer: Arc<Buffer>,
+    /// A multiple of 256.
+    pub(crate) offset: u64,
+    pub(crate) bytes: u64,
+    shared: bool,
+    pool: Arc<Pool>,
+}
+
+impl AccelStorage {
+    /// Never holds more than `budget_bytes` at once.
+    pub(crate) fn new(budget_bytes: u64) -> Self {
+        Self { pool: Arc::default(), budget_bytes }
+    }
+
+    /// Memory for the structure `name`.
+    pub(crate) fn alloc(&self, gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<StorageRange> {
+        let bytes = bytes.max(1).checked_next_multiple_of(ALIGNMENT).unwrap_or(u64::MAX);
+        self.reserve(name, bytes)?;
+        let made = if bytes > LARGEST_SHARED {
+            new_buffer(gpu, name, bytes).map(|buffer| (Arc::new(buffer), 0, false))
+        } else {
+            self.alloc_shared(gpu, bytes).map(|(buffer, offset)| (buffer, offset, true))
+        };
+        let (buffer, offset, shared) = made.inspect_err(|_| self.pool.unreserve(bytes))?;
+        Ok(StorageRange { buffer, offset, bytes, shared, pool: Arc::clone(&self.pool) })
+    }
+
+    /// Bytes of all structures alive.
+    pub(crate) fn used_bytes(&self) -> u64 {
+        self.pool.used_bytes.load(Ordering::Relaxed)
+    }
+
+    /// Bytes of shared buffers that no structure uses.
+    pub(crate) fn spare_bytes(&self) -> u64 {
+        let blocks = self.pool.blocks.lock().unwrap_or_else(PoisonError::into_inner);
+        blocks.iter().map(|block| BLOCK_BYTES - block.ranges.used_bytes()).sum()
+    }
+
+    fn reserve(&self, name: &str, bytes: u64) -> Result<()> {
+        let add = |used: u64| used.checked_add(bytes).filter(|sum| *sum <= self.budget_bytes);
+        let used = &self.pool.used_bytes;
+        used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add).map(drop).map_err(|used| {
+            let message = format!(
+                "{bytes} bytes more than the {used} in use would take acceleration structures over their budget of \
+                 {} bytes; destroy or compact some, or raise ContextDesc::accel_budget_bytes",
+                self.budget_bytes
+            );
+            Error::usage(name, message)
+        })
+    }
+
+    fn alloc_shared(&self, gpu: &Arc<Gpu>, bytes: u64) -> Result<(Arc<Buffer>, u64)> {
+        let mut blocks = self.pool.blocks.lock().unwrap_or_else(PoisonError::into_inner);
+        for block in blocks.iter_mut() {
+            if let Some(offset) = block.ranges.alloc(bytes) {
+                return Ok((Arc::clone(&block.buffer), offset));
+            }
+        }
+        let buffer = Arc::new(new_buffer(gpu, "small acceleration structures", BLOCK_BYTES)?);
+        let mut block = Block { buffer: Arc::clone(&buffer), ranges: Ranges::new(BLOCK_BYTES) };
+        let offset = block.ranges.alloc(bytes).unwrap_or(0);
+        blocks.push(block);
+        Ok((buffer, offset))
+    }
+}
+
+impl Pool {
+    fn unreserve(&self, bytes: u64) {
+        self.used_bytes.fetch_sub(bytes, Ordering::Relaxed);
+    }
+
+    /// Takes a range of a shared buffer back; the buffer goes with its last structure.
+    fn free_shared(&self, range: &StorageRange) {
+        let mut blocks = self.blocks.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(index) = blocks.iter().position(|block| block.buffer.id == range.buffer.id) else { return };
+        blocks[index].ranges.free(range.offset, range.bytes);
+        if blocks[index].ranges.is_empty() {
+            blocks.swap_remove(index);
+        }
+    }
+}
+
+impl Drop for StorageRange {
+    fn drop(&mut self) {
+        self.pool.unreserve(self.bytes);
+        if self.shared {
+            self.pool.free_shared(self);
+        }
+    }
+}
+
+fn new_buffer(gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Buffer> {
+    let desc =
+        BufferDesc { size_bytes: bytes, usage: BufferUsage::empty(), debug_name: name, ..Default::default() };
+    Buffer::new(gpu, &desc, InternalUsage::ACCEL_STORAGE)
+}

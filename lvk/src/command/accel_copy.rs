@@ -1,0 +1,126 @@
+//! Sizes, compaction and serialisation of bottom-level structures.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::CommandBuffer;
+use crate::accel::AccelStruct;
+use crate::accel::blas::BlasBody;
+use crate::accel::compaction::SizeQuery;
+use crate::barrier::{Stages, Use};
+use crate::error::Result;
+use crate::resource::{Buffer, QueryPool};
+
+impl CommandBuffer {
+    /// Asks how large each target would be, compacted. Answers arrive in the query's pool.
+    pub(crate) fn query_compacted_sizes(&mut self, query: &Arc<SizeQuery>) -> Result<()> {
+        for (target, first) in &query.targets {
+            let body = target.blas()?.body();
+            let ty = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
+            self.write_sizes(target, &body, &query.pool, *first, ty)?;
+        }
+        self.size_queries.push(Arc::clone(query));
+        Ok(())
+    }
+
+    /// Writes a property of each part into the pool (`vkCmdWriteAccelerationStructuresPropertiesKHR`).
+    pub(crate) fn write_sizes(
+        &mut self,
+        target: &AccelStruct,
+        body: &BlasBody,
+        pool: &QueryPool,
+        first: u32,
+        ty: vk::QueryType,
+    ) -> Result<()> {
+        let shared = Arc::clone(&self.shared);
+        let ext = shared.gpu.accel()?;
+        pool.check_range(first, body.structures.len() as u32)?;
+        let structures: Vec<_> = body.structures.iter().map(|part| part.raw).collect();
+        self.uses.id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
+        self.flush();
+        // SAFETY: the structures are alive and built; the queries exist and were reset when the pool was made.
+        unsafe {
+            ext.cmd_write_acceleration_structures_properties(self.raw(), &structures, ty, pool.raw, first);
+        }
+        Ok(())
+    }
+
+    /// Copies every part into a smaller structure (`vkCmdCopyAccelerationStructureKHR`).
+    pub(crate) fn copy_compacted(
+        &mut self,
+        target: &AccelStruct,
+        from: &BlasBody,
+        to: &BlasBody,
+    ) -> Result<()> {
+        let shared = Arc::clone(&self.shared);
+        let ext = shared.gpu.accel()?;
+        self.use_copy(target);
+        self.flush();
+        for (source, copy) in from.structures.iter().zip(&to.structures) {
+            let info = vk::CopyAccelerationStructureInfoKHR::default()
+                .src(source.raw)
+                .dst(copy.raw)
+                .mode(vk::CopyAccelerationStructureModeKHR::COMPACT);
+            // SAFETY: the source was built to be compacted, and the copy has the size the GPU answered.
+            unsafe { ext.cmd_copy_acceleration_structure(self.raw(), &info) };
+        }
+        Ok(())
+    }
+
+    /// Writes each part as bytes to its address, a multiple of 256 in `buffer`
+    /// (`vkCmdCopyAccelerationStructureToMemoryKHR`).
+    pub(crate) fn serialize_parts(
+        &mut self,
+        target: &AccelStruct,
+        body: &BlasBody,
+        buffer: &Buffer,
+        addresses: &[u64],
+    ) -> Result<()> {
+        let shared = Arc::clone(&self.shared);
+        let ext = shared.gpu.accel()?;
+        self.uses.id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
+        self.use_buffer(buffer, Use::accel_to_memory());
+        self.flush();
+        for (part, address) in body.structures.iter().zip(addresses) {
+            let info = vk::CopyAccelerationStructureToMemoryInfoKHR::default()
+                .src(part.raw)
+                .dst(vk::DeviceOrHostAddressKHR { device_address: *address })
+                .mode(vk::CopyAccelerationStructureModeKHR::SERIALIZE);
+            // SAFETY: the structure is built, and the buffer has the bytes the GPU answered for it.
+            unsafe { ext.cmd_copy_acceleration_structure_to_memory(self.raw(), &info) };
+        }
+        Ok(())
+    }
+
+    /// Makes each part from bytes at its address, a multiple of 256 in `buffer`
+    /// (`vkCmdCopyMemoryToAccelerationStructureKHR`).
+    pub(crate) fn deserialize_parts(
+        &mut self,
+        target: &Arc<AccelStruct>,
+        buffer: &Buffer,
+        addresses: &[u64],
+    ) -> Result<()> {
+        let shared = Arc::clone(&self.shared);
+        let ext = shared.gpu.accel()?;
+        let body = target.blas()?.body();
+        self.use_copy(target);
+        self.use_buffer(buffer, Use::accel_from_memory());
+        self.flush();
+        for (part, address) in body.structures.iter().zip(addresses) {
+            let info = vk::CopyMemoryToAccelerationStructureInfoKHR::default()
+                .src(vk::DeviceOrHostAddressConstKHR { device_address: *address })
+                .dst(part.raw)
+                .mode(vk::CopyAccelerationStructureModeKHR::DESERIALIZE);
+            // SAFETY: the driver said it can read the bytes, and the structure has the size they say.
+            unsafe { ext.cmd_copy_memory_to_acceleration_structure(self.raw(), &info) };
+        }
+        // A refit reads the same indices as the build did.
+        self.gather_inputs(std::slice::from_ref(target), &[false])
+    }
+
+    fn use_copy(&mut self, target: &AccelStruct) {
+        self.uses.id(target.id, Use::accel_build_write());
+        self.uses.accumulate(self.shared.all_blas, Use::accel_build_write());
+    }
+}

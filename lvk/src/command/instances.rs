@@ -1,0 +1,233 @@
+//! Instances on their way into the build of a top-level structure: written by the host where it knows the addresses,
+//! by a kernel where structures have parts, maps, or may move.
+
+use std::sync::{Arc, OnceLock};
+
+use super::CommandBuffer;
+use crate::accel::AccelStruct;
+use crate::accel::build::instance_bytes;
+use crate::accel::instance::{DeviceInstances, InstancePlan, TlasInstance};
+use crate::accel::tlas::{Entry, InstanceSource, InstanceTables, Shown, SourceBytes, Tlas};
+use crate::barrier::{Stages, Use};
+use crate::error::{Error, Result};
+use crate::gpu::memory::MemoryKind;
+use crate::kernel::{InstancesPush, Kernel};
+use crate::resource::Buffer;
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
+
+/// Addresses of instances must be a multiple of this.
+const INSTANCE_ALIGNMENT: u64 = 16;
+
+/// Bytes of `LvkTlasRow` in `shader/glsl/tlas.glsl`.
+pub(crate) const ROW_BYTES: u64 = 16;
+
+/// Instances on their way into a build.
+pub(super) struct Ready {
+    /// Where Vulkan reads them.
+    pub(super) address: u64,
+    pub(super) built_count: u32,
+    pub(super) shown: Vec<Shown>,
+    pub(super) source: Option<InstanceSource>,
+    pub(super) reads: Vec<Arc<Buffer>>,
+}
+
+impl CommandBuffer {
+    /// Instances whose addresses the host knows.
+    pub(super) fn stage_instances(
+        &mut self,
+        name: &str,
+        instances: &[TlasInstance],
+        plan: InstancePlan,
+    ) -> Result<Ready> {
+        let bytes = instance_bytes(plan.built_count.max(1));
+        let mut written = Ok(());
+        let staging = &self.shared.staging;
+        let region = staging.write_with(bytes, INSTANCE_ALIGNMENT, self.recording.sequence, |out| {
+            written = plan.write_addresses(name, instances, out);
+        })?;
+        self.retire_temporary(region.temporary);
+        written?;
+        let InstancePlan { built_count, shown, .. } = plan;
+        Ok(Ready { address: region.address, built_count, shown, source: None, reads: Vec::new() })
+    }
+
+    /// Instances for the kernel, and the owners of those for further parts.
+    pub(super) fn host_source(
+        &mut self,
+        name: &str,
+        instances: &[TlasInstance],
+        plan: InstancePlan,
+    ) -> Result<(InstanceSource, Vec<Shown>)> {
+        let list = plan.entries();
+        let keep = plan.shown.iter().any(Shown::may_move);
+        let mut written = Ok(());
+        let records = self.source_bytes(name, instance_bytes(plan.built_count), keep, |out| {
+            written = plan.write_entries(name, instances, &list, out);
+        })?;
+        written?;
+        let owners: &[u8] = bytemuck::cast_slice(&list.owners);
+        let owners = match owners.len() as u64 {
+            0 => None,
+            bytes => {
+                Some(self.source_bytes(name, bytes, keep, |out| out[..owners.len()].copy_from_slice(owners))?)
+            }
+        };
+        let source = InstanceSource {
+            instances: records,
+            count: plan.built_count,
+            owners,
+            user_count: instances.len() as u32,
+            copies: 1,
+            entries: list.entries,
+        };
+        Ok((source, plan.shown))
+    }
+
+    /// Bytes for the kernel to read: in a buffer of their own if they are to be kept, else in the staging ring.
+    fn source_bytes(
+        &mut self,
+        name: &str,
+        size_bytes: u64,
+        keep: bool,
+        fill: impl FnOnce(&mut [u8]),
+    ) -> Result<SourceBytes> {
+        if !keep {
+            let staging = &self.shared.staging;
+            let region = staging.write_with(size_bytes, INSTANCE_ALIGNMENT, self.recording.sequence, fill)?;
+            self.retire_temporary(region.temporary);
+            return Ok(SourceBytes { address: region.address, buffer: None });
+        }
+        let memory = MemoryKind::HostVisible;
+        let size_bytes = size_bytes.max(INSTANCE_ALIGNMENT);
+        let desc = BufferDesc { size_bytes, memory, debug_name: name, ..Default::default() };
+        let buffer = Buffer::new(&self.shared.gpu, &desc, InternalUsage::NONE)?;
+        buffer.fill(fill);
+        Ok(SourceBytes { address: buffer.address, buffer: Some(Arc::new(buffer)) })
+    }
+
+    /// The caller's buffer as a source; a copy of it where structures may move later.
+    pub(super) fn device_source(
+        &mut self,
+        name: &str,
+        instances: &DeviceInstances<'_>,
+    ) -> Result<(Vec<Shown>, InstanceSource)> {
+        let shared = Arc::clone(&self.shared);
+        let buffer = shared.store.buffers.get(instances.buffer)?;
+        buffer.check_usage(BufferUsage::STORAGE)?;
+        if !instances.offset.is_multiple_of(INSTANCE_ALIGNMENT) {
+            let message = format!("instances start at a multiple of 16 bytes, not at {}", instances.offset);
+            return Err(Error::usage(name, message));
+        }
+        let bytes = instance_bytes(instances.count);
+        buffer.check_range(instances.offset, bytes)?;
+        let mut shown = Vec::with_capacity(instances.blas.len());
+        for handle in instances.blas {
+            let blas = shared.store.accel_structs.get(*handle)?;
+            let body = blas.blas()?.body();
+            shown.push(Shown { blas, body });
+        }
+        let parts = |shown: &Shown| shown.body.structures.len() as u32;
+        let entry = |(place, of): (u32, &Shown)| Entry { shown: place, first: 0, count: parts(of) };
+        let own =
+            SourceBytes { address: buffer.address + instances.offset, buffer: Some(Arc::clone(&buffer)) };
+        let mut source = InstanceSource {
+            instances: own,
+            count: instances.count,
+            owners: None,
+            user_count: instances.count,
+            copies: shown.iter().map(parts).max().unwrap_or(1),
+            entries: (0..).zip(&shown).map(entry).collect(),
+        };
+        if shown.iter().any(Shown::may_move) && bytes > 0 {
+            let desc = BufferDesc { size_bytes: bytes, debug_name: name, ..Default::default() };
+            let copy = Arc::new(Buffer::new(&shared.gpu, &desc, InternalUsage::NONE)?);
+            self.copy_buffer_objects(&buffer, instances.offset, &copy, 0, bytes)?;
+            source.instances = SourceBytes { address: copy.address, buffer: Some(copy) };
+        }
+        Ok((shown, source))
+    }
+
+    /// Has the kernel write the instances and their rows.
+    pub(super) fn run_instances(
+        &mut self,
+        target: &AccelStruct,
+        tlas: &Tlas,
+        shown: Vec<Shown>,
+        source: InstanceSource,
+        built_count: u32,
+    ) -> Result<Ready> {
+        let records = self.kept_buffer(&tlas.records, target, u64::from(tlas.room) * instance_bytes(1))?;
+        let mapped = shown.iter().any(Shown::has_rows);
+        let rows = match mapped || tlas.rows.get().is_some() {
+            true => Some(self.kept_buffer(&tlas.rows, target, u64::from(tlas.room) * ROW_BYTES)?),
+            false => None,
+        };
+        self.record_instances(&source, &shown, &records, rows.as_deref())?;
+        let source = shown.iter().any(Shown::may_move).then_some(source);
+        Ok(Ready { address: records.address, built_count, shown, source, reads: vec![records] })
+    }
+
+    fn record_instances(
+        &mut self,
+        source: &InstanceSource,
+        shown: &[Shown],
+        records: &Buffer,
+        rows: Option<&Buffer>,
+    ) -> Result<()> {
+        let tables = InstanceTables::new(shown, &source.entries);
+        let entries = self.stage(bytemuck::cast_slice(&tables.entries))?;
+        let parts = self.stage(bytemuck::cast_slice(&tables.parts))?;
+        let push = InstancesPush {
+            source: source.instances.address,
+            target: records.address,
+            rows: rows.map_or(0, |rows| rows.address),
+            entries,
+            parts,
+            owners: source.owners.as_ref().map_or(0, |owners| owners.address),
+            count: source.count,
+            copies: source.copies,
+            entry_count: tables.entries.len() as u32,
+            user_count: source.user_count,
+        };
+        if let Some(buffer) = &source.instances.buffer {
+            self.use_buffer(buffer, Use::shader_read(Stages::COMPUTE));
+        }
+        self.use_buffer(records, Use::shader_write(Stages::COMPUTE));
+        if rows.is_some() {
+            self.uses.id(self.shared.tlas_tables, Use::shader_write(Stages::COMPUTE));
+        }
+        self.flush();
+        let invocations = source.count.saturating_mul(source.copies);
+        if invocations == 0 {
+            return Ok(());
+        }
+        self.run_kernel(Kernel::Instances, std::iter::once((bytemuck::bytes_of(&push), invocations)))
+    }
+
+    /// The address of bytes that the GPU may read until the command buffer is done.
+    fn stage(&mut self, bytes: &[u8]) -> Result<u64> {
+        let region = self.shared.staging.write(bytes, INSTANCE_ALIGNMENT, self.recording.sequence)?;
+        self.retire_temporary(region.temporary);
+        Ok(region.address)
+    }
+
+    /// A buffer that lives as long as the structure, made when it is first needed.
+    fn kept_buffer(
+        &self,
+        place: &OnceLock<Arc<Buffer>>,
+        target: &AccelStruct,
+        bytes: u64,
+    ) -> Result<Arc<Buffer>> {
+        if let Some(buffer) = place.get() {
+            return Ok(Arc::clone(buffer));
+        }
+        let desc = BufferDesc {
+            size_bytes: bytes.max(1),
+            usage: BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT,
+            debug_name: &target.name,
+            ..Default::default()
+        };
+        let buffer = Arc::new(Buffer::new(&self.shared.gpu, &desc, InternalUsage::NONE)?);
+        Ok(Arc::clone(place.get_or_init(|| buffer)))
+    }
+}

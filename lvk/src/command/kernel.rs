@@ -1,0 +1,123 @@
+//! Runs the library's own compute shaders between the caller's commands, and leaves no trace of them.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::CommandBuffer;
+use crate::accel::AccelStruct;
+use crate::accel::blas::{Blas, PartShape};
+use crate::accel::geometry::BlasGeometry;
+use crate::accel::primitive_map::PrimitiveMap;
+use crate::barrier::{Stages, Use};
+use crate::error::Result;
+use crate::format::IndexFormat;
+use crate::kernel::{GatherPush, Kernel, groups};
+
+const KIND_NO_INDICES: u32 = 0;
+const KIND_INDICES_16: u32 = 1;
+const KIND_INDICES_32: u32 = 2;
+const KIND_BOXES: u32 = 3;
+const BOX_BYTES: u64 = 24;
+
+impl CommandBuffer {
+    /// Gathers indices and boxes for the parts of these structures. A refit moves vertices or boxes, never indices.
+    pub(super) fn gather_inputs(&mut self, structures: &[Arc<AccelStruct>], refits: &[bool]) -> Result<()> {
+        let mut runs = Vec::new();
+        for (target, refit) in structures.iter().zip(refits) {
+            let blas = target.blas()?;
+            for part in &blas.parts {
+                if let Some(map) = &part.map {
+                    self.plan_gather(blas, part, map, *refit, &mut runs)?;
+                }
+            }
+        }
+        if runs.is_empty() {
+            return Ok(());
+        }
+        self.flush();
+        self.run_kernel(Kernel::Gather, runs.iter().map(|push| (bytemuck::bytes_of(push), push.count)))
+    }
+
+    fn plan_gather(
+        &mut self,
+        blas: &Blas,
+        part: &PartShape,
+        map: &PrimitiveMap,
+        refit: bool,
+        runs: &mut Vec<GatherPush>,
+    ) -> Result<()> {
+        let geometries = blas.geometries.iter().zip(&part.counts).enumerate();
+        for (index, (geometry, count)) in geometries.filter(|(_, (_, count))| **count > 0) {
+            if refit && !geometry.is_boxes() {
+                continue;
+            }
+            let source = self.gather_source(geometry)?;
+            self.use_buffer(&map.table, Use::shader_read(Stages::COMPUTE));
+            self.use_buffer(&map.inputs, Use::shader_write(Stages::COMPUTE));
+            let (numbers, gathered) = (map.numbers_address(index), map.input_address(index));
+            runs.push(GatherPush { numbers, gathered, count: *count, ..source });
+        }
+        Ok(())
+    }
+
+    /// Where the inputs of a geometry lie.
+    fn gather_source(&mut self, geometry: &BlasGeometry) -> Result<GatherPush> {
+        let push = |source: u64, kind, box_stride| GatherPush {
+            source: source & !3,
+            kind,
+            odd_half: u32::from(source & 2 != 0),
+            box_stride,
+            ..bytemuck::Zeroable::zeroed()
+        };
+        let (handle, offset, kind, stride) = match geometry {
+            BlasGeometry::Aabbs(boxes) => {
+                let stride = if boxes.stride == 0 { BOX_BYTES } else { boxes.stride };
+                (boxes.buffer, boxes.offset, KIND_BOXES, stride as u32)
+            }
+            BlasGeometry::Triangles(triangles) => match triangles.indices {
+                None => return Ok(push(0, KIND_NO_INDICES, 0)),
+                Some(indices) => {
+                    let short = indices.format == IndexFormat::U16;
+                    let kind = if short { KIND_INDICES_16 } else { KIND_INDICES_32 };
+                    (indices.buffer, indices.offset, kind, 0)
+                }
+            },
+        };
+        let buffer = self.shared.store.buffers.get(handle)?;
+        self.use_buffer(&buffer, Use::shader_read(Stages::COMPUTE));
+        Ok(push(buffer.address + offset, kind, stride))
+    }
+
+    /// Runs a kernel several times, each with its push constants and number of invocations; barriers are in place.
+    /// Afterwards the caller's pipeline and push constants are as before.
+    pub(super) fn run_kernel<'a>(
+        &mut self,
+        kernel: Kernel,
+        runs: impl Iterator<Item = (&'a [u8], u32)>,
+    ) -> Result<()> {
+        let shared = Arc::clone(&self.shared);
+        let pipeline =
+            shared.kernels.get(&shared.gpu, &shared.layout, shared.pipeline_base().cache, kernel)?;
+        let (device, raw) = (&shared.gpu.device, self.raw());
+        let (point, stages) = (vk::PipelineBindPoint::COMPUTE, vk::ShaderStageFlags::ALL);
+        // SAFETY: the pipeline lives as long as the context; it uses no descriptors, and its push constants and
+        // groups are within every device's limits.
+        unsafe {
+            device.cmd_bind_pipeline(raw, point, pipeline.raw);
+            for (push, invocations) in runs {
+                let [x, y, z] = groups(invocations);
+                device.cmd_push_constants(raw, shared.layout.raw, stages, 0, push);
+                device.cmd_dispatch(raw, x, y, z);
+            }
+            if let Some(own) = &self.compute {
+                device.cmd_bind_pipeline(raw, point, own.raw);
+            }
+            let pushed = self.push_constants.pushed_bytes();
+            if !pushed.is_empty() {
+                device.cmd_push_constants(raw, shared.layout.raw, stages, 0, pushed);
+            }
+        }
+        Ok(())
+    }
+}

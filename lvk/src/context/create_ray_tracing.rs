@@ -1,0 +1,82 @@
+//! Creates ray tracing pipelines and the libraries they are linked from.
+
+use std::sync::Arc;
+
+use super::Context;
+use super::create::NO_SLOT;
+use super::holder::Holder;
+use crate::error::{Error, Result};
+use crate::handle::{RayTracingLibraryHandle, RayTracingPipelineHandle};
+use crate::pipeline::library::RayTracingLibraryDesc;
+use crate::pipeline::ray_tracing::RayTracingPipelineDesc;
+use crate::pipeline::{RayTracingLibrary, RayTracingPipeline};
+
+impl Context {
+    /// Creates a ray tracing pipeline with its shader binding table (`vkCreateRayTracingPipelinesKHR`), compiled on as
+    /// many cores as the driver uses.
+    ///
+    /// # Errors
+    /// [`Unsupported`](Error::Unsupported) without
+    /// [`ray_tracing_pipeline`](crate::Capabilities::ray_tracing_pipeline);
+    /// [`LimitExceeded`](Error::LimitExceeded) for a recursion or a shader record beyond the device's;
+    /// [`InvalidUsage`](Error::InvalidUsage) for a module of another stage, more records than shaders, or a library
+    /// that does not agree with the pipeline.
+    pub fn create_ray_tracing_pipeline(
+        &self,
+        desc: &RayTracingPipelineDesc<'_>,
+    ) -> Result<Holder<RayTracingPipelineHandle>> {
+        let shared = self.shared();
+        let find = |handle| shared.store.shader_modules.get(handle);
+        let libraries = desc.libraries.iter().map(|handle| shared.store.ray_tracing_libraries.get(*handle));
+        let libraries = libraries.collect::<Result<Vec<_>>>()?;
+        let base = shared.pipeline_base();
+        let (pipeline, table) = RayTracingPipeline::new(&shared.gpu, base, desc, &find, &libraries)?;
+        let target = Arc::clone(&pipeline.table);
+        let holder = Holder::new(self, shared.store.ray_tracing_pipelines.insert(pipeline), NO_SLOT);
+        self.before_next_submission(|cmd| cmd.upload_buffer(&target, table.offset, &table.bytes))?;
+        Ok(holder)
+    }
+
+    /// Compiles shaders that several ray tracing pipelines have in common (`vkCreateRayTracingPipelinesKHR` with
+    /// `VK_PIPELINE_CREATE_LIBRARY_BIT_KHR`).
+    ///
+    /// # Errors
+    /// [`Unsupported`](Error::Unsupported) without [`pipeline_libraries`](crate::Capabilities::pipeline_libraries);
+    /// [`InvalidUsage`](Error::InvalidUsage) without any shader, and where a shader's payload or hit attributes are
+    /// larger than the description says; else as
+    /// [`create_ray_tracing_pipeline`](Self::create_ray_tracing_pipeline).
+    pub fn create_ray_tracing_library(
+        &self,
+        desc: &RayTracingLibraryDesc<'_>,
+    ) -> Result<Holder<RayTracingLibraryHandle>> {
+        let shared = self.shared();
+        let find = |handle| shared.store.shader_modules.get(handle);
+        let library = RayTracingLibrary::new(&shared.gpu, shared.pipeline_base(), desc, &find)?;
+        Ok(Holder::new(self, shared.store.ray_tracing_libraries.insert(library), NO_SLOT))
+    }
+
+    /// Bytes of stack each ray of a pipeline needs, as set when it is bound
+    /// (`vkCmdSetRayTracingPipelineStackSizeKHR`). Whoever binds the raw pipeline has to set it too.
+    pub fn ray_tracing_stack_bytes(&self, pipeline: RayTracingPipelineHandle) -> Result<u32> {
+        Ok(self.shared().store.ray_tracing_pipelines.get(pipeline)?.stack_bytes)
+    }
+
+    /// Writes what was compiled so far to the file of
+    /// [`ContextDesc::pipeline_cache`](crate::ContextDesc::pipeline_cache), which is replaced at once. The end of the
+    /// context does so too.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) where the context was given no file; [`File`](Error::File) when it cannot
+    /// be written, for instance because its folder does not exist.
+    pub fn save_pipeline_cache(&self) -> Result<()> {
+        let message = "name a file in ContextDesc::pipeline_cache to keep compiled pipelines";
+        let cache = self.shared().pipeline_cache.as_ref();
+        cache.ok_or_else(|| Error::usage("save_pipeline_cache", message))?.save()
+    }
+
+    /// Bytes of compiled pipelines that the context started with from its file; 0 where it has none, or the file was
+    /// dropped because it is damaged or of another device or driver.
+    pub fn pipeline_cache_loaded_bytes(&self) -> u64 {
+        self.shared().pipeline_cache.as_ref().map_or(0, |cache| cache.loaded_bytes)
+    }
+}

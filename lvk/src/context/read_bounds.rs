@@ -1,0 +1,150 @@
+//! Reads the inputs of meshes back, to learn where their primitives lie.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::Context;
+use crate::accel::bounds::{Bounds, IndexBytes, VertexBytes, box_bounds, triangle_bounds};
+use crate::accel::desc::BlasDesc;
+use crate::accel::geometry::{BlasGeometry, GeometryTransform, Triangles};
+use crate::error::Result;
+use crate::format::IndexFormat;
+use crate::handle::BufferHandle;
+use crate::resource::Buffer;
+
+/// Bytes of a buffer: its handle, where they start, how many.
+type Piece = (BufferHandle, u64, u64);
+
+/// Pieces of buffers that are read together, each once.
+#[derive(Default)]
+struct Pieces {
+    places: HashMap<Piece, usize>,
+    list: Vec<(Arc<Buffer>, u64, u64)>,
+    bytes: Vec<u8>,
+}
+
+impl Context {
+    /// The boxes of the primitives of each geometry of each mesh. Waits for the GPU once.
+    pub(super) fn read_bounds(&self, descs: &[&BlasDesc<'_>]) -> Result<Vec<Vec<Vec<Bounds>>>> {
+        let mut pieces = Pieces::default();
+        for geometry in descs.iter().flat_map(|desc| desc.geometries) {
+            for piece in inputs(geometry) {
+                self.add_piece(&mut pieces, piece)?;
+            }
+        }
+        self.read_pieces(&mut pieces)?;
+        let of_mesh = |desc: &&BlasDesc<'_>| desc.geometries.iter().map(|g| bounds(g, &pieces)).collect();
+        Ok(descs.iter().map(of_mesh).collect())
+    }
+
+    fn add_piece(&self, pieces: &mut Pieces, piece: Piece) -> Result<()> {
+        let (handle, offset, size) = piece;
+        if size == 0 || pieces.places.contains_key(&piece) {
+            return Ok(());
+        }
+        let buffer = self.shared().store.buffers.get(handle)?;
+        pieces.places.insert(piece, pieces.bytes.len());
+        pieces.bytes.resize(pieces.bytes.len() + size as usize, 0);
+        pieces.list.push((buffer, offset, size));
+        Ok(())
+    }
+
+    fn read_pieces(&self, pieces: &mut Pieces) -> Result<()> {
+        let Pieces { list, bytes, .. } = pieces;
+        self.read_back(bytes.len() as u64, bytes, |cmd, target| {
+            let mut end = 0;
+            for (buffer, offset, size) in list.iter() {
+                cmd.copy_buffer_objects(buffer, *offset, target, end, *size)?;
+                end += size;
+            }
+            Ok(())
+        })
+    }
+}
+
+impl Pieces {
+    fn get(&self, piece: Piece) -> &[u8] {
+        let place = self.places.get(&piece);
+        place.and_then(|start| self.bytes.get(*start..*start + piece.2 as usize)).unwrap_or_default()
+    }
+}
+
+/// What of its buffers a geometry reads.
+fn inputs(geometry: &BlasGeometry) -> impl Iterator<Item = Piece> {
+    let pieces = match geometry {
+        BlasGeometry::Aabbs(boxes) => {
+            const BOX_BYTES: u64 = 24;
+            let bytes = span(boxes.count, boxes.stride, BOX_BYTES);
+            [Some((boxes.buffer, boxes.offset, bytes)), None, None]
+        }
+        BlasGeometry::Triangles(triangles) => {
+            [Some(vertices(triangles)), indices(triangles), matrix(triangles)]
+        }
+    };
+    pieces.into_iter().flatten()
+}
+
+fn vertices(triangles: &Triangles) -> Piece {
+    let packed = u64::from(triangles.vertex_format.size_bytes());
+    let bytes = span(triangles.vertex_count, triangles.vertex_stride, packed);
+    (triangles.vertex_buffer, triangles.vertex_offset, bytes)
+}
+
+fn indices(triangles: &Triangles) -> Option<Piece> {
+    let indices = triangles.indices?;
+    let bytes = u64::from(triangles.triangle_count) * 3 * u64::from(indices.format.size_bytes());
+    Some((indices.buffer, indices.offset, bytes))
+}
+
+fn matrix(triangles: &Triangles) -> Option<Piece> {
+    const MATRIX_BYTES: u64 = 48;
+    match triangles.transform {
+        Some(GeometryTransform::Buffer { buffer, offset }) => Some((buffer, offset, MATRIX_BYTES)),
+        _ => None,
+    }
+}
+
+/// Bytes from the first to the end of the last element.
+fn span(count: u32, stride: u64, packed: u64) -> u64 {
+    let stride = if stride == 0 { packed } else { stride };
+    if count == 0 { 0 } else { u64::from(count - 1) * stride + packed }
+}
+
+fn bounds(geometry: &BlasGeometry, pieces: &Pieces) -> Vec<Bounds> {
+    match geometry {
+        BlasGeometry::Aabbs(boxes) => {
+            let bytes = inputs(geometry).next().map_or(&[][..], |piece| pieces.get(piece));
+            box_bounds(bytes, boxes.stride as usize, boxes.count)
+        }
+        BlasGeometry::Triangles(triangles) => {
+            let bytes = pieces.get(vertices(triangles));
+            let vertices = VertexBytes {
+                bytes,
+                stride: triangles.vertex_stride as usize,
+                format: triangles.vertex_format,
+                count: triangles.vertex_count,
+            };
+            let of_triangles = indices(triangles).map(|piece| pieces.get(piece)).unwrap_or_default();
+            let indices = match triangles.indices.map(|indices| indices.format) {
+                None => IndexBytes::None,
+                Some(IndexFormat::U16) => IndexBytes::U16(of_triangles),
+                Some(IndexFormat::U32) => IndexBytes::U32(of_triangles),
+            };
+            let rows = transform(triangles, pieces);
+            triangle_bounds(&vertices, &indices, triangles.triangle_count, rows.as_ref())
+        }
+    }
+}
+
+fn transform(triangles: &Triangles, pieces: &Pieces) -> Option<[f32; 12]> {
+    match triangles.transform? {
+        GeometryTransform::Rows(rows) => Some(rows),
+        GeometryTransform::Buffer { .. } => {
+            let mut rows = [0.0; 12];
+            let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut rows);
+            let found = pieces.get(matrix(triangles)?);
+            (found.len() == bytes.len()).then(|| bytes.copy_from_slice(found))?;
+            Some(rows)
+        }
+    }
+}

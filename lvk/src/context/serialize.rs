@@ -1,0 +1,262 @@
+//! Bottom-level structures as bytes, so that a scene can be kept on disk.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::Context;
+use super::blas_shapes::input;
+use super::create_accel::blas_object;
+use super::holder::Holder;
+use crate::accel::AccelStruct;
+use crate::accel::blas::{BlasBody, PartShape};
+use crate::accel::blob::{Blob, BlobGeometry, BlobGeometryKind, BlobPart, decode, encode};
+use crate::accel::desc::BlasDesc;
+use crate::accel::flags::BuildFlags;
+use crate::accel::geometry::{BlasGeometry, GeometryFlags};
+use crate::accel::primitive_map::table_lists;
+use crate::accel::raw_structure::RawStructure;
+use crate::accel::split::PartPlan;
+use crate::error::{Error, Result};
+use crate::handle::AccelStructHandle;
+use crate::resource::buffer::{BufferDesc, InternalUsage};
+use crate::resource::query::QueryPoolDesc;
+use crate::resource::{Buffer, QueryPool};
+use crate::shared::Garbage;
+
+/// Addresses of serialised structures are multiples of this.
+const ALIGNMENT: u64 = 256;
+
+/// A structure from [`Context::load_or_create_blas`].
+pub struct LoadedBlas {
+    /// The structure.
+    pub blas: Holder<AccelStructHandle>,
+    /// Why the bytes were not used and the structure was built instead; `None` where they were.
+    pub rejected: Option<Error>,
+}
+
+impl Context {
+    /// A bottom-level structure as bytes, for a file that [`load_blas`](Self::load_blas) reads on the same device with
+    /// the same driver (`vkCmdCopyAccelerationStructureToMemoryKHR`). Waits for the GPU.
+    pub fn serialize_blas(&self, handle: AccelStructHandle) -> Result<Vec<u8>> {
+        let object = self.shared().store.accel_structs.get(handle)?;
+        let blas = object.blas()?;
+        let body = blas.body();
+        let sizes = self.serialized_sizes(&object, &body)?;
+        let mut parts = Vec::with_capacity(sizes.len());
+        for (driver, shape) in self.serialized_parts(&object, &body, &sizes)?.into_iter().zip(&blas.parts) {
+            parts.push(BlobPart { driver, map: self.read_map(shape)? });
+        }
+        let geometries = blas.geometries.iter().map(blob_geometry).collect();
+        Ok(encode(&Blob { flags: object.flags.bits(), geometries, parts }))
+    }
+
+    /// Makes a bottom-level structure from what [`serialize_blas`](Self::serialize_blas) wrote
+    /// (`vkCmdCopyMemoryToAccelerationStructureKHR`). `desc` is what it was created from: flags, kinds and counts of
+    /// its geometries must be the same, and its buffers are what a refit reads.
+    ///
+    /// The bytes must come from a file that only this library wrote: they are checked for damage and for the driver that
+    /// wrote them, but a driver trusts what it once wrote.
+    ///
+    /// # Errors
+    /// [`Serialized`](Error::Serialized) for bytes that are damaged, of another mesh, or of another device or driver.
+    pub fn load_blas(&self, desc: &BlasDesc<'_>, bytes: &[u8]) -> Result<Holder<AccelStructHandle>> {
+        self.shared().gpu.accel()?;
+        let blob = decode(bytes).map_err(|error| rejected(desc, error.to_string()))?;
+        check_same_mesh(desc, &blob).map_err(|reason| rejected(desc, reason))?;
+        let mut bytes = Vec::with_capacity(blob.parts.len());
+        for part in &blob.parts {
+            bytes.push(self.check_driver(part).map_err(|reason| rejected(desc, reason))?);
+        }
+        let shapes = self.loaded_shapes(desc, &blob)?;
+        self.deserialize(desc, &blob, shapes, &bytes)
+    }
+
+    /// As [`load_blas`](Self::load_blas), and as [`create_blas`](Self::create_blas) where there are no bytes or they
+    /// cannot be used.
+    pub fn load_or_create_blas(&self, desc: &BlasDesc<'_>, bytes: Option<&[u8]>) -> Result<LoadedBlas> {
+        match bytes.map(|bytes| self.load_blas(desc, bytes)) {
+            Some(Ok(blas)) => Ok(LoadedBlas { blas, rejected: None }),
+            Some(Err(error @ Error::Serialized { .. })) => {
+                log::warn!("{error}; building it anew");
+                Ok(LoadedBlas { blas: self.create_blas(desc)?, rejected: Some(error) })
+            }
+            Some(Err(error)) => Err(error),
+            None => Ok(LoadedBlas { blas: self.create_blas(desc)?, rejected: None }),
+        }
+    }
+
+    fn serialized_sizes(&self, object: &AccelStruct, body: &BlasBody) -> Result<Vec<u64>> {
+        let count = body.structures.len() as u32;
+        let desc = QueryPoolDesc { count, debug_name: "serialised sizes" };
+        let ty = vk::QueryType::ACCELERATION_STRUCTURE_SERIALIZATION_SIZE_KHR;
+        let pool = Arc::new(QueryPool::of(&self.shared().gpu, &desc, ty)?);
+        let mut cmd = self.acquire_command_buffer()?;
+        cmd.write_sizes(object, body, &pool, 0, ty)?;
+        self.shared().retire(Garbage::QueryPool(Arc::clone(&pool)));
+        self.wait(self.submit(cmd)?)?;
+        let sizes: Option<Vec<_>> = pool.values(0, count)?.into_iter().collect();
+        sizes.ok_or_else(|| {
+            Error::usage(&object.name, "the device did not answer the size of a serialised structure")
+        })
+    }
+
+    fn serialized_parts(&self, object: &AccelStruct, body: &BlasBody, sizes: &[u64]) -> Result<Vec<Vec<u8>>> {
+        let places = Places::new(sizes);
+        let buffer = self.blob_buffer(&object.name, places.total)?;
+        let base = buffer.address.next_multiple_of(ALIGNMENT);
+        let addresses: Vec<_> = places.offsets.iter().map(|offset| base + offset).collect();
+        let mut cmd = self.acquire_command_buffer()?;
+        cmd.serialize_parts(object, body, &buffer, &addresses)?;
+        self.submit(cmd)?;
+        let mut parts = Vec::with_capacity(sizes.len());
+        for (offset, size) in places.offsets.iter().zip(sizes) {
+            let mut bytes = vec![0; *size as usize];
+            let start = base - buffer.address + offset;
+            self.read_back(*size, &mut bytes, |cmd, target| {
+                cmd.copy_buffer_objects(&buffer, start, target, 0, *size)
+            })?;
+            parts.push(bytes);
+        }
+        self.shared().retire(Garbage::Buffer(buffer));
+        Ok(parts)
+    }
+
+    /// The words of a part's table.
+    fn read_map(&self, shape: &PartShape) -> Result<Option<Vec<u32>>> {
+        let Some(map) = &shape.map else { return Ok(None) };
+        let count = shape.counts.iter().map(|count| *count as usize).sum::<usize>();
+        let mut words = vec![0_u32; shape.counts.len() + count];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
+        let size = bytes.len() as u64;
+        self.read_back(size, bytes, |cmd, target| cmd.copy_buffer_objects(&map.table, 0, target, 0, size))?;
+        Ok(Some(words))
+    }
+
+    /// Room for serialised structures, wherever the buffer's address lies.
+    fn blob_buffer(&self, name: &str, bytes: u64) -> Result<Arc<Buffer>> {
+        let desc = BufferDesc { size_bytes: bytes + ALIGNMENT, debug_name: name, ..Default::default() };
+        Ok(Arc::new(Buffer::new(&self.shared().gpu, &desc, InternalUsage::NONE)?))
+    }
+
+    /// Whether the driver can read a part, by the head it wrote itself; answers how large the structure will be.
+    fn check_driver(&self, part: &BlobPart) -> Result<u64, String> {
+        let damaged = || "the driver's head is damaged".to_owned();
+        let version = part.version_data().ok_or_else(damaged)?;
+        let number = |at: usize| {
+            let bytes = part.driver.get(at..at + 8)?.try_into().ok()?;
+            Some(u64::from_le_bytes(bytes))
+        };
+        let (written, structure) = number(32).zip(number(40)).ok_or_else(damaged)?;
+        let info = vk::AccelerationStructureVersionInfoKHR::default().version_data(version);
+        let gpu = &self.shared().gpu;
+        let ext = gpu.accel().map_err(|error| error.to_string())?;
+        // SAFETY: the version data has the 32 bytes Vulkan reads.
+        let answer = unsafe { ext.get_device_acceleration_structure_compatibility(&info) };
+        if answer != vk::AccelerationStructureCompatibilityKHR::COMPATIBLE {
+            return Err(format!(
+                "another device or driver wrote it, '{}' cannot read it",
+                gpu.caps.device_name
+            ));
+        }
+        if written != part.driver.len() as u64 || structure == 0 {
+            return Err(damaged());
+        }
+        Ok(structure)
+    }
+
+    fn deserialize(
+        &self,
+        desc: &BlasDesc<'_>,
+        blob: &Blob,
+        shapes: Vec<PartShape>,
+        bytes: &[u64],
+    ) -> Result<Holder<AccelStructHandle>> {
+        let shared = self.shared();
+        let (name, ty) = (desc.debug_name, vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL);
+        let fits = |(shape, bytes): (&PartShape, &u64)| shape.sizes.structure_bytes <= *bytes;
+        let rebuildable = shapes.iter().zip(bytes).all(fits);
+        let structure = |bytes: &u64| RawStructure::new(&shared.gpu, &shared.accel_storage, name, ty, *bytes);
+        let structures = bytes.iter().map(structure).collect::<Result<Vec<_>>>()?;
+        let body = BlasBody { structures, compacted_from: None, rebuildable };
+        let handle = shared.store.accel_structs.insert(blas_object(shared, desc, shapes, body)?);
+        let holder = Holder::new(self, handle, 0);
+        let object = shared.store.accel_structs.get(handle)?;
+        let sizes: Vec<_> = blob.parts.iter().map(|part| part.driver.len() as u64).collect();
+        let places = Places::new(&sizes);
+        let buffer = self.blob_buffer(name, places.total)?;
+        let base = buffer.address.next_multiple_of(ALIGNMENT);
+        let addresses: Vec<_> = places.offsets.iter().map(|offset| base + offset).collect();
+        self.before_next_submission(|cmd| {
+            for (part, offset) in blob.parts.iter().zip(&places.offsets) {
+                cmd.upload_buffer(&buffer, base - buffer.address + offset, &part.driver)?;
+            }
+            cmd.deserialize_parts(&object, &buffer, &addresses)
+        })?;
+        shared.retire(Garbage::Buffer(buffer));
+        Ok(holder)
+    }
+
+    /// The shapes of loaded parts, with their tables.
+    fn loaded_shapes(&self, desc: &BlasDesc<'_>, blob: &Blob) -> Result<Vec<PartShape>> {
+        let shared = self.shared();
+        let counts: Vec<_> = desc.geometries.iter().map(BlasGeometry::primitive_count).collect();
+        let damaged = || rejected(desc, "its map of primitives is damaged");
+        let mut shapes = Vec::with_capacity(blob.parts.len());
+        for part in &blob.parts {
+            shapes.push(match &part.map {
+                None if blob.parts.len() == 1 => {
+                    let sizes = input(shared, desc)?.sizes(&shared.gpu)?;
+                    PartShape { counts: counts.clone(), map: None, sizes }
+                }
+                None => return Err(damaged()),
+                Some(words) => {
+                    let geometries = table_lists(words, &counts).ok_or_else(damaged)?;
+                    self.part_shape(desc, &PartPlan { geometries })?
+                }
+            });
+        }
+        Ok(shapes)
+    }
+}
+
+fn rejected(desc: &BlasDesc<'_>, reason: impl Into<String>) -> Error {
+    Error::Serialized { object: desc.debug_name.to_owned(), reason: reason.into() }
+}
+
+/// Where each of several blobs starts.
+struct Places {
+    offsets: Vec<u64>,
+    total: u64,
+}
+
+impl Places {
+    fn new(sizes: &[u64]) -> Self {
+        let mut total = 0;
+        let mut place = |size: &u64| {
+            let offset = total;
+            total += size.next_multiple_of(ALIGNMENT);
+            offset
+        };
+        let offsets = sizes.iter().map(&mut place).collect();
+        Self { offsets, total }
+    }
+}
+
+fn blob_geometry(geometry: &BlasGeometry) -> BlobGeometry {
+    let kind = if geometry.is_boxes() { BlobGeometryKind::Boxes } else { BlobGeometryKind::Triangles };
+    let flags: GeometryFlags = geometry.flags();
+    BlobGeometry { kind, primitive_count: geometry.primitive_count(), flags: flags.bits() }
+}
+
+fn check_same_mesh(desc: &BlasDesc<'_>, blob: &Blob) -> Result<(), String> {
+    if blob.flags != desc.flags.bits() {
+        let found = BuildFlags::from_bits_retain(blob.flags);
+        return Err(format!("it was built with {found:?}, not with {:?}", desc.flags));
+    }
+    let wanted: Vec<_> = desc.geometries.iter().map(blob_geometry).collect();
+    if blob.geometries != wanted {
+        return Err("it was built from other geometries".to_owned());
+    }
+    Ok(())
+}

@@ -1,0 +1,135 @@
+//! Whether a graphics pipeline can be: its stages, targets and vertex input against each other and the device.
+
+use ash::vk;
+
+use super::graphics::RenderModules;
+use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
+use super::group_size::{GroupLimits, check_group_size};
+use crate::error::{Error, Result, check_limit};
+use crate::format::Format;
+use crate::gpu::Gpu;
+use crate::shader::ShaderStage;
+
+/// Fails unless the description names stages that go together.
+pub(super) fn check_stages(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
+    let name = desc.debug_name;
+    let message = match (desc.vertex, desc.task, desc.mesh) {
+        (None, _, None) if desc.task.is_some() => "a task shader needs a mesh shader behind it",
+        (None, _, None) => "give the pipeline a vertex shader or a mesh shader",
+        (Some(_), _, Some(_)) => "a mesh shader takes the place of the vertex shader; give one of them",
+        (Some(_), Some(_), None) => "a task shader feeds a mesh shader, not a vertex shader",
+        (None, _, Some(_)) if !desc.vertex_bindings.is_empty() || !desc.vertex_attributes.is_empty() => {
+            "a mesh shader has no vertex buffers and attributes; let it read by address"
+        }
+        _ => {
+            let lacking = desc.mesh.is_some() && !gpu.caps.mesh_shader;
+            return if lacking {
+                Err(gpu.lacks(&format!("pipeline '{name}': mesh shaders")))
+            } else {
+                Ok(())
+            };
+        }
+    };
+    Err(Error::usage(name, message))
+}
+
+/// Fails unless the modules are of their stages and everything fits the device.
+pub(super) fn check(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
+    let name = desc.debug_name;
+    let stages = [
+        (&modules.vertex, ShaderStage::Vertex),
+        (&modules.task, ShaderStage::Task),
+        (&modules.mesh, ShaderStage::Mesh),
+        (&modules.fragment, ShaderStage::Fragment),
+    ];
+    for (module, stage) in stages {
+        module.as_ref().map_or(Ok(()), |module| module.check_stage(stage))?;
+    }
+    let targets = desc.color.len() as u64;
+    check_limit(name, "colour target count", targets, gpu.caps.limits.max_color_targets.into())?;
+    desc.color.iter().try_for_each(|target| check_color(gpu, name, target))?;
+    desc.depth.map_or(Ok(()), |depth| check_depth(gpu, name, depth.format))?;
+    check_mesh(gpu, desc, modules)?;
+    check_vertex_input(name, desc)?;
+    match &modules.vertex {
+        Some(vertex) => check_locations(name, desc, &vertex.reflection.inputs),
+        None => Ok(()),
+    }
+}
+
+fn check_color(gpu: &Gpu, name: &str, target: &ColorTarget) -> Result<()> {
+    let features = gpu.image_features(target.format.raw());
+    if target.format.is_depth() || !features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT) {
+        let what = format!("{:?} as a colour target of '{name}'", target.format);
+        return Err(Error::unsupported(what, "the device cannot draw to it; choose another format"));
+    }
+    if target.blend.is_some() && !features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT_BLEND) {
+        let what = format!("blending into {:?} in '{name}'", target.format);
+        return Err(Error::unsupported(what, "the device cannot blend this format"));
+    }
+    Ok(())
+}
+
+fn check_depth(gpu: &Gpu, name: &str, format: Format) -> Result<()> {
+    let features = gpu.image_features(format.raw());
+    if features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT) {
+        return Ok(());
+    }
+    let what = format!("{format:?} as the depth target of '{name}'");
+    Err(Error::unsupported(what, "choose D32Float or D16Unorm"))
+}
+
+fn check_mesh(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
+    let (name, limits) = (desc.debug_name, &gpu.caps.limits.mesh);
+    if let Some(task) = &modules.task {
+        let most = GroupLimits { size: limits.max_task_group_size, invocations: limits.max_task_invocations };
+        check_group_size(name, task, desc.specialization, &most)?;
+    }
+    let Some(mesh) = &modules.mesh else { return Ok(()) };
+    let most = GroupLimits { size: limits.max_mesh_group_size, invocations: limits.max_mesh_invocations };
+    check_group_size(name, mesh, desc.specialization, &most)?;
+    let [vertices, primitives] = mesh.reflection.mesh_outputs;
+    let most = limits.max_output_vertices;
+    check_limit(name, "count of vertices of a mesh workgroup", vertices.into(), most.into())?;
+    let most = limits.max_output_primitives;
+    check_limit(name, "count of primitives of a mesh workgroup", primitives.into(), most.into())
+}
+
+/// Fails unless each location the vertex shader reads has an attribute, and no location has two.
+fn check_locations(name: &str, desc: &RenderPipelineDesc<'_>, inputs: &[u32]) -> Result<()> {
+    let mut given: Vec<u32> = desc.vertex_attributes.iter().map(|attribute| attribute.location).collect();
+    given.sort_unstable();
+    if let Some(pair) = given.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(Error::usage(name, format!("two vertex attributes have the location {}", pair[0])));
+    }
+    match inputs.iter().find(|location| !given.contains(location)) {
+        None => Ok(()),
+        Some(location) => {
+            let message =
+                format!("the vertex shader reads location {location}, which no vertex attribute has");
+            Err(Error::usage(name, message))
+        }
+    }
+}
+
+fn check_vertex_input(name: &str, desc: &RenderPipelineDesc<'_>) -> Result<()> {
+    const MAX: u64 = 16;
+    check_limit(name, "vertex binding count", desc.vertex_bindings.len() as u64, MAX)?;
+    check_limit(name, "vertex attribute count", desc.vertex_attributes.len() as u64, MAX)?;
+    for attribute in desc.vertex_attributes {
+        let Some(binding) = desc.vertex_bindings.get(attribute.binding as usize) else {
+            let message =
+                format!("vertex attribute {} names binding {}", attribute.location, attribute.binding);
+            return Err(Error::usage(name, format!("{message}, which does not exist")));
+        };
+        let end = u64::from(attribute.offset) + u64::from(attribute.format.size_bytes());
+        if end > u64::from(binding.stride) {
+            let message = format!("vertex attribute {} ends beyond the stride", attribute.location);
+            return Err(Error::usage(name, message));
+        }
+        check_limit(name, "vertex attribute location", attribute.location.into(), MAX - 1)?;
+    }
+    desc.vertex_bindings
+        .iter()
+        .try_for_each(|binding| check_limit(name, "vertex stride in bytes", binding.stride.into(), 2048))
+}

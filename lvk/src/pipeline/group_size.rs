@@ -1,0 +1,34 @@
+//! Whether a module's workgroup, with the specialization constants at hand, fits the device.
+
+use super::shader_module::ShaderModule;
+use super::stage::SpecializationConstant;
+use crate::error::{Error, Result, check_limit};
+
+/// The largest workgroup of a stage.
+pub(super) struct GroupLimits {
+    /// Most invocations for each axis.
+    pub(super) size: [u32; 3],
+    /// Most invocations altogether.
+    pub(super) invocations: u32,
+}
+
+/// Fails if a workgroup of `module` is empty or larger than `limits`.
+pub(super) fn check_group_size(
+    pipeline: &str,
+    module: &ShaderModule,
+    specialization: &[SpecializationConstant],
+    limits: &GroupLimits,
+) -> Result<()> {
+    let mut invocations = 1_u64;
+    for axis in 0..3 {
+        let id = module.reflection.local_size_ids[axis];
+        let given = specialization.iter().find(|constant| Some(constant.id) == id);
+        let size = given.map_or(module.reflection.local_size[axis], |constant| constant.value.bits());
+        if size == 0 {
+            return Err(Error::usage(pipeline, "a workgroup needs at least one invocation along each axis"));
+        }
+        check_limit(pipeline, "workgroup size along an axis", size.into(), limits.size[axis].into())?;
+        invocations = invocations.saturating_mul(size.into());
+    }
+    check_limit(pipeline, "invocations of a workgroup", invocations, limits.invocations.into())
+}

@@ -1,0 +1,60 @@
+//! GLSL to SPIR-V without a context.
+
+use super::compile::{CompileOptions, compile};
+use super::{ShaderModuleDesc, reflect};
+use crate::error::Result;
+use crate::gpu::caps::Capabilities;
+
+/// The SPIR-V that a context on a device with `capabilities` would make of `desc`, for caches and tools that compile
+/// ahead of time; no device is opened. [`ShaderSource::Spirv`](super::ShaderSource::Spirv) takes it.
+///
+/// What the preamble offers depends on what the device can do: the words are good for devices that have at least
+/// [`Capabilities::formatless_storage_read`] and [`Capabilities::position_fetch`] as given here. With
+/// `Capabilities::default()`, which has nothing, they are good for every device, as far as the text itself is.
+///
+/// # Errors
+/// [`Error::Shader`](crate::Error::Shader) with the compiler's text, or when the module declares resources outside of
+/// the bindless set.
+pub fn compile_glsl(desc: &ShaderModuleDesc<'_>, capabilities: &Capabilities) -> Result<Vec<u32>> {
+    let words = compile(desc, &CompileOptions::of(capabilities))?;
+    reflect(desc.debug_name, desc.stage, &words)?;
+    Ok(words)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test")]
+    use super::*;
+    use crate::shader::{ShaderSource, ShaderStage};
+
+    fn compiled(text: &str, capabilities: &Capabilities) -> Result<Vec<u32>> {
+        let source = ShaderSource::Glsl(text);
+        let desc = ShaderModuleDesc {
+            stage: ShaderStage::Compute,
+            source,
+            debug_name: "ahead of time",
+            ..ShaderModuleDesc::default()
+        };
+        compile_glsl(&desc, capabilities)
+    }
+
+    #[test]
+    fn what_the_device_can_do_decides_what_the_text_may_use() {
+        let text = "layout(local_size_x = 1) in; layout(push_constant) uniform Push { uint image; };
+            void main() { imageStore(kImages2D[image], ivec2(0), imageLoad(kImages2D[image], ivec2(1))); }";
+        let capable = Capabilities { formatless_storage_read: true, ..Capabilities::default() };
+        assert_eq!(compiled(text, &capable).unwrap()[0], 0x0723_0203);
+        assert!(compiled(text, &Capabilities::default()).is_err());
+    }
+
+    #[test]
+    fn errors_name_the_module_and_the_callers_line() {
+        let message =
+            compiled("\nvoid main() { nothing(); }", &Capabilities::default()).unwrap_err().to_string();
+        assert!(message.contains("'ahead of time'") && message.contains("nothing"), "{message}");
+        let foreign =
+            "layout(local_size_x = 1) in; layout(set = 3, binding = 0) buffer Other { uint value; } other;
+            void main() { other.value = 1; }";
+        assert!(compiled(foreign, &Capabilities::default()).is_err());
+    }
+}

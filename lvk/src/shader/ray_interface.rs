@@ -1,0 +1,131 @@
+//! How large the payloads and hit attributes of ray tracing shaders are.
+
+use std::collections::HashMap;
+
+use ::spirv::StorageClass;
+
+use super::module::{MAX_NESTING, Module, Type};
+
+/// Sizes in bytes, 0 where a module has none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct RayInterface {
+    /// The largest ray payload, of either direction.
+    pub(crate) payload_bytes: u32,
+    /// The hit attributes.
+    pub(crate) hit_attribute_bytes: u32,
+}
+
+impl RayInterface {
+    /// What the module declares. A size that cannot be known counts as the largest.
+    pub(super) fn of(module: &Module) -> Self {
+        let largest = |classes: &[StorageClass]| {
+            let variables = module.variables.iter();
+            let ours =
+                variables.filter(|variable| classes.iter().any(|class| *class as u32 == variable.storage));
+            let bytes = ours.map(|variable| match module.types.get(&variable.ty) {
+                Some(Type::Pointer { target }) => bytes(module, *target),
+                _ => u32::MAX,
+            });
+            bytes.max().unwrap_or(0)
+        };
+        Self {
+            payload_bytes: largest(&[StorageClass::RayPayloadKHR, StorageClass::IncomingRayPayloadKHR]),
+            hit_attribute_bytes: largest(&[StorageClass::HitAttributeKHR]),
+        }
+    }
+}
+
+/// Size and largest scalar of a type, in bytes.
+type Extent = (u64, u64);
+
+/// The size as Vulkan counts it, where no offset is given: every member is aligned to the type's largest scalar
+/// (`VkRayTracingPipelineInterfaceCreateInfoKHR`).
+fn bytes(module: &Module, ty: u32) -> u32 {
+    let Some((_, scalar)) = extent(module, ty, 1, MAX_NESTING, &mut HashMap::new()) else { return u32::MAX };
+    let whole = extent(module, ty, scalar, MAX_NESTING, &mut HashMap::new());
+    whole.and_then(|(bytes, _)| u32::try_from(bytes).ok()).unwrap_or(u32::MAX)
+}
+
+/// The extent with members aligned to `alignment`; `None` for what has none.
+fn extent(
+    module: &Module,
+    ty: u32,
+    alignment: u64,
+    nesting: u32,
+    known: &mut HashMap<u32, Extent>,
+) -> Option<Extent> {
+    const BOOL_BYTES: u64 = 4;
+    const ADDRESS_BYTES: u64 = 8;
+    if let Some(extent) = known.get(&ty) {
+        return Some(*extent);
+    }
+    let nesting = nesting.checked_sub(1)?;
+    let mut of = |ty: u32| extent(module, ty, alignment, nesting, known);
+    let times = |(bytes, scalar): Extent, count: u32| (bytes.saturating_mul(count.into()), scalar);
+    let found = match module.types.get(&ty)? {
+        Type::Bool => (BOOL_BYTES, BOOL_BYTES),
+        Type::Number { bytes } => (u64::from(*bytes), u64::from(*bytes)),
+        Type::Pointer { .. } => (ADDRESS_BYTES, ADDRESS_BYTES),
+        Type::Vector { element, count } => times(of(*element)?, *count),
+        Type::Matrix { column, count } => times(of(*column)?, *count),
+        Type::Array { element, length } => times(of(*element)?, module.constants.get(length)?.value),
+        Type::Struct { members } => members.iter().try_fold((0_u64, 0_u64), |(end, scalar), member| {
+            let (bytes, own) = of(*member)?;
+            let bytes = bytes.checked_next_multiple_of(alignment.max(1))?;
+            Some((end.saturating_add(bytes), scalar.max(own)))
+        })?,
+        Type::RuntimeArray { .. } | Type::Image { .. } | Type::Opaque(_) => return None,
+    };
+    known.insert(ty, found);
+    Some(found)
+}
+
+#[cfg(all(test, feature = "glsl"))]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+    use super::super::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile, reflect};
+    use super::*;
+
+    fn sizes(stage: ShaderStage, text: &str) -> RayInterface {
+        let desc = ShaderModuleDesc { stage, source: ShaderSource::Glsl(text), ..Default::default() };
+        let words = compile(&desc, &CompileOptions::default()).unwrap();
+        reflect("shader", stage, &words).unwrap().ray_interface
+    }
+
+    #[test]
+    fn the_largest_payload_counts() {
+        let text = "
+            struct Deep { bool hit; float t[3]; };
+            layout(location = 0) rayPayloadEXT vec3 small;
+            layout(location = 1) rayPayloadEXT Deep large[2];
+            void main() { small = vec3(1); large[1].hit = true; }";
+        let expected = RayInterface { payload_bytes: 32, hit_attribute_bytes: 0 };
+        assert_eq!(sizes(ShaderStage::RayGen, text), expected);
+    }
+
+    #[test]
+    fn members_are_aligned_to_the_largest_scalar() {
+        let text = "
+            struct Wide { float first; double second; vec3 third; };
+            layout(location = 0) rayPayloadInEXT Wide wide;
+            hitAttributeEXT vec2 where;
+            void main() { wide = Wide(where.x, 2.0LF, vec3(where.y)); }";
+        let expected = RayInterface { payload_bytes: 32, hit_attribute_bytes: 8 };
+        assert_eq!(sizes(ShaderStage::ClosestHit, text), expected);
+    }
+
+    #[test]
+    fn other_shaders_have_none() {
+        let text = "layout(local_size_x = 1) in; void main() {}";
+        assert_eq!(sizes(ShaderStage::Compute, text), RayInterface::default());
+    }
+
+    #[test]
+    fn a_type_that_contains_itself_counts_as_the_largest() {
+        let mut module = Module::default();
+        module.types.insert(1, Type::Struct { members: vec![1, 1] });
+        assert_eq!(bytes(&module, 1), u32::MAX);
+        assert_eq!(bytes(&module, 2), u32::MAX);
+    }
+}
