@@ -3,5 +3,6 @@
 pub mod app;
 pub mod driver;
 pub mod hybrid;
+pub mod pipelines;
 pub mod scene;
 pub mod shaders;

@@ -21,6 +21,8 @@ pub const INCLUDES: &[(&str, &str)] = &[
 
 /// Stages of the `hybrid` sample.
 pub mod hybrid {
+    /// Macros of the ray stages that start from the G-buffer of the geometry pass.
+    pub const WITH_GBUFFER: &[(&str, &str)] = &[("HYBRID_GBUFFER", "1")];
     /// Vertex stage of the geometry pass.
     pub const GEOMETRY_VERT: &str = include_str!("../../shaders/hybrid/geometry.vert.glsl");
     /// Fragment stage of the geometry pass.

@@ -243,6 +243,7 @@ fn wrong_arguments_are_named() {
         ("--frames 0", ["--frames", "'0'"]),
         ("--method raster", ["--method", "standalone, hybrid"]),
         ("--rt mesh", ["--rt", "auto, pipeline, query"]),
+        ("--profile pixel", ["--profile", "mali-g715, xclipse-940"]),
         ("--sceen a.obj", ["--sceen", "--scene"]),
         ("a.obj", ["a.obj", "Usage"]),
     ] {
@@ -270,6 +271,7 @@ fn the_help_tells_every_option() {
             "--depth",
             "--out",
             "--device",
+            "--profile",
             "--validate",
             "--list-devices",
             "--cameras",
@@ -396,6 +398,29 @@ fn without_a_driver_and_a_way_to_one_the_user_learns_what_to_install() {
     assert!(start.elapsed() < Duration::from_secs(5), "{:?}", start.elapsed());
     assert_eq!(desk.output_files(), Vec::<String>::new());
     assert_eq!(fs::read_dir(empty.path()).unwrap().count(), 0, "nothing was begun");
+}
+
+/// The path follows from what the profile leaves, and the first lines say which profile and which path.
+#[test]
+fn a_profile_decides_the_path_and_is_told() {
+    if !has_device() {
+        return;
+    }
+    let desk = Desk::new();
+    let scene = desk.file("triangle.obj", TRIANGLE);
+    for (profile, path) in [("mali-g715", "ray queries"), ("no-ray-query", "ray tracing pipeline")] {
+        let outcome = desk.run(&["--scene", &scene, "--frames", "1", "--profile", profile, "--validate"]);
+        outcome.assert_success();
+        let told = format!("profile   {profile}, ");
+        assert_names(&outcome.out, &[&told, path, "validation messages: 0"]);
+    }
+    for (arguments, parts) in [
+        (["--rt", "auto"], ["neither", "profile 'no-ray-tracing'"]),
+        (["--rt", "query"], ["lacks ray queries", "hidden by the device profile 'no-ray-tracing'"]),
+    ] {
+        let wish = ["--scene", &scene, "--profile", "no-ray-tracing"];
+        desk.run(&[&wish[..], &arguments].concat()).assert_error(1, &parts);
+    }
 }
 
 /// `hybrid | head -1` must not keep the picture from being written.

@@ -15,7 +15,7 @@ Hit traceClosest(vec3 origin, float tmin, vec3 direction, float tmax) {
     Hit hit = Hit(kNoTriangle, vec2(0.0));
     if (lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE) {
         uint firstTriangle = uint(lvkRayQueryInstanceCustomIndex(query, LVK_COMMITTED));
-        hit.triangle = firstTriangle + uint(lvkRayQueryPrimitiveIndex(query, LVK_COMMITTED));
+        hit.triangle = firstTriangle + uint(lvkRayQueryPrimitiveIndex(query, LVK_COMMITTED, frame.tlas));
         hit.barycentrics = lvkRayQueryBarycentrics(query, LVK_COMMITTED);
     }
     return hit;

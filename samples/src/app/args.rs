@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{Parser, ValueEnum};
+use lvk::DeviceProfile;
 
 /// Largest width and height of a picture, in pixels.
 pub const MAX_SIZE: u32 = 16_384;
@@ -94,6 +96,15 @@ pub struct HybridArgs {
     #[arg(long, value_name = "NUMBER|NAME", help_heading = "Device")]
     pub device: Option<String>,
 
+    /// Rehearse another device on this one: without what it lacks, and within its limits
+    #[arg(
+        long,
+        value_name = "NAME",
+        value_parser = PossibleValuesParser::new(DeviceProfile::names()).try_map(|name| DeviceProfile::named(&name)),
+        help_heading = "Device"
+    )]
+    pub profile: Option<DeviceProfile>,
+
     /// Print the devices and what they can do, and exit
     #[arg(long, help_heading = "Device")]
     pub list_devices: bool,
@@ -145,6 +156,7 @@ Examples:
   hybrid --scene kitchen.obj --camera 3 --out k3.png      an OBJ through its third camera
   hybrid --method standalone --rt query --frames 1        everything ray traced in a compute shader, once
   hybrid --device 1 --validate                            on the second device, with validation
+  hybrid --profile mali-g715                              as on a phone: ray queries, split meshes
 
 Exit status: 0 when the picture was written, 1 for trouble with the device, 2 for wrong arguments or input.";
 
@@ -182,6 +194,17 @@ mod tests {
         assert_eq!(parsed("--validate").unwrap().validate, Some(Validation::Core));
         assert_eq!(parsed("--validate gpu --camera 2").unwrap().validate, Some(Validation::Gpu));
         assert_eq!(parsed("--validate --camera 2").unwrap().validate, Some(Validation::Core));
+    }
+
+    #[test]
+    fn profiles_are_chosen_by_name_and_listed() {
+        assert_eq!(parsed("--profile mali-g715").unwrap().profile, Some(DeviceProfile::mali_g715()));
+        let refusal = parsed("--profile pixel").unwrap_err();
+        let (help, refused) = (HybridArgs::command().render_help().to_string(), refusal.to_string());
+        assert_eq!(refusal.exit_code(), 2);
+        for name in DeviceProfile::names() {
+            assert!(help.contains(name) && refused.contains(name), "{name}: {help}{refused}");
+        }
     }
 
     #[test]

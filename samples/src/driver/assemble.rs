@@ -7,7 +7,8 @@ use super::elf;
 use super::error::FetchError;
 use super::layer_description;
 use super::prefix::{
-    DRIVER, DRIVER_JSON, LAYER, LAYER_FOLDER, LOADER, Manifest, Part, SWIFTSHADER, SWIFTSHADER_JSON,
+    DRIVER, DRIVER_JSON, LAYER, LAYER_FOLDER, LOADER, Manifest, Part, RADV, RADV_JSON, SWIFTSHADER,
+    SWIFTSHADER_JSON,
 };
 
 const LIBRARY_FOLDERS: [&str; 3] = ["usr/lib/x86_64-linux-gnu", "lib/x86_64-linux-gnu", "usr/lib/chromium"];
@@ -20,25 +21,30 @@ pub(super) fn assemble(part: Part, tree: &Path, folder: &Path) -> Result<Manifes
         fs::create_dir_all(&path).map_err(FetchError::file("create", &path))?;
     }
     match part {
-        Part::Driver => driver(tree, folder),
+        Part::Driver => {
+            take(tree, folder, LOADER)?;
+            driver(tree, folder, DRIVER, DRIVER_JSON)
+        }
+        Part::Radv => driver(tree, folder, RADV, RADV_JSON),
         Part::Validation => validation(tree, folder),
     }
 }
 
-fn driver(tree: &Path, folder: &Path) -> Result<Manifest, FetchError> {
-    take(tree, folder, LOADER)?;
+/// Takes the driver `library` and all it needs.
+fn driver(tree: &Path, folder: &Path, library: &str, description: &str) -> Result<Manifest, FetchError> {
     let needed = |name: &str| match find(tree, name) {
         Some(path) => read_needed(&path).map(Some),
         None => Ok(None),
     };
-    let mut order = elf::load_order(file_name(DRIVER), needed)?;
+    let mut order = elf::load_order(file_name(library), needed)?;
     for name in &order {
         take(tree, folder, &format!("lib/{name}"))?;
     }
-    if order.pop().as_deref() != Some(file_name(DRIVER)) {
-        return Err(missing(DRIVER));
+    if order.pop().as_deref() != Some(file_name(library)) {
+        return Err(missing(library));
     }
-    write(&folder.join(DRIVER_JSON), &driver_description(DRIVER, &driver_version(tree)))?;
+    let version = driver_version(tree, file_name(description));
+    write(&folder.join(description), &driver_description(library, &version))?;
     Ok(Manifest { preload: order.iter().map(|name| format!("lib/{name}")).collect(), ..Manifest::default() })
 }
 
@@ -71,10 +77,11 @@ fn read_needed(path: &Path) -> Result<Vec<String>, FetchError> {
     elf::needed(&image).ok_or_else(damaged)
 }
 
-/// The Vulkan version in the driver's own description, which distributions name differently.
-fn driver_version(tree: &Path) -> String {
+/// The Vulkan version in the driver's own description, whose `name` distributions lengthen in different ways.
+fn driver_version(tree: &Path, name: &str) -> String {
+    let stem = name.trim_end_matches(".json");
     let entries = fs::read_dir(tree.join("usr/share/vulkan/icd.d")).into_iter().flatten().flatten();
-    let mut own = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with("lvp_icd"));
+    let mut own = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(stem));
     let text = own.next().and_then(|entry| fs::read_to_string(entry.path()).ok()).unwrap_or_default();
     quoted_value(&text, "api_version").unwrap_or("1.3.0").to_owned()
 }

@@ -28,6 +28,13 @@ pub enum DriverError {
         #[source]
         cause: FetchError,
     },
+    /// The driver for AMD cards cannot be fetched.
+    #[error("the driver for AMD cards (RADV) cannot be fetched because {cause}")]
+    NoRadv {
+        /// What stopped the fetch.
+        #[source]
+        cause: FetchError,
+    },
     /// `LVK_DRIVER=system` on a machine without a Vulkan loader.
     #[error(
         "LVK_DRIVER=system, but this machine has no Vulkan loader ({reason}); install `libvulkan1` and a driver, or \

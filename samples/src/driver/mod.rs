@@ -100,6 +100,18 @@ pub fn swiftshader_icd() -> Result<PathBuf, DriverError> {
     Ok(folder_of(Part::Validation, &Settings::from_env()?)?.join(prefix::SWIFTSHADER_JSON))
 }
 
+/// The description file of RADV, Mesa's driver for AMD cards, whose libraries this opens in the process: one started
+/// with `VK_DRIVER_FILES` set to it and `RADV_FORCE_FAMILY` to the name of a chip, such as `navi31`, compiles pipelines
+/// for that chip with no card in the machine. The device has no memory, so nothing else works on it.
+///
+/// # Errors
+/// [`DriverError::NoRadv`] if the package cannot be fetched, [`DriverError::Broken`] if a fetched file is damaged.
+pub fn radv_icd() -> Result<PathBuf, DriverError> {
+    let prefix = folder_of(Part::Radv, &Settings::from_env()?)?;
+    preload::preload(&prefix, &Manifest::read(&prefix).unwrap_or_default().preload)?;
+    Ok(prefix.join(prefix::RADV_JSON))
+}
+
 impl Prepared {
     fn new(request: &DriverRequest) -> Result<Self, DriverError> {
         let settings = Settings::from_env()?;
@@ -189,6 +201,7 @@ fn refusal(part: Part, cause: FetchError) -> DriverError {
     match part {
         Part::Driver => DriverError::NoDriver { cause },
         Part::Validation => DriverError::NoValidationLayer { cause },
+        Part::Radv => DriverError::NoRadv { cause },
     }
 }
 

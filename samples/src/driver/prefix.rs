@@ -6,6 +6,8 @@
 //! <folder>/validation/lib/*.so              validation layer and SwiftShader
 //! <folder>/validation/explicit_layer.d/     for VK_ADD_LAYER_PATH
 //! <folder>/validation/icd.d/swiftshader_icd.json
+//! <folder>/radv/lib/*.so*                   driver for AMD cards and all it needs but a loader
+//! <folder>/radv/icd.d/radeon_icd.json
 //! <folder>/*/manifest                       written last; without it the folder does not count
 //! ```
 //! Every path inside is relative, so the folder can be moved and copied.
@@ -29,18 +31,24 @@ pub(super) const LAYER_FOLDER: &str = "explicit_layer.d";
 pub(super) const SWIFTSHADER: &str = "lib/libvk_swiftshader.so";
 /// Its description inside [`Part::Validation`].
 pub(super) const SWIFTSHADER_JSON: &str = "icd.d/swiftshader_icd.json";
+/// The driver inside [`Part::Radv`].
+pub(super) const RADV: &str = "lib/libvulkan_radeon.so";
+/// Its description inside [`Part::Radv`].
+pub(super) const RADV_JSON: &str = "icd.d/radeon_icd.json";
 
 const MANIFEST: &str = "manifest";
 /// Counts layouts: a folder written for another one is fetched anew.
 const MANIFEST_HEAD: &str = "lvk vulkan folder 1";
 
-/// One of the two things that can be fetched.
+/// One of the things that can be fetched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     /// Loader and software driver with ray tracing.
     Driver,
     /// Validation layer, and a software driver without ray tracing.
     Validation,
+    /// Mesa's driver for AMD cards, which compiles for them without one.
+    Radv,
 }
 
 impl Part {
@@ -49,6 +57,7 @@ impl Part {
         root.join(match self {
             Self::Driver => "driver",
             Self::Validation => "validation",
+            Self::Radv => "radv",
         })
     }
 
@@ -65,6 +74,9 @@ impl Part {
                 with_dependencies: true,
                 suite: Suite::Backports,
             },
+            Self::Radv => {
+                Order { packages: &["mesa-vulkan-drivers"], with_dependencies: true, suite: Suite::Backports }
+            }
             Self::Validation => {
                 Order { packages: &["chromium-common"], with_dependencies: false, suite: Suite::Security }
             }
@@ -76,8 +88,12 @@ impl Part {
         match self {
             Self::Driver => "software driver lavapipe",
             Self::Validation => "validation layer",
+            Self::Radv => "driver for AMD cards, RADV",
         }
     }
+
+    /// All of them.
+    pub(super) const ALL: [Self; 3] = [Self::Driver, Self::Validation, Self::Radv];
 
     /// The complete folder of this part, if one of `roots` has it.
     pub(super) fn find(self, roots: &[PathBuf]) -> Option<PathBuf> {

@@ -22,8 +22,9 @@ pub(super) fn provision(root: &Path, parts: &[Part]) -> Result<(), FetchError> {
         return Ok(());
     }
     let work = root.join("fetch.partial");
-    for leftover in [work.clone(), Part::Driver.partial_folder(root), Part::Validation.partial_folder(root)] {
-        remove(&leftover)?;
+    remove(&work)?;
+    for part in Part::ALL {
+        remove(&part.partial_folder(root))?;
     }
     fs::create_dir(&work).map_err(FetchError::file("create", &work))?;
     let outcome = fetch(root, &work, &lock, &missing);

@@ -81,7 +81,8 @@ impl RayPath {
             Self::Pipeline if pipeline => Ok(()),
             Self::Query if query => Ok(()),
             _ if !pipeline && !query => {
-                let reason = capabilities.ray_tracing_fallback.as_ref();
+                let hidden = || Some(format!("under the profile '{}'", capabilities.profile.as_ref()?));
+                let reason = capabilities.ray_tracing_fallback.clone().or_else(hidden);
                 let reason = reason.map_or_else(String::new, |reason| format!(" ({reason})"));
                 Err(HybridError::NoRayTracing { device, reason })
             }
@@ -124,6 +125,14 @@ mod tests {
             RayPath::choose(None, &device(false, false)),
             Err(HybridError::NoRayTracing { .. })
         ));
+    }
+
+    #[test]
+    fn a_profile_that_hides_all_ray_tracing_is_named() {
+        let profile = Some("no-ray-tracing".to_owned());
+        let capabilities = Capabilities { profile, ..device(false, false) };
+        let message = RayPath::choose(None, &capabilities).unwrap_err().to_string();
+        assert!(message.contains("(under the profile 'no-ray-tracing')"), "{message}");
     }
 
     #[test]

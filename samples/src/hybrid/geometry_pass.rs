@@ -39,7 +39,9 @@ impl GBuffer {
     const POSITION: Format = Format::Rgba32Float;
     const SURFACE: Format = Format::Rgba32Uint;
     const ALBEDO: Format = Format::Rgba16Float;
-    const DEPTH: Format = Format::D32Float;
+    /// Formats of the colour targets, in the order of the shader's outputs.
+    pub(super) const COLOR: [Format; 3] = [Self::POSITION, Self::SURFACE, Self::ALBEDO];
+    pub(super) const DEPTH: Format = Format::D32Float;
 
     fn new(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Self> {
         let target = |format, debug_name| {
@@ -87,8 +89,7 @@ impl GeometryPass {
     pub(super) fn new(ctx: &Context, scene: &GpuScene, extent: [u32; 2]) -> lvk::Result<Self> {
         let vertex = module(ctx, ShaderStage::Vertex, texts::GEOMETRY_VERT, &[], "geometry.vert")?;
         let fragment = module(ctx, ShaderStage::Fragment, texts::GEOMETRY_FRAG, &[], "geometry.frag")?;
-        let formats = [GBuffer::POSITION, GBuffer::SURFACE, GBuffer::ALBEDO];
-        let color = formats.map(ColorTarget::from);
+        let color = GBuffer::COLOR.map(ColorTarget::from);
         let pipeline = ctx.create_render_pipeline(&RenderPipelineDesc {
             vertex: Some(*vertex),
             fragment: Some(*fragment),

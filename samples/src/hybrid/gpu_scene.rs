@@ -15,7 +15,6 @@ use super::frame::SceneAddresses;
 use super::half_float::half_bits;
 use super::scene_check::check;
 use super::texture_density::lod_constant;
-use super::triangle_order::upload_order;
 use crate::scene::{Material, Scene, Sky, Texture};
 
 /// Mask bit of instances that stop light (`kMaskOpaque` in `shaders/hybrid/hit.glsl`).
@@ -36,6 +35,8 @@ pub(super) struct GpuScene {
     pub(super) tlas: Holder<AccelStructHandle>,
     /// Milliseconds that building the bottom-level structures took, submission and wait included.
     pub(super) blas_build_ms: f64,
+    /// Parts that the library made of the bottom-level structures, where they are too large for the device.
+    pub(super) blas_part_count: u32,
     arrays: Arrays,
     _textures: Vec<Holder<TextureHandle>>,
     blas: Vec<Holder<AccelStructHandle>>,
@@ -84,6 +85,10 @@ impl GpuScene {
         let (blas, instances) = build_blas(ctx, scene, *arrays.positions, *arrays.triangles)?;
         ctx.wait_idle()?;
         let blas_build_ms = start.elapsed().as_secs_f64() * 1e3;
+        let mut blas_part_count = 0;
+        for blas in &blas {
+            blas_part_count += ctx.accel_struct_info(**blas)?.parts;
+        }
         let debug_name = "scene tlas";
         let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, debug_name, ..TlasDesc::default() })?;
         Ok(Self {
@@ -93,6 +98,7 @@ impl GpuScene {
             sky_sampler: sampler(ctx, "sky sampler", AddressMode::ClampToEdge)?,
             tlas,
             blas_build_ms,
+            blas_part_count,
             arrays,
             _textures: textures,
             blas,
@@ -117,10 +123,7 @@ impl GpuScene {
 
 impl Arrays {
     fn new(ctx: &Context, scene: &Scene, textures: &[Holder<TextureHandle>]) -> lvk::Result<Self> {
-        let sorts = !ctx.capabilities().prefers_spatial_order;
-        let order = upload_order(&scene.source_triangles, scene.opaque_triangle_count, sorts);
-        let corners: Vec<[u32; 3]> = order.iter().map(|&i| scene.triangles[i as usize]).collect();
-        let infos: Vec<TriangleInfo> = order.iter().map(|&i| triangle_info(scene, i as usize)).collect();
+        let infos: Vec<_> = (0..scene.triangles.len()).map(|i| triangle_info(scene, i)).collect();
         let materials: Vec<_> = scene.materials.iter().map(|m| gpu_material(m, textures)).collect();
 
         let read = BufferUsage::STORAGE;
@@ -128,7 +131,7 @@ impl Arrays {
         let positions = array(ctx, "scene positions", input, &scene.positions)?;
         let normals = array(ctx, "scene normals", read, &scene.normals)?;
         let texcoords = array(ctx, "scene texture coordinates", read, &scene.texcoords)?;
-        let triangles = array(ctx, "scene triangles", input | BufferUsage::INDEX, &corners)?;
+        let triangles = array(ctx, "scene triangles", input | BufferUsage::INDEX, &scene.triangles)?;
         let triangle_infos = array(ctx, "scene triangle infos", read, &infos)?;
         let materials = array(ctx, "scene materials", read, &materials)?;
         let addresses = SceneAddresses {

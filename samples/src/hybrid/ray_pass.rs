@@ -37,9 +37,9 @@ impl RayPass {
         gbuffer: Vec<TextureHandle>,
         output: TextureHandle,
     ) -> lvk::Result<Self> {
-        let defines: &[(&str, &str)] = match config.method {
+        let defines = match config.method {
             Method::Standalone => &[],
-            Method::Hybrid => &[("HYBRID_GBUFFER", "1")],
+            Method::Hybrid => texts::WITH_GBUFFER,
         };
         let value = SpecializationValue::U32(config.max_depth);
         let depth = [SpecializationConstant { id: DEPTH_CONSTANT, value }];

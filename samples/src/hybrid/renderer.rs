@@ -133,6 +133,12 @@ impl HybridRenderer {
         self.scene.blas_count()
     }
 
+    /// Of how many parts these consist: more than there are structures where the device, or the profile, sets limits
+    /// that the scene exceeds.
+    pub fn blas_part_count(&self) -> u32 {
+        self.scene.blas_part_count
+    }
+
     fn upload_constants(&mut self, camera: &Camera) -> lvk::Result<()> {
         let constants = FrameConstants {
             camera: GpuCamera::new(camera, self.config.width, self.config.height, self.near_plane),

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::process::ExitCode;
 
-use lvk::{Capabilities, Context, ContextDesc, FeatureRequest, Validation, ValidationSink};
+use lvk::{Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, Validation, ValidationSink};
 
 use super::texture_fit::{fit_textures, textures_needed};
 use super::{HybridConfig, HybridError, HybridRenderer, Method, RayPath};
@@ -73,7 +73,7 @@ pub fn run(args: &HybridArgs) -> ExitCode {
 
 fn attempt(args: &HybridArgs) -> Result<(), RunError> {
     if args.list_devices {
-        return list_devices();
+        return list_devices(args.profile.as_ref());
     }
     check_out(args)?;
     let mut progress = Progress::visible();
@@ -145,6 +145,7 @@ fn open(args: &HybridArgs, driver: &Driver, sink: &ValidationSink, textures: u32
             application_name: "hybrid",
             vulkan_library: driver.loader.as_deref(),
             device: args.device.as_deref(),
+            profile: args.profile.as_ref(),
             validation: validation(args.validate),
             validation_sink: args.validate.map(|_| sink.clone()),
             ray_tracing_pipeline,
@@ -203,6 +204,9 @@ fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &Hybr
         RayPath::Query => "ray queries in a compute shader",
     };
     let mut text = format!("device    {} ({})\n", capabilities.device_name, driver_text(capabilities));
+    if let Some(profile) = &capabilities.profile {
+        let _ = writeln!(text, "profile   {profile}, rehearsed on this device");
+    }
     let _ = writeln!(text, "method    {method}; {path}; depth {}", config.max_depth);
     let _ = writeln!(
         text,
@@ -212,7 +216,11 @@ fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &Hybr
         scene.materials.len(),
         scene.textures.len()
     );
-    let _ = write!(text, "built     {} BLAS in {:.1} ms", renderer.blas_count(), renderer.blas_build_ms());
+    let _ = write!(text, "built     {} BLAS", renderer.blas_count());
+    if renderer.blas_part_count() as usize > renderer.blas_count() {
+        let _ = write!(text, ", split into {} parts,", renderer.blas_part_count());
+    }
+    let _ = write!(text, " in {:.1} ms", renderer.blas_build_ms());
     text
 }
 
@@ -260,10 +268,13 @@ fn say(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }
 
-fn list_devices() -> Result<(), RunError> {
+fn list_devices(profile: Option<&DeviceProfile>) -> Result<(), RunError> {
     let driver = driver::prepare(&DriverRequest::default())?;
-    for (number, device) in Context::devices(driver.loader.as_deref())?.iter().enumerate() {
-        say(&device_line(number, device));
+    for (number, mut device) in Context::devices(driver.loader.as_deref())?.into_iter().enumerate() {
+        if let Some(profile) = profile {
+            profile.apply(&mut device);
+        }
+        say(&device_line(number, &device));
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::{Material, median_order};
+use super::Material;
 
 /// Triangles while a scene is being put together; the arrays are those of [`super::Scene`].
 #[derive(Debug, Clone, Default)]
@@ -55,27 +55,17 @@ impl Mesh {
         (b - a).cross(c - a).length_squared() > 0.0
     }
 
-    /// Puts opaque triangles first and each group in [`median_order`], then numbers the vertices by first use
-    /// and drops unused ones. Returns the number of opaque triangles.
+    /// Puts opaque triangles first, each group in the order of the source, then numbers the vertices by first use and
+    /// drops unused ones. Returns the number of opaque triangles.
     pub fn arrange(&mut self, materials: &[Material]) -> u32 {
         let is_opaque = |i: &usize| !materials[self.triangle_materials[*i] as usize].is_refractive();
-        let (opaque, refractive): (Vec<usize>, Vec<usize>) = (0..self.triangles.len()).partition(is_opaque);
-        let mut sequence = self.in_median_order(&opaque);
-        sequence.extend(self.in_median_order(&refractive));
+        let (mut sequence, refractive): (Vec<usize>, Vec<usize>) =
+            (0..self.triangles.len()).partition(is_opaque);
+        let opaque_count = sequence.len() as u32;
+        sequence.extend(refractive);
         self.keep(&sequence);
         self.number_vertices_by_use();
-        opaque.len() as u32
-    }
-
-    fn in_median_order(&self, chosen: &[usize]) -> Vec<usize> {
-        let boxes: Vec<_> = chosen
-            .iter()
-            .map(|&i| {
-                let [a, b, c] = self.triangles[i].map(|v| Vec3::from(self.positions[v as usize]));
-                (a.min(b).min(c), a.max(b).max(c))
-            })
-            .collect();
-        median_order(&boxes).into_iter().map(|i| chosen[i as usize]).collect()
+        opaque_count
     }
 
     /// Leaves the triangles named in `sequence`, in that order.

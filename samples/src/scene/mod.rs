@@ -36,7 +36,6 @@ mod noise;
 mod normals;
 mod obj;
 mod obj_text;
-mod order;
 mod polygon;
 mod procedural;
 mod recentre;
@@ -53,7 +52,6 @@ pub use camera::Camera;
 pub use error::SceneError;
 pub use light::{Ambient, DirectionalLight, PointLight, display};
 pub use material::Material;
-pub use order::median_order;
 pub use sky::Sky;
 pub use texture::Texture;
 
@@ -72,7 +70,8 @@ pub struct Scene {
     pub normals: Vec<[f32; 3]>,
     /// Texture coordinates in images that repeat; (0, 0) is the image's first texel, so `v` runs down.
     pub texcoords: Vec<[f32; 2]>,
-    /// Vertex indices; opaque triangles first, then refractive ones, each group in [`median_order`].
+    /// Vertex indices; opaque triangles first, then refractive ones, each group in the order of
+    /// the source.
     pub triangles: Vec<[u32; 3]>,
     /// How many of `triangles` are opaque. Shadow rays pass through the rest.
     pub opaque_triangle_count: u32,
