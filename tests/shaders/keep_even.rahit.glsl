@@ -1,6 +1,7 @@
 // Looks through every second primitive.
+#include "ray_records.glsl"
 void main() {
-    if ((gl_PrimitiveID & 1) != 0) {
+    if ((lvkPrimitiveIndex(tlas) & 1) != 0) {
         ignoreIntersectionEXT;
     }
 }

@@ -17,7 +17,7 @@ void main() {
             continue;
         }
 #ifdef KEEP_EVEN
-        if ((lvkRayQueryPrimitiveIndex(rq, LVK_CANDIDATE) & 1) != 0) {
+        if ((lvkRayQueryPrimitiveIndex(rq, LVK_CANDIDATE, tlas) & 1) != 0) {
             continue;
         }
 #endif
@@ -28,10 +28,10 @@ void main() {
         record.t = lvkRayQueryT(rq, LVK_COMMITTED);
         record.barycentrics = lvkRayQueryBarycentrics(rq, LVK_COMMITTED);
         record.kind = lvkRayQueryFrontFace(rq, LVK_COMMITTED) ? kFront : kBack;
-        record.instance = lvkRayQueryInstanceId(rq, LVK_COMMITTED);
+        record.instance = lvkRayQueryInstanceId(rq, LVK_COMMITTED, tlas);
         record.customIndex = lvkRayQueryInstanceCustomIndex(rq, LVK_COMMITTED);
         record.geometry = lvkRayQueryGeometryIndex(rq, LVK_COMMITTED);
-        record.primitive = lvkRayQueryPrimitiveIndex(rq, LVK_COMMITTED);
+        record.primitive = lvkRayQueryPrimitiveIndex(rq, LVK_COMMITTED, tlas);
     }
     hits.at[index] = record;
 }

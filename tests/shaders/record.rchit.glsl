@@ -4,6 +4,6 @@ layout(location = 0) rayPayloadInEXT HitRecord record;
 hitAttributeEXT vec2 barycentrics;
 
 void main() {
-    record = HitRecord(gl_HitTEXT, barycentrics, gl_HitKindEXT, gl_InstanceID, gl_InstanceCustomIndexEXT,
-                       gl_GeometryIndexEXT, gl_PrimitiveID);
+    record = HitRecord(gl_HitTEXT, barycentrics, gl_HitKindEXT, lvkInstanceId(tlas), gl_InstanceCustomIndexEXT,
+                       gl_GeometryIndexEXT, lvkPrimitiveIndex(tlas));
 }

@@ -8,6 +8,6 @@ layout(shaderRecordEXT, scalar) buffer Record {
 layout(location = 0) rayPayloadInEXT HitRecord record;
 
 void main() {
-    record = HitRecord(gl_HitTEXT, vec2(radius, float(tag)), gl_HitKindEXT, gl_InstanceID, gl_InstanceCustomIndexEXT,
-                       gl_GeometryIndexEXT, gl_PrimitiveID);
+    record = HitRecord(gl_HitTEXT, vec2(radius, float(tag)), gl_HitKindEXT, lvkInstanceId(tlas), gl_InstanceCustomIndexEXT,
+                       gl_GeometryIndexEXT, lvkPrimitiveIndex(tlas));
 }

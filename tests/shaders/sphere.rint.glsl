@@ -1,3 +1,4 @@
+#include "ray_records.glsl"
 #include "sphere_object.glsl"
 
 layout(shaderRecordEXT, scalar) buffer Record {
@@ -7,7 +8,7 @@ layout(shaderRecordEXT, scalar) buffer Record {
 
 void main() {
     vec2 places;
-    vec3 center = sphereCenter(gl_GeometryIndexEXT, gl_PrimitiveID);
+    vec3 center = sphereCenter(gl_GeometryIndexEXT, lvkPrimitiveIndex(tlas));
     if (crossSphere(center, radius, gl_ObjectRayOriginEXT, gl_ObjectRayDirectionEXT, places)) {
         if (!reportIntersectionEXT(places.x, tag)) {
             reportIntersectionEXT(places.y, tag);

@@ -23,7 +23,7 @@ void main() {
         }
         vec2 places;
         vec3 center = sphereCenter(lvkRayQueryGeometryIndex(rq, LVK_CANDIDATE),
-                                   lvkRayQueryPrimitiveIndex(rq, LVK_CANDIDATE));
+                                   lvkRayQueryPrimitiveIndex(rq, LVK_CANDIDATE, tlas));
         vec3 origin = lvkRayQueryObjectRayOrigin(rq, LVK_CANDIDATE);
         vec3 direction = lvkRayQueryObjectRayDirection(rq, LVK_CANDIDATE);
         float radius = kRadius[lvkRayQuerySbtOffset(rq, LVK_CANDIDATE)];
@@ -39,10 +39,10 @@ void main() {
     if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_GENERATED) {
         uint group = lvkRayQuerySbtOffset(rq, LVK_COMMITTED);
         record = HitRecord(lvkRayQueryT(rq, LVK_COMMITTED), vec2(kRadius[group], float(kTag[group])), kTag[group],
-                           lvkRayQueryInstanceId(rq, LVK_COMMITTED),
+                           lvkRayQueryInstanceId(rq, LVK_COMMITTED, tlas),
                            lvkRayQueryInstanceCustomIndex(rq, LVK_COMMITTED),
                            lvkRayQueryGeometryIndex(rq, LVK_COMMITTED),
-                           lvkRayQueryPrimitiveIndex(rq, LVK_COMMITTED));
+                           lvkRayQueryPrimitiveIndex(rq, LVK_COMMITTED, tlas));
     }
     hits.at[index] = record;
 }

@@ -2,9 +2,10 @@
 #![expect(clippy::expect_used, reason = "a test whose process cannot be started has failed")]
 
 use std::ffi::OsStr;
+use std::path::Path;
 use std::process::Command;
 
-use crate::device::swiftshader;
+use crate::device::{radv, swiftshader};
 
 const MARK: &str = "LVK_TEST_CHILD";
 
@@ -40,11 +41,28 @@ pub fn in_child(test: &str, variables: &[(&str, Option<&OsStr>)], body: impl FnO
 /// As [`in_child`] and [`swiftshader`].
 pub fn without_ray_tracing(test: &str, body: impl FnOnce()) {
     let Some(icd) = swiftshader() else { return };
-    let variables = [
+    in_child(test, &only_driver(&icd), body);
+}
+
+/// As [`in_child`], with no device but an AMD chip of this `family` (`RADV_FORCE_FAMILY`), which compiles and does nothing
+/// else; skipped loudly where its driver cannot be had.
+///
+/// # Panics
+/// As [`in_child`] and [`radv`].
+pub fn on_radv(test: &str, family: &str, body: impl FnOnce()) {
+    let Some(icd) = radv() else { return };
+    let mut variables = only_driver(&icd).to_vec();
+    variables.push(("RADV_FORCE_FAMILY", Some(OsStr::new(family))));
+    // What was compiled before is to be compiled again.
+    variables.push(("MESA_SHADER_CACHE_DISABLE", Some(OsStr::new("true"))));
+    in_child(test, &variables, body);
+}
+
+fn only_driver(icd: &Path) -> [(&str, Option<&OsStr>); 4] {
+    [
         ("VK_DRIVER_FILES", Some(icd.as_os_str())),
         ("VK_ICD_FILENAMES", None),
         ("LVK_DRIVER", None),
         ("LVK_DEVICE", None),
-    ];
-    in_child(test, &variables, body);
+    ]
 }

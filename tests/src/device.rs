@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use lvk::{Context, ContextDesc, Validation, ValidationSink};
-use lvk_samples::driver::{DriverRequest, prepare, swiftshader_icd};
+use lvk_samples::driver::{DriverError, DriverRequest, prepare, radv_icd, swiftshader_icd};
 
 /// A context under core and synchronization validation. Dropping it fails the test on any message, those of the
 /// context's own end included.
@@ -57,7 +57,7 @@ pub fn device() -> Option<TestDevice> {
 ///
 /// # Panics
 /// When there is no device, or the context cannot be made.
-pub fn device_with(adjust: impl FnOnce(&mut ContextDesc<'_>)) -> Option<TestDevice> {
+pub fn device_with<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<TestDevice> {
     let library = vulkan()?;
     let sink = ValidationSink::default();
     let mut desc = ContextDesc {
@@ -103,11 +103,24 @@ pub fn vulkan() -> Option<Option<&'static Path>> {
 /// # Panics
 /// When it cannot be fetched although `LVK_REQUIRE_GPU=1` demands every test.
 pub fn swiftshader() -> Option<PathBuf> {
-    match swiftshader_icd() {
+    fetched(swiftshader_icd(), "device without ray tracing")
+}
+
+/// The description file of the driver for AMD cards, with its libraries open in this process; `None`, loudly, where it
+/// cannot be fetched.
+///
+/// # Panics
+/// As [`swiftshader`].
+pub fn radv() -> Option<PathBuf> {
+    fetched(radv_icd(), "driver for AMD cards")
+}
+
+fn fetched(icd: Result<PathBuf, DriverError>, what: &str) -> Option<PathBuf> {
+    match icd {
         Ok(icd) => Some(icd),
         Err(error) if is_set("LVK_REQUIRE_GPU") => unavailable(&error.to_string()),
         Err(error) => {
-            eprintln!("SKIPPED, no device without ray tracing: {error}");
+            eprintln!("SKIPPED, no {what}: {error}");
             None
         }
     }

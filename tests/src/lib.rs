@@ -8,12 +8,15 @@ pub mod hybrid;
 pub mod meshes;
 pub mod noise;
 pub mod picture;
+pub mod radv;
 pub mod random;
 pub mod raster;
 pub mod ray_scene;
 pub mod ray_tracer;
 pub mod rays;
 pub mod reference;
+pub mod shader_groups;
 pub mod still_life;
+pub mod warnings;
 
 pub use device::{TestDevice, device, device_with};

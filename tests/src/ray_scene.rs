@@ -184,7 +184,7 @@ fn upload_models(
         }
         geometries.push(of_model);
     }
-    let desc = |geometries| BlasDesc { geometries, flags, debug_name: "model" };
+    let desc = |geometries| BlasDesc { geometries, flags, debug_name: "model", ..Default::default() };
     let descs: Vec<_> = geometries.iter().map(|of_model| desc(&of_model[..])).collect();
     Ok((ctx.create_blas_batch(&descs)?, buffers))
 }
@@ -208,7 +208,7 @@ fn upload_part(ctx: &Context, part: &Part) -> Result<(PartBuffers, Triangles)> {
         vertex_stride,
         indices: indices.as_ref().map(|buffer| Indices { buffer: **buffer, offset, format }),
         triangle_count,
-        transform: part.transform.as_ref().map(transform_rows),
+        transform: part.transform.as_ref().map(|transform| transform_rows(transform).into()),
         flags: part.flags,
         ..Triangles::packed(*vertices, vertex_count)
     };

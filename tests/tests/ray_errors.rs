@@ -189,6 +189,7 @@ fn refits_that_are_not_possible_are_refused() -> Result<()> {
         capacity: 6,
         flags: BuildFlags::ALLOW_UPDATE,
         debug_name: "of six",
+        ..Default::default()
     })?;
     intact.refuse("ALLOW_UPDATE", |cmd| cmd.build_blas(&[model], BuildMode::Refit))?;
     intact.refuse("ALLOW_UPDATE", |cmd| cmd.update_tlas(tlas, &[one], BuildMode::Refit))?;

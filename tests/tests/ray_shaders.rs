@@ -25,8 +25,8 @@ const TAGGED_HIT: &str = r#"
     layout(shaderRecordEXT, scalar) buffer Record { uint tag; };
     layout(location = 0) rayPayloadInEXT HitRecord record;
     void main() {
-        record = HitRecord(gl_HitTEXT, vec2(0), tag + ADD, gl_InstanceID, gl_InstanceCustomIndexEXT,
-                           gl_GeometryIndexEXT, gl_PrimitiveID);
+        record = HitRecord(gl_HitTEXT, vec2(0), tag + ADD, lvkInstanceId(tlas), gl_InstanceCustomIndexEXT,
+                           gl_GeometryIndexEXT, lvkPrimitiveIndex(tlas));
     }"#;
 
 /// A context with ray tracing pipelines, or a word about why there is none.
@@ -146,10 +146,10 @@ fn a_hit_shader_calls_the_callable_it_names() -> Result<()> {
         layout(location = 0) rayPayloadInEXT HitRecord record;
         layout(location = 3) callableDataEXT uint value;
         void main() {
-            value = gl_PrimitiveID;
-            executeCallableEXT(gl_PrimitiveID % 3, 3);
-            record = HitRecord(gl_HitTEXT, vec2(0), 1 + value, gl_InstanceID, gl_InstanceCustomIndexEXT,
-                               gl_GeometryIndexEXT, gl_PrimitiveID);
+            value = lvkPrimitiveIndex(tlas);
+            executeCallableEXT(lvkPrimitiveIndex(tlas) % 3, 3);
+            record = HitRecord(gl_HitTEXT, vec2(0), 1 + value, lvkInstanceId(tlas), gl_InstanceCustomIndexEXT,
+                               gl_GeometryIndexEXT, lvkPrimitiveIndex(tlas));
         }"#;
     const CALLABLE: &str = r"
         layout(location = 3) callableDataInEXT uint value;
@@ -201,8 +201,8 @@ fn a_hit_shader_traces_a_ray_of_its_own() -> Result<()> {
         #include "ray_records.glsl"
         layout(location = 1) rayPayloadInEXT HitRecord next;
         void main() {
-            next = HitRecord(gl_HitTEXT, vec2(0), kFront, gl_InstanceID, gl_InstanceCustomIndexEXT,
-                             gl_GeometryIndexEXT, gl_PrimitiveID);
+            next = HitRecord(gl_HitTEXT, vec2(0), kFront, lvkInstanceId(tlas), gl_InstanceCustomIndexEXT,
+                             gl_GeometryIndexEXT, lvkPrimitiveIndex(tlas));
         }"#;
     const NEXT_MISS: &str = r#"
         #include "ray_records.glsl"

@@ -1,0 +1,162 @@
+//! Device profiles: what they hide is not there, what they tighten is tight, and refusals say whose doing it is.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::ffi::CStr;
+
+use lvk::ash::{self, vk};
+use lvk::{
+    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Capabilities, Context, ContextDesc, DeviceProfile,
+    Error, FeatureRequest, Holder, Triangles,
+};
+use lvk_tests::device::vulkan;
+use lvk_tests::{TestDevice, device, device_with};
+
+fn under(profile: &DeviceProfile) -> Option<TestDevice> {
+    device_with(|desc| desc.profile = Some(profile))
+}
+
+#[test]
+fn built_in_profiles_leave_what_they_say() {
+    let Some(real) = device() else { return };
+    let real = real.capabilities().clone();
+    assert_eq!(real.profile, None);
+    for name in DeviceProfile::names() {
+        let profile = DeviceProfile::named(name).unwrap();
+        let Some(ctx) = under(&profile) else { return };
+        let left = ctx.capabilities();
+        assert_eq!(left.profile.as_deref(), Some(name));
+        assert_eq!(left.ray_tracing_pipeline, real.ray_tracing_pipeline && profile.ray_tracing_pipeline);
+        assert_eq!(left.ray_query, real.ray_query && profile.ray_query, "{name}");
+        assert_eq!(left.mesh_shader, real.mesh_shader && profile.mesh_shader, "{name}");
+        let any = left.ray_tracing_pipeline || left.ray_query;
+        assert_eq!(left.position_fetch, real.position_fetch && profile.position_fetch && any, "{name}");
+        assert_eq!(ctx.accel_memory().structure_bytes > 0, any, "{name}: the dummy structure");
+    }
+}
+
+#[test]
+fn phone_limits_hold_on_a_laxer_driver() {
+    let Some(ctx) = under(&DeviceProfile::mali_g715()) else { return };
+    let limits = &ctx.capabilities().limits;
+    assert_eq!(limits.scratch_alignment % 256, 0);
+    assert!(limits.max_storage_buffer_range <= 256 << 20);
+    assert!(limits.max_accel_structure_bytes <= 256 << 20 && limits.max_accel_scratch_bytes <= 256 << 20);
+}
+
+/// Extensions are really off: the driver gives no functions of theirs.
+#[test]
+fn the_device_is_made_without_what_is_hidden() {
+    let has = |ctx: &Context, name: &CStr| {
+        let device = ctx.raw_device().handle();
+        // SAFETY: the device is alive.
+        unsafe { ctx.raw_instance().get_device_proc_addr(device, name.as_ptr()) }.is_some()
+    };
+    for (profile, pipelines, structures) in [
+        (DeviceProfile::default(), true, true),
+        (DeviceProfile::no_rt_pipeline(), false, true),
+        (DeviceProfile::no_ray_tracing(), false, false),
+    ] {
+        let Some(ctx) = under(&profile) else { return };
+        let real = ctx.capabilities();
+        let trace = has(&ctx, c"vkCmdTraceRaysKHR");
+        assert_eq!(trace, pipelines && real.ray_tracing_pipeline, "{}", profile.name);
+        let build = has(&ctx, c"vkCmdBuildAccelerationStructuresKHR");
+        assert_eq!(build, structures && (real.ray_tracing_pipeline || real.ray_query), "{}", profile.name);
+        assert!(
+            !pipelines || trace,
+            "{}: the device of this test has no ray tracing pipelines",
+            profile.name
+        );
+    }
+}
+
+#[test]
+fn what_a_profile_hides_is_not_there_for_those_who_require_it() {
+    let Some(ctx) = device() else { return };
+    let real: Capabilities = ctx.capabilities().clone();
+    for (profile, pipeline, query, had, lack) in [
+        (
+            DeviceProfile::mali_g715(),
+            FeatureRequest::Required,
+            FeatureRequest::Optional,
+            real.ray_tracing_pipeline,
+            "lacks ray tracing pipelines (hidden by the device profile 'mali-g715')",
+        ),
+        (
+            DeviceProfile::no_ray_query(),
+            FeatureRequest::Optional,
+            FeatureRequest::Required,
+            real.ray_query,
+            "lacks ray queries (hidden by the device profile 'no-ray-query')",
+        ),
+    ] {
+        let desc = ContextDesc {
+            vulkan_library: vulkan().flatten(),
+            device: Some(&real.device_name),
+            profile: Some(&profile),
+            ray_tracing_pipeline: pipeline,
+            ray_query: query,
+            ..Default::default()
+        };
+        match Context::new(&desc) {
+            Err(Error::NoDevice { reasons }) => {
+                assert!(reasons.contains(&real.device_name), "{reasons}");
+                assert_eq!(reasons.contains(lack), had, "{reasons}");
+            }
+            other => unreachable!("{:?}", other.map(|ctx| ctx.capabilities().clone())),
+        }
+    }
+}
+
+fn vertices(ctx: &Context, triangles: u32) -> Holder<lvk::BufferHandle> {
+    let corner = |index: u32| [(index % 97) as f32, (index % 89) as f32 * 0.5, (index % 83) as f32];
+    let positions: Vec<[f32; 3]> = (0..triangles * 3).map(corner).collect();
+    let data = Some(bytemuck::cast_slice(&positions));
+    ctx.create_buffer(&BufferDesc { usage: BufferUsage::ACCEL_INPUT, data, ..Default::default() }).unwrap()
+}
+
+/// What the driver itself would answer for one build is less: the phone's figures count.
+#[test]
+fn sizes_are_those_of_the_phone_where_it_needs_more() {
+    const TRIANGLES: u64 = 1_000;
+    let sizes = |ctx: &Context| {
+        let buffer = vertices(ctx, TRIANGLES as u32);
+        let geometries = [BlasGeometry::Triangles(Triangles::packed(*buffer, 3 * TRIANGLES as u32))];
+        ctx.blas_sizes(&BlasDesc { geometries: &geometries, ..Default::default() }).unwrap()
+    };
+    let Some(real) = device() else { return };
+    if !(real.capabilities().ray_query || real.capabilities().ray_tracing_pipeline) {
+        return;
+    }
+    let own = sizes(&real);
+    let profile = DeviceProfile { ray_tracing_pipeline: true, ..DeviceProfile::mali_g715() };
+    let Some(ctx) = under(&profile) else { return };
+    let mali = sizes(&ctx);
+    assert_eq!(mali.build_scratch_bytes, own.build_scratch_bytes.max(2_805 * TRIANGLES));
+    assert_eq!(mali.structure_bytes, own.structure_bytes.max(219 * TRIANGLES));
+}
+
+#[test]
+fn a_profile_of_ones_own_is_made_from_a_built_in_one() {
+    let profile = DeviceProfile { name: "tiny".into(), max_blas_primitives: 100, ..DeviceProfile::default() };
+    let Some(ctx) = under(&profile) else { return };
+    assert_eq!(ctx.capabilities().profile.as_deref(), Some("tiny"));
+    assert!(ctx.capabilities().limits.max_blas_primitives <= 100);
+}
+
+#[test]
+fn limits_of_mesh_shaders_are_there_with_them_only() {
+    let Some(ctx) = device() else { return };
+    let limits = |ctx: &Context| ctx.capabilities().limits.mesh;
+    let has = ctx.capabilities().mesh_shader;
+    assert_eq!(limits(&ctx) != Default::default(), has);
+    assert!(!has || limits(&ctx).max_mesh_groups_total >= 1 << 22, "{:?}", limits(&ctx));
+    let Some(ctx) = under(&DeviceProfile { mesh_shader: false, ..DeviceProfile::default() }) else { return };
+    assert_eq!(limits(&ctx), Default::default());
+    let device = ctx.raw_device().handle();
+    let name = ash::ext::mesh_shader::NAME;
+    // SAFETY: the device is alive.
+    let draw: vk::PFN_vkVoidFunction =
+        unsafe { ctx.raw_instance().get_device_proc_addr(device, c"vkCmdDrawMeshTasksEXT".as_ptr()) };
+    assert!(draw.is_none(), "{name:?}");
+}
