@@ -50,6 +50,7 @@
 //! | link compiled shaders into several pipelines | [`RayTracingLibraryDesc`] |
 //! | keep compiled pipelines on disk | [`ContextDesc::pipeline_cache`] |
 //! | trace rays in any shader | [`ShaderModuleDesc`] with `#include <lvk/ray_query.glsl>` |
+//! | read how it all hangs together | [`manual`] |
 //! | build what rays hit | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
 //! | say what a shader reaches | [`Dependencies`] |
 //! | submit, wait, keep frames apart | [`Context::submit`], [`Context::wait`], [`Context::next_frame`] |
@@ -77,9 +78,8 @@
 //!
 //! # What `lvk` does not do (yet)
 //!
-//! Windows and swapchains, tessellation pipelines, multisampling, 3D textures, queues beside the main one,
-//! splitting and compaction of acceleration structures. `lvk` is no scene graph and no
-//! renderer.
+//! Windows and swapchains, tessellation pipelines, multisampling, 3D textures, queues beside the main one. `lvk` is no
+//! scene graph and no renderer.
 //!
 //! # Features
 //!
@@ -96,6 +96,7 @@ mod format;
 mod gpu;
 mod handle;
 mod kernel;
+pub mod manual;
 mod pipeline;
 mod resource;
 mod shader;

@@ -1,6 +1,7 @@
 //! Samples of `lvk`: each is a type that renders headless, with a small main in `src/bin`.
 
 pub mod app;
+pub mod bench;
 pub mod driver;
 pub mod hybrid;
 pub mod pipelines;

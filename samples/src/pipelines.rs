@@ -2,7 +2,7 @@
 
 use lvk::{Format, ShaderModuleDesc, ShaderSource, ShaderStage};
 
-use crate::hybrid;
+use crate::{bench, hybrid};
 use crate::shaders::INCLUDES;
 
 /// A stage of a [`SamplePipeline`].
@@ -50,7 +50,7 @@ pub struct SamplePipeline {
 /// All of them.
 #[must_use]
 pub fn all() -> Vec<SamplePipeline> {
-    hybrid::pipelines()
+    hybrid::pipelines().into_iter().chain(bench::pipelines()).collect()
 }
 
 #[cfg(test)]

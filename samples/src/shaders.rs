@@ -2,6 +2,7 @@
 
 /// Names as `#include` writes them, and texts, for every sample.
 pub const INCLUDES: &[(&str, &str)] = &[
+    ("bench/view.glsl", include_str!("../../shaders/bench/view.glsl")),
     ("common/camera.glsl", include_str!("../../shaders/common/camera.glsl")),
     ("common/fresnel.glsl", include_str!("../../shaders/common/fresnel.glsl")),
     ("common/octahedral.glsl", include_str!("../../shaders/common/octahedral.glsl")),
@@ -18,6 +19,26 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("hybrid/trace_pipeline.glsl", include_str!("../../shaders/hybrid/trace_pipeline.glsl")),
     ("hybrid/trace_query.glsl", include_str!("../../shaders/hybrid/trace_query.glsl")),
 ];
+
+/// Stages of the `bench` program.
+pub mod bench {
+    /// Macros of the hit shader that takes the number of the primitive from Vulkan.
+    pub const BUILT_IN_NUMBERS: &[(&str, &str)] = &[("BENCH_BUILT_IN", "1")];
+    /// Macros of the compute stage that traces shadow rays.
+    pub const SHADOW_RAYS: &[(&str, &str)] = &[("BENCH_SHADOW", "1")];
+    /// A primary ray of a pixel.
+    pub const PRIMARY_RGEN: &str = include_str!("../../shaders/bench/primary.rgen.glsl");
+    /// A shadow ray of a pixel.
+    pub const SHADOW_RGEN: &str = include_str!("../../shaders/bench/shadow.rgen.glsl");
+    /// A primary ray that left the scene.
+    pub const PRIMARY_RMISS: &str = include_str!("../../shaders/bench/primary.rmiss.glsl");
+    /// A shadow ray that reached the light.
+    pub const SHADOW_RMISS: &str = include_str!("../../shaders/bench/shadow.rmiss.glsl");
+    /// The nearest triangle of a primary ray.
+    pub const PRIMARY_RCHIT: &str = include_str!("../../shaders/bench/primary.rchit.glsl");
+    /// Rays by query.
+    pub const RAYS_COMP: &str = include_str!("../../shaders/bench/rays.comp.glsl");
+}
 
 /// Stages of the `hybrid` sample.
 pub mod hybrid {

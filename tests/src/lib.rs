@@ -1,9 +1,11 @@
 //! Harness of the tests: a device with silent validation, or a loud failure.
 
 pub mod agreement;
+pub mod bender;
 pub mod child;
 pub mod compute;
 pub mod device;
+pub mod hit_check;
 pub mod hybrid;
 pub mod meshes;
 pub mod noise;
@@ -16,6 +18,7 @@ pub mod ray_tracer;
 pub mod rays;
 pub mod reference;
 pub mod shader_groups;
+pub mod sphere_scene;
 pub mod still_life;
 pub mod warnings;
 

@@ -3,8 +3,8 @@
 use lvk::glam::{Affine3A, DAffine3};
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, Context,
-    GeometryFlags, Holder, IndexFormat, Indices, InstanceFlags, Result, TlasDesc, TlasInstance, Triangles,
-    transform_rows,
+    GeometryFlags, GeometryTransform, Holder, IndexFormat, Indices, InstanceFlags, Result, TlasDesc,
+    TlasInstance, Triangles, transform_rows,
 };
 
 use crate::meshes::Mesh;
@@ -33,6 +33,8 @@ pub struct Part {
     pub layout: Layout,
     /// Moves the vertices before the build.
     pub transform: Option<Affine3A>,
+    /// The matrix lies in a buffer, behind another one.
+    pub transform_in_buffer: bool,
     /// How rays treat it.
     pub flags: GeometryFlags,
 }
@@ -40,7 +42,8 @@ pub struct Part {
 impl Part {
     /// Opaque, and where the mesh says.
     pub fn new(mesh: Mesh, layout: Layout) -> Self {
-        Self { mesh, layout, transform: None, flags: GeometryFlags::OPAQUE }
+        let (transform_in_buffer, flags) = (false, GeometryFlags::OPAQUE);
+        Self { mesh, layout, transform: None, transform_in_buffer, flags }
     }
 }
 
@@ -75,6 +78,9 @@ impl Placed {
     }
 }
 
+/// Where a matrix lies in its buffer, in bytes.
+pub const MATRIX_OFFSET: u64 = 48;
+
 /// Models and where they stand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RayScene {
@@ -100,6 +106,8 @@ pub struct PartBuffers {
     pub vertices: Holder<BufferHandle>,
     /// Holds the indices, if there are any.
     pub indices: Option<Holder<BufferHandle>>,
+    /// Holds the matrix at [`MATRIX_OFFSET`], if it lies in a buffer.
+    pub matrix: Option<Holder<BufferHandle>>,
 }
 
 impl RayScene {
@@ -119,6 +127,8 @@ impl RayScene {
             custom_index: placed.custom_index,
             mask: placed.mask,
             flip_facing: placed.flags.contains(InstanceFlags::FLIP_FACING),
+            no_cull: placed.flags.contains(InstanceFlags::NO_CULL),
+            force_opaque: force_opaque(placed.flags),
         };
         Reference::new(&self.placed.iter().map(instance).collect::<Vec<_>>())
     }
@@ -168,6 +178,18 @@ pub fn vertex_bytes(mesh: &Mesh, layout: Layout) -> Vec<u8> {
     }
 }
 
+/// The geometries of one model, and the buffers they lie in.
+pub fn upload_geometries(ctx: &Context, parts: &[Part]) -> Result<(Vec<PartBuffers>, Vec<BlasGeometry>)> {
+    let mut buffers = Vec::with_capacity(parts.len());
+    let mut geometries = Vec::with_capacity(parts.len());
+    for part in parts {
+        let (uploaded, geometry) = upload_part(ctx, part)?;
+        buffers.push(uploaded);
+        geometries.push(BlasGeometry::Triangles(geometry));
+    }
+    Ok((buffers, geometries))
+}
+
 fn upload_models(
     ctx: &Context,
     models: &[Vec<Part>],
@@ -176,12 +198,8 @@ fn upload_models(
     let mut buffers = Vec::new();
     let mut geometries = Vec::new();
     for parts in models {
-        let mut of_model = Vec::new();
-        for part in parts {
-            let (uploaded, geometry) = upload_part(ctx, part)?;
-            buffers.push(uploaded);
-            of_model.push(BlasGeometry::Triangles(geometry));
-        }
+        let (uploaded, of_model) = upload_geometries(ctx, parts)?;
+        buffers.extend(uploaded);
         geometries.push(of_model);
     }
     let desc = |geometries| BlasDesc { geometries, flags, debug_name: "model", ..Default::default() };
@@ -203,16 +221,24 @@ fn upload_part(ctx: &Context, part: &Part) -> Result<(PartBuffers, Triangles)> {
         Layout::Unshared => triangle_count * 3,
         _ => part.mesh.positions.len() as u32,
     };
+    let rows = part.transform.as_ref().map(transform_rows);
+    let by_value = rows.map(GeometryTransform::Rows);
+    let matrix = match rows.filter(|_| part.transform_in_buffer) {
+        Some(rows) => Some(input(bytemuck::cast_slice(&[[f32::NAN; 12], rows]), "matrix")?),
+        None => None,
+    };
     let triangles = Triangles {
         vertex_offset,
         vertex_stride,
         indices: indices.as_ref().map(|buffer| Indices { buffer: **buffer, offset, format }),
         triangle_count,
-        transform: part.transform.as_ref().map(|transform| transform_rows(transform).into()),
+        transform: matrix.as_ref().map_or(by_value, |buffer| {
+            Some(GeometryTransform::Buffer { buffer: **buffer, offset: MATRIX_OFFSET })
+        }),
         flags: part.flags,
         ..Triangles::packed(*vertices, vertex_count)
     };
-    Ok((PartBuffers { vertices, indices }, triangles))
+    Ok((PartBuffers { vertices, indices, matrix }, triangles))
 }
 
 fn index_bytes(part: &Part) -> (Vec<u8>, u64, IndexFormat) {
@@ -236,7 +262,13 @@ fn reference_geometry(part: &Part) -> reference::Geometry {
         positions: part.mesh.positions.iter().map(|position| position.map(f64::from).into()).collect(),
         triangles: part.mesh.triangles.clone(),
         transform: part.transform.as_ref().map_or(DAffine3::IDENTITY, double),
+        is_opaque: part.flags.contains(GeometryFlags::OPAQUE),
     }
+}
+
+fn force_opaque(flags: InstanceFlags) -> Option<bool> {
+    let forced = flags.intersects(InstanceFlags::FORCE_OPAQUE | InstanceFlags::FORCE_NO_OPAQUE);
+    forced.then(|| flags.contains(InstanceFlags::FORCE_OPAQUE))
 }
 
 fn double(transform: &Affine3A) -> DAffine3 {

@@ -18,12 +18,22 @@ pub const BACK: u32 = 0xff;
 
 /// Ray flag: every hit counts, without any-hit shader.
 pub const OPAQUE: u32 = 1;
+/// Ray flag: nothing is opaque.
+pub const NO_OPAQUE: u32 = 2;
 /// Ray flag: the first hit found ends the ray.
 pub const TERMINATE_ON_FIRST_HIT: u32 = 4;
 /// Ray flag: hits from behind do not count.
 pub const CULL_BACK: u32 = 0x10;
 /// Ray flag: hits from the front do not count.
 pub const CULL_FRONT: u32 = 0x20;
+/// Ray flag: what is opaque is not hit.
+pub const CULL_OPAQUE: u32 = 0x40;
+/// Ray flag: what is not opaque is not hit.
+pub const CULL_NO_OPAQUE: u32 = 0x80;
+/// Ray flag: triangles are not hit. Shaders declare `primitive_culling`.
+pub const SKIP_TRIANGLES: u32 = 0x100;
+/// Ray flag: boxes are not hit. Shaders declare `primitive_culling`.
+pub const SKIP_AABBS: u32 = 0x200;
 
 /// The files that shaders may include; `ray_records.glsl` has the push constants.
 pub const INCLUDES: [(&str, &str); 2] = [

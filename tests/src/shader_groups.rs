@@ -1,4 +1,4 @@
-//! A scene whose launches run each shader of a ray tracing pipeline once: hit groups, then miss shaders, then callables.
+//! A scene whose launches run each shader of a ray tracing pipeline once: hit groups, miss shaders, then callables.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{

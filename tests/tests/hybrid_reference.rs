@@ -27,6 +27,7 @@ fn reference(scene: &Scene) -> Reference {
         positions: scene.positions.iter().map(|position| Vec3::from(*position).as_dvec3()).collect(),
         triangles: triangles.to_vec(),
         transform: DAffine3::IDENTITY,
+        is_opaque: true,
     };
     let geometries = [[geometry(opaque)], [geometry(refractive)]];
     let instance = |number: usize, mask| Instance {
@@ -35,6 +36,8 @@ fn reference(scene: &Scene) -> Reference {
         custom_index: if number == 0 { 0 } else { opaque.len() as u32 },
         mask,
         flip_facing: false,
+        no_cull: false,
+        force_opaque: None,
     };
     Reference::new(&[instance(0, OPAQUE), instance(1, REFRACTIVE)])
 }

@@ -3,8 +3,7 @@
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
-    Aabbs, AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferUsage, ComputePipelineDesc, Context,
-    GeometryFlags, HitGroup, Holder, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderStage,
+    BlasDesc, Context, HitGroup, Holder, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderStage,
     TlasDesc,
 };
 use lvk_tests::agreement::Agreement;
@@ -12,7 +11,8 @@ use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances};
 use lvk_tests::ray_tracer::{How, Method, RayTracer, shader, shader_with};
 use lvk_tests::rays::{Ray, random_rays};
-use lvk_tests::reference::{HitIds, Reference, Sphere};
+use lvk_tests::reference::{Reference, Sphere};
+use lvk_tests::sphere_scene::{GROUPS, sphere_boxes, sphere_tracer, spheres};
 use lvk_tests::{TestDevice, device};
 
 const RAY_GEN: &str = include_str!("../shaders/closest.rgen.glsl");
@@ -245,14 +245,12 @@ fn a_hit_shader_traces_a_ray_of_its_own() -> Result<()> {
     Ok(())
 }
 
-/// Radius in object space and tag of each hit group of spheres.
-const GROUPS: [(f32, u32); 2] = [(0.9, 17), (0.5, 99)];
-
 /// Five spheres each in two geometries of boxes; two instances with radii of their own.
 #[test]
 fn an_intersection_shader_hits_spheres_in_boxes() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let model = [sphere_boxes(&ctx)?];
+    let (_buffers, geometries) = sphere_boxes(&ctx, 5)?;
+    let model = [ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?];
     let turn = Quat::from_rotation_y(0.7);
     let places = [
         Affine3A::from_scale_rotation_translation(Vec3::splat(0.8), turn, Vec3::new(-1.0, 0.5, 0.0)),
@@ -269,13 +267,10 @@ fn an_intersection_shader_hits_spheres_in_boxes() -> Result<()> {
     };
     let placed: Vec<_> = (0..).zip(&places).map(place).collect();
     let tlas = ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
-    let spheres = spheres(&placed);
+    let spheres = spheres(&placed, 5);
     let rays = random_rays(51, 2_000, Vec3::new(-2.0, -1.0, -4.0), Vec3::new(10.0, 5.0, 5.0));
     for method in Method::available(&ctx) {
-        let tracer = match method {
-            Method::Pipeline => sphere_pipeline(&ctx)?,
-            Method::Query => sphere_query(&ctx)?,
-        };
+        let tracer = sphere_tracer(&ctx, method)?;
         let records = tracer.trace(&tlas, &rays, How::default())?;
         Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&spheres, ray))
             .assert(&format!("spheres by {method:?}"));
@@ -285,70 +280,4 @@ fn an_intersection_shader_hits_spheres_in_boxes() -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Where the shaders look for a sphere, in object space.
-fn sphere_center(geometry: u32, primitive: u32) -> Vec3 {
-    Vec3::new((primitive % 3) as f32, (primitive / 3) as f32, geometry as f32) * 2.0
-}
-
-fn sphere_boxes(ctx: &Context) -> Result<Holder<AccelStructHandle>> {
-    let mut buffers = Vec::new();
-    let mut geometries = Vec::new();
-    // The second list starts late and has gaps.
-    for (geometry, offset, stride) in [(0, 0, 0), (1, 16, 32)] {
-        let mut floats = vec![f32::NAN; offset as usize / 4];
-        for center in (0..5).map(|primitive| sphere_center(geometry, primitive)) {
-            floats.extend([center - 1.0, center + 1.0].iter().flat_map(Vec3::to_array));
-            floats.extend(vec![f32::NAN; if stride == 0 { 0 } else { 2 }]);
-        }
-        let data = Some(bytemuck::cast_slice(&floats));
-        let usage = BufferUsage::ACCEL_INPUT;
-        let buffer = ctx.create_buffer(&BufferDesc { data, usage, ..Default::default() })?;
-        let flags = GeometryFlags::OPAQUE;
-        geometries.push(BlasGeometry::Aabbs(Aabbs { buffer: *buffer, offset, stride, count: 5, flags }));
-        buffers.push(buffer);
-    }
-    ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })
-}
-
-fn spheres(placed: &[Placed]) -> Vec<Sphere> {
-    let mut spheres = Vec::new();
-    for (instance, placed) in (0..).zip(placed) {
-        let scale = f64::from(placed.transform.matrix3.x_axis.length());
-        let radius = f64::from(GROUPS[placed.hit_group_offset as usize].0) * scale;
-        for (geometry, primitive) in (0..10).map(|index| (index / 5, index % 5)) {
-            let center = placed.transform.transform_point3(sphere_center(geometry, primitive)).as_dvec3();
-            let ids = HitIds { instance, custom_index: placed.custom_index, geometry, primitive };
-            spheres.push(Sphere { center, radius, ids });
-        }
-    }
-    spheres
-}
-
-fn sphere_pipeline(ctx: &Context) -> Result<RayTracer> {
-    let ray_gen = shader(ctx, ShaderStage::RayGen, RAY_GEN)?;
-    let miss = shader(ctx, ShaderStage::Miss, MISS)?;
-    let hit = shader(ctx, ShaderStage::ClosestHit, include_str!("../shaders/sphere.rchit.glsl"))?;
-    let sphere = shader(ctx, ShaderStage::Intersection, include_str!("../shaders/sphere.rint.glsl"))?;
-    let records = GROUPS.map(|(radius, tag)| [radius.to_ne_bytes(), tag.to_ne_bytes()].concat());
-    let groups = records.each_ref().map(|record| HitGroup {
-        closest_hit: Some(*hit),
-        intersection: Some(*sphere),
-        record,
-        ..Default::default()
-    });
-    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &[*ray_gen],
-        miss: &[*miss],
-        hit_groups: &groups,
-        ..Default::default()
-    })?;
-    Ok(RayTracer::of_pipeline(ctx, pipeline))
-}
-
-fn sphere_query(ctx: &Context) -> Result<RayTracer> {
-    let module = shader(ctx, ShaderStage::Compute, include_str!("../shaders/sphere_query.comp.glsl"))?;
-    let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-    Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?))
 }

@@ -1,68 +1,17 @@
 //! Structures that change: rebuilt, refitted, in the same command buffer and with frames in flight. No test places a
 //! barrier or waits before its last line.
 
-use bytemuck::NoUninit;
 use lvk::glam::{Affine3A, Vec3};
-use lvk::{
-    BufferHandle, BuildFlags, BuildMode, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context,
-    Dependencies, Holder, Result, ShaderStage,
-};
+use lvk::{BuildFlags, BuildMode, Context, Result};
 use lvk_tests::agreement::Agreement;
+use lvk_tests::bender::{Bender, bent};
 use lvk_tests::device;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances, vertex_bytes};
-use lvk_tests::ray_tracer::{How, Method, RayTracer, shader};
+use lvk_tests::ray_tracer::{How, Method, RayTracer};
 use lvk_tests::rays::{Ray, random_rays};
 
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
-
-/// Moves every vertex by its own amount, which [`bent`] repeats.
-const BEND: &str = r"
-    layout(local_size_x = 64) in;
-    layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Positions { vec3 at[]; };
-    layout(push_constant, scalar) uniform Push { Positions positions; uint count; float amount; };
-    void main() {
-        uint index = gl_GlobalInvocationID.x;
-        if (index < count) {
-            vec3 p = positions.at[index];
-            positions.at[index] = p + vec3(amount * p.y, amount, 0.5 * amount * p.x);
-        }
-    }";
-
-#[repr(C)]
-#[derive(Clone, Copy, NoUninit)]
-struct BendPush {
-    positions: u64,
-    count: u32,
-    amount: f32,
-}
-
-fn bent(mesh: &Mesh, amount: f32) -> Mesh {
-    let positions =
-        mesh.positions.iter().map(|[x, y, z]| [x + amount * y, y + amount, z + 0.5 * amount * x]).collect();
-    Mesh { positions, triangles: mesh.triangles.clone() }
-}
-
-struct Bender {
-    ctx: Context,
-    pipeline: Holder<ComputePipelineHandle>,
-}
-
-impl Bender {
-    fn new(ctx: &Context) -> Result<Self> {
-        let module = shader(ctx, ShaderStage::Compute, BEND)?;
-        let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-        Ok(Self { ctx: ctx.clone(), pipeline: ctx.create_compute_pipeline(&desc)? })
-    }
-
-    fn record(&self, cmd: &mut CommandBuffer, buffer: BufferHandle, mesh: &Mesh, amount: f32) -> Result<()> {
-        let count = mesh.positions.len() as u32;
-        cmd.bind_compute_pipeline(*self.pipeline)?;
-        cmd.push_constants(&BendPush { positions: self.ctx.buffer_address(buffer)?, count, amount })?;
-        let writes = Dependencies { buffers: &[buffer], ..Default::default() };
-        cmd.dispatch([count.div_ceil(64), 1, 1], &writes)
-    }
-}
 
 fn rays() -> Vec<Ray> {
     random_rays(31, 1_200, Vec3::splat(-1.5), Vec3::splat(1.5))

@@ -62,8 +62,9 @@ impl InstanceCulling {
     /// As [`keeps`](Self::keeps), of a box in the space of an object that `transform` (3 rows of 4 columns, as in
     /// [`TlasInstance`](crate::TlasInstance)) moves into the world.
     pub fn keeps_instance(&self, low: Vec3, high: Vec3, transform: &[f32; 12]) -> bool {
+        let is_box = low.cmple(high).all();
         let (low, high) = transformed_box(low, high, transform);
-        self.keeps(low, high)
+        !is_box || self.keeps(low, high)
     }
 
     /// Places, in the list given, of the boxes `(low, high)` in the world that are kept.
@@ -96,9 +97,8 @@ fn transformed_box(low: Vec3, high: Vec3, transform: &[f32; 12]) -> (Vec3, Vec3)
     let (mut world_low, mut world_high) = (column(3), column(3));
     for axis in 0..3 {
         let (a, b) = (column(axis) * low[axis], column(axis) * high[axis]);
-        // A sum keeps what is not a number, which a minimum could hide.
-        world_low += a.min(b) + (a + b) * 0.0;
-        world_high += a.max(b) + (a + b) * 0.0;
+        world_low += a.min(b);
+        world_high += a.max(b);
     }
     (world_low, world_high)
 }
@@ -204,6 +204,8 @@ mod tests {
         assert!(strict.keeps(high, low), "inverted");
         let mut transform = transform_rows(&Affine3A::IDENTITY);
         assert!(!strict.keeps_instance(low, high, &transform));
+        assert!(strict.keeps_instance(Vec3::new(1.0, f32::NAN, 1.0), high, &transform));
+        assert!(strict.keeps_instance(high, low, &transform), "inverted");
         transform[6] = f32::NAN;
         assert!(strict.keeps_instance(low, high, &transform));
         assert!(InstanceCulling { eye: Vec3::NAN, planes: [Vec4::NAN; 6], ..strict }.keeps(low, high));

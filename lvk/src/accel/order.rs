@@ -133,6 +133,15 @@ mod tests {
     }
 
     #[test]
+    fn the_larger_half_of_an_odd_number_is_the_first() {
+        let places = [[0.0, 0.1], [9.0, -9.0], [0.1, 0.0], [9.0, -8.0], [0.2, 0.2]];
+        let bounds = places.map(|[x, y]| Bounds { low: Vec3::new(x, y, 0.0), high: Vec3::new(x, y, 1.0) });
+        let mut left = spatial_order(&bounds)[..3].to_vec();
+        left.sort_unstable();
+        assert_eq!(left, [0, 2, 4], "the three that lie together");
+    }
+
+    #[test]
     fn threads_do_not_change_the_result() {
         let bounds = scattered(3 * PARALLEL_COUNT as u32);
         let (mut alone, mut many) = (items(&bounds), items(&bounds));

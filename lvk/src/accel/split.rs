@@ -154,16 +154,14 @@ impl Planner<'_> {
 /// How many primitives of each geometry an average one of so many parts holds: `ceil(total / parts)` together, as
 /// the geometries may be more than the primitives of a part.
 fn equal_share(counts: &[u32], parts: u64) -> Vec<u32> {
-    let total: u64 = counts.iter().copied().map(u64::from).sum();
-    let share = total.div_ceil(parts.max(1));
-    let (mut behind, mut given) = (0, 0);
-    let next = |&count: &u32| {
+    let (mut behind, mut given) = (0_u64, 0);
+    let share = |&count: &u32| {
         behind += u64::from(count);
         let before = given;
-        given = behind * share / total.max(1);
+        given = behind.div_ceil(parts.max(1));
         (given - before) as u32
     };
-    counts.iter().map(next).collect()
+    counts.iter().map(share).collect()
 }
 
 /// One limit, and into how many parts it asks to cut.
@@ -295,6 +293,14 @@ mod tests {
         let parts = plan_split("mesh", &[scattered(500), right], &limits(5000, 1, 1000), &mut sizes).unwrap();
         let largest = |geometry: usize| parts.iter().map(|part| part.geometries[geometry].len()).max();
         assert!(largest(0) <= Some(100) && largest(1) > Some(150), "{:?} {:?}", largest(0), largest(1));
+    }
+
+    #[test]
+    fn a_share_is_as_large_as_an_average_part() {
+        assert_eq!(equal_share(&[100, 0, 50], 1), [100, 0, 50]);
+        assert_eq!(equal_share(&[100, 0, 51], 10), [10, 0, 6]);
+        assert_eq!(equal_share(&[1; 7], 3).iter().sum::<u32>(), 3);
+        assert_eq!(equal_share(&[u32::MAX, 0], u64::MAX), [1, 0]);
     }
 
     #[test]

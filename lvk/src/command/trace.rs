@@ -65,8 +65,8 @@ impl CommandBuffer {
     /// Runs the ray generation shader at place `ray_gen` as often as three `u32` at `offset` in `arguments` say: width,
     /// height and depth, of which any may be 0 (`vkCmdTraceRaysIndirectKHR`).
     ///
-    /// `arguments` needs [`BufferUsage::INDIRECT`]; `offset` is a multiple of 4. That the size is within the device's
-    /// limits is up to whoever writes it.
+    /// `arguments` needs [`INDIRECT`](crate::BufferUsage::INDIRECT); `offset` is a multiple of 4. That the size is
+    /// within the device's limits is up to whoever writes it.
     ///
     /// # Errors
     /// [`Unsupported`](Error::Unsupported) without

@@ -110,7 +110,7 @@ fn new_blas(shared: &Shared, desc: &BlasDesc<'_>, parts: Vec<PartShape>) -> Resu
         })
         .collect();
     let body = BlasBody { structures: structures?, compacted_from: None, rebuildable: true };
-    Ok(blas_object(shared, desc, parts, body)?)
+    blas_object(shared, desc, parts, body)
 }
 
 /// The object behind the handle of a bottom-level structure.

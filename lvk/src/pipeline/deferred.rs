@@ -19,18 +19,19 @@ pub(crate) unsafe fn compile(
     cache: vk::PipelineCache,
     info: &vk::RayTracingPipelineCreateInfoKHR<'_>,
 ) -> Result<vk::Pipeline> {
+    // NVIDIA's driver 580 crashes after deferring what has nothing to compile, only libraries to link.
+    let operation = if info.stage_count > 0 { Some(Operation::new(gpu)?) } else { None };
+    let deferred = operation.as_ref().map_or(vk::DeferredOperationKHR::null(), |operation| operation.raw);
     let ext = gpu.ray_tracing()?;
-    let operation = Operation::new(gpu)?;
     let create = ext.fp().create_ray_tracing_pipelines_khr;
     let mut raw = vk::Pipeline::null();
     // SAFETY: the caller vouches for the description. It and `raw` stay where they are until the driver is done with
     // them, since `finish` returns no sooner.
-    let started =
-        unsafe { create(ext.device(), operation.raw, cache, 1, info, std::ptr::null(), &raw mut raw) };
-    let result = match started {
-        vk::Result::OPERATION_DEFERRED_KHR => operation.finish(),
-        vk::Result::OPERATION_NOT_DEFERRED_KHR => vk::Result::SUCCESS,
-        result => result,
+    let started = unsafe { create(ext.device(), deferred, cache, 1, info, std::ptr::null(), &raw mut raw) };
+    let result = match (started, &operation) {
+        (vk::Result::OPERATION_DEFERRED_KHR, Some(operation)) => operation.finish(),
+        (vk::Result::OPERATION_NOT_DEFERRED_KHR, _) => vk::Result::SUCCESS,
+        (result, _) => result,
     };
     result.result().map_err(Error::vulkan("vkCreateRayTracingPipelinesKHR"))?;
     Ok(raw)

@@ -198,7 +198,9 @@ mod tests {
             prop_assert!(regions.iter().all(|region| region.size == region.stride));
             let counts = groups.as_ref().map(Vec::len);
             prop_assert_eq!(regions.len(), counts.ray_gen);
-            for (region, count) in [(plan.miss, counts.miss), (plan.hit, counts.hit), (plan.callable, counts.callable)] {
+            let shared =
+                [(plan.miss, counts.miss), (plan.hit, counts.hit), (plan.callable, counts.callable)];
+            for (region, count) in shared {
                 prop_assert_eq!(region.size, count as u64 * region.stride);
                 prop_assert_eq!(region == SbtRegion::default(), count == 0);
                 regions.push(region);

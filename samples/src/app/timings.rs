@@ -93,7 +93,8 @@ impl fmt::Display for Timings {
     }
 }
 
-fn spread(mut values: Vec<f64>) -> Option<Spread> {
+/// Smallest, middle and largest of some values; `None` where there are none.
+pub(crate) fn spread(mut values: Vec<f64>) -> Option<Spread> {
     values.sort_unstable_by(f64::total_cmp);
     let (&min, &max) = (values.first()?, values.last()?);
     let middle = values.len() / 2;

@@ -36,6 +36,8 @@ pub struct Hit {
     /// Whether the ray came from the side where the corners, in object space, turn clockwise in left-handed
     /// coordinates.
     pub is_front: bool,
+    /// Whether it counts without an any-hit shader.
+    pub is_opaque: bool,
 }
 
 /// What a ray hits first.
@@ -75,6 +77,7 @@ impl Candidate {
             ids,
             barycentrics: [crossing.weights[1], crossing.weights[2]],
             is_front: (crossing.cosine < 0.0) != mirrored,
+            is_opaque: true,
         };
         let is_certain = margin > blur && !grazes && in_range == Range::Inside;
         Some(Self { hit, is_hit: margin >= 0.0 && range.0 < crossing.t && crossing.t < range.1, is_certain })
@@ -114,6 +117,14 @@ pub(super) fn closest(candidates: impl Iterator<Item = Candidate> + Clone) -> An
         before && (!other.is_certain || other.hit.ids != best.hit.ids)
     };
     Answer { hit: Some(best.hit), is_certain: !candidates.clone().any(|other| rival(&other)) }
+}
+
+/// All hits, the closest first; `None` where any is doubtful.
+pub(super) fn all(candidates: impl Iterator<Item = Candidate> + Clone) -> Option<Vec<Hit>> {
+    let certain = candidates.clone().all(|candidate| candidate.is_certain);
+    let mut hits: Vec<_> = candidates.map(|candidate| candidate.hit).collect();
+    hits.sort_by(|a, b| a.t.total_cmp(&b.t));
+    certain.then_some(hits)
 }
 
 /// Whether there is any hit; `None` where that is doubtful.

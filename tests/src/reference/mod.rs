@@ -5,10 +5,12 @@
 //! leaves the ray out and counts it.
 
 mod candidate;
+mod rules;
 mod sphere;
 mod triangle;
 mod world;
 
 pub use candidate::{Answer, Hit, HitIds};
+pub use rules::Rules;
 pub use sphere::Sphere;
 pub use world::{Geometry, Instance, Reference};

@@ -40,7 +40,7 @@ impl Sphere {
         let places = ends.map(|t| Range::of(t, range));
         let first = places.iter().position(|place| *place != Range::Outside)?;
         let t = ends[first];
-        let hit = Hit { t, ids: self.ids, barycentrics: [0.0; 2], is_front: true };
+        let hit = Hit { t, ids: self.ids, barycentrics: [0.0; 2], is_front: true, is_opaque: true };
         let is_certain = places[first] == Range::Inside && passing < self.radius * (1.0 - SILHOUETTE);
         Some(Candidate { hit, is_hit: passing < self.radius && range.0 < t && t < range.1, is_certain })
     }

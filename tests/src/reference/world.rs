@@ -8,7 +8,8 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 
-use super::candidate::{Answer, Candidate, Hit, HitIds, any, closest};
+use super::candidate::{Answer, Candidate, Hit, HitIds, all, any, closest};
+use super::rules::{Rules, Surface};
 use super::triangle::cross;
 use crate::rays::Ray;
 
@@ -26,6 +27,8 @@ pub struct Geometry {
     pub triangles: Vec<[u32; 3]>,
     /// Moves the vertices into object space; mirrored ones change their front.
     pub transform: DAffine3,
+    /// Hits count without an any-hit shader.
+    pub is_opaque: bool,
 }
 
 /// Geometries placed in the world.
@@ -41,6 +44,10 @@ pub struct Instance<'a> {
     pub mask: u8,
     /// The other side is the front.
     pub flip_facing: bool,
+    /// Rays that cull a side do not cull its triangles.
+    pub no_cull: bool,
+    /// Every geometry is opaque, or none.
+    pub force_opaque: Option<bool>,
 }
 
 /// The triangles of all instances, ready for rays.
@@ -55,12 +62,14 @@ struct Triangle {
     mask: u8,
     /// World space winds the other way round than object space, or the front is flipped, but not both.
     mirrored: bool,
+    surface: Surface,
 }
 
 impl Reference {
     /// Flattens instances; their order gives the instance indices.
     pub fn new(instances: &[Instance<'_>]) -> Self {
-        let triangles: Vec<_> = (0..).zip(instances).flat_map(|(index, item)| flatten(index, item)).collect();
+        let all = (0..).zip(instances).flat_map(|(index, item)| flatten(index, item));
+        let triangles: Vec<_> = all.filter(Triangle::can_be_hit).collect();
         let boxes: Vec<_> = triangles.iter().map(Triangle::bounds).collect();
         let tree = (boxes.len() >= TREE_TRIANGLES)
             .then(|| build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut Duration::default()));
@@ -79,20 +88,40 @@ impl Reference {
         self.closest_where(ray, mask, |_| true)
     }
 
+    /// As [`closest`](Self::closest), by mask and flags.
+    pub fn closest_by(&self, ray: &Ray, rules: impl Into<Rules>) -> Answer {
+        self.closest_by_where(ray, rules, |_| true)
+    }
+
     /// As [`closest`](Self::closest), as if only the hits that `accept` likes existed.
     pub fn closest_where(&self, ray: &Ray, mask: u8, accept: impl Fn(&Hit) -> bool) -> Answer {
-        let mut candidates = self.candidates(ray, mask);
+        self.closest_by_where(ray, Rules::of_mask(mask), accept)
+    }
+
+    /// As [`closest_by`](Self::closest_by), as if only the hits that `accept` likes existed.
+    pub fn closest_by_where(
+        &self,
+        ray: &Ray,
+        rules: impl Into<Rules>,
+        accept: impl Fn(&Hit) -> bool,
+    ) -> Answer {
+        let mut candidates = self.candidates(ray, rules.into());
         candidates.retain(|candidate| accept(&candidate.hit));
         closest(candidates.iter().copied())
     }
 
     /// Whether a ray hits anything; `None` where that is in doubt.
     pub fn occluded(&self, ray: &Ray, mask: u8) -> Option<bool> {
-        any(self.candidates(ray, mask).iter().copied())
+        any(self.candidates(ray, Rules::of_mask(mask)).iter().copied())
     }
 
-    fn candidates(&self, ray: &Ray, mask: u8) -> Vec<Candidate> {
-        let Some(tree) = &self.tree else { return self.candidates_of_all(ray, mask) };
+    /// Everything a ray hits, the closest first; `None` where any of it is in doubt.
+    pub fn all_hits(&self, ray: &Ray, rules: impl Into<Rules>) -> Option<Vec<Hit>> {
+        all(self.candidates(ray, rules.into()).iter().copied())
+    }
+
+    fn candidates(&self, ray: &Ray, rules: Rules) -> Vec<Candidate> {
+        let Some(tree) = &self.tree else { return self.candidates_of_all(ray, rules) };
         let mut found = Vec::new();
         let walker = obvhs::ray::Ray::new(
             Vec3A::from_array(ray.origin),
@@ -102,25 +131,35 @@ impl Reference {
         );
         tree.ray_traverse_anyhit(walker, |_, place| {
             let triangle = &self.triangles[tree.primitive_indices[place] as usize];
-            found.extend(triangle.candidate(ray, mask));
+            found.extend(triangle.candidate(ray, rules));
         });
         found
     }
 
-    fn candidates_of_all(&self, ray: &Ray, mask: u8) -> Vec<Candidate> {
-        self.triangles.iter().filter_map(|triangle| triangle.candidate(ray, mask)).collect()
+    fn candidates_of_all(&self, ray: &Ray, rules: Rules) -> Vec<Candidate> {
+        self.triangles.iter().filter_map(|triangle| triangle.candidate(ray, rules)).collect()
     }
 }
 
 impl Triangle {
-    fn candidate(&self, ray: &Ray, mask: u8) -> Option<Candidate> {
-        if self.mask & mask == 0 {
+    /// Vulkan calls triangles with a NaN as an x coordinate inactive; one without an area has no inside.
+    fn can_be_hit(&self) -> bool {
+        const THINNEST: f64 = 1e-12;
+        let [a, b, c] = self.corners;
+        let (ab, ac) = (b - a, c - a);
+        ab.cross(ac).length() > THINNEST * ab.length_squared().max(ac.length_squared())
+    }
+
+    fn candidate(&self, ray: &Ray, rules: Rules) -> Option<Candidate> {
+        if self.mask & rules.mask == 0 {
             return None;
         }
         let (origin, direction) = (ray.origin.map(f64::from).into(), ray.direction.map(f64::from).into());
         let crossing = cross(origin, direction, &self.corners)?;
         let range = (f64::from(ray.t_min), f64::from(ray.t_max));
-        Candidate::of_triangle(&crossing, self.ids, self.mirrored, range)
+        let mut candidate = Candidate::of_triangle(&crossing, self.ids, self.mirrored, range)?;
+        candidate.hit.is_opaque = rules.is_opaque(self.surface);
+        rules.admits(self.surface, candidate.hit.is_front).then_some(candidate)
     }
 
     fn bounds(&self) -> Aabb {
@@ -136,11 +175,14 @@ fn flatten<'a>(index: u32, instance: &'a Instance<'_>) -> impl Iterator<Item = T
     let mirrored = (instance.transform.matrix3.determinant() < 0.0) != instance.flip_facing;
     (0..).zip(instance.geometries).flat_map(move |(geometry, shape)| {
         let transform = instance.transform * shape.transform;
+        let (force_opaque, no_cull) = (instance.force_opaque, instance.no_cull);
+        let surface = Surface { is_opaque: shape.is_opaque, force_opaque, no_cull };
         (0..).zip(&shape.triangles).map(move |(primitive, triangle)| Triangle {
             corners: triangle.map(|vertex| transform.transform_point3(shape.positions[vertex as usize])),
             ids: HitIds { instance: index, custom_index: instance.custom_index, geometry, primitive },
             mask: instance.mask,
             mirrored,
+            surface,
         })
     })
 }
@@ -164,7 +206,7 @@ mod tests {
             positions.extend([(); 3].map(|()| corner(&mut random, center)));
         }
         let triangles = (0..count).map(|index| [index * 3, index * 3 + 1, index * 3 + 2]).collect();
-        Geometry { positions, triangles, transform: DAffine3::IDENTITY }
+        Geometry { positions, triangles, transform: DAffine3::IDENTITY, is_opaque: true }
     }
 
     fn instance(geometries: &[Geometry]) -> Instance<'_> {
@@ -174,6 +216,8 @@ mod tests {
             custom_index: 0,
             mask: 0xff,
             flip_facing: false,
+            no_cull: false,
+            force_opaque: None,
         }
     }
 
@@ -186,10 +230,13 @@ mod tests {
             let mut hits = 0;
             for ray in random_rays(seed, 500, Vec3::NEG_ONE, Vec3::ONE) {
                 let by_tree = reference.closest(&ray, 0xff);
-                assert_eq!(by_tree, closest(reference.candidates_of_all(&ray, 0xff).iter().copied()));
+                assert_eq!(
+                    by_tree,
+                    closest(reference.candidates_of_all(&ray, Rules::of_mask(0xff)).iter().copied())
+                );
                 assert_eq!(
                     reference.occluded(&ray, 0xff),
-                    any(reference.candidates_of_all(&ray, 0xff).iter().copied())
+                    any(reference.candidates_of_all(&ray, Rules::of_mask(0xff)).iter().copied())
                 );
                 hits += usize::from(by_tree.hit.is_some());
             }
@@ -203,6 +250,7 @@ mod tests {
             positions: vec![DVec3::NEG_ONE, DVec3::new(3.0, -1.0, -1.0), DVec3::new(-1.0, 3.0, -1.0)],
             triangles: vec![[0, 1, 2]],
             transform: DAffine3::from_translation(DVec3::Z),
+            is_opaque: true,
         }];
         let near = Instance { custom_index: 7, mask: 1, ..instance(&square) };
         let far = Instance {

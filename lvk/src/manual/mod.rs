@@ -1,0 +1,10 @@
+//! The manual: one page a topic, for reading from top to bottom. The items' own pages have the details.
+
+#[doc = include_str!("acceleration_structures.md")]
+pub mod acceleration_structures {}
+
+#[doc = include_str!("splitting_and_profiles.md")]
+pub mod splitting_and_profiles {}
+
+#[doc = include_str!("ray_tracing_pipelines.md")]
+pub mod ray_tracing_pipelines {}

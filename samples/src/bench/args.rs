@@ -1,0 +1,164 @@
+//! The command line of the `bench` program.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand};
+
+/// Measures what lvk costs and gains on this device, and prints tables in markdown.
+///
+/// Sizes that are not given suit the device: real ones on a GPU, smaller ones on a driver that runs on the CPU.
+#[derive(Debug, Clone, PartialEq, Parser)]
+#[command(name = "bench", version, after_help = EXAMPLES)]
+pub struct BenchArgs {
+    /// What to measure
+    #[command(subcommand)]
+    pub(super) benchmark: Benchmark,
+
+    /// Only see whether it works: tiny sizes, one run
+    #[arg(long, global = true)]
+    pub(super) quick: bool,
+
+    /// Runs of each measurement, of which the median counts [default: by benchmark and device]
+    #[arg(long, value_name = "N", global = true, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub(super) runs: Option<u32>,
+
+    /// Device to use, by its number or part of its name [default: the most capable one]
+    #[arg(long, value_name = "NUMBER|NAME", global = true)]
+    pub(super) device: Option<String>,
+}
+
+/// What to measure.
+#[derive(Debug, Clone, PartialEq, Subcommand)]
+pub(super) enum Benchmark {
+    /// Many small meshes: one batch against a submission and a wait for each
+    Batch(BatchArgs),
+    /// Builds, refits and compaction of one large mesh, beside hand-written Vulkan
+    Compaction(MeshArgs),
+    /// A mesh whole and split into parts: what tracing costs
+    Split(SplitArgs),
+    /// Updates of a top-level structure, against a copy of the bytes and the driver's own build
+    Tlas(TlasArgs),
+    /// Orders of triangles: as given, along a Morton curve, by the library
+    Order(TraceArgs),
+    /// A traced frame by lvk and by hand-written Vulkan
+    Overhead(TraceArgs),
+}
+
+/// Sizes of [`Benchmark::Batch`].
+#[derive(Debug, Clone, PartialEq, Args)]
+pub(super) struct BatchArgs {
+    /// Number of meshes [default: 1000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(super) meshes: Option<u32>,
+
+    /// Triangles of each [default: 1000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub(super) triangles: Option<u32>,
+}
+
+/// Which mesh.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub(super) struct MeshArgs {
+    /// Wavefront OBJ to measure with, its triangles in the order of the file [default: a mesh made by formulas]
+    #[arg(long, value_name = "FILE")]
+    pub(super) scene: Option<PathBuf>,
+
+    /// Triangles of the mesh made by formulas [default: by benchmark and device]
+    #[arg(
+        long,
+        value_name = "N",
+        conflicts_with = "scene",
+        value_parser = clap::value_parser!(u32).range(500..=100_000_000)
+    )]
+    pub(super) triangles: Option<u32>,
+}
+
+/// Which mesh, and what picture of it.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub(super) struct TraceArgs {
+    #[command(flatten)]
+    pub(super) mesh: MeshArgs,
+
+    /// Which of the scene's five cameras to look through
+    #[arg(long, value_name = "1-5", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=5))]
+    pub(super) camera: u32,
+
+    /// Width of the picture in pixels [default: 1280, or 160 on a driver that runs on the CPU]
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
+    pub(super) width: Option<u32>,
+
+    /// Height of the picture in pixels [default: 720, or 90 on a driver that runs on the CPU]
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
+    pub(super) height: Option<u32>,
+}
+
+/// Which mesh, what picture, how many parts.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub(super) struct SplitArgs {
+    #[command(flatten)]
+    pub(super) trace: TraceArgs,
+
+    /// Least number of parts
+    #[arg(long, value_name = "N", default_value_t = 30, value_parser = clap::value_parser!(u32).range(2..=10_000))]
+    pub(super) parts: u32,
+}
+
+/// Sizes of [`Benchmark::Tlas`].
+#[derive(Debug, Clone, PartialEq, Args)]
+pub(super) struct TlasArgs {
+    /// Number of instances; may be given several times [default: 100000 and 1000000]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
+    pub(super) instances: Vec<u32>,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  bench batch                                      1000 meshes of 1000 triangles
+  bench compaction --scene living_room.obj         builds, refits and compaction of that scene
+  bench split --parts 100 --runs 200               parts of the mesh made by formulas
+  bench order --scene living_room.obj --camera 3   what the order of triangles does to rays a second
+  bench overhead --quick                           does it work at all?
+
+Exit status: 0 when everything was measured, 1 for trouble with the device, 2 for wrong arguments or input.";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    fn parsed(line: &str) -> Result<BenchArgs, clap::Error> {
+        BenchArgs::try_parse_from(std::iter::once("bench").chain(line.split_whitespace()))
+    }
+
+    #[test]
+    fn the_definition_is_sound() {
+        BenchArgs::command().debug_assert();
+    }
+
+    #[test]
+    fn options_of_all_benchmarks_may_stand_on_either_side() {
+        for line in ["--quick --runs 3 batch --meshes 7", "batch --meshes 7 --runs 3 --quick"] {
+            let args = parsed(line).unwrap();
+            assert_eq!((args.quick, args.runs), (true, Some(3)), "{line}");
+            let expected = BatchArgs { meshes: Some(7), triangles: None };
+            assert_eq!(args.benchmark, Benchmark::Batch(expected), "{line}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_measured_is_refused_with_exit_status_2() {
+        for line in [
+            "",
+            "everything",
+            "batch --meshes 0",
+            "tlas --instances 0",
+            "split --parts 1",
+            "order --camera 6",
+            "order --scene a.obj --triangles 1000",
+            "overhead --width 0",
+            "batch --runs 0",
+        ] {
+            assert_eq!(parsed(line).unwrap_err().exit_code(), 2, "{line}");
+        }
+    }
+}

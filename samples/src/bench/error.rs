@@ -1,0 +1,40 @@
+//! Why there is no figure.
+
+use lvk::ash::vk;
+
+use crate::driver::DriverError;
+use crate::scene::SceneError;
+
+/// Why there is no figure.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum BenchError {
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Driver(#[from] DriverError),
+    #[error(transparent)]
+    Device(#[from] lvk::Error),
+    #[error("{call} failed in the hand-written code: {result}")]
+    HandWritten { call: &'static str, result: vk::Result },
+    #[error("{device} can trace rays neither by pipeline nor by query; choose another one with --device")]
+    NoRayTracing { device: String },
+    #[error("{device} wrote no timestamp")]
+    NoTimestamp { device: String },
+    #[error("{device} did not finish a compaction within {tries} submissions")]
+    NoCompaction { device: String, tries: u32 },
+}
+
+impl BenchError {
+    /// For `map_err` of a Vulkan call of the hand-written side.
+    pub(super) fn of(call: &'static str) -> impl Fn(vk::Result) -> Self {
+        move |result| Self::HandWritten { call, result }
+    }
+
+    /// 2 when the user can mend it by other arguments or input, 1 for trouble with the device.
+    pub(super) fn status(&self) -> u8 {
+        match self {
+            Self::Scene(_) | Self::Driver(DriverError::Variable { .. }) => 2,
+            _ => 1,
+        }
+    }
+}

@@ -1,0 +1,29 @@
+//! The `bench` program: what `lvk` costs and gains on the device at hand, each figure measured and each ratio of two
+//! figures of the same run.
+//!
+//! GPU times come from timestamps, CPU times from the clock of the host. Where two things are compared they take turns,
+//! so that both see the same clocks and temperatures; figures are medians.
+
+mod args;
+mod batch;
+mod compaction;
+mod error;
+mod hand_written;
+mod instance_record;
+mod measure;
+mod mesh;
+mod morton;
+mod order;
+mod overhead;
+mod pipelines;
+mod run;
+mod setup;
+mod split;
+mod synthetic;
+mod table;
+mod tlas;
+mod tracer;
+
+pub use args::BenchArgs;
+pub use pipelines::pipelines;
+pub use run::run;

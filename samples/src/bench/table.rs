@@ -1,0 +1,109 @@
+//! A table in markdown, with a headline above and notes below.
+
+use std::fmt;
+
+/// A table in markdown, with a headline above and notes below. Columns after the first are set to the right.
+pub(super) struct Table {
+    headline: String,
+    rows: Vec<Vec<String>>,
+    notes: Vec<String>,
+}
+
+impl Table {
+    /// `columns` are the heads of the columns.
+    pub(super) fn new(headline: String, columns: &[&str]) -> Self {
+        let head = columns.iter().map(|head| (*head).to_owned()).collect();
+        Self { headline, rows: vec![head], notes: Vec::new() }
+    }
+
+    /// Adds a row; missing cells stay empty.
+    pub(super) fn row(&mut self, name: impl Into<String>, cells: impl IntoIterator<Item = String>) {
+        let row: Vec<String> = std::iter::once(name.into()).chain(cells).collect();
+        debug_assert!(row.len() <= self.rows[0].len(), "{row:?}");
+        self.rows.push(row);
+    }
+
+    /// Adds a line below the table.
+    pub(super) fn note(&mut self, text: impl Into<String>) {
+        self.notes.push(text.into());
+    }
+
+    fn width(&self, column: usize) -> usize {
+        self.rows.iter().filter_map(|row| row.get(column)).map(|cell| cell.chars().count()).max().unwrap_or(0).max(3)
+    }
+}
+
+impl fmt::Display for Table {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}\n", self.headline)?;
+        let widths: Vec<usize> = (0..self.rows[0].len()).map(|column| self.width(column)).collect();
+        for (number, row) in self.rows.iter().enumerate() {
+            for (column, &width) in widths.iter().enumerate() {
+                let cell = row.get(column).map_or("", String::as_str);
+                match column {
+                    0 => write!(f, "| {cell:width$} |")?,
+                    _ => write!(f, " {cell:>width$} |")?,
+                }
+            }
+            writeln!(f)?;
+            if number == 0 {
+                write!(f, "|{}|", "-".repeat(widths[0] + 2))?;
+                widths[1..].iter().try_for_each(|width| write!(f, "{}:|", "-".repeat(width + 1)))?;
+                writeln!(f)?;
+            }
+        }
+        self.notes.iter().try_for_each(|note| write!(f, "\n- {note}"))?;
+        if self.notes.is_empty() { Ok(()) } else { writeln!(f) }
+    }
+}
+
+/// Milliseconds, to the microsecond.
+pub(super) fn ms(milliseconds: f64) -> String {
+    format!("{milliseconds:.3} ms")
+}
+
+/// How many times.
+pub(super) fn times(ratio: f64) -> String {
+    format!("{ratio:.3}x")
+}
+
+/// Bytes, by thousands.
+pub(super) fn bytes(count: u64) -> String {
+    format!("{} B", grouped(count))
+}
+
+/// A number with a comma after every three digits.
+pub(super) fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::with_capacity(digits.len() * 4 / 3);
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tables_are_aligned_markdown() {
+        let mut table = Table::new("## title".to_owned(), &["what", "GPU"]);
+        table.row("a build", [ms(1.5)]);
+        table.row("ratio", []);
+        table.note("measured");
+        let expected = "## title\n\n| what    |      GPU |\n|---------|---------:|\n| a build | 1.500 ms |\n\
+                        | ratio   |          |\n\n- measured\n";
+        assert_eq!(table.to_string(), expected);
+    }
+
+    #[test]
+    fn digits_are_grouped_by_three() {
+        let grouped = [0, 999, 1000, 123_456, 1_234_567].map(grouped);
+        assert_eq!(grouped, ["0", "999", "1,000", "123,456", "1,234,567"]);
+        assert_eq!((bytes(1024), times(2.0)), ("1,024 B".to_owned(), "2.000x".to_owned()));
+    }
+}

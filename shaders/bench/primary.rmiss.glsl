@@ -1,0 +1,5 @@
+#include "bench/view.glsl"
+
+layout(location = 0) rayPayloadInEXT Hit hit;
+
+void main() { hit.t = kNoHit; }

@@ -1,0 +1,39 @@
+// Primary rays by query, or with BENCH_SHADOW those towards the light.
+#include <lvk/ray_query.glsl>
+#include "bench/view.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+#ifdef BENCH_SHADOW
+void trace(uvec2 pixel, uint index) {
+    float t = hits.at[index].t;
+    lit.at[index] = 0u;
+    if (t == kNoHit) {
+        return;
+    }
+    vec3 point = pixelPoint(pixel, t);
+    LvkRayQuery rq;
+    uint flags = LVK_RAY_FLAG_OPAQUE | LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT;
+    lvkRayQueryInitialize(rq, tlas, flags, 0xffu, point, 0.0, light - point, 1.0);
+    while (lvkRayQueryProceed(rq)) {}
+    lit.at[index] = lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_NONE ? 1u : 0u;
+}
+#else
+void trace(uvec2 pixel, uint index) {
+    LvkRayQuery rq;
+    lvkRayQueryInitialize(rq, tlas, LVK_RAY_FLAG_OPAQUE, 0xffu, eye, 0.0, pixelDirection(pixel), kFar);
+    while (lvkRayQueryProceed(rq)) {}
+    Hit hit = Hit(kNoHit, 0u);
+    if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_TRIANGLE) {
+        hit = Hit(lvkRayQueryT(rq, LVK_COMMITTED), uint(lvkRayQueryPrimitiveIndex(rq, LVK_COMMITTED, tlas)));
+    }
+    hits.at[index] = hit;
+}
+#endif
+
+void main() {
+    uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (pixel.x < width && pixel.y < height) {
+        trace(pixel, pixel.y * width + pixel.x);
+    }
+}

@@ -1,0 +1,348 @@
+//! Meshes cut into parts because the device takes no larger ones: hits, shaders and numbers are those of the whole mesh.
+
+use lvk::glam::{Affine3A, Quat, Vec3};
+use lvk::{
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferUsage, BuildFlags, Context, DeviceProfile,
+    GeometryFlags, GeometryTransform, HitGroup, InstanceFlags, PrimitiveOrder, RayTracingPipelineDesc,
+    Result, ShaderStage, TlasDesc, transform_rows,
+};
+use lvk_tests::agreement::Agreement;
+use lvk_tests::hit_check::{HitCheck, rays_for, same_hits};
+use lvk_tests::meshes::Mesh;
+use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances, upload_geometries};
+use lvk_tests::ray_tracer::{CULL_BACK, CULL_FRONT, How, MISSED, Method, RayTracer, shader};
+use lvk_tests::rays::{Ray, random_rays};
+use lvk_tests::reference::{Hit, Reference, Sphere};
+use lvk_tests::sphere_scene::{GROUPS, sphere_boxes, sphere_tracer, spheres};
+use lvk_tests::{TestDevice, device, device_with};
+
+/// A device that takes so many primitives in a structure.
+fn device_of(primitives: u64) -> Option<TestDevice> {
+    let profile = DeviceProfile {
+        name: "small structures".into(),
+        max_blas_primitives: primitives,
+        ..DeviceProfile::default()
+    };
+    device_with(|desc| desc.profile = Some(&profile))
+}
+
+fn parts(ctx: &Context, handle: AccelStructHandle) -> Result<u32> {
+    Ok(ctx.accel_struct_info(handle)?.parts)
+}
+
+fn turned(angle: f32, scale: Vec3, to: Vec3) -> Affine3A {
+    let turn = Quat::from_axis_angle(Vec3::new(1.0, 2.0, -0.5).normalize(), angle);
+    Affine3A::from_scale_rotation_translation(scale, turn, to)
+}
+
+/// A model of four geometries in all layouts, two of them not opaque, and one of 12 triangles.
+fn models() -> Vec<Vec<Part>> {
+    let part = |mesh, layout, flags, transform| Part { flags, transform, ..Part::new(mesh, layout) };
+    let (opaque, seen_through) = (GeometryFlags::OPAQUE, GeometryFlags::empty());
+    let mirrored = turned(2.0, Vec3::new(1.5, -1.0, 1.0), Vec3::NEG_Y);
+    let stretched = turned(0.7, Vec3::new(1.0, 0.5, 1.5), Vec3::X);
+    vec![
+        vec![
+            part(Mesh::sphere(7), Layout::Unshared, seen_through, None),
+            part(
+                Mesh::cube_grid(2),
+                Layout::Indexed16,
+                opaque,
+                Some(Affine3A::from_translation(Vec3::Y * 2.0)),
+            ),
+            part(Mesh::torus(7), Layout::Interleaved, opaque, Some(stretched)),
+            part(
+                Mesh::terrain(7),
+                Layout::Indexed32,
+                seen_through | GeometryFlags::NO_DUPLICATE_ANY_HIT,
+                Some(mirrored),
+            ),
+        ],
+        vec![Part::new(Mesh::cube_grid(1), Layout::Unshared)],
+        vec![Part::new(Mesh::torus(9), Layout::Indexed16)],
+    ]
+}
+
+/// Split and unsplit models in turn, of all masks, custom indices, fronts and flags, a third of them mirrored.
+fn scene() -> RayScene {
+    let place = |index: u32| {
+        let scale = Vec3::new(if index % 3 == 1 { -0.8 } else { 1.1 }, 0.9, 1.2);
+        let to = Vec3::new((index % 3) as f32 * 3.1, (index / 3) as f32 * 3.3, (index % 2) as f32 * 2.0);
+        let flags = match index {
+            2 => InstanceFlags::FLIP_FACING,
+            3 | 7 => InstanceFlags::NO_CULL,
+            4 => InstanceFlags::FORCE_OPAQUE,
+            5 => InstanceFlags::FORCE_NO_OPAQUE,
+            _ => InstanceFlags::empty(),
+        };
+        Placed {
+            custom_index: 0xff_ffff - index * 1_000,
+            mask: 1 << (index % 4),
+            flags,
+            ..Placed::new([0, 1, 0, 2, 0, 2, 1, 0, 2][index as usize], turned(index as f32, scale, to))
+        }
+    };
+    RayScene { models: models(), placed: (0..9).map(place).collect() }
+}
+
+/// As the plain device, whose numbers are Vulkan's own, and as the reference say.
+#[test]
+fn a_split_mesh_is_hit_like_the_whole_one_whatever_limit_splits_it() -> Result<()> {
+    let Some(plain) = device() else { return Ok(()) };
+    let scene = RayScene::single(Mesh::torus(14), Layout::Indexed16);
+    let whole = scene.upload_with(&plain, BuildFlags::FAST_BUILD, BuildFlags::default(), 0)?;
+    let info = plain.accel_struct_info(*whole.models[0])?;
+    assert_eq!((info.parts, info.is_remapped), (1, false));
+    let reference = scene.reference();
+    let rays = rays_for(&reference);
+    let of_whole: Vec<_> = HitCheck::new(&plain)?
+        .tracers()
+        .map(|(_, tracer)| tracer.trace(&whole.tlas, &rays, How::default()))
+        .collect::<Result<_>>()?;
+    let any = DeviceProfile { name: "small structures".into(), ..DeviceProfile::default() };
+    let structure_bytes = plain.accel_struct_sizes(*whole.models[0])?.structure_bytes / 9;
+    for profile in [
+        DeviceProfile { max_blas_primitives: 31, ..any.clone() },
+        DeviceProfile {
+            scratch_bytes_per_primitive: 5_000,
+            max_accel_scratch_bytes: 200_000,
+            min_scratch_alignment: 256,
+            ..any.clone()
+        },
+        DeviceProfile { max_accel_structure_bytes: structure_bytes, ..any },
+    ] {
+        let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
+        let split = scene.upload(&ctx)?;
+        let info = ctx.accel_struct_info(*split.models[0])?;
+        assert!((5..=40).contains(&info.parts) && info.is_remapped, "{info:?}");
+        for ((method, tracer), of_whole) in HitCheck::new(&ctx)?.tracers().zip(&of_whole) {
+            let what = format!("{} parts, {method:?}", info.parts);
+            let records = tracer.trace(&split.tlas, &rays, How::default())?;
+            let at_edges = same_hits(&what, &rays, (of_whole, &records), &reference);
+            assert!(at_edges * 100 < rays.len(), "{what}: {at_edges} differ");
+            Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(&what);
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn split_and_whole_meshes_share_a_scene() -> Result<()> {
+    let Some(ctx) = device_of(24) else { return Ok(()) };
+    let scene = scene();
+    let gpu = scene.upload(&ctx)?;
+    let parts: Vec<u32> = gpu.models.iter().map(|model| parts(&ctx, **model)).collect::<Result<_>>()?;
+    assert!((5..=40).contains(&parts[0]) && parts[1] == 1 && (5..=40).contains(&parts[2]), "{parts:?}");
+    let reference = scene.reference();
+    let rays = rays_for(&reference);
+    let check = HitCheck::new(&ctx)?;
+    for mask in [0xff, 0b0001, 0b0110] {
+        let (what, how) = (format!("mask {mask:#b}"), How { mask, ..How::default() });
+        check.closest(&what, &gpu.tlas, &rays, how, |ray| reference.closest(ray, mask))?;
+        for (method, tracer) in check.tracers() {
+            let shadows = tracer.trace(&gpu.tlas, &rays, How { mask, ..How::shadows() })?;
+            Agreement::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, mask))
+                .assert(&format!("shadows, {what}, {method:?}"));
+        }
+    }
+    let faces = |hit: &Hit, front| hit.is_front == front || [3, 7].contains(&hit.ids.instance);
+    for (flags, front) in [(CULL_BACK, true), (CULL_FRONT, false)] {
+        let answer = |ray: &Ray| reference.closest_where(ray, 0xff, |hit| faces(hit, front));
+        check.closest("culling", &gpu.tlas, &rays, How { flags, ..How::default() }, answer)?;
+    }
+    Ok(())
+}
+
+/// The any-hit shader decides by the number of the primitive, which is not the one that Vulkan counts.
+#[test]
+fn any_hit_shaders_know_the_primitives_of_split_meshes() -> Result<()> {
+    let Some(ctx) = device_of(30) else { return Ok(()) };
+    let scene = scene();
+    let gpu = scene.upload(&ctx)?;
+    assert!((5..=40).contains(&parts(&ctx, *gpu.models[0])?));
+    let reference = scene.reference();
+    let rays = rays_for(&reference);
+    let has_holes = |hit: &Hit| match scene.placed[hit.ids.instance as usize].flags {
+        InstanceFlags::FORCE_OPAQUE => false,
+        InstanceFlags::FORCE_NO_OPAQUE => true,
+        _ => {
+            let model = scene.placed[hit.ids.instance as usize].model;
+            !scene.models[model][hit.ids.geometry as usize].flags.contains(GeometryFlags::OPAQUE)
+        }
+    };
+    let answer = |ray: &Ray| {
+        reference.closest_where(ray, 0xff, |hit| hit.ids.primitive.is_multiple_of(2) || !has_holes(hit))
+    };
+    HitCheck::keeping_even(&ctx)?.closest("holes", &gpu.tlas, &rays, How::default(), answer)
+}
+
+/// The group is the instance's offset and the geometry's place, which a part without some geometries must not shift.
+#[test]
+fn parts_keep_hit_groups() -> Result<()> {
+    const TAGGED_HIT: &str = r#"
+        #include "ray_records.glsl"
+        layout(shaderRecordEXT, scalar) buffer Record { uint tag; };
+        layout(location = 0) rayPayloadInEXT HitRecord record;
+        void main() {
+            record = HitRecord(gl_HitTEXT, vec2(0), tag, lvkInstanceId(tlas), gl_InstanceCustomIndexEXT,
+                               lvkGeometryIndex(), lvkPrimitiveIndex(tlas));
+        }"#;
+    const RAY_GEN: &str = include_str!("../shaders/closest.rgen.glsl");
+    let Some(ctx) = device_of(24) else { return Ok(()) };
+    if !Method::available(&ctx).contains(&Method::Pipeline) {
+        return Ok(());
+    }
+    let defines = [("SBT_STRIDE", "1")];
+    let ray_gen = lvk_tests::ray_tracer::shader_with(&ctx, ShaderStage::RayGen, RAY_GEN, &defines)?;
+    let miss = shader(&ctx, ShaderStage::Miss, include_str!("../shaders/record.rmiss.glsl"))?;
+    let hit = shader(&ctx, ShaderStage::ClosestHit, TAGGED_HIT)?;
+    let records: Vec<_> = (0..13_u32).map(|group| (100 + group).to_ne_bytes()).collect();
+    let group = |record| HitGroup { closest_hit: Some(*hit), record, ..Default::default() };
+    let groups: Vec<_> = records.iter().map(|record| group(&record[..])).collect();
+    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+        ray_gen: &[*ray_gen],
+        miss: &[*miss],
+        hit_groups: &groups,
+        ..Default::default()
+    })?;
+    let mut scene = scene();
+    (0..).zip(&mut scene.placed).for_each(|(index, placed)| placed.hit_group_offset = index);
+    let gpu = scene.upload(&ctx)?;
+    assert!(parts(&ctx, *gpu.models[0])? >= 5);
+    let reference = scene.reference();
+    let rays = rays_for(&reference);
+    let records = RayTracer::of_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
+    Agreement::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("hit groups");
+    let mut tags: Vec<_> =
+        records.iter().filter(|hit| hit.kind != MISSED).map(|hit| (hit.kind, hit)).collect();
+    assert!(tags.iter().all(|(tag, hit)| *tag == 100 + hit.instance + hit.geometry));
+    tags.sort_by_key(|(tag, _)| *tag);
+    tags.dedup_by_key(|(tag, _)| *tag);
+    assert!(tags.len() > 8, "the rays reach many groups");
+    Ok(())
+}
+
+/// The planner has to know a matrix to place the triangles it moves, and every part has to be built with it.
+#[test]
+fn a_transform_in_a_buffer_is_one_by_value() -> Result<()> {
+    let Some(ctx) = device_of(28) else { return Ok(()) };
+    let scene = RayScene { models: models(), placed: vec![Placed::new(0, Affine3A::IDENTITY)] };
+    let (_buffers, mut geometries) = upload_geometries(&ctx, &scene.models[0])?;
+    let mut floats = vec![f32::NAN; 4];
+    for geometry in &mut geometries {
+        let BlasGeometry::Triangles(triangles) = geometry else { continue };
+        if let Some(GeometryTransform::Rows(rows)) = triangles.transform {
+            floats.extend(rows);
+        }
+    }
+    let data = Some(bytemuck::cast_slice(&floats));
+    let usage = BufferUsage::ACCEL_INPUT;
+    let matrices = ctx.create_buffer(&BufferDesc { data, usage, ..Default::default() })?;
+    let mut offset = 16;
+    for geometry in &mut geometries {
+        let BlasGeometry::Triangles(triangles) = geometry else { continue };
+        if triangles.transform.is_some() {
+            triangles.transform = Some(GeometryTransform::Buffer { buffer: *matrices, offset });
+            offset += 48;
+        }
+    }
+    let blas = [ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?];
+    assert!((5..=40).contains(&parts(&ctx, *blas[0])?));
+    let shown = instances(&scene.placed, &blas);
+    let tlas = ctx.create_tlas(&TlasDesc { instances: &shown, ..Default::default() })?;
+    HitCheck::new(&ctx)?.scene("matrices in a buffer", &tlas, &scene)
+}
+
+/// Intersection shaders find their sphere by the number of the box.
+#[test]
+fn intersection_shaders_know_the_boxes_of_split_meshes() -> Result<()> {
+    const COUNT: u32 = 21;
+    let Some(ctx) = device_of(5) else { return Ok(()) };
+    let (_buffers, geometries) = sphere_boxes(&ctx, COUNT)?;
+    let model = [ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?];
+    assert!((9..=40).contains(&parts(&ctx, *model[0])?));
+    let place = |index: u32| Placed {
+        hit_group_offset: 1 - index,
+        custom_index: 900 + index,
+        ..Placed::new(0, turned(index as f32, Vec3::splat(1.2), Vec3::X * 8.0 * index as f32))
+    };
+    let placed = [place(0), place(1)];
+    let tlas = ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
+    let spheres = spheres(&placed, COUNT);
+    let rays = random_rays(51, 1_500, Vec3::new(-4.0, -2.0, -6.0), Vec3::new(14.0, 14.0, 8.0));
+    for (method, tracer) in HitCheck::with(&ctx, sphere_tracer)?.tracers() {
+        let records = tracer.trace(&tlas, &rays, How::default())?;
+        Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&spheres, ray))
+            .assert(&format!("split boxes by {method:?}"));
+        for hit in records.iter().filter(|record| record.kind != MISSED) {
+            let (radius, tag) = GROUPS[1 - hit.instance as usize];
+            assert_eq!((hit.kind, hit.barycentrics), (tag, [radius, tag as f32]));
+        }
+    }
+    Ok(())
+}
+
+/// The numbers of a part need not rise: parts are put into order like whole meshes, or left alone.
+#[test]
+fn parts_may_be_put_into_order() -> Result<()> {
+    let Some(ctx) = device_of(100) else { return Ok(()) };
+    let scene = RayScene::single(shuffled(&Mesh::torus(12)), Layout::Indexed16);
+    let (_buffers, geometries) = upload_geometries(&ctx, &scene.models[0])?;
+    let check = HitCheck::new(&ctx)?;
+    for order in [PrimitiveOrder::Given, PrimitiveOrder::Spatial] {
+        let blas = [ctx.create_blas(&BlasDesc { geometries: &geometries, order, ..Default::default() })?];
+        assert_eq!(parts(&ctx, *blas[0])?, 6);
+        let shown = instances(&scene.placed, &blas);
+        let tlas = ctx.create_tlas(&TlasDesc { instances: &shown, ..Default::default() })?;
+        check.scene(&format!("{order:?}"), &tlas, &scene)?;
+    }
+    Ok(())
+}
+
+fn shuffled(mesh: &Mesh) -> Mesh {
+    let count = mesh.triangles.len();
+    let triangles = (0..count).map(|index| mesh.triangles[index * 211 % count]).collect();
+    Mesh { positions: mesh.positions.clone(), triangles }
+}
+
+/// What a hit of one of many parts says does not depend on how many there are: from one triangle a part on.
+#[test]
+fn a_part_may_be_a_single_triangle() -> Result<()> {
+    let Some(ctx) = device_of(1) else { return Ok(()) };
+    let scene = RayScene::single(Mesh::cube_grid(1), Layout::Interleaved);
+    let gpu = scene.upload(&ctx)?;
+    assert_eq!(parts(&ctx, *gpu.models[0])?, 12);
+    HitCheck::new(&ctx)?.scene("a triangle a part", &gpu.tlas, &scene)
+}
+
+/// 95,700 triangles are 256 MiB of scratch on the phone: a few more make two parts.
+#[test]
+fn a_mesh_over_the_limits_of_the_phone_is_split_once() -> Result<()> {
+    let profile = DeviceProfile::mali_g715();
+    let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
+    assert_eq!(Method::available(&ctx), [Method::Query]);
+    let scene = RayScene::single(Mesh::terrain(219), Layout::Indexed32);
+    let gpu = scene.upload(&ctx)?;
+    let sizes = ctx.accel_struct_sizes(*gpu.models[0])?;
+    assert_eq!(parts(&ctx, *gpu.models[0])?, 2);
+    assert!(sizes.build_scratch_bytes <= 256 << 20, "{sizes:?}");
+    let reference: Reference = scene.reference();
+    let rays = rays_for(&reference);
+    HitCheck::new(&ctx)?
+        .closest("phone", &gpu.tlas, &rays, How::default(), |ray| reference.closest(ray, 0xff))?;
+    assert!(ctx.accel_memory().scratch_bytes <= (256 << 20) + 256);
+    Ok(())
+}
+
+/// The transform of an instance belongs to all its parts.
+#[test]
+fn rows_of_a_transform_reach_every_part() -> Result<()> {
+    let Some(ctx) = device_of(20) else { return Ok(()) };
+    let turn = turned(1.3, Vec3::new(-2.0, 0.4, 1.0), Vec3::new(5.0, -3.0, 2.0));
+    let mut scene = RayScene::single(Mesh::sphere(8), Layout::Unshared);
+    scene.placed[0].transform = turn;
+    let gpu = scene.upload(&ctx)?;
+    assert!(parts(&ctx, *gpu.models[0])? >= 10);
+    assert_eq!(instances(&scene.placed, &gpu.models)[0].transform, transform_rows(&turn));
+    HitCheck::new(&ctx)?.scene("stretched and mirrored", &gpu.tlas, &scene)
+}
