@@ -31,7 +31,6 @@ pub(crate) struct Shared {
     pub(crate) store: Store,
     pub(crate) staging: Staging,
     pub(crate) scratch: ScratchBuffer,
-    pub(crate) scratch_budget_bytes: u64,
     pub(crate) accel_storage: AccelStorage,
     pub(crate) kernels: Kernels,
     /// For each top-level structure where the rows of its instances lie; none without acceleration structures.
@@ -179,13 +178,6 @@ impl Shared {
         let bytes = [Some(&source.instances), source.owners.as_ref()];
         let buffers = bytes.into_iter().flatten().filter_map(|bytes| bytes.buffer.as_ref());
         buffers.for_each(|buffer| self.submitter.forget(buffer.id));
-    }
-
-    /// Most scratch memory that builds side by side take, in bytes.
-    pub(crate) fn scratch_budget(&self) -> u64 {
-        let limits = &self.gpu.caps.limits;
-        let largest = limits.max_buffer_bytes.min(limits.max_accel_scratch_bytes);
-        self.scratch_budget_bytes.min(largest.saturating_sub(limits.scratch_alignment.into()))
     }
 
     /// Some top-level structure shows what compaction has replaced.

@@ -2,8 +2,8 @@
 
 use lvk::{Format, ShaderModuleDesc, ShaderSource, ShaderStage};
 
-use crate::{bench, hybrid};
 use crate::shaders::INCLUDES;
+use crate::{bench, hybrid};
 
 /// A stage of a [`SamplePipeline`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

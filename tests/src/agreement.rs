@@ -74,6 +74,14 @@ impl Agreement {
         agreement
     }
 
+    /// Takes in another comparison.
+    pub fn add(&mut self, other: Self) {
+        self.rays += other.rays;
+        self.excluded += other.excluded;
+        self.hits += other.hits;
+        self.mistakes.extend(other.mistakes);
+    }
+
     /// Fails the test unless nothing is wrong, few rays were left out, and at least a twentieth hit something.
     ///
     /// # Panics

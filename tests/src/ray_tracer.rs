@@ -36,7 +36,8 @@ pub const SKIP_TRIANGLES: u32 = 0x100;
 pub const SKIP_AABBS: u32 = 0x200;
 
 /// The files that shaders may include; `ray_records.glsl` has the push constants.
-pub const INCLUDES: [(&str, &str); 2] = [
+pub const INCLUDES: [(&str, &str); 3] = [
+    ("any_hit_payload.glsl", include_str!("../shaders/any_hit_payload.glsl")),
     ("ray_records.glsl", include_str!("../shaders/ray_records.glsl")),
     ("sphere_object.glsl", include_str!("../shaders/sphere_object.glsl")),
 ];
@@ -171,6 +172,11 @@ impl RayTracer {
             Method::Query => AnyPipeline::Compute(compute(ctx, keep_even)?),
         };
         Ok(Self { ctx: ctx.clone(), pipeline })
+    }
+
+    /// Where it traces.
+    pub fn context(&self) -> &Context {
+        &self.ctx
     }
 
     /// Uploads rays.

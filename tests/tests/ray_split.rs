@@ -4,15 +4,15 @@ use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferUsage, BuildFlags, Context, DeviceProfile,
     GeometryFlags, GeometryTransform, HitGroup, InstanceFlags, PrimitiveOrder, RayTracingPipelineDesc,
-    Result, ShaderStage, TlasDesc, transform_rows,
+    Result, ShaderStage, TlasDesc,
 };
 use lvk_tests::agreement::Agreement;
 use lvk_tests::hit_check::{HitCheck, rays_for, same_hits};
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances, upload_geometries};
-use lvk_tests::ray_tracer::{CULL_BACK, CULL_FRONT, How, MISSED, Method, RayTracer, shader};
+use lvk_tests::ray_tracer::{CULL_BACK, CULL_FRONT, How, MISSED, Method, RayTracer, shader, shader_with};
 use lvk_tests::rays::{Ray, random_rays};
-use lvk_tests::reference::{Hit, Reference, Sphere};
+use lvk_tests::reference::{Hit, Sphere};
 use lvk_tests::sphere_scene::{GROUPS, sphere_boxes, sphere_tracer, spheres};
 use lvk_tests::{TestDevice, device, device_with};
 
@@ -193,7 +193,7 @@ fn parts_keep_hit_groups() -> Result<()> {
         return Ok(());
     }
     let defines = [("SBT_STRIDE", "1")];
-    let ray_gen = lvk_tests::ray_tracer::shader_with(&ctx, ShaderStage::RayGen, RAY_GEN, &defines)?;
+    let ray_gen = shader_with(&ctx, ShaderStage::RayGen, RAY_GEN, &defines)?;
     let miss = shader(&ctx, ShaderStage::Miss, include_str!("../shaders/record.rmiss.glsl"))?;
     let hit = shader(&ctx, ShaderStage::ClosestHit, TAGGED_HIT)?;
     let records: Vec<_> = (0..13_u32).map(|group| (100 + group).to_ne_bytes()).collect();
@@ -326,23 +326,11 @@ fn a_mesh_over_the_limits_of_the_phone_is_split_once() -> Result<()> {
     let sizes = ctx.accel_struct_sizes(*gpu.models[0])?;
     assert_eq!(parts(&ctx, *gpu.models[0])?, 2);
     assert!(sizes.build_scratch_bytes <= 256 << 20, "{sizes:?}");
-    let reference: Reference = scene.reference();
+    let reference = scene.reference();
     let rays = rays_for(&reference);
-    HitCheck::new(&ctx)?
-        .closest("phone", &gpu.tlas, &rays, How::default(), |ray| reference.closest(ray, 0xff))?;
+    // Weights of triangles this small are not those of f64.
+    let records = RayTracer::new(&ctx, Method::Query)?.trace(&gpu.tlas, &rays, How::default())?;
+    Agreement::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("on the phone");
     assert!(ctx.accel_memory().scratch_bytes <= (256 << 20) + 256);
     Ok(())
-}
-
-/// The transform of an instance belongs to all its parts.
-#[test]
-fn rows_of_a_transform_reach_every_part() -> Result<()> {
-    let Some(ctx) = device_of(20) else { return Ok(()) };
-    let turn = turned(1.3, Vec3::new(-2.0, 0.4, 1.0), Vec3::new(5.0, -3.0, 2.0));
-    let mut scene = RayScene::single(Mesh::sphere(8), Layout::Unshared);
-    scene.placed[0].transform = turn;
-    let gpu = scene.upload(&ctx)?;
-    assert!(parts(&ctx, *gpu.models[0])? >= 10);
-    assert_eq!(instances(&scene.placed, &gpu.models)[0].transform, transform_rows(&turn));
-    HitCheck::new(&ctx)?.scene("stretched and mirrored", &gpu.tlas, &scene)
 }

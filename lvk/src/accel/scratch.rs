@@ -32,6 +32,36 @@ pub(crate) fn plan_scratch(sizes: &[u64], alignment: u64, budget: u64) -> Vec<Sc
     batches
 }
 
+/// Sizes of scratch buffers within a budget.
+///
+/// A buffer that has become too small is freed only when the GPU is done with it, and until then both count. So there
+/// are two sizes that together make the budget, and larger ones only for single builds that need them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct ScratchTiers {
+    small: u64,
+    large: u64,
+}
+
+impl ScratchTiers {
+    /// For buffers that together take at most `budget` bytes, the alignment of their addresses included.
+    pub(crate) fn new(budget: u64, alignment: u64) -> Self {
+        let small = budget / 8;
+        let large = budget - small;
+        let usable = |bytes: u64| bytes.saturating_sub(alignment.saturating_sub(1));
+        Self { small: usable(small), large: usable(large) }
+    }
+
+    /// Most scratch memory of builds side by side, in bytes.
+    pub(crate) fn batch_bytes(&self) -> u64 {
+        self.large
+    }
+
+    /// Scratch bytes of the buffer to make for a batch that needs `bytes`.
+    pub(crate) fn buffer_bytes(&self, bytes: u64) -> u64 {
+        if bytes <= self.small { self.small } else { self.large.max(bytes) }
+    }
+}
+
 /// Bytes to allocate for `bytes` of scratch, so that they still fit once the address is rounded up: Vulkan aligns the
 /// address a build is given, and a buffer's address need not be aligned that far.
 pub(crate) fn scratch_buffer_bytes(bytes: u64, alignment: u64) -> u64 {
@@ -100,6 +130,21 @@ mod tests {
         let builds: Vec<_> = batches.iter().map(|batch| batch.builds.clone()).collect();
         assert_eq!(builds, [0..1, 1..2, 2..4]);
         assert_eq!(batches[2].offsets, [0, 128]);
+    }
+
+    #[test]
+    fn two_buffers_stay_within_the_budget() {
+        for budget in [0, 1, 100, 4096, 64 << 20, u64::MAX] {
+            for alignment in [1, 128, 256] {
+                let tiers = ScratchTiers::new(budget, alignment);
+                let bytes = |needed| scratch_buffer_bytes(tiers.buffer_bytes(needed), alignment);
+                assert!(tiers.buffer_bytes(tiers.batch_bytes()) >= tiers.batch_bytes());
+                if budget >= 16 * alignment {
+                    assert!(bytes(1) + bytes(tiers.batch_bytes()) <= budget, "{budget} {alignment}");
+                }
+                assert_eq!(tiers.buffer_bytes(u64::MAX), u64::MAX);
+            }
+        }
     }
 
     #[test]

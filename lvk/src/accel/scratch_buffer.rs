@@ -2,27 +2,34 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::scratch::scratch_buffer_bytes;
+use super::scratch::{ScratchTiers, scratch_buffer_bytes};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
 /// The pooled scratch buffer. Builds that share it are kept apart by the tracker like any other writes.
-#[derive(Default)]
 pub(crate) struct ScratchBuffer {
+    pub(crate) tiers: ScratchTiers,
     current: Mutex<Option<Arc<Buffer>>>,
 }
 
 impl ScratchBuffer {
+    /// Takes at most `budget` bytes, unless a single build needs more.
+    pub(crate) fn new(budget: u64, alignment: u64) -> Self {
+        Self { tiers: ScratchTiers::new(budget, alignment), current: Mutex::default() }
+    }
+
     /// A buffer with room for `bytes` at an aligned address, and the smaller one it replaces, to be retired.
     pub(crate) fn get(&self, gpu: &Arc<Gpu>, bytes: u64) -> Result<(Arc<Buffer>, Option<Arc<Buffer>>)> {
-        let needed = scratch_buffer_bytes(bytes, gpu.caps.limits.scratch_alignment.into());
+        let alignment = gpu.caps.limits.scratch_alignment.into();
+        let needed = scratch_buffer_bytes(bytes, alignment);
         let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
         match &*current {
             Some(buffer) if buffer.size_bytes >= needed => Ok((Arc::clone(buffer), None)),
             _ => {
-                let buffer = Arc::new(new_buffer(gpu, needed)?);
+                let bytes = scratch_buffer_bytes(self.tiers.buffer_bytes(bytes), alignment);
+                let buffer = Arc::new(new_buffer(gpu, bytes)?);
                 let replaced = current.replace(Arc::clone(&buffer));
                 Ok((buffer, replaced))
             }

@@ -152,7 +152,7 @@ impl CommandBuffer {
         let shared = Arc::clone(&self.shared);
         let alignment = shared.gpu.caps.limits.scratch_alignment.into();
         let sizes: Vec<_> = builds.iter().map(|build| build.scratch_bytes).collect();
-        let batches = plan_scratch(&sizes, alignment, shared.scratch_budget());
+        let batches = plan_scratch(&sizes, alignment, shared.scratch.tiers.batch_bytes());
         let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
         let ext = shared.gpu.accel()?;
         let (scratch, replaced) = shared.scratch.get(&shared.gpu, most)?;

@@ -143,7 +143,7 @@ impl CommandBuffer {
         if built > tlas.room {
             let message = format!(
                 "its {count} instances of split meshes stand for {built}, but there is room for {}; create it with a \
-                 larger capacity",
+                 larger capacity or more TlasDesc::parts_per_instance",
                 tlas.room
             );
             return Err(Error::usage(&target.name, message));

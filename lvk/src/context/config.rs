@@ -30,7 +30,8 @@ pub struct ContextDesc<'a> {
     pub frames_in_flight: u32,
     /// Size of the staging ring in bytes. Larger uploads get memory of their own.
     pub staging_bytes: u64,
-    /// Most scratch memory for the builds of acceleration structures, in bytes. One build that needs more gets it.
+    /// Most scratch memory for the builds of acceleration structures, in bytes, buffers included that a larger one has
+    /// replaced while the GPU still used them. One build that needs more gets it.
     pub scratch_budget_bytes: u64,
     /// Most memory for acceleration structures, in bytes. A creation that would exceed it fails and leaves nothing
     /// behind; compaction gives some back.

@@ -6,6 +6,7 @@ use super::Context;
 use super::holder::Holder;
 use crate::bindless::TextureViews;
 use crate::error::{Error, Result};
+use crate::gpu::caps::Capabilities;
 use crate::handle::{
     BufferHandle, ComputePipelineHandle, QueryPoolHandle, RenderPipelineHandle, SamplerHandle,
     ShaderModuleHandle, TextureHandle,
@@ -18,7 +19,7 @@ use crate::resource::query::QueryPoolDesc;
 use crate::resource::sampler::SamplerDesc;
 use crate::resource::texture::{TextureDesc, TextureRegion, TextureUsage};
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
-use crate::shader::ShaderModuleDesc;
+use crate::shader::{ShaderModuleDesc, raw_hit_number};
 
 /// Objects that take no bindless slot.
 pub(super) const NO_SLOT: u32 = 0;
@@ -99,6 +100,7 @@ impl Context {
     pub fn create_shader_module(&self, desc: &ShaderModuleDesc<'_>) -> Result<Holder<ShaderModuleHandle>> {
         let shared = self.shared();
         let module = ShaderModule::new(&shared.gpu, desc, shared.layout.push_constant_bytes)?;
+        warn_of_raw_numbers(&shared.gpu.caps, desc);
         Ok(Holder::new(self, shared.store.shader_modules.insert(module), NO_SLOT))
     }
 
@@ -145,6 +147,17 @@ impl Context {
     ) -> Result<Arc<ShaderModule>> {
         let missing = || Error::usage(pipeline, format!("give the pipeline a {stage} shader"));
         self.shared().store.shader_modules.get(handle.ok_or_else(missing)?)
+    }
+}
+
+/// On drivers and profiles whose meshes are split or reordered, hits have other numbers than the caller's.
+fn warn_of_raw_numbers(caps: &Capabilities, desc: &ShaderModuleDesc<'_>) {
+    if !(caps.prefers_spatial_order || caps.profile.is_some()) {
+        return;
+    }
+    if let Some((number, helper)) = raw_hit_number(desc) {
+        let name = desc.debug_name;
+        log::warn!("shader '{name}': {number} counts parts of split and reordered meshes here; use {helper}");
     }
 }
 

@@ -62,7 +62,7 @@ impl Context {
 
     /// Builds structures for the first time: one submission for each scratch budget that they fill.
     fn build_batch(&self, objects: &[Arc<AccelStruct>]) -> Result<()> {
-        let budget = self.shared().scratch_budget();
+        let budget = self.shared().scratch.tiers.batch_bytes();
         let (mut first, mut scratch) = (0, 0_u64);
         for (index, object) in objects.iter().enumerate() {
             let next: u64 = object.blas()?.parts.iter().map(|part| part.sizes.build_scratch_bytes).sum();

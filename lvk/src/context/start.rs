@@ -70,8 +70,7 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         dummies: OnceLock::new(),
         store: Store::new(),
         staging: Staging::new(&gpu, desc.staging_bytes)?,
-        scratch: ScratchBuffer::default(),
-        scratch_budget_bytes: desc.scratch_budget_bytes,
+        scratch: new_scratch(&gpu, desc.scratch_budget_bytes),
         accel_storage: AccelStorage::new(desc.accel_budget_bytes),
         graphics_queries: QueryStages::default(),
         kernels: Kernels::default(),
@@ -99,4 +98,11 @@ fn new_tlas_table(gpu: &Arc<Gpu>) -> Result<Option<Arc<Buffer>>> {
         ..Default::default()
     };
     Ok(Some(Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?)))
+}
+
+/// One scratch buffer is no larger than what a build may take.
+fn new_scratch(gpu: &Gpu, budget_bytes: u64) -> ScratchBuffer {
+    let limits = &gpu.caps.limits;
+    let largest = limits.max_buffer_bytes.min(limits.max_accel_scratch_bytes);
+    ScratchBuffer::new(budget_bytes.min(largest), limits.scratch_alignment.into())
 }

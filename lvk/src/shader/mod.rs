@@ -7,6 +7,7 @@ mod compile;
 mod diagnostics;
 #[cfg(feature = "glsl")]
 mod front_end;
+mod hit_numbers;
 #[cfg(feature = "glsl")]
 mod include;
 mod module;
@@ -25,6 +26,7 @@ mod unused;
 
 pub(crate) use capability::{check_capabilities, check_stage};
 pub(crate) use compile::{CompileOptions, compile};
+pub(crate) use hit_numbers::raw_hit_number;
 #[cfg(feature = "glsl")]
 pub use offline::compile_glsl;
 pub(crate) use reflect::{Reflection, reflect};

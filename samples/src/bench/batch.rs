@@ -3,8 +3,8 @@
 use std::time::Instant;
 
 use lvk::{
-    AccelStructHandle, BlasDesc, BlasGeometry, Context, ContextDesc, Holder, IndexFormat, Indices, PrimitiveOrder,
-    Triangles,
+    AccelStructHandle, BlasDesc, BlasGeometry, Context, ContextDesc, Holder, IndexFormat, Indices,
+    PrimitiveOrder, Triangles,
 };
 
 use super::args::BatchArgs;
@@ -27,7 +27,8 @@ pub(super) fn measure(setup: &Setup, args: &BatchArgs) -> Result<Table, BenchErr
         grouped(u64::from(meshes)),
         grouped(u64::from(triangles))
     );
-    let mut table = Table::new(setup.headline(&ctx, &what), &["builds, until the GPU is done", "time", "a mesh"]);
+    let mut table =
+        Table::new(setup.headline(&ctx, &what), &["builds, until the GPU is done", "time", "a mesh"]);
     let scratch = compare(&ctx, meshes, triangles, runs, &mut table)?;
     let budget = ContextDesc::default().scratch_budget_bytes;
     table.row("peak scratch", [bytes(scratch), share(scratch, budget)]);
@@ -47,7 +48,8 @@ fn compare(
     table: &mut Table,
 ) -> Result<u64, BenchError> {
     let grids = Grids::new(ctx, meshes, triangles)?;
-    let [batch, each] = take_turns(runs, |which| if which == 0 { grids.batch(ctx) } else { grids.each(ctx) })?;
+    let [batch, each] =
+        take_turns(runs, |which| if which == 0 { grids.batch(ctx) } else { grids.each(ctx) })?;
     let [batch, each] = [batch, each].map(|samples| median_of(&samples, |time| *time));
     let cells = |time: f64| [ms(time), format!("{:.2} us", 1e3 * time / f64::from(meshes))];
     table.row("one batch", cells(batch));
@@ -92,7 +94,9 @@ impl Grids {
     fn new(ctx: &Context, meshes: u32, triangles: u32) -> Result<Self, BenchError> {
         let columns = f64::from(triangles).div_euclid(2.0).sqrt().ceil().max(1.0) as u32;
         let rows = triangles.div_ceil(2 * columns);
-        let place = |mesh: u32| (0..(rows + 1) * (columns + 1)).map(move |vertex| vertex_at(mesh, vertex, columns + 1));
+        let place = |mesh: u32| {
+            (0..(rows + 1) * (columns + 1)).map(move |vertex| vertex_at(mesh, vertex, columns + 1))
+        };
         let positions: Vec<[f32; 3]> = (0..meshes).flat_map(place).collect();
         let grid = (0..triangles).map(|triangle| triangle_at(triangle, columns));
         let indices: Vec<[u32; 3]> = grid.collect();
@@ -120,8 +124,7 @@ impl Grids {
     }
 
     fn descs(&self) -> Vec<BlasDesc<'_>> {
-        let desc =
-            |geometries| BlasDesc { geometries, order: PrimitiveOrder::Given, ..BlasDesc::default() };
+        let desc = |geometries| BlasDesc { geometries, order: PrimitiveOrder::Given, ..BlasDesc::default() };
         self.geometries.iter().map(|geometries| desc(geometries)).collect()
     }
 

@@ -128,6 +128,9 @@ mod tests {
         scene.source_triangles = (0..count as u32).rev().collect();
         let (first, last) = (scene.triangles[0], scene.triangles[count - 1]);
         let mesh = Mesh::of_scene(scene, 2);
-        assert_eq!((mesh.triangles[0], mesh.triangles[count - 1], mesh.triangles.len()), (last, first, count));
+        assert_eq!(
+            (mesh.triangles[0], mesh.triangles[count - 1], mesh.triangles.len()),
+            (last, first, count)
+        );
     }
 }

@@ -10,9 +10,10 @@ pub(super) fn morton_order(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Ve
     let middle = |triangle: &[u32; 3]| {
         triangle.iter().map(|vertex| Vec3::from(positions[*vertex as usize])).sum::<Vec3>() / 3.0
     };
-    let (low, high) = triangles.iter().map(middle).fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| {
-        (low.min(p), high.max(p))
-    });
+    let (low, high) = triangles
+        .iter()
+        .map(middle)
+        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)));
     let scale = ((1 << BITS) as f32 - 1.0) / (high - low).max(Vec3::splat(f32::MIN_POSITIVE));
     let mut coded: Vec<(u32, [u32; 3])> =
         triangles.iter().map(|triangle| (code((middle(triangle) - low) * scale), *triangle)).collect();

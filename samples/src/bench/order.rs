@@ -28,14 +28,20 @@ pub(super) fn measure(setup: &Setup, args: &TraceArgs) -> Result<Table, BenchErr
     let sides = sides(&ctx, &mesh, size)?;
     let [given, morton, spatial] = &sides;
     table.row("ordering on the host by the benchmark", [String::new(), ms(morton.sorting)]);
-    table.row("creation, ordering by lvk included", [ms(given.creation), ms(morton.creation), ms(spatial.creation)]);
+    table.row(
+        "creation, ordering by lvk included",
+        [ms(given.creation), ms(morton.creation), ms(spatial.creation)],
+    );
     for path in paths {
         compare(&ctx, &sides, path, runs, &mut table)?;
     }
     let is_default = ctx.capabilities().prefers_spatial_order;
     missing.into_iter().for_each(|note| table.note(note));
     table.note(format!("rays a second by the medians of {runs} frames, taken in turns; shadow rays only where a primary ray hit"));
-    table.note(format!("the library orders by itself on this driver: {}", if is_default { "yes" } else { "no" }));
+    table.note(format!(
+        "the library orders by itself on this driver: {}",
+        if is_default { "yes" } else { "no" }
+    ));
     table.note("aim on the software driver: 3x over the given order");
     Ok(table)
 }

@@ -33,6 +33,7 @@ pub(super) fn stages(defines: &'static [(&'static str, &'static str)]) -> [Sampl
 }
 
 fn compute(name: &'static str, defines: &'static [(&'static str, &'static str)]) -> SamplePipeline {
-    let stages = vec![SampleStage { stage: ShaderStage::Compute, text: texts::RAYS_COMP, defines, name: "rays.comp" }];
+    let stages =
+        vec![SampleStage { stage: ShaderStage::Compute, text: texts::RAYS_COMP, defines, name: "rays.comp" }];
     SamplePipeline { name, stages, color: Vec::new(), depth: None }
 }

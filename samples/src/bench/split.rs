@@ -36,7 +36,10 @@ pub(super) fn measure(setup: &Setup, args: &SplitArgs) -> Result<Table, BenchErr
         compare(&sides, path, runs, &mut table)?;
     }
     missing.into_iter().for_each(|note| table.note(note));
-    table.note(format!("medians of {runs} frames, taken in turns; parts hold at most {} triangles", profile.max_blas_primitives));
+    table.note(format!(
+        "medians of {runs} frames, taken in turns; parts hold at most {} triangles",
+        profile.max_blas_primitives
+    ));
     table.note("limit: 1.15x on the H200, 1.3x on the software driver");
     Ok(table)
 }
@@ -71,6 +74,9 @@ fn compare(sides: &[Side; 2], path: RayPath, runs: u32, table: &mut Table) -> Re
     }
     let (differing, all) = (sides[0].picture.differing(&sides[1].picture)?, sides[0].picture.size);
     let all = all[0] * all[1];
-    table.row(format!("pixels that differ by {}", path_name(path)), [String::new(), format!("{differing} of {all}")]);
+    table.row(
+        format!("pixels that differ by {}", path_name(path)),
+        [String::new(), format!("{differing} of {all}")],
+    );
     Ok(())
 }

@@ -3,9 +3,9 @@
 use bytemuck::{NoUninit, Pod, Zeroable};
 use glam::Vec3;
 use lvk::{
-    BufferDesc, BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies,
-    HitGroup, Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderModuleDesc, ShaderModuleHandle,
-    ShaderSource, ShaderStage,
+    BufferDesc, BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context,
+    Dependencies, HitGroup, Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderModuleDesc,
+    ShaderModuleHandle, ShaderSource, ShaderStage,
 };
 
 use super::mesh::Mesh;
@@ -157,7 +157,11 @@ impl Tracer {
     }
 
     /// A tracer by pipeline of words that were compiled before, one for each of [`stages`].
-    pub(super) fn of_words(ctx: &Context, stages: &[SampleStage; 5], words: &[Vec<u32>]) -> lvk::Result<Self> {
+    pub(super) fn of_words(
+        ctx: &Context,
+        stages: &[SampleStage; 5],
+        words: &[Vec<u32>],
+    ) -> lvk::Result<Self> {
         let module = |(stage, words): (&SampleStage, &Vec<u32>)| {
             let source = ShaderSource::Spirv(words);
             ctx.create_shader_module(&ShaderModuleDesc { source, ..stage.module() })
@@ -218,5 +222,9 @@ fn compute_pipeline(ctx: &Context, defines: &[(&str, &str)]) -> lvk::Result<Hold
         ..ShaderModuleDesc::default()
     })?;
     let module = Some(*module);
-    ctx.create_compute_pipeline(&ComputePipelineDesc { module, debug_name: "bench rays", ..Default::default() })
+    ctx.create_compute_pipeline(&ComputePipelineDesc {
+        module,
+        debug_name: "bench rays",
+        ..Default::default()
+    })
 }

@@ -1,0 +1,39 @@
+//! Whether a hit shader reads Vulkan's own numbers of what was hit, which are not the caller's where meshes were split or
+//! reordered.
+
+use super::{ShaderModuleDesc, ShaderSource, ShaderStage};
+
+/// The built-ins, each with the helper to use instead.
+const NUMBERS: [(&str, &str); 2] =
+    [("gl_InstanceID", "lvkInstanceId(tlas)"), ("gl_PrimitiveID", "lvkPrimitiveIndex(tlas)")];
+
+/// The first such built-in in the caller's text, with the helper to use instead.
+pub(crate) fn raw_hit_number(desc: &ShaderModuleDesc<'_>) -> Option<(&'static str, &'static str)> {
+    use ShaderStage::{AnyHit, ClosestHit, Intersection};
+    let ShaderSource::Glsl(text) = desc.source else { return None };
+    if !matches!(desc.stage, ClosestHit | AnyHit | Intersection) {
+        return None;
+    }
+    let words = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+    let mut found = words.filter_map(|word| NUMBERS.iter().find(|(name, _)| *name == word));
+    found.next().copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(stage: ShaderStage, text: &str) -> Option<&'static str> {
+        let source = ShaderSource::Glsl(text);
+        raw_hit_number(&ShaderModuleDesc { stage, source, ..Default::default() }).map(|(name, _)| name)
+    }
+
+    #[test]
+    fn whole_words_of_hit_shaders_count() {
+        assert_eq!(found(ShaderStage::ClosestHit, "x = gl_PrimitiveID+1;"), Some("gl_PrimitiveID"));
+        assert_eq!(found(ShaderStage::AnyHit, "gl_InstanceID"), Some("gl_InstanceID"));
+        assert_eq!(found(ShaderStage::Intersection, "my_gl_PrimitiveID gl_PrimitiveIDIn"), None);
+        assert_eq!(found(ShaderStage::Fragment, "gl_PrimitiveID"), None);
+        assert_eq!(found(ShaderStage::ClosestHit, "gl_InstanceCustomIndexEXT"), None);
+    }
+}

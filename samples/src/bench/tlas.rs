@@ -1,0 +1,190 @@
+//! Updates of a top-level structure, against a copy of the bytes and the driver's own build.
+
+use std::rc::Rc;
+use std::time::Instant;
+
+use glam::{Affine3A, Quat, Vec3};
+use lvk::ash::vk;
+use lvk::{
+    AccelStructHandle, BufferDesc, BufferHandle, BufferUsage, BuildFlags, BuildMode, CommandBuffer, Context,
+    DeviceInstances, Holder, MemoryKind, PrimitiveOrder, TlasDesc, TlasInstance, transform_rows,
+};
+
+use super::args::TlasArgs;
+use super::error::BenchError;
+use super::hand_written::{RawCommands, RawDevice, RawStructure, instance_geometry};
+use super::instance_record::InstanceRecord;
+use super::measure::{Stopwatch, Timed, median, since, take_turns};
+use super::mesh::MeshBuffers;
+use super::setup::{Choice, Setup};
+use super::synthetic::spheres;
+use super::table::{Table, grouped, ms, times};
+
+/// Triangles of the mesh that all instances show.
+const MESH_TRIANGLES: u32 = 1000;
+
+/// Compares updates by `lvk` with a copy of the bytes and the driver's own build, for several numbers of instances.
+pub(super) fn measure(setup: &Setup, args: &TlasArgs) -> Result<Table, BenchError> {
+    let ctx = setup.open()?;
+    let runs = setup.runs(&ctx, Choice { quick: 1, cpu: 5, gpu: 30 });
+    let default: &[u32] =
+        setup.choose(&ctx, Choice { quick: &[2000], cpu: &[100_000], gpu: &[100_000, 1_000_000] });
+    let counts = if args.instances.is_empty() { default } else { &args.instances };
+    let columns =
+        ["", "record or copy (CPU)", "build (GPU)", "sum", "until done", "ratio of sums", "ratio until done"];
+    let mut table = Table::new(setup.headline(&ctx, "tlas: updates"), &columns);
+    for count in counts {
+        let bench = Bench::new(&ctx, *count)?;
+        bench.rebuilds(runs, &mut table)?;
+        bench.refits(runs, &mut table)?;
+    }
+    table.note(format!("medians of {runs} runs, taken in turns; all instances show one mesh"));
+    table.note("the plain copy writes 64 bytes an instance into mapped memory, as one piece; the driver builds from there");
+    table.note("limit: the update from the host at most 1.3 times the plain copy and the driver's own build");
+    Ok(table)
+}
+
+/// One number of instances, in every form.
+struct Bench {
+    ctx: Context,
+    stopwatch: Stopwatch,
+    commands: RawCommands,
+    device: Rc<RawDevice>,
+    blas: Holder<AccelStructHandle>,
+    instances: Vec<TlasInstance>,
+    /// As Vulkan reads them.
+    records: Vec<InstanceRecord>,
+    /// Mapped memory for those.
+    mapped: Holder<BufferHandle>,
+    /// The same records with places instead of addresses, in memory of the device.
+    on_device: Holder<BufferHandle>,
+    _buffers: MeshBuffers,
+}
+
+impl Bench {
+    fn new(ctx: &Context, count: u32) -> Result<Self, BenchError> {
+        let buffers = MeshBuffers::new(ctx, &spheres(MESH_TRIANGLES))?;
+        let blas = buffers.blas(ctx, BuildFlags::FAST_TRACE, PrimitiveOrder::Given)?;
+        let address = ctx.accel_struct_addresses(*blas)?[0];
+        let transforms: Vec<_> = (0..count).map(|number| transform_of(number, count)).collect();
+        let instance =
+            |transform: &[f32; 12]| TlasInstance { transform: *transform, ..TlasInstance::new(*blas) };
+        let records = |reference| transforms.iter().map(move |rows| InstanceRecord::new(*rows, reference));
+        let placed: Vec<InstanceRecord> = records(0).collect();
+        let on_device = ctx.create_buffer(&BufferDesc {
+            data: Some(bytemuck::cast_slice(&placed)),
+            debug_name: "instances",
+            ..BufferDesc::default()
+        })?;
+        let mapped = ctx.create_buffer(&BufferDesc {
+            size_bytes: (count as usize * size_of::<InstanceRecord>()) as u64,
+            usage: BufferUsage::ACCEL_INPUT,
+            memory: MemoryKind::HostVisible,
+            debug_name: "mapped instances",
+            ..BufferDesc::default()
+        })?;
+        ctx.wait(ctx.flush()?)?;
+        let device = RawDevice::new(ctx);
+        Ok(Self {
+            stopwatch: Stopwatch::new(ctx)?,
+            commands: RawCommands::new(&device)?,
+            device,
+            instances: transforms.iter().map(instance).collect(),
+            records: records(address).collect(),
+            mapped,
+            on_device,
+            blas,
+            ctx: ctx.clone(),
+            _buffers: buffers,
+        })
+    }
+
+    fn count(&self) -> u32 {
+        self.instances.len() as u32
+    }
+
+    fn tlas(&self, flags: BuildFlags) -> lvk::Result<Holder<AccelStructHandle>> {
+        let tlas = self.ctx.create_tlas(&TlasDesc {
+            instances: &self.instances,
+            flags,
+            debug_name: "many instances",
+            ..TlasDesc::default()
+        })?;
+        self.ctx.wait(self.ctx.flush()?)?;
+        Ok(tlas)
+    }
+
+    fn raw(&self, flags: vk::BuildAccelerationStructureFlagsKHR) -> Result<RawStructure, BenchError> {
+        let geometry = instance_geometry(self.ctx.buffer_address(*self.mapped)?);
+        RawStructure::new(&self.device, geometry, self.count(), flags)
+    }
+
+    /// Copies the records into mapped memory and has the driver build from there.
+    fn plain(&self, build: impl FnOnce(vk::CommandBuffer)) -> Result<Timed, BenchError> {
+        let start = Instant::now();
+        self.ctx.upload_buffer(*self.mapped, 0, bytemuck::cast_slice(&self.records))?;
+        let copy = since(start);
+        let timed = self.commands.time(build)?;
+        Ok(Timed { record: copy, total: copy + timed.total, ..timed })
+    }
+
+    fn from_device(
+        &self,
+        cmd: &mut CommandBuffer,
+        tlas: AccelStructHandle,
+        mode: BuildMode,
+    ) -> lvk::Result<()> {
+        let blas = [*self.blas];
+        let instances =
+            DeviceInstances { buffer: *self.on_device, offset: 0, count: self.count(), blas: &blas };
+        cmd.update_tlas_from(tlas, &instances, mode)
+    }
+
+    fn rebuilds(&self, runs: u32, table: &mut Table) -> Result<(), BenchError> {
+        let tlas = self.tlas(BuildFlags::FAST_TRACE)?;
+        let raw = self.raw(vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE)?;
+        let mode = BuildMode::Rebuild;
+        let samples: [Vec<_>; 3] = take_turns(runs, |which| match which {
+            0 => self.plain(|commands| raw.build(commands)),
+            1 => self.stopwatch.time(|cmd| cmd.update_tlas(*tlas, &self.instances, mode)),
+            _ => self.stopwatch.time(|cmd| self.from_device(cmd, *tlas, mode)),
+        })?;
+        self.rows("rebuild", samples, table);
+        Ok(())
+    }
+
+    fn refits(&self, runs: u32, table: &mut Table) -> Result<(), BenchError> {
+        use vk::BuildAccelerationStructureFlagsKHR as Raw;
+        let tlas = self.tlas(BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE)?;
+        let raw = self.raw(Raw::PREFER_FAST_TRACE | Raw::ALLOW_UPDATE)?;
+        self.plain(|commands| raw.build(commands))?;
+        let mode = BuildMode::Refit;
+        let samples: [Vec<_>; 3] = take_turns(runs, |which| match which {
+            0 => self.plain(|commands| raw.refit(commands)),
+            1 => self.stopwatch.time(|cmd| cmd.update_tlas(*tlas, &self.instances, mode)),
+            _ => self.stopwatch.time(|cmd| self.from_device(cmd, *tlas, mode)),
+        })?;
+        self.rows("refit", samples, table);
+        Ok(())
+    }
+
+    fn rows(&self, mode: &str, samples: [Vec<Timed>; 3], table: &mut Table) {
+        let medians = samples.map(|samples| median(&samples));
+        let names = ["plain copy + driver", "lvk, from the host", "lvk, from a buffer"];
+        let sum = |timed: &Timed| timed.record + timed.gpu;
+        for (name, timed) in names.iter().zip(&medians) {
+            let name = format!("{mode} of {}: {name}", grouped(u64::from(self.count())));
+            let ratios = [sum(timed) / sum(&medians[0]), timed.total / medians[0].total];
+            let figures = [timed.record, timed.gpu, sum(timed), timed.total];
+            table.row(name, figures.map(ms).into_iter().chain(ratios.map(times)));
+        }
+    }
+}
+
+/// A turned and shrunken instance in a cube of them.
+fn transform_of(number: u32, count: u32) -> [f32; 12] {
+    let side = f64::from(count).cbrt().ceil() as u32;
+    let place = [number % side, number / side % side, number / side / side].map(|cell| 20.0 * cell as f32);
+    let turn = Quat::from_rotation_y(0.37 * number as f32);
+    transform_rows(&Affine3A::from_scale_rotation_translation(Vec3::splat(0.5), turn, place.into()))
+}

@@ -1,0 +1,241 @@
+//! What any-hit shaders and query candidates see and decide: in whatever order the driver finds them, the set of hits
+//! and what becomes of the ray are the same.
+
+use lvk::glam::{Affine3A, Quat, Vec3};
+use lvk::{
+    ComputePipelineDesc, Context, DeviceProfile, GeometryFlags, HitGroup, RayTracingPipelineDesc, Result,
+    ShaderStage,
+};
+use lvk_tests::agreement::Agreement;
+use lvk_tests::meshes::Mesh;
+use lvk_tests::random::Random;
+use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene};
+use lvk_tests::ray_tracer::{
+    HitRecord, How, MISSED, Method, OPAQUE, RayTracer, TERMINATE_ON_FIRST_HIT, shader, shader_with,
+};
+use lvk_tests::rays::{Ray, random_rays};
+use lvk_tests::reference::{Hit, HitIds, Reference};
+use lvk_tests::{TestDevice, device, device_with};
+
+/// What the shaders do with a candidate.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Verdict {
+    Ignore,
+    Accept,
+    Terminate,
+}
+
+impl Verdict {
+    fn define(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Ignore => ("IGNORE", ""),
+            Self::Accept => ("ACCEPT", ""),
+            Self::Terminate => ("TERMINATE", ""),
+        }
+    }
+}
+
+/// Shaders that count candidates, see `shaders/any_hit.rgen.glsl`.
+fn counter(ctx: &Context, method: Method, verdict: Verdict) -> Result<RayTracer> {
+    let defines = &[verdict.define()];
+    if method == Method::Query {
+        let text = include_str!("../shaders/any_hit_query.comp.glsl");
+        let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
+        let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
+        return Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?));
+    }
+    let ray_gen = shader(ctx, ShaderStage::RayGen, include_str!("../shaders/any_hit.rgen.glsl"))?;
+    let miss = shader(ctx, ShaderStage::Miss, include_str!("../shaders/any_hit_keep.rmiss.glsl"))?;
+    let closest = shader(ctx, ShaderStage::ClosestHit, include_str!("../shaders/any_hit.rchit.glsl"))?;
+    let text = include_str!("../shaders/any_hit.rahit.glsl");
+    let any = shader_with(ctx, ShaderStage::AnyHit, text, defines)?;
+    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+        ray_gen: &[*ray_gen],
+        miss: &[*miss],
+        hit_groups: &[HitGroup { closest_hit: Some(*closest), any_hit: Some(*any), ..Default::default() }],
+        ..Default::default()
+    })?;
+    Ok(RayTracer::of_pipeline(ctx, pipeline))
+}
+
+fn devices() -> Vec<TestDevice> {
+    let profile = DeviceProfile { max_blas_primitives: 50, ..DeviceProfile::default() };
+    device().into_iter().chain(device_with(|desc| desc.profile = Some(&profile))).collect()
+}
+
+/// Overlapping models of two geometries with these flags.
+fn scene(flags: [GeometryFlags; 2]) -> RayScene {
+    let part = |mesh, flags| Part { flags, ..Part::new(mesh, Layout::Indexed16) };
+    let models = vec![
+        vec![part(Mesh::sphere(6), flags[0]), part(Mesh::cube_grid(2), flags[1])],
+        vec![part(Mesh::torus(6), flags[0]), part(Mesh::terrain(5), flags[1])],
+    ];
+    let mut random = Random::new(81);
+    let mut place = |index: u32| {
+        let turn = Quat::from_rotation_x(random.between(0.0, 6.0));
+        let scale = random.point(Vec3::splat(0.6), Vec3::splat(1.5));
+        let to = random.point(Vec3::splat(-1.0), Vec3::splat(1.0));
+        let transform = Affine3A::from_scale_rotation_translation(scale, turn, to);
+        Placed { custom_index: 40 + index, ..Placed::new(index as usize % 2, transform) }
+    };
+    RayScene { models, placed: (0..7).map(&mut place).collect() }
+}
+
+fn rays_for(reference: &Reference) -> Vec<Ray> {
+    let (low, high) = reference.bounds();
+    random_rays(83, 900, low.as_vec3(), high.as_vec3())
+}
+
+/// As the shaders count.
+fn tag(ids: &HitIds) -> u32 {
+    1 + ids.instance * 131 + ids.geometry * 37 + ids.primitive
+}
+
+fn ids(record: &HitRecord) -> HitIds {
+    let HitRecord { instance, custom_index, geometry, primitive, .. } = *record;
+    HitIds { instance, custom_index, geometry, primitive }
+}
+
+/// Rays of which every hit is certain, with their records and hits.
+fn certain<'a>(
+    reference: &Reference,
+    rays: &[Ray],
+    records: &'a [HitRecord],
+    how: How,
+) -> Vec<(&'a HitRecord, Vec<Hit>)> {
+    let hits = rays.iter().zip(records).filter_map(|(ray, record)| {
+        let hits = reference.all_hits(ray, how)?;
+        Some((record, hits))
+    });
+    let all: Vec<_> = hits.collect();
+    let several = all.iter().filter(|(_, hits)| hits.len() > 3).count();
+    assert!(all.len() * 10 > rays.len() * 9 && several * 10 > rays.len(), "{} of {several}", all.len());
+    all
+}
+
+#[test]
+fn every_candidate_is_seen_once_where_that_is_asked() -> Result<()> {
+    for ctx in devices() {
+        let scene = scene([GeometryFlags::NO_DUPLICATE_ANY_HIT; 2]);
+        let gpu = scene.upload(&ctx)?;
+        let reference = scene.reference();
+        let rays = rays_for(&reference);
+        for method in Method::available(&ctx) {
+            let how = How::default();
+            let records = counter(&ctx, method, Verdict::Ignore)?.trace(&gpu.tlas, &rays, how)?;
+            for (record, hits) in certain(&reference, &rays, &records, how) {
+                let sum: u32 = hits.iter().map(|hit| tag(&hit.ids)).sum();
+                let expected = [hits.len() as f32, sum as f32];
+                assert_eq!(record.barycentrics, expected, "{method:?}: {hits:?}");
+                assert_eq!(record.kind, MISSED, "all were ignored");
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Without the flag a driver may show a candidate again, but leaves none out.
+#[test]
+fn every_candidate_is_seen_at_least_once() -> Result<()> {
+    for ctx in devices() {
+        let scene = scene([GeometryFlags::empty(); 2]);
+        let gpu = scene.upload(&ctx)?;
+        let reference = scene.reference();
+        let rays = rays_for(&reference);
+        for method in Method::available(&ctx) {
+            let how = How::default();
+            let records = counter(&ctx, method, Verdict::Ignore)?.trace(&gpu.tlas, &rays, how)?;
+            for (record, hits) in certain(&reference, &rays, &records, how) {
+                let sum: u32 = hits.iter().map(|hit| tag(&hit.ids)).sum();
+                let [seen, seen_sum] = record.barycentrics;
+                assert!(
+                    seen >= hits.len() as f32 && seen_sum >= sum as f32,
+                    "{method:?}: {seen} of {hits:?}"
+                );
+                assert!(hits.is_empty() == (seen == 0.0));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The closest hit does not depend on the order in which candidates were accepted.
+#[test]
+fn accepted_candidates_leave_the_closest() -> Result<()> {
+    for ctx in devices() {
+        let scene = scene([GeometryFlags::empty(), GeometryFlags::OPAQUE]);
+        let gpu = scene.upload(&ctx)?;
+        let reference = scene.reference();
+        let rays = rays_for(&reference);
+        for method in Method::available(&ctx) {
+            for flags in [0, OPAQUE] {
+                let how = How { flags, ..How::default() };
+                let records = counter(&ctx, method, Verdict::Accept)?.trace(&gpu.tlas, &rays, how)?;
+                Agreement::of_shapes(&rays, &records, |ray| reference.closest_by(ray, how))
+                    .assert(&format!("all accepted by {method:?}, flags {flags}"));
+                for (record, hits) in certain(&reference, &rays, &records, how) {
+                    let least = hits.first().is_some_and(|hit| !hit.is_opaque);
+                    let most = hits.iter().filter(|hit| !hit.is_opaque).count();
+                    let seen = record.barycentrics[0] as usize;
+                    assert!(usize::from(least) <= seen && seen <= most, "{method:?}: {seen} of {hits:?}");
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Which hit ends the ray is the driver's choice, but it is one of the hits, and there is none after it.
+#[test]
+fn a_terminated_ray_keeps_one_of_its_hits() -> Result<()> {
+    for ctx in devices() {
+        let scene = scene([GeometryFlags::empty(); 2]);
+        let gpu = scene.upload(&ctx)?;
+        let reference = scene.reference();
+        let rays = rays_for(&reference);
+        for method in Method::available(&ctx) {
+            for (verdict, flags) in [(Verdict::Terminate, 0), (Verdict::Accept, TERMINATE_ON_FIRST_HIT)] {
+                let how = How { flags, ..How::default() };
+                let records = counter(&ctx, method, verdict)?.trace(&gpu.tlas, &rays, how)?;
+                for (record, hits) in certain(&reference, &rays, &records, how) {
+                    let Some(first) = hits.first() else {
+                        assert_eq!((record.kind, record.barycentrics), (MISSED, [0.0; 2]));
+                        continue;
+                    };
+                    assert_eq!(record.barycentrics[0], 1.0, "{method:?}: one candidate was judged");
+                    let hit = hits.iter().find(|hit| hit.ids == ids(record));
+                    let hit =
+                        hit.unwrap_or_else(|| unreachable!("{method:?}: {record:?} is none of {hits:?}"));
+                    let error = (f64::from(record.t) - hit.t).abs();
+                    assert!(error <= 1e-5 * hit.t.max(1.0) && hit.t >= first.t, "{record:?}, {hit:?}");
+                    assert_eq!(record.barycentrics[1], tag(&hit.ids) as f32);
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Ignored candidates in front of opaque ones: those are hit as if nothing stood before them.
+#[test]
+fn what_is_ignored_hides_nothing() -> Result<()> {
+    for ctx in devices() {
+        let scene = scene([GeometryFlags::empty(), GeometryFlags::OPAQUE]);
+        let gpu = scene.upload(&ctx)?;
+        let reference = scene.reference();
+        let rays = rays_for(&reference);
+        for method in Method::available(&ctx) {
+            let how = How::default();
+            let records = counter(&ctx, method, Verdict::Ignore)?.trace(&gpu.tlas, &rays, how)?;
+            Agreement::of_shapes(&rays, &records, |ray| {
+                reference.closest_by_where(ray, how, |hit| hit.is_opaque)
+            })
+            .assert(&format!("behind the ignored by {method:?}"));
+            for (record, hits) in certain(&reference, &rays, &records, how) {
+                let before = hits.iter().take_while(|hit| !hit.is_opaque).count();
+                assert!(record.barycentrics[0] >= before as f32, "{method:?}: {record:?} of {hits:?}");
+            }
+        }
+    }
+    Ok(())
+}
