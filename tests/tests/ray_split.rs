@@ -13,7 +13,7 @@ use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances, upload_geo
 use lvk_tests::ray_tracer::{CULL_BACK, CULL_FRONT, How, MISSED, Method, RayTracer, shader, shader_with};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::reference::{Hit, Sphere};
-use lvk_tests::sphere_scene::{GROUPS, sphere_boxes, sphere_tracer, spheres};
+use lvk_tests::sphere_scene::{GROUPS, SphereModel};
 use lvk_tests::{TestDevice, device, device_with};
 
 /// A device that takes so many primitives in a structure.
@@ -256,9 +256,9 @@ fn a_transform_in_a_buffer_is_one_by_value() -> Result<()> {
 /// Intersection shaders find their sphere by the number of the box.
 #[test]
 fn intersection_shaders_know_the_boxes_of_split_meshes() -> Result<()> {
-    const COUNT: u32 = 21;
     let Some(ctx) = device_of(5) else { return Ok(()) };
-    let (_buffers, geometries) = sphere_boxes(&ctx, COUNT)?;
+    let spheres = SphereModel { count: 21, step: 8 };
+    let (_buffers, geometries) = spheres.boxes(&ctx)?;
     let model = [ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?];
     assert!((9..=40).contains(&parts(&ctx, *model[0])?));
     let place = |index: u32| Placed {
@@ -268,11 +268,11 @@ fn intersection_shaders_know_the_boxes_of_split_meshes() -> Result<()> {
     };
     let placed = [place(0), place(1)];
     let tlas = ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
-    let spheres = spheres(&placed, COUNT);
+    let expected = spheres.spheres(&placed);
     let rays = random_rays(51, 1_500, Vec3::new(-4.0, -2.0, -6.0), Vec3::new(14.0, 14.0, 8.0));
-    for (method, tracer) in HitCheck::with(&ctx, sphere_tracer)?.tracers() {
+    for (method, tracer) in HitCheck::with(&ctx, |ctx, method| spheres.tracer(ctx, method))?.tracers() {
         let records = tracer.trace(&tlas, &rays, How::default())?;
-        Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&spheres, ray))
+        Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
             .assert(&format!("split boxes by {method:?}"));
         for hit in records.iter().filter(|record| record.kind != MISSED) {
             let (radius, tag) = GROUPS[1 - hit.instance as usize];

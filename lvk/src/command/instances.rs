@@ -18,7 +18,7 @@ use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 /// Addresses of instances must be a multiple of this.
 const INSTANCE_ALIGNMENT: u64 = 16;
 
-/// Bytes of `LvkTlasRow` in `shader/glsl/tlas.glsl`.
+/// Bytes of `LvkTlasRow` in `shader/glsl/hit_numbers.glsl`.
 pub(crate) const ROW_BYTES: u64 = 16;
 
 /// Instances on their way into a build.
