@@ -19,6 +19,11 @@ impl TestDevice {
     pub fn take_messages(&self) -> Vec<lvk::ValidationMessage> {
         self.sink.take()
     }
+
+    /// The bare context, whose end waits for nothing, and the messages, which the caller has to check.
+    pub fn into_context(mut self) -> (Option<Context>, ValidationSink) {
+        (self.context.take(), self.sink.clone())
+    }
 }
 
 impl Deref for TestDevice {

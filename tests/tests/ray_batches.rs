@@ -4,7 +4,6 @@ use lvk::glam::{Affine3A, Vec3};
 use lvk::{
     AccelMemory, AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage,
     BuildFlags, BuildMode, Context, DeviceProfile, Error, Holder, Result, TlasDesc, Triangles,
-    ValidationSink,
 };
 use lvk_tests::agreement::Agreement;
 use lvk_tests::hit_check::HitCheck;
@@ -13,7 +12,7 @@ use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances, upload_geo
 use lvk_tests::ray_tracer::{How, Method, RayTracer};
 use lvk_tests::rays::random_rays;
 use lvk_tests::warnings::{listen, take_warnings};
-use lvk_tests::{device, device_with};
+use lvk_tests::{TestDevice, device, device_with};
 
 /// Fits a block of the memory of small structures many times.
 const SMALL_STRUCTURE: u64 = 64 << 10;
@@ -46,12 +45,8 @@ impl Cubes {
     }
 
     fn descs(&self) -> Vec<BlasDesc<'_>> {
-        let desc = |geometries: &'_ [BlasGeometry; 1]| BlasDesc {
-            geometries: geometries.as_slice(),
-            debug_name: "cube",
-            ..Default::default()
-        };
-        self.geometries.iter().map(|geometries| desc(geometries)).collect()
+        let desc = BlasDesc { debug_name: "cube", ..Default::default() };
+        self.geometries.iter().map(|geometries| BlasDesc { geometries, ..desc }).collect()
     }
 
     /// All of them in rows.
@@ -66,6 +61,19 @@ impl Cubes {
     }
 }
 
+/// A device whose builds take 1 KiB of scratch a triangle, with so much for all together.
+fn device_of_budget(scratch_budget_bytes: u64) -> Option<TestDevice> {
+    let profile = DeviceProfile {
+        name: "much scratch".into(),
+        scratch_bytes_per_primitive: 1 << 10,
+        ..DeviceProfile::default()
+    };
+    device_with(|desc| {
+        desc.scratch_budget_bytes = scratch_budget_bytes;
+        desc.profile = Some(&profile);
+    })
+}
+
 fn handles(made: &[Holder<AccelStructHandle>]) -> Vec<AccelStructHandle> {
     made.iter().map(|holder| **holder).collect()
 }
@@ -75,7 +83,7 @@ fn handles(made: &[Holder<AccelStructHandle>]) -> Vec<AccelStructHandle> {
 fn two_thousand_structures_are_built_within_a_scratch_budget() -> Result<()> {
     const COUNT: usize = 2_000;
     const BUDGET: u64 = 256 << 10;
-    let Some(ctx) = device_with(|desc| desc.scratch_budget_bytes = BUDGET) else { return Ok(()) };
+    let Some(ctx) = device_of_budget(BUDGET) else { return Ok(()) };
     let method = Method::available(&ctx)[0];
     let tracer = RayTracer::new(&ctx, method)?;
     let cubes = Cubes::new(&ctx, COUNT)?;
@@ -95,7 +103,7 @@ fn two_thousand_structures_are_built_within_a_scratch_budget() -> Result<()> {
     let alignment = u64::from(ctx.capabilities().limits.scratch_alignment);
     let top = ctx.accel_struct_sizes(*tlas)?.build_scratch_bytes;
     let scratch = ctx.accel_memory().scratch_bytes;
-    assert!(scratch <= BUDGET.max(top) + alignment, "{scratch} bytes of scratch");
+    assert!(scratch <= BUDGET.max(top + alignment), "{scratch} bytes of scratch");
     let progress = ctx.build_progress(&all)?;
     assert_eq!((progress.built, progress.total), (COUNT, COUNT));
     Ok(())
@@ -103,7 +111,7 @@ fn two_thousand_structures_are_built_within_a_scratch_budget() -> Result<()> {
 
 #[test]
 fn progress_counts_what_the_gpu_has_built() -> Result<()> {
-    let Some(ctx) = device_with(|desc| desc.scratch_budget_bytes = 64 << 10) else { return Ok(()) };
+    let Some(ctx) = device_of_budget(64 << 10) else { return Ok(()) };
     let cubes = Cubes::new(&ctx, 300)?;
     ctx.wait_idle()?;
     let made = ctx.create_blas_batch(&cubes.descs())?;
@@ -130,7 +138,7 @@ fn progress_counts_what_the_gpu_has_built() -> Result<()> {
 #[test]
 fn rebuilds_keep_the_scratch_budget() -> Result<()> {
     const BUDGET: u64 = 128 << 10;
-    let Some(ctx) = device_with(|desc| desc.scratch_budget_bytes = BUDGET) else { return Ok(()) };
+    let Some(ctx) = device_of_budget(BUDGET) else { return Ok(()) };
     let cubes = Cubes::new(&ctx, 200)?;
     let flags = BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE;
     let descs: Vec<_> = cubes.descs().into_iter().map(|desc| BlasDesc { flags, ..desc }).collect();
@@ -141,9 +149,8 @@ fn rebuilds_keep_the_scratch_budget() -> Result<()> {
         ctx.submit(cmd)?;
     }
     ctx.wait_idle()?;
-    let alignment = u64::from(ctx.capabilities().limits.scratch_alignment);
     let scratch = ctx.accel_memory().scratch_bytes;
-    assert!(scratch <= BUDGET + alignment, "{scratch} bytes of scratch");
+    assert!(scratch <= BUDGET, "{scratch} bytes of scratch");
     let scene = cubes.scene();
     let shown = instances(&scene.placed, &made);
     let tlas = ctx.create_tlas(&TlasDesc { instances: &shown, ..Default::default() })?;
@@ -218,6 +225,44 @@ fn a_memory_budget_is_kept() -> Result<()> {
     Ok(())
 }
 
+/// Their maps of primitives are on the way to the GPU when there turns out to be no memory.
+#[test]
+fn split_meshes_over_the_memory_budget_leave_nothing_behind() -> Result<()> {
+    let profile =
+        DeviceProfile { name: "small".into(), max_blas_primitives: 100, ..DeviceProfile::default() };
+    let of_budget = |accel_budget_bytes| {
+        device_with(|desc| {
+            desc.profile = Some(&profile);
+            desc.accel_budget_bytes = accel_budget_bytes;
+        })
+    };
+    let parts = [Part::new(Mesh::torus(10), Layout::Indexed16)];
+    let (needed, bytes) = {
+        let Some(ctx) = of_budget(u64::MAX) else { return Ok(()) };
+        let (_buffers, geometries) = upload_geometries(&ctx, &parts)?;
+        let made = ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?;
+        let bytes = ctx.serialize_blas(*made)?;
+        (ctx.accel_memory().structure_bytes, bytes)
+    };
+    let Some(ctx) = of_budget(needed - 256) else { return Ok(()) };
+    let (_buffers, geometries) = upload_geometries(&ctx, &parts)?;
+    let desc = BlasDesc { geometries: &geometries, debug_name: "ring", ..Default::default() };
+    let before = of_structures(&ctx);
+    for submits in [true, false, true] {
+        for refused in [ctx.create_blas(&desc), ctx.load_blas(&desc, &bytes)] {
+            assert!(
+                matches!(&refused, Err(Error::InvalidUsage { object, .. }) if object == "ring"),
+                "{refused:?}"
+            );
+            if submits {
+                ctx.wait_idle()?;
+            }
+        }
+        assert_eq!(of_structures(&ctx), before);
+    }
+    Ok(())
+}
+
 /// Every reason for which a creation may fail half-way.
 #[test]
 fn failed_creations_leave_nothing_behind() -> Result<()> {
@@ -277,7 +322,7 @@ fn statistics_name_every_structure() -> Result<()> {
     assert_eq!(memory.structures.len(), 2);
     assert_eq!((of_ring, of_top), (&ctx.accel_struct_info(*ring)?, &ctx.accel_struct_info(*top)?));
     assert!(!of_ring.is_top_level && of_top.is_top_level);
-    assert_eq!((of_ring.parts, of_ring.is_remapped, of_top.parts), (4, true, 1));
+    assert!((4..=8).contains(&of_ring.parts) && of_ring.is_remapped && of_top.parts == 1);
     assert!(of_ring.structure_bytes > 0 && of_ring.table_bytes >= 400 * 4 && of_top.structure_bytes > 0);
     assert!(memory.structure_bytes >= of_ring.structure_bytes + of_top.structure_bytes);
     drop(ring);
@@ -294,13 +339,8 @@ fn structures_end_well_whoever_goes_first() -> Result<()> {
     let profile =
         DeviceProfile { name: "small".into(), max_blas_primitives: 100, ..DeviceProfile::default() };
     for profile in [None, Some(&profile)] {
-        let sink = ValidationSink::default();
-        let Some(ctx) = device_with(|desc| {
-            desc.validation_sink = Some(sink.clone());
-            desc.profile = profile;
-        }) else {
-            return Ok(());
-        };
+        let Some(device) = device_with(|desc| desc.profile = profile) else { return Ok(()) };
+        let (Some(ctx), sink) = device.into_context() else { return Ok(()) };
         let (buffers, geometries) =
             upload_geometries(&ctx, &[Part::new(Mesh::torus(10), Layout::Indexed16)])?;
         let desc = |debug_name| BlasDesc {

@@ -3,7 +3,6 @@
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
     AccelStructHandle, BuildFlags, BuildMode, Compaction, Context, DeviceInstances, Error, Result, TlasDesc,
-    ValidationSink,
 };
 use lvk_tests::bender::{Bender, bent};
 use lvk_tests::compute::words_buffer;
@@ -307,24 +306,72 @@ fn structures_may_be_destroyed_meanwhile() -> Result<()> {
     Ok(())
 }
 
+/// Nothing else keeps them.
+#[test]
+fn structures_that_nobody_shows_may_be_destroyed_meanwhile() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let scene = scene();
+    ctx.wait_idle()?;
+    let before = memory(&ctx);
+    for steps in 0..8 {
+        let GpuScene { models, tlas, buffers } = upload(&ctx, &scene, COMPACTABLE)?;
+        drop(tlas);
+        let handles: Vec<_> = models.iter().map(|model| **model).collect();
+        if steps % 2 == 1 {
+            ctx.wait_idle()?;
+        }
+        ctx.compact(&handles)?;
+        (0..steps / 2).try_for_each(|_| ctx.flush().map(drop))?;
+        drop((models, buffers));
+        settle(&ctx)?;
+        assert_eq!(memory(&ctx), before, "step {steps}");
+    }
+    Ok(())
+}
+
+/// In every state of the compaction, with work that was never submitted.
 #[test]
 fn a_context_may_go_meanwhile() -> Result<()> {
-    for steps in 0..3 {
-        let sink = ValidationSink::default();
-        let Some(ctx) = device_with(|desc| desc.validation_sink = Some(sink.clone())) else { return Ok(()) };
+    for steps in 0..4 {
+        let Some(device) = device() else { return Ok(()) };
+        let (Some(ctx), sink) = device.into_context() else { return Ok(()) };
         let gpu = upload(&ctx, &scene(), COMPACTABLE)?;
         ctx.compact(&handles(&gpu))?;
-        for _ in 0..steps {
-            ctx.flush()?;
+        (0..steps).try_for_each(|_| ctx.flush().map(drop))?;
+        if steps == 3 {
+            ctx.wait_idle()?;
+            ctx.next_frame()?;
         }
-        // Not the end of `TestDevice`, which waits.
-        let clone = Context::clone(&ctx);
-        drop(gpu);
         drop(ctx);
-        drop(clone);
+        drop(gpu);
         assert!(sink.is_empty(), "{steps} submissions: {:?}", sink.messages());
     }
     Ok(())
+}
+
+/// Compactions of one thread are carried out by whatever thread submits next.
+#[test]
+fn threads_compact_side_by_side() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let work = || -> Result<()> {
+        let (check, scene) = (HitCheck::new(&ctx)?, scene());
+        for round in 0..5 {
+            let gpu = upload(&ctx, &scene, MOVING)?;
+            ctx.compact(&handles(&gpu))?;
+            for frame in 0..3 {
+                let mut cmd = ctx.acquire_command_buffer()?;
+                cmd.build_blas(&handles(&gpu), BuildMode::Refit)?;
+                cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Refit)?;
+                ctx.submit(cmd)?;
+                check.scene(&format!("round {round}, frame {frame}"), &gpu.tlas, &scene)?;
+            }
+        }
+        Ok(())
+    };
+    std::thread::scope(|scope| {
+        let threads = [scope.spawn(work), scope.spawn(work)];
+        threads.into_iter().try_for_each(|thread| thread.join().unwrap_or_else(|_| unreachable!("it failed")))
+    })
 }
 
 fn measured() -> Result<Option<u64>> {

@@ -169,6 +169,9 @@ fn build(ctx: &TestDevice, gpu: &GpuScene, scene: &RayScene, mode: BuildMode) ->
     Ok(())
 }
 
+/// Whether a triangle is folded up, by an x coordinate of its.
+type Folded = fn(f32) -> bool;
+
 /// The number of primitives stays, but which of them have an area changes from build to build.
 #[test]
 fn triangles_fold_up_and_unfold() -> Result<()> {
@@ -178,7 +181,7 @@ fn triangles_fold_up_and_unfold() -> Result<()> {
         let whole = scene.models[0][0].mesh.clone();
         let flags = BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE;
         let gpu = scene.upload_with(&ctx, flags, flags, 0)?;
-        let half = |mesh: &Mesh, folded: fn(f32) -> bool| {
+        let half = |mesh: &Mesh, folded: Folded| {
             let mut mesh = mesh.clone();
             for corners in
                 mesh.positions.as_chunks_mut::<3>().0.iter_mut().filter(|corners| folded(corners[0][0]))
@@ -187,7 +190,7 @@ fn triangles_fold_up_and_unfold() -> Result<()> {
             }
             mesh
         };
-        let shapes: [(&str, fn(f32) -> bool, BuildMode); 4] = [
+        let shapes: [(&str, Folded, BuildMode); 4] = [
             ("left, refitted", |x| x > 0.0, BuildMode::Refit),
             ("right, rebuilt", |x| x < 0.0, BuildMode::Rebuild),
             ("left again", |x| x > 0.2, BuildMode::Rebuild),

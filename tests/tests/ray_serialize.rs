@@ -157,6 +157,25 @@ fn what_is_loaded_moves_on() -> Result<()> {
     Ok(())
 }
 
+/// Nothing was submitted in between: the question comes behind the loading.
+#[test]
+fn what_is_loaded_may_be_compacted_at_once() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let mine = Mine::new(&ctx)?;
+    let desc = mine.desc(MOVING, PrimitiveOrder::Spatial);
+    let bytes = {
+        let built = ctx.create_blas(&desc)?;
+        ctx.serialize_blas(*built)?
+    };
+    let loaded = ctx.load_blas(&desc, &bytes)?;
+    ctx.compact(&[*loaded])?;
+    let tlas = mine.show(&ctx, &loaded)?;
+    settle(&ctx)?;
+    settle(&ctx)?;
+    assert!(matches!(ctx.accel_struct_info(*loaded)?.compaction, Compaction::Done { .. }));
+    HitCheck::new(&ctx)?.scene("compacted at once", &tlas, &mine.scene)
+}
+
 /// A structure from a larger allocation is loaded into what its bytes say: no more may be built in it than fits.
 #[test]
 fn what_was_compacted_before_it_was_saved_is_refitted() -> Result<()> {

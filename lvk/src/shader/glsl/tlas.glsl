@@ -12,6 +12,7 @@ layout(set = LVK_SET, binding = LVK_BINDING_ACCEL_STRUCTS) uniform accelerationS
 #define LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES 0x20u
 #define LVK_RAY_FLAG_CULL_OPAQUE 0x40u
 #define LVK_RAY_FLAG_CULL_NO_OPAQUE 0x80u
+// Shaders that skip by kind require GL_EXT_ray_flags_primitive_culling and say layout(primitive_culling);
 #define LVK_RAY_FLAG_SKIP_TRIANGLES 0x100u
 #define LVK_RAY_FLAG_SKIP_AABBS 0x200u
 
