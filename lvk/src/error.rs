@@ -10,11 +10,12 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 /// What went wrong, separated by who can mend it.
 ///
 /// * the caller: [`StaleHandle`](Error::StaleHandle), [`InvalidUsage`](Error::InvalidUsage),
-///   [`Shader`](Error::Shader), [`PushConstants`](Error::PushConstants), [`Serialized`](Error::Serialized);
+///   [`Shader`](Error::Shader), [`PushConstants`](Error::PushConstants), [`Serialized`](Error::Serialized),
+///   [`OverBudget`](Error::OverBudget);
 /// * the device or its driver lacks something: [`NoVulkan`](Error::NoVulkan), [`NoDevice`](Error::NoDevice),
 ///   [`Unsupported`](Error::Unsupported), [`LimitExceeded`](Error::LimitExceeded);
 /// * bad luck: [`OutOfDeviceMemory`](Error::OutOfDeviceMemory), [`OutOfHostMemory`](Error::OutOfHostMemory),
-///   [`File`](Error::File),   [`DeviceLost`](Error::DeviceLost), [`Vulkan`](Error::Vulkan).
+///   [`File`](Error::File), [`DeviceLost`](Error::DeviceLost), [`Vulkan`](Error::Vulkan).
 #[derive(Debug, Clone, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -102,6 +103,21 @@ pub enum Error {
         object: String,
         /// Whether they are damaged, of another mesh, or of another device or driver.
         reason: String,
+    },
+    /// An acceleration structure does not fit the budget of the context.
+    #[error(
+        "'{object}' needs {bytes} bytes, but acceleration structures have {used} of their budget of {budget} in use; \
+         destroy or compact some, or raise ContextDesc::accel_budget_bytes"
+    )]
+    OverBudget {
+        /// Debug name of the structure.
+        object: String,
+        /// Bytes it needs.
+        bytes: u64,
+        /// Bytes of all structures alive, those included that wait for the GPU to be done with them.
+        used: u64,
+        /// [`ContextDesc::accel_budget_bytes`](crate::ContextDesc).
+        budget: u64,
     },
     /// Device memory is exhausted.
     #[error("out of device memory while creating '{object}' ({bytes} bytes)")]

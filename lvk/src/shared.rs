@@ -23,7 +23,7 @@ use crate::pipeline::{
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::store::Store;
 use crate::submit::Submitter;
-use crate::upload::Staging;
+use crate::upload::{SpareBuffers, Staging};
 
 /// The parts of a context below the command layer. Fields are dropped in this order, the device last.
 pub(crate) struct Shared {
@@ -34,6 +34,8 @@ pub(crate) struct Shared {
     pub(crate) scratch: ScratchBuffer,
     pub(crate) accel_storage: AccelStorage,
     pub(crate) kernels: Kernels,
+    /// Mapped buffers for lists of instances that are kept for a while.
+    pub(crate) instance_buffers: SpareBuffers,
     /// For each top-level structure where the rows of its instances lie; none without acceleration structures.
     pub(crate) tlas_table: Option<Arc<Buffer>>,
     pub(crate) layout: PipelineLayout,
@@ -76,8 +78,8 @@ pub(crate) enum Garbage {
     Contents(Box<TlasContents>),
     /// What a compacted structure took the place of, or what took its place.
     Body(#[expect(dead_code, reason = "held only to be dropped")] Arc<BlasBody>),
-    /// A map of primitives on its way to the GPU, for whose structure there may be no memory.
-    Table(Arc<Buffer>),
+    /// A buffer that a command buffer uses, whoever else holds it: its owner may fail to come into being.
+    Held(Arc<Buffer>),
     /// Answered sizes, which may be there before the GPU is done with the command buffer that asked.
     SizeQuery(#[expect(dead_code, reason = "held only to be dropped")] Arc<SizeQuery>),
 }
@@ -129,9 +131,9 @@ impl Shared {
             Garbage::Sampler(sampler) => self.bindless.free_sampler(sampler.slot),
             Garbage::AccelStruct(object) => self.dispose_accel_struct(&object),
             Garbage::RayTracingPipeline(pipeline) => self.submitter.forget(pipeline.table.id),
-            Garbage::Contents(contents) => self.forget_source(&contents),
-            Garbage::Table(table) => {
-                if let Some(unused) = Arc::into_inner(table) {
+            Garbage::Contents(contents) => self.take_source(*contents),
+            Garbage::Held(buffer) => {
+                if let Some(unused) = Arc::into_inner(buffer) {
                     self.submitter.forget(unused.id);
                 }
             }
@@ -177,18 +179,20 @@ impl Shared {
             AccelKind::Blas(blas) => {
                 for map in blas.parts.iter().filter_map(|part| part.map.as_ref()) {
                     self.submitter.forget(map.table.id);
-                    self.submitter.forget(map.inputs.id);
+                    map.inputs().into_iter().for_each(|inputs| self.submitter.forget(inputs.id));
                 }
             }
         }
     }
 
-    /// A source that was kept lies in buffers of the library's own.
-    fn forget_source(&self, contents: &TlasContents) {
-        let Some(source) = &contents.source else { return };
-        let bytes = [Some(&source.instances), source.owners.as_ref()];
-        let buffers = bytes.into_iter().flatten().filter_map(|bytes| bytes.buffer.as_ref());
-        buffers.for_each(|buffer| self.submitter.forget(buffer.id));
+    /// A source that was kept lies in buffers of the library's own; the next one may have the mapped one.
+    fn take_source(&self, contents: TlasContents) {
+        let Some(source) = contents.source else { return };
+        let bytes = [Some(source.instances), source.owners];
+        for buffer in bytes.into_iter().flatten().filter_map(|bytes| bytes.buffer) {
+            self.submitter.forget(buffer.id);
+            self.instance_buffers.give(buffer);
+        }
     }
 
     /// Some top-level structure shows what compaction has replaced.

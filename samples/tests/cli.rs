@@ -423,6 +423,25 @@ fn a_profile_decides_the_path_and_is_told() {
     }
 }
 
+/// The phone takes the courtyard in parts only, and the picture is made all the same.
+#[test]
+fn a_scene_too_large_for_the_profile_is_split_and_told() {
+    if !has_device() {
+        return;
+    }
+    let desk = Desk::new();
+    let outcome = desk.run(&["--profile", "mali-g715", "--frames", "1", "--validate"]);
+    outcome.assert_success();
+    let told = [
+        "profile   mali-g715",
+        "courtyard: 276930 triangles",
+        "split into 4 parts",
+        "validation messages: 0",
+    ];
+    assert_names(&outcome.out, &told);
+    assert_eq!(desk.picture_size(), (WIDTH, HEIGHT));
+}
+
 /// `hybrid | head -1` must not keep the picture from being written.
 #[test]
 fn a_reader_that_goes_away_does_not_cost_the_picture() {

@@ -6,7 +6,7 @@ use std::ffi::CStr;
 use lvk::ash::{self, vk};
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Capabilities, Context, ContextDesc, DeviceProfile,
-    Error, FeatureRequest, Holder, Triangles,
+    Error, FeatureRequest, Holder, TlasDesc, Triangles,
 };
 use lvk_tests::device::vulkan;
 use lvk_tests::{TestDevice, device, device_with};
@@ -134,6 +134,45 @@ fn sizes_are_those_of_the_phone_where_it_needs_more() {
     let mali = sizes(&ctx);
     assert_eq!(mali.build_scratch_bytes, own.build_scratch_bytes.max(2_805 * TRIANGLES));
     assert_eq!(mali.structure_bytes, own.structure_bytes.max(219 * TRIANGLES));
+}
+
+/// A top-level structure cannot be split: it is refused by name, whichever of its sizes is over.
+#[test]
+fn a_profile_limits_top_levels() {
+    const INSTANCES: u32 = 20_000;
+    let desc = TlasDesc { capacity: INSTANCES, debug_name: "the world", ..Default::default() };
+    let Some(real) = device() else { return };
+    if !(real.capabilities().ray_query || real.capabilities().ray_tracing_pipeline) {
+        return;
+    }
+    let sizes = real.accel_struct_sizes(*real.create_tlas(&desc).unwrap()).unwrap();
+    let (structure, scratch) = (sizes.structure_bytes, sizes.build_scratch_bytes);
+    let alignment = u64::from(real.capabilities().limits.scratch_alignment);
+    let any = DeviceProfile { name: "phone".into(), ..DeviceProfile::default() };
+    let larger = structure.max(scratch + alignment);
+    for (profile, what) in [
+        (DeviceProfile { max_accel_structure_bytes: structure - 1, ..any.clone() }, Some("size of the top")),
+        (DeviceProfile { max_accel_scratch_bytes: scratch - 1, ..any.clone() }, Some("scratch of the top")),
+        (
+            DeviceProfile { max_storage_buffer_range: structure.min(scratch) - 1, ..any.clone() },
+            Some("of the top"),
+        ),
+        (DeviceProfile { max_storage_buffer_range: larger, ..any }, None),
+    ] {
+        let Some(ctx) = under(&profile) else { return };
+        match (ctx.create_tlas(&desc), what) {
+            (Ok(_), None) => {}
+            (Err(Error::LimitExceeded { object, what: found, requested, limit }), Some(what)) => {
+                assert!(
+                    object == "the world" && found.contains(what) && requested > limit,
+                    "{object}: {found}"
+                );
+            }
+            (other, _) => unreachable!("{what:?}: {:?}", other.map(drop)),
+        }
+        let few = TlasDesc { capacity: 8, ..desc };
+        drop(ctx.create_tlas(&few).unwrap());
+    }
 }
 
 #[test]

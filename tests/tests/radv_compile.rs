@@ -1,4 +1,4 @@
-//! Every pipeline of the samples compiles for AMD cards, with no card in the machine.
+//! Every pipeline of the library and of the samples compiles for AMD cards, with no card in the machine.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::Path;
@@ -8,6 +8,19 @@ use lvk_samples::pipelines::{self, SamplePipeline, SampleStage};
 use lvk_tests::child::on_radv;
 use lvk_tests::device::vulkan;
 use lvk_tests::radv::Radv;
+
+/// The compute shaders that the library runs by itself.
+const KERNELS: [(&str, &str); 2] = [
+    ("gather", include_str!("../../lvk/src/kernel/gather.comp.glsl")),
+    ("instances", include_str!("../../lvk/src/kernel/instances.comp.glsl")),
+];
+
+fn kernels() -> impl Iterator<Item = SamplePipeline> {
+    KERNELS.into_iter().map(|(name, text)| {
+        let stage = SampleStage { stage: ShaderStage::Compute, text, defines: &[], name };
+        SamplePipeline { name, stages: vec![stage], color: Vec::new(), depth: None }
+    })
+}
 
 /// The text of a constant in the program of the `triangle` sample.
 fn triangle_text(constant: &str) -> &'static str {
@@ -30,8 +43,8 @@ fn compile_all(chip: &str) {
     let radv = Radv::open();
     assert!(radv.capabilities.device_name.contains(chip), "{:?}", radv.capabilities);
     assert!(radv.capabilities.ray_query && radv.capabilities.ray_tracing_pipeline);
-    let shipped: Vec<_> = pipelines::all().into_iter().chain([triangle()]).collect();
-    assert!(shipped.len() >= 6);
+    let shipped: Vec<_> = pipelines::all().into_iter().chain([triangle()]).chain(kernels()).collect();
+    assert!(shipped.len() >= 8);
     for pipeline in shipped {
         let programs = radv.compile(&pipeline);
         println!("{chip}, {}: {programs:?}", pipeline.name);
@@ -39,6 +52,20 @@ fn compile_all(chip: &str) {
         assert!(programs.len() >= expected, "{}: {programs:?}", pipeline.name);
         assert!(programs.values().all(|instructions| *instructions > 0), "{}: {programs:?}", pipeline.name);
     }
+}
+
+#[test]
+fn every_kernel_of_the_library_is_compiled() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../lvk/src/kernel");
+    let mut texts = Vec::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.to_string_lossy().ends_with(".comp.glsl") {
+            texts.push(std::fs::read_to_string(path).unwrap());
+        }
+    }
+    assert_eq!(texts.len(), KERNELS.len());
+    assert!(KERNELS.iter().all(|(_, text)| texts.iter().any(|found| found == text)));
 }
 
 #[test]

@@ -249,7 +249,9 @@ fn split_meshes_over_the_memory_budget_leave_nothing_behind() -> Result<()> {
     let desc = BlasDesc { geometries: &geometries, debug_name: "ring", ..Default::default() };
     let before = of_structures(&ctx);
     for submits in [true, false, true] {
-        for refused in [ctx.create_blas(&desc), ctx.load_blas(&desc, &bytes)] {
+        // SAFETY: the library wrote the bytes, on a context before.
+        let loaded = unsafe { ctx.load_blas(&desc, &bytes) };
+        for refused in [ctx.create_blas(&desc), loaded] {
             assert!(
                 matches!(&refused, Err(Error::InvalidUsage { object, .. }) if object == "ring"),
                 "{refused:?}"
@@ -300,6 +302,34 @@ fn failed_creations_leave_nothing_behind() -> Result<()> {
     ctx.wait_idle()?;
     assert_eq!(of_structures(&ctx), before);
     Ok(())
+}
+
+/// What lies between the vertices is read back too, in several pieces that end anywhere.
+#[test]
+fn inputs_may_be_larger_than_what_is_read_back_at_once() -> Result<()> {
+    const STRIDE: u64 = (1 << 20) + 12;
+    let profile = DeviceProfile { name: "small".into(), max_blas_primitives: 30, ..DeviceProfile::default() };
+    let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
+    let scene = RayScene::single(Mesh::torus(10), Layout::Indexed32);
+    let (_buffers, geometries) = upload_geometries(&ctx, &scene.models[0])?;
+    let BlasGeometry::Triangles(packed) = geometries[0] else { unreachable!("triangles") };
+    let size_bytes = u64::from(packed.vertex_count) * STRIDE;
+    assert!(size_bytes > 3 * (32 << 20), "{size_bytes} bytes");
+    let usage = BufferUsage::ACCEL_INPUT;
+    let wide = ctx.create_buffer(&BufferDesc { size_bytes, usage, ..Default::default() })?;
+    for vertex in 0..u64::from(packed.vertex_count) {
+        let mut bytes = [0; 12];
+        let from = packed.vertex_offset + vertex * packed.vertex_stride;
+        ctx.download_buffer(packed.vertex_buffer, from, &mut bytes)?;
+        ctx.upload_buffer(*wide, vertex * STRIDE, &bytes)?;
+    }
+    let spread = Triangles { vertex_buffer: *wide, vertex_offset: 0, vertex_stride: STRIDE, ..packed };
+    let geometries = [BlasGeometry::Triangles(spread)];
+    let blas = [ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?];
+    assert!(ctx.accel_struct_info(*blas[0])?.parts >= 7);
+    let shown = instances(&scene.placed, &blas);
+    let tlas = ctx.create_tlas(&TlasDesc { instances: &shown, ..Default::default() })?;
+    HitCheck::new(&ctx)?.scene("spread vertices", &tlas, &scene)
 }
 
 #[test]

@@ -351,3 +351,23 @@ fn a_mesh_over_the_limits_of_the_phone_is_split() -> Result<()> {
     assert!(ctx.accel_memory().scratch_bytes <= (256 << 20) + 256);
     Ok(())
 }
+
+/// A mesh for which the phone would ask 30 times what it can give, all of it a thousand times smaller.
+#[test]
+fn a_mesh_far_over_the_limits_of_the_phone_is_hit_like_the_whole_one() -> Result<()> {
+    const TRIANGLES: u64 = 3_200;
+    let phone = DeviceProfile::mali_g715();
+    let profile = DeviceProfile {
+        name: "little phone".into(),
+        max_accel_scratch_bytes: TRIANGLES * phone.scratch_bytes_per_primitive / 30,
+        ray_tracing_pipeline: true,
+        ..phone
+    };
+    let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
+    let scene = RayScene::single(Mesh::torus(40), Layout::Indexed32);
+    assert_eq!(scene.models[0][0].mesh.triangles.len() as u64, TRIANGLES);
+    let gpu = scene.upload(&ctx)?;
+    let info = ctx.accel_struct_info(*gpu.models[0])?;
+    assert!((31..=50).contains(&info.parts) && info.is_remapped, "{info:?}");
+    HitCheck::new(&ctx)?.scene("many parts", &gpu.tlas, &scene)
+}

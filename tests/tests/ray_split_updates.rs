@@ -10,7 +10,7 @@ use lvk_tests::bender::{Bender, bent};
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::hit_check::{HitCheck, rays_for};
 use lvk_tests::meshes::Mesh;
-use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances};
+use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances, upload_geometries};
 use lvk_tests::ray_tracer::How;
 use lvk_tests::{TestDevice, device_with};
 
@@ -335,6 +335,50 @@ fn a_triangle_that_does_not_fit_is_an_error() -> Result<()> {
         assert!(object == "huge" && requested > limit, "{object}: {what} {requested} {limit}");
         ctx.wait_idle()?;
         assert_eq!(ctx.accel_memory(), before);
+    }
+    Ok(())
+}
+
+/// Indices gathered for the parts are of no use once nothing can build them again.
+#[test]
+fn compaction_frees_what_only_builds_read() -> Result<()> {
+    let Some(ctx) = split_device() else { return Ok(()) };
+    let (scene, check) = (scene(), HitCheck::new(&ctx)?);
+    for (flags, freed) in [(BuildFlags::FAST_TRACE, true), (UPDATABLE, false)] {
+        let gpu = scene.upload_with(&ctx, flags | BuildFlags::ALLOW_COMPACTION, UPDATABLE, 0)?;
+        let (ring, triangles) = (*gpu.models[0], scene.models[0][0].mesh.triangles.len() as u64);
+        let before = ctx.accel_struct_info(ring)?.table_bytes;
+        ctx.compact(&[ring])?;
+        (0..3).try_for_each(|_| ctx.wait_idle())?;
+        let info = ctx.accel_struct_info(ring)?;
+        assert!(matches!(info.compaction, Compaction::Done { .. }), "{info:?}");
+        assert_eq!(before - info.table_bytes, if freed { triangles * 12 } else { 0 });
+        check.scene("compacted", &gpu.tlas, &scene)?;
+        let mut cmd = ctx.acquire_command_buffer()?;
+        assert!(matches!(cmd.build_blas(&[ring], BuildMode::Rebuild), Err(Error::InvalidUsage { .. })));
+        let refit = cmd.build_blas(&[ring], BuildMode::Refit);
+        assert_eq!(refit.is_err(), freed, "{refit:?}");
+        ctx.wait(ctx.submit(cmd)?)?;
+        check.scene("refitted or not", &gpu.tlas, &scene)?;
+        let bytes = ctx.serialize_blas(ring)?;
+        let (_buffers, geometries) = upload_geometries(&ctx, &scene.models[0])?;
+        let desc = BlasDesc {
+            geometries: &geometries,
+            flags: flags | BuildFlags::ALLOW_COMPACTION,
+            ..Default::default()
+        };
+        // SAFETY: the library wrote the bytes just now.
+        let loaded = unsafe { ctx.load_blas(&desc, &bytes) }?;
+        ctx.wait_idle()?;
+        assert_eq!(ctx.accel_struct_info(*loaded)?.table_bytes, info.table_bytes);
+        let models = [loaded];
+        let single = RayScene {
+            placed: vec![Placed::new(0, Affine3A::IDENTITY)],
+            ..RayScene::single(scene.models[0][0].mesh.clone(), Layout::Indexed32)
+        };
+        let shown = instances(&single.placed, &models);
+        let tlas = ctx.create_tlas(&TlasDesc { instances: &shown, ..Default::default() })?;
+        check.scene("loaded", &tlas, &single)?;
     }
     Ok(())
 }

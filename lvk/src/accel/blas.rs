@@ -25,9 +25,20 @@ struct BlasState {
     open_builds: u32,
     /// Builds submitted so far, refits not counted; tells whether a compacted size still holds.
     builds: u64,
-    /// Refits recorded since the last rebuild.
+    /// Refits submitted since the last rebuild.
     refits: u32,
-    compaction_requested: bool,
+    wish: CompactionWish,
+}
+
+/// What has become of the wish to compact a structure that is not compacted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum CompactionWish {
+    /// Nobody has it.
+    None,
+    /// It is under way.
+    Open,
+    /// It could not be met.
+    Failed,
 }
 
 /// What one part is built from.
@@ -67,7 +78,7 @@ impl Blas {
             open_builds: 0,
             builds: 0,
             refits: 0,
-            compaction_requested: false,
+            wish: CompactionWish::None,
         };
         Self { geometries, transforms, parts, state: Mutex::new(state) }
     }
@@ -99,12 +110,18 @@ impl Blas {
         Arc::clone(&state.body)
     }
 
-    /// The command buffer with a recorded build was submitted, or given up; `rebuilt` if it was submitted and is no
-    /// refit, which leaves sizes as they are.
-    pub(crate) fn close_build(&self, rebuilt: bool) {
+    /// The command buffer with a recorded build, a refit or not, was submitted, or given up.
+    pub(crate) fn close_build(&self, submitted: bool, refit: bool) {
         let mut state = self.lock();
-        state.builds += u64::from(rebuilt);
         state.open_builds = state.open_builds.saturating_sub(1);
+        match (submitted, refit) {
+            (false, _) => {}
+            (true, true) => state.refits = state.refits.saturating_add(1),
+            (true, false) => {
+                state.builds += 1;
+                state.refits = 0;
+            }
+        }
     }
 
     /// How many builds were submitted so far, refits not counted.
@@ -117,28 +134,63 @@ impl Blas {
         self.lock().open_builds > 0
     }
 
-    /// Refits recorded since the last rebuild.
+    /// Refits submitted since the last rebuild.
     pub(crate) fn refits(&self) -> u32 {
         self.lock().refits
     }
 
-    /// A build was recorded, a refit or not.
-    pub(crate) fn count_refit(&self, refit: bool) {
-        let mut state = self.lock();
-        state.refits = if refit { state.refits.saturating_add(1) } else { 0 };
+    /// What has become of the wish to compact it.
+    pub(crate) fn wish(&self) -> CompactionWish {
+        self.lock().wish
     }
 
-    /// Compaction is under way from now on, or no longer; answers whether it was before.
-    pub(crate) fn request_compaction(&self, on: bool) -> bool {
-        std::mem::replace(&mut self.lock().compaction_requested, on)
-    }
-
-    /// Whether compaction is under way.
-    pub(crate) fn is_compacting(&self) -> bool {
-        self.lock().compaction_requested
+    /// Changes that; answers what it was before.
+    pub(crate) fn set_wish(&self, wish: CompactionWish) -> CompactionWish {
+        std::mem::replace(&mut self.lock().wish, wish)
     }
 
     fn lock(&self) -> MutexGuard<'_, BlasState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn blas() -> Blas {
+        let body = BlasBody { structures: Vec::new(), compacted_from: None, rebuildable: true };
+        Blas::new(Vec::new(), None, Vec::new(), body)
+    }
+
+    #[test]
+    fn builds_given_up_leave_the_counts_alone() {
+        let blas = blas();
+        for (submitted, refit, counts) in [
+            (true, false, (1, 0)),
+            (true, true, (1, 1)),
+            (false, true, (1, 1)),
+            (true, true, (1, 2)),
+            (false, false, (1, 2)),
+            (true, false, (2, 0)),
+        ] {
+            blas.open_build();
+            assert!(blas.has_open_builds());
+            blas.close_build(submitted, refit);
+            assert_eq!((blas.builds(), blas.refits()), counts);
+            assert!(!blas.has_open_builds());
+        }
+    }
+
+    #[test]
+    fn a_body_is_replaced_only_where_no_build_came_in_between() {
+        let blas = blas();
+        let copy = || BlasBody { structures: Vec::new(), compacted_from: Some(1), rebuildable: false };
+        blas.open_build();
+        assert!(blas.replace_body(copy(), 0).is_none(), "a build waits for its submission");
+        blas.close_build(true, false);
+        assert!(blas.replace_body(copy(), 0).is_none(), "it was built since");
+        assert!(blas.replace_body(copy(), 1).is_some());
+        assert_eq!(blas.body().compacted_from, Some(1));
     }
 }

@@ -2,7 +2,7 @@
 //! must know to put the parts together again.
 //!
 //! All numbers are little-endian: magic (8 bytes), version (`u32`), length of the whole (`u64`), checksum of all that
-//! follows (`u64`); flags, then the number of geometries and each of them (three `u32`), then the number of parts and
+//! follows (`u64`); flags, then the number of geometries and each of them (seven `u32`), then the number of parts and
 //! each of them: bytes of the driver's data (`u64`), words in the map plus one, or 0 without a map (`u64`), the data,
 //! the map.
 
@@ -26,11 +26,25 @@ pub(crate) struct BlobGeometry {
     pub(crate) flags: u32,
 }
 
-/// What a geometry consists of.
+/// What a geometry consists of, as far as a refit must not change it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum BlobGeometryKind {
-    Triangles,
+    Triangles {
+        /// Number of a `VkFormat`.
+        vertex_format: u32,
+        vertex_count: u32,
+        indices: BlobIndices,
+        is_transformed: bool,
+    },
     Boxes,
+}
+
+/// How triangles are indexed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum BlobIndices {
+    None,
+    U16,
+    U32,
 }
 
 /// One structure.
@@ -83,8 +97,9 @@ pub(crate) enum BlobError {
 }
 
 const MAGIC: [u8; 8] = *b"\x89lvkblas";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const HEADER_BYTES: usize = 28;
+const GEOMETRY_WORDS: usize = 7;
 
 /// Writes a structure as bytes.
 pub(crate) fn encode(blob: &Blob) -> Vec<u8> {
@@ -95,11 +110,7 @@ pub(crate) fn encode(blob: &Blob) -> Vec<u8> {
     body.extend(blob.flags.to_le_bytes());
     body.extend((blob.geometries.len() as u32).to_le_bytes());
     for geometry in &blob.geometries {
-        let kind = match geometry.kind {
-            BlobGeometryKind::Triangles => 0,
-            BlobGeometryKind::Boxes => 1,
-        };
-        body.extend([kind, geometry.primitive_count, geometry.flags].into_iter().flat_map(u32::to_le_bytes));
+        body.extend(geometry_words(geometry).into_iter().flat_map(u32::to_le_bytes));
     }
     body.extend((blob.parts.len() as u32).to_le_bytes());
     for part in &blob.parts {
@@ -139,6 +150,22 @@ pub(crate) fn decode(bytes: &[u8]) -> Result<Blob, BlobError> {
     reader.blob()
 }
 
+/// Kind, primitives, flags; then of triangles vertex format, vertices, bits of an index, whether there is a matrix.
+fn geometry_words(geometry: &BlobGeometry) -> [u32; GEOMETRY_WORDS] {
+    let (count, flags) = (geometry.primitive_count, geometry.flags);
+    match geometry.kind {
+        BlobGeometryKind::Triangles { vertex_format, vertex_count, indices, is_transformed } => {
+            let index_bits = match indices {
+                BlobIndices::None => 0,
+                BlobIndices::U16 => 16,
+                BlobIndices::U32 => 32,
+            };
+            [0, count, flags, vertex_format, vertex_count, index_bits, is_transformed.into()]
+        }
+        BlobGeometryKind::Boxes => [1, count, flags, 0, 0, 0, 0],
+    }
+}
+
 /// Takes numbers from the front of bytes.
 struct Reader<'a> {
     rest: &'a [u8],
@@ -160,13 +187,26 @@ impl<'a> Reader<'a> {
     }
 
     fn geometry(&mut self) -> Result<BlobGeometry, BlobError> {
-        let kind = match self.u32().ok_or(SHORT)? {
-            0 => BlobGeometryKind::Triangles,
-            1 => BlobGeometryKind::Boxes,
+        let mut words = [0; GEOMETRY_WORDS];
+        for word in &mut words {
+            *word = self.u32().ok_or(SHORT)?;
+        }
+        let [kind, primitive_count, flags, vertex_format, vertex_count, index_bits, matrix] = words;
+        let indices = match index_bits {
+            0 => Some(BlobIndices::None),
+            16 => Some(BlobIndices::U16),
+            32 => Some(BlobIndices::U32),
+            _ => None,
+        };
+        let kind = match (kind, indices, matrix) {
+            (0, Some(indices), 0 | 1) => {
+                let is_transformed = matrix == 1;
+                BlobGeometryKind::Triangles { vertex_format, vertex_count, indices, is_transformed }
+            }
+            (1, ..) if words[3..] == [0; 4] => BlobGeometryKind::Boxes,
             _ => return Err(BlobError::Malformed("it holds a geometry of an unknown kind")),
         };
-        let primitive_count = self.u32().ok_or(SHORT)?;
-        Ok(BlobGeometry { kind, primitive_count, flags: self.u32().ok_or(SHORT)? })
+        Ok(BlobGeometry { kind, primitive_count, flags })
     }
 
     fn part(&mut self) -> Result<BlobPart, BlobError> {
@@ -208,7 +248,10 @@ impl<'a> Reader<'a> {
 
 fn encoded_bytes(blob: &Blob) -> usize {
     let part = |part: &BlobPart| 16 + part.driver.len() + part.map.as_ref().map_or(0, |map| 4 * map.len());
-    HEADER_BYTES + 12 + 12 * blob.geometries.len() + blob.parts.iter().map(part).sum::<usize>()
+    HEADER_BYTES
+        + 12
+        + 4 * GEOMETRY_WORDS * blob.geometries.len()
+        + blob.parts.iter().map(part).sum::<usize>()
 }
 
 /// FNV-1a, 64 bits: every step can be undone, so that a single changed byte always changes the sum.
@@ -225,7 +268,16 @@ mod tests {
     use super::*;
 
     fn any_blob() -> impl Strategy<Value = Blob> {
-        let kind = prop_oneof![Just(BlobGeometryKind::Triangles), Just(BlobGeometryKind::Boxes)];
+        let indices = prop_oneof![Just(BlobIndices::None), Just(BlobIndices::U16), Just(BlobIndices::U32)];
+        let triangles = (any::<u32>(), any::<u32>(), indices, any::<bool>()).prop_map(
+            |(vertex_format, vertex_count, indices, is_transformed)| BlobGeometryKind::Triangles {
+                vertex_format,
+                vertex_count,
+                indices,
+                is_transformed,
+            },
+        );
+        let kind = prop_oneof![triangles, Just(BlobGeometryKind::Boxes)];
         let geometry = (kind, any::<u32>(), any::<u32>())
             .prop_map(|(kind, primitive_count, flags)| BlobGeometry { kind, primitive_count, flags });
         let driver = prop::collection::vec(any::<u8>(), VERSION_DATA_BYTES..100);
@@ -267,7 +319,7 @@ mod tests {
             decode(&bytes)
         };
         assert_eq!(changed(0), Err(BlobError::NotABlob));
-        assert_eq!(changed(8), Err(BlobError::Version { found: 0 }));
+        assert_eq!(changed(8), Err(BlobError::Version { found: VERSION ^ 1 }));
         assert_eq!(changed(good.len() - 1), Err(BlobError::Checksum));
         assert_eq!(decode(b"not at all one"), Err(BlobError::NotABlob));
         assert_eq!(
@@ -285,7 +337,11 @@ mod tests {
             words(&[0]),
             words(&[0, u32::MAX, 0]),
             words(&[0, 0, u32::MAX, 0]),
-            words(&[0, 1, 7, 0, 0, 0]),
+            words(&[0, 1, 7, 0, 0, 0, 0, 0, 0, 0]),
+            words(&[0, 1, 0, 3, 0, 106, 9, 8, 0, 0]),
+            words(&[0, 1, 0, 3, 0, 106, 9, 16, 2, 0]),
+            words(&[0, 1, 1, 3, 0, 0, 0, 16, 0, 0]),
+            words(&[0, 1, 0, 3, 0, 106, 9, 16, 1]),
             words(&[0, 0, 1, u32::MAX, u32::MAX, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]),
             [words(&[0, 0, 1, 32, 0, u32::MAX, u32::MAX]), vec![0; 32]].concat(),
             [words(&[0, 0, 1, 31, 0, 0, 0]), vec![0; 31]].concat(),
@@ -294,7 +350,9 @@ mod tests {
         for body in nonsense {
             assert!(matches!(decode(&sealed(&body)), Err(BlobError::Malformed(_))), "{body:?}");
         }
-        assert!(decode(&sealed(&words(&[0, 0, 0]))).is_ok());
+        for body in [words(&[0, 0, 0]), words(&[0, 1, 0, 3, 0, 106, 9, 16, 1, 0])] {
+            assert!(decode(&sealed(&body)).is_ok(), "{body:?}");
+        }
     }
 
     proptest! {

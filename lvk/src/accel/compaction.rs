@@ -1,9 +1,66 @@
-//! Compactions under way: sizes asked of the GPU, and for whom.
+//! Compactions under way: sizes are asked of the GPU, and the copies made once it has answered.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
 
+use super::blas::BlasBody;
 use super::structure::AccelStruct;
+use crate::error::{Error, Result};
 use crate::resource::QueryPool;
+
+/// All compactions of a context.
+#[derive(Default)]
+pub(crate) struct Compactions {
+    /// Those whose sizes the GPU is to answer.
+    pub(crate) asked: Vec<Arc<SizeQuery>>,
+    /// Copies to be made.
+    pub(crate) copies: Vec<PlannedCopy>,
+    /// What copies took the place of: memory that comes back.
+    pub(crate) replaced: Vec<Weak<BlasBody>>,
+}
+
+/// A copy whose sizes are known.
+pub(crate) struct PlannedCopy {
+    /// Nothing is kept for the sake of its copy.
+    pub(crate) target: Weak<AccelStruct>,
+    /// Bytes of each part.
+    pub(crate) sizes: Vec<u64>,
+    /// How many builds the structure had seen when it was asked.
+    pub(crate) builds: u64,
+    /// Why there was no room for it when that was last tried.
+    pub(crate) refused: Option<Refusal>,
+}
+
+/// There was no room for a copy.
+pub(crate) struct Refusal {
+    pub(crate) error: Error,
+    /// Bytes that structures had in use.
+    pub(crate) used_bytes: u64,
+}
+
+impl Compactions {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.asked.is_empty() && self.copies.is_empty()
+    }
+
+    /// Forgets what is freed by now.
+    pub(crate) fn forget_freed(&mut self) {
+        self.replaced.retain(|body| body.strong_count() > 0);
+    }
+
+    /// The copies without room, where none of what is under way will free any.
+    pub(crate) fn take_stuck(&mut self) -> Vec<PlannedCopy> {
+        let waits = |copy: &PlannedCopy| copy.refused.is_none();
+        let hope = !self.asked.is_empty() || !self.replaced.is_empty() || self.copies.iter().any(waits);
+        if hope { Vec::new() } else { std::mem::take(&mut self.copies) }
+    }
+}
+
+impl PlannedCopy {
+    /// Whether to try it, with so many bytes of structures in use.
+    pub(crate) fn is_worth_trying(&self, used_bytes: u64) -> bool {
+        self.refused.as_ref().is_none_or(|refusal| used_bytes < refusal.used_bytes)
+    }
+}
 
 /// Compacted sizes asked for together.
 pub(crate) struct SizeQuery {
@@ -26,9 +83,54 @@ impl SizeQuery {
             self.targets.iter().map(builds).collect();
     }
 
+    /// The copies to be made, once the GPU has answered.
+    pub(crate) fn answer(&self) -> Result<Option<Vec<PlannedCopy>>> {
+        let Some(builds) = self.builds() else { return Ok(None) };
+        let sizes: Option<Vec<_>> = self.pool.values(0, self.pool.count)?.into_iter().collect();
+        let Some(sizes) = sizes else { return Ok(None) };
+        let copy = |((target, first), builds): (&(Arc<AccelStruct>, u32), u64)| {
+            let parts = sizes.iter().skip(*first as usize).take(target.blas()?.parts.len());
+            let (target, sizes) = (Arc::downgrade(target), parts.copied().collect());
+            Ok(PlannedCopy { target, sizes, builds, refused: None })
+        };
+        self.targets.iter().zip(builds).map(copy).collect::<Result<_>>().map(Some)
+    }
+
     /// The builds each target's size is of; `None` before the submission.
-    pub(crate) fn builds(&self) -> Option<Vec<u64>> {
+    fn builds(&self) -> Option<Vec<u64>> {
         let builds = self.builds.lock().unwrap_or_else(PoisonError::into_inner);
         (builds.len() == self.targets.len()).then(|| builds.clone())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn copy(used_bytes: Option<u64>) -> PlannedCopy {
+        let refused = used_bytes.map(|used_bytes| Refusal { error: Error::usage("", ""), used_bytes });
+        PlannedCopy { target: Weak::new(), sizes: Vec::new(), builds: 1, refused }
+    }
+
+    #[test]
+    fn what_had_no_room_is_tried_again_when_memory_was_freed() {
+        assert!(copy(None).is_worth_trying(100));
+        assert!(copy(Some(100)).is_worth_trying(99));
+        assert!(!copy(Some(100)).is_worth_trying(100));
+    }
+
+    #[test]
+    fn copies_are_given_up_when_nothing_will_free_memory() {
+        let body = Arc::new(BlasBody { structures: Vec::new(), compacted_from: None, rebuildable: true });
+        let mut all = Compactions { copies: vec![copy(Some(1)), copy(None)], ..Default::default() };
+        assert!(all.take_stuck().is_empty(), "another copy is not tried yet");
+        all.copies.pop();
+        all.replaced.push(Arc::downgrade(&body));
+        all.forget_freed();
+        assert!(all.take_stuck().is_empty(), "a replaced body will be freed");
+        drop(body);
+        all.forget_freed();
+        assert_eq!(all.take_stuck().len(), 1);
+        assert!(all.is_empty());
     }
 }

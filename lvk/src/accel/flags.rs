@@ -112,7 +112,8 @@ pub enum BuildMode {
     /// Moves the boxes of the present tree. Needs [`BuildFlags::ALLOW_UPDATE`] and unchanged counts.
     Refit,
     /// Refits where that is allowed, and rebuilds where it is not (no [`BuildFlags::ALLOW_UPDATE`], another number of
-    /// instances) or when this many refits in a row have worn the tree out. 16 to 64 suit most animations.
+    /// instances) or when this many submitted refits in a row have worn the tree out. 16 to 64 suit most animations. A
+    /// bottom-level structure without room for a rebuild, since it was compacted, is refitted on.
     Auto {
         /// Most refits between two rebuilds.
         max_refits: u32,

@@ -1,6 +1,6 @@
 //! Which of the caller's primitives a part holds, and the inputs gathered for it.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Result, check_limit};
 use crate::gpu::Gpu;
@@ -18,7 +18,9 @@ const BOX_BYTES: u64 = 24;
 /// the mesh's primitives. Shaders read it to answer the caller's number, and the kernel that gathers inputs does too.
 pub(crate) struct PrimitiveMap {
     pub(crate) table: Arc<Buffer>,
-    pub(crate) inputs: Arc<Buffer>,
+    /// The gathered inputs; none once no build can come any more.
+    inputs: Mutex<Option<Arc<Buffer>>>,
+    inputs_address: u64,
     /// First primitive of each geometry in `inputs`.
     firsts: Vec<u32>,
     primitive_bytes: u64,
@@ -31,18 +33,30 @@ impl PrimitiveMap {
         let total: u64 = geometries.iter().map(|list| list.len() as u64).sum();
         let words = total + geometries.len() as u64;
         check_limit(name, "primitives and geometries of a part", words, u32::MAX.into())?;
+        let inputs = Arc::new(new_buffer(gpu, name, total * primitive_bytes, BufferUsage::ACCEL_INPUT)?);
         Ok(Self {
             table: Arc::new(new_buffer(gpu, name, words * 4, BufferUsage::STORAGE)?),
-            inputs: Arc::new(new_buffer(gpu, name, total * primitive_bytes, BufferUsage::ACCEL_INPUT)?),
+            inputs_address: inputs.address,
+            inputs: Mutex::new(Some(inputs)),
             firsts: firsts(geometries),
             primitive_bytes,
         })
     }
 
+    /// The gathered inputs, unless they were taken.
+    pub(crate) fn inputs(&self) -> Option<Arc<Buffer>> {
+        self.inputs.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// Takes the gathered inputs away from a part that is never built again, to be retired.
+    pub(crate) fn take_inputs(&self) -> Option<Arc<Buffer>> {
+        self.inputs.lock().unwrap_or_else(PoisonError::into_inner).take()
+    }
+
     /// Address of the gathered inputs of a geometry.
     pub(crate) fn input_address(&self, geometry: usize) -> u64 {
         let first = self.firsts.get(geometry).copied().unwrap_or(0);
-        self.inputs.address + u64::from(first) * self.primitive_bytes
+        self.inputs_address + u64::from(first) * self.primitive_bytes
     }
 
     /// Address of the numbers of a geometry's primitives.
@@ -51,9 +65,9 @@ impl PrimitiveMap {
         self.table.address + (self.firsts.len() as u64 + u64::from(first)) * 4
     }
 
-    /// Bytes of both buffers.
+    /// Bytes of both buffers, of those that are left.
     pub(crate) fn bytes(&self) -> u64 {
-        self.table.size_bytes + self.inputs.size_bytes
+        self.table.size_bytes + self.inputs().map_or(0, |inputs| inputs.size_bytes)
     }
 }
 
@@ -75,6 +89,21 @@ pub(crate) fn table_lists(words: &[u32], primitive_counts: &[u32]) -> Option<Vec
     };
     let lists = head.iter().zip(ends).zip(primitive_counts).map(list).collect::<Option<Vec<_>>>()?;
     (table_words(&lists) == words).then_some(lists)
+}
+
+/// Whether parts of so many primitives of each geometry have every one of the mesh, and none twice.
+pub(crate) fn cover_mesh(parts: &[Vec<Vec<u32>>], primitive_counts: &[u32]) -> bool {
+    primitive_counts.iter().enumerate().all(|(geometry, count)| {
+        let lists = parts.iter().filter_map(|part| part.get(geometry));
+        let held: usize = lists.clone().map(Vec::len).sum();
+        if held != *count as usize {
+            return false;
+        }
+        let mut seen = vec![false; held];
+        let mut is_new =
+            |number: &u32| seen.get_mut(*number as usize).is_some_and(|seen| !std::mem::replace(seen, true));
+        lists.flatten().all(&mut is_new)
+    })
 }
 
 fn firsts(geometries: &[Vec<u32>]) -> Vec<u32> {
@@ -108,6 +137,19 @@ mod tests {
             }
         }
         assert_eq!(words.len(), 6);
+    }
+
+    #[test]
+    fn parts_have_each_primitive_once() {
+        let whole = [vec![vec![1, 0], vec![]], vec![vec![2], vec![0]]];
+        assert!(cover_mesh(&whole, &[3, 1]));
+        assert!(cover_mesh(&[], &[0, 0]));
+        assert!(!cover_mesh(&[], &[1]));
+        assert!(!cover_mesh(&whole[..1], &[3, 1]), "some are missing");
+        assert!(!cover_mesh(&whole, &[4, 1]), "the last is missing");
+        assert!(!cover_mesh(&whole, &[2, 1]), "there are too many");
+        assert!(!cover_mesh(&[vec![vec![1, 0]], vec![vec![1]]], &[3]), "one is there twice");
+        assert!(!cover_mesh(&[vec![vec![1, 3, 0]]], &[3]), "one is of no mesh");
     }
 
     #[test]

@@ -152,7 +152,7 @@ impl Planner<'_> {
 /// Into how many leaves a share is cut before they are merged: more give parts that overlap less, but merging looks at
 /// all pairs.
 fn leaves_of_part(parts: u64) -> usize {
-    (1024 / parts.max(1)).clamp(1, 4) as usize
+    (1024 / parts.max(1)).clamp(1, 8) as usize
 }
 
 /// Cuts freely until no piece has more than `most` primitives.

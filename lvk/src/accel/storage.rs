@@ -77,14 +77,9 @@ impl AccelStorage {
     fn reserve(&self, name: &str, bytes: u64) -> Result<()> {
         let add = |used: u64| used.checked_add(bytes).filter(|sum| *sum <= self.budget_bytes);
         let used = &self.pool.used_bytes;
-        used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add).map(drop).map_err(|used| {
-            let message = format!(
-                "{bytes} bytes more than the {used} in use would take acceleration structures over their budget of \
-                 {} bytes; destroy or compact some, or raise ContextDesc::accel_budget_bytes",
-                self.budget_bytes
-            );
-            Error::usage(name, message)
-        })
+        let over =
+            |used| Error::OverBudget { object: name.to_owned(), bytes, used, budget: self.budget_bytes };
+        used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add).map(drop).map_err(over)
     }
 
     fn alloc_shared(&self, gpu: &Arc<Gpu>, bytes: u64) -> Result<(Arc<Buffer>, u64)> {

@@ -20,7 +20,7 @@ mod model_tests;
 pub(crate) use access::{Access, Layout, Stages, Use};
 pub(crate) use batch::{Barriers, ImageBarrier, MemoryBarrier};
 pub(crate) use query_stages::QueryStages;
-pub(crate) use resource_id::{IdHasher, ResourceId};
+pub(crate) use resource_id::{IdHasher, IdMap, ResourceId};
 pub(crate) use states::States;
 pub(crate) use subresource::{Subresources, TextureShape};
 pub(crate) use tracker::Tracker;

@@ -59,7 +59,7 @@ impl OpenBuild {
 impl Drop for OpenBuild {
     fn drop(&mut self) {
         if let AccelKind::Blas(blas) = &self.target.kind {
-            blas.close_build(self.submitted && !self.refit);
+            blas.close_build(self.submitted, self.refit);
         }
     }
 }
@@ -74,8 +74,8 @@ impl CommandBuffer {
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for a refit without
-    /// [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), a rebuild of a structure that was compacted or
-    /// loaded, and a structure listed twice.
+    /// [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), a rebuild of a structure that was compacted, or
+    /// compacted before it was saved, and a structure listed twice.
     pub fn build_blas(&mut self, structures: &[AccelStructHandle], mode: BuildMode) -> Result<()> {
         let found: Result<Vec<_>> =
             structures.iter().map(|handle| self.shared.store.accel_structs.get(*handle)).collect();
@@ -94,7 +94,7 @@ impl CommandBuffer {
         let mut refits = Vec::with_capacity(structures.len());
         for target in structures {
             let (mut build, body) = OpenBuild::of_blas(target)?;
-            let refit = resolve_mode(target, &body, mode)?;
+            let refit = resolve_mode(target, &body, mode, self.refits_of(target)?)?;
             build.refit = refit;
             open.push(build);
             self.plan_blas(target, &body, refit, &mut builds)?;
@@ -102,11 +102,18 @@ impl CommandBuffer {
         }
         self.gather_inputs(structures, &refits)?;
         self.record_builds(&builds)?;
-        self.open_builds.extend(open);
-        for (target, refit) in structures.iter().zip(refits) {
-            target.blas()?.count_refit(refit);
+        for build in &open {
+            let refits = if build.refit { self.refits_of(&build.target)?.saturating_add(1) } else { 0 };
+            self.refits.insert(build.target.id.0, refits);
         }
+        self.open_builds.extend(open);
         Ok(())
+    }
+
+    /// Refits since the last rebuild of a bottom-level structure, before the next command.
+    fn refits_of(&self, target: &AccelStruct) -> Result<u32> {
+        let submitted = target.blas()?.refits();
+        Ok(self.refits.get(&target.id.0).copied().unwrap_or(submitted))
     }
 
     /// Adds a build for each part.
@@ -121,7 +128,7 @@ impl CommandBuffer {
         let reads = self.reads(blas)?;
         for (part, structure) in blas.parts.iter().zip(&body.structures) {
             let mut reads = reads.clone();
-            reads.extend(part.map.as_ref().map(|map| Arc::clone(&map.inputs)));
+            reads.extend(part.map.as_ref().and_then(|map| map.inputs()));
             builds.push(Build {
                 target: Arc::clone(target),
                 raw: structure.raw,
@@ -206,9 +213,13 @@ impl CommandBuffer {
     }
 }
 
-/// Whether the build is a refit, or why it cannot be made.
-fn resolve_mode(target: &AccelStruct, body: &BlasBody, mode: BuildMode) -> Result<bool> {
-    let refit = mode.refits(target.check_refit().is_ok(), target.blas()?.refits());
+/// Whether the build after so many refits is one too, or why it cannot be made.
+fn resolve_mode(target: &AccelStruct, body: &BlasBody, mode: BuildMode, refits: u32) -> Result<bool> {
+    let possible = target.check_refit().is_ok();
+    let refit = match mode {
+        BuildMode::Auto { .. } if !body.rebuildable => possible,
+        _ => mode.refits(possible, refits),
+    };
     if refit {
         target.check_refit()?;
     } else if !body.rebuildable {

@@ -8,9 +8,11 @@ use super::CommandBuffer;
 use crate::accel::AccelStruct;
 use crate::accel::blas::BlasBody;
 use crate::accel::compaction::SizeQuery;
+use crate::accel::primitive_map::PrimitiveMap;
 use crate::barrier::{Stages, Use};
 use crate::error::Result;
 use crate::resource::{Buffer, QueryPool};
+use crate::shared::Garbage;
 
 impl CommandBuffer {
     /// Asks how large each target would be, compacted. Answers arrive in the query's pool.
@@ -65,6 +67,9 @@ impl CommandBuffer {
             // SAFETY: the source was built to be compacted, and the copy has the size the GPU answered.
             unsafe { ext.cmd_copy_acceleration_structure(self.raw(), &info) };
         }
+        if !is_ever_built(target, to) {
+            self.retire_inputs(target)?;
+        }
         Ok(())
     }
 
@@ -95,7 +100,10 @@ impl CommandBuffer {
 
     /// Makes each part from bytes at its address, a multiple of 256 in `buffer`
     /// (`vkCmdCopyMemoryToAccelerationStructureKHR`).
-    pub(crate) fn deserialize_parts(
+    ///
+    /// # Safety
+    /// The driver wrote the bytes, and each structure has the size they say.
+    pub(crate) unsafe fn deserialize_parts(
         &mut self,
         target: &Arc<AccelStruct>,
         buffer: &Buffer,
@@ -112,15 +120,31 @@ impl CommandBuffer {
                 .src(vk::DeviceOrHostAddressConstKHR { device_address: *address })
                 .dst(part.raw)
                 .mode(vk::CopyAccelerationStructureModeKHR::DESERIALIZE);
-            // SAFETY: the driver said it can read the bytes, and the structure has the size they say.
+            // SAFETY: the caller's promise, and the driver said that it can read the bytes.
             unsafe { ext.cmd_copy_memory_to_acceleration_structure(self.raw(), &info) };
         }
-        // A refit reads the same indices as the build did.
-        self.gather_inputs(std::slice::from_ref(target), &[false])
+        if is_ever_built(target, &body) {
+            // A refit reads the same indices as the build did.
+            return self.gather_inputs(std::slice::from_ref(target), &[false]);
+        }
+        self.retire_inputs(target)
+    }
+
+    /// Frees what only builds read.
+    fn retire_inputs(&self, target: &AccelStruct) -> Result<()> {
+        let maps = target.blas()?.parts.iter().filter_map(|part| part.map.as_ref());
+        maps.filter_map(PrimitiveMap::take_inputs)
+            .for_each(|inputs| self.shared.retire(Garbage::Buffer(inputs)));
+        Ok(())
     }
 
     fn use_copy(&mut self, target: &AccelStruct) {
         self.uses.id(target.id, Use::accel_build_write());
         self.uses.accumulate(self.shared.all_blas, Use::accel_build_write());
     }
+}
+
+/// Whether another build or a refit of the body can come.
+fn is_ever_built(target: &AccelStruct, body: &BlasBody) -> bool {
+    body.rebuildable || target.check_refit().is_ok()
 }

@@ -6,15 +6,16 @@ use std::sync::{Arc, OnceLock};
 use super::CommandBuffer;
 use crate::accel::AccelStruct;
 use crate::accel::build::instance_bytes;
+use crate::accel::flags::BuildFlags;
 use crate::accel::instance::{DeviceInstances, TlasInstance};
 use crate::accel::instance_plan::{Find, InstancePlan, starts_plain, write_addresses};
 use crate::accel::tlas::{Entry, InstanceSource, InstanceTables, Shown, SourceBytes, Tlas};
 use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result};
-use crate::gpu::memory::MemoryKind;
 use crate::kernel::{InstancesPush, Kernel};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
+use crate::shared::Garbage;
 
 /// Addresses of instances must be a multiple of this.
 const INSTANCE_ALIGNMENT: u64 = 16;
@@ -133,17 +134,16 @@ impl CommandBuffer {
             self.retire_temporary(region.temporary);
             return Ok(SourceBytes { address: region.address, buffer: None });
         }
-        let memory = MemoryKind::HostVisible;
         let size_bytes = size_bytes.max(INSTANCE_ALIGNMENT);
-        let desc = BufferDesc { size_bytes, memory, debug_name: name, ..Default::default() };
-        let buffer = Buffer::new(&self.shared.gpu, &desc, InternalUsage::NONE)?;
+        let buffer = self.shared.instance_buffers.take(&self.shared.gpu, name, size_bytes)?;
         buffer.fill(fill);
-        Ok(SourceBytes { address: buffer.address, buffer: Some(Arc::new(buffer)) })
+        self.shared.retire(Garbage::Held(Arc::clone(&buffer)));
+        Ok(SourceBytes { address: buffer.address, buffer: Some(buffer) })
     }
 
-    /// The caller's buffer as a source; a copy of it where structures may move later.
+    /// The caller's buffer as a source.
     pub(super) fn device_source(
-        &mut self,
+        &self,
         name: &str,
         instances: &DeviceInstances<'_>,
     ) -> Result<(Vec<Shown>, InstanceSource)> {
@@ -166,7 +166,7 @@ impl CommandBuffer {
         let entry = |(place, of): (u32, &Shown)| Entry { shown: place, first: 0, count: parts(of) };
         let own =
             SourceBytes { address: buffer.address + instances.offset, buffer: Some(Arc::clone(&buffer)) };
-        let mut source = InstanceSource {
+        let source = InstanceSource {
             instances: own,
             count: instances.count,
             owners: None,
@@ -174,13 +174,29 @@ impl CommandBuffer {
             copies: shown.iter().map(parts).max().unwrap_or(1),
             entries: (0..).zip(&shown).map(entry).collect(),
         };
-        if shown.iter().any(Shown::may_move) && bytes > 0 {
-            let desc = BufferDesc { size_bytes: bytes, debug_name: name, ..Default::default() };
-            let copy = Arc::new(Buffer::new(&shared.gpu, &desc, InternalUsage::NONE)?);
-            self.copy_buffer_objects(&buffer, instances.offset, &copy, 0, bytes)?;
-            source.instances = SourceBytes { address: copy.address, buffer: Some(copy) };
-        }
         Ok((shown, source))
+    }
+
+    /// Copies the caller's buffer where structures may move later, since it may have other contents by then.
+    pub(super) fn keep_source(
+        &mut self,
+        name: &str,
+        instances: &DeviceInstances<'_>,
+        shown: &[Shown],
+        source: &mut InstanceSource,
+    ) -> Result<()> {
+        let bytes = instance_bytes(instances.count);
+        if bytes == 0 || !shown.iter().any(Shown::may_move) {
+            return Ok(());
+        }
+        let shared = Arc::clone(&self.shared);
+        let buffer = shared.store.buffers.get(instances.buffer)?;
+        let desc = BufferDesc { size_bytes: bytes, debug_name: name, ..Default::default() };
+        let copy = Arc::new(Buffer::new(&shared.gpu, &desc, InternalUsage::NONE)?);
+        self.copy_buffer_objects(&buffer, instances.offset, &copy, 0, bytes)?;
+        shared.retire(Garbage::Held(Arc::clone(&copy)));
+        source.instances = SourceBytes { address: copy.address, buffer: Some(copy) };
+        Ok(())
     }
 
     /// Has the kernel write the instances and their rows.
@@ -198,7 +214,9 @@ impl CommandBuffer {
             true => Some(self.kept_buffer(&tlas.rows, target, u64::from(tlas.room) * ROW_BYTES)?),
             false => None,
         };
-        self.record_instances(&source, &shown, &records, rows.as_deref())?;
+        // A refit may neither add nor remove instances, but records may come to name meshes of other parts.
+        let keep_active = source.copies > 1 && target.flags.contains(BuildFlags::ALLOW_UPDATE);
+        self.record_instances(&source, &shown, &records, rows.as_deref(), keep_active)?;
         let source = shown.iter().any(Shown::may_move).then_some(source);
         Ok(Ready { address: records.address, built_count, shown, source, reads: vec![records] })
     }
@@ -209,6 +227,7 @@ impl CommandBuffer {
         shown: &[Shown],
         records: &Buffer,
         rows: Option<&Buffer>,
+        keep_active: bool,
     ) -> Result<()> {
         let tables = InstanceTables::new(shown, &source.entries);
         let entries = self.stage(bytemuck::cast_slice(&tables.entries))?;
@@ -224,6 +243,8 @@ impl CommandBuffer {
             copies: source.copies,
             entry_count: tables.entries.len() as u32,
             user_count: source.user_count,
+            keep_active: keep_active.into(),
+            unused: 0,
         };
         if let Some(buffer) = &source.instances.buffer {
             self.use_buffer(buffer, Use::shader_read(Stages::COMPUTE));

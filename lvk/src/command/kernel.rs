@@ -25,18 +25,23 @@ impl CommandBuffer {
     pub(super) fn gather_inputs(&mut self, structures: &[Arc<AccelStruct>], refits: &[bool]) -> Result<()> {
         let mut runs = Vec::new();
         for (target, refit) in structures.iter().zip(refits) {
-            let blas = target.blas()?;
-            for part in &blas.parts {
-                if let Some(map) = &part.map {
-                    self.plan_gather(blas, part, map, *refit, &mut runs)?;
-                }
-            }
+            self.plan_gathers(target, *refit, &mut runs).inspect_err(|_| self.uses.clear())?;
         }
         if runs.is_empty() {
             return Ok(());
         }
         self.flush();
         self.run_kernel(Kernel::Gather, runs.iter().map(|push| (bytemuck::bytes_of(push), push.count)))
+    }
+
+    fn plan_gathers(&mut self, target: &AccelStruct, refit: bool, runs: &mut Vec<GatherPush>) -> Result<()> {
+        let blas = target.blas()?;
+        for part in &blas.parts {
+            if let Some(map) = &part.map {
+                self.plan_gather(blas, part, map, refit, runs)?;
+            }
+        }
+        Ok(())
     }
 
     fn plan_gather(
@@ -47,6 +52,7 @@ impl CommandBuffer {
         refit: bool,
         runs: &mut Vec<GatherPush>,
     ) -> Result<()> {
+        let Some(inputs) = map.inputs() else { return Ok(()) };
         let geometries = blas.geometries.iter().zip(&part.counts).enumerate();
         for (index, (geometry, count)) in geometries.filter(|(_, (_, count))| **count > 0) {
             if refit && !geometry.is_boxes() {
@@ -54,7 +60,7 @@ impl CommandBuffer {
             }
             let source = self.gather_source(geometry)?;
             self.use_buffer(&map.table, Use::shader_read(Stages::COMPUTE));
-            self.use_buffer(&map.inputs, Use::shader_write(Stages::COMPUTE));
+            self.use_buffer(&inputs, Use::shader_write(Stages::COMPUTE));
             let (numbers, gathered) = (map.numbers_address(index), map.input_address(index));
             runs.push(GatherPush { numbers, gathered, count: *count, ..source });
         }

@@ -19,6 +19,7 @@ pub(crate) mod trace;
 pub(crate) mod transfer;
 pub(crate) mod uses;
 
+use std::collections::HashMap;
 use std::mem::ManuallyDrop;
 use std::sync::Arc;
 
@@ -61,6 +62,8 @@ pub struct CommandBuffer {
     settle: Vec<Settle>,
     tlas_updates: Vec<TlasUpdate>,
     open_builds: Vec<OpenBuild>,
+    /// Refits since the last rebuild of each bottom-level structure that is built here, by its id.
+    refits: HashMap<u64, u32>,
     size_queries: Vec<Arc<SizeQuery>>,
 }
 
@@ -98,6 +101,7 @@ impl CommandBuffer {
             settle: Vec::new(),
             tlas_updates: Vec::new(),
             open_builds: Vec::new(),
+            refits: HashMap::new(),
             size_queries: Vec::new(),
         })
     }

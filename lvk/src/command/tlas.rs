@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use ash::vk;
+
 use super::CommandBuffer;
 use super::accel::{Build, OpenBuild};
 use super::instances::{Planned, Ready};
@@ -11,6 +13,7 @@ use crate::accel::flags::BuildMode;
 use crate::accel::instance::{DeviceInstances, TlasInstance};
 use crate::accel::tlas::{Shown, Tlas, TlasContents};
 use crate::barrier::Use;
+use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::error::{Error, Result, check_limit};
 use crate::handle::AccelStructHandle;
 use crate::shared::{Garbage, Shared};
@@ -66,7 +69,9 @@ impl CommandBuffer {
     /// As [`update_tlas`](Self::update_tlas), with instances that lie in a buffer: written by a compute shader, say,
     /// earlier in the same command buffer.
     ///
-    /// Split meshes take the room of their parts for every record, since the host does not know who refers to them.
+    /// Split meshes take the room of their parts for every record, since the host does not know who refers to them. From
+    /// one refit to the next a record may come to name another structure of the list, but it may not begin or cease to
+    /// name one that exists: Vulkan takes that for an instance that comes or goes.
     ///
     /// # Errors
     /// As [`update_tlas`](Self::update_tlas), but the records themselves are not checked; and
@@ -80,9 +85,10 @@ impl CommandBuffer {
         let target = self.shared.store.accel_structs.get(tlas)?;
         let object = target.tlas()?;
         check_limit(&target.name, "instance count", instances.count.into(), object.capacity.into())?;
-        let (shown, source) = self.device_source(&target.name, instances)?;
+        let (shown, mut source) = self.device_source(&target.name, instances)?;
         let built_count = source.built_count(&target.name)?;
         let refit = self.check_update(&target, instances.count, built_count, mode)?;
+        self.keep_source(&target.name, instances, &shown, &mut source)?;
         let ready = self.run_instances(&target, object, shown, source, built_count)?;
         self.record_tlas(&target, ready, instances.count, refit)
     }
@@ -191,9 +197,12 @@ impl CommandBuffer {
         };
         self.record_builds(&[build])?;
         self.open_builds.push(OpenBuild::of_tlas(target));
-        if let Some(rows) = tlas.rows.get() {
+        // At first the entry is that of the slot's last owner.
+        let is_first = self.last_update(target, tlas).0.is_none();
+        if is_first || tlas.rows.get().is_some() {
             let mapped = ready.shown.iter().any(Shown::has_rows);
-            self.write_tlas_table(tlas.slot, if mapped { rows.address } else { 0 });
+            let rows = tlas.rows.get().filter(|_| mapped).map_or(0, |rows| rows.address);
+            self.write_tlas_table(tlas.slot, rows);
         }
         let refits = if refit { self.last_update(target, tlas).1.saturating_add(1) } else { 0 };
         let refits_submitted = refit && self.own_update(target).is_none();
@@ -205,7 +214,6 @@ impl CommandBuffer {
 
     /// Tells shaders where the rows of a structure lie; 0 if its hits need none.
     fn write_tlas_table(&mut self, slot: u32, rows: u64) {
-        use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
         let shared = Arc::clone(&self.shared);
         let Some(table) = shared.tlas_table.as_ref() else { return };
         self.uses.id(shared.tlas_tables, Use::transfer_write());
@@ -215,5 +223,15 @@ impl CommandBuffer {
         unsafe {
             shared.gpu.device.cmd_update_buffer(self.raw(), table.raw, offset, &rows.to_le_bytes());
         }
+    }
+
+    /// Empties the table that says where rows lie.
+    pub(crate) fn clear_tlas_table(&mut self) {
+        let shared = Arc::clone(&self.shared);
+        let Some(table) = shared.tlas_table.as_ref() else { return };
+        self.uses.id(shared.tlas_tables, Use::transfer_write());
+        self.flush();
+        // SAFETY: the whole buffer is filled.
+        unsafe { shared.gpu.device.cmd_fill_buffer(self.raw(), table.raw, 0, vk::WHOLE_SIZE, 0) };
     }
 }

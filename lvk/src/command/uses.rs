@@ -2,15 +2,20 @@
 
 use std::sync::Arc;
 
-use crate::barrier::{Barriers, ResourceId, Subresources, Tracker, Use};
+use crate::barrier::{Barriers, IdMap, ResourceId, Subresources, Tracker, Use};
 use crate::error::{Error, Result};
 use crate::resource::{Buffer, Texture};
 use crate::submit::emit::Images;
+
+/// So many are searched one by one, which is faster than a map. Builds of many structures use more.
+const FEW: usize = 16;
 
 /// The uses of one command. Kept in the command buffer and emptied, so that recording does not allocate.
 #[derive(Default)]
 pub(crate) struct Uses {
     buffers: Vec<(ResourceId, Use)>,
+    /// Where each of `buffers` is, once they are more than a few; empty before.
+    places: IdMap<usize>,
     textures: Vec<(Arc<Texture>, Subresources, Use)>,
     writers: Vec<(ResourceId, Use)>,
 }
@@ -18,14 +23,31 @@ pub(crate) struct Uses {
 impl Uses {
     /// The command uses a buffer, or what stands for one.
     pub(crate) fn id(&mut self, id: ResourceId, next: Use) {
-        match self.buffers.iter_mut().find(|(known, _)| *known == id) {
+        match self.place(id) {
             // Layouts mean nothing to buffers, so their uses always merge.
-            Some((_, present)) => {
+            Some(place) => {
+                let (_, present) = &mut self.buffers[place];
                 present.stages |= next.stages;
                 present.access |= next.access;
             }
-            None => self.buffers.push((id, next)),
+            None => {
+                if self.buffers.len() >= FEW {
+                    self.places.insert(id, self.buffers.len());
+                }
+                self.buffers.push((id, next));
+            }
         }
+    }
+
+    /// Where a buffer that the command uses already is in the list.
+    fn place(&mut self, id: ResourceId) -> Option<usize> {
+        if self.buffers.len() < FEW {
+            return self.buffers.iter().position(|(known, _)| *known == id);
+        }
+        if self.places.is_empty() {
+            self.places.extend(self.buffers.iter().enumerate().map(|(place, (known, _))| (*known, place)));
+        }
+        self.places.get(&id).copied()
     }
 
     /// The command uses a buffer.
@@ -66,6 +88,7 @@ impl Uses {
 
     /// Tells the tracker, which adds the barriers to `out`.
     pub(crate) fn track(&mut self, tracker: &mut Tracker, images: &mut Images, out: &mut Barriers) {
+        self.places.clear();
         for (id, next) in self.buffers.drain(..) {
             tracker.use_buffer(id, next, out);
         }
@@ -81,6 +104,7 @@ impl Uses {
     /// Forgets a command that failed before it was recorded.
     pub(crate) fn clear(&mut self) {
         self.buffers.clear();
+        self.places.clear();
         self.textures.clear();
         self.writers.clear();
     }
@@ -98,4 +122,42 @@ fn conflict(texture: &Texture) -> Error {
         &texture.name,
         "one command uses the texture in two ways that exclude each other; use a second texture or two commands",
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::barrier::Stages;
+
+    fn uses() -> [Use; 3] {
+        [Use::shader_read(Stages::COMPUTE), Use::transfer_write(), Use::accel_build_input()]
+    }
+
+    proptest! {
+        /// Few and many, and again after a command was given up.
+        #[test]
+        fn a_buffer_used_twice_counts_once(
+            commands in prop::collection::vec(prop::collection::vec((0..60_u64, 0..3_usize), 0..120), 1..4)
+        ) {
+            let mut found = Uses::default();
+            for command in commands {
+                let mut expected: Vec<(ResourceId, Use)> = Vec::new();
+                for (id, kind) in command {
+                    let (id, next) = (ResourceId(id), uses()[kind]);
+                    found.id(id, next);
+                    match expected.iter_mut().find(|(known, _)| *known == id) {
+                        Some((_, present)) => {
+                            present.stages |= next.stages;
+                            present.access |= next.access;
+                        }
+                        None => expected.push((id, next)),
+                    }
+                }
+                prop_assert_eq!(&found.buffers, &expected);
+                found.clear();
+            }
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 use super::Context;
 use crate::accel::AccelStruct;
+use crate::accel::blas::CompactionWish;
 use crate::accel::flags::AccelStructSizes;
 use crate::accel::structure::AccelKind;
 use crate::error::Result;
@@ -21,6 +22,9 @@ pub enum Compaction {
         /// Bytes of memory since.
         after_bytes: u64,
     },
+    /// It was not possible, mostly because the copy had no room beside the structure, within the budget or on the
+    /// device; a warning says more. The structure is as it was. [`Context::compact`] tries again.
+    Failed,
 }
 
 /// What is known of an acceleration structure.
@@ -36,7 +40,9 @@ pub struct AccelStructInfo {
     pub is_remapped: bool,
     /// Bytes of memory of its structures.
     pub structure_bytes: u64,
-    /// Bytes of buffers that the library keeps for it: maps of primitives, gathered inputs, instances.
+    /// Bytes of buffers that the library keeps for it: maps of primitives, gathered inputs, instances. Gathered inputs
+    /// go with the compaction of a structure without [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE),
+    /// which nothing builds again.
     pub table_bytes: u64,
     /// Its compaction.
     pub compaction: Compaction,
@@ -115,8 +121,11 @@ fn info(object: &AccelStruct) -> AccelStructInfo {
             let after_bytes = body.memory_bytes();
             let compaction = match body.compacted_from {
                 Some(before_bytes) => Compaction::Done { before_bytes, after_bytes },
-                None if blas.is_compacting() => Compaction::Pending,
-                None => Compaction::None,
+                None => match blas.wish() {
+                    CompactionWish::None => Compaction::None,
+                    CompactionWish::Open => Compaction::Pending,
+                    CompactionWish::Failed => Compaction::Failed,
+                },
             };
             AccelStructInfo {
                 name,

@@ -89,7 +89,7 @@ impl Context {
         let table = Arc::clone(&map.table);
         let uploaded =
             self.before_next_submission(|cmd| cmd.upload_buffer(&table, 0, bytemuck::cast_slice(&words)));
-        shared.retire(Garbage::Table(table));
+        shared.retire(Garbage::Held(table));
         uploaded?;
         let counts: Vec<u32> = plan.geometries.iter().map(|list| list.len() as u32).collect();
         let mut input = input(shared, desc)?.gathered();
@@ -128,7 +128,7 @@ fn treatment(gpu: &Gpu, desc: &BlasDesc<'_>, whole: &AccelStructSizes) -> Treatm
 }
 
 /// Scratch is given at an aligned address, which may take up to the alignment of what the limit allows.
-fn part_limits(limits: &Limits) -> PartLimits {
+pub(super) fn part_limits(limits: &Limits) -> PartLimits {
     PartLimits {
         structure_bytes: limits.max_accel_structure_bytes,
         scratch_bytes: limits.max_accel_scratch_bytes.saturating_sub(limits.scratch_alignment.into()),

@@ -1,13 +1,13 @@
 //! Compaction: asked for, carried out once the GPU has said how small structures can be.
 
-use std::sync::{Arc, PoisonError};
+use std::sync::{Arc, MutexGuard, PoisonError, Weak};
 
 use ash::vk;
 
 use super::Context;
 use crate::accel::AccelStruct;
-use crate::accel::blas::{Blas, BlasBody};
-use crate::accel::compaction::SizeQuery;
+use crate::accel::blas::{BlasBody, CompactionWish};
+use crate::accel::compaction::{Compactions, PlannedCopy, Refusal, SizeQuery};
 use crate::accel::flags::BuildFlags;
 use crate::accel::raw_structure::RawStructure;
 use crate::error::{Error, Result};
@@ -26,7 +26,9 @@ impl Context {
     /// structure may be refitted, but not rebuilt. While a command buffer that builds a structure is not submitted yet,
     /// its copy waits: [`next_frame`](Self::next_frame) and [`flush`](Self::flush) are good moments.
     ///
-    /// Structures that are compacted already, or about to be, are left alone.
+    /// A copy needs room beside what it replaces. One that has none waits for the others, whose memory comes back, and
+    /// [fails](crate::Compaction::Failed) when there is still none then; nothing else does for it. Structures that are
+    /// compacted already, or about to be, are left alone.
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for a structure without [`BuildFlags::ALLOW_COMPACTION`], and then nothing
@@ -45,16 +47,19 @@ impl Context {
         let mut wanted = Vec::with_capacity(targets.len());
         for target in targets {
             let blas = target.blas()?;
-            if blas.body().compacted_from.is_none() && !blas.request_compaction(true) {
+            let compacted = blas.body().compacted_from.is_some();
+            if !compacted && blas.set_wish(CompactionWish::Open) != CompactionWish::Open {
                 wanted.push(target);
             }
         }
-        self.ask_sizes(&wanted).inspect_err(|_| give_up(&wanted))
+        let query = self.ask_sizes(&wanted).inspect_err(|_| end_wishes(&wanted, CompactionWish::None))?;
+        self.compactions().asked.extend(query);
+        Ok(())
     }
 
-    fn ask_sizes(&self, wanted: &[Arc<AccelStruct>]) -> Result<()> {
+    fn ask_sizes(&self, wanted: &[Arc<AccelStruct>]) -> Result<Option<Arc<SizeQuery>>> {
         if wanted.is_empty() {
-            return Ok(());
+            return Ok(None);
         }
         let mut count = 0;
         let mut targets = Vec::with_capacity(wanted.len());
@@ -68,21 +73,17 @@ impl Context {
         let query = Arc::new(SizeQuery::new(pool, targets));
         let asked = self.before_next_submission(|cmd| cmd.query_compacted_sizes(&query));
         self.shared().retire(Garbage::SizeQuery(Arc::clone(&query)));
-        asked?;
-        self.compactions().push(query);
-        Ok(())
+        asked.map(|()| Some(query))
     }
 
     /// Carries out compactions whose sizes are known, and builds top-level structures again that refer to what they
     /// replaced. What fails stays as it was, with a warning: no submission of the caller fails for it.
     pub(super) fn advance_compactions(&self) {
-        let open = std::mem::take(&mut *self.compactions());
-        for query in open {
-            if let Err(error) = self.advance_compaction(&query) {
-                log::warn!("structures stay uncompacted: {error}");
-                query.targets.iter().for_each(|(target, _)| give_up(std::slice::from_ref(target)));
-            }
+        let mut compactions = self.compactions();
+        if !compactions.is_empty() {
+            self.advance(&mut compactions);
         }
+        drop(compactions);
         if self.shared().take_outdated_tlas()
             && let Err(error) = self.rewrite_outdated()
         {
@@ -90,62 +91,70 @@ impl Context {
         }
     }
 
-    fn advance_compaction(&self, query: &Arc<SizeQuery>) -> Result<()> {
-        let Some(builds) = query.builds() else {
-            self.compactions().push(Arc::clone(query));
-            return Ok(());
-        };
-        let sizes = query.pool.values(0, query.pool.count)?;
-        let Some(sizes) = sizes.into_iter().collect::<Option<Vec<_>>>() else {
-            self.compactions().push(Arc::clone(query));
-            return Ok(());
-        };
-        let (mut later, mut again) = (false, Vec::new());
-        for ((target, first), builds) in query.targets.iter().zip(builds) {
-            let blas = target.blas()?;
-            if blas.body().compacted_from.is_some() {
-                continue;
-            }
-            let sizes = &sizes[*first as usize..*first as usize + blas.parts.len()];
-            if blas.builds() != builds {
-                again.push(Arc::clone(target));
-            } else if blas.has_open_builds() || !self.compact_one(target, blas, sizes, builds)? {
-                later = true;
+    /// Copies that have no room wait for those that have, which give memory back.
+    fn advance(&self, compactions: &mut Compactions) {
+        compactions.forget_freed();
+        for query in std::mem::take(&mut compactions.asked) {
+            match query.answer() {
+                Ok(Some(copies)) => compactions.copies.extend(copies),
+                Ok(None) => compactions.asked.push(query),
+                Err(error) => query.targets.iter().for_each(|(target, _)| give_up(target, &error)),
             }
         }
-        if later {
-            self.compactions().push(Arc::clone(query));
+        let mut again = Vec::new();
+        for mut copy in std::mem::take(&mut compactions.copies) {
+            let Some(target) = copy.target.upgrade() else { continue };
+            let used_bytes = self.shared().accel_storage.used_bytes();
+            match self.compact_one(&target, &copy, used_bytes) {
+                Ok(Step::Copied(old)) => compactions.replaced.push(old),
+                Ok(Step::Wait) => compactions.copies.push(copy),
+                Ok(Step::AskAgain) => again.push(target),
+                Err(error @ (Error::OverBudget { .. } | Error::OutOfDeviceMemory { .. })) => {
+                    copy.refused = Some(Refusal { error, used_bytes });
+                    compactions.copies.push(copy);
+                }
+                Err(error) => give_up(&target, &error),
+            }
         }
-        self.ask_sizes(&again)
+        match self.ask_sizes(&again) {
+            Ok(query) => compactions.asked.extend(query),
+            Err(error) => again.iter().for_each(|target| give_up(target, &error)),
+        }
+        for PlannedCopy { target, refused, .. } in compactions.take_stuck() {
+            if let (Some(target), Some(refusal)) = (target.upgrade(), refused) {
+                give_up(&target, &refusal.error);
+            }
+        }
     }
 
     /// Copies one structure, unless a build of it was recorded meanwhile.
-    fn compact_one(
-        &self,
-        target: &Arc<AccelStruct>,
-        blas: &Blas,
-        sizes: &[u64],
-        builds: u64,
-    ) -> Result<bool> {
-        let shared = self.shared();
+    fn compact_one(&self, target: &Arc<AccelStruct>, copy: &PlannedCopy, used_bytes: u64) -> Result<Step> {
+        let (shared, blas) = (self.shared(), target.blas()?);
+        if blas.builds() != copy.builds {
+            return Ok(Step::AskAgain);
+        }
+        if blas.has_open_builds() || !copy.is_worth_trying(used_bytes) {
+            return Ok(Step::Wait);
+        }
         let ty = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
         let structure =
             |bytes: &u64| RawStructure::new(&shared.gpu, &shared.accel_storage, &target.name, ty, *bytes);
-        let structures = sizes.iter().map(structure).collect::<Result<Vec<_>>>()?;
+        let structures = copy.sizes.iter().map(structure).collect::<Result<Vec<_>>>()?;
         let compacted_from = Some(blas.body().memory_bytes());
         let body = BlasBody { structures, compacted_from, rebuildable: false };
         let replaced = self.before_next_submission(|cmd| {
-            let Some(old) = blas.replace_body(body, builds) else { return Ok(None) };
+            let Some(old) = blas.replace_body(body, copy.builds) else { return Ok(None) };
             cmd.copy_compacted(target, &old, &blas.body())?;
             Ok(Some(old))
         })?;
-        let Some(old) = replaced else { return Ok(false) };
-        blas.request_compaction(false);
+        let Some(old) = replaced else { return Ok(Step::Wait) };
+        blas.set_wish(CompactionWish::None);
+        let freed = Arc::downgrade(&old);
         shared.retire(Garbage::Body(old));
         // Its handle may be gone, and nobody else keep it until the copy is made.
         shared.retire(Garbage::Body(blas.body()));
         shared.note_outdated_tlas();
-        Ok(true)
+        Ok(Step::Copied(freed))
     }
 
     fn rewrite_outdated(&self) -> Result<()> {
@@ -157,13 +166,28 @@ impl Context {
         Ok(())
     }
 
-    fn compactions(&self) -> std::sync::MutexGuard<'_, Vec<Arc<SizeQuery>>> {
+    fn compactions(&self) -> MutexGuard<'_, Compactions> {
         self.inner.compactions.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-fn give_up(targets: &[Arc<AccelStruct>]) {
+/// What became of a copy.
+enum Step {
+    /// It is recorded; this is what it takes the place of.
+    Copied(Weak<BlasBody>),
+    /// A build is not submitted yet, or there is no more room than before.
+    Wait,
+    /// The sizes are those of an earlier build.
+    AskAgain,
+}
+
+fn give_up(target: &Arc<AccelStruct>, error: &Error) {
+    log::warn!("structure '{}' stays uncompacted: {error}", target.name);
+    end_wishes(std::slice::from_ref(target), CompactionWish::Failed);
+}
+
+fn end_wishes(targets: &[Arc<AccelStruct>], wish: CompactionWish) {
     for blas in targets.iter().filter_map(|target| target.blas().ok()) {
-        blas.request_compaction(false);
+        blas.set_wish(wish);
     }
 }

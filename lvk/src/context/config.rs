@@ -35,6 +35,11 @@ pub struct ContextDesc<'a> {
     pub scratch_budget_bytes: u64,
     /// Most memory for acceleration structures, in bytes. A creation that would exceed it fails and leaves nothing
     /// behind; compaction gives some back.
+    ///
+    /// The structures count, of both levels and all parts, and those too that wait for the GPU to be done with them.
+    /// What does not: unused room in the buffers that small ones share and scratch memory
+    /// ([`AccelMemory`](crate::AccelMemory) tells both), and the tables and gathered inputs of meshes that are split or
+    /// reordered ([`AccelStructInfo::table_bytes`](crate::AccelStructInfo::table_bytes)).
     pub accel_budget_bytes: u64,
     /// Room for textures in the bindless set; clamped to what the device allows.
     pub max_textures: u32,

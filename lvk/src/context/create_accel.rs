@@ -5,6 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::Context;
+use super::blas_shapes::part_limits;
 use super::holder::Holder;
 use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasBody, PartShape};
@@ -40,7 +41,7 @@ impl Context {
     ///
     /// A mesh that would exceed the device's limits for scratch memory, structure size or primitives is cut into
     /// spatially compact parts behind its one handle; see [`PrimitiveOrder`](crate::PrimitiveOrder) for meshes that are
-    /// put into another order. Both read the inputs back once for the whole batch, and that does wait. Both go by the
+    /// put into another order. Both read the inputs of the whole batch back first, and that does wait. Both go by the
     /// contents of the buffers now; later contents may be anything.
     ///
     /// # Errors
@@ -82,7 +83,8 @@ impl Context {
     ///
     /// # Errors
     /// As [`CommandBuffer::update_tlas`](crate::CommandBuffer::update_tlas), and
-    /// [`LimitExceeded`](Error::LimitExceeded) for more instances than the device takes.
+    /// [`LimitExceeded`](Error::LimitExceeded) for more instances than the device takes, or whose structure or scratch
+    /// memory would be larger than it takes.
     pub fn create_tlas(&self, desc: &TlasDesc<'_>) -> Result<Holder<AccelStructHandle>> {
         let shared = self.shared();
         shared.gpu.accel()?;
@@ -155,6 +157,19 @@ pub(super) fn new_tlas(shared: &Shared, desc: &TlasDesc<'_>, slot: u32) -> Resul
     check_limit(name, "instance capacity", room, shared.gpu.caps.limits.max_tlas_instances)?;
     let room = u32::try_from(room).unwrap_or(u32::MAX);
     let sizes = BuildInput::tlas(desc.flags, 0, room).sizes(&shared.gpu)?;
+    let limits = part_limits(&shared.gpu.caps.limits);
+    check_limit(
+        name,
+        "size of the top-level structure in bytes",
+        sizes.structure_bytes,
+        limits.structure_bytes,
+    )?;
+    check_limit(
+        name,
+        "scratch of the top-level build in bytes",
+        sizes.scratch_bytes(),
+        limits.scratch_bytes,
+    )?;
     let ty = vk::AccelerationStructureTypeKHR::TOP_LEVEL;
     let bytes = sizes.structure_bytes;
     let structure = RawStructure::new(&shared.gpu, &shared.accel_storage, name, ty, bytes)?;

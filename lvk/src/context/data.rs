@@ -9,6 +9,7 @@ use crate::handle::{BufferHandle, QueryPoolHandle, TextureHandle};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::resource::texture::TextureRegion;
+use crate::shared::Garbage;
 
 impl Context {
     /// The address by which shaders reach a buffer (`vkGetBufferDeviceAddress`).
@@ -90,12 +91,10 @@ impl Context {
         let target = Arc::new(Buffer::new(&self.shared().gpu, &desc, InternalUsage::NONE)?);
         let mut cmd = self.acquire_command_buffer()?;
         record(&mut cmd, &target)?;
-        let submitted = self.submit(cmd)?;
-        let waited = self.wait(submitted);
-        if waited.is_ok() {
-            target.read(0, bytes);
-        }
-        self.shared().retire(crate::shared::Garbage::Buffer(target));
-        waited
+        // Before the submission: should that fail half-way, the GPU may yet write the buffer.
+        self.shared().retire(Garbage::Buffer(Arc::clone(&target)));
+        self.wait(self.submit(cmd)?)?;
+        target.read(0, bytes);
+        Ok(())
     }
 }

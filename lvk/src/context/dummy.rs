@@ -26,10 +26,10 @@ pub(super) fn fill_dummies(ctx: &Context) -> Result<()> {
     let storage = checker(ctx, TextureUsage::STORAGE)?;
     let sampler = SamplerDesc { debug_name: "dummy sampler", ..Default::default() };
     let sampler = Sampler::new(&shared.gpu, &sampler, SLOT)?;
-    if let Some(table) = &shared.tlas_table {
-        let zeros = vec![0; table.size_bytes as usize];
-        ctx.before_next_submission(|cmd| cmd.upload_buffer(table, 0, &zeros))?;
-    }
+    ctx.before_next_submission(|cmd| {
+        cmd.clear_tlas_table();
+        Ok(())
+    })?;
     let tlas = if shared.gpu.accel.is_some() { Some(empty_tlas(ctx)?) } else { None };
     shared.bindless.fill(Dummies {
         sampled: sampled.sampled_view()?,

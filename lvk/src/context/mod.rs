@@ -20,7 +20,7 @@ mod submit;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use crate::accel::compaction::SizeQuery;
+use crate::accel::compaction::Compactions;
 use crate::command::CommandBuffer;
 use crate::error::Result;
 use crate::gpu::caps::Capabilities;
@@ -44,7 +44,7 @@ struct Inner {
     pending: Mutex<Option<CommandBuffer>>,
     frames: Mutex<FrameRing>,
     /// Compactions under way.
-    compactions: Mutex<Vec<Arc<SizeQuery>>>,
+    compactions: Mutex<Compactions>,
     shared: Arc<Shared>,
 }
 
@@ -63,17 +63,17 @@ impl Context {
         &self.inner.shared
     }
 
-    /// Records into the command buffer that runs before the next submission.
+    /// Records into the command buffer that runs before the next submission. What it holds stays there whatever
+    /// becomes of `record`.
     fn before_next_submission<T>(&self, record: impl FnOnce(&mut CommandBuffer) -> Result<T>) -> Result<T> {
         let mut pending = self.pending();
-        let mut cmd = match pending.take() {
+        let cmd = match &mut *pending {
             Some(cmd) => cmd,
-            None => CommandBuffer::new(self.shared())?,
+            none => none.insert(CommandBuffer::new(self.shared())?),
         };
-        let result = record(&mut cmd);
+        let result = record(cmd);
         // It goes before whatever is submitted next, so commands recorded from now on may rely on it.
         cmd.apply_tlas_updates();
-        *pending = Some(cmd);
         result
     }
 

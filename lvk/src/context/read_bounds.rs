@@ -1,6 +1,7 @@
 //! Reads the inputs of meshes back, to learn where their primitives lie.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::Context;
@@ -12,6 +13,9 @@ use crate::format::IndexFormat;
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;
 
+/// Most bytes read back at once: inputs of a whole scene may be more than there is readback memory for.
+const READ_AT_ONCE: u64 = 64 << 20;
+
 /// Bytes of a buffer: its handle, where they start, how many.
 type Piece = (BufferHandle, u64, u64);
 
@@ -19,12 +23,15 @@ type Piece = (BufferHandle, u64, u64);
 #[derive(Default)]
 struct Pieces {
     places: HashMap<Piece, usize>,
-    list: Vec<(Arc<Buffer>, u64, u64)>,
+    /// Buffer and first byte in it.
+    list: Vec<(Arc<Buffer>, u64)>,
+    /// Where each piece of the list lies in `bytes`.
+    ranges: Vec<Range<u64>>,
     bytes: Vec<u8>,
 }
 
 impl Context {
-    /// The boxes of the primitives of each geometry of each mesh. Waits for the GPU once.
+    /// The boxes of the primitives of each geometry of each mesh. Waits for the GPU.
     pub(super) fn read_bounds(&self, descs: &[&BlasDesc<'_>]) -> Result<Vec<Vec<Vec<Bounds>>>> {
         let mut pieces = Pieces::default();
         for geometry in descs.iter().flat_map(|desc| desc.geometries) {
@@ -45,20 +52,27 @@ impl Context {
         let buffer = self.shared().store.buffers.get(handle)?;
         pieces.places.insert(piece, pieces.bytes.len());
         pieces.bytes.resize(pieces.bytes.len() + size as usize, 0);
-        pieces.list.push((buffer, offset, size));
+        let start = pieces.ranges.last().map_or(0, |last| last.end);
+        pieces.ranges.push(start..start + size);
+        pieces.list.push((buffer, offset));
         Ok(())
     }
 
     fn read_pieces(&self, pieces: &mut Pieces) -> Result<()> {
-        let Pieces { list, bytes, .. } = pieces;
-        self.read_back(bytes.len() as u64, bytes, |cmd, target| {
-            let mut end = 0;
-            for (buffer, offset, size) in list.iter() {
-                cmd.copy_buffer_objects(buffer, *offset, target, end, *size)?;
-                end += size;
-            }
-            Ok(())
-        })
+        let Pieces { list, ranges, bytes, .. } = pieces;
+        let most = READ_AT_ONCE.min(self.shared().gpu.caps.limits.max_buffer_bytes).max(1);
+        for (bytes, start) in bytes.chunks_mut(most as usize).zip((0_u64..).step_by(most as usize)) {
+            let size = bytes.len() as u64;
+            self.read_back(size, bytes, |cmd, target| {
+                for (index, part) in overlaps(ranges, start..start + size) {
+                    let (buffer, offset) = &list[index];
+                    let from = offset + (part.start - ranges[index].start);
+                    cmd.copy_buffer_objects(buffer, from, target, part.start - start, part.end - part.start)?;
+                }
+                Ok(())
+            })?;
+        }
+        Ok(())
     }
 }
 
@@ -67,6 +81,14 @@ impl Pieces {
         let place = self.places.get(&piece);
         place.and_then(|start| self.bytes.get(*start..*start + piece.2 as usize)).unwrap_or_default()
     }
+}
+
+/// Which of `ranges`, which follow each other, reach into `window`, and what of them lies in it.
+fn overlaps(ranges: &[Range<u64>], window: Range<u64>) -> impl Iterator<Item = (usize, Range<u64>)> {
+    let first = ranges.partition_point(|range| range.end <= window.start);
+    let inside = ranges[first..].iter().take_while(move |range| range.start < window.end);
+    let common = move |range: &Range<u64>| range.start.max(window.start)..range.end.min(window.end);
+    (first..).zip(inside.map(common))
 }
 
 /// What of its buffers a geometry reads.
@@ -145,6 +167,35 @@ fn transform(triangles: &Triangles, pieces: &Pieces) -> Option<[f32; 12]> {
             let found = pieces.get(matrix(triangles)?);
             (found.len() == bytes.len()).then(|| bytes.copy_from_slice(found))?;
             Some(rows)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn windows_cover_every_byte_once(sizes in prop::collection::vec(1..40_u64, 0..20), most in 1..50_u64) {
+            let mut end = 0;
+            let mut place = |size: &u64| {
+                end += size;
+                end - size..end
+            };
+            let ranges: Vec<_> = sizes.iter().map(&mut place).collect();
+            let mut next = 0;
+            for start in (0..end).step_by(most as usize) {
+                for (index, part) in overlaps(&ranges, start..start + most) {
+                    prop_assert_eq!(part.start, next);
+                    prop_assert!(part.start >= start && part.end <= start + most && !part.is_empty());
+                    prop_assert!(ranges[index].start <= part.start && part.end <= ranges[index].end);
+                    next = part.end;
+                }
+            }
+            prop_assert_eq!(next, end);
         }
     }
 }

@@ -10,14 +10,15 @@ use super::create_accel::blas_object;
 use super::holder::Holder;
 use crate::accel::AccelStruct;
 use crate::accel::blas::{BlasBody, PartShape};
-use crate::accel::blob::{Blob, BlobGeometry, BlobGeometryKind, BlobPart, decode, encode};
+use crate::accel::blob::{Blob, BlobGeometry, BlobGeometryKind, BlobIndices, BlobPart, decode, encode};
 use crate::accel::desc::BlasDesc;
 use crate::accel::flags::BuildFlags;
 use crate::accel::geometry::{BlasGeometry, GeometryFlags};
-use crate::accel::primitive_map::table_lists;
+use crate::accel::primitive_map::{cover_mesh, table_lists};
 use crate::accel::raw_structure::RawStructure;
 use crate::accel::split::PartPlan;
 use crate::error::{Error, Result};
+use crate::format::IndexFormat;
 use crate::handle::AccelStructHandle;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::resource::query::QueryPoolDesc;
@@ -38,6 +39,8 @@ pub struct LoadedBlas {
 impl Context {
     /// A bottom-level structure as bytes, for a file that [`load_blas`](Self::load_blas) reads on the same device with
     /// the same driver (`vkCmdCopyAccelerationStructureToMemoryKHR`). Waits for the GPU.
+    ///
+    /// Keep the file where only the program writes it: its checksum finds damage, not intent.
     pub fn serialize_blas(&self, handle: AccelStructHandle) -> Result<Vec<u8>> {
         let object = self.shared().store.accel_structs.get(handle)?;
         let blas = object.blas()?;
@@ -53,14 +56,18 @@ impl Context {
 
     /// Makes a bottom-level structure from what [`serialize_blas`](Self::serialize_blas) wrote
     /// (`vkCmdCopyMemoryToAccelerationStructureKHR`). `desc` is what it was created from: flags, kinds and counts of
-    /// its geometries must be the same, and its buffers are what a refit reads.
-    ///
-    /// The bytes must come from a file that only this library wrote: they are checked for damage and for the driver that
-    /// wrote them, but a driver trusts what it once wrote.
+    /// its geometries must be the same, and so must vertex formats, numbers of vertices, kinds of indices, and whether
+    /// there is a matrix; its buffers are what a refit reads.
     ///
     /// # Errors
     /// [`Serialized`](Error::Serialized) for bytes that are damaged, of another mesh, or of another device or driver.
-    pub fn load_blas(&self, desc: &BlasDesc<'_>, bytes: &[u8]) -> Result<Holder<AccelStructHandle>> {
+    ///
+    /// # Safety
+    /// `bytes` are what [`serialize_blas`](Self::serialize_blas) wrote, whole or damaged by accident, but not made up to
+    /// look like it. Damage, and sizes and counts that contradict the mesh, are found and refused; but what the driver
+    /// wrote of a structure only the driver can read, and it takes it for its own: made-up contents send the GPU to any
+    /// address. A file that others can write is no source.
+    pub unsafe fn load_blas(&self, desc: &BlasDesc<'_>, bytes: &[u8]) -> Result<Holder<AccelStructHandle>> {
         self.shared().gpu.accel()?;
         let blob = decode(bytes).map_err(|error| rejected(desc, error.to_string()))?;
         check_same_mesh(desc, &blob).map_err(|reason| rejected(desc, reason))?;
@@ -68,14 +75,23 @@ impl Context {
         for part in &blob.parts {
             bytes.push(self.check_driver(part).map_err(|reason| rejected(desc, reason))?);
         }
-        let shapes = self.loaded_shapes(desc, &blob)?;
-        self.deserialize(desc, &blob, shapes, &bytes)
+        let shapes = self.loaded_shapes(desc, &blob, &bytes)?;
+        // SAFETY: the caller vouches for what the driver wrote; all else is checked.
+        unsafe { self.deserialize(desc, &blob, shapes, &bytes) }
     }
 
     /// As [`load_blas`](Self::load_blas), and as [`create_blas`](Self::create_blas) where there are no bytes or they
     /// cannot be used.
-    pub fn load_or_create_blas(&self, desc: &BlasDesc<'_>, bytes: Option<&[u8]>) -> Result<LoadedBlas> {
-        match bytes.map(|bytes| self.load_blas(desc, bytes)) {
+    ///
+    /// # Safety
+    /// As [`load_blas`](Self::load_blas): nobody made the bytes up.
+    pub unsafe fn load_or_create_blas(
+        &self,
+        desc: &BlasDesc<'_>,
+        bytes: Option<&[u8]>,
+    ) -> Result<LoadedBlas> {
+        // SAFETY: the caller vouches for the bytes.
+        match bytes.map(|bytes| unsafe { self.load_blas(desc, bytes) }) {
             Some(Ok(blas)) => Ok(LoadedBlas { blas, rejected: None }),
             Some(Err(error @ Error::Serialized { .. })) => {
                 log::warn!("{error}; building it anew");
@@ -106,20 +122,14 @@ impl Context {
         let buffer = self.blob_buffer(&object.name, places.total)?;
         let base = buffer.address.next_multiple_of(ALIGNMENT);
         let addresses: Vec<_> = places.offsets.iter().map(|offset| base + offset).collect();
-        let mut cmd = self.acquire_command_buffer()?;
-        cmd.serialize_parts(object, body, &buffer, &addresses)?;
-        self.submit(cmd)?;
-        let mut parts = Vec::with_capacity(sizes.len());
-        for (offset, size) in places.offsets.iter().zip(sizes) {
-            let mut bytes = vec![0; *size as usize];
-            let start = base - buffer.address + offset;
-            self.read_back(*size, &mut bytes, |cmd, target| {
-                cmd.copy_buffer_objects(&buffer, start, target, 0, *size)
-            })?;
-            parts.push(bytes);
-        }
-        self.shared().retire(Garbage::Buffer(buffer));
-        Ok(parts)
+        let mut bytes = vec![0; places.total as usize];
+        self.read_back(places.total, &mut bytes, |cmd, target| {
+            self.shared().retire(Garbage::Buffer(Arc::clone(&buffer)));
+            cmd.serialize_parts(object, body, &buffer, &addresses)?;
+            cmd.copy_buffer_objects(&buffer, base - buffer.address, target, 0, places.total)
+        })?;
+        let part = |(offset, size): (&u64, &u64)| bytes[*offset as usize..][..*size as usize].to_vec();
+        Ok(places.offsets.iter().zip(sizes).map(part).collect())
     }
 
     /// The words of a part's table.
@@ -147,7 +157,8 @@ impl Context {
             let bytes = part.driver.get(at..at + 8)?.try_into().ok()?;
             Some(u64::from_le_bytes(bytes))
         };
-        let (written, structure) = number(32).zip(number(40)).ok_or_else(damaged)?;
+        let head = number(32).zip(number(40)).zip(number(48));
+        let ((written, structure), handles) = head.ok_or_else(damaged)?;
         let info = vk::AccelerationStructureVersionInfoKHR::default().version_data(version);
         let gpu = &self.shared().gpu;
         let ext = gpu.accel().map_err(|error| error.to_string())?;
@@ -159,13 +170,16 @@ impl Context {
                 gpu.caps.device_name
             ));
         }
-        if written != part.driver.len() as u64 || structure == 0 {
+        let is_bottom_level = handles == 0;
+        if written != part.driver.len() as u64 || structure == 0 || !is_bottom_level {
             return Err(damaged());
         }
         Ok(structure)
     }
 
-    fn deserialize(
+    /// # Safety
+    /// The driver wrote the parts' data.
+    unsafe fn deserialize(
         &self,
         desc: &BlasDesc<'_>,
         blob: &Blob,
@@ -191,33 +205,46 @@ impl Context {
             for (part, offset) in blob.parts.iter().zip(&places.offsets) {
                 cmd.upload_buffer(&buffer, base - buffer.address + offset, &part.driver)?;
             }
-            cmd.deserialize_parts(&object, &buffer, &addresses)
+            // SAFETY: the caller's promise; the structures have the sizes the data says, at addresses for them.
+            unsafe { cmd.deserialize_parts(&object, &buffer, &addresses) }
         });
         shared.retire(Garbage::Buffer(buffer));
         recorded.map(|()| holder)
     }
 
-    /// The shapes of loaded parts, with their tables.
-    fn loaded_shapes(&self, desc: &BlasDesc<'_>, blob: &Blob) -> Result<Vec<PartShape>> {
+    /// The shapes of loaded parts, with their tables. `bytes` is how large each part will be.
+    fn loaded_shapes(&self, desc: &BlasDesc<'_>, blob: &Blob, bytes: &[u64]) -> Result<Vec<PartShape>> {
         let shared = self.shared();
+        let whole = input(shared, desc)?;
         let counts: Vec<_> = desc.geometries.iter().map(BlasGeometry::primitive_count).collect();
-        let damaged = || rejected(desc, "its map of primitives is damaged");
-        let mut shapes = Vec::with_capacity(blob.parts.len());
-        for part in &blob.parts {
-            shapes.push(match &part.map {
-                None if blob.parts.len() == 1 => {
-                    let sizes = input(shared, desc)?.sizes(&shared.gpu)?;
-                    PartShape { counts: counts.clone(), map: None, sizes }
-                }
-                None => return Err(damaged()),
-                Some(words) => {
-                    let geometries = table_lists(words, &counts).ok_or_else(damaged)?;
-                    self.part_shape(desc, &PartPlan { geometries })?
-                }
-            });
+        let plans = loaded_plans(blob, &counts)
+            .ok_or_else(|| rejected(desc, "its parts are not those of the mesh, each primitive once"))?;
+        let mut shapes = Vec::with_capacity(plans.len());
+        for (plan, bytes) in plans.iter().zip(bytes) {
+            let shape = match plan {
+                None => PartShape { counts: counts.clone(), map: None, sizes: whole.sizes(&shared.gpu)? },
+                Some(plan) => self.part_shape(desc, plan)?,
+            };
+            let most = shape.sizes.structure_bytes;
+            if *bytes > most {
+                let reason = format!("a part is to take {bytes} bytes, where a build takes at most {most}");
+                return Err(rejected(desc, reason));
+            }
+            shapes.push(shape);
         }
         Ok(shapes)
     }
+}
+
+/// The primitives of each part, or none for the mesh as it is; `None` where they do not make up the mesh.
+fn loaded_plans(blob: &Blob, counts: &[u32]) -> Option<Vec<Option<PartPlan>>> {
+    if let [BlobPart { map: None, .. }] = &blob.parts[..] {
+        return Some(vec![None]);
+    }
+    let lists = |part: &BlobPart| table_lists(part.map.as_ref()?, counts);
+    let parts: Vec<_> = blob.parts.iter().map(lists).collect::<Option<_>>()?;
+    let complete = !parts.is_empty() && cover_mesh(&parts, counts);
+    complete.then(|| parts.into_iter().map(|geometries| Some(PartPlan { geometries })).collect())
 }
 
 fn rejected(desc: &BlasDesc<'_>, reason: impl Into<String>) -> Error {
@@ -244,7 +271,19 @@ impl Places {
 }
 
 fn blob_geometry(geometry: &BlasGeometry) -> BlobGeometry {
-    let kind = if geometry.is_boxes() { BlobGeometryKind::Boxes } else { BlobGeometryKind::Triangles };
+    let kind = match geometry {
+        BlasGeometry::Triangles(triangles) => BlobGeometryKind::Triangles {
+            vertex_format: triangles.vertex_format.raw().as_raw().cast_unsigned(),
+            vertex_count: triangles.vertex_count,
+            indices: match triangles.indices.map(|indices| indices.format) {
+                None => BlobIndices::None,
+                Some(IndexFormat::U16) => BlobIndices::U16,
+                Some(IndexFormat::U32) => BlobIndices::U32,
+            },
+            is_transformed: triangles.transform.is_some(),
+        },
+        BlasGeometry::Aabbs(_) => BlobGeometryKind::Boxes,
+    };
     let flags: GeometryFlags = geometry.flags();
     BlobGeometry { kind, primitive_count: geometry.primitive_count(), flags: flags.bits() }
 }

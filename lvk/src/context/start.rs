@@ -26,7 +26,7 @@ use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::shared::Shared;
 use crate::store::Store;
 use crate::submit::Submitter;
-use crate::upload::Staging;
+use crate::upload::{SpareBuffers, Staging};
 
 impl Context {
     /// Opens Vulkan and makes a device that has what `desc` requires.
@@ -74,6 +74,7 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         accel_storage: AccelStorage::new(desc.accel_budget_bytes),
         graphics_queries: QueryStages::default(),
         kernels: Kernels::default(),
+        instance_buffers: SpareBuffers::default(),
         tlas_table: new_tlas_table(&gpu)?,
         layout: PipelineLayout::new(&gpu, bindless.set_layout)?,
         pipeline_cache: desc.pipeline_cache.map(|path| PipelineCache::new(&gpu, path)).transpose()?,

@@ -37,10 +37,14 @@ pub struct DeviceProfile {
     /// Least alignment of scratch addresses in bytes; rounded up to a power of two.
     pub min_scratch_alignment: u32,
     /// Most bytes of a storage buffer descriptor.
+    ///
+    /// Shaders reach the caller's buffers by address, where no device bounds them by this. Devices whose builds go
+    /// through such descriptors are bound by it in their acceleration structures and in the scratch of a build, so it
+    /// tightens both limits below.
     pub max_storage_buffer_range: u64,
-    /// Most bytes of one acceleration structure.
+    /// Most bytes of one acceleration structure. Meshes beyond it are split, larger top-level structures refused.
     pub max_accel_structure_bytes: u64,
-    /// Most bytes of scratch for one build.
+    /// Most bytes of scratch for one build, with the same consequences.
     pub max_accel_scratch_bytes: u64,
     /// Most primitives of one bottom-level structure.
     pub max_blas_primitives: u64,
@@ -162,10 +166,11 @@ impl DeviceProfile {
         capabilities.mesh_shader &= self.mesh_shader;
         let limits = &mut capabilities.limits;
         limits.scratch_alignment = stricter_alignment(limits.scratch_alignment, self.min_scratch_alignment);
+        let range = self.max_storage_buffer_range;
         for (limit, most) in [
-            (&mut limits.max_storage_buffer_range, self.max_storage_buffer_range),
-            (&mut limits.max_accel_structure_bytes, self.max_accel_structure_bytes),
-            (&mut limits.max_accel_scratch_bytes, self.max_accel_scratch_bytes),
+            (&mut limits.max_storage_buffer_range, range),
+            (&mut limits.max_accel_structure_bytes, self.max_accel_structure_bytes.min(range)),
+            (&mut limits.max_accel_scratch_bytes, self.max_accel_scratch_bytes.min(range)),
             (&mut limits.max_blas_primitives, self.max_blas_primitives),
         ] {
             *limit = most.min(*limit);
@@ -245,6 +250,16 @@ mod tests {
         assert_eq!(limits.max_storage_buffer_range, range);
         assert_eq!((limits.max_accel_structure_bytes, limits.max_accel_scratch_bytes), (range, range));
         assert_eq!(limits.max_blas_primitives, 1 << 24);
+    }
+
+    #[test]
+    fn the_storage_range_alone_bounds_structures_and_their_scratch() {
+        let range = 1 << 20;
+        let profile = DeviceProfile { max_storage_buffer_range: range, ..DeviceProfile::default() };
+        let limits = under(&profile).limits;
+        assert_eq!((limits.max_accel_structure_bytes, limits.max_accel_scratch_bytes), (range, range));
+        let limits = under(&DeviceProfile { max_accel_scratch_bytes: 9, ..profile }).limits;
+        assert_eq!((limits.max_accel_structure_bytes, limits.max_accel_scratch_bytes), (range, 9));
     }
 
     #[test]

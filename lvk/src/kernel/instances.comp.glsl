@@ -25,7 +25,11 @@ layout(push_constant, scalar) uniform Push {
     uint copies;       // most parts of an entry; copy p of the list shows part p
     uint entryCount;
     uint userCount;
+    uint keepActive;   // not 0: copies without a part of their own stay in the tree, for no ray to meet
 };
+
+// The custom index without the mask above it: no ray has a bit in common with 0.
+const uint kNoMask = 0x00ffffffu;
 
 void main() {
     uint i = gl_GlobalInvocationID.x + gl_GlobalInvocationID.y * gl_NumWorkGroups.x * gl_WorkGroupSize.x;
@@ -35,8 +39,14 @@ void main() {
     Instance instance = source.instance[from];
     uint entry = instance.structure.x;
     Part part = Part(uvec2(0), uvec2(0));
-    if (entry < entryCount && instance.structure.y == 0u && copy < entries.entry[entry].count) {
-        part = parts.part[entries.entry[entry].first + copy];
+    if (entry < entryCount && instance.structure.y == 0u) {
+        Entry found = entries.entry[entry];
+        if (copy < found.count) {
+            part = parts.part[found.first + copy];
+        } else if (keepActive != 0u && found.count > 0u) {
+            part = parts.part[found.first];
+            instance.numbers.x &= kNoMask;
+        }
     }
     instance.structure = part.structure;
     target.instance[i] = instance;

@@ -51,6 +51,9 @@ pub(crate) struct InstancesPush {
     pub(crate) copies: u32,
     pub(crate) entry_count: u32,
     pub(crate) user_count: u32,
+    pub(crate) keep_active: u32,
+    /// Fills the block to the alignment of its addresses.
+    pub(crate) unused: u32,
 }
 
 /// The pipelines, each made when first needed.

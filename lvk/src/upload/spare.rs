@@ -1,0 +1,44 @@
+//! Mapped buffers that are used again instead of made anew.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::gpu::memory::MemoryKind;
+use crate::resource::Buffer;
+use crate::resource::buffer::{BufferDesc, InternalUsage};
+
+/// A few mapped buffers that nobody uses at the moment.
+#[derive(Default)]
+pub(crate) struct SpareBuffers {
+    buffers: Mutex<Vec<Arc<Buffer>>>,
+}
+
+impl SpareBuffers {
+    /// More than this are let go: a list for each frame in flight, of two structures.
+    const MOST: usize = 6;
+    /// A buffer this many times too large is not worth its memory.
+    const WASTE: u64 = 4;
+
+    /// A mapped buffer of at least `bytes`.
+    pub(crate) fn take(&self, gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Arc<Buffer>> {
+        let mut buffers = self.buffers.lock().unwrap_or_else(PoisonError::into_inner);
+        let fits = |buffer: &Arc<Buffer>| {
+            buffer.size_bytes >= bytes && buffer.size_bytes <= bytes.saturating_mul(Self::WASTE)
+        };
+        if let Some(place) = buffers.iter().position(fits) {
+            return Ok(buffers.swap_remove(place));
+        }
+        let memory = MemoryKind::HostVisible;
+        let desc = BufferDesc { size_bytes: bytes.max(1), memory, debug_name: name, ..Default::default() };
+        Ok(Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?))
+    }
+
+    /// Takes a buffer back that neither the GPU nor anybody else uses any more.
+    pub(crate) fn give(&self, buffer: Arc<Buffer>) {
+        let mut buffers = self.buffers.lock().unwrap_or_else(PoisonError::into_inner);
+        if buffer.mapped().is_some() && Arc::strong_count(&buffer) == 1 && buffers.len() < Self::MOST {
+            buffers.push(buffer);
+        }
+    }
+}
