@@ -52,6 +52,17 @@ impl Setup {
         })?)
     }
 
+    /// The device with room for so many textures.
+    pub(super) fn open_for_textures(&self, textures: u32) -> Result<Context, BenchError> {
+        Ok(Context::new(&ContextDesc {
+            application_name: "bench",
+            vulkan_library: self.loader.as_deref(),
+            device: self.device.as_deref(),
+            max_textures: textures.max(ContextDesc::default().max_textures),
+            ..ContextDesc::default()
+        })?)
+    }
+
     /// What suits the device.
     pub(super) fn choose<T>(&self, ctx: &Context, choice: Choice<T>) -> T {
         match (self.quick, ctx.capabilities().is_cpu) {
@@ -72,12 +83,17 @@ impl Setup {
         [args.width.unwrap_or(width), args.height.unwrap_or(height)]
     }
 
+    /// What to say beside figures of a smoke test.
+    pub(super) fn quick_remark(&self) -> &'static str {
+        if self.quick { " (quick: the figures mean little)" } else { "" }
+    }
+
     /// The title of a table about `what`.
     pub(super) fn headline(&self, ctx: &Context, what: &str) -> String {
         let caps = ctx.capabilities();
         let (major, minor, patch) = caps.api_version;
         let driver = format!("{} {}", caps.driver_name, caps.driver_info);
-        let quick = if self.quick { " (quick: the figures mean little)" } else { "" };
+        let quick = self.quick_remark();
         format!(
             "## {what}{quick}\n\n{}; {}, Vulkan {major}.{minor}.{patch}",
             caps.device_name,
