@@ -5,9 +5,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::error::PaperError;
-
-/// A colour, red, green and blue.
-pub(super) type Hue = (u8, u8, u8);
+use super::legend::{Area, Hue, headed};
 
 /// Groups of bars side by side.
 pub(super) struct BarChart {
@@ -51,10 +49,9 @@ impl BarChart {
         let slots: usize = self.groups.iter().map(|group| group.bars.len()).sum();
         let width = MARGIN + slots as u32 * BAR_WIDTH + self.groups.len() as u32 * GROUP_GAP;
         let root = SVGBackend::with_string(text, (width.max(640), HEIGHT)).into_drawing_area();
-        root.fill(&WHITE).map_err(|error| error.to_string())?;
+        let area = headed(&root, &self.title, &self.legend)?;
         let across = slots as f64 * f64::from(BAR_WIDTH) + self.groups.len() as f64 * f64::from(GROUP_GAP);
-        let mut chart = ChartBuilder::on(&root)
-            .caption(&self.title, ("sans-serif", 17))
+        let mut chart = ChartBuilder::on(&area)
             .margin(12)
             .y_label_area_size(56)
             .x_label_area_size(110)
@@ -65,7 +62,6 @@ impl BarChart {
         mesh.draw().map_err(|error| error.to_string())?;
         self.draw_bars(&mut chart, &root)?;
         self.draw_levels(&mut chart, across)?;
-        self.draw_legend(&root)?;
         root.present().map_err(|error| error.to_string())
     }
 
@@ -78,11 +74,7 @@ impl BarChart {
         if highest > 0.0 { 1.08 * highest } else { 1.0 }
     }
 
-    fn draw_bars<'b>(
-        &self,
-        chart: &mut Chart<'_, 'b>,
-        root: &DrawingArea<SVGBackend<'b>, plotters::coord::Shift>,
-    ) -> Result<(), String> {
+    fn draw_bars<'b>(&self, chart: &mut Chart<'_, 'b>, root: &Area<'b>) -> Result<(), String> {
         let label = ("sans-serif", 12).into_text_style(root).transform(FontTransform::Rotate90);
         let label = label.pos(Pos::new(HPos::Left, VPos::Center));
         let mut x = 0.5 * f64::from(GROUP_GAP);
@@ -110,18 +102,6 @@ impl BarChart {
         for &(level, (r, g, b)) in &self.levels {
             let line = PathElement::new([(0.0, level), (across, level)], RGBColor(r, g, b).stroke_width(1));
             chart.draw_series(std::iter::once(line)).map_err(|error| error.to_string())?;
-        }
-        Ok(())
-    }
-
-    fn draw_legend(&self, root: &DrawingArea<SVGBackend<'_>, plotters::coord::Shift>) -> Result<(), String> {
-        let mut x = 70;
-        for (name, (r, g, b)) in &self.legend {
-            let patch = Rectangle::new([(x, 38), (x + 10, 48)], RGBColor(*r, *g, *b).filled());
-            root.draw(&patch).map_err(|error| error.to_string())?;
-            root.draw(&Text::new(name.clone(), (x + 14, 37), ("sans-serif", 12)))
-                .map_err(|error| error.to_string())?;
-            x += 30 + 7 * name.chars().count() as i32;
         }
         Ok(())
     }

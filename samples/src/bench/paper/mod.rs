@@ -11,6 +11,7 @@ mod csv;
 mod date;
 mod error;
 mod goals;
+mod legend;
 mod likeness;
 mod line_chart;
 mod measured;

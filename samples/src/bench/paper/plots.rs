@@ -1,9 +1,10 @@
 //! Which plots the report has.
 
 use super::super::setup::path_name;
-use super::bar_chart::{Bar, BarChart, Group, Hue};
+use super::bar_chart::{Bar, BarChart, Group};
 use super::error::PaperError;
 use super::goals::AVERAGE_RATIO;
+use super::legend::Hue;
 use super::line_chart::LineChart;
 use super::measured::SceneResult;
 use super::published::{self, PublishedScene};
@@ -100,27 +101,20 @@ fn times(scenes: &[SceneResult], path: RayPath) -> BarChart {
 }
 
 fn frames(scene: &SceneResult, path: RayPath) -> LineChart {
-    let all: Vec<&Times> = scene.of(path).flat_map(|cell| &cell.frames).collect();
-    let mut start = 0;
-    let marks = scene.of(path).map(|cell| {
-        let mark = (start, format!("cam {}", cell.camera + 1));
-        start += cell.frames.len();
-        mark
-    });
-    let marks = marks.collect();
-    let curve = |name: &str, color, number: &dyn Fn(&Times) -> f64| {
-        (name.to_owned(), color, all.iter().map(|times| number(times)).collect())
+    let curve = |name: &str, hue, number: fn(&Times) -> f64| {
+        let stretches = scene.of(path).map(|cell| cell.frames.iter().map(number).collect());
+        (name.to_owned(), hue, stretches.collect())
     };
     LineChart {
         title: format!("Every frame of {} by {}", scene.name, path_name(path)),
         axis: "milliseconds",
         curves: vec![
-            curve("stand-alone T", STANDALONE, &|times| times.standalone),
-            curve("hybrid t", BLACK, &Times::hybrid),
-            curve("ray pass t_a", RAYS, &|times| times.rays),
-            curve("geometry pass t_b", GEOMETRY, &|times| times.geometry),
+            curve("stand-alone T", STANDALONE, |times| times.standalone),
+            curve("hybrid t", BLACK, Times::hybrid),
+            curve("ray pass t_a", RAYS, |times| times.rays),
+            curve("geometry pass t_b", GEOMETRY, |times| times.geometry),
         ],
-        marks,
+        stretches: scene.of(path).map(|cell| format!("cam {}", cell.camera + 1)).collect(),
     }
 }
 

@@ -11,25 +11,32 @@ use crate::hybrid::RayPath;
 /// Columns of a table of times, the first apart.
 const TIMES: [&str; 6] = ["T", "t_a", "t_a/T", "t_b", "t", "t/T"];
 
+/// Whether the paper has numbers for any of the scenes.
+pub(super) fn has_published(scenes: &[SceneResult]) -> bool {
+    scenes.iter().any(|scene| PublishedScene::named(&scene.name).is_some())
+}
+
 /// Geometry (Table 1).
 pub(super) fn geometry(scenes: &[SceneResult]) -> Table {
-    let head = ["scene", "vertices", "triangles", "the paper's", "vertices ", "faces"];
-    let mut table = Table::new("### Table 1: geometry".to_owned(), &head);
+    let head = ["scene", "vertices", "triangles", "paper: scene", "vertices", "faces"];
+    let shown = if has_published(scenes) { head.len() } else { 3 };
+    let mut table = Table::new("### Table 1: geometry".to_owned(), &head[..shown]);
     for scene in scenes {
         let own = [scene.vertices, scene.triangles].map(grouped);
         let published = PublishedScene::named(&scene.name);
         let theirs =
             published.map(|theirs| [theirs.name.to_owned(), grouped(theirs.vertices), grouped(theirs.faces)]);
-        table.row(scene.name.clone(), own.into_iter().chain(theirs.unwrap_or_default()));
+        table.row(scene.name.clone(), own.into_iter().chain(theirs.into_iter().flatten()));
     }
     table
 }
 
 /// How alike the pictures of both methods are (Table 2).
 pub(super) fn likeness(scenes: &[SceneResult], path: RayPath) -> Table {
-    let head = ["camera", "PSNR dB", "lowest", "SSIM", "differing", "paper: PSNR dB", "SSIM "];
+    let head = ["camera", "PSNR dB", "lowest", "SSIM", "differing", "paper: PSNR dB", "SSIM"];
+    let shown = if has_published(scenes) { head.len() } else { 5 };
     let title = format!("### Table 2, by {}: stand-alone and hybrid pictures compared", path_name(path));
-    let mut table = Table::new(title, &head);
+    let mut table = Table::new(title, &head[..shown]);
     for scene in scenes {
         let published = PublishedScene::named(&scene.name);
         for cell in scene.of(path) {
@@ -43,7 +50,7 @@ pub(super) fn likeness(scenes: &[SceneResult], path: RayPath) -> Table {
 
 /// How alike pictures by pipeline and by query are.
 pub(super) fn paths(scenes: &[SceneResult]) -> Option<Table> {
-    let head = ["camera", "stand-alone: PSNR dB", "SSIM", "hybrid: PSNR dB", "SSIM "];
+    let head = ["camera", "stand-alone: PSNR dB", "SSIM", "hybrid: PSNR dB", "SSIM"];
     let mut table = Table::new("### Pictures by pipeline and by query compared".to_owned(), &head);
     for scene in scenes {
         for (number, (standalone, hybrid)) in scene.paths_alike.iter().enumerate() {
@@ -63,11 +70,13 @@ pub(super) fn times(
     published: &TimesTable,
 ) -> Table {
     let TimesTable { number, card, .. } = published;
-    let title = format!(
-        "### Table {number}, by {}: {what} in milliseconds, beside the paper's {card}",
-        path_name(path)
-    );
-    let theirs = TIMES.map(|column| format!("paper: {column}"));
+    let beside = if has_published(scenes) { format!(", beside the paper's {card}") } else { String::new() };
+    let title = format!("### Table {number}, by {}: {what} in milliseconds{beside}", path_name(path));
+    let theirs = if has_published(scenes) {
+        TIMES.map(|column| format!("paper: {column}")).into()
+    } else {
+        Vec::new()
+    };
     let head: Vec<&str> =
         ["camera"].into_iter().chain(TIMES).chain(theirs.iter().map(String::as_str)).collect();
     let mut table = Table::new(title, &head);
@@ -128,7 +137,8 @@ pub(super) fn spread(scenes: &[SceneResult], path: RayPath) -> Table {
 
 /// The averages of the scenes, for the terminal.
 pub(super) fn summary(headline: String, scenes: &[SceneResult], paths: &[RayPath]) -> Table {
-    let head: Vec<&str> = ["scene"].into_iter().chain(TIMES).chain(["PSNR dB", "paper: t/T"]).collect();
+    let theirs = has_published(scenes).then_some("paper: t/T");
+    let head: Vec<&str> = ["scene"].into_iter().chain(TIMES).chain(["PSNR dB"]).chain(theirs).collect();
     let mut table = Table::new(headline, &head);
     for scene in scenes {
         for &path in paths {
