@@ -7,6 +7,7 @@ use ash::vk;
 
 use crate::accel::AccelStruct;
 use crate::accel::blas::BlasBody;
+use crate::accel::compaction::SizeQuery;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
 use crate::accel::structure::AccelKind;
@@ -73,8 +74,12 @@ pub(crate) enum Garbage {
     AccelStruct(Arc<AccelStruct>),
     /// What a top-level structure showed; handles of it may still be in use.
     Contents(Box<TlasContents>),
-    /// What a compacted structure took the place of.
+    /// What a compacted structure took the place of, or what took its place.
     Body(#[expect(dead_code, reason = "held only to be dropped")] Arc<BlasBody>),
+    /// A map of primitives on its way to the GPU, for whose structure there may be no memory.
+    Table(Arc<Buffer>),
+    /// Answered sizes, which may be there before the GPU is done with the command buffer that asked.
+    SizeQuery(#[expect(dead_code, reason = "held only to be dropped")] Arc<SizeQuery>),
 }
 
 impl Shared {
@@ -125,10 +130,16 @@ impl Shared {
             Garbage::AccelStruct(object) => self.dispose_accel_struct(&object),
             Garbage::RayTracingPipeline(pipeline) => self.submitter.forget(pipeline.table.id),
             Garbage::Contents(contents) => self.forget_source(&contents),
+            Garbage::Table(table) => {
+                if let Some(unused) = Arc::into_inner(table) {
+                    self.submitter.forget(unused.id);
+                }
+            }
             Garbage::RenderPipeline(_)
             | Garbage::ComputePipeline(_)
             | Garbage::QueryPool(_)
-            | Garbage::Body(_) => {}
+            | Garbage::Body(_)
+            | Garbage::SizeQuery(_) => {}
         }
     }
 

@@ -1,9 +1,16 @@
-// Spheres in object space, where the boxes of the test are.
+// Spheres in object space, where the boxes of the test are. SPHERE_STEP and SPHERE_COUNT, which have no common divisor,
+// put neighbours far from each other in the list.
 #ifndef SPHERE_OBJECT
 #define SPHERE_OBJECT
 
+#ifndef SPHERE_STEP
+#define SPHERE_STEP 1
+#define SPHERE_COUNT 0x7fffffff
+#endif
+
 vec3 sphereCenter(int geometry, int primitive) {
-    return vec3(primitive % 3, primitive / 3, geometry) * 2.0;
+    int place = primitive * SPHERE_STEP % SPHERE_COUNT;
+    return vec3(place % 3, place / 3, geometry) * 2.0;
 }
 
 // Both places where a ray passes through the surface; false if it passes the sphere.

@@ -6,7 +6,7 @@ use crate::reference::{Answer, HitIds};
 
 /// Relative to the distance, or to 1 where that is larger.
 const DISTANCE: f64 = 1e-5;
-const BARYCENTRICS: f64 = 1e-4;
+const BARYCENTRICS: f64 = 2e-4;
 /// Most of the rays may not be left out: one in so many.
 const EXCLUDED_SHARE: usize = 50;
 const SHOWN: usize = 5;

@@ -19,6 +19,11 @@ impl TestDevice {
     pub fn take_messages(&self) -> Vec<lvk::ValidationMessage> {
         self.sink.take()
     }
+
+    /// The bare context, whose end waits for nothing, and the messages, which the caller has to check.
+    pub fn into_context(mut self) -> (Option<Context>, ValidationSink) {
+        (self.context.take(), self.sink.clone())
+    }
 }
 
 impl Deref for TestDevice {
@@ -96,6 +101,17 @@ pub fn vulkan() -> Option<Option<&'static Path>> {
         }
         Err(reason) => unavailable(reason),
     }
+}
+
+/// Whether the driver builds boxes that are not numbers around what lies beside inactive primitives, so that rays miss
+/// it, as lavapipe 25.0 does. Says so on standard error.
+pub fn loses_neighbours_of_inactive(ctx: &Context) -> bool {
+    let name = &ctx.capabilities().device_name;
+    let loses = name.contains("llvmpipe");
+    if loses {
+        eprintln!("NOT TESTED, {name} loses primitives beside inactive ones");
+    }
+    loses
 }
 
 /// The description file of the device without ray tracing; `None`, loudly, where it cannot be fetched.

@@ -212,7 +212,9 @@ fn upload_part(ctx: &Context, part: &Part) -> Result<(PartBuffers, Triangles)> {
         let usage = BufferUsage::ACCEL_INPUT | BufferUsage::STORAGE;
         ctx.create_buffer(&BufferDesc { data: Some(data), usage, debug_name, ..Default::default() })
     };
-    let vertices = input(&vertex_bytes(&part.mesh, part.layout), "vertices")?;
+    let mut vertices = vertex_bytes(&part.mesh, part.layout);
+    vertices.resize(vertices.len().max(12), 0);
+    let vertices = input(&vertices, "vertices")?;
     let triangle_count = part.mesh.triangles.len() as u32;
     let (indices, offset, format) = index_bytes(part);
     let indices = if indices.is_empty() { None } else { Some(input(&indices, "indices")?) };

@@ -7,7 +7,7 @@ use lvk::{
 };
 
 use crate::ray_scene::Placed;
-use crate::ray_tracer::{Method, RayTracer, shader};
+use crate::ray_tracer::{Method, RayTracer, shader, shader_with};
 use crate::reference::{HitIds, Sphere};
 
 /// Radius in object space and tag of each hit group of spheres; an instance's hit-group offset chooses one.
@@ -16,59 +16,81 @@ pub const GROUPS: [(f32, u32); 2] = [(0.9, 17), (0.5, 99)];
 /// Geometries of a model of spheres.
 const GEOMETRIES: u32 = 2;
 
-/// Two geometries of `count` boxes each, and their buffers. The second list starts late and has gaps.
-pub fn sphere_boxes(ctx: &Context, count: u32) -> Result<(Vec<Holder<BufferHandle>>, Vec<BlasGeometry>)> {
-    let mut buffers = Vec::new();
-    let mut geometries = Vec::new();
-    for (geometry, offset, stride) in [(0, 0, 0), (1, 16, 32)] {
-        let mut floats = vec![f32::NAN; offset as usize / 4];
-        for center in (0..count).map(|primitive| sphere_center(geometry, primitive)) {
-            floats.extend([center - 1.0, center + 1.0].iter().flat_map(Vec3::to_array));
-            floats.extend(vec![f32::NAN; if stride == 0 { 0 } else { 2 }]);
+/// A model of two geometries of boxes with a sphere in each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SphereModel {
+    /// Boxes of a geometry.
+    pub count: u32,
+    /// From one box of the list to the next, round and round the places; 1 is neighbour after neighbour. Shares no
+    /// divisor with `count`.
+    pub step: u32,
+}
+
+impl SphereModel {
+    /// Neighbour after neighbour.
+    pub fn new(count: u32) -> Self {
+        Self { count, step: 1 }
+    }
+
+    /// The boxes, and the buffers they lie in. The second list starts late and has gaps.
+    pub fn boxes(&self, ctx: &Context) -> Result<(Vec<Holder<BufferHandle>>, Vec<BlasGeometry>)> {
+        let mut buffers = Vec::new();
+        let mut geometries = Vec::new();
+        for (geometry, offset, stride) in [(0, 0, 0), (1, 16, 32)] {
+            let mut floats = vec![f32::NAN; offset as usize / 4];
+            for center in (0..self.count).map(|primitive| self.center(geometry, primitive)) {
+                floats.extend([center - 1.0, center + 1.0].iter().flat_map(Vec3::to_array));
+                floats.extend(vec![f32::NAN; if stride == 0 { 0 } else { 2 }]);
+            }
+            let data = Some(bytemuck::cast_slice(&floats));
+            let usage = BufferUsage::ACCEL_INPUT;
+            let buffer = ctx.create_buffer(&BufferDesc { data, usage, ..Default::default() })?;
+            let (count, flags) = (self.count, GeometryFlags::OPAQUE);
+            geometries.push(BlasGeometry::Aabbs(Aabbs { buffer: *buffer, offset, stride, count, flags }));
+            buffers.push(buffer);
         }
-        let data = Some(bytemuck::cast_slice(&floats));
-        let usage = BufferUsage::ACCEL_INPUT;
-        let buffer = ctx.create_buffer(&BufferDesc { data, usage, ..Default::default() })?;
-        let flags = GeometryFlags::OPAQUE;
-        geometries.push(BlasGeometry::Aabbs(Aabbs { buffer: *buffer, offset, stride, count, flags }));
-        buffers.push(buffer);
+        Ok((buffers, geometries))
     }
-    Ok((buffers, geometries))
-}
 
-/// The spheres of models of `count` boxes a geometry, for the reference.
-pub fn spheres(placed: &[Placed], count: u32) -> Vec<Sphere> {
-    let mut spheres = Vec::new();
-    for (instance, placed) in (0..).zip(placed) {
-        let scale = f64::from(placed.transform.matrix3.x_axis.length());
-        let radius = f64::from(GROUPS[placed.hit_group_offset as usize].0) * scale;
-        for (geometry, primitive) in (0..GEOMETRIES * count).map(|index| (index / count, index % count)) {
-            let center = placed.transform.transform_point3(sphere_center(geometry, primitive)).as_dvec3();
-            let ids = HitIds { instance, custom_index: placed.custom_index, geometry, primitive };
-            spheres.push(Sphere { center, radius, ids });
+    /// The spheres of instances of the model, for the reference.
+    pub fn spheres(&self, placed: &[Placed]) -> Vec<Sphere> {
+        let mut spheres = Vec::new();
+        for (instance, placed) in (0..).zip(placed) {
+            let scale = f64::from(placed.transform.matrix3.x_axis.length());
+            let radius = f64::from(GROUPS[placed.hit_group_offset as usize].0) * scale;
+            for index in 0..GEOMETRIES * self.count {
+                let (geometry, primitive) = (index / self.count, index % self.count);
+                let center = placed.transform.transform_point3(self.center(geometry, primitive)).as_dvec3();
+                let ids = HitIds { instance, custom_index: placed.custom_index, geometry, primitive };
+                spheres.push(Sphere { center, radius, ids });
+            }
+        }
+        spheres
+    }
+
+    /// Hits spheres by either method.
+    pub fn tracer(&self, ctx: &Context, method: Method) -> Result<RayTracer> {
+        let numbers = [self.step, self.count].map(|number| number.to_string());
+        let defines = [("SPHERE_STEP", &numbers[0][..]), ("SPHERE_COUNT", &numbers[1][..])];
+        match method {
+            Method::Pipeline => sphere_pipeline(ctx, &defines),
+            Method::Query => sphere_query(ctx, &defines),
         }
     }
-    spheres
-}
 
-/// Hits spheres by either method.
-pub fn sphere_tracer(ctx: &Context, method: Method) -> Result<RayTracer> {
-    match method {
-        Method::Pipeline => sphere_pipeline(ctx),
-        Method::Query => sphere_query(ctx),
+    /// Where the shaders look for a sphere, in object space.
+    fn center(&self, geometry: u32, primitive: u32) -> Vec3 {
+        let place = primitive * self.step % self.count;
+        Vec3::new((place % 3) as f32, (place / 3) as f32, geometry as f32) * 2.0
     }
 }
 
-/// Where the shaders look for a sphere, in object space.
-fn sphere_center(geometry: u32, primitive: u32) -> Vec3 {
-    Vec3::new((primitive % 3) as f32, (primitive / 3) as f32, geometry as f32) * 2.0
-}
-
-fn sphere_pipeline(ctx: &Context) -> Result<RayTracer> {
+fn sphere_pipeline(ctx: &Context, defines: &[(&str, &str)]) -> Result<RayTracer> {
     let ray_gen = shader(ctx, ShaderStage::RayGen, include_str!("../shaders/closest.rgen.glsl"))?;
     let miss = shader(ctx, ShaderStage::Miss, include_str!("../shaders/record.rmiss.glsl"))?;
     let hit = shader(ctx, ShaderStage::ClosestHit, include_str!("../shaders/sphere.rchit.glsl"))?;
-    let sphere = shader(ctx, ShaderStage::Intersection, include_str!("../shaders/sphere.rint.glsl"))?;
+    let text = include_str!("../shaders/sphere.rint.glsl");
+    let sphere = shader_with(ctx, ShaderStage::Intersection, text, defines)?;
     let records = GROUPS.map(|(radius, tag)| [radius.to_ne_bytes(), tag.to_ne_bytes()].concat());
     let groups = records.each_ref().map(|record| HitGroup {
         closest_hit: Some(*hit),
@@ -85,8 +107,9 @@ fn sphere_pipeline(ctx: &Context) -> Result<RayTracer> {
     Ok(RayTracer::of_pipeline(ctx, pipeline))
 }
 
-fn sphere_query(ctx: &Context) -> Result<RayTracer> {
-    let module = shader(ctx, ShaderStage::Compute, include_str!("../shaders/sphere_query.comp.glsl"))?;
+fn sphere_query(ctx: &Context, defines: &[(&str, &str)]) -> Result<RayTracer> {
+    let text = include_str!("../shaders/sphere_query.comp.glsl");
+    let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
     let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
     Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?))
 }

@@ -12,7 +12,7 @@ use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances};
 use lvk_tests::ray_tracer::{How, Method, RayTracer, shader, shader_with};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::reference::{Reference, Sphere};
-use lvk_tests::sphere_scene::{GROUPS, sphere_boxes, sphere_tracer, spheres};
+use lvk_tests::sphere_scene::{GROUPS, SphereModel};
 use lvk_tests::{TestDevice, device};
 
 const RAY_GEN: &str = include_str!("../shaders/closest.rgen.glsl");
@@ -249,7 +249,8 @@ fn a_hit_shader_traces_a_ray_of_its_own() -> Result<()> {
 #[test]
 fn an_intersection_shader_hits_spheres_in_boxes() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let (_buffers, geometries) = sphere_boxes(&ctx, 5)?;
+    let spheres = SphereModel::new(5);
+    let (_buffers, geometries) = spheres.boxes(&ctx)?;
     let model = [ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?];
     let turn = Quat::from_rotation_y(0.7);
     let places = [
@@ -267,12 +268,12 @@ fn an_intersection_shader_hits_spheres_in_boxes() -> Result<()> {
     };
     let placed: Vec<_> = (0..).zip(&places).map(place).collect();
     let tlas = ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
-    let spheres = spheres(&placed, 5);
+    let expected = spheres.spheres(&placed);
     let rays = random_rays(51, 2_000, Vec3::new(-2.0, -1.0, -4.0), Vec3::new(10.0, 5.0, 5.0));
     for method in Method::available(&ctx) {
-        let tracer = sphere_tracer(&ctx, method)?;
+        let tracer = spheres.tracer(&ctx, method)?;
         let records = tracer.trace(&tlas, &rays, How::default())?;
-        Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&spheres, ray))
+        Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
             .assert(&format!("spheres by {method:?}"));
         for hit in records.iter().filter(|record| record.kind != 0) {
             let (radius, tag) = GROUPS[1 - hit.instance as usize];

@@ -46,6 +46,90 @@ pub(crate) fn cut(items: &mut [Item], left: usize) {
     select(items, left, way);
 }
 
+/// Moves some of the primitives to the front, wherever both pieces together cost least when a ray that enters a piece
+/// costs the root of its count; answers how many. At least one goes to either side of a list of two or more.
+///
+/// Unlike [`cut`] it follows the gaps of the mesh and not a count, so pieces may be of any size.
+pub(crate) fn cut_freely(items: &mut [Item]) -> usize {
+    let step = (items.len() / SAMPLE_COUNT).max(1);
+    let sample: Vec<_> = items.iter().copied().step_by(step).collect();
+    let best = (0..FREE_WAY_COUNT)
+        .filter_map(|way| cheapest_place(&sample, way))
+        .reduce(|best, other| if other.cost < best.cost { other } else { best });
+    let left = best.map_or(0, |best| partition(items, |item| free_rank(item, best.way) < best.place));
+    if left > 0 && left < items.len() {
+        return left;
+    }
+    let middle = items.len() / 2;
+    cut(items, middle);
+    middle
+}
+
+/// By the low end, by the high end and by the centre along x, y or z.
+const FREE_WAY_COUNT: usize = 9;
+
+fn free_rank(item: &Item, way: usize) -> f32 {
+    match way {
+        0..WAY_COUNT => rank(item, way),
+        _ => item.bounds.low[way - WAY_COUNT] + item.bounds.high[way - WAY_COUNT],
+    }
+}
+
+/// Where a list may be cut in two.
+struct Place {
+    cost: f32,
+    way: usize,
+    /// What ranks below goes left.
+    place: f32,
+}
+
+/// The cheapest of evenly spaced places along one way; none where all rank alike.
+fn cheapest_place(items: &[Item], way: usize) -> Option<Place> {
+    const BIN_COUNT: usize = 64;
+    let ranks = || items.iter().map(|item| free_rank(item, way));
+    let low = ranks().fold(f32::INFINITY, f32::min);
+    let high = ranks().fold(f32::NEG_INFINITY, f32::max);
+    let width = (high - low) / BIN_COUNT as f32;
+    if !(width > 0.0 && width.is_finite()) {
+        return None;
+    }
+    let mut bins = [(Bounds::EMPTY, 0_usize); BIN_COUNT];
+    for item in items {
+        let bin = &mut bins[(((free_rank(item, way) - low) / width) as usize).min(BIN_COUNT - 1)];
+        *bin = (bin.0.union(item.bounds), bin.1 + 1);
+    }
+    let join = |a: (Bounds, usize), b: (Bounds, usize)| (a.0.union(b.0), a.1 + b.1);
+    let mut behind = [(Bounds::EMPTY, 0); BIN_COUNT + 1];
+    for bin in (0..BIN_COUNT).rev() {
+        behind[bin] = join(behind[bin + 1], bins[bin]);
+    }
+    let (mut before, mut best) = ((Bounds::EMPTY, 0), None::<Place>);
+    for bin in 1..BIN_COUNT {
+        before = join(before, bins[bin - 1]);
+        let cost = free_cost(before) + free_cost(behind[bin]);
+        if before.1 > 0 && behind[bin].1 > 0 && best.as_ref().is_none_or(|best| cost < best.cost) {
+            best = Some(Place { cost, way, place: low + width * bin as f32 });
+        }
+    }
+    best
+}
+
+fn free_cost((bounds, count): (Bounds, usize)) -> f32 {
+    if count == 0 { 0.0 } else { bounds.half_area() * (count as f32).sqrt() }
+}
+
+/// Moves what goes left to the front, and answers how many that are.
+fn partition(items: &mut [Item], goes_left: impl Fn(&Item) -> bool) -> usize {
+    let mut left = 0;
+    for index in 0..items.len() {
+        if goes_left(&items[index]) {
+            items.swap(left, index);
+            left += 1;
+        }
+    }
+    left
+}
+
 fn cheapest_way(items: &mut [Item], left: usize) -> usize {
     let mut best = (f32::INFINITY, 0);
     for way in 0..WAY_COUNT {

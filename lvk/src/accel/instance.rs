@@ -1,16 +1,9 @@
 //! Instances of a top-level structure, from the host.
 
-use std::collections::HashMap;
-use std::hash::BuildHasherDefault;
-use std::sync::Arc;
-
 use bitflags::bitflags;
 use bytemuck::{Pod, Zeroable};
 
-use super::structure::AccelStruct;
-use super::tlas::{Entry, Shown};
-use crate::barrier::IdHasher;
-use crate::error::{Error, Result, check_limit};
+use crate::error::{Error, Result};
 use crate::handle::{AccelStructHandle, BufferHandle};
 
 bitflags! {
@@ -79,9 +72,6 @@ pub(crate) struct RawInstance {
 /// Bytes of one instance.
 pub(crate) const INSTANCE_BYTES: usize = size_of::<RawInstance>();
 
-/// Fewer instances than this are converted on the calling thread alone.
-const PARALLEL_COUNT: usize = 1 << 14;
-
 /// Instances that the GPU wrote, or that lie in a buffer for another reason.
 #[derive(Debug, Clone, Copy)]
 pub struct DeviceInstances<'a> {
@@ -98,186 +88,38 @@ pub struct DeviceInstances<'a> {
     pub blas: &'a [AccelStructHandle],
 }
 
-/// What a list of instances refers to, and how many Vulkan is given.
-pub(crate) struct InstancePlan {
-    /// Each structure once.
-    pub(crate) shown: Vec<Shown>,
-    /// For each instance its place in `shown`.
-    refers: Vec<u32>,
-    /// Instances with those for further parts of split meshes.
-    pub(crate) built_count: u32,
-    /// Whether addresses are put in by the kernel: parts have maps, there are several, or they may move.
-    pub(crate) needs_kernel: bool,
+/// Fails unless every number of the instance fits. Quick where it does: there may be millions.
+pub(super) fn check(name: &str, index: usize, instance: &TlasInstance) -> Result<()> {
+    const BOTH: InstanceFlags = InstanceFlags::FORCE_OPAQUE.union(InstanceFlags::FORCE_NO_OPAQUE);
+    let fits = (instance.custom_index | instance.hit_group_offset) >> 24 == 0;
+    if fits && is_finite(&instance.transform) && !instance.flags.contains(BOTH) {
+        return Ok(());
+    }
+    Err(complaint(name, index, instance))
 }
 
-/// Instances that name entries, see [`InstanceSource`](super::tlas::InstanceSource).
-pub(crate) struct EntryList {
-    /// One for each part of each structure.
-    pub(crate) entries: Vec<Entry>,
-    /// Of the instances behind the caller's: whose further parts they are.
-    pub(crate) owners: Vec<u32>,
-    /// Of the same: the entry.
-    further: Vec<u32>,
-    /// First entry of each structure.
-    firsts: Vec<u32>,
+/// Whether no exponent is all ones, without a branch for each number.
+fn is_finite(transform: &[f32; 12]) -> bool {
+    let all = transform.iter().fold(0, |all, number| all | ((number.to_bits() & 0x7fff_ffff) + 0x0080_0000));
+    all >> 31 == 0
 }
 
-impl InstancePlan {
-    /// Finds the structures of `instances`, which are to be shown by the structure `name`.
-    pub(crate) fn new(
-        name: &str,
-        instances: &[TlasInstance],
-        find: impl Fn(AccelStructHandle) -> Result<Arc<AccelStruct>>,
-    ) -> Result<Self> {
-        let mut known: HashMap<AccelStructHandle, u32, BuildHasherDefault<IdHasher>> = HashMap::default();
-        let mut shown: Vec<Shown> = Vec::new();
-        let mut refers = Vec::with_capacity(instances.len());
-        let mut last = None;
-        for instance in instances {
-            let place = match last {
-                Some((handle, place)) if handle == instance.blas => place,
-                _ => match known.get(&instance.blas) {
-                    Some(place) => *place,
-                    None => {
-                        let blas = find(instance.blas)?;
-                        let body = blas.blas()?.body();
-                        shown.push(Shown { blas, body });
-                        known.insert(instance.blas, shown.len() as u32 - 1);
-                        shown.len() as u32 - 1
-                    }
-                },
-            };
-            last = Some((instance.blas, place));
-            refers.push(place);
-        }
-        let parts: Vec<u64> = shown.iter().map(|shown| shown.body.structures.len() as u64).collect();
-        let built: u64 = if parts.iter().all(|count| *count == 1) {
-            refers.len() as u64
-        } else {
-            refers.iter().map(|place| parts[*place as usize]).sum()
-        };
-        check_limit(name, "number of instances, parts of split meshes included", built, u32::MAX.into())?;
-        let needs_kernel = shown.iter().any(|shown| shown.may_move() || shown.has_rows());
-        Ok(Self { shown, refers, built_count: built as u32, needs_kernel })
-    }
-
-    /// Checks the instances and writes them with addresses. Good only if no kernel is needed.
-    pub(crate) fn write_addresses(
-        &self,
-        name: &str,
-        instances: &[TlasInstance],
-        out: &mut [u8],
-    ) -> Result<()> {
-        let addresses: Vec<u64> = self.shown.iter().map(|shown| shown.body.structures[0].address).collect();
-        write_all(name, instances, &self.refers, &addresses, out)
-    }
-
-    /// Numbers the parts of everything shown, and the instances behind the caller's own.
-    pub(crate) fn entries(&self) -> EntryList {
-        let mut list =
-            EntryList { entries: Vec::new(), owners: Vec::new(), further: Vec::new(), firsts: Vec::new() };
-        for (shown, of) in (0..).zip(&self.shown) {
-            list.firsts.push(list.entries.len() as u32);
-            let parts = 0..of.body.structures.len() as u32;
-            list.entries.extend(parts.map(|first| Entry { shown, first, count: 1 }));
-        }
-        for (owner, place) in (0..).zip(&self.refers) {
-            let first = list.firsts[*place as usize];
-            let parts = self.shown[*place as usize].body.structures.len() as u32;
-            for part in 1..parts {
-                list.owners.push(owner);
-                list.further.push(first + part);
-            }
-        }
-        list
-    }
-
-    /// Checks the instances and writes them with entry numbers, those of further parts behind the caller's.
-    pub(crate) fn write_entries(
-        &self,
-        name: &str,
-        instances: &[TlasInstance],
-        list: &EntryList,
-        out: &mut [u8],
-    ) -> Result<()> {
-        let firsts: Vec<u64> = list.firsts.iter().map(|first| u64::from(*first)).collect();
-        let (own, further) = out.split_at_mut(instances.len() * INSTANCE_BYTES);
-        write_all(name, instances, &self.refers, &firsts, own)?;
-        let places = list.owners.iter().zip(&list.further);
-        for ((owner, entry), out) in places.zip(further.chunks_exact_mut(INSTANCE_BYTES)) {
-            let raw = pack(&instances[*owner as usize], u64::from(*entry));
-            out.copy_from_slice(bytemuck::bytes_of(&raw));
-        }
-        Ok(())
-    }
-}
-
-/// Checks and writes `instances`, each with what `references` holds for the structure it refers to.
-fn write_all(
-    name: &str,
-    instances: &[TlasInstance],
-    refers: &[u32],
-    references: &[u64],
-    out: &mut [u8],
-) -> Result<()> {
-    if instances.len() < PARALLEL_COUNT {
-        return write_chunk(name, 0, instances, refers, references, out);
-    }
-    let threads = std::thread::available_parallelism().map_or(1, usize::from).min(8);
-    let count = instances.len().div_ceil(threads);
-    std::thread::scope(|scope| {
-        let chunks = instances.chunks(count).zip(refers.chunks(count));
-        let workers: Vec<_> = chunks
-            .zip(out.chunks_mut(count * INSTANCE_BYTES))
-            .enumerate()
-            .map(|(index, ((instances, refers), out))| {
-                let first = index * count;
-                scope.spawn(move || write_chunk(name, first, instances, refers, references, out))
-            })
-            .collect();
-        let joined = workers.into_iter().map(|worker| worker.join().unwrap_or_else(|_| Err(lost(name))));
-        joined.collect::<Vec<_>>().into_iter().collect()
-    })
-}
-
-fn lost(name: &str) -> Error {
-    Error::usage(name, "a thread that converted instances ended early")
-}
-
-fn write_chunk(
-    name: &str,
-    first: usize,
-    instances: &[TlasInstance],
-    refers: &[u32],
-    references: &[u64],
-    out: &mut [u8],
-) -> Result<()> {
-    let records = instances.iter().zip(refers).zip(out.chunks_exact_mut(INSTANCE_BYTES));
-    for (index, ((instance, place), out)) in records.enumerate() {
-        check(name, first + index, instance)?;
-        let raw = pack(instance, references[*place as usize]);
-        out.copy_from_slice(bytemuck::bytes_of(&raw));
-    }
-    Ok(())
-}
-
-fn check(name: &str, index: usize, instance: &TlasInstance) -> Result<()> {
+#[cold]
+fn complaint(name: &str, index: usize, instance: &TlasInstance) -> Error {
     const LARGEST: u32 = (1 << 24) - 1;
     if instance.custom_index > LARGEST || instance.hit_group_offset > LARGEST {
-        let message = format!("instance {index}: custom index and hit-group offset have 24 bits");
-        return Err(Error::usage(name, message));
+        return Error::usage(
+            name,
+            format!("instance {index}: custom index and hit-group offset have 24 bits"),
+        );
     }
-    if instance.transform.iter().any(|number| !number.is_finite()) {
-        return Err(Error::usage(name, format!("instance {index}: its transform is not finite")));
+    if !is_finite(&instance.transform) {
+        return Error::usage(name, format!("instance {index}: its transform is not finite"));
     }
-    if instance.flags.contains(InstanceFlags::FORCE_OPAQUE | InstanceFlags::FORCE_NO_OPAQUE) {
-        let message = format!("instance {index}: choose either FORCE_OPAQUE or FORCE_NO_OPAQUE");
-        return Err(Error::usage(name, message));
-    }
-    Ok(())
+    Error::usage(name, format!("instance {index}: choose either FORCE_OPAQUE or FORCE_NO_OPAQUE"))
 }
 
-fn pack(instance: &TlasInstance, blas_address: u64) -> RawInstance {
+pub(super) fn pack(instance: &TlasInstance, blas_address: u64) -> RawInstance {
     RawInstance {
         transform: instance.transform,
         custom_index_and_mask: instance.custom_index | u32::from(instance.mask) << 24,
@@ -313,6 +155,20 @@ mod tests {
         let transform = glam::Affine3A::from_translation(glam::Vec3::new(1.0, 2.0, 3.0));
         let rows = transform_rows(&transform);
         assert_eq!(rows, [1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, 1.0, 3.0]);
+    }
+
+    #[test]
+    fn a_transform_is_finite_only_if_all_its_numbers_are() {
+        for number in [0.0, -0.0, 1.5, f32::MAX, -f32::MAX, f32::MIN_POSITIVE, 1e-45] {
+            assert!(is_finite(&[number; 12]), "{number}");
+        }
+        for place in 0..12 {
+            for number in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+                let mut transform = [f32::MAX; 12];
+                transform[place] = number;
+                assert!(!is_finite(&transform), "{number} at {place}");
+            }
+        }
     }
 
     #[test]

@@ -11,6 +11,7 @@ pub(crate) mod desc;
 pub(crate) mod flags;
 pub(crate) mod geometry;
 pub(crate) mod instance;
+pub(crate) mod instance_plan;
 pub(crate) mod order;
 pub(crate) mod primitive_map;
 pub(crate) mod ranges;

@@ -1,7 +1,7 @@
 //! How a mesh too large for the device is cut into parts that each fit.
 
 use super::bounds::Bounds;
-use super::cut::{Item, cut, items};
+use super::cut::{Item, cut_freely, items, union};
 use crate::error::{Error, Result, check_limit};
 
 /// Most that one structure may take.
@@ -31,8 +31,9 @@ pub(crate) struct PartPlan {
     pub(crate) geometries: Vec<Vec<u32>>,
 }
 
-/// Cuts a mesh into the least number of equal, spatially compact parts that fit; parts that still do not fit, because
-/// their mixture of geometries takes more, are cut further. `bounds` holds the boxes of each geometry's primitives,
+/// Cuts a mesh into spatially compact parts that fit and overlap little: about the least number of parts, or up to twice
+/// as many where the mesh has large primitives and small ones side by side. Parts that still do not fit, because their
+/// mixture of geometries takes more, are cut further. `bounds` holds the boxes of each geometry's primitives,
 /// `sizes` answers what a structure with so many primitives of each geometry takes. Deterministic.
 ///
 /// Fails with [`Error::LimitExceeded`] if a single primitive does not fit.
@@ -85,17 +86,14 @@ impl Planner<'_> {
         self.cut(items, parts)
     }
 
-    /// Cuts into so many parts of equal counts and plans each of them.
+    /// Cuts into parts of at most an equal share each, and plans each of them.
     fn cut(&mut self, items: &mut [Item], parts: u64) -> Result<()> {
-        if parts <= 1 {
-            return self.plan(items);
+        let share = (items.len() as u64).div_ceil(parts).max(1) as usize;
+        let leaf = (share / leaves_of_part(parts)).max(1);
+        for mut part in merge(leaves(items, leaf), share) {
+            self.plan(&mut part)?;
         }
-        let left_parts = parts / 2;
-        let left = (items.len() as u128 * u128::from(left_parts) / u128::from(parts)) as usize;
-        cut(items, left);
-        let (left, right) = items.split_at_mut(left);
-        self.cut(left, left_parts)?;
-        self.cut(right, parts - left_parts)
+        Ok(())
     }
 
     /// Least number of parts, at least `lowest` and at most `highest`, of which an equal share of every geometry fits:
@@ -149,6 +147,98 @@ impl Planner<'_> {
         }
         PartPlan { geometries }
     }
+}
+
+/// Into how many leaves a share is cut before they are merged: more give parts that overlap less, but merging looks at
+/// all pairs.
+fn leaves_of_part(parts: u64) -> usize {
+    (1024 / parts.max(1)).clamp(1, 4) as usize
+}
+
+/// Cuts freely until no piece has more than `most` primitives.
+fn leaves(items: &mut [Item], most: usize) -> Vec<&mut [Item]> {
+    let (mut open, mut done) = (vec![items], Vec::new());
+    while let Some(piece) = open.pop() {
+        if piece.len() <= most {
+            done.push(piece);
+            continue;
+        }
+        let left = cut_freely(piece);
+        let (left, right) = piece.split_at_mut(left);
+        open.extend([right, left]);
+    }
+    done
+}
+
+/// A part while it is put together of leaves.
+struct Merged {
+    items: Vec<Item>,
+    bounds: Bounds,
+    /// The part it gains most to be merged with, and the gain.
+    partner: Option<(usize, f32)>,
+}
+
+impl Merged {
+    /// How much surface a ray is spared when both are one part; none where there is nothing to gain, or no room.
+    fn gain(&self, other: &Self, most: usize) -> Option<f32> {
+        /// One part is better than two that are a little smaller together: each costs a ray that enters it.
+        const PREFERENCE: f32 = 0.25;
+        if self.items.len() + other.items.len() > most {
+            return None;
+        }
+        let together = self.bounds.union(other.bounds).half_area() * (1.0 - PREFERENCE);
+        Some(self.bounds.half_area() + other.bounds.half_area() - together).filter(|gain| *gain >= 0.0)
+    }
+}
+
+/// Merges pieces, those first that overlap most, as long as they gain and no part has more than `most` primitives.
+fn merge(pieces: Vec<&mut [Item]>, most: usize) -> Vec<Vec<Item>> {
+    let merged = |piece: &mut [Item]| Merged { items: piece.to_vec(), bounds: union(piece), partner: None };
+    let mut parts: Vec<_> = pieces.into_iter().map(merged).collect();
+    (0..parts.len()).for_each(|part| find_partner(&mut parts, part, most));
+    while let Some((part, partner)) = best_pair(&parts) {
+        let (part, partner) = (part.min(partner), part.max(partner));
+        let taken = parts.swap_remove(partner);
+        let moved = parts.len();
+        parts[part].bounds = parts[part].bounds.union(taken.bounds);
+        parts[part].items.extend(taken.items);
+        for other in 0..parts.len() {
+            match parts[other].partner {
+                Some((with, _)) if with == part || with == partner => find_partner(&mut parts, other, most),
+                Some((with, gain)) if with == moved => parts[other].partner = Some((partner, gain)),
+                _ => {}
+            }
+        }
+        find_partner(&mut parts, part, most);
+        (0..parts.len()).for_each(|other| offer(&mut parts, other, part, most));
+    }
+    parts.into_iter().map(|part| part.items).collect()
+}
+
+fn find_partner(parts: &mut [Merged], part: usize, most: usize) {
+    parts[part].partner = None;
+    (0..parts.len()).for_each(|other| offer(parts, part, other, most));
+}
+
+/// Makes `other` the partner of `part` if it gains more than the present one.
+fn offer(parts: &mut [Merged], part: usize, other: usize, most: usize) {
+    if part == other {
+        return;
+    }
+    if let Some(gain) = parts[part].gain(&parts[other], most)
+        && parts[part].partner.is_none_or(|(_, present)| gain > present)
+    {
+        parts[part].partner = Some((other, gain));
+    }
+}
+
+fn best_pair(parts: &[Merged]) -> Option<(usize, usize)> {
+    let pairs = parts.iter().enumerate().filter_map(|(part, merged)| {
+        let (partner, gain) = merged.partner?;
+        Some((part, partner, gain))
+    });
+    let best = pairs.reduce(|best, pair| if pair.2 > best.2 { pair } else { best });
+    best.map(|(part, partner, _)| (part, partner))
 }
 
 /// How many primitives of each geometry an average one of so many parts holds: `ceil(total / parts)` together, as
@@ -237,20 +327,20 @@ mod tests {
 
     /// The phone of the slides: 2.8 M triangles of 2,805 bytes of scratch each need 29.3 times 256 MiB.
     #[test]
-    fn a_large_mesh_on_a_phone_is_thirty_equal_parts() {
+    fn a_large_mesh_on_a_phone_is_some_thirty_parts() {
         let bounds = [scattered(2_800_000)];
         let limits = limits(256 * MIB, 256 * MIB, 1 << 24);
         let parts = plan_split("mesh", &bounds, &limits, &mut linear(0, 219, 2805)).unwrap();
-        assert_eq!(parts.len(), 30);
-        assert!(parts.iter().all(|part| part_count(part).abs_diff(2_800_000 / 30) <= 1));
+        assert!((30..=45).contains(&parts.len()), "{}", parts.len());
+        assert_eq!(parts.iter().map(part_count).sum::<usize>(), 2_800_000);
     }
 
     #[test]
-    fn a_fixed_base_takes_no_more_parts_than_it_must() {
+    fn a_fixed_base_takes_little_more_parts_than_it_must() {
         let bounds = [scattered(1000)];
         // 1000 + 10 n <= 1500 holds for n <= 50, so 20 parts, though the whole is only 8 times too large.
         let parts = plan_split("mesh", &bounds, &limits(1500, 1500, 1000), &mut linear(1000, 10, 1)).unwrap();
-        assert_eq!(parts.len(), 20);
+        assert!((20..=35).contains(&parts.len()), "{}", parts.len());
     }
 
     #[test]
@@ -304,10 +394,10 @@ mod tests {
     }
 
     #[test]
-    fn many_small_geometries_take_no_more_parts_than_one_large_one() {
+    fn many_small_geometries_take_no_more_parts_than_a_large_one() {
         let bounds: Vec<_> = scattered(5000).chunks(10).map(<[Bounds]>::to_vec).collect();
         let parts = plan_split("mesh", &bounds, &limits(MIB, MIB, 170), &mut linear(0, 1, 1)).unwrap();
-        assert_eq!(parts.len(), 30);
+        assert!((30..=45).contains(&parts.len()), "{}", parts.len());
     }
 
     #[test]
@@ -315,8 +405,7 @@ mod tests {
         for one in [Bounds::ORIGIN, Bounds { low: Vec3::NAN, high: Vec3::NAN }] {
             let parts =
                 plan_split("mesh", &[vec![one; 100]], &limits(MIB, MIB, 30), &mut linear(0, 1, 1)).unwrap();
-            let numbers: Vec<_> = parts.into_iter().flat_map(|mut part| part.geometries.remove(0)).collect();
-            assert!(numbers.into_iter().eq(0..100), "in order, as nothing else tells them apart");
+            assert!((4..=5).contains(&parts.len()), "{}", parts.len());
         }
     }
 

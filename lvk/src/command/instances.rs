@@ -6,7 +6,8 @@ use std::sync::{Arc, OnceLock};
 use super::CommandBuffer;
 use crate::accel::AccelStruct;
 use crate::accel::build::instance_bytes;
-use crate::accel::instance::{DeviceInstances, InstancePlan, TlasInstance};
+use crate::accel::instance::{DeviceInstances, TlasInstance};
+use crate::accel::instance_plan::{Find, InstancePlan, starts_plain, write_addresses};
 use crate::accel::tlas::{Entry, InstanceSource, InstanceTables, Shown, SourceBytes, Tlas};
 use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result};
@@ -18,7 +19,7 @@ use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 /// Addresses of instances must be a multiple of this.
 const INSTANCE_ALIGNMENT: u64 = 16;
 
-/// Bytes of `LvkTlasRow` in `shader/glsl/tlas.glsl`.
+/// Bytes of `LvkTlasRow` in `shader/glsl/hit_numbers.glsl`.
 pub(crate) const ROW_BYTES: u64 = 16;
 
 /// Instances on their way into a build.
@@ -31,24 +32,59 @@ pub(super) struct Ready {
     pub(super) reads: Vec<Arc<Buffer>>,
 }
 
+/// Instances of the host, as far as they are prepared before the counts are checked.
+pub(super) enum Planned {
+    /// Vulkan can read them.
+    Ready(Ready),
+    /// A kernel has to write them.
+    Kernel(InstancePlan),
+}
+
+impl Planned {
+    /// Instances Vulkan will be given.
+    pub(super) fn built_count(&self) -> u32 {
+        match self {
+            Self::Ready(ready) => ready.built_count,
+            Self::Kernel(plan) => plan.built_count,
+        }
+    }
+}
+
 impl CommandBuffer {
-    /// Instances whose addresses the host knows.
-    pub(super) fn stage_instances(
+    /// The instances, ready to be built.
+    pub(super) fn host_instances(
+        &mut self,
+        target: &AccelStruct,
+        instances: &[TlasInstance],
+    ) -> Result<Planned> {
+        let shared = Arc::clone(&self.shared);
+        let find = |handle| shared.store.accel_structs.get(handle);
+        if starts_plain(instances, &find)?
+            && let Some(ready) = self.stage_instances(&target.name, instances, &find)?
+        {
+            return Ok(Planned::Ready(ready));
+        }
+        Ok(Planned::Kernel(InstancePlan::new(&target.name, instances, &find)?))
+    }
+
+    /// Instances whose addresses the host knows; nothing where a kernel is needed.
+    fn stage_instances(
         &mut self,
         name: &str,
         instances: &[TlasInstance],
-        plan: InstancePlan,
-    ) -> Result<Ready> {
-        let bytes = instance_bytes(plan.built_count.max(1));
-        let mut written = Ok(());
+        find: Find<'_>,
+    ) -> Result<Option<Ready>> {
+        let built_count = instances.len() as u32;
+        let bytes = instance_bytes(built_count.max(1));
+        let mut shown = Ok(None);
         let staging = &self.shared.staging;
         let region = staging.write_with(bytes, INSTANCE_ALIGNMENT, self.recording.sequence, |out| {
-            written = plan.write_addresses(name, instances, out);
+            shown = write_addresses(name, instances, find, out);
         })?;
         self.retire_temporary(region.temporary);
-        written?;
-        let InstancePlan { built_count, shown, .. } = plan;
-        Ok(Ready { address: region.address, built_count, shown, source: None, reads: Vec::new() })
+        let ready =
+            |shown| Ready { address: region.address, built_count, shown, source: None, reads: Vec::new() };
+        Ok(shown?.map(ready))
     }
 
     /// Instances for the kernel, and the owners of those for further parts.

@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use super::CommandBuffer;
 use super::accel::{Build, OpenBuild};
-use super::instances::Ready;
+use super::instances::{Planned, Ready};
 use crate::accel::AccelStruct;
 use crate::accel::build::BuildInput;
 use crate::accel::flags::BuildMode;
-use crate::accel::instance::{DeviceInstances, InstancePlan, TlasInstance};
+use crate::accel::instance::{DeviceInstances, TlasInstance};
 use crate::accel::tlas::{Shown, Tlas, TlasContents};
 use crate::barrier::Use;
 use crate::error::{Error, Result, check_limit};
@@ -98,16 +98,15 @@ impl CommandBuffer {
         let count = instances.len() as u64;
         check_limit(&target.name, "instance count", count, tlas.capacity.into())?;
         let count = count as u32;
-        let shared = Arc::clone(&self.shared);
-        let plan =
-            InstancePlan::new(&target.name, instances, |handle| shared.store.accel_structs.get(handle))?;
-        let refit = self.check_update(target, count, plan.built_count, mode)?;
-        let ready = if plan.needs_kernel {
-            let (source, shown) = self.host_source(&target.name, instances, plan)?;
-            let built_count = source.built_count(&target.name)?;
-            self.run_instances(target, tlas, shown, source, built_count)?
-        } else {
-            self.stage_instances(&target.name, instances, plan)?
+        let planned = self.host_instances(target, instances)?;
+        let refit = self.check_update(target, count, planned.built_count(), mode)?;
+        let ready = match planned {
+            Planned::Ready(ready) => ready,
+            Planned::Kernel(plan) => {
+                let (source, shown) = self.host_source(&target.name, instances, plan)?;
+                let built_count = source.built_count(&target.name)?;
+                self.run_instances(target, tlas, shown, source, built_count)?
+            }
         };
         self.record_tlas(target, ready, count, refit)
     }

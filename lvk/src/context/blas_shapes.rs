@@ -14,7 +14,7 @@ use crate::accel::split::{PartLimits, PartPlan, PartSizes, plan_split};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::Limits;
-use crate::shared::Shared;
+use crate::shared::{Garbage, Shared};
 
 /// Meshes of fewer primitives are built as given: no order makes them slow.
 const ORDERED_FROM: u64 = 64;
@@ -87,7 +87,10 @@ impl Context {
         let map = PrimitiveMap::new(&shared.gpu, desc.debug_name, &plan.geometries, boxes)?;
         let words = table_words(&plan.geometries);
         let table = Arc::clone(&map.table);
-        self.before_next_submission(|cmd| cmd.upload_buffer(&table, 0, bytemuck::cast_slice(&words)))?;
+        let uploaded =
+            self.before_next_submission(|cmd| cmd.upload_buffer(&table, 0, bytemuck::cast_slice(&words)));
+        shared.retire(Garbage::Table(table));
+        uploaded?;
         let counts: Vec<u32> = plan.geometries.iter().map(|list| list.len() as u32).collect();
         let mut input = input(shared, desc)?.gathered();
         input.set_counts(&counts);

@@ -66,7 +66,9 @@ impl Context {
         let ty = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
         let pool = QueryPool::of(&self.shared().gpu, &desc, ty)?;
         let query = Arc::new(SizeQuery::new(pool, targets));
-        self.before_next_submission(|cmd| cmd.query_compacted_sizes(&query))?;
+        let asked = self.before_next_submission(|cmd| cmd.query_compacted_sizes(&query));
+        self.shared().retire(Garbage::SizeQuery(Arc::clone(&query)));
+        asked?;
         self.compactions().push(query);
         Ok(())
     }
@@ -140,6 +142,8 @@ impl Context {
         let Some(old) = replaced else { return Ok(false) };
         blas.request_compaction(false);
         shared.retire(Garbage::Body(old));
+        // Its handle may be gone, and nobody else keep it until the copy is made.
+        shared.retire(Garbage::Body(blas.body()));
         shared.note_outdated_tlas();
         Ok(true)
     }

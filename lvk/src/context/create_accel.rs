@@ -11,7 +11,7 @@ use crate::accel::blas::{Blas, BlasBody, PartShape};
 use crate::accel::build::{BuildInput, transforms};
 use crate::accel::desc::{BlasDesc, TlasDesc};
 use crate::accel::flags::{AccelStructSizes, BuildMode};
-use crate::accel::instance::InstancePlan;
+use crate::accel::instance_plan::InstancePlan;
 use crate::accel::raw_structure::RawStructure;
 use crate::accel::structure::AccelKind;
 use crate::accel::tlas::Tlas;
@@ -149,7 +149,7 @@ pub(super) fn new_tlas(shared: &Shared, desc: &TlasDesc<'_>, slot: u32) -> Resul
     desc.flags.check_tlas(name)?;
     let count = u32::try_from(desc.instances.len()).unwrap_or(u32::MAX);
     let capacity = desc.capacity.max(count);
-    let plan = InstancePlan::new(name, desc.instances, |handle| shared.store.accel_structs.get(handle))?;
+    let plan = InstancePlan::new(name, desc.instances, &|handle| shared.store.accel_structs.get(handle))?;
     let average = u64::from(plan.built_count).div_ceil(u64::from(count.max(1)));
     let room = u64::from(capacity) * average.max(desc.parts_per_instance.into());
     check_limit(name, "instance capacity", room, shared.gpu.caps.limits.max_tlas_instances)?;

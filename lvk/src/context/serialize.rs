@@ -187,14 +187,14 @@ impl Context {
         let buffer = self.blob_buffer(name, places.total)?;
         let base = buffer.address.next_multiple_of(ALIGNMENT);
         let addresses: Vec<_> = places.offsets.iter().map(|offset| base + offset).collect();
-        self.before_next_submission(|cmd| {
+        let recorded = self.before_next_submission(|cmd| {
             for (part, offset) in blob.parts.iter().zip(&places.offsets) {
                 cmd.upload_buffer(&buffer, base - buffer.address + offset, &part.driver)?;
             }
             cmd.deserialize_parts(&object, &buffer, &addresses)
-        })?;
+        });
         shared.retire(Garbage::Buffer(buffer));
-        Ok(holder)
+        recorded.map(|()| holder)
     }
 
     /// The shapes of loaded parts, with their tables.

@@ -9,7 +9,8 @@ use crate::bindless::layout;
 const BINDLESS: &str = include_str!("glsl/bindless.glsl");
 
 /// The files behind `#include <lvk/..>`.
-pub(super) const LIBRARY: [(&str, &str); 3] = [
+pub(super) const LIBRARY: [(&str, &str); 4] = [
+    ("lvk/hit_numbers.glsl", include_str!("glsl/hit_numbers.glsl")),
     ("lvk/ray_query.glsl", include_str!("glsl/ray_query.glsl")),
     ("lvk/ray_tracing.glsl", include_str!("glsl/ray_tracing.glsl")),
     ("lvk/tlas.glsl", include_str!("glsl/tlas.glsl")),

@@ -217,7 +217,7 @@ fn binding(module: &Module, variable: &Variable) -> Result<u32, String> {
     }
 }
 
-/// The one buffer descriptor, which `<lvk/tlas.glsl>` declares.
+/// The one buffer descriptor, which `<lvk/hit_numbers.glsl>` declares.
 const TLAS_TABLE: (u32, u32) = (layout::SET, layout::TLAS_TABLE);
 
 /// The binding that takes resources of this type.

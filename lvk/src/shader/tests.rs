@@ -269,7 +269,7 @@ fn a_missing_include_names_the_places_and_the_chain() {
     assert!(found.contains("included by a.glsl"), "{found}");
     let found = error(ShaderStage::Compute, "\n#include <lvk/nothing.glsl>\nvoid main() {}");
     assert!(
-        found.starts_with("line 2: the library has no <lvk/nothing.glsl>; it has <lvk/ray_query.glsl>"),
+        found.starts_with("line 2: the library has no <lvk/nothing.glsl>; it has <lvk/hit_numbers.glsl>"),
         "{found}"
     );
     let found = error(ShaderStage::Compute, "#include \"x\"\nvoid main() {}");
@@ -334,8 +334,8 @@ const QUERY: &str = "
     }
     if (lvkRayQueryType(rq, LVK_COMMITTED) != LVK_COMMITTED_NONE) {
         t += lvkRayQueryT(rq, LVK_COMMITTED) + lvkRayQueryTMin(rq);
-        n += uint(lvkRayQueryInstanceId(rq, LVK_COMMITTED) + lvkRayQueryInstanceCustomIndex(rq, LVK_COMMITTED)
-            + lvkRayQueryGeometryIndex(rq, LVK_COMMITTED) + lvkRayQueryPrimitiveIndex(rq, LVK_COMMITTED));
+        n += uint(lvkRayQueryInstanceId(rq, LVK_COMMITTED, 0) + lvkRayQueryInstanceCustomIndex(rq, LVK_COMMITTED)
+            + lvkRayQueryGeometryIndex(rq, LVK_COMMITTED) + lvkRayQueryPrimitiveIndex(rq, LVK_COMMITTED, 0));
         n += lvkRayQuerySbtOffset(rq, LVK_COMMITTED) + lvkRayQueryFlags(rq);
         v += vec3(lvkRayQueryBarycentrics(rq, LVK_COMMITTED), 0) + lvkRayQueryObjectRayOrigin(rq, LVK_COMMITTED)
             + lvkRayQueryObjectRayDirection(rq, LVK_COMMITTED) + lvkRayQueryWorldRayOrigin(rq) + lvkRayQueryWorldRayDirection(rq);
@@ -352,7 +352,7 @@ fn ray_queries_compile_in_every_stage() {
         let found = facts(stage, &text);
         assert!(found.ray_query, "{stage:?}");
         assert_eq!(found.ray_tracing, stage.is_ray_tracing(), "{stage:?}");
-        assert_eq!(found.bindings, [2, 4], "{stage:?}");
+        assert_eq!(found.bindings, [2, 4, 5], "{stage:?}");
     }
 }
 

@@ -28,8 +28,8 @@ pub(super) fn without_unused_resources(words: Vec<u32>) -> Vec<u32> {
 }
 
 fn resource_variable(instruction: &Instruction<'_>) -> Option<u32> {
-    let is_resource = instruction.op == Some(Op::Variable)
-        && instruction.operand(2) == StorageClass::UniformConstant as u32;
+    let classes = [StorageClass::UniformConstant as u32, StorageClass::StorageBuffer as u32];
+    let is_resource = instruction.op == Some(Op::Variable) && classes.contains(&instruction.operand(2));
     is_resource.then(|| instruction.operand(1))
 }
 

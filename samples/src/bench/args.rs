@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{Args, Parser, Subcommand};
+use lvk::DeviceProfile;
 
 use super::paper::PaperArgs;
 
@@ -27,6 +29,19 @@ pub struct BenchArgs {
     /// Device to use, by its number or part of its name [default: the most capable one]
     #[arg(long, value_name = "NUMBER|NAME", global = true)]
     pub(super) device: Option<String>,
+
+    /// Rehearse another device on this one: without what it lacks, and within its limits
+    #[arg(
+        long,
+        value_name = "NAME",
+        global = true,
+        value_parser = PossibleValuesParser::new(DeviceProfile::names()).try_map(|name| DeviceProfile::named(&name))
+    )]
+    pub(super) profile: Option<DeviceProfile>,
+
+    /// Run with Vulkan validation; a message is an error, and the figures mean little
+    #[arg(long, global = true)]
+    pub(super) validate: bool,
 }
 
 /// What to measure.

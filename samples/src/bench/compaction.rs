@@ -108,7 +108,7 @@ impl Bench {
         self.ctx.wait_idle()?;
         let held = self.ctx.accel_memory().structure_bytes;
         let sizes = self.wait_for_compaction(*blas)?;
-        let freed = held - self.ctx.accel_memory().structure_bytes;
+        let freed = held.saturating_sub(self.ctx.accel_memory().structure_bytes);
         self.size_row("before compaction", sizes[0], raw_sizes[0], table);
         self.size_row("after compaction", sizes[1], raw_sizes[1], table);
         let saved =

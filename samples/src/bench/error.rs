@@ -25,6 +25,8 @@ pub(super) enum BenchError {
     NoTimestamp { device: String },
     #[error("{device} did not finish a compaction within {tries} submissions")]
     NoCompaction { device: String, tries: u32 },
+    #[error("validation reported {} messages; the first: {}", .0.len(), .0.first().map_or("", String::as_str))]
+    Validation(Vec<String>),
 }
 
 impl BenchError {

@@ -19,7 +19,7 @@ pub(super) fn measure(setup: &Setup, args: &TraceArgs) -> Result<Table, BenchErr
     let ctx = setup.open()?;
     let (paths, missing) = ray_paths(&ctx)?;
     let default_triangles = setup.choose(&ctx, Choice { quick: 2000, cpu: 100_000, gpu: 1_000_000 });
-    let runs = setup.runs(&ctx, Choice { quick: 1, cpu: 3, gpu: 60 });
+    let runs = setup.runs(&ctx, Choice { quick: 1, cpu: 7, gpu: 60 });
     let mesh = Mesh::new(&args.mesh, args.camera, default_triangles)?;
     let size = setup.picture_size(&ctx, args);
     let headline = setup.headline(&ctx, &format!("order: {}, {}x{}", mesh.describe(), size[0], size[1]));
@@ -48,7 +48,7 @@ pub(super) fn measure(setup: &Setup, args: &TraceArgs) -> Result<Table, BenchErr
 
 /// The mesh in one order.
 struct Side {
-    scene: Traceable,
+    _scene: Traceable,
     picture: Picture,
     /// Milliseconds that sorting took on the host, before the library saw the mesh.
     sorting: f64,
@@ -82,7 +82,7 @@ impl Side {
         let scene = Traceable::new(ctx, buffers, order)?;
         let creation = since(start);
         let picture = Picture::new(ctx, mesh, size, scene.tlas.index())?;
-        Ok(Self { scene, picture, sorting, creation })
+        Ok(Self { _scene: scene, picture, sorting, creation })
     }
 }
 

@@ -27,7 +27,7 @@ pub fn run(args: &BenchArgs) -> ExitCode {
 
 fn measured(args: &BenchArgs) -> Result<Table, BenchError> {
     let setup = Setup::new(args)?;
-    match &args.benchmark {
+    let table = match &args.benchmark {
         Benchmark::Batch(args) => batch::measure(&setup, args),
         Benchmark::Compaction(args) => compaction::measure(&setup, args),
         Benchmark::Split(args) => split::measure(&setup, args),
@@ -35,5 +35,7 @@ fn measured(args: &BenchArgs) -> Result<Table, BenchError> {
         Benchmark::Order(args) => order::measure(&setup, args),
         Benchmark::Overhead(args) => overhead::measure(&setup, args),
         Benchmark::Paper(args) => paper::run(&setup, args),
-    }
+    }?;
+    let messages = setup.validation_messages();
+    if messages.is_empty() { Ok(table) } else { Err(BenchError::Validation(messages)) }
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use lvk::{Context, ContextDesc, DeviceProfile};
+use lvk::{Context, ContextDesc, DeviceProfile, Validation, ValidationSink};
 
 use super::args::{BenchArgs, TraceArgs};
 use super::error::BenchError;
@@ -13,8 +13,11 @@ use crate::hybrid::RayPath;
 pub(super) struct Setup {
     loader: Option<PathBuf>,
     device: Option<String>,
+    profile: DeviceProfile,
     runs: Option<u32>,
     quick: bool,
+    /// Where messages go, if the validation layer is to run.
+    sink: Option<ValidationSink>,
 }
 
 /// Values for a smoke test, for a driver on the CPU, and for a GPU.
@@ -27,40 +30,61 @@ pub(super) struct Choice<T> {
 
 impl Setup {
     pub(super) fn new(args: &BenchArgs) -> Result<Self, BenchError> {
-        let driver = prepare(&DriverRequest::default())?;
-        Ok(Self { loader: driver.loader, device: args.device.clone(), runs: args.runs, quick: args.quick })
+        let driver = prepare(&DriverRequest { validation: args.validate })?;
+        Ok(Self {
+            loader: driver.loader,
+            device: args.device.clone(),
+            profile: args.profile.clone().unwrap_or_default(),
+            runs: args.runs,
+            quick: args.quick,
+            sink: args.validate.then(ValidationSink::default),
+        })
     }
 
-    /// The device as it is.
+    /// The device, as the command line has it.
     pub(super) fn open(&self) -> Result<Context, BenchError> {
-        self.open_with(ContextDesc::default().scratch_budget_bytes, None)
+        self.open_with(ContextDesc::default().scratch_budget_bytes)
     }
 
-    /// The device with this budget for scratch memory, under a profile.
-    pub(super) fn open_with(
+    /// The same with this budget for scratch memory.
+    pub(super) fn open_with(&self, scratch_budget_bytes: u64) -> Result<Context, BenchError> {
+        self.open_profile(scratch_budget_bytes, &self.profile, 0)
+    }
+
+    /// The device with room for so many textures at least.
+    pub(super) fn open_for_textures(&self, textures: u32) -> Result<Context, BenchError> {
+        self.open_profile(ContextDesc::default().scratch_budget_bytes, &self.profile, textures)
+    }
+
+    /// The same with at most so many primitives in a structure.
+    pub(super) fn open_limited(&self, max_blas_primitives: u64) -> Result<Context, BenchError> {
+        let max_blas_primitives = max_blas_primitives.min(self.profile.max_blas_primitives);
+        let profile = DeviceProfile { max_blas_primitives, ..self.profile.clone() };
+        self.open_profile(ContextDesc::default().scratch_budget_bytes, &profile, 0)
+    }
+
+    fn open_profile(
         &self,
         scratch_budget_bytes: u64,
-        profile: Option<&DeviceProfile>,
+        profile: &DeviceProfile,
+        textures: u32,
     ) -> Result<Context, BenchError> {
         Ok(Context::new(&ContextDesc {
             application_name: "bench",
             vulkan_library: self.loader.as_deref(),
             device: self.device.as_deref(),
             scratch_budget_bytes,
-            profile,
+            validation: if self.sink.is_some() { Validation::Standard } else { Validation::Off },
+            validation_sink: self.sink.clone(),
+            max_textures: textures.max(ContextDesc::default().max_textures),
+            profile: Some(profile).filter(|profile| **profile != DeviceProfile::default()),
             ..ContextDesc::default()
         })?)
     }
 
-    /// The device with room for so many textures.
-    pub(super) fn open_for_textures(&self, textures: u32) -> Result<Context, BenchError> {
-        Ok(Context::new(&ContextDesc {
-            application_name: "bench",
-            vulkan_library: self.loader.as_deref(),
-            device: self.device.as_deref(),
-            max_textures: textures.max(ContextDesc::default().max_textures),
-            ..ContextDesc::default()
-        })?)
+    /// What the validation layer said so far; contexts should be gone, as their end is checked too.
+    pub(super) fn validation_messages(&self) -> Vec<String> {
+        self.sink.iter().flat_map(ValidationSink::take).map(|message| message.to_string()).collect()
     }
 
     /// What suits the device.
@@ -83,9 +107,9 @@ impl Setup {
         [args.width.unwrap_or(width), args.height.unwrap_or(height)]
     }
 
-    /// What to say beside figures of a smoke test.
-    pub(super) fn quick_remark(&self) -> &'static str {
-        if self.quick { " (quick: the figures mean little)" } else { "" }
+    /// Whether figures mean little, because sizes are tiny or the validation layer is at work.
+    pub(super) fn is_rehearsal(&self) -> bool {
+        self.quick || self.sink.is_some()
     }
 
     /// The title of a table about `what`.
@@ -93,12 +117,10 @@ impl Setup {
         let caps = ctx.capabilities();
         let (major, minor, patch) = caps.api_version;
         let driver = format!("{} {}", caps.driver_name, caps.driver_info);
-        let quick = self.quick_remark();
-        format!(
-            "## {what}{quick}\n\n{}; {}, Vulkan {major}.{minor}.{patch}",
-            caps.device_name,
-            driver.trim_end()
-        )
+        let quick = if self.is_rehearsal() { " (a rehearsal: the figures mean little)" } else { "" };
+        let profile = caps.profile.as_ref().map_or_else(String::new, |name| format!(", as {name}"));
+        let driver = driver.trim_end();
+        format!("## {what}{quick}\n\n{}{profile}; {driver}, Vulkan {major}.{minor}.{patch}", caps.device_name)
     }
 }
 

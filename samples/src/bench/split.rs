@@ -1,6 +1,6 @@
 //! A mesh whole and split into parts: what tracing costs.
 
-use lvk::{Context, ContextDesc, DeviceProfile, PrimitiveOrder};
+use lvk::{Context, PrimitiveOrder};
 
 use super::args::SplitArgs;
 use super::error::BenchError;
@@ -16,17 +16,12 @@ pub(super) fn measure(setup: &Setup, args: &SplitArgs) -> Result<Table, BenchErr
     let ctx = setup.open()?;
     let (paths, missing) = ray_paths(&ctx)?;
     let default_triangles = setup.choose(&ctx, Choice { quick: 2000, cpu: 100_000, gpu: 1_000_000 });
-    let runs = setup.runs(&ctx, Choice { quick: 1, cpu: 5, gpu: 60 });
+    let runs = setup.runs(&ctx, Choice { quick: 1, cpu: 21, gpu: 60 });
     let mesh = Mesh::new(&args.trace.mesh, args.trace.camera, default_triangles)?;
     let size = setup.picture_size(&ctx, &args.trace);
     let headline = setup.headline(&ctx, &format!("split: {}, {}x{}", mesh.describe(), size[0], size[1]));
-    let profile = DeviceProfile {
-        name: "few primitives".into(),
-        max_blas_primitives: (mesh.triangles.len() as u64 / u64::from(args.parts)).max(1),
-        ..DeviceProfile::default()
-    };
-    let budget = ContextDesc::default().scratch_budget_bytes;
-    let sides = [ctx, setup.open_with(budget, Some(&profile))?];
+    let most = (mesh.triangles.len() as u64 / u64::from(args.parts)).max(1);
+    let sides = [ctx, setup.open_limited(most)?];
     let [whole, split] = sides.map(|ctx| Side::new(ctx, &mesh, size));
     let sides = [whole?, split?];
     let parts = sides[1].ctx.accel_struct_info(*sides[1].scene.blas)?.parts;
@@ -36,10 +31,7 @@ pub(super) fn measure(setup: &Setup, args: &SplitArgs) -> Result<Table, BenchErr
         compare(&sides, path, runs, &mut table)?;
     }
     missing.into_iter().for_each(|note| table.note(note));
-    table.note(format!(
-        "medians of {runs} frames, taken in turns; parts hold at most {} triangles",
-        profile.max_blas_primitives
-    ));
+    table.note(format!("medians of {runs} frames, taken in turns; parts hold at most {most} triangles"));
     table.note("limit: 1.15x on the H200, 1.3x on the software driver");
     Ok(table)
 }

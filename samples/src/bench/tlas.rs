@@ -128,7 +128,7 @@ impl Bench {
         Ok(Timed { record: copy, total: copy + timed.total, ..timed })
     }
 
-    fn from_device(
+    fn update_on_device(
         &self,
         cmd: &mut CommandBuffer,
         tlas: AccelStructHandle,
@@ -147,7 +147,7 @@ impl Bench {
         let samples: [Vec<_>; 3] = take_turns(runs, |which| match which {
             0 => self.plain(|commands| raw.build(commands)),
             1 => self.stopwatch.time(|cmd| cmd.update_tlas(*tlas, &self.instances, mode)),
-            _ => self.stopwatch.time(|cmd| self.from_device(cmd, *tlas, mode)),
+            _ => self.stopwatch.time(|cmd| self.update_on_device(cmd, *tlas, mode)),
         })?;
         self.rows("rebuild", samples, table);
         Ok(())
@@ -162,7 +162,7 @@ impl Bench {
         let samples: [Vec<_>; 3] = take_turns(runs, |which| match which {
             0 => self.plain(|commands| raw.refit(commands)),
             1 => self.stopwatch.time(|cmd| cmd.update_tlas(*tlas, &self.instances, mode)),
-            _ => self.stopwatch.time(|cmd| self.from_device(cmd, *tlas, mode)),
+            _ => self.stopwatch.time(|cmd| self.update_on_device(cmd, *tlas, mode)),
         })?;
         self.rows("refit", samples, table);
         Ok(())

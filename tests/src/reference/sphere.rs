@@ -22,11 +22,21 @@ pub struct Sphere {
 impl Sphere {
     /// The first place where a ray passes through the surface of one of the spheres, from outside or from inside.
     pub fn closest(spheres: &[Self], ray: &Ray) -> Answer {
-        let candidates: Vec<_> = spheres.iter().filter_map(|sphere| sphere.candidate(ray)).collect();
+        Self::closest_of(spheres, ray, &[0, 1])
+    }
+
+    /// The first place where a ray leaves one of the spheres.
+    pub fn closest_exit(spheres: &[Self], ray: &Ray) -> Answer {
+        Self::closest_of(spheres, ray, &[1])
+    }
+
+    fn closest_of(spheres: &[Self], ray: &Ray, sides: &[usize]) -> Answer {
+        let candidates: Vec<_> = spheres.iter().filter_map(|sphere| sphere.candidate(ray, sides)).collect();
         closest(candidates.iter().copied())
     }
 
-    fn candidate(&self, ray: &Ray) -> Option<Candidate> {
+    /// The first of the sides (0 in, 1 out) that lies on the ray.
+    fn candidate(&self, ray: &Ray, sides: &[usize]) -> Option<Candidate> {
         let direction = DVec3::from(ray.direction.map(f64::from));
         let to_center = self.center - DVec3::from(ray.origin.map(f64::from));
         let middle = to_center.dot(direction) / direction.length_squared();
@@ -38,9 +48,9 @@ impl Sphere {
         let range = (f64::from(ray.t_min), f64::from(ray.t_max));
         let ends = [middle - half, middle + half];
         let places = ends.map(|t| Range::of(t, range));
-        let first = places.iter().position(|place| *place != Range::Outside)?;
+        let first = *sides.iter().find(|side| places[**side] != Range::Outside)?;
         let t = ends[first];
-        let hit = Hit { t, ids: self.ids, barycentrics: [0.0; 2], is_front: true, is_opaque: true };
+        let hit = Hit { t, ids: self.ids, barycentrics: [0.0; 2], is_front: first == 0, is_opaque: true };
         let is_certain = places[first] == Range::Inside && passing < self.radius * (1.0 - SILHOUETTE);
         Some(Candidate { hit, is_hit: passing < self.radius && range.0 < t && t < range.1, is_certain })
     }
@@ -60,6 +70,8 @@ mod tests {
         assert_eq!(hit(&ray), Some(1.5));
         assert_eq!(hit(&Ray { t_min: 2.0, ..ray }), Some(3.5));
         assert_eq!(hit(&Ray { t_max: 1.0, ..ray }), None);
+        let exit = Sphere::closest_exit(&[sphere], &ray).hit;
+        assert_eq!(exit.map(|hit| (hit.t, hit.is_front)), Some((3.5, false)));
         assert_eq!(hit(&Ray { direction: [0.0, 1.0, 0.0], ..ray }), None);
     }
 }

@@ -9,6 +9,7 @@
 #include <lvk/tlas.glsl>
 
 #if defined(LVK_STAGE_CLOSEST_HIT) || defined(LVK_STAGE_ANY_HIT) || defined(LVK_STAGE_INTERSECTION)
+#include <lvk/hit_numbers.glsl>
 // The application's own numbers of what was hit in kTLAS[tlas]: its place in the list of instances, of geometries, of
 // primitives. Use these and not gl_InstanceID and gl_PrimitiveID, which count the parts of split and reordered meshes.
 int lvkInstanceId(uint tlas) { return lvkMapInstance(tlas, gl_InstanceID); }

@@ -26,6 +26,7 @@ pub(in crate::bench) fn run(setup: &Setup, args: &PaperArgs) -> Result<Table, Be
     };
     let mut progress = Progress::visible();
     let mut experiment: Option<Experiment> = None;
+    let mut headline = String::new();
     for file in files {
         let mut scene = load(file, &mut progress)?;
         progress.stage("opening the device", 0);
@@ -33,21 +34,20 @@ pub(in crate::bench) fn run(setup: &Setup, args: &PaperArgs) -> Result<Table, Be
         progress.pause();
         warn(&scene.warnings);
         warn(&fit_textures(&mut scene, &ctx.capabilities().limits).map_err(super::PaperError::from)?);
+        headline = setup.headline(&ctx, "Stand-alone and hybrid, averages in milliseconds");
         let experiment = match &mut experiment {
             Some(known) => known,
             none => none.insert(begin(setup, args, &ctx)?),
         };
-        let plan = &experiment.plan;
-        let pictures = Pictures::new(&args.out.join(PICTURES), plan.size)?;
-        let found = measure(&ctx, &scene, plan, &pictures, &mut progress)?;
+        let pictures = Pictures::new(&args.out.join(PICTURES), experiment.plan.size)?;
+        let found = measure(&ctx, &scene, &experiment.plan, &pictures, &mut progress)?;
         experiment.scenes.push(found);
         experiment.write(&args.out)?;
     }
-    progress.pause();
-    Ok(experiment.map_or_else(
-        || Table::new(String::new(), &["scene"]),
-        |experiment| summary(setup, args, &experiment),
-    ))
+    let (scenes, paths) = experiment.map(|found| (found.scenes, found.plan.paths)).unwrap_or_default();
+    let mut table = tables::summary(headline, &scenes, &paths);
+    table.note(format!("all tables, plots and pictures: {}", args.out.join("report.md").display()));
+    Ok(table)
 }
 
 fn load(file: Option<&Path>, progress: &mut Progress) -> Result<Scene, BenchError> {
@@ -84,22 +84,17 @@ fn begin(setup: &Setup, args: &PaperArgs, ctx: &Context) -> Result<Experiment, B
         paths,
     };
     let mut experiment = Experiment::new(ctx.capabilities(), command(), plan);
+    if setup.is_rehearsal() {
+        experiment
+            .notes
+            .push("a rehearsal, with tiny sizes or validation: the figures mean little".to_owned());
+    }
     experiment.notes.extend(note.filter(|_| args.rt == RayTracing::Auto));
     Ok(experiment)
 }
 
 fn only(ctx: &Context, path: RayPath) -> Result<RayPath, BenchError> {
     Ok(RayPath::choose(Some(path), ctx.capabilities()).map_err(super::PaperError::from)?)
-}
-
-fn summary(setup: &Setup, args: &PaperArgs, experiment: &Experiment) -> Table {
-    let Experiment { device, driver, plan, scenes, .. } = experiment;
-    let quick = setup.quick_remark();
-    let headline =
-        format!("## Stand-alone and hybrid, averages in milliseconds{quick}\n\n{device}; {driver}");
-    let mut table = tables::summary(headline, scenes, &plan.paths);
-    table.note(format!("all tables, plots and pictures: {}", args.out.join("report.md").display()));
-    table
 }
 
 /// The command line, with the last part of each path alone, since folders are everybody's own.

@@ -51,8 +51,9 @@ impl Experiment {
     /// An experiment that nothing was measured of yet.
     #[must_use]
     pub fn new(capabilities: &Capabilities, command: String, plan: Plan) -> Self {
+        let profile = capabilities.profile.as_ref().map_or_else(String::new, |name| format!(", as {name}"));
         Self {
-            device: capabilities.device_name.clone(),
+            device: format!("{}{profile}", capabilities.device_name),
             driver: driver_text(capabilities),
             date: super::date::today(),
             command,

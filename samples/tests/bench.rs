@@ -1,0 +1,142 @@
+//! The `bench` program as a user meets it: every benchmark runs in its smallest form and prints its figures.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
+use std::process::{Command, Output};
+
+/// Standard output of the program, which must succeed, with a silent validation layer.
+fn table(args: &[&str]) -> String {
+    let args = [args, &["--validate"]].concat();
+    let (status, out, err) = outcome(&args);
+    assert_eq!(status, Some(0), "{args:?}: {out}{err}");
+    out
+}
+
+fn outcome(args: &[&str]) -> (Option<i32>, String, String) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_bench"));
+    let Output { status, stdout, stderr } = command.args(args).output().unwrap();
+    let text = |bytes| String::from_utf8(bytes).unwrap();
+    (status.code(), text(stdout), text(stderr))
+}
+
+/// The cells of the row that begins with `name`, the name left out.
+fn row(table: &str, name: &str) -> Vec<String> {
+    let line = table.lines().find(|line| line.trim_start_matches("| ").starts_with(name));
+    let line = line.unwrap_or_else(|| panic!("no row '{name}' in\n{table}"));
+    let cells: Vec<String> = line.split('|').skip(2).map(|cell| cell.trim().to_owned()).collect();
+    cells[..cells.len() - 1].to_vec()
+}
+
+/// The number in front of the unit of a cell.
+fn number(cell: &str) -> f64 {
+    let digits: String = cell.chars().take_while(|c| c.is_ascii_digit() || ".,".contains(*c)).collect();
+    digits.replace(',', "").parse().unwrap_or_else(|_| panic!("no number in '{cell}'"))
+}
+
+fn assert_positive(table: &str, name: &str, cells: std::ops::Range<usize>) {
+    for cell in &row(table, name)[cells] {
+        let value = number(cell);
+        assert!(value > 0.0 && value.is_finite(), "{name}: {cell} in\n{table}");
+    }
+}
+
+#[test]
+fn a_batch_is_timed_and_its_scratch_memory_within_the_budget() {
+    let table = table(&["batch", "--quick"]);
+    for name in ["one batch", "a submission and a wait for each", "one batch, scratch budget"] {
+        assert_positive(&table, name, 0..2);
+    }
+    assert_positive(&table, "ratio", 0..1);
+    for name in ["peak of scratch memory ", "peak of scratch memory then"] {
+        assert!(number(&row(&table, name)[1]) <= 100.0, "{table}");
+    }
+}
+
+#[test]
+fn builds_and_sizes_stand_beside_hand_written_ones() {
+    let table = table(&["compaction", "--quick"]);
+    for name in
+        ["build, fast trace", "build, fast build", "rebuild, updates allowed", "refit", "before compaction"]
+    {
+        assert_positive(&table, name, 0..3);
+    }
+    let [before, after] =
+        ["before compaction ", "after compaction "].map(|name| number(&row(&table, name)[0]));
+    assert!(after <= before, "{table}");
+    let freed = number(&row(&table, "given back to the allocator")[0]);
+    assert!((freed - (before - after)).abs() < 1.0, "what compaction saves is given back\n{table}");
+}
+
+#[test]
+fn a_split_mesh_shows_the_same_picture() {
+    let table = table(&["split", "--quick", "--parts", "12"]);
+    let head = table.lines().find(|line| line.contains(" parts |")).unwrap();
+    let parts = number(head.split('|').nth(3).unwrap().trim());
+    assert!(parts >= 12.0, "{table}");
+    let traced = table.lines().filter(|line| line.starts_with("| primary rays by")).count();
+    assert!(traced > 0, "{table}");
+    for line in table.lines().filter(|line| line.starts_with("| pixels that differ")) {
+        assert!(line.contains(" 0 of 576 "), "{table}");
+    }
+}
+
+#[test]
+fn updates_of_instances_are_timed_for_every_number_asked_for() {
+    let table = table(&["tlas", "--quick", "--instances", "1", "--instances", "300"]);
+    for count in ["1", "300"] {
+        for mode in ["rebuild", "refit"] {
+            for what in ["plain copy + driver", "lvk, from the host", "lvk, from a buffer"] {
+                assert_positive(&table, &format!("{mode} of {count}: {what}"), 1..6);
+            }
+        }
+    }
+}
+
+#[test]
+fn orders_are_timed_and_show_the_same_picture() {
+    let table = table(&["order", "--quick"]);
+    assert!(table.lines().any(|line| line.starts_with("| primary rays by")), "{table}");
+    for line in table.lines().filter(|line| line.starts_with("| pixels that differ")) {
+        assert!(line.contains(" 0 |"), "{table}");
+    }
+}
+
+#[test]
+fn a_frame_is_timed_by_both_hands_and_shows_the_same_picture() {
+    let table = table(&["overhead", "--quick"]);
+    if table.contains("not measured") {
+        return eprintln!("NOT TESTED, no ray tracing pipelines");
+    }
+    for name in ["trace (GPU)", "record and submit (CPU)", "until done"] {
+        assert_positive(&table, name, 0..3);
+    }
+    assert_eq!(row(&table, "pixels that differ")[1], "0 of 576");
+}
+
+#[test]
+fn the_papers_experiment_writes_its_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("made/report");
+    let size = ["--width", "32", "--height", "18", "--frames", "2", "--depth", "1"];
+    let table = table(&[&["paper", "--quick", "--out", out.to_str().unwrap()], &size[..]].concat());
+    assert!(table.contains("| courtyard, "), "{table}");
+    let page = std::fs::read_to_string(out.join("report.md")).unwrap();
+    assert!(page.contains("--width 32") && page.contains("a rehearsal"), "{page}");
+    assert!(!page.contains(folder.path().to_str().unwrap()), "folders are everybody's own");
+}
+
+#[test]
+fn what_a_device_lacks_is_said_and_no_failure() {
+    let without_query = table(&["order", "--quick", "--profile", "no-ray-query"]);
+    assert!(without_query.contains("ray queries not measured"), "{without_query}");
+    assert!(!without_query.contains("| primary rays by query"), "{without_query}");
+    let without_pipeline = table(&["overhead", "--quick", "--profile", "no-rt-pipeline"]);
+    assert!(without_pipeline.contains("not measured"), "{without_pipeline}");
+}
+
+#[test]
+fn wrong_input_and_no_ray_tracing_have_statuses_of_their_own() {
+    let (status, _, err) = outcome(&["order", "--quick", "--scene", "absent.obj"]);
+    assert!(status == Some(2) && err.contains("absent.obj"), "{status:?}: {err}");
+    let (status, _, err) = outcome(&["split", "--quick", "--profile", "no-ray-tracing"]);
+    assert!(status == Some(1) && err.starts_with("error: "), "{status:?}: {err}");
+}

@@ -1,0 +1,14 @@
+// IGNORE, TERMINATE or ACCEPT says what becomes of the candidate.
+#include "any_hit_payload.glsl"
+
+layout(location = 0) rayPayloadInEXT Seen seen;
+
+void main() {
+    seen.count += 1;
+    seen.sum += tagOf(lvkInstanceId(tlas), lvkGeometryIndex(), lvkPrimitiveIndex(tlas));
+#if defined(IGNORE)
+    ignoreIntersectionEXT;
+#elif defined(TERMINATE)
+    terminateRayEXT;
+#endif
+}

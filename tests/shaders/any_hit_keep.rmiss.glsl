@@ -1,0 +1,2 @@
+// Leaves what the any-hit shader counted.
+void main() {}

@@ -1,0 +1,37 @@
+// The same counts by ray query.
+#include <lvk/ray_query.glsl>
+#include "any_hit_payload.glsl"
+
+layout(local_size_x = 64) in;
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= count) {
+        return;
+    }
+    Ray ray = rays.at[index];
+    Seen seen = Seen(kNoHit, 0, 0);
+    LvkRayQuery rq;
+    lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
+    while (lvkRayQueryProceed(rq)) {
+        seen.count += 1;
+        seen.sum += tagOf(lvkRayQueryInstanceId(rq, LVK_CANDIDATE, tlas), lvkRayQueryGeometryIndex(rq, LVK_CANDIDATE),
+                          lvkRayQueryPrimitiveIndex(rq, LVK_CANDIDATE, tlas));
+#if !defined(IGNORE)
+        lvkRayQueryConfirmIntersection(rq);
+#endif
+#if defined(TERMINATE)
+        lvkRayQueryTerminate(rq);
+#endif
+    }
+    if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_TRIANGLE) {
+        seen.record.t = lvkRayQueryT(rq, LVK_COMMITTED);
+        seen.record.kind = lvkRayQueryFrontFace(rq, LVK_COMMITTED) ? kFront : kBack;
+        seen.record.instance = lvkRayQueryInstanceId(rq, LVK_COMMITTED, tlas);
+        seen.record.customIndex = lvkRayQueryInstanceCustomIndex(rq, LVK_COMMITTED);
+        seen.record.geometry = lvkRayQueryGeometryIndex(rq, LVK_COMMITTED);
+        seen.record.primitive = lvkRayQueryPrimitiveIndex(rq, LVK_COMMITTED, tlas);
+    }
+    seen.record.barycentrics = vec2(seen.count, seen.sum);
+    hits.at[index] = seen.record;
+}

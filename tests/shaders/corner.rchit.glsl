@@ -1,0 +1,10 @@
+// Corner number CORNER of what was hit, in place of distance and weights.
+#include "ray_records.glsl"
+
+layout(location = 0) rayPayloadInEXT HitRecord record;
+
+void main() {
+    vec3 corner = gl_HitTriangleVertexPositionsEXT[CORNER];
+    record = HitRecord(corner.x, corner.yz, gl_HitKindEXT, lvkInstanceId(tlas), gl_InstanceCustomIndexEXT,
+                       lvkGeometryIndex(), lvkPrimitiveIndex(tlas));
+}

@@ -1,0 +1,402 @@
+//! Compaction: an asynchronous second step that keeps the handle and what shows it, and gives memory back.
+
+use lvk::glam::{Affine3A, Quat, Vec3};
+use lvk::{
+    AccelStructHandle, BuildFlags, BuildMode, Compaction, Context, DeviceInstances, Error, Result, TlasDesc,
+};
+use lvk_tests::bender::{Bender, bent};
+use lvk_tests::compute::words_buffer;
+use lvk_tests::hit_check::HitCheck;
+use lvk_tests::meshes::Mesh;
+use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances};
+use lvk_tests::warnings::{listen, take_warnings};
+use lvk_tests::{device, device_with};
+
+const COMPACTABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_COMPACTION);
+const MOVING: BuildFlags = COMPACTABLE.union(BuildFlags::ALLOW_UPDATE);
+
+/// Three models, each shown twice.
+fn scene() -> RayScene {
+    let model = |mesh| vec![Part::new(mesh, Layout::Indexed16)];
+    let models = vec![model(Mesh::torus(10)), model(Mesh::sphere(12)), model(Mesh::cube_grid(2))];
+    let place = |index: u32| {
+        let turn = Quat::from_rotation_z(index as f32);
+        let to = Vec3::new((index % 3) as f32 * 2.9, (index / 3) as f32 * 2.7, 0.0);
+        let transform = Affine3A::from_rotation_translation(turn, to);
+        Placed { custom_index: 20 + index, ..Placed::new(index as usize % 3, transform) }
+    };
+    RayScene { models, placed: (0..6).map(place).collect() }
+}
+
+fn upload(ctx: &Context, scene: &RayScene, flags: BuildFlags) -> Result<GpuScene> {
+    scene.upload_with(ctx, flags, BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE, 8)
+}
+
+fn handles(gpu: &GpuScene) -> Vec<AccelStructHandle> {
+    gpu.models.iter().map(|model| **model).collect()
+}
+
+fn compaction(ctx: &Context, handle: AccelStructHandle) -> Result<Compaction> {
+    Ok(ctx.accel_struct_info(handle)?.compaction)
+}
+
+/// Bytes before and after.
+fn done(ctx: &Context, handle: AccelStructHandle) -> Result<(u64, u64)> {
+    match compaction(ctx, handle)? {
+        Compaction::Done { before_bytes, after_bytes } => Ok((before_bytes, after_bytes)),
+        other => unreachable!("compacted by now, not {other:?}"),
+    }
+}
+
+/// Lets the sizes arrive, the copies be made, and what they replaced go.
+fn settle(ctx: &Context) -> Result<()> {
+    (0..3).try_for_each(|_| ctx.wait_idle())
+}
+
+/// Bytes of structures, the library's own included, and the sum of those with a handle.
+fn memory(ctx: &Context) -> (u64, u64) {
+    let memory = ctx.accel_memory();
+    (memory.structure_bytes, memory.structures.iter().map(|info| info.structure_bytes).sum())
+}
+
+#[test]
+fn memory_goes_back_to_the_byte() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let scene = scene();
+    let gpu = upload(&ctx, &scene, COMPACTABLE)?;
+    let check = HitCheck::new(&ctx)?;
+    ctx.wait_idle()?;
+    let before: Vec<_> =
+        handles(&gpu).into_iter().map(|handle| ctx.accel_struct_info(handle)).collect::<Result<_>>()?;
+    let (all_before, own_before) = memory(&ctx);
+    ctx.compact(&handles(&gpu)[..1])?;
+    assert_eq!(compaction(&ctx, *gpu.models[0])?, Compaction::Pending);
+    assert_eq!(compaction(&ctx, *gpu.models[1])?, Compaction::None);
+    settle(&ctx)?;
+    check.scene("one compacted", &gpu.tlas, &scene)?;
+    ctx.compact(&handles(&gpu))?;
+    settle(&ctx)?;
+    check.scene("all compacted", &gpu.tlas, &scene)?;
+    ctx.wait_idle()?;
+    let mut saved = 0;
+    for (model, was) in gpu.models.iter().zip(&before) {
+        let (before_bytes, after_bytes) = done(&ctx, **model)?;
+        let info = ctx.accel_struct_info(**model)?;
+        assert_eq!((before_bytes, after_bytes), (was.structure_bytes, info.structure_bytes));
+        assert!(after_bytes <= before_bytes);
+        saved += before_bytes - after_bytes;
+        eprintln!("{before_bytes} -> {after_bytes} bytes");
+    }
+    assert_eq!(memory(&ctx), (all_before - saved, own_before - saved));
+    drop(gpu);
+    ctx.wait_idle()?;
+    assert_eq!(memory(&ctx), (all_before - own_before, 0), "only the library's own structure is left");
+    Ok(())
+}
+
+/// Instances from the host and from a buffer that changed since; no update tells them of the copies.
+#[test]
+fn top_level_structures_of_before_show_the_copies() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let check = HitCheck::new(&ctx)?;
+    let scene = scene();
+    let gpu = upload(&ctx, &scene, COMPACTABLE)?;
+    let mut words = Vec::new();
+    for (index, placed) in scene.placed.iter().enumerate() {
+        words.extend(lvk::transform_rows(&placed.transform).map(f32::to_bits));
+        words.extend([placed.custom_index | 0xff << 24, 0, index as u32 % 3, 0]);
+    }
+    let records = words_buffer(&ctx, &words);
+    let from_buffer = ctx.create_tlas(&TlasDesc { capacity: 6, ..Default::default() })?;
+    let blas = handles(&gpu);
+    let mut cmd = ctx.acquire_command_buffer()?;
+    let source = DeviceInstances { buffer: *records, offset: 0, count: 6, blas: &blas };
+    cmd.update_tlas_from(*from_buffer, &source, BuildMode::Rebuild)?;
+    ctx.submit(cmd)?;
+    ctx.compact(&blas)?;
+    ctx.upload_buffer(*records, 0, &vec![0xff; words.len() * 4])?;
+    drop(records);
+    settle(&ctx)?;
+    for handle in &blas {
+        done(&ctx, *handle)?;
+    }
+    // What the copies replaced is overwritten by others.
+    let _others = upload(&ctx, &scene, BuildFlags::default())?;
+    check.scene("host instances", &gpu.tlas, &scene)?;
+    check.scene("device instances", &from_buffer, &scene)
+}
+
+/// The update was recorded for the old structures and is submitted when they are replaced.
+#[test]
+fn an_update_that_is_overtaken_by_compaction_is_mended() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let check = HitCheck::new(&ctx)?;
+    let mut scene = scene();
+    let gpu = upload(&ctx, &scene, COMPACTABLE)?;
+    ctx.wait_idle()?;
+    let (all_before, own_before) = memory(&ctx);
+    scene.placed.truncate(5);
+    scene.placed[4].transform = Affine3A::from_translation(Vec3::new(1.0, 5.5, -0.5));
+    let mut cmd = ctx.acquire_command_buffer()?;
+    cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
+    ctx.compact(&handles(&gpu))?;
+    settle(&ctx)?;
+    let saved =
+        gpu.models.iter().map(|model| done(&ctx, **model)).map(|of| of.map(|(before, after)| before - after));
+    let saved: u64 = saved.collect::<Result<Vec<_>>>()?.iter().sum();
+    ctx.submit(cmd)?;
+    check.scene("right after", &gpu.tlas, &scene)?;
+    settle(&ctx)?;
+    check.scene("later", &gpu.tlas, &scene)?;
+    settle(&ctx)?;
+    assert_eq!(memory(&ctx), (all_before - saved, own_before - saved), "nobody holds the old ones");
+    Ok(())
+}
+
+#[test]
+fn compaction_waits_for_builds_that_are_recorded() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let check = HitCheck::new(&ctx)?;
+    let scene = scene();
+    for submits in [true, false] {
+        let gpu = upload(&ctx, &scene, COMPACTABLE)?;
+        let mut cmd = ctx.acquire_command_buffer()?;
+        cmd.build_blas(&handles(&gpu)[..2], BuildMode::Rebuild)?;
+        cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
+        ctx.compact(&handles(&gpu))?;
+        settle(&ctx)?;
+        assert_eq!(compaction(&ctx, *gpu.models[0])?, Compaction::Pending);
+        done(&ctx, *gpu.models[2])?;
+        if submits {
+            ctx.submit(cmd)?;
+        } else {
+            drop(cmd);
+        }
+        settle(&ctx)?;
+        settle(&ctx)?;
+        for model in &gpu.models {
+            done(&ctx, **model)?;
+        }
+        check.scene(&format!("built meanwhile: {submits}"), &gpu.tlas, &scene)?;
+    }
+    Ok(())
+}
+
+/// A build between the question and the copy makes the answer worthless: it is asked again.
+#[test]
+fn a_build_after_the_question_makes_another_one() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let mut scene = scene();
+    let gpu = upload(&ctx, &scene, COMPACTABLE)?;
+    ctx.compact(&handles(&gpu))?;
+    let mut cmd = ctx.acquire_command_buffer()?;
+    let mesh = scene.models[0][0].mesh.clone();
+    Bender::new(&ctx)?.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.4)?;
+    cmd.build_blas(&handles(&gpu), BuildMode::Rebuild)?;
+    cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
+    ctx.submit(cmd)?;
+    scene.models[0][0].mesh = bent(&mesh, 0.4);
+    settle(&ctx)?;
+    settle(&ctx)?;
+    for model in &gpu.models {
+        done(&ctx, **model)?;
+    }
+    HitCheck::new(&ctx)?.scene("built again", &gpu.tlas, &scene)
+}
+
+/// The usual life of a moving mesh: a refit a frame, none of which waits, and compaction somewhere in between.
+#[test]
+fn a_mesh_is_compacted_while_it_moves() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let (bender, check) = (Bender::new(&ctx)?, HitCheck::new(&ctx)?);
+    let mut scene = scene();
+    let gpu = upload(&ctx, &scene, MOVING)?;
+    let mut done_at = None;
+    for frame in 0..8 {
+        ctx.next_frame()?;
+        let mesh = scene.models[0][0].mesh.clone();
+        let mut cmd = ctx.acquire_command_buffer()?;
+        bender.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.1)?;
+        cmd.build_blas(&[*gpu.models[0]], BuildMode::Refit)?;
+        cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Refit)?;
+        if frame == 2 {
+            ctx.compact(&handles(&gpu))?;
+        }
+        ctx.submit(cmd)?;
+        scene.models[0][0].mesh = bent(&mesh, 0.1);
+        check.scene(&format!("frame {frame}"), &gpu.tlas, &scene)?;
+        if done_at.is_none() && matches!(compaction(&ctx, *gpu.models[0])?, Compaction::Done { .. }) {
+            done_at = Some(frame);
+        }
+    }
+    assert!(done_at.is_some_and(|frame| (2..7).contains(&frame)), "{done_at:?}");
+    Ok(())
+}
+
+#[test]
+fn a_compacted_structure_cannot_be_rebuilt() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let scene = scene();
+    let gpu = upload(&ctx, &scene, MOVING)?;
+    ctx.compact(&handles(&gpu))?;
+    settle(&ctx)?;
+    done(&ctx, *gpu.models[0])?;
+    let mut cmd = ctx.acquire_command_buffer()?;
+    // One refit is allowed, the next Auto build would have to rebuild.
+    cmd.build_blas(&[*gpu.models[1]], BuildMode::Auto { max_refits: 1 })?;
+    for mode in [BuildMode::Rebuild, BuildMode::Auto { max_refits: 1 }] {
+        let refused = cmd.build_blas(&[*gpu.models[1]], mode);
+        let Err(Error::InvalidUsage { object, message }) = refused else { unreachable!("{refused:?}") };
+        assert!(object == "model" && message.contains("compacted"), "{object}: {message}");
+    }
+    ctx.submit(cmd)?;
+    HitCheck::new(&ctx)?.scene("after refusals", &gpu.tlas, &scene)
+}
+
+#[test]
+fn asking_twice_is_asking_once_and_wrong_questions_are_refused() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let scene = scene();
+    let gpu = upload(&ctx, &scene, COMPACTABLE)?;
+    let plain = upload(&ctx, &scene, BuildFlags::default())?;
+    let refused = |result: Result<()>, name: &str| match result {
+        Err(Error::InvalidUsage { object, .. }) => assert_eq!(object, name),
+        other => unreachable!("{name}: {other:?}"),
+    };
+    refused(ctx.compact(&[*gpu.models[0], *plain.models[0]]), "model");
+    assert_eq!(compaction(&ctx, *gpu.models[0])?, Compaction::None, "all or none");
+    refused(ctx.compact(&[*gpu.tlas]), "tlas");
+    let stale = {
+        let [first, ..] = handles(&plain)[..] else { unreachable!("three models") };
+        drop(plain);
+        first
+    };
+    assert!(matches!(ctx.compact(&[*gpu.models[0], stale]), Err(Error::StaleHandle { .. })));
+    ctx.compact(&[])?;
+    ctx.compact(&[*gpu.models[0], *gpu.models[0]])?;
+    ctx.compact(&[*gpu.models[0]])?;
+    settle(&ctx)?;
+    let sizes = done(&ctx, *gpu.models[0])?;
+    ctx.compact(&handles(&gpu))?;
+    settle(&ctx)?;
+    assert_eq!(done(&ctx, *gpu.models[0])?, sizes, "left alone");
+    HitCheck::new(&ctx)?.scene("asked often", &gpu.tlas, &scene)
+}
+
+/// In every state of the compaction.
+#[test]
+fn structures_may_be_destroyed_meanwhile() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let check = HitCheck::new(&ctx)?;
+    let scene = scene();
+    ctx.wait_idle()?;
+    let before = memory(&ctx);
+    for steps in 0..3 {
+        let mut gpu = upload(&ctx, &scene, COMPACTABLE)?;
+        ctx.compact(&handles(&gpu))?;
+        (0..steps).try_for_each(|_| ctx.flush().map(drop))?;
+        gpu.models.clear();
+        gpu.buffers.clear();
+        settle(&ctx)?;
+        check.scene(&format!("destroyed after {steps} submissions"), &gpu.tlas, &scene)?;
+        drop(gpu);
+        settle(&ctx)?;
+        assert_eq!(memory(&ctx), before, "{steps} submissions");
+    }
+    Ok(())
+}
+
+/// Nothing else keeps them.
+#[test]
+fn structures_that_nobody_shows_may_be_destroyed_meanwhile() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let scene = scene();
+    ctx.wait_idle()?;
+    let before = memory(&ctx);
+    for steps in 0..8 {
+        let GpuScene { models, tlas, buffers } = upload(&ctx, &scene, COMPACTABLE)?;
+        drop(tlas);
+        let handles: Vec<_> = models.iter().map(|model| **model).collect();
+        if steps % 2 == 1 {
+            ctx.wait_idle()?;
+        }
+        ctx.compact(&handles)?;
+        (0..steps / 2).try_for_each(|_| ctx.flush().map(drop))?;
+        drop((models, buffers));
+        settle(&ctx)?;
+        assert_eq!(memory(&ctx), before, "step {steps}");
+    }
+    Ok(())
+}
+
+/// In every state of the compaction, with work that was never submitted.
+#[test]
+fn a_context_may_go_meanwhile() -> Result<()> {
+    for steps in 0..4 {
+        let Some(device) = device() else { return Ok(()) };
+        let (Some(ctx), sink) = device.into_context() else { return Ok(()) };
+        let gpu = upload(&ctx, &scene(), COMPACTABLE)?;
+        ctx.compact(&handles(&gpu))?;
+        (0..steps).try_for_each(|_| ctx.flush().map(drop))?;
+        if steps == 3 {
+            ctx.wait_idle()?;
+            ctx.next_frame()?;
+        }
+        drop(ctx);
+        drop(gpu);
+        assert!(sink.is_empty(), "{steps} submissions: {:?}", sink.messages());
+    }
+    Ok(())
+}
+
+/// Compactions of one thread are carried out by whatever thread submits next.
+#[test]
+fn threads_compact_side_by_side() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let work = || -> Result<()> {
+        let (check, scene) = (HitCheck::new(&ctx)?, scene());
+        for round in 0..5 {
+            let gpu = upload(&ctx, &scene, MOVING)?;
+            ctx.compact(&handles(&gpu))?;
+            for frame in 0..3 {
+                let mut cmd = ctx.acquire_command_buffer()?;
+                cmd.build_blas(&handles(&gpu), BuildMode::Refit)?;
+                cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Refit)?;
+                ctx.submit(cmd)?;
+                check.scene(&format!("round {round}, frame {frame}"), &gpu.tlas, &scene)?;
+            }
+        }
+        Ok(())
+    };
+    std::thread::scope(|scope| {
+        let threads = [scope.spawn(work), scope.spawn(work)];
+        threads.into_iter().try_for_each(|thread| thread.join().unwrap_or_else(|_| unreachable!("it failed")))
+    })
+}
+
+fn measured() -> Result<Option<u64>> {
+    let Some(ctx) = device() else { return Ok(None) };
+    let _gpu = upload(&ctx, &scene(), COMPACTABLE)?;
+    ctx.wait_idle()?;
+    Ok(Some(memory(&ctx).0))
+}
+
+/// Copies need room beside what they replace. Without it everything stays as it is, with a warning.
+#[test]
+fn compaction_gives_up_where_the_budget_has_no_room_for_copies() -> Result<()> {
+    listen();
+    let Some(needed) = measured()? else { return Ok(()) };
+    let Some(ctx) = device_with(|desc| desc.accel_budget_bytes = needed + 256) else {
+        return Ok(());
+    };
+    let scene = scene();
+    let gpu = upload(&ctx, &scene, COMPACTABLE)?;
+    ctx.compact(&handles(&gpu))?;
+    settle(&ctx)?;
+    for model in &gpu.models {
+        assert_eq!(compaction(&ctx, **model)?, Compaction::None);
+    }
+    assert_eq!(memory(&ctx).0, needed);
+    assert!(!take_warnings("stay uncompacted").is_empty());
+    HitCheck::new(&ctx)?.scene("not compacted", &gpu.tlas, &scene)
+}

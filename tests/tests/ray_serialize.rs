@@ -1,0 +1,345 @@
+//! Structures as bytes: what was loaded is hit like what was built, and bytes that cannot be used are refused.
+
+use lvk::glam::{Affine3A, Vec3};
+use lvk::{
+    AccelStructHandle, BlasDesc, BlasGeometry, BuildFlags, BuildMode, Compaction, Context, DeviceProfile,
+    Error, Holder, PrimitiveOrder, Result, TlasDesc,
+};
+use lvk_tests::agreement::Agreement;
+use lvk_tests::bender::{Bender, bent};
+use lvk_tests::hit_check::HitCheck;
+use lvk_tests::meshes::Mesh;
+use lvk_tests::ray_scene::{Layout, Part, PartBuffers, Placed, RayScene, instances, upload_geometries};
+use lvk_tests::ray_tracer::How;
+use lvk_tests::rays::random_rays;
+use lvk_tests::reference::Sphere;
+use lvk_tests::sphere_scene::SphereModel;
+use lvk_tests::warnings::{listen, take_warnings};
+use lvk_tests::{TestDevice, device, device_with};
+
+const MOVING: BuildFlags =
+    BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE).union(BuildFlags::ALLOW_COMPACTION);
+
+/// A device that takes 60 primitives in a structure.
+fn split_device() -> Option<TestDevice> {
+    let profile = DeviceProfile {
+        name: "small structures".into(),
+        max_blas_primitives: 60,
+        ..DeviceProfile::default()
+    };
+    device_with(|desc| desc.profile = Some(&profile))
+}
+
+/// A shuffled ring and a cube that is moved before the build, in two places.
+fn scene() -> RayScene {
+    let ring = Mesh::torus(10);
+    let count = ring.triangles.len();
+    let triangles = (0..count).map(|index| ring.triangles[index * 211 % count]).collect();
+    let ring = Part::new(Mesh { triangles, ..ring }, Layout::Indexed16);
+    let cube = Part {
+        transform: Some(Affine3A::from_translation(Vec3::Y * 1.5)),
+        ..Part::new(Mesh::cube_grid(1), Layout::Unshared)
+    };
+    let place = |index: u32| {
+        let transform = Affine3A::from_translation(Vec3::X * 3.0 * index as f32);
+        Placed { custom_index: 7 + index, ..Placed::new(0, transform) }
+    };
+    RayScene { models: vec![vec![ring, cube]], placed: (0..2).map(place).collect() }
+}
+
+/// The geometries of [`scene`] on a device.
+struct Mine {
+    scene: RayScene,
+    buffers: Vec<PartBuffers>,
+    geometries: Vec<BlasGeometry>,
+}
+
+impl Mine {
+    fn new(ctx: &Context) -> Result<Self> {
+        let scene = scene();
+        let (buffers, geometries) = upload_geometries(ctx, &scene.models[0])?;
+        Ok(Self { scene, buffers, geometries })
+    }
+
+    fn desc(&self, flags: BuildFlags, order: PrimitiveOrder) -> BlasDesc<'_> {
+        BlasDesc { geometries: &self.geometries, flags, order, debug_name: "mine" }
+    }
+
+    fn show(&self, ctx: &Context, blas: &Holder<AccelStructHandle>) -> Result<Holder<AccelStructHandle>> {
+        let instances = self.scene.placed.iter().map(|placed| lvk::TlasInstance {
+            transform: lvk::transform_rows(&placed.transform),
+            custom_index: placed.custom_index,
+            ..lvk::TlasInstance::new(**blas)
+        });
+        let (flags, instances) = (BuildFlags::ALLOW_UPDATE, instances.collect::<Vec<_>>());
+        ctx.create_tlas(&TlasDesc { instances: &instances, flags, ..Default::default() })
+    }
+}
+
+fn settle(ctx: &Context) -> Result<()> {
+    (0..3).try_for_each(|_| ctx.wait_idle())
+}
+
+fn reason(result: Result<Holder<AccelStructHandle>>) -> String {
+    match result {
+        Err(Error::Serialized { object, reason }) => {
+            assert_eq!(object, "mine");
+            reason
+        }
+        other => unreachable!("the bytes are no good, but {other:?}"),
+    }
+}
+
+/// Whole, in another order, split; compacted or not; and what was loaded, once more.
+#[test]
+fn what_is_loaded_is_hit_like_what_was_built() -> Result<()> {
+    for (split, order) in
+        [(false, PrimitiveOrder::Given), (false, PrimitiveOrder::Spatial), (true, PrimitiveOrder::Auto)]
+    {
+        let Some(ctx) = (if split { split_device() } else { device() }) else { return Ok(()) };
+        let check = HitCheck::new(&ctx)?;
+        let mine = Mine::new(&ctx)?;
+        let desc = mine.desc(MOVING, order);
+        let built = ctx.create_blas(&desc)?;
+        let info = ctx.accel_struct_info(*built)?;
+        assert_eq!((info.parts > 5, info.is_remapped), (split, order != PrimitiveOrder::Given));
+        let plain = ctx.serialize_blas(*built)?;
+        ctx.compact(&[*built])?;
+        settle(&ctx)?;
+        assert!(matches!(ctx.accel_struct_info(*built)?.compaction, Compaction::Done { .. }));
+        let compacted = ctx.serialize_blas(*built)?;
+        drop(built);
+        settle(&ctx)?;
+        for (what, bytes) in [("plain", &plain), ("compacted", &compacted)] {
+            let loaded = ctx.load_blas(&desc, bytes)?;
+            let again = ctx.serialize_blas(*loaded)?;
+            check.scene(&format!("{what}, {order:?}"), &mine.show(&ctx, &loaded)?, &mine.scene)?;
+            drop(loaded);
+            let loaded = ctx.load_or_create_blas(&desc, Some(&again))?;
+            assert!(loaded.rejected.is_none());
+            let of_loaded = ctx.accel_struct_info(*loaded.blas)?;
+            assert_eq!((of_loaded.parts, of_loaded.is_remapped), (info.parts, info.is_remapped));
+            check.scene(&format!("{what} twice, {order:?}"), &mine.show(&ctx, &loaded.blas)?, &mine.scene)?;
+        }
+    }
+    Ok(())
+}
+
+/// A refit reads the buffers of the description; so does a rebuild, where there is room for one.
+#[test]
+fn what_is_loaded_moves_on() -> Result<()> {
+    for ctx in [device(), split_device()] {
+        let Some(ctx) = ctx else { return Ok(()) };
+        let (bender, check) = (Bender::new(&ctx)?, HitCheck::new(&ctx)?);
+        let mut mine = Mine::new(&ctx)?;
+        let bytes = {
+            let built = ctx.create_blas(&mine.desc(MOVING, PrimitiveOrder::Spatial))?;
+            ctx.serialize_blas(*built)?
+        };
+        let loaded = ctx.load_blas(&mine.desc(MOVING, PrimitiveOrder::Spatial), &bytes)?;
+        let tlas = mine.show(&ctx, &loaded)?;
+        for (amount, mode) in [(0.3, BuildMode::Refit), (-0.5, BuildMode::Refit), (0.3, BuildMode::Rebuild)] {
+            let mesh = mine.scene.models[0][0].mesh.clone();
+            let mut cmd = ctx.acquire_command_buffer()?;
+            bender.record(&mut cmd, *mine.buffers[0].vertices, &mesh, amount)?;
+            cmd.build_blas(&[*loaded], mode)?;
+            let model = std::slice::from_ref(&loaded);
+            cmd.update_tlas(*tlas, &instances(&mine.scene.placed, model), BuildMode::Refit)?;
+            ctx.submit(cmd)?;
+            mine.scene.models[0][0].mesh = bent(&mesh, amount);
+            check.scene(&format!("loaded, {mode:?}"), &tlas, &mine.scene)?;
+        }
+        ctx.compact(&[*loaded])?;
+        settle(&ctx)?;
+        assert!(matches!(ctx.accel_struct_info(*loaded)?.compaction, Compaction::Done { .. }));
+        check.scene("loaded and compacted", &tlas, &mine.scene)?;
+    }
+    Ok(())
+}
+
+/// Nothing was submitted in between: the question comes behind the loading.
+#[test]
+fn what_is_loaded_may_be_compacted_at_once() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let mine = Mine::new(&ctx)?;
+    let desc = mine.desc(MOVING, PrimitiveOrder::Spatial);
+    let bytes = {
+        let built = ctx.create_blas(&desc)?;
+        ctx.serialize_blas(*built)?
+    };
+    let loaded = ctx.load_blas(&desc, &bytes)?;
+    ctx.compact(&[*loaded])?;
+    let tlas = mine.show(&ctx, &loaded)?;
+    settle(&ctx)?;
+    settle(&ctx)?;
+    assert!(matches!(ctx.accel_struct_info(*loaded)?.compaction, Compaction::Done { .. }));
+    HitCheck::new(&ctx)?.scene("compacted at once", &tlas, &mine.scene)
+}
+
+/// A structure from a larger allocation is loaded into what its bytes say: no more may be built in it than fits.
+#[test]
+fn what_was_compacted_before_it_was_saved_is_refitted() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let (bender, check) = (Bender::new(&ctx)?, HitCheck::new(&ctx)?);
+    let mut mine = Mine::new(&ctx)?;
+    let built = ctx.create_blas(&mine.desc(MOVING, PrimitiveOrder::Given))?;
+    ctx.compact(&[*built])?;
+    settle(&ctx)?;
+    let bytes = ctx.serialize_blas(*built)?;
+    drop(built);
+    let loaded = ctx.load_blas(&mine.desc(MOVING, PrimitiveOrder::Given), &bytes)?;
+    let tlas = mine.show(&ctx, &loaded)?;
+    let mesh = mine.scene.models[0][0].mesh.clone();
+    let mut cmd = ctx.acquire_command_buffer()?;
+    bender.record(&mut cmd, *mine.buffers[0].vertices, &mesh, 0.3)?;
+    cmd.build_blas(&[*loaded], BuildMode::Refit)?;
+    let model = std::slice::from_ref(&loaded);
+    cmd.update_tlas(*tlas, &instances(&mine.scene.placed, model), BuildMode::Refit)?;
+    ctx.submit(cmd)?;
+    mine.scene.models[0][0].mesh = bent(&mesh, 0.3);
+    check.scene("compacted, loaded, refitted", &tlas, &mine.scene)
+}
+
+#[test]
+fn boxes_are_saved_too() -> Result<()> {
+    let profile = DeviceProfile { name: "small".into(), max_blas_primitives: 30, ..DeviceProfile::default() };
+    for profile in [None, Some(&profile)] {
+        let Some(ctx) = device_with(|desc| desc.profile = profile) else { return Ok(()) };
+        let spheres = SphereModel { count: 40, step: 27 };
+        let (_buffers, geometries) = spheres.boxes(&ctx)?;
+        let order = PrimitiveOrder::Spatial;
+        let desc = BlasDesc { geometries: &geometries, order, ..Default::default() };
+        let built = ctx.create_blas(&desc)?;
+        assert!(ctx.accel_struct_info(*built)?.is_remapped);
+        let bytes = ctx.serialize_blas(*built)?;
+        drop(built);
+        let model = [ctx.load_blas(&desc, &bytes)?];
+        let placed = [Placed::new(0, Affine3A::IDENTITY)];
+        let instances = instances(&placed, &model);
+        let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() })?;
+        let expected = spheres.spheres(&placed);
+        let rays = random_rays(53, 800, Vec3::new(-1.0, -1.0, -1.0), Vec3::new(5.0, 27.0, 3.0));
+        for (method, tracer) in HitCheck::with(&ctx, |ctx, method| spheres.tracer(ctx, method))?.tracers() {
+            let records = tracer.trace(&tlas, &rays, How::default())?;
+            Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
+                .assert(&format!("loaded boxes by {method:?}"));
+        }
+    }
+    Ok(())
+}
+
+#[test]
+fn damaged_bytes_are_refused_and_leave_nothing_behind() -> Result<()> {
+    for ctx in [device(), split_device()] {
+        let Some(ctx) = ctx else { return Ok(()) };
+        let mine = Mine::new(&ctx)?;
+        let desc = mine.desc(MOVING, PrimitiveOrder::Spatial);
+        let bytes = {
+            let built = ctx.create_blas(&desc)?;
+            ctx.serialize_blas(*built)?
+        };
+        settle(&ctx)?;
+        let before = ctx.accel_memory();
+        for length in [0, 1, 7, 8, 11, 27, 28, 60, bytes.len() / 2, bytes.len() - 1] {
+            let reason = reason(ctx.load_blas(&desc, &bytes[..length]));
+            assert!(!reason.is_empty(), "{length}");
+        }
+        let longer = [&bytes[..], &[0]].concat();
+        reason(ctx.load_blas(&desc, &longer));
+        for place in (0..bytes.len()).step_by(bytes.len() / 150) {
+            let mut damaged = bytes.clone();
+            damaged[place] ^= 1 << (place % 8);
+            reason(ctx.load_blas(&desc, &damaged));
+        }
+        reason(ctx.load_blas(&desc, &vec![0x5a; 4_000]));
+        settle(&ctx)?;
+        assert_eq!(ctx.accel_memory(), before);
+        drop(ctx.load_blas(&desc, &bytes)?);
+    }
+    Ok(())
+}
+
+#[test]
+fn bytes_of_another_mesh_or_of_other_flags_are_refused() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let mine = Mine::new(&ctx)?;
+    let order = PrimitiveOrder::Given;
+    let bytes = {
+        let built = ctx.create_blas(&mine.desc(MOVING, order))?;
+        ctx.serialize_blas(*built)?
+    };
+    let refused = reason(ctx.load_blas(&mine.desc(BuildFlags::FAST_TRACE, order), &bytes));
+    assert!(refused.contains("FAST_TRACE"), "{refused}");
+    let swapped: Vec<_> = mine.geometries.iter().rev().copied().collect();
+    let fewer = &mine.geometries[..1];
+    let spheres = SphereModel::new(12);
+    let (_buffers, boxes) = spheres.boxes(&ctx)?;
+    for geometries in [&swapped[..], fewer, &boxes] {
+        let desc = BlasDesc { geometries, ..mine.desc(MOVING, order) };
+        let refused = reason(ctx.load_blas(&desc, &bytes));
+        assert!(refused.contains("other geometries"), "{refused}");
+    }
+    let mut seen_through = mine.geometries.clone();
+    if let BlasGeometry::Triangles(triangles) = &mut seen_through[1] {
+        triangles.flags = lvk::GeometryFlags::empty();
+    }
+    let desc = BlasDesc { geometries: &seen_through, ..mine.desc(MOVING, order) };
+    reason(ctx.load_blas(&desc, &bytes));
+    let stale = *ctx.create_blas(&mine.desc(MOVING, order))?;
+    assert!(matches!(ctx.serialize_blas(stale), Err(Error::StaleHandle { .. })));
+    let tlas = ctx.create_tlas(&TlasDesc::default())?;
+    assert!(matches!(ctx.serialize_blas(*tlas), Err(Error::InvalidUsage { .. })));
+    Ok(())
+}
+
+/// The bytes as the library would have written them: the checksum over everything behind the 28 bytes of its head is
+/// right again.
+fn resealed(mut bytes: Vec<u8>) -> Vec<u8> {
+    let sum = bytes[28..]
+        .iter()
+        .fold(0xcbf2_9ce4_8422_2325_u64, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
+    bytes[20..28].copy_from_slice(&sum.to_le_bytes());
+    bytes
+}
+
+/// Where the driver's own bytes start, in a structure of one part: behind the head, flags, geometries and lengths.
+fn driver_start(geometries: &[BlasGeometry]) -> usize {
+    28 + 8 + 12 * geometries.len() + 4 + 16
+}
+
+#[test]
+fn bytes_of_another_driver_are_refused_and_built_instead() -> Result<()> {
+    listen();
+    let Some(ctx) = device() else { return Ok(()) };
+    let mine = Mine::new(&ctx)?;
+    let desc = mine.desc(BuildFlags::FAST_TRACE, PrimitiveOrder::Given);
+    let bytes = {
+        let built = ctx.create_blas(&desc)?;
+        ctx.serialize_blas(*built)?
+    };
+    assert_eq!(resealed(bytes.clone()), bytes, "the checksum is the library's");
+    let uuid = driver_start(&mine.geometries);
+    // The driver's UUID comes first; what of the 16 bytes behind it matters is up to the driver.
+    for place in [uuid, uuid + 7, uuid + 15] {
+        let mut foreign = bytes.clone();
+        foreign[place] ^= 0x10;
+        let reason = reason(ctx.load_blas(&desc, &resealed(foreign)));
+        assert!(reason.contains("another device or driver"), "byte {}: {reason}", place - uuid);
+    }
+    let mut short = bytes.clone();
+    short[uuid + 32] ^= 0x10;
+    assert!(reason(ctx.load_blas(&desc, &resealed(short.clone()))).contains("damaged"));
+    let check = HitCheck::new(&ctx)?;
+    let loaded = ctx.load_or_create_blas(&desc, Some(&resealed(short)))?;
+    let rejected = loaded.rejected.map(|error| error.to_string()).unwrap_or_default();
+    assert!(rejected.contains("mine") && rejected.contains("damaged"), "{rejected}");
+    assert_eq!(take_warnings("building it anew").len(), 1);
+    check.scene("built instead", &mine.show(&ctx, &loaded.blas)?, &mine.scene)?;
+    let without = ctx.load_or_create_blas(&desc, None)?;
+    assert!(without.rejected.is_none());
+    check.scene("built without bytes", &mine.show(&ctx, &without.blas)?, &mine.scene)?;
+    // A description that is no good is no reason to build.
+    let wrong = BlasDesc { geometries: &[], ..desc };
+    assert!(ctx.load_or_create_blas(&wrong, Some(&bytes)).is_err());
+    Ok(())
+}
