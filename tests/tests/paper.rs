@@ -86,7 +86,7 @@ fn assert_report_is_whole(folder: &Path, experiment: &Experiment) {
         let rows = page.matches(&format!("\n| conference cam {camera} ")).count();
         assert_eq!(rows, 7 * path_count + usize::from(path_count > 1), "camera {camera}");
     }
-    for what in ["## Goals", "### Table 8", "RX 6600 (paper)", "| 61.35 |", "1,338,208", &experiment.device] {
+    for what in ["## Goals", "### Table 8", "RX 6600 (paper)", " 61.35 |", "1,338,208", &experiment.device] {
         assert!(page.contains(what), "{what} is not in the report");
     }
     let mut linked = 0;
