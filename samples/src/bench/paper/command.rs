@@ -77,7 +77,7 @@ fn begin(setup: &Setup, args: &PaperArgs, ctx: &Context) -> Result<Experiment, B
     let plan = Plan {
         size: [args.width.unwrap_or(width), args.height.unwrap_or(height)],
         frames: args.frames.unwrap_or_else(|| setup.choose(ctx, Choice { quick: 4, cpu: 12, gpu: 4000 })),
-        runs: setup.runs(ctx, Choice { quick: 1, cpu: 1, gpu: 3 }),
+        runs: setup.runs(ctx, Choice { quick: 1, cpu: 1, gpu: 1 }),
         warm_up: setup.choose(ctx, Choice { quick: 1, cpu: 1, gpu: 30 }),
         compared: args.compared.unwrap_or_else(|| setup.choose(ctx, Choice { quick: 2, cpu: 5, gpu: 5 })),
         max_depth: args.depth,
