@@ -12,8 +12,8 @@ Ray primaryRay(uvec2 pixel) {
     return Ray(frame.camera.eye, tmin, direction, 0.0, vec3(1.0), 0u);
 }
 
-#ifdef HYBRID_GBUFFER
-// The surface that the geometry pass left in the G-buffer.
+#if defined(HYBRID_GBUFFER)
+// The surface that the paper's geometry pass left in the G-buffer.
 bool primarySurface(uvec2 pixel, Ray ray, out SurfacePoint point) {
     ivec2 texel = ivec2(pixel);
     uvec4 surface = textureBindlessFetchU2D(frame.gbufferSurface, texel, 0);
@@ -27,6 +27,26 @@ bool primarySurface(uvec2 pixel, Ray ray, out SurfacePoint point) {
     point.normal = unitFromOctahedral(uintBitsToFloat(surface.xy));
     point.geometricNormal = unitFromOctahedral(unpackSnorm2x16(surface.z));
     point.albedo = textureBindlessFetch2D(frame.gbufferAlbedo, texel, 0).rgb;
+    return true;
+}
+#elif defined(HYBRID_VISIBILITY)
+uint visibleTriangle(uvec2 pixel) {
+    Visibility visibility = frame.visibility;
+    if (visibility.image != kNoImage) {
+        return textureBindlessFetchU2D(visibility.image, ivec2(pixel), 0).x;
+    }
+    return visibility.words.at[pixel.y * frame.camera.width + pixel.x].x;
+}
+
+// The surface of the triangle that the visibility pass found, where the pixel's ray meets it.
+bool primarySurface(uvec2 pixel, Ray ray, out SurfacePoint point) {
+    uint triangle = visibleTriangle(pixel);
+    if (triangle == kNoTriangle) {
+        return false;
+    }
+    vec2 b = barycentricsAlong(frame.scene, triangle, ray.origin, ray.direction);
+    point = surfaceAt(frame.scene, triangle, b, ray.origin, ray.direction, 0.0, frame.camera.pixelSpread,
+                      frame.surfaceSampler);
     return true;
 }
 #else

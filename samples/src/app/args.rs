@@ -44,6 +44,18 @@ pub struct HybridArgs {
     #[arg(long, value_enum, default_value_t = Method::Hybrid, help_heading = "Rendering")]
     pub method: Method,
 
+    /// What the hybrid method's geometry pass leaves for the rays
+    #[arg(long, value_enum, default_value_t = GBuffer::Visibility, help_heading = "Rendering")]
+    pub gbuffer: GBuffer,
+
+    /// How to rasterise visible triangles
+    #[arg(long, value_enum, default_value_t = Raster::Auto, help_heading = "Rendering")]
+    pub raster: Raster,
+
+    /// Most pixels of a triangle that one thread of the compute rasteriser takes on, for tuning
+    #[arg(long, value_name = "PIXELS", hide = true)]
+    pub small_triangle: Option<u32>,
+
     /// How to trace rays
     #[arg(long, value_enum, default_value_t = RayTracing::Auto, help_heading = "Rendering")]
     pub rt: RayTracing,
@@ -130,6 +142,26 @@ pub enum Method {
     Hybrid,
 }
 
+/// What the geometry pass leaves for the rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum GBuffer {
+    /// Position, normals, albedo and triangle, as in the paper.
+    Paper,
+    /// The triangle alone.
+    Visibility,
+}
+
+/// How to rasterise visible triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Raster {
+    /// Whichever is faster in a few frames at the start.
+    Auto,
+    /// By compute shaders with 64-bit atomics.
+    Compute,
+    /// By the device's rasteriser, after culling in compute shaders.
+    Hardware,
+}
+
 /// How to trace rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RayTracing {
@@ -186,6 +218,7 @@ mod tests {
         let args = parsed("").unwrap();
         assert_eq!((args.width, args.height, args.camera, args.depth, args.frames), (1280, 720, 1, 4, None));
         assert_eq!((args.method, args.rt, args.validate), (Method::Hybrid, RayTracing::Auto, None));
+        assert_eq!((args.gbuffer, args.raster), (GBuffer::Visibility, Raster::Auto));
         assert_eq!((args.scene, args.out), (None, PathBuf::from("hybrid.png")));
     }
 

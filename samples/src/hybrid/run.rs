@@ -7,13 +7,13 @@ use std::process::ExitCode;
 use lvk::{Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, Validation, ValidationSink};
 
 use super::texture_fit::{fit_textures, textures_needed};
-use super::{HybridConfig, HybridError, HybridRenderer, Method, RayPath};
+use super::{Geometry, HybridConfig, HybridError, HybridRenderer, Method, Raster, RasterTuning, RayPath};
 use crate::app::args::{self, HybridArgs};
 use crate::app::png::{self, PngError};
 use crate::app::progress::Progress;
 use crate::app::timings::Timings;
 use crate::driver::{self, Driver, DriverError, DriverRequest};
-use crate::scene::{ObjOptions, Scene, SceneError};
+use crate::scene::{Camera, ObjOptions, Scene, SceneError};
 
 /// Frames to time where none are asked for, on a GPU.
 const GPU_FRAMES: u32 = 60;
@@ -94,7 +94,11 @@ fn attempt(args: &HybridArgs) -> Result<(), RunError> {
     progress.stage("uploading the scene and building acceleration structures", 0);
     let mut renderer = HybridRenderer::new(&ctx, &scene, &config)?;
     drop(progress);
+    let choice = renderer.choose_raster(camera(args, &scene))?;
     say(&headline(&ctx, &scene, &config, &renderer));
+    if let Some(choice) = choice {
+        say(&format!("geometry  {choice}"));
+    }
     let timings = render(args, &ctx, &scene, &mut renderer)?;
     let image = renderer.read_image()?;
     drop(renderer);
@@ -189,7 +193,19 @@ fn config(args: &HybridArgs, path: RayPath) -> HybridConfig {
         args::Method::Standalone => Method::Standalone,
         args::Method::Hybrid => Method::Hybrid,
     };
-    HybridConfig { method, path, width: args.width, height: args.height, max_depth: args.depth }
+    let raster = match args.raster {
+        args::Raster::Auto => None,
+        args::Raster::Compute => Some(Raster::Compute),
+        args::Raster::Hardware => Some(Raster::Hardware),
+    };
+    let geometry = match args.gbuffer {
+        args::GBuffer::Paper => Geometry::Paper,
+        args::GBuffer::Visibility => Geometry::Visibility(raster),
+    };
+    let small_pixels = args.small_triangle.unwrap_or(RasterTuning::default().small_pixels);
+    let tuning = RasterTuning { small_pixels, ..RasterTuning::default() };
+    let (width, height, max_depth) = (args.width, args.height, args.depth);
+    HybridConfig { method, path, width, height, max_depth, geometry, tuning }
 }
 
 fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &HybridRenderer) -> String {
@@ -197,7 +213,10 @@ fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &Hybr
     let refractive = scene.triangles.len() - scene.opaque_triangle_count as usize;
     let method = match config.method {
         Method::Standalone => "stand-alone ray tracing",
-        Method::Hybrid => "hybrid: geometry pass, then rays",
+        Method::Hybrid => match config.geometry {
+            Geometry::Paper => "hybrid: the paper's G-buffer, then rays",
+            Geometry::Visibility(_) => "hybrid: visible triangles, then rays",
+        },
     };
     let path = match config.path {
         RayPath::Pipeline => "ray tracing pipeline",
@@ -230,6 +249,10 @@ fn driver_text(capabilities: &Capabilities) -> String {
     format!("{}, Vulkan {major}.{minor}.{patch}", driver.trim_end())
 }
 
+fn camera<'a>(args: &HybridArgs, scene: &'a Scene) -> &'a Camera {
+    &scene.cameras[(args.camera as usize).clamp(1, 5) - 1]
+}
+
 /// Renders the frames and times all but those of the warm-up.
 fn render(
     args: &HybridArgs,
@@ -240,7 +263,7 @@ fn render(
     let is_cpu = ctx.capabilities().is_cpu;
     let frames = u64::from(args.frames.unwrap_or(if is_cpu { 1 } else { GPU_FRAMES }));
     let warm_up = if is_cpu { 0 } else { u64::from(WARM_UP_FRAMES) };
-    let camera = &scene.cameras[(args.camera as usize).clamp(1, 5) - 1];
+    let camera = camera(args, scene);
     let bands = renderer.band_count();
     let mut progress = Progress::visible();
     progress.stage("rendering", (warm_up + frames) * bands);
