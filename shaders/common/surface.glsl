@@ -19,8 +19,8 @@ struct SurfacePoint {
 // also covers pixels whose centre misses it by a rounding error.
 vec2 barycentricsAlong(Scene scene, uint triangle, vec3 origin, vec3 direction) {
     uvec3 corner = scene.triangles.at[triangle];
-    vec3 volumes = rayVolumes(direction, scene.positions.at[corner.x] - origin,
-                              scene.positions.at[corner.y] - origin, scene.positions.at[corner.z] - origin);
+    vec3 volumes = passageOf(direction, scene.positions.at[corner.x] - origin, scene.positions.at[corner.y] - origin,
+                             scene.positions.at[corner.z] - origin).volumes;
     float sum = volumes.x + volumes.y + volumes.z;
     if (sum == 0.0) {
         return vec2(1.0 / 3.0);

@@ -3,6 +3,7 @@
 #ifndef HYBRID_COVERAGE
 #define HYBRID_COVERAGE
 
+#include "common/ray_triangle.glsl"
 #include "hybrid/footprint.glsl"
 
 // The volume between a ray and an edge is linear in the place in the picture: x + y * right + z * down. Each is named
@@ -31,7 +32,7 @@ Edges edgesOf(Corners corners) {
 }
 
 // The depth at which the ray of `pixel` meets the triangle; negative where it does not or is before the near plane.
-float depthAt(Edges edges, ivec2 pixel) {
+float depthAt(Edges edges, Corners corners, ivec2 pixel) {
     vec2 size = vec2(frame.camera.width, frame.camera.height);
     precise vec3 place = vec3(1.0, (vec2(pixel) + 0.5) / size * 2.0 - 1.0);
     precise vec3 volumes = vec3(dot(edges.a, place), dot(edges.b, place), dot(edges.c, place));
@@ -40,8 +41,9 @@ float depthAt(Edges edges, ivec2 pixel) {
     if (isMissed || sum == 0.0) {
         return -1.0;
     }
-    precise float depth = dot(volumes, edges.depth) / sum;
-    return depth >= frame.camera.nearPlane ? depth : -1.0;
+    vec3 direction = cameraDirection(frame.camera, uvec2(pixel));
+    float depth = distanceAlong(passageOf(direction, corners.a, corners.b, corners.c));
+    return depth >= cameraNearDistance(frame.camera, direction) ? depth : -1.0;
 }
 
 #endif

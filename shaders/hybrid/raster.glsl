@@ -35,8 +35,8 @@ void claimPixel(ivec2 pixel, float depth, uint triangle) {
     }
 }
 
-void rasterPixel(Edges edges, ivec2 pixel, uint triangle) {
-    float depth = depthAt(edges, pixel);
+void rasterPixel(Edges edges, Corners corners, ivec2 pixel, uint triangle) {
+    float depth = depthAt(edges, corners, pixel);
     if (depth >= 0.0) {
         claimPixel(pixel, depth, triangle);
     }

@@ -6,10 +6,10 @@ layout(local_size_x = 128) in;
 // Triangles whose footprint has more pixels are for the queue.
 layout(constant_id = 0) const uint kSmallPixels = 32u;
 
-void rasterRectangle(Edges edges, ivec2 first, ivec2 last, uint triangle) {
+void rasterRectangle(Edges edges, Corners corners, ivec2 first, ivec2 last, uint triangle) {
     for (int y = first.y; y <= last.y; ++y) {
         for (int x = first.x; x <= last.x; ++x) {
-            rasterPixel(edges, ivec2(x, y), triangle);
+            rasterPixel(edges, corners, ivec2(x, y), triangle);
         }
     }
 }
@@ -24,7 +24,7 @@ uint reserve(TileQueue queue, uint count, out uint start) {
 }
 
 // Queues the triangle; tiles without room are rasterised here, slowly but right.
-void enqueue(Edges edges, Footprint footprint, uint triangle) {
+void enqueue(Edges edges, Corners corners, Footprint footprint, uint triangle) {
     TileQueue queue = TileQueue(frame.visibility.tileQueue);
     ivec2 tiles = (footprint.last - footprint.first) / kTile + 1;
     uint start;
@@ -34,7 +34,7 @@ void enqueue(Edges edges, Footprint footprint, uint triangle) {
         if (i < granted) {
             queue.at[start + uint(i)] = Tile(triangle, uint(corner.x) | uint(corner.y) << 16);
         } else {
-            rasterRectangle(edges, corner, min(corner + (kTile - 1), footprint.last), triangle);
+            rasterRectangle(edges, corners, corner, min(corner + (kTile - 1), footprint.last), triangle);
         }
     }
 }
@@ -53,8 +53,8 @@ void main() {
     Edges edges = edgesOf(corners);
     ivec2 size = footprint.last - footprint.first + 1;
     if (uint(size.x * size.y) <= kSmallPixels) {
-        rasterRectangle(edges, footprint.first, footprint.last, triangle);
+        rasterRectangle(edges, corners, footprint.first, footprint.last, triangle);
     } else {
-        enqueue(edges, footprint, triangle);
+        enqueue(edges, corners, footprint, triangle);
     }
 }

@@ -10,7 +10,7 @@ void rasterTile(Tile tile) {
     ivec2 first = ivec2(tile.corner & 0xffffu, tile.corner >> 16);
     ivec2 size = min(ivec2(kTile), footprint.last - first + 1);
     for (int i = int(gl_LocalInvocationIndex); i < size.x * size.y; i += int(gl_WorkGroupSize.x)) {
-        rasterPixel(edges, first + ivec2(i % size.x, i / size.x), tile.triangle);
+        rasterPixel(edges, corners, first + ivec2(i % size.x, i / size.x), tile.triangle);
     }
 }
 
