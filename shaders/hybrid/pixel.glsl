@@ -30,23 +30,33 @@ bool primarySurface(uvec2 pixel, Ray ray, out SurfacePoint point) {
     return true;
 }
 #elif defined(HYBRID_VISIBILITY)
-uint visibleTriangle(uvec2 pixel) {
+// The triangle that the visibility pass found; kNoTriangle also where the ray must say, and then `isInDoubt`.
+uint visibleTriangle(uvec2 pixel, out bool isInDoubt) {
     Visibility visibility = frame.visibility;
+    isInDoubt = false;
     if (visibility.image != kNoImage) {
         return textureBindlessFetchU2D(visibility.image, ivec2(pixel), 0).x;
     }
-    return visibility.words.at[pixel.y * frame.camera.width + pixel.x].x;
+    uvec2 word = visibility.words.at[pixel.y * frame.camera.width + pixel.x];
+    isInDoubt = word.x == kAskRay;
+    return word.y == kNoTriangle || isInDoubt ? kNoTriangle : ~word.x;
 }
 
 // The surface of the triangle that the visibility pass found, where the pixel's ray meets it.
 bool primarySurface(uvec2 pixel, Ray ray, out SurfacePoint point) {
-    uint triangle = visibleTriangle(pixel);
-    if (triangle == kNoTriangle) {
+    bool isInDoubt;
+    uint triangle = visibleTriangle(pixel, isInDoubt);
+    Hit hit = Hit(triangle, vec2(0.0));
+    if (isInDoubt) {
+        hit = traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
+    } else if (triangle != kNoTriangle) {
+        hit.barycentrics = barycentricsAlong(frame.scene, triangle, ray.origin, ray.direction);
+    }
+    if (hit.triangle == kNoTriangle) {
         return false;
     }
-    vec2 b = barycentricsAlong(frame.scene, triangle, ray.origin, ray.direction);
-    point = surfaceAt(frame.scene, triangle, b, ray.origin, ray.direction, 0.0, frame.camera.pixelSpread,
-                      frame.surfaceSampler);
+    point = surfaceAt(frame.scene, hit.triangle, hit.barycentrics, ray.origin, ray.direction, 0.0,
+                      frame.camera.pixelSpread, frame.surfaceSampler);
     return true;
 }
 #else

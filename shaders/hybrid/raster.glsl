@@ -3,11 +3,15 @@
 #define HYBRID_RASTER
 
 #include "hybrid/coverage.glsl"
+#include "hybrid/hit.glsl"
 
 // Side of a tile in pixels.
 const int kTile = 32;
 // Most workgroups along one axis that every device takes.
 const uint kMostGroups = 65535u;
+
+// Distances this many floating-point numbers apart are one surface on top of another, to be told apart by the ray.
+const uint kCloseUnits = 4u;
 
 struct Tile {
     uint triangle;
@@ -25,20 +29,30 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) buffer AtomicWords 
     uint64_t at[];
 };
 
-void claimPixel(ivec2 pixel, float depth, uint triangle) {
+// Puts the smaller word into a pixel. Where the two are so close that another tracer's rounding could order them
+// otherwise, the pixel is left to its ray.
+void claimPixel(ivec2 pixel, Crossing crossing, uint triangle) {
     uint index = uint(pixel.y) * frame.camera.width + uint(pixel.x);
-    uint bits = floatBitsToUint(depth);
+    uint bits = floatBitsToUint(crossing.distance);
     // Words only ever get smaller: one that is already nearer, even if read late, saves the atomic operation.
-    if (bits <= frame.visibility.words.at[index].y) {
-        AtomicWords words = AtomicWords(uint64_t(frame.visibility.words));
-        atomicMin(words.at[index], uint64_t(bits) << 32 | uint64_t(triangle));
+    uint seen = frame.visibility.words.at[index].y;
+    if (seen != kNoTriangle && bits > seen + kCloseUnits) {
+        return;
+    }
+    AtomicWords words = AtomicWords(uint64_t(frame.visibility.words));
+    uint64_t mine = uint64_t(bits) << 32 | uint64_t(crossing.isDoubtful ? kAskRay : ~triangle);
+    uint old = uint(atomicMin(words.at[index], mine) >> 32);
+    if (old != kNoTriangle && uint(abs(int(old) - int(bits))) <= kCloseUnits) {
+        atomicMin(words.at[index], uint64_t(min(old, bits)) << 32 | uint64_t(kAskRay));
     }
 }
 
 void rasterPixel(Edges edges, Corners corners, ivec2 pixel, uint triangle) {
-    float depth = depthAt(edges, corners, pixel);
-    if (depth >= 0.0) {
-        claimPixel(pixel, depth, triangle);
+    if (isNearby(edges, pixel)) {
+        Crossing crossing = crossingAt(edges, corners, pixel);
+        if (crossing.distance >= 0.0) {
+            claimPixel(pixel, crossing, triangle);
+        }
     }
 }
 

@@ -2,8 +2,9 @@
 #ifndef HYBRID_VISIBILITY_BUFFERS
 #define HYBRID_VISIBILITY_BUFFERS
 
-// A 64-bit word a pixel, row by row: x is the triangle (or kNoTriangle), y the bits of its depth. So the smaller word
-// is the nearer triangle.
+// A 64-bit word a pixel, row by row: x has the bits of the triangle inverted, y those of its distance. So the smaller
+// word is the nearer triangle. Without a triangle both are kNoTriangle; where x is kAskRay, rounding decides what the
+// pixel shows, and so its ray must say.
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer VisibilityWords {
     uvec2 at[];
 };
@@ -24,6 +25,7 @@ struct Visibility {
     uint triangleCount;
 };
 
+const uint kAskRay = 0u;
 const uint kNoImage = 0xffffffffu;
 
 #endif
