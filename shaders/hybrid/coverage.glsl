@@ -7,12 +7,12 @@
 #include "common/ray_triangle.glsl"
 #include "hybrid/footprint.glsl"
 
-// The volume between a ray and an edge is linear in the place in the picture: x + y * right + z * down. Each is named
-// after the corner across, and positive inside where the triangle's side is known.
+// The volumes between a pixel's ray and the edges, named after the corner across: linear in the pixel, and positive
+// inside where the triangle's side is known.
 struct Edges {
-    vec3 a;
-    vec3 b;
-    vec3 c;
+    vec3 volumes; // of the pixel (0, 0), with the slack added
+    vec3 along; // growth for each pixel along x
+    vec3 down; // and along y
     float slack; // how far the volumes may be off
     float doubt; // how far those of a tracer may be off
     bool isSided; // whether the side is known: not for triangles seen edge-on
@@ -27,45 +27,44 @@ float largest(vec3 v) {
     return max(abs(v.x), max(abs(v.y), abs(v.z)));
 }
 
-// x, y and z of the volume of the edge from p to q.
+// The volumes that the camera's axes span with the edge from p to q.
 vec3 edgeVolume(vec3 p, vec3 q) {
     vec3 normal = cross(p + q, q - p);
     return vec3(dot(normal, frame.camera.forward), dot(normal, frame.camera.right), dot(normal, frame.camera.down));
 }
 
 Edges edgesOf(Corners corners) {
-    vec3 along = corners.b - corners.a;
-    vec3 across = corners.c - corners.a;
-    float volume = dot(corners.a, cross(along, across));
-    float side = volume < 0.0 ? -1.0 : 1.0;
+    vec3 first = corners.b - corners.a;
+    vec3 second = corners.c - corners.a;
+    float volume = dot(corners.a, cross(first, second));
     float away = max(largest(corners.a), max(largest(corners.b), largest(corners.c)));
-    float size = max(largest(along), largest(across));
+    float size = max(largest(first), largest(second));
     float view = 1.0 + largest(frame.camera.right) + largest(frame.camera.down);
-    return Edges(side * edgeVolume(corners.b, corners.c), side * edgeVolume(corners.c, corners.a),
-                 side * edgeVolume(corners.a, corners.b), 12.0 * kVolumeSlack * away * size * view,
-                 kDoubt * away * size,                 abs(volume) > kSideSlack * away * size * size);
+    float slack = 12.0 * kVolumeSlack * away * size * view;
+    // Rows: volumes along `forward`, `right` and `down`.
+    mat3 planes = transpose(mat3(edgeVolume(corners.b, corners.c), edgeVolume(corners.c, corners.a),
+                                 edgeVolume(corners.a, corners.b))) * (volume < 0.0 ? -1.0 : 1.0);
+    vec2 pixel = 2.0 / vec2(frame.camera.width, frame.camera.height);
+    vec2 origin = 0.5 * pixel - 1.0;
+    vec3 volumes = planes[0] + planes[1] * origin.x + planes[2] * origin.y + slack;
+    return Edges(volumes, planes[1] * pixel.x, planes[2] * pixel.y, slack, kDoubt * away * size,
+                 abs(volume) > kSideSlack * away * size * size);
 }
 
-vec2 placeOf(vec2 pixel) {
-    return (pixel + 0.5) / vec2(frame.camera.width, frame.camera.height) * 2.0 - 1.0;
-}
-
-vec3 volumesAt(Edges edges, vec2 place) {
-    vec3 p = vec3(1.0, place);
-    return vec3(dot(edges.a, p), dot(edges.b, p), dot(edges.c, p)) + edges.slack;
+vec3 volumesAt(Edges edges, vec2 pixel) {
+    return edges.volumes + edges.along * pixel.x + edges.down * pixel.y;
 }
 
 // Whether no pixel from `first` to `last` is covered; may be false where that is so.
 bool isRectangleOutside(Edges edges, ivec2 first, ivec2 last) {
-    vec2 extent = vec2(last - first) / vec2(frame.camera.width, frame.camera.height);
-    vec3 reach = vec3(dot(abs(edges.a.yz), extent), dot(abs(edges.b.yz), extent), dot(abs(edges.c.yz), extent));
-    vec3 most = volumesAt(edges, placeOf(0.5 * vec2(first + last))) + reach;
+    vec2 reach = 0.5 * vec2(last - first);
+    vec3 most = volumesAt(edges, 0.5 * vec2(first + last)) + abs(edges.along) * reach.x + abs(edges.down) * reach.y;
     return edges.isSided && any(lessThan(most, vec3(0.0)));
 }
 
 // Whether the ray of `pixel` may meet the triangle.
 bool isNearby(Edges edges, ivec2 pixel) {
-    vec3 volumes = volumesAt(edges, placeOf(vec2(pixel)));
+    vec3 volumes = volumesAt(edges, vec2(pixel));
     bool isInside = all(greaterThanEqual(volumes, vec3(0.0)));
     bool isInsideBackwards = all(lessThanEqual(volumes, vec3(2.0 * edges.slack)));
     return isInside || (!edges.isSided && isInsideBackwards);

@@ -164,7 +164,11 @@ fn draw(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
         fragment: Some(*fragment),
         cull: CullMode::None,
         color: &[ColorTarget::from(HardwareRaster::IMAGE)],
-        depth: Some(DepthTest { format: HardwareRaster::DEPTH, compare: CompareOp::GreaterOrEqual, write: true }),
+        depth: Some(DepthTest {
+            format: HardwareRaster::DEPTH,
+            compare: CompareOp::GreaterOrEqual,
+            write: true,
+        }),
         debug_name: "visibility pass",
         ..RenderPipelineDesc::default()
     })
