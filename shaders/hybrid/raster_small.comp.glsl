@@ -23,18 +23,29 @@ uint reserve(TileQueue queue, uint count, out uint start) {
     return granted;
 }
 
-// Queues the triangle; tiles without room are rasterised here, slowly but right.
+// Queues the triangle's tiles; those without room are rasterised here, slowly but right.
 void enqueue(Edges edges, Corners corners, Footprint footprint, uint triangle) {
     TileQueue queue = TileQueue(frame.visibility.tileQueue);
-    ivec2 tiles = (footprint.last - footprint.first) / kTile + 1;
-    uint start;
-    int granted = int(reserve(queue, uint(tiles.x * tiles.y), start));
-    for (int i = 0; i < tiles.x * tiles.y; ++i) {
-        ivec2 corner = footprint.first + kTile * ivec2(i % tiles.x, i / tiles.x);
-        if (i < granted) {
-            queue.at[start + uint(i)] = Tile(triangle, uint(corner.x) | uint(corner.y) << 16);
-        } else {
-            rasterRectangle(edges, corners, corner, min(corner + (kTile - 1), footprint.last), triangle);
+    uint count = 0u;
+    for (int y = footprint.first.y; y <= footprint.last.y; y += kTile) {
+        for (int x = footprint.first.x; x <= footprint.last.x; x += kTile) {
+            count += isRectangleOutside(edges, ivec2(x, y), ivec2(x, y) + (kTile - 1)) ? 0u : 1u;
+        }
+    }
+    uint next;
+    uint granted = reserve(queue, count, next);
+    uint end = next + granted;
+    for (int y = footprint.first.y; y <= footprint.last.y; y += kTile) {
+        for (int x = footprint.first.x; x <= footprint.last.x; x += kTile) {
+            ivec2 first = ivec2(x, y);
+            if (isRectangleOutside(edges, first, first + (kTile - 1))) {
+                continue;
+            }
+            if (next < end) {
+                queue.at[next++] = Tile(triangle, uint(x) | uint(y) << 16);
+            } else {
+                rasterRectangle(edges, corners, first, min(first + (kTile - 1), footprint.last), triangle);
+            }
         }
     }
 }

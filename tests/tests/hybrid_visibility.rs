@@ -119,7 +119,7 @@ fn tuning_and_a_full_queue_do_not_change_the_picture() {
     let plain = config(paths(&ctx)[0], COMPUTE);
     let expected = pictures(&ctx, &scene, &plain, &scene.cameras[..2]);
     for (small_pixels, queue_tiles) in [(0, 1 << 20), (u32::MAX, 1), (0, 0), (8, 1), (8, 7), (64, 40)] {
-        let tuning = RasterTuning { small_pixels, queue_tiles };
+        let tuning = RasterTuning { small_pixels: Some(small_pixels), queue_tiles };
         let found = pictures(&ctx, &scene, &HybridConfig { tuning, ..plain }, &scene.cameras[..2]);
         assert!(found == expected, "{tuning:?} changes the picture");
     }

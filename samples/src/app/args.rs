@@ -154,7 +154,7 @@ pub enum GBuffer {
 /// How to rasterise visible triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Raster {
-    /// Whichever is faster in a few frames at the start.
+    /// By compute, unless hardware is much faster in a few frames at the start.
     Auto,
     /// By compute shaders with 64-bit atomics.
     Compute,

@@ -16,6 +16,10 @@ use crate::shaders::hybrid as texts;
 const GROUP: u32 = 128;
 /// `constant_id` of the pixels of a small triangle (`shaders/hybrid/raster_small.comp.glsl`).
 const SMALL_CONSTANT: u32 = 0;
+/// Pixels of a small triangle on a GPU, where neighbours wait for the thread with the largest one.
+const GPU_SMALL_PIXELS: u32 = 32;
+/// The same on a CPU, where a workgroup for a tile costs more than waiting.
+const CPU_SMALL_PIXELS: u32 = 1 << 16;
 /// Bytes at the start of the queue that each frame sets to 0: the count and the first argument.
 const QUEUE_RESET_BYTES: u64 = 12;
 
@@ -51,7 +55,8 @@ impl ComputeRaster {
         extent: [u32; 2],
         tuning: &RasterTuning,
     ) -> lvk::Result<Self> {
-        let value = SpecializationValue::U32(tuning.small_pixels);
+        let suited = if ctx.capabilities().is_cpu { CPU_SMALL_PIXELS } else { GPU_SMALL_PIXELS };
+        let value = SpecializationValue::U32(tuning.small_pixels.unwrap_or(suited));
         let small_pixels = [SpecializationConstant { id: SMALL_CONSTANT, value }];
         let small = pipeline(ctx, texts::RASTER_SMALL_COMP, &small_pixels, "raster_small.comp")?;
         let tiles = pipeline(ctx, texts::RASTER_TILE_COMP, &[], "raster_tile.comp")?;

@@ -43,8 +43,8 @@ pub enum Raster {
 /// Numbers that change how fast the compute rasteriser is, and nothing else.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RasterTuning {
-    /// Most pixels of the rectangle around a triangle that one thread rasterises.
-    pub small_pixels: u32,
+    /// Most pixels of the rectangle around a triangle that one thread rasterises; `None` for what suits the device.
+    pub small_pixels: Option<u32>,
     /// Tiles of larger triangles that the queue has room for, 8 bytes each; further ones are rasterised by the thread
     /// that found them.
     pub queue_tiles: u32,
@@ -52,7 +52,7 @@ pub struct RasterTuning {
 
 impl Default for RasterTuning {
     fn default() -> Self {
-        Self { small_pixels: 32, queue_tiles: 1 << 20 }
+        Self { small_pixels: None, queue_tiles: 1 << 20 }
     }
 }
 

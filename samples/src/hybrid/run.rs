@@ -202,8 +202,7 @@ fn config(args: &HybridArgs, path: RayPath) -> HybridConfig {
         args::GBuffer::Paper => Geometry::Paper,
         args::GBuffer::Visibility => Geometry::Visibility(raster),
     };
-    let small_pixels = args.small_triangle.unwrap_or(RasterTuning::default().small_pixels);
-    let tuning = RasterTuning { small_pixels, ..RasterTuning::default() };
+    let tuning = RasterTuning { small_pixels: args.small_triangle, ..RasterTuning::default() };
     let (width, height, max_depth) = (args.width, args.height, args.depth);
     HybridConfig { method, path, width, height, max_depth, geometry, tuning }
 }
