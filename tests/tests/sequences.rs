@@ -19,7 +19,8 @@ const SIZE: [u32; 2] = [64, 36];
 fn played(ctx: &Context, frames: &str, folder: &Path) -> Played {
     let scene = still_life();
     let path = paths(ctx)[0];
-    let config = HybridConfig { method: Method::Hybrid, path, width: SIZE[0], height: SIZE[1], max_depth: 2 };
+    let config =
+        HybridConfig { path, width: SIZE[0], height: SIZE[1], max_depth: 2, ..HybridConfig::default() };
     let renderer = HybridRenderer::new(ctx, &scene, &config).unwrap();
     let mut sequence = HybridSequence::new(renderer, &scene, 0, true);
     let job = Job {

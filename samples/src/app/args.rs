@@ -22,6 +22,18 @@ pub struct HybridArgs {
     #[arg(long, value_enum, default_value_t = Method::Hybrid, help_heading = "Rendering")]
     pub method: Method,
 
+    /// What the hybrid method's geometry pass leaves for the rays
+    #[arg(long, value_enum, default_value_t = GBuffer::Visibility, help_heading = "Rendering")]
+    pub gbuffer: GBuffer,
+
+    /// How to rasterise visible triangles
+    #[arg(long, value_enum, default_value_t = Raster::Auto, help_heading = "Rendering")]
+    pub raster: Raster,
+
+    /// Most pixels of a triangle that one thread of the compute rasteriser takes on, for tuning
+    #[arg(long, value_name = "PIXELS", hide = true)]
+    pub small_triangle: Option<u32>,
+
     /// How often a ray may be reflected or refracted before it gives up, 0 to 16; 0 gives shadows only
     #[arg(
         long,
@@ -48,6 +60,27 @@ pub enum Method {
     Standalone,
     /// Rasterise first; rays only for shadows, mirrors and glass.
     Hybrid,
+}
+
+/// What the geometry pass leaves for the rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum GBuffer {
+    /// Position, normals, albedo and triangle, as in the paper.
+    Paper,
+    /// The triangle alone.
+    Visibility,
+}
+
+/// How to rasterise visible triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Raster {
+    /// By compute, unless hardware is much faster in a few frames at the start; in sequences always by compute where the
+    /// device can.
+    Auto,
+    /// By compute shaders with 64-bit atomics.
+    Compute,
+    /// By the device's rasteriser, after culling in compute shaders.
+    Hardware,
 }
 
 /// What the lamp does in a sequence.
@@ -103,6 +136,7 @@ mod tests {
         assert_eq!((run.width, run.height, scene.camera, args.depth), (1280, 720, 1, 4));
         assert_eq!((run.frames.clone(), run.round, run.resume), (None, 240, false));
         assert_eq!((args.method, run.rt, run.validate), (Method::Hybrid, RayTracing::Auto, None));
+        assert_eq!((args.gbuffer, args.raster), (GBuffer::Visibility, Raster::Auto));
         assert_eq!((scene.scene.clone(), args.lamp), (None, Lamp::Still));
         assert_eq!(run.out_or("hybrid"), Path::new("hybrid.png"));
     }

@@ -56,6 +56,15 @@ impl Stamps {
         cmd.write_timestamp(*self.pool, 2 + 2 * band + u32::from(end))
     }
 
+    /// Milliseconds of the geometry pass alone, where no band was stamped; the GPU must be done with it.
+    pub(super) fn read_geometry(&self, ctx: &Context) -> lvk::Result<f64> {
+        let stamps = ctx.timestamps_ms(*self.pool, 0, 2)?;
+        Ok(match stamps[..] {
+            [Some(begin), Some(end)] => end - begin,
+            _ => 0.0,
+        })
+    }
+
     /// What the frame took; the GPU must be done with it.
     pub(super) fn read(&self, ctx: &Context, has_geometry: bool) -> lvk::Result<FrameTimings> {
         let stamps = ctx.timestamps_ms(*self.pool, 0, 2 + 2 * self.band_count)?;

@@ -7,9 +7,10 @@ use lvk::Context;
 
 use super::sequence::HybridSequence;
 use super::texture_fit::{fit_textures, textures_needed};
-use super::{HybridConfig, HybridError, HybridRenderer, Method, RayPath};
+use super::{Geometry, HybridConfig, HybridError, HybridRenderer, Method, Raster, RasterTuning, RayPath};
 use crate::app::args::{self, HybridArgs};
 use crate::app::device::{DeviceNeeds, driver_text};
+use crate::app::frames::Frames;
 use crate::app::run::{self, Opened, Opening};
 use crate::app::run_args::RayTracing;
 use crate::app::run_error::RunError;
@@ -55,9 +56,15 @@ fn open(args: &HybridArgs, opening: &mut Opening<'_>) -> Result<Opened<HybridSeq
     let warnings = fit_textures(&mut scene, &context.capabilities().limits)?;
     opening.warn(&warnings);
     opening.progress.stage("uploading the scene and building acceleration structures", 0);
-    let renderer = HybridRenderer::new(&context, &scene, &config)?;
-    let headline = headline(&context, &scene, &config, &renderer);
+    let mut renderer = HybridRenderer::new(&context, &scene, &config)?;
+    let mut headline = headline(&context, &scene, &config, &renderer);
     let first = (args.scene.camera as usize).clamp(1, 5) - 1;
+    // What a measurement decides could differ between the processes that share a sequence.
+    if !matches!(args.run.frames, Some(Frames::Sequence(_)))
+        && let Some(choice) = renderer.choose_raster(&scene.cameras[first])?
+    {
+        let _ = write!(headline, "\ngeometry  {choice}");
+    }
     let sample = HybridSequence::new(renderer, &scene, first, args.lamp == args::Lamp::Circle);
     Ok(Opened { context, sample, headline })
 }
@@ -75,7 +82,18 @@ fn config(args: &HybridArgs, path: RayPath) -> HybridConfig {
         args::Method::Standalone => Method::Standalone,
         args::Method::Hybrid => Method::Hybrid,
     };
-    HybridConfig { method, path, width: args.run.width, height: args.run.height, max_depth: args.depth }
+    let raster = match args.raster {
+        args::Raster::Auto => None,
+        args::Raster::Compute => Some(Raster::Compute),
+        args::Raster::Hardware => Some(Raster::Hardware),
+    };
+    let geometry = match args.gbuffer {
+        args::GBuffer::Paper => Geometry::Paper,
+        args::GBuffer::Visibility => Geometry::Visibility(raster),
+    };
+    let tuning = RasterTuning { small_pixels: args.small_triangle, ..RasterTuning::default() };
+    let (width, height, max_depth) = (args.run.width, args.run.height, args.depth);
+    HybridConfig { method, path, width, height, max_depth, geometry, tuning }
 }
 
 fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &HybridRenderer) -> String {
@@ -83,7 +101,10 @@ fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &Hybr
     let refractive = scene.triangles.len() - scene.opaque_triangle_count as usize;
     let method = match config.method {
         Method::Standalone => "stand-alone ray tracing",
-        Method::Hybrid => "hybrid: geometry pass, then rays",
+        Method::Hybrid => match config.geometry {
+            Geometry::Paper => "hybrid: the paper's G-buffer, then rays",
+            Geometry::Visibility(_) => "hybrid: visible triangles, then rays",
+        },
     };
     let path = match config.path {
         RayPath::Pipeline => "ray tracing pipeline",

@@ -147,10 +147,12 @@ impl<'a> Pair<'a> {
     fn new(ctx: &Context, scene: &Scene, plan: &'a Plan, path: RayPath) -> Result<Self, PaperError> {
         let [width, height] = plan.size;
         let renderer = |method| {
-            let config = HybridConfig { method, path, width, height, max_depth: plan.max_depth };
+            let max_depth = plan.max_depth;
+            let config = HybridConfig { method, path, width, height, max_depth, ..HybridConfig::default() };
             HybridRenderer::new(ctx, scene, &config)
         };
-        let (standalone, hybrid) = (renderer(Method::Standalone)?, renderer(Method::Hybrid)?);
+        let (standalone, mut hybrid) = (renderer(Method::Standalone)?, renderer(Method::Hybrid)?);
+        hybrid.choose_raster(&scene.cameras[0])?;
         Ok(Self { plan, path, standalone, hybrid, done: 0 })
     }
 
