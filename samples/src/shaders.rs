@@ -8,16 +8,22 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("common/octahedral.glsl", include_str!("../../shaders/common/octahedral.glsl")),
     ("common/phong.glsl", include_str!("../../shaders/common/phong.glsl")),
     ("common/ray_offset.glsl", include_str!("../../shaders/common/ray_offset.glsl")),
+    ("common/ray_triangle.glsl", include_str!("../../shaders/common/ray_triangle.glsl")),
     ("common/scene_buffers.glsl", include_str!("../../shaders/common/scene_buffers.glsl")),
     ("common/surface.glsl", include_str!("../../shaders/common/surface.glsl")),
     ("common/texture_lod.glsl", include_str!("../../shaders/common/texture_lod.glsl")),
     ("common/tonemap.glsl", include_str!("../../shaders/common/tonemap.glsl")),
+    ("hybrid/coverage.glsl", include_str!("../../shaders/hybrid/coverage.glsl")),
+    ("hybrid/footprint.glsl", include_str!("../../shaders/hybrid/footprint.glsl")),
     ("hybrid/frame.glsl", include_str!("../../shaders/hybrid/frame.glsl")),
     ("hybrid/hit.glsl", include_str!("../../shaders/hybrid/hit.glsl")),
     ("hybrid/integrator.glsl", include_str!("../../shaders/hybrid/integrator.glsl")),
     ("hybrid/pixel.glsl", include_str!("../../shaders/hybrid/pixel.glsl")),
+    ("hybrid/raster.glsl", include_str!("../../shaders/hybrid/raster.glsl")),
+    ("hybrid/survivors.glsl", include_str!("../../shaders/hybrid/survivors.glsl")),
     ("hybrid/trace_pipeline.glsl", include_str!("../../shaders/hybrid/trace_pipeline.glsl")),
     ("hybrid/trace_query.glsl", include_str!("../../shaders/hybrid/trace_query.glsl")),
+    ("hybrid/visibility.glsl", include_str!("../../shaders/hybrid/visibility.glsl")),
 ];
 
 /// Stages of the `bench` program.
@@ -42,8 +48,22 @@ pub mod bench {
 
 /// Stages of the `hybrid` sample.
 pub mod hybrid {
-    /// Macros of the ray stages that start from the G-buffer of the geometry pass.
+    /// Macros of the ray stages that start from the paper's G-buffer.
     pub const WITH_GBUFFER: &[(&str, &str)] = &[("HYBRID_GBUFFER", "1")];
+    /// Macros of the ray stages that start from the visible triangles.
+    pub const WITH_VISIBILITY: &[(&str, &str)] = &[("HYBRID_VISIBILITY", "1")];
+    /// `kNoImage` in `shaders/hybrid/visibility.glsl`.
+    pub const NO_IMAGE: u32 = u32::MAX;
+    /// Small triangles of the compute rasteriser.
+    pub const RASTER_SMALL_COMP: &str = include_str!("../../shaders/hybrid/raster_small.comp.glsl");
+    /// Tiles of the compute rasteriser's large triangles.
+    pub const RASTER_TILE_COMP: &str = include_str!("../../shaders/hybrid/raster_tile.comp.glsl");
+    /// Culling for the hardware rasteriser.
+    pub const CULL_COMP: &str = include_str!("../../shaders/hybrid/cull.comp.glsl");
+    /// Closing the gaps that culling leaves.
+    pub const COMPACT_COMP: &str = include_str!("../../shaders/hybrid/compact.comp.glsl");
+    /// Fragment stage of the hardware rasteriser's visibility.
+    pub const VISIBILITY_FRAG: &str = include_str!("../../shaders/hybrid/visibility.frag.glsl");
     /// Vertex stage of the geometry pass.
     pub const GEOMETRY_VERT: &str = include_str!("../../shaders/hybrid/geometry.vert.glsl");
     /// Fragment stage of the geometry pass.

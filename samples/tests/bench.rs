@@ -113,6 +113,18 @@ fn a_frame_is_timed_by_both_hands_and_shows_the_same_picture() {
 }
 
 #[test]
+fn the_papers_experiment_writes_its_report() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("made/report");
+    let size = ["--width", "32", "--height", "18", "--frames", "2", "--depth", "1"];
+    let table = table(&[&["paper", "--quick", "--out", out.to_str().unwrap()], &size[..]].concat());
+    assert!(table.contains("| courtyard, "), "{table}");
+    let page = std::fs::read_to_string(out.join("report.md")).unwrap();
+    assert!(page.contains("--width 32") && page.contains("a rehearsal"), "{page}");
+    assert!(!page.contains(folder.path().to_str().unwrap()), "folders are everybody's own");
+}
+
+#[test]
 fn what_a_device_lacks_is_said_and_no_failure() {
     let without_query = table(&["order", "--quick", "--profile", "no-ray-query"]);
     assert!(without_query.contains("ray queries not measured"), "{without_query}");

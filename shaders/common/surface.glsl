@@ -2,6 +2,7 @@
 #ifndef COMMON_SURFACE
 #define COMMON_SURFACE
 
+#include "common/ray_triangle.glsl"
 #include "common/scene_buffers.glsl"
 #include "common/texture_lod.glsl"
 
@@ -14,17 +15,17 @@ struct SurfacePoint {
     uint triangle;
 };
 
-// Where a pixel's ray meets the plane of a triangle that covers it. The result is pulled into the triangle: a
-// rasteriser also covers pixels whose centre misses it by a rounding error.
-vec2 barycentricsAlong(vec3 origin, vec3 direction, vec3 p0, vec3 edge1, vec3 edge2) {
-    vec3 p = cross(direction, edge2);
-    float determinant = dot(edge1, p);
-    if (determinant == 0.0) {
+// Where a ray meets a triangle that is known to be in its way. The result is pulled into the triangle: a rasteriser
+// also covers pixels whose centre misses it by a rounding error.
+vec2 barycentricsAlong(Scene scene, uint triangle, vec3 origin, vec3 direction) {
+    uvec3 corner = scene.triangles.at[triangle];
+    vec3 volumes = passageOf(direction, scene.positions.at[corner.x] - origin, scene.positions.at[corner.y] - origin,
+                             scene.positions.at[corner.z] - origin).volumes;
+    float sum = volumes.x + volumes.y + volumes.z;
+    if (sum == 0.0) {
         return vec2(1.0 / 3.0);
     }
-    vec3 toOrigin = origin - p0;
-    vec2 b = vec2(dot(toOrigin, p), dot(direction, cross(toOrigin, edge1))) / determinant;
-    b = clamp(b, vec2(0.0), vec2(1.0));
+    vec2 b = clamp(volumes.yz / sum, vec2(0.0), vec2(1.0));
     return b / max(b.x + b.y, 1.0);
 }
 

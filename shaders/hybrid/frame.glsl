@@ -4,6 +4,7 @@
 
 #include "common/camera.glsl"
 #include "common/scene_buffers.glsl"
+#include "hybrid/visibility.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;
@@ -21,6 +22,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint gbufferPosition;
     uint gbufferSurface;
     uint gbufferAlbedo;
+    Visibility visibility;
 };
 
 layout(push_constant, scalar) uniform PushConstants {

@@ -12,11 +12,7 @@ void main() {
     uint triangle = uint(gl_PrimitiveID);
     vec3 eye = frame.camera.eye;
     vec3 direction = cameraDirection(frame.camera, uvec2(gl_FragCoord.xy));
-    uvec3 corner = frame.scene.triangles.at[triangle];
-    vec3 p0 = frame.scene.positions.at[corner.x];
-    vec3 edge1 = frame.scene.positions.at[corner.y] - p0;
-    vec3 edge2 = frame.scene.positions.at[corner.z] - p0;
-    vec2 b = barycentricsAlong(eye, direction, p0, edge1, edge2);
+    vec2 b = barycentricsAlong(frame.scene, triangle, eye, direction);
     SurfacePoint point = surfaceAt(frame.scene, triangle, b, eye, direction, 0.0, frame.camera.pixelSpread,
                                    frame.surfaceSampler);
     outPosition = vec4(point.position, point.distance);

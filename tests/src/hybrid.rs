@@ -24,9 +24,18 @@ impl Studio {
         size: [u32; 2],
         max_depth: u32,
     ) -> Self {
-        let config = HybridConfig { method, path, width: size[0], height: size[1], max_depth };
-        let renderer = HybridRenderer::new(ctx, scene, &config).expect("the sample can be set up");
-        Self { renderer, size }
+        let [width, height] = size;
+        let config = HybridConfig { method, path, width, height, max_depth, ..HybridConfig::default() };
+        Self::with(ctx, scene, &config)
+    }
+
+    /// A studio for pictures as `config` has them.
+    ///
+    /// # Panics
+    /// When the sample refuses.
+    pub fn with(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Self {
+        let renderer = HybridRenderer::new(ctx, scene, config).expect("the sample can be set up");
+        Self { renderer, size: [config.width, config.height] }
     }
 
     /// Takes a picture.

@@ -143,6 +143,7 @@ fn a_device_with_one_path_renders_by_it_and_names_the_other() {
             width: SIZE[0],
             height: SIZE[1],
             max_depth: 1,
+            ..HybridConfig::default()
         };
         let refused = HybridRenderer::new(&ctx, &scene, &config).err();
         assert!(matches!(refused, Some(HybridError::PathMissing { .. })), "{refused:?}");

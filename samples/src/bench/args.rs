@@ -6,6 +6,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{Args, Parser, Subcommand};
 use lvk::DeviceProfile;
 
+use super::paper::PaperArgs;
+
 /// Measures what lvk costs and gains on this device, and prints tables in markdown.
 ///
 /// Sizes that are not given suit the device: real ones on a GPU, smaller ones on a driver that runs on the CPU.
@@ -57,6 +59,8 @@ pub(super) enum Benchmark {
     Order(TraceArgs),
     /// A traced frame by lvk and by hand-written Vulkan
     Overhead(TraceArgs),
+    /// The paper's experiment: stand-alone and hybrid rendering along the paths of five cameras, as a report
+    Paper(PaperArgs),
 }
 
 /// Sizes of [`Benchmark::Batch`].
@@ -133,6 +137,7 @@ Examples:
   bench split --parts 100 --runs 200               parts of the mesh made by formulas
   bench order --scene living_room.obj --camera 3   what the order of triangles does to rays a second
   bench overhead --quick                           does it work at all?
+  bench paper --scenes living_room.obj conference.obj kitchen.obj --out report    the paper's tables and figures
 
 Exit status: 0 when everything was measured, 1 for trouble with the device, 2 for wrong arguments or input.";
 
@@ -172,6 +177,9 @@ mod tests {
             "order --scene a.obj --triangles 1000",
             "overhead --width 0",
             "batch --runs 0",
+            "paper --frames 0",
+            "paper --scenes",
+            "paper --depth 17",
         ] {
             assert_eq!(parsed(line).unwrap_err().exit_code(), 2, "{line}");
         }

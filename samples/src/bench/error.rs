@@ -2,6 +2,7 @@
 
 use lvk::ash::vk;
 
+use super::paper::PaperError;
 use crate::driver::DriverError;
 use crate::scene::SceneError;
 
@@ -14,6 +15,8 @@ pub(super) enum BenchError {
     Driver(#[from] DriverError),
     #[error(transparent)]
     Device(#[from] lvk::Error),
+    #[error(transparent)]
+    Paper(#[from] PaperError),
     #[error("{call} failed in the hand-written code: {result}")]
     HandWritten { call: &'static str, result: vk::Result },
     #[error("{device} can trace rays neither by pipeline nor by query; choose another one with --device")]
@@ -35,6 +38,7 @@ impl BenchError {
     /// 2 when the user can mend it by other arguments or input, 1 for trouble with the device.
     pub(super) fn status(&self) -> u8 {
         match self {
+            Self::Paper(error) if error.is_input() => 2,
             Self::Scene(_) | Self::Driver(DriverError::Variable { .. }) => 2,
             _ => 1,
         }

@@ -15,6 +15,7 @@ mod mesh;
 mod morton;
 mod order;
 mod overhead;
+pub mod paper;
 mod pipelines;
 mod run;
 mod setup;

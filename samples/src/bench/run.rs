@@ -7,7 +7,7 @@ use super::args::{BenchArgs, Benchmark};
 use super::error::BenchError;
 use super::setup::Setup;
 use super::table::Table;
-use super::{batch, compaction, order, overhead, split, tlas};
+use super::{batch, compaction, order, overhead, paper, split, tlas};
 
 /// Does what the command line says. Prints a table to standard output, errors in one line to standard error; the
 /// status is 0 when everything was measured, 1 for trouble with the device, 2 for wrong input.
@@ -34,6 +34,7 @@ fn measured(args: &BenchArgs) -> Result<Table, BenchError> {
         Benchmark::Tlas(args) => tlas::measure(&setup, args),
         Benchmark::Order(args) => order::measure(&setup, args),
         Benchmark::Overhead(args) => overhead::measure(&setup, args),
+        Benchmark::Paper(args) => paper::run(&setup, args),
     }?;
     let messages = setup.validation_messages();
     if messages.is_empty() { Ok(table) } else { Err(BenchError::Validation(messages)) }

@@ -48,20 +48,26 @@ impl Setup {
 
     /// The same with this budget for scratch memory.
     pub(super) fn open_with(&self, scratch_budget_bytes: u64) -> Result<Context, BenchError> {
-        self.open_profile(scratch_budget_bytes, &self.profile)
+        self.open_profile(scratch_budget_bytes, &self.profile, 0)
+    }
+
+    /// The device with room for so many textures at least.
+    pub(super) fn open_for_textures(&self, textures: u32) -> Result<Context, BenchError> {
+        self.open_profile(ContextDesc::default().scratch_budget_bytes, &self.profile, textures)
     }
 
     /// The same with at most so many primitives in a structure.
     pub(super) fn open_limited(&self, max_blas_primitives: u64) -> Result<Context, BenchError> {
         let max_blas_primitives = max_blas_primitives.min(self.profile.max_blas_primitives);
         let profile = DeviceProfile { max_blas_primitives, ..self.profile.clone() };
-        self.open_profile(ContextDesc::default().scratch_budget_bytes, &profile)
+        self.open_profile(ContextDesc::default().scratch_budget_bytes, &profile, 0)
     }
 
     fn open_profile(
         &self,
         scratch_budget_bytes: u64,
         profile: &DeviceProfile,
+        textures: u32,
     ) -> Result<Context, BenchError> {
         Ok(Context::new(&ContextDesc {
             application_name: "bench",
@@ -70,6 +76,7 @@ impl Setup {
             scratch_budget_bytes,
             validation: if self.sink.is_some() { Validation::Standard } else { Validation::Off },
             validation_sink: self.sink.clone(),
+            max_textures: textures.max(ContextDesc::default().max_textures),
             profile: Some(profile).filter(|profile| **profile != DeviceProfile::default()),
             ..ContextDesc::default()
         })?)
@@ -100,13 +107,17 @@ impl Setup {
         [args.width.unwrap_or(width), args.height.unwrap_or(height)]
     }
 
+    /// Whether figures mean little, because sizes are tiny or the validation layer is at work.
+    pub(super) fn is_rehearsal(&self) -> bool {
+        self.quick || self.sink.is_some()
+    }
+
     /// The title of a table about `what`.
     pub(super) fn headline(&self, ctx: &Context, what: &str) -> String {
         let caps = ctx.capabilities();
         let (major, minor, patch) = caps.api_version;
         let driver = format!("{} {}", caps.driver_name, caps.driver_info);
-        let is_rehearsal = self.quick || self.sink.is_some();
-        let quick = if is_rehearsal { " (a rehearsal: the figures mean little)" } else { "" };
+        let quick = if self.is_rehearsal() { " (a rehearsal: the figures mean little)" } else { "" };
         let profile = caps.profile.as_ref().map_or_else(String::new, |name| format!(", as {name}"));
         let driver = driver.trim_end();
         format!("## {what}{quick}\n\n{}{profile}; {driver}, Vulkan {major}.{minor}.{patch}", caps.device_name)

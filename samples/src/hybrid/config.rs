@@ -15,6 +15,47 @@ pub enum Method {
     Hybrid,
 }
 
+/// What the hybrid method's geometry pass leaves for the ray pass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Geometry {
+    /// Position, normals, albedo and triangle of each pixel, as in the paper.
+    Paper,
+    /// The triangle of each pixel, by some rasteriser; `None` takes compute where the device can, and can be chosen
+    /// anew by [`HybridRenderer::choose_raster`](super::HybridRenderer::choose_raster).
+    Visibility(Option<Raster>),
+}
+
+impl Default for Geometry {
+    fn default() -> Self {
+        Self::Visibility(None)
+    }
+}
+
+/// By which rasteriser visible triangles are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Raster {
+    /// Compute shaders with 64-bit atomics (`shaderBufferInt64Atomics`).
+    Compute,
+    /// The device's own, after culling in compute shaders.
+    Hardware,
+}
+
+/// Numbers that change how fast the compute rasteriser is, and nothing else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RasterTuning {
+    /// Most pixels of the rectangle around a triangle that one thread rasterises; `None` for what suits the device.
+    pub small_pixels: Option<u32>,
+    /// Tiles of larger triangles that the queue has room for, 8 bytes each; further ones are rasterised by the thread
+    /// that found them.
+    pub queue_tiles: u32,
+}
+
+impl Default for RasterTuning {
+    fn default() -> Self {
+        Self { small_pixels: None, queue_tiles: 1 << 20 }
+    }
+}
+
 /// By which part of Vulkan rays are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RayPath {
@@ -37,6 +78,25 @@ pub struct HybridConfig {
     pub height: u32,
     /// How often a ray may be reflected or refracted, 0 to [`HybridConfig::MAX_DEPTH`].
     pub max_depth: u32,
+    /// What the geometry pass leaves; nothing where the method has none.
+    pub geometry: Geometry,
+    /// Numbers of the compute rasteriser.
+    pub tuning: RasterTuning,
+}
+
+impl Default for HybridConfig {
+    /// The hybrid method by the ray tracing pipeline, 1280 x 720 pixels, depth 4.
+    fn default() -> Self {
+        Self {
+            method: Method::Hybrid,
+            path: RayPath::Pipeline,
+            width: 1280,
+            height: 720,
+            max_depth: 4,
+            geometry: Geometry::default(),
+            tuning: RasterTuning::default(),
+        }
+    }
 }
 
 impl HybridConfig {
@@ -53,7 +113,9 @@ impl HybridConfig {
         if self.max_depth > Self::MAX_DEPTH {
             return Err(HybridError::TooDeep { depth: self.max_depth, limit: Self::MAX_DEPTH });
         }
-        if self.method == Method::Hybrid && !capabilities.primitive_id {
+        let numbers_fragments =
+            matches!(self.geometry, Geometry::Paper | Geometry::Visibility(Some(Raster::Hardware)));
+        if self.method == Method::Hybrid && numbers_fragments && !capabilities.primitive_id {
             return Err(HybridError::NoPrimitiveId { device: capabilities.device_name.clone() });
         }
         self.path.check(capabilities)
@@ -114,7 +176,7 @@ mod tests {
     }
 
     fn config() -> HybridConfig {
-        HybridConfig { method: Method::Hybrid, path: RayPath::Query, width: 64, height: 64, max_depth: 4 }
+        HybridConfig { path: RayPath::Query, width: 64, height: 64, ..HybridConfig::default() }
     }
 
     #[test]
@@ -157,10 +219,14 @@ mod tests {
     }
 
     #[test]
-    fn only_the_hybrid_method_needs_triangle_numbers() {
+    fn only_the_hardware_rasteriser_needs_triangle_numbers() {
         let mut capabilities = device(true, true);
         capabilities.primitive_id = false;
-        assert!(matches!(config().check(&capabilities), Err(HybridError::NoPrimitiveId { .. })));
-        assert!(HybridConfig { method: Method::Standalone, ..config() }.check(&capabilities).is_ok());
+        for geometry in [Geometry::Paper, Geometry::Visibility(Some(Raster::Hardware))] {
+            let config = HybridConfig { geometry, ..config() };
+            assert!(matches!(config.check(&capabilities), Err(HybridError::NoPrimitiveId { .. })));
+            assert!(HybridConfig { method: Method::Standalone, ..config }.check(&capabilities).is_ok());
+        }
+        assert!(config().check(&capabilities).is_ok());
     }
 }

@@ -27,8 +27,10 @@ pub enum HybridError {
         /// The value of `--rt` that works.
         instead: &'static str,
     },
-    /// The geometry pass needs triangle numbers in fragment shaders.
-    #[error("{device} cannot number triangles in fragment shaders (geometryShader); use --method standalone")]
+    /// The hardware rasteriser needs triangle numbers in fragment shaders.
+    #[error(
+        "{device} cannot number triangles in fragment shaders (geometryShader); use --raster compute or --method standalone"
+    )]
     NoPrimitiveId {
         /// Name of the device.
         device: String,

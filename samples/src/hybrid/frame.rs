@@ -98,6 +98,11 @@ impl Lighting {
             offset_extent: offset_extent(scene),
         }
     }
+
+    /// Puts the lamp somewhere else.
+    pub(super) fn move_lamp(&mut self, position: [f32; 3]) {
+        self.lights[0].position = position;
+    }
 }
 
 /// Bindless indices (the tail of `Frame` in `shaders/hybrid/frame.glsl`).
@@ -114,6 +119,21 @@ pub(super) struct Indices {
     pub(super) gbuffer_albedo: u32,
 }
 
+/// Addresses and indices of the visibility pass (`Visibility` in `shaders/hybrid/visibility.glsl`).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct VisibilityPlaces {
+    pub(super) words: u64,
+    pub(super) tile_queue: u64,
+    pub(super) survivor_bits: u64,
+    pub(super) survivor_counts: u64,
+    pub(super) survivor_indices: u64,
+    pub(super) survivors: u64,
+    pub(super) draw: u64,
+    pub(super) image: u32,
+    pub(super) triangle_count: u32,
+}
+
 /// The whole block (`Frame` in `shaders/hybrid/frame.glsl`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -122,6 +142,7 @@ pub(super) struct FrameConstants {
     pub(super) scene: SceneAddresses,
     pub(super) lighting: Lighting,
     pub(super) indices: Indices,
+    pub(super) visibility: VisibilityPlaces,
 }
 
 /// The push constants: where the block is, and which rows of the image to render.
@@ -185,6 +206,8 @@ mod tests {
         assert_eq!(size_of::<GpuCamera>(), 96);
         assert_eq!(std::mem::offset_of!(FrameConstants, lighting), 144);
         assert_eq!(std::mem::offset_of!(FrameConstants, indices), 240);
+        assert_eq!(std::mem::offset_of!(FrameConstants, visibility), 272);
+        assert_eq!(size_of::<VisibilityPlaces>(), 64);
         assert_eq!(size_of::<Push>(), 16);
     }
 }

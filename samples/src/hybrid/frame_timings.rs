@@ -2,7 +2,7 @@
 
 use lvk::{CommandBuffer, Context, Holder, QueryPoolDesc, QueryPoolHandle};
 
-use crate::app::timings::Timings;
+use crate::app::sample::PassTimes;
 
 /// GPU milliseconds of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -21,12 +21,11 @@ impl FrameTimings {
         self.geometry_ms + self.rays_ms
     }
 
-    /// Adds the frame to a table.
-    pub fn add_to(&self, timings: &mut Timings, frame: u64) {
-        if self.has_geometry {
-            timings.push(frame, "geometry pass", self.geometry_ms);
-        }
-        timings.push(frame, "ray pass", self.rays_ms);
+    /// The passes by name.
+    #[must_use]
+    pub fn passes(&self) -> PassTimes {
+        let geometry = self.has_geometry.then_some(("geometry pass", self.geometry_ms));
+        geometry.into_iter().chain([("ray pass", self.rays_ms)]).collect()
     }
 }
 
@@ -55,6 +54,15 @@ impl Stamps {
     /// Stamps the beginning (`end` false) or the end of a band.
     pub(super) fn band(&self, cmd: &mut CommandBuffer, band: u32, end: bool) -> lvk::Result<()> {
         cmd.write_timestamp(*self.pool, 2 + 2 * band + u32::from(end))
+    }
+
+    /// Milliseconds of the geometry pass alone, where no band was stamped; the GPU must be done with it.
+    pub(super) fn read_geometry(&self, ctx: &Context) -> lvk::Result<f64> {
+        let stamps = ctx.timestamps_ms(*self.pool, 0, 2)?;
+        Ok(match stamps[..] {
+            [Some(begin), Some(end)] => end - begin,
+            _ => 0.0,
+        })
     }
 
     /// What the frame took; the GPU must be done with it.

@@ -1,5 +1,5 @@
-//! The geometry pass of the hybrid method: every triangle once through the rasteriser into a G-buffer
-//! (algorithms 4 and 5 of the paper).
+//! The geometry pass as the paper has it: every triangle once through the rasteriser into a G-buffer (algorithms 4
+//! and 5). It is the reference that the visibility pass is measured against.
 
 use lvk::{
     BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoad, ColorTarget, CommandBuffer, CompareOp,
@@ -13,7 +13,7 @@ use super::shader_module::module;
 use crate::shaders::hybrid as texts;
 
 /// Triangle number of pixels that show the sky (`kNoTriangle` in `shaders/hybrid/hit.glsl`).
-const NO_TRIANGLE: u32 = u32::MAX;
+pub(super) const NO_TRIANGLE: u32 = u32::MAX;
 
 /// What the geometry pass leaves for the ray pass, a texel a pixel.
 pub(super) struct GBuffer {

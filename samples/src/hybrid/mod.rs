@@ -2,12 +2,13 @@
 //! for Vulkan-Based Ray Tracing Implementations" by Kim and Baek.
 //!
 //! Two methods give the same picture: [`Method::Standalone`] traces every pixel's ray, [`Method::Hybrid`] finds
-//! what a pixel shows with the rasteriser and traces from there. Both run by a ray tracing pipeline and by ray
-//! queries ([`RayPath`]), from one text of shading code (`shaders/hybrid/integrator.glsl`).
+//! what a pixel shows with a rasteriser and traces from there ([`Geometry`] says how). Both run by a ray tracing
+//! pipeline and by ray queries ([`RayPath`]), from one text of shading code (`shaders/hybrid/integrator.glsl`).
 //!
 //! [`HybridRenderer`] is the sample for programs and tests, [`run`] the one for the command line.
 
 mod bands;
+mod compute_raster;
 mod config;
 mod error;
 mod frame;
@@ -15,18 +16,25 @@ mod frame_timings;
 mod geometry_pass;
 mod gpu_scene;
 mod half_float;
+mod hardware_raster;
 mod pipelines;
+mod raster_choice;
 mod ray_pass;
 mod renderer;
 mod run;
 mod scene_check;
+mod sequence;
 mod shader_module;
 mod texture_density;
 mod texture_fit;
+mod visibility_pass;
 
-pub use config::{HybridConfig, Method, RayPath};
+pub use config::{Geometry, HybridConfig, Method, Raster, RasterTuning, RayPath};
 pub use error::HybridError;
 pub use frame_timings::FrameTimings;
 pub use pipelines::pipelines;
+pub use raster_choice::RasterChoice;
 pub use renderer::HybridRenderer;
 pub use run::run;
+pub use sequence::HybridSequence;
+pub use texture_fit::{fit_textures, textures_needed};

@@ -3,6 +3,7 @@
 use lvk::ShaderStage;
 
 use super::geometry_pass::GBuffer;
+use super::hardware_raster::HardwareRaster;
 use crate::pipelines::{SamplePipeline, SampleStage};
 use crate::shaders::hybrid as texts;
 
@@ -13,16 +14,23 @@ type Defines = &'static [(&'static str, &'static str)];
 pub fn pipelines() -> Vec<SamplePipeline> {
     vec![
         geometry(),
-        tracing("hybrid: rays by pipeline", texts::WITH_GBUFFER),
+        visibility(),
+        compute("hybrid: small triangles", texts::RASTER_SMALL_COMP, &[], "raster_small.comp"),
+        compute("hybrid: tiles of large triangles", texts::RASTER_TILE_COMP, &[], "raster_tile.comp"),
+        compute("hybrid: culling", texts::CULL_COMP, &[], "cull.comp"),
+        compute("hybrid: survivors of culling", texts::COMPACT_COMP, &[], "compact.comp"),
+        tracing("hybrid: rays by pipeline", texts::WITH_VISIBILITY),
+        tracing("hybrid: rays from the paper's G-buffer by pipeline", texts::WITH_GBUFFER),
         tracing("stand-alone: rays by pipeline", &[]),
-        compute("hybrid: rays by query", texts::WITH_GBUFFER),
-        compute("stand-alone: rays by query", &[]),
+        rays("hybrid: rays by query", texts::WITH_VISIBILITY),
+        rays("hybrid: rays from the paper's G-buffer by query", texts::WITH_GBUFFER),
+        rays("stand-alone: rays by query", &[]),
     ]
 }
 
 fn geometry() -> SamplePipeline {
     SamplePipeline {
-        name: "hybrid: geometry pass",
+        name: "hybrid: the paper's geometry pass",
         stages: vec![
             stage(ShaderStage::Vertex, texts::GEOMETRY_VERT, &[], "geometry.vert"),
             stage(ShaderStage::Fragment, texts::GEOMETRY_FRAG, &[], "geometry.frag"),
@@ -42,8 +50,24 @@ fn tracing(name: &'static str, defines: Defines) -> SamplePipeline {
     SamplePipeline { name, stages, color: Vec::new(), depth: None }
 }
 
-fn compute(name: &'static str, defines: Defines) -> SamplePipeline {
-    let stages = vec![stage(ShaderStage::Compute, texts::RENDER_COMP, defines, "render.comp")];
+fn visibility() -> SamplePipeline {
+    SamplePipeline {
+        name: "hybrid: visibility by hardware",
+        stages: vec![
+            stage(ShaderStage::Vertex, texts::GEOMETRY_VERT, &[], "geometry.vert"),
+            stage(ShaderStage::Fragment, texts::VISIBILITY_FRAG, &[], "visibility.frag"),
+        ],
+        color: vec![HardwareRaster::IMAGE],
+        depth: Some(HardwareRaster::DEPTH),
+    }
+}
+
+fn rays(name: &'static str, defines: Defines) -> SamplePipeline {
+    compute(name, texts::RENDER_COMP, defines, "render.comp")
+}
+
+fn compute(name: &'static str, text: &'static str, defines: Defines, file: &'static str) -> SamplePipeline {
+    let stages = vec![stage(ShaderStage::Compute, text, defines, file)];
     SamplePipeline { name, stages, color: Vec::new(), depth: None }
 }
 

@@ -2,12 +2,12 @@
 //! compute shader with ray queries.
 
 use lvk::{
-    CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup, Holder,
-    RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderStage, SpecializationConstant,
+    BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup,
+    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderStage, SpecializationConstant,
     SpecializationValue, TextureHandle,
 };
 
-use super::config::{HybridConfig, Method, RayPath};
+use super::config::{Geometry, HybridConfig, Method, RayPath};
 use super::frame::Push;
 use super::shader_module::module;
 use crate::shaders::hybrid as texts;
@@ -20,8 +20,14 @@ const DEPTH_CONSTANT: u32 = 0;
 /// The pass: its pipeline and all it touches.
 pub(super) struct RayPass {
     pipeline: Pipeline,
-    gbuffer: Vec<TextureHandle>,
     output: TextureHandle,
+}
+
+/// What a geometry pass leaves for the ray pass to read.
+#[derive(Debug, Default)]
+pub(super) struct GeometryLeft {
+    pub(super) textures: Vec<TextureHandle>,
+    pub(super) buffers: Vec<BufferHandle>,
 }
 
 enum Pipeline {
@@ -30,16 +36,12 @@ enum Pipeline {
 }
 
 impl RayPass {
-    /// The pass that `config` asks for, from `gbuffer` (empty where the method has none) into `output`.
-    pub(super) fn new(
-        ctx: &Context,
-        config: &HybridConfig,
-        gbuffer: Vec<TextureHandle>,
-        output: TextureHandle,
-    ) -> lvk::Result<Self> {
-        let defines = match config.method {
-            Method::Standalone => &[],
-            Method::Hybrid => texts::WITH_GBUFFER,
+    /// The pass that `config` asks for, into `output`.
+    pub(super) fn new(ctx: &Context, config: &HybridConfig, output: TextureHandle) -> lvk::Result<Self> {
+        let defines = match (config.method, config.geometry) {
+            (Method::Standalone, _) => &[],
+            (Method::Hybrid, Geometry::Paper) => texts::WITH_GBUFFER,
+            (Method::Hybrid, Geometry::Visibility(_)) => texts::WITH_VISIBILITY,
         };
         let value = SpecializationValue::U32(config.max_depth);
         let depth = [SpecializationConstant { id: DEPTH_CONSTANT, value }];
@@ -47,14 +49,21 @@ impl RayPass {
             RayPath::Pipeline => Pipeline::Tracing(tracing_pipeline(ctx, defines, &depth)?),
             RayPath::Query => Pipeline::Compute(compute_pipeline(ctx, defines, &depth)?),
         };
-        Ok(Self { pipeline, gbuffer, output })
+        Ok(Self { pipeline, output })
     }
 
-    /// Records the rows that `push` names, in an image `width` pixels wide.
-    pub(super) fn record(&self, cmd: &mut CommandBuffer, width: u32, push: &Push) -> lvk::Result<()> {
+    /// Records the rows that `push` names, in an image `width` pixels wide, from what the geometry pass left.
+    pub(super) fn record(
+        &self,
+        cmd: &mut CommandBuffer,
+        width: u32,
+        push: &Push,
+        left: &GeometryLeft,
+    ) -> lvk::Result<()> {
         let rows = push.end_row.saturating_sub(push.first_row);
         let dependencies = Dependencies {
-            sampled_images: &self.gbuffer,
+            sampled_images: &left.textures,
+            read_buffers: &left.buffers,
             storage_images: &[self.output],
             ..Dependencies::default()
         };

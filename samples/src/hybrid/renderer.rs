@@ -9,12 +9,14 @@ use lvk::{
 
 use super::HybridError;
 use super::bands::bands;
-use super::config::{HybridConfig, Method};
-use super::frame::{FrameConstants, GpuCamera, Indices, Lighting, Push, near_plane};
+use super::config::{Geometry, HybridConfig, Method, Raster};
+use super::frame::{FrameConstants, GpuCamera, Indices, Lighting, Push, VisibilityPlaces, near_plane};
 use super::frame_timings::{FrameTimings, Stamps};
 use super::geometry_pass::GeometryPass;
 use super::gpu_scene::GpuScene;
-use super::ray_pass::RayPass;
+use super::raster_choice::RasterChoice;
+use super::ray_pass::{GeometryLeft, RayPass};
+use super::visibility_pass::VisibilityPass;
 use crate::scene::{Camera, Scene};
 
 /// Rows that a CPU renders in one go: short enough to show progress, long enough to keep every core busy.
@@ -22,12 +24,22 @@ const CPU_BAND_ROWS: u32 = 48;
 /// Pixels that a GPU renders in one go: so few that no driver takes it for hung.
 const GPU_BAND_PIXELS: u32 = 1 << 23;
 
+/// Geometry passes by each rasteriser that decide which one is taken.
+const MEASURED_FRAMES: u32 = 4;
+
+/// What comes before the ray pass.
+enum GeometryStage {
+    None,
+    Paper(GeometryPass),
+    Visibility(VisibilityPass),
+}
+
 /// Renders a scene by one method and one path of ray tracing.
 pub struct HybridRenderer {
     ctx: Context,
     config: HybridConfig,
     scene: GpuScene,
-    geometry: Option<GeometryPass>,
+    geometry: GeometryStage,
     rays: RayPass,
     stamps: Option<Stamps>,
     output: Holder<TextureHandle>,
@@ -51,17 +63,13 @@ impl HybridRenderer {
         let gpu_scene = GpuScene::new(ctx, scene)?;
         let frame_buffer = frame_buffer(ctx)?;
         let output = output(ctx, extent)?;
-        let geometry = match config.method {
-            Method::Standalone => None,
-            Method::Hybrid => Some(GeometryPass::new(ctx, &gpu_scene, extent)?),
-        };
-        let gbuffer = geometry.iter().flat_map(|pass| pass.targets.textures()).collect();
-        let rays = RayPass::new(ctx, config, gbuffer, *output)?;
+        let geometry = GeometryStage::new(ctx, &gpu_scene, config)?;
+        let rays = RayPass::new(ctx, config, *output)?;
         let bands = bands(config.height, band_rows(config, ctx.capabilities().is_cpu));
         let has_stamps = ctx.capabilities().limits.timestamp_bits > 0;
         let stamps = has_stamps.then(|| Stamps::new(ctx, bands.len() as u32)).transpose()?;
         Ok(Self {
-            indices: indices(&gpu_scene, geometry.as_ref(), output.index()),
+            indices: indices(&gpu_scene, &geometry, output.index()),
             frame_address: ctx.buffer_address(*frame_buffer)?,
             uploaded: None,
             lighting: Lighting::new(scene),
@@ -76,6 +84,11 @@ impl HybridRenderer {
             frame_buffer,
             bands,
         })
+    }
+
+    /// Puts the lamp at `position`, in scene units, from the next frame on.
+    pub fn move_lamp(&mut self, position: [f32; 3]) {
+        self.lighting.move_lamp(position);
     }
 
     /// Renders one frame and waits for it.
@@ -106,8 +119,25 @@ impl HybridRenderer {
             self.ctx.wait(submitted)?;
             after_band(band as u64 + 1);
         }
-        let read = |stamps: &Stamps| stamps.read(&self.ctx, self.geometry.is_some());
+        let has_geometry = !matches!(self.geometry, GeometryStage::None);
+        let read = |stamps: &Stamps| stamps.read(&self.ctx, has_geometry);
         Ok(self.stamps.as_ref().map(read).transpose()?.unwrap_or_default())
+    }
+
+    /// Measures the geometry pass by each rasteriser that there is, where the configuration leaves the choice, and
+    /// takes the faster one from now on. Returns which one is in use and why; `None` where no visibility is rasterised.
+    ///
+    /// # Errors
+    /// [`HybridError::Device`].
+    pub fn choose_raster(&mut self, camera: &Camera) -> Result<Option<RasterChoice>, HybridError> {
+        if let GeometryStage::Visibility(pass) = &self.geometry
+            && pass.has_both()
+        {
+            let compute = self.measure_raster(camera, Raster::Compute)?;
+            let hardware = self.measure_raster(camera, Raster::Hardware)?;
+            self.geometry.choose(RasterChoice::by_time(&compute, &hardware));
+        }
+        Ok(self.geometry.choice())
     }
 
     /// The last frame: red, green, blue and alpha of each pixel, 8 bits each, sRGB, rows from the top.
@@ -145,6 +175,7 @@ impl HybridRenderer {
             scene: self.scene.addresses(),
             lighting: self.lighting,
             indices: self.indices,
+            visibility: self.geometry.places(),
         };
         if self.uploaded != Some(constants) {
             self.ctx.upload_buffer(*self.frame_buffer, 0, bytemuck::bytes_of(&constants))?;
@@ -153,14 +184,28 @@ impl HybridRenderer {
         Ok(())
     }
 
+    /// Milliseconds of some geometry passes by `raster`; none where the device has no timestamps.
+    fn measure_raster(&mut self, camera: &Camera, raster: Raster) -> lvk::Result<Vec<f64>> {
+        self.geometry.choose(RasterChoice { raster, why: String::new() });
+        let mut times = Vec::new();
+        for _ in 0..MEASURED_FRAMES {
+            self.upload_constants(camera)?;
+            let mut cmd = self.ctx.acquire_command_buffer()?;
+            self.begin_frame(&mut cmd)?;
+            let submitted = self.ctx.submit(cmd)?;
+            self.ctx.wait(submitted)?;
+            let Some(stamps) = &self.stamps else { break };
+            times.push(stamps.read_geometry(&self.ctx)?);
+        }
+        Ok(times)
+    }
+
     fn begin_frame(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
         if let Some(stamps) = &self.stamps {
             stamps.reset(cmd)?;
             stamps.geometry(cmd, false)?;
         }
-        if let Some(geometry) = &self.geometry {
-            geometry.record(cmd, &self.push(0..self.config.height))?;
-        }
+        self.geometry.record(cmd, &self.push(0..self.config.height))?;
         self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.geometry(cmd, true))
     }
 
@@ -169,12 +214,65 @@ impl HybridRenderer {
             self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.band(cmd, band as u32, end))
         };
         stamp(cmd, false)?;
-        self.rays.record(cmd, self.config.width, &self.push(self.bands[band].clone()))?;
+        let push = self.push(self.bands[band].clone());
+        self.rays.record(cmd, self.config.width, &push, &self.geometry.left())?;
         stamp(cmd, true)
     }
 
     fn push(&self, rows: Range<u32>) -> Push {
         Push { frame: self.frame_address, first_row: rows.start, end_row: rows.end }
+    }
+}
+
+impl GeometryStage {
+    fn new(ctx: &Context, scene: &GpuScene, config: &HybridConfig) -> lvk::Result<Self> {
+        Ok(match (config.method, config.geometry) {
+            (Method::Standalone, _) => Self::None,
+            (Method::Hybrid, Geometry::Paper) => {
+                Self::Paper(GeometryPass::new(ctx, scene, [config.width, config.height])?)
+            }
+            (Method::Hybrid, Geometry::Visibility(wish)) => {
+                Self::Visibility(VisibilityPass::new(ctx, scene.triangle_count, config, wish)?)
+            }
+        })
+    }
+
+    fn record(&self, cmd: &mut CommandBuffer, push: &Push) -> lvk::Result<()> {
+        match self {
+            Self::None => Ok(()),
+            Self::Paper(pass) => pass.record(cmd, push),
+            Self::Visibility(pass) => pass.record(cmd, push),
+        }
+    }
+
+    fn left(&self) -> GeometryLeft {
+        match self {
+            Self::None => GeometryLeft::default(),
+            Self::Paper(pass) => {
+                GeometryLeft { textures: pass.targets.textures().to_vec(), buffers: Vec::new() }
+            }
+            Self::Visibility(pass) => GeometryLeft { textures: pass.textures(), buffers: pass.buffers() },
+        }
+    }
+
+    fn places(&self) -> VisibilityPlaces {
+        match self {
+            Self::Visibility(pass) => pass.places(),
+            _ => bytemuck::Zeroable::zeroed(),
+        }
+    }
+
+    fn choose(&mut self, choice: RasterChoice) {
+        if let Self::Visibility(pass) = self {
+            pass.choose(choice);
+        }
+    }
+
+    fn choice(&self) -> Option<RasterChoice> {
+        match self {
+            Self::Visibility(pass) => Some(pass.choice()),
+            _ => None,
+        }
     }
 }
 
@@ -197,7 +295,7 @@ fn output(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Holder<TextureHandle>>
     })
 }
 
-fn indices(scene: &GpuScene, geometry: Option<&GeometryPass>, output: u32) -> Indices {
+fn indices(scene: &GpuScene, geometry: &GeometryStage, output: u32) -> Indices {
     let mut indices = Indices {
         tlas: scene.tlas.index(),
         sky: scene.sky.index(),
@@ -206,7 +304,7 @@ fn indices(scene: &GpuScene, geometry: Option<&GeometryPass>, output: u32) -> In
         output,
         ..bytemuck::Zeroable::zeroed()
     };
-    if let Some(pass) = geometry {
+    if let GeometryStage::Paper(pass) = geometry {
         pass.targets.name_in(&mut indices);
     }
     indices

@@ -1,0 +1,90 @@
+//! All numbers as comma-separated values, for other programs.
+
+use std::fmt::Write as _;
+
+use super::super::setup::path_name;
+use super::measured::SceneResult;
+use super::times::{Statistic, Times};
+
+/// The statistics by the names that they have in files.
+const STATISTICS: [(&str, Statistic); 5] = [
+    ("average", Statistic::Average),
+    ("best", Statistic::BEST),
+    ("median", Statistic::MEDIAN),
+    ("p99", Statistic::NEARLY_WORST),
+    ("worst", Statistic::WORST),
+];
+
+/// A line for each scene, path, camera and statistic.
+pub(super) fn times(scenes: &[SceneResult]) -> String {
+    let mut text = "scene,path,camera,statistic,T_ms,t_a_ms,t_b_ms,t_ms,t_over_T\n".to_owned();
+    for scene in scenes {
+        for cell in &scene.cells {
+            for (name, statistic) in STATISTICS {
+                let times = statistic.of(&cell.frames);
+                let (path, camera) = (path_name(cell.path), cell.camera + 1);
+                let numbers = numbers(&times);
+                let _ = writeln!(
+                    text,
+                    "{},{path},{camera},{name},{numbers},{:.5}",
+                    quoted(&scene.name),
+                    times.ratio()
+                );
+            }
+        }
+    }
+    text
+}
+
+/// A line for each frame.
+pub(super) fn frames(scenes: &[SceneResult]) -> String {
+    let mut text = "scene,path,camera,frame,T_ms,t_a_ms,t_b_ms,t_ms\n".to_owned();
+    for scene in scenes {
+        let name = quoted(&scene.name);
+        for cell in &scene.cells {
+            let (path, camera) = (path_name(cell.path), cell.camera + 1);
+            for (frame, times) in cell.frames.iter().enumerate() {
+                let _ = writeln!(text, "{name},{path},{camera},{frame},{}", numbers(times));
+            }
+        }
+    }
+    text
+}
+
+/// A line for each scene, path and camera.
+pub(super) fn likeness(scenes: &[SceneResult]) -> String {
+    let mut text = "scene,path,camera,psnr_db,lowest_psnr_db,ssim,differing_share\n".to_owned();
+    for scene in scenes {
+        for cell in &scene.cells {
+            let alike = &cell.likeness;
+            let (name, path, camera) = (quoted(&scene.name), path_name(cell.path), cell.camera + 1);
+            let _ = writeln!(
+                text,
+                "{name},{path},{camera},{:.4},{:.4},{:.6},{:.8}",
+                alike.psnr, alike.lowest_psnr, alike.ssim, alike.differing_share
+            );
+        }
+    }
+    text
+}
+
+fn numbers(times: &Times) -> String {
+    format!("{:.6},{:.6},{:.6},{:.6}", times.standalone, times.rays, times.geometry, times.hybrid())
+}
+
+/// Names come from files and may hold anything.
+fn quoted(name: &str) -> String {
+    match name.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", name.replace('"', "\"\"")),
+        false => name.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn names_with_commas_stay_one_value() {
+        assert_eq!(super::quoted("a,\"b\""), "\"a,\"\"b\"\"\"");
+        assert_eq!(super::quoted("living_room"), "living_room");
+    }
+}

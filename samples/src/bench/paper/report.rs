@@ -1,0 +1,238 @@
+//! The report as a folder: one page of markdown, numbers for other programs, plots and pictures.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use lvk::Capabilities;
+
+use super::super::setup::path_name;
+use super::error::PaperError;
+use super::measured::{Plan, SceneResult};
+use super::pictures::sheet_name;
+use super::published::{self, TimesTable};
+use super::times::Statistic;
+use super::{csv, goals, plots, tables};
+use crate::app::device::driver_text;
+use crate::hybrid::RayPath;
+
+/// What was measured, on what and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experiment {
+    /// Name of the device.
+    pub device: String,
+    /// Its driver and Vulkan.
+    pub driver: String,
+    /// Day of the measurement, as 2026-02-03, in UTC.
+    pub date: String,
+    /// How to repeat it.
+    pub command: String,
+    /// How much was measured.
+    pub plan: Plan,
+    /// What was found.
+    pub scenes: Vec<SceneResult>,
+    /// What else the reader has to know.
+    pub notes: Vec<String>,
+}
+
+/// Folder of the pictures inside the report's.
+pub const PICTURES: &str = "pictures";
+
+/// The paper's tables of times: what they are of, and which one stands beside. The last two show the first again, beside
+/// other cards.
+const TIMES: [((&str, Statistic), TimesTable); 5] = [
+    (("averages", Statistic::Average), published::AVERAGE),
+    (("best frames", Statistic::BEST), published::BEST),
+    (("worst frames", Statistic::WORST), published::WORST),
+    (("averages", Statistic::Average), published::RTX_2080),
+    (("averages", Statistic::Average), published::RX_6600),
+];
+
+impl Experiment {
+    /// An experiment that nothing was measured of yet.
+    #[must_use]
+    pub fn new(capabilities: &Capabilities, command: String, plan: Plan) -> Self {
+        let profile = capabilities.profile.as_ref().map_or_else(String::new, |name| format!(", as {name}"));
+        Self {
+            device: format!("{}{profile}", capabilities.device_name),
+            driver: driver_text(capabilities),
+            date: super::date::today(),
+            command,
+            plan,
+            scenes: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// Writes the report into `folder`, which is there: `report.md`, `times.csv`, `frames.csv`, `likeness.csv` and
+    /// plots as SVG. Pictures are written while measuring.
+    ///
+    /// # Errors
+    /// [`PaperError::Write`] and [`PaperError::Plot`].
+    pub fn write(&self, folder: &Path) -> Result<(), PaperError> {
+        let mut files = plots::all(&self.scenes, &self.plan.paths)?;
+        files.extend([
+            ("times.csv".to_owned(), csv::times(&self.scenes)),
+            ("frames.csv".to_owned(), csv::frames(&self.scenes)),
+            ("likeness.csv".to_owned(), csv::likeness(&self.scenes)),
+            ("report.md".to_owned(), self.page()),
+        ]);
+        for (name, text) in files {
+            let path = folder.join(name);
+            std::fs::write(&path, text).map_err(PaperError::write(&path))?;
+        }
+        Ok(())
+    }
+
+    /// The page.
+    #[must_use]
+    pub fn page(&self) -> String {
+        let mut page = self.head();
+        let _ = writeln!(page, "{}", goals::table(&self.scenes, &self.plan.paths));
+        page.push_str("![Hybrid over stand-alone](ratio.svg)\n\n## Tables\n\n");
+        let _ = writeln!(page, "{}", tables::geometry(&self.scenes));
+        for &path in &self.plan.paths {
+            self.add_path(&mut page, path);
+        }
+        let _ = writeln!(page, "{}", tables::cards(&self.scenes, &self.plan.paths, &self.device));
+        if let Some(table) = tables::paths(&self.scenes) {
+            let _ = writeln!(page, "{table}");
+        }
+        self.add_pictures(&mut page);
+        page
+    }
+
+    fn head(&self) -> String {
+        let Plan { size: [width, height], frames, runs, compared, max_depth, .. } = &self.plan;
+        let mut text = format!(
+            "# The paper's experiment\n\nKim and Baek, \"A Hybrid Approach for Vulkan-Based Ray Tracing \
+             Implementations\", 2026, repeated.\n\n- device: {}\n- driver: {}\n- date: {}\n- command: `{}`\n- \
+             pictures: {width}x{height}, up to {max_depth} bounces; {frames} frames along a path around each of five \
+             cameras, each rendered {runs} times by each method, of which the median counts; {compared} frames of \
+             each camera compared\n",
+            self.device, self.driver, self.date, self.command
+        );
+        self.notes.iter().for_each(|note| {
+            let _ = writeln!(text, "- {note}");
+        });
+        text.push_str(HOW);
+        text
+    }
+
+    fn add_path(&self, page: &mut String, path: RayPath) {
+        let _ = writeln!(page, "## By {}\n\n![Times]({})\n", path_name(path), plots::times_name(path));
+        let _ = writeln!(page, "{}", tables::likeness(&self.scenes, path));
+        let shown = if tables::has_published(&self.scenes) { TIMES.len() } else { 3 };
+        for (what, published) in &TIMES[..shown] {
+            let _ = writeln!(page, "{}", tables::times(&self.scenes, path, *what, published));
+        }
+        let _ = writeln!(page, "{}", tables::spread(&self.scenes, path));
+        for scene in &self.scenes {
+            let _ = writeln!(page, "![Every frame of {}]({})\n", scene.name, plots::frames_name(scene, path));
+        }
+    }
+
+    fn add_pictures(&self, page: &mut String) {
+        page.push_str("## Pictures (Figures 8 to 10)\n\nStand-alone, hybrid, and their difference, inverted and times 32.\n");
+        for scene in &self.scenes {
+            for &path in &self.plan.paths {
+                let _ = write!(page, "\n{} by {}:\n\n", scene.name, path_name(path));
+                let _ = writeln!(page, "![{}]({PICTURES}/{})", scene.name, sheet_name(&scene.name, path));
+            }
+        }
+    }
+}
+
+/// What the symbols mean.
+const HOW: &str = "
+T is the stand-alone method's time, t_a that of the hybrid method's ray pass, t_b that of its geometry pass, t = t_a + t_b,
+all from timestamps on the device around the commands. Both methods take turns frame by frame. The best and the worst frame
+are those of each method by itself, t_a and t_b those of the hybrid method's frame. Rows called average are averages over the
+cameras, as in the paper. The paper rendered 1280x720 on its cards; its scenes are other exports of the same models, the
+kitchen stands beside its gallery, and its camera positions are not known, so columns compare like with similar.
+
+";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bench::paper::{Cell, Likeness, Times};
+
+    fn experiment(names: &[&str], paths: &[RayPath]) -> Experiment {
+        let alike = Likeness { psnr: 50.0, lowest_psnr: 49.0, ssim: 0.9995, differing_share: 1e-4 };
+        let frames = |slow: f64| {
+            (0..2500)
+                .map(|i| Times { standalone: slow, rays: 0.2 + 1e-5 * f64::from(i), geometry: 0.1 })
+                .collect()
+        };
+        let cells = |&path: &RayPath| {
+            (0..5).map(move |camera| Cell {
+                path,
+                camera,
+                frames: frames(1.0 + camera as f64),
+                likeness: alike,
+            })
+        };
+        let scene = |name: &&str| SceneResult {
+            name: (*name).to_owned(),
+            vertices: 12_345,
+            triangles: 54_321,
+            cells: paths.iter().flat_map(cells).collect(),
+            paths_alike: if paths.len() > 1 { vec![(alike, alike); 5] } else { Vec::new() },
+        };
+        let paths = paths.to_vec();
+        let plan =
+            Plan { size: [32, 18], frames: 2500, runs: 1, warm_up: 0, compared: 1, max_depth: 1, paths };
+        let capabilities = Capabilities { device_name: "Thing 3000".to_owned(), ..Capabilities::default() };
+        let scenes = names.iter().map(scene).collect();
+        Experiment { scenes, ..Experiment::new(&capabilities, "bench paper".to_owned(), plan) }
+    }
+
+    /// Cells of the row whose first cell is `name`, of the first table whose title contains `title`.
+    fn row(page: &str, title: &str, name: &str) -> Vec<String> {
+        let table = page.split("\n### ").find(|table| table.lines().next().unwrap().contains(title)).unwrap();
+        let line = table.lines().find(|line| line.starts_with(&format!("| {name} "))).unwrap();
+        line.trim_matches('|').split('|').map(|cell| cell.trim().to_owned()).collect()
+    }
+
+    #[test]
+    fn the_papers_numbers_stand_beside_ones_own() {
+        let page = experiment(&["living_room", "kitchen", "teapot"], &[RayPath::Pipeline]).page();
+        let average = row(&page, "Table 3", "living_room cam 5");
+        assert_eq!(average[1], "5.000");
+        assert_eq!(average[7..], ["1.047", "0.672", "64.2 %", "0.366", "1.038", "99.1 %"]);
+        let worst = row(&page, "Table 5", "kitchen cam 1");
+        assert_eq!(worst[2..7], ["0.225", "22.5 %", "0.100", "0.325", "32.5 %"]);
+        assert_eq!(worst[12], "231.6 %");
+        assert_eq!(row(&page, "Table 7", "kitchen average")[12], "72.2 %");
+        assert_eq!(row(&page, "Table 2", "living_room cam 1")[5..], ["45.25", "0.9858"]);
+        assert_eq!(row(&page, "Table 1", "kitchen")[3..], ["Gallery", "648,417", "998,831"]);
+        assert_eq!(row(&page, "Table 3", "teapot cam 2")[7..], ["", "", "", "", "", ""]);
+        assert_eq!(row(&page, "Table 8", "Gallery, RX 6600 (paper)")[6..], ["2.060", "72.2 %"]);
+        for number in 1..=8 {
+            assert_eq!(page.matches(&format!("### Table {number}")).count(), 1, "table {number}");
+        }
+    }
+
+    #[test]
+    fn scenes_that_the_paper_does_not_have_leave_its_columns_out() {
+        let page = experiment(&["teapot"], &[RayPath::Pipeline, RayPath::Query]).page();
+        assert!(!page.contains("paper:") && !page.contains("Table 6"), "{page}");
+        assert_eq!(row(&page, "Table 3, by query", "teapot cam 2").len(), 7);
+        assert_eq!(row(&page, "pipeline and by query", "teapot cam 2")[1], "50.00");
+    }
+
+    #[test]
+    fn plots_are_svg_and_small_whatever_the_number_of_frames() {
+        let experiment = experiment(&["conference", "a <b>"], &[RayPath::Pipeline, RayPath::Query]);
+        let plots = plots::all(&experiment.scenes, &experiment.plan.paths).unwrap();
+        assert_eq!(plots.len(), 1 + 2 * 3);
+        for (name, text) in plots {
+            assert!(text.starts_with("<svg") && text.trim_end().ends_with("</svg>"), "{name}");
+            assert!(
+                text.len() < 200_000 && !text.contains("a <b>") && !text.contains("NaN"),
+                "{name} {}",
+                text.len()
+            );
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! The paper's tables with one's own numbers, and the paper's beside them.
+
+use super::super::setup::path_name;
+use super::super::table::{Table, grouped};
+use super::likeness::Likeness;
+use super::measured::SceneResult;
+use super::published::{self, PublishedScene, TimesTable};
+use super::times::{Statistic, Times};
+use crate::hybrid::RayPath;
+
+/// Columns of a table of times, the first apart.
+const TIMES: [&str; 6] = ["T", "t_a", "t_a/T", "t_b", "t", "t/T"];
+
+/// Whether the paper has numbers for any of the scenes.
+pub(super) fn has_published(scenes: &[SceneResult]) -> bool {
+    scenes.iter().any(|scene| PublishedScene::named(&scene.name).is_some())
+}
+
+/// Geometry (Table 1).
+pub(super) fn geometry(scenes: &[SceneResult]) -> Table {
+    let head = ["scene", "vertices", "triangles", "paper: scene", "vertices", "faces"];
+    let shown = if has_published(scenes) { head.len() } else { 3 };
+    let mut table = Table::new("### Table 1: geometry".to_owned(), &head[..shown]);
+    for scene in scenes {
+        let own = [scene.vertices, scene.triangles].map(grouped);
+        let published = PublishedScene::named(&scene.name);
+        let theirs =
+            published.map(|theirs| [theirs.name.to_owned(), grouped(theirs.vertices), grouped(theirs.faces)]);
+        table.row(scene.name.clone(), own.into_iter().chain(theirs.into_iter().flatten()));
+    }
+    table
+}
+
+/// How alike the pictures of both methods are (Table 2).
+pub(super) fn likeness(scenes: &[SceneResult], path: RayPath) -> Table {
+    let head = ["camera", "PSNR dB", "lowest", "SSIM", "differing", "paper: PSNR dB", "SSIM"];
+    let shown = if has_published(scenes) { head.len() } else { 5 };
+    let title = format!("### Table 2, by {}: stand-alone and hybrid pictures compared", path_name(path));
+    let mut table = Table::new(title, &head[..shown]);
+    for scene in scenes {
+        let published = PublishedScene::named(&scene.name);
+        for cell in scene.of(path) {
+            let theirs = published.and_then(|theirs| theirs.likeness(cell.camera));
+            table.row(camera(scene, cell.camera), likeness_row(&cell.likeness, theirs));
+        }
+    }
+    table.note("differing: share of pixels that differ by more than 1/255 in a channel");
+    table
+}
+
+/// How alike pictures by pipeline and by query are.
+pub(super) fn paths(scenes: &[SceneResult]) -> Option<Table> {
+    let head = ["camera", "stand-alone: PSNR dB", "SSIM", "hybrid: PSNR dB", "SSIM"];
+    let mut table = Table::new("### Pictures by pipeline and by query compared".to_owned(), &head);
+    for scene in scenes {
+        for (number, (standalone, hybrid)) in scene.paths_alike.iter().enumerate() {
+            let cells =
+                [standalone, hybrid].map(|alike| [decibels(alike.psnr), format!("{:.5}", alike.ssim)]);
+            table.row(camera(scene, number), cells.into_iter().flatten());
+        }
+    }
+    scenes.iter().any(|scene| !scene.paths_alike.is_empty()).then_some(table)
+}
+
+/// Times of every camera, beside a table of the paper (Tables 3 to 7).
+pub(super) fn times(
+    scenes: &[SceneResult],
+    path: RayPath,
+    (what, statistic): (&str, Statistic),
+    published: &TimesTable,
+) -> Table {
+    let TimesTable { number, card, .. } = published;
+    let beside = if has_published(scenes) { format!(", beside the paper's {card}") } else { String::new() };
+    let title = format!("### Table {number}, by {}: {what} in milliseconds{beside}", path_name(path));
+    let theirs = if has_published(scenes) {
+        TIMES.map(|column| format!("paper: {column}")).into()
+    } else {
+        Vec::new()
+    };
+    let head: Vec<&str> =
+        ["camera"].into_iter().chain(TIMES).chain(theirs.iter().map(String::as_str)).collect();
+    let mut table = Table::new(title, &head);
+    for scene in scenes {
+        let scene_published = PublishedScene::named(&scene.name);
+        for cell in scene.of(path) {
+            let theirs = scene_published.and_then(|theirs| published.times(&theirs, cell.camera));
+            table.row(camera(scene, cell.camera), times_row(&statistic.of(&cell.frames), theirs));
+        }
+        let theirs = scene_published.map(|theirs| published.mean(&theirs));
+        table.row(format!("{} average", scene.name), times_row(&scene.mean(path, statistic), theirs));
+    }
+    table
+}
+
+/// Averages of this device beside those of the paper's cards (Table 8).
+pub(super) fn cards(scenes: &[SceneResult], paths: &[RayPath], device: &str) -> Table {
+    let head = ["scene, card", "T", "t_a", "t_a/T", "t_b", "t_b/T", "t", "t/T"];
+    let mut table = Table::new("### Table 8: averages by card, in milliseconds".to_owned(), &head);
+    for scene in scenes {
+        for &path in paths {
+            let name = format!("{}, {device}, {}", scene.name, path_name(path));
+            table.row(name, card_row(&scene.mean(path, Statistic::Average)));
+        }
+        let Some(theirs) = PublishedScene::named(&scene.name) else { continue };
+        for card in published::CARDS {
+            table.row(format!("{}, {} (paper)", theirs.name, card.card), card_row(&card.mean(&theirs)));
+        }
+    }
+    table
+}
+
+/// How far frames lie from each other, by figures that a single slow frame does not move.
+pub(super) fn spread(scenes: &[SceneResult], path: RayPath) -> Table {
+    let head =
+        ["camera", "T median", "T 99 %", "T worst/avg", "t median", "t 99 %", "t worst/avg", "t/T median"];
+    let title = format!("### Spread of frames, by {}, in milliseconds", path_name(path));
+    let mut table = Table::new(title, &head);
+    for scene in scenes {
+        for cell in scene.of(path) {
+            let of = |statistic: Statistic| statistic.of(&cell.frames);
+            let (median, nearly) = (of(Statistic::MEDIAN), of(Statistic::NEARLY_WORST));
+            let (average, worst) = (of(Statistic::Average), of(Statistic::WORST));
+            let cells = [
+                number(median.standalone),
+                number(nearly.standalone),
+                times_over(worst.standalone / average.standalone),
+                number(median.hybrid()),
+                number(nearly.hybrid()),
+                times_over(worst.hybrid() / average.hybrid()),
+                percent(median.ratio()),
+            ];
+            table.row(camera(scene, cell.camera), cells);
+        }
+    }
+    table
+}
+
+/// The averages of the scenes, for the terminal.
+pub(super) fn summary(headline: String, scenes: &[SceneResult], paths: &[RayPath]) -> Table {
+    let theirs = has_published(scenes).then_some("paper: t/T");
+    let head: Vec<&str> = ["scene"].into_iter().chain(TIMES).chain(["PSNR dB"]).chain(theirs).collect();
+    let mut table = Table::new(headline, &head);
+    for scene in scenes {
+        for &path in paths {
+            let alike: Vec<Likeness> = scene.of(path).map(|cell| cell.likeness).collect();
+            let psnr = alike.iter().map(|alike| alike.psnr).sum::<f64>() / alike.len().max(1) as f64;
+            let theirs = PublishedScene::named(&scene.name).map(|theirs| published::AVERAGE.mean(&theirs));
+            let own = times_cells(&scene.mean(path, Statistic::Average));
+            let cells =
+                own.into_iter().chain([decibels(psnr)]).chain(theirs.map(|theirs| percent(theirs.ratio())));
+            table.row(format!("{}, {}", scene.name, path_name(path)), cells);
+        }
+    }
+    table
+}
+
+fn likeness_row(own: &Likeness, theirs: Option<(f64, f64)>) -> Vec<String> {
+    let share = format!("{:.4} %", 100.0 * own.differing_share);
+    let mut cells = vec![decibels(own.psnr), decibels(own.lowest_psnr), format!("{:.5}", own.ssim), share];
+    if let Some((psnr, ssim)) = theirs {
+        cells.extend([decibels(psnr), format!("{ssim:.4}")]);
+    }
+    cells
+}
+
+fn times_row(own: &Times, theirs: Option<Times>) -> Vec<String> {
+    let mut cells = times_cells(own).to_vec();
+    cells.extend(theirs.iter().flat_map(times_cells));
+    cells
+}
+
+fn times_cells(times: &Times) -> [String; 6] {
+    [
+        number(times.standalone),
+        number(times.rays),
+        percent(times.ray_ratio()),
+        number(times.geometry),
+        number(times.hybrid()),
+        percent(times.ratio()),
+    ]
+}
+
+fn card_row(times: &Times) -> [String; 7] {
+    let [alone, rays, ray_ratio, geometry, hybrid, ratio] = times_cells(times);
+    [alone, rays, ray_ratio, geometry, percent(times.geometry_ratio()), hybrid, ratio]
+}
+
+fn camera(scene: &SceneResult, camera: usize) -> String {
+    format!("{} cam {}", scene.name, camera + 1)
+}
+
+/// Milliseconds, to the microsecond.
+fn number(milliseconds: f64) -> String {
+    format!("{milliseconds:.3}")
+}
+
+fn times_over(ratio: f64) -> String {
+    format!("{ratio:.2}x")
+}
+
+fn percent(ratio: f64) -> String {
+    format!("{:.1} %", 100.0 * ratio)
+}
+
+/// Decibels; equal pictures have infinitely many.
+pub(super) fn decibels(psnr: f64) -> String {
+    if psnr.is_finite() { format!("{psnr:.2}") } else { "equal".to_owned() }
+}

@@ -1,0 +1,125 @@
+//! The paper's experiment on a tiny scene: it measures everything, and its report is whole and consistent.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use lvk_samples::app::progress::Progress;
+use lvk_samples::bench::paper::{CAMERA_COUNT, Experiment, PICTURES, Pictures, Plan, Statistic, measure};
+use lvk_tests::device;
+use lvk_tests::hybrid::paths;
+use lvk_tests::still_life::still_life;
+
+const SIZE: [u32; 2] = [96, 54];
+const FRAMES: u32 = 3;
+
+/// The experiment on a scene that bears the name of one of the paper's.
+fn experiment(folder: &Path) -> Option<Experiment> {
+    let ctx = device()?;
+    let mut scene = still_life();
+    scene.name = "conference".to_owned();
+    let paths = paths(&ctx);
+    let plan = Plan { size: SIZE, frames: FRAMES, runs: 1, warm_up: 0, compared: 2, max_depth: 2, paths };
+    let pictures = Pictures::new(&folder.join(PICTURES), SIZE).unwrap();
+    let found = measure(&ctx, &scene, &plan, &pictures, &mut Progress::hidden()).unwrap();
+    let mut experiment = Experiment::new(ctx.capabilities(), "bench paper".to_owned(), plan);
+    experiment.scenes.push(found);
+    experiment.write(folder).unwrap();
+    Some(experiment)
+}
+
+/// The lines of a CSV file as values by the names of their columns.
+fn csv(path: &Path) -> Vec<HashMap<String, String>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let head: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let row = |line: &str| {
+        let values: Vec<&str> = line.split(',').collect();
+        assert_eq!(values.len(), head.len(), "{line}");
+        head.iter().zip(values).map(|(name, value)| ((*name).to_owned(), value.to_owned())).collect()
+    };
+    lines.map(row).collect()
+}
+
+fn number(row: &HashMap<String, String>, name: &str) -> f64 {
+    row[name].parse().unwrap()
+}
+
+#[test]
+fn the_experiment_measures_everything_and_reports_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let Some(experiment) = experiment(folder.path()) else { return };
+    let path_count = experiment.plan.paths.len();
+    let cells = CAMERA_COUNT * path_count;
+
+    let frames = csv(&folder.path().join("frames.csv"));
+    assert_eq!(frames.len(), cells * FRAMES as usize);
+    for frame in &frames {
+        let [rays, geometry, hybrid] = ["t_a_ms", "t_b_ms", "t_ms"].map(|name| number(frame, name));
+        assert!((rays + geometry - hybrid).abs() < 2e-6, "{frame:?}");
+        assert!(rays > 0.0 && geometry > 0.0 && number(frame, "T_ms") > 0.0, "{frame:?}");
+    }
+    let times = csv(&folder.path().join("times.csv"));
+    assert_eq!(times.len(), cells * 5);
+    for cell in times.chunks(5) {
+        let of = |statistic: &str| cell.iter().find(|row| row["statistic"] == statistic).unwrap();
+        for name in ["T_ms", "t_ms"] {
+            let [best, average, median, worst] =
+                ["best", "average", "median", "worst"].map(|statistic| number(of(statistic), name));
+            assert!(best <= median && median <= worst && best <= average && average <= worst, "{cell:?}");
+        }
+        for row in cell {
+            let sum = number(row, "t_a_ms") + number(row, "t_b_ms");
+            assert!((sum - number(row, "t_ms")).abs() < 2e-6, "{row:?}");
+            assert!((sum / number(row, "T_ms") - number(row, "t_over_T")).abs() < 1e-4, "{row:?}");
+        }
+    }
+    assert_report_is_whole(folder.path(), &experiment);
+    assert_pictures_are_alike(folder.path(), &experiment);
+}
+
+fn assert_report_is_whole(folder: &Path, experiment: &Experiment) {
+    let page = std::fs::read_to_string(folder.join("report.md")).unwrap();
+    let path_count = experiment.plan.paths.len();
+    for camera in 1..=CAMERA_COUNT {
+        // In tables 2 to 7 and in that of the spread, by each path, and once where paths are compared.
+        let rows = page.matches(&format!("\n| conference cam {camera} ")).count();
+        assert_eq!(rows, 7 * path_count + usize::from(path_count > 1), "camera {camera}");
+    }
+    for what in ["## Goals", "### Table 8", "RX 6600 (paper)", " 61.35 |", "1,338,208", &experiment.device] {
+        assert!(page.contains(what), "{what} is not in the report");
+    }
+    let mut linked = 0;
+    for link in page.split("](").skip(1).map(|rest| rest.split(')').next().unwrap()) {
+        assert!(folder.join(link).is_file(), "{link} is not there");
+        linked += 1;
+    }
+    assert_eq!(linked, 1 + path_count * 3);
+}
+
+fn assert_pictures_are_alike(folder: &Path, experiment: &Experiment) {
+    let scene = &experiment.scenes[0];
+    for cell in &scene.cells {
+        let alike = &cell.likeness;
+        assert!(alike.psnr > 35.0 && alike.lowest_psnr > 33.0, "{alike:?}");
+        assert!(alike.ssim > 0.98 && alike.ssim <= 1.0 + 1e-9, "{alike:?}");
+        assert!(alike.differing_share < 0.01, "{alike:?}");
+        assert!(Statistic::WORST.of(&cell.frames).hybrid() > 0.0);
+    }
+    for (standalone, hybrid) in &scene.paths_alike {
+        assert!(standalone.psnr >= 50.0 && hybrid.psnr >= 50.0, "{standalone:?} {hybrid:?}");
+    }
+    for name in ["pipeline", "query"] {
+        let file = |what: &str| folder.join(PICTURES).join(format!("conference_{name}_cam3_{what}.png"));
+        if !file("hybrid").exists() {
+            assert!(experiment.plan.paths.len() == 1);
+            continue;
+        }
+        let picture = |what: &str| image::open(file(what)).unwrap().into_rgba8();
+        let (standalone, difference) = (picture("standalone"), picture("difference"));
+        assert_eq!((standalone.dimensions(), difference.dimensions()), ((96, 54), (96, 54)));
+        let white = difference.pixels().filter(|pixel| pixel.0 == [255; 4]).count();
+        assert!(white > 96 * 54 / 2, "only {white} pixels are equal");
+        assert!(standalone.pixels().any(|pixel| pixel.0 != standalone.get_pixel(0, 0).0), "an empty picture");
+    }
+}
