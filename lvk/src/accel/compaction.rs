@@ -35,6 +35,8 @@ pub(crate) struct Refusal {
     pub(crate) error: Error,
     /// Bytes that structures had in use.
     pub(crate) used_bytes: u64,
+    /// The last submission by then: what was destroyed before is freed when the GPU is done with it.
+    pub(crate) submitted: u64,
 }
 
 impl Compactions {
@@ -47,9 +49,10 @@ impl Compactions {
         self.replaced.retain(|body| body.strong_count() > 0);
     }
 
-    /// The copies without room, where none of what is under way will free any.
-    pub(crate) fn take_stuck(&mut self) -> Vec<PlannedCopy> {
-        let waits = |copy: &PlannedCopy| copy.refused.is_none();
+    /// The copies without room, where nothing under way will free any, with the GPU as far as submission `completed`.
+    pub(crate) fn take_stuck(&mut self, completed: u64) -> Vec<PlannedCopy> {
+        let waits =
+            |copy: &PlannedCopy| copy.refused.as_ref().is_none_or(|refusal| refusal.submitted > completed);
         let hope = !self.asked.is_empty() || !self.replaced.is_empty() || self.copies.iter().any(waits);
         if hope { Vec::new() } else { std::mem::take(&mut self.copies) }
     }
@@ -108,7 +111,8 @@ mod tests {
     use super::*;
 
     fn copy(used_bytes: Option<u64>) -> PlannedCopy {
-        let refused = used_bytes.map(|used_bytes| Refusal { error: Error::usage("", ""), used_bytes });
+        let error = Error::usage("", "");
+        let refused = used_bytes.map(|used_bytes| Refusal { error, used_bytes, submitted: 7 });
         PlannedCopy { target: Weak::new(), sizes: Vec::new(), builds: 1, refused }
     }
 
@@ -123,14 +127,15 @@ mod tests {
     fn copies_are_given_up_when_nothing_will_free_memory() {
         let body = Arc::new(BlasBody { structures: Vec::new(), compacted_from: None, rebuildable: true });
         let mut all = Compactions { copies: vec![copy(Some(1)), copy(None)], ..Default::default() };
-        assert!(all.take_stuck().is_empty(), "another copy is not tried yet");
+        assert!(all.take_stuck(7).is_empty(), "another copy is not tried yet");
         all.copies.pop();
         all.replaced.push(Arc::downgrade(&body));
         all.forget_freed();
-        assert!(all.take_stuck().is_empty(), "a replaced body will be freed");
+        assert!(all.take_stuck(7).is_empty(), "a replaced body will be freed");
         drop(body);
         all.forget_freed();
-        assert_eq!(all.take_stuck().len(), 1);
+        assert!(all.take_stuck(6).is_empty(), "the GPU may yet use what was destroyed");
+        assert_eq!(all.take_stuck(7).len(), 1);
         assert!(all.is_empty());
     }
 }

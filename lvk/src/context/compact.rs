@@ -80,8 +80,10 @@ impl Context {
     /// replaced. What fails stays as it was, with a warning: no submission of the caller fails for it.
     pub(super) fn advance_compactions(&self) {
         let mut compactions = self.compactions();
-        if !compactions.is_empty() {
-            self.advance(&mut compactions);
+        if !compactions.is_empty()
+            && let Err(error) = self.advance(&mut compactions)
+        {
+            log::warn!("compaction does not go on: {error}");
         }
         drop(compactions);
         if self.shared().take_outdated_tlas()
@@ -92,7 +94,10 @@ impl Context {
     }
 
     /// Copies that have no room wait for those that have, which give memory back.
-    fn advance(&self, compactions: &mut Compactions) {
+    fn advance(&self, compactions: &mut Compactions) -> Result<()> {
+        let shared = self.shared();
+        let (submitted, completed) = (shared.submitter.submitted(), shared.submitter.timeline.completed()?);
+        shared.collect()?;
         compactions.forget_freed();
         for query in std::mem::take(&mut compactions.asked) {
             match query.answer() {
@@ -104,13 +109,13 @@ impl Context {
         let mut again = Vec::new();
         for mut copy in std::mem::take(&mut compactions.copies) {
             let Some(target) = copy.target.upgrade() else { continue };
-            let used_bytes = self.shared().accel_storage.used_bytes();
+            let used_bytes = shared.accel_storage.used_bytes();
             match self.compact_one(&target, &copy, used_bytes) {
                 Ok(Step::Copied(old)) => compactions.replaced.push(old),
                 Ok(Step::Wait) => compactions.copies.push(copy),
                 Ok(Step::AskAgain) => again.push(target),
                 Err(error @ (Error::OverBudget { .. } | Error::OutOfDeviceMemory { .. })) => {
-                    copy.refused = Some(Refusal { error, used_bytes });
+                    copy.refused = Some(Refusal { error, used_bytes, submitted });
                     compactions.copies.push(copy);
                 }
                 Err(error) => give_up(&target, &error),
@@ -120,11 +125,12 @@ impl Context {
             Ok(query) => compactions.asked.extend(query),
             Err(error) => again.iter().for_each(|target| give_up(target, &error)),
         }
-        for PlannedCopy { target, refused, .. } in compactions.take_stuck() {
+        for PlannedCopy { target, refused, .. } in compactions.take_stuck(completed) {
             if let (Some(target), Some(refusal)) = (target.upgrade(), refused) {
                 give_up(&target, &refusal.error);
             }
         }
+        Ok(())
     }
 
     /// Copies one structure, unless a build of it was recorded meanwhile.

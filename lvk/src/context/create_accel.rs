@@ -14,6 +14,7 @@ use crate::accel::desc::{BlasDesc, TlasDesc};
 use crate::accel::flags::{AccelStructSizes, BuildMode};
 use crate::accel::instance_plan::InstancePlan;
 use crate::accel::raw_structure::RawStructure;
+use crate::accel::split::PartLimits;
 use crate::accel::structure::AccelKind;
 use crate::accel::tlas::Tlas;
 use crate::error::{Error, Result, check_limit};
@@ -89,7 +90,9 @@ impl Context {
         let shared = self.shared();
         shared.gpu.accel()?;
         let slot = shared.reserve(|| shared.bindless.reserve_tlas(desc.debug_name))?;
-        let tlas = new_tlas(shared, desc, slot).inspect_err(|_| shared.bindless.free_tlas(slot))?;
+        let limits = part_limits(&shared.gpu.caps.limits);
+        let tlas =
+            tlas_within(shared, desc, slot, &limits).inspect_err(|_| shared.bindless.free_tlas(slot))?;
         if let AccelKind::Tlas(object) = &tlas.kind {
             shared.bindless.set_tlas(slot, object.structure.raw);
         }
@@ -145,8 +148,13 @@ fn new_transforms(shared: &Shared, name: &str, matrices: &[f32]) -> Result<Buffe
     Ok(buffer)
 }
 
-/// Makes a top-level structure for a slot the caller reserved; nothing is built yet.
+/// Makes a top-level structure for a slot the caller reserved, whatever it takes; nothing is built yet.
 pub(super) fn new_tlas(shared: &Shared, desc: &TlasDesc<'_>, slot: u32) -> Result<AccelStruct> {
+    let limits = PartLimits { structure_bytes: u64::MAX, scratch_bytes: u64::MAX, primitives: u64::MAX };
+    tlas_within(shared, desc, slot, &limits)
+}
+
+fn tlas_within(shared: &Shared, desc: &TlasDesc<'_>, slot: u32, limits: &PartLimits) -> Result<AccelStruct> {
     let name = desc.debug_name;
     desc.flags.check_tlas(name)?;
     let count = u32::try_from(desc.instances.len()).unwrap_or(u32::MAX);
@@ -157,19 +165,8 @@ pub(super) fn new_tlas(shared: &Shared, desc: &TlasDesc<'_>, slot: u32) -> Resul
     check_limit(name, "instance capacity", room, shared.gpu.caps.limits.max_tlas_instances)?;
     let room = u32::try_from(room).unwrap_or(u32::MAX);
     let sizes = BuildInput::tlas(desc.flags, 0, room).sizes(&shared.gpu)?;
-    let limits = part_limits(&shared.gpu.caps.limits);
-    check_limit(
-        name,
-        "size of the top-level structure in bytes",
-        sizes.structure_bytes,
-        limits.structure_bytes,
-    )?;
-    check_limit(
-        name,
-        "scratch of the top-level build in bytes",
-        sizes.scratch_bytes(),
-        limits.scratch_bytes,
-    )?;
+    check_limit(name, "size of the structure in bytes", sizes.structure_bytes, limits.structure_bytes)?;
+    check_limit(name, "scratch of a build in bytes", sizes.scratch_bytes(), limits.scratch_bytes)?;
     let ty = vk::AccelerationStructureTypeKHR::TOP_LEVEL;
     let bytes = sizes.structure_bytes;
     let structure = RawStructure::new(&shared.gpu, &shared.accel_storage, name, ty, bytes)?;
