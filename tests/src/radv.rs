@@ -247,6 +247,7 @@ fn raw(format: Format) -> vk::Format {
         Format::Rgba32Float => vk::Format::R32G32B32A32_SFLOAT,
         Format::Rgba32Uint => vk::Format::R32G32B32A32_UINT,
         Format::D32Float => vk::Format::D32_SFLOAT,
+        Format::R32Uint => vk::Format::R32_UINT,
         other => panic!("{other:?}: add its Vulkan format here"),
     }
 }

@@ -31,7 +31,7 @@ const MEASURED_FRAMES: u32 = 4;
 enum GeometryStage {
     None,
     Paper(GeometryPass),
-    Visibility(VisibilityPass),
+    Visibility(Box<VisibilityPass>),
 }
 
 /// Renders a scene by one method and one path of ray tracing.
@@ -232,7 +232,7 @@ impl GeometryStage {
                 Self::Paper(GeometryPass::new(ctx, scene, [config.width, config.height])?)
             }
             (Method::Hybrid, Geometry::Visibility(wish)) => {
-                Self::Visibility(VisibilityPass::new(ctx, scene.triangle_count, config, wish)?)
+                Self::Visibility(Box::new(VisibilityPass::new(ctx, scene.triangle_count, config, wish)?))
             }
         })
     }
