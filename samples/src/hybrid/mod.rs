@@ -14,7 +14,7 @@ mod frame;
 mod frame_timings;
 mod geometry_pass;
 mod gpu_scene;
-mod half_float;
+pub(crate) mod half_float;
 mod pipelines;
 mod ray_pass;
 mod renderer;
