@@ -7,7 +7,7 @@
 const float kPi = 3.14159265;
 
 vec3 normalReflectance(Surface surface) {
-    return mix(vec3(0.04), surface.albedo, surface.metalness);
+    return mix(vec3(0.05), surface.albedo, surface.metalness);
 }
 
 vec3 fresnelSchlick(vec3 normalIncidence, float cosine) {

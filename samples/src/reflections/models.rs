@@ -6,6 +6,7 @@ use glam::{Vec2, Vec3};
 
 use super::mesh::Mesh;
 use super::world::{Model, material};
+use crate::scene::noise;
 
 /// Texture coordinates of the floor repeat after this many scene units.
 const FLOOR_TILE: f32 = 4.0;
@@ -116,13 +117,18 @@ fn trim() -> Mesh {
     })
 }
 
-/// The land around the hall.
+/// The land around the hall, and hills at the horizon.
 pub(super) fn ground() -> Model {
     let corner = Vec3::new(-100.0, -0.8, -100.0);
-    model(
-        "ground",
-        vec![(Mesh::default().quad(corner, Vec3::Z * 200.0, Vec3::X * 200.0, 4.0), material::SAND)],
-    )
+    let plain = Mesh::default().quad(corner, Vec3::Z * 200.0, Vec3::X * 200.0, 4.0);
+    let hills = Mesh::default().grid(160, 8, |u, v| {
+        let (sine, cosine) = (-u * TAU).sin_cos();
+        let radius = 62.0 + 34.0 * v;
+        let rough = noise::tiled(14.0 * u, 2.0 * v, [14, 0], 5);
+        let height = (18.0 * rough * (0.5 * std::f32::consts::PI * v).sin() - 0.5).max(-1.0);
+        Vec3::new(radius * cosine, height, radius * sine)
+    });
+    model("ground", vec![(plain, material::SAND), (hills, material::HILLS)])
 }
 
 /// A column on a base, with a gilded capital.

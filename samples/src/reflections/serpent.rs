@@ -13,7 +13,7 @@ const BONE_LENGTH: f32 = 0.22;
 /// Length of the body.
 const LENGTH: f32 = BONE_LENGTH * (BONE_COUNT - 1) as f32;
 /// Middle of the path, in scene units.
-const MIDDLE: Vec3 = Vec3::new(0.0, 1.75, -9.0);
+const MIDDLE: Vec3 = Vec3::new(0.0, 1.5, -8.2);
 /// Half of the path's extent across and along the hall.
 const REACH: [f32; 2] = [2.5, 6.6];
 /// Radians of the path's parameter that the serpent swims in a second.
@@ -47,8 +47,8 @@ impl Skin {
                 Vec3::new(girth * cosine, 0.92 * girth * sine, along)
             })
         };
-        let head = Vec3::new(0.0, 0.06, -0.22);
-        let back = body(215.0, -35.0, 20).ball(head, Vec3::new(0.25, 0.19, 0.36), 24).ball(
+        let head = Vec3::new(0.0, 0.1, -0.26);
+        let back = body(215.0, -35.0, 20).ball(head, Vec3::new(0.34, 0.27, 0.46), 24).ball(
             head + Vec3::new(0.0, -0.02, -0.3),
             Vec3::new(0.16, 0.11, 0.26),
             20,
@@ -58,8 +58,8 @@ impl Skin {
         let mut eyes = Mesh::default();
         let mut fins = Mesh::default();
         for side in [-1.0, 1.0] {
-            eyes = eyes.ball(head + Vec3::new(0.17 * side, 0.09, -0.2), Vec3::splat(0.05), 12);
-            fins = fins.ball(head + Vec3::new(0.13 * side, 0.2, 0.22), Vec3::new(0.035, 0.045, 0.3), 12);
+            eyes = eyes.ball(head + Vec3::new(0.23 * side, 0.13, -0.28), Vec3::splat(0.065), 12);
+            fins = fins.ball(head + Vec3::new(0.17 * side, 0.27, 0.26), Vec3::new(0.045, 0.06, 0.4), 12);
         }
         for number in 0..26 {
             let along = 0.5 + number as f32 * 0.29;
@@ -91,18 +91,18 @@ impl Skin {
 
 /// Transforms of the bones at `time` in seconds, from the mesh at rest to the world: 3 rows of 4 columns each.
 pub(super) fn bones(time: f32) -> Vec<[f32; 12]> {
-    let mut parameter = 0.4 + SPEED * time;
+    let mut parameter = 0.5 - SPEED * time;
     let mut bones = Vec::with_capacity(BONE_COUNT);
     for bone in 0..BONE_COUNT {
         let speed = velocity(parameter, time);
         bones.push(transform_rows(&bone_transform(parameter, time, bone as f32 * BONE_LENGTH)));
-        parameter -= BONE_LENGTH / speed.length();
+        parameter += BONE_LENGTH / speed.length();
     }
     bones
 }
 
 fn bone_transform(parameter: f32, time: f32, along: f32) -> Affine3A {
-    let forward = Vec3A::from(velocity(parameter, time).normalize());
+    let forward = Vec3A::from(-velocity(parameter, time).normalize());
     let right = forward.cross(Vec3A::Y).normalize();
     let frame = Mat3A::from_cols(right, right.cross(forward), -forward);
     let to_joint = Affine3A::from_translation(Vec3::new(0.0, 0.0, -along));
@@ -125,7 +125,7 @@ fn velocity(parameter: f32, time: f32) -> Vec3 {
 fn girth(along: f32) -> f32 {
     let share = (along / LENGTH).clamp(0.0, 1.0);
     let tail = (1.0 - share).powf(0.6);
-    0.02 + (0.17 + 0.1 * (std::f32::consts::PI * (share * 1.6).min(1.0)).sin()) * tail
+    0.02 + (0.21 + 0.11 * (std::f32::consts::PI * (share * 1.6).min(1.0)).sin()) * tail
 }
 
 #[cfg(test)]

@@ -89,6 +89,7 @@ pub(super) mod material {
     pub(in super::super) const FINS: u32 = 14;
     pub(in super::super) const EYES: u32 = 15;
     pub(in super::super) const LEAF: u32 = 16;
+    pub(in super::super) const HILLS: u32 = 17;
 }
 
 impl World {
@@ -112,8 +113,8 @@ impl World {
 pub(super) fn camera(time: f32) -> Camera {
     let walk = (time * 0.25).sin();
     let sway = (time * 0.17).sin();
-    let eye = [-2.35 + 1.2 * sway, 1.55 + 0.15 * walk, 4.6 - 3.0 * walk.abs()];
-    Camera::looking_at(eye, [0.35 + 0.4 * sway, 1.3, -9.0], 46.0)
+    let eye = [-2.0 + 1.0 * sway, 1.3 + 0.25 * walk.abs(), 3.6 - 2.5 * walk.abs()];
+    Camera::looking_at(eye, [0.45 + 0.4 * sway, 1.0, -9.0], 50.0)
 }
 
 fn furnish() -> (Vec<Model>, Vec<Placed>) {
@@ -126,7 +127,7 @@ fn furnish() -> (Vec<Model>, Vec<Placed>) {
         (0..count).map(|k| from - step * k as f32).collect()
     };
     let screen =
-        Affine3A::from_rotation_translation(Quat::from_rotation_y(-0.45), Vec3::new(2.15, 0.0, -0.6));
+        Affine3A::from_rotation_translation(Quat::from_rotation_y(-0.55), Vec3::new(3.15, 0.0, -1.1));
     let studs = [both(2.15, 0.0, along(4.5, 0.25, 146)), both(3.6, 0.0, along(4.5, 0.25, 146))].concat();
     let lamps = [both(5.75, 0.0, along(4.2, 0.75, 48)), both(1.72, 0.1, along(-4.9, 1.15, 10))].concat();
     let list: Vec<(Model, Vec<Affine3A>)> = vec![
@@ -184,28 +185,29 @@ fn materials() -> Vec<Material> {
         Material { metalness: 0.6, ..plain([0.75, 0.10, 0.06], 0.3) },
         glowing([8.0, 5.5, 1.2]),
         Material { texture: Some((3, 1.0)), ..plain([0.85, 0.85, 0.85], 0.8) },
+        plain([0.07, 0.09, 0.13], 0.95),
     ]
 }
 
 fn sun_direction() -> [f32; 3] {
-    Vec3::new(-0.62, 0.42, -0.55).normalize().to_array()
+    Vec3::new(-0.66, 0.36, -0.55).normalize().to_array()
 }
 
 fn sky() -> Sky {
     Sky {
-        zenith: [0.10, 0.20, 0.46],
-        horizon: [0.98, 0.66, 0.42],
-        ground: [0.22, 0.17, 0.13],
+        zenith: [0.05, 0.11, 0.30],
+        horizon: [0.86, 0.46, 0.26],
+        ground: [0.16, 0.12, 0.10],
         sun_direction: sun_direction(),
-        sun_color: [16.0, 10.0, 5.5],
-        clouds: 0.42,
+        sun_color: [15.0, 8.5, 4.2],
+        clouds: 0.5,
     }
 }
 
 fn lights() -> Vec<Light> {
-    let lantern = |position| Light { position, radius: 0.14, color: [3.4, 1.9, 0.8], spread: 0.0 };
+    let lantern = |position| Light { position, radius: 0.14, color: [4.6, 2.5, 1.0], spread: 0.0 };
     vec![
-        Light { position: sun_direction(), radius: 0.0, color: [4.6, 3.1, 1.85], spread: 0.012 },
+        Light { position: sun_direction(), radius: 0.0, color: [4.4, 2.6, 1.35], spread: 0.009 },
         lantern([-3.1, 3.1, -7.0]),
         lantern([3.1, 3.1, -7.0]),
     ]
