@@ -133,7 +133,7 @@ pub(super) fn ground() -> Model {
 
 /// A column on a base, with a gilded capital.
 pub(super) fn column() -> Model {
-    let shaft = Mesh::default().grid(96, 8, |u, v| {
+    let shaft = Mesh::default().grid(192, 6, |u, v| {
         let angle = u * TAU;
         let radius = 0.36 - 0.06 * v - 0.016 * (16.0 * angle).cos().abs();
         Vec3::new(radius * angle.cos(), 0.42 + 3.95 * v, radius * angle.sin())

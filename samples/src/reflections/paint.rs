@@ -37,7 +37,7 @@ impl Picture {
             let joint = [x, y].iter().any(|k| (k - k.round()).abs() < 0.012);
             let (base, streak, roughness) = match is_dark {
                 true => (Vec3::new(0.030, 0.040, 0.045), Vec3::new(0.28, 0.27, 0.24), 0.06 + 0.24 * worn),
-                false => (Vec3::new(0.21, 0.17, 0.13), Vec3::new(0.42, 0.36, 0.29), 0.10 + 0.28 * worn),
+                false => (Vec3::new(0.135, 0.105, 0.08), Vec3::new(0.34, 0.28, 0.22), 0.09 + 0.26 * worn),
             };
             if joint {
                 return ([0.05, 0.045, 0.04], 0.8);

@@ -91,7 +91,7 @@ impl Skin {
 
 /// Transforms of the bones at `time` in seconds, from the mesh at rest to the world: 3 rows of 4 columns each.
 pub(super) fn bones(time: f32) -> Vec<[f32; 12]> {
-    let mut parameter = 0.5 - SPEED * time;
+    let mut parameter = -0.3 - SPEED * time;
     let mut bones = Vec::with_capacity(BONE_COUNT);
     for bone in 0..BONE_COUNT {
         let speed = velocity(parameter, time);
@@ -113,7 +113,7 @@ fn bone_transform(parameter: f32, time: f32, along: f32) -> Affine3A {
 fn path(parameter: f32, time: f32) -> Vec3 {
     let (sine, cosine) = parameter.sin_cos();
     let sway = 0.28 * (7.0 * parameter + 1.5 * time).sin();
-    let rise = 0.45 * (3.0 * parameter).sin() + 0.12 * (8.0 * parameter + 2.0 * time).cos();
+    let rise = 0.45 * (3.0 * parameter).sin() + 0.06 * (8.0 * parameter + 2.0 * time).cos();
     MIDDLE + Vec3::new((REACH[0] + sway) * sine, rise, REACH[1] * cosine)
 }
 

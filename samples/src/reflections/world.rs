@@ -126,8 +126,7 @@ fn furnish() -> (Vec<Model>, Vec<Placed>) {
     let along = |from: f32, step: f32, count: i32| -> Vec<f32> {
         (0..count).map(|k| from - step * k as f32).collect()
     };
-    let screen =
-        Affine3A::from_rotation_translation(Quat::from_rotation_y(-0.55), Vec3::new(3.15, 0.0, -1.1));
+    let screen = Affine3A::from_rotation_translation(Quat::from_rotation_y(-0.75), Vec3::new(3.3, 0.0, -4.4));
     let studs = [both(2.15, 0.0, along(4.5, 0.25, 146)), both(3.6, 0.0, along(4.5, 0.25, 146))].concat();
     let lamps = [both(5.75, 0.0, along(4.2, 0.75, 48)), both(1.72, 0.1, along(-4.9, 1.15, 10))].concat();
     let list: Vec<(Model, Vec<Affine3A>)> = vec![
@@ -135,7 +134,7 @@ fn furnish() -> (Vec<Model>, Vec<Placed>) {
         (models::ground(), here.clone()),
         (models::column(), both(4.6, 0.0, along(1.0, 4.0, 9))),
         (models::mirror_ball(), vec![upright(-3.1, 0.0, -4.2), upright(3.1, 0.0, -16.8)]),
-        (models::knot(), vec![upright(3.05, 0.0, -4.6), upright(-3.1, 0.0, -16.8)]),
+        (models::knot(), vec![upright(-3.2, 0.0, -9.0), upright(-3.1, 0.0, -16.8)]),
         (models::lantern(), both(3.1, 3.1, vec![-7.0, -15.0])),
         (models::screen_frame(), vec![screen]),
         (models::lamp(), lamps),
