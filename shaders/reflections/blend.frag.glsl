@@ -26,7 +26,7 @@ void main() {
     bool inFront = gl_FragCoord.z >= textureBindlessFetch2D(frame.glassDepth, pixel, 0).r;
     vec3 mirrored = inFront ? textureBindlessFetch2D(frame.glassReflection, pixel, 0).rgb
                             : ambientRadiance(reflect(direction, normal));
-    float normalIncidence = material.density > 0.0 ? 0.02 : 0.05;
+    float normalIncidence = material.density > 0.0 ? 0.02 : 0.08;
     float fresnel = fresnelSchlick(vec3(normalIncidence), -dot(direction, normal)).x;
     float opacity = opacityOf(material, direction);
     vec3 tint = material.albedo * ambientIrradiance(vec3(0.0, 1.0, 0.0));

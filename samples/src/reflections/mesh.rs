@@ -137,9 +137,9 @@ mod tests {
 
     #[test]
     fn normals_have_unit_length_and_boxes_their_bounds() {
-        let mesh =
-            Mesh::default().cuboid([0.0; 3], [1.0, 2.0, 3.0], 2.0).ball(Vec3::ONE, Vec3::splat(0.5), 8);
-        assert!(mesh.vertices.iter().all(|v| (v.normal.length() - 1.0).abs() < 1e-5));
-        assert_eq!(mesh.bounds(), (Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)));
+        let ball = Mesh::default().ball(Vec3::ONE, Vec3::new(0.5, 0.2, 0.9), 8);
+        assert!(ball.vertices.iter().all(|v| (v.normal.length() - 1.0).abs() < 1e-5));
+        let cuboid = Mesh::default().cuboid([0.0; 3], [1.0, 2.0, 3.0], 2.0);
+        assert_eq!(cuboid.bounds(), (Vec3::ZERO, Vec3::new(1.0, 2.0, 3.0)));
     }
 }

@@ -177,7 +177,7 @@ fn materials() -> Vec<Material> {
         plain([0.42, 0.33, 0.22], 0.95),
         glowing([9.0, 3.6, 0.9]),
         glowing([7.0, 4.4, 2.0]),
-        Material { opacity: 0.12, ..plain([0.35, 0.65, 0.52], 0.02) },
+        Material { opacity: 0.2, ..plain([0.35, 0.65, 0.52], 0.02) },
         Material { opacity: 0.5, density: 1.1, ..plain([0.03, 0.16, 0.17], 0.02) },
         Material { metalness: 0.85, ..plain([0.06, 0.42, 0.32], 0.22) },
         metal([1.0, 0.76, 0.36], 0.25),
