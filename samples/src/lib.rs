@@ -5,5 +5,6 @@ pub mod bench;
 pub mod driver;
 pub mod hybrid;
 pub mod pipelines;
+pub mod reflections;
 pub mod scene;
 pub mod shaders;

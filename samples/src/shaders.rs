@@ -24,6 +24,20 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("hybrid/trace_pipeline.glsl", include_str!("../../shaders/hybrid/trace_pipeline.glsl")),
     ("hybrid/trace_query.glsl", include_str!("../../shaders/hybrid/trace_query.glsl")),
     ("hybrid/visibility.glsl", include_str!("../../shaders/hybrid/visibility.glsl")),
+    ("reflections/ambient.glsl", include_str!("../../shaders/reflections/ambient.glsl")),
+    ("reflections/fragment.glsl", include_str!("../../shaders/reflections/fragment.glsl")),
+    ("reflections/frame.glsl", include_str!("../../shaders/reflections/frame.glsl")),
+    ("reflections/gbuffer.glsl", include_str!("../../shaders/reflections/gbuffer.glsl")),
+    ("reflections/lighting.glsl", include_str!("../../shaders/reflections/lighting.glsl")),
+    ("reflections/masks.glsl", include_str!("../../shaders/reflections/masks.glsl")),
+    ("reflections/noise.glsl", include_str!("../../shaders/reflections/noise.glsl")),
+    ("reflections/range.glsl", include_str!("../../shaders/reflections/range.glsl")),
+    ("reflections/reflect.glsl", include_str!("../../shaders/reflections/reflect.glsl")),
+    ("reflections/reflectance.glsl", include_str!("../../shaders/reflections/reflectance.glsl")),
+    ("reflections/surface.glsl", include_str!("../../shaders/reflections/surface.glsl")),
+    ("reflections/trace_pipeline.glsl", include_str!("../../shaders/reflections/trace_pipeline.glsl")),
+    ("reflections/trace_query.glsl", include_str!("../../shaders/reflections/trace_query.glsl")),
+    ("reflections/waves.glsl", include_str!("../../shaders/reflections/waves.glsl")),
 ];
 
 /// Stages of the `bench` program.
@@ -78,4 +92,42 @@ pub mod hybrid {
     pub const CLOSEST_RMISS: &str = include_str!("../../shaders/hybrid/closest.rmiss.glsl");
     /// A shadow ray that reached the light.
     pub const SHADOW_RMISS: &str = include_str!("../../shaders/hybrid/shadow.rmiss.glsl");
+}
+
+/// Stages of the `reflections` sample.
+pub mod reflections {
+    /// Moves the vertices of the character by its bones.
+    pub const SKIN_COMP: &str = include_str!("../../shaders/reflections/skin.comp.glsl");
+    /// Turns the leaves to the camera.
+    pub const LEAVES_COMP: &str = include_str!("../../shaders/reflections/leaves.comp.glsl");
+    /// Vertex stage of all raster passes.
+    pub const SURFACE_VERT: &str = include_str!("../../shaders/reflections/surface.vert.glsl");
+    /// The g-buffer of opaque surfaces.
+    pub const OPAQUE_FRAG: &str = include_str!("../../shaders/reflections/opaque.frag.glsl");
+    /// The g-buffer of transparent surfaces.
+    pub const TRANSPARENT_FRAG: &str = include_str!("../../shaders/reflections/transparent.frag.glsl");
+    /// Transparent surfaces over the lit picture.
+    pub const BLEND_FRAG: &str = include_str!("../../shaders/reflections/blend.frag.glsl");
+    /// What opaque surfaces reflect, by the ray tracing pipeline.
+    pub const OPAQUE_RGEN: &str = include_str!("../../shaders/reflections/opaque.rgen.glsl");
+    /// The same by ray queries.
+    pub const OPAQUE_COMP: &str = include_str!("../../shaders/reflections/opaque.comp.glsl");
+    /// What transparent surfaces reflect, by the ray tracing pipeline.
+    pub const TRANSPARENT_RGEN: &str = include_str!("../../shaders/reflections/transparent.rgen.glsl");
+    /// The same by ray queries.
+    pub const TRANSPARENT_COMP: &str = include_str!("../../shaders/reflections/transparent.comp.glsl");
+    /// The nearest triangle of a ray.
+    pub const CLOSEST_RCHIT: &str = include_str!("../../shaders/reflections/closest.rchit.glsl");
+    /// Whether a ray passes a leaf.
+    pub const LEAF_RAHIT: &str = include_str!("../../shaders/reflections/leaf.rahit.glsl");
+    /// A ray that left the scene.
+    pub const CLOSEST_RMISS: &str = include_str!("../../shaders/reflections/closest.rmiss.glsl");
+    /// A shadow ray that reached the light.
+    pub const SHADOW_RMISS: &str = include_str!("../../shaders/reflections/shadow.rmiss.glsl");
+    /// Blurs reflections.
+    pub const FILTER_COMP: &str = include_str!("../../shaders/reflections/filter.comp.glsl");
+    /// Lights the opaque surfaces.
+    pub const COMPOSITE_COMP: &str = include_str!("../../shaders/reflections/composite.comp.glsl");
+    /// Averages the samples of a picture.
+    pub const RESOLVE_COMP: &str = include_str!("../../shaders/reflections/resolve.comp.glsl");
 }

@@ -233,10 +233,11 @@ fn group(index: u32, stage: vk::ShaderStageFlags) -> vk::RayTracingShaderGroupCr
         .closest_hit_shader(vk::SHADER_UNUSED_KHR)
         .any_hit_shader(vk::SHADER_UNUSED_KHR)
         .intersection_shader(vk::SHADER_UNUSED_KHR);
-    if stage == vk::ShaderStageFlags::CLOSEST_HIT_KHR {
-        unused.ty(vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP).closest_hit_shader(index)
-    } else {
-        unused.ty(vk::RayTracingShaderGroupTypeKHR::GENERAL).general_shader(index)
+    let hit = unused.ty(vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP);
+    match stage {
+        vk::ShaderStageFlags::CLOSEST_HIT_KHR => hit.closest_hit_shader(index),
+        vk::ShaderStageFlags::ANY_HIT_KHR => hit.any_hit_shader(index),
+        _ => unused.ty(vk::RayTracingShaderGroupTypeKHR::GENERAL).general_shader(index),
     }
 }
 

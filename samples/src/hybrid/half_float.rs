@@ -1,7 +1,7 @@
 //! Half-precision bits of a number, for textures that every device can filter.
 
 /// IEEE 754 binary16 nearest to `value`, ties to even; values too large become infinite, NaN stays NaN.
-pub(super) fn half_bits(value: f32) -> u16 {
+pub(crate) fn half_bits(value: f32) -> u16 {
     let bits = value.to_bits();
     let sign = (bits >> 16 & 0x8000) as u16;
     let magnitude = bits & 0x7fff_ffff;

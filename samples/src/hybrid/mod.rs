@@ -15,7 +15,7 @@ mod frame;
 mod frame_timings;
 mod geometry_pass;
 mod gpu_scene;
-mod half_float;
+pub(crate) mod half_float;
 mod hardware_raster;
 mod pipelines;
 mod raster_choice;

@@ -33,7 +33,7 @@ mod light;
 mod material;
 mod mesh;
 mod mtl;
-mod noise;
+pub(crate) mod noise;
 mod normals;
 mod obj;
 mod obj_text;

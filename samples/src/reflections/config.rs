@@ -1,0 +1,61 @@
+//! What to render, and by which means of the device.
+
+use lvk::Capabilities;
+
+use super::ReflectionsError;
+use crate::hybrid::RayPath;
+
+/// How the skinned character's structure follows its skin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SkinUpdate {
+    /// The structure of the first frame is refitted.
+    #[default]
+    Refit,
+    /// It is built anew in every frame, to compare with.
+    Rebuild,
+}
+
+/// What to render.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReflectionsConfig {
+    /// By which part of Vulkan rays are traced.
+    pub path: RayPath,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Samples of each pixel, 1 to [`ReflectionsConfig::MAX_SAMPLES`]: they smooth edges, reflections and shadows.
+    pub samples: u32,
+    /// Instances seen under a smaller angle than this, in radians, are left out of the top-level structure; 0 keeps
+    /// them all.
+    pub min_angle: f32,
+    /// How the skinned character's structure follows its skin.
+    pub skin_update: SkinUpdate,
+}
+
+impl ReflectionsConfig {
+    /// The largest number of samples.
+    pub const MAX_SAMPLES: u32 = 256;
+    /// A smallest angle that is about four pixels of a picture of 720 rows.
+    pub const DEFAULT_MIN_ANGLE: f32 = 0.005;
+
+    /// A picture of this size by `path`, everything else as usual.
+    #[must_use]
+    pub fn new(path: RayPath, width: u32, height: u32) -> Self {
+        let (samples, min_angle) = (4, Self::DEFAULT_MIN_ANGLE);
+        Self { path, width, height, samples, min_angle, skin_update: SkinUpdate::default() }
+    }
+
+    pub(super) fn check(&self, capabilities: &Capabilities) -> Result<(), ReflectionsError> {
+        let limit = capabilities.limits.max_texture_2d;
+        let (width, height, samples) = (self.width, self.height, self.samples);
+        if width == 0 || height == 0 || width > limit || height > limit {
+            return Err(ReflectionsError::BadSize { width, height, limit });
+        }
+        if samples == 0 || samples > Self::MAX_SAMPLES {
+            return Err(ReflectionsError::BadSamples { samples, limit: Self::MAX_SAMPLES });
+        }
+        RayPath::choose(Some(self.path), capabilities)?;
+        Ok(())
+    }
+}

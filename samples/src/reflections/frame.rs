@@ -1,0 +1,162 @@
+//! The constants that every shader of the sample reads, laid out as `shaders/reflections/frame.glsl` has them.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::world::Light;
+use crate::scene::Camera;
+
+/// Lights that the shaders have room for.
+const MOST_LIGHTS: usize = 4;
+/// Distance of the near plane in scene units.
+const NEAR_PLANE: f32 = 0.05;
+
+/// `Camera` in `shaders/common/camera.glsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct ViewConstants {
+    eye: [f32; 3],
+    near_plane: f32,
+    forward: [f32; 3],
+    pixel_spread: f32,
+    right: [f32; 3],
+    width: u32,
+    down: [f32; 3],
+    height: u32,
+    clip_right: [f32; 3],
+    padding0: f32,
+    clip_down: [f32; 3],
+    padding1: f32,
+}
+
+impl ViewConstants {
+    /// Of a picture of `extent` pixels.
+    pub(super) fn new(camera: &Camera, extent: [u32; 2]) -> Self {
+        let [right, up, forward] = camera.frame().map(Vec3::from);
+        let half_height = (0.5 * camera.vertical_fov_degrees.to_radians()).tan();
+        let right = right * (half_height * extent[0] as f32 / extent[1] as f32);
+        let down = -up * half_height;
+        Self {
+            eye: camera.eye,
+            near_plane: NEAR_PLANE,
+            forward: forward.to_array(),
+            pixel_spread: 2.0 * half_height / extent[1] as f32,
+            right: right.to_array(),
+            width: extent[0],
+            down: down.to_array(),
+            height: extent[1],
+            clip_right: (right / right.length_squared()).to_array(),
+            padding0: 0.0,
+            clip_down: (down / down.length_squared()).to_array(),
+            padding1: 0.0,
+        }
+    }
+}
+
+/// `Light` of the same name there.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct LightConstants {
+    position: [f32; 3],
+    radius: f32,
+    color: [f32; 3],
+    spread: f32,
+}
+
+/// The tables of the world, and its light: the same in every frame.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct WorldConstants {
+    pub(super) materials: u64,
+    pub(super) geometries: u64,
+    pub(super) instances: u64,
+    pub(super) lights: [LightConstants; MOST_LIGHTS],
+    pub(super) harmonics: [[f32; 3]; 9],
+    pub(super) light_count: u32,
+}
+
+/// Bindless indices.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Indices {
+    pub(super) tlas: u32,
+    pub(super) sky: u32,
+    pub(super) sky_sampler: u32,
+    pub(super) surface_sampler: u32,
+    pub(super) opaque_surface: u32,
+    pub(super) opaque_depth: u32,
+    pub(super) glass_surface: u32,
+    pub(super) glass_depth: u32,
+    pub(super) direct: u32,
+    pub(super) reflection: u32,
+    pub(super) filtered: u32,
+    pub(super) glass_reflection: u32,
+    pub(super) composite: u32,
+    pub(super) picture: u32,
+    pub(super) padding: [u32; 3],
+}
+
+/// The whole block, padded so that the next sample's is aligned.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct FrameConstants {
+    pub(super) view: ViewConstants,
+    pub(super) world: WorldConstants,
+    pub(super) jitter: [f32; 2],
+    pub(super) frame_number: u32,
+    pub(super) sample_number: u32,
+    pub(super) time: f32,
+    pub(super) indices: Indices,
+}
+
+/// Bytes from one sample's block to the next.
+pub(super) const FRAME_BYTES: u64 = size_of::<FrameConstants>() as u64;
+
+const _: () = assert!(FRAME_BYTES.is_multiple_of(16) && std::mem::offset_of!(FrameConstants, jitter) == 360);
+
+/// The push constants of all passes but the skinning.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Push {
+    pub(super) frame: u64,
+    pub(super) arguments: [u32; 4],
+}
+
+/// What shaders know of the lights; more than they have room for are left out.
+pub(super) fn light_constants(lights: &[Light]) -> ([LightConstants; MOST_LIGHTS], u32) {
+    let mut all = [LightConstants::zeroed(); MOST_LIGHTS];
+    for (constants, light) in all.iter_mut().zip(lights) {
+        let Light { position, radius, color, spread } = *light;
+        *constants = LightConstants { position, radius, color, spread };
+    }
+    (all, lights.len().min(MOST_LIGHTS) as u32)
+}
+
+/// Where in a pixel sample `number` looks, in normalised device coordinates: evenly spread, the only one in the middle.
+pub(super) fn jitter(number: u32, count: u32, extent: [u32; 2]) -> [f32; 2] {
+    if count <= 1 {
+        return [0.0; 2];
+    }
+    let place = |ratio: f32| (0.5 + ratio * number as f32).fract() - 0.5;
+    [2.0 * place(0.754_877_7) / extent[0] as f32, 2.0 * place(0.569_840_3) / extent[1] as f32]
+}
+
+/// An address in two words, as push constants carry it.
+pub(super) fn words(address: u64) -> [u32; 2] {
+    [address as u32, (address >> 32) as u32]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_stay_in_their_pixel_and_differ() {
+        let all: Vec<_> = (0..16).map(|number| jitter(number, 16, [100, 50])).collect();
+        for (number, [x, y]) in all.iter().enumerate() {
+            assert!(x.abs() <= 0.01 && y.abs() <= 0.02);
+            assert!(all[..number].iter().all(|other| other != &[*x, *y]));
+        }
+        assert_eq!(jitter(0, 1, [8, 8]), [0.0; 2]);
+    }
+}

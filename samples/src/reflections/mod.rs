@@ -1,0 +1,49 @@
+//! The `reflections` sample: ray traced reflections over a rasterised picture, after "Vulkan Ray Tracing Best Practices
+//! for Hybrid Rendering" (Khronos, on Wolfenstein: Youngblood).
+//!
+//! * Opaque reflections start from depth and normals of a g-buffer; transparent surfaces are drawn into a second one,
+//!   whose depth masks a second ray pass, and are blended over the lit picture afterwards.
+//! * Rays are shortened by roughness ([`reflection_range`]) and what they find is filtered by roughness and by the
+//!   distance of what they met.
+//! * A character is skinned by compute into the buffer that its structure is refitted from in every frame; leaves turn
+//!   to the camera and are built anew, alpha-masked by an any-hit shader or while a query walks.
+//! * Models have a geometry for each material, positions of 16 bits and indices of 16 bits; the grid of the positions
+//!   is undone by the transforms of the instances.
+//! * The top-level structure shows what is seen under a large enough angle ([`InstanceCount`]).
+//! * What is reflected is lit as what is seen, with shadow rays of its own, on screen or off; only light from all around
+//!   is a guess there, by spherical harmonics (`shaders/reflections/lighting.glsl`).
+//!
+//! [`Reflections`] is the sample for programs and tests, [`run`] the one for the command line.
+
+mod args;
+mod config;
+mod error;
+mod frame;
+mod image_passes;
+mod mesh;
+mod models;
+mod moving;
+mod paint;
+mod pipelines;
+mod quantise;
+mod range;
+mod raster_passes;
+mod ray_passes;
+mod renderer;
+mod run;
+mod serpent;
+mod sky_light;
+mod stamps;
+mod tables;
+mod targets;
+mod top_level;
+mod world;
+
+pub use args::ReflectionsArgs;
+pub use config::{ReflectionsConfig, SkinUpdate};
+pub use error::ReflectionsError;
+pub use pipelines::pipelines;
+pub use range::{FAR, ROUGHEST_TRACED, reflection_range};
+pub use renderer::Reflections;
+pub use run::run;
+pub use top_level::InstanceCount;

@@ -1,0 +1,214 @@
+//! What moves: the serpent, skinned by compute into the buffer that its structure is refitted from, and the leaves,
+//! turned to the camera by compute and built anew. Both happen in the command buffer that the rays are traced in.
+
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+use lvk::{
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, BuildMode,
+    CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, GeometryFlags, Holder,
+    PrimitiveOrder, Triangles,
+};
+
+use super::config::SkinUpdate;
+use super::frame::{Push, words};
+use super::pipelines::{LEAVES, SKIN};
+use super::quantise::pack_normal;
+use super::serpent::{self, BONE_COUNT, Skin};
+use super::tables::{Arena, array, index_range};
+use crate::pipelines::SampleStage;
+
+/// Invocations of a work group of both compute shaders.
+const GROUP: u32 = 64;
+
+/// `Push` in `shaders/reflections/skin.comp.glsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct SkinPush {
+    rest: u64,
+    bones: u64,
+    positions: u64,
+    normals: u64,
+    vertex_count: u64,
+}
+
+/// A mesh of the serpent.
+pub(super) struct SkinPart {
+    pub(super) first_vertex: u32,
+    vertex_count: u32,
+    /// Places of the shared buffer of indices.
+    pub(super) indices: Range<u32>,
+}
+
+/// The buffers of moving things.
+pub(super) struct Moving {
+    pub(super) skin_parts: Vec<SkinPart>,
+    pub(super) skin_positions: u64,
+    pub(super) skin_normals: u64,
+    pub(super) leaf_positions: u64,
+    pub(super) leaf_indices: Range<u32>,
+    leaf_count: u32,
+    rest: Holder<BufferHandle>,
+    bones: Holder<BufferHandle>,
+    positions: Holder<BufferHandle>,
+    normals: Holder<BufferHandle>,
+    leaves: Holder<BufferHandle>,
+    skin_vertex_count: u32,
+}
+
+/// The passes that move them, and their structures.
+pub(super) struct MovingPasses {
+    skin: Holder<ComputePipelineHandle>,
+    turn: Holder<ComputePipelineHandle>,
+    pub(super) serpent: Holder<AccelStructHandle>,
+    pub(super) leaves: Holder<AccelStructHandle>,
+    skin_mode: BuildMode,
+}
+
+impl Moving {
+    /// Buffers with the serpent at rest; its indices, and those of the leaves, go into `arena`.
+    pub(super) fn new(ctx: &Context, arena: &mut Arena, leaf_count: u32) -> lvk::Result<Self> {
+        let skin = Skin::new();
+        let rest = skin.rest_vertices();
+        let mut first_vertex = 0;
+        let mut skin_parts = Vec::new();
+        for mesh in &skin.parts {
+            let vertex_count = mesh.vertices.len() as u32;
+            skin_parts.push(SkinPart {
+                first_vertex,
+                vertex_count,
+                indices: arena.add_indices(&mesh.triangles),
+            });
+            first_vertex += vertex_count;
+        }
+        let quads: Vec<[u16; 3]> = (0..leaf_count as u16)
+            .map(|leaf| 4 * leaf)
+            .flat_map(|v| [[v, v + 1, v + 2], [v + 2, v + 1, v + 3]])
+            .collect();
+        let input = BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT;
+        let at_rest: Vec<[f32; 3]> = rest.iter().map(|vertex| vertex.position).collect();
+        let packed: Vec<u32> = rest.iter().map(|vertex| pack_normal(vertex.normal.into())).collect();
+        let positions = array(ctx, "skinned positions", input, &at_rest)?;
+        let normals = array(ctx, "skinned normals", BufferUsage::STORAGE, &packed)?;
+        let leaves = array(ctx, "leaf positions", input, &vec![[0.0_f32; 3]; 4 * leaf_count as usize])?;
+        Ok(Self {
+            skin_parts,
+            skin_positions: ctx.buffer_address(*positions)?,
+            skin_normals: ctx.buffer_address(*normals)?,
+            leaf_positions: ctx.buffer_address(*leaves)?,
+            leaf_indices: arena.add_indices(&quads),
+            leaf_count,
+            rest: array(ctx, "skin at rest", BufferUsage::STORAGE, &rest)?,
+            bones: ctx.create_buffer(&BufferDesc {
+                size_bytes: (BONE_COUNT * size_of::<[f32; 12]>()) as u64,
+                debug_name: "bones",
+                ..BufferDesc::default()
+            })?,
+            positions,
+            normals,
+            leaves,
+            skin_vertex_count: rest.len() as u32,
+        })
+    }
+
+    /// Moves the bones to where they are at `time` in seconds.
+    pub(super) fn pose(&self, ctx: &Context, time: f32) -> lvk::Result<()> {
+        ctx.upload_buffer(*self.bones, 0, bytemuck::cast_slice(&serpent::bones(time)))
+    }
+
+    fn skin_geometries(&self, indices: BufferHandle) -> Vec<BlasGeometry> {
+        let geometry = |part: &SkinPart| {
+            BlasGeometry::Triangles(Triangles {
+                vertex_offset: 12 * u64::from(part.first_vertex),
+                indices: Some(index_range(indices, &part.indices)),
+                triangle_count: (part.indices.end - part.indices.start) / 3,
+                ..Triangles::packed(*self.positions, part.vertex_count)
+            })
+        };
+        self.skin_parts.iter().map(geometry).collect()
+    }
+
+    /// Alpha-masked: its hits are asked about.
+    fn leaf_geometry(&self, indices: BufferHandle) -> BlasGeometry {
+        BlasGeometry::Triangles(Triangles {
+            indices: Some(index_range(indices, &self.leaf_indices)),
+            triangle_count: 2 * self.leaf_count,
+            flags: GeometryFlags::NO_DUPLICATE_ANY_HIT,
+            ..Triangles::packed(*self.leaves, 4 * self.leaf_count)
+        })
+    }
+
+    /// What the compute shaders write: draws and rays read it in the same command buffer.
+    pub(super) fn written(&self) -> [BufferHandle; 3] {
+        [*self.positions, *self.normals, *self.leaves]
+    }
+}
+
+impl MovingPasses {
+    pub(super) fn new(
+        ctx: &Context,
+        moving: &Moving,
+        indices: BufferHandle,
+        update: SkinUpdate,
+    ) -> lvk::Result<Self> {
+        let skin_mode = match update {
+            SkinUpdate::Refit => BuildMode::Refit,
+            SkinUpdate::Rebuild => BuildMode::Rebuild,
+        };
+        let serpent = ctx.create_blas(&BlasDesc {
+            geometries: &moving.skin_geometries(indices),
+            flags: BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE,
+            debug_name: "serpent",
+            ..BlasDesc::default()
+        })?;
+        let leaves = ctx.create_blas(&BlasDesc {
+            geometries: &[moving.leaf_geometry(indices)],
+            flags: BuildFlags::FAST_BUILD,
+            order: PrimitiveOrder::Given,
+            debug_name: "leaves",
+        })?;
+        Ok(Self { skin: compute(ctx, SKIN)?, turn: compute(ctx, LEAVES)?, serpent, leaves, skin_mode })
+    }
+
+    /// Records what moves everything, and the builds that follow it. `frame` is the address of the frame's constants.
+    pub(super) fn record(
+        &self,
+        ctx: &Context,
+        cmd: &mut CommandBuffer,
+        moving: &Moving,
+        frame: u64,
+    ) -> lvk::Result<()> {
+        cmd.push_label("skinning");
+        cmd.bind_compute_pipeline(*self.skin)?;
+        cmd.push_constants(&SkinPush {
+            rest: ctx.buffer_address(*moving.rest)?,
+            bones: ctx.buffer_address(*moving.bones)?,
+            positions: moving.skin_positions,
+            normals: moving.skin_normals,
+            vertex_count: moving.skin_vertex_count.into(),
+        })?;
+        let buffers = [*moving.positions, *moving.normals];
+        let writes = Dependencies { buffers: &buffers, ..Dependencies::default() };
+        cmd.dispatch([moving.skin_vertex_count.div_ceil(GROUP), 1, 1], &writes)?;
+        cmd.pop_label();
+        cmd.push_label("leaves");
+        cmd.bind_compute_pipeline(*self.turn)?;
+        let [low, high] = words(moving.leaf_positions);
+        cmd.push_constants(&Push { frame, arguments: [low, high, moving.leaf_count, 0] })?;
+        let writes = Dependencies { buffers: &[*moving.leaves], ..Dependencies::default() };
+        cmd.dispatch([moving.leaf_count.div_ceil(GROUP), 1, 1], &writes)?;
+        cmd.pop_label();
+        cmd.build_blas(&[*self.serpent], self.skin_mode)?;
+        cmd.build_blas(&[*self.leaves], BuildMode::Rebuild)
+    }
+}
+
+/// A compute pipeline of one stage.
+pub(super) fn compute(ctx: &Context, stage: SampleStage) -> lvk::Result<Holder<ComputePipelineHandle>> {
+    let module = ctx.create_shader_module(&stage.module())?;
+    ctx.create_compute_pipeline(&ComputePipelineDesc {
+        module: Some(*module),
+        debug_name: stage.name,
+        ..ComputePipelineDesc::default()
+    })
+}

@@ -1,0 +1,266 @@
+//! The sample as a type: say the time, get a picture.
+
+use lvk::{
+    AddressMode, BufferDesc, BufferHandle, CommandBuffer, Context, Format, Holder, SamplerDesc,
+    SamplerHandle, TextureDesc, TextureHandle, TextureKind, TextureRegion, TextureUsage,
+};
+
+use super::config::ReflectionsConfig;
+use super::error::ReflectionsError;
+use super::frame::{
+    FRAME_BYTES, FrameConstants, Indices, ViewConstants, WorldConstants, jitter, light_constants,
+};
+use super::image_passes::ImagePasses;
+use super::moving::{Moving, MovingPasses};
+use super::paint::Picture;
+use super::raster_passes::{Drawn, RasterPasses};
+use super::ray_passes::{RayPasses, Surfaces};
+use super::sky_light::harmonics;
+use super::stamps::{PASSES, Stamps};
+use super::tables::{Arena, Tables};
+use super::targets::Targets;
+use super::top_level::{InstanceCount, TopLevel};
+use super::world::{self, World};
+use crate::app::sample::PassTimes;
+use crate::hybrid::half_float::half_bits;
+use crate::scene::{Camera, Sky};
+
+/// Frames in a second of the animation.
+const FRAME_RATE: f32 = 60.0;
+/// Texels on an edge of the sky's cube map.
+const SKY_SIZE: u32 = 256;
+
+/// Renders the hall. All pipelines are made by [`new`](Self::new).
+pub struct Reflections {
+    ctx: Context,
+    config: ReflectionsConfig,
+    tables: Tables,
+    moving: Moving,
+    moving_passes: MovingPasses,
+    top_level: TopLevel,
+    targets: Targets,
+    raster: RasterPasses,
+    rays: RayPasses,
+    images: ImagePasses,
+    stamps: Option<Stamps>,
+    constants: WorldConstants,
+    indices: Indices,
+    frame_buffer: Holder<BufferHandle>,
+    frame_address: u64,
+    camera: Camera,
+    time: f32,
+    _held: (Vec<Holder<TextureHandle>>, [Holder<SamplerHandle>; 2]),
+}
+
+impl Reflections {
+    /// Makes the hall, its structures and all pipelines. The animation stands at its beginning.
+    ///
+    /// # Errors
+    /// [`ReflectionsError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, config: &ReflectionsConfig) -> Result<Self, ReflectionsError> {
+        config.check(ctx.capabilities())?;
+        let extent = [config.width, config.height];
+        let world = World::new();
+        let mut textures = upload_textures(ctx, &world)?;
+        let mut arena = Arena::of(&world.models);
+        let moving = Moving::new(ctx, &mut arena, world.leaf_count)?;
+        let buffers = arena.upload(ctx)?;
+        let handles = [*buffers[0], *buffers[1]];
+        let tables = Tables::new(ctx, &world, &arena, buffers, &moving, &textures)?;
+        let moving_passes = MovingPasses::new(ctx, &moving, handles[1], config.skin_update)?;
+        let top_level = TopLevel::new(ctx, &world, &arena, handles, &moving_passes)?;
+        let targets = Targets::new(ctx, extent)?;
+        let samplers = [
+            sampler(ctx, "surface sampler", AddressMode::Repeat)?,
+            sampler(ctx, "sky sampler", AddressMode::ClampToEdge)?,
+        ];
+        let sky = upload_sky(ctx, &world.sky)?;
+        let mut indices = Indices {
+            tlas: top_level.tlas.index(),
+            sky: sky.index(),
+            surface_sampler: samplers[0].index(),
+            sky_sampler: samplers[1].index(),
+            ..bytemuck::Zeroable::zeroed()
+        };
+        targets.name_in(&mut indices);
+        textures.push(sky);
+        let frame_buffer = ctx.create_buffer(&BufferDesc {
+            size_bytes: FRAME_BYTES * u64::from(config.samples),
+            debug_name: "frame constants",
+            ..BufferDesc::default()
+        })?;
+        let has_stamps = ctx.capabilities().limits.timestamp_bits > 0;
+        Ok(Self {
+            constants: world_constants(&world, &tables),
+            raster: RasterPasses::new(ctx)?,
+            rays: RayPasses::new(ctx, config.path)?,
+            images: ImagePasses::new(ctx, extent)?,
+            stamps: has_stamps.then(|| Stamps::new(ctx)).transpose()?,
+            frame_address: ctx.buffer_address(*frame_buffer)?,
+            ctx: ctx.clone(),
+            config: *config,
+            tables,
+            moving,
+            moving_passes,
+            top_level,
+            targets,
+            indices,
+            frame_buffer,
+            camera: world::camera(0.0),
+            time: 0.0,
+            _held: (textures, samplers),
+        })
+    }
+
+    /// Moves the camera and everything that moves to where they are at `time`, in seconds. Nothing depends on earlier
+    /// times.
+    pub fn show(&mut self, time: f32) {
+        self.time = time;
+        self.camera = world::camera(time);
+    }
+
+    /// Looks from another place than the animation's, until the next [`show`](Self::show).
+    pub fn look(&mut self, camera: &Camera) {
+        self.camera = *camera;
+    }
+
+    /// Renders the picture, waits for it and answers what its passes took. Calls `after_sample` with the number of samples
+    /// done.
+    ///
+    /// # Errors
+    /// [`ReflectionsError::Device`].
+    pub fn render_with(&mut self, after_sample: &mut dyn FnMut(u32)) -> Result<PassTimes, ReflectionsError> {
+        self.upload_constants()?;
+        let mut times = [0.0; PASSES.len()];
+        for sample in 0..self.config.samples {
+            let mut cmd = self.ctx.acquire_command_buffer()?;
+            self.record(&mut cmd, sample)?;
+            let submitted = self.ctx.submit(cmd)?;
+            self.ctx.wait(submitted)?;
+            if let Some(stamps) = &self.stamps {
+                stamps.add_to(&self.ctx, &mut times)?;
+            }
+            after_sample(sample + 1);
+        }
+        let has_times = self.stamps.is_some();
+        Ok(PASSES.into_iter().zip(times).filter(|_| has_times).collect())
+    }
+
+    /// The texture with the last picture, sRGB, for a copy to whatever shows it.
+    pub fn picture(&self) -> TextureHandle {
+        *self.targets.picture
+    }
+
+    /// The last picture: red, green, blue and alpha of each pixel, 8 bits each, sRGB, rows from the top.
+    ///
+    /// # Errors
+    /// [`ReflectionsError::Device`].
+    pub fn read_image(&self) -> Result<Vec<u8>, ReflectionsError> {
+        Ok(self.ctx.download_texture(*self.targets.picture, &TextureRegion::default())?)
+    }
+
+    /// How many instances rays can meet from where the camera is.
+    pub fn instance_count(&self) -> InstanceCount {
+        self.top_level.count(self.camera.eye.into(), self.config.min_angle)
+    }
+
+    /// What is rendered.
+    pub fn config(&self) -> &ReflectionsConfig {
+        &self.config
+    }
+
+    fn upload_constants(&self) -> lvk::Result<()> {
+        let extent = [self.config.width, self.config.height];
+        let all: Vec<FrameConstants> = (0..self.config.samples)
+            .map(|sample_number| FrameConstants {
+                view: ViewConstants::new(&self.camera, extent),
+                world: self.constants,
+                jitter: jitter(sample_number, self.config.samples, extent),
+                frame_number: (self.time * FRAME_RATE).round() as u32,
+                sample_number,
+                time: self.time,
+                indices: self.indices,
+            })
+            .collect();
+        self.ctx.upload_buffer(*self.frame_buffer, 0, bytemuck::cast_slice(&all))?;
+        self.moving.pose(&self.ctx, self.time)
+    }
+
+    fn record(&self, cmd: &mut CommandBuffer, sample: u32) -> lvk::Result<()> {
+        let frame = self.frame_address + FRAME_BYTES * u64::from(sample);
+        let extent = [self.config.width, self.config.height];
+        let stamp = |cmd: &mut CommandBuffer, passes| {
+            self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.after(cmd, passes))
+        };
+        self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.reset(cmd))?;
+        if sample == 0 {
+            self.moving_passes.record(&self.ctx, cmd, &self.moving, frame)?;
+            let eye = self.camera.eye.into();
+            self.top_level.record(cmd, eye, self.config.min_angle)?;
+        }
+        stamp(cmd, 1)?;
+        let written = self.moving.written();
+        let draws = &self.tables.draws;
+        let drawn = Drawn { indices: *self.tables.indices, draws, written: &written, frame };
+        self.raster.record_surfaces(cmd, &self.targets, drawn)?;
+        stamp(cmd, 2)?;
+        self.rays.record(cmd, Surfaces::Opaque, extent, &self.targets, &written, frame)?;
+        stamp(cmd, 3)?;
+        self.rays.record(cmd, Surfaces::Transparent, extent, &self.targets, &written, frame)?;
+        stamp(cmd, 4)?;
+        self.images.record_composite(cmd, &self.targets, frame)?;
+        self.raster.record_blend(cmd, &self.targets, drawn)?;
+        self.images.record_resolve(cmd, &self.targets, frame, self.config.samples)?;
+        stamp(cmd, 5)
+    }
+}
+
+fn world_constants(world: &World, tables: &Tables) -> WorldConstants {
+    let (lights, light_count) = light_constants(&world.lights);
+    WorldConstants {
+        materials: tables.materials,
+        geometries: tables.geometries,
+        instances: tables.instances,
+        lights,
+        harmonics: harmonics(&world.sky),
+        light_count,
+    }
+}
+
+fn upload_textures(ctx: &Context, world: &World) -> lvk::Result<Vec<Holder<TextureHandle>>> {
+    let upload = |picture: &Picture| {
+        ctx.create_texture(&TextureDesc {
+            format: Format::Rgba8Srgb,
+            extent: [picture.size; 2],
+            mips: 0,
+            data: Some(&picture.pixels),
+            generate_mips: true,
+            debug_name: "painted texture",
+            ..TextureDesc::default()
+        })
+    };
+    world.textures.iter().map(upload).collect()
+}
+
+fn upload_sky(ctx: &Context, sky: &Sky) -> lvk::Result<Holder<TextureHandle>> {
+    let faces = sky.bake_cube(SKY_SIZE);
+    let texels: Vec<u16> = faces.iter().flatten().flatten().map(|&c| half_bits(c)).collect();
+    ctx.create_texture(&TextureDesc {
+        kind: TextureKind::Cube,
+        format: Format::Rgba16Float,
+        extent: [SKY_SIZE, SKY_SIZE],
+        usage: TextureUsage::SAMPLED,
+        data: Some(bytemuck::cast_slice(&texels)),
+        debug_name: "sky",
+        ..TextureDesc::default()
+    })
+}
+
+fn sampler(ctx: &Context, debug_name: &str, address: AddressMode) -> lvk::Result<Holder<SamplerHandle>> {
+    ctx.create_sampler(&SamplerDesc {
+        address: [address; 3],
+        max_anisotropy: 8.0,
+        debug_name,
+        ..SamplerDesc::default()
+    })
+}

@@ -1,0 +1,100 @@
+//! The sample on the command line: pictures and timings out.
+
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+use lvk::Context;
+
+use super::{Reflections, ReflectionsArgs, ReflectionsConfig, ReflectionsError};
+use crate::app::device::{DeviceNeeds, driver_text};
+use crate::app::run::{self, Opened, Opening};
+use crate::app::run_args::RayTracing;
+use crate::app::run_error::RunError;
+use crate::app::sample::{Moment, PassTimes, Sample};
+use crate::hybrid::RayPath;
+
+/// What the sample and its pictures are called.
+const NAME: &str = "reflections";
+
+impl From<ReflectionsError> for RunError {
+    fn from(error: ReflectionsError) -> Self {
+        match error {
+            ReflectionsError::BadSize { .. } | ReflectionsError::BadSamples { .. } => Self::input(error),
+            ReflectionsError::Rays(error) => error.into(),
+            ReflectionsError::Device(_) => Self::device(error),
+        }
+    }
+}
+
+impl Sample for Reflections {
+    type Error = ReflectionsError;
+
+    fn update(&mut self, moment: Moment) -> Result<(), ReflectionsError> {
+        self.show(moment.seconds() as f32);
+        Ok(())
+    }
+
+    fn steps_per_frame(&self) -> u64 {
+        self.config().samples.into()
+    }
+
+    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, ReflectionsError> {
+        self.render_with(&mut |samples| after_step(samples.into()))
+    }
+
+    fn picture(&self) -> Result<Vec<u8>, ReflectionsError> {
+        self.read_image()
+    }
+}
+
+/// Does what the command line says. Prints to standard output, errors in one line to standard error; the status
+/// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
+#[must_use]
+pub fn run(args: &ReflectionsArgs) -> ExitCode {
+    run::run(NAME, &args.run, |opening| open(args, opening))
+}
+
+fn open(args: &ReflectionsArgs, opening: &mut Opening<'_>) -> Result<Opened<Reflections>, RunError> {
+    let context = opening.device(&DeviceNeeds::default())?;
+    let wish = match args.run.rt {
+        RayTracing::Auto => None,
+        RayTracing::Pipeline => Some(RayPath::Pipeline),
+        RayTracing::Query => Some(RayPath::Query),
+    };
+    let path = RayPath::choose(wish, context.capabilities())?;
+    let config = ReflectionsConfig {
+        samples: args.samples,
+        min_angle: args.min_angle,
+        ..ReflectionsConfig::new(path, args.run.width, args.run.height)
+    };
+    opening.progress.stage("making the hall and its pipelines", 0);
+    let sample = Reflections::new(&context, &config)?;
+    let headline = headline(&context, &sample);
+    Ok(Opened { context, sample, headline })
+}
+
+fn headline(ctx: &Context, sample: &Reflections) -> String {
+    let capabilities = ctx.capabilities();
+    let mut text = format!("device    {} ({})\n", capabilities.device_name, driver_text(capabilities));
+    if let Some(profile) = &capabilities.profile {
+        let _ = writeln!(text, "profile   {profile}, rehearsed on this device");
+    }
+    let path = match sample.config().path {
+        RayPath::Pipeline => "ray tracing pipeline",
+        RayPath::Query => "ray queries in compute shaders",
+    };
+    let _ = writeln!(
+        text,
+        "method    g-buffers, then reflected rays; {path}; {} samples",
+        sample.config().samples
+    );
+    let count = sample.instance_count();
+    let share = 100.0 * f64::from(count.kept) / f64::from(count.total.max(1));
+    let angle = sample.config().min_angle;
+    let _ = write!(
+        text,
+        "culling   {} of {} instances kept ({share:.0} %): those seen under {angle} radians or more",
+        count.kept, count.total
+    );
+    text
+}

@@ -1,0 +1,48 @@
+// traceClosest() and traceOccluded() by ray queries. A candidate is a leaf: nothing else is not opaque.
+#ifndef REFLECTIONS_TRACE_QUERY
+#define REFLECTIONS_TRACE_QUERY
+
+#include <lvk/ray_query.glsl>
+
+#include "reflections/masks.glsl"
+#include "reflections/surface.glsl"
+
+bool isSolidCandidate(LvkRayQuery query) {
+    uint instance = uint(lvkRayQueryInstanceCustomIndex(query, LVK_CANDIDATE));
+    uint geometry = uint(lvkRayQueryGeometryIndex(query, LVK_CANDIDATE));
+    uint primitive = uint(lvkRayQueryPrimitiveIndex(query, LVK_CANDIDATE, frame.tlas));
+    return isSolid(instance, geometry, primitive, lvkRayQueryBarycentrics(query, LVK_CANDIDATE));
+}
+
+Hit traceClosest(vec3 origin, vec3 direction, float range) {
+    LvkRayQuery query;
+    lvkRayQueryInitialize(query, frame.tlas, LVK_RAY_FLAG_NONE, kMaskAll, origin, 0.0, direction, range);
+    while (lvkRayQueryProceed(query)) {
+        if (isSolidCandidate(query)) {
+            lvkRayQueryConfirmIntersection(query);
+        }
+    }
+    Hit hit = Hit(kNothing, 0u, 0u, vec2(0.0), 0.0);
+    if (lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE) {
+        hit.instance = uint(lvkRayQueryInstanceCustomIndex(query, LVK_COMMITTED));
+        hit.geometry = uint(lvkRayQueryGeometryIndex(query, LVK_COMMITTED));
+        hit.primitive = uint(lvkRayQueryPrimitiveIndex(query, LVK_COMMITTED, frame.tlas));
+        hit.barycentrics = lvkRayQueryBarycentrics(query, LVK_COMMITTED);
+        hit.distance = lvkRayQueryT(query, LVK_COMMITTED);
+    }
+    return hit;
+}
+
+bool traceOccluded(vec3 origin, vec3 direction, float range) {
+    LvkRayQuery query;
+    lvkRayQueryInitialize(query, frame.tlas, LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT, kMaskOpaque, origin, 0.0, direction,
+                          range);
+    while (lvkRayQueryProceed(query)) {
+        if (isSolidCandidate(query)) {
+            lvkRayQueryConfirmIntersection(query);
+        }
+    }
+    return lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE;
+}
+
+#endif

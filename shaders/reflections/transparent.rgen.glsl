@@ -1,0 +1,7 @@
+// What transparent surfaces reflect, by the ray tracing pipeline.
+#include "reflections/trace_pipeline.glsl"
+#include "reflections/reflect.glsl"
+
+void main() {
+    transparentPixel(gl_LaunchIDEXT.xy);
+}

@@ -1,0 +1,224 @@
+//! The pictures of the `reflections` sample: its ways of rendering agree, and they show what they should.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::path::{Path, PathBuf};
+
+use image::RgbaImage;
+use lvk::{Context, Dependencies, DeviceProfile};
+use lvk_samples::hybrid::RayPath;
+use lvk_samples::reflections::{
+    FAR, Reflections, ReflectionsConfig, ReflectionsError, SkinUpdate, reflection_range,
+};
+use lvk_samples::scene::Camera;
+use lvk_samples::shaders::INCLUDES;
+use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
+use lvk_tests::hybrid::paths;
+use lvk_tests::picture::{Likeness, Tolerance, assert_alike, keep};
+use lvk_tests::{device, device_with};
+
+/// No multiple of a work group.
+const SIZE: [u32; 2] = [162, 91];
+/// Of one picture by two paths.
+const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.999, differing_share: 2e-3, flip: 2e-3 };
+/// Of a picture and the same one by another driver, years ago.
+const SAME_AS_EVER: Tolerance = Tolerance { psnr: 40.0, ssim: 0.995, differing_share: 1.0, flip: 0.012 };
+
+fn config(path: RayPath) -> ReflectionsConfig {
+    ReflectionsConfig { samples: 1, ..ReflectionsConfig::new(path, SIZE[0], SIZE[1]) }
+}
+
+fn hall(ctx: &Context, config: &ReflectionsConfig) -> Reflections {
+    Reflections::new(ctx, config).unwrap()
+}
+
+fn picture_at(hall: &mut Reflections, time: f32) -> RgbaImage {
+    hall.show(time);
+    picture(hall)
+}
+
+fn picture(hall: &mut Reflections) -> RgbaImage {
+    hall.render_with(&mut |_| {}).unwrap();
+    let [width, height] = [hall.config().width, hall.config().height];
+    RgbaImage::from_raw(width, height, hall.read_image().unwrap()).unwrap()
+}
+
+/// Two empty pictures would agree too.
+fn assert_shows_something(picture: &RgbaImage) {
+    let colors: std::collections::HashSet<[u8; 4]> = picture.pixels().map(|pixel| pixel.0).collect();
+    assert!(colors.len() > 2000, "{} colours", colors.len());
+    assert!(picture.pixels().all(|pixel| pixel[3] == 255), "a pixel was left out");
+}
+
+#[test]
+fn both_paths_give_the_same_picture() {
+    let Some(ctx) = device() else { return };
+    let paths = paths(&ctx);
+    for time in [0.0, 2.5] {
+        let all: Vec<_> =
+            paths.iter().map(|path| picture_at(&mut hall(&ctx, &config(*path)), time)).collect();
+        assert_shows_something(&all[0]);
+        for other in &all[1..] {
+            assert_alike(&format!("reflections at {time} by query"), other, &all[0], &SAME_RAYS);
+        }
+    }
+}
+
+#[test]
+fn a_frame_depends_on_its_time_alone() {
+    let Some(ctx) = device() else { return };
+    let config = ReflectionsConfig { samples: 2, ..config(paths(&ctx)[0]) };
+    let mut sequence = hall(&ctx, &config);
+    let first = picture_at(&mut sequence, 0.0);
+    for frame in 1..4 {
+        assert_ne!(picture_at(&mut sequence, frame as f32 / 30.0), first, "something moves");
+    }
+    let fifth = picture_at(&mut sequence, 5.0 / 30.0);
+    assert_eq!(picture_at(&mut hall(&ctx, &config), 5.0 / 30.0), fifth, "alone");
+    assert_eq!(picture_at(&mut sequence, 0.0), first, "back again");
+}
+
+/// From close by the basin.
+fn look_at_serpent(hall: &mut Reflections, time: f32) {
+    hall.show(time);
+    hall.look(&Camera::looking_at([-3.6, 1.0, -9.5], [2.0, 1.1, -9.5], 70.0));
+}
+
+#[test]
+fn the_refitted_serpent_is_the_one_built_anew() {
+    let Some(ctx) = device() else { return };
+    for path in paths(&ctx) {
+        let updated = |skin_update| {
+            let mut hall = hall(&ctx, &ReflectionsConfig { skin_update, ..config(path) });
+            // Several refits, each from the one before.
+            for step in 0..4 {
+                hall.show(3.0 * step as f32);
+                picture(&mut hall);
+            }
+            look_at_serpent(&mut hall, 9.0);
+            picture(&mut hall)
+        };
+        let (refitted, rebuilt) = (updated(SkinUpdate::Refit), updated(SkinUpdate::Rebuild));
+        assert_shows_something(&refitted);
+        let elsewhere = {
+            let mut hall = hall(&ctx, &config(path));
+            look_at_serpent(&mut hall, 0.0);
+            picture(&mut hall)
+        };
+        let moved = Likeness::of(&refitted, &elsewhere);
+        assert!(moved.difference.psnr < 28.0, "the serpent is large in the picture, and swims: {moved}");
+        let what = format!("refitted serpent {path:?}");
+        assert_alike(
+            &what,
+            &refitted,
+            &rebuilt,
+            &Tolerance { psnr: 60.0, differing_share: 2e-4, ..SAME_RAYS },
+        );
+    }
+}
+
+#[test]
+fn culling_leaves_out_small_things_and_nothing_else() {
+    let Some(ctx) = device() else { return };
+    let path = paths(&ctx)[0];
+    let with = |min_angle| {
+        let mut hall = hall(&ctx, &ReflectionsConfig { min_angle, ..config(path) });
+        let picture = picture_at(&mut hall, 0.0);
+        (hall.instance_count(), picture)
+    };
+    let (all, whole) = with(0.0);
+    let (usual, culled) = with(ReflectionsConfig::DEFAULT_MIN_ANGLE);
+    let (few, empty) = with(0.1);
+    eprintln!("{all:?} {usual:?} {few:?}");
+    assert_eq!((all.kept, all.total), (usual.total, few.total));
+    assert!(usual.kept * 10 < usual.total * 8, "{usual:?}: culling saves something");
+    assert!(few.kept < usual.kept && few.kept > 10, "{few:?}: large things stay");
+    let tolerance = Tolerance { psnr: 38.0, ssim: 0.99, differing_share: 0.02, flip: 0.01 };
+    assert_alike("culled hall", &culled, &whole, &tolerance);
+    let likeness = Likeness::of(&empty, &whole);
+    assert!(likeness.difference.psnr < 60.0, "larger things do show: {likeness}");
+}
+
+/// The length of rays for roughness 0, 0.01 and so on to 1, by the shaders' own text.
+fn ranges_by_shader(ctx: &Context) -> Vec<f32> {
+    let (_, rule) = INCLUDES.iter().find(|(name, _)| *name == "reflections/range.glsl").unwrap();
+    let main = "
+        layout(local_size_x = 1) in;
+        layout(buffer_reference, scalar) writeonly buffer Ranges { float at[]; };
+        layout(push_constant, scalar) uniform Push { Ranges ranges; };
+        void main() {
+            uint place = gl_WorkGroupID.x;
+            ranges.at[place] = reflectionRange(float(place) / 100.0);
+        }";
+    let pipeline = compute_pipeline(ctx, &format!("{rule}{main}"));
+    let buffer = words_buffer(ctx, &[0; 101]);
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.bind_compute_pipeline(*pipeline).unwrap();
+    cmd.push_constants(&ctx.buffer_address(*buffer).unwrap()).unwrap();
+    cmd.dispatch([101, 1, 1], &Dependencies { buffers: &[*buffer], ..Dependencies::default() }).unwrap();
+    ctx.submit(cmd).unwrap();
+    read_words(ctx, *buffer, 101).into_iter().map(f32::from_bits).collect()
+}
+
+#[test]
+fn shaders_shorten_rays_by_the_rule() {
+    let Some(ctx) = device() else { return };
+    let ranges = ranges_by_shader(&ctx);
+    assert!(ranges.windows(2).all(|pair| pair[1] <= pair[0]), "{ranges:?}");
+    for (step, range) in ranges.iter().enumerate() {
+        // Beside its steps, where division rounds to either side.
+        if ![8, 70].contains(&step) {
+            let expected = reflection_range(step as f32 / 100.0);
+            assert!((range - expected).abs() <= 1e-4 * FAR, "{step} %: {range} instead of {expected}");
+        }
+    }
+}
+
+#[test]
+fn a_phone_shows_the_same() {
+    let phone = DeviceProfile::mali_g715();
+    let Some(ctx) = device() else { return };
+    let Some(rehearsal) = device_with(|desc| desc.profile = Some(&phone)) else { return };
+    let path = RayPath::choose(None, rehearsal.capabilities()).unwrap();
+    assert_eq!(path, RayPath::Query, "the phone has no ray tracing pipelines");
+    if !ctx.capabilities().ray_query {
+        eprintln!("NOT TESTED, {} has no ray queries", ctx.capabilities().device_name);
+        return;
+    }
+    let expected = picture_at(&mut hall(&ctx, &config(path)), 1.0);
+    let picture = picture_at(&mut hall(&rehearsal, &config(path)), 1.0);
+    assert_alike("hall on a phone", &picture, &expected, &Tolerance { psnr: 60.0, ..SAME_RAYS });
+}
+
+#[test]
+fn impossible_pictures_are_refused() {
+    let Some(ctx) = device() else { return };
+    let config = config(paths(&ctx)[0]);
+    let refused = |config| Reflections::new(&ctx, &config).err();
+    for samples in [0, ReflectionsConfig::MAX_SAMPLES + 1] {
+        let error = refused(ReflectionsConfig { samples, ..config });
+        assert!(matches!(error, Some(ReflectionsError::BadSamples { .. })), "{error:?}");
+    }
+    for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {
+        let error = refused(ReflectionsConfig { width, height, ..config });
+        assert!(matches!(error, Some(ReflectionsError::BadSize { .. })), "{error:?}");
+    }
+}
+
+/// Where the change of a picture is meant, look at the new one and copy it over `tests/reference/reflections_small.png`.
+#[test]
+fn the_hall_looks_as_it_always_did() {
+    let Some(ctx) = device() else { return };
+    let config = ReflectionsConfig { samples: 4, ..config(paths(&ctx)[0]) };
+    let picture = picture_at(&mut hall(&ctx, &config), 0.0);
+    match image::open(reference_path()) {
+        Ok(expected) => assert_alike("reflections_small", &picture, &expected.into_rgba8(), &SAME_AS_EVER),
+        Err(error) => {
+            let kept = keep("reflections_small actual", &picture);
+            panic!("{}: {error}; the picture is in {}", reference_path().display(), kept.display());
+        }
+    }
+}
+
+fn reference_path() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("reference/reflections_small.png")
+}
