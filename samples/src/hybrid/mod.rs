@@ -26,6 +26,7 @@ mod texture_fit;
 
 pub use config::{HybridConfig, Method, RayPath};
 pub use error::HybridError;
+pub(crate) use frame::GpuCamera;
 pub use frame_timings::FrameTimings;
 pub use pipelines::pipelines;
 pub use renderer::HybridRenderer;
