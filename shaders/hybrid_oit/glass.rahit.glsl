@@ -3,10 +3,10 @@
 #include "hybrid_oit/sphere.glsl"
 
 layout(location = 0) rayPayloadInEXT Sunlight payload;
-hitAttributeEXT Crossing attribute;
+hitAttributeEXT Crossing crossing;
 
 void main() {
     Sphere sphere = frame.spheres.at[gl_InstanceCustomIndexEXT + lvkPrimitiveIndex(frame.tlas)];
-    payload.opticalDepth += glassOpticalDepth(attribute, sphere.color, gl_RayTminEXT);
+    payload.opticalDepth += glassOpticalDepth(crossing, sphere.color, gl_RayTminEXT);
     ignoreIntersectionEXT;
 }
