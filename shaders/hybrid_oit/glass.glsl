@@ -13,7 +13,7 @@ struct Layer {
 
 const float kHighlight = 900.0;
 const float kFocus = 26.0;
-const float kScatter = 0.55;
+const float kScatter = 0.4;
 
 // Where the ray enters, with all that happens along `inside` units of its way in the glass.
 Layer frontLayer(Sphere sphere, vec3 direction, Crossing crossing, float inside, vec3 sunlight) {
@@ -22,7 +22,7 @@ Layer frontLayer(Sphere sphere, vec3 direction, Crossing crossing, float inside,
     float reflectance = glassReflectance(crossing.cosine);
     vec3 passed = exp(-sphere.color * inside);
     float highlight = pow(max(dot(mirrored, frame.sunDirection), 0.0), kHighlight);
-    vec3 mirror = skyAlong(mirrored) + 60.0 * highlight * sunlight;
+    vec3 mirror = 1.6 * skyAlong(mirrored) + 60.0 * highlight * sunlight;
     // Single scattering where the eye sees the lit side, tinted by the dye.
     float lit = 0.5 + 0.5 * dot(normal, frame.sunDirection);
     vec3 dye = exp(-0.9 * sphere.radius * sphere.color);
@@ -35,7 +35,7 @@ Layer backLayer(Sphere sphere, vec3 direction, Crossing crossing, vec3 sunlight)
     vec3 normal = normalize(frame.camera.eye + crossing.exit * direction - sphere.center);
     float reflectance = glassReflectance(crossing.cosine);
     float focus = pow(max(dot(normal, -frame.sunDirection), 0.0), kFocus);
-    vec3 gathered = 0.8 * focus * sunlight * exp(-sphere.radius * sphere.color);
+    vec3 gathered = 1.5 * focus * sunlight * exp(-sphere.radius * sphere.color);
     vec3 inner = 0.5 * reflectance * skyAlong(reflect(direction, -normal));
     return Layer(gathered + inner, vec3(1.0 - reflectance));
 }

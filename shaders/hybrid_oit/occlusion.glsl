@@ -17,19 +17,34 @@ float edgeShare(vec3 normal, vec3 a, vec3 b) {
     vec3 axis = cross(a, b);
     float squaredSine = dot(axis, axis);
     float angle = atan(sqrt(squaredSine), dot(a, b));
-    return angle * dot(normal, axis) * inversesqrt(max(squaredSine, 1e-12));
+    return angle * dot(normal, axis) * inversesqrt(max(squaredSine, 1e-24));
 }
 
-// The same of a rectangle. What reaches below the horizon is pushed up to it, which errs a little near it.
+// The same of the part of a rectangle above the horizon. Two of its sides cross the horizon or none; between the
+// crossings the part is closed along the horizon.
 float rectangleShare(vec3 normal, vec3 corners[4]) {
-    for (int i = 0; i < 4; i++) {
-        corners[i] = normalize(corners[i] - min(dot(corners[i], normal), 0.0) * normal + 1e-5 * normal);
-    }
     float sum = 0.0;
+    vec3 down = vec3(0.0);
+    vec3 up = vec3(0.0);
     for (int i = 0; i < 4; i++) {
-        sum += edgeShare(normal, corners[i], corners[(i + 1) & 3]);
+        vec3 a = corners[i];
+        vec3 b = corners[(i + 1) & 3];
+        float heightA = dot(a, normal);
+        float heightB = dot(b, normal);
+        if (heightA < 0.0 && heightB < 0.0) {
+            continue;
+        }
+        vec3 crossing = mix(a, b, heightA / (heightA - heightB));
+        if (heightA < 0.0) {
+            up = crossing;
+            a = crossing;
+        } else if (heightB < 0.0) {
+            down = crossing;
+            b = crossing;
+        }
+        sum += edgeShare(normal, a, b);
     }
-    return abs(sum) / 6.283185307;
+    return abs(sum + edgeShare(normal, down, up)) / 6.283185307;
 }
 
 float blockShare(vec3 position, vec3 normal, Block block) {
@@ -55,6 +70,9 @@ float blockShare(vec3 position, vec3 normal, Block block) {
     return share;
 }
 
+// What blocks give back of the light that they keep away, for their albedo and that of the floor between them.
+const float kGivenBack = 0.3;
+
 // What is left of the sky's light, by colour: balls and blocks take it, glass tints it.
 vec3 skyVisibility(vec3 position, vec3 normal) {
     vec3 visible = vec3(1.0);
@@ -68,7 +86,7 @@ vec3 skyVisibility(vec3 position, vec3 normal) {
     for (uint i = 0u; i < frame.blockCount; i++) {
         blocked += blockShare(position, normal, frame.blocks.at[i]);
     }
-    return visible * max(1.0 - blocked, 0.0);
+    return visible * mix(kGivenBack, 1.0, max(1.0 - blocked, 0.0));
 }
 
 #endif

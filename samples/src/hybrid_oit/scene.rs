@@ -170,11 +170,11 @@ impl Default for OitScene {
         Self {
             camera: Camera::looking_at([0.6, 4.6, 10.6], [0.15, 1.25, 0.0], 34.0),
             sun: Sun {
-                direction: Vec3::new(-0.62, 0.72, -0.42),
+                direction: Vec3::new(-0.74, 0.68, 0.16),
                 radius: 0.022,
-                color: Vec3::new(1.42, 1.27, 1.06),
+                color: Vec3::new(1.75, 1.55, 1.26),
             },
-            floor_albedo: Vec3::new(0.80, 0.78, 0.75),
+            floor_albedo: Vec3::new(0.70, 0.69, 0.67),
             blocks: blocks(),
             balls: balls(),
             glass: glass(),
@@ -234,8 +234,8 @@ fn glass() -> Vec<Glass> {
         tint: Vec3::from(tint),
         motion: Motion::drifting(Vec3::new(x, y, z), Vec2::new(0.34, 0.26), turns, 0.16, phase),
     };
-    let (aqua, rose, amber) = ([0.10, 0.72, 0.86], [0.88, 0.16, 0.42], [0.96, 0.62, 0.10]);
-    let (emerald, violet, sky) = ([0.12, 0.78, 0.34], [0.50, 0.22, 0.90], [0.20, 0.46, 0.95]);
+    let (aqua, rose, amber) = ([0.05, 0.58, 0.78], [0.86, 0.07, 0.30], [0.96, 0.52, 0.04]);
+    let (emerald, violet, sky) = ([0.05, 0.66, 0.22], [0.38, 0.12, 0.84], [0.09, 0.32, 0.92]);
     vec![
         glass(0.82, -3.55, 1.20, 1.55, aqua, 1.0, 0.10),
         glass(0.62, -2.75, 0.95, 2.85, rose, -1.0, 0.35),
