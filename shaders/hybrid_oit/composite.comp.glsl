@@ -25,7 +25,7 @@ vec3 shade(Surface surface, vec3 direction, vec3 shadow) {
         color = mix(color, mirror, surface.gloss * reflectance);
     }
     float haze = 1.0 - exp(-kHazePerUnit * max(surface.distance - kHazeStart, 0.0));
-    return mix(color, skyAlong(normalize(vec3(direction.x, 0.03, direction.z))), haze);
+    return mix(color, skyAlong(normalize(vec3(direction.x, 0.0, direction.z))), haze);
 }
 
 vec3 radianceAt(uvec2 pixel) {

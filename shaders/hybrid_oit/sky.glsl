@@ -4,7 +4,7 @@
 
 #include "hybrid_oit/frame.glsl"
 
-const vec3 kHorizon = vec3(0.72, 0.70, 0.70);
+const vec3 kHorizon = vec3(0.66, 0.68, 0.73);
 const vec3 kZenith = vec3(0.13, 0.24, 0.46);
 const vec3 kGround = vec3(0.30, 0.28, 0.27);
 
