@@ -208,6 +208,6 @@ fn reflectance(cosine: f64) -> f64 {
 fn cross_block(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> (bool, bool) {
     let (a, b) = ((low - origin) / direction, (high - origin) / direction);
     let (entry, exit) = (a.min(b).max_element(), a.max(b).min_element());
-    let is_doubtful = exit > -1e-3 && (exit - entry).abs() < 4e-3 || exit.abs() < 1e-3;
+    let is_doubtful = exit > -2e-5 && (exit - entry).abs() < 4e-3 || exit.abs() < 2e-5;
     (exit > entry && exit > 0.0, is_doubtful)
 }

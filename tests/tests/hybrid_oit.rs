@@ -193,7 +193,7 @@ fn shadows_are_those_the_host_computes() {
             let normal = host.normal_at(point);
             let cosine = normal.dot(sun);
             let expected = host.sunlight(point + 1e-4 * normal);
-            if expected.is_doubtful || cosine.abs() < 5e-3 {
+            if cosine.abs() < 5e-3 || expected.is_doubtful && cosine > 0.0 {
                 doubtful += 1;
                 continue;
             }
@@ -208,7 +208,7 @@ fn shadows_are_those_the_host_computes() {
             }
         }
         eprintln!("{path:?}: {lit} lit, {dark} dark, {tinted} tinted, {doubtful} left out");
-        assert!(lit > 2000 && dark > 500 && tinted > 500 && doubtful < 700);
+        assert!(lit > 2000 && dark > 500 && tinted > 500 && doubtful < 500);
     }
 }
 
@@ -285,8 +285,8 @@ fn the_reference_picture_tells_small_mistakes() {
         ("paler glass", |scene| scene.glass.iter_mut().for_each(|glass| glass.tint = glass.tint.powf(0.8))),
         ("moved sun", |scene| scene.sun.direction.x += 0.06),
         ("dimmer sun", |scene| scene.sun.color *= 0.9),
-        ("one ball less", |scene| drop(scene.balls.pop())),
-        ("one sphere less", |scene| drop(scene.glass.pop())),
+        ("one ball less", |scene| scene.balls.truncate(5)),
+        ("one sphere less", |scene| scene.glass.truncate(13)),
     ];
     for (what, mistake) in mistakes {
         let mut wrong = OitScene::default();
