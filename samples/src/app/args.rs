@@ -1,52 +1,26 @@
 //! The command line of the `hybrid` sample.
 
-use std::path::PathBuf;
-
-use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 use clap::{Parser, ValueEnum};
-use lvk::DeviceProfile;
 
-/// Largest width and height of a picture, in pixels.
-pub const MAX_SIZE: u32 = 16_384;
+use super::run_args::RunArgs;
+use super::scene_args::SceneArgs;
 
 /// Largest number of bounces.
 pub const MAX_DEPTH: u32 = 16;
 
-/// Renders a scene with ray traced shadows, reflections and refractions, and writes the last frame as a PNG.
+/// Renders a scene with ray traced shadows, reflections and refractions, and writes pictures as PNG.
 ///
 /// Without --scene it shows a courtyard made by code, so that `cargo run --release` alone gives a picture.
 #[derive(Debug, Clone, PartialEq, Parser)]
 #[command(name = "hybrid", version, after_help = EXAMPLES)]
 pub struct HybridArgs {
-    /// Wavefront OBJ to render, with its MTL and textures beside it [default: the built-in courtyard]
-    #[arg(long, value_name = "FILE", help_heading = "Scene")]
-    pub scene: Option<PathBuf>,
-
-    /// Factor from the file's units to scene units [default: 1, or the known scale of a benchmark scene]
-    #[arg(long, value_name = "F", value_parser = positive, requires = "scene", help_heading = "Scene")]
-    pub scale: Option<f32>,
-
-    /// Light and up to five cameras: lines `scene NAME x y z`, then `at EYE TARGET FOV` or `dir EYE DIRECTION FOV`
-    #[arg(long, value_name = "FILE", requires = "scene", help_heading = "Scene")]
-    pub cameras: Option<PathBuf>,
-
-    /// Which of the scene's five cameras to look through
-    #[arg(
-        long,
-        value_name = "1-5",
-        default_value_t = 1,
-        value_parser = clap::value_parser!(u32).range(1..=5),
-        help_heading = "Scene"
-    )]
-    pub camera: u32,
+    /// Which scene, and from where it is seen
+    #[command(flatten)]
+    pub scene: SceneArgs,
 
     /// How to find what a pixel sees
     #[arg(long, value_enum, default_value_t = Method::Hybrid, help_heading = "Rendering")]
     pub method: Method,
-
-    /// How to trace rays
-    #[arg(long, value_enum, default_value_t = RayTracing::Auto, help_heading = "Rendering")]
-    pub rt: RayTracing,
 
     /// How often a ray may be reflected or refracted before it gives up, 0 to 16; 0 gives shadows only
     #[arg(
@@ -58,67 +32,13 @@ pub struct HybridArgs {
     )]
     pub depth: u32,
 
-    /// Frames to render and time [default: 60, or 1 on a driver that runs on the CPU]
-    #[arg(
-        long,
-        value_name = "N",
-        value_parser = clap::value_parser!(u32).range(1..=1_000_000),
-        help_heading = "Rendering"
-    )]
-    pub frames: Option<u32>,
+    /// What the lamp does in a sequence
+    #[arg(long, value_enum, default_value_t = Lamp::Still, help_heading = "Frames")]
+    pub lamp: Lamp,
 
-    /// Width of the picture in pixels, 1 to 16384
-    #[arg(
-        long,
-        value_name = "PIXELS",
-        default_value_t = 1280,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIZE)),
-        help_heading = "Output"
-    )]
-    pub width: u32,
-
-    /// Height of the picture in pixels, 1 to 16384
-    #[arg(
-        long,
-        value_name = "PIXELS",
-        default_value_t = 720,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIZE)),
-        help_heading = "Output"
-    )]
-    pub height: u32,
-
-    /// PNG to write; an existing file is replaced
-    #[arg(long, value_name = "FILE", default_value = "hybrid.png", help_heading = "Output")]
-    pub out: PathBuf,
-
-    /// Device to use, by its number in --list-devices or part of its name
-    /// [default: the most capable one that can trace rays]
-    #[arg(long, value_name = "NUMBER|NAME", help_heading = "Device")]
-    pub device: Option<String>,
-
-    /// Rehearse another device on this one: without what it lacks, and within its limits
-    #[arg(
-        long,
-        value_name = "NAME",
-        value_parser = PossibleValuesParser::new(DeviceProfile::names()).try_map(|name| DeviceProfile::named(&name)),
-        help_heading = "Device"
-    )]
-    pub profile: Option<DeviceProfile>,
-
-    /// Print the devices and what they can do, and exit
-    #[arg(long, help_heading = "Device")]
-    pub list_devices: bool,
-
-    /// Run with Vulkan validation; a message is an error
-    #[arg(
-        long,
-        value_enum,
-        value_name = "KIND",
-        num_args = 0..=1,
-        default_missing_value = "core",
-        help_heading = "Device"
-    )]
-    pub validate: Option<Validation>,
+    /// Frames, pictures and device
+    #[command(flatten)]
+    pub run: RunArgs,
 }
 
 /// How to find what a pixel sees.
@@ -130,24 +50,13 @@ pub enum Method {
     Hybrid,
 }
 
-/// How to trace rays.
+/// What the lamp does in a sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum RayTracing {
-    /// A ray tracing pipeline where the device has one, else ray queries.
-    Auto,
-    /// A ray tracing pipeline with shader binding table.
-    Pipeline,
-    /// Ray queries in a compute shader.
-    Query,
-}
-
-/// What Vulkan validation checks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Validation {
-    /// Correct use and synchronisation.
-    Core,
-    /// The same, and what shaders do on the device; slow.
-    Gpu,
+pub enum Lamp {
+    /// It stays where it is.
+    Still,
+    /// It goes round once in a small level circle, through its own place in frame 0.
+    Circle,
 }
 
 const EXAMPLES: &str = "\
@@ -157,20 +66,26 @@ Examples:
   hybrid --method standalone --rt query --frames 1        everything ray traced in a compute shader, once
   hybrid --device 1 --validate                            on the second device, with validation
   hybrid --profile mali-g715                              as on a phone: ray queries, split meshes
+  hybrid --frames 100                                     one picture, and how long its passes take over 100 frames
+  hybrid --frames 0..240 --out dir/frame_####.png         8 seconds through all five cameras, which repeat without a seam
+  hybrid --frames 120..240 --out dir/frame_####.png       their second half, on another machine: the same pictures
+  hybrid --frames 0..240 --out dir/frame_####.png --resume    what is missing of them
 
-Exit status: 0 when the picture was written, 1 for trouble with the device, 2 for wrong arguments or input.";
+Frame N of a sequence depends on N alone, so any number of processes may share one. Ctrl-C ends after the frame under way;
+pictures get their names when they are complete. A film of them: ffmpeg -framerate 30 -i dir/frame_%04d.png film.mp4
 
-fn positive(text: &str) -> Result<f32, String> {
-    match text.parse::<f32>() {
-        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
-        _ => Err("a positive number is needed".to_owned()),
-    }
-}
+Exit status: 0 when the pictures were written, 1 for trouble with the device, 2 for wrong arguments or input, 130 after
+Ctrl-C.";
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use clap::CommandFactory;
+    use lvk::DeviceProfile;
+    use std::path::Path;
+
+    use super::*;
+    use crate::app::frames::Frames;
+    use crate::app::run_args::{RayTracing, Validation};
 
     fn parsed(line: &str) -> Result<HybridArgs, clap::Error> {
         HybridArgs::try_parse_from(std::iter::once("hybrid").chain(line.split_whitespace()))
@@ -184,21 +99,31 @@ mod tests {
     #[test]
     fn defaults_are_those_of_the_help() {
         let args = parsed("").unwrap();
-        assert_eq!((args.width, args.height, args.camera, args.depth, args.frames), (1280, 720, 1, 4, None));
-        assert_eq!((args.method, args.rt, args.validate), (Method::Hybrid, RayTracing::Auto, None));
-        assert_eq!((args.scene, args.out), (None, PathBuf::from("hybrid.png")));
+        let (run, scene) = (&args.run, &args.scene);
+        assert_eq!((run.width, run.height, scene.camera, args.depth), (1280, 720, 1, 4));
+        assert_eq!((run.frames.clone(), run.round, run.resume), (None, 240, false));
+        assert_eq!((args.method, run.rt, run.validate), (Method::Hybrid, RayTracing::Auto, None));
+        assert_eq!((scene.scene.clone(), args.lamp), (None, Lamp::Still));
+        assert_eq!(run.out_or("hybrid"), Path::new("hybrid.png"));
+    }
+
+    #[test]
+    fn a_range_of_frames_has_numbered_pictures() {
+        let args = parsed("--frames 3..9").unwrap();
+        assert_eq!(args.run.frames, Some(Frames::Sequence(3..9)));
+        assert_eq!(args.run.out_or("hybrid"), Path::new("hybrid_####.png"));
     }
 
     #[test]
     fn validation_has_a_plain_and_a_deep_kind() {
-        assert_eq!(parsed("--validate").unwrap().validate, Some(Validation::Core));
-        assert_eq!(parsed("--validate gpu --camera 2").unwrap().validate, Some(Validation::Gpu));
-        assert_eq!(parsed("--validate --camera 2").unwrap().validate, Some(Validation::Core));
+        assert_eq!(parsed("--validate").unwrap().run.validate, Some(Validation::Core));
+        assert_eq!(parsed("--validate gpu --camera 2").unwrap().run.validate, Some(Validation::Gpu));
+        assert_eq!(parsed("--validate --camera 2").unwrap().run.validate, Some(Validation::Core));
     }
 
     #[test]
     fn profiles_are_chosen_by_name_and_listed() {
-        assert_eq!(parsed("--profile mali-g715").unwrap().profile, Some(DeviceProfile::mali_g715()));
+        assert_eq!(parsed("--profile mali-g715").unwrap().run.profile, Some(DeviceProfile::mali_g715()));
         let refusal = parsed("--profile pixel").unwrap_err();
         let (help, refused) = (HybridArgs::command().render_help().to_string(), refusal.to_string());
         assert_eq!(refusal.exit_code(), 2);
@@ -216,6 +141,10 @@ mod tests {
             "--camera 6",
             "--depth 17",
             "--frames 0",
+            "--frames 4..4",
+            "--frames 0..",
+            "--resume",
+            "--round 0",
             "--scene a.obj --scale 0",
             "--scene a.obj --scale nan",
             "--scene a.obj --scale -1",
@@ -228,6 +157,6 @@ mod tests {
         ] {
             assert_eq!(parsed(line).unwrap_err().exit_code(), 2, "{line}");
         }
-        assert_eq!(parsed("--width 16384 --height 1 --depth 0").unwrap().width, 16_384);
+        assert_eq!(parsed("--width 16384 --height 1 --depth 0").unwrap().run.width, 16_384);
     }
 }

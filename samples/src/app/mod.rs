@@ -1,7 +1,27 @@
-//! What the samples share around a frame: command line, pictures, measures, timings and progress.
+//! What the samples share around a frame: command line, device, frames, pictures, measures, timings and progress.
+//!
+//! [`sample`] tells what a sample is and how its program is written.
 
 pub mod args;
+pub mod device;
+pub mod frame_name;
+pub mod frames;
+pub mod interrupt;
 pub mod metrics;
+pub mod play;
 pub mod png;
 pub mod progress;
+pub mod run;
+pub mod run_args;
+pub mod run_error;
+pub mod sample;
+pub mod scene_args;
+pub mod scene_list;
 pub mod timings;
+
+use std::io::Write as _;
+
+/// Prints to standard output. A reader that has gone, as that of `hybrid | head -1`, does not cost the picture.
+pub(crate) fn say(text: &str) {
+    let _ = writeln!(std::io::stdout(), "{text}");
+}

@@ -58,6 +58,7 @@ impl Progress {
         bar.set_style(style(total > 0));
         bar.set_length(total);
         bar.set_position(0);
+        bar.reset_eta();
         bar.set_message(name.to_owned());
     }
 
@@ -105,7 +106,7 @@ impl Drop for Shown {
 }
 
 fn style(is_counted: bool) -> ProgressStyle {
-    let template = if is_counted { "{msg} {wide_bar} {percent:>3} %" } else { "{msg} {spinner}" };
+    let template = if is_counted { "{msg} {wide_bar} {percent:>3} %, {eta} left" } else { "{msg} {spinner}" };
     ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
 }
 
@@ -160,7 +161,7 @@ mod tests {
 
     #[test]
     fn both_templates_are_valid() {
-        for template in ["{msg} {wide_bar} {percent:>3} %", "{msg} {spinner}"] {
+        for template in ["{msg} {wide_bar} {percent:>3} %, {eta} left", "{msg} {spinner}"] {
             assert!(ProgressStyle::with_template(template).is_ok());
         }
     }

@@ -98,6 +98,11 @@ impl Lighting {
             offset_extent: offset_extent(scene),
         }
     }
+
+    /// Puts the lamp somewhere else.
+    pub(super) fn move_lamp(&mut self, position: [f32; 3]) {
+        self.lights[0].position = position;
+    }
 }
 
 /// Bindless indices (the tail of `Frame` in `shaders/hybrid/frame.glsl`).

@@ -2,7 +2,7 @@
 
 use lvk::{CommandBuffer, Context, Holder, QueryPoolDesc, QueryPoolHandle};
 
-use crate::app::timings::Timings;
+use crate::app::sample::PassTimes;
 
 /// GPU milliseconds of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -21,12 +21,11 @@ impl FrameTimings {
         self.geometry_ms + self.rays_ms
     }
 
-    /// Adds the frame to a table.
-    pub fn add_to(&self, timings: &mut Timings, frame: u64) {
-        if self.has_geometry {
-            timings.push(frame, "geometry pass", self.geometry_ms);
-        }
-        timings.push(frame, "ray pass", self.rays_ms);
+    /// The passes by name.
+    #[must_use]
+    pub fn passes(&self) -> PassTimes {
+        let geometry = self.has_geometry.then_some(("geometry pass", self.geometry_ms));
+        geometry.into_iter().chain([("ray pass", self.rays_ms)]).collect()
     }
 }
 

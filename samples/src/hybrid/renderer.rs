@@ -78,6 +78,11 @@ impl HybridRenderer {
         })
     }
 
+    /// Puts the lamp at `position`, in scene units, from the next frame on.
+    pub fn move_lamp(&mut self, position: [f32; 3]) {
+        self.lighting.move_lamp(position);
+    }
+
     /// Renders one frame and waits for it.
     ///
     /// # Errors

@@ -14,7 +14,7 @@ const OWN_TEXTURES: u32 = 16;
 ///
 /// # Errors
 /// [`HybridError::TooManyTextures`].
-pub(super) fn fit_textures(scene: &mut Scene, limits: &Limits) -> Result<Vec<String>, HybridError> {
+pub fn fit_textures(scene: &mut Scene, limits: &Limits) -> Result<Vec<String>, HybridError> {
     let limit = limits.max_bindless_textures.saturating_sub(OWN_TEXTURES);
     let count = scene.textures.len();
     if count > limit as usize {
@@ -25,7 +25,7 @@ pub(super) fn fit_textures(scene: &mut Scene, limits: &Limits) -> Result<Vec<Str
 }
 
 /// How many textures the context for `scene` must have room for.
-pub(super) fn textures_needed(scene: &Scene) -> u32 {
+pub fn textures_needed(scene: &Scene) -> u32 {
     u32::try_from(scene.textures.len()).unwrap_or(u32::MAX).saturating_add(OWN_TEXTURES)
 }
 

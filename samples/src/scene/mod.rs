@@ -25,6 +25,7 @@
 mod benchmark;
 mod camera;
 mod camera_file;
+mod camera_path;
 mod error;
 mod framing;
 mod interior;
@@ -49,6 +50,7 @@ use std::path::PathBuf;
 use crate::app::progress::Progress;
 
 pub use camera::Camera;
+pub use camera_path::CameraPath;
 pub use error::SceneError;
 pub use light::{Ambient, DirectionalLight, PointLight, display};
 pub use material::Material;

@@ -1,0 +1,98 @@
+//! Opens the device the user names, and lists what there is.
+
+use lvk::{Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, ValidationSink};
+
+use super::run_args::{RayTracing, RunArgs, Validation};
+use super::run_error::RunError;
+use super::say;
+use crate::driver::{self, Driver, DriverRequest};
+
+/// What a sample needs beyond what the command line says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DeviceNeeds {
+    /// Places for textures; fewer than the library's default count as that.
+    pub textures: u32,
+}
+
+/// Opens the device the user names, or the best one; a better one without ray tracing gives way to one with. Messages of
+/// the validation layer, where it is asked for, go into `sink`.
+pub(super) fn open(
+    name: &str,
+    args: &RunArgs,
+    driver: &Driver,
+    sink: &ValidationSink,
+    needs: &DeviceNeeds,
+) -> lvk::Result<Context> {
+    use FeatureRequest::{Optional, Required};
+    let with = |ray_tracing_pipeline, ray_query| {
+        Context::new(&ContextDesc {
+            application_name: name,
+            vulkan_library: driver.loader.as_deref(),
+            device: args.device.as_deref(),
+            profile: args.profile.as_ref(),
+            validation: validation(args.validate),
+            validation_sink: args.validate.map(|_| sink.clone()),
+            ray_tracing_pipeline,
+            ray_query,
+            max_textures: needs.textures.max(ContextDesc::default().max_textures),
+            ..ContextDesc::default()
+        })
+    };
+    match args.rt {
+        RayTracing::Pipeline => with(Required, Optional),
+        RayTracing::Query => with(Optional, Required),
+        RayTracing::Auto => {
+            let best = with(Optional, Optional)?;
+            let capabilities = best.capabilities();
+            if capabilities.ray_tracing_pipeline || capabilities.ray_query {
+                return Ok(best);
+            }
+            Ok(with(Required, Optional).or_else(|_| with(Optional, Required)).unwrap_or(best))
+        }
+    }
+}
+
+/// Prints the devices, one a line, as they are under the profile.
+pub(super) fn list(profile: Option<&DeviceProfile>) -> Result<(), RunError> {
+    let driver = driver::prepare(&DriverRequest::default())?;
+    for (number, mut device) in Context::devices(driver.loader.as_deref())?.into_iter().enumerate() {
+        if let Some(profile) = profile {
+            profile.apply(&mut device);
+        }
+        say(&device_line(number, &device));
+    }
+    Ok(())
+}
+
+/// Name and version of a device's driver, and of its Vulkan.
+#[must_use]
+pub fn driver_text(capabilities: &Capabilities) -> String {
+    let (major, minor, patch) = capabilities.api_version;
+    let driver = format!("{} {}", capabilities.driver_name, capabilities.driver_info);
+    format!("{}, Vulkan {major}.{minor}.{patch}", driver.trim_end())
+}
+
+/// Fails when the validation layer was not silent.
+pub(super) fn report_validation(sink: &ValidationSink) -> Result<(), RunError> {
+    let messages = sink.messages();
+    for message in &messages {
+        eprintln!("validation: {message}");
+    }
+    say(&format!("validation messages: {}", messages.len()));
+    if messages.is_empty() { Ok(()) } else { Err(RunError::Validation(messages.len())) }
+}
+
+fn validation(wish: Option<Validation>) -> lvk::Validation {
+    match wish {
+        None => lvk::Validation::Off,
+        Some(Validation::Core) => lvk::Validation::Standard,
+        Some(Validation::Gpu) => lvk::Validation::GpuAssisted,
+    }
+}
+
+fn device_line(number: usize, device: &Capabilities) -> String {
+    let has = |has: bool| if has { "yes" } else { "no" };
+    let Capabilities { device_name: name, ray_tracing_pipeline: pipeline, ray_query: query, .. } = device;
+    let (driver, pipeline, query) = (driver_text(device), has(*pipeline), has(*query));
+    format!("[{number}] {name} ({driver}): ray tracing pipeline {pipeline}, ray query {query}")
+}

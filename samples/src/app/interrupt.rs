@@ -1,0 +1,52 @@
+//! Ctrl-C as a flag.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+
+/// Exit status of a program that was interrupted, by the custom of shells.
+pub const STATUS: u8 = 130;
+
+/// Whether the user has pressed Ctrl-C, or a batch system has asked the process to end. The first time only raises the
+/// flag, so that the frame under way becomes a whole picture; the second time ends the process at once, with status
+/// 130. Either way no picture is left in part, because pictures get their names when they are complete.
+#[derive(Debug, Clone, Default)]
+pub struct Interrupt {
+    is_raised: Arc<AtomicBool>,
+}
+
+impl Interrupt {
+    /// Listens from now on. Where the system does not let it, Ctrl-C ends the process as ever.
+    #[must_use]
+    pub fn listen() -> Self {
+        let interrupt = Self::default();
+        for signal in [SIGINT, SIGTERM] {
+            // In this order: the first signal must not find the flag that it raises itself.
+            let is_raised = &interrupt.is_raised;
+            let ends = flag::register_conditional_shutdown(signal, i32::from(STATUS), Arc::clone(is_raised));
+            if let Err(error) = ends.and_then(|_| flag::register(signal, Arc::clone(is_raised))) {
+                log::warn!("cannot listen to signal {signal}: {error}");
+            }
+        }
+        interrupt
+    }
+
+    /// One that nobody raises but [`Interrupt::raise`].
+    #[must_use]
+    pub fn deaf() -> Self {
+        Self::default()
+    }
+
+    /// Raises the flag.
+    pub fn raise(&self) {
+        self.is_raised.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether the work is to end after the present frame.
+    #[must_use]
+    pub fn is_raised(&self) -> bool {
+        self.is_raised.load(Ordering::Relaxed)
+    }
+}

@@ -1,0 +1,130 @@
+//! The program of every sample: device, frames, pictures, timings and what is said about them.
+
+use std::process::ExitCode;
+
+use lvk::{Context, ValidationSink};
+
+use super::device::{self, DeviceNeeds};
+use super::frame_name::FrameName;
+use super::frames::Frames;
+use super::interrupt::Interrupt;
+use super::play::{Job, Played, play};
+use super::progress::Progress;
+use super::run_args::RunArgs;
+use super::run_error::RunError;
+use super::sample::Sample;
+use super::say;
+use crate::driver::{DriverRequest, prepare};
+
+/// Frames to time where none are asked for, on a GPU.
+const GPU_FRAMES: u32 = 60;
+/// Frames that a GPU renders before any is timed, so that its clocks are up.
+const WARM_UP_FRAMES: u32 = 5;
+
+/// What a sample is made with.
+pub struct Opening<'a> {
+    /// Shows which slow thing is under way.
+    pub progress: Progress,
+    name: &'a str,
+    args: &'a RunArgs,
+    sink: &'a ValidationSink,
+}
+
+/// A sample that is ready to render.
+pub struct Opened<S> {
+    /// The device.
+    pub context: Context,
+    /// The sample.
+    pub sample: S,
+    /// What is said about it, in a line or several.
+    pub headline: String,
+}
+
+impl Opening<'_> {
+    /// Opens the device that the command line names, or the best.
+    ///
+    /// # Errors
+    /// [`RunError::Device`] and [`RunError::Driver`].
+    pub fn device(&mut self, needs: &DeviceNeeds) -> Result<Context, RunError> {
+        self.progress.pause();
+        let driver = prepare(&DriverRequest { validation: self.args.validate.is_some() })?;
+        self.progress.stage("opening the device", 0);
+        Ok(device::open(self.name, self.args, &driver, self.sink, needs)?)
+    }
+
+    /// Prints warnings to standard error, past the progress bar.
+    pub fn warn(&mut self, warnings: &[String]) {
+        if !warnings.is_empty() {
+            self.progress.pause();
+        }
+        for warning in warnings {
+            eprintln!("warning: {warning}");
+        }
+    }
+}
+
+/// Does what the command line of the sample called `name` says; `make` makes it. Prints to standard output, errors in one
+/// line to standard error; the status is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong
+/// input, 130 after Ctrl-C.
+#[must_use]
+pub fn run<S: Sample>(
+    name: &str,
+    args: &RunArgs,
+    make: impl FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
+) -> ExitCode {
+    match attempt(name, args, make) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.status())
+        }
+    }
+}
+
+fn attempt<S: Sample>(
+    name: &str,
+    args: &RunArgs,
+    make: impl FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
+) -> Result<(), RunError> {
+    if args.list_devices {
+        return device::list(args.profile.as_ref());
+    }
+    let out = args.out_or(name);
+    let mut job = Job {
+        frames: args.frames.clone().unwrap_or(Frames::Still(GPU_FRAMES)),
+        warm_up: WARM_UP_FRAMES,
+        frames_per_round: args.round,
+        size: [args.width, args.height],
+        out: FrameName::new(&out),
+        resume: args.resume,
+    };
+    job.check()?;
+    let sink = ValidationSink::default();
+    let mut opening = Opening { progress: Progress::visible(), name, args, sink: &sink };
+    let Opened { context, mut sample, headline } = make(&mut opening)?;
+    drop(opening);
+    say(&headline);
+    if context.capabilities().is_cpu {
+        job.warm_up = 0;
+        job.frames = args.frames.clone().unwrap_or(Frames::Still(1));
+    }
+    let played = play(&mut sample, &job, &mut Progress::visible(), &Interrupt::listen());
+    drop(sample);
+    context.wait_idle()?;
+    drop(context);
+    if args.validate.is_some() {
+        device::report_validation(&sink)?;
+    }
+    say(&summary(&job, &played?));
+    Ok(())
+}
+
+fn summary(job: &Job, played: &Played) -> String {
+    let Played { timings, written, skipped } = played;
+    let out = job.out.path().display();
+    match (&job.frames, skipped) {
+        (Frames::Still(_), _) => format!("{timings}\nwrote {out}"),
+        (Frames::Sequence(_), 0) => format!("{timings}\nwrote {written} frames to {out}"),
+        _ => format!("{timings}\nwrote {written} frames to {out}; {skipped} were there"),
+    }
+}

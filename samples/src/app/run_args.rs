@@ -1,0 +1,123 @@
+//! The part of the command line that all samples share.
+
+use std::path::{Path, PathBuf};
+
+use clap::builder::{PossibleValuesParser, TypedValueParser as _};
+use clap::{Args, ValueEnum};
+use lvk::DeviceProfile;
+
+use super::frames::Frames;
+
+/// Largest width and height of a picture, in pixels.
+pub const MAX_SIZE: u32 = 16_384;
+
+/// Frames, pictures and device: what all samples share.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct RunArgs {
+    /// How to trace rays
+    #[arg(long, value_enum, default_value_t = RayTracing::Auto, help_heading = "Rendering")]
+    pub rt: RayTracing,
+
+    /// A number: render the first frame so often and time it [default: 60, or 1 on a driver that runs on the CPU].
+    /// A range as 0..240, without its end: render each frame once as a picture of its own
+    #[arg(long, value_name = "N|FIRST..END", help_heading = "Frames")]
+    pub frames: Option<Frames>,
+
+    /// Frames until the animation has come round and repeats itself, at 30 a second
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 240,
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(Frames::MAX_COUNT)),
+        help_heading = "Frames"
+    )]
+    pub round: u32,
+
+    /// Leave out the frames of a sequence whose pictures are there
+    #[arg(long, requires = "frames", help_heading = "Frames")]
+    pub resume: bool,
+
+    /// Width of the picture in pixels, 1 to 16384
+    #[arg(
+        long,
+        value_name = "PIXELS",
+        default_value_t = 1280,
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIZE)),
+        help_heading = "Output"
+    )]
+    pub width: u32,
+
+    /// Height of the picture in pixels, 1 to 16384
+    #[arg(
+        long,
+        value_name = "PIXELS",
+        default_value_t = 720,
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIZE)),
+        help_heading = "Output"
+    )]
+    pub height: u32,
+
+    /// PNG to write; an existing file is replaced. For a sequence, with # for each digit of the frame's number
+    /// [default: the sample's name, in this folder]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub out: Option<PathBuf>,
+
+    /// Device to use, by its number in --list-devices or part of its name
+    /// [default: the most capable one that can trace rays]
+    #[arg(long, value_name = "NUMBER|NAME", help_heading = "Device")]
+    pub device: Option<String>,
+
+    /// Rehearse another device on this one: without what it lacks, and within its limits
+    #[arg(
+        long,
+        value_name = "NAME",
+        value_parser = PossibleValuesParser::new(DeviceProfile::names()).try_map(|name| DeviceProfile::named(&name)),
+        help_heading = "Device"
+    )]
+    pub profile: Option<DeviceProfile>,
+
+    /// Print the devices and what they can do, and exit
+    #[arg(long, help_heading = "Device")]
+    pub list_devices: bool,
+
+    /// Run with Vulkan validation; a message is an error
+    #[arg(
+        long,
+        value_enum,
+        value_name = "KIND",
+        num_args = 0..=1,
+        default_missing_value = "core",
+        help_heading = "Device"
+    )]
+    pub validate: Option<Validation>,
+}
+
+impl RunArgs {
+    /// Where to write pictures of the sample called `name`.
+    #[must_use]
+    pub fn out_or(&self, name: &str) -> PathBuf {
+        let is_sequence = matches!(self.frames, Some(Frames::Sequence(_)));
+        let file = if is_sequence { format!("{name}_####.png") } else { format!("{name}.png") };
+        self.out.clone().unwrap_or_else(|| Path::new(&file).to_owned())
+    }
+}
+
+/// How to trace rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum RayTracing {
+    /// A ray tracing pipeline where the device has one, else ray queries.
+    Auto,
+    /// A ray tracing pipeline with shader binding table.
+    Pipeline,
+    /// Ray queries in a compute shader.
+    Query,
+}
+
+/// What Vulkan validation checks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Validation {
+    /// Correct use and synchronisation.
+    Core,
+    /// The same, and what shaders do on the device; slow.
+    Gpu,
+}

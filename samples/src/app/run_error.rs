@@ -1,0 +1,85 @@
+//! Why a sample's program ended without its picture.
+
+use super::interrupt;
+use super::png::PngError;
+use crate::driver::DriverError;
+use crate::scene::SceneError;
+
+/// Why a sample's program ended without its picture.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// What the user can mend by other arguments or input.
+    #[error("{0}")]
+    Input(Box<dyn std::error::Error + Send + Sync>),
+    /// Trouble with the device.
+    #[error("{0}")]
+    Device(Box<dyn std::error::Error + Send + Sync>),
+    /// The scene could not be loaded.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The picture could not be written.
+    #[error(transparent)]
+    Png(#[from] PngError),
+    /// There is no driver.
+    #[error(transparent)]
+    Driver(#[from] DriverError),
+    /// A range of frames needs a name for each.
+    #[error("--out {name}: a sequence needs # in the name, as frame_####.png, for the frames' numbers")]
+    NoNumber {
+        /// The name as given.
+        name: String,
+    },
+    /// A single picture has no number.
+    #[error("--out {name} names a sequence, for which --frames is a range, as --frames 0..240")]
+    NoSequence {
+        /// The name as given.
+        name: String,
+    },
+    /// A sequence cannot be resumed that is none.
+    #[error("--resume is for sequences, as --frames 0..240 --out frame_####.png")]
+    NothingToResume,
+    /// The validation layer was not silent.
+    #[error("validation reported {0} messages")]
+    Validation(usize),
+    /// Ctrl-C, or the request of a batch system.
+    #[error("interrupted after {done} of {count} frames; every picture written is whole{hint}")]
+    Interrupted {
+        /// Frames that are done.
+        done: u32,
+        /// Frames that were asked for.
+        count: u32,
+        /// How to go on.
+        hint: &'static str,
+    },
+}
+
+impl RunError {
+    /// Something the user can mend by other arguments or input.
+    pub fn input(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self::Input(Box::new(error))
+    }
+
+    /// Trouble with the device.
+    pub fn device(error: impl std::error::Error + Send + Sync + 'static) -> Self {
+        Self::Device(Box::new(error))
+    }
+
+    /// The program's exit status: 2 when the user can mend it by other arguments or input, 130 after Ctrl-C, 1 for
+    /// trouble with the device.
+    #[must_use]
+    pub fn status(&self) -> u8 {
+        match self {
+            Self::Input(_) | Self::Scene(_) | Self::Png(_) | Self::Driver(DriverError::Variable { .. }) => 2,
+            Self::NoNumber { .. } | Self::NoSequence { .. } | Self::NothingToResume => 2,
+            Self::Interrupted { .. } => interrupt::STATUS,
+            Self::Device(_) | Self::Driver(_) | Self::Validation(_) => 1,
+        }
+    }
+}
+
+impl From<lvk::Error> for RunError {
+    fn from(error: lvk::Error) -> Self {
+        Self::device(error)
+    }
+}

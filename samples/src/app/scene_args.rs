@@ -1,0 +1,100 @@
+//! The part of the command line that samples with scenes share.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::png::{self, PngError};
+use super::progress::Progress;
+use super::scene_list;
+use crate::scene::{ObjOptions, Scene, SceneError};
+
+/// Which scene, and from where it is seen.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub struct SceneArgs {
+    /// Wavefront OBJ to render, with its MTL and textures beside it, or a name in --list-scenes
+    /// [default: the built-in courtyard]
+    #[arg(long, value_name = "FILE|NAME", help_heading = "Scene")]
+    pub scene: Option<PathBuf>,
+
+    /// Factor from the file's units to scene units [default: 1, or the known scale of a benchmark scene]
+    #[arg(long, value_name = "F", value_parser = positive, requires = "scene", help_heading = "Scene")]
+    pub scale: Option<f32>,
+
+    /// Light and up to five cameras: lines `scene NAME x y z`, then `at EYE TARGET FOV` or `dir EYE DIRECTION FOV`
+    #[arg(long, value_name = "FILE", requires = "scene", help_heading = "Scene")]
+    pub cameras: Option<PathBuf>,
+
+    /// Which of the scene's five cameras to look through; a sequence starts there and passes through all five
+    #[arg(
+        long,
+        value_name = "1-5",
+        default_value_t = 1,
+        value_parser = clap::value_parser!(u32).range(1..=5),
+        help_heading = "Scene"
+    )]
+    pub camera: u32,
+
+    /// Print the scenes that --scene knows by name, and exit; FOLDER is searched, else that in LVK_SCENES
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        num_args = 0..=1,
+        default_missing_value = "",
+        value_parser = clap::value_parser!(std::ffi::OsString),
+        help_heading = "Scene"
+    )]
+    pub list_scenes: Option<std::ffi::OsString>,
+}
+
+impl SceneArgs {
+    /// Loads the scene, or makes the courtyard.
+    ///
+    /// # Errors
+    /// [`SceneError`].
+    pub fn load(&self, progress: &mut Progress) -> Result<Scene, SceneError> {
+        match self.file() {
+            None => {
+                progress.stage("making the courtyard", 0);
+                Ok(Scene::procedural())
+            }
+            Some(path) => {
+                let options = ObjOptions { scale: self.scale, cameras: self.cameras.clone() };
+                Scene::from_obj(&path, &options, progress)
+            }
+        }
+    }
+
+    /// Refuses a picture that would replace an input.
+    ///
+    /// # Errors
+    /// [`PngError::IsInput`].
+    pub fn check_out(&self, out: &Path) -> Result<(), PngError> {
+        for (option, input) in [("--scene", self.file()), ("--cameras", self.cameras.clone())] {
+            if let Some(input) = input {
+                png::check_not_input(out, option, &input)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What `--list-scenes` prints, where it was given.
+    #[must_use]
+    pub fn listing(&self) -> Option<String> {
+        self.list_scenes.as_ref().map(|folder| scene_list::listing(Some(Path::new(folder))))
+    }
+
+    fn file(&self) -> Option<PathBuf> {
+        let wish = self.scene.as_ref()?;
+        let file = scene_list::resolve(wish, scene_list::folder().as_deref());
+        let is_built_in = file == Path::new(scene_list::BUILT_IN) && !file.exists();
+        if is_built_in { None } else { Some(file) }
+    }
+}
+
+fn positive(text: &str) -> Result<f32, String> {
+    match text.parse::<f32>() {
+        Ok(value) if value > 0.0 && value.is_finite() => Ok(value),
+        _ => Err("a positive number is needed".to_owned()),
+    }
+}

@@ -1,0 +1,86 @@
+//! The sample as an animation: a tour through the scene's cameras, and a lamp that may move.
+
+use glam::Vec3;
+
+use super::{HybridError, HybridRenderer};
+use crate::app::sample::{Moment, PassTimes, Sample};
+use crate::scene::{Camera, CameraPath, Scene};
+
+/// Radius of the lamp's circle, as a share of the diagonal of the scene's bounding box.
+const LAMP_SHARE: f32 = 0.04;
+
+/// A renderer, and what moves.
+pub struct HybridSequence {
+    renderer: HybridRenderer,
+    path: CameraPath,
+    lamp: Option<LampCircle>,
+    camera: Camera,
+}
+
+/// A level circle that passes through the lamp's own place at phase 0.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct LampCircle {
+    place: Vec3,
+    radius: f32,
+}
+
+impl HybridSequence {
+    /// A tour through the cameras of `scene`, which is the one that `renderer` draws, from the camera with the index
+    /// `first` on; with `lamp_moves` the lamp goes round once meanwhile.
+    #[must_use]
+    pub fn new(renderer: HybridRenderer, scene: &Scene, first: usize, lamp_moves: bool) -> Self {
+        let path = CameraPath::tour(scene, first);
+        let lamp = lamp_moves.then(|| LampCircle::of(scene));
+        Self { renderer, camera: path.at(0.0), path, lamp }
+    }
+}
+
+impl Sample for HybridSequence {
+    type Error = HybridError;
+
+    fn update(&mut self, moment: Moment) -> Result<(), HybridError> {
+        self.camera = self.path.at(moment.phase());
+        if let Some(lamp) = &self.lamp {
+            self.renderer.move_lamp(lamp.at(moment.phase()));
+        }
+        Ok(())
+    }
+
+    fn steps_per_frame(&self) -> u64 {
+        self.renderer.band_count()
+    }
+
+    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, HybridError> {
+        Ok(self.renderer.render_with(&self.camera, after_step)?.passes())
+    }
+
+    fn picture(&self) -> Result<Vec<u8>, HybridError> {
+        self.renderer.read_image()
+    }
+}
+
+impl LampCircle {
+    fn of(scene: &Scene) -> Self {
+        let (low, high) = scene.bounds();
+        let radius = LAMP_SHARE * Vec3::from(low).distance(Vec3::from(high));
+        Self { place: Vec3::from(scene.light.position), radius }
+    }
+
+    fn at(&self, phase: f32) -> [f32; 3] {
+        let (sin, cos) = (phase * std::f32::consts::TAU).sin_cos();
+        (self.place + self.radius * Vec3::new(cos - 1.0, 0.0, sin)).to_array()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_lamp_starts_at_its_place_and_comes_back() {
+        let circle = LampCircle { place: Vec3::new(1.0, 2.0, 3.0), radius: 0.5 };
+        assert_eq!(circle.at(0.0), [1.0, 2.0, 3.0]);
+        let far = Vec3::from(circle.at(0.5)).distance(circle.place);
+        assert!((far - 1.0).abs() < 1e-5, "{far}");
+    }
+}
