@@ -39,5 +39,5 @@ pub use error::HybridOitError;
 pub use glass_lists::{GlassLists, GlassNode, NodeUse};
 pub use pipelines::pipelines;
 pub use run::run;
-pub use sample::{HybridOit, PassTimes};
+pub use sample::HybridOit;
 pub use scene::{Ball, Block, Glass, Motion, OitScene, PERIOD_SECONDS, Sun};

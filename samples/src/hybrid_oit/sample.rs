@@ -14,10 +14,7 @@ use super::shadow_pass::ShadowPass;
 use super::stamps::Stamps;
 use super::structures::Structures;
 use super::targets::Targets;
-
-/// Names of a frame's passes, in the order in which they run, and what each took on the GPU in milliseconds. Empty where
-/// the device has no timestamps.
-pub type PassTimes = Vec<(&'static str, f64)>;
+use crate::app::sample::PassTimes;
 
 /// Renders a scene of blocks, balls and glass. What it shows depends on the time alone, not on frames before.
 pub struct HybridOit {

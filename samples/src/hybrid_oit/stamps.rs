@@ -2,7 +2,7 @@
 
 use lvk::{CommandBuffer, Context, Holder, QueryPoolDesc, QueryPoolHandle};
 
-use super::sample::PassTimes;
+use crate::app::sample::PassTimes;
 
 /// Names of the passes, in the order in which they run.
 pub(super) const PASSES: [&str; 7] =
