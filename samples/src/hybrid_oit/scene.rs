@@ -172,7 +172,7 @@ impl Default for OitScene {
             sun: Sun {
                 direction: Vec3::new(-0.74, 0.68, 0.16),
                 radius: 0.022,
-                color: Vec3::new(1.75, 1.55, 1.26),
+                color: Vec3::new(2.20, 1.94, 1.56),
             },
             floor_albedo: Vec3::new(0.70, 0.69, 0.67),
             blocks: blocks(),
