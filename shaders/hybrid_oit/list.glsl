@@ -28,55 +28,62 @@ vec3 nodeTransmittance(Node node) {
     return vec3(unpackHalf2x16(node.packed.y).y, unpackHalf2x16(node.packed.z));
 }
 
+// A node, and what it is sorted by.
+struct Place {
+    float distance;
+    uint node;
+};
+
 // Nearest first. Nodes as near as each other go by what they hold, so that the order in which fragments ran does not
 // show; those that hold the same are as good as each other.
-bool isBefore(uint a, uint b) {
-    Node first = frame.nodes.at[a];
-    Node second = frame.nodes.at[b];
-    if (first.distance != second.distance) {
-        return first.distance < second.distance;
+bool isBefore(Place a, Place b) {
+    if (a.distance != b.distance) {
+        return a.distance < b.distance;
     }
+    uvec3 first = frame.nodes.at[a.node].packed;
+    uvec3 second = frame.nodes.at[b.node].packed;
     for (int i = 0; i < 3; i++) {
-        if (first.packed[i] != second.packed[i]) {
-            return first.packed[i] < second.packed[i];
+        if (first[i] != second[i]) {
+            return first[i] < second[i];
         }
     }
-    return a < b;
+    return a.node < b.node;
 }
 
 // Nodes sorted at a time; longer lists are walked again for the next ones.
 const uint kBatch = 8u;
 
 struct Batch {
-    uint at[kBatch];
+    Place at[kBatch];
     uint count;
     bool isLast;
 };
 
-void insertNode(inout Batch batch, uint node) {
+void insertNode(inout Batch batch, Place place) {
     if (batch.count == kBatch) {
         batch.isLast = false;
-        if (!isBefore(node, batch.at[kBatch - 1u])) {
+        if (!isBefore(place, batch.at[kBatch - 1u])) {
             return;
         }
         batch.count--;
     }
-    uint place = batch.count;
-    for (; place > 0u && isBefore(node, batch.at[place - 1u]); place--) {
-        batch.at[place] = batch.at[place - 1u];
+    uint index = batch.count;
+    for (; index > 0u && isBefore(place, batch.at[index - 1u]); index--) {
+        batch.at[index] = batch.at[index - 1u];
     }
-    batch.at[place] = node;
+    batch.at[index] = place;
     batch.count++;
 }
 
-// The nearest nodes of a list behind the node `last`, or of all where that is kNoNode.
-Batch nearestNodes(uint head, uint last) {
+// The nearest nodes of a list behind `last`, or of all where that is no node.
+Batch nearestNodes(uint head, Place last) {
     Batch batch;
     batch.count = 0u;
     batch.isLast = true;
     for (uint node = head; node != kNoNode; node = frame.nodes.at[node].next) {
-        if (last == kNoNode || isBefore(last, node)) {
-            insertNode(batch, node);
+        Place place = Place(frame.nodes.at[node].distance, node);
+        if (last.node == kNoNode || isBefore(last, place)) {
+            insertNode(batch, place);
         }
     }
     return batch;
@@ -86,17 +93,17 @@ Batch nearestNodes(uint head, uint last) {
 vec3 throughNodes(uint head, vec3 background) {
     vec3 radiance = vec3(0.0);
     vec3 transmittance = vec3(1.0);
-    uint last = kNoNode;
+    Place last = Place(0.0, kNoNode);
     bool isDone = head == kNoNode;
     while (!isDone) {
         Batch batch = nearestNodes(head, last);
         for (uint i = 0u; i < batch.count; i++) {
-            Node node = frame.nodes.at[batch.at[i]];
+            last = batch.at[i];
+            Node node = frame.nodes.at[last.node];
             radiance += transmittance * nodeRadiance(node);
             transmittance *= nodeTransmittance(node);
         }
-        isDone = batch.isLast || batch.count == 0u;
-        last = batch.at[kBatch - 1u];
+        isDone = batch.isLast;
     }
     return radiance + transmittance * background;
 }

@@ -19,7 +19,7 @@ pub struct HybridOitConfig {
     /// Shadow rays a sample, 1 to [`HybridOitConfig::MAX_SHADOW_RAYS`]; a single one aims at the middle of the sun.
     pub shadow_rays: u32,
     /// Nodes in the pool of the glass lists, 0 and up; `None` for [`HybridOitConfig::NODES_PER_SAMPLE`] a sample. Glass
-    /// that finds no node is left out and counted.
+    /// that finds no node is left out and counted; which, is up to the device.
     pub node_capacity: Option<u32>,
 }
 
