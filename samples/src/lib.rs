@@ -4,6 +4,7 @@ pub mod app;
 pub mod bench;
 pub mod driver;
 pub mod hybrid;
+pub mod hybrid_oit;
 pub mod pipelines;
 pub mod reflections;
 pub mod scene;

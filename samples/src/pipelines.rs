@@ -3,7 +3,7 @@
 use lvk::{Format, ShaderModuleDesc, ShaderSource, ShaderStage};
 
 use crate::shaders::INCLUDES;
-use crate::{bench, hybrid, reflections};
+use crate::{bench, hybrid, hybrid_oit, reflections};
 
 /// A stage of a [`SamplePipeline`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,7 +34,8 @@ impl SampleStage {
 }
 
 /// A pipeline that a sample creates. Its stages tell its kind: one compute stage, ray tracing stages, or stages that
-/// draw. Each closest-hit stage, and each any-hit stage, is a hit group for triangles; nothing traces more than one ray deep.
+/// draw. Each closest-hit stage is a hit group for triangles; an intersection stage begins a hit group for boxes, which an
+/// any-hit stage behind it belongs to. Nothing traces more than one ray deep.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SamplePipeline {
     /// For messages.
@@ -50,7 +51,7 @@ pub struct SamplePipeline {
 /// All of them.
 #[must_use]
 pub fn all() -> Vec<SamplePipeline> {
-    [hybrid::pipelines(), bench::pipelines(), reflections::pipelines()].concat()
+    [hybrid::pipelines(), hybrid_oit::pipelines(), reflections::pipelines(), bench::pipelines()].concat()
 }
 
 #[cfg(test)]
@@ -59,7 +60,8 @@ mod tests {
 
     use super::*;
 
-    const STAGES: [&str; 9] = ["vert", "frag", "comp", "rgen", "rmiss", "rchit", "rahit", "mesh", "task"];
+    const STAGES: [&str; 10] =
+        ["vert", "frag", "comp", "rgen", "rmiss", "rchit", "rahit", "rint", "mesh", "task"];
 
     fn stage_files(folder: &Path) -> Vec<PathBuf> {
         let mut found = Vec::new();

@@ -38,6 +38,16 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("reflections/trace_pipeline.glsl", include_str!("../../shaders/reflections/trace_pipeline.glsl")),
     ("reflections/trace_query.glsl", include_str!("../../shaders/reflections/trace_query.glsl")),
     ("reflections/waves.glsl", include_str!("../../shaders/reflections/waves.glsl")),
+    ("hybrid_oit/ball.glsl", include_str!("../../shaders/hybrid_oit/ball.glsl")),
+    ("hybrid_oit/frame.glsl", include_str!("../../shaders/hybrid_oit/frame.glsl")),
+    ("hybrid_oit/gbuffer.glsl", include_str!("../../shaders/hybrid_oit/gbuffer.glsl")),
+    ("hybrid_oit/glass.glsl", include_str!("../../shaders/hybrid_oit/glass.glsl")),
+    ("hybrid_oit/list.glsl", include_str!("../../shaders/hybrid_oit/list.glsl")),
+    ("hybrid_oit/occlusion.glsl", include_str!("../../shaders/hybrid_oit/occlusion.glsl")),
+    ("hybrid_oit/payload.glsl", include_str!("../../shaders/hybrid_oit/payload.glsl")),
+    ("hybrid_oit/shadow.glsl", include_str!("../../shaders/hybrid_oit/shadow.glsl")),
+    ("hybrid_oit/sky.glsl", include_str!("../../shaders/hybrid_oit/sky.glsl")),
+    ("hybrid_oit/sphere.glsl", include_str!("../../shaders/hybrid_oit/sphere.glsl")),
 ];
 
 /// Stages of the `bench` program.
@@ -130,4 +140,34 @@ pub mod reflections {
     pub const COMPOSITE_COMP: &str = include_str!("../../shaders/reflections/composite.comp.glsl");
     /// Averages the samples of a picture.
     pub const RESOLVE_COMP: &str = include_str!("../../shaders/reflections/resolve.comp.glsl");
+}
+
+/// Stages of the `hybrid_oit` sample.
+pub mod hybrid_oit {
+    /// Places the spheres.
+    pub const ANIMATE_COMP: &str = include_str!("../../shaders/hybrid_oit/animate.comp.glsl");
+    /// Floor and blocks.
+    pub const SOLID_VERT: &str = include_str!("../../shaders/hybrid_oit/solid.vert.glsl");
+    /// A square that covers a sphere.
+    pub const SPHERE_VERT: &str = include_str!("../../shaders/hybrid_oit/sphere.vert.glsl");
+    /// Depth of a ball.
+    pub const BALL_DEPTH_FRAG: &str = include_str!("../../shaders/hybrid_oit/ball_depth.frag.glsl");
+    /// Floor and blocks into the G-buffer.
+    pub const SOLID_FRAG: &str = include_str!("../../shaders/hybrid_oit/solid.frag.glsl");
+    /// A ball into the G-buffer.
+    pub const BALL_FRAG: &str = include_str!("../../shaders/hybrid_oit/ball.frag.glsl");
+    /// Glass into the lists.
+    pub const GLASS_FRAG: &str = include_str!("../../shaders/hybrid_oit/glass.frag.glsl");
+    /// Shadow rays by the ray tracing pipeline.
+    pub const SHADOW_RGEN: &str = include_str!("../../shaders/hybrid_oit/shadow.rgen.glsl");
+    /// A shadow ray that reached the sun.
+    pub const SHADOW_RMISS: &str = include_str!("../../shaders/hybrid_oit/shadow.rmiss.glsl");
+    /// A shadow ray in the box of a sphere.
+    pub const SPHERE_RINT: &str = include_str!("../../shaders/hybrid_oit/sphere.rint.glsl");
+    /// A shadow ray through glass.
+    pub const GLASS_RAHIT: &str = include_str!("../../shaders/hybrid_oit/glass.rahit.glsl");
+    /// Shadow rays by queries.
+    pub const SHADOW_COMP: &str = include_str!("../../shaders/hybrid_oit/shadow.comp.glsl");
+    /// The picture.
+    pub const COMPOSITE_COMP: &str = include_str!("../../shaders/hybrid_oit/composite.comp.glsl");
 }

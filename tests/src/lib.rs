@@ -5,6 +5,7 @@ pub mod bender;
 pub mod child;
 pub mod compute;
 pub mod device;
+pub mod glass_room;
 pub mod hit_check;
 pub mod hybrid;
 pub mod meshes;

@@ -121,7 +121,7 @@ impl Radv {
         &self,
         stages: &[vk::PipelineShaderStageCreateInfo<'_>],
     ) -> Result<vk::Pipeline, vk::Result> {
-        let groups: Vec<_> = (0_u32..).zip(stages).map(|(index, stage)| group(index, stage.stage)).collect();
+        let groups = groups(stages);
         let info = vk::RayTracingPipelineCreateInfoKHR::default()
             .flags(FLAGS)
             .stages(stages)
@@ -227,18 +227,30 @@ impl Drop for Radv {
 
 const FLAGS: vk::PipelineCreateFlags = vk::PipelineCreateFlags::CAPTURE_STATISTICS_KHR;
 
-fn group(index: u32, stage: vk::ShaderStageFlags) -> vk::RayTracingShaderGroupCreateInfoKHR<'static> {
-    let unused = vk::RayTracingShaderGroupCreateInfoKHR::default()
-        .general_shader(vk::SHADER_UNUSED_KHR)
-        .closest_hit_shader(vk::SHADER_UNUSED_KHR)
-        .any_hit_shader(vk::SHADER_UNUSED_KHR)
-        .intersection_shader(vk::SHADER_UNUSED_KHR);
-    let hit = unused.ty(vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP);
-    match stage {
-        vk::ShaderStageFlags::CLOSEST_HIT_KHR => hit.closest_hit_shader(index),
-        vk::ShaderStageFlags::ANY_HIT_KHR => hit.any_hit_shader(index),
-        _ => unused.ty(vk::RayTracingShaderGroupTypeKHR::GENERAL).general_shader(index),
+/// A group for each stage, but that an any-hit stage belongs to the hit group before it.
+fn groups(
+    stages: &[vk::PipelineShaderStageCreateInfo<'_>],
+) -> Vec<vk::RayTracingShaderGroupCreateInfoKHR<'static>> {
+    use vk::{RayTracingShaderGroupTypeKHR as Group, ShaderStageFlags as Stage};
+    let mut groups: Vec<vk::RayTracingShaderGroupCreateInfoKHR<'_>> = Vec::new();
+    for (index, stage) in (0_u32..).zip(stages) {
+        let unused = vk::RayTracingShaderGroupCreateInfoKHR::default()
+            .general_shader(vk::SHADER_UNUSED_KHR)
+            .closest_hit_shader(vk::SHADER_UNUSED_KHR)
+            .any_hit_shader(vk::SHADER_UNUSED_KHR)
+            .intersection_shader(vk::SHADER_UNUSED_KHR);
+        let group = match stage.stage {
+            Stage::CLOSEST_HIT_KHR => unused.ty(Group::TRIANGLES_HIT_GROUP).closest_hit_shader(index),
+            Stage::INTERSECTION_KHR => unused.ty(Group::PROCEDURAL_HIT_GROUP).intersection_shader(index),
+            Stage::ANY_HIT_KHR => match groups.pop_if(|before| before.ty != Group::GENERAL) {
+                Some(before) => before.any_hit_shader(index),
+                None => unused.ty(Group::TRIANGLES_HIT_GROUP).any_hit_shader(index),
+            },
+            _ => unused.ty(Group::GENERAL).general_shader(index),
+        };
+        groups.push(group);
     }
+    groups
 }
 
 fn raw(format: Format) -> vk::Format {

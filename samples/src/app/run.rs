@@ -109,22 +109,24 @@ fn attempt<S: Sample>(
         job.frames = args.frames.clone().unwrap_or(Frames::Still(1));
     }
     let played = play(&mut sample, &job, &mut Progress::visible(), &Interrupt::listen());
+    let remark = sample.remark();
     drop(sample);
     context.wait_idle()?;
     drop(context);
     if args.validate.is_some() {
         device::report_validation(&sink)?;
     }
-    say(&summary(&job, &played?));
+    say(&summary(&job, &played?, remark));
     Ok(())
 }
 
-fn summary(job: &Job, played: &Played) -> String {
+fn summary(job: &Job, played: &Played, remark: Option<String>) -> String {
     let Played { timings, written, skipped } = played;
+    let remark = remark.map_or_else(String::new, |remark| format!("\n{remark}"));
     let out = job.out.path().display();
     match (&job.frames, skipped) {
-        (Frames::Still(_), _) => format!("{timings}\nwrote {out}"),
-        (Frames::Sequence(_), 0) => format!("{timings}\nwrote {written} frames to {out}"),
-        _ => format!("{timings}\nwrote {written} frames to {out}; {skipped} were there"),
+        (Frames::Still(_), _) => format!("{timings}{remark}\nwrote {out}"),
+        (Frames::Sequence(_), 0) => format!("{timings}{remark}\nwrote {written} frames to {out}"),
+        _ => format!("{timings}{remark}\nwrote {written} frames to {out}; {skipped} were there"),
     }
 }

@@ -81,6 +81,11 @@ pub trait Sample {
     /// # Errors
     /// The sample's own.
     fn picture(&self) -> Result<Vec<u8>, Self::Error>;
+
+    /// What is to be said below the timings when the last frame is done.
+    fn remark(&self) -> Option<String> {
+        None
+    }
 }
 
 #[cfg(test)]

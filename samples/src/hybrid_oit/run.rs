@@ -1,0 +1,113 @@
+//! The sample on the command line: pictures and timings out.
+
+use std::fmt::Write as _;
+use std::process::ExitCode;
+
+use lvk::Context;
+
+use super::{HybridOit, HybridOitArgs, HybridOitConfig, HybridOitError, NodeUse, OitScene, PERIOD_SECONDS};
+use crate::app::device::{DeviceNeeds, driver_text};
+use crate::app::run::{self, Opened, Opening};
+use crate::app::run_args::RayTracing;
+use crate::app::run_error::RunError;
+use crate::app::sample::{Moment, PassTimes, Sample};
+use crate::hybrid::RayPath;
+
+/// What the sample and its pictures are called.
+const NAME: &str = "hybrid_oit";
+
+/// The sample in an animation.
+struct Animation {
+    sample: HybridOit,
+    /// What frame 0 shows, in seconds.
+    start: f64,
+    /// Of the frame that asked for most.
+    nodes: NodeUse,
+}
+
+impl From<HybridOitError> for RunError {
+    fn from(error: HybridOitError) -> Self {
+        match error {
+            HybridOitError::Path(error) => error.into(),
+            HybridOitError::Device(_) => Self::device(error),
+            _ => Self::input(error),
+        }
+    }
+}
+
+impl Sample for Animation {
+    type Error = HybridOitError;
+
+    fn update(&mut self, moment: Moment) -> Result<(), HybridOitError> {
+        self.sample.update(self.start + PERIOD_SECONDS * f64::from(moment.phase()));
+        Ok(())
+    }
+
+    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, HybridOitError> {
+        let times = self.sample.render()?;
+        let nodes = self.sample.node_use()?;
+        self.nodes = if nodes.asked >= self.nodes.asked { nodes } else { self.nodes };
+        after_step(1);
+        Ok(times)
+    }
+
+    fn picture(&self) -> Result<Vec<u8>, HybridOitError> {
+        self.sample.picture()
+    }
+
+    fn remark(&self) -> Option<String> {
+        Some(format!("glass     {}", self.nodes))
+    }
+}
+
+/// Does what the command line says. Prints to standard output, errors in one line to standard error; the status
+/// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
+#[must_use]
+pub fn run(args: &HybridOitArgs) -> ExitCode {
+    run::run(NAME, &args.run, |opening| open(args, opening))
+}
+
+fn open(args: &HybridOitArgs, opening: &mut Opening<'_>) -> Result<Opened<Animation>, RunError> {
+    let context = opening.device(&DeviceNeeds::default())?;
+    let wish = match args.run.rt {
+        RayTracing::Auto => None,
+        RayTracing::Pipeline => Some(RayPath::Pipeline),
+        RayTracing::Query => Some(RayPath::Query),
+    };
+    let path = RayPath::choose(wish, context.capabilities())?;
+    let scene = OitScene::default();
+    let config = HybridOitConfig {
+        supersampling: args.supersampling,
+        shadow_rays: args.shadow_rays,
+        node_capacity: args.nodes,
+        ..HybridOitConfig::new(path, args.run.width, args.run.height)
+    };
+    opening.progress.stage("making the scene and its pipelines", 0);
+    let sample = HybridOit::new(&context, &scene, &config)?;
+    let headline = headline(&context, &scene, &config);
+    let sample = Animation { sample, start: args.time, nodes: NodeUse::default() };
+    Ok(Opened { context, sample, headline })
+}
+
+fn headline(ctx: &Context, scene: &OitScene, config: &HybridOitConfig) -> String {
+    let capabilities = ctx.capabilities();
+    let mut text = format!("device    {} ({})\n", capabilities.device_name, driver_text(capabilities));
+    if let Some(profile) = &capabilities.profile {
+        let _ = writeln!(text, "profile   {profile}, rehearsed on this device");
+    }
+    let path = match config.path {
+        RayPath::Pipeline => "a ray tracing pipeline",
+        RayPath::Query => "ray queries in a compute shader",
+    };
+    let _ = writeln!(text, "method    raster with a list of glass for each sample; shadows by {path}");
+    let (samples, rays) = (config.supersampling * config.supersampling, config.shadow_rays);
+    let OitScene { blocks, balls, glass, .. } = scene;
+    let _ = write!(
+        text,
+        "scene     {} blocks, {} balls, {} spheres of glass; samples a pixel {samples}, shadow rays each {rays}",
+        blocks.len(),
+        balls.len(),
+        glass.len()
+    );
+    text
+}

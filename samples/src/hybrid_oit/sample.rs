@@ -1,0 +1,202 @@
+//! The sample as a type: give it a scene and a time, get a picture.
+
+use lvk::{BufferDesc, BufferHandle, CommandBuffer, Context, Holder, TextureHandle, TextureRegion};
+
+use super::buffers::Buffers;
+use super::config::HybridOitConfig;
+use super::error::HybridOitError;
+use super::frame::{FrameConstants, Numbers, Push};
+use super::glass_lists::{GlassLists, NodeUse};
+use super::image_passes::ImagePasses;
+use super::raster_passes::RasterPasses;
+use super::scene::{OitScene, PERIOD_SECONDS};
+use super::shadow_pass::ShadowPass;
+use super::stamps::Stamps;
+use super::structures::Structures;
+use super::targets::Targets;
+use crate::app::sample::PassTimes;
+
+/// Renders a scene of blocks, balls and glass. What it shows depends on the time alone, not on frames before.
+pub struct HybridOit {
+    ctx: Context,
+    config: HybridOitConfig,
+    buffers: Buffers,
+    structures: Structures,
+    targets: Targets,
+    images: ImagePasses,
+    raster: RasterPasses,
+    shadows: ShadowPass,
+    stamps: Stamps,
+    sphere_count: u32,
+    _constants: Holder<BufferHandle>,
+    push: Push,
+}
+
+impl HybridOit {
+    /// Uploads `scene`, builds what does not move and compiles the pipelines. The time is 0.
+    ///
+    /// # Errors
+    /// [`HybridOitError`] when the configuration or the scene is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, scene: &OitScene, config: &HybridOitConfig) -> Result<Self, HybridOitError> {
+        scene.check()?;
+        config.check(ctx.capabilities(), scene.glass.len())?;
+        let extent = config.extent();
+        let buffers = Buffers::new(ctx, scene, samples(extent), config.nodes())?;
+        let structures = Structures::new(ctx, scene, &buffers)?;
+        let targets = Targets::new(ctx, extent, [config.width, config.height])?;
+        let numbers = numbers(scene, config, &structures, &targets);
+        let constants = FrameConstants::new(scene, extent, buffers.addresses(ctx)?, numbers);
+        let constants = ctx.create_buffer(&BufferDesc {
+            data: Some(bytemuck::bytes_of(&constants)),
+            debug_name: "frame constants",
+            ..BufferDesc::default()
+        })?;
+        Ok(Self {
+            images: ImagePasses::new(ctx)?,
+            raster: RasterPasses::new(ctx, scene, &buffers)?,
+            shadows: ShadowPass::new(ctx, config.path)?,
+            stamps: Stamps::new(ctx)?,
+            sphere_count: (scene.balls.len() + scene.glass.len()) as u32,
+            push: Push { frame: ctx.buffer_address(*constants)?, time: 0.0, padding: 0 },
+            _constants: constants,
+            ctx: ctx.clone(),
+            config: *config,
+            buffers,
+            structures,
+            targets,
+        })
+    }
+
+    /// Puts everything that moves where it is at `seconds`. Times that are not finite count as 0. The animation repeats
+    /// itself every [`PERIOD_SECONDS`].
+    pub fn update(&mut self, seconds: f64) {
+        let time = if seconds.is_finite() { seconds } else { 0.0 };
+        self.push.time = time.rem_euclid(PERIOD_SECONDS) as f32;
+    }
+
+    /// Renders a frame and waits for it.
+    ///
+    /// # Errors
+    /// [`HybridOitError::Device`].
+    pub fn render(&mut self) -> Result<PassTimes, HybridOitError> {
+        let mut cmd = self.ctx.acquire_command_buffer()?;
+        self.record(&mut cmd)?;
+        let submitted = self.ctx.submit(cmd)?;
+        self.ctx.wait(submitted)?;
+        Ok(self.stamps.read(&self.ctx)?)
+    }
+
+    /// Records a frame for a program that submits by itself, to show [`HybridOit::texture`] in a window, say.
+    ///
+    /// # Errors
+    /// [`HybridOitError::Device`].
+    pub fn record(&self, cmd: &mut CommandBuffer) -> Result<(), HybridOitError> {
+        let Self { buffers, targets, push, .. } = self;
+        let extent = self.config.extent();
+        self.stamps.begin(cmd)?;
+        self.images.record_animate(cmd, buffers, push, self.sphere_count)?;
+        self.stamps.end_of(cmd, 0)?;
+        self.structures.record(cmd)?;
+        self.stamps.end_of(cmd, 1)?;
+        self.raster.record_depth(cmd, targets, buffers, push)?;
+        self.stamps.end_of(cmd, 2)?;
+        self.raster.record_gbuffer(cmd, targets, buffers, push)?;
+        self.stamps.end_of(cmd, 3)?;
+        self.shadows.record(cmd, targets, buffers, push, extent)?;
+        self.stamps.end_of(cmd, 4)?;
+        self.raster.record_glass(cmd, targets, buffers, push, samples(extent))?;
+        self.stamps.end_of(cmd, 5)?;
+        let pixels = [self.config.width, self.config.height];
+        self.images.record_composite(cmd, targets, buffers, push, pixels)?;
+        Ok(self.stamps.end_of(cmd, 6)?)
+    }
+
+    /// The texture that holds the picture.
+    #[must_use]
+    pub fn texture(&self) -> TextureHandle {
+        *self.targets.picture
+    }
+
+    /// The last frame: red, green, blue and alpha of each pixel, 8 bits each, sRGB, rows from the top.
+    ///
+    /// # Errors
+    /// [`HybridOitError::Device`].
+    pub fn picture(&self) -> Result<Vec<u8>, HybridOitError> {
+        self.download(&self.targets.picture)
+    }
+
+    /// How many nodes the glass of the last frame asked for, and how many there are.
+    ///
+    /// # Errors
+    /// [`HybridOitError::Device`].
+    pub fn node_use(&self) -> Result<NodeUse, HybridOitError> {
+        let mut asked = [0_u32];
+        self.ctx.download_buffer(*self.buffers.node_count, 0, bytemuck::cast_slice_mut(&mut asked))?;
+        Ok(NodeUse { asked: asked[0], capacity: self.config.nodes() })
+    }
+
+    /// The lists of glass of the last frame, one for each sample.
+    ///
+    /// # Errors
+    /// [`HybridOitError::Device`].
+    pub fn glass_lists(&self) -> Result<GlassLists, HybridOitError> {
+        let NodeUse { asked, capacity } = self.node_use()?;
+        let count = samples(self.config.extent()) as usize;
+        Ok(GlassLists::read(&self.ctx, &self.buffers, count, asked.min(capacity))?)
+    }
+
+    /// Where the opaque surface of each sample of the last frame is: x, y, z in scene units, and the distance from the
+    /// eye, which is 0 where the sky is seen.
+    ///
+    /// # Errors
+    /// [`HybridOitError::Device`].
+    pub fn positions(&self) -> Result<Vec<[f32; 4]>, HybridOitError> {
+        let bytes = self.download(&self.targets.position)?;
+        let number = |at: usize| bytes[at..].first_chunk().map_or(0.0, |word| f32::from_le_bytes(*word));
+        Ok((0..bytes.len() / 16).map(|texel| [0, 4, 8, 12].map(|at| number(16 * texel + at))).collect())
+    }
+
+    /// Which share of the sun's red, green and blue reaches each sample of the last frame (the
+    /// fourth number is 1).
+    ///
+    /// # Errors
+    /// [`HybridOitError::Device`].
+    pub fn sunlight(&self) -> Result<Vec<[f32; 4]>, HybridOitError> {
+        let bytes = self.download(&self.targets.shadow)?;
+        let number = |at: usize| {
+            let bits = bytes[at..].first_chunk().map_or(0, |word| u16::from_le_bytes(*word));
+            super::glass_lists::half(bits)
+        };
+        Ok((0..bytes.len() / 8).map(|texel| [0, 2, 4, 6].map(|at| number(8 * texel + at))).collect())
+    }
+
+    fn download(&self, texture: &Holder<TextureHandle>) -> Result<Vec<u8>, HybridOitError> {
+        Ok(self.ctx.download_texture(**texture, &TextureRegion::default())?)
+    }
+}
+
+fn samples([width, height]: [u32; 2]) -> u64 {
+    u64::from(width) * u64::from(height)
+}
+
+fn numbers(
+    scene: &OitScene,
+    config: &HybridOitConfig,
+    structures: &Structures,
+    targets: &Targets,
+) -> Numbers {
+    Numbers {
+        ball_count: scene.balls.len() as u32,
+        glass_count: scene.glass.len() as u32,
+        block_count: scene.blocks.len() as u32,
+        node_capacity: config.nodes(),
+        shadow_rays: config.shadow_rays,
+        supersampling: config.supersampling,
+        tlas: structures.tlas.index(),
+        gbuffer_position: targets.position.index(),
+        gbuffer_surface: targets.surface.index(),
+        shadow_image: targets.shadow.index(),
+        shadow_texture: targets.shadow.index(),
+        output: targets.picture.index(),
+    }
+}

@@ -1,0 +1,338 @@
+//! The `hybrid_oit` sample: its lists, its shadows and its pictures against what the host computes.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::path::{Path, PathBuf};
+
+use image::RgbaImage;
+use lvk::glam::{DVec3, Vec2, Vec3};
+use lvk::{Context, DeviceProfile};
+use lvk_samples::hybrid::RayPath;
+use lvk_samples::hybrid_oit::{Glass, HybridOit, HybridOitConfig, HybridOitError, Motion, OitScene};
+use lvk_tests::glass_room::{GlassRoom, HostScene, decode, encode, through, through_sorted};
+use lvk_tests::hybrid::paths;
+use lvk_tests::picture::{Likeness, Tolerance, assert_alike, keep};
+use lvk_tests::{device, device_with};
+
+/// No multiple of a workgroup.
+const SIZE: [u32; 2] = [163, 91];
+const MOMENT: f64 = 1.9;
+
+/// Of the same picture by pipeline and by query.
+const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
+/// Of a picture and the same one on a lesser device.
+const SAME_DEVICE: Tolerance = Tolerance { psnr: 60.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
+/// Of a picture and the same one by another driver, years ago.
+const SAME_AS_EVER: Tolerance = Tolerance { psnr: 40.0, ssim: 0.995, differing_share: 1.0, flip: 0.012 };
+
+/// Glass that is sunk into the floor, blocks and balls, so that shadow rays begin inside of it.
+fn sunk() -> OitScene {
+    let mut scene = OitScene::default();
+    scene.glass.iter_mut().for_each(|glass| glass.motion.anchor.y = 0.25);
+    scene
+}
+
+/// A sample a pixel and a ray a sample, for comparisons with the host.
+fn plain(ctx: &Context) -> HybridOitConfig {
+    let path = paths(ctx)[0];
+    HybridOitConfig { supersampling: 1, shadow_rays: 1, ..HybridOitConfig::new(path, SIZE[0], SIZE[1]) }
+}
+
+/// Glass behind glass, in a row along the view and into each other, so that lists are longer than what is sorted at once.
+fn crowd() -> OitScene {
+    let mut scene = OitScene::default();
+    let tints = [[0.9, 0.5, 0.6], [0.5, 0.9, 0.7], [0.6, 0.6, 0.95], [0.95, 0.9, 0.5]];
+    scene.glass = (0..17)
+        .map(|index| {
+            let along = index as f32 / 17.0;
+            let anchor = Vec3::new(0.4 - 0.3 * along, 2.2 + 0.9 * along, 5.0 - 5.5 * along);
+            let orbit = Vec2::splat(0.1);
+            let motion = Motion { anchor, orbit, orbit_phase: 2.4 * index as f32, ..Motion::default() };
+            Glass { radius: 0.5 + 0.1 * (index % 5) as f32, tint: Vec3::from(tints[index % 4]), motion }
+        })
+        .collect();
+    scene
+}
+
+#[test]
+fn both_paths_give_the_same_picture() {
+    let Some(ctx) = device() else { return };
+    let pictures = |seconds| -> Vec<RgbaImage> {
+        let take = |path| {
+            let config = HybridOitConfig::new(path, SIZE[0], SIZE[1]);
+            GlassRoom::new(&ctx, &OitScene::default(), &config).picture(seconds)
+        };
+        paths(&ctx).into_iter().map(take).collect()
+    };
+    for seconds in [0.0, 5.3] {
+        let pictures = pictures(seconds);
+        for other in &pictures[1..] {
+            assert_alike("oit query", other, &pictures[0], &SAME_RAYS);
+        }
+    }
+}
+
+/// Every list holds the places where its pixel's ray enters and leaves glass in front of what is opaque, and no other.
+#[test]
+fn lists_hold_every_crossing_in_front() {
+    let Some(ctx) = device() else { return };
+    for (scene, least) in [(OitScene::default(), 3000), (crowd(), 10_000)] {
+        let mut room = GlassRoom::new(&ctx, &scene, &plain(&ctx));
+        room.picture(MOMENT);
+        let (lists, opaque) = (room.sample.glass_lists().unwrap(), room.sample.positions().unwrap());
+        let host = HostScene::new(&scene, MOMENT);
+        let (mut compared, mut doubtful) = (0, 0);
+        for (sample, position) in opaque.iter().enumerate() {
+            let pixel = [sample as u32 % SIZE[0], sample as u32 / SIZE[0]];
+            let Some(expected) = crossings(&host, pixel, position[3]) else {
+                doubtful += 1;
+                continue;
+            };
+            let mut found: Vec<f64> = lists.of(sample).iter().map(|node| f64::from(node.distance)).collect();
+            found.sort_by(f64::total_cmp);
+            assert_eq!(found.len(), expected.len(), "pixel {pixel:?}: {found:?}, must be {expected:?}");
+            for (found, expected) in found.iter().zip(&expected) {
+                assert!((found - expected).abs() < 2e-3, "pixel {pixel:?}: {found}, must be {expected}");
+            }
+            compared += found.len();
+        }
+        assert!(
+            compared > least && doubtful * 10 < SIZE[0] * SIZE[1],
+            "{compared} nodes, {doubtful} pixels out"
+        );
+    }
+}
+
+/// Distances of what a pixel's list must hold; `None` where rounding decides.
+fn crossings(host: &HostScene, pixel: [u32; 2], opaque: f32) -> Option<Vec<f64>> {
+    let (origin, direction) = host.camera_ray(pixel, SIZE);
+    let end = if opaque > 0.0 { f64::from(opaque) } else { f64::INFINITY };
+    let mut is_doubtful = false;
+    let glass = host.spheres.iter().filter(|sphere| sphere.absorption.is_some());
+    let mut all: Vec<f64> = glass
+        .filter_map(|sphere| sphere.crossing(origin, direction, &mut is_doubtful))
+        .flatten()
+        .inspect(|distance| assert!(*distance > 0.0))
+        .collect();
+    is_doubtful |= all.iter().any(|distance| (distance - end).abs() < 2e-3);
+    all.retain(|distance| *distance < end);
+    all.sort_by(f64::total_cmp);
+    (!is_doubtful).then_some(all)
+}
+
+/// A pool without nodes gives the picture behind the glass; what the host sees of it through the lists that it sorts is
+/// the picture with glass. Lists taken as they come give another.
+#[test]
+fn the_picture_is_what_sorted_lists_show() {
+    let Some(ctx) = device() else { return };
+    for (scene, longest) in [(OitScene::default(), 4), (crowd(), 17)] {
+        let config = plain(&ctx);
+        let without = HybridOitConfig { node_capacity: Some(0), ..config };
+        let behind = GlassRoom::new(&ctx, &scene, &without).picture(MOMENT);
+        let mut room =
+            GlassRoom::new(&ctx, &scene, &HybridOitConfig { node_capacity: Some(1 << 18), ..config });
+        let picture = room.picture(MOMENT);
+        let lists = room.sample.glass_lists().unwrap();
+        let (mut worst, mut unsorted, mut found_longest) = (0.0_f64, 0, 0);
+        for (sample, (seen, behind)) in picture.pixels().zip(behind.pixels()).enumerate() {
+            let mut nodes = lists.of(sample);
+            found_longest = found_longest.max(nodes.len());
+            let background = [0, 1, 2].map(|channel| decode(behind[channel]));
+            let sorted = through_sorted(&nodes, background);
+            nodes.reverse();
+            let as_they_came = through(&nodes, background);
+            let error = |color: [f64; 3]| {
+                (0..3).map(|c| (encode(color[c]) - f64::from(seen[c])).abs()).fold(0.0, f64::max)
+            };
+            worst = worst.max(error(sorted));
+            unsorted += usize::from(error(as_they_came) > 6.0);
+        }
+        eprintln!(
+            "{found_longest} nodes in the longest list; {worst:.2}/255 off; unsorted {unsorted} pixels differ"
+        );
+        assert!(worst < 3.0, "a pixel is {worst}/255 off");
+        assert!(found_longest >= longest, "the longest list has {found_longest} nodes");
+        assert!(unsorted > 20, "order makes no difference, so nothing was tested");
+    }
+}
+
+/// What does not fit is counted, and the lists use every node of the pool once and none beside it.
+#[test]
+fn a_pool_that_runs_out_is_counted_and_safe() {
+    let Some(ctx) = device() else { return };
+    let scene = OitScene::default();
+    let config = plain(&ctx);
+    let mut whole = GlassRoom::new(&ctx, &scene, &config);
+    let complete = whole.picture(MOMENT);
+    let asked = whole.sample.node_use().unwrap();
+    assert_eq!(asked.lost(), 0);
+    assert_eq!(whole.sample.glass_lists().unwrap().linked_count(), asked.asked as usize);
+    for capacity in [0, 1, 1000, asked.asked] {
+        let config = HybridOitConfig { node_capacity: Some(capacity), ..config };
+        let mut room = GlassRoom::new(&ctx, &scene, &config);
+        let picture = room.picture(MOMENT);
+        let nodes = room.sample.node_use().unwrap();
+        assert_eq!((nodes.asked, nodes.capacity), (asked.asked, capacity));
+        assert_eq!(nodes.lost(), asked.asked - capacity);
+        assert_eq!(room.sample.glass_lists().unwrap().linked_count(), capacity as usize);
+        assert_eq!(picture == complete, capacity == asked.asked, "{capacity} nodes");
+    }
+}
+
+/// Rays from every surface to the sun, blocked by blocks and balls, tinted by glass. A surface never shades itself: that
+/// would show as light that is missing here.
+#[test]
+fn shadows_are_those_the_host_computes() {
+    let Some(ctx) = device() else { return };
+    for scene in [OitScene::default(), sunk()] {
+        for path in paths(&ctx) {
+            let mut room = GlassRoom::new(&ctx, &scene, &HybridOitConfig { path, ..plain(&ctx) });
+            room.picture(MOMENT);
+            let (positions, sunlight) = (room.sample.positions().unwrap(), room.sample.sunlight().unwrap());
+            let host = HostScene::new(&scene, MOMENT);
+            let mut counts = ShadowCounts::default();
+            for (position, found) in
+                positions.iter().zip(&sunlight).filter(|(at, _)| at[3] > 0.0 && at[3] < 30.0)
+            {
+                let point = DVec3::new(position[0].into(), position[1].into(), position[2].into());
+                let found = DVec3::new(found[0].into(), found[1].into(), found[2].into());
+                match expected_sunlight(&host, &scene, point) {
+                    None => counts.doubtful += 1,
+                    Some(expected) => {
+                        let error = (found - expected).abs().max_element();
+                        assert!(error < 3e-3, "{path:?} at {point}: {found}, must be {expected}");
+                        counts.add(expected);
+                    }
+                }
+            }
+            eprintln!("{path:?}: {counts:?}");
+            assert!(counts.lit > 2000 && counts.dark > 500 && counts.tinted > 500 && counts.doubtful < 500);
+        }
+    }
+}
+
+/// How many points were compared.
+#[derive(Debug, Default)]
+struct ShadowCounts {
+    lit: u32,
+    dark: u32,
+    tinted: u32,
+    doubtful: u32,
+}
+
+impl ShadowCounts {
+    fn add(&mut self, light: DVec3) {
+        match light.max_element() {
+            0.0 => self.dark += 1,
+            1.0 => self.lit += 1,
+            _ => self.tinted += 1,
+        }
+    }
+}
+
+/// The sunlight at a point of an opaque surface; `None` where rounding decides.
+fn expected_sunlight(host: &HostScene, scene: &OitScene, point: DVec3) -> Option<DVec3> {
+    let normal = host.normal_at(point);
+    let cosine = normal.dot(scene.sun.direction.as_dvec3().normalize());
+    if cosine.abs() < 5e-3 {
+        return None;
+    }
+    if cosine < 0.0 {
+        return Some(DVec3::ZERO);
+    }
+    let found = host.sunlight(point + 1e-4 * normal);
+    (!found.is_doubtful).then_some(found.light)
+}
+
+#[test]
+fn a_frame_is_the_same_alone_and_in_a_sequence() {
+    let Some(ctx) = device() else { return };
+    let scene = OitScene::default();
+    for path in paths(&ctx) {
+        let config = HybridOitConfig { path, ..plain(&ctx) };
+        let at = |frame: u32| f64::from(frame) / 30.0;
+        let mut sequence = GlassRoom::new(&ctx, &scene, &config);
+        let frames: Vec<_> = (100..104).map(|frame| sequence.picture(at(frame))).collect();
+        assert_ne!(frames[0], frames[1], "the animation stands still");
+        let alone = GlassRoom::new(&ctx, &scene, &config).picture(at(103));
+        assert_eq!(alone, frames[3], "{path:?}");
+        assert_eq!(sequence.picture(at(103 + 240)), frames[3], "{path:?}: a round later");
+        assert_eq!(sequence.picture(at(100)), frames[0], "{path:?}: back in time");
+    }
+}
+
+#[test]
+fn a_phone_would_show_the_same() {
+    let Some(ctx) = device() else { return };
+    let scene = OitScene::default();
+    let picture = |ctx: &Context| GlassRoom::new(ctx, &scene, &plain(ctx)).picture(MOMENT);
+    let expected = picture(&ctx);
+    let profile = DeviceProfile::mali_g715();
+    let Some(phone) = device_with(|desc| desc.profile = Some(&profile)) else { return };
+    assert_eq!(paths(&phone), [RayPath::Query]);
+    assert_alike("oit as on a phone", &picture(&phone), &expected, &SAME_DEVICE);
+}
+
+#[test]
+fn scenes_without_sense_are_refused() {
+    let Some(ctx) = device() else { return };
+    let mistakes: [fn(&mut OitScene); 5] = [
+        |scene| scene.glass.clear(),
+        |scene| scene.balls[0].radius = f32::NAN,
+        |scene| scene.glass[1].tint.x = 0.0,
+        |scene| scene.glass[1].motion.anchor.y = f32::INFINITY,
+        |scene| scene.sun.direction = Vec3::ZERO,
+    ];
+    for mistake in mistakes {
+        let mut scene = OitScene::default();
+        mistake(&mut scene);
+        let refused = HybridOit::new(&ctx, &scene, &plain(&ctx)).err();
+        assert!(matches!(refused, Some(HybridOitError::BrokenScene(_))), "{refused:?}");
+    }
+}
+
+/// Where the change of a picture is meant, look at the new one and copy it over `tests/reference/hybrid_oit_small.png`.
+#[test]
+fn the_room_looks_as_it_always_did() {
+    let Some(ctx) = device() else { return };
+    let picture = small_picture(&ctx, &OitScene::default());
+    match image::open(reference_path()) {
+        Ok(expected) => assert_alike("hybrid_oit_small", &picture, &expected.into_rgba8(), &SAME_AS_EVER),
+        Err(error) => {
+            let kept = keep("hybrid_oit_small actual", &picture);
+            panic!("{}: {error}; the picture is in {}", reference_path().display(), kept.display());
+        }
+    }
+}
+
+/// What it is, and how a scene shows it.
+type Mistake = (&'static str, fn(&mut OitScene));
+
+/// What a shader forgets or gets wrong must not pass for another driver's rounding.
+#[test]
+fn the_reference_picture_tells_small_mistakes() {
+    let Some(ctx) = device() else { return };
+    let expected = image::open(reference_path()).unwrap().into_rgba8();
+    let mistakes: [Mistake; 5] = [
+        ("paler glass", |scene| scene.glass.iter_mut().for_each(|glass| glass.tint = glass.tint.powf(0.8))),
+        ("moved sun", |scene| scene.sun.direction.x += 0.06),
+        ("dimmer sun", |scene| scene.sun.color *= 0.9),
+        ("one ball less", |scene| scene.balls.truncate(5)),
+        ("one sphere less", |scene| scene.glass.truncate(13)),
+    ];
+    for (what, mistake) in mistakes {
+        let mut wrong = OitScene::default();
+        mistake(&mut wrong);
+        let likeness = Likeness::of(&small_picture(&ctx, &wrong), &expected);
+        eprintln!("{what}: {likeness}");
+        assert!(!likeness.is_within(&SAME_AS_EVER), "{what} goes unnoticed: {likeness}");
+    }
+}
+
+fn small_picture(ctx: &Context, scene: &OitScene) -> RgbaImage {
+    let config = HybridOitConfig::new(paths(ctx)[0], 240, 135);
+    GlassRoom::new(ctx, scene, &config).picture(MOMENT)
+}
+
+fn reference_path() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("reference/hybrid_oit_small.png")
+}
