@@ -4,7 +4,8 @@ use crate::ray_tracer::{BACK, FRONT, HitRecord, MISSED};
 use crate::rays::Ray;
 use crate::reference::{Answer, HitIds};
 
-/// Relative to the distance, or to 1 where that is larger.
+/// Relative to the distance, or to 1, or to an eighth of the largest coordinate the ray starts at, whichever is most: far
+/// from the origin the device's floats are no finer.
 const DISTANCE: f64 = 1e-5;
 const BARYCENTRICS: f64 = 2e-4;
 /// Most of the rays may not be left out: one in so many.
@@ -29,7 +30,7 @@ impl Agreement {
     pub fn of_triangles(rays: &[Ray], records: &[HitRecord], answer: impl Fn(&Ray) -> Answer) -> Self {
         Self::of(rays, records, |ray, record| {
             let answer = answer(ray);
-            answer.is_certain.then(|| (answer.hit.is_some(), triangle_mistake(record, &answer)))
+            answer.is_certain.then(|| (answer.hit.is_some(), triangle_mistake(ray, record, &answer)))
         })
     }
 
@@ -37,7 +38,7 @@ impl Agreement {
     pub fn of_shapes(rays: &[Ray], records: &[HitRecord], answer: impl Fn(&Ray) -> Answer) -> Self {
         Self::of(rays, records, |ray, record| {
             let answer = answer(ray);
-            answer.is_certain.then(|| (answer.hit.is_some(), mistake(record, &answer)))
+            answer.is_certain.then(|| (answer.hit.is_some(), mistake(ray, record, &answer)))
         })
     }
 
@@ -98,7 +99,7 @@ impl Agreement {
     }
 }
 
-fn mistake(record: &HitRecord, answer: &Answer) -> Option<String> {
+fn mistake(ray: &Ray, record: &HitRecord, answer: &Answer) -> Option<String> {
     let found = (record.kind != MISSED).then_some(HitIds {
         instance: record.instance,
         custom_index: record.custom_index,
@@ -110,12 +111,13 @@ fn mistake(record: &HitRecord, answer: &Answer) -> Option<String> {
         return Some(format!("hit {found:?} at {}, must be {expected:?} ({:?})", record.t, answer.hit));
     }
     let t = answer.hit?.t;
-    let is_close = within(f64::from(record.t), t, DISTANCE * t.abs().max(1.0));
+    let coordinate = ray.origin.iter().fold(0.0_f64, |most, place| most.max(f64::from(place.abs())));
+    let is_close = within(f64::from(record.t), t, DISTANCE * t.abs().max(1.0).max(coordinate / 8.0));
     (!is_close).then(|| format!("distance {}, must be {t}", record.t))
 }
 
-fn triangle_mistake(record: &HitRecord, answer: &Answer) -> Option<String> {
-    if let Some(mistake) = mistake(record, answer) {
+fn triangle_mistake(ray: &Ray, record: &HitRecord, answer: &Answer) -> Option<String> {
+    if let Some(mistake) = mistake(ray, record, answer) {
         return Some(mistake);
     }
     let hit = answer.hit?;

@@ -484,7 +484,8 @@ fn draws_that_do_not_fit_the_pipeline_are_refused() {
     assert!(exceeded(pass.draw_mesh_tasks([1, limits.max_task_groups[1].saturating_add(1), 1])));
     drop(pass);
     ctx.submit(cmd).unwrap();
-    assert_eq!(first_bytes(&ctx, *target), [128; 16]);
+    let bytes = first_bytes(&ctx, *target);
+    assert!(bytes.iter().all(|byte| (127..=128).contains(byte)), "a half, rounded either way: {bytes:?}");
 }
 
 #[test]

@@ -337,7 +337,14 @@ fn a_part_may_be_a_single_triangle() -> Result<()> {
 fn a_mesh_over_the_limits_of_the_phone_is_split() -> Result<()> {
     let profile = DeviceProfile::mali_g715();
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
-    assert_eq!(Method::available(&ctx), [Method::Query]);
+    assert!(!ctx.capabilities().ray_tracing_pipeline);
+    if !ctx.capabilities().ray_query {
+        eprintln!(
+            "NOT TESTED, {} has no ray queries, and the phone nothing else",
+            ctx.capabilities().device_name
+        );
+        return Ok(());
+    }
     let scene = RayScene::single(Mesh::terrain(219), Layout::Indexed32);
     let gpu = scene.upload(&ctx)?;
     let sizes = ctx.accel_struct_sizes(*gpu.models[0])?;
