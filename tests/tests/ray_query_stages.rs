@@ -9,6 +9,7 @@ use lvk::{
     RenderPipelineDesc, RenderPipelineHandle, Result, ShaderStage, TextureHandle, Topology,
 };
 use lvk_tests::agreement::Agreement;
+use lvk_tests::bender::{Bender, bent};
 use lvk_tests::meshes::Mesh;
 use lvk_tests::raster::{pixels, target};
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances};
@@ -119,33 +120,6 @@ const PASS_ON: &str = "
     layout(location = 0) flat in vec4 texel;
     layout(location = 0) out vec4 result;
     void main() { result = texel; }";
-
-/// Moves every vertex by its own amount, as [`bent`] does.
-const BEND: &str = "
-    layout(local_size_x = 64) in;
-    layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Positions { vec3 at[]; };
-    layout(push_constant, scalar) uniform Push { Positions positions; uint count; float amount; };
-    void main() {
-        uint index = gl_GlobalInvocationID.x;
-        if (index < count) {
-            vec3 p = positions.at[index];
-            positions.at[index] = p + vec3(amount * p.y, amount, 0.5 * amount * p.x);
-        }
-    }";
-
-#[repr(C)]
-#[derive(Clone, Copy, NoUninit)]
-struct BendPush {
-    positions: u64,
-    count: u32,
-    amount: f32,
-}
-
-fn bent(mesh: &Mesh, amount: f32) -> Mesh {
-    let positions =
-        mesh.positions.iter().map(|[x, y, z]| [x + amount * y, y + amount, z + 0.5 * amount * x]).collect();
-    Mesh { positions, triangles: mesh.triangles.clone() }
-}
 
 #[repr(C)]
 #[derive(Clone, Copy, NoUninit)]
@@ -310,7 +284,7 @@ fn without_places(answer: Answer) -> Answer {
 /// A deforming torus, and room to show it several times.
 struct Stage {
     prober: Prober,
-    bend: Holder<ComputePipelineHandle>,
+    bender: Bender,
     scene: RayScene,
     gpu: GpuScene,
     /// Declared last: its end judges that of everything else.
@@ -332,21 +306,15 @@ impl Stage {
             placed: vec![Placed { custom_index: 3, ..Placed::new(0, Affine3A::IDENTITY) }],
         };
         let gpu = scene.upload_with(&ctx, UPDATABLE, UPDATABLE, 4)?;
-        let module = shader(&ctx, ShaderStage::Compute, BEND)?;
-        let bend = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-        let bend = ctx.create_compute_pipeline(&bend)?;
+        let bender = Bender::new(&ctx)?;
         let prober = Prober::new(&ctx, stage)?;
-        Ok(Some(Self { prober, bend, scene, gpu, ctx }))
+        Ok(Some(Self { prober, bender, scene, gpu, ctx }))
     }
 
     /// Moves the vertices by a dispatch and builds from them.
     fn deform(&mut self, cmd: &mut CommandBuffer, amount: f32, mode: BuildMode) -> Result<()> {
         let (vertices, mesh) = (*self.gpu.buffers[0].vertices, &mut self.scene.models[0][0].mesh);
-        let count = mesh.positions.len() as u32;
-        cmd.bind_compute_pipeline(*self.bend)?;
-        cmd.push_constants(&BendPush { positions: self.ctx.buffer_address(vertices)?, count, amount })?;
-        let writes = Dependencies { buffers: &[vertices], ..Default::default() };
-        cmd.dispatch([count.div_ceil(64), 1, 1], &writes)?;
+        self.bender.record(cmd, vertices, mesh, amount)?;
         cmd.build_blas(&[*self.gpu.models[0]], mode)?;
         *mesh = bent(mesh, amount);
         Ok(())

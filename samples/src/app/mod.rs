@@ -3,6 +3,7 @@
 //! [`sample`] tells what a sample is and how its program is written.
 
 pub mod args;
+pub(crate) mod array_buffer;
 pub mod device;
 pub mod frame_name;
 pub mod frames;

@@ -3,49 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use crate::scene::{Camera, Scene};
-
-/// Bytes by which the shaders know a camera (`shaders/common/camera.glsl`).
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct GpuCamera {
-    eye: [f32; 3],
-    near_plane: f32,
-    forward: [f32; 3],
-    pixel_spread: f32,
-    right: [f32; 3],
-    width: u32,
-    down: [f32; 3],
-    height: u32,
-    clip_right: [f32; 3],
-    padding0: f32,
-    clip_down: [f32; 3],
-    padding1: f32,
-}
-
-impl GpuCamera {
-    /// The camera of a picture of `width` times `height` pixels. `near_plane` is in scene units.
-    pub(crate) fn new(camera: &Camera, width: u32, height: u32, near_plane: f32) -> Self {
-        let [right, up, forward] = camera.frame().map(Vec3::from);
-        let half_height = (0.5 * camera.vertical_fov_degrees.to_radians()).tan();
-        let right = right * (half_height * width as f32 / height as f32);
-        let down = -up * half_height;
-        Self {
-            eye: camera.eye,
-            near_plane,
-            forward: forward.to_array(),
-            pixel_spread: 2.0 * half_height / height as f32,
-            right: right.to_array(),
-            width,
-            down: down.to_array(),
-            height,
-            clip_right: (right / right.length_squared()).to_array(),
-            padding0: 0.0,
-            clip_down: (down / down.length_squared()).to_array(),
-            padding1: 0.0,
-        }
-    }
-}
+use crate::scene::{GpuCamera, Scene};
 
 /// Addresses of a scene's arrays (`Scene` in `shaders/common/scene_buffers.glsl`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -172,38 +130,8 @@ fn offset_extent(scene: &Scene) -> f32 {
 mod tests {
     use super::*;
 
-    fn camera() -> Camera {
-        Camera::looking_at([1.0, 2.0, 3.0], [4.0, 1.0, -2.0], 60.0)
-    }
-
-    fn direction(camera: &GpuCamera, ndc: [f32; 2]) -> Vec3 {
-        Vec3::from(camera.forward) + ndc[0] * Vec3::from(camera.right) + ndc[1] * Vec3::from(camera.down)
-    }
-
-    #[test]
-    fn rays_and_clip_space_agree() {
-        let gpu = GpuCamera::new(&camera(), 1280, 720, 0.1);
-        for ndc in [[0.0, 0.0], [0.7, -0.3], [-1.0, 1.0]] {
-            let offset = 3.5 * direction(&gpu, ndc);
-            let w = offset.dot(Vec3::from(gpu.forward));
-            assert!((offset.dot(Vec3::from(gpu.clip_right)) / w - ndc[0]).abs() < 1e-5);
-            assert!((offset.dot(Vec3::from(gpu.clip_down)) / w - ndc[1]).abs() < 1e-5);
-        }
-    }
-
-    #[test]
-    fn rays_and_the_scenes_own_matrices_agree() {
-        let gpu = GpuCamera::new(&camera(), 1280, 720, 0.1);
-        let clip_from_world =
-            camera().clip_from_view(1280.0 / 720.0, 0.1, 100.0) * camera().view_from_world();
-        let point = Vec3::from(camera().eye) + 7.0 * direction(&gpu, [0.4, -0.8]);
-        let clip = clip_from_world.project_point3(point);
-        assert!((clip.x - 0.4).abs() < 1e-4 && (clip.y + 0.8).abs() < 1e-4, "{clip}");
-    }
-
     #[test]
     fn the_layout_is_the_shaders_scalar_one() {
-        assert_eq!(size_of::<GpuCamera>(), 96);
         assert_eq!(std::mem::offset_of!(FrameConstants, lighting), 144);
         assert_eq!(std::mem::offset_of!(FrameConstants, indices), 240);
         assert_eq!(std::mem::offset_of!(FrameConstants, visibility), 272);

@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    AccelStructHandle, AddressMode, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, Context,
-    Format, GeometryFlags, Holder, IndexFormat, Indices, SamplerDesc, SamplerHandle, TextureDesc,
-    TextureHandle, TextureKind, TextureUsage, TlasDesc, TlasInstance, Triangles, VertexFormat,
+    AccelStructHandle, AddressMode, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, Context, Format,
+    GeometryFlags, Holder, IndexFormat, Indices, SamplerDesc, SamplerHandle, TextureDesc, TextureHandle,
+    TextureKind, TextureUsage, TlasDesc, TlasInstance, Triangles, VertexFormat,
 };
 
 use super::HybridError;
@@ -15,6 +15,7 @@ use super::frame::SceneAddresses;
 use super::half_float::half_bits;
 use super::scene_check::check;
 use super::texture_density::lod_constant;
+use crate::app::array_buffer::array;
 use crate::scene::{Material, Scene, Sky, Texture};
 
 /// Mask bit of instances that stop light (`kMaskOpaque` in `shaders/hybrid/hit.glsl`).
@@ -171,16 +172,6 @@ fn gpu_material(material: &Material, textures: &[Holder<TextureHandle>]) -> GpuM
         transmission: material.transmission,
         ior: material.ior,
     }
-}
-
-fn array<T: bytemuck::NoUninit>(
-    ctx: &Context,
-    debug_name: &str,
-    usage: BufferUsage,
-    elements: &[T],
-) -> lvk::Result<Holder<BufferHandle>> {
-    let data = bytemuck::cast_slice(elements);
-    ctx.create_buffer(&BufferDesc { usage, data: Some(data), debug_name, ..BufferDesc::default() })
 }
 
 fn sampler(ctx: &Context, debug_name: &str, address: AddressMode) -> lvk::Result<Holder<SamplerHandle>> {

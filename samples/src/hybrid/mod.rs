@@ -31,7 +31,6 @@ mod visibility_pass;
 
 pub use config::{Geometry, HybridConfig, Method, Raster, RasterTuning, RayPath};
 pub use error::HybridError;
-pub(crate) use frame::GpuCamera;
 pub use frame_timings::FrameTimings;
 pub use pipelines::pipelines;
 pub use raster_choice::RasterChoice;

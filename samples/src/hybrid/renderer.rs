@@ -10,14 +10,14 @@ use lvk::{
 use super::HybridError;
 use super::bands::bands;
 use super::config::{Geometry, HybridConfig, Method, Raster};
-use super::frame::{FrameConstants, GpuCamera, Indices, Lighting, Push, VisibilityPlaces, near_plane};
+use super::frame::{FrameConstants, Indices, Lighting, Push, VisibilityPlaces, near_plane};
 use super::frame_timings::{FrameTimings, Stamps};
 use super::geometry_pass::GeometryPass;
 use super::gpu_scene::GpuScene;
 use super::raster_choice::RasterChoice;
 use super::ray_pass::{GeometryLeft, RayPass};
 use super::visibility_pass::VisibilityPass;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, GpuCamera, Scene};
 
 /// Rows that a CPU renders in one go: short enough to show progress, long enough to keep every core busy.
 const CPU_BAND_ROWS: u32 = 48;

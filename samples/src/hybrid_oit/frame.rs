@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::scene::{Motion, OitScene};
-use crate::hybrid::GpuCamera;
+use crate::scene::GpuCamera;
 
 /// Addresses of the buffers (the middle of `Frame`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]

@@ -1,59 +1,16 @@
 //! The constants that every shader of the sample reads, laid out as `shaders/reflections/frame.glsl` has them.
 
 use bytemuck::{Pod, Zeroable};
-use glam::Vec3;
 
 use super::world::Light;
-use crate::scene::Camera;
+use crate::scene::GpuCamera;
 
 /// Lights that the shaders have room for.
 const MOST_LIGHTS: usize = 4;
 /// Distance of the near plane in scene units.
-const NEAR_PLANE: f32 = 0.05;
+pub(super) const NEAR_PLANE: f32 = 0.05;
 
-/// `Camera` in `shaders/common/camera.glsl`.
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub(super) struct ViewConstants {
-    eye: [f32; 3],
-    near_plane: f32,
-    forward: [f32; 3],
-    pixel_spread: f32,
-    right: [f32; 3],
-    width: u32,
-    down: [f32; 3],
-    height: u32,
-    clip_right: [f32; 3],
-    padding0: f32,
-    clip_down: [f32; 3],
-    padding1: f32,
-}
-
-impl ViewConstants {
-    /// Of a picture of `extent` pixels.
-    pub(super) fn new(camera: &Camera, extent: [u32; 2]) -> Self {
-        let [right, up, forward] = camera.frame().map(Vec3::from);
-        let half_height = (0.5 * camera.vertical_fov_degrees.to_radians()).tan();
-        let right = right * (half_height * extent[0] as f32 / extent[1] as f32);
-        let down = -up * half_height;
-        Self {
-            eye: camera.eye,
-            near_plane: NEAR_PLANE,
-            forward: forward.to_array(),
-            pixel_spread: 2.0 * half_height / extent[1] as f32,
-            right: right.to_array(),
-            width: extent[0],
-            down: down.to_array(),
-            height: extent[1],
-            clip_right: (right / right.length_squared()).to_array(),
-            padding0: 0.0,
-            clip_down: (down / down.length_squared()).to_array(),
-            padding1: 0.0,
-        }
-    }
-}
-
-/// `Light` of the same name there.
+/// `Light` in `shaders/reflections/frame.glsl`.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct LightConstants {
@@ -100,7 +57,7 @@ pub(super) struct Indices {
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct FrameConstants {
-    pub(super) view: ViewConstants,
+    pub(super) view: GpuCamera,
     pub(super) world: WorldConstants,
     pub(super) jitter: [f32; 2],
     pub(super) frame_number: u32,

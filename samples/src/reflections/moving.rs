@@ -15,7 +15,8 @@ use super::frame::{Push, words};
 use super::pipelines::{LEAVES, SKIN};
 use super::quantise::pack_normal;
 use super::serpent::{self, BONE_COUNT, Skin};
-use super::tables::{Arena, array, index_range};
+use super::tables::{Arena, index_range};
+use crate::app::array_buffer::array;
 use crate::pipelines::SampleStage;
 
 /// Invocations of a work group of both compute shaders.

@@ -8,7 +8,7 @@ use lvk::{
 use super::config::ReflectionsConfig;
 use super::error::ReflectionsError;
 use super::frame::{
-    FRAME_BYTES, FrameConstants, Indices, ViewConstants, WorldConstants, jitter, light_constants,
+    FRAME_BYTES, FrameConstants, Indices, NEAR_PLANE, WorldConstants, jitter, light_constants,
 };
 use super::image_passes::ImagePasses;
 use super::moving::{Moving, MovingPasses};
@@ -23,7 +23,7 @@ use super::top_level::{InstanceCount, TopLevel};
 use super::world::{self, World};
 use crate::app::sample::PassTimes;
 use crate::hybrid::half_float::half_bits;
-use crate::scene::{Camera, Sky};
+use crate::scene::{Camera, GpuCamera, Sky};
 
 /// Frames in a second of the animation.
 const FRAME_RATE: f32 = 60.0;
@@ -173,7 +173,7 @@ impl Reflections {
         let extent = [self.config.width, self.config.height];
         let all: Vec<FrameConstants> = (0..self.config.samples)
             .map(|sample_number| FrameConstants {
-                view: ViewConstants::new(&self.camera, extent),
+                view: GpuCamera::new(&self.camera, extent[0], extent[1], NEAR_PLANE),
                 world: self.constants,
                 jitter: jitter(sample_number, self.config.samples, extent),
                 frame_number: (self.time * FRAME_RATE).round() as u32,

@@ -2,17 +2,18 @@
 
 use std::ops::Range;
 
-use bytemuck::{NoUninit, Pod, Zeroable};
+use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, Mat3A};
 use lvk::{
-    BlasGeometry, BufferDesc, BufferHandle, BufferUsage, Context, GeometryFlags, Holder, IndexFormat,
-    Indices, TextureHandle, Triangles, VertexFormat, transform_rows,
+    BlasGeometry, BufferHandle, BufferUsage, Context, GeometryFlags, Holder, IndexFormat, Indices,
+    TextureHandle, Triangles, VertexFormat, transform_rows,
 };
 
 use super::mesh::Mesh;
 use super::moving::Moving;
 use super::quantise::{Grid, PackedVertex};
 use super::world::{Material, Model, World};
+use crate::app::array_buffer::array;
 
 /// `kNoTexture` in `shaders/reflections/frame.glsl`.
 const NO_TEXTURE: u32 = u32::MAX;
@@ -292,15 +293,4 @@ fn gpu_material(material: &Material, world: &World, textures: &[Holder<TextureHa
         opacity: material.opacity,
         density: material.density,
     }
-}
-
-/// A buffer with these elements.
-pub(super) fn array<T: NoUninit>(
-    ctx: &Context,
-    debug_name: &str,
-    usage: BufferUsage,
-    elements: &[T],
-) -> lvk::Result<Holder<BufferHandle>> {
-    let data = bytemuck::cast_slice(elements);
-    ctx.create_buffer(&BufferDesc { usage, data: Some(data), debug_name, ..BufferDesc::default() })
 }
