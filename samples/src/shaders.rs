@@ -13,6 +13,7 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("common/surface.glsl", include_str!("../../shaders/common/surface.glsl")),
     ("common/texture_lod.glsl", include_str!("../../shaders/common/texture_lod.glsl")),
     ("common/tonemap.glsl", include_str!("../../shaders/common/tonemap.glsl")),
+    ("hybrid/bounce_queue.glsl", include_str!("../../shaders/hybrid/bounce_queue.glsl")),
     ("hybrid/coverage.glsl", include_str!("../../shaders/hybrid/coverage.glsl")),
     ("hybrid/footprint.glsl", include_str!("../../shaders/hybrid/footprint.glsl")),
     ("hybrid/frame.glsl", include_str!("../../shaders/hybrid/frame.glsl")),
@@ -76,6 +77,11 @@ pub mod hybrid {
     pub const WITH_GBUFFER: &[(&str, &str)] = &[("HYBRID_GBUFFER", "1")];
     /// Macros of the ray stages that start from the visible triangles.
     pub const WITH_VISIBILITY: &[(&str, &str)] = &[("HYBRID_VISIBILITY", "1")];
+    /// Macros of the ray stage that queues mirrors and glass.
+    pub const WITH_QUEUE: &[(&str, &str)] = &[("HYBRID_QUEUE", "1")];
+    /// Macros of the same from the visible triangles.
+    pub const WITH_VISIBILITY_AND_QUEUE: &[(&str, &str)] =
+        &[("HYBRID_VISIBILITY", "1"), ("HYBRID_QUEUE", "1")];
     /// `kNoImage` in `shaders/hybrid/visibility.glsl`.
     pub const NO_IMAGE: u32 = u32::MAX;
     /// Small triangles of the compute rasteriser.
@@ -96,6 +102,10 @@ pub mod hybrid {
     pub const RENDER_RGEN: &str = include_str!("../../shaders/hybrid/render.rgen.glsl");
     /// A pixel by ray queries.
     pub const RENDER_COMP: &str = include_str!("../../shaders/hybrid/render.comp.glsl");
+    /// The further rays of a queued pixel by the ray tracing pipeline.
+    pub const BOUNCES_RGEN: &str = include_str!("../../shaders/hybrid/bounces.rgen.glsl");
+    /// The same by ray queries.
+    pub const BOUNCES_COMP: &str = include_str!("../../shaders/hybrid/bounces.comp.glsl");
     /// The nearest triangle of a ray.
     pub const CLOSEST_RCHIT: &str = include_str!("../../shaders/hybrid/closest.rchit.glsl");
     /// A ray that left the scene.

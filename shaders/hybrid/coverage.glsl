@@ -45,7 +45,7 @@ Edges edgesOf(Corners corners) {
     mat3 planes = transpose(mat3(edgeVolume(corners.b, corners.c), edgeVolume(corners.c, corners.a),
                                  edgeVolume(corners.a, corners.b))) * (volume < 0.0 ? -1.0 : 1.0);
     vec2 pixel = 2.0 / vec2(frame.camera.width, frame.camera.height);
-    vec2 origin = 0.5 * pixel - 1.0;
+    vec2 origin = 0.5 * pixel - 1.0 + frame.camera.shift;
     vec3 volumes = planes[0] + planes[1] * origin.x + planes[2] * origin.y + slack;
     return Edges(volumes, planes[1] * pixel.x, planes[2] * pixel.y, slack, kDoubt * away * size,
                  abs(volume) > kSideSlack * away * size * size);

@@ -4,6 +4,7 @@
 
 #include "common/camera.glsl"
 #include "common/scene_buffers.glsl"
+#include "hybrid/bounce_queue.glsl"
 #include "hybrid/visibility.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
@@ -23,6 +24,10 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint gbufferSurface;
     uint gbufferAlbedo;
     Visibility visibility;
+    BounceQueue bounces;
+    ColorArray sums; // of the samples so far, a colour a pixel
+    uint sampleNumber;
+    uint sampleCount;
 };
 
 layout(push_constant, scalar) uniform PushConstants {

@@ -11,7 +11,7 @@ float smoothOpenness(ivec2 pixel, ivec2 last, Surface surface, float distance) {
     float total = 0.0;
     for (int i = 0; i < 25; ++i) {
         ivec2 at = clamp(pixel + ivec2(i % 5 - 2, i / 5 - 2), ivec2(0), last);
-        vec3 direction = viewDirection(uvec2(at));
+        vec3 direction = cameraDirection(frame.camera, uvec2(at));
         float depth = textureBindlessFetch2D(frame.opaqueDepth, at, 0).r;
         vec3 position = frame.camera.eye + direction * depthDistance(max(depth, 1e-6), direction);
         vec3 normal = packedNormal(textureBindlessFetchU2D(frame.opaqueSurface, at, 0));
@@ -29,7 +29,7 @@ void main() {
     if (any(greaterThan(pixel, last))) {
         return;
     }
-    vec3 direction = viewDirection(uvec2(pixel));
+    vec3 direction = cameraDirection(frame.camera, uvec2(pixel));
     Surface surface;
     float distance;
     vec3 color = skyRadiance(direction);

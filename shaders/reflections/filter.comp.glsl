@@ -18,7 +18,7 @@ struct Centre {
 };
 
 bool readCentre(ivec2 pixel, out Centre centre) {
-    vec3 direction = viewDirection(uvec2(pixel));
+    vec3 direction = cameraDirection(frame.camera, uvec2(pixel));
     float depth = textureBindlessFetch2D(frame.opaqueDepth, pixel, 0).r;
     if (depth <= 0.0) {
         return false;

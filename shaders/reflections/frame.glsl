@@ -71,7 +71,6 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     Light lights[4];
     vec3 harmonics[9]; // radiance of the sky, in spherical harmonics
     uint lightCount;
-    vec2 jitter; // of the pixel centres, in normalised device coordinates
     uint frameNumber;
     uint sampleNumber;
     float time; // in seconds
@@ -95,17 +94,6 @@ layout(push_constant, scalar) uniform PushConstants {
     Frame frame;
     uint passArguments[4];
 };
-
-vec3 viewDirection(uvec2 pixel) {
-    vec2 ndc = (vec2(pixel) + 0.5) / vec2(frame.camera.width, frame.camera.height) * 2.0 - 1.0 + frame.jitter;
-    return normalize(frame.camera.forward + ndc.x * frame.camera.right + ndc.y * frame.camera.down);
-}
-
-vec4 viewClip(vec3 position) {
-    vec4 clip = cameraClip(frame.camera, position);
-    clip.xy -= frame.jitter * clip.w;
-    return clip;
-}
 
 // Distance along `direction` of what has this depth, which counts down from 1 at the near plane to 0.
 float depthDistance(float depth, vec3 direction) {

@@ -73,7 +73,7 @@ vec4 reflectionOf(Surface surface, vec3 direction, float distance, vec2 noise, v
 }
 
 void opaquePixel(uvec2 pixel) {
-    vec3 direction = viewDirection(pixel);
+    vec3 direction = cameraDirection(frame.camera, pixel);
     Surface surface;
     float distance;
     vec4 direct = vec4(0.0);
@@ -90,7 +90,7 @@ void opaquePixel(uvec2 pixel) {
 
 // Only where the transparent g-buffer has something that the opaque one does not hide: its depth is the mask.
 void transparentPixel(uvec2 pixel) {
-    vec3 direction = viewDirection(pixel);
+    vec3 direction = cameraDirection(frame.camera, pixel);
     Surface surface;
     float distance;
     vec4 reflection = vec4(0.0);

@@ -53,6 +53,14 @@ pub enum HybridError {
         /// The largest depth.
         limit: u32,
     },
+    /// No samples, or too many.
+    #[error("--samples {samples} is not possible: 1 to {limit}")]
+    BadSamples {
+        /// What was asked for.
+        samples: u32,
+        /// The largest number.
+        limit: u32,
+    },
     /// A scene made by hand breaks the invariants of [`Scene`](crate::scene::Scene).
     #[error("the scene cannot be drawn: {0}")]
     BrokenScene(&'static str),

@@ -92,6 +92,14 @@ pub(super) struct VisibilityPlaces {
     pub(super) triangle_count: u32,
 }
 
+/// Addresses of the queue of mirrors and glass (`BounceQueue` in `shaders/hybrid/bounce_queue.glsl`).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct BouncePlaces {
+    pub(super) head: u64,
+    pub(super) pixels: u64,
+}
+
 /// The whole block (`Frame` in `shaders/hybrid/frame.glsl`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -101,7 +109,16 @@ pub(super) struct FrameConstants {
     pub(super) lighting: Lighting,
     pub(super) indices: Indices,
     pub(super) visibility: VisibilityPlaces,
+    pub(super) bounces: BouncePlaces,
+    pub(super) sums: u64,
+    pub(super) sample_number: u32,
+    pub(super) sample_count: u32,
 }
+
+/// Bytes from one sample's block to the next.
+pub(super) const FRAME_BYTES: u64 = size_of::<FrameConstants>() as u64;
+
+const _: () = assert!(FRAME_BYTES.is_multiple_of(16));
 
 /// The push constants: where the block is, and which rows of the image to render.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -135,7 +152,8 @@ mod tests {
         assert_eq!(std::mem::offset_of!(FrameConstants, lighting), 144);
         assert_eq!(std::mem::offset_of!(FrameConstants, indices), 240);
         assert_eq!(std::mem::offset_of!(FrameConstants, visibility), 272);
-        assert_eq!(size_of::<VisibilityPlaces>(), 64);
+        assert_eq!(std::mem::offset_of!(FrameConstants, bounces), 336);
+        assert_eq!(std::mem::offset_of!(FrameConstants, sample_number), 360);
         assert_eq!(size_of::<Push>(), 16);
     }
 }

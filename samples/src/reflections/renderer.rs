@@ -7,9 +7,7 @@ use lvk::{
 
 use super::config::ReflectionsConfig;
 use super::error::ReflectionsError;
-use super::frame::{
-    FRAME_BYTES, FrameConstants, Indices, NEAR_PLANE, WorldConstants, jitter, light_constants,
-};
+use super::frame::{FRAME_BYTES, FrameConstants, Indices, NEAR_PLANE, WorldConstants, light_constants};
 use super::image_passes::ImagePasses;
 use super::moving::{Moving, MovingPasses};
 use super::paint::Picture;
@@ -171,11 +169,11 @@ impl Reflections {
 
     fn upload_constants(&self) -> lvk::Result<()> {
         let extent = [self.config.width, self.config.height];
+        let view = GpuCamera::new(&self.camera, extent[0], extent[1], NEAR_PLANE);
         let all: Vec<FrameConstants> = (0..self.config.samples)
             .map(|sample_number| FrameConstants {
-                view: GpuCamera::new(&self.camera, extent[0], extent[1], NEAR_PLANE),
+                view: view.for_sample(sample_number, self.config.samples),
                 world: self.constants,
-                jitter: jitter(sample_number, self.config.samples, extent),
                 frame_number: (self.time * FRAME_RATE).round() as u32,
                 sample_number,
                 time: self.time,
