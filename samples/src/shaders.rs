@@ -20,11 +20,13 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("hybrid/hit.glsl", include_str!("../../shaders/hybrid/hit.glsl")),
     ("hybrid/integrator.glsl", include_str!("../../shaders/hybrid/integrator.glsl")),
     ("hybrid/pixel.glsl", include_str!("../../shaders/hybrid/pixel.glsl")),
+    ("hybrid/pixel_order.glsl", include_str!("../../shaders/hybrid/pixel_order.glsl")),
     ("hybrid/raster.glsl", include_str!("../../shaders/hybrid/raster.glsl")),
     ("hybrid/survivors.glsl", include_str!("../../shaders/hybrid/survivors.glsl")),
     ("hybrid/trace_pipeline.glsl", include_str!("../../shaders/hybrid/trace_pipeline.glsl")),
     ("hybrid/trace_query.glsl", include_str!("../../shaders/hybrid/trace_query.glsl")),
     ("hybrid/visibility.glsl", include_str!("../../shaders/hybrid/visibility.glsl")),
+    ("hybrid/visible_triangle.glsl", include_str!("../../shaders/hybrid/visible_triangle.glsl")),
     ("reflections/ambient.glsl", include_str!("../../shaders/reflections/ambient.glsl")),
     ("reflections/fragment.glsl", include_str!("../../shaders/reflections/fragment.glsl")),
     ("reflections/frame.glsl", include_str!("../../shaders/reflections/frame.glsl")),
@@ -79,15 +81,24 @@ pub mod hybrid {
     pub const WITH_VISIBILITY: &[(&str, &str)] = &[("HYBRID_VISIBILITY", "1")];
     /// Macros of the ray stage that queues mirrors and glass.
     pub const WITH_QUEUE: &[(&str, &str)] = &[("HYBRID_QUEUE", "1")];
-    /// Macros of the same from the visible triangles.
+    /// Macros of ray stages on a device without subgroup operations in them.
+    pub const WITHOUT_SUBGROUPS: &[(&str, &str)] = &[("HYBRID_NO_SUBGROUPS", "1")];
+    /// Macros of the ray stages that take pixels in their order.
+    pub const WITH_VISIBILITY_AND_ORDER: &[(&str, &str)] =
+        &[("HYBRID_VISIBILITY", "1"), ("HYBRID_ORDERED", "1")];
+    /// Macros of the ray stage that queues mirrors and glass, from the visible triangles.
     pub const WITH_VISIBILITY_AND_QUEUE: &[(&str, &str)] =
         &[("HYBRID_VISIBILITY", "1"), ("HYBRID_QUEUE", "1")];
     /// `kNoImage` in `shaders/hybrid/visibility.glsl`.
     pub const NO_IMAGE: u32 = u32::MAX;
     /// Small triangles of the compute rasteriser.
     pub const RASTER_SMALL_COMP: &str = include_str!("../../shaders/hybrid/raster_small.comp.glsl");
+    /// Its medium triangles.
+    pub const RASTER_MEDIUM_COMP: &str = include_str!("../../shaders/hybrid/raster_medium.comp.glsl");
     /// Tiles of the compute rasteriser's large triangles.
     pub const RASTER_TILE_COMP: &str = include_str!("../../shaders/hybrid/raster_tile.comp.glsl");
+    /// The order of pixels.
+    pub const ORDER_COMP: &str = include_str!("../../shaders/hybrid/order.comp.glsl");
     /// Culling for the hardware rasteriser.
     pub const CULL_COMP: &str = include_str!("../../shaders/hybrid/cull.comp.glsl");
     /// Closing the gaps that culling leaves.

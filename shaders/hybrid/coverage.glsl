@@ -70,14 +70,13 @@ bool isNearby(Edges edges, ivec2 pixel) {
     return isInside || (!edges.isSided && isInsideBackwards);
 }
 
-// Where a pixel's ray meets a triangle.
+// Where a pixel's ray, which has this direction, meets a triangle.
 struct Crossing {
     float distance; // negative where it misses it, or meets it before the near plane
     bool isDoubtful; // whether it is so close to an edge that another tracer may decide otherwise
 };
 
-Crossing crossingAt(Edges edges, Corners corners, ivec2 pixel) {
-    vec3 direction = cameraDirection(frame.camera, uvec2(pixel));
+Crossing crossingAlong(Edges edges, Corners corners, vec3 direction) {
     RayPassage passage = passageOf(direction, corners.a, corners.b, corners.c);
     vec3 volumes = passage.volumes;
     vec3 size = abs(volumes);

@@ -5,6 +5,12 @@
 #include "common/octahedral.glsl"
 #include "common/tonemap.glsl"
 #include "hybrid/integrator.glsl"
+#include "hybrid/visible_triangle.glsl"
+
+uvec2 pixelInOrder(uint index) {
+    uint place = frame.order.at[index];
+    return uvec2(place & 0xffffu, place >> 16);
+}
 
 Ray primaryRay(uvec2 pixel) {
     vec3 direction = cameraDirection(frame.camera, pixel);
@@ -34,18 +40,6 @@ SurfacePoint primarySurface(uvec2 pixel, Ray ray, Hit hit) {
 }
 #else
 #if defined(HYBRID_VISIBILITY)
-// The triangle that the visibility pass found; kNoTriangle also where the ray must say, and then `isInDoubt`.
-uint visibleTriangle(uvec2 pixel, out bool isInDoubt) {
-    Visibility visibility = frame.visibility;
-    isInDoubt = false;
-    if (visibility.image != kNoImage) {
-        return textureBindlessFetchU2D(visibility.image, ivec2(pixel), 0).x;
-    }
-    uvec2 word = visibility.words.at[pixel.y * frame.camera.width + pixel.x];
-    isInDoubt = word.x == kAskRay;
-    return word.y == kNoTriangle || isInDoubt ? kNoTriangle : ~word.x;
-}
-
 // Where the pixel's ray meets the triangle that the visibility pass found.
 Hit primaryHit(uvec2 pixel, Ray ray) {
     bool isInDoubt;

@@ -111,15 +111,24 @@ fn awkward_triangles_are_seen_as_rays_see_them() {
     }
 }
 
-/// Who rasterises a triangle, and whether the queue has room for its tiles, must not show.
+/// Who rasterises a triangle, and whether lists have room for it and its tiles, must not show.
 #[test]
-fn tuning_and_a_full_queue_do_not_change_the_picture() {
+fn tuning_and_full_lists_do_not_change_the_picture() {
     let Some(ctx) = device() else { return };
     let scene = still_life();
     let plain = config(paths(&ctx)[0], COMPUTE);
     let expected = pictures(&ctx, &scene, &plain, &scene.cameras[..2]);
-    for (small_pixels, queue_tiles) in [(0, 1 << 20), (u32::MAX, 1), (0, 0), (8, 1), (8, 7), (64, 40)] {
-        let tuning = RasterTuning { small_pixels: Some(small_pixels), queue_tiles };
+    for (small, medium_pixels, set_aside, tiles) in [
+        (0, 1024, 1 << 16, 1 << 16),
+        (0, 0, 1 << 16, 1 << 16),
+        (0, u32::MAX, 1 << 16, 0),
+        (u32::MAX, 0, 1, 1),
+        (0, 0, 0, 0),
+        (8, 64, 7, 1),
+        (8, 64, 1 << 16, 5),
+        (64, 100, 40, 40),
+    ] {
+        let tuning = RasterTuning { small_pixels: Some(small), medium_pixels, set_aside, tiles };
         let found = pictures(&ctx, &scene, &HybridConfig { tuning, ..plain }, &scene.cameras[..2]);
         assert!(found == expected, "{tuning:?} changes the picture");
     }

@@ -36,6 +36,10 @@ pub struct HybridArgs {
     #[arg(long, value_name = "PIXELS", hide = true)]
     pub small_triangle: Option<u32>,
 
+    /// Most pixels of a triangle that some threads take on together, for tuning
+    #[arg(long, value_name = "PIXELS", hide = true)]
+    pub medium_triangle: Option<u32>,
+
     /// How often a ray may be reflected or refracted before it gives up, 0 to 16; 0 gives shadows only
     #[arg(
         long,
@@ -102,12 +106,14 @@ pub enum Raster {
 /// When the rays of mirrors and glass are followed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Bounces {
-    /// Queued on a GPU that can launch by what it counted, else inline.
+    /// What suits the device and the method.
     Auto,
     /// At once, by the thread of the pixel.
     Inline,
     /// In a launch of their own, of just the pixels that have some.
     Queued,
+    /// At once, but pixels that have some are launched before the others; for the hybrid method.
+    First,
 }
 
 /// What the lamp does in a sequence.

@@ -45,14 +45,24 @@ pub enum Raster {
 pub struct RasterTuning {
     /// Most pixels of the rectangle around a triangle that one thread rasterises; `None` for what suits the device.
     pub small_pixels: Option<u32>,
-    /// Tiles of larger triangles that the queue has room for, 8 bytes each; further ones are rasterised by the thread
-    /// that found them.
-    pub queue_tiles: u32,
+    /// Most pixels of the rectangle around a triangle that some threads rasterise together; larger ones are cut into tiles.
+    pub medium_pixels: u32,
+    /// Medium and large triangles that there is room for, 104 bytes each, at most [`RasterTuning::MOST_SET_ASIDE`];
+    /// further ones are rasterised by the thread that found them.
+    pub set_aside: u32,
+    /// Tiles of large triangles that there is room for, 8 bytes each; further ones are rasterised by the thread that found
+    /// them.
+    pub tiles: u32,
+}
+
+impl RasterTuning {
+    /// As many triangles as the workgroups of one dispatch take on.
+    pub const MOST_SET_ASIDE: u32 = 8 * 65_535;
 }
 
 impl Default for RasterTuning {
     fn default() -> Self {
-        Self { small_pixels: None, queue_tiles: 1 << 20 }
+        Self { small_pixels: None, medium_pixels: 1024, set_aside: 1 << 17, tiles: 1 << 18 }
     }
 }
 
@@ -63,6 +73,9 @@ pub enum Bounces {
     Inline,
     /// In a launch of their own, of just the pixels that have some: the same picture.
     Queued,
+    /// At once, but pixels with such rays are launched first, since theirs take longest: the same picture. Only where
+    /// visible triangles are known before any ray: by the hybrid method from [`Geometry::Visibility`].
+    First,
 }
 
 /// By which part of Vulkan rays are traced.
@@ -120,6 +133,11 @@ impl HybridConfig {
     /// The largest number of samples.
     pub const MAX_SAMPLES: u32 = args::MAX_SAMPLES;
 
+    /// Whether the triangles that pixels show are known before any ray is traced.
+    pub(super) fn knows_triangles(&self) -> bool {
+        self.method == Method::Hybrid && matches!(self.geometry, Geometry::Visibility(_))
+    }
+
     /// Checks sizes and depth against what the device with `capabilities` can do.
     pub(super) fn check(&self, capabilities: &Capabilities) -> Result<(), HybridError> {
         let limit = capabilities.limits.max_texture_2d;
@@ -132,6 +150,9 @@ impl HybridConfig {
         }
         if self.samples == 0 || self.samples > Self::MAX_SAMPLES {
             return Err(HybridError::BadSamples { samples: self.samples, limit: Self::MAX_SAMPLES });
+        }
+        if self.bounces == Some(Bounces::First) && !self.knows_triangles() {
+            return Err(HybridError::NothingFirst);
         }
         let numbers_fragments =
             matches!(self.geometry, Geometry::Paper | Geometry::Visibility(Some(Raster::Hardware)));

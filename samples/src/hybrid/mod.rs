@@ -20,6 +20,7 @@ mod gpu_scene;
 pub(crate) mod half_float;
 mod hardware_raster;
 mod pipelines;
+mod pixel_order;
 mod raster_choice;
 mod ray_pass;
 mod renderer;

@@ -2,12 +2,13 @@
 //! shaders with ray queries; at once, or first surfaces first and mirrors and glass in a launch of their own.
 
 use lvk::{
-    BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup,
-    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderStage, SpecializationConstant,
-    SpecializationValue, TextureHandle,
+    BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, Error,
+    HitGroup, Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderModuleHandle, ShaderStage,
+    SpecializationConstant, SpecializationValue, TextureHandle,
 };
 
 use super::bounce_queue::BounceQueue;
+use super::compute_raster::groups_for;
 use super::config::{Bounces, Geometry, HybridConfig, Method, RayPath};
 use super::film::Film;
 use super::frame::{BouncePlaces, Push};
@@ -26,6 +27,8 @@ const BOUNCES: u32 = 1;
 pub(super) struct RayPass {
     pipeline: Pipeline,
     queue: Option<BounceQueue>,
+    /// Whether pixels are taken in their order and not by rows.
+    ordered: bool,
 }
 
 /// What a geometry pass leaves for the ray pass to read.
@@ -43,8 +46,9 @@ enum Pipeline {
 impl RayPass {
     /// The pass that `config` asks for, of bands of `band_pixels` pixels.
     pub(super) fn new(ctx: &Context, config: &HybridConfig, band_pixels: u32) -> lvk::Result<Self> {
-        let queued = config.bounces == Some(Bounces::Queued) && config.max_depth > 0;
-        let stages = Stages::of(config, queued);
+        let bounces = config.bounces.filter(|_| config.max_depth > 0);
+        let (queued, ordered) = (bounces == Some(Bounces::Queued), bounces == Some(Bounces::First));
+        let stages = Stages::of(config, queued, ordered);
         let pipeline = match config.path {
             RayPath::Pipeline => Pipeline::Tracing(tracing_pipeline(ctx, &stages)?),
             RayPath::Query => Pipeline::Compute {
@@ -55,7 +59,7 @@ impl RayPass {
             },
         };
         let queue = queued.then(|| BounceQueue::new(ctx, band_pixels)).transpose()?;
-        Ok(Self { pipeline, queue })
+        Ok(Self { pipeline, queue, ordered })
     }
 
     /// Where the shaders find the queue.
@@ -72,7 +76,7 @@ impl RayPass {
         left: &GeometryLeft,
         film: &Film,
     ) -> lvk::Result<()> {
-        let rows = push.end_row.saturating_sub(push.first_row);
+        let (push, launch) = self.launch(width, push);
         let mut buffers: Vec<_> = film.sums().into_iter().collect();
         if let Some(queue) = &self.queue {
             queue.record_reset(cmd)?;
@@ -85,12 +89,13 @@ impl RayPass {
             buffers: &buffers,
             ..Dependencies::default()
         };
+        let push = &push;
         cmd.push_label("ray pass");
         match &self.pipeline {
             Pipeline::Tracing(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
                 cmd.push_constants(push)?;
-                cmd.trace_rays_from(RENDER, [width, rows, 1], &dependencies)?;
+                cmd.trace_rays_from(RENDER, launch, &dependencies)?;
                 if let Some(queue) = &self.queue {
                     cmd.trace_rays_indirect(BOUNCES, queue.head(), BounceQueue::RAYS, &dependencies)?;
                 }
@@ -98,7 +103,7 @@ impl RayPass {
             Pipeline::Compute { render, bounces } => {
                 cmd.bind_compute_pipeline(**render)?;
                 cmd.push_constants(push)?;
-                cmd.dispatch([width.div_ceil(GROUP), rows.div_ceil(GROUP), 1], &dependencies)?;
+                cmd.dispatch(self.groups(launch), &dependencies)?;
                 if let (Some(queue), Some(bounces)) = (&self.queue, bounces) {
                     cmd.bind_compute_pipeline(**bounces)?;
                     cmd.push_constants(push)?;
@@ -108,6 +113,24 @@ impl RayPass {
         }
         cmd.pop_label();
         Ok(())
+    }
+
+    /// What shaders are told of the rows that `push` names, and how many threads that takes along each axis.
+    fn launch(&self, width: u32, push: &Push) -> (Push, [u32; 3]) {
+        let rows = push.end.saturating_sub(push.first);
+        if self.ordered {
+            (Push { first: push.first * width, end: push.end * width, ..*push }, [width * rows, 1, 1])
+        } else {
+            (*push, [width, rows, 1])
+        }
+    }
+
+    fn groups(&self, [width, height, depth]: [u32; 3]) -> [u32; 3] {
+        if self.ordered {
+            groups_for(width, GROUP * GROUP)
+        } else {
+            [width.div_ceil(GROUP), height.div_ceil(GROUP), depth]
+        }
     }
 }
 
@@ -119,10 +142,11 @@ struct Stages {
 }
 
 impl Stages {
-    fn of(config: &HybridConfig, queued: bool) -> Self {
+    fn of(config: &HybridConfig, queued: bool, ordered: bool) -> Self {
         let first = match (config.method, config.geometry) {
             (Method::Standalone, _) => &[],
             (Method::Hybrid, Geometry::Paper) => texts::WITH_GBUFFER,
+            (Method::Hybrid, Geometry::Visibility(_)) if ordered => texts::WITH_VISIBILITY_AND_ORDER,
             (Method::Hybrid, Geometry::Visibility(_)) => texts::WITH_VISIBILITY,
         };
         let queue = if queued { texts::WITH_QUEUE } else { &[] };
@@ -131,6 +155,17 @@ impl Stages {
             defines: [first, queue].concat(),
             specialization: [SpecializationConstant { id: DEPTH_CONSTANT, value }],
             queued,
+        }
+    }
+
+    /// A ray generation stage; not every device has subgroup operations in it.
+    fn ray_gen(&self, ctx: &Context, text: &str, name: &str) -> lvk::Result<Holder<ShaderModuleHandle>> {
+        match module(ctx, ShaderStage::RayGen, text, &self.defines, name) {
+            Err(Error::Unsupported { .. }) => {
+                let defines = [&self.defines, texts::WITHOUT_SUBGROUPS].concat();
+                module(ctx, ShaderStage::RayGen, text, &defines, name)
+            }
+            made => made,
         }
     }
 
@@ -145,9 +180,9 @@ impl Stages {
 }
 
 fn tracing_pipeline(ctx: &Context, stages: &Stages) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
-    let ray_gen = |text, name| module(ctx, ShaderStage::RayGen, text, &stages.defines, name);
-    let render = ray_gen(texts::RENDER_RGEN, "render.rgen")?;
-    let bounces = stages.queued.then(|| ray_gen(texts::BOUNCES_RGEN, "bounces.rgen")).transpose()?;
+    let render = stages.ray_gen(ctx, texts::RENDER_RGEN, "render.rgen")?;
+    let bounces =
+        stages.queued.then(|| stages.ray_gen(ctx, texts::BOUNCES_RGEN, "bounces.rgen")).transpose()?;
     let ray_gens: Vec<_> = std::iter::once(&render).chain(&bounces).map(Holder::handle).collect();
     let closest_miss = module(ctx, ShaderStage::Miss, texts::CLOSEST_RMISS, &[], "closest.rmiss")?;
     let shadow_miss = module(ctx, ShaderStage::Miss, texts::SHADOW_RMISS, &[], "shadow.rmiss")?;

@@ -14,6 +14,7 @@ use super::frame::{
 use super::frame_timings::{FrameTimings, Stamps};
 use super::geometry_pass::GeometryPass;
 use super::gpu_scene::GpuScene;
+use super::pixel_order::PixelOrder;
 use super::raster_choice::RasterChoice;
 use super::ray_pass::{GeometryLeft, RayPass};
 use super::visibility_pass::VisibilityPass;
@@ -40,11 +41,13 @@ pub struct HybridRenderer {
     config: HybridConfig,
     scene: GpuScene,
     geometry: GeometryStage,
+    order: Option<PixelOrder>,
     rays: RayPass,
     stamps: Option<Stamps>,
     film: Film,
     sums_address: u64,
     bounce_places: BouncePlaces,
+    order_address: u64,
     /// A block for each sample.
     frame_buffer: Holder<BufferHandle>,
     frame_address: u64,
@@ -68,6 +71,8 @@ impl HybridRenderer {
         let frame_buffer = frame_buffer(ctx, config.samples)?;
         let film = Film::new(ctx, extent, config.samples)?;
         let geometry = GeometryStage::new(ctx, &gpu_scene, config)?;
+        let is_ordered = config.bounces == Some(Bounces::First) && config.max_depth > 0;
+        let order = is_ordered.then(|| PixelOrder::new(ctx, extent)).transpose()?;
         let band_rows = band_rows(config, ctx.capabilities().is_cpu).min(config.height);
         let bands = bands(config.height, band_rows);
         let rays = RayPass::new(ctx, config, config.width * band_rows)?;
@@ -85,6 +90,8 @@ impl HybridRenderer {
             config: *config,
             scene: gpu_scene,
             geometry,
+            order_address: order.as_ref().map_or(Ok(0), |order| order.address(ctx))?,
+            order,
             rays,
             stamps,
             film,
@@ -190,9 +197,11 @@ impl HybridRenderer {
                 indices: self.indices,
                 visibility: self.geometry.places(),
                 bounces: self.bounce_places,
+                order: self.order_address,
                 sums: self.sums_address,
                 sample_number,
                 sample_count,
+                padding: [0; 2],
             })
             .collect();
         if self.uploaded != constants {
@@ -223,7 +232,11 @@ impl HybridRenderer {
             stamps.reset(cmd, sample)?;
             stamps.geometry(cmd, sample, false)?;
         }
-        self.geometry.record(cmd, &self.push(sample, 0..self.config.height))?;
+        let push = self.push(sample, 0..self.config.height);
+        self.geometry.record(cmd, &push)?;
+        if let Some(order) = &self.order {
+            order.record(cmd, &push, &self.geometry.left())?;
+        }
         self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.geometry(cmd, sample, true))
     }
 
@@ -233,13 +246,20 @@ impl HybridRenderer {
         };
         stamp(cmd, false)?;
         let push = self.push(sample, self.bands[band as usize].clone());
-        self.rays.record(cmd, self.config.width, &push, &self.geometry.left(), &self.film)?;
+        self.rays.record(cmd, self.config.width, &push, &self.left(), &self.film)?;
         stamp(cmd, true)
+    }
+
+    /// What the geometry pass and the order of pixels left.
+    fn left(&self) -> GeometryLeft {
+        let mut left = self.geometry.left();
+        left.buffers.extend(self.order.as_ref().map(PixelOrder::buffer));
+        left
     }
 
     fn push(&self, sample: u32, rows: Range<u32>) -> Push {
         let frame = self.frame_address + FRAME_BYTES * u64::from(sample);
-        Push { frame, first_row: rows.start, end_row: rows.end }
+        Push { frame, first: rows.start, end: rows.end }
     }
 }
 
@@ -301,11 +321,15 @@ fn band_rows(config: &HybridConfig, is_cpu: bool) -> u32 {
 
 /// The configuration with what it leaves open decided, and without bounces where nothing mirrors or refracts.
 fn suited(config: &HybridConfig, scene: &Scene, capabilities: &Capabilities) -> HybridConfig {
-    let bounces = scene.materials.iter().any(|m| m.reflectivity > 0.0 || m.is_refractive());
+    let goes_on = scene.materials.iter().any(|m| m.reflectivity > 0.0 || m.is_refractive());
     let can_queue = config.path == RayPath::Query || capabilities.trace_rays_indirect;
-    let suits = if can_queue && !capabilities.is_cpu { Bounces::Queued } else { Bounces::Inline };
+    let suits = match (capabilities.is_cpu, config.knows_triangles()) {
+        (true, _) if can_queue => Bounces::Queued,
+        (false, true) => Bounces::First,
+        _ => Bounces::Inline,
+    };
     HybridConfig {
-        max_depth: if bounces { config.max_depth } else { 0 },
+        max_depth: if goes_on { config.max_depth } else { 0 },
         bounces: Some(config.bounces.unwrap_or(suits)),
         ..*config
     }

@@ -28,6 +28,7 @@ impl From<HybridError> for RunError {
             HybridError::BadSize { .. }
             | HybridError::TooDeep { .. }
             | HybridError::BadSamples { .. }
+            | HybridError::NothingFirst
             | HybridError::TooManyTriangles { .. }
             | HybridError::TooManyTextures { .. }
             | HybridError::BrokenScene(_) => Self::input(error),
@@ -94,11 +95,14 @@ fn config(args: &HybridArgs, path: RayPath) -> HybridConfig {
         args::GBuffer::Paper => Geometry::Paper,
         args::GBuffer::Visibility => Geometry::Visibility(raster),
     };
-    let tuning = RasterTuning { small_pixels: args.small_triangle, ..RasterTuning::default() };
+    let usual = RasterTuning::default();
+    let medium_pixels = args.medium_triangle.unwrap_or(usual.medium_pixels);
+    let tuning = RasterTuning { small_pixels: args.small_triangle, medium_pixels, ..usual };
     let bounces = match args.bounces {
         args::Bounces::Auto => None,
         args::Bounces::Inline => Some(Bounces::Inline),
         args::Bounces::Queued => Some(Bounces::Queued),
+        args::Bounces::First => Some(Bounces::First),
     };
     let (width, height, max_depth, samples) = (args.run.width, args.run.height, args.depth, args.samples);
     HybridConfig { method, path, width, height, max_depth, bounces, samples, geometry, tuning }
