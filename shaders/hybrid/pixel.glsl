@@ -7,10 +7,24 @@
 #include "hybrid/integrator.glsl"
 #include "hybrid/visible_triangle.glsl"
 
+#if defined(HYBRID_ORDERED)
+// Threads that a device runs in step, and how many such groups of threads the pixels that go on are spread over: as many
+// as run at once. In fewer, one pixel's rays would wait for those of many; in more, some would begin late.
+const uint kNeighbours = 32u;
+const uint kFirstGroups = 2048u;
+
+// The pixel at a place of the order: some that go on beside some others, as long as there are such.
 uvec2 pixelInOrder(uint index) {
-    uint place = frame.order.at[index];
+    uint firsts = frame.order.firsts;
+    uint groups = frame.camera.width * frame.camera.height / kNeighbours;
+    uint share = min(firsts / max(min(kFirstGroups, groups), 1u) + 1u, kNeighbours);
+    uint lane = index % kNeighbours;
+    uint before = index / kNeighbours * share + min(lane, share);
+    bool isFirst = lane < share && before < firsts;
+    uint place = frame.order.at[isFirst ? before : firsts + index - min(before, firsts)];
     return uvec2(place & 0xffffu, place >> 16);
 }
+#endif
 
 Ray primaryRay(uvec2 pixel) {
     vec3 direction = cameraDirection(frame.camera, pixel);

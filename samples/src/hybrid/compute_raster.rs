@@ -17,7 +17,7 @@ const GROUP: u32 = 128;
 /// `constant_id` of the most pixels of a triangle in the first and in the second pass.
 const MOST_PIXELS: u32 = 0;
 /// Pixels of a small triangle on a GPU, where neighbours wait for the thread with the largest one.
-const GPU_SMALL_PIXELS: u32 = 16;
+const GPU_SMALL_PIXELS: u32 = 8;
 /// The same on a CPU, where threads that share a triangle cost more.
 const CPU_SMALL_PIXELS: u32 = 1 << 16;
 

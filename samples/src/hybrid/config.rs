@@ -62,7 +62,7 @@ impl RasterTuning {
 
 impl Default for RasterTuning {
     fn default() -> Self {
-        Self { small_pixels: None, medium_pixels: 1024, set_aside: 1 << 17, tiles: 1 << 18 }
+        Self { small_pixels: None, medium_pixels: 512, set_aside: 1 << 17, tiles: 1 << 18 }
     }
 }
 
