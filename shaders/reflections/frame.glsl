@@ -73,7 +73,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint lightCount;
     uint frameNumber;
     uint sampleNumber;
-    float time; // in seconds
+    float phase; // of the animation's round, 0 to 1
     uint tlas;
     uint sky; // index into kTexturesCube
     uint skySampler;

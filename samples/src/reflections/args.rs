@@ -39,11 +39,11 @@ const EXAMPLES: &str = "\
 Examples:
   reflections                                             a picture, by the best path of the best device
   reflections --samples 16 --out hall.png                 a smoother one
-  reflections --frames 0..240 --out dir/frame_####.png    the first eight seconds; ranges can be shared among machines
+  reflections --frames 0..240 --out dir/frame_####.png    one round of the animation; ranges can be shared among machines
   reflections --rt query --validate                       by ray queries in compute shaders, with validation
   reflections --profile mali-g715                         as on a phone: ray queries, split meshes
 
-Exit status: 0 when the pictures were written, 1 for trouble with the device, 2 for wrong arguments.";
+Exit status: 0 when the pictures were written, 1 for trouble with the device, 2 for wrong arguments, 130 after Ctrl-C.";
 
 fn angle(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {

@@ -61,7 +61,7 @@ pub(super) struct FrameConstants {
     pub(super) world: WorldConstants,
     pub(super) frame_number: u32,
     pub(super) sample_number: u32,
-    pub(super) time: f32,
+    pub(super) phase: f32,
     pub(super) indices: Indices,
 }
 

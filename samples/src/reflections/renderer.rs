@@ -1,4 +1,4 @@
-//! The sample as a type: say the time, get a picture.
+//! The sample as a type: say the moment, get a picture.
 
 use lvk::{
     AddressMode, BufferDesc, BufferHandle, CommandBuffer, Context, Format, Holder, SamplerDesc,
@@ -23,8 +23,6 @@ use crate::app::sample::PassTimes;
 use crate::hybrid::half_float::half_bits;
 use crate::scene::{Camera, GpuCamera, Sky};
 
-/// Frames in a second of the animation.
-const FRAME_RATE: f32 = 60.0;
 /// Texels on an edge of the sky's cube map.
 const SKY_SIZE: u32 = 256;
 
@@ -46,7 +44,7 @@ pub struct Reflections {
     frame_buffer: Holder<BufferHandle>,
     frame_address: u64,
     camera: Camera,
-    time: f32,
+    phase: f32,
     _held: (Vec<Holder<TextureHandle>>, [Holder<SamplerHandle>; 2]),
 }
 
@@ -105,16 +103,16 @@ impl Reflections {
             indices,
             frame_buffer,
             camera: world::camera(0.0),
-            time: 0.0,
+            phase: 0.0,
             _held: (textures, samplers),
         })
     }
 
-    /// Moves the camera and everything that moves to where they are at `time`, in seconds. Nothing depends on earlier
-    /// times.
-    pub fn show(&mut self, time: f32) {
-        self.time = time;
-        self.camera = world::camera(time);
+    /// Moves the camera and everything that moves to where they are at `phase` of the animation's round: 0 to 1, beyond
+    /// which it goes round again. What is not finite counts as 0. Nothing depends on earlier phases.
+    pub fn show(&mut self, phase: f32) {
+        self.phase = if phase.is_finite() { phase.rem_euclid(1.0) % 1.0 } else { 0.0 };
+        self.camera = world::camera(self.phase);
     }
 
     /// Looks from another place than the animation's, until the next [`show`](Self::show).
@@ -174,14 +172,14 @@ impl Reflections {
             .map(|sample_number| FrameConstants {
                 view: view.for_sample(sample_number, self.config.samples),
                 world: self.constants,
-                frame_number: (self.time * FRAME_RATE).round() as u32,
+                frame_number: (self.phase * 16_777_216.0) as u32,
                 sample_number,
-                time: self.time,
+                phase: self.phase,
                 indices: self.indices,
             })
             .collect();
         self.ctx.upload_buffer(*self.frame_buffer, 0, bytemuck::cast_slice(&all))?;
-        self.moving.pose(&self.ctx, self.time)
+        self.moving.pose(&self.ctx, self.phase)
     }
 
     fn record(&self, cmd: &mut CommandBuffer, sample: u32) -> lvk::Result<()> {

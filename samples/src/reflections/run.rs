@@ -30,7 +30,7 @@ impl Sample for Reflections {
     type Error = ReflectionsError;
 
     fn update(&mut self, moment: Moment) -> Result<(), ReflectionsError> {
-        self.show(moment.seconds() as f32);
+        self.show(moment.phase());
         Ok(())
     }
 

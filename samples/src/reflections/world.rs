@@ -1,5 +1,7 @@
 //! What the sample shows: models of several materials each, where they stand, lamps and sky.
 
+use std::f32::consts::TAU;
+
 use glam::{Affine3A, Quat, Vec3};
 
 use super::mesh::Mesh;
@@ -109,12 +111,12 @@ impl World {
     }
 }
 
-/// Where the picture of `time`, in seconds, is taken from: a slow walk through the hall and back.
-pub(super) fn camera(time: f32) -> Camera {
-    let walk = (time * 0.25).sin();
-    let sway = (time * 0.17).sin();
-    let eye = [-2.0 + 1.0 * sway, 1.3 + 0.25 * walk.abs(), 3.6 - 2.5 * walk.abs()];
-    Camera::looking_at(eye, [0.45 + 0.4 * sway, 1.0, -9.0], 50.0)
+/// Where the picture at `phase` of the round, 0 to 1, is taken from: a slow walk into the hall and back.
+pub(super) fn camera(phase: f32) -> Camera {
+    let (sway, away) = (TAU * phase).sin_cos();
+    let walk = 0.5 - 0.5 * away;
+    let eye = [-2.0 + 0.6 * sway, 1.3 + 0.25 * walk, 3.6 - 2.5 * walk];
+    Camera::looking_at(eye, [0.45 + 0.3 * sway, 1.0, -9.0], 50.0)
 }
 
 fn furnish() -> (Vec<Model>, Vec<Placed>) {
@@ -215,6 +217,14 @@ fn lights() -> Vec<Light> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_walk_ends_where_it_began() {
+        let eye = |phase| Vec3::from(camera(phase).eye);
+        let step = eye(0.0).distance(eye(1.0 / 240.0));
+        assert!(eye(1.0).distance(eye(0.0)) < 1e-3);
+        assert!((eye(239.0 / 240.0).distance(eye(0.0)) - step).abs() < 1e-3, "nor does it halt there");
+    }
 
     #[test]
     fn the_tables_fit_together() {
