@@ -48,7 +48,7 @@ impl Skin {
             })
         };
         let head = Vec3::new(0.0, 0.1, -0.26);
-        let back = body(215.0, -35.0, 20).ball(head, Vec3::new(0.34, 0.27, 0.46), 24).ball(
+        let mut back = body(215.0, -35.0, 20).ball(head, Vec3::new(0.34, 0.27, 0.46), 24).ball(
             head + Vec3::new(0.0, -0.02, -0.3),
             Vec3::new(0.16, 0.11, 0.26),
             20,
@@ -58,7 +58,9 @@ impl Skin {
         let mut eyes = Mesh::default();
         let mut fins = Mesh::default();
         for side in [-1.0, 1.0] {
-            eyes = eyes.ball(head + Vec3::new(0.23 * side, 0.13, -0.28), Vec3::splat(0.065), 12);
+            eyes = eyes.ball(head + Vec3::new(0.23 * side, 0.13, -0.28), Vec3::splat(0.065), 24);
+            let pupil = head + Vec3::new(0.278 * side, 0.137, -0.295);
+            back = back.ball(pupil, Vec3::new(0.02, 0.046, 0.016), 12);
             fins = fins.ball(head + Vec3::new(0.17 * side, 0.27, 0.26), Vec3::new(0.045, 0.06, 0.4), 12);
         }
         for number in 0..26 {
