@@ -8,7 +8,7 @@ use lvk::{Context, Dependencies, DeviceProfile};
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::reflections::{
-    FAR, Reflections, ReflectionsConfig, ReflectionsError, SkinUpdate, reflection_range,
+    CullingCost, FAR, RayCost, Reflections, ReflectionsConfig, ReflectionsError, SkinUpdate, reflection_range,
 };
 use lvk_samples::scene::Camera;
 use lvk_samples::shaders::INCLUDES;
@@ -156,6 +156,21 @@ fn culling_leaves_out_small_things_and_nothing_else() {
     assert_alike("culled hall", &culled, &whole, &tolerance);
     let likeness = Likeness::of(&empty, &whole);
     assert!(likeness.difference.psnr < 60.0, "larger things do show: {likeness}");
+}
+
+#[test]
+fn what_culling_saves_is_measured_and_changes_nothing() {
+    let Some(ctx) = device() else { return };
+    let mut hall = hall(&ctx, &config(paths(&ctx)[0]));
+    let before = picture_at(&mut hall, 0.0);
+    let Some(cost) = CullingCost::measure(&hall, 2).unwrap() else {
+        return eprintln!("NOT TESTED, {} has no timestamps", ctx.capabilities().device_name);
+    };
+    for RayCost { build_ms, rays_ms } in [cost.culled, cost.whole] {
+        assert!(build_ms > 0.0 && rays_ms > 0.0, "{cost}");
+    }
+    assert_eq!(CullingCost::measure(&hall, 0).unwrap(), None);
+    assert!(picture(&mut hall) == before);
 }
 
 /// The length of rays for roughness 0, 0.01 and so on to 1, by the shaders' own text.

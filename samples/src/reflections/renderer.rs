@@ -130,7 +130,7 @@ impl Reflections {
         let mut times = [0.0; PASSES.len()];
         for sample in 0..self.config.samples {
             let mut cmd = self.ctx.acquire_command_buffer()?;
-            self.record(&mut cmd, sample)?;
+            self.record(&mut cmd, sample, self.config.min_angle)?;
             let submitted = self.ctx.submit(cmd)?;
             self.ctx.wait(submitted)?;
             if let Some(stamps) = &self.stamps {
@@ -140,6 +140,23 @@ impl Reflections {
         }
         let has_times = self.stamps.is_some();
         Ok(PASSES.into_iter().zip(times).filter(|_| has_times).collect())
+    }
+
+    /// What the passes of the first sample take on the GPU, in milliseconds, where instances seen under less than
+    /// `min_angle` are culled; `None` where the device has no timestamps.
+    pub(super) fn time_sample(
+        &self,
+        min_angle: f32,
+    ) -> Result<Option<[f64; PASSES.len()]>, ReflectionsError> {
+        let Some(stamps) = &self.stamps else { return Ok(None) };
+        self.upload_constants()?;
+        let mut cmd = self.ctx.acquire_command_buffer()?;
+        self.record(&mut cmd, 0, min_angle)?;
+        let submitted = self.ctx.submit(cmd)?;
+        self.ctx.wait(submitted)?;
+        let mut times = [0.0; PASSES.len()];
+        stamps.add_to(&self.ctx, &mut times)?;
+        Ok(Some(times))
     }
 
     /// The texture with the last picture, sRGB, for a copy to whatever shows it.
@@ -182,32 +199,40 @@ impl Reflections {
         self.moving.pose(&self.ctx, self.phase)
     }
 
-    fn record(&self, cmd: &mut CommandBuffer, sample: u32) -> lvk::Result<()> {
+    fn record(&self, cmd: &mut CommandBuffer, sample: u32, min_angle: f32) -> lvk::Result<()> {
         let frame = self.frame_address + FRAME_BYTES * u64::from(sample);
         let extent = [self.config.width, self.config.height];
         let stamp = |cmd: &mut CommandBuffer, passes| {
             self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.after(cmd, passes))
         };
         self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.reset(cmd))?;
+        let eye = self.camera.eye.into();
         if sample == 0 {
             self.moving_passes.record(&self.ctx, cmd, &self.moving, frame)?;
-            let eye = self.camera.eye.into();
-            self.top_level.record(cmd, eye, self.config.min_angle)?;
         }
         stamp(cmd, 1)?;
-        let written = self.moving.written();
-        let draws = &self.tables.draws;
-        let drawn = Drawn { indices: *self.tables.indices, draws, written: &written, frame };
-        self.raster.record_surfaces(cmd, &self.targets, drawn)?;
+        if sample == 0 {
+            self.top_level.record(cmd, eye, min_angle)?;
+        }
         stamp(cmd, 2)?;
-        self.rays.record(cmd, Surfaces::Opaque, extent, &self.targets, &written, frame)?;
+        let (written, transparent) = (self.moving.written(), self.tables.transparent(eye));
+        let drawn = Drawn {
+            indices: *self.tables.indices,
+            opaque: &self.tables.opaque,
+            transparent: &transparent,
+            written: &written,
+            frame,
+        };
+        self.raster.record_surfaces(cmd, &self.targets, drawn)?;
         stamp(cmd, 3)?;
-        self.rays.record(cmd, Surfaces::Transparent, extent, &self.targets, &written, frame)?;
+        self.rays.record(cmd, Surfaces::Opaque, extent, &self.targets, &written, frame)?;
         stamp(cmd, 4)?;
+        self.rays.record(cmd, Surfaces::Transparent, extent, &self.targets, &written, frame)?;
+        stamp(cmd, 5)?;
         self.images.record_composite(cmd, &self.targets, frame)?;
         self.raster.record_blend(cmd, &self.targets, drawn)?;
         self.images.record_resolve(cmd, &self.targets, frame, self.config.samples)?;
-        stamp(cmd, 5)
+        stamp(cmd, 6)
     }
 }
 

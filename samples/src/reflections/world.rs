@@ -128,7 +128,9 @@ fn furnish() -> (Vec<Model>, Vec<Placed>) {
     let along = |from: f32, step: f32, count: i32| -> Vec<f32> {
         (0..count).map(|k| from - step * k as f32).collect()
     };
-    let screen = Affine3A::from_rotation_translation(Quat::from_rotation_y(-0.75), Vec3::new(3.3, 0.0, -4.4));
+    let turned = |angle, place| Affine3A::from_rotation_translation(Quat::from_rotation_y(angle), place);
+    // The second is seen through the first.
+    let screens = vec![turned(-0.75, Vec3::new(3.3, 0.0, -4.4)), turned(0.5, Vec3::new(3.9, 0.0, -5.6))];
     let studs = [both(2.15, 0.0, along(4.5, 0.25, 146)), both(3.6, 0.0, along(4.5, 0.25, 146))].concat();
     let lamps = [both(5.75, 0.0, along(4.2, 0.75, 48)), both(1.72, 0.1, along(-4.9, 1.15, 10))].concat();
     let list: Vec<(Model, Vec<Affine3A>)> = vec![
@@ -138,10 +140,10 @@ fn furnish() -> (Vec<Model>, Vec<Placed>) {
         (models::mirror_ball(), vec![upright(-3.1, 0.0, -4.2), upright(3.1, 0.0, -16.8)]),
         (models::knot(), vec![upright(-3.2, 0.0, -9.0), upright(-3.1, 0.0, -16.8)]),
         (models::lantern(), both(3.1, 3.1, vec![-7.0, -15.0])),
-        (models::screen_frame(), vec![screen]),
+        (models::screen_frame(), screens.clone()),
         (models::lamp(), lamps),
         (models::stud(), studs),
-        (models::pane(), vec![screen]),
+        (models::pane(), screens),
         (models::water(), here),
     ];
     let mut placed = Vec::new();
