@@ -16,7 +16,8 @@ pub struct RayCost {
     pub rays_ms: f64,
 }
 
-/// What a sample of the picture costs with and without culling by angular size: medians of several rounds.
+/// What a sample of the picture costs with and without culling by angular size: the least of several rounds, which other
+/// work on the device disturbs less than a mean.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CullingCost {
     /// With the instances that the configuration keeps.
@@ -42,8 +43,8 @@ impl CullingCost {
             }
         }
         let [culled, whole] = times.map(|(builds, rays)| {
-            let median = |values| timings::spread(values).map(|spread| spread.median);
-            Some(RayCost { build_ms: median(builds)?, rays_ms: median(rays)? })
+            let least = |values| timings::spread(values).map(|spread| spread.min);
+            Some(RayCost { build_ms: least(builds)?, rays_ms: least(rays)? })
         });
         Ok(culled.zip(whole).map(|(culled, whole)| Self { culled, whole }))
     }
