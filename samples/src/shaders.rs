@@ -32,7 +32,9 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("reflections/frame.glsl", include_str!("../../shaders/reflections/frame.glsl")),
     ("reflections/gbuffer.glsl", include_str!("../../shaders/reflections/gbuffer.glsl")),
     ("reflections/lighting.glsl", include_str!("../../shaders/reflections/lighting.glsl")),
+    ("reflections/lights.glsl", include_str!("../../shaders/reflections/lights.glsl")),
     ("reflections/masks.glsl", include_str!("../../shaders/reflections/masks.glsl")),
+    ("reflections/neighbour.glsl", include_str!("../../shaders/reflections/neighbour.glsl")),
     ("reflections/noise.glsl", include_str!("../../shaders/reflections/noise.glsl")),
     ("reflections/range.glsl", include_str!("../../shaders/reflections/range.glsl")),
     ("reflections/reflect.glsl", include_str!("../../shaders/reflections/reflect.glsl")),
@@ -40,6 +42,7 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("reflections/surface.glsl", include_str!("../../shaders/reflections/surface.glsl")),
     ("reflections/trace_pipeline.glsl", include_str!("../../shaders/reflections/trace_pipeline.glsl")),
     ("reflections/trace_query.glsl", include_str!("../../shaders/reflections/trace_query.glsl")),
+    ("reflections/visibility.glsl", include_str!("../../shaders/reflections/visibility.glsl")),
     ("reflections/waves.glsl", include_str!("../../shaders/reflections/waves.glsl")),
     ("hybrid_oit/ball.glsl", include_str!("../../shaders/hybrid_oit/ball.glsl")),
     ("hybrid_oit/frame.glsl", include_str!("../../shaders/hybrid_oit/frame.glsl")),
@@ -155,6 +158,8 @@ pub mod reflections {
     pub const CLOSEST_RMISS: &str = include_str!("../../shaders/reflections/closest.rmiss.glsl");
     /// A shadow ray that reached the light.
     pub const SHADOW_RMISS: &str = include_str!("../../shaders/reflections/shadow.rmiss.glsl");
+    /// Smooths shadows and openness.
+    pub const SMOOTH_COMP: &str = include_str!("../../shaders/reflections/smooth.comp.glsl");
     /// Blurs reflections.
     pub const FILTER_COMP: &str = include_str!("../../shaders/reflections/filter.comp.glsl");
     /// Lights the opaque surfaces.

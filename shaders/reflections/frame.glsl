@@ -68,12 +68,12 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     MaterialArray materials;
     GeometryArray geometries;
     InstanceArray instances;
-    Light lights[4];
+    Light lights[3]; // as many as visibility.glsl has channels for
     vec3 harmonics[9]; // radiance of the sky, in spherical harmonics
     uint lightCount;
     uint frameNumber;
     uint sampleNumber;
-    float time; // in seconds
+    float phase; // of the animation's round, 0 to 1
     uint tlas;
     uint sky; // index into kTexturesCube
     uint skySampler;
@@ -82,7 +82,9 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint opaqueDepth;
     uint glassSurface;
     uint glassDepth;
-    uint direct; // light that arrives straight, and how open the surroundings are
+    uint visibility; // of each light, and how open the surroundings are: see visibility.glsl
+    uint smoothed; // the same, on its way through the filter
+    uint penumbra;
     uint reflection; // radiance and hit distance
     uint filtered;
     uint glassReflection;

@@ -5,8 +5,8 @@ use bytemuck::{Pod, Zeroable};
 use super::world::Light;
 use crate::scene::GpuCamera;
 
-/// Lights that the shaders have room for.
-const MOST_LIGHTS: usize = 4;
+/// Lights that the shaders have room for: channels of a texture, beside the one for openness.
+const MOST_LIGHTS: usize = 3;
 /// Distance of the near plane in scene units.
 pub(super) const NEAR_PLANE: f32 = 0.05;
 
@@ -44,13 +44,15 @@ pub(super) struct Indices {
     pub(super) opaque_depth: u32,
     pub(super) glass_surface: u32,
     pub(super) glass_depth: u32,
-    pub(super) direct: u32,
+    pub(super) visibility: u32,
+    pub(super) smoothed: u32,
+    pub(super) penumbra: u32,
     pub(super) reflection: u32,
     pub(super) filtered: u32,
     pub(super) glass_reflection: u32,
     pub(super) composite: u32,
     pub(super) picture: u32,
-    pub(super) padding: u32,
+    pub(super) padding: [u32; 3],
 }
 
 /// The whole block, padded so that the next sample's is aligned.
@@ -61,7 +63,7 @@ pub(super) struct FrameConstants {
     pub(super) world: WorldConstants,
     pub(super) frame_number: u32,
     pub(super) sample_number: u32,
-    pub(super) time: f32,
+    pub(super) phase: f32,
     pub(super) indices: Indices,
 }
 
@@ -69,7 +71,7 @@ pub(super) struct FrameConstants {
 pub(super) const FRAME_BYTES: u64 = size_of::<FrameConstants>() as u64;
 
 const _: () =
-    assert!(FRAME_BYTES.is_multiple_of(16) && std::mem::offset_of!(FrameConstants, frame_number) == 360);
+    assert!(FRAME_BYTES.is_multiple_of(16) && std::mem::offset_of!(FrameConstants, frame_number) == 328);
 
 /// The push constants of all passes but the skinning.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]

@@ -112,9 +112,9 @@ impl Moving {
         })
     }
 
-    /// Moves the bones to where they are at `time` in seconds.
-    pub(super) fn pose(&self, ctx: &Context, time: f32) -> lvk::Result<()> {
-        ctx.upload_buffer(*self.bones, 0, bytemuck::cast_slice(&serpent::bones(time)))
+    /// Moves the bones to where they are at `phase` of the round, 0 to 1.
+    pub(super) fn pose(&self, ctx: &Context, phase: f32) -> lvk::Result<()> {
+        ctx.upload_buffer(*self.bones, 0, bytemuck::cast_slice(&serpent::bones(phase)))
     }
 
     fn skin_geometries(&self, indices: BufferHandle) -> Vec<BlasGeometry> {

@@ -53,7 +53,7 @@ impl RayPasses {
             Surfaces::Opaque => targets.opaque(),
             Surfaces::Transparent => targets.glass(),
         };
-        let opaque_images = [*targets.direct, *targets.reflection];
+        let opaque_images = [*targets.visibility, *targets.penumbra, *targets.reflection];
         let storage_images: &[_] = match surfaces {
             Surfaces::Opaque => &opaque_images,
             Surfaces::Transparent => &[*targets.glass_reflection],
