@@ -34,12 +34,13 @@ SurfacePoint primarySurface(uvec2 pixel, Ray ray, Hit hit) {
 }
 #else
 #if defined(HYBRID_VISIBILITY)
+#include "hybrid/hardware_visibility.glsl"
+
 // The triangle that the visibility pass found; kNoTriangle also where the ray must say, and then `isInDoubt`.
-uint visibleTriangle(uvec2 pixel, out bool isInDoubt) {
+uint visibleTriangle(uvec2 pixel, Ray ray, out bool isInDoubt) {
     Visibility visibility = frame.visibility;
-    isInDoubt = false;
     if (visibility.image != kNoImage) {
-        return textureBindlessFetchU2D(visibility.image, ivec2(pixel), 0).x;
+        return hardwareTriangle(ivec2(pixel), ray.direction, isInDoubt);
     }
     uvec2 word = visibility.words.at[pixel.y * frame.camera.width + pixel.x];
     isInDoubt = word.x == kAskRay;
@@ -49,7 +50,7 @@ uint visibleTriangle(uvec2 pixel, out bool isInDoubt) {
 // Where the pixel's ray meets the triangle that the visibility pass found.
 Hit primaryHit(uvec2 pixel, Ray ray) {
     bool isInDoubt;
-    Hit hit = Hit(visibleTriangle(pixel, isInDoubt), vec2(0.0));
+    Hit hit = Hit(visibleTriangle(pixel, ray, isInDoubt), vec2(0.0));
     if (isInDoubt) {
         hit = traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
     } else if (hit.triangle != kNoTriangle) {

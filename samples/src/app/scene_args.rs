@@ -21,7 +21,8 @@ pub struct SceneArgs {
     #[arg(long, value_name = "F", value_parser = positive, requires = "scene", help_heading = "Scene")]
     pub scale: Option<f32>,
 
-    /// Light and up to five cameras: lines `scene NAME x y z`, then `at EYE TARGET FOV` or `dir EYE DIRECTION FOV`
+    /// Lights and up to five cameras: lines `scene NAME x y z` with the lamp's place, then `sun x y z` towards the sun if
+    /// it shines, and `at EYE TARGET FOV` or `dir EYE DIRECTION FOV`
     #[arg(long, value_name = "FILE", requires = "scene", help_heading = "Scene")]
     pub cameras: Option<PathBuf>,
 

@@ -1,7 +1,8 @@
-//! Shader modules from the texts inside the binary.
+//! Shader modules of the sample.
 
 use lvk::{Context, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage};
 
+use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
 
 /// Compiles a stage of the sample.
@@ -12,12 +13,13 @@ pub(super) fn module(
     defines: &[(&str, &str)],
     debug_name: &str,
 ) -> lvk::Result<Holder<ShaderModuleHandle>> {
-    ctx.create_shader_module(&ShaderModuleDesc {
+    let desc = ShaderModuleDesc {
         stage,
         source: ShaderSource::Glsl(text),
         includes: INCLUDES,
         defines,
         debug_name,
         ..ShaderModuleDesc::default()
-    })
+    };
+    create_module(ctx, "hybrid", &desc)
 }
