@@ -117,7 +117,7 @@ fn assert_pictures_are_alike(folder: &Path, experiment: &Experiment) {
         }
         let picture = |what: &str| image::open(file(what)).unwrap().into_rgba8();
         let (standalone, difference) = (picture("standalone"), picture("difference"));
-        assert_eq!((standalone.dimensions(), difference.dimensions()), ((96, 54), (96, 54)));
+        assert_eq!((standalone.dimensions(), difference.dimensions()), ((96, 54), (98, 56)));
         let white = difference.pixels().filter(|pixel| pixel.0 == [255; 4]).count();
         assert!(white > 96 * 54 / 2, "only {white} pixels are equal");
         assert!(standalone.pixels().any(|pixel| pixel.0 != standalone.get_pixel(0, 0).0), "an empty picture");

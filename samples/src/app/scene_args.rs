@@ -93,6 +93,22 @@ impl SceneArgs {
     }
 }
 
+/// For samples that show one scene made by code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
+pub struct BuiltInSceneArgs {
+    /// Print the scene that the sample shows, and exit
+    #[arg(long, help_heading = "Frames")]
+    pub list_scenes: bool,
+}
+
+impl BuiltInSceneArgs {
+    /// What `--list-scenes` prints, where it was given, for a scene that is called `name`.
+    #[must_use]
+    pub fn listing(&self, name: &str, what: &str) -> Option<String> {
+        self.list_scenes.then(|| format!("{name}  built in: {what}; the only one"))
+    }
+}
+
 fn positive(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
         Ok(value) if value > 0.0 && value.is_finite() => Ok(value),

@@ -20,7 +20,9 @@ impl RasterChoice {
     pub(super) fn by_time(compute_ms: &[f64], hardware_ms: &[f64]) -> Self {
         let best = |times: &[f64]| times.iter().copied().filter(|ms| *ms > 0.0).min_by(f64::total_cmp);
         let why = match (best(compute_ms), best(hardware_ms)) {
-            (Some(compute), Some(hardware)) => format!("exact; {compute:.3} ms, hardware {hardware:.3} ms"),
+            (Some(compute), Some(hardware)) => {
+                format!("exact; {compute:.3} ms beside {hardware:.3} ms by hardware")
+            }
             _ => "exact; the device has no timestamps to measure by".to_owned(),
         };
         Self { raster: Raster::Compute, why }
@@ -44,7 +46,7 @@ mod tests {
     #[test]
     fn the_exact_one_is_taken_and_the_reason_says_both_times() {
         let choice = RasterChoice::by_time(&[0.3, 0.2, 9.0], &[0.7, 0.15]);
-        assert_eq!(choice.to_string(), "compute rasteriser (exact; 0.200 ms, hardware 0.150 ms)");
+        assert_eq!(choice.to_string(), "compute rasteriser (exact; 0.200 ms beside 0.150 ms by hardware)");
         for (compute, hardware) in [(&[][..], &[][..]), (&[0.0], &[0.5]), (&[0.5], &[])] {
             let choice = RasterChoice::by_time(compute, hardware);
             assert_eq!(choice.raster, Raster::Compute);

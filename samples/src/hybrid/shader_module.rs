@@ -1,6 +1,6 @@
 //! Shader modules of the sample.
 
-use lvk::{Context, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage};
+use lvk::{Context, Error, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage};
 
 use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
@@ -21,5 +21,12 @@ pub(super) fn module(
         debug_name,
         ..ShaderModuleDesc::default()
     };
-    create_module(ctx, "hybrid", &desc)
+    match create_module(ctx, "hybrid", &desc) {
+        // Not every device has subgroup operations in the stages of a ray tracing pipeline.
+        Err(Error::Unsupported { .. }) if stage == ShaderStage::RayGen => {
+            let defines = &[defines, &[("HYBRID_NO_SUBGROUPS", "1")]].concat();
+            create_module(ctx, "hybrid", &ShaderModuleDesc { defines, ..desc })
+        }
+        result => result,
+    }
 }
