@@ -2,7 +2,6 @@
 //! from a copy of `shaders/` that is changed and mended again (`LVK_SHADERS`).
 #![expect(clippy::expect_used, reason = "a test that cannot change its shaders has failed")]
 
-use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -52,7 +51,7 @@ impl BrokenShaders {
         copy(&shaders, folder.path()).expect("the shaders can be copied");
         in_child(test, &[(VARIABLE, Some(folder.path().as_os_str()))], || {
             let folder = std::env::var_os(VARIABLE).expect("the parent has named the folder");
-            body(&Self { folder: AsRef::<OsStr>::as_ref(&folder).into() });
+            body(&Self { folder: PathBuf::from(folder) });
         });
     }
 

@@ -136,7 +136,7 @@ fn compare_mask(what: &str, picture: &RgbaImage, mask: &[Option<bool>], allowed:
     eprintln!("{what}: {count} of {} pixels certain, {bright} bright, {} wrong", mask.len(), wrong.len());
     assert!(count * 20 > mask.len() * 19, "{what}: too few pixels are certain");
     assert!(
-        bright * 50 > count && (count - bright) * 50 > count,
+        bright * 200 > count && (count - bright) * 200 > count,
         "{what}: an even picture would test nothing"
     );
     let kept = (wrong.len() > allowed).then(|| keep(what, picture));

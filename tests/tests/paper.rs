@@ -101,10 +101,14 @@ fn assert_pictures_are_alike(folder: &Path, experiment: &Experiment) {
     let scene = &experiment.scenes[0];
     for cell in &scene.cells {
         let alike = &cell.likeness;
-        assert!(alike.psnr > 35.0 && alike.lowest_psnr > 33.0, "{alike:?}");
-        assert!(alike.ssim > 0.98 && alike.ssim <= 1.0 + 1e-9, "{alike:?}");
-        assert!(alike.differing_share < 0.01, "{alike:?}");
+        // The goals of the experiment.
+        assert!(alike.psnr >= 60.0 && alike.lowest_psnr >= 60.0, "{alike:?}");
+        assert!(alike.ssim >= 0.999 && alike.ssim <= 1.0 + 1e-9, "{alike:?}");
+        assert!(alike.differing_share < 2e-4, "{alike:?}");
         assert!(Statistic::WORST.of(&cell.frames).hybrid() > 0.0);
+    }
+    for (path, choice) in &scene.rasterisers {
+        assert!(experiment.plan.paths.contains(path) && choice.contains("rasteriser ("), "{choice}");
     }
     for (standalone, hybrid) in &scene.paths_alike {
         assert!(standalone.psnr >= 50.0 && hybrid.psnr >= 50.0, "{standalone:?} {hybrid:?}");
