@@ -130,7 +130,14 @@ fn the_picture_is_what_sorted_lists_show() {
                 GlassRoom::new(&ctx, &scene, &HybridOitConfig { node_capacity: Some(1 << 19), ..config });
             let picture = room.picture(MOMENT);
             let lists = room.sample.glass_lists().unwrap();
-            let behind = behind_glass(&ctx, &scene, side);
+            let behind = behind_glass(&ctx, &scene, side, 1);
+            // Where there is no glass nothing is sorted, and the samples' 8 bits would only add their rounding.
+            let without = behind_glass(&ctx, &scene, 1, side);
+            let has_glass = |[x, y]: [u32; 2]| {
+                let samples =
+                    (0..side * side).map(|i| (side * y + i / side) * side * SIZE[0] + side * x + i % side);
+                samples.into_iter().any(|sample| !lists.of(sample as usize).is_empty())
+            };
             let mut found_longest = 0;
             let mut seen = |is_sorted: bool| {
                 let radiance = |sample: [u32; 2]| {
@@ -144,7 +151,11 @@ fn the_picture_is_what_sorted_lists_show() {
                     nodes.reverse();
                     through(&nodes, background)
                 };
-                averaged(side, radiance)
+                let mut picture = averaged(side, radiance);
+                for (x, y, pixel) in picture.enumerate_pixels_mut().filter(|(x, y, _)| !has_glass([*x, *y])) {
+                    *pixel = *without.get_pixel(x, y);
+                }
+                picture
             };
             let (sorted, as_they_came) = (seen(true), seen(false));
             let what = format!("{name}, {side} x {side} samples");
@@ -156,10 +167,10 @@ fn the_picture_is_what_sorted_lists_show() {
     }
 }
 
-/// What every sample shows without glass.
-fn behind_glass(ctx: &Context, scene: &OitScene, side: u32) -> RgbaImage {
-    let [width, height] = SIZE.map(|pixels| side * pixels);
-    let config = HybridOitConfig { width, height, node_capacity: Some(0), ..plain(ctx) };
+/// What is seen without glass, in a picture `times` as large.
+fn behind_glass(ctx: &Context, scene: &OitScene, times: u32, supersampling: u32) -> RgbaImage {
+    let [width, height] = SIZE.map(|pixels| times * pixels);
+    let config = HybridOitConfig { width, height, supersampling, node_capacity: Some(0), ..plain(ctx) };
     GlassRoom::new(ctx, scene, &config).picture(MOMENT)
 }
 
