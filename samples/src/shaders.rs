@@ -17,6 +17,7 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("hybrid/coverage.glsl", include_str!("../../shaders/hybrid/coverage.glsl")),
     ("hybrid/footprint.glsl", include_str!("../../shaders/hybrid/footprint.glsl")),
     ("hybrid/frame.glsl", include_str!("../../shaders/hybrid/frame.glsl")),
+    ("hybrid/hardware_visibility.glsl", include_str!("../../shaders/hybrid/hardware_visibility.glsl")),
     ("hybrid/hit.glsl", include_str!("../../shaders/hybrid/hit.glsl")),
     ("hybrid/integrator.glsl", include_str!("../../shaders/hybrid/integrator.glsl")),
     ("hybrid/pixel.glsl", include_str!("../../shaders/hybrid/pixel.glsl")),

@@ -54,10 +54,15 @@ SurfacePoint primarySurface(uvec2 pixel, Ray ray, Hit hit) {
 }
 #else
 #if defined(HYBRID_VISIBILITY)
+#include "hybrid/hardware_visibility.glsl"
+
 // Where the pixel's ray meets the triangle that the visibility pass found.
 Hit primaryHit(uvec2 pixel, Ray ray) {
     bool isInDoubt;
-    Hit hit = Hit(visibleTriangle(pixel, isInDoubt), vec2(0.0));
+    bool byHardware = frame.visibility.image != kNoImage;
+    uint triangle = byHardware ? hardwareTriangle(ivec2(pixel), ray.direction, isInDoubt)
+                               : visibleTriangle(pixel, isInDoubt);
+    Hit hit = Hit(triangle, vec2(0.0));
     if (isInDoubt) {
         hit = traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
     } else if (hit.triangle != kNoTriangle) {

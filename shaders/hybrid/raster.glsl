@@ -77,7 +77,7 @@ uvec2 wordOf(Crossing crossing, uint triangle) {
 
 void rasterPixel(Edges edges, Corners corners, ivec2 pixel, uint triangle) {
     if (isNearby(edges, pixel)) {
-        Crossing crossing = crossingAlong(edges, corners, cameraDirection(frame.camera, uvec2(pixel)));
+        Crossing crossing = crossingAt(edges, corners, pixel);
         if (crossing.distance >= 0.0) {
             claimPixel(pixel, wordOf(crossing, triangle));
         }

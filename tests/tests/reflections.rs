@@ -1,8 +1,6 @@
 //! The pictures of the `reflections` sample: its ways of rendering agree, and they show what they should.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use std::path::{Path, PathBuf};
-
 use image::RgbaImage;
 use lvk::{Context, Dependencies, DeviceProfile};
 use lvk_samples::app::sample::{Moment, Sample};
@@ -14,15 +12,13 @@ use lvk_samples::scene::Camera;
 use lvk_samples::shaders::INCLUDES;
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::hybrid::paths;
-use lvk_tests::picture::{Likeness, Tolerance, assert_alike, keep};
+use lvk_tests::picture::{Likeness, Tolerance, assert_alike, assert_as_ever};
 use lvk_tests::{device, device_with};
 
 /// No multiple of a work group.
 const SIZE: [u32; 2] = [162, 91];
 /// Of one picture by two paths.
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.999, differing_share: 2e-3, flip: 2e-3 };
-/// Of a picture and the same one by another driver, years ago.
-const SAME_AS_EVER: Tolerance = Tolerance { psnr: 40.0, ssim: 0.995, differing_share: 1.0, flip: 0.012 };
 
 fn config(path: RayPath) -> ReflectionsConfig {
     ReflectionsConfig { samples: 1, ..ReflectionsConfig::new(path, SIZE[0], SIZE[1]) }
@@ -239,21 +235,10 @@ fn impossible_pictures_are_refused() {
     }
 }
 
-/// Where the change of a picture is meant, look at the new one and copy it over `tests/reference/reflections_small.png`.
 #[test]
 fn the_hall_looks_as_it_always_did() {
     let Some(ctx) = device() else { return };
     let config = ReflectionsConfig { samples: 4, ..config(paths(&ctx)[0]) };
     let picture = picture_at(&mut hall(&ctx, &config), 0.0);
-    match image::open(reference_path()) {
-        Ok(expected) => assert_alike("reflections_small", &picture, &expected.into_rgba8(), &SAME_AS_EVER),
-        Err(error) => {
-            let kept = keep("reflections_small actual", &picture);
-            panic!("{}: {error}; the picture is in {}", reference_path().display(), kept.display());
-        }
-    }
-}
-
-fn reference_path() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("reference/reflections_small.png")
+    assert_as_ever("reflections_small", &picture);
 }

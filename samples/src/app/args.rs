@@ -94,12 +94,12 @@ pub enum GBuffer {
 /// How to rasterise visible triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Raster {
-    /// By compute, unless hardware is much faster in a few frames at the start; in sequences always by compute where the
-    /// device can.
+    /// By compute where the device can, as its picture is exactly that of rays; says how long each took in a few frames.
     Auto,
     /// By compute shaders with 64-bit atomics.
     Compute,
-    /// By the device's rasteriser, after culling in compute shaders.
+    /// By the device's rasteriser, after culling in compute shaders; where it is in doubt rays decide, but it misses what
+    /// shows through gaps narrower than a pixel.
     Hardware,
 }
 

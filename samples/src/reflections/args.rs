@@ -4,6 +4,7 @@ use clap::Parser;
 
 use super::ReflectionsConfig;
 use crate::app::run_args::RunArgs;
+use crate::app::scene_args::BuiltInSceneArgs;
 
 /// Renders a hall with polished floors, water, glass, a serpent and drifting leaves, all of them reflected by ray tracing
 /// over a rasterised picture, and writes pictures as PNG.
@@ -33,6 +34,10 @@ pub struct ReflectionsArgs {
     /// Also measure the frame without leaving instances out, and say what that saves
     #[arg(long, help_heading = "Rendering")]
     pub compare_culling: bool,
+
+    /// The built-in scene
+    #[command(flatten)]
+    pub scene: BuiltInSceneArgs,
 
     /// Frames, pictures and device
     #[command(flatten)]

@@ -206,7 +206,7 @@ impl MovingPasses {
 
 /// A compute pipeline of one stage.
 pub(super) fn compute(ctx: &Context, stage: SampleStage) -> lvk::Result<Holder<ComputePipelineHandle>> {
-    let module = ctx.create_shader_module(&stage.module())?;
+    let module = stage.create(ctx, "reflections")?;
     ctx.create_compute_pipeline(&ComputePipelineDesc {
         module: Some(*module),
         debug_name: stage.name,

@@ -123,8 +123,8 @@ fn pipeline(
     color: ColorTarget,
     depth: Option<DepthTest>,
 ) -> lvk::Result<Holder<RenderPipelineHandle>> {
-    let vertex = ctx.create_shader_module(&SURFACE_VERTEX.module())?;
-    let module = ctx.create_shader_module(&fragment.module())?;
+    let vertex = SURFACE_VERTEX.create(ctx, "reflections")?;
+    let module = fragment.create(ctx, "reflections")?;
     ctx.create_render_pipeline(&RenderPipelineDesc {
         vertex: Some(*vertex),
         fragment: Some(*module),

@@ -82,7 +82,7 @@ impl RayPasses {
 
 fn tracing_pipeline(ctx: &Context) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
     let stages = [OPAQUE_RAYS, TRANSPARENT_RAYS, CLOSEST_MISS, SHADOW_MISS, CLOSEST_HIT, LEAF_ANY_HIT];
-    let modules = stages.map(|stage| ctx.create_shader_module(&stage.module()));
+    let modules = stages.map(|stage| stage.create(ctx, "reflections"));
     let [opaque, transparent, closest_miss, shadow_miss, closest_hit, leaf] = modules;
     let (closest_hit, leaf) = (closest_hit?, leaf?);
     let solid = HitGroup { closest_hit: Some(*closest_hit), ..HitGroup::default() };
