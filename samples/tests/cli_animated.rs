@@ -1,5 +1,5 @@
 //! The `reflections` and `hybrid_oit` programs as a user meets them: help, pictures, sequences and Ctrl-C.
-#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
