@@ -85,8 +85,6 @@ pub mod hybrid {
     pub const WITH_VISIBILITY: &[(&str, &str)] = &[("HYBRID_VISIBILITY", "1")];
     /// Macros of the ray stage that queues mirrors and glass.
     pub const WITH_QUEUE: &[(&str, &str)] = &[("HYBRID_QUEUE", "1")];
-    /// Macros of ray stages on a device without subgroup operations in them.
-    pub const WITHOUT_SUBGROUPS: &[(&str, &str)] = &[("HYBRID_NO_SUBGROUPS", "1")];
     /// Macros of the ray stages that take pixels in their order.
     pub const WITH_VISIBILITY_AND_ORDER: &[(&str, &str)] =
         &[("HYBRID_VISIBILITY", "1"), ("HYBRID_ORDERED", "1")];

@@ -241,7 +241,15 @@ fn queued_bounces_give_the_very_same_picture() {
                 Studio::with(&ctx, &scene, &config).picture(&scene.cameras[1])
             };
             let what = format!("{method:?} {path:?} {geometry:?}, {samples} samples");
-            assert!(picture(Bounces::Inline) == picture(Bounces::Queued), "{what}");
+            let inline = picture(Bounces::Inline);
+            assert!(picture(Bounces::Queued) == inline, "{what}, queued");
+            if method == Method::Hybrid && geometry != Geometry::Paper {
+                assert!(picture(Bounces::First) == inline, "{what}, first");
+                continue;
+            }
+            let config = HybridConfig { method, path, geometry, bounces: Some(Bounces::First), ..sized() };
+            let refused = HybridRenderer::new(&ctx, &scene, &config).err();
+            assert!(matches!(refused, Some(HybridError::NothingFirst)), "{what}, first: {refused:?}");
         }
     }
 }

@@ -2,9 +2,9 @@
 //! shaders with ray queries; at once, or first surfaces first and mirrors and glass in a launch of their own.
 
 use lvk::{
-    BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, Error,
-    HitGroup, Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderModuleHandle, ShaderStage,
-    SpecializationConstant, SpecializationValue, TextureHandle,
+    BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup,
+    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderStage, SpecializationConstant,
+    SpecializationValue, TextureHandle,
 };
 
 use super::bounce_queue::BounceQueue;
@@ -158,17 +158,6 @@ impl Stages {
         }
     }
 
-    /// A ray generation stage; not every device has subgroup operations in it.
-    fn ray_gen(&self, ctx: &Context, text: &str, name: &str) -> lvk::Result<Holder<ShaderModuleHandle>> {
-        match module(ctx, ShaderStage::RayGen, text, &self.defines, name) {
-            Err(Error::Unsupported { .. }) => {
-                let defines = [&self.defines, texts::WITHOUT_SUBGROUPS].concat();
-                module(ctx, ShaderStage::RayGen, text, &defines, name)
-            }
-            made => made,
-        }
-    }
-
     fn compute(&self, ctx: &Context, text: &str, name: &str) -> lvk::Result<Holder<ComputePipelineHandle>> {
         let shader = module(ctx, ShaderStage::Compute, text, &self.defines, name)?;
         ctx.create_compute_pipeline(&ComputePipelineDesc {
@@ -180,9 +169,9 @@ impl Stages {
 }
 
 fn tracing_pipeline(ctx: &Context, stages: &Stages) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
-    let render = stages.ray_gen(ctx, texts::RENDER_RGEN, "render.rgen")?;
-    let bounces =
-        stages.queued.then(|| stages.ray_gen(ctx, texts::BOUNCES_RGEN, "bounces.rgen")).transpose()?;
+    let ray_gen = |text, name| module(ctx, ShaderStage::RayGen, text, &stages.defines, name);
+    let render = ray_gen(texts::RENDER_RGEN, "render.rgen")?;
+    let bounces = stages.queued.then(|| ray_gen(texts::BOUNCES_RGEN, "bounces.rgen")).transpose()?;
     let ray_gens: Vec<_> = std::iter::once(&render).chain(&bounces).map(Holder::handle).collect();
     let closest_miss = module(ctx, ShaderStage::Miss, texts::CLOSEST_RMISS, &[], "closest.rmiss")?;
     let shadow_miss = module(ctx, ShaderStage::Miss, texts::SHADOW_RMISS, &[], "shadow.rmiss")?;
