@@ -21,6 +21,7 @@ use crate::pipeline::{
     ComputePipeline, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline, RenderPipeline,
 };
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
+use crate::software::body::SoftwareBody;
 use crate::store::Store;
 use crate::submit::Submitter;
 use crate::upload::{SpareBuffers, Staging};
@@ -80,6 +81,8 @@ pub(crate) enum Garbage {
     Body(#[expect(dead_code, reason = "held only to be dropped")] Arc<BlasBody>),
     /// A buffer that a command buffer uses, whoever else holds it: its owner may fail to come into being.
     Held(Arc<Buffer>),
+    /// A structure of the library's own that a command buffer fills, whoever else holds it.
+    Software(#[expect(dead_code, reason = "held only to be dropped")] Arc<SoftwareBody>),
     /// Answered sizes, which may be there before the GPU is done with the command buffer that asked.
     SizeQuery(#[expect(dead_code, reason = "held only to be dropped")] Arc<SizeQuery>),
 }
@@ -141,6 +144,7 @@ impl Shared {
             | Garbage::ComputePipeline(_)
             | Garbage::QueryPool(_)
             | Garbage::Body(_)
+            | Garbage::Software(_)
             | Garbage::SizeQuery(_) => {}
         }
     }

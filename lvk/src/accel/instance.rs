@@ -98,6 +98,11 @@ pub(super) fn check(name: &str, index: usize, instance: &TlasInstance) -> Result
     Err(complaint(name, index, instance))
 }
 
+/// Fails unless every number of every instance fits.
+pub(crate) fn check_instances(name: &str, instances: &[TlasInstance]) -> Result<()> {
+    instances.iter().enumerate().try_for_each(|(index, instance)| check(name, index, instance))
+}
+
 /// Whether no exponent is all ones, without a branch for each number.
 fn is_finite(transform: &[f32; 12]) -> bool {
     let all = transform.iter().fold(0, |all, number| all | ((number.to_bits() & 0x7fff_ffff) + 0x0080_0000));

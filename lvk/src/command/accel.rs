@@ -87,6 +87,18 @@ impl CommandBuffer {
         self.build_all(&found, mode)
     }
 
+    /// Builds structures for the first time. Those of the library's own come ready from the CPU.
+    pub(crate) fn build_first(&mut self, structures: &[Arc<AccelStruct>]) -> Result<()> {
+        if self.shared.gpu.accel.is_some() {
+            return self.build_all(structures, BuildMode::Rebuild);
+        }
+        for target in structures {
+            let (build, _) = OpenBuild::of_blas(target)?;
+            self.open_builds.push(build);
+        }
+        Ok(())
+    }
+
     /// As [`build_blas`](Self::build_blas), by object.
     pub(crate) fn build_all(&mut self, structures: &[Arc<AccelStruct>], mode: BuildMode) -> Result<()> {
         let mut open = Vec::with_capacity(structures.len());

@@ -13,6 +13,7 @@ mod kernel;
 pub(crate) mod query;
 pub(crate) mod render;
 pub(crate) mod render_pass;
+mod software;
 mod targets;
 pub(crate) mod tlas;
 pub(crate) mod trace;

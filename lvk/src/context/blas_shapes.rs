@@ -40,6 +40,10 @@ impl Context {
     /// The parts of every structure, with the tables of those that are cut or reordered.
     pub(super) fn blas_shapes(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Vec<PartShape>>> {
         let shared = self.shared();
+        if shared.gpu.accel.is_none() {
+            // Software has no parts; the descriptions are checked as for hardware.
+            return descs.iter().map(|desc| input(shared, desc).map(|_| Vec::new())).collect();
+        }
         let mut sizes = Vec::with_capacity(descs.len());
         let mut treatments = Vec::with_capacity(descs.len());
         for desc in descs {
@@ -102,7 +106,7 @@ impl Context {
 /// The checked input of the mesh as a whole. Addresses of matrices do not matter to size queries, but for being null.
 pub(super) fn input(shared: &Shared, desc: &BlasDesc<'_>) -> Result<BuildInput> {
     const SOME_ADDRESS: u64 = 16;
-    shared.gpu.accel()?;
+    shared.gpu.check_structures()?;
     desc.flags.check_blas(&shared.gpu, desc.debug_name)?;
     let find = |handle| shared.store.buffers.get(handle);
     let name = desc.debug_name;

@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::gpu::caps::FeatureRequest;
 use crate::gpu::debug::{Validation, ValidationSink};
 use crate::gpu::profile::DeviceProfile;
+use crate::gpu::ray_query_path::RayQueryRequest;
 
 /// Describes a context.
 #[derive(Debug, Clone)]
@@ -22,8 +23,9 @@ pub struct ContextDesc<'a> {
     pub validation_sink: Option<ValidationSink>,
     /// Ray tracing pipelines.
     pub ray_tracing_pipeline: FeatureRequest,
-    /// Ray queries in any shader stage.
-    pub ray_query: FeatureRequest,
+    /// Ray queries in any shader stage, and who walks their trees; [`Capabilities`](crate::Capabilities) says which it
+    /// became and why.
+    pub ray_query: RayQueryRequest,
     /// Another device to rehearse on this one, also by the requirements above; none for the device as it is.
     pub profile: Option<&'a DeviceProfile>,
     /// Frames the CPU may be ahead of the GPU; see [`Context::next_frame`](crate::Context::next_frame). 1 to 8.
@@ -60,7 +62,7 @@ impl Default for ContextDesc<'_> {
             validation: Validation::Off,
             validation_sink: None,
             ray_tracing_pipeline: FeatureRequest::Optional,
-            ray_query: FeatureRequest::Optional,
+            ray_query: RayQueryRequest::Auto,
             profile: None,
             frames_in_flight: 2,
             staging_bytes: 16 << 20,

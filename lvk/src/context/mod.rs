@@ -15,6 +15,7 @@ pub(crate) mod holder;
 mod interop;
 mod read_bounds;
 pub(crate) mod serialize;
+mod software_blas;
 mod start;
 mod submit;
 

@@ -193,7 +193,7 @@ impl Context {
         let structure = |bytes: &u64| RawStructure::new(&shared.gpu, &shared.accel_storage, name, ty, *bytes);
         let structures = bytes.iter().map(structure).collect::<Result<Vec<_>>>()?;
         let body = BlasBody { structures, compacted_from: None, rebuildable };
-        let handle = shared.store.accel_structs.insert(blas_object(shared, desc, shapes, body)?);
+        let handle = shared.store.accel_structs.insert(blas_object(shared, desc, shapes, body, None)?);
         let holder = Holder::new(self, handle, 0);
         let object = shared.store.accel_structs.get(handle)?;
         let sizes: Vec<_> = blob.parts.iter().map(|part| part.driver.len() as u64).collect();

@@ -90,7 +90,7 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
 
 /// An entry for each element of `kTLAS[]`.
 fn new_tlas_table(gpu: &Arc<Gpu>) -> Result<Option<Arc<Buffer>>> {
-    if gpu.accel.is_none() {
+    if !gpu.has_structures() {
         return Ok(None);
     }
     let desc = BufferDesc {

@@ -217,15 +217,20 @@ fn check_size(gpu: &Gpu, desc: &BufferDesc<'_>) -> Result<u64> {
 }
 
 fn raw_usage(gpu: &Gpu, usage: BufferUsage, name: &str) -> Result<vk::BufferUsageFlags> {
-    if usage.contains(BufferUsage::ACCEL_INPUT) && gpu.accel.is_none() {
+    if usage.contains(BufferUsage::ACCEL_INPUT) && !gpu.has_structures() {
         return Err(gpu.lacks(&format!("buffer '{name}' with ACCEL_INPUT: acceleration structures")));
     }
+    // The library's own builders read inputs as any shader does.
+    let accel_input = match gpu.accel {
+        Some(_) => vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR,
+        None => vk::BufferUsageFlags::STORAGE_BUFFER,
+    };
     let pairs = [
         (BufferUsage::STORAGE, vk::BufferUsageFlags::STORAGE_BUFFER),
         (BufferUsage::INDEX, vk::BufferUsageFlags::INDEX_BUFFER),
         (BufferUsage::VERTEX, vk::BufferUsageFlags::VERTEX_BUFFER),
         (BufferUsage::INDIRECT, vk::BufferUsageFlags::INDIRECT_BUFFER),
-        (BufferUsage::ACCEL_INPUT, vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR),
+        (BufferUsage::ACCEL_INPUT, accel_input),
     ];
     let always = vk::BufferUsageFlags::TRANSFER_SRC
         | vk::BufferUsageFlags::TRANSFER_DST

@@ -1,6 +1,8 @@
 //! Opens the device the user names, and lists what there is.
 
-use lvk::{Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, ValidationSink};
+use lvk::{
+    Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryRequest, ValidationSink,
+};
 
 use super::run_args::{RayTracing, RunArgs, Validation};
 use super::run_error::RunError;
@@ -24,6 +26,7 @@ pub(super) fn open(
     needs: &DeviceNeeds,
 ) -> lvk::Result<Context> {
     use FeatureRequest::{Optional, Required};
+    use RayQueryRequest::{Hardware, HardwareIfPresent};
     let with = |ray_tracing_pipeline, ray_query| {
         Context::new(&ContextDesc {
             application_name: name,
@@ -39,15 +42,15 @@ pub(super) fn open(
         })
     };
     match args.rt {
-        RayTracing::Pipeline => with(Required, Optional),
-        RayTracing::Query => with(Optional, Required),
+        RayTracing::Pipeline => with(Required, HardwareIfPresent),
+        RayTracing::Query => with(Optional, Hardware),
         RayTracing::Auto => {
-            let best = with(Optional, Optional)?;
+            let best = with(Optional, HardwareIfPresent)?;
             let capabilities = best.capabilities();
             if capabilities.ray_tracing_pipeline || capabilities.ray_query {
                 return Ok(best);
             }
-            Ok(with(Required, Optional).or_else(|_| with(Optional, Required)).unwrap_or(best))
+            Ok(with(Required, HardwareIfPresent).or_else(|_| with(Optional, Hardware)).unwrap_or(best))
         }
     }
 }

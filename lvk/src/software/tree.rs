@@ -1,0 +1,51 @@
+//! A tree over the primitives of a mesh, in the form that suits it.
+
+use obvhs::cwbvh::node::CwBvhNode;
+
+use super::binary_tree;
+use super::layout::{BinaryNode, LEAF, LARGEST_LEAF, NONE, leaf};
+use super::quality::Quality;
+use super::wide_tree;
+use crate::accel::bounds::Bounds;
+
+/// Nodes of either form.
+pub(crate) enum Nodes {
+    Wide(Vec<CwBvhNode>),
+    Binary(Vec<BinaryNode>),
+}
+
+/// A tree, and the order of primitives in its leaves.
+pub(crate) struct Tree {
+    pub(crate) nodes: Nodes,
+    /// A node or a leaf, or [`NONE`].
+    pub(crate) root: u32,
+    /// For each place in the leaves which primitive stands there.
+    pub(crate) order: Vec<u32>,
+}
+
+impl Tree {
+    /// The tree of a bottom-level structure: wide, but for meshes that wide nodes do not suit.
+    pub(crate) fn of_mesh(bounds: &[Bounds], quality: Quality) -> Self {
+        const ONE_LEAF: usize = 3;
+        match bounds.len() {
+            0 => Self { nodes: Nodes::Wide(Vec::new()), root: NONE, order: Vec::new() },
+            count @ 1..=ONE_LEAF => {
+                let order = (0..count as u32).collect();
+                Self { nodes: Nodes::Wide(Vec::new()), root: leaf(0, count), order }
+            }
+            _ => wide_tree::build(bounds, quality).unwrap_or_else(|| binary_tree::build(bounds, ONE_LEAF)),
+        }
+    }
+
+    /// Whether every reference names what is there: made-up trees must not send the GPU anywhere.
+    pub(crate) fn is_sound(&self) -> bool {
+        debug_assert!(LARGEST_LEAF <= 16);
+        let primitives = self.order.len();
+        match &self.nodes {
+            _ if self.root == NONE => primitives == 0,
+            Nodes::Wide(nodes) if self.root & LEAF == 0 => wide_tree::is_sound(nodes, primitives),
+            Nodes::Binary(nodes) if self.root & LEAF == 0 => binary_tree::is_sound(nodes, primitives),
+            _ => binary_tree::names_primitives(self.root, primitives),
+        }
+    }
+}
