@@ -2,6 +2,7 @@
 
 #[cfg(feature = "glsl")]
 use super::front_end::glsl;
+use super::idle_culling::without_idle_culling;
 use super::{ShaderModuleDesc, ShaderSource, spirv};
 use crate::error::{Error, Result};
 use crate::gpu::caps::Capabilities;
@@ -35,6 +36,9 @@ impl CompileOptions {
 /// The module's SPIR-V: version 1.6 for GLSL, the caller's own words, checked for their structure, otherwise.
 pub(crate) fn compile(desc: &ShaderModuleDesc<'_>, options: &CompileOptions) -> Result<Vec<u32>> {
     match desc.source {
+        ShaderSource::Glsl(text) if options.software_ray_query => {
+            glsl(desc, text, options).map(|words| without_idle_culling(&words))
+        }
         ShaderSource::Glsl(text) => glsl(desc, text, options),
         ShaderSource::Spirv(words) => {
             spirv::check(words).map_err(|log| failed(desc.debug_name, log))?;

@@ -50,7 +50,7 @@ void lvkSoftConfirm(inout LvkSoftState state) {
 }
 
 void lvkSoftGenerate(inout LvkSoftState state, float t) {
-    if (lvkSoftIsInRange(state, t)) {
+    if (t >= state.tMin && t <= state.committed.t) {
         state.candidate.t = t;
         lvkSoftJudge(state, 2u);
     }
@@ -124,9 +124,11 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
 #define lvkRayQueryGeometryIndex(rq, which) int(lvkSoftHitNumbers((rq).state, LVK_SOFT_HIT(rq, which)).x)
 #define lvkRayQueryBarycentrics(rq, which) (LVK_SOFT_HIT(rq, which).barycentrics)
 #define lvkRayQueryFrontFace(rq, which) (LVK_SOFT_HIT(rq, which).front)
+#ifdef LVK_POSITION_FETCH
 // The corners of the triangle, in object space: void (LvkRayQuery, which, out vec3[3]). Needs BuildFlags::POSITION_FETCH.
 #define lvkRayQueryTrianglePositions(rq, which, positions) \
     lvkSoftPositions((rq).state, LVK_SOFT_HIT(rq, which), positions)
+#endif
 #define lvkRayQueryCandidateAabbOpaque(rq) ((rq).state.candidate.opaque)
 #define lvkRayQueryObjectRayOrigin(rq, which) \
     lvkSoftObject((rq).state, LVK_SOFT_HIT(rq, which), vec4((rq).state.origin, 1.0))

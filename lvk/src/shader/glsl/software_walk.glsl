@@ -230,10 +230,6 @@ void lvkSoftCommit(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftHi
     }
 }
 
-bool lvkSoftIsInRange(LvkSoftState state, float t) {
-    bool closer = t < state.committed.t || (t == state.committed.t && state.committed.kind == 0u);
-    return t >= state.tMin && closer;
-}
 
 // The corners of a triangle.
 void lvkSoftCorners(uvec2 structure, uvec2 primitives, bool indexed, uint primitive, out vec3 corners[3]) {
@@ -287,12 +283,15 @@ bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, uint primitive) {
     return range.x <= range.y;
 }
 
-// Whether the ray hits a triangle in its range, and from a side that counts.
+// Whether the ray hits a triangle between its ends, which do not count themselves, and from a side that counts.
 bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, uint primitive, inout LvkSoftHit hit) {
     vec3 corners[3];
     lvkSoftCorners(level.structure, level.primitives, level.kind == LVK_SOFT_INDEXED, primitive, corners);
     LvkSoftPassage passage;
-    if (!lvkSoftPasses(level.shear, corners[0], corners[1], corners[2], passage) || !lvkSoftIsInRange(state, passage.t)) {
+    if (!lvkSoftPasses(level.shear, corners[0], corners[1], corners[2], passage)) {
+        return false;
+    }
+    if (!(passage.t > state.tMin && passage.t < state.committed.t)) {
         return false;
     }
     hit.t = passage.t;
