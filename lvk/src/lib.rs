@@ -101,6 +101,7 @@ mod pipeline;
 mod resource;
 mod shader;
 mod shared;
+mod software;
 mod store;
 mod submit;
 mod upload;

@@ -8,6 +8,7 @@ pub(crate) mod compute;
 pub(crate) mod dependencies;
 mod draw_mesh;
 pub(crate) mod flush;
+pub(crate) mod gpu_build;
 mod instances;
 mod kernel;
 pub(crate) mod query;
