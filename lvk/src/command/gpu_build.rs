@@ -16,6 +16,10 @@ use crate::software::gpu_build::plan::{BuildSource, GpuBuildPlan};
 use crate::software::gpu_build::refit_plan::GpuRefitPlan;
 use crate::software::gpu_build::steps::{Step, build_steps, refit_steps};
 
+#[cfg(feature = "test-hooks")]
+#[path = "sort_test.rs"]
+pub(crate) mod sort_test;
+
 /// Parts of the scratch memory are aligned to their widest accesses.
 const SCRATCH_ALIGNMENT: u64 = 256;
 const TABLE_ALIGNMENT: u64 = 16;
@@ -69,7 +73,11 @@ impl CommandBuffer {
     }
 
     /// Records refits, side by side as far as the scratch memory has room. On an error nothing is recorded.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a structure that keeps no parents.
     pub(crate) fn record_gpu_refits(&mut self, refits: &[GpuRefit]) -> Result<()> {
+        refits.iter().try_for_each(|refit| refit.plan.check(&refit.target.name))?;
         let sizes: Vec<_> = refits.iter().map(|refit| refit.plan.scratch_bytes()).collect();
         self.in_scratch_batches(&sizes, |cmd, range, scratch| {
             let refits = &refits[range];

@@ -8,6 +8,7 @@ pub(crate) mod compute;
 pub(crate) mod dependencies;
 mod draw_mesh;
 pub(crate) mod flush;
+#[allow(dead_code, reason = "nothing but tests builds software structures yet")]
 pub(crate) mod gpu_build;
 mod instances;
 mod kernel;

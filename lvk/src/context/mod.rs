@@ -17,6 +17,8 @@ mod read_bounds;
 pub(crate) mod serialize;
 mod start;
 mod submit;
+#[cfg(feature = "test-hooks")]
+pub mod test_hooks;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

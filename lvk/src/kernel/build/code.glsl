@@ -1,4 +1,4 @@
-// Codes of places along a space-filling curve (Morton order), of 30 or 60 bits.
+// Codes of places along a space-filling curve (Morton order), of 30 to 60 bits.
 uint spread(uint v) {
     v = (v | v << 16) & 0x030000ffu;
     v = (v | v << 8) & 0x0300f00fu;
@@ -16,18 +16,18 @@ uvec2 codeOf(Box box) {
     vec3 extent = hi * 0.5 - lo * 0.5;
     float largest = max(extent.x, max(extent.y, extent.z));
     vec3 unit = largest > 0.0 ? (centre(box) * 0.5 - lo * 0.5) / largest : vec3(0);
-    float cells = job.longCodes != 0u ? 1048576.0 : 1024.0;
+    float cells = job.lowBits != 0u ? 1048576.0 : 1024.0;
     uvec3 cell = uvec3(clamp(unit * cells, vec3(0), vec3(cells - 1.0)));
-    if (job.longCodes == 0u) return uvec2(interleave(cell), 0);
-    return uvec2(interleave(cell >> 10), interleave(cell & 1023u));
+    if (job.lowBits == 0u) return uvec2(interleave(cell), 0);
+    return uvec2(interleave(cell >> 10), interleave(cell & 1023u) >> 30u - job.lowBits);
 }
 
 // Writes the key of primitive `i`; those that are inactive sort behind all others.
 void writeKey(uint i) {
     Box box = readBox(Floats(work(job.boxes)), i * 6);
     uvec2 code = isEmpty(box) ? uvec2(kNone) : codeOf(box);
-    Words keys = Words(work(job.keys));
+    Words keys = keysBefore(0u);
     keys.word[i] = code.x;
     keys.word[job.count + i] = i;
-    if (job.longCodes != 0u) keys.word[2 * job.count + i] = code.y;
+    if (job.lowBits != 0u) keys.word[2 * job.count + i] = code.y;
 }

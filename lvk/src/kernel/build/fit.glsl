@@ -29,7 +29,7 @@ void finish(Fitted root) {
     Floats to = Floats(job.blob);
     writeVec3(to, 12, root.box.lo);
     writeVec3(to, 15, root.box.hi);
-    header().word[11] = root.height;
+    header().word[18] = root.height;
 }
 
 // Fits what can be fitted from node `i` up to the root.

@@ -2,6 +2,9 @@
 const uint kRecordWords = 16u;
 const uint kInstanceWords = 32u;
 
+// A header that only says where the structure lies now.
+const uint kMoved = 2u;
+
 struct Affine { vec3 x; vec3 y; vec3 z; vec3 t; };
 
 vec3 apply(Affine m, vec3 p) { return m.x * p.x + m.y * p.y + m.z * p.z + m.t; }
@@ -24,15 +27,16 @@ bool invert(Affine m, out Affine inverse) {
     return isFinite(inverse.x) && isFinite(inverse.y) && isFinite(inverse.z) && isFinite(inverse.t);
 }
 
-// Around the box as a matrix moves it, with what rounding may take away.
+// Around the box as a matrix moves it, with what rounding may take away, here and where rays are moved.
 Box moved(Affine m, Box box) {
     const float kRounding = 6e-7;
+    const float kRays = 1.0 / 1048576.0;
     vec3 c = centre(box);
     vec3 h = box.hi * 0.5 - box.lo * 0.5;
     vec3 reach = abs(m.x) * h.x + abs(m.y) * h.y + abs(m.z) * h.z;
     vec3 far = abs(m.x) * abs(c.x) + abs(m.y) * abs(c.y) + abs(m.z) * abs(c.z) + abs(m.t);
     vec3 middle = apply(m, c);
-    vec3 half_ = reach + (far + reach) * kRounding;
+    vec3 half_ = reach + (far + reach) * kRounding + (abs(middle) + reach) * kRays;
     return Box(clamp(middle - half_, vec3(-kFar), vec3(kFar)), clamp(middle + half_, vec3(-kFar), vec3(kFar)));
 }
 
@@ -69,11 +73,12 @@ Box keepInstance(uint i) {
     bool isActive = finite && record.word[12] >> 24 != 0u && structure != uvec2(0) && invert(m, inverse);
     if (!isActive) return emptyBox();
     Inputs shown = Inputs(structure);
+    if (shown.word[0] == kMoved) shown = Inputs(uvec2(shown.word[2], shown.word[3]));
     if (shown.word[2] == kNone) return emptyBox();
     Words kept = Words(plus(place(job.primitives), i * kInstanceWords << 2, i >> 25));
     Floats numbers = Floats(plus(place(job.primitives), i * kInstanceWords << 2, i >> 25));
-    writeRows(numbers, 0, m);
-    writeRows(numbers, 12, inverse);
+    writeRows(numbers, 0, inverse);
+    writeRows(numbers, 12, m);
     kept.word[24] = structure.x;
     kept.word[25] = structure.y;
     kept.word[26] = record.word[12];

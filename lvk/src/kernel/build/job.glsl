@@ -31,7 +31,7 @@ struct Job {
     uint inputCount;     // geometries, or addresses in `table`
     uint leafKind;
     uint leafSize;       // primitives of a leaf
-    uint longCodes;      // not 0: codes have two words
+    uint lowBits;        // of the second word of a code; 0 where codes have but one
     uint nodes;          // places in the structure, in units of 16 bytes
     uint primitives;
     uint vertices;
@@ -44,7 +44,7 @@ struct Job {
     uint digits;         // how often each digit occurs in each block
     uint arrivals;       // a counter for each node
     uint nodeCapacity;
-    uint reserved;
+    uint headerFlags;    // bit 0: every geometry is opaque, bit 1: none is
 };
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Jobs { Job job[]; };
@@ -79,6 +79,14 @@ uvec2 place(uint units) { return plus(job.blob, units << 4, units >> 28); }
 uvec2 work(uint words) { return plus(job.scratch, words << 2, words >> 30); }
 
 Words header() { return Words(job.blob); }
+
+// Passes of the sort: four bits each, the second words first, then 31 bits of the first words.
+uint lowPasses() { return (job.lowBits + 3) / 4; }
+
+uint passes() { return lowPasses() + 8; }
+
+// Where keys lie before a pass; after the last they are in `keys`.
+Words keysBefore(uint pass) { return Words(work((passes() - pass & 1u) != 0u ? job.spareKeys : job.keys)); }
 
 // The scratch memory starts with these words. Bounds are kept as numbers that only grow from 0.
 const uint kStateWords = 8u;

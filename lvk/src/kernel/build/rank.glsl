@@ -9,19 +9,18 @@ struct Source { Words keys; uint digitWord; uint shift; };
 
 // The word of the keys and the bits that a pass sorts by; the low words come first.
 Source sourceOf(uint pass) {
-    bool flipped = (pass & 1u) != 0u;
-    bool low = job.longCodes != 0u && pass < 8u;
-    return Source(Words(work(flipped ? job.spareKeys : job.keys)), low ? 2 * job.count : 0u, (pass & 7u) * 4u);
+    bool low = pass < lowPasses();
+    return Source(keysBefore(pass), low ? 2 * job.count : 0u, (low ? pass : pass - lowPasses()) * 4u);
 }
 
-Words targetOf(uint pass) { return Words(work((pass & 1u) != 0u ? job.keys : job.spareKeys)); }
+Words targetOf(uint pass) { return keysBefore(pass + 1u); }
 
 uint digitOf(Source from, uint i) { return from.keys.word[from.digitWord + i] >> from.shift & (kDigits - 1); }
 
 void moveKey(Source from, Words to, uint i, uint rank) {
     to.word[rank] = from.keys.word[i];
     to.word[job.count + rank] = from.keys.word[job.count + i];
-    if (job.longCodes != 0u) to.word[2 * job.count + rank] = from.keys.word[2 * job.count + i];
+    if (job.lowBits != 0u) to.word[2 * job.count + rank] = from.keys.word[2 * job.count + i];
 }
 
 // Sums of what all invocations before this one gave.

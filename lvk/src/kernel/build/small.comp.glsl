@@ -18,8 +18,7 @@ void sortAll() {
     uint each = (job.count + kGroup - 1) / kGroup;
     uint first = min(gl_LocalInvocationIndex * each, job.count);
     uint end = min(first + each, job.count);
-    uint passes = job.longCodes != 0u ? 16u : 8u;
-    for (uint pass = 0; pass < passes; ++pass) {
+    for (uint pass = 0; pass < passes(); ++pass) {
         Source from = sourceOf(pass);
         Words to = targetOf(pass);
         rankKeys(from, first, end);

@@ -17,7 +17,7 @@ int sameBits(uint i, uvec2 own, int j, uint leaves) {
     uint at = uint(j) * job.leafSize;
     uint other = keys.word[at];
     if (own.x != other) return 31 - findMSB(own.x ^ other);
-    if (job.longCodes != 0u) {
+    if (job.lowBits != 0u) {
         uint low = keys.word[2 * job.count + at];
         if (own.y != low) return 63 - findMSB(own.y ^ low);
     }
@@ -29,7 +29,7 @@ void writeParent(uint child, uint parent, uint which) { Words(job.parents).word[
 void writeNode(uint i, uint leaves) {
     Words keys = Words(work(job.keys));
     uint at = i * job.leafSize;
-    uvec2 own = uvec2(keys.word[at], job.longCodes != 0u ? keys.word[2 * job.count + at] : 0u);
+    uvec2 own = uvec2(keys.word[at], job.lowBits != 0u ? keys.word[2 * job.count + at] : 0u);
     int n = int(i);
     int direction = sameBits(i, own, n + 1, leaves) > sameBits(i, own, n - 1, leaves) ? 1 : -1;
     int least = sameBits(i, own, n - direction, leaves);
@@ -73,6 +73,7 @@ void writeHeader(uint leaves) {
     to.word[8] = leaves == 0u ? 0u : leaves - 1;
     to.word[9] = job.leafKind == kInstances ? 0u : job.inputCount;
     to.word[10] = job.savedParents;
+    to.word[11] = job.headerFlags;
 }
 
 void writeGeometry(uint i) {

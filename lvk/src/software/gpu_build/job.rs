@@ -41,7 +41,7 @@ pub(crate) struct Job {
     pub(crate) input_count: u32,
     pub(crate) leaf_kind: u32,
     pub(crate) leaf_size: u32,
-    pub(crate) long_codes: u32,
+    pub(crate) low_bits: u32,
     pub(crate) nodes: u32,
     pub(crate) primitives: u32,
     pub(crate) vertices: u32,
@@ -54,7 +54,7 @@ pub(crate) struct Job {
     pub(crate) digits: u32,
     pub(crate) arrivals: u32,
     pub(crate) node_capacity: u32,
-    pub(crate) reserved: u32,
+    pub(crate) header_flags: u32,
 }
 
 /// Push constants of every kernel of a build.

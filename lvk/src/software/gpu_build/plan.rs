@@ -2,6 +2,7 @@
 
 use super::geometry::GpuGeometry;
 use super::job::{Job, LeafKind};
+use crate::accel::geometry::GeometryFlags;
 use crate::error::{Error, Result, check_limit};
 
 /// Bytes of the header of a structure.
@@ -20,6 +21,10 @@ const MOST_SMALL: u32 = 2048;
 /// Keys that a workgroup sorts, `kBlock` of `kernel/build/job.glsl`.
 pub(super) const SORT_BLOCK: u32 = 1024;
 const DIGITS: u32 = 16;
+/// Nodes on a path that traversal has room for.
+pub(crate) const MOST_HEIGHT: u32 = 64;
+/// Of the first word of a code.
+const CODE_BITS: u32 = 30;
 const STATE_WORDS: u64 = 8;
 const BOX_WORDS: u64 = 6;
 
@@ -75,7 +80,8 @@ pub(crate) struct GpuBuildPlan {
     /// Bytes of scratch memory of a build, at an address that is a multiple of 16.
     pub(crate) scratch_bytes: u64,
     pub(super) scratch: ScratchPlaces,
-    pub(super) long_codes: bool,
+    /// Of the second word of a code; 0 where codes have but one.
+    pub(super) low_bits: u32,
 }
 
 /// What a build reads.
@@ -132,8 +138,8 @@ impl GpuBuildPlan {
         let indexed = shape.leaf_kind == LeafKind::IndexedTriangles;
         let vertex_count = if indexed { shape.vertex_count } else { 0 };
         let (places, blob_bytes) = blob_places(name, shape, vertex_count)?;
-        let long_codes = has_long_codes(shape.leaf_kind, shape.primitive_count);
-        let (scratch, scratch_bytes) = scratch_places(shape, long_codes);
+        let low_bits = low_bits(shape);
+        let (scratch, scratch_bytes) = scratch_places(shape, low_bits > 0);
         Ok(Self {
             leaf_kind: shape.leaf_kind,
             capacity: shape.primitive_count,
@@ -144,7 +150,7 @@ impl GpuBuildPlan {
             blob_bytes,
             scratch_bytes,
             scratch,
-            long_codes,
+            low_bits,
         })
     }
 
@@ -153,18 +159,16 @@ impl GpuBuildPlan {
         node_capacity(self.capacity, self.leaf_size)
     }
 
-    /// Most nodes on a path from the root to a leaf: every node splits at a bit of the code, or, where codes are equal,
-    /// of the leaf's number. What a path really has stands in the header.
+    /// Most nodes on a path from the root to a leaf, at most [`MOST_HEIGHT`]: every node splits at a bit of the code, or,
+    /// where codes are equal, of the leaf's number. What a path really has stands in the header.
     pub(crate) fn most_height(&self) -> u32 {
-        let leaves = self.capacity.div_ceil(self.leaf_size);
-        let number_bits = u32::BITS - leaves.saturating_sub(1).leading_zeros();
-        let code_bits = if self.long_codes { 60 } else { 30 };
-        (code_bits + number_bits).min(self.node_capacity())
+        let number_bits = number_bits(self.capacity, self.leaf_size);
+        (CODE_BITS + self.low_bits + number_bits).min(self.node_capacity())
     }
 
-    /// Whether one workgroup makes the whole build.
-    pub(super) fn is_small(&self) -> bool {
-        self.capacity.max(self.geometry_count) <= MOST_SMALL && self.vertex_count <= 3 * MOST_SMALL
+    /// Whether one workgroup makes the whole build of `count` primitives or instances.
+    pub(super) fn is_small(&self, count: u32) -> bool {
+        count.max(self.geometry_count) <= MOST_SMALL && self.vertex_count <= 3 * MOST_SMALL
     }
 
     /// What the kernels of one build are told. `inputs` is the address of the geometries; instances have their own.
@@ -190,7 +194,7 @@ impl GpuBuildPlan {
             input_count,
             leaf_kind: self.leaf_kind as u32,
             leaf_size: self.leaf_size,
-            long_codes: self.long_codes.into(),
+            low_bits: self.low_bits,
             nodes: self.places.nodes,
             primitives: self.places.primitives,
             vertices: self.places.vertices,
@@ -203,7 +207,7 @@ impl GpuBuildPlan {
             digits: self.scratch.digits,
             arrivals: self.scratch.arrivals,
             node_capacity: node_capacity(count, self.leaf_size),
-            reserved: 0,
+            header_flags: header_flags(source),
         }
     }
 }
@@ -232,9 +236,30 @@ impl Layout {
     }
 }
 
-/// Codes of 30 bits have 1024 cells along an axis: fine enough for few primitives, and sorted twice as fast.
-fn has_long_codes(kind: LeafKind, count: u32) -> bool {
-    count > if kind == LeafKind::Instances { 1 << 15 } else { 1 << 12 }
+/// Bits of the second word of a code. Codes of one word have 1024 cells along an axis: fine enough for few primitives,
+/// and sorted in fewer passes. No code has so many bits that the tree could get too high.
+fn low_bits(shape: &BlasShape) -> u32 {
+    let few = if shape.leaf_kind == LeafKind::Instances { 1 << 15 } else { 1 << 12 };
+    if shape.primitive_count <= few {
+        return 0;
+    }
+    MOST_HEIGHT - CODE_BITS - number_bits(shape.primitive_count, shape.leaf_size)
+}
+
+/// Bits that the number of a leaf has.
+fn number_bits(count: u32, leaf_size: u32) -> u32 {
+    u32::BITS - count.div_ceil(leaf_size).saturating_sub(1).leading_zeros()
+}
+
+/// Bit 0: every geometry is opaque; bit 1: none is.
+fn header_flags(source: &BuildSource) -> u32 {
+    match source {
+        BuildSource::Geometries(list) => {
+            let opaque = |geometry: &GpuGeometry| geometry.flags & GeometryFlags::OPAQUE.bits() != 0;
+            u32::from(list.iter().all(opaque)) | u32::from(!list.iter().any(opaque)) << 1
+        }
+        BuildSource::Instances { .. } => 0,
+    }
 }
 
 fn node_capacity(count: u32, leaf_size: u32) -> u32 {
@@ -339,7 +364,8 @@ mod tests {
             let plan = GpuBuildPlan::blas("s", &shape).unwrap();
             let (count, nodes) = (u64::from(shape.primitive_count), u64::from(plan.node_capacity()));
             let at = |place: u32| u64::from(place) * 4;
-            let keys = count * if plan.long_codes { 12 } else { 8 };
+            let keys = count * if plan.low_bits > 0 { 12 } else { 8 };
+            prop_assert!(plan.most_height() <= MOST_HEIGHT && plan.low_bits <= 30);
             check_parts(vec![
                 (at(plan.scratch.boxes), count * 24),
                 (at(plan.scratch.keys), keys),

@@ -4,6 +4,7 @@ use bytemuck::Zeroable;
 
 use super::job::{Job, LeafKind};
 use super::plan::{BlobPlaces, GpuBuildPlan};
+use crate::error::{Error, Result};
 
 const ARRIVAL_BYTES: u64 = 4;
 const BOX_BYTES: u64 = 24;
@@ -43,6 +44,17 @@ impl GpuRefitPlan {
             primitive_count: plan.capacity,
             vertex_count: plan.vertex_count,
         }
+    }
+
+    /// Fails where the structure keeps no parents.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage).
+    pub(crate) fn check(&self, name: &str) -> Result<()> {
+        if self.places.parents != 0 || self.node_count == 0 {
+            return Ok(());
+        }
+        Err(Error::usage(name, "the structure was built without ALLOW_UPDATE: it cannot be refitted"))
     }
 
     /// Bytes of scratch memory, at an address that is a multiple of 16.

@@ -1,11 +1,14 @@
 //! Which kernels run in which order, and which of them side by side.
 
+use super::job::LeafKind;
 use super::plan::{BuildSource, GpuBuildPlan, SORT_BLOCK};
 use super::refit_plan::{GpuRefitPlan, NodeFormat};
 use crate::kernel::Kernel;
 
 /// Invocations of a workgroup, `kGroup` of `kernel/build/job.glsl`.
 const GROUP: u32 = 128;
+/// Passes over the first word of codes, four bits each, and at most over both words.
+const FIRST_WORD_PASSES: u32 = 8;
 const MOST_PASSES: u32 = 16;
 
 /// One dispatch.
@@ -24,8 +27,12 @@ pub(crate) struct Step {
 /// dispatch has them all.
 pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usize>, Vec<Step>) {
     let mut order: Vec<usize> = (0..builds.len()).collect();
-    order.sort_by_key(|build| !builds[*build].0.is_small());
-    let small = builds.iter().filter(|(plan, _)| plan.is_small()).count() as u32;
+    let is_small = |build: &usize| {
+        let (plan, source) = builds[*build];
+        plan.is_small(source.count(plan))
+    };
+    order.sort_by_key(|build| !is_small(build));
+    let small = order.partition_point(is_small) as u32;
     let mut steps = Vec::new();
     if small > 0 {
         steps.push(Step { phase: 0, kernel: Kernel::BuildSmall, job: 0, sort_pass: 0, groups: small });
@@ -40,24 +47,34 @@ pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usiz
 
 fn large_build(job: u32, plan: &GpuBuildPlan, count: u32, steps: &mut Vec<Step>) {
     let groups = |invocations: u32| invocations.div_ceil(GROUP).max(1);
-    let mut add =
-        |phase, kernel, sort_pass, groups| steps.push(Step { phase, kernel, job, sort_pass, groups });
+    let mut add = |phase, kernel, groups| steps.push(Step { phase, kernel, job, sort_pass: 0, groups });
     let read = match plan.leaf_kind {
-        super::job::LeafKind::Instances => Kernel::BuildInstances,
+        LeafKind::Instances => Kernel::BuildInstances,
         _ => Kernel::BuildPrimitives,
     };
-    add(0, Kernel::BuildReset, 0, 1);
-    add(1, read, 0, groups(count));
-    add(2, Kernel::BuildCodes, 0, groups(count));
-    let blocks = count.div_ceil(SORT_BLOCK).max(1);
-    for pass in 0..if plan.long_codes { MOST_PASSES } else { MOST_PASSES / 2 } {
-        add(3 + pass * 3, Kernel::SortCount, pass, blocks);
-        add(4 + pass * 3, Kernel::SortScan, pass, 1);
-        add(5 + pass * 3, Kernel::SortScatter, pass, blocks);
-    }
+    add(0, Kernel::BuildReset, 1);
+    add(1, read, groups(count));
+    add(2, Kernel::BuildCodes, groups(count));
     let written = count.max(plan.geometry_count).max(plan.vertex_count);
-    add(3 + MOST_PASSES * 3, Kernel::BuildTree, 0, groups(written));
-    add(4 + MOST_PASSES * 3, Kernel::FitBinary, 0, groups(plan.node_capacity()));
+    add(3 + MOST_PASSES * 3, Kernel::BuildTree, groups(written));
+    add(4 + MOST_PASSES * 3, Kernel::FitBinary, groups(plan.node_capacity()));
+    steps.extend(sort_steps(job, count, plan.low_bits));
+}
+
+/// The steps that sort the keys of a build, the low words first.
+pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<Step> {
+    let blocks = count.div_ceil(SORT_BLOCK).max(1);
+    let passes = low_bits.div_ceil(4) + FIRST_WORD_PASSES;
+    let pass = |sort_pass| {
+        let step =
+            |nth, kernel, groups| Step { phase: 3 + sort_pass * 3 + nth, kernel, job, sort_pass, groups };
+        [
+            step(0, Kernel::SortCount, blocks),
+            step(1, Kernel::SortScan, 1),
+            step(2, Kernel::SortScatter, blocks),
+        ]
+    };
+    (0..passes).flat_map(pass).collect()
 }
 
 /// The steps of refits, by phases; job `i` is refit `i`.
@@ -82,7 +99,6 @@ pub(crate) fn refit_steps(refits: &[GpuRefitPlan]) -> Vec<Step> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::job::LeafKind;
     use super::super::plan::BlasShape;
     use super::*;
 
@@ -118,7 +134,7 @@ mod tests {
                 let expected = match counts[*build] {
                     0..=2048 => 1,
                     2049..=4096 => 5 + 8 * 3,
-                    _ => 5 + 16 * 3,
+                    _ => 5 + 3 * (plans[*build].low_bits.div_ceil(4) as usize + 8),
                 };
                 prop_assert_eq!(own.len(), expected);
             }
