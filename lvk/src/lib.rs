@@ -106,6 +106,10 @@ mod store;
 mod submit;
 mod upload;
 
+#[cfg(feature = "test-hooks")]
+#[doc(hidden)]
+pub use context::test_hooks;
+
 pub use ash;
 pub use glam;
 

@@ -7,7 +7,7 @@ use super::geometry::BlasGeometry;
 use super::primitive_map::PrimitiveMap;
 use super::raw_structure::RawStructure;
 use crate::resource::Buffer;
-use crate::software::body::SoftwareBody;
+use crate::software::blas::SoftwareBlas;
 
 /// What a bottom-level structure is built from, and what was built.
 pub(crate) struct Blas {
@@ -17,7 +17,7 @@ pub(crate) struct Blas {
     /// The parts a mesh was cut into; a single one where it was not.
     pub(crate) parts: Vec<PartShape>,
     /// What software traces, where it does.
-    pub(crate) software: Option<Arc<SoftwareBody>>,
+    pub(crate) software: Option<SoftwareBlas>,
     state: Mutex<BlasState>,
 }
 
@@ -75,7 +75,7 @@ impl Blas {
         transforms: Option<Buffer>,
         parts: Vec<PartShape>,
         body: BlasBody,
-        software: Option<Arc<SoftwareBody>>,
+        software: Option<SoftwareBlas>,
     ) -> Self {
         let state = BlasState {
             body: Arc::new(body),
@@ -102,7 +102,7 @@ impl Blas {
 
     /// Bytes of memory of all parts, and of what software traces.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        let software = self.software.as_ref().map_or(0, |body| body.memory_bytes());
+        let software = self.software.as_ref().map_or(0, SoftwareBlas::memory_bytes);
         self.body().memory_bytes() + software
     }
 

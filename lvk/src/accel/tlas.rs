@@ -8,7 +8,7 @@ use super::raw_structure::RawStructure;
 use super::structure::AccelStruct;
 use crate::error::{Result, check_limit};
 use crate::resource::Buffer;
-use crate::software::body::SoftwareBody;
+use crate::software::tlas::SoftwareTlas;
 
 /// A top-level structure.
 pub(crate) struct Tlas {
@@ -21,7 +21,7 @@ pub(crate) struct Tlas {
     /// What the device traces, where it does.
     pub(crate) structure: Option<RawStructure>,
     /// What software traces, where it does.
-    pub(crate) software: Option<Arc<SoftwareBody>>,
+    pub(crate) software: Option<SoftwareTlas>,
     /// From hits to the caller's numbers: a row for each instance Vulkan is given. Made when first needed.
     pub(crate) rows: OnceLock<Arc<Buffer>>,
     /// The instances Vulkan is given, where a kernel writes them. Made when first needed.
@@ -90,7 +90,7 @@ impl Tlas {
         capacity: u32,
         room: u32,
         structure: Option<RawStructure>,
-        software: Option<Arc<SoftwareBody>>,
+        software: Option<SoftwareTlas>,
     ) -> Self {
         Self {
             slot,
@@ -111,7 +111,7 @@ impl Tlas {
     /// Bytes of the structure.
     pub(crate) fn memory_bytes(&self) -> u64 {
         let hardware = self.structure.as_ref().map_or(0, RawStructure::memory_bytes);
-        hardware + self.software.as_ref().map_or(0, |body| body.memory_bytes())
+        hardware + self.software.as_ref().map_or(0, |software| software.body.memory_bytes())
     }
 
     /// Bytes of buffers the library keeps for it.

@@ -89,18 +89,22 @@ impl CommandBuffer {
 
     /// Builds structures for the first time. Those of the library's own come ready from the CPU.
     pub(crate) fn build_first(&mut self, structures: &[Arc<AccelStruct>]) -> Result<()> {
-        if self.shared.gpu.accel.is_some() {
-            return self.build_all(structures, BuildMode::Rebuild);
-        }
-        for target in structures {
-            let (build, _) = OpenBuild::of_blas(target)?;
-            self.open_builds.push(build);
-        }
-        Ok(())
+        self.build_form(structures, BuildMode::Rebuild, Self::build_software_first)
     }
 
     /// As [`build_blas`](Self::build_blas), by object.
     pub(crate) fn build_all(&mut self, structures: &[Arc<AccelStruct>], mode: BuildMode) -> Result<()> {
+        self.shared.gpu.check_structures()?;
+        self.build_form(structures, mode, Self::build_software)
+    }
+
+    /// Builds what the device traces, and by `software` what software does.
+    fn build_form(
+        &mut self,
+        structures: &[Arc<AccelStruct>],
+        mode: BuildMode,
+        software: fn(&mut Self, &[Arc<AccelStruct>], &[bool]) -> Result<()>,
+    ) -> Result<()> {
         let mut open = Vec::with_capacity(structures.len());
         let mut builds = Vec::with_capacity(structures.len());
         let mut refits = Vec::with_capacity(structures.len());
@@ -112,8 +116,11 @@ impl CommandBuffer {
             self.plan_blas(target, &body, refit, &mut builds)?;
             refits.push(refit);
         }
-        self.gather_inputs(structures, &refits)?;
-        self.record_builds(&builds)?;
+        if self.shared.gpu.accel.is_some() {
+            self.gather_inputs(structures, &refits)?;
+            self.record_builds(&builds)?;
+        }
+        software(self, structures, &refits)?;
         for build in &open {
             let refits = if build.refit { self.refits_of(&build.target)?.saturating_add(1) } else { 0 };
             self.refits.insert(build.target.id.0, refits);
@@ -161,7 +168,7 @@ impl CommandBuffer {
         Ok(whole.into_part(part))
     }
 
-    fn reads(&self, blas: &Blas) -> Result<Vec<Arc<Buffer>>> {
+    pub(super) fn reads(&self, blas: &Blas) -> Result<Vec<Arc<Buffer>>> {
         let buffers = blas.geometries.iter().flat_map(|geometry| geometry.buffers());
         buffers.map(|handle| self.shared.store.buffers.get(handle)).collect()
     }

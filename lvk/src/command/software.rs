@@ -1,16 +1,39 @@
 //! Builds of the library's own structures.
 
+use std::sync::Arc;
+
 use ash::vk;
 
 use super::CommandBuffer;
+use super::gpu_build::{GpuBuild, GpuRefit};
 use crate::accel::AccelStruct;
-use crate::accel::instance::TlasInstance;
-use crate::barrier::{ResourceId, Use};
+use crate::accel::blas::Blas;
+use crate::accel::build::instance_bytes;
+use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance, check, pack};
+use crate::accel::tlas::Shown;
+use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
+use crate::resource::Buffer;
+use crate::software::blas::{Origin, Rebuilt, SoftwareBlas, gpu_plan};
 use crate::software::body::SoftwareBody;
-use crate::software::instances::{PlacedInstance, ShownStructure, place};
-use crate::software::tlas_blob;
+use crate::software::gpu_build::geometry::{GpuGeometry, gpu_geometries};
+use crate::software::gpu_build::plan::BuildSource;
+use crate::software::gpu_build::refit_plan::GpuRefitPlan;
+use crate::software::layout::{MOVED, MovedHeader};
+use crate::software::tlas::SoftwareTlas;
+
+/// Addresses of tables and records.
+const ALIGNMENT: u64 = 16;
+
+/// Builds and refits to record side by side.
+#[derive(Default)]
+struct SoftwareWork {
+    builds: Vec<GpuBuild>,
+    refits: Vec<GpuRefit>,
+    /// Bodies that refer to others from now on.
+    moves: Vec<(Arc<SoftwareBody>, MovedHeader)>,
+}
 
 impl CommandBuffer {
     /// Copies what the CPU built into a bottom-level structure.
@@ -20,48 +43,11 @@ impl CommandBuffer {
         body: &SoftwareBody,
         bytes: &[u8],
     ) -> Result<()> {
-        self.fill_software(target, self.shared.all_blas, body, bytes)
-    }
-
-    /// Builds a top-level structure of the library's own from instances of the host.
-    pub(super) fn build_software_tlas(
-        &mut self,
-        target: &AccelStruct,
-        body: &SoftwareBody,
-        instances: &[TlasInstance],
-    ) -> Result<()> {
-        let mut placed: Vec<PlacedInstance> = Vec::with_capacity(instances.len());
-        let mut last: Option<(AccelStructHandle, ShownStructure)> = None;
-        for (number, instance) in (0..).zip(instances) {
-            let shown = match last {
-                Some((handle, shown)) if handle == instance.blas => shown,
-                _ => self.shown_structure(instance.blas)?,
-            };
-            last = Some((instance.blas, shown));
-            placed.extend(place(number, instance, &shown));
-        }
-        let bytes = tlas_blob::build(&placed);
-        self.fill_software(target, self.shared.all_tlas, body, &bytes)
-    }
-
-    fn shown_structure(&self, handle: AccelStructHandle) -> Result<ShownStructure> {
-        let blas = self.shared.store.accel_structs.get(handle)?;
-        let body = blas.blas()?.software.as_ref();
-        let known = body.and_then(|body| Some(ShownStructure { address: body.address, bounds: body.bounds? }));
-        known.ok_or_else(|| Error::usage(&blas.name, "the structure has nothing that software could trace"))
-    }
-
-    fn fill_software(
-        &mut self,
-        target: &AccelStruct,
-        all: ResourceId,
-        body: &SoftwareBody,
-        bytes: &[u8],
-    ) -> Result<()> {
-        let region = self.shared.staging.write(bytes, 16, self.recording.sequence)?;
+        let region = self.shared.staging.write(bytes, ALIGNMENT, self.recording.sequence)?;
         self.retire_temporary(region.temporary);
         self.uses.id(target.id, Use::transfer_write());
-        self.uses.accumulate(all, Use::transfer_write());
+        self.uses.accumulate(self.shared.all_blas, Use::transfer_write());
+        self.use_buffer(body.buffer(), Use::transfer_write());
         self.flush();
         let copy = vk::BufferCopy {
             src_offset: region.offset,
@@ -74,4 +60,204 @@ impl CommandBuffer {
         }
         Ok(())
     }
+
+    /// Builds structures on the GPU that have none yet; those that the CPU built are ready.
+    pub(super) fn build_software_first(&mut self, structures: &[Arc<AccelStruct>], _: &[bool]) -> Result<()> {
+        let is_of_gpu = |target: &&Arc<AccelStruct>| {
+            let software = target.blas().ok().and_then(|blas| blas.software.as_ref());
+            software.is_some_and(|software| matches!(software.origin, Origin::Gpu(_)))
+        };
+        let structures: Vec<_> = structures.iter().filter(is_of_gpu).cloned().collect();
+        let rebuilds = vec![false; structures.len()];
+        self.build_software(&structures, &rebuilds)
+    }
+
+    /// Builds or refits what software traces of these structures.
+    pub(super) fn build_software(&mut self, structures: &[Arc<AccelStruct>], refits: &[bool]) -> Result<()> {
+        let mut work = SoftwareWork::default();
+        for (target, refit) in structures.iter().zip(refits) {
+            let blas = target.blas()?;
+            if let Some(software) = &blas.software {
+                self.plan_software(target, blas, software, *refit, &mut work)?;
+            }
+        }
+        if work.builds.is_empty() && work.refits.is_empty() {
+            return Ok(());
+        }
+        let write = Use::shader_write(Stages::COMPUTE);
+        structures.iter().for_each(|target| self.uses.id(target.id, write));
+        self.uses.accumulate(self.shared.all_blas, write);
+        if !work.builds.is_empty() {
+            self.record_gpu_builds(&work.builds)?;
+        }
+        if !work.refits.is_empty() {
+            self.record_gpu_refits(&work.refits)?;
+        }
+        self.record_moves(&work.moves);
+        Ok(())
+    }
+
+    fn plan_software(
+        &mut self,
+        target: &Arc<AccelStruct>,
+        blas: &Blas,
+        software: &SoftwareBlas,
+        refit: bool,
+        work: &mut SoftwareWork,
+    ) -> Result<()> {
+        let geometries = self.gpu_geometries(target, blas)?;
+        let reads = self.reads(blas)?;
+        let moved = software.rebuilt().filter(|_| blas.builds() > 1 || self.moved.contains(&target.id.0));
+        let refit_of = |plan: GpuRefitPlan, body: &SoftwareBody| GpuRefit {
+            plan,
+            geometries: geometries.clone(),
+            blob: body.address,
+            target: Arc::clone(body.buffer()),
+            reads: reads.clone(),
+        };
+        let build_of = |plan: &_, body: &SoftwareBody| GpuBuild {
+            plan: Clone::clone(plan),
+            source: BuildSource::Geometries(geometries.clone()),
+            blob: body.address,
+            target: Arc::clone(body.buffer()),
+            reads: reads.clone(),
+        };
+        match (refit, &software.origin, moved) {
+            (true, _, Some(rebuilt)) => {
+                work.refits.push(refit_of(GpuRefitPlan::of_build(&rebuilt.plan), &rebuilt.body));
+            }
+            (true, Origin::Cpu { refit: Some(plan) }, None) => work.refits.push(refit_of(*plan, &software.body)),
+            (true, Origin::Cpu { refit: None }, None) => target.check_refit()?,
+            (true, Origin::Gpu(plan), None) => {
+                work.refits.push(refit_of(GpuRefitPlan::of_build(plan), &software.body));
+            }
+            (false, Origin::Gpu(plan), _) => work.builds.push(build_of(plan, &software.body)),
+            (false, Origin::Cpu { .. }, _) => {
+                let rebuilt = software.rebuilt_or(|| self.new_rebuilt(target, blas))?;
+                work.builds.push(build_of(&rebuilt.plan, &rebuilt.body));
+                let header = MovedHeader { format: MOVED, leaf_kind: 0, address: rebuilt.body.address };
+                work.moves.push((Arc::clone(&software.body), header));
+                self.moved.insert(target.id.0);
+            }
+        }
+        Ok(())
+    }
+
+    /// Room for builds on the GPU of what the CPU built first.
+    fn new_rebuilt(&self, target: &AccelStruct, blas: &Blas) -> Result<Rebuilt> {
+        let (shared, name) = (&self.shared, &target.name);
+        let plan = gpu_plan(name, &blas.geometries, target.flags)?;
+        let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, plan.blob_bytes)?;
+        Ok(Rebuilt { body: Arc::new(body), plan })
+    }
+
+    fn gpu_geometries(&self, target: &AccelStruct, blas: &Blas) -> Result<Vec<GpuGeometry>> {
+        let find = |handle| self.shared.store.buffers.get(handle);
+        let matrices = blas.transforms.as_ref().map(|buffer| buffer.address);
+        gpu_geometries(&target.name, &blas.geometries, &find, matrices)
+    }
+
+    /// Has bodies refer to others.
+    fn record_moves(&mut self, moves: &[(Arc<SoftwareBody>, MovedHeader)]) {
+        for (body, header) in moves {
+            self.use_buffer(body.buffer(), Use::transfer_write());
+            self.uses.accumulate(self.shared.all_blas, Use::transfer_write());
+            self.flush();
+            let bytes = bytemuck::bytes_of(header);
+            // SAFETY: the body begins with a header, at a multiple of 4.
+            unsafe {
+                let device = &self.shared.gpu.device;
+                device.cmd_update_buffer(self.raw(), body.buffer().raw, body.offset(), bytes);
+            }
+        }
+    }
+
+    /// Builds a top-level structure of the library's own from instances of the host.
+    pub(super) fn build_software_tlas(
+        &mut self,
+        target: &AccelStruct,
+        software: &SoftwareTlas,
+        instances: &[TlasInstance],
+    ) -> Result<()> {
+        let shared = Arc::clone(&self.shared);
+        let mut written = Ok(());
+        let bytes = instance_bytes(instances.len().max(1) as u32);
+        let region = shared.staging.write_with(bytes, ALIGNMENT, self.recording.sequence, |out| {
+            written = self.write_software_instances(target, instances, out);
+        })?;
+        self.retire_temporary(region.temporary);
+        written?;
+        let count = instances.len() as u32;
+        let source = BuildSource::Instances { records: region.address, count, table: None };
+        self.record_software_tlas(target, software, source, Vec::new())
+    }
+
+    /// As [`build_software_tlas`](Self::build_software_tlas), from records in a buffer that name structures by place.
+    pub(super) fn build_software_tlas_from(
+        &mut self,
+        target: &AccelStruct,
+        software: &SoftwareTlas,
+        instances: &DeviceInstances<'_>,
+        shown: &[Shown],
+    ) -> Result<()> {
+        let buffer = self.shared.store.buffers.get(instances.buffer)?;
+        let address = |shown: &Shown| Ok(software_body(&shown.blas)?.address);
+        let mut table = shown.iter().map(address).collect::<Result<Vec<u64>>>()?;
+        let entries = table.len() as u32;
+        table.resize(table.len().max(1), 0);
+        let bytes = bytemuck::cast_slice(&table);
+        let region = self.shared.staging.write(bytes, ALIGNMENT, self.recording.sequence)?;
+        self.retire_temporary(region.temporary);
+        let source = BuildSource::Instances {
+            records: buffer.address + instances.offset,
+            count: instances.count,
+            table: Some((region.address, entries)),
+        };
+        self.record_software_tlas(target, software, source, vec![buffer])
+    }
+
+    fn write_software_instances(
+        &self,
+        target: &AccelStruct,
+        instances: &[TlasInstance],
+        out: &mut [u8],
+    ) -> Result<()> {
+        let mut last: Option<(AccelStructHandle, u64)> = None;
+        for (index, (instance, out)) in instances.iter().zip(out.chunks_exact_mut(INSTANCE_BYTES)).enumerate() {
+            check(&target.name, index, instance)?;
+            let address = match last {
+                Some((handle, address)) if handle == instance.blas => address,
+                _ => software_body(&*self.shared.store.accel_structs.get(instance.blas)?)?.address,
+            };
+            last = Some((instance.blas, address));
+            out.copy_from_slice(bytemuck::bytes_of(&pack(instance, address)));
+        }
+        Ok(())
+    }
+
+    fn record_software_tlas(
+        &mut self,
+        target: &AccelStruct,
+        software: &SoftwareTlas,
+        source: BuildSource,
+        reads: Vec<Arc<Buffer>>,
+    ) -> Result<()> {
+        let write = Use::shader_write(Stages::COMPUTE);
+        self.uses.id(target.id, write);
+        self.uses.id(self.shared.all_blas, Use::shader_read(Stages::COMPUTE));
+        self.uses.accumulate(self.shared.all_tlas, write);
+        self.record_gpu_builds(&[GpuBuild {
+            plan: software.plan.clone(),
+            source,
+            blob: software.body.address,
+            target: Arc::clone(software.body.buffer()),
+            reads,
+        }])
+    }
+}
+
+/// What software traces of a bottom-level structure.
+fn software_body(blas: &AccelStruct) -> Result<&Arc<SoftwareBody>> {
+    let none = || Error::usage(&blas.name, "the structure has nothing that software could trace");
+    Ok(&blas.blas()?.software.as_ref().ok_or_else(none)?.body)
 }

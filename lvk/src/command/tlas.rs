@@ -11,7 +11,6 @@ use crate::accel::AccelStruct;
 use crate::accel::build::BuildInput;
 use crate::accel::flags::BuildMode;
 use crate::accel::instance::{DeviceInstances, TlasInstance};
-use crate::accel::instance::check_instances;
 use crate::accel::instance_plan::InstancePlan;
 use crate::accel::tlas::{InstanceSource, Shown, Tlas, TlasContents};
 use crate::barrier::Use;
@@ -88,11 +87,24 @@ impl CommandBuffer {
         let object = target.tlas()?;
         check_limit(&target.name, "instance count", instances.count.into(), object.capacity.into())?;
         let (shown, mut source) = self.device_source(&target.name, instances)?;
+        if object.structure.is_none() {
+            let refit = self.check_update(&target, instances.count, instances.count, mode)?;
+            if let Some(software) = &object.software {
+                self.build_software_tlas_from(&target, software, instances, &shown)?;
+            }
+            self.open_builds.push(OpenBuild::of_tlas(&target));
+            return self.note_contents(&target, instances.count, instances.count, shown, None, refit);
+        }
         let built_count = source.built_count(&target.name)?;
         let refit = self.check_update(&target, instances.count, built_count, mode)?;
         self.keep_source(&target.name, instances, &shown, &mut source)?;
+        let software_shown = object.software.as_ref().map(|_| shown.clone()).unwrap_or_default();
         let ready = self.run_instances(&target, object, shown, source, built_count)?;
-        self.record_tlas(&target, ready, instances.count, refit)
+        self.record_tlas(&target, ready, instances.count, refit)?;
+        match &object.software {
+            Some(software) => self.build_software_tlas_from(&target, software, instances, &software_shown),
+            None => Ok(()),
+        }
     }
 
     /// As [`update_tlas`](Self::update_tlas), by object.
@@ -121,7 +133,7 @@ impl CommandBuffer {
         };
         self.record_tlas(target, ready, count, refit)?;
         match &tlas.software {
-            Some(body) => self.build_software_tlas(target, body, instances),
+            Some(software) => self.build_software_tlas(target, software, instances),
             None => Ok(()),
         }
     }
@@ -137,11 +149,10 @@ impl CommandBuffer {
         let shared = Arc::clone(&self.shared);
         let find = |handle| shared.store.accel_structs.get(handle);
         let plan = InstancePlan::new(&target.name, instances, &find)?;
-        check_instances(&target.name, instances)?;
         let count = instances.len() as u32;
         let refit = self.check_update(target, count, count, mode)?;
-        if let Some(body) = &tlas.software {
-            self.build_software_tlas(target, body, instances)?;
+        if let Some(software) = &tlas.software {
+            self.build_software_tlas(target, software, instances)?;
         }
         self.open_builds.push(OpenBuild::of_tlas(target));
         self.note_contents(target, count, count, plan.shown, None, refit)
@@ -247,7 +258,7 @@ impl CommandBuffer {
         if is_first || tlas.rows.get().is_some() {
             let mapped = shown.iter().any(Shown::has_rows);
             let rows = tlas.rows.get().filter(|_| mapped).map_or(0, |rows| rows.address);
-            let software = tlas.software.as_ref().map_or(0, |body| body.address);
+            let software = tlas.software.as_ref().map_or(0, |software| software.body.address);
             self.write_tlas_table(tlas.slot, [rows, software]);
         }
         let refits = if refit { self.last_update(target, tlas).1.saturating_add(1) } else { 0 };

@@ -15,6 +15,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::Limits;
 use crate::shared::{Garbage, Shared};
+use crate::software::blas::gpu_plan;
 
 /// Meshes of fewer primitives are built as given: no order makes them slow.
 const ORDERED_FROM: u64 = 64;
@@ -32,9 +33,19 @@ enum Treatment {
 
 impl Context {
     /// Bytes a bottom-level structure would take in one piece (`vkGetAccelerationStructureBuildSizesKHR`, raised to
-    /// what the context's [`DeviceProfile`](crate::DeviceProfile) says).
+    /// what the context's [`DeviceProfile`](crate::DeviceProfile) says); at most, where only software traces it.
     pub fn blas_sizes(&self, desc: &BlasDesc<'_>) -> Result<AccelStructSizes> {
-        input(self.shared(), desc)?.sizes(&self.shared().gpu)
+        let shared = self.shared();
+        let input = input(shared, desc)?;
+        if shared.gpu.accel.is_some() {
+            return input.sizes(&shared.gpu);
+        }
+        let plan = gpu_plan(desc.debug_name, desc.geometries, desc.flags)?;
+        Ok(AccelStructSizes {
+            structure_bytes: plan.blob_bytes,
+            build_scratch_bytes: plan.scratch_bytes,
+            update_scratch_bytes: 0,
+        })
     }
 
     /// The parts of every structure, with the tables of those that are cut or reordered.

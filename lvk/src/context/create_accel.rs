@@ -24,7 +24,9 @@ use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::shared::Shared;
 use crate::software::body::SoftwareBody;
-use crate::software::tlas_blob;
+use crate::software::blas::SoftwareBlas;
+use crate::software::gpu_build::plan::GpuBuildPlan;
+use crate::software::tlas::SoftwareTlas;
 
 impl Context {
     /// Creates a bottom-level structure from geometries and builds it before the next submission.
@@ -57,7 +59,7 @@ impl Context {
         let mut holders = Vec::with_capacity(descs.len());
         let mut objects = Vec::with_capacity(descs.len());
         for ((desc, parts), blob) in descs.iter().zip(shapes).zip(&blobs) {
-            let software = blob.as_ref().map(|blob| self.software_body(desc.debug_name, blob)).transpose()?;
+            let software = self.software_blas(desc, blob.as_ref())?;
             let object = new_blas(self.shared(), desc, parts, software)?;
             let handle = self.shared().store.accel_structs.insert(object);
             holders.push(Holder::new(self, handle, 0));
@@ -116,7 +118,7 @@ fn new_blas(
     shared: &Shared,
     desc: &BlasDesc<'_>,
     parts: Vec<PartShape>,
-    software: Option<Arc<SoftwareBody>>,
+    software: Option<SoftwareBlas>,
 ) -> Result<AccelStruct> {
     let name = desc.debug_name;
     let structures: Result<Vec<_>> = parts
@@ -137,15 +139,15 @@ pub(super) fn blas_object(
     desc: &BlasDesc<'_>,
     parts: Vec<PartShape>,
     body: BlasBody,
-    software: Option<Arc<SoftwareBody>>,
+    software: Option<SoftwareBlas>,
 ) -> Result<AccelStruct> {
     let transforms = match transforms(desc.geometries) {
         Some(matrices) => Some(new_transforms(shared, desc.debug_name, &matrices)?),
         None => None,
     };
-    let mut sizes =
-        parts.iter().map(|part| part.sizes).fold(AccelStructSizes::default(), AccelStructSizes::join);
-    sizes.structure_bytes += software.as_ref().map_or(0, |body| body.memory_bytes());
+    let hardware = parts.iter().map(|part| part.sizes);
+    let all = hardware.chain(software.as_ref().map(SoftwareBlas::sizes));
+    let sizes = all.fold(AccelStructSizes::default(), AccelStructSizes::join);
     let blas = Blas::new(desc.geometries.to_vec(), transforms, parts, body, software);
     Ok(AccelStruct::new(desc.debug_name, desc.flags, sizes, AccelKind::Blas(blas)))
 }
@@ -180,7 +182,7 @@ fn tlas_within(shared: &Shared, desc: &TlasDesc<'_>, slot: u32, limits: &PartLim
     let room = u64::from(capacity) * average.max(desc.parts_per_instance.into());
     check_limit(name, "instance capacity", room, shared.gpu.caps.limits.max_tlas_instances)?;
     let room = u32::try_from(room).unwrap_or(u32::MAX);
-    let (structure, mut sizes) = match shared.gpu.accel {
+    let (structure, sizes) = match shared.gpu.accel {
         Some(_) => {
             let (structure, sizes) = hardware_tlas(shared, desc, room, limits)?;
             (Some(structure), sizes)
@@ -188,7 +190,7 @@ fn tlas_within(shared: &Shared, desc: &TlasDesc<'_>, slot: u32, limits: &PartLim
         None => (None, AccelStructSizes::default()),
     };
     let software = software_tlas(shared, name, capacity)?;
-    sizes.structure_bytes += software.as_ref().map_or(0, |body| body.memory_bytes());
+    let sizes = software.as_ref().map_or(sizes, |software| sizes.join(software.sizes()));
     let tlas = Tlas::new(slot, capacity, room, structure, software);
     Ok(AccelStruct::new(name, desc.flags, sizes, AccelKind::Tlas(tlas)))
 }
@@ -211,11 +213,11 @@ fn hardware_tlas(
 }
 
 /// Room for what software traces, where it does.
-fn software_tlas(shared: &Shared, name: &str, capacity: u32) -> Result<Option<Arc<SoftwareBody>>> {
+fn software_tlas(shared: &Shared, name: &str, capacity: u32) -> Result<Option<SoftwareTlas>> {
     if !shared.gpu.caps.software_ray_query() {
         return Ok(None);
     }
-    let bytes = tlas_blob::most_bytes(capacity);
-    let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, bytes, None)?;
-    Ok(Some(Arc::new(body)))
+    let plan = GpuBuildPlan::tlas(name, capacity)?;
+    let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, plan.blob_bytes)?;
+    Ok(Some(SoftwareTlas { body: Arc::new(body), plan }))
 }

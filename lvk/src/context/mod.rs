@@ -18,6 +18,8 @@ pub(crate) mod serialize;
 mod software_blas;
 mod start;
 mod submit;
+#[cfg(feature = "test-hooks")]
+pub mod test_hooks;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

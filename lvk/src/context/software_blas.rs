@@ -10,36 +10,56 @@ use crate::accel::desc::BlasDesc;
 use crate::error::{Error, Result};
 use crate::shared::Garbage;
 use crate::software::blas_blob::{self, BlasBlob};
+use crate::software::blas::{Origin, SoftwareBlas, builds_on_gpu, gpu_plan, refit_plan};
 use crate::software::body::SoftwareBody;
 use crate::software::mesh::Mesh;
 use crate::software::quality::Quality;
 
 impl Context {
-    /// The structures of meshes, built on all cores; nothing where the device traces queries itself. Waits for the GPU
-    /// to read the inputs back.
+    /// The structures of meshes that the CPU builds, on all its cores; nothing for those that the GPU builds, and where
+    /// the device traces queries itself. Waits for the GPU to read the inputs back.
     pub(super) fn software_blobs(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Option<BlasBlob>>> {
         if !self.shared().gpu.caps.software_ray_query() {
             return Ok(descs.iter().map(|_| None).collect());
         }
-        let all: Vec<_> = descs.iter().collect();
-        let pieces = self.read_inputs(&all)?;
+        let is_of_cpu = |desc: &&BlasDesc<'_>| !builds_on_gpu(desc.flags);
+        let read: Vec<_> = descs.iter().filter(is_of_cpu).collect();
+        let pieces = self.read_inputs(&read)?;
         let mesh = |desc: &BlasDesc<'_>| {
             let bytes = |geometry| (geometry_bytes(geometry, &pieces), geometry.flags());
             Mesh::new(&desc.geometries.iter().map(bytes).collect::<Vec<_>>())
         };
-        on_all_cores(descs, |desc| blas_blob::build(&mesh(desc), Quality::of(desc.flags)))
+        on_all_cores(descs, |desc| {
+            is_of_cpu(&desc).then(|| blas_blob::build(&mesh(desc), Quality::of(desc.flags)))
+        })
     }
 
-    /// Memory for a structure; it is filled before the next submission.
-    pub(super) fn software_body(&self, name: &str, blob: &BlasBlob) -> Result<Arc<SoftwareBody>> {
-        let (shared, bytes) = (self.shared(), blob.bytes.len() as u64);
-        let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, bytes, Some(blob.bounds))?;
-        Ok(Arc::new(body))
+    /// Memory for a structure that the CPU built, or that the GPU is to build; nothing where the device traces queries
+    /// itself.
+    pub(super) fn software_blas(
+        &self,
+        desc: &BlasDesc<'_>,
+        blob: Option<&BlasBlob>,
+    ) -> Result<Option<SoftwareBlas>> {
+        let (shared, name) = (self.shared(), desc.debug_name);
+        if !shared.gpu.caps.software_ray_query() {
+            return Ok(None);
+        }
+        let (bytes, origin) = match blob {
+            Some(blob) => (blob.bytes.len() as u64, Origin::Cpu { refit: refit_plan(&blob.header()) }),
+            None => {
+                let plan = gpu_plan(name, desc.geometries, desc.flags)?;
+                (plan.blob_bytes, Origin::Gpu(plan))
+            }
+        };
+        let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, bytes)?;
+        Ok(Some(SoftwareBlas::new(Arc::new(body), origin)))
     }
 
     /// Copies what the CPU built.
     pub(super) fn fill_software(&self, target: &Arc<AccelStruct>, blob: &BlasBlob) -> Result<()> {
-        let Some(body) = target.blas()?.software.as_ref() else { return Ok(()) };
+        let Some(software) = target.blas()?.software.as_ref() else { return Ok(()) };
+        let body = &software.body;
         self.shared().retire(Garbage::Software(Arc::clone(body)));
         self.before_next_submission(|cmd| cmd.fill_software_blas(target, body, &blob.bytes))
     }
@@ -48,7 +68,7 @@ impl Context {
 /// Each desc by whichever thread is free.
 fn on_all_cores<T: Send>(
     descs: &[BlasDesc<'_>],
-    build: impl Fn(&BlasDesc<'_>) -> T + Sync,
+    build: impl Fn(&BlasDesc<'_>) -> Option<T> + Sync,
 ) -> Result<Vec<Option<T>>> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let next = AtomicUsize::new(0);
@@ -69,7 +89,7 @@ fn on_all_cores<T: Send>(
         for helper in helpers {
             made.extend(helper.join().map_err(lost)?);
         }
-        made.into_iter().for_each(|(index, built)| all[index] = Some(built));
+        made.into_iter().for_each(|(index, built)| all[index] = built);
         Ok(all)
     })
 }

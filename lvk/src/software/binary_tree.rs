@@ -163,6 +163,21 @@ fn partition(numbers: &mut [u32], first: impl Fn(&u32) -> bool) -> usize {
     count
 }
 
+/// For each node its parent and, in the highest three bits, which child it is.
+pub(super) fn parents(nodes: &[BinaryNode]) -> Vec<u32> {
+    let mut parents = vec![NONE; nodes.len()];
+    for (number, node) in (0_u32..).zip(nodes) {
+        for (child, place) in [node.child0, node.child1].into_iter().enumerate() {
+            if place & LEAF == 0
+                && let Some(parent) = parents.get_mut(place as usize)
+            {
+                *parent = number | (child as u32) << 29;
+            }
+        }
+    }
+    parents
+}
+
 /// Whether all children exist, nodes behind their parents, and no path is too long.
 pub(super) fn is_sound(nodes: &[BinaryNode], primitives: usize) -> bool {
     let mut depths = vec![1_usize; nodes.len()];

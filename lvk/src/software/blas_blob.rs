@@ -3,8 +3,9 @@
 use glam::Vec3;
 
 use super::layout::{
-    BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafKind, LeafTriangle, WIDE,
+    BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafTriangle, WIDE,
 };
+use super::gpu_build::job::LeafKind;
 use super::mesh::{Mesh, Primitives};
 use super::quality::Quality;
 use super::tree::{Nodes, Tree};
@@ -16,7 +17,14 @@ use crate::accel::geometry::GeometryFlags;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct BlasBlob {
     pub(crate) bytes: Vec<u8>,
-    pub(crate) bounds: Bounds,
+}
+
+impl BlasBlob {
+    /// Its header.
+    pub(crate) fn header(&self) -> Header {
+        let bytes = self.bytes.get(..size_of::<Header>());
+        bytes.map_or_else(bytemuck::Zeroable::zeroed, bytemuck::pod_read_unaligned)
+    }
 }
 
 /// The leaves of a structure.
@@ -31,7 +39,7 @@ pub(crate) fn build(mesh: &Mesh, quality: Quality) -> BlasBlob {
     let bounds = mesh.bounds();
     let tree = Tree::of_mesh(&bounds, quality);
     let whole = bounds.into_iter().fold(Bounds::EMPTY, Bounds::union);
-    BlasBlob { bytes: pack(mesh, &tree, quality, whole), bounds: whole }
+    BlasBlob { bytes: pack(mesh, &tree, quality, whole) }
 }
 
 fn pack(mesh: &Mesh, tree: &Tree, quality: Quality, bounds: Bounds) -> Vec<u8> {
@@ -42,6 +50,7 @@ fn pack(mesh: &Mesh, tree: &Tree, quality: Quality, bounds: Bounds) -> Vec<u8> {
     let leaves = leaves(mesh, &tree.order, quality);
     let row = |flags: &GeometryFlags| GeometryRow { flags: flags.bits(), reserved: [0; 3] };
     let geometries: Vec<_> = mesh.flags.iter().map(row).collect();
+    let parents = if quality.refit { tree.parents() } else { Vec::new() };
     let mut bytes = vec![0; size_of::<Header>()];
     let header = Header {
         format,
@@ -54,6 +63,7 @@ fn pack(mesh: &Mesh, tree: &Tree, quality: Quality, bounds: Bounds) -> Vec<u8> {
         geometries: append(&mut bytes, bytemuck::cast_slice(&geometries)),
         node_count: node_count as u32,
         geometry_count: geometries.len() as u32,
+        parents: if parents.is_empty() { 0 } else { append(&mut bytes, bytemuck::cast_slice(&parents)) },
         marks: marks(&mesh.flags),
         low: bounds.low.to_array(),
         high: bounds.high.to_array(),
@@ -82,10 +92,10 @@ fn leaves(mesh: &Mesh, order: &[u32], quality: Quality) -> Leaves {
             }
         }
         Primitives::Triangles(triangles) => {
-            let small = if quality.low_memory { indexed(triangles, order, mesh.flags.len()) } else { None };
+            let small = if quality.low_memory && !quality.refit { indexed(triangles, order, mesh.flags.len()) } else { None };
             match small {
                 Some(indexed) => Leaves {
-                    kind: LeafKind::Indexed,
+                    kind: LeafKind::IndexedTriangles,
                     bytes: bytemuck::cast_slice(&indexed.triangles).to_vec(),
                     vertices: indexed.vertices,
                 },

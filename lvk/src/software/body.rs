@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use crate::accel::bounds::Bounds;
 use crate::accel::storage::{AccelStorage, StorageRange};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -13,8 +12,6 @@ pub(crate) struct SoftwareBody {
     storage: StorageRange,
     /// What instances, or the table of top-level structures, refer to.
     pub(crate) address: u64,
-    /// Where the host built it, the box around everything in it.
-    pub(crate) bounds: Option<Bounds>,
 }
 
 impl SoftwareBody {
@@ -24,11 +21,10 @@ impl SoftwareBody {
         storage: &AccelStorage,
         name: &str,
         bytes: u64,
-        bounds: Option<Bounds>,
     ) -> Result<Self> {
         let storage = storage.alloc(gpu, name, bytes)?;
         let address = storage.buffer.address + storage.offset;
-        Ok(Self { storage, address, bounds })
+        Ok(Self { storage, address })
     }
 
     /// The buffer it lies in.

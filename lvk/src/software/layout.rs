@@ -6,7 +6,6 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use crate::accel::bounds::Bounds;
 
 /// Bytes of a block.
 pub(crate) const BLOCK_BYTES: usize = 16;
@@ -27,20 +26,8 @@ pub(crate) const DEEPEST_WIDE: usize = 32;
 pub(crate) const WIDE: u32 = 0;
 /// [`Header::format`]: nodes of two children.
 pub(crate) const BINARY: u32 = 1;
-
-/// What leaves hold.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u32)]
-pub(crate) enum LeafKind {
-    /// [`LeafTriangle`].
-    Triangles = 0,
-    /// [`LeafIndexed`].
-    Indexed = 1,
-    /// [`LeafBox`].
-    Boxes = 2,
-    /// [`Instance`].
-    Instances = 3,
-}
+/// [`MovedHeader::format`].
+pub(crate) const MOVED: u32 = 2;
 
 /// The first 128 bytes of a structure.
 #[repr(C)]
@@ -72,19 +59,6 @@ impl Header {
     pub(crate) const ALL_OPAQUE: u32 = 1;
     /// No geometry is.
     pub(crate) const NONE_OPAQUE: u32 = 2;
-
-    /// Of a structure without primitives.
-    pub(crate) fn empty(leaf_kind: LeafKind) -> Self {
-        let bounds = Bounds::EMPTY;
-        Self {
-            format: BINARY,
-            leaf_kind: leaf_kind as u32,
-            root: NONE,
-            low: bounds.low.to_array(),
-            high: bounds.high.to_array(),
-            ..Self::zeroed()
-        }
-    }
 }
 
 /// A triangle with its corners.
@@ -148,22 +122,15 @@ pub(crate) struct GeometryRow {
     pub(crate) reserved: [u32; 3],
 }
 
-/// An instance of a bottom-level structure.
+/// What stands at the start of a structure that has moved.
 #[repr(C)]
-#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(crate) struct Instance {
-    /// 3 rows of 4 columns.
-    pub(crate) world_to_object: [f32; 12],
-    /// 3 rows of 4 columns.
-    pub(crate) object_to_world: [f32; 12],
-    pub(crate) structure: u64,
-    /// 24 bits custom index, 8 bits mask.
-    pub(crate) custom_index_and_mask: u32,
-    /// 24 bits hit-group offset, 8 bits flags.
-    pub(crate) hit_group_offset_and_flags: u32,
-    /// The caller's.
-    pub(crate) number: u32,
-    pub(crate) reserved: [u32; 3],
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub(crate) struct MovedHeader {
+    /// [`MOVED`].
+    pub(crate) format: u32,
+    pub(crate) leaf_kind: u32,
+    /// Of the structure that is meant, which has not moved itself.
+    pub(crate) address: u64,
 }
 
 /// The reference to `count` primitives of leaves, 1 to [`LARGEST_LEAF`].
@@ -183,7 +150,7 @@ mod tests {
         assert_eq!(size_of::<LeafBox>(), 32);
         assert_eq!(size_of::<BinaryNode>(), 64);
         assert_eq!(size_of::<GeometryRow>(), 16);
-        assert_eq!(size_of::<Instance>(), 128);
+        assert_eq!(size_of::<MovedHeader>(), 16);
         assert_eq!(leaf(5, 3), 0x9000_0005);
     }
 }

@@ -11,6 +11,8 @@ pub(crate) struct Quality {
     pub(crate) fast_build: bool,
     /// Leaves name shared vertices.
     pub(crate) low_memory: bool,
+    /// The structure may be refitted.
+    pub(crate) refit: bool,
 }
 
 impl Quality {
@@ -18,6 +20,7 @@ impl Quality {
         Self {
             fast_build: flags.contains(BuildFlags::FAST_BUILD),
             low_memory: flags.contains(BuildFlags::LOW_MEMORY),
+            refit: flags.contains(BuildFlags::ALLOW_UPDATE),
         }
     }
 

@@ -37,6 +37,14 @@ impl Tree {
         }
     }
 
+    /// For each node its parent, with which child of it in the highest three bits; [`NONE`] for the root.
+    pub(super) fn parents(&self) -> Vec<u32> {
+        match &self.nodes {
+            Nodes::Wide(nodes) => wide_tree::parents(nodes),
+            Nodes::Binary(nodes) => binary_tree::parents(nodes),
+        }
+    }
+
     /// Whether every reference names what is there: made-up trees must not send the GPU anywhere.
     pub(crate) fn is_sound(&self) -> bool {
         debug_assert!(LARGEST_LEAF <= 16);

@@ -7,7 +7,7 @@ use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::cwbvh::node::CwBvhNode;
 use obvhs::ploc::PlocBuilder;
 
-use super::layout::DEEPEST_WIDE;
+use super::layout::{DEEPEST_WIDE, NONE};
 use super::quality::Quality;
 use super::tree::{Nodes, Tree};
 use crate::accel::bounds::Bounds;
@@ -58,6 +58,20 @@ fn depth(nodes: &[CwBvhNode]) -> usize {
 /// The numbers of a node's inner children.
 pub(super) fn children(node: &CwBvhNode) -> std::ops::Range<u32> {
     node.child_base_idx..node.child_base_idx.saturating_add(node.imask.count_ones())
+}
+
+/// For each node its parent and, in the highest three bits, which child it is.
+pub(super) fn parents(nodes: &[CwBvhNode]) -> Vec<u32> {
+    let mut parents = vec![NONE; nodes.len()];
+    for (number, node) in (0_u32..).zip(nodes) {
+        let inner = (0..8_u32).filter(|child| node.imask >> child & 1 == 1);
+        for (child, place) in inner.zip(children(node)) {
+            if let Some(parent) = parents.get_mut(place as usize) {
+                *parent = number | child << 29;
+            }
+        }
+    }
+    parents
 }
 
 /// Whether all children and primitives exist, children behind their parents, and no path is too long.

@@ -1,0 +1,5 @@
+// The boxes of wide nodes.
+void main() {
+    job = jobs.job[firstJob];
+    fitWideFrom(invocation());
+}

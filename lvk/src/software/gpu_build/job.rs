@@ -1,0 +1,67 @@
+//! What the kernels of a build are told.
+
+use bytemuck::{Pod, Zeroable};
+
+/// What leaves hold, by the numbers of the structure's header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub(crate) enum LeafKind {
+    /// Triangles with their corners, 48 bytes.
+    Triangles = 0,
+    /// Triangles that name vertices of a copy, 16 bytes.
+    IndexedTriangles = 1,
+    /// Boxes, 32 bytes.
+    Boxes = 2,
+    /// Instances, 128 bytes.
+    Instances = 3,
+}
+
+impl LeafKind {
+    /// Bytes of a primitive as the structure keeps it.
+    pub(crate) fn primitive_bytes(self) -> u64 {
+        match self {
+            Self::Triangles => 48,
+            Self::IndexedTriangles => 16,
+            Self::Boxes => 32,
+            Self::Instances => 128,
+        }
+    }
+}
+
+/// `Job` of `kernel/build/job.glsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub(crate) struct Job {
+    pub(crate) inputs: u64,
+    pub(crate) table: u64,
+    pub(crate) blob: u64,
+    pub(crate) scratch: u64,
+    pub(crate) parents: u64,
+    pub(crate) count: u32,
+    pub(crate) input_count: u32,
+    pub(crate) leaf_kind: u32,
+    pub(crate) leaf_size: u32,
+    pub(crate) low_bits: u32,
+    pub(crate) nodes: u32,
+    pub(crate) primitives: u32,
+    pub(crate) vertices: u32,
+    pub(crate) geometries: u32,
+    pub(crate) saved_parents: u32,
+    pub(crate) vertex_count: u32,
+    pub(crate) boxes: u32,
+    pub(crate) keys: u32,
+    pub(crate) spare_keys: u32,
+    pub(crate) digits: u32,
+    pub(crate) arrivals: u32,
+    pub(crate) node_capacity: u32,
+    pub(crate) header_flags: u32,
+}
+
+/// Push constants of every kernel of a build.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(crate) struct BuildPush {
+    pub(crate) jobs: u64,
+    pub(crate) first_job: u32,
+    pub(crate) sort_pass: u32,
+}
