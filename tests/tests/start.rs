@@ -7,8 +7,8 @@ use std::path::Path;
 use lvk::ash::vk;
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferUsage, ColorAttachment, Context, ContextDesc, Dependencies,
-    Error, FeatureRequest, Format, RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc, ShaderSource,
-    ShaderStage, TlasDesc, Triangles, Validation,
+    Error, FeatureRequest, Format, RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc,
+    ShaderSource, ShaderStage, TlasDesc, Triangles, Validation,
 };
 use lvk_tests::child::{in_child, without_ray_tracing};
 use lvk_tests::compute::{Evaluator, words_buffer};

@@ -42,6 +42,8 @@ pub(crate) enum CompactionWish {
     Open,
     /// It could not be met.
     Failed,
+    /// There is nothing to gain.
+    Idle,
 }
 
 /// What one part is built from.

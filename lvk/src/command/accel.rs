@@ -19,6 +19,9 @@ use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
 use crate::shared::Garbage;
 
+/// Records the builds or refits of what software traces.
+type BuildSoftware = fn(&mut CommandBuffer, &[Arc<AccelStruct>], &[bool]) -> Result<()>;
+
 /// One build to record.
 pub(super) struct Build {
     pub(super) target: Arc<AccelStruct>,
@@ -103,7 +106,7 @@ impl CommandBuffer {
         &mut self,
         structures: &[Arc<AccelStruct>],
         mode: BuildMode,
-        software: fn(&mut Self, &[Arc<AccelStruct>], &[bool]) -> Result<()>,
+        software: BuildSoftware,
     ) -> Result<()> {
         let mut open = Vec::with_capacity(structures.len());
         let mut builds = Vec::with_capacity(structures.len());

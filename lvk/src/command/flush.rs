@@ -104,9 +104,5 @@ fn structure_reads(shared: &Shared, stages: Stages) -> [(ResourceId, Use); 3] {
         true => Use::structure_walk(stages),
         false => Use::accel_read(stages),
     };
-    [
-        (shared.all_blas, read),
-        (shared.all_tlas, read),
-        (shared.tlas_tables, Use::shader_read(stages)),
-    ]
+    [(shared.all_blas, read), (shared.all_tlas, read), (shared.tlas_tables, Use::shader_read(stages))]
 }

@@ -49,11 +49,8 @@ impl CommandBuffer {
         self.uses.accumulate(self.shared.all_blas, Use::transfer_write());
         self.use_buffer(body.buffer(), Use::transfer_write());
         self.flush();
-        let copy = vk::BufferCopy {
-            src_offset: region.offset,
-            dst_offset: body.offset(),
-            size: bytes.len() as u64,
-        };
+        let copy =
+            vk::BufferCopy { src_offset: region.offset, dst_offset: body.offset(), size: bytes.len() as u64 };
         // SAFETY: the structure has room for the bytes, which lie in the staging memory.
         unsafe {
             self.shared.gpu.device.cmd_copy_buffer(self.raw(), region.buffer, body.buffer().raw, &[copy]);
@@ -126,7 +123,9 @@ impl CommandBuffer {
             (true, _, Some(rebuilt)) => {
                 work.refits.push(refit_of(GpuRefitPlan::of_build(&rebuilt.plan), &rebuilt.body));
             }
-            (true, Origin::Cpu { refit: Some(plan) }, None) => work.refits.push(refit_of(*plan, &software.body)),
+            (true, Origin::Cpu { refit: Some(plan) }, None) => {
+                work.refits.push(refit_of(*plan, &software.body))
+            }
             (true, Origin::Cpu { refit: None }, None) => target.check_refit()?,
             (true, Origin::Gpu(plan), None) => {
                 work.refits.push(refit_of(GpuRefitPlan::of_build(plan), &software.body));
@@ -223,7 +222,8 @@ impl CommandBuffer {
         out: &mut [u8],
     ) -> Result<()> {
         let mut last: Option<(AccelStructHandle, u64)> = None;
-        for (index, (instance, out)) in instances.iter().zip(out.chunks_exact_mut(INSTANCE_BYTES)).enumerate() {
+        for (index, (instance, out)) in instances.iter().zip(out.chunks_exact_mut(INSTANCE_BYTES)).enumerate()
+        {
             check(&target.name, index, instance)?;
             let address = match last {
                 Some((handle, address)) if handle == instance.blas => address,

@@ -125,6 +125,7 @@ fn info(object: &AccelStruct) -> AccelStructInfo {
                     CompactionWish::None => Compaction::None,
                     CompactionWish::Open => Compaction::Pending,
                     CompactionWish::Failed => Compaction::Failed,
+                    CompactionWish::Idle => Compaction::Done { before_bytes: after_bytes, after_bytes },
                 },
             };
             AccelStructInfo {

@@ -23,8 +23,8 @@ use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::shared::Shared;
-use crate::software::body::SoftwareBody;
 use crate::software::blas::SoftwareBlas;
+use crate::software::body::SoftwareBody;
 use crate::software::gpu_build::plan::GpuBuildPlan;
 use crate::software::tlas::SoftwareTlas;
 

@@ -109,7 +109,7 @@ impl Context {
         Ok(match &object.kind {
             AccelKind::Tlas(tlas) => {
                 tlas.structure.iter().map(|structure| (structure.raw, structure.address)).collect()
-            },
+            }
             AccelKind::Blas(blas) => {
                 blas.body().structures.iter().map(|part| (part.raw, part.address)).collect()
             }

@@ -57,7 +57,9 @@ impl RayQueryRequest {
             Self::Off => (None, "ray queries are turned off"),
             Self::Software => (Software, "software was asked for"),
             Self::Auto if !has => (Software, "the device has no ray queries of its own"),
-            Self::Auto if is_cpu => (Software, "the device is a CPU, on which the library's own walk is faster"),
+            Self::Auto if is_cpu => {
+                (Software, "the device is a CPU, on which the library's own walk is faster")
+            }
             Self::Auto => (Hardware, "the device has ray queries"),
             Self::Hardware | Self::HardwareIfPresent if has => (Hardware, "hardware was asked for"),
             Self::Hardware | Self::HardwareIfPresent => (None, "the device has no ray queries of its own"),

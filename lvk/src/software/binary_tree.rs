@@ -26,7 +26,8 @@ struct Builder<'a> {
 /// A tree whose leaves hold at most `leaf_size` primitives.
 pub(crate) fn build(bounds: &[Bounds], leaf_size: usize) -> Tree {
     let leaf_size = leaf_size.clamp(1, LARGEST_LEAF);
-    let mut builder = Builder { bounds, order: (0..bounds.len() as u32).collect(), nodes: Vec::new(), leaf_size };
+    let mut builder =
+        Builder { bounds, order: (0..bounds.len() as u32).collect(), nodes: Vec::new(), leaf_size };
     let root = builder.root();
     Tree { nodes: Nodes::Binary(builder.nodes), root, order: builder.order }
 }

@@ -82,7 +82,8 @@ impl SoftwareBlas {
 /// Whether the GPU makes the first build too: where builds are to be fast, and where refits are to find the vertices of
 /// indexed leaves as it lays them out.
 pub(crate) fn builds_on_gpu(flags: BuildFlags) -> bool {
-    flags.contains(BuildFlags::FAST_BUILD) || flags.contains(BuildFlags::LOW_MEMORY | BuildFlags::ALLOW_UPDATE)
+    flags.contains(BuildFlags::FAST_BUILD)
+        || flags.contains(BuildFlags::LOW_MEMORY | BuildFlags::ALLOW_UPDATE)
 }
 
 /// A build on the GPU of these geometries, which have been checked.
@@ -117,7 +118,11 @@ fn numbers_fit(geometries: &[BlasGeometry]) -> bool {
 pub(crate) fn refit_plan(header: &Header) -> Option<GpuRefitPlan> {
     (header.parents != 0 || header.node_count == 0).then_some(GpuRefitPlan {
         format: if header.format == NodeFormat::Wide as u32 { NodeFormat::Wide } else { NodeFormat::Binary },
-        leaf_kind: if header.leaf_kind == LeafKind::Boxes as u32 { LeafKind::Boxes } else { LeafKind::Triangles },
+        leaf_kind: if header.leaf_kind == LeafKind::Boxes as u32 {
+            LeafKind::Boxes
+        } else {
+            LeafKind::Triangles
+        },
         places: BlobPlaces {
             nodes: header.nodes,
             primitives: header.primitives,

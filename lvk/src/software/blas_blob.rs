@@ -2,10 +2,8 @@
 
 use glam::Vec3;
 
-use super::layout::{
-    BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafTriangle, WIDE,
-};
 use super::gpu_build::job::LeafKind;
+use super::layout::{BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafTriangle, WIDE};
 use super::mesh::{Mesh, Primitives};
 use super::quality::Quality;
 use super::tree::{Nodes, Tree};
@@ -92,7 +90,11 @@ fn leaves(mesh: &Mesh, order: &[u32], quality: Quality) -> Leaves {
             }
         }
         Primitives::Triangles(triangles) => {
-            let small = if quality.low_memory && !quality.refit { indexed(triangles, order, mesh.flags.len()) } else { None };
+            let small = if quality.low_memory && !quality.refit {
+                indexed(triangles, order, mesh.flags.len())
+            } else {
+                None
+            };
             match small {
                 Some(indexed) => Leaves {
                     kind: LeafKind::IndexedTriangles,

@@ -16,12 +16,7 @@ pub(crate) struct SoftwareBody {
 
 impl SoftwareBody {
     /// Room for `bytes`; nothing is built yet.
-    pub(crate) fn new(
-        gpu: &Arc<Gpu>,
-        storage: &AccelStorage,
-        name: &str,
-        bytes: u64,
-    ) -> Result<Self> {
+    pub(crate) fn new(gpu: &Arc<Gpu>, storage: &AccelStorage, name: &str, bytes: u64) -> Result<Self> {
         let storage = storage.alloc(gpu, name, bytes)?;
         let address = storage.buffer.address + storage.offset;
         Ok(Self { storage, address })

@@ -6,7 +6,6 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-
 /// Bytes of a block.
 pub(crate) const BLOCK_BYTES: usize = 16;
 /// Reference to no node, or to no root: the structure is empty.
@@ -15,8 +14,6 @@ pub(crate) const NONE: u32 = u32::MAX;
 pub(crate) const LEAF: u32 = 1 << 31;
 /// Most primitives of a leaf that a reference names.
 pub(crate) const LARGEST_LEAF: usize = 16;
-/// Most primitives of a structure.
-pub(crate) const MOST_PRIMITIVES: u64 = 1 << 27;
 /// Most nodes on a path of a binary tree: the walk pushes a word for each.
 pub(crate) const DEEPEST_BINARY: usize = 64;
 /// Most nodes on a path of a wide tree: the walk pushes two words for each.

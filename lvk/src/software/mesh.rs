@@ -36,11 +36,7 @@ impl Mesh {
         let flags = geometries.iter().map(|(_, flags)| *flags).collect();
         let boxes = matches!(geometries.first(), Some((GeometryBytes::Boxes(_), _)));
         let mut mesh = Self {
-            primitives: if boxes {
-                Primitives::Boxes(Vec::new())
-            } else {
-                Primitives::Triangles(Vec::new())
-            },
+            primitives: if boxes { Primitives::Boxes(Vec::new()) } else { Primitives::Triangles(Vec::new()) },
             flags,
         };
         for (number, (bytes, flags)) in (0..).zip(geometries) {

@@ -3,7 +3,7 @@
 use obvhs::cwbvh::node::CwBvhNode;
 
 use super::binary_tree;
-use super::layout::{BinaryNode, LEAF, LARGEST_LEAF, NONE, leaf};
+use super::layout::{BinaryNode, LEAF, NONE, leaf};
 use super::quality::Quality;
 use super::wide_tree;
 use crate::accel::bounds::Bounds;
@@ -47,7 +47,6 @@ impl Tree {
 
     /// Whether every reference names what is there: made-up trees must not send the GPU anywhere.
     pub(crate) fn is_sound(&self) -> bool {
-        debug_assert!(LARGEST_LEAF <= 16);
         let primitives = self.order.len();
         match &self.nodes {
             _ if self.root == NONE => primitives == 0,

@@ -22,7 +22,8 @@ const MOST_PRIMITIVES: u32 = 1 << 24;
 /// The triangles in this order; `None` where their numbers do not fit.
 pub(super) fn indexed(triangles: &[LeafTriangle], order: &[u32], geometries: usize) -> Option<Indexed> {
     let several = geometries > 1;
-    if several && (geometries > MOST_GEOMETRIES || triangles.iter().any(|of| of.primitive >= MOST_PRIMITIVES)) {
+    if several && (geometries > MOST_GEOMETRIES || triangles.iter().any(|of| of.primitive >= MOST_PRIMITIVES))
+    {
         return None;
     }
     let mut places: HashMap<[u32; 3], u32, BuildHasherDefault<IdHasher>> = HashMap::default();

@@ -79,7 +79,8 @@ pub(super) fn is_sound(nodes: &[CwBvhNode], primitives: usize) -> bool {
     let sound = |(index, node): (usize, &CwBvhNode)| {
         let children = children(node);
         let has_children = !children.is_empty();
-        let inner = !has_children || (children.start as usize > index && children.end as usize <= nodes.len());
+        let inner =
+            !has_children || (children.start as usize > index && children.end as usize <= nodes.len());
         inner && (0..8).all(|child| leaf_is_sound(node, child, primitives))
     };
     !nodes.is_empty() && nodes.iter().enumerate().all(sound) && depth(nodes) <= DEEPEST_WIDE
