@@ -22,6 +22,7 @@ use crate::pipeline::{
 };
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::software::body::SoftwareBody;
+use crate::software::tree_cache::TreeCache;
 use crate::store::Store;
 use crate::submit::Submitter;
 use crate::upload::{SpareBuffers, Staging};
@@ -43,6 +44,8 @@ pub(crate) struct Shared {
     /// Where the context keeps compiled pipelines in a file.
     pub(crate) pipeline_cache: Option<PipelineCache>,
     pub(crate) bindless: Bindless,
+    /// Where the context keeps trees that the CPU has built.
+    pub(crate) tree_cache: Option<TreeCache>,
     pub(crate) submitter: Submitter<Garbage>,
     /// Where graphics pipelines query rays.
     pub(crate) graphics_queries: QueryStages,

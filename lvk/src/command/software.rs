@@ -11,7 +11,7 @@ use crate::accel::blas::Blas;
 use crate::accel::build::instance_bytes;
 use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance, check, pack};
 use crate::accel::tlas::Shown;
-use crate::barrier::{Stages, Use};
+use crate::barrier::{ResourceId, Stages, Use};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
@@ -20,9 +20,14 @@ use crate::software::body::SoftwareBody;
 use crate::software::gpu_build::geometry::{GpuGeometry, gpu_geometries};
 use crate::software::gpu_build::plan::BuildSource;
 use crate::software::gpu_build::refit_plan::GpuRefitPlan;
+use crate::software::instances::{PlacedInstance, ShownStructure, place};
 use crate::software::layout::{MOVED, MovedHeader};
 use crate::software::tlas::SoftwareTlas;
+use crate::software::tlas_blob;
 
+/// So many instances the CPU builds a tree over that is worth more than its time. A driver that runs on the CPU has no
+/// faster builds.
+const MOST_ON_CPU: usize = 512;
 /// Addresses of tables and records.
 const ALIGNMENT: u64 = 16;
 
@@ -43,10 +48,20 @@ impl CommandBuffer {
         body: &SoftwareBody,
         bytes: &[u8],
     ) -> Result<()> {
+        self.fill_software(target, self.shared.all_blas, body, bytes)
+    }
+
+    fn fill_software(
+        &mut self,
+        target: &AccelStruct,
+        all: ResourceId,
+        body: &SoftwareBody,
+        bytes: &[u8],
+    ) -> Result<()> {
         let region = self.shared.staging.write(bytes, ALIGNMENT, self.recording.sequence)?;
         self.retire_temporary(region.temporary);
         self.uses.id(target.id, Use::transfer_write());
-        self.uses.accumulate(self.shared.all_blas, Use::transfer_write());
+        self.uses.accumulate(all, Use::transfer_write());
         self.use_buffer(body.buffer(), Use::transfer_write());
         self.flush();
         let copy =
@@ -123,10 +138,10 @@ impl CommandBuffer {
             (true, _, Some(rebuilt)) => {
                 work.refits.push(refit_of(GpuRefitPlan::of_build(&rebuilt.plan), &rebuilt.body));
             }
-            (true, Origin::Cpu { refit: Some(plan) }, None) => {
+            (true, Origin::Cpu { refit: Some(plan), .. }, None) => {
                 work.refits.push(refit_of(*plan, &software.body))
             }
-            (true, Origin::Cpu { refit: None }, None) => target.check_refit()?,
+            (true, Origin::Cpu { refit: None, .. }, None) => target.check_refit()?,
             (true, Origin::Gpu(plan), None) => {
                 work.refits.push(refit_of(GpuRefitPlan::of_build(plan), &software.body));
             }
@@ -179,6 +194,12 @@ impl CommandBuffer {
         instances: &[TlasInstance],
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
+        if (shared.gpu.caps.is_cpu || instances.len() <= MOST_ON_CPU)
+            && let Some(placed) = self.place_instances(target, instances)?
+        {
+            let bytes = tlas_blob::build(&placed);
+            return self.fill_software(target, shared.all_tlas, &software.body, &bytes);
+        }
         let mut written = Ok(());
         let bytes = instance_bytes(instances.len().max(1) as u32);
         let region = shared.staging.write_with(bytes, ALIGNMENT, self.recording.sequence, |out| {
@@ -213,6 +234,36 @@ impl CommandBuffer {
             table: Some((region.address, entries)),
         };
         self.record_software_tlas(target, software, source, vec![buffer])
+    }
+
+    /// The instances for a build on the CPU; nothing where it does not know all of their bounds.
+    fn place_instances(
+        &self,
+        target: &AccelStruct,
+        instances: &[TlasInstance],
+    ) -> Result<Option<Vec<PlacedInstance>>> {
+        let mut placed = Vec::with_capacity(instances.len());
+        let mut last: Option<(AccelStructHandle, ShownStructure)> = None;
+        for (number, instance) in instances.iter().enumerate() {
+            check(&target.name, number, instance)?;
+            let shown = match last {
+                Some((handle, shown)) if handle == instance.blas => shown,
+                _ => match self.shown_structure(instance.blas)? {
+                    Some(shown) => shown,
+                    None => return Ok(None),
+                },
+            };
+            last = Some((instance.blas, shown));
+            placed.extend(place(number as u32, instance, &shown));
+        }
+        Ok(Some(placed))
+    }
+
+    fn shown_structure(&self, handle: AccelStructHandle) -> Result<Option<ShownStructure>> {
+        let blas = self.shared.store.accel_structs.get(handle)?;
+        let address = software_body(&blas)?.address;
+        let bounds = blas.blas()?.software.as_ref().and_then(SoftwareBlas::known_bounds);
+        Ok(bounds.map(|bounds| ShownStructure { address, bounds }))
     }
 
     fn write_software_instances(

@@ -51,6 +51,12 @@ pub struct ContextDesc<'a> {
     /// A file that is damaged, or of another device or driver, is dropped with a warning to the `log` crate, never an
     /// error. Drivers trust what is in it, so it belongs into a folder that nobody else can write.
     pub pipeline_cache: Option<&'a Path>,
+    /// A folder that keeps the trees that the CPU builds where software traces, from one run to the next, each under the
+    /// checksum of the primitives and settings it was built from. It is made when needed, and never emptied.
+    ///
+    /// A file that is damaged, or of another version, is dropped with a warning to the `log` crate and made anew, never an
+    /// error. Keep the folder where only the program writes it.
+    pub tree_cache: Option<&'a Path>,
 }
 
 impl Default for ContextDesc<'_> {
@@ -70,6 +76,7 @@ impl Default for ContextDesc<'_> {
             accel_budget_bytes: u64::MAX,
             max_textures: 16_384,
             pipeline_cache: None,
+            tree_cache: None,
         }
     }
 }

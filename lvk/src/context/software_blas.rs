@@ -14,6 +14,7 @@ use crate::software::blas_blob::{self, BlasBlob};
 use crate::software::body::SoftwareBody;
 use crate::software::mesh::Mesh;
 use crate::software::quality::Quality;
+use crate::software::tree_cache::TreeKey;
 
 impl Context {
     /// The structures of meshes that the CPU builds, on all its cores; nothing for those that the GPU builds, and where
@@ -29,9 +30,16 @@ impl Context {
             let bytes = |geometry| (geometry_bytes(geometry, &pieces), geometry.flags());
             Mesh::new(&desc.geometries.iter().map(bytes).collect::<Vec<_>>())
         };
-        on_all_cores(descs, |desc| {
-            is_of_cpu(&desc).then(|| blas_blob::build(&mesh(desc), Quality::of(desc.flags)))
-        })
+        on_all_cores(descs, |desc| is_of_cpu(&desc).then(|| self.built(&mesh(desc), Quality::of(desc.flags))))
+    }
+
+    /// The structure of a mesh, of an earlier run where trees are kept.
+    fn built(&self, mesh: &Mesh, quality: Quality) -> BlasBlob {
+        let build = || blas_blob::build(mesh, quality);
+        match &self.shared().tree_cache {
+            Some(cache) => cache.get_or(TreeKey::of(mesh, quality), build),
+            None => build(),
+        }
     }
 
     /// Memory for a structure that the CPU built, or that the GPU is to build; nothing where the device traces queries
@@ -46,7 +54,10 @@ impl Context {
             return Ok(None);
         }
         let (bytes, origin) = match blob {
-            Some(blob) => (blob.bytes.len() as u64, Origin::Cpu { refit: refit_plan(&blob.header()) }),
+            Some(blob) => {
+                let refit = refit_plan(&blob.header(), desc.flags);
+                (blob.bytes.len() as u64, Origin::Cpu { refit, bounds: blob.bounds })
+            }
             None => {
                 let plan = gpu_plan(name, desc.geometries, desc.flags)?;
                 (plan.blob_bytes, Origin::Gpu(plan))

@@ -8,6 +8,7 @@ use super::gpu_build::job::LeafKind;
 use super::gpu_build::plan::{BlasShape, BlobPlaces, GpuBuildPlan};
 use super::gpu_build::refit_plan::{GpuRefitPlan, NodeFormat};
 use super::layout::Header;
+use crate::accel::bounds::Bounds;
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
 use crate::accel::geometry::BlasGeometry;
 use crate::error::Result;
@@ -28,6 +29,8 @@ pub(crate) enum Origin {
     Cpu {
         /// How it is refitted, where it may be.
         refit: Option<GpuRefitPlan>,
+        /// Around everything in it, as long as it is neither refitted nor rebuilt.
+        bounds: Bounds,
     },
     /// The GPU, as every build of it.
     Gpu(GpuBuildPlan),
@@ -58,6 +61,14 @@ impl SoftwareBlas {
         Ok(self.rebuilt.get_or_init(|| rebuilt))
     }
 
+    /// Where it lies, if the host knows: then it never was nor will be refitted, nor was a rebuild recorded.
+    pub(crate) fn known_bounds(&self) -> Option<Bounds> {
+        match self.origin {
+            Origin::Cpu { refit: None, bounds } if self.rebuilt.get().is_none() => Some(bounds),
+            _ => None,
+        }
+    }
+
     /// Bytes of memory.
     pub(crate) fn memory_bytes(&self) -> u64 {
         let rebuilt = self.rebuilt.get().map_or(0, |rebuilt| rebuilt.body.memory_bytes());
@@ -67,7 +78,7 @@ impl SoftwareBlas {
     /// What it takes and its builds take.
     pub(crate) fn sizes(&self) -> AccelStructSizes {
         let (build_scratch_bytes, update_scratch_bytes) = match &self.origin {
-            Origin::Cpu { refit } => (0, refit.as_ref().map_or(0, GpuRefitPlan::scratch_bytes)),
+            Origin::Cpu { refit, .. } => (0, refit.as_ref().map_or(0, GpuRefitPlan::scratch_bytes)),
             Origin::Gpu(plan) if plan.places.parents == 0 => (plan.scratch_bytes, 0),
             Origin::Gpu(plan) => (plan.scratch_bytes, GpuRefitPlan::of_build(plan).scratch_bytes()),
         };
@@ -114,9 +125,12 @@ fn numbers_fit(geometries: &[BlasGeometry]) -> bool {
     geometries.len() <= 1 || (geometries.len() <= MOST_GEOMETRIES && geometries.iter().all(few))
 }
 
-/// How a structure with this header, which the CPU built with parents, is refitted.
-pub(crate) fn refit_plan(header: &Header) -> Option<GpuRefitPlan> {
-    (header.parents != 0 || header.node_count == 0).then_some(GpuRefitPlan {
+/// How a structure with this header, which the CPU built for refits or not, is refitted.
+pub(crate) fn refit_plan(header: &Header, flags: BuildFlags) -> Option<GpuRefitPlan> {
+    if !flags.contains(BuildFlags::ALLOW_UPDATE) {
+        return None;
+    }
+    Some(GpuRefitPlan {
         format: if header.format == NodeFormat::Wide as u32 { NodeFormat::Wide } else { NodeFormat::Binary },
         leaf_kind: if header.leaf_kind == LeafKind::Boxes as u32 {
             LeafKind::Boxes

@@ -15,6 +15,8 @@ use crate::accel::geometry::GeometryFlags;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct BlasBlob {
     pub(crate) bytes: Vec<u8>,
+    /// Of all primitives.
+    pub(crate) bounds: Bounds,
 }
 
 impl BlasBlob {
@@ -37,7 +39,7 @@ pub(crate) fn build(mesh: &Mesh, quality: Quality) -> BlasBlob {
     let bounds = mesh.bounds();
     let tree = Tree::of_mesh(&bounds, quality);
     let whole = bounds.into_iter().fold(Bounds::EMPTY, Bounds::union);
-    BlasBlob { bytes: pack(mesh, &tree, quality, whole) }
+    BlasBlob { bytes: pack(mesh, &tree, quality, whole), bounds: whole }
 }
 
 fn pack(mesh: &Mesh, tree: &Tree, quality: Quality, bounds: Bounds) -> Vec<u8> {

@@ -130,6 +130,24 @@ pub(crate) struct MovedHeader {
     pub(crate) address: u64,
 }
 
+/// An instance of a bottom-level structure.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct Instance {
+    /// 3 rows of 4 columns.
+    pub(crate) world_to_object: [f32; 12],
+    /// 3 rows of 4 columns.
+    pub(crate) object_to_world: [f32; 12],
+    pub(crate) structure: u64,
+    /// 24 bits custom index, 8 bits mask.
+    pub(crate) custom_index_and_mask: u32,
+    /// 24 bits hit-group offset, 8 bits flags.
+    pub(crate) hit_group_offset_and_flags: u32,
+    /// The caller's.
+    pub(crate) number: u32,
+    pub(crate) reserved: [u32; 3],
+}
+
 /// The reference to `count` primitives of leaves, 1 to [`LARGEST_LEAF`].
 pub(crate) fn leaf(first: u32, count: usize) -> u32 {
     LEAF | (count as u32 - 1) << 27 | first
@@ -148,6 +166,7 @@ mod tests {
         assert_eq!(size_of::<BinaryNode>(), 64);
         assert_eq!(size_of::<GeometryRow>(), 16);
         assert_eq!(size_of::<MovedHeader>(), 16);
+        assert_eq!(size_of::<Instance>(), 128);
         assert_eq!(leaf(5, 3), 0x9000_0005);
     }
 }

@@ -57,14 +57,6 @@ impl Mesh {
         }
     }
 
-    /// Number of primitives.
-    pub(crate) fn len(&self) -> usize {
-        match &self.primitives {
-            Primitives::Triangles(all) => all.len(),
-            Primitives::Boxes(all) => all.len(),
-        }
-    }
-
     fn add(&mut self, geometry: u32, bytes: &GeometryBytes<'_>, opaque: bool) {
         match (&mut self.primitives, bytes) {
             (Primitives::Triangles(all), GeometryBytes::Triangles(triangles)) => {

@@ -3,7 +3,7 @@
 use obvhs::cwbvh::node::CwBvhNode;
 
 use super::binary_tree;
-use super::layout::{BinaryNode, LEAF, NONE, leaf};
+use super::layout::{BinaryNode, NONE, leaf};
 use super::quality::Quality;
 use super::wide_tree;
 use crate::accel::bounds::Bounds;
@@ -42,17 +42,6 @@ impl Tree {
         match &self.nodes {
             Nodes::Wide(nodes) => wide_tree::parents(nodes),
             Nodes::Binary(nodes) => binary_tree::parents(nodes),
-        }
-    }
-
-    /// Whether every reference names what is there: made-up trees must not send the GPU anywhere.
-    pub(crate) fn is_sound(&self) -> bool {
-        let primitives = self.order.len();
-        match &self.nodes {
-            _ if self.root == NONE => primitives == 0,
-            Nodes::Wide(nodes) if self.root & LEAF == 0 => wide_tree::is_sound(nodes, primitives),
-            Nodes::Binary(nodes) if self.root & LEAF == 0 => binary_tree::is_sound(nodes, primitives),
-            _ => binary_tree::names_primitives(self.root, primitives),
         }
     }
 }

@@ -3,7 +3,7 @@
 //! A build sorts primitives along a space-filling curve, finds the hierarchy of their codes, and fits boxes from the
 //! leaves up; see [`steps`] for the order of the kernels. Many builds are recorded side by side.
 
-#[cfg(any(test, feature = "test-hooks"))]
+#[cfg(feature = "test-hooks")]
 pub(crate) mod check;
 pub(crate) mod geometry;
 pub(crate) mod job;

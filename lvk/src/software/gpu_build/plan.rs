@@ -161,6 +161,7 @@ impl GpuBuildPlan {
 
     /// Most nodes on a path from the root to a leaf, at most [`MOST_HEIGHT`]: every node splits at a bit of the code, or,
     /// where codes are equal, of the leaf's number. What a path really has stands in the header.
+    #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn most_height(&self) -> u32 {
         let number_bits = number_bits(self.capacity, self.leaf_size);
         (CODE_BITS + self.low_bits + number_bits).min(self.node_capacity())
