@@ -51,6 +51,12 @@ impl CommandBuffer {
         self.fill_software(target, self.shared.all_blas, body, bytes)
     }
 
+    /// The next command copies what software traces.
+    pub(crate) fn read_software_blas(&mut self, body: &SoftwareBody) {
+        self.uses.id(self.shared.all_blas, Use::transfer_read());
+        self.use_buffer(body.buffer(), Use::transfer_read());
+    }
+
     fn fill_software(
         &mut self,
         target: &AccelStruct,
@@ -82,6 +88,11 @@ impl CommandBuffer {
         let structures: Vec<_> = structures.iter().filter(is_of_gpu).cloned().collect();
         let rebuilds = vec![false; structures.len()];
         self.build_software(&structures, &rebuilds)
+    }
+
+    /// As [`build_software_first`](Self::build_software_first), of one structure.
+    pub(crate) fn build_software_of(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
+        self.build_software_first(std::slice::from_ref(target), &[false])
     }
 
     /// Builds or refits what software traces of these structures.

@@ -4,17 +4,27 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::Context;
+use super::blas_shapes::input;
+use super::create_accel::blas_object;
+use super::holder::Holder;
 use super::read_bounds::geometry_bytes;
 use crate::accel::AccelStruct;
+use crate::accel::blas::{Blas, BlasBody};
+use crate::accel::blob::Blob;
 use crate::accel::desc::BlasDesc;
 use crate::error::{Error, Result};
+use crate::handle::AccelStructHandle;
 use crate::shared::Garbage;
 use crate::software::blas::{Origin, SoftwareBlas, builds_on_gpu, gpu_plan, refit_plan};
 use crate::software::blas_blob::{self, BlasBlob};
 use crate::software::body::SoftwareBody;
 use crate::software::mesh::Mesh;
 use crate::software::quality::Quality;
+use crate::software::sound;
 use crate::software::tree_cache::TreeKey;
+
+/// Stands in front of structures that no driver wrote; as long as what drivers begin with.
+const MARK: [u8; 32] = *b"lvk software structure, form 1\0\0";
 
 impl Context {
     /// The structures of meshes that the CPU builds, on all its cores; nothing for those that the GPU builds, and where
@@ -55,7 +65,7 @@ impl Context {
         }
         let (bytes, origin) = match blob {
             Some(blob) => {
-                let refit = refit_plan(&blob.header(), desc.flags);
+                let refit = refit_plan(&blob.header(), desc);
                 (blob.bytes.len() as u64, Origin::Cpu { refit, bounds: blob.bounds })
             }
             None => {
@@ -65,6 +75,50 @@ impl Context {
         };
         let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, bytes)?;
         Ok(Some(SoftwareBlas::new(Arc::new(body), origin)))
+    }
+
+    /// The bytes of what software traces, behind a mark that no driver writes. Waits for the GPU.
+    pub(super) fn software_bytes(&self, blas: &Blas) -> Result<Vec<u8>> {
+        let Some(software) = &blas.software else { return Ok(Vec::new()) };
+        let moved = software.rebuilt().filter(|_| blas.builds() > 1);
+        let body = moved.map_or(&software.body, |rebuilt| &rebuilt.body);
+        let size = body.memory_bytes();
+        let mut bytes = vec![0; MARK.len() + size as usize];
+        bytes[..MARK.len()].copy_from_slice(&MARK);
+        self.read_back(size, &mut bytes[MARK.len()..], |cmd, target| {
+            cmd.read_software_blas(body);
+            cmd.copy_buffer_objects(body.buffer(), body.offset(), target, 0, size)
+        })?;
+        Ok(bytes)
+    }
+
+    /// A structure of what [`software_bytes`](Self::software_bytes) answered.
+    pub(super) fn load_software_blas(
+        &self,
+        desc: &BlasDesc<'_>,
+        blob: &Blob,
+    ) -> Result<Holder<AccelStructHandle>> {
+        let reject = |reason: &str| Error::Serialized {
+            object: desc.debug_name.to_owned(),
+            reason: reason.to_owned(),
+        };
+        input(self.shared(), desc)?;
+        let bytes = match &blob.parts[..] {
+            [part] => part.driver.strip_prefix(&MARK[..]),
+            _ => None,
+        };
+        let bytes = bytes.ok_or_else(|| reject("a driver wrote it, and here only software traces"))?;
+        let sound = sound::check(bytes).map_err(reject)?;
+        let built = BlasBlob { bytes: bytes.to_vec(), bounds: sound.bounds };
+        let software = self.software_blas(desc, Some(&built))?;
+        let body = BlasBody { structures: Vec::new(), compacted_from: None, rebuildable: true };
+        let object = blas_object(self.shared(), desc, Vec::new(), body, software)?;
+        let handle = self.shared().store.accel_structs.insert(object);
+        let holder = Holder::new(self, handle, 0);
+        let object = self.shared().store.accel_structs.get(handle)?;
+        self.fill_software(&object, &built)?;
+        self.before_next_submission(|cmd| cmd.build_first(std::slice::from_ref(&object)))?;
+        Ok(holder)
     }
 
     /// Copies what the CPU built.

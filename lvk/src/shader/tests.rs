@@ -269,7 +269,9 @@ fn a_missing_include_names_the_places_and_the_chain() {
     assert!(found.contains("included by a.glsl"), "{found}");
     let found = error(ShaderStage::Compute, "\n#include <lvk/nothing.glsl>\nvoid main() {}");
     assert!(
-        found.starts_with("line 2: the library has no <lvk/nothing.glsl>; it has <lvk/hit_numbers.glsl>"),
+        found.starts_with(
+            "line 2: the library has no <lvk/nothing.glsl>; it has <lvk/hardware_ray_query.glsl>"
+        ),
         "{found}"
     );
     let found = error(ShaderStage::Compute, "#include \"x\"\nvoid main() {}");

@@ -9,6 +9,7 @@ use super::gpu_build::plan::{BlasShape, BlobPlaces, GpuBuildPlan};
 use super::gpu_build::refit_plan::{GpuRefitPlan, NodeFormat};
 use super::layout::Header;
 use crate::accel::bounds::Bounds;
+use crate::accel::desc::BlasDesc;
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
 use crate::accel::geometry::BlasGeometry;
 use crate::error::Result;
@@ -126,26 +127,26 @@ fn numbers_fit(geometries: &[BlasGeometry]) -> bool {
 }
 
 /// How a structure with this header, which the CPU built for refits or not, is refitted.
-pub(crate) fn refit_plan(header: &Header, flags: BuildFlags) -> Option<GpuRefitPlan> {
-    if !flags.contains(BuildFlags::ALLOW_UPDATE) {
+pub(crate) fn refit_plan(header: &Header, desc: &BlasDesc<'_>) -> Option<GpuRefitPlan> {
+    if !desc.flags.contains(BuildFlags::ALLOW_UPDATE) {
         return None;
     }
+    let kinds = [LeafKind::Boxes, LeafKind::IndexedTriangles];
+    let kind = kinds.into_iter().find(|kind| *kind as u32 == header.leaf_kind);
+    let leaf_kind = kind.unwrap_or(LeafKind::Triangles);
+    let vertices = desc.geometries.iter().map(vertex_count).fold(0_u32, u32::saturating_add);
     Some(GpuRefitPlan {
         format: if header.format == NodeFormat::Wide as u32 { NodeFormat::Wide } else { NodeFormat::Binary },
-        leaf_kind: if header.leaf_kind == LeafKind::Boxes as u32 {
-            LeafKind::Boxes
-        } else {
-            LeafKind::Triangles
-        },
+        leaf_kind,
         places: BlobPlaces {
             nodes: header.nodes,
             primitives: header.primitives,
-            vertices: 0,
+            vertices: header.vertices,
             geometries: header.geometries,
             parents: header.parents,
         },
         node_count: header.node_count,
         primitive_count: header.primitive_count,
-        vertex_count: 0,
+        vertex_count: if leaf_kind == LeafKind::IndexedTriangles { vertices } else { 0 },
     })
 }
