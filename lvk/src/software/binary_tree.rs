@@ -179,26 +179,25 @@ pub(super) fn parents(nodes: &[BinaryNode]) -> Vec<u32> {
     parents
 }
 
-/// Whether all children exist, nodes behind their parents, and no path is too long.
+/// Whether every path from the first node ends in primitives that exist, none is too long, and no two meet. Nodes stand
+/// in any order.
 pub(super) fn is_sound(nodes: &[BinaryNode], primitives: usize) -> bool {
-    let mut depths = vec![1_usize; nodes.len()];
-    for (index, node) in nodes.iter().enumerate() {
-        let below = depths[index] + 1;
-        for child in [node.child0, node.child1] {
-            let sound = match child {
-                NONE => true,
-                child if child & LEAF != 0 => names_primitives(child, primitives),
-                child => depths.get_mut(child as usize).is_some_and(|depth| {
-                    *depth = (*depth).max(below);
-                    child as usize > index && below <= DEEPEST_BINARY
-                }),
-            };
-            if !sound {
+    let mut seen = vec![false; nodes.len()];
+    let mut open = vec![(0_u32, 1_usize)];
+    while let Some((place, depth)) = open.pop() {
+        let Some(node) = nodes.get(place as usize) else { return false };
+        if depth > DEEPEST_BINARY || std::mem::replace(&mut seen[place as usize], true) {
+            return false;
+        }
+        for child in [node.child0, node.child1].into_iter().filter(|child| *child != NONE) {
+            if child & LEAF == 0 {
+                open.push((child, depth + 1));
+            } else if !names_primitives(child, primitives) {
                 return false;
             }
         }
     }
-    !nodes.is_empty()
+    true
 }
 
 /// Whether a reference to a leaf names primitives that exist.
