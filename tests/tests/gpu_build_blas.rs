@@ -41,7 +41,8 @@ fn many_structures_are_built_side_by_side() {
     let vertices: Vec<_> = meshes.iter().map(|corners| input(&ctx, corners)).collect();
     let geometries: Vec<_> =
         vertices.iter().zip(counts).map(|(vertices, count)| [triangles(**vertices, count)]).collect();
-    let desc = |geometries| GpuBlasDesc { geometries, leaf_size: 2, indexed: false, refit: false };
+    let desc =
+        |geometries| GpuBlasDesc { geometries, leaf_size: 2, improvements: 1, indexed: false, refit: false };
     let descs: Vec<_> = geometries.iter().map(|geometries| desc(&geometries[..])).collect();
     for (structure, corners) in build_blas(&ctx, &descs).unwrap().iter().zip(&meshes) {
         check_contents(&facts(&ctx, structure), &numbered(corners));
@@ -246,7 +247,8 @@ fn several_geometries_keep_their_numbers() {
             expected.extend(numbered(mesh).into_iter().map(|((_, index), c)| ((geometry, index), c)));
         }
         for indexed in [false, true] {
-            let desc = GpuBlasDesc { geometries: &geometries, leaf_size: 2, indexed, refit: true };
+            let desc =
+                GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, indexed, refit: true };
             let built = build_blas(&ctx, &[desc]).unwrap();
             check_contents(&facts(&ctx, &built[0]), &expected);
         }

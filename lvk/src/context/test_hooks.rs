@@ -24,6 +24,7 @@ const ALIGNMENT: u64 = 256;
 pub struct GpuBlasDesc<'a> {
     pub geometries: &'a [BlasGeometry],
     pub leaf_size: u32,
+    pub improvements: u32,
     pub indexed: bool,
     pub refit: bool,
 }
@@ -53,6 +54,7 @@ pub fn build_blas(ctx: &Context, descs: &[GpuBlasDesc<'_>]) -> Result<Vec<GpuStr
             vertex_count: geometries.iter().map(|geometry| geometry.vertex_count).sum(),
             geometry_count: geometries.len() as u32,
             leaf_size: desc.leaf_size,
+            improvements: desc.improvements,
             refit: desc.refit,
         };
         let plan = GpuBuildPlan::blas("test", &shape)?;

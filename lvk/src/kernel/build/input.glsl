@@ -79,14 +79,17 @@ struct Primitive {
 Primitive readTriangle(Geometry g, uint index) {
     Primitive found;
     found.corner = cornersOf(g, index);
-    found.a = found.b = found.c = vec3(0);
     found.isActive = all(lessThan(found.corner, uvec3(g.vertexCount)));
+    mat3 corners = mat3(0.0);
     if (found.isActive) {
-        found.a = positionOf(g, found.corner.x);
-        found.b = positionOf(g, found.corner.y);
-        found.c = positionOf(g, found.corner.z);
-        found.isActive = isFinite(found.a) && isFinite(found.b) && isFinite(found.c);
+        [[dont_unroll]] for (uint k = 0; k < 3; ++k) {
+            corners[k] = positionOf(g, found.corner[k]);
+            found.isActive = found.isActive && isFinite(corners[k]);
+        }
     }
+    found.a = corners[0];
+    found.b = corners[1];
+    found.c = corners[2];
     return found;
 }
 

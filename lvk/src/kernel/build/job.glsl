@@ -44,6 +44,8 @@ struct Job {
     uint digits;         // how often each digit occurs in each block
     uint arrivals;       // a counter for each node
     uint nodeCapacity;
+    uint improvements;   // how often places are made better
+    uint reserved;
     uint headerFlags;    // bit 0: every geometry is opaque, bit 1: none is
 };
 
@@ -52,7 +54,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Job
 layout(push_constant, scalar) uniform Push {
     Jobs jobs;
     uint firstJob;
-    uint sortPass;
+    uint passOrJobs;     // which pass of the sort, or how many jobs there are with a workgroup each
 };
 
 Job job;

@@ -1,3 +1,5 @@
+const uint kBinary = 1u;
+
 // Rewrites the primitives of leaves from the caller's current buffers; their order and their ids stay.
 void refitPrimitive(uint slot) {
     Words kept = Words(place(job.primitives));
@@ -17,7 +19,10 @@ void refitPrimitive(uint slot) {
 
 // Everything that must be ready before boxes are fitted and has number `i`.
 void refitFrom(uint i) {
-    if (i < job.nodeCapacity) Words(work(job.arrivals)).word[i] = 0u;
+    if (i < min(header().word[8], job.nodeCapacity)) {
+        if (header().word[0] == kBinary) resetArrivals(i);
+        else Words(work(job.arrivals)).word[i] = 0u;
+    }
     if (job.leafKind == kIndexedTriangles) {
         if (i < job.vertexCount) copyVertex(i);
     } else if (i < min(header().word[3], job.count)) {

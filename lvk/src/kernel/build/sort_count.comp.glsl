@@ -8,7 +8,7 @@ void main() {
     uint t = gl_LocalInvocationIndex;
     if (t < kDigits) found[t] = 0;
     barrier();
-    Source from = sourceOf(sortPass);
+    Source from = sourceOf(passOrJobs);
     for (uint k = 0; k < kItems; ++k) {
         uint i = block * kBlock + k * kGroup + t;
         if (i < job.count) atomicAdd(found[digitOf(from, i)], 1u);

@@ -8,8 +8,8 @@ void main() {
     uint t = gl_LocalInvocationIndex;
     uint first = block * kBlock + t * kItems;
     uint end = block < blocks ? min(first + kItems, job.count) : first;
-    Source from = sourceOf(sortPass);
-    Words to = targetOf(sortPass);
+    Source from = sourceOf(passOrJobs);
+    Words to = targetOf(passOrJobs);
     rankKeys(from, first, end);
     if (t < kDigits && block < blocks) {
         start[t] = Words(work(job.digits)).word[t * blocks + block] - counts[t * kGroup];

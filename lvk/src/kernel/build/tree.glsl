@@ -54,6 +54,7 @@ void writeNode(uint i, uint leaves) {
     node.word[7] = rightLeaf ? leafReference(uint(left + 1)) : uint(left + 1);
     node.word[11] = 0u;
     node.word[15] = 0u;
+    resetArrivals(i);
     if (!leftLeaf) writeParent(uint(left), i, 0u);
     if (!rightLeaf) writeParent(uint(left + 1), i, 1u);
     if (i == 0u) Words(job.parents).word[0] = kNone;
@@ -76,26 +77,9 @@ void writeHeader(uint leaves) {
     to.word[11] = job.headerFlags;
 }
 
-void writeGeometry(uint i) {
-    Words to = Words(plus(place(job.geometries), i << 4, i >> 28));
-    to.word[0] = Geometries(job.inputs).geometry[i].flags;
-    to.word[1] = to.word[2] = to.word[3] = 0u;
-}
-
-// Everything of the structure but its boxes that has number `i`.
-void writeTree(uint i) {
-    uint actives = state().word[kActive];
+// The hierarchy and the header.
+void writeHierarchy(uint i) {
     uint leaves = leafCount();
     if (i + 1 < leaves) writeNode(i, leaves);
     if (i == 0u) writeHeader(leaves);
-    if (job.leafKind == kInstances) return;
-    if (i < job.inputCount) writeGeometry(i);
-    if (i < actives) {
-        uint number = Words(work(job.keys)).word[job.count + i];
-        uint geometry = geometryOf(number, false);
-        Geometry g = Geometries(job.inputs).geometry[geometry];
-        uint index = number - g.firstPrimitive;
-        writePrimitive(i, geometry, index, g, readPrimitive(g, index));
-    }
-    if (job.leafKind == kIndexedTriangles && i < job.vertexCount) copyVertex(i);
 }

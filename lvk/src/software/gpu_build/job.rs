@@ -54,6 +54,8 @@ pub(crate) struct Job {
     pub(crate) digits: u32,
     pub(crate) arrivals: u32,
     pub(crate) node_capacity: u32,
+    pub(crate) improvements: u32,
+    pub(crate) reserved: u32,
     pub(crate) header_flags: u32,
 }
 
@@ -63,5 +65,5 @@ pub(crate) struct Job {
 pub(crate) struct BuildPush {
     pub(crate) jobs: u64,
     pub(crate) first_job: u32,
-    pub(crate) sort_pass: u32,
+    pub(crate) pass_or_jobs: u32,
 }

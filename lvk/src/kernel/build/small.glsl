@@ -8,8 +8,7 @@ void boundAll() {
     uint actives = 0;
     Box centres = emptyBox();
     for (uint i = gl_LocalInvocationIndex; i < job.count; i += kGroup) {
-        bool instances = job.leafKind == kInstances;
-        centres = join(centres, keepBox(i, instances ? keepInstance(i) : inputBox(i), actives));
+        centres = join(centres, keepBox(i, smallBox(i), actives));
     }
     extendBounds(centres, actives);
 }
@@ -31,6 +30,7 @@ void sortAll() {
 }
 
 void main() {
+    if (groupNumber() >= passOrJobs) return;
     job = jobs.job[firstJob + groupNumber()];
     uint t = gl_LocalInvocationIndex;
     if (t < kStateWords) state().word[t] = 0u;
@@ -38,12 +38,15 @@ void main() {
     boundAll();
     meet();
     for (uint i = t; i < job.count; i += kGroup) writeKey(i);
-    for (uint i = t; i < job.nodeCapacity; i += kGroup) Words(work(job.arrivals)).word[i] = 0u;
     meet();
     sortAll();
-    uint geometries = job.leafKind == kInstances ? 0u : job.inputCount;
-    uint most = max(max(job.count, geometries), max(job.vertexCount, 1u));
-    for (uint i = t; i < most; i += kGroup) writeTree(i);
+    for (uint i = t; i < smallParts(); i += kGroup) writeTree(i);
     meet();
-    for (uint i = t; i < max(job.nodeCapacity, 1u); i += kGroup) fitFrom(i);
+    for (uint round_ = 1;; ++round_) {
+        for (uint i = t; i < max(job.nodeCapacity, 1u); i += kGroup) fitFrom(i);
+        if (round_ == max(job.improvements, 1u)) return;
+        meet();
+        for (uint i = t; i < min(header().word[8], job.nodeCapacity); i += kGroup) resetArrivals(i);
+        meet();
+    }
 }
