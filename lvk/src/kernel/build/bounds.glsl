@@ -8,7 +8,7 @@ void extendBounds(Box centres, uint actives) {
     groupLo[t] = centres.lo;
     groupHi[t] = centres.hi;
     groupActive[t] = actives;
-    for (uint half_ = kGroup / 2; half_ > 0; half_ /= 2) {
+    [[dont_unroll]] for (uint half_ = kGroup / 2; half_ > 0; half_ /= 2) {
         barrier();
         if (t < half_) {
             groupLo[t] = min(groupLo[t], groupLo[t + half_]);
@@ -20,7 +20,7 @@ void extendBounds(Box centres, uint actives) {
         uvec3 lo = ~ordered(groupLo[0]);
         uvec3 hi = ordered(groupHi[0]);
         Words all_ = state();
-        for (uint axis = 0; axis < 3; ++axis) {
+        [[dont_unroll]] for (uint axis = 0; axis < 3; ++axis) {
             atomicMax(all_.word[axis], lo[axis]);
             atomicMax(all_.word[3 + axis], hi[axis]);
         }

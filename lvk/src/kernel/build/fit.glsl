@@ -17,7 +17,7 @@ void fitFrom(uint i) {
     uint which = 0u;
     fitLeaf(node, which, nodeAt(node).word[3]);
     // Each step goes one node up; a damaged structure with a circle ends too.
-    for (uint steps = 0; steps < nodes; ++steps) {
+    [[dont_unroll]] for (uint steps = 0; steps < nodes; ++steps) {
         uint sibling = nodeAt(node).word[which == 0u ? 7 : 3];
         if (isLeaf(sibling)) {
             fitLeaf(node, 1u - which, sibling);

@@ -33,19 +33,19 @@ uint stepsUp(float distance_, float unit) { return uint(clamp(ceil(distance_ / u
 Box encode(Words node) {
     Box child[kChildren];
     Box all_ = emptyBox();
-    for (uint i = 0; i < kChildren; ++i) {
+    [[dont_unroll]] for (uint i = 0; i < kChildren; ++i) {
         child[i] = wideChild(node, i);
         all_ = join(all_, child[i]);
     }
     vec3 corner = isEmpty(all_) ? vec3(0) : all_.lo;
     vec3 extent = isEmpty(all_) ? vec3(0) : all_.hi - all_.lo;
     uint exponents = 0u;
-    for (uint axis = 0; axis < 3; ++axis) {
+    [[dont_unroll]] for (uint axis = 0; axis < 3; ++axis) {
         uint exponent = exponentOf(extent[axis]);
         float unit = uintBitsToFloat(exponent << 23);
         exponents |= exponent << axis * 8;
         uvec2 low = uvec2(0), high = uvec2(0);
-        for (uint i = 0; i < kChildren; ++i) {
+        [[dont_unroll]] for (uint i = 0; i < kChildren; ++i) {
             bool none = isEmpty(child[i]);
             uint down = none ? 255u : stepsDown(child[i].lo[axis] - corner[axis], unit);
             uint up = none ? 0u : stepsUp(child[i].hi[axis] - corner[axis], unit);
@@ -58,7 +58,7 @@ Box encode(Words node) {
         node.word[at + 2] = high.x;
         node.word[at + 3] = high.y;
     }
-    for (uint axis = 0; axis < 3; ++axis) node.word[axis] = floatBitsToUint(corner[axis]);
+    [[dont_unroll]] for (uint axis = 0; axis < 3; ++axis) node.word[axis] = floatBitsToUint(corner[axis]);
     node.word[3] = exponents | (node.word[3] & 0xff000000u);
     return all_;
 }
@@ -74,7 +74,7 @@ void fitWideFrom(uint i) {
     if (nodes == 0u && i == 0u) finishWide(leafBox(header().word[2]));
     if (i >= nodes || wideAt(i).word[3] >> 24 != 0u) return;
     uint node = i;
-    for (uint steps = 0; steps < nodes; ++steps) {
+    [[dont_unroll]] for (uint steps = 0; steps < nodes; ++steps) {
         Box box = encode(wideAt(node));
         writeBox(Floats(work(job.boxes)), node * 6, box);
         uint parent = Words(job.parents).word[node];

@@ -51,7 +51,7 @@ vec3 positionOf(Geometry g, uint vertex) {
     if (g.matrix == uvec2(0)) return p;
     Inputs rows = Inputs(g.matrix);
     vec3 moved;
-    for (uint row = 0; row < 3; ++row) {
+    [[dont_unroll]] for (uint row = 0; row < 3; ++row) {
         vec4 r = uintBitsToFloat(uvec4(rows.word[row * 4], rows.word[row * 4 + 1], rows.word[row * 4 + 2],
                                        rows.word[row * 4 + 3]));
         moved[row] = dot(r.xyz, p) + r.w;
@@ -120,7 +120,7 @@ Box boxOf(Primitive found) {
 uint geometryOf(uint i, bool vertices) {
     Geometries list = Geometries(job.inputs);
     uint low = 0, high = job.inputCount;
-    while (high - low > 1) {
+    [[dont_unroll]] while (high - low > 1) {
         uint middle = (low + high) / 2;
         uint first = vertices ? list.geometry[middle].firstVertex : list.geometry[middle].firstPrimitive;
         if (first <= i) low = middle; else high = middle;

@@ -49,7 +49,7 @@ uvec2 structureOf(Inputs record) {
 }
 
 void writeRows(Floats to, uint at, Affine m) {
-    for (uint row = 0; row < 3; ++row) {
+    [[dont_unroll]] for (uint row = 0; row < 3; ++row) {
         to.value[at + row * 4] = m.x[row];
         to.value[at + row * 4 + 1] = m.y[row];
         to.value[at + row * 4 + 2] = m.z[row];
@@ -61,7 +61,7 @@ void writeRows(Floats to, uint at, Affine m) {
 Box keepInstance(uint i) {
     Inputs record = Inputs(element(job.inputs, i, kRecordWords * 4u));
     Affine m;
-    for (uint row = 0; row < 3; ++row) {
+    [[dont_unroll]] for (uint row = 0; row < 3; ++row) {
         m.x[row] = uintBitsToFloat(record.word[row * 4]);
         m.y[row] = uintBitsToFloat(record.word[row * 4 + 1]);
         m.z[row] = uintBitsToFloat(record.word[row * 4 + 2]);
@@ -84,7 +84,7 @@ Box keepInstance(uint i) {
     kept.word[26] = record.word[12];
     kept.word[27] = record.word[13];
     kept.word[28] = i;
-    for (uint k = 29; k < kInstanceWords; ++k) kept.word[k] = 0u;
+    [[dont_unroll]] for (uint k = 29; k < kInstanceWords; ++k) kept.word[k] = 0u;
     vec3 lo = uintBitsToFloat(uvec3(shown.word[12], shown.word[13], shown.word[14]));
     vec3 hi = uintBitsToFloat(uvec3(shown.word[15], shown.word[16], shown.word[17]));
     return moved(m, Box(lo, hi));

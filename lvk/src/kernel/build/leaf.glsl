@@ -16,7 +16,7 @@ Box keptBox(uint slot);
 
 Box slotsBox(uint first, uint count) {
     Box box = emptyBox();
-    for (uint i = 0; i < count; ++i) box = join(box, keptBox(first + i));
+    [[dont_unroll]] for (uint i = 0; i < count; ++i) box = join(box, keptBox(first + i));
     return box;
 }
 

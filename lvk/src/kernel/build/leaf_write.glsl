@@ -12,7 +12,7 @@ void writePrimitive(uint slot, uint geometry, uint index, Geometry g, Primitive 
         kept.word[at + 11] = g.flags & 1u;
     } else if (job.leafKind == kIndexedTriangles) {
         uint at = slot * kIndexedWords;
-        for (uint k = 0; k < 3; ++k) kept.word[at + k] = from.corner[k] + g.firstVertex;
+        [[dont_unroll]] for (uint k = 0; k < 3; ++k) kept.word[at + k] = from.corner[k] + g.firstVertex;
         kept.word[at + 3] = index | (job.inputCount > 1 ? geometry << 24 : 0u);
     } else {
         uint at = slot * kBoxWords;

@@ -19,11 +19,11 @@ uint rotate(uint node) {
     uint height = max(child[0].height, child[1].height) + 1;
     float gain = 0.0;
     uint side = 0u, given = kNone;  // grandchild `given` below `side` changes places with the other side
-    for (uint inner = 0; inner < 2; ++inner) {
+    [[dont_unroll]] for (uint inner = 0; inner < 2; ++inner) {
         if (isLeaf(reference[inner])) continue;
         Fitted sibling = child[1 - inner];
         float before = areaOf(child[inner].box);
-        for (uint up = 0; up < 2; ++up) {
+        [[dont_unroll]] for (uint up = 0; up < 2; ++up) {
             Fitted raised = readChild(reference[inner], up);
             Fitted kept = readChild(reference[inner], 1 - up);
             float saved = before - areaOf(join(sibling.box, kept.box));

@@ -7,7 +7,7 @@ void meet() {
 void boundAll() {
     uint actives = 0;
     Box centres = emptyBox();
-    for (uint i = gl_LocalInvocationIndex; i < job.count; i += kGroup) {
+    [[dont_unroll]] for (uint i = gl_LocalInvocationIndex; i < job.count; i += kGroup) {
         centres = join(centres, keepBox(i, smallBox(i), actives));
     }
     extendBounds(centres, actives);
@@ -17,11 +17,11 @@ void sortAll() {
     uint each = (job.count + kGroup - 1) / kGroup;
     uint first = min(gl_LocalInvocationIndex * each, job.count);
     uint end = min(first + each, job.count);
-    for (uint pass = 0; pass < passes(); ++pass) {
+    [[dont_unroll]] for (uint pass = 0; pass < passes(); ++pass) {
         Source from = sourceOf(pass);
         Words to = targetOf(pass);
         rankKeys(from, first, end);
-        for (uint i = first; i < end; ++i) {
+        [[dont_unroll]] for (uint i = first; i < end; ++i) {
             uint rank = counts[digitOf(from, i) * kGroup + gl_LocalInvocationIndex]++;
             moveKey(from, to, i, rank);
         }
@@ -37,16 +37,16 @@ void main() {
     meet();
     boundAll();
     meet();
-    for (uint i = t; i < job.count; i += kGroup) writeKey(i);
+    [[dont_unroll]] for (uint i = t; i < job.count; i += kGroup) writeKey(i);
     meet();
     sortAll();
-    for (uint i = t; i < smallParts(); i += kGroup) writeTree(i);
+    [[dont_unroll]] for (uint i = t; i < smallParts(); i += kGroup) writeTree(i);
     meet();
-    for (uint round_ = 1;; ++round_) {
-        for (uint i = t; i < max(job.nodeCapacity, 1u); i += kGroup) fitFrom(i);
+    [[dont_unroll]] for (uint round_ = 1;; ++round_) {
+        [[dont_unroll]] for (uint i = t; i < max(job.nodeCapacity, 1u); i += kGroup) fitFrom(i);
         if (round_ == max(job.improvements, 1u)) return;
         meet();
-        for (uint i = t; i < min(header().word[8], job.nodeCapacity); i += kGroup) resetArrivals(i);
+        [[dont_unroll]] for (uint i = t; i < min(header().word[8], job.nodeCapacity); i += kGroup) resetArrivals(i);
         meet();
     }
 }

@@ -9,7 +9,7 @@ void main() {
     if (t < kDigits) found[t] = 0;
     barrier();
     Source from = sourceOf(passOrJobs);
-    for (uint k = 0; k < kItems; ++k) {
+    [[dont_unroll]] for (uint k = 0; k < kItems; ++k) {
         uint i = block * kBlock + k * kGroup + t;
         if (i < job.count) atomicAdd(found[digitOf(from, i)], 1u);
     }

@@ -15,7 +15,7 @@ void main() {
         start[t] = Words(work(job.digits)).word[t * blocks + block] - counts[t * kGroup];
     }
     barrier();
-    for (uint i = first; i < end; ++i) {
+    [[dont_unroll]] for (uint i = first; i < end; ++i) {
         uint digit = digitOf(from, i);
         uint rank = counts[digit * kGroup + t]++;
         moveKey(from, to, i, start[digit] + rank);

@@ -34,15 +34,15 @@ void writeNode(uint i, uint leaves) {
     int direction = sameBits(i, own, n + 1, leaves) > sameBits(i, own, n - 1, leaves) ? 1 : -1;
     int least = sameBits(i, own, n - direction, leaves);
     int most = 2;
-    while (sameBits(i, own, n + most * direction, leaves) > least) most *= 2;
+    [[dont_unroll]] while (sameBits(i, own, n + most * direction, leaves) > least) most *= 2;
     int reach = 0;
-    for (int jump = most / 2; jump >= 1; jump /= 2) {
+    [[dont_unroll]] for (int jump = most / 2; jump >= 1; jump /= 2) {
         if (sameBits(i, own, n + (reach + jump) * direction, leaves) > least) reach += jump;
     }
     int last = n + reach * direction;
     int shared_ = sameBits(i, own, last, leaves);
     int split = 0;
-    for (int jump = reach; jump > 1;) {
+    [[dont_unroll]] for (int jump = reach; jump > 1;) {
         jump = (jump + 1) / 2;
         if (sameBits(i, own, n + (split + jump) * direction, leaves) > shared_) split += jump;
     }
@@ -62,7 +62,7 @@ void writeNode(uint i, uint leaves) {
 
 void writeHeader(uint leaves) {
     Words to = header();
-    for (uint k = 0; k < 32; ++k) to.word[k] = 0u;
+    [[dont_unroll]] for (uint k = 0; k < 32; ++k) to.word[k] = 0u;
     to.word[0] = 1u;
     to.word[1] = job.leafKind;
     to.word[2] = leaves == 0u ? kNone : leaves == 1u ? leafReference(0u) : 0u;
