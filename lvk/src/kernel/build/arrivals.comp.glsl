@@ -1,6 +1,6 @@
 // Nobody has arrived anywhere.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     uint i = invocation();
     if (i < min(header().word[8], job.nodeCapacity)) resetArrivals(i);
 }

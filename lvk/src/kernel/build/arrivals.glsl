@@ -2,8 +2,9 @@
 // beforehand: others may change a node before its own invocation looks at it.
 const uint kStart = 0x80000000u;
 
+void writeArrivals(uint node, bool start) { Words(work(job.arrivals)).word[node] = start ? kStart : 0u; }
+
 void resetArrivals(uint node) {
-    Words at = Words(plus(place(job.nodes), node << 6, node >> 26));
-    bool start = (at.word[3] & at.word[7] & kLeaf) != 0u;
-    Words(work(job.arrivals)).word[node] = start ? kStart : 0u;
+    Quads at = Quads(element(place(job.nodes), node, 64u));
+    writeArrivals(node, (at.quad[0].w & at.quad[1].w & kLeaf) != 0u);
 }

@@ -30,7 +30,7 @@ void extendBounds(Box centres, uint actives) {
 
 // Keeps the box of a primitive and answers its centre as a box; empty where the primitive is inactive.
 Box keepBox(uint i, Box box, inout uint actives) {
-    writeBox(Floats(work(job.boxes)), i * 6, box);
+    writeBox(Corners(work(job.boxes)), i, box);
     if (isEmpty(box)) return box;
     actives += 1;
     vec3 c = centre(box);

@@ -1,6 +1,6 @@
 // The key of every primitive.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     uint i = invocation();
     if (i < job.count) writeKey(i);
 }

@@ -1,7 +1,5 @@
 void writeGeometry(uint i) {
-    Words to = Words(plus(place(job.geometries), i << 4, i >> 28));
-    to.word[0] = Geometries(job.inputs).geometry[i].flags;
-    to.word[1] = to.word[2] = to.word[3] = 0u;
+    Quads(element(place(job.geometries), i, 16u)).quad[0] = uvec4(readGeometry(i).flags, uvec3(0));
 }
 
 // Everything of the structure but its boxes that has number `i`.
@@ -12,7 +10,7 @@ void writeTree(uint i) {
     if (i < actives) {
         uint number = Words(work(job.keys)).word[job.count + i];
         uint geometry = geometryOf(number, false);
-        Geometry g = Geometries(job.inputs).geometry[geometry];
+        Geometry g = readGeometry(geometry);
         uint index = number - g.firstPrimitive;
         writePrimitive(i, geometry, index, g, readPrimitive(g, index));
     }

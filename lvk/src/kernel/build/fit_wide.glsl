@@ -14,7 +14,7 @@ Box wideChild(Words node, uint child) {
     if ((internal >> child & 1u) == 0u) return slotsBox(node.word[5] + (meta & 31u), bitCount(meta >> 5));
     uint number = node.word[4] + bitCount(internal & ((1u << child) - 1));
     if (number >= job.nodeCapacity) return emptyBox();
-    return readBox(Floats(work(job.boxes)), number * 6);
+    return readBox(Corners(work(job.boxes)), number);
 }
 
 // The smallest power of two by whose 255 steps the extent is covered, as an exponent with its bias.
@@ -64,8 +64,9 @@ Box encode(Words node) {
 }
 
 void finishWide(Box box) {
-    writeVec3(Floats(job.blob), 12, box.lo);
-    writeVec3(Floats(job.blob), 15, box.hi);
+    Corners to = Corners(plus(job.blob, 48u, 0u));
+    to.corner[0] = box.lo;
+    to.corner[1] = box.hi;
 }
 
 // Fits what can be fitted from node `i` up to the root: it starts where no child is a node.
@@ -76,7 +77,7 @@ void fitWideFrom(uint i) {
     uint node = i;
     [[dont_unroll]] for (uint steps = 0; steps < nodes; ++steps) {
         Box box = encode(wideAt(node));
-        writeBox(Floats(work(job.boxes)), node * 6, box);
+        writeBox(Corners(work(job.boxes)), node, box);
         uint parent = Words(job.parents).word[node];
         if (parent == kNone) {
             finishWide(box);

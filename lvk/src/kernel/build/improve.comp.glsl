@@ -1,5 +1,5 @@
 // The boxes of binary nodes, and better places for some of them.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     fitFrom(invocation());
 }

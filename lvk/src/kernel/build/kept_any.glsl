@@ -5,20 +5,18 @@ Box cornersBox(vec3 a, vec3 b, vec3 c) {
 }
 
 Box keptBox(uint slot) {
-    Floats kept = Floats(place(job.primitives));
-    if (job.leafKind == kInstances) return readBox(Floats(work(job.boxes)), slot * 6);
+    if (job.leafKind == kInstances) return readBox(Corners(work(job.boxes)), slot);
+    if (job.leafKind == kBoxes) {
+        Quads kept = slotAt(slot, 32u);
+        Box box = Box(uintBitsToFloat(kept.quad[0].xyz), uintBitsToFloat(kept.quad[1].xyz));
+        return isNumber(box.lo) && isNumber(box.hi) && all(lessThanEqual(box.lo, box.hi)) ? box : emptyBox();
+    }
     if (job.leafKind == kTriangles) {
-        uint at = slot * kTriangleWords;
-        return cornersBox(readVec3(kept, at), readVec3(kept, at + 4), readVec3(kept, at + 8));
+        Quads kept = slotAt(slot, 48u);
+        return cornersBox(uintBitsToFloat(kept.quad[0].xyz), uintBitsToFloat(kept.quad[1].xyz),
+                          uintBitsToFloat(kept.quad[2].xyz));
     }
-    if (job.leafKind == kIndexedTriangles) {
-        Words corners = Words(place(job.primitives));
-        Floats vertices = Floats(place(job.vertices));
-        uint at = slot * kIndexedWords;
-        return cornersBox(readVec3(vertices, corners.word[at] * 3), readVec3(vertices, corners.word[at + 1] * 3),
-                          readVec3(vertices, corners.word[at + 2] * 3));
-    }
-    uint at = slot * kBoxWords;
-    Box box = Box(readVec3(kept, at), readVec3(kept, at + 4));
-    return isNumber(box.lo) && isNumber(box.hi) && all(lessThanEqual(box.lo, box.hi)) ? box : emptyBox();
+    uvec4 named = slotAt(slot, 16u).quad[0];
+    Corners vertices = Corners(place(job.vertices));
+    return cornersBox(vertices.corner[named.x], vertices.corner[named.y], vertices.corner[named.z]);
 }

@@ -1,2 +1,2 @@
 // A node keeps its children.
-uint rotate(uint node) { return max(nodeAt(node).word[11], nodeAt(node).word[15]) + 1; }
+uint rotate(uint number, Node node) { return max(node.part[2].w, node.part[3].w) + 1; }

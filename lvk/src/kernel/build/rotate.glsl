@@ -5,47 +5,47 @@ float areaOf(Box box) {
     return side.x * side.y + side.y * side.z + side.z * side.x;
 }
 
-uint referenceOf(uint node, uint which) { return nodeAt(node).word[3 + which * 4]; }
-
 void writeReference(uint node, uint which, uint reference) {
-    nodeAt(node).word[3 + which * 4] = reference;
+    Words(nodeAt(node)).word[3 + which * 4] = reference;
     if (!isLeaf(reference)) Words(job.parents).word[reference] = node | which << 29;
 }
 
 // Answers how high the node then is.
-uint rotate(uint node) {
-    Fitted child[2] = Fitted[2](readChild(node, 0u), readChild(node, 1u));
-    uint reference[2] = uint[2](referenceOf(node, 0u), referenceOf(node, 1u));
-    uint height = max(child[0].height, child[1].height) + 1;
+uint rotate(uint number, Node node) {
+    uint height = max(node.part[2].w, node.part[3].w) + 1;
+    if (job.improvements == 0u) return height;
     float gain = 0.0;
     uint side = 0u, given = kNone;  // grandchild `given` below `side` changes places with the other side
+    Node lower;
     [[dont_unroll]] for (uint inner = 0; inner < 2; ++inner) {
-        if (isLeaf(reference[inner])) continue;
-        Fitted sibling = child[1 - inner];
-        float before = areaOf(child[inner].box);
-        [[dont_unroll]] for (uint up = 0; up < 2; ++up) {
-            Fitted raised = readChild(reference[inner], up);
-            Fitted kept = readChild(reference[inner], 1 - up);
+        uint reference = referenceOf(node, inner);
+        if (isLeaf(reference)) continue;
+        Node below = readNode(reference);
+        Fitted sibling = childOf(node, 1 - inner);
+        float before = areaOf(childOf(node, inner).box);
+        for (uint up = 0; up < 2; ++up) {
+            Fitted raised = childOf(below, up);
+            Fitted kept = childOf(below, 1 - up);
             float saved = before - areaOf(join(sibling.box, kept.box));
             uint after = max(max(sibling.height, kept.height) + 1, raised.height) + 1;
             if (saved > gain && after <= height) {
                 gain = saved;
                 side = inner;
                 given = up;
+                lower = below;
             }
         }
     }
-    if (given == kNone || job.improvements == 0u) return height;
-    uint inner = reference[side];
-    Fitted sibling = child[1 - side];
-    Fitted raised = readChild(inner, given);
-    Fitted kept = readChild(inner, 1 - given);
-    uint raisedReference = referenceOf(inner, given);
-    writeReference(inner, given, reference[1 - side]);
+    if (given == kNone) return height;
+    uint inner = referenceOf(node, side);
+    Fitted sibling = childOf(node, 1 - side);
+    Fitted raised = childOf(lower, given);
+    Fitted kept = childOf(lower, 1 - given);
+    writeReference(inner, given, referenceOf(node, 1 - side));
     writeChild(inner, given, sibling);
-    writeReference(node, 1 - side, raisedReference);
-    writeChild(node, 1 - side, raised);
-    Fitted lower = Fitted(join(sibling.box, kept.box), max(sibling.height, kept.height) + 1);
-    writeChild(node, side, lower);
-    return max(lower.height, raised.height) + 1;
+    writeReference(number, 1 - side, referenceOf(lower, given));
+    writeChild(number, 1 - side, raised);
+    Fitted made = Fitted(join(sibling.box, kept.box), max(sibling.height, kept.height) + 1);
+    writeChild(number, side, made);
+    return max(made.height, raised.height) + 1;
 }

@@ -31,7 +31,7 @@ void sortAll() {
 
 void main() {
     if (groupNumber() >= passOrJobs) return;
-    job = jobs.job[firstJob + groupNumber()];
+    readJob(firstJob + groupNumber());
     uint t = gl_LocalInvocationIndex;
     if (t < kStateWords) state().word[t] = 0u;
     meet();

@@ -1,6 +1,6 @@
 // From how often digits occur to where their keys go: sums of all counters before each. One workgroup.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     uint total = kDigits * ((job.count + kBlock - 1) / kBlock);
     Words table = Words(work(job.digits));
     uint carried = 0;

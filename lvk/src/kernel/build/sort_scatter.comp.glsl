@@ -2,7 +2,7 @@
 shared uint start[kDigits];
 
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     uint blocks = (job.count + kBlock - 1) / kBlock;
     uint block = groupNumber();
     uint t = gl_LocalInvocationIndex;

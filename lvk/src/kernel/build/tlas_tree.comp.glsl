@@ -1,5 +1,5 @@
 // The hierarchy of instances; those stand where they were read.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     writeHierarchy(invocation());
 }

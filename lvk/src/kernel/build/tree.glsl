@@ -49,32 +49,23 @@ void writeNode(uint i, uint leaves) {
     int left = n + split * direction + min(direction, 0);
     bool leftLeaf = min(n, last) == left;
     bool rightLeaf = max(n, last) == left + 1;
-    Words node = Words(plus(place(job.nodes), i << 6, i >> 26));
-    node.word[3] = leftLeaf ? leafReference(uint(left)) : uint(left);
-    node.word[7] = rightLeaf ? leafReference(uint(left + 1)) : uint(left + 1);
-    node.word[11] = 0u;
-    node.word[15] = 0u;
-    resetArrivals(i);
+    Quads node = Quads(element(place(job.nodes), i, 64u));
+    node.quad[0] = uvec4(uvec3(0), leftLeaf ? leafReference(uint(left)) : uint(left));
+    node.quad[1] = uvec4(uvec3(0), rightLeaf ? leafReference(uint(left + 1)) : uint(left + 1));
+    writeArrivals(i, leftLeaf && rightLeaf);
     if (!leftLeaf) writeParent(uint(left), i, 0u);
     if (!rightLeaf) writeParent(uint(left + 1), i, 1u);
     if (i == 0u) Words(job.parents).word[0] = kNone;
 }
 
 void writeHeader(uint leaves) {
-    Words to = header();
-    [[dont_unroll]] for (uint k = 0; k < 32; ++k) to.word[k] = 0u;
-    to.word[0] = 1u;
-    to.word[1] = job.leafKind;
-    to.word[2] = leaves == 0u ? kNone : leaves == 1u ? leafReference(0u) : 0u;
-    to.word[3] = state().word[kActive];
-    to.word[4] = job.nodes;
-    to.word[5] = job.primitives;
-    to.word[6] = job.vertices;
-    to.word[7] = job.geometries;
-    to.word[8] = leaves == 0u ? 0u : leaves - 1;
-    to.word[9] = job.leafKind == kInstances ? 0u : job.inputCount;
-    to.word[10] = job.savedParents;
-    to.word[11] = job.headerFlags;
+    Quads to = Quads(job.blob);
+    uint root = leaves == 0u ? kNone : leaves == 1u ? leafReference(0u) : 0u;
+    uint geometries = job.leafKind == kInstances ? 0u : job.inputCount;
+    to.quad[0] = uvec4(kBinary, job.leafKind, root, state().word[kActive]);
+    to.quad[1] = uvec4(job.nodes, job.primitives, job.vertices, job.geometries);
+    to.quad[2] = uvec4(leaves == 0u ? 0u : leaves - 1, geometries, job.savedParents, job.headerFlags);
+    for (uint k = 3; k < 8; ++k) to.quad[k] = uvec4(0);
 }
 
 // The hierarchy and the header.

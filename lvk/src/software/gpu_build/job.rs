@@ -57,6 +57,8 @@ pub(crate) struct Job {
     pub(crate) improvements: u32,
     pub(crate) reserved: u32,
     pub(crate) header_flags: u32,
+    /// Fills the record to a multiple of 16 bytes.
+    pub(crate) unused: [u32; 2],
 }
 
 /// Push constants of every kernel of a build.

@@ -219,6 +219,7 @@ impl GpuBuildPlan {
             improvements: self.improvements,
             reserved: 0,
             header_flags: header_flags(source),
+            unused: [0; 2],
         }
     }
 }
