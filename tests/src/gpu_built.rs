@@ -11,10 +11,13 @@ use crate::random::Random;
 /// A buffer that builds read.
 pub fn input<T: bytemuck::NoUninit>(ctx: &Context, data: &[T]) -> Holder<BufferHandle> {
     let bytes: &[u8] = bytemuck::cast_slice(data);
+    let device = ctx.capabilities();
+    let traces = device.ray_tracing_pipeline || device.ray_query;
+    let accel = if traces { BufferUsage::ACCEL_INPUT } else { BufferUsage::empty() };
     let desc = BufferDesc {
         size_bytes: bytes.len().max(16) as u64,
         data: Some(bytes),
-        usage: BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT,
+        usage: BufferUsage::STORAGE | accel,
         debug_name: "input",
         ..Default::default()
     };

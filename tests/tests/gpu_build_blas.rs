@@ -254,3 +254,23 @@ fn several_geometries_keep_their_numbers() {
         }
     }
 }
+
+#[test]
+fn better_places_cost_rays_less() {
+    let Some(ctx) = device() else { return };
+    // A few long triangles among many small ones are what a space-filling curve is bad at.
+    let mut corners = scattered(4000, 21);
+    corners.iter_mut().step_by(16).for_each(|triangle| triangle[1] = triangle[1].map(|n| n * 0.5));
+    let vertices = input(&ctx, &corners);
+    let geometries = [triangles(*vertices, corners.len())];
+    let desc = |improvements| GpuBlasDesc {
+        geometries: &geometries,
+        leaf_size: 1,
+        improvements,
+        indexed: false,
+        refit: true,
+    };
+    let built = build_blas(&ctx, &[0, 1, 2].map(desc)).unwrap();
+    let costs: Vec<f64> = built.iter().map(|structure| facts(&ctx, structure).cost).collect();
+    assert!(costs[1] < costs[0] && costs[2] <= costs[1] * 1.001, "{costs:?}");
+}

@@ -10,6 +10,7 @@ use crate::command::gpu_build::{GpuBuild, GpuRefit};
 use crate::context::holder::Holder;
 use crate::error::Result;
 use crate::handle::BufferHandle;
+use crate::kernel::Kernel;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage};
 pub use crate::software::gpu_build::check::{Bounds, EMPTY, Facts, check_structure};
@@ -154,6 +155,16 @@ pub fn sort(ctx: &Context, keys: &[u64], low_bits: u32) -> Result<Vec<(u64, u32)
     let mut words = vec![0_u32; (sorter.bytes() / 4) as usize];
     ctx.download_buffer(*buffer, offset, bytemuck::cast_slice_mut(&mut words))?;
     Ok(sorter.sorted(&words))
+}
+
+/// Compiles every kernel, after telling its name.
+pub fn compile_kernels(ctx: &Context, tell: &mut dyn FnMut(&str)) -> Result<()> {
+    let shared = ctx.shared();
+    for kernel in Kernel::ALL {
+        tell(kernel.name());
+        shared.kernels.get(&shared.gpu, &shared.layout, shared.pipeline_base().cache, *kernel)?;
+    }
+    Ok(())
 }
 
 fn record(ctx: &Context, record: impl FnOnce(&mut crate::CommandBuffer) -> Result<()>) -> Result<()> {

@@ -24,9 +24,9 @@ macro_rules! kernels {
         }
 
         impl Kernel {
-            const ALL: &'static [Self] = &[$(Self::$name),*];
+            pub(crate) const ALL: &'static [Self] = &[$(Self::$name),*];
 
-            fn name(self) -> &'static str {
+            pub(crate) fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => concat!("lvk kernel ", $file),)*
                 }

@@ -46,39 +46,34 @@ uvec2 structureOf(uvec2 named) {
     return uvec2(entry.word[0], entry.word[1]);
 }
 
-uvec4 rowOf(Affine m, uint row) { return floatBitsToUint(vec4(m.x[row], m.y[row], m.z[row], m.t[row])); }
-
-Affine affineOf(uvec4 rows[3]) {
-    mat3x4 m = mat3x4(uintBitsToFloat(rows[0]), uintBitsToFloat(rows[1]), uintBitsToFloat(rows[2]));
-    mat4x3 columns = transpose(m);
-    return Affine(columns[0], columns[1], columns[2], columns[3]);
-}
-
 // Keeps an instance and answers its box in the world; empty where no ray can meet it.
 Box keepInstance(uint i) {
     InputQuads record = InputQuads(element(job.inputs, i, 64u));
-    uvec4 rows[3] = uvec4[3](record.quad[0], record.quad[1], record.quad[2]);
-    uvec4 numbers = record.quad[3];
-    Affine m = affineOf(rows);
+    uvec4 a = record.quad[0], b = record.quad[1], c = record.quad[2], numbers = record.quad[3];
+    Affine m;
+    m.x = uintBitsToFloat(uvec3(a.x, b.x, c.x));
+    m.y = uintBitsToFloat(uvec3(a.y, b.y, c.y));
+    m.z = uintBitsToFloat(uvec3(a.z, b.z, c.z));
+    m.t = uintBitsToFloat(uvec3(a.w, b.w, c.w));
     uvec2 structure = structureOf(numbers.zw);
     Affine inverse;
     bool finite = isFinite(m.x) && isFinite(m.y) && isFinite(m.z) && isFinite(m.t);
     bool isActive = finite && numbers.x >> 24 != 0u && structure != uvec2(0) && invert(m, inverse);
     if (!isActive) return emptyBox();
-    InputQuads shown = InputQuads(structure);
-    uvec4 start = shown.quad[0];
-    if (start.x == kMoved) {
-        shown = InputQuads(start.zw);
-        start = shown.quad[0];
-    }
+    uvec4 start = InputQuads(structure).quad[0];
+    // An address, as references that depend on a condition are too much for some drivers.
+    uvec2 shown = start.x == kMoved ? start.zw : structure;
+    if (start.x == kMoved) start = InputQuads(shown).quad[0];
     if (start.z == kNone) return emptyBox();
     Quads kept = Quads(element(place(job.primitives), i, kInstanceBytes));
-    for (uint row = 0; row < 3; ++row) {
-        kept.quad[row] = rowOf(inverse, row);
-        kept.quad[3 + row] = rows[row];
-    }
+    kept.quad[0] = floatBitsToUint(vec4(inverse.x.x, inverse.y.x, inverse.z.x, inverse.t.x));
+    kept.quad[1] = floatBitsToUint(vec4(inverse.x.y, inverse.y.y, inverse.z.y, inverse.t.y));
+    kept.quad[2] = floatBitsToUint(vec4(inverse.x.z, inverse.y.z, inverse.z.z, inverse.t.z));
+    kept.quad[3] = a;
+    kept.quad[4] = b;
+    kept.quad[5] = c;
     kept.quad[6] = uvec4(structure, numbers.xy);
     kept.quad[7] = uvec4(i, uvec3(0));
-    uvec4 low = shown.quad[3], high = shown.quad[4];
+    uvec4 low = InputQuads(shown).quad[3], high = InputQuads(shown).quad[4];
     return moved(m, Box(uintBitsToFloat(low.xyz), uintBitsToFloat(uvec3(low.w, high.xy))));
 }
