@@ -8,6 +8,9 @@ use lvk::{
 
 use crate::random::Random;
 
+/// Geometry and primitive, and corners.
+pub type Content = ((u32, u32), Vec<[f32; 3]>);
+
 /// A buffer that builds read.
 pub fn input<T: bytemuck::NoUninit>(ctx: &Context, data: &[T]) -> Holder<BufferHandle> {
     let bytes: &[u8] = bytemuck::cast_slice(data);
@@ -71,7 +74,7 @@ pub fn facts(ctx: &Context, structure: &GpuStructure) -> Facts {
 ///
 /// # Panics
 /// When it does not.
-pub fn check_contents(facts: &Facts, expected: &[((u32, u32), Vec<[f32; 3]>)]) {
+pub fn check_contents(facts: &Facts, expected: &[Content]) {
     let bits = |corners: &[[f32; 3]]| corners.iter().map(|c| c.map(f32::to_bits)).collect::<Vec<_>>();
     let mut found: Vec<_> =
         facts.primitives.iter().zip(&facts.corners).map(|(ids, corners)| (*ids, bits(corners))).collect();
@@ -85,6 +88,6 @@ pub fn check_contents(facts: &Facts, expected: &[((u32, u32), Vec<[f32; 3]>)]) {
 }
 
 /// The triangles of geometry 0 as [`check_contents`] takes them.
-pub fn numbered(triangles: &[[[f32; 3]; 3]]) -> Vec<((u32, u32), Vec<[f32; 3]>)> {
+pub fn numbered(triangles: &[[[f32; 3]; 3]]) -> Vec<Content> {
     (0..).zip(triangles).map(|(index, corners)| ((0, index), corners.to_vec())).collect()
 }

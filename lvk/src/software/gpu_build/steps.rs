@@ -30,10 +30,11 @@ pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usiz
     let mut order: Vec<usize> = (0..builds.len()).collect();
     let small = |build: &usize| {
         let (plan, source) = builds[*build];
-        plan.is_small(source.count(plan)).then(|| match plan.leaf_kind {
+        let kernel = match plan.leaf_kind {
             LeafKind::Instances => Kernel::BuildSmallTlas,
             _ => Kernel::BuildSmallBlas,
-        })
+        };
+        plan.is_small(source.count(plan)).then_some(kernel)
     };
     order.sort_by_key(|build| (small(build).is_none(), small(build)));
     let mut steps: Vec<Step> = Vec::new();
