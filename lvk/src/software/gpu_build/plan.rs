@@ -98,7 +98,7 @@ pub(crate) enum BuildSource {
     Geometries(Vec<GpuGeometry>),
     /// Records of 64 bytes each (`VkAccelerationStructureInstanceKHR`).
     Instances {
-        /// Where the first lies; a multiple of 4.
+        /// Where the first lies; a multiple of 16.
         records: u64,
         /// How many, at most the plan's capacity.
         count: u32,
