@@ -8,13 +8,19 @@ use lvk::{
 
 use crate::random::Random;
 
+/// Geometry and primitive, and corners.
+pub type Content = ((u32, u32), Vec<[f32; 3]>);
+
 /// A buffer that builds read.
 pub fn input<T: bytemuck::NoUninit>(ctx: &Context, data: &[T]) -> Holder<BufferHandle> {
     let bytes: &[u8] = bytemuck::cast_slice(data);
+    let device = ctx.capabilities();
+    let traces = device.ray_tracing_pipeline || device.ray_query;
+    let accel = if traces { BufferUsage::ACCEL_INPUT } else { BufferUsage::empty() };
     let desc = BufferDesc {
         size_bytes: bytes.len().max(16) as u64,
         data: Some(bytes),
-        usage: BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT,
+        usage: BufferUsage::STORAGE | accel,
         debug_name: "input",
         ..Default::default()
     };
@@ -48,7 +54,7 @@ pub fn boxes(buffer: BufferHandle, count: usize) -> BlasGeometry {
 
 /// Builds one structure.
 pub fn build(ctx: &Context, geometries: &[BlasGeometry], leaf_size: u32) -> GpuStructure {
-    let desc = GpuBlasDesc { geometries, leaf_size, indexed: false, refit: true };
+    let desc = GpuBlasDesc { geometries, leaf_size, improvements: 1, indexed: false, refit: true };
     build_blas(ctx, &[desc]).expect("the build is recorded").remove(0)
 }
 
@@ -68,7 +74,7 @@ pub fn facts(ctx: &Context, structure: &GpuStructure) -> Facts {
 ///
 /// # Panics
 /// When it does not.
-pub fn check_contents(facts: &Facts, expected: &[((u32, u32), Vec<[f32; 3]>)]) {
+pub fn check_contents(facts: &Facts, expected: &[Content]) {
     let bits = |corners: &[[f32; 3]]| corners.iter().map(|c| c.map(f32::to_bits)).collect::<Vec<_>>();
     let mut found: Vec<_> =
         facts.primitives.iter().zip(&facts.corners).map(|(ids, corners)| (*ids, bits(corners))).collect();
@@ -82,6 +88,6 @@ pub fn check_contents(facts: &Facts, expected: &[((u32, u32), Vec<[f32; 3]>)]) {
 }
 
 /// The triangles of geometry 0 as [`check_contents`] takes them.
-pub fn numbered(triangles: &[[[f32; 3]; 3]]) -> Vec<((u32, u32), Vec<[f32; 3]>)> {
+pub fn numbered(triangles: &[[[f32; 3]; 3]]) -> Vec<Content> {
     (0..).zip(triangles).map(|(index, corners)| ((0, index), corners.to_vec())).collect()
 }

@@ -6,60 +6,52 @@ const CHILDREN: usize = 8;
 const NODE_WORDS: usize = 20;
 const HEADER_WORDS: usize = 32;
 
-/// The words of a structure of `count` triangles of one geometry, in their own order. A node has leaves only where all
-/// its triangles fit into them; else it has nodes and, where the triangles run out, nothing.
+/// The words of a structure of `count` triangles of one geometry, in their own order. Most nodes have both nodes and
+/// leaves below them, and some children that are missing.
 pub fn wide_structure(count: usize) -> Vec<u32> {
     let mut nodes: Vec<[u32; NODE_WORDS]> = Vec::new();
     let mut parents = Vec::new();
     let mut open = std::collections::VecDeque::from([(0, count, u32::MAX)]);
-    let mut reserved = 1;
     while let Some((first, count, parent)) = open.pop_front() {
         let mut node = [0; NODE_WORDS];
-        let mut metas = [0_u8; CHILDREN];
         let own = nodes.len() as u32;
-        let mut internal = 0;
-        node[4] = reserved;
-        node[5] = first as u32;
-        // Children that would be small become leaves beside nodes.
-        let mut taken = 0;
-        let share = count.div_ceil(CHILDREN);
-        let mut leaf_slots = 0;
-        for (child, meta) in metas.iter_mut().enumerate() {
-            let wanted = if share > LEAF && child >= 6 { LEAF } else { share.max(LEAF) };
-            let remaining_nodes = count - taken;
-            let size = if share > LEAF && child == 5 {
-                remaining_nodes.saturating_sub(2 * LEAF)
-            } else {
-                wanted.min(remaining_nodes)
-            };
-            if size == 0 {
-                continue;
-            }
-            if size <= LEAF {
-                let offset = first + taken - node[5] as usize;
-                if offset + size > 24 {
-                    // Leaves count from the node's first leaf.
-                    node[5] = (first + taken - leaf_slots) as u32;
+        node[4] = own + 1 + open.len() as u32;
+        let (mut taken, mut leaf_slots) = (0, 0);
+        for (child, size) in child_sizes(count).into_iter().enumerate() {
+            let meta = if size <= LEAF {
+                if leaf_slots == 0 {
+                    node[5] = (first + taken) as u32;
                 }
-                let offset = first + taken - node[5] as usize;
-                *meta = ((1_u8 << size) - 1) << 5 | offset as u8;
                 leaf_slots += size;
+                ((1 << size) - 1) << 5 | (first + taken - node[5] as usize) as u32
             } else {
-                internal |= 1 << child;
-                *meta = 0x20 | (24 + child as u8);
                 open.push_back((first + taken, size, own | (child as u32) << 29));
-                reserved += 1;
-            }
+                node[3] |= 1 << (24 + child);
+                0x20 | (24 + child as u32)
+            };
+            node[6 + child / 4] |= if size == 0 { 0 } else { meta << (child % 4 * 8) };
             taken += size;
         }
-        assert_eq!(taken, count);
-        node[3] = internal << 24;
-        node[6] = u32::from_le_bytes([metas[0], metas[1], metas[2], metas[3]]);
-        node[7] = u32::from_le_bytes([metas[4], metas[5], metas[6], metas[7]]);
+        assert_eq!(taken, count, "children have all triangles");
         nodes.push(node);
         parents.push(parent);
     }
     assemble(count, &nodes, &parents)
+}
+
+/// Leaves only where all fits into them, else six nodes and two leaves behind them, as far as there are triangles.
+fn child_sizes(count: usize) -> [usize; CHILDREN] {
+    let mut left = count;
+    let mut take = |size: usize| {
+        let size = size.min(left);
+        left -= size;
+        size
+    };
+    if count <= LEAF * CHILDREN {
+        return [(); CHILDREN].map(|()| take(LEAF));
+    }
+    let share = (count - 2 * LEAF).div_ceil(CHILDREN - 2);
+    std::array::from_fn(|child| take(if child < CHILDREN - 2 { share.min(count) } else { LEAF }))
 }
 
 fn assemble(count: usize, nodes: &[[u32; NODE_WORDS]], parents: &[u32]) -> Vec<u32> {

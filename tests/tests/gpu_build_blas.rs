@@ -41,7 +41,8 @@ fn many_structures_are_built_side_by_side() {
     let vertices: Vec<_> = meshes.iter().map(|corners| input(&ctx, corners)).collect();
     let geometries: Vec<_> =
         vertices.iter().zip(counts).map(|(vertices, count)| [triangles(**vertices, count)]).collect();
-    let desc = |geometries| GpuBlasDesc { geometries, leaf_size: 2, indexed: false, refit: false };
+    let desc =
+        |geometries| GpuBlasDesc { geometries, leaf_size: 2, improvements: 1, indexed: false, refit: false };
     let descs: Vec<_> = geometries.iter().map(|geometries| desc(&geometries[..])).collect();
     for (structure, corners) in build_blas(&ctx, &descs).unwrap().iter().zip(&meshes) {
         check_contents(&facts(&ctx, structure), &numbered(corners));
@@ -246,9 +247,30 @@ fn several_geometries_keep_their_numbers() {
             expected.extend(numbered(mesh).into_iter().map(|((_, index), c)| ((geometry, index), c)));
         }
         for indexed in [false, true] {
-            let desc = GpuBlasDesc { geometries: &geometries, leaf_size: 2, indexed, refit: true };
+            let desc =
+                GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, indexed, refit: true };
             let built = build_blas(&ctx, &[desc]).unwrap();
             check_contents(&facts(&ctx, &built[0]), &expected);
         }
     }
+}
+
+#[test]
+fn better_places_cost_rays_less() {
+    let Some(ctx) = device() else { return };
+    // A few long triangles among many small ones are what a space-filling curve is bad at.
+    let mut corners = scattered(4000, 21);
+    corners.iter_mut().step_by(16).for_each(|triangle| triangle[1] = triangle[1].map(|n| n * 0.5));
+    let vertices = input(&ctx, &corners);
+    let geometries = [triangles(*vertices, corners.len())];
+    let desc = |improvements| GpuBlasDesc {
+        geometries: &geometries,
+        leaf_size: 1,
+        improvements,
+        indexed: false,
+        refit: true,
+    };
+    let built = build_blas(&ctx, &[0, 1, 2].map(desc)).unwrap();
+    let costs: Vec<f64> = built.iter().map(|structure| facts(&ctx, structure).cost).collect();
+    assert!(costs[1] < costs[0] && costs[2] <= costs[1] * 1.001, "{costs:?}");
 }

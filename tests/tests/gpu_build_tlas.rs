@@ -106,8 +106,10 @@ impl Shown {
         };
         let expected = transform_rows(&affine(&numbers[12..]).inverse());
         for (axis, (found, expected)) in numbers[..12].iter().zip(expected).enumerate() {
-            let scale = numbers[axis / 4 * 4..][..4].iter().fold(0.0_f32, |most, n| most.max(n.abs()));
-            assert!((found - expected).abs() <= 1e-4 * scale, "{found} {expected}");
+            let row = &numbers[axis / 4 * 4..][..4];
+            let largest = |list: &[f32]| list.iter().fold(0.0_f32, |most, number| most.max(number.abs()));
+            let moved = largest(&row[..3]) * largest(&[numbers[15], numbers[19], numbers[23]]);
+            assert!((found - expected).abs() <= 1e-4 * largest(row) + 1e-5 * moved, "{found} {expected}");
         }
         assert_eq!(u64::from(kept[24]) | u64::from(kept[25]) << 32, self.structures[place].0.address);
         assert_eq!(kept[26..28], [record.custom_index_and_mask, record.offset_and_flags]);

@@ -13,7 +13,8 @@ fn binary_nodes_follow_moved_triangles() {
         for indexed in [false, true] {
             let vertices = input(&ctx, &scattered(count, 1));
             let geometries = [triangles(*vertices, count)];
-            let desc = GpuBlasDesc { geometries: &geometries, leaf_size: 2, indexed, refit: true };
+            let desc =
+                GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, indexed, refit: true };
             let structure = build_blas(&ctx, &[desc]).unwrap().remove(0);
             let before = facts(&ctx, &structure);
             for seed in [2, 3] {

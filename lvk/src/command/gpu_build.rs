@@ -133,7 +133,7 @@ impl CommandBuffer {
             if before.is_some_and(|before| before.phase != step.phase) {
                 self.meet_in_compute();
             }
-            let push = BuildPush { jobs, first_job: step.job, sort_pass: step.sort_pass };
+            let push = BuildPush { jobs, first_job: step.job, pass_or_jobs: step.pass_or_jobs };
             let bind = before.is_none_or(|before| before.kernel != step.kernel);
             self.dispatch_kernel(bind.then_some(&pipeline), bytemuck::bytes_of(&push), spread(step.groups));
         }

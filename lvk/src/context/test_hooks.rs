@@ -10,6 +10,7 @@ use crate::command::gpu_build::{GpuBuild, GpuRefit};
 use crate::context::holder::Holder;
 use crate::error::Result;
 use crate::handle::BufferHandle;
+use crate::kernel::Kernel;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage};
 pub use crate::software::gpu_build::check::{Bounds, EMPTY, Facts, check_structure};
@@ -24,6 +25,7 @@ const ALIGNMENT: u64 = 256;
 pub struct GpuBlasDesc<'a> {
     pub geometries: &'a [BlasGeometry],
     pub leaf_size: u32,
+    pub improvements: u32,
     pub indexed: bool,
     pub refit: bool,
 }
@@ -53,6 +55,7 @@ pub fn build_blas(ctx: &Context, descs: &[GpuBlasDesc<'_>]) -> Result<Vec<GpuStr
             vertex_count: geometries.iter().map(|geometry| geometry.vertex_count).sum(),
             geometry_count: geometries.len() as u32,
             leaf_size: desc.leaf_size,
+            improvements: desc.improvements,
             refit: desc.refit,
         };
         let plan = GpuBuildPlan::blas("test", &shape)?;
@@ -152,6 +155,16 @@ pub fn sort(ctx: &Context, keys: &[u64], low_bits: u32) -> Result<Vec<(u64, u32)
     let mut words = vec![0_u32; (sorter.bytes() / 4) as usize];
     ctx.download_buffer(*buffer, offset, bytemuck::cast_slice_mut(&mut words))?;
     Ok(sorter.sorted(&words))
+}
+
+/// Compiles every kernel, after telling its name.
+pub fn compile_kernels(ctx: &Context, tell: &mut dyn FnMut(&str)) -> Result<()> {
+    let shared = ctx.shared();
+    for kernel in Kernel::ALL {
+        tell(kernel.name());
+        shared.kernels.get(&shared.gpu, &shared.layout, shared.pipeline_base().cache, *kernel)?;
+    }
+    Ok(())
 }
 
 fn record(ctx: &Context, record: impl FnOnce(&mut crate::CommandBuffer) -> Result<()>) -> Result<()> {

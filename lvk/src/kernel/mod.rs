@@ -24,9 +24,9 @@ macro_rules! kernels {
         }
 
         impl Kernel {
-            const ALL: &'static [Self] = &[$(Self::$name),*];
+            pub(crate) const ALL: &'static [Self] = &[$(Self::$name),*];
 
-            fn name(self) -> &'static str {
+            pub(crate) fn name(self) -> &'static str {
                 match self {
                     $(Self::$name => concat!("lvk kernel ", $file),)*
                 }
@@ -70,27 +70,43 @@ kernels! {
     SortScan = "build/sort_scan", ["build/job.glsl", "build/rank.glsl", "build/sort_scan.comp.glsl"];
     /// Moves codes to where they belong.
     SortScatter = "build/sort_scatter", ["build/job.glsl", "build/rank.glsl", "build/sort_scatter.comp.glsl"];
-    /// The hierarchy and the leaves.
+    /// The hierarchy and the leaves of triangles and boxes.
     BuildTree = "build/tree",
         ["build/job.glsl", "build/box.glsl", "build/input.glsl", "build/leaf.glsl", "build/leaf_write.glsl",
-         "build/tree.glsl", "build/tree.comp.glsl"];
+         "build/arrivals.glsl", "build/tree.glsl", "build/contents.glsl", "build/tree.comp.glsl"];
+    /// The hierarchy of instances.
+    BuildTlasTree = "build/tlas_tree",
+        ["build/job.glsl", "build/arrivals.glsl", "build/tree.glsl", "build/tlas_tree.comp.glsl"];
+    /// No child has arrived at any node.
+    ResetArrivals = "build/arrivals", ["build/job.glsl", "build/arrivals.glsl", "build/arrivals.comp.glsl"];
+    /// Boxes of binary nodes, and better places for them.
+    BuildImprove = "build/improve",
+        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
+         "build/arrivals.glsl", "build/node.glsl", "build/rotate.glsl", "build/fit.glsl", "build/improve.comp.glsl"];
     /// Boxes of binary nodes.
     FitBinary = "build/fit",
-        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/fit.glsl",
-         "build/fit.comp.glsl"];
+        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
+         "build/arrivals.glsl", "build/node.glsl", "build/no_rotation.glsl", "build/fit.glsl", "build/fit.comp.glsl"];
     /// Boxes of wide nodes.
     FitWide = "build/fit_wide",
-        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/fit_wide.glsl",
-         "build/fit_wide.comp.glsl"];
+        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
+         "build/fit_wide.glsl", "build/fit_wide.comp.glsl"];
     /// Primitives of leaves from inputs that moved.
     RefitLeaves = "build/refit",
         ["build/job.glsl", "build/box.glsl", "build/input.glsl", "build/leaf.glsl", "build/leaf_write.glsl",
-         "build/refit.glsl", "build/refit.comp.glsl"];
-    /// A whole build by one workgroup.
-    BuildSmall = "build/small",
+         "build/arrivals.glsl", "build/refit.glsl", "build/refit.comp.glsl"];
+    /// A whole bottom-level structure by one workgroup.
+    BuildSmallBlas = "build/small_blas",
         ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/input.glsl",
-         "build/instance.glsl", "build/code.glsl", "build/rank.glsl", "build/leaf.glsl", "build/leaf_write.glsl",
-         "build/tree.glsl", "build/fit.glsl", "build/small.comp.glsl"];
+         "build/code.glsl", "build/rank.glsl", "build/leaf.glsl", "build/kept_any.glsl", "build/leaf_write.glsl",
+         "build/arrivals.glsl", "build/tree.glsl", "build/contents.glsl", "build/node.glsl", "build/rotate.glsl",
+         "build/fit.glsl", "build/small_blas.comp.glsl", "build/small.glsl"];
+    /// A whole top-level structure by one workgroup.
+    BuildSmallTlas = "build/small_tlas",
+        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/instance.glsl",
+         "build/code.glsl", "build/rank.glsl", "build/leaf.glsl", "build/kept_instance.glsl", "build/arrivals.glsl",
+         "build/tree.glsl", "build/node.glsl", "build/rotate.glsl", "build/fit.glsl",
+         "build/small_tlas.comp.glsl", "build/small.glsl"];
 }
 
 /// Push constants of [`Kernel::Gather`].

@@ -8,7 +8,7 @@ void extendBounds(Box centres, uint actives) {
     groupLo[t] = centres.lo;
     groupHi[t] = centres.hi;
     groupActive[t] = actives;
-    for (uint half_ = kGroup / 2; half_ > 0; half_ /= 2) {
+    [[dont_unroll]] for (uint half_ = kGroup / 2; half_ > 0; half_ /= 2) {
         barrier();
         if (t < half_) {
             groupLo[t] = min(groupLo[t], groupLo[t + half_]);
@@ -20,7 +20,7 @@ void extendBounds(Box centres, uint actives) {
         uvec3 lo = ~ordered(groupLo[0]);
         uvec3 hi = ordered(groupHi[0]);
         Words all_ = state();
-        for (uint axis = 0; axis < 3; ++axis) {
+        [[dont_unroll]] for (uint axis = 0; axis < 3; ++axis) {
             atomicMax(all_.word[axis], lo[axis]);
             atomicMax(all_.word[3 + axis], hi[axis]);
         }
@@ -30,7 +30,7 @@ void extendBounds(Box centres, uint actives) {
 
 // Keeps the box of a primitive and answers its centre as a box; empty where the primitive is inactive.
 Box keepBox(uint i, Box box, inout uint actives) {
-    writeBox(Floats(work(job.boxes)), i * 6, box);
+    writeBox(Corners(work(job.boxes)), i, box);
     if (isEmpty(box)) return box;
     actives += 1;
     vec3 c = centre(box);

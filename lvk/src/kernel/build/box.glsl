@@ -30,16 +30,9 @@ vec3 unordered(uvec3 v) {
     return uintBitsToFloat(mix(~v, v & 0x7fffffffu, notEqual(v & 0x80000000u, uvec3(0))));
 }
 
-Box readBox(Floats from, uint at) {
-    return Box(vec3(from.value[at], from.value[at + 1], from.value[at + 2]),
-               vec3(from.value[at + 3], from.value[at + 4], from.value[at + 5]));
-}
+Box readBox(Corners from, uint i) { return Box(from.corner[2 * i], from.corner[2 * i + 1]); }
 
-void writeBox(Floats to, uint at, Box box) {
-    to.value[at] = box.lo.x;
-    to.value[at + 1] = box.lo.y;
-    to.value[at + 2] = box.lo.z;
-    to.value[at + 3] = box.hi.x;
-    to.value[at + 4] = box.hi.y;
-    to.value[at + 5] = box.hi.z;
+void writeBox(Corners to, uint i, Box box) {
+    to.corner[2 * i] = box.lo;
+    to.corner[2 * i + 1] = box.hi;
 }

@@ -10,9 +10,10 @@ uint interleave(uvec3 v) { return spread(v.x) << 2 | spread(v.y) << 1 | spread(v
 
 // Where primitive `i` lies in the bounds of all centres, by cells that are cubes. High word, low word.
 uvec2 codeOf(Box box) {
-    Words all_ = state();
-    vec3 lo = unordered(~uvec3(all_.word[0], all_.word[1], all_.word[2]));
-    vec3 hi = unordered(uvec3(all_.word[3], all_.word[4], all_.word[5]));
+    Quads all_ = Quads(job.scratch);
+    uvec4 first = all_.quad[0], second = all_.quad[1];
+    vec3 lo = unordered(~first.xyz);
+    vec3 hi = unordered(uvec3(first.w, second.xy));
     vec3 extent = hi * 0.5 - lo * 0.5;
     float largest = max(extent.x, max(extent.y, extent.z));
     vec3 unit = largest > 0.0 ? (centre(box) * 0.5 - lo * 0.5) / largest : vec3(0);
@@ -24,7 +25,7 @@ uvec2 codeOf(Box box) {
 
 // Writes the key of primitive `i`; those that are inactive sort behind all others.
 void writeKey(uint i) {
-    Box box = readBox(Floats(work(job.boxes)), i * 6);
+    Box box = readBox(Corners(work(job.boxes)), i);
     uvec2 code = isEmpty(box) ? uvec2(kNone) : codeOf(box);
     Words keys = keysBefore(0u);
     keys.word[i] = code.x;

@@ -1,7 +1,6 @@
-// The key of every primitive; and no node has been fitted yet.
+// The key of every primitive.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     uint i = invocation();
     if (i < job.count) writeKey(i);
-    if (i < job.nodeCapacity) Words(work(job.arrivals)).word[i] = 0u;
 }

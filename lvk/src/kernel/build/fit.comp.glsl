@@ -1,5 +1,5 @@
 // The boxes of binary nodes.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     fitFrom(invocation());
 }

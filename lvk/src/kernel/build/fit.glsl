@@ -1,34 +1,9 @@
 // Fits the boxes of binary nodes, bottom up. A node's own invocation starts where both children are leaves; above, the
 // child that arrives last goes on, so that nobody ever waits.
-Words nodeAt(uint node) { return Words(plus(place(job.nodes), node << 6, node >> 26)); }
-
-// A child's box and the nodes on the longest path below it.
-struct Fitted { Box box; uint height; };
-
-void writeChild(uint node, uint which, Fitted child) {
-    Floats to = Floats(plus(place(job.nodes), node << 6, node >> 26));
-    writeVec3(to, which * 8, child.box.lo);
-    writeVec3(to, which * 8 + 4, child.box.hi);
-    nodeAt(node).word[11 + which * 4] = child.height;
-}
-
-Fitted readChild(uint node, uint which) {
-    Floats from = Floats(plus(place(job.nodes), node << 6, node >> 26));
-    return Fitted(Box(readVec3(from, which * 8), readVec3(from, which * 8 + 4)), nodeAt(node).word[11 + which * 4]);
-}
-
-bool isLeaf(uint reference) { return (reference & kLeaf) != 0u; }
-
-Fitted fitLeaf(uint node, uint which, uint reference) {
-    Fitted fitted = Fitted(leafBox(reference), 0u);
-    writeChild(node, which, fitted);
-    return fitted;
-}
-
 void finish(Fitted root) {
-    Floats to = Floats(job.blob);
-    writeVec3(to, 12, root.box.lo);
-    writeVec3(to, 15, root.box.hi);
+    Corners to = Corners(plus(job.blob, 48u, 0u));
+    to.corner[0] = root.box.lo;
+    to.corner[1] = root.box.hi;
     header().word[18] = root.height;
 }
 
@@ -37,32 +12,31 @@ void fitFrom(uint i) {
     uint nodes = min(header().word[8], job.nodeCapacity);
     if (nodes == 0u && i == 0u) finish(Fitted(leafBox(header().word[2]), 0u));
     if (i >= nodes) return;
-    uint node = i;
-    uint first = nodeAt(node).word[3], second = nodeAt(node).word[7];
-    if (!isLeaf(first) || !isLeaf(second)) return;
-    Fitted one = fitLeaf(node, 0u, first);
-    Fitted other = fitLeaf(node, 1u, second);
+    if (Words(work(job.arrivals)).word[i] != kStart) return;
+    uint number = i;
+    uint which = 0u;
+    fitLeaf(number, which, Words(nodeAt(number)).word[3]);
     // Each step goes one node up; a damaged structure with a circle ends too.
-    for (uint steps = 0; steps < nodes; ++steps) {
-        Fitted both = Fitted(join(one.box, other.box), max(one.height, other.height) + 1);
-        uint parent = Words(job.parents).word[node];
-        if (parent == kNone) {
-            finish(both);
-            return;
-        }
-        uint which = parent >> 29 & 1u;
-        node = parent & 0x1fffffffu;
-        if (node >= nodes) return;
-        writeChild(node, which, both);
-        uint sibling = nodeAt(node).word[which == 0u ? 7 : 3];
-        one = both;
+    [[dont_unroll]] for (uint steps = 0; steps < nodes; ++steps) {
+        uint sibling = Words(nodeAt(number)).word[which == 0u ? 7 : 3];
         if (isLeaf(sibling)) {
-            other = fitLeaf(node, 1u - which, sibling);
+            fitLeaf(number, 1u - which, sibling);
         } else {
             memoryBarrierBuffer();
-            if (atomicAdd(Words(work(job.arrivals)).word[node], 1u) == 0u) return;
+            if (atomicAdd(Words(work(job.arrivals)).word[number], 1u) == 0u) return;
             memoryBarrierBuffer();
-            other = readChild(node, 1u - which);
         }
+        Node node = readNode(number);
+        Fitted whole = Fitted(join(childOf(node, 0u).box, childOf(node, 1u).box), 0u);
+        whole.height = rotate(number, node);
+        uint parent = Words(job.parents).word[number];
+        if (parent == kNone) {
+            finish(whole);
+            return;
+        }
+        which = parent >> 29 & 1u;
+        number = parent & 0x1fffffffu;
+        if (number >= nodes) return;
+        writeChild(number, which, whole);
     }
 }

@@ -1,5 +1,5 @@
 // The boxes of wide nodes.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     fitWideFrom(invocation());
 }

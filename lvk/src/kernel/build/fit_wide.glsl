@@ -14,7 +14,7 @@ Box wideChild(Words node, uint child) {
     if ((internal >> child & 1u) == 0u) return slotsBox(node.word[5] + (meta & 31u), bitCount(meta >> 5));
     uint number = node.word[4] + bitCount(internal & ((1u << child) - 1));
     if (number >= job.nodeCapacity) return emptyBox();
-    return readBox(Floats(work(job.boxes)), number * 6);
+    return readBox(Corners(work(job.boxes)), number);
 }
 
 // The smallest power of two by whose 255 steps the extent is covered, as an exponent with its bias.
@@ -33,19 +33,19 @@ uint stepsUp(float distance_, float unit) { return uint(clamp(ceil(distance_ / u
 Box encode(Words node) {
     Box child[kChildren];
     Box all_ = emptyBox();
-    for (uint i = 0; i < kChildren; ++i) {
+    [[dont_unroll]] for (uint i = 0; i < kChildren; ++i) {
         child[i] = wideChild(node, i);
         all_ = join(all_, child[i]);
     }
     vec3 corner = isEmpty(all_) ? vec3(0) : all_.lo;
     vec3 extent = isEmpty(all_) ? vec3(0) : all_.hi - all_.lo;
     uint exponents = 0u;
-    for (uint axis = 0; axis < 3; ++axis) {
+    [[dont_unroll]] for (uint axis = 0; axis < 3; ++axis) {
         uint exponent = exponentOf(extent[axis]);
         float unit = uintBitsToFloat(exponent << 23);
         exponents |= exponent << axis * 8;
         uvec2 low = uvec2(0), high = uvec2(0);
-        for (uint i = 0; i < kChildren; ++i) {
+        [[dont_unroll]] for (uint i = 0; i < kChildren; ++i) {
             bool none = isEmpty(child[i]);
             uint down = none ? 255u : stepsDown(child[i].lo[axis] - corner[axis], unit);
             uint up = none ? 0u : stepsUp(child[i].hi[axis] - corner[axis], unit);
@@ -58,14 +58,15 @@ Box encode(Words node) {
         node.word[at + 2] = high.x;
         node.word[at + 3] = high.y;
     }
-    for (uint axis = 0; axis < 3; ++axis) node.word[axis] = floatBitsToUint(corner[axis]);
+    [[dont_unroll]] for (uint axis = 0; axis < 3; ++axis) node.word[axis] = floatBitsToUint(corner[axis]);
     node.word[3] = exponents | (node.word[3] & 0xff000000u);
     return all_;
 }
 
 void finishWide(Box box) {
-    writeVec3(Floats(job.blob), 12, box.lo);
-    writeVec3(Floats(job.blob), 15, box.hi);
+    Corners to = Corners(plus(job.blob, 48u, 0u));
+    to.corner[0] = box.lo;
+    to.corner[1] = box.hi;
 }
 
 // Fits what can be fitted from node `i` up to the root: it starts where no child is a node.
@@ -74,9 +75,9 @@ void fitWideFrom(uint i) {
     if (nodes == 0u && i == 0u) finishWide(leafBox(header().word[2]));
     if (i >= nodes || wideAt(i).word[3] >> 24 != 0u) return;
     uint node = i;
-    for (uint steps = 0; steps < nodes; ++steps) {
+    [[dont_unroll]] for (uint steps = 0; steps < nodes; ++steps) {
         Box box = encode(wideAt(node));
-        writeBox(Floats(work(job.boxes)), node * 6, box);
+        writeBox(Corners(work(job.boxes)), node, box);
         uint parent = Words(job.parents).word[node];
         if (parent == kNone) {
             finishWide(box);

@@ -15,7 +15,16 @@ struct Geometry {
     uint reserved2;
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Geometries { Geometry geometry[]; };
+const uint kGeometryBytes = 64u;
+// Their words.
+const uint kFirstPrimitive = 10u;
+const uint kFirstVertex = 11u;
+
+Geometry readGeometry(uint number) {
+    InputQuads from = InputQuads(element(job.inputs, number, kGeometryBytes));
+    uvec4 a = from.quad[0], b = from.quad[1], c = from.quad[2], d = from.quad[3];
+    return Geometry(a.xy, a.zw, b.xy, b.z, b.w, c.x, c.y, c.z, c.w, d.x, d.y, d.z, d.w);
+}
 
 // Four bytes from any address; reads no word that has none of them.
 uint wordAt(uvec2 address) {
@@ -30,41 +39,37 @@ uint halfAt(uvec2 address) {
     return (address.x & 2u) == 0u ? word & 0xffffu : word >> 16;
 }
 
-vec3 positionAt(uvec2 at, uint format) {
-    uint x = wordAt(at);
-    switch (format) {
-        case 0u: return vec3(uintBitsToFloat(x), 0.0, 0.0);
-        case 1u: return vec3(uintBitsToFloat(uvec2(x, wordAt(plus(at, 4u, 0u)))), 0.0);
-        case 2u:
-        case 3u: return uintBitsToFloat(uvec3(x, wordAt(plus(at, 4u, 0u)), wordAt(plus(at, 8u, 0u))));
-        case 4u: return vec3(unpackHalf2x16(x), 0.0);
-        case 5u: return vec3(unpackHalf2x16(x), unpackHalf2x16(halfAt(plus(at, 4u, 0u))).x);
-        case 6u: return vec3(unpackSnorm2x16(x), 0.0);
-        case 7u: return vec3(unpackSnorm2x16(x), unpackSnorm2x16(halfAt(plus(at, 4u, 0u))).x);
-        case 8u: return unpackUnorm4x8(x).xyz;
-        default: return vec3(float(x), 0.0, 0.0);
-    }
+// Positions of 32-bit numbers lie at multiples of four bytes.
+vec3 widePosition(uvec2 at, uint format) {
+    if (format == 2u || format == 3u) return uintBitsToFloat(InputTriples(at).triple[0]);
+    Inputs words = Inputs(at);
+    uint x = words.word[0];
+    if (format == 9u) return vec3(float(x), 0.0, 0.0);
+    return vec3(uintBitsToFloat(x), format == 1u ? uintBitsToFloat(words.word[1]) : 0.0, 0.0);
+}
+
+vec3 narrowPosition(uvec2 at, uint format) {
+    uint low = wordAt(at);
+    uint high = format == 5u || format == 7u ? halfAt(plus(at, 4u, 0u)) : 0u;
+    if (format < 6u) return vec3(unpackHalf2x16(low), unpackHalf2x16(high).x);
+    if (format < 8u) return vec3(unpackSnorm2x16(low), unpackSnorm2x16(high).x);
+    return unpackUnorm4x8(low).xyz;
 }
 
 vec3 positionOf(Geometry g, uint vertex) {
-    vec3 p = positionAt(element(g.data, vertex, g.stride), g.format);
+    uvec2 at = element(g.data, vertex, g.stride);
+    vec3 p = g.format < 4u || g.format > 8u ? widePosition(at, g.format) : narrowPosition(at, g.format);
     if (g.matrix == uvec2(0)) return p;
-    Inputs rows = Inputs(g.matrix);
-    vec3 moved;
-    for (uint row = 0; row < 3; ++row) {
-        vec4 r = uintBitsToFloat(uvec4(rows.word[row * 4], rows.word[row * 4 + 1], rows.word[row * 4 + 2],
-                                       rows.word[row * 4 + 3]));
-        moved[row] = dot(r.xyz, p) + r.w;
-    }
-    return moved;
+    InputQuads rows = InputQuads(g.matrix);
+    mat3x4 m = mat3x4(uintBitsToFloat(rows.quad[0]), uintBitsToFloat(rows.quad[1]), uintBitsToFloat(rows.quad[2]));
+    return vec4(p, 1.0) * m;
 }
 
 uvec3 cornersOf(Geometry g, uint primitive) {
     if (g.indexBytes == 0u) return uvec3(0, 1, 2) + primitive * 3u;
     uvec2 at = element(g.indices, primitive, g.indexBytes * 3u);
     if (g.indexBytes == 2u) return uvec3(halfAt(at), halfAt(plus(at, 2u, 0u)), halfAt(plus(at, 4u, 0u)));
-    Inputs three = Inputs(at);
-    return uvec3(three.word[0], three.word[1], three.word[2]);
+    return InputTriples(at).triple[0];
 }
 
 // A triangle, or the two corners of a box. Inactive where a number is none, or an index beyond the vertices.
@@ -79,14 +84,17 @@ struct Primitive {
 Primitive readTriangle(Geometry g, uint index) {
     Primitive found;
     found.corner = cornersOf(g, index);
-    found.a = found.b = found.c = vec3(0);
     found.isActive = all(lessThan(found.corner, uvec3(g.vertexCount)));
+    mat3 corners = mat3(0.0);
     if (found.isActive) {
-        found.a = positionOf(g, found.corner.x);
-        found.b = positionOf(g, found.corner.y);
-        found.c = positionOf(g, found.corner.z);
-        found.isActive = isFinite(found.a) && isFinite(found.b) && isFinite(found.c);
+        [[dont_unroll]] for (uint k = 0; k < 3; ++k) {
+            corners[k] = positionOf(g, found.corner[k]);
+            found.isActive = found.isActive && isFinite(corners[k]);
+        }
     }
+    found.a = corners[0];
+    found.b = corners[1];
+    found.c = corners[2];
     return found;
 }
 
@@ -94,8 +102,9 @@ Primitive readBoxInput(Geometry g, uint index) {
     uvec2 at = element(g.data, index, g.stride);
     Primitive found;
     found.corner = uvec3(0);
-    found.a = positionAt(at, 2u);
-    found.b = positionAt(plus(at, 12u, 0u), 2u);
+    InputTriples corners = InputTriples(at);
+    found.a = uintBitsToFloat(corners.triple[0]);
+    found.b = uintBitsToFloat(corners.triple[1]);
     found.c = vec3(0);
     found.isActive = isNumber(found.a) && isNumber(found.b) && all(lessThanEqual(found.a, found.b));
     found.a = clamp(found.a, vec3(-kFar), vec3(kFar));
@@ -115,17 +124,16 @@ Box boxOf(Primitive found) {
 
 // The last geometry that starts at or before number `i`, counted in primitives or vertices.
 uint geometryOf(uint i, bool vertices) {
-    Geometries list = Geometries(job.inputs);
+    uint word = vertices ? kFirstVertex : kFirstPrimitive;
     uint low = 0, high = job.inputCount;
-    while (high - low > 1) {
+    [[dont_unroll]] while (high - low > 1) {
         uint middle = (low + high) / 2;
-        uint first = vertices ? list.geometry[middle].firstVertex : list.geometry[middle].firstPrimitive;
-        if (first <= i) low = middle; else high = middle;
+        if (Inputs(element(job.inputs, middle, kGeometryBytes)).word[word] <= i) low = middle; else high = middle;
     }
     return low;
 }
 
 Box inputBox(uint i) {
-    Geometry g = Geometries(job.inputs).geometry[geometryOf(i, false)];
+    Geometry g = readGeometry(geometryOf(i, false));
     return boxOf(readPrimitive(g, i - g.firstPrimitive));
 }

@@ -1,6 +1,5 @@
 // Instances: records as the caller's buffers hold them, and as the structure keeps them.
-const uint kRecordWords = 16u;
-const uint kInstanceWords = 32u;
+const uint kInstanceBytes = 128u;
 
 // A header that only says where the structure lies now.
 const uint kMoved = 2u;
@@ -40,52 +39,41 @@ Box moved(Affine m, Box box) {
     return Box(clamp(middle - half_, vec3(-kFar), vec3(kFar)), clamp(middle + half_, vec3(-kFar), vec3(kFar)));
 }
 
-uvec2 structureOf(Inputs record) {
-    uvec2 named = uvec2(record.word[14], record.word[15]);
+uvec2 structureOf(uvec2 named) {
     if (job.table == uvec2(0)) return named;
     if (named.y != 0u || named.x >= job.inputCount) return uvec2(0);
     Inputs entry = Inputs(element(job.table, named.x, 8u));
     return uvec2(entry.word[0], entry.word[1]);
 }
 
-void writeRows(Floats to, uint at, Affine m) {
-    for (uint row = 0; row < 3; ++row) {
-        to.value[at + row * 4] = m.x[row];
-        to.value[at + row * 4 + 1] = m.y[row];
-        to.value[at + row * 4 + 2] = m.z[row];
-        to.value[at + row * 4 + 3] = m.t[row];
-    }
-}
-
 // Keeps an instance and answers its box in the world; empty where no ray can meet it.
 Box keepInstance(uint i) {
-    Inputs record = Inputs(element(job.inputs, i, kRecordWords * 4u));
+    InputQuads record = InputQuads(element(job.inputs, i, 64u));
+    uvec4 a = record.quad[0], b = record.quad[1], c = record.quad[2], numbers = record.quad[3];
     Affine m;
-    for (uint row = 0; row < 3; ++row) {
-        m.x[row] = uintBitsToFloat(record.word[row * 4]);
-        m.y[row] = uintBitsToFloat(record.word[row * 4 + 1]);
-        m.z[row] = uintBitsToFloat(record.word[row * 4 + 2]);
-        m.t[row] = uintBitsToFloat(record.word[row * 4 + 3]);
-    }
-    uvec2 structure = structureOf(record);
+    m.x = uintBitsToFloat(uvec3(a.x, b.x, c.x));
+    m.y = uintBitsToFloat(uvec3(a.y, b.y, c.y));
+    m.z = uintBitsToFloat(uvec3(a.z, b.z, c.z));
+    m.t = uintBitsToFloat(uvec3(a.w, b.w, c.w));
+    uvec2 structure = structureOf(numbers.zw);
     Affine inverse;
     bool finite = isFinite(m.x) && isFinite(m.y) && isFinite(m.z) && isFinite(m.t);
-    bool isActive = finite && record.word[12] >> 24 != 0u && structure != uvec2(0) && invert(m, inverse);
+    bool isActive = finite && numbers.x >> 24 != 0u && structure != uvec2(0) && invert(m, inverse);
     if (!isActive) return emptyBox();
-    Inputs shown = Inputs(structure);
-    if (shown.word[0] == kMoved) shown = Inputs(uvec2(shown.word[2], shown.word[3]));
-    if (shown.word[2] == kNone) return emptyBox();
-    Words kept = Words(plus(place(job.primitives), i * kInstanceWords << 2, i >> 25));
-    Floats numbers = Floats(plus(place(job.primitives), i * kInstanceWords << 2, i >> 25));
-    writeRows(numbers, 0, inverse);
-    writeRows(numbers, 12, m);
-    kept.word[24] = structure.x;
-    kept.word[25] = structure.y;
-    kept.word[26] = record.word[12];
-    kept.word[27] = record.word[13];
-    kept.word[28] = i;
-    for (uint k = 29; k < kInstanceWords; ++k) kept.word[k] = 0u;
-    vec3 lo = uintBitsToFloat(uvec3(shown.word[12], shown.word[13], shown.word[14]));
-    vec3 hi = uintBitsToFloat(uvec3(shown.word[15], shown.word[16], shown.word[17]));
-    return moved(m, Box(lo, hi));
+    uvec4 start = InputQuads(structure).quad[0];
+    // An address, as references that depend on a condition are too much for some drivers.
+    uvec2 shown = start.x == kMoved ? start.zw : structure;
+    if (start.x == kMoved) start = InputQuads(shown).quad[0];
+    if (start.z == kNone) return emptyBox();
+    Quads kept = Quads(element(place(job.primitives), i, kInstanceBytes));
+    kept.quad[0] = floatBitsToUint(vec4(inverse.x.x, inverse.y.x, inverse.z.x, inverse.t.x));
+    kept.quad[1] = floatBitsToUint(vec4(inverse.x.y, inverse.y.y, inverse.z.y, inverse.t.y));
+    kept.quad[2] = floatBitsToUint(vec4(inverse.x.z, inverse.y.z, inverse.z.z, inverse.t.z));
+    kept.quad[3] = a;
+    kept.quad[4] = b;
+    kept.quad[5] = c;
+    kept.quad[6] = uvec4(structure, numbers.xy);
+    kept.quad[7] = uvec4(i, uvec3(0));
+    uvec4 low = InputQuads(shown).quad[3], high = InputQuads(shown).quad[4];
+    return moved(m, Box(uintBitsToFloat(low.xyz), uintBitsToFloat(uvec3(low.w, high.xy))));
 }

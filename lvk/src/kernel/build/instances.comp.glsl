@@ -1,6 +1,6 @@
 // Keeps every instance, its box in the world, and the bounds of all.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     uint i = invocation();
     uint actives = 0;
     Box centres = emptyBox();

@@ -1,43 +1,12 @@
 // Primitives of leaves as the structure keeps them.
-const uint kTriangleWords = 12u;
-const uint kIndexedWords = 4u;
-const uint kBoxWords = 8u;
+Quads slotAt(uint slot, uint bytes) { return Quads(element(place(job.primitives), slot, bytes)); }
 
-vec3 readVec3(Floats from, uint at) { return vec3(from.value[at], from.value[at + 1], from.value[at + 2]); }
-
-void writeVec3(Floats to, uint at, vec3 v) {
-    to.value[at] = v.x;
-    to.value[at + 1] = v.y;
-    to.value[at + 2] = v.z;
-}
-
-Box cornersBox(vec3 a, vec3 b, vec3 c) {
-    if (!(isFinite(a) && isFinite(b) && isFinite(c))) return emptyBox();
-    return Box(min(a, min(b, c)), max(a, max(b, c)));
-}
-
-Box keptBox(uint slot) {
-    Floats kept = Floats(place(job.primitives));
-    if (job.leafKind == kInstances) return readBox(Floats(work(job.boxes)), slot * 6);
-    if (job.leafKind == kTriangles) {
-        uint at = slot * kTriangleWords;
-        return cornersBox(readVec3(kept, at), readVec3(kept, at + 4), readVec3(kept, at + 8));
-    }
-    if (job.leafKind == kIndexedTriangles) {
-        Words corners = Words(place(job.primitives));
-        Floats vertices = Floats(place(job.vertices));
-        uint at = slot * kIndexedWords;
-        return cornersBox(readVec3(vertices, corners.word[at] * 3), readVec3(vertices, corners.word[at + 1] * 3),
-                          readVec3(vertices, corners.word[at + 2] * 3));
-    }
-    uint at = slot * kBoxWords;
-    Box box = Box(readVec3(kept, at), readVec3(kept, at + 4));
-    return isNumber(box.lo) && isNumber(box.hi) && all(lessThanEqual(box.lo, box.hi)) ? box : emptyBox();
-}
+// The box of what lies in a slot.
+Box keptBox(uint slot);
 
 Box slotsBox(uint first, uint count) {
     Box box = emptyBox();
-    for (uint i = 0; i < count; ++i) box = join(box, keptBox(first + i));
+    [[dont_unroll]] for (uint i = 0; i < count; ++i) box = join(box, keptBox(first + i));
     return box;
 }
 

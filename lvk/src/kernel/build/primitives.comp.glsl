@@ -1,6 +1,6 @@
 // The box of every triangle or box of the inputs, and the bounds of all.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     uint i = invocation();
     uint actives = 0;
     Box centres = emptyBox();

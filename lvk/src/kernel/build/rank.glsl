@@ -28,7 +28,7 @@ uint before(uint own) {
     uint t = gl_LocalInvocationIndex;
     sums[t] = own;
     barrier();
-    for (uint step_ = 1; step_ < kGroup; step_ *= 2) {
+    [[dont_unroll]] for (uint step_ = 1; step_ < kGroup; step_ *= 2) {
         uint left = t >= step_ ? sums[t - step_] : 0u;
         barrier();
         sums[t] += left;
@@ -40,13 +40,13 @@ uint before(uint own) {
 // Fills `counts` with the rank, within the workgroup, of the first key of each digit and invocation.
 void rankKeys(Source from, uint first, uint end) {
     uint t = gl_LocalInvocationIndex;
-    for (uint digit = 0; digit < kDigits; ++digit) counts[digit * kGroup + t] = 0;
-    for (uint i = first; i < end; ++i) counts[digitOf(from, i) * kGroup + t] += 1;
+    [[dont_unroll]] for (uint digit = 0; digit < kDigits; ++digit) counts[digit * kGroup + t] = 0;
+    [[dont_unroll]] for (uint i = first; i < end; ++i) counts[digitOf(from, i) * kGroup + t] += 1;
     barrier();
     uint own = 0;
-    for (uint k = 0; k < kDigits; ++k) own += counts[t * kDigits + k];
+    [[dont_unroll]] for (uint k = 0; k < kDigits; ++k) own += counts[t * kDigits + k];
     uint sum = before(own);
-    for (uint k = 0; k < kDigits; ++k) {
+    [[dont_unroll]] for (uint k = 0; k < kDigits; ++k) {
         uint count = counts[t * kDigits + k];
         counts[t * kDigits + k] = sum;
         sum += count;

@@ -1,5 +1,5 @@
 // The primitives of leaves, as the caller's buffers hold them now.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     refitFrom(invocation());
 }

@@ -1,6 +1,6 @@
 // Nothing is known yet of any primitive.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     uint i = invocation();
     if (i < kStateWords) state().word[i] = 0u;
 }

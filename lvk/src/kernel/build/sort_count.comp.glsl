@@ -2,14 +2,14 @@
 shared uint found[kDigits];
 
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     uint blocks = (job.count + kBlock - 1) / kBlock;
     uint block = groupNumber();
     uint t = gl_LocalInvocationIndex;
     if (t < kDigits) found[t] = 0;
     barrier();
-    Source from = sourceOf(sortPass);
-    for (uint k = 0; k < kItems; ++k) {
+    Source from = sourceOf(passOrJobs);
+    [[dont_unroll]] for (uint k = 0; k < kItems; ++k) {
         uint i = block * kBlock + k * kGroup + t;
         if (i < job.count) atomicAdd(found[digitOf(from, i)], 1u);
     }

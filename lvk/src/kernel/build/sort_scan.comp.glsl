@@ -1,16 +1,16 @@
 // From how often digits occur to where their keys go: sums of all counters before each. One workgroup.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     uint total = kDigits * ((job.count + kBlock - 1) / kBlock);
     Words table = Words(work(job.digits));
     uint carried = 0;
-    for (uint tile = 0; tile < total; tile += kBlock) {
+    [[dont_unroll]] for (uint tile = 0; tile < total; tile += kBlock) {
         uint first = tile + gl_LocalInvocationIndex * kItems;
         uint end = min(first + kItems, total);
         uint own = 0;
-        for (uint i = first; i < end; ++i) own += table.word[i];
+        [[dont_unroll]] for (uint i = first; i < end; ++i) own += table.word[i];
         uint sum = carried + before(own);
-        for (uint i = first; i < end; ++i) {
+        [[dont_unroll]] for (uint i = first; i < end; ++i) {
             uint count = table.word[i];
             table.word[i] = sum;
             sum += count;

@@ -1,5 +1,5 @@
 // The hierarchy, and everything else of the structure but its boxes.
 void main() {
-    job = jobs.job[firstJob];
+    readJob(firstJob);
     writeTree(invocation());
 }

@@ -34,68 +34,43 @@ void writeNode(uint i, uint leaves) {
     int direction = sameBits(i, own, n + 1, leaves) > sameBits(i, own, n - 1, leaves) ? 1 : -1;
     int least = sameBits(i, own, n - direction, leaves);
     int most = 2;
-    while (sameBits(i, own, n + most * direction, leaves) > least) most *= 2;
+    [[dont_unroll]] while (sameBits(i, own, n + most * direction, leaves) > least) most *= 2;
     int reach = 0;
-    for (int jump = most / 2; jump >= 1; jump /= 2) {
+    [[dont_unroll]] for (int jump = most / 2; jump >= 1; jump /= 2) {
         if (sameBits(i, own, n + (reach + jump) * direction, leaves) > least) reach += jump;
     }
     int last = n + reach * direction;
     int shared_ = sameBits(i, own, last, leaves);
     int split = 0;
-    for (int jump = reach; jump > 1;) {
+    [[dont_unroll]] for (int jump = reach; jump > 1;) {
         jump = (jump + 1) / 2;
         if (sameBits(i, own, n + (split + jump) * direction, leaves) > shared_) split += jump;
     }
     int left = n + split * direction + min(direction, 0);
     bool leftLeaf = min(n, last) == left;
     bool rightLeaf = max(n, last) == left + 1;
-    Words node = Words(plus(place(job.nodes), i << 6, i >> 26));
-    node.word[3] = leftLeaf ? leafReference(uint(left)) : uint(left);
-    node.word[7] = rightLeaf ? leafReference(uint(left + 1)) : uint(left + 1);
-    node.word[11] = 0u;
-    node.word[15] = 0u;
+    Quads node = Quads(element(place(job.nodes), i, 64u));
+    node.quad[0] = uvec4(uvec3(0), leftLeaf ? leafReference(uint(left)) : uint(left));
+    node.quad[1] = uvec4(uvec3(0), rightLeaf ? leafReference(uint(left + 1)) : uint(left + 1));
+    writeArrivals(i, leftLeaf && rightLeaf);
     if (!leftLeaf) writeParent(uint(left), i, 0u);
     if (!rightLeaf) writeParent(uint(left + 1), i, 1u);
     if (i == 0u) Words(job.parents).word[0] = kNone;
 }
 
 void writeHeader(uint leaves) {
-    Words to = header();
-    for (uint k = 0; k < 32; ++k) to.word[k] = 0u;
-    to.word[0] = 1u;
-    to.word[1] = job.leafKind;
-    to.word[2] = leaves == 0u ? kNone : leaves == 1u ? leafReference(0u) : 0u;
-    to.word[3] = state().word[kActive];
-    to.word[4] = job.nodes;
-    to.word[5] = job.primitives;
-    to.word[6] = job.vertices;
-    to.word[7] = job.geometries;
-    to.word[8] = leaves == 0u ? 0u : leaves - 1;
-    to.word[9] = job.leafKind == kInstances ? 0u : job.inputCount;
-    to.word[10] = job.savedParents;
-    to.word[11] = job.headerFlags;
+    Quads to = Quads(job.blob);
+    uint root = leaves == 0u ? kNone : leaves == 1u ? leafReference(0u) : 0u;
+    uint geometries = job.leafKind == kInstances ? 0u : job.inputCount;
+    to.quad[0] = uvec4(kBinary, job.leafKind, root, state().word[kActive]);
+    to.quad[1] = uvec4(job.nodes, job.primitives, job.vertices, job.geometries);
+    to.quad[2] = uvec4(leaves == 0u ? 0u : leaves - 1, geometries, job.savedParents, job.headerFlags);
+    for (uint k = 3; k < 8; ++k) to.quad[k] = uvec4(0);
 }
 
-void writeGeometry(uint i) {
-    Words to = Words(plus(place(job.geometries), i << 4, i >> 28));
-    to.word[0] = Geometries(job.inputs).geometry[i].flags;
-    to.word[1] = to.word[2] = to.word[3] = 0u;
-}
-
-// Everything of the structure but its boxes that has number `i`.
-void writeTree(uint i) {
-    uint actives = state().word[kActive];
+// The hierarchy and the header.
+void writeHierarchy(uint i) {
     uint leaves = leafCount();
     if (i + 1 < leaves) writeNode(i, leaves);
     if (i == 0u) writeHeader(leaves);
-    if (job.leafKind == kInstances) return;
-    if (i < job.inputCount) writeGeometry(i);
-    if (i < actives) {
-        uint number = Words(work(job.keys)).word[job.count + i];
-        uint geometry = geometryOf(number, false);
-        Geometry g = Geometries(job.inputs).geometry[geometry];
-        uint index = number - g.firstPrimitive;
-        writePrimitive(i, geometry, index, g, readPrimitive(g, index));
-    }
-    if (job.leafKind == kIndexedTriangles && i < job.vertexCount) copyVertex(i);
 }

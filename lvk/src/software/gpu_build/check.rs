@@ -87,6 +87,13 @@ struct Child {
     slack: [f32; 3],
 }
 
+/// What lies in a slot: geometry and primitive, corners, and the box around.
+struct Primitive {
+    ids: (u32, u32),
+    corners: Vec<[f32; 3]>,
+    bounds: Bounds,
+}
+
 impl<'a> Walk<'a> {
     fn new(words: &'a [u32], instance: &'a dyn Fn(u32) -> Bounds) -> Checked<Self> {
         if words.len() < 32 {
@@ -212,7 +219,7 @@ impl<'a> Walk<'a> {
     fn leaf(&mut self, first: u32, count: u32) -> Checked<Bounds> {
         let mut bounds = EMPTY;
         for slot in first..first + count {
-            let (ids, corners, own) = self.primitive(slot)?;
+            let Primitive { ids, corners, bounds: own } = self.primitive(slot)?;
             match self.primitives.get_mut(slot as usize) {
                 None => return Err(format!("slot {slot} does not exist")),
                 Some(Some(_)) => return Err(format!("slot {slot} is in two leaves")),
@@ -224,7 +231,7 @@ impl<'a> Walk<'a> {
         Ok(bounds)
     }
 
-    fn primitive(&self, slot: u32) -> Checked<((u32, u32), Vec<[f32; 3]>, Bounds)> {
+    fn primitive(&self, slot: u32) -> Checked<Primitive> {
         let start = self.place(5);
         let place = slot as usize;
         match self.header(1) {
@@ -233,7 +240,7 @@ impl<'a> Walk<'a> {
                 let corners = vec![self.vec3(at)?, self.vec3(at + 4)?, self.vec3(at + 8)?];
                 let ids = (self.word(at + 7)?, self.word(at + 3)?);
                 let bounds = around(&corners);
-                Ok((ids, corners, bounds))
+                Ok(Primitive { ids, corners, bounds })
             }
             KIND_INDEXED => {
                 let at = start + place * 4;
@@ -244,17 +251,18 @@ impl<'a> Walk<'a> {
                 let id = self.word(at + 3)?;
                 let ids = if self.header(9) > 1 { (id >> 24, id & 0xff_ffff) } else { (0, id) };
                 let bounds = around(&corners);
-                Ok((ids, corners, bounds))
+                Ok(Primitive { ids, corners, bounds })
             }
             KIND_BOXES => {
                 let at = start + place * 8;
                 let corners = vec![self.vec3(at)?, self.vec3(at + 4)?];
                 let bounds = around(&corners);
-                Ok(((self.word(at + 7)? & !LEAF, self.word(at + 3)?), corners, bounds))
+                let ids = (self.word(at + 7)? & !LEAF, self.word(at + 3)?);
+                Ok(Primitive { ids, corners, bounds })
             }
             KIND_INSTANCES => {
                 let number = self.word(start + place * 32 + 28)?;
-                Ok(((0, number), Vec::new(), (self.instance)(number)))
+                Ok(Primitive { ids: (0, number), corners: Vec::new(), bounds: (self.instance)(number) })
             }
             kind => Err(format!("leaf kind {kind} does not exist")),
         }

@@ -32,7 +32,7 @@ pub(crate) struct GpuGeometry {
 }
 
 /// The geometries of a structure, which have been checked, as kernels read them. `matrices` is the address of the
-/// matrices that are given by value, 48 bytes for each geometry, or `None` where there are none.
+/// matrices that are given by value, a multiple of 16, with 48 bytes for each geometry; `None` where there are none.
 ///
 /// # Errors
 /// A buffer that is gone; more primitives or vertices than 32 bits count.

@@ -54,7 +54,11 @@ pub(crate) struct Job {
     pub(crate) digits: u32,
     pub(crate) arrivals: u32,
     pub(crate) node_capacity: u32,
+    pub(crate) improvements: u32,
+    pub(crate) reserved: u32,
     pub(crate) header_flags: u32,
+    /// Fills the record to a multiple of 16 bytes.
+    pub(crate) unused: [u32; 2],
 }
 
 /// Push constants of every kernel of a build.
@@ -63,5 +67,5 @@ pub(crate) struct Job {
 pub(crate) struct BuildPush {
     pub(crate) jobs: u64,
     pub(crate) first_job: u32,
-    pub(crate) sort_pass: u32,
+    pub(crate) pass_or_jobs: u32,
 }

@@ -25,6 +25,9 @@ const DIGITS: u32 = 16;
 pub(crate) const MOST_HEIGHT: u32 = 64;
 /// Of the first word of a code.
 const CODE_BITS: u32 = 30;
+const MOST_IMPROVEMENTS: u32 = 8;
+/// Of top-level structures.
+const TLAS_IMPROVEMENTS: u32 = 1;
 const STATE_WORDS: u64 = 8;
 const BOX_WORDS: u64 = 6;
 
@@ -39,6 +42,8 @@ pub(crate) struct BlasShape {
     pub(crate) geometry_count: u32,
     /// Most primitives of a leaf, 1 to 8. More make smaller structures and faster builds, fewer make faster rays.
     pub(crate) leaf_size: u32,
+    /// How often nodes are given better places, 0 to 8. Each makes builds a little slower and rays faster.
+    pub(crate) improvements: u32,
     /// Whether the structure can be refitted.
     pub(crate) refit: bool,
 }
@@ -82,6 +87,8 @@ pub(crate) struct GpuBuildPlan {
     pub(super) scratch: ScratchPlaces,
     /// Of the second word of a code; 0 where codes have but one.
     pub(super) low_bits: u32,
+    /// How often nodes are given better places.
+    pub(super) improvements: u32,
 }
 
 /// What a build reads.
@@ -91,7 +98,7 @@ pub(crate) enum BuildSource {
     Geometries(Vec<GpuGeometry>),
     /// Records of 64 bytes each (`VkAccelerationStructureInstanceKHR`).
     Instances {
-        /// Where the first lies; a multiple of 4.
+        /// Where the first lies; a multiple of 16.
         records: u64,
         /// How many, at most the plan's capacity.
         count: u32,
@@ -127,6 +134,7 @@ impl GpuBuildPlan {
             vertex_count: 0,
             geometry_count: 0,
             leaf_size: 1,
+            improvements: TLAS_IMPROVEMENTS,
             refit: false,
         };
         Self::new(name, &shape)
@@ -151,6 +159,7 @@ impl GpuBuildPlan {
             scratch_bytes,
             scratch,
             low_bits,
+            improvements: shape.improvements.min(MOST_IMPROVEMENTS),
         })
     }
 
@@ -208,7 +217,10 @@ impl GpuBuildPlan {
             digits: self.scratch.digits,
             arrivals: self.scratch.arrivals,
             node_capacity: node_capacity(count, self.leaf_size),
+            improvements: self.improvements,
+            reserved: 0,
             header_flags: header_flags(source),
+            unused: [0; 2],
         }
     }
 }
@@ -326,6 +338,7 @@ mod tests {
                 vertex_count,
                 geometry_count,
                 leaf_size,
+                improvements: 1,
                 refit,
             },
         )
@@ -387,6 +400,7 @@ mod tests {
             vertex_count: 0,
             geometry_count: 1,
             leaf_size: 2,
+            improvements: 1,
             refit: true,
         };
         assert!(GpuBuildPlan::blas("s", &shape).is_err());
@@ -403,6 +417,7 @@ mod tests {
             vertex_count: 0,
             geometry_count: 1,
             leaf_size: 2,
+            improvements: 1,
             refit: true,
         };
         let plan = GpuBuildPlan::blas("s", &shape).unwrap();

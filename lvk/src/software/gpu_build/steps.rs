@@ -19,27 +19,37 @@ pub(crate) struct Step {
     pub(crate) kernel: Kernel,
     /// Which job, or the first of several that a workgroup each works on.
     pub(crate) job: u32,
-    pub(crate) sort_pass: u32,
+    /// Which pass of the sort, or how many jobs there are with a workgroup each.
+    pub(crate) pass_or_jobs: u32,
     pub(crate) groups: u32,
 }
 
-/// The steps of builds, by phases. Job `i` is build `order[i]`: those that one workgroup makes come first, so that one
-/// dispatch has them all.
+/// The steps of builds, by phases. Job `i` is build `order[i]`: those that one workgroup makes come first, by kind, so that
+/// one dispatch has them all.
 pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usize>, Vec<Step>) {
     let mut order: Vec<usize> = (0..builds.len()).collect();
-    let is_small = |build: &usize| {
+    let small = |build: &usize| {
         let (plan, source) = builds[*build];
-        plan.is_small(source.count(plan))
+        let kernel = match plan.leaf_kind {
+            LeafKind::Instances => Kernel::BuildSmallTlas,
+            _ => Kernel::BuildSmallBlas,
+        };
+        plan.is_small(source.count(plan)).then_some(kernel)
     };
-    order.sort_by_key(|build| !is_small(build));
-    let small = order.partition_point(is_small) as u32;
-    let mut steps = Vec::new();
-    if small > 0 {
-        steps.push(Step { phase: 0, kernel: Kernel::BuildSmall, job: 0, sort_pass: 0, groups: small });
-    }
-    for (job, build) in (0..).zip(&order).skip(small as usize) {
-        let (plan, source) = builds[*build];
-        large_build(job, plan, source.count(plan), &mut steps);
+    order.sort_by_key(|build| (small(build).is_none(), small(build)));
+    let mut steps: Vec<Step> = Vec::new();
+    for (job, build) in (0..).zip(&order) {
+        match (small(build), steps.last_mut()) {
+            (None, _) => {
+                let (plan, source) = builds[*build];
+                large_build(job, plan, source.count(plan), &mut steps);
+            }
+            (Some(kernel), Some(last)) if last.kernel == kernel => {
+                last.groups += 1;
+                last.pass_or_jobs += 1;
+            }
+            (Some(kernel), _) => steps.push(Step { phase: 0, kernel, job, pass_or_jobs: 1, groups: 1 }),
+        }
     }
     steps.sort_by_key(|step| (step.phase, step.kernel));
     (order, steps)
@@ -47,17 +57,26 @@ pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usiz
 
 fn large_build(job: u32, plan: &GpuBuildPlan, count: u32, steps: &mut Vec<Step>) {
     let groups = |invocations: u32| invocations.div_ceil(GROUP).max(1);
-    let mut add = |phase, kernel, groups| steps.push(Step { phase, kernel, job, sort_pass: 0, groups });
-    let read = match plan.leaf_kind {
-        LeafKind::Instances => Kernel::BuildInstances,
-        _ => Kernel::BuildPrimitives,
+    let mut add = |phase, kernel, groups| steps.push(Step { phase, kernel, job, pass_or_jobs: 0, groups });
+    let (read, tree) = match plan.leaf_kind {
+        LeafKind::Instances => (Kernel::BuildInstances, Kernel::BuildTlasTree),
+        _ => (Kernel::BuildPrimitives, Kernel::BuildTree),
     };
     add(0, Kernel::BuildReset, 1);
     add(1, read, groups(count));
     add(2, Kernel::BuildCodes, groups(count));
     let written = count.max(plan.geometry_count).max(plan.vertex_count);
-    add(3 + MOST_PASSES * 3, Kernel::BuildTree, groups(written));
-    add(4 + MOST_PASSES * 3, Kernel::FitBinary, groups(plan.node_capacity()));
+    add(3 + MOST_PASSES * 3, tree, groups(written));
+    let nodes = groups(plan.node_capacity());
+    if plan.improvements == 0 {
+        add(4 + MOST_PASSES * 3, Kernel::FitBinary, nodes);
+    }
+    for round in 0..plan.improvements {
+        if round > 0 {
+            add(3 + MOST_PASSES * 3 + 2 * round, Kernel::ResetArrivals, nodes);
+        }
+        add(4 + MOST_PASSES * 3 + 2 * round, Kernel::BuildImprove, nodes);
+    }
     steps.extend(sort_steps(job, count, plan.low_bits));
 }
 
@@ -65,9 +84,14 @@ fn large_build(job: u32, plan: &GpuBuildPlan, count: u32, steps: &mut Vec<Step>)
 pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<Step> {
     let blocks = count.div_ceil(SORT_BLOCK).max(1);
     let passes = low_bits.div_ceil(4) + FIRST_WORD_PASSES;
-    let pass = |sort_pass| {
-        let step =
-            |nth, kernel, groups| Step { phase: 3 + sort_pass * 3 + nth, kernel, job, sort_pass, groups };
+    let pass = |pass_or_jobs| {
+        let step = |nth, kernel, groups| Step {
+            phase: 3 + pass_or_jobs * 3 + nth,
+            kernel,
+            job,
+            pass_or_jobs,
+            groups,
+        };
         [
             step(0, Kernel::SortCount, blocks),
             step(1, Kernel::SortScan, 1),
@@ -88,7 +112,7 @@ pub(crate) fn refit_steps(refits: &[GpuRefitPlan]) -> Vec<Step> {
         };
         for (phase, kernel, invocations) in [(0, Kernel::RefitLeaves, written), (1, fit, plan.node_count)] {
             let groups = invocations.div_ceil(GROUP).max(1);
-            steps.push(Step { phase, kernel, job, sort_pass: 0, groups });
+            steps.push(Step { phase, kernel, job, pass_or_jobs: 0, groups });
         }
     }
     steps.sort_by_key(|step| (step.phase, step.kernel));
@@ -109,6 +133,7 @@ mod tests {
             vertex_count: 0,
             geometry_count: 1,
             leaf_size: 2,
+            improvements: 1,
             refit: true,
         };
         GpuBuildPlan::blas("s", &shape).unwrap()
@@ -127,14 +152,14 @@ mod tests {
             prop_assert!(steps.is_sorted_by_key(|step| step.phase));
             for (job, build) in order.iter().enumerate() {
                 let covers = |step: &&Step| match step.kernel {
-                    Kernel::BuildSmall => job < step.groups as usize,
+                    Kernel::BuildSmallBlas => job < step.groups as usize,
                     _ => step.job as usize == job,
                 };
                 let own: Vec<_> = steps.iter().filter(covers).collect();
                 let expected = match counts[*build] {
                     0..=2048 => 1,
                     2049..=4096 => 5 + 8 * 3,
-                    _ => 5 + 3 * (plans[*build].low_bits.div_ceil(4) as usize + 8),
+                    _ => 3 + 2 * plans[*build].improvements as usize + 3 * (plans[*build].low_bits.div_ceil(4) as usize + 8),
                 };
                 prop_assert_eq!(own.len(), expected);
             }

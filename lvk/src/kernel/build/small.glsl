@@ -7,9 +7,8 @@ void meet() {
 void boundAll() {
     uint actives = 0;
     Box centres = emptyBox();
-    for (uint i = gl_LocalInvocationIndex; i < job.count; i += kGroup) {
-        bool instances = job.leafKind == kInstances;
-        centres = join(centres, keepBox(i, instances ? keepInstance(i) : inputBox(i), actives));
+    [[dont_unroll]] for (uint i = gl_LocalInvocationIndex; i < job.count; i += kGroup) {
+        centres = join(centres, keepBox(i, smallBox(i), actives));
     }
     extendBounds(centres, actives);
 }
@@ -18,11 +17,11 @@ void sortAll() {
     uint each = (job.count + kGroup - 1) / kGroup;
     uint first = min(gl_LocalInvocationIndex * each, job.count);
     uint end = min(first + each, job.count);
-    for (uint pass = 0; pass < passes(); ++pass) {
+    [[dont_unroll]] for (uint pass = 0; pass < passes(); ++pass) {
         Source from = sourceOf(pass);
         Words to = targetOf(pass);
         rankKeys(from, first, end);
-        for (uint i = first; i < end; ++i) {
+        [[dont_unroll]] for (uint i = first; i < end; ++i) {
             uint rank = counts[digitOf(from, i) * kGroup + gl_LocalInvocationIndex]++;
             moveKey(from, to, i, rank);
         }
@@ -31,19 +30,23 @@ void sortAll() {
 }
 
 void main() {
-    job = jobs.job[firstJob + groupNumber()];
+    if (groupNumber() >= passOrJobs) return;
+    readJob(firstJob + groupNumber());
     uint t = gl_LocalInvocationIndex;
     if (t < kStateWords) state().word[t] = 0u;
     meet();
     boundAll();
     meet();
-    for (uint i = t; i < job.count; i += kGroup) writeKey(i);
-    for (uint i = t; i < job.nodeCapacity; i += kGroup) Words(work(job.arrivals)).word[i] = 0u;
+    [[dont_unroll]] for (uint i = t; i < job.count; i += kGroup) writeKey(i);
     meet();
     sortAll();
-    uint geometries = job.leafKind == kInstances ? 0u : job.inputCount;
-    uint most = max(max(job.count, geometries), max(job.vertexCount, 1u));
-    for (uint i = t; i < most; i += kGroup) writeTree(i);
+    [[dont_unroll]] for (uint i = t; i < smallParts(); i += kGroup) writeTree(i);
     meet();
-    for (uint i = t; i < max(job.nodeCapacity, 1u); i += kGroup) fitFrom(i);
+    [[dont_unroll]] for (uint round_ = 1;; ++round_) {
+        [[dont_unroll]] for (uint i = t; i < max(job.nodeCapacity, 1u); i += kGroup) fitFrom(i);
+        if (round_ == max(job.improvements, 1u)) return;
+        meet();
+        [[dont_unroll]] for (uint i = t; i < min(header().word[8], job.nodeCapacity); i += kGroup) resetArrivals(i);
+        meet();
+    }
 }
