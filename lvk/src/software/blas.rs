@@ -101,6 +101,7 @@ pub(crate) fn builds_on_gpu(flags: BuildFlags) -> bool {
 /// A build on the GPU of these geometries, which have been checked.
 pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlags) -> Result<GpuBuildPlan> {
     const LEAF_SIZE: u32 = 2;
+    const IMPROVEMENTS: u32 = 2;
     let boxes = geometries.first().is_some_and(BlasGeometry::is_boxes);
     let sum = |of: fn(&BlasGeometry) -> u32| geometries.iter().map(of).fold(0_u32, u32::saturating_add);
     let shape = BlasShape {
@@ -114,6 +115,7 @@ pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlag
         geometry_count: geometries.len() as u32,
         leaf_size: LEAF_SIZE,
         refit: flags.contains(BuildFlags::ALLOW_UPDATE),
+        improvements: if flags.contains(BuildFlags::FAST_TRACE) { IMPROVEMENTS } else { 0 },
     };
     GpuBuildPlan::blas(name, &shape)
 }
