@@ -9,6 +9,7 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::BlasBody;
 use crate::accel::compaction::SizeQuery;
 use crate::accel::scratch_buffer::ScratchBuffer;
+use crate::accel::software::body::SoftwareBody;
 use crate::accel::storage::AccelStorage;
 use crate::accel::structure::AccelKind;
 use crate::accel::tlas::TlasContents;
@@ -21,7 +22,6 @@ use crate::pipeline::{
     ComputePipeline, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline, RenderPipeline,
 };
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
-use crate::software::body::SoftwareBody;
 use crate::software::tree_cache::TreeCache;
 use crate::store::Store;
 use crate::submit::Submitter;

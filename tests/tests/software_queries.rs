@@ -91,7 +91,7 @@ fn a_driver_without_ray_tracing_traces() {
     without_ray_tracing("a_driver_without_ray_tracing_traces", || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
         assert!(ctx.capabilities().device_name.contains("SwiftShader"));
-        for flags in [BuildFlags::FAST_TRACE, BuildFlags::LOW_MEMORY] {
+        for flags in FLAGS {
             if let Err(error) = check_crowd(&ctx, flags, 600) {
                 unreachable!("{flags:?}: {error}");
             }

@@ -6,8 +6,8 @@ use super::flags::AccelStructSizes;
 use super::geometry::BlasGeometry;
 use super::primitive_map::PrimitiveMap;
 use super::raw_structure::RawStructure;
+use crate::accel::software::blas::SoftwareBlas;
 use crate::resource::Buffer;
-use crate::software::blas::SoftwareBlas;
 
 /// What a bottom-level structure is built from, and what was built.
 pub(crate) struct Blas {

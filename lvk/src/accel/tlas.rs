@@ -6,9 +6,9 @@ use super::blas::BlasBody;
 use super::flags::BuildFlags;
 use super::raw_structure::RawStructure;
 use super::structure::AccelStruct;
+use crate::accel::software::tlas::SoftwareTlas;
 use crate::error::{Result, check_limit};
 use crate::resource::Buffer;
-use crate::software::tlas::SoftwareTlas;
 
 /// A top-level structure.
 pub(crate) struct Tlas {

@@ -6,14 +6,14 @@ use ash::vk;
 
 use super::CommandBuffer;
 use crate::accel::scratch::{aligned_scratch_address, plan_scratch};
+use crate::accel::software::geometry::GpuGeometry;
+use crate::accel::software::job::{BuildPush, Job};
+use crate::accel::software::plan::{BuildSource, GpuBuildPlan};
+use crate::accel::software::refit_plan::GpuRefitPlan;
 use crate::barrier::{Stages, Use};
 use crate::error::Result;
 use crate::kernel::spread;
 use crate::resource::Buffer;
-use crate::software::gpu_build::geometry::GpuGeometry;
-use crate::software::gpu_build::job::{BuildPush, Job};
-use crate::software::gpu_build::plan::{BuildSource, GpuBuildPlan};
-use crate::software::gpu_build::refit_plan::GpuRefitPlan;
 use crate::software::gpu_build::steps::{Step, build_steps, refit_steps};
 
 #[cfg(feature = "test-hooks")]

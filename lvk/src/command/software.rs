@@ -10,19 +10,19 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::Blas;
 use crate::accel::build::instance_bytes;
 use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance, check, pack};
+use crate::accel::software::blas::{Origin, Rebuilt, SoftwareBlas, gpu_plan};
+use crate::accel::software::body::SoftwareBody;
+use crate::accel::software::geometry::{GpuGeometry, gpu_geometries};
+use crate::accel::software::layout::{MOVED, MovedHeader};
+use crate::accel::software::plan::BuildSource;
+use crate::accel::software::refit_plan::GpuRefitPlan;
+use crate::accel::software::tlas::SoftwareTlas;
 use crate::accel::tlas::Shown;
 use crate::barrier::{ResourceId, Stages, Use};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
-use crate::software::blas::{Origin, Rebuilt, SoftwareBlas, gpu_plan};
-use crate::software::body::SoftwareBody;
-use crate::software::gpu_build::geometry::{GpuGeometry, gpu_geometries};
-use crate::software::gpu_build::plan::BuildSource;
-use crate::software::gpu_build::refit_plan::GpuRefitPlan;
 use crate::software::instances::{PlacedInstance, ShownStructure, place};
-use crate::software::layout::{MOVED, MovedHeader};
-use crate::software::tlas::SoftwareTlas;
 use crate::software::tlas_blob;
 
 /// So many instances the CPU builds a tree over that is worth more than its time. A driver that runs on the CPU has no

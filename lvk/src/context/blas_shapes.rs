@@ -10,12 +10,12 @@ use crate::accel::desc::{BlasDesc, PrimitiveOrder};
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
 use crate::accel::order::{spatial_order, worth_ordering};
 use crate::accel::primitive_map::{PrimitiveMap, table_words};
+use crate::accel::software::blas::gpu_plan;
 use crate::accel::split::{PartLimits, PartPlan, PartSizes, plan_split};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::Limits;
 use crate::shared::{Garbage, Shared};
-use crate::software::blas::gpu_plan;
 
 /// Meshes of fewer primitives are built as given: no order makes them slow.
 const ORDERED_FROM: u64 = 64;

@@ -14,6 +14,10 @@ use crate::accel::desc::{BlasDesc, TlasDesc};
 use crate::accel::flags::{AccelStructSizes, BuildMode};
 use crate::accel::instance_plan::InstancePlan;
 use crate::accel::raw_structure::RawStructure;
+use crate::accel::software::blas::SoftwareBlas;
+use crate::accel::software::body::SoftwareBody;
+use crate::accel::software::plan::GpuBuildPlan;
+use crate::accel::software::tlas::SoftwareTlas;
 use crate::accel::split::PartLimits;
 use crate::accel::structure::AccelKind;
 use crate::accel::tlas::Tlas;
@@ -23,10 +27,6 @@ use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::shared::Shared;
-use crate::software::blas::SoftwareBlas;
-use crate::software::body::SoftwareBody;
-use crate::software::gpu_build::plan::GpuBuildPlan;
-use crate::software::tlas::SoftwareTlas;
 
 impl Context {
     /// Creates a bottom-level structure from geometries and builds it before the next submission.

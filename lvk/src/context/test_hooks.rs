@@ -6,6 +6,10 @@ use std::sync::Arc;
 
 use super::Context;
 use crate::accel::geometry::BlasGeometry;
+use crate::accel::software::geometry::gpu_geometries;
+use crate::accel::software::layout::LeafKind;
+use crate::accel::software::plan::{BlasShape, BlobPlaces, BuildSource, GpuBuildPlan};
+use crate::accel::software::refit_plan::{GpuRefitPlan, NodeFormat};
 use crate::command::gpu_build::{GpuBuild, GpuRefit};
 use crate::context::holder::Holder;
 use crate::error::Result;
@@ -14,10 +18,6 @@ use crate::kernel::Kernel;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage};
 pub use crate::software::gpu_build::check::{Bounds, EMPTY, Facts, check_structure};
-use crate::software::gpu_build::geometry::gpu_geometries;
-use crate::software::gpu_build::job::LeafKind;
-use crate::software::gpu_build::plan::{BlasShape, BlobPlaces, BuildSource, GpuBuildPlan};
-use crate::software::gpu_build::refit_plan::{GpuRefitPlan, NodeFormat};
 
 const ALIGNMENT: u64 = 256;
 
@@ -197,7 +197,7 @@ fn room(ctx: &Context, plan: &GpuBuildPlan) -> Result<(GpuStructure, Arc<Buffer>
 fn read_geometries(
     ctx: &Context,
     geometries: &[BlasGeometry],
-) -> Result<Vec<crate::software::gpu_build::geometry::GpuGeometry>> {
+) -> Result<Vec<crate::accel::software::geometry::GpuGeometry>> {
     gpu_geometries("test", geometries, &|handle| ctx.shared().store.buffers.get(handle), None)
 }
 

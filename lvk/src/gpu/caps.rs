@@ -208,7 +208,7 @@ impl Limits {
     }
 }
 
-/// Bounds of what references to nodes and leaves can name; see `software::layout`.
+/// Bounds of what references to nodes and leaves can name; see `accel::software::layout`.
 mod software {
     pub(super) const MOST_GEOMETRIES: u64 = 1 << 24;
     pub(super) const MOST_PRIMITIVES: u64 = 1 << 27;

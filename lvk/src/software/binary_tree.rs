@@ -1,8 +1,8 @@
 //! Binary trees by binned surface area, never deeper than the walk's stack.
 
-use super::layout::{BinaryNode, DEEPEST_BINARY, LARGEST_LEAF, LEAF, NONE, leaf};
 use super::tree::{Nodes, Tree};
 use crate::accel::bounds::Bounds;
+use crate::accel::software::layout::{BinaryNode, DEEPEST_BINARY, LARGEST_LEAF, LEAF, NONE, leaf};
 
 const BINS: usize = 16;
 /// From here on halves have the same number of primitives, so that at most 27 levels follow.

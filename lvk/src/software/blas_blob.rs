@@ -2,14 +2,14 @@
 
 use glam::Vec3;
 
-use super::gpu_build::job::LeafKind;
-use super::layout::{BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafTriangle, WIDE};
 use super::mesh::{Mesh, Primitives};
 use super::quality::Quality;
 use super::tree::{Nodes, Tree};
 use super::vertices::indexed;
 use crate::accel::bounds::Bounds;
 use crate::accel::geometry::GeometryFlags;
+use crate::accel::software::layout::LeafKind;
+use crate::accel::software::layout::{BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafTriangle, WIDE};
 
 /// A structure, ready to be copied to the GPU.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,9 +2,9 @@
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
-use super::layout::Instance;
 use crate::accel::bounds::Bounds;
 use crate::accel::instance::TlasInstance;
+use crate::accel::software::layout::Instance;
 
 /// What an instance shows.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,9 +2,9 @@
 
 use glam::Vec3;
 
-use super::layout::{LeafBox, LeafTriangle};
 use crate::accel::bounds::{Bounds, BoxBytes, TriangleBytes};
 use crate::accel::geometry::GeometryFlags;
+use crate::accel::software::layout::{LeafBox, LeafTriangle};
 
 /// Beyond this coordinates count as not finite: products of two of them still are numbers.
 const FARTHEST: f32 = 1e18;

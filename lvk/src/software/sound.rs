@@ -1,10 +1,10 @@
 //! Whether bytes from a file are a structure that shaders can walk: damage must not send the GPU anywhere.
 
 use super::binary_tree;
-use super::gpu_build::job::LeafKind;
-use super::layout::{BINARY, BLOCK_BYTES, Header, LEAF, NONE, WIDE};
 use super::wide_tree;
 use crate::accel::bounds::Bounds;
+use crate::accel::software::layout::LeafKind;
+use crate::accel::software::layout::{BINARY, BLOCK_BYTES, Header, LEAF, NONE, WIDE};
 
 /// What a sound structure says of itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,11 +85,11 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::blas_blob;
-    use super::super::layout::LeafTriangle;
     use super::super::mesh::{Mesh, Primitives};
     use super::super::quality::Quality;
     use super::*;
     use crate::accel::geometry::GeometryFlags;
+    use crate::accel::software::layout::LeafTriangle;
 
     fn mesh(corners: &[[f32; 3]]) -> Mesh {
         let leaf = |(primitive, at): (u32, &[f32; 3])| {

@@ -1,11 +1,11 @@
 //! The bytes of a top-level structure that the CPU builds. They fit wherever a build on the GPU of as many would.
 
 use super::binary_tree;
-use super::gpu_build::job::LeafKind;
 use super::instances::PlacedInstance;
-use super::layout::{BINARY, BLOCK_BYTES, BinaryNode, Header, Instance, NONE};
 use super::tree::Nodes;
 use crate::accel::bounds::Bounds;
+use crate::accel::software::layout::LeafKind;
+use crate::accel::software::layout::{BINARY, BLOCK_BYTES, BinaryNode, Header, Instance, NONE};
 
 /// Builds a tree over the instances and packs it.
 pub(crate) fn build(instances: &[PlacedInstance]) -> Vec<u8> {

@@ -3,10 +3,10 @@
 use obvhs::cwbvh::node::CwBvhNode;
 
 use super::binary_tree;
-use super::layout::{BinaryNode, NONE, leaf};
 use super::quality::Quality;
 use super::wide_tree;
 use crate::accel::bounds::Bounds;
+use crate::accel::software::layout::{BinaryNode, NONE, leaf};
 
 /// Nodes of either form.
 pub(crate) enum Nodes {

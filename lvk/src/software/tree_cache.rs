@@ -108,9 +108,9 @@ mod tests {
     use glam::Vec3;
 
     use super::super::blas_blob;
-    use super::super::layout::LeafBox;
     use super::*;
     use crate::accel::geometry::GeometryFlags;
+    use crate::accel::software::layout::LeafBox;
 
     const QUALITY: Quality = Quality { fast_build: false, low_memory: false, refit: false };
 

@@ -5,7 +5,7 @@ use std::hash::BuildHasherDefault;
 
 use glam::Vec3;
 
-use super::layout::{LeafIndexed, LeafTriangle};
+use crate::accel::software::layout::{LeafIndexed, LeafTriangle};
 use crate::barrier::IdHasher;
 
 /// Triangles and the vertices they name, each position once.

@@ -7,10 +7,10 @@ use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::cwbvh::node::CwBvhNode;
 use obvhs::ploc::PlocBuilder;
 
-use super::layout::{DEEPEST_WIDE, NONE};
 use super::quality::Quality;
 use super::tree::{Nodes, Tree};
 use crate::accel::bounds::Bounds;
+use crate::accel::software::layout::{DEEPEST_WIDE, NONE};
 
 /// Most primitives of a leaf: they are counted in three bits, one by one.
 const LARGEST_LEAF: u32 = 3;

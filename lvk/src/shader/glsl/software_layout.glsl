@@ -1,8 +1,8 @@
 #ifndef LVK_SOFTWARE_LAYOUT_GLSL
 #define LVK_SOFTWARE_LAYOUT_GLSL
 
-// How structures lie in memory; the same numbers as in lvk/src/software/layout.rs. Everything is read in blocks of 16
-// bytes by address, and a structure says by numbers of blocks from its own start where its parts lie.
+// How structures lie in memory; the same numbers as in lvk/src/accel/software/layout.rs. Everything is read in blocks of
+// 16 bytes by address, and a structure says by numbers of blocks from its own start where its parts lie.
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer LvkSoftBlocks { uvec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LvkSoftVertices { vec3 at[]; };
 

@@ -1,8 +1,8 @@
 //! Which kernels run in which order, and which of them side by side.
 
-use super::job::LeafKind;
-use super::plan::{BuildSource, GpuBuildPlan, SORT_BLOCK};
-use super::refit_plan::{GpuRefitPlan, NodeFormat};
+use crate::accel::software::layout::LeafKind;
+use crate::accel::software::plan::{BuildSource, GpuBuildPlan, SORT_BLOCK};
+use crate::accel::software::refit_plan::{GpuRefitPlan, NodeFormat};
 use crate::kernel::Kernel;
 
 /// Invocations of a workgroup, `kGroup` of `kernel/build/job.glsl`.
@@ -123,8 +123,8 @@ pub(crate) fn refit_steps(refits: &[GpuRefitPlan]) -> Vec<Step> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::plan::BlasShape;
     use super::*;
+    use crate::accel::software::plan::BlasShape;
 
     fn plan(primitive_count: u32) -> GpuBuildPlan {
         let shape = BlasShape {

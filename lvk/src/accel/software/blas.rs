@@ -3,11 +3,11 @@
 use std::sync::{Arc, OnceLock};
 
 use super::body::SoftwareBody;
-use super::gpu_build::geometry::vertex_count;
-use super::gpu_build::job::LeafKind;
-use super::gpu_build::plan::{BlasShape, BlobPlaces, GpuBuildPlan};
-use super::gpu_build::refit_plan::{GpuRefitPlan, NodeFormat};
+use super::geometry::vertex_count;
 use super::layout::Header;
+use super::layout::LeafKind;
+use super::plan::{BlasShape, BlobPlaces, GpuBuildPlan};
+use super::refit_plan::{GpuRefitPlan, NodeFormat};
 use crate::accel::bounds::Bounds;
 use crate::accel::desc::BlasDesc;
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
@@ -100,7 +100,6 @@ pub(crate) fn builds_on_gpu(flags: BuildFlags) -> bool {
 
 /// A build on the GPU of these geometries, which have been checked.
 pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlags) -> Result<GpuBuildPlan> {
-    const LEAF_SIZE: u32 = 2;
     const IMPROVEMENTS: u32 = 2;
     let boxes = geometries.first().is_some_and(BlasGeometry::is_boxes);
     let sum = |of: fn(&BlasGeometry) -> u32| geometries.iter().map(of).fold(0_u32, u32::saturating_add);
@@ -113,7 +112,7 @@ pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlag
         primitive_count: sum(BlasGeometry::primitive_count),
         vertex_count: sum(vertex_count),
         geometry_count: geometries.len() as u32,
-        leaf_size: LEAF_SIZE,
+        leaf_size: if flags.contains(BuildFlags::LOW_MEMORY) { 2 } else { 1 },
         refit: flags.contains(BuildFlags::ALLOW_UPDATE),
         improvements: if flags.contains(BuildFlags::FAST_TRACE) { IMPROVEMENTS } else { 0 },
     };

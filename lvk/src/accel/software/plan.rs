@@ -1,7 +1,8 @@
 //! How much memory a build on the GPU takes, and where in it everything lies.
 
 use super::geometry::GpuGeometry;
-use super::job::{Job, LeafKind};
+use super::job::Job;
+use super::layout::LeafKind;
 use crate::accel::geometry::GeometryFlags;
 use crate::error::{Error, Result, check_limit};
 
@@ -19,7 +20,7 @@ const MOST_LEAF_SIZE: u32 = 8;
 /// Up to so many primitives one workgroup makes the whole build.
 const MOST_SMALL: u32 = 2048;
 /// Keys that a workgroup sorts, `kBlock` of `kernel/build/job.glsl`.
-pub(super) const SORT_BLOCK: u32 = 1024;
+pub(crate) const SORT_BLOCK: u32 = 1024;
 const DIGITS: u32 = 16;
 /// Nodes on a path that traversal has room for.
 pub(crate) const MOST_HEIGHT: u32 = 64;
@@ -60,13 +61,13 @@ pub(crate) struct BlobPlaces {
 
 /// Where the parts of the scratch memory of a build lie, in words from its start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct ScratchPlaces {
-    pub(super) boxes: u32,
-    pub(super) keys: u32,
-    pub(super) spare_keys: u32,
-    pub(super) digits: u32,
-    pub(super) arrivals: u32,
-    pub(super) parents: u32,
+pub(crate) struct ScratchPlaces {
+    pub(crate) boxes: u32,
+    pub(crate) keys: u32,
+    pub(crate) spare_keys: u32,
+    pub(crate) digits: u32,
+    pub(crate) arrivals: u32,
+    pub(crate) parents: u32,
 }
 
 /// A build on the GPU, as far as counts decide it.
@@ -84,11 +85,11 @@ pub(crate) struct GpuBuildPlan {
     pub(crate) blob_bytes: u64,
     /// Bytes of scratch memory of a build, at an address that is a multiple of 16.
     pub(crate) scratch_bytes: u64,
-    pub(super) scratch: ScratchPlaces,
+    pub(crate) scratch: ScratchPlaces,
     /// Of the second word of a code; 0 where codes have but one.
-    pub(super) low_bits: u32,
+    pub(crate) low_bits: u32,
     /// How often nodes are given better places.
-    pub(super) improvements: u32,
+    pub(crate) improvements: u32,
 }
 
 /// What a build reads.
@@ -177,7 +178,7 @@ impl GpuBuildPlan {
     }
 
     /// Whether one workgroup makes the whole build of `count` primitives or instances.
-    pub(super) fn is_small(&self, count: u32) -> bool {
+    pub(crate) fn is_small(&self, count: u32) -> bool {
         count.max(self.geometry_count) <= MOST_SMALL && self.vertex_count <= 3 * MOST_SMALL
     }
 
@@ -227,7 +228,7 @@ impl GpuBuildPlan {
 
 impl BuildSource {
     /// Primitives or instances that a build of `plan` looks at.
-    pub(super) fn count(&self, plan: &GpuBuildPlan) -> u32 {
+    pub(crate) fn count(&self, plan: &GpuBuildPlan) -> u32 {
         match self {
             Self::Geometries(_) => plan.capacity,
             Self::Instances { count, .. } => *count,

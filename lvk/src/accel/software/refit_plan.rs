@@ -2,7 +2,8 @@
 
 use bytemuck::Zeroable;
 
-use super::job::{Job, LeafKind};
+use super::job::Job;
+use super::layout::LeafKind;
 use super::plan::{BlobPlaces, GpuBuildPlan};
 use crate::error::{Error, Result};
 

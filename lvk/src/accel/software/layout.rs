@@ -26,11 +26,38 @@ pub(crate) const BINARY: u32 = 1;
 /// [`MovedHeader::format`].
 pub(crate) const MOVED: u32 = 2;
 
+/// What leaves hold, by the numbers of the structure's header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub(crate) enum LeafKind {
+    /// Triangles with their corners, 48 bytes.
+    Triangles = 0,
+    /// Triangles that name vertices of a copy, 16 bytes.
+    IndexedTriangles = 1,
+    /// Boxes, 32 bytes.
+    Boxes = 2,
+    /// Instances, 128 bytes.
+    Instances = 3,
+}
+
+impl LeafKind {
+    /// Bytes of a primitive as the structure keeps it.
+    pub(crate) fn primitive_bytes(self) -> u64 {
+        match self {
+            Self::Triangles => 48,
+            Self::IndexedTriangles => 16,
+            Self::Boxes => 32,
+            Self::Instances => 128,
+        }
+    }
+}
+
 /// The first 128 bytes of a structure.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub(crate) struct Header {
     pub(crate) format: u32,
+    /// A number of [`LeafKind`].
     pub(crate) leaf_kind: u32,
     /// A node or a leaf, or [`NONE`].
     pub(crate) root: u32,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::body::SoftwareBody;
-use super::gpu_build::plan::GpuBuildPlan;
+use super::plan::GpuBuildPlan;
 use crate::accel::flags::AccelStructSizes;
 
 /// What stands behind the handle of a top-level structure for software to trace. Every update is a build.

@@ -2,32 +2,6 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// What leaves hold, by the numbers of the structure's header.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u32)]
-pub(crate) enum LeafKind {
-    /// Triangles with their corners, 48 bytes.
-    Triangles = 0,
-    /// Triangles that name vertices of a copy, 16 bytes.
-    IndexedTriangles = 1,
-    /// Boxes, 32 bytes.
-    Boxes = 2,
-    /// Instances, 128 bytes.
-    Instances = 3,
-}
-
-impl LeafKind {
-    /// Bytes of a primitive as the structure keeps it.
-    pub(crate) fn primitive_bytes(self) -> u64 {
-        match self {
-            Self::Triangles => 48,
-            Self::IndexedTriangles => 16,
-            Self::Boxes => 32,
-            Self::Instances => 128,
-        }
-    }
-}
-
 /// `Job` of `kernel/build/job.glsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
