@@ -8,4 +8,5 @@ pub mod hybrid_oit;
 pub mod pipelines;
 pub mod reflections;
 pub mod scene;
+pub mod shader_folder;
 pub mod shaders;

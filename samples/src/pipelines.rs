@@ -1,7 +1,8 @@
 //! Every pipeline of the samples as data, for those who compile them without running them.
 
-use lvk::{Format, ShaderModuleDesc, ShaderSource, ShaderStage};
+use lvk::{Context, Format, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage};
 
+use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
 use crate::{bench, hybrid, hybrid_oit, reflections};
 
@@ -30,6 +31,14 @@ impl SampleStage {
             debug_name: self.name,
             ..ShaderModuleDesc::default()
         }
+    }
+
+    /// Compiles it as a stage of `sample`; see [`create_module`].
+    ///
+    /// # Errors
+    /// Those of [`create_module`].
+    pub fn create(&self, ctx: &Context, sample: &str) -> lvk::Result<Holder<ShaderModuleHandle>> {
+        create_module(ctx, sample, &self.module())
     }
 }
 

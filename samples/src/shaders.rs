@@ -13,23 +13,29 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("common/surface.glsl", include_str!("../../shaders/common/surface.glsl")),
     ("common/texture_lod.glsl", include_str!("../../shaders/common/texture_lod.glsl")),
     ("common/tonemap.glsl", include_str!("../../shaders/common/tonemap.glsl")),
+    ("hybrid/bounce_queue.glsl", include_str!("../../shaders/hybrid/bounce_queue.glsl")),
     ("hybrid/coverage.glsl", include_str!("../../shaders/hybrid/coverage.glsl")),
     ("hybrid/footprint.glsl", include_str!("../../shaders/hybrid/footprint.glsl")),
     ("hybrid/frame.glsl", include_str!("../../shaders/hybrid/frame.glsl")),
+    ("hybrid/hardware_visibility.glsl", include_str!("../../shaders/hybrid/hardware_visibility.glsl")),
     ("hybrid/hit.glsl", include_str!("../../shaders/hybrid/hit.glsl")),
     ("hybrid/integrator.glsl", include_str!("../../shaders/hybrid/integrator.glsl")),
     ("hybrid/pixel.glsl", include_str!("../../shaders/hybrid/pixel.glsl")),
+    ("hybrid/pixel_order.glsl", include_str!("../../shaders/hybrid/pixel_order.glsl")),
     ("hybrid/raster.glsl", include_str!("../../shaders/hybrid/raster.glsl")),
     ("hybrid/survivors.glsl", include_str!("../../shaders/hybrid/survivors.glsl")),
     ("hybrid/trace_pipeline.glsl", include_str!("../../shaders/hybrid/trace_pipeline.glsl")),
     ("hybrid/trace_query.glsl", include_str!("../../shaders/hybrid/trace_query.glsl")),
     ("hybrid/visibility.glsl", include_str!("../../shaders/hybrid/visibility.glsl")),
+    ("hybrid/visible_triangle.glsl", include_str!("../../shaders/hybrid/visible_triangle.glsl")),
     ("reflections/ambient.glsl", include_str!("../../shaders/reflections/ambient.glsl")),
     ("reflections/fragment.glsl", include_str!("../../shaders/reflections/fragment.glsl")),
     ("reflections/frame.glsl", include_str!("../../shaders/reflections/frame.glsl")),
     ("reflections/gbuffer.glsl", include_str!("../../shaders/reflections/gbuffer.glsl")),
     ("reflections/lighting.glsl", include_str!("../../shaders/reflections/lighting.glsl")),
+    ("reflections/lights.glsl", include_str!("../../shaders/reflections/lights.glsl")),
     ("reflections/masks.glsl", include_str!("../../shaders/reflections/masks.glsl")),
+    ("reflections/neighbour.glsl", include_str!("../../shaders/reflections/neighbour.glsl")),
     ("reflections/noise.glsl", include_str!("../../shaders/reflections/noise.glsl")),
     ("reflections/range.glsl", include_str!("../../shaders/reflections/range.glsl")),
     ("reflections/reflect.glsl", include_str!("../../shaders/reflections/reflect.glsl")),
@@ -37,6 +43,7 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("reflections/surface.glsl", include_str!("../../shaders/reflections/surface.glsl")),
     ("reflections/trace_pipeline.glsl", include_str!("../../shaders/reflections/trace_pipeline.glsl")),
     ("reflections/trace_query.glsl", include_str!("../../shaders/reflections/trace_query.glsl")),
+    ("reflections/visibility.glsl", include_str!("../../shaders/reflections/visibility.glsl")),
     ("reflections/waves.glsl", include_str!("../../shaders/reflections/waves.glsl")),
     ("hybrid_oit/ball.glsl", include_str!("../../shaders/hybrid_oit/ball.glsl")),
     ("hybrid_oit/frame.glsl", include_str!("../../shaders/hybrid_oit/frame.glsl")),
@@ -76,12 +83,24 @@ pub mod hybrid {
     pub const WITH_GBUFFER: &[(&str, &str)] = &[("HYBRID_GBUFFER", "1")];
     /// Macros of the ray stages that start from the visible triangles.
     pub const WITH_VISIBILITY: &[(&str, &str)] = &[("HYBRID_VISIBILITY", "1")];
+    /// Macros of the ray stage that queues mirrors and glass.
+    pub const WITH_QUEUE: &[(&str, &str)] = &[("HYBRID_QUEUE", "1")];
+    /// Macros of the ray stages that take pixels in their order.
+    pub const WITH_VISIBILITY_AND_ORDER: &[(&str, &str)] =
+        &[("HYBRID_VISIBILITY", "1"), ("HYBRID_ORDERED", "1")];
+    /// Macros of the ray stage that queues mirrors and glass, from the visible triangles.
+    pub const WITH_VISIBILITY_AND_QUEUE: &[(&str, &str)] =
+        &[("HYBRID_VISIBILITY", "1"), ("HYBRID_QUEUE", "1")];
     /// `kNoImage` in `shaders/hybrid/visibility.glsl`.
     pub const NO_IMAGE: u32 = u32::MAX;
     /// Small triangles of the compute rasteriser.
     pub const RASTER_SMALL_COMP: &str = include_str!("../../shaders/hybrid/raster_small.comp.glsl");
+    /// Its medium triangles.
+    pub const RASTER_MEDIUM_COMP: &str = include_str!("../../shaders/hybrid/raster_medium.comp.glsl");
     /// Tiles of the compute rasteriser's large triangles.
     pub const RASTER_TILE_COMP: &str = include_str!("../../shaders/hybrid/raster_tile.comp.glsl");
+    /// The order of pixels.
+    pub const ORDER_COMP: &str = include_str!("../../shaders/hybrid/order.comp.glsl");
     /// Culling for the hardware rasteriser.
     pub const CULL_COMP: &str = include_str!("../../shaders/hybrid/cull.comp.glsl");
     /// Closing the gaps that culling leaves.
@@ -96,6 +115,10 @@ pub mod hybrid {
     pub const RENDER_RGEN: &str = include_str!("../../shaders/hybrid/render.rgen.glsl");
     /// A pixel by ray queries.
     pub const RENDER_COMP: &str = include_str!("../../shaders/hybrid/render.comp.glsl");
+    /// The further rays of a queued pixel by the ray tracing pipeline.
+    pub const BOUNCES_RGEN: &str = include_str!("../../shaders/hybrid/bounces.rgen.glsl");
+    /// The same by ray queries.
+    pub const BOUNCES_COMP: &str = include_str!("../../shaders/hybrid/bounces.comp.glsl");
     /// The nearest triangle of a ray.
     pub const CLOSEST_RCHIT: &str = include_str!("../../shaders/hybrid/closest.rchit.glsl");
     /// A ray that left the scene.
@@ -134,6 +157,8 @@ pub mod reflections {
     pub const CLOSEST_RMISS: &str = include_str!("../../shaders/reflections/closest.rmiss.glsl");
     /// A shadow ray that reached the light.
     pub const SHADOW_RMISS: &str = include_str!("../../shaders/reflections/shadow.rmiss.glsl");
+    /// Smooths shadows and openness.
+    pub const SMOOTH_COMP: &str = include_str!("../../shaders/reflections/smooth.comp.glsl");
     /// Blurs reflections.
     pub const FILTER_COMP: &str = include_str!("../../shaders/reflections/filter.comp.glsl");
     /// Lights the opaque surfaces.

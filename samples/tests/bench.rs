@@ -18,6 +18,19 @@ fn outcome(args: &[&str]) -> (Option<i32>, String, String) {
     (status.code(), text(stdout), text(stderr))
 }
 
+#[test]
+fn devices_and_scenes_are_listed_without_a_benchmark() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("attic.obj"), "").unwrap();
+    let (status, out, err) = outcome(&["--list-scenes", &folder.path().display().to_string()]);
+    assert_eq!(status, Some(0), "{err}");
+    assert!(out.contains("courtyard") && out.contains("attic"), "{out}");
+    let (status, out, err) = outcome(&["--list-devices"]);
+    assert!(status == Some(0) && out.starts_with("[0] "), "{out}{err}");
+    let (status, _, err) = outcome(&[]);
+    assert!(status == Some(2) && err.contains("--help"), "{err}");
+}
+
 /// The cells of the row that begins with `name`, the name left out.
 fn row(table: &str, name: &str) -> Vec<String> {
     let line = table.lines().find(|line| line.trim_start_matches("| ").starts_with(name));

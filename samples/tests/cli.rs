@@ -348,6 +348,28 @@ fn devices_are_listed_a_line_each() {
 }
 
 #[test]
+fn samples_with_one_scene_list_it_and_all_list_devices() {
+    if !has_device() {
+        return;
+    }
+    for (program, scene) in [
+        (env!("CARGO_BIN_EXE_hybrid_oit"), "room  built in"),
+        (env!("CARGO_BIN_EXE_reflections"), "hall  built in"),
+    ] {
+        let mut command = Command::new(program);
+        command.arg("--list-scenes");
+        let outcome = Outcome::of(command);
+        outcome.assert_success();
+        assert!(outcome.out.starts_with(scene), "{}", outcome.out);
+        let mut command = Command::new(program);
+        command.arg("--list-devices");
+        let outcome = Outcome::of(command);
+        outcome.assert_success();
+        assert!(outcome.out.starts_with("[0] "), "{}", outcome.out);
+    }
+}
+
+#[test]
 fn a_device_that_is_not_there_is_device_trouble() {
     if !has_device() {
         return;

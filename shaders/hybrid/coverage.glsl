@@ -33,6 +33,11 @@ vec3 edgeVolume(vec3 p, vec3 q) {
     return vec3(dot(normal, frame.camera.forward), dot(normal, frame.camera.right), dot(normal, frame.camera.down));
 }
 
+// How far the volumes of a tracer may be off, for a triangle whose corners are `away` and whose edges are `size` long.
+float doubtOf(float away, float size) {
+    return kDoubt * away * size;
+}
+
 Edges edgesOf(Corners corners) {
     vec3 first = corners.b - corners.a;
     vec3 second = corners.c - corners.a;
@@ -45,9 +50,9 @@ Edges edgesOf(Corners corners) {
     mat3 planes = transpose(mat3(edgeVolume(corners.b, corners.c), edgeVolume(corners.c, corners.a),
                                  edgeVolume(corners.a, corners.b))) * (volume < 0.0 ? -1.0 : 1.0);
     vec2 pixel = 2.0 / vec2(frame.camera.width, frame.camera.height);
-    vec2 origin = 0.5 * pixel - 1.0;
+    vec2 origin = 0.5 * pixel - 1.0 + frame.camera.shift;
     vec3 volumes = planes[0] + planes[1] * origin.x + planes[2] * origin.y + slack;
-    return Edges(volumes, planes[1] * pixel.x, planes[2] * pixel.y, slack, kDoubt * away * size,
+    return Edges(volumes, planes[1] * pixel.x, planes[2] * pixel.y, slack, doubtOf(away, size),
                  abs(volume) > kSideSlack * away * size * size);
 }
 
@@ -70,23 +75,26 @@ bool isNearby(Edges edges, ivec2 pixel) {
     return isInside || (!edges.isSided && isInsideBackwards);
 }
 
-// Where a pixel's ray meets a triangle.
+// Where a pixel's ray, which has this direction, meets a triangle.
 struct Crossing {
     float distance; // negative where it misses it, or meets it before the near plane
     bool isDoubtful; // whether it is so close to an edge that another tracer may decide otherwise
 };
 
-Crossing crossingAt(Edges edges, Corners corners, ivec2 pixel) {
-    vec3 direction = cameraDirection(frame.camera, uvec2(pixel));
+Crossing crossingAlong(vec3 direction, Corners corners, float doubt) {
     RayPassage passage = passageOf(direction, corners.a, corners.b, corners.c);
     vec3 volumes = passage.volumes;
     vec3 size = abs(volumes);
-    bool isDoubtful = min(size.x, min(size.y, size.z)) <= edges.doubt;
+    bool isDoubtful = min(size.x, min(size.y, size.z)) <= doubt;
     bool isMissed = any(lessThan(volumes, vec3(0.0))) && any(greaterThan(volumes, vec3(0.0)));
     float distance = distanceAlong(passage);
     // Written so that a triangle without area, whose distance is no number, is missed.
     bool isBehindNearPlane = distance >= cameraNearDistance(frame.camera, direction);
     return Crossing(isBehindNearPlane && (isDoubtful || !isMissed) ? distance : -1.0, isDoubtful);
+}
+
+Crossing crossingAt(Edges edges, Corners corners, ivec2 pixel) {
+    return crossingAlong(cameraDirection(frame.camera, uvec2(pixel)), corners, edges.doubt);
 }
 
 #endif

@@ -33,8 +33,9 @@ Corners cornersFromEye(uint triangle) {
 
 // x and y over z is the place in the picture, from -1 to 1; z is the depth.
 vec3 homogeneous(vec3 fromEye) {
-    return vec3(dot(fromEye, frame.camera.clipRight), dot(fromEye, frame.camera.clipDown),
-                dot(fromEye, frame.camera.forward));
+    float depth = dot(fromEye, frame.camera.forward);
+    vec2 place = vec2(dot(fromEye, frame.camera.clipRight), dot(fromEye, frame.camera.clipDown));
+    return vec3(place - depth * frame.camera.shift, depth);
 }
 
 bool isOutside(vec3 x, vec3 z) {

@@ -4,6 +4,8 @@
 
 #include "common/camera.glsl"
 #include "common/scene_buffers.glsl"
+#include "hybrid/bounce_queue.glsl"
+#include "hybrid/pixel_order.glsl"
 #include "hybrid/visibility.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
@@ -23,12 +25,18 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint gbufferSurface;
     uint gbufferAlbedo;
     Visibility visibility;
+    BounceQueue bounces;
+    PixelOrder order;
+    ColorArray sums; // of the samples so far, a colour a pixel
+    uint sampleNumber;
+    uint sampleCount;
+    uvec2 padding;
 };
 
 layout(push_constant, scalar) uniform PushConstants {
     Frame frame;
-    uint firstRow; // of the band of the image that this launch renders
-    uint endRow;
+    uint first; // row of the band of the image that this launch renders, or place in the order of pixels
+    uint end; // of it
 };
 
 #endif

@@ -50,14 +50,9 @@ Facing faceRay(SurfacePoint point, vec3 direction) {
     return facing;
 }
 
-bool surfaceAlong(Ray ray, out SurfacePoint point) {
-    Hit hit = traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
-    if (hit.triangle == kNoTriangle) {
-        return false;
-    }
-    point = surfaceAt(frame.scene, hit.triangle, hit.barycentrics, ray.origin, ray.direction, ray.coneWidth,
-                      frame.camera.pixelSpread, frame.surfaceSampler);
-    return true;
+SurfacePoint surfaceOf(Hit hit, Ray ray) {
+    return surfaceAt(frame.scene, hit.triangle, hit.barycentrics, ray.origin, ray.direction, ray.coneWidth,
+                     frame.camera.pixelSpread, frame.surfaceSampler);
 }
 
 vec3 skyColor(vec3 direction) {
@@ -120,45 +115,81 @@ Ray refractedRay(Ray ray, SurfacePoint point, Facing facing, float eta, vec3 wei
     return Ray(origin, 0.0, normalize(direction), width, weight, ray.depth + 1u);
 }
 
-bool isNegligible(vec3 weight) {
-    return max(weight.x, max(weight.y, weight.z)) < kSmallestWeight;
+// What goes on from a surface: the weights of the mirrored and of the refracted ray, 0 where none is followed.
+struct Branches {
+    vec3 reflected;
+    vec3 refracted;
+    float eta; // index of refraction on the ray's side over that on the other
+};
+
+// A surface that a ray meets, and all that decides about its light.
+struct Encounter {
+    SurfacePoint point;
+    Facing facing;
+    Material material;
+    Branches branches;
+};
+
+vec3 unlessNegligible(vec3 weight) {
+    return max(weight.x, max(weight.y, weight.z)) < kSmallestWeight ? vec3(0.0) : weight;
 }
 
-// Light along `ray`, whose first surface is already known: `point` where `found`, else the sky.
-vec3 lightAlong(Ray ray, SurfacePoint point, bool found) {
-    Ray waiting[kStackSize];
-    uint count = 0u;
-    vec3 color = vec3(0.0);
-    for (;;) {
-        if (found) {
-            Material material = frame.scene.materials.at[frame.scene.triangleInfos.at[point.triangle].material];
-            Facing facing = faceRay(point, ray.direction);
-            float glass = material.transmission;
-            float local = max(1.0 - material.reflectivity - glass, 0.0);
-            if (local > 0.0) {
-                color += ray.weight * local * shadeLocally(point, facing, material, -ray.direction);
-            }
+Branches branchesAt(Ray ray, Facing facing, Material material) {
+    Branches branches = Branches(vec3(0.0), vec3(0.0), facing.entering ? 1.0 / material.ior : material.ior);
+    if (ray.depth < kMaxDepth) {
+        float glass = material.transmission;
+        float fresnel = glass > 0.0 ? fresnelDielectric(dot(facing.normal, -ray.direction), branches.eta) : 0.0;
+        vec3 weight = ray.weight * material.tint;
+        branches.reflected = unlessNegligible(weight * (material.reflectivity + glass * fresnel));
+        branches.refracted = unlessNegligible(weight * (glass * (1.0 - fresnel)));
+    }
+    return branches;
+}
 
-            float eta = facing.entering ? 1.0 / material.ior : material.ior;
-            float fresnel = glass > 0.0 ? fresnelDielectric(dot(facing.normal, -ray.direction), eta) : 0.0;
-            vec3 reflected = ray.weight * material.tint * (material.reflectivity + glass * fresnel);
-            vec3 refracted = ray.weight * material.tint * (glass * (1.0 - fresnel));
-            bool mayContinue = ray.depth < kMaxDepth;
-            if (mayContinue && !isNegligible(reflected)) {
-                waiting[count++] = reflectedRay(ray, point, facing, reflected);
-            }
-            if (mayContinue && !isNegligible(refracted)) {
-                waiting[count++] = refractedRay(ray, point, facing, eta, refracted);
-            }
+bool goesOn(Branches branches) {
+    return branches.reflected != vec3(0.0) || branches.refracted != vec3(0.0);
+}
+
+Encounter encounterAt(Ray ray, SurfacePoint point) {
+    Material material = frame.scene.materials.at[frame.scene.triangleInfos.at[point.triangle].material];
+    Facing facing = faceRay(point, ray.direction);
+    return Encounter(point, facing, material, branchesAt(ray, facing, material));
+}
+
+// What the surface sends along the ray by itself.
+vec3 localLight(Ray ray, Encounter met) {
+    float share = max(1.0 - met.material.reflectivity - met.material.transmission, 0.0);
+    return share > 0.0 ? ray.weight * share * shadeLocally(met.point, met.facing, met.material, -ray.direction)
+                       : vec3(0.0);
+}
+
+Ray waiting[kStackSize];
+uint waitingCount;
+
+void pushBranches(Ray ray, Encounter met) {
+    Branches branches = met.branches;
+    if (branches.reflected != vec3(0.0)) {
+        waiting[waitingCount++] = reflectedRay(ray, met.point, met.facing, branches.reflected);
+    }
+    if (branches.refracted != vec3(0.0)) {
+        waiting[waitingCount++] = refractedRay(ray, met.point, met.facing, branches.eta, branches.refracted);
+    }
+}
+
+// `color` and the light along all waiting rays.
+vec3 followWaiting(vec3 color) {
+    while (waitingCount > 0u) {
+        Ray ray = waiting[--waitingCount];
+        Hit hit = traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
+        if (hit.triangle != kNoTriangle) {
+            Encounter met = encounterAt(ray, surfaceOf(hit, ray));
+            color += localLight(ray, met);
+            pushBranches(ray, met);
         } else {
             color += ray.weight * skyColor(ray.direction);
         }
-        if (count == 0u) {
-            return color;
-        }
-        ray = waiting[--count];
-        found = surfaceAlong(ray, point);
     }
+    return color;
 }
 
 #endif

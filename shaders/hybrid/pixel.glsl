@@ -5,6 +5,26 @@
 #include "common/octahedral.glsl"
 #include "common/tonemap.glsl"
 #include "hybrid/integrator.glsl"
+#include "hybrid/visible_triangle.glsl"
+
+#if defined(HYBRID_ORDERED)
+// Threads that a device runs in step, and how many such groups of threads the pixels that go on are spread over: as many
+// as run at once. In fewer, one pixel's rays would wait for those of many; in more, some would begin late.
+const uint kNeighbours = 32u;
+const uint kFirstGroups = 2048u;
+
+// The pixel at a place of the order: some that go on beside some others, as long as there are such.
+uvec2 pixelInOrder(uint index) {
+    uint firsts = frame.order.firsts;
+    uint groups = frame.camera.width * frame.camera.height / kNeighbours;
+    uint share = min(firsts / max(min(kFirstGroups, groups), 1u) + 1u, kNeighbours);
+    uint lane = index % kNeighbours;
+    uint before = index / kNeighbours * share + min(lane, share);
+    bool isFirst = lane < share && before < firsts;
+    uint place = frame.order.at[isFirst ? before : firsts + index - min(before, firsts)];
+    return uvec2(place & 0xffffu, place >> 16);
+}
+#endif
 
 Ray primaryRay(uvec2 pixel) {
     vec3 direction = cameraDirection(frame.camera, pixel);
@@ -13,64 +33,107 @@ Ray primaryRay(uvec2 pixel) {
 }
 
 #if defined(HYBRID_GBUFFER)
-// The surface that the paper's geometry pass left in the G-buffer.
-bool primarySurface(uvec2 pixel, Ray ray, out SurfacePoint point) {
+// The triangle that the paper's geometry pass left in the G-buffer.
+Hit primaryHit(uvec2 pixel, Ray ray) {
+    return Hit(textureBindlessFetchU2D(frame.gbufferSurface, ivec2(pixel), 0).w, vec2(0.0));
+}
+
+// Its surface, from there too.
+SurfacePoint primarySurface(uvec2 pixel, Ray ray, Hit hit) {
     ivec2 texel = ivec2(pixel);
     uvec4 surface = textureBindlessFetchU2D(frame.gbufferSurface, texel, 0);
-    point.triangle = surface.w;
-    if (point.triangle == kNoTriangle) {
-        return false;
-    }
     vec4 position = textureBindlessFetch2D(frame.gbufferPosition, texel, 0);
+    SurfacePoint point;
+    point.triangle = hit.triangle;
     point.position = position.xyz;
     point.distance = position.w;
     point.normal = unitFromOctahedral(uintBitsToFloat(surface.xy));
     point.geometricNormal = unitFromOctahedral(unpackSnorm2x16(surface.z));
     point.albedo = textureBindlessFetch2D(frame.gbufferAlbedo, texel, 0).rgb;
-    return true;
+    return point;
 }
-#elif defined(HYBRID_VISIBILITY)
-// The triangle that the visibility pass found; kNoTriangle also where the ray must say, and then `isInDoubt`.
-uint visibleTriangle(uvec2 pixel, out bool isInDoubt) {
-    Visibility visibility = frame.visibility;
-    isInDoubt = false;
-    if (visibility.image != kNoImage) {
-        return textureBindlessFetchU2D(visibility.image, ivec2(pixel), 0).x;
-    }
-    uvec2 word = visibility.words.at[pixel.y * frame.camera.width + pixel.x];
-    isInDoubt = word.x == kAskRay;
-    return word.y == kNoTriangle || isInDoubt ? kNoTriangle : ~word.x;
-}
+#else
+#if defined(HYBRID_VISIBILITY)
+#include "hybrid/hardware_visibility.glsl"
 
-// The surface of the triangle that the visibility pass found, where the pixel's ray meets it.
-bool primarySurface(uvec2 pixel, Ray ray, out SurfacePoint point) {
+// Where the pixel's ray meets the triangle that the visibility pass found.
+Hit primaryHit(uvec2 pixel, Ray ray) {
     bool isInDoubt;
-    uint triangle = visibleTriangle(pixel, isInDoubt);
+    bool byHardware = frame.visibility.image != kNoImage;
+    uint triangle = byHardware ? hardwareTriangle(ivec2(pixel), ray.direction, isInDoubt)
+                               : visibleTriangle(pixel, isInDoubt);
     Hit hit = Hit(triangle, vec2(0.0));
     if (isInDoubt) {
         hit = traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
-    } else if (triangle != kNoTriangle) {
-        hit.barycentrics = barycentricsAlong(frame.scene, triangle, ray.origin, ray.direction);
+    } else if (hit.triangle != kNoTriangle) {
+        hit.barycentrics = barycentricsAlong(frame.scene, hit.triangle, ray.origin, ray.direction);
     }
-    if (hit.triangle == kNoTriangle) {
-        return false;
-    }
-    point = surfaceAt(frame.scene, hit.triangle, hit.barycentrics, ray.origin, ray.direction, 0.0,
-                      frame.camera.pixelSpread, frame.surfaceSampler);
-    return true;
+    return hit;
 }
 #else
-bool primarySurface(uvec2 pixel, Ray ray, out SurfacePoint point) {
-    return surfaceAlong(ray, point);
+Hit primaryHit(uvec2 pixel, Ray ray) {
+    return traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
 }
 #endif
 
+SurfacePoint primarySurface(uvec2 pixel, Ray ray, Hit hit) {
+    return surfaceOf(hit, ray);
+}
+#endif
+
+// Adds the sample's colour to the pixel; the last sample gives the picture. Colours are averaged as they are shown, so
+// that a light beside a dark wall has a smooth edge too.
+void finishPixel(uvec2 pixel, vec3 color) {
+    vec3 shown = expose(color);
+    if (frame.sampleCount > 1u) {
+        uint index = pixel.y * frame.camera.width + pixel.x;
+        shown += frame.sampleNumber > 0u ? frame.sums.at[index] : vec3(0.0);
+        frame.sums.at[index] = shown;
+        shown /= float(frame.sampleCount);
+    }
+    if (frame.sampleNumber + 1u == frame.sampleCount) {
+        imageStore(kImages2D[frame.outputImage], ivec2(pixel), vec4(encodeSrgb(shown), 1.0));
+    }
+}
+
+#if defined(HYBRID_BOUNCES)
+// Follows the rays of a queued pixel.
+void renderBounces(uint index) {
+    if (index >= frame.bounces.head.rays.x) {
+        return;
+    }
+    BouncePixel queued = frame.bounces.pixels.at[index];
+    uvec2 pixel = uvec2(queued.place & 0xffffu, queued.place >> 16);
+    Ray ray = primaryRay(pixel);
+    SurfacePoint point = primarySurface(pixel, ray, Hit(queued.triangle, queued.barycentrics));
+    waitingCount = 0u;
+    pushBranches(ray, encounterAt(ray, point));
+    finishPixel(pixel, followWaiting(queued.color));
+}
+#else
+// Renders the pixel, or its first surface alone where the rest is queued.
 void renderPixel(uvec2 pixel) {
     Ray ray = primaryRay(pixel);
-    SurfacePoint point;
-    bool found = primarySurface(pixel, ray, point);
-    vec3 color = lightAlong(ray, point, found);
-    imageStore(kImages2D[frame.outputImage], ivec2(pixel), vec4(encodeSrgb(expose(color)), 1.0));
+    Hit hit = primaryHit(pixel, ray);
+    if (hit.triangle == kNoTriangle) {
+        finishPixel(pixel, skyColor(ray.direction));
+        return;
+    }
+    Encounter met = encounterAt(ray, primarySurface(pixel, ray, hit));
+    vec3 color = localLight(ray, met);
+#if defined(HYBRID_QUEUE)
+    if (goesOn(met.branches)) {
+        uint place = takeBouncePlace(frame.bounces);
+        frame.bounces.pixels.at[place] = BouncePixel(pixel.x | pixel.y << 16, hit.triangle, hit.barycentrics, color);
+        return;
+    }
+#else
+    waitingCount = 0u;
+    pushBranches(ray, met);
+    color = followWaiting(color);
+#endif
+    finishPixel(pixel, color);
 }
+#endif
 
 #endif

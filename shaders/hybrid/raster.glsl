@@ -1,57 +1,85 @@
-// Rasterising into the visibility words, and the queue of tiles of large triangles.
+// Visibility words, and what the three passes of the compute rasteriser hand over.
 #ifndef HYBRID_RASTER
 #define HYBRID_RASTER
 
 #include "hybrid/coverage.glsl"
 #include "hybrid/hit.glsl"
 
-// Side of a tile in pixels.
-const int kTile = 32;
-// Most workgroups along one axis that every device takes.
-const uint kMostGroups = 65535u;
-
 // Distances this many floating-point numbers apart are one surface on top of another, to be told apart by the ray.
 const uint kCloseUnits = 4u;
 
-struct Tile {
+// Triangles that a workgroup of the second pass takes on at a time.
+const uint kSetPerGroup = 8u;
+// Most workgroups along one axis that every device takes.
+const uint kMostGroups = 65535u;
+
+// A triangle of more than a few pixels, set up.
+struct SetTriangle {
+    Corners corners;
+    Edges edges;
+    Footprint footprint;
     uint triangle;
+};
+
+// Triangles that the first pass sets aside for the second.
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer SetTriangles {
+    uvec3 groups; // of the dispatch that takes them on
+    uint count; // of triangles that were found, of which there is room for `setCapacity`
+    SetTriangle at[];
+};
+
+// Side of a tile in pixels.
+const int kTile = 32;
+
+struct Tile {
+    uint number; // in the list of set triangles
     uint corner; // x in the low, y in the high half
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 8) coherent buffer TileQueue {
-    uint64_t count; // of tiles that were asked for, of which `capacity` have room
-    uvec3 groups; // arguments of the dispatch that works them off
-    uint capacity;
+// Tiles of large triangles, which the second pass leaves for the third.
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer Tiles {
+    uvec3 groups; // of the dispatch that takes them on
+    uint count; // of tiles that were found, of which there is room for `tileCapacity`
     Tile at[];
 };
+
+bool isClose(uint bits, uint other) {
+    return other != kNoTriangle && uint(abs(int(other) - int(bits))) <= kCloseUnits;
+}
 
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer AtomicWords {
     uint64_t at[];
 };
 
+uint64_t packed(uvec2 word) {
+    return uint64_t(word.y) << 32 | uint64_t(word.x);
+}
+
 // Puts the smaller word into a pixel. Where the two are so close that another tracer's rounding could order them
 // otherwise, the pixel is left to its ray.
-void claimPixel(ivec2 pixel, Crossing crossing, uint triangle) {
+void claimPixel(ivec2 pixel, uvec2 word) {
     uint index = uint(pixel.y) * frame.camera.width + uint(pixel.x);
-    uint bits = floatBitsToUint(crossing.distance);
     // Words only ever get smaller: one that is already nearer, even if read late, saves the atomic operation.
     uint seen = frame.visibility.words.at[index].y;
-    if (seen != kNoTriangle && bits > seen + kCloseUnits) {
+    if (seen != kNoTriangle && word.y > seen + kCloseUnits) {
         return;
     }
     AtomicWords words = AtomicWords(uint64_t(frame.visibility.words));
-    uint64_t mine = uint64_t(bits) << 32 | uint64_t(crossing.isDoubtful ? kAskRay : ~triangle);
-    uint old = uint(atomicMin(words.at[index], mine) >> 32);
-    if (old != kNoTriangle && uint(abs(int(old) - int(bits))) <= kCloseUnits) {
-        atomicMin(words.at[index], uint64_t(min(old, bits)) << 32 | uint64_t(kAskRay));
+    uint old = uint(atomicMin(words.at[index], packed(word)) >> 32);
+    if (isClose(word.y, old)) {
+        atomicMin(words.at[index], packed(uvec2(kAskRay, min(old, word.y))));
     }
+}
+
+uvec2 wordOf(Crossing crossing, uint triangle) {
+    return uvec2(crossing.isDoubtful ? kAskRay : ~triangle, floatBitsToUint(crossing.distance));
 }
 
 void rasterPixel(Edges edges, Corners corners, ivec2 pixel, uint triangle) {
     if (isNearby(edges, pixel)) {
         Crossing crossing = crossingAt(edges, corners, pixel);
         if (crossing.distance >= 0.0) {
-            claimPixel(pixel, crossing, triangle);
+            claimPixel(pixel, wordOf(crossing, triangle));
         }
     }
 }

@@ -3,5 +3,9 @@
 #include "hybrid/pixel.glsl"
 
 void main() {
-    renderPixel(uvec2(gl_LaunchIDEXT.x, firstRow + gl_LaunchIDEXT.y));
+#if defined(HYBRID_ORDERED)
+    renderPixel(pixelInOrder(first + gl_LaunchIDEXT.x));
+#else
+    renderPixel(uvec2(gl_LaunchIDEXT.x, first + gl_LaunchIDEXT.y));
+#endif
 }

@@ -15,7 +15,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) buffer UintArray {
 
 struct Visibility {
     VisibilityWords words; // by the compute rasteriser
-    uvec2 tileQueue; // address of its TileQueue
+    uvec2 setTriangles; // addresses of its SetTriangles
+    uvec2 tiles; // and of its Tiles
     UintArray survivorBits; // of the hardware rasteriser's culling: a bit a triangle
     UintArray survivorCounts; // for each workgroup
     UintArray survivorIndices; // three vertices a survivor
@@ -23,6 +24,8 @@ struct Visibility {
     UintArray draw; // arguments of the indirect draw
     uint image; // index into kTextures2D, or kNoImage where `words` counts
     uint triangleCount;
+    uint setCapacity; // of these
+    uint tileCapacity;
 };
 
 const uint kAskRay = 0u;

@@ -29,4 +29,12 @@ vec3 skyRadiance(vec3 direction) {
     return textureBindlessCubeLod(frame.sky, frame.skySampler, direction, 0.0).rgb;
 }
 
+// What is far away fades into the sky at the horizon behind it.
+vec3 hazed(vec3 color, vec3 direction, float distance) {
+    const float kBegin = 34.0; // scene units
+    const float kDepth = 75.0; // in which all but 1/e fades
+    vec3 horizon = skyRadiance(normalize(vec3(direction.x, max(direction.y, 0.0) + 0.03, direction.z)));
+    return mix(horizon, color, exp(-max(distance - kBegin, 0.0) / kDepth));
+}
+
 #endif

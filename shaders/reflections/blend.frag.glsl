@@ -1,5 +1,5 @@
-// Lays a transparent surface over the lit opaque ones, farthest first. The one in front has its traced reflection;
-// those behind it see the ambient light.
+// Lays a transparent surface over the lit opaque ones and over those farther away: the draws come farthest first. The one
+// in front has its traced reflection; those behind it see the ambient light.
 #include "reflections/ambient.glsl"
 #include "reflections/fragment.glsl"
 #include "reflections/reflectance.glsl"

@@ -1,6 +1,6 @@
 // Blurs reflections as far as their roughness and the distance of what they show ask for, and not across edges of
 // depth, normal or roughness. Two passes with different turns of the same spiral.
-#include "reflections/gbuffer.glsl"
+#include "reflections/neighbour.glsl"
 #include "reflections/noise.glsl"
 #include "reflections/range.glsl"
 
@@ -8,35 +8,13 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 const int kTaps = 16;
 const float kMostPixels = 20.0; // at 720 rows
-const float kGoldenAngle = 2.39996323;
 
-struct Centre {
-    vec3 position;
-    vec3 normal;
-    float roughness;
-    float distance;
-};
-
-bool readCentre(ivec2 pixel, out Centre centre) {
-    vec3 direction = viewDirection(uvec2(pixel));
-    float depth = textureBindlessFetch2D(frame.opaqueDepth, pixel, 0).r;
-    if (depth <= 0.0) {
-        return false;
-    }
-    uvec4 texel = textureBindlessFetchU2D(frame.opaqueSurface, pixel, 0);
-    centre.distance = depthDistance(depth, direction);
-    centre.position = frame.camera.eye + direction * centre.distance;
-    centre.normal = packedNormal(texel);
-    centre.roughness = packedRoughness(texel);
-    return true;
-}
-
-// 1 for neighbours on the same smooth surface, down to 0 across edges.
+// 1 for neighbours on the same smooth surface, down to 0 across edges, those of roughness too.
 float likeness(Centre a, Centre b) {
-    float offPlane = abs(dot(a.normal, b.position - a.position)) / (0.01 * a.distance);
-    float facing = pow(max(dot(a.normal, b.normal), 0.0), 64.0);
     float rough = abs(a.roughness - b.roughness) / (0.25 * a.roughness + 0.01);
-    return facing * exp(-offPlane * offPlane - rough * rough);
+    // The wider the lobe, the more a surface may be curved.
+    float sharpness = mix(64.0, 16.0, smoothstep(0.1, 0.3, a.roughness));
+    return onOneSurface(a, b, sharpness) * exp(-rough * rough);
 }
 
 // Mean hit distance of the nearest neighbours: a single ray says little about a lobe.
@@ -65,11 +43,10 @@ void main() {
         float most = kMostPixels * float(frame.camera.height) / 720.0;
         float radius = min(angle / frame.camera.pixelSpread, most) * (passArguments[2] == 0u ? 1.0 : 0.5);
         float total = 1.0;
-        float turn = 6.2831853 * pixelNoise(uvec2(pixel), 8u + passArguments[2]).x;
+        float turn = spiralTurn(pixel, 8u + passArguments[2]);
         for (int i = 0; radius > 0.75 && i < kTaps; ++i) {
-            float spoke = sqrt((float(i) + 0.5) / float(kTaps));
-            float phase = turn + float(i) * kGoldenAngle;
-            ivec2 at = pixel + ivec2(round(radius * spoke * vec2(cos(phase), sin(phase))));
+            float spoke = spiralSpoke(i, kTaps);
+            ivec2 at = pixel + spiralStep(i, turn, radius * spoke);
             Centre other;
             if (any(lessThan(at, ivec2(0))) || any(greaterThan(at, last)) || !readCentre(at, other)) {
                 continue;
@@ -77,7 +54,7 @@ void main() {
             vec4 tap = textureBindlessFetch2D(source, at, 0);
             // A sharp thing close by does not take the blur of one far away.
             float depths = abs(tap.a - hit) / (hit + 0.1);
-            float weight = likeness(centre, other) * exp(-1.5 * spoke * spoke - 0.5 * depths * depths);
+            float weight = likeness(centre, other) * exp(-1.5 * spoke * spoke - 0.2 * depths * depths);
             // Few bright rays would otherwise leave specks.
             weight /= 1.0 + 0.25 * max(tap.r, max(tap.g, tap.b));
             sum += weight * tap;

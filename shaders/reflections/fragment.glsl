@@ -16,7 +16,7 @@ vec3 facing(vec3 normal, vec3 direction) {
 
 // Transparent surfaces are mirrors from both sides, those of water with ripples.
 vec3 transparentNormal(Material material, vec3 direction) {
-    vec3 n = material.density > 0.0 ? waterNormal(inPosition.xz, frame.time) : normalize(inNormal);
+    vec3 n = material.density > 0.0 ? waterNormal(inPosition.xz, frame.phase) : normalize(inNormal);
     return facing(n, direction);
 }
 

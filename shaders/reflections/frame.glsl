@@ -68,13 +68,12 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     MaterialArray materials;
     GeometryArray geometries;
     InstanceArray instances;
-    Light lights[4];
+    Light lights[3]; // as many as visibility.glsl has channels for
     vec3 harmonics[9]; // radiance of the sky, in spherical harmonics
     uint lightCount;
-    vec2 jitter; // of the pixel centres, in normalised device coordinates
     uint frameNumber;
     uint sampleNumber;
-    float time; // in seconds
+    float phase; // of the animation's round, 0 to 1
     uint tlas;
     uint sky; // index into kTexturesCube
     uint skySampler;
@@ -83,7 +82,9 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint opaqueDepth;
     uint glassSurface;
     uint glassDepth;
-    uint direct; // light that arrives straight, and how open the surroundings are
+    uint visibility; // of each light, and how open the surroundings are: see visibility.glsl
+    uint smoothed; // the same, on its way through the filter
+    uint penumbra;
     uint reflection; // radiance and hit distance
     uint filtered;
     uint glassReflection;
@@ -95,17 +96,6 @@ layout(push_constant, scalar) uniform PushConstants {
     Frame frame;
     uint passArguments[4];
 };
-
-vec3 viewDirection(uvec2 pixel) {
-    vec2 ndc = (vec2(pixel) + 0.5) / vec2(frame.camera.width, frame.camera.height) * 2.0 - 1.0 + frame.jitter;
-    return normalize(frame.camera.forward + ndc.x * frame.camera.right + ndc.y * frame.camera.down);
-}
-
-vec4 viewClip(vec3 position) {
-    vec4 clip = cameraClip(frame.camera, position);
-    clip.xy -= frame.jitter * clip.w;
-    return clip;
-}
 
 // Distance along `direction` of what has this depth, which counts down from 1 at the near plane to 0.
 float depthDistance(float depth, vec3 direction) {

@@ -19,6 +19,11 @@ vec3 packedNormal(uvec4 texel) {
     return unitFromOctahedral(unpackSnorm2x16(texel.x));
 }
 
+// How far from the surface rays start: beyond what depth and normals are rounded by.
+float liftAt(float distance) {
+    return 1.5e-3 + 2.5e-4 * distance;
+}
+
 // What the pixel shows in the g-buffer of `depthTexture` and `surfaceTexture`; false where that is nothing.
 bool readSurface(uint depthTexture, uint surfaceTexture, uvec2 pixel, vec3 direction, out Surface surface, out float distance) {
     float depth = textureBindlessFetch2D(depthTexture, ivec2(pixel), 0).r;

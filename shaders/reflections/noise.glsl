@@ -19,6 +19,32 @@ vec2 pixelNoise(uvec2 pixel, uint purpose) {
     return fract(start + float(frame.sampleNumber) * vec2(0.7548776662, 0.5698402910));
 }
 
+// Place of a pixel on Hilbert's curve through tiles of 64 x 64 pixels: neighbours on it are neighbours in the picture.
+uint curvePlace(uvec2 pixel) {
+    uvec2 at = pixel & 63u;
+    uint place = 0u;
+    for (uint side = 32u; side > 0u; side >>= 1u) {
+        uvec2 upper = uvec2(notEqual(at & side, uvec2(0u)));
+        place += side * side * ((3u * upper.x) ^ upper.y);
+        if (upper.y == 0u) {
+            at = upper.x == 1u ? 63u - at : at;
+            at = at.yx;
+        }
+    }
+    return place;
+}
+
+// As pixelNoise(), but neighbouring pixels and the samples of each take evenly spread numbers (the R2 sequence along
+// the curve), so that a filter over few of them sees all of the range. For one purpose only in a ray: those of several
+// depend on each other.
+vec2 spreadNoise(uvec2 pixel, uint purpose) {
+    // Steps along the sequence from sample to sample that spread as well as those from pixel to pixel, and lead far away.
+    const uint kSampleStride = 834u;
+    uint place = curvePlace(pixel) + kSampleStride * frame.sampleNumber;
+    uvec2 start = scramble(uvec3(frame.frameNumber, purpose, 5u)).xy;
+    return vec2((start + place * uvec2(3242174889u, 2447445413u)) >> 8u) / 16777216.0;
+}
+
 mat3 basisAround(vec3 n) {
     float s = n.z >= 0.0 ? 1.0 : -1.0;
     float a = -1.0 / (s + n.z);

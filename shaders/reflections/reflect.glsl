@@ -6,10 +6,10 @@
 #include "reflections/gbuffer.glsl"
 #include "reflections/lighting.glsl"
 #include "reflections/range.glsl"
+#include "reflections/visibility.glsl"
 
 // Panes and leaves of water that a reflected ray may pass.
 const int kMostPanes = 2;
-const float kOpenness = 2.2; // scene units; as far as surroundings darken a surface
 
 // Radiance along a ray, and how far away what it met is. A ray that ends before it met anything sees the ambient
 // light in place of what is there; that the end does not show as an edge, it fades into it.
@@ -29,7 +29,7 @@ vec4 radianceAlong(vec3 origin, vec3 direction, float range, float coneStart, ve
         met = panes == 0 ? travelled : met;
         float faded = range < kFar ? smoothstep(0.6, 1.0, travelled / range) : 0.0;
         if (surface.opacity >= 1.0 || panes == kMostPanes) {
-            color += weight * mix(shadeReflected(surface, direction, noise), ambientRadiance(direction), faded);
+            color += weight * mix(shadeReflected(surface, direction, travelled, noise), ambientRadiance(direction), faded);
             break;
         }
         float fresnel = fresnelSchlick(vec3(0.04), -dot(surface.geometricNormal, direction)).x;
@@ -38,24 +38,13 @@ vec4 radianceAlong(vec3 origin, vec3 direction, float range, float coneStart, ve
         weight *= (1.0 - fresnel) * (1.0 - surface.opacity);
         origin = surface.position - surface.geometricNormal * 2e-3;
     }
-    return vec4(min(color, vec3(30.0)), met);
+    return vec4(color, met);
 }
 
-// How far from the surface rays start: beyond what depth and normals are rounded by.
-float liftAt(float distance) {
-    return 1.5e-3 + 2.5e-4 * distance;
-}
-
-vec3 keptAbove(vec3 direction, vec3 geometricNormal) {
-    float below = dot(direction, geometricNormal);
-    return below < 5e-3 ? normalize(direction + geometricNormal * (5e-3 - below)) : direction;
-}
-
-float openness(Surface surface, float lift, vec2 noise) {
-    float angle = 2.0 * kPi * noise.y;
-    vec3 local = vec3(sqrt(noise.x) * vec2(cos(angle), sin(angle)), sqrt(1.0 - noise.x));
-    vec3 direction = keptAbove(basisAround(surface.normal) * local, surface.geometricNormal);
-    return traceOccluded(surface.position + surface.geometricNormal * lift, direction, kOpenness) ? 0.0 : 1.0;
+// The brightest that a ray may report. Few rays of a wide lobe meet flames and lanterns; what they would say at full
+// strength is specks.
+float brightestReflected(float roughness) {
+    return mix(30.0, 4.0, smoothstep(0.04, 0.25, roughness));
 }
 
 vec4 reflectionOf(Surface surface, vec3 direction, float distance, vec2 noise, vec2 shadowNoise) {
@@ -65,32 +54,33 @@ vec4 reflectionOf(Surface surface, vec3 direction, float distance, vec2 noise, v
     }
     mat3 basis = basisAround(surface.normal);
     float alpha = lobeTangent(surface.roughness);
-    vec3 normal = basis * visibleNormal(-direction * basis, alpha, vec2(0.9 * noise.x, noise.y));
+    vec3 normal = basis * visibleNormal(-direction * basis, alpha, vec2(0.75 * noise.x, noise.y));
     vec3 mirrored = keptAbove(reflect(direction, normal), surface.geometricNormal);
     vec3 origin = surface.position + surface.geometricNormal * liftAt(distance);
     float cone = distance * frame.camera.pixelSpread;
-    return radianceAlong(origin, mirrored, range, cone, shadowNoise);
+    vec4 reflection = radianceAlong(origin, mirrored, range, cone, shadowNoise);
+    return vec4(min(reflection.rgb, vec3(brightestReflected(surface.roughness))), reflection.a);
 }
 
 void opaquePixel(uvec2 pixel) {
-    vec3 direction = viewDirection(pixel);
+    vec3 direction = cameraDirection(frame.camera, pixel);
     Surface surface;
     float distance;
-    vec4 direct = vec4(0.0);
+    vec4 visibility = vec4(1.0);
+    vec4 penumbra = vec4(0.0);
     vec4 reflection = vec4(0.0);
     if (readSurface(frame.opaqueDepth, frame.opaqueSurface, pixel, direction, surface, distance)) {
-        float lift = liftAt(distance);
-        direct.rgb = lightDirectly(surface, -direction, lift, pixelNoise(pixel, 0u));
-        direct.a = openness(surface, lift, pixelNoise(pixel, 1u));
-        reflection = reflectionOf(surface, direction, distance, pixelNoise(pixel, 2u), pixelNoise(pixel, 3u));
+        visibility = visibilityOf(surface, -direction, distance, spreadNoise(pixel, 0u), spreadNoise(pixel, 1u), penumbra);
+        reflection = reflectionOf(surface, direction, distance, spreadNoise(pixel, 2u), pixelNoise(pixel, 3u));
     }
-    imageStore(kImages2D[frame.direct], ivec2(pixel), direct);
+    imageStore(kImages2D[frame.visibility], ivec2(pixel), visibility);
+    imageStore(kImages2D[frame.penumbra], ivec2(pixel), penumbra);
     imageStore(kImages2D[frame.reflection], ivec2(pixel), reflection);
 }
 
 // Only where the transparent g-buffer has something that the opaque one does not hide: its depth is the mask.
 void transparentPixel(uvec2 pixel) {
-    vec3 direction = viewDirection(pixel);
+    vec3 direction = cameraDirection(frame.camera, pixel);
     Surface surface;
     float distance;
     vec4 reflection = vec4(0.0);

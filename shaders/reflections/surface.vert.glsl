@@ -16,5 +16,5 @@ void main() {
     outNormal = vertexNormal(geometry, instance, vertex);
     outTexcoord = vertexTexcoord(geometry, vertex);
     outQuad = vertex >> 2u;
-    gl_Position = viewClip(outPosition);
+    gl_Position = cameraClip(frame.camera, outPosition);
 }

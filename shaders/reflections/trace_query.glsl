@@ -1,4 +1,4 @@
-// traceClosest() and traceOccluded() by ray queries. A candidate is a leaf: nothing else is not opaque.
+// traceClosest(), traceOccluder() and traceOccluded() by ray queries. A candidate is a leaf: nothing else is not opaque.
 #ifndef REFLECTIONS_TRACE_QUERY
 #define REFLECTIONS_TRACE_QUERY
 
@@ -33,7 +33,8 @@ Hit traceClosest(vec3 origin, vec3 direction, float range) {
     return hit;
 }
 
-bool traceOccluded(vec3 origin, vec3 direction, float range) {
+// Distance of something that blocks the way, not the nearest; below 0 where nothing does.
+float traceOccluder(vec3 origin, vec3 direction, float range) {
     LvkRayQuery query;
     lvkRayQueryInitialize(query, frame.tlas, LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT, kMaskOpaque, origin, 0.0, direction,
                           range);
@@ -42,7 +43,12 @@ bool traceOccluded(vec3 origin, vec3 direction, float range) {
             lvkRayQueryConfirmIntersection(query);
         }
     }
-    return lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE;
+    bool isBlocked = lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE;
+    return isBlocked ? lvkRayQueryT(query, LVK_COMMITTED) : -1.0;
+}
+
+bool traceOccluded(vec3 origin, vec3 direction, float range) {
+    return traceOccluder(origin, direction, range) >= 0.0;
 }
 
 #endif

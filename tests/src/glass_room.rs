@@ -175,9 +175,13 @@ pub fn through(nodes: &[GlassNode], background: [f64; 3]) -> [f64; 3] {
     })
 }
 
-/// From linear light to 8 bits, as `shaders/common/tonemap.glsl` does.
-pub fn encode(radiance: f64) -> f64 {
-    let exposed = 1.0 - (-radiance.max(0.0)).exp();
+/// From linear light to a film's share of white, as `shaders/common/tonemap.glsl` does.
+pub fn expose(radiance: f64) -> f64 {
+    1.0 - (-radiance.max(0.0)).exp()
+}
+
+/// From there to 8 bits, as it does too.
+pub fn encode(exposed: f64) -> f64 {
     255.0 * if exposed <= 0.003_130_8 { 12.92 * exposed } else { 1.055 * exposed.powf(1.0 / 2.4) - 0.055 }
 }
 

@@ -2,6 +2,7 @@
 
 pub mod agreement;
 pub mod bender;
+pub mod broken_shaders;
 pub mod child;
 pub mod compute;
 pub mod device;

@@ -20,6 +20,11 @@ pub struct Tolerance {
     pub flip: f32,
 }
 
+impl Tolerance {
+    /// Of a picture and the same one by another driver, years ago.
+    pub const SAME_AS_EVER: Self = Self { psnr: 46.0, ssim: 0.995, differing_share: 0.03, flip: 0.012 };
+}
+
 impl Default for Tolerance {
     fn default() -> Self {
         Self { psnr: 0.0, ssim: -1.0, differing_share: 1.0, flip: 1.0 }
@@ -95,6 +100,30 @@ pub fn keep(name: &str, picture: &RgbaImage) -> PathBuf {
     let path = folder.join(format!("{}.png", name.replace([' ', '/'], "_")));
     picture.save(&path).expect("test images can be written");
     path
+}
+
+/// The picture of that name in `tests/reference`.
+///
+/// # Panics
+/// When it cannot be read.
+pub fn reference(name: &str) -> RgbaImage {
+    image::open(reference_path(name)).expect("the reference picture can be read").into_rgba8()
+}
+
+/// Fails the test unless the picture looks as it always did: as the one of that name in `tests/reference`. Where a change
+/// is meant, look at the new picture and copy it there.
+///
+/// # Panics
+/// As said.
+pub fn assert_as_ever(name: &str, picture: &RgbaImage) {
+    let path = reference_path(name);
+    let kept = (!path.is_file()).then(|| keep(&format!("{name} actual"), picture));
+    assert_eq!(kept, None, "{} is not there", path.display());
+    assert_alike(name, picture, &reference(name), &Tolerance::SAME_AS_EVER);
+}
+
+fn reference_path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("reference/{name}.png"))
 }
 
 /// FLIP's error of each pixel, from black over purple to light yellow.

@@ -1,4 +1,4 @@
-//! A small scene from a Wavefront OBJ file: a tiled floor, a mirror wall, a red box, and balls of plastic, gold and
+//! A small scene from a Wavefront OBJ file in lamplight and sunshine: a tiled floor, a mirror wall, a red box, and balls of plastic, gold and
 //! glass.
 #![expect(clippy::expect_used, reason = "a test without its scene has failed")]
 
@@ -45,6 +45,7 @@ illum 7
 
 const VIEWS: &str = "
 scene still_life 1.5 3.5 2.5
+sun -0.6 0.7 0.5
 at 0.3 1.3 3.6 0.1 0.6 0 55
 at -3 1.6 2 0.2 0.5 0 50
 at 2.8 0.9 2.2 0 0.6 -0.5 55

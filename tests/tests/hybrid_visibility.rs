@@ -14,7 +14,9 @@ const SIZE: [u32; 2] = [163, 91];
 
 /// By the compute rasteriser, which leaves to rays what rounding decides: no pixel in ten thousand.
 const SAME_PIXELS: Tolerance = Tolerance { psnr: 60.0, ssim: 0.9999, differing_share: 1e-4, flip: 1e-3 };
-/// By the device's rasteriser, which places corners on a grid.
+/// By the device's rasteriser, which leaves to rays what its grid decides.
+const SAME_EDGES: Tolerance = Tolerance { psnr: 60.0, ssim: 0.999, differing_share: 2e-4, flip: 1e-3 };
+/// By the paper's geometry pass, which has the edges of the device's rasteriser.
 const SAME_VIEW: Tolerance = Tolerance { psnr: 40.0, ssim: 0.995, differing_share: 3e-3, flip: 0.01 };
 
 const COMPUTE: Geometry = Geometry::Visibility(Some(Raster::Compute));
@@ -30,11 +32,12 @@ fn pictures(ctx: &Context, scene: &Scene, config: &HybridConfig, cameras: &[Came
 }
 
 /// Compares all geometry passes with rays alone, through each camera and by each path.
-fn assert_geometry_agrees(ctx: &Context, scene: &Scene, cameras: &[Camera]) {
+fn assert_geometry_agrees(ctx: &Context, scene: &Scene, cameras: &[Camera], by_hardware: Tolerance) {
     let path = paths(ctx)[0];
     let standalone = HybridConfig { method: Method::Standalone, ..config(path, COMPUTE) };
     let expected = pictures(ctx, scene, &standalone, cameras);
-    for (geometry, tolerance) in [(COMPUTE, SAME_PIXELS), (HARDWARE, SAME_VIEW), (Geometry::Paper, SAME_VIEW)]
+    for (geometry, tolerance) in
+        [(COMPUTE, SAME_PIXELS), (HARDWARE, by_hardware), (Geometry::Paper, SAME_VIEW)]
     {
         let mut by_path: Vec<Vec<RgbaImage>> = Vec::new();
         for path in paths(ctx) {
@@ -54,7 +57,7 @@ fn assert_geometry_agrees(ctx: &Context, scene: &Scene, cameras: &[Camera]) {
 fn every_geometry_pass_finds_what_rays_find() {
     let Some(ctx) = device() else { return };
     let scene = still_life();
-    assert_geometry_agrees(&ctx, &scene, &scene.cameras);
+    assert_geometry_agrees(&ctx, &scene, &scene.cameras, SAME_EDGES);
 }
 
 /// Just above the floor and beside a wall, so that large triangles begin far behind the eye, and with a corner at it.
@@ -68,7 +71,9 @@ fn triangles_through_the_near_plane_are_cut_where_rays_begin() {
         Camera::looking_along([0.3, 0.4, 1.5], [0.1, -1.0, -0.2], 120.0),
         Camera::looking_along([corner[0], corner[1] + 0.001, corner[2]], [0.3, -0.2, -1.0], 90.0),
     ];
-    assert_geometry_agrees(&ctx, &scene, &cameras);
+    // A pixel of 14,833 at the near plane, where hardware cuts triangles before it places their corners.
+    let one_pixel = Tolerance { psnr: 50.0, ..SAME_EDGES };
+    assert_geometry_agrees(&ctx, &scene, &cameras, one_pixel);
 }
 
 /// Points, lines, needles, a twin of another triangle and one as large as the world.
@@ -111,15 +116,24 @@ fn awkward_triangles_are_seen_as_rays_see_them() {
     }
 }
 
-/// Who rasterises a triangle, and whether the queue has room for its tiles, must not show.
+/// Who rasterises a triangle, and whether lists have room for it and its tiles, must not show.
 #[test]
-fn tuning_and_a_full_queue_do_not_change_the_picture() {
+fn tuning_and_full_lists_do_not_change_the_picture() {
     let Some(ctx) = device() else { return };
     let scene = still_life();
     let plain = config(paths(&ctx)[0], COMPUTE);
     let expected = pictures(&ctx, &scene, &plain, &scene.cameras[..2]);
-    for (small_pixels, queue_tiles) in [(0, 1 << 20), (u32::MAX, 1), (0, 0), (8, 1), (8, 7), (64, 40)] {
-        let tuning = RasterTuning { small_pixels: Some(small_pixels), queue_tiles };
+    for (small, medium_pixels, set_aside, tiles) in [
+        (0, 1024, 1 << 16, 1 << 16),
+        (0, 0, 1 << 16, 1 << 16),
+        (0, u32::MAX, 1 << 16, 0),
+        (u32::MAX, 0, 1, 1),
+        (0, 0, 0, 0),
+        (8, 64, 7, 1),
+        (8, 64, 1 << 16, 5),
+        (64, 100, 40, 40),
+    ] {
+        let tuning = RasterTuning { small_pixels: Some(small), medium_pixels, set_aside, tiles };
         let found = pictures(&ctx, &scene, &HybridConfig { tuning, ..plain }, &scene.cameras[..2]);
         assert!(found == expected, "{tuning:?} changes the picture");
     }

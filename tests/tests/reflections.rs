@@ -1,27 +1,24 @@
 //! The pictures of the `reflections` sample: its ways of rendering agree, and they show what they should.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use std::path::{Path, PathBuf};
-
 use image::RgbaImage;
 use lvk::{Context, Dependencies, DeviceProfile};
+use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::reflections::{
-    FAR, Reflections, ReflectionsConfig, ReflectionsError, SkinUpdate, reflection_range,
+    CullingCost, FAR, RayCost, Reflections, ReflectionsConfig, ReflectionsError, SkinUpdate, reflection_range,
 };
 use lvk_samples::scene::Camera;
 use lvk_samples::shaders::INCLUDES;
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::hybrid::paths;
-use lvk_tests::picture::{Likeness, Tolerance, assert_alike, keep};
+use lvk_tests::picture::{Likeness, Tolerance, assert_alike, assert_as_ever};
 use lvk_tests::{device, device_with};
 
 /// No multiple of a work group.
 const SIZE: [u32; 2] = [162, 91];
 /// Of one picture by two paths.
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.999, differing_share: 2e-3, flip: 2e-3 };
-/// Of a picture and the same one by another driver, years ago.
-const SAME_AS_EVER: Tolerance = Tolerance { psnr: 40.0, ssim: 0.995, differing_share: 1.0, flip: 0.012 };
 
 fn config(path: RayPath) -> ReflectionsConfig {
     ReflectionsConfig { samples: 1, ..ReflectionsConfig::new(path, SIZE[0], SIZE[1]) }
@@ -31,8 +28,8 @@ fn hall(ctx: &Context, config: &ReflectionsConfig) -> Reflections {
     Reflections::new(ctx, config).unwrap()
 }
 
-fn picture_at(hall: &mut Reflections, time: f32) -> RgbaImage {
-    hall.show(time);
+fn picture_at(hall: &mut Reflections, phase: f32) -> RgbaImage {
+    hall.show(phase);
     picture(hall)
 }
 
@@ -53,33 +50,52 @@ fn assert_shows_something(picture: &RgbaImage) {
 fn both_paths_give_the_same_picture() {
     let Some(ctx) = device() else { return };
     let paths = paths(&ctx);
-    for time in [0.0, 2.5] {
+    for phase in [0.0, 0.3] {
         let all: Vec<_> =
-            paths.iter().map(|path| picture_at(&mut hall(&ctx, &config(*path)), time)).collect();
+            paths.iter().map(|path| picture_at(&mut hall(&ctx, &config(*path)), phase)).collect();
         assert_shows_something(&all[0]);
         for other in &all[1..] {
-            assert_alike(&format!("reflections at {time} by query"), other, &all[0], &SAME_RAYS);
+            assert_alike(&format!("reflections at {phase} by query"), other, &all[0], &SAME_RAYS);
         }
     }
 }
 
 #[test]
-fn a_frame_depends_on_its_time_alone() {
+fn a_frame_depends_on_its_phase_alone() {
     let Some(ctx) = device() else { return };
     let config = ReflectionsConfig { samples: 2, ..config(paths(&ctx)[0]) };
     let mut sequence = hall(&ctx, &config);
     let first = picture_at(&mut sequence, 0.0);
     for frame in 1..4 {
-        assert_ne!(picture_at(&mut sequence, frame as f32 / 30.0), first, "something moves");
+        assert_ne!(picture_at(&mut sequence, frame as f32 / 240.0), first, "something moves");
     }
-    let fifth = picture_at(&mut sequence, 5.0 / 30.0);
-    assert_eq!(picture_at(&mut hall(&ctx, &config), 5.0 / 30.0), fifth, "alone");
+    let fifth = picture_at(&mut sequence, 5.0 / 240.0);
+    assert_eq!(picture_at(&mut hall(&ctx, &config), 5.0 / 240.0), fifth, "alone");
     assert_eq!(picture_at(&mut sequence, 0.0), first, "back again");
 }
 
+#[test]
+fn a_round_ends_where_it_began_without_a_seam() {
+    let Some(ctx) = device() else { return };
+    let mut hall = hall(&ctx, &config(paths(&ctx)[0]));
+    let mut frame = |frame, frames_per_round| {
+        hall.update(Moment { frame, frames_per_round }).unwrap();
+        picture(&mut hall)
+    };
+    let first = frame(0, 240);
+    assert_shows_something(&first);
+    for round in [1, 7, 240] {
+        assert!(frame(round, round) == first, "frame {round} of a round of as many is frame 0");
+    }
+    assert!(frame(242, 240) == frame(2, 240), "and so on");
+    let [next, last] = [1, 239].map(|number| Likeness::of(&frame(number, 240), &first).difference.psnr);
+    assert!(next < 40.0, "something moves: {next} dB");
+    assert!((next - last).abs() < 2.0, "{last} dB to the end of the round, {next} dB from its beginning on");
+}
+
 /// From close by the basin.
-fn look_at_serpent(hall: &mut Reflections, time: f32) {
-    hall.show(time);
+fn look_at_serpent(hall: &mut Reflections, phase: f32) {
+    hall.show(phase);
     hall.look(&Camera::looking_at([-3.6, 1.0, -9.5], [2.0, 1.1, -9.5], 70.0));
 }
 
@@ -91,10 +107,10 @@ fn the_refitted_serpent_is_the_one_built_anew() {
             let mut hall = hall(&ctx, &ReflectionsConfig { skin_update, ..config(path) });
             // Several refits, each from the one before.
             for step in 0..4 {
-                hall.show(3.0 * step as f32);
+                hall.show(0.15 * step as f32);
                 picture(&mut hall);
             }
-            look_at_serpent(&mut hall, 9.0);
+            look_at_serpent(&mut hall, 0.6);
             picture(&mut hall)
         };
         let (refitted, rebuilt) = (updated(SkinUpdate::Refit), updated(SkinUpdate::Rebuild));
@@ -136,6 +152,21 @@ fn culling_leaves_out_small_things_and_nothing_else() {
     assert_alike("culled hall", &culled, &whole, &tolerance);
     let likeness = Likeness::of(&empty, &whole);
     assert!(likeness.difference.psnr < 60.0, "larger things do show: {likeness}");
+}
+
+#[test]
+fn what_culling_saves_is_measured_and_changes_nothing() {
+    let Some(ctx) = device() else { return };
+    let mut hall = hall(&ctx, &config(paths(&ctx)[0]));
+    let before = picture_at(&mut hall, 0.0);
+    let Some(cost) = CullingCost::measure(&hall, 2).unwrap() else {
+        return eprintln!("NOT TESTED, {} has no timestamps", ctx.capabilities().device_name);
+    };
+    for RayCost { build_ms, rays_ms } in [cost.culled, cost.whole] {
+        assert!(build_ms > 0.0 && rays_ms > 0.0, "{cost}");
+    }
+    assert_eq!(CullingCost::measure(&hall, 0).unwrap(), None);
+    assert!(picture(&mut hall) == before);
 }
 
 /// The length of rays for roughness 0, 0.01 and so on to 1, by the shaders' own text.
@@ -204,21 +235,10 @@ fn impossible_pictures_are_refused() {
     }
 }
 
-/// Where the change of a picture is meant, look at the new one and copy it over `tests/reference/reflections_small.png`.
 #[test]
 fn the_hall_looks_as_it_always_did() {
     let Some(ctx) = device() else { return };
     let config = ReflectionsConfig { samples: 4, ..config(paths(&ctx)[0]) };
     let picture = picture_at(&mut hall(&ctx, &config), 0.0);
-    match image::open(reference_path()) {
-        Ok(expected) => assert_alike("reflections_small", &picture, &expected.into_rgba8(), &SAME_AS_EVER),
-        Err(error) => {
-            let kept = keep("reflections_small actual", &picture);
-            panic!("{}: {error}; the picture is in {}", reference_path().display(), kept.display());
-        }
-    }
-}
-
-fn reference_path() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("reference/reflections_small.png")
+    assert_as_ever("reflections_small", &picture);
 }

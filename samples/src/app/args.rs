@@ -7,6 +7,8 @@ use super::scene_args::SceneArgs;
 
 /// Largest number of bounces.
 pub const MAX_DEPTH: u32 = 16;
+/// Largest number of samples.
+pub const MAX_SAMPLES: u32 = 256;
 
 /// Renders a scene with ray traced shadows, reflections and refractions, and writes pictures as PNG.
 ///
@@ -34,6 +36,10 @@ pub struct HybridArgs {
     #[arg(long, value_name = "PIXELS", hide = true)]
     pub small_triangle: Option<u32>,
 
+    /// Most pixels of a triangle that some threads take on together, for tuning
+    #[arg(long, value_name = "PIXELS", hide = true)]
+    pub medium_triangle: Option<u32>,
+
     /// How often a ray may be reflected or refracted before it gives up, 0 to 16; 0 gives shadows only
     #[arg(
         long,
@@ -43,6 +49,20 @@ pub struct HybridArgs {
         help_heading = "Rendering"
     )]
     pub depth: u32,
+
+    /// When to follow the rays of mirrors and glass; the picture is the same
+    #[arg(long, value_enum, default_value_t = Bounces::Auto, help_heading = "Rendering")]
+    pub bounces: Bounces,
+
+    /// Views of each pixel, 1 to 256, whose average smooths edges; each costs as much as the first
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 1,
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)),
+        help_heading = "Rendering"
+    )]
+    pub samples: u32,
 
     /// What the lamp does in a sequence
     #[arg(long, value_enum, default_value_t = Lamp::Still, help_heading = "Frames")]
@@ -74,13 +94,26 @@ pub enum GBuffer {
 /// How to rasterise visible triangles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Raster {
-    /// By compute, unless hardware is much faster in a few frames at the start; in sequences always by compute where the
-    /// device can.
+    /// By compute where the device can, as its picture is exactly that of rays; says how long each took in a few frames.
     Auto,
     /// By compute shaders with 64-bit atomics.
     Compute,
-    /// By the device's rasteriser, after culling in compute shaders.
+    /// By the device's rasteriser, after culling in compute shaders; where it is in doubt rays decide, but it misses what
+    /// shows through gaps narrower than a pixel.
     Hardware,
+}
+
+/// When the rays of mirrors and glass are followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Bounces {
+    /// What suits the device and the method.
+    Auto,
+    /// At once, by the thread of the pixel.
+    Inline,
+    /// In a launch of their own, of just the pixels that have some.
+    Queued,
+    /// At once, but pixels that have some are launched before the others; for the hybrid method.
+    First,
 }
 
 /// What the lamp does in a sequence.
@@ -96,6 +129,7 @@ const EXAMPLES: &str = "\
 Examples:
   hybrid                                                  the courtyard, by the best path of the best device
   hybrid --scene kitchen.obj --camera 3 --out k3.png      an OBJ through its third camera
+  hybrid --samples 16 --out smooth.png                    with smooth edges
   hybrid --method standalone --rt query --frames 1        everything ray traced in a compute shader, once
   hybrid --device 1 --validate                            on the second device, with validation
   hybrid --profile mali-g715                              as on a phone: ray queries, split meshes
@@ -137,6 +171,7 @@ mod tests {
         assert_eq!((run.frames.clone(), run.round, run.resume), (None, 240, false));
         assert_eq!((args.method, run.rt, run.validate), (Method::Hybrid, RayTracing::Auto, None));
         assert_eq!((args.gbuffer, args.raster), (GBuffer::Visibility, Raster::Auto));
+        assert_eq!((args.bounces, args.samples), (Bounces::Auto, 1));
         assert_eq!((scene.scene.clone(), args.lamp), (None, Lamp::Still));
         assert_eq!(run.out_or("hybrid"), Path::new("hybrid.png"));
     }
@@ -174,6 +209,9 @@ mod tests {
             "--camera 0",
             "--camera 6",
             "--depth 17",
+            "--samples 0",
+            "--samples 257",
+            "--bounces never",
             "--frames 0",
             "--frames 4..4",
             "--frames 0..",

@@ -56,7 +56,7 @@ pub(super) fn open(
 }
 
 /// Prints the devices, one a line, as they are under the profile.
-pub(super) fn list(profile: Option<&DeviceProfile>) -> Result<(), RunError> {
+pub(crate) fn list(profile: Option<&DeviceProfile>) -> Result<(), RunError> {
     let driver = driver::prepare(&DriverRequest::default())?;
     for (number, mut device) in Context::devices(driver.loader.as_deref())?.into_iter().enumerate() {
         if let Some(profile) = profile {

@@ -21,7 +21,8 @@ pub struct SceneArgs {
     #[arg(long, value_name = "F", value_parser = positive, requires = "scene", help_heading = "Scene")]
     pub scale: Option<f32>,
 
-    /// Light and up to five cameras: lines `scene NAME x y z`, then `at EYE TARGET FOV` or `dir EYE DIRECTION FOV`
+    /// Lights and up to five cameras: lines `scene NAME x y z` with the lamp's place, then `sun x y z` towards the sun if
+    /// it shines, and `at EYE TARGET FOV` or `dir EYE DIRECTION FOV`
     #[arg(long, value_name = "FILE", requires = "scene", help_heading = "Scene")]
     pub cameras: Option<PathBuf>,
 
@@ -89,6 +90,22 @@ impl SceneArgs {
         let file = scene_list::resolve(wish, scene_list::folder().as_deref());
         let is_built_in = file == Path::new(scene_list::BUILT_IN) && !file.exists();
         if is_built_in { None } else { Some(file) }
+    }
+}
+
+/// For samples that show one scene made by code.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
+pub struct BuiltInSceneArgs {
+    /// Print the scene that the sample shows, and exit
+    #[arg(long, help_heading = "Frames")]
+    pub list_scenes: bool,
+}
+
+impl BuiltInSceneArgs {
+    /// What `--list-scenes` prints, where it was given, for a scene that is called `name`.
+    #[must_use]
+    pub fn listing(&self, name: &str, what: &str) -> Option<String> {
+        self.list_scenes.then(|| format!("{name}  built in: {what}; the only one"))
     }
 }
 

@@ -16,7 +16,7 @@ use super::paper::PaperArgs;
 pub struct BenchArgs {
     /// What to measure
     #[command(subcommand)]
-    pub(super) benchmark: Benchmark,
+    pub(super) benchmark: Option<Benchmark>,
 
     /// Only see whether it works: tiny sizes, one run
     #[arg(long, global = true)]
@@ -38,6 +38,14 @@ pub struct BenchArgs {
         value_parser = PossibleValuesParser::new(DeviceProfile::names()).try_map(|name| DeviceProfile::named(&name))
     )]
     pub(super) profile: Option<DeviceProfile>,
+
+    /// Print the devices and what they can do, and exit
+    #[arg(long, global = true)]
+    pub(super) list_devices: bool,
+
+    /// Print the scenes that `paper --scenes` knows by name, and exit; FOLDER is searched, else that in LVK_SCENES
+    #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "", global = true)]
+    pub(super) list_scenes: Option<PathBuf>,
 
     /// Run with Vulkan validation; a message is an error, and the figures mean little
     #[arg(long, global = true)]
@@ -137,9 +145,10 @@ Examples:
   bench split --parts 100 --runs 200               parts of the mesh made by formulas
   bench order --scene living_room.obj --camera 3   what the order of triangles does to rays a second
   bench overhead --quick                           does it work at all?
-  bench paper --scenes living_room.obj conference.obj kitchen.obj --out report    the paper's tables and figures
+  bench paper --out report                         the paper's tables and figures, with the scenes of LVK_SCENES
 
-Exit status: 0 when everything was measured, 1 for trouble with the device, 2 for wrong arguments or input.";
+Exit status: 0 when everything was measured, 1 for trouble with the device, 2 for wrong arguments or input, 130 after
+Ctrl-C, which lets `paper` finish the scene under way and its report.";
 
 #[cfg(test)]
 mod tests {
@@ -161,14 +170,15 @@ mod tests {
             let args = parsed(line).unwrap();
             assert_eq!((args.quick, args.runs), (true, Some(3)), "{line}");
             let expected = BatchArgs { meshes: Some(7), triangles: None };
-            assert_eq!(args.benchmark, Benchmark::Batch(expected), "{line}");
+            assert_eq!(args.benchmark, Some(Benchmark::Batch(expected)), "{line}");
         }
+        let listing = parsed("--list-scenes --list-devices").unwrap();
+        assert!(listing.list_devices && listing.list_scenes.is_some() && listing.benchmark.is_none());
     }
 
     #[test]
     fn what_cannot_be_measured_is_refused_with_exit_status_2() {
         for line in [
-            "",
             "everything",
             "batch --meshes 0",
             "tlas --instances 0",

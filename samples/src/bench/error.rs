@@ -1,8 +1,12 @@
 //! Why there is no figure.
 
+use std::path::PathBuf;
+
 use lvk::ash::vk;
 
 use super::paper::PaperError;
+use crate::app::interrupt;
+use crate::app::run_error::RunError;
 use crate::driver::DriverError;
 use crate::scene::SceneError;
 
@@ -25,6 +29,12 @@ pub(super) enum BenchError {
     NoTimestamp { device: String },
     #[error("{device} did not finish a compaction within {tries} submissions")]
     NoCompaction { device: String, tries: u32 },
+    #[error("interrupted; {done} of {of} scenes are in {}", page.display())]
+    Interrupted { done: usize, of: usize, page: PathBuf },
+    #[error("which benchmark? bench --help lists them")]
+    NoBenchmark,
+    #[error(transparent)]
+    Listing(#[from] RunError),
     #[error("validation reported {} messages; the first: {}", .0.len(), .0.first().map_or("", String::as_str))]
     Validation(Vec<String>),
 }
@@ -35,9 +45,12 @@ impl BenchError {
         move |result| Self::HandWritten { call, result }
     }
 
-    /// 2 when the user can mend it by other arguments or input, 1 for trouble with the device.
+    /// 2 when the user can mend it by other arguments or input, 1 for trouble with the device, 130 after Ctrl-C.
     pub(super) fn status(&self) -> u8 {
         match self {
+            Self::Interrupted { .. } => interrupt::STATUS,
+            Self::NoBenchmark => 2,
+            Self::Listing(error) => error.status(),
             Self::Paper(error) if error.is_input() => 2,
             Self::Scene(_) | Self::Driver(DriverError::Variable { .. }) => 2,
             _ => 1,

@@ -8,14 +8,15 @@ use super::error::BenchError;
 use super::setup::Setup;
 use super::table::Table;
 use super::{batch, compaction, order, overhead, paper, split, tlas};
+use crate::app::{device, scene_list};
 
 /// Does what the command line says. Prints a table to standard output, errors in one line to standard error; the
 /// status is 0 when everything was measured, 1 for trouble with the device, 2 for wrong input.
 #[must_use]
 pub fn run(args: &BenchArgs) -> ExitCode {
-    match measured(args) {
-        Ok(table) => {
-            let _ = write!(std::io::stdout(), "{table}");
+    match answered(args) {
+        Ok(text) => {
+            let _ = write!(std::io::stdout(), "{text}");
             ExitCode::SUCCESS
         }
         Err(error) => {
@@ -25,9 +26,21 @@ pub fn run(args: &BenchArgs) -> ExitCode {
     }
 }
 
-fn measured(args: &BenchArgs) -> Result<Table, BenchError> {
+fn answered(args: &BenchArgs) -> Result<String, BenchError> {
+    if let Some(folder) = &args.list_scenes {
+        return Ok(scene_list::listing(Some(folder)) + "\n");
+    }
+    if args.list_devices {
+        device::list(args.profile.as_ref())?;
+        return Ok(String::new());
+    }
+    let benchmark = args.benchmark.as_ref().ok_or(BenchError::NoBenchmark)?;
+    Ok(measured(args, benchmark)?.to_string())
+}
+
+fn measured(args: &BenchArgs, benchmark: &Benchmark) -> Result<Table, BenchError> {
     let setup = Setup::new(args)?;
-    let table = match &args.benchmark {
+    let table = match benchmark {
         Benchmark::Batch(args) => batch::measure(&setup, args),
         Benchmark::Compaction(args) => compaction::measure(&setup, args),
         Benchmark::Split(args) => split::measure(&setup, args),

@@ -1,5 +1,5 @@
-//! Visibility by a rasteriser of compute shaders: every triangle a thread, large ones in tiles, and the nearest
-//! one of each pixel by 64-bit atomic minimum.
+//! Visibility by a rasteriser of compute shaders, in three passes: small triangles, each by a thread; medium ones, each by
+//! some threads; large ones in tiles, each by a workgroup. The nearest triangle of each pixel wins, by 64-bit atomic minimum.
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
@@ -12,39 +12,42 @@ use super::frame::{Push, VisibilityPlaces};
 use super::shader_module::module;
 use crate::shaders::hybrid as texts;
 
-/// Triangles of a workgroup (`shaders/hybrid/raster_small.comp.glsl`).
+/// Triangles of a workgroup of the first pass (`shaders/hybrid/raster_small.comp.glsl`).
 const GROUP: u32 = 128;
-/// `constant_id` of the pixels of a small triangle (`shaders/hybrid/raster_small.comp.glsl`).
-const SMALL_CONSTANT: u32 = 0;
+/// `constant_id` of the most pixels of a triangle in the first and in the second pass.
+const MOST_PIXELS: u32 = 0;
 /// Pixels of a small triangle on a GPU, where neighbours wait for the thread with the largest one.
-const GPU_SMALL_PIXELS: u32 = 32;
-/// The same on a CPU, where a workgroup for a tile costs more than waiting.
+const GPU_SMALL_PIXELS: u32 = 8;
+/// The same on a CPU, where threads that share a triangle cost more.
 const CPU_SMALL_PIXELS: u32 = 1 << 16;
-/// Bytes at the start of the queue that each frame sets to 0: the count and the first argument.
-const QUEUE_RESET_BYTES: u64 = 12;
 
-/// The rasteriser: its pipelines, the words it fills and its queue.
+/// The rasteriser: its pipelines, the words it fills, and the triangles that its first pass sets aside.
 pub(super) struct ComputeRaster {
     small: Holder<ComputePipelineHandle>,
+    medium: Holder<ComputePipelineHandle>,
     tiles: Holder<ComputePipelineHandle>,
     words: Holder<BufferHandle>,
     words_bytes: u64,
-    queue: Holder<BufferHandle>,
+    set_triangles: Holder<BufferHandle>,
+    set_capacity: u32,
+    tile_list: Holder<BufferHandle>,
+    tile_capacity: u32,
     groups: [u32; 3],
 }
 
-/// The head of `TileQueue` in `shaders/hybrid/raster.glsl`; tiles of 8 bytes follow.
+/// The head of `SetTriangles` and of `Tiles` in `shaders/hybrid/raster.glsl`.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct QueueHead {
-    count: [u32; 2],
+struct ListHead {
     groups: [u32; 3],
-    capacity: u32,
+    count: u32,
 }
 
-impl ComputeRaster {
-    const TILE_BYTES: u64 = 8;
+/// Bytes of `SetTriangle` and of `Tile` there.
+const TRIANGLE_BYTES: u64 = 104;
+const TILE_BYTES: u64 = 8;
 
+impl ComputeRaster {
     /// The rasteriser of `triangle_count` triangles for a picture of `extent` pixels.
     ///
     /// # Errors
@@ -56,24 +59,41 @@ impl ComputeRaster {
         tuning: &RasterTuning,
     ) -> lvk::Result<Self> {
         let suited = if ctx.capabilities().is_cpu { CPU_SMALL_PIXELS } else { GPU_SMALL_PIXELS };
-        let value = SpecializationValue::U32(tuning.small_pixels.unwrap_or(suited));
-        let small_pixels = [SpecializationConstant { id: SMALL_CONSTANT, value }];
-        let small = pipeline(ctx, texts::RASTER_SMALL_COMP, &small_pixels, "raster_small.comp")?;
-        let tiles = pipeline(ctx, texts::RASTER_TILE_COMP, &[], "raster_tile.comp")?;
+        let most =
+            |pixels| [SpecializationConstant { id: MOST_PIXELS, value: SpecializationValue::U32(pixels) }];
+        let small_pixels = most(tuning.small_pixels.unwrap_or(suited));
+        let set_capacity = tuning.set_aside.min(RasterTuning::MOST_SET_ASIDE);
         let words_bytes = u64::from(extent[0]) * u64::from(extent[1]) * size_of::<u64>() as u64;
-        let words = ctx.create_buffer(&BufferDesc {
-            size_bytes: words_bytes,
-            debug_name: "visibility words",
-            ..BufferDesc::default()
-        })?;
-        let groups = groups_for(triangle_count, GROUP);
-        Ok(Self { small, tiles, words, words_bytes, queue: queue(ctx, tuning.queue_tiles)?, groups })
+        Ok(Self {
+            small: pipeline(ctx, texts::RASTER_SMALL_COMP, &small_pixels, "raster_small.comp")?,
+            medium: pipeline(
+                ctx,
+                texts::RASTER_MEDIUM_COMP,
+                &most(tuning.medium_pixels),
+                "raster_medium.comp",
+            )?,
+            tiles: pipeline(ctx, texts::RASTER_TILE_COMP, &[], "raster_tile.comp")?,
+            words: ctx.create_buffer(&BufferDesc {
+                size_bytes: words_bytes,
+                debug_name: "visibility words",
+                ..BufferDesc::default()
+            })?,
+            words_bytes,
+            set_triangles: list(ctx, u64::from(set_capacity) * TRIANGLE_BYTES, "triangles set aside")?,
+            set_capacity,
+            tile_list: list(ctx, u64::from(tuning.tiles) * TILE_BYTES, "tiles of triangles")?,
+            tile_capacity: tuning.tiles,
+            groups: groups_for(triangle_count, GROUP),
+        })
     }
 
     /// Tells the shaders where its buffers are.
     pub(super) fn name_in(&self, ctx: &Context, places: &mut VisibilityPlaces) -> lvk::Result<()> {
         places.words = ctx.buffer_address(*self.words)?;
-        places.tile_queue = ctx.buffer_address(*self.queue)?;
+        places.set_triangles = ctx.buffer_address(*self.set_triangles)?;
+        places.set_capacity = self.set_capacity;
+        places.tiles = ctx.buffer_address(*self.tile_list)?;
+        places.tile_capacity = self.tile_capacity;
         Ok(())
     }
 
@@ -82,20 +102,29 @@ impl ComputeRaster {
         self.words.handle()
     }
 
-    /// Records the pass.
+    /// Records the passes.
     pub(super) fn record(&self, cmd: &mut CommandBuffer, push: &Push) -> lvk::Result<()> {
-        let (words, queue) = (self.words.handle(), self.queue.handle());
+        const GROUPS: u64 = std::mem::offset_of!(ListHead, groups) as u64;
+        const COUNT: u64 = std::mem::offset_of!(ListHead, count) as u64;
+        let (words, triangles, tiles) = (*self.words, *self.set_triangles, *self.tile_list);
         cmd.fill_buffer(words, 0, self.words_bytes, u32::MAX)?;
-        cmd.fill_buffer(queue, 0, QUEUE_RESET_BYTES, 0)?;
-        let both = Dependencies { buffers: &[words, queue], ..Dependencies::default() };
+        for (list, word) in [(triangles, GROUPS), (triangles, COUNT), (tiles, GROUPS), (tiles, COUNT)] {
+            cmd.fill_buffer(list, word, size_of::<u32>() as u64, 0)?;
+        }
+        let first = Dependencies { buffers: &[words, triangles], ..Dependencies::default() };
         cmd.bind_compute_pipeline(*self.small)?;
         cmd.push_constants(push)?;
-        cmd.dispatch(self.groups, &both)?;
-        let tiles = Dependencies { buffers: &[words], read_buffers: &[queue], ..Dependencies::default() };
+        cmd.dispatch(self.groups, &first)?;
+        let second =
+            Dependencies { buffers: &[words, tiles], read_buffers: &[triangles], ..Dependencies::default() };
+        cmd.bind_compute_pipeline(*self.medium)?;
+        cmd.push_constants(push)?;
+        cmd.dispatch_indirect(triangles, GROUPS, &second)?;
+        let third =
+            Dependencies { buffers: &[words], read_buffers: &[triangles, tiles], ..Dependencies::default() };
         cmd.bind_compute_pipeline(*self.tiles)?;
         cmd.push_constants(push)?;
-        let arguments = std::mem::offset_of!(QueueHead, groups) as u64;
-        cmd.dispatch_indirect(queue, arguments, &tiles)
+        cmd.dispatch_indirect(tiles, GROUPS, &third)
     }
 }
 
@@ -117,16 +146,17 @@ fn pipeline(
     ctx.create_compute_pipeline(&ComputePipelineDesc { module: Some(*shader), specialization, debug_name })
 }
 
-fn queue(ctx: &Context, capacity: u32) -> lvk::Result<Holder<BufferHandle>> {
-    let head = QueueHead { count: [0; 2], groups: [0, 1, 1], capacity };
-    let queue = ctx.create_buffer(&BufferDesc {
-        size_bytes: size_of::<QueueHead>() as u64 + u64::from(capacity) * ComputeRaster::TILE_BYTES,
+/// A list with room for items of `bytes` in all.
+fn list(ctx: &Context, bytes: u64, debug_name: &str) -> lvk::Result<Holder<BufferHandle>> {
+    let head = ListHead { groups: [0, 1, 1], count: 0 };
+    let list = ctx.create_buffer(&BufferDesc {
+        size_bytes: size_of::<ListHead>() as u64 + bytes,
         usage: BufferUsage::STORAGE | BufferUsage::INDIRECT,
-        debug_name: "tile queue",
+        debug_name,
         ..BufferDesc::default()
     })?;
-    ctx.upload_buffer(*queue, 0, bytemuck::bytes_of(&head))?;
-    Ok(queue)
+    ctx.upload_buffer(*list, 0, bytemuck::bytes_of(&head))?;
+    Ok(list)
 }
 
 #[cfg(test)]
@@ -146,11 +176,5 @@ mod tests {
                 "{count}"
             );
         }
-    }
-
-    #[test]
-    fn the_queue_head_is_the_shaders() {
-        assert_eq!(size_of::<QueueHead>(), 24);
-        assert_eq!(std::mem::offset_of!(QueueHead, groups), 8);
     }
 }

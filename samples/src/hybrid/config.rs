@@ -45,15 +45,37 @@ pub enum Raster {
 pub struct RasterTuning {
     /// Most pixels of the rectangle around a triangle that one thread rasterises; `None` for what suits the device.
     pub small_pixels: Option<u32>,
-    /// Tiles of larger triangles that the queue has room for, 8 bytes each; further ones are rasterised by the thread
-    /// that found them.
-    pub queue_tiles: u32,
+    /// Most pixels of the rectangle around a triangle that some threads rasterise together; larger ones are cut into tiles.
+    pub medium_pixels: u32,
+    /// Medium and large triangles that there is room for, 104 bytes each, at most [`RasterTuning::MOST_SET_ASIDE`];
+    /// further ones are rasterised by the thread that found them.
+    pub set_aside: u32,
+    /// Tiles of large triangles that there is room for, 8 bytes each; further ones are rasterised by the thread that found
+    /// them.
+    pub tiles: u32,
+}
+
+impl RasterTuning {
+    /// As many triangles as the workgroups of one dispatch take on.
+    pub const MOST_SET_ASIDE: u32 = 8 * 65_535;
 }
 
 impl Default for RasterTuning {
     fn default() -> Self {
-        Self { small_pixels: None, queue_tiles: 1 << 20 }
+        Self { small_pixels: None, medium_pixels: 512, set_aside: 1 << 17, tiles: 1 << 18 }
     }
+}
+
+/// When the rays of mirrors and glass are followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bounces {
+    /// At once, by the thread of the pixel.
+    Inline,
+    /// In a launch of their own, of just the pixels that have some: the same picture.
+    Queued,
+    /// At once, but pixels with such rays are launched first, since theirs take longest: the same picture. Only where
+    /// visible triangles are known before any ray: by the hybrid method from [`Geometry::Visibility`].
+    First,
 }
 
 /// By which part of Vulkan rays are traced.
@@ -78,6 +100,10 @@ pub struct HybridConfig {
     pub height: u32,
     /// How often a ray may be reflected or refracted, 0 to [`HybridConfig::MAX_DEPTH`].
     pub max_depth: u32,
+    /// When reflected and refracted rays are followed; `None` for what suits the device.
+    pub bounces: Option<Bounces>,
+    /// Views of each pixel, evenly spread over it, whose average it shows: 1 to [`HybridConfig::MAX_SAMPLES`].
+    pub samples: u32,
     /// What the geometry pass leaves; nothing where the method has none.
     pub geometry: Geometry,
     /// Numbers of the compute rasteriser.
@@ -85,7 +111,7 @@ pub struct HybridConfig {
 }
 
 impl Default for HybridConfig {
-    /// The hybrid method by the ray tracing pipeline, 1280 x 720 pixels, depth 4.
+    /// The hybrid method by the ray tracing pipeline, 1280 x 720 pixels of one sample each, depth 4.
     fn default() -> Self {
         Self {
             method: Method::Hybrid,
@@ -93,6 +119,8 @@ impl Default for HybridConfig {
             width: 1280,
             height: 720,
             max_depth: 4,
+            bounces: None,
+            samples: 1,
             geometry: Geometry::default(),
             tuning: RasterTuning::default(),
         }
@@ -102,6 +130,13 @@ impl Default for HybridConfig {
 impl HybridConfig {
     /// The largest depth; every level costs a place on each pixel's stack of waiting rays.
     pub const MAX_DEPTH: u32 = args::MAX_DEPTH;
+    /// The largest number of samples.
+    pub const MAX_SAMPLES: u32 = args::MAX_SAMPLES;
+
+    /// Whether the triangles that pixels show are known before any ray is traced.
+    pub(super) fn knows_triangles(&self) -> bool {
+        self.method == Method::Hybrid && matches!(self.geometry, Geometry::Visibility(_))
+    }
 
     /// Checks sizes and depth against what the device with `capabilities` can do.
     pub(super) fn check(&self, capabilities: &Capabilities) -> Result<(), HybridError> {
@@ -112,6 +147,12 @@ impl HybridConfig {
         }
         if self.max_depth > Self::MAX_DEPTH {
             return Err(HybridError::TooDeep { depth: self.max_depth, limit: Self::MAX_DEPTH });
+        }
+        if self.samples == 0 || self.samples > Self::MAX_SAMPLES {
+            return Err(HybridError::BadSamples { samples: self.samples, limit: Self::MAX_SAMPLES });
+        }
+        if self.bounces == Some(Bounces::First) && !self.knows_triangles() {
+            return Err(HybridError::NothingFirst);
         }
         let numbers_fragments =
             matches!(self.geometry, Geometry::Paper | Geometry::Visibility(Some(Raster::Hardware)));
@@ -216,6 +257,10 @@ mod tests {
         }
         let deep = HybridConfig { max_depth: HybridConfig::MAX_DEPTH + 1, ..config() };
         assert!(matches!(deep.check(&capabilities), Err(HybridError::TooDeep { .. })));
+        for samples in [0, HybridConfig::MAX_SAMPLES + 1] {
+            let error = HybridConfig { samples, ..config() }.check(&capabilities).unwrap_err();
+            assert!(matches!(error, HybridError::BadSamples { .. }), "{error}");
+        }
     }
 
     #[test]

@@ -53,6 +53,19 @@ pub enum HybridError {
         /// The largest depth.
         limit: u32,
     },
+    /// No samples, or too many.
+    #[error("--samples {samples} is not possible: 1 to {limit}")]
+    BadSamples {
+        /// What was asked for.
+        samples: u32,
+        /// The largest number.
+        limit: u32,
+    },
+    /// Pixels cannot be ordered before it is known what they show.
+    #[error(
+        "--bounces first needs --method hybrid with --gbuffer visibility; use --bounces inline or queued"
+    )]
+    NothingFirst,
     /// A scene made by hand breaks the invariants of [`Scene`](crate::scene::Scene).
     #[error("the scene cannot be drawn: {0}")]
     BrokenScene(&'static str),

@@ -82,7 +82,8 @@ pub(super) struct Indices {
 #[repr(C)]
 pub(super) struct VisibilityPlaces {
     pub(super) words: u64,
-    pub(super) tile_queue: u64,
+    pub(super) set_triangles: u64,
+    pub(super) tiles: u64,
     pub(super) survivor_bits: u64,
     pub(super) survivor_counts: u64,
     pub(super) survivor_indices: u64,
@@ -90,6 +91,16 @@ pub(super) struct VisibilityPlaces {
     pub(super) draw: u64,
     pub(super) image: u32,
     pub(super) triangle_count: u32,
+    pub(super) set_capacity: u32,
+    pub(super) tile_capacity: u32,
+}
+
+/// Addresses of the queue of mirrors and glass (`BounceQueue` in `shaders/hybrid/bounce_queue.glsl`).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct BouncePlaces {
+    pub(super) head: u64,
+    pub(super) pixels: u64,
 }
 
 /// The whole block (`Frame` in `shaders/hybrid/frame.glsl`).
@@ -101,15 +112,26 @@ pub(super) struct FrameConstants {
     pub(super) lighting: Lighting,
     pub(super) indices: Indices,
     pub(super) visibility: VisibilityPlaces,
+    pub(super) bounces: BouncePlaces,
+    pub(super) order: u64,
+    pub(super) sums: u64,
+    pub(super) sample_number: u32,
+    pub(super) sample_count: u32,
+    pub(super) padding: [u32; 2],
 }
 
-/// The push constants: where the block is, and which rows of the image to render.
+/// Bytes from one sample's block to the next.
+pub(super) const FRAME_BYTES: u64 = size_of::<FrameConstants>() as u64;
+
+const _: () = assert!(FRAME_BYTES.is_multiple_of(16));
+
+/// The push constants: where the block is, and which rows of the image, or pixels in their order, to render.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Push {
     pub(super) frame: u64,
-    pub(super) first_row: u32,
-    pub(super) end_row: u32,
+    pub(super) first: u32,
+    pub(super) end: u32,
 }
 
 /// Distance of the near plane in scene units: small against the scene, but not so small that depth suffers.
@@ -135,7 +157,8 @@ mod tests {
         assert_eq!(std::mem::offset_of!(FrameConstants, lighting), 144);
         assert_eq!(std::mem::offset_of!(FrameConstants, indices), 240);
         assert_eq!(std::mem::offset_of!(FrameConstants, visibility), 272);
-        assert_eq!(size_of::<VisibilityPlaces>(), 64);
+        assert_eq!(std::mem::offset_of!(FrameConstants, bounces), 352);
+        assert_eq!(std::mem::offset_of!(FrameConstants, sample_number), 384);
         assert_eq!(size_of::<Push>(), 16);
     }
 }

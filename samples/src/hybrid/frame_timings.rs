@@ -29,31 +29,37 @@ impl FrameTimings {
     }
 }
 
-/// The stamps of a frame: one before and one after the geometry pass, and a pair around each band.
+/// The stamps of a frame, for each sample one before and one after the geometry pass, and a pair around each band.
 pub(super) struct Stamps {
     pool: Holder<QueryPoolHandle>,
     band_count: u32,
+    sample_count: u32,
 }
 
 impl Stamps {
-    pub(super) fn new(ctx: &Context, band_count: u32) -> lvk::Result<Self> {
-        let count = 2 + 2 * band_count;
+    pub(super) fn new(ctx: &Context, band_count: u32, sample_count: u32) -> lvk::Result<Self> {
+        let count = sample_count * (2 + 2 * band_count);
         let pool = ctx.create_query_pool(&QueryPoolDesc { count, debug_name: "frame stamps" })?;
-        Ok(Self { pool, band_count })
+        Ok(Self { pool, band_count, sample_count })
     }
 
-    pub(super) fn reset(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
-        cmd.reset_queries(*self.pool, 0..2 + 2 * self.band_count)
+    /// Where the stamps of a sample begin.
+    fn first(&self, sample: u32) -> u32 {
+        sample * (2 + 2 * self.band_count)
     }
 
-    /// Stamps the beginning (`end` false) or the end of the geometry pass.
-    pub(super) fn geometry(&self, cmd: &mut CommandBuffer, end: bool) -> lvk::Result<()> {
-        cmd.write_timestamp(*self.pool, u32::from(end))
+    pub(super) fn reset(&self, cmd: &mut CommandBuffer, sample: u32) -> lvk::Result<()> {
+        cmd.reset_queries(*self.pool, self.first(sample)..self.first(sample + 1))
     }
 
-    /// Stamps the beginning (`end` false) or the end of a band.
-    pub(super) fn band(&self, cmd: &mut CommandBuffer, band: u32, end: bool) -> lvk::Result<()> {
-        cmd.write_timestamp(*self.pool, 2 + 2 * band + u32::from(end))
+    /// Stamps the beginning (`end` false) or the end of a sample's geometry pass.
+    pub(super) fn geometry(&self, cmd: &mut CommandBuffer, sample: u32, end: bool) -> lvk::Result<()> {
+        cmd.write_timestamp(*self.pool, self.first(sample) + u32::from(end))
+    }
+
+    /// Stamps the beginning (`end` false) or the end of a band of a sample.
+    pub(super) fn band(&self, cmd: &mut CommandBuffer, sample: u32, band: u32, end: bool) -> lvk::Result<()> {
+        cmd.write_timestamp(*self.pool, self.first(sample) + 2 + 2 * band + u32::from(end))
     }
 
     /// Milliseconds of the geometry pass alone, where no band was stamped; the GPU must be done with it.
@@ -67,15 +73,13 @@ impl Stamps {
 
     /// What the frame took; the GPU must be done with it.
     pub(super) fn read(&self, ctx: &Context, has_geometry: bool) -> lvk::Result<FrameTimings> {
-        let stamps = ctx.timestamps_ms(*self.pool, 0, 2 + 2 * self.band_count)?;
-        let spans: Vec<f64> = stamps
-            .chunks_exact(2)
-            .map(|pair| match *pair {
-                [Some(begin), Some(end)] => end - begin,
-                _ => 0.0,
-            })
-            .collect();
-        let (geometry, bands) = spans.split_at(1);
-        Ok(FrameTimings { geometry_ms: geometry.iter().sum(), rays_ms: bands.iter().sum(), has_geometry })
+        let stamps = ctx.timestamps_ms(*self.pool, 0, self.first(self.sample_count))?;
+        let mut timings = FrameTimings { has_geometry, ..FrameTimings::default() };
+        for (number, pair) in stamps.chunks_exact(2).enumerate() {
+            let [Some(begin), Some(end)] = *pair else { continue };
+            let is_geometry = number % (1 + self.band_count as usize) == 0;
+            *(if is_geometry { &mut timings.geometry_ms } else { &mut timings.rays_ms }) += end - begin;
+        }
+        Ok(timings)
     }
 }

@@ -8,9 +8,11 @@
 //! [`HybridRenderer`] is the sample for programs and tests, [`run`] the one for the command line.
 
 mod bands;
+mod bounce_queue;
 mod compute_raster;
 mod config;
 mod error;
+mod film;
 mod frame;
 mod frame_timings;
 mod geometry_pass;
@@ -18,6 +20,7 @@ mod gpu_scene;
 pub(crate) mod half_float;
 mod hardware_raster;
 mod pipelines;
+mod pixel_order;
 mod raster_choice;
 mod ray_pass;
 mod renderer;
@@ -29,7 +32,7 @@ mod texture_density;
 mod texture_fit;
 mod visibility_pass;
 
-pub use config::{Geometry, HybridConfig, Method, Raster, RasterTuning, RayPath};
+pub use config::{Bounces, Geometry, HybridConfig, Method, Raster, RasterTuning, RayPath};
 pub use error::HybridError;
 pub use frame_timings::FrameTimings;
 pub use pipelines::pipelines;

@@ -16,15 +16,25 @@ pub fn pipelines() -> Vec<SamplePipeline> {
         geometry(),
         visibility(),
         compute("hybrid: small triangles", texts::RASTER_SMALL_COMP, &[], "raster_small.comp"),
+        compute("hybrid: medium triangles", texts::RASTER_MEDIUM_COMP, &[], "raster_medium.comp"),
         compute("hybrid: tiles of large triangles", texts::RASTER_TILE_COMP, &[], "raster_tile.comp"),
         compute("hybrid: culling", texts::CULL_COMP, &[], "cull.comp"),
         compute("hybrid: survivors of culling", texts::COMPACT_COMP, &[], "compact.comp"),
         tracing("hybrid: rays by pipeline", texts::WITH_VISIBILITY),
         tracing("hybrid: rays from the paper's G-buffer by pipeline", texts::WITH_GBUFFER),
         tracing("stand-alone: rays by pipeline", &[]),
+        queued_tracing("hybrid: rays in two launches by pipeline", texts::WITH_VISIBILITY_AND_QUEUE),
+        queued_tracing("stand-alone: rays in two launches by pipeline", texts::WITH_QUEUE),
         rays("hybrid: rays by query", texts::WITH_VISIBILITY),
         rays("hybrid: rays from the paper's G-buffer by query", texts::WITH_GBUFFER),
         rays("stand-alone: rays by query", &[]),
+        compute("hybrid: order of pixels", texts::ORDER_COMP, &[], "order.comp"),
+        tracing("hybrid: rays in order by pipeline", texts::WITH_VISIBILITY_AND_ORDER),
+        rays("hybrid: rays in order by query", texts::WITH_VISIBILITY_AND_ORDER),
+        rays("hybrid: first surfaces by query", texts::WITH_VISIBILITY_AND_QUEUE),
+        rays("stand-alone: first surfaces by query", texts::WITH_QUEUE),
+        compute("hybrid: bounces by query", texts::BOUNCES_COMP, texts::WITH_VISIBILITY, "bounces.comp"),
+        compute("stand-alone: bounces by query", texts::BOUNCES_COMP, &[], "bounces.comp"),
     ]
 }
 
@@ -48,6 +58,13 @@ fn tracing(name: &'static str, defines: Defines) -> SamplePipeline {
         stage(ShaderStage::ClosestHit, texts::CLOSEST_RCHIT, &[], "closest.rchit"),
     ];
     SamplePipeline { name, stages, color: Vec::new(), depth: None }
+}
+
+/// First surfaces, with mirrors and glass queued for the second ray generation stage.
+fn queued_tracing(name: &'static str, defines: Defines) -> SamplePipeline {
+    let mut pipeline = tracing(name, defines);
+    pipeline.stages.insert(1, stage(ShaderStage::RayGen, texts::BOUNCES_RGEN, defines, "bounces.rgen"));
+    pipeline
 }
 
 fn visibility() -> SamplePipeline {

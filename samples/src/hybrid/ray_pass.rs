@@ -1,5 +1,5 @@
-//! The ray pass: shading, shadows, reflection and refraction of every pixel, by a ray tracing pipeline or by a
-//! compute shader with ray queries.
+//! The ray pass: shading, shadows, reflection and refraction of every pixel, by a ray tracing pipeline or by compute
+//! shaders with ray queries; at once, or first surfaces first and mirrors and glass in a launch of their own.
 
 use lvk::{
     BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup,
@@ -7,8 +7,11 @@ use lvk::{
     SpecializationValue, TextureHandle,
 };
 
-use super::config::{Geometry, HybridConfig, Method, RayPath};
-use super::frame::Push;
+use super::bounce_queue::BounceQueue;
+use super::compute_raster::groups_for;
+use super::config::{Bounces, Geometry, HybridConfig, Method, RayPath};
+use super::film::Film;
+use super::frame::{BouncePlaces, Push};
 use super::shader_module::module;
 use crate::shaders::hybrid as texts;
 
@@ -16,11 +19,16 @@ use crate::shaders::hybrid as texts;
 const GROUP: u32 = 8;
 /// `constant_id` of the depth limit (`shaders/hybrid/integrator.glsl`).
 const DEPTH_CONSTANT: u32 = 0;
+/// Ray generation shaders by their place in the pipeline.
+const RENDER: u32 = 0;
+const BOUNCES: u32 = 1;
 
-/// The pass: its pipeline and all it touches.
+/// The pass: its pipelines and all they touch.
 pub(super) struct RayPass {
     pipeline: Pipeline,
-    output: TextureHandle,
+    queue: Option<BounceQueue>,
+    /// Whether pixels are taken in their order and not by rows.
+    ordered: bool,
 }
 
 /// What a geometry pass leaves for the ray pass to read.
@@ -32,88 +40,149 @@ pub(super) struct GeometryLeft {
 
 enum Pipeline {
     Tracing(Holder<RayTracingPipelineHandle>),
-    Compute(Holder<ComputePipelineHandle>),
+    Compute { render: Holder<ComputePipelineHandle>, bounces: Option<Holder<ComputePipelineHandle>> },
 }
 
 impl RayPass {
-    /// The pass that `config` asks for, into `output`.
-    pub(super) fn new(ctx: &Context, config: &HybridConfig, output: TextureHandle) -> lvk::Result<Self> {
-        let defines = match (config.method, config.geometry) {
-            (Method::Standalone, _) => &[],
-            (Method::Hybrid, Geometry::Paper) => texts::WITH_GBUFFER,
-            (Method::Hybrid, Geometry::Visibility(_)) => texts::WITH_VISIBILITY,
-        };
-        let value = SpecializationValue::U32(config.max_depth);
-        let depth = [SpecializationConstant { id: DEPTH_CONSTANT, value }];
+    /// The pass that `config` asks for, of bands of `band_pixels` pixels.
+    pub(super) fn new(ctx: &Context, config: &HybridConfig, band_pixels: u32) -> lvk::Result<Self> {
+        let bounces = config.bounces.filter(|_| config.max_depth > 0);
+        let (queued, ordered) = (bounces == Some(Bounces::Queued), bounces == Some(Bounces::First));
+        let stages = Stages::of(config, queued, ordered);
         let pipeline = match config.path {
-            RayPath::Pipeline => Pipeline::Tracing(tracing_pipeline(ctx, defines, &depth)?),
-            RayPath::Query => Pipeline::Compute(compute_pipeline(ctx, defines, &depth)?),
+            RayPath::Pipeline => Pipeline::Tracing(tracing_pipeline(ctx, &stages)?),
+            RayPath::Query => Pipeline::Compute {
+                render: stages.compute(ctx, texts::RENDER_COMP, "render.comp")?,
+                bounces: queued
+                    .then(|| stages.compute(ctx, texts::BOUNCES_COMP, "bounces.comp"))
+                    .transpose()?,
+            },
         };
-        Ok(Self { pipeline, output })
+        let queue = queued.then(|| BounceQueue::new(ctx, band_pixels)).transpose()?;
+        Ok(Self { pipeline, queue, ordered })
     }
 
-    /// Records the rows that `push` names, in an image `width` pixels wide, from what the geometry pass left.
+    /// Where the shaders find the queue.
+    pub(super) fn bounce_places(&self, ctx: &Context) -> lvk::Result<BouncePlaces> {
+        self.queue.as_ref().map_or(Ok(bytemuck::Zeroable::zeroed()), |queue| queue.places(ctx))
+    }
+
+    /// Records the rows that `push` names, in an image `width` pixels wide, from what the geometry pass left onto `film`.
     pub(super) fn record(
         &self,
         cmd: &mut CommandBuffer,
         width: u32,
         push: &Push,
         left: &GeometryLeft,
+        film: &Film,
     ) -> lvk::Result<()> {
-        let rows = push.end_row.saturating_sub(push.first_row);
+        let (push, launch) = self.launch(width, push);
+        let mut buffers: Vec<_> = film.sums().into_iter().collect();
+        if let Some(queue) = &self.queue {
+            queue.record_reset(cmd)?;
+            buffers.extend(queue.buffers());
+        }
         let dependencies = Dependencies {
             sampled_images: &left.textures,
             read_buffers: &left.buffers,
-            storage_images: &[self.output],
+            storage_images: &[*film.picture],
+            buffers: &buffers,
             ..Dependencies::default()
         };
+        let push = &push;
         cmd.push_label("ray pass");
         match &self.pipeline {
             Pipeline::Tracing(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
                 cmd.push_constants(push)?;
-                cmd.trace_rays([width, rows, 1], &dependencies)?;
+                cmd.trace_rays_from(RENDER, launch, &dependencies)?;
+                if let Some(queue) = &self.queue {
+                    cmd.trace_rays_indirect(BOUNCES, queue.head(), BounceQueue::RAYS, &dependencies)?;
+                }
             }
-            Pipeline::Compute(pipeline) => {
-                cmd.bind_compute_pipeline(**pipeline)?;
+            Pipeline::Compute { render, bounces } => {
+                cmd.bind_compute_pipeline(**render)?;
                 cmd.push_constants(push)?;
-                cmd.dispatch([width.div_ceil(GROUP), rows.div_ceil(GROUP), 1], &dependencies)?;
+                cmd.dispatch(self.groups(launch), &dependencies)?;
+                if let (Some(queue), Some(bounces)) = (&self.queue, bounces) {
+                    cmd.bind_compute_pipeline(**bounces)?;
+                    cmd.push_constants(push)?;
+                    cmd.dispatch_indirect(queue.head(), BounceQueue::GROUPS, &dependencies)?;
+                }
             }
         }
         cmd.pop_label();
         Ok(())
     }
+
+    /// What shaders are told of the rows that `push` names, and how many threads that takes along each axis.
+    fn launch(&self, width: u32, push: &Push) -> (Push, [u32; 3]) {
+        let rows = push.end.saturating_sub(push.first);
+        if self.ordered {
+            (Push { first: push.first * width, end: push.end * width, ..*push }, [width * rows, 1, 1])
+        } else {
+            (*push, [width, rows, 1])
+        }
+    }
+
+    fn groups(&self, [width, height, depth]: [u32; 3]) -> [u32; 3] {
+        if self.ordered {
+            groups_for(width, GROUP * GROUP)
+        } else {
+            [width.div_ceil(GROUP), height.div_ceil(GROUP), depth]
+        }
+    }
 }
 
-fn tracing_pipeline(
-    ctx: &Context,
-    defines: &[(&str, &str)],
-    specialization: &[SpecializationConstant],
-) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
-    let ray_gen = module(ctx, ShaderStage::RayGen, texts::RENDER_RGEN, defines, "render.rgen")?;
+/// What all stages are compiled with.
+struct Stages {
+    defines: Vec<(&'static str, &'static str)>,
+    specialization: [SpecializationConstant; 1],
+    queued: bool,
+}
+
+impl Stages {
+    fn of(config: &HybridConfig, queued: bool, ordered: bool) -> Self {
+        let first = match (config.method, config.geometry) {
+            (Method::Standalone, _) => &[],
+            (Method::Hybrid, Geometry::Paper) => texts::WITH_GBUFFER,
+            (Method::Hybrid, Geometry::Visibility(_)) if ordered => texts::WITH_VISIBILITY_AND_ORDER,
+            (Method::Hybrid, Geometry::Visibility(_)) => texts::WITH_VISIBILITY,
+        };
+        let queue = if queued { texts::WITH_QUEUE } else { &[] };
+        let value = SpecializationValue::U32(config.max_depth);
+        Self {
+            defines: [first, queue].concat(),
+            specialization: [SpecializationConstant { id: DEPTH_CONSTANT, value }],
+            queued,
+        }
+    }
+
+    fn compute(&self, ctx: &Context, text: &str, name: &str) -> lvk::Result<Holder<ComputePipelineHandle>> {
+        let shader = module(ctx, ShaderStage::Compute, text, &self.defines, name)?;
+        ctx.create_compute_pipeline(&ComputePipelineDesc {
+            module: Some(*shader),
+            specialization: &self.specialization,
+            debug_name: name,
+        })
+    }
+}
+
+fn tracing_pipeline(ctx: &Context, stages: &Stages) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
+    let ray_gen = |text, name| module(ctx, ShaderStage::RayGen, text, &stages.defines, name);
+    let render = ray_gen(texts::RENDER_RGEN, "render.rgen")?;
+    let bounces = stages.queued.then(|| ray_gen(texts::BOUNCES_RGEN, "bounces.rgen")).transpose()?;
+    let ray_gens: Vec<_> = std::iter::once(&render).chain(&bounces).map(Holder::handle).collect();
     let closest_miss = module(ctx, ShaderStage::Miss, texts::CLOSEST_RMISS, &[], "closest.rmiss")?;
     let shadow_miss = module(ctx, ShaderStage::Miss, texts::SHADOW_RMISS, &[], "shadow.rmiss")?;
     let closest_hit = module(ctx, ShaderStage::ClosestHit, texts::CLOSEST_RCHIT, &[], "closest.rchit")?;
     ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &[*ray_gen],
+        ray_gen: &ray_gens,
         miss: &[*closest_miss, *shadow_miss],
         hit_groups: &[HitGroup { closest_hit: Some(*closest_hit), ..HitGroup::default() }],
         max_recursion: 1,
-        specialization,
+        specialization: &stages.specialization,
         debug_name: "ray pass",
         ..RayTracingPipelineDesc::default()
-    })
-}
-
-fn compute_pipeline(
-    ctx: &Context,
-    defines: &[(&str, &str)],
-    specialization: &[SpecializationConstant],
-) -> lvk::Result<Holder<ComputePipelineHandle>> {
-    let shader = module(ctx, ShaderStage::Compute, texts::RENDER_COMP, defines, "render.comp")?;
-    ctx.create_compute_pipeline(&ComputePipelineDesc {
-        module: Some(*shader),
-        specialization,
-        debug_name: "ray pass",
     })
 }

@@ -2,18 +2,19 @@
 
 use std::ops::Range;
 
-use lvk::{
-    BufferDesc, BufferHandle, CommandBuffer, Context, Format, Holder, TextureDesc, TextureHandle,
-    TextureRegion, TextureUsage,
-};
+use lvk::{BufferDesc, BufferHandle, Capabilities, CommandBuffer, Context, Holder, TextureRegion};
 
 use super::HybridError;
 use super::bands::bands;
-use super::config::{Geometry, HybridConfig, Method, Raster};
-use super::frame::{FrameConstants, Indices, Lighting, Push, VisibilityPlaces, near_plane};
+use super::config::{Bounces, Geometry, HybridConfig, Method, Raster, RayPath};
+use super::film::Film;
+use super::frame::{
+    BouncePlaces, FRAME_BYTES, FrameConstants, Indices, Lighting, Push, VisibilityPlaces, near_plane,
+};
 use super::frame_timings::{FrameTimings, Stamps};
 use super::geometry_pass::GeometryPass;
 use super::gpu_scene::GpuScene;
+use super::pixel_order::PixelOrder;
 use super::raster_choice::RasterChoice;
 use super::ray_pass::{GeometryLeft, RayPass};
 use super::visibility_pass::VisibilityPass;
@@ -40,12 +41,17 @@ pub struct HybridRenderer {
     config: HybridConfig,
     scene: GpuScene,
     geometry: GeometryStage,
+    order: Option<PixelOrder>,
     rays: RayPass,
     stamps: Option<Stamps>,
-    output: Holder<TextureHandle>,
+    film: Film,
+    sums_address: u64,
+    bounce_places: BouncePlaces,
+    order_address: u64,
+    /// A block for each sample.
     frame_buffer: Holder<BufferHandle>,
     frame_address: u64,
-    uploaded: Option<FrameConstants>,
+    uploaded: Vec<FrameConstants>,
     lighting: Lighting,
     indices: Indices,
     near_plane: f32,
@@ -59,28 +65,36 @@ impl HybridRenderer {
     /// [`HybridError`] when the configuration or the scene is beyond the device, or the device fails.
     pub fn new(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Result<Self, HybridError> {
         config.check(ctx.capabilities())?;
+        let config = &suited(config, scene, ctx.capabilities());
         let extent = [config.width, config.height];
         let gpu_scene = GpuScene::new(ctx, scene)?;
-        let frame_buffer = frame_buffer(ctx)?;
-        let output = output(ctx, extent)?;
+        let frame_buffer = frame_buffer(ctx, config.samples)?;
+        let film = Film::new(ctx, extent, config.samples)?;
         let geometry = GeometryStage::new(ctx, &gpu_scene, config)?;
-        let rays = RayPass::new(ctx, config, *output)?;
-        let bands = bands(config.height, band_rows(config, ctx.capabilities().is_cpu));
+        let is_ordered = config.bounces == Some(Bounces::First) && config.max_depth > 0;
+        let order = is_ordered.then(|| PixelOrder::new(ctx, extent)).transpose()?;
+        let band_rows = band_rows(config, ctx.capabilities().is_cpu).min(config.height);
+        let bands = bands(config.height, band_rows);
+        let rays = RayPass::new(ctx, config, config.width * band_rows)?;
         let has_stamps = ctx.capabilities().limits.timestamp_bits > 0;
-        let stamps = has_stamps.then(|| Stamps::new(ctx, bands.len() as u32)).transpose()?;
+        let stamps = has_stamps.then(|| Stamps::new(ctx, bands.len() as u32, config.samples)).transpose()?;
         Ok(Self {
-            indices: indices(&gpu_scene, &geometry, output.index()),
+            indices: indices(&gpu_scene, &geometry, film.picture.index()),
             frame_address: ctx.buffer_address(*frame_buffer)?,
-            uploaded: None,
+            sums_address: film.sums_address(ctx)?,
+            bounce_places: rays.bounce_places(ctx)?,
+            uploaded: Vec::new(),
             lighting: Lighting::new(scene),
             near_plane: near_plane(scene),
             ctx: ctx.clone(),
             config: *config,
             scene: gpu_scene,
             geometry,
+            order_address: order.as_ref().map_or(Ok(0), |order| order.address(ctx))?,
+            order,
             rays,
             stamps,
-            output,
+            film,
             frame_buffer,
             bands,
         })
@@ -99,7 +113,8 @@ impl HybridRenderer {
         self.render_with(camera, &mut |_| {})
     }
 
-    /// Renders one frame, a band of rows after the other, and calls `after_band` with the number of bands done.
+    /// Renders one frame, a band of rows after the other, once for each sample, and calls `after_band` with the number of
+    /// bands done.
     ///
     /// # Errors
     /// [`HybridError::Device`].
@@ -109,15 +124,17 @@ impl HybridRenderer {
         after_band: &mut dyn FnMut(u64),
     ) -> Result<FrameTimings, HybridError> {
         self.upload_constants(camera)?;
-        for band in 0..self.bands.len() {
+        let bands = self.bands.len() as u32;
+        for step in 0..self.config.samples * bands {
+            let (sample, band) = (step / bands, step % bands);
             let mut cmd = self.ctx.acquire_command_buffer()?;
             if band == 0 {
-                self.begin_frame(&mut cmd)?;
+                self.begin_sample(&mut cmd, sample)?;
             }
-            self.record_band(&mut cmd, band)?;
+            self.record_band(&mut cmd, sample, band)?;
             let submitted = self.ctx.submit(cmd)?;
             self.ctx.wait(submitted)?;
-            after_band(band as u64 + 1);
+            after_band(u64::from(step) + 1);
         }
         let has_geometry = !matches!(self.geometry, GeometryStage::None);
         let read = |stamps: &Stamps| stamps.read(&self.ctx, has_geometry);
@@ -145,12 +162,12 @@ impl HybridRenderer {
     /// # Errors
     /// [`HybridError::Device`].
     pub fn read_image(&self) -> Result<Vec<u8>, HybridError> {
-        Ok(self.ctx.download_texture(*self.output, &TextureRegion::default())?)
+        Ok(self.ctx.download_texture(*self.film.picture, &TextureRegion::default())?)
     }
 
-    /// How many bands a frame is rendered in.
+    /// How many bands a frame is rendered in, those of all samples counted.
     pub fn band_count(&self) -> u64 {
-        self.bands.len() as u64
+        self.bands.len() as u64 * u64::from(self.config.samples)
     }
 
     /// Milliseconds that building the bottom-level acceleration structures took, submission and wait included.
@@ -170,16 +187,26 @@ impl HybridRenderer {
     }
 
     fn upload_constants(&mut self, camera: &Camera) -> lvk::Result<()> {
-        let constants = FrameConstants {
-            camera: GpuCamera::new(camera, self.config.width, self.config.height, self.near_plane),
-            scene: self.scene.addresses(),
-            lighting: self.lighting,
-            indices: self.indices,
-            visibility: self.geometry.places(),
-        };
-        if self.uploaded != Some(constants) {
-            self.ctx.upload_buffer(*self.frame_buffer, 0, bytemuck::bytes_of(&constants))?;
-            self.uploaded = Some(constants);
+        let view = GpuCamera::new(camera, self.config.width, self.config.height, self.near_plane);
+        let sample_count = self.config.samples;
+        let constants: Vec<_> = (0..sample_count)
+            .map(|sample_number| FrameConstants {
+                camera: view.for_sample(sample_number, sample_count),
+                scene: self.scene.addresses(),
+                lighting: self.lighting,
+                indices: self.indices,
+                visibility: self.geometry.places(),
+                bounces: self.bounce_places,
+                order: self.order_address,
+                sums: self.sums_address,
+                sample_number,
+                sample_count,
+                padding: [0; 2],
+            })
+            .collect();
+        if self.uploaded != constants {
+            self.ctx.upload_buffer(*self.frame_buffer, 0, bytemuck::cast_slice(&constants))?;
+            self.uploaded = constants;
         }
         Ok(())
     }
@@ -191,7 +218,7 @@ impl HybridRenderer {
         for _ in 0..MEASURED_FRAMES {
             self.upload_constants(camera)?;
             let mut cmd = self.ctx.acquire_command_buffer()?;
-            self.begin_frame(&mut cmd)?;
+            self.begin_sample(&mut cmd, 0)?;
             let submitted = self.ctx.submit(cmd)?;
             self.ctx.wait(submitted)?;
             let Some(stamps) = &self.stamps else { break };
@@ -200,27 +227,39 @@ impl HybridRenderer {
         Ok(times)
     }
 
-    fn begin_frame(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+    fn begin_sample(&self, cmd: &mut CommandBuffer, sample: u32) -> lvk::Result<()> {
         if let Some(stamps) = &self.stamps {
-            stamps.reset(cmd)?;
-            stamps.geometry(cmd, false)?;
+            stamps.reset(cmd, sample)?;
+            stamps.geometry(cmd, sample, false)?;
         }
-        self.geometry.record(cmd, &self.push(0..self.config.height))?;
-        self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.geometry(cmd, true))
+        let push = self.push(sample, 0..self.config.height);
+        self.geometry.record(cmd, &push)?;
+        if let Some(order) = &self.order {
+            order.record(cmd, &push, &self.geometry.left())?;
+        }
+        self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.geometry(cmd, sample, true))
     }
 
-    fn record_band(&self, cmd: &mut CommandBuffer, band: usize) -> lvk::Result<()> {
+    fn record_band(&self, cmd: &mut CommandBuffer, sample: u32, band: u32) -> lvk::Result<()> {
         let stamp = |cmd: &mut CommandBuffer, end| {
-            self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.band(cmd, band as u32, end))
+            self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.band(cmd, sample, band, end))
         };
         stamp(cmd, false)?;
-        let push = self.push(self.bands[band].clone());
-        self.rays.record(cmd, self.config.width, &push, &self.geometry.left())?;
+        let push = self.push(sample, self.bands[band as usize].clone());
+        self.rays.record(cmd, self.config.width, &push, &self.left(), &self.film)?;
         stamp(cmd, true)
     }
 
-    fn push(&self, rows: Range<u32>) -> Push {
-        Push { frame: self.frame_address, first_row: rows.start, end_row: rows.end }
+    /// What the geometry pass and the order of pixels left.
+    fn left(&self) -> GeometryLeft {
+        let mut left = self.geometry.left();
+        left.buffers.extend(self.order.as_ref().map(PixelOrder::buffer));
+        left
+    }
+
+    fn push(&self, sample: u32, rows: Range<u32>) -> Push {
+        let frame = self.frame_address + FRAME_BYTES * u64::from(sample);
+        Push { frame, first: rows.start, end: rows.end }
     }
 }
 
@@ -280,19 +319,25 @@ fn band_rows(config: &HybridConfig, is_cpu: bool) -> u32 {
     if is_cpu { CPU_BAND_ROWS } else { GPU_BAND_PIXELS / config.width }
 }
 
-fn frame_buffer(ctx: &Context) -> lvk::Result<Holder<BufferHandle>> {
-    let size_bytes = size_of::<FrameConstants>() as u64;
-    ctx.create_buffer(&BufferDesc { size_bytes, debug_name: "frame constants", ..BufferDesc::default() })
+/// The configuration with what it leaves open decided, and without bounces where nothing mirrors or refracts.
+fn suited(config: &HybridConfig, scene: &Scene, capabilities: &Capabilities) -> HybridConfig {
+    let goes_on = scene.materials.iter().any(|m| m.reflectivity > 0.0 || m.is_refractive());
+    let can_queue = config.path == RayPath::Query || capabilities.trace_rays_indirect;
+    let suits = match (capabilities.is_cpu, config.knows_triangles()) {
+        (true, _) if can_queue => Bounces::Queued,
+        (false, true) => Bounces::First,
+        _ => Bounces::Inline,
+    };
+    HybridConfig {
+        max_depth: if goes_on { config.max_depth } else { 0 },
+        bounces: Some(config.bounces.unwrap_or(suits)),
+        ..*config
+    }
 }
 
-fn output(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Holder<TextureHandle>> {
-    ctx.create_texture(&TextureDesc {
-        format: Format::Rgba8Unorm,
-        extent,
-        usage: TextureUsage::STORAGE,
-        debug_name: "picture",
-        ..TextureDesc::default()
-    })
+fn frame_buffer(ctx: &Context, samples: u32) -> lvk::Result<Holder<BufferHandle>> {
+    let size_bytes = FRAME_BYTES * u64::from(samples);
+    ctx.create_buffer(&BufferDesc { size_bytes, debug_name: "frame constants", ..BufferDesc::default() })
 }
 
 fn indices(scene: &GpuScene, geometry: &GeometryStage, output: u32) -> Indices {

@@ -7,7 +7,9 @@ use lvk::Context;
 
 use super::sequence::HybridSequence;
 use super::texture_fit::{fit_textures, textures_needed};
-use super::{Geometry, HybridConfig, HybridError, HybridRenderer, Method, Raster, RasterTuning, RayPath};
+use super::{
+    Bounces, Geometry, HybridConfig, HybridError, HybridRenderer, Method, Raster, RasterTuning, RayPath,
+};
 use crate::app::args::{self, HybridArgs};
 use crate::app::device::{DeviceNeeds, driver_text};
 use crate::app::frames::Frames;
@@ -25,6 +27,8 @@ impl From<HybridError> for RunError {
         match error {
             HybridError::BadSize { .. }
             | HybridError::TooDeep { .. }
+            | HybridError::BadSamples { .. }
+            | HybridError::NothingFirst
             | HybridError::TooManyTriangles { .. }
             | HybridError::TooManyTextures { .. }
             | HybridError::BrokenScene(_) => Self::input(error),
@@ -91,9 +95,17 @@ fn config(args: &HybridArgs, path: RayPath) -> HybridConfig {
         args::GBuffer::Paper => Geometry::Paper,
         args::GBuffer::Visibility => Geometry::Visibility(raster),
     };
-    let tuning = RasterTuning { small_pixels: args.small_triangle, ..RasterTuning::default() };
-    let (width, height, max_depth) = (args.run.width, args.run.height, args.depth);
-    HybridConfig { method, path, width, height, max_depth, geometry, tuning }
+    let usual = RasterTuning::default();
+    let medium_pixels = args.medium_triangle.unwrap_or(usual.medium_pixels);
+    let tuning = RasterTuning { small_pixels: args.small_triangle, medium_pixels, ..usual };
+    let bounces = match args.bounces {
+        args::Bounces::Auto => None,
+        args::Bounces::Inline => Some(Bounces::Inline),
+        args::Bounces::Queued => Some(Bounces::Queued),
+        args::Bounces::First => Some(Bounces::First),
+    };
+    let (width, height, max_depth, samples) = (args.run.width, args.run.height, args.depth, args.samples);
+    HybridConfig { method, path, width, height, max_depth, bounces, samples, geometry, tuning }
 }
 
 fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &HybridRenderer) -> String {
@@ -114,7 +126,11 @@ fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &Hybr
     if let Some(profile) = &capabilities.profile {
         let _ = writeln!(text, "profile   {profile}, rehearsed on this device");
     }
-    let _ = writeln!(text, "method    {method}; {path}; depth {}", config.max_depth);
+    let _ = write!(text, "method    {method}; {path}; depth {}", config.max_depth);
+    let _ = match config.samples {
+        1 => writeln!(text),
+        samples => writeln!(text, "; {samples} samples"),
+    };
     let _ = writeln!(
         text,
         "scene     {}: {} triangles, {refractive} of them refractive; {} materials, {} textures",

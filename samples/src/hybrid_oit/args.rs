@@ -4,6 +4,7 @@ use clap::Parser;
 
 use super::HybridOitConfig;
 use crate::app::run_args::RunArgs;
+use crate::app::scene_args::BuiltInSceneArgs;
 
 /// Moment in seconds at which the built-in animation begins: one that shows every colour of shadow.
 const SHOWN_MOMENT: f64 = 1.9;
@@ -48,6 +49,10 @@ pub struct HybridOitArgs {
         help_heading = "Frames"
     )]
     pub time: f64,
+
+    /// The built-in scene
+    #[command(flatten)]
+    pub scene: BuiltInSceneArgs,
 
     /// Frames, pictures and device
     #[command(flatten)]

@@ -49,7 +49,7 @@ pub fn pipelines() -> Vec<SamplePipeline> {
 
 /// Compiles a stage.
 pub(super) fn module(ctx: &Context, stage: &SampleStage) -> lvk::Result<Holder<ShaderModuleHandle>> {
-    ctx.create_shader_module(&stage.module())
+    stage.create(ctx, "hybrid_oit")
 }
 
 const fn stage(stage: ShaderStage, text: &'static str, name: &'static str) -> SampleStage {

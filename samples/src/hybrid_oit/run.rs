@@ -11,6 +11,7 @@ use crate::app::run::{self, Opened, Opening};
 use crate::app::run_args::RayTracing;
 use crate::app::run_error::RunError;
 use crate::app::sample::{Moment, PassTimes, Sample};
+use crate::app::say;
 use crate::hybrid::RayPath;
 
 /// What the sample and its pictures are called.
@@ -64,7 +65,13 @@ impl Sample for Animation {
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &HybridOitArgs) -> ExitCode {
-    run::run(NAME, &args.run, |opening| open(args, opening))
+    match args.scene.listing("room", "blocks and drifting spheres of tinted glass") {
+        Some(listing) => {
+            say(&listing);
+            ExitCode::SUCCESS
+        }
+        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+    }
 }
 
 fn open(args: &HybridOitArgs, opening: &mut Opening<'_>) -> Result<Opened<Animation>, RunError> {

@@ -4,6 +4,7 @@ use clap::Parser;
 
 use super::ReflectionsConfig;
 use crate::app::run_args::RunArgs;
+use crate::app::scene_args::BuiltInSceneArgs;
 
 /// Renders a hall with polished floors, water, glass, a serpent and drifting leaves, all of them reflected by ray tracing
 /// over a rasterised picture, and writes pictures as PNG.
@@ -30,6 +31,14 @@ pub struct ReflectionsArgs {
     )]
     pub min_angle: f32,
 
+    /// Also measure the frame without leaving instances out, and say what that saves
+    #[arg(long, help_heading = "Rendering")]
+    pub compare_culling: bool,
+
+    /// The built-in scene
+    #[command(flatten)]
+    pub scene: BuiltInSceneArgs,
+
     /// Frames, pictures and device
     #[command(flatten)]
     pub run: RunArgs,
@@ -39,11 +48,12 @@ const EXAMPLES: &str = "\
 Examples:
   reflections                                             a picture, by the best path of the best device
   reflections --samples 16 --out hall.png                 a smoother one
-  reflections --frames 0..240 --out dir/frame_####.png    the first eight seconds; ranges can be shared among machines
+  reflections --frames 0..240 --out dir/frame_####.png    one round of the animation; ranges can be shared among machines
+  reflections --compare-culling                           what leaving small instances out saves, in milliseconds
   reflections --rt query --validate                       by ray queries in compute shaders, with validation
   reflections --profile mali-g715                         as on a phone: ray queries, split meshes
 
-Exit status: 0 when the pictures were written, 1 for trouble with the device, 2 for wrong arguments.";
+Exit status: 0 when the pictures were written, 1 for trouble with the device, 2 for wrong arguments, 130 after Ctrl-C.";
 
 fn angle(text: &str) -> Result<f32, String> {
     match text.parse::<f32>() {
@@ -67,6 +77,7 @@ mod tests {
         ReflectionsArgs::command().debug_assert();
         let args = parsed("").unwrap();
         assert_eq!((args.samples, args.min_angle), (4, ReflectionsConfig::DEFAULT_MIN_ANGLE));
+        assert!(!args.compare_culling && parsed("--compare-culling").unwrap().compare_culling);
     }
 
     #[test]

@@ -5,8 +5,8 @@ use bytemuck::{Pod, Zeroable};
 use super::world::Light;
 use crate::scene::GpuCamera;
 
-/// Lights that the shaders have room for.
-const MOST_LIGHTS: usize = 4;
+/// Lights that the shaders have room for: channels of a texture, beside the one for openness.
+const MOST_LIGHTS: usize = 3;
 /// Distance of the near plane in scene units.
 pub(super) const NEAR_PLANE: f32 = 0.05;
 
@@ -44,7 +44,9 @@ pub(super) struct Indices {
     pub(super) opaque_depth: u32,
     pub(super) glass_surface: u32,
     pub(super) glass_depth: u32,
-    pub(super) direct: u32,
+    pub(super) visibility: u32,
+    pub(super) smoothed: u32,
+    pub(super) penumbra: u32,
     pub(super) reflection: u32,
     pub(super) filtered: u32,
     pub(super) glass_reflection: u32,
@@ -59,17 +61,17 @@ pub(super) struct Indices {
 pub(super) struct FrameConstants {
     pub(super) view: GpuCamera,
     pub(super) world: WorldConstants,
-    pub(super) jitter: [f32; 2],
     pub(super) frame_number: u32,
     pub(super) sample_number: u32,
-    pub(super) time: f32,
+    pub(super) phase: f32,
     pub(super) indices: Indices,
 }
 
 /// Bytes from one sample's block to the next.
 pub(super) const FRAME_BYTES: u64 = size_of::<FrameConstants>() as u64;
 
-const _: () = assert!(FRAME_BYTES.is_multiple_of(16) && std::mem::offset_of!(FrameConstants, jitter) == 360);
+const _: () =
+    assert!(FRAME_BYTES.is_multiple_of(16) && std::mem::offset_of!(FrameConstants, frame_number) == 328);
 
 /// The push constants of all passes but the skinning.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -89,31 +91,7 @@ pub(super) fn light_constants(lights: &[Light]) -> ([LightConstants; MOST_LIGHTS
     (all, lights.len().min(MOST_LIGHTS) as u32)
 }
 
-/// Where in a pixel sample `number` looks, in normalised device coordinates: evenly spread, the only one in the middle.
-pub(super) fn jitter(number: u32, count: u32, extent: [u32; 2]) -> [f32; 2] {
-    if count <= 1 {
-        return [0.0; 2];
-    }
-    let place = |ratio: f32| (0.5 + ratio * number as f32).fract() - 0.5;
-    [2.0 * place(0.754_877_7) / extent[0] as f32, 2.0 * place(0.569_840_3) / extent[1] as f32]
-}
-
 /// An address in two words, as push constants carry it.
 pub(super) fn words(address: u64) -> [u32; 2] {
     [address as u32, (address >> 32) as u32]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn samples_stay_in_their_pixel_and_differ() {
-        let all: Vec<_> = (0..16).map(|number| jitter(number, 16, [100, 50])).collect();
-        for (number, [x, y]) in all.iter().enumerate() {
-            assert!(x.abs() <= 0.01 && y.abs() <= 0.02);
-            assert!(all[..number].iter().all(|other| other != &[*x, *y]));
-        }
-        assert_eq!(jitter(0, 1, [8, 8]), [0.0; 2]);
-    }
 }

@@ -1,4 +1,4 @@
-//! The passes from picture to picture: the filter of reflections, the composite and the final average.
+//! The passes from picture to picture: the filters of shadows and reflections, the composite and the final average.
 
 use lvk::{
     BufferDesc, BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder,
@@ -7,12 +7,13 @@ use lvk::{
 
 use super::frame::{Push, words};
 use super::moving::compute;
-use super::pipelines::{COMPOSITE, FILTER, RESOLVE};
+use super::pipelines::{COMPOSITE, FILTER, RESOLVE, SMOOTH};
 use super::ray_passes::GROUP;
 use super::targets::Targets;
 
 /// The pipelines, and the sums of the samples.
 pub(super) struct ImagePasses {
+    smooth: Holder<ComputePipelineHandle>,
     filter: Holder<ComputePipelineHandle>,
     composite: Holder<ComputePipelineHandle>,
     resolve: Holder<ComputePipelineHandle>,
@@ -27,6 +28,7 @@ impl ImagePasses {
         let sums =
             ctx.create_buffer(&BufferDesc { size_bytes, debug_name: "sums", ..BufferDesc::default() })?;
         Ok(Self {
+            smooth: compute(ctx, SMOOTH)?,
             filter: compute(ctx, FILTER)?,
             composite: compute(ctx, COMPOSITE)?,
             resolve: compute(ctx, RESOLVE)?,
@@ -36,7 +38,8 @@ impl ImagePasses {
         })
     }
 
-    /// Filters the reflections twice, there and back again, and lights the opaque surfaces with them.
+    /// Smooths shadows and filters reflections, both twice, there and back again, and lights the opaque surfaces with
+    /// them.
     pub(super) fn record_composite(
         &self,
         cmd: &mut CommandBuffer,
@@ -44,13 +47,19 @@ impl ImagePasses {
         frame: u64,
     ) -> lvk::Result<()> {
         let [surface, depth] = targets.opaque();
+        let ways = [(&targets.visibility, &targets.smoothed), (&targets.smoothed, &targets.visibility)];
+        for (number, (from, to)) in (0..).zip(ways) {
+            let arguments = [from.index(), to.index(), number, 0];
+            let sampled = [surface, depth, from.handle(), *targets.penumbra];
+            self.run(cmd, *self.smooth, Push { frame, arguments }, &sampled, &[to.handle()], &[])?;
+        }
         let ways = [(&targets.reflection, &targets.filtered), (&targets.filtered, &targets.reflection)];
         for (number, (from, to)) in (0..).zip(ways) {
             let arguments = [from.index(), to.index(), number, 0];
             let sampled = [surface, depth, from.handle()];
             self.run(cmd, *self.filter, Push { frame, arguments }, &sampled, &[to.handle()], &[])?;
         }
-        let sampled = [surface, depth, *targets.direct, *targets.reflection];
+        let sampled = [surface, depth, *targets.visibility, *targets.reflection];
         let push = Push { frame, arguments: [0; 4] };
         self.run(cmd, *self.composite, push, &sampled, &[*targets.composite], &[])
     }

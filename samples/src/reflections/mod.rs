@@ -2,7 +2,9 @@
 //! for Hybrid Rendering" (Khronos, on Wolfenstein: Youngblood).
 //!
 //! * Opaque reflections start from depth and normals of a g-buffer; transparent surfaces are drawn into a second one,
-//!   whose depth masks a second ray pass, and are blended over the lit picture afterwards.
+//!   whose depth masks a second ray pass, and are blended over the lit picture afterwards, farthest first.
+//! * One ray for each light says whether a pixel sees it; shadows are then smoothed as far as their penumbra reaches, which
+//!   follows from the distance of the blocker.
 //! * Rays are shortened by roughness ([`reflection_range`]) and what they find is filtered by roughness and by the
 //!   distance of what they met.
 //! * A character is skinned by compute into the buffer that its structure is refitted from in every frame; leaves turn
@@ -17,9 +19,11 @@
 
 mod args;
 mod config;
+mod culling_cost;
 mod error;
 mod frame;
 mod image_passes;
+mod layers;
 mod mesh;
 mod models;
 mod moving;
@@ -41,6 +45,7 @@ mod world;
 
 pub use args::ReflectionsArgs;
 pub use config::{ReflectionsConfig, SkinUpdate};
+pub use culling_cost::{CullingCost, RayCost};
 pub use error::ReflectionsError;
 pub use pipelines::pipelines;
 pub use range::{FAR, ROUGHEST_TRACED, reflection_range};

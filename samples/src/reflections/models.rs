@@ -121,10 +121,10 @@ fn trim() -> Mesh {
 pub(super) fn ground() -> Model {
     let corner = Vec3::new(-100.0, -0.8, -100.0);
     let plain = Mesh::default().quad(corner, Vec3::Z * 200.0, Vec3::X * 200.0, 4.0);
-    let hills = Mesh::default().grid(160, 8, |u, v| {
+    let hills = Mesh::default().grid(320, 24, |u, v| {
         let (sine, cosine) = (-u * TAU).sin_cos();
         let radius = 62.0 + 34.0 * v;
-        let rough = noise::tiled(14.0 * u, 2.0 * v, [14, 0], 5);
+        let rough = noise::tiled(14.0 * u, 2.0 * v, [14, 0], 3);
         let height = (18.0 * rough * (0.5 * std::f32::consts::PI * v).sin() - 0.5).max(-1.0);
         Vec3::new(radius * cosine, height, radius * sine)
     });

@@ -112,9 +112,9 @@ impl Moving {
         })
     }
 
-    /// Moves the bones to where they are at `time` in seconds.
-    pub(super) fn pose(&self, ctx: &Context, time: f32) -> lvk::Result<()> {
-        ctx.upload_buffer(*self.bones, 0, bytemuck::cast_slice(&serpent::bones(time)))
+    /// Moves the bones to where they are at `phase` of the round, 0 to 1.
+    pub(super) fn pose(&self, ctx: &Context, phase: f32) -> lvk::Result<()> {
+        ctx.upload_buffer(*self.bones, 0, bytemuck::cast_slice(&serpent::bones(phase)))
     }
 
     fn skin_geometries(&self, indices: BufferHandle) -> Vec<BlasGeometry> {
@@ -206,7 +206,7 @@ impl MovingPasses {
 
 /// A compute pipeline of one stage.
 pub(super) fn compute(ctx: &Context, stage: SampleStage) -> lvk::Result<Holder<ComputePipelineHandle>> {
-    let module = ctx.create_shader_module(&stage.module())?;
+    let module = stage.create(ctx, "reflections")?;
     ctx.create_compute_pipeline(&ComputePipelineDesc {
         module: Some(*module),
         debug_name: stage.name,

@@ -9,6 +9,7 @@ use crate::shaders::reflections as texts;
 pub(super) const SKIN: SampleStage = stage(ShaderStage::Compute, texts::SKIN_COMP, "skin.comp");
 pub(super) const LEAVES: SampleStage = stage(ShaderStage::Compute, texts::LEAVES_COMP, "leaves.comp");
 pub(super) const FILTER: SampleStage = stage(ShaderStage::Compute, texts::FILTER_COMP, "filter.comp");
+pub(super) const SMOOTH: SampleStage = stage(ShaderStage::Compute, texts::SMOOTH_COMP, "smooth.comp");
 pub(super) const COMPOSITE: SampleStage =
     stage(ShaderStage::Compute, texts::COMPOSITE_COMP, "composite.comp");
 pub(super) const RESOLVE: SampleStage = stage(ShaderStage::Compute, texts::RESOLVE_COMP, "resolve.comp");
@@ -47,6 +48,7 @@ pub fn pipelines() -> Vec<SamplePipeline> {
         },
         compute("reflections: opaque rays by query", OPAQUE_QUERY),
         compute("reflections: transparent rays by query", TRANSPARENT_QUERY),
+        compute("reflections: smoothing of shadows", SMOOTH),
         compute("reflections: filter", FILTER),
         compute("reflections: composite", COMPOSITE),
         raster("reflections: blend", BLEND_FRAGMENT, COMPOSITE_FORMAT, None),

@@ -23,8 +23,9 @@ pub(super) struct RasterPasses {
 #[derive(Clone, Copy)]
 pub(super) struct Drawn<'a> {
     pub(super) indices: BufferHandle,
-    /// In the order in which transparent ones are blended.
-    pub(super) draws: &'a [Draw],
+    pub(super) opaque: &'a [Draw],
+    /// Farthest first.
+    pub(super) transparent: &'a [Draw],
     /// Buffers that were written in the same command buffer.
     pub(super) written: &'a [BufferHandle],
     /// Address of the frame's constants.
@@ -52,12 +53,12 @@ impl RasterPasses {
     ) -> lvk::Result<()> {
         let written = Dependencies { read_buffers: drawn.written, ..Dependencies::default() };
         let mut pass = begin_surfaces(cmd, targets.opaque(), written, "opaque surfaces")?;
-        draw_all(&mut pass, *self.opaque, drawn, false)?;
+        draw_all(&mut pass, *self.opaque, drawn, drawn.opaque)?;
         drop(pass);
         let behind = [*targets.opaque_depth];
         let read = Dependencies { sampled_images: &behind, ..written };
         let mut pass = begin_surfaces(cmd, targets.glass(), read, "transparent surfaces")?;
-        draw_all(&mut pass, *self.transparent, drawn, true)
+        draw_all(&mut pass, *self.transparent, drawn, drawn.transparent)
     }
 
     /// Lays the transparent surfaces over the lit picture.
@@ -76,7 +77,7 @@ impl RasterPasses {
             debug_name: "blend",
             ..RenderPassDesc::default()
         })?;
-        draw_all(&mut pass, *self.blend, drawn, true)
+        draw_all(&mut pass, *self.blend, drawn, drawn.transparent)
     }
 }
 
@@ -105,11 +106,11 @@ fn draw_all(
     pass: &mut RenderPass<'_>,
     pipeline: RenderPipelineHandle,
     drawn: Drawn<'_>,
-    is_transparent: bool,
+    draws: &[Draw],
 ) -> lvk::Result<()> {
     pass.bind_render_pipeline(pipeline)?;
     pass.bind_index_buffer(drawn.indices, 0, IndexFormat::U16)?;
-    for draw in drawn.draws.iter().filter(|draw| draw.is_transparent == is_transparent) {
+    for draw in draws {
         pass.push_constants(&Push { frame: drawn.frame, arguments: [draw.geometry, 0, 0, 0] })?;
         pass.draw_indexed(draw.indices.clone(), 0, draw.instances.clone())?;
     }
@@ -122,8 +123,8 @@ fn pipeline(
     color: ColorTarget,
     depth: Option<DepthTest>,
 ) -> lvk::Result<Holder<RenderPipelineHandle>> {
-    let vertex = ctx.create_shader_module(&SURFACE_VERTEX.module())?;
-    let module = ctx.create_shader_module(&fragment.module())?;
+    let vertex = SURFACE_VERTEX.create(ctx, "reflections")?;
+    let module = fragment.create(ctx, "reflections")?;
     ctx.create_render_pipeline(&RenderPipelineDesc {
         vertex: Some(*vertex),
         fragment: Some(*module),

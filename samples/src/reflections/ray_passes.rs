@@ -53,7 +53,7 @@ impl RayPasses {
             Surfaces::Opaque => targets.opaque(),
             Surfaces::Transparent => targets.glass(),
         };
-        let opaque_images = [*targets.direct, *targets.reflection];
+        let opaque_images = [*targets.visibility, *targets.penumbra, *targets.reflection];
         let storage_images: &[_] = match surfaces {
             Surfaces::Opaque => &opaque_images,
             Surfaces::Transparent => &[*targets.glass_reflection],
@@ -82,7 +82,7 @@ impl RayPasses {
 
 fn tracing_pipeline(ctx: &Context) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
     let stages = [OPAQUE_RAYS, TRANSPARENT_RAYS, CLOSEST_MISS, SHADOW_MISS, CLOSEST_HIT, LEAF_ANY_HIT];
-    let modules = stages.map(|stage| ctx.create_shader_module(&stage.module()));
+    let modules = stages.map(|stage| stage.create(ctx, "reflections"));
     let [opaque, transparent, closest_miss, shadow_miss, closest_hit, leaf] = modules;
     let (closest_hit, leaf) = (closest_hit?, leaf?);
     let solid = HitGroup { closest_hit: Some(*closest_hit), ..HitGroup::default() };

@@ -1,4 +1,4 @@
-//! The sample as a type: say the time, get a picture.
+//! The sample as a type: say the moment, get a picture.
 
 use lvk::{
     AddressMode, BufferDesc, BufferHandle, CommandBuffer, Context, Format, Holder, SamplerDesc,
@@ -7,9 +7,7 @@ use lvk::{
 
 use super::config::ReflectionsConfig;
 use super::error::ReflectionsError;
-use super::frame::{
-    FRAME_BYTES, FrameConstants, Indices, NEAR_PLANE, WorldConstants, jitter, light_constants,
-};
+use super::frame::{FRAME_BYTES, FrameConstants, Indices, NEAR_PLANE, WorldConstants, light_constants};
 use super::image_passes::ImagePasses;
 use super::moving::{Moving, MovingPasses};
 use super::paint::Picture;
@@ -25,8 +23,6 @@ use crate::app::sample::PassTimes;
 use crate::hybrid::half_float::half_bits;
 use crate::scene::{Camera, GpuCamera, Sky};
 
-/// Frames in a second of the animation.
-const FRAME_RATE: f32 = 60.0;
 /// Texels on an edge of the sky's cube map.
 const SKY_SIZE: u32 = 256;
 
@@ -48,7 +44,7 @@ pub struct Reflections {
     frame_buffer: Holder<BufferHandle>,
     frame_address: u64,
     camera: Camera,
-    time: f32,
+    phase: f32,
     _held: (Vec<Holder<TextureHandle>>, [Holder<SamplerHandle>; 2]),
 }
 
@@ -107,16 +103,16 @@ impl Reflections {
             indices,
             frame_buffer,
             camera: world::camera(0.0),
-            time: 0.0,
+            phase: 0.0,
             _held: (textures, samplers),
         })
     }
 
-    /// Moves the camera and everything that moves to where they are at `time`, in seconds. Nothing depends on earlier
-    /// times.
-    pub fn show(&mut self, time: f32) {
-        self.time = time;
-        self.camera = world::camera(time);
+    /// Moves the camera and everything that moves to where they are at `phase` of the animation's round: 0 to 1, beyond
+    /// which it goes round again. What is not finite counts as 0. Nothing depends on earlier phases.
+    pub fn show(&mut self, phase: f32) {
+        self.phase = if phase.is_finite() { phase.rem_euclid(1.0) % 1.0 } else { 0.0 };
+        self.camera = world::camera(self.phase);
     }
 
     /// Looks from another place than the animation's, until the next [`show`](Self::show).
@@ -134,7 +130,7 @@ impl Reflections {
         let mut times = [0.0; PASSES.len()];
         for sample in 0..self.config.samples {
             let mut cmd = self.ctx.acquire_command_buffer()?;
-            self.record(&mut cmd, sample)?;
+            self.record(&mut cmd, sample, self.config.min_angle)?;
             let submitted = self.ctx.submit(cmd)?;
             self.ctx.wait(submitted)?;
             if let Some(stamps) = &self.stamps {
@@ -144,6 +140,23 @@ impl Reflections {
         }
         let has_times = self.stamps.is_some();
         Ok(PASSES.into_iter().zip(times).filter(|_| has_times).collect())
+    }
+
+    /// What the passes of the first sample take on the GPU, in milliseconds, where instances seen under less than
+    /// `min_angle` are culled; `None` where the device has no timestamps.
+    pub(super) fn time_sample(
+        &self,
+        min_angle: f32,
+    ) -> Result<Option<[f64; PASSES.len()]>, ReflectionsError> {
+        let Some(stamps) = &self.stamps else { return Ok(None) };
+        self.upload_constants()?;
+        let mut cmd = self.ctx.acquire_command_buffer()?;
+        self.record(&mut cmd, 0, min_angle)?;
+        let submitted = self.ctx.submit(cmd)?;
+        self.ctx.wait(submitted)?;
+        let mut times = [0.0; PASSES.len()];
+        stamps.add_to(&self.ctx, &mut times)?;
+        Ok(Some(times))
     }
 
     /// The texture with the last picture, sRGB, for a copy to whatever shows it.
@@ -171,47 +184,55 @@ impl Reflections {
 
     fn upload_constants(&self) -> lvk::Result<()> {
         let extent = [self.config.width, self.config.height];
+        let view = GpuCamera::new(&self.camera, extent[0], extent[1], NEAR_PLANE);
         let all: Vec<FrameConstants> = (0..self.config.samples)
             .map(|sample_number| FrameConstants {
-                view: GpuCamera::new(&self.camera, extent[0], extent[1], NEAR_PLANE),
+                view: view.for_sample(sample_number, self.config.samples),
                 world: self.constants,
-                jitter: jitter(sample_number, self.config.samples, extent),
-                frame_number: (self.time * FRAME_RATE).round() as u32,
+                frame_number: (self.phase * 16_777_216.0) as u32,
                 sample_number,
-                time: self.time,
+                phase: self.phase,
                 indices: self.indices,
             })
             .collect();
         self.ctx.upload_buffer(*self.frame_buffer, 0, bytemuck::cast_slice(&all))?;
-        self.moving.pose(&self.ctx, self.time)
+        self.moving.pose(&self.ctx, self.phase)
     }
 
-    fn record(&self, cmd: &mut CommandBuffer, sample: u32) -> lvk::Result<()> {
+    fn record(&self, cmd: &mut CommandBuffer, sample: u32, min_angle: f32) -> lvk::Result<()> {
         let frame = self.frame_address + FRAME_BYTES * u64::from(sample);
         let extent = [self.config.width, self.config.height];
         let stamp = |cmd: &mut CommandBuffer, passes| {
             self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.after(cmd, passes))
         };
         self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.reset(cmd))?;
+        let eye = self.camera.eye.into();
         if sample == 0 {
             self.moving_passes.record(&self.ctx, cmd, &self.moving, frame)?;
-            let eye = self.camera.eye.into();
-            self.top_level.record(cmd, eye, self.config.min_angle)?;
         }
         stamp(cmd, 1)?;
-        let written = self.moving.written();
-        let draws = &self.tables.draws;
-        let drawn = Drawn { indices: *self.tables.indices, draws, written: &written, frame };
-        self.raster.record_surfaces(cmd, &self.targets, drawn)?;
+        if sample == 0 {
+            self.top_level.record(cmd, eye, min_angle)?;
+        }
         stamp(cmd, 2)?;
-        self.rays.record(cmd, Surfaces::Opaque, extent, &self.targets, &written, frame)?;
+        let (written, transparent) = (self.moving.written(), self.tables.transparent(eye));
+        let drawn = Drawn {
+            indices: *self.tables.indices,
+            opaque: &self.tables.opaque,
+            transparent: &transparent,
+            written: &written,
+            frame,
+        };
+        self.raster.record_surfaces(cmd, &self.targets, drawn)?;
         stamp(cmd, 3)?;
-        self.rays.record(cmd, Surfaces::Transparent, extent, &self.targets, &written, frame)?;
+        self.rays.record(cmd, Surfaces::Opaque, extent, &self.targets, &written, frame)?;
         stamp(cmd, 4)?;
+        self.rays.record(cmd, Surfaces::Transparent, extent, &self.targets, &written, frame)?;
+        stamp(cmd, 5)?;
         self.images.record_composite(cmd, &self.targets, frame)?;
         self.raster.record_blend(cmd, &self.targets, drawn)?;
         self.images.record_resolve(cmd, &self.targets, frame, self.config.samples)?;
-        stamp(cmd, 5)
+        stamp(cmd, 6)
     }
 }
 

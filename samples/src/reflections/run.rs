@@ -5,16 +5,21 @@ use std::process::ExitCode;
 
 use lvk::Context;
 
-use super::{Reflections, ReflectionsArgs, ReflectionsConfig, ReflectionsError};
+use super::{CullingCost, Reflections, ReflectionsArgs, ReflectionsConfig, ReflectionsError};
 use crate::app::device::{DeviceNeeds, driver_text};
 use crate::app::run::{self, Opened, Opening};
 use crate::app::run_args::RayTracing;
 use crate::app::run_error::RunError;
 use crate::app::sample::{Moment, PassTimes, Sample};
+use crate::app::say;
 use crate::hybrid::RayPath;
 
 /// What the sample and its pictures are called.
 const NAME: &str = "reflections";
+
+/// How often culling is measured on a GPU, and on a driver that runs on the CPU.
+const GPU_ROUNDS: u32 = 25;
+const CPU_ROUNDS: u32 = 3;
 
 impl From<ReflectionsError> for RunError {
     fn from(error: ReflectionsError) -> Self {
@@ -30,7 +35,7 @@ impl Sample for Reflections {
     type Error = ReflectionsError;
 
     fn update(&mut self, moment: Moment) -> Result<(), ReflectionsError> {
-        self.show(moment.seconds() as f32);
+        self.show(moment.phase());
         Ok(())
     }
 
@@ -51,7 +56,13 @@ impl Sample for Reflections {
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &ReflectionsArgs) -> ExitCode {
-    run::run(NAME, &args.run, |opening| open(args, opening))
+    match args.scene.listing("hall", "polished floors, water, glass, a serpent and drifting leaves") {
+        Some(listing) => {
+            say(&listing);
+            ExitCode::SUCCESS
+        }
+        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+    }
 }
 
 fn open(args: &ReflectionsArgs, opening: &mut Opening<'_>) -> Result<Opened<Reflections>, RunError> {
@@ -69,7 +80,14 @@ fn open(args: &ReflectionsArgs, opening: &mut Opening<'_>) -> Result<Opened<Refl
     };
     opening.progress.stage("making the hall and its pipelines", 0);
     let sample = Reflections::new(&context, &config)?;
-    let headline = headline(&context, &sample);
+    let mut headline = headline(&context, &sample);
+    if args.compare_culling {
+        opening.progress.stage("measuring what culling saves", 0);
+        let rounds = if context.capabilities().is_cpu { CPU_ROUNDS } else { GPU_ROUNDS };
+        if let Some(cost) = CullingCost::measure(&sample, rounds)? {
+            let _ = write!(headline, "\n          {cost}");
+        }
+    }
     Ok(Opened { context, sample, headline })
 }
 

@@ -1,5 +1,7 @@
 //! The animated character: a serpent that swims through the air around the basin, a skin over a chain of bones.
 
+use std::f32::consts::TAU;
+
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 use lvk::transform_rows;
@@ -16,8 +18,6 @@ const LENGTH: f32 = BONE_LENGTH * (BONE_COUNT - 1) as f32;
 const MIDDLE: Vec3 = Vec3::new(0.0, 1.5, -8.2);
 /// Half of the path's extent across and along the hall.
 const REACH: [f32; 2] = [2.5, 6.6];
-/// Radians of the path's parameter that the serpent swims in a second.
-const SPEED: f32 = 0.16;
 
 /// A vertex at rest (`RestVertex` in `shaders/reflections/skin.comp.glsl`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -48,7 +48,7 @@ impl Skin {
             })
         };
         let head = Vec3::new(0.0, 0.1, -0.26);
-        let back = body(215.0, -35.0, 20).ball(head, Vec3::new(0.34, 0.27, 0.46), 24).ball(
+        let mut back = body(215.0, -35.0, 20).ball(head, Vec3::new(0.34, 0.27, 0.46), 24).ball(
             head + Vec3::new(0.0, -0.02, -0.3),
             Vec3::new(0.16, 0.11, 0.26),
             20,
@@ -58,7 +58,9 @@ impl Skin {
         let mut eyes = Mesh::default();
         let mut fins = Mesh::default();
         for side in [-1.0, 1.0] {
-            eyes = eyes.ball(head + Vec3::new(0.23 * side, 0.13, -0.28), Vec3::splat(0.065), 12);
+            eyes = eyes.ball(head + Vec3::new(0.23 * side, 0.13, -0.28), Vec3::splat(0.065), 24);
+            let pupil = head + Vec3::new(0.278 * side, 0.137, -0.295);
+            back = back.ball(pupil, Vec3::new(0.02, 0.046, 0.016), 12);
             fins = fins.ball(head + Vec3::new(0.17 * side, 0.27, 0.26), Vec3::new(0.045, 0.06, 0.4), 12);
         }
         for number in 0..26 {
@@ -89,37 +91,38 @@ impl Skin {
     }
 }
 
-/// Transforms of the bones at `time` in seconds, from the mesh at rest to the world: 3 rows of 4 columns each.
-pub(super) fn bones(time: f32) -> Vec<[f32; 12]> {
-    let mut parameter = -0.3 - SPEED * time;
+/// Transforms of the bones at `phase` of the round, 0 to 1, in which the serpent swims around the basin once: from the
+/// mesh at rest to the world, 3 rows of 4 columns each.
+pub(super) fn bones(phase: f32) -> Vec<[f32; 12]> {
+    let mut parameter = -0.3 - TAU * phase;
     let mut bones = Vec::with_capacity(BONE_COUNT);
     for bone in 0..BONE_COUNT {
-        let speed = velocity(parameter, time);
-        bones.push(transform_rows(&bone_transform(parameter, time, bone as f32 * BONE_LENGTH)));
+        let speed = velocity(parameter, phase);
+        bones.push(transform_rows(&bone_transform(parameter, phase, bone as f32 * BONE_LENGTH)));
         parameter += BONE_LENGTH / speed.length();
     }
     bones
 }
 
-fn bone_transform(parameter: f32, time: f32, along: f32) -> Affine3A {
-    let forward = Vec3A::from(-velocity(parameter, time).normalize());
+fn bone_transform(parameter: f32, phase: f32, along: f32) -> Affine3A {
+    let forward = Vec3A::from(-velocity(parameter, phase).normalize());
     let right = forward.cross(Vec3A::Y).normalize();
     let frame = Mat3A::from_cols(right, right.cross(forward), -forward);
     let to_joint = Affine3A::from_translation(Vec3::new(0.0, 0.0, -along));
-    Affine3A { matrix3: frame, translation: path(parameter, time).into() } * to_joint
+    Affine3A { matrix3: frame, translation: path(parameter, phase).into() } * to_joint
 }
 
 /// Where the serpent's middle line is: a ring around the basin that undulates.
-fn path(parameter: f32, time: f32) -> Vec3 {
+fn path(parameter: f32, phase: f32) -> Vec3 {
     let (sine, cosine) = parameter.sin_cos();
-    let sway = 0.28 * (7.0 * parameter + 1.5 * time).sin();
-    let rise = 0.45 * (3.0 * parameter).sin() + 0.06 * (8.0 * parameter + 2.0 * time).cos();
+    let sway = 0.28 * (7.0 * parameter + 2.0 * TAU * phase).sin();
+    let rise = 0.45 * (3.0 * parameter).sin() + 0.06 * (8.0 * parameter + 3.0 * TAU * phase).cos();
     MIDDLE + Vec3::new((REACH[0] + sway) * sine, rise, REACH[1] * cosine)
 }
 
-fn velocity(parameter: f32, time: f32) -> Vec3 {
+fn velocity(parameter: f32, phase: f32) -> Vec3 {
     const STEP: f32 = 1e-2;
-    (path(parameter + STEP, time) - path(parameter - STEP, time)) / (2.0 * STEP)
+    (path(parameter + STEP, phase) - path(parameter - STEP, phase)) / (2.0 * STEP)
 }
 
 fn girth(along: f32) -> f32 {
@@ -132,25 +135,37 @@ fn girth(along: f32) -> f32 {
 mod tests {
     use super::*;
 
+    fn joints(phase: f32) -> Vec<Vec3> {
+        let joint = |(bone, rows): (usize, &[f32; 12])| {
+            let along = bone as f32 * BONE_LENGTH;
+            let at = |row: usize| rows[4 * row + 2] * along + rows[4 * row + 3];
+            Vec3::new(at(0), at(1), at(2))
+        };
+        bones(phase).iter().enumerate().map(joint).collect()
+    }
+
     #[test]
     fn bones_hang_together_and_move() {
-        for time in [0.0, 1.0, 17.3, 400.0] {
-            let joints: Vec<Vec3> = bones(time)
-                .iter()
-                .enumerate()
-                .map(|(bone, rows)| {
-                    let along = bone as f32 * BONE_LENGTH;
-                    let at = |row: usize| rows[4 * row + 2] * along + rows[4 * row + 3];
-                    Vec3::new(at(0), at(1), at(2))
-                })
-                .collect();
+        for phase in (0..50).map(|step| step as f32 / 50.0) {
+            let joints = joints(phase);
             for pair in joints.windows(2) {
                 let length = pair[0].distance(pair[1]);
-                assert!((length - BONE_LENGTH).abs() < 0.1 * BONE_LENGTH, "{time}: {length}");
+                assert!((length - BONE_LENGTH).abs() < 0.1 * BONE_LENGTH, "{phase}: {length}");
             }
             assert!(joints.iter().all(|joint| joint.y > 0.6), "above water and floor");
         }
-        assert_ne!(bones(0.0), bones(1.0 / 60.0));
+        assert_ne!(bones(0.0), bones(1.0 / 240.0));
+    }
+
+    #[test]
+    fn a_round_has_no_seam() {
+        let way = |from: f32, to: f32| {
+            let (from, to) = (joints(from), joints(to));
+            from.iter().zip(&to).map(|(a, b)| a.distance(*b)).fold(0.0, f32::max)
+        };
+        assert!(way(1.0, 0.0) < 1e-3, "{}", way(1.0, 0.0));
+        let (step, last) = (way(0.0, 1.0 / 240.0), way(239.0 / 240.0, 0.0));
+        assert!(step > 0.05 && (last - step).abs() < 0.2 * step, "{step} {last}");
     }
 
     #[test]

@@ -3,8 +3,17 @@
 use lvk::{CommandBuffer, Context, Holder, QueryPoolDesc, QueryPoolHandle};
 
 /// The passes that are timed, in their order.
-pub(super) const PASSES: [&str; 5] =
-    ["skinning and builds", "g-buffers", "opaque rays", "transparent rays", "filter to picture"];
+pub(super) const PASSES: [&str; 6] = [
+    "skinning and its builds",
+    "TLAS build",
+    "g-buffers",
+    "opaque rays",
+    "transparent rays",
+    "filters to picture",
+];
+/// Of those, the build of the top-level structure and the ray passes.
+pub(super) const TLAS_BUILD: usize = 1;
+pub(super) const RAYS: [usize; 2] = [3, 4];
 
 /// A stamp before the first pass of a submission, and one after each pass.
 pub(super) struct Stamps {

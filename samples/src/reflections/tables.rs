@@ -3,16 +3,17 @@
 use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{Affine3A, Mat3A};
+use glam::{Affine3A, Mat3A, Vec3};
 use lvk::{
     BlasGeometry, BufferHandle, BufferUsage, Context, GeometryFlags, Holder, IndexFormat, Indices,
     TextureHandle, Triangles, VertexFormat, transform_rows,
 };
 
+use super::layers::{Layer, farthest_first};
 use super::mesh::Mesh;
 use super::moving::Moving;
 use super::quantise::{Grid, PackedVertex};
-use super::world::{Material, Model, World};
+use super::world::{Material, Model, Placed, World};
 use crate::app::array_buffer::array;
 
 /// `kNoTexture` in `shaders/reflections/frame.glsl`.
@@ -65,7 +66,6 @@ pub(super) struct Draw {
     pub(super) indices: Range<u32>,
     /// Places in the table of instances.
     pub(super) instances: Range<u32>,
-    pub(super) is_transparent: bool,
 }
 
 /// Vertices and indices while they are collected, and where the parts of each model came to lie.
@@ -94,7 +94,10 @@ pub(super) struct Tables {
     pub(super) materials: u64,
     pub(super) geometries: u64,
     pub(super) instances: u64,
-    pub(super) draws: Vec<Draw>,
+    pub(super) opaque: Vec<Draw>,
+    transparent: Vec<Draw>,
+    /// Where those are, one each.
+    layers: Vec<Layer>,
     _held: [Holder<BufferHandle>; 4],
 }
 
@@ -184,7 +187,7 @@ impl Tables {
         let mut lists = Lists { vertices: ctx.buffer_address(*vertices)?, ..Lists::default() };
         lists.indices = ctx.buffer_address(*indices)?;
         for (number, model) in world.models.iter().enumerate() {
-            lists.add_model(world, arena, number, model.is_transparent);
+            lists.add_model(world, arena, number, model);
         }
         lists.add_moving(world, moving);
         let materials: Vec<_> =
@@ -198,9 +201,18 @@ impl Tables {
             materials: ctx.buffer_address(*materials)?,
             geometries: ctx.buffer_address(*geometries)?,
             instances: ctx.buffer_address(*instances)?,
-            draws: lists.draws,
+            opaque: lists.opaque,
+            transparent: lists.transparent,
+            layers: lists.layers,
             _held: [vertices, materials, geometries, instances],
         })
+    }
+}
+
+impl Tables {
+    /// The transparent surfaces, one instance each, farthest first as seen from `eye`.
+    pub(super) fn transparent(&self, eye: Vec3) -> Vec<Draw> {
+        farthest_first(&self.layers, eye).into_iter().map(|place| self.transparent[place].clone()).collect()
     }
 }
 
@@ -210,17 +222,19 @@ struct Lists {
     indices: u64,
     geometries: Vec<GpuGeometry>,
     instances: Vec<GpuInstance>,
-    draws: Vec<Draw>,
+    opaque: Vec<Draw>,
+    transparent: Vec<Draw>,
+    layers: Vec<Layer>,
 }
 
 impl Lists {
-    fn add_model(&mut self, world: &World, arena: &Arena, number: usize, is_transparent: bool) {
+    fn add_model(&mut self, world: &World, arena: &Arena, number: usize, model: &Model) {
         let PackedModel { grid, parts } = &arena.models[number];
         let (first_geometry, first) = (self.geometries.len() as u32, self.instances.len() as u32);
         for placed in world.placed.iter().filter(|placed| placed.model == number) {
             self.instances.push(gpu_instance(placed.to_world, *grid, first_geometry));
         }
-        for part in parts {
+        for (part, (mesh, _)) in parts.iter().zip(&model.parts) {
             let geometry = GpuGeometry {
                 vertices: self.vertices + u64::from(part.vertices.start) * size_of::<PackedVertex>() as u64,
                 normals: 0,
@@ -228,7 +242,31 @@ impl Lists {
                 material: part.material,
                 kind: KIND_STATIC,
             };
-            self.add_geometry(geometry, part.indices.clone(), first, is_transparent);
+            if model.is_transparent {
+                let places = world.placed.iter().filter(|placed| placed.model == number);
+                self.add_layers(geometry, &part.indices, first, mesh, places);
+            } else {
+                self.add_geometry(geometry, part.indices.clone(), first);
+            }
+        }
+    }
+
+    /// A draw for each instance of a transparent mesh: they are ordered one by one.
+    fn add_layers<'a>(
+        &mut self,
+        geometry: GpuGeometry,
+        indices: &Range<u32>,
+        first: u32,
+        mesh: &Mesh,
+        places: impl Iterator<Item = &'a Placed>,
+    ) {
+        let number = self.geometries.len() as u32;
+        self.geometries.push(geometry);
+        let (low, high) = mesh.bounds();
+        for (instance, placed) in (first..).zip(places) {
+            self.layers.push(Layer::new(low, high, &placed.to_world));
+            let (indices, instances) = (indices.clone(), instance..instance + 1);
+            self.transparent.push(Draw { geometry: number, indices, instances });
         }
     }
 
@@ -244,7 +282,7 @@ impl Lists {
                 material,
                 kind: KIND_SKINNED,
             };
-            self.add_geometry(geometry, part.indices.clone(), serpent, false);
+            self.add_geometry(geometry, part.indices.clone(), serpent);
         }
         let leaves = self.add_identity();
         let geometry = GpuGeometry {
@@ -254,7 +292,7 @@ impl Lists {
             material: world.leaf_material,
             kind: KIND_LEAF,
         };
-        self.add_geometry(geometry, moving.leaf_indices.clone(), leaves, false);
+        self.add_geometry(geometry, moving.leaf_indices.clone(), leaves);
     }
 
     fn add_identity(&mut self) -> u32 {
@@ -265,10 +303,10 @@ impl Lists {
         self.instances.len() as u32 - 1
     }
 
-    fn add_geometry(&mut self, geometry: GpuGeometry, indices: Range<u32>, first: u32, is_transparent: bool) {
+    fn add_geometry(&mut self, geometry: GpuGeometry, indices: Range<u32>, first: u32) {
         let (number, end) = (self.geometries.len() as u32, self.instances.len() as u32);
         self.geometries.push(geometry);
-        self.draws.push(Draw { geometry: number, indices, instances: first..end, is_transparent });
+        self.opaque.push(Draw { geometry: number, indices, instances: first..end });
     }
 }
 

@@ -17,8 +17,12 @@ pub(super) struct Targets {
     pub(super) opaque_depth: Holder<TextureHandle>,
     pub(super) glass_surface: Holder<TextureHandle>,
     pub(super) glass_depth: Holder<TextureHandle>,
-    /// Light of lamps and sun, and how open the surroundings are.
-    pub(super) direct: Holder<TextureHandle>,
+    /// How much of each light is seen, and how open the surroundings are.
+    pub(super) visibility: Holder<TextureHandle>,
+    /// The same on its way through the filter.
+    pub(super) smoothed: Holder<TextureHandle>,
+    /// Half the width of each light's penumbra, in pixels.
+    pub(super) penumbra: Holder<TextureHandle>,
     /// Reflected radiance and the distance of what is reflected.
     pub(super) reflection: Holder<TextureHandle>,
     pub(super) filtered: Holder<TextureHandle>,
@@ -41,7 +45,9 @@ impl Targets {
             opaque_depth: target(DEPTH_FORMAT, "opaque depth")?,
             glass_surface: target(SURFACE_FORMAT, "glass surface")?,
             glass_depth: target(DEPTH_FORMAT, "glass depth")?,
-            direct: light("direct light")?,
+            visibility: light("visibility")?,
+            smoothed: light("smoothed visibility")?,
+            penumbra: light("penumbra")?,
             reflection: light("reflection")?,
             filtered: light("filtered reflection")?,
             glass_reflection: light("glass reflection")?,
@@ -56,7 +62,9 @@ impl Targets {
         indices.opaque_depth = self.opaque_depth.index();
         indices.glass_surface = self.glass_surface.index();
         indices.glass_depth = self.glass_depth.index();
-        indices.direct = self.direct.index();
+        indices.visibility = self.visibility.index();
+        indices.smoothed = self.smoothed.index();
+        indices.penumbra = self.penumbra.index();
         indices.reflection = self.reflection.index();
         indices.filtered = self.filtered.index();
         indices.glass_reflection = self.glass_reflection.index();

@@ -1,5 +1,7 @@
 //! What the sample shows: models of several materials each, where they stand, lamps and sky.
 
+use std::f32::consts::TAU;
+
 use glam::{Affine3A, Quat, Vec3};
 
 use super::mesh::Mesh;
@@ -109,12 +111,12 @@ impl World {
     }
 }
 
-/// Where the picture of `time`, in seconds, is taken from: a slow walk through the hall and back.
-pub(super) fn camera(time: f32) -> Camera {
-    let walk = (time * 0.25).sin();
-    let sway = (time * 0.17).sin();
-    let eye = [-2.0 + 1.0 * sway, 1.3 + 0.25 * walk.abs(), 3.6 - 2.5 * walk.abs()];
-    Camera::looking_at(eye, [0.45 + 0.4 * sway, 1.0, -9.0], 50.0)
+/// Where the picture at `phase` of the round, 0 to 1, is taken from: a slow walk into the hall and back.
+pub(super) fn camera(phase: f32) -> Camera {
+    let (sway, away) = (TAU * phase).sin_cos();
+    let walk = 0.5 - 0.5 * away;
+    let eye = [-2.0 + 0.6 * sway, 1.3 + 0.25 * walk, 3.6 - 2.5 * walk];
+    Camera::looking_at(eye, [0.45 + 0.3 * sway, 1.0, -9.0], 50.0)
 }
 
 fn furnish() -> (Vec<Model>, Vec<Placed>) {
@@ -126,7 +128,9 @@ fn furnish() -> (Vec<Model>, Vec<Placed>) {
     let along = |from: f32, step: f32, count: i32| -> Vec<f32> {
         (0..count).map(|k| from - step * k as f32).collect()
     };
-    let screen = Affine3A::from_rotation_translation(Quat::from_rotation_y(-0.75), Vec3::new(3.3, 0.0, -4.4));
+    let turned = |angle, place| Affine3A::from_rotation_translation(Quat::from_rotation_y(angle), place);
+    // The second is seen through the first.
+    let screens = vec![turned(-0.75, Vec3::new(3.3, 0.0, -4.4)), turned(0.5, Vec3::new(3.9, 0.0, -5.6))];
     let studs = [both(2.15, 0.0, along(4.5, 0.25, 146)), both(3.6, 0.0, along(4.5, 0.25, 146))].concat();
     let lamps = [both(5.75, 0.0, along(4.2, 0.75, 48)), both(1.72, 0.1, along(-4.9, 1.15, 10))].concat();
     let list: Vec<(Model, Vec<Affine3A>)> = vec![
@@ -136,10 +140,10 @@ fn furnish() -> (Vec<Model>, Vec<Placed>) {
         (models::mirror_ball(), vec![upright(-3.1, 0.0, -4.2), upright(3.1, 0.0, -16.8)]),
         (models::knot(), vec![upright(-3.2, 0.0, -9.0), upright(-3.1, 0.0, -16.8)]),
         (models::lantern(), both(3.1, 3.1, vec![-7.0, -15.0])),
-        (models::screen_frame(), vec![screen]),
+        (models::screen_frame(), screens.clone()),
         (models::lamp(), lamps),
         (models::stud(), studs),
-        (models::pane(), vec![screen]),
+        (models::pane(), screens),
         (models::water(), here),
     ];
     let mut placed = Vec::new();
@@ -182,9 +186,9 @@ fn materials() -> Vec<Material> {
         Material { metalness: 0.85, ..plain([0.06, 0.42, 0.32], 0.22) },
         metal([1.0, 0.76, 0.36], 0.25),
         Material { metalness: 0.6, ..plain([0.75, 0.10, 0.06], 0.3) },
-        glowing([8.0, 5.5, 1.2]),
+        Material { emission: [1.5, 0.62, 0.05], ..plain([0.5, 0.2, 0.02], 0.2) },
         Material { texture: Some((3, 1.0)), ..plain([0.85, 0.85, 0.85], 0.8) },
-        plain([0.07, 0.09, 0.13], 0.95),
+        plain([0.15, 0.13, 0.13], 0.95),
     ]
 }
 
@@ -217,9 +221,17 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_walk_ends_where_it_began() {
+        let eye = |phase| Vec3::from(camera(phase).eye);
+        let step = eye(0.0).distance(eye(1.0 / 240.0));
+        assert!(eye(1.0).distance(eye(0.0)) < 1e-3);
+        assert!((eye(239.0 / 240.0).distance(eye(0.0)) - step).abs() < 1e-3, "nor does it halt there");
+    }
+
+    #[test]
     fn the_tables_fit_together() {
         let world = World::new();
-        assert!(world.lights.len() <= 4, "the shaders have room for four");
+        assert!(world.lights.len() <= 3, "the shaders have room for three");
         assert!(world.materials.iter().all(|m| m.texture.is_none_or(|(t, _)| t < world.textures.len())));
         for model in &world.models {
             assert!(!model.parts.is_empty(), "{}", model.name);

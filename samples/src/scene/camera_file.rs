@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use glam::Vec3;
+
 use super::{Camera, SceneError};
 
 /// Light and cameras of one scene.
@@ -11,12 +13,14 @@ pub(super) struct Views {
     pub name: String,
     /// Position of the point light.
     pub light: [f32; 3],
+    /// Unit vector towards the sun, if it shines.
+    pub sun: Option<[f32; 3]>,
     /// Up to five cameras.
     pub cameras: Vec<Camera>,
 }
 
 impl Views {
-    /// Moves the light and the cameras, in scene units.
+    /// Moves the light and the cameras, in scene units. The sun is everywhere.
     pub(super) fn move_by(&mut self, offset: [f64; 3]) {
         let eyes = self.cameras.iter_mut().flat_map(|camera| [&mut camera.eye, &mut camera.target]);
         for point in eyes.chain([&mut self.light]) {
@@ -51,7 +55,15 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<Views>, SceneError> {
             "scene" => {
                 let name = words.next().ok_or_else(|| wrong(path, number, "no scene name".to_owned()))?;
                 let light = numbers(words).map_err(|what| wrong(path, number, what))?;
-                all.push(Views { name: name.to_owned(), light, cameras: Vec::new() });
+                all.push(Views { name: name.to_owned(), light, sun: None, cameras: Vec::new() });
+            }
+            "sun" => {
+                let direction = sun(words).map_err(|what| wrong(path, number, what))?;
+                let views =
+                    all.last_mut().ok_or_else(|| wrong(path, number, "a sun before any scene".into()))?;
+                if views.sun.replace(direction).is_some() {
+                    return Err(wrong(path, number, "a second sun in a scene".to_owned()));
+                }
             }
             "at" | "dir" => {
                 let camera = camera(keyword == "dir", words).map_err(|what| wrong(path, number, what))?;
@@ -66,6 +78,13 @@ pub(super) fn parse(path: &Path, text: &str) -> Result<Vec<Views>, SceneError> {
         }
     }
     Ok(all)
+}
+
+fn sun<'a>(words: impl Iterator<Item = &'a str>) -> Result<[f32; 3], String> {
+    let direction = Vec3::from(numbers::<3>(words)?).try_normalize();
+    direction
+        .map(|towards| towards.to_array())
+        .ok_or_else(|| "the sun stands nowhere: its direction has no length".to_owned())
 }
 
 fn camera<'a>(is_direction: bool, words: impl Iterator<Item = &'a str>) -> Result<Camera, String> {
@@ -120,7 +139,19 @@ mod tests {
             Camera::looking_at([0.0; 3], [0.0, 0.0, -2.0], 60.0),
             Camera::looking_at([1.0; 3], [1.0, 1.0, -1.0], 75.0),
         ];
-        assert_eq!(all, [Views { name: "a".to_owned(), light: [1.0, 2.0, 3.0], cameras: cameras.into() }]);
+        assert_eq!(
+            all,
+            [Views { name: "a".to_owned(), light: [1.0, 2.0, 3.0], sun: None, cameras: cameras.into() }]
+        );
+    }
+
+    #[test]
+    fn the_sun_is_a_unit_vector_and_stays_where_it_is() {
+        let all = parsed("scene a 1 2 3\nsun 0 3 4\nscene b 1 2 3\n").unwrap();
+        assert_eq!((all[0].sun, all[1].sun), (Some([0.0, 0.6, 0.8]), None));
+        let mut views = all[0].clone();
+        views.move_by([1.0; 3]);
+        assert_eq!((views.light, views.sun), ([2.0, 3.0, 4.0], all[0].sun));
     }
 
     #[test]
@@ -134,6 +165,10 @@ mod tests {
             ("scene a 1 2 3\nat 0 0 0 0 0 1 180", 2),
             ("scene a 1 2 3\n\ndir 0 0 0 nan 0 1 60", 3),
             ("light 1 2 3", 1),
+            ("sun 1 2 3", 1),
+            ("scene a 1 2 3\nsun 0 0 0", 2),
+            ("scene a 1 2 3\nsun 1 2", 2),
+            ("scene a 1 2 3\nsun 1 2 3\nsun 1 2 3", 3),
         ] {
             match parsed(text) {
                 Err(SceneError::CameraFile { line: found, .. }) => assert_eq!(found, line, "{text}"),

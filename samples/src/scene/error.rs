@@ -90,9 +90,9 @@ pub enum SceneError {
         source: tobj::LoadError,
     },
     /// A camera file is wrong. It consists of lines `scene NAME x y z` (the point light's position), each
-    /// followed by one to five lines `at ex ey ez tx ty tz fov` (eye, target, vertical field of view in
+    /// followed by `sun x y z` where the sun shines (the direction towards it), and by one to five lines `at ex ey ez tx ty tz fov` (eye, target, vertical field of view in
     /// degrees) or `dir ex ey ez dx dy dz fov` (eye, direction); `#` starts a comment.
-    #[error("{}:{line}: {what} (expected `scene NAME x y z`, then `at` or `dir` with 7 numbers)", path.display())]
+    #[error("{}:{line}: {what} (expected `scene NAME x y z`, then `sun x y z`, `at` or `dir` with 7 numbers)", path.display())]
     CameraFile {
         /// The path as given.
         path: PathBuf,

@@ -36,7 +36,7 @@ fn around(mesh: &Mesh) -> Views {
         Camera { eye: eye.to_array(), ..far }
     };
     let light = center + radius * Vec3::new(1.1, 1.8, 1.6);
-    Views { name: String::new(), light: light.to_array(), cameras: directions.map(camera).into() }
+    Views { name: String::new(), light: light.to_array(), sun: None, cameras: directions.map(camera).into() }
 }
 
 /// How far from the middle of a box with the given half size a camera must stand to see all of it, in a picture

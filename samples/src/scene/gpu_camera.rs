@@ -18,9 +18,8 @@ pub(crate) struct GpuCamera {
     down: [f32; 3],
     height: u32,
     clip_right: [f32; 3],
-    padding0: f32,
     clip_down: [f32; 3],
-    padding1: f32,
+    shift: [f32; 2],
 }
 
 impl GpuCamera {
@@ -40,10 +39,20 @@ impl GpuCamera {
             down: down.to_array(),
             height,
             clip_right: (right / right.length_squared()).to_array(),
-            padding0: 0.0,
             clip_down: (down / down.length_squared()).to_array(),
-            padding1: 0.0,
+            shift: [0.0; 2],
         }
+    }
+
+    /// The same camera for sample `number` of `count`: evenly spread over each pixel, the only one in the middle.
+    pub(crate) fn for_sample(self, number: u32, count: u32) -> Self {
+        if count <= 1 {
+            return self;
+        }
+        // The steps of the R2 sequence, which fills the plane evenly however many are taken.
+        let place = |ratio: f64| ((0.5 + ratio * f64::from(number)).fract() - 0.5) as f32;
+        let [x, y] = [place(0.754_877_666_246_693), place(0.569_840_290_998_053)];
+        Self { shift: [2.0 * x / self.width as f32, 2.0 * y / self.height as f32], ..self }
     }
 }
 
@@ -78,6 +87,17 @@ mod tests {
         let point = Vec3::from(camera().eye) + 7.0 * direction(&gpu, [0.4, -0.8]);
         let clip = clip_from_world.project_point3(point);
         assert!((clip.x - 0.4).abs() < 1e-4 && (clip.y + 0.8).abs() < 1e-4, "{clip}");
+    }
+
+    #[test]
+    fn samples_stay_in_their_pixel_and_differ() {
+        let gpu = GpuCamera::new(&camera(), 100, 50, 0.1);
+        let all: Vec<_> = (0..16).map(|number| gpu.for_sample(number, 16).shift).collect();
+        for (number, [x, y]) in all.iter().enumerate() {
+            assert!(x.abs() <= 0.01 && y.abs() <= 0.02);
+            assert!(all[..number].iter().all(|other| other != &[*x, *y]));
+        }
+        assert_eq!(gpu.for_sample(0, 1).shift, [0.0; 2]);
     }
 
     #[test]

@@ -6,6 +6,9 @@ use super::camera_file::Views;
 use super::mesh::Mesh;
 use super::{Ambient, Camera, DirectionalLight, Material, PointLight, Scene, Sky, bounds_of, framing};
 
+/// Irradiance of a surface that faces the sun.
+const SUN_COLOR: [f32; 3] = [1.5, 1.38, 1.15];
+
 /// Lights, sky and cameras around a mesh.
 pub(super) struct Setting {
     pub light: PointLight,
@@ -23,6 +26,7 @@ impl Setting {
         let diagonal = low_corner.distance(high_corner);
         let needed = views.as_ref().is_none_or(|views| views.cameras.len() < 5);
         let automatic = needed.then(|| framing::views(mesh));
+        let sun = views.as_ref().and_then(|views| views.sun);
         let position = views.iter().chain(&automatic).map(|views| views.light).next().unwrap_or(high);
         let mut found = views.into_iter().chain(automatic).flat_map(|views| views.cameras);
         let to_middle = Vec3::from(position).distance(low_corner.midpoint(high_corner));
@@ -30,9 +34,9 @@ impl Setting {
         let fallback = Camera::looking_at(high, low, 60.0);
         Self {
             light: PointLight { position, color: [2.2, 2.1, 1.95], reach },
-            sun: None,
+            sun: sun.map(|direction| DirectionalLight { direction, color: SUN_COLOR }),
             ambient: Ambient { above: [0.30, 0.31, 0.33], below: [0.22, 0.21, 0.20] },
-            sky: Sky::day(),
+            sky: sun.map_or_else(Sky::day, |sun_direction| Sky { sun_direction, ..Sky::day() }),
             cameras: std::array::from_fn(|_| found.next().unwrap_or(fallback)),
         }
     }

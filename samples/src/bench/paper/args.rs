@@ -10,7 +10,8 @@ use crate::app::run_args::{MAX_SIZE, RayTracing};
 /// The paper's experiment.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct PaperArgs {
-    /// Wavefront OBJ files, or names in the folder of LVK_SCENES [default: the built-in courtyard]
+    /// Wavefront OBJ files, or names in the folder of LVK_SCENES
+    /// [default: living_room, conference and kitchen of that folder, else the built-in courtyard]
     #[arg(long, value_name = "FILE|NAME", num_args = 1..)]
     pub scenes: Vec<PathBuf>,
 
@@ -22,8 +23,8 @@ pub struct PaperArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub compared: Option<u32>,
 
-    /// By which path to trace rays; auto means by every one that the device has
-    #[arg(long, value_enum, default_value_t = RayTracing::Auto)]
+    /// By which path to trace rays: auto, which measures every one that the device has, pipeline or query
+    #[arg(long, value_enum, default_value_t = RayTracing::Auto, hide_possible_values = true)]
     pub rt: RayTracing,
 
     /// How often a ray may be reflected or refracted, 0 to 16

@@ -1,6 +1,7 @@
 //! The experiment as a subcommand of `bench`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use lvk::Context;
 
@@ -12,22 +13,34 @@ use super::measured::{Plan, measure};
 use super::pictures::Pictures;
 use super::report::{Experiment, PICTURES};
 use super::tables;
+use crate::app::interrupt::Interrupt;
 use crate::app::progress::Progress;
 use crate::app::run_args::RayTracing;
-use crate::app::scene_list;
+use crate::app::scene_list::{self, FOLDER_VARIABLE as VARIABLE};
 use crate::hybrid::{RayPath, fit_textures, textures_needed};
 use crate::scene::{ObjOptions, Scene};
 
+/// The paper's scenes, the last one in place of its gallery.
+const SCENES: [&str; 3] = ["living_room", "conference", "kitchen"];
+
 /// Measures all scenes, writes the report after each, and answers the averages.
 pub(in crate::bench) fn run(setup: &Setup, args: &PaperArgs) -> Result<Table, BenchError> {
-    let files: Vec<Option<&Path>> = match args.scenes.is_empty() {
-        true => vec![None],
-        false => args.scenes.iter().map(|scene| Some(scene.as_path())).collect(),
+    let (files, remark) = match args.scenes.is_empty() {
+        true => default_scenes(scene_list::folder().as_deref()),
+        false => (args.scenes.clone(), None),
     };
+    if let Some(remark) = &remark {
+        eprintln!("{remark}");
+    }
+    let started = Instant::now();
+    let interrupt = Interrupt::listen();
     let mut progress = Progress::visible();
     let mut experiment: Option<Experiment> = None;
     let mut headline = String::new();
-    for file in files {
+    for file in &files {
+        if interrupt.is_raised() {
+            break;
+        }
         let mut scene = load(file, &mut progress)?;
         progress.stage("opening the device", 0);
         let ctx = setup.open_for_textures(textures_needed(&scene))?;
@@ -37,24 +50,45 @@ pub(in crate::bench) fn run(setup: &Setup, args: &PaperArgs) -> Result<Table, Be
         headline = setup.headline(&ctx, "Stand-alone and hybrid, averages in milliseconds");
         let experiment = match &mut experiment {
             Some(known) => known,
-            none => none.insert(begin(setup, args, &ctx)?),
+            none => {
+                let mut begun = begin(setup, args, &ctx)?;
+                begun.notes.extend(remark.clone());
+                none.insert(begun)
+            }
         };
         let pictures = Pictures::new(&args.out.join(PICTURES), experiment.plan.size)?;
         let found = measure(&ctx, &scene, &experiment.plan, &pictures, &mut progress)?;
         experiment.scenes.push(found);
+        experiment.wall_seconds = started.elapsed().as_secs_f64();
         experiment.write(&args.out)?;
     }
     let (scenes, paths) = experiment.map(|found| (found.scenes, found.plan.paths)).unwrap_or_default();
+    let page = args.out.join("report.md");
+    if interrupt.is_raised() {
+        return Err(BenchError::Interrupted { done: scenes.len(), of: files.len(), page });
+    }
     let mut table = tables::summary(headline, &scenes, &paths);
-    table.note(format!("all tables, plots and pictures: {}", args.out.join("report.md").display()));
+    let seconds = started.elapsed().as_secs();
+    table.note(format!("took {} min {} s", seconds / 60, seconds % 60));
+    table.note(format!("all tables, plots and pictures: {}", page.display()));
     Ok(table)
 }
 
-fn load(file: Option<&Path>, progress: &mut Progress) -> Result<Scene, BenchError> {
-    let Some(wish) = file else {
-        progress.stage("making the courtyard", 0);
-        return Ok(Scene::procedural());
-    };
+/// Those of the paper's scenes that are in `folder`, else the built-in one; and what to say where some are not there.
+fn default_scenes(folder: Option<&Path>) -> (Vec<PathBuf>, Option<String>) {
+    let found = folder.map(scene_list::find).unwrap_or_default();
+    let (there, missing): (Vec<&str>, Vec<&str>) =
+        SCENES.into_iter().partition(|name| found.iter().any(|scene| scene.name == *name));
+    let wanted = missing.join(", ");
+    if there.is_empty() {
+        let remark = format!("the built-in courtyard stands in for {wanted}, which {VARIABLE} would name");
+        return (vec![PathBuf::from(scene_list::BUILT_IN)], Some(remark));
+    }
+    let remark = (!missing.is_empty()).then(|| format!("without {wanted}, which {VARIABLE} would name"));
+    (there.into_iter().map(PathBuf::from).collect(), remark)
+}
+
+fn load(wish: &Path, progress: &mut Progress) -> Result<Scene, BenchError> {
     let path = scene_list::resolve(wish, scene_list::folder().as_deref());
     match path == Path::new(scene_list::BUILT_IN) && !path.exists() {
         true => Ok(Scene::procedural()),
@@ -106,4 +140,25 @@ fn command() -> String {
     });
     let words: Vec<String> = ["bench".to_owned()].into_iter().chain(words).collect();
     words.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scenes_of_the_paper_are_taken_where_they_are() {
+        let (scenes, remark) = default_scenes(None);
+        assert_eq!(scenes, [Path::new(scene_list::BUILT_IN)]);
+        assert!(remark.is_some_and(|remark| remark.contains("courtyard") && remark.contains("kitchen")));
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["kitchen", "living_room"] {
+            std::fs::write(folder.path().join(format!("{name}.obj")), "").unwrap();
+        }
+        let (scenes, remark) = default_scenes(Some(folder.path()));
+        assert_eq!(scenes, [Path::new("living_room"), Path::new("kitchen")]);
+        assert!(remark.is_some_and(|remark| remark.starts_with("without conference,")));
+        std::fs::write(folder.path().join("conference.obj"), "").unwrap();
+        assert_eq!(default_scenes(Some(folder.path())).1, None);
+    }
 }

@@ -17,7 +17,7 @@ const STATISTICS: [(&str, Statistic); 5] = [
 
 /// A line for each scene, path, camera and statistic.
 pub(super) fn times(scenes: &[SceneResult]) -> String {
-    let mut text = "scene,path,camera,statistic,T_ms,t_a_ms,t_b_ms,t_ms,t_over_T\n".to_owned();
+    let mut text = "scene,path,camera,statistic,T_ms,t_a_ms,t_b_ms,t_ms,t_over_T,rasteriser\n".to_owned();
     for scene in scenes {
         for cell in &scene.cells {
             for (name, statistic) in STATISTICS {
@@ -26,9 +26,10 @@ pub(super) fn times(scenes: &[SceneResult]) -> String {
                 let numbers = numbers(&times);
                 let _ = writeln!(
                     text,
-                    "{},{path},{camera},{name},{numbers},{:.5}",
+                    "{},{path},{camera},{name},{numbers},{:.5},{}",
                     quoted(&scene.name),
-                    times.ratio()
+                    times.ratio(),
+                    quoted(scene.rasteriser(cell.path))
                 );
             }
         }

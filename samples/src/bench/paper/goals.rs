@@ -161,7 +161,14 @@ mod tests {
             likeness: alike,
         });
         let cells = cells.collect();
-        SceneResult { name: name.to_owned(), vertices: 3, triangles: 1, cells, paths_alike: Vec::new() }
+        SceneResult {
+            name: name.to_owned(),
+            vertices: 3,
+            triangles: 1,
+            cells,
+            rasterisers: Vec::new(),
+            paths_alike: Vec::new(),
+        }
     }
 
     fn missed(scenes: &[SceneResult]) -> Vec<String> {

@@ -27,6 +27,18 @@ impl Likeness {
         Ok(Self::over(&compared?))
     }
 
+    /// Of several cameras as of one: squared errors are averaged, not decibels.
+    pub(super) fn mean(cells: &[Self]) -> Self {
+        let mean =
+            |number: &dyn Fn(&Self) -> f64| cells.iter().map(number).sum::<f64>() / cells.len().max(1) as f64;
+        Self {
+            psnr: -10.0 * mean(&|cell| 10.0_f64.powf(-0.1 * cell.psnr)).log10(),
+            lowest_psnr: cells.iter().map(|cell| cell.lowest_psnr).fold(f64::INFINITY, f64::min),
+            ssim: mean(&|cell| cell.ssim),
+            differing_share: mean(&|cell| cell.differing_share),
+        }
+    }
+
     fn over(frames: &[Difference]) -> Self {
         let mean = |number: &dyn Fn(&Difference) -> f64| {
             frames.iter().map(number).sum::<f64>() / frames.len().max(1) as f64
@@ -57,5 +69,7 @@ mod tests {
         let same = Likeness::of(&pairs[..1], [12, 12]).unwrap();
         assert_eq!((same.psnr, same.lowest_psnr, same.differing_share), (f64::INFINITY, f64::INFINITY, 0.0));
         assert!(Likeness::of(&pairs, [13, 12]).is_err());
+        let other = Likeness::of(&pairs[1..], [12, 12]).unwrap();
+        assert_eq!(Likeness::mean(&[same, other]), likeness, "an equal camera counts as no error");
     }
 }

@@ -56,6 +56,8 @@ pub struct SceneResult {
     pub triangles: u64,
     /// Five for each path of ray tracing, in the order of the plan.
     pub cells: Vec<Cell>,
+    /// Which rasteriser found the visible triangles by each path, and why.
+    pub rasterisers: Vec<(RayPath, String)>,
     /// How alike pictures by pipeline and by query are, for each camera and both methods; empty where there is one path.
     pub paths_alike: Vec<(Likeness, Likeness)>,
 }
@@ -85,6 +87,11 @@ impl SceneResult {
         self.cells.iter().filter(move |cell| cell.path == path)
     }
 
+    /// Which rasteriser found the visible triangles by a path, and why.
+    pub(super) fn rasteriser(&self, path: RayPath) -> &str {
+        self.rasterisers.iter().find(|(known, _)| *known == path).map_or("", |(_, choice)| choice)
+    }
+
     /// The average of a statistic over the cameras.
     #[must_use]
     pub fn mean(&self, path: RayPath, statistic: Statistic) -> Times {
@@ -108,12 +115,13 @@ pub fn measure(
     if capabilities.limits.timestamp_bits == 0 {
         return Err(PaperError::NoTimestamps { device: capabilities.device_name.clone() });
     }
-    let mut cells = Vec::new();
+    let (mut cells, mut rasterisers) = (Vec::new(), Vec::new());
     let mut firsts: Vec<Vec<[Vec<u8>; 2]>> = Vec::new();
     for &path in &plan.paths {
         let name = format!("{} by {}", scene.name, super::super::setup::path_name(path));
         progress.stage(&format!("{name}: building"), 0);
         let mut pair = Pair::new(ctx, scene, plan, path)?;
+        rasterisers.push((path, pair.rasteriser.clone()));
         progress.stage(&name, plan.steps());
         let mut shown = Vec::new();
         for camera in 0..CAMERA_COUNT {
@@ -130,6 +138,7 @@ pub fn measure(
         vertices: scene.positions.len() as u64,
         triangles: scene.triangles.len() as u64,
         cells,
+        rasterisers,
         paths_alike: compare_paths(&firsts, plan)?,
     })
 }
@@ -140,6 +149,7 @@ struct Pair<'a> {
     path: RayPath,
     standalone: HybridRenderer,
     hybrid: HybridRenderer,
+    rasteriser: String,
     done: u64,
 }
 
@@ -152,8 +162,9 @@ impl<'a> Pair<'a> {
             HybridRenderer::new(ctx, scene, &config)
         };
         let (standalone, mut hybrid) = (renderer(Method::Standalone)?, renderer(Method::Hybrid)?);
-        hybrid.choose_raster(&scene.cameras[0])?;
-        Ok(Self { plan, path, standalone, hybrid, done: 0 })
+        let choice = hybrid.choose_raster(&scene.cameras[0])?;
+        let rasteriser = choice.map_or_else(|| "none".to_owned(), |choice| choice.to_string());
+        Ok(Self { plan, path, standalone, hybrid, rasteriser, done: 0 })
     }
 
     /// The camera's cell, and its first picture by both methods.

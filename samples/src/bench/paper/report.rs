@@ -28,6 +28,8 @@ pub struct Experiment {
     pub command: String,
     /// How much was measured.
     pub plan: Plan,
+    /// How long the whole run took so far, in seconds.
+    pub wall_seconds: f64,
     /// What was found.
     pub scenes: Vec<SceneResult>,
     /// What else the reader has to know.
@@ -58,6 +60,7 @@ impl Experiment {
             date: super::date::today(),
             command,
             plan,
+            wall_seconds: 0.0,
             scenes: Vec::new(),
             notes: Vec::new(),
         }
@@ -78,7 +81,7 @@ impl Experiment {
         ]);
         for (name, text) in files {
             let path = folder.join(name);
-            std::fs::write(&path, text).map_err(PaperError::write(&path))?;
+            write_whole(&path, &text).map_err(PaperError::write(&path))?;
         }
         Ok(())
     }
@@ -111,6 +114,16 @@ impl Experiment {
              each camera compared\n",
             self.device, self.driver, self.date, self.command
         );
+        if self.wall_seconds > 0.0 {
+            let seconds = self.wall_seconds.round() as u64;
+            let _ =
+                writeln!(text, "- took {} min {} s with loading and building", seconds / 60, seconds % 60);
+        }
+        for scene in &self.scenes {
+            for (path, choice) in &scene.rasterisers {
+                let _ = writeln!(text, "- {} by {}: {choice}", scene.name, path_name(*path));
+            }
+        }
         self.notes.iter().for_each(|note| {
             let _ = writeln!(text, "- {note}");
         });
@@ -152,6 +165,14 @@ kitchen stands beside its gallery, and its camera positions are not known, so co
 
 ";
 
+/// Under its name there is the old file or the whole new one.
+fn write_whole(path: &Path, text: &str) -> std::io::Result<()> {
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".part");
+    std::fs::write(&partial, text)?;
+    std::fs::rename(&partial, path)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -177,6 +198,7 @@ mod tests {
             vertices: 12_345,
             triangles: 54_321,
             cells: paths.iter().flat_map(cells).collect(),
+            rasterisers: paths.iter().map(|path| (*path, "compute rasteriser (exact)".to_owned())).collect(),
             paths_alike: if paths.len() > 1 { vec![(alike, alike); 5] } else { Vec::new() },
         };
         let paths = paths.to_vec();
@@ -205,6 +227,11 @@ mod tests {
         assert_eq!(worst[12], "231.6 %");
         assert_eq!(row(&page, "Table 7", "kitchen average")[12], "72.2 %");
         assert_eq!(row(&page, "Table 2", "living_room cam 1")[5..], ["45.25", "0.9858"]);
+        assert_eq!(
+            row(&page, "Table 2", "living_room average")[1..],
+            ["50.00", "49.00", "0.99950", "0.0100 %", "46.30", "0.9898"]
+        );
+        assert!(page.contains("- kitchen by pipeline: compute rasteriser (exact)\n"), "{page}");
         assert_eq!(row(&page, "Table 1", "kitchen")[3..], ["Gallery", "648,417", "998,831"]);
         assert_eq!(row(&page, "Table 3", "teapot cam 2")[7..], ["", "", "", "", "", ""]);
         assert_eq!(row(&page, "Table 8", "Gallery, RX 6600 (paper)")[6..], ["2.060", "72.2 %"]);

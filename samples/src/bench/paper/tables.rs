@@ -43,8 +43,13 @@ pub(super) fn likeness(scenes: &[SceneResult], path: RayPath) -> Table {
             let theirs = published.and_then(|theirs| theirs.likeness(cell.camera));
             table.row(camera(scene, cell.camera), likeness_row(&cell.likeness, theirs));
         }
+        let theirs = published.map(|theirs| theirs.mean_likeness());
+        table.row(format!("{} average", scene.name), likeness_row(&mean_likeness(scene, path), theirs));
     }
     table.note("differing: share of pixels that differ by more than 1/255 in a channel");
+    table.note(
+        "average: PSNR of the mean square error over the cameras; the paper's is the mean of its decibels",
+    );
     table
 }
 
@@ -142,8 +147,7 @@ pub(super) fn summary(headline: String, scenes: &[SceneResult], paths: &[RayPath
     let mut table = Table::new(headline, &head);
     for scene in scenes {
         for &path in paths {
-            let alike: Vec<Likeness> = scene.of(path).map(|cell| cell.likeness).collect();
-            let psnr = alike.iter().map(|alike| alike.psnr).sum::<f64>() / alike.len().max(1) as f64;
+            let psnr = mean_likeness(scene, path).psnr;
             let theirs = PublishedScene::named(&scene.name).map(|theirs| published::AVERAGE.mean(&theirs));
             let own = times_cells(&scene.mean(path, Statistic::Average));
             let cells =
@@ -152,6 +156,11 @@ pub(super) fn summary(headline: String, scenes: &[SceneResult], paths: &[RayPath
         }
     }
     table
+}
+
+fn mean_likeness(scene: &SceneResult, path: RayPath) -> Likeness {
+    let cells: Vec<Likeness> = scene.of(path).map(|cell| cell.likeness).collect();
+    Likeness::mean(&cells)
 }
 
 fn likeness_row(own: &Likeness, theirs: Option<(f64, f64)>) -> Vec<String> {

@@ -1,0 +1,72 @@
+//! Pixels that mirror or refract, waiting for a launch of their own.
+
+use bytemuck::{Pod, Zeroable};
+use lvk::{BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context, Holder};
+
+use super::frame::BouncePlaces;
+
+/// Bytes of `BouncePixel` in `shaders/hybrid/bounce_queue.glsl`.
+const PIXEL_BYTES: u64 = 28;
+
+/// `BounceHead` in `shaders/hybrid/bounce_queue.glsl`: how many pixels wait, as arguments of both kinds of launches.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Head {
+    rays: [u32; 3],
+    groups: [u32; 3],
+}
+
+/// The queue of a band of the picture.
+pub(super) struct BounceQueue {
+    head: Holder<BufferHandle>,
+    pixels: Holder<BufferHandle>,
+}
+
+impl BounceQueue {
+    /// Where the size of an indirect trace stands in [`head`](Self::head).
+    pub(super) const RAYS: u64 = std::mem::offset_of!(Head, rays) as u64;
+    /// Where the groups of an indirect dispatch stand.
+    pub(super) const GROUPS: u64 = std::mem::offset_of!(Head, groups) as u64;
+
+    /// A queue with room for `capacity` pixels.
+    pub(super) fn new(ctx: &Context, capacity: u32) -> lvk::Result<Self> {
+        let head = Head { rays: [0, 1, 1], groups: [0, 1, 1] };
+        let usage = BufferUsage::STORAGE | BufferUsage::INDIRECT;
+        Ok(Self {
+            head: ctx.create_buffer(&BufferDesc {
+                size_bytes: size_of::<Head>() as u64,
+                usage,
+                data: Some(bytemuck::bytes_of(&head)),
+                debug_name: "bounce queue's head",
+                ..BufferDesc::default()
+            })?,
+            pixels: ctx.create_buffer(&BufferDesc {
+                size_bytes: u64::from(capacity) * PIXEL_BYTES,
+                debug_name: "bounce queue",
+                ..BufferDesc::default()
+            })?,
+        })
+    }
+
+    /// Tells the shaders where it is.
+    pub(super) fn places(&self, ctx: &Context) -> lvk::Result<BouncePlaces> {
+        Ok(BouncePlaces { head: ctx.buffer_address(*self.head)?, pixels: ctx.buffer_address(*self.pixels)? })
+    }
+
+    /// Records that nobody waits.
+    pub(super) fn record_reset(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+        const COUNT_BYTES: u64 = 4;
+        cmd.fill_buffer(*self.head, Self::RAYS, COUNT_BYTES, 0)?;
+        cmd.fill_buffer(*self.head, Self::GROUPS, COUNT_BYTES, 0)
+    }
+
+    /// The count of waiting pixels.
+    pub(super) fn head(&self) -> BufferHandle {
+        *self.head
+    }
+
+    /// All that its launches write and read.
+    pub(super) fn buffers(&self) -> [BufferHandle; 2] {
+        [*self.head, *self.pixels]
+    }
+}

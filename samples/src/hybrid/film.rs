@@ -1,0 +1,36 @@
+//! Where the light of pixels ends: the picture, and the sums of samples on the way to it.
+
+use lvk::{BufferDesc, BufferHandle, Context, Format, Holder, TextureDesc, TextureHandle, TextureUsage};
+
+/// The picture, and a colour a pixel where it has several samples.
+pub(super) struct Film {
+    pub(super) picture: Holder<TextureHandle>,
+    sums: Option<Holder<BufferHandle>>,
+}
+
+impl Film {
+    /// A film of `extent` pixels.
+    pub(super) fn new(ctx: &Context, extent: [u32; 2], samples: u32) -> lvk::Result<Self> {
+        let picture = ctx.create_texture(&TextureDesc {
+            format: Format::Rgba8Unorm,
+            extent,
+            usage: TextureUsage::STORAGE,
+            debug_name: "picture",
+            ..TextureDesc::default()
+        })?;
+        let size_bytes = u64::from(extent[0]) * u64::from(extent[1]) * size_of::<[f32; 3]>() as u64;
+        let desc = BufferDesc { size_bytes, debug_name: "sums of samples", ..BufferDesc::default() };
+        let sums = (samples > 1).then(|| ctx.create_buffer(&desc)).transpose()?;
+        Ok(Self { picture, sums })
+    }
+
+    /// Address of the sums; 0 where there are none.
+    pub(super) fn sums_address(&self, ctx: &Context) -> lvk::Result<u64> {
+        self.sums.as_ref().map_or(Ok(0), |sums| ctx.buffer_address(**sums))
+    }
+
+    /// The sums, for the ray pass to write.
+    pub(super) fn sums(&self) -> Option<BufferHandle> {
+        self.sums.as_ref().map(Holder::handle)
+    }
+}

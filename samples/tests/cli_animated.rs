@@ -1,0 +1,232 @@
+//! The `reflections` and `hybrid_oit` programs as a user meets them: help, pictures, sequences and Ctrl-C.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use lvk_samples::driver::{DriverRequest, prepare};
+
+/// A program, and the arguments that make it quick.
+struct Program {
+    path: &'static str,
+    quick: &'static [&'static str],
+    /// What its help tells beside what all samples have.
+    own: &'static [&'static str],
+    /// What it says of the picture.
+    said: &'static [&'static str],
+}
+
+const PROGRAMS: [Program; 2] = [
+    Program {
+        path: env!("CARGO_BIN_EXE_reflections"),
+        quick: &["--samples", "1"],
+        own: &["--samples", "--min-angle", "--compare-culling"],
+        said: &["g-buffers, then reflected rays", "instances kept", "opaque rays", "transparent rays"],
+    },
+    Program {
+        path: env!("CARGO_BIN_EXE_hybrid_oit"),
+        quick: &["--supersampling", "1", "--shadow-rays", "1"],
+        own: &["--supersampling", "--shadow-rays", "--nodes", "--time"],
+        said: &["list of glass", "spheres of glass", "composite", "nodes"],
+    },
+];
+
+const SHARED: [&str; 14] = [
+    "--rt",
+    "--frames",
+    "--round",
+    "--resume",
+    "--width",
+    "--height",
+    "--out",
+    "--device",
+    "--profile",
+    "--list-devices",
+    "--validate",
+    "Examples:",
+    "Exit status: 0",
+    "130 after Ctrl-C",
+];
+
+const SIZE: [u32; 2] = [48, 27];
+
+struct Outcome {
+    status: Option<i32>,
+    out: String,
+    err: String,
+}
+
+impl Program {
+    fn command(&self, args: &[&str]) -> Command {
+        let mut command = Command::new(self.path);
+        command.args(args).env_remove("LVK_DEVICE");
+        command
+    }
+
+    /// The program with small pictures in `folder`.
+    fn small(&self, folder: &Path, name: &str, args: &[&str]) -> Command {
+        let mut command = self.command(args);
+        command.args(self.quick).args(["--width", &SIZE[0].to_string(), "--height", &SIZE[1].to_string()]);
+        command.arg("--out").arg(folder.join(name));
+        command
+    }
+}
+
+impl Outcome {
+    fn of(mut command: Command) -> Self {
+        let Output { status, stdout, stderr } = command.output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        Self { status: status.code(), out: text(stdout), err: text(stderr) }
+    }
+
+    fn assert_success(&self) {
+        assert_eq!(self.status, Some(0), "{}{}", self.out, self.err);
+    }
+}
+
+fn assert_names(text: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(text.contains(part), "no `{part}` in: {text}");
+    }
+}
+
+/// Whether the test can go on; `false`, with a line, only where the user allowed to go on without a device.
+fn has_device() -> bool {
+    let is_set = |name| std::env::var(name).is_ok_and(|value| !value.is_empty() && value != "0");
+    let found = prepare(&DriverRequest { validation: true });
+    match found {
+        Ok(_) => true,
+        Err(error) if is_set("LVK_SKIP_GPU_TESTS") && !is_set("LVK_REQUIRE_GPU") => {
+            eprintln!("SKIPPED, no Vulkan device: {error}");
+            false
+        }
+        Err(error) => panic!("{error}"),
+    }
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    files.sort();
+    files
+}
+
+#[test]
+fn the_help_teaches() {
+    for program in PROGRAMS {
+        let help = Outcome::of(program.command(&["--help"]));
+        help.assert_success();
+        assert_names(&help.out, &SHARED);
+        assert_names(&help.out, program.own);
+    }
+}
+
+#[test]
+fn wrong_arguments_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    for program in PROGRAMS {
+        for (line, part) in [("--frames 3..3", "--frames"), ("--width 0", "--width"), ("x", "Usage")] {
+            let mut command = program.command(&line.split(' ').collect::<Vec<_>>());
+            command.current_dir(folder.path());
+            let outcome = Outcome::of(command);
+            assert_eq!(outcome.status, Some(2), "{}", outcome.err);
+            assert_names(&outcome.err, &["error: ", part]);
+        }
+        let unnumbered = Outcome::of(program.small(folder.path(), "a.png", &["--frames", "0..2"]));
+        assert_eq!(unnumbered.status, Some(2), "{}", unnumbered.err);
+    }
+    assert!(files(folder.path()).is_empty());
+}
+
+#[test]
+fn both_paths_write_a_picture_under_validation() {
+    if !has_device() {
+        return;
+    }
+    for program in PROGRAMS {
+        for rt in ["pipeline", "query"] {
+            let folder = tempfile::tempdir().unwrap();
+            let args = ["--rt", rt, "--frames", "1", "--validate"];
+            let outcome = Outcome::of(program.small(folder.path(), "a.png", &args));
+            outcome.assert_success();
+            assert_names(&outcome.out, &["device  ", "GPU ms", "total", "validation messages: 0", "wrote "]);
+            assert_names(&outcome.out, program.said);
+            let [picture] = &files(folder.path())[..] else { panic!("one picture") };
+            assert_eq!(image::open(picture).unwrap().into_rgba8().dimensions(), SIZE.into());
+        }
+    }
+}
+
+#[test]
+fn what_culling_saves_is_told() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let outcome = Outcome::of(PROGRAMS[0].small(folder.path(), "a.png", &["--compare-culling"]));
+    outcome.assert_success();
+    assert_names(&outcome.out, &["culling   ", "TLAS build ", " ms instead of ", "rays of a sample "]);
+}
+
+/// Frame 3 of a round of three is frame 0, and ranges of two processes make the files of one.
+#[test]
+fn sequences_repeat_and_can_be_shared_among_processes() {
+    if !has_device() {
+        return;
+    }
+    for program in PROGRAMS {
+        let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let play = |folder: &Path, frames: &str| {
+            let args = ["--round", "3", "--frames", frames];
+            Outcome::of(program.small(folder, "frame_##.png", &args)).assert_success();
+        };
+        play(whole.path(), "0..4");
+        play(parts.path(), "2..4");
+        play(parts.path(), "0..2");
+        let read = |folder: &Path| -> Vec<Vec<u8>> {
+            files(folder).iter().map(|file| std::fs::read(file).unwrap()).collect()
+        };
+        let (whole, parts) = (read(whole.path()), read(parts.path()));
+        assert_eq!(whole.len(), 4);
+        assert!(whole == parts, "{}: a frame depends on the range it is in", program.path);
+        assert!(whole[0] == whole[3], "{}: a round has a seam", program.path);
+        assert!(whole[0] != whole[1] && whole[1] != whole[2], "{}: nothing moves", program.path);
+    }
+}
+
+#[test]
+fn ctrl_c_leaves_whole_pictures_that_can_be_resumed() {
+    if !has_device() {
+        return;
+    }
+    for program in PROGRAMS {
+        let folder = tempfile::tempdir().unwrap();
+        let mut command = program.small(folder.path(), "frame_######.png", &["--frames", "0..1000000"]);
+        let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+        let start = Instant::now();
+        while files(folder.path()).len() < 2 {
+            assert!(start.elapsed() < Duration::from_secs(300), "{}: no pictures", program.path);
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+        assert!(sent.success());
+        let output = child.wait_with_output().unwrap();
+        let err = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(130), "{err}");
+        assert_names(&err, &["of 1000000 frames", "--resume"]);
+        let written = files(folder.path());
+        for file in &written {
+            assert_eq!(
+                image::open(file).unwrap().into_rgba8().dimensions(),
+                SIZE.into(),
+                "{}",
+                file.display()
+            );
+        }
+        let range = format!("0..{}", written.len() + 1);
+        let resumed =
+            Outcome::of(program.small(folder.path(), "frame_######.png", &["--resume", "--frames", &range]));
+        resumed.assert_success();
+        assert_names(&resumed.out, &["wrote 1 frames", &format!("{} were there", written.len())]);
+    }
+}

@@ -1,0 +1,54 @@
+// Pixels whose light goes on from their first surface, by mirror or glass. The launch over all pixels queues them, and
+// another one, of just as many threads, follows their rays: so those of one pixel keep no neighbour waiting.
+#ifndef HYBRID_BOUNCE_QUEUE
+#define HYBRID_BOUNCE_QUEUE
+
+// Threads of a workgroup that follows rays by query.
+const uint kBounceGroup = 64u;
+
+// How many pixels wait, as arguments of the launch that takes them on.
+layout(buffer_reference, scalar, buffer_reference_align = 8) buffer BounceHead {
+    uvec3 rays; // of an indirect trace: x pixels
+    uvec3 groups; // of an indirect dispatch
+};
+
+struct BouncePixel {
+    uint place; // x in the low, y in the high half
+    uint triangle; // the first surface
+    vec2 barycentrics;
+    vec3 color; // what it sends by itself
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer BouncePixels {
+    BouncePixel at[];
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer ColorArray {
+    vec3 at[];
+};
+
+struct BounceQueue {
+    BounceHead head;
+    BouncePixels pixels; // room for all pixels of a band
+};
+
+// A place in the queue for each thread that asks.
+uint takeBouncePlace(BounceQueue queue) {
+#if defined(HYBRID_NO_SUBGROUPS)
+    uint place = atomicAdd(queue.head.rays.x, 1u);
+    atomicMax(queue.head.groups.x, place / kBounceGroup + 1u);
+    return place;
+#else
+    // Once for all that ask together; neighbours get neighbouring places.
+    uvec4 askers = subgroupBallot(true);
+    uint first = 0u;
+    if (subgroupElect()) {
+        uint count = subgroupBallotBitCount(askers);
+        first = atomicAdd(queue.head.rays.x, count);
+        atomicMax(queue.head.groups.x, (first + count + kBounceGroup - 1u) / kBounceGroup);
+    }
+    return subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(askers);
+#endif
+}
+
+#endif

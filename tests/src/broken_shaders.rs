@@ -1,0 +1,110 @@
+//! Shaders broken on purpose, to show that somebody would notice: in a process of its own, whose samples take their GLSL
+//! from a copy of `shaders/` that is changed and mended again (`LVK_SHADERS`).
+#![expect(clippy::expect_used, reason = "a test that cannot change its shaders has failed")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use image::RgbaImage;
+use lvk_samples::shader_folder::VARIABLE;
+
+use crate::child::in_child;
+use crate::picture::{Likeness, Tolerance};
+
+/// A change that breaks a shader.
+#[derive(Debug, Clone, Copy)]
+pub struct Mistake {
+    /// What is wrong then.
+    pub what: &'static str,
+    /// The file below `shaders/`.
+    pub file: &'static str,
+    /// What the file says, once.
+    pub right: &'static str,
+    /// What it says instead.
+    pub wrong: &'static str,
+}
+
+/// Shorter than naming all fields.
+#[must_use]
+pub const fn mistake(
+    what: &'static str,
+    file: &'static str,
+    right: &'static str,
+    wrong: &'static str,
+) -> Mistake {
+    Mistake { what, file, right, wrong }
+}
+
+/// The copy of `shaders/`.
+pub struct BrokenShaders {
+    folder: PathBuf,
+}
+
+impl BrokenShaders {
+    /// Runs `body` in a process of its own with a copy of the shaders; `test` as for [`in_child`].
+    ///
+    /// # Panics
+    /// As [`in_child`], and when the files cannot be copied.
+    pub fn in_child(test: &str, body: impl FnOnce(&Self)) {
+        let folder = tempfile::tempdir().expect("temporary folders can be made");
+        let shaders = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders");
+        copy(&shaders, folder.path()).expect("the shaders can be copied");
+        in_child(test, &[(VARIABLE, Some(folder.path().as_os_str()))], || {
+            let folder = std::env::var_os(VARIABLE).expect("the parent has named the folder");
+            body(&Self { folder: PathBuf::from(folder) });
+        });
+    }
+
+    /// Breaks the shaders in each way, one after the other, and takes a picture that must not be within `tolerance` of
+    /// the expected one, as the first picture, by whole shaders, must.
+    ///
+    /// # Panics
+    /// When a mistake goes unnoticed, or does not fit its file.
+    pub fn assert_each_shows(
+        &self,
+        by: &str,
+        expected: &RgbaImage,
+        tolerance: &Tolerance,
+        mistakes: &[Mistake],
+        picture: impl Fn() -> RgbaImage,
+    ) {
+        let whole = Likeness::of(&picture(), expected);
+        eprintln!("{by}, whole: {whole}");
+        assert!(whole.is_within(tolerance), "{by}: whole shaders give another picture: {whole}");
+        let mut unnoticed = Vec::new();
+        for mistake in mistakes {
+            let broken = self.with(mistake, &picture);
+            let likeness = Likeness::of(&broken, expected);
+            eprintln!("{by}, {}: {likeness}", mistake.what);
+            if likeness.is_within(tolerance) {
+                unnoticed.push(format!("{}: {likeness}", mistake.what));
+            }
+        }
+        assert!(unnoticed.is_empty(), "{by}, unnoticed:\n{}", unnoticed.join("\n"));
+    }
+
+    fn with(&self, mistake: &Mistake, picture: &impl Fn() -> RgbaImage) -> RgbaImage {
+        let path = self.folder.join(mistake.file);
+        let text = fs::read_to_string(&path).expect("the file of a mistake is there");
+        let count = text.matches(mistake.right).count();
+        assert_eq!(count, 1, "{}: {} is {count} times in {}", mistake.what, mistake.right, mistake.file);
+        fs::write(&path, text.replace(mistake.right, mistake.wrong)).expect("the copy can be written");
+        let broken = picture();
+        fs::write(&path, text).expect("the copy can be written");
+        broken
+    }
+}
+
+fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
+    fs::create_dir_all(to)?;
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let target = to.join(entry.file_name());
+        if entry.file_type()?.is_dir() {
+            copy(&entry.path(), &target)?;
+        } else {
+            fs::copy(entry.path(), target)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,324 @@
+//! Tests of the tests: the pictures of the samples fail to be what they were when a shader is broken on purpose, each
+//! stage and each technique once.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use image::RgbaImage;
+use lvk::Context;
+use lvk_samples::hybrid::{Bounces, Geometry, HybridConfig, Method, Raster, RasterTuning, RayPath};
+use lvk_samples::hybrid_oit::{HybridOitConfig, OitScene};
+use lvk_samples::reflections::{Reflections, ReflectionsConfig};
+use lvk_samples::scene::Camera;
+use lvk_tests::broken_shaders::{BrokenShaders, Mistake, mistake};
+use lvk_tests::device;
+use lvk_tests::glass_room::GlassRoom;
+use lvk_tests::hybrid::{Studio, paths};
+use lvk_tests::picture::{Tolerance, reference};
+use lvk_tests::still_life::still_life;
+
+const SAME_AS_EVER: Tolerance = Tolerance::SAME_AS_EVER;
+const MAIN: &str = "void main() {";
+const NOTHING: &str = "void main() {\n    return;";
+
+const HYBRID: [Mistake; 17] = [
+    mistake("no shadows", "hybrid/integrator.glsl", "if (!traceOccluded(", "if (true || !traceOccluded("),
+    mistake(
+        "no sun",
+        "hybrid/integrator.glsl",
+        "if (light.isDistant != 0.0) {",
+        "if (light.isDistant > 5.0) {",
+    ),
+    mistake("no lamp", "hybrid/integrator.glsl", "return light.color / (", "return 0.0 * light.color / ("),
+    mistake("even ambient light", "hybrid/integrator.glsl", "0.5 + 0.5 * facing.normal.y", "0.5"),
+    mistake(
+        "light bent the wrong way",
+        "hybrid/integrator.glsl",
+        "facing.entering ? 1.0 / material.ior : material.ior",
+        "facing.entering ? material.ior : 1.0 / material.ior",
+    ),
+    mistake("glass without mirror", "hybrid/integrator.glsl", "glass > 0.0 ?", "glass > 9.0 ?"),
+    mistake(
+        "one bounce less",
+        "hybrid/integrator.glsl",
+        "ray.depth < kMaxDepth",
+        "ray.depth + 1u < kMaxDepth",
+    ),
+    mistake("no mirror", "hybrid/integrator.glsl", "weight * (material.reflectivity +", "weight * (0.0 *"),
+    mistake("no highlights", "common/phong.glsl", "+ specular *", "+ 0.0 * specular *"),
+    mistake("flat normals", "common/surface.glsl", "squaredLength > 1e-12 ?", "squaredLength > 1e30 ?"),
+    mistake(
+        "blurred textures",
+        "common/texture_lod.glsl",
+        "return lodConstant +",
+        "return 2.0 + lodConstant +",
+    ),
+    mistake("no exposure", "common/tonemap.glsl", "1.0 - exp(-max(radiance, 0.0))", "min(radiance, 1.0)"),
+    mistake("hits elsewhere", "hybrid/closest.rchit.glsl", "= barycentrics;", "= barycentrics.yx;"),
+    mistake("no sky", "hybrid/closest.rmiss.glsl", "= kNoTriangle;", "= 0u;"),
+    mistake("no light", "hybrid/shadow.rmiss.glsl", "occluded = 0u", "occluded = 1u"),
+    mistake("no rays", "hybrid/render.rgen.glsl", MAIN, NOTHING),
+    mistake("no triangles", "hybrid/raster_small.comp.glsl", MAIN, NOTHING),
+];
+const HYBRID_LARGE: [Mistake; 1] = [mistake("no tiles", "hybrid/raster_tile.comp.glsl", MAIN, NOTHING)];
+const HYBRID_HARDWARE: [Mistake; 4] = [
+    mistake("nothing survives", "hybrid/cull.comp.glsl", "bool isInside = ", "bool isInside = false && "),
+    mistake("nothing drawn", "hybrid/compact.comp.glsl", "= 3u * (before +", "= 0u * (before +"),
+    mistake("no numbers", "hybrid/visibility.frag.glsl", "outTriangle = ", "outTriangle = 0xffffffffu | "),
+    mistake("no place", "hybrid/geometry.vert.glsl", "gl_Position = ", "gl_Position = 0.0 * "),
+];
+const HYBRID_PAPER: [Mistake; 3] = [
+    mistake("white things", "hybrid/geometry.frag.glsl", "vec4(point.albedo, 1.0)", "vec4(1.0)"),
+    mistake("coarse normals", "hybrid/geometry.frag.glsl", "point.normal)", "point.geometricNormal)"),
+    mistake(
+        "moved things",
+        "hybrid/geometry.frag.glsl",
+        "vec4(point.position,",
+        "vec4(point.position + 0.05,",
+    ),
+];
+const HYBRID_QUERY: [Mistake; 4] = [
+    mistake("no rays", "hybrid/render.comp.glsl", MAIN, NOTHING),
+    mistake(
+        "hits elsewhere",
+        "hybrid/trace_query.glsl",
+        "lvkRayQueryBarycentrics(query, LVK_COMMITTED)",
+        "vec2(0.2)",
+    ),
+    mistake(
+        "other triangles",
+        "hybrid/trace_query.glsl",
+        "hit.triangle = firstTriangle +",
+        "hit.triangle = 1u +",
+    ),
+    mistake(
+        "glass casts shadows",
+        "hybrid/trace_query.glsl",
+        "frame.tlas, flags, kMaskOpaque",
+        "frame.tlas, flags, kMaskAll",
+    ),
+];
+const QUEUED_PIPELINE: [Mistake; 1] = [mistake("no bounces", "hybrid/bounces.rgen.glsl", MAIN, NOTHING)];
+const QUEUED_QUERY: [Mistake; 1] = [mistake("no bounces", "hybrid/bounces.comp.glsl", MAIN, NOTHING)];
+
+/// What is broken, who notices, and what is asked of the device's paths.
+type HybridWay<'a> = (&'a str, &'a [Mistake], HybridConfig);
+
+fn hybrid_ways() -> [HybridWay<'static>; 7] {
+    let plain =
+        HybridConfig { width: 160, height: 90, bounces: Some(Bounces::Inline), ..HybridConfig::default() };
+    let geometry = |geometry| HybridConfig { geometry, ..plain };
+    let visible = |raster| geometry(Geometry::Visibility(Some(raster)));
+    let tuning = RasterTuning { small_pixels: Some(0), ..RasterTuning::default() };
+    let query = HybridConfig { path: RayPath::Query, ..plain };
+    let queued = |config| HybridConfig { bounces: Some(Bounces::Queued), ..config };
+    [
+        ("by pipeline", &HYBRID, visible(Raster::Compute)),
+        ("by tiles", &HYBRID_LARGE, HybridConfig { tuning, ..visible(Raster::Compute) }),
+        ("by hardware", &HYBRID_HARDWARE, visible(Raster::Hardware)),
+        ("by the paper", &HYBRID_PAPER, geometry(Geometry::Paper)),
+        ("by query", &HYBRID_QUERY, query),
+        ("queued by pipeline", &QUEUED_PIPELINE, queued(plain)),
+        ("queued by query", &QUEUED_QUERY, queued(query)),
+    ]
+}
+
+#[test]
+fn hybrid_notices() {
+    BrokenShaders::in_child("hybrid_notices", |shaders| {
+        let Some(ctx) = device() else { return };
+        let (scene, paths) = (still_life(), paths(&ctx));
+        assert_eq!(HybridConfig::default().method, Method::Hybrid);
+        for (by, mistakes, config) in hybrid_ways().iter().filter(|way| paths.contains(&way.2.path)) {
+            let picture = || Studio::with(&ctx, &scene, config).picture(&scene.cameras[0]);
+            // The paper's edges are not those of rays.
+            let expected =
+                if config.geometry == Geometry::Paper { picture() } else { reference("hybrid_small") };
+            shaders.assert_each_shows(by, &expected, &SAME_AS_EVER, mistakes, picture);
+        }
+    });
+}
+
+const OIT: [Mistake; 16] = [
+    mistake("not sorted", "hybrid_oit/list.glsl", "; index > 0u && isBefore(", "; false && isBefore("),
+    mistake("only the last node", "hybrid_oit/list.glsl", "Node(next, distance", "Node(kNoNode, distance"),
+    mistake(
+        "no tint in shadows",
+        "hybrid_oit/glass.rahit.glsl",
+        "payload.opticalDepth += ",
+        "uvec3 unused = ",
+    ),
+    mistake("glass casts dark shadows", "hybrid_oit/glass.rahit.glsl", "ignoreIntersectionEXT;", ";"),
+    mistake("no spheres in shadows", "hybrid_oit/sphere.rint.glsl", MAIN, NOTHING),
+    mistake("no sunlight", "hybrid_oit/shadow.rmiss.glsl", "isBlocked = 0u", "isBlocked = 1u"),
+    mistake("no shadow pass", "hybrid_oit/shadow.rgen.glsl", MAIN, NOTHING),
+    mistake("no focus", "hybrid_oit/glass.glsl", "1.5 * focus", "0.0 * focus"),
+    mistake(
+        "no mirrored sky in glass",
+        "hybrid_oit/glass.glsl",
+        "1.6 * skyAlong(mirrored)",
+        "0.0 * mirrored",
+    ),
+    mistake("spheres hide no sky", "hybrid_oit/occlusion.glsl", "1.0 - share * (", "1.0 - 0.0 * share * ("),
+    mistake("blocks hide no sky", "hybrid_oit/occlusion.glsl", "blocked += ", "blocked += 0.0 * "),
+    mistake("hard shadows", "hybrid_oit/shadow.glsl", "shadowRays == 1u ?", "shadowRays >= 1u ?"),
+    mistake("no varnish", "hybrid_oit/composite.comp.glsl", "surface.gloss * reflectance", "0.0"),
+    mistake(
+        "no highlight on varnish",
+        "hybrid_oit/composite.comp.glsl",
+        "30.0 * highlight",
+        "0.0 * highlight",
+    ),
+    mistake("no haze", "hybrid_oit/composite.comp.glsl", "1.0 - exp(-kHaze", "0.0 * exp(-kHaze"),
+    mistake("all at rest", "hybrid_oit/animate.comp.glsl", "motion.anchor + offset", "motion.anchor"),
+];
+const OIT_RASTER: [Mistake; 7] = [
+    mistake("no solids", "hybrid_oit/solid.vert.glsl", "gl_Position = ", "gl_Position = 0.0 * "),
+    mistake("black solids", "hybrid_oit/solid.frag.glsl", "face.albedo", "vec3(0.0)"),
+    mistake("no spheres", "hybrid_oit/sphere.vert.glsl", "gl_Position = ", "gl_Position = 0.0 * "),
+    mistake(
+        "balls turned inside out",
+        "hybrid_oit/ball.frag.glsl",
+        "position - sphere.center",
+        "sphere.center - position",
+    ),
+    mistake(
+        "balls in front of all",
+        "hybrid_oit/ball_depth.frag.glsl",
+        "gl_FragDepth = ",
+        "gl_FragDepth = 1.0 + 0.0 * ",
+    ),
+    mistake("no glass", "hybrid_oit/glass.frag.glsl", MAIN, NOTHING),
+    mistake("no backs of glass", "hybrid_oit/glass.frag.glsl", "end == crossing.exit", "false"),
+];
+const OIT_QUERY: [Mistake; 3] = [
+    mistake("no tint in shadows", "hybrid_oit/shadow.comp.glsl", "opticalDepth += ", "uvec3 unused = "),
+    mistake("balls cast none", "hybrid_oit/shadow.comp.glsl", "sphere.isGlass != 0u", "true"),
+    mistake("no shadow pass", "hybrid_oit/shadow.comp.glsl", MAIN, NOTHING),
+];
+
+#[test]
+fn hybrid_oit_notices() {
+    BrokenShaders::in_child("hybrid_oit_notices", |shaders| {
+        let Some(ctx) = device() else { return };
+        let expected = reference("hybrid_oit_small");
+        let picture = |path| {
+            let config = HybridOitConfig::new(path, 240, 135);
+            GlassRoom::new(&ctx, &OitScene::default(), &config).picture(1.9)
+        };
+        for path in paths(&ctx) {
+            let mistakes = match path {
+                RayPath::Pipeline => [&OIT[..], &OIT_RASTER].concat(),
+                RayPath::Query => OIT_QUERY.to_vec(),
+            };
+            let by = format!("oit by {path:?}");
+            shaders.assert_each_shows(&by, &expected, &SAME_AS_EVER, &mistakes, || picture(path));
+        }
+    });
+}
+
+const REFLECTIONS: [Mistake; 20] = [
+    mistake("mirrors short-sighted", "reflections/range.glsl", "return kFar;", "return 0.5;"),
+    mistake(
+        "rough surfaces not traced",
+        "reflections/range.glsl",
+        "kRoughestTraced = 0.7",
+        "kRoughestTraced = 0.09",
+    ),
+    mistake(
+        "no glossy lobe",
+        "reflections/reflectance.glsl",
+        "float radius = sqrt(u.x);",
+        "float radius = 0.0;",
+    ),
+    mistake("no fresnel", "reflections/reflectance.glsl", "(1.0 - normalIncidence) * pow(", "0.0 * pow("),
+    mistake(
+        "water mirrors nothing",
+        "reflections/reflect.glsl",
+        "reflection = reflectionOf(surface, direction, distance, vec2(0.0), pixelNoise(pixel, 4u));",
+        "reflection = vec4(0.0);",
+    ),
+    mistake("all is open", "reflections/reflect.glsl", "? 0.0 : 1.0;", "? 1.0 : 1.0;"),
+    mistake(
+        "reflections dark",
+        "reflections/reflect.glsl",
+        "mix(shadeReflected(",
+        "mix(0.5 * shadeReflected(",
+    ),
+    mistake(
+        "no light on reflected things",
+        "reflections/lighting.glsl",
+        "surface.emission + lightDirectly(surface, view, 2e-3, noise)",
+        "surface.emission",
+    ),
+    mistake("no shadows", "reflections/lighting.glsl", "&& !traceOccluded(", "&& true || traceOccluded("),
+    mistake(
+        "no sky light",
+        "reflections/ambient.glsl",
+        "return harmonicSum(normal,",
+        "return 0.0 * harmonicSum(normal,",
+    ),
+    mistake("water flat", "reflections/waves.glsl", "(0.022 /", "(0.0 /"),
+    mistake("serpent at rest", "reflections/skin.comp.glsl", "= dot(row, p);", "= v.position[axis];"),
+    mistake(
+        "serpent's normals at rest",
+        "reflections/skin.comp.glsl",
+        "= dot(row.xyz, v.normal);",
+        "= v.normal[axis];",
+    ),
+    mistake("leaves elsewhere", "reflections/leaves.comp.glsl", "return place + ", "return place + 0.7 + "),
+    mistake("no lights", "reflections/shadow.rmiss.glsl", "= 0u;", "= 1u;"),
+    mistake("no opaque rays", "reflections/opaque.rgen.glsl", MAIN, NOTHING),
+    mistake("no rays from glass", "reflections/transparent.rgen.glsl", MAIN, NOTHING),
+    mistake("hits elsewhere", "reflections/closest.rchit.glsl", "= barycentrics;", "= barycentrics.yx;"),
+    mistake("no water", "reflections/blend.frag.glsl", "outColor = ", "outColor = 0.0 * "),
+    mistake("no blur", "reflections/filter.comp.glsl", "radius > 0.75", "radius > 1e9"),
+];
+const REFLECTIONS_QUERY: [Mistake; 3] = [
+    mistake(
+        "leaves are squares",
+        "reflections/trace_query.glsl",
+        "return isSolid(instance, geometry, primitive, ",
+        "return true || isSolid(instance, geometry, primitive, ",
+    ),
+    mistake("no opaque rays", "reflections/opaque.comp.glsl", MAIN, NOTHING),
+    mistake("no rays from glass", "reflections/transparent.comp.glsl", MAIN, NOTHING),
+];
+
+/// Seen from just above the floor, where leaves are mirrored and throw shadows.
+const LEAVES: [Mistake; 2] = [
+    mistake("leaves are squares", "reflections/surface.glsl", ".a >= 0.5;", ".a >= -1.0;"),
+    mistake("leaves are squares to rays", "reflections/leaf.rahit.glsl", "ignoreIntersectionEXT;", ";"),
+];
+
+fn hall(ctx: &Context, path: RayPath, view: Option<&Camera>) -> RgbaImage {
+    let config = ReflectionsConfig { samples: 4, ..ReflectionsConfig::new(path, 162, 91) };
+    let mut hall = Reflections::new(ctx, &config).unwrap();
+    hall.show(0.0);
+    if let Some(view) = view {
+        hall.look(view);
+    }
+    hall.render_with(&mut |_| {}).unwrap();
+    RgbaImage::from_raw(config.width, config.height, hall.read_image().unwrap()).unwrap()
+}
+
+#[test]
+fn reflections_notices() {
+    BrokenShaders::in_child("reflections_notices", |shaders| {
+        let Some(ctx) = device() else { return };
+        let expected = reference("reflections_small");
+        for path in paths(&ctx) {
+            let mistakes: &[Mistake] = match path {
+                RayPath::Pipeline => &REFLECTIONS,
+                RayPath::Query => &REFLECTIONS_QUERY,
+            };
+            let by = format!("reflections by {path:?}");
+            shaders.assert_each_shows(&by, &expected, &SAME_AS_EVER, mistakes, || hall(&ctx, path, None));
+        }
+        let path = paths(&ctx)[0];
+        let view = Camera::looking_at([0.0, 1.2, -6.0], [0.5, 0.0, -9.0], 70.0);
+        let expected = hall(&ctx, path, Some(&view));
+        let mistakes = if path == RayPath::Pipeline { &LEAVES[..] } else { &LEAVES[..1] };
+        shaders.assert_each_shows("leaves", &expected, &SAME_AS_EVER, mistakes, || {
+            hall(&ctx, path, Some(&view))
+        });
+    });
+}
