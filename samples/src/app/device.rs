@@ -1,7 +1,8 @@
 //! Opens the device the user names, and lists what there is.
 
 use lvk::{
-    Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryRequest, ValidationSink,
+    Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryPath, RayQueryRequest,
+    ValidationSink,
 };
 
 use super::run_args::{RayTracing, RunArgs, Validation};
@@ -16,7 +17,8 @@ pub struct DeviceNeeds {
     pub textures: u32,
 }
 
-/// Opens the device the user names, or the best one; a better one without ray tracing gives way to one with. Messages of
+/// Opens the device the user names, or the best one; a better one without ray tracing gives way to one with, and
+/// traces in software where there is none. Messages of
 /// the validation layer, where it is asked for, go into `sink`.
 pub(super) fn open(
     name: &str,
@@ -25,8 +27,8 @@ pub(super) fn open(
     sink: &ValidationSink,
     needs: &DeviceNeeds,
 ) -> lvk::Result<Context> {
-    use FeatureRequest::{Optional, Required};
-    use RayQueryRequest::{Hardware, HardwareIfPresent};
+    use FeatureRequest::{Off, Optional, Required};
+    use RayQueryRequest::{Hardware, HardwareIfPresent, Software};
     let with = |ray_tracing_pipeline, ray_query| {
         Context::new(&ContextDesc {
             application_name: name,
@@ -44,13 +46,16 @@ pub(super) fn open(
     match args.rt {
         RayTracing::Pipeline => with(Required, HardwareIfPresent),
         RayTracing::Query => with(Optional, Hardware),
+        RayTracing::Software => with(Off, Software),
         RayTracing::Auto => {
             let best = with(Optional, HardwareIfPresent)?;
             let capabilities = best.capabilities();
             if capabilities.ray_tracing_pipeline || capabilities.ray_query {
                 return Ok(best);
             }
-            Ok(with(Required, HardwareIfPresent).or_else(|_| with(Optional, Hardware)).unwrap_or(best))
+            let other = with(Required, HardwareIfPresent).or_else(|_| with(Optional, Hardware));
+            drop(best);
+            other.or_else(|_| with(Off, Software))
         }
     }
 }
@@ -73,6 +78,17 @@ pub fn driver_text(capabilities: &Capabilities) -> String {
     let (major, minor, patch) = capabilities.api_version;
     let driver = format!("{} {}", capabilities.driver_name, capabilities.driver_info);
     format!("{}, Vulkan {major}.{minor}.{patch}", driver.trim_end())
+}
+
+/// What ray queries in `stages` are, and why where software walks.
+#[must_use]
+pub fn query_text(capabilities: &Capabilities, stages: &str) -> String {
+    match capabilities.ray_query_path {
+        RayQueryPath::Software => {
+            format!("ray queries in {stages}, in software ({})", capabilities.ray_query_reason)
+        }
+        RayQueryPath::Hardware | RayQueryPath::None => format!("ray queries in {stages}"),
+    }
 }
 
 /// Fails when the validation layer was not silent.

@@ -105,12 +105,14 @@ impl RunArgs {
 /// How to trace rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RayTracing {
-    /// A ray tracing pipeline where the device has one, else ray queries.
+    /// A ray tracing pipeline where the device has one, else ray queries, else these in software.
     Auto,
     /// A ray tracing pipeline with shader binding table.
     Pipeline,
     /// Ray queries in a compute shader.
     Query,
+    /// Ray queries that the library walks in the shader itself, on any device.
+    Software,
 }
 
 /// What Vulkan validation checks.
