@@ -1,5 +1,6 @@
 //! The command line of the `bench` program.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
@@ -44,8 +45,15 @@ pub struct BenchArgs {
     pub(super) list_devices: bool,
 
     /// Print the scenes that `paper --scenes` knows by name, and exit; FOLDER is searched, else that in LVK_SCENES
-    #[arg(long, value_name = "FOLDER", num_args = 0..=1, default_missing_value = "", global = true)]
-    pub(super) list_scenes: Option<PathBuf>,
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        num_args = 0..=1,
+        default_missing_value = "",
+        value_parser = clap::value_parser!(OsString),
+        global = true
+    )]
+    pub(super) list_scenes: Option<OsString>,
 
     /// Run with Vulkan validation; a message is an error, and the figures mean little
     #[arg(long, global = true)]

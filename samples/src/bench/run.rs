@@ -28,7 +28,7 @@ pub fn run(args: &BenchArgs) -> ExitCode {
 
 fn answered(args: &BenchArgs) -> Result<String, BenchError> {
     if let Some(folder) = &args.list_scenes {
-        return Ok(scene_list::listing(Some(folder)) + "\n");
+        return Ok(scene_list::listing(Some(std::path::Path::new(folder))) + "\n");
     }
     if args.list_devices {
         device::list(args.profile.as_ref())?;
