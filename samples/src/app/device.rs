@@ -17,8 +17,7 @@ pub struct DeviceNeeds {
     pub textures: u32,
 }
 
-/// Opens the device the user names, or the best one; a better one without ray tracing gives way to one with, and
-/// traces in software where there is none. Messages of
+/// Opens the device the user names, or the best one; a better one without ray tracing gives way to one with. Messages of
 /// the validation layer, where it is asked for, go into `sink`.
 pub(super) fn open(
     name: &str,
@@ -53,9 +52,7 @@ pub(super) fn open(
             if capabilities.ray_tracing_pipeline || capabilities.ray_query {
                 return Ok(best);
             }
-            let other = with(Required, HardwareIfPresent).or_else(|_| with(Optional, Hardware));
-            drop(best);
-            other.or_else(|_| with(Off, Software))
+            Ok(with(Required, HardwareIfPresent).or_else(|_| with(Optional, Hardware)).unwrap_or(best))
         }
     }
 }

@@ -105,7 +105,7 @@ impl RunArgs {
 /// How to trace rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RayTracing {
-    /// A ray tracing pipeline where the device has one, else ray queries, else these in software.
+    /// A ray tracing pipeline where the device has one, else ray queries.
     Auto,
     /// A ray tracing pipeline with shader binding table.
     Pipeline,
