@@ -101,9 +101,14 @@ mod pipeline;
 mod resource;
 mod shader;
 mod shared;
+mod software;
 mod store;
 mod submit;
 mod upload;
+
+#[cfg(feature = "test-hooks")]
+#[doc(hidden)]
+pub use context::test_hooks;
 
 pub use ash;
 pub use glam;
@@ -132,6 +137,7 @@ pub use gpu::debug::{Validation, ValidationMessage, ValidationSink};
 pub use gpu::memory::MemoryKind;
 pub use gpu::mesh_limits::MeshLimits;
 pub use gpu::profile::DeviceProfile;
+pub use gpu::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,

@@ -9,6 +9,7 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::BlasBody;
 use crate::accel::compaction::SizeQuery;
 use crate::accel::scratch_buffer::ScratchBuffer;
+use crate::accel::software::body::SoftwareBody;
 use crate::accel::storage::AccelStorage;
 use crate::accel::structure::AccelKind;
 use crate::accel::tlas::TlasContents;
@@ -21,6 +22,7 @@ use crate::pipeline::{
     ComputePipeline, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline, RenderPipeline,
 };
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
+use crate::software::tree_cache::TreeCache;
 use crate::store::Store;
 use crate::submit::Submitter;
 use crate::upload::{SpareBuffers, Staging};
@@ -42,6 +44,8 @@ pub(crate) struct Shared {
     /// Where the context keeps compiled pipelines in a file.
     pub(crate) pipeline_cache: Option<PipelineCache>,
     pub(crate) bindless: Bindless,
+    /// Where the context keeps trees that the CPU has built.
+    pub(crate) tree_cache: Option<TreeCache>,
     pub(crate) submitter: Submitter<Garbage>,
     /// Where graphics pipelines query rays.
     pub(crate) graphics_queries: QueryStages,
@@ -80,6 +84,8 @@ pub(crate) enum Garbage {
     Body(#[expect(dead_code, reason = "held only to be dropped")] Arc<BlasBody>),
     /// A buffer that a command buffer uses, whoever else holds it: its owner may fail to come into being.
     Held(Arc<Buffer>),
+    /// A structure of the library's own that a command buffer fills, whoever else holds it.
+    Software(#[expect(dead_code, reason = "held only to be dropped")] Arc<SoftwareBody>),
     /// Answered sizes, which may be there before the GPU is done with the command buffer that asked.
     SizeQuery(#[expect(dead_code, reason = "held only to be dropped")] Arc<SizeQuery>),
 }
@@ -141,6 +147,7 @@ impl Shared {
             | Garbage::ComputePipeline(_)
             | Garbage::QueryPool(_)
             | Garbage::Body(_)
+            | Garbage::Software(_)
             | Garbage::SizeQuery(_) => {}
         }
     }

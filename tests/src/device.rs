@@ -4,7 +4,7 @@ use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-use lvk::{Context, ContextDesc, Validation, ValidationSink};
+use lvk::{Context, ContextDesc, RayQueryRequest, Validation, ValidationSink};
 use lvk_samples::driver::{DriverError, DriverRequest, prepare, radv_icd, swiftshader_icd};
 
 /// A context under core and synchronization validation. Dropping it fails the test on any message, those of the
@@ -70,12 +70,23 @@ pub fn device_with<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<Test
         vulkan_library: library,
         validation: validation(),
         validation_sink: Some(sink.clone()),
+        ray_query: ray_query(),
         ..Default::default()
     };
     adjust(&mut desc);
     match Context::new(&desc) {
         Ok(context) => Some(TestDevice { context: Some(context), sink }),
         Err(error) => unavailable(&error.to_string()),
+    }
+}
+
+/// Who walks ray queries unless a test says otherwise: the device, where it can, or what `LVK_TEST_RAY_QUERY` says
+/// (`hardware`, `software`, `auto`).
+fn ray_query() -> RayQueryRequest {
+    match std::env::var("LVK_TEST_RAY_QUERY").as_deref() {
+        Ok("software") => RayQueryRequest::Software,
+        Ok("auto") => RayQueryRequest::Auto,
+        _ => RayQueryRequest::HardwareIfPresent,
     }
 }
 

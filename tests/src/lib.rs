@@ -7,6 +7,7 @@ pub mod child;
 pub mod compute;
 pub mod device;
 pub mod glass_room;
+pub mod gpu_built;
 pub mod hit_check;
 pub mod hybrid;
 pub mod meshes;
@@ -23,5 +24,6 @@ pub mod shader_groups;
 pub mod sphere_scene;
 pub mod still_life;
 pub mod warnings;
+pub mod wide_tree;
 
 pub use device::{TestDevice, device, device_with};

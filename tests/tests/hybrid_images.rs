@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
-use lvk::{Context, DeviceProfile, FeatureRequest};
+use lvk::{Context, DeviceProfile, FeatureRequest, RayQueryRequest};
 use lvk_samples::hybrid::{Bounces, Geometry, HybridConfig, HybridError, HybridRenderer, Method, RayPath};
 use lvk_samples::scene::Scene;
 use lvk_tests::hybrid::{Studio, paths};
@@ -116,11 +116,12 @@ fn a_picture_is_the_same_each_time() {
 #[test]
 fn a_device_with_one_path_renders_by_it_and_names_the_other() {
     use FeatureRequest::{Off, Optional};
+    use RayQueryRequest::{HardwareIfPresent, Off as NoQuery};
     let scene = still_life();
     let mut pictures = Vec::new();
     for (pipeline, query, path, missing) in [
-        (Optional, Off, RayPath::Pipeline, RayPath::Query),
-        (Off, Optional, RayPath::Query, RayPath::Pipeline),
+        (Optional, NoQuery, RayPath::Pipeline, RayPath::Query),
+        (Off, HardwareIfPresent, RayPath::Query, RayPath::Pipeline),
     ] {
         let Some(ctx) = device_with(|desc| (desc.ray_tracing_pipeline, desc.ray_query) = (pipeline, query))
         else {

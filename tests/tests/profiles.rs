@@ -6,7 +6,7 @@ use std::ffi::CStr;
 use lvk::ash::{self, vk};
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Capabilities, Context, ContextDesc, DeviceProfile,
-    Error, FeatureRequest, Holder, TlasDesc, Triangles,
+    Error, FeatureRequest, Holder, RayQueryRequest, TlasDesc, Triangles,
 };
 use lvk_tests::device::vulkan;
 use lvk_tests::{TestDevice, device, device_with};
@@ -78,14 +78,14 @@ fn what_a_profile_hides_is_not_there_for_those_who_require_it() {
         (
             DeviceProfile::mali_g715(),
             FeatureRequest::Required,
-            FeatureRequest::Optional,
+            RayQueryRequest::HardwareIfPresent,
             real.ray_tracing_pipeline,
             "lacks ray tracing pipelines (hidden by the device profile 'mali-g715')",
         ),
         (
             DeviceProfile::no_ray_query(),
             FeatureRequest::Optional,
-            FeatureRequest::Required,
+            RayQueryRequest::Hardware,
             real.ray_query,
             "lacks ray queries (hidden by the device profile 'no-ray-query')",
         ),

@@ -7,8 +7,8 @@ use std::path::Path;
 use lvk::ash::vk;
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferUsage, ColorAttachment, Context, ContextDesc, Dependencies,
-    Error, FeatureRequest, Format, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc, ShaderSource,
-    ShaderStage, TlasDesc, Triangles, Validation,
+    Error, FeatureRequest, Format, RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc,
+    ShaderSource, ShaderStage, TlasDesc, Triangles, Validation,
 };
 use lvk_tests::child::{in_child, without_ray_tracing};
 use lvk_tests::compute::{Evaluator, words_buffer};
@@ -115,7 +115,7 @@ fn unsupported<T: std::fmt::Debug>(result: lvk::Result<T>) {
 
 #[test]
 fn features_turned_off_are_missing() {
-    let Some(ctx) = device_with(|desc| desc.ray_query = FeatureRequest::Off) else { return };
+    let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Off) else { return };
     assert!(!ctx.capabilities().ray_query);
     unsupported(ray_query_shader(&ctx));
     assert_eq!(ray_gen_shader(&ctx).is_ok(), ctx.capabilities().ray_tracing_pipeline);
@@ -163,7 +163,7 @@ fn expect_drawing(ctx: &Context) {
 #[test]
 fn everything_else_works_with_ray_tracing_turned_off() {
     let Some(ctx) = device_with(|desc| {
-        desc.ray_query = FeatureRequest::Off;
+        desc.ray_query = RayQueryRequest::Off;
         desc.ray_tracing_pipeline = FeatureRequest::Off;
     }) else {
         return;
@@ -180,8 +180,8 @@ fn a_device_without_ray_tracing_does_everything_else() {
         expect_no_ray_tracing(&ctx);
         expect_drawing(&ctx);
         for (pipeline, query, lack) in [
-            (FeatureRequest::Required, FeatureRequest::Optional, "lacks ray tracing pipelines"),
-            (FeatureRequest::Off, FeatureRequest::Required, "lacks ray queries"),
+            (FeatureRequest::Required, RayQueryRequest::HardwareIfPresent, "lacks ray tracing pipelines"),
+            (FeatureRequest::Off, RayQueryRequest::Hardware, "lacks ray queries"),
         ] {
             let required = start(|desc| (desc.ray_tracing_pipeline, desc.ray_query) = (pipeline, query));
             match required {

@@ -6,6 +6,7 @@ use super::flags::AccelStructSizes;
 use super::geometry::BlasGeometry;
 use super::primitive_map::PrimitiveMap;
 use super::raw_structure::RawStructure;
+use crate::accel::software::blas::SoftwareBlas;
 use crate::resource::Buffer;
 
 /// What a bottom-level structure is built from, and what was built.
@@ -15,6 +16,8 @@ pub(crate) struct Blas {
     pub(crate) transforms: Option<Buffer>,
     /// The parts a mesh was cut into; a single one where it was not.
     pub(crate) parts: Vec<PartShape>,
+    /// What software traces, where it does.
+    pub(crate) software: Option<SoftwareBlas>,
     state: Mutex<BlasState>,
 }
 
@@ -39,6 +42,8 @@ pub(crate) enum CompactionWish {
     Open,
     /// It could not be met.
     Failed,
+    /// There is nothing to gain.
+    Idle,
 }
 
 /// What one part is built from.
@@ -72,6 +77,7 @@ impl Blas {
         transforms: Option<Buffer>,
         parts: Vec<PartShape>,
         body: BlasBody,
+        software: Option<SoftwareBlas>,
     ) -> Self {
         let state = BlasState {
             body: Arc::new(body),
@@ -80,7 +86,7 @@ impl Blas {
             refits: 0,
             wish: CompactionWish::None,
         };
-        Self { geometries, transforms, parts, state: Mutex::new(state) }
+        Self { geometries, transforms, parts, software, state: Mutex::new(state) }
     }
 
     /// What stands for it now.
@@ -94,6 +100,12 @@ impl Blas {
         let mut state = self.lock();
         let settled = state.open_builds == 0 && state.builds == builds;
         settled.then(|| std::mem::replace(&mut state.body, Arc::new(body)))
+    }
+
+    /// Bytes of memory of all parts, and of what software traces.
+    pub(crate) fn memory_bytes(&self) -> u64 {
+        let software = self.software.as_ref().map_or(0, SoftwareBlas::memory_bytes);
+        self.body().memory_bytes() + software
     }
 
     /// Buffers the library keeps for it, in bytes: maps of primitives and matrices.
@@ -160,7 +172,7 @@ mod tests {
 
     fn blas() -> Blas {
         let body = BlasBody { structures: Vec::new(), compacted_from: None, rebuildable: true };
-        Blas::new(Vec::new(), None, Vec::new(), body)
+        Blas::new(Vec::new(), None, Vec::new(), body, None)
     }
 
     #[test]

@@ -85,39 +85,61 @@ impl IndexBytes<'_> {
     }
 }
 
-/// Boxes of triangles. `transform` (3 rows of 4 columns) moves the vertices first. A triangle with a coordinate that
-/// is not a number, or with a vertex that is not there, lies at the origin.
-pub(crate) fn triangle_bounds(
-    vertices: &VertexBytes<'_>,
-    indices: &IndexBytes<'_>,
-    triangle_count: u32,
-    transform: Option<&[f32; 12]>,
-) -> Vec<Bounds> {
-    let rows = transform.map(|m| [0, 4, 8].map(|row| Vec4::new(m[row], m[row + 1], m[row + 2], m[row + 3])));
-    let corner = |vertex: u32| -> Option<Vec3> {
-        let position = vertices.position(vertex)?;
-        Some(match rows {
-            Some(rows) => Vec3::from_array(rows.map(|row| row.dot(position.extend(1.0)))),
-            None => position,
-        })
-    };
-    let bounds = |triangle: u32| -> Option<Bounds> {
-        let [a, b, c] = indices.corners(triangle)?;
-        let corners = [corner(a)?, corner(b)?, corner(c)?];
-        (!corners.iter().any(|corner| corner.is_nan())).then(|| Bounds::of(corners))
-    };
-    (0..triangle_count).map(|triangle| bounds(triangle).unwrap_or(Bounds::ORIGIN)).collect()
+/// Triangles as they lie in memory.
+pub(crate) struct TriangleBytes<'a> {
+    pub(crate) vertices: VertexBytes<'a>,
+    pub(crate) indices: IndexBytes<'a>,
+    /// Number of triangles.
+    pub(crate) count: u32,
+    /// 3 rows of 4 columns that move the vertices.
+    pub(crate) transform: Option<[f32; 12]>,
 }
 
-/// Boxes as they lie in memory, each six floats: smallest corner, largest corner; `stride` 0 is tightly packed. One
-/// that is inverted, not a number or beyond the bytes lies at the origin.
-pub(crate) fn box_bounds(bytes: &[u8], stride: usize, count: u32) -> Vec<Bounds> {
-    let bounds = |index: u32| -> Option<Bounds> {
-        let [ax, ay, az, bx, by, bz] = numbers(element(bytes, stride, 24, index)?, f32::from_le_bytes)?;
+impl TriangleBytes<'_> {
+    /// The corners of a triangle; `None` where a coordinate is not a number, or a vertex not there.
+    pub(crate) fn corners(&self, triangle: u32) -> Option<[Vec3; 3]> {
+        let [a, b, c] = self.indices.corners(triangle)?;
+        let corners = [self.corner(a)?, self.corner(b)?, self.corner(c)?];
+        (!corners.iter().any(|corner| corner.is_nan())).then_some(corners)
+    }
+
+    /// The boxes of all triangles. One without corners lies at the origin.
+    pub(crate) fn bounds(&self) -> Vec<Bounds> {
+        let bounds = |triangle| self.corners(triangle).map_or(Bounds::ORIGIN, Bounds::of);
+        (0..self.count).map(bounds).collect()
+    }
+
+    fn corner(&self, vertex: u32) -> Option<Vec3> {
+        let position = self.vertices.position(vertex)?;
+        let Some(m) = &self.transform else { return Some(position) };
+        let row = |first: usize| Vec4::new(m[first], m[first + 1], m[first + 2], m[first + 3]);
+        Some(Vec3::from_array([0, 4, 8].map(|first| row(first).dot(position.extend(1.0)))))
+    }
+}
+
+/// Boxes as they lie in memory, each six floats: smallest corner, largest corner.
+pub(crate) struct BoxBytes<'a> {
+    /// Starts at the first box.
+    pub(crate) bytes: &'a [u8],
+    /// From one box to the next, in bytes; 0 is tightly packed.
+    pub(crate) stride: usize,
+    /// Number of boxes.
+    pub(crate) count: u32,
+}
+
+impl BoxBytes<'_> {
+    /// A box; `None` for one that is inverted, not a number or beyond the bytes.
+    pub(crate) fn bounds(&self, index: u32) -> Option<Bounds> {
+        let bytes = element(self.bytes, self.stride, 24, index)?;
+        let [ax, ay, az, bx, by, bz] = numbers(bytes, f32::from_le_bytes)?;
         let (low, high) = (Vec3::new(ax, ay, az), Vec3::new(bx, by, bz));
         low.cmple(high).all().then_some(Bounds { low, high })
-    };
-    (0..count).map(|index| bounds(index).unwrap_or(Bounds::ORIGIN)).collect()
+    }
+
+    /// All boxes; those that are none lie at the origin.
+    pub(crate) fn all_bounds(&self) -> Vec<Bounds> {
+        (0..self.count).map(|index| self.bounds(index).unwrap_or(Bounds::ORIGIN)).collect()
+    }
 }
 
 /// The bytes of one element; `None` if they are not all there.
@@ -181,6 +203,20 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    fn triangle_bounds(
+        vertices: &VertexBytes<'_>,
+        indices: IndexBytes<'_>,
+        count: u32,
+        transform: Option<&[f32; 12]>,
+    ) -> Vec<Bounds> {
+        let vertices = VertexBytes { ..*vertices };
+        TriangleBytes { vertices, indices, count, transform: transform.copied() }.bounds()
+    }
+
+    fn box_bounds(bytes: &[u8], stride: usize, count: u32) -> Vec<Bounds> {
+        BoxBytes { bytes, stride, count }.all_bounds()
+    }
 
     const FORMATS: [VertexFormat; 10] = [
         VertexFormat::F32,
@@ -246,7 +282,7 @@ mod tests {
             .collect();
         let vertices = VertexBytes { bytes: &bytes, stride: 0, format: VertexFormat::F32x3, count: 3 };
         let mirrored = [-2.0, 0.0, 0.0, 10.0, 0.0, 1.0, 0.0, 20.0, 0.0, 3.0, 1.0, 30.0];
-        let bounds = triangle_bounds(&vertices, &IndexBytes::None, 1, Some(&mirrored));
+        let bounds = triangle_bounds(&vertices, IndexBytes::None, 1, Some(&mirrored));
         let expected = Bounds { low: Vec3::new(8.0, 20.0, 30.0), high: Vec3::new(10.0, 21.0, 33.0) };
         assert_eq!(bounds, [expected]);
     }
@@ -258,11 +294,11 @@ mod tests {
         let vertices = VertexBytes { bytes: &bytes, stride: 12, format: VertexFormat::F32x3, count: 9 };
         let indices: Vec<u8> =
             [0_u16, 1, 2, 0, 1, 3, 0, 1, 4, 0, 9, 1, 0].into_iter().flat_map(u16::to_le_bytes).collect();
-        let bounds = triangle_bounds(&vertices, &IndexBytes::U16(&indices), 6, None);
+        let bounds = triangle_bounds(&vertices, IndexBytes::U16(&indices), 6, None);
         assert_eq!(bounds[0], Bounds { low: Vec3::splat(5.0), high: Vec3::new(6.0, 6.0, 5.0) });
         assert_eq!(bounds[1..], [Bounds::ORIGIN; 5], "not a number, no bytes, no vertex, no indices");
         let fewer = VertexBytes { count: 2, ..vertices };
-        assert_eq!(triangle_bounds(&fewer, &IndexBytes::None, 1, None), [Bounds::ORIGIN]);
+        assert_eq!(triangle_bounds(&fewer, IndexBytes::None, 1, None), [Bounds::ORIGIN]);
     }
 
     #[test]
@@ -300,8 +336,8 @@ mod tests {
             let picks: Vec<_> = picks.iter().map(|pick| pick.map(|vertex| vertex % count as u16)).collect();
             let short: Vec<u8> = picks.concat().into_iter().flat_map(u16::to_le_bytes).collect();
             let long: Vec<u8> = picks.concat().into_iter().map(u32::from).flat_map(u32::to_le_bytes).collect();
-            let bounds = triangle_bounds(&vertices, &IndexBytes::U16(&short), picks.len() as u32, None);
-            prop_assert_eq!(&bounds, &triangle_bounds(&vertices, &IndexBytes::U32(&long), picks.len() as u32, None));
+            let bounds = triangle_bounds(&vertices, IndexBytes::U16(&short), picks.len() as u32, None);
+            prop_assert_eq!(&bounds, &triangle_bounds(&vertices, IndexBytes::U32(&long), picks.len() as u32, None));
             for (bounds, pick) in bounds.iter().zip(&picks) {
                 for axis in [0, 1, 2] {
                     let values = pick.map(|vertex| corners[vertex as usize][axis]);
@@ -322,7 +358,7 @@ mod tests {
         ) {
             let vertices = VertexBytes { bytes: &bytes, stride, format, count };
             for indices in [IndexBytes::None, IndexBytes::U16(&indices), IndexBytes::U32(&indices)] {
-                let bounds = triangle_bounds(&vertices, &indices, 50, transform.as_ref());
+                let bounds = triangle_bounds(&vertices, indices, 50, transform.as_ref());
                 prop_assert_eq!(bounds.len(), 50);
                 prop_assert!(bounds.iter().all(|bounds| bounds.low.cmple(bounds.high).all()));
             }

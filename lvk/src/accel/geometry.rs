@@ -220,7 +220,7 @@ fn convert_triangles(
 ) -> Result<Converted> {
     let format = triangles.vertex_format;
     let vertex_features = vk::FormatFeatureFlags::ACCELERATION_STRUCTURE_VERTEX_BUFFER_KHR;
-    if !gpu.buffer_features(format.raw()).contains(vertex_features) {
+    if gpu.accel.is_some() && !gpu.buffer_features(format.raw()).contains(vertex_features) {
         let what = format!("vertex format {format:?} in acceleration structure '{name}'");
         return Err(Error::unsupported(what, "the device cannot build from it; F32x3 always works"));
     }

@@ -89,7 +89,7 @@ pub struct DeviceInstances<'a> {
 }
 
 /// Fails unless every number of the instance fits. Quick where it does: there may be millions.
-pub(super) fn check(name: &str, index: usize, instance: &TlasInstance) -> Result<()> {
+pub(crate) fn check(name: &str, index: usize, instance: &TlasInstance) -> Result<()> {
     const BOTH: InstanceFlags = InstanceFlags::FORCE_OPAQUE.union(InstanceFlags::FORCE_NO_OPAQUE);
     let fits = (instance.custom_index | instance.hit_group_offset) >> 24 == 0;
     if fits && is_finite(&instance.transform) && !instance.flags.contains(BOTH) {
@@ -119,7 +119,7 @@ fn complaint(name: &str, index: usize, instance: &TlasInstance) -> Error {
     Error::usage(name, format!("instance {index}: choose either FORCE_OPAQUE or FORCE_NO_OPAQUE"))
 }
 
-pub(super) fn pack(instance: &TlasInstance, blas_address: u64) -> RawInstance {
+pub(crate) fn pack(instance: &TlasInstance, blas_address: u64) -> RawInstance {
     RawInstance {
         transform: instance.transform,
         custom_index_and_mask: instance.custom_index | u32::from(instance.mask) << 24,

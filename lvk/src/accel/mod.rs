@@ -19,6 +19,7 @@ pub(crate) mod raw_structure;
 pub(crate) mod scratch;
 pub(crate) mod scratch_buffer;
 mod size_model;
+pub(crate) mod software;
 pub(crate) mod split;
 pub(crate) mod storage;
 pub(crate) mod structure;

@@ -124,6 +124,9 @@ impl Drop for StorageRange {
 
 fn new_buffer(gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Buffer> {
     let desc =
-        BufferDesc { size_bytes: bytes, usage: BufferUsage::empty(), debug_name: name, ..Default::default() };
-    Buffer::new(gpu, &desc, InternalUsage::ACCEL_STORAGE)
+        BufferDesc { size_bytes: bytes, usage: BufferUsage::STORAGE, debug_name: name, ..Default::default() };
+    // Those of the library's own are read as any buffer is.
+    let usage =
+        if gpu.accel.is_some() { InternalUsage::ACCEL_STORAGE } else { InternalUsage::SOFTWARE_STRUCTURES };
+    Buffer::new(gpu, &desc, usage)
 }

@@ -6,6 +6,7 @@ use super::blas::BlasBody;
 use super::flags::BuildFlags;
 use super::raw_structure::RawStructure;
 use super::structure::AccelStruct;
+use crate::accel::software::tlas::SoftwareTlas;
 use crate::error::{Result, check_limit};
 use crate::resource::Buffer;
 
@@ -17,7 +18,10 @@ pub(crate) struct Tlas {
     pub(crate) capacity: u32,
     /// Instances Vulkan may be given, those for further parts of split meshes included.
     pub(crate) room: u32,
-    pub(crate) structure: RawStructure,
+    /// What the device traces, where it does.
+    pub(crate) structure: Option<RawStructure>,
+    /// What software traces, where it does.
+    pub(crate) software: Option<SoftwareTlas>,
     /// From hits to the caller's numbers: a row for each instance Vulkan is given. Made when first needed.
     pub(crate) rows: OnceLock<Arc<Buffer>>,
     /// The instances Vulkan is given, where a kernel writes them. Made when first needed.
@@ -81,12 +85,19 @@ pub(crate) struct Entry {
 }
 
 impl Tlas {
-    pub(crate) fn new(slot: u32, capacity: u32, room: u32, structure: RawStructure) -> Self {
+    pub(crate) fn new(
+        slot: u32,
+        capacity: u32,
+        room: u32,
+        structure: Option<RawStructure>,
+        software: Option<SoftwareTlas>,
+    ) -> Self {
         Self {
             slot,
             capacity,
             room,
             structure,
+            software,
             rows: OnceLock::new(),
             records: OnceLock::new(),
             contents: Mutex::default(),
@@ -99,7 +110,8 @@ impl Tlas {
 
     /// Bytes of the structure.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        self.structure.memory_bytes()
+        let hardware = self.structure.as_ref().map_or(0, RawStructure::memory_bytes);
+        hardware + self.software.as_ref().map_or(0, |software| software.body.memory_bytes())
     }
 
     /// Bytes of buffers the library keeps for it.

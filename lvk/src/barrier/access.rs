@@ -215,6 +215,11 @@ impl Use {
         Self::new(stages, Access::ACCEL_READ, Layout::Undefined)
     }
 
+    /// Structures that shaders of `stages` walk themselves, or have walked for them.
+    pub(crate) const fn structure_walk(stages: Stages) -> Self {
+        Self::new(stages, Access::ACCEL_READ.union(Access::SHADER_READ), Layout::Undefined)
+    }
+
     /// Reads through a mapped pointer once the GPU is done.
     pub(crate) const fn host_read() -> Self {
         Self::new(Stages::HOST, Access::HOST_READ, Layout::General)

@@ -19,7 +19,7 @@ pub(crate) const ACCEL_STRUCTS: u32 = 4;
 pub(crate) const TLAS_TABLE: u32 = 5;
 
 /// Bytes of an entry of the table of top-level structures.
-pub(crate) const TLAS_TABLE_ENTRY_BYTES: u64 = 8;
+pub(crate) const TLAS_TABLE_ENTRY_BYTES: u64 = 16;
 
 /// Each binding with the words an error message and the preamble use for it.
 pub(crate) const BINDINGS: [(u32, &str, &str); 6] = [

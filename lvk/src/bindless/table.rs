@@ -87,7 +87,7 @@ impl Bindless {
             (layout::SAMPLERS, vk::DescriptorType::SAMPLER, limits.max_bindless_samplers),
             (layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE, textures),
             (layout::ACCEL_STRUCTS, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, tlas_count(gpu)),
-            (layout::TLAS_TABLE, vk::DescriptorType::STORAGE_BUFFER, tlas_count(gpu).min(1)),
+            (layout::TLAS_TABLE, vk::DescriptorType::STORAGE_BUFFER, slot_count(gpu).min(1)),
         ];
         let set_layout = create_layout(gpu, &counts)?;
         let (pool, set) = match create_set(gpu, set_layout, &counts) {
@@ -102,7 +102,7 @@ impl Bindless {
             dummies: None,
             textures: Array::new("number of textures", textures),
             samplers: Array::new("number of samplers", limits.max_bindless_samplers),
-            tlas: Array::new("number of top-level acceleration structures", tlas_count(gpu)),
+            tlas: Array::new("number of top-level acceleration structures", slot_count(gpu)),
         };
         Ok(Self { set_layout, set, pool, entries: Mutex::new(entries), gpu: Arc::clone(gpu) })
     }
@@ -293,6 +293,12 @@ fn image(view: vk::ImageView, layout: vk::ImageLayout) -> vk::DescriptorImageInf
     vk::DescriptorImageInfo::default().image_view(view).image_layout(layout)
 }
 
+/// Top-level structures there may be, of either form.
+fn slot_count(gpu: &Gpu) -> u32 {
+    if gpu.has_structures() { gpu.caps.limits.max_bindless_tlas } else { 0 }
+}
+
+/// Those of the device.
 fn tlas_count(gpu: &Gpu) -> u32 {
     if gpu.accel.is_some() { gpu.caps.limits.max_bindless_tlas } else { 0 }
 }

@@ -19,6 +19,9 @@ use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
 use crate::shared::Garbage;
 
+/// Records the builds or refits of what software traces.
+type BuildSoftware = fn(&mut CommandBuffer, &[Arc<AccelStruct>], &[bool]) -> Result<()>;
+
 /// One build to record.
 pub(super) struct Build {
     pub(super) target: Arc<AccelStruct>,
@@ -87,8 +90,24 @@ impl CommandBuffer {
         self.build_all(&found, mode)
     }
 
+    /// Builds structures for the first time. Those of the library's own come ready from the CPU.
+    pub(crate) fn build_first(&mut self, structures: &[Arc<AccelStruct>]) -> Result<()> {
+        self.build_form(structures, BuildMode::Rebuild, Self::build_software_first)
+    }
+
     /// As [`build_blas`](Self::build_blas), by object.
     pub(crate) fn build_all(&mut self, structures: &[Arc<AccelStruct>], mode: BuildMode) -> Result<()> {
+        self.shared.gpu.check_structures()?;
+        self.build_form(structures, mode, Self::build_software)
+    }
+
+    /// Builds what the device traces, and by `software` what software does.
+    fn build_form(
+        &mut self,
+        structures: &[Arc<AccelStruct>],
+        mode: BuildMode,
+        software: BuildSoftware,
+    ) -> Result<()> {
         let mut open = Vec::with_capacity(structures.len());
         let mut builds = Vec::with_capacity(structures.len());
         let mut refits = Vec::with_capacity(structures.len());
@@ -100,8 +119,11 @@ impl CommandBuffer {
             self.plan_blas(target, &body, refit, &mut builds)?;
             refits.push(refit);
         }
-        self.gather_inputs(structures, &refits)?;
-        self.record_builds(&builds)?;
+        if self.shared.gpu.accel.is_some() {
+            self.gather_inputs(structures, &refits)?;
+            self.record_builds(&builds)?;
+        }
+        software(self, structures, &refits)?;
         for build in &open {
             let refits = if build.refit { self.refits_of(&build.target)?.saturating_add(1) } else { 0 };
             self.refits.insert(build.target.id.0, refits);
@@ -149,7 +171,7 @@ impl CommandBuffer {
         Ok(whole.into_part(part))
     }
 
-    fn reads(&self, blas: &Blas) -> Result<Vec<Arc<Buffer>>> {
+    pub(super) fn reads(&self, blas: &Blas) -> Result<Vec<Arc<Buffer>>> {
         let buffers = blas.geometries.iter().flat_map(|geometry| geometry.buffers());
         buffers.map(|handle| self.shared.store.buffers.get(handle)).collect()
     }

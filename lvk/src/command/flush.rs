@@ -100,9 +100,9 @@ impl CommandBuffer {
 
 /// Everything that shaders of `stages` read when they trace rays.
 fn structure_reads(shared: &Shared, stages: Stages) -> [(ResourceId, Use); 3] {
-    [
-        (shared.all_blas, Use::accel_read(stages)),
-        (shared.all_tlas, Use::accel_read(stages)),
-        (shared.tlas_tables, Use::shader_read(stages)),
-    ]
+    let read = match shared.gpu.caps.software_ray_query() {
+        true => Use::structure_walk(stages),
+        false => Use::accel_read(stages),
+    };
+    [(shared.all_blas, read), (shared.all_tlas, read), (shared.tlas_tables, Use::shader_read(stages))]
 }

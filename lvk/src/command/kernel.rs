@@ -13,6 +13,7 @@ use crate::barrier::{Stages, Use};
 use crate::error::Result;
 use crate::format::IndexFormat;
 use crate::kernel::{GatherPush, Kernel, groups};
+use crate::pipeline::ComputePipeline;
 
 const KIND_NO_INDICES: u32 = 0;
 const KIND_INDICES_16: u32 = 1;
@@ -102,28 +103,55 @@ impl CommandBuffer {
         kernel: Kernel,
         runs: impl Iterator<Item = (&'a [u8], u32)>,
     ) -> Result<()> {
-        let shared = Arc::clone(&self.shared);
-        let pipeline =
-            shared.kernels.get(&shared.gpu, &shared.layout, shared.pipeline_base().cache, kernel)?;
-        let (device, raw) = (&shared.gpu.device, self.raw());
+        let pipeline = self.kernel_pipeline(kernel)?;
+        let mut unbound = Some(&pipeline);
+        for (push, invocations) in runs {
+            self.dispatch_kernel(unbound.take(), push, groups(invocations));
+        }
+        self.restore_compute();
+        Ok(())
+    }
+
+    /// The pipeline of a kernel.
+    pub(super) fn kernel_pipeline(&self, kernel: Kernel) -> Result<Arc<ComputePipeline>> {
+        let shared = &self.shared;
+        shared.kernels.get(&shared.gpu, &shared.layout, shared.pipeline_base().cache, kernel)
+    }
+
+    /// Runs a kernel that is bound, or is to be bound first. Barriers are in place;
+    /// [`restore_compute`](Self::restore_compute) comes after the last.
+    pub(super) fn dispatch_kernel(
+        &self,
+        pipeline: Option<&Arc<ComputePipeline>>,
+        push: &[u8],
+        [x, y, z]: [u32; 3],
+    ) {
+        let (device, raw) = (&self.shared.gpu.device, self.raw());
         let (point, stages) = (vk::PipelineBindPoint::COMPUTE, vk::ShaderStageFlags::ALL);
         // SAFETY: the pipeline lives as long as the context; it uses no descriptors, and its push constants and
         // groups are within every device's limits.
         unsafe {
-            device.cmd_bind_pipeline(raw, point, pipeline.raw);
-            for (push, invocations) in runs {
-                let [x, y, z] = groups(invocations);
-                device.cmd_push_constants(raw, shared.layout.raw, stages, 0, push);
-                device.cmd_dispatch(raw, x, y, z);
+            if let Some(pipeline) = pipeline {
+                device.cmd_bind_pipeline(raw, point, pipeline.raw);
             }
+            device.cmd_push_constants(raw, self.shared.layout.raw, stages, 0, push);
+            device.cmd_dispatch(raw, x, y, z);
+        }
+    }
+
+    /// Has the caller's pipeline and push constants as they were before the kernels.
+    pub(super) fn restore_compute(&self) {
+        let (device, raw) = (&self.shared.gpu.device, self.raw());
+        // SAFETY: the pipeline is alive, and the bytes lie inside the push constants of the layout.
+        unsafe {
             if let Some(own) = &self.compute {
-                device.cmd_bind_pipeline(raw, point, own.raw);
+                device.cmd_bind_pipeline(raw, vk::PipelineBindPoint::COMPUTE, own.raw);
             }
             let pushed = self.push_constants.pushed_bytes();
             if !pushed.is_empty() {
-                device.cmd_push_constants(raw, shared.layout.raw, stages, 0, pushed);
+                let stages = vk::ShaderStageFlags::ALL;
+                device.cmd_push_constants(raw, self.shared.layout.raw, stages, 0, pushed);
             }
         }
-        Ok(())
     }
 }

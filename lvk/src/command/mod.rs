@@ -8,18 +8,20 @@ pub(crate) mod compute;
 pub(crate) mod dependencies;
 mod draw_mesh;
 pub(crate) mod flush;
+pub(crate) mod gpu_build;
 mod instances;
 mod kernel;
 pub(crate) mod query;
 pub(crate) mod render;
 pub(crate) mod render_pass;
+mod software;
 mod targets;
 pub(crate) mod tlas;
 pub(crate) mod trace;
 pub(crate) mod transfer;
 pub(crate) mod uses;
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::mem::ManuallyDrop;
 use std::sync::Arc;
 
@@ -65,6 +67,8 @@ pub struct CommandBuffer {
     /// Refits since the last rebuild of each bottom-level structure that is built here, by its id.
     refits: HashMap<u64, u32>,
     size_queries: Vec<Arc<SizeQuery>>,
+    /// Bottom-level structures that are built elsewhere from here on, by their ids.
+    moved: HashSet<u64>,
 }
 
 /// What becomes true once a command buffer is submitted.
@@ -103,6 +107,7 @@ impl CommandBuffer {
             open_builds: Vec::new(),
             refits: HashMap::new(),
             size_queries: Vec::new(),
+            moved: HashSet::new(),
         })
     }
 

@@ -11,7 +11,8 @@ use crate::accel::AccelStruct;
 use crate::accel::build::BuildInput;
 use crate::accel::flags::BuildMode;
 use crate::accel::instance::{DeviceInstances, TlasInstance};
-use crate::accel::tlas::{Shown, Tlas, TlasContents};
+use crate::accel::instance_plan::InstancePlan;
+use crate::accel::tlas::{InstanceSource, Shown, Tlas, TlasContents};
 use crate::barrier::Use;
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::error::{Error, Result, check_limit};
@@ -86,11 +87,24 @@ impl CommandBuffer {
         let object = target.tlas()?;
         check_limit(&target.name, "instance count", instances.count.into(), object.capacity.into())?;
         let (shown, mut source) = self.device_source(&target.name, instances)?;
+        if object.structure.is_none() {
+            let refit = self.check_update(&target, instances.count, instances.count, mode)?;
+            if let Some(software) = &object.software {
+                self.build_software_tlas_from(&target, software, instances, &shown)?;
+            }
+            self.open_builds.push(OpenBuild::of_tlas(&target));
+            return self.note_contents(&target, instances.count, instances.count, shown, None, refit);
+        }
         let built_count = source.built_count(&target.name)?;
         let refit = self.check_update(&target, instances.count, built_count, mode)?;
         self.keep_source(&target.name, instances, &shown, &mut source)?;
+        let software_shown = object.software.as_ref().map(|_| shown.clone()).unwrap_or_default();
         let ready = self.run_instances(&target, object, shown, source, built_count)?;
-        self.record_tlas(&target, ready, instances.count, refit)
+        self.record_tlas(&target, ready, instances.count, refit)?;
+        match &object.software {
+            Some(software) => self.build_software_tlas_from(&target, software, instances, &software_shown),
+            None => Ok(()),
+        }
     }
 
     /// As [`update_tlas`](Self::update_tlas), by object.
@@ -104,6 +118,9 @@ impl CommandBuffer {
         let count = instances.len() as u64;
         check_limit(&target.name, "instance count", count, tlas.capacity.into())?;
         let count = count as u32;
+        if tlas.structure.is_none() {
+            return self.update_software_tlas(target, instances, mode);
+        }
         let planned = self.host_instances(target, instances)?;
         let refit = self.check_update(target, count, planned.built_count(), mode)?;
         let ready = match planned {
@@ -114,7 +131,31 @@ impl CommandBuffer {
                 self.run_instances(target, tlas, shown, source, built_count)?
             }
         };
-        self.record_tlas(target, ready, count, refit)
+        self.record_tlas(target, ready, count, refit)?;
+        match &tlas.software {
+            Some(software) => self.build_software_tlas(target, software, instances),
+            None => Ok(()),
+        }
+    }
+
+    /// As [`update_tlas`](Self::update_tlas), where the device has no structures of its own.
+    fn update_software_tlas(
+        &mut self,
+        target: &Arc<AccelStruct>,
+        instances: &[TlasInstance],
+        mode: BuildMode,
+    ) -> Result<()> {
+        let tlas = target.tlas()?;
+        let shared = Arc::clone(&self.shared);
+        let find = |handle| shared.store.accel_structs.get(handle);
+        let plan = InstancePlan::new(&target.name, instances, &find)?;
+        let count = instances.len() as u32;
+        let refit = self.check_update(target, count, count, mode)?;
+        if let Some(software) = &tlas.software {
+            self.build_software_tlas(target, software, instances)?;
+        }
+        self.open_builds.push(OpenBuild::of_tlas(target));
+        self.note_contents(target, count, count, plan.shown, None, refit)
     }
 
     /// Writes the instances of a structure again, as what it shows has moved, and builds it.
@@ -189,7 +230,7 @@ impl CommandBuffer {
         let scratch = &target.sizes;
         let build = Build {
             target: Arc::clone(target),
-            raw: tlas.structure.raw,
+            raw: tlas.structure.as_ref().map_or(vk::AccelerationStructureKHR::null(), |of| of.raw),
             input: BuildInput::tlas(target.flags, ready.address, ready.built_count),
             refit,
             scratch_bytes: if refit { scratch.update_scratch_bytes } else { scratch.build_scratch_bytes },
@@ -197,23 +238,38 @@ impl CommandBuffer {
         };
         self.record_builds(&[build])?;
         self.open_builds.push(OpenBuild::of_tlas(target));
+        let Ready { built_count, shown, source, .. } = ready;
+        self.note_contents(target, count, built_count, shown, source, refit)
+    }
+
+    /// Tells shaders what is known of the structure, and remembers what it shows.
+    fn note_contents(
+        &mut self,
+        target: &Arc<AccelStruct>,
+        count: u32,
+        built_count: u32,
+        shown: Vec<Shown>,
+        source: Option<InstanceSource>,
+        refit: bool,
+    ) -> Result<()> {
+        let tlas = target.tlas()?;
         // At first the entry is that of the slot's last owner.
         let is_first = self.last_update(target, tlas).0.is_none();
         if is_first || tlas.rows.get().is_some() {
-            let mapped = ready.shown.iter().any(Shown::has_rows);
+            let mapped = shown.iter().any(Shown::has_rows);
             let rows = tlas.rows.get().filter(|_| mapped).map_or(0, |rows| rows.address);
-            self.write_tlas_table(tlas.slot, rows);
+            let software = tlas.software.as_ref().map_or(0, |software| software.body.address);
+            self.write_tlas_table(tlas.slot, [rows, software]);
         }
         let refits = if refit { self.last_update(target, tlas).1.saturating_add(1) } else { 0 };
         let refits_submitted = refit && self.own_update(target).is_none();
-        let Ready { built_count, shown, source, .. } = ready;
         let contents = TlasContents { instance_count: Some(count), built_count, shown, source, refits };
         self.tlas_updates.push(TlasUpdate { target: Arc::clone(target), contents, refits_submitted });
         Ok(())
     }
 
-    /// Tells shaders where the rows of a structure lie; 0 if its hits need none.
-    fn write_tlas_table(&mut self, slot: u32, rows: u64) {
+    /// Tells shaders where the rows of a structure lie, and what software traces; 0 where there is nothing.
+    fn write_tlas_table(&mut self, slot: u32, entry: [u64; 2]) {
         let shared = Arc::clone(&self.shared);
         let Some(table) = shared.tlas_table.as_ref() else { return };
         self.uses.id(shared.tlas_tables, Use::transfer_write());
@@ -221,7 +277,7 @@ impl CommandBuffer {
         let offset = u64::from(slot) * TLAS_TABLE_ENTRY_BYTES;
         // SAFETY: the table has an entry for every slot.
         unsafe {
-            shared.gpu.device.cmd_update_buffer(self.raw(), table.raw, offset, &rows.to_le_bytes());
+            shared.gpu.device.cmd_update_buffer(self.raw(), table.raw, offset, bytemuck::bytes_of(&entry));
         }
     }
 

@@ -118,19 +118,20 @@ fn info(object: &AccelStruct) -> AccelStructInfo {
         },
         AccelKind::Blas(blas) => {
             let body = blas.body();
-            let after_bytes = body.memory_bytes();
+            let after_bytes = blas.memory_bytes();
             let compaction = match body.compacted_from {
                 Some(before_bytes) => Compaction::Done { before_bytes, after_bytes },
                 None => match blas.wish() {
                     CompactionWish::None => Compaction::None,
                     CompactionWish::Open => Compaction::Pending,
                     CompactionWish::Failed => Compaction::Failed,
+                    CompactionWish::Idle => Compaction::Done { before_bytes: after_bytes, after_bytes },
                 },
             };
             AccelStructInfo {
                 name,
                 is_top_level: false,
-                parts: blas.parts.len() as u32,
+                parts: blas.parts.len().max(1) as u32,
                 is_remapped: blas.parts.iter().any(|part| part.map.is_some()),
                 structure_bytes: after_bytes,
                 table_bytes: blas.table_bytes(),

@@ -10,6 +10,7 @@ use crate::accel::desc::{BlasDesc, PrimitiveOrder};
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
 use crate::accel::order::{spatial_order, worth_ordering};
 use crate::accel::primitive_map::{PrimitiveMap, table_words};
+use crate::accel::software::blas::gpu_plan;
 use crate::accel::split::{PartLimits, PartPlan, PartSizes, plan_split};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -32,14 +33,28 @@ enum Treatment {
 
 impl Context {
     /// Bytes a bottom-level structure would take in one piece (`vkGetAccelerationStructureBuildSizesKHR`, raised to
-    /// what the context's [`DeviceProfile`](crate::DeviceProfile) says).
+    /// what the context's [`DeviceProfile`](crate::DeviceProfile) says); at most, where only software traces it.
     pub fn blas_sizes(&self, desc: &BlasDesc<'_>) -> Result<AccelStructSizes> {
-        input(self.shared(), desc)?.sizes(&self.shared().gpu)
+        let shared = self.shared();
+        let input = input(shared, desc)?;
+        if shared.gpu.accel.is_some() {
+            return input.sizes(&shared.gpu);
+        }
+        let plan = gpu_plan(desc.debug_name, desc.geometries, desc.flags)?;
+        Ok(AccelStructSizes {
+            structure_bytes: plan.blob_bytes,
+            build_scratch_bytes: plan.scratch_bytes,
+            update_scratch_bytes: 0,
+        })
     }
 
     /// The parts of every structure, with the tables of those that are cut or reordered.
     pub(super) fn blas_shapes(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Vec<PartShape>>> {
         let shared = self.shared();
+        if shared.gpu.accel.is_none() {
+            // Software has no parts; the descriptions are checked as for hardware.
+            return descs.iter().map(|desc| input(shared, desc).map(|_| Vec::new())).collect();
+        }
         let mut sizes = Vec::with_capacity(descs.len());
         let mut treatments = Vec::with_capacity(descs.len());
         for desc in descs {
@@ -102,7 +117,7 @@ impl Context {
 /// The checked input of the mesh as a whole. Addresses of matrices do not matter to size queries, but for being null.
 pub(super) fn input(shared: &Shared, desc: &BlasDesc<'_>) -> Result<BuildInput> {
     const SOME_ADDRESS: u64 = 16;
-    shared.gpu.accel()?;
+    shared.gpu.check_structures()?;
     desc.flags.check_blas(&shared.gpu, desc.debug_name)?;
     let find = |handle| shared.store.buffers.get(handle);
     let name = desc.debug_name;

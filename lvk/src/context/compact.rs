@@ -28,7 +28,8 @@ impl Context {
     ///
     /// A copy needs room beside what it replaces. One that has none waits for the others, whose memory comes back, and
     /// [fails](crate::Compaction::Failed) when there is still none then; nothing else does for it. Structures that are
-    /// compacted already, or about to be, are left alone.
+    /// compacted already, or about to be, are left alone. What software traces is never larger than it needs to be: where
+    /// nothing else is traced, compaction is done at once and saves nothing.
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for a structure without [`BuildFlags::ALLOW_COMPACTION`], and then nothing
@@ -48,6 +49,11 @@ impl Context {
         for target in targets {
             let blas = target.blas()?;
             let compacted = blas.body().compacted_from.is_some();
+            if self.shared().gpu.accel.is_none() {
+                // What software traces has the size it needs from the start.
+                blas.set_wish(CompactionWish::Idle);
+                continue;
+            }
             if !compacted && blas.set_wish(CompactionWish::Open) != CompactionWish::Open {
                 wanted.push(target);
             }

@@ -5,6 +5,7 @@ use std::path::Path;
 use crate::gpu::caps::FeatureRequest;
 use crate::gpu::debug::{Validation, ValidationSink};
 use crate::gpu::profile::DeviceProfile;
+use crate::gpu::ray_query_path::RayQueryRequest;
 
 /// Describes a context.
 #[derive(Debug, Clone)]
@@ -22,8 +23,9 @@ pub struct ContextDesc<'a> {
     pub validation_sink: Option<ValidationSink>,
     /// Ray tracing pipelines.
     pub ray_tracing_pipeline: FeatureRequest,
-    /// Ray queries in any shader stage.
-    pub ray_query: FeatureRequest,
+    /// Ray queries in any shader stage, and who walks their trees; [`Capabilities`](crate::Capabilities) says which it
+    /// became and why.
+    pub ray_query: RayQueryRequest,
     /// Another device to rehearse on this one, also by the requirements above; none for the device as it is.
     pub profile: Option<&'a DeviceProfile>,
     /// Frames the CPU may be ahead of the GPU; see [`Context::next_frame`](crate::Context::next_frame). 1 to 8.
@@ -49,6 +51,12 @@ pub struct ContextDesc<'a> {
     /// A file that is damaged, or of another device or driver, is dropped with a warning to the `log` crate, never an
     /// error. Drivers trust what is in it, so it belongs into a folder that nobody else can write.
     pub pipeline_cache: Option<&'a Path>,
+    /// A folder that keeps the trees that the CPU builds where software traces, from one run to the next, each under the
+    /// checksum of the primitives and settings it was built from. It is made when needed, and never emptied.
+    ///
+    /// A file that is damaged, or of another version, is dropped with a warning to the `log` crate and made anew, never an
+    /// error. Keep the folder where only the program writes it.
+    pub tree_cache: Option<&'a Path>,
 }
 
 impl Default for ContextDesc<'_> {
@@ -60,7 +68,7 @@ impl Default for ContextDesc<'_> {
             validation: Validation::Off,
             validation_sink: None,
             ray_tracing_pipeline: FeatureRequest::Optional,
-            ray_query: FeatureRequest::Optional,
+            ray_query: RayQueryRequest::Auto,
             profile: None,
             frames_in_flight: 2,
             staging_bytes: 16 << 20,
@@ -68,6 +76,7 @@ impl Default for ContextDesc<'_> {
             accel_budget_bytes: u64::MAX,
             max_textures: 16_384,
             pipeline_cache: None,
+            tree_cache: None,
         }
     }
 }

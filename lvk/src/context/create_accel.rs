@@ -14,6 +14,10 @@ use crate::accel::desc::{BlasDesc, TlasDesc};
 use crate::accel::flags::{AccelStructSizes, BuildMode};
 use crate::accel::instance_plan::InstancePlan;
 use crate::accel::raw_structure::RawStructure;
+use crate::accel::software::blas::SoftwareBlas;
+use crate::accel::software::body::SoftwareBody;
+use crate::accel::software::plan::GpuBuildPlan;
+use crate::accel::software::tlas::SoftwareTlas;
 use crate::accel::split::PartLimits;
 use crate::accel::structure::AccelKind;
 use crate::accel::tlas::Tlas;
@@ -51,12 +55,18 @@ impl Context {
     /// ([`ContextDesc::accel_budget_bytes`](crate::ContextDesc)).
     pub fn create_blas_batch(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Holder<AccelStructHandle>>> {
         let shapes = self.blas_shapes(descs)?;
+        let blobs = self.software_blobs(descs)?;
         let mut holders = Vec::with_capacity(descs.len());
         let mut objects = Vec::with_capacity(descs.len());
-        for (desc, parts) in descs.iter().zip(shapes) {
-            let handle = self.shared().store.accel_structs.insert(new_blas(self.shared(), desc, parts)?);
+        for ((desc, parts), blob) in descs.iter().zip(shapes).zip(&blobs) {
+            let software = self.software_blas(desc, blob.as_ref())?;
+            let object = new_blas(self.shared(), desc, parts, software)?;
+            let handle = self.shared().store.accel_structs.insert(object);
             holders.push(Holder::new(self, handle, 0));
             objects.push(self.shared().store.accel_structs.get(handle)?);
+        }
+        for (object, blob) in objects.iter().zip(blobs) {
+            blob.map(|blob| self.fill_software(object, &blob)).transpose()?;
         }
         self.build_batch(&objects)?;
         Ok(holders)
@@ -70,13 +80,13 @@ impl Context {
             let next: u64 = object.blas()?.parts.iter().map(|part| part.sizes.build_scratch_bytes).sum();
             if index > first && scratch.saturating_add(next) > budget {
                 let chunk = &objects[first..index];
-                self.before_next_submission(|cmd| cmd.build_all(chunk, BuildMode::Rebuild))?;
+                self.before_next_submission(|cmd| cmd.build_first(chunk))?;
                 self.flush()?;
                 (first, scratch) = (index, 0);
             }
             scratch = scratch.saturating_add(next);
         }
-        self.before_next_submission(|cmd| cmd.build_all(&objects[first..], BuildMode::Rebuild))
+        self.before_next_submission(|cmd| cmd.build_first(&objects[first..]))
     }
 
     /// Creates a top-level structure and builds it before the next submission. [`Holder::index`] is its element of
@@ -88,13 +98,13 @@ impl Context {
     /// memory would be larger than it takes.
     pub fn create_tlas(&self, desc: &TlasDesc<'_>) -> Result<Holder<AccelStructHandle>> {
         let shared = self.shared();
-        shared.gpu.accel()?;
+        shared.gpu.check_structures()?;
         let slot = shared.reserve(|| shared.bindless.reserve_tlas(desc.debug_name))?;
         let limits = part_limits(&shared.gpu.caps.limits);
         let tlas =
             tlas_within(shared, desc, slot, &limits).inspect_err(|_| shared.bindless.free_tlas(slot))?;
         if let AccelKind::Tlas(object) = &tlas.kind {
-            shared.bindless.set_tlas(slot, object.structure.raw);
+            object.structure.iter().for_each(|structure| shared.bindless.set_tlas(slot, structure.raw));
         }
         let handle = shared.store.accel_structs.insert(tlas);
         let holder = Holder::new(self, handle, slot);
@@ -104,7 +114,12 @@ impl Context {
 }
 
 /// Makes a bottom-level structure of these parts; nothing is built yet.
-fn new_blas(shared: &Shared, desc: &BlasDesc<'_>, parts: Vec<PartShape>) -> Result<AccelStruct> {
+fn new_blas(
+    shared: &Shared,
+    desc: &BlasDesc<'_>,
+    parts: Vec<PartShape>,
+    software: Option<SoftwareBlas>,
+) -> Result<AccelStruct> {
     let name = desc.debug_name;
     let structures: Result<Vec<_>> = parts
         .iter()
@@ -115,7 +130,7 @@ fn new_blas(shared: &Shared, desc: &BlasDesc<'_>, parts: Vec<PartShape>) -> Resu
         })
         .collect();
     let body = BlasBody { structures: structures?, compacted_from: None, rebuildable: true };
-    blas_object(shared, desc, parts, body)
+    blas_object(shared, desc, parts, body, software)
 }
 
 /// The object behind the handle of a bottom-level structure.
@@ -124,13 +139,16 @@ pub(super) fn blas_object(
     desc: &BlasDesc<'_>,
     parts: Vec<PartShape>,
     body: BlasBody,
+    software: Option<SoftwareBlas>,
 ) -> Result<AccelStruct> {
     let transforms = match transforms(desc.geometries) {
         Some(matrices) => Some(new_transforms(shared, desc.debug_name, &matrices)?),
         None => None,
     };
-    let sizes = parts.iter().map(|part| part.sizes).fold(AccelStructSizes::default(), AccelStructSizes::join);
-    let blas = Blas::new(desc.geometries.to_vec(), transforms, parts, body);
+    let hardware = parts.iter().map(|part| part.sizes);
+    let all = hardware.chain(software.as_ref().map(SoftwareBlas::sizes));
+    let sizes = all.fold(AccelStructSizes::default(), AccelStructSizes::join);
+    let blas = Blas::new(desc.geometries.to_vec(), transforms, parts, body, software);
     Ok(AccelStruct::new(desc.debug_name, desc.flags, sizes, AccelKind::Blas(blas)))
 }
 
@@ -164,12 +182,42 @@ fn tlas_within(shared: &Shared, desc: &TlasDesc<'_>, slot: u32, limits: &PartLim
     let room = u64::from(capacity) * average.max(desc.parts_per_instance.into());
     check_limit(name, "instance capacity", room, shared.gpu.caps.limits.max_tlas_instances)?;
     let room = u32::try_from(room).unwrap_or(u32::MAX);
+    let (structure, sizes) = match shared.gpu.accel {
+        Some(_) => {
+            let (structure, sizes) = hardware_tlas(shared, desc, room, limits)?;
+            (Some(structure), sizes)
+        }
+        None => (None, AccelStructSizes::default()),
+    };
+    let software = software_tlas(shared, name, capacity)?;
+    let sizes = software.as_ref().map_or(sizes, |software| sizes.join(software.sizes()));
+    let tlas = Tlas::new(slot, capacity, room, structure, software);
+    Ok(AccelStruct::new(name, desc.flags, sizes, AccelKind::Tlas(tlas)))
+}
+
+/// Room for what the device traces.
+fn hardware_tlas(
+    shared: &Shared,
+    desc: &TlasDesc<'_>,
+    room: u32,
+    limits: &PartLimits,
+) -> Result<(RawStructure, AccelStructSizes)> {
+    let name = desc.debug_name;
     let sizes = BuildInput::tlas(desc.flags, 0, room).sizes(&shared.gpu)?;
     check_limit(name, "size of the structure in bytes", sizes.structure_bytes, limits.structure_bytes)?;
     check_limit(name, "scratch of a build in bytes", sizes.scratch_bytes(), limits.scratch_bytes)?;
     let ty = vk::AccelerationStructureTypeKHR::TOP_LEVEL;
     let bytes = sizes.structure_bytes;
     let structure = RawStructure::new(&shared.gpu, &shared.accel_storage, name, ty, bytes)?;
-    let tlas = Tlas::new(slot, capacity, room, structure);
-    Ok(AccelStruct::new(name, desc.flags, sizes, AccelKind::Tlas(tlas)))
+    Ok((structure, sizes))
+}
+
+/// Room for what software traces, where it does.
+fn software_tlas(shared: &Shared, name: &str, capacity: u32) -> Result<Option<SoftwareTlas>> {
+    if !shared.gpu.caps.software_ray_query() {
+        return Ok(None);
+    }
+    let plan = GpuBuildPlan::tlas(name, capacity)?;
+    let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, plan.blob_bytes)?;
+    Ok(Some(SoftwareTlas { body: Arc::new(body), plan }))
 }

@@ -30,12 +30,12 @@ pub(super) fn fill_dummies(ctx: &Context) -> Result<()> {
         cmd.clear_tlas_table();
         Ok(())
     })?;
-    let tlas = if shared.gpu.accel.is_some() { Some(empty_tlas(ctx)?) } else { None };
+    let tlas = if shared.gpu.has_structures() { Some(empty_tlas(ctx)?) } else { None };
     shared.bindless.fill(Dummies {
         sampled: sampled.sampled_view()?,
         storage: storage.storage_view()?,
         sampler: sampler.raw,
-        tlas: tlas.as_ref().and_then(|tlas| Some(tlas.tlas().ok()?.structure.raw)),
+        tlas: tlas.as_ref().and_then(|tlas| Some(tlas.tlas().ok()?.structure.as_ref()?.raw)),
         tlas_table: shared.tlas_table.as_ref().map(|table| table.raw),
     });
     let objects = DummyObjects { _textures: [sampled, storage], _sampler: sampler, _tlas: tlas };

@@ -107,7 +107,9 @@ impl Context {
     ) -> Result<Vec<(vk::AccelerationStructureKHR, u64)>> {
         let object = self.shared().store.accel_structs.get(structure)?;
         Ok(match &object.kind {
-            AccelKind::Tlas(tlas) => vec![(tlas.structure.raw, tlas.structure.address)],
+            AccelKind::Tlas(tlas) => {
+                tlas.structure.iter().map(|structure| (structure.raw, structure.address)).collect()
+            }
             AccelKind::Blas(blas) => {
                 blas.body().structures.iter().map(|part| (part.raw, part.address)).collect()
             }

@@ -15,8 +15,11 @@ pub(crate) mod holder;
 mod interop;
 mod read_bounds;
 pub(crate) mod serialize;
+mod software_blas;
 mod start;
 mod submit;
+#[cfg(feature = "test-hooks")]
+pub mod test_hooks;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -5,13 +5,14 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::Context;
-use crate::accel::bounds::{Bounds, IndexBytes, VertexBytes, box_bounds, triangle_bounds};
+use crate::accel::bounds::{Bounds, BoxBytes, IndexBytes, TriangleBytes, VertexBytes};
 use crate::accel::desc::BlasDesc;
 use crate::accel::geometry::{BlasGeometry, GeometryTransform, Triangles};
 use crate::error::Result;
 use crate::format::IndexFormat;
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;
+use crate::software::mesh::GeometryBytes;
 
 /// Most bytes read back at once: inputs of a whole scene may be more than there is readback memory for.
 const READ_AT_ONCE: u64 = 64 << 20;
@@ -21,7 +22,7 @@ type Piece = (BufferHandle, u64, u64);
 
 /// Pieces of buffers that are read together, each once.
 #[derive(Default)]
-struct Pieces {
+pub(super) struct Pieces {
     places: HashMap<Piece, usize>,
     /// Buffer and first byte in it.
     list: Vec<(Arc<Buffer>, u64)>,
@@ -33,6 +34,13 @@ struct Pieces {
 impl Context {
     /// The boxes of the primitives of each geometry of each mesh. Waits for the GPU.
     pub(super) fn read_bounds(&self, descs: &[&BlasDesc<'_>]) -> Result<Vec<Vec<Vec<Bounds>>>> {
+        let pieces = self.read_inputs(descs)?;
+        let of_mesh = |desc: &&BlasDesc<'_>| desc.geometries.iter().map(|g| bounds(g, &pieces)).collect();
+        Ok(descs.iter().map(of_mesh).collect())
+    }
+
+    /// The inputs of meshes. Waits for the GPU.
+    pub(super) fn read_inputs(&self, descs: &[&BlasDesc<'_>]) -> Result<Pieces> {
         let mut pieces = Pieces::default();
         for geometry in descs.iter().flat_map(|desc| desc.geometries) {
             for piece in inputs(geometry) {
@@ -40,8 +48,7 @@ impl Context {
             }
         }
         self.read_pieces(&mut pieces)?;
-        let of_mesh = |desc: &&BlasDesc<'_>| desc.geometries.iter().map(|g| bounds(g, &pieces)).collect();
-        Ok(descs.iter().map(of_mesh).collect())
+        Ok(pieces)
     }
 
     fn add_piece(&self, pieces: &mut Pieces, piece: Piece) -> Result<()> {
@@ -133,10 +140,18 @@ fn span(count: u32, stride: u64, packed: u64) -> u64 {
 }
 
 fn bounds(geometry: &BlasGeometry, pieces: &Pieces) -> Vec<Bounds> {
+    match geometry_bytes(geometry, pieces) {
+        GeometryBytes::Boxes(boxes) => boxes.all_bounds(),
+        GeometryBytes::Triangles(triangles) => triangles.bounds(),
+    }
+}
+
+/// A geometry as it was read.
+pub(super) fn geometry_bytes<'a>(geometry: &BlasGeometry, pieces: &'a Pieces) -> GeometryBytes<'a> {
     match geometry {
         BlasGeometry::Aabbs(boxes) => {
             let bytes = inputs(geometry).next().map_or(&[][..], |piece| pieces.get(piece));
-            box_bounds(bytes, boxes.stride as usize, boxes.count)
+            GeometryBytes::Boxes(BoxBytes { bytes, stride: boxes.stride as usize, count: boxes.count })
         }
         BlasGeometry::Triangles(triangles) => {
             let bytes = pieces.get(vertices(triangles));
@@ -152,8 +167,13 @@ fn bounds(geometry: &BlasGeometry, pieces: &Pieces) -> Vec<Bounds> {
                 Some(IndexFormat::U16) => IndexBytes::U16(of_triangles),
                 Some(IndexFormat::U32) => IndexBytes::U32(of_triangles),
             };
-            let rows = transform(triangles, pieces);
-            triangle_bounds(&vertices, &indices, triangles.triangle_count, rows.as_ref())
+            let transform = transform(triangles, pieces);
+            GeometryBytes::Triangles(TriangleBytes {
+                vertices,
+                indices,
+                count: triangles.triangle_count,
+                transform,
+            })
         }
     }
 }

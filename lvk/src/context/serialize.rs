@@ -40,17 +40,23 @@ impl Context {
     /// A bottom-level structure as bytes, for a file that [`load_blas`](Self::load_blas) reads on the same device with
     /// the same driver (`vkCmdCopyAccelerationStructureToMemoryKHR`). Waits for the GPU.
     ///
+    /// Where only software traces, what it does serves every device with the same version of the library.
+    ///
     /// Keep the file where only the program writes it: its checksum finds damage, not intent.
     pub fn serialize_blas(&self, handle: AccelStructHandle) -> Result<Vec<u8>> {
         let object = self.shared().store.accel_structs.get(handle)?;
         let blas = object.blas()?;
         let body = blas.body();
+        let geometries = blas.geometries.iter().map(blob_geometry).collect();
+        if self.shared().gpu.accel.is_none() {
+            let parts = vec![BlobPart { driver: self.software_bytes(blas)?, map: None }];
+            return Ok(encode(&Blob { flags: object.flags.bits(), geometries, parts }));
+        }
         let sizes = self.serialized_sizes(&object, &body)?;
         let mut parts = Vec::with_capacity(sizes.len());
         for (driver, shape) in self.serialized_parts(&object, &body, &sizes)?.into_iter().zip(&blas.parts) {
             parts.push(BlobPart { driver, map: self.read_map(shape)? });
         }
-        let geometries = blas.geometries.iter().map(blob_geometry).collect();
         Ok(encode(&Blob { flags: object.flags.bits(), geometries, parts }))
     }
 
@@ -68,9 +74,12 @@ impl Context {
     /// wrote of a structure only the driver can read, and it takes it for its own: made-up contents send the GPU to any
     /// address. A file that others can write is no source.
     pub unsafe fn load_blas(&self, desc: &BlasDesc<'_>, bytes: &[u8]) -> Result<Holder<AccelStructHandle>> {
-        self.shared().gpu.accel()?;
+        self.shared().gpu.check_structures()?;
         let blob = decode(bytes).map_err(|error| rejected(desc, error.to_string()))?;
         check_same_mesh(desc, &blob).map_err(|reason| rejected(desc, reason))?;
+        if self.shared().gpu.accel.is_none() {
+            return self.load_software_blas(desc, &blob);
+        }
         let mut bytes = Vec::with_capacity(blob.parts.len());
         for part in &blob.parts {
             bytes.push(self.check_driver(part).map_err(|reason| rejected(desc, reason))?);
@@ -193,9 +202,14 @@ impl Context {
         let structure = |bytes: &u64| RawStructure::new(&shared.gpu, &shared.accel_storage, name, ty, *bytes);
         let structures = bytes.iter().map(structure).collect::<Result<Vec<_>>>()?;
         let body = BlasBody { structures, compacted_from: None, rebuildable };
-        let handle = shared.store.accel_structs.insert(blas_object(shared, desc, shapes, body)?);
+        // What software traces beside it is built anew: the file is the driver's.
+        let built = self.software_blobs(std::slice::from_ref(desc))?.pop().flatten();
+        let software = self.software_blas(desc, built.as_ref())?;
+        let handle = shared.store.accel_structs.insert(blas_object(shared, desc, shapes, body, software)?);
         let holder = Holder::new(self, handle, 0);
         let object = shared.store.accel_structs.get(handle)?;
+        built.map(|built| self.fill_software(&object, &built)).transpose()?;
+        self.before_next_submission(|cmd| cmd.build_software_of(&object))?;
         let sizes: Vec<_> = blob.parts.iter().map(|part| part.driver.len() as u64).collect();
         let places = Places::new(&sizes);
         let buffer = self.blob_buffer(name, places.total)?;

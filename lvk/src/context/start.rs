@@ -24,6 +24,7 @@ use crate::pipeline::{PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::shared::Shared;
+use crate::software::tree_cache::TreeCache;
 use crate::store::Store;
 use crate::submit::Submitter;
 use crate::upload::{SpareBuffers, Staging};
@@ -78,6 +79,7 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         tlas_table: new_tlas_table(&gpu)?,
         layout: PipelineLayout::new(&gpu, bindless.set_layout)?,
         pipeline_cache: desc.pipeline_cache.map(|path| PipelineCache::new(&gpu, path)).transpose()?,
+        tree_cache: desc.tree_cache.map(TreeCache::new),
         bindless,
         submitter: Submitter::new(&gpu)?,
         all_blas: ResourceId::next(),
@@ -90,7 +92,7 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
 
 /// An entry for each element of `kTLAS[]`.
 fn new_tlas_table(gpu: &Arc<Gpu>) -> Result<Option<Arc<Buffer>>> {
-    if gpu.accel.is_none() {
+    if !gpu.has_structures() {
         return Ok(None);
     }
     let desc = BufferDesc {

@@ -6,6 +6,7 @@ use ash::vk;
 
 use super::features::{Features, Subgroups, missing};
 use super::mesh_limits::MeshLimits;
+use super::ray_query_path::{RayQueryPath, RayQueryRequest};
 use super::select::DeviceKind;
 use crate::error::{Error, Result};
 
@@ -46,8 +47,13 @@ pub struct Capabilities {
     pub trace_rays_indirect: bool,
     /// Ray tracing pipelines may be linked from libraries (`VK_KHR_pipeline_library`).
     pub pipeline_libraries: bool,
-    /// Shaders may use ray queries (`VK_KHR_ray_query`).
+    /// Shaders may use ray queries, by whom [`ray_query_path`](Self::ray_query_path) says. In
+    /// [`Context::devices`](crate::Context::devices), before anybody has chosen, whether the device itself has them.
     pub ray_query: bool,
+    /// Who walks the trees of ray queries.
+    pub ray_query_path: RayQueryPath,
+    /// Why it is that one.
+    pub ray_query_reason: &'static str,
     /// Hit shaders and ray queries may read the corners of the triangle that was hit
     /// (`VK_KHR_ray_tracing_position_fetch`).
     pub position_fetch: bool,
@@ -81,7 +87,38 @@ impl Capabilities {
         self.trace_rays_indirect &= pipeline;
         self.pipeline_libraries &= pipeline;
         self.ray_query &= query;
+        if !self.ray_query {
+            self.ray_query_path = RayQueryPath::None;
+        }
         self.position_fetch &= self.ray_tracing_pipeline || self.ray_query;
+    }
+
+    /// Whether the device itself walks the trees of ray queries (`VK_KHR_ray_query`).
+    pub(crate) fn hardware_ray_query(&self) -> bool {
+        self.ray_query_path == RayQueryPath::Hardware
+    }
+
+    /// Whether the library does.
+    pub(crate) fn software_ray_query(&self) -> bool {
+        self.ray_query_path == RayQueryPath::Software
+    }
+
+    /// Whether the device builds acceleration structures, for either use of them.
+    pub(crate) fn hardware_structures(&self) -> bool {
+        self.ray_tracing_pipeline || self.hardware_ray_query()
+    }
+
+    /// Turns on what is asked for of what the device has.
+    pub(crate) fn choose_ray_tracing(&mut self, pipeline: FeatureRequest, query: RayQueryRequest) {
+        let choice = query.choose(self.ray_query, self.is_cpu);
+        self.limit_ray_tracing(pipeline.wants(), choice.path == RayQueryPath::Hardware);
+        self.ray_query_path = choice.path;
+        self.ray_query_reason = choice.reason;
+        if self.software_ray_query() {
+            self.ray_query = true;
+            self.limits.allow_software(self.hardware_structures());
+            self.position_fetch |= !self.hardware_structures();
+        }
     }
 }
 
@@ -156,6 +193,27 @@ pub struct Limits {
     pub mesh: MeshLimits,
 }
 
+impl Limits {
+    /// Of structures the library builds itself; without any of the device's own they are the only ones.
+    fn allow_software(&mut self, beside_hardware: bool) {
+        if beside_hardware {
+            return;
+        }
+        self.max_bindless_tlas = WANTED_TLAS;
+        self.max_blas_geometries = software::MOST_GEOMETRIES;
+        self.max_blas_primitives = software::MOST_PRIMITIVES;
+        self.max_tlas_instances = software::MOST_PRIMITIVES;
+        self.max_accel_structure_bytes = self.max_buffer_bytes;
+        self.max_accel_scratch_bytes = self.max_buffer_bytes;
+    }
+}
+
+/// Bounds of what references to nodes and leaves can name; see `accel::software::layout`.
+mod software {
+    pub(super) const MOST_GEOMETRIES: u64 = 1 << 24;
+    pub(super) const MOST_PRIMITIVES: u64 = 1 << 27;
+}
+
 /// One physical device as found, before any is chosen.
 pub(crate) struct PhysicalDevice {
     pub(crate) raw: vk::PhysicalDevice,
@@ -217,6 +275,7 @@ impl PhysicalDevice {
         caps.trace_rays_indirect = found.trace_indirect == vk::TRUE;
         caps.pipeline_libraries = caps.ray_tracing_pipeline && has(ash::khr::pipeline_library::NAME);
         caps.ray_query = found.ray_query == vk::TRUE;
+        caps.ray_query_path = if caps.ray_query { RayQueryPath::Hardware } else { RayQueryPath::None };
         caps.position_fetch = found.position_fetch == vk::TRUE;
         caps.mesh_shader = found.mesh_shader == vk::TRUE;
         caps.primitive_id = found.core.geometry_shader == vk::TRUE;

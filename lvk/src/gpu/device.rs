@@ -12,6 +12,7 @@ use super::debug::c_name;
 use super::features::Features;
 use super::instance::Instance;
 use super::profile::DeviceProfile;
+use super::ray_query_path::RayQueryRequest;
 use super::select::{Candidate, choose};
 use crate::error::{Error, Result};
 
@@ -19,7 +20,7 @@ use crate::error::{Error, Result};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct RayTracing {
     pub(crate) pipeline: FeatureRequest,
-    pub(crate) query: FeatureRequest,
+    pub(crate) query: RayQueryRequest,
 }
 
 /// One logical device with everything made from it that is not a resource. It knows no resource.
@@ -63,7 +64,7 @@ impl Gpu {
         // SAFETY: the device was created with one queue of this family.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
         let raw = &instance.raw;
-        let structures = caps.ray_tracing_pipeline || caps.ray_query;
+        let structures = caps.hardware_structures();
         Ok(Self {
             queue_family,
             accel: structures.then(|| ash::khr::acceleration_structure::Device::new(raw, &device)),
@@ -96,6 +97,16 @@ impl Gpu {
     /// The functions of `VK_KHR_acceleration_structure`, or the error that says what the device lacks.
     pub(crate) fn accel(&self) -> Result<&ash::khr::acceleration_structure::Device> {
         self.accel.as_ref().ok_or_else(|| self.lacks("acceleration structures"))
+    }
+
+    /// Whether there are acceleration structures, the device's or the library's own.
+    pub(crate) fn has_structures(&self) -> bool {
+        self.accel.is_some() || self.caps.software_ray_query()
+    }
+
+    /// Fails unless there are acceleration structures of either form.
+    pub(crate) fn check_structures(&self) -> Result<()> {
+        if self.has_structures() { Ok(()) } else { Err(self.lacks("acceleration structures")) }
     }
 
     /// The functions of `VK_KHR_ray_tracing_pipeline`, or the error that says what the device lacks.
@@ -217,10 +228,12 @@ fn candidate(device: &mut PhysicalDevice, request: RayTracing, profile: Option<&
     if let Some(profile) = profile {
         profile.apply(&mut device.capabilities);
     }
-    let (requests, left) = ([request.pipeline, request.query], has(&device.capabilities));
+    let left = has(&device.capabilities);
+    let required = [request.pipeline == FeatureRequest::Required, request.query.requires_hardware()];
+    let preferred = [request.pipeline.wants(), request.query.prefers_hardware()];
     let mut missing = device.missing.clone();
     for (index, name) in ["ray tracing pipelines", "ray queries"].into_iter().enumerate() {
-        if requests[index] == FeatureRequest::Required && !left[index] {
+        if required[index] && !left[index] {
             missing.push(lack(name, profile.filter(|_| found[index])));
         }
     }
@@ -230,8 +243,7 @@ fn candidate(device: &mut PhysicalDevice, request: RayTracing, profile: Option<&
         kind: device.kind,
         local_memory_bytes: device.local_memory_bytes,
         missing,
-        optional_score: requests.iter().zip(left).filter(|(wanted, has)| wanted.wants() && *has).count()
-            as u32,
+        optional_score: preferred.iter().zip(left).filter(|(wanted, has)| **wanted && *has).count() as u32,
     }
 }
 
@@ -249,17 +261,18 @@ fn create_with_fallback(
     request: RayTracing,
 ) -> Result<(ash::Device, Capabilities, Features)> {
     let mut caps = chosen.capabilities.clone();
-    caps.limit_ray_tracing(request.pipeline.wants(), request.query.wants());
+    caps.choose_ray_tracing(request.pipeline, request.query);
     let first = match create(instance, chosen, &caps) {
         Ok((device, features)) => return Ok((device, caps, features)),
         Err(error) => error,
     };
-    let optional = [request.pipeline, request.query].iter().all(|r| *r != FeatureRequest::Required);
-    if !optional || !(caps.ray_tracing_pipeline || caps.ray_query) {
+    let required = request.pipeline == FeatureRequest::Required || request.query.requires_hardware();
+    if required || !caps.hardware_structures() {
         return Err(Error::vulkan("vkCreateDevice")(first));
     }
-    caps.limit_ray_tracing(false, false);
     caps.limits.max_bindless_tlas = 0;
+    caps.ray_query = false;
+    caps.choose_ray_tracing(FeatureRequest::Off, request.query);
     caps.ray_tracing_fallback = Some(format!("vkCreateDevice with ray tracing answered {first}"));
     log::warn!("{}: ray tracing is off: vkCreateDevice with it answered {first}", caps.device_name);
     let (device, features) = create(instance, chosen, &caps).map_err(Error::vulkan("vkCreateDevice"))?;
@@ -289,16 +302,16 @@ fn create(
         .push_next(&mut chain.v11)
         .push_next(&mut chain.v12)
         .push_next(&mut chain.v13);
-    if caps.ray_tracing_pipeline || caps.ray_query {
+    if caps.hardware_structures() {
         all = all.push_next(&mut accel);
     }
     if caps.ray_tracing_pipeline {
         all = all.push_next(&mut pipeline);
     }
-    if caps.ray_query {
+    if caps.hardware_ray_query() {
         all = all.push_next(&mut query);
     }
-    if caps.position_fetch {
+    if features.position_fetch == vk::TRUE {
         all = all.push_next(&mut positions);
     }
     if caps.mesh_shader {
@@ -323,7 +336,7 @@ fn create(
 /// GPU-assisted validation finds no access out of bounds where the driver has to make it harmless.
 fn enabled(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) -> Features {
     let mut features = chosen.features;
-    features.limit_ray_tracing(caps.ray_tracing_pipeline, caps.ray_query);
+    features.limit_ray_tracing(caps.ray_tracing_pipeline, caps.hardware_ray_query());
     features.position_fetch &= vk::Bool32::from(caps.position_fetch);
     features.mesh_shader &= vk::Bool32::from(caps.mesh_shader);
     if instance.gpu_assisted {
@@ -334,7 +347,7 @@ fn enabled(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) ->
 
 fn extensions(features: &Features, caps: &Capabilities) -> Vec<*const c_char> {
     let mut names = Vec::new();
-    if caps.ray_tracing_pipeline || caps.ray_query {
+    if caps.hardware_structures() {
         names.push(ash::khr::acceleration_structure::NAME.as_ptr());
         names.push(ash::khr::deferred_host_operations::NAME.as_ptr());
     }
@@ -344,10 +357,10 @@ fn extensions(features: &Features, caps: &Capabilities) -> Vec<*const c_char> {
     if caps.pipeline_libraries {
         names.push(ash::khr::pipeline_library::NAME.as_ptr());
     }
-    if caps.ray_query {
+    if caps.hardware_ray_query() {
         names.push(ash::khr::ray_query::NAME.as_ptr());
     }
-    if caps.position_fetch {
+    if features.position_fetch == vk::TRUE {
         names.push(ash::khr::ray_tracing_position_fetch::NAME.as_ptr());
     }
     if caps.mesh_shader {

@@ -8,6 +8,7 @@ pub(crate) mod instance;
 pub(crate) mod memory;
 pub(crate) mod mesh_limits;
 pub(crate) mod profile;
+pub(crate) mod ray_query_path;
 pub(crate) mod select;
 
 pub(crate) use device::Gpu;

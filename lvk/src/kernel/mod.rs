@@ -11,16 +11,102 @@ use crate::pipeline::compute::ComputePipelineDesc;
 use crate::pipeline::{ComputePipeline, PipelineBase, PipelineLayout, ShaderModule};
 use crate::shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
 
-/// Invocations of a workgroup of every kernel.
+/// Invocations of a workgroup of the kernels that prepare inputs.
 pub(crate) const GROUP_SIZE: u32 = 64;
 
-/// Which of the library's compute shaders.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Kernel {
+/// Every kernel: its name, the stem of its SPIR-V, and the pieces of its GLSL, which are read one behind the other.
+macro_rules! kernels {
+    ($($(#[$doc:meta])* $name:ident = $file:literal, [$($piece:literal),*];)*) => {
+        /// Which of the library's compute shaders.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+        pub(crate) enum Kernel {
+            $($(#[$doc])* $name,)*
+        }
+
+        impl Kernel {
+            pub(crate) const ALL: &'static [Self] = &[$(Self::$name),*];
+
+            pub(crate) fn name(self) -> &'static str {
+                match self {
+                    $(Self::$name => concat!("lvk kernel ", $file),)*
+                }
+            }
+
+            fn bytes(self) -> &'static [u8] {
+                match self {
+                    $(Self::$name => include_bytes!(concat!($file, ".comp.spv")),)*
+                }
+            }
+
+            /// Where the words lie, and the pieces they come from.
+            #[cfg(all(test, feature = "glsl"))]
+            fn source(self) -> (&'static str, &'static [&'static str]) {
+                match self {
+                    $(Self::$name => ($file, &[$($piece),*]),)*
+                }
+            }
+        }
+    };
+}
+
+kernels! {
     /// Gathers the indices or boxes of a part of a mesh.
-    Gather,
+    Gather = "gather", ["gather.comp.glsl"];
     /// Puts addresses into instances and writes their rows.
-    Instances,
+    Instances = "instances", ["instances.comp.glsl"];
+    /// Forgets what an earlier build left in the scratch memory.
+    BuildReset = "build/reset", ["build/job.glsl", "build/reset.comp.glsl"];
+    /// Boxes of triangles and boxes.
+    BuildPrimitives = "build/primitives",
+        ["build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/input.glsl", "build/primitives.comp.glsl"];
+    /// Boxes of instances, and the instances as the structure keeps them.
+    BuildInstances = "build/instances",
+        ["build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/instance.glsl", "build/instances.comp.glsl"];
+    /// Codes of places.
+    BuildCodes = "build/codes", ["build/job.glsl", "build/box.glsl", "build/code.glsl", "build/codes.comp.glsl"];
+    /// Counts digits of codes.
+    SortCount = "build/sort_count", ["build/job.glsl", "build/rank.glsl", "build/sort_count.comp.glsl"];
+    /// Sums the counts.
+    SortScan = "build/sort_scan", ["build/job.glsl", "build/rank.glsl", "build/sort_scan.comp.glsl"];
+    /// Moves codes to where they belong.
+    SortScatter = "build/sort_scatter", ["build/job.glsl", "build/rank.glsl", "build/sort_scatter.comp.glsl"];
+    /// The hierarchy and the leaves of triangles and boxes.
+    BuildTree = "build/tree",
+        ["build/job.glsl", "build/box.glsl", "build/input.glsl", "build/leaf.glsl", "build/leaf_write.glsl",
+         "build/arrivals.glsl", "build/tree.glsl", "build/contents.glsl", "build/tree.comp.glsl"];
+    /// The hierarchy of instances.
+    BuildTlasTree = "build/tlas_tree",
+        ["build/job.glsl", "build/arrivals.glsl", "build/tree.glsl", "build/tlas_tree.comp.glsl"];
+    /// No child has arrived at any node.
+    ResetArrivals = "build/arrivals", ["build/job.glsl", "build/arrivals.glsl", "build/arrivals.comp.glsl"];
+    /// Boxes of binary nodes, and better places for them.
+    BuildImprove = "build/improve",
+        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
+         "build/arrivals.glsl", "build/node.glsl", "build/rotate.glsl", "build/fit.glsl", "build/improve.comp.glsl"];
+    /// Boxes of binary nodes.
+    FitBinary = "build/fit",
+        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
+         "build/arrivals.glsl", "build/node.glsl", "build/no_rotation.glsl", "build/fit.glsl", "build/fit.comp.glsl"];
+    /// Boxes of wide nodes.
+    FitWide = "build/fit_wide",
+        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
+         "build/fit_wide.glsl", "build/fit_wide.comp.glsl"];
+    /// Primitives of leaves from inputs that moved.
+    RefitLeaves = "build/refit",
+        ["build/job.glsl", "build/box.glsl", "build/input.glsl", "build/leaf.glsl", "build/leaf_write.glsl",
+         "build/arrivals.glsl", "build/refit.glsl", "build/refit.comp.glsl"];
+    /// A whole bottom-level structure by one workgroup.
+    BuildSmallBlas = "build/small_blas",
+        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/input.glsl",
+         "build/code.glsl", "build/rank.glsl", "build/leaf.glsl", "build/kept_any.glsl", "build/leaf_write.glsl",
+         "build/arrivals.glsl", "build/tree.glsl", "build/contents.glsl", "build/node.glsl", "build/rotate.glsl",
+         "build/fit.glsl", "build/small_blas.comp.glsl", "build/small.glsl"];
+    /// A whole top-level structure by one workgroup.
+    BuildSmallTlas = "build/small_tlas",
+        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/instance.glsl",
+         "build/code.glsl", "build/rank.glsl", "build/leaf.glsl", "build/kept_instance.glsl", "build/arrivals.glsl",
+         "build/tree.glsl", "build/node.glsl", "build/rotate.glsl", "build/fit.glsl",
+         "build/small_tlas.comp.glsl", "build/small.glsl"];
 }
 
 /// Push constants of [`Kernel::Gather`].
@@ -59,7 +145,7 @@ pub(crate) struct InstancesPush {
 /// The pipelines, each made when first needed.
 #[derive(Default)]
 pub(crate) struct Kernels {
-    made: Mutex<[Option<Arc<ComputePipeline>>; 2]>,
+    made: Mutex<[Option<Arc<ComputePipeline>>; Kernel::ALL.len()]>,
 }
 
 impl Kernels {
@@ -81,19 +167,9 @@ impl Kernels {
 }
 
 impl Kernel {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Gather => "lvk gather kernel",
-            Self::Instances => "lvk instances kernel",
-        }
-    }
-
     fn spirv(self) -> Vec<u32> {
-        let bytes: &[u8] = match self {
-            Self::Gather => include_bytes!("gather.comp.spv"),
-            Self::Instances => include_bytes!("instances.comp.spv"),
-        };
-        bytes.chunks_exact(4).map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect()
+        let words = self.bytes().chunks_exact(4);
+        words.map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]])).collect()
     }
 
     fn pipeline(
@@ -115,11 +191,16 @@ impl Kernel {
     }
 }
 
-/// Workgroups along x and y for so many invocations, within what every device takes along an axis. The shader finds
-/// its invocation by both.
+/// Workgroups along x and y for so many invocations; see [`spread`].
 pub(crate) fn groups(invocations: u32) -> [u32; 3] {
+    spread(invocations.div_ceil(GROUP_SIZE))
+}
+
+/// At least so many workgroups, and one, along x and y, within what every device takes along an axis. The shader finds
+/// its number by both.
+pub(crate) fn spread(groups: u32) -> [u32; 3] {
     const MOST: u32 = 65_535;
-    let groups = invocations.div_ceil(GROUP_SIZE).max(1);
+    let groups = groups.max(1);
     let y = groups.div_ceil(MOST);
     [groups.div_ceil(y), y, 1]
 }
@@ -141,22 +222,24 @@ mod tests {
     #[cfg(feature = "glsl")]
     #[test]
     fn the_words_are_those_of_the_source() {
-        for (kernel, name, text) in [
-            (Kernel::Gather, "gather", include_str!("gather.comp.glsl")),
-            (Kernel::Instances, "instances", include_str!("instances.comp.glsl")),
-        ] {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/kernel");
+        for kernel in Kernel::ALL {
+            let (file, pieces) = kernel.source();
+            let text: String =
+                pieces.iter().map(|piece| std::fs::read_to_string(folder.join(piece)).unwrap()).collect();
             let desc = ShaderModuleDesc {
                 stage: ShaderStage::Compute,
-                source: ShaderSource::Glsl(text),
-                debug_name: name,
+                source: ShaderSource::Glsl(&text),
+                debug_name: file,
                 ..Default::default()
             };
-            let words = crate::shader::compile(&desc, &Default::default()).unwrap();
+            let words = crate::shader::compile(&desc, &Default::default())
+                .unwrap_or_else(|error| panic!("{file}: {error}"));
             if std::env::var("LVK_UPDATE_KERNELS").is_ok() {
-                let path = format!("{}/src/kernel/{name}.comp.spv", env!("CARGO_MANIFEST_DIR"));
+                let path = folder.join(format!("{file}.comp.spv"));
                 std::fs::write(path, bytemuck::cast_slice::<u32, u8>(&words)).unwrap();
             } else {
-                assert!(words == kernel.spirv(), "{name}: set LVK_UPDATE_KERNELS=1 once");
+                assert!(words == kernel.spirv(), "{file}: set LVK_UPDATE_KERNELS=1 once");
             }
         }
     }

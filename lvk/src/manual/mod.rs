@@ -3,6 +3,9 @@
 #[doc = include_str!("acceleration_structures.md")]
 pub mod acceleration_structures {}
 
+#[doc = include_str!("software_ray_queries.md")]
+pub mod software_ray_queries {}
+
 #[doc = include_str!("splitting_and_profiles.md")]
 pub mod splitting_and_profiles {}
 

@@ -1,7 +1,7 @@
 //! Shader modules and pipelines.
 
 pub(crate) mod cache;
-mod cache_file;
+pub(crate) mod cache_file;
 pub(crate) mod compute;
 mod deferred;
 pub(crate) mod graphics;

@@ -63,6 +63,14 @@ fn check_features(gpu: &Gpu, name: &str, reflection: &Reflection) -> Result<()> 
     if reflection.ray_query && !gpu.caps.ray_query {
         return Err(gpu.lacks(&format!("shader '{name}' uses ray queries: they")));
     }
+    if reflection.ray_query && reflection.hardware_ray_query != gpu.caps.hardware_ray_query() {
+        let made_for = if reflection.hardware_ray_query { "the device" } else { "the library itself" };
+        let message = format!(
+            "its ray queries were compiled for {made_for} to walk; this context takes {:?}",
+            gpu.caps.ray_query_path
+        );
+        return Err(Error::usage(name, message));
+    }
     if reflection.ray_tracing && !gpu.caps.ray_tracing_pipeline {
         return Err(gpu.lacks(&format!("shader '{name}' is of a ray tracing stage: ray tracing pipelines")));
     }

@@ -75,14 +75,18 @@ pub(crate) struct Buffer {
 #[derive(Clone, Copy, Default)]
 pub(crate) struct InternalUsage {
     pub(crate) raw: vk::BufferUsageFlags,
+    /// Of the address, in bytes.
+    pub(crate) alignment: u64,
 }
 
 impl InternalUsage {
-    pub(crate) const NONE: Self = Self { raw: vk::BufferUsageFlags::empty() };
+    pub(crate) const NONE: Self = Self { raw: vk::BufferUsageFlags::empty(), alignment: 1 };
+    /// Structures that software traces, whose nodes should not lie across cache lines.
+    pub(crate) const SOFTWARE_STRUCTURES: Self = Self { alignment: 256, ..Self::NONE };
     pub(crate) const ACCEL_STORAGE: Self =
-        Self { raw: vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR };
+        Self { raw: vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR, alignment: 256 };
     pub(crate) const SHADER_BINDING_TABLE: Self =
-        Self { raw: vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR };
+        Self { raw: vk::BufferUsageFlags::SHADER_BINDING_TABLE_KHR, alignment: 1 };
 }
 
 impl Buffer {
@@ -110,16 +114,16 @@ impl Buffer {
             copying: Mutex::new(()),
             gpu: Arc::clone(gpu),
         };
-        buffer.bind_memory()?;
+        buffer.bind_memory(internal.alignment)?;
         gpu.name(raw, name);
         Ok(buffer)
     }
 
-    fn bind_memory(&mut self) -> Result<()> {
+    fn bind_memory(&mut self, alignment: u64) -> Result<()> {
         let device = &self.gpu.device;
         // SAFETY: the buffer was created by this device.
         let mut requirements = unsafe { device.get_buffer_memory_requirements(self.raw) };
-        requirements.alignment = requirements.alignment.max(Self::ALIGNMENT);
+        requirements.alignment = requirements.alignment.max(Self::ALIGNMENT).max(alignment);
         let allocation = self.gpu.allocate(&self.name, requirements, self.memory, true)?;
         // SAFETY: the allocation was made for this buffer's requirements and is bound once.
         let bound = unsafe { device.bind_buffer_memory(self.raw, allocation.memory(), allocation.offset()) };
@@ -217,15 +221,20 @@ fn check_size(gpu: &Gpu, desc: &BufferDesc<'_>) -> Result<u64> {
 }
 
 fn raw_usage(gpu: &Gpu, usage: BufferUsage, name: &str) -> Result<vk::BufferUsageFlags> {
-    if usage.contains(BufferUsage::ACCEL_INPUT) && gpu.accel.is_none() {
+    if usage.contains(BufferUsage::ACCEL_INPUT) && !gpu.has_structures() {
         return Err(gpu.lacks(&format!("buffer '{name}' with ACCEL_INPUT: acceleration structures")));
     }
+    // The library's own builders read inputs as any shader does.
+    let accel_input = match gpu.accel {
+        Some(_) => vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR,
+        None => vk::BufferUsageFlags::STORAGE_BUFFER,
+    };
     let pairs = [
         (BufferUsage::STORAGE, vk::BufferUsageFlags::STORAGE_BUFFER),
         (BufferUsage::INDEX, vk::BufferUsageFlags::INDEX_BUFFER),
         (BufferUsage::VERTEX, vk::BufferUsageFlags::VERTEX_BUFFER),
         (BufferUsage::INDIRECT, vk::BufferUsageFlags::INDIRECT_BUFFER),
-        (BufferUsage::ACCEL_INPUT, vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR),
+        (BufferUsage::ACCEL_INPUT, accel_input),
     ];
     let always = vk::BufferUsageFlags::TRANSFER_SRC
         | vk::BufferUsageFlags::TRANSFER_DST

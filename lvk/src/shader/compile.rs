@@ -2,9 +2,11 @@
 
 #[cfg(feature = "glsl")]
 use super::front_end::glsl;
+use super::idle_culling::without_idle_culling;
 use super::{ShaderModuleDesc, ShaderSource, spirv};
 use crate::error::{Error, Result};
 use crate::gpu::caps::Capabilities;
+use crate::gpu::ray_query_path::RayQueryPath;
 
 /// What the preamble must know of the device.
 #[derive(Debug, Clone, Copy, Default)]
@@ -15,18 +17,28 @@ pub(crate) struct CompileOptions {
     /// The device fetches the corners of triangles that were hit (`VK_KHR_ray_tracing_position_fetch`).
     #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) position_fetch: bool,
+    /// The library walks ray queries itself.
+    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
+    pub(crate) software_ray_query: bool,
 }
 
 impl CompileOptions {
     /// For a device with these capabilities.
     pub(crate) fn of(device: &Capabilities) -> Self {
-        Self { formatless_read: device.formatless_storage_read, position_fetch: device.position_fetch }
+        Self {
+            formatless_read: device.formatless_storage_read,
+            position_fetch: device.position_fetch,
+            software_ray_query: device.ray_query_path == RayQueryPath::Software,
+        }
     }
 }
 
 /// The module's SPIR-V: version 1.6 for GLSL, the caller's own words, checked for their structure, otherwise.
 pub(crate) fn compile(desc: &ShaderModuleDesc<'_>, options: &CompileOptions) -> Result<Vec<u32>> {
     match desc.source {
+        ShaderSource::Glsl(text) if options.software_ray_query => {
+            glsl(desc, text, options).map(|words| without_idle_culling(&words))
+        }
         ShaderSource::Glsl(text) => glsl(desc, text, options),
         ShaderSource::Spirv(words) => {
             spirv::check(words).map_err(|log| failed(desc.debug_name, log))?;

@@ -8,6 +8,7 @@ mod diagnostics;
 #[cfg(feature = "glsl")]
 mod front_end;
 mod hit_numbers;
+mod idle_culling;
 #[cfg(feature = "glsl")]
 mod include;
 mod module;

@@ -9,11 +9,19 @@ use crate::bindless::layout;
 const BINDLESS: &str = include_str!("glsl/bindless.glsl");
 
 /// The files behind `#include <lvk/..>`.
-pub(super) const LIBRARY: [(&str, &str); 4] = [
+pub(super) const LIBRARY: [(&str, &str); 12] = [
+    ("lvk/hardware_ray_query.glsl", include_str!("glsl/hardware_ray_query.glsl")),
     ("lvk/hit_numbers.glsl", include_str!("glsl/hit_numbers.glsl")),
+    ("lvk/ray_flags.glsl", include_str!("glsl/ray_flags.glsl")),
     ("lvk/ray_query.glsl", include_str!("glsl/ray_query.glsl")),
     ("lvk/ray_tracing.glsl", include_str!("glsl/ray_tracing.glsl")),
+    ("lvk/software_boxes.glsl", include_str!("glsl/software_boxes.glsl")),
+    ("lvk/software_layout.glsl", include_str!("glsl/software_layout.glsl")),
+    ("lvk/software_ray_query.glsl", include_str!("glsl/software_ray_query.glsl")),
+    ("lvk/software_triangle.glsl", include_str!("glsl/software_triangle.glsl")),
+    ("lvk/software_walk.glsl", include_str!("glsl/software_walk.glsl")),
     ("lvk/tlas.glsl", include_str!("glsl/tlas.glsl")),
+    ("lvk/tlas_table.glsl", include_str!("glsl/tlas_table.glsl")),
 ];
 
 /// On in every stage; an extension asks nothing of the device until its types or functions are used.
@@ -65,6 +73,9 @@ pub(super) fn preamble(stage: ShaderStage, options: &CompileOptions, defines: &[
         if stage.is_ray_tracing() {
             require(&mut text, "GL_EXT_ray_tracing_position_fetch");
         }
+    }
+    if options.software_ray_query {
+        define(&mut text, "LVK_SOFTWARE_RAY_QUERY", "1");
     }
     text.push_str(BINDLESS);
     if stage.is_ray_tracing() {

@@ -14,8 +14,10 @@ use crate::error::{Error, Result};
 pub(crate) struct Reflection {
     /// Bytes that must be pushed: the end of the block's last member, rounded up to 4; 0 without a block.
     pub(crate) push_constant_bytes: u32,
-    /// The module uses ray queries.
+    /// The module uses ray queries, the device's or the library's own.
     pub(crate) ray_query: bool,
+    /// The module uses those of the device.
+    pub(crate) hardware_ray_query: bool,
     /// The module is for a ray tracing pipeline.
     pub(crate) ray_tracing: bool,
     /// Payloads and hit attributes.
@@ -63,10 +65,15 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
     }
     bindings.sort_unstable();
     bindings.dedup();
+    let hardware_ray_query = module.has(Capability::RayQueryKHR);
+    let ray_tracing = stage.is_ray_tracing() || module.has(Capability::RayTracingKHR);
+    // Only what traces rays itself has any business with the table.
+    let software_ray_query = !hardware_ray_query && !ray_tracing && bindings.contains(&layout::TLAS_TABLE);
     Ok(Reflection {
         push_constant_bytes,
-        ray_query: module.has(Capability::RayQueryKHR),
-        ray_tracing: stage.is_ray_tracing() || module.has(Capability::RayTracingKHR),
+        ray_query: hardware_ray_query || software_ray_query,
+        hardware_ray_query,
+        ray_tracing,
         ray_interface: RayInterface::of(&module),
         local_size,
         local_size_ids,

@@ -2,7 +2,7 @@
 
 use ::spirv::{MAGIC_NUMBER, Op};
 
-const HEADER_WORDS: usize = 5;
+pub(super) const HEADER_WORDS: usize = 5;
 /// SPIR-V 1.6, what Vulkan 1.3 takes.
 const MAX_VERSION: u32 = 0x0001_0600;
 pub(super) const VERSION_1_4: u32 = 0x0001_0400;

@@ -194,7 +194,7 @@ fn formatless_reads_follow_the_device() {
         "",
         "imageStore(kImages2D[1], ivec2(0), imageLoad(kImages2D[0], ivec2(0)));",
     );
-    let read = CompileOptions { formatless_read: true, position_fetch: false };
+    let read = CompileOptions { formatless_read: true, ..Default::default() };
     let words = compile(&desc(ShaderStage::Compute, &text), &read).unwrap();
     assert!(capabilities(&words).contains(&(Capability::StorageImageReadWithoutFormat as u32)));
     assert!(error(ShaderStage::Compute, &text).contains("writeonly"));
@@ -269,7 +269,9 @@ fn a_missing_include_names_the_places_and_the_chain() {
     assert!(found.contains("included by a.glsl"), "{found}");
     let found = error(ShaderStage::Compute, "\n#include <lvk/nothing.glsl>\nvoid main() {}");
     assert!(
-        found.starts_with("line 2: the library has no <lvk/nothing.glsl>; it has <lvk/hit_numbers.glsl>"),
+        found.starts_with(
+            "line 2: the library has no <lvk/nothing.glsl>; it has <lvk/hardware_ray_query.glsl>"
+        ),
         "{found}"
     );
     let found = error(ShaderStage::Compute, "#include \"x\"\nvoid main() {}");

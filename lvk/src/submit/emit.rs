@@ -24,7 +24,7 @@ pub(crate) fn emit(gpu: &Gpu, commands: vk::CommandBuffer, barriers: &Barriers, 
 }
 
 fn memory_barriers(gpu: &Gpu, barrier: Option<MemoryBarrier>) -> Vec<vk::MemoryBarrier2<'static>> {
-    if gpu.caps.ray_query {
+    if gpu.caps.hardware_ray_query() {
         return barrier.iter().map(|barrier| memory_barrier(gpu, barrier)).collect();
     }
     let parts = barrier.into_iter().flat_map(MemoryBarrier::without_ray_queries);

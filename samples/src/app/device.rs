@@ -1,6 +1,9 @@
 //! Opens the device the user names, and lists what there is.
 
-use lvk::{Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, ValidationSink};
+use lvk::{
+    Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryPath, RayQueryRequest,
+    ValidationSink,
+};
 
 use super::run_args::{RayTracing, RunArgs, Validation};
 use super::run_error::RunError;
@@ -23,7 +26,8 @@ pub(super) fn open(
     sink: &ValidationSink,
     needs: &DeviceNeeds,
 ) -> lvk::Result<Context> {
-    use FeatureRequest::{Optional, Required};
+    use FeatureRequest::{Off, Optional, Required};
+    use RayQueryRequest::{Hardware, HardwareIfPresent, Software};
     let with = |ray_tracing_pipeline, ray_query| {
         Context::new(&ContextDesc {
             application_name: name,
@@ -39,15 +43,16 @@ pub(super) fn open(
         })
     };
     match args.rt {
-        RayTracing::Pipeline => with(Required, Optional),
-        RayTracing::Query => with(Optional, Required),
+        RayTracing::Pipeline => with(Required, HardwareIfPresent),
+        RayTracing::Query => with(Optional, Hardware),
+        RayTracing::Software => with(Off, Software),
         RayTracing::Auto => {
-            let best = with(Optional, Optional)?;
+            let best = with(Optional, HardwareIfPresent)?;
             let capabilities = best.capabilities();
             if capabilities.ray_tracing_pipeline || capabilities.ray_query {
                 return Ok(best);
             }
-            Ok(with(Required, Optional).or_else(|_| with(Optional, Required)).unwrap_or(best))
+            Ok(with(Required, HardwareIfPresent).or_else(|_| with(Optional, Hardware)).unwrap_or(best))
         }
     }
 }
@@ -70,6 +75,17 @@ pub fn driver_text(capabilities: &Capabilities) -> String {
     let (major, minor, patch) = capabilities.api_version;
     let driver = format!("{} {}", capabilities.driver_name, capabilities.driver_info);
     format!("{}, Vulkan {major}.{minor}.{patch}", driver.trim_end())
+}
+
+/// What ray queries in `stages` are, and why where software walks.
+#[must_use]
+pub fn query_text(capabilities: &Capabilities, stages: &str) -> String {
+    match capabilities.ray_query_path {
+        RayQueryPath::Software => {
+            format!("ray queries in {stages}, in software ({})", capabilities.ray_query_reason)
+        }
+        RayQueryPath::Hardware | RayQueryPath::None => format!("ray queries in {stages}"),
+    }
 }
 
 /// Fails when the validation layer was not silent.

@@ -111,6 +111,8 @@ pub enum RayTracing {
     Pipeline,
     /// Ray queries in a compute shader.
     Query,
+    /// Ray queries that the library walks in the shader itself, on any device.
+    Software,
 }
 
 /// What Vulkan validation checks.

@@ -2,10 +2,11 @@
 
 use std::path::PathBuf;
 
-use lvk::{Context, ContextDesc, DeviceProfile, Validation, ValidationSink};
+use lvk::{Context, ContextDesc, DeviceProfile, RayQueryRequest, Validation, ValidationSink};
 
-use super::args::{BenchArgs, TraceArgs};
+use super::args::{BenchArgs, Benchmark, TraceArgs};
 use super::error::BenchError;
+use crate::app::run_args::RayTracing;
 use crate::driver::{DriverRequest, prepare};
 use crate::hybrid::RayPath;
 
@@ -14,6 +15,8 @@ pub(super) struct Setup {
     loader: Option<PathBuf>,
     device: Option<String>,
     profile: DeviceProfile,
+    /// Who walks the trees of ray queries: the driver, unless software is to be measured.
+    ray_query: RayQueryRequest,
     runs: Option<u32>,
     quick: bool,
     /// Where messages go, if the validation layer is to run.
@@ -35,6 +38,7 @@ impl Setup {
             loader: driver.loader,
             device: args.device.clone(),
             profile: args.profile.clone().unwrap_or_default(),
+            ray_query: ray_query(args.benchmark.as_ref()),
             runs: args.runs,
             quick: args.quick,
             sink: args.validate.then(ValidationSink::default),
@@ -74,6 +78,7 @@ impl Setup {
             vulkan_library: self.loader.as_deref(),
             device: self.device.as_deref(),
             scratch_budget_bytes,
+            ray_query: self.ray_query,
             validation: if self.sink.is_some() { Validation::Standard } else { Validation::Off },
             validation_sink: self.sink.clone(),
             max_textures: textures.max(ContextDesc::default().max_textures),
@@ -121,6 +126,13 @@ impl Setup {
         let profile = caps.profile.as_ref().map_or_else(String::new, |name| format!(", as {name}"));
         let driver = driver.trim_end();
         format!("## {what}{quick}\n\n{}{profile}; {driver}, Vulkan {major}.{minor}.{patch}", caps.device_name)
+    }
+}
+
+fn ray_query(benchmark: Option<&Benchmark>) -> RayQueryRequest {
+    match benchmark {
+        Some(Benchmark::Paper(paper)) if paper.rt == RayTracing::Software => RayQueryRequest::Software,
+        _ => RayQueryRequest::HardwareIfPresent,
     }
 }
 

@@ -11,7 +11,7 @@ use super::{
     Bounces, Geometry, HybridConfig, HybridError, HybridRenderer, Method, Raster, RasterTuning, RayPath,
 };
 use crate::app::args::{self, HybridArgs};
-use crate::app::device::{DeviceNeeds, driver_text};
+use crate::app::device::{DeviceNeeds, driver_text, query_text};
 use crate::app::frames::Frames;
 use crate::app::run::{self, Opened, Opening};
 use crate::app::run_args::RayTracing;
@@ -77,7 +77,7 @@ fn wished_path(wish: RayTracing) -> Option<RayPath> {
     match wish {
         RayTracing::Auto => None,
         RayTracing::Pipeline => Some(RayPath::Pipeline),
-        RayTracing::Query => Some(RayPath::Query),
+        RayTracing::Query | RayTracing::Software => Some(RayPath::Query),
     }
 }
 
@@ -120,7 +120,7 @@ fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &Hybr
     };
     let path = match config.path {
         RayPath::Pipeline => "ray tracing pipeline",
-        RayPath::Query => "ray queries in a compute shader",
+        RayPath::Query => &query_text(capabilities, "a compute shader"),
     };
     let mut text = format!("device    {} ({})\n", capabilities.device_name, driver_text(capabilities));
     if let Some(profile) = &capabilities.profile {

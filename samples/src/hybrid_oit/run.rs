@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use lvk::Context;
 
 use super::{HybridOit, HybridOitArgs, HybridOitConfig, HybridOitError, NodeUse, OitScene, PERIOD_SECONDS};
-use crate::app::device::{DeviceNeeds, driver_text};
+use crate::app::device::{DeviceNeeds, driver_text, query_text};
 use crate::app::run::{self, Opened, Opening};
 use crate::app::run_args::RayTracing;
 use crate::app::run_error::RunError;
@@ -79,7 +79,7 @@ fn open(args: &HybridOitArgs, opening: &mut Opening<'_>) -> Result<Opened<Animat
     let wish = match args.run.rt {
         RayTracing::Auto => None,
         RayTracing::Pipeline => Some(RayPath::Pipeline),
-        RayTracing::Query => Some(RayPath::Query),
+        RayTracing::Query | RayTracing::Software => Some(RayPath::Query),
     };
     let path = RayPath::choose(wish, context.capabilities())?;
     let scene = OitScene::default();
@@ -104,7 +104,7 @@ fn headline(ctx: &Context, scene: &OitScene, config: &HybridOitConfig) -> String
     }
     let path = match config.path {
         RayPath::Pipeline => "a ray tracing pipeline",
-        RayPath::Query => "ray queries in a compute shader",
+        RayPath::Query => &query_text(capabilities, "a compute shader"),
     };
     let _ = writeln!(text, "method    raster with a list of glass for each sample; shadows by {path}");
     let (samples, rays) = (config.supersampling * config.supersampling, config.shadow_rays);

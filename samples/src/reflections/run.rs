@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use lvk::Context;
 
 use super::{CullingCost, Reflections, ReflectionsArgs, ReflectionsConfig, ReflectionsError};
-use crate::app::device::{DeviceNeeds, driver_text};
+use crate::app::device::{DeviceNeeds, driver_text, query_text};
 use crate::app::run::{self, Opened, Opening};
 use crate::app::run_args::RayTracing;
 use crate::app::run_error::RunError;
@@ -70,7 +70,7 @@ fn open(args: &ReflectionsArgs, opening: &mut Opening<'_>) -> Result<Opened<Refl
     let wish = match args.run.rt {
         RayTracing::Auto => None,
         RayTracing::Pipeline => Some(RayPath::Pipeline),
-        RayTracing::Query => Some(RayPath::Query),
+        RayTracing::Query | RayTracing::Software => Some(RayPath::Query),
     };
     let path = RayPath::choose(wish, context.capabilities())?;
     let config = ReflectionsConfig {
@@ -99,7 +99,7 @@ fn headline(ctx: &Context, sample: &Reflections) -> String {
     }
     let path = match sample.config().path {
         RayPath::Pipeline => "ray tracing pipeline",
-        RayPath::Query => "ray queries in compute shaders",
+        RayPath::Query => &query_text(capabilities, "compute shaders"),
     };
     let _ = writeln!(
         text,

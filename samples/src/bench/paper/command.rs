@@ -105,7 +105,7 @@ fn begin(setup: &Setup, args: &PaperArgs, ctx: &Context) -> Result<Experiment, B
     let paths = match args.rt {
         RayTracing::Auto => paths,
         RayTracing::Pipeline => vec![only(ctx, RayPath::Pipeline)?],
-        RayTracing::Query => vec![only(ctx, RayPath::Query)?],
+        RayTracing::Query | RayTracing::Software => vec![only(ctx, RayPath::Query)?],
     };
     let [width, height] = setup.choose(ctx, Choice { quick: [256, 144], cpu: [640, 360], gpu: [1280, 720] });
     let plan = Plan {

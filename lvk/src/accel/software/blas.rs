@@ -1,0 +1,153 @@
+//! A bottom-level structure of the library's own.
+
+use std::sync::{Arc, OnceLock};
+
+use super::body::SoftwareBody;
+use super::geometry::vertex_count;
+use super::layout::Header;
+use super::layout::LeafKind;
+use super::plan::{BlasShape, BlobPlaces, GpuBuildPlan};
+use super::refit_plan::{GpuRefitPlan, NodeFormat};
+use crate::accel::bounds::Bounds;
+use crate::accel::desc::BlasDesc;
+use crate::accel::flags::{AccelStructSizes, BuildFlags};
+use crate::accel::geometry::BlasGeometry;
+use crate::error::Result;
+
+/// What stands behind the handle of a bottom-level structure for software to trace.
+pub(crate) struct SoftwareBlas {
+    /// What instances refer to as long as the handle lives.
+    pub(crate) body: Arc<SoftwareBody>,
+    pub(crate) origin: Origin,
+    /// Where a structure that the CPU built is built again on the GPU; its body says then that it has moved there. Made
+    /// when first needed.
+    rebuilt: OnceLock<Rebuilt>,
+}
+
+/// Who built it first.
+pub(crate) enum Origin {
+    /// The CPU, from inputs that were read back: the better trees.
+    Cpu {
+        /// How it is refitted, where it may be.
+        refit: Option<GpuRefitPlan>,
+        /// Around everything in it, as long as it is neither refitted nor rebuilt.
+        bounds: Bounds,
+    },
+    /// The GPU, as every build of it.
+    Gpu(GpuBuildPlan),
+}
+
+/// Memory for builds on the GPU.
+pub(crate) struct Rebuilt {
+    pub(crate) body: Arc<SoftwareBody>,
+    pub(crate) plan: GpuBuildPlan,
+}
+
+impl SoftwareBlas {
+    pub(crate) fn new(body: Arc<SoftwareBody>, origin: Origin) -> Self {
+        Self { body, origin, rebuilt: OnceLock::new() }
+    }
+
+    /// Where it has been rebuilt, if it ever was.
+    pub(crate) fn rebuilt(&self) -> Option<&Rebuilt> {
+        self.rebuilt.get()
+    }
+
+    /// Where it is rebuilt; `make` makes room the first time.
+    pub(crate) fn rebuilt_or(&self, make: impl FnOnce() -> Result<Rebuilt>) -> Result<&Rebuilt> {
+        if let Some(rebuilt) = self.rebuilt.get() {
+            return Ok(rebuilt);
+        }
+        let rebuilt = make()?;
+        Ok(self.rebuilt.get_or_init(|| rebuilt))
+    }
+
+    /// Where it lies, if the host knows: then it never was nor will be refitted, nor was a rebuild recorded.
+    pub(crate) fn known_bounds(&self) -> Option<Bounds> {
+        match self.origin {
+            Origin::Cpu { refit: None, bounds } if self.rebuilt.get().is_none() => Some(bounds),
+            _ => None,
+        }
+    }
+
+    /// Bytes of memory.
+    pub(crate) fn memory_bytes(&self) -> u64 {
+        let rebuilt = self.rebuilt.get().map_or(0, |rebuilt| rebuilt.body.memory_bytes());
+        self.body.memory_bytes() + rebuilt
+    }
+
+    /// What it takes and its builds take.
+    pub(crate) fn sizes(&self) -> AccelStructSizes {
+        let (build_scratch_bytes, update_scratch_bytes) = match &self.origin {
+            Origin::Cpu { refit, .. } => (0, refit.as_ref().map_or(0, GpuRefitPlan::scratch_bytes)),
+            Origin::Gpu(plan) if plan.places.parents == 0 => (plan.scratch_bytes, 0),
+            Origin::Gpu(plan) => (plan.scratch_bytes, GpuRefitPlan::of_build(plan).scratch_bytes()),
+        };
+        AccelStructSizes {
+            structure_bytes: self.body.memory_bytes(),
+            build_scratch_bytes,
+            update_scratch_bytes,
+        }
+    }
+}
+
+/// Whether the GPU makes the first build too: where builds are to be fast, and where refits are to find the vertices of
+/// indexed leaves as it lays them out.
+pub(crate) fn builds_on_gpu(flags: BuildFlags) -> bool {
+    flags.contains(BuildFlags::FAST_BUILD)
+        || flags.contains(BuildFlags::LOW_MEMORY | BuildFlags::ALLOW_UPDATE)
+}
+
+/// A build on the GPU of these geometries, which have been checked.
+pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlags) -> Result<GpuBuildPlan> {
+    const IMPROVEMENTS: u32 = 2;
+    let boxes = geometries.first().is_some_and(BlasGeometry::is_boxes);
+    let sum = |of: fn(&BlasGeometry) -> u32| geometries.iter().map(of).fold(0_u32, u32::saturating_add);
+    let shape = BlasShape {
+        leaf_kind: match (boxes, flags.contains(BuildFlags::LOW_MEMORY) && numbers_fit(geometries)) {
+            (true, _) => LeafKind::Boxes,
+            (false, true) => LeafKind::IndexedTriangles,
+            (false, false) => LeafKind::Triangles,
+        },
+        primitive_count: sum(BlasGeometry::primitive_count),
+        vertex_count: sum(vertex_count),
+        geometry_count: geometries.len() as u32,
+        leaf_size: if flags.contains(BuildFlags::LOW_MEMORY) { 2 } else { 1 },
+        refit: flags.contains(BuildFlags::ALLOW_UPDATE),
+        improvements: if flags.contains(BuildFlags::FAST_TRACE) { IMPROVEMENTS } else { 0 },
+    };
+    GpuBuildPlan::blas(name, &shape)
+}
+
+/// Whether an indexed leaf has room for the numbers of geometry and primitive.
+fn numbers_fit(geometries: &[BlasGeometry]) -> bool {
+    const MOST_GEOMETRIES: usize = 1 << 8;
+    const MOST_PRIMITIVES: u32 = 1 << 24;
+    let few = |geometry: &BlasGeometry| geometry.primitive_count() < MOST_PRIMITIVES;
+    geometries.len() <= 1 || (geometries.len() <= MOST_GEOMETRIES && geometries.iter().all(few))
+}
+
+/// How a structure with this header, which the CPU built for refits or not, is refitted.
+pub(crate) fn refit_plan(header: &Header, desc: &BlasDesc<'_>) -> Option<GpuRefitPlan> {
+    if !desc.flags.contains(BuildFlags::ALLOW_UPDATE) {
+        return None;
+    }
+    let kinds = [LeafKind::Boxes, LeafKind::IndexedTriangles];
+    let kind = kinds.into_iter().find(|kind| *kind as u32 == header.leaf_kind);
+    let leaf_kind = kind.unwrap_or(LeafKind::Triangles);
+    let vertices = desc.geometries.iter().map(vertex_count).fold(0_u32, u32::saturating_add);
+    Some(GpuRefitPlan {
+        format: if header.format == NodeFormat::Wide as u32 { NodeFormat::Wide } else { NodeFormat::Binary },
+        leaf_kind,
+        places: BlobPlaces {
+            nodes: header.nodes,
+            primitives: header.primitives,
+            vertices: header.vertices,
+            geometries: header.geometries,
+            parents: header.parents,
+        },
+        node_count: header.node_count,
+        primitive_count: header.primitive_count,
+        vertex_count: if leaf_kind == LeafKind::IndexedTriangles { vertices } else { 0 },
+    })
+}

@@ -1,0 +1,45 @@
+//! What the kernels of a build are told.
+
+use bytemuck::{Pod, Zeroable};
+
+/// `Job` of `kernel/build/job.glsl`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub(crate) struct Job {
+    pub(crate) inputs: u64,
+    pub(crate) table: u64,
+    pub(crate) blob: u64,
+    pub(crate) scratch: u64,
+    pub(crate) parents: u64,
+    pub(crate) count: u32,
+    pub(crate) input_count: u32,
+    pub(crate) leaf_kind: u32,
+    pub(crate) leaf_size: u32,
+    pub(crate) low_bits: u32,
+    pub(crate) nodes: u32,
+    pub(crate) primitives: u32,
+    pub(crate) vertices: u32,
+    pub(crate) geometries: u32,
+    pub(crate) saved_parents: u32,
+    pub(crate) vertex_count: u32,
+    pub(crate) boxes: u32,
+    pub(crate) keys: u32,
+    pub(crate) spare_keys: u32,
+    pub(crate) digits: u32,
+    pub(crate) arrivals: u32,
+    pub(crate) node_capacity: u32,
+    pub(crate) improvements: u32,
+    pub(crate) reserved: u32,
+    pub(crate) header_flags: u32,
+    /// Fills the record to a multiple of 16 bytes.
+    pub(crate) unused: [u32; 2],
+}
+
+/// Push constants of every kernel of a build.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+pub(crate) struct BuildPush {
+    pub(crate) jobs: u64,
+    pub(crate) first_job: u32,
+    pub(crate) pass_or_jobs: u32,
+}

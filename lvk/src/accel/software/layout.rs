@@ -1,0 +1,199 @@
+//! How a structure lies in memory; the same numbers as in `shader/glsl/software_layout.glsl`.
+//!
+//! A structure is one range of a buffer. Its header says by numbers of 16-byte blocks from its own start where its parts
+//! lie, so that it may be copied as it is.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+/// Bytes of a block.
+pub(crate) const BLOCK_BYTES: usize = 16;
+/// Reference to no node, or to no root: the structure is empty.
+pub(crate) const NONE: u32 = u32::MAX;
+/// Marks a reference to a leaf.
+pub(crate) const LEAF: u32 = 1 << 31;
+/// Most primitives of a leaf that a reference names.
+pub(crate) const LARGEST_LEAF: usize = 16;
+/// Most nodes on a path of a binary tree: the walk pushes a word for each.
+pub(crate) const DEEPEST_BINARY: usize = 64;
+/// Most nodes on a path of a wide tree: the walk pushes two words for each.
+pub(crate) const DEEPEST_WIDE: usize = 32;
+
+/// [`Header::format`]: nodes of eight compressed children.
+pub(crate) const WIDE: u32 = 0;
+/// [`Header::format`]: nodes of two children.
+pub(crate) const BINARY: u32 = 1;
+/// [`MovedHeader::format`].
+pub(crate) const MOVED: u32 = 2;
+
+/// What leaves hold, by the numbers of the structure's header.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub(crate) enum LeafKind {
+    /// Triangles with their corners, 48 bytes.
+    Triangles = 0,
+    /// Triangles that name vertices of a copy, 16 bytes.
+    IndexedTriangles = 1,
+    /// Boxes, 32 bytes.
+    Boxes = 2,
+    /// Instances, 128 bytes.
+    Instances = 3,
+}
+
+impl LeafKind {
+    /// Bytes of a primitive as the structure keeps it.
+    pub(crate) fn primitive_bytes(self) -> u64 {
+        match self {
+            Self::Triangles => 48,
+            Self::IndexedTriangles => 16,
+            Self::Boxes => 32,
+            Self::Instances => 128,
+        }
+    }
+}
+
+/// The first 128 bytes of a structure.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct Header {
+    pub(crate) format: u32,
+    /// A number of [`LeafKind`].
+    pub(crate) leaf_kind: u32,
+    /// A node or a leaf, or [`NONE`].
+    pub(crate) root: u32,
+    pub(crate) primitive_count: u32,
+    /// The next four count blocks.
+    pub(crate) nodes: u32,
+    pub(crate) primitives: u32,
+    pub(crate) vertices: u32,
+    pub(crate) geometries: u32,
+    pub(crate) node_count: u32,
+    pub(crate) geometry_count: u32,
+    /// In blocks; 0 for none.
+    pub(crate) parents: u32,
+    /// [`Header::ALL_OPAQUE`], [`Header::NONE_OPAQUE`].
+    pub(crate) marks: u32,
+    pub(crate) low: [f32; 3],
+    pub(crate) high: [f32; 3],
+    pub(crate) reserved: [u32; 14],
+}
+
+impl Header {
+    /// Every geometry is opaque.
+    pub(crate) const ALL_OPAQUE: u32 = 1;
+    /// No geometry is.
+    pub(crate) const NONE_OPAQUE: u32 = 2;
+}
+
+/// A triangle with its corners.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct LeafTriangle {
+    pub(crate) a: Vec3,
+    pub(crate) primitive: u32,
+    pub(crate) b: Vec3,
+    pub(crate) geometry: u32,
+    pub(crate) c: Vec3,
+    /// 1 if it is opaque.
+    pub(crate) opaque: u32,
+}
+
+/// A triangle that names vertices.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub(crate) struct LeafIndexed {
+    pub(crate) vertices: [u32; 3],
+    /// With the geometry in the highest 8 bits where there are several.
+    pub(crate) primitive: u32,
+}
+
+/// A box.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct LeafBox {
+    pub(crate) low: Vec3,
+    pub(crate) primitive: u32,
+    pub(crate) high: Vec3,
+    /// With [`LeafBox::OPAQUE`] if it is opaque.
+    pub(crate) geometry: u32,
+}
+
+impl LeafBox {
+    /// Marks the geometry number of an opaque box.
+    pub(crate) const OPAQUE: u32 = 1 << 31;
+}
+
+/// A node of two children.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct BinaryNode {
+    pub(crate) low0: Vec3,
+    pub(crate) child0: u32,
+    pub(crate) high0: Vec3,
+    pub(crate) child1: u32,
+    pub(crate) low1: Vec3,
+    pub(crate) reserved0: u32,
+    pub(crate) high1: Vec3,
+    pub(crate) reserved1: u32,
+}
+
+/// A row of the table of geometries.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub(crate) struct GeometryRow {
+    /// [`GeometryFlags`](crate::GeometryFlags).
+    pub(crate) flags: u32,
+    pub(crate) reserved: [u32; 3],
+}
+
+/// What stands at the start of a structure that has moved.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub(crate) struct MovedHeader {
+    /// [`MOVED`].
+    pub(crate) format: u32,
+    pub(crate) leaf_kind: u32,
+    /// Of the structure that is meant, which has not moved itself.
+    pub(crate) address: u64,
+}
+
+/// An instance of a bottom-level structure.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+pub(crate) struct Instance {
+    /// 3 rows of 4 columns.
+    pub(crate) world_to_object: [f32; 12],
+    /// 3 rows of 4 columns.
+    pub(crate) object_to_world: [f32; 12],
+    pub(crate) structure: u64,
+    /// 24 bits custom index, 8 bits mask.
+    pub(crate) custom_index_and_mask: u32,
+    /// 24 bits hit-group offset, 8 bits flags.
+    pub(crate) hit_group_offset_and_flags: u32,
+    /// The caller's.
+    pub(crate) number: u32,
+    pub(crate) reserved: [u32; 3],
+}
+
+/// The reference to `count` primitives of leaves, 1 to [`LARGEST_LEAF`].
+pub(crate) fn leaf(first: u32, count: usize) -> u32 {
+    LEAF | (count as u32 - 1) << 27 | first
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn everything_has_the_bytes_that_shaders_read() {
+        assert_eq!(size_of::<Header>(), 128);
+        assert_eq!(size_of::<LeafTriangle>(), 48);
+        assert_eq!(size_of::<LeafIndexed>(), 16);
+        assert_eq!(size_of::<LeafBox>(), 32);
+        assert_eq!(size_of::<BinaryNode>(), 64);
+        assert_eq!(size_of::<GeometryRow>(), 16);
+        assert_eq!(size_of::<MovedHeader>(), 16);
+        assert_eq!(size_of::<Instance>(), 128);
+        assert_eq!(leaf(5, 3), 0x9000_0005);
+    }
+}

@@ -1,0 +1,427 @@
+//! How much memory a build on the GPU takes, and where in it everything lies.
+
+use super::geometry::GpuGeometry;
+use super::job::Job;
+use super::layout::LeafKind;
+use crate::accel::geometry::GeometryFlags;
+use crate::error::{Error, Result, check_limit};
+
+/// Bytes of the header of a structure.
+pub(crate) const HEADER_BYTES: u64 = 128;
+/// Bytes of a binary node.
+pub(crate) const NODE_BYTES: u64 = 64;
+const GEOMETRY_BYTES: u64 = 16;
+const VERTEX_BYTES: u64 = 12;
+const BLOB_ALIGNMENT: u64 = 256;
+/// A leaf's first primitive has 27 bits.
+const MOST_PRIMITIVES: u64 = 1 << 27;
+/// Of a leaf, as its reference and the kernels have it.
+const MOST_LEAF_SIZE: u32 = 8;
+/// Up to so many primitives one workgroup makes the whole build.
+const MOST_SMALL: u32 = 2048;
+/// Keys that a workgroup sorts, `kBlock` of `kernel/build/job.glsl`.
+pub(crate) const SORT_BLOCK: u32 = 1024;
+const DIGITS: u32 = 16;
+/// Nodes on a path that traversal has room for.
+pub(crate) const MOST_HEIGHT: u32 = 64;
+/// Of the first word of a code.
+const CODE_BITS: u32 = 30;
+const MOST_IMPROVEMENTS: u32 = 8;
+/// Of top-level structures.
+const TLAS_IMPROVEMENTS: u32 = 1;
+const STATE_WORDS: u64 = 8;
+const BOX_WORDS: u64 = 6;
+
+/// What a bottom-level structure is to hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct BlasShape {
+    pub(crate) leaf_kind: LeafKind,
+    /// Of all geometries, inactive ones included.
+    pub(crate) primitive_count: u32,
+    /// Of all geometries; they count only where leaves are indexed.
+    pub(crate) vertex_count: u32,
+    pub(crate) geometry_count: u32,
+    /// Most primitives of a leaf, 1 to 8. More make smaller structures and faster builds, fewer make faster rays.
+    pub(crate) leaf_size: u32,
+    /// How often nodes are given better places, 0 to 8. Each makes builds a little slower and rays faster.
+    pub(crate) improvements: u32,
+    /// Whether the structure can be refitted.
+    pub(crate) refit: bool,
+}
+
+/// Where the parts of a structure lie, in units of 16 bytes from its start; 0 where there is no such part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct BlobPlaces {
+    pub(crate) nodes: u32,
+    pub(crate) primitives: u32,
+    pub(crate) vertices: u32,
+    pub(crate) geometries: u32,
+    pub(crate) parents: u32,
+}
+
+/// Where the parts of the scratch memory of a build lie, in words from its start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct ScratchPlaces {
+    pub(crate) boxes: u32,
+    pub(crate) keys: u32,
+    pub(crate) spare_keys: u32,
+    pub(crate) digits: u32,
+    pub(crate) arrivals: u32,
+    pub(crate) parents: u32,
+}
+
+/// A build on the GPU, as far as counts decide it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct GpuBuildPlan {
+    pub(crate) leaf_kind: LeafKind,
+    /// Most primitives or instances.
+    pub(crate) capacity: u32,
+    pub(crate) vertex_count: u32,
+    pub(crate) geometry_count: u32,
+    pub(crate) leaf_size: u32,
+    /// Where the parts of the structure lie.
+    pub(crate) places: BlobPlaces,
+    /// Bytes of the structure, a multiple of 256.
+    pub(crate) blob_bytes: u64,
+    /// Bytes of scratch memory of a build, at an address that is a multiple of 16.
+    pub(crate) scratch_bytes: u64,
+    pub(crate) scratch: ScratchPlaces,
+    /// Of the second word of a code; 0 where codes have but one.
+    pub(crate) low_bits: u32,
+    /// How often nodes are given better places.
+    pub(crate) improvements: u32,
+}
+
+/// What a build reads.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum BuildSource {
+    /// As many as the plan has.
+    Geometries(Vec<GpuGeometry>),
+    /// Records of 64 bytes each (`VkAccelerationStructureInstanceKHR`).
+    Instances {
+        /// Where the first lies; a multiple of 16.
+        records: u64,
+        /// How many, at most the plan's capacity.
+        count: u32,
+        /// Where records name structures by place: the addresses of the structures, and how many. Without it they
+        /// hold addresses. Address 0, and a place that does not exist, are an instance that no ray meets.
+        table: Option<(u64, u32)>,
+    },
+}
+
+impl GpuBuildPlan {
+    /// Of a bottom-level structure.
+    ///
+    /// # Errors
+    /// [`LimitExceeded`](Error::LimitExceeded) for more primitives than the format has numbers for;
+    /// [`InvalidUsage`](Error::InvalidUsage) for leaves of a size that does not exist.
+    pub(crate) fn blas(name: &str, shape: &BlasShape) -> Result<Self> {
+        if shape.leaf_kind == LeafKind::Instances || !(1..=MOST_LEAF_SIZE).contains(&shape.leaf_size) {
+            let message =
+                format!("leaves hold 1 to {MOST_LEAF_SIZE} triangles or boxes, not {}", shape.leaf_size);
+            return Err(Error::usage(name, message));
+        }
+        Self::new(name, shape)
+    }
+
+    /// Of a top-level structure with room for `capacity` instances.
+    ///
+    /// # Errors
+    /// [`LimitExceeded`](Error::LimitExceeded) for more instances than the format has numbers for.
+    pub(crate) fn tlas(name: &str, capacity: u32) -> Result<Self> {
+        let shape = BlasShape {
+            leaf_kind: LeafKind::Instances,
+            primitive_count: capacity,
+            vertex_count: 0,
+            geometry_count: 0,
+            leaf_size: 1,
+            improvements: TLAS_IMPROVEMENTS,
+            refit: false,
+        };
+        Self::new(name, &shape)
+    }
+
+    fn new(name: &str, shape: &BlasShape) -> Result<Self> {
+        let what = if shape.leaf_kind == LeafKind::Instances { "instance count" } else { "primitive count" };
+        check_limit(name, what, shape.primitive_count.into(), MOST_PRIMITIVES)?;
+        let indexed = shape.leaf_kind == LeafKind::IndexedTriangles;
+        let vertex_count = if indexed { shape.vertex_count } else { 0 };
+        let (places, blob_bytes) = blob_places(name, shape, vertex_count)?;
+        let low_bits = low_bits(shape);
+        let (scratch, scratch_bytes) = scratch_places(shape, low_bits > 0);
+        Ok(Self {
+            leaf_kind: shape.leaf_kind,
+            capacity: shape.primitive_count,
+            vertex_count,
+            geometry_count: shape.geometry_count,
+            leaf_size: shape.leaf_size,
+            places,
+            blob_bytes,
+            scratch_bytes,
+            scratch,
+            low_bits,
+            improvements: shape.improvements.min(MOST_IMPROVEMENTS),
+        })
+    }
+
+    /// Most nodes of the structure.
+    pub(crate) fn node_capacity(&self) -> u32 {
+        node_capacity(self.capacity, self.leaf_size)
+    }
+
+    /// Most nodes on a path from the root to a leaf, at most [`MOST_HEIGHT`]: every node splits at a bit of the code, or,
+    /// where codes are equal, of the leaf's number. What a path really has stands in the header.
+    #[cfg(any(test, feature = "test-hooks"))]
+    pub(crate) fn most_height(&self) -> u32 {
+        let number_bits = number_bits(self.capacity, self.leaf_size);
+        (CODE_BITS + self.low_bits + number_bits).min(self.node_capacity())
+    }
+
+    /// Whether one workgroup makes the whole build of `count` primitives or instances.
+    pub(crate) fn is_small(&self, count: u32) -> bool {
+        count.max(self.geometry_count) <= MOST_SMALL && self.vertex_count <= 3 * MOST_SMALL
+    }
+
+    /// What the kernels of one build are told. `inputs` is the address of the geometries; instances have their own.
+    pub(crate) fn job(&self, source: &BuildSource, inputs: u64, blob: u64, scratch: u64) -> Job {
+        let (inputs, table, count, input_count) = match source {
+            BuildSource::Geometries(list) => (inputs, 0, self.capacity, list.len() as u32),
+            BuildSource::Instances { records, count, table } => {
+                let (table, entries) = table.unwrap_or((0, 0));
+                (*records, table, *count, entries)
+            }
+        };
+        let parents = match self.places.parents {
+            0 => scratch + u64::from(self.scratch.parents) * 4,
+            saved => blob + u64::from(saved) * 16,
+        };
+        Job {
+            inputs,
+            table,
+            blob,
+            scratch,
+            parents,
+            count,
+            input_count,
+            leaf_kind: self.leaf_kind as u32,
+            leaf_size: self.leaf_size,
+            low_bits: self.low_bits,
+            nodes: self.places.nodes,
+            primitives: self.places.primitives,
+            vertices: self.places.vertices,
+            geometries: self.places.geometries,
+            saved_parents: self.places.parents,
+            vertex_count: self.vertex_count,
+            boxes: self.scratch.boxes,
+            keys: self.scratch.keys,
+            spare_keys: self.scratch.spare_keys,
+            digits: self.scratch.digits,
+            arrivals: self.scratch.arrivals,
+            node_capacity: node_capacity(count, self.leaf_size),
+            improvements: self.improvements,
+            reserved: 0,
+            header_flags: header_flags(source),
+            unused: [0; 2],
+        }
+    }
+}
+
+impl BuildSource {
+    /// Primitives or instances that a build of `plan` looks at.
+    pub(crate) fn count(&self, plan: &GpuBuildPlan) -> u32 {
+        match self {
+            Self::Geometries(_) => plan.capacity,
+            Self::Instances { count, .. } => *count,
+        }
+    }
+}
+
+/// Lays parts out one behind the other.
+struct Layout {
+    end: u64,
+}
+
+impl Layout {
+    /// The place of a part of `bytes`, in units of `unit` bytes, which the part's alignment is a multiple of.
+    fn add(&mut self, bytes: u64, alignment: u64, unit: u64) -> u64 {
+        let start = self.end.next_multiple_of(alignment);
+        self.end = start + bytes;
+        start / unit
+    }
+}
+
+/// Bits of the second word of a code. Codes of one word have 1024 cells along an axis: fine enough for few primitives,
+/// and sorted in fewer passes. No code has so many bits that the tree could get too high.
+fn low_bits(shape: &BlasShape) -> u32 {
+    let few = if shape.leaf_kind == LeafKind::Instances { 1 << 15 } else { 1 << 12 };
+    if shape.primitive_count <= few {
+        return 0;
+    }
+    MOST_HEIGHT - CODE_BITS - number_bits(shape.primitive_count, shape.leaf_size)
+}
+
+/// Bits that the number of a leaf has.
+fn number_bits(count: u32, leaf_size: u32) -> u32 {
+    u32::BITS - count.div_ceil(leaf_size).saturating_sub(1).leading_zeros()
+}
+
+/// Bit 0: every geometry is opaque; bit 1: none is.
+fn header_flags(source: &BuildSource) -> u32 {
+    match source {
+        BuildSource::Geometries(list) => {
+            let opaque = |geometry: &GpuGeometry| geometry.flags & GeometryFlags::OPAQUE.bits() != 0;
+            u32::from(list.iter().all(opaque)) | u32::from(!list.iter().any(opaque)) << 1
+        }
+        BuildSource::Instances { .. } => 0,
+    }
+}
+
+fn node_capacity(count: u32, leaf_size: u32) -> u32 {
+    count.div_ceil(leaf_size).saturating_sub(1)
+}
+
+fn blob_places(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(BlobPlaces, u64)> {
+    let nodes = u64::from(node_capacity(shape.primitive_count, shape.leaf_size));
+    let primitives = u64::from(shape.primitive_count) * shape.leaf_kind.primitive_bytes();
+    let mut layout = Layout { end: HEADER_BYTES };
+    let mut part = |bytes: u64, alignment| match bytes {
+        0 => 0,
+        bytes => layout.add(bytes, alignment, 16),
+    };
+    let places = [
+        part(nodes * NODE_BYTES, 64),
+        part(primitives, 16),
+        part(u64::from(vertex_count) * VERTEX_BYTES, 16),
+        part(u64::from(shape.geometry_count) * GEOMETRY_BYTES, 16),
+        part(if shape.refit { nodes * 4 } else { 0 }, 16),
+    ];
+    let bytes = layout.end.next_multiple_of(BLOB_ALIGNMENT);
+    check_limit(name, "structure size in bytes", bytes, u64::from(u32::MAX) * 16)?;
+    let [nodes, primitives, vertices, geometries, parents] = places.map(|place| place as u32);
+    Ok((BlobPlaces { nodes, primitives, vertices, geometries, parents }, bytes))
+}
+
+/// All of it is below 2^31 words, as kernels number them: a primitive takes at most 13 and a sixty-fourth.
+fn scratch_places(shape: &BlasShape, long_codes: bool) -> (ScratchPlaces, u64) {
+    let count = u64::from(shape.primitive_count);
+    let nodes = u64::from(node_capacity(shape.primitive_count, shape.leaf_size));
+    let keys = count * if long_codes { 3 } else { 2 };
+    let blocks = u64::from(shape.primitive_count.div_ceil(SORT_BLOCK));
+    let mut layout = Layout { end: STATE_WORDS * 4 };
+    let mut part = |words: u64| layout.add(words * 4, 16, 4) as u32;
+    let places = ScratchPlaces {
+        boxes: part(count * BOX_WORDS),
+        keys: part(keys),
+        spare_keys: part(keys),
+        digits: part(blocks * u64::from(DIGITS)),
+        arrivals: part(nodes),
+        parents: part(if shape.refit { 0 } else { nodes }),
+    };
+    (places, layout.end.next_multiple_of(16))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn kinds() -> impl Strategy<Value = LeafKind> {
+        prop::sample::select(vec![LeafKind::Triangles, LeafKind::IndexedTriangles, LeafKind::Boxes])
+    }
+
+    fn shapes() -> impl Strategy<Value = BlasShape> {
+        let counts = prop_oneof![0..10_u32, 0..10_000_u32, 0..=(1_u32 << 27)];
+        (kinds(), counts, 0..1_000_000_u32, 0..3000_u32, 1..=8_u32, any::<bool>()).prop_map(
+            |(leaf_kind, primitive_count, vertex_count, geometry_count, leaf_size, refit)| BlasShape {
+                leaf_kind,
+                primitive_count,
+                vertex_count,
+                geometry_count,
+                leaf_size,
+                improvements: 1,
+                refit,
+            },
+        )
+    }
+
+    /// Fails where parts overlap, are not aligned, or leave the memory.
+    fn check_parts(mut parts: Vec<(u64, u64)>, start: u64, end: u64) {
+        parts.retain(|(_, bytes)| *bytes > 0);
+        parts.sort_unstable();
+        let mut free = start;
+        for (place, bytes) in parts {
+            assert!(place >= free && place % 16 == 0);
+            free = place + bytes;
+        }
+        assert!(free <= end);
+    }
+
+    proptest! {
+        #[test]
+        fn parts_of_a_structure_lie_apart(shape in shapes()) {
+            let plan = GpuBuildPlan::blas("s", &shape).unwrap();
+            let nodes = u64::from(plan.node_capacity());
+            let at = |place: u32| u64::from(place) * 16;
+            let count = u64::from(shape.primitive_count);
+            check_parts(vec![
+                (at(plan.places.nodes), nodes * 64),
+                (at(plan.places.primitives), count * shape.leaf_kind.primitive_bytes()),
+                (at(plan.places.vertices), u64::from(plan.vertex_count) * 12),
+                (at(plan.places.geometries), u64::from(shape.geometry_count) * 16),
+                (at(plan.places.parents), if shape.refit { nodes * 4 } else { 0 }),
+            ], HEADER_BYTES, plan.blob_bytes);
+            prop_assert_eq!(plan.blob_bytes % 256, 0);
+        }
+
+        #[test]
+        fn parts_of_the_scratch_memory_lie_apart(shape in shapes()) {
+            let plan = GpuBuildPlan::blas("s", &shape).unwrap();
+            let (count, nodes) = (u64::from(shape.primitive_count), u64::from(plan.node_capacity()));
+            let at = |place: u32| u64::from(place) * 4;
+            let keys = count * if plan.low_bits > 0 { 12 } else { 8 };
+            prop_assert!(plan.most_height() <= MOST_HEIGHT && plan.low_bits <= 30);
+            check_parts(vec![
+                (at(plan.scratch.boxes), count * 24),
+                (at(plan.scratch.keys), keys),
+                (at(plan.scratch.spare_keys), keys),
+                (at(plan.scratch.digits), count.div_ceil(1024) * 64),
+                (at(plan.scratch.arrivals), nodes * 4),
+                (at(plan.scratch.parents), if shape.refit { 0 } else { nodes * 4 }),
+            ], 32, plan.scratch_bytes);
+            prop_assert!(plan.scratch_bytes < 1 << 33);
+        }
+    }
+
+    #[test]
+    fn what_has_no_numbers_is_refused() {
+        let shape = BlasShape {
+            leaf_kind: LeafKind::Triangles,
+            primitive_count: (1 << 27) + 1,
+            vertex_count: 0,
+            geometry_count: 1,
+            leaf_size: 2,
+            improvements: 1,
+            refit: true,
+        };
+        assert!(GpuBuildPlan::blas("s", &shape).is_err());
+        assert!(GpuBuildPlan::blas("s", &BlasShape { primitive_count: 1, leaf_size: 9, ..shape }).is_err());
+        assert!(GpuBuildPlan::tlas("s", u32::MAX).is_err());
+        assert!(GpuBuildPlan::tlas("s", 0).is_ok());
+    }
+
+    #[test]
+    fn pairs_of_triangles_take_82_bytes_each() {
+        let shape = BlasShape {
+            leaf_kind: LeafKind::Triangles,
+            primitive_count: 1_000_000,
+            vertex_count: 0,
+            geometry_count: 1,
+            leaf_size: 2,
+            improvements: 1,
+            refit: true,
+        };
+        let plan = GpuBuildPlan::blas("s", &shape).unwrap();
+        assert!(plan.blob_bytes < 82_001_000, "{}", plan.blob_bytes);
+    }
+}

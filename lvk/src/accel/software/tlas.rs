@@ -1,0 +1,24 @@
+//! A top-level structure of the library's own.
+
+use std::sync::Arc;
+
+use super::body::SoftwareBody;
+use super::plan::GpuBuildPlan;
+use crate::accel::flags::AccelStructSizes;
+
+/// What stands behind the handle of a top-level structure for software to trace. Every update is a build.
+pub(crate) struct SoftwareTlas {
+    pub(crate) body: Arc<SoftwareBody>,
+    pub(crate) plan: GpuBuildPlan,
+}
+
+impl SoftwareTlas {
+    /// What it takes and its builds take.
+    pub(crate) fn sizes(&self) -> AccelStructSizes {
+        AccelStructSizes {
+            structure_bytes: self.body.memory_bytes(),
+            build_scratch_bytes: self.plan.scratch_bytes,
+            update_scratch_bytes: self.plan.scratch_bytes,
+        }
+    }
+}

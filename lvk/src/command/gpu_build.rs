@@ -1,0 +1,164 @@
+//! Builds and refits of software structures by the library's kernels.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::CommandBuffer;
+use crate::accel::scratch::{aligned_scratch_address, plan_scratch};
+use crate::accel::software::geometry::GpuGeometry;
+use crate::accel::software::job::{BuildPush, Job};
+use crate::accel::software::plan::{BuildSource, GpuBuildPlan};
+use crate::accel::software::refit_plan::GpuRefitPlan;
+use crate::barrier::{Stages, Use};
+use crate::error::Result;
+use crate::kernel::spread;
+use crate::resource::Buffer;
+use crate::software::gpu_build::steps::{Step, build_steps, refit_steps};
+
+#[cfg(feature = "test-hooks")]
+#[path = "sort_test.rs"]
+pub(crate) mod sort_test;
+
+/// Parts of the scratch memory are aligned to their widest accesses.
+const SCRATCH_ALIGNMENT: u64 = 256;
+const TABLE_ALIGNMENT: u64 = 16;
+
+/// One build to record.
+pub(crate) struct GpuBuild {
+    pub(crate) plan: GpuBuildPlan,
+    pub(crate) source: BuildSource,
+    /// Address of the structure, a multiple of 256, with room for the plan's `blob_bytes`.
+    pub(crate) blob: u64,
+    /// The buffer the structure lies in.
+    pub(crate) target: Arc<Buffer>,
+    /// Buffers the build reads: inputs, and buffers of the structures that instances show.
+    pub(crate) reads: Vec<Arc<Buffer>>,
+}
+
+/// One refit to record.
+pub(crate) struct GpuRefit {
+    pub(crate) plan: GpuRefitPlan,
+    /// The geometries of the build, over buffers whose contents may have changed.
+    pub(crate) geometries: Vec<GpuGeometry>,
+    /// Address of the structure.
+    pub(crate) blob: u64,
+    /// The buffer the structure lies in.
+    pub(crate) target: Arc<Buffer>,
+    /// Buffers the refit reads.
+    pub(crate) reads: Vec<Arc<Buffer>>,
+}
+
+impl CommandBuffer {
+    /// Records builds, side by side as far as the scratch memory has room. A top-level structure goes into a later call
+    /// than what it shows. On an error nothing is recorded.
+    pub(crate) fn record_gpu_builds(&mut self, builds: &[GpuBuild]) -> Result<()> {
+        let sizes: Vec<_> = builds.iter().map(|build| build.plan.scratch_bytes).collect();
+        self.in_scratch_batches(&sizes, |cmd, range, scratch| {
+            let builds = &builds[range];
+            let parts: Vec<_> = builds.iter().map(|build| (&build.plan, &build.source)).collect();
+            let (order, steps) = build_steps(&parts);
+            let mut jobs = Vec::with_capacity(builds.len());
+            for index in order {
+                let build = &builds[index];
+                let inputs = match &build.source {
+                    BuildSource::Geometries(list) => cmd.stage_table(list)?,
+                    BuildSource::Instances { .. } => 0,
+                };
+                jobs.push(build.plan.job(&build.source, inputs, build.blob, scratch[index]));
+            }
+            let uses = builds.iter().map(|build| (&build.target, &build.reads[..]));
+            cmd.record_jobs(&jobs, &steps, uses)
+        })
+    }
+
+    /// Records refits, side by side as far as the scratch memory has room. On an error nothing is recorded.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a structure that keeps no parents.
+    pub(crate) fn record_gpu_refits(&mut self, refits: &[GpuRefit]) -> Result<()> {
+        refits.iter().try_for_each(|refit| refit.plan.check(&refit.target.name))?;
+        let sizes: Vec<_> = refits.iter().map(|refit| refit.plan.scratch_bytes()).collect();
+        self.in_scratch_batches(&sizes, |cmd, range, scratch| {
+            let refits = &refits[range];
+            let plans: Vec<_> = refits.iter().map(|refit| refit.plan).collect();
+            let mut jobs = Vec::with_capacity(refits.len());
+            for (refit, scratch) in refits.iter().zip(scratch) {
+                let inputs = cmd.stage_table(&refit.geometries)?;
+                jobs.push(refit.plan.job(inputs, refit.geometries.len() as u32, refit.blob, *scratch));
+            }
+            let uses = refits.iter().map(|refit| (&refit.target, &refit.reads[..]));
+            cmd.record_jobs(&jobs, &refit_steps(&plans), uses)
+        })
+    }
+
+    /// Calls `record` for each batch that shares the scratch buffer, with the addresses of its scratch memory.
+    fn in_scratch_batches(
+        &mut self,
+        sizes: &[u64],
+        mut record: impl FnMut(&mut Self, std::ops::Range<usize>, &[u64]) -> Result<()>,
+    ) -> Result<()> {
+        let shared = Arc::clone(&self.shared);
+        let alignment = u64::from(shared.gpu.caps.limits.scratch_alignment).max(SCRATCH_ALIGNMENT);
+        let batches = plan_scratch(sizes, alignment, shared.scratch.tiers.batch_bytes());
+        let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
+        let (scratch, replaced) = shared.scratch.get(&shared.gpu, most.saturating_add(alignment))?;
+        self.retire_temporary(replaced);
+        let base = aligned_scratch_address(scratch.address, alignment);
+        for batch in batches {
+            let addresses: Vec<_> = batch.offsets.iter().map(|offset| base + offset).collect();
+            self.use_buffer(&scratch, Use::shader_write(Stages::COMPUTE));
+            record(self, batch.builds, &addresses).inspect_err(|_| self.uses.clear())?;
+        }
+        Ok(())
+    }
+
+    /// Runs the steps of some jobs, with barriers between phases; the scratch buffer is among the uses.
+    fn record_jobs<'a>(
+        &mut self,
+        jobs: &[Job],
+        steps: &[Step],
+        uses: impl Iterator<Item = (&'a Arc<Buffer>, &'a [Arc<Buffer>])>,
+    ) -> Result<()> {
+        let jobs = self.stage_table(jobs)?;
+        let pipelines =
+            steps.iter().map(|step| self.kernel_pipeline(step.kernel)).collect::<Result<Vec<_>>>()?;
+        for (target, reads) in uses {
+            self.use_buffer(target, Use::shader_write(Stages::COMPUTE));
+            reads.iter().for_each(|buffer| self.use_buffer(buffer, Use::shader_read(Stages::COMPUTE)));
+        }
+        self.flush();
+        for (place, (step, pipeline)) in steps.iter().zip(pipelines).enumerate() {
+            let before = place.checked_sub(1).map(|place| steps[place]);
+            if before.is_some_and(|before| before.phase != step.phase) {
+                self.meet_in_compute();
+            }
+            let push = BuildPush { jobs, first_job: step.job, pass_or_jobs: step.pass_or_jobs };
+            let bind = before.is_none_or(|before| before.kernel != step.kernel);
+            self.dispatch_kernel(bind.then_some(&pipeline), bytemuck::bytes_of(&push), spread(step.groups));
+        }
+        self.restore_compute();
+        Ok(())
+    }
+
+    /// Has later dispatches of a build see what earlier ones wrote. The tracker knows the first and the last of them.
+    fn meet_in_compute(&self) {
+        let written = vk::AccessFlags2::SHADER_STORAGE_WRITE;
+        let barrier = [vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::COMPUTE_SHADER)
+            .src_access_mask(written)
+            .dst_stage_mask(vk::PipelineStageFlags2::COMPUTE_SHADER)
+            .dst_access_mask(written | vk::AccessFlags2::SHADER_STORAGE_READ)];
+        let info = vk::DependencyInfo::default().memory_barriers(&barrier);
+        // SAFETY: the command buffer is being recorded, outside of a render pass.
+        unsafe { self.shared.gpu.device.cmd_pipeline_barrier2(self.raw(), &info) };
+    }
+
+    /// The address of records that the GPU may read until the command buffer is done.
+    fn stage_table<T: bytemuck::NoUninit>(&mut self, records: &[T]) -> Result<u64> {
+        let bytes = bytemuck::cast_slice(records);
+        let region = self.shared.staging.write(bytes, TABLE_ALIGNMENT, self.recording.sequence)?;
+        self.retire_temporary(region.temporary);
+        Ok(region.address)
+    }
+}

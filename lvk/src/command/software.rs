@@ -1,0 +1,325 @@
+//! Builds of the library's own structures.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::CommandBuffer;
+use super::gpu_build::{GpuBuild, GpuRefit};
+use crate::accel::AccelStruct;
+use crate::accel::blas::Blas;
+use crate::accel::build::instance_bytes;
+use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance, check, pack};
+use crate::accel::software::blas::{Origin, Rebuilt, SoftwareBlas, gpu_plan};
+use crate::accel::software::body::SoftwareBody;
+use crate::accel::software::geometry::{GpuGeometry, gpu_geometries};
+use crate::accel::software::layout::{MOVED, MovedHeader};
+use crate::accel::software::plan::BuildSource;
+use crate::accel::software::refit_plan::GpuRefitPlan;
+use crate::accel::software::tlas::SoftwareTlas;
+use crate::accel::tlas::Shown;
+use crate::barrier::{ResourceId, Stages, Use};
+use crate::error::{Error, Result};
+use crate::handle::AccelStructHandle;
+use crate::resource::Buffer;
+use crate::software::instances::{PlacedInstance, ShownStructure, place};
+use crate::software::tlas_blob;
+
+/// So many instances the CPU builds a tree over that is worth more than its time. A driver that runs on the CPU has no
+/// faster builds.
+const MOST_ON_CPU: usize = 512;
+/// Addresses of tables and records.
+const ALIGNMENT: u64 = 16;
+
+/// Builds and refits to record side by side.
+#[derive(Default)]
+struct SoftwareWork {
+    builds: Vec<GpuBuild>,
+    refits: Vec<GpuRefit>,
+    /// Bodies that refer to others from now on.
+    moves: Vec<(Arc<SoftwareBody>, MovedHeader)>,
+}
+
+impl CommandBuffer {
+    /// Copies what the CPU built into a bottom-level structure.
+    pub(crate) fn fill_software_blas(
+        &mut self,
+        target: &AccelStruct,
+        body: &SoftwareBody,
+        bytes: &[u8],
+    ) -> Result<()> {
+        self.fill_software(target, self.shared.all_blas, body, bytes)
+    }
+
+    /// The next command copies what software traces.
+    pub(crate) fn read_software_blas(&mut self, body: &SoftwareBody) {
+        self.uses.id(self.shared.all_blas, Use::transfer_read());
+        self.use_buffer(body.buffer(), Use::transfer_read());
+    }
+
+    fn fill_software(
+        &mut self,
+        target: &AccelStruct,
+        all: ResourceId,
+        body: &SoftwareBody,
+        bytes: &[u8],
+    ) -> Result<()> {
+        let region = self.shared.staging.write(bytes, ALIGNMENT, self.recording.sequence)?;
+        self.retire_temporary(region.temporary);
+        self.uses.id(target.id, Use::transfer_write());
+        self.uses.accumulate(all, Use::transfer_write());
+        self.use_buffer(body.buffer(), Use::transfer_write());
+        self.flush();
+        let copy =
+            vk::BufferCopy { src_offset: region.offset, dst_offset: body.offset(), size: bytes.len() as u64 };
+        // SAFETY: the structure has room for the bytes, which lie in the staging memory.
+        unsafe {
+            self.shared.gpu.device.cmd_copy_buffer(self.raw(), region.buffer, body.buffer().raw, &[copy]);
+        }
+        Ok(())
+    }
+
+    /// Builds structures on the GPU that have none yet; those that the CPU built are ready.
+    pub(super) fn build_software_first(&mut self, structures: &[Arc<AccelStruct>], _: &[bool]) -> Result<()> {
+        let is_of_gpu = |target: &&Arc<AccelStruct>| {
+            let software = target.blas().ok().and_then(|blas| blas.software.as_ref());
+            software.is_some_and(|software| matches!(software.origin, Origin::Gpu(_)))
+        };
+        let structures: Vec<_> = structures.iter().filter(is_of_gpu).cloned().collect();
+        let rebuilds = vec![false; structures.len()];
+        self.build_software(&structures, &rebuilds)
+    }
+
+    /// As [`build_software_first`](Self::build_software_first), of one structure.
+    pub(crate) fn build_software_of(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
+        self.build_software_first(std::slice::from_ref(target), &[false])
+    }
+
+    /// Builds or refits what software traces of these structures.
+    pub(super) fn build_software(&mut self, structures: &[Arc<AccelStruct>], refits: &[bool]) -> Result<()> {
+        let mut work = SoftwareWork::default();
+        for (target, refit) in structures.iter().zip(refits) {
+            let blas = target.blas()?;
+            if let Some(software) = &blas.software {
+                self.plan_software(target, blas, software, *refit, &mut work)?;
+            }
+        }
+        if work.builds.is_empty() && work.refits.is_empty() {
+            return Ok(());
+        }
+        let write = Use::shader_write(Stages::COMPUTE);
+        structures.iter().for_each(|target| self.uses.id(target.id, write));
+        self.uses.accumulate(self.shared.all_blas, write);
+        if !work.builds.is_empty() {
+            self.record_gpu_builds(&work.builds)?;
+        }
+        if !work.refits.is_empty() {
+            self.record_gpu_refits(&work.refits)?;
+        }
+        self.record_moves(&work.moves);
+        Ok(())
+    }
+
+    fn plan_software(
+        &mut self,
+        target: &Arc<AccelStruct>,
+        blas: &Blas,
+        software: &SoftwareBlas,
+        refit: bool,
+        work: &mut SoftwareWork,
+    ) -> Result<()> {
+        let geometries = self.gpu_geometries(target, blas)?;
+        let reads = self.reads(blas)?;
+        let moved = software.rebuilt().filter(|_| blas.builds() > 1 || self.moved.contains(&target.id.0));
+        let refit_of = |plan: GpuRefitPlan, body: &SoftwareBody| GpuRefit {
+            plan,
+            geometries: geometries.clone(),
+            blob: body.address,
+            target: Arc::clone(body.buffer()),
+            reads: reads.clone(),
+        };
+        let build_of = |plan: &_, body: &SoftwareBody| GpuBuild {
+            plan: Clone::clone(plan),
+            source: BuildSource::Geometries(geometries.clone()),
+            blob: body.address,
+            target: Arc::clone(body.buffer()),
+            reads: reads.clone(),
+        };
+        match (refit, &software.origin, moved) {
+            (true, _, Some(rebuilt)) => {
+                work.refits.push(refit_of(GpuRefitPlan::of_build(&rebuilt.plan), &rebuilt.body));
+            }
+            (true, Origin::Cpu { refit: Some(plan), .. }, None) => {
+                work.refits.push(refit_of(*plan, &software.body))
+            }
+            (true, Origin::Cpu { refit: None, .. }, None) => target.check_refit()?,
+            (true, Origin::Gpu(plan), None) => {
+                work.refits.push(refit_of(GpuRefitPlan::of_build(plan), &software.body));
+            }
+            (false, Origin::Gpu(plan), _) => work.builds.push(build_of(plan, &software.body)),
+            (false, Origin::Cpu { .. }, _) => {
+                let rebuilt = software.rebuilt_or(|| self.new_rebuilt(target, blas))?;
+                work.builds.push(build_of(&rebuilt.plan, &rebuilt.body));
+                let header = MovedHeader { format: MOVED, leaf_kind: 0, address: rebuilt.body.address };
+                work.moves.push((Arc::clone(&software.body), header));
+                self.moved.insert(target.id.0);
+            }
+        }
+        Ok(())
+    }
+
+    /// Room for builds on the GPU of what the CPU built first.
+    fn new_rebuilt(&self, target: &AccelStruct, blas: &Blas) -> Result<Rebuilt> {
+        let (shared, name) = (&self.shared, &target.name);
+        let plan = gpu_plan(name, &blas.geometries, target.flags)?;
+        let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, plan.blob_bytes)?;
+        Ok(Rebuilt { body: Arc::new(body), plan })
+    }
+
+    fn gpu_geometries(&self, target: &AccelStruct, blas: &Blas) -> Result<Vec<GpuGeometry>> {
+        let find = |handle| self.shared.store.buffers.get(handle);
+        let matrices = blas.transforms.as_ref().map(|buffer| buffer.address);
+        gpu_geometries(&target.name, &blas.geometries, &find, matrices)
+    }
+
+    /// Has bodies refer to others.
+    fn record_moves(&mut self, moves: &[(Arc<SoftwareBody>, MovedHeader)]) {
+        for (body, header) in moves {
+            self.use_buffer(body.buffer(), Use::transfer_write());
+            self.uses.accumulate(self.shared.all_blas, Use::transfer_write());
+            self.flush();
+            let bytes = bytemuck::bytes_of(header);
+            // SAFETY: the body begins with a header, at a multiple of 4.
+            unsafe {
+                let device = &self.shared.gpu.device;
+                device.cmd_update_buffer(self.raw(), body.buffer().raw, body.offset(), bytes);
+            }
+        }
+    }
+
+    /// Builds a top-level structure of the library's own from instances of the host.
+    pub(super) fn build_software_tlas(
+        &mut self,
+        target: &AccelStruct,
+        software: &SoftwareTlas,
+        instances: &[TlasInstance],
+    ) -> Result<()> {
+        let shared = Arc::clone(&self.shared);
+        if (shared.gpu.caps.is_cpu || instances.len() <= MOST_ON_CPU)
+            && let Some(placed) = self.place_instances(target, instances)?
+        {
+            let bytes = tlas_blob::build(&placed);
+            return self.fill_software(target, shared.all_tlas, &software.body, &bytes);
+        }
+        let mut written = Ok(());
+        let bytes = instance_bytes(instances.len().max(1) as u32);
+        let region = shared.staging.write_with(bytes, ALIGNMENT, self.recording.sequence, |out| {
+            written = self.write_software_instances(target, instances, out);
+        })?;
+        self.retire_temporary(region.temporary);
+        written?;
+        let count = instances.len() as u32;
+        let source = BuildSource::Instances { records: region.address, count, table: None };
+        self.record_software_tlas(target, software, source, Vec::new())
+    }
+
+    /// As [`build_software_tlas`](Self::build_software_tlas), from records in a buffer that name structures by place.
+    pub(super) fn build_software_tlas_from(
+        &mut self,
+        target: &AccelStruct,
+        software: &SoftwareTlas,
+        instances: &DeviceInstances<'_>,
+        shown: &[Shown],
+    ) -> Result<()> {
+        let buffer = self.shared.store.buffers.get(instances.buffer)?;
+        let address = |shown: &Shown| Ok(software_body(&shown.blas)?.address);
+        let mut table = shown.iter().map(address).collect::<Result<Vec<u64>>>()?;
+        let entries = table.len() as u32;
+        table.resize(table.len().max(1), 0);
+        let bytes = bytemuck::cast_slice(&table);
+        let region = self.shared.staging.write(bytes, ALIGNMENT, self.recording.sequence)?;
+        self.retire_temporary(region.temporary);
+        let source = BuildSource::Instances {
+            records: buffer.address + instances.offset,
+            count: instances.count,
+            table: Some((region.address, entries)),
+        };
+        self.record_software_tlas(target, software, source, vec![buffer])
+    }
+
+    /// The instances for a build on the CPU; nothing where it does not know all of their bounds.
+    fn place_instances(
+        &self,
+        target: &AccelStruct,
+        instances: &[TlasInstance],
+    ) -> Result<Option<Vec<PlacedInstance>>> {
+        let mut placed = Vec::with_capacity(instances.len());
+        let mut last: Option<(AccelStructHandle, ShownStructure)> = None;
+        for (number, instance) in instances.iter().enumerate() {
+            check(&target.name, number, instance)?;
+            let shown = match last {
+                Some((handle, shown)) if handle == instance.blas => shown,
+                _ => match self.shown_structure(instance.blas)? {
+                    Some(shown) => shown,
+                    None => return Ok(None),
+                },
+            };
+            last = Some((instance.blas, shown));
+            placed.extend(place(number as u32, instance, &shown));
+        }
+        Ok(Some(placed))
+    }
+
+    fn shown_structure(&self, handle: AccelStructHandle) -> Result<Option<ShownStructure>> {
+        let blas = self.shared.store.accel_structs.get(handle)?;
+        let address = software_body(&blas)?.address;
+        let bounds = blas.blas()?.software.as_ref().and_then(SoftwareBlas::known_bounds);
+        Ok(bounds.map(|bounds| ShownStructure { address, bounds }))
+    }
+
+    fn write_software_instances(
+        &self,
+        target: &AccelStruct,
+        instances: &[TlasInstance],
+        out: &mut [u8],
+    ) -> Result<()> {
+        let mut last: Option<(AccelStructHandle, u64)> = None;
+        for (index, (instance, out)) in instances.iter().zip(out.chunks_exact_mut(INSTANCE_BYTES)).enumerate()
+        {
+            check(&target.name, index, instance)?;
+            let address = match last {
+                Some((handle, address)) if handle == instance.blas => address,
+                _ => software_body(&*self.shared.store.accel_structs.get(instance.blas)?)?.address,
+            };
+            last = Some((instance.blas, address));
+            out.copy_from_slice(bytemuck::bytes_of(&pack(instance, address)));
+        }
+        Ok(())
+    }
+
+    fn record_software_tlas(
+        &mut self,
+        target: &AccelStruct,
+        software: &SoftwareTlas,
+        source: BuildSource,
+        reads: Vec<Arc<Buffer>>,
+    ) -> Result<()> {
+        let write = Use::shader_write(Stages::COMPUTE);
+        self.uses.id(target.id, write);
+        self.uses.id(self.shared.all_blas, Use::shader_read(Stages::COMPUTE));
+        self.uses.accumulate(self.shared.all_tlas, write);
+        self.record_gpu_builds(&[GpuBuild {
+            plan: software.plan.clone(),
+            source,
+            blob: software.body.address,
+            target: Arc::clone(software.body.buffer()),
+            reads,
+        }])
+    }
+}
+
+/// What software traces of a bottom-level structure.
+fn software_body(blas: &AccelStruct) -> Result<&Arc<SoftwareBody>> {
+    let none = || Error::usage(&blas.name, "the structure has nothing that software could trace");
+    Ok(&blas.blas()?.software.as_ref().ok_or_else(none)?.body)
+}

@@ -1,0 +1,160 @@
+//! Bottom-level structures of the library's own, built by the CPU when they are created.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::Context;
+use super::blas_shapes::input;
+use super::create_accel::blas_object;
+use super::holder::Holder;
+use super::read_bounds::geometry_bytes;
+use crate::accel::AccelStruct;
+use crate::accel::blas::{Blas, BlasBody};
+use crate::accel::blob::Blob;
+use crate::accel::desc::BlasDesc;
+use crate::accel::software::blas::{Origin, SoftwareBlas, builds_on_gpu, gpu_plan, refit_plan};
+use crate::accel::software::body::SoftwareBody;
+use crate::error::{Error, Result};
+use crate::handle::AccelStructHandle;
+use crate::shared::Garbage;
+use crate::software::blas_blob::{self, BlasBlob};
+use crate::software::mesh::Mesh;
+use crate::software::quality::Quality;
+use crate::software::sound;
+use crate::software::tree_cache::TreeKey;
+
+/// Stands in front of structures that no driver wrote; as long as what drivers begin with.
+const MARK: [u8; 32] = *b"lvk software structure, form 1\0\0";
+
+impl Context {
+    /// The structures of meshes that the CPU builds, on all its cores; nothing for those that the GPU builds, and where
+    /// the device traces queries itself. Waits for the GPU to read the inputs back.
+    pub(super) fn software_blobs(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Option<BlasBlob>>> {
+        if !self.shared().gpu.caps.software_ray_query() {
+            return Ok(descs.iter().map(|_| None).collect());
+        }
+        let is_of_cpu = |desc: &&BlasDesc<'_>| !builds_on_gpu(desc.flags);
+        let read: Vec<_> = descs.iter().filter(is_of_cpu).collect();
+        let pieces = self.read_inputs(&read)?;
+        let mesh = |desc: &BlasDesc<'_>| {
+            let bytes = |geometry| (geometry_bytes(geometry, &pieces), geometry.flags());
+            Mesh::new(&desc.geometries.iter().map(bytes).collect::<Vec<_>>())
+        };
+        on_all_cores(descs, |desc| is_of_cpu(&desc).then(|| self.built(&mesh(desc), Quality::of(desc.flags))))
+    }
+
+    /// The structure of a mesh, of an earlier run where trees are kept.
+    fn built(&self, mesh: &Mesh, quality: Quality) -> BlasBlob {
+        let build = || blas_blob::build(mesh, quality);
+        match &self.shared().tree_cache {
+            Some(cache) => cache.get_or(TreeKey::of(mesh, quality), build),
+            None => build(),
+        }
+    }
+
+    /// Memory for a structure that the CPU built, or that the GPU is to build; nothing where the device traces queries
+    /// itself.
+    pub(super) fn software_blas(
+        &self,
+        desc: &BlasDesc<'_>,
+        blob: Option<&BlasBlob>,
+    ) -> Result<Option<SoftwareBlas>> {
+        let (shared, name) = (self.shared(), desc.debug_name);
+        if !shared.gpu.caps.software_ray_query() {
+            return Ok(None);
+        }
+        let (bytes, origin) = match blob {
+            Some(blob) => {
+                let refit = refit_plan(&blob.header(), desc);
+                (blob.bytes.len() as u64, Origin::Cpu { refit, bounds: blob.bounds })
+            }
+            None => {
+                let plan = gpu_plan(name, desc.geometries, desc.flags)?;
+                (plan.blob_bytes, Origin::Gpu(plan))
+            }
+        };
+        let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, bytes)?;
+        Ok(Some(SoftwareBlas::new(Arc::new(body), origin)))
+    }
+
+    /// The bytes of what software traces, behind a mark that no driver writes. Waits for the GPU.
+    pub(super) fn software_bytes(&self, blas: &Blas) -> Result<Vec<u8>> {
+        let Some(software) = &blas.software else { return Ok(Vec::new()) };
+        let moved = software.rebuilt().filter(|_| blas.builds() > 1);
+        let body = moved.map_or(&software.body, |rebuilt| &rebuilt.body);
+        let size = body.memory_bytes();
+        let mut bytes = vec![0; MARK.len() + size as usize];
+        bytes[..MARK.len()].copy_from_slice(&MARK);
+        self.read_back(size, &mut bytes[MARK.len()..], |cmd, target| {
+            cmd.read_software_blas(body);
+            cmd.copy_buffer_objects(body.buffer(), body.offset(), target, 0, size)
+        })?;
+        Ok(bytes)
+    }
+
+    /// A structure of what [`software_bytes`](Self::software_bytes) answered.
+    pub(super) fn load_software_blas(
+        &self,
+        desc: &BlasDesc<'_>,
+        blob: &Blob,
+    ) -> Result<Holder<AccelStructHandle>> {
+        let reject = |reason: &str| Error::Serialized {
+            object: desc.debug_name.to_owned(),
+            reason: reason.to_owned(),
+        };
+        input(self.shared(), desc)?;
+        let bytes = match &blob.parts[..] {
+            [part] => part.driver.strip_prefix(&MARK[..]),
+            _ => None,
+        };
+        let bytes = bytes.ok_or_else(|| reject("a driver wrote it, and here only software traces"))?;
+        let sound = sound::check(bytes).map_err(reject)?;
+        let built = BlasBlob { bytes: bytes.to_vec(), bounds: sound.bounds };
+        let software = self.software_blas(desc, Some(&built))?;
+        let body = BlasBody { structures: Vec::new(), compacted_from: None, rebuildable: true };
+        let object = blas_object(self.shared(), desc, Vec::new(), body, software)?;
+        let handle = self.shared().store.accel_structs.insert(object);
+        let holder = Holder::new(self, handle, 0);
+        let object = self.shared().store.accel_structs.get(handle)?;
+        self.fill_software(&object, &built)?;
+        self.before_next_submission(|cmd| cmd.build_first(std::slice::from_ref(&object)))?;
+        Ok(holder)
+    }
+
+    /// Copies what the CPU built.
+    pub(super) fn fill_software(&self, target: &Arc<AccelStruct>, blob: &BlasBlob) -> Result<()> {
+        let Some(software) = target.blas()?.software.as_ref() else { return Ok(()) };
+        let body = &software.body;
+        self.shared().retire(Garbage::Software(Arc::clone(body)));
+        self.before_next_submission(|cmd| cmd.fill_software_blas(target, body, &blob.bytes))
+    }
+}
+
+/// Each desc by whichever thread is free.
+fn on_all_cores<T: Send>(
+    descs: &[BlasDesc<'_>],
+    build: impl Fn(&BlasDesc<'_>) -> Option<T> + Sync,
+) -> Result<Vec<Option<T>>> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let next = AtomicUsize::new(0);
+    let work = || {
+        let mut made = Vec::new();
+        while let index = next.fetch_add(1, Ordering::Relaxed)
+            && let Some(desc) = descs.get(index)
+        {
+            made.push((index, build(desc)));
+        }
+        made
+    };
+    let mut all: Vec<Option<T>> = descs.iter().map(|_| None).collect();
+    let lost = |_| Error::usage("create_blas", "a thread that built a tree ended early");
+    std::thread::scope(|scope| {
+        let helpers: Vec<_> = (1..cores.min(descs.len())).map(|_| scope.spawn(work)).collect();
+        let mut made = work();
+        for helper in helpers {
+            made.extend(helper.join().map_err(lost)?);
+        }
+        made.into_iter().for_each(|(index, built)| all[index] = built);
+        Ok(all)
+    })
+}

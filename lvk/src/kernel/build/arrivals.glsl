@@ -1,0 +1,10 @@
+// Counts of the children that arrived at each node. Fitting starts where both children are leaves, which has to be known
+// beforehand: others may change a node before its own invocation looks at it.
+const uint kStart = 0x80000000u;
+
+void writeArrivals(uint node, bool start) { Words(work(job.arrivals)).word[node] = start ? kStart : 0u; }
+
+void resetArrivals(uint node) {
+    Quads at = Quads(element(place(job.nodes), node, 64u));
+    writeArrivals(node, (at.quad[0].w & at.quad[1].w & kLeaf) != 0u);
+}

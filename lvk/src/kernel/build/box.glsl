@@ -1,0 +1,38 @@
+// Axis-aligned boxes, and bounds that many invocations extend.
+struct Box { vec3 lo; vec3 hi; };
+
+const float kFar = 3.402823466e38;
+
+Box emptyBox() { return Box(vec3(kFar), vec3(-kFar)); }
+
+bool isEmpty(Box box) { return box.lo.x > box.hi.x; }
+
+Box join(Box a, Box b) { return Box(min(a.lo, b.lo), max(a.hi, b.hi)); }
+
+// By bits: compilers may take it that no number is infinite or none at all.
+bool isFinite(vec3 v) {
+    return all(notEqual(floatBitsToUint(v) & uvec3(0x7f800000u), uvec3(0x7f800000u)));
+}
+
+bool isNumber(vec3 v) {
+    return all(lessThanEqual(floatBitsToUint(v) & uvec3(0x7fffffffu), uvec3(0x7f800000u)));
+}
+
+vec3 centre(Box box) { return box.lo * 0.5 + box.hi * 0.5; }
+
+// Floats as integers of the same order.
+uvec3 ordered(vec3 v) {
+    uvec3 bits = floatBitsToUint(v);
+    return mix(bits | 0x80000000u, ~bits, notEqual(bits & 0x80000000u, uvec3(0)));
+}
+
+vec3 unordered(uvec3 v) {
+    return uintBitsToFloat(mix(~v, v & 0x7fffffffu, notEqual(v & 0x80000000u, uvec3(0))));
+}
+
+Box readBox(Corners from, uint i) { return Box(from.corner[2 * i], from.corner[2 * i + 1]); }
+
+void writeBox(Corners to, uint i, Box box) {
+    to.corner[2 * i] = box.lo;
+    to.corner[2 * i + 1] = box.hi;
+}

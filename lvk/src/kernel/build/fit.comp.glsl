@@ -1,0 +1,5 @@
+// The boxes of binary nodes.
+void main() {
+    readJob(firstJob);
+    fitFrom(invocation());
+}

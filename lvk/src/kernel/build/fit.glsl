@@ -1,0 +1,42 @@
+// Fits the boxes of binary nodes, bottom up. A node's own invocation starts where both children are leaves; above, the
+// child that arrives last goes on, so that nobody ever waits.
+void finish(Fitted root) {
+    Corners to = Corners(plus(job.blob, 48u, 0u));
+    to.corner[0] = root.box.lo;
+    to.corner[1] = root.box.hi;
+    header().word[18] = root.height;
+}
+
+// Fits what can be fitted from node `i` up to the root.
+void fitFrom(uint i) {
+    uint nodes = min(header().word[8], job.nodeCapacity);
+    if (nodes == 0u && i == 0u) finish(Fitted(leafBox(header().word[2]), 0u));
+    if (i >= nodes) return;
+    if (Words(work(job.arrivals)).word[i] != kStart) return;
+    uint number = i;
+    uint which = 0u;
+    fitLeaf(number, which, Words(nodeAt(number)).word[3]);
+    // Each step goes one node up; a damaged structure with a circle ends too.
+    [[dont_unroll]] for (uint steps = 0; steps < nodes; ++steps) {
+        uint sibling = Words(nodeAt(number)).word[which == 0u ? 7 : 3];
+        if (isLeaf(sibling)) {
+            fitLeaf(number, 1u - which, sibling);
+        } else {
+            memoryBarrierBuffer();
+            if (atomicAdd(Words(work(job.arrivals)).word[number], 1u) == 0u) return;
+            memoryBarrierBuffer();
+        }
+        Node node = readNode(number);
+        Fitted whole = Fitted(join(childOf(node, 0u).box, childOf(node, 1u).box), 0u);
+        whole.height = rotate(number, node);
+        uint parent = Words(job.parents).word[number];
+        if (parent == kNone) {
+            finish(whole);
+            return;
+        }
+        which = parent >> 29 & 1u;
+        number = parent & 0x1fffffffu;
+        if (number >= nodes) return;
+        writeChild(number, which, whole);
+    }
+}

@@ -1,0 +1,5 @@
+// The boxes of wide nodes.
+void main() {
+    readJob(firstJob);
+    fitWideFrom(invocation());
+}

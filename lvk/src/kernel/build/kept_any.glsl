@@ -1,0 +1,22 @@
+// Boxes of what leaves hold.
+Box cornersBox(vec3 a, vec3 b, vec3 c) {
+    if (!(isFinite(a) && isFinite(b) && isFinite(c))) return emptyBox();
+    return Box(min(a, min(b, c)), max(a, max(b, c)));
+}
+
+Box keptBox(uint slot) {
+    if (job.leafKind == kInstances) return readBox(Corners(work(job.boxes)), slot);
+    if (job.leafKind == kBoxes) {
+        Quads kept = slotAt(slot, 32u);
+        Box box = Box(uintBitsToFloat(kept.quad[0].xyz), uintBitsToFloat(kept.quad[1].xyz));
+        return isNumber(box.lo) && isNumber(box.hi) && all(lessThanEqual(box.lo, box.hi)) ? box : emptyBox();
+    }
+    if (job.leafKind == kTriangles) {
+        Quads kept = slotAt(slot, 48u);
+        return cornersBox(uintBitsToFloat(kept.quad[0].xyz), uintBitsToFloat(kept.quad[1].xyz),
+                          uintBitsToFloat(kept.quad[2].xyz));
+    }
+    uvec4 named = slotAt(slot, 16u).quad[0];
+    Corners vertices = Corners(place(job.vertices));
+    return cornersBox(vertices.corner[named.x], vertices.corner[named.y], vertices.corner[named.z]);
+}

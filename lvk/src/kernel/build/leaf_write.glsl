@@ -1,0 +1,22 @@
+// Writes primitives of leaves.
+void writePrimitive(uint slot, uint geometry, uint index, Geometry g, Primitive from) {
+    if (job.leafKind == kTriangles) {
+        Quads kept = slotAt(slot, 48u);
+        kept.quad[0] = uvec4(floatBitsToUint(from.a), index);
+        kept.quad[1] = uvec4(floatBitsToUint(from.b), geometry);
+        kept.quad[2] = uvec4(floatBitsToUint(from.c), g.flags & 1u);
+    } else if (job.leafKind == kIndexedTriangles) {
+        uint number = index | (job.inputCount > 1 ? geometry << 24 : 0u);
+        slotAt(slot, 16u).quad[0] = uvec4(from.corner + g.firstVertex, number);
+    } else {
+        Quads kept = slotAt(slot, 32u);
+        kept.quad[0] = uvec4(floatBitsToUint(from.a), index);
+        kept.quad[1] = uvec4(floatBitsToUint(from.b), geometry | (g.flags & 1u) << 31);
+    }
+}
+
+// The copy of vertices that indexed leaves name.
+void copyVertex(uint i) {
+    Geometry g = readGeometry(geometryOf(i, true));
+    Corners(place(job.vertices)).corner[i] = positionOf(g, i - g.firstVertex);
+}

@@ -1,0 +1,9 @@
+// The box of every triangle or box of the inputs, and the bounds of all.
+void main() {
+    readJob(firstJob);
+    uint i = invocation();
+    uint actives = 0;
+    Box centres = emptyBox();
+    if (i < job.count) centres = keepBox(i, inputBox(i), actives);
+    extendBounds(centres, actives);
+}

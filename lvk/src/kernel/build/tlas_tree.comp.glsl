@@ -1,0 +1,5 @@
+// The hierarchy of instances; those stand where they were read.
+void main() {
+    readJob(firstJob);
+    writeHierarchy(invocation());
+}

@@ -1,0 +1,5 @@
+// The hierarchy, and everything else of the structure but its boxes.
+void main() {
+    readJob(firstJob);
+    writeTree(invocation());
+}

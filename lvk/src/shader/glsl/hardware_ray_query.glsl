@@ -1,0 +1,56 @@
+#ifndef LVK_HARDWARE_RAY_QUERY_GLSL
+#define LVK_HARDWARE_RAY_QUERY_GLSL
+
+// Part of <lvk/ray_query.glsl>: queries by rayQueryEXT.
+
+#extension GL_EXT_ray_query : require
+#ifdef LVK_POSITION_FETCH
+#extension GL_EXT_ray_tracing_position_fetch : require
+#endif
+#include <lvk/hit_numbers.glsl>
+#include <lvk/tlas.glsl>
+
+#define LvkRayQuery rayQueryEXT
+
+// Starts a query: void (LvkRayQuery, uint tlasIndex, uint flags, uint cullMask, vec3 origin, float tMin, vec3 direction, float tMax).
+#define lvkRayQueryInitialize(rq, tlasIndex, flags, mask, origin, tMin, direction, tMax) \
+    rayQueryInitializeEXT(rq, kTLAS[nonuniformEXT(tlasIndex)], flags, mask, origin, tMin, direction, tMax)
+// Steps to the next candidate that the shader must judge; false when the walk is over.
+#define lvkRayQueryProceed(rq) rayQueryProceedEXT(rq)
+// Ends the walk; what was committed stays.
+#define lvkRayQueryTerminate(rq) rayQueryTerminateEXT(rq)
+// Commits the candidate box at distance `t`.
+#define lvkRayQueryGenerateIntersection(rq, t) rayQueryGenerateIntersectionEXT(rq, t)
+// Commits the candidate triangle.
+#define lvkRayQueryConfirmIntersection(rq) rayQueryConfirmIntersectionEXT(rq)
+
+// Of the ray.
+#define lvkRayQueryTMin(rq) rayQueryGetRayTMinEXT(rq)
+#define lvkRayQueryFlags(rq) uint(rayQueryGetRayFlagsEXT(rq))
+#define lvkRayQueryWorldRayOrigin(rq) rayQueryGetWorldRayOriginEXT(rq)
+#define lvkRayQueryWorldRayDirection(rq) rayQueryGetWorldRayDirectionEXT(rq)
+
+// Of an intersection.
+#define lvkRayQueryType(rq, which) rayQueryGetIntersectionTypeEXT(rq, which)
+#define lvkRayQueryT(rq, which) rayQueryGetIntersectionTEXT(rq, which)
+// The application's own numbers of instance and primitive; `tlas` is the index the query was started with.
+#define lvkRayQueryInstanceId(rq, which, tlas) lvkMapInstance(tlas, rayQueryGetIntersectionInstanceIdEXT(rq, which))
+#define lvkRayQueryPrimitiveIndex(rq, which, tlas) \
+    lvkMapPrimitive(tlas, rayQueryGetIntersectionInstanceIdEXT(rq, which), \
+        rayQueryGetIntersectionGeometryIndexEXT(rq, which), rayQueryGetIntersectionPrimitiveIndexEXT(rq, which))
+#define lvkRayQueryInstanceCustomIndex(rq, which) rayQueryGetIntersectionInstanceCustomIndexEXT(rq, which)
+#define lvkRayQuerySbtOffset(rq, which) rayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetEXT(rq, which)
+#define lvkRayQueryGeometryIndex(rq, which) rayQueryGetIntersectionGeometryIndexEXT(rq, which)
+#define lvkRayQueryBarycentrics(rq, which) rayQueryGetIntersectionBarycentricsEXT(rq, which)
+#define lvkRayQueryFrontFace(rq, which) rayQueryGetIntersectionFrontFaceEXT(rq, which)
+#ifdef LVK_POSITION_FETCH
+// The corners of the triangle, in object space: void (LvkRayQuery, which, out vec3[3]). Needs BuildFlags::POSITION_FETCH.
+#define lvkRayQueryTrianglePositions(rq, which, positions) rayQueryGetIntersectionTriangleVertexPositionsEXT(rq, which, positions)
+#endif
+#define lvkRayQueryCandidateAabbOpaque(rq) rayQueryGetIntersectionCandidateAABBOpaqueEXT(rq)
+#define lvkRayQueryObjectRayOrigin(rq, which) rayQueryGetIntersectionObjectRayOriginEXT(rq, which)
+#define lvkRayQueryObjectRayDirection(rq, which) rayQueryGetIntersectionObjectRayDirectionEXT(rq, which)
+#define lvkRayQueryObjectToWorld(rq, which) rayQueryGetIntersectionObjectToWorldEXT(rq, which)
+#define lvkRayQueryWorldToObject(rq, which) rayQueryGetIntersectionWorldToObjectEXT(rq, which)
+
+#endif

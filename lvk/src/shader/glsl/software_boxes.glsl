@@ -1,0 +1,93 @@
+#ifndef LVK_SOFTWARE_BOXES_GLSL
+#define LVK_SOFTWARE_BOXES_GLSL
+
+#include <lvk/software_layout.glsl>
+
+// A ray against the boxes of a node. Every test errs on the side of a hit, by more than rounding can be wrong, so that
+// the triangles alone decide.
+
+// What of a ray the boxes of a level share.
+struct LvkSoftSlabs {
+    vec3 origin;
+    vec3 inverse; // of the direction, never infinite
+    uint octant;  // a bit for each axis the ray follows: x 4, y 2, z 1
+};
+
+LvkSoftSlabs lvkSoftSlabsOf(vec3 origin, vec3 direction) {
+    const float kLeast = 1e-18;
+    bvec3 isFlat = lessThan(abs(direction), vec3(kLeast));
+    vec3 least = mix(vec3(kLeast), vec3(-kLeast), lessThan(direction, vec3(0.0)));
+    uint octant = (direction.x < 0.0 ? 0u : 4u) | (direction.y < 0.0 ? 0u : 2u) | (direction.z < 0.0 ? 0u : 1u);
+    return LvkSoftSlabs(origin, 1.0 / mix(direction, least, isFlat), octant);
+}
+
+// Where the ray enters and leaves a box, of the range it has left.
+vec2 lvkSoftCross(LvkSoftSlabs ray, vec3 low, vec3 high, vec2 range) {
+    const float kLess = 1.0 - 5e-7, kMore = 1.0 + 5e-7;
+    vec3 a = (low - ray.origin) * ray.inverse;
+    vec3 b = (high - ray.origin) * ray.inverse;
+    vec3 near = min(a, b);
+    vec3 far = max(a, b);
+    return vec2(max(max(near.x, near.y), max(near.z, range.x)) * kLess,
+                min(min(far.x, far.y), min(far.z, range.y)) * kMore);
+}
+
+// The children of a binary node that the ray meets, the nearer one first; LVK_SOFT_NONE for each it misses.
+uvec2 lvkSoftMeet2(LvkSoftSlabs ray, uvec2 nodes, uint node, vec2 range) {
+    LvkSoftBlocks blocks = LvkSoftBlocks(nodes);
+    uint first = node * LVK_SOFT_BINARY_NODE_BLOCKS;
+    uvec4 a = blocks.at[first];
+    uvec4 b = blocks.at[first + 1u];
+    uvec4 c = blocks.at[first + 2u];
+    uvec4 d = blocks.at[first + 3u];
+    vec2 one = lvkSoftCross(ray, uintBitsToFloat(a.xyz), uintBitsToFloat(b.xyz), range);
+    vec2 two = lvkSoftCross(ray, uintBitsToFloat(c.xyz), uintBitsToFloat(d.xyz), range);
+    uint left = one.x <= one.y ? a.w : LVK_SOFT_NONE;
+    uint right = two.x <= two.y ? b.w : LVK_SOFT_NONE;
+    bool swap = left == LVK_SOFT_NONE || (right != LVK_SOFT_NONE && two.x < one.x);
+    return swap ? uvec2(right, left) : uvec2(left, right);
+}
+
+// Of four children of a wide node, those the ray meets, as bits at their places.
+uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, vec3 start, vec3 end, vec2 range) {
+    uint met = 0u;
+    [[unroll]] for (uint child = 0u; child < 32u; child += 8u) {
+        vec3 enter = vec3(near >> child & 255u) * scale + start;
+        vec3 leave = vec3(far >> child & 255u) * scale + end;
+        float first = max(max(enter.x, enter.y), max(enter.z, range.x));
+        float last = min(min(leave.x, leave.y), min(leave.z, range.y));
+        met |= first <= last ? (counts >> child & 7u) << (places >> child & 31u) : 0u;
+    }
+    return met;
+}
+
+// What of a wide node the ray meets (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through
+// Compressed Wide BVHs", 2017): its inner children as a group of nodes, first node and, in the order of the ray, a bit for
+// each from bit 24 on; and its leaves as a group of primitives, first one and a bit for each.
+uvec4 lvkSoftMeet8(LvkSoftSlabs ray, uvec2 nodes, uint node, vec2 range) {
+    LvkSoftBlocks blocks = LvkSoftBlocks(nodes);
+    uint first = node * LVK_SOFT_WIDE_NODE_BLOCKS;
+    uvec4 head = blocks.at[first];
+    uvec4 children = blocks.at[first + 1u];
+    uvec4 x = blocks.at[first + 2u];
+    uvec4 y = blocks.at[first + 3u];
+    uvec4 z = blocks.at[first + 4u];
+    vec3 scale = uintBitsToFloat((head.www >> uvec3(0u, 8u, 16u) & 255u) << 23) * ray.inverse;
+    vec3 start = (uintBitsToFloat(head.xyz) - ray.origin) * ray.inverse;
+    vec3 error = (abs(start) + 256.0 * abs(scale)) * 1e-6;
+    bvec3 along = bvec3(ray.octant & 4u, ray.octant & 2u, ray.octant & 1u);
+    uvec4 nearX = along.x ? x : x.zwxy;
+    uvec4 nearY = along.y ? y : y.zwxy;
+    uvec4 nearZ = along.z ? z : z.zwxy;
+    // Inner children have 24 and more for their place, which then follows the order of the ray.
+    uvec2 inner = (children.zw & (children.zw << 1) & 0x10101010u) >> 4;
+    uvec2 counts = children.zw >> 5 & 0x07070707u;
+    uvec2 places = (children.zw ^ inner * ray.octant) & 0x1F1F1F1Fu;
+    uint met = lvkSoftMeet4(uvec3(nearX.x, nearY.x, nearZ.x), uvec3(nearX.z, nearY.z, nearZ.z), counts.x, places.x,
+                            scale, start - error, start + error, range);
+    met |= lvkSoftMeet4(uvec3(nearX.y, nearY.y, nearZ.y), uvec3(nearX.w, nearY.w, nearZ.w), counts.y, places.y,
+                        scale, start - error, start + error, range);
+    return uvec4(children.x, met & 0xFF000000u | head.w >> 24, children.y, met & 0x00FFFFFFu);
+}
+
+#endif

@@ -1,0 +1,51 @@
+#ifndef LVK_SOFTWARE_LAYOUT_GLSL
+#define LVK_SOFTWARE_LAYOUT_GLSL
+
+// How structures lie in memory; the same numbers as in lvk/src/accel/software/layout.rs. Everything is read in blocks of
+// 16 bytes by address, and a structure says by numbers of blocks from its own start where its parts lie.
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer LvkSoftBlocks { uvec4 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LvkSoftVertices { vec3 at[]; };
+
+// Format of a structure: block 0 is (format, kind of leaves, root, number of primitives); of a moved one the last two
+// are the address of the structure that is meant.
+#define LVK_SOFT_WIDE 0u
+#define LVK_SOFT_BINARY 1u
+#define LVK_SOFT_MOVED 2u
+
+// Kinds of leaves.
+#define LVK_SOFT_TRIANGLES 0u
+#define LVK_SOFT_INDEXED 1u
+#define LVK_SOFT_BOXES 2u
+#define LVK_SOFT_INSTANCES 3u
+
+// References to nodes: a node's number, or with the highest bit a leaf: first primitive, 4 bits number of them less 1.
+#define LVK_SOFT_LEAF 0x80000000u
+#define LVK_SOFT_NONE 0xFFFFFFFFu
+
+// Marks of a bottom-level structure, the last number of block 2.
+#define LVK_SOFT_ALL_OPAQUE 1u
+#define LVK_SOFT_NONE_OPAQUE 2u
+
+// Flags of an instance, the highest byte of the last number of its block 6.
+#define LVK_SOFT_NO_CULL 1u
+#define LVK_SOFT_FLIP_FACING 2u
+#define LVK_SOFT_FORCE_OPAQUE 4u
+#define LVK_SOFT_FORCE_NO_OPAQUE 8u
+
+#define LVK_SOFT_INSTANCE_BLOCKS 8u
+#define LVK_SOFT_TRIANGLE_BLOCKS 3u
+#define LVK_SOFT_BOX_BLOCKS 2u
+#define LVK_SOFT_BINARY_NODE_BLOCKS 4u
+#define LVK_SOFT_WIDE_NODE_BLOCKS 5u
+
+// Paths have at most 64 binary nodes in either level, or 32 wide ones, and a level that is entered saves 3 words.
+#define LVK_SOFT_STACK_WORDS 132u
+
+// The address `blocks` blocks behind another one.
+uvec2 lvkSoftBehind(uvec2 base, uint blocks) {
+    uint carry;
+    uint low = uaddCarry(base.x, blocks << 4, carry);
+    return uvec2(low, base.y + (blocks >> 28) + carry);
+}
+
+#endif

@@ -1,0 +1,140 @@
+#ifndef LVK_SOFTWARE_RAY_QUERY_GLSL
+#define LVK_SOFTWARE_RAY_QUERY_GLSL
+
+// Part of <lvk/ray_query.glsl>: queries that the library walks itself, on devices that have none or only slow ones.
+#include <lvk/software_walk.glsl>
+#include <lvk/tlas_table.glsl>
+
+// A query: its state, and the words of its stack while it waits with a candidate.
+struct LvkRayQuery {
+    LvkSoftState state;
+    uint stack[LVK_SOFT_STACK_WORDS];
+};
+
+void lvkSoftInitialize(out LvkSoftState state, uint tlas, uint flags, uint mask, vec3 origin, float tMin,
+                       vec3 direction, float tMax) {
+    LvkSoftHit none = LvkSoftHit(tMax, 0u, LVK_SOFT_NONE, 0u, vec2(0.0), false, false);
+    lvkSoftQueries += 1u;
+    state = LvkSoftState(kLvkTlasTable.entry[tlas].software, origin, tMin, direction, flags, mask & 0xFFu,
+                         lvkSoftQueries, false, LvkSoftPlace(uvec2(0u), uvec2(0u), 0u, 0u, LVK_SOFT_NONE), none, none);
+    uint root = state.tlas == uvec2(0u) ? LVK_SOFT_NONE : LvkSoftBlocks(state.tlas).at[0].z;
+    if (root != LVK_SOFT_NONE) {
+        lvkSoftGo(state.place, root);
+    }
+}
+
+// Keeps the stack while the shader judges a candidate.
+bool lvkSoftSave(LvkSoftState state, inout uint stack[LVK_SOFT_STACK_WORDS]) {
+    for (uint word = 0u; word < state.place.top; ++word) {
+        stack[word] = lvkSoftStack[word];
+    }
+    return true;
+}
+
+// Takes the stack back that another query has used meanwhile.
+bool lvkSoftRestore(LvkSoftState state, uint stack[LVK_SOFT_STACK_WORDS]) {
+    for (uint word = 0u; word < state.place.top; ++word) {
+        lvkSoftStack[word] = stack[word];
+    }
+    return true;
+}
+
+void lvkSoftJudge(inout LvkSoftState state, uint kind) {
+    LvkSoftPlace place = state.place;
+    lvkSoftCommit(state, place, state.candidate, kind);
+    state.place = place;
+}
+
+void lvkSoftConfirm(inout LvkSoftState state) {
+    lvkSoftJudge(state, 1u);
+}
+
+void lvkSoftGenerate(inout LvkSoftState state, float t) {
+    if (t >= state.tMin && t <= state.committed.t) {
+        state.candidate.t = t;
+        lvkSoftJudge(state, 2u);
+    }
+}
+
+uvec2 lvkSoftInstances(LvkSoftState state) {
+    return lvkSoftBehind(state.tlas, LvkSoftBlocks(state.tlas).at[1].y);
+}
+
+uvec4 lvkSoftInstanceBlock(LvkSoftState state, uint instance, uint block) {
+    return LvkSoftBlocks(lvkSoftInstances(state)).at[instance * LVK_SOFT_INSTANCE_BLOCKS + block];
+}
+
+uvec2 lvkSoftHitNumbers(LvkSoftState state, LvkSoftHit hit) {
+    return lvkSoftNumbers(lvkSoftStructureOf(lvkSoftInstances(state), hit.instance), hit.primitive);
+}
+
+vec3 lvkSoftObject(LvkSoftState state, LvkSoftHit hit, vec4 v) {
+    return lvkSoftTransform(lvkSoftInstances(state), hit.instance * LVK_SOFT_INSTANCE_BLOCKS, v);
+}
+
+// The matrix in the instance's blocks from `first` on.
+mat4x3 lvkSoftMatrix(LvkSoftState state, LvkSoftHit hit, uint first) {
+    vec4 x = uintBitsToFloat(lvkSoftInstanceBlock(state, hit.instance, first));
+    vec4 y = uintBitsToFloat(lvkSoftInstanceBlock(state, hit.instance, first + 1u));
+    vec4 z = uintBitsToFloat(lvkSoftInstanceBlock(state, hit.instance, first + 2u));
+    return transpose(mat3x4(x, y, z));
+}
+
+void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3]) {
+    uvec2 structure = lvkSoftStructureOf(lvkSoftInstances(state), hit.instance);
+    LvkSoftBlocks head = LvkSoftBlocks(structure);
+    uvec2 primitives = lvkSoftBehind(structure, head.at[1].y);
+    lvkSoftCorners(structure, primitives, head.at[0].y == LVK_SOFT_INDEXED, hit.primitive, positions);
+}
+
+// The hit that `which` means.
+#define LVK_SOFT_HIT(rq, which) ((which) ? (rq).state.committed : (rq).state.candidate)
+
+// Starts a query: void (LvkRayQuery, uint tlasIndex, uint flags, uint cullMask, vec3 origin, float tMin, vec3 direction, float tMax).
+#define lvkRayQueryInitialize(rq, tlasIndex, flags, mask, origin, tMin, direction, tMax) \
+    lvkSoftInitialize((rq).state, tlasIndex, flags, mask, origin, tMin, direction, tMax)
+// Steps to the next candidate that the shader must judge; false when the walk is over.
+#define lvkRayQueryProceed(rq) \
+    ((!(rq).state.interrupted || lvkSoftOwner == (rq).state.id || lvkSoftRestore((rq).state, (rq).stack)) \
+        && lvkSoftProceed((rq).state) && lvkSoftSave((rq).state, (rq).stack))
+// Ends the walk; what was committed stays.
+#define lvkRayQueryTerminate(rq) lvkSoftFinish((rq).state.place)
+// Commits the candidate box at distance `t`.
+#define lvkRayQueryGenerateIntersection(rq, t) lvkSoftGenerate((rq).state, t)
+// Commits the candidate triangle.
+#define lvkRayQueryConfirmIntersection(rq) lvkSoftConfirm((rq).state)
+
+// Of the ray.
+#define lvkRayQueryTMin(rq) ((rq).state.tMin)
+#define lvkRayQueryFlags(rq) ((rq).state.flags)
+#define lvkRayQueryWorldRayOrigin(rq) ((rq).state.origin)
+#define lvkRayQueryWorldRayDirection(rq) ((rq).state.direction)
+
+// Of an intersection.
+#define lvkRayQueryType(rq, which) (LVK_SOFT_HIT(rq, which).kind)
+#define lvkRayQueryT(rq, which) (LVK_SOFT_HIT(rq, which).t)
+// The application's own numbers of instance and primitive; `tlas` is the index the query was started with.
+#define lvkRayQueryInstanceId(rq, which, tlas) \
+    int(lvkSoftInstanceBlock((rq).state, LVK_SOFT_HIT(rq, which).instance, 7u).x)
+#define lvkRayQueryPrimitiveIndex(rq, which, tlas) int(lvkSoftHitNumbers((rq).state, LVK_SOFT_HIT(rq, which)).y)
+#define lvkRayQueryInstanceCustomIndex(rq, which) \
+    int(lvkSoftInstanceBlock((rq).state, LVK_SOFT_HIT(rq, which).instance, 6u).z & 0x00FFFFFFu)
+#define lvkRayQuerySbtOffset(rq, which) \
+    (lvkSoftInstanceBlock((rq).state, LVK_SOFT_HIT(rq, which).instance, 6u).w & 0x00FFFFFFu)
+#define lvkRayQueryGeometryIndex(rq, which) int(lvkSoftHitNumbers((rq).state, LVK_SOFT_HIT(rq, which)).x)
+#define lvkRayQueryBarycentrics(rq, which) (LVK_SOFT_HIT(rq, which).barycentrics)
+#define lvkRayQueryFrontFace(rq, which) (LVK_SOFT_HIT(rq, which).front)
+#ifdef LVK_POSITION_FETCH
+// The corners of the triangle, in object space: void (LvkRayQuery, which, out vec3[3]). Needs BuildFlags::POSITION_FETCH.
+#define lvkRayQueryTrianglePositions(rq, which, positions) \
+    lvkSoftPositions((rq).state, LVK_SOFT_HIT(rq, which), positions)
+#endif
+#define lvkRayQueryCandidateAabbOpaque(rq) ((rq).state.candidate.opaque)
+#define lvkRayQueryObjectRayOrigin(rq, which) \
+    lvkSoftObject((rq).state, LVK_SOFT_HIT(rq, which), vec4((rq).state.origin, 1.0))
+#define lvkRayQueryObjectRayDirection(rq, which) \
+    lvkSoftObject((rq).state, LVK_SOFT_HIT(rq, which), vec4((rq).state.direction, 0.0))
+#define lvkRayQueryObjectToWorld(rq, which) lvkSoftMatrix((rq).state, LVK_SOFT_HIT(rq, which), 3u)
+#define lvkRayQueryWorldToObject(rq, which) lvkSoftMatrix((rq).state, LVK_SOFT_HIT(rq, which), 0u)
+
+#endif

@@ -1,0 +1,392 @@
+#ifndef LVK_SOFTWARE_WALK_GLSL
+#define LVK_SOFTWARE_WALK_GLSL
+
+// The state of a query that the library walks itself, and its walk through both levels.
+#include <lvk/ray_flags.glsl>
+#include <lvk/software_boxes.glsl>
+#include <lvk/software_layout.glsl>
+#include <lvk/software_triangle.glsl>
+
+// LvkSoftHit.kind of candidates. Committed ones have LVK_COMMITTED_*.
+#define LVK_SOFT_CANDIDATE_TRIANGLE 0u
+#define LVK_SOFT_CANDIDATE_BOX 1u
+
+struct LvkSoftHit {
+    float t;
+    uint kind;
+    uint instance;  // place in the structure
+    uint primitive; // place among the leaves of the instance's structure
+    vec2 barycentrics;
+    bool front;
+    bool opaque;
+};
+
+// What is left to visit. Words behind `top` are of others; those below `floor` of the level above.
+struct LvkSoftPlace {
+    uvec2 group;   // nodes: of a wide node as lvkSoftMeet8 tells them, or a binary node's number and LVK_SOFT_ONE_NODE
+    uvec2 leaves;  // primitives: the first, and which of it and those behind it
+    uint top;
+    uint floor;
+    uint instance; // the one whose structure is walked, or LVK_SOFT_NONE
+};
+
+// A query without its stack, small enough to be handed in and out of functions.
+struct LvkSoftState {
+    uvec2 tlas;
+    vec3 origin;
+    float tMin;
+    vec3 direction;
+    uint flags;
+    uint mask;
+    uint id;
+    bool interrupted; // a candidate waits, and the stack is kept in the query
+    LvkSoftPlace place;
+    LvkSoftHit candidate;
+    LvkSoftHit committed;
+};
+
+// The structure that is walked, and the ray in its space.
+struct LvkSoftLevel {
+    LvkSoftSlabs slabs;
+    LvkSoftShear shear;
+    uvec2 structure;
+    uvec2 nodes;
+    uvec2 primitives;
+    bool wide;
+    uint kind;    // of its leaves
+    uint opacity; // of all primitives: LVK_SOFT_CLEAR, LVK_SOFT_OPAQUE, or LVK_SOFT_EACH where each has its own
+    uint cull;    // LVK_RAY_FLAG_CULL_* of faces
+    bool flip;
+};
+
+#define LVK_SOFT_ONE_NODE 0x80000000u
+#define LVK_SOFT_ANY_NODE 0x01000000u
+
+#define LVK_SOFT_CLEAR 0u
+#define LVK_SOFT_OPAQUE 1u
+#define LVK_SOFT_EACH 2u
+
+#define LVK_SOFT_CULL_FACES (LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES | LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES)
+
+// The stack of the query that is walking. Queries take turns: one that waits with a candidate keeps its words itself.
+uint lvkSoftStack[LVK_SOFT_STACK_WORDS];
+uint lvkSoftOwner = 0u;
+uint lvkSoftQueries = 0u;
+
+void lvkSoftPush(inout LvkSoftPlace place, uint word) {
+    lvkSoftStack[place.top] = word;
+    place.top += 1u;
+}
+
+uint lvkSoftPop(inout LvkSoftPlace place) {
+    place.top -= 1u;
+    return lvkSoftStack[place.top];
+}
+
+// Goes to a node or leaf that a reference names.
+void lvkSoftGo(inout LvkSoftPlace place, uint reference) {
+    bool isLeaf = (reference & LVK_SOFT_LEAF) != 0u;
+    uint count = (reference >> 27 & 15u) + 1u;
+    place.group = isLeaf ? uvec2(0u) : uvec2(reference, LVK_SOFT_ONE_NODE);
+    place.leaves = isLeaf ? uvec2(reference & 0x07FFFFFFu, (1u << count) - 1u) : uvec2(0u);
+}
+
+bool lvkSoftIsCulled(uint flags, bool opaque) {
+    return (flags & (opaque ? LVK_RAY_FLAG_CULL_OPAQUE : LVK_RAY_FLAG_CULL_NO_OPAQUE)) != 0u;
+}
+
+uint lvkSoftOpacity(uint marks, uint instanceFlags, uint rayFlags) {
+    uint opacity = (marks & LVK_SOFT_ALL_OPAQUE) != 0u ? LVK_SOFT_OPAQUE
+        : (marks & LVK_SOFT_NONE_OPAQUE) != 0u ? LVK_SOFT_CLEAR : LVK_SOFT_EACH;
+    opacity = (instanceFlags & LVK_SOFT_FORCE_OPAQUE) != 0u ? LVK_SOFT_OPAQUE : opacity;
+    opacity = (instanceFlags & LVK_SOFT_FORCE_NO_OPAQUE) != 0u ? LVK_SOFT_CLEAR : opacity;
+    opacity = (rayFlags & LVK_RAY_FLAG_OPAQUE) != 0u ? LVK_SOFT_OPAQUE : opacity;
+    return (rayFlags & LVK_RAY_FLAG_NO_OPAQUE) != 0u ? LVK_SOFT_CLEAR : opacity;
+}
+
+// The top level, as the ray is.
+LvkSoftLevel lvkSoftTopLevel(LvkSoftState state) {
+    LvkSoftLevel level;
+    uvec2 addresses = LvkSoftBlocks(state.tlas).at[1].xy;
+    level.slabs = lvkSoftSlabsOf(state.origin, state.direction);
+    level.shear = LvkSoftShear(vec3(0.0), vec3(0.0), 0u);
+    level.structure = state.tlas;
+    level.nodes = lvkSoftBehind(state.tlas, addresses.x);
+    level.primitives = lvkSoftBehind(state.tlas, addresses.y);
+    level.wide = false;
+    level.kind = LVK_SOFT_INSTANCES;
+    level.opacity = LVK_SOFT_EACH;
+    level.cull = 0u;
+    level.flip = false;
+    return level;
+}
+
+// Three rows of a matrix by a vector.
+vec3 lvkSoftTransform(uvec2 blocks, uint first, vec4 v) {
+    vec4 x = uintBitsToFloat(LvkSoftBlocks(blocks).at[first]);
+    vec4 y = uintBitsToFloat(LvkSoftBlocks(blocks).at[first + 1u]);
+    vec4 z = uintBitsToFloat(LvkSoftBlocks(blocks).at[first + 2u]);
+    return vec3(dot(x, v), dot(y, v), dot(z, v));
+}
+
+// The structure of an instance.
+uvec2 lvkSoftStructureOf(uvec2 instances, uint instance) {
+    uvec2 structure = LvkSoftBlocks(instances).at[instance * LVK_SOFT_INSTANCE_BLOCKS + 6u].xy;
+    uvec4 head = LvkSoftBlocks(structure).at[0];
+    return head.x == LVK_SOFT_MOVED ? head.zw : structure;
+}
+
+// The structure of an instance with the ray in its space; answers its root, or LVK_SOFT_NONE if the ray passes it by.
+uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSoftLevel level) {
+    uint first = instance * LVK_SOFT_INSTANCE_BLOCKS;
+    uvec4 numbers = LvkSoftBlocks(instances).at[first + 6u];
+    if ((numbers.z >> 24 & state.mask) == 0u) {
+        return LVK_SOFT_NONE;
+    }
+    level.structure = lvkSoftStructureOf(instances, instance);
+    uvec4 head = LvkSoftBlocks(level.structure).at[0];
+    uvec4 places = LvkSoftBlocks(level.structure).at[1];
+    uint marks = LvkSoftBlocks(level.structure).at[2].w;
+    uint flags = numbers.w >> 24;
+    level.wide = head.x == LVK_SOFT_WIDE;
+    level.kind = head.y;
+    level.opacity = lvkSoftOpacity(marks, flags, state.flags);
+    level.cull = (flags & LVK_SOFT_NO_CULL) != 0u ? 0u : state.flags & LVK_SOFT_CULL_FACES;
+    level.flip = (flags & LVK_SOFT_FLIP_FACING) != 0u;
+    level.nodes = lvkSoftBehind(level.structure, places.x);
+    level.primitives = lvkSoftBehind(level.structure, places.y);
+    vec3 origin = lvkSoftTransform(instances, first, vec4(state.origin, 1.0));
+    vec3 direction = lvkSoftTransform(instances, first, vec4(state.direction, 0.0));
+    level.slabs = lvkSoftSlabsOf(origin, direction);
+    level.shear = lvkSoftShearOf(origin, direction);
+    uint skip = level.kind == LVK_SOFT_BOXES ? LVK_RAY_FLAG_SKIP_AABBS : LVK_RAY_FLAG_SKIP_TRIANGLES;
+    bool culled = level.opacity != LVK_SOFT_EACH && lvkSoftIsCulled(state.flags, level.opacity == LVK_SOFT_OPAQUE);
+    return culled || (state.flags & skip) != 0u ? LVK_SOFT_NONE : head.z;
+}
+
+// Visits the next node of the group.
+void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
+    if (level.wide) {
+        uint bit = uint(findMSB(place.group.y));
+        uint slot = bit - 24u ^ level.slabs.octant;
+        uint before = bitCount(place.group.y & 0xFFu & (1u << slot) - 1u);
+        uint node = place.group.x + before;
+        place.group.y ^= 1u << bit;
+        if (place.group.y >= LVK_SOFT_ANY_NODE) {
+            lvkSoftPush(place, place.group.x);
+            lvkSoftPush(place, place.group.y);
+        }
+        uvec4 met = lvkSoftMeet8(level.slabs, level.nodes, node, range);
+        place.group = met.xy;
+        place.leaves = met.zw;
+    } else {
+        uvec2 met = lvkSoftMeet2(level.slabs, level.nodes, place.group.x, range);
+        place.group = uvec2(0u);
+        if (met.y != LVK_SOFT_NONE) {
+            lvkSoftPush(place, met.y);
+        }
+        if (met.x != LVK_SOFT_NONE) {
+            lvkSoftGo(place, met.x);
+        }
+    }
+}
+
+// Takes from the stack what was put aside last in this level.
+void lvkSoftResume(inout LvkSoftPlace place, LvkSoftLevel level) {
+    uint word = lvkSoftPop(place);
+    if (level.wide) {
+        place.group = uvec2(lvkSoftPop(place), word);
+    } else {
+        lvkSoftGo(place, word);
+    }
+}
+
+// Goes on to primitives that the ray may hit; false where the level has none left.
+bool lvkSoftFindLeaves(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
+    while (place.leaves.y == 0u) {
+        if (place.group.y < LVK_SOFT_ANY_NODE) {
+            if (place.top == place.floor) {
+                return false;
+            }
+            lvkSoftResume(place, level);
+        } else {
+            lvkSoftVisit(place, level, range);
+        }
+    }
+    return true;
+}
+
+// Ends the walk.
+void lvkSoftFinish(inout LvkSoftPlace place) {
+    place = LvkSoftPlace(uvec2(0u), uvec2(0u), 0u, 0u, LVK_SOFT_NONE);
+}
+
+// Commits a hit; ends the walk if that is enough.
+void lvkSoftCommit(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftHit hit, uint kind) {
+    state.committed = hit;
+    state.committed.kind = kind;
+    if ((state.flags & LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT) != 0u) {
+        lvkSoftFinish(place);
+    }
+}
+
+
+// The corners of a triangle.
+void lvkSoftCorners(uvec2 structure, uvec2 primitives, bool indexed, uint primitive, out vec3 corners[3]) {
+    if (indexed) {
+        uvec3 vertices = LvkSoftBlocks(primitives).at[primitive].xyz;
+        uvec2 points = lvkSoftBehind(structure, LvkSoftBlocks(structure).at[1].z);
+        corners[0] = LvkSoftVertices(points).at[vertices.x];
+        corners[1] = LvkSoftVertices(points).at[vertices.y];
+        corners[2] = LvkSoftVertices(points).at[vertices.z];
+    } else {
+        uint first = primitive * LVK_SOFT_TRIANGLE_BLOCKS;
+        corners[0] = uintBitsToFloat(LvkSoftBlocks(primitives).at[first].xyz);
+        corners[1] = uintBitsToFloat(LvkSoftBlocks(primitives).at[first + 1u].xyz);
+        corners[2] = uintBitsToFloat(LvkSoftBlocks(primitives).at[first + 2u].xyz);
+    }
+}
+
+// The application's numbers of a primitive: geometry, primitive.
+uvec2 lvkSoftNumbers(uvec2 structure, uint primitive) {
+    LvkSoftBlocks head = LvkSoftBlocks(structure);
+    uint kind = head.at[0].y;
+    LvkSoftBlocks blocks = LvkSoftBlocks(lvkSoftBehind(structure, head.at[1].y));
+    if (kind == LVK_SOFT_INDEXED) {
+        uint both = blocks.at[primitive].w;
+        bool several = head.at[2].y > 1u;
+        return several ? uvec2(both >> 24, both & 0x00FFFFFFu) : uvec2(0u, both);
+    }
+    uint first = primitive * (kind == LVK_SOFT_BOXES ? LVK_SOFT_BOX_BLOCKS : LVK_SOFT_TRIANGLE_BLOCKS);
+    return uvec2(blocks.at[first + 1u].w & 0x7FFFFFFFu, blocks.at[first].w);
+}
+
+// Whether a primitive says of itself that it is opaque.
+bool lvkSoftSaysOpaque(LvkSoftLevel level, uint primitive) {
+    LvkSoftBlocks blocks = LvkSoftBlocks(level.primitives);
+    if (level.kind == LVK_SOFT_TRIANGLES) {
+        return (blocks.at[primitive * LVK_SOFT_TRIANGLE_BLOCKS + 2u].w & 1u) != 0u;
+    }
+    if (level.kind == LVK_SOFT_BOXES) {
+        return (blocks.at[primitive * LVK_SOFT_BOX_BLOCKS + 1u].w & 0x80000000u) != 0u;
+    }
+    uvec2 geometries = lvkSoftBehind(level.structure, LvkSoftBlocks(level.structure).at[1].w);
+    return (LvkSoftBlocks(geometries).at[lvkSoftNumbers(level.structure, primitive).x].x & 1u) != 0u;
+}
+
+// Whether the ray meets the box of a primitive.
+bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, uint primitive) {
+    uint first = primitive * LVK_SOFT_BOX_BLOCKS;
+    vec3 low = uintBitsToFloat(LvkSoftBlocks(level.primitives).at[first].xyz);
+    vec3 high = uintBitsToFloat(LvkSoftBlocks(level.primitives).at[first + 1u].xyz);
+    vec2 range = lvkSoftCross(level.slabs, low, high, vec2(state.tMin, state.committed.t));
+    return range.x <= range.y;
+}
+
+// Whether the ray hits a triangle between its ends, which do not count themselves, and from a side that counts.
+bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, uint primitive, inout LvkSoftHit hit) {
+    vec3 corners[3];
+    lvkSoftCorners(level.structure, level.primitives, level.kind == LVK_SOFT_INDEXED, primitive, corners);
+    LvkSoftPassage passage;
+    if (!lvkSoftPasses(level.shear, corners[0], corners[1], corners[2], passage)) {
+        return false;
+    }
+    if (!(passage.t > state.tMin && passage.t < state.committed.t)) {
+        return false;
+    }
+    hit.t = passage.t;
+    hit.barycentrics = passage.barycentrics;
+    hit.front = passage.front != level.flip;
+    uint culls = hit.front ? LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES : LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES;
+    return (level.cull & culls) == 0u;
+}
+
+// Tests the next primitive. Answers whether it is a candidate that the shader must judge.
+bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
+    uint primitive = place.leaves.x + uint(findLSB(place.leaves.y));
+    place.leaves.y &= place.leaves.y - 1u;
+    bool isBox = level.kind == LVK_SOFT_BOXES;
+    LvkSoftHit hit = LvkSoftHit(0.0, LVK_SOFT_CANDIDATE_TRIANGLE, place.instance, primitive, vec2(0.0), false, false);
+    bool isHit = isBox ? lvkSoftMeetsBox(state, level, primitive) : lvkSoftHitsTriangle(state, level, primitive, hit);
+    if (!isHit) {
+        return false;
+    }
+    hit.opaque = level.opacity == LVK_SOFT_EACH ? lvkSoftSaysOpaque(level, primitive) : level.opacity == LVK_SOFT_OPAQUE;
+    if (lvkSoftIsCulled(state.flags, hit.opaque)) {
+        return false;
+    }
+    if (hit.opaque && !isBox) {
+        lvkSoftCommit(state, place, hit, 1u);
+        return false;
+    }
+    state.candidate = hit;
+    state.candidate.kind = isBox ? LVK_SOFT_CANDIDATE_BOX : LVK_SOFT_CANDIDATE_TRIANGLE;
+    return true;
+}
+
+// From a leaf of the top level into the structure of its next instance, if the ray may hit it.
+void lvkSoftDescend(LvkSoftState state, inout LvkSoftPlace place, inout LvkSoftLevel level) {
+    uint instance = place.leaves.x + uint(findLSB(place.leaves.y));
+    place.leaves.y &= place.leaves.y - 1u;
+    LvkSoftLevel below;
+    uint root = lvkSoftEnter(state, level.primitives, instance, below);
+    if (root == LVK_SOFT_NONE) {
+        return;
+    }
+    lvkSoftPush(place, place.group.y == 0u ? LVK_SOFT_NONE : place.group.x);
+    lvkSoftPush(place, place.leaves.x);
+    lvkSoftPush(place, place.leaves.y);
+    place.floor = place.top;
+    place.instance = instance;
+    level = below;
+    lvkSoftGo(place, root);
+}
+
+// Back to the top level.
+void lvkSoftAscend(LvkSoftState state, inout LvkSoftPlace place, inout LvkSoftLevel level) {
+    place.instance = LVK_SOFT_NONE;
+    place.floor = 0u;
+    uint bits = lvkSoftPop(place);
+    uint first = lvkSoftPop(place);
+    uint node = lvkSoftPop(place);
+    place.group = node == LVK_SOFT_NONE ? uvec2(0u) : uvec2(node, LVK_SOFT_ONE_NODE);
+    place.leaves = uvec2(first, bits);
+    level = lvkSoftTopLevel(state);
+}
+
+// Walks on to the next candidate; false when there is none.
+bool lvkSoftProceed(inout LvkSoftState state) {
+    state.interrupted = false;
+    if (state.tlas == uvec2(0u)) {
+        return false;
+    }
+    lvkSoftOwner = state.id;
+    LvkSoftPlace place = state.place;
+    LvkSoftLevel level = lvkSoftTopLevel(state);
+    if (place.instance != LVK_SOFT_NONE) {
+        uvec2 instances = level.primitives;
+        lvkSoftEnter(state, instances, place.instance, level);
+    }
+    while (true) {
+        if (!lvkSoftFindLeaves(place, level, vec2(state.tMin, state.committed.t))) {
+            if (place.instance == LVK_SOFT_NONE) {
+                break;
+            }
+            lvkSoftAscend(state, place, level);
+        } else if (place.instance == LVK_SOFT_NONE) {
+            lvkSoftDescend(state, place, level);
+        } else {
+            while (place.leaves.y != 0u) {
+                if (lvkSoftTest(state, place, level)) {
+                    state.interrupted = true;
+                    state.place = place;
+                    return true;
+                }
+            }
+        }
+    }
+    lvkSoftFinish(state.place);
+    return false;
+}
+
+#endif

@@ -1,0 +1,25 @@
+//! Takes a declaration out of modules that walk ray queries themselves.
+
+use ::spirv::{Capability, Op};
+
+use super::spirv::{HEADER_WORDS, instructions};
+
+/// The module without the capability that `layout(primitive_culling)` asks for, where nothing in it traces by the device:
+/// software skips kinds of primitives without a word of permission, and Vulkan refuses the capability alone.
+pub(super) fn without_idle_culling(words: &[u32]) -> Vec<u32> {
+    let declares = |capability: Capability| {
+        let is = |words: &[u32]| words.len() == 2 && words[1] == capability as u32;
+        instructions(words).flatten().any(|found| found.op == Some(Op::Capability) && is(found.words))
+    };
+    if declares(Capability::RayQueryKHR) || declares(Capability::RayTracingKHR) {
+        return words.to_vec();
+    }
+    let culling = Capability::RayTraversalPrimitiveCullingKHR as u32;
+    let mut kept = words.get(..HEADER_WORDS).unwrap_or(words).to_vec();
+    for instruction in instructions(words).flatten() {
+        if instruction.op != Some(Op::Capability) || instruction.operand(0) != culling {
+            kept.extend_from_slice(instruction.words);
+        }
+    }
+    kept
+}

@@ -1,0 +1,207 @@
+//! Binary trees by binned surface area, never deeper than the walk's stack.
+
+use super::tree::{Nodes, Tree};
+use crate::accel::bounds::Bounds;
+use crate::accel::software::layout::{BinaryNode, DEEPEST_BINARY, LARGEST_LEAF, LEAF, NONE, leaf};
+
+const BINS: usize = 16;
+/// From here on halves have the same number of primitives, so that at most 27 levels follow.
+const HALVED_FROM: usize = DEEPEST_BINARY - 28;
+
+/// A range of the order that becomes a node or a leaf.
+#[derive(Clone, Copy)]
+struct Work {
+    first: usize,
+    end: usize,
+    depth: usize,
+}
+
+struct Builder<'a> {
+    bounds: &'a [Bounds],
+    order: Vec<u32>,
+    nodes: Vec<BinaryNode>,
+    leaf_size: usize,
+}
+
+/// A tree whose leaves hold at most `leaf_size` primitives.
+pub(crate) fn build(bounds: &[Bounds], leaf_size: usize) -> Tree {
+    let leaf_size = leaf_size.clamp(1, LARGEST_LEAF);
+    let mut builder =
+        Builder { bounds, order: (0..bounds.len() as u32).collect(), nodes: Vec::new(), leaf_size };
+    let root = builder.root();
+    Tree { nodes: Nodes::Binary(builder.nodes), root, order: builder.order }
+}
+
+impl Builder<'_> {
+    fn root(&mut self) -> u32 {
+        let whole = Work { first: 0, end: self.order.len(), depth: 1 };
+        let mut open = Vec::new();
+        let root = self.place(whole, &mut open);
+        while let Some((node, work)) = open.pop() {
+            self.fill(node, work, &mut open);
+        }
+        root
+    }
+
+    /// The reference to a range: a leaf, or a node that is filled later.
+    fn place(&mut self, work: Work, open: &mut Vec<(usize, Work)>) -> u32 {
+        match work.end - work.first {
+            0 => NONE,
+            count if count <= self.leaf_size => leaf(work.first as u32, count),
+            _ => {
+                self.nodes.push(bytemuck::Zeroable::zeroed());
+                open.push((self.nodes.len() - 1, work));
+                self.nodes.len() as u32 - 1
+            }
+        }
+    }
+
+    fn fill(&mut self, node: usize, work: Work, open: &mut Vec<(usize, Work)>) {
+        let middle = self.split(work);
+        let (one, two) = (self.union(work.first, middle), self.union(middle, work.end));
+        let depth = work.depth + 1;
+        let child0 = self.place(Work { end: middle, depth, ..work }, open);
+        let child1 = self.place(Work { first: middle, depth, ..work }, open);
+        self.nodes[node] = BinaryNode {
+            low0: one.low,
+            child0,
+            high0: one.high,
+            child1,
+            low1: two.low,
+            reserved0: 0,
+            high1: two.high,
+            reserved1: 0,
+        };
+    }
+
+    fn union(&self, first: usize, end: usize) -> Bounds {
+        let of = |number: &u32| self.bounds[*number as usize];
+        self.order[first..end].iter().map(of).fold(Bounds::EMPTY, Bounds::union)
+    }
+
+    /// Orders a range so that it falls into two at the place that is answered.
+    fn split(&mut self, work: Work) -> usize {
+        let Work { first, end, depth } = work;
+        let centers = self.order[first..end].iter().map(|number| center(&self.bounds[*number as usize]));
+        let spread = centers.fold(Bounds::EMPTY, |all, at| all.union(Bounds { low: at, high: at }));
+        if depth < HALVED_FROM
+            && let Some((axis, bin)) = self.best_bin(work, &spread)
+        {
+            let bounds = self.bounds;
+            let below = |number: &u32| bin_of(&bounds[*number as usize], &spread, axis) < bin;
+            let middle = first + partition(&mut self.order[first..end], below);
+            if middle > first && middle < end {
+                return middle;
+            }
+        }
+        let size = spread.high - spread.low;
+        let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
+        let (bounds, middle) = (self.bounds, first + (end - first) / 2);
+        self.order[first..end].select_nth_unstable_by(middle - first, |a, b| {
+            let at = |number: &u32| center(&bounds[*number as usize])[axis];
+            at(a).total_cmp(&at(b)).then(a.cmp(b))
+        });
+        middle
+    }
+
+    /// The axis and the first bin of the second half that make the cheapest children.
+    fn best_bin(&self, work: Work, spread: &Bounds) -> Option<(usize, usize)> {
+        let mut best = None;
+        let mut least = f32::INFINITY;
+        for axis in 0..3 {
+            if spread.high[axis] <= spread.low[axis] {
+                continue;
+            }
+            let mut bins = [(Bounds::EMPTY, 0_usize); BINS];
+            for number in &self.order[work.first..work.end] {
+                let bounds = &self.bounds[*number as usize];
+                let bin = &mut bins[bin_of(bounds, spread, axis)];
+                *bin = (bin.0.union(*bounds), bin.1 + 1);
+            }
+            for (bin, cost) in costs(&bins) {
+                if cost < least {
+                    (least, best) = (cost, Some((axis, bin)));
+                }
+            }
+        }
+        best
+    }
+}
+
+/// The cost of a split in front of each bin but the first.
+fn costs(bins: &[(Bounds, usize); BINS]) -> [(usize, f32); BINS - 1] {
+    let mut after = [0.0; BINS];
+    let (mut bounds, mut count) = (Bounds::EMPTY, 0);
+    for bin in (1..BINS).rev() {
+        (bounds, count) = (bounds.union(bins[bin].0), count + bins[bin].1);
+        after[bin] = bounds.half_area() * count as f32;
+    }
+    (bounds, count) = (Bounds::EMPTY, 0);
+    std::array::from_fn(|bin| {
+        (bounds, count) = (bounds.union(bins[bin].0), count + bins[bin].1);
+        (bin + 1, bounds.half_area() * count as f32 + after[bin + 1])
+    })
+}
+
+fn center(bounds: &Bounds) -> glam::Vec3 {
+    bounds.low * 0.5 + bounds.high * 0.5
+}
+
+fn bin_of(bounds: &Bounds, spread: &Bounds, axis: usize) -> usize {
+    let share = (center(bounds)[axis] - spread.low[axis]) / (spread.high[axis] - spread.low[axis]);
+    ((share * BINS as f32) as usize).min(BINS - 1)
+}
+
+/// Moves those that are `first` to the front; answers how many.
+fn partition(numbers: &mut [u32], first: impl Fn(&u32) -> bool) -> usize {
+    let mut count = 0;
+    for index in 0..numbers.len() {
+        if first(&numbers[index]) {
+            numbers.swap(count, index);
+            count += 1;
+        }
+    }
+    count
+}
+
+/// For each node its parent and, in the highest three bits, which child it is.
+pub(super) fn parents(nodes: &[BinaryNode]) -> Vec<u32> {
+    let mut parents = vec![NONE; nodes.len()];
+    for (number, node) in (0_u32..).zip(nodes) {
+        for (child, place) in [node.child0, node.child1].into_iter().enumerate() {
+            if place & LEAF == 0
+                && let Some(parent) = parents.get_mut(place as usize)
+            {
+                *parent = number | (child as u32) << 29;
+            }
+        }
+    }
+    parents
+}
+
+/// Whether every path from the first node ends in primitives that exist, none is too long, and no two meet. Nodes stand
+/// in any order.
+pub(super) fn is_sound(nodes: &[BinaryNode], primitives: usize) -> bool {
+    let mut seen = vec![false; nodes.len()];
+    let mut open = vec![(0_u32, 1_usize)];
+    while let Some((place, depth)) = open.pop() {
+        let Some(node) = nodes.get(place as usize) else { return false };
+        if depth > DEEPEST_BINARY || std::mem::replace(&mut seen[place as usize], true) {
+            return false;
+        }
+        for child in [node.child0, node.child1].into_iter().filter(|child| *child != NONE) {
+            if child & LEAF == 0 {
+                open.push((child, depth + 1));
+            } else if !names_primitives(child, primitives) {
+                return false;
+            }
+        }
+    }
+    true
+}
+
+/// Whether a reference to a leaf names primitives that exist.
+pub(super) fn names_primitives(reference: u32, primitives: usize) -> bool {
+    let (first, count) = (reference & 0x07ff_ffff, (reference >> 27 & 15) + 1);
+    reference & LEAF != 0 && first as usize + count as usize <= primitives
+}

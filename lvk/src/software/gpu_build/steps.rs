@@ -1,0 +1,168 @@
+//! Which kernels run in which order, and which of them side by side.
+
+use crate::accel::software::layout::LeafKind;
+use crate::accel::software::plan::{BuildSource, GpuBuildPlan, SORT_BLOCK};
+use crate::accel::software::refit_plan::{GpuRefitPlan, NodeFormat};
+use crate::kernel::Kernel;
+
+/// Invocations of a workgroup, `kGroup` of `kernel/build/job.glsl`.
+const GROUP: u32 = 128;
+/// Passes over the first word of codes, four bits each, and at most over both words.
+const FIRST_WORD_PASSES: u32 = 8;
+const MOST_PASSES: u32 = 16;
+
+/// One dispatch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Step {
+    /// Steps of a phase run side by side; a phase waits for the one before.
+    pub(crate) phase: u32,
+    pub(crate) kernel: Kernel,
+    /// Which job, or the first of several that a workgroup each works on.
+    pub(crate) job: u32,
+    /// Which pass of the sort, or how many jobs there are with a workgroup each.
+    pub(crate) pass_or_jobs: u32,
+    pub(crate) groups: u32,
+}
+
+/// The steps of builds, by phases. Job `i` is build `order[i]`: those that one workgroup makes come first, by kind, so that
+/// one dispatch has them all.
+pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usize>, Vec<Step>) {
+    let mut order: Vec<usize> = (0..builds.len()).collect();
+    let small = |build: &usize| {
+        let (plan, source) = builds[*build];
+        let kernel = match plan.leaf_kind {
+            LeafKind::Instances => Kernel::BuildSmallTlas,
+            _ => Kernel::BuildSmallBlas,
+        };
+        plan.is_small(source.count(plan)).then_some(kernel)
+    };
+    order.sort_by_key(|build| (small(build).is_none(), small(build)));
+    let mut steps: Vec<Step> = Vec::new();
+    for (job, build) in (0..).zip(&order) {
+        match (small(build), steps.last_mut()) {
+            (None, _) => {
+                let (plan, source) = builds[*build];
+                large_build(job, plan, source.count(plan), &mut steps);
+            }
+            (Some(kernel), Some(last)) if last.kernel == kernel => {
+                last.groups += 1;
+                last.pass_or_jobs += 1;
+            }
+            (Some(kernel), _) => steps.push(Step { phase: 0, kernel, job, pass_or_jobs: 1, groups: 1 }),
+        }
+    }
+    steps.sort_by_key(|step| (step.phase, step.kernel));
+    (order, steps)
+}
+
+fn large_build(job: u32, plan: &GpuBuildPlan, count: u32, steps: &mut Vec<Step>) {
+    let groups = |invocations: u32| invocations.div_ceil(GROUP).max(1);
+    let mut add = |phase, kernel, groups| steps.push(Step { phase, kernel, job, pass_or_jobs: 0, groups });
+    let (read, tree) = match plan.leaf_kind {
+        LeafKind::Instances => (Kernel::BuildInstances, Kernel::BuildTlasTree),
+        _ => (Kernel::BuildPrimitives, Kernel::BuildTree),
+    };
+    add(0, Kernel::BuildReset, 1);
+    add(1, read, groups(count));
+    add(2, Kernel::BuildCodes, groups(count));
+    let written = count.max(plan.geometry_count).max(plan.vertex_count);
+    add(3 + MOST_PASSES * 3, tree, groups(written));
+    let nodes = groups(plan.node_capacity());
+    if plan.improvements == 0 {
+        add(4 + MOST_PASSES * 3, Kernel::FitBinary, nodes);
+    }
+    for round in 0..plan.improvements {
+        if round > 0 {
+            add(3 + MOST_PASSES * 3 + 2 * round, Kernel::ResetArrivals, nodes);
+        }
+        add(4 + MOST_PASSES * 3 + 2 * round, Kernel::BuildImprove, nodes);
+    }
+    steps.extend(sort_steps(job, count, plan.low_bits));
+}
+
+/// The steps that sort the keys of a build, the low words first.
+pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<Step> {
+    let blocks = count.div_ceil(SORT_BLOCK).max(1);
+    let passes = low_bits.div_ceil(4) + FIRST_WORD_PASSES;
+    let pass = |pass_or_jobs| {
+        let step = |nth, kernel, groups| Step {
+            phase: 3 + pass_or_jobs * 3 + nth,
+            kernel,
+            job,
+            pass_or_jobs,
+            groups,
+        };
+        [
+            step(0, Kernel::SortCount, blocks),
+            step(1, Kernel::SortScan, 1),
+            step(2, Kernel::SortScatter, blocks),
+        ]
+    };
+    (0..passes).flat_map(pass).collect()
+}
+
+/// The steps of refits, by phases; job `i` is refit `i`.
+pub(crate) fn refit_steps(refits: &[GpuRefitPlan]) -> Vec<Step> {
+    let mut steps = Vec::new();
+    for (job, plan) in (0..).zip(refits) {
+        let written = plan.primitive_count.max(plan.node_count).max(plan.vertex_count);
+        let fit = match plan.format {
+            NodeFormat::Wide => Kernel::FitWide,
+            NodeFormat::Binary => Kernel::FitBinary,
+        };
+        for (phase, kernel, invocations) in [(0, Kernel::RefitLeaves, written), (1, fit, plan.node_count)] {
+            let groups = invocations.div_ceil(GROUP).max(1);
+            steps.push(Step { phase, kernel, job, pass_or_jobs: 0, groups });
+        }
+    }
+    steps.sort_by_key(|step| (step.phase, step.kernel));
+    steps
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::accel::software::plan::BlasShape;
+
+    fn plan(primitive_count: u32) -> GpuBuildPlan {
+        let shape = BlasShape {
+            leaf_kind: LeafKind::Triangles,
+            primitive_count,
+            vertex_count: 0,
+            geometry_count: 1,
+            leaf_size: 2,
+            improvements: 1,
+            refit: true,
+        };
+        GpuBuildPlan::blas("s", &shape).unwrap()
+    }
+
+    proptest! {
+        #[test]
+        fn every_build_has_its_steps_in_order(counts in prop::collection::vec(0..10_000_u32, 0..20)) {
+            let plans: Vec<_> = counts.iter().map(|count| plan(*count)).collect();
+            let source = BuildSource::Geometries(Vec::new());
+            let builds: Vec<_> = plans.iter().map(|plan| (plan, &source)).collect();
+            let (order, steps) = build_steps(&builds);
+            let mut sorted = order.clone();
+            sorted.sort_unstable();
+            prop_assert!(sorted.into_iter().eq(0..counts.len()));
+            prop_assert!(steps.is_sorted_by_key(|step| step.phase));
+            for (job, build) in order.iter().enumerate() {
+                let covers = |step: &&Step| match step.kernel {
+                    Kernel::BuildSmallBlas => job < step.groups as usize,
+                    _ => step.job as usize == job,
+                };
+                let own: Vec<_> = steps.iter().filter(covers).collect();
+                let expected = match counts[*build] {
+                    0..=2048 => 1,
+                    2049..=4096 => 5 + 8 * 3,
+                    _ => 3 + 2 * plans[*build].improvements as usize + 3 * (plans[*build].low_bits.div_ceil(4) as usize + 8),
+                };
+                prop_assert_eq!(own.len(), expected);
+            }
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Instances as the walk reads them.
+
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+
+use crate::accel::bounds::Bounds;
+use crate::accel::instance::TlasInstance;
+use crate::accel::software::layout::Instance;
+
+/// What an instance shows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ShownStructure {
+    pub(crate) address: u64,
+    /// In its own space.
+    pub(crate) bounds: Bounds,
+}
+
+/// An instance and its box in the world.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct PlacedInstance {
+    pub(crate) instance: Instance,
+    pub(crate) bounds: Bounds,
+}
+
+/// The instance with this number in the caller's list; `None` where no ray can meet it.
+pub(crate) fn place(number: u32, instance: &TlasInstance, shown: &ShownStructure) -> Option<PlacedInstance> {
+    let matrix = matrix(&instance.transform);
+    let inverse = rows(&matrix.inverse());
+    let is_finite = inverse.iter().all(|number| number.is_finite());
+    let is_empty = shown.bounds.low.x > shown.bounds.high.x;
+    if instance.mask == 0 || is_empty || !is_finite || matrix.matrix3.determinant() == 0.0 {
+        return None;
+    }
+    let record = Instance {
+        world_to_object: inverse,
+        object_to_world: instance.transform,
+        structure: shown.address,
+        custom_index_and_mask: instance.custom_index | u32::from(instance.mask) << 24,
+        hit_group_offset_and_flags: instance.hit_group_offset | u32::from(instance.flags.bits()) << 24,
+        number,
+        reserved: [0; 3],
+    };
+    Some(PlacedInstance { instance: record, bounds: moved(&matrix, shown.bounds) })
+}
+
+fn matrix(rows: &[f32; 12]) -> DAffine3 {
+    let m = rows.map(f64::from);
+    let column = |x: usize| DVec3::new(m[x], m[x + 4], m[x + 8]);
+    DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) }
+}
+
+fn rows(matrix: &DAffine3) -> [f32; 12] {
+    let (m, t) = (matrix.matrix3.transpose(), matrix.translation);
+    let row = |row: DVec3, last: f64| [row.x as f32, row.y as f32, row.z as f32, last as f32];
+    let (x, y, z) = (row(m.x_axis, t.x), row(m.y_axis, t.y), row(m.z_axis, t.z));
+    [x[0], x[1], x[2], x[3], y[0], y[1], y[2], y[3], z[0], z[1], z[2], z[3]]
+}
+
+/// Around the box as the matrix moves it, with room for what rounding does to the rays.
+fn moved(matrix: &DAffine3, bounds: Bounds) -> Bounds {
+    const ROUNDING: f64 = 1.0 / (1 << 20) as f64;
+    let (low, high) = (bounds.low.as_dvec3(), bounds.high.as_dvec3());
+    let center = matrix.transform_point3((low + high) * 0.5);
+    let m = &matrix.matrix3;
+    let half = (high - low) * 0.5;
+    let reach = m.x_axis.abs() * half.x + m.y_axis.abs() * half.y + m.z_axis.abs() * half.z;
+    let most = (center.abs() + reach).max_element();
+    let reach = reach + DVec3::splat(most * ROUNDING);
+    let finite = |v: DVec3| v.as_vec3().clamp(Vec3::splat(-f32::MAX), Vec3::splat(f32::MAX));
+    Bounds { low: finite(center - reach), high: finite(center + reach) }
+}

@@ -1,0 +1,49 @@
+//! The bytes of a top-level structure that the CPU builds. They fit wherever a build on the GPU of as many would.
+
+use super::binary_tree;
+use super::instances::PlacedInstance;
+use super::tree::Nodes;
+use crate::accel::bounds::Bounds;
+use crate::accel::software::layout::LeafKind;
+use crate::accel::software::layout::{BINARY, BLOCK_BYTES, BinaryNode, Header, Instance, NONE};
+
+/// Builds a tree over the instances and packs it.
+pub(crate) fn build(instances: &[PlacedInstance]) -> Vec<u8> {
+    if instances.is_empty() {
+        let nothing = Header {
+            format: BINARY,
+            leaf_kind: LeafKind::Instances as u32,
+            root: NONE,
+            low: [f32::MAX; 3],
+            high: [-f32::MAX; 3],
+            ..bytemuck::Zeroable::zeroed()
+        };
+        return bytemuck::bytes_of(&nothing).to_vec();
+    }
+    let bounds: Vec<Bounds> = instances.iter().map(|placed| placed.bounds).collect();
+    let tree = binary_tree::build(&bounds, 1);
+    let whole = bounds.into_iter().fold(Bounds::EMPTY, Bounds::union);
+    let nodes: &[BinaryNode] = match &tree.nodes {
+        Nodes::Binary(nodes) => nodes,
+        Nodes::Wide(_) => &[],
+    };
+    let ordered: Vec<Instance> =
+        tree.order.iter().map(|number| instances[*number as usize].instance).collect();
+    let places = size_of::<Header>() / BLOCK_BYTES;
+    let header = Header {
+        format: BINARY,
+        leaf_kind: LeafKind::Instances as u32,
+        root: tree.root,
+        primitive_count: ordered.len() as u32,
+        nodes: places as u32,
+        primitives: (places + size_of_val(nodes) / BLOCK_BYTES) as u32,
+        node_count: nodes.len() as u32,
+        low: whole.low.to_array(),
+        high: whole.high.to_array(),
+        ..bytemuck::Zeroable::zeroed()
+    };
+    let mut bytes = bytemuck::bytes_of(&header).to_vec();
+    bytes.extend_from_slice(bytemuck::cast_slice(nodes));
+    bytes.extend_from_slice(bytemuck::cast_slice(&ordered));
+    bytes
+}

@@ -1,0 +1,47 @@
+//! A tree over the primitives of a mesh, in the form that suits it.
+
+use obvhs::cwbvh::node::CwBvhNode;
+
+use super::binary_tree;
+use super::quality::Quality;
+use super::wide_tree;
+use crate::accel::bounds::Bounds;
+use crate::accel::software::layout::{BinaryNode, NONE, leaf};
+
+/// Nodes of either form.
+pub(crate) enum Nodes {
+    Wide(Vec<CwBvhNode>),
+    Binary(Vec<BinaryNode>),
+}
+
+/// A tree, and the order of primitives in its leaves.
+pub(crate) struct Tree {
+    pub(crate) nodes: Nodes,
+    /// A node or a leaf, or [`NONE`].
+    pub(crate) root: u32,
+    /// For each place in the leaves which primitive stands there.
+    pub(crate) order: Vec<u32>,
+}
+
+impl Tree {
+    /// The tree of a bottom-level structure: wide, but for meshes that wide nodes do not suit.
+    pub(crate) fn of_mesh(bounds: &[Bounds], quality: Quality) -> Self {
+        const ONE_LEAF: usize = 3;
+        match bounds.len() {
+            0 => Self { nodes: Nodes::Wide(Vec::new()), root: NONE, order: Vec::new() },
+            count @ 1..=ONE_LEAF => {
+                let order = (0..count as u32).collect();
+                Self { nodes: Nodes::Wide(Vec::new()), root: leaf(0, count), order }
+            }
+            _ => wide_tree::build(bounds, quality).unwrap_or_else(|| binary_tree::build(bounds, ONE_LEAF)),
+        }
+    }
+
+    /// For each node its parent, with which child of it in the highest three bits; [`NONE`] for the root.
+    pub(super) fn parents(&self) -> Vec<u32> {
+        match &self.nodes {
+            Nodes::Wide(nodes) => wide_tree::parents(nodes),
+            Nodes::Binary(nodes) => binary_tree::parents(nodes),
+        }
+    }
+}

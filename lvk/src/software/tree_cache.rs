@@ -1,0 +1,160 @@
+//! Trees that the CPU has built, kept in a folder from one run to the next.
+
+use std::path::{Path, PathBuf};
+
+use super::blas_blob::BlasBlob;
+use super::mesh::{Mesh, Primitives};
+use super::quality::Quality;
+use super::sound;
+use crate::pipeline::cache_file::{read, replace};
+
+const MAGIC: [u8; 8] = *b"\x89lvktree";
+/// Changes with the builders and with the form of structures.
+const VERSION: u32 = 1;
+/// Magic, version, reserved, length of the structure, checksum of it.
+const HEADER_BYTES: usize = 32;
+
+/// A folder of built trees, each in a file named after what it was built from.
+pub(crate) struct TreeCache {
+    folder: PathBuf,
+}
+
+/// What a tree is built from: the primitives and the settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct TreeKey([u64; 2]);
+
+impl TreeKey {
+    pub(crate) fn of(mesh: &Mesh, quality: Quality) -> Self {
+        let bytes: &[u8] = match &mesh.primitives {
+            Primitives::Triangles(all) => bytemuck::cast_slice(all),
+            Primitives::Boxes(all) => bytemuck::cast_slice(all),
+        };
+        let boxes = matches!(mesh.primitives, Primitives::Boxes(_));
+        let bits = [boxes, quality.fast_build, quality.low_memory, quality.refit];
+        let settings = bits.iter().fold(u64::from(VERSION), |all, bit| all << 1 | u64::from(*bit));
+        let flags: Vec<u32> = mesh.flags.iter().map(|flags| flags.bits()).collect();
+        Self(
+            [1, 2].map(|seed| {
+                sum(bytes, sum(bytemuck::cast_slice(&flags), sum(&settings.to_le_bytes(), seed)))
+            }),
+        )
+    }
+}
+
+impl TreeCache {
+    /// In this folder, which need not exist.
+    pub(crate) fn new(folder: &Path) -> Self {
+        Self { folder: folder.to_owned() }
+    }
+
+    /// The tree of an earlier run, or what `build` makes, which is kept. No trouble with files is an error.
+    pub(crate) fn get_or(&self, key: TreeKey, build: impl FnOnce() -> BlasBlob) -> BlasBlob {
+        let path = self.folder.join(format!("{:016x}{:016x}.tree", key.0[0], key.0[1]));
+        match read(&path) {
+            Ok(file) => match open(&file) {
+                Ok(blob) => return blob,
+                Err(reason) => log::warn!("the tree '{}' is dropped: {reason}", path.display()),
+            },
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {}
+            Err(error) => log::warn!("the tree '{}' cannot be read: {error}", path.display()),
+        }
+        let blob = build();
+        let kept = std::fs::create_dir_all(&self.folder).and_then(|()| replace(&path, &seal(&blob)));
+        if let Err(error) = kept {
+            log::warn!("the tree '{}' cannot be kept: {error}", path.display());
+        }
+        blob
+    }
+}
+
+fn seal(blob: &BlasBlob) -> Vec<u8> {
+    let mut file = Vec::with_capacity(HEADER_BYTES + blob.bytes.len());
+    file.extend(MAGIC);
+    file.extend(VERSION.to_le_bytes());
+    file.extend([0; 4]);
+    file.extend((blob.bytes.len() as u64).to_le_bytes());
+    file.extend(sum(&blob.bytes, 0).to_le_bytes());
+    file.extend(&blob.bytes);
+    file
+}
+
+fn open(file: &[u8]) -> Result<BlasBlob, &'static str> {
+    let (header, bytes) = file.split_at_checked(HEADER_BYTES).ok_or("it is cut off")?;
+    if header[..8] != MAGIC || header[8..12] != VERSION.to_le_bytes() {
+        return Err("another version of the library wrote it");
+    }
+    let whole = header[16..24] == (bytes.len() as u64).to_le_bytes();
+    if !whole || header[24..] != sum(bytes, 0).to_le_bytes() {
+        return Err("it is damaged or cut off");
+    }
+    let sound = sound::check(bytes)?;
+    Ok(BlasBlob { bytes: bytes.to_vec(), bounds: sound.bounds })
+}
+
+/// A checksum of eight bytes at a time: tells damage and other contents, not malice.
+fn sum(bytes: &[u8], seed: u64) -> u64 {
+    const PRIME: u64 = 0x9e37_79b9_7f4a_7c15;
+    let mix = |sum: u64, word: u64| {
+        let mixed = (sum ^ word).wrapping_mul(PRIME);
+        mixed ^ mixed >> 29
+    };
+    let (words, rest) = bytes.as_chunks::<8>();
+    let all = words.iter().fold(seed ^ bytes.len() as u64, |sum, word| mix(sum, u64::from_le_bytes(*word)));
+    rest.iter().fold(all, |sum, byte| mix(sum, u64::from(*byte)))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::super::blas_blob;
+    use super::*;
+    use crate::accel::geometry::GeometryFlags;
+    use crate::accel::software::layout::LeafBox;
+
+    const QUALITY: Quality = Quality { fast_build: false, low_memory: false, refit: false };
+
+    fn mesh(count: u32) -> Mesh {
+        let place = |primitive: u32| {
+            let low = Vec3::splat(primitive as f32);
+            LeafBox { low, primitive, high: low + Vec3::ONE, geometry: 0 }
+        };
+        Mesh {
+            primitives: Primitives::Boxes((0..count).map(place).collect()),
+            flags: vec![GeometryFlags::empty()],
+        }
+    }
+
+    #[test]
+    fn a_tree_is_built_once_and_again_where_its_file_is_damaged() {
+        let folder = std::env::temp_dir().join(format!("lvk-trees-{}", std::process::id()));
+        let cache = TreeCache::new(&folder);
+        let (mesh, key) = (mesh(50), TreeKey::of(&mesh(50), QUALITY));
+        let built = blas_blob::build(&mesh, QUALITY);
+        let mut builds = 0;
+        let mut get = || {
+            cache.get_or(key, || {
+                builds += 1;
+                built.clone()
+            })
+        };
+        assert_eq!((get(), get()), (built.clone(), built.clone()));
+        let path = std::fs::read_dir(&folder).unwrap().next().unwrap().unwrap().path();
+        let mut file = std::fs::read(&path).unwrap();
+        let last = file.len() - 1;
+        file[last] ^= 1;
+        std::fs::write(&path, file).unwrap();
+        assert_eq!(get(), built);
+        assert_eq!(get(), built);
+        assert_eq!(builds, 2, "once, and once more after the damage");
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn other_contents_and_settings_have_other_keys() {
+        let fast = Quality { fast_build: true, ..QUALITY };
+        let keys =
+            [TreeKey::of(&mesh(5), QUALITY), TreeKey::of(&mesh(6), QUALITY), TreeKey::of(&mesh(5), fast)];
+        assert!(keys[0] != keys[1] && keys[0] != keys[2] && keys[1] != keys[2]);
+    }
+}

@@ -1,0 +1,99 @@
+//! Wide trees: PLOC with reinsertion, collapsed to eight compressed children, by the crate `obvhs`.
+
+use glam::Vec3A;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
+use obvhs::cwbvh::node::CwBvhNode;
+use obvhs::ploc::PlocBuilder;
+
+use super::quality::Quality;
+use super::tree::{Nodes, Tree};
+use crate::accel::bounds::Bounds;
+use crate::accel::software::layout::{DEEPEST_WIDE, NONE};
+
+/// Most primitives of a leaf: they are counted in three bits, one by one.
+const LARGEST_LEAF: u32 = 3;
+/// A binary tree deeper than this is not collapsed, which recurses.
+const DEEPEST_SOURCE: usize = 1_000;
+
+/// A wide tree; `None` where the primitives make it too deep.
+pub(super) fn build(bounds: &[Bounds], quality: Quality) -> Option<Tree> {
+    let params = quality.params();
+    let boxes: Vec<Aabb> = bounds
+        .iter()
+        .map(|bounds| Aabb { min: Vec3A::from(bounds.low), max: Vec3A::from(bounds.high) })
+        .collect();
+    let numbers = (0..boxes.len() as u32).collect();
+    let mut binary = PlocBuilder::with_capacity(boxes.len()).build(
+        params.ploc_search_distance,
+        &boxes,
+        numbers,
+        params.sort_precision,
+        params.search_depth_threshold,
+    );
+    if binary.max_depth > DEEPEST_SOURCE {
+        return None;
+    }
+    ReinsertionOptimizer::default().run(&mut binary, params.reinsertion_batch_ratio, None);
+    let wide = bvh2_to_cwbvh(&binary, params.max_prims_per_leaf.clamp(1, LARGEST_LEAF), true, false);
+    let shallow = depth(&wide.nodes) <= DEEPEST_WIDE;
+    shallow.then_some(Tree { nodes: Nodes::Wide(wide.nodes), root: 0, order: wide.primitive_indices })
+}
+
+/// Nodes on the longest path. Children stand behind their parents.
+fn depth(nodes: &[CwBvhNode]) -> usize {
+    let mut depths = vec![1_u32; nodes.len()];
+    for index in 0..nodes.len() {
+        let below = depths[index] + 1;
+        for child in children(&nodes[index]) {
+            if let Some(depth) = depths.get_mut(child as usize) {
+                *depth = (*depth).max(below);
+            }
+        }
+    }
+    depths.into_iter().max().unwrap_or(0) as usize
+}
+
+/// The numbers of a node's inner children.
+pub(super) fn children(node: &CwBvhNode) -> std::ops::Range<u32> {
+    node.child_base_idx..node.child_base_idx.saturating_add(node.imask.count_ones())
+}
+
+/// For each node its parent and, in the highest three bits, which child it is.
+pub(super) fn parents(nodes: &[CwBvhNode]) -> Vec<u32> {
+    let mut parents = vec![NONE; nodes.len()];
+    for (number, node) in (0_u32..).zip(nodes) {
+        let inner = (0..8_u32).filter(|child| node.imask >> child & 1 == 1);
+        for (child, place) in inner.zip(children(node)) {
+            if let Some(parent) = parents.get_mut(place as usize) {
+                *parent = number | child << 29;
+            }
+        }
+    }
+    parents
+}
+
+/// Whether all children and primitives exist, children behind their parents, and no path is too long.
+pub(super) fn is_sound(nodes: &[CwBvhNode], primitives: usize) -> bool {
+    let sound = |(index, node): (usize, &CwBvhNode)| {
+        let children = children(node);
+        let has_children = !children.is_empty();
+        let inner =
+            !has_children || (children.start as usize > index && children.end as usize <= nodes.len());
+        inner && (0..8).all(|child| leaf_is_sound(node, child, primitives))
+    };
+    !nodes.is_empty() && nodes.iter().enumerate().all(sound) && depth(nodes) <= DEEPEST_WIDE
+}
+
+fn leaf_is_sound(node: &CwBvhNode, child: usize, primitives: usize) -> bool {
+    let meta = node.child_meta[child];
+    let is_inner = node.imask >> child & 1 == 1;
+    if is_inner {
+        return meta == 0x20 | (24 + child as u8);
+    }
+    let count = (meta >> 5).count_ones();
+    let end = u64::from(node.primitive_base_idx) + u64::from(meta & 0x1f) + u64::from(count);
+    let unary = matches!(meta >> 5, 0 | 1 | 3 | 7);
+    meta == 0 || (unary && u32::from(meta & 0x1f) + count <= 24 && end <= primitives as u64)
+}

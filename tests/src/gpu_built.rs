@@ -1,0 +1,93 @@
+//! Meshes whose software structures tests build on the GPU, and what the structures then have to hold.
+#![expect(clippy::expect_used, clippy::panic, reason = "a test whose set-up fails has failed")]
+
+use lvk::test_hooks::{Facts, GpuBlasDesc, GpuStructure, build_blas, check_structure, read};
+use lvk::{
+    Aabbs, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, Context, GeometryFlags, Holder, Triangles,
+};
+
+use crate::random::Random;
+
+/// Geometry and primitive, and corners.
+pub type Content = ((u32, u32), Vec<[f32; 3]>);
+
+/// A buffer that builds read.
+pub fn input<T: bytemuck::NoUninit>(ctx: &Context, data: &[T]) -> Holder<BufferHandle> {
+    let bytes: &[u8] = bytemuck::cast_slice(data);
+    let device = ctx.capabilities();
+    let traces = device.ray_tracing_pipeline || device.ray_query;
+    let accel = if traces { BufferUsage::ACCEL_INPUT } else { BufferUsage::empty() };
+    let desc = BufferDesc {
+        size_bytes: bytes.len().max(16) as u64,
+        data: Some(bytes),
+        usage: BufferUsage::STORAGE | accel,
+        debug_name: "input",
+        ..Default::default()
+    };
+    ctx.create_buffer(&desc).expect("a buffer can be made")
+}
+
+/// Corners of small triangles all over a room, the same for the same seed.
+pub fn scattered(count: usize, seed: u64) -> Vec<[[f32; 3]; 3]> {
+    let mut random = Random::new(seed);
+    let mut point = |reach: f32| [(); 3].map(|()| random.between(-reach, reach));
+    let mut triangle = || {
+        let middle = point(100.0);
+        [(); 3].map(|()| {
+            let offset = point(1.0);
+            std::array::from_fn(|axis| middle[axis] + offset[axis])
+        })
+    };
+    (0..count).map(|_| triangle()).collect()
+}
+
+/// One geometry of triangles without indices.
+pub fn triangles(vertices: BufferHandle, count: usize) -> BlasGeometry {
+    BlasGeometry::Triangles(Triangles::packed(vertices, count as u32 * 3))
+}
+
+/// One geometry of boxes.
+pub fn boxes(buffer: BufferHandle, count: usize) -> BlasGeometry {
+    let flags = GeometryFlags::default();
+    BlasGeometry::Aabbs(Aabbs { buffer, offset: 0, stride: 0, count: count as u32, flags })
+}
+
+/// Builds one structure.
+pub fn build(ctx: &Context, geometries: &[BlasGeometry], leaf_size: u32) -> GpuStructure {
+    let desc = GpuBlasDesc { geometries, leaf_size, improvements: 1, indexed: false, refit: true };
+    build_blas(ctx, &[desc]).expect("the build is recorded").remove(0)
+}
+
+/// What a bottom-level structure holds.
+///
+/// # Panics
+/// When it is not sound, or higher than its plan says.
+pub fn facts(ctx: &Context, structure: &GpuStructure) -> Facts {
+    let words = read(ctx, structure).expect("the structure can be read");
+    let facts =
+        check_structure(&words, &|_| panic!("no instances here")).unwrap_or_else(|what| panic!("{what}"));
+    assert!(facts.height <= structure.most_height, "{} nodes high", facts.height);
+    facts
+}
+
+/// Fails unless the structure holds these primitives, each once, with these corners.
+///
+/// # Panics
+/// When it does not.
+pub fn check_contents(facts: &Facts, expected: &[Content]) {
+    let bits = |corners: &[[f32; 3]]| corners.iter().map(|c| c.map(f32::to_bits)).collect::<Vec<_>>();
+    let mut found: Vec<_> =
+        facts.primitives.iter().zip(&facts.corners).map(|(ids, corners)| (*ids, bits(corners))).collect();
+    found.sort_unstable();
+    let mut wanted: Vec<_> = expected.iter().map(|(ids, corners)| (*ids, bits(corners))).collect();
+    wanted.sort_unstable();
+    assert_eq!(found.len(), wanted.len(), "primitives");
+    for (found, wanted) in found.iter().zip(&wanted) {
+        assert_eq!(found, wanted);
+    }
+}
+
+/// The triangles of geometry 0 as [`check_contents`] takes them.
+pub fn numbered(triangles: &[[[f32; 3]; 3]]) -> Vec<Content> {
+    (0..).zip(triangles).map(|(index, corners)| ((0, index), corners.to_vec())).collect()
+}

@@ -1,0 +1,276 @@
+//! Bottom-level structures built on the GPU: every primitive once, boxes that fit, heights within the bound.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use lvk::test_hooks::{EMPTY, GpuBlasDesc, build_blas};
+use lvk::{BlasGeometry, GeometryFlags, GeometryTransform, IndexFormat, Indices, Triangles, VertexFormat};
+use lvk_tests::device;
+use lvk_tests::gpu_built::{boxes, build, check_contents, facts, input, numbered, scattered, triangles};
+
+#[test]
+fn every_triangle_is_in_one_leaf() {
+    let Some(ctx) = device() else { return };
+    for (count, leaf_size) in [
+        (0, 2),
+        (1, 2),
+        (2, 2),
+        (3, 2),
+        (3, 1),
+        (100, 4),
+        (2048, 2),
+        (2049, 2),
+        (2049, 8),
+        (5000, 1),
+        (30_000, 3),
+    ] {
+        let corners = scattered(count, 7);
+        let vertices = input(&ctx, &corners);
+        let found = facts(&ctx, &build(&ctx, &[triangles(*vertices, count)], leaf_size));
+        check_contents(&found, &numbered(&corners));
+        assert_eq!(found.node_count, (count as u32).div_ceil(leaf_size).saturating_sub(1));
+        if count == 0 {
+            assert_eq!(found.bounds, EMPTY);
+        }
+    }
+}
+
+#[test]
+fn many_structures_are_built_side_by_side() {
+    let Some(ctx) = device() else { return };
+    let counts = [10, 3000, 0, 700, 5000, 1, 2500];
+    let meshes: Vec<_> = counts.iter().map(|count| scattered(*count, *count as u64)).collect();
+    let vertices: Vec<_> = meshes.iter().map(|corners| input(&ctx, corners)).collect();
+    let geometries: Vec<_> =
+        vertices.iter().zip(counts).map(|(vertices, count)| [triangles(**vertices, count)]).collect();
+    let desc =
+        |geometries| GpuBlasDesc { geometries, leaf_size: 2, improvements: 1, indexed: false, refit: false };
+    let descs: Vec<_> = geometries.iter().map(|geometries| desc(&geometries[..])).collect();
+    for (structure, corners) in build_blas(&ctx, &descs).unwrap().iter().zip(&meshes) {
+        check_contents(&facts(&ctx, structure), &numbered(corners));
+    }
+}
+
+#[test]
+fn equal_triangles_make_a_low_tree() {
+    let Some(ctx) = device() else { return };
+    for count in [2000, 6000] {
+        let corners = vec![[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, -9.0]]; count];
+        let vertices = input(&ctx, &corners);
+        let found = facts(&ctx, &build(&ctx, &[triangles(*vertices, count)], 1));
+        check_contents(&found, &numbered(&corners));
+        assert!(found.height <= 13, "{}", found.height);
+    }
+}
+
+#[test]
+fn inactive_triangles_are_left_out() {
+    let Some(ctx) = device() else { return };
+    for count in [9, 3000] {
+        let mut corners = scattered(count, 3);
+        for i in (0..count).step_by(3) {
+            corners[i][i % 2][0] = f32::NAN;
+        }
+        let vertices = input(&ctx, &corners);
+        let found = facts(&ctx, &build(&ctx, &[triangles(*vertices, count)], 2));
+        let mut expected = numbered(&corners);
+        expected.retain(|(_, corners)| corners.iter().flatten().all(|number| number.is_finite()));
+        check_contents(&found, &expected);
+        let nothing = input(&ctx, &vec![[[f32::NAN; 3]; 3]; count]);
+        assert_eq!(facts(&ctx, &build(&ctx, &[triangles(*nothing, count)], 2)).bounds, EMPTY);
+    }
+}
+
+#[test]
+fn degenerate_triangles_are_kept() {
+    let Some(ctx) = device() else { return };
+    let corners = [[[1.0; 3]; 3], [[0.0; 3]; 3], [[2.0; 3], [2.0; 3], [3.0; 3]]];
+    let vertices = input(&ctx, &corners);
+    check_contents(&facts(&ctx, &build(&ctx, &[triangles(*vertices, 3)], 1)), &numbered(&corners));
+}
+
+#[test]
+fn boxes_are_built_around() {
+    let Some(ctx) = device() else { return };
+    for count in [1, 500, 4000] {
+        let corners = scattered(count, 11);
+        let lo = |t: &[[f32; 3]; 3], axis: usize| t[0][axis].min(t[1][axis]).min(t[2][axis]);
+        let hi = |t: &[[f32; 3]; 3], axis: usize| t[0][axis].max(t[1][axis]).max(t[2][axis]);
+        let mut list: Vec<[[f32; 3]; 2]> = corners
+            .iter()
+            .map(|t| [std::array::from_fn(|axis| lo(t, axis)), std::array::from_fn(|axis| hi(t, axis))])
+            .collect();
+        if count > 10 {
+            list[7][0][0] = f32::NAN;
+        }
+        let buffer = input(&ctx, &list);
+        let found = facts(&ctx, &build(&ctx, &[boxes(*buffer, count)], 2));
+        let expected: Vec<_> = (0..)
+            .zip(&list)
+            .filter(|(_, corners)| !corners[0][0].is_nan())
+            .map(|(index, corners)| ((0, index), corners.to_vec()))
+            .collect();
+        check_contents(&found, &expected);
+    }
+}
+
+/// Three vertices in a format, as bytes, and what they are as floats.
+fn formats() -> Vec<(VertexFormat, Vec<u8>, [[f32; 3]; 3])> {
+    fn bytes<T: bytemuck::NoUninit>(data: &[T]) -> Vec<u8> {
+        bytemuck::cast_slice(data).to_vec()
+    }
+    let half = |n: i32| [0xc000_u16, 0xbc00, 0, 0x3c00, 0x4000][(n + 2) as usize];
+    let n = i16::MAX;
+    vec![
+        (VertexFormat::F32, bytes(&[1.0_f32, 2.0, 3.0]), [[1., 0., 0.], [2., 0., 0.], [3., 0., 0.]]),
+        (
+            VertexFormat::F32x2,
+            bytes(&[1.0_f32, 2.0, 3.0, 4.0, 5.0, 6.0]),
+            [[1., 2., 0.], [3., 4., 0.], [5., 6., 0.]],
+        ),
+        (
+            VertexFormat::F32x3,
+            bytes(&[1.0_f32, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]),
+            [[1., 2., 3.], [4., 5., 6.], [7., 8., 9.]],
+        ),
+        (
+            VertexFormat::F32x4,
+            bytes(&[1.0_f32, 2.0, 3.0, 0.0, 4.0, 5.0, 6.0, 0.0, 7.0, 8.0, 9.0, 0.0]),
+            [[1., 2., 3.], [4., 5., 6.], [7., 8., 9.]],
+        ),
+        (
+            VertexFormat::F16x2,
+            bytes(&[half(1), half(2), half(-1), half(0), half(0), half(-2)]),
+            [[1., 2., 0.], [-1., 0., 0.], [0., -2., 0.]],
+        ),
+        (
+            VertexFormat::F16x4,
+            bytes(&[
+                half(1),
+                half(2),
+                half(-2),
+                half(0),
+                half(-1),
+                half(0),
+                half(1),
+                half(0),
+                half(0),
+                half(-2),
+                half(2),
+                half(0),
+            ]),
+            [[1., 2., -2.], [-1., 0., 1.], [0., -2., 2.]],
+        ),
+        (VertexFormat::Snorm16x2, bytes(&[n, -n, 0, n, -n, 0]), [[1., -1., 0.], [0., 1., 0.], [-1., 0., 0.]]),
+        (
+            VertexFormat::Snorm16x4,
+            bytes(&[n, -n, n, 0, 0, n, -n, 0, -n, 0, n, 0]),
+            [[1., -1., 1.], [0., 1., -1.], [-1., 0., 1.]],
+        ),
+        (
+            VertexFormat::Unorm8x4,
+            vec![255, 0, 255, 0, 0, 255, 0, 0, 255, 255, 255, 0],
+            [[1., 0., 1.], [0., 1., 0.], [1., 1., 1.]],
+        ),
+        (VertexFormat::U32, bytes(&[1_u32, 2, 3]), [[1., 0., 0.], [2., 0., 0.], [3., 0., 0.]]),
+    ]
+}
+
+#[test]
+fn all_formats_strides_indices_and_matrices_are_read() {
+    let Some(ctx) = device() else { return };
+    let matrix = input(&ctx, &[0.0_f32, 2.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 4.0, -3.0]);
+    let moved = |p: [f32; 3]| [2.0 * p[1] + 1.0, p[0], 4.0 * p[2] - 3.0];
+    for (format, data, corners) in formats() {
+        for (index, extra) in [(None, 0), (Some(IndexFormat::U16), 0), (Some(IndexFormat::U32), 2), (None, 6)]
+        {
+            let unit = data.len() / 3;
+            let extra = if format.size_bytes() > 4 && !format!("{format:?}").starts_with('F') {
+                extra
+            } else {
+                extra / 2 * 4
+            };
+            // The first bytes are skipped, and so are those between vertices.
+            let skipped = extra;
+            let mut bytes = vec![0xff_u8; skipped];
+            for vertex in data.chunks(unit) {
+                bytes.extend_from_slice(vertex);
+                bytes.resize(bytes.len() + extra, 0xff);
+            }
+            let vertices = input(&ctx, &bytes);
+            let short = input(&ctx, &[9_u16, 2, 0, 1, 1, 1, 1]);
+            let long = input(&ctx, &[9_u32, 2, 0, 1, 1, 1, 1]);
+            let indices = index.map(|format| Indices {
+                buffer: if format == IndexFormat::U16 { *short } else { *long },
+                offset: u64::from(format.size_bytes()),
+                format,
+            });
+            let geometry = Triangles {
+                vertex_offset: skipped as u64,
+                vertex_stride: (unit + extra) as u64,
+                vertex_format: format,
+                triangle_count: if index.is_some() { 2 } else { 1 },
+                indices,
+                transform: Some(GeometryTransform::Buffer { buffer: *matrix, offset: 0 }),
+                flags: GeometryFlags::OPAQUE,
+                ..Triangles::packed(*vertices, 3)
+            };
+            let found = facts(&ctx, &build(&ctx, &[BlasGeometry::Triangles(geometry)], 2));
+            let [a, b, c] = corners.map(moved);
+            let expected = match index {
+                None => vec![((0, 0), vec![a, b, c])],
+                Some(_) => vec![((0, 0), vec![c, a, b]), ((0, 1), vec![b, b, b])],
+            };
+            check_contents(&found, &expected);
+        }
+    }
+}
+
+#[test]
+fn indices_beyond_the_vertices_make_inactive_triangles() {
+    let Some(ctx) = device() else { return };
+    let vertices = input(&ctx, &scattered(1, 1));
+    let indices = input(&ctx, &[0_u32, 1, 2, 0, 1, 3, u32::MAX, 0, 0]);
+    let geometry = BlasGeometry::Triangles(Triangles::indexed(*vertices, 3, *indices, 3));
+    check_contents(&facts(&ctx, &build(&ctx, &[geometry], 2)), &numbered(&scattered(1, 1)));
+}
+
+#[test]
+fn several_geometries_keep_their_numbers() {
+    let Some(ctx) = device() else { return };
+    for scale in [1, 40] {
+        let counts = [0, 30, 0, 0, 17, 100, 0].map(|count| count * scale);
+        let meshes: Vec<_> = counts.iter().map(|count| scattered(*count, *count as u64)).collect();
+        let vertices: Vec<_> = meshes.iter().map(|corners| input(&ctx, corners)).collect();
+        let geometries: Vec<_> =
+            vertices.iter().zip(counts).map(|(vertices, count)| triangles(**vertices, count)).collect();
+        let mut expected = Vec::new();
+        for (geometry, mesh) in (0..).zip(&meshes) {
+            expected.extend(numbered(mesh).into_iter().map(|((_, index), c)| ((geometry, index), c)));
+        }
+        for indexed in [false, true] {
+            let desc =
+                GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, indexed, refit: true };
+            let built = build_blas(&ctx, &[desc]).unwrap();
+            check_contents(&facts(&ctx, &built[0]), &expected);
+        }
+    }
+}
+
+#[test]
+fn better_places_cost_rays_less() {
+    let Some(ctx) = device() else { return };
+    // A few long triangles among many small ones are what a space-filling curve is bad at.
+    let mut corners = scattered(4000, 21);
+    corners.iter_mut().step_by(16).for_each(|triangle| triangle[1] = triangle[1].map(|n| n * 0.5));
+    let vertices = input(&ctx, &corners);
+    let geometries = [triangles(*vertices, corners.len())];
+    let desc = |improvements| GpuBlasDesc {
+        geometries: &geometries,
+        leaf_size: 1,
+        improvements,
+        indexed: false,
+        refit: true,
+    };
+    let built = build_blas(&ctx, &[0, 1, 2].map(desc)).unwrap();
+    let costs: Vec<f64> = built.iter().map(|structure| facts(&ctx, structure).cost).collect();
+    assert!(costs[1] < costs[0] && costs[2] <= costs[1] * 1.001, "{costs:?}");
+}

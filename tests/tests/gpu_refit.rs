@@ -1,0 +1,98 @@
+//! Refits on the GPU of both node formats: new places in the old tree, with boxes as a fresh fit has them.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use lvk::test_hooks::{EMPTY, GpuBlasDesc, build_blas, place, refit};
+use lvk_tests::device;
+use lvk_tests::gpu_built::{boxes, build, check_contents, facts, input, numbered, scattered, triangles};
+use lvk_tests::wide_tree::wide_structure;
+
+#[test]
+fn binary_nodes_follow_moved_triangles() {
+    let Some(ctx) = device() else { return };
+    for count in [0, 1, 2, 3, 1000, 20_000] {
+        for indexed in [false, true] {
+            let vertices = input(&ctx, &scattered(count, 1));
+            let geometries = [triangles(*vertices, count)];
+            let desc =
+                GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, indexed, refit: true };
+            let structure = build_blas(&ctx, &[desc]).unwrap().remove(0);
+            let before = facts(&ctx, &structure);
+            for seed in [2, 3] {
+                let moved = scattered(count, seed);
+                if count > 0 {
+                    ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&moved)).unwrap();
+                }
+                refit(&ctx, &[(&structure, &geometries)]).unwrap();
+                let after = facts(&ctx, &structure);
+                assert_eq!(after.primitives, before.primitives);
+                assert_eq!(after.height, before.height);
+                check_contents(&after, &numbered(&moved));
+            }
+        }
+    }
+}
+
+#[test]
+fn boxes_follow_too() {
+    let Some(ctx) = device() else { return };
+    let count = 3000;
+    let list = |shift: f32| -> Vec<[[f32; 3]; 2]> {
+        scattered(count, 5).iter().map(|t| [t[0].map(|n| n + shift), t[0].map(|n| n + shift + 2.0)]).collect()
+    };
+    let buffer = input(&ctx, &list(0.0));
+    let geometries = [boxes(*buffer, count)];
+    let structure = build(&ctx, &geometries, 4);
+    ctx.upload_buffer(*buffer, 0, bytemuck::cast_slice(&list(50.0))).unwrap();
+    refit(&ctx, &[(&structure, &geometries)]).unwrap();
+    let expected: Vec<_> =
+        (0..).zip(list(50.0)).map(|(index, corners)| ((0, index), corners.to_vec())).collect();
+    check_contents(&facts(&ctx, &structure), &expected);
+}
+
+#[test]
+fn triangles_that_are_lost_are_in_no_box() {
+    let Some(ctx) = device() else { return };
+    let count = 100;
+    let vertices = input(&ctx, &scattered(count, 1));
+    let geometries = [triangles(*vertices, count)];
+    let structure = build(&ctx, &geometries, 2);
+    ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&vec![[[f32::NAN; 3]; 3]; count])).unwrap();
+    refit(&ctx, &[(&structure, &geometries)]).unwrap();
+    assert_eq!(facts(&ctx, &structure).bounds, EMPTY);
+}
+
+#[test]
+fn wide_nodes_follow_moved_triangles() {
+    let Some(ctx) = device() else { return };
+    for count in [1, 3, 4, 24, 25, 200, 5000] {
+        let vertices = input(&ctx, &scattered(count, 1));
+        let geometries = [triangles(*vertices, count)];
+        let structure = place(&ctx, &wide_structure(count)).unwrap();
+        for seed in [1, 4] {
+            let moved = scattered(count, seed);
+            ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&moved)).unwrap();
+            refit(&ctx, &[(&structure, &geometries)]).unwrap();
+            check_contents(&facts(&ctx, &structure), &numbered(&moved));
+        }
+    }
+}
+
+#[test]
+fn structures_are_refitted_side_by_side() {
+    let Some(ctx) = device() else { return };
+    let counts = [50, 3000, 900];
+    let vertices: Vec<_> = counts.iter().map(|count| input(&ctx, &scattered(*count, 1))).collect();
+    let geometries: Vec<_> =
+        vertices.iter().zip(counts).map(|(vertices, count)| [triangles(**vertices, count)]).collect();
+    let mut structures: Vec<_> =
+        geometries[..2].iter().map(|geometries| build(&ctx, geometries, 2)).collect();
+    structures.push(place(&ctx, &wide_structure(counts[2])).unwrap());
+    for (vertices, count) in vertices.iter().zip(counts) {
+        ctx.upload_buffer(**vertices, 0, bytemuck::cast_slice(&scattered(count, 9))).unwrap();
+    }
+    let refits: Vec<_> = structures.iter().zip(&geometries).map(|(s, g)| (s, &g[..])).collect();
+    refit(&ctx, &refits).unwrap();
+    for (structure, count) in structures.iter().zip(counts) {
+        check_contents(&facts(&ctx, structure), &numbered(&scattered(count, 9)));
+    }
+}

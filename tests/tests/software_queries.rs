@@ -1,0 +1,367 @@
+//! Ray queries that the library walks itself: on devices without ray tracing, beside those that have it, and at the seams
+//! of closed meshes.
+
+use std::collections::HashMap;
+
+use lvk::glam::{Affine3A, Quat, Vec3};
+use lvk::{
+    BlasDesc, BuildFlags, BuildMode, ComputePipelineDesc, Context, DeviceProfile, Error, GeometryFlags,
+    RayQueryPath, RayQueryRequest, Result, ShaderStage, TlasDesc, TlasInstance,
+};
+use lvk_tests::agreement::Agreement;
+use lvk_tests::child::without_ray_tracing;
+use lvk_tests::meshes::Mesh;
+use lvk_tests::random::Random;
+use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, upload_geometries};
+use lvk_tests::ray_tracer::{HitRecord, How, MISSED, Method, RayTracer, shader};
+use lvk_tests::rays::{Ray, random_rays};
+use lvk_tests::{TestDevice, device, device_with};
+
+/// Whatever the flags ask for: trees of the CPU and of the GPU, all kinds of leaves.
+const FLAGS: [BuildFlags; 6] = [
+    BuildFlags::FAST_TRACE,
+    BuildFlags::FAST_BUILD,
+    BuildFlags::LOW_MEMORY,
+    BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE),
+    BuildFlags::LOW_MEMORY.union(BuildFlags::ALLOW_UPDATE),
+    BuildFlags::LOW_MEMORY.union(BuildFlags::FAST_BUILD),
+];
+
+fn software() -> Option<TestDevice> {
+    device_with(|desc| desc.ray_query = RayQueryRequest::Software)
+}
+
+/// Shapes of two geometries, turned, stretched and mirrored, over each other.
+fn crowd() -> RayScene {
+    let mut random = Random::new(77);
+    let glass = |mesh| Part { flags: GeometryFlags::empty(), ..Part::new(mesh, Layout::Indexed32) };
+    let models = vec![
+        vec![Part::new(Mesh::torus(9), Layout::Indexed16), glass(Mesh::cube_grid(2))],
+        vec![Part::new(Mesh::terrain(12), Layout::Unshared)],
+        vec![Part::new(Mesh::cube_grid(1), Layout::Interleaved)],
+    ];
+    let mut place = |index: u32| {
+        let scale = Vec3::new(random.between(0.3, 1.5), random.between(-1.5, -0.3), random.between(0.3, 1.5));
+        let turn = Quat::from_axis_angle(random.direction(), random.between(0.0, 6.0));
+        let to = random.direction() * random.between(0.0, 2.0);
+        let transform = Affine3A::from_scale_rotation_translation(scale, turn, to);
+        Placed { custom_index: 1000 + index, ..Placed::new(index as usize % 3, transform) }
+    };
+    RayScene { placed: (0..40).map(&mut place).collect(), models }
+}
+
+fn check_crowd(ctx: &Context, flags: BuildFlags, rays: usize) -> Result<()> {
+    let scene = crowd();
+    let gpu = scene.upload_with(ctx, flags, BuildFlags::default(), 0)?;
+    let reference = scene.reference();
+    let rays = random_rays(5, rays, Vec3::splat(-2.0), Vec3::splat(2.0));
+    let records = RayTracer::new(ctx, Method::Query)?.trace(&gpu.tlas, &rays, How::default())?;
+    Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
+        .assert(&format!("a crowd with {flags:?}"));
+    let shadows = RayTracer::new(ctx, Method::Query)?.trace(&gpu.tlas, &rays, How::shadows())?;
+    Agreement::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, 0xff))
+        .assert(&format!("shadows of a crowd with {flags:?}"));
+    Ok(())
+}
+
+#[test]
+fn every_kind_of_build_is_hit_as_the_reference_says() -> Result<()> {
+    let Some(ctx) = software() else { return Ok(()) };
+    assert_eq!(ctx.capabilities().ray_query_path, RayQueryPath::Software);
+    FLAGS.into_iter().try_for_each(|flags| check_crowd(&ctx, flags, 3_000))
+}
+
+#[test]
+fn a_device_without_structures_of_its_own_has_everything() -> Result<()> {
+    let profile = DeviceProfile::no_ray_tracing();
+    let Some(ctx) = device_with(|desc| {
+        desc.profile = Some(&profile);
+        desc.ray_query = RayQueryRequest::Auto;
+    }) else {
+        return Ok(());
+    };
+    let caps = ctx.capabilities();
+    assert!(caps.ray_query && !caps.ray_tracing_pipeline && !caps.ray_query_reason.is_empty());
+    assert_eq!(caps.ray_query_path, RayQueryPath::Software);
+    FLAGS.into_iter().try_for_each(|flags| check_crowd(&ctx, flags, 1_000))
+}
+
+#[test]
+fn a_driver_without_ray_tracing_traces() {
+    without_ray_tracing("a_driver_without_ray_tracing_traces", || {
+        let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
+        assert!(ctx.capabilities().device_name.contains("SwiftShader"));
+        for flags in FLAGS {
+            if let Err(error) = check_crowd(&ctx, flags, 600) {
+                unreachable!("{flags:?}: {error}");
+            }
+        }
+    });
+}
+
+#[test]
+fn software_and_the_device_answer_alike() -> Result<()> {
+    let (Some(one), Some(other)) = (device(), software()) else { return Ok(()) };
+    if one.capabilities().ray_query_path != RayQueryPath::Hardware {
+        eprintln!("NOT TESTED, {} has no ray queries", one.capabilities().device_name);
+        return Ok(());
+    }
+    let rays = random_rays(6, 20_000, Vec3::splat(-2.0), Vec3::splat(2.0));
+    let trace = |ctx: &Context| -> Result<Vec<HitRecord>> {
+        let gpu = crowd().upload(ctx)?;
+        RayTracer::new(ctx, Method::Query)?.trace(&gpu.tlas, &rays, How::default())
+    };
+    let (one, other) = (trace(&one)?, trace(&other)?);
+    let ids = |record: &HitRecord| (record.kind, record.instance, record.geometry, record.primitive);
+    let differ = one.iter().zip(&other).filter(|(one, other)| ids(one) != ids(other)).count();
+    assert!(differ * 2_000 < rays.len(), "{differ} of {} rays differ", rays.len());
+    Ok(())
+}
+
+/// A closed mesh around the origin whose triangles share their vertices to the bit.
+fn closed_ball(rounds: u32) -> Mesh {
+    let t = (1.0 + 5.0_f32.sqrt()) / 2.0;
+    let corners = [(-1.0, t), (1.0, t), (-1.0, -t), (1.0, -t)];
+    let mut positions: Vec<Vec3> = Vec::new();
+    positions.extend(corners.map(|(a, b)| Vec3::new(a, b, 0.0)));
+    positions.extend(corners.map(|(a, b)| Vec3::new(0.0, a, b)));
+    positions.extend(corners.map(|(a, b)| Vec3::new(b, 0.0, a)));
+    positions.iter_mut().for_each(|position| *position = position.normalize());
+    let mut triangles = vec![
+        [0, 11, 5],
+        [0, 5, 1],
+        [0, 1, 7],
+        [0, 7, 10],
+        [0, 10, 11],
+        [1, 5, 9],
+        [5, 11, 4],
+        [11, 10, 2],
+        [10, 7, 6],
+        [7, 1, 8],
+        [3, 9, 4],
+        [3, 4, 2],
+        [3, 2, 6],
+        [3, 6, 8],
+        [3, 8, 9],
+        [4, 9, 5],
+        [2, 4, 11],
+        [6, 2, 10],
+        [8, 6, 7],
+        [9, 8, 1],
+    ];
+    for _ in 0..rounds {
+        let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
+        let mut middle = |a: u32, b: u32| {
+            *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
+                positions.push((positions[a as usize] + positions[b as usize]).normalize() * 0.999);
+                positions.len() as u32 - 1
+            })
+        };
+        let mut finer = Vec::with_capacity(triangles.len() * 4);
+        for [a, b, c] in triangles {
+            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
+            finer.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
+        }
+        triangles = finer;
+    }
+    Mesh { positions: positions.iter().map(|position| position.to_array()).collect(), triangles }
+}
+
+/// Rays from inside of a closed mesh at its corners, along its edges' points, and anywhere.
+fn rays_at_seams(mesh: &Mesh, seed: u64, count: usize) -> Vec<Ray> {
+    let mut random = Random::new(seed);
+    let corner = |index: u32| Vec3::from(mesh.positions[index as usize]);
+    let mut ray = |number: usize| {
+        let [a, b, c] =
+            mesh.triangles[(random.between(0.0, 1.0) * 0.999 * mesh.triangles.len() as f32) as usize];
+        let share = random.between(0.0, 1.0);
+        let at = match number % 3 {
+            0 => corner(a),
+            1 => corner(a).lerp(corner(b), share),
+            _ => corner(a).lerp(corner(b), share).lerp(corner(c), random.between(0.0, 1.0)),
+        };
+        let from = match number % 5 {
+            0 => Vec3::ZERO,
+            _ => random.direction() * random.between(0.0, 0.8),
+        };
+        Ray::new(from, at - from)
+    };
+    (0..count).map(&mut ray).collect()
+}
+
+/// How many rays from inside leave a closed mesh without a hit.
+fn leaks(ctx: &Context, tracer: &RayTracer, count: usize, flags: BuildFlags) -> Result<usize> {
+    let mesh = closed_ball(4);
+    let odd = Affine3A::from_scale_rotation_translation(
+        Vec3::new(3.0, 0.5, -1.25),
+        Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.1),
+        Vec3::new(7.0, -3.0, 11.0),
+    );
+    let mut leaks = 0;
+    for transform in [Affine3A::IDENTITY, odd] {
+        let part = Part::new(mesh.clone(), Layout::Indexed32);
+        let scene = RayScene { models: vec![vec![part]], placed: vec![Placed::new(0, transform)] };
+        let gpu: GpuScene = scene.upload_with(ctx, flags, BuildFlags::default(), 0)?;
+        let moved = |ray: Ray| Ray {
+            origin: transform.transform_point3(ray.origin.into()).into(),
+            direction: transform.transform_vector3(ray.direction.into()).into(),
+            ..ray
+        };
+        for part in 0..count.div_ceil(CHUNK) {
+            let rays = rays_at_seams(&mesh, part as u64, CHUNK.min(count));
+            let rays: Vec<_> = rays.into_iter().map(moved).collect();
+            let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
+            leaks += records.iter().filter(|record| record.kind == MISSED).count();
+        }
+    }
+    Ok(leaks)
+}
+
+const CHUNK: usize = 1 << 20;
+
+#[test]
+fn no_ray_slips_through_a_seam() -> Result<()> {
+    let Some(ctx) = software() else { return Ok(()) };
+    let tracer = RayTracer::new(&ctx, Method::Query)?;
+    for flags in FLAGS {
+        assert_eq!(leaks(&ctx, &tracer, 60_000, flags)?, 0, "{flags:?}");
+    }
+    Ok(())
+}
+
+/// `cargo test --test software_queries -- --ignored`
+#[test]
+#[ignore = "takes minutes on a CPU"]
+fn none_of_ten_million_rays_slips_through_a_seam() -> Result<()> {
+    let Some(ctx) = software() else { return Ok(()) };
+    let tracer = RayTracer::new(&ctx, Method::Query)?;
+    assert_eq!(leaks(&ctx, &tracer, 5_000_000, BuildFlags::FAST_TRACE)?, 0);
+    Ok(())
+}
+
+/// Two queries that take turns, each with candidates of its own.
+const TURNS: &str = r#"
+    #include <lvk/ray_query.glsl>
+    #include "ray_records.glsl"
+    layout(local_size_x = 64) in;
+
+    uint tag(uint instance, uint primitive) { return (instance * 7919u + primitive * 104729u) % 65521u; }
+
+    void main() {
+        uint index = gl_GlobalInvocationID.x;
+        if (index >= count) return;
+        Ray one = rays.at[index];
+        Ray two = rays.at[count - 1u - index];
+        LvkRayQuery a, b;
+        lvkRayQueryInitialize(a, tlas, flags, mask, one.origin, one.tMin, one.direction, one.tMax);
+        lvkRayQueryInitialize(b, tlas, flags, mask, two.origin, two.tMin, two.direction, two.tMax);
+        uint sumA = 0u, sumB = 0u, seenA = 0u, seenB = 0u;
+        bool goesA = true, goesB = true;
+        while (goesA || goesB) {
+            if (goesA) goesA = lvkRayQueryProceed(a);
+            if (goesA) {
+                sumA += tag(lvkRayQueryInstanceId(a, LVK_CANDIDATE, tlas), lvkRayQueryPrimitiveIndex(a, LVK_CANDIDATE, tlas));
+                seenA += 1u;
+            }
+            if (goesB && ALTERNATE(index)) {
+                goesB = lvkRayQueryProceed(b);
+                if (goesB) {
+                    sumB += tag(lvkRayQueryInstanceId(b, LVK_CANDIDATE, tlas), lvkRayQueryPrimitiveIndex(b, LVK_CANDIDATE, tlas));
+                    seenB += 1u;
+                }
+            }
+        }
+        HitRecord record = kNoHit;
+        record.instance = sumA;
+        record.customIndex = seenA;
+        record.geometry = sumB;
+        record.primitive = seenB;
+        hits.at[index] = record;
+    }"#;
+
+#[test]
+fn queries_that_take_turns_do_not_disturb_each_other() -> Result<()> {
+    let Some(ctx) = software() else { return Ok(()) };
+    let scene = {
+        let mut scene = crowd();
+        scene.models.iter_mut().flatten().for_each(|part| part.flags = GeometryFlags::NO_DUPLICATE_ANY_HIT);
+        scene
+    };
+    let gpu = scene.upload(&ctx)?;
+    let rays = random_rays(8, 2_000, Vec3::splat(-2.0), Vec3::splat(2.0));
+    let records = |when: &str| -> Result<Vec<HitRecord>> {
+        let text = TURNS.replace("ALTERNATE(index)", when);
+        let module = shader(&ctx, ShaderStage::Compute, &text)?;
+        let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
+        let tracer = RayTracer::of_query(&ctx, ctx.create_compute_pipeline(&desc)?);
+        tracer.trace(&gpu.tlas, &rays, How::default())
+    };
+    let (in_turns, one_after_the_other) = (records("true")?, records("!goesA")?);
+    for (index, (one, other)) in in_turns.iter().zip(&one_after_the_other).enumerate() {
+        let numbers = |of: &HitRecord| [of.instance, of.custom_index, of.geometry, of.primitive];
+        assert_eq!(numbers(one), numbers(other), "ray {index}");
+        let back = &in_turns[rays.len() - 1 - index];
+        assert_eq!((one.instance, one.custom_index), (back.geometry, back.primitive), "ray {index}");
+    }
+    assert!(in_turns.iter().any(|record| record.custom_index > 3), "there are candidates");
+    Ok(())
+}
+
+#[test]
+fn a_structure_is_the_same_after_a_file() -> Result<()> {
+    let profile = DeviceProfile::no_ray_tracing();
+    let Some(ctx) = device_with(|desc| {
+        desc.profile = Some(&profile);
+        desc.ray_query = RayQueryRequest::Software;
+    }) else {
+        return Ok(());
+    };
+    let parts = [Part::new(Mesh::torus(12), Layout::Indexed16)];
+    let (_buffers, geometries) = upload_geometries(&ctx, &parts)?;
+    let rays = random_rays(9, 2_000, Vec3::splat(-1.5), Vec3::splat(1.5));
+    let tracer = RayTracer::new(&ctx, Method::Query)?;
+    for flags in FLAGS {
+        let desc = BlasDesc { geometries: &geometries, flags, ..Default::default() };
+        let built = ctx.create_blas(&desc)?;
+        let bytes = ctx.serialize_blas(*built)?;
+        // SAFETY: nobody made the bytes up.
+        let loaded = unsafe { ctx.load_blas(&desc, &bytes) }?;
+        let trace = |blas| {
+            let instances = [TlasInstance::new(blas)];
+            let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() })?;
+            tracer.trace(&tlas, &rays, How::default())
+        };
+        assert_eq!(trace(*built)?, trace(*loaded)?, "{flags:?}");
+        let mut damaged = bytes.clone();
+        damaged[bytes.len() / 2] ^= 4;
+        // SAFETY: they were damaged, not made up.
+        let refused = unsafe { ctx.load_blas(&desc, &damaged) };
+        assert!(matches!(refused, Err(Error::Serialized { .. })), "{refused:?}");
+    }
+    Ok(())
+}
+
+#[test]
+fn compaction_has_nothing_to_do_and_says_so() -> Result<()> {
+    let profile = DeviceProfile::no_ray_tracing();
+    let Some(ctx) = device_with(|desc| {
+        desc.profile = Some(&profile);
+        desc.ray_query = RayQueryRequest::Software;
+    }) else {
+        return Ok(());
+    };
+    let flags = BuildFlags::FAST_TRACE | BuildFlags::ALLOW_COMPACTION;
+    let gpu = crowd().upload_with(&ctx, flags, BuildFlags::default(), 0)?;
+    let models: Vec<_> = gpu.models.iter().map(|model| **model).collect();
+    ctx.compact(&models)?;
+    ctx.wait_idle()?;
+    for model in models {
+        let info = ctx.accel_struct_info(model)?;
+        let bytes = info.structure_bytes;
+        assert_eq!(info.compaction, lvk::Compaction::Done { before_bytes: bytes, after_bytes: bytes });
+        let mut cmd = ctx.acquire_command_buffer()?;
+        cmd.build_blas(&[model], BuildMode::Rebuild)?;
+        ctx.submit(cmd)?;
+    }
+    ctx.wait_idle()
+}
