@@ -18,7 +18,6 @@ pub(crate) struct CompileOptions {
     #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) position_fetch: bool,
     /// The library walks ray queries itself.
-    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) software_ray_query: bool,
 }
 
