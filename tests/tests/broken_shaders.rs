@@ -159,6 +159,7 @@ fn hybrid_ways() -> [HybridWay<'static>; 9] {
 }
 
 #[test]
+#[ignore = "minutes for each: cargo test -p lvk-tests --test broken_shaders -- --ignored"]
 fn hybrid_notices() {
     BrokenShaders::in_child("hybrid_notices", |shaders| {
         let Some(ctx) = device() else { return };
@@ -239,6 +240,7 @@ const OIT_QUERY: [Mistake; 3] = [
 ];
 
 #[test]
+#[ignore = "minutes for each: cargo test -p lvk-tests --test broken_shaders -- --ignored"]
 fn hybrid_oit_notices() {
     BrokenShaders::in_child("hybrid_oit_notices", |shaders| {
         let Some(ctx) = device() else { return };
@@ -362,6 +364,7 @@ fn hall(ctx: &Context, path: RayPath, view: Option<&Camera>) -> RgbaImage {
 }
 
 #[test]
+#[ignore = "minutes for each: cargo test -p lvk-tests --test broken_shaders -- --ignored"]
 fn reflections_notices() {
     BrokenShaders::in_child("reflections_notices", |shaders| {
         let Some(ctx) = device() else { return };

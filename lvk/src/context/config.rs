@@ -68,7 +68,7 @@ impl Default for ContextDesc<'_> {
             validation: Validation::Off,
             validation_sink: None,
             ray_tracing_pipeline: FeatureRequest::Optional,
-            ray_query: RayQueryRequest::Auto,
+            ray_query: RayQueryRequest::default(),
             profile: None,
             frames_in_flight: 2,
             staging_bytes: 16 << 20,

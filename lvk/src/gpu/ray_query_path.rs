@@ -7,12 +7,13 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum RayQueryRequest {
     /// Hardware where it is real; software where there is none, or where the device is a CPU, whose own queries are no
-    /// hardware and slower. Queries always work.
-    #[default]
+    /// hardware and slower. Not the default yet: software is proved on CPU drivers only, and was seen to answer wrongly
+    /// on a GPU (see the manual).
     Auto,
     /// Only devices with `VK_KHR_ray_query` are considered.
     Hardware,
     /// `VK_KHR_ray_query` where present; without it queries do not work.
+    #[default]
     HardwareIfPresent,
     /// The library itself, even where there is hardware.
     Software,
