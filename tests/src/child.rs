@@ -22,7 +22,7 @@ pub fn in_child(test: &str, variables: &[(&str, Option<&OsStr>)], body: impl FnO
     }
     let program = std::env::current_exe().expect("the program of the test has a path");
     let mut command = Command::new(program);
-    command.args([test, "--exact", "--nocapture"]).env(MARK, test);
+    command.args([test, "--exact", "--nocapture", "--include-ignored"]).env(MARK, test);
     for (name, value) in variables {
         match value {
             Some(value) => command.env(name, value),
