@@ -64,6 +64,15 @@ fn check_crowd(ctx: &Context, flags: BuildFlags, rays: usize) -> Result<()> {
     Ok(())
 }
 
+/// A device without any ray tracing of its own.
+fn bare_device(ray_query: RayQueryRequest) -> Option<TestDevice> {
+    let profile = DeviceProfile::no_ray_tracing();
+    device_with(|desc| {
+        desc.profile = Some(&profile);
+        desc.ray_query = ray_query;
+    })
+}
+
 #[test]
 fn every_kind_of_build_is_hit_as_the_reference_says() -> Result<()> {
     let Some(ctx) = software() else { return Ok(()) };
@@ -73,13 +82,7 @@ fn every_kind_of_build_is_hit_as_the_reference_says() -> Result<()> {
 
 #[test]
 fn a_device_without_structures_of_its_own_has_everything() -> Result<()> {
-    let profile = DeviceProfile::no_ray_tracing();
-    let Some(ctx) = device_with(|desc| {
-        desc.profile = Some(&profile);
-        desc.ray_query = RayQueryRequest::Auto;
-    }) else {
-        return Ok(());
-    };
+    let Some(ctx) = bare_device(RayQueryRequest::Auto) else { return Ok(()) };
     let caps = ctx.capabilities();
     assert!(caps.ray_query && !caps.ray_tracing_pipeline && !caps.ray_query_reason.is_empty());
     assert_eq!(caps.ray_query_path, RayQueryPath::Software);
@@ -309,13 +312,7 @@ fn queries_that_take_turns_do_not_disturb_each_other() -> Result<()> {
 
 #[test]
 fn a_structure_is_the_same_after_a_file() -> Result<()> {
-    let profile = DeviceProfile::no_ray_tracing();
-    let Some(ctx) = device_with(|desc| {
-        desc.profile = Some(&profile);
-        desc.ray_query = RayQueryRequest::Software;
-    }) else {
-        return Ok(());
-    };
+    let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
     let parts = [Part::new(Mesh::torus(12), Layout::Indexed16)];
     let (_buffers, geometries) = upload_geometries(&ctx, &parts)?;
     let rays = random_rays(9, 2_000, Vec3::splat(-1.5), Vec3::splat(1.5));
@@ -343,13 +340,7 @@ fn a_structure_is_the_same_after_a_file() -> Result<()> {
 
 #[test]
 fn compaction_has_nothing_to_do_and_says_so() -> Result<()> {
-    let profile = DeviceProfile::no_ray_tracing();
-    let Some(ctx) = device_with(|desc| {
-        desc.profile = Some(&profile);
-        desc.ray_query = RayQueryRequest::Software;
-    }) else {
-        return Ok(());
-    };
+    let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
     let flags = BuildFlags::FAST_TRACE | BuildFlags::ALLOW_COMPACTION;
     let gpu = crowd().upload_with(&ctx, flags, BuildFlags::default(), 0)?;
     let models: Vec<_> = gpu.models.iter().map(|model| **model).collect();
