@@ -2,11 +2,13 @@
 
 use crate::ray_tracer::{BACK, FRONT, HitRecord, MISSED};
 use crate::rays::Ray;
-use crate::reference::{Answer, HitIds};
+use crate::reference::{Answer, Hit, HitIds};
 
 /// Relative to the distance, or to 1, or to an eighth of the largest coordinate the ray starts at, whichever is most: far
 /// from the origin the device's floats are no finer.
 const DISTANCE: f64 = 1e-5;
+/// Relative to the largest coordinate the ray starts at: rounding of a ray that is taken to an instance's space.
+const PLACE: f64 = 1e-6;
 const BARYCENTRICS: f64 = 2e-4;
 /// Most of the rays may not be left out: one in so many.
 const EXCLUDED_SHARE: usize = 50;
@@ -110,9 +112,10 @@ fn mistake(ray: &Ray, record: &HitRecord, answer: &Answer) -> Option<String> {
     if found != expected {
         return Some(format!("hit {found:?} at {}, must be {expected:?} ({:?})", record.t, answer.hit));
     }
-    let t = answer.hit?.t;
+    let Hit { t, cosine, .. } = answer.hit?;
     let coordinate = ray.origin.iter().fold(0.0_f64, |most, place| most.max(f64::from(place.abs())));
-    let is_close = within(f64::from(record.t), t, DISTANCE * t.abs().max(1.0).max(coordinate / 8.0));
+    let moved = PLACE * coordinate / cosine;
+    let is_close = within(f64::from(record.t), t, DISTANCE * t.abs().max(1.0).max(coordinate / 8.0) + moved);
     (!is_close).then(|| format!("distance {}, must be {t}", record.t))
 }
 

@@ -17,8 +17,8 @@ pub struct DeviceNeeds {
     pub textures: u32,
 }
 
-/// Opens the device the user names, or the best one; a better one without ray tracing gives way to one with. Messages of
-/// the validation layer, where it is asked for, go into `sink`.
+/// Opens the device the user names, or the best one; where that is a CPU or has no ray tracing, rays are traced by queries
+/// in software. Messages of the validation layer, where it is asked for, go into `sink`.
 pub(super) fn open(
     name: &str,
     args: &RunArgs,
@@ -27,7 +27,7 @@ pub(super) fn open(
     needs: &DeviceNeeds,
 ) -> lvk::Result<Context> {
     use FeatureRequest::{Off, Optional, Required};
-    use RayQueryRequest::{Hardware, HardwareIfPresent, Software};
+    use RayQueryRequest::{Auto, Hardware, HardwareIfPresent, Software};
     let with = |ray_tracing_pipeline, ray_query| {
         Context::new(&ContextDesc {
             application_name: name,
@@ -46,13 +46,12 @@ pub(super) fn open(
         RayTracing::Pipeline => with(Required, HardwareIfPresent),
         RayTracing::Query => with(Optional, Hardware),
         RayTracing::Software => with(Off, Software),
+        // What traces in hardware keeps no structures for software beside it.
         RayTracing::Auto => {
             let best = with(Optional, HardwareIfPresent)?;
-            let capabilities = best.capabilities();
-            if capabilities.ray_tracing_pipeline || capabilities.ray_query {
-                return Ok(best);
-            }
-            Ok(with(Required, HardwareIfPresent).or_else(|_| with(Optional, Hardware)).unwrap_or(best))
+            let caps = best.capabilities();
+            let is_hardware = !caps.is_cpu && (caps.ray_tracing_pipeline || caps.ray_query);
+            if is_hardware { Ok(best) } else { with(Off, Auto) }
         }
     }
 }

@@ -105,7 +105,7 @@ impl RunArgs {
 /// How to trace rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum RayTracing {
-    /// A ray tracing pipeline where the device has one, else ray queries.
+    /// A ray tracing pipeline where the device has one, else ray queries; on a CPU ray queries in software, the fastest.
     Auto,
     /// A ray tracing pipeline with shader binding table.
     Pipeline,

@@ -1,6 +1,6 @@
 //! What to render, and by which means of the device.
 
-use lvk::Capabilities;
+use lvk::{Capabilities, RayQueryPath};
 
 use super::HybridError;
 use crate::app::args;
@@ -164,13 +164,17 @@ impl HybridConfig {
 }
 
 impl RayPath {
-    /// The path to take: `wish`, or the pipeline where there is one, else the query.
+    /// The path to take: `wish`, or what is fastest: the pipeline where there is one, else the query; on a CPU queries in
+    /// software, if those are on.
     ///
     /// # Errors
     /// [`HybridError::NoRayTracing`] and [`HybridError::PathMissing`] say what the device lacks.
     pub fn choose(wish: Option<Self>, capabilities: &Capabilities) -> Result<Self, HybridError> {
         let path = match wish {
             Some(path) => path,
+            None if capabilities.is_cpu && capabilities.ray_query_path == RayQueryPath::Software => {
+                Self::Query
+            }
             None if capabilities.ray_tracing_pipeline => Self::Pipeline,
             None => Self::Query,
         };
@@ -224,6 +228,10 @@ mod tests {
     fn auto_prefers_the_pipeline_and_falls_back() {
         assert_eq!(RayPath::choose(None, &device(true, true)).unwrap(), RayPath::Pipeline);
         assert_eq!(RayPath::choose(None, &device(false, true)).unwrap(), RayPath::Query);
+        let walked = Capabilities { ray_query_path: RayQueryPath::Software, ..device(true, true) };
+        assert_eq!(RayPath::choose(None, &walked).unwrap(), RayPath::Pipeline);
+        let cpu = Capabilities { is_cpu: true, ..walked };
+        assert_eq!(RayPath::choose(None, &cpu).unwrap(), RayPath::Query);
         assert!(matches!(
             RayPath::choose(None, &device(false, false)),
             Err(HybridError::NoRayTracing { .. })

@@ -38,6 +38,9 @@ pub struct Hit {
     pub is_front: bool,
     /// Whether it counts without an any-hit shader.
     pub is_opaque: bool,
+    /// Between the direction and the surface's normal, without its sign. Where a ray grazes a surface, rounding of its
+    /// origin moves the hit by one over this.
+    pub cosine: f64,
 }
 
 /// What a ray hits first.
@@ -78,6 +81,7 @@ impl Candidate {
             barycentrics: [crossing.weights[1], crossing.weights[2]],
             is_front: (crossing.cosine < 0.0) != mirrored,
             is_opaque: true,
+            cosine: crossing.cosine.abs(),
         };
         let is_certain = margin > blur && !grazes && in_range == Range::Inside;
         Some(Self { hit, is_hit: margin >= 0.0 && range.0 < crossing.t && crossing.t < range.1, is_certain })

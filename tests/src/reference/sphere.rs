@@ -50,7 +50,9 @@ impl Sphere {
         let places = ends.map(|t| Range::of(t, range));
         let first = *sides.iter().find(|side| places[**side] != Range::Outside)?;
         let t = ends[first];
-        let hit = Hit { t, ids: self.ids, barycentrics: [0.0; 2], is_front: first == 0, is_opaque: true };
+        let cosine = (1.0 - (passing / self.radius).powi(2)).max(0.0).sqrt();
+        let hit =
+            Hit { t, ids: self.ids, barycentrics: [0.0; 2], is_front: first == 0, is_opaque: true, cosine };
         let is_certain = places[first] == Range::Inside && passing < self.radius * (1.0 - SILHOUETTE);
         Some(Candidate { hit, is_hit: passing < self.radius && range.0 < t && t < range.1, is_certain })
     }
