@@ -60,6 +60,10 @@ impl Agreement {
 pub(super) fn table(walked: &[Walked]) -> Table {
     let columns = ["the same as by pipeline, as given", "triangle", "distance", "shadow"];
     let mut table = Table::new("### Agreement".to_owned(), &columns);
+    if walked.iter().all(|side| side.agreement.is_none()) {
+        table.note("not compared: the device has no ray tracing pipelines");
+        return table;
+    }
     for side in walked {
         let Some(found) = side.agreement else { continue };
         let shape = if side.shape == Shape::Cut { ", overlapping instances" } else { "" };
