@@ -114,6 +114,28 @@ fn orders_are_timed_and_show_the_same_picture() {
 }
 
 #[test]
+fn queries_in_software_are_timed_and_agree_with_the_devices_pipeline() {
+    let tables = table(&["queries", "--quick", "--camera", "1", "--instances", "5"]);
+    let [rates, cut, agreement, structures]: [&str; 4] =
+        tables.split("\n##").collect::<Vec<_>>().try_into().unwrap_or_else(|_| panic!("{tables}"));
+    for name in ["software, fast trace", "software, low memory", "software, fast build"] {
+        assert_positive(rates, name, 0..1);
+    }
+    assert!(cut.contains("As 5 overlapping instances"), "{cut}");
+    assert_positive(cut, "software, fast trace", 0..1);
+    for line in agreement.lines().filter(|line| line.starts_with("| software")) {
+        for share in line.split('|').skip(2).filter(|cell| cell.contains('%')) {
+            assert!(number(share.trim()) > 99.0, "{agreement}");
+        }
+    }
+    for name in
+        ["bytes a triangle, low memory", "build by the CPU, fast trace", "refit of what the GPU built"]
+    {
+        assert_positive(structures, name, 0..1);
+    }
+}
+
+#[test]
 fn a_frame_is_timed_by_both_hands_and_shows_the_same_picture() {
     let table = table(&["overhead", "--quick"]);
     if table.contains("not measured") {
@@ -142,6 +164,13 @@ fn what_a_device_lacks_is_said_and_no_failure() {
     let without_query = table(&["order", "--quick", "--profile", "no-ray-query"]);
     assert!(without_query.contains("ray queries not measured"), "{without_query}");
     assert!(!without_query.contains("| primary rays by query"), "{without_query}");
+    let alone =
+        table(&["queries", "--quick", "--camera", "1", "--instances", "2", "--profile", "no-ray-tracing"]);
+    assert!(
+        alone.contains("ray tracing pipelines not measured") && alone.contains("ray queries not measured"),
+        "{alone}"
+    );
+    assert!(alone.contains("| software, fast trace") && !alone.contains("| pipeline, as given"), "{alone}");
     let without_pipeline = table(&["overhead", "--quick", "--profile", "no-rt-pipeline"]);
     assert!(without_pipeline.contains("not measured"), "{without_pipeline}");
 }

@@ -73,6 +73,8 @@ pub(super) enum Benchmark {
     Tlas(TlasArgs),
     /// Orders of triangles: as given, along a Morton curve, by the library
     Order(TraceArgs),
+    /// Ray queries walked by the library, beside the device's own tracing
+    Queries(QueriesArgs),
     /// A traced frame by lvk and by hand-written Vulkan
     Overhead(TraceArgs),
     /// The paper's experiment: stand-alone and hybrid rendering along the paths of five cameras, as a report
@@ -118,6 +120,13 @@ pub(super) struct TraceArgs {
     #[arg(long, value_name = "1-5", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=5))]
     pub(super) camera: u32,
 
+    #[command(flatten)]
+    pub(super) picture: PictureArgs,
+}
+
+/// How large a picture.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub(super) struct PictureArgs {
     /// Width of the picture in pixels [default: 1280, or 160 on a driver that runs on the CPU]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(super) width: Option<u32>,
@@ -125,6 +134,24 @@ pub(super) struct TraceArgs {
     /// Height of the picture in pixels [default: 720, or 90 on a driver that runs on the CPU]
     #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(1..=16_384))]
     pub(super) height: Option<u32>,
+}
+
+/// Which mesh, what pictures of it, how many instances.
+#[derive(Debug, Clone, PartialEq, Args)]
+pub(super) struct QueriesArgs {
+    #[command(flatten)]
+    pub(super) mesh: MeshArgs,
+
+    /// Which of the scene's five cameras to look through [default: all, one after the other]
+    #[arg(long, value_name = "1-5", value_parser = clap::value_parser!(u32).range(1..=5))]
+    pub(super) camera: Option<u32>,
+
+    #[command(flatten)]
+    pub(super) picture: PictureArgs,
+
+    /// Overlapping instances that the mesh is cut into
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub(super) instances: u32,
 }
 
 /// Which mesh, what picture, how many parts.
@@ -152,6 +179,7 @@ Examples:
   bench compaction --scene living_room.obj         builds, refits and compaction of that scene
   bench split --parts 100 --runs 200               parts of the mesh made by formulas
   bench order --scene living_room.obj --camera 3   what the order of triangles does to rays a second
+  bench queries --scene living_room.obj            ray queries in software beside the device's own tracing
   bench overhead --quick                           does it work at all?
   bench paper --out report                         the paper's tables and figures, with the scenes of LVK_SCENES
 
@@ -192,6 +220,8 @@ mod tests {
             "tlas --instances 0",
             "split --parts 1",
             "order --camera 6",
+            "queries --camera 0",
+            "queries --instances 0",
             "order --scene a.obj --triangles 1000",
             "overhead --width 0",
             "batch --runs 0",

@@ -107,7 +107,7 @@ impl Bench {
         self.ctx.wait(self.ctx.flush()?)?;
         self.ctx.wait_idle()?;
         let held = self.ctx.accel_memory().structure_bytes;
-        let sizes = self.wait_for_compaction(*blas)?;
+        let sizes = compacted(&self.ctx, *blas)?;
         let freed = held.saturating_sub(self.ctx.accel_memory().structure_bytes);
         self.size_row("before compaction", sizes[0], raw_sizes[0], table);
         self.size_row("after compaction", sizes[1], raw_sizes[1], table);
@@ -126,23 +126,21 @@ impl Bench {
             [format!("{:.2} B", each(ours)), format!("{:.2} B", each(theirs))],
         );
     }
+}
 
-    /// Compacts a structure and answers its bytes before and after.
-    fn wait_for_compaction(&self, blas: AccelStructHandle) -> Result<[u64; 2], BenchError> {
-        self.ctx.compact(&[blas])?;
-        for _ in 0..MOST_SUBMISSIONS {
-            self.ctx.wait(self.ctx.flush()?)?;
-            if let Compaction::Done { before_bytes, after_bytes } =
-                self.ctx.accel_struct_info(blas)?.compaction
-            {
-                // What was replaced goes once the GPU is done with the copy.
-                self.ctx.wait_idle()?;
-                return Ok([before_bytes, after_bytes]);
-            }
+/// Compacts a structure and answers its bytes before and after.
+pub(super) fn compacted(ctx: &Context, blas: AccelStructHandle) -> Result<[u64; 2], BenchError> {
+    ctx.compact(&[blas])?;
+    for _ in 0..MOST_SUBMISSIONS {
+        ctx.wait(ctx.flush()?)?;
+        if let Compaction::Done { before_bytes, after_bytes } = ctx.accel_struct_info(blas)?.compaction {
+            // What was replaced goes once the GPU is done with the copy.
+            ctx.wait_idle()?;
+            return Ok([before_bytes, after_bytes]);
         }
-        let device = self.ctx.capabilities().device_name.clone();
-        Err(BenchError::NoCompaction { device, tries: MOST_SUBMISSIONS })
     }
+    let device = ctx.capabilities().device_name.clone();
+    Err(BenchError::NoCompaction { device, tries: MOST_SUBMISSIONS })
 }
 
 /// The same flags for the hand-written side.

@@ -33,6 +33,8 @@ pub(super) enum BenchError {
     Interrupted { done: usize, of: usize, page: PathBuf },
     #[error("which benchmark? bench --help lists them")]
     NoBenchmark,
+    #[error("no folder to keep trees in: {0}")]
+    NoFolder(#[from] std::io::Error),
     #[error(transparent)]
     Listing(#[from] RunError),
     #[error("validation reported {} messages; the first: {}", .0.len(), .0.first().map_or("", String::as_str))]

@@ -87,20 +87,40 @@ const WARM_UP_RUNS: u32 = 3;
 /// samples of each.
 pub(super) fn take_turns<T, const N: usize>(
     runs: u32,
-    mut run: impl FnMut(usize) -> Result<T, BenchError>,
+    run: impl FnMut(usize) -> Result<T, BenchError>,
 ) -> Result<[Vec<T>; N], BenchError> {
     let mut samples = std::array::from_fn(|_| Vec::with_capacity(runs as usize));
+    in_turns(runs, &mut samples, run)?;
+    Ok(samples)
+}
+
+/// As [`take_turns`], for any number of things.
+pub(super) fn all_take_turns<T>(
+    count: usize,
+    runs: u32,
+    run: impl FnMut(usize) -> Result<T, BenchError>,
+) -> Result<Vec<Vec<T>>, BenchError> {
+    let mut samples: Vec<_> = (0..count).map(|_| Vec::with_capacity(runs as usize)).collect();
+    in_turns(runs, &mut samples, run)?;
+    Ok(samples)
+}
+
+fn in_turns<T>(
+    runs: u32,
+    samples: &mut [Vec<T>],
+    mut run: impl FnMut(usize) -> Result<T, BenchError>,
+) -> Result<(), BenchError> {
     let warm_up = WARM_UP_RUNS.min(runs);
     for round in 0..warm_up + runs {
-        for turn in 0..N {
-            let which = (turn + round as usize) % N;
+        for turn in 0..samples.len() {
+            let which = (turn + round as usize) % samples.len();
             let sample = run(which)?;
             if round >= warm_up {
                 samples[which].push(sample);
             }
         }
     }
-    Ok(samples)
+    Ok(())
 }
 
 #[cfg(test)]

@@ -18,7 +18,10 @@ pub(super) struct Mesh {
     pub(super) positions: Vec<[f32; 3]>,
     /// Three vertices each.
     pub(super) triangles: Vec<[u32; 3]>,
+    /// The one to look through.
     pub(super) camera: Camera,
+    /// All there are.
+    pub(super) cameras: [Camera; 5],
     /// Where shadow rays go.
     pub(super) light: [f32; 3],
 }
@@ -42,6 +45,7 @@ impl Mesh {
             triangles: numbered.into_iter().map(|(_, triangle)| *triangle).collect(),
             positions: scene.positions,
             camera: scene.cameras[(camera as usize).clamp(1, 5) - 1],
+            cameras: scene.cameras,
             light: scene.light.position,
         }
     }

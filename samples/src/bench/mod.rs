@@ -17,6 +17,7 @@ mod order;
 mod overhead;
 pub mod paper;
 mod pipelines;
+mod queries;
 mod run;
 mod setup;
 mod split;

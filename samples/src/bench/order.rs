@@ -21,7 +21,7 @@ pub(super) fn measure(setup: &Setup, args: &TraceArgs) -> Result<Table, BenchErr
     let default_triangles = setup.choose(&ctx, Choice { quick: 2000, cpu: 100_000, gpu: 1_000_000 });
     let runs = setup.runs(&ctx, Choice { quick: 1, cpu: 7, gpu: 60 });
     let mesh = Mesh::new(&args.mesh, args.camera, default_triangles)?;
-    let size = setup.picture_size(&ctx, args);
+    let size = setup.picture_size(&ctx, &args.picture);
     let headline = setup.headline(&ctx, &format!("order: {}, {}x{}", mesh.describe(), size[0], size[1]));
     let columns = ["", "as given", "Morton", "spatial", "Morton gains", "spatial gains"];
     let mut table = Table::new(headline, &columns);
@@ -100,7 +100,7 @@ fn compare(
         let samples: [Vec<_>; 3] =
             take_turns(runs, |which| stopwatch.time(|cmd| tracer.record(cmd, &sides[which].picture, rays)))?;
         let medians = samples.map(|samples| median_of(&samples, |timed| timed.gpu));
-        let count = ray_count(&sides[0].picture, rays)?;
+        let count = sides[0].picture.ray_count(rays)?;
         let rates = medians.map(|time| format!("{:.3} M/s", count as f64 / time / 1e3));
         let gains = [1, 2].map(|which| times(medians[0] / medians[which]));
         table.row(format!("{} by {}", rays.name(), path_name(path)), rates.into_iter().chain(gains));
@@ -109,13 +109,4 @@ fn compare(
     let name = format!("pixels that differ by {}", path_name(path));
     table.row(name, [String::new(), String::new(), differing.to_string()]);
     Ok(())
-}
-
-/// How many rays a picture takes.
-fn ray_count(picture: &Picture, rays: Rays) -> lvk::Result<usize> {
-    let hits = picture.hits()?;
-    Ok(match rays {
-        Rays::Primary => hits.len(),
-        Rays::Shadow => hits.iter().filter(|hit| hit.t >= 0.0).count(),
-    })
 }

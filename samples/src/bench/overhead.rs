@@ -26,7 +26,7 @@ pub(super) fn measure(setup: &Setup, args: &TraceArgs) -> Result<Table, BenchErr
     let default_triangles = setup.choose(&ctx, Choice { quick: 2000, cpu: 20_000, gpu: 1_000_000 });
     let runs = setup.runs(&ctx, Choice { quick: 2, cpu: 20, gpu: 500 });
     let mesh = Mesh::new(&args.mesh, args.camera, default_triangles)?;
-    let size = setup.picture_size(&ctx, args);
+    let size = setup.picture_size(&ctx, &args.picture);
     let what = format!("overhead: {}, {}x{} primary rays by pipeline", mesh.describe(), size[0], size[1]);
     let mut table = Table::new(setup.headline(&ctx, &what), &["", "lvk", "hand-written", "ratio"]);
     if ctx.capabilities().ray_tracing_pipeline {

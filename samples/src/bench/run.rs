@@ -7,10 +7,10 @@ use super::args::{BenchArgs, Benchmark};
 use super::error::BenchError;
 use super::setup::Setup;
 use super::table::Table;
-use super::{batch, compaction, order, overhead, paper, split, tlas};
+use super::{batch, compaction, order, overhead, paper, queries, split, tlas};
 use crate::app::{device, scene_list};
 
-/// Does what the command line says. Prints a table to standard output, errors in one line to standard error; the
+/// Does what the command line says. Prints tables to standard output, errors in one line to standard error; the
 /// status is 0 when everything was measured, 1 for trouble with the device, 2 for wrong input.
 #[must_use]
 pub fn run(args: &BenchArgs) -> ExitCode {
@@ -35,20 +35,22 @@ fn answered(args: &BenchArgs) -> Result<String, BenchError> {
         return Ok(String::new());
     }
     let benchmark = args.benchmark.as_ref().ok_or(BenchError::NoBenchmark)?;
-    Ok(measured(args, benchmark)?.to_string())
+    let tables = measured(args, benchmark)?;
+    Ok(tables.iter().map(Table::to_string).collect::<Vec<_>>().join("\n"))
 }
 
-fn measured(args: &BenchArgs, benchmark: &Benchmark) -> Result<Table, BenchError> {
+fn measured(args: &BenchArgs, benchmark: &Benchmark) -> Result<Vec<Table>, BenchError> {
     let setup = Setup::new(args)?;
-    let table = match benchmark {
-        Benchmark::Batch(args) => batch::measure(&setup, args),
-        Benchmark::Compaction(args) => compaction::measure(&setup, args),
-        Benchmark::Split(args) => split::measure(&setup, args),
-        Benchmark::Tlas(args) => tlas::measure(&setup, args),
-        Benchmark::Order(args) => order::measure(&setup, args),
-        Benchmark::Overhead(args) => overhead::measure(&setup, args),
-        Benchmark::Paper(args) => paper::run(&setup, args),
-    }?;
+    let tables = match benchmark {
+        Benchmark::Batch(args) => vec![batch::measure(&setup, args)?],
+        Benchmark::Compaction(args) => vec![compaction::measure(&setup, args)?],
+        Benchmark::Split(args) => vec![split::measure(&setup, args)?],
+        Benchmark::Tlas(args) => vec![tlas::measure(&setup, args)?],
+        Benchmark::Order(args) => vec![order::measure(&setup, args)?],
+        Benchmark::Queries(args) => queries::measure(&setup, args)?,
+        Benchmark::Overhead(args) => vec![overhead::measure(&setup, args)?],
+        Benchmark::Paper(args) => vec![paper::run(&setup, args)?],
+    };
     let messages = setup.validation_messages();
-    if messages.is_empty() { Ok(table) } else { Err(BenchError::Validation(messages)) }
+    if messages.is_empty() { Ok(tables) } else { Err(BenchError::Validation(messages)) }
 }

@@ -1,10 +1,10 @@
 //! The device to measure, and how much to measure on it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use lvk::{Context, ContextDesc, DeviceProfile, RayQueryRequest, Validation, ValidationSink};
+use lvk::{Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryRequest, Validation, ValidationSink};
 
-use super::args::{BenchArgs, Benchmark, TraceArgs};
+use super::args::{BenchArgs, Benchmark, PictureArgs};
 use super::error::BenchError;
 use crate::app::run_args::RayTracing;
 use crate::driver::{DriverRequest, prepare};
@@ -67,24 +67,38 @@ impl Setup {
         self.open_profile(ContextDesc::default().scratch_budget_bytes, &profile, 0)
     }
 
+    /// The device with pipelines as asked for, ray queries by whom, and built trees kept in this folder.
+    pub(super) fn open_tracing(
+        &self,
+        ray_tracing_pipeline: FeatureRequest,
+        ray_query: RayQueryRequest,
+        tree_cache: Option<&Path>,
+    ) -> Result<Context, BenchError> {
+        let desc = self.desc(&self.profile);
+        Ok(Context::new(&ContextDesc { ray_tracing_pipeline, ray_query, tree_cache, ..desc })?)
+    }
+
     fn open_profile(
         &self,
         scratch_budget_bytes: u64,
         profile: &DeviceProfile,
         textures: u32,
     ) -> Result<Context, BenchError> {
-        Ok(Context::new(&ContextDesc {
+        let max_textures = textures.max(ContextDesc::default().max_textures);
+        Ok(Context::new(&ContextDesc { scratch_budget_bytes, max_textures, ..self.desc(profile) })?)
+    }
+
+    fn desc<'a>(&'a self, profile: &'a DeviceProfile) -> ContextDesc<'a> {
+        ContextDesc {
             application_name: "bench",
             vulkan_library: self.loader.as_deref(),
             device: self.device.as_deref(),
-            scratch_budget_bytes,
             ray_query: self.ray_query,
             validation: if self.sink.is_some() { Validation::Standard } else { Validation::Off },
             validation_sink: self.sink.clone(),
-            max_textures: textures.max(ContextDesc::default().max_textures),
             profile: Some(profile).filter(|profile| **profile != DeviceProfile::default()),
             ..ContextDesc::default()
-        })?)
+        }
     }
 
     /// What the validation layer said so far; contexts should be gone, as their end is checked too.
@@ -107,7 +121,7 @@ impl Setup {
     }
 
     /// Width and height of pictures: as the user says, else what suits the device.
-    pub(super) fn picture_size(&self, ctx: &Context, args: &TraceArgs) -> [u32; 2] {
+    pub(super) fn picture_size(&self, ctx: &Context, args: &PictureArgs) -> [u32; 2] {
         let [width, height] = self.choose(ctx, Choice { quick: [32, 18], cpu: [160, 90], gpu: [1280, 720] });
         [args.width.unwrap_or(width), args.height.unwrap_or(height)]
     }

@@ -18,7 +18,7 @@ pub(super) fn measure(setup: &Setup, args: &SplitArgs) -> Result<Table, BenchErr
     let default_triangles = setup.choose(&ctx, Choice { quick: 2000, cpu: 100_000, gpu: 1_000_000 });
     let runs = setup.runs(&ctx, Choice { quick: 1, cpu: 21, gpu: 60 });
     let mesh = Mesh::new(&args.trace.mesh, args.trace.camera, default_triangles)?;
-    let size = setup.picture_size(&ctx, &args.trace);
+    let size = setup.picture_size(&ctx, &args.trace.picture);
     let headline = setup.headline(&ctx, &format!("split: {}, {}x{}", mesh.describe(), size[0], size[1]));
     let most = (mesh.triangles.len() as u64 / u64::from(args.parts)).max(1);
     let sides = [ctx, setup.open_limited(most)?];

@@ -7,6 +7,9 @@ use crate::scene::Camera;
 
 /// Spheres along x and z.
 const SPHERES: [u32; 2] = [4, 3];
+/// From where five cameras look at the middle.
+const EYES: [[f32; 3]; 5] =
+    [[0.0, 3.5, 7.5], [6.5, 1.5, 2.5], [-5.5, 5.5, -4.0], [0.6, 8.5, 0.5], [-1.8, 0.7, 3.9]];
 /// Share of the triangles that the spheres take.
 const SPHERE_SHARE: f64 = 0.9;
 
@@ -16,9 +19,11 @@ pub(super) fn spheres(triangle_count: u32) -> Mesh {
     let count = SPHERES[0] * SPHERES[1];
     let of_one = f64::from(triangle_count) * SPHERE_SHARE / f64::from(count);
     let rows = (of_one / 4.0).sqrt().floor().max(1.0) as u32;
+    let cameras = EYES.map(|eye| Camera::looking_at(eye, [0.0, 0.3, 0.0], 50.0));
     let mut mesh = Mesh {
         name: "spheres made by formulas".to_owned(),
-        camera: Camera::looking_at([0.0, 3.5, 7.5], [0.0, 0.3, 0.0], 50.0),
+        camera: cameras[0],
+        cameras,
         light: [2.0, 6.0, 3.0],
         positions: Vec::new(),
         triangles: Vec::new(),

@@ -182,7 +182,7 @@ impl Bench {
 }
 
 /// A turned and shrunken instance in a cube of them.
-fn transform_of(number: u32, count: u32) -> [f32; 12] {
+pub(super) fn transform_of(number: u32, count: u32) -> [f32; 12] {
     let side = f64::from(count).cbrt().ceil() as u32;
     let place = [number % side, number / side % side, number / side / side].map(|cell| 20.0 * cell as f32);
     let turn = Quat::from_rotation_y(0.37 * number as f32);

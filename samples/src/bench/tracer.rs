@@ -111,6 +111,15 @@ impl Picture {
         Ok(lit)
     }
 
+    /// How many rays it takes. Waits; shadow rays are known once the primary ones are traced.
+    pub(super) fn ray_count(&self, rays: Rays) -> lvk::Result<usize> {
+        let hits = self.hits()?;
+        Ok(match rays {
+            Rays::Primary => hits.len(),
+            Rays::Shadow => hits.iter().filter(|hit| hit.t >= 0.0).count(),
+        })
+    }
+
     /// Number of pixels in which two pictures show different distances (by more than 1e-5 of them), triangles or light.
     pub(super) fn differing(&self, other: &Self) -> lvk::Result<usize> {
         let (hits, others) = (self.hits()?, other.hits()?);
