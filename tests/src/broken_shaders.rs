@@ -2,10 +2,12 @@
 //! from a copy of `shaders/` that is changed and mended again (`LVK_SHADERS`).
 #![expect(clippy::expect_used, reason = "a test that cannot change its shaders has failed")]
 
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use image::RgbaImage;
+use lvk::{Context, TextureHandle};
 use lvk_samples::shader_folder::VARIABLE;
 
 use crate::child::in_child;
@@ -41,15 +43,22 @@ pub struct BrokenShaders {
 }
 
 impl BrokenShaders {
-    /// Runs `body` in a process of its own with a copy of the shaders; `test` as for [`in_child`].
+    /// Runs `body` in a process of its own with a copy of the shaders; `test` as for [`in_child`]. Most of the time goes
+    /// into compiling, so lavapipe is told not to optimise, and keeps what it compiles apart from what is optimised.
     ///
     /// # Panics
     /// As [`in_child`], and when the files cannot be copied.
     pub fn in_child(test: &str, body: impl FnOnce(&Self)) {
         let folder = tempfile::tempdir().expect("temporary folders can be made");
-        let shaders = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders");
-        copy(&shaders, folder.path()).expect("the shaders can be copied");
-        in_child(test, &[(VARIABLE, Some(folder.path().as_os_str()))], || {
+        let [shaders, compiled] = ["shaders", "compiled"].map(|name| folder.path().join(name));
+        copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders"), &shaders)
+            .expect("the shaders can be copied");
+        let variables = [
+            (VARIABLE, Some(shaders.as_os_str())),
+            ("MESA_SHADER_CACHE_DIR", Some(compiled.as_os_str())),
+            ("GALLIVM_PERF", Some(OsStr::new("nopt"))),
+        ];
+        in_child(test, &variables, || {
             let folder = std::env::var_os(VARIABLE).expect("the parent has named the folder");
             body(&Self { folder: PathBuf::from(folder) });
         });
@@ -103,6 +112,18 @@ impl BrokenShaders {
         fs::write(&path, text).expect("the copy can be written");
         Ok(broken)
     }
+}
+
+/// Fills a picture with a colour that no sample shows. Memory keeps what was there before, and a pixel that a broken shader
+/// leaves out would else be right where the picture before was.
+///
+/// # Panics
+/// When the device fails.
+pub fn paint_over(ctx: &Context, picture: TextureHandle) {
+    let mut cmd = ctx.acquire_command_buffer().expect("a command buffer can be had");
+    cmd.clear_texture(picture, [1.0, 0.0, 1.0, 1.0]).expect("pictures can be cleared");
+    let submitted = ctx.submit(cmd).expect("the device works");
+    ctx.wait(submitted).expect("the device works");
 }
 
 fn copy(from: &Path, to: &Path) -> std::io::Result<()> {

@@ -8,7 +8,8 @@ use lvk_samples::scene::{Camera, Scene};
 
 /// The sample with one configuration, ready to take pictures of a scene.
 pub struct Studio {
-    renderer: HybridRenderer,
+    /// The sample.
+    pub renderer: HybridRenderer,
     size: [u32; 2],
 }
 

@@ -2,7 +2,9 @@
 
 use std::ops::Range;
 
-use lvk::{BufferDesc, BufferHandle, Capabilities, CommandBuffer, Context, Holder, TextureRegion};
+use lvk::{
+    BufferDesc, BufferHandle, Capabilities, CommandBuffer, Context, Holder, TextureHandle, TextureRegion,
+};
 
 use super::HybridError;
 use super::bands::bands;
@@ -155,6 +157,11 @@ impl HybridRenderer {
             self.geometry.choose(RasterChoice::by_time(&compute, &hardware));
         }
         Ok(self.geometry.choice())
+    }
+
+    /// The texture with the last frame, sRGB, for a copy to whatever shows it.
+    pub fn picture(&self) -> TextureHandle {
+        *self.film.picture
     }
 
     /// The last frame: red, green, blue and alpha of each pixel, 8 bits each, sRGB, rows from the top.
