@@ -58,6 +58,7 @@ fn the_experiment_measures_everything_and_reports_it() {
         let [rays, geometry, hybrid] = ["t_a_ms", "t_b_ms", "t_ms"].map(|name| number(frame, name));
         assert!((rays + geometry - hybrid).abs() < 2e-6, "{frame:?}");
         assert!(rays > 0.0 && geometry > 0.0 && number(frame, "T_ms") > 0.0, "{frame:?}");
+        assert_spans_hold_passes(frame);
     }
     let times = csv(&folder.path().join("times.csv"));
     assert_eq!(times.len(), cells * 5);
@@ -72,21 +73,40 @@ fn the_experiment_measures_everything_and_reports_it() {
             let sum = number(row, "t_a_ms") + number(row, "t_b_ms");
             assert!((sum - number(row, "t_ms")).abs() < 2e-6, "{row:?}");
             assert!((sum / number(row, "T_ms") - number(row, "t_over_T")).abs() < 1e-4, "{row:?}");
+            let spans = number(row, "t_span_ms") / number(row, "T_span_ms");
+            assert!((spans - number(row, "t_span_over_T_span")).abs() < 1e-4, "{row:?}");
+            assert_spans_hold_passes(row);
         }
     }
     assert_report_is_whole(folder.path(), &experiment);
     assert_pictures_are_alike(folder.path(), &experiment);
 }
 
+/// A span is at least as long as its passes, up to rounding.
+fn assert_spans_hold_passes(row: &HashMap<String, String>) {
+    for (span, passes) in [("T_span_ms", "T_ms"), ("t_span_ms", "t_ms")] {
+        assert!(number(row, span) >= number(row, passes) - 2e-6, "{row:?}");
+    }
+}
+
 fn assert_report_is_whole(folder: &Path, experiment: &Experiment) {
     let page = std::fs::read_to_string(folder.join("report.md")).unwrap();
     let path_count = experiment.plan.paths.len();
     for camera in 1..=CAMERA_COUNT {
-        // In tables 2 to 7 and in that of the spread, by each path, and once where paths are compared.
+        // In tables 2 to 7 and in those of the spans and of the spread, by each path, and once where paths are compared.
         let rows = page.matches(&format!("\n| conference cam {camera} ")).count();
-        assert_eq!(rows, 7 * path_count + usize::from(path_count > 1), "camera {camera}");
+        assert_eq!(rows, 8 * path_count + usize::from(path_count > 1), "camera {camera}");
     }
-    for what in ["## Goals", "### Table 8", "RX 6600 (paper)", " 61.35 |", "1,338,208", &experiment.device] {
+    for what in [
+        "## Goals",
+        "### Whole frames as one span",
+        "t span/T span",
+        "### Table 8",
+        "RX 6600 (paper)",
+        " 61.35 |",
+        "1,338,208",
+        &experiment.device,
+    ] {
         assert!(page.contains(what), "{what} is not in the report");
     }
     let mut linked = 0;

@@ -15,9 +15,12 @@ const STATISTICS: [(&str, Statistic); 5] = [
     ("worst", Statistic::WORST),
 ];
 
+/// The columns of [`numbers`].
+const NUMBERS: &str = "T_ms,t_a_ms,t_b_ms,t_ms,T_span_ms,t_span_ms";
+
 /// A line for each scene, path, camera and statistic.
 pub(super) fn times(scenes: &[SceneResult]) -> String {
-    let mut text = "scene,path,camera,statistic,T_ms,t_a_ms,t_b_ms,t_ms,t_over_T,rasteriser\n".to_owned();
+    let mut text = format!("scene,path,camera,statistic,{NUMBERS},t_over_T,t_span_over_T_span,rasteriser\n");
     for scene in scenes {
         for cell in &scene.cells {
             for (name, statistic) in STATISTICS {
@@ -26,9 +29,10 @@ pub(super) fn times(scenes: &[SceneResult]) -> String {
                 let numbers = numbers(&times);
                 let _ = writeln!(
                     text,
-                    "{},{path},{camera},{name},{numbers},{:.5},{}",
+                    "{},{path},{camera},{name},{numbers},{:.5},{:.5},{}",
                     quoted(&scene.name),
                     times.ratio(),
+                    times.span_ratio(),
                     quoted(scene.rasteriser(cell.path))
                 );
             }
@@ -39,7 +43,7 @@ pub(super) fn times(scenes: &[SceneResult]) -> String {
 
 /// A line for each frame.
 pub(super) fn frames(scenes: &[SceneResult]) -> String {
-    let mut text = "scene,path,camera,frame,T_ms,t_a_ms,t_b_ms,t_ms\n".to_owned();
+    let mut text = format!("scene,path,camera,frame,{NUMBERS}\n");
     for scene in scenes {
         let name = quoted(&scene.name);
         for cell in &scene.cells {
@@ -70,7 +74,9 @@ pub(super) fn likeness(scenes: &[SceneResult]) -> String {
 }
 
 fn numbers(times: &Times) -> String {
-    format!("{:.6},{:.6},{:.6},{:.6}", times.standalone, times.rays, times.geometry, times.hybrid())
+    let passes = [times.standalone, times.rays, times.geometry, times.hybrid()];
+    let spans = [times.standalone_span, times.hybrid_span];
+    passes.into_iter().chain(spans).map(|ms| format!("{ms:.6}")).collect::<Vec<_>>().join(",")
 }
 
 /// Names come from files and may hold anything.

@@ -207,7 +207,13 @@ impl<'a> Pair<'a> {
             (self.standalone.render(view)?, hybrid)
         };
         self.done += 2;
-        Ok(Times { standalone: alone.total_ms(), rays: hybrid.rays_ms, geometry: hybrid.geometry_ms })
+        Ok(Times {
+            standalone: alone.total_ms(),
+            rays: hybrid.rays_ms,
+            geometry: hybrid.geometry_ms,
+            standalone_span: alone.span_ms,
+            hybrid_span: hybrid.span_ms,
+        })
     }
 }
 

@@ -114,6 +114,20 @@ pub(super) fn cards(scenes: &[SceneResult], paths: &[RayPath], device: &str) -> 
     table
 }
 
+/// Averages of whole frames, each as one span, beside those of their passes.
+pub(super) fn spans(scenes: &[SceneResult], path: RayPath) -> Table {
+    let head = ["camera", "T", "T span", "t", "t span", "t span - t", "t/T", "t span/T span"];
+    let title = format!("### Whole frames as one span, by {}: averages in milliseconds", path_name(path));
+    let mut table = Table::new(title, &head);
+    for scene in scenes {
+        for cell in scene.of(path) {
+            table.row(camera(scene, cell.camera), spans_row(&Statistic::Average.of(&cell.frames)));
+        }
+        table.row(format!("{} average", scene.name), spans_row(&scene.mean(path, Statistic::Average)));
+    }
+    table
+}
+
 /// How far frames lie from each other, by figures that a single slow frame does not move.
 pub(super) fn spread(scenes: &[SceneResult], path: RayPath) -> Table {
     let head =
@@ -186,6 +200,18 @@ fn times_cells(times: &Times) -> [String; 6] {
         number(times.geometry),
         number(times.hybrid()),
         percent(times.ratio()),
+    ]
+}
+
+fn spans_row(times: &Times) -> [String; 7] {
+    [
+        number(times.standalone),
+        number(times.standalone_span),
+        number(times.hybrid()),
+        number(times.hybrid_span),
+        number(times.outside_passes()),
+        percent(times.ratio()),
+        percent(times.span_ratio()),
     ]
 }
 
