@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use lvk::{Context, ContextDesc, DeviceProfile, RayQueryRequest, Validation, ValidationSink};
+use lvk::{Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryRequest, Validation, ValidationSink};
 
 use super::args::{BenchArgs, Benchmark, TraceArgs};
 use super::error::BenchError;
@@ -79,12 +79,21 @@ impl Setup {
             device: self.device.as_deref(),
             scratch_budget_bytes,
             ray_query: self.ray_query,
+            ray_tracing_pipeline: self.pipeline(),
             validation: if self.sink.is_some() { Validation::Standard } else { Validation::Off },
             validation_sink: self.sink.clone(),
             max_textures: textures.max(ContextDesc::default().max_textures),
             profile: Some(profile).filter(|profile| **profile != DeviceProfile::default()),
             ..ContextDesc::default()
         })?)
+    }
+
+    /// None beside queries in software: the device's own structures would be built for nothing.
+    fn pipeline(&self) -> FeatureRequest {
+        match self.ray_query {
+            RayQueryRequest::Software => FeatureRequest::Off,
+            _ => ContextDesc::default().ray_tracing_pipeline,
+        }
     }
 
     /// What the validation layer said so far; contexts should be gone, as their end is checked too.

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use super::super::setup::path_name;
 use super::measured::SceneResult;
 use super::times::{Statistic, Times};
 
@@ -25,7 +24,7 @@ pub(super) fn times(scenes: &[SceneResult]) -> String {
         for cell in &scene.cells {
             for (name, statistic) in STATISTICS {
                 let times = statistic.of(&cell.frames);
-                let (path, camera) = (path_name(cell.path), cell.camera + 1);
+                let (path, camera) = (cell.path.name(), cell.camera + 1);
                 let numbers = numbers(&times);
                 let _ = writeln!(
                     text,
@@ -47,7 +46,7 @@ pub(super) fn frames(scenes: &[SceneResult]) -> String {
     for scene in scenes {
         let name = quoted(&scene.name);
         for cell in &scene.cells {
-            let (path, camera) = (path_name(cell.path), cell.camera + 1);
+            let (path, camera) = (cell.path.name(), cell.camera + 1);
             for (frame, times) in cell.frames.iter().enumerate() {
                 let _ = writeln!(text, "{name},{path},{camera},{frame},{}", numbers(times));
             }
@@ -62,7 +61,7 @@ pub(super) fn likeness(scenes: &[SceneResult]) -> String {
     for scene in scenes {
         for cell in &scene.cells {
             let alike = &cell.likeness;
-            let (name, path, camera) = (quoted(&scene.name), path_name(cell.path), cell.camera + 1);
+            let (name, path, camera) = (quoted(&scene.name), cell.path.name(), cell.camera + 1);
             let _ = writeln!(
                 text,
                 "{name},{path},{camera},{:.4},{:.4},{:.6},{:.8}",

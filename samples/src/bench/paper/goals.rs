@@ -1,12 +1,11 @@
 //! What the hybrid method is to reach, and whether it does.
 
-use super::super::setup::path_name;
 use super::super::table::Table;
 use super::measured::{Cell, SceneResult};
 use super::published::PublishedScene;
 use super::tables::decibels;
 use super::times::{Statistic, Times};
-use crate::hybrid::RayPath;
+use super::trace_path::TracePath;
 
 /// Largest t/T on average.
 pub(super) const AVERAGE_RATIO: f64 = 0.75;
@@ -18,7 +17,7 @@ const WORST_OVER_AVERAGE: f64 = 1.5;
 const SSIM: f64 = 0.999;
 /// Largest share of pixels that differ.
 const DIFFERING_SHARE: f64 = 0.0002;
-/// Least PSNR between pipeline and query, in dB.
+/// Least PSNR between two paths, in dB.
 const PATHS_PSNR: f64 = 50.0;
 
 /// A goal, what was measured, and whether that is enough.
@@ -30,16 +29,16 @@ struct Goal {
 }
 
 /// All goals of the paths that were measured.
-pub(super) fn table(scenes: &[SceneResult], paths: &[RayPath]) -> Table {
+pub(super) fn table(scenes: &[SceneResult], paths: &[TracePath]) -> Table {
     let mut table = Table::new("## Goals".to_owned(), &["goal", "measured", "met"]);
-    for goal in paths.iter().flat_map(|&path| of_path(scenes, path)).chain(paths_agree(scenes)) {
+    for goal in paths.iter().flat_map(|&path| of_path(scenes, path)).chain(paths_agree(scenes, paths)) {
         table.row(goal.what, [goal.found, if goal.is_met { "yes" } else { "no" }.to_owned()]);
     }
     table
 }
 
-fn of_path(scenes: &[SceneResult], path: RayPath) -> Vec<Goal> {
-    let name = path_name(path);
+fn of_path(scenes: &[SceneResult], path: TracePath) -> Vec<Goal> {
+    let name = path.name();
     let cells: Vec<(&SceneResult, &Cell)> =
         scenes.iter().flat_map(|scene| scene.of(path).map(move |cell| (scene, cell))).collect();
     let below = |what: &str, limit: f64, number: &dyn Fn(&SceneResult, &Cell) -> f64, unit: Unit| {
@@ -100,10 +99,10 @@ fn worst(cells: &[(&SceneResult, &Cell)], number: impl Fn(&SceneResult, &Cell) -
 }
 
 /// Every scene counts as much as any other, however long it takes.
-fn average_ratio(what: &str, scenes: &[SceneResult], path: RayPath, ratio: fn(&Times) -> f64) -> Goal {
+fn average_ratio(what: &str, scenes: &[SceneResult], path: TracePath, ratio: fn(&Times) -> f64) -> Goal {
     let ratios = scenes.iter().map(|scene| ratio(&scene.mean(path, Statistic::Average)));
     let found = ratios.sum::<f64>() / scenes.len().max(1) as f64;
-    let (name, limit) = (path_name(path), Unit::Percent.text(AVERAGE_RATIO));
+    let (name, limit) = (path.name(), Unit::Percent.text(AVERAGE_RATIO));
     Goal {
         what: format!("{name}: {what} on average at most {limit}"),
         found: Unit::Percent.text(found),
@@ -142,11 +141,12 @@ fn psnr_margin(name: &str, cells: &[(&SceneResult, &Cell)]) -> Goal {
 /// The paper's average over its scenes, in dB.
 const MEAN_PSNR: f64 = 46.71;
 
-fn paths_agree(scenes: &[SceneResult]) -> Option<Goal> {
+fn paths_agree(scenes: &[SceneResult], paths: &[TracePath]) -> Option<Goal> {
+    let [first, second, ..] = paths else { return None };
     let alike = scenes.iter().flat_map(|scene| &scene.paths_alike);
     let lowest = alike.flat_map(|(a, b)| [a.psnr, b.psnr]).reduce(f64::min)?;
     Some(Goal {
-        what: format!("pipeline and query: PSNR at least {PATHS_PSNR} dB"),
+        what: format!("{} and {}: PSNR at least {PATHS_PSNR} dB", first.name(), second.name()),
         found: decibels(lowest),
         is_met: lowest >= PATHS_PSNR,
     })
@@ -162,7 +162,7 @@ mod tests {
         let spans = Times { standalone_span: standalone, hybrid_span: 0.7, ..Times::default() };
         let frames = vec![Times { standalone, rays: 0.4, geometry: 0.2, ..spans }; 3];
         let cells = (0..5).map(|camera| Cell {
-            path: RayPath::Query,
+            path: TracePath::Query,
             camera,
             frames: frames.clone(),
             likeness: alike,
@@ -179,7 +179,7 @@ mod tests {
     }
 
     fn missed(scenes: &[SceneResult]) -> Vec<String> {
-        let goals = of_path(scenes, RayPath::Query).into_iter().filter(|goal| !goal.is_met);
+        let goals = of_path(scenes, TracePath::Query).into_iter().filter(|goal| !goal.is_met);
         goals.map(|goal| goal.what).collect()
     }
 
