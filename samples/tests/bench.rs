@@ -3,6 +3,8 @@
 
 use std::process::{Command, Output};
 
+use lvk_samples::app::metrics::compare;
+
 /// Standard output of the program, which must succeed, with a silent validation layer.
 fn table(args: &[&str]) -> String {
     let args = [args, &["--validate"]].concat();
@@ -157,6 +159,45 @@ fn the_papers_experiment_writes_its_report() {
     let page = std::fs::read_to_string(out.join("report.md")).unwrap();
     assert!(page.contains("--width 32") && page.contains("a rehearsal"), "{page}");
     assert!(!page.contains(folder.path().to_str().unwrap()), "folders are everybody's own");
+}
+
+/// The experiment in its smallest form by this path: its table, and its folder; `None`, loudly, where the device lacks
+/// the path.
+fn small_paper(rt: &str) -> Option<(String, tempfile::TempDir)> {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let size = ["--width", "64", "--height", "36", "--frames", "1", "--depth", "2"];
+    let args = [&["paper", "--quick", "--validate", "--rt", rt, "--out", out], &size[..]].concat();
+    let (status, table, err) = outcome(&args);
+    if status == Some(1) && (err.contains("has no ray queries") || err.contains("neither by pipeline")) {
+        eprintln!("NOT TESTED, {err}");
+        return None;
+    }
+    assert_eq!(status, Some(0), "{args:?}: {table}{err}");
+    Some((table, folder))
+}
+
+#[test]
+fn the_papers_experiment_in_software_says_so_and_shows_the_same() {
+    let (table, software) = small_paper("software").unwrap();
+    assert!(table.contains("| courtyard, software query "), "{table}");
+    let text = |name: &str| std::fs::read_to_string(software.path().join(name)).unwrap();
+    let page = text("report.md");
+    assert!(page.contains("in software (software was asked for)"), "{page}");
+    assert!(page.contains("## By software query") && !page.contains("by query"), "{page}");
+    assert!(text("times.csv").lines().skip(1).all(|line| line.starts_with("courtyard,software query,")));
+    assert!(text("times_software_query.svg").contains("by software query"));
+    let Some((table, hardware)) = small_paper("query") else { return };
+    assert!(table.contains("| courtyard, query "), "{table}");
+    for (camera, method) in (1..=5).flat_map(|camera| [(camera, "standalone"), (camera, "hybrid")]) {
+        let picture = |folder: &tempfile::TempDir, path: &str| {
+            let name = format!("pictures/courtyard_{path}_cam{camera}_{method}.png");
+            image::open(folder.path().join(name)).unwrap().into_rgba8()
+        };
+        let (ours, theirs) = (picture(&software, "software_query"), picture(&hardware, "query"));
+        let found = compare(&ours, &theirs, 64, 36).unwrap();
+        assert!(found.psnr > 50.0 && found.differing_share < 2e-3, "camera {camera}, {method}: {found:?}");
+    }
 }
 
 #[test]

@@ -5,7 +5,9 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use lvk_samples::app::progress::Progress;
-use lvk_samples::bench::paper::{CAMERA_COUNT, Experiment, PICTURES, Pictures, Plan, Statistic, measure};
+use lvk_samples::bench::paper::{
+    CAMERA_COUNT, Experiment, PICTURES, Pictures, Plan, Statistic, TracePath, measure,
+};
 use lvk_tests::device;
 use lvk_tests::hybrid::paths;
 use lvk_tests::still_life::still_life;
@@ -18,7 +20,7 @@ fn experiment(folder: &Path) -> Option<Experiment> {
     let ctx = device()?;
     let mut scene = still_life();
     scene.name = "conference".to_owned();
-    let paths = paths(&ctx);
+    let paths = paths(&ctx).into_iter().map(|path| TracePath::of(path, ctx.capabilities())).collect();
     let plan = Plan { size: SIZE, frames: FRAMES, runs: 1, warm_up: 0, compared: 2, max_depth: 2, paths };
     let pictures = Pictures::new(&folder.join(PICTURES), SIZE).unwrap();
     let found = measure(&ctx, &scene, &plan, &pictures, &mut Progress::hidden()).unwrap();
@@ -58,6 +60,7 @@ fn the_experiment_measures_everything_and_reports_it() {
         let [rays, geometry, hybrid] = ["t_a_ms", "t_b_ms", "t_ms"].map(|name| number(frame, name));
         assert!((rays + geometry - hybrid).abs() < 2e-6, "{frame:?}");
         assert!(rays > 0.0 && geometry > 0.0 && number(frame, "T_ms") > 0.0, "{frame:?}");
+        assert_spans_hold_passes(frame);
     }
     let times = csv(&folder.path().join("times.csv"));
     assert_eq!(times.len(), cells * 5);
@@ -72,21 +75,40 @@ fn the_experiment_measures_everything_and_reports_it() {
             let sum = number(row, "t_a_ms") + number(row, "t_b_ms");
             assert!((sum - number(row, "t_ms")).abs() < 2e-6, "{row:?}");
             assert!((sum / number(row, "T_ms") - number(row, "t_over_T")).abs() < 1e-4, "{row:?}");
+            let spans = number(row, "t_span_ms") / number(row, "T_span_ms");
+            assert!((spans - number(row, "t_span_over_T_span")).abs() < 1e-4, "{row:?}");
+            assert_spans_hold_passes(row);
         }
     }
     assert_report_is_whole(folder.path(), &experiment);
     assert_pictures_are_alike(folder.path(), &experiment);
 }
 
+/// A span is at least as long as its passes, up to rounding.
+fn assert_spans_hold_passes(row: &HashMap<String, String>) {
+    for (span, passes) in [("T_span_ms", "T_ms"), ("t_span_ms", "t_ms")] {
+        assert!(number(row, span) >= number(row, passes) - 2e-6, "{row:?}");
+    }
+}
+
 fn assert_report_is_whole(folder: &Path, experiment: &Experiment) {
     let page = std::fs::read_to_string(folder.join("report.md")).unwrap();
     let path_count = experiment.plan.paths.len();
     for camera in 1..=CAMERA_COUNT {
-        // In tables 2 to 7 and in that of the spread, by each path, and once where paths are compared.
+        // In tables 2 to 7 and in those of the spans and of the spread, by each path, and once where paths are compared.
         let rows = page.matches(&format!("\n| conference cam {camera} ")).count();
-        assert_eq!(rows, 7 * path_count + usize::from(path_count > 1), "camera {camera}");
+        assert_eq!(rows, 8 * path_count + usize::from(path_count > 1), "camera {camera}");
     }
-    for what in ["## Goals", "### Table 8", "RX 6600 (paper)", " 61.35 |", "1,338,208", &experiment.device] {
+    for what in [
+        "## Goals",
+        "### Whole frames as one span",
+        "t span/T span",
+        "### Table 8",
+        "RX 6600 (paper)",
+        " 61.35 |",
+        "1,338,208",
+        &experiment.device,
+    ] {
         assert!(page.contains(what), "{what} is not in the report");
     }
     let mut linked = 0;
@@ -113,12 +135,9 @@ fn assert_pictures_are_alike(folder: &Path, experiment: &Experiment) {
     for (standalone, hybrid) in &scene.paths_alike {
         assert!(standalone.psnr >= 50.0 && hybrid.psnr >= 50.0, "{standalone:?} {hybrid:?}");
     }
-    for name in ["pipeline", "query"] {
+    for path in &experiment.plan.paths {
+        let name = path.file_name();
         let file = |what: &str| folder.join(PICTURES).join(format!("conference_{name}_cam3_{what}.png"));
-        if !file("hybrid").exists() {
-            assert!(experiment.plan.paths.len() == 1);
-            continue;
-        }
         let picture = |what: &str| image::open(file(what)).unwrap().into_rgba8();
         let (standalone, difference) = (picture("standalone"), picture("difference"));
         assert_eq!((standalone.dimensions(), difference.dimensions()), ((96, 54), (98, 56)));

@@ -94,10 +94,19 @@ impl Setup {
             vulkan_library: self.loader.as_deref(),
             device: self.device.as_deref(),
             ray_query: self.ray_query,
+            ray_tracing_pipeline: self.pipeline(),
             validation: if self.sink.is_some() { Validation::Standard } else { Validation::Off },
             validation_sink: self.sink.clone(),
             profile: Some(profile).filter(|profile| **profile != DeviceProfile::default()),
             ..ContextDesc::default()
+        }
+    }
+
+    /// None beside queries in software: the device's own structures would be built for nothing.
+    fn pipeline(&self) -> FeatureRequest {
+        match self.ray_query {
+            RayQueryRequest::Software => FeatureRequest::Off,
+            _ => ContextDesc::default().ray_tracing_pipeline,
         }
     }
 

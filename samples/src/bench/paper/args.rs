@@ -23,7 +23,8 @@ pub struct PaperArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub compared: Option<u32>,
 
-    /// By which path to trace rays: auto, which measures every one that the device has, pipeline or query
+    /// By which path to trace rays: auto, which measures every one that the device has, pipeline, query, or software for
+    /// ray queries that the library walks itself
     #[arg(long, value_enum, default_value_t = RayTracing::Auto, hide_possible_values = true)]
     pub rt: RayTracing,
 

@@ -13,6 +13,7 @@ use super::measured::{Plan, measure};
 use super::pictures::Pictures;
 use super::report::{Experiment, PICTURES};
 use super::tables;
+use super::trace_path::TracePath;
 use crate::app::interrupt::Interrupt;
 use crate::app::progress::Progress;
 use crate::app::run_args::RayTracing;
@@ -102,7 +103,7 @@ fn warn(warnings: &[String]) {
 
 fn begin(setup: &Setup, args: &PaperArgs, ctx: &Context) -> Result<Experiment, BenchError> {
     let (paths, note) = ray_paths(ctx)?;
-    let paths = match args.rt {
+    let paths: Vec<RayPath> = match args.rt {
         RayTracing::Auto => paths,
         RayTracing::Pipeline => vec![only(ctx, RayPath::Pipeline)?],
         RayTracing::Query | RayTracing::Software => vec![only(ctx, RayPath::Query)?],
@@ -115,7 +116,7 @@ fn begin(setup: &Setup, args: &PaperArgs, ctx: &Context) -> Result<Experiment, B
         warm_up: setup.choose(ctx, Choice { quick: 1, cpu: 1, gpu: 30 }),
         compared: args.compared.unwrap_or_else(|| setup.choose(ctx, Choice { quick: 2, cpu: 5, gpu: 5 })),
         max_depth: args.depth,
-        paths,
+        paths: paths.into_iter().map(|path| TracePath::of(path, ctx.capabilities())).collect(),
     };
     let mut experiment = Experiment::new(ctx.capabilities(), command(), plan);
     if setup.is_rehearsal() {

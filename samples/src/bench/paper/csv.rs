@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use super::super::setup::path_name;
 use super::measured::SceneResult;
 use super::times::{Statistic, Times};
 
@@ -15,20 +14,24 @@ const STATISTICS: [(&str, Statistic); 5] = [
     ("worst", Statistic::WORST),
 ];
 
+/// The columns of [`numbers`].
+const NUMBERS: &str = "T_ms,t_a_ms,t_b_ms,t_ms,T_span_ms,t_span_ms";
+
 /// A line for each scene, path, camera and statistic.
 pub(super) fn times(scenes: &[SceneResult]) -> String {
-    let mut text = "scene,path,camera,statistic,T_ms,t_a_ms,t_b_ms,t_ms,t_over_T,rasteriser\n".to_owned();
+    let mut text = format!("scene,path,camera,statistic,{NUMBERS},t_over_T,t_span_over_T_span,rasteriser\n");
     for scene in scenes {
         for cell in &scene.cells {
             for (name, statistic) in STATISTICS {
                 let times = statistic.of(&cell.frames);
-                let (path, camera) = (path_name(cell.path), cell.camera + 1);
+                let (path, camera) = (cell.path.name(), cell.camera + 1);
                 let numbers = numbers(&times);
                 let _ = writeln!(
                     text,
-                    "{},{path},{camera},{name},{numbers},{:.5},{}",
+                    "{},{path},{camera},{name},{numbers},{:.5},{:.5},{}",
                     quoted(&scene.name),
                     times.ratio(),
+                    times.span_ratio(),
                     quoted(scene.rasteriser(cell.path))
                 );
             }
@@ -39,11 +42,11 @@ pub(super) fn times(scenes: &[SceneResult]) -> String {
 
 /// A line for each frame.
 pub(super) fn frames(scenes: &[SceneResult]) -> String {
-    let mut text = "scene,path,camera,frame,T_ms,t_a_ms,t_b_ms,t_ms\n".to_owned();
+    let mut text = format!("scene,path,camera,frame,{NUMBERS}\n");
     for scene in scenes {
         let name = quoted(&scene.name);
         for cell in &scene.cells {
-            let (path, camera) = (path_name(cell.path), cell.camera + 1);
+            let (path, camera) = (cell.path.name(), cell.camera + 1);
             for (frame, times) in cell.frames.iter().enumerate() {
                 let _ = writeln!(text, "{name},{path},{camera},{frame},{}", numbers(times));
             }
@@ -58,7 +61,7 @@ pub(super) fn likeness(scenes: &[SceneResult]) -> String {
     for scene in scenes {
         for cell in &scene.cells {
             let alike = &cell.likeness;
-            let (name, path, camera) = (quoted(&scene.name), path_name(cell.path), cell.camera + 1);
+            let (name, path, camera) = (quoted(&scene.name), cell.path.name(), cell.camera + 1);
             let _ = writeln!(
                 text,
                 "{name},{path},{camera},{:.4},{:.4},{:.6},{:.8}",
@@ -70,7 +73,9 @@ pub(super) fn likeness(scenes: &[SceneResult]) -> String {
 }
 
 fn numbers(times: &Times) -> String {
-    format!("{:.6},{:.6},{:.6},{:.6}", times.standalone, times.rays, times.geometry, times.hybrid())
+    let passes = [times.standalone, times.rays, times.geometry, times.hybrid()];
+    let spans = [times.standalone_span, times.hybrid_span];
+    passes.into_iter().chain(spans).map(|ms| format!("{ms:.6}")).collect::<Vec<_>>().join(",")
 }
 
 /// Names come from files and may hold anything.

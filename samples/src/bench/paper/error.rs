@@ -41,6 +41,16 @@ pub enum PaperError {
         /// Name of the device.
         device: String,
     },
+    /// The device was opened with other ray queries than are to be measured.
+    #[error(
+        "the plan is to trace by {planned}, but the device was opened to trace by {found}; see ContextDesc::ray_query"
+    )]
+    OtherPath {
+        /// Name of the path in the plan.
+        planned: &'static str,
+        /// Name of what the device does.
+        found: &'static str,
+    },
 }
 
 impl PaperError {

@@ -1,13 +1,14 @@
 //! Renders a scene along its five paths by both methods, and keeps what each frame took and how the pictures differ.
 
-use lvk::Context;
+use lvk::{Capabilities, Context};
 
 use super::error::PaperError;
 use super::likeness::Likeness;
 use super::pictures::Pictures;
 use super::times::{Statistic, Times};
+use super::trace_path::TracePath;
 use crate::app::progress::Progress;
-use crate::hybrid::{HybridConfig, HybridRenderer, Method, RayPath};
+use crate::hybrid::{HybridConfig, HybridRenderer, Method};
 use crate::scene::{Camera, CameraPath, Scene};
 
 /// Cameras of a scene.
@@ -29,14 +30,14 @@ pub struct Plan {
     /// How often a ray may be reflected or refracted.
     pub max_depth: u32,
     /// The paths of ray tracing.
-    pub paths: Vec<RayPath>,
+    pub paths: Vec<TracePath>,
 }
 
 /// What was measured of a camera by one path of ray tracing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cell {
     /// By which path rays were traced.
-    pub path: RayPath,
+    pub path: TracePath,
     /// Which of the five cameras, from 0.
     pub camera: usize,
     /// Each frame.
@@ -57,7 +58,7 @@ pub struct SceneResult {
     /// Five for each path of ray tracing, in the order of the plan.
     pub cells: Vec<Cell>,
     /// Which rasteriser found the visible triangles by each path, and why.
-    pub rasterisers: Vec<(RayPath, String)>,
+    pub rasterisers: Vec<(TracePath, String)>,
     /// How alike pictures by pipeline and by query are, for each camera and both methods; empty where there is one path.
     pub paths_alike: Vec<(Likeness, Likeness)>,
 }
@@ -83,18 +84,18 @@ impl Plan {
 
 impl SceneResult {
     /// The cells of a path, by camera.
-    pub fn of(&self, path: RayPath) -> impl Iterator<Item = &Cell> {
+    pub fn of(&self, path: TracePath) -> impl Iterator<Item = &Cell> {
         self.cells.iter().filter(move |cell| cell.path == path)
     }
 
     /// Which rasteriser found the visible triangles by a path, and why.
-    pub(super) fn rasteriser(&self, path: RayPath) -> &str {
+    pub(super) fn rasteriser(&self, path: TracePath) -> &str {
         self.rasterisers.iter().find(|(known, _)| *known == path).map_or("", |(_, choice)| choice)
     }
 
     /// The average of a statistic over the cameras.
     #[must_use]
-    pub fn mean(&self, path: RayPath, statistic: Statistic) -> Times {
+    pub fn mean(&self, path: TracePath, statistic: Statistic) -> Times {
         let rows: Vec<Times> = self.of(path).map(|cell| statistic.of(&cell.frames)).collect();
         Times::mean(&rows)
     }
@@ -115,10 +116,11 @@ pub fn measure(
     if capabilities.limits.timestamp_bits == 0 {
         return Err(PaperError::NoTimestamps { device: capabilities.device_name.clone() });
     }
+    check_paths(&plan.paths, capabilities)?;
     let (mut cells, mut rasterisers) = (Vec::new(), Vec::new());
     let mut firsts: Vec<Vec<[Vec<u8>; 2]>> = Vec::new();
     for &path in &plan.paths {
-        let name = format!("{} by {}", scene.name, super::super::setup::path_name(path));
+        let name = format!("{} by {}", scene.name, path.name());
         progress.stage(&format!("{name}: building"), 0);
         let mut pair = Pair::new(ctx, scene, plan, path)?;
         rasterisers.push((path, pair.rasteriser.clone()));
@@ -143,10 +145,19 @@ pub fn measure(
     })
 }
 
+/// So that no figure bears the name of another path.
+fn check_paths(paths: &[TracePath], capabilities: &Capabilities) -> Result<(), PaperError> {
+    let other = paths.iter().map(|&path| [path, TracePath::of(path.ray_path(), capabilities)]);
+    match other.into_iter().find(|[planned, found]| planned != found) {
+        Some([planned, found]) => Err(PaperError::OtherPath { planned: planned.name(), found: found.name() }),
+        None => Ok(()),
+    }
+}
+
 /// Both methods, ready to take turns.
 struct Pair<'a> {
     plan: &'a Plan,
-    path: RayPath,
+    path: TracePath,
     standalone: HybridRenderer,
     hybrid: HybridRenderer,
     rasteriser: String,
@@ -154,11 +165,18 @@ struct Pair<'a> {
 }
 
 impl<'a> Pair<'a> {
-    fn new(ctx: &Context, scene: &Scene, plan: &'a Plan, path: RayPath) -> Result<Self, PaperError> {
+    fn new(ctx: &Context, scene: &Scene, plan: &'a Plan, path: TracePath) -> Result<Self, PaperError> {
         let [width, height] = plan.size;
         let renderer = |method| {
             let max_depth = plan.max_depth;
-            let config = HybridConfig { method, path, width, height, max_depth, ..HybridConfig::default() };
+            let config = HybridConfig {
+                method,
+                path: path.ray_path(),
+                width,
+                height,
+                max_depth,
+                ..HybridConfig::default()
+            };
             HybridRenderer::new(ctx, scene, &config)
         };
         let (standalone, mut hybrid) = (renderer(Method::Standalone)?, renderer(Method::Hybrid)?);
@@ -207,7 +225,13 @@ impl<'a> Pair<'a> {
             (self.standalone.render(view)?, hybrid)
         };
         self.done += 2;
-        Ok(Times { standalone: alone.total_ms(), rays: hybrid.rays_ms, geometry: hybrid.geometry_ms })
+        Ok(Times {
+            standalone: alone.total_ms(),
+            rays: hybrid.rays_ms,
+            geometry: hybrid.geometry_ms,
+            standalone_span: alone.span_ms,
+            hybrid_span: hybrid.span_ms,
+        })
     }
 }
 
@@ -227,6 +251,18 @@ mod tests {
 
     fn plan(frames: u32, compared: u32) -> Plan {
         Plan { size: [8, 8], frames, runs: 2, warm_up: 1, compared, max_depth: 1, paths: Vec::new() }
+    }
+
+    #[test]
+    fn a_device_with_other_queries_than_planned_is_refused() {
+        use TracePath::{Pipeline, Query, SoftwareQuery};
+        let software =
+            Capabilities { ray_query_path: lvk::RayQueryPath::Software, ..Capabilities::default() };
+        assert!(check_paths(&[Pipeline, SoftwareQuery], &software).is_ok());
+        let refused = check_paths(&[Pipeline, Query], &software).unwrap_err().to_string();
+        assert!(refused.contains("by query") && refused.contains("by software query"), "{refused}");
+        assert!(check_paths(&[SoftwareQuery], &Capabilities::default()).is_err());
+        assert!(check_paths(&[Pipeline, Query], &Capabilities::default()).is_ok());
     }
 
     #[test]

@@ -21,6 +21,7 @@ mod published;
 mod report;
 mod tables;
 mod times;
+mod trace_path;
 
 pub use args::PaperArgs;
 pub(super) use command::run;
@@ -30,3 +31,4 @@ pub use measured::{CAMERA_COUNT, Cell, Plan, SceneResult, measure};
 pub use pictures::Pictures;
 pub use report::{Experiment, PICTURES};
 pub use times::{Statistic, Times};
+pub use trace_path::TracePath;

@@ -5,10 +5,9 @@ use std::path::{Path, PathBuf};
 use image::RgbaImage;
 use image::imageops::{self, FilterType};
 
-use super::super::setup::path_name;
 use super::error::PaperError;
+use super::trace_path::TracePath;
 use crate::app::png;
-use crate::hybrid::RayPath;
 
 /// By what the paper multiplies differences to make them visible.
 const GAIN: u8 = 32;
@@ -40,13 +39,13 @@ impl Pictures {
     pub(super) fn write(
         &self,
         scene: &str,
-        path: RayPath,
+        path: TracePath,
         camera: usize,
         [standalone, hybrid]: &[Vec<u8>; 2],
     ) -> Result<(), PaperError> {
         let [width, height] = self.size;
         let file = |what: &str| {
-            let name = format!("{scene}_{}_cam{}_{what}.png", path_name(path), camera + 1);
+            let name = format!("{scene}_{}_cam{}_{what}.png", path.file_name(), camera + 1);
             self.folder.join(name)
         };
         png::write(&file("standalone"), width, height, standalone)?;
@@ -62,7 +61,7 @@ impl Pictures {
     pub(super) fn write_sheet(
         &self,
         scene: &str,
-        path: RayPath,
+        path: TracePath,
         cameras: &[[Vec<u8>; 2]],
     ) -> Result<(), PaperError> {
         let [width, height] = self.size;
@@ -90,8 +89,8 @@ impl Pictures {
 }
 
 /// Name of the sheet of a scene.
-pub(super) fn sheet_name(scene: &str, path: RayPath) -> String {
-    format!("{scene}_{}.png", path_name(path))
+pub(super) fn sheet_name(scene: &str, path: TracePath) -> String {
+    format!("{scene}_{}.png", path.file_name())
 }
 
 /// White where two pictures are equal, darker by 32 times their difference in each channel.
@@ -147,8 +146,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let pictures = Pictures::new(folder.path(), [8, 4]).unwrap();
         let pair = || [vec![7; 128], vec![9; 128]];
-        pictures.write_sheet("a", RayPath::Query, &[pair(), pair()]).unwrap();
-        pictures.write("a", RayPath::Query, 1, &pair()).unwrap();
+        pictures.write_sheet("a", TracePath::Query, &[pair(), pair()]).unwrap();
+        pictures.write("a", TracePath::Query, 1, &pair()).unwrap();
         let sheet = image::open(folder.path().join("a_query.png")).unwrap().into_rgba8();
         assert_eq!(sheet.dimensions(), (3 * 8 + 8, 2 * 4 + 4));
         assert_eq!(sheet.get_pixel(0, 0).0[0], 7);

@@ -1,6 +1,5 @@
 //! Which plots the report has.
 
-use super::super::setup::path_name;
 use super::bar_chart::{Bar, BarChart, Group};
 use super::error::PaperError;
 use super::goals::AVERAGE_RATIO;
@@ -9,11 +8,12 @@ use super::line_chart::LineChart;
 use super::measured::SceneResult;
 use super::published::{self, PublishedScene};
 use super::times::{Statistic, Times};
-use crate::hybrid::RayPath;
+use super::trace_path::TracePath;
 
 // Told apart by those who see no red or green (after Okabe and Ito).
 const PIPELINE: Hue = (0, 114, 178);
 const QUERY: Hue = (86, 180, 233);
+const SOFTWARE_QUERY: Hue = (204, 121, 167);
 const PAPER: [Hue; 3] = [(230, 159, 0), (240, 200, 100), (213, 94, 0)];
 const STANDALONE: Hue = (120, 120, 120);
 const RAYS: Hue = (0, 114, 178);
@@ -25,7 +25,7 @@ const GOAL: Hue = (0, 158, 115);
 pub(super) type NamedPlot = (String, String);
 
 /// All plots, as names and contents of files.
-pub(super) fn all(scenes: &[SceneResult], paths: &[RayPath]) -> Result<Vec<NamedPlot>, PaperError> {
+pub(super) fn all(scenes: &[SceneResult], paths: &[TracePath]) -> Result<Vec<NamedPlot>, PaperError> {
     let mut plots = vec![("ratio.svg".to_owned(), ratios(scenes, paths).svg()?)];
     for &path in paths {
         plots.push((times_name(path), times(scenes, path).svg()?));
@@ -37,17 +37,17 @@ pub(super) fn all(scenes: &[SceneResult], paths: &[RayPath]) -> Result<Vec<Named
 }
 
 /// File of the bars of a path.
-pub(super) fn times_name(path: RayPath) -> String {
-    format!("times_{}.svg", path_name(path))
+pub(super) fn times_name(path: TracePath) -> String {
+    format!("times_{}.svg", path.file_name())
 }
 
 /// File of the curves of a scene.
-pub(super) fn frames_name(scene: &SceneResult, path: RayPath) -> String {
-    format!("frames_{}_{}.svg", scene.name, path_name(path))
+pub(super) fn frames_name(scene: &SceneResult, path: TracePath) -> String {
+    format!("frames_{}_{}.svg", scene.name, path.file_name())
 }
 
 /// t/T of each camera, beside those of the paper's cards.
-fn ratios(scenes: &[SceneResult], paths: &[RayPath]) -> BarChart {
+fn ratios(scenes: &[SceneResult], paths: &[TracePath]) -> BarChart {
     let mut groups = Vec::new();
     for scene in scenes {
         let published = PublishedScene::named(&scene.name);
@@ -63,7 +63,7 @@ fn ratios(scenes: &[SceneResult], paths: &[RayPath]) -> BarChart {
             groups.push(Group { name: group_name(scene, camera), bars: own.chain(theirs).collect() });
         }
     }
-    let own = paths.iter().map(|&path| (format!("measured, {}", path_name(path)), path_color(path)));
+    let own = paths.iter().map(|&path| (format!("measured, {}", path.name()), path_color(path)));
     let theirs =
         published::CARDS.iter().zip(PAPER).map(|(card, color)| (format!("paper, {}", card.card), color));
     let has_published = scenes.iter().any(|scene| PublishedScene::named(&scene.name).is_some());
@@ -80,7 +80,7 @@ fn ratios(scenes: &[SceneResult], paths: &[RayPath]) -> BarChart {
 }
 
 /// T beside t_a on t_b of each camera.
-fn times(scenes: &[SceneResult], path: RayPath) -> BarChart {
+fn times(scenes: &[SceneResult], path: TracePath) -> BarChart {
     let mut groups = Vec::new();
     for scene in scenes {
         for camera in (0..5).map(Some).chain([None]) {
@@ -92,7 +92,7 @@ fn times(scenes: &[SceneResult], path: RayPath) -> BarChart {
     }
     let legend = [("stand-alone T", STANDALONE), ("ray pass t_a", RAYS), ("geometry pass t_b", GEOMETRY)];
     BarChart {
-        title: format!("Average times by {}", path_name(path)),
+        title: format!("Average times by {}", path.name()),
         axis: "milliseconds",
         legend: legend.map(|(name, color)| (name.to_owned(), color)).into(),
         levels: Vec::new(),
@@ -100,13 +100,13 @@ fn times(scenes: &[SceneResult], path: RayPath) -> BarChart {
     }
 }
 
-fn frames(scene: &SceneResult, path: RayPath) -> LineChart {
+fn frames(scene: &SceneResult, path: TracePath) -> LineChart {
     let curve = |name: &str, hue, number: fn(&Times) -> f64| {
         let stretches = scene.of(path).map(|cell| cell.frames.iter().map(number).collect());
         (name.to_owned(), hue, stretches.collect())
     };
     LineChart {
-        title: format!("Every frame of {} by {}", scene.name, path_name(path)),
+        title: format!("Every frame of {} by {}", scene.name, path.name()),
         axis: "milliseconds",
         curves: vec![
             curve("stand-alone T", STANDALONE, |times| times.standalone),
@@ -119,7 +119,7 @@ fn frames(scene: &SceneResult, path: RayPath) -> LineChart {
 }
 
 /// The average of a camera, or of all.
-fn at(scene: &SceneResult, path: RayPath, camera: Option<usize>) -> Times {
+fn at(scene: &SceneResult, path: TracePath, camera: Option<usize>) -> Times {
     let cell = camera.and_then(|camera| scene.of(path).find(|cell| cell.camera == camera));
     match cell {
         Some(cell) => Statistic::Average.of(&cell.frames),
@@ -136,9 +136,10 @@ fn single(value: f64, color: Hue) -> Bar {
     vec![(value, color)]
 }
 
-fn path_color(path: RayPath) -> Hue {
+fn path_color(path: TracePath) -> Hue {
     match path {
-        RayPath::Pipeline => PIPELINE,
-        RayPath::Query => QUERY,
+        TracePath::Pipeline => PIPELINE,
+        TracePath::Query => QUERY,
+        TracePath::SoftwareQuery => SOFTWARE_QUERY,
     }
 }

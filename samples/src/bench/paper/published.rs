@@ -74,13 +74,13 @@ impl TimesTable {
     /// The row of a camera, 0 to 4.
     pub(super) fn times(&self, scene: &PublishedScene, camera: usize) -> Option<Times> {
         let &[standalone, rays, geometry] = self.rows[scene.index].get(camera)?;
-        Some(Times { standalone, rays, geometry })
+        Some(Times { standalone, rays, geometry, ..Times::default() })
     }
 
     /// The average over the cameras, as printed.
     pub(super) fn mean(&self, scene: &PublishedScene) -> Times {
         let [standalone, rays, geometry] = self.means[scene.index];
-        Times { standalone, rays, geometry }
+        Times { standalone, rays, geometry, ..Times::default() }
     }
 }
 

@@ -5,15 +5,14 @@ use std::path::Path;
 
 use lvk::Capabilities;
 
-use super::super::setup::path_name;
 use super::error::PaperError;
 use super::measured::{Plan, SceneResult};
 use super::pictures::sheet_name;
 use super::published::{self, TimesTable};
 use super::times::Statistic;
+use super::trace_path::TracePath;
 use super::{csv, goals, plots, tables};
-use crate::app::device::driver_text;
-use crate::hybrid::RayPath;
+use crate::app::device::{driver_text, query_text};
 
 /// What was measured, on what and how.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,6 +53,7 @@ impl Experiment {
     #[must_use]
     pub fn new(capabilities: &Capabilities, command: String, plan: Plan) -> Self {
         let profile = capabilities.profile.as_ref().map_or_else(String::new, |name| format!(", as {name}"));
+        let notes = software_note(capabilities, &plan).into_iter().collect();
         Self {
             device: format!("{}{profile}", capabilities.device_name),
             driver: driver_text(capabilities),
@@ -62,7 +62,7 @@ impl Experiment {
             plan,
             wall_seconds: 0.0,
             scenes: Vec::new(),
-            notes: Vec::new(),
+            notes,
         }
     }
 
@@ -97,7 +97,7 @@ impl Experiment {
             self.add_path(&mut page, path);
         }
         let _ = writeln!(page, "{}", tables::cards(&self.scenes, &self.plan.paths, &self.device));
-        if let Some(table) = tables::paths(&self.scenes) {
+        if let Some(table) = tables::paths(&self.scenes, &self.plan.paths) {
             let _ = writeln!(page, "{table}");
         }
         self.add_pictures(&mut page);
@@ -121,7 +121,7 @@ impl Experiment {
         }
         for scene in &self.scenes {
             for (path, choice) in &scene.rasterisers {
-                let _ = writeln!(text, "- {} by {}: {choice}", scene.name, path_name(*path));
+                let _ = writeln!(text, "- {} by {}: {choice}", scene.name, path.name());
             }
         }
         self.notes.iter().for_each(|note| {
@@ -131,13 +131,14 @@ impl Experiment {
         text
     }
 
-    fn add_path(&self, page: &mut String, path: RayPath) {
-        let _ = writeln!(page, "## By {}\n\n![Times]({})\n", path_name(path), plots::times_name(path));
+    fn add_path(&self, page: &mut String, path: TracePath) {
+        let _ = writeln!(page, "## By {}\n\n![Times]({})\n", path.name(), plots::times_name(path));
         let _ = writeln!(page, "{}", tables::likeness(&self.scenes, path));
         let shown = if tables::has_published(&self.scenes) { TIMES.len() } else { 3 };
         for (what, published) in &TIMES[..shown] {
             let _ = writeln!(page, "{}", tables::times(&self.scenes, path, *what, published));
         }
+        let _ = writeln!(page, "{}", tables::spans(&self.scenes, path));
         let _ = writeln!(page, "{}", tables::spread(&self.scenes, path));
         for scene in &self.scenes {
             let _ = writeln!(page, "![Every frame of {}]({})\n", scene.name, plots::frames_name(scene, path));
@@ -148,18 +149,28 @@ impl Experiment {
         page.push_str("## Pictures (Figures 8 to 10)\n\nStand-alone, hybrid, and their difference, inverted and times 32.\n");
         for scene in &self.scenes {
             for &path in &self.plan.paths {
-                let _ = write!(page, "\n{} by {}:\n\n", scene.name, path_name(path));
+                let _ = write!(page, "\n{} by {}:\n\n", scene.name, path.name());
                 let _ = writeln!(page, "![{}]({PICTURES}/{})", scene.name, sheet_name(&scene.name, path));
             }
         }
     }
 }
 
+/// Who walks the trees, and why, where it is not the device.
+fn software_note(capabilities: &Capabilities, plan: &Plan) -> Option<String> {
+    let is_planned = plan.paths.contains(&TracePath::SoftwareQuery);
+    let text = || format!("software query: {}", query_text(capabilities, "a compute shader"));
+    is_planned.then(text)
+}
+
 /// What the symbols mean.
 const HOW: &str = "
 T is the stand-alone method's time, t_a that of the hybrid method's ray pass, t_b that of its geometry pass, t = t_a + t_b,
-all from timestamps on the device around the commands. Both methods take turns frame by frame. The best and the worst frame
-are those of each method by itself, t_a and t_b those of the hybrid method's frame. Rows called average are averages over the
+all from timestamps on the device around the commands. A span is a whole frame, from the first timestamp before the geometry
+pass to the last one after the ray pass, so that what lies between the passes counts too: barriers, and where a frame is
+rendered in several bands of rows the host, which waits for each. The paper adds its passes up, so t is the sum here as well,
+and the spans have a table of their own. Both methods take turns frame by frame. The best and the worst frame
+are those of each method by itself, t_a, t_b and the span those of the hybrid method's frame. Rows called average are averages over the
 cameras, as in the paper. The paper rendered 1280x720 on its cards; its scenes are other exports of the same models, the
 kitchen stands beside its gallery, and its camera positions are not known, so columns compare like with similar.
 
@@ -178,14 +189,20 @@ mod tests {
     use super::*;
     use crate::bench::paper::{Cell, Likeness, Times};
 
-    fn experiment(names: &[&str], paths: &[RayPath]) -> Experiment {
+    fn experiment(names: &[&str], paths: &[TracePath]) -> Experiment {
         let alike = Likeness { psnr: 50.0, lowest_psnr: 49.0, ssim: 0.9995, differing_share: 1e-4 };
         let frames = |slow: f64| {
             (0..2500)
-                .map(|i| Times { standalone: slow, rays: 0.2 + 1e-5 * f64::from(i), geometry: 0.1 })
+                .map(|i| Times {
+                    standalone: slow,
+                    rays: 0.2 + 1e-5 * f64::from(i),
+                    geometry: 0.1,
+                    standalone_span: slow + 0.25,
+                    hybrid_span: 0.4 + 1e-5 * f64::from(i),
+                })
                 .collect()
         };
-        let cells = |&path: &RayPath| {
+        let cells = |&path: &TracePath| {
             (0..5).map(move |camera| Cell {
                 path,
                 camera,
@@ -218,7 +235,7 @@ mod tests {
 
     #[test]
     fn the_papers_numbers_stand_beside_ones_own() {
-        let page = experiment(&["living_room", "kitchen", "teapot"], &[RayPath::Pipeline]).page();
+        let page = experiment(&["living_room", "kitchen", "teapot"], &[TracePath::Pipeline]).page();
         let average = row(&page, "Table 3", "living_room cam 5");
         assert_eq!(average[1], "5.000");
         assert_eq!(average[7..], ["1.047", "0.672", "64.2 %", "0.366", "1.038", "99.1 %"]);
@@ -231,6 +248,10 @@ mod tests {
             row(&page, "Table 2", "living_room average")[1..],
             ["50.00", "49.00", "0.99950", "0.0100 %", "46.30", "0.9892"]
         );
+        assert_eq!(
+            row(&page, "as one span", "living_room cam 4")[1..],
+            ["4.000", "4.250", "0.312", "0.412", "0.100", "7.8 %", "9.7 %"]
+        );
         assert!(page.contains("- kitchen by pipeline: compute rasteriser (exact)\n"), "{page}");
         assert_eq!(row(&page, "Table 1", "kitchen")[3..], ["Gallery", "648,417", "998,831"]);
         assert_eq!(row(&page, "Table 3", "teapot cam 2")[7..], ["", "", "", "", "", ""]);
@@ -242,15 +263,32 @@ mod tests {
 
     #[test]
     fn scenes_that_the_paper_does_not_have_leave_its_columns_out() {
-        let page = experiment(&["teapot"], &[RayPath::Pipeline, RayPath::Query]).page();
+        let page = experiment(&["teapot"], &[TracePath::Pipeline, TracePath::Query]).page();
         assert!(!page.contains("paper:") && !page.contains("Table 6"), "{page}");
         assert_eq!(row(&page, "Table 3, by query", "teapot cam 2").len(), 7);
         assert_eq!(row(&page, "pipeline and by query", "teapot cam 2")[1], "50.00");
     }
 
     #[test]
+    fn software_queries_bear_their_own_name() {
+        use TracePath::{Pipeline, SoftwareQuery};
+        let experiment = experiment(&["teapot"], &[Pipeline, SoftwareQuery]);
+        let page = experiment.page();
+        assert!(page.contains("## By software query\n") && page.contains("\n- software query: "), "{page}");
+        assert!(!page.contains("by query") && !page.contains(": query"), "{page}");
+        assert_eq!(row(&page, "by pipeline and by software query", "teapot cam 2")[1], "50.00");
+        assert!(page.contains("](times_software_query.svg)"), "{page}");
+        assert!(csv::times(&experiment.scenes).contains("\nteapot,software query,1,average,"));
+        let plots = plots::all(&experiment.scenes, &experiment.plan.paths).unwrap();
+        for name in ["ratio.svg", "times_software_query.svg", "frames_teapot_software_query.svg"] {
+            let plot = plots.iter().find(|(known, _)| known == name);
+            assert!(plot.is_some_and(|(_, text)| text.contains("software query")), "{name}");
+        }
+    }
+
+    #[test]
     fn plots_are_svg_and_small_whatever_the_number_of_frames() {
-        let experiment = experiment(&["conference", "a <b>"], &[RayPath::Pipeline, RayPath::Query]);
+        let experiment = experiment(&["conference", "a <b>"], &[TracePath::Pipeline, TracePath::Query]);
         let plots = plots::all(&experiment.scenes, &experiment.plan.paths).unwrap();
         assert_eq!(plots.len(), 1 + 2 * 3);
         for (name, text) in plots {

@@ -1,12 +1,11 @@
 //! The paper's tables with one's own numbers, and the paper's beside them.
 
-use super::super::setup::path_name;
 use super::super::table::{Table, grouped};
 use super::likeness::Likeness;
 use super::measured::SceneResult;
 use super::published::{self, PublishedScene, TimesTable};
 use super::times::{Statistic, Times};
-use crate::hybrid::RayPath;
+use super::trace_path::TracePath;
 
 /// Columns of a table of times, the first apart.
 const TIMES: [&str; 6] = ["T", "t_a", "t_a/T", "t_b", "t", "t/T"];
@@ -32,10 +31,10 @@ pub(super) fn geometry(scenes: &[SceneResult]) -> Table {
 }
 
 /// How alike the pictures of both methods are (Table 2).
-pub(super) fn likeness(scenes: &[SceneResult], path: RayPath) -> Table {
+pub(super) fn likeness(scenes: &[SceneResult], path: TracePath) -> Table {
     let head = ["camera", "PSNR dB", "lowest", "SSIM", "differing", "paper: PSNR dB", "SSIM"];
     let shown = if has_published(scenes) { head.len() } else { 5 };
-    let title = format!("### Table 2, by {}: stand-alone and hybrid pictures compared", path_name(path));
+    let title = format!("### Table 2, by {}: stand-alone and hybrid pictures compared", path.name());
     let mut table = Table::new(title, &head[..shown]);
     for scene in scenes {
         let published = PublishedScene::named(&scene.name);
@@ -53,10 +52,12 @@ pub(super) fn likeness(scenes: &[SceneResult], path: RayPath) -> Table {
     table
 }
 
-/// How alike pictures by pipeline and by query are.
-pub(super) fn paths(scenes: &[SceneResult]) -> Option<Table> {
+/// How alike pictures by the first two paths are.
+pub(super) fn paths(scenes: &[SceneResult], paths: &[TracePath]) -> Option<Table> {
+    let [first, second, ..] = paths else { return None };
     let head = ["camera", "stand-alone: PSNR dB", "SSIM", "hybrid: PSNR dB", "SSIM"];
-    let mut table = Table::new("### Pictures by pipeline and by query compared".to_owned(), &head);
+    let title = format!("### Pictures by {} and by {} compared", first.name(), second.name());
+    let mut table = Table::new(title, &head);
     for scene in scenes {
         for (number, (standalone, hybrid)) in scene.paths_alike.iter().enumerate() {
             let cells =
@@ -70,13 +71,13 @@ pub(super) fn paths(scenes: &[SceneResult]) -> Option<Table> {
 /// Times of every camera, beside a table of the paper (Tables 3 to 7).
 pub(super) fn times(
     scenes: &[SceneResult],
-    path: RayPath,
+    path: TracePath,
     (what, statistic): (&str, Statistic),
     published: &TimesTable,
 ) -> Table {
     let TimesTable { number, card, .. } = published;
     let beside = if has_published(scenes) { format!(", beside the paper's {card}") } else { String::new() };
-    let title = format!("### Table {number}, by {}: {what} in milliseconds{beside}", path_name(path));
+    let title = format!("### Table {number}, by {}: {what} in milliseconds{beside}", path.name());
     let theirs = if has_published(scenes) {
         TIMES.map(|column| format!("paper: {column}")).into()
     } else {
@@ -98,12 +99,12 @@ pub(super) fn times(
 }
 
 /// Averages of this device beside those of the paper's cards (Table 8).
-pub(super) fn cards(scenes: &[SceneResult], paths: &[RayPath], device: &str) -> Table {
+pub(super) fn cards(scenes: &[SceneResult], paths: &[TracePath], device: &str) -> Table {
     let head = ["scene, card", "T", "t_a", "t_a/T", "t_b", "t_b/T", "t", "t/T"];
     let mut table = Table::new("### Table 8: averages by card, in milliseconds".to_owned(), &head);
     for scene in scenes {
         for &path in paths {
-            let name = format!("{}, {device}, {}", scene.name, path_name(path));
+            let name = format!("{}, {device}, {}", scene.name, path.name());
             table.row(name, card_row(&scene.mean(path, Statistic::Average)));
         }
         let Some(theirs) = PublishedScene::named(&scene.name) else { continue };
@@ -114,11 +115,25 @@ pub(super) fn cards(scenes: &[SceneResult], paths: &[RayPath], device: &str) -> 
     table
 }
 
+/// Averages of whole frames, each as one span, beside those of their passes.
+pub(super) fn spans(scenes: &[SceneResult], path: TracePath) -> Table {
+    let head = ["camera", "T", "T span", "t", "t span", "t span - t", "t/T", "t span/T span"];
+    let title = format!("### Whole frames as one span, by {}: averages in milliseconds", path.name());
+    let mut table = Table::new(title, &head);
+    for scene in scenes {
+        for cell in scene.of(path) {
+            table.row(camera(scene, cell.camera), spans_row(&Statistic::Average.of(&cell.frames)));
+        }
+        table.row(format!("{} average", scene.name), spans_row(&scene.mean(path, Statistic::Average)));
+    }
+    table
+}
+
 /// How far frames lie from each other, by figures that a single slow frame does not move.
-pub(super) fn spread(scenes: &[SceneResult], path: RayPath) -> Table {
+pub(super) fn spread(scenes: &[SceneResult], path: TracePath) -> Table {
     let head =
         ["camera", "T median", "T 99 %", "T worst/avg", "t median", "t 99 %", "t worst/avg", "t/T median"];
-    let title = format!("### Spread of frames, by {}, in milliseconds", path_name(path));
+    let title = format!("### Spread of frames, by {}, in milliseconds", path.name());
     let mut table = Table::new(title, &head);
     for scene in scenes {
         for cell in scene.of(path) {
@@ -141,7 +156,7 @@ pub(super) fn spread(scenes: &[SceneResult], path: RayPath) -> Table {
 }
 
 /// The averages of the scenes, for the terminal.
-pub(super) fn summary(headline: String, scenes: &[SceneResult], paths: &[RayPath]) -> Table {
+pub(super) fn summary(headline: String, scenes: &[SceneResult], paths: &[TracePath]) -> Table {
     let theirs = has_published(scenes).then_some("paper: t/T");
     let head: Vec<&str> = ["scene"].into_iter().chain(TIMES).chain(["PSNR dB"]).chain(theirs).collect();
     let mut table = Table::new(headline, &head);
@@ -152,13 +167,13 @@ pub(super) fn summary(headline: String, scenes: &[SceneResult], paths: &[RayPath
             let own = times_cells(&scene.mean(path, Statistic::Average));
             let cells =
                 own.into_iter().chain([decibels(psnr)]).chain(theirs.map(|theirs| percent(theirs.ratio())));
-            table.row(format!("{}, {}", scene.name, path_name(path)), cells);
+            table.row(format!("{}, {}", scene.name, path.name()), cells);
         }
     }
     table
 }
 
-fn mean_likeness(scene: &SceneResult, path: RayPath) -> Likeness {
+fn mean_likeness(scene: &SceneResult, path: TracePath) -> Likeness {
     let cells: Vec<Likeness> = scene.of(path).map(|cell| cell.likeness).collect();
     Likeness::mean(&cells)
 }
@@ -186,6 +201,18 @@ fn times_cells(times: &Times) -> [String; 6] {
         number(times.geometry),
         number(times.hybrid()),
         percent(times.ratio()),
+    ]
+}
+
+fn spans_row(times: &Times) -> [String; 7] {
+    [
+        number(times.standalone),
+        number(times.standalone_span),
+        number(times.hybrid()),
+        number(times.hybrid_span),
+        number(times.outside_passes()),
+        percent(times.ratio()),
+        percent(times.span_ratio()),
     ]
 }
 

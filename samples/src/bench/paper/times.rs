@@ -9,6 +9,10 @@ pub struct Times {
     pub rays: f64,
     /// t_b: the hybrid method's geometry pass.
     pub geometry: f64,
+    /// T as one span, from the first stamp of the frame to the last; 0 where only the passes are known.
+    pub standalone_span: f64,
+    /// t as one span, as well: with what lies between the passes.
+    pub hybrid_span: f64,
 }
 
 /// What stands for many frames.
@@ -31,8 +35,8 @@ impl Statistic {
     /// The frame that only one of a hundred is slower than.
     pub const NEARLY_WORST: Self = Self::Quantile(0.99);
 
-    /// Of `frames`; zero where there are none. The passes of the hybrid method are those of one and the same frame, so
-    /// that t = t_a + t_b.
+    /// Of `frames`; zero where there are none. The passes and the span of the hybrid method are those of one and the
+    /// same frame, so that t = t_a + t_b, and so are T and its span.
     #[must_use]
     pub fn of(self, frames: &[Times]) -> Times {
         match self {
@@ -55,6 +59,18 @@ impl Times {
         self.hybrid() / self.standalone
     }
 
+    /// The same of whole frames, each as one span.
+    #[must_use]
+    pub fn span_ratio(&self) -> f64 {
+        self.hybrid_span / self.standalone_span
+    }
+
+    /// What of the hybrid method's frame lies outside its passes.
+    #[must_use]
+    pub fn outside_passes(&self) -> f64 {
+        self.hybrid_span - self.hybrid()
+    }
+
     /// t_a / T.
     #[must_use]
     pub fn ray_ratio(&self) -> f64 {
@@ -75,6 +91,8 @@ impl Times {
             standalone: mean(|times| times.standalone),
             rays: mean(|times| times.rays),
             geometry: mean(|times| times.geometry),
+            standalone_span: mean(|times| times.standalone_span),
+            hybrid_span: mean(|times| times.hybrid_span),
         }
     }
 }
@@ -86,7 +104,8 @@ fn quantile(frames: &[Times], share: f64) -> Times {
         frames.sort_by(|a, b| key(a).total_cmp(&key(b)));
         frames.get(place).copied().unwrap_or_default()
     };
-    Times { standalone: sorted(|times| times.standalone).standalone, ..sorted(Times::hybrid) }
+    let Times { standalone, standalone_span, .. } = sorted(|times| times.standalone);
+    Times { standalone, standalone_span, ..sorted(Times::hybrid) }
 }
 
 #[cfg(test)]
@@ -95,16 +114,20 @@ mod tests {
 
     fn frames() -> Vec<Times> {
         [(3.0, 1.0, 1.0), (1.0, 2.0, 0.5), (2.0, 0.5, 4.0)]
-            .map(|(standalone, rays, geometry)| Times { standalone, rays, geometry })
+            .map(|(standalone, rays, geometry)| {
+                let (standalone_span, hybrid_span) = (standalone + 0.25, rays + geometry + 0.5);
+                Times { standalone, rays, geometry, standalone_span, hybrid_span }
+            })
             .to_vec()
     }
 
     #[test]
     fn the_worst_frame_of_each_method_is_its_own() {
         let worst = Statistic::WORST.of(&frames());
-        assert_eq!(worst, Times { standalone: 3.0, rays: 0.5, geometry: 4.0 });
+        let spans = |standalone_span, hybrid_span| Times { standalone_span, hybrid_span, ..Times::default() };
+        assert_eq!(worst, Times { standalone: 3.0, rays: 0.5, geometry: 4.0, ..spans(3.25, 5.0) });
         let best = Statistic::BEST.of(&frames());
-        assert_eq!(best, Times { standalone: 1.0, rays: 1.0, geometry: 1.0 });
+        assert_eq!(best, Times { standalone: 1.0, rays: 1.0, geometry: 1.0, ..spans(1.25, 2.5) });
         assert_eq!(Statistic::MEDIAN.of(&frames()).hybrid(), 2.5);
     }
 
@@ -113,6 +136,7 @@ mod tests {
         let mean = Statistic::Average.of(&frames());
         assert_eq!((mean.standalone, mean.hybrid()), (2.0, 3.0));
         assert_eq!((mean.ratio(), mean.ray_ratio() + mean.geometry_ratio()), (1.5, 1.5));
+        assert_eq!((mean.outside_passes(), mean.span_ratio()), (0.5, 3.5 / 2.25));
         assert_eq!(Statistic::Average.of(&[]), Times::default());
         assert_eq!(Statistic::WORST.of(&[]), Times::default());
     }
