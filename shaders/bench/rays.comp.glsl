@@ -1,4 +1,5 @@
 // Primary rays by query, or with BENCH_SHADOW those towards the light.
+#define LVK_OPAQUE_TRIANGLES_ONLY
 #include <lvk/ray_query.glsl>
 #include "bench/view.glsl"
 

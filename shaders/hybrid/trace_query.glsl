@@ -2,6 +2,7 @@
 #ifndef HYBRID_TRACE_QUERY
 #define HYBRID_TRACE_QUERY
 
+#define LVK_OPAQUE_TRIANGLES_ONLY
 #include <lvk/ray_query.glsl>
 
 #include "hybrid/frame.glsl"

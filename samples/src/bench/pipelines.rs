@@ -5,6 +5,9 @@ use lvk::ShaderStage;
 use crate::pipelines::{SamplePipeline, SampleStage};
 use crate::shaders::bench as texts;
 
+/// The folder of the shaders.
+pub(super) const SAMPLE: &str = "bench";
+
 /// Every pipeline of the benchmarks.
 #[must_use]
 pub fn pipelines() -> Vec<SamplePipeline> {
@@ -33,7 +36,10 @@ pub(super) fn stages(defines: &'static [(&'static str, &'static str)]) -> [Sampl
 }
 
 fn compute(name: &'static str, defines: &'static [(&'static str, &'static str)]) -> SamplePipeline {
-    let stages =
-        vec![SampleStage { stage: ShaderStage::Compute, text: texts::RAYS_COMP, defines, name: "rays.comp" }];
-    SamplePipeline { name, stages, color: Vec::new(), depth: None }
+    SamplePipeline { name, stages: vec![query_stage(defines)], color: Vec::new(), depth: None }
+}
+
+/// Rays by query, primary ones unless defined otherwise.
+pub(super) fn query_stage(defines: &'static [(&'static str, &'static str)]) -> SampleStage {
+    SampleStage { stage: ShaderStage::Compute, text: texts::RAYS_COMP, defines, name: "rays.comp" }
 }

@@ -5,14 +5,14 @@ use glam::Vec3;
 use lvk::{
     BufferDesc, BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context,
     Dependencies, HitGroup, Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderModuleDesc,
-    ShaderModuleHandle, ShaderSource, ShaderStage,
+    ShaderModuleHandle, ShaderSource,
 };
 
 use super::mesh::Mesh;
-use super::pipelines::stages;
+use super::pipelines::{SAMPLE, query_stage, stages};
 use crate::hybrid::RayPath;
 use crate::pipelines::SampleStage;
-use crate::shaders::{INCLUDES, bench as texts};
+use crate::shaders::bench as texts;
 
 /// Side of a work group in pixels (`shaders/bench/rays.comp.glsl`).
 const GROUP: u32 = 8;
@@ -154,7 +154,7 @@ impl Tracer {
         let pipelines = match path {
             RayPath::Pipeline => {
                 let modules: lvk::Result<Vec<_>> =
-                    stages(&[]).iter().map(|stage| ctx.create_shader_module(&stage.module())).collect();
+                    stages(&[]).iter().map(|stage| stage.create(ctx, SAMPLE)).collect();
                 Pipelines::Tracing(tracing_pipeline(ctx, &modules?)?)
             }
             RayPath::Query => Pipelines::Compute {
@@ -221,15 +221,11 @@ fn tracing_pipeline(
     })
 }
 
-fn compute_pipeline(ctx: &Context, defines: &[(&str, &str)]) -> lvk::Result<Holder<ComputePipelineHandle>> {
-    let module = ctx.create_shader_module(&ShaderModuleDesc {
-        stage: ShaderStage::Compute,
-        source: ShaderSource::Glsl(texts::RAYS_COMP),
-        includes: INCLUDES,
-        defines,
-        debug_name: "rays.comp",
-        ..ShaderModuleDesc::default()
-    })?;
+fn compute_pipeline(
+    ctx: &Context,
+    defines: &'static [(&'static str, &'static str)],
+) -> lvk::Result<Holder<ComputePipelineHandle>> {
+    let module = query_stage(defines).create(ctx, SAMPLE)?;
     let module = Some(*module);
     ctx.create_compute_pipeline(&ComputePipelineDesc {
         module,

@@ -14,7 +14,7 @@
 
 // Starts a query: void (LvkRayQuery, uint tlasIndex, uint flags, uint cullMask, vec3 origin, float tMin, vec3 direction, float tMax).
 #define lvkRayQueryInitialize(rq, tlasIndex, flags, mask, origin, tMin, direction, tMax) \
-    rayQueryInitializeEXT(rq, kTLAS[nonuniformEXT(tlasIndex)], flags, mask, origin, tMin, direction, tMax)
+    rayQueryInitializeEXT(rq, kTLAS[nonuniformEXT(tlasIndex)], (flags) | LVK_RAY_FLAGS_ALWAYS, mask, origin, tMin, direction, tMax)
 // Steps to the next candidate that the shader must judge; false when the walk is over.
 #define lvkRayQueryProceed(rq) rayQueryProceedEXT(rq)
 // Ends the walk; what was committed stays.

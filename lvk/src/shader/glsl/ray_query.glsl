@@ -12,8 +12,17 @@
 // `which` is LVK_CANDIDATE (inside the loop) or LVK_COMMITTED (the closest hit so far), written as a constant.
 // `rq` and `which` may be evaluated more than once or not at all: pass plain names.
 //
+// A module whose rays take all triangles for opaque and meet no boxes defines LVK_OPAQUE_TRIANGLES_ONLY before the include:
+// all its rays have LVK_RAY_FLAG_OPAQUE, and there are no candidates. The library walks much faster then.
+//
 // The context decides who walks the tree when the module is compiled: `rayQueryEXT`, or the library itself where
 // LVK_SOFTWARE_RAY_QUERY is defined (Capabilities::ray_query_path).
+
+#ifdef LVK_OPAQUE_TRIANGLES_ONLY
+#define LVK_RAY_FLAGS_ALWAYS 1u
+#else
+#define LVK_RAY_FLAGS_ALWAYS 0u
+#endif
 
 #define LVK_CANDIDATE false
 #define LVK_COMMITTED true

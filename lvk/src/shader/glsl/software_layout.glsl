@@ -20,6 +20,9 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lvk
 
 // References to nodes: a node's number, or with the highest bit a leaf: first primitive, 4 bits number of them less 1.
 #define LVK_SOFT_LEAF 0x80000000u
+#define LVK_SOFT_LEAF_COUNT 0x78000000u
+#define LVK_SOFT_LEAF_ONE 0x08000000u
+#define LVK_SOFT_LEAF_FIRST 0x07FFFFFFu
 #define LVK_SOFT_NONE 0xFFFFFFFFu
 
 // Marks of a bottom-level structure, the last number of block 2.
@@ -38,8 +41,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lvk
 #define LVK_SOFT_BINARY_NODE_BLOCKS 4u
 #define LVK_SOFT_WIDE_NODE_BLOCKS 5u
 
-// Paths have at most 64 binary nodes in either level, or 32 wide ones, and a level that is entered saves 3 words.
-#define LVK_SOFT_STACK_WORDS 132u
+// Paths have at most 64 binary nodes in either level, or 32 wide ones, and an instance may leave others of its leaf.
+#define LVK_SOFT_STACK_WORDS 130u
 
 // The address `blocks` blocks behind another one.
 uvec2 lvkSoftBehind(uvec2 base, uint blocks) {

@@ -5,21 +5,29 @@
 #include <lvk/software_walk.glsl>
 #include <lvk/tlas_table.glsl>
 
-// A query: its state, and the words of its stack while it waits with a candidate.
+// A query: its state, and the words of its stack while it waits with a candidate, if there are such.
+#ifdef LVK_OPAQUE_TRIANGLES_ONLY
+struct LvkRayQuery {
+    LvkSoftState state;
+};
+#else
 struct LvkRayQuery {
     LvkSoftState state;
     uint stack[LVK_SOFT_STACK_WORDS];
 };
+#endif
 
 void lvkSoftInitialize(out LvkSoftState state, uint tlas, uint flags, uint mask, vec3 origin, float tMin,
                        vec3 direction, float tMax) {
     LvkSoftHit none = LvkSoftHit(tMax, 0u, LVK_SOFT_NONE, 0u, vec2(0.0), false, false);
+    LvkSoftPlace start;
+    lvkSoftFinish(start);
     lvkSoftQueries += 1u;
+    flags |= LVK_RAY_FLAGS_ALWAYS;
     state = LvkSoftState(kLvkTlasTable.entry[tlas].software, origin, tMin, direction, flags, mask & 0xFFu,
-                         lvkSoftQueries, false, LvkSoftPlace(uvec2(0u), uvec2(0u), 0u, 0u, LVK_SOFT_NONE), none, none);
-    uint root = state.tlas == uvec2(0u) ? LVK_SOFT_NONE : LvkSoftBlocks(state.tlas).at[0].z;
-    if (root != LVK_SOFT_NONE) {
-        lvkSoftGo(state.place, root);
+                         lvkSoftQueries, false, start, none, none);
+    if (state.tlas != uvec2(0u)) {
+        state.place.next = LvkSoftBlocks(state.tlas).at[0].z;
     }
 }
 
@@ -56,10 +64,6 @@ void lvkSoftGenerate(inout LvkSoftState state, float t) {
     }
 }
 
-uvec2 lvkSoftInstances(LvkSoftState state) {
-    return lvkSoftBehind(state.tlas, LvkSoftBlocks(state.tlas).at[1].y);
-}
-
 uvec4 lvkSoftInstanceBlock(LvkSoftState state, uint instance, uint block) {
     return LvkSoftBlocks(lvkSoftInstances(state)).at[instance * LVK_SOFT_INSTANCE_BLOCKS + block];
 }
@@ -94,9 +98,13 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
 #define lvkRayQueryInitialize(rq, tlasIndex, flags, mask, origin, tMin, direction, tMax) \
     lvkSoftInitialize((rq).state, tlasIndex, flags, mask, origin, tMin, direction, tMax)
 // Steps to the next candidate that the shader must judge; false when the walk is over.
+#ifdef LVK_OPAQUE_TRIANGLES_ONLY
+#define lvkRayQueryProceed(rq) lvkSoftProceed((rq).state)
+#else
 #define lvkRayQueryProceed(rq) \
     ((!(rq).state.interrupted || lvkSoftOwner == (rq).state.id || lvkSoftRestore((rq).state, (rq).stack)) \
         && lvkSoftProceed((rq).state) && lvkSoftSave((rq).state, (rq).stack))
+#endif
 // Ends the walk; what was committed stays.
 #define lvkRayQueryTerminate(rq) lvkSoftFinish((rq).state.place)
 // Commits the candidate box at distance `t`.

@@ -5,11 +5,12 @@
 // Intersection", 2013). Triangles that share an edge compute its area from the same numbers by the same operations, so
 // that none of a ray's areas can be wrong on both sides; an area of 0 counts as inside on either.
 
-// What of a ray all triangles share.
+// What of a ray all triangles share: how they are sheared so that it runs along the longest of its axes.
 struct LvkSoftShear {
-    vec3 origin;
-    vec3 shear; // by how much x and y lean for each unit of z, and 1/z, with z the longest axis
-    uint axis;  // which axis that is
+    vec2 lean;   // of the other two axes, for each unit of the longest
+    float scale; // one over the longest
+    bool alongX; // the longest is x
+    bool alongZ; // it is z; else y
 };
 
 struct LvkSoftPassage {
@@ -18,27 +19,30 @@ struct LvkSoftPassage {
     bool front;
 };
 
-vec3 lvkSoftTurn(vec3 v, uint axis) {
-    return axis == 0u ? v.yzx : axis == 1u ? v.zxy : v;
+// The other two axes, and the longest. For y they are in the wrong order, which mirrors triangles.
+vec3 lvkSoftTurn(LvkSoftShear shear, vec3 v) {
+    return vec3(shear.alongX ? v.y : v.x, shear.alongZ ? v.y : v.z, shear.alongX ? v.x : shear.alongZ ? v.z : v.y);
 }
 
-LvkSoftShear lvkSoftShearOf(vec3 origin, vec3 direction) {
+LvkSoftShear lvkSoftShearOf(vec3 direction) {
     vec3 size = abs(direction);
-    uint axis = size.x >= size.y && size.x >= size.z ? 0u : size.y >= size.z ? 1u : 2u;
-    vec3 turned = lvkSoftTurn(direction, axis);
-    precise float scale = 1.0 / turned.z;
-    precise vec2 lean = turned.xy * scale;
-    return LvkSoftShear(origin, vec3(lean, scale), axis);
+    LvkSoftShear shear;
+    shear.alongX = size.x >= size.y && size.x >= size.z;
+    shear.alongZ = !shear.alongX && size.z > size.y;
+    vec3 turned = lvkSoftTurn(shear, direction);
+    shear.scale = 1.0 / turned.z;
+    shear.lean = turned.xy * shear.scale;
+    return shear;
 }
 
 // Whether the ray's line passes the triangle, and where.
-bool lvkSoftPasses(LvkSoftShear ray, vec3 a, vec3 b, vec3 c, out LvkSoftPassage passage) {
-    precise vec3 p = lvkSoftTurn(a - ray.origin, ray.axis);
-    precise vec3 q = lvkSoftTurn(b - ray.origin, ray.axis);
-    precise vec3 r = lvkSoftTurn(c - ray.origin, ray.axis);
-    precise vec2 pf = p.xy - ray.shear.xy * p.z;
-    precise vec2 qf = q.xy - ray.shear.xy * q.z;
-    precise vec2 rf = r.xy - ray.shear.xy * r.z;
+bool lvkSoftPasses(LvkSoftShear ray, vec3 origin, vec3 corners[3], out LvkSoftPassage passage) {
+    precise vec3 p = lvkSoftTurn(ray, corners[0] - origin);
+    precise vec3 q = lvkSoftTurn(ray, corners[1] - origin);
+    precise vec3 r = lvkSoftTurn(ray, corners[2] - origin);
+    precise vec2 pf = fma(-ray.lean, p.zz, p.xy);
+    precise vec2 qf = fma(-ray.lean, q.zz, q.xy);
+    precise vec2 rf = fma(-ray.lean, r.zz, r.xy);
     precise vec3 areas =
         vec3(qf.x * rf.y - qf.y * rf.x, rf.x * pf.y - rf.y * pf.x, pf.x * qf.y - pf.y * qf.x);
     float whole = areas.x + areas.y + areas.z;
@@ -48,9 +52,10 @@ bool lvkSoftPasses(LvkSoftShear ray, vec3 a, vec3 b, vec3 c, out LvkSoftPassage 
         return false;
     }
     float share = 1.0 / whole;
-    passage.t = (areas.x * p.z + areas.y * q.z + areas.z * r.z) * ray.shear.z * share;
+    passage.t = (areas.x * p.z + areas.y * q.z + areas.z * r.z) * ray.scale * share;
     passage.barycentrics = areas.yz * share;
-    passage.front = (whole < 0.0) == (ray.shear.z > 0.0);
+    bool mirrors = !ray.alongX && !ray.alongZ;
+    passage.front = ((whole < 0.0) == (ray.scale > 0.0)) != mirrors;
     return true;
 }
 

@@ -21,13 +21,14 @@ struct LvkSoftHit {
     bool opaque;
 };
 
-// What is left to visit. Words behind `top` are of others; those below `floor` of the level above.
+// What is left to visit. Words behind `top` are of others; those below `floor` are references of the top level.
 struct LvkSoftPlace {
+    uint next;     // reference of the top level to go to before those on the stack, or LVK_SOFT_NONE
+    uint instance; // the one whose structure is walked, or LVK_SOFT_NONE
     uvec2 group;   // nodes: of a wide node as lvkSoftMeet8 tells them, or a binary node's number and LVK_SOFT_ONE_NODE
     uvec2 leaves;  // primitives: the first, and which of it and those behind it
     uint top;
     uint floor;
-    uint instance; // the one whose structure is walked, or LVK_SOFT_NONE
 };
 
 // A query without its stack, small enough to be handed in and out of functions.
@@ -45,7 +46,7 @@ struct LvkSoftState {
     LvkSoftHit committed;
 };
 
-// The structure that is walked, and the ray in its space.
+// The structure of an instance, and the ray in its space.
 struct LvkSoftLevel {
     LvkSoftSlabs slabs;
     LvkSoftShear shear;
@@ -61,6 +62,12 @@ struct LvkSoftLevel {
 
 #define LVK_SOFT_ONE_NODE 0x80000000u
 #define LVK_SOFT_ANY_NODE 0x01000000u
+
+#ifdef LVK_OPAQUE_TRIANGLES_ONLY
+const bool kLvkSoftMeetsBoxes = false;
+#else
+const bool kLvkSoftMeetsBoxes = true;
+#endif
 
 #define LVK_SOFT_CLEAR 0u
 #define LVK_SOFT_OPAQUE 1u
@@ -86,9 +93,9 @@ uint lvkSoftPop(inout LvkSoftPlace place) {
 // Goes to a node or leaf that a reference names.
 void lvkSoftGo(inout LvkSoftPlace place, uint reference) {
     bool isLeaf = (reference & LVK_SOFT_LEAF) != 0u;
-    uint count = (reference >> 27 & 15u) + 1u;
+    uint count = (reference & LVK_SOFT_LEAF_COUNT) / LVK_SOFT_LEAF_ONE + 1u;
     place.group = isLeaf ? uvec2(0u) : uvec2(reference, LVK_SOFT_ONE_NODE);
-    place.leaves = isLeaf ? uvec2(reference & 0x07FFFFFFu, (1u << count) - 1u) : uvec2(0u);
+    place.leaves = isLeaf ? uvec2(reference & LVK_SOFT_LEAF_FIRST, (1u << count) - 1u) : uvec2(0u);
 }
 
 bool lvkSoftIsCulled(uint flags, bool opaque) {
@@ -104,29 +111,17 @@ uint lvkSoftOpacity(uint marks, uint instanceFlags, uint rayFlags) {
     return (rayFlags & LVK_RAY_FLAG_NO_OPAQUE) != 0u ? LVK_SOFT_CLEAR : opacity;
 }
 
-// The top level, as the ray is.
-LvkSoftLevel lvkSoftTopLevel(LvkSoftState state) {
-    LvkSoftLevel level;
-    uvec2 addresses = LvkSoftBlocks(state.tlas).at[1].xy;
-    level.slabs = lvkSoftSlabsOf(state.origin, state.direction);
-    level.shear = LvkSoftShear(vec3(0.0), vec3(0.0), 0u);
-    level.structure = state.tlas;
-    level.nodes = lvkSoftBehind(state.tlas, addresses.x);
-    level.primitives = lvkSoftBehind(state.tlas, addresses.y);
-    level.wide = false;
-    level.kind = LVK_SOFT_INSTANCES;
-    level.opacity = LVK_SOFT_EACH;
-    level.cull = 0u;
-    level.flip = false;
-    return level;
-}
-
 // Three rows of a matrix by a vector.
 vec3 lvkSoftTransform(uvec2 blocks, uint first, vec4 v) {
     vec4 x = uintBitsToFloat(LvkSoftBlocks(blocks).at[first]);
     vec4 y = uintBitsToFloat(LvkSoftBlocks(blocks).at[first + 1u]);
     vec4 z = uintBitsToFloat(LvkSoftBlocks(blocks).at[first + 2u]);
     return vec3(dot(x, v), dot(y, v), dot(z, v));
+}
+
+// Where the instances of the structure that is traced lie.
+uvec2 lvkSoftInstances(LvkSoftState state) {
+    return lvkSoftBehind(state.tlas, LvkSoftBlocks(state.tlas).at[1].y);
 }
 
 // The structure of an instance.
@@ -143,8 +138,12 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     if ((numbers.z >> 24 & state.mask) == 0u) {
         return LVK_SOFT_NONE;
     }
-    level.structure = lvkSoftStructureOf(instances, instance);
+    level.structure = numbers.xy;
     uvec4 head = LvkSoftBlocks(level.structure).at[0];
+    if (head.x == LVK_SOFT_MOVED) {
+        level.structure = head.zw;
+        head = LvkSoftBlocks(level.structure).at[0];
+    }
     uvec4 places = LvkSoftBlocks(level.structure).at[1];
     uint marks = LvkSoftBlocks(level.structure).at[2].w;
     uint flags = numbers.w >> 24;
@@ -158,10 +157,12 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     vec3 origin = lvkSoftTransform(instances, first, vec4(state.origin, 1.0));
     vec3 direction = lvkSoftTransform(instances, first, vec4(state.direction, 0.0));
     level.slabs = lvkSoftSlabsOf(origin, direction);
-    level.shear = lvkSoftShearOf(origin, direction);
-    uint skip = level.kind == LVK_SOFT_BOXES ? LVK_RAY_FLAG_SKIP_AABBS : LVK_RAY_FLAG_SKIP_TRIANGLES;
+    level.shear = lvkSoftShearOf(direction);
+    bool isBox = level.kind == LVK_SOFT_BOXES;
+    uint skip = isBox ? LVK_RAY_FLAG_SKIP_AABBS : LVK_RAY_FLAG_SKIP_TRIANGLES;
+    bool skipped = (state.flags & skip) != 0u || (isBox && !kLvkSoftMeetsBoxes);
     bool culled = level.opacity != LVK_SOFT_EACH && lvkSoftIsCulled(state.flags, level.opacity == LVK_SOFT_OPAQUE);
-    return culled || (state.flags & skip) != 0u ? LVK_SOFT_NONE : head.z;
+    return culled || skipped ? LVK_SOFT_NONE : head.z;
 }
 
 // Visits the next node of the group.
@@ -201,24 +202,9 @@ void lvkSoftResume(inout LvkSoftPlace place, LvkSoftLevel level) {
     }
 }
 
-// Goes on to primitives that the ray may hit; false where the level has none left.
-bool lvkSoftFindLeaves(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
-    while (place.leaves.y == 0u) {
-        if (place.group.y < LVK_SOFT_ANY_NODE) {
-            if (place.top == place.floor) {
-                return false;
-            }
-            lvkSoftResume(place, level);
-        } else {
-            lvkSoftVisit(place, level, range);
-        }
-    }
-    return true;
-}
-
 // Ends the walk.
 void lvkSoftFinish(inout LvkSoftPlace place) {
-    place = LvkSoftPlace(uvec2(0u), uvec2(0u), 0u, 0u, LVK_SOFT_NONE);
+    place = LvkSoftPlace(LVK_SOFT_NONE, LVK_SOFT_NONE, uvec2(0u), uvec2(0u), 0u, 0u);
 }
 
 // Commits a hit; ends the walk if that is enough.
@@ -288,7 +274,7 @@ bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, uint primitive,
     vec3 corners[3];
     lvkSoftCorners(level.structure, level.primitives, level.kind == LVK_SOFT_INDEXED, primitive, corners);
     LvkSoftPassage passage;
-    if (!lvkSoftPasses(level.shear, corners[0], corners[1], corners[2], passage)) {
+    if (!lvkSoftPasses(level.shear, level.slabs.origin, corners, passage)) {
         return false;
     }
     if (!(passage.t > state.tMin && passage.t < state.committed.t)) {
@@ -305,7 +291,7 @@ bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, uint primitive,
 bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
     uint primitive = place.leaves.x + uint(findLSB(place.leaves.y));
     place.leaves.y &= place.leaves.y - 1u;
-    bool isBox = level.kind == LVK_SOFT_BOXES;
+    bool isBox = kLvkSoftMeetsBoxes && level.kind == LVK_SOFT_BOXES;
     LvkSoftHit hit = LvkSoftHit(0.0, LVK_SOFT_CANDIDATE_TRIANGLE, place.instance, primitive, vec2(0.0), false, false);
     bool isHit = isBox ? lvkSoftMeetsBox(state, level, primitive) : lvkSoftHitsTriangle(state, level, primitive, hit);
     if (!isHit) {
@@ -324,34 +310,71 @@ bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLeve
     return true;
 }
 
-// From a leaf of the top level into the structure of its next instance, if the ray may hit it.
-void lvkSoftDescend(LvkSoftState state, inout LvkSoftPlace place, inout LvkSoftLevel level) {
-    uint instance = place.leaves.x + uint(findLSB(place.leaves.y));
-    place.leaves.y &= place.leaves.y - 1u;
-    LvkSoftLevel below;
-    uint root = lvkSoftEnter(state, level.primitives, instance, below);
-    if (root == LVK_SOFT_NONE) {
-        return;
-    }
-    lvkSoftPush(place, place.group.y == 0u ? LVK_SOFT_NONE : place.group.x);
-    lvkSoftPush(place, place.leaves.x);
-    lvkSoftPush(place, place.leaves.y);
-    place.floor = place.top;
-    place.instance = instance;
-    level = below;
-    lvkSoftGo(place, root);
+// The reference of the top level to go on with; LVK_SOFT_NONE where none is left.
+uint lvkSoftNextReference(inout LvkSoftPlace place) {
+    uint next = place.next;
+    place.next = LVK_SOFT_NONE;
+    return next != LVK_SOFT_NONE || place.top == 0u ? next : lvkSoftPop(place);
 }
 
-// Back to the top level.
-void lvkSoftAscend(LvkSoftState state, inout LvkSoftPlace place, inout LvkSoftLevel level) {
+// The next instance whose box the ray meets, or LVK_SOFT_NONE.
+uint lvkSoftNextInstance(inout LvkSoftPlace place, LvkSoftSlabs slabs, uvec2 nodes, vec2 range) {
+    uint reference = lvkSoftNextReference(place);
+    while ((reference & LVK_SOFT_LEAF) == 0u) {
+        uvec2 met = lvkSoftMeet2(slabs, nodes, reference, range);
+        if (met.y != LVK_SOFT_NONE) {
+            lvkSoftPush(place, met.y);
+        }
+        reference = met.x != LVK_SOFT_NONE ? met.x : lvkSoftNextReference(place);
+    }
+    if (reference == LVK_SOFT_NONE) {
+        return reference;
+    }
+    if ((reference & LVK_SOFT_LEAF_COUNT) != 0u) {
+        lvkSoftPush(place, reference + 1u - LVK_SOFT_LEAF_ONE); // the leaf without its first instance
+    }
+    return reference & LVK_SOFT_LEAF_FIRST;
+}
+
+// Goes on to the root of the next instance that the ray may hit; false where there is none.
+bool lvkSoftFindInstance(LvkSoftState state, inout LvkSoftPlace place, out LvkSoftLevel level) {
+    uvec2 places = LvkSoftBlocks(state.tlas).at[1].xy;
+    uvec2 nodes = lvkSoftBehind(state.tlas, places.x);
+    uvec2 instances = lvkSoftBehind(state.tlas, places.y);
+    LvkSoftSlabs slabs = lvkSoftSlabsOf(state.origin, state.direction);
+    uint root = LVK_SOFT_NONE;
+    while (root == LVK_SOFT_NONE) {
+        place.instance = lvkSoftNextInstance(place, slabs, nodes, vec2(state.tMin, state.committed.t));
+        if (place.instance == LVK_SOFT_NONE) {
+            return false;
+        }
+        root = lvkSoftEnter(state, instances, place.instance, level);
+    }
+    place.floor = place.top;
+    lvkSoftGo(place, root);
+    return true;
+}
+
+// Walks through the structure of the instance. Answers whether a candidate waits that the shader must judge.
+bool lvkSoftWalk(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
+    while (true) {
+        while (place.leaves.y != 0u) {
+            if (lvkSoftTest(state, place, level)) {
+                return true;
+            }
+        }
+        if (place.group.y < LVK_SOFT_ANY_NODE) {
+            if (place.top == place.floor) {
+                break;
+            }
+            lvkSoftResume(place, level);
+        }
+        if (place.group.y >= LVK_SOFT_ANY_NODE) {
+            lvkSoftVisit(place, level, vec2(state.tMin, state.committed.t));
+        }
+    }
     place.instance = LVK_SOFT_NONE;
-    place.floor = 0u;
-    uint bits = lvkSoftPop(place);
-    uint first = lvkSoftPop(place);
-    uint node = lvkSoftPop(place);
-    place.group = node == LVK_SOFT_NONE ? uvec2(0u) : uvec2(node, LVK_SOFT_ONE_NODE);
-    place.leaves = uvec2(first, bits);
-    level = lvkSoftTopLevel(state);
+    return false;
 }
 
 // Walks on to the next candidate; false when there is none.
@@ -362,27 +385,15 @@ bool lvkSoftProceed(inout LvkSoftState state) {
     }
     lvkSoftOwner = state.id;
     LvkSoftPlace place = state.place;
-    LvkSoftLevel level = lvkSoftTopLevel(state);
+    LvkSoftLevel level;
     if (place.instance != LVK_SOFT_NONE) {
-        uvec2 instances = level.primitives;
-        lvkSoftEnter(state, instances, place.instance, level);
+        lvkSoftEnter(state, lvkSoftInstances(state), place.instance, level);
     }
-    while (true) {
-        if (!lvkSoftFindLeaves(place, level, vec2(state.tMin, state.committed.t))) {
-            if (place.instance == LVK_SOFT_NONE) {
-                break;
-            }
-            lvkSoftAscend(state, place, level);
-        } else if (place.instance == LVK_SOFT_NONE) {
-            lvkSoftDescend(state, place, level);
-        } else {
-            while (place.leaves.y != 0u) {
-                if (lvkSoftTest(state, place, level)) {
-                    state.interrupted = true;
-                    state.place = place;
-                    return true;
-                }
-            }
+    while (place.instance != LVK_SOFT_NONE || lvkSoftFindInstance(state, place, level)) {
+        if (lvkSoftWalk(state, place, level)) {
+            state.interrupted = true;
+            state.place = place;
+            return true;
         }
     }
     lvkSoftFinish(state.place);
