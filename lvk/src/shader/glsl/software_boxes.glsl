@@ -32,10 +32,10 @@ vec2 lvkSoftCross(LvkSoftSlabs ray, vec3 low, vec3 high, vec2 range) {
                 min(min(far.x, far.y), min(far.z, range.y)) * kMore);
 }
 
-// The children of a binary node that the ray meets, the nearer one first; LVK_SOFT_NONE for each it misses.
-uvec2 lvkSoftMeet2(LvkSoftSlabs ray, uvec2 nodes, uint node, vec2 range) {
-    LvkSoftBlocks blocks = LvkSoftBlocks(nodes);
-    uint first = node * LVK_SOFT_BINARY_NODE_BLOCKS;
+// The children of a binary node that the ray meets, the nearer one first; LVK_SOFT_NONE for each it misses. `nodes` is the
+// block where nodes begin.
+uvec2 lvkSoftMeet2(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint nodes, uint node, vec2 range) {
+    uint first = nodes + node * LVK_SOFT_BINARY_NODE_BLOCKS;
     uvec4 a = blocks.at[first];
     uvec4 b = blocks.at[first + 1u];
     uvec4 c = blocks.at[first + 2u];
@@ -64,9 +64,8 @@ uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, v
 // What of a wide node the ray meets (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through
 // Compressed Wide BVHs", 2017): its inner children as a group of nodes, first node and, in the order of the ray, a bit for
 // each from bit 24 on; and its leaves as a group of primitives, first one and a bit for each.
-uvec4 lvkSoftMeet8(LvkSoftSlabs ray, uvec2 nodes, uint node, vec2 range) {
-    LvkSoftBlocks blocks = LvkSoftBlocks(nodes);
-    uint first = node * LVK_SOFT_WIDE_NODE_BLOCKS;
+uvec4 lvkSoftMeet8(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint nodes, uint node, vec2 range) {
+    uint first = nodes + node * LVK_SOFT_WIDE_NODE_BLOCKS;
     uvec4 head = blocks.at[first];
     uvec4 children = blocks.at[first + 1u];
     uvec4 x = blocks.at[first + 2u];

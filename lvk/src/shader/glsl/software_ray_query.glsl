@@ -87,8 +87,7 @@ mat4x3 lvkSoftMatrix(LvkSoftState state, LvkSoftHit hit, uint first) {
 void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3]) {
     uvec2 structure = lvkSoftStructureOf(lvkSoftInstances(state), hit.instance);
     LvkSoftBlocks head = LvkSoftBlocks(structure);
-    uvec2 primitives = lvkSoftBehind(structure, head.at[1].y);
-    lvkSoftCorners(structure, primitives, head.at[0].y == LVK_SOFT_INDEXED, hit.primitive, positions);
+    lvkSoftCorners(structure, head.at[1].y, head.at[0].y == LVK_SOFT_INDEXED, hit.primitive, positions);
 }
 
 // The hit that `which` means.

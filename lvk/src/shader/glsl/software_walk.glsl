@@ -51,8 +51,8 @@ struct LvkSoftLevel {
     LvkSoftSlabs slabs;
     LvkSoftShear shear;
     uvec2 structure;
-    uvec2 nodes;
-    uvec2 primitives;
+    uint nodes;      // blocks where nodes and primitives begin
+    uint primitives;
     bool wide;
     uint kind;    // of its leaves
     uint opacity; // of all primitives: LVK_SOFT_CLEAR, LVK_SOFT_OPAQUE, or LVK_SOFT_EACH where each has its own
@@ -135,27 +135,30 @@ uvec2 lvkSoftStructureOf(uvec2 instances, uint instance) {
 uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSoftLevel level) {
     uint first = instance * LVK_SOFT_INSTANCE_BLOCKS;
     uvec4 numbers = LvkSoftBlocks(instances).at[first + 6u];
+    vec3 origin = lvkSoftTransform(instances, first, vec4(state.origin, 1.0));
+    vec3 direction = lvkSoftTransform(instances, first, vec4(state.direction, 0.0));
     if ((numbers.z >> 24 & state.mask) == 0u) {
         return LVK_SOFT_NONE;
     }
+    // Structures are rarely moved: their blocks are read as if this one were not.
     level.structure = numbers.xy;
     uvec4 head = LvkSoftBlocks(level.structure).at[0];
+    uvec4 places = LvkSoftBlocks(level.structure).at[1];
+    uint marks = LvkSoftBlocks(level.structure).at[2].w;
     if (head.x == LVK_SOFT_MOVED) {
         level.structure = head.zw;
         head = LvkSoftBlocks(level.structure).at[0];
+        places = LvkSoftBlocks(level.structure).at[1];
+        marks = LvkSoftBlocks(level.structure).at[2].w;
     }
-    uvec4 places = LvkSoftBlocks(level.structure).at[1];
-    uint marks = LvkSoftBlocks(level.structure).at[2].w;
     uint flags = numbers.w >> 24;
     level.wide = head.x == LVK_SOFT_WIDE;
     level.kind = head.y;
     level.opacity = lvkSoftOpacity(marks, flags, state.flags);
     level.cull = (flags & LVK_SOFT_NO_CULL) != 0u ? 0u : state.flags & LVK_SOFT_CULL_FACES;
     level.flip = (flags & LVK_SOFT_FLIP_FACING) != 0u;
-    level.nodes = lvkSoftBehind(level.structure, places.x);
-    level.primitives = lvkSoftBehind(level.structure, places.y);
-    vec3 origin = lvkSoftTransform(instances, first, vec4(state.origin, 1.0));
-    vec3 direction = lvkSoftTransform(instances, first, vec4(state.direction, 0.0));
+    level.nodes = places.x;
+    level.primitives = places.y;
     level.slabs = lvkSoftSlabsOf(origin, direction);
     level.shear = lvkSoftShearOf(direction);
     bool isBox = level.kind == LVK_SOFT_BOXES;
@@ -177,11 +180,12 @@ void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
             lvkSoftPush(place, place.group.x);
             lvkSoftPush(place, place.group.y);
         }
-        uvec4 met = lvkSoftMeet8(level.slabs, level.nodes, node, range);
+        uvec4 met = lvkSoftMeet8(level.slabs, LvkSoftBlocks(level.structure), level.nodes, node, range);
         place.group = met.xy;
         place.leaves = met.zw;
     } else {
-        uvec2 met = lvkSoftMeet2(level.slabs, level.nodes, place.group.x, range);
+        uvec2 met =
+            lvkSoftMeet2(level.slabs, LvkSoftBlocks(level.structure), level.nodes, place.group.x, range);
         place.group = uvec2(0u);
         if (met.y != LVK_SOFT_NONE) {
             lvkSoftPush(place, met.y);
@@ -218,18 +222,19 @@ void lvkSoftCommit(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftHi
 
 
 // The corners of a triangle.
-void lvkSoftCorners(uvec2 structure, uvec2 primitives, bool indexed, uint primitive, out vec3 corners[3]) {
+void lvkSoftCorners(uvec2 structure, uint primitives, bool indexed, uint primitive, out vec3 corners[3]) {
+    LvkSoftBlocks blocks = LvkSoftBlocks(structure);
     if (indexed) {
-        uvec3 vertices = LvkSoftBlocks(primitives).at[primitive].xyz;
-        uvec2 points = lvkSoftBehind(structure, LvkSoftBlocks(structure).at[1].z);
+        uvec3 vertices = blocks.at[primitives + primitive].xyz;
+        uvec2 points = lvkSoftBehind(structure, blocks.at[1].z);
         corners[0] = LvkSoftVertices(points).at[vertices.x];
         corners[1] = LvkSoftVertices(points).at[vertices.y];
         corners[2] = LvkSoftVertices(points).at[vertices.z];
     } else {
-        uint first = primitive * LVK_SOFT_TRIANGLE_BLOCKS;
-        corners[0] = uintBitsToFloat(LvkSoftBlocks(primitives).at[first].xyz);
-        corners[1] = uintBitsToFloat(LvkSoftBlocks(primitives).at[first + 1u].xyz);
-        corners[2] = uintBitsToFloat(LvkSoftBlocks(primitives).at[first + 2u].xyz);
+        uint first = primitives + primitive * LVK_SOFT_TRIANGLE_BLOCKS;
+        corners[0] = uintBitsToFloat(blocks.at[first].xyz);
+        corners[1] = uintBitsToFloat(blocks.at[first + 1u].xyz);
+        corners[2] = uintBitsToFloat(blocks.at[first + 2u].xyz);
     }
 }
 
@@ -249,12 +254,12 @@ uvec2 lvkSoftNumbers(uvec2 structure, uint primitive) {
 
 // Whether a primitive says of itself that it is opaque.
 bool lvkSoftSaysOpaque(LvkSoftLevel level, uint primitive) {
-    LvkSoftBlocks blocks = LvkSoftBlocks(level.primitives);
+    LvkSoftBlocks blocks = LvkSoftBlocks(level.structure);
     if (level.kind == LVK_SOFT_TRIANGLES) {
-        return (blocks.at[primitive * LVK_SOFT_TRIANGLE_BLOCKS + 2u].w & 1u) != 0u;
+        return (blocks.at[level.primitives + primitive * LVK_SOFT_TRIANGLE_BLOCKS + 2u].w & 1u) != 0u;
     }
     if (level.kind == LVK_SOFT_BOXES) {
-        return (blocks.at[primitive * LVK_SOFT_BOX_BLOCKS + 1u].w & 0x80000000u) != 0u;
+        return (blocks.at[level.primitives + primitive * LVK_SOFT_BOX_BLOCKS + 1u].w & 0x80000000u) != 0u;
     }
     uvec2 geometries = lvkSoftBehind(level.structure, LvkSoftBlocks(level.structure).at[1].w);
     return (LvkSoftBlocks(geometries).at[lvkSoftNumbers(level.structure, primitive).x].x & 1u) != 0u;
@@ -262,9 +267,9 @@ bool lvkSoftSaysOpaque(LvkSoftLevel level, uint primitive) {
 
 // Whether the ray meets the box of a primitive.
 bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, uint primitive) {
-    uint first = primitive * LVK_SOFT_BOX_BLOCKS;
-    vec3 low = uintBitsToFloat(LvkSoftBlocks(level.primitives).at[first].xyz);
-    vec3 high = uintBitsToFloat(LvkSoftBlocks(level.primitives).at[first + 1u].xyz);
+    uint first = level.primitives + primitive * LVK_SOFT_BOX_BLOCKS;
+    vec3 low = uintBitsToFloat(LvkSoftBlocks(level.structure).at[first].xyz);
+    vec3 high = uintBitsToFloat(LvkSoftBlocks(level.structure).at[first + 1u].xyz);
     vec2 range = lvkSoftCross(level.slabs, low, high, vec2(state.tMin, state.committed.t));
     return range.x <= range.y;
 }
@@ -318,10 +323,11 @@ uint lvkSoftNextReference(inout LvkSoftPlace place) {
 }
 
 // The next instance whose box the ray meets, or LVK_SOFT_NONE.
-uint lvkSoftNextInstance(inout LvkSoftPlace place, LvkSoftSlabs slabs, uvec2 nodes, vec2 range) {
+uint lvkSoftNextInstance(inout LvkSoftPlace place, LvkSoftSlabs slabs, LvkSoftBlocks tlas, vec2 range) {
+    uint nodes = tlas.at[1].x;
     uint reference = lvkSoftNextReference(place);
     while ((reference & LVK_SOFT_LEAF) == 0u) {
-        uvec2 met = lvkSoftMeet2(slabs, nodes, reference, range);
+        uvec2 met = lvkSoftMeet2(slabs, tlas, nodes, reference, range);
         if (met.y != LVK_SOFT_NONE) {
             lvkSoftPush(place, met.y);
         }
@@ -338,13 +344,15 @@ uint lvkSoftNextInstance(inout LvkSoftPlace place, LvkSoftSlabs slabs, uvec2 nod
 
 // Goes on to the root of the next instance that the ray may hit; false where there is none.
 bool lvkSoftFindInstance(LvkSoftState state, inout LvkSoftPlace place, out LvkSoftLevel level) {
-    uvec2 places = LvkSoftBlocks(state.tlas).at[1].xy;
-    uvec2 nodes = lvkSoftBehind(state.tlas, places.x);
-    uvec2 instances = lvkSoftBehind(state.tlas, places.y);
+    if (place.next == LVK_SOFT_NONE && place.top == 0u) {
+        return false;
+    }
+    LvkSoftBlocks tlas = LvkSoftBlocks(state.tlas);
+    uvec2 instances = lvkSoftInstances(state);
     LvkSoftSlabs slabs = lvkSoftSlabsOf(state.origin, state.direction);
     uint root = LVK_SOFT_NONE;
     while (root == LVK_SOFT_NONE) {
-        place.instance = lvkSoftNextInstance(place, slabs, nodes, vec2(state.tMin, state.committed.t));
+        place.instance = lvkSoftNextInstance(place, slabs, tlas, vec2(state.tMin, state.committed.t));
         if (place.instance == LVK_SOFT_NONE) {
             return false;
         }
