@@ -155,6 +155,12 @@ impl RayTracer {
         Self::with(ctx, method, true)
     }
 
+    /// By query, in a module without candidates: all triangles are opaque.
+    pub fn for_opaque_triangles(ctx: &Context) -> Result<Self> {
+        let pipeline = AnyPipeline::Compute(compute(ctx, &[("LVK_OPAQUE_TRIANGLES_ONLY", "")])?);
+        Ok(Self { ctx: ctx.clone(), pipeline })
+    }
+
     /// Traces with a pipeline of the caller's own, whose ray generation shaders take the push constants of
     /// `ray_records.glsl`.
     pub fn of_pipeline(ctx: &Context, pipeline: Holder<RayTracingPipelineHandle>) -> Self {
@@ -169,7 +175,9 @@ impl RayTracer {
     fn with(ctx: &Context, method: Method, keep_even: bool) -> Result<Self> {
         let pipeline = match method {
             Method::Pipeline => AnyPipeline::RayTracing(ray_tracing(ctx, keep_even)?),
-            Method::Query => AnyPipeline::Compute(compute(ctx, keep_even)?),
+            Method::Query => {
+                AnyPipeline::Compute(compute(ctx, if keep_even { &[("KEEP_EVEN", "")] } else { &[] })?)
+            }
         };
         Ok(Self { ctx: ctx.clone(), pipeline })
     }
@@ -274,8 +282,7 @@ fn ray_tracing(ctx: &Context, keep_even: bool) -> Result<Holder<RayTracingPipeli
     })
 }
 
-fn compute(ctx: &Context, keep_even: bool) -> Result<Holder<ComputePipelineHandle>> {
-    let defines: &[_] = if keep_even { &[("KEEP_EVEN", "")] } else { &[] };
+fn compute(ctx: &Context, defines: &[(&str, &str)]) -> Result<Holder<ComputePipelineHandle>> {
     let text = include_str!("../shaders/query.comp.glsl");
     let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
     ctx.create_compute_pipeline(&ComputePipelineDesc {

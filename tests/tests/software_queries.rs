@@ -13,7 +13,7 @@ use lvk_tests::child::without_ray_tracing;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, upload_geometries};
-use lvk_tests::ray_tracer::{HitRecord, How, MISSED, Method, RayTracer, shader};
+use lvk_tests::ray_tracer::{HitRecord, How, MISSED, Method, OPAQUE, RayTracer, shader};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::{TestDevice, device, device_with};
 
@@ -118,6 +118,25 @@ fn software_and_the_device_answer_alike() -> Result<()> {
     let ids = |record: &HitRecord| (record.kind, record.instance, record.geometry, record.primitive);
     let differ = one.iter().zip(&other).filter(|(one, other)| ids(one) != ids(other)).count();
     assert!(differ * 2_000 < rays.len(), "{differ} of {} rays differ", rays.len());
+    Ok(())
+}
+
+/// Where a module promises to meet opaque triangles alone, by the library and by the device.
+#[test]
+fn modules_without_candidates_see_the_same() -> Result<()> {
+    let (Some(one), Some(other)) = (device(), software()) else { return Ok(()) };
+    let rays = random_rays(8, 5_000, Vec3::splat(-2.0), Vec3::splat(2.0));
+    for ctx in [one, other].iter().filter(|ctx| ctx.capabilities().ray_query) {
+        let gpu = crowd().upload(ctx)?;
+        let (tracer, plain) = (RayTracer::for_opaque_triangles(ctx)?, RayTracer::new(ctx, Method::Query)?);
+        let opaque = |how: How| How { flags: how.flags | OPAQUE, ..how };
+        let found = tracer.trace(&gpu.tlas, &rays, How::default())?;
+        let path = ctx.capabilities().ray_query_path;
+        assert_eq!(found, plain.trace(&gpu.tlas, &rays, opaque(How::default()))?, "{path:?}");
+        let missed = |records: Vec<HitRecord>| records.iter().map(|it| it.kind == MISSED).collect::<Vec<_>>();
+        let found = missed(tracer.trace(&gpu.tlas, &rays, How::shadows())?);
+        assert_eq!(found, missed(plain.trace(&gpu.tlas, &rays, opaque(How::shadows()))?), "{path:?}");
+    }
     Ok(())
 }
 
