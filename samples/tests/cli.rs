@@ -433,15 +433,17 @@ fn a_profile_decides_the_path_and_is_told() {
         assert_names(&outcome.out, &[&told, path, "validation messages: 0"]);
     }
     let wish = ["--scene", &scene, "--frames", "1", "--profile", "no-ray-tracing", "--validate", "--rt"];
-    for (rt, parts) in [
-        ("auto", ["neither", "profile 'no-ray-tracing'"]),
-        ("query", ["lacks ray queries", "hidden by the device profile 'no-ray-tracing'"]),
-    ] {
+    for (rt, lacks) in [("pipeline", "lacks ray tracing pipelines"), ("query", "lacks ray queries")] {
+        let parts = [lacks, "hidden by the device profile 'no-ray-tracing'"];
         desk.run(&[&wish[..], &[rt]].concat()).assert_error(1, &parts);
     }
-    let outcome = desk.run(&[&wish[..], &["software"]].concat());
-    outcome.assert_success();
-    assert_names(&outcome.out, &["in software (software was asked for)", "validation messages: 0"]);
+    for (rt, why) in
+        [("software", "software was asked for"), ("auto", "the device has no ray queries of its own")]
+    {
+        let outcome = desk.run(&[&wish[..], &[rt]].concat());
+        outcome.assert_success();
+        assert_names(&outcome.out, &[&format!("in software ({why})"), "validation messages: 0"]);
+    }
 }
 
 /// The phone takes the courtyard in parts only, and the picture is made all the same.

@@ -147,7 +147,7 @@ fn hybrid_ways() -> [HybridWay<'static>; 9] {
         HybridConfig { width: 160, height: 90, bounces: Some(Bounces::Inline), ..HybridConfig::default() };
     let geometry = |geometry| HybridConfig { geometry, ..plain };
     let visible = |raster| geometry(Geometry::Visibility(Some(raster)));
-    let tuning = RasterTuning { small_pixels: Some(0), ..RasterTuning::default() };
+    let tuning = RasterTuning { small_pixels: Some(0), medium_pixels: Some(512), ..RasterTuning::default() };
     let query = HybridConfig { path: RayPath::Query, ..plain };
     let queued = |config| HybridConfig { bounces: Some(Bounces::Queued), ..config };
     let ordered = |config| HybridConfig { bounces: Some(Bounces::First), ..config };
@@ -378,6 +378,12 @@ const REFLECTIONS_QUERY: [Mistake; 3] = [
     mistake("only the sky in glass", "reflections/transparent.comp.glsl", HALL_RAYS, NO_HALL_RAYS),
 ];
 
+const REFLECTIONS_EVER: [Mistake; 3] = [
+    mistake("mirrors short-sighted", "reflections/range.glsl", "return kFar;", "return 0.5;"),
+    mistake("no shadows", "reflections/visibility.glsl", "if (blocker >= 0.0)", "if (blocker >= 1e30)"),
+    mistake("no blur", "reflections/filter.comp.glsl", "radius > 0.75", "radius > 1e9"),
+];
+
 /// Seen from just above the floor, where leaves are mirrored and throw shadows.
 const LEAVES: [Mistake; 2] = [
     mistake("leaves are squares", "reflections/surface.glsl", ".a >= 0.5;", ".a >= -1.0;"),
@@ -385,8 +391,11 @@ const LEAVES: [Mistake; 2] = [
 ];
 
 fn hall(ctx: &Context, path: RayPath, view: Option<&Camera>) -> RgbaImage {
-    let config = ReflectionsConfig { samples: 1, ..ReflectionsConfig::new(path, 130, 73) };
-    let mut hall = Reflections::new(ctx, &config).unwrap();
+    hall_of(ctx, &ReflectionsConfig { samples: 1, ..ReflectionsConfig::new(path, 130, 73) }, view)
+}
+
+fn hall_of(ctx: &Context, config: &ReflectionsConfig, view: Option<&Camera>) -> RgbaImage {
+    let mut hall = Reflections::new(ctx, config).unwrap();
     hall.show(0.0);
     if let Some(view) = view {
         hall.look(view);
@@ -417,6 +426,12 @@ fn reflections_notices() {
         let mistakes = if path == RayPath::Pipeline { &LEAVES[..] } else { &LEAVES[..1] };
         shaders.assert_each_shows("leaves", &expected, &SAME_AS_EVER, mistakes, || {
             hall(&ctx, path, Some(&view))
+        });
+        // The picture of the test that the hall looks as it always did.
+        let config = ReflectionsConfig { samples: 4, ..ReflectionsConfig::new(path, 162, 91) };
+        let expected = reference("reflections_small");
+        shaders.assert_each_shows("as ever", &expected, &SAME_AS_EVER, &REFLECTIONS_EVER, || {
+            hall_of(&ctx, &config, None)
         });
     });
 }

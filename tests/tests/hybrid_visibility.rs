@@ -123,7 +123,7 @@ fn tuning_and_full_lists_do_not_change_the_picture() {
     let scene = still_life();
     let plain = config(paths(&ctx)[0], COMPUTE);
     let expected = pictures(&ctx, &scene, &plain, &scene.cameras[..2]);
-    for (small, medium_pixels, set_aside, tiles) in [
+    for (small, medium, set_aside, tiles) in [
         (0, 1024, 1 << 16, 1 << 16),
         (0, 0, 1 << 16, 1 << 16),
         (0, u32::MAX, 1 << 16, 0),
@@ -133,7 +133,8 @@ fn tuning_and_full_lists_do_not_change_the_picture() {
         (8, 64, 1 << 16, 5),
         (64, 100, 40, 40),
     ] {
-        let tuning = RasterTuning { small_pixels: Some(small), medium_pixels, set_aside, tiles };
+        let (small_pixels, medium_pixels) = (Some(small), Some(medium));
+        let tuning = RasterTuning { small_pixels, medium_pixels, set_aside, tiles };
         let found = pictures(&ctx, &scene, &HybridConfig { tuning, ..plain }, &scene.cameras[..2]);
         assert!(found == expected, "{tuning:?} changes the picture");
     }

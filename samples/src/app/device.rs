@@ -46,12 +46,13 @@ pub(super) fn open(
         RayTracing::Pipeline => with(Required, HardwareIfPresent),
         RayTracing::Query => with(Optional, Hardware),
         RayTracing::Software => with(Off, Software),
-        // What traces in hardware keeps no structures for software beside it.
+        // A profile rehearses the device's own paths. These keep no structures for software beside theirs.
         RayTracing::Auto => {
             let best = with(Optional, HardwareIfPresent)?;
             let caps = best.capabilities();
-            let is_hardware = !caps.is_cpu && (caps.ray_tracing_pipeline || caps.ray_query);
-            if is_hardware { Ok(best) } else { with(Off, Auto) }
+            let can_trace = caps.ray_tracing_pipeline || caps.ray_query;
+            let is_slow = caps.is_cpu && args.profile.is_none();
+            if can_trace && !is_slow { Ok(best) } else { with(Off, Auto) }
         }
     }
 }

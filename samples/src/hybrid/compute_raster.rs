@@ -16,10 +16,10 @@ use crate::shaders::hybrid as texts;
 const GROUP: u32 = 128;
 /// `constant_id` of the most pixels of a triangle in the first and in the second pass.
 const MOST_PIXELS: u32 = 0;
-/// Pixels of a small triangle on a GPU, where neighbours wait for the thread with the largest one.
-const GPU_SMALL_PIXELS: u32 = 8;
-/// The same on a CPU, where threads that share a triangle cost more.
-const CPU_SMALL_PIXELS: u32 = 1 << 16;
+/// Most pixels of a small and of a medium triangle on a GPU.
+const GPU_PIXELS: [u32; 2] = [8, 512];
+/// The same on a CPU, where a pass costs more and fewer threads wait for the one with the largest triangle.
+const CPU_PIXELS: [u32; 2] = [256, 1 << 16];
 
 /// The rasteriser: its pipelines, the words it fills, and the triangles that its first pass sets aside.
 pub(super) struct ComputeRaster {
@@ -58,20 +58,16 @@ impl ComputeRaster {
         extent: [u32; 2],
         tuning: &RasterTuning,
     ) -> lvk::Result<Self> {
-        let suited = if ctx.capabilities().is_cpu { CPU_SMALL_PIXELS } else { GPU_SMALL_PIXELS };
+        let [small, medium] = if ctx.capabilities().is_cpu { CPU_PIXELS } else { GPU_PIXELS };
         let most =
             |pixels| [SpecializationConstant { id: MOST_PIXELS, value: SpecializationValue::U32(pixels) }];
-        let small_pixels = most(tuning.small_pixels.unwrap_or(suited));
+        let small_pixels = most(tuning.small_pixels.unwrap_or(small));
+        let medium_pixels = most(tuning.medium_pixels.unwrap_or(medium));
         let set_capacity = tuning.set_aside.min(RasterTuning::MOST_SET_ASIDE);
         let words_bytes = u64::from(extent[0]) * u64::from(extent[1]) * size_of::<u64>() as u64;
         Ok(Self {
             small: pipeline(ctx, texts::RASTER_SMALL_COMP, &small_pixels, "raster_small.comp")?,
-            medium: pipeline(
-                ctx,
-                texts::RASTER_MEDIUM_COMP,
-                &most(tuning.medium_pixels),
-                "raster_medium.comp",
-            )?,
+            medium: pipeline(ctx, texts::RASTER_MEDIUM_COMP, &medium_pixels, "raster_medium.comp")?,
             tiles: pipeline(ctx, texts::RASTER_TILE_COMP, &[], "raster_tile.comp")?,
             words: ctx.create_buffer(&BufferDesc {
                 size_bytes: words_bytes,

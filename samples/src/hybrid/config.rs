@@ -45,8 +45,9 @@ pub enum Raster {
 pub struct RasterTuning {
     /// Most pixels of the rectangle around a triangle that one thread rasterises; `None` for what suits the device.
     pub small_pixels: Option<u32>,
-    /// Most pixels of the rectangle around a triangle that some threads rasterise together; larger ones are cut into tiles.
-    pub medium_pixels: u32,
+    /// Most pixels of the rectangle around a triangle that some threads rasterise together; larger ones are cut into tiles;
+    /// `None` for what suits the device.
+    pub medium_pixels: Option<u32>,
     /// Medium and large triangles that there is room for, 104 bytes each, at most [`RasterTuning::MOST_SET_ASIDE`];
     /// further ones are rasterised by the thread that found them.
     pub set_aside: u32,
@@ -62,7 +63,7 @@ impl RasterTuning {
 
 impl Default for RasterTuning {
     fn default() -> Self {
-        Self { small_pixels: None, medium_pixels: 512, set_aside: 1 << 17, tiles: 1 << 18 }
+        Self { small_pixels: None, medium_pixels: None, set_aside: 1 << 17, tiles: 1 << 18 }
     }
 }
 

@@ -27,7 +27,7 @@ const CPU_BAND_ROWS: u32 = 48;
 /// Pixels that a GPU renders in one go: so few that no driver takes it for hung.
 const GPU_BAND_PIXELS: u32 = 1 << 23;
 
-/// Geometry passes by each rasteriser that decide which one is taken.
+/// Geometry passes by each rasteriser whose times the choice tells.
 const MEASURED_FRAMES: u32 = 4;
 
 /// What comes before the ray pass.
@@ -143,8 +143,8 @@ impl HybridRenderer {
         Ok(self.stamps.as_ref().map(read).transpose()?.unwrap_or_default())
     }
 
-    /// Measures the geometry pass by each rasteriser that there is, where the configuration leaves the choice, and
-    /// takes the faster one from now on. Returns which one is in use and why; `None` where no visibility is rasterised.
+    /// Measures the geometry pass by each rasteriser that there is, where the configuration leaves the choice, which is
+    /// compute then. Returns which one is in use, why, and both times; `None` where no visibility is rasterised.
     ///
     /// # Errors
     /// [`HybridError::Device`].

@@ -63,7 +63,7 @@ fn open(args: &HybridArgs, opening: &mut Opening<'_>) -> Result<Opened<HybridSeq
     let mut renderer = HybridRenderer::new(&context, &scene, &config)?;
     let mut headline = headline(&context, &scene, &config, &renderer);
     let first = (args.scene.camera as usize).clamp(1, 5) - 1;
-    // What a measurement decides could differ between the processes that share a sequence.
+    // A sequence needs no telling which rasteriser would be faster.
     if !matches!(args.run.frames, Some(Frames::Sequence(_)))
         && let Some(choice) = renderer.choose_raster(&scene.cameras[first])?
     {
@@ -96,8 +96,8 @@ fn config(args: &HybridArgs, path: RayPath) -> HybridConfig {
         args::GBuffer::Visibility => Geometry::Visibility(raster),
     };
     let usual = RasterTuning::default();
-    let medium_pixels = args.medium_triangle.unwrap_or(usual.medium_pixels);
-    let tuning = RasterTuning { small_pixels: args.small_triangle, medium_pixels, ..usual };
+    let (small_pixels, medium_pixels) = (args.small_triangle, args.medium_triangle);
+    let tuning = RasterTuning { small_pixels, medium_pixels, ..usual };
     let bounces = match args.bounces {
         args::Bounces::Auto => None,
         args::Bounces::Inline => Some(Bounces::Inline),
