@@ -19,9 +19,9 @@
 // LVK_SOFTWARE_RAY_QUERY is defined (Capabilities::ray_query_path).
 
 #ifdef LVK_OPAQUE_TRIANGLES_ONLY
-#define LVK_RAY_FLAGS_ALWAYS 1u
+#define LVK_RAY_FLAGS_ALWAYS LVK_RAY_FLAG_OPAQUE
 #else
-#define LVK_RAY_FLAGS_ALWAYS 0u
+#define LVK_RAY_FLAGS_ALWAYS LVK_RAY_FLAG_NONE
 #endif
 
 #define LVK_CANDIDATE false

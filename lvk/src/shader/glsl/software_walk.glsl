@@ -140,17 +140,10 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     if ((numbers.z >> 24 & state.mask) == 0u) {
         return LVK_SOFT_NONE;
     }
-    // Structures are rarely moved: their blocks are read as if this one were not.
-    level.structure = numbers.xy;
+    level.structure = lvkSoftStructureOf(instances, instance);
     uvec4 head = LvkSoftBlocks(level.structure).at[0];
     uvec4 places = LvkSoftBlocks(level.structure).at[1];
     uint marks = LvkSoftBlocks(level.structure).at[2].w;
-    if (head.x == LVK_SOFT_MOVED) {
-        level.structure = head.zw;
-        head = LvkSoftBlocks(level.structure).at[0];
-        places = LvkSoftBlocks(level.structure).at[1];
-        marks = LvkSoftBlocks(level.structure).at[2].w;
-    }
     uint flags = numbers.w >> 24;
     level.wide = head.x == LVK_SOFT_WIDE;
     level.kind = head.y;
@@ -219,7 +212,6 @@ void lvkSoftCommit(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftHi
         lvkSoftFinish(place);
     }
 }
-
 
 // The corners of a triangle.
 void lvkSoftCorners(uvec2 structure, uint primitives, bool indexed, uint primitive, out vec3 corners[3]) {
