@@ -76,6 +76,9 @@ pub struct Capabilities {
     /// The driver's builder keeps the order of triangles it is given (lavapipe before 26): meshes should be ordered
     /// spatially first.
     pub prefers_spatial_order: bool,
+    /// Arrays that helper invocations of fragment shaders write keep nothing (lavapipe): there, ray queries in software see
+    /// nothing in helper invocations.
+    pub helpers_lose_arrays: bool,
     /// The numbers behind the limits.
     pub limits: Limits,
 }
@@ -328,6 +331,7 @@ impl PhysicalDevice {
             1.0
         };
         caps.prefers_spatial_order = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
+        caps.helpers_lose_arrays = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.limits = limits(&plain.limits, &v12, &v13, &accel, &pipeline);
         caps.limits.mesh = MeshLimits::of(&mesh);
     }

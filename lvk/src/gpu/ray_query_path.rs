@@ -7,13 +7,13 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum RayQueryRequest {
     /// Hardware where it is real; software where there is none, or where the device is a CPU, whose own queries are no
-    /// hardware and slower. Not the default yet: lavapipe 25.0 crashes where fragment shaders walk (see the manual).
+    /// hardware and slower.
+    #[default]
     Auto,
     /// Only devices with `VK_KHR_ray_query` are considered.
     Hardware,
     /// `VK_KHR_ray_query` where present; without it queries do not work. Spares devices that trace by pipelines alone the
     /// structures of software queries.
-    #[default]
     HardwareIfPresent,
     /// The library itself, even where there is hardware.
     Software,

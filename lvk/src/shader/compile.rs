@@ -19,6 +19,9 @@ pub(crate) struct CompileOptions {
     pub(crate) position_fetch: bool,
     /// The library walks ray queries itself.
     pub(crate) software_ray_query: bool,
+    /// Helper invocations of fragment shaders have no arrays that work.
+    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
+    pub(crate) helpers_lose_arrays: bool,
 }
 
 impl CompileOptions {
@@ -28,6 +31,7 @@ impl CompileOptions {
             formatless_read: device.formatless_storage_read,
             position_fetch: device.position_fetch,
             software_ray_query: device.ray_query_path == RayQueryPath::Software,
+            helpers_lose_arrays: device.helpers_lose_arrays,
         }
     }
 }

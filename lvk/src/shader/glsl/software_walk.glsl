@@ -69,6 +69,13 @@ const bool kLvkSoftMeetsBoxes = false;
 const bool kLvkSoftMeetsBoxes = true;
 #endif
 
+// lavapipe drops what helper invocations write to arrays of their own (mesa 25.0), so these have no stack.
+#if defined(LVK_STAGE_FRAGMENT) && defined(LVK_HELPERS_LOSE_ARRAYS)
+#define LVK_SOFT_IS_STACKLESS gl_HelperInvocation
+#else
+#define LVK_SOFT_IS_STACKLESS false
+#endif
+
 #define LVK_SOFT_CLEAR 0u
 #define LVK_SOFT_OPAQUE 1u
 #define LVK_SOFT_EACH 2u
@@ -380,7 +387,7 @@ bool lvkSoftWalk(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLeve
 // Walks on to the next candidate; false when there is none.
 bool lvkSoftProceed(inout LvkSoftState state) {
     state.interrupted = false;
-    if (state.tlas == uvec2(0u)) {
+    if (state.tlas == uvec2(0u) || LVK_SOFT_IS_STACKLESS) {
         return false;
     }
     lvkSoftOwner = state.id;
