@@ -21,6 +21,19 @@ LvkSoftSlabs lvkSoftSlabsOf(vec3 origin, vec3 direction) {
     return LvkSoftSlabs(origin, 1.0 / mix(direction, least, isFlat), octant);
 }
 
+// The last of the distances at which a ray enters, of which tMin is not negative. As integers, positive floats are in order
+// and before them all negative ones, and devices may have instructions for the most of three integers.
+float lvkSoftLast(vec3 enter, float tMin) {
+    ivec3 all = floatBitsToInt(enter);
+    return intBitsToFloat(max(max(max(all.x, all.y), all.z), floatBitsToInt(tMin)));
+}
+
+// The first of the distances at which it leaves; any negative one if there are such.
+float lvkSoftFirst(vec3 leave, float tMax) {
+    ivec3 all = floatBitsToInt(leave);
+    return intBitsToFloat(min(min(min(all.x, all.y), all.z), floatBitsToInt(tMax)));
+}
+
 // Where the ray enters and leaves a box, of the range it has left.
 vec2 lvkSoftCross(LvkSoftSlabs ray, vec3 low, vec3 high, vec2 range) {
     const float kLess = 1.0 - 5e-7, kMore = 1.0 + 5e-7;
@@ -28,8 +41,7 @@ vec2 lvkSoftCross(LvkSoftSlabs ray, vec3 low, vec3 high, vec2 range) {
     vec3 b = (high - ray.origin) * ray.inverse;
     vec3 near = min(a, b);
     vec3 far = max(a, b);
-    return vec2(max(max(near.x, near.y), max(near.z, range.x)) * kLess,
-                min(min(far.x, far.y), min(far.z, range.y)) * kMore);
+    return vec2(lvkSoftLast(near, range.x) * kLess, lvkSoftFirst(far, range.y) * kMore);
 }
 
 // The children of a binary node that the ray meets, the nearer one first; LVK_SOFT_NONE for each it misses. `nodes` is the
@@ -54,9 +66,8 @@ uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, v
     [[unroll]] for (uint child = 0u; child < 32u; child += 8u) {
         vec3 enter = vec3(near >> child & 255u) * scale + start;
         vec3 leave = vec3(far >> child & 255u) * scale + end;
-        float first = max(max(enter.x, enter.y), max(enter.z, range.x));
-        float last = min(min(leave.x, leave.y), min(leave.z, range.y));
-        met |= first <= last ? (counts >> child & 7u) << (places >> child & 31u) : 0u;
+        bool meets = lvkSoftLast(enter, range.x) <= lvkSoftFirst(leave, range.y);
+        met |= meets ? (counts >> child & 7u) << (places >> child & 31u) : 0u;
     }
     return met;
 }

@@ -19,12 +19,12 @@ struct LvkRayQuery {
 
 void lvkSoftInitialize(out LvkSoftState state, uint tlas, uint flags, uint mask, vec3 origin, float tMin,
                        vec3 direction, float tMax) {
-    LvkSoftHit none = LvkSoftHit(tMax, 0u, LVK_SOFT_NONE, 0u, vec2(0.0), false, false);
+    LvkSoftHit none = lvkSoftNoHit(tMax);
     LvkSoftPlace start;
     lvkSoftFinish(start);
     lvkSoftQueries += 1u;
     flags |= LVK_RAY_FLAGS_ALWAYS;
-    state = LvkSoftState(kLvkTlasTable.entry[tlas].software, origin, tMin, direction, flags, mask & 0xFFu,
+    state = LvkSoftState(kLvkTlasTable.entry[tlas].software, origin, max(tMin, 0.0), direction, flags, mask & 0xFFu,
                          lvkSoftQueries, false, start, none, none);
     if (state.tlas != uvec2(0u)) {
         state.place.next = LvkSoftBlocks(state.tlas).at[0].z;
@@ -68,10 +68,6 @@ uvec4 lvkSoftInstanceBlock(LvkSoftState state, uint instance, uint block) {
     return LvkSoftBlocks(lvkSoftInstances(state)).at[instance * LVK_SOFT_INSTANCE_BLOCKS + block];
 }
 
-uvec2 lvkSoftHitNumbers(LvkSoftState state, LvkSoftHit hit) {
-    return lvkSoftNumbers(lvkSoftStructureOf(lvkSoftInstances(state), hit.instance), hit.primitive);
-}
-
 vec3 lvkSoftObject(LvkSoftState state, LvkSoftHit hit, vec4 v) {
     return lvkSoftTransform(lvkSoftInstances(state), hit.instance * LVK_SOFT_INSTANCE_BLOCKS, v);
 }
@@ -87,7 +83,8 @@ mat4x3 lvkSoftMatrix(LvkSoftState state, LvkSoftHit hit, uint first) {
 void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3]) {
     uvec2 structure = lvkSoftStructureOf(lvkSoftInstances(state), hit.instance);
     LvkSoftBlocks head = LvkSoftBlocks(structure);
-    lvkSoftCorners(structure, head.at[1].y, head.at[0].y == LVK_SOFT_INDEXED, hit.primitive, positions);
+    uvec3 words;
+    lvkSoftCorners(structure, head.at[1].y, head.at[0].y == LVK_SOFT_INDEXED, hit.primitive, positions, words);
 }
 
 // The hit that `which` means.
@@ -123,12 +120,12 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
 // The application's own numbers of instance and primitive; `tlas` is the index the query was started with.
 #define lvkRayQueryInstanceId(rq, which, tlas) \
     int(lvkSoftInstanceBlock((rq).state, LVK_SOFT_HIT(rq, which).instance, 7u).x)
-#define lvkRayQueryPrimitiveIndex(rq, which, tlas) int(lvkSoftHitNumbers((rq).state, LVK_SOFT_HIT(rq, which)).y)
+#define lvkRayQueryPrimitiveIndex(rq, which, tlas) int(LVK_SOFT_HIT(rq, which).numbers.y)
 #define lvkRayQueryInstanceCustomIndex(rq, which) \
     int(lvkSoftInstanceBlock((rq).state, LVK_SOFT_HIT(rq, which).instance, 6u).z & 0x00FFFFFFu)
 #define lvkRayQuerySbtOffset(rq, which) \
     (lvkSoftInstanceBlock((rq).state, LVK_SOFT_HIT(rq, which).instance, 6u).w & 0x00FFFFFFu)
-#define lvkRayQueryGeometryIndex(rq, which) int(lvkSoftHitNumbers((rq).state, LVK_SOFT_HIT(rq, which)).x)
+#define lvkRayQueryGeometryIndex(rq, which) int(LVK_SOFT_HIT(rq, which).numbers.x)
 #define lvkRayQueryBarycentrics(rq, which) (LVK_SOFT_HIT(rq, which).barycentrics)
 #define lvkRayQueryFrontFace(rq, which) (LVK_SOFT_HIT(rq, which).front)
 #ifdef LVK_POSITION_FETCH

@@ -16,6 +16,7 @@ struct LvkSoftHit {
     uint kind;
     uint instance;  // place in the structure
     uint primitive; // place among the leaves of the instance's structure
+    uvec2 numbers;  // the application's own of geometry and primitive
     vec2 barycentrics;
     bool front;
     bool opaque;
@@ -54,6 +55,7 @@ struct LvkSoftLevel {
     uint nodes;      // blocks where nodes and primitives begin
     uint primitives;
     bool wide;
+    bool several; // it has more than one geometry
     uint kind;    // of its leaves
     uint opacity; // of all primitives: LVK_SOFT_CLEAR, LVK_SOFT_OPAQUE, or LVK_SOFT_EACH where each has its own
     uint cull;    // LVK_RAY_FLAG_CULL_* of faces
@@ -63,10 +65,11 @@ struct LvkSoftLevel {
 #define LVK_SOFT_ONE_NODE 0x80000000u
 #define LVK_SOFT_ANY_NODE 0x01000000u
 
+// Said as constants, so that compilers drop what a module without candidates does not need.
 #ifdef LVK_OPAQUE_TRIANGLES_ONLY
-const bool kLvkSoftMeetsBoxes = false;
+const bool kLvkSoftHasCandidates = false;
 #else
-const bool kLvkSoftMeetsBoxes = true;
+const bool kLvkSoftHasCandidates = true;
 #endif
 
 // lavapipe drops what helper invocations write to arrays of their own (mesa 25.0), so these have no stack.
@@ -150,11 +153,12 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     level.structure = lvkSoftStructureOf(instances, instance);
     uvec4 head = LvkSoftBlocks(level.structure).at[0];
     uvec4 places = LvkSoftBlocks(level.structure).at[1];
-    uint marks = LvkSoftBlocks(level.structure).at[2].w;
+    uvec4 counts = LvkSoftBlocks(level.structure).at[2];
     uint flags = numbers.w >> 24;
     level.wide = head.x == LVK_SOFT_WIDE;
+    level.several = counts.y > 1u;
     level.kind = head.y;
-    level.opacity = lvkSoftOpacity(marks, flags, state.flags);
+    level.opacity = lvkSoftOpacity(counts.w, flags, state.flags);
     level.cull = (flags & LVK_SOFT_NO_CULL) != 0u ? 0u : state.flags & LVK_SOFT_CULL_FACES;
     level.flip = (flags & LVK_SOFT_FLIP_FACING) != 0u;
     level.nodes = places.x;
@@ -163,7 +167,7 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     level.shear = lvkSoftShearOf(direction);
     bool isBox = level.kind == LVK_SOFT_BOXES;
     uint skip = isBox ? LVK_RAY_FLAG_SKIP_AABBS : LVK_RAY_FLAG_SKIP_TRIANGLES;
-    bool skipped = (state.flags & skip) != 0u || (isBox && !kLvkSoftMeetsBoxes);
+    bool skipped = (state.flags & skip) != 0u || (isBox && !kLvkSoftHasCandidates);
     bool culled = level.opacity != LVK_SOFT_EACH && lvkSoftIsCulled(state.flags, level.opacity == LVK_SOFT_OPAQUE);
     return culled || skipped ? LVK_SOFT_NONE : head.z;
 }
@@ -206,6 +210,10 @@ void lvkSoftResume(inout LvkSoftPlace place, LvkSoftLevel level) {
     }
 }
 
+LvkSoftHit lvkSoftNoHit(float t) {
+    return LvkSoftHit(t, 0u, LVK_SOFT_NONE, 0u, uvec2(0u), vec2(0.0), false, false);
+}
+
 // Ends the walk.
 void lvkSoftFinish(inout LvkSoftPlace place) {
     place = LvkSoftPlace(LVK_SOFT_NONE, LVK_SOFT_NONE, uvec2(0u), uvec2(0u), 0u, 0u);
@@ -220,63 +228,66 @@ void lvkSoftCommit(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftHi
     }
 }
 
-// The corners of a triangle.
-void lvkSoftCorners(uvec2 structure, uint primitives, bool indexed, uint primitive, out vec3 corners[3]) {
+// The corners of a triangle, and in its last three words what its leaf says besides.
+void lvkSoftCorners(uvec2 structure, uint primitives, bool indexed, uint primitive, out vec3 corners[3],
+                    out uvec3 words) {
     LvkSoftBlocks blocks = LvkSoftBlocks(structure);
     if (indexed) {
-        uvec3 vertices = blocks.at[primitives + primitive].xyz;
+        uvec4 vertices = blocks.at[primitives + primitive];
         uvec2 points = lvkSoftBehind(structure, blocks.at[1].z);
         corners[0] = LvkSoftVertices(points).at[vertices.x];
         corners[1] = LvkSoftVertices(points).at[vertices.y];
         corners[2] = LvkSoftVertices(points).at[vertices.z];
+        words = uvec3(vertices.w, 0u, 0u);
     } else {
         uint first = primitives + primitive * LVK_SOFT_TRIANGLE_BLOCKS;
-        corners[0] = uintBitsToFloat(blocks.at[first].xyz);
-        corners[1] = uintBitsToFloat(blocks.at[first + 1u].xyz);
-        corners[2] = uintBitsToFloat(blocks.at[first + 2u].xyz);
+        uvec4 a = blocks.at[first];
+        uvec4 b = blocks.at[first + 1u];
+        uvec4 c = blocks.at[first + 2u];
+        corners[0] = uintBitsToFloat(a.xyz);
+        corners[1] = uintBitsToFloat(b.xyz);
+        corners[2] = uintBitsToFloat(c.xyz);
+        words = uvec3(a.w, b.w, c.w);
     }
 }
 
-// The application's numbers of a primitive: geometry, primitive.
-uvec2 lvkSoftNumbers(uvec2 structure, uint primitive) {
-    LvkSoftBlocks head = LvkSoftBlocks(structure);
-    uint kind = head.at[0].y;
-    LvkSoftBlocks blocks = LvkSoftBlocks(lvkSoftBehind(structure, head.at[1].y));
-    if (kind == LVK_SOFT_INDEXED) {
-        uint both = blocks.at[primitive].w;
-        bool several = head.at[2].y > 1u;
-        return several ? uvec2(both >> 24, both & 0x00FFFFFFu) : uvec2(0u, both);
-    }
-    uint first = primitive * (kind == LVK_SOFT_BOXES ? LVK_SOFT_BOX_BLOCKS : LVK_SOFT_TRIANGLE_BLOCKS);
-    return uvec2(blocks.at[first + 1u].w & 0x7FFFFFFFu, blocks.at[first].w);
+// The application's numbers of a triangle, geometry and primitive, from the words of its leaf.
+uvec2 lvkSoftNumbers(uvec3 words, bool indexed, bool several) {
+    bool packed = indexed && several;
+    uint geometry = packed ? words.x >> 24 : words.y & 0x7FFFFFFFu;
+    return uvec2(geometry, packed ? words.x & 0x00FFFFFFu : words.x);
 }
 
 // Whether a primitive says of itself that it is opaque.
-bool lvkSoftSaysOpaque(LvkSoftLevel level, uint primitive) {
+bool lvkSoftSaysOpaque(LvkSoftLevel level, LvkSoftHit hit) {
     LvkSoftBlocks blocks = LvkSoftBlocks(level.structure);
     if (level.kind == LVK_SOFT_TRIANGLES) {
-        return (blocks.at[level.primitives + primitive * LVK_SOFT_TRIANGLE_BLOCKS + 2u].w & 1u) != 0u;
+        return (blocks.at[level.primitives + hit.primitive * LVK_SOFT_TRIANGLE_BLOCKS + 2u].w & 1u) != 0u;
     }
     if (level.kind == LVK_SOFT_BOXES) {
-        return (blocks.at[level.primitives + primitive * LVK_SOFT_BOX_BLOCKS + 1u].w & 0x80000000u) != 0u;
+        return (blocks.at[level.primitives + hit.primitive * LVK_SOFT_BOX_BLOCKS + 1u].w & 0x80000000u) != 0u;
     }
-    uvec2 geometries = lvkSoftBehind(level.structure, LvkSoftBlocks(level.structure).at[1].w);
-    return (LvkSoftBlocks(geometries).at[lvkSoftNumbers(level.structure, primitive).x].x & 1u) != 0u;
+    uvec2 geometries = lvkSoftBehind(level.structure, blocks.at[1].w);
+    return (LvkSoftBlocks(geometries).at[hit.numbers.x].x & 1u) != 0u;
 }
 
 // Whether the ray meets the box of a primitive.
-bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, uint primitive) {
-    uint first = level.primitives + primitive * LVK_SOFT_BOX_BLOCKS;
-    vec3 low = uintBitsToFloat(LvkSoftBlocks(level.structure).at[first].xyz);
-    vec3 high = uintBitsToFloat(LvkSoftBlocks(level.structure).at[first + 1u].xyz);
-    vec2 range = lvkSoftCross(level.slabs, low, high, vec2(state.tMin, state.committed.t));
+bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hit) {
+    uint first = level.primitives + hit.primitive * LVK_SOFT_BOX_BLOCKS;
+    uvec4 low = LvkSoftBlocks(level.structure).at[first];
+    uvec4 high = LvkSoftBlocks(level.structure).at[first + 1u];
+    hit.numbers = uvec2(high.w & 0x7FFFFFFFu, low.w);
+    vec2 range = lvkSoftCross(level.slabs, uintBitsToFloat(low.xyz), uintBitsToFloat(high.xyz),
+                              vec2(state.tMin, state.committed.t));
     return range.x <= range.y;
 }
 
 // Whether the ray hits a triangle between its ends, which do not count themselves, and from a side that counts.
-bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, uint primitive, inout LvkSoftHit hit) {
+bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hit) {
     vec3 corners[3];
-    lvkSoftCorners(level.structure, level.primitives, level.kind == LVK_SOFT_INDEXED, primitive, corners);
+    uvec3 words;
+    bool indexed = level.kind == LVK_SOFT_INDEXED;
+    lvkSoftCorners(level.structure, level.primitives, indexed, hit.primitive, corners, words);
     LvkSoftPassage passage;
     if (!lvkSoftPasses(level.shear, level.slabs.origin, corners, passage)) {
         return false;
@@ -285,6 +296,7 @@ bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, uint primitive,
         return false;
     }
     hit.t = passage.t;
+    hit.numbers = lvkSoftNumbers(words, indexed, level.several);
     hit.barycentrics = passage.barycentrics;
     hit.front = passage.front != level.flip;
     uint culls = hit.front ? LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES : LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES;
@@ -295,13 +307,19 @@ bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, uint primitive,
 bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
     uint primitive = place.leaves.x + uint(findLSB(place.leaves.y));
     place.leaves.y &= place.leaves.y - 1u;
-    bool isBox = kLvkSoftMeetsBoxes && level.kind == LVK_SOFT_BOXES;
-    LvkSoftHit hit = LvkSoftHit(0.0, LVK_SOFT_CANDIDATE_TRIANGLE, place.instance, primitive, vec2(0.0), false, false);
-    bool isHit = isBox ? lvkSoftMeetsBox(state, level, primitive) : lvkSoftHitsTriangle(state, level, primitive, hit);
+    bool isBox = kLvkSoftHasCandidates && level.kind == LVK_SOFT_BOXES;
+    LvkSoftHit hit = lvkSoftNoHit(0.0);
+    hit.instance = place.instance;
+    hit.primitive = primitive;
+    bool isHit = isBox ? lvkSoftMeetsBox(state, level, hit) : lvkSoftHitsTriangle(state, level, hit);
     if (!isHit) {
         return false;
     }
-    hit.opaque = level.opacity == LVK_SOFT_EACH ? lvkSoftSaysOpaque(level, primitive) : level.opacity == LVK_SOFT_OPAQUE;
+    if (!kLvkSoftHasCandidates) {
+        lvkSoftCommit(state, place, hit, 1u);
+        return false;
+    }
+    hit.opaque = level.opacity == LVK_SOFT_EACH ? lvkSoftSaysOpaque(level, hit) : level.opacity == LVK_SOFT_OPAQUE;
     if (lvkSoftIsCulled(state.flags, hit.opaque)) {
         return false;
     }
@@ -321,16 +339,26 @@ uint lvkSoftNextReference(inout LvkSoftPlace place) {
     return next != LVK_SOFT_NONE || place.top == 0u ? next : lvkSoftPop(place);
 }
 
-// The next instance whose box the ray meets, or LVK_SOFT_NONE.
-uint lvkSoftNextInstance(inout LvkSoftPlace place, LvkSoftSlabs slabs, LvkSoftBlocks tlas, vec2 range) {
+// The next leaf of the top level that the ray meets, from a node on; LVK_SOFT_NONE where none is left.
+uint lvkSoftDescend(LvkSoftState state, inout LvkSoftPlace place, uint reference) {
+    LvkSoftBlocks tlas = LvkSoftBlocks(state.tlas);
+    LvkSoftSlabs slabs = lvkSoftSlabsOf(state.origin, state.direction);
     uint nodes = tlas.at[1].x;
-    uint reference = lvkSoftNextReference(place);
     while ((reference & LVK_SOFT_LEAF) == 0u) {
-        uvec2 met = lvkSoftMeet2(slabs, tlas, nodes, reference, range);
+        uvec2 met = lvkSoftMeet2(slabs, tlas, nodes, reference, vec2(state.tMin, state.committed.t));
         if (met.y != LVK_SOFT_NONE) {
             lvkSoftPush(place, met.y);
         }
         reference = met.x != LVK_SOFT_NONE ? met.x : lvkSoftNextReference(place);
+    }
+    return reference;
+}
+
+// The next instance whose box the ray meets, or LVK_SOFT_NONE.
+uint lvkSoftNextInstance(LvkSoftState state, inout LvkSoftPlace place) {
+    uint reference = lvkSoftNextReference(place);
+    if ((reference & LVK_SOFT_LEAF) == 0u) { // else a ray would be prepared for nothing
+        reference = lvkSoftDescend(state, place, reference);
     }
     if (reference == LVK_SOFT_NONE) {
         return reference;
@@ -346,12 +374,10 @@ bool lvkSoftFindInstance(LvkSoftState state, inout LvkSoftPlace place, out LvkSo
     if (place.next == LVK_SOFT_NONE && place.top == 0u) {
         return false;
     }
-    LvkSoftBlocks tlas = LvkSoftBlocks(state.tlas);
     uvec2 instances = lvkSoftInstances(state);
-    LvkSoftSlabs slabs = lvkSoftSlabsOf(state.origin, state.direction);
     uint root = LVK_SOFT_NONE;
     while (root == LVK_SOFT_NONE) {
-        place.instance = lvkSoftNextInstance(place, slabs, tlas, vec2(state.tMin, state.committed.t));
+        place.instance = lvkSoftNextInstance(state, place);
         if (place.instance == LVK_SOFT_NONE) {
             return false;
         }
