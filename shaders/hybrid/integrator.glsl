@@ -51,8 +51,8 @@ Facing faceRay(SurfacePoint point, vec3 direction) {
 }
 
 SurfacePoint surfaceOf(Hit hit, Ray ray) {
-    return surfaceAt(frame.scene, hit.triangle, hit.barycentrics, ray.origin, ray.direction, ray.coneWidth,
-                     frame.camera.pixelSpread, frame.surfaceSampler);
+    return surfaceAt(hit.triangle, hit.barycentrics, ray.origin, ray.direction, ray.coneWidth, frame.camera.pixelSpread,
+                     frame.surfaceSampler);
 }
 
 vec3 skyColor(vec3 direction) {
