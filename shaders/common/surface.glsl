@@ -1,5 +1,5 @@
 // The point of a surface that a ray met or a pixel shows, and how it is interpolated from its triangle.
-// The including file provides `frame.scene`, which is reached in place: SwiftShader miscompiles copies of structs that
+// The including file provides `frame.scene` before. It is reached in place: SwiftShader miscompiles copies of structs that
 // hold buffer references.
 #ifndef COMMON_SURFACE
 #define COMMON_SURFACE

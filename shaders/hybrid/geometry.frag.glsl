@@ -1,8 +1,8 @@
 // Geometry pass: what the ray pass needs to know about a pixel's surface. The interpolation is the traced one,
 // from the triangle's vertices, so that both methods see the same surface point.
+#include "hybrid/frame.glsl"
 #include "common/octahedral.glsl"
 #include "common/surface.glsl"
-#include "hybrid/frame.glsl"
 
 layout(location = 0) out vec4 outPosition; // w: distance from the eye
 layout(location = 1) out uvec4 outSurface; // shading normal (two floats), geometric normal, triangle

@@ -5,11 +5,11 @@
 #ifndef HYBRID_INTEGRATOR
 #define HYBRID_INTEGRATOR
 
+#include "hybrid/frame.glsl"
 #include "common/fresnel.glsl"
 #include "common/phong.glsl"
 #include "common/ray_offset.glsl"
 #include "common/surface.glsl"
-#include "hybrid/frame.glsl"
 #include "hybrid/hit.glsl"
 
 // Reflections and refractions a ray may go through; deeper ones are black.
