@@ -51,6 +51,21 @@ impl Desk {
         command
     }
 
+    /// The same on a device without ray tracing; `None`, loudly, where that cannot be had.
+    fn without_ray_tracing(&self, args: &[&str]) -> Option<Command> {
+        let icd = match swiftshader_icd() {
+            Ok(icd) => icd,
+            Err(error) => {
+                assert!(std::env::var_os("LVK_REQUIRE_GPU").is_none(), "{error}");
+                eprintln!("SKIPPED, no device without ray tracing: {error}");
+                return None;
+            }
+        };
+        let mut command = self.command(args);
+        command.env("VK_DRIVER_FILES", icd).env_remove("VK_ICD_FILENAMES").env_remove("LVK_DRIVER");
+        Some(command)
+    }
+
     fn run(&self, args: &[&str]) -> Outcome {
         Outcome::of(self.command(args))
     }
@@ -388,19 +403,33 @@ fn a_device_without_ray_tracing_is_told_what_it_lacks() {
     }
     let desk = Desk::new();
     let scene = desk.file("triangle.obj", TRIANGLE);
-    let icd = match swiftshader_icd() {
-        Ok(icd) => icd,
-        Err(error) => {
-            assert!(std::env::var_os("LVK_REQUIRE_GPU").is_none(), "{error}");
-            return eprintln!("SKIPPED, no device without ray tracing: {error}");
-        }
-    };
     for (rt, lack) in [("pipeline", "lacks ray tracing pipelines"), ("query", "lacks ray queries")] {
-        let mut command = desk.command(&["--scene", &scene, "--rt", rt]);
-        command.env("VK_DRIVER_FILES", &icd).env_remove("VK_ICD_FILENAMES").env_remove("LVK_DRIVER");
+        let Some(command) = desk.without_ray_tracing(&["--scene", &scene, "--rt", rt]) else { return };
         Outcome::of(command).assert_error(1, &["SwiftShader", lack]);
     }
     assert_eq!(desk.output_files(), Vec::<String>::new());
+}
+
+#[test]
+fn a_device_that_finds_no_visible_triangles_traces_everything() {
+    if !has_device() {
+        return;
+    }
+    let desk = Desk::new();
+    let scene = desk.file("triangle.obj", TRIANGLE);
+    for named in [&["--method", "hybrid"][..], &["--raster", "compute"], &["--bounces", "first"]] {
+        let args = [&["--scene", &scene, "--rt", "software"], named].concat();
+        let Some(command) = desk.without_ray_tracing(&args) else { return };
+        Outcome::of(command).assert_error(1, &["SwiftShader", "64-bit atomics", "--method standalone"]);
+    }
+    for rt in ["auto", "software"] {
+        let Some(command) = desk.without_ray_tracing(&["--scene", &scene, "--rt", rt]) else { return };
+        let Outcome { status, out, err } = Outcome::of(command);
+        assert_eq!(status, Some(0), "{out}{err}");
+        assert!(out.contains("stand-alone ray tracing") && out.contains("in software"), "{out}");
+        assert!(err.contains("warning: SwiftShader") && err.contains("--method standalone"), "{err}");
+        assert_eq!(desk.picture_size(), (WIDTH, HEIGHT));
+    }
 }
 
 #[test]

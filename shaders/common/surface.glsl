@@ -1,4 +1,6 @@
 // The point of a surface that a ray met or a pixel shows, and how it is interpolated from its triangle.
+// The including file provides `frame.scene` before. It is reached in place: SwiftShader miscompiles copies of structs that
+// hold buffer references.
 #ifndef COMMON_SURFACE
 #define COMMON_SURFACE
 
@@ -17,10 +19,11 @@ struct SurfacePoint {
 
 // Where a ray meets a triangle that is known to be in its way. The result is pulled into the triangle: a rasteriser
 // also covers pixels whose centre misses it by a rounding error.
-vec2 barycentricsAlong(Scene scene, uint triangle, vec3 origin, vec3 direction) {
-    uvec3 corner = scene.triangles.at[triangle];
-    vec3 volumes = passageOf(direction, scene.positions.at[corner.x] - origin, scene.positions.at[corner.y] - origin,
-                             scene.positions.at[corner.z] - origin).volumes;
+vec2 barycentricsAlong(uint triangle, vec3 origin, vec3 direction) {
+    uvec3 corner = frame.scene.triangles.at[triangle];
+    vec3 volumes = passageOf(direction, frame.scene.positions.at[corner.x] - origin,
+                             frame.scene.positions.at[corner.y] - origin,
+                             frame.scene.positions.at[corner.z] - origin).volumes;
     float sum = volumes.x + volumes.y + volumes.z;
     if (sum == 0.0) {
         return vec2(1.0 / 3.0);
@@ -29,26 +32,26 @@ vec2 barycentricsAlong(Scene scene, uint triangle, vec3 origin, vec3 direction) 
     return b / max(b.x + b.y, 1.0);
 }
 
-vec3 sampleAlbedo(Scene scene, TriangleInfo info, uvec3 corner, vec2 b, float coneWidth, float cosine, uint smp) {
-    Material material = scene.materials.at[info.material];
+vec3 sampleAlbedo(TriangleInfo info, uvec3 corner, vec2 b, float coneWidth, float cosine, uint smp) {
+    Material material = frame.scene.materials.at[info.material];
     if (material.albedoTexture == kNoTexture) {
         return material.albedo;
     }
-    vec2 uv0 = scene.texcoords.at[corner.x];
-    vec2 uv = uv0 + b.x * (scene.texcoords.at[corner.y] - uv0) + b.y * (scene.texcoords.at[corner.z] - uv0);
+    vec2 uv0 = frame.scene.texcoords.at[corner.x];
+    vec2 uv = uv0 + b.x * (frame.scene.texcoords.at[corner.y] - uv0) +
+              b.y * (frame.scene.texcoords.at[corner.z] - uv0);
     float lod = coneTextureLod(info.lodConstant, coneWidth, cosine);
     return material.albedo * textureBindless2DLod(material.albedoTexture, smp, uv, lod).rgb;
 }
 
 // `coneWidth` is the footprint at the ray's origin, `spread` its growth per unit of distance.
-SurfacePoint surfaceAt(Scene scene, uint triangle, vec2 b, vec3 origin, vec3 direction, float coneWidth,
-                       float spread, uint smp) {
-    uvec3 corner = scene.triangles.at[triangle];
-    vec3 p0 = scene.positions.at[corner.x];
-    vec3 edge1 = scene.positions.at[corner.y] - p0;
-    vec3 edge2 = scene.positions.at[corner.z] - p0;
-    vec3 n0 = scene.normals.at[corner.x];
-    vec3 n = n0 + b.x * (scene.normals.at[corner.y] - n0) + b.y * (scene.normals.at[corner.z] - n0);
+SurfacePoint surfaceAt(uint triangle, vec2 b, vec3 origin, vec3 direction, float coneWidth, float spread, uint smp) {
+    uvec3 corner = frame.scene.triangles.at[triangle];
+    vec3 p0 = frame.scene.positions.at[corner.x];
+    vec3 edge1 = frame.scene.positions.at[corner.y] - p0;
+    vec3 edge2 = frame.scene.positions.at[corner.z] - p0;
+    vec3 n0 = frame.scene.normals.at[corner.x];
+    vec3 n = n0 + b.x * (frame.scene.normals.at[corner.y] - n0) + b.y * (frame.scene.normals.at[corner.z] - n0);
 
     SurfacePoint point;
     point.position = p0 + b.x * edge1 + b.y * edge2;
@@ -61,7 +64,7 @@ SurfacePoint surfaceAt(Scene scene, uint triangle, vec2 b, vec3 origin, vec3 dir
     point.triangle = triangle;
     float width = coneWidth + spread * point.distance;
     float cosine = dot(direction, point.geometricNormal);
-    point.albedo = sampleAlbedo(scene, scene.triangleInfos.at[triangle], corner, b, width, cosine, smp);
+    point.albedo = sampleAlbedo(frame.scene.triangleInfos.at[triangle], corner, b, width, cosine, smp);
     return point;
 }
 

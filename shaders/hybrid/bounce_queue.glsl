@@ -32,23 +32,4 @@ struct BounceQueue {
     BouncePixels pixels; // room for all pixels of a band
 };
 
-// A place in the queue for each thread that asks.
-uint takeBouncePlace(BounceQueue queue) {
-#if defined(HYBRID_NO_SUBGROUPS)
-    uint place = atomicAdd(queue.head.rays.x, 1u);
-    atomicMax(queue.head.groups.x, place / kBounceGroup + 1u);
-    return place;
-#else
-    // Once for all that ask together; neighbours get neighbouring places.
-    uvec4 askers = subgroupBallot(true);
-    uint first = 0u;
-    if (subgroupElect()) {
-        uint count = subgroupBallotBitCount(askers);
-        first = atomicAdd(queue.head.rays.x, count);
-        atomicMax(queue.head.groups.x, (first + count + kBounceGroup - 1u) / kBounceGroup);
-    }
-    return subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(askers);
-#endif
-}
-
 #endif

@@ -5,11 +5,11 @@
 #ifndef HYBRID_INTEGRATOR
 #define HYBRID_INTEGRATOR
 
+#include "hybrid/frame.glsl"
 #include "common/fresnel.glsl"
 #include "common/phong.glsl"
 #include "common/ray_offset.glsl"
 #include "common/surface.glsl"
-#include "hybrid/frame.glsl"
 #include "hybrid/hit.glsl"
 
 // Reflections and refractions a ray may go through; deeper ones are black.
@@ -51,8 +51,8 @@ Facing faceRay(SurfacePoint point, vec3 direction) {
 }
 
 SurfacePoint surfaceOf(Hit hit, Ray ray) {
-    return surfaceAt(frame.scene, hit.triangle, hit.barycentrics, ray.origin, ray.direction, ray.coneWidth,
-                     frame.camera.pixelSpread, frame.surfaceSampler);
+    return surfaceAt(hit.triangle, hit.barycentrics, ray.origin, ray.direction, ray.coneWidth, frame.camera.pixelSpread,
+                     frame.surfaceSampler);
 }
 
 vec3 skyColor(vec3 direction) {

@@ -26,6 +26,27 @@ uvec2 pixelInOrder(uint index) {
 }
 #endif
 
+#if defined(HYBRID_QUEUE)
+// A place in the queue for each thread that asks.
+uint takeBouncePlace() {
+#if defined(HYBRID_NO_SUBGROUPS)
+    uint place = atomicAdd(frame.bounces.head.rays.x, 1u);
+    atomicMax(frame.bounces.head.groups.x, place / kBounceGroup + 1u);
+    return place;
+#else
+    // Once for all that ask together; neighbours get neighbouring places.
+    uvec4 askers = subgroupBallot(true);
+    uint first = 0u;
+    if (subgroupElect()) {
+        uint count = subgroupBallotBitCount(askers);
+        first = atomicAdd(frame.bounces.head.rays.x, count);
+        atomicMax(frame.bounces.head.groups.x, (first + count + kBounceGroup - 1u) / kBounceGroup);
+    }
+    return subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(askers);
+#endif
+}
+#endif
+
 Ray primaryRay(uvec2 pixel) {
     vec3 direction = cameraDirection(frame.camera, pixel);
     float tmin = cameraNearDistance(frame.camera, direction);
@@ -66,7 +87,7 @@ Hit primaryHit(uvec2 pixel, Ray ray) {
     if (isInDoubt) {
         hit = traceClosest(ray.origin, ray.tmin, ray.direction, kFar);
     } else if (hit.triangle != kNoTriangle) {
-        hit.barycentrics = barycentricsAlong(frame.scene, hit.triangle, ray.origin, ray.direction);
+        hit.barycentrics = barycentricsAlong(hit.triangle, ray.origin, ray.direction);
     }
     return hit;
 }
@@ -92,7 +113,8 @@ void finishPixel(uvec2 pixel, vec3 color) {
         shown /= float(frame.sampleCount);
     }
     if (frame.sampleNumber + 1u == frame.sampleCount) {
-        imageStore(kImages2D[frame.outputImage], ivec2(pixel), vec4(encodeSrgb(shown), 1.0));
+        // All have the same index, but SwiftShader asks the first lane for it, even one that took another way.
+        imageStore(kImages2D[nonuniformEXT(frame.outputImage)], ivec2(pixel), vec4(encodeSrgb(shown), 1.0));
     }
 }
 
@@ -123,7 +145,7 @@ void renderPixel(uvec2 pixel) {
     vec3 color = localLight(ray, met);
 #if defined(HYBRID_QUEUE)
     if (goesOn(met.branches)) {
-        uint place = takeBouncePlace(frame.bounces);
+        uint place = takeBouncePlace();
         frame.bounces.pixels.at[place] = BouncePixel(pixel.x | pixel.y << 16, hit.triangle, hit.barycentrics, color);
         return;
     }

@@ -30,10 +30,11 @@ const uint kKindStatic = 0u; // 16 bytes: snorm16 position, octahedral normal, h
 const uint kKindSkinned = 1u; // float positions in the world, octahedral normals in an array of their own
 const uint kKindLeaf = 2u; // float positions in the world, four for each quad
 
+// Addresses of Words, as numbers: SwiftShader miscompiles copies of structs that hold buffer references.
 struct Geometry {
-    Words vertices;
-    Words normals;
-    Words indices; // 16 bits each
+    uvec2 vertices;
+    uvec2 normals;
+    uvec2 indices; // 16 bits each
     uint material;
     uint kind;
 };

@@ -26,8 +26,8 @@ struct Surface {
     float opacity;
 };
 
-uint indexAt(Words indices, uint place) {
-    uint pair = indices.at[place >> 1u];
+uint indexAt(uvec2 indices, uint place) {
+    uint pair = Words(indices).at[place >> 1u];
     return (place & 1u) == 0u ? pair & 0xffffu : pair >> 16u;
 }
 
@@ -50,26 +50,27 @@ vec3 floatPosition(Words vertices, uint vertex) {
 }
 
 vec3 vertexPosition(Geometry geometry, Instance instance, uint vertex) {
+    Words vertices = Words(geometry.vertices);
     if (geometry.kind != kKindStatic) {
-        return floatPosition(geometry.vertices, vertex);
+        return floatPosition(vertices, vertex);
     }
-    vec2 xy = unpackSnorm2x16(geometry.vertices.at[4u * vertex]);
-    return moved(instance, vec3(xy, unpackSnorm2x16(geometry.vertices.at[4u * vertex + 1u]).x));
+    vec2 xy = unpackSnorm2x16(vertices.at[4u * vertex]);
+    return moved(instance, vec3(xy, unpackSnorm2x16(vertices.at[4u * vertex + 1u]).x));
 }
 
 vec3 vertexNormal(Geometry geometry, Instance instance, uint vertex) {
     if (geometry.kind == kKindStatic) {
-        return turned(instance, unitFromOctahedral(unpackSnorm2x16(geometry.vertices.at[4u * vertex + 2u])));
+        return turned(instance, unitFromOctahedral(unpackSnorm2x16(Words(geometry.vertices).at[4u * vertex + 2u])));
     }
     if (geometry.kind == kKindSkinned) {
-        return unitFromOctahedral(unpackSnorm2x16(geometry.normals.at[vertex]));
+        return unitFromOctahedral(unpackSnorm2x16(Words(geometry.normals).at[vertex]));
     }
     return -frame.camera.forward;
 }
 
 vec2 vertexTexcoord(Geometry geometry, uint vertex) {
     if (geometry.kind == kKindStatic) {
-        return unpackHalf2x16(geometry.vertices.at[4u * vertex + 3u]);
+        return unpackHalf2x16(Words(geometry.vertices).at[4u * vertex + 3u]);
     }
     return vec2(vertex & 1u, (vertex >> 1u) & 1u);
 }

@@ -1,15 +1,29 @@
-//! The pictures of the `hybrid` sample by software ray queries are those of the device's own queries.
+//! The pictures of the samples by software ray queries are those of a device's own, on a device without ray tracing too.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use lvk::{FeatureRequest, RayQueryPath, RayQueryRequest};
-use lvk_samples::hybrid::{Method, RayPath};
+use image::RgbaImage;
+use lvk::{Context, FeatureRequest, RayQueryPath, RayQueryRequest};
+use lvk_samples::hybrid::{Bounces, HybridConfig, HybridError, HybridRenderer, Method, RayPath};
+use lvk_samples::hybrid_oit::{HybridOitConfig, OitScene};
+use lvk_samples::reflections::{Reflections, ReflectionsConfig};
+use lvk_tests::child::without_ray_tracing;
+use lvk_tests::glass_room::GlassRoom;
 use lvk_tests::hybrid::Studio;
-use lvk_tests::picture::{Tolerance, assert_alike};
+use lvk_tests::picture::{Tolerance, assert_alike, reference};
 use lvk_tests::still_life::still_life;
 use lvk_tests::{TestDevice, device_with};
 
 const SIZE: [u32; 2] = [160, 90];
 const DEPTH: u32 = 3;
+/// Of the picture of the room of glass that is kept.
+const MOMENT: f64 = 1.9;
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
+/// Of what rays alone find, on SwiftShader: its textures are filtered with fewer bits.
+const OTHER_FILTERS: Tolerance = Tolerance { psnr: 46.0, ssim: 0.999, differing_share: 0.2, flip: 0.012 };
+/// Where it rasterises too: its corners lie on a grid of 4 bits of a pixel in place of 8, so edges differ.
+const OTHER_EDGES: Tolerance = Tolerance { psnr: 38.0, ssim: 0.99, differing_share: 0.1, flip: 0.012 };
+/// Reflected and lit edges, on top of those that are seen.
+const OTHER_REFLECTIONS: Tolerance = Tolerance { psnr: 33.0, ssim: 0.975, differing_share: 0.3, flip: 0.05 };
 
 fn queries(request: RayQueryRequest) -> Option<TestDevice> {
     device_with(|desc| (desc.ray_tracing_pipeline, desc.ray_query) = (FeatureRequest::Off, request))
@@ -36,4 +50,63 @@ fn software_and_the_device_make_the_same_picture() {
             assert_alike(&what, &actual.picture(camera), &expected.picture(camera), &SAME_RAYS);
         }
     }
+}
+
+/// A device without any ray tracing, whose queries are the library's.
+fn without() -> Option<TestDevice> {
+    let ctx = device_with(|desc| desc.ray_query = RayQueryRequest::Auto)?;
+    assert_eq!(ctx.capabilities().ray_query_path, RayQueryPath::Software);
+    Some(ctx)
+}
+
+#[test]
+fn a_driver_without_ray_tracing_shows_the_still_life() {
+    without_ray_tracing("a_driver_without_ray_tracing_shows_the_still_life", || {
+        let Some(ctx) = without() else { return };
+        let (scene, expected) = (still_life(), reference("hybrid_small"));
+        let plain = HybridConfig { path: RayPath::Query, ..sized(&expected) };
+        let refused = HybridRenderer::new(&ctx, &scene, &plain).err();
+        assert!(matches!(refused, Some(HybridError::NoRasteriser { .. })), "{refused:?}");
+        let method = Method::choose(None, ctx.capabilities());
+        assert_eq!(method, Method::Standalone);
+        for bounces in [Bounces::Inline, Bounces::Queued] {
+            let config = HybridConfig { method, bounces: Some(bounces), ..plain };
+            let picture = Studio::with(&ctx, &scene, &config).picture(&scene.cameras[0]);
+            assert_alike(&format!("SwiftShader {bounces:?}"), &picture, &expected, &OTHER_FILTERS);
+        }
+    });
+}
+
+#[test]
+fn a_driver_without_ray_tracing_shows_the_room_of_glass() {
+    without_ray_tracing("a_driver_without_ray_tracing_shows_the_room_of_glass", || {
+        let Some(ctx) = without() else { return };
+        let expected = reference("hybrid_oit_small");
+        let config = HybridOitConfig::new(RayPath::Query, expected.width(), expected.height());
+        let picture = GlassRoom::new(&ctx, &OitScene::default(), &config).picture(MOMENT);
+        assert_alike("SwiftShader glass", &picture, &expected, &OTHER_EDGES);
+    });
+}
+
+#[test]
+fn a_driver_without_ray_tracing_shows_the_hall() {
+    without_ray_tracing("a_driver_without_ray_tracing_shows_the_hall", || {
+        let Some(ctx) = without() else { return };
+        let expected = reference("reflections_small");
+        let picture = hall(&ctx, [expected.width(), expected.height()]);
+        assert_alike("SwiftShader hall", &picture, &expected, &OTHER_REFLECTIONS);
+    });
+}
+
+fn sized(picture: &RgbaImage) -> HybridConfig {
+    let (width, height) = picture.dimensions();
+    HybridConfig { width, height, max_depth: 4, ..HybridConfig::default() }
+}
+
+fn hall(ctx: &Context, [width, height]: [u32; 2]) -> RgbaImage {
+    let config = ReflectionsConfig { samples: 4, ..ReflectionsConfig::new(RayPath::Query, width, height) };
+    let mut hall = Reflections::new(ctx, &config).unwrap();
+    hall.show(0.0);
+    hall.render_with(&mut |_| {}).unwrap();
+    RgbaImage::from_raw(width, height, hall.read_image().unwrap()).unwrap()
 }

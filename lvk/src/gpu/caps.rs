@@ -69,6 +69,8 @@ pub struct Capabilities {
     pub formatless_storage_read: bool,
     /// Shaders may use 64-bit integers (`shaderInt64`).
     pub shader_int64: bool,
+    /// Shaders may change 64-bit integers in buffers atomically (`shaderBufferInt64Atomics`).
+    pub buffer_int64_atomics: bool,
     /// Several draws may come from one indirect call (`multiDrawIndirect`).
     pub multi_draw_indirect: bool,
     /// Largest sampler anisotropy; 1 where the device has none.
@@ -284,6 +286,7 @@ impl PhysicalDevice {
         caps.primitive_id = found.core.geometry_shader == vk::TRUE;
         caps.formatless_storage_read = found.core.shader_storage_image_read_without_format == vk::TRUE;
         caps.shader_int64 = found.core.shader_int64 == vk::TRUE;
+        caps.buffer_int64_atomics = found.v12.shader_buffer_int64_atomics == vk::TRUE;
         caps.multi_draw_indirect = found.core.multi_draw_indirect == vk::TRUE;
         self.missing.extend(missing(&found));
         self.features = Features::wanted(&found);

@@ -8,6 +8,7 @@ use glslang::{Compiler, CompilerOptions, ShaderInput, ShaderMessage, SpirvVersio
 
 use super::compile::{CompileOptions, failed};
 use super::include::Includes;
+use super::sampled_copies::without_sampled_copies;
 use super::source::{self, Complaint};
 use super::unused::without_unused_resources;
 use super::{ShaderModuleDesc, ShaderStage, diagnostics, preamble};
@@ -21,7 +22,7 @@ pub(super) fn glsl(desc: &ShaderModuleDesc<'_>, text: &str, options: &CompileOpt
     let text = preamble::preamble(desc.stage, options, desc.defines) + &text;
     let mut includes = Includes::new(desc.includes, desc.include_dirs);
     match to_spirv(name, desc.stage, text, &mut includes) {
-        Ok(words) => Ok(without_unused_resources(words)),
+        Ok(words) => Ok(without_sampled_copies(without_unused_resources(words))),
         Err(error) => Err(failed(name, diagnostics::errors(&log_of(error), includes.into_failures()))),
     }
 }

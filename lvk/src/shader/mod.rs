@@ -19,6 +19,8 @@ mod preamble;
 mod ray_interface;
 mod reflect;
 #[cfg(feature = "glsl")]
+mod sampled_copies;
+#[cfg(feature = "glsl")]
 mod source;
 mod spirv;
 mod stage;

@@ -20,9 +20,9 @@ pub struct HybridArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
 
-    /// How to find what a pixel sees
-    #[arg(long, value_enum, default_value_t = Method::Hybrid, help_heading = "Rendering")]
-    pub method: Method,
+    /// How to find what a pixel sees [default: hybrid, or standalone on a device that cannot]
+    #[arg(long, value_enum, help_heading = "Rendering")]
+    pub method: Option<Method>,
 
     /// What the hybrid method's geometry pass leaves for the rays
     #[arg(long, value_enum, default_value_t = GBuffer::Visibility, help_heading = "Rendering")]
@@ -169,7 +169,7 @@ mod tests {
         let (run, scene) = (&args.run, &args.scene);
         assert_eq!((run.width, run.height, scene.camera, args.depth), (1280, 720, 1, 4));
         assert_eq!((run.frames.clone(), run.round, run.resume), (None, 240, false));
-        assert_eq!((args.method, run.rt, run.validate), (Method::Hybrid, RayTracing::Auto, None));
+        assert_eq!((args.method, run.rt, run.validate), (None, RayTracing::Auto, None));
         assert_eq!((args.gbuffer, args.raster), (GBuffer::Visibility, Raster::Auto));
         assert_eq!((args.bounces, args.samples), (Bounces::Auto, 1));
         assert_eq!((scene.scene.clone(), args.lamp), (None, Lamp::Still));

@@ -160,7 +160,24 @@ impl HybridConfig {
         if self.method == Method::Hybrid && numbers_fragments && !capabilities.primitive_id {
             return Err(HybridError::NoPrimitiveId { device: capabilities.device_name.clone() });
         }
+        if self.knows_triangles() && Method::choose(None, capabilities) == Method::Standalone {
+            return Err(HybridError::NoRasteriser { device: capabilities.device_name.clone() });
+        }
         self.path.check(capabilities)
+    }
+}
+
+impl Method {
+    /// The method to take: `wish`, or hybrid where the device can find visible triangles by one of the rasterisers, else
+    /// stand-alone.
+    #[must_use]
+    pub fn choose(wish: Option<Self>, capabilities: &Capabilities) -> Self {
+        let by_compute = capabilities.shader_int64 && capabilities.buffer_int64_atomics;
+        match wish {
+            Some(method) => method,
+            None if by_compute || capabilities.primitive_id => Self::Hybrid,
+            None => Self::Standalone,
+        }
     }
 }
 
@@ -281,6 +298,20 @@ mod tests {
             assert!(matches!(config.check(&capabilities), Err(HybridError::NoPrimitiveId { .. })));
             assert!(HybridConfig { method: Method::Standalone, ..config }.check(&capabilities).is_ok());
         }
+        assert!(matches!(config().check(&capabilities), Err(HybridError::NoRasteriser { .. })));
+        (capabilities.shader_int64, capabilities.buffer_int64_atomics) = (true, true);
         assert!(config().check(&capabilities).is_ok());
+    }
+
+    #[test]
+    fn the_method_follows_the_device_unless_it_is_named() {
+        let mut capabilities = device(false, true);
+        assert_eq!(Method::choose(None, &capabilities), Method::Hybrid);
+        (capabilities.primitive_id, capabilities.shader_int64) = (false, true);
+        assert_eq!(Method::choose(None, &capabilities), Method::Standalone);
+        assert_eq!(Method::choose(Some(Method::Hybrid), &capabilities), Method::Hybrid);
+        capabilities.buffer_int64_atomics = true;
+        assert_eq!(Method::choose(None, &capabilities), Method::Hybrid);
+        assert_eq!(Method::choose(Some(Method::Standalone), &capabilities), Method::Standalone);
     }
 }

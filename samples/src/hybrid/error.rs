@@ -35,6 +35,14 @@ pub enum HybridError {
         /// Name of the device.
         device: String,
     },
+    /// The hybrid method needs one of two things to find visible triangles.
+    #[error(
+        "{device} has neither 64-bit atomics (shaderInt64, shaderBufferInt64Atomics) nor triangle numbers in fragment shaders (geometryShader); use --method standalone"
+    )]
+    NoRasteriser {
+        /// Name of the device.
+        device: String,
+    },
     /// The picture has no pixels or more than the device takes.
     #[error("a picture of {width}x{height} pixels is not possible: each side must be 1 to {limit}")]
     BadSize {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::process::ExitCode;
 
-use lvk::Context;
+use lvk::{Capabilities, Context};
 
 use super::sequence::HybridSequence;
 use super::texture_fit::{fit_textures, textures_needed};
@@ -56,7 +56,12 @@ fn open(args: &HybridArgs, opening: &mut Opening<'_>) -> Result<Opened<HybridSeq
     opening.warn(&scene.warnings);
     let context = opening.device(&DeviceNeeds { textures: textures_needed(&scene) })?;
     let path = RayPath::choose(wished_path(args.run.rt), context.capabilities())?;
-    let config = config(args, path);
+    let wish = wished_method(args);
+    let method = Method::choose(wish, context.capabilities());
+    if wish.is_none() && method == Method::Standalone {
+        opening.warn(&[stand_in(context.capabilities())]);
+    }
+    let config = config(args, method, path);
     let warnings = fit_textures(&mut scene, &context.capabilities().limits)?;
     opening.warn(&warnings);
     opening.progress.stage("uploading the scene and building acceleration structures", 0);
@@ -81,11 +86,28 @@ fn wished_path(wish: RayTracing) -> Option<RayPath> {
     }
 }
 
-fn config(args: &HybridArgs, path: RayPath) -> HybridConfig {
-    let method = match args.method {
-        args::Method::Standalone => Method::Standalone,
-        args::Method::Hybrid => Method::Hybrid,
-    };
+/// The method that is named, if only by something that it alone has.
+fn wished_method(args: &HybridArgs) -> Option<Method> {
+    let names_hybrid = args.gbuffer == args::GBuffer::Paper
+        || args.raster != args::Raster::Auto
+        || args.bounces == args::Bounces::First;
+    match args.method {
+        Some(args::Method::Standalone) => Some(Method::Standalone),
+        Some(args::Method::Hybrid) => Some(Method::Hybrid),
+        None => names_hybrid.then_some(Method::Hybrid),
+    }
+}
+
+/// The notice that the usual method gives way.
+fn stand_in(capabilities: &Capabilities) -> String {
+    format!(
+        "{} has neither 64-bit atomics nor triangle numbers in fragment shaders, one of which the hybrid method needs: \
+         everything is traced, as by --method standalone",
+        capabilities.device_name
+    )
+}
+
+fn config(args: &HybridArgs, method: Method, path: RayPath) -> HybridConfig {
     let raster = match args.raster {
         args::Raster::Auto => None,
         args::Raster::Compute => Some(Raster::Compute),

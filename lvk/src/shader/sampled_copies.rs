@@ -1,0 +1,49 @@
+//! Lets combinations of image and sampler carry their decorations themselves.
+
+use std::collections::HashSet;
+
+use ::spirv::Op;
+
+use super::spirv::{HEADER_WORDS, Instruction, instructions};
+
+/// `words` without copies of `OpSampledImage`, which GLSL's compiler makes of `nonuniformEXT(sampler2D(...))`.
+///
+/// The combination takes the name and so the decorations of its copy. SPIR-V has combinations used by sampling instructions
+/// alone, and SwiftShader looks at nothing but the combination to know that lanes may differ.
+pub(super) fn without_sampled_copies(words: Vec<u32>) -> Vec<u32> {
+    let Ok(code) = instructions(&words).collect::<Result<Vec<_>, _>>() else {
+        return words;
+    };
+    let decorated: HashSet<u32> =
+        code.iter().filter(|i| i.op == Some(Op::Decorate)).map(|i| i.operand(0)).collect();
+    let mut out = words.get(..HEADER_WORDS).unwrap_or(&words).to_vec();
+    let mut rest = code.as_slice();
+    while let [first, after @ ..] = rest {
+        rest = match after {
+            [copy, after @ ..] if is_copy_of(copy, first) && !decorated.contains(&first.operand(1)) => {
+                out.extend([
+                    first.words[0],
+                    first.operand(0),
+                    copy.operand(1),
+                    first.operand(2),
+                    first.operand(3),
+                ]);
+                after
+            }
+            _ => {
+                out.extend(first.words);
+                after
+            }
+        };
+    }
+    out
+}
+
+/// Whether `next` copies what `combination` made.
+fn is_copy_of(next: &Instruction<'_>, combination: &Instruction<'_>) -> bool {
+    combination.op == Some(Op::SampledImage)
+        && next.op == Some(Op::CopyObject)
+        && combination.words.len() == 5
+        && next.words.len() == 4
+        && next.operand(2) == combination.operand(1)
+}
