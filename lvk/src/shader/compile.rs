@@ -22,6 +22,9 @@ pub(crate) struct CompileOptions {
     /// Helper invocations of fragment shaders have no arrays that work.
     #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) helpers_lose_arrays: bool,
+    /// The device is a CPU.
+    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
+    pub(crate) is_cpu: bool,
 }
 
 impl CompileOptions {
@@ -32,6 +35,7 @@ impl CompileOptions {
             position_fetch: device.position_fetch,
             software_ray_query: device.ray_query_path == RayQueryPath::Software,
             helpers_lose_arrays: device.helpers_lose_arrays,
+            is_cpu: device.is_cpu,
         }
     }
 }

@@ -77,6 +77,9 @@ pub(super) fn preamble(stage: ShaderStage, options: &CompileOptions, defines: &[
     if options.software_ray_query {
         define(&mut text, "LVK_SOFTWARE_RAY_QUERY", "1");
     }
+    if options.is_cpu {
+        define(&mut text, "LVK_DEVICE_IS_CPU", "1");
+    }
     if options.helpers_lose_arrays {
         define(&mut text, "LVK_HELPERS_LOSE_ARRAYS", "1");
     }

@@ -72,6 +72,13 @@ const bool kLvkSoftHasCandidates = false;
 const bool kLvkSoftHasCandidates = true;
 #endif
 
+// A loop costs CPUs more than lanes that wait for one another: there, each turn tests a primitive or visits a node.
+#ifdef LVK_DEVICE_IS_CPU
+const bool kLvkSoftStepByStep = true;
+#else
+const bool kLvkSoftStepByStep = false;
+#endif
+
 // lavapipe drops what helper invocations write to arrays of their own (mesa 25.0), so these have no stack.
 #if defined(LVK_STAGE_FRAGMENT) && defined(LVK_HELPERS_LOSE_ARRAYS)
 #define LVK_SOFT_IS_STACKLESS gl_HelperInvocation
@@ -395,6 +402,12 @@ bool lvkSoftWalk(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLeve
             if (lvkSoftTest(state, place, level)) {
                 return true;
             }
+            if (kLvkSoftStepByStep) {
+                break;
+            }
+        }
+        if (kLvkSoftStepByStep && place.leaves.y != 0u) {
+            continue;
         }
         if (place.group.y < LVK_SOFT_ANY_NODE) {
             if (place.top == place.floor) {

@@ -22,8 +22,8 @@ pub(super) fn whole(headline: String, walked: &[Walked], plan: &Plan) -> Table {
     let (runs, cameras) = (plan.runs, plan.cameras.len());
     let cameras = if cameras == 1 { "one camera".to_owned() } else { format!("{cameras} cameras") };
     table.note(format!(
-        "means over {cameras} of rays a second by the medians of {runs} frames, taken in turns, each after one that fills the caches; shadow rays only where a \
-         primary ray hit"
+        "means over {cameras} of rays a second by the medians of {runs} frames, taken in turns, each after one that fills \
+         the caches; shadow rays only where a primary ray hit"
     ));
     table.note("aim on the H200: software at least 1.5 times the pipeline, for primary and for shadow rays");
     table.note(
