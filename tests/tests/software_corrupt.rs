@@ -366,6 +366,39 @@ fn boxes_of_nothing_are_not_hit() -> Result<()> {
     Ok(())
 }
 
+/// Rays without place, direction or length, or with endless ones.
+#[test]
+fn rays_of_garbage_come_to_an_end() -> Result<()> {
+    let Some(ctx) = bare() else { return Ok(()) };
+    let tracer = RayTracer::new(&ctx, Method::Query)?;
+    let none = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+    let mut rays = vec![Ray { direction: [0.0; 3], ..Ray::new(Vec3::ZERO, Vec3::X) }];
+    for number in none {
+        for axis in 0..3 {
+            let mut ray = Ray::new(Vec3::Z * 0.1, Vec3::ONE);
+            ray.origin[axis] = number;
+            rays.push(ray);
+            let mut ray = Ray::new(Vec3::Z * 0.1, Vec3::ONE);
+            ray.direction[axis] = number;
+            rays.push(ray);
+        }
+    }
+    rays.extend([f32::NAN, -1.0].map(|t_max| Ray { t_max, ..Ray::new(Vec3::ZERO, Vec3::X) }));
+    rays.push(Ray { t_min: f32::NAN, ..Ray::new(Vec3::ZERO, Vec3::X) });
+    let opaque = shapes();
+    let mut glass = shapes();
+    glass.iter_mut().for_each(|part| part.flags = GeometryFlags::empty());
+    for parts in [opaque, glass] {
+        for flags in FLAGS {
+            let scene =
+                RayScene { models: vec![parts.clone()], placed: vec![Placed::new(0, Affine3A::IDENTITY)] };
+            let gpu = scene.upload_with(&ctx, flags, BuildFlags::default(), 0)?;
+            expect_nothing(&tracer, &gpu.tlas, &rays, "garbage")?;
+        }
+    }
+    Ok(())
+}
+
 const RECORD_WORDS: usize = 16;
 
 /// A record that shows a structure by its place in the list.

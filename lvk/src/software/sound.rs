@@ -88,7 +88,8 @@ pub(crate) fn check(bytes: &[u8], expected: &Expected) -> Result<Sound, &'static
     }
     let bounds = Bounds { low: header.low.into(), high: header.high.into() };
     let is_box = bounds.low.is_finite() && bounds.high.is_finite() && bounds.low.cmple(bounds.high).all();
-    if !is_box && !(bounds.low.x > bounds.high.x) {
+    let is_empty = bounds.low.x > bounds.high.x;
+    if !is_box && !is_empty {
         return Err("it has no bounds");
     }
     Ok(Sound { header, bounds })
@@ -388,6 +389,20 @@ mod tests {
             }).collect();
             numbers.sort_unstable_by_key(|(geometry, primitive)| (*primitive, *geometry));
             prop_assert!(numbers.into_iter().eq((0..corners.len() as u32).map(|number| (number % 2, number / 2))));
+            walk(&bytes, &expected);
+        }
+
+        /// As large and as small as numbers are that builds take, many of them in one place.
+        #[test]
+        fn extreme_places_are_built(
+            corners in prop::collection::vec(prop::array::uniform3(prop::sample::select(
+                vec![0.0, -0.0, 1.0, -1.0, 1e18, -1e18, 9.9e17, 1e-38, -1e-42, 1e-7, 4e9, f32::MIN_POSITIVE]
+            )), 0..60),
+            quality in quality(),
+        ) {
+            let (bytes, expected) = built(&mesh(&corners), quality);
+            walk(&bytes, &expected);
+            let (bytes, expected) = built_binary(&mesh(&corners), quality);
             walk(&bytes, &expected);
         }
 
