@@ -1,7 +1,7 @@
 //! Everything a context and its command buffers share.
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use ash::vk;
 
@@ -58,6 +58,8 @@ pub(crate) struct Shared {
     pub(crate) tlas_tables: ResourceId,
     /// Some top-level structure shows what compaction has replaced.
     pub(crate) outdated_tlas: AtomicBool,
+    /// Slots of top-level structures that are gone, where the table still says what software traced.
+    pub(crate) freed_tlas: Mutex<Vec<u32>>,
     pub(crate) gpu: Arc<Gpu>,
 }
 
@@ -180,6 +182,8 @@ impl Shared {
         self.submitter.forget(object.id);
         match &object.kind {
             AccelKind::Tlas(tlas) => {
+                // Before somebody else may take the slot.
+                tlas.software.iter().for_each(|_| self.freed_tlas().push(tlas.slot));
                 self.bindless.free_tlas(tlas.slot);
                 tlas.records.get().into_iter().for_each(|buffer| self.submitter.forget(buffer.id));
             }
@@ -190,6 +194,11 @@ impl Shared {
                 }
             }
         }
+    }
+
+    /// Slots whose entry in the table is to be emptied before anything else is submitted.
+    pub(crate) fn freed_tlas(&self) -> MutexGuard<'_, Vec<u32>> {
+        self.freed_tlas.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// A source that was kept lies in buffers of the library's own; the next one may have the mapped one.

@@ -13,12 +13,13 @@ const uint kSetPerGroup = 8u;
 // Most workgroups along one axis that every device takes.
 const uint kMostGroups = 65535u;
 
-// A triangle of more than a few pixels, set up.
+// A triangle of more than a few pixels, set up. What has members begins at a multiple of 8, which glslang takes for granted
+// when it stores them one by one.
 struct SetTriangle {
     Corners corners;
+    uint triangle;
     Edges edges;
     Footprint footprint;
-    uint triangle;
 };
 
 // Triangles that the first pass sets aside for the second.

@@ -42,7 +42,7 @@ void main() {
     ivec2 size = footprint.last - footprint.first + 1;
     SetTriangles list = SetTriangles(frame.visibility.setTriangles);
     bool isSmall = uint(size.x * size.y) <= kSmallPixels;
-    if (isSmall || !isSetAside(list, SetTriangle(corners, edges, footprint, triangle))) {
+    if (isSmall || !isSetAside(list, SetTriangle(corners, triangle, edges, footprint))) {
         rasterFootprint(edges, corners, footprint, triangle);
     }
 }

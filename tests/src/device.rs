@@ -80,6 +80,15 @@ pub fn device_with<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<Test
     }
 }
 
+/// As [`device_with`], with no structures but the device's own, whatever `LVK_TEST_RAY_QUERY` says: for tests of what the
+/// driver's take.
+pub fn without_software<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<TestDevice> {
+    device_with(|desc| {
+        desc.ray_query = RayQueryRequest::HardwareIfPresent;
+        adjust(desc);
+    })
+}
+
 /// Who walks ray queries unless a test says otherwise: the device, where it can, or what `LVK_TEST_RAY_QUERY` says
 /// (`hardware`, `software`, `auto`).
 fn ray_query() -> RayQueryRequest {

@@ -26,4 +26,4 @@ pub mod still_life;
 pub mod warnings;
 pub mod wide_tree;
 
-pub use device::{TestDevice, device, device_with};
+pub use device::{TestDevice, device, device_with, without_software};

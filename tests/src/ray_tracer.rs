@@ -207,10 +207,15 @@ impl RayTracer {
         job: &Job,
         how: How,
     ) -> Result<()> {
+        self.record_at(cmd, tlas.index(), job, how)
+    }
+
+    /// As [`record`](Self::record), whoever is at this index.
+    pub fn record_at(&self, cmd: &mut CommandBuffer, tlas: u32, job: &Job, how: How) -> Result<()> {
         let push = Push {
             rays: self.ctx.buffer_address(*job.rays)?,
             hits: self.ctx.buffer_address(*job.hits)?,
-            tlas: tlas.index(),
+            tlas,
             count: job.count,
             mask: how.mask.into(),
             flags: how.flags,

@@ -10,7 +10,7 @@ use lvk_tests::hit_check::HitCheck;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances};
 use lvk_tests::warnings::{listen, take_warnings};
-use lvk_tests::{device, device_with};
+use lvk_tests::{TestDevice, device, device_with, without_software};
 
 const COMPACTABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_COMPACTION);
 const MOVING: BuildFlags = COMPACTABLE.union(BuildFlags::ALLOW_UPDATE);
@@ -403,8 +403,8 @@ fn threads_compact_side_by_side() -> Result<()> {
 type Sizes = (u64, u64);
 
 /// Bytes of all structures, and of each of the [`scene`]'s.
-fn measured() -> Result<Option<(u64, Vec<Sizes>)>> {
-    let Some(ctx) = device() else { return Ok(None) };
+fn measured(ctx: Option<TestDevice>) -> Result<Option<(u64, Vec<Sizes>)>> {
+    let Some(ctx) = ctx else { return Ok(None) };
     let gpu = upload(&ctx, &scene(), COMPACTABLE)?;
     ctx.wait_idle()?;
     let needed = memory(&ctx).0;
@@ -418,7 +418,7 @@ fn measured() -> Result<Option<(u64, Vec<Sizes>)>> {
 #[test]
 fn compaction_fails_where_the_budget_has_no_room_for_copies() -> Result<()> {
     listen();
-    let Some((needed, sizes)) = measured()? else { return Ok(()) };
+    let Some((needed, sizes)) = measured(device())? else { return Ok(()) };
     let Some(ctx) = device_with(|desc| desc.accel_budget_bytes = needed + 256) else {
         return Ok(());
     };
@@ -448,9 +448,9 @@ fn compaction_fails_where_the_budget_has_no_room_for_copies() -> Result<()> {
 /// There is room for the smallest copy only; more is made of what memory comes back, and the rest fails alone.
 #[test]
 fn what_fits_is_compacted_whatever_becomes_of_the_rest() -> Result<()> {
-    let Some((needed, sizes)) = measured()? else { return Ok(()) };
+    let Some((needed, sizes)) = measured(without_software(|_| ()))? else { return Ok(()) };
     let smallest = sizes.iter().map(|(_, after)| *after).min().unwrap_or(0);
-    let Some(ctx) = device_with(|desc| desc.accel_budget_bytes = needed + smallest) else {
+    let Some(ctx) = without_software(|desc| desc.accel_budget_bytes = needed + smallest) else {
         return Ok(());
     };
     let scene = scene();
@@ -479,9 +479,9 @@ fn what_fits_is_compacted_whatever_becomes_of_the_rest() -> Result<()> {
 /// Room for one copy at a time: the next is made when what the last one replaced is freed.
 #[test]
 fn copies_wait_for_the_memory_of_others() -> Result<()> {
-    let Some((needed, sizes)) = measured()? else { return Ok(()) };
+    let Some((needed, sizes)) = measured(without_software(|_| ()))? else { return Ok(()) };
     let largest = sizes.iter().map(|(_, after)| *after).max().unwrap_or(0);
-    let Some(ctx) = device_with(|desc| desc.accel_budget_bytes = needed + largest) else {
+    let Some(ctx) = without_software(|desc| desc.accel_budget_bytes = needed + largest) else {
         return Ok(());
     };
     let scene = scene();
@@ -507,8 +507,8 @@ fn copies_wait_for_the_memory_of_others() -> Result<()> {
 /// A copy that waits for room does not keep what was destroyed.
 #[test]
 fn what_waits_for_room_may_be_destroyed() -> Result<()> {
-    let Some((needed, sizes)) = measured()? else { return Ok(()) };
-    let Some(ctx) = device_with(|desc| desc.accel_budget_bytes = needed + 256) else {
+    let Some((needed, sizes)) = measured(without_software(|_| ()))? else { return Ok(()) };
+    let Some(ctx) = without_software(|desc| desc.accel_budget_bytes = needed + 256) else {
         return Ok(());
     };
     let GpuScene { mut models, tlas, buffers: _buffers } = upload(&ctx, &scene(), COMPACTABLE)?;

@@ -14,7 +14,7 @@ use lvk_tests::ray_tracer::{CULL_BACK, CULL_FRONT, How, MISSED, Method, RayTrace
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::reference::{Hit, Sphere};
 use lvk_tests::sphere_scene::{GROUPS, SphereModel};
-use lvk_tests::{TestDevice, device, device_with};
+use lvk_tests::{TestDevice, device, device_with, without_software};
 
 /// A device that takes so many primitives in a structure.
 fn device_of(primitives: u64) -> Option<TestDevice> {
@@ -336,7 +336,7 @@ fn a_part_may_be_a_single_triangle() -> Result<()> {
 #[test]
 fn a_mesh_over_the_limits_of_the_phone_is_split() -> Result<()> {
     let profile = DeviceProfile::mali_g715();
-    let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
+    let Some(ctx) = without_software(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
     assert!(!ctx.capabilities().ray_tracing_pipeline);
     if !ctx.capabilities().ray_query {
         eprintln!(

@@ -58,7 +58,7 @@ pub(crate) struct PartShape {
 /// The Vulkan structures of all parts. Compaction replaces the body; who still uses the old one keeps it alive.
 pub(crate) struct BlasBody {
     pub(crate) structures: Vec<RawStructure>,
-    /// Bytes before compaction, for a body that is compacted or was loaded.
+    /// Bytes of its structures before compaction, for a body that is compacted.
     pub(crate) compacted_from: Option<u64>,
     /// Whether another build from scratch fits.
     pub(crate) rebuildable: bool,
@@ -102,10 +102,9 @@ impl Blas {
         settled.then(|| std::mem::replace(&mut state.body, Arc::new(body)))
     }
 
-    /// Bytes of memory of all parts, and of what software traces.
-    pub(crate) fn memory_bytes(&self) -> u64 {
-        let software = self.software.as_ref().map_or(0, SoftwareBlas::memory_bytes);
-        self.body().memory_bytes() + software
+    /// Bytes of memory of what software traces, which compaction leaves alone.
+    pub(crate) fn software_bytes(&self) -> u64 {
+        self.software.as_ref().map_or(0, SoftwareBlas::memory_bytes)
     }
 
     /// Buffers the library keeps for it, in bytes: maps of primitives and matrices.

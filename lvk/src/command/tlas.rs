@@ -281,6 +281,11 @@ impl CommandBuffer {
         }
     }
 
+    /// Has shaders see nothing in slots whose structures are gone.
+    pub(crate) fn forget_tlas(&mut self, slots: &[u32]) {
+        slots.iter().for_each(|slot| self.write_tlas_table(*slot, [0; 2]));
+    }
+
     /// Empties the table that says where rows lie.
     pub(crate) fn clear_tlas_table(&mut self) {
         let shared = Arc::clone(&self.shared);

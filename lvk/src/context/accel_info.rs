@@ -17,7 +17,7 @@ pub enum Compaction {
     Pending,
     /// Done.
     Done {
-        /// Bytes of memory before.
+        /// Bytes of memory before, of all that [`AccelStructInfo::structure_bytes`] counts.
         before_bytes: u64,
         /// Bytes of memory since.
         after_bytes: u64,
@@ -38,7 +38,7 @@ pub struct AccelStructInfo {
     pub parts: u32,
     /// Whether the primitives were put into another order, or split: hits need `lvkPrimitiveIndex` then.
     pub is_remapped: bool,
-    /// Bytes of memory of its structures.
+    /// Bytes of memory of its structures: the device's, and those that software traces.
     pub structure_bytes: u64,
     /// Bytes of buffers that the library keeps for it: maps of primitives, gathered inputs, instances. Gathered inputs
     /// go with the compaction of a structure without [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE),
@@ -117,10 +117,10 @@ fn info(object: &AccelStruct) -> AccelStructInfo {
             compaction: Compaction::None,
         },
         AccelKind::Blas(blas) => {
-            let body = blas.body();
-            let after_bytes = blas.memory_bytes();
+            let (body, kept_bytes) = (blas.body(), blas.software_bytes());
+            let after_bytes = body.memory_bytes() + kept_bytes;
             let compaction = match body.compacted_from {
-                Some(before_bytes) => Compaction::Done { before_bytes, after_bytes },
+                Some(bytes) => Compaction::Done { before_bytes: bytes + kept_bytes, after_bytes },
                 None => match blas.wish() {
                     CompactionWish::None => Compaction::None,
                     CompactionWish::Open => Compaction::Pending,

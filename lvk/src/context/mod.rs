@@ -70,14 +70,23 @@ impl Context {
     /// becomes of `record`.
     fn before_next_submission<T>(&self, record: impl FnOnce(&mut CommandBuffer) -> Result<T>) -> Result<T> {
         let mut pending = self.pending();
-        let cmd = match &mut *pending {
-            Some(cmd) => cmd,
-            none => none.insert(CommandBuffer::new(self.shared())?),
-        };
+        let cmd = self.open(&mut pending)?;
         let result = record(cmd);
         // It goes before whatever is submitted next, so commands recorded from now on may rely on it.
         cmd.apply_tlas_updates();
         result
+    }
+
+    /// The command buffer that runs before the next submission. What it records next may be for those who have the slots
+    /// of structures that are gone.
+    fn open<'a>(&self, pending: &'a mut Option<CommandBuffer>) -> Result<&'a mut CommandBuffer> {
+        let cmd = match pending {
+            Some(cmd) => cmd,
+            none => none.insert(CommandBuffer::new(self.shared())?),
+        };
+        let freed = std::mem::take(&mut *self.shared().freed_tlas());
+        cmd.forget_tlas(&freed);
+        Ok(cmd)
     }
 
     fn pending(&self) -> MutexGuard<'_, Option<CommandBuffer>> {

@@ -73,6 +73,9 @@ impl Context {
     /// look like it. Damage, and sizes and counts that contradict the mesh, are found and refused; but what the driver
     /// wrote of a structure only the driver can read, and it takes it for its own: made-up contents send the GPU to any
     /// address. A file that others can write is no source.
+    ///
+    /// Where only software traces, made-up contents are refused or harmless too: every place, count and reference is
+    /// checked before a shader follows it.
     pub unsafe fn load_blas(&self, desc: &BlasDesc<'_>, bytes: &[u8]) -> Result<Holder<AccelStructHandle>> {
         self.shared().gpu.check_structures()?;
         let blob = decode(bytes).map_err(|error| rejected(desc, error.to_string()))?;

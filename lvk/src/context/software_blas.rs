@@ -20,7 +20,7 @@ use crate::shared::Garbage;
 use crate::software::blas_blob::{self, BlasBlob};
 use crate::software::mesh::Mesh;
 use crate::software::quality::Quality;
-use crate::software::sound;
+use crate::software::sound::{self, Expected};
 use crate::software::tree_cache::TreeKey;
 
 /// Stands in front of structures that no driver wrote; as long as what drivers begin with.
@@ -47,7 +47,10 @@ impl Context {
     fn built(&self, mesh: &Mesh, quality: Quality) -> BlasBlob {
         let build = || blas_blob::build(mesh, quality);
         match &self.shared().tree_cache {
-            Some(cache) => cache.get_or(TreeKey::of(mesh, quality), build),
+            Some(cache) => {
+                let expected = Expected::of_mesh(mesh, quality.refit);
+                cache.get_or(TreeKey::of(mesh, quality), &expected, build)
+            }
             None => build(),
         }
     }
@@ -108,7 +111,7 @@ impl Context {
             _ => None,
         };
         let bytes = bytes.ok_or_else(|| reject("a driver wrote it, and here only software traces"))?;
-        let sound = sound::check(bytes).map_err(reject)?;
+        let sound = sound::check(bytes, &Expected::of_desc(desc)).map_err(reject)?;
         let built = BlasBlob { bytes: bytes.to_vec(), bounds: sound.bounds };
         let software = self.software_blas(desc, Some(&built))?;
         let body = BlasBody { structures: Vec::new(), compacted_from: None, rebuildable: true };

@@ -86,6 +86,7 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         all_tlas: ResourceId::next(),
         tlas_tables: ResourceId::next(),
         outdated_tlas: AtomicBool::new(false),
+        freed_tlas: Mutex::default(),
         gpu,
     })
 }

@@ -25,6 +25,9 @@ impl Context {
         self.advance_compactions();
         let mut pending = self.pending();
         cmd.check_tlas_updates()?;
+        if !self.shared().freed_tlas().is_empty() {
+            self.open(&mut pending)?;
+        }
         self.send(pending.take().into_iter().chain([cmd]))
     }
 

@@ -92,6 +92,8 @@ impl InternalUsage {
 impl Buffer {
     /// Matrices and instances of builds, and the largest texels, lie at multiples of this; drivers may ask for less.
     const ALIGNMENT: u64 = 16;
+    /// Memory behind each buffer under GPU-assisted validation, for which what lies in some other buffer is no error.
+    const GAP_BYTES: u64 = 4096;
 
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &BufferDesc<'_>, internal: InternalUsage) -> Result<Self> {
         let name = desc.debug_name;
@@ -124,6 +126,9 @@ impl Buffer {
         // SAFETY: the buffer was created by this device.
         let mut requirements = unsafe { device.get_buffer_memory_requirements(self.raw) };
         requirements.alignment = requirements.alignment.max(Self::ALIGNMENT).max(alignment);
+        if self.gpu.instance.gpu_assisted {
+            requirements.size += Self::GAP_BYTES;
+        }
         let allocation = self.gpu.allocate(&self.name, requirements, self.memory, true)?;
         // SAFETY: the allocation was made for this buffer's requirements and is bound once.
         let bound = unsafe { device.bind_buffer_memory(self.raw, allocation.memory(), allocation.offset()) };

@@ -179,8 +179,8 @@ pub(super) fn parents(nodes: &[BinaryNode]) -> Vec<u32> {
     parents
 }
 
-/// Whether every path from the first node ends in primitives that exist, none is too long, and no two meet. Nodes stand
-/// in any order.
+/// Whether every path from the first node ends in primitives that exist, none is too long, no two meet, and all nodes are
+/// on one. Nodes stand in any order.
 pub(super) fn is_sound(nodes: &[BinaryNode], primitives: usize) -> bool {
     let mut seen = vec![false; nodes.len()];
     let mut open = vec![(0_u32, 1_usize)];
@@ -197,7 +197,7 @@ pub(super) fn is_sound(nodes: &[BinaryNode], primitives: usize) -> bool {
             }
         }
     }
-    true
+    seen.into_iter().all(|seen| seen)
 }
 
 /// Whether a reference to a leaf names primitives that exist.

@@ -42,7 +42,7 @@ pub(crate) fn build(mesh: &Mesh, quality: Quality) -> BlasBlob {
     BlasBlob { bytes: pack(mesh, &tree, quality, whole), bounds: whole }
 }
 
-fn pack(mesh: &Mesh, tree: &Tree, quality: Quality, bounds: Bounds) -> Vec<u8> {
+pub(super) fn pack(mesh: &Mesh, tree: &Tree, quality: Quality, bounds: Bounds) -> Vec<u8> {
     let (format, nodes, node_count): (_, &[u8], _) = match &tree.nodes {
         Nodes::Wide(nodes) => (WIDE, bytemuck::cast_slice(nodes), nodes.len()),
         Nodes::Binary(nodes) => (BINARY, bytemuck::cast_slice(nodes), nodes.len()),

@@ -1,10 +1,63 @@
-//! Whether bytes from a file are a structure that shaders can walk: damage must not send the GPU anywhere.
+//! Whether bytes from a file are a structure that shaders can walk, and kernels refit: neither damage nor made-up numbers
+//! must send the GPU anywhere.
 
-use super::binary_tree;
-use super::wide_tree;
+use std::ops::Range;
+
+use super::mesh::{Mesh, Primitives};
+use super::{binary_tree, wide_tree};
 use crate::accel::bounds::Bounds;
+use crate::accel::desc::BlasDesc;
+use crate::accel::flags::BuildFlags;
+use crate::accel::geometry::BlasGeometry;
+use crate::accel::software::geometry::vertex_count;
 use crate::accel::software::layout::LeafKind;
-use crate::accel::software::layout::{BINARY, BLOCK_BYTES, Header, LEAF, NONE, WIDE};
+use crate::accel::software::layout::{BINARY, BLOCK_BYTES, BinaryNode, Header, LeafBox, NONE, WIDE};
+
+/// What a structure is to be of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct Expected {
+    /// Boxes, or triangles.
+    pub(crate) boxes: bool,
+    /// Primitives of each geometry.
+    pub(crate) counts: Vec<u32>,
+    /// Vertices of all geometries, where refits are to copy them.
+    pub(crate) vertices: u32,
+    /// Whether it is to be refitted.
+    pub(crate) refit: bool,
+}
+
+impl Expected {
+    /// What a build of this mesh is of.
+    pub(crate) fn of_mesh(mesh: &Mesh, refit: bool) -> Self {
+        let mut counts = vec![0; mesh.flags.len()];
+        let mut add = |geometry: u32, primitive: u32| {
+            if let Some(count) = counts.get_mut(geometry as usize) {
+                *count = primitive.saturating_add(1).max(*count);
+            }
+        };
+        let boxes = match &mesh.primitives {
+            Primitives::Triangles(all) => {
+                all.iter().for_each(|of| add(of.geometry, of.primitive));
+                false
+            }
+            Primitives::Boxes(all) => {
+                all.iter().for_each(|of| add(of.geometry & !LeafBox::OPAQUE, of.primitive));
+                true
+            }
+        };
+        Self { boxes, counts, vertices: 0, refit }
+    }
+
+    /// What a structure of this description is of.
+    pub(crate) fn of_desc(desc: &BlasDesc<'_>) -> Self {
+        Self {
+            boxes: desc.geometries.first().is_some_and(BlasGeometry::is_boxes),
+            counts: desc.geometries.iter().map(BlasGeometry::primitive_count).collect(),
+            vertices: desc.geometries.iter().map(vertex_count).fold(0, u32::saturating_add),
+            refit: desc.flags.contains(BuildFlags::ALLOW_UPDATE),
+        }
+    }
+}
 
 /// What a sound structure says of itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,69 +67,159 @@ pub(crate) struct Sound {
 }
 
 /// Checks a bottom-level structure; answers what is wrong with it.
-pub(crate) fn check(bytes: &[u8]) -> Result<Sound, &'static str> {
+pub(crate) fn check(bytes: &[u8], expected: &Expected) -> Result<Sound, &'static str> {
     let head = bytes.get(..size_of::<Header>()).ok_or("its header is cut off")?;
     let header: Header = bytemuck::pod_read_unaligned(head);
+    let kind = leaf_kind(&header).ok_or("its leaves are of no known kind")?;
+    if (kind == LeafKind::Boxes) != expected.boxes || header.geometry_count as usize != expected.counts.len()
+    {
+        return Err("it is of other geometries");
+    }
+    let parts = Parts::new(bytes, &header, kind, expected).ok_or("parts of it are cut off")?;
+    if !parts.lie_apart() {
+        return Err("parts of it lie over each other");
+    }
+    let parents = parents_of_sound_tree(&parts, &header).ok_or("its tree is damaged")?;
+    if expected.refit && !parts.parents().eq(parents) {
+        return Err("its nodes have other parents");
+    }
+    if !parts.leaves().all(|leaf| names_primitive(leaf, kind, &expected.counts)) {
+        return Err("its leaves name primitives that are not there");
+    }
+    let bounds = Bounds { low: header.low.into(), high: header.high.into() };
+    let is_box = bounds.low.is_finite() && bounds.high.is_finite() && bounds.low.cmple(bounds.high).all();
+    let is_empty = bounds.low.x > bounds.high.x;
+    if !is_box && !is_empty {
+        return Err("it has no bounds");
+    }
+    Ok(Sound { header, bounds })
+}
+
+fn leaf_kind(header: &Header) -> Option<LeafKind> {
+    let kinds = [LeafKind::Triangles, LeafKind::IndexedTriangles, LeafKind::Boxes];
+    kinds.into_iter().find(|kind| *kind as u32 == header.leaf_kind)
+}
+
+/// The parts of a structure, all of them within its bytes.
+struct Parts<'a> {
+    bytes: &'a [u8],
+    leaf_bytes: usize,
+    nodes: Range<usize>,
+    leaves: Range<usize>,
+    vertices: Range<usize>,
+    geometries: Range<usize>,
+    parents: Range<usize>,
+}
+
+impl<'a> Parts<'a> {
+    fn new(bytes: &'a [u8], header: &Header, kind: LeafKind, expected: &Expected) -> Option<Self> {
+        const VERTEX_BYTES: usize = 12;
+        const PARENT_BYTES: usize = 4;
+        let leaf_bytes = kind.primitive_bytes() as usize;
+        let leaves = part(bytes, header.primitives, header.primitive_count as usize, leaf_bytes)?;
+        let vertices = match kind {
+            LeafKind::IndexedTriangles => {
+                let copied = if expected.refit { expected.vertices as usize } else { 0 };
+                vertices_named(&bytes[leaves.clone()]).max(copied)
+            }
+            _ => 0,
+        };
+        let nodes = header.node_count as usize;
+        let parents = if expected.refit { nodes } else { 0 };
+        Some(Self {
+            bytes,
+            leaf_bytes,
+            nodes: part(bytes, header.nodes, nodes, node_bytes(header)?)?,
+            leaves,
+            vertices: part(bytes, header.vertices, vertices, VERTEX_BYTES)?,
+            geometries: part(bytes, header.geometries, header.geometry_count as usize, BLOCK_BYTES)?,
+            parents: part(bytes, header.parents, parents, PARENT_BYTES)?,
+        })
+    }
+
+    /// Refits write to one part what they must not find in another.
+    fn lie_apart(&self) -> bool {
+        let mut parts = [&self.nodes, &self.leaves, &self.vertices, &self.geometries, &self.parents];
+        parts.sort_by_key(|part| (part.start, part.end));
+        let mut free = size_of::<Header>();
+        parts.into_iter().filter(|part| !part.is_empty()).all(|part| {
+            let apart = part.start >= free;
+            free = part.end;
+            apart
+        })
+    }
+
+    fn nodes<Node: bytemuck::AnyBitPattern>(&self) -> Vec<Node> {
+        let nodes = self.bytes[self.nodes.clone()].chunks_exact(size_of::<Node>());
+        nodes.map(bytemuck::pod_read_unaligned).collect()
+    }
+
+    fn leaves(&self) -> impl Iterator<Item = &'a [u8]> {
+        self.bytes[self.leaves.clone()].chunks_exact(self.leaf_bytes)
+    }
+
+    fn parents(&self) -> impl Iterator<Item = u32> {
+        self.bytes[self.parents.clone()].as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes))
+    }
+}
+
+/// The parents of all nodes, where every path from the root ends in leaves that exist, none is too long and no two meet.
+fn parents_of_sound_tree(parts: &Parts<'_>, header: &Header) -> Option<Vec<u32>> {
     let primitives = header.primitive_count as usize;
-    let leaf_bytes = match header.leaf_kind {
-        kind if kind == LeafKind::Triangles as u32 => LeafKind::Triangles.primitive_bytes(),
-        kind if kind == LeafKind::IndexedTriangles as u32 => LeafKind::IndexedTriangles.primitive_bytes(),
-        kind if kind == LeafKind::Boxes as u32 => LeafKind::Boxes.primitive_bytes(),
-        _ => return Err("its leaves are of no known kind"),
-    };
-    part(bytes, header.primitives, primitives, leaf_bytes as usize).ok_or("its leaves are cut off")?;
-    part(bytes, header.geometries, header.geometry_count as usize, BLOCK_BYTES)
-        .ok_or("its geometries are cut off")?;
-    let tree = match header.root {
-        NONE => primitives == 0,
-        root if root & LEAF != 0 => binary_tree::names_primitives(root, primitives),
-        0 => nodes_are_sound(bytes, &header, primitives),
-        _ => false,
-    };
-    if !tree {
-        return Err("its tree is damaged");
+    match (header.root, header.node_count) {
+        (NONE, 0) => (primitives == 0).then(Vec::new),
+        (root, 0) => binary_tree::names_primitives(root, primitives).then(Vec::new),
+        (0, _) if header.format == WIDE => {
+            let nodes = parts.nodes();
+            wide_tree::is_sound(&nodes, primitives).then(|| wide_tree::parents(&nodes))
+        }
+        (0, _) => {
+            let nodes = parts.nodes();
+            binary_tree::is_sound(&nodes, primitives).then(|| binary_tree::parents(&nodes))
+        }
+        _ => None,
     }
-    if header.leaf_kind == LeafKind::IndexedTriangles as u32 && !vertices_exist(bytes, &header) {
-        return Err("its leaves name vertices that are not there");
-    }
-    Ok(Sound { header, bounds: Bounds { low: header.low.into(), high: header.high.into() } })
 }
 
-fn nodes_are_sound(bytes: &[u8], header: &Header, primitives: usize) -> bool {
+/// Bytes of a node; none for formats that do not exist, and for what has moved to another address.
+fn node_bytes(header: &Header) -> Option<usize> {
     const WIDE_BYTES: usize = 80;
-    const BINARY_BYTES: usize = 64;
-    let count = header.node_count as usize;
-    let nodes = |size| part(bytes, header.nodes, count, size);
     match header.format {
-        WIDE => nodes(WIDE_BYTES).is_some_and(|nodes| {
-            let nodes: Vec<_> = nodes.chunks_exact(WIDE_BYTES).map(bytemuck::pod_read_unaligned).collect();
-            wide_tree::is_sound(&nodes, primitives)
-        }),
-        BINARY => nodes(BINARY_BYTES).is_some_and(|nodes| {
-            let nodes: Vec<_> = nodes.chunks_exact(BINARY_BYTES).map(bytemuck::pod_read_unaligned).collect();
-            binary_tree::is_sound(&nodes, primitives)
-        }),
-        _ => false,
+        WIDE => Some(WIDE_BYTES),
+        BINARY => Some(size_of::<BinaryNode>()),
+        _ => None,
     }
 }
 
-fn vertices_exist(bytes: &[u8], header: &Header) -> bool {
-    const VERTEX_BYTES: usize = 12;
-    let start = header.vertices as usize * BLOCK_BYTES;
-    let room = bytes.len().saturating_sub(start) / VERTEX_BYTES;
-    let Some(leaves) = part(bytes, header.primitives, header.primitive_count as usize, BLOCK_BYTES) else {
-        return false;
-    };
-    leaves.chunks_exact(BLOCK_BYTES).all(|leaf| {
+/// Vertices up to the last that indexed leaves name.
+fn vertices_named(leaves: &[u8]) -> usize {
+    let last = |leaf: &[u8; BLOCK_BYTES]| {
         let [a, b, c, _]: [u32; 4] = bytemuck::pod_read_unaligned(leaf);
-        (a.max(b).max(c) as usize) < room
-    })
+        a.max(b).max(c) as usize + 1
+    };
+    leaves.as_chunks().0.iter().map(last).max().unwrap_or(0)
 }
 
-/// `count` elements of `size` bytes at a place in blocks.
-fn part(bytes: &[u8], place: u32, count: usize, size: usize) -> Option<&[u8]> {
+/// Whether a leaf's primitive is one of the geometries'.
+fn names_primitive(leaf: &[u8], kind: LeafKind, counts: &[u32]) -> bool {
+    let word = |at: usize| leaf.get(at..at + 4).map_or(NONE, bytemuck::pod_read_unaligned);
+    let (geometry, primitive) = match kind {
+        LeafKind::IndexedTriangles if counts.len() > 1 => (word(12) >> 24, word(12) & 0x00ff_ffff),
+        LeafKind::IndexedTriangles => (0, word(12)),
+        LeafKind::Boxes => (word(28) & !LeafBox::OPAQUE, word(12)),
+        _ => (word(28), word(12)),
+    };
+    counts.get(geometry as usize).is_some_and(|count| primitive < *count)
+}
+
+/// Where `count` elements of `size` bytes lie that begin at a place in blocks.
+fn part(bytes: &[u8], place: u32, count: usize, size: usize) -> Option<Range<usize>> {
+    if count == 0 {
+        return Some(0..0);
+    }
     let start = (place as usize).checked_mul(BLOCK_BYTES)?;
-    bytes.get(start..start.checked_add(count.checked_mul(size)?)?)
+    let end = start.checked_add(count.checked_mul(size)?)?;
+    (end <= bytes.len()).then_some(start..end)
 }
 
 #[cfg(test)]
@@ -85,19 +228,50 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::blas_blob;
-    use super::super::mesh::{Mesh, Primitives};
     use super::super::quality::Quality;
     use super::*;
     use crate::accel::geometry::GeometryFlags;
-    use crate::accel::software::layout::LeafTriangle;
+    use crate::accel::software::layout::{LEAF, LeafTriangle, MOVED, leaf};
 
+    const SMALL: Quality = Quality { fast_build: false, low_memory: true, refit: false };
+    const MOVING: Quality = Quality { fast_build: false, low_memory: false, refit: true };
+
+    /// Triangles of two geometries in turn.
     fn mesh(corners: &[[f32; 3]]) -> Mesh {
-        let leaf = |(primitive, at): (u32, &[f32; 3])| {
-            let a = Vec3::from(*at);
-            LeafTriangle { a, primitive, b: a + Vec3::X, geometry: 0, c: a + Vec3::Y, opaque: 1 }
+        let triangle = |(number, at): (u32, &[f32; 3])| {
+            let (a, primitive, geometry) = (Vec3::from(*at), number / 2, number % 2);
+            LeafTriangle { a, primitive, b: a + Vec3::X, geometry, c: a + Vec3::Y, opaque: 1 }
         };
-        let triangles = (0..).zip(corners).map(leaf).collect();
-        Mesh { primitives: Primitives::Triangles(triangles), flags: vec![GeometryFlags::OPAQUE] }
+        let triangles = (0..).zip(corners).map(triangle).collect();
+        Mesh { primitives: Primitives::Triangles(triangles), flags: vec![GeometryFlags::OPAQUE; 2] }
+    }
+
+    fn boxes(count: u32) -> Mesh {
+        let place = |primitive: u32| {
+            let low = Vec3::splat(primitive as f32);
+            LeafBox { low, primitive, high: low + Vec3::ONE, geometry: LeafBox::OPAQUE }
+        };
+        let primitives = Primitives::Boxes((0..count).map(place).collect());
+        Mesh { primitives, flags: vec![GeometryFlags::OPAQUE] }
+    }
+
+    fn row(count: u8) -> Mesh {
+        let corner = |index| [f32::from(index), f32::from(index % 7), 0.5];
+        mesh(&(0..count).map(corner).collect::<Vec<_>>())
+    }
+
+    fn heap(count: usize) -> Mesh {
+        mesh(&vec![[1.0, 2.0, 3.0]; count])
+    }
+
+    /// A sound structure of binary nodes.
+    fn built_binary(mesh: &Mesh, quality: Quality) -> (Vec<u8>, Expected) {
+        let bounds = mesh.bounds();
+        let whole = bounds.iter().fold(Bounds::EMPTY, |all, one| all.union(*one));
+        let bytes = blas_blob::pack(mesh, &binary_tree::build(&bounds, 3), quality, whole);
+        let expected = Expected::of_mesh(mesh, quality.refit);
+        check(&bytes, &expected).unwrap();
+        (bytes, expected)
     }
 
     fn quality() -> impl Strategy<Value = Quality> {
@@ -108,6 +282,94 @@ mod tests {
         })
     }
 
+    /// A sound structure with what it is to be of.
+    fn built(mesh: &Mesh, quality: Quality) -> (Vec<u8>, Expected) {
+        let (blob, expected) = (blas_blob::build(mesh, quality), Expected::of_mesh(mesh, quality.refit));
+        check(&blob.bytes, &expected).unwrap();
+        (blob.bytes, expected)
+    }
+
+    fn header(bytes: &[u8]) -> Header {
+        bytemuck::pod_read_unaligned(&bytes[..size_of::<Header>()])
+    }
+
+    fn refused(mut bytes: Vec<u8>, expected: &Expected, change: impl FnOnce(&mut Header)) -> &'static str {
+        let mut changed = header(&bytes);
+        change(&mut changed);
+        bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&changed));
+        check(&bytes, expected).unwrap_err()
+    }
+
+    /// As [`refused`], with a word of the part at a place in blocks.
+    fn refused_word(
+        mut bytes: Vec<u8>,
+        expected: &Expected,
+        place: u32,
+        word: usize,
+        value: u32,
+    ) -> &'static str {
+        let at = place as usize * BLOCK_BYTES + word * 4;
+        bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
+        check(&bytes, expected).unwrap_err()
+    }
+
+    /// Walks every path as shaders do, and refits as kernels do, but fails where these would read anything else.
+    fn walk(bytes: &[u8], expected: &Expected) -> usize {
+        let header = header(bytes);
+        let word = |place: u32, word: usize| -> u32 {
+            let at = place as usize * BLOCK_BYTES + word * 4;
+            bytemuck::pod_read_unaligned(&bytes[at..at + 4])
+        };
+        let visit = |first: u32, count: u32| {
+            for number in first as usize..(first + count) as usize {
+                match leaf_kind(&header).unwrap() {
+                    LeafKind::IndexedTriangles => {
+                        let place = number * 4;
+                        for corner in 0..3 {
+                            word(header.vertices, word(header.primitives, place + corner) as usize * 3 + 2);
+                        }
+                    }
+                    kind => {
+                        word(header.primitives, (number + 1) * kind.primitive_bytes() as usize / 4 - 1);
+                    }
+                }
+            }
+        };
+        let (mut open, mut steps) = (vec![(header.root, 0)], 0);
+        while let Some((reference, pushed)) = open.pop() {
+            steps += 1;
+            assert!(steps <= header.node_count as usize * 9 + 1 && pushed < 64, "it would not end");
+            match reference {
+                NONE => {}
+                _ if reference & LEAF != 0 => visit(reference & 0x07ff_ffff, (reference >> 27 & 15) + 1),
+                _ if header.format == BINARY => {
+                    let node = reference as usize * 16;
+                    open.extend([3, 7].map(|child| (word(header.nodes, node + child), pushed + 1)));
+                }
+                _ => {
+                    let node = reference as usize * 20;
+                    let (inner, first) = (word(header.nodes, node + 3) >> 24, word(header.nodes, node + 4));
+                    open.extend((0..inner.count_ones()).map(|child| (first + child, pushed + 2)));
+                    for child in (0..8).filter(|child| inner >> child & 1 == 0) {
+                        let meta = word(header.nodes, node + 6 + child / 4) >> (child % 4 * 8) & 255;
+                        visit(word(header.nodes, node + 5) + (meta & 31), (meta >> 5).count_ones());
+                    }
+                }
+            }
+        }
+        if expected.refit {
+            for node in 0..header.node_count as usize {
+                let (mut node, mut steps) = (node, 0);
+                while word(header.parents, node) != NONE {
+                    node = (word(header.parents, node) & 0x1fff_ffff) as usize;
+                    steps += 1;
+                    assert!(steps <= header.node_count, "it would not end");
+                }
+            }
+        }
+        steps
+    }
+
     proptest! {
         #![proptest_config(ProptestConfig { cases: 64, ..ProptestConfig::default() })]
 
@@ -115,40 +377,182 @@ mod tests {
         fn what_the_cpu_builds_is_sound_and_has_every_primitive_once(
             corners in prop::collection::vec(prop::array::uniform3(-9.0_f32..9.0), 0..300), quality in quality()
         ) {
-            let blob = blas_blob::build(&mesh(&corners), quality);
-            let sound = check(&blob.bytes).unwrap();
-            prop_assert_eq!(sound.header.primitive_count as usize, corners.len());
-            let size = if sound.header.leaf_kind == 0 { 48 } else { 16 };
-            let leaves = part(&blob.bytes, sound.header.primitives, corners.len(), size).unwrap();
-            let mut numbers: Vec<u32> = leaves
-                .chunks_exact(size)
-                .map(|leaf| bytemuck::pod_read_unaligned(&leaf[12..16]))
-                .collect();
-            numbers.sort_unstable();
-            prop_assert!(numbers.into_iter().eq(0..corners.len() as u32));
+            let mesh = mesh(&corners);
+            let (bytes, expected) = built(&mesh, quality);
+            let header = header(&bytes);
+            prop_assert_eq!(header.primitive_count as usize, corners.len());
+            let kind = leaf_kind(&header).unwrap();
+            let parts = Parts::new(&bytes, &header, kind, &expected).unwrap();
+            let mut numbers: Vec<(u32, u32)> = parts.leaves().map(|leaf| {
+                let word = |at: usize| -> u32 { bytemuck::pod_read_unaligned(&leaf[at..at + 4]) };
+                if kind == LeafKind::Triangles { (word(28), word(12)) } else { (word(12) >> 24, word(12) & 0xff_ffff) }
+            }).collect();
+            numbers.sort_unstable_by_key(|(geometry, primitive)| (*primitive, *geometry));
+            prop_assert!(numbers.into_iter().eq((0..corners.len() as u32).map(|number| (number % 2, number / 2))));
+            walk(&bytes, &expected);
         }
 
+        /// As large and as small as numbers are that builds take, many of them in one place.
+        #[test]
+        fn extreme_places_are_built(
+            corners in prop::collection::vec(prop::array::uniform3(prop::sample::select(
+                vec![0.0, -0.0, 1.0, -1.0, 1e18, -1e18, 9.9e17, 1e-38, -1e-42, 1e-7, 4e9, f32::MIN_POSITIVE]
+            )), 0..60),
+            quality in quality(),
+        ) {
+            let (bytes, expected) = built(&mesh(&corners), quality);
+            walk(&bytes, &expected);
+            let (bytes, expected) = built_binary(&mesh(&corners), quality);
+            walk(&bytes, &expected);
+        }
+
+        /// With every length cut off, and words that are wrong by little, by much, or those of others.
         #[test]
         fn damage_is_refused_or_harmless(
-            place in any::<prop::sample::Index>(), value in any::<u8>(), cut in any::<prop::sample::Index>()
+            small in any::<bool>(),
+            wide in any::<bool>(),
+            changes in prop::collection::vec((any::<prop::sample::Index>(), prop_oneof![
+                Just(None), any::<u32>().prop_map(Some), (0..300_u32).prop_map(Some), Just(Some(NONE))
+            ], any::<prop::sample::Index>()), 1..4),
+            in_header in any::<bool>(),
+            cut in prop::option::of(any::<prop::sample::Index>()),
         ) {
-            let corners: Vec<_> = (0..200_u8).map(|index| [f32::from(index), f32::from(index % 7), 0.5]).collect();
-            let blob = blas_blob::build(&mesh(&corners), Quality { fast_build: false, low_memory: true, refit: false });
-            let mut bytes = blob.bytes;
-            let at = place.index(bytes.len());
-            bytes[at] = value;
-            let _ = check(&bytes);
-            bytes.truncate(cut.index(bytes.len()));
-            let _ = check(&bytes);
+            let quality = if small { SMALL } else { MOVING };
+            let (mut bytes, expected) =
+                if wide { built(&row(120), quality) } else { built_binary(&row(120), quality) };
+            for (place, value, from) in changes {
+                let words = if in_header { size_of::<Header>() / 4 } else { bytes.len() / 4 };
+                let (at, from) = (place.index(words) * 4, from.index(bytes.len() / 4) * 4);
+                let other: [u8; 4] = bytes[from..from + 4].try_into().unwrap();
+                bytes[at..at + 4].copy_from_slice(&value.map_or(other, u32::to_le_bytes));
+            }
+            if let Some(cut) = cut {
+                bytes.truncate(cut.index(bytes.len()));
+            }
+            if check(&bytes, &expected).is_ok() {
+                walk(&bytes, &expected);
+            }
         }
     }
 
     #[test]
     fn many_primitives_at_one_place_are_built() {
-        let blob = blas_blob::build(
-            &mesh(&[[1.0, 2.0, 3.0]; 20_000]),
-            Quality { fast_build: false, low_memory: false, refit: true },
-        );
-        assert_eq!(check(&blob.bytes).unwrap().header.primitive_count, 20_000);
+        let (bytes, _) = built(&heap(20_000), MOVING);
+        assert_eq!(header(&bytes).primitive_count, 20_000);
+    }
+
+    #[test]
+    fn numbers_of_the_header_that_point_elsewhere_are_refused() {
+        let structures = [
+            (built(&row(200), MOVING), MOVING),
+            (built(&row(200), SMALL), SMALL),
+            (built_binary(&row(200), MOVING), MOVING),
+            (built_binary(&row(200), SMALL), SMALL),
+            (built(&boxes(50), MOVING), MOVING),
+        ];
+        for ((bytes, expected), quality) in structures {
+            let refuses = |change: fn(&mut Header)| refused(bytes.clone(), &expected, change);
+            refuses(|header| header.format = MOVED);
+            refuses(|header| header.leaf_kind = LeafKind::Instances as u32);
+            refuses(|header| header.leaf_kind = 77);
+            refuses(|header| header.root = 1);
+            refuses(|header| header.root = NONE);
+            refuses(|header| header.nodes = header.geometries);
+            refuses(|header| header.nodes = u32::MAX);
+            refuses(|header| header.node_count += 1);
+            refuses(|header| header.node_count = u32::MAX);
+            refuses(|header| header.node_count = 0);
+            refuses(|header| header.primitive_count = u32::MAX);
+            refuses(|header| header.primitive_count -= 1);
+            refuses(|header| header.primitives = 0);
+            refuses(|header| header.primitives = header.nodes);
+            refuses(|header| header.geometry_count += 1);
+            refuses(|header| header.geometries = 0);
+            refuses(|header| header.low[1] = f32::NAN);
+            refuses(|header| header.high = [f32::INFINITY; 3]);
+            if quality.refit {
+                refuses(|header| header.parents = 0);
+                refuses(|header| header.parents = header.nodes);
+                refuses(|header| header.parents = u32::MAX);
+            } else {
+                refuses(|header| header.vertices = u32::MAX);
+                refuses(|header| header.vertices = header.geometries);
+            }
+        }
+    }
+
+    /// Where nothing but the leaf at the root says that the format is one.
+    #[test]
+    fn a_leaf_that_says_it_has_moved_is_refused() {
+        let (bytes, expected) = built(&row(2), MOVING);
+        let refuses = |change: fn(&mut Header)| refused(bytes.clone(), &expected, change);
+        refuses(|header| header.format = MOVED);
+        refuses(|header| header.node_count = 1);
+        refuses(|header| header.node_count = u32::MAX);
+        refuses(|header| header.root = leaf(1, 2));
+        refuses(|header| header.root = leaf(0, 16));
+        refuses(|header| header.root = 0);
+    }
+
+    #[test]
+    fn circles_and_paths_that_meet_are_refused() {
+        let (wide, expected) = built(&row(200), MOVING);
+        let at = header(&wide);
+        assert_eq!(at.format, WIDE);
+        let nodes = [0, 1, at.node_count - 1, at.node_count, u32::MAX];
+        let first =
+            |node: u32, value| refused_word(wide.clone(), &expected, at.nodes, node as usize * 20 + 4, value);
+        for value in nodes {
+            let inner = (0..at.node_count).find(|node| first_child(&wide, *node) > Some(1)).unwrap();
+            assert_eq!(first(inner, value), "its tree is damaged", "{value}");
+        }
+        let (binary, expected) = built_binary(&row(200), MOVING);
+        let at = header(&binary);
+        for value in [0, 1, at.node_count, 0x7fff_ffff, LEAF | 200, LEAF | 15 << 27 | 190] {
+            assert_eq!(
+                refused_word(binary.clone(), &expected, at.nodes, 7, value),
+                "its tree is damaged",
+                "{value:#x}"
+            );
+        }
+    }
+
+    /// The first inner child of a wide node that has one.
+    fn first_child(bytes: &[u8], node: u32) -> Option<u32> {
+        let at = header(bytes).nodes as usize * BLOCK_BYTES + node as usize * 80;
+        (bytes[at + 15] != 0).then(|| bytemuck::pod_read_unaligned(&bytes[at + 16..at + 20]))
+    }
+
+    #[test]
+    fn leaves_that_name_what_is_not_there_are_refused() {
+        let (triangles, expected) = built(&row(200), MOVING);
+        let at = header(&triangles);
+        for (word, value) in [(3, 100), (3, NONE), (7, 2), (7, LEAF), (7, NONE)] {
+            let reason = refused_word(triangles.clone(), &expected, at.primitives, word, value);
+            assert_eq!(reason, "its leaves name primitives that are not there");
+        }
+        let (indexed, expected) = built(&row(200), SMALL);
+        let at = header(&indexed);
+        for value in [2 << 24, 100, NONE] {
+            refused_word(indexed.clone(), &expected, at.primitives, 3, value);
+        }
+        for value in [u32::MAX, 1 << 20] {
+            refused_word(indexed.clone(), &expected, at.primitives, 1, value);
+        }
+        let (boxes, expected) = built(&boxes(50), MOVING);
+        let at = header(&boxes);
+        refused_word(boxes, &expected, at.primitives, 7, 1);
+    }
+
+    #[test]
+    fn other_meshes_are_refused() {
+        let (bytes, expected) = built(&row(200), MOVING);
+        let refuses = |expected: Expected| check(&bytes, &expected).unwrap_err();
+        refuses(Expected { boxes: true, ..expected.clone() });
+        refuses(Expected { counts: vec![200], ..expected.clone() });
+        refuses(Expected { counts: vec![100, 99], ..expected.clone() });
+        refuses(Expected { counts: vec![100, 100, 0], ..expected.clone() });
+        let (unmoving, _) = built(&row(200), Quality { refit: false, ..MOVING });
+        assert!(check(&unmoving, &expected).is_err(), "it has no parents");
     }
 }

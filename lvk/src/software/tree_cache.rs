@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::blas_blob::BlasBlob;
 use super::mesh::{Mesh, Primitives};
 use super::quality::Quality;
-use super::sound;
+use super::sound::{self, Expected};
 use crate::pipeline::cache_file::{read, replace};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
@@ -47,11 +47,17 @@ impl TreeCache {
         Self { folder: folder.to_owned() }
     }
 
-    /// The tree of an earlier run, or what `build` makes, which is kept. No trouble with files is an error.
-    pub(crate) fn get_or(&self, key: TreeKey, build: impl FnOnce() -> BlasBlob) -> BlasBlob {
+    /// The tree of an earlier run if it is what is expected, or what `build` makes, which is kept. No trouble with files
+    /// is an error.
+    pub(crate) fn get_or(
+        &self,
+        key: TreeKey,
+        expected: &Expected,
+        build: impl FnOnce() -> BlasBlob,
+    ) -> BlasBlob {
         let path = self.folder.join(format!("{:016x}{:016x}.tree", key.0[0], key.0[1]));
         match read(&path) {
-            Ok(file) => match open(&file) {
+            Ok(file) => match open(&file, expected) {
                 Ok(blob) => return blob,
                 Err(reason) => log::warn!("the tree '{}' is dropped: {reason}", path.display()),
             },
@@ -78,7 +84,7 @@ fn seal(blob: &BlasBlob) -> Vec<u8> {
     file
 }
 
-fn open(file: &[u8]) -> Result<BlasBlob, &'static str> {
+fn open(file: &[u8], expected: &Expected) -> Result<BlasBlob, &'static str> {
     let (header, bytes) = file.split_at_checked(HEADER_BYTES).ok_or("it is cut off")?;
     if header[..8] != MAGIC || header[8..12] != VERSION.to_le_bytes() {
         return Err("another version of the library wrote it");
@@ -87,7 +93,7 @@ fn open(file: &[u8]) -> Result<BlasBlob, &'static str> {
     if !whole || header[24..] != sum(bytes, 0).to_le_bytes() {
         return Err("it is damaged or cut off");
     }
-    let sound = sound::check(bytes)?;
+    let sound = sound::check(bytes, expected)?;
     Ok(BlasBlob { bytes: bytes.to_vec(), bounds: sound.bounds })
 }
 
@@ -132,8 +138,9 @@ mod tests {
         let (mesh, key) = (mesh(50), TreeKey::of(&mesh(50), QUALITY));
         let built = blas_blob::build(&mesh, QUALITY);
         let mut builds = 0;
+        let expected = Expected::of_mesh(&mesh, QUALITY.refit);
         let mut get = || {
-            cache.get_or(key, || {
+            cache.get_or(key, &expected, || {
                 builds += 1;
                 built.clone()
             })
@@ -146,7 +153,17 @@ mod tests {
         std::fs::write(&path, file).unwrap();
         assert_eq!(get(), built);
         assert_eq!(get(), built);
-        assert_eq!(builds, 2, "once, and once more after the damage");
+        // Sealed as if the library had written it: nothing, and a node that is its own child.
+        let mut circle = built.clone();
+        let node = circle.header().nodes as usize * 16;
+        circle.bytes[node + 15] = 1;
+        circle.bytes[node + 16..node + 20].copy_from_slice(&[0; 4]);
+        for nonsense in [BlasBlob { bytes: Vec::new(), ..built.clone() }, circle] {
+            std::fs::write(&path, seal(&nonsense)).unwrap();
+            assert_eq!(get(), built);
+            assert_eq!(get(), built);
+        }
+        assert_eq!(builds, 4, "once, and once more after each damage");
         std::fs::remove_dir_all(&folder).unwrap();
     }
 

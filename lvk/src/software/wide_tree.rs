@@ -74,7 +74,8 @@ pub(super) fn parents(nodes: &[CwBvhNode]) -> Vec<u32> {
     parents
 }
 
-/// Whether all children and primitives exist, children behind their parents, and no path is too long.
+/// Whether all children and primitives exist, children behind their parents and each below but one, and no path is too
+/// long.
 pub(super) fn is_sound(nodes: &[CwBvhNode], primitives: usize) -> bool {
     let sound = |(index, node): (usize, &CwBvhNode)| {
         let children = children(node);
@@ -83,7 +84,21 @@ pub(super) fn is_sound(nodes: &[CwBvhNode], primitives: usize) -> bool {
             !has_children || (children.start as usize > index && children.end as usize <= nodes.len());
         inner && (0..8).all(|child| leaf_is_sound(node, child, primitives))
     };
-    !nodes.is_empty() && nodes.iter().enumerate().all(sound) && depth(nodes) <= DEEPEST_WIDE
+    !nodes.is_empty()
+        && nodes.iter().enumerate().all(sound)
+        && have_one_parent(nodes)
+        && depth(nodes) <= DEEPEST_WIDE
+}
+
+/// Whether each node but the first is the child of exactly one: paths that meet would be walked over and over.
+fn have_one_parent(nodes: &[CwBvhNode]) -> bool {
+    let mut parents = vec![0_u32; nodes.len()];
+    for child in nodes.iter().flat_map(children) {
+        if let Some(count) = parents.get_mut(child as usize) {
+            *count += 1;
+        }
+    }
+    parents.iter().skip(1).all(|count| *count == 1)
 }
 
 fn leaf_is_sound(node: &CwBvhNode, child: usize, primitives: usize) -> bool {

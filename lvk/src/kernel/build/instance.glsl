@@ -26,6 +26,12 @@ bool invert(Affine m, out Affine inverse) {
     return isFinite(inverse.x) && isFinite(inverse.y) && isFinite(inverse.z) && isFinite(inverse.t);
 }
 
+// Finite numbers, and something else in place of those that are none: infinite ones that met.
+vec3 numberOr(vec3 v, float other) {
+    bvec3 isNone = greaterThan(floatBitsToUint(v) & uvec3(0x7fffffffu), uvec3(0x7f800000u));
+    return mix(clamp(v, vec3(-kFar), vec3(kFar)), vec3(other), isNone);
+}
+
 // Around the box as a matrix moves it, with what rounding may take away, here and where rays are moved.
 Box moved(Affine m, Box box) {
     const float kRounding = 6e-7;
@@ -36,7 +42,7 @@ Box moved(Affine m, Box box) {
     vec3 far = abs(m.x) * abs(c.x) + abs(m.y) * abs(c.y) + abs(m.z) * abs(c.z) + abs(m.t);
     vec3 middle = apply(m, c);
     vec3 half_ = reach + (far + reach) * kRounding + (abs(middle) + reach) * kRays;
-    return Box(clamp(middle - half_, vec3(-kFar), vec3(kFar)), clamp(middle + half_, vec3(-kFar), vec3(kFar)));
+    return Box(numberOr(middle - half_, -kFar), numberOr(middle + half_, kFar));
 }
 
 uvec2 structureOf(uvec2 named) {
