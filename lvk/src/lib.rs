@@ -41,6 +41,7 @@
 //! |---|---|
 //! | open a device, ask what it can do | [`Context::new`], [`ContextDesc`], [`Capabilities`] |
 //! | make objects | `Context::create_*`, each with its `*Desc` |
+//! | show part of a texture, or as another format | [`Context::create_texture_view`], [`TextureViewDesc`] |
 //! | move data | [`Context::upload_buffer`], [`Context::download_texture`] and their kin |
 //! | record | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
 //! | draw | [`CommandBuffer::begin_rendering`], [`RenderPass`] |
@@ -153,7 +154,9 @@ pub use pipeline::stage::{SpecializationConstant, SpecializationValue};
 pub use resource::buffer::{BufferDesc, BufferUsage};
 pub use resource::query::QueryPoolDesc;
 pub use resource::sampler::{AddressMode, CompareOp, Filter, SamplerDesc};
-pub use resource::texture::{TextureDesc, TextureKind, TextureRegion, TextureUsage};
+pub use resource::texture::TextureRegion;
+pub use resource::texture_desc::{TextureDesc, TextureKind, TextureUsage};
+pub use resource::view::{Channel, Swizzle, TextureViewDesc};
 #[cfg(feature = "glsl")]
 pub use shader::compile_glsl;
 pub use shader::{ShaderModuleDesc, ShaderSource, ShaderStage};

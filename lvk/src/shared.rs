@@ -133,7 +133,9 @@ impl Shared {
         match garbage {
             Garbage::Buffer(buffer) => self.submitter.forget(buffer.id),
             Garbage::Texture(texture) => {
-                self.submitter.forget(texture.id);
+                if texture.image.release() {
+                    self.submitter.forget(texture.image.id);
+                }
                 self.bindless.free_texture(texture.slot);
             }
             Garbage::Sampler(sampler) => self.bindless.free_sampler(sampler.slot),

@@ -30,7 +30,7 @@ impl TextureShape {
 }
 
 /// A range of mip levels of a range of array layers.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(crate) struct Subresources {
     /// First mip level.
     pub(crate) base_mip: u32,
@@ -45,6 +45,34 @@ pub(crate) struct Subresources {
 impl Subresources {
     fn is_empty(self) -> bool {
         self.mip_count == 0 || self.layer_count == 0
+    }
+
+    /// What both have, if anything.
+    pub(crate) fn intersection(self, other: Self) -> Option<Self> {
+        let (base_mip, mip_count) =
+            common((self.base_mip, self.mip_count), (other.base_mip, other.mip_count))?;
+        let (base_layer, layer_count) =
+            common((self.base_layer, self.layer_count), (other.base_layer, other.layer_count))?;
+        Some(Self { base_mip, mip_count, base_layer, layer_count })
+    }
+
+    /// What of this is not in `cut`, as disjoint ranges.
+    pub(crate) fn without(self, cut: Self) -> impl Iterator<Item = Self> {
+        let pieces = match self.intersection(cut) {
+            None => [self, EMPTY, EMPTY, EMPTY],
+            Some(cut) => {
+                let mips = |base_mip, mip_count| Self { base_mip, mip_count, ..self };
+                let layers = |base_layer, layer_count| Self { base_layer, layer_count, ..cut };
+                let (mip_end, layer_end) = (cut.base_mip + cut.mip_count, cut.base_layer + cut.layer_count);
+                [
+                    mips(self.base_mip, cut.base_mip - self.base_mip),
+                    mips(mip_end, self.base_mip + self.mip_count - mip_end),
+                    layers(self.base_layer, cut.base_layer - self.base_layer),
+                    layers(layer_end, self.base_layer + self.layer_count - layer_end),
+                ]
+            }
+        };
+        pieces.into_iter().filter(|piece| !piece.is_empty())
     }
 
     /// Makes `self` one mip longer if `scopes` goes on at `mip` of the same single layer.
@@ -62,6 +90,14 @@ impl Subresources {
         self.layer_count += if extends { next.layer_count } else { 0 };
         extends
     }
+}
+
+const EMPTY: Subresources = Subresources { base_mip: 0, mip_count: 0, base_layer: 0, layer_count: 0 };
+
+/// First and count of what two ranges, each its first and count, have in common.
+fn common((a, a_count): (u32, u32), (b, b_count): (u32, u32)) -> Option<(u32, u32)> {
+    let (start, end) = (a.max(b), (a + a_count).min(b + b_count));
+    (start < end).then(|| (start, end - start))
 }
 
 /// One `T` for each subresource.

@@ -31,9 +31,9 @@ pub enum DepthLoad {
 pub struct ColorAttachment {
     /// A texture with [`TextureUsage::TARGET`](crate::TextureUsage::TARGET).
     pub texture: TextureHandle,
-    /// Mip level drawn to.
+    /// Mip level drawn to; of a view, counted from its first.
     pub mip: u32,
-    /// Layer or cube face drawn to.
+    /// Layer or cube face drawn to; of a view, counted from its first.
     pub layer: u32,
     /// What it holds when the pass begins.
     pub load: ColorLoad,
@@ -53,9 +53,9 @@ impl ColorAttachment {
 pub struct DepthAttachment {
     /// A texture of a depth format with [`TextureUsage::TARGET`](crate::TextureUsage::TARGET).
     pub texture: TextureHandle,
-    /// Mip level drawn to.
+    /// Mip level drawn to; of a view, counted from its first.
     pub mip: u32,
-    /// Layer or cube face drawn to.
+    /// Layer or cube face drawn to; of a view, counted from its first.
     pub layer: u32,
     /// What it holds when the pass begins.
     pub load: DepthLoad,

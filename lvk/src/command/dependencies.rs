@@ -10,9 +10,9 @@ use crate::handle::{AccelStructHandle, BufferHandle, TextureHandle};
 /// render pass see what was built before it wherever a graphics pipeline queries rays.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Dependencies<'a> {
-    /// Textures that are sampled or fetched.
+    /// Textures and views that are sampled or fetched: all their mips and layers.
     pub sampled_images: &'a [TextureHandle],
-    /// Textures that are written or read as storage images.
+    /// Textures and views that are written or read as storage images: the first mip of each.
     pub storage_images: &'a [TextureHandle],
     /// Buffers that are written, or both read and written.
     pub buffers: &'a [BufferHandle],

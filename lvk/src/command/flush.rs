@@ -6,7 +6,7 @@ use super::CommandBuffer;
 use super::dependencies::Dependencies;
 use crate::barrier::{ResourceId, Stages, Subresources, Use};
 use crate::error::Result;
-use crate::resource::texture::TextureUsage;
+use crate::resource::texture_desc::TextureUsage;
 use crate::resource::{Buffer, Texture};
 use crate::shared::Shared;
 use crate::submit::emit::emit;
@@ -20,7 +20,7 @@ impl CommandBuffer {
         }
     }
 
-    /// The next command uses part of a texture.
+    /// The next command uses a part of the image that a texture shows.
     pub(super) fn use_texture(
         &mut self,
         texture: &Arc<Texture>,
@@ -50,12 +50,12 @@ impl CommandBuffer {
         for handle in deps.sampled_images {
             let texture = shared.store.textures.get(*handle)?;
             texture.check_usage(TextureUsage::SAMPLED)?;
-            self.use_texture(&texture, texture.all(), Use::shader_read(stages))?;
+            self.use_texture(&texture, texture.range, Use::shader_read(stages))?;
         }
         for handle in deps.storage_images {
             let texture = shared.store.textures.get(*handle)?;
             texture.check_usage(TextureUsage::STORAGE)?;
-            self.use_texture(&texture, texture.all(), Use::shader_write(stages))?;
+            self.use_texture(&texture, texture.stored_part(), Use::shader_write(stages))?;
         }
         for handle in deps.buffers {
             let buffer = shared.store.buffers.get(*handle)?;

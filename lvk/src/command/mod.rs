@@ -11,6 +11,7 @@ pub(crate) mod flush;
 pub(crate) mod gpu_build;
 mod instances;
 mod kernel;
+mod part_uses;
 pub(crate) mod query;
 pub(crate) mod render;
 pub(crate) mod render_pass;

@@ -11,7 +11,7 @@ use crate::error::{Error, Result, check_limit};
 use crate::format::Format;
 use crate::handle::TextureHandle;
 use crate::resource::Texture;
-use crate::resource::texture::{TextureUsage, one};
+use crate::resource::texture_desc::TextureUsage;
 use crate::submit::emit::layout;
 
 /// The targets of a pass, found and checked.
@@ -42,22 +42,23 @@ impl CommandBuffer {
             stencil: false,
         };
         let mut extent = None;
-        for (index, attachment) in color.iter().enumerate() {
-            let place = |other: &ColorAttachment| (other.texture, other.mip, other.layer);
+        let mut drawn = Vec::with_capacity(color.len());
+        for attachment in color {
             let texture = self.target(attachment.texture, attachment.mip, attachment.layer, &mut extent)?;
             check_color(&texture, attachment.load)?;
-            if color[..index].iter().any(|other| place(other) == place(attachment)) {
+            let part = texture.part(attachment.mip, attachment.layer);
+            if drawn.contains(&(texture.image.id, part)) {
                 return Err(Error::usage(&texture.name, "the pass lists the colour target twice"));
             }
-            let next = Use::color_target(attachment.load == ColorLoad::Load);
-            self.use_texture(&texture, one(attachment.mip, attachment.layer), next)?;
+            drawn.push((texture.image.id, part));
+            self.use_texture(&texture, part, Use::color_target(attachment.load == ColorLoad::Load))?;
             targets.colors.push(color_info(&texture, attachment)?);
             targets.color_formats.push(texture.format);
         }
         if let Some(attachment) = depth {
             let texture = self.target(attachment.texture, attachment.mip, attachment.layer, &mut extent)?;
             check_depth(&texture, attachment.load)?;
-            self.use_texture(&texture, one(attachment.mip, attachment.layer), Use::depth_target())?;
+            self.use_texture(&texture, texture.part(attachment.mip, attachment.layer), Use::depth_target())?;
             targets.depth = Some(depth_info(&texture, attachment)?);
             targets.depth_format = Some(texture.format);
             targets.stencil = texture.format.has_stencil();

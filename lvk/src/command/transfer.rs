@@ -10,7 +10,9 @@ use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::sampler::Filter;
-use crate::resource::texture::{TextureRegion, TextureUsage, layers_of, one};
+use crate::resource::texture::TextureRegion;
+use crate::resource::texture_desc::TextureUsage;
+use crate::resource::view::raw_range;
 use crate::resource::{Buffer, Texture};
 use crate::submit::Recording;
 use crate::submit::emit::emit;
@@ -123,14 +125,14 @@ impl CommandBuffer {
         offset: u64,
     ) -> Result<()> {
         let region = self.check_packed(target, offset, source, region)?;
-        self.use_texture(source, one(region.mip, region.layer), Use::transfer_read())?;
+        self.use_texture(source, source.part(region.mip, region.layer), Use::transfer_read())?;
         self.use_buffer(target, Use::transfer_write());
         self.flush();
-        let copy = region.buffer_copy(source.format, offset);
+        let copy = source.buffer_copy(&region, offset);
         // SAFETY: the region lies inside the image and its bytes inside the buffer.
         unsafe {
             let device = &self.shared.gpu.device;
-            device.cmd_copy_image_to_buffer(self.raw(), source.raw, SOURCE, target.raw, &[copy]);
+            device.cmd_copy_image_to_buffer(self.raw(), source.image.raw, SOURCE, target.raw, &[copy]);
         }
         self.settle.push(Settle::Texture(Arc::clone(source)));
         self.settle.push(Settle::Buffer(Arc::clone(target)));
@@ -153,22 +155,23 @@ impl CommandBuffer {
         check_copyable(&source, &target)?;
         self.use_texture_pair(&source, &from, &target, &to)?;
         let copy = vk::ImageCopy {
-            src_subresource: layers_of(source.format, from.mip, from.layer),
+            src_subresource: source.layers_of(from.mip, from.layer),
             src_offset: corner(from.offset),
-            dst_subresource: layers_of(target.format, to.mip, to.layer),
+            dst_subresource: target.layers_of(to.mip, to.layer),
             dst_offset: corner(to.offset),
             extent: vk::Extent3D { width: from.extent[0], height: from.extent[1], depth: 1 },
         };
         // SAFETY: both regions lie inside their images, whose texels are equally large.
         unsafe {
             let device = &self.shared.gpu.device;
-            device.cmd_copy_image(self.raw(), source.raw, SOURCE, target.raw, TARGET, &[copy]);
+            device.cmd_copy_image(self.raw(), source.image.raw, SOURCE, target.image.raw, TARGET, &[copy]);
         }
         self.settle.extend([source, target].map(Settle::Texture));
         Ok(())
     }
 
-    /// Copies and scales a region, converting the format (`vkCmdBlitImage`).
+    /// Copies and scales a region, converting the format (`vkCmdBlitImage`). Views count as of the format of the texture
+    /// they show.
     pub fn blit_texture(
         &mut self,
         source: TextureHandle,
@@ -197,8 +200,8 @@ impl CommandBuffer {
     /// As [`generate_mipmaps`](Self::generate_mipmaps), by object.
     pub(crate) fn generate_mipmaps_object(&mut self, texture: &Arc<Texture>) -> Result<()> {
         self.check_blit(texture, texture, Filter::Linear)?;
-        for mip in 1..texture.shape.mips {
-            for layer in 0..texture.shape.layers {
+        for mip in 1..texture.mips() {
+            for layer in 0..texture.layers() {
                 let from =
                     texture.resolve_region(&TextureRegion { mip: mip - 1, layer, ..Default::default() })?;
                 let to = texture.resolve_region(&TextureRegion { mip, layer, ..Default::default() })?;
@@ -210,26 +213,21 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Fills all mips and layers of a colour texture with one colour (`vkCmdClearColorImage`).
+    /// Fills all mips and layers of a colour texture with one colour (`vkCmdClearColorImage`), which is encoded in the
+    /// format of the texture itself where this is a view of it.
     pub fn clear_texture(&mut self, texture: TextureHandle, color: [f32; 4]) -> Result<()> {
         let texture = self.shared.store.textures.get(texture)?;
-        if texture.format.is_depth() || texture.format.is_uint() {
+        if texture.image.format.is_depth() || texture.image.format.is_uint() {
             return Err(Error::usage(&texture.name, "only textures of colours are cleared to a colour"));
         }
-        self.use_texture(&texture, texture.all(), Use::transfer_write())?;
+        self.use_texture(&texture, texture.range, Use::transfer_write())?;
         self.flush();
-        let range = vk::ImageSubresourceRange {
-            aspect_mask: vk::ImageAspectFlags::COLOR,
-            base_mip_level: 0,
-            level_count: texture.shape.mips,
-            base_array_layer: 0,
-            layer_count: texture.shape.layers,
-        };
+        let range = raw_range(vk::ImageAspectFlags::COLOR, texture.range);
         let color = vk::ClearColorValue { float32: color };
-        // SAFETY: the range is the whole image.
+        // SAFETY: the range lies inside the image.
         unsafe {
             let device = &self.shared.gpu.device;
-            device.cmd_clear_color_image(self.raw(), texture.raw, TARGET, &color, &[range]);
+            device.cmd_clear_color_image(self.raw(), texture.image.raw, TARGET, &color, &[range]);
         }
         self.settle.push(Settle::Texture(texture));
         Ok(())
@@ -277,13 +275,13 @@ impl CommandBuffer {
         target: &Arc<Texture>,
         region: &TextureRegion,
     ) -> Result<()> {
-        self.use_texture(target, one(region.mip, region.layer), Use::transfer_write())?;
+        self.use_texture(target, target.part(region.mip, region.layer), Use::transfer_write())?;
         self.flush();
-        let copy = region.buffer_copy(target.format, offset);
+        let copy = target.buffer_copy(region, offset);
         // SAFETY: the bytes lie inside the buffer and the region inside the image.
         unsafe {
             let device = &self.shared.gpu.device;
-            device.cmd_copy_buffer_to_image(self.raw(), source, target.raw, TARGET, &[copy]);
+            device.cmd_copy_buffer_to_image(self.raw(), source, target.image.raw, TARGET, &[copy]);
         }
         self.settle.push(Settle::Texture(Arc::clone(target)));
         Ok(())
@@ -315,8 +313,8 @@ impl CommandBuffer {
         to: &TextureRegion,
     ) -> Result<()> {
         self.uses.clear();
-        self.use_texture(source, one(from.mip, from.layer), Use::transfer_read())?;
-        if let Err(error) = self.use_texture(target, one(to.mip, to.layer), Use::transfer_write()) {
+        self.use_texture(source, source.part(from.mip, from.layer), Use::transfer_read())?;
+        if let Err(error) = self.use_texture(target, target.part(to.mip, to.layer), Use::transfer_write()) {
             self.uses.clear();
             return Err(error);
         }
@@ -331,16 +329,17 @@ impl CommandBuffer {
             Filter::Linear => vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR,
         };
         let from = vk::FormatFeatureFlags::BLIT_SRC | linear;
-        let compatible = !source.format.is_depth()
-            && !target.format.is_depth()
-            && source.format.is_uint() == target.format.is_uint()
-            && gpu.image_features(source.format.raw()).contains(from)
-            && gpu.image_features(target.format.raw()).contains(vk::FormatFeatureFlags::BLIT_DST);
+        let [source_format, target_format] = [source, target].map(|texture| texture.image.format);
+        let compatible = !source_format.is_depth()
+            && !target_format.is_depth()
+            && source_format.is_uint() == target_format.is_uint()
+            && gpu.image_features(source_format.raw()).contains(from)
+            && gpu.image_features(target_format.raw()).contains(vk::FormatFeatureFlags::BLIT_DST);
         if compatible {
             return Ok(());
         }
         let what = format!("a {filter:?} blit from '{}' to '{}'", source.name, target.name);
-        let formats = format!("{:?} and {:?}", source.format, target.format);
+        let formats = format!("{source_format:?} and {target_format:?}");
         Err(Error::unsupported(what, format!("the device cannot scale between {formats}; use a shader")))
     }
 
@@ -353,9 +352,9 @@ impl CommandBuffer {
         filter: Filter,
     ) {
         let blit = vk::ImageBlit {
-            src_subresource: layers_of(source.format, from.mip, from.layer),
+            src_subresource: source.layers_of(from.mip, from.layer),
             src_offsets: corners(from),
-            dst_subresource: layers_of(target.format, to.mip, to.layer),
+            dst_subresource: target.layers_of(to.mip, to.layer),
             dst_offsets: corners(to),
         };
         let filter = match filter {
@@ -365,7 +364,15 @@ impl CommandBuffer {
         // SAFETY: both regions lie inside their images, and the formats can be blitted.
         unsafe {
             let device = &self.shared.gpu.device;
-            device.cmd_blit_image(self.raw(), source.raw, SOURCE, target.raw, TARGET, &[blit], filter);
+            device.cmd_blit_image(
+                self.raw(),
+                source.image.raw,
+                SOURCE,
+                target.image.raw,
+                TARGET,
+                &[blit],
+                filter,
+            );
         }
     }
 
@@ -388,9 +395,10 @@ impl CommandBuffer {
                     tracker.use_buffer(buffer.id, Use::everything_read(), &mut self.barriers);
                 }
                 Settle::Texture(texture) => {
-                    let Some(read) = resting_use(texture.usage) else { continue };
-                    images.insert(texture.id, (texture.raw, texture.format.aspects()));
-                    tracker.use_texture(texture.id, texture.shape, texture.all(), read, &mut self.barriers);
+                    let Some(read) = resting_use(texture.image.usage) else { continue };
+                    let image = &texture.image;
+                    images.insert(image.id, image.for_barriers());
+                    tracker.use_texture(image.id, image.shape, texture.range, read, &mut self.barriers);
                 }
             }
         }
@@ -409,7 +417,7 @@ fn resting_use(usage: TextureUsage) -> Option<Use> {
 
 fn check_copyable(source: &Texture, target: &Texture) -> Result<()> {
     let depth = |format: Format| format.is_depth();
-    let (from, to) = (source.format, target.format);
+    let (from, to) = (source.image.format, target.image.format);
     let same_bits = from.texel_bytes() == to.texel_bytes() && !depth(from) && !depth(to);
     if from == to || same_bits {
         return Ok(());

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::part_uses::{PartUse, PartUses};
 use crate::barrier::{Barriers, IdMap, ResourceId, Subresources, Tracker, Use};
 use crate::error::{Error, Result};
 use crate::resource::{Buffer, Texture};
@@ -16,7 +17,7 @@ pub(crate) struct Uses {
     buffers: Vec<(ResourceId, Use)>,
     /// Where each of `buffers` is, once they are more than a few; empty before.
     places: IdMap<usize>,
-    textures: Vec<(Arc<Texture>, Subresources, Use)>,
+    textures: PartUses<Arc<Texture>>,
     writers: Vec<(ResourceId, Use)>,
 }
 
@@ -62,27 +63,16 @@ impl Uses {
         }
     }
 
-    /// The command uses part of a texture.
+    /// The command uses a part of the image that a texture shows.
     pub(crate) fn texture(&mut self, texture: Arc<Texture>, part: Subresources, next: Use) -> Result<()> {
-        let overlapping = |(known, other, _): &&mut (Arc<Texture>, Subresources, Use)| {
-            known.id == texture.id && overlap(part, *other)
-        };
-        match self.textures.iter_mut().find(overlapping) {
-            Some((_, other, present)) => match present.merge(next) {
-                Some(merged) if *other == part => *present = merged,
-                _ => return Err(conflict(&texture)),
-            },
-            None => self.textures.push((texture, part, next)),
-        }
-        Ok(())
+        let new = PartUse { id: texture.image.id, part, next, owner: Arc::clone(&texture) };
+        self.textures.add(new).map_err(|other| conflict(&texture, &other))
     }
 
     /// Whether the command needs a barrier behind earlier commands of the same command buffer.
     pub(crate) fn need_barriers(&self, tracker: &Tracker) -> bool {
         let buffer = |(id, next): &(ResourceId, Use)| tracker.needs_barrier_buffer(*id, *next);
-        let texture = |(texture, part, next): &(Arc<Texture>, Subresources, Use)| {
-            tracker.needs_barrier_texture(texture.id, *part, *next)
-        };
+        let texture = |used: &PartUse<_>| tracker.needs_barrier_texture(used.id, used.part, used.next);
         self.buffers.iter().any(buffer) || self.textures.iter().any(texture)
     }
 
@@ -95,9 +85,9 @@ impl Uses {
         for (id, write) in self.writers.drain(..) {
             tracker.accumulate_buffer(id, write, out);
         }
-        for (texture, part, next) in self.textures.drain(..) {
-            images.insert(texture.id, (texture.raw, texture.format.aspects()));
-            tracker.use_texture(texture.id, texture.shape, part, next, out);
+        for PartUse { id, part, next, owner } in self.textures.drain() {
+            images.insert(id, owner.image.for_barriers());
+            tracker.use_texture(id, owner.image.shape, part, next, out);
         }
     }
 
@@ -110,18 +100,18 @@ impl Uses {
     }
 }
 
-fn overlap(a: Subresources, b: Subresources) -> bool {
-    let crosses =
-        |first: u32, count: u32, other: u32, others: u32| first < other + others && other < first + count;
-    crosses(a.base_mip, a.mip_count, b.base_mip, b.mip_count)
-        && crosses(a.base_layer, a.layer_count, b.base_layer, b.layer_count)
-}
-
-fn conflict(texture: &Texture) -> Error {
-    Error::usage(
-        &texture.name,
-        "one command uses the texture in two ways that exclude each other; use a second texture or two commands",
-    )
+fn conflict(texture: &Arc<Texture>, other: &Arc<Texture>) -> Error {
+    let message = if Arc::ptr_eq(texture, other) {
+        "one command uses the texture in two ways that exclude each other; use a second texture or two commands"
+            .to_owned()
+    } else {
+        format!(
+            "it shows texels that '{}' shows too, and one command uses them in two ways that exclude each other; \
+             use a second texture or two commands",
+            other.name
+        )
+    };
+    Error::usage(&texture.name, message)
 }
 
 #[cfg(test)]

@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use super::Context;
 use super::holder::Holder;
-use crate::bindless::TextureViews;
 use crate::error::{Error, Result};
 use crate::gpu::caps::Capabilities;
 use crate::handle::{
     BufferHandle, ComputePipelineHandle, QueryPoolHandle, RenderPipelineHandle, SamplerHandle,
-    ShaderModuleHandle, TextureHandle,
+    ShaderModuleHandle,
 };
 use crate::pipeline::compute::ComputePipelineDesc;
 use crate::pipeline::graphics_desc::RenderPipelineDesc;
@@ -17,8 +16,7 @@ use crate::pipeline::{ComputePipeline, RenderPipeline, ShaderModule};
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::resource::query::QueryPoolDesc;
 use crate::resource::sampler::SamplerDesc;
-use crate::resource::texture::{TextureDesc, TextureRegion, TextureUsage};
-use crate::resource::{Buffer, QueryPool, Sampler, Texture};
+use crate::resource::{Buffer, QueryPool, Sampler};
 use crate::shader::{ShaderModuleDesc, raw_hit_number};
 
 /// Objects that take no bindless slot.
@@ -34,51 +32,6 @@ impl Context {
             self.upload_buffer(handle, 0, data)?;
         }
         Ok(holder)
-    }
-
-    /// Creates a texture (`vkCreateImage`). [`Holder::index`] is its element of `kTextures2D[]`, `kTexturesCube[]`
-    /// and the storage images. Its first contents are there for every command submitted afterwards.
-    pub fn create_texture(&self, desc: &TextureDesc<'_>) -> Result<Holder<TextureHandle>> {
-        let shared = self.shared();
-        let slot = shared.reserve(|| shared.bindless.reserve_texture(desc.debug_name))?;
-        let made = Texture::new(&shared.gpu, desc, slot).and_then(|texture| {
-            let views = views(&texture)?;
-            Ok((texture, views))
-        });
-        let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
-        shared.bindless.set_texture(slot, views);
-        let holder = Holder::new(self, shared.store.textures.insert(texture), slot);
-        self.fill_texture(holder.handle(), desc)?;
-        Ok(holder)
-    }
-
-    /// Uploads the first contents; without any, shaders may still read what is there.
-    fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>) -> Result<()> {
-        let texture = self.shared().store.textures.get(handle)?;
-        let Some(data) = desc.data else {
-            if desc.generate_mips {
-                let message = "mips are generated from data; without it use CommandBuffer::generate_mipmaps";
-                return Err(Error::usage(desc.debug_name, message));
-            }
-            return self.before_next_submission(|cmd| {
-                cmd.settle_texture(&texture);
-                Ok(())
-            });
-        };
-        let layers = texture.shape.layers as usize;
-        let texels = u64::from(desc.extent[0]) * u64::from(desc.extent[1]) * layers as u64;
-        let expected = texels * u64::from(desc.format.texel_bytes());
-        if data.len() as u64 != expected {
-            let message = format!("mip 0 has {expected} bytes in all layers, but {} were given", data.len());
-            return Err(Error::usage(desc.debug_name, message));
-        }
-        self.before_next_submission(|cmd| {
-            for (layer, bytes) in (0..).zip(data.chunks(data.len() / layers)) {
-                let region = TextureRegion { layer, ..Default::default() };
-                cmd.upload_texture(&texture, &region, bytes)?;
-            }
-            if desc.generate_mips { cmd.generate_mipmaps_object(&texture) } else { Ok(()) }
-        })
     }
 
     /// Creates a sampler (`vkCreateSampler`). [`Holder::index`] is its element of `kSamplers[]`.
@@ -159,13 +112,4 @@ fn warn_of_raw_numbers(caps: &Capabilities, desc: &ShaderModuleDesc<'_>) {
         let name = desc.debug_name;
         log::warn!("shader '{name}': {number} counts parts of split and reordered meshes here; use {helper}");
     }
-}
-
-fn views(texture: &Texture) -> Result<TextureViews> {
-    let sampled = texture.usage.contains(TextureUsage::SAMPLED);
-    let storage = texture.usage.contains(TextureUsage::STORAGE);
-    Ok(TextureViews {
-        sampled: if sampled { Some(texture.sampled_view()?) } else { None },
-        storage: if storage { Some(texture.storage_view()?) } else { None },
-    })
 }

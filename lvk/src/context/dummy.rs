@@ -10,7 +10,8 @@ use crate::accel::flags::BuildMode;
 use crate::bindless::Dummies;
 use crate::error::Result;
 use crate::resource::sampler::SamplerDesc;
-use crate::resource::texture::{TextureDesc, TextureRegion, TextureUsage};
+use crate::resource::texture::TextureRegion;
+use crate::resource::texture_desc::{TextureDesc, TextureUsage};
 use crate::resource::{Sampler, Texture};
 use crate::shared::DummyObjects;
 

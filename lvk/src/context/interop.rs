@@ -57,9 +57,9 @@ impl Context {
         Ok(self.shared().store.buffers.get(buffer)?.raw)
     }
 
-    /// The image behind a handle.
+    /// The image behind a handle; that of the texture which a view shows.
     pub fn raw_image(&self, texture: TextureHandle) -> Result<vk::Image> {
-        Ok(self.shared().store.textures.get(texture)?.raw)
+        Ok(self.shared().store.textures.get(texture)?.image.raw)
     }
 
     /// The view shaders sample.

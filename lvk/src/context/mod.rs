@@ -7,6 +7,7 @@ pub(crate) mod config;
 mod create;
 mod create_accel;
 mod create_ray_tracing;
+mod create_texture;
 mod data;
 pub(crate) mod destroy;
 mod dummy;

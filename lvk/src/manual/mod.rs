@@ -1,5 +1,8 @@
 //! The manual: one page a topic, for reading from top to bottom. The items' own pages have the details.
 
+#[doc = include_str!("textures.md")]
+pub mod textures {}
+
 #[doc = include_str!("acceleration_structures.md")]
 pub mod acceleration_structures {}
 

@@ -1,0 +1,151 @@
+//! How one command uses parts of textures: disjoint parts, each with one use.
+
+use crate::barrier::{ResourceId, Subresources, Use};
+
+/// Parts of images with their uses, and with whom to name in errors.
+///
+/// Parts of one image never overlap: what is used twice counts once, with both uses.
+#[derive(Debug)]
+pub(super) struct PartUses<T> {
+    parts: Vec<PartUse<T>>,
+}
+
+/// A part of an image and what a command does to it.
+#[derive(Debug, Clone)]
+pub(super) struct PartUse<T> {
+    pub(super) id: ResourceId,
+    pub(super) part: Subresources,
+    pub(super) next: Use,
+    pub(super) owner: T,
+}
+
+impl<T: Clone> PartUses<T> {
+    /// Adds a use. Fails with the owner of an earlier use of the same texels that excludes this one.
+    pub(super) fn add(&mut self, new: PartUse<T>) -> Result<(), T> {
+        let overlaps = |old: &PartUse<T>| old.id == new.id && old.part.intersection(new.part).is_some();
+        let Some(place) = self.parts.iter().position(overlaps) else {
+            self.parts.push(new);
+            return Ok(());
+        };
+        let first = &mut self.parts[place];
+        if first.part == new.part {
+            first.next = first.next.merge(new.next).ok_or_else(|| first.owner.clone())?;
+            return Ok(());
+        }
+        self.add_pieces(place, new)
+    }
+
+    /// Adds a use of texels of which some, from the part at `first` on, are used already.
+    fn add_pieces(&mut self, first: usize, new: PartUse<T>) -> Result<(), T> {
+        let mut rest = vec![new.part];
+        for place in first..self.parts.len() {
+            let old = self.parts[place].clone();
+            let Some(both) = old.part.intersection(new.part).filter(|_| old.id == new.id) else { continue };
+            let next = old.next.merge(new.next).ok_or_else(|| old.owner.clone())?;
+            rest = rest.into_iter().flat_map(|piece| piece.without(both)).collect();
+            if next != old.next {
+                let kept = old.part.without(both).map(|part| PartUse { part, ..old.clone() });
+                self.parts.extend(kept);
+                self.parts[place] = PartUse { part: both, next, ..old };
+            }
+        }
+        self.parts.extend(rest.into_iter().map(|part| PartUse { part, ..new.clone() }));
+        Ok(())
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = &PartUse<T>> {
+        self.parts.iter()
+    }
+
+    /// Takes everything out and keeps the memory.
+    pub(super) fn drain(&mut self) -> impl Iterator<Item = PartUse<T>> {
+        self.parts.drain(..)
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.parts.clear();
+    }
+}
+
+impl<T> Default for PartUses<T> {
+    fn default() -> Self {
+        Self { parts: Vec::new() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::barrier::Stages;
+
+    fn uses() -> [Use; 4] {
+        [
+            Use::shader_read(Stages::COMPUTE),
+            Use::shader_read(Stages::FRAGMENT),
+            Use::shader_write(Stages::COMPUTE),
+            Use::transfer_read(),
+        ]
+    }
+
+    fn part() -> impl Strategy<Value = Subresources> {
+        (0..4_u32, 1..4_u32, 0..4_u32, 1..4_u32).prop_map(|(base_mip, mip_count, base_layer, layer_count)| {
+            Subresources { base_mip, mip_count, base_layer, layer_count }
+        })
+    }
+
+    fn cells(part: Subresources) -> impl Iterator<Item = (u32, u32)> {
+        let layers = part.base_layer..part.base_layer + part.layer_count;
+        let mips = part.base_mip..part.base_mip + part.mip_count;
+        layers.flat_map(move |layer| mips.clone().map(move |mip| (mip, layer)))
+    }
+
+    proptest! {
+        /// Against a map that has one entry for each mip of each layer.
+        #[test]
+        fn every_subresource_has_the_merged_use_of_all_who_name_it(
+            added in prop::collection::vec((0..2_u64, part(), 0..4_usize), 1..8)
+        ) {
+            let mut found = PartUses::default();
+            let mut expected: BTreeMap<(u64, u32, u32), (Use, usize)> = BTreeMap::new();
+            for (owner, (id, part, kind)) in added.into_iter().enumerate() {
+                let next = uses()[kind];
+                let excluded = |cell: &(u64, u32, u32)| {
+                    expected.get(cell).is_some_and(|(present, _)| present.merge(next).is_none())
+                };
+                let keys: Vec<_> = cells(part).map(|(mip, layer)| (id, mip, layer)).collect();
+                let conflict = keys.iter().any(excluded);
+                let answer = found.add(PartUse { id: ResourceId(id), part, next, owner });
+                prop_assert_eq!(answer.is_err(), conflict);
+                if conflict {
+                    return Ok(());
+                }
+                for key in keys {
+                    let (present, _) = expected.entry(key).or_insert((next, owner));
+                    *present = present.merge(next).unwrap();
+                }
+            }
+            let mut seen = BTreeMap::new();
+            for PartUse { id, part, next, owner } in found.iter().cloned() {
+                for (mip, layer) in cells(part) {
+                    prop_assert!(seen.insert((id.0, mip, layer), (next, owner)).is_none(), "parts overlap");
+                }
+            }
+            prop_assert_eq!(seen, expected);
+        }
+    }
+
+    #[test]
+    fn a_conflict_names_the_owner_of_the_first_use() {
+        let whole = Subresources { base_mip: 0, mip_count: 4, base_layer: 0, layer_count: 1 };
+        let tail = Subresources { base_mip: 2, mip_count: 2, ..whole };
+        let mut found = PartUses::default();
+        let use_of = |part, next, owner| PartUse { id: ResourceId(1), part, next, owner };
+        found.add(use_of(tail, Use::shader_write(Stages::COMPUTE), "tail")).unwrap();
+        let read = use_of(whole, Use::shader_read(Stages::COMPUTE), "whole");
+        assert_eq!(found.add(read), Err("tail"));
+    }
+}

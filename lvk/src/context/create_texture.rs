@@ -1,0 +1,94 @@
+//! Creates textures and views of them.
+
+use super::Context;
+use super::holder::Holder;
+use crate::bindless::TextureViews;
+use crate::error::{Error, Result};
+use crate::handle::TextureHandle;
+use crate::resource::Texture;
+use crate::resource::texture::TextureRegion;
+use crate::resource::texture_desc::{TextureDesc, TextureUsage};
+use crate::resource::view::TextureViewDesc;
+
+impl Context {
+    /// Creates a texture (`vkCreateImage`). [`Holder::index`] is its element of `kTextures2D[]`, `kTexturesCube[]`
+    /// and the storage images. Its first contents are there for every command submitted afterwards.
+    pub fn create_texture(&self, desc: &TextureDesc<'_>) -> Result<Holder<TextureHandle>> {
+        let shared = self.shared();
+        let slot = shared.reserve(|| shared.bindless.reserve_texture(desc.debug_name))?;
+        let made = Texture::new(&shared.gpu, desc, slot).and_then(|texture| {
+            let views = views(&texture)?;
+            Ok((texture, views))
+        });
+        let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
+        shared.bindless.set_texture(slot, views);
+        let holder = Holder::new(self, shared.store.textures.insert(texture), slot);
+        self.fill_texture(holder.handle(), desc)?;
+        Ok(holder)
+    }
+
+    /// Creates a view of a texture (`vkCreateImageView`): a texture that shows some mips and layers of another one, as
+    /// another kind or in another format, or with its channels in another order.
+    ///
+    /// It has a number and a handle of its own and goes wherever a texture does: shaders, [`Dependencies`](crate::Dependencies),
+    /// render passes, copies. The texels live until the last handle that shows them is destroyed and the GPU is done.
+    /// Barriers follow the texels, whoever names them.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) for mips and layers that the texture does not have, for cubes of anything but
+    /// six square layers, for a format that is not among the [`view_formats`](TextureDesc::view_formats), and for usages
+    /// that the texture was not made for or that the format or the swizzle exclude;
+    /// [`StaleHandle`](Error::StaleHandle); [`LimitExceeded`](Error::LimitExceeded) when all numbers of textures are taken.
+    pub fn create_texture_view(&self, desc: &TextureViewDesc<'_>) -> Result<Holder<TextureHandle>> {
+        let shared = self.shared();
+        let missing = || Error::usage(desc.debug_name, "give the view a texture");
+        let shown = shared.store.textures.get(desc.texture.ok_or_else(missing)?)?;
+        let slot = shared.reserve(|| shared.bindless.reserve_texture(desc.debug_name))?;
+        let made = shown.view(desc, slot).and_then(|texture| {
+            let views = views(&texture)?;
+            texture.image.share()?;
+            Ok((texture, views))
+        });
+        let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
+        shared.bindless.set_texture(slot, views);
+        Ok(Holder::new(self, shared.store.textures.insert(texture), slot))
+    }
+
+    /// Uploads the first contents; without any, shaders may still read what is there.
+    fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>) -> Result<()> {
+        let texture = self.shared().store.textures.get(handle)?;
+        let Some(data) = desc.data else {
+            if desc.generate_mips {
+                let message = "mips are generated from data; without it use CommandBuffer::generate_mipmaps";
+                return Err(Error::usage(desc.debug_name, message));
+            }
+            return self.before_next_submission(|cmd| {
+                cmd.settle_texture(&texture);
+                Ok(())
+            });
+        };
+        let layers = texture.layers() as usize;
+        let texels = u64::from(desc.extent[0]) * u64::from(desc.extent[1]) * layers as u64;
+        let expected = texels * u64::from(desc.format.texel_bytes());
+        if data.len() as u64 != expected {
+            let message = format!("mip 0 has {expected} bytes in all layers, but {} were given", data.len());
+            return Err(Error::usage(desc.debug_name, message));
+        }
+        self.before_next_submission(|cmd| {
+            for (layer, bytes) in (0..).zip(data.chunks(data.len() / layers)) {
+                let region = TextureRegion { layer, ..Default::default() };
+                cmd.upload_texture(&texture, &region, bytes)?;
+            }
+            if desc.generate_mips { cmd.generate_mipmaps_object(&texture) } else { Ok(()) }
+        })
+    }
+}
+
+fn views(texture: &Texture) -> Result<TextureViews> {
+    let sampled = texture.usage.contains(TextureUsage::SAMPLED);
+    let storage = texture.usage.contains(TextureUsage::STORAGE);
+    Ok(TextureViews {
+        sampled: if sampled { Some(texture.sampled_view()?) } else { None },
+        storage: if storage { Some(texture.storage_view()?) } else { None },
+    })
+}

@@ -1,0 +1,87 @@
+//! What callers say of a texture: its shape, format and uses.
+
+use bitflags::bitflags;
+
+use crate::format::Format;
+
+bitflags! {
+    /// What a texture is used for, besides copies, which are always allowed.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+    pub struct TextureUsage: u32 {
+        /// Sampled or fetched by shaders.
+        const SAMPLED = 1;
+        /// Written and read by shaders as a storage image (mip 0).
+        const STORAGE = 1 << 1;
+        /// A colour or depth target of render passes.
+        const TARGET = 1 << 2;
+    }
+}
+
+/// Shape of a texture.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum TextureKind {
+    /// One 2D image: an element of `kTextures2D[]`.
+    #[default]
+    D2,
+    /// Layers of 2D images: an element of `kTextures2DArray[]`.
+    D2Array {
+        /// Number of layers, at least 1.
+        layers: u32,
+    },
+    /// Six faces in the order +X -X +Y -Y +Z -Z: an element of `kTexturesCube[]`.
+    Cube,
+}
+
+impl TextureKind {
+    /// Images of one mip.
+    pub fn layers(self) -> u32 {
+        match self {
+            Self::D2 => 1,
+            Self::D2Array { layers } => layers,
+            Self::Cube => 6,
+        }
+    }
+}
+
+/// Describes a texture.
+#[derive(Debug, Clone, Copy)]
+pub struct TextureDesc<'a> {
+    /// Shape.
+    pub kind: TextureKind,
+    /// Format of the texels.
+    pub format: Format,
+    /// Width and height of mip 0 in texels.
+    pub extent: [u32; 2],
+    /// Number of mips; 0 is the whole chain down to one texel.
+    pub mips: u32,
+    /// What the texture is used for.
+    pub usage: TextureUsage,
+    /// Other colour formats, of texels of the same size, in which
+    /// [`Context::create_texture_view`](crate::Context::create_texture_view) may show the texels. A usage is then enough if
+    /// one of all these formats has it; the texture itself keeps what its own format can.
+    ///
+    /// Any (`VK_IMAGE_CREATE_MUTABLE_FORMAT_BIT`) may cost the compression of the image, so list none without need.
+    pub view_formats: &'a [Format],
+    /// First contents of mip 0: all layers one after the other, rows tightly packed.
+    pub data: Option<&'a [u8]>,
+    /// Fills the other mips from `data` by repeated halving (colour formats the device can filter).
+    pub generate_mips: bool,
+    /// Name in error messages, validation messages and debuggers.
+    pub debug_name: &'a str,
+}
+
+impl Default for TextureDesc<'_> {
+    fn default() -> Self {
+        Self {
+            kind: TextureKind::D2,
+            format: Format::Rgba8Unorm,
+            extent: [1, 1],
+            mips: 1,
+            usage: TextureUsage::SAMPLED,
+            view_formats: &[],
+            data: None,
+            generate_mips: false,
+            debug_name: "texture",
+        }
+    }
+}
