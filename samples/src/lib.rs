@@ -7,6 +7,8 @@ pub mod hybrid;
 pub mod hybrid_oit;
 pub mod pipelines;
 pub mod reflections;
+pub mod rtx;
+pub mod rtx_hello;
 pub mod scene;
 pub mod shader_folder;
 pub mod shaders;
