@@ -9,6 +9,7 @@ pub mod pipelines;
 pub mod reflections;
 pub mod rtx;
 pub mod rtx_hello;
+pub mod rtx_textures;
 pub mod scene;
 pub mod shader_folder;
 pub mod shaders;

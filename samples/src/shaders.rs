@@ -46,6 +46,9 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("reflections/visibility.glsl", include_str!("../../shaders/reflections/visibility.glsl")),
     ("reflections/waves.glsl", include_str!("../../shaders/reflections/waves.glsl")),
     ("rtx_hello/view.glsl", include_str!("../../shaders/rtx_hello/view.glsl")),
+    ("rtx_textures/frame.glsl", include_str!("../../shaders/rtx_textures/frame.glsl")),
+    ("rtx_textures/shade.glsl", include_str!("../../shaders/rtx_textures/shade.glsl")),
+    ("rtx_textures/surface.glsl", include_str!("../../shaders/rtx_textures/surface.glsl")),
     ("hybrid_oit/ball.glsl", include_str!("../../shaders/hybrid_oit/ball.glsl")),
     ("hybrid_oit/frame.glsl", include_str!("../../shaders/hybrid_oit/frame.glsl")),
     ("hybrid_oit/gbuffer.glsl", include_str!("../../shaders/hybrid_oit/gbuffer.glsl")),
@@ -208,4 +211,20 @@ pub mod rtx_hello {
     pub const HELLO_RCHIT: &str = include_str!("../../shaders/rtx_hello/hello.rchit.glsl");
     /// Rays of a pixel, by ray queries.
     pub const HELLO_COMP: &str = include_str!("../../shaders/rtx_hello/hello.comp.glsl");
+}
+
+/// Stages of the `rtx_textures` sample.
+pub mod rtx_textures {
+    /// Writes the instances.
+    pub const INSTANCES_COMP: &str = include_str!("../../shaders/rtx_textures/instances.comp.glsl");
+    /// Rays of a pixel, by the ray tracing pipeline.
+    pub const TEXTURES_RGEN: &str = include_str!("../../shaders/rtx_textures/textures.rgen.glsl");
+    /// A ray that left the scene.
+    pub const SKY_RMISS: &str = include_str!("../../shaders/rtx_textures/sky.rmiss.glsl");
+    /// The hit group of what is painted.
+    pub const PAINTED_RCHIT: &str = include_str!("../../shaders/rtx_textures/painted.rchit.glsl");
+    /// The hit group of what is glazed.
+    pub const GLAZED_RCHIT: &str = include_str!("../../shaders/rtx_textures/glazed.rchit.glsl");
+    /// Rays of a pixel, by ray queries.
+    pub const TEXTURES_COMP: &str = include_str!("../../shaders/rtx_textures/textures.comp.glsl");
 }

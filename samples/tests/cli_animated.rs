@@ -17,7 +17,7 @@ struct Program {
     said: &'static [&'static str],
 }
 
-const PROGRAMS: [Program; 3] = [
+const PROGRAMS: [Program; 4] = [
     Program {
         path: env!("CARGO_BIN_EXE_reflections"),
         quick: &["--samples", "1"],
@@ -35,6 +35,12 @@ const PROGRAMS: [Program; 3] = [
         quick: &[],
         own: &["--list-scenes"],
         said: &["37 triangles", "TLAS update", "rays"],
+    },
+    Program {
+        path: env!("CARGO_BIN_EXE_rtx_textures"),
+        quick: &[],
+        own: &["--list-scenes"],
+        said: &["170 instances", "6 textures", "TLAS build", "rays"],
     },
 ];
 
