@@ -4,7 +4,7 @@ use lvk::{Context, Format, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderS
 
 use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
-use crate::{bench, hybrid, hybrid_oit, reflections};
+use crate::{bench, hybrid, hybrid_oit, reflections, rtx_hello, rtx_textures};
 
 /// A stage of a [`SamplePipeline`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,7 +60,15 @@ pub struct SamplePipeline {
 /// All of them.
 #[must_use]
 pub fn all() -> Vec<SamplePipeline> {
-    [hybrid::pipelines(), hybrid_oit::pipelines(), reflections::pipelines(), bench::pipelines()].concat()
+    [
+        hybrid::pipelines(),
+        hybrid_oit::pipelines(),
+        reflections::pipelines(),
+        rtx_hello::pipelines(),
+        rtx_textures::pipelines(),
+        bench::pipelines(),
+    ]
+    .concat()
 }
 
 #[cfg(test)]

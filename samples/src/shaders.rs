@@ -45,6 +45,10 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("reflections/trace_query.glsl", include_str!("../../shaders/reflections/trace_query.glsl")),
     ("reflections/visibility.glsl", include_str!("../../shaders/reflections/visibility.glsl")),
     ("reflections/waves.glsl", include_str!("../../shaders/reflections/waves.glsl")),
+    ("rtx_hello/view.glsl", include_str!("../../shaders/rtx_hello/view.glsl")),
+    ("rtx_textures/frame.glsl", include_str!("../../shaders/rtx_textures/frame.glsl")),
+    ("rtx_textures/shade.glsl", include_str!("../../shaders/rtx_textures/shade.glsl")),
+    ("rtx_textures/surface.glsl", include_str!("../../shaders/rtx_textures/surface.glsl")),
     ("hybrid_oit/ball.glsl", include_str!("../../shaders/hybrid_oit/ball.glsl")),
     ("hybrid_oit/frame.glsl", include_str!("../../shaders/hybrid_oit/frame.glsl")),
     ("hybrid_oit/gbuffer.glsl", include_str!("../../shaders/hybrid_oit/gbuffer.glsl")),
@@ -195,4 +199,32 @@ pub mod hybrid_oit {
     pub const SHADOW_COMP: &str = include_str!("../../shaders/hybrid_oit/shadow.comp.glsl");
     /// The picture.
     pub const COMPOSITE_COMP: &str = include_str!("../../shaders/hybrid_oit/composite.comp.glsl");
+}
+
+/// Stages of the `rtx_hello` sample.
+pub mod rtx_hello {
+    /// Rays of a pixel, by the ray tracing pipeline.
+    pub const HELLO_RGEN: &str = include_str!("../../shaders/rtx_hello/hello.rgen.glsl");
+    /// A ray that met nothing.
+    pub const HELLO_RMISS: &str = include_str!("../../shaders/rtx_hello/hello.rmiss.glsl");
+    /// The nearest triangle of a ray.
+    pub const HELLO_RCHIT: &str = include_str!("../../shaders/rtx_hello/hello.rchit.glsl");
+    /// Rays of a pixel, by ray queries.
+    pub const HELLO_COMP: &str = include_str!("../../shaders/rtx_hello/hello.comp.glsl");
+}
+
+/// Stages of the `rtx_textures` sample.
+pub mod rtx_textures {
+    /// Writes the instances.
+    pub const INSTANCES_COMP: &str = include_str!("../../shaders/rtx_textures/instances.comp.glsl");
+    /// Rays of a pixel, by the ray tracing pipeline.
+    pub const TEXTURES_RGEN: &str = include_str!("../../shaders/rtx_textures/textures.rgen.glsl");
+    /// A ray that left the scene.
+    pub const SKY_RMISS: &str = include_str!("../../shaders/rtx_textures/sky.rmiss.glsl");
+    /// The hit group of what is painted.
+    pub const PAINTED_RCHIT: &str = include_str!("../../shaders/rtx_textures/painted.rchit.glsl");
+    /// The hit group of what is glazed.
+    pub const GLAZED_RCHIT: &str = include_str!("../../shaders/rtx_textures/glazed.rchit.glsl");
+    /// Rays of a pixel, by ray queries.
+    pub const TEXTURES_COMP: &str = include_str!("../../shaders/rtx_textures/textures.comp.glsl");
 }

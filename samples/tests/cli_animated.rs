@@ -1,4 +1,4 @@
-//! The `reflections` and `hybrid_oit` programs as a user meets them: help, pictures, sequences and Ctrl-C.
+//! The animated programs as a user meets them: help, pictures, sequences and Ctrl-C.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ struct Program {
     said: &'static [&'static str],
 }
 
-const PROGRAMS: [Program; 2] = [
+const PROGRAMS: [Program; 4] = [
     Program {
         path: env!("CARGO_BIN_EXE_reflections"),
         quick: &["--samples", "1"],
@@ -29,6 +29,18 @@ const PROGRAMS: [Program; 2] = [
         quick: &["--supersampling", "1", "--shadow-rays", "1"],
         own: &["--supersampling", "--shadow-rays", "--nodes", "--time"],
         said: &["list of glass", "spheres of glass", "composite", "nodes"],
+    },
+    Program {
+        path: env!("CARGO_BIN_EXE_rtx_hello"),
+        quick: &[],
+        own: &["--list-scenes"],
+        said: &["37 triangles", "TLAS update", "rays"],
+    },
+    Program {
+        path: env!("CARGO_BIN_EXE_rtx_textures"),
+        quick: &[],
+        own: &["--list-scenes"],
+        said: &["170 instances", "6 textures", "TLAS build", "rays"],
     },
 ];
 

@@ -4,6 +4,7 @@ use lvk::{Capabilities, RayQueryPath};
 
 use super::HybridError;
 use crate::app::args;
+use crate::app::run_args::RayTracing;
 
 /// How primary visibility is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -182,6 +183,16 @@ impl Method {
 }
 
 impl RayPath {
+    /// The path that the command line names, if it does.
+    #[must_use]
+    pub fn wished(wish: RayTracing) -> Option<Self> {
+        match wish {
+            RayTracing::Auto => None,
+            RayTracing::Pipeline => Some(Self::Pipeline),
+            RayTracing::Query | RayTracing::Software => Some(Self::Query),
+        }
+    }
+
     /// The path to take: `wish`, or what is fastest: the pipeline where there is one, else the query; on a CPU queries in
     /// software, if those are on.
     ///

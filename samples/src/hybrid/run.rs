@@ -14,7 +14,6 @@ use crate::app::args::{self, HybridArgs};
 use crate::app::device::{DeviceNeeds, driver_text, query_text};
 use crate::app::frames::Frames;
 use crate::app::run::{self, Opened, Opening};
-use crate::app::run_args::RayTracing;
 use crate::app::run_error::RunError;
 use crate::app::say;
 use crate::scene::Scene;
@@ -55,7 +54,7 @@ fn open(args: &HybridArgs, opening: &mut Opening<'_>) -> Result<Opened<HybridSeq
     let mut scene = args.scene.load(&mut opening.progress)?;
     opening.warn(&scene.warnings);
     let context = opening.device(&DeviceNeeds { textures: textures_needed(&scene) })?;
-    let path = RayPath::choose(wished_path(args.run.rt), context.capabilities())?;
+    let path = RayPath::choose(RayPath::wished(args.run.rt), context.capabilities())?;
     let wish = wished_method(args);
     let method = Method::choose(wish, context.capabilities());
     if wish.is_none() && method == Method::Standalone {
@@ -76,14 +75,6 @@ fn open(args: &HybridArgs, opening: &mut Opening<'_>) -> Result<Opened<HybridSeq
     }
     let sample = HybridSequence::new(renderer, &scene, first, args.lamp == args::Lamp::Circle);
     Ok(Opened { context, sample, headline })
-}
-
-fn wished_path(wish: RayTracing) -> Option<RayPath> {
-    match wish {
-        RayTracing::Auto => None,
-        RayTracing::Pipeline => Some(RayPath::Pipeline),
-        RayTracing::Query | RayTracing::Software => Some(RayPath::Query),
-    }
 }
 
 /// The method that is named, if only by something that it alone has.

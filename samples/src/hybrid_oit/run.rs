@@ -8,7 +8,6 @@ use lvk::Context;
 use super::{HybridOit, HybridOitArgs, HybridOitConfig, HybridOitError, NodeUse, OitScene, PERIOD_SECONDS};
 use crate::app::device::{DeviceNeeds, driver_text, query_text};
 use crate::app::run::{self, Opened, Opening};
-use crate::app::run_args::RayTracing;
 use crate::app::run_error::RunError;
 use crate::app::sample::{Moment, PassTimes, Sample};
 use crate::app::say;
@@ -76,12 +75,7 @@ pub fn run(args: &HybridOitArgs) -> ExitCode {
 
 fn open(args: &HybridOitArgs, opening: &mut Opening<'_>) -> Result<Opened<Animation>, RunError> {
     let context = opening.device(&DeviceNeeds::default())?;
-    let wish = match args.run.rt {
-        RayTracing::Auto => None,
-        RayTracing::Pipeline => Some(RayPath::Pipeline),
-        RayTracing::Query | RayTracing::Software => Some(RayPath::Query),
-    };
-    let path = RayPath::choose(wish, context.capabilities())?;
+    let path = RayPath::choose(RayPath::wished(args.run.rt), context.capabilities())?;
     let scene = OitScene::default();
     let config = HybridOitConfig {
         supersampling: args.supersampling,

@@ -8,7 +8,6 @@ use lvk::Context;
 use super::{CullingCost, Reflections, ReflectionsArgs, ReflectionsConfig, ReflectionsError};
 use crate::app::device::{DeviceNeeds, driver_text, query_text};
 use crate::app::run::{self, Opened, Opening};
-use crate::app::run_args::RayTracing;
 use crate::app::run_error::RunError;
 use crate::app::sample::{Moment, PassTimes, Sample};
 use crate::app::say;
@@ -67,12 +66,7 @@ pub fn run(args: &ReflectionsArgs) -> ExitCode {
 
 fn open(args: &ReflectionsArgs, opening: &mut Opening<'_>) -> Result<Opened<Reflections>, RunError> {
     let context = opening.device(&DeviceNeeds::default())?;
-    let wish = match args.run.rt {
-        RayTracing::Auto => None,
-        RayTracing::Pipeline => Some(RayPath::Pipeline),
-        RayTracing::Query | RayTracing::Software => Some(RayPath::Query),
-    };
-    let path = RayPath::choose(wish, context.capabilities())?;
+    let path = RayPath::choose(RayPath::wished(args.run.rt), context.capabilities())?;
     let config = ReflectionsConfig {
         samples: args.samples,
         min_angle: args.min_angle,

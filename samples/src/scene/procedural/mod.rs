@@ -11,7 +11,7 @@ use glam::Vec3;
 use self::solid::Solids;
 use super::mesh::Mesh;
 use super::setting::Setting;
-use super::{Ambient, Camera, DirectionalLight, Material, PointLight, Scene, Sky, normals};
+use super::{Ambient, Camera, DirectionalLight, Material, PointLight, Scene, Sky, Texture, normals};
 
 /// What [`Scene::procedural`] does.
 pub(super) fn courtyard() -> Scene {
@@ -23,6 +23,11 @@ pub(super) fn courtyard() -> Scene {
     });
     let scene = setting().into_scene("courtyard".to_owned(), mesh, materials);
     Scene { opaque_triangle_count, textures, ..scene }
+}
+
+/// The courtyard's images.
+pub(crate) fn painted_textures() -> Vec<Texture> {
+    materials::textures()
 }
 
 /// The geometry, and how many of its triangles are opaque.

@@ -1,0 +1,14 @@
+//! What the small ray tracing samples (`rtx_hello`, `rtx_textures`, `rtx_ao`, `rtx_pipeline`) share: what is asked for,
+//! rays by pipeline or by query, a picture with the times of its passes, and what their programs say.
+
+mod canvas;
+mod config;
+mod error;
+mod headline;
+mod tracer;
+
+pub(crate) use canvas::Canvas;
+pub use config::RtxConfig;
+pub use error::RtxError;
+pub(crate) use headline::headline;
+pub(crate) use tracer::{RayStages, Tracer, compute_pipeline};

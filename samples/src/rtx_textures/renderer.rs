@@ -1,0 +1,230 @@
+//! The sample as a type: say the moment, get a picture.
+
+use std::f32::consts::TAU;
+
+use bytemuck::{Pod, Zeroable};
+use lvk::{
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildMode,
+    CommandBuffer, ComputePipelineHandle, Context, Dependencies, DeviceInstances, Format, GeometryFlags,
+    Holder, IndexFormat, Indices, SamplerDesc, SamplerHandle, TextureDesc, TextureHandle, TlasDesc,
+    Triangles, VertexFormat,
+};
+
+use super::models::{Models, Vertex};
+use super::pipelines::{INSTANCES, RAYS};
+use crate::app::array_buffer::array;
+use crate::app::sample::{Moment, PassTimes, Sample};
+use crate::rtx::{Canvas, RtxConfig, RtxError, Tracer, compute_pipeline};
+use crate::scene::{Camera, GpuCamera, Texture, painted_textures};
+
+/// Textures that the shaders have room for.
+const TEXTURES: usize = 6;
+/// Things in a row and in a column (`kColumns` in `shaders/rtx_textures/instances.comp.glsl`).
+const COLUMNS: u32 = 13;
+/// They and the ground.
+const INSTANCE_COUNT: u32 = COLUMNS * COLUMNS + 1;
+/// Bytes of an instance.
+const RECORD_BYTES: u64 = 64;
+/// Instances that a work group writes.
+const GROUP: u32 = 64;
+
+/// Renders crates and rings.
+pub struct RtxTextures {
+    canvas: Canvas,
+    ctx: Context,
+    config: RtxConfig,
+    writer: Holder<ComputePipelineHandle>,
+    tracer: Tracer,
+    tlas: Holder<AccelStructHandle>,
+    blas: Vec<AccelStructHandle>,
+    records: Holder<BufferHandle>,
+    frame: Holder<BufferHandle>,
+    frame_address: u64,
+    constants: FrameConstants,
+    _held: Held,
+}
+
+/// What only the GPU reads.
+struct Held {
+    _blas: Vec<Holder<AccelStructHandle>>,
+    _buffers: [Holder<BufferHandle>; 2],
+    _textures: Vec<Holder<TextureHandle>>,
+    _sampler: Holder<SamplerHandle>,
+}
+
+/// `Frame` in `shaders/rtx_textures/frame.glsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct FrameConstants {
+    camera: GpuCamera,
+    vertices: u64,
+    triangles: u64,
+    records: u64,
+    textures: [u32; TEXTURES],
+    first_triangle: [u32; 3],
+    tlas: u32,
+    image: u32,
+    sampler: u32,
+    count: u32,
+    phase: f32,
+}
+
+impl RtxTextures {
+    /// Makes models, textures, structures and pipelines. The animation stands at its beginning.
+    ///
+    /// # Errors
+    /// [`RtxError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, config: &RtxConfig) -> Result<Self, RtxError> {
+        let canvas = Canvas::new(ctx, config)?;
+        let models = Models::new();
+        let usage = BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT;
+        let vertices = array(ctx, "vertices", usage, &models.vertices)?;
+        let triangles = array(ctx, "triangles", usage, &models.triangles)?;
+        let blas = build_blas(ctx, &models, [*vertices, *triangles])?;
+        let tlas = ctx.create_tlas(&TlasDesc { capacity: INSTANCE_COUNT, ..TlasDesc::default() })?;
+        let textures: Vec<_> = painted_textures()
+            .iter()
+            .take(TEXTURES)
+            .map(|picture| upload(ctx, picture))
+            .collect::<Result<_, _>>()?;
+        let sampler = ctx.create_sampler(&SamplerDesc::default())?;
+        let records = buffer(ctx, "instances", RECORD_BYTES * u64::from(INSTANCE_COUNT))?;
+        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
+        let constants = FrameConstants {
+            camera: GpuCamera::zeroed(),
+            vertices: ctx.buffer_address(*vertices)?,
+            triangles: ctx.buffer_address(*triangles)?,
+            records: ctx.buffer_address(*records)?,
+            textures: std::array::from_fn(|number| textures[number % textures.len()].index()),
+            first_triangle: std::array::from_fn(|model| models.ranges[model].start),
+            tlas: tlas.index(),
+            image: canvas.picture().index(),
+            sampler: sampler.index(),
+            count: INSTANCE_COUNT,
+            phase: 0.0,
+        };
+        let mut sample = Self {
+            canvas,
+            ctx: ctx.clone(),
+            config: *config,
+            writer: compute_pipeline(ctx, RAYS.sample, INSTANCES)?,
+            tracer: Tracer::new(ctx, config.path, &RAYS)?,
+            tlas,
+            blas: blas.iter().map(|blas| **blas).collect(),
+            records,
+            frame_address: ctx.buffer_address(*frame)?,
+            frame,
+            constants,
+            _held: Held {
+                _blas: blas,
+                _buffers: [vertices, triangles],
+                _textures: textures,
+                _sampler: sampler,
+            },
+        };
+        sample.show(0.0);
+        Ok(sample)
+    }
+
+    /// Moves everything to where it is at `phase` of the animation's round, 0 to 1.
+    pub fn show(&mut self, phase: f32) {
+        let sway = 0.35 * (TAU * phase).sin();
+        let eye = [9.2 * (0.5 + sway).sin(), 3.7, 9.2 * (0.5 + sway).cos()];
+        let camera = Camera::looking_at(eye, [0.0, 0.2, 0.6], 38.0);
+        self.constants.phase = phase;
+        self.constants.camera = GpuCamera::new(&camera, self.config.width, self.config.height, 0.1);
+    }
+
+    /// Instances that the compute shader writes.
+    pub fn instance_count(&self) -> u32 {
+        self.constants.count
+    }
+
+    /// Textures that they show.
+    pub fn texture_count(&self) -> usize {
+        TEXTURES
+    }
+
+    fn write_instances(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+        cmd.bind_compute_pipeline(*self.writer)?;
+        cmd.push_constants(&self.frame_address)?;
+        let writes = Dependencies { buffers: &[*self.records], ..Dependencies::default() };
+        cmd.dispatch([INSTANCE_COUNT.div_ceil(GROUP), 1, 1], &writes)
+    }
+
+    fn build_tlas(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+        let instances =
+            DeviceInstances { buffer: *self.records, offset: 0, count: INSTANCE_COUNT, blas: &self.blas };
+        cmd.update_tlas_from(*self.tlas, &instances, BuildMode::Rebuild)
+    }
+
+    fn trace(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+        let writes = Dependencies { storage_images: &[**self.canvas.picture()], ..Dependencies::default() };
+        self.tracer.record(cmd, &self.frame_address, self.config.extent(), &writes)
+    }
+}
+
+impl Sample for RtxTextures {
+    type Error = RtxError;
+
+    fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
+        self.show(moment.phase());
+        Ok(())
+    }
+
+    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, RtxError> {
+        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
+        let times = self.canvas.render(&[
+            ("instances", &|cmd| self.write_instances(cmd)),
+            ("TLAS build", &|cmd| self.build_tlas(cmd)),
+            ("rays", &|cmd| self.trace(cmd)),
+        ])?;
+        after_step(1);
+        Ok(times)
+    }
+
+    fn picture(&self) -> Result<Vec<u8>, RtxError> {
+        Ok(self.canvas.read()?)
+    }
+}
+
+fn build_blas(
+    ctx: &Context,
+    models: &Models,
+    [vertices, triangles]: [BufferHandle; 2],
+) -> lvk::Result<Vec<Holder<AccelStructHandle>>> {
+    let geometry = |range: &std::ops::Range<u32>| {
+        let offset = u64::from(range.start) * size_of::<[u32; 3]>() as u64;
+        [BlasGeometry::Triangles(Triangles {
+            vertex_buffer: vertices,
+            vertex_offset: 0,
+            vertex_stride: size_of::<Vertex>() as u64,
+            vertex_format: VertexFormat::F32x3,
+            vertex_count: models.vertices.len() as u32,
+            indices: Some(Indices { buffer: triangles, offset, format: IndexFormat::U32 }),
+            triangle_count: range.len() as u32,
+            transform: None,
+            flags: GeometryFlags::OPAQUE,
+        })]
+    };
+    let geometries: Vec<_> = models.ranges.iter().map(geometry).collect();
+    let desc = |geometries| BlasDesc { geometries, debug_name: "model", ..BlasDesc::default() };
+    let descs: Vec<_> = geometries.iter().map(|geometries| desc(&geometries[..])).collect();
+    ctx.create_blas_batch(&descs)
+}
+
+fn upload(ctx: &Context, picture: &Texture) -> lvk::Result<Holder<TextureHandle>> {
+    ctx.create_texture(&TextureDesc {
+        format: Format::Rgba8Srgb,
+        extent: [picture.width, picture.height],
+        mips: 0,
+        data: Some(&picture.pixels),
+        generate_mips: true,
+        debug_name: &picture.name,
+        ..TextureDesc::default()
+    })
+}
+
+fn buffer(ctx: &Context, debug_name: &str, size_bytes: u64) -> lvk::Result<Holder<BufferHandle>> {
+    ctx.create_buffer(&BufferDesc { size_bytes, debug_name, ..BufferDesc::default() })
+}

@@ -1,0 +1,36 @@
+//! The sample on the command line: pictures and timings out.
+
+use std::process::ExitCode;
+
+use super::{RtxTextures, RtxTexturesArgs};
+use crate::app::device::DeviceNeeds;
+use crate::app::run::{self, Opened, Opening};
+use crate::app::run_error::RunError;
+use crate::app::say;
+use crate::rtx::{RtxConfig, headline};
+
+/// What the sample and its pictures are called.
+const NAME: &str = "rtx_textures";
+
+/// Does what the command line says. Prints to standard output, errors in one line to standard error; the status
+/// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
+#[must_use]
+pub fn run(args: &RtxTexturesArgs) -> ExitCode {
+    match args.scene.listing("waves", "crates and rings with textures, on paving") {
+        Some(listing) => {
+            say(&listing);
+            ExitCode::SUCCESS
+        }
+        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+    }
+}
+
+fn open(args: &RtxTexturesArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxTextures>, RunError> {
+    let context = opening.device(&DeviceNeeds::default())?;
+    let capabilities = context.capabilities();
+    let config = RtxConfig::of(&args.run, capabilities)?;
+    let sample = RtxTextures::new(&context, &config)?;
+    let scene = format!("{} instances, {} textures", sample.instance_count(), sample.texture_count());
+    let headline = headline(capabilities, config.path, "a compute shader", &scene);
+    Ok(Opened { context, sample, headline })
+}

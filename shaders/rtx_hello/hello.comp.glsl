@@ -1,0 +1,29 @@
+// Rays of a pixel, by ray queries.
+#define LVK_OPAQUE_TRIANGLES_ONLY
+#include <lvk/ray_query.glsl>
+#include "rtx_hello/view.glsl"
+layout(local_size_x = 8, local_size_y = 8) in;
+
+vec3 colorAlong(vec3 direction) {
+    LvkRayQuery query;
+    lvkRayQueryInitialize(query, tlas, LVK_RAY_FLAG_OPAQUE, 0xffu, kEye, 0.0, direction, 99.0);
+    while (lvkRayQueryProceed(query)) {
+    }
+    if (lvkRayQueryType(query, LVK_COMMITTED) == LVK_COMMITTED_NONE) {
+        return backdropColor(direction);
+    }
+    vec3 normal = lvkRayQueryObjectToWorld(query, LVK_COMMITTED)[2];
+    return triangleColor(lvkRayQueryBarycentrics(query, LVK_COMMITTED), normal);
+}
+
+void main() {
+    uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (pixel.x >= size.x || pixel.y >= size.y) {
+        return;
+    }
+    vec3 sum = vec3(0.0);
+    for (uint place = 0u; place < 4u; ++place) {
+        sum += colorAlong(rayDirection(pixel, place));
+    }
+    imageStore(kImages2D[image], ivec2(pixel), vec4(sum / 4.0, 1.0));
+}

@@ -1,0 +1,11 @@
+// Hit group kPainted: reads the texture that the instance names.
+#include "rtx_textures/surface.glsl"
+
+layout(location = 0) rayPayloadInEXT Found payload;
+hitAttributeEXT vec2 barycentrics;
+
+void main() {
+    uint primitive = uint(lvkPrimitiveIndex(frame.tlas));
+    payload = asPainted(surfaceOf(uint(gl_InstanceCustomIndexEXT), primitive, barycentrics, mat3(gl_ObjectToWorldEXT),
+                                 gl_WorldRayDirectionEXT, gl_HitTEXT, payload.distance));
+}

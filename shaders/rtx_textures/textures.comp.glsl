@@ -1,0 +1,41 @@
+// Rays of a pixel, by ray queries. What the hit groups do is chosen by the offset that leads to them.
+#define LVK_OPAQUE_TRIANGLES_ONLY
+#include <lvk/ray_query.glsl>
+
+#include "rtx_textures/surface.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+Found traceNearest(vec3 origin, vec3 direction, float travelled) {
+    LvkRayQuery query;
+    lvkRayQueryInitialize(query, frame.tlas, LVK_RAY_FLAG_OPAQUE, 0xffu, origin, 0.0, direction, 1e4);
+    while (lvkRayQueryProceed(query)) {
+    }
+    if (lvkRayQueryType(query, LVK_COMMITTED) == LVK_COMMITTED_NONE) {
+        return Found(vec3(0.0), -1.0, vec3(0.0), 0.0);
+    }
+    uint customIndex = uint(lvkRayQueryInstanceCustomIndex(query, LVK_COMMITTED));
+    uint primitive = uint(lvkRayQueryPrimitiveIndex(query, LVK_COMMITTED, frame.tlas));
+    Found found = surfaceOf(customIndex, primitive, lvkRayQueryBarycentrics(query, LVK_COMMITTED),
+                            mat3(lvkRayQueryObjectToWorld(query, LVK_COMMITTED)), direction,
+                            lvkRayQueryT(query, LVK_COMMITTED), travelled);
+    return uint(lvkRayQuerySbtOffset(query, LVK_COMMITTED)) == kGlazed ? asGlazed(found) : asPainted(found);
+}
+
+bool reachesSky(vec3 origin, vec3 direction) {
+    LvkRayQuery query;
+    const uint flags = LVK_RAY_FLAG_OPAQUE | LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT;
+    lvkRayQueryInitialize(query, frame.tlas, flags, 0xffu, origin, 0.0, direction, 1e4);
+    while (lvkRayQueryProceed(query)) {
+    }
+    return lvkRayQueryType(query, LVK_COMMITTED) == LVK_COMMITTED_NONE;
+}
+
+#include "rtx_textures/shade.glsl"
+
+void main() {
+    uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
+        renderPixel(pixel);
+    }
+}
