@@ -12,6 +12,7 @@ pub(crate) mod gpu_build;
 mod instances;
 mod kernel;
 pub(crate) mod query;
+mod query_log;
 pub(crate) mod render;
 pub(crate) mod render_pass;
 mod software;
@@ -36,6 +37,7 @@ use crate::submit::Recording;
 
 use accel::OpenBuild;
 use bind::PushConstants;
+use query_log::QueryLog;
 use tlas::TlasUpdate;
 use transfer::Settle;
 use uses::Uses;
@@ -61,12 +63,15 @@ pub struct CommandBuffer {
     open_labels: u32,
     /// Whether a render pass is open; it stays so where its value was forgotten instead of dropped.
     rendering: bool,
+    /// Whether one was ever begun.
+    had_pass: bool,
     settle: Vec<Settle>,
     tlas_updates: Vec<TlasUpdate>,
     open_builds: Vec<OpenBuild>,
     /// Refits since the last rebuild of each bottom-level structure that is built here, by its id.
     refits: HashMap<u64, u32>,
     size_queries: Vec<Arc<SizeQuery>>,
+    queries: QueryLog,
     /// Bottom-level structures that are built elsewhere from here on, by their ids.
     moved: HashSet<u64>,
 }
@@ -76,6 +81,7 @@ pub(crate) struct Outcome {
     pub(crate) tlas_updates: Vec<TlasUpdate>,
     pub(crate) builds: Vec<OpenBuild>,
     pub(crate) size_queries: Vec<Arc<SizeQuery>>,
+    queries: QueryLog,
 }
 
 impl Outcome {
@@ -84,6 +90,7 @@ impl Outcome {
         self.tlas_updates.into_iter().for_each(|update| update.apply(shared));
         self.builds.into_iter().for_each(|build| build.submit(value));
         self.size_queries.iter().for_each(|query| query.submit());
+        self.queries.submit();
     }
 }
 
@@ -102,11 +109,13 @@ impl CommandBuffer {
             host_reads: Vec::new(),
             open_labels: 0,
             rendering: false,
+            had_pass: false,
             settle: Vec::new(),
             tlas_updates: Vec::new(),
             open_builds: Vec::new(),
             refits: HashMap::new(),
             size_queries: Vec::new(),
+            queries: QueryLog::default(),
             moved: HashSet::new(),
         })
     }
@@ -144,6 +153,7 @@ impl CommandBuffer {
         while self.open_labels > 0 {
             self.pop_label();
         }
+        self.end_open_queries();
         self.settle();
         for id in std::mem::take(&mut self.host_reads) {
             self.uses.id(id, Use::host_read());
@@ -156,6 +166,7 @@ impl CommandBuffer {
             tlas_updates: std::mem::take(&mut self.tlas_updates),
             builds: std::mem::take(&mut self.open_builds),
             size_queries: std::mem::take(&mut self.size_queries),
+            queries: std::mem::take(&mut self.queries),
         };
         (recording, outcome)
     }

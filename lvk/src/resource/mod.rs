@@ -2,6 +2,7 @@
 
 pub(crate) mod buffer;
 pub(crate) mod query;
+pub(crate) mod query_marks;
 pub(crate) mod sampler;
 pub(crate) mod texture;
 
