@@ -54,7 +54,7 @@
 //! | build what rays hit | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
 //! | say what a shader reaches | [`Dependencies`] |
 //! | submit, wait, keep frames apart | [`Context::submit`], [`Context::wait`], [`Context::next_frame`] |
-//! | measure | [`manual::measuring`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
+//! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
 //! | check | [`Validation`], [`ValidationSink`] |
 //! | mix in Vulkan calls of your own | `Context::raw_*`, [`CommandBuffer::raw`] |
 //!
@@ -158,4 +158,4 @@ pub use resource::texture::{TextureDesc, TextureKind, TextureRegion, TextureUsag
 #[cfg(feature = "glsl")]
 pub use shader::compile_glsl;
 pub use shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
-pub use submit::SubmitHandle;
+pub use submit::{GpuProfile, GpuScope, SubmitHandle};

@@ -11,6 +11,7 @@ pub(crate) mod flush;
 pub(crate) mod gpu_build;
 mod instances;
 mod kernel;
+mod label;
 pub(crate) mod query;
 mod query_log;
 pub(crate) mod render;
@@ -34,6 +35,7 @@ use crate::error::Result;
 use crate::pipeline::{ComputePipeline, RayTracingPipeline};
 use crate::shared::Shared;
 use crate::submit::Recording;
+use crate::submit::profiler::Scopes;
 
 use accel::OpenBuild;
 use bind::PushConstants;
@@ -72,6 +74,8 @@ pub struct CommandBuffer {
     refits: HashMap<u64, u32>,
     size_queries: Vec<Arc<SizeQuery>>,
     queries: QueryLog,
+    /// Present where the command buffer is profiled.
+    scopes: Option<Box<Scopes>>,
     /// Bottom-level structures that are built elsewhere from here on, by their ids.
     moved: HashSet<u64>,
 }
@@ -82,6 +86,8 @@ pub(crate) struct Outcome {
     pub(crate) builds: Vec<OpenBuild>,
     pub(crate) size_queries: Vec<Arc<SizeQuery>>,
     queries: QueryLog,
+    /// Present where the command buffer was profiled.
+    pub(crate) scopes: Option<Box<Scopes>>,
 }
 
 impl Outcome {
@@ -96,8 +102,10 @@ impl Outcome {
 
 impl CommandBuffer {
     pub(crate) fn new(shared: &Arc<Shared>) -> Result<Self> {
+        let recording = shared.submitter.acquire()?;
         Ok(Self {
-            recording: ManuallyDrop::new(shared.submitter.acquire()?),
+            scopes: shared.profiler.begin(recording.commands),
+            recording: ManuallyDrop::new(recording),
             shared: Arc::clone(shared),
             finished: false,
             uses: Uses::default(),
@@ -120,20 +128,6 @@ impl CommandBuffer {
         })
     }
 
-    /// Opens a labelled range that debuggers and profilers show.
-    pub fn push_label(&mut self, name: &str) {
-        self.shared.gpu.begin_label(self.raw(), name);
-        self.open_labels += 1;
-    }
-
-    /// Closes the innermost labelled range; does nothing where none is open.
-    pub fn pop_label(&mut self) {
-        if self.open_labels > 0 {
-            self.shared.gpu.end_label(self.raw());
-            self.open_labels -= 1;
-        }
-    }
-
     /// The Vulkan command buffer, for commands the library does not have.
     ///
     /// What is recorded this way is not tracked: the caller places its barriers, and leaves images in the layout it
@@ -150,15 +144,14 @@ impl CommandBuffer {
 
     /// Ends the recording. Answers also what becomes true once it is submitted.
     pub(crate) fn finish(mut self) -> (Recording, Outcome) {
-        while self.open_labels > 0 {
-            self.pop_label();
-        }
+        self.pop_labels(0);
         self.end_open_queries();
         self.settle();
         for id in std::mem::take(&mut self.host_reads) {
             self.uses.id(id, Use::host_read());
         }
         self.flush();
+        self.stamp(None);
         self.finished = true;
         // SAFETY: `finished` keeps `drop` from taking the recording again.
         let recording = unsafe { ManuallyDrop::take(&mut self.recording) };
@@ -167,6 +160,7 @@ impl CommandBuffer {
             builds: std::mem::take(&mut self.open_builds),
             size_queries: std::mem::take(&mut self.size_queries),
             queries: std::mem::take(&mut self.queries),
+            scopes: self.scopes.take(),
         };
         (recording, outcome)
     }
@@ -178,6 +172,9 @@ impl Drop for CommandBuffer {
             // SAFETY: only `finish` takes the recording too, and it sets `finished`.
             let recording = unsafe { ManuallyDrop::take(&mut self.recording) };
             self.shared.submitter.discard(recording);
+            if let Some(scopes) = self.scopes.take() {
+                self.shared.profiler.discard(*scopes);
+            }
         }
     }
 }

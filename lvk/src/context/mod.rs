@@ -13,6 +13,7 @@ mod dummy;
 pub(crate) mod frame;
 pub(crate) mod holder;
 mod interop;
+mod profile;
 mod queries;
 mod read_bounds;
 pub(crate) mod serialize;

@@ -31,9 +31,11 @@ impl Context {
     }
 
     fn send(&self, commands: impl Iterator<Item = CommandBuffer>) -> Result<SubmitHandle> {
-        let (recordings, outcomes): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
+        let (recordings, mut outcomes): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
         let shared = self.shared();
         let value = shared.submitter.submit(recordings, || shared.bindless.flush())?;
+        let scopes = outcomes.iter_mut().filter_map(|outcome| outcome.scopes.take());
+        shared.profiler.submit(value, scopes.map(|scopes| *scopes).collect());
         outcomes.into_iter().for_each(|outcome| outcome.submit(shared, value));
         shared.collect()?;
         Ok(self.submission(value))

@@ -197,6 +197,15 @@ impl Gpu {
         unsafe { ext.cmd_begin_debug_utils_label(commands, &label) };
     }
 
+    /// Marks a place in a command buffer.
+    pub(crate) fn insert_label(&self, commands: vk::CommandBuffer, name: &str) {
+        let Some(ext) = &self.debug_utils else { return };
+        let name = c_name(name);
+        let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
+        // SAFETY: the command buffer is being recorded.
+        unsafe { ext.cmd_insert_debug_utils_label(commands, &label) };
+    }
+
     /// Closes the innermost labelled range.
     pub(crate) fn end_label(&self, commands: vk::CommandBuffer) {
         if let Some(ext) = &self.debug_utils {
