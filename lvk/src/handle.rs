@@ -60,7 +60,7 @@ handles! {
     RayTracingPipelineHandle, "ray tracing pipeline";
     /// Names a library of compiled ray tracing shaders.
     RayTracingLibraryHandle, "ray tracing library";
-    /// Names a pool of timestamp queries.
+    /// Names a pool of queries.
     QueryPoolHandle, "query pool";
     /// Names a bottom- or top-level acceleration structure.
     AccelStructHandle, "acceleration structure";

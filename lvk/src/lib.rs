@@ -55,7 +55,7 @@
 //! | build what rays hit | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
 //! | say what a shader reaches | [`Dependencies`] |
 //! | submit, wait, keep frames apart | [`Context::submit`], [`Context::wait`], [`Context::next_frame`] |
-//! | measure | [`CommandBuffer::write_timestamp`], [`Context::timestamps_ms`] |
+//! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
 //! | check | [`Validation`], [`ValidationSink`] |
 //! | mix in Vulkan calls of your own | `Context::raw_*`, [`CommandBuffer::raw`] |
 //!
@@ -134,6 +134,7 @@ pub use context::serialize::LoadedBlas;
 pub use error::{Error, Result};
 pub use format::{Format, IndexFormat, VertexFormat};
 pub use gpu::caps::{Capabilities, FeatureRequest, Limits};
+pub use gpu::clock::ClockPair;
 pub use gpu::debug::{Validation, ValidationMessage, ValidationSink};
 pub use gpu::memory::MemoryKind;
 pub use gpu::mesh_limits::MeshLimits;
@@ -152,7 +153,7 @@ pub use pipeline::library::RayTracingLibraryDesc;
 pub use pipeline::ray_tracing::{HitGroup, RayTracingPipelineDesc, record_bytes};
 pub use pipeline::stage::{SpecializationConstant, SpecializationValue};
 pub use resource::buffer::{BufferDesc, BufferUsage};
-pub use resource::query::QueryPoolDesc;
+pub use resource::query::{PipelineStatistics, QueryKind, QueryPoolDesc};
 pub use resource::sampler::{AddressMode, CompareOp, Filter, SamplerDesc};
 pub use resource::texture::TextureRegion;
 pub use resource::texture_desc::{TextureDesc, TextureKind, TextureUsage};
@@ -160,4 +161,4 @@ pub use resource::view::{Channel, Swizzle, TextureViewDesc};
 #[cfg(feature = "glsl")]
 pub use shader::compile_glsl;
 pub use shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
-pub use submit::SubmitHandle;
+pub use submit::{GpuProfile, GpuScope, SubmitHandle};

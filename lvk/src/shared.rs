@@ -25,6 +25,7 @@ use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::software::tree_cache::TreeCache;
 use crate::store::Store;
 use crate::submit::Submitter;
+use crate::submit::profiler::Profiler;
 use crate::upload::{SpareBuffers, Staging};
 
 /// The parts of a context below the command layer. Fields are dropped in this order, the device last.
@@ -47,6 +48,7 @@ pub(crate) struct Shared {
     /// Where the context keeps trees that the CPU has built.
     pub(crate) tree_cache: Option<TreeCache>,
     pub(crate) submitter: Submitter<Garbage>,
+    pub(crate) profiler: Profiler,
     /// Where graphics pipelines query rays.
     pub(crate) graphics_queries: QueryStages,
     /// Stands for every bottom-level structure at once: their builds add to it; builds of top levels, traces and
@@ -125,7 +127,7 @@ impl Shared {
             self.staging.release(sequence);
         }
         finished.garbage.into_iter().for_each(|garbage| self.dispose(garbage));
-        Ok(())
+        self.profiler.collect(self.submitter.timeline.seen())
     }
 
     /// Drops an object the GPU is done with, and frees its slot.

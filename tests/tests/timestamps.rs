@@ -10,7 +10,9 @@ use lvk_tests::device;
 #[test]
 fn times_rise_and_stay_below_the_wall_clock() {
     let Some(ctx) = device() else { return };
-    let pool = ctx.create_query_pool(&QueryPoolDesc { count: 4, debug_name: "times" }).unwrap();
+    let pool = ctx
+        .create_query_pool(&QueryPoolDesc { count: 4, debug_name: "times", ..Default::default() })
+        .unwrap();
     assert_eq!(ctx.timestamps_ms(*pool, 0, 4).unwrap(), [None; 4]);
     let work = compute_pipeline(
         &ctx,
@@ -69,7 +71,9 @@ fn queries_are_written_again_after_a_reset() {
 #[test]
 fn queries_outside_of_the_pool_are_errors() {
     let Some(ctx) = device() else { return };
-    let pool = ctx.create_query_pool(&QueryPoolDesc { count: 3, debug_name: "three" }).unwrap();
+    let pool = ctx
+        .create_query_pool(&QueryPoolDesc { count: 3, debug_name: "three", ..Default::default() })
+        .unwrap();
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let refused = [
         cmd.write_timestamp(*pool, 3),
@@ -93,7 +97,9 @@ fn queries_outside_of_the_pool_are_errors() {
 #[test]
 fn impossible_pools_are_errors() {
     let Some(ctx) = device() else { return };
-    let make = |count| ctx.create_query_pool(&QueryPoolDesc { count, debug_name: "odd one" }).map(drop);
+    let make = |count| {
+        ctx.create_query_pool(&QueryPoolDesc { count, debug_name: "odd one", ..Default::default() }).map(drop)
+    };
     assert!(matches!(make(0), Err(Error::InvalidUsage { .. })));
     assert!(matches!(make(65_537), Err(Error::LimitExceeded { requested: 65_537, limit: 65_536, .. })));
     make(65_536).unwrap();

@@ -11,8 +11,10 @@ pub(crate) mod flush;
 pub(crate) mod gpu_build;
 mod instances;
 mod kernel;
+mod label;
 mod part_uses;
 pub(crate) mod query;
+mod query_log;
 pub(crate) mod render;
 pub(crate) mod render_pass;
 mod software;
@@ -34,9 +36,11 @@ use crate::error::Result;
 use crate::pipeline::{ComputePipeline, RayTracingPipeline};
 use crate::shared::Shared;
 use crate::submit::Recording;
+use crate::submit::profiler::Scopes;
 
 use accel::OpenBuild;
 use bind::PushConstants;
+use query_log::QueryLog;
 use tlas::TlasUpdate;
 use transfer::Settle;
 use uses::Uses;
@@ -62,12 +66,17 @@ pub struct CommandBuffer {
     open_labels: u32,
     /// Whether a render pass is open; it stays so where its value was forgotten instead of dropped.
     rendering: bool,
+    /// Whether one was ever begun.
+    had_pass: bool,
     settle: Vec<Settle>,
     tlas_updates: Vec<TlasUpdate>,
     open_builds: Vec<OpenBuild>,
     /// Refits since the last rebuild of each bottom-level structure that is built here, by its id.
     refits: HashMap<u64, u32>,
     size_queries: Vec<Arc<SizeQuery>>,
+    queries: QueryLog,
+    /// Present where the command buffer is profiled.
+    scopes: Option<Box<Scopes>>,
     /// Bottom-level structures that are built elsewhere from here on, by their ids.
     moved: HashSet<u64>,
 }
@@ -77,6 +86,9 @@ pub(crate) struct Outcome {
     pub(crate) tlas_updates: Vec<TlasUpdate>,
     pub(crate) builds: Vec<OpenBuild>,
     pub(crate) size_queries: Vec<Arc<SizeQuery>>,
+    queries: QueryLog,
+    /// Present where the command buffer was profiled.
+    pub(crate) scopes: Option<Box<Scopes>>,
 }
 
 impl Outcome {
@@ -85,13 +97,16 @@ impl Outcome {
         self.tlas_updates.into_iter().for_each(|update| update.apply(shared));
         self.builds.into_iter().for_each(|build| build.submit(value));
         self.size_queries.iter().for_each(|query| query.submit());
+        self.queries.submit();
     }
 }
 
 impl CommandBuffer {
     pub(crate) fn new(shared: &Arc<Shared>) -> Result<Self> {
+        let recording = shared.submitter.acquire()?;
         Ok(Self {
-            recording: ManuallyDrop::new(shared.submitter.acquire()?),
+            scopes: shared.profiler.begin(recording.commands),
+            recording: ManuallyDrop::new(recording),
             shared: Arc::clone(shared),
             finished: false,
             uses: Uses::default(),
@@ -103,27 +118,15 @@ impl CommandBuffer {
             host_reads: Vec::new(),
             open_labels: 0,
             rendering: false,
+            had_pass: false,
             settle: Vec::new(),
             tlas_updates: Vec::new(),
             open_builds: Vec::new(),
             refits: HashMap::new(),
             size_queries: Vec::new(),
+            queries: QueryLog::default(),
             moved: HashSet::new(),
         })
-    }
-
-    /// Opens a labelled range that debuggers and profilers show.
-    pub fn push_label(&mut self, name: &str) {
-        self.shared.gpu.begin_label(self.raw(), name);
-        self.open_labels += 1;
-    }
-
-    /// Closes the innermost labelled range; does nothing where none is open.
-    pub fn pop_label(&mut self) {
-        if self.open_labels > 0 {
-            self.shared.gpu.end_label(self.raw());
-            self.open_labels -= 1;
-        }
     }
 
     /// The Vulkan command buffer, for commands the library does not have.
@@ -142,14 +145,14 @@ impl CommandBuffer {
 
     /// Ends the recording. Answers also what becomes true once it is submitted.
     pub(crate) fn finish(mut self) -> (Recording, Outcome) {
-        while self.open_labels > 0 {
-            self.pop_label();
-        }
+        self.pop_labels(0);
+        self.end_open_queries();
         self.settle();
         for id in std::mem::take(&mut self.host_reads) {
             self.uses.id(id, Use::host_read());
         }
         self.flush();
+        self.stamp(None);
         self.finished = true;
         // SAFETY: `finished` keeps `drop` from taking the recording again.
         let recording = unsafe { ManuallyDrop::take(&mut self.recording) };
@@ -157,6 +160,8 @@ impl CommandBuffer {
             tlas_updates: std::mem::take(&mut self.tlas_updates),
             builds: std::mem::take(&mut self.open_builds),
             size_queries: std::mem::take(&mut self.size_queries),
+            queries: std::mem::take(&mut self.queries),
+            scopes: self.scopes.take(),
         };
         (recording, outcome)
     }
@@ -168,6 +173,9 @@ impl Drop for CommandBuffer {
             // SAFETY: only `finish` takes the recording too, and it sets `finished`.
             let recording = unsafe { ManuallyDrop::take(&mut self.recording) };
             self.shared.submitter.discard(recording);
+            if let Some(scopes) = self.scopes.take() {
+                self.shared.profiler.discard(*scopes);
+            }
         }
     }
 }

@@ -1,37 +1,155 @@
-//! Timestamps.
+//! Queries: timestamps, and what happens between a begin and an end.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use ash::vk;
 
 use super::CommandBuffer;
-use crate::error::Result;
+use super::render::RenderPass;
+use crate::error::{Error, Result};
 use crate::handle::QueryPoolHandle;
+use crate::resource::QueryPool;
+use crate::resource::query::QueryKind;
 
 impl CommandBuffer {
     /// Makes queries ready to be written again (`vkCmdResetQueryPool`).
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for open ones.
     pub fn reset_queries(&mut self, pool: QueryPoolHandle, queries: Range<u32>) -> Result<()> {
         let pool = self.shared.store.query_pools.get(pool)?;
         let count = queries.end.saturating_sub(queries.start);
         pool.check_range(queries.start, count)?;
+        self.queries.check_reset(&pool, queries.clone())?;
         if count > 0 {
             self.end_rendering();
-            // SAFETY: the queries exist, and no pass is open.
+            // SAFETY: the queries exist and are not open, and no pass is open.
             unsafe {
                 self.shared.gpu.device.cmd_reset_query_pool(self.raw(), pool.raw, queries.start, count)
             };
+            self.queries.reset(&pool, queries);
         }
         Ok(())
     }
 
     /// Writes the time at which every earlier command is done (`vkCmdWriteTimestamp2`). The query must have been
     /// reset since it was last written.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a query outside of the pool, for pools of another kind, and
+    /// where this command buffer has written the query already. What earlier command buffers have written,
+    /// [`Context::submit`](crate::Context::submit) checks.
     pub fn write_timestamp(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         let pool = self.shared.store.query_pools.get(pool)?;
         pool.check_range(query, 1)?;
+        pool.check_kind(pool.kind == QueryKind::Timestamps, "measure with begin_query and end_query")?;
+        self.queries.check_ready(&pool, query)?;
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
-        // SAFETY: the query exists.
+        // SAFETY: the query exists and is ready.
         unsafe { self.shared.gpu.device.cmd_write_timestamp2(self.raw(), stage, pool.raw, query) };
+        self.queries.write(&pool, query);
         Ok(())
+    }
+
+    /// Begins to count: samples that pass, or what the stages do (`vkCmdBeginQuery`), up to
+    /// [`end_query`](Self::end_query). Passes may lie in between. The query must have been reset since it was last used.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a query outside of the pool, for pools of timestamps, while
+    /// another query of the same kind is open, and where this command buffer has used the query already. What earlier
+    /// command buffers have used, [`Context::submit`](crate::Context::submit) checks.
+    /// [`Unsupported`](Error::Unsupported) for statistics behind a render pass on lavapipe, which crashes there.
+    pub fn begin_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
+        self.end_rendering();
+        self.begin_query_here(pool, query)
+    }
+
+    /// Ends what [`begin_query`](Self::begin_query) began (`vkCmdEndQuery`).
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) where the query is not open, or was begun in a render pass.
+    pub fn end_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
+        self.end_rendering();
+        self.end_query_here(pool, query)
+    }
+
+    fn begin_query_here(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
+        let pool = self.shared.store.query_pools.get(pool)?;
+        pool.check_range(query, 1)?;
+        pool.check_kind(pool.kind != QueryKind::Timestamps, "write them with write_timestamp")?;
+        self.queries.check_begin(&pool)?;
+        self.queries.check_ready(&pool, query)?;
+        self.check_statistics(pool.kind)?;
+        // SAFETY: the query exists and is ready, and none of its type is open.
+        unsafe {
+            let device = &self.shared.gpu.device;
+            device.cmd_begin_query(self.raw(), pool.raw, query, pool.kind.control());
+        }
+        self.queries.begin(pool, query, self.rendering);
+        Ok(())
+    }
+
+    /// lavapipe 25.0 crashes where pipeline statistics begin outside of render passes after one.
+    fn check_statistics(&self, kind: QueryKind) -> Result<()> {
+        let gpu = &self.shared.gpu;
+        let outside = self.had_pass && !self.rendering;
+        if kind != QueryKind::PipelineStatistics || !outside || gpu.caps.driver_name != "llvmpipe" {
+            return Ok(());
+        }
+        let why = "lavapipe cannot; begin them inside of a pass, before the first pass, or in a command buffer of their own";
+        Err(Error::unsupported("beginning pipeline statistics behind a render pass", why))
+    }
+
+    fn end_query_here(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
+        let pool = self.shared.store.query_pools.get(pool)?;
+        self.queries.end(&pool, query, self.rendering)?;
+        self.record_end_query(&pool, query);
+        Ok(())
+    }
+
+    /// Ends what was begun in the pass that ends now; that it is open is an error of the submission.
+    pub(super) fn end_pass_queries(&mut self) {
+        for open in self.queries.take_pass_queries() {
+            self.record_end_query(&open.pool, open.query);
+        }
+    }
+
+    /// Ends what is still open.
+    pub(super) fn end_open_queries(&mut self) {
+        self.end_rendering();
+        for open in self.queries.take_open() {
+            self.record_end_query(&open.pool, open.query);
+        }
+    }
+
+    fn record_end_query(&self, pool: &Arc<QueryPool>, query: u32) {
+        // SAFETY: the query was begun on this side of the pass and has not been ended.
+        unsafe { self.shared.gpu.device.cmd_end_query(self.raw(), pool.raw, query) };
+    }
+
+    /// Fails where a query is open, or is written again without a reset.
+    pub(crate) fn check_queries(&self) -> Result<()> {
+        self.queries.check_submit()
+    }
+}
+
+impl RenderPass<'_> {
+    /// As [`CommandBuffer::write_timestamp`], between draws. Devices that draw in tiles answer times of the whole pass.
+    pub fn write_timestamp(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
+        self.cmd.write_timestamp(pool, query)
+    }
+
+    /// As [`CommandBuffer::begin_query`], to be ended in the same pass.
+    pub fn begin_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
+        self.cmd.begin_query_here(pool, query)
+    }
+
+    /// Ends what [`begin_query`](Self::begin_query) began in this pass (`vkCmdEndQuery`).
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) where the query is not open, or was begun before the pass.
+    pub fn end_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
+        self.cmd.end_query_here(pool, query)
     }
 }

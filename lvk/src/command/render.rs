@@ -30,7 +30,9 @@ use crate::resource::buffer::BufferUsage;
 pub struct RenderPass<'a> {
     pub(super) cmd: &'a mut CommandBuffer,
     targets: Targets,
-    labelled: bool,
+    pub(super) labelled: bool,
+    /// Labels open around the pass.
+    pub(super) labels_outside: u32,
     pipeline: Option<Arc<RenderPipeline>>,
     indices: Option<BoundIndices>,
     vertex_slots: u32,
@@ -45,7 +47,9 @@ struct BoundIndices {
 impl<'a> RenderPass<'a> {
     pub(super) fn new(cmd: &'a mut CommandBuffer, targets: Targets, labelled: bool) -> Self {
         let [width, height] = targets.extent;
-        let pass = Self { cmd, targets, labelled, pipeline: None, indices: None, vertex_slots: 0 };
+        let labels_outside = cmd.open_labels - u32::from(labelled);
+        let pass =
+            Self { cmd, targets, labelled, labels_outside, pipeline: None, indices: None, vertex_slots: 0 };
         pass.set_viewport([0.0, 0.0, width as f32, height as f32], [0.0, 1.0]);
         pass.set_scissor([0, 0], [width, height]);
         pass
@@ -342,9 +346,7 @@ impl<'a> RenderPass<'a> {
 impl Drop for RenderPass<'_> {
     fn drop(&mut self) {
         self.cmd.end_rendering();
-        if self.labelled {
-            self.cmd.pop_label();
-        }
+        self.cmd.pop_labels(self.labels_outside);
     }
 }
 

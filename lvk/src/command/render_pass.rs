@@ -70,11 +70,14 @@ impl CommandBuffer {
         // SAFETY: the views are alive and in the layouts named; no other pass is open, as passes borrow `self`.
         unsafe { self.shared.gpu.device.cmd_begin_rendering(self.raw(), &info) };
         self.rendering = true;
+        self.had_pass = true;
     }
 
     /// Ends the pass that is open, if any: everything but draws happens outside of passes.
     pub(super) fn end_rendering(&mut self) {
-        if std::mem::take(&mut self.rendering) {
+        if self.rendering {
+            self.end_pass_queries();
+            self.rendering = false;
             // SAFETY: a pass was begun and has not been ended.
             unsafe { self.shared.gpu.device.cmd_end_rendering(self.raw()) };
         }

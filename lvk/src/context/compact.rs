@@ -73,7 +73,7 @@ impl Context {
             targets.push((Arc::clone(target), count));
             count += target.blas()?.parts.len() as u32;
         }
-        let desc = QueryPoolDesc { count, debug_name: "compacted sizes" };
+        let desc = QueryPoolDesc { count, debug_name: "compacted sizes", ..Default::default() };
         let ty = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
         let pool = QueryPool::of(&self.shared().gpu, &desc, ty)?;
         let query = Arc::new(SizeQuery::new(pool, targets));

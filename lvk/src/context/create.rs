@@ -86,7 +86,11 @@ impl Context {
         Ok(Holder::new(self, shared.store.compute_pipelines.insert(pipeline), NO_SLOT))
     }
 
-    /// Creates a pool of timestamp queries (`vkCreateQueryPool`), all ready to be written.
+    /// Creates a pool of queries (`vkCreateQueryPool`), all ready to be written.
+    ///
+    /// # Errors
+    /// [`Unsupported`](Error::Unsupported) where the device lacks the kind, [`LimitExceeded`](Error::LimitExceeded) for
+    /// more than 65,536 queries, and [`InvalidUsage`](Error::InvalidUsage) for none.
     pub fn create_query_pool(&self, desc: &QueryPoolDesc<'_>) -> Result<Holder<QueryPoolHandle>> {
         let pool = QueryPool::new(&self.shared().gpu, desc)?;
         Ok(Holder::new(self, self.shared().store.query_pools.insert(pool), NO_SLOT))

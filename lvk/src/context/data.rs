@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::Context;
 use crate::error::Result;
 use crate::gpu::memory::MemoryKind;
-use crate::handle::{BufferHandle, QueryPoolHandle, TextureHandle};
+use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::resource::texture::TextureRegion;
@@ -63,12 +63,6 @@ impl Context {
             cmd.copy_texture_objects_to_buffer(&texture, &region, target, 0)
         })?;
         Ok(bytes)
-    }
-
-    /// Milliseconds of `count` timestamps since an arbitrary start that all share; `None` where none was written yet
-    /// (`vkGetQueryPoolResults`). Does not wait.
-    pub fn timestamps_ms(&self, pool: QueryPoolHandle, first: u32, count: u32) -> Result<Vec<Option<f64>>> {
-        self.shared().store.query_pools.get(pool)?.milliseconds(first, count)
     }
 
     /// Runs a copy into a readback buffer, waits, and reads it.

@@ -54,6 +54,7 @@ impl Context {
             let mut frames = self.inner.frames.lock().unwrap_or_else(PoisonError::into_inner);
             frames.start(submitted)
         };
+        self.shared().profiler.begin_frame(frame.number);
         self.wait(self.submission(wait_for))?;
         self.advance_compactions();
         Ok(frame)

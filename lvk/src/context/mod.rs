@@ -14,6 +14,8 @@ mod dummy;
 pub(crate) mod frame;
 pub(crate) mod holder;
 mod interop;
+mod profile;
+mod queries;
 mod read_bounds;
 pub(crate) mod serialize;
 mod software_blas;

@@ -116,7 +116,7 @@ impl Context {
 
     fn serialized_sizes(&self, object: &AccelStruct, body: &BlasBody) -> Result<Vec<u64>> {
         let count = body.structures.len() as u32;
-        let desc = QueryPoolDesc { count, debug_name: "serialised sizes" };
+        let desc = QueryPoolDesc { count, debug_name: "serialised sizes", ..Default::default() };
         let ty = vk::QueryType::ACCELERATION_STRUCTURE_SERIALIZATION_SIZE_KHR;
         let pool = Arc::new(QueryPool::of(&self.shared().gpu, &desc, ty)?);
         let mut cmd = self.acquire_command_buffer()?;

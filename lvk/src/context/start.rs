@@ -27,6 +27,7 @@ use crate::shared::Shared;
 use crate::software::tree_cache::TreeCache;
 use crate::store::Store;
 use crate::submit::Submitter;
+use crate::submit::profiler::Profiler;
 use crate::upload::{SpareBuffers, Staging};
 
 impl Context {
@@ -82,6 +83,7 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         tree_cache: desc.tree_cache.map(TreeCache::new),
         bindless,
         submitter: Submitter::new(&gpu)?,
+        profiler: Profiler::new(&gpu),
         all_blas: ResourceId::next(),
         all_tlas: ResourceId::next(),
         tlas_tables: ResourceId::next(),

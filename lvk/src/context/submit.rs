@@ -15,8 +15,9 @@ impl Context {
     /// Submits a command buffer, after uploads and builds made before (`vkQueueSubmit2`). Does not wait.
     ///
     /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage) if the command buffer belongs to another context, or refits a top-level
-    /// structure whose number of instances another submission changed meanwhile. A failure of Vulkan itself leaves
+    /// [`InvalidUsage`](Error::InvalidUsage) if the command buffer belongs to another context, refits a top-level
+    /// structure whose number of instances another submission changed meanwhile, left a query open, or writes one that
+    /// was written and not reset. A failure of Vulkan itself leaves
     /// the context without a known state: this and every later submission answers it, and a new context is needed.
     pub fn submit(&self, cmd: CommandBuffer) -> Result<SubmitHandle> {
         if !cmd.belongs_to(self.shared()) {
@@ -25,6 +26,7 @@ impl Context {
         self.advance_compactions();
         let mut pending = self.pending();
         cmd.check_tlas_updates()?;
+        cmd.check_queries()?;
         if !self.shared().freed_tlas().is_empty() {
             self.open(&mut pending)?;
         }
@@ -32,9 +34,11 @@ impl Context {
     }
 
     fn send(&self, commands: impl Iterator<Item = CommandBuffer>) -> Result<SubmitHandle> {
-        let (recordings, outcomes): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
+        let (recordings, mut outcomes): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
         let shared = self.shared();
         let value = shared.submitter.submit(recordings, || shared.bindless.flush())?;
+        let scopes = outcomes.iter_mut().filter_map(|outcome| outcome.scopes.take());
+        shared.profiler.submit(value, scopes.map(|scopes| *scopes).collect());
         outcomes.into_iter().for_each(|outcome| outcome.submit(shared, value));
         shared.collect()?;
         Ok(self.submission(value))

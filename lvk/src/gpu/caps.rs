@@ -4,7 +4,7 @@ use std::ffi::CStr;
 
 use ash::vk;
 
-use super::features::{Features, Subgroups, missing};
+use super::features::{Calibration, Features, Subgroups, missing};
 use super::mesh_limits::MeshLimits;
 use super::ray_query_path::{RayQueryPath, RayQueryRequest};
 use super::select::DeviceKind;
@@ -73,6 +73,13 @@ pub struct Capabilities {
     pub buffer_int64_atomics: bool,
     /// Several draws may come from one indirect call (`multiDrawIndirect`).
     pub multi_draw_indirect: bool,
+    /// Occlusion queries may count samples exactly (`occlusionQueryPrecise`).
+    pub precise_occlusion: bool,
+    /// Queries may count what the stages of pipelines do (`pipelineStatisticsQuery`).
+    pub pipeline_statistics: bool,
+    /// The clocks of device and host can be read together (`VK_KHR_calibrated_timestamps` or
+    /// `VK_EXT_calibrated_timestamps`): see [`Context::clock_pair`](crate::Context::clock_pair).
+    pub calibrated_timestamps: bool,
     /// Largest sampler anisotropy; 1 where the device has none.
     pub max_anisotropy: f32,
     /// The driver's builder keeps the order of triangles it is given (lavapipe before 26): meshes should be ordered
@@ -288,6 +295,9 @@ impl PhysicalDevice {
         caps.shader_int64 = found.core.shader_int64 == vk::TRUE;
         caps.buffer_int64_atomics = found.v12.shader_buffer_int64_atomics == vk::TRUE;
         caps.multi_draw_indirect = found.core.multi_draw_indirect == vk::TRUE;
+        caps.precise_occlusion = found.core.occlusion_query_precise == vk::TRUE;
+        caps.pipeline_statistics = found.core.pipeline_statistics_query == vk::TRUE;
+        caps.calibrated_timestamps = found.calibration != Calibration::None;
         self.missing.extend(missing(&found));
         self.features = Features::wanted(&found);
         usable
@@ -384,9 +394,21 @@ fn found_features(
     found.ray_query = query.ray_query;
     found.position_fetch = positions.ray_tracing_position_fetch;
     found.mesh_shader = mesh.mesh_shader & mesh.task_shader;
+    found.mesh_shader_queries = found.mesh_shader & mesh.mesh_shader_queries;
+    found.calibration = calibration(has);
     let usable =
         accel.acceleration_structure & accel.descriptor_binding_acceleration_structure_update_after_bind;
     (found, usable == vk::TRUE)
+}
+
+fn calibration(has: &dyn Fn(&CStr) -> bool) -> Calibration {
+    if has(ash::khr::calibrated_timestamps::NAME) {
+        Calibration::Khr
+    } else if has(ash::ext::calibrated_timestamps::NAME) {
+        Calibration::Ext
+    } else {
+        Calibration::None
+    }
 }
 
 /// A queue family for everything the library submits, with the bits of its timestamps.

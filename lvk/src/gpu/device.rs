@@ -8,8 +8,9 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 
 use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
+use super::clock::HostClock;
 use super::debug::c_name;
-use super::features::Features;
+use super::features::{Calibration, Features};
 use super::instance::Instance;
 use super::profile::DeviceProfile;
 use super::ray_query_path::RayQueryRequest;
@@ -35,6 +36,8 @@ pub(crate) struct Gpu {
     pub(crate) accel: Option<ash::khr::acceleration_structure::Device>,
     pub(crate) ray_tracing: Option<ash::khr::ray_tracing_pipeline::Device>,
     pub(crate) mesh: Option<ash::ext::mesh_shader::Device>,
+    /// Reads the clocks of device and host together.
+    pub(crate) host_clock: Option<HostClock>,
     physical: vk::PhysicalDevice,
     debug_utils: Option<ash::ext::debug_utils::Device>,
     allocator: Mutex<Option<Allocator>>,
@@ -72,6 +75,7 @@ impl Gpu {
                 .ray_tracing_pipeline
                 .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
             mesh: caps.mesh_shader.then(|| ash::ext::mesh_shader::Device::new(raw, &device)),
+            host_clock: HostClock::new(&instance, &device, chosen.raw, features.calibration),
             debug_utils: instance.debug_utils.then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             allocator: Mutex::new(Some(allocator)),
             queue: Mutex::new(queue),
@@ -129,6 +133,13 @@ impl Gpu {
         Error::unsupported(what, format!("the device '{}' has none: {reason}", self.caps.device_name))
     }
 
+    /// Milliseconds since an arbitrary start of what a timestamp counts.
+    pub(crate) fn milliseconds(&self, ticks: u64) -> f64 {
+        let limits = &self.caps.limits;
+        let mask = u64::MAX >> (64 - limits.timestamp_bits.clamp(1, 64));
+        (ticks & mask) as f64 * f64::from(limits.timestamp_period_ns) * 1e-6
+    }
+
     /// The physical device.
     pub(crate) fn physical(&self) -> vk::PhysicalDevice {
         self.physical
@@ -184,6 +195,15 @@ impl Gpu {
         let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
         // SAFETY: the command buffer is being recorded.
         unsafe { ext.cmd_begin_debug_utils_label(commands, &label) };
+    }
+
+    /// Marks a place in a command buffer.
+    pub(crate) fn insert_label(&self, commands: vk::CommandBuffer, name: &str) {
+        let Some(ext) = &self.debug_utils else { return };
+        let name = c_name(name);
+        let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
+        // SAFETY: the command buffer is being recorded.
+        unsafe { ext.cmd_insert_debug_utils_label(commands, &label) };
     }
 
     /// Closes the innermost labelled range.
@@ -295,7 +315,10 @@ fn create(
     let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
     let mut positions =
         vk::PhysicalDeviceRayTracingPositionFetchFeaturesKHR::default().ray_tracing_position_fetch(true);
-    let mut mesh = vk::PhysicalDeviceMeshShaderFeaturesEXT::default().mesh_shader(true).task_shader(true);
+    let mut mesh = vk::PhysicalDeviceMeshShaderFeaturesEXT::default()
+        .mesh_shader(true)
+        .task_shader(true)
+        .mesh_shader_queries(features.mesh_shader_queries == vk::TRUE);
     let mut chain = features;
     let mut all = vk::PhysicalDeviceFeatures2::default()
         .features(chain.core)
@@ -339,6 +362,7 @@ fn enabled(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) ->
     features.limit_ray_tracing(caps.ray_tracing_pipeline, caps.hardware_ray_query());
     features.position_fetch &= vk::Bool32::from(caps.position_fetch);
     features.mesh_shader &= vk::Bool32::from(caps.mesh_shader);
+    features.mesh_shader_queries &= features.mesh_shader & features.core.pipeline_statistics_query;
     if instance.gpu_assisted {
         features.core.robust_buffer_access = vk::FALSE;
     }
@@ -365,6 +389,11 @@ fn extensions(features: &Features, caps: &Capabilities) -> Vec<*const c_char> {
     }
     if caps.mesh_shader {
         names.push(ash::ext::mesh_shader::NAME.as_ptr());
+    }
+    match features.calibration {
+        Calibration::Khr => names.push(ash::khr::calibrated_timestamps::NAME.as_ptr()),
+        Calibration::Ext => names.push(ash::ext::calibrated_timestamps::NAME.as_ptr()),
+        Calibration::None => {}
     }
     if features.has_float_atomics() {
         names.push(ash::ext::shader_atomic_float::NAME.as_ptr());

@@ -19,7 +19,22 @@ pub(crate) struct Features {
     pub(crate) position_fetch: vk::Bool32,
     /// `VK_EXT_mesh_shader`, with both its stages.
     pub(crate) mesh_shader: vk::Bool32,
+    /// Pipeline statistics count task and mesh shaders.
+    pub(crate) mesh_shader_queries: vk::Bool32,
+    /// Which extension reads the clocks of device and host together.
+    pub(crate) calibration: Calibration,
     pub(crate) subgroups: Subgroups,
+}
+
+/// Extensions that read the clocks of device and host together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Calibration {
+    #[default]
+    None,
+    /// `VK_EXT_calibrated_timestamps`.
+    Ext,
+    /// `VK_KHR_calibrated_timestamps`.
+    Khr,
 }
 
 /// What subgroups of a device can do.
@@ -105,6 +120,8 @@ fn wanted_core(found: &vk::PhysicalDeviceFeatures) -> vk::PhysicalDeviceFeatures
         sample_rate_shading: found.sample_rate_shading,
         dual_src_blend: found.dual_src_blend,
         multi_draw_indirect: found.multi_draw_indirect,
+        occlusion_query_precise: found.occlusion_query_precise,
+        pipeline_statistics_query: found.pipeline_statistics_query,
         draw_indirect_first_instance: found.draw_indirect_first_instance,
         depth_clamp: found.depth_clamp,
         fill_mode_non_solid: found.fill_mode_non_solid,

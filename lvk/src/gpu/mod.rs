@@ -1,6 +1,7 @@
 //! One logical device: instance, choice, features, memory, debugging. It knows no resource.
 
 pub(crate) mod caps;
+pub(crate) mod clock;
 pub(crate) mod debug;
 pub(crate) mod device;
 pub(crate) mod features;

@@ -14,3 +14,6 @@ pub mod splitting_and_profiles {}
 
 #[doc = include_str!("ray_tracing_pipelines.md")]
 pub mod ray_tracing_pipelines {}
+
+#[doc = include_str!("measuring.md")]
+pub mod measuring {}

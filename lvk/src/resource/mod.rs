@@ -3,6 +3,7 @@
 pub(crate) mod buffer;
 pub(crate) mod image;
 pub(crate) mod query;
+pub(crate) mod query_marks;
 pub(crate) mod sampler;
 pub(crate) mod texture;
 pub(crate) mod texture_desc;

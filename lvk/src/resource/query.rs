@@ -1,16 +1,74 @@
-//! Pools of timestamp queries.
+//! Pools of queries: times, samples that passed, and what the pipeline's stages did.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
 
+use super::query_marks::QueryMarks;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 
-/// Describes a pool of timestamp queries.
+/// What the queries of a pool measure.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum QueryKind {
+    /// When the GPU gets to a place in a command buffer (`VK_QUERY_TYPE_TIMESTAMP`).
+    #[default]
+    Timestamps,
+    /// How many samples pass the depth and stencil tests between begin and end (`VK_QUERY_TYPE_OCCLUSION`).
+    Occlusion {
+        /// Count them exactly (`VK_QUERY_CONTROL_PRECISE_BIT`), which needs
+        /// [`Capabilities::precise_occlusion`](crate::Capabilities::precise_occlusion). Otherwise the number is 0 where
+        /// none passed and anything else where some did.
+        precise: bool,
+    },
+    /// How often the stages ran between begin and end (`VK_QUERY_TYPE_PIPELINE_STATISTICS`), as
+    /// [`PipelineStatistics`]. Needs [`Capabilities::pipeline_statistics`](crate::Capabilities::pipeline_statistics).
+    PipelineStatistics,
+}
+
+impl QueryKind {
+    pub(crate) fn raw(self) -> vk::QueryType {
+        match self {
+            Self::Timestamps => vk::QueryType::TIMESTAMP,
+            Self::Occlusion { .. } => vk::QueryType::OCCLUSION,
+            Self::PipelineStatistics => vk::QueryType::PIPELINE_STATISTICS,
+        }
+    }
+
+    pub(crate) fn control(self) -> vk::QueryControlFlags {
+        match self {
+            Self::Occlusion { precise: true } => vk::QueryControlFlags::PRECISE,
+            _ => vk::QueryControlFlags::empty(),
+        }
+    }
+
+    /// As error messages say it.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Self::Timestamps => "timestamps",
+            Self::Occlusion { .. } => "occlusion",
+            Self::PipelineStatistics => "pipeline statistics",
+        }
+    }
+
+    fn check_supported(self, gpu: &Gpu) -> Result<()> {
+        let (has, what) = match self {
+            Self::Timestamps => (gpu.caps.limits.timestamp_bits > 0, "timestamps on the queue"),
+            Self::Occlusion { precise } => {
+                (!precise || gpu.caps.precise_occlusion, "exact occlusion queries")
+            }
+            Self::PipelineStatistics => (gpu.caps.pipeline_statistics, "pipeline statistics"),
+        };
+        if has { Ok(()) } else { Err(gpu.lacks(what)) }
+    }
+}
+
+/// Describes a pool of queries.
 #[derive(Debug, Clone, Copy)]
 pub struct QueryPoolDesc<'a> {
-    /// Number of timestamps, 1 to 65,536.
+    /// What all of them measure.
+    pub kind: QueryKind,
+    /// Number of queries, 1 to 65,536.
     pub count: u32,
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
@@ -18,15 +76,93 @@ pub struct QueryPoolDesc<'a> {
 
 impl Default for QueryPoolDesc<'_> {
     fn default() -> Self {
-        Self { count: 2, debug_name: "query pool" }
+        Self { kind: QueryKind::Timestamps, count: 2, debug_name: "query pool" }
+    }
+}
+
+/// How often the stages of pipelines ran, and what they passed on (`VkQueryPipelineStatisticFlagBits`).
+///
+/// Drivers may count more or fewer than an ideal machine: vertices shared by triangles may be shaded once or each time,
+/// and invocations that only serve derivatives may count. What no pipeline in between has stays 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PipelineStatistics {
+    /// Vertices that draws asked for.
+    pub input_vertices: u64,
+    /// Primitives that draws asked for.
+    pub input_primitives: u64,
+    /// Invocations of vertex shaders.
+    pub vertex_invocations: u64,
+    /// Invocations of geometry shaders.
+    pub geometry_invocations: u64,
+    /// Primitives that geometry shaders made.
+    pub geometry_primitives: u64,
+    /// Primitives that came to clipping.
+    pub clipped_primitives: u64,
+    /// Primitives that clipping passed on.
+    pub rasterized_primitives: u64,
+    /// Invocations of fragment shaders.
+    pub fragment_invocations: u64,
+    /// Patches that tessellation control shaders worked on.
+    pub tessellation_patches: u64,
+    /// Invocations of tessellation evaluation shaders.
+    pub tessellation_invocations: u64,
+    /// Invocations of compute shaders, those of the library's own kernels included.
+    pub compute_invocations: u64,
+    /// Invocations of task shaders; 0 where the device does not count them (`meshShaderQueries`).
+    pub task_invocations: u64,
+    /// Invocations of mesh shaders; 0 where the device does not count them (`meshShaderQueries`).
+    pub mesh_invocations: u64,
+}
+
+impl PipelineStatistics {
+    /// The bits of the fields down to the compute shaders.
+    const PLAIN_BITS: u32 = (1 << 11) - 1;
+    /// The bits of all fields.
+    const ALL_BITS: u32 = (1 << 13) - 1;
+
+    /// What Vulkan counts, in the order of its bits.
+    fn of(values: [u64; 13]) -> Self {
+        let [
+            input_vertices,
+            input_primitives,
+            vertex_invocations,
+            geometry_invocations,
+            geometry_primitives,
+            clipped_primitives,
+            rasterized_primitives,
+            fragment_invocations,
+            tessellation_patches,
+            tessellation_invocations,
+            compute_invocations,
+            task_invocations,
+            mesh_invocations,
+        ] = values;
+        Self {
+            input_vertices,
+            input_primitives,
+            vertex_invocations,
+            geometry_invocations,
+            geometry_primitives,
+            clipped_primitives,
+            rasterized_primitives,
+            fragment_invocations,
+            tessellation_patches,
+            tessellation_invocations,
+            compute_invocations,
+            task_invocations,
+            mesh_invocations,
+        }
     }
 }
 
 /// A query pool, destroyed on drop.
 pub(crate) struct QueryPool {
     pub(crate) raw: vk::QueryPool,
+    pub(crate) kind: QueryKind,
     pub(crate) count: u32,
     pub(crate) name: String,
+    /// What everything submitted so far does to the queries.
+    marks: Mutex<QueryMarks>,
     gpu: Arc<Gpu>,
 }
 
@@ -34,26 +170,34 @@ impl QueryPool {
     const MAX_COUNT: u32 = 65_536;
 
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &QueryPoolDesc<'_>) -> Result<Self> {
-        if gpu.caps.limits.timestamp_bits == 0 {
-            return Err(gpu.lacks("timestamps on the queue"));
-        }
+        desc.kind.check_supported(gpu)?;
         if desc.count == 0 {
             return Err(Error::usage(desc.debug_name, "a query pool needs at least one query"));
         }
         check_limit(desc.debug_name, "query count", desc.count.into(), Self::MAX_COUNT.into())?;
-        Self::of(gpu, desc, vk::QueryType::TIMESTAMP)
+        Self::of(gpu, desc, desc.kind.raw())
     }
 
-    /// A pool of any kind whose queries answer one number each.
+    /// A pool whose queries are of type `ty`, which the description need not know.
     pub(crate) fn of(gpu: &Arc<Gpu>, desc: &QueryPoolDesc<'_>, ty: vk::QueryType) -> Result<Self> {
-        let info = vk::QueryPoolCreateInfo::default().query_type(ty).query_count(desc.count);
+        let mut info = vk::QueryPoolCreateInfo::default().query_type(ty).query_count(desc.count);
+        if ty == vk::QueryType::PIPELINE_STATISTICS {
+            info = info.pipeline_statistics(statistics_bits(gpu));
+        }
         // SAFETY: the description is valid.
         let raw = unsafe { gpu.device.create_query_pool(&info, None) }
             .map_err(Error::vulkan("vkCreateQueryPool"))?;
         // SAFETY: `hostQueryReset` is on and no command uses the new pool.
         unsafe { gpu.device.reset_query_pool(raw, 0, desc.count) };
         gpu.name(raw, desc.debug_name);
-        Ok(Self { raw, count: desc.count, name: desc.debug_name.to_owned(), gpu: Arc::clone(gpu) })
+        Ok(Self {
+            raw,
+            kind: desc.kind,
+            count: desc.count,
+            name: desc.debug_name.to_owned(),
+            marks: Mutex::new(QueryMarks::new(desc.count)),
+            gpu: Arc::clone(gpu),
+        })
     }
 
     /// Fails unless `first..first + count` are queries of the pool.
@@ -65,30 +209,105 @@ impl QueryPool {
         Err(Error::usage(&self.name, message))
     }
 
+    /// Fails where the pool is of a kind that `call` has nothing to do with.
+    pub(crate) fn check_kind(&self, fits: bool, call: &str) -> Result<()> {
+        if fits {
+            return Ok(());
+        }
+        Err(Error::usage(&self.name, format!("its queries are {}; {call}", self.kind.words())))
+    }
+
+    /// Fails where a command buffer that does `next` writes a query twice without a reset in between.
+    pub(crate) fn check_submit(&self, next: &QueryMarks) -> Result<()> {
+        match self.marks().first_conflict(next) {
+            None => Ok(()),
+            Some(query) => Err(self.not_reset(query)),
+        }
+    }
+
+    /// Says that a query would be written twice.
+    pub(crate) fn not_reset(&self, query: u32) -> Error {
+        let message = format!("query {query} was written before; reset it first with reset_queries");
+        Error::usage(&self.name, message)
+    }
+
+    /// A command buffer that does `next` was submitted.
+    pub(crate) fn submit(&self, next: &QueryMarks) {
+        self.marks().append(next);
+    }
+
     /// Milliseconds of each timestamp since an arbitrary start; `None` where none was written yet.
     pub(crate) fn milliseconds(&self, first: u32, count: u32) -> Result<Vec<Option<f64>>> {
-        let limits = &self.gpu.caps.limits;
-        let mask = u64::MAX >> (64 - limits.timestamp_bits.clamp(1, 64));
-        let period = f64::from(limits.timestamp_period_ns) * 1e-6;
-        let milliseconds = |ticks: u64| (ticks & mask) as f64 * period;
+        self.check_kind(self.kind == QueryKind::Timestamps, "times come from a pool of timestamps")?;
+        let milliseconds = |ticks: u64| self.gpu.milliseconds(ticks);
         Ok(self.values(first, count)?.into_iter().map(|ticks| ticks.map(milliseconds)).collect())
     }
 
-    /// The number of each query; `None` where none was written yet (`vkGetQueryPoolResults`).
+    /// The number of each query; `None` where it is not there yet (`vkGetQueryPoolResults`).
     pub(crate) fn values(&self, first: u32, count: u32) -> Result<Vec<Option<u64>>> {
         self.check_range(first, count)?;
-        let mut raw = vec![[0_u64; 2]; count as usize];
-        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
-        if count > 0 {
-            // SAFETY: the range is checked and `raw` holds a value and an availability for each query.
-            let read = unsafe { self.gpu.device.get_query_pool_results(self.raw, first, &mut raw, flags) };
-            match read {
-                Ok(()) | Err(vk::Result::NOT_READY) => {}
-                Err(result) => return Err(Error::vulkan("vkGetQueryPoolResults")(result)),
+        let mut values = vec![None; count as usize];
+        self.read(first, &mut values)?;
+        Ok(values)
+    }
+
+    /// As [`values`](Self::values), without an allocation.
+    pub(crate) fn read(&self, first: u32, out: &mut [Option<u64>]) -> Result<()> {
+        const AT_ONCE: usize = 32;
+        self.check_range(first, u32::try_from(out.len()).unwrap_or(u32::MAX))?;
+        for (place, part) in (first..).step_by(AT_ONCE).zip(out.chunks_mut(AT_ONCE)) {
+            let mut raw = [[0_u64; 2]; AT_ONCE];
+            let raw = &mut raw[..part.len()];
+            self.results(place, raw)?;
+            for (value, [number, ready]) in part.iter_mut().zip(raw) {
+                *value = (*ready != 0).then_some(*number);
             }
         }
-        Ok(raw.iter().map(|[value, ready]| (*ready != 0).then_some(*value)).collect())
+        Ok(())
     }
+
+    /// What the stages did; `None` where it is not there yet.
+    pub(crate) fn statistics(&self, query: u32) -> Result<Option<PipelineStatistics>> {
+        let fits = self.kind == QueryKind::PipelineStatistics;
+        self.check_kind(fits, "statistics come from a pool of pipeline statistics")?;
+        self.check_range(query, 1)?;
+        let mut values = [0; 13];
+        let ready = if self.gpu.features.mesh_shader_queries == vk::TRUE {
+            self.statistic_values::<14>(query, &mut values)?
+        } else {
+            self.statistic_values::<12>(query, &mut values)?
+        };
+        Ok(ready.then(|| PipelineStatistics::of(values)))
+    }
+
+    /// Reads `N - 1` numbers and whether they are there.
+    fn statistic_values<const N: usize>(&self, query: u32, values: &mut [u64; 13]) -> Result<bool> {
+        let mut raw = [[0_u64; N]];
+        self.results(query, &mut raw)?;
+        let [(ready, numbers)] = raw.each_ref().map(|row| row.split_last().unwrap_or((&0, &[])));
+        values[..numbers.len()].copy_from_slice(numbers);
+        Ok(*ready != 0)
+    }
+
+    /// Numbers with their availability behind them, for queries of the pool.
+    fn results<T: Copy>(&self, first: u32, raw: &mut [T]) -> Result<()> {
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WITH_AVAILABILITY;
+        // SAFETY: the queries exist, and a `T` holds the numbers and the availability of one.
+        match unsafe { self.gpu.device.get_query_pool_results(self.raw, first, raw, flags) } {
+            Ok(()) | Err(vk::Result::NOT_READY) => Ok(()),
+            Err(result) => Err(Error::vulkan("vkGetQueryPoolResults")(result)),
+        }
+    }
+
+    fn marks(&self) -> MutexGuard<'_, QueryMarks> {
+        self.marks.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn statistics_bits(gpu: &Gpu) -> vk::QueryPipelineStatisticFlags {
+    let counted = gpu.features.mesh_shader_queries == vk::TRUE;
+    let bits = if counted { PipelineStatistics::ALL_BITS } else { PipelineStatistics::PLAIN_BITS };
+    vk::QueryPipelineStatisticFlags::from_raw(bits)
 }
 
 impl Drop for QueryPool {

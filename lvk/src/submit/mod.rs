@@ -3,8 +3,11 @@
 pub(crate) mod command_ring;
 pub(crate) mod deferred;
 pub(crate) mod emit;
+pub(crate) mod profiler;
 pub(crate) mod queue;
+pub(crate) mod scope_tree;
 pub(crate) mod timeline;
 
 pub(crate) use queue::{Recording, Submitter};
+pub use scope_tree::{GpuProfile, GpuScope};
 pub use timeline::SubmitHandle;

@@ -28,7 +28,11 @@ pub(super) struct Stopwatch {
 
 impl Stopwatch {
     pub(super) fn new(ctx: &Context) -> lvk::Result<Self> {
-        let pool = ctx.create_query_pool(&QueryPoolDesc { count: 2, debug_name: "stopwatch" })?;
+        let pool = ctx.create_query_pool(&QueryPoolDesc {
+            count: 2,
+            debug_name: "stopwatch",
+            ..Default::default()
+        })?;
         Ok(Self { ctx: ctx.clone(), pool })
     }
 

@@ -53,7 +53,11 @@ pub(super) struct Stamps {
 impl Stamps {
     pub(super) fn new(ctx: &Context, band_count: u32, sample_count: u32) -> lvk::Result<Self> {
         let count = sample_count * (2 + 2 * band_count);
-        let pool = ctx.create_query_pool(&QueryPoolDesc { count, debug_name: "frame stamps" })?;
+        let pool = ctx.create_query_pool(&QueryPoolDesc {
+            count,
+            debug_name: "frame stamps",
+            ..Default::default()
+        })?;
         Ok(Self { pool, band_count, sample_count })
     }
 

@@ -19,7 +19,7 @@ impl Stamps {
     /// Stamps, which do nothing where the device has none.
     pub(super) fn new(ctx: &Context) -> lvk::Result<Self> {
         let has_stamps = ctx.capabilities().limits.timestamp_bits > 0;
-        let desc = QueryPoolDesc { count: Self::COUNT, debug_name: "frame stamps" };
+        let desc = QueryPoolDesc { count: Self::COUNT, debug_name: "frame stamps", ..Default::default() };
         Ok(Self { pool: has_stamps.then(|| ctx.create_query_pool(&desc)).transpose()? })
     }
 

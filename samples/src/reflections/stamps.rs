@@ -24,7 +24,13 @@ const COUNT: u32 = PASSES.len() as u32 + 1;
 
 impl Stamps {
     pub(super) fn new(ctx: &Context) -> lvk::Result<Self> {
-        Ok(Self { pool: ctx.create_query_pool(&QueryPoolDesc { count: COUNT, debug_name: "pass stamps" })? })
+        Ok(Self {
+            pool: ctx.create_query_pool(&QueryPoolDesc {
+                count: COUNT,
+                debug_name: "pass stamps",
+                ..Default::default()
+            })?,
+        })
     }
 
     pub(super) fn reset(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {

@@ -32,7 +32,8 @@ impl Canvas {
             debug_name: "picture",
             ..TextureDesc::default()
         })?;
-        let stamps = QueryPoolDesc { count: MOST_PASSES + 1, debug_name: "pass stamps" };
+        let stamps =
+            QueryPoolDesc { count: MOST_PASSES + 1, debug_name: "pass stamps", ..Default::default() };
         let has_stamps = ctx.capabilities().limits.timestamp_bits > 0;
         let stamps = has_stamps.then(|| ctx.create_query_pool(&stamps)).transpose()?;
         Ok(Self { ctx: ctx.clone(), picture, stamps })

@@ -1,0 +1,131 @@
+//! What a command buffer does to queries, for the checks while it is recorded and when it is submitted.
+
+use std::sync::Arc;
+
+use crate::error::{Error, Result};
+use crate::resource::QueryPool;
+use crate::resource::query_marks::QueryMarks;
+
+/// The queries a command buffer writes and resets, and those it has begun.
+#[derive(Default)]
+pub(super) struct QueryLog {
+    pools: Vec<(Arc<QueryPool>, QueryMarks)>,
+    open: Vec<OpenQuery>,
+    /// A query that was begun in a render pass and left open at its end.
+    left_open: Option<Error>,
+}
+
+/// A query that was begun and not ended.
+pub(super) struct OpenQuery {
+    pub(super) pool: Arc<QueryPool>,
+    pub(super) query: u32,
+    /// Where it was begun, and must be ended.
+    pub(super) in_pass: bool,
+}
+
+impl QueryLog {
+    /// Fails unless the query may be written.
+    pub(super) fn check_ready(&mut self, pool: &Arc<QueryPool>, query: u32) -> Result<()> {
+        if self.marks(pool).is_ready(query) { Ok(()) } else { Err(pool.not_reset(query)) }
+    }
+
+    /// The query is written.
+    pub(super) fn write(&mut self, pool: &Arc<QueryPool>, query: u32) {
+        self.marks(pool).write(query);
+    }
+
+    /// Fails where one of the queries is open.
+    pub(super) fn check_reset(&self, pool: &Arc<QueryPool>, queries: std::ops::Range<u32>) -> Result<()> {
+        let open = |open: &&OpenQuery| Arc::ptr_eq(&open.pool, pool) && queries.contains(&open.query);
+        match self.open.iter().find(open) {
+            None => Ok(()),
+            Some(open) => {
+                let message = format!("query {} is open; end it before it is reset", open.query);
+                Err(Error::usage(&pool.name, message))
+            }
+        }
+    }
+
+    /// Queries are reset.
+    pub(super) fn reset(&mut self, pool: &Arc<QueryPool>, queries: std::ops::Range<u32>) {
+        let marks = self.marks(pool);
+        queries.for_each(|query| marks.reset(query));
+    }
+
+    /// Fails where a query of the same kind is open.
+    pub(super) fn check_begin(&self, pool: &QueryPool) -> Result<()> {
+        match self.open.iter().find(|open| open.pool.kind.raw() == pool.kind.raw()) {
+            None => Ok(()),
+            Some(open) => {
+                let (query, name, kind) = (open.query, &open.pool.name, pool.kind.words());
+                let message = format!(
+                    "queries of {kind} cannot be nested: query {query} of '{name}' is open, end it first"
+                );
+                Err(Error::usage(&pool.name, message))
+            }
+        }
+    }
+
+    /// The query is open from now on.
+    pub(super) fn begin(&mut self, pool: Arc<QueryPool>, query: u32, in_pass: bool) {
+        self.write(&pool, query);
+        self.open.push(OpenQuery { pool, query, in_pass });
+    }
+
+    /// Closes a query.
+    pub(super) fn end(&mut self, pool: &Arc<QueryPool>, query: u32, in_pass: bool) -> Result<()> {
+        let same = |open: &OpenQuery| Arc::ptr_eq(&open.pool, pool) && open.query == query;
+        let Some(place) = self.open.iter().position(same) else {
+            return Err(Error::usage(&pool.name, format!("query {query} was not begun; begin it first")));
+        };
+        if self.open[place].in_pass != in_pass {
+            let place = if in_pass { "before the render pass" } else { "in a render pass" };
+            let message = format!("query {query} was begun {place} and must be ended on the same side");
+            return Err(Error::usage(&pool.name, message));
+        }
+        self.open.swap_remove(place);
+        Ok(())
+    }
+
+    /// Takes the queries out that were begun in a pass that ends now. That they are open is a mistake.
+    pub(super) fn take_pass_queries(&mut self) -> Vec<OpenQuery> {
+        let open: Vec<_> = self.open.extract_if(.., |open| open.in_pass).collect();
+        if let Some(first) = open.first() {
+            self.left_open.get_or_insert_with(|| not_ended(first));
+        }
+        open
+    }
+
+    /// Takes all open queries out.
+    pub(super) fn take_open(&mut self) -> Vec<OpenQuery> {
+        std::mem::take(&mut self.open)
+    }
+
+    /// Fails where the command buffer cannot be submitted after those before it.
+    pub(super) fn check_submit(&self) -> Result<()> {
+        if let Some(error) = self.left_open.clone().or_else(|| self.open.first().map(not_ended)) {
+            return Err(error);
+        }
+        self.pools.iter().try_for_each(|(pool, marks)| pool.check_submit(marks))
+    }
+
+    /// The command buffer was submitted.
+    pub(super) fn submit(self) {
+        self.pools.iter().for_each(|(pool, marks)| pool.submit(marks));
+    }
+
+    fn marks(&mut self, pool: &Arc<QueryPool>) -> &mut QueryMarks {
+        let known = self.pools.iter().position(|(known, _)| Arc::ptr_eq(known, pool));
+        let place = known.unwrap_or(self.pools.len());
+        if known.is_none() {
+            self.pools.push((Arc::clone(pool), QueryMarks::new(pool.count)));
+        }
+        &mut self.pools[place].1
+    }
+}
+
+fn not_ended(open: &OpenQuery) -> Error {
+    let place = if open.in_pass { "render pass" } else { "command buffer" };
+    let message = format!("query {} was begun and not ended in its {place}", open.query);
+    Error::usage(&open.pool.name, message)
+}

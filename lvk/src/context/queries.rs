@@ -1,0 +1,63 @@
+//! Reads what queries measured.
+
+use std::time::Duration;
+
+use super::Context;
+use crate::error::Result;
+use crate::gpu::clock::ClockPair;
+use crate::handle::QueryPoolHandle;
+use crate::resource::query::{PipelineStatistics, QueryKind};
+
+impl Context {
+    /// Milliseconds of `count` timestamps since an arbitrary start that all share; `None` where none was written yet
+    /// (`vkGetQueryPoolResults`). Does not wait.
+    ///
+    /// The clock of a device begins anew after `2^`[`timestamp_bits`](crate::Limits::timestamp_bits) ticks.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for pools of another kind.
+    pub fn timestamps_ms(&self, pool: QueryPoolHandle, first: u32, count: u32) -> Result<Vec<Option<f64>>> {
+        self.shared().store.query_pools.get(pool)?.milliseconds(first, count)
+    }
+
+    /// The numbers of queries from `first` on, as many as `out` has room for: ticks of
+    /// [`timestamp_period_ns`](crate::Limits::timestamp_period_ns) for timestamps, samples for occlusion. `None` where
+    /// the GPU is not there yet or the query was reset (`vkGetQueryPoolResults`). Neither waits nor allocates.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for pools of pipeline
+    /// statistics.
+    pub fn read_queries(&self, pool: QueryPoolHandle, first: u32, out: &mut [Option<u64>]) -> Result<()> {
+        let pool = self.shared().store.query_pools.get(pool)?;
+        let fits = pool.kind != QueryKind::PipelineStatistics;
+        pool.check_kind(fits, "read them with Context::statistics")?;
+        pool.read(first, out)
+    }
+
+    /// What the stages did between begin and end of a query; `None` where the GPU is not there yet or the query was
+    /// reset (`vkGetQueryPoolResults`). Does not wait.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a query outside of the pool, and for pools of another kind.
+    pub fn statistics(&self, pool: QueryPoolHandle, query: u32) -> Result<Option<PipelineStatistics>> {
+        self.shared().store.query_pools.get(pool)?.statistics(query)
+    }
+
+    /// Reads the clocks of GPU and host at one moment (`vkGetCalibratedTimestampsKHR`), so that timestamps can be laid
+    /// beside what the host did. Does not wait.
+    ///
+    /// # Errors
+    /// [`Unsupported`](crate::Error::Unsupported) without
+    /// [`Capabilities::calibrated_timestamps`](crate::Capabilities::calibrated_timestamps), and where the driver knows
+    /// no `CLOCK_MONOTONIC`.
+    pub fn clock_pair(&self) -> Result<ClockPair> {
+        let gpu = &self.shared().gpu;
+        let clock = gpu.host_clock.as_ref().ok_or_else(|| gpu.lacks("clocks of device and host together"))?;
+        let (ticks, host, deviation) = clock.read()?;
+        Ok(ClockPair {
+            gpu_ms: gpu.milliseconds(ticks),
+            host: Duration::from_nanos(host),
+            deviation: Duration::from_nanos(deviation),
+        })
+    }
+}

@@ -1,0 +1,240 @@
+//! Stamps the scopes of command buffers while they are recorded, and reads them once the GPU is done.
+
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ash::vk;
+
+use super::scope_tree::{GpuProfile, Stamps, scope_tree};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::resource::QueryPool;
+use crate::resource::query::QueryPoolDesc;
+
+/// The stamps of one command buffer.
+#[derive(Default)]
+pub(crate) struct Scopes {
+    /// Full ones but the last.
+    pools: Vec<QueryPool>,
+    stamps: Stamps,
+    /// There was no pool for a stamp: nothing of the command buffer counts.
+    broken: bool,
+}
+
+/// Measures command buffers while it is on.
+pub(crate) struct Profiler {
+    on: AtomicBool,
+    /// Something is measured, or is to be finished.
+    busy: AtomicBool,
+    /// How many frames have begun.
+    frames: AtomicU64,
+    inner: Mutex<Inner>,
+    gpu: Arc<Gpu>,
+}
+
+#[derive(Default)]
+struct Inner {
+    spare: Vec<QueryPool>,
+    in_flight: VecDeque<Measured>,
+    /// The profile that is being put together: which, its first tick, and what is known.
+    open: Option<(Part, u64, GpuProfile)>,
+    last: Option<Arc<GpuProfile>>,
+}
+
+/// Command buffers of one submission.
+struct Measured {
+    value: u64,
+    part: Part,
+    scopes: Vec<Scopes>,
+}
+
+/// What a submission belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Part {
+    Frame(u64),
+    Submission(u64),
+}
+
+impl Profiler {
+    const STAMPS: usize = 64;
+
+    pub(crate) fn new(gpu: &Arc<Gpu>) -> Self {
+        Self {
+            on: AtomicBool::new(false),
+            busy: AtomicBool::new(false),
+            frames: AtomicU64::new(0),
+            inner: Mutex::default(),
+            gpu: Arc::clone(gpu),
+        }
+    }
+
+    /// Measures command buffers begun from now on, or not.
+    pub(crate) fn set(&self, on: bool) -> Result<()> {
+        if on && self.gpu.caps.limits.timestamp_bits == 0 {
+            return Err(self.gpu.lacks("timestamps on the queue"));
+        }
+        self.on.store(on, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// The frame with this number begins.
+    pub(crate) fn begin_frame(&self, number: u64) {
+        self.frames.fetch_max(number + 1, Ordering::AcqRel);
+    }
+
+    /// Begins to measure a command buffer, if that is wanted.
+    pub(crate) fn begin(&self, commands: vk::CommandBuffer) -> Option<Box<Scopes>> {
+        if !self.on.load(Ordering::Relaxed) {
+            return None;
+        }
+        let mut scopes = Box::default();
+        self.stamp(&mut scopes, commands, Some(""));
+        Some(scopes)
+    }
+
+    /// Stamps the begin of a scope with this name, or the end of the innermost.
+    pub(crate) fn stamp(&self, scopes: &mut Scopes, commands: vk::CommandBuffer, name: Option<&str>) {
+        if scopes.broken {
+            return;
+        }
+        let place = scopes.stamps.len() % Self::STAMPS;
+        if place == 0 {
+            match self.pool() {
+                Ok(pool) => scopes.pools.push(pool),
+                Err(error) => {
+                    log::warn!("a command buffer is not profiled: {error}");
+                    scopes.broken = true;
+                    return;
+                }
+            }
+        }
+        let Some(pool) = scopes.pools.last() else { return };
+        let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
+        // SAFETY: the query exists, is reset, and is written once.
+        unsafe { self.gpu.device.cmd_write_timestamp2(commands, stage, pool.raw, place as u32) };
+        scopes.stamps.push(name.map(Into::into));
+    }
+
+    /// A pool of stamps that are ready.
+    fn pool(&self) -> Result<QueryPool> {
+        let spare = self.lock().spare.pop();
+        let Some(pool) = spare else {
+            let desc = QueryPoolDesc {
+                count: Self::STAMPS as u32,
+                debug_name: "profiler stamps",
+                ..Default::default()
+            };
+            return QueryPool::of(&self.gpu, &desc, vk::QueryType::TIMESTAMP);
+        };
+        // SAFETY: `hostQueryReset` is on, and the GPU is done with the pool.
+        unsafe { self.gpu.device.reset_query_pool(pool.raw, 0, pool.count) };
+        Ok(pool)
+    }
+
+    /// Takes back what a command buffer stamped that was given up.
+    pub(crate) fn discard(&self, scopes: Scopes) {
+        self.lock().spare.extend(scopes.pools);
+    }
+
+    /// Command buffers went to the GPU with this timeline value.
+    pub(crate) fn submit(&self, value: u64, scopes: Vec<Scopes>) {
+        if scopes.is_empty() {
+            return;
+        }
+        let part = match self.frames.load(Ordering::Acquire) {
+            0 => Part::Submission(value),
+            begun => Part::Frame(begun - 1),
+        };
+        let mut inner = self.lock();
+        // Threads may get here in another order than to the queue.
+        let place = inner.in_flight.partition_point(|other| other.value < value);
+        inner.in_flight.insert(place, Measured { value, part, scopes });
+        self.busy.store(true, Ordering::Release);
+    }
+
+    /// Reads what the GPU is done with, up to this value of the timeline.
+    pub(crate) fn collect(&self, completed: u64) -> Result<()> {
+        if !self.busy.load(Ordering::Acquire) {
+            return Ok(());
+        }
+        let mut inner = self.lock();
+        while inner.in_flight.front().is_some_and(|front| front.value <= completed) {
+            if let Some(measured) = inner.in_flight.pop_front() {
+                inner.read(&self.gpu, measured)?;
+            }
+        }
+        let begun = self.frames.load(Ordering::Acquire);
+        inner.close_finished(begun);
+        self.busy.store(inner.open.is_some() || !inner.in_flight.is_empty(), Ordering::Release);
+        Ok(())
+    }
+
+    /// The profile finished last.
+    pub(crate) fn last(&self) -> Option<Arc<GpuProfile>> {
+        self.lock().last.clone()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Inner {
+    fn read(&mut self, gpu: &Gpu, measured: Measured) -> Result<()> {
+        if self.open.as_ref().is_some_and(|(part, ..)| *part != measured.part) {
+            self.close();
+        }
+        for scopes in measured.scopes {
+            if let Some(ticks) = scopes.ticks()? {
+                self.add(gpu, measured.part, &scopes.stamps, &ticks);
+            }
+            self.spare.extend(scopes.pools);
+        }
+        Ok(())
+    }
+
+    /// Adds a command buffer to the profile.
+    fn add(&mut self, gpu: &Gpu, part: Part, stamps: &[Option<Box<str>>], ticks: &[u64]) {
+        let Some(&begin) = ticks.first() else { return };
+        let frame = if let Part::Frame(number) = part { Some(number) } else { None };
+        let fresh = || (part, begin, GpuProfile { frame, ..Default::default() });
+        let (_, first, profile) = self.open.get_or_insert_with(fresh);
+        let ms: Vec<f64> = ticks.iter().map(|tick| gpu.milliseconds(tick.wrapping_sub(*first))).collect();
+        if let Some(root) = scope_tree(stamps, &ms) {
+            profile.ms = profile.ms.max(root.start_ms + root.ms);
+            profile.scopes.extend(root.children);
+        }
+    }
+
+    /// Closes the profile if nothing can come to it any more, where so many frames have begun.
+    fn close_finished(&mut self, begun: u64) {
+        let Some((part, ..)) = self.open else { return };
+        let expected = match part {
+            Part::Frame(number) => {
+                number + 1 >= begun || self.in_flight.iter().any(|measured| measured.part == part)
+            }
+            Part::Submission(_) => false,
+        };
+        if !expected {
+            self.close();
+        }
+    }
+
+    fn close(&mut self) {
+        if let Some((.., profile)) = self.open.take() {
+            self.last = Some(Arc::new(profile));
+        }
+    }
+}
+
+impl Scopes {
+    /// The time of each stamp; `None` where one is missing.
+    fn ticks(&self) -> Result<Option<Vec<u64>>> {
+        let mut ticks = vec![None; self.stamps.len()];
+        for (pool, part) in self.pools.iter().zip(ticks.chunks_mut(Profiler::STAMPS)) {
+            pool.read(0, part)?;
+        }
+        Ok(if self.broken { None } else { ticks.into_iter().collect() })
+    }
+}

@@ -1,0 +1,341 @@
+//! Queries: samples that pass, what the stages do, times inside of passes, clocks; and what must be refused.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::time::{Duration, Instant};
+
+use lvk::{
+    ColorAttachment, ColorTarget, CommandBuffer, CompareOp, Context, Dependencies, DepthAttachment,
+    DepthTest, Error, Format, Holder, PipelineStatistics, QueryKind, QueryPoolDesc, QueryPoolHandle,
+    RenderPass, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, TextureHandle,
+};
+use lvk_tests::compute::compute_pipeline;
+use lvk_tests::device;
+use lvk_tests::raster::{COVER, PAINT, render_pipeline, target};
+
+const SIDE: u32 = 64;
+
+/// A target with depth and a pipeline that covers it.
+struct Canvas {
+    color: Holder<TextureHandle>,
+    depth: Holder<TextureHandle>,
+    pipeline: Holder<RenderPipelineHandle>,
+}
+
+impl Canvas {
+    fn new(ctx: &Context) -> Self {
+        let depth = DepthTest { format: Format::D32Float, compare: CompareOp::Less, write: true };
+        let color = [ColorTarget { format: Format::Rgba8Unorm, blend: None }];
+        let desc = RenderPipelineDesc { color: &color, depth: Some(depth), ..Default::default() };
+        Self {
+            color: target(ctx, Format::Rgba8Unorm, [SIDE; 2]),
+            depth: target(ctx, Format::D32Float, [SIDE; 2]),
+            pipeline: render_pipeline(ctx, COVER, PAINT, &desc),
+        }
+    }
+
+    fn pass<'a>(&self, cmd: &'a mut CommandBuffer) -> RenderPass<'a> {
+        let color = [ColorAttachment::clear(*self.color, [0.0; 4])];
+        let depth = Some(DepthAttachment::clear(*self.depth, 1.0));
+        let mut pass =
+            cmd.begin_rendering(&RenderPassDesc { color: &color, depth, ..Default::default() }).unwrap();
+        pass.bind_render_pipeline(*self.pipeline).unwrap();
+        pass
+    }
+}
+
+/// Draws over a rectangle.
+fn draw(pass: &mut RenderPass<'_>, offset: [u32; 2], extent: [u32; 2], depth: f32) {
+    pass.scissor(offset, extent).unwrap();
+    pass.push_constants(&[1.0_f32, 0.5, 0.25, 1.0, depth]).unwrap();
+    pass.draw(0..3, 0..1).unwrap();
+}
+
+fn pool(ctx: &Context, kind: QueryKind, count: u32) -> Holder<QueryPoolHandle> {
+    ctx.create_query_pool(&QueryPoolDesc { kind, count, debug_name: "the pool" }).unwrap()
+}
+
+fn occlusion(ctx: &Context, count: u32) -> Holder<QueryPoolHandle> {
+    pool(ctx, QueryKind::Occlusion { precise: ctx.capabilities().precise_occlusion }, count)
+}
+
+fn read(ctx: &Context, pool: QueryPoolHandle, count: usize) -> Vec<Option<u64>> {
+    let mut values = vec![Some(77); count];
+    ctx.read_queries(pool, 0, &mut values).unwrap();
+    values
+}
+
+fn finish(ctx: &Context, cmd: CommandBuffer) {
+    ctx.wait(ctx.submit(cmd).unwrap()).unwrap();
+}
+
+#[track_caller]
+fn refused<T: std::fmt::Debug>(result: lvk::Result<T>, words: &str) {
+    match &result {
+        Err(Error::InvalidUsage { object, message }) if object == "the pool" => {
+            assert!(message.contains(words), "'{message}' has no '{words}'");
+        }
+        _ => unreachable!("{result:?}"),
+    }
+}
+
+#[test]
+fn samples_of_rectangles_are_counted() {
+    let Some(ctx) = device() else { return };
+    let (canvas, pool) = (Canvas::new(&ctx), occlusion(&ctx, 5));
+    assert_eq!(read(&ctx, *pool, 5), [None; 5]);
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.begin_query(*pool, 4).unwrap();
+    for again in 0..2 {
+        let mut pass = canvas.pass(&mut cmd);
+        draw(&mut pass, [0, 0], [10 + again, 1], 0.5);
+    }
+    cmd.end_query(*pool, 4).unwrap();
+    let mut pass = canvas.pass(&mut cmd);
+    pass.begin_query(*pool, 0).unwrap();
+    draw(&mut pass, [3, 5], [17, 11], 0.5);
+    pass.end_query(*pool, 0).unwrap();
+    pass.begin_query(*pool, 1).unwrap();
+    draw(&mut pass, [3, 5], [17, 11], 0.75);
+    pass.end_query(*pool, 1).unwrap();
+    pass.begin_query(*pool, 2).unwrap();
+    draw(&mut pass, [0, 0], [SIDE; 2], 0.625);
+    draw(&mut pass, [40, 40], [2, 3], 0.25);
+    pass.end_query(*pool, 2).unwrap();
+    drop(pass);
+    finish(&ctx, cmd);
+    let rest = u64::from(SIDE * SIDE);
+    let expected = [17 * 11, 0, rest - 17 * 11 + 6, 0, 21];
+    let found = read(&ctx, *pool, 5);
+    assert_eq!(found[3], None, "was never begun");
+    for (query, exact) in expected.into_iter().enumerate().filter(|(query, _)| *query != 3) {
+        let count = found[query].unwrap();
+        match ctx.capabilities().precise_occlusion {
+            true => assert_eq!(count, exact, "query {query}"),
+            false => assert_eq!(count > 0, exact > 0, "query {query}"),
+        }
+    }
+    let mut middle = [None; 2];
+    ctx.read_queries(*pool, 1, &mut middle).unwrap();
+    assert_eq!(middle, found[1..3]);
+}
+
+#[test]
+fn more_queries_than_are_read_at_once_keep_their_places() {
+    let Some(ctx) = device() else { return };
+    let (canvas, pool) = (Canvas::new(&ctx), occlusion(&ctx, 70));
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let mut pass = canvas.pass(&mut cmd);
+    for query in (0..70).filter(|query| query % 3 != 0) {
+        pass.begin_query(*pool, query).unwrap();
+        draw(
+            &mut pass,
+            [0, 0],
+            [if query % 2 == 0 { 0 } else { 64 - query / 2 }, 1],
+            0.9 - query as f32 * 0.01,
+        );
+        pass.end_query(*pool, query).unwrap();
+    }
+    drop(pass);
+    finish(&ctx, cmd);
+    for (query, found) in read(&ctx, *pool, 70).into_iter().enumerate() {
+        let expected = (query % 3 != 0).then_some(query % 2 == 1);
+        assert_eq!(found.map(|count| count > 0), expected, "query {query}");
+    }
+}
+
+#[test]
+fn an_inexact_count_says_whether_anything_passed() {
+    let Some(ctx) = device() else { return };
+    let (canvas, pool) = (Canvas::new(&ctx), pool(&ctx, QueryKind::Occlusion { precise: false }, 2));
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let mut pass = canvas.pass(&mut cmd);
+    pass.begin_query(*pool, 0).unwrap();
+    draw(&mut pass, [0, 0], [8, 8], 0.5);
+    pass.end_query(*pool, 0).unwrap();
+    pass.begin_query(*pool, 1).unwrap();
+    draw(&mut pass, [0, 0], [8, 8], 0.6);
+    pass.end_query(*pool, 1).unwrap();
+    drop(pass);
+    finish(&ctx, cmd);
+    let found = read(&ctx, *pool, 2);
+    assert!(found[0].unwrap() > 0 && found[1] == Some(0), "{found:?}");
+}
+
+#[test]
+fn stages_are_counted_beside_samples() {
+    let Some(ctx) = device() else { return };
+    let desc = QueryPoolDesc { kind: QueryKind::PipelineStatistics, count: 3, debug_name: "the pool" };
+    if !ctx.capabilities().pipeline_statistics {
+        assert!(matches!(ctx.create_query_pool(&desc), Err(Error::Unsupported { .. })));
+        return eprintln!("NOT TESTED, the device counts no stages");
+    }
+    let (canvas, stages) = (Canvas::new(&ctx), ctx.create_query_pool(&desc).unwrap());
+    let samples = occlusion(&ctx, 1);
+    let work = compute_pipeline(&ctx, "layout(local_size_x = 32) in; void main() {}");
+    assert_eq!(ctx.statistics(*stages, 0).unwrap(), None);
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.begin_query(*stages, 1).unwrap();
+    cmd.bind_compute_pipeline(*work).unwrap();
+    cmd.dispatch([3, 2, 1], &Dependencies::default()).unwrap();
+    cmd.end_query(*stages, 1).unwrap();
+    let mut pass = canvas.pass(&mut cmd);
+    pass.begin_query(*stages, 0).unwrap();
+    pass.begin_query(*samples, 0).unwrap();
+    for step in 0..5_u8 {
+        draw(&mut pass, [0, 0], [16, 16], 0.9 - f32::from(step) * 0.1);
+    }
+    pass.end_query(*stages, 0).unwrap();
+    pass.end_query(*samples, 0).unwrap();
+    drop(pass);
+    match cmd.begin_query(*stages, 2) {
+        Err(Error::Unsupported { .. }) if ctx.capabilities().driver_name == "llvmpipe" => {}
+        begun => {
+            begun.unwrap();
+            cmd.end_query(*stages, 2).unwrap();
+        }
+    }
+    finish(&ctx, cmd);
+    let drawn = ctx.statistics(*stages, 0).unwrap().unwrap();
+    assert_eq!((drawn.input_vertices, drawn.input_primitives), (15, 5));
+    assert!((5..=15).contains(&drawn.vertex_invocations), "{drawn:?}");
+    assert_eq!(drawn.clipped_primitives, 5);
+    assert!(drawn.rasterized_primitives >= 5 && drawn.fragment_invocations >= 5 * 256, "{drawn:?}");
+    assert_eq!(
+        (drawn.compute_invocations, drawn.geometry_invocations, drawn.tessellation_patches),
+        (0, 0, 0)
+    );
+    let computed = ctx.statistics(*stages, 1).unwrap().unwrap();
+    assert_eq!(computed, PipelineStatistics { compute_invocations: 192, ..Default::default() });
+    let nothing = ctx.statistics(*stages, 2).unwrap();
+    assert!(nothing.is_none_or(|found| found == PipelineStatistics::default()), "{nothing:?}");
+    assert!(read(&ctx, *samples, 1)[0].is_some_and(|count| count > 0));
+}
+
+#[test]
+fn times_inside_of_a_pass_rise() {
+    let Some(ctx) = device() else { return };
+    let (canvas, times) = (Canvas::new(&ctx), pool(&ctx, QueryKind::Timestamps, 4));
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.write_timestamp(*times, 0).unwrap();
+    let mut pass = canvas.pass(&mut cmd);
+    pass.write_timestamp(*times, 1).unwrap();
+    draw(&mut pass, [0, 0], [SIDE; 2], 0.5);
+    pass.write_timestamp(*times, 2).unwrap();
+    drop(pass);
+    cmd.write_timestamp(*times, 3).unwrap();
+    finish(&ctx, cmd);
+    let found = ctx.timestamps_ms(*times, 0, 4).unwrap();
+    assert!(found.iter().all(Option::is_some) && found.is_sorted(), "{found:?}");
+    let ticks = read(&ctx, *times, 4);
+    let period = f64::from(ctx.capabilities().limits.timestamp_period_ns) * 1e-6;
+    for (ms, ticks) in found.iter().zip(ticks) {
+        assert!((ms.unwrap() - ticks.unwrap() as f64 * period).abs() < 1e-3);
+    }
+}
+
+#[test]
+fn misuse_is_refused_while_it_is_recorded() {
+    let Some(ctx) = device() else { return };
+    let (canvas, samples) = (Canvas::new(&ctx), occlusion(&ctx, 3));
+    let times = pool(&ctx, QueryKind::Timestamps, 3);
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    refused(cmd.write_timestamp(*samples, 0), "begin_query");
+    refused(cmd.begin_query(*times, 0), "write_timestamp");
+    refused(cmd.begin_query(*samples, 3), "outside");
+    refused(cmd.end_query(*samples, 3), "not begun");
+    refused(cmd.end_query(*samples, 0), "not begun");
+    cmd.begin_query(*samples, 0).unwrap();
+    refused(cmd.begin_query(*samples, 1), "nested");
+    refused(cmd.reset_queries(*samples, 0..2), "open");
+    cmd.reset_queries(*samples, 1..2).unwrap();
+    let mut pass = canvas.pass(&mut cmd);
+    refused(pass.begin_query(*samples, 1), "nested");
+    refused(pass.end_query(*samples, 0), "same side");
+    draw(&mut pass, [0, 0], [4, 4], 0.5);
+    drop(pass);
+    cmd.end_query(*samples, 0).unwrap();
+    refused(cmd.begin_query(*samples, 0), "reset it first");
+    cmd.write_timestamp(*times, 0).unwrap();
+    refused(cmd.write_timestamp(*times, 0), "reset it first");
+    cmd.reset_queries(*times, 0..1).unwrap();
+    cmd.write_timestamp(*times, 0).unwrap();
+    finish(&ctx, cmd);
+    assert!(read(&ctx, *samples, 1)[0].unwrap() > 0);
+    refused(ctx.timestamps_ms(*samples, 0, 1), "times");
+    refused(ctx.statistics(*samples, 0), "statistics");
+    refused(ctx.read_queries(*samples, 2, &mut [None; 2]), "outside");
+    refused(ctx.read_queries(*samples, u32::MAX, &mut [None; 2]), "outside");
+}
+
+#[test]
+fn queries_left_open_do_not_get_to_the_gpu() {
+    let Some(ctx) = device() else { return };
+    let (canvas, samples) = (Canvas::new(&ctx), occlusion(&ctx, 2));
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.begin_query(*samples, 0).unwrap();
+    refused(ctx.submit(cmd), "not ended in its command buffer");
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let mut pass = canvas.pass(&mut cmd);
+    pass.begin_query(*samples, 1).unwrap();
+    drop(pass);
+    refused(cmd.end_query(*samples, 1), "not begun");
+    refused(ctx.submit(cmd), "not ended in its render pass");
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let mut pass = canvas.pass(&mut cmd);
+    pass.begin_query(*samples, 1).unwrap();
+    std::mem::forget(pass);
+    cmd.begin_query(*samples, 0).unwrap();
+    cmd.end_query(*samples, 0).unwrap();
+    refused(ctx.submit(cmd), "not ended in its render pass");
+    assert_eq!(read(&ctx, *samples, 2), [None; 2]);
+}
+
+#[test]
+fn a_query_written_by_an_earlier_submission_must_be_reset() {
+    let Some(ctx) = device() else { return };
+    let times = pool(&ctx, QueryKind::Timestamps, 2);
+    let stamped = || {
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        cmd.write_timestamp(*times, 1).unwrap();
+        cmd
+    };
+    let (first, second) = (stamped(), stamped());
+    finish(&ctx, second);
+    let before = ctx.timestamps_ms(*times, 1, 1).unwrap()[0].unwrap();
+    refused(ctx.submit(first), "query 1 was written before");
+    let late = stamped();
+    let mut reset = ctx.acquire_command_buffer().unwrap();
+    reset.reset_queries(*times, 0..2).unwrap();
+    ctx.submit(reset).unwrap();
+    finish(&ctx, late);
+    assert!(ctx.timestamps_ms(*times, 1, 1).unwrap()[0].unwrap() > before);
+}
+
+#[test]
+fn clocks_of_gpu_and_host_go_together() {
+    let Some(ctx) = device() else { return };
+    if !ctx.capabilities().calibrated_timestamps {
+        assert!(matches!(ctx.clock_pair(), Err(Error::Unsupported { .. })));
+        return eprintln!("NOT TESTED, the device's clock cannot be read with the host's");
+    }
+    let times = pool(&ctx, QueryKind::Timestamps, 1);
+    let (before, start) = (monotonic(), Instant::now());
+    let first = ctx.clock_pair().unwrap();
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.write_timestamp(*times, 0).unwrap();
+    finish(&ctx, cmd);
+    let second = ctx.clock_pair().unwrap();
+    let (after, wall) = (monotonic(), start.elapsed());
+    assert!(before <= first.host && first.host <= second.host && second.host <= after);
+    assert!(second.host - first.host <= wall + Duration::from_millis(1));
+    let stamp = ctx.timestamps_ms(*times, 0, 1).unwrap()[0].unwrap();
+    assert!(first.gpu_ms <= stamp && stamp <= second.gpu_ms, "{first:?} {stamp} {second:?}");
+    let slack = first.deviation + second.deviation + Duration::from_micros(50);
+    let seen = first.host_at(stamp);
+    assert!(seen + slack >= first.host && seen <= second.host + slack, "{seen:?} of {first:?} to {second:?}");
+}
+
+fn monotonic() -> Duration {
+    let now = rustix::time::clock_gettime(rustix::time::ClockId::Monotonic);
+    Duration::new(now.tv_sec.unsigned_abs(), u32::try_from(now.tv_nsec).unwrap())
+}
