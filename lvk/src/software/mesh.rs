@@ -6,8 +6,8 @@ use crate::accel::bounds::{Bounds, BoxBytes, TriangleBytes};
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::software::layout::{LeafBox, LeafTriangle};
 
-/// Beyond this coordinates count as not finite: products of two of them still are numbers.
-const FARTHEST: f32 = 1e18;
+/// Bounds end here: the sums of areas that a build compares still are numbers.
+const FARTHEST: f32 = 1e15;
 
 /// The primitives of all geometries.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,9 +48,10 @@ impl Mesh {
     /// The boxes of the primitives.
     pub(crate) fn bounds(&self) -> Vec<Bounds> {
         match &self.primitives {
-            Primitives::Triangles(all) => {
-                all.iter().map(|triangle| Bounds::of([triangle.a, triangle.b, triangle.c])).collect()
-            }
+            Primitives::Triangles(all) => all
+                .iter()
+                .map(|triangle| Bounds::of([triangle.a, triangle.b, triangle.c].map(clamped)))
+                .collect(),
             Primitives::Boxes(all) => {
                 all.iter().map(|place| Bounds { low: place.low, high: place.high }).collect()
             }
@@ -74,8 +75,8 @@ impl Mesh {
 }
 
 fn triangle([a, b, c]: [Vec3; 3], primitive: u32, geometry: u32, opaque: bool) -> Option<LeafTriangle> {
-    let near = [a, b, c].iter().all(|corner| is_near(*corner));
-    near.then(|| LeafTriangle { a, primitive, b, geometry, c, opaque: opaque.into() })
+    let finite = [a, b, c].iter().all(|corner| corner.is_finite());
+    finite.then(|| LeafTriangle { a, primitive, b, geometry, c, opaque: opaque.into() })
 }
 
 fn place(bounds: Bounds, primitive: u32, geometry: u32, opaque: bool) -> Option<LeafBox> {
@@ -86,10 +87,6 @@ fn place(bounds: Bounds, primitive: u32, geometry: u32, opaque: bool) -> Option<
     let (low, high) = (clamped(low), clamped(high));
     let geometry = if opaque { geometry | LeafBox::OPAQUE } else { geometry };
     Some(LeafBox { low, primitive, high, geometry })
-}
-
-fn is_near(corner: Vec3) -> bool {
-    corner.abs().cmple(Vec3::splat(FARTHEST)).all()
 }
 
 /// Boxes may reach to infinity; the walk wants numbers.

@@ -1,6 +1,6 @@
 //! Wide trees: PLOC with reinsertion, collapsed to eight compressed children, by the crate `obvhs`.
 
-use glam::Vec3A;
+use glam::{Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
@@ -20,10 +20,7 @@ const DEEPEST_SOURCE: usize = 1_000;
 /// A wide tree; `None` where the primitives make it too deep.
 pub(super) fn build(bounds: &[Bounds], quality: Quality) -> Option<Tree> {
     let params = quality.params();
-    let boxes: Vec<Aabb> = bounds
-        .iter()
-        .map(|bounds| Aabb { min: Vec3A::from(bounds.low), max: Vec3A::from(bounds.high) })
-        .collect();
+    let boxes = distinct(bounds);
     let numbers = (0..boxes.len() as u32).collect();
     let mut binary = PlocBuilder::with_capacity(boxes.len()).build(
         params.ploc_search_distance,
@@ -39,6 +36,34 @@ pub(super) fn build(bounds: &[Bounds], quality: Quality) -> Option<Tree> {
     let wide = bvh2_to_cwbvh(&binary, params.max_prims_per_leaf.clamp(1, LARGEST_LEAF), true, false);
     let shallow = depth(&wide.nodes) <= DEEPEST_WIDE;
     shallow.then_some(Tree { nodes: Nodes::Wide(wide.nodes), root: 0, order: wide.primitive_indices })
+}
+
+/// The boxes, each a little larger in its own way. Equal ones in a row would be merged by one pair a round, and a round
+/// looks at them all.
+fn distinct(bounds: &[Bounds]) -> Vec<Aabb> {
+    let whole = bounds.iter().fold(0.0_f32, |most, bounds| {
+        most.max(bounds.low.abs().max_element()).max(bounds.high.abs().max_element())
+    });
+    let least = (whole * 1e-7).max(f32::MIN_POSITIVE.sqrt());
+    let grown = |(number, bounds): (u32, &Bounds)| {
+        let size = (bounds.high - bounds.low) * 1e-4 + least;
+        Aabb {
+            min: Vec3A::from(bounds.low - size * fractions(2 * number)),
+            max: Vec3A::from(bounds.high + size * fractions(2 * number + 1)),
+        }
+    };
+    (0..).zip(bounds).map(grown).collect()
+}
+
+/// Three numbers from 0 to 1, others for each `seed` (the finaliser of MurmurHash3).
+fn fractions(seed: u32) -> Vec3 {
+    let mixed = |axis: u32| {
+        let mut bits = seed.wrapping_mul(3).wrapping_add(axis);
+        bits = (bits ^ bits >> 16).wrapping_mul(0x85EB_CA6B);
+        bits = (bits ^ bits >> 13).wrapping_mul(0xC2B2_AE35);
+        (bits ^ bits >> 16) as f32 / u32::MAX as f32
+    };
+    Vec3::new(mixed(0), mixed(1), mixed(2))
 }
 
 /// Nodes on the longest path. Children stand behind their parents.
