@@ -85,7 +85,7 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
     uvec2 structure = lvkSoftStructureOf(lvkSoftInstances(state), hit.instance);
     LvkSoftBlocks head = LvkSoftBlocks(structure);
     uvec3 words;
-    lvkSoftCorners(structure, head.at[1].y, head.at[0].y == LVK_SOFT_INDEXED, hit.primitive, positions, words);
+    lvkSoftCorners(structure, head.at[1].y, head.at[0].y, hit.primitive, positions, words);
 }
 
 // The hit that `which` means.
