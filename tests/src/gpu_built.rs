@@ -1,7 +1,7 @@
 //! Meshes whose software structures tests build on the GPU, and what the structures then have to hold.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test whose set-up fails has failed")]
 
-use lvk::test_hooks::{Facts, GpuBlasDesc, GpuStructure, build_blas, check_structure, read};
+use lvk::test_hooks::{Facts, GpuBlasDesc, GpuStructure, Leaves, build_blas, check_structure, read};
 use lvk::{
     Aabbs, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, Context, GeometryFlags, Holder, Triangles,
 };
@@ -54,7 +54,7 @@ pub fn boxes(buffer: BufferHandle, count: usize) -> BlasGeometry {
 
 /// Builds one structure.
 pub fn build(ctx: &Context, geometries: &[BlasGeometry], leaf_size: u32) -> GpuStructure {
-    let desc = GpuBlasDesc { geometries, leaf_size, improvements: 1, indexed: false, refit: true };
+    let desc = GpuBlasDesc { geometries, leaf_size, improvements: 1, leaves: Leaves::Corners, refit: true };
     build_blas(ctx, &[desc]).expect("the build is recorded").remove(0)
 }
 

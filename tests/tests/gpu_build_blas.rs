@@ -1,7 +1,7 @@
 //! Bottom-level structures built on the GPU: every primitive once, boxes that fit, heights within the bound.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use lvk::test_hooks::{EMPTY, GpuBlasDesc, build_blas};
+use lvk::test_hooks::{EMPTY, GpuBlasDesc, Leaves, build_blas};
 use lvk::{BlasGeometry, GeometryFlags, GeometryTransform, IndexFormat, Indices, Triangles, VertexFormat};
 use lvk_tests::device;
 use lvk_tests::gpu_built::{boxes, build, check_contents, facts, input, numbered, scattered, triangles};
@@ -41,8 +41,8 @@ fn many_structures_are_built_side_by_side() {
     let vertices: Vec<_> = meshes.iter().map(|corners| input(&ctx, corners)).collect();
     let geometries: Vec<_> =
         vertices.iter().zip(counts).map(|(vertices, count)| [triangles(**vertices, count)]).collect();
-    let desc =
-        |geometries| GpuBlasDesc { geometries, leaf_size: 2, improvements: 1, indexed: false, refit: false };
+    let leaves = Leaves::Corners;
+    let desc = |geometries| GpuBlasDesc { geometries, leaf_size: 2, improvements: 1, leaves, refit: false };
     let descs: Vec<_> = geometries.iter().map(|geometries| desc(&geometries[..])).collect();
     for (structure, corners) in build_blas(&ctx, &descs).unwrap().iter().zip(&meshes) {
         check_contents(&facts(&ctx, structure), &numbered(corners));
@@ -246,9 +246,9 @@ fn several_geometries_keep_their_numbers() {
         for (geometry, mesh) in (0..).zip(&meshes) {
             expected.extend(numbered(mesh).into_iter().map(|((_, index), c)| ((geometry, index), c)));
         }
-        for indexed in [false, true] {
+        for leaves in [Leaves::Corners, Leaves::Indexed, Leaves::Packed] {
             let desc =
-                GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, indexed, refit: true };
+                GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, leaves, refit: true };
             let built = build_blas(&ctx, &[desc]).unwrap();
             check_contents(&facts(&ctx, &built[0]), &expected);
         }
@@ -267,7 +267,7 @@ fn better_places_cost_rays_less() {
         geometries: &geometries,
         leaf_size: 1,
         improvements,
-        indexed: false,
+        leaves: Leaves::Corners,
         refit: true,
     };
     let built = build_blas(&ctx, &[0, 1, 2].map(desc)).unwrap();

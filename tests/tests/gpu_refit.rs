@@ -1,7 +1,7 @@
 //! Refits on the GPU of both node formats: new places in the old tree, with boxes as a fresh fit has them.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use lvk::test_hooks::{EMPTY, GpuBlasDesc, build_blas, place, refit};
+use lvk::test_hooks::{EMPTY, GpuBlasDesc, Leaves, build_blas, place, refit};
 use lvk_tests::device;
 use lvk_tests::gpu_built::{boxes, build, check_contents, facts, input, numbered, scattered, triangles};
 use lvk_tests::wide_tree::wide_structure;
@@ -10,11 +10,11 @@ use lvk_tests::wide_tree::wide_structure;
 fn binary_nodes_follow_moved_triangles() {
     let Some(ctx) = device() else { return };
     for count in [0, 1, 2, 3, 1000, 20_000] {
-        for indexed in [false, true] {
+        for leaves in [Leaves::Corners, Leaves::Indexed, Leaves::Packed] {
             let vertices = input(&ctx, &scattered(count, 1));
             let geometries = [triangles(*vertices, count)];
             let desc =
-                GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, indexed, refit: true };
+                GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, leaves, refit: true };
             let structure = build_blas(&ctx, &[desc]).unwrap().remove(0);
             let before = facts(&ctx, &structure);
             for seed in [2, 3] {

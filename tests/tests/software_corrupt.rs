@@ -54,7 +54,7 @@ struct File {
 
 impl File {
     fn new(bytes: &[u8]) -> Self {
-        const MARK: &[u8] = b"lvk software structure, form 1\0\0";
+        const MARK: &[u8] = b"lvk software structure, form 2\0\0";
         let at = bytes.windows(MARK.len()).position(|window| window == MARK);
         Self { bytes: bytes.to_vec(), start: at.map_or(0, |at| at + MARK.len()) }
     }

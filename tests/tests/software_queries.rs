@@ -357,6 +357,43 @@ fn a_structure_is_the_same_after_a_file() -> Result<()> {
     Ok(())
 }
 
+/// Three triangles side by side whose corners lie far apart in a list of so many vertices.
+fn among_many(count: usize) -> Mesh {
+    let named = [[0, 1 << 11, count - 1], [count - 2, 5, 1 << 20], [count / 2 + 1, count - 3, (1 << 11) - 1]];
+    let mut positions = vec![[0.0; 3]; count];
+    for (at, corners) in (0_u8..).zip(named) {
+        for (corner, offset) in corners.into_iter().zip([Vec3::ZERO, Vec3::X, Vec3::Y]) {
+            positions[corner] = (Vec3::X * f32::from(at) * 10.0 + offset).to_array();
+        }
+    }
+    Mesh { positions, triangles: named.map(|corners| corners.map(|corner| corner as u32)).to_vec() }
+}
+
+/// Leaves are packed up to 2^21 vertices, and not beyond; builds of the GPU copy those that no triangle names too.
+#[test]
+fn the_last_of_many_vertices_are_found() -> Result<()> {
+    let Some(ctx) = software() else { return Ok(()) };
+    let tracer = RayTracer::new(&ctx, Method::Query)?;
+    let ray =
+        |at: f32| Ray { origin: [at + 0.25, 0.25, 1.0], t_min: 0.0, direction: [0.0, 0.0, -1.0], t_max: 9.0 };
+    let rays = [0.0, 10.0, 20.0, 30.0].map(ray);
+    for count in [1 << 21, (1 << 21) + 1] {
+        let parts = [Part::new(among_many(count), Layout::Indexed32)];
+        let (_buffers, geometries) = upload_geometries(&ctx, &parts)?;
+        for more in [BuildFlags::FAST_BUILD, BuildFlags::ALLOW_UPDATE] {
+            let flags = BuildFlags::LOW_MEMORY | more;
+            let blas = ctx.create_blas(&BlasDesc { geometries: &geometries, flags, ..Default::default() })?;
+            let instances = [TlasInstance::new(*blas)];
+            let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() })?;
+            let records = tracer.trace(&tlas, &rays, How::default())?;
+            let found = records.iter().map(|it| (it.kind != MISSED).then_some((it.primitive, it.t)));
+            let expected = [Some((0, 1.0)), Some((1, 1.0)), Some((2, 1.0)), None];
+            assert!(found.eq(expected), "{count} vertices, {flags:?}: {records:?}");
+        }
+    }
+    Ok(())
+}
+
 #[test]
 fn compaction_has_nothing_to_do_and_says_so() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };

@@ -24,7 +24,7 @@ use crate::software::sound::{self, Expected};
 use crate::software::tree_cache::TreeKey;
 
 /// Stands in front of structures that no driver wrote; as long as what drivers begin with.
-const MARK: [u8; 32] = *b"lvk software structure, form 1\0\0";
+const MARK: [u8; 32] = *b"lvk software structure, form 2\0\0";
 
 impl Context {
     /// The structures of meshes that the CPU builds, on all its cores; nothing for those that the GPU builds, and where
@@ -110,7 +110,7 @@ impl Context {
             [part] => part.driver.strip_prefix(&MARK[..]),
             _ => None,
         };
-        let bytes = bytes.ok_or_else(|| reject("a driver wrote it, and here only software traces"))?;
+        let bytes = bytes.ok_or_else(|| reject("a driver or another version of the library wrote it"))?;
         let sound = sound::check(bytes, &Expected::of_desc(desc)).map_err(reject)?;
         let built = BlasBlob { bytes: bytes.to_vec(), bounds: sound.bounds };
         let software = self.software_blas(desc, Some(&built))?;

@@ -21,12 +21,23 @@ pub use crate::software::gpu_build::check::{Bounds, EMPTY, Facts, check_structur
 
 const ALIGNMENT: u64 = 256;
 
+/// What leaves of triangles hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Leaves {
+    /// Corners.
+    Corners,
+    /// Numbers of vertices, a word each.
+    Indexed,
+    /// Numbers of vertices, 21 bits each.
+    Packed,
+}
+
 /// A bottom-level structure to build.
 pub struct GpuBlasDesc<'a> {
     pub geometries: &'a [BlasGeometry],
     pub leaf_size: u32,
     pub improvements: u32,
-    pub indexed: bool,
+    pub leaves: Leaves,
     pub refit: bool,
 }
 
@@ -46,10 +57,11 @@ pub fn build_blas(ctx: &Context, descs: &[GpuBlasDesc<'_>]) -> Result<Vec<GpuStr
         let geometries = read_geometries(ctx, desc.geometries)?;
         let boxes = desc.geometries.iter().any(BlasGeometry::is_boxes);
         let shape = BlasShape {
-            leaf_kind: match (boxes, desc.indexed) {
-                (true, _) => LeafKind::Boxes,
-                (false, true) => LeafKind::IndexedTriangles,
-                (false, false) => LeafKind::Triangles,
+            leaf_kind: match desc.leaves {
+                _ if boxes => LeafKind::Boxes,
+                Leaves::Corners => LeafKind::Triangles,
+                Leaves::Indexed => LeafKind::IndexedTriangles,
+                Leaves::Packed => LeafKind::PackedTriangles,
             },
             primitive_count: desc.geometries.iter().map(BlasGeometry::primitive_count).sum(),
             vertex_count: geometries.iter().map(|geometry| geometry.vertex_count).sum(),
@@ -127,6 +139,7 @@ pub fn place(ctx: &Context, words: &[u32]) -> Result<GpuStructure> {
         leaf_kind: match words[1] {
             0 => LeafKind::Triangles,
             1 => LeafKind::IndexedTriangles,
+            4 => LeafKind::PackedTriangles,
             _ => LeafKind::Boxes,
         },
         places: BlobPlaces {

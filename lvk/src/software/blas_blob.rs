@@ -5,11 +5,13 @@ use glam::Vec3;
 use super::mesh::{Mesh, Primitives};
 use super::quality::Quality;
 use super::tree::{Nodes, Tree};
-use super::vertices::indexed;
+use super::vertices::{Indexed, indexed};
 use crate::accel::bounds::Bounds;
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::software::layout::LeafKind;
-use crate::accel::software::layout::{BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafTriangle, WIDE};
+use crate::accel::software::layout::{
+    BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafPacked, LeafTriangle, WIDE,
+};
 
 /// A structure, ready to be copied to the GPU.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,11 +100,7 @@ fn leaves(mesh: &Mesh, order: &[u32], quality: Quality) -> Leaves {
                 None
             };
             match small {
-                Some(indexed) => Leaves {
-                    kind: LeafKind::IndexedTriangles,
-                    bytes: bytemuck::cast_slice(&indexed.triangles).to_vec(),
-                    vertices: indexed.vertices,
-                },
+                Some(indexed) => naming(indexed),
                 None => {
                     let ordered: Vec<LeafTriangle> =
                         order.iter().map(|number| triangles[*number as usize]).collect();
@@ -114,11 +112,46 @@ fn leaves(mesh: &Mesh, order: &[u32], quality: Quality) -> Leaves {
     }
 }
 
+/// Leaves that name vertices, as small as their numbers allow.
+fn naming(Indexed { triangles, vertices }: Indexed) -> Leaves {
+    let kind = LeafKind::naming(vertices.len());
+    let bytes = if kind == LeafKind::PackedTriangles {
+        let packed: Vec<_> = triangles.iter().map(LeafPacked::of).collect();
+        bytemuck::cast_slice(&packed).to_vec()
+    } else {
+        bytemuck::cast_slice(&triangles).to_vec()
+    };
+    Leaves { kind, bytes, vertices }
+}
+
 fn marks(flags: &[GeometryFlags]) -> u32 {
     let opaque = flags.iter().filter(|flags| flags.contains(GeometryFlags::OPAQUE)).count();
     match opaque {
         0 => Header::NONE_OPAQUE,
         count if count == flags.len() => Header::ALL_OPAQUE,
         _ => 0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::software::layout::LeafIndexed;
+
+    /// The leaves of one triangle that names the last of so many vertices.
+    fn last_of(count: usize) -> (LeafIndexed, Leaves) {
+        let vertices = [0, 1, count as u32 - 1];
+        let triangle = LeafIndexed { vertices, primitive: 7 };
+        (triangle, naming(Indexed { triangles: vec![triangle], vertices: vec![Vec3::ZERO; count] }))
+    }
+
+    #[test]
+    fn leaves_are_packed_where_all_vertices_have_names() {
+        let (triangle, leaves) = last_of(LeafPacked::MOST_VERTICES);
+        assert_eq!(leaves.kind, LeafKind::PackedTriangles);
+        assert_eq!(leaves.bytes, bytemuck::bytes_of(&LeafPacked::of(&triangle)));
+        let (triangle, leaves) = last_of(LeafPacked::MOST_VERTICES + 1);
+        assert_eq!(leaves.kind, LeafKind::IndexedTriangles);
+        assert_eq!(leaves.bytes, bytemuck::bytes_of(&triangle));
     }
 }

@@ -11,7 +11,9 @@ use crate::accel::flags::BuildFlags;
 use crate::accel::geometry::BlasGeometry;
 use crate::accel::software::geometry::vertex_count;
 use crate::accel::software::layout::LeafKind;
-use crate::accel::software::layout::{BINARY, BLOCK_BYTES, BinaryNode, Header, LeafBox, NONE, WIDE};
+use crate::accel::software::layout::{
+    BINARY, BLOCK_BYTES, BinaryNode, Header, LeafBox, LeafIndexed, LeafPacked, NONE, WIDE,
+};
 
 /// What a structure is to be of.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -96,7 +98,8 @@ pub(crate) fn check(bytes: &[u8], expected: &Expected) -> Result<Sound, &'static
 }
 
 fn leaf_kind(header: &Header) -> Option<LeafKind> {
-    let kinds = [LeafKind::Triangles, LeafKind::IndexedTriangles, LeafKind::Boxes];
+    use LeafKind::{Boxes, IndexedTriangles, PackedTriangles, Triangles};
+    let kinds = [Triangles, IndexedTriangles, PackedTriangles, Boxes];
     kinds.into_iter().find(|kind| *kind as u32 == header.leaf_kind)
 }
 
@@ -117,13 +120,8 @@ impl<'a> Parts<'a> {
         const PARENT_BYTES: usize = 4;
         let leaf_bytes = kind.primitive_bytes() as usize;
         let leaves = part(bytes, header.primitives, header.primitive_count as usize, leaf_bytes)?;
-        let vertices = match kind {
-            LeafKind::IndexedTriangles => {
-                let copied = if expected.refit { expected.vertices as usize } else { 0 };
-                vertices_named(&bytes[leaves.clone()]).max(copied)
-            }
-            _ => 0,
-        };
+        let copied = if expected.refit && kind.names_vertices() { expected.vertices as usize } else { 0 };
+        let vertices = vertices_named(&bytes[leaves.clone()], kind).max(copied);
         let nodes = header.node_count as usize;
         let parents = if expected.refit { nodes } else { 0 };
         Some(Self {
@@ -191,21 +189,29 @@ fn node_bytes(header: &Header) -> Option<usize> {
     }
 }
 
-/// Vertices up to the last that indexed leaves name.
-fn vertices_named(leaves: &[u8]) -> usize {
-    let last = |leaf: &[u8; BLOCK_BYTES]| {
-        let [a, b, c, _]: [u32; 4] = bytemuck::pod_read_unaligned(leaf);
-        a.max(b).max(c) as usize + 1
-    };
-    leaves.as_chunks().0.iter().map(last).max().unwrap_or(0)
+/// Vertices up to the last that leaves name.
+fn vertices_named(leaves: &[u8], kind: LeafKind) -> usize {
+    let names = |leaf| names(leaf, kind).into_iter().flatten();
+    let all = leaves.chunks_exact(kind.primitive_bytes() as usize).flat_map(names);
+    all.max().map_or(0, |last| last as usize + 1)
+}
+
+/// The vertices that a leaf names, if it does.
+fn names(leaf: &[u8], kind: LeafKind) -> Option<[u32; 3]> {
+    match kind {
+        LeafKind::IndexedTriangles => Some(bytemuck::pod_read_unaligned::<LeafIndexed>(leaf).vertices),
+        LeafKind::PackedTriangles => Some(bytemuck::pod_read_unaligned::<LeafPacked>(leaf).vertices()),
+        _ => None,
+    }
 }
 
 /// Whether a leaf's primitive is one of the geometries'.
 fn names_primitive(leaf: &[u8], kind: LeafKind, counts: &[u32]) -> bool {
     let word = |at: usize| leaf.get(at..at + 4).map_or(NONE, bytemuck::pod_read_unaligned);
+    let shared = |word: u32| if counts.len() > 1 { (word >> 24, word & 0x00ff_ffff) } else { (0, word) };
     let (geometry, primitive) = match kind {
-        LeafKind::IndexedTriangles if counts.len() > 1 => (word(12) >> 24, word(12) & 0x00ff_ffff),
-        LeafKind::IndexedTriangles => (0, word(12)),
+        LeafKind::IndexedTriangles => shared(word(12)),
+        LeafKind::PackedTriangles => shared(word(8)),
         LeafKind::Boxes => (word(28) & !LeafBox::OPAQUE, word(12)),
         _ => (word(28), word(12)),
     };
@@ -289,6 +295,24 @@ mod tests {
         (blob.bytes, expected)
     }
 
+    /// The same structure with leaves that have a word for each vertex.
+    fn unpacked((mut bytes, expected): (Vec<u8>, Expected)) -> (Vec<u8>, Expected) {
+        let mut changed = header(&bytes);
+        let packed = part(&bytes, changed.primitives, changed.primitive_count as usize, 12).unwrap();
+        let leaf = |leaf: &[u8]| {
+            let [a, b, c] = names(leaf, LeafKind::PackedTriangles).unwrap();
+            [a, b, c, bytemuck::pod_read_unaligned(&leaf[8..])]
+        };
+        let leaves: Vec<[u32; 4]> = bytes[packed].chunks_exact(12).map(leaf).collect();
+        assert_eq!(changed.leaf_kind, LeafKind::PackedTriangles as u32);
+        changed.leaf_kind = LeafKind::IndexedTriangles as u32;
+        changed.primitives = (bytes.len() / BLOCK_BYTES) as u32;
+        bytes.extend_from_slice(bytemuck::cast_slice(&leaves));
+        bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&changed));
+        check(&bytes, &expected).unwrap();
+        (bytes, expected)
+    }
+
     fn header(bytes: &[u8]) -> Header {
         bytemuck::pod_read_unaligned(&bytes[..size_of::<Header>()])
     }
@@ -322,16 +346,11 @@ mod tests {
         };
         let visit = |first: u32, count: u32| {
             for number in first as usize..(first + count) as usize {
-                match leaf_kind(&header).unwrap() {
-                    LeafKind::IndexedTriangles => {
-                        let place = number * 4;
-                        for corner in 0..3 {
-                            word(header.vertices, word(header.primitives, place + corner) as usize * 3 + 2);
-                        }
-                    }
-                    kind => {
-                        word(header.primitives, (number + 1) * kind.primitive_bytes() as usize / 4 - 1);
-                    }
+                let kind = leaf_kind(&header).unwrap();
+                let size = kind.primitive_bytes() as usize;
+                let at = header.primitives as usize * BLOCK_BYTES + number * size;
+                for vertex in names(&bytes[at..at + size], kind).into_iter().flatten() {
+                    word(header.vertices, vertex as usize * 3 + 2);
                 }
             }
         };
@@ -385,7 +404,7 @@ mod tests {
             let parts = Parts::new(&bytes, &header, kind, &expected).unwrap();
             let mut numbers: Vec<(u32, u32)> = parts.leaves().map(|leaf| {
                 let word = |at: usize| -> u32 { bytemuck::pod_read_unaligned(&leaf[at..at + 4]) };
-                if kind == LeafKind::Triangles { (word(28), word(12)) } else { (word(12) >> 24, word(12) & 0xff_ffff) }
+                if kind == LeafKind::Triangles { (word(28), word(12)) } else { (word(8) >> 24, word(8) & 0xff_ffff) }
             }).collect();
             numbers.sort_unstable_by_key(|(geometry, primitive)| (*primitive, *geometry));
             prop_assert!(numbers.into_iter().eq((0..corners.len() as u32).map(|number| (number % 2, number / 2))));
@@ -411,6 +430,7 @@ mod tests {
         fn damage_is_refused_or_harmless(
             small in any::<bool>(),
             wide in any::<bool>(),
+            loose in any::<bool>(),
             changes in prop::collection::vec((any::<prop::sample::Index>(), prop_oneof![
                 Just(None), any::<u32>().prop_map(Some), (0..300_u32).prop_map(Some), Just(Some(NONE))
             ], any::<prop::sample::Index>()), 1..4),
@@ -420,6 +440,9 @@ mod tests {
             let quality = if small { SMALL } else { MOVING };
             let (mut bytes, expected) =
                 if wide { built(&row(120), quality) } else { built_binary(&row(120), quality) };
+            if small && loose {
+                (bytes, _) = unpacked((bytes, expected.clone()));
+            }
             for (place, value, from) in changes {
                 let words = if in_header { size_of::<Header>() / 4 } else { bytes.len() / 4 };
                 let (at, from) = (place.index(words) * 4, from.index(bytes.len() / 4) * 4);
@@ -448,6 +471,7 @@ mod tests {
             (built(&row(200), SMALL), SMALL),
             (built_binary(&row(200), MOVING), MOVING),
             (built_binary(&row(200), SMALL), SMALL),
+            (unpacked(built(&row(200), SMALL)), SMALL),
             (built(&boxes(50), MOVING), MOVING),
         ];
         for ((bytes, expected), quality) in structures {
@@ -531,13 +555,17 @@ mod tests {
             let reason = refused_word(triangles.clone(), &expected, at.primitives, word, value);
             assert_eq!(reason, "its leaves name primitives that are not there");
         }
-        let (indexed, expected) = built(&row(200), SMALL);
-        let at = header(&indexed);
-        for value in [2 << 24, 100, NONE] {
-            refused_word(indexed.clone(), &expected, at.primitives, 3, value);
-        }
-        for value in [u32::MAX, 1 << 20] {
-            refused_word(indexed.clone(), &expected, at.primitives, 1, value);
+        let packed = built(&row(200), SMALL);
+        for ((bytes, expected), last) in [(packed.clone(), 2), (unpacked(packed), 3)] {
+            let at = header(&bytes);
+            for value in [2 << 24, 100, NONE] {
+                let reason = refused_word(bytes.clone(), &expected, at.primitives, last, value);
+                assert_eq!(reason, "its leaves name primitives that are not there");
+            }
+            for (word, value) in [(0, 1 << 20), (1, u32::MAX), (1, 1 << 20), (last - 1, 1 << 31)] {
+                let reason = refused_word(bytes.clone(), &expected, at.primitives, word, value);
+                assert_eq!(reason, "parts of it are cut off");
+            }
         }
         let (boxes, expected) = built(&boxes(50), MOVING);
         let at = header(&boxes);

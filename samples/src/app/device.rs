@@ -44,7 +44,9 @@ pub(super) fn open(
     };
     match args.rt {
         RayTracing::Pipeline => with(Required, HardwareIfPresent),
-        RayTracing::Query => with(Optional, Hardware),
+        RayTracing::Query => with(Optional, Hardware).inspect_err(|_| {
+            eprintln!("note: --rt software needs no ray queries of the device");
+        }),
         RayTracing::Software => with(Off, Software),
         // A profile rehearses the device's own paths. These keep no structures for software beside theirs.
         RayTracing::Auto => {
@@ -52,8 +54,21 @@ pub(super) fn open(
             let caps = best.capabilities();
             let can_trace = caps.ray_tracing_pipeline || caps.ray_query;
             let is_slow = caps.is_cpu && args.profile.is_none();
-            if can_trace && !is_slow { Ok(best) } else { with(Off, Auto) }
+            let chosen = if can_trace && !is_slow { best } else { with(Off, Auto)? };
+            eprintln!("note: --rt auto takes {}", choice(chosen.capabilities()));
+            Ok(chosen)
         }
+    }
+}
+
+/// What rays are traced by, and why.
+fn choice(capabilities: &Capabilities) -> String {
+    match (capabilities.ray_tracing_pipeline, capabilities.ray_query_path) {
+        (true, _) => "the ray tracing pipelines that the device has".to_owned(),
+        (false, RayQueryPath::Hardware) => {
+            "ray queries of the device, which has no ray tracing pipelines".to_owned()
+        }
+        (false, _) => format!("ray queries in software: {}", capabilities.ray_query_reason),
     }
 }
 

@@ -103,14 +103,15 @@ pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlag
     const IMPROVEMENTS: u32 = 2;
     let boxes = geometries.first().is_some_and(BlasGeometry::is_boxes);
     let sum = |of: fn(&BlasGeometry) -> u32| geometries.iter().map(of).fold(0_u32, u32::saturating_add);
+    let vertex_count = sum(vertex_count);
     let shape = BlasShape {
         leaf_kind: match (boxes, flags.contains(BuildFlags::LOW_MEMORY) && numbers_fit(geometries)) {
             (true, _) => LeafKind::Boxes,
-            (false, true) => LeafKind::IndexedTriangles,
+            (false, true) => LeafKind::naming(vertex_count as usize),
             (false, false) => LeafKind::Triangles,
         },
         primitive_count: sum(BlasGeometry::primitive_count),
-        vertex_count: sum(vertex_count),
+        vertex_count,
         geometry_count: geometries.len() as u32,
         leaf_size: if flags.contains(BuildFlags::LOW_MEMORY) { 2 } else { 1 },
         refit: flags.contains(BuildFlags::ALLOW_UPDATE),
@@ -119,7 +120,7 @@ pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlag
     GpuBuildPlan::blas(name, &shape)
 }
 
-/// Whether an indexed leaf has room for the numbers of geometry and primitive.
+/// Whether a leaf that names vertices has room for the numbers of geometry and primitive.
 fn numbers_fit(geometries: &[BlasGeometry]) -> bool {
     const MOST_GEOMETRIES: usize = 1 << 8;
     const MOST_PRIMITIVES: u32 = 1 << 24;
@@ -132,7 +133,7 @@ pub(crate) fn refit_plan(header: &Header, desc: &BlasDesc<'_>) -> Option<GpuRefi
     if !desc.flags.contains(BuildFlags::ALLOW_UPDATE) {
         return None;
     }
-    let kinds = [LeafKind::Boxes, LeafKind::IndexedTriangles];
+    let kinds = [LeafKind::Boxes, LeafKind::IndexedTriangles, LeafKind::PackedTriangles];
     let kind = kinds.into_iter().find(|kind| *kind as u32 == header.leaf_kind);
     let leaf_kind = kind.unwrap_or(LeafKind::Triangles);
     let vertices = desc.geometries.iter().map(vertex_count).fold(0_u32, u32::saturating_add);
@@ -148,6 +149,6 @@ pub(crate) fn refit_plan(header: &Header, desc: &BlasDesc<'_>) -> Option<GpuRefi
         },
         node_count: header.node_count,
         primitive_count: header.primitive_count,
-        vertex_count: if leaf_kind == LeafKind::IndexedTriangles { vertices } else { 0 },
+        vertex_count: if leaf_kind.names_vertices() { vertices } else { 0 },
     })
 }

@@ -38,14 +38,27 @@ pub(crate) enum LeafKind {
     Boxes = 2,
     /// Instances, 128 bytes.
     Instances = 3,
+    /// Triangles that name vertices of a copy by 21 bits each, 12 bytes.
+    PackedTriangles = 4,
 }
 
 impl LeafKind {
+    /// The smallest kind of triangles that name vertices of a copy of so many.
+    pub(crate) fn naming(vertices: usize) -> Self {
+        if vertices <= LeafPacked::MOST_VERTICES { Self::PackedTriangles } else { Self::IndexedTriangles }
+    }
+
+    /// Whether leaves name vertices of a copy.
+    pub(crate) fn names_vertices(self) -> bool {
+        matches!(self, Self::IndexedTriangles | Self::PackedTriangles)
+    }
+
     /// Bytes of a primitive as the structure keeps it.
     pub(crate) fn primitive_bytes(self) -> u64 {
         match self {
             Self::Triangles => 48,
             Self::IndexedTriangles => 16,
+            Self::PackedTriangles => 12,
             Self::Boxes => 32,
             Self::Instances => 128,
         }
@@ -105,6 +118,36 @@ pub(crate) struct LeafIndexed {
     pub(crate) vertices: [u32; 3],
     /// With the geometry in the highest 8 bits where there are several.
     pub(crate) primitive: u32,
+}
+
+/// As [`LeafIndexed`], with 21 bits for each vertex: of the first and the second in the lowest bits of a word each, of
+/// the third 11 bits above the first's and 10 above the second's.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+pub(crate) struct LeafPacked {
+    names: [u32; 2],
+    primitive: u32,
+}
+
+impl LeafPacked {
+    const NAME_BITS: u32 = 21;
+    const REST_BITS: u32 = u32::BITS - Self::NAME_BITS;
+    /// Most vertices that its bits can name.
+    pub(crate) const MOST_VERTICES: usize = 1 << Self::NAME_BITS;
+
+    /// Of one that names less than [`MOST_VERTICES`](Self::MOST_VERTICES).
+    pub(crate) fn of(leaf: &LeafIndexed) -> Self {
+        let [a, b, c] = leaf.vertices;
+        let names = [a | c << Self::NAME_BITS, b | c >> Self::REST_BITS << Self::NAME_BITS];
+        Self { names, primitive: leaf.primitive }
+    }
+
+    /// What it names; as shaders read it, which take the highest bit of the third name for one of it too.
+    pub(crate) fn vertices(&self) -> [u32; 3] {
+        let [a, b] = self.names;
+        let name = |word| word & (Self::MOST_VERTICES as u32 - 1);
+        [name(a), name(b), a >> Self::NAME_BITS | b >> Self::NAME_BITS << Self::REST_BITS]
+    }
 }
 
 /// A box.
@@ -185,10 +228,31 @@ mod tests {
     use super::*;
 
     #[test]
+    fn packed_leaves_name_what_they_were_made_of() {
+        const LAST: u32 = (1 << 21) - 1;
+        let some = [0, 1, (1 << 11) - 1, 1 << 11, 1_234_567, LAST - 1, LAST];
+        for number in 0..some.len().pow(3) {
+            let vertices = [0, 1, 2].map(|corner| some[number / some.len().pow(corner) % some.len()]);
+            for primitive in [0, 0x0100_0002, u32::MAX] {
+                let packed = LeafPacked::of(&LeafIndexed { vertices, primitive });
+                assert_eq!((packed.vertices(), packed.primitive), (vertices, primitive));
+            }
+        }
+    }
+
+    #[test]
+    fn leaves_are_packed_up_to_two_to_the_21_vertices() {
+        assert_eq!(LeafKind::naming(0), LeafKind::PackedTriangles);
+        assert_eq!(LeafKind::naming(1 << 21), LeafKind::PackedTriangles);
+        assert_eq!(LeafKind::naming((1 << 21) + 1), LeafKind::IndexedTriangles);
+    }
+
+    #[test]
     fn everything_has_the_bytes_that_shaders_read() {
         assert_eq!(size_of::<Header>(), 128);
         assert_eq!(size_of::<LeafTriangle>(), 48);
         assert_eq!(size_of::<LeafIndexed>(), 16);
+        assert_eq!(size_of::<LeafPacked>(), 12);
         assert_eq!(size_of::<LeafBox>(), 32);
         assert_eq!(size_of::<BinaryNode>(), 64);
         assert_eq!(size_of::<GeometryRow>(), 16);

@@ -38,7 +38,7 @@ pub(crate) struct BlasShape {
     pub(crate) leaf_kind: LeafKind,
     /// Of all geometries, inactive ones included.
     pub(crate) primitive_count: u32,
-    /// Of all geometries; they count only where leaves are indexed.
+    /// Of all geometries; they count only where leaves name them.
     pub(crate) vertex_count: u32,
     pub(crate) geometry_count: u32,
     /// Most primitives of a leaf, 1 to 8. More make smaller structures and faster builds, fewer make faster rays.
@@ -144,8 +144,7 @@ impl GpuBuildPlan {
     fn new(name: &str, shape: &BlasShape) -> Result<Self> {
         let what = if shape.leaf_kind == LeafKind::Instances { "instance count" } else { "primitive count" };
         check_limit(name, what, shape.primitive_count.into(), MOST_PRIMITIVES)?;
-        let indexed = shape.leaf_kind == LeafKind::IndexedTriangles;
-        let vertex_count = if indexed { shape.vertex_count } else { 0 };
+        let vertex_count = if shape.leaf_kind.names_vertices() { shape.vertex_count } else { 0 };
         let (places, blob_bytes) = blob_places(name, shape, vertex_count)?;
         let low_bits = low_bits(shape);
         let (scratch, scratch_bytes) = scratch_places(shape, low_bits > 0);
@@ -327,7 +326,8 @@ mod tests {
     use super::*;
 
     fn kinds() -> impl Strategy<Value = LeafKind> {
-        prop::sample::select(vec![LeafKind::Triangles, LeafKind::IndexedTriangles, LeafKind::Boxes])
+        use LeafKind::{Boxes, IndexedTriangles, PackedTriangles, Triangles};
+        prop::sample::select(vec![Triangles, IndexedTriangles, PackedTriangles, Boxes])
     }
 
     fn shapes() -> impl Strategy<Value = BlasShape> {

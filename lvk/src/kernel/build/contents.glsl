@@ -14,5 +14,5 @@ void writeTree(uint i) {
         uint index = number - g.firstPrimitive;
         writePrimitive(i, geometry, index, g, readPrimitive(g, index));
     }
-    if (job.leafKind == kIndexedTriangles && i < job.vertexCount) copyVertex(i);
+    if (namesVertices() && i < job.vertexCount) copyVertex(i);
 }

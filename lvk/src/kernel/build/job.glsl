@@ -18,6 +18,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Inp
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer InputQuads { uvec4 quad[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) LVK_SHARED buffer Words { uint word[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) LVK_SHARED buffer Corners { vec3 corner[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) LVK_SHARED buffer Triples { uvec3 triple[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 16) LVK_SHARED buffer Quads { uvec4 quad[]; };
 
 // Formats and leaf kinds as the header has them.
@@ -26,6 +27,7 @@ const uint kTriangles = 0u;
 const uint kIndexedTriangles = 1u;
 const uint kBoxes = 2u;
 const uint kInstances = 3u;
+const uint kPackedTriangles = 4u;
 
 struct Job {
     uvec2 inputs;        // geometries, or the records of instances
@@ -43,7 +45,7 @@ struct Job {
     uint vertices;
     uint geometries;
     uint savedParents;   // as `parents`; 0 if they are not part of the structure
-    uint vertexCount;    // vertices that indexed leaves copy
+    uint vertexCount;    // vertices of the copy that leaves name
     uint boxes;          // places in the scratch memory, in words: six floats for each primitive or wide node
     uint keys;           // codes and numbers of primitives
     uint spareKeys;

@@ -16,7 +16,7 @@ Box keptBox(uint slot) {
         return cornersBox(uintBitsToFloat(kept.quad[0].xyz), uintBitsToFloat(kept.quad[1].xyz),
                           uintBitsToFloat(kept.quad[2].xyz));
     }
-    uvec4 named = slotAt(slot, 16u).quad[0];
+    uvec3 named = namedVertices(slot);
     Corners vertices = Corners(place(job.vertices));
     return cornersBox(vertices.corner[named.x], vertices.corner[named.y], vertices.corner[named.z]);
 }

@@ -16,7 +16,7 @@ void refitFrom(uint i) {
         if (header().word[0] == kBinary) resetArrivals(i);
         else Words(work(job.arrivals)).word[i] = 0u;
     }
-    if (job.leafKind == kIndexedTriangles) {
+    if (namesVertices()) {
         if (i < job.vertexCount) copyVertex(i);
     } else if (i < min(header().word[3], job.count)) {
         refitPrimitive(i);

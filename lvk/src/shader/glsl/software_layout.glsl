@@ -5,6 +5,7 @@
 // 16 bytes by address, and a structure says by numbers of blocks from its own start where its parts lie.
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer LvkSoftBlocks { uvec4 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LvkSoftVertices { vec3 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LvkSoftTriples { uvec3 at[]; };
 
 // Format of a structure: block 0 is (format, kind of leaves, root, number of primitives); of a moved one the last two
 // are the address of the structure that is meant.
@@ -17,6 +18,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lvk
 #define LVK_SOFT_INDEXED 1u
 #define LVK_SOFT_BOXES 2u
 #define LVK_SOFT_INSTANCES 3u
+#define LVK_SOFT_PACKED 4u
 
 // References to nodes: a node's number, or with the highest bit a leaf: first primitive, 4 bits number of them less 1.
 #define LVK_SOFT_LEAF 0x80000000u
@@ -40,6 +42,11 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lvk
 #define LVK_SOFT_BOX_BLOCKS 2u
 #define LVK_SOFT_BINARY_NODE_BLOCKS 4u
 #define LVK_SOFT_WIDE_NODE_BLOCKS 5u
+
+// Of packed leaves: bits of a vertex in a word of its own, which has those of the third above them.
+#define LVK_SOFT_NAME_BITS 21
+#define LVK_SOFT_REST_BITS 11
+#define LVK_SOFT_NAME 0x001FFFFFu
 
 // Paths have at most 64 binary nodes in either level, or 32 wide ones, and an instance may leave others of its leaf.
 #define LVK_SOFT_STACK_WORDS 130u

@@ -24,7 +24,8 @@ void lvkSoftInitialize(out LvkSoftState state, uint tlas, uint flags, uint mask,
     lvkSoftFinish(start);
     lvkSoftQueries += 1u;
     flags |= LVK_RAY_FLAGS_ALWAYS;
-    state = LvkSoftState(kLvkTlasTable.entry[tlas].software, origin, max(tMin, 0.0), direction, flags, mask & 0xFFu,
+    float from = intBitsToFloat(max(floatBitsToInt(tMin), 0)); // what is no number stays so: nothing is behind it
+    state = LvkSoftState(kLvkTlasTable.entry[tlas].software, origin, from, direction, flags, mask & 0xFFu,
                          lvkSoftQueries, false, start, none, none);
     if (state.tlas != uvec2(0u)) {
         state.place.next = LvkSoftBlocks(state.tlas).at[0].z;
@@ -84,7 +85,7 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
     uvec2 structure = lvkSoftStructureOf(lvkSoftInstances(state), hit.instance);
     LvkSoftBlocks head = LvkSoftBlocks(structure);
     uvec3 words;
-    lvkSoftCorners(structure, head.at[1].y, head.at[0].y == LVK_SOFT_INDEXED, hit.primitive, positions, words);
+    lvkSoftCorners(structure, head.at[1].y, head.at[0].y, hit.primitive, positions, words);
 }
 
 // The hit that `which` means.

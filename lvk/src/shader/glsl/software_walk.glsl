@@ -235,12 +235,22 @@ void lvkSoftCommit(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftHi
     }
 }
 
+// The vertices that a triangle names, and the word with its numbers.
+uvec4 lvkSoftNames(uvec2 structure, uint primitives, uint kind, uint primitive) {
+    if (kind == LVK_SOFT_INDEXED) {
+        return LvkSoftBlocks(structure).at[primitives + primitive];
+    }
+    uvec3 leaf = LvkSoftTriples(lvkSoftBehind(structure, primitives)).at[primitive];
+    uvec2 rest = leaf.xy >> LVK_SOFT_NAME_BITS;
+    return uvec4(leaf.xy & LVK_SOFT_NAME, rest.x | rest.y << LVK_SOFT_REST_BITS, leaf.z);
+}
+
 // The corners of a triangle, and in its last three words what its leaf says besides.
-void lvkSoftCorners(uvec2 structure, uint primitives, bool indexed, uint primitive, out vec3 corners[3],
+void lvkSoftCorners(uvec2 structure, uint primitives, uint kind, uint primitive, out vec3 corners[3],
                     out uvec3 words) {
     LvkSoftBlocks blocks = LvkSoftBlocks(structure);
-    if (indexed) {
-        uvec4 vertices = blocks.at[primitives + primitive];
+    if (kind != LVK_SOFT_TRIANGLES) {
+        uvec4 vertices = lvkSoftNames(structure, primitives, kind, primitive);
         uvec2 points = lvkSoftBehind(structure, blocks.at[1].z);
         corners[0] = LvkSoftVertices(points).at[vertices.x];
         corners[1] = LvkSoftVertices(points).at[vertices.y];
@@ -259,10 +269,10 @@ void lvkSoftCorners(uvec2 structure, uint primitives, bool indexed, uint primiti
 }
 
 // The application's numbers of a triangle, geometry and primitive, from the words of its leaf.
-uvec2 lvkSoftNumbers(uvec3 words, bool indexed, bool several) {
-    bool packed = indexed && several;
-    uint geometry = packed ? words.x >> 24 : words.y & 0x7FFFFFFFu;
-    return uvec2(geometry, packed ? words.x & 0x00FFFFFFu : words.x);
+uvec2 lvkSoftNumbers(uvec3 words, uint kind, bool several) {
+    bool inOneWord = kind != LVK_SOFT_TRIANGLES && several;
+    uint geometry = inOneWord ? words.x >> 24 : words.y & 0x7FFFFFFFu;
+    return uvec2(geometry, inOneWord ? words.x & 0x00FFFFFFu : words.x);
 }
 
 // Whether a primitive says of itself that it is opaque.
@@ -293,8 +303,7 @@ bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hi
 bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hit) {
     vec3 corners[3];
     uvec3 words;
-    bool indexed = level.kind == LVK_SOFT_INDEXED;
-    lvkSoftCorners(level.structure, level.primitives, indexed, hit.primitive, corners, words);
+    lvkSoftCorners(level.structure, level.primitives, level.kind, hit.primitive, corners, words);
     LvkSoftPassage passage;
     if (!lvkSoftPasses(level.shear, level.slabs.origin, corners, passage)) {
         return false;
@@ -303,7 +312,7 @@ bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHi
         return false;
     }
     hit.t = passage.t;
-    hit.numbers = lvkSoftNumbers(words, indexed, level.several);
+    hit.numbers = lvkSoftNumbers(words, level.kind, level.several);
     hit.barycentrics = passage.barycentrics;
     hit.front = passage.front != level.flip;
     uint culls = hit.front ? LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES : LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES;

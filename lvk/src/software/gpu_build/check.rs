@@ -32,6 +32,7 @@ const KIND_TRIANGLES: u32 = 0;
 const KIND_INDEXED: u32 = 1;
 const KIND_BOXES: u32 = 2;
 const KIND_INSTANCES: u32 = 3;
+const KIND_PACKED: u32 = 4;
 
 type Checked<T> = Result<T, String>;
 
@@ -244,14 +245,14 @@ impl<'a> Walk<'a> {
             }
             KIND_INDEXED => {
                 let at = start + place * 4;
-                let mut corners = Vec::new();
-                for corner in 0..3 {
-                    corners.push(self.vec3(self.place(6) + self.word(at + corner)? as usize * 3)?);
-                }
-                let id = self.word(at + 3)?;
-                let ids = if self.header(9) > 1 { (id >> 24, id & 0xff_ffff) } else { (0, id) };
-                let bounds = around(&corners);
-                Ok(Primitive { ids, corners, bounds })
+                let names = [self.word(at)?, self.word(at + 1)?, self.word(at + 2)?];
+                self.named_triangle(names, self.word(at + 3)?)
+            }
+            KIND_PACKED => {
+                let at = start + place * 3;
+                let (a, b) = (self.word(at)?, self.word(at + 1)?);
+                let names = [a & 0x1f_ffff, b & 0x1f_ffff, a >> 21 | b >> 21 << 11];
+                self.named_triangle(names, self.word(at + 2)?)
             }
             KIND_BOXES => {
                 let at = start + place * 8;
@@ -266,6 +267,19 @@ impl<'a> Walk<'a> {
             }
             kind => Err(format!("leaf kind {kind} does not exist")),
         }
+    }
+}
+
+impl Walk<'_> {
+    /// The triangle of these vertices; `id` has the numbers of geometry and primitive.
+    fn named_triangle(&self, names: [u32; 3], id: u32) -> Checked<Primitive> {
+        let mut corners = Vec::new();
+        for name in names {
+            corners.push(self.vec3(self.place(6) + name as usize * 3)?);
+        }
+        let ids = if self.header(9) > 1 { (id >> 24, id & 0xff_ffff) } else { (0, id) };
+        let bounds = around(&corners);
+        Ok(Primitive { ids, corners, bounds })
     }
 }
 
