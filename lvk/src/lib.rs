@@ -79,7 +79,7 @@
 //!
 //! # What `lvk` does not do (yet)
 //!
-//! Windows and swapchains, tessellation pipelines, multisampling, 3D textures, queues beside the main one. `lvk` is no
+//! Windows and swapchains, tessellation pipelines, multisampling, queues beside the main one. `lvk` is no
 //! scene graph and no renderer.
 //!
 //! # Features

@@ -121,7 +121,13 @@ fn every_mip_layer_and_region_is_a_place_of_its_own() {
         for (seed, (mip, layer)) in (0..).zip(&places) {
             ctx.upload_texture(*texture, &whole(*mip, *layer), &bytes_of(seed, *mip)).unwrap();
         }
-        let region = TextureRegion { mip: 1, layer: kind.layers() - 1, offset: [2, 1], extent: [3, 2] };
+        let region = TextureRegion {
+            mip: 1,
+            layer: kind.layers() - 1,
+            offset: [2, 1],
+            extent: [3, 2],
+            ..Default::default()
+        };
         ctx.upload_texture(*texture, &region, &[0x55; 24]).unwrap();
         for (seed, (mip, layer)) in (0..).zip(&places) {
             let mut expected = bytes_of(seed, *mip);

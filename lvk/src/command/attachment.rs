@@ -33,7 +33,7 @@ pub struct ColorAttachment {
     pub texture: TextureHandle,
     /// Mip level drawn to; of a view, counted from its first.
     pub mip: u32,
-    /// Layer or cube face drawn to; of a view, counted from its first.
+    /// Layer, cube face, or slice of a volume drawn to; of a view, counted from its first.
     pub layer: u32,
     /// What it holds when the pass begins.
     pub load: ColorLoad,
@@ -55,7 +55,7 @@ pub struct DepthAttachment {
     pub texture: TextureHandle,
     /// Mip level drawn to; of a view, counted from its first.
     pub mip: u32,
-    /// Layer or cube face drawn to; of a view, counted from its first.
+    /// Layer, cube face, or slice of a volume drawn to; of a view, counted from its first.
     pub layer: u32,
     /// What it holds when the pass begins.
     pub load: DepthLoad,

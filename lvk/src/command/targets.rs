@@ -51,6 +51,7 @@ impl CommandBuffer {
                 return Err(Error::usage(&texture.name, "the pass lists the colour target twice"));
             }
             drawn.push((texture.image.id, part));
+            let part = texture.drawn_part(attachment.mip, attachment.layer);
             self.use_texture(&texture, part, Use::color_target(attachment.load == ColorLoad::Load))?;
             targets.colors.push(color_info(&texture, attachment)?);
             targets.color_formats.push(texture.format);
@@ -58,7 +59,8 @@ impl CommandBuffer {
         if let Some(attachment) = depth {
             let texture = self.target(attachment.texture, attachment.mip, attachment.layer, &mut extent)?;
             check_depth(&texture, attachment.load)?;
-            self.use_texture(&texture, texture.part(attachment.mip, attachment.layer), Use::depth_target())?;
+            let part = texture.drawn_part(attachment.mip, attachment.layer);
+            self.use_texture(&texture, part, Use::depth_target())?;
             targets.depth = Some(depth_info(&texture, attachment)?);
             targets.depth_format = Some(texture.format);
             targets.stencil = texture.format.has_stencil();
@@ -78,7 +80,7 @@ impl CommandBuffer {
     ) -> Result<Arc<Texture>> {
         let texture = self.shared.store.textures.get(handle)?;
         texture.check_usage(TextureUsage::TARGET)?;
-        texture.check_subresource(mip, layer)?;
+        texture.check_target(mip, layer)?;
         let own = texture.mip_extent(mip);
         if *extent.get_or_insert(own) != own {
             let message =

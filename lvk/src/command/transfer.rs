@@ -12,7 +12,6 @@ use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::sampler::Filter;
 use crate::resource::texture::TextureRegion;
 use crate::resource::texture_desc::TextureUsage;
-use crate::resource::view::raw_range;
 use crate::resource::{Buffer, Texture};
 use crate::submit::Recording;
 use crate::submit::emit::emit;
@@ -139,8 +138,8 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Copies texels between textures of texels of the same size (`vkCmdCopyImage`). Both regions have the extent of
-    /// the first.
+    /// Copies texels between textures of texels of the same size (`vkCmdCopyImage`). Both regions have the extent and depth
+    /// of the first. A slice of a volume may be copied to a layer, and a layer to a slice.
     pub fn copy_texture(
         &mut self,
         source: TextureHandle,
@@ -151,15 +150,15 @@ impl CommandBuffer {
         let source = self.shared.store.textures.get(source)?;
         let target = self.shared.store.textures.get(target)?;
         let from = source.resolve_region(from)?;
-        let to = target.resolve_region(&TextureRegion { extent: from.extent, ..*to })?;
+        let to = target.resolve_region(&TextureRegion { extent: from.extent, depth: from.depth, ..*to })?;
         check_copyable(&source, &target)?;
         self.use_texture_pair(&source, &from, &target, &to)?;
         let copy = vk::ImageCopy {
             src_subresource: source.layers_of(from.mip, from.layer),
-            src_offset: corner(from.offset),
+            src_offset: from.raw_offset(),
             dst_subresource: target.layers_of(to.mip, to.layer),
-            dst_offset: corner(to.offset),
-            extent: vk::Extent3D { width: from.extent[0], height: from.extent[1], depth: 1 },
+            dst_offset: to.raw_offset(),
+            extent: from.raw_extent(),
         };
         // SAFETY: both regions lie inside their images, whose texels are equally large.
         unsafe {
@@ -191,7 +190,7 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Fills every mip but the first by halving the one before, for all layers.
+    /// Fills every mip but the first by halving the one before, for all layers, volumes in depth too.
     pub fn generate_mipmaps(&mut self, texture: TextureHandle) -> Result<()> {
         let texture = self.shared.store.textures.get(texture)?;
         self.generate_mipmaps_object(&texture)
@@ -222,7 +221,7 @@ impl CommandBuffer {
         }
         self.use_texture(&texture, texture.range, Use::transfer_write())?;
         self.flush();
-        let range = raw_range(vk::ImageAspectFlags::COLOR, texture.range);
+        let range = texture.image.for_barriers().range(texture.range);
         let color = vk::ClearColorValue { float32: color };
         // SAFETY: the range lies inside the image.
         unsafe {
@@ -353,9 +352,9 @@ impl CommandBuffer {
     ) {
         let blit = vk::ImageBlit {
             src_subresource: source.layers_of(from.mip, from.layer),
-            src_offsets: corners(from),
+            src_offsets: from.raw_corners(),
             dst_subresource: target.layers_of(to.mip, to.layer),
-            dst_offsets: corners(to),
+            dst_offsets: to.raw_corners(),
         };
         let filter = match filter {
             Filter::Nearest => vk::Filter::NEAREST,
@@ -424,14 +423,4 @@ fn check_copyable(source: &Texture, target: &Texture) -> Result<()> {
     }
     let message = format!("texels of {from:?} cannot be copied to {to:?}; blit, or use a shader");
     Err(Error::usage(&target.name, message))
-}
-
-fn corner([x, y]: [u32; 2]) -> vk::Offset3D {
-    vk::Offset3D { x: x as i32, y: y as i32, z: 0 }
-}
-
-fn corners(region: &TextureRegion) -> [vk::Offset3D; 2] {
-    let [x, y] = region.offset;
-    let end = [x + region.extent[0], y + region.extent[1]];
-    [corner(region.offset), vk::Offset3D { z: 1, ..corner(end) }]
 }

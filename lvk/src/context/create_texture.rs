@@ -11,8 +11,8 @@ use crate::resource::texture_desc::{TextureDesc, TextureUsage};
 use crate::resource::view::TextureViewDesc;
 
 impl Context {
-    /// Creates a texture (`vkCreateImage`). [`Holder::index`] is its element of `kTextures2D[]`, `kTexturesCube[]`
-    /// and the storage images. Its first contents are there for every command submitted afterwards.
+    /// Creates a texture (`vkCreateImage`). [`Holder::index`] is its element of `kTextures2D[]`, `kTextures3D[]`,
+    /// `kTexturesCube[]` and the storage images. Its first contents are there for every command submitted afterwards.
     pub fn create_texture(&self, desc: &TextureDesc<'_>) -> Result<Holder<TextureHandle>> {
         let shared = self.shared();
         let slot = shared.reserve(|| shared.bindless.reserve_texture(desc.debug_name))?;
@@ -68,10 +68,12 @@ impl Context {
             });
         };
         let layers = texture.layers() as usize;
-        let texels = u64::from(desc.extent[0]) * u64::from(desc.extent[1]) * layers as u64;
+        let depth = u64::from(desc.kind.depth());
+        let texels = u64::from(desc.extent[0]) * u64::from(desc.extent[1]) * depth * layers as u64;
         let expected = texels * u64::from(desc.format.texel_bytes());
         if data.len() as u64 != expected {
-            let message = format!("mip 0 has {expected} bytes in all layers, but {} were given", data.len());
+            let message =
+                format!("mip 0 has {expected} bytes in all layers and slices, but {} were given", data.len());
             return Err(Error::usage(desc.debug_name, message));
         }
         self.before_next_submission(|cmd| {

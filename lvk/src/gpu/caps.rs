@@ -67,6 +67,8 @@ pub struct Capabilities {
     pub primitive_id: bool,
     /// Storage images may be read without a format in the shader (`shaderStorageImageReadWithoutFormat`).
     pub formatless_storage_read: bool,
+    /// Arrays of cubes can be made and sampled (`imageCubeArray`).
+    pub cube_arrays: bool,
     /// Shaders may use 64-bit integers (`shaderInt64`).
     pub shader_int64: bool,
     /// Shaders may change 64-bit integers in buffers atomically (`shaderBufferInt64Atomics`).
@@ -139,6 +141,8 @@ impl Capabilities {
 pub struct Limits {
     /// Widest 2D texture, in texels a side (`maxImageDimension2D`).
     pub max_texture_2d: u32,
+    /// Widest and deepest volume, in texels a side (`maxImageDimension3D`).
+    pub max_texture_3d: u32,
     /// Widest cube texture, in texels a side (`maxImageDimensionCube`).
     pub max_texture_cube: u32,
     /// Most layers of a texture (`maxImageArrayLayers`).
@@ -292,6 +296,7 @@ impl PhysicalDevice {
         caps.mesh_shader = found.mesh_shader == vk::TRUE;
         caps.primitive_id = found.core.geometry_shader == vk::TRUE;
         caps.formatless_storage_read = found.core.shader_storage_image_read_without_format == vk::TRUE;
+        caps.cube_arrays = found.core.image_cube_array == vk::TRUE;
         caps.shader_int64 = found.core.shader_int64 == vk::TRUE;
         caps.buffer_int64_atomics = found.v12.shader_buffer_int64_atomics == vk::TRUE;
         caps.multi_draw_indirect = found.core.multi_draw_indirect == vk::TRUE;
@@ -441,6 +446,7 @@ fn limits(
     let accel_bytes = accel_bytes(v12.driver_id, plain.max_storage_buffer_range, v13.max_buffer_size);
     let mut limits = Limits {
         max_texture_2d: plain.max_image_dimension2_d,
+        max_texture_3d: plain.max_image_dimension3_d,
         max_texture_cube: plain.max_image_dimension_cube,
         max_texture_layers: plain.max_image_array_layers,
         max_buffer_bytes: v13.max_buffer_size,

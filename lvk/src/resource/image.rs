@@ -7,7 +7,7 @@ use ash::vk;
 use gpu_allocator::vulkan::Allocation;
 
 use super::texture_desc::{TextureDesc, TextureKind, TextureUsage};
-use crate::barrier::{ResourceId, TextureShape};
+use crate::barrier::{ResourceId, Subresources, TextureShape};
 use crate::error::{Error, Result, check_limit};
 use crate::format::Format;
 use crate::gpu::Gpu;
@@ -21,6 +21,9 @@ pub(crate) struct Image {
     pub(crate) format: Format,
     /// Width and height of mip 0.
     pub(crate) extent: [u32; 2],
+    /// Slices of mip 0.
+    pub(crate) depth: u32,
+    volume: bool,
     pub(crate) shape: TextureShape,
     pub(crate) usage: TextureUsage,
     /// What other formats views may have.
@@ -31,6 +34,22 @@ pub(crate) struct Image {
     handles: AtomicU32,
     allocation: Option<Allocation>,
     gpu: Arc<Gpu>,
+}
+
+/// An image as barriers and clears name its parts.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct BarrierImage {
+    pub(crate) raw: vk::Image,
+    aspects: vk::ImageAspectFlags,
+    volume: bool,
+}
+
+impl BarrierImage {
+    /// A part of the image with all its aspects. Of volumes all slices are meant, which is what one layer may mean too.
+    pub(crate) fn range(&self, part: Subresources) -> vk::ImageSubresourceRange {
+        let layer_count = if self.volume { vk::REMAINING_ARRAY_LAYERS } else { part.layer_count };
+        vk::ImageSubresourceRange { layer_count, ..raw_range(self.aspects, part) }
+    }
 }
 
 impl Image {
@@ -53,6 +72,8 @@ impl Image {
             id: ResourceId::next(),
             format: desc.format,
             extent: desc.extent,
+            depth: desc.kind.depth(),
+            volume: desc.kind.is_3d(),
             shape: TextureShape { mips, layers: desc.kind.layers() },
             usage: desc.usage,
             view_formats: desc.view_formats.to_vec(),
@@ -104,9 +125,9 @@ impl Image {
         format == self.format || self.view_formats.contains(&format)
     }
 
-    /// The aspects and the image, as barriers name them.
-    pub(crate) fn for_barriers(&self) -> (vk::Image, vk::ImageAspectFlags) {
-        (self.raw, self.format.aspects())
+    /// What barriers have to know of the image.
+    pub(crate) fn for_barriers(&self) -> BarrierImage {
+        BarrierImage { raw: self.raw, aspects: self.format.aspects(), volume: self.volume }
     }
 
     pub(crate) fn gpu(&self) -> &Arc<Gpu> {
@@ -121,6 +142,17 @@ impl Drop for Image {
         if let Some(allocation) = self.allocation.take() {
             self.gpu.free(allocation);
         }
+    }
+}
+
+/// A part of an image by its Vulkan name.
+pub(crate) fn raw_range(aspect_mask: vk::ImageAspectFlags, part: Subresources) -> vk::ImageSubresourceRange {
+    vk::ImageSubresourceRange {
+        aspect_mask,
+        base_mip_level: part.base_mip,
+        level_count: part.mip_count,
+        base_array_layer: part.base_layer,
+        layer_count: part.layer_count,
     }
 }
 
@@ -155,29 +187,46 @@ fn usage_of(features: vk::FormatFeatureFlags) -> TextureUsage {
 fn check_shape(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<u32> {
     let name = desc.debug_name;
     let [width, height] = desc.extent;
-    let layers = desc.kind.layers();
-    if width == 0 || height == 0 || layers == 0 {
-        return Err(Error::usage(name, format!("a texture needs texels, not {width} x {height} x {layers}")));
+    let (layers, depth) = (desc.kind.layers(), desc.kind.depth());
+    if width == 0 || height == 0 || layers == 0 || depth == 0 {
+        let count = layers.min(depth);
+        return Err(Error::usage(name, format!("a texture needs texels, not {width} x {height} x {count}")));
     }
     if desc.usage.is_empty() {
         return Err(Error::usage(name, "give the texture at least one usage"));
     }
-    let limits = &gpu.caps.limits;
+    check_sides(gpu, desc)?;
+    check_limit(name, "layer count", layers.into(), gpu.caps.limits.max_texture_layers.into())?;
+    let full = 32 - width.max(height).max(depth).leading_zeros();
+    if desc.mips > full {
+        let message =
+            format!("{} mips, but {width} x {height} x {depth} texels have at most {full}", desc.mips);
+        return Err(Error::usage(name, message));
+    }
+    Ok(if desc.mips == 0 { full } else { desc.mips })
+}
+
+fn check_sides(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<()> {
+    let (name, limits) = (desc.debug_name, &gpu.caps.limits);
+    let [width, height] = desc.extent;
     let side = u64::from(width.max(height));
-    if desc.kind == TextureKind::Cube {
+    if let TextureKind::D3 { depth } = desc.kind {
+        let side = side.max(depth.into());
+        return check_limit(name, "volume side in texels", side, limits.max_texture_3d.into());
+    }
+    if desc.kind.is_cube() {
         if width != height {
             return Err(Error::usage(name, format!("faces of a cube are square, not {width} x {height}")));
         }
         check_limit(name, "cube side in texels", side, limits.max_texture_cube.into())?;
     }
     check_limit(name, "texture side in texels", side, limits.max_texture_2d.into())?;
-    check_limit(name, "layer count", layers.into(), limits.max_texture_layers.into())?;
-    let full = 32 - width.max(height).leading_zeros();
-    if desc.mips > full {
-        let message = format!("{} mips, but {width} x {height} texels have at most {full}", desc.mips);
-        return Err(Error::usage(name, message));
-    }
-    Ok(if desc.mips == 0 { full } else { desc.mips })
+    if matches!(desc.kind, TextureKind::CubeArray { .. }) { check_cube_arrays(gpu) } else { Ok(()) }
+}
+
+/// Fails unless the device has arrays of cubes.
+pub(crate) fn check_cube_arrays(gpu: &Gpu) -> Result<()> {
+    if gpu.caps.cube_arrays { Ok(()) } else { Err(gpu.lacks("arrays of cubes (imageCubeArray)")) }
 }
 
 /// Fails unless all formats are colours of texels of one size.
@@ -206,23 +255,27 @@ fn flags(gpu: &Gpu, desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateFlags {
     };
     let cube = formats | Flags::CUBE_COMPATIBLE;
     match desc.kind {
-        TextureKind::Cube => cube,
+        TextureKind::Cube | TextureKind::CubeArray { .. } => cube,
+        // Passes draw to slices by 2D views of them.
+        TextureKind::D3 { .. } if desc.usage.contains(TextureUsage::TARGET) => {
+            formats | Flags::TYPE_2D_ARRAY_COMPATIBLE
+        }
         TextureKind::D2Array { layers } if layers >= 6 && desc.extent[0] == desc.extent[1] => {
             let small = desc.extent[0] <= gpu.caps.limits.max_texture_cube;
             let allowed = gpu.image_limits(&image_info(desc, mips).flags(cube));
             let allowed = allowed.is_ok_and(|limits| limits.max_array_layers >= layers);
             if small && allowed { cube } else { formats }
         }
-        TextureKind::D2 | TextureKind::D2Array { .. } => formats,
+        TextureKind::D2 | TextureKind::D2Array { .. } | TextureKind::D3 { .. } => formats,
     }
 }
 
 fn image_info(desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateInfo<'static> {
     let copies = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
     vk::ImageCreateInfo::default()
-        .image_type(vk::ImageType::TYPE_2D)
+        .image_type(if desc.kind.is_3d() { vk::ImageType::TYPE_3D } else { vk::ImageType::TYPE_2D })
         .format(desc.format.raw())
-        .extent(vk::Extent3D { width: desc.extent[0], height: desc.extent[1], depth: 1 })
+        .extent(vk::Extent3D { width: desc.extent[0], height: desc.extent[1], depth: desc.kind.depth() })
         .mip_levels(mips)
         .array_layers(desc.kind.layers())
         .samples(vk::SampleCountFlags::TYPE_1)
@@ -254,9 +307,12 @@ fn check_format(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_
     let side = u64::from(desc.extent[0].max(desc.extent[1]));
     let limit = limits.max_extent.width.min(limits.max_extent.height);
     check_limit(name, "texture side in texels for its format", side, limit.into())?;
+    let depth = u64::from(desc.kind.depth());
+    check_limit(name, "texture depth in texels for its format", depth, limits.max_extent.depth.into())?;
+    check_limit(name, "mip count for its format", info.mip_levels.into(), limits.max_mip_levels.into())?;
     let layers = u64::from(info.array_layers);
     check_limit(name, "layer count for its format", layers, limits.max_array_layers.into())?;
-    let bytes =
-        u64::from(desc.extent[0]) * u64::from(desc.extent[1]) * layers * u64::from(desc.format.texel_bytes());
+    let texels = desc.extent.map(u64::from).into_iter().chain([depth, layers]);
+    let bytes = texels.fold(desc.format.texel_bytes().into(), u64::saturating_mul);
     check_limit(name, "texture size in bytes", bytes, limits.max_resource_size)
 }

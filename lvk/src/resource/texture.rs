@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::image::{Image, raw_usage};
+use super::image::{Image, check_cube_arrays, raw_usage};
 use super::texture_desc::{TextureDesc, TextureKind, TextureUsage};
 use super::view::{Swizzle, TextureViewDesc, ViewCache, ViewInfo, raw_kind};
 use crate::barrier::Subresources;
@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
 
-/// Part of a texture: a rectangle of one mip of one layer.
+/// Part of a texture: a rectangle of one mip of one layer, or a box of one mip of a volume.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct TextureRegion {
     /// Mip level; of a view, counted from its first.
@@ -23,6 +23,10 @@ pub struct TextureRegion {
     pub offset: [u32; 2],
     /// Width and height in texels; `[0, 0]` is everything from `offset` on.
     pub extent: [u32; 2],
+    /// First slice of a volume; 0 for everything else.
+    pub z: u32,
+    /// Number of slices; 0 is all from `z` on. 0 or 1 for everything but volumes.
+    pub depth: u32,
 }
 
 /// Mips and layers of an image as one kind and format. Several textures may show the same image.
@@ -81,15 +85,33 @@ impl Texture {
     /// The view shaders write: mip 0, every layer.
     pub(crate) fn storage_view(&self) -> Result<vk::ImageView> {
         let kind = match self.kind {
-            TextureKind::Cube => vk::ImageViewType::TYPE_2D_ARRAY,
+            TextureKind::Cube | TextureKind::CubeArray { .. } => vk::ImageViewType::TYPE_2D_ARRAY,
             kind => raw_kind(kind),
         };
         self.raw_view(self.stored_part(), kind, TextureUsage::STORAGE)
     }
 
-    /// The view a render pass draws to.
+    /// The view a render pass draws to: a mip of a layer, or of a slice.
     pub(crate) fn target_view(&self, mip: u32, layer: u32) -> Result<vk::ImageView> {
         self.raw_view(self.part(mip, layer), vk::ImageViewType::TYPE_2D, TextureUsage::TARGET)
+    }
+
+    /// Fails unless a pass can draw to the mip of the layer, or of the slice.
+    pub(crate) fn check_target(&self, mip: u32, layer: u32) -> Result<()> {
+        if !self.kind.is_3d() {
+            return self.check_subresource(mip, layer);
+        }
+        self.check_subresource(mip, 0)?;
+        let slices = self.mip_depth(mip);
+        if layer < slices {
+            return Ok(());
+        }
+        Err(Error::usage(&self.name, format!("slice {layer} does not exist: mip {mip} has {slices}")))
+    }
+
+    /// The part of the image that a pass uses which draws to the mip of the layer or slice: slices are not tracked.
+    pub(crate) fn drawn_part(&self, mip: u32, layer: u32) -> Subresources {
+        self.part(mip, if self.kind.is_3d() { 0 } else { layer })
     }
 
     fn raw_view(
@@ -153,6 +175,11 @@ impl Texture {
         self.image.extent.map(|side| (side >> mip).max(1))
     }
 
+    /// Slices of a mip: 1 for all but volumes.
+    pub(crate) fn mip_depth(&self, mip: u32) -> u32 {
+        (self.image.depth >> self.range.base_mip.saturating_add(mip).min(31)).max(1)
+    }
+
     /// Fails unless the mip and the layer exist.
     pub(crate) fn check_subresource(&self, mip: u32, layer: u32) -> Result<()> {
         let (mips, layers) = (self.mips(), self.layers());
@@ -164,22 +191,27 @@ impl Texture {
         Err(Error::usage(&self.name, message))
     }
 
-    /// Checks a region and resolves its extent.
+    /// Checks a region and resolves its extent and depth.
     pub(crate) fn resolve_region(&self, region: &TextureRegion) -> Result<TextureRegion> {
         self.check_subresource(region.mip, region.layer)?;
-        let whole = self.mip_extent(region.mip);
-        let mut extent = region.extent;
-        for axis in 0..2 {
-            if region.extent == [0, 0] {
-                extent[axis] = whole[axis].saturating_sub(region.offset[axis]);
-            }
-            let end = region.offset[axis].checked_add(extent[axis]);
-            if extent[axis] == 0 || end.is_none_or(|end| end > whole[axis]) {
-                let message = format!("region {region:?} does not lie inside the mip's {whole:?} texels");
-                return Err(Error::usage(&self.name, message));
+        let ([width, height], depth) = (self.mip_extent(region.mip), self.mip_depth(region.mip));
+        let [columns, rows] = region.extent;
+        let sides = if (columns == 0) == (rows == 0) {
+            let columns = resolve_side(region.offset[0], columns, width);
+            let rows = resolve_side(region.offset[1], rows, height);
+            columns.zip(rows).zip(resolve_side(region.z, region.depth, depth))
+        } else {
+            None
+        };
+        match sides {
+            Some(((columns, rows), depth)) => Ok(TextureRegion { extent: [columns, rows], depth, ..*region }),
+            None => {
+                let message = format!(
+                    "region {region:?} does not lie inside the mip's {width} x {height} x {depth} texels"
+                );
+                Err(Error::usage(&self.name, message))
             }
         }
-        Ok(TextureRegion { extent, ..*region })
     }
 
     /// Fails unless the texture was created with `usage`.
@@ -205,8 +237,8 @@ impl Texture {
             buffer_row_length: 0,
             buffer_image_height: 0,
             image_subresource: self.layers_of(region.mip, region.layer),
-            image_offset: vk::Offset3D { x: region.offset[0] as i32, y: region.offset[1] as i32, z: 0 },
-            image_extent: vk::Extent3D { width: region.extent[0], height: region.extent[1], depth: 1 },
+            image_offset: region.raw_offset(),
+            image_extent: region.raw_extent(),
         }
     }
 
@@ -216,13 +248,27 @@ impl Texture {
             TextureKind::D2Array { layers } => {
                 TextureKind::D2Array { layers: layers.saturating_sub(desc.base_layer) }
             }
+            TextureKind::CubeArray { .. } => {
+                TextureKind::CubeArray { cubes: self.layers().saturating_sub(desc.base_layer) / 6 }
+            }
+            TextureKind::D3 { .. } => TextureKind::D3 { depth: self.mip_depth(desc.base_mip) },
             kind => kind,
         });
         let range = self.check_view_range(desc, kind)?;
         let format = desc.format.unwrap_or(self.format);
         let allowed = self.image.usage_in(format);
         let wrong = |message: String| Err(Error::usage(desc.debug_name, message));
-        if kind == TextureKind::Cube && !self.image.cube_compatible {
+        let volume = TextureKind::D3 { depth: self.mip_depth(desc.base_mip) };
+        if (kind.is_3d() || self.kind.is_3d()) && (kind != volume || !self.kind.is_3d()) {
+            return wrong(format!(
+                "'{}' is {:?}, whose mip cannot be shown as {kind:?}",
+                self.name, self.kind
+            ));
+        }
+        if matches!(kind, TextureKind::CubeArray { .. }) {
+            check_cube_arrays(self.image.gpu())?;
+        }
+        if kind.is_cube() && !self.image.cube_compatible {
             return wrong(format!(
                 "'{}' has no six square layers that the device takes for a cube",
                 self.name
@@ -282,6 +328,33 @@ struct Shown {
 impl TextureRegion {
     /// Texels of the region, once resolved.
     pub(crate) fn texels(&self) -> u64 {
-        u64::from(self.extent[0]) * u64::from(self.extent[1])
+        u64::from(self.extent[0]) * u64::from(self.extent[1]) * u64::from(self.depth)
+    }
+
+    /// The first corner.
+    pub(crate) fn raw_offset(&self) -> vk::Offset3D {
+        vk::Offset3D { x: self.offset[0] as i32, y: self.offset[1] as i32, z: self.z as i32 }
+    }
+
+    /// Size of a resolved region.
+    pub(crate) fn raw_extent(&self) -> vk::Extent3D {
+        vk::Extent3D { width: self.extent[0], height: self.extent[1], depth: self.depth }
+    }
+
+    /// First corner of a resolved region and the one behind its last.
+    pub(crate) fn raw_corners(&self) -> [vk::Offset3D; 2] {
+        let vk::Offset3D { x, y, z } = self.raw_offset();
+        let [width, height] = self.extent.map(|side| side as i32);
+        [self.raw_offset(), vk::Offset3D { x: x + width, y: y + height, z: z + self.depth as i32 }]
+    }
+}
+
+/// How many of the texels of a side from `offset` on a region takes, all of them where `count` is 0; `None` where there
+/// are not so many.
+fn resolve_side(offset: u32, count: u32, whole: u32) -> Option<u32> {
+    let rest = whole.checked_sub(offset).filter(|rest| *rest > 0)?;
+    match count {
+        0 => Some(rest),
+        count => (count <= rest).then_some(count),
     }
 }

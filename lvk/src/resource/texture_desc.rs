@@ -28,18 +28,45 @@ pub enum TextureKind {
         /// Number of layers, at least 1.
         layers: u32,
     },
+    /// Slices of a volume: an element of `kTextures3D[]`. Its mips halve in depth too; it has one layer.
+    D3 {
+        /// Number of slices of mip 0, at least 1.
+        depth: u32,
+    },
     /// Six faces in the order +X -X +Y -Y +Z -Z: an element of `kTexturesCube[]`.
     Cube,
+    /// Cubes, each with six layers: an element of what `LVK_TEXTURES(textureCubeArray, kTexturesCubeArray)` declares
+    /// in a shader. Needs [`Capabilities::cube_arrays`](crate::Capabilities).
+    CubeArray {
+        /// Number of cubes, at least 1.
+        cubes: u32,
+    },
 }
 
 impl TextureKind {
-    /// Images of one mip.
+    /// Images of one mip; faces of cubes count each. Slices of a volume are no layers.
     pub fn layers(self) -> u32 {
         match self {
-            Self::D2 => 1,
+            Self::D2 | Self::D3 { .. } => 1,
             Self::D2Array { layers } => layers,
             Self::Cube => 6,
+            Self::CubeArray { cubes } => cubes.saturating_mul(6),
         }
+    }
+
+    /// Slices of mip 0: 1 for all but volumes.
+    pub fn depth(self) -> u32 {
+        if let Self::D3 { depth } = self { depth } else { 1 }
+    }
+
+    /// Whether layers are faces.
+    pub(crate) fn is_cube(self) -> bool {
+        matches!(self, Self::Cube | Self::CubeArray { .. })
+    }
+
+    /// Whether the texture is a volume.
+    pub(crate) fn is_3d(self) -> bool {
+        matches!(self, Self::D3 { .. })
     }
 }
 
@@ -62,7 +89,7 @@ pub struct TextureDesc<'a> {
     ///
     /// Any (`VK_IMAGE_CREATE_MUTABLE_FORMAT_BIT`) may cost the compression of the image, so list none without need.
     pub view_formats: &'a [Format],
-    /// First contents of mip 0: all layers one after the other, rows tightly packed.
+    /// First contents of mip 0: all layers or slices one after the other, rows tightly packed.
     pub data: Option<&'a [u8]>,
     /// Fills the other mips from `data` by repeated halving (colour formats the device can filter).
     pub generate_mips: bool,

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::vk;
 
-use super::image::Image;
+use super::image::{Image, raw_range};
 use super::texture_desc::{TextureKind, TextureUsage};
 use crate::barrier::Subresources;
 use crate::error::{Error, Result};
@@ -87,9 +87,10 @@ pub struct TextureViewDesc<'a> {
     /// The texture to show, which may be a view itself: mips and layers then count from its first ones.
     pub texture: Option<TextureHandle>,
     /// Shape, which also says how many layers there are from [`base_layer`](Self::base_layer) on: 1, those of the array,
-    /// or the 6 of a cube. `None` is the shape of the texture, for arrays with all layers from `base_layer` on.
+    /// or the 6 of each cube. `None` is the shape of the texture, for arrays with all layers or whole cubes from
+    /// `base_layer` on, for volumes with the depth of `base_mip`.
     ///
-    /// Cubes can be made of square arrays of at least six layers.
+    /// Cubes can be made of square arrays of at least six layers. Volumes are seen as volumes only, of all their slices.
     pub kind: Option<TextureKind>,
     /// First mip.
     pub base_mip: u32,
@@ -169,18 +170,9 @@ pub(crate) fn raw_kind(kind: TextureKind) -> vk::ImageViewType {
     match kind {
         TextureKind::D2 => vk::ImageViewType::TYPE_2D,
         TextureKind::D2Array { .. } => vk::ImageViewType::TYPE_2D_ARRAY,
+        TextureKind::D3 { .. } => vk::ImageViewType::TYPE_3D,
         TextureKind::Cube => vk::ImageViewType::CUBE,
-    }
-}
-
-/// A part of an image by its Vulkan name.
-pub(crate) fn raw_range(aspect_mask: vk::ImageAspectFlags, part: Subresources) -> vk::ImageSubresourceRange {
-    vk::ImageSubresourceRange {
-        aspect_mask,
-        base_mip_level: part.base_mip,
-        level_count: part.mip_count,
-        base_array_layer: part.base_layer,
-        layer_count: part.layer_count,
+        TextureKind::CubeArray { .. } => vk::ImageViewType::CUBE_ARRAY,
     }
 }
 

@@ -146,6 +146,9 @@ pub enum ShaderSource<'a> {
 ///   `..Cube[Lod]`, `textureBindlessFetch2D(tex, texel, lod)` (`FetchU2D`, `FetchI2D`), `textureBindlessSize2D(tex)`
 ///   (`Size2DArray`, `Size3D`, `SizeCube`), `textureBindlessQueryLevels2D(tex)` (`QueryLevelsCube`). Those without an
 ///   explicit level use derivatives in fragment shaders and mip level 0 in every other stage.
+/// * Textures of other shapes are declared once at global scope: `LVK_TEXTURES(utexture3D, kVolumes);`. After
+///   `LVK_TEXTURES(textureCubeArray, kTexturesCubeArray);` there are `textureBindlessCubeArray[Lod]` with the number of
+///   the cube as fourth coordinate, and `textureBindlessSizeCubeArray(tex)`.
 /// * Storage images: `kImages2D`, `kImages2DArray`, `kImages3D`, `kImagesU2D`, `kImagesI2D` take stores of any format
 ///   (and loads where `LVK_FORMATLESS_READ` is defined, that is where the device can load without a format). To load
 ///   elsewhere, or to use atomics, name the format once at global scope:

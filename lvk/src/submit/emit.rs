@@ -6,9 +6,10 @@ use ash::vk;
 
 use crate::barrier::{Access, Barriers, ImageBarrier, Layout, MemoryBarrier, ResourceId, Stages};
 use crate::gpu::Gpu;
+use crate::resource::image::BarrierImage;
 
 /// Images a command buffer touches, by the id the tracker knows them by.
-pub(crate) type Images = HashMap<ResourceId, (vk::Image, vk::ImageAspectFlags)>;
+pub(crate) type Images = HashMap<ResourceId, BarrierImage>;
 
 /// Records the barriers, if there are any.
 pub(crate) fn emit(gpu: &Gpu, commands: vk::CommandBuffer, barriers: &Barriers, images: &Images) {
@@ -44,15 +45,8 @@ fn image_barrier(
     barrier: &ImageBarrier,
     images: &Images,
 ) -> Option<vk::ImageMemoryBarrier2<'static>> {
-    let (image, aspects) = *images.get(&barrier.id)?;
-    let (scopes, part) = (&barrier.scopes, &barrier.subresources);
-    let range = vk::ImageSubresourceRange {
-        aspect_mask: aspects,
-        base_mip_level: part.base_mip,
-        level_count: part.mip_count,
-        base_array_layer: part.base_layer,
-        layer_count: part.layer_count,
-    };
+    let image = images.get(&barrier.id)?;
+    let scopes = &barrier.scopes;
     let barrier = vk::ImageMemoryBarrier2::default()
         .src_stage_mask(stages(gpu, scopes.src_stages))
         .src_access_mask(access(gpu, scopes.src_access))
@@ -62,8 +56,8 @@ fn image_barrier(
         .new_layout(layout(scopes.new_layout))
         .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
         .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
-        .image(image)
-        .subresource_range(range);
+        .image(image.raw)
+        .subresource_range(image.range(barrier.subresources));
     Some(barrier)
 }
 

@@ -6,6 +6,10 @@ layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform utexture2D k
 layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform itexture2D kTexturesI2D[];
 #define kTextures2DShadow kTextures2D
 
+// Textures of a further shape, declared by the shaders that want them, as it may need a feature of the device; `type` is
+// textureCubeArray, utexture3D and so on.
+#define LVK_TEXTURES(type, name) layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform type name[]
+
 layout(set = LVK_SET, binding = LVK_BINDING_SAMPLERS) uniform sampler kSamplers[];
 layout(set = LVK_SET, binding = LVK_BINDING_SAMPLERS) uniform samplerShadow kSamplersShadow[];
 
@@ -62,6 +66,12 @@ vec4 textureBindlessCubeLod(uint tex, uint smp, vec3 dir, float lod) { return te
 vec4 textureBindlessFetch2D(uint tex, ivec2 texel, int lod) { return texelFetch(kTextures2D[nonuniformEXT(tex)], texel, lod); }
 uvec4 textureBindlessFetchU2D(uint tex, ivec2 texel, int lod) { return texelFetch(kTexturesU2D[nonuniformEXT(tex)], texel, lod); }
 ivec4 textureBindlessFetchI2D(uint tex, ivec2 texel, int lod) { return texelFetch(kTexturesI2D[nonuniformEXT(tex)], texel, lod); }
+
+// These need LVK_TEXTURES(textureCubeArray, kTexturesCubeArray); the fourth coordinate is the number of the cube.
+#define LVK_CUBE_ARRAY(tex, smp) LVK_SAMPLED(samplerCubeArray, kTexturesCubeArray, kSamplers, tex, smp)
+#define textureBindlessCubeArray(tex, smp, dirCube) LVK_SAMPLE(LVK_CUBE_ARRAY(tex, smp), dirCube)
+#define textureBindlessCubeArrayLod(tex, smp, dirCube, lod) textureLod(LVK_CUBE_ARRAY(tex, smp), dirCube, lod)
+#define textureBindlessSizeCubeArray(tex) textureSize(kTexturesCubeArray[nonuniformEXT(tex)], 0)
 
 ivec2 textureBindlessSize2D(uint tex) { return textureSize(kTextures2D[nonuniformEXT(tex)], 0); }
 ivec3 textureBindlessSize2DArray(uint tex) { return textureSize(kTextures2DArray[nonuniformEXT(tex)], 0); }
