@@ -11,8 +11,10 @@ use crate::accel::software::layout::LeafKind;
 use crate::accel::software::plan::{BlasShape, BlobPlaces, BuildSource, GpuBuildPlan};
 use crate::accel::software::refit_plan::{GpuRefitPlan, NodeFormat};
 use crate::command::gpu_build::{GpuBuild, GpuRefit};
+use crate::context::config::ContextDesc;
 use crate::context::holder::Holder;
 use crate::error::Result;
+use crate::gpu::silent::silently;
 use crate::handle::BufferHandle;
 use crate::kernel::Kernel;
 use crate::resource::Buffer;
@@ -20,6 +22,11 @@ use crate::resource::buffer::{BufferDesc, BufferUsage};
 pub use crate::software::gpu_build::check::{Bounds, EMPTY, Facts, check_structure};
 
 const ALIGNMENT: u64 = 256;
+
+/// A context whose recorded commands do nothing, to measure what the library takes to record them.
+pub fn silent_context(desc: &ContextDesc<'_>) -> Result<Context> {
+    silently(|| Context::new(desc))
+}
 
 /// A bottom-level structure to build.
 pub struct GpuBlasDesc<'a> {
