@@ -11,8 +11,10 @@ use crate::accel::software::layout::LeafKind;
 use crate::accel::software::plan::{BlasShape, BlobPlaces, BuildSource, GpuBuildPlan};
 use crate::accel::software::refit_plan::{GpuRefitPlan, NodeFormat};
 use crate::command::gpu_build::{GpuBuild, GpuRefit};
+use crate::context::config::ContextDesc;
 use crate::context::holder::Holder;
 use crate::error::Result;
+use crate::gpu::silent::silently;
 use crate::handle::BufferHandle;
 use crate::kernel::Kernel;
 use crate::resource::Buffer;
@@ -30,6 +32,11 @@ pub enum Leaves {
     Indexed,
     /// Numbers of vertices, 21 bits each.
     Packed,
+}
+
+/// A context whose recorded commands do nothing, to measure what the library takes to record them.
+pub fn silent_context(desc: &ContextDesc<'_>) -> Result<Context> {
+    silently(|| Context::new(desc))
 }
 
 /// A bottom-level structure to build.

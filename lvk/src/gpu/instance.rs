@@ -163,8 +163,10 @@ fn create(
         info = info.push_next(&mut settings);
     }
     // SAFETY: every pointer in `info` lives until the end of this function.
-    unsafe { entry.create_instance(&info, None) }
-        .map_err(|result| Error::NoVulkan { reason: format!("vkCreateInstance answered {result}") })
+    let made = unsafe { entry.create_instance(&info, None) };
+    #[cfg(feature = "test-hooks")]
+    let made = made.map(super::silent::silenced);
+    made.map_err(|result| Error::NoVulkan { reason: format!("vkCreateInstance answered {result}") })
 }
 
 /// The switches of the layer, by its own setting names.

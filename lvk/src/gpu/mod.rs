@@ -11,5 +11,7 @@ pub(crate) mod mesh_limits;
 pub(crate) mod profile;
 pub(crate) mod ray_query_path;
 pub(crate) mod select;
+#[cfg(feature = "test-hooks")]
+pub(crate) mod silent;
 
 pub(crate) use device::Gpu;

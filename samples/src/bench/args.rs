@@ -67,6 +67,8 @@ pub(super) enum Benchmark {
     Batch(BatchArgs),
     /// Builds, refits and compaction of one large mesh, beside hand-written Vulkan
     Compaction(MeshArgs),
+    /// What the library costs the host: draws, dispatches, objects, submissions, uploads, the start, the heap
+    Core,
     /// A mesh whole and split into parts: what tracing costs
     Split(SplitArgs),
     /// Updates of a top-level structure, against a copy of the bytes and the driver's own build
@@ -177,6 +179,7 @@ const EXAMPLES: &str = "\
 Examples:
   bench batch                                      1000 meshes of 1000 triangles
   bench compaction --scene living_room.obj         builds, refits and compaction of that scene
+  bench core                                       what the library costs the host, beside its limits
   bench split --parts 100 --runs 200               parts of the mesh made by formulas
   bench order --scene living_room.obj --camera 3   what the order of triangles does to rays a second
   bench queries --scene living_room.obj            ray queries in software beside the device's own tracing

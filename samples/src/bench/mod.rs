@@ -7,6 +7,7 @@
 mod args;
 mod batch;
 mod compaction;
+mod core;
 mod error;
 mod hand_written;
 mod instance_record;
@@ -27,5 +28,6 @@ mod tlas;
 mod tracer;
 
 pub use args::BenchArgs;
+pub use core::CountingAllocator;
 pub use pipelines::pipelines;
 pub use run::run;

@@ -7,7 +7,7 @@ use super::args::{BenchArgs, Benchmark};
 use super::error::BenchError;
 use super::setup::Setup;
 use super::table::Table;
-use super::{batch, compaction, order, overhead, paper, queries, split, tlas};
+use super::{batch, compaction, core, order, overhead, paper, queries, split, tlas};
 use crate::app::{device, scene_list};
 
 /// Does what the command line says. Prints tables to standard output, errors in one line to standard error; the
@@ -44,6 +44,7 @@ fn measured(args: &BenchArgs, benchmark: &Benchmark) -> Result<Vec<Table>, Bench
     let tables = match benchmark {
         Benchmark::Batch(args) => vec![batch::measure(&setup, args)?],
         Benchmark::Compaction(args) => vec![compaction::measure(&setup, args)?],
+        Benchmark::Core => vec![core::measure(&setup)?],
         Benchmark::Split(args) => vec![split::measure(&setup, args)?],
         Benchmark::Tlas(args) => vec![tlas::measure(&setup, args)?],
         Benchmark::Order(args) => vec![order::measure(&setup, args)?],

@@ -50,6 +50,11 @@ impl Setup {
         self.open_with(ContextDesc::default().scratch_budget_bytes)
     }
 
+    /// The same, but what is recorded does nothing.
+    pub(super) fn open_silent(&self) -> Result<Context, BenchError> {
+        Ok(lvk::test_hooks::silent_context(&self.desc(&self.profile))?)
+    }
+
     /// The same with this budget for scratch memory.
     pub(super) fn open_with(&self, scratch_budget_bytes: u64) -> Result<Context, BenchError> {
         self.open_profile(scratch_budget_bytes, &self.profile, 0)

@@ -3,7 +3,10 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use lvk_samples::bench::{BenchArgs, run};
+use lvk_samples::bench::{BenchArgs, CountingAllocator, run};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 fn main() -> ExitCode {
     run(&BenchArgs::parse())

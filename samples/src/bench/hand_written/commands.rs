@@ -67,7 +67,22 @@ impl RawCommands {
         Ok(Timed { gpu: self.read()?, cpu, record, total })
     }
 
+    /// Submits nothing and waits for it.
+    pub(in crate::bench) fn submit_empty(&self) -> Result<(), BenchError> {
+        self.begin_bare()?;
+        self.submit()?;
+        self.wait()
+    }
+
     fn begin(&self) -> Result<(), BenchError> {
+        self.begin_bare()?;
+        // SAFETY: the command buffer is being recorded, and the last submission was waited for.
+        unsafe { self.device.device.cmd_reset_query_pool(self.commands, self.queries, 0, 2) };
+        self.write_timestamp(0);
+        Ok(())
+    }
+
+    fn begin_bare(&self) -> Result<(), BenchError> {
         let device = &self.device.device;
         let flags = vk::CommandPoolResetFlags::empty();
         let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
@@ -75,11 +90,8 @@ impl RawCommands {
         unsafe {
             device.reset_command_pool(self.pool, flags).map_err(BenchError::of("vkResetCommandPool"))?;
             let begun = device.begin_command_buffer(self.commands, &info);
-            begun.map_err(BenchError::of("vkBeginCommandBuffer"))?;
-            device.cmd_reset_query_pool(self.commands, self.queries, 0, 2);
+            begun.map_err(BenchError::of("vkBeginCommandBuffer"))
         }
-        self.write_timestamp(0);
-        Ok(())
     }
 
     fn write_timestamp(&self, query: u32) {
@@ -90,6 +102,10 @@ impl RawCommands {
 
     fn end_and_submit(&self) -> Result<(), BenchError> {
         self.write_timestamp(1);
+        self.submit()
+    }
+
+    fn submit(&self) -> Result<(), BenchError> {
         let device = &self.device.device;
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands)];
         let submits = [vk::SubmitInfo2::default().command_buffer_infos(&commands)];

@@ -7,9 +7,11 @@ mod buffer;
 mod commands;
 mod device;
 mod pipeline;
+mod recorder;
 mod structure;
 
 pub(super) use commands::RawCommands;
 pub(super) use device::RawDevice;
 pub(super) use pipeline::RawTracing;
+pub(super) use recorder::RawRecorder;
 pub(super) use structure::{RawStructure, instance_geometry, triangle_geometry};

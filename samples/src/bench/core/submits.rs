@@ -1,0 +1,56 @@
+//! Empty submissions and small uploads.
+
+use std::time::Instant;
+
+use lvk::{BufferDesc, BufferHandle, Context};
+
+use super::Amount;
+use super::row::{Limit, Row};
+use crate::bench::error::BenchError;
+use crate::bench::hand_written::{RawCommands, RawDevice};
+use crate::bench::measure::{median_of, since, take_turns};
+
+const UPLOAD_BYTES: usize = 4096;
+
+pub(super) fn measure(ctx: &Context, amount: Amount) -> Result<Vec<Row>, BenchError> {
+    let raw = RawCommands::new(&RawDevice::new(ctx))?;
+    let count = (amount.many / 10).max(1);
+    let samples: [Vec<f64>; 2] = take_turns(amount.runs, |which| {
+        let start = Instant::now();
+        for _ in 0..count {
+            match which {
+                0 => ctx.wait(ctx.submit(ctx.acquire_command_buffer()?)?)?,
+                _ => raw.submit_empty()?,
+            }
+        }
+        Ok(since(start) * 1e3 / f64::from(count))
+    })?;
+    let [ours, other] = samples.map(|samples| median_of(&samples, |us| *us));
+    let what = "empty submission + wait".to_owned();
+    let empty = Row { what, ours, other: Some(other), unit: "us", limit: Limit::Ratio(1.0) };
+    Ok(vec![empty, uploads(ctx, amount)?])
+}
+
+fn uploads(ctx: &Context, amount: Amount) -> Result<Row, BenchError> {
+    let size_bytes = u64::from(amount.many) * UPLOAD_BYTES as u64;
+    let buffer = ctx.create_buffer(&BufferDesc { size_bytes, ..BufferDesc::default() })?;
+    let samples: [Vec<f64>; 2] =
+        take_turns(amount.runs.div_ceil(5), |which| upload(ctx, *buffer, amount.many, which == 1))?;
+    let [ours, other] = samples.map(|samples| median_of(&samples, |ms| *ms));
+    let what = format!("{} uploads of 4 KiB, compared with a submission each", amount.many);
+    Ok(Row { what, ours, other: Some(other), unit: "ms", limit: Limit::Faster(10.0) })
+}
+
+/// Milliseconds until all are there.
+fn upload(ctx: &Context, buffer: BufferHandle, count: u32, one_by_one: bool) -> Result<f64, BenchError> {
+    let bytes = [7_u8; UPLOAD_BYTES];
+    let start = Instant::now();
+    for number in 0..u64::from(count) {
+        ctx.upload_buffer(buffer, number * UPLOAD_BYTES as u64, &bytes)?;
+        if one_by_one {
+            ctx.wait(ctx.flush()?)?;
+        }
+    }
+    ctx.wait_idle()?;
+    Ok(since(start))
+}

@@ -1,0 +1,44 @@
+//! Updates of a top-level structure of one instance, recorded.
+
+use std::time::Instant;
+
+use lvk::{BuildFlags, BuildMode, Context, PrimitiveOrder, TlasDesc, TlasInstance};
+
+use super::row::{Limit, Row};
+use super::{Amount, each_ns};
+use crate::bench::error::BenchError;
+use crate::bench::measure::{median_of, since, take_turns};
+use crate::bench::mesh::MeshBuffers;
+use crate::bench::synthetic::spheres;
+
+/// Structures that a frame updates, each once.
+const AT_ONCE: u32 = 16;
+
+pub(super) fn measure(silent: &Context, amount: Amount) -> Result<Vec<Row>, BenchError> {
+    if !(silent.capabilities().ray_query || silent.capabilities().ray_tracing_pipeline) {
+        return Ok(Vec::new());
+    }
+    let blas = MeshBuffers::new(silent, &spheres(500))?.blas(
+        silent,
+        BuildFlags::FAST_TRACE,
+        PrimitiveOrder::Given,
+    )?;
+    let instances = [TlasInstance::new(*blas)];
+    let flags = BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE;
+    let desc = TlasDesc { instances: &instances, flags, ..TlasDesc::default() };
+    let structures: Vec<_> = (0..AT_ONCE).map(|_| silent.create_tlas(&desc)).collect::<lvk::Result<_>>()?;
+    silent.wait(silent.flush()?)?;
+    let [samples] = take_turns(amount.runs * 20, |_| {
+        let mut cmd = silent.acquire_command_buffer()?;
+        let start = Instant::now();
+        for tlas in &structures {
+            cmd.update_tlas(**tlas, &instances, BuildMode::Refit)?;
+        }
+        let taken = since(start);
+        silent.wait(silent.submit(cmd)?)?;
+        Ok(taken)
+    })?;
+    let ours = each_ns(median_of(&samples, |ms| *ms), AT_ONCE);
+    let what = "refit of a TLAS recorded, own share".to_owned();
+    Ok(vec![Row { what, ours, other: None, unit: "ns", limit: Limit::Most(50.0) }])
+}
