@@ -8,6 +8,7 @@ pub mod hybrid_oit;
 pub mod pipelines;
 pub mod reflections;
 pub mod rtx;
+pub mod rtx_ao;
 pub mod rtx_hello;
 pub mod rtx_textures;
 pub mod scene;

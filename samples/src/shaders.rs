@@ -45,6 +45,8 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("reflections/trace_query.glsl", include_str!("../../shaders/reflections/trace_query.glsl")),
     ("reflections/visibility.glsl", include_str!("../../shaders/reflections/visibility.glsl")),
     ("reflections/waves.glsl", include_str!("../../shaders/reflections/waves.glsl")),
+    ("rtx_ao/frame.glsl", include_str!("../../shaders/rtx_ao/frame.glsl")),
+    ("rtx_ao/light.glsl", include_str!("../../shaders/rtx_ao/light.glsl")),
     ("rtx_hello/view.glsl", include_str!("../../shaders/rtx_hello/view.glsl")),
     ("rtx_textures/frame.glsl", include_str!("../../shaders/rtx_textures/frame.glsl")),
     ("rtx_textures/shade.glsl", include_str!("../../shaders/rtx_textures/shade.glsl")),
@@ -227,4 +229,20 @@ pub mod rtx_textures {
     pub const GLAZED_RCHIT: &str = include_str!("../../shaders/rtx_textures/glazed.rchit.glsl");
     /// Rays of a pixel, by ray queries.
     pub const TEXTURES_COMP: &str = include_str!("../../shaders/rtx_textures/textures.comp.glsl");
+}
+
+/// Stages of the `rtx_ao` sample.
+pub mod rtx_ao {
+    /// Macros of the fragment stage that leaves light to a later pass.
+    pub const WITH_TARGETS: &[(&str, &str)] = &[("RTX_AO_TARGETS", "1")];
+    /// Corners of a body's triangles.
+    pub const SURFACE_VERT: &str = include_str!("../../shaders/rtx_ao/surface.vert.glsl");
+    /// Colour and light of what is nearest.
+    pub const SURFACE_FRAG: &str = include_str!("../../shaders/rtx_ao/surface.frag.glsl");
+    /// Light by the ray tracing pipeline.
+    pub const LIGHT_RGEN: &str = include_str!("../../shaders/rtx_ao/light.rgen.glsl");
+    /// A ray that nothing stopped.
+    pub const OPEN_RMISS: &str = include_str!("../../shaders/rtx_ao/open.rmiss.glsl");
+    /// The cache, and the picture.
+    pub const ACCUMULATE_COMP: &str = include_str!("../../shaders/rtx_ao/accumulate.comp.glsl");
 }

@@ -17,7 +17,7 @@ struct Program {
     said: &'static [&'static str],
 }
 
-const PROGRAMS: [Program; 4] = [
+const PROGRAMS: [Program; 5] = [
     Program {
         path: env!("CARGO_BIN_EXE_reflections"),
         quick: &["--samples", "1"],
@@ -29,6 +29,12 @@ const PROGRAMS: [Program; 4] = [
         quick: &["--supersampling", "1", "--shadow-rays", "1"],
         own: &["--supersampling", "--shadow-rays", "--nodes", "--time"],
         said: &["list of glass", "spheres of glass", "composite", "nodes"],
+    },
+    Program {
+        path: env!("CARGO_BIN_EXE_rtx_ao"),
+        quick: &["--passes", "1", "--rays", "1"],
+        own: &["--passes", "--rays", "--radius", "--scene", "--camera"],
+        said: &["town: 14962 triangles", "depth", "surfaces", "cache"],
     },
     Program {
         path: env!("CARGO_BIN_EXE_rtx_hello"),

@@ -13,7 +13,7 @@ use crate::scene::{ObjOptions, Scene, SceneError};
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct SceneArgs {
     /// Wavefront OBJ to render, with its MTL and textures beside it, or a name in --list-scenes
-    /// [default: the built-in courtyard]
+    /// [default: the built-in scene]
     #[arg(long, value_name = "FILE|NAME", help_heading = "Scene")]
     pub scene: Option<PathBuf>,
 

@@ -11,4 +11,4 @@ pub(crate) use canvas::Canvas;
 pub use config::RtxConfig;
 pub use error::RtxError;
 pub(crate) use headline::headline;
-pub(crate) use tracer::{RayStages, Tracer, compute_pipeline};
+pub(crate) use tracer::{RayStages, Tracer, compute_pipeline, groups};

@@ -137,6 +137,16 @@ impl Scene {
         procedural::courtyard()
     }
 
+    /// Builds a town of paper, a scene of plain surfaces for light and shade. The same everywhere.
+    pub fn town() -> Self {
+        procedural::town()
+    }
+
+    /// Builds what turns around the vertical in the middle of the [`town`](Self::town).
+    pub fn carousel() -> Self {
+        procedural::carousel()
+    }
+
     /// Smallest box around all positions, as (minimum, maximum) in scene units.
     pub fn bounds(&self) -> ([f32; 3], [f32; 3]) {
         bounds_of(&self.positions)

@@ -5,10 +5,12 @@ mod materials;
 mod paint;
 mod sculpture;
 mod solid;
+mod town;
 
 use glam::Vec3;
 
 use self::solid::Solids;
+pub(super) use self::town::{carousel, town};
 use super::mesh::Mesh;
 use super::setting::Setting;
 use super::{Ambient, Camera, DirectionalLight, Material, PointLight, Scene, Sky, Texture, normals};

@@ -1,0 +1,82 @@
+//! The passes over pixels: rays by pipeline from what was rasterised, and the cache.
+
+use lvk::{
+    BufferDesc, BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder,
+    RayTracingPipelineDesc, RayTracingPipelineHandle, TextureHandle,
+};
+
+use super::frame::Push;
+use super::pipelines::{ACCUMULATE, LIGHT_RAYS, OPEN_MISS, SAMPLE};
+use super::targets::Targets;
+use crate::rtx::{compute_pipeline, groups};
+
+/// Rays from the targets of the rasteriser.
+pub(super) struct LightRays {
+    pipeline: Holder<RayTracingPipelineHandle>,
+}
+
+/// What all passes since the last change add up to.
+pub(super) struct Cache {
+    pipeline: Holder<ComputePipelineHandle>,
+    pub(super) sums: Holder<BufferHandle>,
+}
+
+impl LightRays {
+    pub(super) fn new(ctx: &Context) -> lvk::Result<Self> {
+        let (rays, open) = (LIGHT_RAYS.create(ctx, SAMPLE)?, OPEN_MISS.create(ctx, SAMPLE)?);
+        let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+            ray_gen: &[*rays],
+            miss: &[*open],
+            max_recursion: 1,
+            debug_name: "light",
+            ..RayTracingPipelineDesc::default()
+        })?;
+        Ok(Self { pipeline })
+    }
+
+    pub(super) fn record(
+        &self,
+        cmd: &mut CommandBuffer,
+        targets: &Targets,
+        [width, height]: [u32; 2],
+        frame: u64,
+    ) -> lvk::Result<()> {
+        let surface: Vec<TextureHandle> = targets.surface.iter().flatten().map(Holder::handle).collect();
+        let dependencies = Dependencies {
+            sampled_images: &surface,
+            storage_images: &[*targets.light],
+            ..Dependencies::default()
+        };
+        cmd.bind_ray_tracing_pipeline(*self.pipeline)?;
+        cmd.push_constants(&Push::new(frame, 0))?;
+        cmd.trace_rays([width, height, 1], &dependencies)
+    }
+}
+
+impl Cache {
+    pub(super) fn new(ctx: &Context, [width, height]: [u32; 2]) -> lvk::Result<Self> {
+        let size_bytes = u64::from(width) * u64::from(height) * size_of::<[f32; 4]>() as u64;
+        let desc = BufferDesc { size_bytes, debug_name: "cache", ..BufferDesc::default() };
+        Ok(Self { pipeline: compute_pipeline(ctx, SAMPLE, ACCUMULATE)?, sums: ctx.create_buffer(&desc)? })
+    }
+
+    /// Adds what was drawn, and writes the picture.
+    pub(super) fn record(
+        &self,
+        cmd: &mut CommandBuffer,
+        targets: &Targets,
+        picture: TextureHandle,
+        extent: [u32; 2],
+        frame: u64,
+    ) -> lvk::Result<()> {
+        let dependencies = Dependencies {
+            sampled_images: &[*targets.albedo, *targets.light],
+            storage_images: &[picture],
+            buffers: &[*self.sums],
+            ..Dependencies::default()
+        };
+        cmd.bind_compute_pipeline(*self.pipeline)?;
+        cmd.push_constants(&Push::new(frame, 0))?;
+        cmd.dispatch(groups(extent), &dependencies)
+    }
+}

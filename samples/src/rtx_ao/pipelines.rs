@@ -1,0 +1,48 @@
+//! The sample's pipelines as data, with the texts and formats that its passes use.
+
+use lvk::{Format, ShaderStage};
+
+use super::targets::{ALBEDO, DEPTH, NUMBERS};
+use crate::hybrid::RayPath;
+use crate::pipelines::{SamplePipeline, SampleStage};
+use crate::shaders::rtx_ao as texts;
+
+/// Folder of the texts in `shaders/`.
+pub(super) const SAMPLE: &str = "rtx_ao";
+
+pub(super) const SURFACE_VERTEX: SampleStage =
+    stage(ShaderStage::Vertex, texts::SURFACE_VERT, "surface.vert");
+const LIT_FRAGMENT: SampleStage = stage(ShaderStage::Fragment, texts::SURFACE_FRAG, "surface.frag");
+const TARGETS_FRAGMENT: SampleStage = SampleStage { defines: texts::WITH_TARGETS, ..LIT_FRAGMENT };
+pub(super) const LIGHT_RAYS: SampleStage = stage(ShaderStage::RayGen, texts::LIGHT_RGEN, "light.rgen");
+pub(super) const OPEN_MISS: SampleStage = stage(ShaderStage::Miss, texts::OPEN_RMISS, "open.rmiss");
+pub(super) const ACCUMULATE: SampleStage =
+    stage(ShaderStage::Compute, texts::ACCUMULATE_COMP, "accumulate.comp");
+
+/// The fragment stage of a path, and the formats that it draws to.
+pub(super) fn surface_fragment(path: RayPath) -> (SampleStage, Vec<Format>) {
+    match path {
+        RayPath::Pipeline => (TARGETS_FRAGMENT, vec![ALBEDO, NUMBERS, NUMBERS, NUMBERS]),
+        RayPath::Query => (LIT_FRAGMENT, vec![ALBEDO, NUMBERS]),
+    }
+}
+
+/// Every pipeline of the sample but the one of depth alone, which has no fragment stage.
+#[must_use]
+pub fn pipelines() -> Vec<SamplePipeline> {
+    let raster = |name, path| {
+        let (fragment, color) = surface_fragment(path);
+        SamplePipeline { name, stages: vec![SURFACE_VERTEX, fragment], color, depth: Some(DEPTH) }
+    };
+    let other = |name, stages| SamplePipeline { name, stages, color: Vec::new(), depth: None };
+    vec![
+        raster("rtx_ao: surfaces and rays by query", RayPath::Query),
+        raster("rtx_ao: surfaces", RayPath::Pipeline),
+        other("rtx_ao: rays by pipeline", vec![LIGHT_RAYS, OPEN_MISS]),
+        other("rtx_ao: cache", vec![ACCUMULATE]),
+    ]
+}
+
+const fn stage(stage: ShaderStage, text: &'static str, name: &'static str) -> SampleStage {
+    SampleStage { stage, text, defines: &[], name }
+}

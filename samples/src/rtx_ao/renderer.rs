@@ -1,0 +1,246 @@
+//! The sample as a type: say the view, get a picture that each call improves.
+
+use glam::{Affine3A, Vec3};
+use lvk::{
+    AccelStructHandle, BufferDesc, BufferHandle, BuildMode, CommandBuffer, Context, Holder, SamplerDesc,
+    SamplerHandle, TlasDesc, TlasInstance, transform_rows,
+};
+
+use super::body::{Body, BodyConstants};
+use super::config::RtxAoConfig;
+use super::frame::{FrameConstants, Lighting};
+use super::light_pass::{Cache, LightRays};
+use super::raster::Raster;
+use super::targets::Targets;
+use crate::app::sample::{Moment, PassTimes, Sample};
+use crate::hybrid::RayPath;
+use crate::rtx::{Canvas, RtxError};
+use crate::scene::{Camera, CameraPath, GpuCamera, Scene};
+
+/// How far surroundings darken, as a share of the diagonal of the scene's bounding box.
+const RADIUS_SHARE: f32 = 0.06;
+/// Distance of the near plane as a share of the distance of what the camera looks at.
+const NEAR_SHARE: f32 = 0.01;
+/// How far rays start off a surface, as a share of the radius.
+const LIFT_SHARE: f32 = 1e-3;
+
+/// From where the scene is seen, and where what turns in it is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// The camera.
+    pub camera: Camera,
+    /// Turns of the second body about the vertical.
+    pub turns: f32,
+}
+
+/// Renders a scene of one body, or of one that stands and one that turns.
+pub struct RtxAo {
+    ctx: Context,
+    canvas: Canvas,
+    config: RtxAoConfig,
+    bodies: Vec<Body>,
+    tlas: Holder<AccelStructHandle>,
+    targets: Targets,
+    raster: Raster,
+    rays: Option<LightRays>,
+    cache: Cache,
+    path: CameraPath,
+    lighting: Lighting,
+    sampler: Holder<SamplerHandle>,
+    frame: Holder<BufferHandle>,
+    tables: Holder<BufferHandle>,
+    view: View,
+    passes: u32,
+}
+
+impl RtxAo {
+    /// Uploads `scene`, and what turns in it if anything does, and makes all pipelines. Refractive triangles are left out.
+    ///
+    /// # Errors
+    /// [`RtxError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(
+        ctx: &Context,
+        scene: &Scene,
+        turning: Option<&Scene>,
+        config: &RtxAoConfig,
+    ) -> Result<Self, RtxError> {
+        let (config, extent) = (config.clamped(), config.rtx.extent());
+        let canvas = Canvas::new(ctx, &config.rtx)?;
+        let bodies: Vec<_> = [Some(scene), turning]
+            .into_iter()
+            .flatten()
+            .map(|scene| Body::new(ctx, scene))
+            .collect::<Result<_, _>>()?;
+        let tlas = ctx.create_tlas(&TlasDesc { capacity: bodies.len() as u32, ..TlasDesc::default() })?;
+        let buffer = |debug_name, size: usize| {
+            ctx.create_buffer(&BufferDesc { size_bytes: size as u64, debug_name, ..BufferDesc::default() })
+        };
+        let path = CameraPath::tour(scene, 0);
+        let radius = config.radius.unwrap_or_else(|| usual_radius(scene));
+        Ok(Self {
+            targets: Targets::new(ctx, config.rtx.path, extent)?,
+            raster: Raster::new(ctx, config.rtx.path)?,
+            rays: (config.rtx.path == RayPath::Pipeline).then(|| LightRays::new(ctx)).transpose()?,
+            cache: Cache::new(ctx, extent)?,
+            lighting: Lighting::new(scene, radius, tlas.index()),
+            sampler: ctx.create_sampler(&SamplerDesc { max_anisotropy: 8.0, ..SamplerDesc::default() })?,
+            frame: buffer("frame constants", size_of::<FrameConstants>())?,
+            tables: buffer("bodies", bodies.len() * size_of::<BodyConstants>())?,
+            view: View { camera: path.at(0.0), turns: 0.0 },
+            path,
+            ctx: ctx.clone(),
+            canvas,
+            config,
+            bodies,
+            tlas,
+            passes: 0,
+        })
+    }
+
+    /// Tours the scene's cameras from the one with this index on.
+    #[must_use]
+    pub fn from_camera(mut self, scene: &Scene, first: usize) -> Self {
+        self.path = CameraPath::tour(scene, first);
+        self.show(&View { camera: self.path.at(0.0), turns: 0.0 });
+        self
+    }
+
+    /// Looks at the scene so. Where that is another view than before, the cache begins anew.
+    pub fn show(&mut self, view: &View) {
+        if self.view != *view {
+            self.view = *view;
+            self.passes = 0;
+        }
+    }
+
+    /// The view that is shown.
+    pub fn view(&self) -> &View {
+        &self.view
+    }
+
+    /// How many passes the picture is the average of.
+    pub fn passes(&self) -> u32 {
+        self.passes
+    }
+
+    /// How far surroundings darken a surface, in scene units.
+    pub fn radius(&self) -> f32 {
+        self.lighting.radius()
+    }
+
+    /// Triangles of all bodies.
+    pub fn triangle_count(&self) -> u32 {
+        self.bodies.iter().map(|body| body.triangle_count).sum()
+    }
+
+    /// The openness of each pixel so far, 0 to 1, rows from the top; 1 where the sky is.
+    ///
+    /// # Errors
+    /// [`RtxError::Device`].
+    pub fn openness(&self) -> Result<Vec<f32>, RtxError> {
+        let [width, height] = self.config.rtx.extent();
+        let mut sums = vec![[0.0_f32; 4]; (width * height) as usize];
+        self.ctx.download_buffer(*self.cache.sums, 0, bytemuck::cast_slice_mut(&mut sums))?;
+        Ok(sums.iter().map(|sum| sum[3] / self.passes.max(1) as f32).collect())
+    }
+
+    fn places(&self) -> [Affine3A; 2] {
+        [Affine3A::IDENTITY, Affine3A::from_rotation_y(std::f32::consts::TAU * self.view.turns)]
+    }
+
+    fn upload_bodies(&self) -> lvk::Result<()> {
+        let bodies = self.bodies.iter().zip(self.places());
+        let tables: Vec<_> = bodies.map(|(body, place)| body.constants(&place)).collect();
+        self.ctx.upload_buffer(*self.tables, 0, bytemuck::cast_slice(&tables))
+    }
+
+    fn upload_frame(&self) -> lvk::Result<()> {
+        let [width, height] = self.config.rtx.extent();
+        let View { camera, .. } = &self.view;
+        let near = NEAR_SHARE * Vec3::from(camera.eye).distance(Vec3::from(camera.target));
+        let constants = FrameConstants {
+            camera: GpuCamera::new(camera, width, height, near).for_sample(self.passes, u32::MAX),
+            bodies: self.ctx.buffer_address(*self.tables)?,
+            sums: self.ctx.buffer_address(*self.cache.sums)?,
+            light: self.lighting,
+            image: self.canvas.picture().index(),
+            sampler: self.sampler.index(),
+            targets: self.targets.indices(),
+            pass: self.passes,
+            rays: self.config.rays,
+            lift: LIFT_SHARE * self.radius(),
+            padding: 0,
+        };
+        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&constants))
+    }
+
+    fn update_tlas(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
+        let instances: Vec<_> = self
+            .bodies
+            .iter()
+            .zip(self.places())
+            .map(|(body, place)| TlasInstance {
+                transform: transform_rows(&place),
+                ..TlasInstance::new(*body.blas)
+            })
+            .collect();
+        cmd.update_tlas(*self.tlas, &instances, BuildMode::Rebuild)
+    }
+
+    /// One more pass. The structure is built in the first after a change.
+    fn add_pass(&mut self) -> Result<PassTimes, RtxError> {
+        self.upload_frame()?;
+        let (frame, extent) = (self.ctx.buffer_address(*self.frame)?, self.config.rtx.extent());
+        let (targets, bodies) = (&self.targets, &self.bodies[..]);
+        let is_first = self.passes == 0;
+        let times = self.canvas.render(&[
+            ("TLAS build", &|cmd| if is_first { self.update_tlas(cmd) } else { Ok(()) }),
+            ("depth", &|cmd| self.raster.record_depth(cmd, targets, bodies, frame)),
+            ("surfaces", &|cmd| self.raster.record_surfaces(cmd, targets, bodies, frame)),
+            ("rays", &|cmd| {
+                self.rays.as_ref().map_or(Ok(()), |rays| rays.record(cmd, targets, extent, frame))
+            }),
+            ("cache", &|cmd| self.cache.record(cmd, targets, **self.canvas.picture(), extent, frame)),
+        ])?;
+        self.passes += 1;
+        Ok(times)
+    }
+}
+
+impl Sample for RtxAo {
+    type Error = RtxError;
+
+    /// Begins anew even where nothing moved, so that a frame does not depend on those before.
+    fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
+        let phase = moment.phase();
+        self.show(&View { camera: self.path.at(phase), turns: phase });
+        self.passes = 0;
+        Ok(())
+    }
+
+    fn steps_per_frame(&self) -> u64 {
+        self.config.passes.into()
+    }
+
+    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, RtxError> {
+        self.upload_bodies()?;
+        let mut sums = self.add_pass()?;
+        after_step(1);
+        for pass in 1..self.config.passes {
+            for (sum, time) in sums.iter_mut().zip(self.add_pass()?) {
+                sum.1 += time.1;
+            }
+            after_step(u64::from(pass) + 1);
+        }
+        Ok(sums)
+    }
+
+    fn picture(&self) -> Result<Vec<u8>, RtxError> {
+        Ok(self.canvas.read()?)
+    }
+}
+
+fn usual_radius(scene: &Scene) -> f32 {
+    let (low, high) = scene.bounds();
+    RADIUS_SHARE * Vec3::from(low).distance(Vec3::from(high))
+}

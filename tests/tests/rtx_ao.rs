@@ -1,0 +1,251 @@
+//! The pictures of the `rtx_ao` sample: its paths agree, it converges to what a reference in f64 finds, and its cache
+//! forgets what has moved.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use image::RgbaImage;
+use image::imageops::{FilterType, resize};
+use lvk::glam::{DAffine3, DVec3, Vec3};
+use lvk::{Context, FeatureRequest, RayQueryRequest};
+use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::hybrid::RayPath;
+use lvk_samples::rtx::{RtxConfig, RtxError};
+use lvk_samples::rtx_ao::{RtxAo, RtxAoConfig, View};
+use lvk_samples::scene::{Camera, Scene};
+use lvk_tests::child::without_ray_tracing;
+use lvk_tests::hybrid::paths;
+use lvk_tests::picture::{Likeness, Tolerance, assert_alike, assert_as_ever, reference};
+use lvk_tests::rays::Ray;
+use lvk_tests::reference::{Geometry, Hit, Instance, Reference};
+use lvk_tests::{TestDevice, device, device_with};
+
+/// No multiple of a work group.
+const SIZE: [u32; 2] = [158, 89];
+const RADIUS: f32 = 1.8;
+const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.999, differing_share: 5e-3, flip: 2e-3 };
+/// Of few passes and many, each pixel the average of sixteen.
+const OTHER_NOISE: Tolerance = Tolerance { psnr: 32.0, ssim: 0.98, differing_share: 1.0, flip: 0.09 };
+
+fn town(ctx: &Context, path: RayPath, passes: u32, rays: u32) -> RtxAo {
+    let rtx = RtxConfig { path, width: SIZE[0], height: SIZE[1] };
+    let config = RtxAoConfig { passes, rays, radius: Some(RADIUS), ..RtxAoConfig::new(rtx) };
+    RtxAo::new(ctx, &Scene::town(), Some(&Scene::carousel()), &config).unwrap()
+}
+
+fn picture(town: &mut RtxAo) -> RgbaImage {
+    town.render(&mut |_| {}).unwrap();
+    RgbaImage::from_raw(SIZE[0], SIZE[1], town.picture().unwrap()).unwrap()
+}
+
+fn software() -> Option<TestDevice> {
+    device_with(|desc| {
+        (desc.ray_tracing_pipeline, desc.ray_query) = (FeatureRequest::Off, RayQueryRequest::Software);
+    })
+}
+
+#[test]
+fn all_paths_show_the_town() {
+    let (Some(ctx), Some(other)) = (device(), software()) else { return };
+    let mut all: Vec<_> = paths(&ctx).into_iter().map(|path| town(&ctx, path, 2, 1)).collect();
+    all.push(town(&other, RayPath::Query, 2, 1));
+    for phase in [0, 3] {
+        let mut show = |town: &mut RtxAo| {
+            town.update(Moment { frame: phase, frames_per_round: 20 }).unwrap();
+            picture(town)
+        };
+        let pictures: Vec<_> = all.iter_mut().map(&mut show).collect();
+        for other in &pictures[1..] {
+            assert_alike(&format!("town in frame {phase}"), other, &pictures[0], &SAME_RAYS);
+        }
+    }
+}
+
+#[test]
+fn the_cache_forgets_what_has_moved() {
+    let Some(ctx) = software() else { return };
+    let mut town = town(&ctx, RayPath::Query, 2, 1);
+    let start = *town.view();
+    let first = picture(&mut town);
+    town.show(&start);
+    assert_eq!(town.passes(), 2, "nothing moved");
+    assert_ne!(picture(&mut town), first, "four passes are not two");
+    assert_eq!(town.passes(), 4);
+    let moved = Camera { eye: [9.0, 6.0, 2.0], ..start.camera };
+    for view in [View { camera: moved, ..start }, View { turns: 0.06, ..start }] {
+        town.show(&view);
+        assert_eq!(town.passes(), 0, "{view:?}");
+        assert_ne!(picture(&mut town), first, "{view:?}");
+        town.show(&start);
+        assert_eq!(picture(&mut town), first, "back from {view:?}");
+    }
+    town.update(Moment { frame: 0, frames_per_round: 9 }).unwrap();
+    assert_eq!(picture(&mut town), first, "a frame depends on its moment alone");
+}
+
+/// The triangles of both bodies, where they are at the beginning.
+struct World {
+    scenes: [Scene; 2],
+    reference: Reference,
+}
+
+impl World {
+    fn new() -> Self {
+        let scenes = [Scene::town(), Scene::carousel()];
+        let geometry = |scene: &Scene| {
+            [Geometry {
+                positions: scene.positions.iter().map(|position| Vec3::from(*position).as_dvec3()).collect(),
+                triangles: scene.triangles.clone(),
+                transform: DAffine3::IDENTITY,
+                is_opaque: true,
+            }]
+        };
+        let geometries = [geometry(&scenes[0]), geometry(&scenes[1])];
+        let instance = |number: u32| Instance {
+            geometries: &geometries[number as usize],
+            transform: DAffine3::IDENTITY,
+            custom_index: number,
+            mask: 0xff,
+            flip_facing: false,
+            no_cull: false,
+            force_opaque: None,
+        };
+        let reference = Reference::new(&[instance(0), instance(1)]);
+        Self { scenes, reference }
+    }
+
+    /// Where a ray ends, and the geometric and the shading normal there, towards its origin.
+    fn surface(&self, ray: &Ray, hit: &Hit) -> [DVec3; 3] {
+        let scene = &self.scenes[hit.ids.custom_index as usize];
+        let corners = scene.triangles[hit.ids.primitive as usize].map(|corner| corner as usize);
+        let [a, b, c] = corners.map(|corner| Vec3::from(scene.positions[corner]).as_dvec3());
+        let normals = corners.map(|corner| Vec3::from(scene.normals[corner]).as_dvec3());
+        let [u, v] = hit.barycentrics;
+        let between = |a: DVec3, b: DVec3, c: DVec3| a * (1.0 - u - v) + b * u + c * v;
+        let geometric = (b - a).cross(c - a).normalize();
+        let away = geometric.dot(Vec3::from(ray.direction).as_dvec3()) > 0.0;
+        let geometric = if away { -geometric } else { geometric };
+        let shading = between(normals[0], normals[1], normals[2]).normalize();
+        let shading = if shading.dot(geometric) < 0.0 { -shading } else { shading };
+        [between(a, b, c), geometric, shading]
+    }
+
+    /// The share of `count` cosine-weighted directions that are open; `None` where the ray is in doubt or meets nothing.
+    fn openness(&self, ray: &Ray, count: u32) -> Option<f64> {
+        let answer = self.reference.closest(ray, 0xff);
+        let hit = answer.hit.filter(|_| answer.is_certain)?;
+        let [point, geometric, normal] = self.surface(ray, &hit);
+        let origin = (point + 1e-3 * f64::from(RADIUS) * geometric).as_vec3();
+        let (across, along) = normal.any_orthonormal_pair();
+        let is_open = |number: u32| {
+            let place = |step: f64| (0.5 + step * f64::from(number)).fract();
+            let (radius, angle) = (place(0.754_877_666).sqrt(), std::f64::consts::TAU * place(0.569_840_29));
+            let up = (1.0 - radius * radius).sqrt();
+            let direction = across * (radius * angle.cos()) + along * (radius * angle.sin()) + normal * up;
+            let ray = Ray { t_max: RADIUS, ..Ray::new(origin, direction.as_vec3()) };
+            self.reference.occluded(&ray, 0xff) == Some(false)
+        };
+        Some(f64::from((0..count).map(|number| u32::from(is_open(number))).sum::<u32>()) / f64::from(count))
+    }
+}
+
+/// The ray through the middle of a pixel.
+fn ray_through(camera: &Camera, [x, y]: [u32; 2]) -> Ray {
+    let [right, up, forward] = camera.frame().map(Vec3::from);
+    let half_height = (0.5 * camera.vertical_fov_degrees.to_radians()).tan();
+    let place = |pixel: u32, size: u32| (pixel as f32 + 0.5) / size as f32 * 2.0 - 1.0;
+    let across = place(x, SIZE[0]) * half_height * SIZE[0] as f32 / SIZE[1] as f32;
+    let down = place(y, SIZE[1]) * half_height;
+    Ray::new(camera.eye.into(), (forward + across * right - down * up).normalize())
+}
+
+/// Pixels in even surroundings, at an even distance from each other.
+fn even_pixels(openness: &[f32]) -> Vec<[u32; 2]> {
+    let at = |x: u32, y: u32| openness[(y * SIZE[0] + x) as usize];
+    let is_even = |&[x, y]: &[u32; 2]| {
+        let around = (0..9).map(|i| at(x + i % 3 - 1, y + i / 3 - 1));
+        let (low, high) = around.fold((1.0_f32, 0.0_f32), |(low, high), one| (low.min(one), high.max(one)));
+        high - low < 0.06 && low < 0.97
+    };
+    let grid = (5..SIZE[1] - 5).step_by(4).flat_map(|y| (5..SIZE[0] - 5).step_by(4).map(move |x| [x, y]));
+    grid.filter(is_even).collect()
+}
+
+fn mean_error(openness: &[f32], expected: &[([u32; 2], f64)]) -> f64 {
+    let error =
+        |([x, y], value): &([u32; 2], f64)| (f64::from(openness[(y * SIZE[0] + x) as usize]) - value).abs();
+    expected.iter().map(error).sum::<f64>() / expected.len() as f64
+}
+
+#[test]
+fn it_converges_to_the_reference() {
+    let Some(ctx) = software() else { return };
+    let mut town = town(&ctx, RayPath::Query, 6, 4);
+    let mut after = |passes: u32| {
+        while town.passes() < passes {
+            town.render(&mut |_| {}).unwrap();
+        }
+        (picture_now(&town), town.openness().unwrap())
+    };
+    let [few, more, most] = [6, 24, 96].map(&mut after);
+    let psnr = |one: &RgbaImage, other: &RgbaImage| Likeness::of(one, other).difference.psnr;
+    let (first, second) = (psnr(&few.0, &more.0), psnr(&more.0, &most.0));
+    eprintln!("6 to 24 passes: {first:.1} dB, 24 to 96: {second:.1} dB");
+    assert!(first > 26.0 && second > first + 3.0, "{first} dB, then {second} dB");
+
+    let world = World::new();
+    let camera = town.view().camera;
+    let pixels = even_pixels(&most.1);
+    let found =
+        pixels.iter().filter_map(|&pixel| Some((pixel, world.openness(&ray_through(&camera, pixel), 1024)?)));
+    let expected: Vec<_> = found.collect();
+    let errors = [&few.1, &more.1, &most.1].map(|openness| mean_error(openness, &expected));
+    eprintln!("mean errors at {} pixels: {errors:?}", expected.len());
+    assert!(expected.len() >= 40);
+    assert!(errors[0] > errors[1] && errors[1] > errors[2] && errors[2] < 0.012, "{errors:?}");
+}
+
+fn picture_now(town: &RtxAo) -> RgbaImage {
+    RgbaImage::from_raw(SIZE[0], SIZE[1], town.picture().unwrap()).unwrap()
+}
+
+#[test]
+fn the_town_looks_as_it_always_did() {
+    let Some(ctx) = device() else { return };
+    assert_as_ever("rtx_ao_small", &picture(&mut town(&ctx, paths(&ctx)[0], 16, 2)));
+}
+
+fn small(picture: &RgbaImage) -> RgbaImage {
+    resize(picture, SIZE[0] / 4, SIZE[1] / 4, FilterType::Triangle)
+}
+
+/// What the next test asks of another driver.
+#[test]
+fn few_passes_show_the_same_but_for_noise_and_nothing_else_does() {
+    let Some(ctx) = software() else { return };
+    let expected = small(&reference("rtx_ao_small"));
+    let noisy = small(&picture(&mut town(&ctx, RayPath::Query, 2, 2)));
+    assert_alike("town by few passes", &noisy, &expected, &OTHER_NOISE);
+    let rtx = RtxConfig { path: RayPath::Query, width: SIZE[0], height: SIZE[1] };
+    let config = RtxAoConfig { passes: 2, radius: Some(0.2), ..RtxAoConfig::new(rtx) };
+    let open = RtxAo::new(&ctx, &Scene::town(), Some(&Scene::carousel()), &config);
+    let likeness = Likeness::of(&small(&picture(&mut open.unwrap())), &expected);
+    assert!(!likeness.is_within(&OTHER_NOISE), "without occlusion: {likeness}");
+    eprintln!("without occlusion: {likeness}");
+}
+
+/// Rays take SwiftShader seconds for each pass.
+#[test]
+fn a_driver_without_ray_tracing_shows_the_town() {
+    without_ray_tracing("a_driver_without_ray_tracing_shows_the_town", || {
+        let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
+        let picture = picture(&mut town(&ctx, RayPath::Query, 2, 2));
+        assert_alike("SwiftShader town", &small(&picture), &small(&reference("rtx_ao_small")), &OTHER_NOISE);
+    });
+}
+
+#[test]
+fn impossible_pictures_are_refused() {
+    let Some(ctx) = device() else { return };
+    let config = RtxAoConfig::new(RtxConfig { path: paths(&ctx)[0], width: 0, height: 8 });
+    let error = RtxAo::new(&ctx, &Scene::carousel(), None, &config).err();
+    assert!(matches!(error, Some(RtxError::BadSize { .. })), "{error:?}");
+}
