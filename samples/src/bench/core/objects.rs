@@ -77,7 +77,8 @@ fn crowded(setup: &Setup, amount: Amount) -> Result<Vec<Row>, BenchError> {
         (setup.open_for_textures(amount.crowd + 100)?, setup.open_for_textures(amount.crowd + 100)?);
     let crowd = |ctx: &Context, count| (0..count).map(|_| texture(ctx)).collect::<lvk::Result<Vec<_>>>();
     let held = (crowd(&few, FEW)?, crowd(&many, amount.crowd)?);
-    (few.wait_idle()?, many.wait_idle()?);
+    few.wait_idle()?;
+    many.wait_idle()?;
     let samples: [Vec<f64>; 2] = take_turns(amount.runs * 10, |which| {
         let ctx = [&many, &few][which];
         let start = Instant::now();
