@@ -75,8 +75,10 @@ pub(crate) fn write_addresses(
     find: Find<'_>,
     out: &mut [u8],
 ) -> Result<Option<Vec<Shown>>> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let threads = (instances.len() / INSTANCES_PER_THREAD).clamp(1, cores.min(MOST_THREADS));
+    let threads = thread_count(instances.len());
+    if threads == 1 {
+        return merge(vec![write_chunk(name, 0, instances, find, out)]);
+    }
     let count = instances.len().div_ceil(threads).max(1);
     std::thread::scope(|scope| {
         let mut chunks = instances.chunks(count).zip(out.chunks_mut(count * INSTANCE_BYTES)).enumerate();
@@ -94,6 +96,15 @@ pub(crate) fn write_addresses(
         all.extend(workers.into_iter().map(|worker| worker.join().unwrap_or_else(lost)));
         merge(all)
     })
+}
+
+/// Counting cores reads files on Linux, some 10 us: only where there is work for several.
+fn thread_count(instances: usize) -> usize {
+    let wanted = (instances / INSTANCES_PER_THREAD).min(MOST_THREADS);
+    if wanted < 2 {
+        return 1;
+    }
+    std::thread::available_parallelism().map_or(1, usize::from).min(wanted)
 }
 
 fn write_chunk(

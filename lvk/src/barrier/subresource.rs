@@ -146,12 +146,18 @@ impl<T: Copy + PartialEq> Cells<T> {
         range: Subresources,
         mut step: impl FnMut(&mut T) -> Option<Scopes>,
     ) -> Vec<(Subresources, Scopes)> {
+        match self.whole(range) {
+            Some((whole, value)) => step(value).map(|scopes| (whole, scopes)).into_iter().collect(),
+            None => self.step_each(range, |value, _, _| step(value)),
+        }
+    }
+
+    /// The one value of all subresources, where `range` has them all.
+    pub(crate) fn whole(&mut self, range: Subresources) -> Option<(Subresources, &mut T)> {
         let whole = self.shape.whole();
         match self.values.as_mut_slice() {
-            [value] if self.shape.clamp(range) == whole => {
-                step(value).map(|scopes| (whole, scopes)).into_iter().collect()
-            }
-            _ => self.step_each(range, |value, _, _| step(value)),
+            [value] if self.shape.clamp(range) == whole => Some((whole, value)),
+            _ => None,
         }
     }
 

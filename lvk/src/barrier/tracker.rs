@@ -144,6 +144,13 @@ impl Tracker {
     ) {
         let next = with_some_layout(next);
         let cells = self.textures.entry(id, || Cells::new(shape, Local::default()));
+        // By far the most frequent: no list of barriers is made.
+        if let Some((whole, local)) = cells.whole(subresources) {
+            if let Some(scopes) = local.step(next) {
+                out.push_image(id, whole, scopes);
+            }
+            return;
+        }
         for (range, scopes) in cells.step(subresources, |local| local.step(next)) {
             out.push_image(id, range, scopes);
         }

@@ -8,28 +8,40 @@ use super::CommandBuffer;
 use crate::error::{Error, Result};
 
 /// What is known of the push constants: which were pushed, and what the last bound pipeline wants.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct PushConstants {
     /// A bit for each 4 bytes: enough, as the layout has at most 256 bytes.
     pushed: u64,
     /// The bytes themselves, for the library to push again what it overwrote.
-    bytes: Vec<u8>,
+    bytes: [u8; Self::MOST_BYTES],
+    /// How many of them, from the first on.
+    length: usize,
     wanted: Option<(Arc<str>, u32)>,
 }
 
+impl Default for PushConstants {
+    fn default() -> Self {
+        Self { pushed: 0, bytes: [0; Self::MOST_BYTES], length: 0, wanted: None }
+    }
+}
+
 impl PushConstants {
+    /// As the layout of all pipelines has at most.
+    const MOST_BYTES: usize = 256;
+
     /// Rust structs end on their alignment, GLSL blocks on their last member; 16 bytes is the largest alignment.
     const TAIL_BYTES: u32 = 16;
 
     /// Everything pushed so far, zero where nothing was.
     pub(super) fn pushed_bytes(&self) -> &[u8] {
-        &self.bytes
+        &self.bytes[..self.length]
     }
 
     fn keep(&mut self, offset: u32, bytes: &[u8]) {
-        let (start, end) = (offset as usize, offset as usize + bytes.len());
-        self.bytes.resize(self.bytes.len().max(end), 0);
-        self.bytes[start..end].copy_from_slice(bytes);
+        let start = offset as usize;
+        let Some(kept) = self.bytes.get_mut(start..start + bytes.len()) else { return };
+        kept.copy_from_slice(bytes);
+        self.length = self.length.max(start + bytes.len());
         self.pushed |= words(offset, bytes.len() as u32);
     }
 
@@ -64,10 +76,11 @@ impl PushConstants {
 
     /// Fails if the pipeline reads bytes that were never pushed.
     fn check_pushed(&self, pipeline: &str, expected: u32) -> Result<()> {
-        let pushed = 4 * (self.pushed & words(0, expected)).count_ones();
-        if pushed >= expected {
+        let needed = words(0, expected);
+        if self.pushed & needed == needed {
             return Ok(());
         }
+        let pushed = 4 * (self.pushed & needed).count_ones();
         let message =
             format!("its shaders read {expected} bytes of push constants, but {pushed} were pushed");
         Err(Error::usage(pipeline, message))

@@ -1,7 +1,5 @@
 //! Dispatches.
 
-use std::sync::Arc;
-
 use ash::vk;
 
 use super::CommandBuffer;
@@ -29,7 +27,8 @@ impl CommandBuffer {
         for (count, limit) in groups.into_iter().zip(limits) {
             check_limit(&pipeline.name, "workgroup count", count.into(), limit.into())?;
         }
-        self.flush_after(|cmd| cmd.use_compute(&pipeline, dependencies))?;
+        let ray_query = pipeline.ray_query;
+        self.flush_after(|cmd| cmd.use_compute(ray_query, dependencies))?;
         // SAFETY: a compute pipeline is bound and the counts are within the limits.
         unsafe { self.shared.gpu.device.cmd_dispatch(self.raw(), groups[0], groups[1], groups[2]) };
         Ok(())
@@ -45,27 +44,27 @@ impl CommandBuffer {
         dependencies: &Dependencies<'_>,
     ) -> Result<()> {
         const ARGUMENT_BYTES: u64 = 12;
-        let pipeline = self.ready_compute()?;
+        let ray_query = self.ready_compute()?.ray_query;
         let buffer = self.shared.store.buffers.get(arguments)?;
         check_arguments(&buffer, offset, ARGUMENT_BYTES)?;
         self.flush_after(|cmd| {
             cmd.use_buffer(&buffer, Use::indirect());
-            cmd.use_compute(&pipeline, dependencies)
+            cmd.use_compute(ray_query, dependencies)
         })?;
         // SAFETY: a compute pipeline is bound and the arguments lie inside the buffer.
         unsafe { self.shared.gpu.device.cmd_dispatch_indirect(self.raw(), buffer.raw, offset) };
         Ok(())
     }
 
-    fn ready_compute(&self) -> Result<Arc<ComputePipeline>> {
-        let pipeline = self.compute.clone();
+    fn ready_compute(&self) -> Result<&ComputePipeline> {
+        let pipeline = self.compute.as_deref();
         let pipeline = pipeline.ok_or_else(|| Error::usage("dispatch", "bind a compute pipeline first"))?;
         self.check_pushed(&pipeline.name, pipeline.push_constant_bytes)?;
         Ok(pipeline)
     }
 
-    fn use_compute(&mut self, pipeline: &ComputePipeline, dependencies: &Dependencies<'_>) -> Result<()> {
-        if pipeline.ray_query {
+    fn use_compute(&mut self, ray_query: bool, dependencies: &Dependencies<'_>) -> Result<()> {
+        if ray_query {
             self.use_structures(Stages::COMPUTE);
         }
         self.use_dependencies(dependencies, Stages::COMPUTE)

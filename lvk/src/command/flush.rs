@@ -46,27 +46,28 @@ impl CommandBuffer {
 
     /// The next command's shaders reach these in `stages`.
     pub(super) fn use_dependencies(&mut self, deps: &Dependencies<'_>, stages: Stages) -> Result<()> {
-        let shared = Arc::clone(&self.shared);
         for handle in deps.sampled_images {
-            let texture = shared.store.textures.get(*handle)?;
+            let texture = self.shared.store.textures.get(*handle)?;
             texture.check_usage(TextureUsage::SAMPLED)?;
-            self.use_texture(&texture, texture.range, Use::shader_read(stages))?;
+            let part = texture.range;
+            self.uses.texture(texture, part, Use::shader_read(stages))?;
         }
         for handle in deps.storage_images {
-            let texture = shared.store.textures.get(*handle)?;
+            let texture = self.shared.store.textures.get(*handle)?;
             texture.check_usage(TextureUsage::STORAGE)?;
-            self.use_texture(&texture, texture.stored_part(), Use::shader_write(stages))?;
+            let part = texture.stored_part();
+            self.uses.texture(texture, part, Use::shader_write(stages))?;
         }
         for handle in deps.buffers {
-            let buffer = shared.store.buffers.get(*handle)?;
+            let buffer = self.shared.store.buffers.get(*handle)?;
             self.use_buffer(&buffer, Use::shader_write(stages));
         }
         for handle in deps.read_buffers {
-            let buffer = shared.store.buffers.get(*handle)?;
+            let buffer = self.shared.store.buffers.get(*handle)?;
             self.use_buffer(&buffer, Use::shader_read(stages));
         }
         for handle in deps.acceleration_structures {
-            shared.store.accel_structs.get(*handle)?;
+            self.shared.store.accel_structs.get(*handle)?;
             self.use_structures(stages);
         }
         Ok(())

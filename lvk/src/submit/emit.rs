@@ -1,35 +1,44 @@
 //! Turns barriers the tracker decided into one `vkCmdPipelineBarrier2`.
 
-use std::collections::HashMap;
-
 use ash::vk;
 
-use crate::barrier::{Access, Barriers, ImageBarrier, Layout, MemoryBarrier, ResourceId, Stages};
+use crate::barrier::{Access, Barriers, IdMap, ImageBarrier, Layout, MemoryBarrier, Stages};
 use crate::gpu::Gpu;
 use crate::resource::image::BarrierImage;
 
 /// Images a command buffer touches, by the id the tracker knows them by.
-pub(crate) type Images = HashMap<ResourceId, BarrierImage>;
+pub(crate) type Images = IdMap<BarrierImage>;
 
 /// Records the barriers, if there are any.
 pub(crate) fn emit(gpu: &Gpu, commands: vk::CommandBuffer, barriers: &Barriers, images: &Images) {
-    let memory = memory_barriers(gpu, barriers.memory);
-    let images: Vec<_> =
-        barriers.images.iter().filter_map(|barrier| image_barrier(gpu, barrier, images)).collect();
-    if memory.is_empty() && images.is_empty() {
+    if barriers.is_empty() {
         return;
     }
-    let info = vk::DependencyInfo::default().memory_barriers(&memory).image_memory_barriers(&images);
+    let mut memory = [vk::MemoryBarrier2::default(); 2];
+    let count = memory_barriers(gpu, barriers.memory, &mut memory);
+    let images: Vec<_> =
+        barriers.images.iter().filter_map(|barrier| image_barrier(gpu, barrier, images)).collect();
+    if count == 0 && images.is_empty() {
+        return;
+    }
+    let info = vk::DependencyInfo::default().memory_barriers(&memory[..count]).image_memory_barriers(&images);
     // SAFETY: the command buffer is being recorded outside of a render pass, and the images are alive.
     unsafe { gpu.device.cmd_pipeline_barrier2(commands, &info) };
 }
 
-fn memory_barriers(gpu: &Gpu, barrier: Option<MemoryBarrier>) -> Vec<vk::MemoryBarrier2<'static>> {
+/// Writes the barrier, in two parts where one must not name all, and answers how many.
+fn memory_barriers(
+    gpu: &Gpu,
+    barrier: Option<MemoryBarrier>,
+    out: &mut [vk::MemoryBarrier2<'static>; 2],
+) -> usize {
+    let Some(barrier) = barrier else { return 0 };
     if gpu.caps.hardware_ray_query() {
-        return barrier.iter().map(|barrier| memory_barrier(gpu, barrier)).collect();
+        out[0] = memory_barrier(gpu, &barrier);
+        return 1;
     }
-    let parts = barrier.into_iter().flat_map(MemoryBarrier::without_ray_queries);
-    parts.map(|barrier| memory_barrier(gpu, &barrier)).collect()
+    let parts = barrier.without_ray_queries().zip(&mut *out);
+    parts.map(|(part, place)| *place = memory_barrier(gpu, &part)).count()
 }
 
 fn memory_barrier(gpu: &Gpu, barrier: &MemoryBarrier) -> vk::MemoryBarrier2<'static> {
@@ -61,51 +70,71 @@ fn image_barrier(
     Some(barrier)
 }
 
+/// Stages by their Vulkan names, in the order of their bits.
+const STAGES: [vk::PipelineStageFlags2; Stages::COUNT] = {
+    use vk::PipelineStageFlags2 as Raw;
+    [
+        Raw::HOST,
+        Raw::ALL_TRANSFER,
+        Raw::DRAW_INDIRECT,
+        Raw::VERTEX_INPUT,
+        Raw::PRE_RASTERIZATION_SHADERS,
+        Raw::FRAGMENT_SHADER,
+        Raw::from_raw(Raw::EARLY_FRAGMENT_TESTS.as_raw() | Raw::LATE_FRAGMENT_TESTS.as_raw()),
+        Raw::COLOR_ATTACHMENT_OUTPUT,
+        Raw::COMPUTE_SHADER,
+        Raw::RAY_TRACING_SHADER_KHR,
+        Raw::ACCELERATION_STRUCTURE_BUILD_KHR,
+    ]
+};
+
+/// Accesses by their Vulkan names, in the order of their bits.
+const ACCESSES: [vk::AccessFlags2; 15] = {
+    use vk::AccessFlags2 as Raw;
+    [
+        Raw::INDIRECT_COMMAND_READ,
+        Raw::INDEX_READ,
+        Raw::VERTEX_ATTRIBUTE_READ,
+        Raw::SHADER_READ,
+        Raw::SHADER_WRITE,
+        Raw::COLOR_ATTACHMENT_READ,
+        Raw::COLOR_ATTACHMENT_WRITE,
+        Raw::DEPTH_STENCIL_ATTACHMENT_READ,
+        Raw::DEPTH_STENCIL_ATTACHMENT_WRITE,
+        Raw::TRANSFER_READ,
+        Raw::TRANSFER_WRITE,
+        Raw::ACCELERATION_STRUCTURE_READ_KHR,
+        Raw::ACCELERATION_STRUCTURE_WRITE_KHR,
+        Raw::HOST_READ,
+        Raw::HOST_WRITE,
+    ]
+};
+
 /// Stages by their Vulkan names, without those whose feature is off.
 fn stages(gpu: &Gpu, stages: Stages) -> vk::PipelineStageFlags2 {
-    use vk::PipelineStageFlags2 as Raw;
-    let table = [
-        (Stages::HOST, Raw::HOST),
-        (Stages::TRANSFER, Raw::ALL_TRANSFER),
-        (Stages::DRAW_INDIRECT, Raw::DRAW_INDIRECT),
-        (Stages::VERTEX_INPUT, Raw::VERTEX_INPUT),
-        (Stages::PRE_RASTER, Raw::PRE_RASTERIZATION_SHADERS),
-        (Stages::FRAGMENT, Raw::FRAGMENT_SHADER),
-        (Stages::DEPTH, Raw::EARLY_FRAGMENT_TESTS | Raw::LATE_FRAGMENT_TESTS),
-        (Stages::COLOR, Raw::COLOR_ATTACHMENT_OUTPUT),
-        (Stages::COMPUTE, Raw::COMPUTE_SHADER),
-        (Stages::RAY_TRACING, if_on(gpu.ray_tracing.is_some(), Raw::RAY_TRACING_SHADER_KHR)),
-        (Stages::ACCEL_BUILD, if_on(gpu.accel.is_some(), Raw::ACCELERATION_STRUCTURE_BUILD_KHR)),
-    ];
-    table.iter().filter(|(bit, _)| stages.contains(*bit)).fold(Raw::NONE, |all, (_, raw)| all | *raw)
+    let mut off = Stages::empty();
+    off.set(Stages::RAY_TRACING, gpu.ray_tracing.is_none());
+    off.set(Stages::ACCEL_BUILD, gpu.accel.is_none());
+    let all = set_bits((stages - off).bits(), &STAGES);
+    all.fold(vk::PipelineStageFlags2::NONE, |all, raw| all | raw)
 }
 
 /// Accesses by their Vulkan names, without those whose feature is off.
 fn access(gpu: &Gpu, access: Access) -> vk::AccessFlags2 {
-    use vk::AccessFlags2 as Raw;
-    let structures = gpu.accel.is_some();
-    let table = [
-        (Access::INDIRECT_READ, Raw::INDIRECT_COMMAND_READ),
-        (Access::INDEX_READ, Raw::INDEX_READ),
-        (Access::VERTEX_READ, Raw::VERTEX_ATTRIBUTE_READ),
-        (Access::SHADER_READ, Raw::SHADER_READ),
-        (Access::SHADER_WRITE, Raw::SHADER_WRITE),
-        (Access::COLOR_READ, Raw::COLOR_ATTACHMENT_READ),
-        (Access::COLOR_WRITE, Raw::COLOR_ATTACHMENT_WRITE),
-        (Access::DEPTH_READ, Raw::DEPTH_STENCIL_ATTACHMENT_READ),
-        (Access::DEPTH_WRITE, Raw::DEPTH_STENCIL_ATTACHMENT_WRITE),
-        (Access::TRANSFER_READ, Raw::TRANSFER_READ),
-        (Access::TRANSFER_WRITE, Raw::TRANSFER_WRITE),
-        (Access::ACCEL_READ, if_on(structures, Raw::ACCELERATION_STRUCTURE_READ_KHR)),
-        (Access::ACCEL_WRITE, if_on(structures, Raw::ACCELERATION_STRUCTURE_WRITE_KHR)),
-        (Access::HOST_READ, Raw::HOST_READ),
-        (Access::HOST_WRITE, Raw::HOST_WRITE),
-    ];
-    table.iter().filter(|(bit, _)| access.contains(*bit)).fold(Raw::NONE, |all, (_, raw)| all | *raw)
+    let mut off = Access::empty();
+    off.set(Access::ACCEL_READ | Access::ACCEL_WRITE, gpu.accel.is_none());
+    let all = set_bits((access - off).bits(), &ACCESSES);
+    all.fold(vk::AccessFlags2::NONE, |all, raw| all | raw)
 }
 
-fn if_on<T: Default>(on: bool, value: T) -> T {
-    if on { value } else { T::default() }
+/// What the table has for each bit that is set: mostly one or two.
+fn set_bits<T: Copy>(bits: u16, table: &[T]) -> impl Iterator<Item = T> {
+    let mut left = bits;
+    std::iter::from_fn(move || {
+        let place = left.trailing_zeros() as usize;
+        left &= left.wrapping_sub(1);
+        table.get(place).copied()
+    })
 }
 
 /// A layout by its Vulkan name.
@@ -118,5 +147,30 @@ pub(crate) fn layout(layout: Layout) -> vk::ImageLayout {
         Layout::DepthTarget => vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
         Layout::TransferSrc => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
         Layout::TransferDst => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tables_stand_in_the_order_of_the_bits() {
+        use vk::{AccessFlags2, PipelineStageFlags2};
+        assert_eq!(Stages::all().bits(), (1 << STAGES.len()) - 1);
+        assert_eq!(Access::all().bits(), (1 << ACCESSES.len()) - 1);
+        let stage = |stages: Stages| set_bits(stages.bits(), &STAGES).collect::<Vec<_>>();
+        assert_eq!(
+            stage(Stages::COMPUTE | Stages::HOST),
+            [PipelineStageFlags2::HOST, PipelineStageFlags2::COMPUTE_SHADER]
+        );
+        assert_eq!(stage(Stages::COLOR), [PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT]);
+        assert_eq!(stage(Stages::ACCEL_BUILD), [PipelineStageFlags2::ACCELERATION_STRUCTURE_BUILD_KHR]);
+        let access = |access: Access| set_bits(access.bits(), &ACCESSES).collect::<Vec<_>>();
+        assert_eq!(access(Access::SHADER_WRITE), [AccessFlags2::SHADER_WRITE]);
+        assert_eq!(access(Access::DEPTH_WRITE), [AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE]);
+        assert_eq!(access(Access::ACCEL_READ), [AccessFlags2::ACCELERATION_STRUCTURE_READ_KHR]);
+        assert_eq!(access(Access::HOST_WRITE), [AccessFlags2::HOST_WRITE]);
+        assert!(access(Access::empty()).is_empty());
     }
 }
