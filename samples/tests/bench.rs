@@ -223,3 +223,13 @@ fn wrong_input_and_no_ray_tracing_have_statuses_of_their_own() {
     let (status, _, err) = outcome(&["split", "--quick", "--profile", "no-ray-tracing"]);
     assert!(status == Some(1) && err.starts_with("error: "), "{status:?}: {err}");
 }
+
+#[test]
+fn what_the_core_costs_stands_beside_its_limits() {
+    let table = table(&["core", "--quick"]);
+    assert_positive(&table, "push constants + draw", 0..2);
+    assert_positive(&table, "- own share", 0..1);
+    assert_positive(&table, "dispatch behind", 0..2);
+    assert_positive(&table, "empty submission", 0..2);
+    assert!(table.contains("60 ms") && !table.contains("NaN"), "{table}");
+}
