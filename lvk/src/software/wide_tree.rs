@@ -1,5 +1,7 @@
 //! Wide trees: PLOC with reinsertion, collapsed to eight compressed children, by the crate `obvhs`.
 
+use std::collections::{HashMap, HashSet};
+
 use glam::{Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
@@ -38,21 +40,39 @@ pub(super) fn build(bounds: &[Bounds], quality: Quality) -> Option<Tree> {
     shallow.then_some(Tree { nodes: Nodes::Wide(wide.nodes), root: 0, order: wide.primitive_indices })
 }
 
-/// The boxes, each a little larger in its own way. Equal ones in a row would be merged by one pair a round, and a round
-/// looks at them all.
+/// The boxes; those of a size that many have are a little larger, each in its own way. Boxes that are alike would be merged
+/// by one pair a round, and a round looks at them all.
 fn distinct(bounds: &[Bounds]) -> Vec<Aabb> {
+    let common = common_sizes(bounds);
     let whole = bounds.iter().fold(0.0_f32, |most, bounds| {
         most.max(bounds.low.abs().max_element()).max(bounds.high.abs().max_element())
     });
     let least = (whole * 1e-7).max(f32::MIN_POSITIVE.sqrt());
     let grown = |(number, bounds): (u32, &Bounds)| {
-        let size = (bounds.high - bounds.low) * 1e-4 + least;
-        Aabb {
-            min: Vec3A::from(bounds.low - size * fractions(2 * number)),
-            max: Vec3A::from(bounds.high + size * fractions(2 * number + 1)),
+        let mut place = Aabb { min: Vec3A::from(bounds.low), max: Vec3A::from(bounds.high) };
+        if !common.is_empty() && common.contains(&size_bits(bounds)) {
+            let most = (bounds.high - bounds.low) * 1e-4 + least;
+            place.min -= Vec3A::from(most * fractions(2 * number));
+            place.max += Vec3A::from(most * fractions(2 * number + 1));
         }
+        place
     };
     (0..).zip(bounds).map(grown).collect()
+}
+
+/// The sizes that one box in 128 or more has, judged by some of them.
+fn common_sizes(bounds: &[Bounds]) -> HashSet<[u32; 3]> {
+    const SAMPLES: usize = 1_024;
+    let mut counts = HashMap::new();
+    for place in bounds.iter().step_by(bounds.len().div_ceil(SAMPLES).max(1)) {
+        *counts.entry(size_bits(place)).or_insert(0) += 1;
+    }
+    counts.retain(|_, count| *count >= SAMPLES / 128);
+    counts.into_keys().collect()
+}
+
+fn size_bits(bounds: &Bounds) -> [u32; 3] {
+    (bounds.high - bounds.low).to_array().map(f32::to_bits)
 }
 
 /// Three numbers from 0 to 1, others for each `seed` (the finaliser of MurmurHash3).
@@ -136,4 +156,38 @@ fn leaf_is_sound(node: &CwBvhNode, child: usize, primitives: usize) -> bool {
     let end = u64::from(node.primitive_base_idx) + u64::from(meta & 0x1f) + u64::from(count);
     let unary = matches!(meta >> 5, 0 | 1 | 3 | 7);
     meta == 0 || (unary && u32::from(meta & 0x1f) + count <= 24 && end <= primitives as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STATIC: Quality = Quality { fast_build: false, low_memory: false, refit: false };
+
+    fn nodes(bounds: &[Bounds]) -> usize {
+        match build(bounds, STATIC).expect("a tree").nodes {
+            Nodes::Wide(nodes) => nodes.len(),
+            Nodes::Binary(_) => unreachable!("wide trees were asked for"),
+        }
+    }
+
+    #[test]
+    fn the_largest_boxes_make_a_tree_as_good_as_others() {
+        let boxes = |half: f32| vec![Bounds { low: Vec3::splat(-half), high: Vec3::splat(half) }; 200];
+        assert!(nodes(&boxes(1e15)) <= 2 * nodes(&boxes(1.0)));
+    }
+
+    #[test]
+    fn only_boxes_of_common_sizes_are_changed() {
+        let size = |number: u32| Vec3::new(1.0, 2.0, 0.5 + number as f32);
+        let sizes = (0..2_000).map(|number| if number % 4 == 0 { size(0) } else { size(number) });
+        let bounds: Vec<_> = sizes.map(|high| Bounds { low: Vec3::ZERO, high }).collect();
+        let changed = distinct(&bounds).into_iter().zip(&bounds).filter(|(after, before)| {
+            let same = after.max == Vec3A::from(before.high) && after.min == Vec3A::from(before.low);
+            let holds = after.max.cmpge(before.high.into()).all() && after.min.cmple(before.low.into()).all();
+            assert!(holds);
+            !same
+        });
+        assert_eq!(changed.count(), 500);
+    }
 }
