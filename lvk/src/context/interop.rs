@@ -9,6 +9,7 @@ use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, RayTracingPipelineHandle, RenderPipelineHandle,
     SamplerHandle, TextureHandle,
 };
+use crate::resource::texture_desc::TextureUsage;
 
 impl Context {
     /// The instance.
@@ -65,6 +66,18 @@ impl Context {
     /// The view shaders sample.
     pub fn raw_image_view(&self, texture: TextureHandle) -> Result<vk::ImageView> {
         self.shared().store.textures.get(texture)?.sampled_view()
+    }
+
+    /// The view that render passes draw to: a layer, or a slice of a volume, of a mip.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) if the texture is no [`TARGET`](TextureUsage::TARGET) or has no such
+    /// mip or layer.
+    pub fn raw_target_view(&self, texture: TextureHandle, mip: u32, layer: u32) -> Result<vk::ImageView> {
+        let texture = self.shared().store.textures.get(texture)?;
+        texture.check_usage(TextureUsage::TARGET)?;
+        texture.check_target(mip, layer)?;
+        texture.target_view(mip, layer)
     }
 
     /// The sampler behind a handle.

@@ -44,9 +44,7 @@ pub(super) fn open(
     };
     match args.rt {
         RayTracing::Pipeline => with(Required, HardwareIfPresent),
-        RayTracing::Query => with(Optional, Hardware).inspect_err(|_| {
-            eprintln!("note: --rt software needs no ray queries of the device");
-        }),
+        RayTracing::Query => with(Optional, Hardware),
         RayTracing::Software => with(Off, Software),
         // A profile rehearses the device's own paths. These keep no structures for software beside theirs.
         RayTracing::Auto => {

@@ -109,7 +109,7 @@ pub enum RayTracing {
     Auto,
     /// A ray tracing pipeline with shader binding table.
     Pipeline,
-    /// Ray queries in a compute shader.
+    /// Ray queries of the device in a compute shader; on devices that have none, see `software`.
     Query,
     /// Ray queries that the library walks in the shader itself, on any device.
     Software,

@@ -45,7 +45,7 @@ fn ours(ctx: &Context, scene: &Scene, count: u32) -> lvk::Result<f64> {
 }
 
 fn by_hand(ctx: &Context, raw: &Rc<RawRecorder>, scene: &Scene, count: u32) -> Result<f64, BenchError> {
-    let (view, pipeline) = (ctx.raw_image_view(*scene.target)?, ctx.raw_render_pipeline(*scene.draw)?);
+    let (view, pipeline) = (ctx.raw_target_view(*scene.target, 0, 0)?, ctx.raw_render_pipeline(*scene.draw)?);
     let (device, layout) = (ctx.raw_device(), ctx.raw_pipeline_layout());
     let commands = raw.begin()?;
     let extent = vk::Extent2D { width: Scene::SIDE, height: Scene::SIDE };
