@@ -43,14 +43,18 @@ pub(super) fn build(bounds: &[Bounds], quality: Quality) -> Option<Tree> {
 /// The boxes; those of a size that many have are a little larger, each in its own way. Boxes that are alike would be merged
 /// by one pair a round, and a round looks at them all.
 fn distinct(bounds: &[Bounds]) -> Vec<Aabb> {
+    let place = |bounds: &Bounds| Aabb { min: Vec3A::from(bounds.low), max: Vec3A::from(bounds.high) };
     let common = common_sizes(bounds);
+    if common.is_empty() {
+        return bounds.iter().map(place).collect();
+    }
     let whole = bounds.iter().fold(0.0_f32, |most, bounds| {
         most.max(bounds.low.abs().max_element()).max(bounds.high.abs().max_element())
     });
     let least = (whole * 1e-7).max(f32::MIN_POSITIVE.sqrt());
     let grown = |(number, bounds): (u32, &Bounds)| {
-        let mut place = Aabb { min: Vec3A::from(bounds.low), max: Vec3A::from(bounds.high) };
-        if !common.is_empty() && common.contains(&size_bits(bounds)) {
+        let mut place = place(bounds);
+        if common.contains(&size_bits(bounds)) {
             let most = (bounds.high - bounds.low) * 1e-4 + least;
             place.min -= Vec3A::from(most * fractions(2 * number));
             place.max += Vec3A::from(most * fractions(2 * number + 1));

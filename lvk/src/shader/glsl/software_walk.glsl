@@ -275,16 +275,12 @@ uvec2 lvkSoftNumbers(uvec3 words, uint kind, bool several) {
     return uvec2(geometry, inOneWord ? words.x & 0x00FFFFFFu : words.x);
 }
 
-// Whether a primitive says of itself that it is opaque.
+// Whether a primitive is opaque where each says so itself; leaves that name vertices leave it to their geometry.
 bool lvkSoftSaysOpaque(LvkSoftLevel level, LvkSoftHit hit) {
-    LvkSoftBlocks blocks = LvkSoftBlocks(level.structure);
-    if (level.kind == LVK_SOFT_TRIANGLES) {
-        return (blocks.at[level.primitives + hit.primitive * LVK_SOFT_TRIANGLE_BLOCKS + 2u].w & 1u) != 0u;
+    if (level.kind == LVK_SOFT_TRIANGLES || level.kind == LVK_SOFT_BOXES) {
+        return hit.opaque;
     }
-    if (level.kind == LVK_SOFT_BOXES) {
-        return (blocks.at[level.primitives + hit.primitive * LVK_SOFT_BOX_BLOCKS + 1u].w & 0x80000000u) != 0u;
-    }
-    uvec2 geometries = lvkSoftBehind(level.structure, blocks.at[1].w);
+    uvec2 geometries = lvkSoftBehind(level.structure, LvkSoftBlocks(level.structure).at[1].w);
     return (LvkSoftBlocks(geometries).at[hit.numbers.x].x & 1u) != 0u;
 }
 
@@ -294,6 +290,7 @@ bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hi
     uvec4 low = LvkSoftBlocks(level.structure).at[first];
     uvec4 high = LvkSoftBlocks(level.structure).at[first + 1u];
     hit.numbers = uvec2(high.w & 0x7FFFFFFFu, low.w);
+    hit.opaque = (high.w & 0x80000000u) != 0u;
     vec2 range = lvkSoftCross(level.slabs, uintBitsToFloat(low.xyz), uintBitsToFloat(high.xyz),
                               vec2(state.tMin, state.committed.t));
     return range.x <= range.y;
@@ -313,6 +310,7 @@ bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHi
     }
     hit.t = passage.t;
     hit.numbers = lvkSoftNumbers(words, level.kind, level.several);
+    hit.opaque = (words.z & 1u) != 0u;
     hit.barycentrics = passage.barycentrics;
     hit.front = passage.front != level.flip;
     uint culls = hit.front ? LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES : LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES;
