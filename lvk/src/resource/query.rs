@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
+use bytemuck::{Pod, Zeroable};
 
 use super::query_marks::QueryMarks;
 use crate::error::{Error, Result, check_limit};
@@ -84,7 +85,8 @@ impl Default for QueryPoolDesc<'_> {
 ///
 /// Drivers may count more or fewer than an ideal machine: vertices shared by triangles may be shaded once or each time,
 /// and invocations that only serve derivatives may count. What no pipeline in between has stays 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+#[repr(C)] // in the order of Vulkan's bits, in which it writes them
 pub struct PipelineStatistics {
     /// Vertices that draws asked for.
     pub input_vertices: u64,
@@ -119,40 +121,6 @@ impl PipelineStatistics {
     const PLAIN_BITS: u32 = (1 << 11) - 1;
     /// The bits of all fields.
     const ALL_BITS: u32 = (1 << 13) - 1;
-
-    /// What Vulkan counts, in the order of its bits.
-    fn of(values: [u64; 13]) -> Self {
-        let [
-            input_vertices,
-            input_primitives,
-            vertex_invocations,
-            geometry_invocations,
-            geometry_primitives,
-            clipped_primitives,
-            rasterized_primitives,
-            fragment_invocations,
-            tessellation_patches,
-            tessellation_invocations,
-            compute_invocations,
-            task_invocations,
-            mesh_invocations,
-        ] = values;
-        Self {
-            input_vertices,
-            input_primitives,
-            vertex_invocations,
-            geometry_invocations,
-            geometry_primitives,
-            clipped_primitives,
-            rasterized_primitives,
-            fragment_invocations,
-            tessellation_patches,
-            tessellation_invocations,
-            compute_invocations,
-            task_invocations,
-            mesh_invocations,
-        }
-    }
 }
 
 /// A query pool, destroyed on drop.
@@ -277,7 +245,7 @@ impl QueryPool {
         } else {
             self.statistic_values::<12>(query, &mut values)?
         };
-        Ok(ready.then(|| PipelineStatistics::of(values)))
+        Ok(ready.then(|| bytemuck::cast(values)))
     }
 
     /// Reads `N - 1` numbers and whether they are there.
