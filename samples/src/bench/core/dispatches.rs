@@ -6,28 +6,19 @@ use std::time::Instant;
 use lvk::ash::vk;
 use lvk::{Context, Dependencies};
 
-use super::row::{Limit, Row};
+use super::Amount;
+use super::recorded::{Limits, recorded};
+use super::row::Row;
 use super::scene::{Push, Scene};
-use super::{Amount, each_ns};
 use crate::bench::error::BenchError;
-use crate::bench::hand_written::{RawDevice, RawRecorder};
-use crate::bench::measure::{median_of, since, take_turns};
+use crate::bench::hand_written::RawRecorder;
+use crate::bench::measure::since;
 
 pub(super) fn measure(ctx: &Context, silent: &Context, amount: Amount) -> Result<Vec<Row>, BenchError> {
-    let (scene, silent_scene) = (Scene::new(ctx)?, Scene::new(silent)?);
-    let raw = RawRecorder::new(&RawDevice::new(ctx))?;
     let count = (amount.draws / 10).max(1);
-    let samples: [Vec<f64>; 3] = take_turns(amount.runs, |which| match which {
-        0 => Ok(ours(ctx, &scene, count)?),
-        1 => by_hand(ctx, &raw, &scene, count),
-        _ => Ok(ours(silent, &silent_scene, count)?),
-    })?;
-    let [ours, by_hand, own] = samples.map(|samples| each_ns(median_of(&samples, |ms| *ms), count));
     let what = format!("dispatch behind a storage image's barrier, {count} recorded");
-    Ok(vec![
-        Row { what, ours, other: Some(by_hand), unit: "ns", limit: Limit::Ratio(1.25) },
-        Row { what: "- own share".to_owned(), ours: own, other: None, unit: "ns", limit: Limit::Most(25.0) },
-    ])
+    let limits = Limits { ratio: 1.25, own_ns: 25.0 };
+    recorded(ctx, silent, (amount.runs, count), (ours, by_hand), (what, limits))
 }
 
 /// Milliseconds to record them.

@@ -7,6 +7,7 @@ mod allocations;
 mod dispatches;
 mod draws;
 mod objects;
+mod recorded;
 mod row;
 mod scene;
 mod start;
