@@ -28,6 +28,8 @@ bitflags! {
         const RAY_TRACING = 1 << 9;
         /// Builds, refits and copies of acceleration structures.
         const ACCEL_BUILD = 1 << 10;
+        /// Fetch of shading rates from an attachment.
+        const SHADING_RATE = 1 << 11;
 
         /// Every stage that runs shaders.
         const SHADERS = Self::PRE_RASTER.bits() | Self::FRAGMENT.bits() | Self::COMPUTE.bits()
@@ -38,7 +40,7 @@ bitflags! {
 bitflags! {
     /// Kinds of memory access.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-    pub(crate) struct Access: u16 {
+    pub(crate) struct Access: u32 {
         /// Indirect parameters.
         const INDIRECT_READ = 1 << 0;
         /// Indices of a draw.
@@ -69,6 +71,10 @@ bitflags! {
         const HOST_READ = 1 << 13;
         /// Writes through a mapped pointer.
         const HOST_WRITE = 1 << 14;
+        /// Attachments of the pass as fragment shaders read them.
+        const INPUT_READ = 1 << 15;
+        /// Shading rates of an attachment.
+        const SHADING_RATE_READ = 1 << 16;
 
         /// Every access that changes memory.
         const WRITES = Self::SHADER_WRITE.bits() | Self::COLOR_WRITE.bits() | Self::DEPTH_WRITE.bits()
@@ -78,7 +84,7 @@ bitflags! {
 
 impl Stages {
     /// How many single stages there are.
-    pub(crate) const COUNT: usize = 11;
+    pub(crate) const COUNT: usize = 12;
 
     /// The accesses that a single stage can perform; Vulkan forbids masks that name any other.
     pub(crate) fn possible_access(self) -> Access {
@@ -94,10 +100,12 @@ impl Stages {
             Self::TRANSFER => Access::TRANSFER_READ | Access::TRANSFER_WRITE,
             Self::DRAW_INDIRECT => Access::INDIRECT_READ,
             Self::VERTEX_INPUT => Access::INDEX_READ | Access::VERTEX_READ,
-            Self::PRE_RASTER | Self::FRAGMENT | Self::COMPUTE | Self::RAY_TRACING => SHADER,
+            Self::PRE_RASTER | Self::COMPUTE | Self::RAY_TRACING => SHADER,
+            Self::FRAGMENT => SHADER | Access::INPUT_READ,
             Self::DEPTH => Access::DEPTH_READ | Access::DEPTH_WRITE,
             Self::COLOR => Access::COLOR_READ | Access::COLOR_WRITE,
             Self::ACCEL_BUILD => ACCEL,
+            Self::SHADING_RATE => Access::SHADING_RATE_READ,
             _ => Access::empty(),
         }
     }
@@ -126,6 +134,14 @@ pub(crate) enum Layout {
     TransferSrc,
     /// Destination of a copy, blit or clear.
     TransferDst,
+    /// With the presentation engine.
+    Present,
+    /// Attachment that fragment shaders of the same pass read.
+    LocalRead,
+    /// Depth or depth-stencil attachment that is only tested, and may be sampled meanwhile.
+    DepthRead,
+    /// Shading rates of a pass.
+    ShadingRate,
 }
 
 /// One way in which a command touches a resource.
@@ -232,7 +248,8 @@ impl Use {
             | Stages::DRAW_INDIRECT
             | Stages::VERTEX_INPUT
             | Stages::ACCEL_BUILD;
-        let attachments = Access::COLOR_READ | Access::DEPTH_READ;
+        let attachments =
+            Access::COLOR_READ | Access::DEPTH_READ | Access::INPUT_READ | Access::SHADING_RATE_READ;
         Self::new(stages, !Access::WRITES - attachments - Access::HOST_READ, Layout::Undefined)
     }
 
@@ -255,6 +272,40 @@ impl Use {
             _ => return None,
         };
         Some(Self { stages: self.stages | other.stages, access: self.access | other.access, layout })
+    }
+}
+
+/// Uses by render passes beyond plain targets, and by windows.
+#[allow(dead_code, reason = "each waits for the command that makes it")]
+impl Use {
+    /// Depth attachment that is tested and not written. Merges with a sampled image in the same layout.
+    pub(crate) const fn depth_read() -> Self {
+        Self::new(Stages::DEPTH, Access::DEPTH_READ, Layout::DepthRead)
+    }
+
+    /// Attachment that fragment shaders of the same pass read; merges with a target in the same layout.
+    pub(crate) const fn local_read() -> Self {
+        Self::new(Stages::FRAGMENT, Access::INPUT_READ, Layout::LocalRead)
+    }
+
+    /// Multisampled target, of depth too, that is resolved at the end of its pass; merges with the target.
+    pub(crate) const fn resolve_source() -> Self {
+        Self::new(Stages::COLOR, Access::COLOR_READ, Layout::Undefined)
+    }
+
+    /// What a colour target is resolved to. Vulkan resolves depth in the same stage, in [`Layout::DepthTarget`].
+    pub(crate) const fn resolve_target() -> Self {
+        Self::new(Stages::COLOR, Access::COLOR_WRITE, Layout::ColorTarget)
+    }
+
+    /// Attachment that a pass takes its shading rates from.
+    pub(crate) const fn shading_rate() -> Self {
+        Self::new(Stages::SHADING_RATE, Access::SHADING_RATE_READ, Layout::ShadingRate)
+    }
+
+    /// Goes to the presentation engine, which waits by a semaphore.
+    pub(crate) const fn present() -> Self {
+        Self::new(Stages::empty(), Access::empty(), Layout::Present)
     }
 }
 
@@ -329,6 +380,12 @@ mod tests {
             Use::accel_read(Stages::SHADERS | Stages::ACCEL_BUILD),
             Use::host_read(),
             Use::everything_read(),
+            Use::depth_read(),
+            Use::local_read(),
+            Use::resolve_source(),
+            Use::resolve_target(),
+            Use::shading_rate(),
+            Use::present(),
         ];
         for touch in uses {
             let table = StageAccess::from(touch);
@@ -348,6 +405,23 @@ mod tests {
     fn reads_of_two_stages_merge() {
         let both = Use::shader_read(Stages::FRAGMENT).merge(Use::shader_read(Stages::COMPUTE)).unwrap();
         assert_eq!(both, Use::shader_read(Stages::FRAGMENT | Stages::COMPUTE));
+    }
+
+    #[test]
+    fn attachments_merge_with_what_their_own_pass_does_with_them() {
+        let sampled = Use::shader_read(Stages::FRAGMENT).with_layout(Layout::DepthRead);
+        let tested = Use::depth_read().merge(sampled).unwrap();
+        assert_eq!(StageAccess::from(tested).at(Stages::DEPTH), Access::DEPTH_READ);
+        assert_eq!(StageAccess::from(tested).at(Stages::FRAGMENT), Access::SHADER_READ);
+        assert!(!tested.is_write());
+        let target = Use::color_target(true).with_layout(Layout::LocalRead);
+        let local = StageAccess::from(target.merge(Use::local_read()).unwrap());
+        assert_eq!(local.at(Stages::COLOR), Access::COLOR_READ | Access::COLOR_WRITE);
+        assert_eq!(local.at(Stages::FRAGMENT), Access::INPUT_READ);
+        let resolved = Use::depth_target().merge(Use::resolve_source()).unwrap();
+        assert_eq!(resolved.layout, Layout::DepthTarget);
+        assert_eq!(StageAccess::from(resolved).at(Stages::COLOR), Access::COLOR_READ);
+        assert_eq!(Use::color_target(true).merge(Use::local_read()), None);
     }
 
     #[test]

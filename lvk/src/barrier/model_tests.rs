@@ -166,6 +166,11 @@ fn texture_use() -> impl Strategy<Value = Use> {
         stages_of_shaders().prop_map(|stages| Use::shader_read(stages).with_layout(Layout::General)),
         any::<bool>().prop_map(Use::color_target),
         Just(Use::depth_target()),
+        Just(Use::depth_target().merge(Use::resolve_source()).unwrap()),
+        Just(Use::depth_read()),
+        Just(Use::color_target(true).with_layout(Layout::LocalRead).merge(Use::local_read()).unwrap()),
+        Just(Use::resolve_target()),
+        Just(Use::shading_rate()),
     ]
 }
 

@@ -85,11 +85,12 @@ const STAGES: [vk::PipelineStageFlags2; Stages::COUNT] = {
         Raw::COMPUTE_SHADER,
         Raw::RAY_TRACING_SHADER_KHR,
         Raw::ACCELERATION_STRUCTURE_BUILD_KHR,
+        Raw::FRAGMENT_SHADING_RATE_ATTACHMENT_KHR,
     ]
 };
 
 /// Accesses by their Vulkan names, in the order of their bits.
-const ACCESSES: [vk::AccessFlags2; 15] = {
+const ACCESSES: [vk::AccessFlags2; 17] = {
     use vk::AccessFlags2 as Raw;
     [
         Raw::INDIRECT_COMMAND_READ,
@@ -107,6 +108,8 @@ const ACCESSES: [vk::AccessFlags2; 15] = {
         Raw::ACCELERATION_STRUCTURE_WRITE_KHR,
         Raw::HOST_READ,
         Raw::HOST_WRITE,
+        Raw::INPUT_ATTACHMENT_READ,
+        Raw::FRAGMENT_SHADING_RATE_ATTACHMENT_READ_KHR,
     ]
 };
 
@@ -115,7 +118,7 @@ fn stages(gpu: &Gpu, stages: Stages) -> vk::PipelineStageFlags2 {
     let mut off = Stages::empty();
     off.set(Stages::RAY_TRACING, gpu.ray_tracing.is_none());
     off.set(Stages::ACCEL_BUILD, gpu.accel.is_none());
-    let all = set_bits((stages - off).bits(), &STAGES);
+    let all = set_bits((stages - off).bits().into(), &STAGES);
     all.fold(vk::PipelineStageFlags2::NONE, |all, raw| all | raw)
 }
 
@@ -128,7 +131,7 @@ fn access(gpu: &Gpu, access: Access) -> vk::AccessFlags2 {
 }
 
 /// What the table has for each bit that is set: mostly one or two.
-fn set_bits<T: Copy>(bits: u16, table: &[T]) -> impl Iterator<Item = T> {
+fn set_bits<T: Copy>(bits: u32, table: &[T]) -> impl Iterator<Item = T> {
     let mut left = bits;
     std::iter::from_fn(move || {
         let place = left.trailing_zeros() as usize;
@@ -147,6 +150,10 @@ pub(crate) fn layout(layout: Layout) -> vk::ImageLayout {
         Layout::DepthTarget => vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
         Layout::TransferSrc => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
         Layout::TransferDst => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+        Layout::Present => vk::ImageLayout::PRESENT_SRC_KHR,
+        Layout::LocalRead => vk::ImageLayout::RENDERING_LOCAL_READ_KHR,
+        Layout::DepthRead => vk::ImageLayout::DEPTH_STENCIL_READ_ONLY_OPTIMAL,
+        Layout::ShadingRate => vk::ImageLayout::FRAGMENT_SHADING_RATE_ATTACHMENT_OPTIMAL_KHR,
     }
 }
 
@@ -159,7 +166,7 @@ mod tests {
         use vk::{AccessFlags2, PipelineStageFlags2};
         assert_eq!(Stages::all().bits(), (1 << STAGES.len()) - 1);
         assert_eq!(Access::all().bits(), (1 << ACCESSES.len()) - 1);
-        let stage = |stages: Stages| set_bits(stages.bits(), &STAGES).collect::<Vec<_>>();
+        let stage = |stages: Stages| set_bits(stages.bits().into(), &STAGES).collect::<Vec<_>>();
         assert_eq!(
             stage(Stages::COMPUTE | Stages::HOST),
             [PipelineStageFlags2::HOST, PipelineStageFlags2::COMPUTE_SHADER]
@@ -171,6 +178,9 @@ mod tests {
         assert_eq!(access(Access::DEPTH_WRITE), [AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE]);
         assert_eq!(access(Access::ACCEL_READ), [AccessFlags2::ACCELERATION_STRUCTURE_READ_KHR]);
         assert_eq!(access(Access::HOST_WRITE), [AccessFlags2::HOST_WRITE]);
+        assert_eq!(access(Access::INPUT_READ), [AccessFlags2::INPUT_ATTACHMENT_READ]);
+        let rates = AccessFlags2::FRAGMENT_SHADING_RATE_ATTACHMENT_READ_KHR;
+        assert_eq!(access(Access::SHADING_RATE_READ), [rates]);
         assert!(access(Access::empty()).is_empty());
     }
 }
