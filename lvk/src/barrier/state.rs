@@ -72,6 +72,11 @@ impl State {
         Self { layout, ..Self::default() }
     }
 
+    /// Image that the presentation engine has let go of: contents are unknown, and a semaphore is waited for at `stages`.
+    pub(crate) fn acquired(stages: Stages) -> Self {
+        Self { write: Scope::waiting(stages), ..Self::default() }
+    }
+
     /// Layout after the last use.
     pub(crate) fn layout(&self) -> Layout {
         self.layout

@@ -1,10 +1,10 @@
 //! What the queue will have done to every resource, and the barriers between it and the next command buffer.
 
-use super::access::{Layout, StageAccess, Use};
+use super::access::{Layout, StageAccess, Stages, Use};
 use super::batch::Barriers;
 use super::resource_id::{IdMap, ResourceId};
 use super::state::{Scopes, State, accumulate, transition};
-use super::subresource::{Cells, Subresources};
+use super::subresource::{Cells, Subresources, TextureShape};
 use super::tracker::{Local, Prefix, Tracker};
 
 /// State of every resource after everything submitted to one queue so far.
@@ -39,6 +39,12 @@ impl States {
             }
         }
         out
+    }
+
+    /// An image comes from the presentation engine. The next submission waits for its semaphore at `stages`, so that the
+    /// first barrier has to start there.
+    pub(crate) fn acquired(&mut self, id: ResourceId, shape: TextureShape, stages: Stages) {
+        self.textures.insert(id, Cells::new(shape, State::acquired(stages)));
     }
 
     /// Drops what is known about a destroyed resource.

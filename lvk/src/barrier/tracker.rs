@@ -1,6 +1,6 @@
 //! Barriers inside one command buffer, recorded without knowing what the queue did before.
 
-use super::access::{Layout, StageAccess, Use};
+use super::access::{Layout, StageAccess, Stages, Use};
 use super::batch::Barriers;
 use super::resource_id::{IdMap, ResourceId};
 use super::state::{Scopes, State, accumulate, transition};
@@ -20,6 +20,16 @@ pub(super) enum Prefix {
     Write(Use),
     /// Writes that do not wait for each other.
     Accumulated(StageAccess),
+}
+
+impl Prefix {
+    fn stages(&self) -> Stages {
+        match self {
+            Self::Unused => Stages::empty(),
+            Self::Reads(_, table) | Self::Accumulated(table) => table.stages(),
+            Self::Write(first) => first.stages,
+        }
+    }
 }
 
 /// One (sub)resource inside one command buffer.
@@ -171,6 +181,11 @@ impl Tracker {
     ) -> bool {
         let next = with_some_layout(next);
         self.textures.get(id).is_some_and(|cells| cells.any(subresources, |local| would_wait(local, next)))
+    }
+
+    /// Stages of the first uses of a texture that is used alike in all its parts; `None` where it is not used.
+    pub(crate) fn first_stages(&self, id: ResourceId) -> Option<Stages> {
+        self.textures.get(id)?.uniform().map(|local| local.prefix.stages())
     }
 
     /// Buffers in the order of their first use.

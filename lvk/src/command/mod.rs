@@ -143,6 +143,11 @@ impl CommandBuffer {
         Arc::ptr_eq(&self.shared, shared)
     }
 
+    /// Fails where images of a swapchain are used that the presentation engine has.
+    pub(crate) fn check_images(&self) -> Result<()> {
+        self.shared.submitter.check(&self.recording.tracker)
+    }
+
     /// Ends the recording. Answers also what becomes true once it is submitted.
     pub(crate) fn finish(mut self) -> (Recording, Outcome) {
         self.pop_labels(0);

@@ -27,6 +27,7 @@ impl Context {
         let mut pending = self.pending();
         cmd.check_tlas_updates()?;
         cmd.check_queries()?;
+        cmd.check_images()?;
         if !self.shared().freed_tlas().is_empty() {
             self.open(&mut pending)?;
         }
@@ -36,7 +37,7 @@ impl Context {
     fn send(&self, commands: impl Iterator<Item = CommandBuffer>) -> Result<SubmitHandle> {
         let (recordings, mut outcomes): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
         let shared = self.shared();
-        let value = shared.submitter.submit(recordings, || shared.bindless.flush())?;
+        let value = shared.submitter.submit(recordings.into(), || shared.bindless.flush())?;
         let scopes = outcomes.iter_mut().filter_map(|outcome| outcome.scopes.take());
         shared.profiler.submit(value, scopes.map(|scopes| *scopes).collect());
         outcomes.into_iter().for_each(|outcome| outcome.submit(shared, value));

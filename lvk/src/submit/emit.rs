@@ -114,7 +114,7 @@ const ACCESSES: [vk::AccessFlags2; 17] = {
 };
 
 /// Stages by their Vulkan names, without those whose feature is off.
-fn stages(gpu: &Gpu, stages: Stages) -> vk::PipelineStageFlags2 {
+pub(super) fn stages(gpu: &Gpu, stages: Stages) -> vk::PipelineStageFlags2 {
     let mut off = Stages::empty();
     off.set(Stages::RAY_TRACING, gpu.ray_tracing.is_none());
     off.set(Stages::ACCEL_BUILD, gpu.accel.is_none());

@@ -3,6 +3,8 @@
 pub(crate) mod command_ring;
 pub(crate) mod deferred;
 pub(crate) mod emit;
+#[allow(dead_code, reason = "swapchains come next")]
+pub(crate) mod presentable;
 pub(crate) mod profiler;
 pub(crate) mod queue;
 pub(crate) mod scope_tree;

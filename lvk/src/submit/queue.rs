@@ -6,7 +6,8 @@ use ash::vk;
 
 use super::command_ring::{CommandRing, CommandSlot};
 use super::deferred::Deferred;
-use super::emit::{Images, emit};
+use super::emit::{Images, emit, stages};
+use super::presentable::Presentables;
 use super::timeline::Timeline;
 use crate::barrier::{Barriers, ResourceId, States, Tracker};
 use crate::error::{Error, Result};
@@ -22,6 +23,24 @@ pub(crate) struct Recording {
     slot: CommandSlot,
 }
 
+/// What goes to the queue at once: one value of the timeline.
+#[derive(Default)]
+pub(crate) struct Submission {
+    /// In their order.
+    pub(crate) recordings: Vec<Recording>,
+    /// What the first of them waits for, besides images that the presentation engine still has.
+    pub(crate) waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
+    /// What is signalled when all of them are done, besides the timeline.
+    pub(crate) signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
+}
+
+/// Command buffers that begin together, once all that they wait for is there.
+#[derive(Default)]
+struct Batch {
+    waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
+    commands: Vec<vk::CommandBufferSubmitInfo<'static>>,
+}
+
 /// The queue with everything that changes when something is submitted. `T` is what is destroyed later.
 pub(crate) struct Submitter<T> {
     pub(crate) timeline: Timeline,
@@ -33,6 +52,7 @@ struct Inner<T> {
     /// Trackers of command buffers that were submitted, emptied for the next ones.
     spare: Vec<(Tracker, Images)>,
     states: States,
+    presentables: Presentables,
     ring: CommandRing,
     deferred: Deferred<T>,
     submitted: u64,
@@ -53,6 +73,7 @@ impl<T> Submitter<T> {
         let inner = Inner {
             spare: Vec::new(),
             states: States::default(),
+            presentables: Presentables::default(),
             ring: CommandRing::default(),
             deferred: Deferred::default(),
             submitted: 0,
@@ -82,26 +103,33 @@ impl<T> Submitter<T> {
         self.lock().ring.discard(&self.gpu, recording.sequence, recording.slot);
     }
 
+    /// Fails where a command buffer uses an image of a swapchain that the application does not have. That is to be known
+    /// before anything is submitted, as a failed submission breaks the queue.
+    pub(crate) fn check(&self, tracker: &Tracker) -> Result<()> {
+        self.lock().presentables.check(tracker)
+    }
+
     /// Submits command buffers in order. `prepare` runs under the lock, right before.
-    pub(crate) fn submit(&self, recordings: Vec<Recording>, prepare: impl FnOnce()) -> Result<u64> {
-        let mut inner = self.lock();
+    pub(crate) fn submit(&self, submission: Submission, prepare: impl FnOnce()) -> Result<u64> {
+        let mut guard = self.lock();
+        let inner = &mut *guard;
         let value = inner.submitted + 1;
         let sent = match inner.broken.clone() {
             Some(error) => Err(error),
-            None => self.finish(&mut inner.states, &recordings).and_then(|raw| {
+            None => self.finish(inner, submission.waits, &submission.recordings).and_then(|batches| {
                 prepare();
-                self.send(&raw, value)
+                self.send(&batches, submission.signals, value)
             }),
         };
         if let Err(error) = sent {
             inner.broken = Some(error.clone());
-            for recording in recordings {
+            for recording in submission.recordings {
                 inner.ring.discard(&self.gpu, recording.sequence, recording.slot);
             }
             return Err(error);
         }
         inner.submitted = value;
-        for mut recording in recordings {
+        for mut recording in submission.recordings {
             inner.ring.submitted(recording.sequence, recording.slot, value);
             recording.tracker.clear();
             recording.images.clear();
@@ -110,35 +138,56 @@ impl<T> Submitter<T> {
         Ok(value)
     }
 
-    /// Ends the command buffers and puts the barriers from the queue's state in front of each.
-    fn finish(&self, states: &mut States, recordings: &[Recording]) -> Result<Vec<vk::CommandBuffer>> {
-        let mut raw = Vec::with_capacity(recordings.len() * 2);
+    /// Ends the command buffers and puts the barriers from the queue's state in front of each. A new batch begins where
+    /// an image is waited for, so that what comes before need not wait.
+    fn finish(
+        &self,
+        inner: &mut Inner<T>,
+        waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
+        recordings: &[Recording],
+    ) -> Result<Vec<Batch>> {
+        let mut batches = Vec::new();
+        let mut batch = Batch { waits, ..Batch::default() };
         for recording in recordings {
             end(&self.gpu, recording.commands)?;
-            let barriers: Barriers = states.submit(&recording.tracker);
+            let images = inner.presentables.take_waits(&recording.tracker, &mut inner.states);
+            if !images.is_empty() && !batch.commands.is_empty() {
+                batches.push(std::mem::take(&mut batch));
+            }
+            batch.waits.extend(images.iter().map(|wait| {
+                vk::SemaphoreSubmitInfo::default()
+                    .semaphore(wait.semaphore)
+                    .stage_mask(stages(&self.gpu, wait.stages))
+            }));
+            let barriers: Barriers = inner.states.submit(&recording.tracker);
             if !barriers.is_empty() {
                 begin(&self.gpu, recording.slot.prologue)?;
                 emit(&self.gpu, recording.slot.prologue, &barriers, &recording.images);
                 end(&self.gpu, recording.slot.prologue)?;
-                raw.push(recording.slot.prologue);
+                batch.push(recording.slot.prologue);
             }
-            raw.push(recording.commands);
+            batch.push(recording.commands);
         }
-        Ok(raw)
+        batches.push(batch);
+        Ok(batches)
     }
 
-    fn send(&self, raw: &[vk::CommandBuffer], value: u64) -> Result<()> {
-        let commands: Vec<_> =
-            raw.iter().map(|raw| vk::CommandBufferSubmitInfo::default().command_buffer(*raw)).collect();
-        let signal = [vk::SemaphoreSubmitInfo::default()
-            .semaphore(self.timeline.raw)
-            .value(value)
-            .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
-        let submit =
-            vk::SubmitInfo2::default().command_buffer_infos(&commands).signal_semaphore_infos(&signal);
+    /// The last batch signals.
+    fn send(
+        &self,
+        batches: &[Batch],
+        mut signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
+        value: u64,
+    ) -> Result<()> {
+        let timeline = vk::SemaphoreSubmitInfo::default().semaphore(self.timeline.raw).value(value);
+        signals.push(timeline.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS));
+        let mut submits: Vec<_> = batches.iter().map(Batch::info).collect();
+        if let Some(last) = submits.last_mut() {
+            *last = last.signal_semaphore_infos(&signals);
+        }
         let queue = self.gpu.queue();
         // SAFETY: the command buffers are complete and used once; the queue is locked.
-        unsafe { self.gpu.device.queue_submit2(*queue, &[submit], vk::Fence::null()) }
+        unsafe { self.gpu.device.queue_submit2(*queue, &submits, vk::Fence::null()) }
             .map_err(Error::vulkan("vkQueueSubmit2"))
     }
 
@@ -165,9 +214,17 @@ impl<T> Submitter<T> {
         Ok(Finished { sequences, garbage })
     }
 
+    /// Changes who has the images of swapchains.
+    #[allow(dead_code, reason = "swapchains come next")]
+    pub(crate) fn with_presentables<R>(&self, change: impl FnOnce(&mut Presentables) -> R) -> R {
+        change(&mut self.lock().presentables)
+    }
+
     /// Forgets the state of a destroyed resource.
     pub(crate) fn forget(&self, id: ResourceId) {
-        self.lock().states.forget(id);
+        let mut inner = self.lock();
+        inner.states.forget(id);
+        inner.presentables.forget(id);
     }
 
     /// Takes everything out that waits for destruction. The GPU is idle.
@@ -179,6 +236,22 @@ impl<T> Submitter<T> {
 
     fn lock(&self) -> MutexGuard<'_, Inner<T>> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Batch {
+    fn push(&mut self, raw: vk::CommandBuffer) {
+        self.commands.push(vk::CommandBufferSubmitInfo::default().command_buffer(raw));
+    }
+
+    fn info(&self) -> vk::SubmitInfo2<'_> {
+        vk::SubmitInfo2::default().wait_semaphore_infos(&self.waits).command_buffer_infos(&self.commands)
+    }
+}
+
+impl From<Vec<Recording>> for Submission {
+    fn from(recordings: Vec<Recording>) -> Self {
+        Self { recordings, ..Self::default() }
     }
 }
 

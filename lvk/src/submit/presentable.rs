@@ -1,0 +1,179 @@
+//! Which images of swapchains the presentation engine has, and which submission waits until it has let go of one.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use crate::barrier::{IdMap, ResourceId, Stages, States, TextureShape, Tracker};
+use crate::error::{Error, Result};
+
+/// Every image of a swapchain, until its texture is gone.
+#[derive(Debug, Default)]
+pub(crate) struct Presentables(IdMap<Presentable>);
+
+#[derive(Debug)]
+struct Presentable {
+    name: Arc<str>,
+    held: Held,
+}
+
+/// Who has an image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Held {
+    /// The presentation engine.
+    Engine,
+    /// The application. The semaphore is signalled when the engine has really let go; the first submission that uses the
+    /// image waits for it, and takes it out.
+    Application(Option<vk::Semaphore>),
+    /// Nobody any more: the swapchain was made anew.
+    Retired,
+}
+
+/// The first submission that uses an acquired image waits at these stages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct AcquireWait {
+    pub(crate) semaphore: vk::Semaphore,
+    pub(crate) stages: Stages,
+}
+
+impl Presentables {
+    /// A new image, which the engine has.
+    pub(crate) fn insert(&mut self, id: ResourceId, name: &Arc<str>) {
+        self.0.insert(id, Presentable { name: Arc::clone(name), held: Held::Engine });
+    }
+
+    /// The engine gives an image away and signals `semaphore` once it is done with it.
+    pub(crate) fn acquire(&mut self, id: ResourceId, semaphore: vk::Semaphore) {
+        self.hold(id, Held::Application(Some(semaphore)));
+    }
+
+    /// The image went back to the engine.
+    pub(crate) fn present(&mut self, id: ResourceId) {
+        self.hold(id, Held::Engine);
+    }
+
+    /// Nothing may use the image any more. Answers the semaphore that nobody has waited for.
+    pub(crate) fn retire(&mut self, id: ResourceId) -> Option<vk::Semaphore> {
+        match self.hold(id, Held::Retired) {
+            Some(Held::Application(unwaited)) => unwaited,
+            _ => None,
+        }
+    }
+
+    /// The image is destroyed.
+    pub(crate) fn forget(&mut self, id: ResourceId) {
+        self.0.remove(&id);
+    }
+
+    /// Fails where a command buffer uses an image that the application does not have.
+    pub(crate) fn check(&self, tracker: &Tracker) -> Result<()> {
+        for (id, image) in &self.0 {
+            if tracker.first_stages(*id).is_none() {
+                continue;
+            }
+            let message = match image.held {
+                Held::Application(_) => continue,
+                Held::Engine => {
+                    "its image is with the presentation engine; use it between next_image and present"
+                }
+                Held::Retired => {
+                    "the swapchain was made anew since the image was taken; take one with next_image again"
+                }
+            };
+            return Err(Error::usage(&*image.name, message));
+        }
+        Ok(())
+    }
+
+    /// Takes out the waits for images that `tracker` is the first to use. Their contents are undefined from then on.
+    pub(crate) fn take_waits(&mut self, tracker: &Tracker, states: &mut States) -> Vec<AcquireWait> {
+        let mut waits = Vec::new();
+        for (id, image) in &mut self.0 {
+            let Held::Application(pending) = &mut image.held else { continue };
+            let Some(first) = tracker.first_stages(*id) else { continue };
+            let Some(semaphore) = pending.take() else { continue };
+            // A command buffer that only presents has no stage of its own.
+            let stages = if first.is_empty() { Stages::COLOR } else { first };
+            states.acquired(*id, TextureShape { mips: 1, layers: 1 }, stages);
+            waits.push(AcquireWait { semaphore, stages });
+        }
+        waits
+    }
+
+    fn hold(&mut self, id: ResourceId, held: Held) -> Option<Held> {
+        self.0.get_mut(&id).map(|image| std::mem::replace(&mut image.held, held))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ash::vk::Handle;
+
+    use super::*;
+    use crate::barrier::{Barriers, Layout, Use};
+
+    const ONE: TextureShape = TextureShape { mips: 1, layers: 1 };
+
+    fn tracker(id: ResourceId, uses: &[Use]) -> Tracker {
+        let mut tracker = Tracker::default();
+        uses.iter()
+            .for_each(|next| tracker.use_texture(id, ONE, ONE.whole(), *next, &mut Barriers::default()));
+        tracker
+    }
+
+    fn presentables(id: ResourceId) -> Presentables {
+        let mut images = Presentables::default();
+        images.insert(id, &Arc::from("window"));
+        images
+    }
+
+    #[test]
+    fn an_image_can_be_used_only_between_acquisition_and_presentation() {
+        let (id, semaphore) = (ResourceId(1), vk::Semaphore::from_raw(7));
+        let drawing = tracker(id, &[Use::color_target(false), Use::present()]);
+        let mut images = presentables(id);
+        let refusal = |images: &Presentables| images.check(&drawing).unwrap_err().to_string();
+        assert!(refusal(&images).contains("presentation engine"));
+        images.acquire(id, semaphore);
+        images.check(&drawing).unwrap();
+        images.present(id);
+        assert!(refusal(&images).contains("presentation engine"));
+        assert_eq!(images.retire(id), None);
+        assert!(refusal(&images).contains("made anew"));
+        images.check(&tracker(ResourceId(2), &[Use::color_target(false)])).unwrap();
+        images.forget(id);
+        images.check(&drawing).unwrap();
+    }
+
+    #[test]
+    fn only_the_first_user_waits_and_its_barrier_chains_with_the_wait() {
+        let (id, semaphore) = (ResourceId(1), vk::Semaphore::from_raw(7));
+        let (mut images, mut states) = (presentables(id), States::default());
+        for (first, stages) in [
+            (Use::color_target(false), Stages::COLOR),
+            (Use::transfer_write(), Stages::TRANSFER),
+            (Use::present(), Stages::COLOR),
+        ] {
+            images.acquire(id, semaphore);
+            let frame = tracker(id, &[first, Use::present()]);
+            assert_eq!(images.take_waits(&frame, &mut states), [AcquireWait { semaphore, stages }]);
+            let barrier = states.submit(&frame).images[0].scopes;
+            assert_eq!((barrier.src_stages, barrier.old_layout), (stages, Layout::Undefined));
+            assert_eq!(images.take_waits(&frame, &mut states), []);
+            images.present(id);
+        }
+    }
+
+    #[test]
+    fn a_retired_image_leaves_the_semaphore_that_nobody_waited_for() {
+        let (id, semaphore) = (ResourceId(1), vk::Semaphore::from_raw(7));
+        let mut images = presentables(id);
+        images.acquire(id, semaphore);
+        assert_eq!(images.retire(id), Some(semaphore));
+        assert_eq!(images.retire(id), None);
+        let mut images = presentables(id);
+        images.acquire(id, semaphore);
+        images.take_waits(&tracker(id, &[Use::color_target(false)]), &mut States::default());
+        assert_eq!(images.retire(id), None);
+    }
+}
