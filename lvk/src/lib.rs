@@ -136,8 +136,10 @@ pub use format::{Format, IndexFormat, VertexFormat};
 pub use gpu::caps::{Capabilities, FeatureRequest, Limits};
 pub use gpu::clock::ClockPair;
 pub use gpu::debug::{Validation, ValidationMessage, ValidationSink};
+pub use gpu::extra::ExtraExtensions;
 pub use gpu::memory::MemoryKind;
 pub use gpu::mesh_limits::MeshLimits;
+pub use gpu::optional::{FeatureSet, OptionalFeature};
 pub use gpu::profile::DeviceProfile;
 pub use gpu::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use handle::{

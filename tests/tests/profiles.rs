@@ -5,10 +5,14 @@ use std::ffi::CStr;
 
 use lvk::ash::{self, vk};
 use lvk::{
-    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Capabilities, Context, ContextDesc, DeviceProfile,
-    Error, FeatureRequest, Holder, RayQueryRequest, TlasDesc, Triangles,
+    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Capabilities, ColorAttachment, Context, ContextDesc,
+    Dependencies, DeviceProfile, Error, ExtraExtensions, FeatureRequest, FeatureSet, Format, Holder,
+    OptionalFeature, RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc, ShaderSource,
+    ShaderStage, TlasDesc, Triangles,
 };
+use lvk_tests::compute::Evaluator;
 use lvk_tests::device::vulkan;
+use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, target};
 use lvk_tests::{TestDevice, device, device_with};
 
 fn under(profile: &DeviceProfile) -> Option<TestDevice> {
@@ -196,4 +200,174 @@ fn limits_of_mesh_shaders_are_there_with_them_only() {
     let draw: vk::PFN_vkVoidFunction =
         unsafe { ctx.raw_instance().get_device_proc_addr(device, c"vkCmdDrawMeshTasksEXT".as_ptr()) };
     assert!(draw.is_none(), "{name:?}");
+}
+
+#[test]
+fn optional_features_are_those_of_the_device() {
+    let Some(ctx) = device() else { return };
+    let has = |ctx: &Context, name: &CStr| {
+        let device = ctx.raw_device().handle();
+        // SAFETY: the device is alive.
+        unsafe { ctx.raw_instance().get_device_proc_addr(device, name.as_ptr()) }.is_some()
+    };
+    for (feature, command) in [
+        (OptionalFeature::LocalRead, c"vkCmdSetRenderingInputAttachmentIndicesKHR"),
+        (OptionalFeature::PipelineShadingRate, c"vkCmdSetFragmentShadingRateKHR"),
+        (OptionalFeature::HostImageCopy, c"vkCopyMemoryToImageEXT"),
+        (OptionalFeature::DeviceFault, c"vkGetDeviceFaultInfoEXT"),
+        (OptionalFeature::CalibratedTimestamps, c"vkGetCalibratedTimestampsEXT"),
+    ] {
+        let there = ctx.capabilities().has(feature);
+        assert!(!has(&ctx, command) || there, "{feature:?}");
+        assert!(
+            has(&ctx, command) || !there || feature == OptionalFeature::CalibratedTimestamps,
+            "{feature:?}"
+        );
+        let hidden = FeatureSet::NONE.with(feature);
+        let profile = DeviceProfile { hidden, ..DeviceProfile::default() };
+        let Some(ctx) = under(&profile) else { return };
+        assert!(!ctx.capabilities().has(feature) && !has(&ctx, command), "{feature:?}");
+    }
+    assert!(!ctx.capabilities().has(OptionalFeature::Swapchain), "no window was asked for");
+}
+
+/// The whole path of a small program, with nothing optional.
+#[test]
+fn core_only_devices_draw_and_compute() {
+    let Some(ctx) = under(&DeviceProfile::core_only()) else { return };
+    let caps = ctx.capabilities();
+    assert_eq!(caps.optional, FeatureSet::NONE);
+    assert!(!(caps.cube_arrays || caps.multi_draw_indirect || caps.shader_int64 || caps.mesh_shader));
+    assert!((caps.max_anisotropy - 1.0).abs() < f32::EPSILON);
+    let drawn = target(&ctx, Format::Rgba8Unorm, [4, 4]);
+    let desc = RenderPipelineDesc { color: &[Format::Rgba8Unorm.into()], ..Default::default() };
+    let pipeline = render_pipeline(&ctx, COVER, PAINT, &desc);
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
+    let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
+    pass.bind_render_pipeline(*pipeline).unwrap();
+    pass.push_constants(&[0.0, 1.0, 0.0, 1.0, 0.5_f32]).unwrap();
+    pass.draw(0..3, 0..1).unwrap();
+    drop(pass);
+    ctx.submit(cmd).unwrap();
+    assert_eq!(pixels::<[u8; 4]>(&ctx, *drawn), [[0, 255, 0, 255]; 16]);
+    let sampler = ctx.create_sampler(&Default::default()).unwrap();
+    let sample = Evaluator::new(&ctx, "textureBindless2D(a, b, vec2(0.5)) * float(i + 1)");
+    let reads = Dependencies { sampled_images: &[*drawn], ..Default::default() };
+    let found = sample.run(&ctx, [drawn.index(), sampler.index(), 0], 2, &reads);
+    assert_eq!(found, [[0.0, 1.0, 0.0, 1.0], [0.0, 2.0, 0.0, 2.0]]);
+}
+
+/// A shader that needs a hidden feature is refused by its name.
+#[test]
+fn a_hidden_feature_refuses_its_shaders() {
+    let source = "layout(local_size_x = 1) in; layout(push_constant) uniform P { uint a; };
+        void main() { if (uint64_t(a) * 5 == 5) { memoryBarrier(); } }";
+    let module = |ctx: &Context| {
+        ctx.create_shader_module(&ShaderModuleDesc {
+            stage: ShaderStage::Compute,
+            source: ShaderSource::Glsl(source),
+            debug_name: "wide",
+            ..Default::default()
+        })
+    };
+    let Some(real) = device() else { return };
+    assert_eq!(module(&real).is_ok(), real.capabilities().has(OptionalFeature::Int64));
+    let hidden = FeatureSet::NONE.with(OptionalFeature::Int64);
+    let Some(ctx) = under(&DeviceProfile { hidden, ..DeviceProfile::default() }) else { return };
+    match module(&ctx) {
+        Err(error @ Error::Unsupported { .. }) => {
+            let text = error.to_string();
+            assert!(text.contains("'wide'") && text.contains("shaderInt64"), "{text}");
+        }
+        other => unreachable!("{:?}", other.map(drop)),
+    }
+}
+
+#[test]
+fn required_features_choose_the_device() {
+    let Some(real) = device() else { return };
+    let name = real.capabilities().device_name.clone();
+    let hidden = FeatureSet::NONE.with(OptionalFeature::ClipDistance);
+    let profile = DeviceProfile { name: "no clipping".into(), hidden, ..DeviceProfile::default() };
+    let start = |profile, required: &[OptionalFeature]| {
+        let desc = ContextDesc {
+            vulkan_library: vulkan().flatten(),
+            device: Some(&name),
+            profile,
+            required_features: required,
+            ..Default::default()
+        };
+        Context::new(&desc)
+    };
+    assert!(start(None, &[OptionalFeature::ClipDistance]).is_ok());
+    assert!(start(Some(&profile), &[OptionalFeature::DrawParameters]).is_ok());
+    match start(Some(&profile), &[OptionalFeature::DrawParameters, OptionalFeature::ClipDistance]) {
+        Err(Error::NoDevice { reasons }) => {
+            let lack = "lacks shaderClipDistance (hidden by the device profile 'no clipping')";
+            assert!(reasons.contains(&name) && reasons.contains(lack), "{reasons}");
+        }
+        other => unreachable!("{:?}", other.map(drop)),
+    }
+}
+
+/// The extension is on with its features, and its shaders are taken.
+#[test]
+fn extensions_of_the_callers_own_are_on() {
+    let Some(plain) = device() else { return };
+    let source = "
+        #extension GL_ARB_fragment_shader_interlock : require
+        layout(pixel_interlock_ordered) in;
+        layout(location = 0) out vec4 result;
+        void main() {
+            beginInvocationInterlockARB();
+            result = vec4(1.0);
+            endInvocationInterlockARB();
+        }";
+    let module = |ctx: &Context| {
+        ctx.create_shader_module(&ShaderModuleDesc {
+            stage: ShaderStage::Fragment,
+            source: ShaderSource::Glsl(source),
+            ..Default::default()
+        })
+    };
+    let refused = module(&plain).map(drop).unwrap_err().to_string();
+    assert!(refused.contains("FragmentShaderPixelInterlockEXT"), "{refused}");
+    // SAFETY: the physical device belongs to the instance.
+    let there =
+        unsafe { plain.raw_instance().enumerate_device_extension_properties(plain.raw_physical_device()) };
+    let name = ash::ext::fragment_shader_interlock::NAME;
+    if !there.unwrap().iter().any(|found| found.extension_name_as_c_str() == Ok(name)) {
+        eprintln!("NOT TESTED, the device lacks {name:?}");
+        return;
+    }
+    let features =
+        vk::PhysicalDeviceFragmentShaderInterlockFeaturesEXT::default().fragment_shader_pixel_interlock(true);
+    const PIXEL_INTERLOCK: u32 = 5378;
+    let extensions = [name, ash::khr::external_memory_fd::NAME, ash::khr::external_memory_fd::NAME];
+    // SAFETY: the chain is one structure of an extension that the device has, which allows this capability; devices
+    // that have the extension have the feature.
+    let extra = unsafe { ExtraExtensions::new(&[], &extensions, Some(&features), &[PIXEL_INTERLOCK]) };
+    let Some(ctx) = device_with(|desc| desc.extra = extra) else { return };
+    assert!(module(&ctx).is_ok());
+    let device = ctx.raw_device().handle();
+    // SAFETY: the device is alive.
+    let found = unsafe { ctx.raw_instance().get_device_proc_addr(device, c"vkGetMemoryFdKHR".as_ptr()) };
+    assert!(found.is_some());
+}
+
+#[test]
+fn extensions_that_nobody_has_are_named() {
+    let Some(_) = device() else { return };
+    let nowhere = [c"VK_LVK_nowhere"];
+    for (instance, device) in [(true, false), (false, true)] {
+        let list = |on: bool| if on { &nowhere[..] } else { &[] };
+        // SAFETY: there is no chain and there are no capabilities.
+        let extra = unsafe { ExtraExtensions::new(list(instance), list(device), None, &[]) };
+        let desc = ContextDesc { vulkan_library: vulkan().flatten(), extra, ..Default::default() };
+        let error = Context::new(&desc).map(drop).unwrap_err();
+        assert_eq!(matches!(error, Error::Unsupported { .. }), instance, "{error}");
+        assert_eq!(matches!(error, Error::NoDevice { .. }), device, "{error}");
+        assert!(error.to_string().contains("VK_LVK_nowhere"), "{error}");
+    }
 }

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use crate::gpu::caps::FeatureRequest;
 use crate::gpu::debug::{Validation, ValidationSink};
+use crate::gpu::extra::ExtraExtensions;
+use crate::gpu::optional::OptionalFeature;
 use crate::gpu::profile::DeviceProfile;
 use crate::gpu::ray_query_path::RayQueryRequest;
 
@@ -26,6 +28,10 @@ pub struct ContextDesc<'a> {
     /// Ray queries in any shader stage, and who walks their trees; [`Capabilities`](crate::Capabilities) says which it
     /// became and why.
     pub ray_query: RayQueryRequest,
+    /// Optional features that are needed: only devices that have them all are considered.
+    pub required_features: &'a [OptionalFeature],
+    /// Extensions and features of the caller's own; only devices that have the extensions are considered.
+    pub extra: ExtraExtensions<'a>,
     /// Another device to rehearse on this one, also by the requirements above; none for the device as it is.
     pub profile: Option<&'a DeviceProfile>,
     /// Frames the CPU may be ahead of the GPU; see [`Context::next_frame`](crate::Context::next_frame). 1 to 8.
@@ -69,6 +75,8 @@ impl Default for ContextDesc<'_> {
             validation_sink: None,
             ray_tracing_pipeline: FeatureRequest::Optional,
             ray_query: RayQueryRequest::default(),
+            required_features: &[],
+            extra: ExtraExtensions::default(),
             profile: None,
             frames_in_flight: 2,
             staging_bytes: 16 << 20,

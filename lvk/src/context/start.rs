@@ -17,8 +17,8 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::{Capabilities, PhysicalDevice};
 use crate::gpu::debug::{Validation, ValidationSink};
-use crate::gpu::device::RayTracing;
-use crate::gpu::instance::Instance;
+use crate::gpu::device::DeviceRequest;
+use crate::gpu::instance::{Instance, InstanceDesc};
 use crate::kernel::Kernels;
 use crate::pipeline::{PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
@@ -36,14 +36,26 @@ impl Context {
     /// # Errors
     /// [`NoVulkan`](crate::Error::NoVulkan) without a loader or driver; [`NoDevice`](crate::Error::NoDevice) with the
     /// reason for each device when none will do; [`Unsupported`](crate::Error::Unsupported) when validation is wanted
-    /// and its layer is missing.
+    /// and its layer is missing, or the instance has no extension of [`ContextDesc::extra`].
     pub fn new(desc: &ContextDesc<'_>) -> Result<Self> {
         let sink = desc.validation_sink.clone().unwrap_or_default();
-        let instance = Instance::new(desc.application_name, desc.vulkan_library, desc.validation, sink)?;
+        let instance = Instance::new(&InstanceDesc {
+            application_name: desc.application_name,
+            library: desc.vulkan_library,
+            validation: desc.validation,
+            extra: desc.extra.of_instance(),
+            sink,
+        })?;
         let wish = std::env::var("LVK_DEVICE").ok().filter(|wish| !wish.is_empty());
-        let wish = wish.as_deref().or(desc.device);
-        let request = RayTracing { pipeline: desc.ray_tracing_pipeline, query: desc.ray_query };
-        let gpu = Arc::new(Gpu::new(instance, wish, request, desc.profile)?);
+        let request = DeviceRequest {
+            wish: wish.as_deref().or(desc.device),
+            pipeline: desc.ray_tracing_pipeline,
+            query: desc.ray_query,
+            required: desc.required_features,
+            profile: desc.profile,
+            extra: desc.extra,
+        };
+        let gpu = Arc::new(Gpu::new(instance, &request)?);
         let shared = Arc::new(new_shared(gpu, desc)?);
         let inner = Inner {
             pending: Mutex::default(),
@@ -60,7 +72,13 @@ impl Context {
     ///
     /// `vulkan_library` is the loader to open, the system's without one.
     pub fn devices(vulkan_library: Option<&Path>) -> Result<Vec<Capabilities>> {
-        let instance = Instance::new("lvk", vulkan_library, Validation::Off, ValidationSink::default())?;
+        let instance = Instance::new(&InstanceDesc {
+            application_name: "lvk",
+            library: vulkan_library,
+            validation: Validation::Off,
+            extra: &[],
+            sink: ValidationSink::default(),
+        })?;
         let devices = instance.physical_devices()?;
         devices.into_iter().map(|raw| Ok(PhysicalDevice::query(&instance.raw, raw)?.capabilities)).collect()
     }

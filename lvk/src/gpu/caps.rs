@@ -1,11 +1,12 @@
 //! What a physical device has, what of it the library turns on, and what callers may ask.
 
-use std::ffi::CStr;
+use std::ffi::{CStr, CString};
 
 use ash::vk;
 
 use super::features::{Calibration, Features, Subgroups, missing};
 use super::mesh_limits::MeshLimits;
+use super::optional::{FeatureSet, OF_MESH_SHADERS, OptionalFeature};
 use super::ray_query_path::{RayQueryPath, RayQueryRequest};
 use super::select::DeviceKind;
 use crate::error::{Error, Result};
@@ -59,6 +60,8 @@ pub struct Capabilities {
     pub position_fetch: bool,
     /// Task and mesh shaders (`VK_EXT_mesh_shader`) can be drawn with.
     pub mesh_shader: bool,
+    /// The optional features that are there; [`has`](Self::has) asks for one.
+    pub optional: FeatureSet,
     /// Name of the [`DeviceProfile`](crate::DeviceProfile) that was applied: what is said here is what it leaves.
     pub profile: Option<String>,
     /// Why ray tracing is off although the device offers it: device creation with it failed, and was repeated without.
@@ -95,6 +98,32 @@ pub struct Capabilities {
 }
 
 impl Capabilities {
+    /// Whether the device has `feature`, and it is on.
+    pub fn has(&self, feature: OptionalFeature) -> bool {
+        self.optional.contains(feature)
+    }
+
+    /// Without the optional features of `hidden` and those that cannot be without them.
+    pub(crate) fn hide(&mut self, hidden: FeatureSet) {
+        let mut left = self.optional.without(hidden);
+        if !self.mesh_shader {
+            left = left.without(OF_MESH_SHADERS.into_iter().collect());
+        }
+        self.optional = left.whole();
+        self.primitive_id = self.has(OptionalFeature::GeometryShader);
+        self.formatless_storage_read = self.has(OptionalFeature::StorageImageReadWithoutFormat);
+        self.cube_arrays = self.has(OptionalFeature::CubeArrays);
+        self.shader_int64 = self.has(OptionalFeature::Int64);
+        self.buffer_int64_atomics = self.has(OptionalFeature::BufferInt64Atomics);
+        self.multi_draw_indirect = self.has(OptionalFeature::MultiDrawIndirect);
+        self.precise_occlusion = self.has(OptionalFeature::OcclusionQueryPrecise);
+        self.pipeline_statistics = self.has(OptionalFeature::PipelineStatisticsQuery);
+        self.calibrated_timestamps = self.has(OptionalFeature::CalibratedTimestamps);
+        if !self.has(OptionalFeature::SamplerAnisotropy) {
+            self.max_anisotropy = 1.0;
+        }
+    }
+
     /// Without the ray tracing that is not to be turned on.
     pub(crate) fn limit_ray_tracing(&mut self, pipeline: bool, query: bool) {
         self.ray_tracing_pipeline &= pipeline;
@@ -239,9 +268,9 @@ pub(crate) struct PhysicalDevice {
     pub(crate) queue_family: Option<u32>,
     /// Core features the library cannot do without and the device lacks.
     pub(crate) missing: Vec<String>,
-    /// Those that the library turns on.
+    /// As found.
     pub(crate) features: Features,
-    pub(crate) deferred_host_operations: bool,
+    pub(crate) extensions: Vec<CString>,
 }
 
 impl PhysicalDevice {
@@ -251,7 +280,7 @@ impl PhysicalDevice {
         // SAFETY: as above.
         let extensions = unsafe { instance.enumerate_device_extension_properties(raw) }
             .map_err(Error::vulkan("vkEnumerateDeviceExtensionProperties"))?;
-        let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        let names = extensions.iter().filter_map(|extension| extension.extension_name_as_c_str().ok());
         let queue = queue_family(instance, raw);
         let mut found = Self {
             raw,
@@ -266,7 +295,7 @@ impl PhysicalDevice {
             queue_family: queue.map(|(family, _)| family),
             missing: Vec::new(),
             features: Features::default(),
-            deferred_host_operations: has(ash::khr::deferred_host_operations::NAME),
+            extensions: names.map(CStr::to_owned).collect(),
         };
         if plain.api_version < vk::API_VERSION_1_3 {
             found.missing.push("Vulkan 1.3".to_owned());
@@ -275,36 +304,41 @@ impl PhysicalDevice {
         if queue.is_none() {
             found.missing.push("a queue for graphics and compute".to_owned());
         }
-        let ray_tracing = found.read_features(instance, &has);
+        let ray_tracing = found.read_features(instance);
         found.read_properties(instance, &plain, ray_tracing);
         found.capabilities.limits.timestamp_bits = queue.map_or(0, |(_, bits)| bits);
+        found.capabilities.hide(FeatureSet::NONE);
         Ok(found)
     }
 
+    /// Whether the device has an extension.
+    pub(crate) fn has_extension(&self, name: &CStr) -> bool {
+        self.extensions.iter().any(|extension| extension.as_c_str() == name)
+    }
+
     /// Fills the features and what is missing; answers whether acceleration structures may be asked about.
-    fn read_features(&mut self, instance: &ash::Instance, has: &dyn Fn(&CStr) -> bool) -> bool {
-        let structures = has(ash::khr::acceleration_structure::NAME) && self.deferred_host_operations;
-        let (mut found, usable) = found_features(instance, self.raw, has, structures);
+    fn read_features(&mut self, instance: &ash::Instance) -> bool {
+        let mut found = found_features(instance, self.raw, &|name| self.has_extension(name));
+        let accel = &found.ext.structures;
+        let usable = accel.acceleration_structure
+            & accel.descriptor_binding_acceleration_structure_update_after_bind
+            & vk::Bool32::from(self.has_extension(ash::khr::deferred_host_operations::NAME))
+            == vk::TRUE;
         found.limit_ray_tracing(usable, usable);
+        found.limit_mesh_shaders(true);
+        let pipeline_library = self.has_extension(ash::khr::pipeline_library::NAME);
         let caps = &mut self.capabilities;
-        caps.ray_tracing_pipeline = found.ray_tracing_pipeline == vk::TRUE;
-        caps.trace_rays_indirect = found.trace_indirect == vk::TRUE;
-        caps.pipeline_libraries = caps.ray_tracing_pipeline && has(ash::khr::pipeline_library::NAME);
-        caps.ray_query = found.ray_query == vk::TRUE;
+        let ray_tracing = &found.ext.ray_tracing;
+        caps.ray_tracing_pipeline = ray_tracing.ray_tracing_pipeline == vk::TRUE;
+        caps.trace_rays_indirect = ray_tracing.ray_tracing_pipeline_trace_rays_indirect == vk::TRUE;
+        caps.pipeline_libraries = caps.ray_tracing_pipeline && pipeline_library;
+        caps.ray_query = found.ext.ray_query.ray_query == vk::TRUE;
         caps.ray_query_path = if caps.ray_query { RayQueryPath::Hardware } else { RayQueryPath::None };
-        caps.position_fetch = found.position_fetch == vk::TRUE;
-        caps.mesh_shader = found.mesh_shader == vk::TRUE;
-        caps.primitive_id = found.core.geometry_shader == vk::TRUE;
-        caps.formatless_storage_read = found.core.shader_storage_image_read_without_format == vk::TRUE;
-        caps.cube_arrays = found.core.image_cube_array == vk::TRUE;
-        caps.shader_int64 = found.core.shader_int64 == vk::TRUE;
-        caps.buffer_int64_atomics = found.v12.shader_buffer_int64_atomics == vk::TRUE;
-        caps.multi_draw_indirect = found.core.multi_draw_indirect == vk::TRUE;
-        caps.precise_occlusion = found.core.occlusion_query_precise == vk::TRUE;
-        caps.pipeline_statistics = found.core.pipeline_statistics_query == vk::TRUE;
-        caps.calibrated_timestamps = found.calibration != Calibration::None;
+        caps.position_fetch = found.ext.position_fetch.ray_tracing_position_fetch == vk::TRUE;
+        caps.mesh_shader = found.ext.mesh.mesh_shader == vk::TRUE;
+        caps.optional = FeatureSet::of(&found);
         self.missing.extend(missing(&found));
-        self.features = Features::wanted(&found);
+        self.features = found;
         usable
     }
 
@@ -343,11 +377,7 @@ impl PhysicalDevice {
         let caps = &mut self.capabilities;
         caps.driver_name = v12.driver_name_as_c_str().map(to_string).unwrap_or_default();
         caps.driver_info = v12.driver_info_as_c_str().map(to_string).unwrap_or_default();
-        caps.max_anisotropy = if self.features.core.sampler_anisotropy == vk::TRUE {
-            plain.limits.max_sampler_anisotropy
-        } else {
-            1.0
-        };
+        caps.max_anisotropy = plain.limits.max_sampler_anisotropy;
         caps.prefers_spatial_order = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.helpers_lose_arrays = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.limits = limits(&plain.limits, &v12, &v13, &accel, &pipeline);
@@ -355,55 +385,24 @@ impl PhysicalDevice {
     }
 }
 
-/// What the device offers, and whether its acceleration structures can be used.
+/// What the device offers.
 fn found_features(
     instance: &ash::Instance,
     raw: vk::PhysicalDevice,
     has: &dyn Fn(&CStr) -> bool,
-    structures: bool,
-) -> (Features, bool) {
+) -> Features {
     let mut found = Features::default();
-    let mut accel = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
-    let mut pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default();
-    let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
-    let mut positions = vk::PhysicalDeviceRayTracingPositionFetchFeaturesKHR::default();
-    let mut mesh = vk::PhysicalDeviceMeshShaderFeaturesEXT::default();
-    let mut all = vk::PhysicalDeviceFeatures2::default()
+    let all = vk::PhysicalDeviceFeatures2::default()
         .push_next(&mut found.v11)
         .push_next(&mut found.v12)
         .push_next(&mut found.v13);
-    if structures {
-        all = all.push_next(&mut accel);
-    }
-    if has(ash::khr::ray_tracing_pipeline::NAME) {
-        all = all.push_next(&mut pipeline);
-    }
-    if has(ash::khr::ray_query::NAME) {
-        all = all.push_next(&mut query);
-    }
-    if has(ash::khr::ray_tracing_position_fetch::NAME) {
-        all = all.push_next(&mut positions);
-    }
-    if has(ash::ext::mesh_shader::NAME) {
-        all = all.push_next(&mut mesh);
-    }
-    if has(ash::ext::shader_atomic_float::NAME) {
-        all = all.push_next(&mut found.float_atomics);
-    }
+    let mut all = found.ext.chain(all, has);
     // SAFETY: the chain holds only structures the device knows, and lives until the call returns.
     unsafe { instance.get_physical_device_features2(raw, &mut all) };
     found.core = all.features;
-    found.ray_tracing_pipeline = pipeline.ray_tracing_pipeline;
-    found.trace_indirect = pipeline.ray_tracing_pipeline_trace_rays_indirect;
-    found.primitive_culling = pipeline.ray_traversal_primitive_culling;
-    found.ray_query = query.ray_query;
-    found.position_fetch = positions.ray_tracing_position_fetch;
-    found.mesh_shader = mesh.mesh_shader & mesh.task_shader;
-    found.mesh_shader_queries = found.mesh_shader & mesh.mesh_shader_queries;
+    found.ext.note_present(has);
     found.calibration = calibration(has);
-    let usable =
-        accel.acceleration_structure & accel.descriptor_binding_acceleration_structure_update_after_bind;
-    (found, usable == vk::TRUE)
+    found
 }
 
 fn calibration(has: &dyn Fn(&CStr) -> bool) -> Calibration {

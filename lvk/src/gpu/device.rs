@@ -1,6 +1,6 @@
 //! Chooses a physical device and makes the logical one, with its queue and its memory allocator.
 
-use std::ffi::c_char;
+use std::ffi::CStr;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
@@ -10,18 +10,26 @@ use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
 use super::clock::HostClock;
 use super::debug::c_name;
-use super::features::{Calibration, Features};
+use super::extra::ExtraExtensions;
+use super::features::Features;
 use super::instance::Instance;
+use super::optional::{OF_WINDOWS, OptionalFeature};
 use super::profile::DeviceProfile;
 use super::ray_query_path::RayQueryRequest;
 use super::select::{Candidate, choose};
 use crate::error::{Error, Result};
 
-/// Which optional features are turned on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct RayTracing {
+/// What the caller asks of a device.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct DeviceRequest<'a> {
+    /// Number or part of the name.
+    pub(crate) wish: Option<&'a str>,
     pub(crate) pipeline: FeatureRequest,
     pub(crate) query: RayQueryRequest,
+    /// Optional features that only devices which have them all will do for.
+    pub(crate) required: &'a [OptionalFeature],
+    pub(crate) profile: Option<&'a DeviceProfile>,
+    pub(crate) extra: ExtraExtensions<'a>,
 }
 
 /// One logical device with everything made from it that is not a resource. It knows no resource.
@@ -32,6 +40,8 @@ pub(crate) struct Gpu {
     pub(crate) features: Features,
     /// What was applied to `caps`; the default where the caller gave none.
     pub(crate) profile: DeviceProfile,
+    /// SPIR-V capabilities that the caller's own extensions allow.
+    pub(crate) extra_capabilities: Vec<u32>,
     pub(crate) queue_family: u32,
     pub(crate) accel: Option<ash::khr::acceleration_structure::Device>,
     pub(crate) ray_tracing: Option<ash::khr::ray_tracing_pipeline::Device>,
@@ -47,13 +57,8 @@ pub(crate) struct Gpu {
 }
 
 impl Gpu {
-    pub(crate) fn new(
-        instance: Instance,
-        wish: Option<&str>,
-        request: RayTracing,
-        profile: Option<&DeviceProfile>,
-    ) -> Result<Self> {
-        let chosen = choose_device(&instance, wish, request, profile)?;
+    pub(crate) fn new(instance: Instance, request: &DeviceRequest<'_>) -> Result<Self> {
+        let chosen = choose_device(&instance, request)?;
         let (device, caps, features) = create_with_fallback(&instance, &chosen, request)?;
         let queue_family = chosen.queue_family.unwrap_or_default();
         let allocator = match new_allocator(&instance, &device, chosen.raw) {
@@ -83,7 +88,8 @@ impl Gpu {
             device,
             caps,
             features,
-            profile: profile.cloned().unwrap_or_default(),
+            profile: request.profile.cloned().unwrap_or_default(),
+            extra_capabilities: request.extra.capabilities().to_vec(),
             instance,
         })
     }
@@ -131,6 +137,21 @@ impl Gpu {
             format!("{}its driver does not offer it, or it was turned off", profile.unwrap_or_default())
         });
         Error::unsupported(what, format!("the device '{}' has none: {reason}", self.caps.device_name))
+    }
+
+    /// Fails unless the device has `feature`; `what` is refused, by name.
+    pub(crate) fn require(&self, feature: OptionalFeature, what: &str) -> Result<()> {
+        if self.caps.has(feature) {
+            return Ok(());
+        }
+        let hidden = self.profile.hidden.contains(feature);
+        let why = if hidden {
+            format!("the device profile '{}' hides it", self.profile.name)
+        } else {
+            "its driver does not offer it".to_owned()
+        };
+        let name = feature.vulkan_name();
+        Err(Error::unsupported(what, format!("the device '{}' lacks {name}: {why}", self.caps.device_name)))
     }
 
     /// Milliseconds since an arbitrary start of what a timestamp counts.
@@ -223,12 +244,7 @@ impl Drop for Gpu {
     }
 }
 
-fn choose_device(
-    instance: &Instance,
-    wish: Option<&str>,
-    request: RayTracing,
-    profile: Option<&DeviceProfile>,
-) -> Result<PhysicalDevice> {
+fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<PhysicalDevice> {
     let mut devices = Vec::new();
     for raw in instance.physical_devices()? {
         devices.push(PhysicalDevice::query(&instance.raw, raw)?);
@@ -236,34 +252,47 @@ fn choose_device(
     if devices.is_empty() {
         return Err(Error::NoVulkan { reason: "the loader found no device".to_owned() });
     }
-    let candidates: Vec<_> = devices.iter_mut().map(|device| candidate(device, request, profile)).collect();
-    let index = choose(&candidates, wish)?;
+    let candidates: Vec<_> = devices.iter_mut().map(|device| candidate(device, request)).collect();
+    let index = choose(&candidates, request.wish)?;
     Ok(devices.swap_remove(index))
 }
 
-/// The device as the choice sees it, under the profile.
-fn candidate(device: &mut PhysicalDevice, request: RayTracing, profile: Option<&DeviceProfile>) -> Candidate {
-    let has = |caps: &Capabilities| [caps.ray_tracing_pipeline, caps.ray_query];
-    let found = has(&device.capabilities);
-    if let Some(profile) = profile {
+/// The device as the choice sees it, under the profile and without windows, for which the instance has no extensions.
+fn candidate(device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candidate {
+    device.capabilities.hide(OF_WINDOWS.into_iter().collect());
+    let found = device.capabilities.clone();
+    if let Some(profile) = request.profile {
         profile.apply(&mut device.capabilities);
     }
-    let left = has(&device.capabilities);
-    let required = [request.pipeline == FeatureRequest::Required, request.query.requires_hardware()];
-    let preferred = [request.pipeline.wants(), request.query.prefers_hardware()];
+    let left = &device.capabilities;
     let mut missing = device.missing.clone();
-    for (index, name) in ["ray tracing pipelines", "ray queries"].into_iter().enumerate() {
-        if required[index] && !left[index] {
-            missing.push(lack(name, profile.filter(|_| found[index])));
+    let mut demand = |name: &str, found: bool, left: bool| {
+        if !left {
+            missing.push(lack(name, request.profile.filter(|_| found)));
         }
+    };
+    if request.pipeline == FeatureRequest::Required {
+        demand("ray tracing pipelines", found.ray_tracing_pipeline, left.ray_tracing_pipeline);
     }
-    let caps = &device.capabilities;
+    if request.query.requires_hardware() {
+        demand("ray queries", found.ray_query, left.ray_query);
+    }
+    for feature in request.required {
+        demand(feature.vulkan_name(), found.has(*feature), left.has(*feature));
+    }
+    for name in request.extra.of_device() {
+        demand(&name.to_string_lossy(), false, device.has_extension(name));
+    }
+    let wanted = [
+        request.pipeline.wants() && left.ray_tracing_pipeline,
+        request.query.prefers_hardware() && left.ray_query,
+    ];
     Candidate {
-        name: caps.device_name.clone(),
+        name: left.device_name.clone(),
         kind: device.kind,
         local_memory_bytes: device.local_memory_bytes,
         missing,
-        optional_score: preferred.iter().zip(left).filter(|(wanted, has)| **wanted && *has).count() as u32,
+        optional_score: wanted.into_iter().filter(|has| *has).count() as u32,
     }
 }
 
@@ -278,11 +307,11 @@ fn lack(name: &str, hidden_by: Option<&DeviceProfile>) -> String {
 fn create_with_fallback(
     instance: &Instance,
     chosen: &PhysicalDevice,
-    request: RayTracing,
+    request: &DeviceRequest<'_>,
 ) -> Result<(ash::Device, Capabilities, Features)> {
     let mut caps = chosen.capabilities.clone();
     caps.choose_ray_tracing(request.pipeline, request.query);
-    let first = match create(instance, chosen, &caps) {
+    let first = match create(instance, chosen, &caps, &request.extra) {
         Ok((device, features)) => return Ok((device, caps, features)),
         Err(error) => error,
     };
@@ -295,7 +324,8 @@ fn create_with_fallback(
     caps.choose_ray_tracing(FeatureRequest::Off, request.query);
     caps.ray_tracing_fallback = Some(format!("vkCreateDevice with ray tracing answered {first}"));
     log::warn!("{}: ray tracing is off: vkCreateDevice with it answered {first}", caps.device_name);
-    let (device, features) = create(instance, chosen, &caps).map_err(Error::vulkan("vkCreateDevice"))?;
+    let (device, features) =
+        create(instance, chosen, &caps, &request.extra).map_err(Error::vulkan("vkCreateDevice"))?;
     Ok((device, caps, features))
 }
 
@@ -303,101 +333,49 @@ fn create(
     instance: &Instance,
     chosen: &PhysicalDevice,
     caps: &Capabilities,
+    extra: &ExtraExtensions<'_>,
 ) -> Result<(ash::Device, Features), vk::Result> {
     let features = enabled(instance, chosen, caps);
-    let mut accel = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default()
-        .acceleration_structure(true)
-        .descriptor_binding_acceleration_structure_update_after_bind(true);
-    let mut pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default()
-        .ray_tracing_pipeline(true)
-        .ray_tracing_pipeline_trace_rays_indirect(features.trace_indirect == vk::TRUE)
-        .ray_traversal_primitive_culling(features.primitive_culling == vk::TRUE);
-    let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
-    let mut positions =
-        vk::PhysicalDeviceRayTracingPositionFetchFeaturesKHR::default().ray_tracing_position_fetch(true);
-    let mut mesh = vk::PhysicalDeviceMeshShaderFeaturesEXT::default()
-        .mesh_shader(true)
-        .task_shader(true)
-        .mesh_shader_queries(features.mesh_shader_queries == vk::TRUE);
+    let extensions = extensions(&features, caps, extra);
     let mut chain = features;
-    let mut all = vk::PhysicalDeviceFeatures2::default()
-        .features(chain.core)
-        .push_next(&mut chain.v11)
-        .push_next(&mut chain.v12)
-        .push_next(&mut chain.v13);
-    if caps.hardware_structures() {
-        all = all.push_next(&mut accel);
-    }
-    if caps.ray_tracing_pipeline {
-        all = all.push_next(&mut pipeline);
-    }
-    if caps.hardware_ray_query() {
-        all = all.push_next(&mut query);
-    }
-    if features.position_fetch == vk::TRUE {
-        all = all.push_next(&mut positions);
-    }
-    if caps.mesh_shader {
-        all = all.push_next(&mut mesh);
-    }
-    if features.has_float_atomics() {
-        all = all.push_next(&mut chain.float_atomics);
-    }
+    let mut all = vk::PhysicalDeviceFeatures2::default().features(chain.core);
+    // What is pushed below goes in front of the caller's chain, which stays as it is.
+    all.p_next = extra.chain();
+    let all = all.push_next(&mut chain.v11).push_next(&mut chain.v12).push_next(&mut chain.v13);
+    let mut all = chain.ext.chain(all, &|name| extensions.contains(&name));
     let queue = vk::DeviceQueueCreateInfo::default()
         .queue_family_index(chosen.queue_family.unwrap_or_default())
         .queue_priorities(&[1.0]);
-    let extensions = extensions(&features, caps);
+    let names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
     let info = vk::DeviceCreateInfo::default()
         .queue_create_infos(std::slice::from_ref(&queue))
-        .enabled_extension_names(&extensions)
+        .enabled_extension_names(&names)
         .push_next(&mut all);
-    // SAFETY: every pointer in `info` lives until the end of this function.
+    // SAFETY: every pointer in `info` lives until the end of this function; the caller vouches for its own chain.
     let device = unsafe { instance.raw.create_device(chosen.raw, &info, None) }?;
     Ok((device, features))
 }
 
 /// GPU-assisted validation finds no access out of bounds where the driver has to make it harmless.
 fn enabled(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) -> Features {
-    let mut features = chosen.features;
+    let mut features = Features::wanted(&chosen.features, caps.optional);
     features.limit_ray_tracing(caps.ray_tracing_pipeline, caps.hardware_ray_query());
-    features.position_fetch &= vk::Bool32::from(caps.position_fetch);
-    features.mesh_shader &= vk::Bool32::from(caps.mesh_shader);
-    features.mesh_shader_queries &= features.mesh_shader & features.core.pipeline_statistics_query;
+    features.ext.position_fetch.ray_tracing_position_fetch &= vk::Bool32::from(caps.position_fetch);
+    features.limit_mesh_shaders(caps.mesh_shader);
     if instance.gpu_assisted {
         features.core.robust_buffer_access = vk::FALSE;
     }
     features
 }
 
-fn extensions(features: &Features, caps: &Capabilities) -> Vec<*const c_char> {
-    let mut names = Vec::new();
-    if caps.hardware_structures() {
-        names.push(ash::khr::acceleration_structure::NAME.as_ptr());
-        names.push(ash::khr::deferred_host_operations::NAME.as_ptr());
-    }
-    if caps.ray_tracing_pipeline {
-        names.push(ash::khr::ray_tracing_pipeline::NAME.as_ptr());
-    }
-    if caps.pipeline_libraries {
-        names.push(ash::khr::pipeline_library::NAME.as_ptr());
-    }
-    if caps.hardware_ray_query() {
-        names.push(ash::khr::ray_query::NAME.as_ptr());
-    }
-    if features.position_fetch == vk::TRUE {
-        names.push(ash::khr::ray_tracing_position_fetch::NAME.as_ptr());
-    }
-    if caps.mesh_shader {
-        names.push(ash::ext::mesh_shader::NAME.as_ptr());
-    }
-    match features.calibration {
-        Calibration::Khr => names.push(ash::khr::calibrated_timestamps::NAME.as_ptr()),
-        Calibration::Ext => names.push(ash::ext::calibrated_timestamps::NAME.as_ptr()),
-        Calibration::None => {}
-    }
-    if features.has_float_atomics() {
-        names.push(ash::ext::shader_atomic_float::NAME.as_ptr());
-    }
+/// Each once.
+fn extensions<'a>(features: &Features, caps: &Capabilities, extra: &ExtraExtensions<'a>) -> Vec<&'a CStr> {
+    let libraries = caps.pipeline_libraries.then_some(ash::khr::pipeline_library::NAME);
+    let own = features.extensions().chain(caps.optional.extensions()).chain(libraries);
+    let mut names: Vec<&'a CStr> = own.map(|name| -> &'a CStr { name }).collect();
+    names.extend_from_slice(extra.of_device());
+    names.sort_unstable();
+    names.dedup();
     names
 }
 

@@ -20,19 +20,25 @@ pub(crate) struct Instance {
     messenger: Messenger,
 }
 
+/// What an instance is made with.
+pub(crate) struct InstanceDesc<'a> {
+    pub(crate) application_name: &'a str,
+    /// The loader to open.
+    pub(crate) library: Option<&'a Path>,
+    pub(crate) validation: Validation,
+    /// Extensions of the caller's own.
+    pub(crate) extra: &'a [&'a CStr],
+    pub(crate) sink: ValidationSink,
+}
+
 impl Instance {
-    pub(crate) fn new(
-        application_name: &str,
-        library: Option<&Path>,
-        validation: Validation,
-        sink: ValidationSink,
-    ) -> Result<Self> {
-        let entry = load_entry(library)?;
+    pub(crate) fn new(desc: &InstanceDesc<'_>) -> Result<Self> {
+        let entry = load_entry(desc.library)?;
         check_version(&entry)?;
-        let layer = find_layer(&entry, validation)?;
-        let extensions = Extensions::of(&entry, layer)?;
-        let mut messenger = Messenger::new(sink);
-        let raw = create(&entry, application_name, validation, layer, &extensions, &messenger)?;
+        let layer = find_layer(&entry, desc.validation)?;
+        let extensions = Extensions::of(&entry, layer, desc.extra)?;
+        let mut messenger = Messenger::new(desc.sink.clone());
+        let raw = create(&entry, desc, layer, &extensions, &messenger)?;
         if extensions.debug_utils
             && layer.is_some()
             && let Err(result) = messenger.install(&entry, &raw)
@@ -41,7 +47,7 @@ impl Instance {
             unsafe { raw.destroy_instance(None) };
             return Err(Error::vulkan("vkCreateDebugUtilsMessengerEXT")(result));
         }
-        let gpu_assisted = validation == Validation::GpuAssisted;
+        let gpu_assisted = desc.validation == Validation::GpuAssisted;
         Ok(Self { entry, raw, debug_utils: extensions.debug_utils, gpu_assisted, messenger })
     }
 
@@ -106,47 +112,57 @@ fn find_layer(entry: &ash::Entry, validation: Validation) -> Result<Option<&'sta
     ))
 }
 
-struct Extensions {
+struct Extensions<'a> {
     debug_utils: bool,
     layer_settings: bool,
+    extra: &'a [&'a CStr],
 }
 
-impl Extensions {
-    fn of(entry: &ash::Entry, layer: Option<&CStr>) -> Result<Self> {
-        let mut found = Self { debug_utils: false, layer_settings: false };
+impl<'a> Extensions<'a> {
+    fn of(entry: &ash::Entry, layer: Option<&CStr>, extra: &'a [&'a CStr]) -> Result<Self> {
+        let mut found = Self { debug_utils: false, layer_settings: false, extra };
+        let mut missing = extra.to_vec();
         for source in [None, layer].into_iter().take(if layer.is_some() { 2 } else { 1 }) {
             // SAFETY: the layer, if any, was found above.
             let list = unsafe { entry.enumerate_instance_extension_properties(source) }
                 .map_err(Error::vulkan("vkEnumerateInstanceExtensionProperties"))?;
-            let has = |name| list.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+            let has = |name: &CStr| list.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
             found.debug_utils |= has(ash::ext::debug_utils::NAME);
             found.layer_settings |= has(ash::ext::layer_settings::NAME);
+            missing.retain(|name| !has(name));
+        }
+        if let Some(name) = missing.first() {
+            let what = format!("the instance extension {}", name.to_string_lossy());
+            return Err(Error::unsupported(what, "the Vulkan loader and its drivers do not have it"));
         }
         Ok(found)
     }
 
     /// The layer reads its settings without its extension being on, and loaders older than the extension refuse it.
     fn names(&self) -> Vec<*const std::ffi::c_char> {
-        self.debug_utils.then_some(ash::ext::debug_utils::NAME.as_ptr()).into_iter().collect()
+        let own = self.debug_utils.then_some(ash::ext::debug_utils::NAME);
+        let mut names: Vec<&CStr> = own.into_iter().chain(self.extra.iter().copied()).collect();
+        names.sort_unstable();
+        names.dedup();
+        names.into_iter().map(CStr::as_ptr).collect()
     }
 }
 
 fn create(
     entry: &ash::Entry,
-    application_name: &str,
-    validation: Validation,
+    desc: &InstanceDesc<'_>,
     layer: Option<&CStr>,
-    extensions: &Extensions,
+    extensions: &Extensions<'_>,
     messenger: &Messenger,
 ) -> Result<ash::Instance> {
-    let name = c_name(application_name);
+    let name = c_name(desc.application_name);
     let application = vk::ApplicationInfo::default()
         .application_name(&name)
         .engine_name(c"lvk")
         .api_version(vk::API_VERSION_1_3);
     let layers: Vec<_> = layer.iter().map(|layer| layer.as_ptr()).collect();
     let extension_names = extensions.names();
-    let switches = switches(validation);
+    let switches = switches(desc.validation);
     let values: Vec<[vk::Bool32; 1]> = switches.iter().map(|(_, on)| [vk::Bool32::from(*on)]).collect();
     let settings: Vec<_> =
         switches.iter().zip(&values).map(|((key, _), value)| setting(key, value)).collect();

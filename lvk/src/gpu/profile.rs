@@ -4,6 +4,7 @@ use std::borrow::Cow;
 
 use super::caps::Capabilities;
 use super::mesh_limits::MeshLimits;
+use super::optional::FeatureSet;
 use crate::error::{Error, Result};
 
 /// Clamps what the real device reports, so that the path of another one runs on it.
@@ -34,6 +35,8 @@ pub struct DeviceProfile {
     pub position_fetch: bool,
     /// Whether task and mesh shaders may be used.
     pub mesh_shader: bool,
+    /// Optional features that may not be used.
+    pub hidden: FeatureSet,
     /// Least alignment of scratch addresses in bytes; rounded up to a power of two.
     pub min_scratch_alignment: u32,
     /// Most bytes of a storage buffer descriptor.
@@ -64,6 +67,7 @@ impl Default for DeviceProfile {
             ray_query: true,
             position_fetch: true,
             mesh_shader: true,
+            hidden: FeatureSet::NONE,
             min_scratch_alignment: 1,
             max_storage_buffer_range: u64::MAX,
             max_accel_structure_bytes: u64::MAX,
@@ -78,12 +82,13 @@ impl Default for DeviceProfile {
 type BuiltIn = (&'static str, fn() -> DeviceProfile);
 
 /// The built-in profiles by name.
-const BUILT_IN: [BuiltIn; 5] = [
+const BUILT_IN: [BuiltIn; 6] = [
     ("mali-g715", DeviceProfile::mali_g715),
     ("xclipse-940", DeviceProfile::xclipse_940),
     ("no-rt-pipeline", DeviceProfile::no_rt_pipeline),
     ("no-ray-query", DeviceProfile::no_ray_query),
     ("no-ray-tracing", DeviceProfile::no_ray_tracing),
+    ("core-only", DeviceProfile::core_only),
 ];
 
 impl DeviceProfile {
@@ -133,6 +138,18 @@ impl DeviceProfile {
         Self { name: Cow::Borrowed("no-ray-tracing"), ray_tracing_pipeline: false, ..Self::no_ray_query() }
     }
 
+    /// `core-only`: the device at hand with nothing optional at all, neither ray tracing nor mesh shaders nor any
+    /// [`OptionalFeature`](crate::OptionalFeature).
+    pub fn core_only() -> Self {
+        Self {
+            name: Cow::Borrowed("core-only"),
+            position_fetch: false,
+            mesh_shader: false,
+            hidden: FeatureSet::ALL,
+            ..Self::no_ray_tracing()
+        }
+    }
+
     /// The names of the built-in profiles.
     pub fn names() -> impl ExactSizeIterator<Item = &'static str> {
         BUILT_IN.iter().map(|(name, _)| *name)
@@ -164,6 +181,7 @@ impl DeviceProfile {
         capabilities.limit_ray_tracing(self.ray_tracing_pipeline, self.ray_query);
         capabilities.position_fetch &= self.position_fetch;
         capabilities.mesh_shader &= self.mesh_shader;
+        capabilities.hide(self.hidden);
         let limits = &mut capabilities.limits;
         limits.scratch_alignment = stricter_alignment(limits.scratch_alignment, self.min_scratch_alignment);
         let range = self.max_storage_buffer_range;
@@ -193,6 +211,7 @@ mod tests {
 
     use super::*;
     use crate::gpu::caps::Limits;
+    use crate::gpu::optional::OptionalFeature;
 
     fn device() -> Capabilities {
         Capabilities {
@@ -234,6 +253,7 @@ mod tests {
             ("no-rt-pipeline", false, true),
             ("no-ray-query", true, false),
             ("no-ray-tracing", false, false),
+            ("core-only", false, false),
         ] {
             let clamped = under(&DeviceProfile::named(name).unwrap());
             assert_eq!((clamped.ray_tracing_pipeline, clamped.ray_query), (pipeline, query), "{name}");
@@ -275,6 +295,26 @@ mod tests {
         prop_oneof![Just(0), Just(u64::MAX), any::<u64>(), 0..1_u64 << 34]
     }
 
+    #[test]
+    fn core_only_leaves_nothing_optional() {
+        let mut capabilities = Capabilities { optional: FeatureSet::ALL, ..device() };
+        capabilities.hide(FeatureSet::NONE);
+        assert!(capabilities.cube_arrays && capabilities.has(OptionalFeature::MeshShaderQueries));
+        DeviceProfile::core_only().apply(&mut capabilities);
+        assert_eq!(capabilities.optional, FeatureSet::NONE);
+        assert!(!(capabilities.cube_arrays || capabilities.shader_int64 || capabilities.mesh_shader));
+    }
+
+    #[test]
+    fn what_hangs_on_a_hidden_feature_is_hidden_with_it() {
+        let mut capabilities = Capabilities { optional: FeatureSet::ALL, ..device() };
+        let hidden = FeatureSet::NONE.with(OptionalFeature::Multiview);
+        DeviceProfile { hidden, mesh_shader: false, ..DeviceProfile::default() }.apply(&mut capabilities);
+        assert!(!capabilities.has(OptionalFeature::MultiviewGeometry));
+        assert!(!capabilities.has(OptionalFeature::MeshShaderQueries));
+        assert!(capabilities.has(OptionalFeature::GeometryShader));
+    }
+
     prop_compose! {
         fn profile()(
             on in any::<[bool; 4]>(), min_scratch_alignment in prop_oneof![any::<u32>(), 0..1025_u32],
@@ -286,6 +326,7 @@ mod tests {
                 ray_query: on[1],
                 position_fetch: on[2],
                 mesh_shader: on[3],
+                hidden: FeatureSet::NONE,
                 min_scratch_alignment,
                 max_storage_buffer_range: limits[0],
                 max_accel_structure_bytes: limits[1],

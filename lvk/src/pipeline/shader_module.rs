@@ -24,7 +24,8 @@ impl ShaderModule {
         let words = compile(desc, &CompileOptions::of(&gpu.caps))?;
         let reflection = reflect(desc.debug_name, desc.stage, &words)?;
         check_features(gpu, desc.debug_name, &reflection)?;
-        check_capabilities(desc.debug_name, desc.stage, &reflection, &gpu.features)?;
+        let extra = &gpu.extra_capabilities;
+        check_capabilities(desc.debug_name, desc.stage, &reflection, &gpu.features, extra)?;
         if reflection.push_constant_bytes > max_push_bytes {
             return Err(Error::LimitExceeded {
                 object: desc.debug_name.to_owned(),

@@ -8,6 +8,7 @@ use bytemuck::{Pod, Zeroable};
 use super::query_marks::QueryMarks;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
+use crate::gpu::optional::OptionalFeature;
 
 /// What the queries of a pool measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -53,14 +54,18 @@ impl QueryKind {
     }
 
     fn check_supported(self, gpu: &Gpu) -> Result<()> {
-        let (has, what) = match self {
-            Self::Timestamps => (gpu.caps.limits.timestamp_bits > 0, "timestamps on the queue"),
-            Self::Occlusion { precise } => {
-                (!precise || gpu.caps.precise_occlusion, "exact occlusion queries")
+        match self {
+            Self::Timestamps if gpu.caps.limits.timestamp_bits == 0 => {
+                Err(gpu.lacks("timestamps on the queue"))
             }
-            Self::PipelineStatistics => (gpu.caps.pipeline_statistics, "pipeline statistics"),
-        };
-        if has { Ok(()) } else { Err(gpu.lacks(what)) }
+            Self::Occlusion { precise: true } => {
+                gpu.require(OptionalFeature::OcclusionQueryPrecise, "an exact occlusion query")
+            }
+            Self::PipelineStatistics => {
+                gpu.require(OptionalFeature::PipelineStatisticsQuery, "a query of pipeline statistics")
+            }
+            Self::Timestamps | Self::Occlusion { .. } => Ok(()),
+        }
     }
 }
 
@@ -240,7 +245,7 @@ impl QueryPool {
         self.check_kind(fits, "statistics come from a pool of pipeline statistics")?;
         self.check_range(query, 1)?;
         let mut values = [0; 13];
-        let ready = if self.gpu.features.mesh_shader_queries == vk::TRUE {
+        let ready = if self.gpu.features.ext.mesh.mesh_shader_queries == vk::TRUE {
             self.statistic_values::<14>(query, &mut values)?
         } else {
             self.statistic_values::<12>(query, &mut values)?
@@ -273,7 +278,7 @@ impl QueryPool {
 }
 
 fn statistics_bits(gpu: &Gpu) -> vk::QueryPipelineStatisticFlags {
-    let counted = gpu.features.mesh_shader_queries == vk::TRUE;
+    let counted = gpu.features.ext.mesh.mesh_shader_queries == vk::TRUE;
     let bits = if counted { PipelineStatistics::ALL_BITS } else { PipelineStatistics::PLAIN_BITS };
     vk::QueryPipelineStatisticFlags::from_raw(bits)
 }

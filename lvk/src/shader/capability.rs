@@ -33,7 +33,7 @@ const FREE: [C; 18] = [
 /// A capability, whether it is allowed, and the feature that allows it.
 type Row = (C, fn(&Features) -> vk::Bool32, &'static str);
 
-const BY_FEATURE: [Row; 44] = [
+const BY_FEATURE: [Row; 51] = [
     (C::Geometry, |f| f.core.geometry_shader, "geometryShader"),
     (C::Tessellation, |f| f.core.tessellation_shader, "tessellationShader"),
     (C::GeometryPointSize, point_size, "shaderTessellationAndGeometryPointSize"),
@@ -93,14 +93,37 @@ const BY_FEATURE: [Row; 44] = [
     (C::DotProductInputAll, dot_product, "shaderIntegerDotProduct"),
     (C::DotProductInput4x8Bit, dot_product, "shaderIntegerDotProduct"),
     (C::DotProductInput4x8BitPacked, dot_product, "shaderIntegerDotProduct"),
-    (C::RayTracingKHR, |f| f.ray_tracing_pipeline, "rayTracingPipeline"),
-    (C::RayQueryKHR, |f| f.ray_query, "rayQuery"),
-    (C::RayTraversalPrimitiveCullingKHR, |f| f.primitive_culling, "rayTraversalPrimitiveCulling"),
-    (C::RayTracingPositionFetchKHR, |f| f.position_fetch, "rayTracingPositionFetch"),
-    (C::RayQueryPositionFetchKHR, |f| f.position_fetch, "rayTracingPositionFetch"),
-    (C::MeshShadingEXT, |f| f.mesh_shader, "meshShader"),
+    (C::RayTracingKHR, |f| f.ext.ray_tracing.ray_tracing_pipeline, "rayTracingPipeline"),
+    (C::RayQueryKHR, |f| f.ext.ray_query.ray_query, "rayQuery"),
+    (
+        C::RayTraversalPrimitiveCullingKHR,
+        |f| f.ext.ray_tracing.ray_traversal_primitive_culling,
+        "rayTraversalPrimitiveCulling",
+    ),
+    (
+        C::RayTracingPositionFetchKHR,
+        |f| f.ext.position_fetch.ray_tracing_position_fetch,
+        "rayTracingPositionFetch",
+    ),
+    (
+        C::RayQueryPositionFetchKHR,
+        |f| f.ext.position_fetch.ray_tracing_position_fetch,
+        "rayTracingPositionFetch",
+    ),
+    (C::MeshShadingEXT, |f| f.ext.mesh.mesh_shader, "meshShader"),
     (C::MinLod, |f| f.core.shader_resource_min_lod, "shaderResourceMinLod"),
     (C::VariablePointers, |f| f.v11.variable_pointers, "variablePointers"),
+    (C::MultiView, |f| f.v11.multiview, "multiview"),
+    (C::InputAttachment, |f| f.ext.local_read.dynamic_rendering_local_read, "dynamicRenderingLocalRead"),
+    (C::ShaderLayer, |f| f.v12.shader_output_layer, "shaderOutputLayer"),
+    (C::StorageImageMultisample, multisampled_storage, "shaderStorageImageMultisample"),
+    (C::ImageMSArray, multisampled_storage, "shaderStorageImageMultisample"),
+    (C::FragmentShadingRateKHR, shading_rate, "pipelineFragmentShadingRate"),
+    (
+        C::FragmentBarycentricKHR,
+        |f| f.ext.barycentrics.fragment_shader_barycentric,
+        "fragmentShaderBarycentric",
+    ),
     (
         C::VariablePointersStorageBuffer,
         |f| f.v11.variable_pointers_storage_buffer,
@@ -120,22 +143,23 @@ const BY_SUBGROUP: [(C, vk::SubgroupFeatureFlags); 7] = [
 
 /// Fails unless the device has pipelines of this stage.
 pub(crate) fn check_stage(name: &str, stage: ShaderStage, features: &Features) -> Result<()> {
-    if matches!(stage, ShaderStage::Task | ShaderStage::Mesh) && features.mesh_shader == vk::FALSE {
+    if matches!(stage, ShaderStage::Task | ShaderStage::Mesh) && features.ext.mesh.mesh_shader == vk::FALSE {
         let what = format!("the {} stage of shader '{name}'", stage.name());
         return Err(Error::unsupported(what, lacks_feature("meshShader")));
     }
     Ok(())
 }
 
-/// Fails unless `features`, those that are on, allow everything the module asks for.
+/// Fails unless `features`, those that are on, allow everything the module asks for beside the capabilities in `extra`.
 pub(crate) fn check_capabilities(
     name: &str,
     stage: ShaderStage,
     module: &Reflection,
     features: &Features,
+    extra: &[u32],
 ) -> Result<()> {
     let subgroup = |c: &u32| subgroup_lack(*c, stage, features);
-    for capability in &module.capabilities {
+    for capability in module.capabilities.iter().filter(|capability| !extra.contains(capability)) {
         if let Some(why) = subgroup(capability).or_else(|| lack(*capability, features)) {
             let what = format!("capability {} of shader '{name}'", capability_name(*capability));
             return Err(Error::unsupported(what, why));
@@ -190,7 +214,7 @@ fn subgroup_lack(capability: u32, stage: ShaderStage, features: &Features) -> Op
 }
 
 fn atomic_lack(atomic: Atomic, features: &Features) -> Option<String> {
-    let on = &features.float_atomics;
+    let on = &features.ext.float_atomics;
     let (allowed, feature) = match (atomic.is_float, atomic.bits, atomic.place, atomic.is_add) {
         (false, 64, Place::Buffer, _) => {
             (features.v12.shader_buffer_int64_atomics, "shaderBufferInt64Atomics")
@@ -235,6 +259,15 @@ fn point_size(features: &Features) -> vk::Bool32 {
     features.core.shader_tessellation_and_geometry_point_size
 }
 
+fn multisampled_storage(features: &Features) -> vk::Bool32 {
+    features.core.shader_storage_image_multisample
+}
+
+/// Reading the rate needs any of the features, and none is there without this one.
+fn shading_rate(features: &Features) -> vk::Bool32 {
+    features.ext.shading_rate.pipeline_fragment_shading_rate
+}
+
 fn dot_product(features: &Features) -> vk::Bool32 {
     features.v13.shader_integer_dot_product
 }
@@ -246,7 +279,7 @@ fn int64_atomics(features: &Features) -> vk::Bool32 {
 
 /// As [`int64_atomics`].
 fn float_add(features: &Features) -> vk::Bool32 {
-    let on = &features.float_atomics;
+    let on = &features.ext.float_atomics;
     on.shader_buffer_float32_atomic_add
         | on.shader_shared_float32_atomic_add
         | on.shader_image_float32_atomic_add
@@ -256,6 +289,7 @@ fn float_add(features: &Features) -> vk::Bool32 {
 mod tests {
     #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
     use super::*;
+    use crate::gpu::optional::FeatureSet;
 
     fn module(capabilities: &[C]) -> Reflection {
         let capabilities = capabilities.iter().map(|c| *c as u32).collect();
@@ -264,7 +298,7 @@ mod tests {
 
     /// The text of the refusal, if there is one.
     fn refusal(stage: ShaderStage, module: &Reflection, features: &Features) -> Option<String> {
-        match check_capabilities("test", stage, module, features) {
+        match check_capabilities("test", stage, module, features, &[]) {
             Ok(()) => None,
             Err(error @ Error::Unsupported { .. }) => Some(error.to_string()),
             Err(other) => panic!("{other:?}"),
@@ -318,11 +352,20 @@ mod tests {
         let mut all = all_subgroups();
         all.core.multi_viewport = vk::TRUE;
         all.core.shader_resource_residency = vk::TRUE;
-        let features = Features::wanted(&all);
+        let features = Features::wanted(&all, FeatureSet::ALL);
         for capability in [C::Kernel, C::MultiViewport, C::SparseResidency, C::Linkage] {
             let found = refusal(ShaderStage::Compute, &module(&[capability]), &features).unwrap();
             assert!(found.contains("lvk turns on no device feature"), "{found}");
         }
+    }
+
+    #[test]
+    fn what_the_caller_allows_is_allowed() {
+        let of = module(&[C::Kernel, C::Linkage]);
+        let check =
+            |extra: &[u32]| check_capabilities("test", ShaderStage::Compute, &of, &all_subgroups(), extra);
+        assert!(check(&[C::Kernel as u32, C::Linkage as u32]).is_ok());
+        assert!(check(&[C::Linkage as u32]).unwrap_err().to_string().contains("Kernel"));
     }
 
     #[test]
@@ -348,7 +391,8 @@ mod tests {
 
     #[test]
     fn mesh_stages_are_refused_where_the_feature_is_off() {
-        let with = Features { mesh_shader: vk::TRUE, ..Features::default() };
+        let mut with = Features::default();
+        with.ext.mesh.mesh_shader = vk::TRUE;
         for stage in ShaderStage::ALL {
             let refused = check_stage("test", stage, &Features::default()).is_err();
             assert_eq!(refused, matches!(stage, ShaderStage::Task | ShaderStage::Mesh), "{stage:?}");
@@ -360,7 +404,7 @@ mod tests {
     fn atomics_are_allowed_where_their_feature_is_on() {
         let mut features = all_subgroups();
         features.v12.shader_buffer_int64_atomics = vk::TRUE;
-        features.float_atomics.shader_shared_float32_atomics = vk::TRUE;
+        features.ext.float_atomics.shader_shared_float32_atomics = vk::TRUE;
         let one = |is_float, bits, is_add, place| Reflection {
             atomics: vec![Atomic { is_float, bits, is_add, place }],
             ..Reflection::default()

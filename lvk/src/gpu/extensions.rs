@@ -1,0 +1,95 @@
+//! The feature structures of extensions: one chain to ask the device with and to make it with.
+
+use std::ffi::CStr;
+
+use ash::vk;
+
+/// What extensions offer; nothing is on where the device lacks the extension.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ExtensionFeatures {
+    pub(crate) structures: vk::PhysicalDeviceAccelerationStructureFeaturesKHR<'static>,
+    pub(crate) ray_tracing: vk::PhysicalDeviceRayTracingPipelineFeaturesKHR<'static>,
+    pub(crate) ray_query: vk::PhysicalDeviceRayQueryFeaturesKHR<'static>,
+    pub(crate) position_fetch: vk::PhysicalDeviceRayTracingPositionFetchFeaturesKHR<'static>,
+    pub(crate) mesh: vk::PhysicalDeviceMeshShaderFeaturesEXT<'static>,
+    pub(crate) float_atomics: vk::PhysicalDeviceShaderAtomicFloatFeaturesEXT<'static>,
+    pub(crate) local_read: vk::PhysicalDeviceDynamicRenderingLocalReadFeaturesKHR<'static>,
+    pub(crate) shading_rate: vk::PhysicalDeviceFragmentShadingRateFeaturesKHR<'static>,
+    pub(crate) barycentrics: vk::PhysicalDeviceFragmentShaderBarycentricFeaturesKHR<'static>,
+    pub(crate) index_uint8: vk::PhysicalDeviceIndexTypeUint8FeaturesKHR<'static>,
+    pub(crate) border_color: vk::PhysicalDeviceCustomBorderColorFeaturesEXT<'static>,
+    pub(crate) host_image_copy: vk::PhysicalDeviceHostImageCopyFeaturesEXT<'static>,
+    pub(crate) maintenance5: vk::PhysicalDeviceMaintenance5FeaturesKHR<'static>,
+    pub(crate) fault: vk::PhysicalDeviceFaultFeaturesEXT<'static>,
+    pub(crate) swapchain_maintenance1: vk::PhysicalDeviceSwapchainMaintenance1FeaturesEXT<'static>,
+    /// These have no features of their own: whether the device has them.
+    pub(crate) calibrated_timestamps: vk::Bool32,
+    pub(crate) memory_budget: vk::Bool32,
+    pub(crate) swapchain: vk::Bool32,
+    pub(crate) hdr_metadata: vk::Bool32,
+}
+
+impl ExtensionFeatures {
+    /// Hangs those structures behind `all` whose extension `has` knows: Vulkan forbids any other.
+    pub(crate) fn chain<'a>(
+        &'a mut self,
+        mut all: vk::PhysicalDeviceFeatures2<'a>,
+        has: &dyn Fn(&CStr) -> bool,
+    ) -> vk::PhysicalDeviceFeatures2<'a> {
+        if has(ash::khr::acceleration_structure::NAME) {
+            all = all.push_next(&mut self.structures);
+        }
+        if has(ash::khr::ray_tracing_pipeline::NAME) {
+            all = all.push_next(&mut self.ray_tracing);
+        }
+        if has(ash::khr::ray_query::NAME) {
+            all = all.push_next(&mut self.ray_query);
+        }
+        if has(ash::khr::ray_tracing_position_fetch::NAME) {
+            all = all.push_next(&mut self.position_fetch);
+        }
+        if has(ash::ext::mesh_shader::NAME) {
+            all = all.push_next(&mut self.mesh);
+        }
+        if has(ash::ext::shader_atomic_float::NAME) {
+            all = all.push_next(&mut self.float_atomics);
+        }
+        if has(ash::khr::dynamic_rendering_local_read::NAME) {
+            all = all.push_next(&mut self.local_read);
+        }
+        if has(ash::khr::fragment_shading_rate::NAME) {
+            all = all.push_next(&mut self.shading_rate);
+        }
+        if has(ash::khr::fragment_shader_barycentric::NAME) {
+            all = all.push_next(&mut self.barycentrics);
+        }
+        if has(ash::khr::index_type_uint8::NAME) {
+            all = all.push_next(&mut self.index_uint8);
+        }
+        if has(ash::ext::custom_border_color::NAME) {
+            all = all.push_next(&mut self.border_color);
+        }
+        if has(ash::ext::host_image_copy::NAME) {
+            all = all.push_next(&mut self.host_image_copy);
+        }
+        if has(ash::khr::maintenance5::NAME) {
+            all = all.push_next(&mut self.maintenance5);
+        }
+        if has(ash::ext::device_fault::NAME) {
+            all = all.push_next(&mut self.fault);
+        }
+        if has(ash::ext::swapchain_maintenance1::NAME) {
+            all = all.push_next(&mut self.swapchain_maintenance1);
+        }
+        all
+    }
+
+    /// Notes the extensions without features.
+    pub(crate) fn note_present(&mut self, has: &dyn Fn(&CStr) -> bool) {
+        let clocks = has(ash::khr::calibrated_timestamps::NAME) || has(ash::ext::calibrated_timestamps::NAME);
+        self.calibrated_timestamps = clocks.into();
+        self.memory_budget = has(ash::ext::memory_budget::NAME).into();
+        self.swapchain = has(ash::khr::swapchain::NAME).into();
+        self.hdr_metadata = has(ash::ext::hdr_metadata::NAME).into();
+    }
+}

@@ -1,0 +1,435 @@
+//! The optional features of devices: each once, with its name in Vulkan, its extension and its place.
+
+use std::ffi::CStr;
+use std::fmt;
+
+use ash::vk;
+
+use super::features::Features;
+
+/// A feature that some devices have and the library does not need. It is turned on wherever it is found, unless a
+/// [`DeviceProfile`](crate::DeviceProfile) hides it; [`Capabilities::has`](crate::Capabilities::has) says whether it is
+/// there. Ray tracing and mesh shaders have flags of their own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum OptionalFeature {
+    /// Indices above 2^24 - 1 (`fullDrawIndexUint32`).
+    FullDrawIndex,
+    /// Arrays of cubes can be made and sampled (`imageCubeArray`).
+    CubeArrays,
+    /// The geometry stage, and `gl_PrimitiveID` in fragment shaders (`geometryShader`).
+    GeometryShader,
+    /// The two tessellation stages (`tessellationShader`).
+    TessellationShader,
+    /// Fragment shaders that run once a sample (`sampleRateShading`).
+    SampleRateShading,
+    /// Blend factors from a second output of the fragment shader (`dualSrcBlend`).
+    DualSourceBlend,
+    /// Several draws from one indirect call of the driver (`multiDrawIndirect`).
+    MultiDrawIndirect,
+    /// Indirect draws whose first instance is not 0 (`drawIndirectFirstInstance`).
+    DrawIndirectFirstInstance,
+    /// Indirect draws that take their number from a buffer (`drawIndirectCount`).
+    DrawIndirectCount,
+    /// Depths beyond the range are clamped in place of clipped (`depthClamp`).
+    DepthClamp,
+    /// Depth biases with a bound (`depthBiasClamp`).
+    DepthBiasClamp,
+    /// Polygons as lines or points (`fillModeNonSolid`).
+    FillModeNonSolid,
+    /// Lines of other widths than 1 (`wideLines`).
+    WideLines,
+    /// Points of other sizes than 1 (`largePoints`).
+    LargePoints,
+    /// Anisotropic filters (`samplerAnisotropy`).
+    SamplerAnisotropy,
+    /// Formats BC1 to BC7 (`textureCompressionBC`).
+    TextureCompressionBc,
+    /// Formats ETC2 and EAC (`textureCompressionETC2`).
+    TextureCompressionEtc2,
+    /// Formats ASTC of low dynamic range (`textureCompressionASTC_LDR`).
+    TextureCompressionAstcLdr,
+    /// Formats ASTC of high dynamic range (`textureCompressionASTC_HDR`).
+    TextureCompressionAstcHdr,
+    /// Occlusion queries that count samples exactly (`occlusionQueryPrecise`).
+    OcclusionQueryPrecise,
+    /// Queries of what the stages of pipelines do (`pipelineStatisticsQuery`).
+    PipelineStatisticsQuery,
+    /// Vertex, tessellation and geometry shaders that write (`vertexPipelineStoresAndAtomics`).
+    VertexStoresAndAtomics,
+    /// `gl_PointSize` in the tessellation and geometry stages
+    /// (`shaderTessellationAndGeometryPointSize`).
+    TessellationAndGeometryPointSize,
+    /// Gathers with offsets that are not constant (`shaderImageGatherExtended`).
+    ImageGatherExtended,
+    /// More formats in the declarations of storage images (`shaderStorageImageExtendedFormats`).
+    StorageImageExtendedFormats,
+    /// Storage images of several samples (`shaderStorageImageMultisample`).
+    StorageImageMultisample,
+    /// Storage images read without a format in the shader
+    /// (`shaderStorageImageReadWithoutFormat`).
+    StorageImageReadWithoutFormat,
+    /// `gl_ClipDistance` (`shaderClipDistance`).
+    ClipDistance,
+    /// `gl_CullDistance` (`shaderCullDistance`).
+    CullDistance,
+    /// 64-bit floats in shaders (`shaderFloat64`).
+    Float64,
+    /// 64-bit integers in shaders (`shaderInt64`).
+    Int64,
+    /// 16-bit integers in shaders (`shaderInt16`).
+    Int16,
+    /// 16-bit floats in shaders (`shaderFloat16`).
+    Float16,
+    /// 8-bit integers in shaders (`shaderInt8`).
+    Int8,
+    /// Samples with a least level of detail (`shaderResourceMinLod`).
+    MinLod,
+    /// 16-bit values in buffers (`storageBuffer16BitAccess`).
+    StorageBuffer16Bit,
+    /// 16-bit values in uniform blocks too (`uniformAndStorageBuffer16BitAccess`).
+    UniformBuffer16Bit,
+    /// 16-bit push constants (`storagePushConstant16`).
+    PushConstant16Bit,
+    /// 16-bit values between stages (`storageInputOutput16`).
+    InputOutput16Bit,
+    /// 8-bit values in buffers (`storageBuffer8BitAccess`).
+    StorageBuffer8Bit,
+    /// 8-bit values in uniform blocks too (`uniformAndStorageBuffer8BitAccess`).
+    UniformBuffer8Bit,
+    /// 8-bit push constants (`storagePushConstant8`).
+    PushConstant8Bit,
+    /// Pointers into one buffer as values (`variablePointersStorageBuffer`).
+    VariablePointersStorageBuffer,
+    /// Pointers into buffers and shared memory as values (`variablePointers`).
+    VariablePointers,
+    /// `gl_DrawID`, `gl_BaseVertex` and `gl_BaseInstance` (`shaderDrawParameters`).
+    DrawParameters,
+    /// Passes that draw several views at once (`multiview`).
+    Multiview,
+    /// Geometry shaders in such passes (`multiviewGeometryShader`).
+    MultiviewGeometry,
+    /// Tessellation in such passes (`multiviewTessellationShader`).
+    MultiviewTessellation,
+    /// Mesh shaders in such passes (`multiviewMeshShader`).
+    MultiviewMesh,
+    /// Pipeline statistics of task and mesh shaders (`meshShaderQueries`).
+    MeshShaderQueries,
+    /// Textures in YCbCr (`samplerYcbcrConversion`).
+    YcbcrConversion,
+    /// Addresses mirrored once (`samplerMirrorClampToEdge`).
+    MirrorClampToEdge,
+    /// Filters that take the least or greatest texel (`samplerFilterMinmax`).
+    FilterMinMax,
+    /// Atomic operations on 64-bit integers in buffers (`shaderBufferInt64Atomics`).
+    BufferInt64Atomics,
+    /// Atomic operations on 64-bit integers in shared memory (`shaderSharedInt64Atomics`).
+    SharedInt64Atomics,
+    /// `gl_Layer` written by vertex and tessellation shaders (`shaderOutputLayer`).
+    ShaderOutputLayer,
+    /// Loads, stores and exchanges of floats in buffers, atomically (`shaderBufferFloat32Atomics`).
+    BufferFloatAtomics,
+    /// Sums of floats in buffers, atomically (`shaderBufferFloat32AtomicAdd`).
+    BufferFloatAtomicAdd,
+    /// Loads, stores and exchanges of floats in shared memory (`shaderSharedFloat32Atomics`).
+    SharedFloatAtomics,
+    /// Sums of floats in shared memory (`shaderSharedFloat32AtomicAdd`).
+    SharedFloatAtomicAdd,
+    /// Loads, stores and exchanges of floats in storage images (`shaderImageFloat32Atomics`).
+    ImageFloatAtomics,
+    /// Sums of floats in storage images (`shaderImageFloat32AtomicAdd`).
+    ImageFloatAtomicAdd,
+    /// Fragment shaders that read what their pass has drawn (`dynamicRenderingLocalRead`).
+    LocalRead,
+    /// Fragment shaders that run once for several pixels, by pipeline or draw
+    /// (`pipelineFragmentShadingRate`).
+    PipelineShadingRate,
+    /// The same, by primitive (`primitiveFragmentShadingRate`).
+    PrimitiveShadingRate,
+    /// The same, by an image (`attachmentFragmentShadingRate`).
+    AttachmentShadingRate,
+    /// The same, by primitives of mesh shaders (`primitiveFragmentShadingRateMeshShader`).
+    MeshPrimitiveShadingRate,
+    /// `gl_BaryCoordEXT` in fragment shaders (`fragmentShaderBarycentric`).
+    Barycentrics,
+    /// 8-bit indices (`indexTypeUint8`).
+    IndexTypeUint8,
+    /// Any colour beyond the edge of a texture (`customBorderColors`).
+    CustomBorderColors,
+    /// The same for samplers that know no format (`customBorderColorWithoutFormat`).
+    CustomBorderColorWithoutFormat,
+    /// Texels written by the CPU without a copy on the GPU (`hostImageCopy`).
+    HostImageCopy,
+    /// Formats A8 and A1B5G5R5, and what else is in `maintenance5`.
+    Maintenance5,
+    /// The clocks of device and host can be read together (`VK_KHR_calibrated_timestamps` or
+    /// `VK_EXT_calibrated_timestamps`).
+    CalibratedTimestamps,
+    /// How much memory of each heap is left (`VK_EXT_memory_budget`).
+    MemoryBudget,
+    /// What a lost device says of its fault (`deviceFault`).
+    DeviceFault,
+    /// Images of windows (`VK_KHR_swapchain`).
+    Swapchain,
+    /// Fences and modes for each present (`swapchainMaintenance1`).
+    SwapchainMaintenance1,
+    /// What a window's display is told of its pictures (`VK_EXT_hdr_metadata`).
+    HdrMetadata,
+}
+
+use OptionalFeature as F;
+
+impl OptionalFeature {
+    /// All of them.
+    pub fn all() -> impl ExactSizeIterator<Item = Self> {
+        ROWS.iter().map(|row| row.feature)
+    }
+
+    /// Its name in Vulkan: that of the member of a feature structure, or of the extension where that has no features.
+    pub fn vulkan_name(self) -> &'static str {
+        self.row().name
+    }
+
+    fn row(self) -> &'static Row {
+        &ROWS[self as usize]
+    }
+
+    fn bit(self) -> u128 {
+        1 << self as u32
+    }
+}
+
+/// Some of the [`OptionalFeature`]s.
+#[derive(Clone, Copy, PartialEq, Eq, Default)]
+pub struct FeatureSet(u128);
+
+impl FeatureSet {
+    /// None of them.
+    pub const NONE: Self = Self(0);
+    /// All of them, those of later versions included.
+    pub const ALL: Self = Self(u128::MAX);
+
+    /// Whether `feature` is one of them.
+    pub fn contains(self, feature: OptionalFeature) -> bool {
+        self.0 & feature.bit() != 0
+    }
+
+    /// These and `feature`.
+    #[must_use]
+    pub fn with(self, feature: OptionalFeature) -> Self {
+        Self(self.0 | feature.bit())
+    }
+
+    /// These without those of `other`.
+    #[must_use]
+    pub fn without(self, other: Self) -> Self {
+        Self(self.0 & !other.0)
+    }
+
+    /// Them, in the order of [`OptionalFeature::all`].
+    pub fn iter(self) -> impl Iterator<Item = OptionalFeature> {
+        OptionalFeature::all().filter(move |feature| self.contains(*feature))
+    }
+
+    /// Those of `features` that are on and can be used without the others.
+    pub(crate) fn of(features: &Features) -> Self {
+        let mut features = *features;
+        let on = ROWS.iter().filter(|row| *(row.place)(&mut features) == vk::TRUE);
+        on.map(|row| row.feature).collect::<Self>().whole()
+    }
+
+    /// Without those whose own requirement is not among them, which Vulkan forbids to turn on.
+    #[must_use]
+    pub(crate) fn whole(self) -> Self {
+        let orphans = REQUIREMENTS.into_iter().filter(|(_, needs)| !self.contains(*needs));
+        self.without(orphans.map(|(feature, _)| feature).collect())
+    }
+
+    /// Copies those of the set that `found` has to `wanted`.
+    pub(crate) fn turn_on(self, wanted: &mut Features, found: &Features) {
+        let mut found = *found;
+        for row in self.iter().map(OptionalFeature::row) {
+            *(row.place)(wanted) = *(row.place)(&mut found);
+        }
+    }
+
+    /// The extensions of them, some several times.
+    pub(crate) fn extensions(self) -> impl Iterator<Item = &'static CStr> {
+        self.iter().filter_map(|feature| feature.row().extension)
+    }
+}
+
+impl FromIterator<OptionalFeature> for FeatureSet {
+    fn from_iter<I: IntoIterator<Item = OptionalFeature>>(features: I) -> Self {
+        features.into_iter().fold(Self::NONE, Self::with)
+    }
+}
+
+impl fmt::Debug for FeatureSet {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        out.debug_set().entries(self.iter()).finish()
+    }
+}
+
+/// Of mesh shaders, which have a switch of their own.
+pub(crate) const OF_MESH_SHADERS: [OptionalFeature; 3] =
+    [F::MultiviewMesh, F::MeshShaderQueries, F::MeshPrimitiveShadingRate];
+
+/// Of a window's images: only where the instance knows windows.
+pub(crate) const OF_WINDOWS: [OptionalFeature; 3] = [F::Swapchain, F::SwapchainMaintenance1, F::HdrMetadata];
+
+/// Features that Vulkan takes only together with another.
+const REQUIREMENTS: [(OptionalFeature, OptionalFeature); 9] = [
+    (F::MultiviewGeometry, F::Multiview),
+    (F::MultiviewTessellation, F::Multiview),
+    (F::MultiviewMesh, F::Multiview),
+    (F::MeshShaderQueries, F::PipelineStatisticsQuery),
+    (F::MeshPrimitiveShadingRate, F::PrimitiveShadingRate),
+    (F::CustomBorderColorWithoutFormat, F::CustomBorderColors),
+    (F::SwapchainMaintenance1, F::Swapchain),
+    (F::HdrMetadata, F::Swapchain),
+    (F::VariablePointers, F::VariablePointersStorageBuffer),
+];
+
+struct Row {
+    feature: OptionalFeature,
+    name: &'static str,
+    extension: Option<&'static CStr>,
+    place: fn(&mut Features) -> &mut vk::Bool32,
+}
+
+#[rustfmt::skip]
+const ROWS: [Row; 79] = [
+    Row { feature: F::FullDrawIndex, name: "fullDrawIndexUint32", extension: None, place: |f| &mut f.core.full_draw_index_uint32 },
+    Row { feature: F::CubeArrays, name: "imageCubeArray", extension: None, place: |f| &mut f.core.image_cube_array },
+    Row { feature: F::GeometryShader, name: "geometryShader", extension: None, place: |f| &mut f.core.geometry_shader },
+    Row { feature: F::TessellationShader, name: "tessellationShader", extension: None, place: |f| &mut f.core.tessellation_shader },
+    Row { feature: F::SampleRateShading, name: "sampleRateShading", extension: None, place: |f| &mut f.core.sample_rate_shading },
+    Row { feature: F::DualSourceBlend, name: "dualSrcBlend", extension: None, place: |f| &mut f.core.dual_src_blend },
+    Row { feature: F::MultiDrawIndirect, name: "multiDrawIndirect", extension: None, place: |f| &mut f.core.multi_draw_indirect },
+    Row { feature: F::DrawIndirectFirstInstance, name: "drawIndirectFirstInstance", extension: None, place: |f| &mut f.core.draw_indirect_first_instance },
+    Row { feature: F::DrawIndirectCount, name: "drawIndirectCount", extension: None, place: |f| &mut f.v12.draw_indirect_count },
+    Row { feature: F::DepthClamp, name: "depthClamp", extension: None, place: |f| &mut f.core.depth_clamp },
+    Row { feature: F::DepthBiasClamp, name: "depthBiasClamp", extension: None, place: |f| &mut f.core.depth_bias_clamp },
+    Row { feature: F::FillModeNonSolid, name: "fillModeNonSolid", extension: None, place: |f| &mut f.core.fill_mode_non_solid },
+    Row { feature: F::WideLines, name: "wideLines", extension: None, place: |f| &mut f.core.wide_lines },
+    Row { feature: F::LargePoints, name: "largePoints", extension: None, place: |f| &mut f.core.large_points },
+    Row { feature: F::SamplerAnisotropy, name: "samplerAnisotropy", extension: None, place: |f| &mut f.core.sampler_anisotropy },
+    Row { feature: F::TextureCompressionBc, name: "textureCompressionBC", extension: None, place: |f| &mut f.core.texture_compression_bc },
+    Row { feature: F::TextureCompressionEtc2, name: "textureCompressionETC2", extension: None, place: |f| &mut f.core.texture_compression_etc2 },
+    Row { feature: F::TextureCompressionAstcLdr, name: "textureCompressionASTC_LDR", extension: None, place: |f| &mut f.core.texture_compression_astc_ldr },
+    Row { feature: F::TextureCompressionAstcHdr, name: "textureCompressionASTC_HDR", extension: None, place: |f| &mut f.v13.texture_compression_astc_hdr },
+    Row { feature: F::OcclusionQueryPrecise, name: "occlusionQueryPrecise", extension: None, place: |f| &mut f.core.occlusion_query_precise },
+    Row { feature: F::PipelineStatisticsQuery, name: "pipelineStatisticsQuery", extension: None, place: |f| &mut f.core.pipeline_statistics_query },
+    Row { feature: F::VertexStoresAndAtomics, name: "vertexPipelineStoresAndAtomics", extension: None, place: |f| &mut f.core.vertex_pipeline_stores_and_atomics },
+    Row { feature: F::TessellationAndGeometryPointSize, name: "shaderTessellationAndGeometryPointSize", extension: None, place: |f| &mut f.core.shader_tessellation_and_geometry_point_size },
+    Row { feature: F::ImageGatherExtended, name: "shaderImageGatherExtended", extension: None, place: |f| &mut f.core.shader_image_gather_extended },
+    Row { feature: F::StorageImageExtendedFormats, name: "shaderStorageImageExtendedFormats", extension: None, place: |f| &mut f.core.shader_storage_image_extended_formats },
+    Row { feature: F::StorageImageMultisample, name: "shaderStorageImageMultisample", extension: None, place: |f| &mut f.core.shader_storage_image_multisample },
+    Row { feature: F::StorageImageReadWithoutFormat, name: "shaderStorageImageReadWithoutFormat", extension: None, place: |f| &mut f.core.shader_storage_image_read_without_format },
+    Row { feature: F::ClipDistance, name: "shaderClipDistance", extension: None, place: |f| &mut f.core.shader_clip_distance },
+    Row { feature: F::CullDistance, name: "shaderCullDistance", extension: None, place: |f| &mut f.core.shader_cull_distance },
+    Row { feature: F::Float64, name: "shaderFloat64", extension: None, place: |f| &mut f.core.shader_float64 },
+    Row { feature: F::Int64, name: "shaderInt64", extension: None, place: |f| &mut f.core.shader_int64 },
+    Row { feature: F::Int16, name: "shaderInt16", extension: None, place: |f| &mut f.core.shader_int16 },
+    Row { feature: F::Float16, name: "shaderFloat16", extension: None, place: |f| &mut f.v12.shader_float16 },
+    Row { feature: F::Int8, name: "shaderInt8", extension: None, place: |f| &mut f.v12.shader_int8 },
+    Row { feature: F::MinLod, name: "shaderResourceMinLod", extension: None, place: |f| &mut f.core.shader_resource_min_lod },
+    Row { feature: F::StorageBuffer16Bit, name: "storageBuffer16BitAccess", extension: None, place: |f| &mut f.v11.storage_buffer16_bit_access },
+    Row { feature: F::UniformBuffer16Bit, name: "uniformAndStorageBuffer16BitAccess", extension: None, place: |f| &mut f.v11.uniform_and_storage_buffer16_bit_access },
+    Row { feature: F::PushConstant16Bit, name: "storagePushConstant16", extension: None, place: |f| &mut f.v11.storage_push_constant16 },
+    Row { feature: F::InputOutput16Bit, name: "storageInputOutput16", extension: None, place: |f| &mut f.v11.storage_input_output16 },
+    Row { feature: F::StorageBuffer8Bit, name: "storageBuffer8BitAccess", extension: None, place: |f| &mut f.v12.storage_buffer8_bit_access },
+    Row { feature: F::UniformBuffer8Bit, name: "uniformAndStorageBuffer8BitAccess", extension: None, place: |f| &mut f.v12.uniform_and_storage_buffer8_bit_access },
+    Row { feature: F::PushConstant8Bit, name: "storagePushConstant8", extension: None, place: |f| &mut f.v12.storage_push_constant8 },
+    Row { feature: F::VariablePointersStorageBuffer, name: "variablePointersStorageBuffer", extension: None, place: |f| &mut f.v11.variable_pointers_storage_buffer },
+    Row { feature: F::VariablePointers, name: "variablePointers", extension: None, place: |f| &mut f.v11.variable_pointers },
+    Row { feature: F::DrawParameters, name: "shaderDrawParameters", extension: None, place: |f| &mut f.v11.shader_draw_parameters },
+    Row { feature: F::Multiview, name: "multiview", extension: None, place: |f| &mut f.v11.multiview },
+    Row { feature: F::MultiviewGeometry, name: "multiviewGeometryShader", extension: None, place: |f| &mut f.v11.multiview_geometry_shader },
+    Row { feature: F::MultiviewTessellation, name: "multiviewTessellationShader", extension: None, place: |f| &mut f.v11.multiview_tessellation_shader },
+    Row { feature: F::MultiviewMesh, name: "multiviewMeshShader", extension: Some(ash::ext::mesh_shader::NAME), place: |f| &mut f.ext.mesh.multiview_mesh_shader },
+    Row { feature: F::MeshShaderQueries, name: "meshShaderQueries", extension: Some(ash::ext::mesh_shader::NAME), place: |f| &mut f.ext.mesh.mesh_shader_queries },
+    Row { feature: F::YcbcrConversion, name: "samplerYcbcrConversion", extension: None, place: |f| &mut f.v11.sampler_ycbcr_conversion },
+    Row { feature: F::MirrorClampToEdge, name: "samplerMirrorClampToEdge", extension: None, place: |f| &mut f.v12.sampler_mirror_clamp_to_edge },
+    Row { feature: F::FilterMinMax, name: "samplerFilterMinmax", extension: None, place: |f| &mut f.v12.sampler_filter_minmax },
+    Row { feature: F::BufferInt64Atomics, name: "shaderBufferInt64Atomics", extension: None, place: |f| &mut f.v12.shader_buffer_int64_atomics },
+    Row { feature: F::SharedInt64Atomics, name: "shaderSharedInt64Atomics", extension: None, place: |f| &mut f.v12.shader_shared_int64_atomics },
+    Row { feature: F::ShaderOutputLayer, name: "shaderOutputLayer", extension: None, place: |f| &mut f.v12.shader_output_layer },
+    Row { feature: F::BufferFloatAtomics, name: "shaderBufferFloat32Atomics", extension: Some(ash::ext::shader_atomic_float::NAME), place: |f| &mut f.ext.float_atomics.shader_buffer_float32_atomics },
+    Row { feature: F::BufferFloatAtomicAdd, name: "shaderBufferFloat32AtomicAdd", extension: Some(ash::ext::shader_atomic_float::NAME), place: |f| &mut f.ext.float_atomics.shader_buffer_float32_atomic_add },
+    Row { feature: F::SharedFloatAtomics, name: "shaderSharedFloat32Atomics", extension: Some(ash::ext::shader_atomic_float::NAME), place: |f| &mut f.ext.float_atomics.shader_shared_float32_atomics },
+    Row { feature: F::SharedFloatAtomicAdd, name: "shaderSharedFloat32AtomicAdd", extension: Some(ash::ext::shader_atomic_float::NAME), place: |f| &mut f.ext.float_atomics.shader_shared_float32_atomic_add },
+    Row { feature: F::ImageFloatAtomics, name: "shaderImageFloat32Atomics", extension: Some(ash::ext::shader_atomic_float::NAME), place: |f| &mut f.ext.float_atomics.shader_image_float32_atomics },
+    Row { feature: F::ImageFloatAtomicAdd, name: "shaderImageFloat32AtomicAdd", extension: Some(ash::ext::shader_atomic_float::NAME), place: |f| &mut f.ext.float_atomics.shader_image_float32_atomic_add },
+    Row { feature: F::LocalRead, name: "dynamicRenderingLocalRead", extension: Some(ash::khr::dynamic_rendering_local_read::NAME), place: |f| &mut f.ext.local_read.dynamic_rendering_local_read },
+    Row { feature: F::PipelineShadingRate, name: "pipelineFragmentShadingRate", extension: Some(ash::khr::fragment_shading_rate::NAME), place: |f| &mut f.ext.shading_rate.pipeline_fragment_shading_rate },
+    Row { feature: F::PrimitiveShadingRate, name: "primitiveFragmentShadingRate", extension: Some(ash::khr::fragment_shading_rate::NAME), place: |f| &mut f.ext.shading_rate.primitive_fragment_shading_rate },
+    Row { feature: F::AttachmentShadingRate, name: "attachmentFragmentShadingRate", extension: Some(ash::khr::fragment_shading_rate::NAME), place: |f| &mut f.ext.shading_rate.attachment_fragment_shading_rate },
+    Row { feature: F::MeshPrimitiveShadingRate, name: "primitiveFragmentShadingRateMeshShader", extension: Some(ash::ext::mesh_shader::NAME), place: |f| &mut f.ext.mesh.primitive_fragment_shading_rate_mesh_shader },
+    Row { feature: F::Barycentrics, name: "fragmentShaderBarycentric", extension: Some(ash::khr::fragment_shader_barycentric::NAME), place: |f| &mut f.ext.barycentrics.fragment_shader_barycentric },
+    Row { feature: F::IndexTypeUint8, name: "indexTypeUint8", extension: Some(ash::khr::index_type_uint8::NAME), place: |f| &mut f.ext.index_uint8.index_type_uint8 },
+    Row { feature: F::CustomBorderColors, name: "customBorderColors", extension: Some(ash::ext::custom_border_color::NAME), place: |f| &mut f.ext.border_color.custom_border_colors },
+    Row { feature: F::CustomBorderColorWithoutFormat, name: "customBorderColorWithoutFormat", extension: Some(ash::ext::custom_border_color::NAME), place: |f| &mut f.ext.border_color.custom_border_color_without_format },
+    Row { feature: F::HostImageCopy, name: "hostImageCopy", extension: Some(ash::ext::host_image_copy::NAME), place: |f| &mut f.ext.host_image_copy.host_image_copy },
+    Row { feature: F::Maintenance5, name: "maintenance5", extension: Some(ash::khr::maintenance5::NAME), place: |f| &mut f.ext.maintenance5.maintenance5 },
+    Row { feature: F::CalibratedTimestamps, name: "VK_KHR_calibrated_timestamps", extension: None, place: |f| &mut f.ext.calibrated_timestamps },
+    Row { feature: F::MemoryBudget, name: "VK_EXT_memory_budget", extension: Some(ash::ext::memory_budget::NAME), place: |f| &mut f.ext.memory_budget },
+    Row { feature: F::DeviceFault, name: "deviceFault", extension: Some(ash::ext::device_fault::NAME), place: |f| &mut f.ext.fault.device_fault },
+    Row { feature: F::Swapchain, name: "VK_KHR_swapchain", extension: Some(ash::khr::swapchain::NAME), place: |f| &mut f.ext.swapchain },
+    Row { feature: F::SwapchainMaintenance1, name: "swapchainMaintenance1", extension: Some(ash::ext::swapchain_maintenance1::NAME), place: |f| &mut f.ext.swapchain_maintenance1.swapchain_maintenance1 },
+    Row { feature: F::HdrMetadata, name: "VK_EXT_hdr_metadata", extension: Some(ash::ext::hdr_metadata::NAME), place: |f| &mut f.ext.hdr_metadata },
+];
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn each_feature_stands_at_its_own_row() {
+        for (index, row) in ROWS.iter().enumerate() {
+            assert_eq!(row.feature as usize, index, "{}", row.name);
+        }
+        assert!(ROWS.len() <= u128::BITS as usize);
+    }
+
+    #[test]
+    fn each_row_has_a_place_and_a_name_of_its_own() {
+        for row in &ROWS {
+            let mut features = Features::default();
+            *(row.place)(&mut features) = vk::TRUE;
+            for other in &ROWS {
+                let same = row.feature == other.feature;
+                assert_eq!(*(other.place)(&mut features) == vk::TRUE, same, "{} {}", row.name, other.name);
+                assert_eq!(row.name == other.name, same);
+            }
+        }
+    }
+
+    #[test]
+    fn a_feature_is_not_on_without_what_it_needs() {
+        let queries = FeatureSet::NONE.with(F::MeshShaderQueries);
+        assert_eq!(queries.whole(), FeatureSet::NONE);
+        let both = queries.with(F::PipelineStatisticsQuery);
+        assert_eq!(both.whole(), both);
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_on_is_found_and_in_the_set(found in any::<u128>(), set in any::<u128>()) {
+            let (found, set) = (FeatureSet(found), FeatureSet(set));
+            let mut device = Features::default();
+            for row in found.iter().map(OptionalFeature::row) {
+                *(row.place)(&mut device) = vk::TRUE;
+            }
+            let mut wanted = Features::default();
+            set.whole().turn_on(&mut wanted, &device);
+            for feature in OptionalFeature::all() {
+                let on = *(feature.row().place)(&mut wanted) == vk::TRUE;
+                prop_assert_eq!(on, found.contains(feature) && set.whole().contains(feature));
+            }
+        }
+    }
+}
