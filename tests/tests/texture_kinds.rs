@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    ColorAttachment, Context, Dependencies, Error, Filter, Format, Holder, RenderPassDesc, TextureDesc,
-    TextureHandle, TextureKind, TextureRegion, TextureUsage, TextureViewDesc,
+    ColorAttachment, Context, Dependencies, DepthAttachment, Error, Filter, Format, Holder, RenderPassDesc,
+    TextureDesc, TextureHandle, TextureKind, TextureRegion, TextureUsage, TextureViewDesc,
 };
 use lvk_tests::compute::{Evaluator, compute_pipeline};
 use lvk_tests::device;
@@ -382,6 +382,143 @@ fn impossible_volumes_and_cubes_are_typed_errors() {
         ctx.upload_texture(*flat, &TextureRegion { depth: 2, ..mip(0) }, &[0; 8]),
     ];
     for (index, result) in refused.into_iter().enumerate() {
+        assert!(matches!(result, Err(Error::InvalidUsage { .. })), "{index}: {result:?}");
+    }
+}
+
+/// Samples that both colour and depth may have, more than one.
+fn sample_counts(ctx: &Context) -> Vec<u32> {
+    let limits = ctx.capabilities().limits;
+    let both = limits.color_samples & limits.depth_samples;
+    (1..7).map(|bit| 1 << bit).filter(|count| both & count != 0).collect()
+}
+
+fn multisampled(format: Format, samples: u32) -> TextureDesc<'static> {
+    let usage = TextureUsage::TARGET | TextureUsage::SAMPLED;
+    TextureDesc { format, samples, usage, extent: [8, 4], debug_name: "samples", ..Default::default() }
+}
+
+#[test]
+fn every_sample_of_a_cleared_texture_has_the_colour_and_resolves_to_it() {
+    let Some(ctx) = device() else { return };
+    let color = [0.25, 0.5, 0.75, 1.0];
+    let fetch = Evaluator::new(&ctx, "textureBindlessFetch2DMS(a, ivec2(i % 8, i / 8 % 4), int(i / 32))");
+    let shape = Evaluator::new(&ctx, "vec4(textureBindlessSize2DMS(a), textureBindlessSamples2DMS(a), 0)");
+    let counts = sample_counts(&ctx);
+    assert!(counts.contains(&4), "Vulkan promises four samples, not only {counts:?}");
+    for samples in counts {
+        let kind = TextureKind::D2Array { layers: 2 };
+        let layers = texture(&ctx, &TextureDesc { kind, ..multisampled(Format::Rgba32Float, samples) });
+        let view = TextureViewDesc {
+            texture: Some(*layers),
+            kind: Some(TextureKind::D2),
+            base_layer: 1,
+            ..Default::default()
+        };
+        let view = ctx.create_texture_view(&view).unwrap();
+        let copy = texture(&ctx, &multisampled(Format::Rgba32Float, samples));
+        let (format, extent) = (Format::Rgba32Float, [9, 9]);
+        let resolved = texture(&ctx, &TextureDesc { format, extent, ..Default::default() });
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        cmd.clear_texture(*resolved, [2.0; 4]).unwrap();
+        cmd.clear_texture(*layers, [0.0; 4]).unwrap();
+        cmd.clear_texture(*view, color).unwrap();
+        let layer = TextureRegion { layer: 1, ..Default::default() };
+        cmd.copy_texture(*layers, &layer, *copy, &TextureRegion::default()).unwrap();
+        let from = TextureRegion { offset: [2, 1], extent: [3, 2], layer: 1, ..Default::default() };
+        let to = TextureRegion { offset: [5, 6], ..Default::default() };
+        cmd.resolve_texture(*layers, &from, *resolved, &to).unwrap();
+        ctx.submit(cmd).unwrap();
+        for seen in [&view, &copy] {
+            let words = [seen.index(), 0, 0];
+            assert_eq!(fetch.run(&ctx, words, 32 * samples, &NONE), vec![color; 32 * samples as usize]);
+            assert_eq!(shape.run(&ctx, words, 1, &NONE), [[8.0, 4.0, samples as f32, 0.0]]);
+        }
+        let found = floats(&ctx, *resolved, &TextureRegion::default());
+        for (i, texel) in found.chunks(4).enumerate() {
+            let inside = (5..8).contains(&(i % 9)) && (6..8).contains(&(i / 9));
+            assert_eq!(texel, if inside { color } else { [2.0; 4] }, "{i}");
+        }
+    }
+}
+
+#[test]
+fn passes_clear_several_samples_of_colour_and_depth() {
+    let Some(ctx) = device() else { return };
+    let fetch = Evaluator::new(&ctx, "textureBindlessFetch2DMS(a, ivec2(i % 8, i / 8 % 4), int(i / 32))");
+    for samples in sample_counts(&ctx) {
+        let color = texture(&ctx, &multisampled(Format::Rgba8Unorm, samples));
+        let depth = texture(&ctx, &multisampled(Format::D32Float, samples));
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        let pass = RenderPassDesc {
+            color: &[ColorAttachment::clear(*color, [1.0, 0.0, 0.0, 1.0])],
+            depth: Some(DepthAttachment::clear(*depth, 0.5)),
+            ..Default::default()
+        };
+        drop(cmd.begin_rendering(&pass).unwrap());
+        ctx.submit(cmd).unwrap();
+        let seen =
+            |texture: &Holder<TextureHandle>| fetch.run(&ctx, [texture.index(), 0, 0], 32 * samples, &NONE);
+        assert!(seen(&color).iter().all(|texel| *texel == [1.0, 0.0, 0.0, 1.0]));
+        assert!(seen(&depth).iter().all(|texel| texel[0] == 0.5));
+    }
+}
+
+#[test]
+fn what_several_samples_exclude_is_an_error() {
+    let Some(ctx) = device() else { return };
+    let samples = 4;
+    let plain = multisampled(Format::Rgba8Unorm, samples);
+    let wrong = [
+        TextureDesc { samples: 0, ..plain },
+        TextureDesc { samples: 3, ..plain },
+        TextureDesc { samples: 128, ..plain },
+        TextureDesc { mips: 0, ..plain },
+        TextureDesc { mips: 2, ..plain },
+        TextureDesc { kind: TextureKind::Cube, extent: [4, 4], ..plain },
+        TextureDesc { kind: TextureKind::D3 { depth: 2 }, ..plain },
+        TextureDesc { usage: TextureUsage::STORAGE, ..plain },
+        TextureDesc { data: Some(&[0; 128]), ..plain },
+    ];
+    for (index, desc) in wrong.iter().enumerate() {
+        let error = ctx.create_texture(desc).unwrap_err();
+        assert!(
+            matches!(&error, Error::InvalidUsage { object, .. } if object == "samples"),
+            "{index}: {error}"
+        );
+    }
+    let known = ctx.capabilities().limits.color_samples;
+    if let Some(unknown) = (1..7).map(|bit| 1 << bit).find(|count| known & count == 0) {
+        let error = ctx.create_texture(&multisampled(Format::Rgba8Unorm, unknown)).unwrap_err();
+        assert!(matches!(&error, Error::Unsupported { what, .. } if what.contains("'samples'")), "{error}");
+    }
+    let (many, one) = (texture(&ctx, &plain), texture(&ctx, &TextureDesc { samples: 1, ..plain }));
+    let floats = texture(&ctx, &TextureDesc { format: Format::Rgba16Float, samples: 1, ..plain });
+    let depth = texture(&ctx, &multisampled(Format::D32Float, samples));
+    let flat = texture(&ctx, &TextureDesc { samples: 1, ..multisampled(Format::D32Float, 1) });
+    let buffer = lvk::BufferDesc { size_bytes: 128, ..Default::default() };
+    let buffer = ctx.create_buffer(&buffer).unwrap();
+    let whole = TextureRegion::default();
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let (color, clear) = (ColorAttachment::clear(*many, [0.0; 4]), DepthAttachment::clear(*flat, 1.0));
+    let pass = RenderPassDesc { color: &[color], depth: Some(clear), ..Default::default() };
+    let results = [
+        cmd.begin_rendering(&pass).map(drop),
+        ctx.upload_texture(*many, &whole, &[0; 128]),
+        ctx.download_texture(*many, &whole).map(drop),
+        cmd.copy_buffer_to_texture(*buffer, 0, *many, &whole),
+        cmd.copy_texture_to_buffer(*many, &whole, *buffer, 0),
+        cmd.copy_texture(*many, &whole, *one, &whole),
+        cmd.blit_texture(*many, &whole, *one, &whole, Filter::Nearest),
+        cmd.blit_texture(*one, &whole, *many, &whole, Filter::Nearest),
+        cmd.generate_mipmaps(*many),
+        cmd.resolve_texture(*one, &whole, *many, &whole),
+        cmd.resolve_texture(*one, &whole, *one, &whole),
+        cmd.resolve_texture(*many, &whole, *floats, &whole),
+        cmd.resolve_texture(*depth, &whole, *flat, &whole),
+        cmd.resolve_texture(*many, &TextureRegion { offset: [8, 0], ..whole }, *one, &whole),
+    ];
+    for (index, result) in results.into_iter().enumerate() {
         assert!(matches!(result, Err(Error::InvalidUsage { .. })), "{index}: {result:?}");
     }
 }

@@ -71,6 +71,10 @@ impl<'a> RenderPass<'a> {
             );
             return Err(Error::usage(&*pipeline.name, message));
         }
+        if targets.samples != 1 {
+            let message = format!("it draws one sample a pixel, but the pass has {}", targets.samples);
+            return Err(Error::usage(&*pipeline.name, message));
+        }
         if !pipeline.query_stages.is_empty() {
             self.cmd.use_structures(pipeline.query_stages);
             let remedy =

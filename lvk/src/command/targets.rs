@@ -22,6 +22,8 @@ pub(super) struct Targets {
     pub(super) colors: Vec<vk::RenderingAttachmentInfo<'static>>,
     pub(super) depth: Option<vk::RenderingAttachmentInfo<'static>>,
     pub(super) stencil: bool,
+    /// Samples a pixel, the same in all targets.
+    pub(super) samples: u32,
 }
 
 impl CommandBuffer {
@@ -40,11 +42,12 @@ impl CommandBuffer {
             colors: Vec::new(),
             depth: None,
             stencil: false,
+            samples: 1,
         };
-        let mut extent = None;
+        let mut shape = None;
         let mut drawn = Vec::with_capacity(color.len());
         for attachment in color {
-            let texture = self.target(attachment.texture, attachment.mip, attachment.layer, &mut extent)?;
+            let texture = self.target(attachment.texture, attachment.mip, attachment.layer, &mut shape)?;
             check_color(&texture, attachment.load)?;
             let part = texture.part(attachment.mip, attachment.layer);
             if drawn.contains(&(texture.image.id, part)) {
@@ -57,7 +60,7 @@ impl CommandBuffer {
             targets.color_formats.push(texture.format);
         }
         if let Some(attachment) = depth {
-            let texture = self.target(attachment.texture, attachment.mip, attachment.layer, &mut extent)?;
+            let texture = self.target(attachment.texture, attachment.mip, attachment.layer, &mut shape)?;
             check_depth(&texture, attachment.load)?;
             let part = texture.drawn_part(attachment.mip, attachment.layer);
             self.use_texture(&texture, part, Use::depth_target())?;
@@ -65,26 +68,29 @@ impl CommandBuffer {
             targets.depth_format = Some(texture.format);
             targets.stencil = texture.format.has_stencil();
         }
-        targets.extent = extent
+        (targets.extent, targets.samples) = shape
             .ok_or_else(|| Error::usage("begin_rendering", "give the pass a colour or a depth target"))?;
         Ok(targets)
     }
 
-    /// Finds a target and checks that all targets are equally large.
+    /// Finds a target and checks that all targets are equally large, with equally many samples.
     fn target(
         &self,
         handle: TextureHandle,
         mip: u32,
         layer: u32,
-        extent: &mut Option<[u32; 2]>,
+        shape: &mut Option<([u32; 2], u32)>,
     ) -> Result<Arc<Texture>> {
         let texture = self.shared.store.textures.get(handle)?;
         texture.check_usage(TextureUsage::TARGET)?;
         texture.check_target(mip, layer)?;
-        let own = texture.mip_extent(mip);
-        if *extent.get_or_insert(own) != own {
-            let message =
-                format!("the target has {own:?} pixels, another one of the pass {:?}", extent.unwrap_or(own));
+        let own = (texture.mip_extent(mip), texture.image.samples);
+        let first = *shape.get_or_insert(own);
+        if first != own {
+            let message = format!(
+                "the target has {:?} pixels of {} samples, another one of the pass {:?} of {}",
+                own.0, own.1, first.0, first.1
+            );
             return Err(Error::usage(&texture.name, message));
         }
         Ok(texture)

@@ -169,6 +169,66 @@ impl CommandBuffer {
         Ok(())
     }
 
+    /// Copies a region of a multisampled colour texture to one of one sample, each texel the mean of its samples, of
+    /// integers one of them (`vkCmdResolveImage`). Both have one format, and both regions have the extent of the first.
+    /// Depth and stencil are resolved by passes.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) for other numbers of samples, for different formats, for depth, and for
+    /// regions that do not exist; [`Unsupported`](Error::Unsupported) where the format cannot be resolved to.
+    pub fn resolve_texture(
+        &mut self,
+        source: TextureHandle,
+        from: &TextureRegion,
+        target: TextureHandle,
+        to: &TextureRegion,
+    ) -> Result<()> {
+        let source = self.shared.store.textures.get(source)?;
+        let target = self.shared.store.textures.get(target)?;
+        let from = source.resolve_region(from)?;
+        let to = target.resolve_region(&TextureRegion { extent: from.extent, depth: from.depth, ..*to })?;
+        self.check_resolve(&source, &target)?;
+        self.use_texture_pair(&source, &from, &target, &to)?;
+        let resolve = vk::ImageResolve {
+            src_subresource: source.layers_of(from.mip, from.layer),
+            src_offset: from.raw_offset(),
+            dst_subresource: target.layers_of(to.mip, to.layer),
+            dst_offset: to.raw_offset(),
+            extent: from.raw_extent(),
+        };
+        // SAFETY: both regions lie inside their images of one format, the first with several samples, the other with one.
+        unsafe {
+            let device = &self.shared.gpu.device;
+            device.cmd_resolve_image(
+                self.raw(),
+                source.image.raw,
+                SOURCE,
+                target.image.raw,
+                TARGET,
+                &[resolve],
+            );
+        }
+        self.settle.extend([source, target].map(Settle::Texture));
+        Ok(())
+    }
+
+    fn check_resolve(&self, source: &Texture, target: &Texture) -> Result<()> {
+        target.check_one_sample("resolves write")?;
+        let [from, to] = [source, target].map(|texture| texture.image.format);
+        if source.image.samples == 1 {
+            return Err(Error::usage(&source.name, "it has one sample a texel; copy or blit it"));
+        }
+        if from != to || from.is_depth() {
+            let message = format!("{from:?} cannot be resolved to {to:?}; both must be one colour format");
+            return Err(Error::usage(&target.name, message));
+        }
+        if self.shared.gpu.image_features(to.raw()).contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT) {
+            return Ok(());
+        }
+        let what = format!("a resolve from '{}' to '{}'", source.name, target.name);
+        Err(Error::unsupported(what, format!("the device cannot resolve {to:?}; use a shader")))
+    }
+
     /// Copies and scales a region, converting the format (`vkCmdBlitImage`). Views count as of the format of the texture
     /// they show.
     pub fn blit_texture(
@@ -257,6 +317,7 @@ impl CommandBuffer {
         bytes: &[u8],
     ) -> Result<()> {
         let region = target.resolve_region(region)?;
+        target.check_one_sample("uploads write")?;
         let expected = region.texels() * u64::from(target.format.texel_bytes());
         if bytes.len() as u64 != expected {
             let message = format!("{} bytes were given for texels of {expected} bytes", bytes.len());
@@ -295,6 +356,7 @@ impl CommandBuffer {
         region: &TextureRegion,
     ) -> Result<TextureRegion> {
         let region = texture.resolve_region(region)?;
+        texture.check_one_sample("copies from and to buffers move")?;
         let texel = u64::from(texture.format.texel_bytes());
         if !offset.is_multiple_of(texel.max(4)) {
             let message = format!("the offset {offset} is no multiple of {} bytes", texel.max(4));
@@ -322,6 +384,8 @@ impl CommandBuffer {
     }
 
     fn check_blit(&self, source: &Texture, target: &Texture, filter: Filter) -> Result<()> {
+        source.check_one_sample("blits read")?;
+        target.check_one_sample("blits write")?;
         let gpu = &self.shared.gpu;
         let linear = match filter {
             Filter::Nearest => vk::FormatFeatureFlags::empty(),
@@ -417,6 +481,13 @@ fn resting_use(usage: TextureUsage) -> Option<Use> {
 fn check_copyable(source: &Texture, target: &Texture) -> Result<()> {
     let depth = |format: Format| format.is_depth();
     let (from, to) = (source.image.format, target.image.format);
+    if source.image.samples != target.image.samples {
+        let message = format!(
+            "texels of {} samples cannot be copied to texels of {}; resolve, or use a shader",
+            source.image.samples, target.image.samples
+        );
+        return Err(Error::usage(&target.name, message));
+    }
     let same_bits = from.texel_bytes() == to.texel_bytes() && !depth(from) && !depth(to);
     if from == to || same_bits {
         return Ok(());

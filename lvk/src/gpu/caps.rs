@@ -176,6 +176,10 @@ pub struct Limits {
     pub max_texture_cube: u32,
     /// Most layers of a texture (`maxImageArrayLayers`).
     pub max_texture_layers: u32,
+    /// Numbers of samples a pixel that colour targets may have, added up: 5 is 1 and 4 (`framebufferColorSampleCounts`).
+    pub color_samples: u32,
+    /// Those that depth targets may have (`framebufferDepthSampleCounts`).
+    pub depth_samples: u32,
     /// Largest buffer in bytes (`maxBufferSize`).
     pub max_buffer_bytes: u64,
     /// Most bytes a shader reaches through one storage buffer descriptor (`maxStorageBufferRange`).
@@ -448,6 +452,8 @@ fn limits(
         max_texture_3d: plain.max_image_dimension3_d,
         max_texture_cube: plain.max_image_dimension_cube,
         max_texture_layers: plain.max_image_array_layers,
+        color_samples: plain.framebuffer_color_sample_counts.as_raw(),
+        depth_samples: plain.framebuffer_depth_sample_counts.as_raw(),
         max_buffer_bytes: v13.max_buffer_size,
         max_storage_buffer_range: plain.max_storage_buffer_range.into(),
         max_push_constant_bytes: plain.max_push_constants_size,

@@ -26,6 +26,8 @@ pub(crate) struct Image {
     volume: bool,
     pub(crate) shape: TextureShape,
     pub(crate) usage: TextureUsage,
+    /// Samples a texel.
+    pub(crate) samples: u32,
     /// What other formats views may have.
     pub(crate) view_formats: Vec<Format>,
     /// Whether six layers can be seen as a cube.
@@ -76,6 +78,7 @@ impl Image {
             volume: desc.kind.is_3d(),
             shape: TextureShape { mips, layers: desc.kind.layers() },
             usage: desc.usage,
+            samples: desc.samples,
             view_formats: desc.view_formats.to_vec(),
             cube_compatible: flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE),
             handles: AtomicU32::new(1),
@@ -197,6 +200,7 @@ fn check_shape(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<u32> {
     }
     check_sides(gpu, desc)?;
     check_limit(name, "layer count", layers.into(), gpu.caps.limits.max_texture_layers.into())?;
+    check_samples(desc)?;
     let full = 32 - width.max(height).max(depth).leading_zeros();
     if desc.mips > full {
         let message =
@@ -204,6 +208,28 @@ fn check_shape(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<u32> {
         return Err(Error::usage(name, message));
     }
     Ok(if desc.mips == 0 { full } else { desc.mips })
+}
+
+/// Fails unless the texture may have as many samples a texel, for all that does not depend on the device.
+fn check_samples(desc: &TextureDesc<'_>) -> Result<()> {
+    let wrong =
+        |message: &str| Err(Error::usage(desc.debug_name, format!("{} samples: {message}", desc.samples)));
+    if !desc.samples.is_power_of_two() || desc.samples > 64 {
+        return wrong("a texel has 1, 2, 4, 8, 16, 32 or 64");
+    }
+    if desc.samples == 1 {
+        return Ok(());
+    }
+    if !matches!(desc.kind, TextureKind::D2 | TextureKind::D2Array { .. }) || desc.mips != 1 {
+        return wrong("multisampled textures are D2 or D2Array, with one mip");
+    }
+    if desc.usage.contains(TextureUsage::STORAGE) {
+        return wrong("storage images have one; resolve to another texture");
+    }
+    if desc.data.is_some() {
+        return wrong("data cannot be uploaded; draw to the texture, or clear it");
+    }
+    Ok(())
 }
 
 fn check_sides(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<()> {
@@ -260,7 +286,9 @@ fn flags(gpu: &Gpu, desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateFlags {
         TextureKind::D3 { .. } if desc.usage.contains(TextureUsage::TARGET) => {
             formats | Flags::TYPE_2D_ARRAY_COMPATIBLE
         }
-        TextureKind::D2Array { layers } if layers >= 6 && desc.extent[0] == desc.extent[1] => {
+        TextureKind::D2Array { layers }
+            if layers >= 6 && desc.extent[0] == desc.extent[1] && desc.samples == 1 =>
+        {
             let small = desc.extent[0] <= gpu.caps.limits.max_texture_cube;
             let allowed = gpu.image_limits(&image_info(desc, mips).flags(cube));
             let allowed = allowed.is_ok_and(|limits| limits.max_array_layers >= layers);
@@ -278,7 +306,7 @@ fn image_info(desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateInfo<'static>
         .extent(vk::Extent3D { width: desc.extent[0], height: desc.extent[1], depth: desc.kind.depth() })
         .mip_levels(mips)
         .array_layers(desc.kind.layers())
-        .samples(vk::SampleCountFlags::TYPE_1)
+        .samples(vk::SampleCountFlags::from_raw(desc.samples))
         .tiling(vk::ImageTiling::OPTIMAL)
         .usage(raw_usage(desc.usage, desc.format) | copies)
         .initial_layout(vk::ImageLayout::UNDEFINED)
@@ -304,6 +332,13 @@ fn check_format(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_
     if !desc.view_formats.is_empty() && !usages.contains(desc.usage) {
         return Err(refused());
     }
+    if !limits.sample_counts.contains(info.samples) {
+        let what =
+            format!("texture '{name}' of {} samples a texel with format {:?}", desc.samples, desc.format);
+        let counts = limits.sample_counts.as_raw();
+        let counts: Vec<_> = (0..7).map(|bit| 1_u32 << bit).filter(|count| counts & count != 0).collect();
+        return Err(Error::unsupported(what, format!("with this usage the device takes {counts:?}")));
+    }
     let side = u64::from(desc.extent[0].max(desc.extent[1]));
     let limit = limits.max_extent.width.min(limits.max_extent.height);
     check_limit(name, "texture side in texels for its format", side, limit.into())?;
@@ -312,7 +347,7 @@ fn check_format(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_
     check_limit(name, "mip count for its format", info.mip_levels.into(), limits.max_mip_levels.into())?;
     let layers = u64::from(info.array_layers);
     check_limit(name, "layer count for its format", layers, limits.max_array_layers.into())?;
-    let texels = desc.extent.map(u64::from).into_iter().chain([depth, layers]);
+    let texels = desc.extent.map(u64::from).into_iter().chain([depth, layers, desc.samples.into()]);
     let bytes = texels.fold(desc.format.texel_bytes().into(), u64::saturating_mul);
     check_limit(name, "texture size in bytes", bytes, limits.max_resource_size)
 }

@@ -230,6 +230,16 @@ impl Texture {
         Err(Error::usage(&self.name, message))
     }
 
+    /// Fails for textures of several samples a texel, which `what` cannot read or write.
+    pub(crate) fn check_one_sample(&self, what: &str) -> Result<()> {
+        if self.image.samples == 1 {
+            return Ok(());
+        }
+        let message =
+            format!("{what} texels of one sample, not of {}; resolve them first", self.image.samples);
+        Err(Error::usage(&self.name, message))
+    }
+
     /// The buffer copy of a resolved region whose bytes start at `buffer_offset`, tightly packed.
     pub(crate) fn buffer_copy(&self, region: &TextureRegion, buffer_offset: u64) -> vk::BufferImageCopy {
         vk::BufferImageCopy {

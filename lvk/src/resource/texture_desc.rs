@@ -81,6 +81,10 @@ pub struct TextureDesc<'a> {
     pub extent: [u32; 2],
     /// Number of mips; 0 is the whole chain down to one texel.
     pub mips: u32,
+    /// Samples a texel: 1, or a power of two for a multisampled target, an element of `kTextures2DMS[]`. It has one mip,
+    /// is `D2` or `D2Array`, and takes no data: passes and clears write it, resolves read it.
+    /// [`Limits::color_samples`](crate::Limits) says which counts there are.
+    pub samples: u32,
     /// What the texture is used for.
     pub usage: TextureUsage,
     /// Other colour formats, of texels of the same size, in which
@@ -104,6 +108,7 @@ impl Default for TextureDesc<'_> {
             format: Format::Rgba8Unorm,
             extent: [1, 1],
             mips: 1,
+            samples: 1,
             usage: TextureUsage::SAMPLED,
             view_formats: &[],
             data: None,

@@ -145,7 +145,8 @@ pub enum ShaderSource<'a> {
 ///   `..2DGrad`, `..2DGather`, `..2DShadow(tex, smp, vec3(uv, reference))`, `..2DArray[Lod]`, `..3D[Lod]`,
 ///   `..Cube[Lod]`, `textureBindlessFetch2D(tex, texel, lod)` (`FetchU2D`, `FetchI2D`), `textureBindlessSize2D(tex)`
 ///   (`Size2DArray`, `Size3D`, `SizeCube`), `textureBindlessQueryLevels2D(tex)` (`QueryLevelsCube`). Those without an
-///   explicit level use derivatives in fragment shaders and mip level 0 in every other stage.
+///   explicit level use derivatives in fragment shaders and mip level 0 in every other stage. Of multisampled textures,
+///   `kTextures2DMS`, there are `textureBindlessFetch2DMS(tex, texel, sample)`, `..Size2DMS` and `..Samples2DMS`.
 /// * Textures of other shapes are declared once at global scope: `LVK_TEXTURES(utexture3D, kVolumes);`. After
 ///   `LVK_TEXTURES(textureCubeArray, kTexturesCubeArray);` there are `textureBindlessCubeArray[Lod]` with the number of
 ///   the cube as fourth coordinate, and `textureBindlessSizeCubeArray(tex)`.

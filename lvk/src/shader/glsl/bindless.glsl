@@ -4,6 +4,7 @@ layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform texture3D kT
 layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform textureCube kTexturesCube[];
 layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform utexture2D kTexturesU2D[];
 layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform itexture2D kTexturesI2D[];
+layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform texture2DMS kTextures2DMS[];
 #define kTextures2DShadow kTextures2D
 
 // Textures of a further shape, declared by the shaders that want them, as it may need a feature of the device; `type` is
@@ -72,6 +73,10 @@ ivec4 textureBindlessFetchI2D(uint tex, ivec2 texel, int lod) { return texelFetc
 #define textureBindlessCubeArray(tex, smp, dirCube) LVK_SAMPLE(LVK_CUBE_ARRAY(tex, smp), dirCube)
 #define textureBindlessCubeArrayLod(tex, smp, dirCube, lod) textureLod(LVK_CUBE_ARRAY(tex, smp), dirCube, lod)
 #define textureBindlessSizeCubeArray(tex) textureSize(kTexturesCubeArray[nonuniformEXT(tex)], 0)
+
+vec4 textureBindlessFetch2DMS(uint tex, ivec2 texel, int smp) { return texelFetch(kTextures2DMS[nonuniformEXT(tex)], texel, smp); }
+ivec2 textureBindlessSize2DMS(uint tex) { return textureSize(kTextures2DMS[nonuniformEXT(tex)]); }
+int textureBindlessSamples2DMS(uint tex) { return textureSamples(kTextures2DMS[nonuniformEXT(tex)]); }
 
 ivec2 textureBindlessSize2D(uint tex) { return textureSize(kTextures2D[nonuniformEXT(tex)], 0); }
 ivec3 textureBindlessSize2DArray(uint tex) { return textureSize(kTextures2DArray[nonuniformEXT(tex)], 0); }
