@@ -50,6 +50,7 @@
 //! | trace rays with a pipeline | [`RayTracingPipelineDesc`], [`CommandBuffer::trace_rays`] |
 //! | link compiled shaders into several pipelines | [`RayTracingLibraryDesc`] |
 //! | keep compiled pipelines on disk | [`ContextDesc::pipeline_cache`] |
+//! | keep compiled shaders on disk | [`ContextDesc::shader_cache`] |
 //! | trace rays in any shader | [`ShaderModuleDesc`] with `#include <lvk/ray_query.glsl>` |
 //! | read how it all hangs together | [`manual`] |
 //! | build what rays hit | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
@@ -92,6 +93,7 @@ mod barrier;
 mod bindless;
 mod command;
 mod context;
+mod disk;
 mod error;
 mod format;
 mod gpu;
@@ -162,5 +164,5 @@ pub use resource::texture_desc::{TextureDesc, TextureKind, TextureUsage};
 pub use resource::view::{Channel, Swizzle, TextureViewDesc};
 #[cfg(feature = "glsl")]
 pub use shader::compile_glsl;
-pub use shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
+pub use shader::{ShaderCacheCounts, ShaderModuleDesc, ShaderSource, ShaderStage};
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};

@@ -22,6 +22,7 @@ use crate::pipeline::{
     ComputePipeline, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline, RenderPipeline,
 };
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
+use crate::shader::ShaderCache;
 use crate::software::tree_cache::TreeCache;
 use crate::store::Store;
 use crate::submit::Submitter;
@@ -44,6 +45,8 @@ pub(crate) struct Shared {
     pub(crate) layout: PipelineLayout,
     /// Where the context keeps compiled pipelines in a file.
     pub(crate) pipeline_cache: Option<PipelineCache>,
+    /// Where the context keeps SPIR-V that was compiled from GLSL.
+    pub(crate) shader_cache: Option<ShaderCache>,
     pub(crate) bindless: Bindless,
     /// Where the context keeps trees that the CPU has built.
     pub(crate) tree_cache: Option<TreeCache>,

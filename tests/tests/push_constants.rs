@@ -204,6 +204,69 @@ fn unknown_and_wide_specialization_constants_are_errors() {
             layout(constant_id = 5) const uint64_t wide = 1;
             shared uint sum;
             void main() { sum = uint(wide); }";
-        refuse(wide, 5, "does not have 32 bits");
+        refuse(wide, 5, "has 64 bits in a shader, and 32 were given");
     }
+}
+
+const WIDE_CONSTANTS: &str = "
+    layout(local_size_x = 1) in;
+    layout(constant_id = 4) const double real_ = 3.0LF;
+    layout(constant_id = 9) const uint narrow_ = 5;
+    layout(constant_id = 0) const uint64_t unsigned_ = 1;
+    layout(constant_id = 1) const int64_t signed_ = 2;
+    layout(buffer_reference, scalar) writeonly buffer Result { uint64_t unsigned_; int64_t signed_; double real_; uint narrow_; };
+    layout(push_constant, scalar) uniform Push { Result result; };
+    void main() {
+        result.unsigned_ = unsigned_;
+        result.signed_ = signed_;
+        result.real_ = real_;
+        result.narrow_ = narrow_;
+    }";
+
+fn wide_constants(ctx: &Context, specialization: &[SpecializationConstant]) -> (u64, i64, f64, u32) {
+    let module = module(ctx, ShaderStage::Compute, WIDE_CONSTANTS);
+    let desc = ComputePipelineDesc { module: Some(*module), specialization, ..Default::default() };
+    let pipeline = ctx.create_compute_pipeline(&desc).unwrap();
+    let result = words_buffer(ctx, &[99; 7]);
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.bind_compute_pipeline(*pipeline).unwrap();
+    cmd.push_constants(&ctx.buffer_address(*result).unwrap()).unwrap();
+    cmd.dispatch([1, 1, 1], &Dependencies { buffers: &[*result], ..Default::default() }).unwrap();
+    ctx.submit(cmd).unwrap();
+    let words = read_words(ctx, *result, 7);
+    let wide = |at: usize| u64::from(words[at]) | u64::from(words[at + 1]) << 32;
+    (wide(0), wide(2).cast_signed(), f64::from_bits(wide(4)), words[6])
+}
+
+#[test]
+fn specialization_constants_of_64_bits_take_their_values() {
+    let Some(ctx) = device() else { return };
+    let wide = ShaderModuleDesc {
+        stage: ShaderStage::Compute,
+        source: ShaderSource::Glsl(WIDE_CONSTANTS),
+        ..Default::default()
+    };
+    if matches!(ctx.create_shader_module(&wide), Err(Error::Unsupported { .. })) {
+        eprintln!("NOT TESTED, the device has no numbers of 64 bits");
+        return;
+    }
+    assert_eq!(wide_constants(&ctx, &[]), (1, 2, 3.0, 5));
+    let all = [
+        constant(9, SpecializationValue::U32(77)),
+        constant(1, SpecializationValue::I64(i64::MIN + 3)),
+        constant(4, SpecializationValue::F64(0.1)),
+        constant(0, SpecializationValue::U64(u64::MAX - 1)),
+    ];
+    assert_eq!(wide_constants(&ctx, &all), (u64::MAX - 1, i64::MIN + 3, 0.1, 77));
+    assert_eq!(wide_constants(&ctx, &all[2..3]), (1, 2, 0.1, 5));
+    let module = module(&ctx, ShaderStage::Compute, CONSTANTS);
+    let specialization = [constant(0, SpecializationValue::U64(1))];
+    let desc =
+        ComputePipelineDesc { module: Some(*module), specialization: &specialization, ..Default::default() };
+    let refused = ctx.create_compute_pipeline(&desc);
+    let words = "has 32 bits in a shader, and 64 were given";
+    assert!(
+        matches!(&refused, Err(Error::InvalidUsage { message, .. }) if message.contains(words)),
+        "{refused:?}"
+    );
 }

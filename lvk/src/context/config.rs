@@ -57,6 +57,15 @@ pub struct ContextDesc<'a> {
     /// A file that is damaged, or of another device or driver, is dropped with a warning to the `log` crate, never an
     /// error. Drivers trust what is in it, so it belongs into a folder that nobody else can write.
     pub pipeline_cache: Option<&'a Path>,
+    /// A folder that keeps the SPIR-V of GLSL modules from one run to the next, each under a checksum of its text, its
+    /// defines, the library's preamble for the device and the version of the compiler; what it includes is compared as well,
+    /// text by text. It is made when needed, several contexts may share it, and above 64 MiB what was not used for longest
+    /// is removed; files of others are left alone.
+    ///
+    /// A file that is damaged, or of another version, is dropped with a warning to the `log` crate and made anew, never an
+    /// error. What the compiler warns of is said when it compiles, not when its words are found. Keep the folder where only
+    /// the program writes it, and give builds with another version of the `glslang` crate one of their own.
+    pub shader_cache: Option<&'a Path>,
     /// A folder that keeps the trees that the CPU builds where software traces, from one run to the next, each under the
     /// checksum of the primitives and settings it was built from. It is made when needed, and never emptied.
     ///
@@ -84,6 +93,7 @@ impl Default for ContextDesc<'_> {
             accel_budget_bytes: u64::MAX,
             max_textures: 16_384,
             pipeline_cache: None,
+            shader_cache: None,
             tree_cache: None,
         }
     }

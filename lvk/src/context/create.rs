@@ -17,7 +17,7 @@ use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::resource::query::QueryPoolDesc;
 use crate::resource::sampler::SamplerDesc;
 use crate::resource::{Buffer, QueryPool, Sampler};
-use crate::shader::{ShaderModuleDesc, raw_hit_number};
+use crate::shader::{ShaderCache, ShaderCacheCounts, ShaderModuleDesc, raw_hit_number};
 
 /// Objects that take no bindless slot.
 pub(super) const NO_SLOT: u32 = 0;
@@ -52,9 +52,20 @@ impl Context {
     /// those of the task and mesh stages.
     pub fn create_shader_module(&self, desc: &ShaderModuleDesc<'_>) -> Result<Holder<ShaderModuleHandle>> {
         let shared = self.shared();
-        let module = ShaderModule::new(&shared.gpu, desc, shared.layout.push_constant_bytes)?;
+        let module = ShaderModule::new(
+            &shared.gpu,
+            desc,
+            shared.shader_cache.as_ref(),
+            shared.layout.push_constant_bytes,
+        )?;
         warn_of_raw_numbers(&shared.gpu.caps, desc);
         Ok(Holder::new(self, shared.store.shader_modules.insert(module), NO_SLOT))
+    }
+
+    /// How many modules made from GLSL were found in the folder of
+    /// [`ContextDesc::shader_cache`](crate::ContextDesc::shader_cache), and how many were not; zeros without a folder.
+    pub fn shader_cache_counts(&self) -> ShaderCacheCounts {
+        self.shared().shader_cache.as_ref().map(ShaderCache::counts).unwrap_or_default()
     }
 
     /// Creates a graphics pipeline (`vkCreateGraphicsPipelines`) of a vertex shader, or of a mesh shader with or without

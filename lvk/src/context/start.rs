@@ -23,6 +23,7 @@ use crate::kernel::Kernels;
 use crate::pipeline::{PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
+use crate::shader::ShaderCache;
 use crate::shared::Shared;
 use crate::software::tree_cache::TreeCache;
 use crate::store::Store;
@@ -98,6 +99,7 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         tlas_table: new_tlas_table(&gpu)?,
         layout: PipelineLayout::new(&gpu, bindless.set_layout)?,
         pipeline_cache: desc.pipeline_cache.map(|path| PipelineCache::new(&gpu, path)).transpose()?,
+        shader_cache: desc.shader_cache.map(ShaderCache::new),
         tree_cache: desc.tree_cache.map(TreeCache::new),
         bindless,
         submitter: Submitter::new(&gpu)?,

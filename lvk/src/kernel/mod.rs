@@ -185,7 +185,7 @@ impl Kernel {
             debug_name: self.name(),
             ..Default::default()
         };
-        let module = ShaderModule::new(gpu, &desc, layout.push_constant_bytes)?;
+        let module = ShaderModule::new(gpu, &desc, None, layout.push_constant_bytes)?;
         let desc = ComputePipelineDesc { debug_name: self.name(), ..Default::default() };
         ComputePipeline::new(gpu, PipelineBase { layout: layout.raw, cache }, &desc, &module)
     }
@@ -233,7 +233,7 @@ mod tests {
                 debug_name: file,
                 ..Default::default()
             };
-            let words = crate::shader::compile(&desc, &Default::default())
+            let words = crate::shader::compile(&desc, &Default::default(), None)
                 .unwrap_or_else(|error| panic!("{file}: {error}"));
             if std::env::var("LVK_UPDATE_KERNELS").is_ok() {
                 let path = folder.join(format!("{file}.comp.spv"));

@@ -15,5 +15,8 @@ pub mod splitting_and_profiles {}
 #[doc = include_str!("ray_tracing_pipelines.md")]
 pub mod ray_tracing_pipelines {}
 
+#[doc = include_str!("shaders.md")]
+pub mod shaders {}
+
 #[doc = include_str!("measuring.md")]
 pub mod measuring {}

@@ -6,7 +6,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::vk;
 
-use super::cache_file::{CacheOwner, checksum, read, replace, seal, unseal};
+use super::cache_file::{CacheOwner, seal, unseal};
+use crate::disk::{checksum, read, replace};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 

@@ -1,9 +1,6 @@
-//! The file that keeps compiled pipelines: who wrote it, whether it is whole, and how it is replaced.
+//! The file that keeps compiled pipelines: who wrote it, and whether it is whole.
 
-use std::fs::File;
-use std::io::{self, Read, Write};
-use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
+use crate::disk::checksum;
 
 /// The device and the driver whose compiled shaders a file holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -39,8 +36,6 @@ const CHECKSUM_AT: usize = 40;
 /// `VkPipelineCacheHeaderVersionOne`: length, version, vendor, device, UUID.
 const VULKAN_HEADER_BYTES: usize = 32;
 const VULKAN_HEADER_VERSION: u32 = 1;
-/// Files beyond this are taken for damage.
-const MOST_BYTES: u64 = 1 << 30;
 
 /// The file for Vulkan's `data`.
 pub(crate) fn seal(owner: &CacheOwner, data: &[u8]) -> Vec<u8> {
@@ -96,49 +91,6 @@ fn check_vulkan_header(owner: &CacheOwner, data: &[u8]) -> Result<(), Refusal> {
 fn word(bytes: &[u8], at: usize) -> Option<u32> {
     let word = bytes.get(at..at + 4)?;
     Some(u32::from_le_bytes(word.try_into().ok()?))
-}
-
-/// FNV-1a with 64 bits: tells damage, not malice.
-pub(crate) fn checksum(parts: &[&[u8]]) -> u64 {
-    const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
-    const PRIME: u64 = 0x0000_0100_0000_01b3;
-    let bytes = parts.iter().copied().flatten();
-    bytes.fold(BASIS, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(PRIME))
-}
-
-/// Reads a file; of one that is too large to be a cache only the start, which is then refused as cut off.
-pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    File::open(path)?.take(MOST_BYTES).read_to_end(&mut bytes)?;
-    Ok(bytes)
-}
-
-/// Replaces a file at once: whoever reads it, or starts after a crash, finds the old bytes or the new ones.
-pub(crate) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let temporary = temporary_name(path)?;
-    let written = write(&temporary, bytes).and_then(|()| std::fs::rename(&temporary, path));
-    if written.is_err() {
-        // What failed first is reported; a leftover is harmless.
-        let _ = std::fs::remove_file(&temporary);
-    }
-    written
-}
-
-fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let mut file = File::create_new(path)?;
-    file.write_all(bytes)?;
-    file.sync_all()
-}
-
-/// A name in the same folder that no other context uses.
-fn temporary_name(path: &Path) -> io::Result<PathBuf> {
-    static COUNT: AtomicU32 = AtomicU32::new(0);
-    let Some(name) = path.file_name() else {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"));
-    };
-    let mut name = name.to_owned();
-    name.push(format!(".{}-{}.tmp", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed)));
-    Ok(path.with_file_name(name))
 }
 
 #[cfg(test)]

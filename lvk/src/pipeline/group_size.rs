@@ -23,7 +23,7 @@ pub(super) fn check_group_size(
     for axis in 0..3 {
         let id = module.reflection.local_size_ids[axis];
         let given = specialization.iter().find(|constant| Some(constant.id) == id);
-        let size = given.map_or(module.reflection.local_size[axis], |constant| constant.value.bits());
+        let size = given.map_or(module.reflection.local_size[axis], |constant| constant.value.bits() as u32);
         if size == 0 {
             return Err(Error::usage(pipeline, "a workgroup needs at least one invocation along each axis"));
         }

@@ -6,7 +6,7 @@ use ash::vk;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::shader::{CompileOptions, Reflection, ShaderModuleDesc, ShaderStage};
+use crate::shader::{CompileOptions, Reflection, ShaderCache, ShaderModuleDesc, ShaderStage};
 use crate::shader::{check_capabilities, check_stage, compile, reflect};
 
 /// A compiled module, destroyed on drop.
@@ -19,9 +19,14 @@ pub(crate) struct ShaderModule {
 }
 
 impl ShaderModule {
-    pub(crate) fn new(gpu: &Arc<Gpu>, desc: &ShaderModuleDesc<'_>, max_push_bytes: u32) -> Result<Self> {
+    pub(crate) fn new(
+        gpu: &Arc<Gpu>,
+        desc: &ShaderModuleDesc<'_>,
+        cache: Option<&ShaderCache>,
+        max_push_bytes: u32,
+    ) -> Result<Self> {
         check_stage(desc.debug_name, desc.stage, &gpu.features)?;
-        let words = compile(desc, &CompileOptions::of(&gpu.caps))?;
+        let words = compile(desc, &CompileOptions::of(&gpu.caps), cache)?;
         let reflection = reflect(desc.debug_name, desc.stage, &words)?;
         check_features(gpu, desc.debug_name, &reflection)?;
         let extra = &gpu.extra_capabilities;

@@ -8,9 +8,6 @@ use super::shader_module::ShaderModule;
 use crate::error::{Error, Result};
 
 const ENTRY_POINT: &CStr = c"main";
-/// Every specialization constant is one 32-bit value.
-const CONSTANT_BYTES: usize = 4;
-
 /// Value of a specialization constant (`layout(constant_id = N) const ...`).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpecializationConstant {
@@ -20,7 +17,7 @@ pub struct SpecializationConstant {
     pub value: SpecializationValue,
 }
 
-/// A 32-bit specialization value.
+/// A specialization value of 32 or 64 bits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum SpecializationValue {
     /// `uint`.
@@ -31,16 +28,32 @@ pub enum SpecializationValue {
     F32(f32),
     /// `bool`.
     Bool(bool),
+    /// `uint64_t`.
+    U64(u64),
+    /// `int64_t`.
+    I64(i64),
+    /// `double`.
+    F64(f64),
 }
 
 impl SpecializationValue {
-    /// The value as the shader gets it.
-    pub(super) fn bits(self) -> u32 {
+    /// The value as the shader gets it, in the low half where it has 32 bits.
+    pub(super) fn bits(self) -> u64 {
         match self {
-            Self::U32(value) => value,
-            Self::I32(value) => value.cast_unsigned(),
-            Self::F32(value) => value.to_bits(),
+            Self::U32(value) => value.into(),
+            Self::I32(value) => value.cast_unsigned().into(),
+            Self::F32(value) => value.to_bits().into(),
             Self::Bool(value) => value.into(),
+            Self::U64(value) => value,
+            Self::I64(value) => value.cast_unsigned(),
+            Self::F64(value) => value.to_bits(),
+        }
+    }
+
+    fn bytes(self) -> usize {
+        match self {
+            Self::U32(_) | Self::I32(_) | Self::F32(_) | Self::Bool(_) => 4,
+            Self::U64(_) | Self::I64(_) | Self::F64(_) => 8,
         }
     }
 }
@@ -52,7 +65,7 @@ pub(crate) struct Specialization {
 }
 
 impl Specialization {
-    /// Checks that some module of the pipeline declares each constant, with 32 bits.
+    /// Checks that some module of the pipeline declares each constant, with as many bits.
     pub(crate) fn new<'a>(
         pipeline: &str,
         constants: &[SpecializationConstant],
@@ -70,20 +83,31 @@ impl Specialization {
                 let message = format!("no shader declares the specialization constant {}", constant.id);
                 return Err(Error::usage(pipeline, message));
             }
-            if sizes.iter().any(|bytes| *bytes as usize != CONSTANT_BYTES) {
-                let message = format!("specialization constant {} does not have 32 bits", constant.id);
+            let given = constant.value.bytes();
+            if let Some(bytes) = sizes.iter().find(|bytes| **bytes as usize != given) {
+                let message = format!(
+                    "specialization constant {} has {} bits in a shader, and {} were given",
+                    constant.id,
+                    bytes * 8,
+                    given * 8
+                );
                 return Err(Error::usage(pipeline, message));
             }
         }
-        let entry = |(index, constant): (usize, &SpecializationConstant)| vk::SpecializationMapEntry {
-            constant_id: constant.id,
-            offset: (index * CONSTANT_BYTES) as u32,
-            size: CONSTANT_BYTES,
-        };
-        Ok(Self {
-            entries: constants.iter().enumerate().map(entry).collect(),
-            data: constants.iter().flat_map(|constant| constant.value.bits().to_ne_bytes()).collect(),
-        })
+        Ok(Self::of(constants))
+    }
+
+    fn of(constants: &[SpecializationConstant]) -> Self {
+        let mut made = Self { entries: Vec::new(), data: Vec::new() };
+        for constant in constants {
+            let (offset, size) = (made.data.len() as u32, constant.value.bytes());
+            made.entries.push(vk::SpecializationMapEntry { constant_id: constant.id, offset, size });
+            match size {
+                8 => made.data.extend(constant.value.bits().to_ne_bytes()),
+                _ => made.data.extend((constant.value.bits() as u32).to_ne_bytes()),
+            }
+        }
+        made
     }
 
     pub(crate) fn info(&self) -> vk::SpecializationInfo<'_> {

@@ -134,7 +134,7 @@ mod tests {
             source: ShaderSource::Glsl(&text),
             ..Default::default()
         };
-        atomics(&compile(&desc, &CompileOptions::default()).unwrap()).unwrap()
+        atomics(&compile(&desc, &CompileOptions::default(), None).unwrap()).unwrap()
     }
 
     #[test]

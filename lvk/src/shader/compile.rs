@@ -3,7 +3,7 @@
 #[cfg(feature = "glsl")]
 use super::front_end::glsl;
 use super::idle_culling::without_idle_culling;
-use super::{ShaderModuleDesc, ShaderSource, spirv};
+use super::{ShaderCache, ShaderModuleDesc, ShaderSource, spirv};
 use crate::error::{Error, Result};
 use crate::gpu::caps::Capabilities;
 use crate::gpu::ray_query_path::RayQueryPath;
@@ -41,12 +41,18 @@ impl CompileOptions {
 }
 
 /// The module's SPIR-V: version 1.6 for GLSL, the caller's own words, checked for their structure, otherwise.
-pub(crate) fn compile(desc: &ShaderModuleDesc<'_>, options: &CompileOptions) -> Result<Vec<u32>> {
+///
+/// What is compiled is looked up in `cache` first.
+pub(crate) fn compile(
+    desc: &ShaderModuleDesc<'_>,
+    options: &CompileOptions,
+    cache: Option<&ShaderCache>,
+) -> Result<Vec<u32>> {
     match desc.source {
         ShaderSource::Glsl(text) if options.software_ray_query => {
-            glsl(desc, text, options).map(|words| without_idle_culling(&words))
+            glsl(desc, text, options, cache).map(|words| without_idle_culling(&words))
         }
-        ShaderSource::Glsl(text) => glsl(desc, text, options),
+        ShaderSource::Glsl(text) => glsl(desc, text, options, cache),
         ShaderSource::Spirv(words) => {
             spirv::check(words).map_err(|log| failed(desc.debug_name, log))?;
             Ok(words.to_vec())
@@ -59,7 +65,12 @@ pub(super) fn failed(name: &str, log: impl Into<String>) -> Error {
 }
 
 #[cfg(not(feature = "glsl"))]
-fn glsl(desc: &ShaderModuleDesc<'_>, _: &str, _: &CompileOptions) -> Result<Vec<u32>> {
+fn glsl(
+    desc: &ShaderModuleDesc<'_>,
+    _: &str,
+    _: &CompileOptions,
+    _: Option<&ShaderCache>,
+) -> Result<Vec<u32>> {
     let what = format!("GLSL source of shader '{}'", desc.debug_name);
     Err(Error::unsupported(
         what,
@@ -75,7 +86,7 @@ mod tests {
     #[test]
     fn glsl_names_the_missing_feature() {
         let desc = ShaderModuleDesc { source: ShaderSource::Glsl("void main() {}"), ..Default::default() };
-        match compile(&desc, &CompileOptions::default()) {
+        match compile(&desc, &CompileOptions::default(), None) {
             Err(Error::Unsupported { why, .. }) => assert!(why.contains("feature `glsl`")),
             other => panic!("{other:?}"),
         }

@@ -7,24 +7,65 @@ use glslang::limits::ResourceLimits;
 use glslang::{Compiler, CompilerOptions, ShaderInput, ShaderMessage, SpirvVersion, Target, VulkanVersion};
 
 use super::compile::{CompileOptions, failed};
+use super::disk_file::{Entry, Fingerprint};
 use super::include::Includes;
 use super::sampled_copies::without_sampled_copies;
 use super::source::{self, Complaint};
+use super::source_text::with_texts;
 use super::unused::without_unused_resources;
-use super::{ShaderModuleDesc, ShaderStage, diagnostics, preamble};
+use super::{ShaderCache, ShaderModuleDesc, ShaderStage, diagnostics, preamble};
 use crate::error::Result;
 
-pub(super) fn glsl(desc: &ShaderModuleDesc<'_>, text: &str, options: &CompileOptions) -> Result<Vec<u32>> {
+/// The words of `text`: those of an earlier run where `cache` has them.
+pub(super) fn glsl(
+    desc: &ShaderModuleDesc<'_>,
+    text: &str,
+    options: &CompileOptions,
+    cache: Option<&ShaderCache>,
+) -> Result<Vec<u32>> {
     let name = desc.debug_name;
     let complain = |c: Complaint| failed(name, format!("line {}: {}", c.line, c.message));
     let text = source::to_ascii(text).and_then(|text| source::without_version(&text)).map_err(complain)?;
     check_defines(desc)?;
-    let text = preamble::preamble(desc.stage, options, desc.defines) + &text;
-    let mut includes = Includes::new(desc.includes, desc.include_dirs);
-    match to_spirv(name, desc.stage, text, &mut includes) {
-        Ok(words) => Ok(without_sampled_copies(without_unused_resources(words))),
-        Err(error) => Err(failed(name, diagnostics::errors(&log_of(error), includes.into_failures()))),
+    let preamble = preamble::preamble(desc.stage, options, desc.defines);
+    let Some(cache) = cache else { return Ok(translate(desc, &preamble, &text)?.words) };
+    let key = fingerprint(desc, &preamble, &text);
+    let found = cache.find(key, |included| Includes::new(desc.includes, desc.include_dirs).finds(included));
+    if let Some(words) = found {
+        return Ok(words);
     }
+    let entry = translate(desc, &preamble, &text)?;
+    cache.keep(key, &entry);
+    Ok(entry.words)
+}
+
+/// Of all that decides about the words but what the includes hold.
+fn fingerprint(desc: &ShaderModuleDesc<'_>, preamble: &str, text: &str) -> Fingerprint {
+    // The name is part of the words only where they name their source.
+    let name = if desc.debug_info { desc.debug_name } else { "" };
+    let parts = [preamble, text, name].into_iter().chain(desc.includes.iter().map(|(name, _)| *name));
+    let dirs = desc.include_dirs.iter().map(|dir| dir.as_os_str().as_encoded_bytes());
+    let numbers = [desc.stage as u32, desc.debug_info.into(), desc.includes.len() as u32];
+    Fingerprint::of_input(&numbers, parts.map(str::as_bytes).chain(dirs))
+}
+
+/// Compiles, and tells what was included.
+fn translate(desc: &ShaderModuleDesc<'_>, preamble: &str, text: &str) -> Result<Entry> {
+    let name = desc.debug_name;
+    let mut includes = Includes::new(desc.includes, desc.include_dirs);
+    let words = match to_spirv(name, desc.stage, format!("{preamble}{text}"), &mut includes) {
+        Ok(words) => without_sampled_copies(without_unused_resources(words)),
+        Err(error) => {
+            return Err(failed(name, diagnostics::errors(&log_of(error), includes.into_failures())));
+        }
+    };
+    let (included, texts) = includes.into_found();
+    if !desc.debug_info {
+        return Ok(Entry { included, words });
+    }
+    let own = (name.replace(|c: char| !c.is_ascii() || c == '\0', "?"), text.to_owned());
+    let texts: Vec<_> = std::iter::once(own).chain(texts).collect();
+    Ok(Entry { included, words: with_texts(&words, &texts) })
 }
 
 fn to_spirv(

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glslang::include::{IncludeHandler, IncludeResult, IncludeType};
 
+use super::disk_file::{Fingerprint, Included};
 use super::{preamble, source};
 
 /// Deeper nesting is taken for a mistake; the compiler recurses on it.
@@ -18,6 +19,9 @@ pub(super) struct Includes<'a> {
     once: HashSet<Place>,
     /// Why each directive failed, in the order the compiler met them.
     failures: Vec<String>,
+    /// What was answered, in order, and the texts with their names, each once.
+    included: Vec<Included>,
+    texts: Vec<(String, String)>,
     /// Depth and name of the directive that failed last, if it was written with quotes.
     refused: Option<(usize, String)>,
 }
@@ -32,7 +36,31 @@ enum Place {
 
 impl<'a> Includes<'a> {
     pub(super) fn new(listed: &'a [(&'a str, &'a str)], dirs: &'a [&'a Path]) -> Self {
-        Self { listed, dirs, open: Vec::new(), once: HashSet::new(), failures: Vec::new(), refused: None }
+        Self {
+            listed,
+            dirs,
+            open: Vec::new(),
+            once: HashSet::new(),
+            failures: Vec::new(),
+            included: Vec::new(),
+            texts: Vec::new(),
+            refused: None,
+        }
+    }
+
+    /// Whether directives like those of an earlier compilation find the same texts still. The compiler asks the same again
+    /// as long as it is given the same.
+    pub(super) fn finds(mut self, earlier: &[Included]) -> bool {
+        earlier.iter().enumerate().all(|(index, earlier)| {
+            let ty = if earlier.local { IncludeType::Local } else { IncludeType::System };
+            self.include(ty, &earlier.name, "", earlier.depth as usize);
+            self.included.get(index) == Some(earlier)
+        })
+    }
+
+    /// What was found: the directives in order, and the texts with their names.
+    pub(super) fn into_found(self) -> (Vec<Included>, Vec<(String, String)>) {
+        (self.included, self.texts)
     }
 
     /// The reasons for the compiler's "could not process include" messages, in order.
@@ -114,6 +142,14 @@ impl<'a> Includes<'a> {
         format!("include '{name}' not found in {}", places.join(", "))
     }
 
+    fn note(&mut self, local: bool, name: &str, depth: usize, found: &IncludeResult) {
+        let text = Fingerprint::of(found.data.as_bytes());
+        self.included.push(Included { local, depth: depth as u32, name: name.to_owned(), text });
+        if !self.texts.iter().any(|(known, _)| *known == found.name) {
+            self.texts.push((found.name.clone(), found.data.clone()));
+        }
+    }
+
     /// ` (included by b.glsl, included by a.glsl)`, innermost first.
     fn chain(&self) -> String {
         if self.open.is_empty() {
@@ -134,7 +170,10 @@ impl IncludeHandler for Includes<'_> {
         }
         self.open.truncate(depth.saturating_sub(1));
         match self.open(local, name) {
-            Ok(result) => Some(result),
+            Ok(result) => {
+                self.note(local, name, depth, &result);
+                Some(result)
+            }
             Err(reason) => {
                 self.failures.push(reason + &self.chain());
                 self.refused = local.then(|| (depth, name.to_owned()));

@@ -5,6 +5,10 @@ mod capability;
 mod compile;
 #[cfg(feature = "glsl")]
 mod diagnostics;
+#[cfg_attr(not(any(feature = "glsl", test)), expect(dead_code, reason = "only what is compiled is kept"))]
+mod disk_cache;
+#[cfg_attr(not(any(feature = "glsl", test)), expect(dead_code, reason = "only what is compiled is kept"))]
+mod disk_file;
 #[cfg(feature = "glsl")]
 mod front_end;
 mod hit_numbers;
@@ -22,6 +26,8 @@ mod reflect;
 mod sampled_copies;
 #[cfg(feature = "glsl")]
 mod source;
+#[cfg(feature = "glsl")]
+mod source_text;
 mod spirv;
 mod stage;
 #[cfg(feature = "glsl")]
@@ -29,6 +35,8 @@ mod unused;
 
 pub(crate) use capability::{check_capabilities, check_stage};
 pub(crate) use compile::{CompileOptions, compile};
+pub(crate) use disk_cache::ShaderCache;
+pub use disk_cache::ShaderCacheCounts;
 pub(crate) use hit_numbers::raw_hit_number;
 #[cfg(feature = "glsl")]
 pub use offline::compile_glsl;

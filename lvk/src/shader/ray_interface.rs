@@ -89,7 +89,7 @@ mod tests {
 
     fn sizes(stage: ShaderStage, text: &str) -> RayInterface {
         let desc = ShaderModuleDesc { stage, source: ShaderSource::Glsl(text), ..Default::default() };
-        let words = compile(&desc, &CompileOptions::default()).unwrap();
+        let words = compile(&desc, &CompileOptions::default(), None).unwrap();
         reflect("shader", stage, &words).unwrap().ray_interface
     }
 

@@ -185,6 +185,9 @@ pub struct ShaderModuleDesc<'a> {
     pub include_dirs: &'a [&'a Path],
     /// Macros defined in front of the text: name and replacement (may be empty). Ignored for SPIR-V.
     pub defines: &'a [(&'a str, &'a str)],
+    /// Keep the text, and those of what it includes, in the module (`OpSource`), for debuggers of frames and shaders.
+    /// Ignored for SPIR-V. The numbers of lines are not among it: the compiler's crate does not hand them out.
+    pub debug_info: bool,
     /// Name shown in errors and by debugging tools.
     pub debug_name: &'a str,
 }
@@ -198,6 +201,7 @@ impl Default for ShaderModuleDesc<'_> {
             includes: &[],
             include_dirs: &[],
             defines: &[],
+            debug_info: false,
             debug_name: "shader module",
         }
     }

@@ -19,7 +19,7 @@ fn desc(stage: ShaderStage, text: &str) -> ShaderModuleDesc<'_> {
 }
 
 fn build(desc: &ShaderModuleDesc<'_>) -> Result<Vec<u32>> {
-    compile(desc, &CompileOptions::default())
+    compile(desc, &CompileOptions::default(), None)
 }
 
 fn words(stage: ShaderStage, text: &str) -> Vec<u32> {
@@ -198,7 +198,7 @@ fn formatless_reads_follow_the_device() {
         "imageStore(kImages2D[1], ivec2(0), imageLoad(kImages2D[0], ivec2(0)));",
     );
     let read = CompileOptions { formatless_read: true, ..Default::default() };
-    let words = compile(&desc(ShaderStage::Compute, &text), &read).unwrap();
+    let words = compile(&desc(ShaderStage::Compute, &text), &read, None).unwrap();
     assert!(capabilities(&words).contains(&(Capability::StorageImageReadWithoutFormat as u32)));
     assert!(error(ShaderStage::Compute, &text).contains("writeonly"));
 }
@@ -255,6 +255,32 @@ fn includes_are_found_beside_the_includer_and_in_the_folders() {
     std::fs::remove_dir_all(&dir).unwrap();
     result.unwrap();
     assert!(log(bad).contains("bad.glsl:2: 'z'"));
+}
+
+#[test]
+fn debug_info_holds_the_texts_as_written() {
+    let text = "// first line\n#include \"one.glsl\"\n#include \"one.glsl\"\nvoid main() { one(); }\n";
+    let one = "#pragma once\nvoid one() {}\n";
+    let desc = ShaderModuleDesc {
+        includes: &[("one.glsl", one)],
+        debug_info: true,
+        debug_name: "textful",
+        ..desc(ShaderStage::Vertex, text)
+    };
+    let words = build(&desc).unwrap();
+    let code: Vec<_> = spirv::instructions(&words).map(Result::unwrap).collect();
+    let sources: Vec<_> = code.iter().filter(|i| i.op == Some(Op::Source)).collect();
+    let name = |id: u32| {
+        let is_named = |i: &&spirv::Instruction<'_>| i.op == Some(Op::String) && i.operand(0) == id;
+        code.iter().find(is_named).unwrap().string(1).0
+    };
+    let found: Vec<_> = sources.iter().map(|i| (name(i.operand(2)), i.string(3).0)).collect();
+    let owned = |(a, b): (&str, &str)| (a.to_owned(), b.to_owned());
+    let once = one.replace("#pragma once", "");
+    assert_eq!(found, [owned(("textful", text)), owned(("one.glsl", &once))]);
+    assert!(reflect("textful", ShaderStage::Vertex, &words).is_ok());
+    let bare = build(&ShaderModuleDesc { debug_info: false, ..desc }).unwrap();
+    assert!(bare.len() + text.len() / 4 < words.len());
 }
 
 #[test]

@@ -6,7 +6,7 @@ use super::blas_blob::BlasBlob;
 use super::mesh::{Mesh, Primitives};
 use super::quality::Quality;
 use super::sound::{self, Expected};
-use crate::pipeline::cache_file::{read, replace};
+use crate::disk::{fingerprint, read, replace};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
 /// Changes with the builders and with the form of structures.
@@ -33,11 +33,12 @@ impl TreeKey {
         let bits = [boxes, quality.fast_build, quality.low_memory, quality.refit];
         let settings = bits.iter().fold(u64::from(VERSION), |all, bit| all << 1 | u64::from(*bit));
         let flags: Vec<u32> = mesh.flags.iter().map(|flags| flags.bits()).collect();
-        Self(
-            [1, 2].map(|seed| {
-                sum(bytes, sum(bytemuck::cast_slice(&flags), sum(&settings.to_le_bytes(), seed)))
-            }),
-        )
+        Self([1, 2].map(|seed| {
+            fingerprint(
+                bytes,
+                fingerprint(bytemuck::cast_slice(&flags), fingerprint(&settings.to_le_bytes(), seed)),
+            )
+        }))
     }
 }
 
@@ -79,7 +80,7 @@ fn seal(blob: &BlasBlob) -> Vec<u8> {
     file.extend(VERSION.to_le_bytes());
     file.extend([0; 4]);
     file.extend((blob.bytes.len() as u64).to_le_bytes());
-    file.extend(sum(&blob.bytes, 0).to_le_bytes());
+    file.extend(fingerprint(&blob.bytes, 0).to_le_bytes());
     file.extend(&blob.bytes);
     file
 }
@@ -90,23 +91,11 @@ fn open(file: &[u8], expected: &Expected) -> Result<BlasBlob, &'static str> {
         return Err("another version of the library wrote it");
     }
     let whole = header[16..24] == (bytes.len() as u64).to_le_bytes();
-    if !whole || header[24..] != sum(bytes, 0).to_le_bytes() {
+    if !whole || header[24..] != fingerprint(bytes, 0).to_le_bytes() {
         return Err("it is damaged or cut off");
     }
     let sound = sound::check(bytes, expected)?;
     Ok(BlasBlob { bytes: bytes.to_vec(), bounds: sound.bounds })
-}
-
-/// A checksum of eight bytes at a time: tells damage and other contents, not malice.
-fn sum(bytes: &[u8], seed: u64) -> u64 {
-    const PRIME: u64 = 0x9e37_79b9_7f4a_7c15;
-    let mix = |sum: u64, word: u64| {
-        let mixed = (sum ^ word).wrapping_mul(PRIME);
-        mixed ^ mixed >> 29
-    };
-    let (words, rest) = bytes.as_chunks::<8>();
-    let all = words.iter().fold(seed ^ bytes.len() as u64, |sum, word| mix(sum, u64::from_le_bytes(*word)));
-    rest.iter().fold(all, |sum, byte| mix(sum, u64::from(*byte)))
 }
 
 #[cfg(test)]

@@ -1,0 +1,220 @@
+//! SPIR-V that was compiled from GLSL, kept in a folder from one run to the next.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+use std::time::SystemTime;
+
+use super::disk_file::{Entry, Fingerprint, Included, open, seal};
+use crate::disk::{read, replace};
+
+/// A folder holds at most this; beyond it what was not used for longest goes until three quarters are left.
+const MOST_BYTES: u64 = 64 << 20;
+const EXTENSION: &str = ".spirv";
+/// Digits of a key in a file's name.
+const KEY_DIGITS: usize = 32;
+
+/// How often modules made from GLSL were found compiled ([`ContextDesc::shader_cache`](crate::ContextDesc::shader_cache)).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ShaderCacheCounts {
+    /// Modules whose words were found.
+    pub found: u64,
+    /// Modules that were compiled and kept.
+    pub compiled: u64,
+}
+
+/// A folder of compiled modules, each in a file named after what it was compiled from.
+pub(crate) struct ShaderCache {
+    folder: PathBuf,
+    most_bytes: u64,
+    /// Bytes in the folder, once somebody had to know.
+    bytes: Mutex<Option<u64>>,
+    found: AtomicU64,
+    compiled: AtomicU64,
+}
+
+impl ShaderCache {
+    /// In this folder, which need not exist.
+    pub(crate) fn new(folder: &Path) -> Self {
+        Self {
+            folder: folder.to_owned(),
+            most_bytes: MOST_BYTES,
+            bytes: Mutex::default(),
+            found: AtomicU64::new(0),
+            compiled: AtomicU64::new(0),
+        }
+    }
+
+    pub(crate) fn counts(&self) -> ShaderCacheCounts {
+        let load = |count: &AtomicU64| count.load(Ordering::Relaxed);
+        ShaderCacheCounts { found: load(&self.found), compiled: load(&self.compiled) }
+    }
+
+    /// The words of an earlier compilation, if `is_same` says that what it included is still the same.
+    pub(super) fn find(
+        &self,
+        key: Fingerprint,
+        is_same: impl FnOnce(&[Included]) -> bool,
+    ) -> Option<Vec<u32>> {
+        let path = self.path(key);
+        let file = match read(&path) {
+            Ok(file) => file,
+            Err(error) => {
+                if error.kind() != ErrorKind::NotFound {
+                    log::warn!("the compiled shader '{}' cannot be read: {error}", path.display());
+                }
+                return None;
+            }
+        };
+        let entry = match open(key, &file) {
+            Ok(entry) => entry,
+            Err(reason) => {
+                log::warn!("the compiled shader '{}' is dropped: {reason}", path.display());
+                return None;
+            }
+        };
+        if !is_same(&entry.included) {
+            return None;
+        }
+        touch(&path);
+        self.found.fetch_add(1, Ordering::Relaxed);
+        Some(entry.words)
+    }
+
+    /// Keeps the words of a compilation. No trouble with files is an error.
+    pub(super) fn keep(&self, key: Fingerprint, entry: &Entry) {
+        self.compiled.fetch_add(1, Ordering::Relaxed);
+        let path = self.path(key);
+        let file = seal(key, entry);
+        let written = std::fs::create_dir_all(&self.folder).and_then(|()| replace(&path, &file));
+        if let Err(error) = written {
+            log::warn!("the compiled shader '{}' cannot be kept: {error}", path.display());
+            return;
+        }
+        self.grow(file.len() as u64);
+    }
+
+    /// Counts a new file, and removes old ones where there are too many.
+    fn grow(&self, bytes: u64) {
+        let mut total = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
+        let now = match *total {
+            Some(known) => known + bytes,
+            None => files_of(&self.folder).iter().map(|file| file.bytes).sum(),
+        };
+        *total = Some(now);
+        if now > self.most_bytes {
+            *total = Some(trim(files_of(&self.folder), self.most_bytes / 4 * 3));
+        }
+    }
+
+    fn path(&self, key: Fingerprint) -> PathBuf {
+        self.folder.join(format!("{:016x}{:016x}{EXTENSION}", key.0[0], key.0[1]))
+    }
+}
+
+/// A file of the cache.
+#[derive(Debug, Clone)]
+struct Kept {
+    path: PathBuf,
+    used: SystemTime,
+    bytes: u64,
+}
+
+/// The files of the cache in a folder; others are left alone.
+fn files_of(folder: &Path) -> Vec<Kept> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
+    let kept = |entry: std::fs::DirEntry| {
+        let data = entry.metadata().ok().filter(|data| data.is_file() && is_ours(&entry.file_name()))?;
+        Some(Kept { path: entry.path(), used: data.modified().ok()?, bytes: data.len() })
+    };
+    entries.flatten().filter_map(kept).collect()
+}
+
+/// Whether the name is that of a compiled shader, or of what a crash has left of writing one.
+fn is_ours(name: &std::ffi::OsStr) -> bool {
+    let parts = name.to_str().and_then(|name| name.split_at_checked(KEY_DIGITS));
+    parts.is_some_and(|(key, rest)| {
+        let is_key = key.bytes().all(|byte| byte.is_ascii_digit() || (b'a'..=b'f').contains(&byte));
+        is_key && (rest == EXTENSION || rest.starts_with(EXTENSION) && rest.ends_with(".tmp"))
+    })
+}
+
+/// Removes what was not used for longest until at most `target` bytes are left; answers how many are.
+fn trim(mut files: Vec<Kept>, target: u64) -> u64 {
+    files.sort_by_key(|file| file.used);
+    let mut left: u64 = files.iter().map(|file| file.bytes).sum();
+    for file in files {
+        if left <= target {
+            break;
+        }
+        // Another context may have been faster.
+        let _ = std::fs::remove_file(&file.path);
+        left -= file.bytes;
+    }
+    left
+}
+
+/// Notes that a file was used; where the folder cannot be written, its age decides instead.
+fn touch(path: &Path) {
+    let file = std::fs::File::options().append(true).open(path);
+    let _ = file.and_then(|file| file.set_modified(SystemTime::now()));
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    const WORDS: u64 = 250;
+
+    fn cache(folder: &Path, files: u64) -> ShaderCache {
+        ShaderCache { most_bytes: files * WORDS * 4 + files * 100, ..ShaderCache::new(folder) }
+    }
+
+    fn entry(number: u32) -> Entry {
+        Entry { included: Vec::new(), words: vec![number; WORDS as usize] }
+    }
+
+    fn key(number: u32) -> Fingerprint {
+        Fingerprint([number.into(), 7])
+    }
+
+    fn age(cache: &ShaderCache, number: u32, seconds: u64) {
+        let file = std::fs::File::options().append(true).open(cache.path(key(number))).unwrap();
+        file.set_modified(SystemTime::now() - Duration::from_secs(seconds)).unwrap();
+    }
+
+    #[test]
+    fn what_was_not_used_for_longest_goes_first_and_foreign_files_stay() {
+        let folder = std::env::temp_dir().join(format!("lvk-shaders-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        std::fs::write(folder.join("mine.spirv"), vec![0; 1 << 16]).unwrap();
+        let cache = cache(&folder, 8);
+        for number in 0..8 {
+            cache.keep(key(number), &entry(number));
+            age(&cache, number, 1000 - u64::from(number));
+        }
+        assert_eq!(cache.find(key(0), |_| true), Some(entry(0).words), "and so it is the newest");
+        assert_eq!(cache.find(key(1), |_| false), None, "other includes");
+        cache.keep(key(8), &entry(8));
+        let found: Vec<u32> = (0..9).filter(|number| cache.find(key(*number), |_| true).is_some()).collect();
+        assert_eq!(found, [0, 4, 5, 6, 7, 8], "three quarters of eight are left");
+        assert!(folder.join("mine.spirv").exists());
+        assert_eq!(cache.counts(), ShaderCacheCounts { found: 7, compiled: 9 });
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn names_of_the_cache_are_told_from_others() {
+        let ours = |name: &str| is_ours(std::ffi::OsStr::new(name));
+        let key = "0123456789abcdef0123456789abcdef";
+        assert!(ours(&format!("{key}.spirv")) && ours(&format!("{key}.spirv.12-3.tmp")));
+        for name in
+            ["", ".spirv", "x.spirv", &format!("{key}.spv"), &format!("{key}0.spirv"), &key.replace('a', "G")]
+        {
+            assert!(!ours(name), "{name}");
+        }
+    }
+}
