@@ -55,13 +55,15 @@ impl Store {
 /// Keys leave the pool combined with a mask of the context, so that a handle of another context finds nothing.
 pub(crate) struct Pool<H, T> {
     objects: RwLock<SlotMap<DefaultKey, Arc<T>>>,
+    /// How many objects were taken out. While it stays the same, whatever was found is still there.
+    removals: AtomicU64,
     mask: u64,
     handle: PhantomData<fn() -> H>,
 }
 
 impl<H: Handle, T> Pool<H, T> {
-    fn new(mask: u64) -> Self {
-        Self { objects: RwLock::default(), mask, handle: PhantomData }
+    pub(crate) fn new(mask: u64) -> Self {
+        Self { objects: RwLock::default(), removals: AtomicU64::new(0), mask, handle: PhantomData }
     }
 
     pub(crate) fn insert(&self, object: T) -> H {
@@ -76,7 +78,14 @@ impl<H: Handle, T> Pool<H, T> {
 
     pub(crate) fn remove(&self, handle: H) -> Result<Arc<T>> {
         let mut objects = self.objects.write().unwrap_or_else(PoisonError::into_inner);
-        objects.remove(self.key(handle)).ok_or(Error::StaleHandle { kind: H::KIND })
+        let object = objects.remove(self.key(handle)).ok_or(Error::StaleHandle { kind: H::KIND })?;
+        self.removals.fetch_add(1, Ordering::Release);
+        Ok(object)
+    }
+
+    /// Rises whenever an object is taken out.
+    pub(crate) fn removals(&self) -> u64 {
+        self.removals.load(Ordering::Acquire)
     }
 
     /// Everything there is.

@@ -1,5 +1,6 @@
 //! The bindless set, pipelines and push constants of a command buffer.
 
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 use ash::vk;
@@ -17,11 +18,14 @@ pub(super) struct PushConstants {
     /// How many of them, from the first on.
     length: usize,
     wanted: Option<(Arc<str>, u32)>,
+    /// How many bytes make up the whole block of the last bound pipeline, padding included; none where it has none.
+    whole: RangeInclusive<u32>,
 }
 
 impl Default for PushConstants {
     fn default() -> Self {
-        Self { pushed: 0, bytes: [0; Self::MOST_BYTES], length: 0, wanted: None }
+        let bytes = [0; Self::MOST_BYTES];
+        Self { pushed: 0, bytes, length: 0, wanted: None, whole: Self::NOTHING }
     }
 }
 
@@ -32,11 +36,22 @@ impl PushConstants {
     /// Rust structs end on their alignment, GLSL blocks on their last member; 16 bytes is the largest alignment.
     const TAIL_BYTES: u32 = 16;
 
+    #[expect(clippy::reversed_empty_ranges, reason = "no number is in it")]
+    const NOTHING: RangeInclusive<u32> = 1..=0;
+
+    /// A pipeline with a block of so many bytes is bound.
+    fn want(&mut self, pipeline: &Arc<str>, expected: u32) {
+        self.wanted = Some((Arc::clone(pipeline), expected));
+        let whole = expected..=expected.next_multiple_of(Self::TAIL_BYTES);
+        self.whole = if expected > 0 { whole } else { Self::NOTHING };
+    }
+
     /// Everything pushed so far, zero where nothing was.
     pub(super) fn pushed_bytes(&self) -> &[u8] {
         &self.bytes[..self.length]
     }
 
+    #[inline]
     fn keep(&mut self, offset: u32, bytes: &[u8]) {
         let start = offset as usize;
         let Some(kept) = self.bytes.get_mut(start..start + bytes.len()) else { return };
@@ -91,26 +106,38 @@ impl CommandBuffer {
     /// Sets the push constants of the pipeline bound last, for this and later pipelines.
     ///
     /// `constants` must match the shader's block, up to padding at the end (`vkCmdPushConstants`).
+    #[inline]
     pub fn push_constants<T: bytemuck::NoUninit>(&mut self, constants: &T) -> Result<()> {
         let bytes = bytemuck::bytes_of(constants);
-        self.push_constants.check_whole(bytes.len())?;
-        self.push_constant_bytes(0, bytes)
+        let size = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
+        if !self.push_constants.whole.contains(&size) || !size.is_multiple_of(4) {
+            self.push_constants.check_whole(bytes.len())?;
+            self.push_constants.check(0, size)?;
+        }
+        self.record_push(0, bytes);
+        Ok(())
     }
 
     /// Sets part of the push constants: `bytes` from `offset` on, both multiples of 4.
     pub fn push_constant_bytes(&mut self, offset: u32, bytes: &[u8]) -> Result<()> {
         let size = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
         self.push_constants.check(offset, size)?;
-        let limit = self.shared.layout.push_constant_bytes;
-        let bytes = &bytes[..bytes.len().min(limit.saturating_sub(offset) as usize)];
+        self.record_push(offset, bytes);
+        Ok(())
+    }
+
+    /// Inlined where the caller knows how many bytes there are, which then need no call to be copied.
+    #[inline]
+    fn record_push(&mut self, offset: u32, bytes: &[u8]) {
         let shared = &self.shared;
+        let room = shared.layout.push_constant_bytes.saturating_sub(offset) as usize;
+        let bytes = if bytes.len() <= room { bytes } else { &bytes[..room] };
         // SAFETY: the layout is alive and the range lies inside its push constants.
         unsafe {
             let stages = vk::ShaderStageFlags::ALL;
             shared.gpu.device.cmd_push_constants(self.raw(), shared.layout.raw, stages, offset, bytes);
         }
         self.push_constants.keep(offset, bytes);
-        Ok(())
     }
 
     /// Binds a pipeline, and the bindless set the first time at its bind point.
@@ -131,7 +158,12 @@ impl CommandBuffer {
                 self.sets_bound.push(point);
             }
         }
-        self.push_constants.wanted = Some((Arc::clone(name), push_constant_bytes));
+        self.push_constants.want(name, push_constant_bytes);
+    }
+
+    /// Whether all these were pushed; see [`words`].
+    pub(super) fn has_pushed(&self, needed: u64) -> bool {
+        self.push_constants.pushed & needed == needed
     }
 
     /// Fails if a pipeline about to run reads bytes that were never pushed.
@@ -140,8 +172,9 @@ impl CommandBuffer {
     }
 }
 
-/// The bits of `size` bytes from `offset` on, all multiples of 4.
-fn words(offset: u32, size: u32) -> u64 {
+/// A bit for each 4 bytes of `size` from `offset` on, all multiples of 4.
+#[inline]
+pub(super) fn words(offset: u32, size: u32) -> u64 {
     let below = |end: u32| u64::MAX.checked_shr(64_u32.saturating_sub(end / 4)).unwrap_or(0);
     below(offset.saturating_add(size)) & !below(offset)
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::CommandBuffer;
 use super::dependencies::Dependencies;
+use super::uses::Uses;
 use crate::barrier::{ResourceId, Stages, Subresources, Use};
 use crate::error::Result;
 use crate::resource::texture_desc::TextureUsage;
@@ -14,10 +15,7 @@ use crate::submit::emit::emit;
 impl CommandBuffer {
     /// The next command uses a buffer.
     pub(super) fn use_buffer(&mut self, buffer: &Buffer, next: Use) {
-        self.uses.buffer(buffer, next);
-        if next.is_write() && buffer.memory.mapped() && !self.host_reads.contains(&buffer.id) {
-            self.host_reads.push(buffer.id);
-        }
+        use_buffer(&mut self.uses, &mut self.host_reads, buffer, next);
     }
 
     /// The next command uses a part of the image that a texture shows.
@@ -27,7 +25,7 @@ impl CommandBuffer {
         part: Subresources,
         next: Use,
     ) -> Result<()> {
-        self.uses.texture(Arc::clone(texture), part, next)
+        self.uses.texture(texture, part, next)
     }
 
     /// The next command's shaders trace rays in these stages.
@@ -46,25 +44,24 @@ impl CommandBuffer {
 
     /// The next command's shaders reach these in `stages`.
     pub(super) fn use_dependencies(&mut self, deps: &Dependencies<'_>, stages: Stages) -> Result<()> {
+        let store = &self.shared.store;
         for handle in deps.sampled_images {
-            let texture = self.shared.store.textures.get(*handle)?;
+            let texture = self.found_textures.get(&store.textures, *handle)?;
             texture.check_usage(TextureUsage::SAMPLED)?;
-            let part = texture.range;
-            self.uses.texture(texture, part, Use::shader_read(stages))?;
+            self.uses.texture(texture, texture.range, Use::shader_read(stages))?;
         }
         for handle in deps.storage_images {
-            let texture = self.shared.store.textures.get(*handle)?;
+            let texture = self.found_textures.get(&store.textures, *handle)?;
             texture.check_usage(TextureUsage::STORAGE)?;
-            let part = texture.stored_part();
-            self.uses.texture(texture, part, Use::shader_write(stages))?;
+            self.uses.texture(texture, texture.stored_part(), Use::shader_write(stages))?;
         }
         for handle in deps.buffers {
-            let buffer = self.shared.store.buffers.get(*handle)?;
-            self.use_buffer(&buffer, Use::shader_write(stages));
+            let buffer = self.found_buffers.get(&store.buffers, *handle)?;
+            use_buffer(&mut self.uses, &mut self.host_reads, buffer, Use::shader_write(stages));
         }
         for handle in deps.read_buffers {
-            let buffer = self.shared.store.buffers.get(*handle)?;
-            self.use_buffer(&buffer, Use::shader_read(stages));
+            let buffer = self.found_buffers.get(&store.buffers, *handle)?;
+            use_buffer(&mut self.uses, &mut self.host_reads, buffer, Use::shader_read(stages));
         }
         for handle in deps.acceleration_structures {
             self.shared.store.accel_structs.get(*handle)?;
@@ -96,6 +93,14 @@ impl CommandBuffer {
                 Err(error)
             }
         }
+    }
+}
+
+/// A command uses a buffer; what it writes in mapped memory is for the host to read afterwards.
+fn use_buffer(uses: &mut Uses, host_reads: &mut Vec<ResourceId>, buffer: &Buffer, next: Use) {
+    uses.buffer(buffer, next);
+    if next.is_write() && buffer.memory.mapped() && !host_reads.contains(&buffer.id) {
+        host_reads.push(buffer.id);
     }
 }
 

@@ -8,6 +8,7 @@ pub(crate) mod compute;
 pub(crate) mod dependencies;
 mod draw_mesh;
 pub(crate) mod flush;
+mod found;
 pub(crate) mod gpu_build;
 mod instances;
 mod kernel;
@@ -33,13 +34,16 @@ use ash::vk;
 use crate::accel::compaction::SizeQuery;
 use crate::barrier::{Barriers, ResourceId, Use};
 use crate::error::Result;
+use crate::handle::{BufferHandle, TextureHandle};
 use crate::pipeline::{ComputePipeline, RayTracingPipeline};
+use crate::resource::{Buffer, Texture};
 use crate::shared::Shared;
 use crate::submit::Recording;
 use crate::submit::profiler::Scopes;
 
 use accel::OpenBuild;
 use bind::PushConstants;
+use found::Found;
 use query_log::QueryLog;
 use tlas::TlasUpdate;
 use transfer::Settle;
@@ -56,6 +60,8 @@ pub struct CommandBuffer {
     shared: Arc<Shared>,
     recording: ManuallyDrop<Recording>,
     finished: bool,
+    found_buffers: Found<BufferHandle, Buffer>,
+    found_textures: Found<TextureHandle, Texture>,
     uses: Uses,
     barriers: Barriers,
     compute: Option<Arc<ComputePipeline>>,
@@ -109,6 +115,8 @@ impl CommandBuffer {
             recording: ManuallyDrop::new(recording),
             shared: Arc::clone(shared),
             finished: false,
+            found_buffers: Found::default(),
+            found_textures: Found::default(),
             uses: Uses::default(),
             barriers: Barriers::default(),
             compute: None,

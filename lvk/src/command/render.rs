@@ -6,6 +6,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
+use super::bind::words;
 use super::compute::check_arguments;
 use super::targets::Targets;
 use crate::barrier::Use;
@@ -34,8 +35,26 @@ pub struct RenderPass<'a> {
     /// Labels open around the pass.
     pub(super) labels_outside: u32,
     pipeline: Option<Arc<RenderPipeline>>,
+    draws: Option<DrawNeeds>,
     indices: Option<BoundIndices>,
     vertex_slots: u32,
+}
+
+/// What draws with the bound pipeline need, gathered when it is bound so that a draw looks at no more than this.
+struct DrawNeeds {
+    vertex_slots: u32,
+    /// A bit for each 4 bytes of push constants.
+    push_constants: u64,
+}
+
+impl DrawNeeds {
+    /// Nothing for a pipeline that has no vertex shader.
+    fn of(pipeline: &RenderPipeline) -> Option<Self> {
+        (pipeline.front_end == FrontEnd::Vertex).then(|| Self {
+            vertex_slots: (1 << pipeline.vertex_binding_count) - 1,
+            push_constants: words(0, pipeline.push_constant_bytes),
+        })
+    }
 }
 
 /// The index buffer bound last.
@@ -48,8 +67,16 @@ impl<'a> RenderPass<'a> {
     pub(super) fn new(cmd: &'a mut CommandBuffer, targets: Targets, labelled: bool) -> Self {
         let [width, height] = targets.extent;
         let labels_outside = cmd.open_labels - u32::from(labelled);
-        let pass =
-            Self { cmd, targets, labelled, labels_outside, pipeline: None, indices: None, vertex_slots: 0 };
+        let pass = Self {
+            cmd,
+            targets,
+            labelled,
+            labels_outside,
+            pipeline: None,
+            draws: None,
+            indices: None,
+            vertex_slots: 0,
+        };
         pass.set_viewport([0.0, 0.0, width as f32, height as f32], [0.0, 1.0]);
         pass.set_scissor([0, 0], [width, height]);
         pass
@@ -83,11 +110,13 @@ impl<'a> RenderPass<'a> {
         }
         let point = vk::PipelineBindPoint::GRAPHICS;
         self.cmd.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
+        self.draws = DrawNeeds::of(&pipeline);
         self.pipeline = Some(pipeline);
         Ok(())
     }
 
     /// Sets the push constants; see [`CommandBuffer::push_constants`].
+    #[inline]
     pub fn push_constants<T: bytemuck::NoUninit>(&mut self, constants: &T) -> Result<()> {
         self.cmd.push_constants(constants)
     }
@@ -287,6 +316,20 @@ impl<'a> RenderPass<'a> {
 
     /// Fails unless a pipeline with a vertex shader is bound with all it reads.
     fn check_draw(&self) -> Result<()> {
+        match &self.draws {
+            Some(needs)
+                if self.vertex_slots & needs.vertex_slots == needs.vertex_slots
+                    && self.cmd.has_pushed(needs.push_constants) =>
+            {
+                Ok(())
+            }
+            _ => self.explain_draw(),
+        }
+    }
+
+    /// What is missing for a draw.
+    #[cold]
+    fn explain_draw(&self) -> Result<()> {
         let pipeline = self.bound("draw")?;
         if pipeline.front_end != FrontEnd::Vertex {
             let message = "it has a mesh shader; draw with draw_mesh_tasks or draw_mesh_tasks_indirect";

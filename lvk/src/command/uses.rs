@@ -17,8 +17,15 @@ pub(crate) struct Uses {
     buffers: Vec<(ResourceId, Use)>,
     /// Where each of `buffers` is, once they are more than a few; empty before.
     places: IdMap<usize>,
-    textures: PartUses<Arc<Texture>>,
+    /// Parts of images, with rows of `seen`.
+    textures: PartUses<usize>,
     writers: Vec<(ResourceId, Use)>,
+    /// Every texture that a command has used so far, so that a command does not count references.
+    seen: Vec<Arc<Texture>>,
+    /// Rows of `seen` by where the texture lies, which nobody else does while it is held.
+    rows: IdMap<usize>,
+    /// How many of `seen` the images of the command buffer have.
+    known_images: usize,
 }
 
 impl Uses {
@@ -64,9 +71,22 @@ impl Uses {
     }
 
     /// The command uses a part of the image that a texture shows.
-    pub(crate) fn texture(&mut self, texture: Arc<Texture>, part: Subresources, next: Use) -> Result<()> {
-        let new = PartUse { id: texture.image.id, part, next, owner: Arc::clone(&texture) };
-        self.textures.add(new).map_err(|other| conflict(&texture, &other))
+    pub(crate) fn texture(&mut self, texture: &Arc<Texture>, part: Subresources, next: Use) -> Result<()> {
+        let new = PartUse { id: texture.image.id, part, next, owner: self.row(texture) };
+        self.textures.add(new).map_err(|other| conflict(texture, &self.seen[other]))
+    }
+
+    /// Where a texture is in the list of those seen.
+    fn row(&mut self, texture: &Arc<Texture>) -> usize {
+        let last = self.seen.len().wrapping_sub(1);
+        if self.seen.get(last).is_some_and(|last| Arc::ptr_eq(last, texture)) {
+            return last;
+        }
+        let place = ResourceId(Arc::as_ptr(texture) as u64);
+        *self.rows.entry(place).or_insert_with(|| {
+            self.seen.push(Arc::clone(texture));
+            self.seen.len() - 1
+        })
     }
 
     /// Whether the command needs a barrier behind earlier commands of the same command buffer.
@@ -85,9 +105,12 @@ impl Uses {
         for (id, write) in self.writers.drain(..) {
             tracker.accumulate_buffer(id, write, out);
         }
+        for texture in &self.seen[self.known_images..] {
+            images.insert(texture.image.id, texture.image.for_barriers());
+        }
+        self.known_images = self.seen.len();
         for PartUse { id, part, next, owner } in self.textures.drain() {
-            images.insert(id, owner.image.for_barriers());
-            tracker.use_texture(id, owner.image.shape, part, next, out);
+            tracker.use_texture(id, self.seen[owner].image.shape, part, next, out);
         }
     }
 

@@ -49,6 +49,7 @@ pub(crate) struct Gpu {
     /// Reads the clocks of device and host together.
     pub(crate) host_clock: Option<HostClock>,
     physical: vk::PhysicalDevice,
+    /// Takes names and labels; present where somebody reads them, as each name costs as much as a small buffer.
     debug_utils: Option<ash::ext::debug_utils::Device>,
     allocator: Mutex<Option<Allocator>>,
     queue: Mutex<vk::Queue>,
@@ -81,7 +82,8 @@ impl Gpu {
                 .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
             mesh: caps.mesh_shader.then(|| ash::ext::mesh_shader::Device::new(raw, &device)),
             host_clock: HostClock::new(&instance, &device, chosen.raw, features.calibration),
-            debug_utils: instance.debug_utils.then(|| ash::ext::debug_utils::Device::new(raw, &device)),
+            debug_utils: (instance.debug_utils && is_watched(&instance, chosen.raw))
+                .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             allocator: Mutex::new(Some(allocator)),
             queue: Mutex::new(queue),
             physical: chosen.raw,
@@ -234,6 +236,13 @@ impl Gpu {
             unsafe { ext.cmd_end_debug_utils_label(commands) };
         }
     }
+}
+
+/// Whether the validation layer, a debugger or a profiler looks on.
+fn is_watched(instance: &Instance, device: vk::PhysicalDevice) -> bool {
+    // SAFETY: the physical device belongs to the instance, which has Vulkan 1.3 as the device does.
+    let tools = || unsafe { instance.raw.get_physical_device_tool_properties_len(device) };
+    instance.validated || tools().is_ok_and(|count| count > 0)
 }
 
 impl Drop for Gpu {

@@ -15,6 +15,8 @@ pub(crate) struct Instance {
     pub(crate) entry: ash::Entry,
     pub(crate) raw: ash::Instance,
     pub(crate) debug_utils: bool,
+    /// The validation layer is on.
+    pub(crate) validated: bool,
     /// Shaders are instrumented by the validation layer.
     pub(crate) gpu_assisted: bool,
     messenger: Messenger,
@@ -48,7 +50,8 @@ impl Instance {
             return Err(Error::vulkan("vkCreateDebugUtilsMessengerEXT")(result));
         }
         let gpu_assisted = desc.validation == Validation::GpuAssisted;
-        Ok(Self { entry, raw, debug_utils: extensions.debug_utils, gpu_assisted, messenger })
+        let (debug_utils, validated) = (extensions.debug_utils, layer.is_some());
+        Ok(Self { entry, raw, debug_utils, validated, gpu_assisted, messenger })
     }
 
     /// The messages of the validation layer.
