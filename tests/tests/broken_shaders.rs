@@ -4,6 +4,7 @@
 
 use image::RgbaImage;
 use lvk::Context;
+use lvk_samples::app::headless;
 use lvk_samples::hybrid::{Bounces, Geometry, HybridConfig, Method, Raster, RasterTuning, RayPath};
 use lvk_samples::hybrid_oit::{HybridOitConfig, OitScene};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
@@ -401,8 +402,7 @@ fn hall_of(ctx: &Context, config: &ReflectionsConfig, view: Option<&Camera>) -> 
         hall.look(view);
     }
     paint_over(ctx, hall.picture());
-    hall.render_with(&mut |_| {}).unwrap();
-    RgbaImage::from_raw(config.width, config.height, hall.read_image().unwrap()).unwrap()
+    RgbaImage::from_raw(config.width, config.height, headless::picture(&mut hall).unwrap()).unwrap()
 }
 
 #[test]

@@ -3,6 +3,7 @@
 
 use image::RgbaImage;
 use lvk::{Context, Dependencies, DeviceProfile};
+use lvk_samples::app::headless;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::reflections::{
@@ -34,9 +35,8 @@ fn picture_at(hall: &mut Reflections, phase: f32) -> RgbaImage {
 }
 
 fn picture(hall: &mut Reflections) -> RgbaImage {
-    hall.render_with(&mut |_| {}).unwrap();
     let [width, height] = [hall.config().width, hall.config().height];
-    RgbaImage::from_raw(width, height, hall.read_image().unwrap()).unwrap()
+    RgbaImage::from_raw(width, height, headless::picture(hall).unwrap()).unwrap()
 }
 
 /// Two empty pictures would agree too.
@@ -79,7 +79,7 @@ fn a_round_ends_where_it_began_without_a_seam() {
     let Some(ctx) = device() else { return };
     let mut hall = hall(&ctx, &config(paths(&ctx)[0]));
     let mut frame = |frame, frames_per_round| {
-        hall.update(Moment { frame, frames_per_round }).unwrap();
+        hall.update(Moment::of_frame(frame, frames_per_round)).unwrap();
         picture(&mut hall)
     };
     let first = frame(0, 240);

@@ -6,6 +6,7 @@ use image::RgbaImage;
 use image::imageops::{FilterType, resize};
 use lvk::glam::{DAffine3, DVec3, Vec3};
 use lvk::{Context, FeatureRequest, RayQueryRequest};
+use lvk_samples::app::headless;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
@@ -32,8 +33,7 @@ fn town(ctx: &Context, path: RayPath, passes: u32, rays: u32) -> RtxAo {
 }
 
 fn picture(town: &mut RtxAo) -> RgbaImage {
-    town.render(&mut |_| {}).unwrap();
-    RgbaImage::from_raw(SIZE[0], SIZE[1], town.picture().unwrap()).unwrap()
+    RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(town).unwrap()).unwrap()
 }
 
 fn software() -> Option<TestDevice> {
@@ -49,7 +49,7 @@ fn all_paths_show_the_town() {
     all.push(town(&other, RayPath::Query, 2, 1));
     for phase in [0, 3] {
         let mut show = |town: &mut RtxAo| {
-            town.update(Moment { frame: phase, frames_per_round: 20 }).unwrap();
+            town.update(Moment::of_frame(phase, 20)).unwrap();
             picture(town)
         };
         let pictures: Vec<_> = all.iter_mut().map(&mut show).collect();
@@ -63,7 +63,7 @@ fn all_paths_show_the_town() {
 fn the_cache_forgets_what_has_moved() {
     let Some(ctx) = software() else { return };
     let mut town = town(&ctx, RayPath::Query, 2, 1);
-    let start = *town.view();
+    let start = *town.shown();
     let first = picture(&mut town);
     town.show(&start);
     assert_eq!(town.passes(), 2, "nothing moved");
@@ -77,7 +77,7 @@ fn the_cache_forgets_what_has_moved() {
         town.show(&start);
         assert_eq!(picture(&mut town), first, "back from {view:?}");
     }
-    town.update(Moment { frame: 0, frames_per_round: 9 }).unwrap();
+    town.update(Moment::of_frame(0, 9)).unwrap();
     assert_eq!(picture(&mut town), first, "a frame depends on its moment alone");
 }
 
@@ -179,11 +179,12 @@ fn mean_error(openness: &[f32], expected: &[([u32; 2], f64)]) -> f64 {
 fn it_converges_to_the_reference() {
     let Some(ctx) = software() else { return };
     let mut town = town(&ctx, RayPath::Query, 6, 4);
+    let mut shown = None;
     let mut after = |passes: u32| {
         while town.passes() < passes {
-            town.render(&mut |_| {}).unwrap();
+            shown = Some(picture(&mut town));
         }
-        (picture_now(&town), town.openness().unwrap())
+        (shown.clone().unwrap(), town.openness().unwrap())
     };
     let [few, more, most] = [6, 24, 96].map(&mut after);
     let psnr = |one: &RgbaImage, other: &RgbaImage| Likeness::of(one, other).difference.psnr;
@@ -192,7 +193,7 @@ fn it_converges_to_the_reference() {
     assert!(first > 26.0 && second > first + 3.0, "{first} dB, then {second} dB");
 
     let world = World::new();
-    let camera = town.view().camera;
+    let camera = town.shown().camera;
     let pixels = even_pixels(&most.1);
     let found =
         pixels.iter().filter_map(|&pixel| Some((pixel, world.openness(&ray_through(&camera, pixel), 1024)?)));
@@ -201,10 +202,6 @@ fn it_converges_to_the_reference() {
     eprintln!("mean errors at {} pixels: {errors:?}", expected.len());
     assert!(expected.len() >= 40);
     assert!(errors[0] > errors[1] && errors[1] > errors[2] && errors[2] < 0.012, "{errors:?}");
-}
-
-fn picture_now(town: &RtxAo) -> RgbaImage {
-    RgbaImage::from_raw(SIZE[0], SIZE[1], town.picture().unwrap()).unwrap()
 }
 
 #[test]

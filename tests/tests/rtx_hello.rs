@@ -3,6 +3,7 @@
 
 use image::RgbaImage;
 use lvk::{Context, FeatureRequest, RayQueryRequest};
+use lvk_samples::app::headless;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
@@ -23,9 +24,8 @@ fn hello(ctx: &Context, path: RayPath) -> RtxHello {
 }
 
 fn picture_of(hello: &mut RtxHello, frame: u32) -> RgbaImage {
-    hello.update(Moment { frame, frames_per_round: ROUND }).unwrap();
-    hello.render(&mut |_| {}).unwrap();
-    RgbaImage::from_raw(SIZE[0], SIZE[1], hello.picture().unwrap()).unwrap()
+    hello.update(Moment::of_frame(frame, ROUND)).unwrap();
+    RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(hello).unwrap()).unwrap()
 }
 
 #[test]

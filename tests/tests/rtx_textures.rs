@@ -3,6 +3,7 @@
 
 use image::RgbaImage;
 use lvk::{Context, FeatureRequest, RayQueryRequest};
+use lvk_samples::app::headless;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
@@ -25,9 +26,8 @@ fn waves(ctx: &Context, path: RayPath) -> RtxTextures {
 }
 
 fn picture_of(waves: &mut RtxTextures, frame: u32) -> RgbaImage {
-    waves.update(Moment { frame, frames_per_round: ROUND }).unwrap();
-    waves.render(&mut |_| {}).unwrap();
-    RgbaImage::from_raw(SIZE[0], SIZE[1], waves.picture().unwrap()).unwrap()
+    waves.update(Moment::of_frame(frame, ROUND)).unwrap();
+    RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(waves).unwrap()).unwrap()
 }
 
 #[test]

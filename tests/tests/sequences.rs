@@ -5,6 +5,7 @@ use std::path::Path;
 
 use lvk::Context;
 use lvk_samples::app::frame_name::FrameName;
+use lvk_samples::app::headless::Headless;
 use lvk_samples::app::interrupt::Interrupt;
 use lvk_samples::app::play::{Job, Played, play};
 use lvk_samples::app::progress::Progress;
@@ -32,7 +33,7 @@ fn played(ctx: &Context, frames: &str, folder: &Path) -> Played {
         resume: false,
     };
     job.check().unwrap();
-    play(&mut sequence, &job, &mut Progress::hidden(), &Interrupt::deaf()).unwrap()
+    play(&mut Headless::new(&mut sequence), &job, &mut Progress::hidden(), &Interrupt::deaf()).unwrap()
 }
 
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {

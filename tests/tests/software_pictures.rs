@@ -3,6 +3,7 @@
 
 use image::RgbaImage;
 use lvk::{Context, FeatureRequest, RayQueryPath, RayQueryRequest};
+use lvk_samples::app::headless;
 use lvk_samples::hybrid::{Bounces, HybridConfig, HybridError, HybridRenderer, Method, RayPath};
 use lvk_samples::hybrid_oit::{HybridOitConfig, OitScene};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
@@ -124,6 +125,5 @@ fn hall(ctx: &Context, [width, height]: [u32; 2]) -> RgbaImage {
     let config = ReflectionsConfig { samples: 4, ..ReflectionsConfig::new(RayPath::Query, width, height) };
     let mut hall = Reflections::new(ctx, &config).unwrap();
     hall.show(0.0);
-    hall.render_with(&mut |_| {}).unwrap();
-    RgbaImage::from_raw(width, height, hall.read_image().unwrap()).unwrap()
+    RgbaImage::from_raw(width, height, headless::picture(&mut hall).unwrap()).unwrap()
 }

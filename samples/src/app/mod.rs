@@ -5,10 +5,13 @@
 pub mod args;
 pub(crate) mod array_buffer;
 pub mod device;
+pub mod frame;
 pub mod frame_name;
 pub mod frames;
+pub mod headless;
 pub mod interrupt;
 pub mod metrics;
+pub mod pass_times;
 pub mod play;
 pub mod png;
 pub mod progress;

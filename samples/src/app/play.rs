@@ -5,11 +5,36 @@ use std::path::Path;
 use super::frame_name::FrameName;
 use super::frames::Frames;
 use super::interrupt::Interrupt;
+use super::pass_times::PassTimes;
 use super::png;
 use super::progress::Progress;
 use super::run_error::RunError;
-use super::sample::{Moment, Sample};
+use super::sample::Moment;
 use super::timings::Timings;
+
+/// What can be played: [`Headless`](super::headless::Headless) does it for samples.
+pub trait Player {
+    /// Goes to a moment.
+    ///
+    /// # Errors
+    /// Its own.
+    fn update(&mut self, moment: Moment) -> Result<(), RunError>;
+
+    /// Into how many steps a frame is cut, for the progress bar.
+    fn steps_per_frame(&self) -> u64;
+
+    /// Renders a frame and waits for it. Calls `after_step` with the number of steps done.
+    ///
+    /// # Errors
+    /// Its own.
+    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, RunError>;
+
+    /// The last frame: red, green, blue and alpha of each pixel, 8 bits each, sRGB, rows from the top.
+    ///
+    /// # Errors
+    /// Its own.
+    fn picture(&self) -> Result<Vec<u8>, RunError>;
+}
 
 /// What to render and where to.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -64,7 +89,7 @@ impl Job {
     }
 
     fn moment(&self, frame: u32) -> Moment {
-        Moment { frame, frames_per_round: self.frames_per_round }
+        Moment::of_frame(frame, self.frames_per_round)
     }
 }
 
@@ -72,53 +97,53 @@ impl Job {
 /// raised, the frame under way is the last.
 ///
 /// # Errors
-/// [`RunError::Interrupted`], [`RunError::Png`] and those of the sample.
-pub fn play<S: Sample>(
-    sample: &mut S,
+/// [`RunError::Interrupted`], [`RunError::Png`] and those of the player.
+pub fn play(
+    player: &mut impl Player,
     job: &Job,
     progress: &mut Progress,
     interrupt: &Interrupt,
 ) -> Result<Played, RunError> {
     match &job.frames {
-        Frames::Still(count) => still(sample, job, *count, progress, interrupt),
-        Frames::Sequence(range) => sequence(sample, job, range.clone(), progress, interrupt),
+        Frames::Still(count) => still(player, job, *count, progress, interrupt),
+        Frames::Sequence(range) => sequence(player, job, range.clone(), progress, interrupt),
     }
 }
 
-fn still<S: Sample>(
-    sample: &mut S,
+fn still(
+    player: &mut impl Player,
     job: &Job,
     count: u32,
     progress: &mut Progress,
     interrupt: &Interrupt,
 ) -> Result<Played, RunError> {
-    let steps = sample.steps_per_frame();
+    let steps = player.steps_per_frame();
     let all = u64::from(job.warm_up) + u64::from(count);
     progress.stage("rendering", all * steps);
     let mut timings = Timings::new();
-    sample.update(job.moment(0)).map_err(Into::into)?;
+    player.update(job.moment(0))?;
     for round in 0..all {
         if interrupt.is_raised() {
             let done = round.saturating_sub(u64::from(job.warm_up)) as u32;
             return Err(RunError::Interrupted { done, count, hint: "" });
         }
-        let times = sample.render(&mut |step| progress.set(round * steps + step)).map_err(Into::into)?;
+        let times = player.render(&mut |step| progress.set(round * steps + step))?;
         if let Some(counted) = round.checked_sub(u64::from(job.warm_up)) {
-            times.iter().for_each(|(pass, milliseconds)| timings.push(counted, pass, *milliseconds));
+            times.passes().for_each(|(pass, milliseconds)| timings.push(counted, pass, milliseconds));
         }
     }
-    write(sample, job, 0)?;
+    write(player, job, 0)?;
     Ok(Played { timings, written: 1, skipped: 0 })
 }
 
-fn sequence<S: Sample>(
-    sample: &mut S,
+fn sequence(
+    player: &mut impl Player,
     job: &Job,
     range: std::ops::Range<u32>,
     progress: &mut Progress,
     interrupt: &Interrupt,
 ) -> Result<Played, RunError> {
-    let steps = sample.steps_per_frame();
+    let steps = player.steps_per_frame();
     let count = range.end - range.start;
     progress.stage("rendering", u64::from(count) * steps);
     let mut played = Played::default();
@@ -133,17 +158,17 @@ fn sequence<S: Sample>(
             progress.set(before + steps);
             continue;
         }
-        sample.update(job.moment(frame)).map_err(Into::into)?;
-        let times = sample.render(&mut |step| progress.set(before + step)).map_err(Into::into)?;
-        times.iter().for_each(|(pass, milliseconds)| played.timings.push(frame.into(), pass, *milliseconds));
-        write(sample, job, frame)?;
+        player.update(job.moment(frame))?;
+        let times = player.render(&mut |step| progress.set(before + step))?;
+        times.passes().for_each(|(pass, milliseconds)| played.timings.push(frame.into(), pass, milliseconds));
+        write(player, job, frame)?;
         played.written += 1;
     }
     Ok(played)
 }
 
-fn write<S: Sample>(sample: &S, job: &Job, frame: u32) -> Result<(), RunError> {
-    let picture = sample.picture().map_err(Into::into)?;
+fn write(player: &impl Player, job: &Job, frame: u32) -> Result<(), RunError> {
+    let picture = player.picture()?;
     Ok(png::write(&job.out.of(frame), job.size[0], job.size[1], &picture)?)
 }
 
@@ -158,13 +183,6 @@ fn make_folder(picture: &Path) -> Result<(), RunError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::convert::Infallible;
-
-    impl From<Infallible> for RunError {
-        fn from(never: Infallible) -> Self {
-            match never {}
-        }
-    }
 
     /// Shows the number of its frame, and raises the flag in one of them.
     struct Counter {
@@ -185,27 +203,26 @@ mod tests {
         }
     }
 
-    impl Sample for Counter {
-        type Error = Infallible;
-
-        fn update(&mut self, moment: Moment) -> Result<(), Infallible> {
+    impl Player for Counter {
+        fn update(&mut self, moment: Moment) -> Result<(), RunError> {
             self.frame = moment.frame;
             Ok(())
         }
 
-        fn render(
-            &mut self,
-            after_step: &mut dyn FnMut(u64),
-        ) -> Result<super::super::sample::PassTimes, Infallible> {
+        fn steps_per_frame(&self) -> u64 {
+            1
+        }
+
+        fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, RunError> {
             after_step(1);
             self.rendered.push(self.frame);
             if self.frame == self.raise_in {
                 self.interrupt.raise();
             }
-            Ok(vec![("count", 1.0)])
+            Ok(PassTimes::default())
         }
 
-        fn picture(&self) -> Result<Vec<u8>, Infallible> {
+        fn picture(&self) -> Result<Vec<u8>, RunError> {
             Ok(vec![self.frame as u8, 0, 0, 255])
         }
     }

@@ -7,6 +7,7 @@ use lvk::{Context, ValidationSink};
 use super::device::{self, DeviceNeeds};
 use super::frame_name::FrameName;
 use super::frames::Frames;
+use super::headless::Headless;
 use super::interrupt::Interrupt;
 use super::play::{Job, Played, play};
 use super::progress::Progress;
@@ -32,8 +33,6 @@ pub struct Opening<'a> {
 
 /// A sample that is ready to render.
 pub struct Opened<S> {
-    /// The device.
-    pub context: Context,
     /// The sample.
     pub sample: S,
     /// What is said about it, in a line or several.
@@ -101,14 +100,15 @@ fn attempt<S: Sample>(
     job.check()?;
     let sink = ValidationSink::default();
     let mut opening = Opening { progress: Progress::visible(), name, args, sink: &sink };
-    let Opened { context, mut sample, headline } = make(&mut opening)?;
+    let Opened { mut sample, headline } = make(&mut opening)?;
+    let context = sample.context().clone();
     drop(opening);
     say(&headline);
     if context.capabilities().is_cpu {
         job.warm_up = 0;
         job.frames = args.frames.clone().unwrap_or(Frames::Still(1));
     }
-    let played = play(&mut sample, &job, &mut Progress::visible(), &Interrupt::listen());
+    let played = play(&mut Headless::new(&mut sample), &job, &mut Progress::visible(), &Interrupt::listen());
     let remark = sample.remark();
     drop(sample);
     context.wait_idle()?;

@@ -1,11 +1,12 @@
-//! What a sample is to the program around it: a type with three verbs.
+//! What a sample is to the program around it: a type with two verbs, and some more where it has a window.
 //!
 //! - **new** is the sample's own: from a context, a scene and a configuration. All that is slow happens here: uploads,
 //!   acceleration structures, every pipeline.
 //! - [`Sample::update`] puts it at a [`Moment`] of its animation: cameras, lights, bones. What it shows afterwards
 //!   depends on the moment alone and not on the moments before, so that a sequence can be cut into ranges that several
 //!   processes share. Something that has to be simulated step by step is evaluated in closed form, or from frame 0.
-//! - [`Sample::render`] renders one frame, waits for it and answers what its passes took.
+//! - [`Sample::record`] uploads what the frame needs, records it, and answers the texture that shows it. It neither
+//!   submits nor waits; [`Frame::next_step`](super::frame::Frame::next_step) cuts frames that take long.
 //!
 //! [`run`](super::run::run) does all the rest: device, validation, `--frames`, pictures, progress, Ctrl-C, timings. A
 //! sample's `run.rs` is then
@@ -15,27 +16,73 @@
 //!     app::run::run("cloud", &args.run, |opening| {
 //!         let ctx = opening.device(&DeviceNeeds::default())?;
 //!         let cloud = Cloud::new(&ctx, &args.config(&ctx)?)?;
-//!         Ok(Opened { headline: cloud.headline(), sample: cloud, context: ctx })
+//!         Ok(Opened { headline: cloud.headline(), sample: cloud })
 //!     })
 //! }
 //! ```
 //!
 //! where `CloudArgs` holds `#[command(flatten)] pub run: RunArgs`, `CloudError: Into<RunError>` says which errors the
-//! user can mend, and `Cloud` implements [`Sample`].
+//! user can mend, and `Cloud` implements [`Sample`]:
+//!
+//! ```ignore
+//! impl Sample for Cloud {
+//!     type Error = CloudError;
+//!
+//!     fn context(&self) -> &Context {
+//!         &self.ctx
+//!     }
+//!
+//!     fn update(&mut self, moment: Moment) -> Result<(), CloudError> {
+//!         self.constants.phase = moment.phase();
+//!         Ok(())
+//!     }
+//!
+//!     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, CloudError> {
+//!         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
+//!         frame.pass("cloud", |cmd| self.trace(cmd))?;
+//!         Ok(*self.picture)
+//!     }
+//! }
+//! ```
+//!
+//! For a window it also says how to [`resize`](Sample::resize), to be looked at from elsewhere
+//! ([`view`](Sample::view), [`set_view`](Sample::set_view)), and to compile its shaders again ([`reload`](Sample::reload)).
+
+use lvk::{Context, TextureHandle};
+
+use super::frame::Frame;
+use super::run_error::RunError;
+use crate::scene::Camera;
 
 /// Frames a second of every animation.
 pub const FRAMES_PER_SECOND: u32 = 30;
 
-/// A moment of an animation that repeats itself after some frames. The time step is fixed.
+/// A moment of an animation that repeats itself after some frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Moment {
     /// Number of the frame, from 0.
     pub frame: u32,
     /// Frames of one round of whatever goes round; at least 1.
     pub frames_per_round: u32,
+    /// Frames a second; at least 1.
+    pub frames_per_second: u32,
 }
 
 impl Moment {
+    /// Frame `frame` of a sequence, whose time step is fixed.
+    #[must_use]
+    pub fn of_frame(frame: u32, frames_per_round: u32) -> Self {
+        Self { frame, frames_per_round, frames_per_second: FRAMES_PER_SECOND }
+    }
+
+    /// So many milliseconds after frame 0 of a sequence with rounds of `frames_per_round` frames.
+    #[must_use]
+    pub fn after(milliseconds: u32, frames_per_round: u32) -> Self {
+        let round = u64::from(frames_per_round) * 1000 / u64::from(FRAMES_PER_SECOND);
+        let frames_per_round = u32::try_from(round).unwrap_or(u32::MAX);
+        Self { frame: milliseconds, frames_per_round, frames_per_second: 1000 }
+    }
+
     /// Where in its round the animation is, from 0 to below 1.
     #[must_use]
     pub fn phase(&self) -> f32 {
@@ -46,45 +93,72 @@ impl Moment {
     /// Seconds since frame 0.
     #[must_use]
     pub fn seconds(&self) -> f64 {
-        f64::from(self.frame) / f64::from(FRAMES_PER_SECOND)
+        f64::from(self.frame) / f64::from(self.frames_per_second.max(1))
     }
 }
-
-/// Names of a frame's passes, in the order in which they run, and what each took on the GPU in milliseconds. Empty where
-/// the device has no timestamps.
-pub type PassTimes = Vec<(&'static str, f64)>;
 
 /// A sample, ready to render.
 pub trait Sample {
     /// What can go wrong while it renders.
-    type Error: Into<super::run_error::RunError>;
+    type Error: From<lvk::Error> + Into<RunError>;
 
-    /// Puts everything that moves where it is at `moment`, whatever was shown before.
+    /// The device.
+    fn context(&self) -> &Context;
+
+    /// Puts everything that moves where it is at `moment`, whatever was shown before, the camera included.
     ///
     /// # Errors
     /// The sample's own.
     fn update(&mut self, moment: Moment) -> Result<(), Self::Error>;
 
-    /// Into how many steps rendering a frame is cut, for the progress bar.
+    /// Records a frame, and answers the texture that shows it: red, green, blue and alpha of each pixel, 8 bits each, sRGB,
+    /// sampled. It holds the frame until the next one is recorded.
+    ///
+    /// # Errors
+    /// The sample's own.
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, Self::Error>;
+
+    /// Into how many steps [`record`](Self::record) cuts a frame.
     fn steps_per_frame(&self) -> u64 {
         1
     }
 
-    /// Renders a frame and waits for it. Calls `after_step` with the number of steps done.
+    /// Reads what a frame left for the host. The GPU has finished the frame; only called where frames are waited for, so not
+    /// in windows.
     ///
     /// # Errors
     /// The sample's own.
-    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, Self::Error>;
-
-    /// The last frame: red, green, blue and alpha of each pixel, 8 bits each, sRGB, rows from the top.
-    ///
-    /// # Errors
-    /// The sample's own.
-    fn picture(&self) -> Result<Vec<u8>, Self::Error>;
+    fn after_frame(&mut self) -> Result<(), Self::Error> {
+        Ok(())
+    }
 
     /// What is to be said below the timings when the last frame is done.
     fn remark(&self) -> Option<String> {
         None
+    }
+
+    /// Renders pictures of `extent` pixels from now on. Where a sample does not, its pictures are stretched.
+    ///
+    /// # Errors
+    /// The sample's own. It must still be able to render, with the old extent.
+    fn resize(&mut self, _extent: [u32; 2]) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    /// From where the next frame is seen; `None` where the sample has no camera that could be elsewhere.
+    fn view(&self) -> Option<Camera> {
+        None
+    }
+
+    /// Looks from another place than the animation's, until the next [`update`](Self::update).
+    fn set_view(&mut self, _camera: &Camera) {}
+
+    /// Makes all pipelines anew, of shaders that have changed.
+    ///
+    /// # Errors
+    /// The sample's own. It must still be able to render, by the old pipelines.
+    fn reload(&mut self) -> Result<(), Self::Error> {
+        Ok(())
     }
 }
 
@@ -94,12 +168,22 @@ mod tests {
 
     #[test]
     fn a_round_ends_where_it_began() {
-        let at = |frame| Moment { frame, frames_per_round: 240 };
+        let at = |frame| Moment::of_frame(frame, 240);
         assert_eq!(at(0).phase(), 0.0);
         assert_eq!(at(60).phase(), 0.25);
         assert_eq!(at(240).phase(), 0.0);
         assert_eq!(at(u32::MAX - 15).phase(), at((u32::MAX - 15) % 240).phase());
         assert_eq!(at(240).seconds(), 8.0);
-        assert_eq!(Moment { frame: 3, frames_per_round: 0 }.phase(), 0.0);
+        assert_eq!(Moment::of_frame(3, 0).phase(), 0.0);
+    }
+
+    #[test]
+    fn frames_are_moments_by_the_clock() {
+        for (milliseconds, frame) in [(0, 0), (1000, 30), (2500, 75), (9000, 270)] {
+            let (by_clock, by_frame) = (Moment::after(milliseconds, 240), Moment::of_frame(frame, 240));
+            assert_eq!(by_clock.seconds(), by_frame.seconds());
+            assert_eq!(by_clock.phase(), by_frame.phase());
+        }
+        assert_eq!(Moment::after(5, 0).phase(), 0.0);
     }
 }

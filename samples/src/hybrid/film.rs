@@ -14,7 +14,7 @@ impl Film {
         let picture = ctx.create_texture(&TextureDesc {
             format: Format::Rgba8Unorm,
             extent,
-            usage: TextureUsage::STORAGE,
+            usage: TextureUsage::STORAGE | TextureUsage::SAMPLED,
             debug_name: "picture",
             ..TextureDesc::default()
         })?;

@@ -90,7 +90,6 @@ impl RayPass {
             ..Dependencies::default()
         };
         let push = &push;
-        cmd.push_label("ray pass");
         match &self.pipeline {
             Pipeline::Tracing(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
@@ -111,7 +110,6 @@ impl RayPass {
                 }
             }
         }
-        cmd.pop_label();
         Ok(())
     }
 

@@ -74,7 +74,7 @@ fn open(args: &HybridArgs, opening: &mut Opening<'_>) -> Result<Opened<HybridSeq
         let _ = write!(headline, "\ngeometry  {choice}");
     }
     let sample = HybridSequence::new(renderer, &scene, first, args.lamp == args::Lamp::Circle);
-    Ok(Opened { context, sample, headline })
+    Ok(Opened { sample, headline })
 }
 
 /// The method that is named, if only by something that it alone has.

@@ -1,9 +1,11 @@
 //! The sample as an animation: a tour through the scene's cameras, and a lamp that may move.
 
 use glam::Vec3;
+use lvk::{Context, TextureHandle};
 
 use super::{HybridError, HybridRenderer};
-use crate::app::sample::{Moment, PassTimes, Sample};
+use crate::app::frame::Frame;
+use crate::app::sample::{Moment, Sample};
 use crate::scene::{Camera, CameraPath, Scene};
 
 /// Radius of the lamp's circle, as a share of the diagonal of the scene's bounding box.
@@ -38,6 +40,10 @@ impl HybridSequence {
 impl Sample for HybridSequence {
     type Error = HybridError;
 
+    fn context(&self) -> &Context {
+        self.renderer.context()
+    }
+
     fn update(&mut self, moment: Moment) -> Result<(), HybridError> {
         self.camera = self.path.at(moment.phase());
         if let Some(lamp) = &self.lamp {
@@ -50,12 +56,24 @@ impl Sample for HybridSequence {
         self.renderer.band_count()
     }
 
-    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, HybridError> {
-        Ok(self.renderer.render_with(&self.camera, after_step)?.passes())
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, HybridError> {
+        self.renderer.record(frame, &self.camera)
     }
 
-    fn picture(&self) -> Result<Vec<u8>, HybridError> {
-        self.renderer.read_image()
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), HybridError> {
+        self.renderer.resize(extent)
+    }
+
+    fn view(&self) -> Option<Camera> {
+        Some(self.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.camera = *camera;
+    }
+
+    fn reload(&mut self) -> Result<(), HybridError> {
+        self.renderer.reload()
     }
 }
 

@@ -71,12 +71,18 @@ impl Buffers {
             blocks: filled(ctx, bytemuck::cast_slice(&blocks), storage, "blocks")?,
             boxes: filled(ctx, &vec![0; (glass_count * BOX_BYTES) as usize], input, "boxes of glass")?,
             records: empty(ctx, instances * RECORD_BYTES, storage, "instance records")?,
-            heads: empty(ctx, samples * 4, storage, "heads of lists")?,
+            heads: heads(ctx, samples)?,
             node_count: empty(ctx, 4, storage, "node count")?,
-            nodes: empty(ctx, u64::from(nodes.max(1)) * NODE_BYTES, storage, "nodes")?,
+            nodes: pool(ctx, nodes)?,
             glass_light: empty(ctx, glass_count * 12, storage, "light on glass")?,
             vertex_count: solids.positions.len() as u32,
         })
+    }
+
+    /// Makes room for a raster of `samples` samples and a pool of `nodes` nodes.
+    pub(super) fn resize(&mut self, ctx: &Context, samples: u64, nodes: u32) -> lvk::Result<()> {
+        (self.heads, self.nodes) = (heads(ctx, samples)?, pool(ctx, nodes)?);
+        Ok(())
     }
 
     /// Where the shaders find them.
@@ -126,6 +132,14 @@ impl Solids {
             self.add_face(center + out, right, up, block.albedo);
         }
     }
+}
+
+fn heads(ctx: &Context, samples: u64) -> lvk::Result<Holder<BufferHandle>> {
+    empty(ctx, samples * 4, BufferUsage::STORAGE, "heads of lists")
+}
+
+fn pool(ctx: &Context, nodes: u32) -> lvk::Result<Holder<BufferHandle>> {
+    empty(ctx, u64::from(nodes.max(1)) * NODE_BYTES, BufferUsage::STORAGE, "nodes")
 }
 
 fn corners(low: Vec3, high: Vec3) -> [f32; 6] {

@@ -36,14 +36,11 @@ impl ImagePasses {
         push: &Push,
         sphere_count: u32,
     ) -> lvk::Result<()> {
-        cmd.push_label("animate");
         cmd.bind_compute_pipeline(*self.animate)?;
         cmd.push_constants(push)?;
         let writes = [*buffers.spheres, *buffers.boxes, *buffers.records];
         let dependencies = Dependencies { buffers: &writes, ..Dependencies::default() };
-        cmd.dispatch([sphere_count.div_ceil(ANIMATE_GROUP), 1, 1], &dependencies)?;
-        cmd.pop_label();
-        Ok(())
+        cmd.dispatch([sphere_count.div_ceil(ANIMATE_GROUP), 1, 1], &dependencies)
     }
 
     /// Records the making of a picture of `pixels`.
@@ -55,7 +52,6 @@ impl ImagePasses {
         push: &Push,
         pixels: [u32; 2],
     ) -> lvk::Result<()> {
-        cmd.push_label("composite");
         cmd.bind_compute_pipeline(*self.composite)?;
         cmd.push_constants(push)?;
         let dependencies = Dependencies {
@@ -65,9 +61,7 @@ impl ImagePasses {
             ..Dependencies::default()
         };
         let [width, height] = pixels.map(|side| side.div_ceil(COMPOSITE_GROUP));
-        cmd.dispatch([width, height, 1], &dependencies)?;
-        cmd.pop_label();
-        Ok(())
+        cmd.dispatch([width, height, 1], &dependencies)
     }
 }
 

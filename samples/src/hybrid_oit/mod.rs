@@ -28,8 +28,8 @@ mod raster_passes;
 mod run;
 mod sample;
 mod scene;
+mod sequence;
 mod shadow_pass;
-mod stamps;
 mod structures;
 mod targets;
 
@@ -41,3 +41,4 @@ pub use pipelines::pipelines;
 pub use run::run;
 pub use sample::HybridOit;
 pub use scene::{Ball, Block, Glass, Motion, OitScene, PERIOD_SECONDS, Sun};
+pub use sequence::HybridOitSequence;

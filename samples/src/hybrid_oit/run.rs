@@ -5,25 +5,15 @@ use std::process::ExitCode;
 
 use lvk::Context;
 
-use super::{HybridOit, HybridOitArgs, HybridOitConfig, HybridOitError, NodeUse, OitScene, PERIOD_SECONDS};
+use super::{HybridOit, HybridOitArgs, HybridOitConfig, HybridOitError, HybridOitSequence, OitScene};
 use crate::app::device::{DeviceNeeds, driver_text, query_text};
 use crate::app::run::{self, Opened, Opening};
 use crate::app::run_error::RunError;
-use crate::app::sample::{Moment, PassTimes, Sample};
 use crate::app::say;
 use crate::hybrid::RayPath;
 
 /// What the sample and its pictures are called.
 const NAME: &str = "hybrid_oit";
-
-/// The sample in an animation.
-struct Animation {
-    sample: HybridOit,
-    /// What frame 0 shows, in seconds.
-    start: f64,
-    /// Of the frame that asked for most.
-    nodes: NodeUse,
-}
 
 impl From<HybridOitError> for RunError {
     fn from(error: HybridOitError) -> Self {
@@ -32,31 +22,6 @@ impl From<HybridOitError> for RunError {
             HybridOitError::Device(_) => Self::device(error),
             _ => Self::input(error),
         }
-    }
-}
-
-impl Sample for Animation {
-    type Error = HybridOitError;
-
-    fn update(&mut self, moment: Moment) -> Result<(), HybridOitError> {
-        self.sample.update(self.start + PERIOD_SECONDS * f64::from(moment.phase()));
-        Ok(())
-    }
-
-    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, HybridOitError> {
-        let times = self.sample.render()?;
-        let nodes = self.sample.node_use()?;
-        self.nodes = if nodes.asked >= self.nodes.asked { nodes } else { self.nodes };
-        after_step(1);
-        Ok(times)
-    }
-
-    fn picture(&self) -> Result<Vec<u8>, HybridOitError> {
-        self.sample.picture()
-    }
-
-    fn remark(&self) -> Option<String> {
-        Some(format!("glass     {}", self.nodes))
     }
 }
 
@@ -73,7 +38,7 @@ pub fn run(args: &HybridOitArgs) -> ExitCode {
     }
 }
 
-fn open(args: &HybridOitArgs, opening: &mut Opening<'_>) -> Result<Opened<Animation>, RunError> {
+fn open(args: &HybridOitArgs, opening: &mut Opening<'_>) -> Result<Opened<HybridOitSequence>, RunError> {
     let context = opening.device(&DeviceNeeds::default())?;
     let path = RayPath::choose(RayPath::wished(args.run.rt), context.capabilities())?;
     let scene = OitScene::default();
@@ -86,8 +51,8 @@ fn open(args: &HybridOitArgs, opening: &mut Opening<'_>) -> Result<Opened<Animat
     opening.progress.stage("making the scene and its pipelines", 0);
     let sample = HybridOit::new(&context, &scene, &config)?;
     let headline = headline(&context, &scene, &config);
-    let sample = Animation { sample, start: args.time, nodes: NodeUse::default() };
-    Ok(Opened { context, sample, headline })
+    let sample = HybridOitSequence::new(sample, args.time);
+    Ok(Opened { sample, headline })
 }
 
 fn headline(ctx: &Context, scene: &OitScene, config: &HybridOitConfig) -> String {

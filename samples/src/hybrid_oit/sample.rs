@@ -1,6 +1,6 @@
 //! The sample as a type: give it a scene and a time, get a picture.
 
-use lvk::{BufferDesc, BufferHandle, CommandBuffer, Context, Holder, TextureHandle, TextureRegion};
+use lvk::{BufferDesc, BufferHandle, Context, Holder, TextureHandle, TextureRegion};
 
 use super::buffers::Buffers;
 use super::config::HybridOitConfig;
@@ -11,10 +11,10 @@ use super::image_passes::ImagePasses;
 use super::raster_passes::RasterPasses;
 use super::scene::{OitScene, PERIOD_SECONDS};
 use super::shadow_pass::ShadowPass;
-use super::stamps::Stamps;
 use super::structures::Structures;
 use super::targets::Targets;
-use crate::app::sample::PassTimes;
+use crate::app::frame::Frame;
+use crate::scene::Camera;
 
 /// Renders a scene of blocks, balls and glass. What it shows depends on the time alone, not on frames before.
 pub struct HybridOit {
@@ -26,9 +26,9 @@ pub struct HybridOit {
     images: ImagePasses,
     raster: RasterPasses,
     shadows: ShadowPass,
-    stamps: Stamps,
     sphere_count: u32,
-    _constants: Holder<BufferHandle>,
+    scene: OitScene,
+    constants: Holder<BufferHandle>,
     push: Push,
 }
 
@@ -44,10 +44,8 @@ impl HybridOit {
         let buffers = Buffers::new(ctx, scene, samples(extent), config.nodes())?;
         let structures = Structures::new(ctx, scene, &buffers)?;
         let targets = Targets::new(ctx, extent, [config.width, config.height])?;
-        let numbers = numbers(scene, config, &structures, &targets);
-        let constants = FrameConstants::new(scene, extent, buffers.addresses(ctx)?, numbers);
         let constants = ctx.create_buffer(&BufferDesc {
-            data: Some(bytemuck::bytes_of(&constants)),
+            size_bytes: size_of::<FrameConstants>() as u64,
             debug_name: "frame constants",
             ..BufferDesc::default()
         })?;
@@ -55,10 +53,10 @@ impl HybridOit {
             images: ImagePasses::new(ctx)?,
             raster: RasterPasses::new(ctx, scene, &buffers)?,
             shadows: ShadowPass::new(ctx, config.path)?,
-            stamps: Stamps::new(ctx)?,
             sphere_count: (scene.balls.len() + scene.glass.len()) as u32,
             push: Push { frame: ctx.buffer_address(*constants)?, time: 0.0, padding: 0 },
-            _constants: constants,
+            scene: scene.clone(),
+            constants,
             ctx: ctx.clone(),
             config: *config,
             buffers,
@@ -74,44 +72,81 @@ impl HybridOit {
         self.push.time = time.rem_euclid(PERIOD_SECONDS) as f32;
     }
 
-    /// Renders a frame and waits for it.
+    /// Looks at the scene from elsewhere than it says.
+    pub fn look(&mut self, camera: &Camera) {
+        self.scene.camera = *camera;
+    }
+
+    /// From where the scene is seen.
+    #[must_use]
+    pub fn camera(&self) -> &Camera {
+        &self.scene.camera
+    }
+
+    /// Renders a frame, waits for it and answers the texture that shows it: 8 bits a channel, sRGB.
     ///
     /// # Errors
     /// [`HybridOitError::Device`].
-    pub fn render(&mut self) -> Result<PassTimes, HybridOitError> {
-        let mut cmd = self.ctx.acquire_command_buffer()?;
-        self.record(&mut cmd)?;
-        let submitted = self.ctx.submit(cmd)?;
-        self.ctx.wait(submitted)?;
-        Ok(self.stamps.read(&self.ctx)?)
+    pub fn render(&mut self) -> Result<TextureHandle, HybridOitError> {
+        let mut ignore = |_| {};
+        let mut frame = Frame::waited(&self.ctx, &mut ignore)?;
+        let picture = self.record(&mut frame)?;
+        frame.finish()?;
+        Ok(picture)
     }
 
-    /// Records a frame for a program that submits by itself, to show [`HybridOit::texture`] in a window, say.
+    /// Records a frame, and answers the texture that shows it: 8 bits a channel, sRGB.
     ///
     /// # Errors
     /// [`HybridOitError::Device`].
-    pub fn record(&self, cmd: &mut CommandBuffer) -> Result<(), HybridOitError> {
-        let Self { buffers, targets, push, .. } = self;
-        let extent = self.config.extent();
-        self.stamps.begin(cmd)?;
-        self.images.record_animate(cmd, buffers, push, self.sphere_count)?;
-        self.stamps.end_of(cmd, 0)?;
-        self.structures.record(cmd)?;
-        self.stamps.end_of(cmd, 1)?;
-        self.raster.record_depth(cmd, targets, buffers, push)?;
-        self.stamps.end_of(cmd, 2)?;
-        self.raster.record_gbuffer(cmd, targets, buffers, push)?;
-        self.stamps.end_of(cmd, 3)?;
-        self.shadows.record(cmd, targets, buffers, push, extent)?;
-        self.stamps.end_of(cmd, 4)?;
-        self.raster.record_glass(cmd, targets, buffers, push, samples(extent))?;
-        self.stamps.end_of(cmd, 5)?;
-        let pixels = [self.config.width, self.config.height];
-        self.images.record_composite(cmd, targets, buffers, push, pixels)?;
-        Ok(self.stamps.end_of(cmd, 6)?)
+    pub fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, HybridOitError> {
+        let constants = self.constants()?;
+        self.ctx.upload_buffer(*self.constants, 0, bytemuck::bytes_of(&constants))?;
+        let Self { buffers, targets, push, .. } = &*self;
+        let (extent, pixels) = (self.config.extent(), [self.config.width, self.config.height]);
+        let count = samples(extent);
+        frame.pass("animate", |cmd| self.images.record_animate(cmd, buffers, push, self.sphere_count))?;
+        frame.pass("build", |cmd| self.structures.record(cmd))?;
+        self.raster.record_depth(&mut frame.cmd, targets, buffers, push)?;
+        self.raster.record_gbuffer(&mut frame.cmd, targets, buffers, push)?;
+        frame.pass("shadows", |cmd| self.shadows.record(cmd, targets, buffers, push, extent))?;
+        frame.pass("glass lists", |cmd| self.raster.record_glass(cmd, targets, buffers, push, count))?;
+        frame.pass("composite", |cmd| self.images.record_composite(cmd, targets, buffers, push, pixels))?;
+        Ok(*self.targets.picture)
     }
 
-    /// The texture that holds the picture.
+    /// Renders pictures of `extent` pixels from now on.
+    ///
+    /// # Errors
+    /// [`HybridOitError`] when that is beyond the device; the extent is then what it was.
+    pub fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), HybridOitError> {
+        let config = HybridOitConfig { width, height, ..self.config };
+        config.check(self.ctx.capabilities(), self.scene.glass.len())?;
+        let targets = Targets::new(&self.ctx, config.extent(), [width, height])?;
+        self.buffers.resize(&self.ctx, samples(config.extent()), config.nodes())?;
+        (self.targets, self.config) = (targets, config);
+        Ok(())
+    }
+
+    /// Makes all pipelines anew, of shaders that have changed.
+    ///
+    /// # Errors
+    /// [`HybridOitError::Device`]; the pipelines are then those that were.
+    pub fn reload(&mut self) -> Result<(), HybridOitError> {
+        let images = ImagePasses::new(&self.ctx)?;
+        let raster = RasterPasses::new(&self.ctx, &self.scene, &self.buffers)?;
+        self.shadows = ShadowPass::new(&self.ctx, self.config.path)?;
+        (self.images, self.raster) = (images, raster);
+        Ok(())
+    }
+
+    /// The device.
+    #[must_use]
+    pub fn context(&self) -> &Context {
+        &self.ctx
+    }
+
+    /// The texture that shows the last frame.
     #[must_use]
     pub fn texture(&self) -> TextureHandle {
         *self.targets.picture
@@ -168,6 +203,12 @@ impl HybridOit {
             super::glass_lists::half(bits)
         };
         Ok((0..bytes.len() / 8).map(|texel| [0, 2, 4, 6].map(|at| number(8 * texel + at))).collect())
+    }
+
+    fn constants(&self) -> lvk::Result<FrameConstants> {
+        let numbers = numbers(&self.scene, &self.config, &self.structures, &self.targets);
+        let addresses = self.buffers.addresses(&self.ctx)?;
+        Ok(FrameConstants::new(&self.scene, self.config.extent(), addresses, numbers))
     }
 
     fn download(&self, texture: &Holder<TextureHandle>) -> Result<Vec<u8>, HybridOitError> {

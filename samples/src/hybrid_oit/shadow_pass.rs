@@ -49,21 +49,18 @@ impl ShadowPass {
             ..Dependencies::default()
         };
         let [width, height] = [samples[0], samples[1] + 1];
-        cmd.push_label("shadows");
         match self {
             Self::Tracing(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
                 cmd.push_constants(push)?;
-                cmd.trace_rays([width, height, 1], &dependencies)?;
+                cmd.trace_rays([width, height, 1], &dependencies)
             }
             Self::Compute(pipeline) => {
                 cmd.bind_compute_pipeline(**pipeline)?;
                 cmd.push_constants(push)?;
-                cmd.dispatch([width.div_ceil(GROUP), height.div_ceil(GROUP), 1], &dependencies)?;
+                cmd.dispatch([width.div_ceil(GROUP), height.div_ceil(GROUP), 1], &dependencies)
             }
         }
-        cmd.pop_label();
-        Ok(())
     }
 }
 

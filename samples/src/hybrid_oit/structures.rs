@@ -49,7 +49,6 @@ impl Structures {
 
     /// Records the builds of a frame.
     pub(super) fn record(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
-        cmd.push_label("acceleration structures");
         cmd.build_blas(&[*self.glass], BuildMode::Rebuild)?;
         let instances = DeviceInstances {
             buffer: self.records,
@@ -57,9 +56,7 @@ impl Structures {
             count: self.instance_count,
             blas: &[*self.solids, *self.glass, *self.ball],
         };
-        cmd.update_tlas_from(*self.tlas, &instances, BuildMode::Rebuild)?;
-        cmd.pop_label();
-        Ok(())
+        cmd.update_tlas_from(*self.tlas, &instances, BuildMode::Rebuild)
     }
 }
 

@@ -3,8 +3,7 @@
 use std::fmt;
 
 use super::error::ReflectionsError;
-use super::renderer::Reflections;
-use super::stamps::{RAYS, TLAS_BUILD};
+use super::renderer::{RAYS, Reflections, TLAS_BUILD};
 use crate::app::timings;
 
 /// What a sample of the picture costs on the GPU, in milliseconds.
@@ -37,9 +36,12 @@ impl CullingCost {
         let mut times = [const { (Vec::new(), Vec::new()) }; 2];
         for _ in 0..rounds {
             for (angle, (builds, rays)) in angles.into_iter().zip(&mut times) {
-                let Some(passes) = sample.time_sample(angle)? else { return Ok(None) };
-                builds.push(passes[TLAS_BUILD]);
-                rays.push(RAYS.iter().map(|pass| passes[*pass]).sum());
+                let passes = sample.time_sample(angle)?;
+                if passes.is_empty() {
+                    return Ok(None);
+                }
+                builds.push(passes.ms(&[TLAS_BUILD]));
+                rays.push(passes.ms(&RAYS));
             }
         }
         let [culled, whole] = times.map(|(builds, rays)| {

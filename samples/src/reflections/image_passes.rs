@@ -1,9 +1,6 @@
 //! The passes from picture to picture: the filters of shadows and reflections, the composite and the final average.
 
-use lvk::{
-    BufferDesc, BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder,
-    TextureHandle,
-};
+use lvk::{BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder, TextureHandle};
 
 use super::frame::{Push, words};
 use super::moving::compute;
@@ -11,30 +8,21 @@ use super::pipelines::{COMPOSITE, FILTER, RESOLVE, SMOOTH};
 use super::ray_passes::GROUP;
 use super::targets::Targets;
 
-/// The pipelines, and the sums of the samples.
+/// The pipelines.
 pub(super) struct ImagePasses {
     smooth: Holder<ComputePipelineHandle>,
     filter: Holder<ComputePipelineHandle>,
     composite: Holder<ComputePipelineHandle>,
     resolve: Holder<ComputePipelineHandle>,
-    sums: Holder<BufferHandle>,
-    sums_address: u64,
-    extent: [u32; 2],
 }
 
 impl ImagePasses {
-    pub(super) fn new(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Self> {
-        let size_bytes = u64::from(extent[0]) * u64::from(extent[1]) * size_of::<[f32; 4]>() as u64;
-        let sums =
-            ctx.create_buffer(&BufferDesc { size_bytes, debug_name: "sums", ..BufferDesc::default() })?;
+    pub(super) fn new(ctx: &Context) -> lvk::Result<Self> {
         Ok(Self {
             smooth: compute(ctx, SMOOTH)?,
             filter: compute(ctx, FILTER)?,
             composite: compute(ctx, COMPOSITE)?,
             resolve: compute(ctx, RESOLVE)?,
-            sums_address: ctx.buffer_address(*sums)?,
-            sums,
-            extent,
         })
     }
 
@@ -51,17 +39,17 @@ impl ImagePasses {
         for (number, (from, to)) in (0..).zip(ways) {
             let arguments = [from.index(), to.index(), number, 0];
             let sampled = [surface, depth, from.handle(), *targets.penumbra];
-            self.run(cmd, *self.smooth, Push { frame, arguments }, &sampled, &[to.handle()], &[])?;
+            run(cmd, targets, *self.smooth, Push { frame, arguments }, &sampled, &[to.handle()], &[])?;
         }
         let ways = [(&targets.reflection, &targets.filtered), (&targets.filtered, &targets.reflection)];
         for (number, (from, to)) in (0..).zip(ways) {
             let arguments = [from.index(), to.index(), number, 0];
             let sampled = [surface, depth, from.handle()];
-            self.run(cmd, *self.filter, Push { frame, arguments }, &sampled, &[to.handle()], &[])?;
+            run(cmd, targets, *self.filter, Push { frame, arguments }, &sampled, &[to.handle()], &[])?;
         }
         let sampled = [surface, depth, *targets.visibility, *targets.reflection];
         let push = Push { frame, arguments: [0; 4] };
-        self.run(cmd, *self.composite, push, &sampled, &[*targets.composite], &[])
+        run(cmd, targets, *self.composite, push, &sampled, &[*targets.composite], &[])
     }
 
     /// Adds the sample to the picture's sums; the last of `count` samples gives the picture.
@@ -72,25 +60,24 @@ impl ImagePasses {
         frame: u64,
         count: u32,
     ) -> lvk::Result<()> {
-        let [low, high] = words(self.sums_address);
+        let [low, high] = words(targets.sums_address);
         let push = Push { frame, arguments: [low, high, count, 0] };
-        self.run(cmd, *self.resolve, push, &[*targets.composite], &[*targets.picture], &[*self.sums])
+        run(cmd, targets, *self.resolve, push, &[*targets.composite], &[*targets.picture], &[*targets.sums])
     }
+}
 
-    fn run(
-        &self,
-        cmd: &mut CommandBuffer,
-        pipeline: ComputePipelineHandle,
-        push: Push,
-        sampled_images: &[TextureHandle],
-        storage_images: &[TextureHandle],
-        buffers: &[BufferHandle],
-    ) -> lvk::Result<()> {
-        cmd.bind_compute_pipeline(pipeline)?;
-        cmd.push_constants(&push)?;
-        let groups = self.extent.map(|side| side.div_ceil(GROUP));
-        let dependencies =
-            Dependencies { sampled_images, storage_images, buffers, ..Dependencies::default() };
-        cmd.dispatch([groups[0], groups[1], 1], &dependencies)
-    }
+fn run(
+    cmd: &mut CommandBuffer,
+    targets: &Targets,
+    pipeline: ComputePipelineHandle,
+    push: Push,
+    sampled_images: &[TextureHandle],
+    storage_images: &[TextureHandle],
+    buffers: &[BufferHandle],
+) -> lvk::Result<()> {
+    cmd.bind_compute_pipeline(pipeline)?;
+    cmd.push_constants(&push)?;
+    let groups = targets.extent.map(|side| side.div_ceil(GROUP));
+    let dependencies = Dependencies { sampled_images, storage_images, buffers, ..Dependencies::default() };
+    cmd.dispatch([groups[0], groups[1], 1], &dependencies)
 }

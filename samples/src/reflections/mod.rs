@@ -37,7 +37,6 @@ mod renderer;
 mod run;
 mod serpent;
 mod sky_light;
-mod stamps;
 mod tables;
 mod targets;
 mod top_level;

@@ -171,6 +171,12 @@ impl MovingPasses {
         Ok(Self { skin: compute(ctx, SKIN)?, turn: compute(ctx, LEAVES)?, serpent, leaves, skin_mode })
     }
 
+    /// Compiles the pipelines again.
+    pub(super) fn reload(&mut self, ctx: &Context) -> lvk::Result<()> {
+        (self.skin, self.turn) = (compute(ctx, SKIN)?, compute(ctx, LEAVES)?);
+        Ok(())
+    }
+
     /// Records what moves everything, and the builds that follow it. `frame` is the address of the frame's constants.
     pub(super) fn record(
         &self,

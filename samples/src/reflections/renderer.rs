@@ -1,8 +1,8 @@
 //! The sample as a type: say the moment, get a picture.
 
 use lvk::{
-    AddressMode, BufferDesc, BufferHandle, CommandBuffer, Context, Format, Holder, SamplerDesc,
-    SamplerHandle, TextureDesc, TextureHandle, TextureKind, TextureRegion, TextureUsage,
+    AddressMode, BufferDesc, BufferHandle, Context, Format, Holder, SamplerDesc, SamplerHandle, TextureDesc,
+    TextureHandle, TextureKind, TextureUsage,
 };
 
 use super::config::ReflectionsConfig;
@@ -14,14 +14,19 @@ use super::paint::Picture;
 use super::raster_passes::{Drawn, RasterPasses};
 use super::ray_passes::{RayPasses, Surfaces};
 use super::sky_light::harmonics;
-use super::stamps::{PASSES, Stamps};
 use super::tables::{Arena, Tables};
 use super::targets::Targets;
 use super::top_level::{InstanceCount, TopLevel};
 use super::world::{self, World};
-use crate::app::sample::PassTimes;
+use crate::app::frame::Frame;
+use crate::app::pass_times::PassTimes;
+use crate::app::sample::{Moment, Sample};
 use crate::hybrid::half_float::half_bits;
 use crate::scene::{Camera, GpuCamera, Sky};
+
+/// Names of the build of the top-level structure and of the ray passes.
+pub(super) const TLAS_BUILD: &str = "TLAS build";
+pub(super) const RAYS: [&str; 2] = ["opaque rays", "transparent rays"];
 
 /// Texels on an edge of the sky's cube map.
 const SKY_SIZE: u32 = 256;
@@ -38,7 +43,6 @@ pub struct Reflections {
     raster: RasterPasses,
     rays: RayPasses,
     images: ImagePasses,
-    stamps: Option<Stamps>,
     constants: WorldConstants,
     indices: Indices,
     frame_buffer: Holder<BufferHandle>,
@@ -85,13 +89,11 @@ impl Reflections {
             debug_name: "frame constants",
             ..BufferDesc::default()
         })?;
-        let has_stamps = ctx.capabilities().limits.timestamp_bits > 0;
         Ok(Self {
             constants: world_constants(&world, &tables),
             raster: RasterPasses::new(ctx)?,
             rays: RayPasses::new(ctx, config.path)?,
-            images: ImagePasses::new(ctx, extent)?,
-            stamps: has_stamps.then(|| Stamps::new(ctx)).transpose()?,
+            images: ImagePasses::new(ctx)?,
             frame_address: ctx.buffer_address(*frame_buffer)?,
             ctx: ctx.clone(),
             config: *config,
@@ -120,56 +122,19 @@ impl Reflections {
         self.camera = *camera;
     }
 
-    /// Renders the picture, waits for it and answers what its passes took. Calls `after_sample` with the number of samples
-    /// done.
-    ///
-    /// # Errors
-    /// [`ReflectionsError::Device`].
-    pub fn render_with(&mut self, after_sample: &mut dyn FnMut(u32)) -> Result<PassTimes, ReflectionsError> {
+    /// What the passes of the first sample take on the GPU, where instances seen under less than `min_angle` are culled;
+    /// none where the device has no timestamps.
+    pub(super) fn time_sample(&self, min_angle: f32) -> Result<PassTimes, ReflectionsError> {
         self.upload_constants()?;
-        let mut times = [0.0; PASSES.len()];
-        for sample in 0..self.config.samples {
-            let mut cmd = self.ctx.acquire_command_buffer()?;
-            self.record(&mut cmd, sample, self.config.min_angle)?;
-            let submitted = self.ctx.submit(cmd)?;
-            self.ctx.wait(submitted)?;
-            if let Some(stamps) = &self.stamps {
-                stamps.add_to(&self.ctx, &mut times)?;
-            }
-            after_sample(sample + 1);
-        }
-        let has_times = self.stamps.is_some();
-        Ok(PASSES.into_iter().zip(times).filter(|_| has_times).collect())
+        let mut ignore = |_| {};
+        let mut frame = Frame::waited(&self.ctx, &mut ignore)?;
+        self.record_sample(&mut frame, 0, min_angle)?;
+        Ok(frame.finish()?)
     }
 
-    /// What the passes of the first sample take on the GPU, in milliseconds, where instances seen under less than
-    /// `min_angle` are culled; `None` where the device has no timestamps.
-    pub(super) fn time_sample(
-        &self,
-        min_angle: f32,
-    ) -> Result<Option<[f64; PASSES.len()]>, ReflectionsError> {
-        let Some(stamps) = &self.stamps else { return Ok(None) };
-        self.upload_constants()?;
-        let mut cmd = self.ctx.acquire_command_buffer()?;
-        self.record(&mut cmd, 0, min_angle)?;
-        let submitted = self.ctx.submit(cmd)?;
-        self.ctx.wait(submitted)?;
-        let mut times = [0.0; PASSES.len()];
-        stamps.add_to(&self.ctx, &mut times)?;
-        Ok(Some(times))
-    }
-
-    /// The texture with the last picture, sRGB, for a copy to whatever shows it.
+    /// The texture that shows the last picture.
     pub fn picture(&self) -> TextureHandle {
         *self.targets.picture
-    }
-
-    /// The last picture: red, green, blue and alpha of each pixel, 8 bits each, sRGB, rows from the top.
-    ///
-    /// # Errors
-    /// [`ReflectionsError::Device`].
-    pub fn read_image(&self) -> Result<Vec<u8>, ReflectionsError> {
-        Ok(self.ctx.download_texture(*self.targets.picture, &TextureRegion::default())?)
     }
 
     /// How many instances rays can meet from where the camera is.
@@ -199,22 +164,15 @@ impl Reflections {
         self.moving.pose(&self.ctx, self.phase)
     }
 
-    fn record(&self, cmd: &mut CommandBuffer, sample: u32, min_angle: f32) -> lvk::Result<()> {
+    fn record_sample(&self, to: &mut Frame<'_>, sample: u32, min_angle: f32) -> lvk::Result<()> {
         let frame = self.frame_address + FRAME_BYTES * u64::from(sample);
         let extent = [self.config.width, self.config.height];
-        let stamp = |cmd: &mut CommandBuffer, passes| {
-            self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.after(cmd, passes))
-        };
-        self.stamps.as_ref().map_or(Ok(()), |stamps| stamps.reset(cmd))?;
         let eye = self.camera.eye.into();
         if sample == 0 {
-            self.moving_passes.record(&self.ctx, cmd, &self.moving, frame)?;
+            let move_all = |cmd: &mut _| self.moving_passes.record(&self.ctx, cmd, &self.moving, frame);
+            to.pass("skinning and its builds", move_all)?;
+            to.pass(TLAS_BUILD, |cmd| self.top_level.record(cmd, eye, min_angle))?;
         }
-        stamp(cmd, 1)?;
-        if sample == 0 {
-            self.top_level.record(cmd, eye, min_angle)?;
-        }
-        stamp(cmd, 2)?;
         let (written, transparent) = (self.moving.written(), self.tables.transparent(eye));
         let drawn = Drawn {
             indices: *self.tables.indices,
@@ -223,16 +181,70 @@ impl Reflections {
             written: &written,
             frame,
         };
-        self.raster.record_surfaces(cmd, &self.targets, drawn)?;
-        stamp(cmd, 3)?;
-        self.rays.record(cmd, Surfaces::Opaque, extent, &self.targets, &written, frame)?;
-        stamp(cmd, 4)?;
-        self.rays.record(cmd, Surfaces::Transparent, extent, &self.targets, &written, frame)?;
-        stamp(cmd, 5)?;
-        self.images.record_composite(cmd, &self.targets, frame)?;
-        self.raster.record_blend(cmd, &self.targets, drawn)?;
-        self.images.record_resolve(cmd, &self.targets, frame, self.config.samples)?;
-        stamp(cmd, 6)
+        to.pass("g-buffers", |cmd| self.raster.record_surfaces(cmd, &self.targets, drawn))?;
+        for (name, surfaces) in RAYS.into_iter().zip([Surfaces::Opaque, Surfaces::Transparent]) {
+            let rays = &self.rays;
+            to.pass(name, |cmd| rays.record(cmd, surfaces, extent, &self.targets, &written, frame))?;
+        }
+        to.pass("filters to picture", |cmd| {
+            self.images.record_composite(cmd, &self.targets, frame)?;
+            self.raster.record_blend(cmd, &self.targets, drawn)?;
+            self.images.record_resolve(cmd, &self.targets, frame, self.config.samples)
+        })
+    }
+}
+
+impl Sample for Reflections {
+    type Error = ReflectionsError;
+
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
+    fn update(&mut self, moment: Moment) -> Result<(), ReflectionsError> {
+        self.show(moment.phase());
+        Ok(())
+    }
+
+    /// A step for each sample.
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, ReflectionsError> {
+        self.upload_constants()?;
+        for sample in 0..self.config.samples {
+            if sample > 0 {
+                frame.next_step()?;
+            }
+            self.record_sample(frame, sample, self.config.min_angle)?;
+        }
+        Ok(*self.targets.picture)
+    }
+
+    fn steps_per_frame(&self) -> u64 {
+        self.config.samples.into()
+    }
+
+    fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), ReflectionsError> {
+        let config = ReflectionsConfig { width, height, ..self.config };
+        config.check(self.ctx.capabilities())?;
+        self.targets = Targets::new(&self.ctx, [width, height])?;
+        self.targets.name_in(&mut self.indices);
+        self.config = config;
+        Ok(())
+    }
+
+    fn view(&self) -> Option<Camera> {
+        Some(self.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.look(camera);
+    }
+
+    fn reload(&mut self) -> Result<(), ReflectionsError> {
+        let (raster, images) = (RasterPasses::new(&self.ctx)?, ImagePasses::new(&self.ctx)?);
+        let rays = RayPasses::new(&self.ctx, self.config.path)?;
+        self.moving_passes.reload(&self.ctx)?;
+        (self.raster, self.rays, self.images) = (raster, rays, images);
+        Ok(())
     }
 }
 

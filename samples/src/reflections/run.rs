@@ -9,7 +9,6 @@ use super::{CullingCost, Reflections, ReflectionsArgs, ReflectionsConfig, Reflec
 use crate::app::device::{DeviceNeeds, driver_text, query_text};
 use crate::app::run::{self, Opened, Opening};
 use crate::app::run_error::RunError;
-use crate::app::sample::{Moment, PassTimes, Sample};
 use crate::app::say;
 use crate::hybrid::RayPath;
 
@@ -27,27 +26,6 @@ impl From<ReflectionsError> for RunError {
             ReflectionsError::Rays(error) => error.into(),
             ReflectionsError::Device(_) => Self::device(error),
         }
-    }
-}
-
-impl Sample for Reflections {
-    type Error = ReflectionsError;
-
-    fn update(&mut self, moment: Moment) -> Result<(), ReflectionsError> {
-        self.show(moment.phase());
-        Ok(())
-    }
-
-    fn steps_per_frame(&self) -> u64 {
-        self.config().samples.into()
-    }
-
-    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, ReflectionsError> {
-        self.render_with(&mut |samples| after_step(samples.into()))
-    }
-
-    fn picture(&self) -> Result<Vec<u8>, ReflectionsError> {
-        self.read_image()
     }
 }
 
@@ -82,7 +60,7 @@ fn open(args: &ReflectionsArgs, opening: &mut Opening<'_>) -> Result<Opened<Refl
             let _ = write!(headline, "\n          {cost}");
         }
     }
-    Ok(Opened { context, sample, headline })
+    Ok(Opened { sample, headline })
 }
 
 fn headline(ctx: &Context, sample: &Reflections) -> String {

@@ -1,6 +1,6 @@
 //! The pictures that the passes hand to each other.
 
-use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureUsage};
+use lvk::{BufferDesc, BufferHandle, Context, Format, Holder, TextureDesc, TextureHandle, TextureUsage};
 
 use super::frame::Indices;
 
@@ -30,6 +30,10 @@ pub(super) struct Targets {
     pub(super) composite: Holder<TextureHandle>,
     /// What is shown: sRGB.
     pub(super) picture: Holder<TextureHandle>,
+    /// The sums of the samples.
+    pub(super) sums: Holder<BufferHandle>,
+    pub(super) sums_address: u64,
+    pub(super) extent: [u32; 2],
 }
 
 impl Targets {
@@ -39,6 +43,9 @@ impl Targets {
             ctx.create_texture(&TextureDesc { format, extent, usage, debug_name, ..TextureDesc::default() })
         };
         let target = |format, name| make(format, TextureUsage::TARGET, name);
+        let size_bytes = u64::from(extent[0]) * u64::from(extent[1]) * size_of::<[f32; 4]>() as u64;
+        let sums =
+            ctx.create_buffer(&BufferDesc { size_bytes, debug_name: "sums", ..BufferDesc::default() })?;
         let light = |name| make(Format::Rgba16Float, TextureUsage::STORAGE, name);
         Ok(Self {
             opaque_surface: target(SURFACE_FORMAT, "opaque surface")?,
@@ -53,6 +60,9 @@ impl Targets {
             glass_reflection: light("glass reflection")?,
             composite: make(COMPOSITE_FORMAT, TextureUsage::STORAGE | TextureUsage::TARGET, "composite")?,
             picture: make(Format::Rgba8Unorm, TextureUsage::STORAGE, "picture")?,
+            sums_address: ctx.buffer_address(*sums)?,
+            sums,
+            extent,
         })
     }
 

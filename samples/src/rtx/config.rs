@@ -24,6 +24,11 @@ impl RtxConfig {
         Ok(Self { path, width: args.width, height: args.height })
     }
 
+    /// The same for a picture of `extent` pixels.
+    pub(crate) fn sized(self, [width, height]: [u32; 2]) -> Self {
+        Self { width, height, ..self }
+    }
+
     /// Width and height.
     pub(crate) fn extent(&self) -> [u32; 2] {
         [self.width, self.height]

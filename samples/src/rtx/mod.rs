@@ -1,5 +1,5 @@
 //! What the small ray tracing samples (`rtx_hello`, `rtx_textures`, `rtx_ao`, `rtx_pipeline`) share: what is asked for,
-//! rays by pipeline or by query, a picture with the times of its passes, and what their programs say.
+//! rays by pipeline or by query, a picture, and what their programs say.
 
 mod canvas;
 mod config;

@@ -17,7 +17,7 @@ pub(super) struct LightRays {
 
 /// What all passes since the last change add up to.
 pub(super) struct Cache {
-    pipeline: Holder<ComputePipelineHandle>,
+    pub(super) pipeline: Holder<ComputePipelineHandle>,
     pub(super) sums: Holder<BufferHandle>,
 }
 
@@ -54,10 +54,19 @@ impl LightRays {
 }
 
 impl Cache {
-    pub(super) fn new(ctx: &Context, [width, height]: [u32; 2]) -> lvk::Result<Self> {
+    pub(super) fn new(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Self> {
+        Ok(Self { pipeline: Self::pipeline(ctx)?, sums: Self::sums(ctx, extent)? })
+    }
+
+    /// The pipeline, compiled.
+    pub(super) fn pipeline(ctx: &Context) -> lvk::Result<Holder<ComputePipelineHandle>> {
+        compute_pipeline(ctx, SAMPLE, ACCUMULATE)
+    }
+
+    /// Room for the sums of a picture.
+    pub(super) fn sums(ctx: &Context, [width, height]: [u32; 2]) -> lvk::Result<Holder<BufferHandle>> {
         let size_bytes = u64::from(width) * u64::from(height) * size_of::<[f32; 4]>() as u64;
-        let desc = BufferDesc { size_bytes, debug_name: "cache", ..BufferDesc::default() };
-        Ok(Self { pipeline: compute_pipeline(ctx, SAMPLE, ACCUMULATE)?, sums: ctx.create_buffer(&desc)? })
+        ctx.create_buffer(&BufferDesc { size_bytes, debug_name: "cache", ..BufferDesc::default() })
     }
 
     /// Adds what was drawn, and writes the picture.

@@ -3,7 +3,7 @@
 use glam::{Affine3A, Vec3};
 use lvk::{
     AccelStructHandle, BufferDesc, BufferHandle, BuildMode, CommandBuffer, Context, Holder, SamplerDesc,
-    SamplerHandle, TlasDesc, TlasInstance, transform_rows,
+    SamplerHandle, TextureHandle, TlasDesc, TlasInstance, transform_rows,
 };
 
 use super::body::{Body, BodyConstants};
@@ -12,7 +12,8 @@ use super::frame::{FrameConstants, Lighting};
 use super::light_pass::{Cache, LightRays};
 use super::raster::Raster;
 use super::targets::Targets;
-use crate::app::sample::{Moment, PassTimes, Sample};
+use crate::app::frame::Frame;
+use crate::app::sample::{Moment, Sample};
 use crate::hybrid::RayPath;
 use crate::rtx::{Canvas, RtxError};
 use crate::scene::{Camera, CameraPath, GpuCamera, Scene};
@@ -80,7 +81,7 @@ impl RtxAo {
         Ok(Self {
             targets: Targets::new(ctx, config.rtx.path, extent)?,
             raster: Raster::new(ctx, config.rtx.path)?,
-            rays: (config.rtx.path == RayPath::Pipeline).then(|| LightRays::new(ctx)).transpose()?,
+            rays: light_rays(ctx, config.rtx.path)?,
             cache: Cache::new(ctx, extent)?,
             lighting: Lighting::new(scene, radius, tlas.index()),
             sampler: ctx.create_sampler(&SamplerDesc { max_anisotropy: 8.0, ..SamplerDesc::default() })?,
@@ -114,7 +115,7 @@ impl RtxAo {
     }
 
     /// The view that is shown.
-    pub fn view(&self) -> &View {
+    pub fn shown(&self) -> &View {
         &self.view
     }
 
@@ -188,27 +189,31 @@ impl RtxAo {
     }
 
     /// One more pass. The structure is built in the first after a change.
-    fn add_pass(&mut self) -> Result<PassTimes, RtxError> {
+    fn add_pass(&mut self, to: &mut Frame<'_>) -> lvk::Result<()> {
         self.upload_frame()?;
         let (frame, extent) = (self.ctx.buffer_address(*self.frame)?, self.config.rtx.extent());
         let (targets, bodies) = (&self.targets, &self.bodies[..]);
-        let is_first = self.passes == 0;
-        let times = self.canvas.render(&[
-            ("TLAS build", &|cmd| if is_first { self.update_tlas(cmd) } else { Ok(()) }),
-            ("depth", &|cmd| self.raster.record_depth(cmd, targets, bodies, frame)),
-            ("surfaces", &|cmd| self.raster.record_surfaces(cmd, targets, bodies, frame)),
-            ("rays", &|cmd| {
-                self.rays.as_ref().map_or(Ok(()), |rays| rays.record(cmd, targets, extent, frame))
-            }),
-            ("cache", &|cmd| self.cache.record(cmd, targets, **self.canvas.picture(), extent, frame)),
-        ])?;
+        if self.passes == 0 {
+            to.pass("TLAS build", |cmd| self.update_tlas(cmd))?;
+        }
+        self.raster.record_depth(&mut to.cmd, targets, bodies, frame)?;
+        self.raster.record_surfaces(&mut to.cmd, targets, bodies, frame)?;
+        if let Some(rays) = &self.rays {
+            to.pass("rays", |cmd| rays.record(cmd, targets, extent, frame))?;
+        }
+        let picture = **self.canvas.picture();
+        to.pass("cache", |cmd| self.cache.record(cmd, targets, picture, extent, frame))?;
         self.passes += 1;
-        Ok(times)
+        Ok(())
     }
 }
 
 impl Sample for RtxAo {
     type Error = RtxError;
+
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
 
     /// Begins anew even where nothing moved, so that a frame does not depend on those before.
     fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
@@ -222,22 +227,48 @@ impl Sample for RtxAo {
         self.config.passes.into()
     }
 
-    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, RtxError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
         self.upload_bodies()?;
-        let mut sums = self.add_pass()?;
-        after_step(1);
-        for pass in 1..self.config.passes {
-            for (sum, time) in sums.iter_mut().zip(self.add_pass()?) {
-                sum.1 += time.1;
+        for pass in 0..self.config.passes {
+            if pass > 0 {
+                frame.next_step()?;
             }
-            after_step(u64::from(pass) + 1);
+            self.add_pass(frame)?;
         }
-        Ok(sums)
+        Ok(**self.canvas.picture())
     }
 
-    fn picture(&self) -> Result<Vec<u8>, RtxError> {
-        Ok(self.canvas.read()?)
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RtxError> {
+        let rtx = self.config.rtx.sized(extent);
+        let canvas = Canvas::new(&self.ctx, &rtx)?;
+        let targets = Targets::new(&self.ctx, rtx.path, extent)?;
+        self.cache.sums = Cache::sums(&self.ctx, extent)?;
+        (self.canvas, self.targets, self.config.rtx) = (canvas, targets, rtx);
+        self.passes = 0;
+        Ok(())
     }
+
+    fn view(&self) -> Option<Camera> {
+        Some(self.view.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.show(&View { camera: *camera, ..self.view });
+    }
+
+    fn reload(&mut self) -> Result<(), RtxError> {
+        let path = self.config.rtx.path;
+        let (raster, rays) = (Raster::new(&self.ctx, path)?, light_rays(&self.ctx, path)?);
+        self.cache.pipeline = Cache::pipeline(&self.ctx)?;
+        (self.raster, self.rays) = (raster, rays);
+        self.passes = 0;
+        Ok(())
+    }
+}
+
+/// The pass of rays by pipeline, on the path that has it.
+fn light_rays(ctx: &Context, path: RayPath) -> lvk::Result<Option<LightRays>> {
+    (path == RayPath::Pipeline).then(|| LightRays::new(ctx)).transpose()
 }
 
 fn usual_radius(scene: &Scene) -> f32 {

@@ -45,7 +45,7 @@ fn open(args: &RtxAoArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxAo>, Ru
     let told =
         format!("{name}: {count} triangles; {passes} passes a frame, {rays} rays within {radius:.2} units");
     let headline = headline(capabilities, config.rtx.path, "a fragment shader", &told);
-    Ok(Opened { context, sample, headline })
+    Ok(Opened { sample, headline })
 }
 
 /// The scene, and what turns in it.

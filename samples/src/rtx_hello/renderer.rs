@@ -3,13 +3,14 @@
 use bytemuck::{Pod, Zeroable};
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, BuildFlags, BuildMode, Context,
-    Dependencies, Holder, TlasDesc, TlasInstance, Triangles, transform_rows,
+    Dependencies, Holder, TextureHandle, TlasDesc, TlasInstance, Triangles, transform_rows,
 };
 
 use super::instances::{CORNERS, places};
 use super::pipelines::RAYS;
 use crate::app::array_buffer::array;
-use crate::app::sample::{Moment, PassTimes, Sample};
+use crate::app::frame::Frame;
+use crate::app::sample::{Moment, Sample};
 use crate::rtx::{Canvas, RtxConfig, RtxError, Tracer};
 
 /// Refits of the top-level structure between two rebuilds.
@@ -17,6 +18,7 @@ const MAX_REFITS: u32 = 32;
 
 /// Renders the triangles.
 pub struct RtxHello {
+    ctx: Context,
     canvas: Canvas,
     config: RtxConfig,
     tracer: Tracer,
@@ -53,7 +55,15 @@ impl RtxHello {
             ..TlasDesc::default()
         })?;
         let tracer = Tracer::new(ctx, config.path, &RAYS)?;
-        Ok(Self { canvas, config: *config, tracer, tlas, instances, _held: (blas, vertices) })
+        Ok(Self {
+            ctx: ctx.clone(),
+            canvas,
+            config: *config,
+            tracer,
+            tlas,
+            instances,
+            _held: (blas, vertices),
+        })
     }
 
     /// How many triangles there are.
@@ -65,26 +75,35 @@ impl RtxHello {
 impl Sample for RtxHello {
     type Error = RtxError;
 
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
     fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
         self.instances = instances(self.instances[0].blas, moment.phase());
         Ok(())
     }
 
-    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, RtxError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
         let (size, image) = (self.config.extent(), self.canvas.picture());
         let push = Push { size, tlas: self.tlas.index(), image: image.index() };
         let mode = BuildMode::Auto { max_refits: MAX_REFITS };
         let writes = Dependencies { storage_images: &[**image], ..Dependencies::default() };
-        let times = self.canvas.render(&[
-            ("TLAS update", &|cmd| cmd.update_tlas(*self.tlas, &self.instances, mode)),
-            ("rays", &|cmd| self.tracer.record(cmd, &push, size, &writes)),
-        ])?;
-        after_step(1);
-        Ok(times)
+        frame.pass("TLAS update", |cmd| cmd.update_tlas(*self.tlas, &self.instances, mode))?;
+        frame.pass("rays", |cmd| self.tracer.record(cmd, &push, size, &writes))?;
+        Ok(**image)
     }
 
-    fn picture(&self) -> Result<Vec<u8>, RtxError> {
-        Ok(self.canvas.read()?)
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RtxError> {
+        let config = self.config.sized(extent);
+        self.canvas = Canvas::new(&self.ctx, &config)?;
+        self.config = config;
+        Ok(())
+    }
+
+    fn reload(&mut self) -> Result<(), RtxError> {
+        self.tracer = Tracer::new(&self.ctx, self.config.path, &RAYS)?;
+        Ok(())
     }
 }
 

@@ -32,5 +32,5 @@ fn open(args: &RtxHelloArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxHell
     let sample = RtxHello::new(&context, &config)?;
     let scene = format!("{} triangles, each an instance of the same one", sample.triangle_count());
     let headline = headline(capabilities, config.path, "a compute shader", &scene);
-    Ok(Opened { context, sample, headline })
+    Ok(Opened { sample, headline })
 }

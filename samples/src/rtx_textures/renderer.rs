@@ -13,7 +13,8 @@ use lvk::{
 use super::models::{Models, Vertex};
 use super::pipelines::{INSTANCES, RAYS};
 use crate::app::array_buffer::array;
-use crate::app::sample::{Moment, PassTimes, Sample};
+use crate::app::frame::Frame;
+use crate::app::sample::{Moment, Sample};
 use crate::rtx::{Canvas, RtxConfig, RtxError, Tracer, compute_pipeline};
 use crate::scene::{Camera, GpuCamera, Texture, painted_textures};
 
@@ -41,6 +42,7 @@ pub struct RtxTextures {
     frame: Holder<BufferHandle>,
     frame_address: u64,
     constants: FrameConstants,
+    camera: Camera,
     _held: Held,
 }
 
@@ -103,7 +105,7 @@ impl RtxTextures {
             count: INSTANCE_COUNT,
             phase: 0.0,
         };
-        let mut sample = Self {
+        Ok(Self {
             canvas,
             ctx: ctx.clone(),
             config: *config,
@@ -115,24 +117,20 @@ impl RtxTextures {
             frame_address: ctx.buffer_address(*frame)?,
             frame,
             constants,
+            camera: camera(0.0),
             _held: Held {
                 _blas: blas,
                 _buffers: [vertices, triangles],
                 _textures: textures,
                 _sampler: sampler,
             },
-        };
-        sample.show(0.0);
-        Ok(sample)
+        })
     }
 
     /// Moves everything to where it is at `phase` of the animation's round, 0 to 1.
     pub fn show(&mut self, phase: f32) {
-        let sway = 0.35 * (TAU * phase).sin();
-        let eye = [9.2 * (0.5 + sway).sin(), 3.7, 9.2 * (0.5 + sway).cos()];
-        let camera = Camera::looking_at(eye, [0.0, 0.2, 0.6], 38.0);
         self.constants.phase = phase;
-        self.constants.camera = GpuCamera::new(&camera, self.config.width, self.config.height, 0.1);
+        self.camera = camera(phase);
     }
 
     /// Instances that the compute shader writes.
@@ -167,25 +165,54 @@ impl RtxTextures {
 impl Sample for RtxTextures {
     type Error = RtxError;
 
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
     fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
         self.show(moment.phase());
         Ok(())
     }
 
-    fn render(&mut self, after_step: &mut dyn FnMut(u64)) -> Result<PassTimes, RtxError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
+        let [width, height] = self.config.extent();
+        self.constants.camera = GpuCamera::new(&self.camera, width, height, 0.1);
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
-        let times = self.canvas.render(&[
-            ("instances", &|cmd| self.write_instances(cmd)),
-            ("TLAS build", &|cmd| self.build_tlas(cmd)),
-            ("rays", &|cmd| self.trace(cmd)),
-        ])?;
-        after_step(1);
-        Ok(times)
+        frame.pass("instances", |cmd| self.write_instances(cmd))?;
+        frame.pass("TLAS build", |cmd| self.build_tlas(cmd))?;
+        frame.pass("rays", |cmd| self.trace(cmd))?;
+        Ok(**self.canvas.picture())
     }
 
-    fn picture(&self) -> Result<Vec<u8>, RtxError> {
-        Ok(self.canvas.read()?)
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RtxError> {
+        let config = self.config.sized(extent);
+        self.canvas = Canvas::new(&self.ctx, &config)?;
+        self.constants.image = self.canvas.picture().index();
+        self.config = config;
+        Ok(())
     }
+
+    fn view(&self) -> Option<Camera> {
+        Some(self.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.camera = *camera;
+    }
+
+    fn reload(&mut self) -> Result<(), RtxError> {
+        let writer = compute_pipeline(&self.ctx, RAYS.sample, INSTANCES)?;
+        self.tracer = Tracer::new(&self.ctx, self.config.path, &RAYS)?;
+        self.writer = writer;
+        Ok(())
+    }
+}
+
+/// Where the animation looks from.
+fn camera(phase: f32) -> Camera {
+    let sway = 0.35 * (TAU * phase).sin();
+    let eye = [9.2 * (0.5 + sway).sin(), 3.7, 9.2 * (0.5 + sway).cos()];
+    Camera::looking_at(eye, [0.0, 0.2, 0.6], 38.0)
 }
 
 fn build_blas(

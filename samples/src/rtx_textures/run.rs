@@ -32,5 +32,5 @@ fn open(args: &RtxTexturesArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxT
     let sample = RtxTextures::new(&context, &config)?;
     let scene = format!("{} instances, {} textures", sample.instance_count(), sample.texture_count());
     let headline = headline(capabilities, config.path, "a compute shader", &scene);
-    Ok(Opened { context, sample, headline })
+    Ok(Opened { sample, headline })
 }

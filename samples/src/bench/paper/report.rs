@@ -167,8 +167,8 @@ fn software_note(capabilities: &Capabilities, plan: &Plan) -> Option<String> {
 const HOW: &str = "
 T is the stand-alone method's time, t_a that of the hybrid method's ray pass, t_b that of its geometry pass, t = t_a + t_b,
 all from timestamps on the device around the commands. A span is a whole frame, from the first timestamp before the geometry
-pass to the last one after the ray pass, so that what lies between the passes counts too: barriers, and where a frame is
-rendered in several bands of rows the host, which waits for each. The paper adds its passes up, so t is the sum here as well,
+pass to the last one after the ray pass, so that what lies between the passes counts too: barriers. Where a frame is rendered in
+several bands of rows the span is the sum of theirs, without the host, which waits for each. The paper adds its passes up, so t is the sum here as well,
 and the spans have a table of their own. Both methods take turns frame by frame. The best and the worst frame
 are those of each method by itself, t_a, t_b and the span those of the hybrid method's frame. Rows called average are averages over the
 cameras, as in the paper. The paper rendered 1280x720 on its cards; its scenes are other exports of the same models, the

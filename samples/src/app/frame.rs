@@ -1,0 +1,104 @@
+//! A frame while it is recorded.
+
+use lvk::{CommandBuffer, Context};
+
+use super::pass_times::PassTimes;
+
+/// A frame under way: the commands so far, and where it is cut into submissions.
+///
+/// Everything goes to one queue in the order in which it is recorded, [`Context::upload_buffer`] included, which takes its
+/// place before the next submission. So a sample needs one buffer of constants and not one for each frame in flight: a
+/// frame's upload waits on the GPU for what the frame before still reads.
+pub struct Frame<'a> {
+    /// Where the frame is recorded.
+    pub cmd: CommandBuffer,
+    ctx: Context,
+    pace: Pace<'a>,
+}
+
+/// What happens between the steps of a frame.
+enum Pace<'a> {
+    /// The host waits for each, tells how many are done, and asks what its passes took.
+    Waited { done: u64, after_step: &'a mut dyn FnMut(u64), times: PassTimes },
+    /// Nothing.
+    Free,
+}
+
+impl<'a> Frame<'a> {
+    /// A frame whose steps are waited for and whose passes are measured; `after_step` is told how many steps are done.
+    ///
+    /// # Errors
+    /// What Vulkan answers.
+    pub fn waited(ctx: &Context, after_step: &'a mut dyn FnMut(u64)) -> lvk::Result<Self> {
+        ctx.set_profiling(ctx.capabilities().limits.timestamp_bits > 0)?;
+        Self::of(ctx, Pace::Waited { done: 0, after_step, times: PassTimes::default() })
+    }
+
+    /// A frame that nobody waits for.
+    ///
+    /// # Errors
+    /// What Vulkan answers.
+    pub fn free(ctx: &Context) -> lvk::Result<Self> {
+        Self::of(ctx, Pace::Free)
+    }
+
+    fn of(ctx: &Context, pace: Pace<'a>) -> lvk::Result<Self> {
+        Ok(Self { cmd: ctx.acquire_command_buffer()?, ctx: ctx.clone(), pace })
+    }
+
+    /// Records a pass that is known by `name` in debuggers and in the times.
+    ///
+    /// # Errors
+    /// That of `record`.
+    pub fn pass(
+        &mut self,
+        name: &str,
+        record: impl FnOnce(&mut CommandBuffer) -> lvk::Result<()>,
+    ) -> lvk::Result<()> {
+        self.cmd.push_label(name);
+        record(&mut self.cmd)?;
+        self.cmd.pop_label();
+        Ok(())
+    }
+
+    /// Ends a step of a frame that has several, so that no submission takes long: submits what is recorded. Not called after
+    /// the last step.
+    ///
+    /// # Errors
+    /// What Vulkan answers.
+    pub fn next_step(&mut self) -> lvk::Result<()> {
+        let next = self.ctx.acquire_command_buffer()?;
+        let step = std::mem::replace(&mut self.cmd, next);
+        self.pace.submit(&self.ctx, step)
+    }
+
+    /// Ends the last step: submits it, and answers what the passes took if the frame was waited for.
+    ///
+    /// # Errors
+    /// What Vulkan answers.
+    pub fn finish(mut self) -> lvk::Result<PassTimes> {
+        self.pace.submit(&self.ctx, self.cmd)?;
+        Ok(match self.pace {
+            Pace::Waited { times, .. } => times,
+            Pace::Free => PassTimes::default(),
+        })
+    }
+
+    /// What is recorded of the last step, for who submits it by other means, to present it for one.
+    #[must_use]
+    pub fn into_commands(self) -> CommandBuffer {
+        self.cmd
+    }
+}
+
+impl Pace<'_> {
+    fn submit(&mut self, ctx: &Context, step: CommandBuffer) -> lvk::Result<()> {
+        let submitted = ctx.submit(step)?;
+        let Self::Waited { done, after_step, times } = self else { return Ok(()) };
+        ctx.wait(submitted)?;
+        *done += 1;
+        after_step(*done);
+        times.steps.extend(ctx.last_profile()?);
+        Ok(())
+    }
+}

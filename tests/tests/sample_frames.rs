@@ -1,0 +1,141 @@
+//! Frames of samples: pictures are the same whether frames are waited for or not, and after changes of size, view and
+//! shaders they are those of a sample made so.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureRegion, TextureUsage};
+use lvk_samples::app::frame::Frame;
+use lvk_samples::app::headless;
+use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence};
+use lvk_samples::hybrid_oit::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene};
+use lvk_samples::reflections::{Reflections, ReflectionsConfig};
+use lvk_samples::rtx::RtxConfig;
+use lvk_samples::rtx_ao::{RtxAo, RtxAoConfig};
+use lvk_samples::rtx_hello::RtxHello;
+use lvk_samples::rtx_textures::RtxTextures;
+use lvk_samples::scene::{Camera, Scene};
+use lvk_tests::device;
+use lvk_tests::hybrid::paths;
+use lvk_tests::still_life::still_life;
+
+const SIZE: [u32; 2] = [40, 24];
+const OTHER_SIZE: [u32; 2] = [24, 40];
+const MOMENTS: [u32; 3] = [0, 3, 7];
+
+fn moment(frame: u32) -> Moment {
+    Moment::of_frame(frame, 10)
+}
+
+/// What a sample shows at some moments; each frame is waited for.
+fn one_by_one<S: Sample>(sample: &mut S) -> Vec<Vec<u8>> {
+    let mut at = |frame| {
+        sample.update(moment(frame)).map_err(Into::into).unwrap();
+        headless::picture(sample).map_err(Into::into).unwrap()
+    };
+    MOMENTS.map(&mut at).to_vec()
+}
+
+/// The same with all frames on their way at once.
+fn at_once<S: Sample>(sample: &mut S, size: [u32; 2]) -> Vec<Vec<u8>> {
+    let ctx = sample.context().clone();
+    let kept = MOMENTS.map(|frame| {
+        let copy = texture(&ctx, size);
+        sample.update(moment(frame)).map_err(Into::into).unwrap();
+        let mut frame = Frame::free(&ctx).unwrap();
+        let picture = sample.record(&mut frame).map_err(Into::into).unwrap();
+        let region = TextureRegion::default();
+        frame.cmd.copy_texture(picture, &region, *copy, &region).unwrap();
+        assert!(frame.finish().unwrap().is_empty(), "nobody waited");
+        copy
+    });
+    kept.map(|copy| ctx.download_texture(*copy, &TextureRegion::default()).unwrap()).to_vec()
+}
+
+fn texture(ctx: &Context, extent: [u32; 2]) -> Holder<TextureHandle> {
+    let (format, usage) = (Format::Rgba8Unorm, TextureUsage::SAMPLED);
+    ctx.create_texture(&TextureDesc { format, extent, usage, ..TextureDesc::default() }).unwrap()
+}
+
+/// Asks of the sample that `make` makes what a window will.
+fn check<S: Sample>(make: impl Fn([u32; 2]) -> S) {
+    let mut sample = make(SIZE);
+    let expected = one_by_one(&mut sample);
+    assert!(expected[0] != expected[1], "nothing moves");
+    assert!(at_once(&mut sample, SIZE) == expected, "a frame depends on the ones under way");
+
+    sample.resize(OTHER_SIZE).map_err(Into::into).unwrap();
+    assert!(one_by_one(&mut sample) == one_by_one(&mut make(OTHER_SIZE)), "another size");
+    sample.reload().map_err(Into::into).unwrap();
+    assert!(sample.resize([0, 9]).is_err() && sample.resize([9, 1 << 20]).is_err());
+    sample.resize(SIZE).map_err(Into::into).unwrap();
+    assert!(one_by_one(&mut sample) == expected, "back again, by new pipelines");
+
+    sample.update(moment(0)).map_err(Into::into).unwrap();
+    let Some(view) = sample.view() else { return };
+    sample.set_view(&Camera { vertical_fov_degrees: 0.5 * view.vertical_fov_degrees, ..view });
+    assert!(headless::picture(&mut sample).map_err(Into::into).unwrap() != expected[0], "another view");
+    sample.set_view(&view);
+    assert!(
+        headless::picture(&mut sample).map_err(Into::into).unwrap() == expected[0],
+        "the first view again"
+    );
+}
+
+fn rtx(ctx: &Context, [width, height]: [u32; 2]) -> RtxConfig {
+    RtxConfig { path: paths(ctx)[0], width, height }
+}
+
+#[test]
+fn rtx_hello_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    check(|size| RtxHello::new(&ctx, &rtx(&ctx, size)).unwrap());
+}
+
+#[test]
+fn rtx_textures_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    check(|size| RtxTextures::new(&ctx, &rtx(&ctx, size)).unwrap());
+}
+
+#[test]
+fn rtx_ao_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    check(|size| {
+        let config = RtxAoConfig { passes: 2, rays: 1, ..RtxAoConfig::new(rtx(&ctx, size)) };
+        RtxAo::new(&ctx, &Scene::town(), Some(&Scene::carousel()), &config).unwrap()
+    });
+}
+
+#[test]
+fn hybrid_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    let scene = still_life();
+    check(|[width, height]| {
+        let path = paths(&ctx)[0];
+        let config =
+            HybridConfig { path, width, height, max_depth: 1, samples: 2, ..HybridConfig::default() };
+        let renderer = HybridRenderer::new(&ctx, &scene, &config).unwrap();
+        HybridSequence::new(renderer, &scene, 0, true)
+    });
+}
+
+#[test]
+fn hybrid_oit_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    check(|[width, height]| {
+        let config =
+            HybridOitConfig { supersampling: 1, ..HybridOitConfig::new(paths(&ctx)[0], width, height) };
+        let sample = HybridOit::new(&ctx, &OitScene::default(), &config).unwrap();
+        HybridOitSequence::new(sample, 1.0)
+    });
+}
+
+#[test]
+fn reflections_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    check(|[width, height]| {
+        let config =
+            ReflectionsConfig { samples: 2, ..ReflectionsConfig::new(paths(&ctx)[0], width, height) };
+        Reflections::new(&ctx, &config).unwrap()
+    });
+}
