@@ -1,8 +1,11 @@
 //! The one error type of the library.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use ash::vk;
+
+use crate::gpu::fault::DeviceFault;
 
 /// Result of every fallible call of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -134,10 +137,12 @@ pub enum Error {
         call: &'static str,
     },
     /// The device was lost; the context cannot be used any more.
-    #[error("the device was lost in {call}; create a new context")]
+    #[error("the device was lost in {call}{}; create a new context", of_fault(fault))]
     DeviceLost {
         /// The Vulkan command that reported the loss.
         call: &'static str,
+        /// What the driver says of the fault, where it can and the loss was noticed by submitting or waiting.
+        fault: Option<Arc<DeviceFault>>,
     },
     /// Any other answer of the driver.
     #[error("{call} failed: {result}")]
@@ -154,7 +159,7 @@ impl Error {
     /// Wraps the driver's answer to `call`.
     pub(crate) fn vulkan(call: &'static str) -> impl FnOnce(vk::Result) -> Self {
         move |result| match result {
-            vk::Result::ERROR_DEVICE_LOST => Self::DeviceLost { call },
+            vk::Result::ERROR_DEVICE_LOST => Self::DeviceLost { call, fault: None },
             vk::Result::ERROR_OUT_OF_HOST_MEMORY => Self::OutOfHostMemory { call },
             vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
                 Self::OutOfDeviceMemory { object: call.to_owned(), bytes: 0 }
@@ -172,6 +177,10 @@ impl Error {
     pub(crate) fn unsupported(what: impl Into<String>, why: impl Into<String>) -> Self {
         Self::Unsupported { what: what.into(), why: why.into() }
     }
+}
+
+fn of_fault(fault: &Option<Arc<DeviceFault>>) -> String {
+    fault.as_ref().map(|fault| format!(" ({fault})")).unwrap_or_default()
 }
 
 /// Fails with [`Error::LimitExceeded`] if `requested` is over `limit`.

@@ -57,7 +57,7 @@
 //! | say what a shader reaches | [`Dependencies`] |
 //! | submit, wait, keep frames apart | [`Context::submit`], [`Context::wait`], [`Context::next_frame`] |
 //! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
-//! | check | [`Validation`], [`ValidationSink`] |
+//! | find what is wrong | [`manual::debugging`], [`Validation`], [`ValidationSink`] |
 //! | mix in Vulkan calls of your own | `Context::raw_*`, [`CommandBuffer::raw`] |
 //!
 //! # Barriers
@@ -99,6 +99,7 @@ mod format;
 mod gpu;
 mod handle;
 mod kernel;
+mod leaks;
 pub mod manual;
 mod pipeline;
 mod resource;
@@ -139,6 +140,7 @@ pub use gpu::caps::{Capabilities, FeatureRequest, Limits};
 pub use gpu::clock::ClockPair;
 pub use gpu::debug::{Validation, ValidationMessage, ValidationSink};
 pub use gpu::extra::ExtraExtensions;
+pub use gpu::fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
 pub use gpu::memory::MemoryKind;
 pub use gpu::mesh_limits::MeshLimits;
 pub use gpu::optional::{FeatureSet, OptionalFeature};
@@ -165,4 +167,5 @@ pub use resource::view::{Channel, Swizzle, TextureViewDesc};
 #[cfg(feature = "glsl")]
 pub use shader::compile_glsl;
 pub use shader::{ShaderCacheCounts, ShaderModuleDesc, ShaderSource, ShaderStage};
+pub use store::LiveObject;
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};

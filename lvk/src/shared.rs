@@ -18,6 +18,7 @@ use crate::bindless::Bindless;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::kernel::Kernels;
+use crate::leaks;
 use crate::pipeline::{
     ComputePipeline, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline, RenderPipeline,
 };
@@ -163,26 +164,10 @@ impl Shared {
 
     /// Takes every object out that is still alive and reports it by name.
     fn drain_store(&mut self) {
-        let store = &self.store;
-        let report = |kind: &str, name: &str| log::warn!("{kind} '{name}' was alive when its context ended");
-        store.buffers.drain().iter().for_each(|object| report("buffer", &object.name));
-        store.textures.drain().iter().for_each(|object| report("texture", &object.name));
-        store.samplers.drain().iter().for_each(|object| report("sampler", &object.name));
-        store.shader_modules.drain().iter().for_each(|object| report("shader module", &object.name));
-        store.render_pipelines.drain().iter().for_each(|object| report("render pipeline", &object.name));
-        store.compute_pipelines.drain().iter().for_each(|object| report("compute pipeline", &object.name));
-        store
-            .ray_tracing_pipelines
-            .drain()
-            .iter()
-            .for_each(|object| report("ray tracing pipeline", &object.name));
-        store
-            .ray_tracing_libraries
-            .drain()
-            .iter()
-            .for_each(|object| report("ray tracing library", &object.name));
-        store.query_pools.drain().iter().for_each(|object| report("query pool", &object.name));
-        store.accel_structs.drain().iter().for_each(|object| report("acceleration structure", &object.name));
+        if let Some(report) = leaks::report(&self.store.live()) {
+            log::warn!("{report}");
+        }
+        self.store.drain();
     }
 
     fn dispose_accel_struct(&self, object: &AccelStruct) {

@@ -48,6 +48,66 @@ impl Store {
             accel_structs: Pool::new(mask),
         }
     }
+
+    /// Every object, kind by kind.
+    pub(crate) fn live(&self) -> Vec<LiveObject> {
+        [
+            self.buffers.live(),
+            self.textures.live(),
+            self.samplers.live(),
+            self.shader_modules.live(),
+            self.render_pipelines.live(),
+            self.compute_pipelines.live(),
+            self.ray_tracing_pipelines.live(),
+            self.ray_tracing_libraries.live(),
+            self.query_pools.live(),
+            self.accel_structs.live(),
+        ]
+        .concat()
+    }
+
+    /// Takes every object out.
+    pub(crate) fn drain(&self) {
+        self.buffers.drain();
+        self.textures.drain();
+        self.samplers.drain();
+        self.shader_modules.drain();
+        self.render_pipelines.drain();
+        self.compute_pipelines.drain();
+        self.ray_tracing_pipelines.drain();
+        self.ray_tracing_libraries.drain();
+        self.query_pools.drain();
+        self.accel_structs.drain();
+    }
+}
+
+/// An object that has a handle.
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct LiveObject {
+    /// Which kind of object, in the words of error messages: `buffer`, `render pipeline` and so on.
+    pub kind: &'static str,
+    /// Its debug name.
+    pub name: String,
+}
+
+/// Objects that have a debug name.
+trait Named {
+    fn name(&self) -> &str;
+}
+
+macro_rules! named {
+    ($($ty:ident)*) => {
+        $(impl Named for $ty {
+            fn name(&self) -> &str {
+                &self.name
+            }
+        })*
+    };
+}
+
+named! {
+    Buffer Texture Sampler ShaderModule RenderPipeline ComputePipeline RayTracingPipeline RayTracingLibrary QueryPool
+    AccelStruct
 }
 
 /// Objects of one kind.
@@ -86,6 +146,14 @@ impl<H: Handle, T> Pool<H, T> {
     /// Rises whenever an object is taken out.
     pub(crate) fn removals(&self) -> u64 {
         self.removals.load(Ordering::Acquire)
+    }
+
+    fn live(&self) -> Vec<LiveObject>
+    where
+        T: Named,
+    {
+        let of = |object: &Arc<T>| LiveObject { kind: H::KIND, name: object.name().to_owned() };
+        self.all().iter().map(of).collect()
     }
 
     /// Everything there is.

@@ -360,6 +360,8 @@ fn create_set(
     match unsafe { gpu.device.allocate_descriptor_sets(&info) } {
         Ok(sets) => {
             gpu.name(sets[0], "bindless set");
+            gpu.name(pool, "bindless pool");
+            gpu.name(layouts[0], "bindless layout");
             Ok((pool, sets[0]))
         }
         Err(result) => {

@@ -23,6 +23,11 @@ pub struct ContextDesc<'a> {
     pub validation: Validation,
     /// Where messages of the layer go; all go to the `log` crate too.
     pub validation_sink: Option<ValidationSink>,
+    /// Whether Vulkan objects get their debug names, and command buffers their labels. Without an answer they do where
+    /// somebody reads them: with the validation layer, or when a debugger or profiler of frames says that it is there
+    /// (`vkGetPhysicalDeviceToolProperties`). Elsewhere a name costs no call of the driver. The library's own errors and
+    /// reports always have names.
+    pub debug_names: Option<bool>,
     /// Ray tracing pipelines.
     pub ray_tracing_pipeline: FeatureRequest,
     /// Ray queries in any shader stage, and who walks their trees; [`Capabilities`](crate::Capabilities) says which it
@@ -82,6 +87,7 @@ impl Default for ContextDesc<'_> {
             device: None,
             validation: Validation::Off,
             validation_sink: None,
+            debug_names: None,
             ray_tracing_pipeline: FeatureRequest::Optional,
             ray_query: RayQueryRequest::default(),
             required_features: &[],

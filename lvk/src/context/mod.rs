@@ -14,6 +14,7 @@ mod dummy;
 pub(crate) mod frame;
 pub(crate) mod holder;
 mod interop;
+mod live_objects;
 mod profile;
 mod queries;
 mod read_bounds;

@@ -55,6 +55,7 @@ impl Context {
             required: desc.required_features,
             profile: desc.profile,
             extra: desc.extra,
+            debug_names: desc.debug_names,
         };
         let gpu = Arc::new(Gpu::new(instance, &request)?);
         let shared = Arc::new(new_shared(gpu, desc)?);

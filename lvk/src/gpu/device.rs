@@ -9,10 +9,10 @@ use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 
 use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
 use super::clock::HostClock;
-use super::debug::c_name;
 use super::extra::ExtraExtensions;
 use super::features::Features;
 use super::instance::Instance;
+use super::naming;
 use super::optional::{OF_WINDOWS, OptionalFeature};
 use super::profile::DeviceProfile;
 use super::ray_query_path::RayQueryRequest;
@@ -30,6 +30,8 @@ pub(crate) struct DeviceRequest<'a> {
     pub(crate) required: &'a [OptionalFeature],
     pub(crate) profile: Option<&'a DeviceProfile>,
     pub(crate) extra: ExtraExtensions<'a>,
+    /// Whether objects get names for debuggers; where somebody reads them without it.
+    pub(crate) debug_names: Option<bool>,
 }
 
 /// One logical device with everything made from it that is not a resource. It knows no resource.
@@ -50,7 +52,8 @@ pub(crate) struct Gpu {
     pub(crate) host_clock: Option<HostClock>,
     physical: vk::PhysicalDevice,
     /// Takes names and labels; present where somebody reads them, as each name costs as much as a small buffer.
-    debug_utils: Option<ash::ext::debug_utils::Device>,
+    pub(super) debug_utils: Option<ash::ext::debug_utils::Device>,
+    pub(super) device_fault: Option<ash::ext::device_fault::Device>,
     allocator: Mutex<Option<Allocator>>,
     queue: Mutex<vk::Queue>,
     /// Declared last: destroyed after the device.
@@ -82,8 +85,10 @@ impl Gpu {
                 .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
             mesh: caps.mesh_shader.then(|| ash::ext::mesh_shader::Device::new(raw, &device)),
             host_clock: HostClock::new(&instance, &device, chosen.raw, features.calibration),
-            debug_utils: (instance.debug_utils && is_watched(&instance, chosen.raw))
+            debug_utils: naming::is_wanted(&instance, chosen.raw, request.debug_names)
                 .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
+            device_fault: (features.ext.fault.device_fault == vk::TRUE)
+                .then(|| ash::ext::device_fault::Device::new(raw, &device)),
             allocator: Mutex::new(Some(allocator)),
             queue: Mutex::new(queue),
             physical: chosen.raw,
@@ -201,48 +206,6 @@ impl Gpu {
         // SAFETY: the physical device belongs to the instance.
         unsafe { self.instance.raw.get_physical_device_format_properties(self.physical, format) }
     }
-
-    /// Names an object for the validation layer and debuggers.
-    pub(crate) fn name<H: vk::Handle>(&self, object: H, name: &str) {
-        let Some(ext) = &self.debug_utils else { return };
-        let name = c_name(name);
-        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
-        // SAFETY: the object is alive and belongs to this device. A failure loses a name only.
-        let _ = unsafe { ext.set_debug_utils_object_name(&info) };
-    }
-
-    /// Opens a labelled range in a command buffer.
-    pub(crate) fn begin_label(&self, commands: vk::CommandBuffer, name: &str) {
-        let Some(ext) = &self.debug_utils else { return };
-        let name = c_name(name);
-        let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
-        // SAFETY: the command buffer is being recorded.
-        unsafe { ext.cmd_begin_debug_utils_label(commands, &label) };
-    }
-
-    /// Marks a place in a command buffer.
-    pub(crate) fn insert_label(&self, commands: vk::CommandBuffer, name: &str) {
-        let Some(ext) = &self.debug_utils else { return };
-        let name = c_name(name);
-        let label = vk::DebugUtilsLabelEXT::default().label_name(&name);
-        // SAFETY: the command buffer is being recorded.
-        unsafe { ext.cmd_insert_debug_utils_label(commands, &label) };
-    }
-
-    /// Closes the innermost labelled range.
-    pub(crate) fn end_label(&self, commands: vk::CommandBuffer) {
-        if let Some(ext) = &self.debug_utils {
-            // SAFETY: the command buffer is being recorded and the caller counts its labels.
-            unsafe { ext.cmd_end_debug_utils_label(commands) };
-        }
-    }
-}
-
-/// Whether the validation layer, a debugger or a profiler looks on.
-fn is_watched(instance: &Instance, device: vk::PhysicalDevice) -> bool {
-    // SAFETY: the physical device belongs to the instance, which has Vulkan 1.3 as the device does.
-    let tools = || unsafe { instance.raw.get_physical_device_tool_properties_len(device) };
-    instance.validated || tools().is_ok_and(|count| count > 0)
 }
 
 impl Drop for Gpu {

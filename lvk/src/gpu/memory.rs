@@ -54,10 +54,20 @@ impl Gpu {
             linear,
             allocation_scheme: AllocationScheme::GpuAllocatorManaged,
         };
-        allocator.allocate(&desc).map_err(|error| match error {
+        let allocated = allocator.allocate(&desc).map_err(|error| match error {
             gpu_allocator::AllocationError::OutOfMemory => out_of_memory(),
             other => Error::unsupported(format!("memory for '{name}' ({bytes} bytes)"), other.to_string()),
-        })
+        })?;
+        self.name_block(&allocated, name);
+        Ok(allocated)
+    }
+
+    /// Names a block of memory after what lies at its start.
+    fn name_block(&self, allocated: &Allocation, name: &str) {
+        if self.names_objects() && allocated.offset() == 0 {
+            // SAFETY: the memory is only named, while the allocator is locked.
+            self.name(unsafe { allocated.memory() }, &format!("memory from '{name}' on"));
+        }
     }
 
     /// Gives memory back.

@@ -18,5 +18,8 @@ pub mod ray_tracing_pipelines {}
 #[doc = include_str!("shaders.md")]
 pub mod shaders {}
 
+#[doc = include_str!("debugging.md")]
+pub mod debugging {}
+
 #[doc = include_str!("measuring.md")]
 pub mod measuring {}

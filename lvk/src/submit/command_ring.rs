@@ -31,7 +31,11 @@ impl CommandSlot {
             .command_buffer_count(2);
         // SAFETY: the pool was just created.
         match unsafe { gpu.device.allocate_command_buffers(&info) } {
-            Ok(buffers) => Ok(Self { pool, prologue: buffers[0], main: buffers[1] }),
+            Ok(buffers) => {
+                gpu.name(pool, "command pool");
+                gpu.name(buffers[0], "barriers before a command buffer");
+                Ok(Self { pool, prologue: buffers[0], main: buffers[1] })
+            }
             Err(result) => {
                 // SAFETY: the pool is unused.
                 unsafe { gpu.device.destroy_command_pool(pool, None) };

@@ -188,7 +188,7 @@ impl<T> Submitter<T> {
         let queue = self.gpu.queue();
         // SAFETY: the command buffers are complete and used once; the queue is locked.
         unsafe { self.gpu.device.queue_submit2(*queue, &submits, vk::Fence::null()) }
-            .map_err(Error::vulkan("vkQueueSubmit2"))
+            .map_err(self.gpu.failed("vkQueueSubmit2"))
     }
 
     /// Timeline value of the last submission.

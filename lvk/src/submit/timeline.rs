@@ -47,7 +47,7 @@ impl Timeline {
     pub(crate) fn completed(&self) -> Result<u64> {
         // SAFETY: the semaphore is alive and a timeline.
         let value = unsafe { self.gpu.device.get_semaphore_counter_value(self.raw) }
-            .map_err(Error::vulkan("vkGetSemaphoreCounterValue"))?;
+            .map_err(self.gpu.failed("vkGetSemaphoreCounterValue"))?;
         self.seen.fetch_max(value, Ordering::AcqRel);
         Ok(value)
     }
@@ -61,7 +61,7 @@ impl Timeline {
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         // SAFETY: the semaphore is alive and a timeline; `value` was submitted, so the wait ends.
         unsafe { self.gpu.device.wait_semaphores(&info, u64::MAX) }
-            .map_err(Error::vulkan("vkWaitSemaphores"))?;
+            .map_err(self.gpu.failed("vkWaitSemaphores"))?;
         self.seen.fetch_max(value, Ordering::AcqRel);
         Ok(())
     }

@@ -1,0 +1,278 @@
+//! What a lost device says of its fault (`VK_EXT_device_fault`).
+
+use std::ffi::{CStr, c_char};
+use std::fmt;
+use std::ops::Range;
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::device::Gpu;
+use crate::error::Error;
+
+/// Lists longer than this are taken for nonsense of a driver that has just failed.
+const MOST_ENTRIES: u32 = 1 << 16;
+
+/// What a driver with `VK_EXT_device_fault` ([`OptionalFeature::DeviceFault`](crate::OptionalFeature)) says of the fault
+/// that lost the device.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct DeviceFault {
+    /// The driver's own words.
+    pub description: String,
+    /// Addresses that have to do with the fault.
+    pub addresses: Vec<FaultAddress>,
+    /// Codes that the vendor's tools understand.
+    pub vendor: Vec<VendorFault>,
+}
+
+/// An address that has to do with a fault.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FaultAddress {
+    /// What happened there.
+    pub kind: FaultKind,
+    /// The address, in the space of [`Context::buffer_address`](crate::Context::buffer_address), as the driver reported it.
+    pub address: u64,
+    /// The addresses among which the true one is.
+    pub range: Range<u64>,
+}
+
+/// What happened at an address.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FaultKind {
+    /// A read of what nobody has.
+    InvalidRead,
+    /// A write to what nobody has.
+    InvalidWrite,
+    /// An instruction taken from where none is.
+    InvalidExecute,
+    /// Where an instruction stood that may have to do with the fault.
+    Instruction,
+    /// Where an instruction stood that was not valid.
+    InvalidInstruction,
+    /// Where the instruction stood that made the fault.
+    FaultingInstruction,
+    /// Something else, by Vulkan's number.
+    Other(i32),
+}
+
+/// A code of the vendor's.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct VendorFault {
+    /// The driver's own words.
+    pub description: String,
+    /// The code.
+    pub code: u64,
+    /// What belongs to the code.
+    pub data: u64,
+}
+
+impl Gpu {
+    /// As [`Error::vulkan`], with what the device says of its fault where it is lost.
+    pub(crate) fn failed(&self, call: &'static str) -> impl FnOnce(vk::Result) -> Error + '_ {
+        move |result| match result {
+            vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { call, fault: self.fault().map(Arc::new) },
+            other => Error::vulkan(call)(other),
+        }
+    }
+
+    /// Asks a lost device; `None` where it cannot say.
+    fn fault(&self) -> Option<DeviceFault> {
+        let functions = self.device_fault.as_ref()?.fp();
+        let raw = self.device.handle();
+        // SAFETY: the device is lost, as its last answer was, and the lists have the lengths that the counts say.
+        read(|counts, info| unsafe { (functions.get_device_fault_info_ext)(raw, counts, info) })
+    }
+}
+
+/// Reads by a function that works like `vkGetDeviceFaultInfoEXT`: counts first, then lists of that length.
+fn read(
+    ask: impl Fn(*mut vk::DeviceFaultCountsEXT<'_>, *mut vk::DeviceFaultInfoEXT<'_>) -> vk::Result,
+) -> Option<DeviceFault> {
+    let mut counts = vk::DeviceFaultCountsEXT::default();
+    if ask(&mut counts, std::ptr::null_mut()) != vk::Result::SUCCESS {
+        return None;
+    }
+    counts.vendor_binary_size = 0; // only drivers' own tools read it, and it has a feature of its own
+    counts.address_info_count = counts.address_info_count.min(MOST_ENTRIES);
+    counts.vendor_info_count = counts.vendor_info_count.min(MOST_ENTRIES);
+    let mut addresses = vec![vk::DeviceFaultAddressInfoEXT::default(); counts.address_info_count as usize];
+    let mut vendor = vec![vk::DeviceFaultVendorInfoEXT::default(); counts.vendor_info_count as usize];
+    let mut info = vk::DeviceFaultInfoEXT {
+        p_address_infos: addresses.as_mut_ptr(),
+        p_vendor_infos: vendor.as_mut_ptr(),
+        ..Default::default()
+    };
+    // Incomplete only says that there is more.
+    let answer = ask(&mut counts, &mut info);
+    if answer != vk::Result::SUCCESS && answer != vk::Result::INCOMPLETE {
+        return None;
+    }
+    addresses.truncate(counts.address_info_count as usize);
+    vendor.truncate(counts.vendor_info_count as usize);
+    Some(decode(&info.description, &addresses, &vendor))
+}
+
+fn decode(
+    description: &[c_char],
+    addresses: &[vk::DeviceFaultAddressInfoEXT],
+    vendor: &[vk::DeviceFaultVendorInfoEXT],
+) -> DeviceFault {
+    let vendor_fault = |info: &vk::DeviceFaultVendorInfoEXT| VendorFault {
+        description: text(&info.description),
+        code: info.vendor_fault_code,
+        data: info.vendor_fault_data,
+    };
+    DeviceFault {
+        description: text(description),
+        addresses: addresses.iter().map(address).collect(),
+        vendor: vendor.iter().map(vendor_fault).collect(),
+    }
+}
+
+/// The precision is a power of two: the true address has the same multiple of it below.
+fn address(info: &vk::DeviceFaultAddressInfoEXT) -> FaultAddress {
+    let precision = info.address_precision.max(1);
+    let start = info.reported_address / precision * precision;
+    FaultAddress {
+        kind: kind(info.address_type),
+        address: info.reported_address,
+        range: start..start.saturating_add(precision),
+    }
+}
+
+fn kind(raw: vk::DeviceFaultAddressTypeEXT) -> FaultKind {
+    use vk::DeviceFaultAddressTypeEXT as Raw;
+    match raw {
+        Raw::READ_INVALID => FaultKind::InvalidRead,
+        Raw::WRITE_INVALID => FaultKind::InvalidWrite,
+        Raw::EXECUTE_INVALID => FaultKind::InvalidExecute,
+        Raw::INSTRUCTION_POINTER_UNKNOWN => FaultKind::Instruction,
+        Raw::INSTRUCTION_POINTER_INVALID => FaultKind::InvalidInstruction,
+        Raw::INSTRUCTION_POINTER_FAULT => FaultKind::FaultingInstruction,
+        other => FaultKind::Other(other.as_raw()),
+    }
+}
+
+/// The text of an array of characters, whether it ends in a zero or not.
+fn text(chars: &[c_char]) -> String {
+    let mut bytes: Vec<u8> = chars.iter().map(|c| c.cast_unsigned()).collect();
+    bytes.push(0);
+    CStr::from_bytes_until_nul(&bytes).map(|text| text.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+impl fmt::Display for DeviceFault {
+    /// In one line, for messages.
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{}", self.description)?;
+        for FaultAddress { kind, range, .. } in &self.addresses {
+            write!(out, "; {kind:?} at {:#x} to {:#x}", range.start, range.end - 1)?;
+        }
+        for VendorFault { description, code, data } in &self.vendor {
+            write!(out, "; {description} (code {code:#x}, data {data:#x})")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn chars<const N: usize>(text: &str) -> [c_char; N] {
+        let mut all = [0; N];
+        all.iter_mut().zip(text.bytes()).for_each(|(place, byte)| *place = byte.cast_signed());
+        all
+    }
+
+    fn address_info(kind: i32, address: u64, precision: u64) -> vk::DeviceFaultAddressInfoEXT {
+        let address_type = vk::DeviceFaultAddressTypeEXT::from_raw(kind);
+        vk::DeviceFaultAddressInfoEXT {
+            address_type,
+            reported_address: address,
+            address_precision: precision,
+        }
+    }
+
+    /// A driver that has two addresses and one code.
+    fn driver(
+        counts: *mut vk::DeviceFaultCountsEXT<'_>,
+        info: *mut vk::DeviceFaultInfoEXT<'_>,
+    ) -> vk::Result {
+        // SAFETY: as of `vkGetDeviceFaultInfoEXT`; the test is its only caller.
+        unsafe {
+            if info.is_null() {
+                *counts = vk::DeviceFaultCountsEXT {
+                    address_info_count: 2,
+                    vendor_info_count: 1,
+                    vendor_binary_size: 512,
+                    ..Default::default()
+                };
+                return vk::Result::SUCCESS;
+            }
+            assert_eq!(((*counts).address_info_count, (*counts).vendor_info_count), (2, 1));
+            assert!((*counts).vendor_binary_size == 0 && (*info).p_vendor_binary_data.is_null());
+            (*info).description = chars("page fault");
+            *(*info).p_address_infos = address_info(1, 0x1_2345, 0x1000);
+            *(*info).p_address_infos.add(1) = address_info(6, 0x77, 1);
+            let code = vk::DeviceFaultVendorInfoEXT {
+                description: chars("unit 7"),
+                vendor_fault_code: 0xab,
+                vendor_fault_data: 3,
+            };
+            *(*info).p_vendor_infos = code;
+        }
+        vk::Result::SUCCESS
+    }
+
+    #[test]
+    fn a_fault_is_read_as_the_driver_says_it() {
+        let fault = read(driver).unwrap();
+        let read =
+            FaultAddress { kind: FaultKind::InvalidRead, address: 0x1_2345, range: 0x1_2000..0x1_3000 };
+        let at = FaultAddress { kind: FaultKind::FaultingInstruction, address: 0x77, range: 0x77..0x78 };
+        assert_eq!(fault.addresses, [read, at]);
+        assert_eq!(fault.vendor, [VendorFault { description: "unit 7".to_owned(), code: 0xab, data: 3 }]);
+        let error = Error::DeviceLost { call: "vkQueueSubmit2", fault: Some(Arc::new(fault)) }.to_string();
+        assert_eq!(
+            error,
+            "the device was lost in vkQueueSubmit2 (page fault; InvalidRead at 0x12000 to 0x12fff; FaultingInstruction \
+             at 0x77 to 0x77; unit 7 (code 0xab, data 0x3)); create a new context"
+        );
+        let error = Error::DeviceLost { call: "vkQueueSubmit2", fault: None }.to_string();
+        assert_eq!(error, "the device was lost in vkQueueSubmit2; create a new context");
+    }
+
+    #[test]
+    fn drivers_that_cannot_say_are_no_second_error() {
+        assert_eq!(read(|_, _| vk::Result::ERROR_UNKNOWN), None);
+        let second_fails = |_: *mut vk::DeviceFaultCountsEXT<'_>, info: *mut vk::DeviceFaultInfoEXT<'_>| {
+            if info.is_null() { vk::Result::SUCCESS } else { vk::Result::ERROR_OUT_OF_HOST_MEMORY }
+        };
+        assert_eq!(read(second_fails), None);
+        assert_eq!(read(|_, _| vk::Result::SUCCESS), Some(DeviceFault::default()));
+        // Counts that no list has, and fewer entries than were announced.
+        let boasts = |counts: *mut vk::DeviceFaultCountsEXT<'_>, info: *mut vk::DeviceFaultInfoEXT<'_>| {
+            // SAFETY: as in `driver`.
+            unsafe { (*counts).address_info_count = if info.is_null() { u32::MAX } else { 1 } };
+            vk::Result::INCOMPLETE
+        };
+        assert_eq!(read(boasts), None, "asked for counts alone, nothing is incomplete");
+        let fewer = |counts: *mut vk::DeviceFaultCountsEXT<'_>, info: *mut vk::DeviceFaultInfoEXT<'_>| {
+            // SAFETY: as in `driver`.
+            unsafe { (*counts).address_info_count = if info.is_null() { u32::MAX } else { 1 } };
+            if info.is_null() { vk::Result::SUCCESS } else { vk::Result::INCOMPLETE }
+        };
+        let fault = read(fewer).unwrap();
+        assert_eq!((fault.addresses.len(), fault.addresses[0].kind), (1, FaultKind::Other(0)));
+    }
+
+    #[test]
+    fn odd_precisions_and_texts_do_no_harm() {
+        assert_eq!(address(&address_info(2, 9, 0)).range, 9..10);
+        let last = address(&address_info(2, u64::MAX, 1 << 20)).range;
+        assert!(last.start < last.end);
+        assert_eq!(text(&chars::<4>("four")), "four");
+        assert_eq!(text(&[]), "");
+    }
+}
