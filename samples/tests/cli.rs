@@ -404,10 +404,14 @@ fn a_device_without_ray_tracing_is_told_what_it_lacks() {
     }
     let desk = Desk::new();
     let scene = desk.file("triangle.obj", TRIANGLE);
-    for (rt, lack) in [("pipeline", "lacks ray tracing pipelines"), ("query", "lacks ray queries")] {
+    let lacks =
+        [("pipeline", "lacks ray tracing pipelines", ""), ("query", "lacks ray queries", "--rt software")];
+    for (rt, lack, remedy) in lacks {
         let Some(command) = desk.without_ray_tracing(&["--scene", &scene, "--rt", rt]) else { return };
-        Outcome::of(command).assert_error(1, &["SwiftShader", lack]);
+        Outcome::of(command).assert_error(1, &["SwiftShader", lack, remedy]);
     }
+    let other = desk.run(&["--scene", &scene, "--rt", "query", "--device", "voodoo"]);
+    assert!(!other.err.contains("--rt software"), "{}", other.err);
     assert_eq!(desk.output_files(), Vec::<String>::new());
 }
 

@@ -25,7 +25,7 @@ pub(super) fn open(
     driver: &Driver,
     sink: &ValidationSink,
     needs: &DeviceNeeds,
-) -> lvk::Result<Context> {
+) -> Result<Context, RunError> {
     use FeatureRequest::{Off, Optional, Required};
     use RayQueryRequest::{Auto, Hardware, HardwareIfPresent, Software};
     let with = |ray_tracing_pipeline, ray_query| {
@@ -43,9 +43,9 @@ pub(super) fn open(
         })
     };
     match args.rt {
-        RayTracing::Pipeline => with(Required, HardwareIfPresent),
-        RayTracing::Query => with(Optional, Hardware),
-        RayTracing::Software => with(Off, Software),
+        RayTracing::Pipeline => Ok(with(Required, HardwareIfPresent)?),
+        RayTracing::Query => with(Optional, Hardware).map_err(without_queries),
+        RayTracing::Software => Ok(with(Off, Software)?),
         // A profile rehearses the device's own paths. These keep no structures for software beside theirs.
         RayTracing::Auto => {
             let best = with(Optional, HardwareIfPresent)?;
@@ -56,6 +56,16 @@ pub(super) fn open(
             eprintln!("note: --rt auto takes {}", choice(chosen.capabilities()));
             Ok(chosen)
         }
+    }
+}
+
+/// Names the way that needs no queries of the device, if these are what it lacks.
+fn without_queries(error: lvk::Error) -> RunError {
+    match error {
+        lvk::Error::NoDevice { reasons } if reasons.contains("ray queries") => {
+            RunError::NoRayQueries { reasons }
+        }
+        error => error.into(),
     }
 }
 

@@ -48,7 +48,7 @@ impl Opening<'_> {
         self.progress.pause();
         let driver = prepare(&DriverRequest { validation: self.args.validate.is_some() })?;
         self.progress.stage("opening the device", 0);
-        Ok(device::open(self.name, self.args, &driver, self.sink, needs)?)
+        device::open(self.name, self.args, &driver, self.sink, needs)
     }
 
     /// Prints warnings to standard error, past the progress bar.

@@ -15,6 +15,14 @@ pub enum RunError {
     /// Trouble with the device.
     #[error("{0}")]
     Device(Box<dyn std::error::Error + Send + Sync>),
+    /// `--rt query`, and no device has what that asks for.
+    #[error(
+        "no Vulkan device has what --rt query requires: {reasons}; --rt software needs no ray queries of the device"
+    )]
+    NoRayQueries {
+        /// Each device with what it lacks.
+        reasons: String,
+    },
     /// The scene could not be loaded.
     #[error(transparent)]
     Scene(#[from] SceneError),
@@ -73,7 +81,7 @@ impl RunError {
             Self::Input(_) | Self::Scene(_) | Self::Png(_) | Self::Driver(DriverError::Variable { .. }) => 2,
             Self::NoNumber { .. } | Self::NoSequence { .. } | Self::NothingToResume => 2,
             Self::Interrupted { .. } => interrupt::STATUS,
-            Self::Device(_) | Self::Driver(_) | Self::Validation(_) => 1,
+            Self::Device(_) | Self::NoRayQueries { .. } | Self::Driver(_) | Self::Validation(_) => 1,
         }
     }
 }
