@@ -10,11 +10,11 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::Blas;
 use crate::accel::build::instance_bytes;
 use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance, check, pack};
-use crate::accel::software::blas::{Origin, Rebuilt, SoftwareBlas, gpu_plan};
+use crate::accel::software::blas::{Origin, SoftwareBlas};
 use crate::accel::software::body::SoftwareBody;
 use crate::accel::software::geometry::{GpuGeometry, gpu_geometries};
 use crate::accel::software::layout::{MOVED, MovedHeader};
-use crate::accel::software::plan::BuildSource;
+use crate::accel::software::plan::{BuildSource, GpuBuildPlan};
 use crate::accel::software::refit_plan::GpuRefitPlan;
 use crate::accel::software::tlas::SoftwareTlas;
 use crate::accel::tlas::Shown;
@@ -146,21 +146,21 @@ impl CommandBuffer {
             reads: reads.clone(),
         };
         match (refit, &software.origin, moved) {
-            (true, _, Some(rebuilt)) => {
-                work.refits.push(refit_of(GpuRefitPlan::of_build(&rebuilt.plan), &rebuilt.body));
+            (true, Origin::Cpu { rebuild, .. }, Some(rebuilt)) => {
+                work.refits.push(refit_of(GpuRefitPlan::of_build(rebuild), rebuilt));
             }
             (true, Origin::Cpu { refit: Some(plan), .. }, None) => {
                 work.refits.push(refit_of(*plan, &software.body))
             }
             (true, Origin::Cpu { refit: None, .. }, None) => target.check_refit()?,
-            (true, Origin::Gpu(plan), None) => {
+            (true, Origin::Gpu(plan), _) => {
                 work.refits.push(refit_of(GpuRefitPlan::of_build(plan), &software.body));
             }
             (false, Origin::Gpu(plan), _) => work.builds.push(build_of(plan, &software.body)),
-            (false, Origin::Cpu { .. }, _) => {
-                let rebuilt = software.rebuilt_or(|| self.new_rebuilt(target, blas))?;
-                work.builds.push(build_of(&rebuilt.plan, &rebuilt.body));
-                let header = MovedHeader { format: MOVED, leaf_kind: 0, address: rebuilt.body.address };
+            (false, Origin::Cpu { rebuild, .. }, _) => {
+                let rebuilt = software.rebuilt_or(|| self.room_for(target, rebuild))?;
+                work.builds.push(build_of(rebuild, rebuilt));
+                let header = MovedHeader { format: MOVED, leaf_kind: 0, address: rebuilt.address };
                 work.moves.push((Arc::clone(&software.body), header));
                 self.moved.insert(target.id.0);
             }
@@ -169,11 +169,9 @@ impl CommandBuffer {
     }
 
     /// Room for builds on the GPU of what the CPU built first.
-    fn new_rebuilt(&self, target: &AccelStruct, blas: &Blas) -> Result<Rebuilt> {
-        let (shared, name) = (&self.shared, &target.name);
-        let plan = gpu_plan(name, &blas.geometries, target.flags)?;
-        let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, plan.blob_bytes)?;
-        Ok(Rebuilt { body: Arc::new(body), plan })
+    fn room_for(&self, target: &AccelStruct, plan: &GpuBuildPlan) -> Result<SoftwareBody> {
+        let shared = &self.shared;
+        SoftwareBody::new(&shared.gpu, &shared.accel_storage, &target.name, plan.blob_bytes)
     }
 
     fn gpu_geometries(&self, target: &AccelStruct, blas: &Blas) -> Result<Vec<GpuGeometry>> {

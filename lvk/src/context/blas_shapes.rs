@@ -10,7 +10,7 @@ use crate::accel::desc::{BlasDesc, PrimitiveOrder};
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
 use crate::accel::order::{spatial_order, worth_ordering};
 use crate::accel::primitive_map::{PrimitiveMap, table_words};
-use crate::accel::software::blas::gpu_plan;
+use crate::accel::software::blas::most_sizes;
 use crate::accel::split::{PartLimits, PartPlan, PartSizes, plan_split};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -40,12 +40,7 @@ impl Context {
         if shared.gpu.accel.is_some() {
             return input.sizes(&shared.gpu);
         }
-        let plan = gpu_plan(desc.debug_name, desc.geometries, desc.flags)?;
-        Ok(AccelStructSizes {
-            structure_bytes: plan.blob_bytes,
-            build_scratch_bytes: plan.scratch_bytes,
-            update_scratch_bytes: 0,
-        })
+        most_sizes(desc.debug_name, desc.geometries, desc.flags)
     }
 
     /// The parts of every structure, with the tables of those that are cut or reordered.

@@ -66,15 +66,13 @@ impl Context {
         if !shared.gpu.caps.software_ray_query() {
             return Ok(None);
         }
+        let plan = gpu_plan(name, desc.geometries, desc.flags)?;
         let (bytes, origin) = match blob {
             Some(blob) => {
                 let refit = refit_plan(&blob.header(), desc);
-                (blob.bytes.len() as u64, Origin::Cpu { refit, bounds: blob.bounds })
+                (blob.bytes.len() as u64, Origin::Cpu { refit, rebuild: plan, bounds: blob.bounds })
             }
-            None => {
-                let plan = gpu_plan(name, desc.geometries, desc.flags)?;
-                (plan.blob_bytes, Origin::Gpu(plan))
-            }
+            None => (plan.blob_bytes, Origin::Gpu(plan)),
         };
         let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, bytes)?;
         Ok(Some(SoftwareBlas::new(Arc::new(body), origin)))
@@ -84,7 +82,7 @@ impl Context {
     pub(super) fn software_bytes(&self, blas: &Blas) -> Result<Vec<u8>> {
         let Some(software) = &blas.software else { return Ok(Vec::new()) };
         let moved = software.rebuilt().filter(|_| blas.builds() > 1);
-        let body = moved.map_or(&software.body, |rebuilt| &rebuilt.body);
+        let body = moved.unwrap_or(&software.body);
         let size = body.memory_bytes();
         let mut bytes = vec![0; MARK.len() + size as usize];
         bytes[..MARK.len()].copy_from_slice(&MARK);

@@ -21,7 +21,7 @@ pub(crate) struct SoftwareBlas {
     pub(crate) origin: Origin,
     /// Where a structure that the CPU built is built again on the GPU; its body says then that it has moved there. Made
     /// when first needed.
-    rebuilt: OnceLock<Rebuilt>,
+    rebuilt: OnceLock<Arc<SoftwareBody>>,
 }
 
 /// Who built it first.
@@ -30,17 +30,13 @@ pub(crate) enum Origin {
     Cpu {
         /// How it is refitted, where it may be.
         refit: Option<GpuRefitPlan>,
+        /// How it is rebuilt.
+        rebuild: GpuBuildPlan,
         /// Around everything in it, as long as it is neither refitted nor rebuilt.
         bounds: Bounds,
     },
     /// The GPU, as every build of it.
     Gpu(GpuBuildPlan),
-}
-
-/// Memory for builds on the GPU.
-pub(crate) struct Rebuilt {
-    pub(crate) body: Arc<SoftwareBody>,
-    pub(crate) plan: GpuBuildPlan,
 }
 
 impl SoftwareBlas {
@@ -49,46 +45,79 @@ impl SoftwareBlas {
     }
 
     /// Where it has been rebuilt, if it ever was.
-    pub(crate) fn rebuilt(&self) -> Option<&Rebuilt> {
+    pub(crate) fn rebuilt(&self) -> Option<&Arc<SoftwareBody>> {
         self.rebuilt.get()
     }
 
     /// Where it is rebuilt; `make` makes room the first time.
-    pub(crate) fn rebuilt_or(&self, make: impl FnOnce() -> Result<Rebuilt>) -> Result<&Rebuilt> {
+    pub(crate) fn rebuilt_or(
+        &self,
+        make: impl FnOnce() -> Result<SoftwareBody>,
+    ) -> Result<&Arc<SoftwareBody>> {
         if let Some(rebuilt) = self.rebuilt.get() {
             return Ok(rebuilt);
         }
         let rebuilt = make()?;
-        Ok(self.rebuilt.get_or_init(|| rebuilt))
+        Ok(self.rebuilt.get_or_init(|| Arc::new(rebuilt)))
     }
 
     /// Where it lies, if the host knows: then it never was nor will be refitted, nor was a rebuild recorded.
     pub(crate) fn known_bounds(&self) -> Option<Bounds> {
         match self.origin {
-            Origin::Cpu { refit: None, bounds } if self.rebuilt.get().is_none() => Some(bounds),
+            Origin::Cpu { refit: None, bounds, .. } if self.rebuilt.get().is_none() => Some(bounds),
             _ => None,
         }
     }
 
     /// Bytes of memory.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        let rebuilt = self.rebuilt.get().map_or(0, |rebuilt| rebuilt.body.memory_bytes());
+        let rebuilt = self.rebuilt.get().map_or(0, |rebuilt| rebuilt.memory_bytes());
         self.body.memory_bytes() + rebuilt
     }
 
     /// What it takes and its builds take.
     pub(crate) fn sizes(&self) -> AccelStructSizes {
-        let (build_scratch_bytes, update_scratch_bytes) = match &self.origin {
-            Origin::Cpu { refit, .. } => (0, refit.as_ref().map_or(0, GpuRefitPlan::scratch_bytes)),
-            Origin::Gpu(plan) if plan.places.parents == 0 => (plan.scratch_bytes, 0),
-            Origin::Gpu(plan) => (plan.scratch_bytes, GpuRefitPlan::of_build(plan).scratch_bytes()),
+        let (rebuild, refit) = match &self.origin {
+            Origin::Cpu { rebuild, refit, .. } => (rebuild, refit.as_ref()),
+            Origin::Gpu(plan) => (plan, None),
         };
         AccelStructSizes {
             structure_bytes: self.body.memory_bytes(),
-            build_scratch_bytes,
-            update_scratch_bytes,
+            build_scratch_bytes: rebuild.scratch_bytes,
+            update_scratch_bytes: refit_scratch_bytes(rebuild)
+                .max(refit.map_or(0, GpuRefitPlan::scratch_bytes)),
         }
     }
+}
+
+/// What structures of these geometries, which have been checked, take at most.
+pub(crate) fn most_sizes(
+    name: &str,
+    geometries: &[BlasGeometry],
+    flags: BuildFlags,
+) -> Result<AccelStructSizes> {
+    let plan = gpu_plan(name, geometries, flags)?;
+    let of_gpu = refit_scratch_bytes(&plan);
+    // A tree of the CPU has no more nodes than one of two children and one primitive in each leaf.
+    let of_cpu = match builds_on_gpu(flags) || !flags.contains(BuildFlags::ALLOW_UPDATE) {
+        true => 0,
+        false => GpuRefitPlan {
+            format: NodeFormat::Wide,
+            node_count: plan.capacity.saturating_sub(1),
+            ..GpuRefitPlan::of_build(&plan)
+        }
+        .scratch_bytes(),
+    };
+    Ok(AccelStructSizes {
+        structure_bytes: plan.blob_bytes,
+        build_scratch_bytes: plan.scratch_bytes,
+        update_scratch_bytes: of_gpu.max(of_cpu),
+    })
+}
+
+/// Scratch bytes of the refit of what the GPU built; 0 where it cannot be refitted.
+fn refit_scratch_bytes(plan: &GpuBuildPlan) -> u64 {
+    if plan.places.parents == 0 { 0 } else { GpuRefitPlan::of_build(plan).scratch_bytes() }
 }
 
 /// Whether the GPU makes the first build too: where builds are to be fast, and where refits are to find the vertices of
