@@ -39,7 +39,7 @@ struct Leaves {
 /// Builds a tree over the mesh and packs it.
 pub(crate) fn build(mesh: &Mesh, quality: Quality) -> BlasBlob {
     let bounds = mesh.bounds();
-    let tree = Tree::of_mesh(&bounds, quality);
+    let tree = Tree::of_mesh(&bounds);
     let whole = bounds.into_iter().fold(Bounds::EMPTY, Bounds::union);
     BlasBlob { bytes: pack(mesh, &tree, quality, whole), bounds: whole }
 }

@@ -8,6 +8,7 @@ pub(crate) mod blas_blob;
 pub(crate) mod gpu_build;
 pub(crate) mod instances;
 pub(crate) mod mesh;
+mod ploc;
 pub(crate) mod quality;
 pub(crate) mod sound;
 pub(crate) mod tlas_blob;

@@ -239,8 +239,8 @@ mod tests {
     use crate::accel::geometry::GeometryFlags;
     use crate::accel::software::layout::{LEAF, LeafTriangle, MOVED, leaf};
 
-    const SMALL: Quality = Quality { fast_build: false, low_memory: true, refit: false };
-    const MOVING: Quality = Quality { fast_build: false, low_memory: false, refit: true };
+    const SMALL: Quality = Quality { low_memory: true, refit: false };
+    const MOVING: Quality = Quality { low_memory: false, refit: true };
 
     /// Triangles of two geometries in turn.
     fn mesh(corners: &[[f32; 3]]) -> Mesh {
@@ -281,11 +281,7 @@ mod tests {
     }
 
     fn quality() -> impl Strategy<Value = Quality> {
-        any::<[bool; 3]>().prop_map(|[fast_build, low_memory, refit]| Quality {
-            fast_build,
-            low_memory,
-            refit,
-        })
+        any::<[bool; 2]>().prop_map(|[low_memory, refit]| Quality { low_memory, refit })
     }
 
     /// A sound structure with what it is to be of.

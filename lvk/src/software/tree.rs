@@ -3,7 +3,6 @@
 use obvhs::cwbvh::node::CwBvhNode;
 
 use super::binary_tree;
-use super::quality::Quality;
 use super::wide_tree;
 use crate::accel::bounds::Bounds;
 use crate::accel::software::layout::{BinaryNode, NONE, leaf};
@@ -25,7 +24,7 @@ pub(crate) struct Tree {
 
 impl Tree {
     /// The tree of a bottom-level structure: wide, but for meshes that wide nodes do not suit.
-    pub(crate) fn of_mesh(bounds: &[Bounds], quality: Quality) -> Self {
+    pub(crate) fn of_mesh(bounds: &[Bounds]) -> Self {
         const ONE_LEAF: usize = 3;
         match bounds.len() {
             0 => Self { nodes: Nodes::Wide(Vec::new()), root: NONE, order: Vec::new() },
@@ -33,7 +32,7 @@ impl Tree {
                 let order = (0..count as u32).collect();
                 Self { nodes: Nodes::Wide(Vec::new()), root: leaf(0, count), order }
             }
-            _ => wide_tree::build(bounds, quality).unwrap_or_else(|| binary_tree::build(bounds, ONE_LEAF)),
+            _ => wide_tree::build(bounds).unwrap_or_else(|| binary_tree::build(bounds, ONE_LEAF)),
         }
     }
 

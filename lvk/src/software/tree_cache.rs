@@ -10,7 +10,7 @@ use crate::disk::{fingerprint, read, replace};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
 /// Changes with the builders and with the form of structures.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// Magic, version, reserved, length of the structure, checksum of it.
 const HEADER_BYTES: usize = 32;
 
@@ -30,7 +30,7 @@ impl TreeKey {
             Primitives::Boxes(all) => bytemuck::cast_slice(all),
         };
         let boxes = matches!(mesh.primitives, Primitives::Boxes(_));
-        let bits = [boxes, quality.fast_build, quality.low_memory, quality.refit];
+        let bits = [boxes, quality.low_memory, quality.refit];
         let settings = bits.iter().fold(u64::from(VERSION), |all, bit| all << 1 | u64::from(*bit));
         let flags: Vec<u32> = mesh.flags.iter().map(|flags| flags.bits()).collect();
         Self([1, 2].map(|seed| {
@@ -107,7 +107,7 @@ mod tests {
     use crate::accel::geometry::GeometryFlags;
     use crate::accel::software::layout::LeafBox;
 
-    const QUALITY: Quality = Quality { fast_build: false, low_memory: false, refit: false };
+    const QUALITY: Quality = Quality { low_memory: false, refit: false };
 
     fn mesh(count: u32) -> Mesh {
         let place = |primitive: u32| {
@@ -158,9 +158,9 @@ mod tests {
 
     #[test]
     fn other_contents_and_settings_have_other_keys() {
-        let fast = Quality { fast_build: true, ..QUALITY };
+        let small = Quality { low_memory: true, ..QUALITY };
         let keys =
-            [TreeKey::of(&mesh(5), QUALITY), TreeKey::of(&mesh(6), QUALITY), TreeKey::of(&mesh(5), fast)];
+            [TreeKey::of(&mesh(5), QUALITY), TreeKey::of(&mesh(6), QUALITY), TreeKey::of(&mesh(5), small)];
         assert!(keys[0] != keys[1] && keys[0] != keys[2] && keys[1] != keys[2]);
     }
 }

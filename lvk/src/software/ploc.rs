@@ -1,0 +1,294 @@
+//! Binary trees by parallel locally ordered clustering (Meister and Bittner, 2018), in O(n log n) for all boxes.
+//!
+//! Boxes stand along a Morton curve. In each round every one looks for the neighbour with which its union has the least
+//! area, and those that find each other become one. Where each looks at the next, as among boxes that lie in one another,
+//! a round would make one pair; such a round pairs by place instead, so that every round leaves a share of boxes less.
+
+use std::sync::{Mutex, PoisonError};
+
+use glam::DVec3;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::node::Bvh2Node;
+use obvhs::ploc::morton::morton_encode_u64_unorm;
+
+/// Rounds that look at the next neighbours only: most of what is small is paired by them.
+const NEAR_ROUNDS: usize = 3;
+/// How far later rounds look to either side.
+const FAR: usize = 14;
+/// A round that pairs less than one in so many pairs those that stand beside each other too.
+const FEWEST: usize = 32;
+/// The last so many are left to the rule.
+const LAST: usize = 32;
+/// So many boxes are worth a thread.
+const PER_THREAD: usize = 16_384;
+
+/// A tree of boxes, at least one, with one in each leaf.
+pub(super) fn build(boxes: &[Aabb]) -> Bvh2 {
+    cluster(boxes).0
+}
+
+/// The tree, and how many boxes looked for a neighbour over all rounds: at most [`FEWEST`] for each.
+fn cluster(boxes: &[Aabb]) -> (Bvh2, usize) {
+    let mut tree = Bvh2::zeroed(boxes.len());
+    tree.primitive_indices = (0..boxes.len() as u32).collect();
+    let mut nodes = sorted(boxes);
+    let mut next = Vec::with_capacity(nodes.len());
+    let mut partners = vec![0; nodes.len()];
+    let (mut rounds, mut searches, mut free) = (0, 0, tree.nodes.len());
+    while nodes.len() > 1 {
+        let partners = &mut partners[..nodes.len()];
+        find_partners(&nodes, if rounds < NEAR_ROUNDS { 1 } else { FAR }, partners);
+        pair_more(partners);
+        merge(&nodes, partners, &mut tree.nodes[..free], &mut next);
+        free -= 2 * (nodes.len() - next.len());
+        searches += nodes.len();
+        rounds += 1;
+        std::mem::swap(&mut nodes, &mut next);
+    }
+    tree.nodes[0] = nodes[0];
+    tree.max_depth = tree.max_depth.max(rounds + 1);
+    tree.children_are_ordered_after_parents = true;
+    (tree, searches)
+}
+
+/// The leaves along a Morton curve through their centers.
+fn sorted(boxes: &[Aabb]) -> Vec<Bvh2Node> {
+    let whole = boxes.iter().fold(Aabb::empty(), |whole, place| whole.union(place));
+    let scale = 1.0 / whole.diagonal().as_dvec3().max(DVec3::splat(f64::MIN_POSITIVE));
+    let low = whole.min.as_dvec3();
+    let mut codes = vec![(0_u64, 0_u32); boxes.len()];
+    let threads = threads(boxes.len());
+    let length = boxes.len().div_ceil(threads).max(1);
+    std::thread::scope(|scope| {
+        for (chunk, codes) in codes.chunks_mut(length).enumerate() {
+            let mut work = move || {
+                for (place, number) in codes.iter_mut().zip((chunk * length) as u32..) {
+                    let center = boxes[number as usize].center().as_dvec3();
+                    *place = (morton_encode_u64_unorm((center - low) * scale), number);
+                }
+                codes.sort_unstable();
+            };
+            if threads == 1 { work() } else { drop(scope.spawn(work)) }
+        }
+    });
+    // Finds the sorted chunks and merges them.
+    codes.sort();
+    codes.iter().map(|(_, number)| Bvh2Node::new(boxes[*number as usize], 1, *number)).collect()
+}
+
+fn threads(boxes: usize) -> usize {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    cores.min(boxes / PER_THREAD).max(1)
+}
+
+/// For each node which other, at most `reach` places away, makes the smallest box with it. Of equals the one beside it with
+/// which it makes an even and an odd place, so that boxes that are alike find each other.
+fn find_partners(nodes: &[Bvh2Node], reach: usize, partners: &mut [u32]) {
+    let threads = threads(nodes.len());
+    if threads == 1 {
+        return search(nodes, reach, 0, partners);
+    }
+    let length = nodes.len().div_ceil(threads * 4);
+    let queue = Mutex::new(partners.chunks_mut(length).enumerate());
+    let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let work = || {
+        while let Some((chunk, partners)) = next() {
+            search(nodes, reach, chunk * length, partners);
+        }
+    };
+    std::thread::scope(|scope| {
+        (1..threads).for_each(|_| drop(scope.spawn(work)));
+        work();
+    });
+}
+
+/// Of the nodes from `first` on.
+fn search(nodes: &[Bvh2Node], reach: usize, first: usize, partners: &mut [u32]) {
+    let end = first + partners.len();
+    let mut least = vec![f32::INFINITY; partners.len()];
+    for place in first..end {
+        let other = if place ^ 1 < nodes.len() { place ^ 1 } else { place - 1 };
+        partners[place - first] = other as u32;
+        least[place - first] = cost(&nodes[place], &nodes[other]);
+    }
+    for place in first.saturating_sub(reach)..end {
+        let own = nodes[place];
+        let (mut best, mut best_cost) = match place.checked_sub(first) {
+            Some(index) => (partners[index], least[index]),
+            None => (0, f32::NEG_INFINITY),
+        };
+        let behind = place + 1..(place + reach + 1).min(nodes.len());
+        for (other, node) in behind.clone().zip(&nodes[behind]) {
+            let cost = cost(&own, node);
+            if cost < best_cost {
+                (best, best_cost) = (other as u32, cost);
+            }
+            if let Some(index) = other.checked_sub(first)
+                && index < partners.len()
+                && cost < least[index]
+            {
+                (partners[index], least[index]) = (place as u32, cost);
+            }
+        }
+        if let Some(index) = place.checked_sub(first) {
+            (partners[index], least[index]) = (best, best_cost);
+        }
+    }
+}
+
+fn cost(one: &Bvh2Node, other: &Bvh2Node) -> f32 {
+    one.aabb().union(other.aabb()).half_area()
+}
+
+/// Pairs those side by side that nobody took, where too few found each other: each looks at one that looks at the next.
+fn pair_more(partners: &mut [u32]) {
+    let found = |partners: &[u32], place: usize| partners[partners[place] as usize] as usize == place;
+    let count = partners.len();
+    let found_one = || (0..count).filter(|place| found(partners, *place)).count();
+    if count <= LAST || found_one() * FEWEST >= 2 * count {
+        return;
+    }
+    for place in (0..count - 1).step_by(2) {
+        if !found(partners, place) && !found(partners, place + 1) {
+            partners[place] = place as u32 + 1;
+            partners[place + 1] = place as u32;
+        }
+    }
+}
+
+/// Makes one node of each pair; its children go to the end of `free`.
+fn merge(nodes: &[Bvh2Node], partners: &[u32], free: &mut [Bvh2Node], next: &mut Vec<Bvh2Node>) {
+    next.clear();
+    let mut end = free.len();
+    for (place, node) in nodes.iter().enumerate() {
+        let other = partners[place] as usize;
+        if partners[other] as usize != place {
+            next.push(*node);
+        } else if other < place {
+            end -= 2;
+            free[end] = nodes[other];
+            free[end + 1] = *node;
+            next.push(Bvh2Node::new(nodes[other].aabb().union(node.aabb()), 0, end as u32));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Vec3A, vec3a};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const COUNT: usize = 24_000;
+
+    fn place(low: Vec3A, size: Vec3A) -> Aabb {
+        Aabb { min: low, max: low + size }
+    }
+
+    /// A number below 1 for each other number.
+    fn share(number: usize) -> f32 {
+        (number as u32).wrapping_mul(0x9e37_79b9) as f32 / u32::MAX as f32
+    }
+
+    fn somewhere(number: usize) -> Vec3A {
+        vec3a(share(3 * number + 1), share(7 * number + 2), share(11 * number + 5)) * 100.0
+    }
+
+    /// Boxes in which each may look at the next, `kinds` times side by side.
+    fn worst(kinds: usize) -> [(&'static str, Vec<Aabb>); 6] {
+        let each = COUNT / kinds;
+        let make = |of: &dyn Fn(usize, f32) -> Aabb| {
+            (0..COUNT).map(|number| of(number / each, (number % each) as f32)).collect::<Vec<_>>()
+        };
+        let part = |at: f32| 1.0 + at / each as f32;
+        [
+            ("equal", make(&|kind, _| place(somewhere(kind), Vec3A::splat(0.1 + share(kind))))),
+            ("from one corner", make(&|kind, at| place(somewhere(kind), Vec3A::splat(part(at))))),
+            (
+                "around one point",
+                make(&|kind, at| place(somewhere(kind) - part(at), Vec3A::splat(2.0 * part(at)))),
+            ),
+            (
+                "with growing gaps",
+                make(&|kind, at| place(vec3a(at * at, kind as f32 * 1e7, 0.0), Vec3A::ONE)),
+            ),
+            (
+                "one in 200 equal",
+                (0..COUNT)
+                    .map(|number| {
+                        let at = if number % 200 < kinds { number % 200 } else { number };
+                        place(somewhere(at), Vec3A::splat(share(at)))
+                    })
+                    .collect(),
+            ),
+            (
+                "flat and in one plane",
+                make(&|kind, at| place(Vec3A::Z * kind as f32, vec3a(part(at), part(at), 0.0))),
+            ),
+        ]
+    }
+
+    /// Fails unless each box is in one leaf and in every box above it.
+    fn check(boxes: &[Aabb], tree: &Bvh2) {
+        let (mut open, mut found) = (vec![(0, 1)], vec![false; boxes.len()]);
+        while let Some((number, depth)) = open.pop() {
+            let node: &Bvh2Node = &tree.nodes[number];
+            assert!(depth <= tree.max_depth);
+            if node.is_leaf() {
+                let primitive = tree.primitive_indices[node.first_index as usize] as usize;
+                assert!(!std::mem::replace(&mut found[primitive], true));
+                assert_eq!(*node.aabb(), boxes[primitive]);
+                continue;
+            }
+            for child in [0, 1].map(|side| node.first_index as usize + side) {
+                let inside = tree.nodes[child].aabb();
+                assert!(child > number && node.aabb().union(inside) == *node.aabb());
+                open.push((child, depth + 1));
+            }
+        }
+        assert!(found.into_iter().all(|found| found));
+    }
+
+    #[test]
+    fn no_boxes_take_more_than_a_few_searches_each() {
+        for kinds in [1, 10, 200, 2_000] {
+            for (name, boxes) in worst(kinds) {
+                let (tree, searches) = cluster(&boxes);
+                assert!(searches <= 16 * boxes.len(), "{kinds} x {name}: {searches}");
+                check(&boxes, &tree);
+            }
+        }
+    }
+
+    #[test]
+    fn threads_find_what_one_finds() {
+        let boxes: Vec<_> =
+            (0..5 * PER_THREAD / 2).map(|it| place(somewhere(it), Vec3A::splat(share(it)))).collect();
+        let nodes = sorted(&boxes);
+        for reach in [1, FAR] {
+            let [mut one, mut many] = [vec![0; nodes.len()], vec![0; nodes.len()]];
+            search(&nodes, reach, 0, &mut one);
+            let length = nodes.len().div_ceil(7);
+            many.chunks_mut(length)
+                .enumerate()
+                .for_each(|(chunk, part)| search(&nodes, reach, chunk * length, part));
+            assert!(one == many, "{reach}");
+        }
+        check(&boxes, &build(&boxes));
+    }
+
+    proptest! {
+        #[test]
+        fn every_box_is_in_one_leaf(
+            corners in prop::collection::vec(([0..4_u8, 0..4, 0..4], [0..3_u8, 0..3, 0..3]), 1..400)
+        ) {
+            let vec = |of: [u8; 3]| Vec3A::from(of.map(f32::from));
+            let boxes: Vec<_> = corners.into_iter().map(|(low, size)| place(vec(low), vec(size))).collect();
+            let (tree, searches) = cluster(&boxes);
+            prop_assert!(searches <= FEWEST * boxes.len());
+            check(&boxes, &tree);
+        }
+    }
+}
