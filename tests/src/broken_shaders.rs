@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use image::RgbaImage;
-use lvk::{Context, TextureHandle};
+use lvk::{ClearValue, Context, TextureHandle, TextureRange};
 use lvk_samples::shader_folder::VARIABLE;
 
 use crate::child::in_child;
@@ -121,7 +121,8 @@ impl BrokenShaders {
 /// When the device fails.
 pub fn paint_over(ctx: &Context, picture: TextureHandle) {
     let mut cmd = ctx.acquire_command_buffer().expect("a command buffer can be had");
-    cmd.clear_texture(picture, [1.0, 0.0, 1.0, 1.0]).expect("pictures can be cleared");
+    cmd.clear_texture(picture, ClearValue::Color([1.0, 0.0, 1.0, 1.0]), &TextureRange::default())
+        .expect("pictures can be cleared");
     let submitted = ctx.submit(cmd).expect("the device works");
     ctx.wait(submitted).expect("the device works");
 }

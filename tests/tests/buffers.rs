@@ -1,7 +1,7 @@
 //! Buffers: what is uploaded, copied, filled and written by shaders is what is downloaded, and misuse is an error.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use lvk::{BufferDesc, BufferUsage, Context, Dependencies, Error, Holder, MemoryKind};
+use lvk::{BufferCopy, BufferDesc, BufferUsage, Context, Dependencies, Error, Holder, MemoryKind};
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::noise::noise;
 use lvk_tests::{device, device_with};
@@ -225,4 +225,42 @@ fn buffers_serve_only_what_their_usage_says() {
         let result = cmd.dispatch_indirect(*arguments, offset, &Dependencies::default());
         assert!(matches!(result, Err(Error::InvalidUsage { .. })), "{offset}: {result:?}");
     }
+}
+
+#[test]
+fn updates_of_any_size_and_copies_of_several_ranges_write_what_they_say() {
+    let Some(ctx) = device() else { return };
+    let make = || ctx.create_buffer(&BufferDesc { size_bytes: 200_000, ..Default::default() }).unwrap();
+    let (first, second) = (make(), make());
+    let mut expected = vec![0xEE_u8; 200_000];
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.fill_buffer(*first, 0, 200_000, 0xEEEE_EEEE).unwrap();
+    cmd.fill_buffer(*second, 0, 200_000, 0).unwrap();
+    for (seed, (offset, size)) in
+        (0..).zip([(0, 4), (8, 65_536), (70_000, 65_540), (150_001, 3), (160_000, 7), (3, 0)])
+    {
+        let bytes: Vec<u8> = (0..size).map(|i| (i * 7 + seed) as u8).collect();
+        expected[offset..offset + size].copy_from_slice(&bytes);
+        cmd.update_buffer(*first, offset as u64, &bytes).unwrap();
+    }
+    let copy = |source_offset, target_offset, size| BufferCopy { source_offset, target_offset, size };
+    cmd.copy_buffer_regions(*first, *second, &[copy(5, 100, 50), copy(0, 0, 10), copy(5, 10, 0)]).unwrap();
+    let wrong = [
+        cmd.update_buffer(*first, 199_998, &[0; 4]),
+        cmd.update_buffer(*first, 200_000, &[0; 1]),
+        cmd.copy_buffer_regions(*first, *second, &[copy(0, 0, 10), copy(20, 9, 10)]),
+        cmd.copy_buffer_regions(*first, *first, &[copy(0, 10, 10), copy(15, 40, 10)]),
+        cmd.copy_buffer_regions(*first, *second, &[copy(0, 0, 10), copy(199_999, 20, 2)]),
+        cmd.copy_buffer_regions(*first, *second, &[copy(u64::MAX, 20, 2)]),
+    ];
+    for (index, result) in wrong.into_iter().enumerate() {
+        assert!(matches!(result, Err(Error::InvalidUsage { .. })), "{index}: {result:?}");
+    }
+    ctx.submit(cmd).unwrap();
+    let mut found = vec![0; 200_000];
+    ctx.download_buffer(*first, 0, &mut found).unwrap();
+    assert!(found == expected, "the updates");
+    ctx.download_buffer(*second, 0, &mut found[..160]).unwrap();
+    let copied = [&expected[..10], &[0; 90], &expected[5..55], &[0; 10]].concat();
+    assert_eq!(found[..160], copied);
 }

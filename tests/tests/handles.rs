@@ -5,9 +5,9 @@ use std::fmt::Debug;
 
 use lvk::ash::vk;
 use lvk::{
-    BufferDesc, ComputePipelineDesc, Context, Dependencies, Destroy, Error, Holder, LiveObject,
-    QueryPoolDesc, RenderPassDesc, RenderPipelineDesc, SamplerDesc, ShaderStage, TextureDesc, TextureRegion,
-    ValidationSink,
+    BufferDesc, ClearValue, ComputePipelineDesc, Context, Dependencies, Destroy, Error, Holder, LiveObject,
+    QueryPoolDesc, RenderPassDesc, RenderPipelineDesc, SamplerDesc, ShaderStage, TextureDesc, TextureRange,
+    TextureRegion, ValidationSink,
 };
 use lvk_tests::compute::{
     Evaluator, compute_pipeline, module, read_vec4, read_words, vec4_buffer, words_buffer,
@@ -36,7 +36,7 @@ fn expect_all_stale(ctx: &Context, made: &Objects) {
     stale(ctx.upload_texture(*texture, &whole, &[0; 4]), "texture");
     stale(ctx.download_texture(*texture, &whole), "texture");
     stale(cmd.copy_texture_to_buffer(*texture, &whole, *good, 0), "texture");
-    stale(cmd.clear_texture(*texture, [0.0; 4]), "texture");
+    stale(cmd.clear_texture(*texture, ClearValue::Color([0.0; 4]), &TextureRange::default()), "texture");
     stale(cmd.generate_mipmaps(*texture), "texture");
     let color = [lvk::ColorAttachment::clear(*texture, [0.0; 4])];
     stale(cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).map(drop), "texture");
@@ -267,7 +267,7 @@ fn a_command_buffer_may_be_the_last_to_go() {
     let texture =
         ctx.create_texture(&TextureDesc { data: Some(&[1; 4]), ..Default::default() }).unwrap().release();
     let mut open = ctx.acquire_command_buffer().unwrap();
-    open.clear_texture(texture, [0.0; 4]).unwrap();
+    open.clear_texture(texture, ClearValue::Color([0.0; 4]), &TextureRange::default()).unwrap();
     drop(ctx);
     open.fill_buffer(buffer, 0, 16, 2).unwrap();
     drop(open);

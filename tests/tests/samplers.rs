@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    AddressMode, CompareOp, Context, Dependencies, Error, Filter, Format, Holder, SamplerDesc, TextureDesc,
-    TextureHandle, TextureRegion,
+    AddressMode, BorderColor, CompareOp, Context, Dependencies, Error, Filter, Format, Holder,
+    OptionalFeature, Reduction, SamplerDesc, TextureDesc, TextureHandle, TextureKind, TextureRegion,
 };
 use lvk_tests::compute::Evaluator;
 use lvk_tests::device;
@@ -150,7 +150,20 @@ fn odd_numbers_are_errors_or_clamped() {
     for max_anisotropy in [-1.0, 0.0, 1.0e9, f32::INFINITY] {
         drop(ctx.create_sampler(&SamplerDesc { max_anisotropy, ..Default::default() }).unwrap());
     }
-    drop(ctx.create_sampler(&SamplerDesc { lod_bias: f32::INFINITY, ..Default::default() }).unwrap());
+    let limit = ctx.capabilities().limits.max_lod_bias;
+    for lod_bias in [limit, -limit] {
+        drop(ctx.create_sampler(&SamplerDesc { lod_bias, ..Default::default() }).unwrap());
+    }
+    let compared =
+        SamplerDesc { compare: Some(CompareOp::Less), reduction: Reduction::Min, ..Default::default() };
+    for desc in [
+        SamplerDesc { lod_bias: limit + 0.5, ..Default::default() },
+        SamplerDesc { lod_bias: f32::NEG_INFINITY, ..Default::default() },
+        compared,
+    ] {
+        let error = ctx.create_sampler(&desc).unwrap_err();
+        assert!(matches!(error, Error::InvalidUsage { .. }), "{error}");
+    }
 }
 
 #[test]
@@ -166,4 +179,127 @@ fn samplers_run_out_and_come_back() {
     let texture = row(&ctx);
     let found = sample(&ctx, texture.index(), &nearest(AddressMode::Repeat), "(0.5 + i) / 4.0", 4);
     assert_eq!(found, [1.0, 2.0, 3.0, 4.0]);
+}
+
+/// What a shader sees of one texel of 0.5 beyond its edge.
+fn beyond(ctx: &Context, border: BorderColor) -> [f32; 4] {
+    let data = Some(&[128; 4][..]);
+    let texture = ctx.create_texture(&TextureDesc { data, ..Default::default() }).unwrap();
+    let sampler = SamplerDesc { border, ..nearest(AddressMode::ClampToBorder) };
+    let sampler = ctx.create_sampler(&sampler).unwrap();
+    let fetch = Evaluator::new(ctx, "textureBindless2DLod(a, b, vec2(1.5, 0.5), 0.0)");
+    fetch.run(ctx, [texture.index(), sampler.index(), 0], 1, &Dependencies::default())[0]
+}
+
+#[test]
+fn borders_have_the_colour_asked_for() {
+    let Some(ctx) = device() else { return };
+    let colors = [
+        (BorderColor::TransparentBlack, [0.0; 4]),
+        (BorderColor::OpaqueBlack, [0.0, 0.0, 0.0, 1.0]),
+        (BorderColor::OpaqueWhite, [1.0; 4]),
+    ];
+    for (border, expected) in colors {
+        assert_eq!(beyond(&ctx, border), expected, "{border:?}");
+    }
+    let own = SamplerDesc { border: BorderColor::Custom([0.25, 0.5, 0.75, 0.125]), ..Default::default() };
+    if !ctx.capabilities().has(OptionalFeature::CustomBorderColorWithoutFormat) {
+        let error = ctx.create_sampler(&own).unwrap_err();
+        assert!(matches!(error, Error::Unsupported { .. }), "{error}");
+        return;
+    }
+    assert_eq!(beyond(&ctx, own.border), [0.25, 0.5, 0.75, 0.125]);
+    let limit = ctx.capabilities().limits.max_custom_borders;
+    let few = limit.min(ctx.capabilities().limits.max_bindless_samplers - 2);
+    ctx.wait_idle().unwrap();
+    let samplers: Vec<_> = (0..few).map(|_| ctx.create_sampler(&own).unwrap()).collect();
+    if few == limit {
+        let error = ctx.create_sampler(&own).unwrap_err();
+        assert!(matches!(error, Error::LimitExceeded { .. }), "{error}");
+    }
+    drop(samplers);
+    ctx.wait_idle().unwrap();
+    drop(ctx.create_sampler(&own).unwrap());
+}
+
+#[test]
+fn without_optional_features_samplers_are_refused_by_name() {
+    let hidden = lvk::DeviceProfile::core_only();
+    let Some(ctx) = lvk_tests::device::device_with(|desc| desc.profile = Some(&hidden)) else { return };
+    let refused = [
+        (nearest(AddressMode::MirrorClampToEdge), "samplerMirrorClampToEdge"),
+        (SamplerDesc { reduction: Reduction::Max, ..Default::default() }, "samplerFilterMinmax"),
+        (SamplerDesc { border: BorderColor::Custom([0.0; 4]), ..Default::default() }, "customBorderColors"),
+    ];
+    for (desc, feature) in refused {
+        let error = ctx.create_sampler(&desc).unwrap_err();
+        assert!(matches!(error, Error::Unsupported { .. }) && error.to_string().contains(feature), "{error}");
+    }
+    for format in [Format::Bc1RgbUnorm, Format::Etc2Rgb8Unorm, Format::Astc4x4Unorm, Format::A8Unorm] {
+        let error = ctx.create_texture(&TextureDesc { format, ..Default::default() }).unwrap_err();
+        assert!(matches!(error, Error::Unsupported { .. }), "{format:?}: {error}");
+    }
+}
+
+#[test]
+fn mirrors_and_reductions_take_the_texels_they_name() {
+    let Some(ctx) = device() else { return };
+    let texture = row(&ctx);
+    let optional = |feature| {
+        let has = ctx.capabilities().has(feature);
+        if !has {
+            eprintln!("NOT TESTED, the device lacks {feature:?}");
+        }
+        has
+    };
+    if optional(OptionalFeature::MirrorClampToEdge) {
+        let desc = nearest(AddressMode::MirrorClampToEdge);
+        let found = sample(&ctx, texture.index(), &desc, "(i - 5.5) / 4.0", 12);
+        assert_eq!(found, [4.0, 4.0, 4.0, 3.0, 2.0, 1.0, 1.0, 2.0, 3.0, 4.0, 4.0, 4.0]);
+    }
+    if optional(OptionalFeature::FilterMinMax) && ctx.format_support(Format::R32Float).min_max {
+        for (reduction, expected) in [(Reduction::Min, [1.0, 2.0, 3.0]), (Reduction::Max, [2.0, 3.0, 4.0])] {
+            let address = [AddressMode::ClampToEdge; 3];
+            let desc = SamplerDesc { reduction, address, ..Default::default() };
+            assert_eq!(sample(&ctx, texture.index(), &desc, "(0.9 + i) / 4.0", 3), expected, "{reduction:?}");
+        }
+    }
+}
+
+#[test]
+fn helpers_of_further_shapes_compare_and_gather() {
+    let Some(ctx) = device() else { return };
+    let values: Vec<f32> = (0..24).map(|i| i as f32 / 24.0).collect();
+    let make = |kind, format| {
+        let data = Some(bytemuck::cast_slice(&values));
+        ctx.create_texture(&TextureDesc { kind, format, extent: [2, 2], data, ..Default::default() }).unwrap()
+    };
+    let cube = make(TextureKind::Cube, Format::D32Float);
+    let array = make(TextureKind::D2Array { layers: 6 }, Format::D32Float);
+    let greater = SamplerDesc { compare: Some(CompareOp::Greater), ..nearest(AddressMode::ClampToEdge) };
+    let greater = ctx.create_sampler(&greater).unwrap();
+    let none = Dependencies::default();
+    let words = |texture: u32| [texture, greater.index(), 0];
+    // The face -Z holds texels 20 to 23 of 24, the layer 5 likewise.
+    let shadow =
+        Evaluator::new(&ctx, "vec4(textureBindlessCubeShadow(a, b, vec4(0.5, 0.5, -1, (18.5 + i) / 24.0)))");
+    let found: Vec<f32> = shadow.run(&ctx, words(cube.index()), 5, &none).iter().map(|v| v[0]).collect();
+    let first = found.iter().position(|passed| *passed == 1.0).unwrap();
+    assert!((2..=5).contains(&first) && found[first..].iter().all(|passed| *passed == 1.0), "{found:?}");
+    let shadow = Evaluator::new(
+        &ctx,
+        "vec4(textureBindless2DArrayShadow(a, b, vec4(0.25, 0.25, 5, (18.5 + i) / 24.0)))",
+    );
+    let found: Vec<f32> = shadow.run(&ctx, words(array.index()), 4, &none).iter().map(|v| v[0]).collect();
+    assert_eq!(found, [0.0, 0.0, 1.0, 1.0]);
+    let data: Vec<u8> = (0..16).collect();
+    let texture =
+        ctx.create_texture(&TextureDesc { extent: [2, 2], data: Some(&data), ..Default::default() });
+    let texture = texture.unwrap();
+    let sampler = ctx.create_sampler(&nearest(AddressMode::ClampToEdge)).unwrap();
+    let gather = Evaluator::new(&ctx, "255.0 * textureBindless2DGatherChannel(a, b, vec2(0.5), 2)");
+    let [found] = gather.run(&ctx, [texture.index(), sampler.index(), 0], 1, &none)[..] else {
+        unreachable!()
+    };
+    assert_eq!(found.map(f32::round), [10.0, 14.0, 6.0, 2.0]);
 }

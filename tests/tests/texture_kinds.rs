@@ -2,8 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    ColorAttachment, Context, Dependencies, DepthAttachment, Error, Filter, Format, Holder, RenderPassDesc,
-    TextureDesc, TextureHandle, TextureKind, TextureRegion, TextureUsage, TextureViewDesc,
+    ClearValue, ColorAttachment, Context, Dependencies, DepthAttachment, Error, Filter, Format, Holder,
+    RenderPassDesc, TextureDesc, TextureHandle, TextureKind, TextureRange, TextureRegion, TextureUsage,
+    TextureViewDesc,
 };
 use lvk_tests::compute::{Evaluator, compute_pipeline};
 use lvk_tests::device;
@@ -215,7 +216,7 @@ fn slices_are_copied_to_layers_and_back() {
     ctx.submit(cmd).unwrap();
     assert_eq!(floats(&ctx, *other, &slice(2)), texels[16..32]);
     let mut cmd = ctx.acquire_command_buffer().unwrap();
-    cmd.clear_texture(*other, [0.5; 4]).unwrap();
+    cmd.clear_texture(*other, ClearValue::Color([0.5; 4]), &TextureRange::default()).unwrap();
     ctx.submit(cmd).unwrap();
     assert_eq!(floats(&ctx, *other, &mip(0)), [0.5; 64]);
 }
@@ -420,9 +421,9 @@ fn every_sample_of_a_cleared_texture_has_the_colour_and_resolves_to_it() {
         let (format, extent) = (Format::Rgba32Float, [9, 9]);
         let resolved = texture(&ctx, &TextureDesc { format, extent, ..Default::default() });
         let mut cmd = ctx.acquire_command_buffer().unwrap();
-        cmd.clear_texture(*resolved, [2.0; 4]).unwrap();
-        cmd.clear_texture(*layers, [0.0; 4]).unwrap();
-        cmd.clear_texture(*view, color).unwrap();
+        cmd.clear_texture(*resolved, ClearValue::Color([2.0; 4]), &TextureRange::default()).unwrap();
+        cmd.clear_texture(*layers, ClearValue::Color([0.0; 4]), &TextureRange::default()).unwrap();
+        cmd.clear_texture(*view, ClearValue::Color(color), &TextureRange::default()).unwrap();
         let layer = TextureRegion { layer: 1, ..Default::default() };
         cmd.copy_texture(*layers, &layer, *copy, &TextureRegion::default()).unwrap();
         let from = TextureRegion { offset: [2, 1], extent: [3, 2], layer: 1, ..Default::default() };

@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    Channel, ColorAttachment, ColorLoad, Context, Dependencies, Error, Filter, Format, Holder,
+    Channel, ClearValue, ColorAttachment, ColorLoad, Context, Dependencies, Error, Filter, Format, Holder,
     RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, Swizzle, TextureDesc, TextureHandle,
-    TextureKind, TextureRegion, TextureUsage, TextureViewDesc,
+    TextureKind, TextureRange, TextureRegion, TextureUsage, TextureViewDesc,
 };
 use lvk_tests::compute::{Evaluator, compute_pipeline};
 use lvk_tests::device;
@@ -455,7 +455,7 @@ fn transfers_count_from_the_first_mip_and_layer_of_a_view() {
     let corner: Vec<u8> = (0..4).flat_map(|row| texels[32 * row..32 * row + 16].to_vec()).collect();
     assert_eq!(ctx.download_texture(*base, &place(2, 0)).unwrap(), corner);
     let mut cmd = ctx.acquire_command_buffer().unwrap();
-    cmd.clear_texture(*part, [1.0; 4]).unwrap();
+    cmd.clear_texture(*part, ClearValue::Color([1.0; 4]), &TextureRange::default()).unwrap();
     ctx.submit(cmd).unwrap();
     for layer in 0..5 {
         for mip in 0..4 {

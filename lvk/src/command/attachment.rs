@@ -9,8 +9,10 @@ pub enum ColorLoad {
     Load,
     /// This colour.
     Clear([f32; 4]),
-    /// These integers, for targets of an integer format.
+    /// These integers, for targets of an unsigned integer format.
     ClearUint([u32; 4]),
+    /// These integers, for targets of a signed integer format.
+    ClearSint([i32; 4]),
     /// Anything; every pixel is drawn.
     DontCare,
 }

@@ -4,6 +4,7 @@
 use std::sync::{Arc, OnceLock};
 
 use super::CommandBuffer;
+use super::transfer::BufferCopy;
 use crate::accel::AccelStruct;
 use crate::accel::build::instance_bytes;
 use crate::accel::flags::BuildFlags;
@@ -193,7 +194,11 @@ impl CommandBuffer {
         let buffer = shared.store.buffers.get(instances.buffer)?;
         let desc = BufferDesc { size_bytes: bytes, debug_name: name, ..Default::default() };
         let copy = Arc::new(Buffer::new(&shared.gpu, &desc, InternalUsage::NONE)?);
-        self.copy_buffer_objects(&buffer, instances.offset, &copy, 0, bytes)?;
+        self.copy_buffer_objects(
+            &buffer,
+            &copy,
+            &[BufferCopy { source_offset: instances.offset, target_offset: 0, size: bytes }],
+        )?;
         shared.retire(Garbage::Held(Arc::clone(&copy)));
         source.instances = SourceBytes { address: copy.address, buffer: Some(copy) };
         Ok(())

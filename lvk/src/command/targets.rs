@@ -8,7 +8,7 @@ use super::CommandBuffer;
 use super::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad};
 use crate::barrier::Use;
 use crate::error::{Error, Result, check_limit};
-use crate::format::Format;
+use crate::format::{Format, Numbers};
 use crate::handle::TextureHandle;
 use crate::resource::Texture;
 use crate::resource::texture_desc::TextureUsage;
@@ -98,12 +98,14 @@ impl CommandBuffer {
 }
 
 fn check_color(texture: &Texture, load: ColorLoad) -> Result<()> {
-    if texture.format.is_depth() {
+    if !texture.format.is_color() {
         return Err(Error::usage(&texture.name, "a depth format cannot be a colour target"));
     }
+    let numbers = texture.format.numbers();
     let fits = match load {
-        ColorLoad::Clear(_) => !texture.format.is_uint(),
-        ColorLoad::ClearUint(_) => texture.format.is_uint(),
+        ColorLoad::Clear(_) => numbers == Numbers::Float,
+        ColorLoad::ClearUint(_) => numbers == Numbers::Uint,
+        ColorLoad::ClearSint(_) => numbers == Numbers::Sint,
         ColorLoad::Load | ColorLoad::DontCare => true,
     };
     if fits {
@@ -114,7 +116,11 @@ fn check_color(texture: &Texture, load: ColorLoad) -> Result<()> {
 }
 
 fn clear_name(format: Format) -> &'static str {
-    if format.is_uint() { "ClearUint" } else { "Clear" }
+    match format.numbers() {
+        Numbers::Float => "Clear",
+        Numbers::Uint => "ClearUint",
+        Numbers::Sint => "ClearSint",
+    }
 }
 
 fn check_depth(texture: &Texture, load: DepthLoad) -> Result<()> {
@@ -137,6 +143,7 @@ fn color_info(
         ColorLoad::Load => (vk::AttachmentLoadOp::LOAD, vk::ClearColorValue::default()),
         ColorLoad::DontCare => (vk::AttachmentLoadOp::DONT_CARE, vk::ClearColorValue::default()),
         ColorLoad::Clear(float32) => (vk::AttachmentLoadOp::CLEAR, vk::ClearColorValue { float32 }),
+        ColorLoad::ClearSint(int32) => (vk::AttachmentLoadOp::CLEAR, vk::ClearColorValue { int32 }),
         ColorLoad::ClearUint(uint32) => (vk::AttachmentLoadOp::CLEAR, vk::ClearColorValue { uint32 }),
     };
     Ok(vk::RenderingAttachmentInfo::default()

@@ -2,11 +2,12 @@
 
 use super::Context;
 use super::holder::Holder;
+use crate::barrier::Subresources;
 use crate::bindless::TextureViews;
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
 use crate::resource::Texture;
-use crate::resource::texture::TextureRegion;
+use crate::resource::region::TextureRegion;
 use crate::resource::texture_desc::{TextureDesc, TextureUsage};
 use crate::resource::view::TextureViewDesc;
 
@@ -17,6 +18,7 @@ impl Context {
         let shared = self.shared();
         let slot = shared.reserve(|| shared.bindless.reserve_texture(desc.debug_name))?;
         let made = Texture::new(&shared.gpu, desc, slot).and_then(|texture| {
+            check_data(desc, texture.mips())?;
             let views = views(&texture)?;
             Ok((texture, views))
         });
@@ -58,32 +60,59 @@ impl Context {
     fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>) -> Result<()> {
         let texture = self.shared().store.textures.get(handle)?;
         let Some(data) = desc.data else {
-            if desc.generate_mips {
-                let message = "mips are generated from data; without it use CommandBuffer::generate_mipmaps";
-                return Err(Error::usage(desc.debug_name, message));
-            }
             return self.before_next_submission(|cmd| {
                 cmd.settle_texture(&texture);
                 Ok(())
             });
         };
-        let layers = texture.layers() as usize;
-        let depth = u64::from(desc.kind.depth());
-        let texels = u64::from(desc.extent[0]) * u64::from(desc.extent[1]) * depth * layers as u64;
-        let expected = texels * u64::from(desc.format.texel_bytes());
-        if data.len() as u64 != expected {
-            let message =
-                format!("mip 0 has {expected} bytes in all layers and slices, but {} were given", data.len());
-            return Err(Error::usage(desc.debug_name, message));
+        let mips = data_mips(desc, texture.mips());
+        let mut regions = Vec::with_capacity(mips as usize);
+        let mut rest = data;
+        for mip in 0..mips {
+            let region = texture.resolve_region(&TextureRegion { mip, layers: 0, ..Default::default() })?;
+            let (bytes, behind) = rest.split_at(region.bytes() as usize);
+            regions.push((region, bytes));
+            rest = behind;
         }
+        let filled = Subresources { mip_count: mips, ..texture.range };
         self.before_next_submission(|cmd| {
-            for (layer, bytes) in (0..).zip(data.chunks(data.len() / layers)) {
-                let region = TextureRegion { layer, ..Default::default() };
-                cmd.upload_texture(&texture, &region, bytes)?;
-            }
+            cmd.upload_regions(&texture, filled, &regions)?;
             if desc.generate_mips { cmd.generate_mipmaps_object(&texture) } else { Ok(()) }
         })
     }
+}
+
+/// Fails unless the first contents are as many bytes as they should be. The texture has so many mips.
+pub(super) fn check_data(desc: &TextureDesc<'_>, mips: u32) -> Result<()> {
+    let wrong = |message: String| Err(Error::usage(desc.debug_name, message));
+    let Some(data) = desc.data else {
+        return match desc.generate_mips {
+            true => wrong(
+                "mips are generated from data; without it use CommandBuffer::generate_mipmaps".to_owned(),
+            ),
+            false => Ok(()),
+        };
+    };
+    let count = data_mips(desc, mips);
+    if count > mips || (desc.generate_mips && count != 1) {
+        return wrong(format!(
+            "the data has {count} mips; the texture has {mips}, and others are generated from one alone"
+        ));
+    }
+    let sizes = (0..count).map(|mip| {
+        let [width, height] = desc.extent.map(|side| (side >> mip).max(1));
+        desc.format.bytes([width, height, (desc.kind.depth() >> mip).max(1)])
+    });
+    let expected = sizes.fold(0, u64::saturating_add).saturating_mul(desc.kind.layers().into());
+    if data.len() as u64 == expected {
+        return Ok(());
+    }
+    let given = data.len();
+    wrong(format!("{count} mips have {expected} bytes in all layers and slices, but {given} were given"))
+}
+
+fn data_mips(desc: &TextureDesc<'_>, mips: u32) -> u32 {
+    if desc.data_mips == 0 { mips } else { desc.data_mips }
 }
 
 fn views(texture: &Texture) -> Result<TextureViews> {

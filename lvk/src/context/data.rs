@@ -3,12 +3,13 @@
 use std::sync::Arc;
 
 use super::Context;
+use crate::command::transfer::BufferCopy;
 use crate::error::Result;
 use crate::gpu::memory::MemoryKind;
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
-use crate::resource::texture::TextureRegion;
+use crate::resource::region::TextureRegion;
 use crate::shared::Garbage;
 
 impl Context {
@@ -44,23 +45,28 @@ impl Context {
             return Ok(());
         }
         let size = bytes.len() as u64;
-        self.read_back(size, bytes, |cmd, target| cmd.copy_buffer_objects(&buffer, offset, target, 0, size))
+        self.read_back(size, bytes, |cmd, target| {
+            cmd.copy_buffer_objects(
+                &buffer,
+                target,
+                &[BufferCopy { source_offset: offset, target_offset: 0, size }],
+            )
+        })
     }
 
-    /// Writes texels, rows tightly packed, before the next submission.
+    /// Writes texels, tightly packed, row by row and layer by layer, before the next submission.
     pub fn upload_texture(&self, texture: TextureHandle, region: &TextureRegion, bytes: &[u8]) -> Result<()> {
         let textures = &self.shared().store.textures;
         self.before_next_submission(|cmd| cmd.upload_texture(&textures.get(texture)?, region, bytes))
     }
 
-    /// Reads texels, rows tightly packed, after everything submitted so far. Waits for the GPU.
+    /// Reads texels, tightly packed, row by row and layer by layer, after everything submitted so far. Waits for the GPU.
     pub fn download_texture(&self, texture: TextureHandle, region: &TextureRegion) -> Result<Vec<u8>> {
         let texture = self.shared().store.textures.get(texture)?;
-        let region = texture.resolve_region(region)?;
-        let size = region.texels() * u64::from(texture.format.texel_bytes());
+        let size = texture.resolve_region(region)?.bytes();
         let mut bytes = vec![0; size as usize];
         self.read_back(size, &mut bytes, |cmd, target| {
-            cmd.copy_texture_objects_to_buffer(&texture, &region, target, 0)
+            cmd.copy_texture_objects_to_buffer(&texture, region, target, 0)
         })?;
         Ok(bytes)
     }

@@ -22,6 +22,7 @@ pub(crate) mod serialize;
 mod software_blas;
 mod start;
 mod submit;
+mod support;
 #[cfg(feature = "test-hooks")]
 pub mod test_hooks;
 

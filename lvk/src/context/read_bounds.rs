@@ -8,6 +8,7 @@ use super::Context;
 use crate::accel::bounds::{Bounds, BoxBytes, IndexBytes, TriangleBytes, VertexBytes};
 use crate::accel::desc::BlasDesc;
 use crate::accel::geometry::{BlasGeometry, GeometryTransform, Triangles};
+use crate::command::transfer::BufferCopy;
 use crate::error::Result;
 use crate::format::IndexFormat;
 use crate::handle::BufferHandle;
@@ -74,7 +75,15 @@ impl Context {
                 for (index, part) in overlaps(ranges, start..start + size) {
                     let (buffer, offset) = &list[index];
                     let from = offset + (part.start - ranges[index].start);
-                    cmd.copy_buffer_objects(buffer, from, target, part.start - start, part.end - part.start)?;
+                    cmd.copy_buffer_objects(
+                        buffer,
+                        target,
+                        &[BufferCopy {
+                            source_offset: from,
+                            target_offset: part.start - start,
+                            size: part.end - part.start,
+                        }],
+                    )?;
                 }
                 Ok(())
             })?;

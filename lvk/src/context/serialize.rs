@@ -17,6 +17,7 @@ use crate::accel::geometry::{BlasGeometry, GeometryFlags};
 use crate::accel::primitive_map::{cover_mesh, table_lists};
 use crate::accel::raw_structure::RawStructure;
 use crate::accel::split::PartPlan;
+use crate::command::transfer::BufferCopy;
 use crate::error::{Error, Result};
 use crate::format::IndexFormat;
 use crate::handle::AccelStructHandle;
@@ -138,7 +139,11 @@ impl Context {
         self.read_back(places.total, &mut bytes, |cmd, target| {
             self.shared().retire(Garbage::Buffer(Arc::clone(&buffer)));
             cmd.serialize_parts(object, body, &buffer, &addresses)?;
-            cmd.copy_buffer_objects(&buffer, base - buffer.address, target, 0, places.total)
+            cmd.copy_buffer_objects(
+                &buffer,
+                target,
+                &[BufferCopy { source_offset: base - buffer.address, target_offset: 0, size: places.total }],
+            )
         })?;
         let part = |(offset, size): (&u64, &u64)| bytes[*offset as usize..][..*size as usize].to_vec();
         Ok(places.offsets.iter().zip(sizes).map(part).collect())
@@ -151,7 +156,13 @@ impl Context {
         let mut words = vec![0_u32; shape.counts.len() + count];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut words);
         let size = bytes.len() as u64;
-        self.read_back(size, bytes, |cmd, target| cmd.copy_buffer_objects(&map.table, 0, target, 0, size))?;
+        self.read_back(size, bytes, |cmd, target| {
+            cmd.copy_buffer_objects(
+                &map.table,
+                target,
+                &[BufferCopy { source_offset: 0, target_offset: 0, size }],
+            )
+        })?;
         Ok(Some(words))
     }
 

@@ -14,6 +14,7 @@ use crate::accel::blob::Blob;
 use crate::accel::desc::BlasDesc;
 use crate::accel::software::blas::{Origin, SoftwareBlas, builds_on_gpu, gpu_plan, refit_plan};
 use crate::accel::software::body::SoftwareBody;
+use crate::command::transfer::BufferCopy;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::shared::Garbage;
@@ -88,7 +89,11 @@ impl Context {
         bytes[..MARK.len()].copy_from_slice(&MARK);
         self.read_back(size, &mut bytes[MARK.len()..], |cmd, target| {
             cmd.read_software_blas(body);
-            cmd.copy_buffer_objects(body.buffer(), body.offset(), target, 0, size)
+            cmd.copy_buffer_objects(
+                body.buffer(),
+                target,
+                &[BufferCopy { source_offset: body.offset(), target_offset: 0, size }],
+            )
         })?;
         Ok(bytes)
     }

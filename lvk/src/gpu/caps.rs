@@ -168,6 +168,12 @@ impl Capabilities {
 /// Limits of the device, in the unit of each name.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Limits {
+    /// Most that the level of detail of a sampler can be biased, in either direction (`maxSamplerLodBias`).
+    pub max_lod_bias: f32,
+    /// Most samplers with a border colour of their own (`maxCustomBorderColorSamplers`).
+    pub max_custom_borders: u32,
+    /// Longest row, in texels (`maxImageDimension1D`).
+    pub max_texture_1d: u32,
     /// Widest 2D texture, in texels a side (`maxImageDimension2D`).
     pub max_texture_2d: u32,
     /// Widest and deepest volume, in texels a side (`maxImageDimension3D`).
@@ -355,6 +361,7 @@ impl PhysicalDevice {
         let mut accel = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
         let mut pipeline = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
         let mut mesh = vk::PhysicalDeviceMeshShaderPropertiesEXT::default();
+        let mut borders = vk::PhysicalDeviceCustomBorderColorPropertiesEXT::default();
         let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
         let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
         let mut v13 = vk::PhysicalDeviceVulkan13Properties::default();
@@ -371,6 +378,9 @@ impl PhysicalDevice {
         if self.capabilities.mesh_shader {
             all = all.push_next(&mut mesh);
         }
+        if self.capabilities.has(OptionalFeature::CustomBorderColors) {
+            all = all.push_next(&mut borders);
+        }
         // SAFETY: the chain holds only structures the device knows, and lives until the call returns.
         unsafe { instance.get_physical_device_properties2(self.raw, &mut all) };
         self.features.subgroups = Subgroups {
@@ -386,6 +396,7 @@ impl PhysicalDevice {
         caps.helpers_lose_arrays = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.limits = limits(&plain.limits, &v12, &v13, &accel, &pipeline);
         caps.limits.mesh = MeshLimits::of(&mesh);
+        caps.limits.max_custom_borders = borders.max_custom_border_color_samplers;
     }
 }
 
@@ -448,6 +459,9 @@ fn limits(
 ) -> Limits {
     let accel_bytes = accel_bytes(v12.driver_id, plain.max_storage_buffer_range, v13.max_buffer_size);
     let mut limits = Limits {
+        max_lod_bias: plain.max_sampler_lod_bias,
+        max_custom_borders: 0,
+        max_texture_1d: plain.max_image_dimension1_d,
         max_texture_2d: plain.max_image_dimension2_d,
         max_texture_3d: plain.max_image_dimension3_d,
         max_texture_cube: plain.max_image_dimension_cube,

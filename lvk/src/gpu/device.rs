@@ -1,6 +1,7 @@
 //! Chooses a physical device and makes the logical one, with its queue and its memory allocator.
 
 use std::ffi::CStr;
+use std::sync::atomic::AtomicU32;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
@@ -50,6 +51,8 @@ pub(crate) struct Gpu {
     pub(crate) mesh: Option<ash::ext::mesh_shader::Device>,
     /// Reads the clocks of device and host together.
     pub(crate) host_clock: Option<HostClock>,
+    /// Samplers alive with a border colour of their own, of which a device has few.
+    pub(crate) custom_borders: AtomicU32,
     physical: vk::PhysicalDevice,
     /// Takes names and labels; present where somebody reads them, as each name costs as much as a small buffer.
     pub(super) debug_utils: Option<ash::ext::debug_utils::Device>,
@@ -91,6 +94,7 @@ impl Gpu {
                 .then(|| ash::ext::device_fault::Device::new(raw, &device)),
             allocator: Mutex::new(Some(allocator)),
             queue: Mutex::new(queue),
+            custom_borders: AtomicU32::new(0),
             physical: chosen.raw,
             device,
             caps,
@@ -190,21 +194,6 @@ impl Gpu {
                 info.flags,
             )
         }
-    }
-
-    /// What the device can do with images of `format` in optimal tiling.
-    pub(crate) fn image_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
-        self.format_properties(format).optimal_tiling_features
-    }
-
-    /// What the device can do with buffers of `format`.
-    pub(crate) fn buffer_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
-        self.format_properties(format).buffer_features
-    }
-
-    fn format_properties(&self, format: vk::Format) -> vk::FormatProperties {
-        // SAFETY: the physical device belongs to the instance.
-        unsafe { self.instance.raw.get_physical_device_format_properties(self.physical, format) }
     }
 }
 

@@ -58,8 +58,8 @@ pub(super) fn check(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderMo
 }
 
 fn check_color(gpu: &Gpu, name: &str, target: &ColorTarget) -> Result<()> {
-    let features = gpu.image_features(target.format.raw());
-    if target.format.is_depth() || !features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT) {
+    let features = gpu.format_features(target.format);
+    if !target.format.is_color() || !features.contains(vk::FormatFeatureFlags::COLOR_ATTACHMENT) {
         let what = format!("{:?} as a colour target of '{name}'", target.format);
         return Err(Error::unsupported(what, "the device cannot draw to it; choose another format"));
     }
@@ -71,7 +71,7 @@ fn check_color(gpu: &Gpu, name: &str, target: &ColorTarget) -> Result<()> {
 }
 
 fn check_depth(gpu: &Gpu, name: &str, format: Format) -> Result<()> {
-    let features = gpu.image_features(format.raw());
+    let features = gpu.format_features(format);
     if features.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT) {
         return Ok(());
     }

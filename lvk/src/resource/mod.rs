@@ -1,15 +1,20 @@
 //! Resources: one file for each kind of object, with its description, creation and end.
 
 pub(crate) mod buffer;
+pub(crate) mod format_support;
 pub(crate) mod image;
+mod image_check;
 pub(crate) mod query;
 pub(crate) mod query_marks;
+pub(crate) mod region;
 pub(crate) mod sampler;
+pub(crate) mod swizzle;
 pub(crate) mod texture;
 pub(crate) mod texture_desc;
 pub(crate) mod view;
 
 pub(crate) use buffer::Buffer;
+pub(crate) use image_check::check as check_image;
 pub(crate) use query::QueryPool;
 pub(crate) use sampler::Sampler;
 pub(crate) use texture::Texture;

@@ -1,11 +1,13 @@
 //! Samplers.
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use ash::vk;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
+use crate::gpu::optional::OptionalFeature;
 
 /// How texels are interpolated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -15,6 +17,15 @@ pub enum Filter {
     /// Linear interpolation.
     #[default]
     Linear,
+}
+
+impl Filter {
+    pub(crate) fn raw(self) -> vk::Filter {
+        match self {
+            Self::Nearest => vk::Filter::NEAREST,
+            Self::Linear => vk::Filter::LINEAR,
+        }
+    }
 }
 
 /// What lies outside of 0..1.
@@ -27,8 +38,82 @@ pub enum AddressMode {
     MirroredRepeat,
     /// The texel at the edge.
     ClampToEdge,
-    /// Transparent black.
+    /// The [`border`](SamplerDesc::border) of the sampler.
     ClampToBorder,
+    /// The texture mirrored once, then the texel at the edge
+    /// ([`OptionalFeature::MirrorClampToEdge`](crate::OptionalFeature)).
+    MirrorClampToEdge,
+}
+
+/// What lies beyond the edge of a texture under [`AddressMode::ClampToBorder`]. Textures of integers take those whose names
+/// say so, all others the rest.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum BorderColor {
+    /// All channels 0.
+    #[default]
+    TransparentBlack,
+    /// Channels 0, alpha 1.
+    OpaqueBlack,
+    /// All channels 1.
+    OpaqueWhite,
+    /// All channels 0, of integers.
+    TransparentBlackInteger,
+    /// Channels 0, alpha 1, of integers.
+    OpaqueBlackInteger,
+    /// All channels 1, of integers.
+    OpaqueWhiteInteger,
+    /// Any colour ([`OptionalFeature::CustomBorderColorWithoutFormat`](crate::OptionalFeature)); a device has
+    /// [few](crate::Limits::max_custom_borders) such samplers at a time.
+    Custom([f32; 4]),
+    /// The same of integers.
+    CustomInteger([u32; 4]),
+}
+
+impl BorderColor {
+    fn raw(self) -> vk::BorderColor {
+        match self {
+            Self::TransparentBlack => vk::BorderColor::FLOAT_TRANSPARENT_BLACK,
+            Self::OpaqueBlack => vk::BorderColor::FLOAT_OPAQUE_BLACK,
+            Self::OpaqueWhite => vk::BorderColor::FLOAT_OPAQUE_WHITE,
+            Self::TransparentBlackInteger => vk::BorderColor::INT_TRANSPARENT_BLACK,
+            Self::OpaqueBlackInteger => vk::BorderColor::INT_OPAQUE_BLACK,
+            Self::OpaqueWhiteInteger => vk::BorderColor::INT_OPAQUE_WHITE,
+            Self::Custom(_) => vk::BorderColor::FLOAT_CUSTOM_EXT,
+            Self::CustomInteger(_) => vk::BorderColor::INT_CUSTOM_EXT,
+        }
+    }
+
+    /// The colour, where it is the caller's own.
+    fn custom(self) -> Option<vk::ClearColorValue> {
+        match self {
+            Self::Custom(float32) => Some(vk::ClearColorValue { float32 }),
+            Self::CustomInteger(uint32) => Some(vk::ClearColorValue { uint32 }),
+            _ => None,
+        }
+    }
+}
+
+/// What becomes of the texels that a filter reads (`VkSamplerReductionMode`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Reduction {
+    /// Their weighted mean.
+    #[default]
+    Mean,
+    /// The least of those with a weight, channel by channel, for formats with
+    /// [`FormatSupport::min_max`](crate::FormatSupport).
+    Min,
+    /// The greatest.
+    Max,
+}
+
+impl Reduction {
+    fn raw(self) -> vk::SamplerReductionMode {
+        match self {
+            Self::Mean => vk::SamplerReductionMode::WEIGHTED_AVERAGE,
+            Self::Min => vk::SamplerReductionMode::MIN,
+            Self::Max => vk::SamplerReductionMode::MAX,
+        }
+    }
 }
 
 /// A comparison, of depths or of a reference with a texel.
@@ -83,7 +168,11 @@ pub struct SamplerDesc<'a> {
     pub max_anisotropy: f32,
     /// Makes a comparison sampler, read through `kSamplersShadow[]`.
     pub compare: Option<CompareOp>,
-    /// Added to the level of detail.
+    /// What lies beyond the edge where an address clamps to the border.
+    pub border: BorderColor,
+    /// What becomes of the texels that are read; not beside a comparison.
+    pub reduction: Reduction,
+    /// Added to the level of detail; at most [`Limits::max_lod_bias`](crate::Limits), in either direction.
     pub lod_bias: f32,
     /// Smallest and largest level of detail.
     pub lod_range: [f32; 2],
@@ -100,6 +189,8 @@ impl Default for SamplerDesc<'_> {
             address: [AddressMode::Repeat; 3],
             max_anisotropy: 1.0,
             compare: None,
+            border: BorderColor::TransparentBlack,
+            reduction: Reduction::Mean,
             lod_bias: 0.0,
             lod_range: [0.0, vk::LOD_CLAMP_NONE],
             debug_name: "sampler",
@@ -112,37 +203,33 @@ pub(crate) struct Sampler {
     pub(crate) raw: vk::Sampler,
     pub(crate) slot: u32,
     pub(crate) name: String,
+    /// Given back after the sampler is gone.
+    _custom_border: Option<CustomBorder>,
     gpu: Arc<Gpu>,
 }
 
 impl Sampler {
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &SamplerDesc<'_>, slot: u32) -> Result<Self> {
-        let [min_lod, max_lod] = desc.lod_range;
-        let numbers = [min_lod, max_lod, desc.lod_bias, desc.max_anisotropy];
-        if numbers.iter().any(|n| n.is_nan()) || min_lod > max_lod {
-            let message = "level of detail, bias and anisotropy must be numbers, and the range in order";
-            return Err(Error::usage(desc.debug_name, message));
+        check(gpu, desc)?;
+        let custom = desc.border.custom();
+        let custom_border = custom.map(|_| CustomBorder::take(gpu, desc.debug_name)).transpose()?;
+        let mut border = vk::SamplerCustomBorderColorCreateInfoEXT::default()
+            .custom_border_color(custom.unwrap_or_default());
+        let mut reduction =
+            vk::SamplerReductionModeCreateInfo::default().reduction_mode(desc.reduction.raw());
+        let mut info = info(desc, gpu.caps.max_anisotropy);
+        if custom_border.is_some() {
+            info = info.push_next(&mut border);
         }
-        let anisotropy = desc.max_anisotropy.clamp(1.0, gpu.caps.max_anisotropy);
-        let info = vk::SamplerCreateInfo::default()
-            .mag_filter(filter(desc.mag_filter))
-            .min_filter(filter(desc.min_filter))
-            .mipmap_mode(mip_mode(desc.mip_filter))
-            .address_mode_u(address(desc.address[0]))
-            .address_mode_v(address(desc.address[1]))
-            .address_mode_w(address(desc.address[2]))
-            .anisotropy_enable(anisotropy > 1.0)
-            .max_anisotropy(anisotropy)
-            .compare_enable(desc.compare.is_some())
-            .compare_op(desc.compare.unwrap_or_default().raw())
-            .mip_lod_bias(desc.lod_bias.clamp(-2.0, 2.0))
-            .min_lod(min_lod)
-            .max_lod(max_lod);
-        // SAFETY: the description is valid.
+        if desc.reduction != Reduction::Mean {
+            info = info.push_next(&mut reduction);
+        }
+        // SAFETY: the description is valid, and the features it needs are on.
         let raw =
             unsafe { gpu.device.create_sampler(&info, None) }.map_err(Error::vulkan("vkCreateSampler"))?;
         gpu.name(raw, desc.debug_name);
-        Ok(Self { raw, slot, name: desc.debug_name.to_owned(), gpu: Arc::clone(gpu) })
+        let name = desc.debug_name.to_owned();
+        Ok(Self { raw, slot, name, _custom_border: custom_border, gpu: Arc::clone(gpu) })
     }
 }
 
@@ -153,11 +240,72 @@ impl Drop for Sampler {
     }
 }
 
-fn filter(filter: Filter) -> vk::Filter {
-    match filter {
-        Filter::Nearest => vk::Filter::NEAREST,
-        Filter::Linear => vk::Filter::LINEAR,
+/// One of the few border colours that the device can keep.
+struct CustomBorder(Arc<Gpu>);
+
+impl CustomBorder {
+    fn take(gpu: &Arc<Gpu>, name: &str) -> Result<Self> {
+        let limit = gpu.caps.limits.max_custom_borders;
+        let taken = gpu.custom_borders.fetch_add(1, Ordering::Relaxed);
+        let own = Self(Arc::clone(gpu));
+        let what = "number of samplers with a border colour of their own";
+        check_limit(name, what, u64::from(taken) + 1, limit.into())?;
+        Ok(own)
     }
+}
+
+impl Drop for CustomBorder {
+    fn drop(&mut self) {
+        self.0.custom_borders.fetch_sub(1, Ordering::Relaxed);
+    }
+}
+
+/// Fails unless the device can make the sampler.
+fn check(gpu: &Gpu, desc: &SamplerDesc<'_>) -> Result<()> {
+    let wrong = |message: &str| Err(Error::usage(desc.debug_name, message));
+    let [min_lod, max_lod] = desc.lod_range;
+    let numbers = [min_lod, max_lod, desc.lod_bias, desc.max_anisotropy];
+    if numbers.iter().any(|n| n.is_nan()) || min_lod > max_lod {
+        return wrong("level of detail, bias and anisotropy must be numbers, and the range in order");
+    }
+    let limit = gpu.caps.limits.max_lod_bias;
+    if desc.lod_bias.abs() > limit {
+        return wrong(&format!("the level of detail can be biased by {limit}, not by {}", desc.lod_bias));
+    }
+    if desc.compare.is_some() && desc.reduction != Reduction::Mean {
+        return wrong("what comparisons answer is only averaged; leave the reduction at Mean");
+    }
+    let needed = [
+        (desc.address.contains(&AddressMode::MirrorClampToEdge), OptionalFeature::MirrorClampToEdge),
+        (desc.reduction != Reduction::Mean, OptionalFeature::FilterMinMax),
+        (desc.border.custom().is_some(), OptionalFeature::CustomBorderColors),
+        (desc.border.custom().is_some(), OptionalFeature::CustomBorderColorWithoutFormat),
+    ];
+    match needed.into_iter().find(|(needs, feature)| *needs && !gpu.caps.has(*feature)) {
+        None => Ok(()),
+        Some((_, feature)) => {
+            Err(gpu.lacks(&format!("sampler '{}': {}", desc.debug_name, feature.vulkan_name())))
+        }
+    }
+}
+
+fn info(desc: &SamplerDesc<'_>, max_anisotropy: f32) -> vk::SamplerCreateInfo<'static> {
+    let anisotropy = desc.max_anisotropy.clamp(1.0, max_anisotropy);
+    vk::SamplerCreateInfo::default()
+        .mag_filter(desc.mag_filter.raw())
+        .min_filter(desc.min_filter.raw())
+        .mipmap_mode(mip_mode(desc.mip_filter))
+        .address_mode_u(address(desc.address[0]))
+        .address_mode_v(address(desc.address[1]))
+        .address_mode_w(address(desc.address[2]))
+        .anisotropy_enable(anisotropy > 1.0)
+        .max_anisotropy(anisotropy)
+        .compare_enable(desc.compare.is_some())
+        .compare_op(desc.compare.unwrap_or_default().raw())
+        .border_color(desc.border.raw())
+        .mip_lod_bias(desc.lod_bias)
+        .min_lod(desc.lod_range[0])
+        .max_lod(desc.lod_range[1])
 }
 
 fn mip_mode(filter: Filter) -> vk::SamplerMipmapMode {
@@ -173,5 +321,6 @@ fn address(mode: AddressMode) -> vk::SamplerAddressMode {
         AddressMode::MirroredRepeat => vk::SamplerAddressMode::MIRRORED_REPEAT,
         AddressMode::ClampToEdge => vk::SamplerAddressMode::CLAMP_TO_EDGE,
         AddressMode::ClampToBorder => vk::SamplerAddressMode::CLAMP_TO_BORDER,
+        AddressMode::MirrorClampToEdge => vk::SamplerAddressMode::MIRROR_CLAMP_TO_EDGE,
     }
 }

@@ -4,30 +4,16 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::image::{Image, check_cube_arrays, raw_usage};
+use super::image::{Image, raw_usage};
+use super::image_check::check_cube_arrays;
+use super::region::{Bounds, Region, TextureRange, TextureRegion};
+use super::swizzle::Swizzle;
 use super::texture_desc::{TextureDesc, TextureKind, TextureUsage};
-use super::view::{Swizzle, TextureViewDesc, ViewCache, ViewInfo, raw_kind};
+use super::view::{TextureViewDesc, ViewCache, ViewInfo, raw_kind};
 use crate::barrier::Subresources;
 use crate::error::{Error, Result};
-use crate::format::Format;
+use crate::format::{Aspect, Format, Part};
 use crate::gpu::Gpu;
-
-/// Part of a texture: a rectangle of one mip of one layer, or a box of one mip of a volume.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct TextureRegion {
-    /// Mip level; of a view, counted from its first.
-    pub mip: u32,
-    /// Layer or cube face; of a view, counted from its first.
-    pub layer: u32,
-    /// First column and row, in texels.
-    pub offset: [u32; 2],
-    /// Width and height in texels; `[0, 0]` is everything from `offset` on.
-    pub extent: [u32; 2],
-    /// First slice of a volume; 0 for everything else.
-    pub z: u32,
-    /// Number of slices; 0 is all from `z` on. 0 or 1 for everything but volumes.
-    pub depth: u32,
-}
 
 /// Mips and layers of an image as one kind and format. Several textures may show the same image.
 pub(crate) struct Texture {
@@ -41,6 +27,8 @@ pub(crate) struct Texture {
     pub(crate) usage: TextureUsage,
     pub(crate) slot: u32,
     pub(crate) name: String,
+    /// Which part of the texels of the image.
+    aspect: Aspect,
     swizzle: Swizzle,
 }
 
@@ -56,7 +44,8 @@ impl Texture {
             usage: image.usage_in(desc.format),
             slot,
             name: desc.debug_name.to_owned(),
-            swizzle: Swizzle::IDENTITY,
+            aspect: Aspect::Main,
+            swizzle: desc.swizzle,
             image,
         })
     }
@@ -73,6 +62,7 @@ impl Texture {
             usage: shown.usage,
             slot,
             name: desc.debug_name.to_owned(),
+            aspect: shown.aspect,
             swizzle: desc.swizzle.after(self.swizzle),
         })
     }
@@ -121,12 +111,13 @@ impl Texture {
         usage: TextureUsage,
     ) -> Result<vk::ImageView> {
         let drawn = usage == TextureUsage::TARGET;
+        let sampled = usage == TextureUsage::SAMPLED;
         let info = ViewInfo {
             kind,
             format: self.format,
-            aspect: if drawn { self.format.aspects() } else { self.format.sampled_aspect() },
+            aspect: if drawn { self.shown_aspects() } else { self.part_of(Aspect::Main)?.aspect },
             range,
-            swizzle: self.swizzle,
+            swizzle: if sampled { self.swizzle } else { Swizzle::IDENTITY },
             usage: raw_usage(usage, self.format),
         };
         self.views.get(&self.image, info, &self.name)
@@ -158,26 +149,51 @@ impl Texture {
         }
     }
 
-    /// The same as copies and blits name it.
-    pub(crate) fn layers_of(&self, mip: u32, layer: u32) -> vk::ImageSubresourceLayers {
-        let part = self.part(mip, layer);
-        vk::ImageSubresourceLayers {
-            aspect_mask: self.image.format.sampled_aspect(),
-            mip_level: part.base_mip,
-            base_array_layer: part.base_layer,
-            layer_count: 1,
-        }
-    }
-
     /// Width and height of a mip.
     pub(crate) fn mip_extent(&self, mip: u32) -> [u32; 2] {
-        let mip = self.range.base_mip.saturating_add(mip).min(31);
-        self.image.extent.map(|side| (side >> mip).max(1))
+        let [width, height, _] = self.bounds().mip_extent(mip);
+        [width, height]
     }
 
     /// Slices of a mip: 1 for all but volumes.
     pub(crate) fn mip_depth(&self, mip: u32) -> u32 {
-        (self.image.depth >> self.range.base_mip.saturating_add(mip).min(31)).max(1)
+        self.bounds().mip_extent(mip)[2]
+    }
+
+    /// What regions lie in.
+    pub(crate) fn bounds(&self) -> Bounds {
+        let [width, height] = self.image.extent;
+        Bounds { shown: self.range, extent: [width, height, self.image.depth] }
+    }
+
+    /// All aspects that the texture shows.
+    pub(crate) fn shown_aspects(&self) -> vk::ImageAspectFlags {
+        match self.aspect {
+            Aspect::Main => self.image.format.aspects(),
+            Aspect::Stencil => vk::ImageAspectFlags::STENCIL,
+        }
+    }
+
+    /// An aspect of what the texture shows, as copies move it.
+    pub(crate) fn part_of(&self, aspect: Aspect) -> Result<Part> {
+        let own = if self.aspect == Aspect::Main { aspect } else { self.aspect };
+        let shown = aspect == Aspect::Main || aspect == own;
+        self.image.format.part(own).filter(|_| shown).ok_or_else(|| {
+            let message =
+                format!("{:?} with the aspect {:?} has no {aspect:?}", self.image.format, self.aspect);
+            Error::usage(&self.name, message)
+        })
+    }
+
+    /// Checks a region and resolves its sizes.
+    pub(crate) fn resolve_region(&self, region: &TextureRegion) -> Result<Region> {
+        let part = self.part_of(region.aspect)?;
+        self.bounds().resolve(region, part).map_err(|message| Error::usage(&self.name, message))
+    }
+
+    /// Checks a range of mips and layers and resolves it.
+    pub(crate) fn resolve_range(&self, range: &TextureRange) -> Result<Subresources> {
+        self.bounds().resolve_range(range).map_err(|message| Error::usage(&self.name, message))
     }
 
     /// Fails unless the mip and the layer exist.
@@ -189,29 +205,6 @@ impl Texture {
         let message =
             format!("mip {mip} of layer {layer} does not exist: it has {mips} mips and {layers} layers");
         Err(Error::usage(&self.name, message))
-    }
-
-    /// Checks a region and resolves its extent and depth.
-    pub(crate) fn resolve_region(&self, region: &TextureRegion) -> Result<TextureRegion> {
-        self.check_subresource(region.mip, region.layer)?;
-        let ([width, height], depth) = (self.mip_extent(region.mip), self.mip_depth(region.mip));
-        let [columns, rows] = region.extent;
-        let sides = if (columns == 0) == (rows == 0) {
-            let columns = resolve_side(region.offset[0], columns, width);
-            let rows = resolve_side(region.offset[1], rows, height);
-            columns.zip(rows).zip(resolve_side(region.z, region.depth, depth))
-        } else {
-            None
-        };
-        match sides {
-            Some(((columns, rows), depth)) => Ok(TextureRegion { extent: [columns, rows], depth, ..*region }),
-            None => {
-                let message = format!(
-                    "region {region:?} does not lie inside the mip's {width} x {height} x {depth} texels"
-                );
-                Err(Error::usage(&self.name, message))
-            }
-        }
     }
 
     /// Fails unless the texture was created with `usage`.
@@ -238,18 +231,6 @@ impl Texture {
         let message =
             format!("{what} texels of one sample, not of {}; resolve them first", self.image.samples);
         Err(Error::usage(&self.name, message))
-    }
-
-    /// The buffer copy of a resolved region whose bytes start at `buffer_offset`, tightly packed.
-    pub(crate) fn buffer_copy(&self, region: &TextureRegion, buffer_offset: u64) -> vk::BufferImageCopy {
-        vk::BufferImageCopy {
-            buffer_offset,
-            buffer_row_length: 0,
-            buffer_image_height: 0,
-            image_subresource: self.layers_of(region.mip, region.layer),
-            image_offset: region.raw_offset(),
-            image_extent: region.raw_extent(),
-        }
     }
 
     /// Decides what a view of the texture shows.
@@ -287,17 +268,26 @@ impl Texture {
         if !self.image.has_format(format) {
             return wrong(format!("list {format:?} in the view_formats of the texture of '{}'", self.name));
         }
-        let stays = desc.swizzle.after(self.swizzle) == Swizzle::IDENTITY;
-        let allowed = if stays { allowed } else { allowed & TextureUsage::SAMPLED };
+        let aspect = if desc.aspect == Aspect::Main { self.aspect } else { desc.aspect };
+        if self.image.format.part(aspect).is_none() {
+            return wrong(format!("'{}' is {:?}, which has no {aspect:?}", self.name, self.image.format));
+        }
+        let shows_all = aspect == Aspect::Main && desc.swizzle.after(self.swizzle) == Swizzle::IDENTITY;
+        let changes_nothing = aspect == self.aspect && desc.swizzle == Swizzle::IDENTITY;
+        let allowed = match (shows_all, changes_nothing) {
+            (true, _) => allowed,
+            (false, true) => allowed & self.usage,
+            (false, false) => allowed & TextureUsage::SAMPLED,
+        };
         let usage = desc.usage.unwrap_or(allowed);
         if usage.is_empty() || !allowed.contains(usage) {
-            let swizzled = if stays { "" } else { ", with a swizzle" };
+            let swizzled = if shows_all { "" } else { ", with a swizzle or of its stencil" };
             return wrong(format!(
                 "'{}' as {format:?}{swizzled} can be used for {allowed:?}, not for {usage:?}",
                 self.name
             ));
         }
-        Ok(Shown { kind, format, range, usage })
+        Ok(Shown { kind, format, range, usage, aspect })
     }
 
     /// The mips and layers of a view, as part of the image.
@@ -333,38 +323,5 @@ struct Shown {
     format: Format,
     range: Subresources,
     usage: TextureUsage,
-}
-
-impl TextureRegion {
-    /// Texels of the region, once resolved.
-    pub(crate) fn texels(&self) -> u64 {
-        u64::from(self.extent[0]) * u64::from(self.extent[1]) * u64::from(self.depth)
-    }
-
-    /// The first corner.
-    pub(crate) fn raw_offset(&self) -> vk::Offset3D {
-        vk::Offset3D { x: self.offset[0] as i32, y: self.offset[1] as i32, z: self.z as i32 }
-    }
-
-    /// Size of a resolved region.
-    pub(crate) fn raw_extent(&self) -> vk::Extent3D {
-        vk::Extent3D { width: self.extent[0], height: self.extent[1], depth: self.depth }
-    }
-
-    /// First corner of a resolved region and the one behind its last.
-    pub(crate) fn raw_corners(&self) -> [vk::Offset3D; 2] {
-        let vk::Offset3D { x, y, z } = self.raw_offset();
-        let [width, height] = self.extent.map(|side| side as i32);
-        [self.raw_offset(), vk::Offset3D { x: x + width, y: y + height, z: z + self.depth as i32 }]
-    }
-}
-
-/// How many of the texels of a side from `offset` on a region takes, all of them where `count` is 0; `None` where there
-/// are not so many.
-fn resolve_side(offset: u32, count: u32, whole: u32) -> Option<u32> {
-    let rest = whole.checked_sub(offset).filter(|rest| *rest > 0)?;
-    match count {
-        0 => Some(rest),
-        count => (count <= rest).then_some(count),
-    }
+    aspect: Aspect,
 }

@@ -2,6 +2,7 @@
 
 use bitflags::bitflags;
 
+use super::swizzle::Swizzle;
 use crate::format::Format;
 
 bitflags! {
@@ -20,6 +21,9 @@ bitflags! {
 /// Shape of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum TextureKind {
+    /// One row of texels, which is not drawn to: an element of what `LVK_TEXTURES(texture1D, kTextures1D)` declares in a
+    /// shader.
+    D1,
     /// One 2D image: an element of `kTextures2D[]`.
     #[default]
     D2,
@@ -47,7 +51,7 @@ impl TextureKind {
     /// Images of one mip; faces of cubes count each. Slices of a volume are no layers.
     pub fn layers(self) -> u32 {
         match self {
-            Self::D2 | Self::D3 { .. } => 1,
+            Self::D1 | Self::D2 | Self::D3 { .. } => 1,
             Self::D2Array { layers } => layers,
             Self::Cube => 6,
             Self::CubeArray { cubes } => cubes.saturating_mul(6),
@@ -77,7 +81,7 @@ pub struct TextureDesc<'a> {
     pub kind: TextureKind,
     /// Format of the texels.
     pub format: Format,
-    /// Width and height of mip 0 in texels.
+    /// Width and height of mip 0 in texels; the height of a row is 1.
     pub extent: [u32; 2],
     /// Number of mips; 0 is the whole chain down to one texel.
     pub mips: u32,
@@ -93,9 +97,14 @@ pub struct TextureDesc<'a> {
     ///
     /// Any (`VK_IMAGE_CREATE_MUTABLE_FORMAT_BIT`) may cost the compression of the image, so list none without need.
     pub view_formats: &'a [Format],
-    /// First contents of mip 0: all layers or slices one after the other, rows tightly packed.
+    /// Which channels of a texel the four that shaders sample are. Storage images and targets show the channels as they are.
+    pub swizzle: Swizzle,
+    /// First contents, tightly packed: of each mip in turn, from 0 on, all layers or slices one after the other. Of depth
+    /// with stencil the depth.
     pub data: Option<&'a [u8]>,
-    /// Fills the other mips from `data` by repeated halving (colour formats the device can filter).
+    /// Number of mips that `data` has; 0 is all.
+    pub data_mips: u32,
+    /// Fills the other mips by halving the last of `data`, which holds one (colour formats the device can filter).
     pub generate_mips: bool,
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
@@ -111,7 +120,9 @@ impl Default for TextureDesc<'_> {
             samples: 1,
             usage: TextureUsage::SAMPLED,
             view_formats: &[],
+            swizzle: Swizzle::IDENTITY,
             data: None,
+            data_mips: 1,
             generate_mips: false,
             debug_name: "texture",
         }

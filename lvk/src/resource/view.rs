@@ -6,80 +6,13 @@ use std::sync::{Arc, Mutex, PoisonError};
 use ash::vk;
 
 use super::image::{Image, raw_range};
+use super::swizzle::Swizzle;
 use super::texture_desc::{TextureKind, TextureUsage};
 use crate::barrier::Subresources;
 use crate::error::{Error, Result};
-use crate::format::Format;
+use crate::format::{Aspect, Format};
 use crate::gpu::Gpu;
 use crate::handle::TextureHandle;
-
-/// Where a channel of what a shader samples comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Channel {
-    /// Always 0.
-    Zero,
-    /// Always 1.
-    One,
-    /// The first channel of the format.
-    Red,
-    /// The second channel of the format.
-    Green,
-    /// The third channel of the format.
-    Blue,
-    /// The fourth channel of the format.
-    Alpha,
-}
-
-/// Which channels of a texel the four that a shader samples are (`VkComponentMapping`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct Swizzle {
-    /// What shaders see as red.
-    pub red: Channel,
-    /// What shaders see as green.
-    pub green: Channel,
-    /// What shaders see as blue.
-    pub blue: Channel,
-    /// What shaders see as alpha.
-    pub alpha: Channel,
-}
-
-impl Swizzle {
-    /// Every channel is itself.
-    pub const IDENTITY: Self =
-        Self { red: Channel::Red, green: Channel::Green, blue: Channel::Blue, alpha: Channel::Alpha };
-
-    /// What a view with this swizzle of a view with the `first` one shows.
-    pub(crate) fn after(self, first: Self) -> Self {
-        let through = |channel| match channel {
-            Channel::Zero | Channel::One => channel,
-            Channel::Red => first.red,
-            Channel::Green => first.green,
-            Channel::Blue => first.blue,
-            Channel::Alpha => first.alpha,
-        };
-        Self {
-            red: through(self.red),
-            green: through(self.green),
-            blue: through(self.blue),
-            alpha: through(self.alpha),
-        }
-    }
-
-    fn raw(self) -> vk::ComponentMapping {
-        vk::ComponentMapping {
-            r: raw_channel(self.red),
-            g: raw_channel(self.green),
-            b: raw_channel(self.blue),
-            a: raw_channel(self.alpha),
-        }
-    }
-}
-
-impl Default for Swizzle {
-    fn default() -> Self {
-        Self::IDENTITY
-    }
-}
 
 /// Describes a view: a texture that shows mips and layers of another one, perhaps as another kind or format.
 #[derive(Debug, Clone, Copy, Default)]
@@ -101,6 +34,8 @@ pub struct TextureViewDesc<'a> {
     /// Format shaders and passes take the texels for: the texture's own, or one of its
     /// [`view_formats`](crate::TextureDesc::view_formats). `None` is the texture's.
     pub format: Option<Format>,
+    /// Which part of the texels shaders sample: the stencil of a format that has it is an element of `kTexturesU2D[]`.
+    pub aspect: Aspect,
     /// Channels as shaders sample them. Storage images and targets show the channels as they are.
     pub swizzle: Swizzle,
     /// What the view is used for, of what its texture was made for. `None` is all of it that the format and the swizzle
@@ -168,39 +103,11 @@ impl Drop for ViewCache {
 /// A kind by its Vulkan name.
 pub(crate) fn raw_kind(kind: TextureKind) -> vk::ImageViewType {
     match kind {
+        TextureKind::D1 => vk::ImageViewType::TYPE_1D,
         TextureKind::D2 => vk::ImageViewType::TYPE_2D,
         TextureKind::D2Array { .. } => vk::ImageViewType::TYPE_2D_ARRAY,
         TextureKind::D3 { .. } => vk::ImageViewType::TYPE_3D,
         TextureKind::Cube => vk::ImageViewType::CUBE,
         TextureKind::CubeArray { .. } => vk::ImageViewType::CUBE_ARRAY,
-    }
-}
-
-fn raw_channel(channel: Channel) -> vk::ComponentSwizzle {
-    match channel {
-        Channel::Zero => vk::ComponentSwizzle::ZERO,
-        Channel::One => vk::ComponentSwizzle::ONE,
-        Channel::Red => vk::ComponentSwizzle::R,
-        Channel::Green => vk::ComponentSwizzle::G,
-        Channel::Blue => vk::ComponentSwizzle::B,
-        Channel::Alpha => vk::ComponentSwizzle::A,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    const REVERSED: Swizzle =
-        Swizzle { red: Channel::Alpha, green: Channel::Blue, blue: Channel::Green, alpha: Channel::Red };
-
-    #[test]
-    fn swizzles_are_taken_one_after_the_other() {
-        let ones = Swizzle { red: Channel::One, green: Channel::Red, ..Swizzle::IDENTITY };
-        assert_eq!(REVERSED.after(REVERSED), Swizzle::IDENTITY);
-        assert_eq!(ones.after(Swizzle::IDENTITY), ones);
-        let both =
-            Swizzle { red: Channel::One, green: Channel::Alpha, blue: Channel::Green, alpha: Channel::Red };
-        assert_eq!(ones.after(REVERSED), both);
     }
 }

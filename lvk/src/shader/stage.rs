@@ -145,11 +145,15 @@ pub enum ShaderSource<'a> {
 ///   `..2DGrad`, `..2DGather`, `..2DShadow(tex, smp, vec3(uv, reference))`, `..2DArray[Lod]`, `..3D[Lod]`,
 ///   `..Cube[Lod]`, `textureBindlessFetch2D(tex, texel, lod)` (`FetchU2D`, `FetchI2D`), `textureBindlessSize2D(tex)`
 ///   (`Size2DArray`, `Size3D`, `SizeCube`), `textureBindlessQueryLevels2D(tex)` (`QueryLevelsCube`). Those without an
-///   explicit level use derivatives in fragment shaders and mip level 0 in every other stage. Of multisampled textures,
+///   explicit level use derivatives in fragment shaders and mip level 0 in every other stage. `..2DArrayShadow`
+///   and `..CubeShadow` take the reference behind the coordinates; `..2DGatherShadow(tex, smp, uv, reference)` and
+///   `..2DGatherChannel(tex, smp, uv, channel)` (`2DArray`, `Cube`) gather. Of multisampled textures,
 ///   `kTextures2DMS`, there are `textureBindlessFetch2DMS(tex, texel, sample)`, `..Size2DMS` and `..Samples2DMS`.
 /// * Textures of other shapes are declared once at global scope: `LVK_TEXTURES(utexture3D, kVolumes);`. After
 ///   `LVK_TEXTURES(textureCubeArray, kTexturesCubeArray);` there are `textureBindlessCubeArray[Lod]` with the number of
-///   the cube as fourth coordinate, and `textureBindlessSizeCubeArray(tex)`.
+///   the cube as fourth coordinate, `textureBindlessCubeArrayShadow(tex, smp, dirCube, reference)` and
+///   `textureBindlessSizeCubeArray(tex)`; after `LVK_TEXTURES(texture1D, kTextures1D);` there are `textureBindless1D[Lod]`,
+///   `textureBindlessFetch1D(tex, texel, lod)` and `textureBindlessSize1D(tex)`.
 /// * Storage images: `kImages2D`, `kImages2DArray`, `kImages3D`, `kImagesU2D`, `kImagesI2D` take stores of any format
 ///   (and loads where `LVK_FORMATLESS_READ` is defined, that is where the device can load without a format). To load
 ///   elsewhere, or to use atomics, name the format once at global scope:

@@ -41,6 +41,8 @@ layout(set = LVK_SET, binding = LVK_BINDING_STORAGE_IMAGES) uniform LVK_IMAGE_AC
 #define LVK_3D(tex, smp) LVK_SAMPLED(sampler3D, kTextures3D, kSamplers, tex, smp)
 #define LVK_CUBE(tex, smp) LVK_SAMPLED(samplerCube, kTexturesCube, kSamplers, tex, smp)
 #define LVK_2D_SHADOW(tex, smp) LVK_SAMPLED(sampler2DShadow, kTextures2D, kSamplersShadow, tex, smp)
+#define LVK_2D_ARRAY_SHADOW(tex, smp) LVK_SAMPLED(sampler2DArrayShadow, kTextures2DArray, kSamplersShadow, tex, smp)
+#define LVK_CUBE_SHADOW(tex, smp) LVK_SAMPLED(samplerCubeShadow, kTexturesCube, kSamplersShadow, tex, smp)
 
 // Only fragment shaders have derivatives; elsewhere the same helper reads mip level 0.
 #ifdef LVK_STAGE_FRAGMENT
@@ -55,14 +57,24 @@ vec4 textureBindless2DGrad(uint tex, uint smp, vec2 uv, vec2 dx, vec2 dy) { retu
 vec4 textureBindless2DGather(uint tex, uint smp, vec2 uv) { return textureGather(LVK_2D(tex, smp), uv); }
 float textureBindless2DShadow(uint tex, uint smp, vec3 uvw) { return LVK_SAMPLE(LVK_2D_SHADOW(tex, smp), uvw); }
 
+vec4 textureBindless2DGatherShadow(uint tex, uint smp, vec2 uv, float ref) { return textureGather(LVK_2D_SHADOW(tex, smp), uv, ref); }
+// The channel, 0 to 3, is a constant.
+#define textureBindless2DGatherChannel(tex, smp, uv, channel) textureGather(LVK_2D(tex, smp), uv, channel)
+#define textureBindless2DArrayGatherChannel(tex, smp, uvLayer, channel) textureGather(LVK_2D_ARRAY(tex, smp), uvLayer, channel)
+#define textureBindlessCubeGatherChannel(tex, smp, dir, channel) textureGather(LVK_CUBE(tex, smp), dir, channel)
+
 vec4 textureBindless2DArray(uint tex, uint smp, vec3 uvLayer) { return LVK_SAMPLE(LVK_2D_ARRAY(tex, smp), uvLayer); }
 vec4 textureBindless2DArrayLod(uint tex, uint smp, vec3 uvLayer, float lod) { return textureLod(LVK_2D_ARRAY(tex, smp), uvLayer, lod); }
+
+float textureBindless2DArrayShadow(uint tex, uint smp, vec4 uvLayerRef) { return texture(LVK_2D_ARRAY_SHADOW(tex, smp), uvLayerRef); }
 
 vec4 textureBindless3D(uint tex, uint smp, vec3 uvw) { return LVK_SAMPLE(LVK_3D(tex, smp), uvw); }
 vec4 textureBindless3DLod(uint tex, uint smp, vec3 uvw, float lod) { return textureLod(LVK_3D(tex, smp), uvw, lod); }
 
 vec4 textureBindlessCube(uint tex, uint smp, vec3 dir) { return LVK_SAMPLE(LVK_CUBE(tex, smp), dir); }
 vec4 textureBindlessCubeLod(uint tex, uint smp, vec3 dir, float lod) { return textureLod(LVK_CUBE(tex, smp), dir, lod); }
+
+float textureBindlessCubeShadow(uint tex, uint smp, vec4 dirRef) { return texture(LVK_CUBE_SHADOW(tex, smp), dirRef); }
 
 vec4 textureBindlessFetch2D(uint tex, ivec2 texel, int lod) { return texelFetch(kTextures2D[nonuniformEXT(tex)], texel, lod); }
 uvec4 textureBindlessFetchU2D(uint tex, ivec2 texel, int lod) { return texelFetch(kTexturesU2D[nonuniformEXT(tex)], texel, lod); }
@@ -72,7 +84,15 @@ ivec4 textureBindlessFetchI2D(uint tex, ivec2 texel, int lod) { return texelFetc
 #define LVK_CUBE_ARRAY(tex, smp) LVK_SAMPLED(samplerCubeArray, kTexturesCubeArray, kSamplers, tex, smp)
 #define textureBindlessCubeArray(tex, smp, dirCube) LVK_SAMPLE(LVK_CUBE_ARRAY(tex, smp), dirCube)
 #define textureBindlessCubeArrayLod(tex, smp, dirCube, lod) textureLod(LVK_CUBE_ARRAY(tex, smp), dirCube, lod)
+#define textureBindlessCubeArrayShadow(tex, smp, dirCube, ref) texture(LVK_SAMPLED(samplerCubeArrayShadow, kTexturesCubeArray, kSamplersShadow, tex, smp), dirCube, ref)
 #define textureBindlessSizeCubeArray(tex) textureSize(kTexturesCubeArray[nonuniformEXT(tex)], 0)
+
+// These need LVK_TEXTURES(texture1D, kTextures1D).
+#define LVK_1D(tex, smp) LVK_SAMPLED(sampler1D, kTextures1D, kSamplers, tex, smp)
+#define textureBindless1D(tex, smp, u) LVK_SAMPLE(LVK_1D(tex, smp), u)
+#define textureBindless1DLod(tex, smp, u, lod) textureLod(LVK_1D(tex, smp), u, lod)
+#define textureBindlessFetch1D(tex, texel, lod) texelFetch(kTextures1D[nonuniformEXT(tex)], texel, lod)
+#define textureBindlessSize1D(tex) textureSize(kTextures1D[nonuniformEXT(tex)], 0)
 
 vec4 textureBindlessFetch2DMS(uint tex, ivec2 texel, int smp) { return texelFetch(kTextures2DMS[nonuniformEXT(tex)], texel, smp); }
 ivec2 textureBindlessSize2DMS(uint tex) { return textureSize(kTextures2DMS[nonuniformEXT(tex)]); }

@@ -1,0 +1,117 @@
+//! Clears of textures.
+
+use ash::vk;
+
+use super::{Settle, TARGET};
+use crate::barrier::Use;
+use crate::command::CommandBuffer;
+use crate::error::{Error, Result};
+use crate::format::Numbers;
+use crate::handle::TextureHandle;
+use crate::resource::Texture;
+use crate::resource::region::TextureRange;
+
+/// What a texture is filled with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ClearValue {
+    /// A colour, for formats that shaders read as floats.
+    Color([f32; 4]),
+    /// Unsigned integers, for colours of such a format.
+    Uint([u32; 4]),
+    /// Signed integers, for colours of such a format.
+    Sint([i32; 4]),
+    /// A depth from 0 to 1; stencil stays.
+    Depth(f32),
+    /// A stencil value from 0 to 255; depth stays.
+    Stencil(u32),
+    /// Both.
+    DepthStencil(f32, u32),
+}
+
+impl CommandBuffer {
+    /// Fills mips and layers of a texture, all slices of volumes, with one value (`vkCmdClearColorImage`,
+    /// `vkCmdClearDepthStencilImage`). A colour is encoded in the format of the texture itself where this is a view of it.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) for mips and layers that do not exist, for values that the format does not
+    /// hold or that are out of range, and for compressed formats.
+    pub fn clear_texture(
+        &mut self,
+        texture: TextureHandle,
+        value: ClearValue,
+        range: &TextureRange,
+    ) -> Result<()> {
+        let texture = self.shared.store.textures.get(texture)?;
+        let part = texture.resolve_range(range)?;
+        let aspects = check_value(&texture, value)?;
+        self.use_texture(&texture, part, Use::transfer_write())?;
+        self.flush();
+        let range =
+            vk::ImageSubresourceRange { aspect_mask: aspects, ..texture.image.for_barriers().range(part) };
+        let (device, image) = (&self.shared.gpu.device, texture.image.raw);
+        // SAFETY: the range lies inside the image, whose format holds such a value.
+        unsafe {
+            match raw_value(value) {
+                Raw::Color(color) => {
+                    device.cmd_clear_color_image(self.raw(), image, TARGET, &color, &[range])
+                }
+                Raw::DepthStencil(value) => {
+                    device.cmd_clear_depth_stencil_image(self.raw(), image, TARGET, &value, &[range]);
+                }
+            }
+        }
+        self.settle.push(Settle::Texture(texture));
+        Ok(())
+    }
+}
+
+enum Raw {
+    Color(vk::ClearColorValue),
+    DepthStencil(vk::ClearDepthStencilValue),
+}
+
+fn raw_value(value: ClearValue) -> Raw {
+    let depth_stencil = |depth, stencil| Raw::DepthStencil(vk::ClearDepthStencilValue { depth, stencil });
+    match value {
+        ClearValue::Color(float32) => Raw::Color(vk::ClearColorValue { float32 }),
+        ClearValue::Uint(uint32) => Raw::Color(vk::ClearColorValue { uint32 }),
+        ClearValue::Sint(int32) => Raw::Color(vk::ClearColorValue { int32 }),
+        ClearValue::Depth(depth) => depth_stencil(depth, 0),
+        ClearValue::Stencil(stencil) => depth_stencil(0.0, stencil),
+        ClearValue::DepthStencil(depth, stencil) => depth_stencil(depth, stencil),
+    }
+}
+
+/// The aspects that the value fills, where the texture has them and the value is in range.
+fn check_value(texture: &Texture, value: ClearValue) -> Result<vk::ImageAspectFlags> {
+    use vk::ImageAspectFlags as Aspects;
+    let format = texture.image.format;
+    let wrong = |why: &str| {
+        Err(Error::usage(&texture.name, format!("{format:?} cannot be cleared to {value:?}: {why}")))
+    };
+    let (wanted, numbers) = match value {
+        ClearValue::Color(_) => (Aspects::COLOR, Some(Numbers::Float)),
+        ClearValue::Uint(_) => (Aspects::COLOR, Some(Numbers::Uint)),
+        ClearValue::Sint(_) => (Aspects::COLOR, Some(Numbers::Sint)),
+        ClearValue::Depth(_) => (Aspects::DEPTH, None),
+        ClearValue::Stencil(_) => (Aspects::STENCIL, None),
+        ClearValue::DepthStencil(..) => (Aspects::DEPTH | Aspects::STENCIL, None),
+    };
+    let (depth, stencil) = match raw_value(value) {
+        Raw::Color(_) => (0.0, 0),
+        Raw::DepthStencil(value) => (value.depth, value.stencil),
+    };
+    if !texture.shown_aspects().contains(wanted) {
+        return wrong("it does not hold that");
+    }
+    if format.is_compressed() {
+        return wrong("blocks are only copied");
+    }
+    if numbers.is_some_and(|numbers| numbers != format.numbers()) {
+        return wrong("its numbers are of another kind");
+    }
+    if !(0.0..=1.0).contains(&depth) || stencil > 0xFF {
+        return wrong("depths are from 0 to 1, stencil values from 0 to 255");
+    }
+    Ok(wanted)
+}

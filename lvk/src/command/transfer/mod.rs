@@ -1,0 +1,52 @@
+//! Copies, fills, clears, blits, resolves and mips.
+
+mod blit;
+mod buffer;
+mod clear;
+mod resolve;
+mod settle;
+mod texture;
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::CommandBuffer;
+use crate::barrier::Use;
+use crate::error::Result;
+use crate::resource::Texture;
+use crate::resource::region::Region;
+
+pub use buffer::BufferCopy;
+pub use clear::ClearValue;
+pub(super) use settle::Settle;
+
+/// Layout of an image that is copied from.
+const SOURCE: vk::ImageLayout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+/// Layout of an image that is copied to.
+const TARGET: vk::ImageLayout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+
+impl CommandBuffer {
+    /// The next command reads one region and writes another.
+    fn use_texture_pair(
+        &mut self,
+        source: &Arc<Texture>,
+        from: &Region,
+        target: &Arc<Texture>,
+        to: &Region,
+    ) -> Result<()> {
+        self.uses.clear();
+        self.use_texture(source, from.subresources(), Use::transfer_read())?;
+        if let Err(error) = self.use_texture(target, to.subresources(), Use::transfer_write()) {
+            self.uses.clear();
+            return Err(error);
+        }
+        self.flush();
+        Ok(())
+    }
+
+    /// Both are read by shaders next, where nobody says otherwise.
+    fn settle_pair(&mut self, source: Arc<Texture>, target: Arc<Texture>) {
+        self.settle.extend([source, target].map(Settle::Texture));
+    }
+}

@@ -1,0 +1,56 @@
+//! What copies leave behind is made readable everywhere before shaders run.
+
+use std::sync::Arc;
+
+use crate::barrier::{Layout, Stages, Use};
+use crate::command::CommandBuffer;
+use crate::resource::texture_desc::TextureUsage;
+use crate::resource::{Buffer, Texture};
+use crate::submit::Recording;
+use crate::submit::emit::emit;
+
+/// A resource a copy wrote, or read in a layout of its own, to be made readable everywhere before shaders run.
+pub(in crate::command) enum Settle {
+    Buffer(Arc<Buffer>),
+    Texture(Arc<Texture>),
+}
+
+impl CommandBuffer {
+    /// Gives a new texture the layout in which shaders read it.
+    pub(crate) fn settle_texture(&mut self, texture: &Arc<Texture>) {
+        self.settle.push(Settle::Texture(Arc::clone(texture)));
+    }
+
+    /// Makes what copies touched readable by every shader and every input, with one barrier for all.
+    pub(in crate::command) fn settle(&mut self) {
+        if self.settle.is_empty() {
+            return;
+        }
+        let Recording { tracker, images, commands, .. } = &mut *self.recording;
+        self.barriers.clear();
+        // What was written twice is listed twice; the second read needs no barrier any more.
+        for written in self.settle.drain(..) {
+            match written {
+                Settle::Buffer(buffer) => {
+                    tracker.use_buffer(buffer.id, Use::everything_read(), &mut self.barriers);
+                }
+                Settle::Texture(texture) => {
+                    let Some(read) = resting_use(texture.image.usage) else { continue };
+                    let image = &texture.image;
+                    images.insert(image.id, image.for_barriers());
+                    tracker.use_texture(image.id, image.shape, texture.range, read, &mut self.barriers);
+                }
+            }
+        }
+        emit(&self.shared.gpu, *commands, &self.barriers, images);
+    }
+}
+
+/// How shaders read a texture that no command declares; `None` for textures they do not read.
+fn resting_use(usage: TextureUsage) -> Option<Use> {
+    let read = Use::shader_read(Stages::SHADERS);
+    if usage.contains(TextureUsage::SAMPLED) {
+        return Some(read);
+    }
+    usage.contains(TextureUsage::STORAGE).then_some(read.with_layout(Layout::General))
+}

@@ -1,0 +1,40 @@
+//! What textures the device can make.
+
+use super::Context;
+use super::create_texture::check_data;
+use crate::error::Result;
+use crate::format::Format;
+use crate::resource::check_image;
+use crate::resource::format_support::FormatSupport;
+use crate::resource::texture_desc::TextureDesc;
+
+/// Depth formats, the best first.
+const DEPTH: [Format; 3] = [Format::D32Float, Format::X8D24Unorm, Format::D16Unorm];
+/// The same with stencil.
+const DEPTH_STENCIL: [Format; 2] = [Format::D32FloatS8, Format::D24UnormS8];
+
+impl Context {
+    /// What the device can do with 2D textures of a format (`vkGetPhysicalDeviceFormatProperties`).
+    pub fn format_support(&self, format: Format) -> FormatSupport {
+        FormatSupport::new(&self.shared().gpu, format)
+    }
+
+    /// Whether [`create_texture`](Self::create_texture) would take the description, short of memory and of numbers for
+    /// shaders (`vkGetPhysicalDeviceImageFormatProperties`).
+    ///
+    /// # Errors
+    /// Those that it would answer.
+    pub fn supports_texture(&self, desc: &TextureDesc<'_>) -> Result<()> {
+        let plan = check_image(&self.shared().gpu, desc)?;
+        check_data(desc, plan.mips)
+    }
+
+    /// The best format of depth, with stencil or without, that can be drawn to and sampled here; `None` where there is none.
+    pub fn depth_format(&self, stencil: bool) -> Option<Format> {
+        let formats: &[Format] = if stencil { &DEPTH_STENCIL } else { &DEPTH };
+        formats.iter().copied().find(|format| {
+            let support = self.format_support(*format);
+            support.target && support.sampled
+        })
+    }
+}

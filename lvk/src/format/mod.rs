@@ -1,0 +1,210 @@
+//! Formats: of texels, with the sizes of what copies move, of vertices, and of indices.
+
+mod table;
+mod vertex;
+
+use ash::vk;
+
+pub use table::Format;
+pub use vertex::{IndexFormat, VertexFormat};
+
+use table::Class;
+
+/// Which part of the texels a transfer moves or a view shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Aspect {
+    /// The colour, or the depth; of a format of stencil alone, that.
+    #[default]
+    Main,
+    /// The stencil, one byte a texel.
+    Stencil,
+}
+
+/// How shaders read colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Numbers {
+    Float,
+    Uint,
+    Sint,
+}
+
+/// One aspect of a format, as copies name and pack it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Part {
+    pub(crate) aspect: vk::ImageAspectFlags,
+    /// Width and height of the smallest piece that can be copied, in texels.
+    pub(crate) block: [u32; 2],
+    pub(crate) block_bytes: u32,
+}
+
+impl Part {
+    /// Bytes of a box of texels, tightly packed; what is not a whole block counts as one.
+    pub(crate) fn bytes(&self, [width, height, depth]: [u32; 3]) -> u64 {
+        let blocks = self.blocks([width, height]).map(u64::from);
+        let layers = [depth.into(), self.block_bytes.into()];
+        layers.into_iter().chain(blocks).fold(1, u64::saturating_mul)
+    }
+
+    /// Columns and rows of blocks that cover so many texels.
+    pub(crate) fn blocks(&self, extent: [u32; 2]) -> [u32; 2] {
+        [extent[0].div_ceil(self.block[0]), extent[1].div_ceil(self.block[1])]
+    }
+}
+
+impl Format {
+    /// Bytes of a box of texels, width x height x depth, as uploads and downloads move it, tightly packed: the colour, or
+    /// the depth without its stencil. Compressed formats round up to whole [blocks](Self::block_extent).
+    pub fn bytes(self, extent: [u32; 3]) -> u64 {
+        self.main().bytes(extent)
+    }
+
+    /// Width and height of a block in texels: 4 x 4 of BC and ETC2, up to 12 x 12 of ASTC, and 1 x 1 of everything that is
+    /// not compressed.
+    pub fn block_extent(self) -> [u32; 2] {
+        self.block().texels
+    }
+
+    /// Whether texels are compressed in blocks.
+    pub fn is_compressed(self) -> bool {
+        self.class() == Class::Block
+    }
+
+    /// Whether texels hold depth, with or without stencil.
+    pub fn is_depth(self) -> bool {
+        matches!(self.class(), Class::Depth | Class::DepthStencil)
+    }
+
+    /// Whether texels hold stencil.
+    pub fn has_stencil(self) -> bool {
+        matches!(self.class(), Class::Stencil | Class::DepthStencil)
+    }
+
+    /// Whether texels hold colour: neither depth nor stencil.
+    pub fn is_color(self) -> bool {
+        !self.is_depth() && !self.has_stencil()
+    }
+
+    /// Whether shaders read texels as unsigned integers.
+    pub fn is_uint(self) -> bool {
+        matches!(self.class(), Class::Uint | Class::Stencil)
+    }
+
+    /// Whether shaders read texels as signed integers.
+    pub fn is_sint(self) -> bool {
+        self.class() == Class::Sint
+    }
+
+    pub(crate) fn numbers(self) -> Numbers {
+        match self.class() {
+            Class::Uint | Class::Stencil => Numbers::Uint,
+            Class::Sint => Numbers::Sint,
+            Class::Float | Class::Block | Class::Depth | Class::DepthStencil => Numbers::Float,
+        }
+    }
+
+    /// All aspects, as barriers name them.
+    pub(crate) fn aspects(self) -> vk::ImageAspectFlags {
+        match self.class() {
+            Class::Float | Class::Uint | Class::Sint | Class::Block => vk::ImageAspectFlags::COLOR,
+            Class::Depth => vk::ImageAspectFlags::DEPTH,
+            Class::Stencil => vk::ImageAspectFlags::STENCIL,
+            Class::DepthStencil => vk::ImageAspectFlags::DEPTH | vk::ImageAspectFlags::STENCIL,
+        }
+    }
+
+    /// An aspect as copies move it, `None` where the format lacks it.
+    pub(crate) fn part(self, aspect: Aspect) -> Option<Part> {
+        match aspect {
+            Aspect::Main => Some(self.main()),
+            Aspect::Stencil => self.has_stencil().then_some(Part {
+                aspect: vk::ImageAspectFlags::STENCIL,
+                block: [1, 1],
+                block_bytes: 1,
+            }),
+        }
+    }
+
+    fn main(self) -> Part {
+        let block = self.block();
+        let depth = vk::ImageAspectFlags::DEPTH;
+        let aspect = if self.is_depth() { depth } else { self.aspects() };
+        Part { aspect, block: block.texels, block_bytes: block.bytes }
+    }
+
+    /// Whether images of one format may be seen in the other: colours of the same number of bytes, and of compressed
+    /// ones the same compression.
+    pub(crate) fn is_viewable_as(self, other: Self) -> bool {
+        if self.is_compressed() || other.is_compressed() {
+            return self == other || self.compression().is_some_and(|own| other.compression() == Some(own));
+        }
+        self.is_color()
+            && other.is_color()
+            && self.block() == other.block()
+            && !self.is_alpha()
+            && !other.is_alpha()
+            || self == other
+    }
+
+    /// Vulkan counts the two forms of each compression, linear or unsigned and the other, one after the other.
+    fn compression(self) -> Option<i32> {
+        const FIRST: i32 = vk::Format::BC1_RGB_UNORM_BLOCK.as_raw();
+        self.is_compressed().then(|| (self.raw().as_raw() - FIRST) / 2)
+    }
+
+    /// Alpha alone is a class of its own.
+    fn is_alpha(self) -> bool {
+        self == Self::A8Unorm
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn boxes_of_blocks_round_up() {
+        assert_eq!(Format::Rgba8Unorm.bytes([5, 3, 2]), 120);
+        assert_eq!(Format::Bc1RgbaUnorm.bytes([5, 3, 1]), 16);
+        assert_eq!(Format::Bc7Srgb.bytes([1, 1, 3]), 48);
+        assert_eq!(Format::Astc10x6Unorm.bytes([20, 13, 1]), 2 * 3 * 16);
+        assert_eq!(Format::D32FloatS8.bytes([2, 2, 1]), 16);
+        assert_eq!(Format::D32FloatS8.part(Aspect::Stencil).map(|part| part.bytes([2, 2, 1])), Some(4));
+        assert_eq!(Format::D32Float.part(Aspect::Stencil), None);
+        assert_eq!(Format::S8Uint.part(Aspect::Main), Format::S8Uint.part(Aspect::Stencil));
+        assert_eq!(Format::Rgba32Float.bytes([u32::MAX; 3]), u64::MAX);
+    }
+
+    #[test]
+    fn compressions_pair_up() {
+        let pairs = [
+            (Format::Bc1RgbUnorm, Format::Bc1RgbSrgb),
+            (Format::Bc4Unorm, Format::Bc4Snorm),
+            (Format::Bc6hUfloat, Format::Bc6hFloat),
+            (Format::Bc7Unorm, Format::Bc7Srgb),
+            (Format::Etc2Rgba8Unorm, Format::Etc2Rgba8Srgb),
+            (Format::EacRg11Unorm, Format::EacRg11Snorm),
+            (Format::Astc12x12Unorm, Format::Astc12x12Srgb),
+        ];
+        assert!(pairs.iter().all(|(a, b)| a.is_viewable_as(*b) && b.is_viewable_as(*a)));
+        for format in Format::ALL.iter().filter(|format| format.is_compressed()) {
+            let others = Format::ALL.iter().filter(|other| format.is_viewable_as(**other));
+            assert_eq!(others.count(), 2, "{format:?}");
+        }
+        assert!(!Format::Bc1RgbUnorm.is_viewable_as(Format::Bc1RgbaUnorm));
+        assert!(!Format::Bc1RgbaUnorm.is_viewable_as(Format::Rg32Uint));
+        assert!(Format::Rgba8Unorm.is_viewable_as(Format::R32Float));
+        assert!(!Format::D32Float.is_viewable_as(Format::R32Float));
+        assert!(!Format::A8Unorm.is_viewable_as(Format::R8Unorm));
+    }
+
+    #[test]
+    fn every_format_is_of_one_kind() {
+        for format in Format::ALL {
+            assert_eq!(format.block_extent() != [1, 1], format.is_compressed(), "{format:?}");
+            let aspects = usize::from(format.is_color())
+                + usize::from(format.is_depth())
+                + usize::from(format.has_stencil());
+            assert_eq!(format.aspects().as_raw().count_ones() as usize, aspects, "{format:?}");
+        }
+    }
+}

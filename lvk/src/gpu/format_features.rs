@@ -1,0 +1,58 @@
+//! What the device can do with formats.
+
+use ash::vk;
+
+use super::device::Gpu;
+use super::optional::OptionalFeature;
+use crate::format::Format;
+
+impl Gpu {
+    /// What the device can do with images of `format` in optimal tiling; nothing where a feature that the format needs is
+    /// off.
+    pub(crate) fn format_features(&self, format: Format) -> vk::FormatFeatureFlags {
+        match needed(format) {
+            Some(feature) if !self.caps.has(feature) => vk::FormatFeatureFlags::empty(),
+            _ => self.format_properties(format.raw()).optimal_tiling_features,
+        }
+    }
+
+    /// What the device can do with buffers of `format`.
+    pub(crate) fn buffer_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
+        self.format_properties(format).buffer_features
+    }
+
+    fn format_properties(&self, format: vk::Format) -> vk::FormatProperties {
+        // SAFETY: the physical device belongs to the instance, and the extension of the format is on.
+        unsafe { self.instance.raw.get_physical_device_format_properties(self.physical(), format) }
+    }
+}
+
+/// The feature by which there is the format, beyond what Vulkan has anyway.
+fn needed(format: Format) -> Option<OptionalFeature> {
+    let name = format.raw().as_raw();
+    let between = |first: vk::Format, last: vk::Format| (first.as_raw()..=last.as_raw()).contains(&name);
+    if between(vk::Format::BC1_RGB_UNORM_BLOCK, vk::Format::BC7_SRGB_BLOCK) {
+        Some(OptionalFeature::TextureCompressionBc)
+    } else if between(vk::Format::ETC2_R8G8B8_UNORM_BLOCK, vk::Format::EAC_R11G11_SNORM_BLOCK) {
+        Some(OptionalFeature::TextureCompressionEtc2)
+    } else if between(vk::Format::ASTC_4X4_UNORM_BLOCK, vk::Format::ASTC_12X12_SRGB_BLOCK) {
+        Some(OptionalFeature::TextureCompressionAstcLdr)
+    } else if matches!(format, Format::A8Unorm | Format::A1Bgr5Unorm) {
+        Some(OptionalFeature::Maintenance5)
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn compressed_formats_need_features_of_their_own() {
+        for format in Format::ALL {
+            let maintenance = needed(*format) == Some(OptionalFeature::Maintenance5);
+            assert_eq!(needed(*format).is_some() && !maintenance, format.is_compressed(), "{format:?}");
+        }
+    }
+}

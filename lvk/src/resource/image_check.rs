@@ -1,0 +1,211 @@
+//! Whether an image can be: its shape, samples and formats against each other and the device.
+
+use ash::vk;
+
+use super::image::{raw_usage, usage_of};
+use super::texture_desc::{TextureDesc, TextureKind, TextureUsage};
+use crate::error::{Error, Result, check_limit};
+use crate::format::Format;
+use crate::gpu::Gpu;
+
+/// What follows from a description that the device can make an image of.
+pub(crate) struct ImagePlan {
+    pub(crate) mips: u32,
+    pub(crate) flags: vk::ImageCreateFlags,
+}
+
+/// Checks a description against the device.
+pub(crate) fn check(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<ImagePlan> {
+    let mips = check_shape(gpu, desc)?;
+    check_view_formats(desc)?;
+    let plan = ImagePlan { mips, flags: flags(gpu, desc, mips) };
+    check_format(gpu, desc, &plan.info(desc))?;
+    Ok(plan)
+}
+
+impl ImagePlan {
+    /// The description for Vulkan.
+    pub(crate) fn info(&self, desc: &TextureDesc<'_>) -> vk::ImageCreateInfo<'static> {
+        image_info(desc, self.mips).flags(self.flags)
+    }
+}
+
+/// Checks the shape and answers the number of mips.
+fn check_shape(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<u32> {
+    let name = desc.debug_name;
+    let [width, height] = desc.extent;
+    let (layers, depth) = (desc.kind.layers(), desc.kind.depth());
+    if width == 0 || height == 0 || layers == 0 || depth == 0 {
+        let count = layers.min(depth);
+        return Err(Error::usage(name, format!("a texture needs texels, not {width} x {height} x {count}")));
+    }
+    if desc.usage.is_empty() {
+        return Err(Error::usage(name, "give the texture at least one usage"));
+    }
+    check_sides(gpu, desc)?;
+    check_limit(name, "layer count", layers.into(), gpu.caps.limits.max_texture_layers.into())?;
+    check_samples(desc)?;
+    let full = 32 - width.max(height).max(depth).leading_zeros();
+    if desc.mips > full {
+        let message =
+            format!("{} mips, but {width} x {height} x {depth} texels have at most {full}", desc.mips);
+        return Err(Error::usage(name, message));
+    }
+    Ok(if desc.mips == 0 { full } else { desc.mips })
+}
+
+/// Fails unless the texture may have as many samples a texel, for all that does not depend on the device.
+fn check_samples(desc: &TextureDesc<'_>) -> Result<()> {
+    let wrong =
+        |message: &str| Err(Error::usage(desc.debug_name, format!("{} samples: {message}", desc.samples)));
+    if !desc.samples.is_power_of_two() || desc.samples > 64 {
+        return wrong("a texel has 1, 2, 4, 8, 16, 32 or 64");
+    }
+    if desc.samples == 1 {
+        return Ok(());
+    }
+    if !matches!(desc.kind, TextureKind::D2 | TextureKind::D2Array { .. }) || desc.mips != 1 {
+        return wrong("multisampled textures are D2 or D2Array, with one mip");
+    }
+    if desc.usage.contains(TextureUsage::STORAGE) {
+        return wrong("storage images have one; resolve to another texture");
+    }
+    if desc.data.is_some() {
+        return wrong("data cannot be uploaded; draw to the texture, or clear it");
+    }
+    Ok(())
+}
+
+fn check_sides(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<()> {
+    let (name, limits) = (desc.debug_name, &gpu.caps.limits);
+    let [width, height] = desc.extent;
+    let side = u64::from(width.max(height));
+    if let TextureKind::D3 { depth } = desc.kind {
+        let side = side.max(depth.into());
+        return check_limit(name, "volume side in texels", side, limits.max_texture_3d.into());
+    }
+    if desc.kind == TextureKind::D1 {
+        if height != 1 || desc.usage.contains(TextureUsage::TARGET) {
+            return Err(Error::usage(name, "a row of texels has the height 1, and no passes draw to it"));
+        }
+        return check_limit(name, "row length in texels", side, limits.max_texture_1d.into());
+    }
+    if desc.kind.is_cube() {
+        if width != height {
+            return Err(Error::usage(name, format!("faces of a cube are square, not {width} x {height}")));
+        }
+        check_limit(name, "cube side in texels", side, limits.max_texture_cube.into())?;
+    }
+    check_limit(name, "texture side in texels", side, limits.max_texture_2d.into())?;
+    if matches!(desc.kind, TextureKind::CubeArray { .. }) { check_cube_arrays(gpu) } else { Ok(()) }
+}
+
+/// Fails unless the device has arrays of cubes.
+pub(crate) fn check_cube_arrays(gpu: &Gpu) -> Result<()> {
+    if gpu.caps.cube_arrays { Ok(()) } else { Err(gpu.lacks("arrays of cubes (imageCubeArray)")) }
+}
+
+/// Fails unless all formats are colours of texels of one size, or of one compression.
+fn check_view_formats(desc: &TextureDesc<'_>) -> Result<()> {
+    let alike = |other: &Format| desc.format.is_color() && other.is_viewable_as(desc.format);
+    match desc.view_formats.iter().find(|other| !alike(other)) {
+        None => Ok(()),
+        Some(other) => {
+            let message = format!(
+                "texels of {:?} cannot be seen as {other:?}: both must be colours of the same number of bytes, or of one \
+                 compression",
+                desc.format
+            );
+            Err(Error::usage(desc.debug_name, message))
+        }
+    }
+}
+
+/// Views of other formats and kinds have to be allowed when the image is made.
+fn flags(gpu: &Gpu, desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateFlags {
+    use vk::ImageCreateFlags as Flags;
+    let formats = match desc.view_formats {
+        [] => Flags::empty(),
+        _ => Flags::MUTABLE_FORMAT | Flags::EXTENDED_USAGE,
+    };
+    let cube = formats | Flags::CUBE_COMPATIBLE;
+    match desc.kind {
+        TextureKind::Cube | TextureKind::CubeArray { .. } => cube,
+        // Passes draw to slices by 2D views of them.
+        TextureKind::D3 { .. } if desc.usage.contains(TextureUsage::TARGET) => {
+            formats | Flags::TYPE_2D_ARRAY_COMPATIBLE
+        }
+        TextureKind::D2Array { layers }
+            if layers >= 6 && desc.extent[0] == desc.extent[1] && desc.samples == 1 =>
+        {
+            let small = desc.extent[0] <= gpu.caps.limits.max_texture_cube;
+            let allowed = gpu.image_limits(&image_info(desc, mips).flags(cube));
+            let allowed = allowed.is_ok_and(|limits| limits.max_array_layers >= layers);
+            if small && allowed { cube } else { formats }
+        }
+        TextureKind::D1 | TextureKind::D2 | TextureKind::D2Array { .. } | TextureKind::D3 { .. } => formats,
+    }
+}
+
+fn image_info(desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateInfo<'static> {
+    let copies = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
+    vk::ImageCreateInfo::default()
+        .image_type(match desc.kind {
+            TextureKind::D1 => vk::ImageType::TYPE_1D,
+            TextureKind::D3 { .. } => vk::ImageType::TYPE_3D,
+            _ => vk::ImageType::TYPE_2D,
+        })
+        .format(desc.format.raw())
+        .extent(vk::Extent3D { width: desc.extent[0], height: desc.extent[1], depth: desc.kind.depth() })
+        .mip_levels(mips)
+        .array_layers(desc.kind.layers())
+        .samples(vk::SampleCountFlags::from_raw(desc.samples))
+        .tiling(vk::ImageTiling::OPTIMAL)
+        .usage(raw_usage(desc.usage, desc.format) | copies)
+        .initial_layout(vk::ImageLayout::UNDEFINED)
+}
+
+/// Asks the device whether the format can be used this way, and how large.
+fn check_format(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_>) -> Result<()> {
+    let name = desc.debug_name;
+    let refused = || {
+        let also = match desc.view_formats {
+            [] => String::new(),
+            formats => format!(", views of {formats:?}"),
+        };
+        let what = format!("texture '{name}' with format {:?}{also} and usage {:?}", desc.format, desc.usage);
+        Error::unsupported(
+            what,
+            "the device's driver refuses the combination; choose another format or usage",
+        )
+    };
+    if gpu.format_features(desc.format).is_empty() {
+        return Err(refused());
+    }
+    let limits = gpu.image_limits(info).map_err(|_| refused())?;
+    let formats = [desc.format].into_iter().chain(desc.view_formats.iter().copied());
+    let usages: TextureUsage = formats.map(|format| usage_of(gpu.format_features(format))).collect();
+    if !desc.view_formats.is_empty() && !usages.contains(desc.usage) {
+        return Err(refused());
+    }
+    if !limits.sample_counts.contains(info.samples) {
+        let what =
+            format!("texture '{name}' of {} samples a texel with format {:?}", desc.samples, desc.format);
+        let counts = limits.sample_counts.as_raw();
+        let counts: Vec<_> = (0..7).map(|bit| 1_u32 << bit).filter(|count| counts & count != 0).collect();
+        return Err(Error::unsupported(what, format!("with this usage the device takes {counts:?}")));
+    }
+    let sides = [(desc.extent[0], limits.max_extent.width), (desc.extent[1], limits.max_extent.height)];
+    for (side, limit) in sides {
+        check_limit(name, "texture side in texels for its format", side.into(), limit.into())?;
+    }
+    let depth = u64::from(desc.kind.depth());
+    check_limit(name, "texture depth in texels for its format", depth, limits.max_extent.depth.into())?;
+    check_limit(name, "mip count for its format", info.mip_levels.into(), limits.max_mip_levels.into())?;
+    let layers = u64::from(info.array_layers);
+    check_limit(name, "layer count for its format", layers, limits.max_array_layers.into())?;
+    let [width, height] = desc.extent;
+    let copies = layers.saturating_mul(desc.samples.into());
+    let bytes = desc.format.bytes([width, height, desc.kind.depth()]).saturating_mul(copies);
+    check_limit(name, "texture size in bytes", bytes, limits.max_resource_size)
+}

@@ -1,0 +1,100 @@
+//! Which channels of a texel shaders see.
+
+use ash::vk;
+
+/// Where a channel of what a shader samples comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Channel {
+    /// Always 0.
+    Zero,
+    /// Always 1.
+    One,
+    /// The first channel of the format.
+    Red,
+    /// The second channel of the format.
+    Green,
+    /// The third channel of the format.
+    Blue,
+    /// The fourth channel of the format.
+    Alpha,
+}
+
+/// Which channels of a texel the four that a shader samples are (`VkComponentMapping`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Swizzle {
+    /// What shaders see as red.
+    pub red: Channel,
+    /// What shaders see as green.
+    pub green: Channel,
+    /// What shaders see as blue.
+    pub blue: Channel,
+    /// What shaders see as alpha.
+    pub alpha: Channel,
+}
+
+impl Swizzle {
+    /// Every channel is itself.
+    pub const IDENTITY: Self =
+        Self { red: Channel::Red, green: Channel::Green, blue: Channel::Blue, alpha: Channel::Alpha };
+
+    /// What a view with this swizzle of a view with the `first` one shows.
+    pub(crate) fn after(self, first: Self) -> Self {
+        let through = |channel| match channel {
+            Channel::Zero | Channel::One => channel,
+            Channel::Red => first.red,
+            Channel::Green => first.green,
+            Channel::Blue => first.blue,
+            Channel::Alpha => first.alpha,
+        };
+        Self {
+            red: through(self.red),
+            green: through(self.green),
+            blue: through(self.blue),
+            alpha: through(self.alpha),
+        }
+    }
+
+    pub(crate) fn raw(self) -> vk::ComponentMapping {
+        vk::ComponentMapping {
+            r: raw_channel(self.red),
+            g: raw_channel(self.green),
+            b: raw_channel(self.blue),
+            a: raw_channel(self.alpha),
+        }
+    }
+}
+
+impl Default for Swizzle {
+    fn default() -> Self {
+        Self::IDENTITY
+    }
+}
+
+fn raw_channel(channel: Channel) -> vk::ComponentSwizzle {
+    match channel {
+        Channel::Zero => vk::ComponentSwizzle::ZERO,
+        Channel::One => vk::ComponentSwizzle::ONE,
+        Channel::Red => vk::ComponentSwizzle::R,
+        Channel::Green => vk::ComponentSwizzle::G,
+        Channel::Blue => vk::ComponentSwizzle::B,
+        Channel::Alpha => vk::ComponentSwizzle::A,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const REVERSED: Swizzle =
+        Swizzle { red: Channel::Alpha, green: Channel::Blue, blue: Channel::Green, alpha: Channel::Red };
+
+    #[test]
+    fn swizzles_are_taken_one_after_the_other() {
+        let ones = Swizzle { red: Channel::One, green: Channel::Red, ..Swizzle::IDENTITY };
+        assert_eq!(REVERSED.after(REVERSED), Swizzle::IDENTITY);
+        assert_eq!(ones.after(Swizzle::IDENTITY), ones);
+        let both =
+            Swizzle { red: Channel::One, green: Channel::Alpha, blue: Channel::Green, alpha: Channel::Red };
+        assert_eq!(ones.after(REVERSED), both);
+    }
+}
