@@ -123,7 +123,7 @@ pub use accel::flags::{AccelStructSizes, BuildFlags, BuildMode};
 pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, GeometryTransform, Indices, Triangles};
 pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, transform_rows};
 pub use command::CommandBuffer;
-pub use command::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad};
+pub use command::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, StencilLoad};
 pub use command::dependencies::Dependencies;
 pub use command::render::RenderPass;
 pub use command::render_pass::RenderPassDesc;
@@ -151,12 +151,12 @@ pub use handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
 };
+pub use pipeline::blend::{Blend, BlendFactor, BlendOp, BlendPart, ColorWrites};
 pub use pipeline::compute::ComputePipelineDesc;
-pub use pipeline::graphics_desc::{
-    Blend, ColorTarget, CullMode, DepthTest, FrontFace, RenderPipelineDesc, Topology, VertexAttribute,
-    VertexBinding,
-};
+pub use pipeline::depth_stencil::{DepthState, DepthTest, StencilFace, StencilOp, StencilTest};
+pub use pipeline::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute, VertexBinding};
 pub use pipeline::library::RayTracingLibraryDesc;
+pub use pipeline::raster::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
 pub use pipeline::ray_tracing::{HitGroup, RayTracingPipelineDesc, record_bytes};
 pub use pipeline::stage::{SpecializationConstant, SpecializationValue};
 pub use resource::buffer::{BufferDesc, BufferUsage};

@@ -2,8 +2,8 @@
 #![expect(clippy::expect_used, reason = "a test whose set-up fails has failed")]
 
 use lvk::{
-    Context, Format, Holder, RenderPipelineDesc, RenderPipelineHandle, ShaderStage, TextureDesc,
-    TextureHandle, TextureRegion, TextureUsage,
+    Context, Error, Format, Holder, OptionalFeature, RenderPass, RenderPassDesc, RenderPipelineDesc,
+    RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle, TextureRegion, TextureUsage,
 };
 
 use crate::compute::module;
@@ -73,4 +73,88 @@ pub fn coverage(corners: [[f64; 2]; 3], [width, height]: [u32; 2]) -> Vec<bool> 
             sides.iter().all(|side| *side > 0.0) || sides.iter().all(|side| *side < 0.0)
         })
         .collect()
+}
+
+/// A pipeline of GLSL texts for whichever stages.
+///
+/// # Errors
+/// Those of the pipeline; the shaders must compile.
+pub fn staged_pipeline(
+    ctx: &Context,
+    stages: &[(ShaderStage, &str)],
+    desc: &RenderPipelineDesc<'_>,
+) -> lvk::Result<Holder<RenderPipelineHandle>> {
+    let modules: Vec<_> = stages.iter().map(|(stage, text)| (*stage, module(ctx, *stage, text))).collect();
+    let of = |wanted| modules.iter().find(|(stage, _)| *stage == wanted).map(|(_, module)| **module);
+    ctx.create_render_pipeline(&RenderPipelineDesc {
+        vertex: of(ShaderStage::Vertex),
+        task: of(ShaderStage::Task),
+        mesh: of(ShaderStage::Mesh),
+        tess_control: of(ShaderStage::TessControl),
+        tess_eval: of(ShaderStage::TessEval),
+        geometry: of(ShaderStage::Geometry),
+        fragment: of(ShaderStage::Fragment),
+        ..*desc
+    })
+}
+
+/// Runs one pass in a submission of its own.
+///
+/// # Panics
+/// When anything is refused.
+pub fn run_pass(
+    ctx: &Context,
+    desc: &RenderPassDesc<'_>,
+    record: impl FnOnce(&mut RenderPass<'_>) -> lvk::Result<()>,
+) {
+    let mut cmd = ctx.acquire_command_buffer().expect("a command buffer can be had");
+    record(&mut cmd.begin_rendering(desc).expect("the pass begins")).expect("the draws are taken");
+    ctx.submit(cmd).expect("the commands are taken");
+}
+
+/// The pushed colour and depth of [`COVER`] and [`PAINT`], drawn over the scissor.
+///
+/// # Errors
+/// Those of the draw.
+pub fn paint(pass: &mut RenderPass<'_>, color: [f32; 4], depth: f32) -> lvk::Result<()> {
+    let [r, g, b, a] = color;
+    pass.push_constants(&[r, g, b, a, depth])?;
+    pass.draw(0..3, 0..1)
+}
+
+/// Asserts that a call was refused as wrong, with these words.
+///
+/// # Panics
+/// Otherwise.
+pub fn usage_error<T>(result: lvk::Result<T>, words: &str) {
+    match result.map(drop) {
+        Err(Error::InvalidUsage { object, message }) => {
+            let text = format!("{object}: {message}");
+            assert!(text.contains(words), "'{text}' does not say '{words}'");
+        }
+        other => unreachable!("expected an error that says '{words}', not {other:?}"),
+    }
+}
+
+/// Asserts that a call was refused because the device lacks something, with these words.
+///
+/// # Panics
+/// Otherwise.
+pub fn unsupported<T>(result: lvk::Result<T>, words: &str) {
+    match result.map(drop) {
+        Err(error @ Error::Unsupported { .. }) => {
+            let text = error.to_string();
+            assert!(text.contains(words), "'{text}' does not say '{words}'");
+        }
+        other => unreachable!("expected an error that says '{words}', not {other:?}"),
+    }
+}
+
+/// Whether the device has a feature; says so on standard error where it lacks it.
+pub fn has(ctx: &Context, feature: OptionalFeature) -> bool {
+    let there = ctx.capabilities().has(feature);
+    if !there {
+        eprintln!("NOT TESTED, {} lacks {}", ctx.capabilities().device_name, feature.vulkan_name());
+    }
+    there
 }

@@ -209,8 +209,8 @@ fn first_bytes(ctx: &Context, target: TextureHandle) -> Vec<u8> {
     pixels::<[u8; 4]>(ctx, target).iter().map(|pixel| pixel[0]).collect()
 }
 
-const PLAIN: ColorTarget = ColorTarget { format: Format::Rgba8Unorm, blend: None };
-const ADDING: ColorTarget = ColorTarget { format: Format::Rgba8Unorm, blend: Some(Blend::Additive) };
+const PLAIN: ColorTarget = ColorTarget::new(Format::Rgba8Unorm);
+const ADDING: ColorTarget = ColorTarget::blended(Format::Rgba8Unorm, Blend::ADDITIVE);
 
 #[test]
 fn a_task_shader_decides_how_many_mesh_workgroups_run() {

@@ -24,7 +24,7 @@ struct Canvas {
 impl Canvas {
     fn new(ctx: &Context) -> Self {
         let depth = DepthTest { format: Format::D32Float, compare: CompareOp::Less, write: true };
-        let color = [ColorTarget { format: Format::Rgba8Unorm, blend: None }];
+        let color = [ColorTarget::new(Format::Rgba8Unorm)];
         let desc = RenderPipelineDesc { color: &color, depth: Some(depth), ..Default::default() };
         Self {
             color: target(ctx, Format::Rgba8Unorm, [SIDE; 2]),

@@ -357,12 +357,12 @@ fn blending_combines_source_and_target() {
     let (behind, over) = ([0.5, 0.25, 0.0, 0.5], [0.25, 0.5, 1.0, 0.25]);
     let blends = [
         (None, [0.25, 0.5, 1.0]),
-        (Some(Blend::Alpha), [0.4375, 0.3125, 0.25]),
-        (Some(Blend::PremultipliedAlpha), [0.625, 0.6875, 1.0]),
-        (Some(Blend::Additive), [0.75, 0.75, 1.0]),
+        (Some(Blend::ALPHA), [0.4375, 0.3125, 0.25]),
+        (Some(Blend::PREMULTIPLIED_ALPHA), [0.625, 0.6875, 1.0]),
+        (Some(Blend::ADDITIVE), [0.75, 0.75, 1.0]),
     ];
     for (blend, expected) in blends {
-        let color = [ColorTarget { format: Format::Rgba32Float, blend }];
+        let color = [ColorTarget { blend, ..ColorTarget::new(Format::Rgba32Float) }];
         let pipeline =
             render_pipeline(&ctx, COVER, PAINT, &RenderPipelineDesc { color: &color, ..Default::default() });
         draw(&ctx, &[attachment(*target, ColorLoad::Clear(behind))], None, |pass| {

@@ -344,7 +344,7 @@ fn copies_leave_sampled_textures_in_the_layout_that_shaders_read() {
 /// Submits a barrier from the layout of sampled textures to another and back; the validation layer knows if they have
 /// yet another.
 fn expect_shader_read(ctx: &Context, textures: &[TextureHandle]) {
-    let read = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+    let read = vk::ImageLayout::READ_ONLY_OPTIMAL;
     let cmd = ctx.acquire_command_buffer().unwrap();
     for [from, to] in [[read, vk::ImageLayout::GENERAL], [vk::ImageLayout::GENERAL, read]] {
         let images = textures.iter().map(|texture| ctx.raw_image(*texture).unwrap());

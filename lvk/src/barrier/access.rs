@@ -124,7 +124,7 @@ pub(crate) enum Layout {
     Undefined,
     /// Storage images, and images that are read and written at once.
     General,
-    /// Sampled images.
+    /// Sampled images, and depth targets that are only tested: both at once too.
     ShaderRead,
     /// Color attachment.
     ColorTarget,
@@ -138,8 +138,6 @@ pub(crate) enum Layout {
     Present,
     /// Attachment that fragment shaders of the same pass read.
     LocalRead,
-    /// Depth or depth-stencil attachment that is only tested, and may be sampled meanwhile.
-    DepthRead,
     /// Shading rates of a pass.
     ShadingRate,
 }
@@ -204,6 +202,11 @@ impl Use {
     /// Depth attachment, tested and written.
     pub(crate) const fn depth_target() -> Self {
         Self::new(Stages::DEPTH, Access::DEPTH_READ.union(Access::DEPTH_WRITE), Layout::DepthTarget)
+    }
+
+    /// Depth attachment that is tested and not written; merges with a sampled image.
+    pub(crate) const fn depth_read() -> Self {
+        Self::new(Stages::DEPTH, Access::DEPTH_READ, Layout::ShaderRead)
     }
 
     /// Destination of an acceleration structure build, refit or copy, or its scratch memory.
@@ -278,11 +281,6 @@ impl Use {
 /// Uses by render passes beyond plain targets, and by windows.
 #[allow(dead_code, reason = "each waits for the command that makes it")]
 impl Use {
-    /// Depth attachment that is tested and not written. Merges with a sampled image in the same layout.
-    pub(crate) const fn depth_read() -> Self {
-        Self::new(Stages::DEPTH, Access::DEPTH_READ, Layout::DepthRead)
-    }
-
     /// Attachment that fragment shaders of the same pass read; merges with a target in the same layout.
     pub(crate) const fn local_read() -> Self {
         Self::new(Stages::FRAGMENT, Access::INPUT_READ, Layout::LocalRead)
@@ -409,7 +407,7 @@ mod tests {
 
     #[test]
     fn attachments_merge_with_what_their_own_pass_does_with_them() {
-        let sampled = Use::shader_read(Stages::FRAGMENT).with_layout(Layout::DepthRead);
+        let sampled = Use::shader_read(Stages::FRAGMENT);
         let tested = Use::depth_read().merge(sampled).unwrap();
         assert_eq!(StageAccess::from(tested).at(Stages::DEPTH), Access::DEPTH_READ);
         assert_eq!(StageAccess::from(tested).at(Stages::FRAGMENT), Access::SHADER_READ);

@@ -180,7 +180,7 @@ impl Bindless {
         let (mut sampled, mut storage) = (Runs::default(), Runs::default());
         for (slot, views) in slots {
             let (read, written) = views.map_or((None, None), |views| (views.sampled, views.storage));
-            let layout = vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL;
+            let layout = vk::ImageLayout::READ_ONLY_OPTIMAL;
             sampled.push(slot, image(read.unwrap_or(dummies.sampled), layout));
             storage.push(slot, image(written.unwrap_or(dummies.storage), vk::ImageLayout::GENERAL));
         }

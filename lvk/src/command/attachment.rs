@@ -28,6 +28,17 @@ pub enum DepthLoad {
     DontCare,
 }
 
+/// What the stencil of a depth target holds when the pass begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StencilLoad {
+    /// What was in it.
+    Load,
+    /// This value.
+    Clear(u8),
+    /// Anything.
+    DontCare,
+}
+
 /// A colour target of a render pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColorAttachment {
@@ -35,7 +46,8 @@ pub struct ColorAttachment {
     pub texture: TextureHandle,
     /// Mip level drawn to; of a view, counted from its first.
     pub mip: u32,
-    /// Layer, cube face, or slice of a volume drawn to; of a view, counted from its first.
+    /// Layer, cube face, or slice of a volume drawn to, the first of them where the pass has several; of a view, counted
+    /// from its first.
     pub layer: u32,
     /// What it holds when the pass begins.
     pub load: ColorLoad,
@@ -57,17 +69,44 @@ pub struct DepthAttachment {
     pub texture: TextureHandle,
     /// Mip level drawn to; of a view, counted from its first.
     pub mip: u32,
-    /// Layer, cube face, or slice of a volume drawn to; of a view, counted from its first.
+    /// Layer, cube face, or slice of a volume drawn to, the first of them where the pass has several; of a view, counted
+    /// from its first.
     pub layer: u32,
     /// What it holds when the pass begins.
     pub load: DepthLoad,
     /// Whether the depth is kept.
     pub store: bool,
+    /// What its stencil holds when the pass begins; means nothing to formats without stencil.
+    pub stencil: StencilLoad,
+    /// Whether the stencil is kept.
+    pub stencil_store: bool,
+    /// Depth and stencil are loaded and tested, and never written. The texture may be sampled meanwhile, where the pass's
+    /// dependencies list it.
+    pub read_only: bool,
 }
 
 impl DepthAttachment {
-    /// The first mip and layer, cleared to a depth and kept.
+    /// The first mip and layer, cleared to a depth and the stencil 0, and kept.
     pub fn clear(texture: TextureHandle, depth: f32) -> Self {
-        Self { texture, mip: 0, layer: 0, load: DepthLoad::Clear(depth), store: true }
+        Self {
+            texture,
+            mip: 0,
+            layer: 0,
+            load: DepthLoad::Clear(depth),
+            store: true,
+            stencil: StencilLoad::Clear(0),
+            stencil_store: true,
+            read_only: false,
+        }
+    }
+
+    /// The first mip and layer, with what is in them, and kept.
+    pub fn load(texture: TextureHandle) -> Self {
+        Self { load: DepthLoad::Load, stencil: StencilLoad::Load, ..Self::clear(texture, 0.0) }
+    }
+
+    /// The first mip and layer, tested and not written.
+    pub fn read_only(texture: TextureHandle) -> Self {
+        Self { read_only: true, ..Self::load(texture) }
     }
 }

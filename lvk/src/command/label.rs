@@ -35,7 +35,7 @@ impl CommandBuffer {
     /// Stamps the begin of a scope or the end of the innermost, if the command buffer is profiled.
     pub(super) fn stamp(&mut self, name: Option<&str>) {
         if let Some(scopes) = &mut self.scopes {
-            self.shared.profiler.stamp(scopes, self.recording.commands, name);
+            self.shared.profiler.stamp(scopes, self.recording.commands, name, self.views);
         }
     }
 }

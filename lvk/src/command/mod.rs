@@ -7,6 +7,7 @@ pub(crate) mod bind;
 pub(crate) mod compute;
 pub(crate) mod dependencies;
 mod draw_mesh;
+mod dynamic;
 pub(crate) mod flush;
 mod found;
 pub(crate) mod gpu_build;
@@ -14,6 +15,7 @@ mod instances;
 mod kernel;
 mod label;
 mod part_uses;
+mod pass_area;
 pub(crate) mod query;
 mod query_log;
 pub(crate) mod render;
@@ -74,6 +76,8 @@ pub struct CommandBuffer {
     rendering: bool,
     /// Whether one was ever begun.
     had_pass: bool,
+    /// Views that the open pass draws at once: every query takes so many. 1 outside of passes.
+    views: u32,
     settle: Vec<Settle>,
     tlas_updates: Vec<TlasUpdate>,
     open_builds: Vec<OpenBuild>,
@@ -126,6 +130,7 @@ impl CommandBuffer {
             host_reads: Vec::new(),
             open_labels: 0,
             rendering: false,
+            views: 1,
             had_pass: false,
             settle: Vec::new(),
             tlas_updates: Vec::new(),

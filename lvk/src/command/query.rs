@@ -42,13 +42,13 @@ impl CommandBuffer {
     /// [`Context::submit`](crate::Context::submit) checks.
     pub fn write_timestamp(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         let pool = self.shared.store.query_pools.get(pool)?;
-        pool.check_range(query, 1)?;
+        pool.check_range(query, self.views)?;
         pool.check_kind(pool.kind == QueryKind::Timestamps, "measure with begin_query and end_query")?;
-        self.queries.check_ready(&pool, query)?;
+        self.queries.check_ready(&pool, query, self.views)?;
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         // SAFETY: the query exists and is ready.
         unsafe { self.shared.gpu.device.cmd_write_timestamp2(self.raw(), stage, pool.raw, query) };
-        self.queries.write(&pool, query);
+        self.queries.write(&pool, query, self.views);
         Ok(())
     }
 
@@ -76,17 +76,17 @@ impl CommandBuffer {
 
     fn begin_query_here(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         let pool = self.shared.store.query_pools.get(pool)?;
-        pool.check_range(query, 1)?;
+        pool.check_range(query, self.views)?;
         pool.check_kind(pool.kind != QueryKind::Timestamps, "write them with write_timestamp")?;
         self.queries.check_begin(&pool)?;
-        self.queries.check_ready(&pool, query)?;
+        self.queries.check_ready(&pool, query, self.views)?;
         self.check_statistics(pool.kind)?;
         // SAFETY: the query exists and is ready, and none of its type is open.
         unsafe {
             let device = &self.shared.gpu.device;
             device.cmd_begin_query(self.raw(), pool.raw, query, pool.kind.control());
         }
-        self.queries.begin(pool, query, self.rendering);
+        self.queries.begin(pool, query, self.views, self.rendering);
         Ok(())
     }
 
@@ -136,11 +136,13 @@ impl CommandBuffer {
 
 impl RenderPass<'_> {
     /// As [`CommandBuffer::write_timestamp`], between draws. Devices that draw in tiles answer times of the whole pass.
+    /// In a pass with a view mask, this and the following queries are written, one for each view.
     pub fn write_timestamp(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         self.cmd.write_timestamp(pool, query)
     }
 
-    /// As [`CommandBuffer::begin_query`], to be ended in the same pass.
+    /// As [`CommandBuffer::begin_query`], to be ended in the same pass. In a pass with a view mask, this and the following
+    /// queries are taken, one for each view: the result is their sum, which drivers may put into the first alone.
     pub fn begin_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         self.cmd.begin_query_here(pool, query)
     }

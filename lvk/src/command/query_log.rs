@@ -24,14 +24,19 @@ pub(super) struct OpenQuery {
 }
 
 impl QueryLog {
-    /// Fails unless the query may be written.
-    pub(super) fn check_ready(&mut self, pool: &Arc<QueryPool>, query: u32) -> Result<()> {
-        if self.marks(pool).is_ready(query) { Ok(()) } else { Err(pool.not_reset(query)) }
+    /// Fails unless `count` queries from `query` on may be written.
+    pub(super) fn check_ready(&mut self, pool: &Arc<QueryPool>, query: u32, count: u32) -> Result<()> {
+        let marks = self.marks(pool);
+        match (query..query + count).find(|query| !marks.is_ready(*query)) {
+            None => Ok(()),
+            Some(query) => Err(pool.not_reset(query)),
+        }
     }
 
-    /// The query is written.
-    pub(super) fn write(&mut self, pool: &Arc<QueryPool>, query: u32) {
-        self.marks(pool).write(query);
+    /// `count` queries from `query` on are written.
+    pub(super) fn write(&mut self, pool: &Arc<QueryPool>, query: u32, count: u32) {
+        let marks = self.marks(pool);
+        (query..query + count).for_each(|query| marks.write(query));
     }
 
     /// Fails where one of the queries is open.
@@ -66,9 +71,9 @@ impl QueryLog {
         }
     }
 
-    /// The query is open from now on.
-    pub(super) fn begin(&mut self, pool: Arc<QueryPool>, query: u32, in_pass: bool) {
-        self.write(&pool, query);
+    /// The query is open from now on, and takes `count` of its pool.
+    pub(super) fn begin(&mut self, pool: Arc<QueryPool>, query: u32, count: u32, in_pass: bool) {
+        self.write(&pool, query, count);
         self.open.push(OpenQuery { pool, query, in_pass });
     }
 

@@ -8,6 +8,8 @@ use ash::vk;
 use super::CommandBuffer;
 use super::bind::words;
 use super::compute::check_arguments;
+use super::dynamic::{DynamicState, WRITES_READ_ONLY};
+use super::pass_area::PassArea;
 use super::targets::Targets;
 use crate::barrier::Use;
 use crate::error::{Error, Result, check_limit};
@@ -30,7 +32,8 @@ use crate::resource::buffer::BufferUsage;
 /// ```
 pub struct RenderPass<'a> {
     pub(super) cmd: &'a mut CommandBuffer,
-    targets: Targets,
+    pub(super) targets: Targets,
+    pub(super) dynamic: DynamicState,
     pub(super) labelled: bool,
     /// Labels open around the pass.
     pub(super) labels_outside: u32,
@@ -70,6 +73,7 @@ impl<'a> RenderPass<'a> {
         let pass = Self {
             cmd,
             targets,
+            dynamic: DynamicState::default(),
             labelled,
             labels_outside,
             pipeline: None,
@@ -78,7 +82,7 @@ impl<'a> RenderPass<'a> {
             vertex_slots: 0,
         };
         pass.set_viewport([0.0, 0.0, width as f32, height as f32], [0.0, 1.0]);
-        pass.set_scissor([0, 0], [width, height]);
+        pass.set_scissor(pass.targets.area);
         pass
     }
 
@@ -87,20 +91,18 @@ impl<'a> RenderPass<'a> {
         self.targets.extent
     }
 
-    /// Binds a graphics pipeline for the draws that follow. Its formats must be those of the targets.
+    /// Binds a graphics pipeline for the draws that follow. Its formats and views must be those of the pass, and it may
+    /// not write to a read-only depth target.
     pub fn bind_render_pipeline(&mut self, pipeline: RenderPipelineHandle) -> Result<()> {
         let pipeline = self.cmd.shared.store.render_pipelines.get(pipeline)?;
         let targets = &self.targets;
-        if pipeline.color_formats != targets.color_formats || pipeline.depth_format != targets.depth_format {
-            let message = format!(
-                "it draws to {:?} and depth {:?}, but the pass has {:?} and depth {:?}",
-                pipeline.color_formats, pipeline.depth_format, targets.color_formats, targets.depth_format
-            );
+        if pipeline.shape != targets.shape {
+            let message = format!("it draws to {}, but the pass has {}", pipeline.shape, targets.shape);
             return Err(Error::usage(&*pipeline.name, message));
         }
-        if targets.samples != 1 {
-            let message = format!("it draws one sample a pixel, but the pass has {}", targets.samples);
-            return Err(Error::usage(&*pipeline.name, message));
+        let writes = pipeline.writes_stencil || pipeline.pass_state.depth.is_some_and(|depth| depth.write);
+        if targets.read_only_depth && writes {
+            return Err(Error::usage(&*pipeline.name, WRITES_READ_ONLY));
         }
         if !pipeline.query_stages.is_empty() {
             self.cmd.use_structures(pipeline.query_stages);
@@ -111,6 +113,7 @@ impl<'a> RenderPass<'a> {
         let point = vk::PipelineBindPoint::GRAPHICS;
         self.cmd.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
         self.draws = DrawNeeds::of(&pipeline);
+        self.set_state_of(&pipeline.pass_state);
         self.pipeline = Some(pipeline);
         Ok(())
     }
@@ -137,16 +140,16 @@ impl<'a> RenderPass<'a> {
         Ok(())
     }
 
-    /// Draws only inside of a rectangle: offset and extent in pixels, inside the targets.
+    /// Draws only inside of a rectangle: offset and extent in pixels, inside the pass's area.
     pub fn scissor(&mut self, offset: [u32; 2], extent: [u32; 2]) -> Result<()> {
-        let inside = (0..2).all(|axis| {
-            offset[axis].checked_add(extent[axis]).is_some_and(|end| end <= self.targets.extent[axis])
-        });
-        if !inside {
-            let message = format!("{offset:?} + {extent:?} is outside of {:?}", self.targets.extent);
+        let area = self.targets.area;
+        let wanted = PassArea { offset, extent };
+        if !area.contains(wanted) {
+            let message =
+                format!("{offset:?} + {extent:?} is outside of {:?} + {:?}", area.offset, area.extent);
             return Err(Error::usage("scissor", message));
         }
-        self.set_scissor(offset, extent);
+        self.set_scissor(wanted);
         Ok(())
     }
 
@@ -354,7 +357,7 @@ impl<'a> RenderPass<'a> {
         Ok(pipeline)
     }
 
-    fn bound(&self, call: &str) -> Result<&RenderPipeline> {
+    pub(super) fn bound(&self, call: &str) -> Result<&RenderPipeline> {
         self.pipeline.as_deref().ok_or_else(|| Error::usage(call, "bind a render pipeline first"))
     }
 
@@ -382,11 +385,9 @@ impl<'a> RenderPass<'a> {
         unsafe { self.cmd.shared.gpu.device.cmd_set_viewport(self.cmd.raw(), 0, &[viewport]) };
     }
 
-    fn set_scissor(&self, [x, y]: [u32; 2], [width, height]: [u32; 2]) {
-        let offset = vk::Offset2D { x: x as i32, y: y as i32 };
-        let scissor = vk::Rect2D { offset, extent: vk::Extent2D { width, height } };
+    fn set_scissor(&self, area: PassArea) {
         // SAFETY: the rectangle lies inside the targets and a pass is open.
-        unsafe { self.cmd.shared.gpu.device.cmd_set_scissor(self.cmd.raw(), 0, &[scissor]) };
+        unsafe { self.cmd.shared.gpu.device.cmd_set_scissor(self.cmd.raw(), 0, &[area.raw()]) };
     }
 }
 

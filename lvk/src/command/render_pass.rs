@@ -25,8 +25,19 @@ const DRAW_INPUTS: [(BufferUsage, fn() -> Use); 3] = [
 pub struct RenderPassDesc<'a> {
     /// Colour targets, in the order of the shaders' outputs.
     pub color: &'a [ColorAttachment],
-    /// Depth target.
+    /// Depth and stencil target.
     pub depth: Option<DepthAttachment>,
+    /// How many layers each target has, from its own first on; 0 and 1 are one. Draws choose theirs by `gl_Layer`, in the
+    /// geometry and mesh stages, and with
+    /// [`OptionalFeature::ShaderOutputLayer`](crate::OptionalFeature::ShaderOutputLayer) in the vertex stage.
+    pub layers: u32,
+    /// Views that each draw makes at once, a bit for each: bit `i` draws to the layer `i` of each target, counted from the
+    /// target's own first, and shaders know it by `gl_ViewIndex` (`#extension GL_EXT_multiview`). 0 for one picture.
+    /// Needs [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview); at most
+    /// [`Limits::max_views`](crate::Limits::max_views).
+    pub view_mask: u32,
+    /// The pixels that are loaded, cleared, drawn and stored: x, y, width and height. `None` for all.
+    pub area: Option<[u32; 4]>,
     /// What the pass's shaders reach bindlessly, and what its draws read that was written earlier in the same command
     /// buffer: no barrier can be placed inside a pass. Acceleration structures need not be listed.
     pub dependencies: Dependencies<'a>,
@@ -35,12 +46,17 @@ pub struct RenderPassDesc<'a> {
 }
 
 impl CommandBuffer {
-    /// Begins a render pass (`vkCmdBeginRendering`), which ends when the value is dropped. Viewport and scissor cover
-    /// the targets.
+    /// Begins a render pass (`vkCmdBeginRendering`), which ends when the value is dropped. The viewport covers the targets,
+    /// the scissor the area.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) for targets that do not go together, do not exist, or are named twice;
+    /// [`LimitExceeded`](Error::LimitExceeded) for too many colours, layers or views; [`Unsupported`](Error::Unsupported)
+    /// for views without [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview).
     pub fn begin_rendering(&mut self, desc: &RenderPassDesc<'_>) -> Result<RenderPass<'_>> {
         let mut targets = None;
         self.flush_after(|cmd| {
-            targets = Some(cmd.use_targets(desc.color, desc.depth.as_ref())?);
+            targets = Some(cmd.use_targets(desc)?);
             cmd.use_built_structures();
             cmd.use_dependencies(&desc.dependencies, Stages::PRE_RASTER | Stages::FRAGMENT)?;
             cmd.use_draw_inputs(&desc.dependencies)
@@ -56,20 +72,22 @@ impl CommandBuffer {
     }
 
     fn record_begin(&mut self, targets: &Targets) {
-        let [width, height] = targets.extent;
-        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent: vk::Extent2D { width, height } };
-        let depth = targets.depth.unwrap_or_default();
-        let mut info =
-            vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&targets.colors);
-        if targets.depth.is_some() {
-            info = info.depth_attachment(&depth);
+        let layers = targets.layers;
+        let mut info = vk::RenderingInfo::default()
+            .render_area(targets.area.raw())
+            .layer_count(layers.count())
+            .view_mask(layers.view_mask)
+            .color_attachments(&targets.colors);
+        if let Some(depth) = &targets.depth {
+            info = info.depth_attachment(depth);
         }
-        if targets.stencil {
-            info = info.stencil_attachment(&depth);
+        if let Some(stencil) = &targets.stencil {
+            info = info.stencil_attachment(stencil);
         }
         // SAFETY: the views are alive and in the layouts named; no other pass is open, as passes borrow `self`.
         unsafe { self.shared.gpu.device.cmd_begin_rendering(self.raw(), &info) };
         self.rendering = true;
+        self.views = layers.queries();
         self.had_pass = true;
     }
 
@@ -78,6 +96,7 @@ impl CommandBuffer {
         if self.rendering {
             self.end_pass_queries();
             self.rendering = false;
+            self.views = 1;
             // SAFETY: a pass was begun and has not been ended.
             unsafe { self.shared.gpu.device.cmd_end_rendering(self.raw()) };
         }

@@ -5,11 +5,14 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad};
-use crate::barrier::Use;
+use super::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, StencilLoad};
+use super::pass_area::{PassArea, PassLayers};
+use super::render_pass::RenderPassDesc;
+use crate::barrier::{Subresources, Use};
 use crate::error::{Error, Result, check_limit};
 use crate::format::{Format, Numbers};
 use crate::handle::TextureHandle;
+use crate::pipeline::shape::PassShape;
 use crate::resource::Texture;
 use crate::resource::texture_desc::TextureUsage;
 use crate::submit::emit::layout;
@@ -17,60 +20,106 @@ use crate::submit::emit::layout;
 /// The targets of a pass, found and checked.
 pub(super) struct Targets {
     pub(super) extent: [u32; 2],
-    pub(super) color_formats: Vec<Format>,
-    pub(super) depth_format: Option<Format>,
+    pub(super) area: PassArea,
+    pub(super) layers: PassLayers,
+    pub(super) shape: PassShape,
+    pub(super) read_only_depth: bool,
     pub(super) colors: Vec<vk::RenderingAttachmentInfo<'static>>,
     pub(super) depth: Option<vk::RenderingAttachmentInfo<'static>>,
-    pub(super) stencil: bool,
-    /// Samples a pixel, the same in all targets.
-    pub(super) samples: u32,
+    pub(super) stencil: Option<vk::RenderingAttachmentInfo<'static>>,
+}
+
+/// A mip of some layers of a texture.
+struct Target {
+    texture: Arc<Texture>,
+    mip: u32,
+    layer: u32,
+    layers: PassLayers,
+}
+
+impl Target {
+    fn view(&self) -> Result<vk::ImageView> {
+        match self.layers.is_layered() {
+            false => self.texture.target_view(self.mip, self.layer),
+            true => self.texture.layered_target_view(self.mip, self.layer, self.layers.count()),
+        }
+    }
+
+    /// Mip and layers, or slices.
+    fn texels(&self) -> Subresources {
+        let part = self.texture.part(self.mip, self.layer);
+        Subresources { layer_count: self.layers.count(), ..part }
+    }
+
+    /// The same as barriers know it.
+    fn part(&self) -> Subresources {
+        self.texture.drawn_part(self.mip, self.layer, self.layers.count())
+    }
 }
 
 impl CommandBuffer {
     /// Finds and checks the targets of a pass; the pass uses them.
-    pub(super) fn use_targets(
-        &mut self,
-        color: &[ColorAttachment],
-        depth: Option<&DepthAttachment>,
-    ) -> Result<Targets> {
-        let limit = self.shared.gpu.caps.limits.max_color_targets;
-        check_limit("begin_rendering", "colour target count", color.len() as u64, limit.into())?;
+    pub(super) fn use_targets(&mut self, desc: &RenderPassDesc<'_>) -> Result<Targets> {
+        let gpu = &self.shared.gpu;
+        let limit = gpu.caps.limits.max_color_targets;
+        check_limit("begin_rendering", "colour target count", desc.color.len() as u64, limit.into())?;
+        let layers = PassLayers::of(gpu, desc)?;
+        let mut size = None;
+        let (mut colors, mut formats) = (Vec::new(), Vec::new());
+        let mut drawn = Vec::with_capacity(desc.color.len());
+        for attachment in desc.color {
+            let ColorAttachment { texture, mip, layer, .. } = *attachment;
+            let target = self.target(texture, mip, layer, layers, &mut size)?;
+            check_color(&target.texture, attachment.load)?;
+            check_apart(&target, &mut drawn)?;
+            self.use_texture(
+                &target.texture,
+                target.part(),
+                Use::color_target(attachment.load == ColorLoad::Load),
+            )?;
+            colors.push(color_info(&target, attachment)?);
+            formats.push(target.texture.format);
+        }
         let mut targets = Targets {
             extent: [0, 0],
-            color_formats: Vec::new(),
-            depth_format: None,
-            colors: Vec::new(),
+            area: PassArea::default(),
+            layers,
+            shape: PassShape::default(),
+            read_only_depth: false,
+            colors,
             depth: None,
-            stencil: false,
-            samples: 1,
+            stencil: None,
         };
-        let mut shape = None;
-        let mut drawn = Vec::with_capacity(color.len());
-        for attachment in color {
-            let texture = self.target(attachment.texture, attachment.mip, attachment.layer, &mut shape)?;
-            check_color(&texture, attachment.load)?;
-            let part = texture.part(attachment.mip, attachment.layer);
-            if drawn.contains(&(texture.image.id, part)) {
-                return Err(Error::usage(&texture.name, "the pass lists the colour target twice"));
-            }
-            drawn.push((texture.image.id, part));
-            let part = texture.drawn_part(attachment.mip, attachment.layer);
-            self.use_texture(&texture, part, Use::color_target(attachment.load == ColorLoad::Load))?;
-            targets.colors.push(color_info(&texture, attachment)?);
-            targets.color_formats.push(texture.format);
+        let mut depth_format = None;
+        if let Some(attachment) = &desc.depth {
+            let target =
+                self.target(attachment.texture, attachment.mip, attachment.layer, layers, &mut size)?;
+            depth_format = Some(target.texture.format);
+            self.use_depth(&target, attachment, &mut targets)?;
         }
-        if let Some(attachment) = depth {
-            let texture = self.target(attachment.texture, attachment.mip, attachment.layer, &mut shape)?;
-            check_depth(&texture, attachment.load)?;
-            let part = texture.drawn_part(attachment.mip, attachment.layer);
-            self.use_texture(&texture, part, Use::depth_target())?;
-            targets.depth = Some(depth_info(&texture, attachment)?);
-            targets.depth_format = Some(texture.format);
-            targets.stencil = texture.format.has_stencil();
-        }
-        (targets.extent, targets.samples) = shape
-            .ok_or_else(|| Error::usage("begin_rendering", "give the pass a colour or a depth target"))?;
+        let (extent, samples) =
+            size.ok_or_else(|| Error::usage("begin_rendering", "give the pass a colour or a depth target"))?;
+        targets.extent = extent;
+        targets.shape = PassShape::new(formats, depth_format, samples, desc.view_mask);
+        targets.area = PassArea::of(desc.area, extent)?;
         Ok(targets)
+    }
+
+    fn use_depth(
+        &mut self,
+        target: &Target,
+        attachment: &DepthAttachment,
+        targets: &mut Targets,
+    ) -> Result<()> {
+        let texture = &target.texture;
+        check_depth(texture, attachment)?;
+        let next = if attachment.read_only { Use::depth_read() } else { Use::depth_target() };
+        self.use_texture(texture, target.part(), next)?;
+        let view = target.view()?;
+        targets.depth = Some(depth_info(view, attachment));
+        targets.stencil = texture.format.has_stencil().then(|| stencil_info(view, attachment));
+        targets.read_only_depth = attachment.read_only;
+        Ok(())
     }
 
     /// Finds a target and checks that all targets are equally large, with equally many samples.
@@ -79,13 +128,14 @@ impl CommandBuffer {
         handle: TextureHandle,
         mip: u32,
         layer: u32,
-        shape: &mut Option<([u32; 2], u32)>,
-    ) -> Result<Arc<Texture>> {
+        layers: PassLayers,
+        size: &mut Option<([u32; 2], u32)>,
+    ) -> Result<Target> {
         let texture = self.shared.store.textures.get(handle)?;
         texture.check_usage(TextureUsage::TARGET)?;
-        texture.check_target(mip, layer)?;
+        texture.check_target(mip, layer, layers.count())?;
         let own = (texture.mip_extent(mip), texture.image.samples);
-        let first = *shape.get_or_insert(own);
+        let first = *size.get_or_insert(own);
         if first != own {
             let message = format!(
                 "the target has {:?} pixels of {} samples, another one of the pass {:?} of {}",
@@ -93,8 +143,18 @@ impl CommandBuffer {
             );
             return Err(Error::usage(&texture.name, message));
         }
-        Ok(texture)
+        Ok(Target { texture, mip, layer, layers })
     }
+}
+
+/// Fails where texels of the target are drawn to by an earlier one.
+fn check_apart(target: &Target, drawn: &mut Vec<(crate::barrier::ResourceId, Subresources)>) -> Result<()> {
+    let (id, texels) = (target.texture.image.id, target.texels());
+    if drawn.iter().any(|(other, part)| *other == id && part.intersection(texels).is_some()) {
+        return Err(Error::usage(&target.texture.name, "the pass lists the colour target twice"));
+    }
+    drawn.push((id, texels));
+    Ok(())
 }
 
 fn check_color(texture: &Texture, load: ColorLoad) -> Result<()> {
@@ -123,11 +183,16 @@ fn clear_name(format: Format) -> &'static str {
     }
 }
 
-fn check_depth(texture: &Texture, load: DepthLoad) -> Result<()> {
+fn check_depth(texture: &Texture, attachment: &DepthAttachment) -> Result<()> {
     if !texture.format.is_depth() {
         return Err(Error::usage(&texture.name, "the depth target needs a depth format"));
     }
-    match load {
+    let stencil_loads = attachment.stencil == StencilLoad::Load || !texture.format.has_stencil();
+    if attachment.read_only && !(attachment.load == DepthLoad::Load && stencil_loads) {
+        let message = "a read-only depth target is loaded, depth and stencil; use DepthAttachment::read_only";
+        return Err(Error::usage(&texture.name, message));
+    }
+    match attachment.load {
         DepthLoad::Clear(depth) if !(0.0..=1.0).contains(&depth) => {
             Err(Error::usage(&texture.name, format!("the clear depth {depth} is not between 0 and 1")))
         }
@@ -135,10 +200,7 @@ fn check_depth(texture: &Texture, load: DepthLoad) -> Result<()> {
     }
 }
 
-fn color_info(
-    texture: &Texture,
-    attachment: &ColorAttachment,
-) -> Result<vk::RenderingAttachmentInfo<'static>> {
+fn color_info(target: &Target, attachment: &ColorAttachment) -> Result<vk::RenderingAttachmentInfo<'static>> {
     let (op, color) = match attachment.load {
         ColorLoad::Load => (vk::AttachmentLoadOp::LOAD, vk::ClearColorValue::default()),
         ColorLoad::DontCare => (vk::AttachmentLoadOp::DONT_CARE, vk::ClearColorValue::default()),
@@ -147,29 +209,47 @@ fn color_info(
         ColorLoad::ClearUint(uint32) => (vk::AttachmentLoadOp::CLEAR, vk::ClearColorValue { uint32 }),
     };
     Ok(vk::RenderingAttachmentInfo::default()
-        .image_view(texture.target_view(attachment.mip, attachment.layer)?)
+        .image_view(target.view()?)
         .image_layout(layout(Use::color_target(false).layout))
         .load_op(op)
         .store_op(store_op(attachment.store))
         .clear_value(vk::ClearValue { color }))
 }
 
-fn depth_info(
-    texture: &Texture,
-    attachment: &DepthAttachment,
-) -> Result<vk::RenderingAttachmentInfo<'static>> {
+fn depth_info(view: vk::ImageView, attachment: &DepthAttachment) -> vk::RenderingAttachmentInfo<'static> {
     let (op, depth) = match attachment.load {
         DepthLoad::Load => (vk::AttachmentLoadOp::LOAD, 0.0),
         DepthLoad::DontCare => (vk::AttachmentLoadOp::DONT_CARE, 0.0),
         DepthLoad::Clear(depth) => (vk::AttachmentLoadOp::CLEAR, depth),
     };
-    let depth_stencil = vk::ClearDepthStencilValue { depth, stencil: 0 };
-    Ok(vk::RenderingAttachmentInfo::default()
-        .image_view(texture.target_view(attachment.mip, attachment.layer)?)
-        .image_layout(layout(Use::depth_target().layout))
+    aspect_info(view, attachment, attachment.store)
         .load_op(op)
-        .store_op(store_op(attachment.store))
-        .clear_value(vk::ClearValue { depth_stencil }))
+        .clear_value(vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth, stencil: 0 } })
+}
+
+fn stencil_info(view: vk::ImageView, attachment: &DepthAttachment) -> vk::RenderingAttachmentInfo<'static> {
+    let (op, value) = match attachment.stencil {
+        StencilLoad::Load => (vk::AttachmentLoadOp::LOAD, 0),
+        StencilLoad::DontCare => (vk::AttachmentLoadOp::DONT_CARE, 0),
+        StencilLoad::Clear(value) => (vk::AttachmentLoadOp::CLEAR, value),
+    };
+    let depth_stencil = vk::ClearDepthStencilValue { depth: 0.0, stencil: value.into() };
+    aspect_info(view, attachment, attachment.stencil_store)
+        .load_op(op)
+        .clear_value(vk::ClearValue { depth_stencil })
+}
+
+/// What depth and stencil share. What is only read is not stored either, which would be a write.
+fn aspect_info(
+    view: vk::ImageView,
+    attachment: &DepthAttachment,
+    store: bool,
+) -> vk::RenderingAttachmentInfo<'static> {
+    let (used, store) = match attachment.read_only {
+        true => (Use::depth_read(), vk::AttachmentStoreOp::NONE),
+        false => (Use::depth_target(), store_op(store)),
+    };
+    vk::RenderingAttachmentInfo::default().image_view(view).image_layout(layout(used.layout)).store_op(store)
 }
 
 fn store_op(store: bool) -> vk::AttachmentStoreOp {

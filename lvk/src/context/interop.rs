@@ -76,7 +76,7 @@ impl Context {
     pub fn raw_target_view(&self, texture: TextureHandle, mip: u32, layer: u32) -> Result<vk::ImageView> {
         let texture = self.shared().store.textures.get(texture)?;
         texture.check_usage(TextureUsage::TARGET)?;
-        texture.check_target(mip, layer)?;
+        texture.check_target(mip, layer, 1)?;
         texture.target_view(mip, layer)
     }
 

@@ -194,6 +194,14 @@ pub struct Limits {
     pub max_push_constant_bytes: u32,
     /// Most colour targets of a render pass (`maxColorAttachments`).
     pub max_color_targets: u32,
+    /// Most layers of a render pass (`maxFramebufferLayers`).
+    pub max_target_layers: u32,
+    /// Most views of a render pass that draws several at once (`maxMultiviewViewCount`).
+    pub max_views: u32,
+    /// Most vertices of a patch, before and behind the tessellation control stage (`maxTessellationPatchSize`).
+    pub max_patch_points: u32,
+    /// Least and greatest width of lines in pixels (`lineWidthRange`).
+    pub line_width: [f32; 2],
     /// Most workgroups of a dispatch for each axis (`maxComputeWorkGroupCount`).
     pub max_dispatch_groups: [u32; 3],
     /// Most invocations of a workgroup for each axis (`maxComputeWorkGroupSize`).
@@ -397,6 +405,7 @@ impl PhysicalDevice {
         caps.limits = limits(&plain.limits, &v12, &v13, &accel, &pipeline);
         caps.limits.mesh = MeshLimits::of(&mesh);
         caps.limits.max_custom_borders = borders.max_custom_border_color_samplers;
+        caps.limits.max_views = v11.max_multiview_view_count;
     }
 }
 
@@ -472,6 +481,10 @@ fn limits(
         max_storage_buffer_range: plain.max_storage_buffer_range.into(),
         max_push_constant_bytes: plain.max_push_constants_size,
         max_color_targets: plain.max_color_attachments.min(8),
+        max_target_layers: plain.max_framebuffer_layers,
+        max_views: 0,
+        max_patch_points: plain.max_tessellation_patch_size,
+        line_width: plain.line_width_range,
         max_dispatch_groups: plain.max_compute_work_group_count,
         max_group_size: plain.max_compute_work_group_size,
         max_group_invocations: plain.max_compute_work_group_invocations,

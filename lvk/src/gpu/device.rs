@@ -18,7 +18,7 @@ use super::optional::{OF_WINDOWS, OptionalFeature};
 use super::profile::DeviceProfile;
 use super::ray_query_path::RayQueryRequest;
 use super::select::{Candidate, choose};
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, check_limit};
 
 /// What the caller asks of a device.
 #[derive(Debug, Clone, Copy)]
@@ -165,6 +165,13 @@ impl Gpu {
         Err(Error::unsupported(what, format!("the device '{}' lacks {name}: {why}", self.caps.device_name)))
     }
 
+    /// Fails unless the device draws so many views at once.
+    pub(crate) fn check_view_mask(&self, name: &str, view_mask: u32) -> Result<()> {
+        self.require(OptionalFeature::Multiview, &format!("the view mask {view_mask:#b} of '{name}'"))?;
+        let views = u64::from(u32::BITS - view_mask.leading_zeros());
+        check_limit(name, "count of views, up to the highest bit", views, self.caps.limits.max_views.into())
+    }
+
     /// Milliseconds since an arbitrary start of what a timestamp counts.
     pub(crate) fn milliseconds(&self, ticks: u64) -> f64 {
         let limits = &self.caps.limits;
@@ -194,6 +201,20 @@ impl Gpu {
                 info.flags,
             )
         }
+    }
+
+    /// How many samples a pixel a plain target of `format` may have; none where it cannot be a target.
+    pub(crate) fn target_samples(
+        &self,
+        format: vk::Format,
+        usage: vk::ImageUsageFlags,
+    ) -> vk::SampleCountFlags {
+        let info = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(format)
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(usage);
+        self.image_limits(&info).map_or(vk::SampleCountFlags::empty(), |limits| limits.sample_counts)
     }
 }
 

@@ -4,16 +4,17 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::blend::{Blend, blend_state};
+use super::depth_stencil::{DepthState, DepthTest, depth_stencil_state};
 use super::graphics_check::{check, check_stages};
-use super::graphics_desc::{
-    Blend, CullMode, DepthTest, FrontFace, RenderPipelineDesc, Topology, VertexAttribute,
-};
+use super::graphics_desc::{RenderPipelineDesc, VertexAttribute};
 use super::layout::PipelineBase;
+use super::raster::{DepthBias, multisampling, rasterization};
 use super::shader_module::ShaderModule;
+use super::shape::PassShape;
 use super::stage::{Specialization, stage};
 use crate::barrier::Stages;
 use crate::error::{Error, Result};
-use crate::format::Format;
 use crate::gpu::Gpu;
 use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;
@@ -23,6 +24,9 @@ pub(super) struct RenderModules {
     pub(super) vertex: Option<Arc<ShaderModule>>,
     pub(super) task: Option<Arc<ShaderModule>>,
     pub(super) mesh: Option<Arc<ShaderModule>>,
+    pub(super) tess_control: Option<Arc<ShaderModule>>,
+    pub(super) tess_eval: Option<Arc<ShaderModule>>,
+    pub(super) geometry: Option<Arc<ShaderModule>>,
     pub(super) fragment: Option<Arc<ShaderModule>>,
 }
 
@@ -33,12 +37,16 @@ impl RenderModules {
             vertex: find(desc.vertex)?,
             task: find(desc.task)?,
             mesh: find(desc.mesh)?,
+            tess_control: find(desc.tess_control)?,
+            tess_eval: find(desc.tess_eval)?,
+            geometry: find(desc.geometry)?,
             fragment: find(desc.fragment)?,
         })
     }
 
-    fn iter(&self) -> impl Iterator<Item = &ShaderModule> + Clone {
-        [&self.vertex, &self.task, &self.mesh, &self.fragment].into_iter().filter_map(Option::as_deref)
+    pub(super) fn iter(&self) -> impl Iterator<Item = &ShaderModule> + Clone {
+        let before = [&self.vertex, &self.task, &self.mesh, &self.tess_control, &self.tess_eval];
+        before.into_iter().chain([&self.geometry, &self.fragment]).filter_map(Option::as_deref)
     }
 
     /// Stages of the pipeline in which rays are queried.
@@ -65,6 +73,46 @@ pub(crate) enum FrontEnd {
     TaskAndMesh,
 }
 
+/// The state that a pipeline leaves to the pass, which sets it when the pipeline is bound.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct PassState {
+    /// The pipeline tests depth, so by default.
+    pub(crate) depth: Option<DepthState>,
+    /// It offsets depths, so by default.
+    pub(crate) bias: Option<DepthBias>,
+    /// It tests stencil, against the pass's reference.
+    pub(crate) stencil: bool,
+    /// It blends with the pass's constants.
+    pub(crate) blend_constants: bool,
+}
+
+impl PassState {
+    fn of(desc: &RenderPipelineDesc<'_>) -> Self {
+        let blends = desc.color.iter().filter_map(|target| target.blend);
+        Self {
+            depth: desc.depth.map(|depth| depth.state()),
+            bias: desc.depth_bias,
+            stencil: desc.stencil.is_some(),
+            blend_constants: blends.into_iter().any(Blend::takes_constants),
+        }
+    }
+
+    fn dynamic_states(&self) -> Vec<vk::DynamicState> {
+        use vk::DynamicState as Raw;
+        let mut states = vec![Raw::VIEWPORT, Raw::SCISSOR];
+        if self.depth.is_some() {
+            states.extend([Raw::DEPTH_WRITE_ENABLE, Raw::DEPTH_COMPARE_OP]);
+        }
+        let rest = [
+            (self.bias.is_some(), Raw::DEPTH_BIAS),
+            (self.stencil, Raw::STENCIL_REFERENCE),
+            (self.blend_constants, Raw::BLEND_CONSTANTS),
+        ];
+        states.extend(rest.iter().filter(|(on, _)| *on).map(|(_, state)| *state));
+        states
+    }
+}
+
 /// A graphics pipeline, destroyed on drop.
 pub(crate) struct RenderPipeline {
     pub(crate) raw: vk::Pipeline,
@@ -72,8 +120,10 @@ pub(crate) struct RenderPipeline {
     /// Stages in which rays are queried.
     pub(crate) query_stages: Stages,
     pub(crate) front_end: FrontEnd,
-    pub(crate) color_formats: Vec<Format>,
-    pub(crate) depth_format: Option<Format>,
+    pub(crate) shape: PassShape,
+    pub(crate) pass_state: PassState,
+    /// Stencil values may change.
+    pub(crate) writes_stencil: bool,
     pub(crate) vertex_binding_count: u32,
     pub(crate) name: Arc<str>,
     gpu: Arc<Gpu>,
@@ -101,8 +151,9 @@ impl RenderPipeline {
                 (Some(_), None) => FrontEnd::Mesh,
                 (Some(_), Some(_)) => FrontEnd::TaskAndMesh,
             },
-            color_formats: desc.color.iter().map(|target| target.format).collect(),
-            depth_format: desc.depth.map(|depth| depth.format),
+            shape: desc.shape(),
+            pass_state: PassState::of(desc),
+            writes_stencil: desc.stencil.is_some_and(|test| test.writes()),
             vertex_binding_count: desc.vertex_bindings.len() as u32,
             name: desc.debug_name.into(),
             gpu: Arc::clone(gpu),
@@ -130,22 +181,24 @@ fn create(
     let input = vk::PipelineVertexInputStateCreateInfo::default()
         .vertex_binding_descriptions(&bindings)
         .vertex_attribute_descriptions(&attributes);
-    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(topology(desc.topology));
+    let assembly = vk::PipelineInputAssemblyStateCreateInfo::default().topology(desc.topology.raw());
+    let patches =
+        vk::PipelineTessellationStateCreateInfo::default().patch_control_points(desc.topology.patch_points());
     let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
     let raster = rasterization(desc);
-    let samples =
-        vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
-    let depth = depth_state(desc.depth);
-    let blends: Vec<_> = desc.color.iter().map(|target| blend_state(target.blend)).collect();
+    let samples = multisampling(desc);
+    let depth = depth_stencil_state(desc.depth, desc.stencil);
+    let blends: Vec<_> = desc.color.iter().map(|target| blend_state(target.blend, target.write)).collect();
     let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
-    let dynamic = [vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR];
+    let dynamic = PassState::of(desc).dynamic_states();
     let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
     let colors: Vec<_> = desc.color.iter().map(|target| target.format.raw()).collect();
-    let mut rendering = rendering_formats(&colors, desc.depth.map(|depth| depth.format));
+    let mut rendering = rendering_info(&colors, desc);
     let info = vk::GraphicsPipelineCreateInfo::default()
         .stages(&stages)
         .vertex_input_state(&input)
         .input_assembly_state(&assembly)
+        .tessellation_state(&patches)
         .viewport_state(&viewport)
         .rasterization_state(&raster)
         .multisample_state(&samples)
@@ -184,57 +237,13 @@ fn vertex_attributes(desc: &RenderPipelineDesc<'_>) -> Vec<vk::VertexInputAttrib
     desc.vertex_attributes.iter().map(raw).collect()
 }
 
-fn topology(topology: Topology) -> vk::PrimitiveTopology {
-    match topology {
-        Topology::Points => vk::PrimitiveTopology::POINT_LIST,
-        Topology::Lines => vk::PrimitiveTopology::LINE_LIST,
-        Topology::LineStrip => vk::PrimitiveTopology::LINE_STRIP,
-        Topology::Triangles => vk::PrimitiveTopology::TRIANGLE_LIST,
-        Topology::TriangleStrip => vk::PrimitiveTopology::TRIANGLE_STRIP,
-    }
-}
-
-fn rasterization(desc: &RenderPipelineDesc<'_>) -> vk::PipelineRasterizationStateCreateInfo<'static> {
-    let cull = match desc.cull {
-        CullMode::None => vk::CullModeFlags::NONE,
-        CullMode::Front => vk::CullModeFlags::FRONT,
-        CullMode::Back => vk::CullModeFlags::BACK,
-    };
-    let front = match desc.front_face {
-        FrontFace::CounterClockwise => vk::FrontFace::COUNTER_CLOCKWISE,
-        FrontFace::Clockwise => vk::FrontFace::CLOCKWISE,
-    };
-    vk::PipelineRasterizationStateCreateInfo::default().cull_mode(cull).front_face(front).line_width(1.0)
-}
-
-fn depth_state(depth: Option<DepthTest>) -> vk::PipelineDepthStencilStateCreateInfo<'static> {
-    let Some(depth) = depth else { return vk::PipelineDepthStencilStateCreateInfo::default() };
-    vk::PipelineDepthStencilStateCreateInfo::default()
-        .depth_test_enable(true)
-        .depth_write_enable(depth.write)
-        .depth_compare_op(depth.compare.raw())
-}
-
-fn blend_state(blend: Option<Blend>) -> vk::PipelineColorBlendAttachmentState {
-    let state =
-        vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
-    let Some(blend) = blend else { return state };
-    let (source, target) = match blend {
-        Blend::Alpha => (vk::BlendFactor::SRC_ALPHA, vk::BlendFactor::ONE_MINUS_SRC_ALPHA),
-        Blend::PremultipliedAlpha => (vk::BlendFactor::ONE, vk::BlendFactor::ONE_MINUS_SRC_ALPHA),
-        Blend::Additive => (vk::BlendFactor::ONE, vk::BlendFactor::ONE),
-    };
-    state
-        .blend_enable(true)
-        .src_color_blend_factor(source)
-        .dst_color_blend_factor(target)
-        .src_alpha_blend_factor(vk::BlendFactor::ONE)
-        .dst_alpha_blend_factor(target)
-}
-
-fn rendering_formats(colors: &[vk::Format], depth: Option<Format>) -> vk::PipelineRenderingCreateInfo<'_> {
-    let info = vk::PipelineRenderingCreateInfo::default().color_attachment_formats(colors);
-    let Some(depth) = depth else { return info };
+fn rendering_info<'a>(
+    colors: &'a [vk::Format],
+    desc: &RenderPipelineDesc<'_>,
+) -> vk::PipelineRenderingCreateInfo<'a> {
+    let info =
+        vk::PipelineRenderingCreateInfo::default().color_attachment_formats(colors).view_mask(desc.view_mask);
+    let Some(DepthTest { format: depth, .. }) = desc.depth else { return info };
     let info = info.depth_attachment_format(depth.raw());
     if depth.has_stencil() { info.stencil_attachment_format(depth.raw()) } else { info }
 }

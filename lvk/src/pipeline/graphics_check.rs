@@ -5,10 +5,13 @@ use ash::vk;
 use super::graphics::RenderModules;
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
 use super::group_size::{GroupLimits, check_group_size};
+use super::raster::Topology;
+use super::state_check::check_state;
 use crate::error::{Error, Result, check_limit};
 use crate::format::Format;
 use crate::gpu::Gpu;
-use crate::shader::ShaderStage;
+use crate::gpu::optional::OptionalFeature;
+use crate::shader::{Primitive, ShaderStage};
 
 /// Fails unless the description names stages that go together.
 pub(super) fn check_stages(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
@@ -18,6 +21,18 @@ pub(super) fn check_stages(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<(
         (None, _, None) => "give the pipeline a vertex shader or a mesh shader",
         (Some(_), _, Some(_)) => "a mesh shader takes the place of the vertex shader; give one of them",
         (Some(_), Some(_), None) => "a task shader feeds a mesh shader, not a vertex shader",
+        (None, _, Some(_))
+            if desc.tess_control.or(desc.tess_eval).or(desc.geometry).is_some()
+                || desc.topology.patch_points() > 0 =>
+        {
+            "a mesh shader makes its primitives itself; leave tessellation, geometry and patches out"
+        }
+        _ if desc.tess_control.is_some() != desc.tess_eval.is_some() => {
+            "tessellation takes a control and an evaluation shader; give the pipeline both"
+        }
+        _ if desc.tess_eval.is_some() != matches!(desc.topology, Topology::Patches { .. }) => {
+            "tessellation shaders and Topology::Patches need each other"
+        }
         (None, _, Some(_)) if !desc.vertex_bindings.is_empty() || !desc.vertex_attributes.is_empty() => {
             "a mesh shader has no vertex buffers and attributes; let it read by address"
         }
@@ -26,11 +41,27 @@ pub(super) fn check_stages(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<(
             return if lacking {
                 Err(gpu.lacks(&format!("pipeline '{name}': mesh shaders")))
             } else {
-                Ok(())
+                check_optional_stages(gpu, desc)
             };
         }
     };
     Err(Error::usage(name, message))
+}
+
+fn check_optional_stages(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
+    let name = desc.debug_name;
+    if let Topology::Patches { points } = desc.topology {
+        gpu.require(OptionalFeature::TessellationShader, &format!("tessellation in pipeline '{name}'"))?;
+        if points == 0 {
+            return Err(Error::usage(name, "patches have at least one point"));
+        }
+        let most = gpu.caps.limits.max_patch_points;
+        check_limit(name, "count of points of a patch", points.into(), most.into())?;
+    }
+    match desc.geometry {
+        Some(_) => gpu.require(OptionalFeature::GeometryShader, &format!("the geometry stage of '{name}'")),
+        None => Ok(()),
+    }
 }
 
 /// Fails unless the modules are of their stages and everything fits the device.
@@ -40,6 +71,9 @@ pub(super) fn check(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderMo
         (&modules.vertex, ShaderStage::Vertex),
         (&modules.task, ShaderStage::Task),
         (&modules.mesh, ShaderStage::Mesh),
+        (&modules.tess_control, ShaderStage::TessControl),
+        (&modules.tess_eval, ShaderStage::TessEval),
+        (&modules.geometry, ShaderStage::Geometry),
         (&modules.fragment, ShaderStage::Fragment),
     ];
     for (module, stage) in stages {
@@ -49,7 +83,9 @@ pub(super) fn check(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderMo
     check_limit(name, "colour target count", targets, gpu.caps.limits.max_color_targets.into())?;
     desc.color.iter().try_for_each(|target| check_color(gpu, name, target))?;
     desc.depth.map_or(Ok(()), |depth| check_depth(gpu, name, depth.format))?;
+    check_state(gpu, desc, modules)?;
     check_mesh(gpu, desc, modules)?;
+    check_geometry(desc, modules)?;
     check_vertex_input(name, desc)?;
     match &modules.vertex {
         Some(vertex) => check_locations(name, desc, &vertex.reflection.inputs),
@@ -93,6 +129,26 @@ fn check_mesh(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules)
     check_limit(name, "count of vertices of a mesh workgroup", vertices.into(), most.into())?;
     let most = limits.max_output_primitives;
     check_limit(name, "count of primitives of a mesh workgroup", primitives.into(), most.into())
+}
+
+/// Fails unless the geometry shader takes the primitives that come to it.
+fn check_geometry(desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
+    let Some(geometry) = &modules.geometry else { return Ok(()) };
+    let of_patches = || modules.tess_eval.as_ref().and_then(|eval| eval.reflection.primitive);
+    let (Some(given), Some(taken)) =
+        (desc.topology.primitive().or_else(of_patches), geometry.reflection.primitive)
+    else {
+        return Ok(());
+    };
+    if given == taken {
+        return Ok(());
+    }
+    let message = if taken == Primitive::Adjacent {
+        format!("the geometry shader '{}' takes adjacent vertices, which no topology has", geometry.name)
+    } else {
+        format!("the geometry shader '{}' takes {taken:?}, but {given:?} come to it", geometry.name)
+    };
+    Err(Error::usage(desc.debug_name, message))
 }
 
 /// Fails unless each location the vertex shader reads has an attribute, and no location has two.

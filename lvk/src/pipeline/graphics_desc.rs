@@ -1,47 +1,12 @@
 //! What a caller says about a graphics pipeline.
 
+use super::blend::{Blend, ColorWrites};
+use super::depth_stencil::{DepthTest, StencilTest};
+use super::raster::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
+use super::shape::PassShape;
 use super::stage::SpecializationConstant;
 use crate::format::{Format, VertexFormat};
 use crate::handle::ShaderModuleHandle;
-use crate::resource::sampler::CompareOp;
-
-/// What vertices make.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Topology {
-    /// Points.
-    Points,
-    /// Every two vertices are a line.
-    Lines,
-    /// Each vertex continues the line.
-    LineStrip,
-    /// Every three vertices are a triangle.
-    #[default]
-    Triangles,
-    /// Each vertex makes a triangle with the two before.
-    TriangleStrip,
-}
-
-/// Which faces are left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum CullMode {
-    /// Both faces are drawn.
-    #[default]
-    None,
-    /// Front faces are left out.
-    Front,
-    /// Back faces are left out.
-    Back,
-}
-
-/// Which winding is the front, as seen in Vulkan's clip space (y down).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum FrontFace {
-    /// Counter-clockwise.
-    #[default]
-    CounterClockwise,
-    /// Clockwise.
-    Clockwise,
-}
 
 /// A buffer slot of vertex attributes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -65,17 +30,6 @@ pub struct VertexAttribute {
     pub offset: u32,
 }
 
-/// How a colour is combined with what is in the target.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Blend {
-    /// `source * alpha + target * (1 - alpha)`.
-    Alpha,
-    /// `source + target * (1 - alpha)`.
-    PremultipliedAlpha,
-    /// `source + target`.
-    Additive,
-}
-
 /// A colour target of a pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct ColorTarget {
@@ -83,23 +37,26 @@ pub struct ColorTarget {
     pub format: Format,
     /// How colours are combined; `None` replaces.
     pub blend: Option<Blend>,
+    /// Channels that are written.
+    pub write: ColorWrites,
+}
+
+impl ColorTarget {
+    /// Replaced in all channels.
+    pub const fn new(format: Format) -> Self {
+        Self { format, blend: None, write: ColorWrites::all() }
+    }
+
+    /// Combined with what is there, in all channels.
+    pub const fn blended(format: Format, blend: Blend) -> Self {
+        Self { format, blend: Some(blend), write: ColorWrites::all() }
+    }
 }
 
 impl From<Format> for ColorTarget {
     fn from(format: Format) -> Self {
-        Self { format, blend: None }
+        Self::new(format)
     }
-}
-
-/// Depth test of a pipeline.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct DepthTest {
-    /// Format of the depth target.
-    pub format: Format,
-    /// A fragment passes if its depth compares so with the target's.
-    pub compare: CompareOp,
-    /// Whether passing fragments write their depth.
-    pub write: bool,
 }
 
 /// Describes a graphics pipeline.
@@ -112,7 +69,15 @@ pub struct RenderPipelineDesc<'a> {
     /// Makes vertices and primitives itself, in place of a vertex shader
     /// ([`Capabilities::mesh_shader`](crate::Capabilities::mesh_shader)).
     pub mesh: Option<ShaderModuleHandle>,
-    /// The fragment shader; without one only depth is written.
+    /// Tessellation control shader (hull): how finely each patch is divided. With an evaluation shader behind it, and
+    /// [`Topology::Patches`] ([`OptionalFeature::TessellationShader`](crate::OptionalFeature::TessellationShader)).
+    pub tess_control: Option<ShaderModuleHandle>,
+    /// Tessellation evaluation shader (domain): where the vertices of a divided patch are.
+    pub tess_eval: Option<ShaderModuleHandle>,
+    /// Geometry shader: primitives out of primitives
+    /// ([`OptionalFeature::GeometryShader`](crate::OptionalFeature::GeometryShader)).
+    pub geometry: Option<ShaderModuleHandle>,
+    /// The fragment shader; without one only depth and stencil are written.
     pub fragment: Option<ShaderModuleHandle>,
     /// What vertices make; a mesh shader says so itself.
     pub topology: Topology,
@@ -120,6 +85,17 @@ pub struct RenderPipelineDesc<'a> {
     pub cull: CullMode,
     /// Which winding is the front.
     pub front_face: FrontFace,
+    /// What is drawn of triangles.
+    pub polygon: PolygonMode,
+    /// Width of lines in pixels, within [`Limits::line_width`](crate::Limits::line_width); all but 1 need
+    /// [`OptionalFeature::WideLines`](crate::OptionalFeature::WideLines).
+    pub line_width: f32,
+    /// Offset of the depths of triangles, which [`RenderPass::depth_bias`](crate::RenderPass::depth_bias) may replace;
+    /// `None` for none.
+    pub depth_bias: Option<DepthBias>,
+    /// Depths beyond the viewport's range are clamped to it in place of clipped
+    /// ([`OptionalFeature::DepthClamp`](crate::OptionalFeature::DepthClamp)).
+    pub depth_clamp: bool,
     /// Vertex buffers; empty when the shader pulls its vertices by address.
     pub vertex_bindings: &'a [VertexBinding],
     /// Attributes read from the vertex buffers.
@@ -128,10 +104,30 @@ pub struct RenderPipelineDesc<'a> {
     pub color: &'a [ColorTarget],
     /// Depth test; `None` draws without depth.
     pub depth: Option<DepthTest>,
+    /// Stencil test; `None` draws without stencil. The format of [`depth`](Self::depth) has to hold stencil.
+    pub stencil: Option<StencilTest>,
+    /// Samples a pixel, as the targets have them ([`TextureDesc::samples`](crate::TextureDesc::samples)).
+    pub samples: u32,
+    /// The alpha of the first output decides how many of a pixel's samples are covered.
+    pub alpha_to_coverage: bool,
+    /// The fragment shader runs for at least this part of a pixel's samples, 0 to 1; for each sample where it reads
+    /// `gl_SampleID`. All but 0 need [`OptionalFeature::SampleRateShading`](crate::OptionalFeature::SampleRateShading).
+    pub sample_shading: f32,
+    /// Views that each draw makes at once, a bit for each, as the pass has them
+    /// ([`RenderPassDesc::view_mask`](crate::RenderPassDesc::view_mask)); 0 for one picture.
+    pub view_mask: u32,
     /// Values of specialization constants.
     pub specialization: &'a [SpecializationConstant],
     /// Name in error messages, validation messages and debuggers.
     pub debug_name: &'a str,
+}
+
+impl RenderPipelineDesc<'_> {
+    /// What its passes have to be like.
+    pub(super) fn shape(&self) -> PassShape {
+        let colors = self.color.iter().map(|target| target.format);
+        PassShape::new(colors, self.depth.map(|depth| depth.format), self.samples, self.view_mask)
+    }
 }
 
 impl Default for RenderPipelineDesc<'_> {
@@ -140,14 +136,26 @@ impl Default for RenderPipelineDesc<'_> {
             vertex: None,
             task: None,
             mesh: None,
+            tess_control: None,
+            tess_eval: None,
+            geometry: None,
             fragment: None,
             topology: Topology::default(),
             cull: CullMode::default(),
             front_face: FrontFace::default(),
+            polygon: PolygonMode::default(),
+            line_width: 1.0,
+            depth_bias: None,
+            depth_clamp: false,
             vertex_bindings: &[],
             vertex_attributes: &[],
             color: &[],
             depth: None,
+            stencil: None,
+            samples: 1,
+            alpha_to_coverage: false,
+            sample_shading: 0.0,
+            view_mask: 0,
             specialization: &[],
             debug_name: "render pipeline",
         }

@@ -86,8 +86,15 @@ impl Texture {
         self.raw_view(self.part(mip, layer), vk::ImageViewType::TYPE_2D, TextureUsage::TARGET)
     }
 
-    /// Fails unless a pass can draw to the mip of the layer, or of the slice.
-    pub(crate) fn check_target(&self, mip: u32, layer: u32) -> Result<()> {
+    /// The view a render pass draws several layers or slices to.
+    pub(crate) fn layered_target_view(&self, mip: u32, layer: u32, count: u32) -> Result<vk::ImageView> {
+        let range = Subresources { layer_count: count, ..self.part(mip, layer) };
+        self.raw_view(range, vk::ImageViewType::TYPE_2D_ARRAY, TextureUsage::TARGET)
+    }
+
+    /// Fails unless a pass can draw to the mip of `count` layers, or slices, from `layer` on.
+    pub(crate) fn check_target(&self, mip: u32, layer: u32, count: u32) -> Result<()> {
+        let layer = layer.saturating_add(count.saturating_sub(1));
         if !self.kind.is_3d() {
             return self.check_subresource(mip, layer);
         }
@@ -99,9 +106,12 @@ impl Texture {
         Err(Error::usage(&self.name, format!("slice {layer} does not exist: mip {mip} has {slices}")))
     }
 
-    /// The part of the image that a pass uses which draws to the mip of the layer or slice: slices are not tracked.
-    pub(crate) fn drawn_part(&self, mip: u32, layer: u32) -> Subresources {
-        self.part(mip, if self.kind.is_3d() { 0 } else { layer })
+    /// The part of the image that a pass uses which draws to the mip of the layers or slices: slices are not tracked.
+    pub(crate) fn drawn_part(&self, mip: u32, layer: u32, count: u32) -> Subresources {
+        if self.kind.is_3d() {
+            return self.part(mip, 0);
+        }
+        Subresources { layer_count: count, ..self.part(mip, layer) }
     }
 
     fn raw_view(

@@ -40,7 +40,7 @@ pub use disk_cache::ShaderCacheCounts;
 pub(crate) use hit_numbers::raw_hit_number;
 #[cfg(feature = "glsl")]
 pub use offline::compile_glsl;
-pub(crate) use reflect::{Reflection, reflect};
+pub(crate) use reflect::{Primitive, Reflection, reflect};
 pub use stage::{ShaderModuleDesc, ShaderSource, ShaderStage};
 
 #[cfg(all(test, feature = "glsl"))]

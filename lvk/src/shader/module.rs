@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use ::spirv::{BuiltIn, Capability, Decoration, Dim, Op};
+use ::spirv::{BuiltIn, Capability, Decoration, Dim, Op, StorageClass};
 
 use super::spirv::{self, Instruction};
 
@@ -108,6 +108,33 @@ impl Module {
     pub(super) fn in_interface(&self, entry: usize, variable: &Variable) -> bool {
         self.version < spirv::VERSION_1_4
             || self.entries.get(entry).is_some_and(|entry| entry.interface.contains(&variable.id))
+    }
+
+    /// Whether an output of the entry point, or a member of one, is the built-in `Layer`.
+    pub(super) fn writes_layer(&self, entry: usize) -> bool {
+        let (builtin, layer) = (Decoration::BuiltIn as u32, BuiltIn::Layer as u32);
+        let members: HashSet<u32> = self
+            .member_decorations
+            .iter()
+            .filter(|((_, _, decoration), value)| *decoration == builtin && **value == layer)
+            .map(|((ty, ..), _)| *ty)
+            .collect();
+        let outputs = self.variables.iter().filter(|variable| {
+            variable.storage == StorageClass::Output as u32 && self.in_interface(entry, variable)
+        });
+        outputs.into_iter().any(|variable| {
+            let own = self.decoration(variable.id, Decoration::BuiltIn) == Some(layer);
+            own || self.block_of(variable.ty).is_some_and(|block| members.contains(&block))
+        })
+    }
+
+    /// The struct that a pointer leads to, or an array behind it.
+    fn block_of(&self, pointer: u32) -> Option<u32> {
+        let Type::Pointer { target } = self.types.get(&pointer)? else { return None };
+        match self.types.get(target)? {
+            Type::Array { element, .. } | Type::RuntimeArray { element } => Some(*element),
+            _ => Some(*target),
+        }
     }
 
     /// The three constants of the `WorkgroupSize` built-in.

@@ -9,6 +9,16 @@ use super::{ShaderStage, spirv};
 use crate::bindless::layout;
 use crate::error::{Error, Result};
 
+/// What a primitive is, as geometry shaders take it and tessellation makes it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(crate) enum Primitive {
+    Points,
+    Lines,
+    Triangles,
+    /// With adjacent vertices, which no topology of the library has.
+    Adjacent,
+}
+
 /// Facts of one entry point that pipelines need.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub(crate) struct Reflection {
@@ -26,6 +36,12 @@ pub(crate) struct Reflection {
     pub(crate) local_size: [u32; 3],
     /// For each axis, the specialization constant that overrides [`local_size`](Self::local_size).
     pub(crate) local_size_ids: [Option<u32>; 3],
+    /// What a geometry stage takes, or what a tessellation evaluation stage makes.
+    pub(crate) primitive: Option<Primitive>,
+    /// A stage before rasterisation chooses the layer it draws to.
+    pub(crate) writes_layer: bool,
+    /// A fragment stage has an output of index 1, the second source of blending.
+    pub(crate) second_output: bool,
     /// Most vertices and primitives that a workgroup of a mesh stage puts out; else zeros.
     pub(crate) mesh_outputs: [u32; 2],
     /// Specialization constants: id and bytes (1 to 8; booleans take 4), sorted by id.
@@ -53,7 +69,7 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
     check_function(words, function)?;
     let (local_size, local_size_ids) = local_size(&module, function);
     let (mut bindings, mut inputs) = (Vec::new(), Vec::new());
-    let mut push_constant_bytes = 0;
+    let (mut push_constant_bytes, mut second_output) = (0, false);
     for variable in module.variables.iter().filter(|variable| module.in_interface(entry, variable)) {
         if variable.storage == StorageClass::PushConstant as u32 {
             push_constant_bytes = push_constant_bytes.max(block_bytes(&module, variable)?);
@@ -61,6 +77,8 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
             bindings.push(binding(&module, variable)?);
         } else if variable.storage == StorageClass::Input as u32 {
             inputs.extend(module.decoration(variable.id, Decoration::Location));
+        } else if variable.storage == StorageClass::Output as u32 {
+            second_output |= module.decoration(variable.id, Decoration::Index) == Some(1);
         }
     }
     bindings.sort_unstable();
@@ -77,6 +95,9 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
         ray_interface: RayInterface::of(&module),
         local_size,
         local_size_ids,
+        primitive: primitive(&module, stage, function),
+        writes_layer: module.writes_layer(entry),
+        second_output,
         mesh_outputs: if stage == ShaderStage::Mesh { mesh_outputs(&module, function) } else { [0; 2] },
         specialization: specialization(&module),
         bindings,
@@ -154,6 +175,31 @@ fn mesh_outputs(module: &Module, function: u32) -> [u32; 2] {
         let of_function = |mode: &&Mode| mode.function == function && mode.mode == wanted as u32;
         module.modes.iter().find(of_function).map_or(0, |mode| mode.operands[0])
     })
+}
+
+/// Stages before rasterisation name their primitives by execution modes.
+fn primitive(module: &Module, stage: ShaderStage, function: u32) -> Option<Primitive> {
+    use ExecutionMode as Mode;
+    let has = |wanted: ExecutionMode| {
+        module.modes.iter().any(|mode| mode.function == function && mode.mode == wanted as u32)
+    };
+    let table: &[(ExecutionMode, Primitive)] = match stage {
+        ShaderStage::Geometry => &[
+            (Mode::InputPoints, Primitive::Points),
+            (Mode::InputLines, Primitive::Lines),
+            (Mode::Triangles, Primitive::Triangles),
+            (Mode::InputLinesAdjacency, Primitive::Adjacent),
+            (Mode::InputTrianglesAdjacency, Primitive::Adjacent),
+        ],
+        ShaderStage::TessEval => &[
+            (Mode::PointMode, Primitive::Points),
+            (Mode::Isolines, Primitive::Lines),
+            (Mode::Triangles, Primitive::Triangles),
+            (Mode::Quads, Primitive::Triangles),
+        ],
+        _ => &[],
+    };
+    table.iter().find(|(mode, _)| has(*mode)).map(|(_, primitive)| *primitive)
 }
 
 fn parts_of(module: &Module, ids: [u32; 3]) -> ([u32; 3], [Option<u32>; 3]) {

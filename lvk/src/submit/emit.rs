@@ -145,14 +145,13 @@ pub(crate) fn layout(layout: Layout) -> vk::ImageLayout {
     match layout {
         Layout::Undefined => vk::ImageLayout::UNDEFINED,
         Layout::General => vk::ImageLayout::GENERAL,
-        Layout::ShaderRead => vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+        Layout::ShaderRead => vk::ImageLayout::READ_ONLY_OPTIMAL,
         Layout::ColorTarget => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
         Layout::DepthTarget => vk::ImageLayout::DEPTH_STENCIL_ATTACHMENT_OPTIMAL,
         Layout::TransferSrc => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
         Layout::TransferDst => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
         Layout::Present => vk::ImageLayout::PRESENT_SRC_KHR,
         Layout::LocalRead => vk::ImageLayout::RENDERING_LOCAL_READ_KHR,
-        Layout::DepthRead => vk::ImageLayout::DEPTH_STENCIL_READ_ONLY_OPTIMAL,
         Layout::ShadingRate => vk::ImageLayout::FRAGMENT_SHADING_RATE_ATTACHMENT_OPTIMAL_KHR,
     }
 }

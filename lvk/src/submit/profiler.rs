@@ -15,9 +15,13 @@ use crate::resource::query::QueryPoolDesc;
 /// The stamps of one command buffer.
 #[derive(Default)]
 pub(crate) struct Scopes {
-    /// Full ones but the last.
+    /// All are done with but the last.
     pools: Vec<QueryPool>,
     stamps: Stamps,
+    /// Where each stamp is, counted through all pools.
+    places: Vec<usize>,
+    /// The first place that is free.
+    next: usize,
     /// There was no pool for a stamp: nothing of the command buffer counts.
     broken: bool,
 }
@@ -89,17 +93,24 @@ impl Profiler {
             return None;
         }
         let mut scopes = Box::default();
-        self.stamp(&mut scopes, commands, Some(""));
+        self.stamp(&mut scopes, commands, Some(""), 1);
         Some(scopes)
     }
 
-    /// Stamps the begin of a scope with this name, or the end of the innermost.
-    pub(crate) fn stamp(&self, scopes: &mut Scopes, commands: vk::CommandBuffer, name: Option<&str>) {
+    /// Stamps the begin of a scope with this name, or the end of the innermost; a stamp in a pass that draws several
+    /// `views` at once takes as many queries, of which the first counts.
+    pub(crate) fn stamp(
+        &self,
+        scopes: &mut Scopes,
+        commands: vk::CommandBuffer,
+        name: Option<&str>,
+        views: u32,
+    ) {
         if scopes.broken {
             return;
         }
-        let place = scopes.stamps.len() % Self::STAMPS;
-        if place == 0 {
+        let place = scopes.take(views as usize);
+        if scopes.pools.len() * Self::STAMPS <= place {
             match self.pool() {
                 Ok(pool) => scopes.pools.push(pool),
                 Err(error) => {
@@ -111,9 +122,11 @@ impl Profiler {
         }
         let Some(pool) = scopes.pools.last() else { return };
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
-        // SAFETY: the query exists, is reset, and is written once.
-        unsafe { self.gpu.device.cmd_write_timestamp2(commands, stage, pool.raw, place as u32) };
+        let query = (place % Self::STAMPS) as u32;
+        // SAFETY: the queries exist, are reset, and are written once.
+        unsafe { self.gpu.device.cmd_write_timestamp2(commands, stage, pool.raw, query) };
         scopes.stamps.push(name.map(Into::into));
+        scopes.places.push(place);
     }
 
     /// A pool of stamps that are ready.
@@ -231,10 +244,39 @@ impl Inner {
 impl Scopes {
     /// The time of each stamp; `None` where one is missing.
     fn ticks(&self) -> Result<Option<Vec<u64>>> {
-        let mut ticks = vec![None; self.stamps.len()];
+        let mut ticks = vec![None; self.next];
         for (pool, part) in self.pools.iter().zip(ticks.chunks_mut(Profiler::STAMPS)) {
             pool.read(0, part)?;
         }
-        Ok(if self.broken { None } else { ticks.into_iter().collect() })
+        Ok(if self.broken { None } else { self.places.iter().map(|place| ticks[*place]).collect() })
+    }
+
+    /// The first of `count` places of one pool.
+    fn take(&mut self, count: usize) -> usize {
+        let left = Profiler::STAMPS - self.next % Profiler::STAMPS;
+        let place = if count <= left { self.next } else { self.next + left };
+        self.next = place + count;
+        place
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// Pools are taken one after the other: each stamp lies within one, behind those before.
+        #[test]
+        fn stamps_lie_apart_and_each_in_one_pool(counts in prop::collection::vec(1..33_usize, 0..40)) {
+            let (mut scopes, mut end) = (Scopes::default(), 0);
+            for count in counts {
+                let place = scopes.take(count);
+                prop_assert!(place >= end && place < end + Profiler::STAMPS);
+                end = place + count;
+                prop_assert_eq!(place / Profiler::STAMPS, (end - 1) / Profiler::STAMPS);
+            }
+        }
     }
 }

@@ -109,6 +109,7 @@ impl HardwareRaster {
             depth: Some(DepthAttachment { store: false, ..DepthAttachment::clear(*self.depth, 0.0) }),
             dependencies: Dependencies { read_buffers: &read, ..Dependencies::default() },
             debug_name: "visibility pass",
+            ..Default::default()
         })?;
         pass.bind_render_pipeline(*self.draw)?;
         pass.bind_index_buffer(*left.indices, 0, IndexFormat::U32)?;

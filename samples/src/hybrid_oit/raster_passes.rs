@@ -81,6 +81,7 @@ impl RasterPasses {
             depth: Some(kept_depth(targets)),
             dependencies: Dependencies { read_buffers: &[*buffers.spheres], ..Dependencies::default() },
             debug_name: "g-buffer",
+            ..Default::default()
         })?;
         self.draw_opaque(pass, [*self.solid, *self.ball], push)
     }

@@ -36,7 +36,7 @@ impl RasterPasses {
     pub(super) fn new(ctx: &Context) -> lvk::Result<Self> {
         let depth = Some(DepthTest { format: DEPTH_FORMAT, compare: CompareOp::Greater, write: true });
         let surface = ColorTarget::from(SURFACE_FORMAT);
-        let blended = ColorTarget { format: COMPOSITE_FORMAT, blend: Some(Blend::PremultipliedAlpha) };
+        let blended = ColorTarget::blended(COMPOSITE_FORMAT, Blend::PREMULTIPLIED_ALPHA);
         Ok(Self {
             opaque: pipeline(ctx, OPAQUE_FRAGMENT, surface, depth)?,
             transparent: pipeline(ctx, TRANSPARENT_FRAGMENT, surface, depth)?,
@@ -99,6 +99,7 @@ fn begin_surfaces<'a>(
         depth: Some(DepthAttachment::clear(depth, 0.0)),
         dependencies,
         debug_name,
+        ..Default::default()
     })
 }
 

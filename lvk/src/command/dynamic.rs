@@ -1,0 +1,205 @@
+//! State that a render pass sets in place of its pipelines.
+
+use ash::vk;
+
+use super::render::RenderPass;
+use crate::error::{Error, Result};
+use crate::gpu::optional::OptionalFeature;
+use crate::pipeline::PassState;
+use crate::pipeline::depth_stencil::DepthState;
+use crate::pipeline::raster::DepthBias;
+
+/// What the pass wants, and what Vulkan's command buffer holds.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct DynamicState {
+    stencil_reference: [u8; 2],
+    blend_constants: [f32; 4],
+    held: Values,
+}
+
+/// Values by state; `None` for one that is not to be set, or is not known.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+struct Values {
+    depth: Option<DepthState>,
+    bias: Option<DepthBias>,
+    stencil_reference: Option<[u8; 2]>,
+    blend_constants: Option<[f32; 4]>,
+}
+
+impl DynamicState {
+    /// What has to be set for a pipeline that leaves `state` to the pass. What a pipeline does not leave is its own, and
+    /// forgotten behind it.
+    fn bind(&mut self, state: &PassState) -> Values {
+        let wanted = Values {
+            depth: state.depth,
+            bias: state.bias,
+            stencil_reference: state.stencil.then_some(self.stencil_reference),
+            blend_constants: state.blend_constants.then_some(self.blend_constants),
+        };
+        let held = std::mem::replace(&mut self.held, wanted);
+        Values {
+            depth: changed(wanted.depth, held.depth),
+            bias: changed(wanted.bias, held.bias),
+            stencil_reference: changed(wanted.stencil_reference, held.stencil_reference),
+            blend_constants: changed(wanted.blend_constants, held.blend_constants),
+        }
+    }
+}
+
+/// The value where it is to be set and another one is held.
+fn changed<T: PartialEq>(wanted: Option<T>, held: Option<T>) -> Option<T> {
+    if wanted == held { None } else { wanted }
+}
+
+impl RenderPass<'_> {
+    /// The reference that stencil values are compared with and replaced by, of front and of back faces, for this and later
+    /// pipelines of the pass (`vkCmdSetStencilReference`). 0 at the begin of a pass.
+    pub fn stencil_reference(&mut self, front: u8, back: u8) {
+        self.dynamic.stencil_reference = [front, back];
+        if self.dynamic.held.stencil_reference.is_some() {
+            self.dynamic.held.stencil_reference = Some([front, back]);
+            self.set(&Values { stencil_reference: Some([front, back]), ..Default::default() });
+        }
+    }
+
+    /// The constants of [`BlendFactor::Constant`](crate::BlendFactor::Constant) and its kin, for this and later pipelines
+    /// of the pass (`vkCmdSetBlendConstants`). 0 at the begin of a pass.
+    pub fn blend_constants(&mut self, constants: [f32; 4]) {
+        self.dynamic.blend_constants = constants;
+        if self.dynamic.held.blend_constants.is_some() {
+            self.dynamic.held.blend_constants = Some(constants);
+            self.set(&Values { blend_constants: Some(constants), ..Default::default() });
+        }
+    }
+
+    /// Another depth test than that of the bound pipeline, until a pipeline is bound (`vkCmdSetDepthCompareOp`,
+    /// `vkCmdSetDepthWriteEnable`).
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) unless a pipeline with a depth test is bound, and for writes in a pass whose
+    /// depth target is read-only.
+    pub fn depth_state(&mut self, state: DepthState) -> Result<()> {
+        let pipeline = self.bound("depth_state")?;
+        if pipeline.pass_state.depth.is_none() {
+            return Err(Error::usage(&*pipeline.name, "it has no depth test to replace; create it with one"));
+        }
+        if state.write && self.targets.read_only_depth {
+            return Err(Error::usage(&*pipeline.name, WRITES_READ_ONLY));
+        }
+        let values = Values { depth: Some(state), ..Default::default() };
+        self.dynamic.held.depth = values.depth;
+        self.set(&values);
+        Ok(())
+    }
+
+    /// Another depth bias than that of the bound pipeline, until a pipeline is bound (`vkCmdSetDepthBias`).
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) unless a pipeline with a depth bias is bound, and for parts that are no
+    /// numbers; [`Unsupported`](Error::Unsupported) for a bound without
+    /// [`OptionalFeature::DepthBiasClamp`](crate::OptionalFeature::DepthBiasClamp).
+    pub fn depth_bias(&mut self, bias: DepthBias) -> Result<()> {
+        let pipeline = self.bound("depth_bias")?;
+        if pipeline.pass_state.bias.is_none() || !bias.is_finite() {
+            let message =
+                format!("{bias:?} needs a pipeline that was created with a depth bias, and finite numbers");
+            return Err(Error::usage(&*pipeline.name, message));
+        }
+        if bias.clamp != 0.0 {
+            self.cmd.shared.gpu.require(OptionalFeature::DepthBiasClamp, "a depth bias with a bound")?;
+        }
+        let values = Values { bias: Some(bias), ..Default::default() };
+        self.dynamic.held.bias = values.bias;
+        self.set(&values);
+        Ok(())
+    }
+
+    /// Sets what the pipeline that was bound now leaves to the pass.
+    pub(super) fn set_state_of(&mut self, state: &PassState) {
+        let values = self.dynamic.bind(state);
+        if values != Values::default() {
+            self.set(&values);
+        }
+    }
+
+    fn set(&self, values: &Values) {
+        let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
+        // SAFETY: the command buffer is being recorded, and the device has each state: those of depth are core, and what
+        // needs a feature was refused without it.
+        unsafe {
+            if let Some(DepthState { compare, write }) = values.depth {
+                device.cmd_set_depth_compare_op(raw, compare.raw());
+                device.cmd_set_depth_write_enable(raw, write);
+            }
+            if let Some(DepthBias { constant, slope, clamp }) = values.bias {
+                device.cmd_set_depth_bias(raw, constant, clamp, slope);
+            }
+            if let Some([front, back]) = values.stencil_reference {
+                device.cmd_set_stencil_reference(raw, vk::StencilFaceFlags::FRONT, front.into());
+                device.cmd_set_stencil_reference(raw, vk::StencilFaceFlags::BACK, back.into());
+            }
+            if let Some(constants) = values.blend_constants {
+                device.cmd_set_blend_constants(raw, &constants);
+            }
+        }
+    }
+}
+
+/// For pipelines in passes whose depth target is read-only.
+pub(super) const WRITES_READ_ONLY: &str =
+    "it writes depth or stencil, but the depth target of the pass is read-only; turn the writes off";
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::resource::sampler::CompareOp;
+
+    fn state() -> impl Strategy<Value = PassState> {
+        let depth = prop::option::of(any::<bool>());
+        let bias = prop::option::of(0..2_u8);
+        (depth, bias, any::<bool>(), any::<bool>()).prop_map(|(depth, bias, stencil, blend_constants)| {
+            PassState {
+                depth: depth.map(|write| DepthState { compare: CompareOp::Less, write }),
+                bias: bias.map(|constant| DepthBias { constant: constant.into(), ..Default::default() }),
+                stencil,
+                blend_constants,
+            }
+        })
+    }
+
+    proptest! {
+        /// Against a command buffer that forgets each value that a pipeline has of its own.
+        #[test]
+        fn every_pipeline_finds_what_it_leaves_to_the_pass(
+            binds in prop::collection::vec((state(), 0..3_u8), 1..12)
+        ) {
+            let (mut found, mut vulkan) = (DynamicState::default(), Values::default());
+            for (state, reference) in binds {
+                found.stencil_reference = [reference; 2];
+                let set = found.bind(&state);
+                vulkan.depth = set.depth.or(vulkan.depth.filter(|_| state.depth.is_some()));
+                vulkan.bias = set.bias.or(vulkan.bias.filter(|_| state.bias.is_some()));
+                vulkan.stencil_reference =
+                    set.stencil_reference.or(vulkan.stencil_reference.filter(|_| state.stencil));
+                vulkan.blend_constants =
+                    set.blend_constants.or(vulkan.blend_constants.filter(|_| state.blend_constants));
+                prop_assert_eq!(vulkan.depth, state.depth);
+                prop_assert_eq!(vulkan.bias, state.bias);
+                prop_assert_eq!(vulkan.stencil_reference, state.stencil.then_some([reference; 2]));
+                prop_assert_eq!(vulkan.blend_constants, state.blend_constants.then_some([0.0; 4]));
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_held_is_not_set_again() {
+        let mut dynamic = DynamicState::default();
+        let state = PassState { stencil: true, blend_constants: true, ..Default::default() };
+        assert_ne!(dynamic.bind(&state), Values::default());
+        assert_eq!(dynamic.bind(&state), Values::default());
+        dynamic.bind(&PassState::default());
+        assert_ne!(dynamic.bind(&state), Values::default());
+    }
+}

@@ -1,0 +1,77 @@
+//! What a graphics pipeline and the passes it draws in have to agree on.
+
+use std::fmt;
+
+use crate::format::Format;
+
+/// Formats, samples and views of targets. Compared at each bind, so it is plain data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct PassShape {
+    /// From the first on, without gaps.
+    colors: [Option<Format>; Self::MOST_COLORS],
+    pub(crate) depth: Option<Format>,
+    /// Samples a pixel.
+    pub(crate) samples: u32,
+    /// The views that are drawn at once, 0 without multiview.
+    pub(crate) view_mask: u32,
+}
+
+impl PassShape {
+    /// As [`Limits::max_color_targets`](crate::Limits::max_color_targets) at most.
+    pub(crate) const MOST_COLORS: usize = 8;
+
+    /// Further colours than the most are left out: both sides have checked their number.
+    pub(crate) fn new(
+        colors: impl IntoIterator<Item = Format>,
+        depth: Option<Format>,
+        samples: u32,
+        view_mask: u32,
+    ) -> Self {
+        let mut shape = Self { depth, samples, view_mask, ..Self::default() };
+        for (place, format) in shape.colors.iter_mut().zip(colors) {
+            *place = Some(format);
+        }
+        shape
+    }
+}
+
+impl fmt::Display for PassShape {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let colors: Vec<Format> = self.colors.iter().flatten().copied().collect();
+        write!(out, "{colors:?} and depth {:?}", self.depth)?;
+        if self.samples != 1 {
+            write!(out, " with {} samples a pixel", self.samples)?;
+        }
+        if self.view_mask != 0 {
+            write!(out, " with the views {:#b}", self.view_mask)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shapes_differ_in_each_part_and_say_so() {
+        let (color, depth) = (Format::Rgba8Unorm, Format::D32Float);
+        let plain = PassShape::new([color], Some(depth), 1, 0);
+        assert_eq!(plain, PassShape::new([color], Some(depth), 1, 0));
+        for (other, text) in [
+            (
+                PassShape::new([color, color], Some(depth), 1, 0),
+                "[Rgba8Unorm, Rgba8Unorm] and depth Some(D32Float)",
+            ),
+            (PassShape::new([], Some(depth), 1, 0), "[] and depth Some(D32Float)"),
+            (PassShape::new([color], None, 1, 0), "[Rgba8Unorm] and depth None"),
+            (
+                PassShape::new([color], None, 4, 5),
+                "[Rgba8Unorm] and depth None with 4 samples a pixel with the views 0b101",
+            ),
+        ] {
+            assert_ne!(plain, other);
+            assert_eq!(other.to_string(), text);
+        }
+    }
+}

@@ -1,0 +1,129 @@
+//! Whether the fixed state of a graphics pipeline can be: raster, stencil and blending, against each other and the device.
+
+use ash::vk;
+
+use super::graphics::RenderModules;
+use super::graphics_desc::RenderPipelineDesc;
+use super::raster::PolygonMode;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::gpu::optional::OptionalFeature;
+
+/// Fails unless the device has what the state asks for.
+pub(super) fn check_state(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
+    check_raster(gpu, desc)?;
+    check_samples(gpu, desc)?;
+    check_stencil(desc)?;
+    check_views(gpu, desc, modules)?;
+    check_second_source(gpu, desc, modules)
+}
+
+fn check_raster(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
+    let name = desc.debug_name;
+    let require = |wanted: bool, feature: OptionalFeature, what: &str| {
+        if wanted { gpu.require(feature, &format!("{what} in pipeline '{name}'")) } else { Ok(()) }
+    };
+    let outlines = desc.polygon != PolygonMode::Fill;
+    require(outlines, OptionalFeature::FillModeNonSolid, "a polygon mode beside Fill")?;
+    require(desc.depth_clamp, OptionalFeature::DepthClamp, "depth clamp")?;
+    check_line_width(gpu, desc)?;
+    let Some(bias) = desc.depth_bias else { return Ok(()) };
+    if !bias.is_finite() {
+        return Err(Error::usage(name, format!("{bias:?} has parts that are no finite numbers")));
+    }
+    require(bias.clamp != 0.0, OptionalFeature::DepthBiasClamp, "a depth bias with a bound")
+}
+
+fn check_line_width(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
+    let (name, width) = (desc.debug_name, desc.line_width);
+    if width.to_bits() == 1.0_f32.to_bits() {
+        return Ok(());
+    }
+    gpu.require(OptionalFeature::WideLines, &format!("lines {width} pixels wide in pipeline '{name}'"))?;
+    let [least, most] = gpu.caps.limits.line_width;
+    if (least..=most).contains(&width) {
+        return Ok(());
+    }
+    Err(Error::usage(name, format!("lines are {least} to {most} pixels wide, not {width}")))
+}
+
+/// Pipelines without targets of their own take what the device has for passes without any.
+fn check_samples(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
+    let (name, samples) = (desc.debug_name, desc.samples);
+    if !samples.is_power_of_two() || samples > 64 {
+        return Err(Error::usage(name, format!("samples are 1, 2, 4, 8, 16, 32 or 64, not {samples}")));
+    }
+    let color = desc.color.iter().map(|target| (target.format, vk::ImageUsageFlags::COLOR_ATTACHMENT));
+    let depth = desc.depth.map(|depth| (depth.format, vk::ImageUsageFlags::DEPTH_STENCIL_ATTACHMENT));
+    for (format, usage) in color.chain(depth) {
+        let most = gpu.target_samples(format.raw(), usage);
+        if samples > 1 && !most.contains(vk::SampleCountFlags::from_raw(samples)) {
+            let what = format!("{samples} samples a pixel of {format:?} in pipeline '{name}'");
+            return Err(Error::unsupported(what, format!("the device has {most:?}")));
+        }
+    }
+    if !(0.0..=1.0).contains(&desc.sample_shading) {
+        let message = format!("sample_shading is a part from 0 to 1, not {}", desc.sample_shading);
+        return Err(Error::usage(name, message));
+    }
+    if desc.sample_shading > 0.0 {
+        gpu.require(OptionalFeature::SampleRateShading, &format!("sample shading in pipeline '{name}'"))?;
+    }
+    Ok(())
+}
+
+fn check_stencil(desc: &RenderPipelineDesc<'_>) -> Result<()> {
+    let holds = desc.depth.is_some_and(|depth| depth.format.has_stencil());
+    if desc.stencil.is_none() || holds {
+        return Ok(());
+    }
+    let message = "a stencil test needs a depth test whose format holds stencil, D32FloatS8 or D24UnormS8; one that \
+                   always passes and writes nothing will do";
+    Err(Error::usage(desc.debug_name, message))
+}
+
+/// Stages before rasterisation need features of their own to run for several views, and may not choose the layer.
+fn check_views(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
+    if desc.view_mask == 0 {
+        return Ok(());
+    }
+    let name = desc.debug_name;
+    gpu.check_view_mask(name, desc.view_mask)?;
+    for (stage, feature, what) in [
+        (&modules.tess_eval, OptionalFeature::MultiviewTessellation, "tessellation"),
+        (&modules.geometry, OptionalFeature::MultiviewGeometry, "the geometry stage"),
+        (&modules.mesh, OptionalFeature::MultiviewMesh, "the mesh stage"),
+    ] {
+        if stage.is_some() {
+            gpu.require(feature, &format!("{what} of pipeline '{name}' with a view mask"))?;
+        }
+    }
+    match modules.iter().find(|module| module.reflection.writes_layer) {
+        None => Ok(()),
+        Some(module) => {
+            let message =
+                format!("'{}' writes gl_Layer, but with a view mask the view decides the layer", module.name);
+            Err(Error::usage(name, message))
+        }
+    }
+}
+
+/// A second source stands in one target alone, and the fragment shader has to put it out.
+fn check_second_source(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
+    let name = desc.debug_name;
+    if !desc.color.iter().filter_map(|target| target.blend).any(|blend| blend.takes_second()) {
+        return Ok(());
+    }
+    gpu.require(OptionalFeature::DualSourceBlend, &format!("a second blend source in pipeline '{name}'"))?;
+    if desc.color.len() > 1 {
+        return Err(Error::usage(name, "a second blend source takes all outputs; draw to one colour target"));
+    }
+    match &modules.fragment {
+        Some(fragment) if fragment.reflection.second_output => Ok(()),
+        _ => {
+            let message = "a blend factor takes the second source, but the fragment shader has no output with \
+                           layout(location = 0, index = 1)";
+            Err(Error::usage(name, message))
+        }
+    }
+}
