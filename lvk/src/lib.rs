@@ -74,7 +74,7 @@
 //! # What is not checked
 //!
 //! Numbers and addresses inside shaders: a shader that indexes past the arrays, or reads through a wrong address, is
-//! undefined behaviour on the GPU, as in every bindless design. Slot 0 of each array and every free slot hold a
+//! undefined behaviour on the GPU, as in every bindless design; [`ContextDesc::check_indices`] finds the former. Slot 0 of each array and every free slot hold a
 //! visible dummy, a 2D one among the textures. Nor are vertices, which indices and draws may ask for beyond the end of
 //! a vertex buffer.
 //!
@@ -122,6 +122,7 @@ pub use accel::desc::{BlasDesc, PrimitiveOrder, TlasDesc};
 pub use accel::flags::{AccelStructSizes, BuildFlags, BuildMode};
 pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, GeometryTransform, Indices, Triangles};
 pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, transform_rows};
+pub use bindless::checks::{BindlessArray, IndexFault, SlotState};
 pub use command::CommandBuffer;
 pub use command::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, StencilLoad};
 pub use command::dependencies::Dependencies;

@@ -14,7 +14,8 @@ use crate::accel::storage::AccelStorage;
 use crate::accel::structure::AccelKind;
 use crate::accel::tlas::TlasContents;
 use crate::barrier::{QueryStages, ResourceId};
-use crate::bindless::Bindless;
+use crate::bindless::checks::BindlessArray;
+use crate::bindless::{Bindless, TEXTURE_ARRAYS};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::kernel::Kernels;
@@ -108,11 +109,29 @@ impl Shared {
     /// Destroys an object later, once no command buffer can use it.
     pub(crate) fn retire(&self, garbage: Garbage) {
         const OFTEN_ENOUGH: usize = 256;
+        self.note_retired(&garbage);
         let waiting = self.submitter.retire(garbage);
         if waiting.is_multiple_of(OFTEN_ENOUGH)
             && let Err(error) = self.collect()
         {
             log::error!("what was destroyed is not freed yet: {error}");
+        }
+    }
+
+    /// The slot of the object may be reached no longer by what is recorded from now on.
+    fn note_retired(&self, garbage: &Garbage) {
+        let newest = || self.submitter.newest();
+        match garbage {
+            Garbage::Texture(texture) => self.bindless.note_retired(&TEXTURE_ARRAYS, texture.slot, newest),
+            Garbage::Sampler(sampler) => {
+                self.bindless.note_retired(&[BindlessArray::Samplers], sampler.slot, newest);
+            }
+            Garbage::AccelStruct(object) => {
+                if let AccelKind::Tlas(tlas) = &object.kind {
+                    self.bindless.note_retired(&[BindlessArray::AccelStructs], tlas.slot, newest);
+                }
+            }
+            _ => {}
         }
     }
 

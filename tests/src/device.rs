@@ -39,12 +39,17 @@ impl Deref for TestDevice {
 
 impl Drop for TestDevice {
     fn drop(&mut self) {
+        let mut faults = Vec::new();
         if let Some(context) = self.context.take() {
             let _ = context.wait_idle();
+            if is_set("LVK_TEST_CHECK_INDICES") {
+                faults = context.index_faults().unwrap_or_default();
+            }
         }
         if std::thread::panicking() {
             return;
         }
+        assert!(faults.is_empty(), "shaders use wrong indices: {faults:#?}");
         let messages: Vec<String> = self.sink.take().iter().map(ToString::to_string).collect();
         assert!(messages.is_empty(), "the validation layer is not silent:\n{}", messages.join("\n"));
     }
@@ -71,6 +76,7 @@ pub fn device_with<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<Test
         validation: validation(),
         validation_sink: Some(sink.clone()),
         ray_query: ray_query(),
+        check_indices: is_set("LVK_TEST_CHECK_INDICES"),
         ..Default::default()
     };
     adjust(&mut desc);

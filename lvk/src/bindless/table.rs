@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
 
+use super::checks::{BindlessArray, CheckPlan, IndexChecks};
 use super::layout;
 use super::slots::Slots;
 use crate::error::{Error, Result};
@@ -33,6 +34,8 @@ pub(crate) struct Bindless {
     pub(crate) set: vk::DescriptorSet,
     pool: vk::DescriptorPool,
     entries: Mutex<Entries>,
+    /// Present where shaders look their indices up.
+    pub(crate) checks: Option<IndexChecks>,
     gpu: Arc<Gpu>,
 }
 
@@ -42,6 +45,9 @@ struct Entries {
     samplers: Array<vk::Sampler>,
     tlas: Array<vk::AccelerationStructureKHR>,
 }
+
+/// The arrays that the slot of a texture belongs to.
+pub(crate) const TEXTURE_ARRAYS: [BindlessArray; 2] = [BindlessArray::Textures, BindlessArray::StorageImages];
 
 /// Slots of one kind and who owns them.
 struct Array<T> {
@@ -79,7 +85,7 @@ impl<T: Copy> Array<T> {
 }
 
 impl Bindless {
-    pub(crate) fn new(gpu: &Arc<Gpu>, max_textures: u32) -> Result<Self> {
+    pub(crate) fn new(gpu: &Arc<Gpu>, max_textures: u32, check_indices: bool) -> Result<Self> {
         let limits = &gpu.caps.limits;
         let textures = max_textures.clamp(2, limits.max_bindless_textures.max(2));
         let counts = [
@@ -89,6 +95,8 @@ impl Bindless {
             (layout::ACCEL_STRUCTS, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, tlas_count(gpu)),
             (layout::TLAS_TABLE, vk::DescriptorType::STORAGE_BUFFER, slot_count(gpu).min(1)),
         ];
+        let capacities = [textures, limits.max_bindless_samplers, textures, slot_count(gpu)];
+        let checks = if check_indices { Some(IndexChecks::new(gpu, capacities)?) } else { None };
         let set_layout = create_layout(gpu, &counts)?;
         let (pool, set) = match create_set(gpu, set_layout, &counts) {
             Ok(made) => made,
@@ -104,7 +112,7 @@ impl Bindless {
             samplers: Array::new("number of samplers", limits.max_bindless_samplers),
             tlas: Array::new("number of top-level acceleration structures", slot_count(gpu)),
         };
-        Ok(Self { set_layout, set, pool, entries: Mutex::new(entries), gpu: Arc::clone(gpu) })
+        Ok(Self { set_layout, set, pool, entries: Mutex::new(entries), checks, gpu: Arc::clone(gpu) })
     }
 
     /// Puts the dummies into every slot. Nothing has been submitted yet.
@@ -123,19 +131,32 @@ impl Bindless {
     }
 
     pub(crate) fn reserve_texture(&self, name: &str) -> Result<u32> {
-        self.lock().textures.reserve(name)
+        let slot = self.lock().textures.reserve(name)?;
+        self.note_reserved(&TEXTURE_ARRAYS, slot, name);
+        Ok(slot)
     }
 
     pub(crate) fn reserve_sampler(&self, name: &str) -> Result<u32> {
-        self.lock().samplers.reserve(name)
+        let slot = self.lock().samplers.reserve(name)?;
+        self.note_reserved(&[BindlessArray::Samplers], slot, name);
+        self.note_set(BindlessArray::Samplers, slot);
+        Ok(slot)
     }
 
     pub(crate) fn reserve_tlas(&self, name: &str) -> Result<u32> {
-        self.lock().tlas.reserve(name)
+        let slot = self.lock().tlas.reserve(name)?;
+        self.note_reserved(&[BindlessArray::AccelStructs], slot, name);
+        self.note_set(BindlessArray::AccelStructs, slot);
+        Ok(slot)
     }
 
     pub(crate) fn set_texture(&self, slot: u32, views: TextureViews) {
         self.lock().textures.set(slot, Some(views));
+        for (array, view) in TEXTURE_ARRAYS.into_iter().zip([views.sampled, views.storage]) {
+            if view.is_some() {
+                self.note_set(array, slot);
+            }
+        }
     }
 
     pub(crate) fn set_sampler(&self, slot: u32, sampler: vk::Sampler) {
@@ -151,6 +172,7 @@ impl Bindless {
         let mut entries = self.lock();
         entries.textures.set(slot, None);
         entries.textures.slots.free(slot);
+        self.note_free(&TEXTURE_ARRAYS, slot);
     }
 
     /// As [`free_texture`](Self::free_texture).
@@ -158,6 +180,7 @@ impl Bindless {
         let mut entries = self.lock();
         entries.samplers.set(slot, None);
         entries.samplers.slots.free(slot);
+        self.note_free(&[BindlessArray::Samplers], slot);
     }
 
     /// As [`free_texture`](Self::free_texture).
@@ -165,6 +188,38 @@ impl Bindless {
         let mut entries = self.lock();
         entries.tlas.set(slot, None);
         entries.tlas.slots.free(slot);
+        self.note_free(&[BindlessArray::AccelStructs], slot);
+    }
+
+    /// The handle of the owner of a slot is gone, and command buffers up to number `newest` were begun before.
+    pub(crate) fn note_retired(&self, arrays: &[BindlessArray], slot: u32, newest: impl FnOnce() -> u64) {
+        if let Some(checks) = &self.checks {
+            let newest = newest();
+            arrays.iter().for_each(|array| checks.retire(*array, slot, newest));
+        }
+    }
+
+    /// What a module of this name needs, where indices are checked.
+    pub(crate) fn check_plan(&self, shader: &str) -> Option<CheckPlan> {
+        self.checks.as_ref().map(|checks| checks.plan(shader))
+    }
+
+    fn note_reserved(&self, arrays: &[BindlessArray], slot: u32, name: &str) {
+        if let Some(checks) = &self.checks {
+            checks.reserve(arrays, slot, name);
+        }
+    }
+
+    fn note_set(&self, array: BindlessArray, slot: u32) {
+        if let Some(checks) = &self.checks {
+            checks.set(array, slot);
+        }
+    }
+
+    fn note_free(&self, arrays: &[BindlessArray], slot: u32) {
+        if let Some(checks) = &self.checks {
+            arrays.iter().for_each(|array| checks.free(*array, slot));
+        }
     }
 
     /// Writes the dirty slots. Called before every submission.

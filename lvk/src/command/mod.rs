@@ -114,6 +114,9 @@ impl Outcome {
 impl CommandBuffer {
     pub(crate) fn new(shared: &Arc<Shared>) -> Result<Self> {
         let recording = shared.submitter.acquire()?;
+        if let Some(checks) = &shared.bindless.checks {
+            checks.begin(&shared.gpu, recording.commands, recording.sequence);
+        }
         Ok(Self {
             scopes: shared.profiler.begin(recording.commands),
             recording: ManuallyDrop::new(recording),

@@ -28,6 +28,11 @@ pub struct ContextDesc<'a> {
     /// (`vkGetPhysicalDeviceToolProperties`). Elsewhere a name costs no call of the driver. The library's own errors and
     /// reports always have names.
     pub debug_names: Option<bool>,
+    /// Have shaders look every index of a bindless array up before they use it: a wrong one is written down, with the name
+    /// of the object it belonged to, for [`Context::index_faults`](crate::Context::index_faults), and the dummy of slot 0
+    /// stands in. For debugging: every access costs several reads of memory, command buffers no longer overlap, and pipelines
+    /// are compiled anew in every run. See the manual's page on [debugging](crate::manual::debugging).
+    pub check_indices: bool,
     /// Ray tracing pipelines.
     pub ray_tracing_pipeline: FeatureRequest,
     /// Ray queries in any shader stage, and who walks their trees; [`Capabilities`](crate::Capabilities) says which it
@@ -88,6 +93,7 @@ impl Default for ContextDesc<'_> {
             validation: Validation::Off,
             validation_sink: None,
             debug_names: None,
+            check_indices: false,
             ray_tracing_pipeline: FeatureRequest::Optional,
             ray_query: RayQueryRequest::default(),
             required_features: &[],

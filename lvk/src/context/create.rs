@@ -56,6 +56,7 @@ impl Context {
             &shared.gpu,
             desc,
             shared.shader_cache.as_ref(),
+            Some(&shared.bindless),
             shared.layout.push_constant_bytes,
         )?;
         warn_of_raw_numbers(&shared.gpu.caps, desc);

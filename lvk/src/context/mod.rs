@@ -13,6 +13,7 @@ pub(crate) mod destroy;
 mod dummy;
 pub(crate) mod frame;
 pub(crate) mod holder;
+mod index_faults;
 mod interop;
 mod live_objects;
 mod profile;

@@ -87,7 +87,7 @@ impl Context {
 }
 
 fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
-    let bindless = Bindless::new(&gpu, desc.max_textures)?;
+    let bindless = Bindless::new(&gpu, desc.max_textures, desc.check_indices)?;
     Ok(Shared {
         dummies: OnceLock::new(),
         store: Store::new(),

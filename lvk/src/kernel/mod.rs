@@ -185,7 +185,7 @@ impl Kernel {
             debug_name: self.name(),
             ..Default::default()
         };
-        let module = ShaderModule::new(gpu, &desc, None, layout.push_constant_bytes)?;
+        let module = ShaderModule::new(gpu, &desc, None, None, layout.push_constant_bytes)?;
         let desc = ComputePipelineDesc { debug_name: self.name(), ..Default::default() };
         ComputePipeline::new(gpu, PipelineBase { layout: layout.raw, cache }, &desc, &module)
     }

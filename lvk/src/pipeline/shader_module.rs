@@ -4,10 +4,12 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use crate::bindless::Bindless;
+use crate::bindless::checks::CheckPlan;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::shader::{CompileOptions, Reflection, ShaderCache, ShaderModuleDesc, ShaderStage};
-use crate::shader::{check_capabilities, check_stage, compile, reflect};
+use crate::shader::{check_capabilities, check_stage, compile, reflect, with_checked_indices};
 
 /// A compiled module, destroyed on drop.
 pub(crate) struct ShaderModule {
@@ -19,10 +21,12 @@ pub(crate) struct ShaderModule {
 }
 
 impl ShaderModule {
+    /// `bindless` knows whether the indices of modules that are not the library's own are checked.
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
         desc: &ShaderModuleDesc<'_>,
         cache: Option<&ShaderCache>,
+        bindless: Option<&Bindless>,
         max_push_bytes: u32,
     ) -> Result<Self> {
         check_stage(desc.debug_name, desc.stage, &gpu.features)?;
@@ -39,6 +43,10 @@ impl ShaderModule {
                 limit: max_push_bytes.into(),
             });
         }
+        let words = match bindless.and_then(|bindless| bindless.check_plan(desc.debug_name)) {
+            Some(plan) => checked(gpu, desc, words, &plan),
+            None => words,
+        };
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the words are a whole module for a stage and features of this device.
         let raw = unsafe { gpu.device.create_shader_module(&info, None) }
@@ -62,6 +70,24 @@ impl Drop for ShaderModule {
     fn drop(&mut self) {
         // SAFETY: pipelines do not need a module once they are created.
         unsafe { self.gpu.device.destroy_shader_module(self.raw, None) };
+    }
+}
+
+/// The module with its indices checked; as it is, with a warning, where that cannot be.
+fn checked(gpu: &Gpu, desc: &ShaderModuleDesc<'_>, words: Vec<u32>, plan: &CheckPlan) -> Vec<u32> {
+    use ShaderStage::{Geometry, TessControl, TessEval, Vertex};
+    let writes = match desc.stage {
+        Vertex | TessControl | TessEval | Geometry => gpu.features.core.vertex_pipeline_stores_and_atomics,
+        _ => vk::TRUE,
+    };
+    let stores =
+        if writes == vk::TRUE { Ok(()) } else { Err("its stage cannot write on this device".to_owned()) };
+    match stores.and_then(|()| with_checked_indices(&words, plan)) {
+        Ok(checked) => checked,
+        Err(why) => {
+            log::warn!("the indices of shader '{}' are not checked: {why}", desc.debug_name);
+            words
+        }
     }
 }
 

@@ -13,8 +13,10 @@ mod disk_file;
 mod front_end;
 mod hit_numbers;
 mod idle_culling;
+mod import;
 #[cfg(feature = "glsl")]
 mod include;
+mod instrument;
 mod module;
 #[cfg(feature = "glsl")]
 mod offline;
@@ -38,6 +40,7 @@ pub(crate) use compile::{CompileOptions, compile};
 pub(crate) use disk_cache::ShaderCache;
 pub use disk_cache::ShaderCacheCounts;
 pub(crate) use hit_numbers::raw_hit_number;
+pub(crate) use instrument::with_checked_indices;
 #[cfg(feature = "glsl")]
 pub use offline::compile_glsl;
 pub(crate) use reflect::{Primitive, Reflection, reflect};

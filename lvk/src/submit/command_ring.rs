@@ -112,6 +112,11 @@ impl CommandRing {
         done
     }
 
+    /// Sequence number of the command buffer that was taken last.
+    pub(crate) fn newest(&self) -> u64 {
+        self.last_sequence
+    }
+
     /// Sequence number of the oldest command buffer being recorded.
     pub(crate) fn oldest_open(&self) -> Option<u64> {
         self.open.first().copied()

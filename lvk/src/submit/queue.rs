@@ -204,6 +204,11 @@ impl<T> Submitter<T> {
         inner.deferred.len()
     }
 
+    /// Number of the command buffer that was begun last.
+    pub(crate) fn newest(&self) -> u64 {
+        self.lock().ring.newest()
+    }
+
     /// Takes out what the GPU has finished with.
     pub(crate) fn collect(&self) -> Result<Finished<T>> {
         let completed = self.timeline.completed()?;

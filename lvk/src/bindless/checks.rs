@@ -1,0 +1,245 @@
+//! What shaders look their indices up in where they are checked, and the faults they write down.
+//!
+//! One word for each slot says up to which command buffer its owner may be reached: 0 where nobody is, all ones while the
+//! owner is alive, and after the end of its handle the number of the last command buffer that was begun before. Every
+//! command buffer first writes its own number into a word in front of them, so that what was recorded while the owner was
+//! alive may still reach it, and what came later may not.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ash::vk;
+
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::gpu::memory::MemoryKind;
+use crate::resource::Buffer;
+use crate::resource::buffer::{BufferDesc, InternalUsage};
+
+/// An array of the bindless set.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum BindlessArray {
+    /// Sampled textures: `kTextures2D` and its kin.
+    Textures,
+    /// `kSamplers` and `kSamplersShadow`.
+    Samplers,
+    /// Storage images: `kImages2D` and its kin.
+    StorageImages,
+    /// Top-level acceleration structures: `kTLAS`, and what the library's helpers and ray queries take for its index.
+    AccelStructs,
+}
+
+/// What was found behind an index.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum SlotState {
+    /// Nobody ever had it since the context began, or the index is beyond the array.
+    NeverCreated,
+    /// Its owner's handle was destroyed before the command buffer was begun.
+    Freed,
+    /// Its owner lacks the usage that this array needs: a texture without `SAMPLED` or `STORAGE`.
+    OtherUsage,
+}
+
+/// Accesses of one shader by one wrong index.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct IndexFault {
+    /// The array.
+    pub array: BindlessArray,
+    /// The index. The shader went on with index 0, the dummy.
+    pub index: u32,
+    /// What was found there.
+    pub state: SlotState,
+    /// Debug name of the object that has or last had the index, if any had.
+    pub object: Option<String>,
+    /// Debug name of the shader module.
+    pub shader: String,
+    /// How often, counted by invocation; those of helper invocations do not count.
+    pub count: u32,
+}
+
+impl BindlessArray {
+    pub(crate) const ALL: [Self; 4] =
+        [Self::Textures, Self::Samplers, Self::StorageImages, Self::AccelStructs];
+}
+
+/// Places in the buffer, in words; `shader/glsl/checked_index.glsl` has the same numbers.
+const CURRENT: u32 = 0;
+const LOST: usize = 1;
+const ENTRIES: u32 = 16;
+pub(crate) const ENTRY_COUNT: u32 = 4096;
+const ENTRY_WORDS: u32 = 8;
+const STATES: u32 = ENTRIES + ENTRY_COUNT * ENTRY_WORDS;
+const NOBODY: u32 = 0;
+const ALIVE: u32 = u32::MAX;
+
+/// Where the words of an array lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Range {
+    pub(crate) first: u32,
+    pub(crate) count: u32,
+}
+
+/// What a shader needs to be checked.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CheckPlan {
+    pub(crate) address: u64,
+    /// The number its faults are written down under.
+    pub(crate) shader: u32,
+    /// By [`BindlessArray::ALL`].
+    pub(crate) arrays: [Range; 4],
+}
+
+/// The buffer, and who has and had which slot.
+pub(crate) struct IndexChecks {
+    pub(crate) buffer: Arc<Buffer>,
+    arrays: [Range; 4],
+    known: Mutex<Known>,
+}
+
+#[derive(Default)]
+struct Known {
+    /// Who has or last had a slot.
+    owners: HashMap<(BindlessArray, u32), String>,
+    shaders: Vec<String>,
+}
+
+impl IndexChecks {
+    /// `counts` are the slots of each array.
+    pub(crate) fn new(gpu: &Arc<Gpu>, counts: [u32; 4]) -> Result<Self> {
+        let mut first = STATES;
+        let arrays = counts.map(|count| {
+            first += count;
+            Range { first: first - count, count }
+        });
+        let desc = BufferDesc {
+            size_bytes: u64::from(first) * 4,
+            memory: MemoryKind::HostVisible,
+            debug_name: "states of bindless slots",
+            ..Default::default()
+        };
+        let buffer = Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?);
+        buffer.fill(|bytes| bytes.fill(0));
+        let checks = Self { buffer, arrays, known: Mutex::default() };
+        BindlessArray::ALL.into_iter().for_each(|array| checks.write(array, 0, ALIVE));
+        Ok(checks)
+    }
+
+    /// What a module of this name needs.
+    pub(crate) fn plan(&self, shader: &str) -> CheckPlan {
+        let mut known = self.known();
+        known.shaders.push(shader.to_owned());
+        CheckPlan {
+            address: self.buffer.address,
+            shader: known.shaders.len() as u32 - 1,
+            arrays: self.arrays,
+        }
+    }
+
+    /// Somebody has a slot from now on; of a texture both arrays are told.
+    pub(super) fn reserve(&self, arrays: &[BindlessArray], slot: u32, name: &str) {
+        let mut known = self.known();
+        arrays.iter().for_each(|array| _ = known.owners.insert((*array, slot), name.to_owned()));
+    }
+
+    /// The owner can be reached.
+    pub(super) fn set(&self, array: BindlessArray, slot: u32) {
+        self.write(array, slot, ALIVE);
+    }
+
+    /// The owner's handle is gone; command buffers up to `newest` may still reach it.
+    pub(super) fn retire(&self, array: BindlessArray, slot: u32, newest: u64) {
+        self.write(array, slot, (newest as u32).clamp(1, ALIVE - 1));
+    }
+
+    /// The slot goes back. An owner that never came into being is forgotten.
+    pub(super) fn free(&self, array: BindlessArray, slot: u32) {
+        if self.read(array, slot) == ALIVE {
+            self.write(array, slot, NOBODY);
+        }
+    }
+
+    /// Records that the command buffer of this number begins, behind everything before it.
+    pub(crate) fn begin(&self, gpu: &Gpu, commands: vk::CommandBuffer, sequence: u64) {
+        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+        let all = (Stage::ALL_COMMANDS, Access::MEMORY_READ | Access::MEMORY_WRITE);
+        let transfer = (Stage::ALL_TRANSFER, Access::TRANSFER_READ | Access::TRANSFER_WRITE);
+        barrier(gpu, commands, all, transfer);
+        let number = (sequence as u32).to_le_bytes();
+        // SAFETY: the command buffer is being recorded outside of a pass; the buffer lives as long as the context.
+        unsafe {
+            gpu.device.cmd_update_buffer(commands, self.buffer.raw, u64::from(CURRENT) * 4, &number);
+        }
+        barrier(gpu, commands, transfer, all);
+    }
+
+    /// The faults in a copy of the buffer's first [`fault_bytes`](Self::fault_bytes), in the order of arrays, indices and
+    /// shaders.
+    pub(crate) fn faults(&self, words: &[u32]) -> Vec<IndexFault> {
+        let (entries, _) =
+            words.get(ENTRIES as usize..).unwrap_or(&[]).as_chunks::<{ ENTRY_WORDS as usize }>();
+        let lost = words.get(LOST).copied().unwrap_or(0);
+        if lost > 0 {
+            log::warn!(
+                "{lost} accesses by wrong indices are not told apart: there are too many kinds of them"
+            );
+        }
+        let mut faults: Vec<_> = entries.iter().filter_map(|entry| self.fault(entry)).collect();
+        faults.sort_by(|a, b| (a.array, a.index, &a.shader).cmp(&(b.array, b.index, &b.shader)));
+        faults
+    }
+
+    /// Bytes at the start of the buffer that hold the faults.
+    pub(crate) fn fault_bytes() -> u64 {
+        u64::from(STATES) * 4
+    }
+
+    /// Key, shader, array, index, the word found, and the count.
+    fn fault(&self, entry: &[u32; ENTRY_WORDS as usize]) -> Option<IndexFault> {
+        let [key, shader, array, index, word, count, ..] = *entry;
+        let array = BindlessArray::ALL.get(array as usize).copied().filter(|_| key != 0)?;
+        let known = self.known();
+        let object = known.owners.get(&(array, index)).cloned();
+        let state = match word {
+            NOBODY if object.is_some() => SlotState::OtherUsage,
+            NOBODY => SlotState::NeverCreated,
+            _ => SlotState::Freed,
+        };
+        let shader = known.shaders.get(shader as usize).cloned().unwrap_or_default();
+        Some(IndexFault { array, index, state, object, shader, count })
+    }
+
+    fn write(&self, array: BindlessArray, slot: u32, word: u32) {
+        if let Some(place) = self.place(array, slot) {
+            self.buffer.write(place, &word.to_ne_bytes());
+        }
+    }
+
+    fn read(&self, array: BindlessArray, slot: u32) -> u32 {
+        let mut word = [0; 4];
+        self.place(array, slot).map(|place| self.buffer.read(place, &mut word));
+        u32::from_ne_bytes(word)
+    }
+
+    fn place(&self, array: BindlessArray, slot: u32) -> Option<u64> {
+        let Range { first, count } = self.arrays[array as usize];
+        (slot < count).then(|| u64::from(first + slot) * 4)
+    }
+
+    fn known(&self) -> MutexGuard<'_, Known> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+type Scope = (vk::PipelineStageFlags2, vk::AccessFlags2);
+
+/// Outside of the trackers, which do not know of the buffer: shaders reach it in every command.
+fn barrier(gpu: &Gpu, commands: vk::CommandBuffer, from: Scope, to: Scope) {
+    let barrier = [vk::MemoryBarrier2::default()
+        .src_stage_mask(from.0)
+        .src_access_mask(from.1)
+        .dst_stage_mask(to.0)
+        .dst_access_mask(to.1)];
+    let info = vk::DependencyInfo::default().memory_barriers(&barrier);
+    // SAFETY: the command buffer is being recorded outside of a pass.
+    unsafe { gpu.device.cmd_pipeline_barrier2(commands, &info) };
+}

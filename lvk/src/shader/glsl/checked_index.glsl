@@ -1,0 +1,45 @@
+// Looks indices of bindless arrays up before they are used. `lvk/src/bindless/checks.rs` has the layout of the words.
+layout(local_size_x = 1) in;
+
+layout(buffer_reference, std430, buffer_reference_align = 4) buffer LvkCheckWords { uint at[]; };
+
+const uint CURRENT = 0u;
+const uint LOST = 1u;
+const uint ENTRIES = 16u;
+const uint ENTRY_COUNT = 4096u;
+const uint ENTRY_WORDS = 8u;
+const uint PROBES = 16u;
+
+// The index, or 0 where nobody has it, after writing that down.
+uint lvkCheckedIndex(const uvec2 address, const uint shader, const uint array, const uint first, const uint count,
+                     const uint index) {
+    LvkCheckWords words = LvkCheckWords(address);
+    uint last = 0u;
+    if (index < count) {
+        last = words.at[first + index];
+    }
+    if (words.at[CURRENT] <= last) {
+        return index;
+    }
+    uint key = ((index * 0x9E3779B9u ^ shader) * 0x85EBCA6Bu ^ array * 0xC2B2AE35u) * 0x27D4EB2Fu;
+    key = (key ^ key >> 15) | 1u;
+    for (uint probe = 0u; probe < PROBES; ++probe) {
+        uint entry = ENTRIES + ((key >> 1) + probe) % ENTRY_COUNT * ENTRY_WORDS;
+        uint found = atomicCompSwap(words.at[entry], 0u, key);
+        if (found == 0u || found == key) {
+            words.at[entry + 1u] = shader;
+            words.at[entry + 2u] = array;
+            words.at[entry + 3u] = index;
+            words.at[entry + 4u] = last;
+            atomicAdd(words.at[entry + 5u], 1u);
+            return 0u;
+        }
+    }
+    atomicAdd(words.at[LOST], 1u);
+    return 0u;
+}
+
+// Only what is called is compiled.
+shared uint result;
+
+void main() { result = lvkCheckedIndex(uvec2(0u), 0u, 0u, 0u, 0u, 0u); }

@@ -1,0 +1,276 @@
+//! Puts a function of one module into another.
+
+use std::collections::{HashMap, HashSet};
+
+use ::spirv::Op;
+
+use super::spirv::{HEADER_WORDS, Instruction, instructions};
+
+/// Word of the header that is above every id.
+const BOUND: usize = 3;
+
+/// A module in its sections, to which something is added.
+pub(super) struct Sections {
+    /// The header.
+    pub(super) header: Vec<u32>,
+    pub(super) capabilities: Vec<u32>,
+    /// Everything up to the decorations, those included.
+    pub(super) annotations: Vec<u32>,
+    /// Types, constants and variables.
+    pub(super) globals: Vec<u32>,
+    pub(super) functions: Vec<u32>,
+}
+
+impl Sections {
+    /// Fails where an instruction is cut off.
+    pub(super) fn of(words: &[u32]) -> Result<Self, String> {
+        let header = words.get(..HEADER_WORDS).ok_or("the header is cut off")?.to_vec();
+        let mut all = Self {
+            header,
+            capabilities: Vec::new(),
+            annotations: Vec::new(),
+            globals: Vec::new(),
+            functions: Vec::new(),
+        };
+        for instruction in instructions(words) {
+            let instruction = instruction?;
+            let section = match instruction.op {
+                _ if !all.functions.is_empty() => &mut all.functions,
+                Some(Op::Function) => &mut all.functions,
+                Some(Op::Capability) => &mut all.capabilities,
+                op if all.globals.is_empty() && op.is_none_or(is_annotation) => &mut all.annotations,
+                _ => &mut all.globals,
+            };
+            section.extend(instruction.words);
+        }
+        Ok(all)
+    }
+
+    pub(super) fn words(self) -> Vec<u32> {
+        [self.header, self.capabilities, self.annotations, self.globals, self.functions].concat()
+    }
+
+    pub(super) fn new_id(&mut self) -> u32 {
+        let id = self.header[BOUND];
+        self.header[BOUND] = id.wrapping_add(1);
+        id
+    }
+
+    /// The id of a new constant of one word.
+    pub(super) fn constant(&mut self, ty: u32, value: u32) -> u32 {
+        let id = self.new_id();
+        push(&mut self.globals, Op::Constant, &[ty, id, value]);
+        id
+    }
+
+    /// Adds the function of this name with the types, constants and decorations that it needs; answers its id.
+    ///
+    /// Types that may be declared only once are shared with what is there.
+    pub(super) fn import(&mut self, donor: &[u32], name: &str) -> Result<Imported, String> {
+        let code: Vec<_> = instructions(donor).collect::<Result<_, _>>()?;
+        let wanted = |i: &&Instruction<'_>| i.op == Some(Op::Name) && i.string(1).0.starts_with(name);
+        let function = code.iter().find(wanted).ok_or("the function is missing")?.operand(0);
+        let mut ids = Ids { known: self.types()?, mapped: HashMap::new() };
+        let body = body_of(&code, function);
+        for instruction in needed(&code, body) {
+            self.import_global(instruction, &mut ids);
+        }
+        let mut functions = std::mem::take(&mut self.functions);
+        for instruction in body {
+            let words = self.mapped(instruction, &mut ids);
+            functions.extend(words);
+        }
+        self.functions = functions;
+        for instruction in code.iter().filter(|i| matches!(i.op, Some(Op::Decorate | Op::MemberDecorate))) {
+            if let Some(target) =
+                ids.mapped.get(&instruction.operand(0)).filter(|id| !ids.known.contains(**id))
+            {
+                let at = self.annotations.len();
+                self.annotations.extend(instruction.words);
+                self.annotations[at + 1] = *target;
+            }
+        }
+        let id = |of: u32| ids.mapped.get(&of).copied().ok_or("an id is missing");
+        let parameter_type = |index: usize| {
+            let parameters = body.iter().filter(|i| i.op == Some(Op::FunctionParameter));
+            parameters.map(|i| i.operand(0)).nth(index).map_or(Err("a parameter is missing"), id)
+        };
+        let result = body.first().map_or(Err("the function is empty"), |first| id(first.operand(0)))?;
+        Ok(Imported {
+            function: id(function)?,
+            result,
+            address: parameter_type(0)?,
+            word: parameter_type(1)?,
+        })
+    }
+
+    fn import_global(&mut self, instruction: &Instruction<'_>, ids: &mut Ids) {
+        let result = result_of(instruction);
+        let mut shape: Vec<u32> = instruction.words.to_vec();
+        for (index, word) in shape.iter_mut().enumerate().skip(1) {
+            if index != result + 1 && is_id(instruction, index - 1) {
+                *word = ids.mapped.get(word).copied().unwrap_or(0);
+            }
+        }
+        shape[result + 1] = 0;
+        if let Some(known) = ids.known.0.get(&shape) {
+            ids.mapped.insert(instruction.operand(result), *known);
+            return;
+        }
+        let id = self.new_id();
+        ids.mapped.insert(instruction.operand(result), id);
+        shape[result + 1] = id;
+        self.globals.extend(shape);
+    }
+
+    fn mapped(&mut self, instruction: &Instruction<'_>, ids: &mut Ids) -> Vec<u32> {
+        let mut words = instruction.words.to_vec();
+        for (index, word) in words.iter_mut().enumerate().skip(1) {
+            if is_id(instruction, index - 1) {
+                *word = *ids.mapped.entry(*word).or_insert_with(|| self.new_id());
+            }
+        }
+        words
+    }
+
+    /// The types that may be declared once only, by their words without the result.
+    fn types(&self) -> Result<Known, String> {
+        let mut known = HashMap::new();
+        for instruction in instructions(&[self.header.clone(), self.globals.clone()].concat()) {
+            let instruction = instruction?;
+            if instruction.op.is_some_and(is_unique) && instruction.words.len() > 1 {
+                let mut shape = instruction.words.to_vec();
+                shape[1] = 0;
+                known.insert(shape, instruction.operand(0));
+            }
+        }
+        Ok(Known(known))
+    }
+}
+
+/// What was imported.
+pub(super) struct Imported {
+    pub(super) function: u32,
+    /// Type of what it answers.
+    pub(super) result: u32,
+    /// Type of its first parameter.
+    pub(super) address: u32,
+    /// Type of its second.
+    pub(super) word: u32,
+}
+
+struct Ids {
+    known: Known,
+    /// Ids of the donor and what they became.
+    mapped: HashMap<u32, u32>,
+}
+
+struct Known(HashMap<Vec<u32>, u32>);
+
+impl Known {
+    fn contains(&self, id: u32) -> bool {
+        self.0.values().any(|known| *known == id)
+    }
+}
+
+/// Adds an instruction.
+pub(super) fn push(section: &mut Vec<u32>, op: Op, operands: &[u32]) {
+    section.push((operands.len() as u32 + 1) << 16 | op as u32);
+    section.extend(operands);
+}
+
+/// The types and constants that `body` needs, in their order.
+fn needed<'a, 'b>(code: &'a [Instruction<'b>], body: &[Instruction<'b>]) -> Vec<&'a Instruction<'b>> {
+    let ids_of = |i: &Instruction<'b>| {
+        let is_id = |(index, word): (usize, &u32)| is_id(i, index).then_some(*word);
+        i.operands().iter().enumerate().filter_map(is_id).collect::<Vec<_>>()
+    };
+    let mut wanted: HashSet<u32> = body.iter().flat_map(ids_of).collect();
+    let mut found = Vec::new();
+    for global in code.iter().rev().filter(|i| i.op.is_some_and(is_type_or_constant)) {
+        if wanted.contains(&global.operand(result_of(global))) {
+            wanted.extend(ids_of(global));
+            found.push(global);
+        }
+    }
+    found.reverse();
+    found
+}
+
+/// Which operand of a type or constant is its own id.
+fn result_of(instruction: &Instruction<'_>) -> usize {
+    if instruction.op.is_some_and(is_type) { 0 } else { 1 }
+}
+
+fn body_of<'a, 'b>(code: &'a [Instruction<'b>], function: u32) -> &'a [Instruction<'b>] {
+    let start = code.iter().position(|i| i.op == Some(Op::Function) && i.operand(1) == function);
+    let rest = &code[start.unwrap_or(code.len())..];
+    let end = rest.iter().position(|i| i.op == Some(Op::FunctionEnd));
+    end.map_or(&[], |end| &rest[..=end])
+}
+
+/// What stands in front of types, constants and variables.
+fn is_annotation(op: Op) -> bool {
+    use Op::{
+        Decorate, DecorateId, DecorateString, DecorationGroup, EntryPoint, ExecutionMode, ExecutionModeId,
+        ExtInstImport, Extension, GroupDecorate, GroupMemberDecorate, MemberDecorate, MemberDecorateString,
+        MemberName, MemoryModel, ModuleProcessed, Name, Source, SourceContinued, SourceExtension, String,
+    };
+    matches!(
+        op,
+        Decorate
+            | DecorateId
+            | DecorateString
+            | DecorationGroup
+            | EntryPoint
+            | ExecutionMode
+            | ExecutionModeId
+            | ExtInstImport
+            | Extension
+            | GroupDecorate
+            | GroupMemberDecorate
+            | MemberDecorate
+            | MemberDecorateString
+            | MemberName
+            | MemoryModel
+            | ModuleProcessed
+            | Name
+            | Source
+            | SourceContinued
+            | SourceExtension
+            | String
+    )
+}
+
+fn is_unique(op: Op) -> bool {
+    use Op::{TypeBool, TypeFloat, TypeFunction, TypeInt, TypePointer, TypeVector, TypeVoid};
+    matches!(op, TypeBool | TypeFloat | TypeFunction | TypeInt | TypePointer | TypeVector | TypeVoid)
+}
+
+fn is_type(op: Op) -> bool {
+    is_unique(op) || matches!(op, Op::TypeStruct | Op::TypeRuntimeArray)
+}
+
+fn is_type_or_constant(op: Op) -> bool {
+    is_type(op) || matches!(op, Op::Constant | Op::ConstantComposite | Op::ConstantTrue | Op::ConstantFalse)
+}
+
+/// Whether operand `index`, counted from 0, is an id, in the instructions that donors have.
+fn is_id(instruction: &Instruction<'_>, index: usize) -> bool {
+    use Op::{
+        BranchConditional, Constant, Function, LoopMerge, SelectionMerge, Store, TypeFloat, TypeInt,
+        TypePointer, TypeVector, Variable,
+    };
+    match instruction.op {
+        Some(TypeInt | TypeFloat) => index == 0,
+        Some(TypeVector) => index < 2,
+        Some(TypePointer) => index != 1,
+        Some(Constant | Store) => index < 2,
+        Some(Op::Load) => index < 3,
+        Some(Variable | Function) => index != 2,
+        Some(SelectionMerge) => index == 0,
+        Some(LoopMerge) => index < 2,
+        Some(BranchConditional) => index < 3,
+        _ => true,
+    }
+}

@@ -1,0 +1,344 @@
+//! Has a module look its indices of bindless arrays up before it uses them.
+
+use std::collections::{HashMap, HashSet};
+
+use ::spirv::{AddressingModel, Capability, Decoration, Op, StorageClass};
+
+use super::import::{Imported, Sections, push};
+use super::module::{Module, Type};
+use super::spirv::{self, Instruction, instructions};
+use crate::bindless::checks::{BindlessArray, CheckPlan};
+use crate::bindless::layout;
+
+/// `glsl/checked_index.glsl` as words.
+const DONOR: &[u8] = include_bytes!("glsl/checked_index.spv");
+const FUNCTION: &str = "lvkCheckedIndex(";
+/// Casts of addresses to pointers are part of it.
+const VERSION_1_5: u32 = 0x0001_0500;
+
+/// The module with every index of a bindless array checked; why not where it cannot be. Arrays of Y'CbCr samplers take
+/// constants alone, and are left as they are.
+pub(crate) fn with_checked_indices(words: &[u32], plan: &CheckPlan) -> Result<Vec<u32>, String> {
+    let module = Module::read(words)?;
+    let arrays = arrays(&module);
+    if arrays.is_empty() {
+        return Ok(words.to_vec());
+    }
+    if spirv::version(words) < VERSION_1_5 {
+        return Err("its SPIR-V is older than version 1.5".to_owned());
+    }
+    if module.has(Capability::VulkanMemoryModel) {
+        return Err("it uses Vulkan's own memory model".to_owned());
+    }
+    let mut sections = Sections::of(words)?;
+    let body = std::mem::take(&mut sections.functions);
+    let donor: Vec<u32> = DONOR.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
+    let imported = sections.import(&donor, FUNCTION)?;
+    let helper = std::mem::take(&mut sections.functions);
+    let checked = Checker::new(&mut sections, words, plan, &imported)?.check(&arrays, &body)?;
+    sections.functions = [checked, helper].concat();
+    allow_addresses(&mut sections, &module);
+    Ok(sections.words())
+}
+
+/// A variable that is an array of the set, or the table beside `kTLAS`: which, and where the index stands in an access.
+fn arrays(module: &Module) -> HashMap<u32, (BindlessArray, usize)> {
+    let found = |variable: &super::module::Variable| {
+        let set = module.decoration(variable.id, Decoration::DescriptorSet)?;
+        let binding = module.decoration(variable.id, Decoration::Binding)?;
+        let Type::Pointer { target } = module.types.get(&variable.ty)? else { return None };
+        let is_array = matches!(module.types.get(target)?, Type::Array { .. } | Type::RuntimeArray { .. });
+        let array = match binding {
+            _ if set != layout::SET => return None,
+            layout::TLAS_TABLE if variable.storage == StorageClass::StorageBuffer as u32 => {
+                return Some((variable.id, (BindlessArray::AccelStructs, 1)));
+            }
+            layout::SAMPLED_IMAGES => BindlessArray::Textures,
+            layout::SAMPLERS => BindlessArray::Samplers,
+            layout::STORAGE_IMAGES => BindlessArray::StorageImages,
+            layout::ACCEL_STRUCTS => BindlessArray::AccelStructs,
+            _ => return None,
+        };
+        is_array.then_some((variable.id, (array, 0)))
+    };
+    module.variables.iter().filter_map(found).collect()
+}
+
+/// Declares that the module has addresses.
+fn allow_addresses(sections: &mut Sections, module: &Module) {
+    if !module.has(Capability::PhysicalStorageBufferAddresses) {
+        let capability = Capability::PhysicalStorageBufferAddresses as u32;
+        push(&mut sections.capabilities, Op::Capability, &[capability]);
+    }
+    let mut at = 0;
+    while let Some(&first) = sections.annotations.get(at) {
+        if first & 0xFFFF == Op::MemoryModel as u32
+            && let Some(model) = sections.annotations.get_mut(at + 1)
+        {
+            *model = AddressingModel::PhysicalStorageBuffer64 as u32;
+            return;
+        }
+        at += (first >> 16).max(1) as usize;
+    }
+}
+
+/// Rewrites the bodies of functions.
+struct Checker<'a> {
+    sections: &'a mut Sections,
+    imported: &'a Imported,
+    address: u32,
+    shader: u32,
+    /// For each array its number, the place of its first word and its length.
+    arrays: Vec<[u32; 3]>,
+    /// Integer types: bits.
+    integers: HashMap<u32, u32>,
+    /// Types of constants and of values so far.
+    types: HashMap<u32, u32>,
+    type_ids: HashSet<u32>,
+    non_uniform: HashSet<u32>,
+}
+
+impl<'a> Checker<'a> {
+    fn new(
+        sections: &'a mut Sections,
+        words: &[u32],
+        plan: &CheckPlan,
+        imported: &'a Imported,
+    ) -> Result<Self, String> {
+        let word = imported.word;
+        let halves =
+            [plan.address as u32, (plan.address >> 32) as u32].map(|half| sections.constant(word, half));
+        let address = sections.new_id();
+        push(
+            &mut sections.globals,
+            Op::ConstantComposite,
+            &[imported.address, address, halves[0], halves[1]],
+        );
+        let shader = sections.constant(word, plan.shader);
+        let arrays = (0..).zip(plan.arrays);
+        let arrays = arrays
+            .map(|(number, range)| {
+                [number, range.first, range.count].map(|value| sections.constant(word, value))
+            })
+            .collect();
+        let mut checker = Self {
+            sections,
+            imported,
+            address,
+            shader,
+            arrays,
+            integers: HashMap::new(),
+            types: HashMap::new(),
+            type_ids: HashSet::new(),
+            non_uniform: HashSet::new(),
+        };
+        for instruction in instructions(words) {
+            let instruction = instruction?;
+            match instruction.op {
+                Some(Op::Function) => break,
+                _ => checker.collect(&instruction),
+            }
+        }
+        Ok(checker)
+    }
+
+    fn collect(&mut self, i: &Instruction<'_>) {
+        match i.op {
+            Some(Op::TypeInt) => _ = self.integers.insert(i.operand(0), i.operand(1)),
+            Some(Op::Decorate) if i.operand(1) == Decoration::NonUniform as u32 => {
+                self.non_uniform.insert(i.operand(0));
+            }
+            _ => {}
+        }
+        if is_type(i) {
+            self.type_ids.insert(i.operand(0));
+        } else if self.type_ids.contains(&i.operand(0)) {
+            // Only result types stand first.
+            self.types.insert(i.operand(1), i.operand(0));
+        }
+    }
+
+    fn check(
+        mut self,
+        arrays: &HashMap<u32, (BindlessArray, usize)>,
+        body: &[u32],
+    ) -> Result<Vec<u32>, String> {
+        let body = [&self.sections.header, body].concat();
+        let mut out = Vec::with_capacity(body.len());
+        for instruction in instructions(&body) {
+            let instruction = instruction?;
+            self.collect(&instruction);
+            let is_access = matches!(instruction.op, Some(Op::AccessChain | Op::InBoundsAccessChain));
+            let array = arrays.get(&instruction.operand(2)).filter(|_| is_access);
+            // Behind type, result and base.
+            let index = array.map(|(_, position)| 3 + position);
+            match (array, index.filter(|index| *index < instruction.operands().len())) {
+                (Some((array, _)), Some(index)) => {
+                    let checked = self.call(&mut out, *array, &instruction, index)?;
+                    let at = out.len();
+                    out.extend(instruction.words);
+                    out[at + 1 + index] = checked;
+                }
+                _ => out.extend(instruction.words),
+            }
+        }
+        Ok(out)
+    }
+
+    /// Calls the function for one index; answers what it answers.
+    fn call(
+        &mut self,
+        out: &mut Vec<u32>,
+        array: BindlessArray,
+        access: &Instruction<'_>,
+        index: usize,
+    ) -> Result<u32, String> {
+        let (word, result) = (self.imported.word, self.imported.result);
+        let index = access.operand(index);
+        let ty = self.types.get(&index).copied().ok_or("the type of an index is unknown")?;
+        let bits = self.integers.get(&ty).copied().ok_or("an index is no integer")?;
+        let marked = self.non_uniform.contains(&index) || self.non_uniform.contains(&access.operand(1));
+        let plain = match ty == word {
+            true => index,
+            false => {
+                let id = self.sections.new_id();
+                let op = if bits == 32 { Op::Bitcast } else { Op::UConvert };
+                push(out, op, &[word, id, index]);
+                id
+            }
+        };
+        let checked = self.sections.new_id();
+        let [number, first, count] = self.arrays[array as usize];
+        let call =
+            [result, checked, self.imported.function, self.address, self.shader, number, first, count, plain];
+        push(out, Op::FunctionCall, &call);
+        if marked {
+            push(&mut self.sections.annotations, Op::Decorate, &[checked, Decoration::NonUniform as u32]);
+        }
+        Ok(checked)
+    }
+}
+
+/// Types have their own id first.
+fn is_type(i: &Instruction<'_>) -> bool {
+    let number = i.words.first().map_or(0, |word| word & 0xFFFF);
+    (Op::TypeVoid as u32..=Op::TypePipe as u32).contains(&number)
+        || matches!(i.op, Some(Op::TypeAccelerationStructureKHR | Op::TypeRayQueryKHR))
+}
+
+#[cfg(all(test, feature = "glsl"))]
+mod tests {
+    #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
+    use super::*;
+    use crate::bindless::checks::{self, Range};
+    use crate::shader::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile, reflect};
+
+    fn compiled(stage: ShaderStage, text: &str) -> Vec<u32> {
+        let desc = ShaderModuleDesc { stage, source: ShaderSource::Glsl(text), ..Default::default() };
+        compile(&desc, &CompileOptions::default(), None).unwrap()
+    }
+
+    fn plan() -> CheckPlan {
+        let arrays = [7, 17, 27, 37].map(|first| Range { first, count: 5 });
+        CheckPlan { address: 0x1234_5678_9abc_def0, shader: 3, arrays }
+    }
+
+    /// Array and index operands of the calls, by the values of constants and the names of ids.
+    fn calls(words: &[u32]) -> Vec<u32> {
+        let code: Vec<_> = instructions(words).map(Result::unwrap).collect();
+        let value = |id: u32| {
+            code.iter().find(|i| i.op == Some(Op::Constant) && i.operand(1) == id).unwrap().operand(2)
+        };
+        let calls = code.iter().filter(|i| i.op == Some(Op::FunctionCall) && i.operands().len() == 9);
+        calls
+            .map(|call| {
+                assert_eq!(value(call.operand(4)), 3);
+                assert_eq!(value(call.operand(6)), 7 + 10 * value(call.operand(5)));
+                value(call.operand(5))
+            })
+            .collect()
+    }
+
+    /// `LVK_UPDATE_KERNELS=1 cargo test -p lvk kernel` writes the words anew.
+    #[test]
+    fn the_kernel_of_checks_is_that_of_its_source() {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/shader/glsl");
+        let text = std::fs::read_to_string(folder.join("checked_index.glsl")).unwrap();
+        let words = compiled(ShaderStage::Compute, &text);
+        let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+        if std::env::var("LVK_UPDATE_KERNELS").is_ok() {
+            std::fs::write(folder.join("checked_index.spv"), bytes).unwrap();
+        } else {
+            assert!(bytes == DONOR, "set LVK_UPDATE_KERNELS=1 once");
+        }
+        assert!(text.contains(&format!("ENTRY_COUNT = {}u", checks::ENTRY_COUNT)));
+    }
+
+    #[test]
+    fn every_access_of_every_array_is_checked() {
+        let text = "
+            layout(local_size_x = 1) in;
+            layout(push_constant, scalar) uniform Push { uint a; int b; uint64_t c; };
+            LVK_STORAGE_IMAGES_U2D(r32ui, kCounts);
+            void main() {
+                vec4 c = textureBindless2D(a, uint(b), vec2(0.5));
+                imageStore(kImages2D[b], ivec2(0), c + texelFetch(kTextures2D[uint(c.x)], ivec2(0), 0));
+                imageAtomicAdd(kCounts[nonuniformEXT(a + 1)], ivec2(0), 1u);
+            }";
+        let words = compiled(ShaderStage::Compute, text);
+        let checked = with_checked_indices(&words, &plan()).unwrap();
+        let mut found = calls(&checked);
+        found.sort_unstable();
+        assert_eq!(found, [0, 0, 1, 2, 2]);
+        let before = reflect("", ShaderStage::Compute, &words).unwrap();
+        let after = reflect("", ShaderStage::Compute, &checked).unwrap();
+        assert_eq!(
+            (before.bindings, before.push_constant_bytes),
+            (after.bindings, after.push_constant_bytes)
+        );
+    }
+
+    #[test]
+    fn types_are_declared_once_and_ids_are_below_the_bound() {
+        let text = "void main() { gl_Position = textureBindless2D(gl_VertexIndex, 0, vec2(0)); }";
+        let words = compiled(ShaderStage::Vertex, text);
+        let checked = with_checked_indices(&words, &plan()).unwrap();
+        let mut shapes = HashSet::new();
+        let mut results = HashSet::new();
+        for i in instructions(&checked).map(Result::unwrap) {
+            if matches!(
+                i.op,
+                Some(Op::TypeInt | Op::TypeVoid | Op::TypeVector | Op::TypePointer | Op::TypeFunction)
+            ) {
+                assert!(results.insert(i.operand(0)) && i.operand(0) < checked[3]);
+                let mut shape = i.words.to_vec();
+                shape[1] = 0;
+                assert!(shapes.insert(shape), "{i:?} is declared twice");
+            }
+        }
+        assert_eq!(instructions(&checked).flatten().filter(|i| i.op == Some(Op::MemoryModel)).count(), 1);
+    }
+
+    #[test]
+    fn modules_without_arrays_stay_as_they_are() {
+        let words = compiled(ShaderStage::Vertex, "void main() { gl_Position = vec4(0); }");
+        assert_eq!(with_checked_indices(&words, &plan()).unwrap(), words);
+        let mut old =
+            compiled(ShaderStage::Vertex, "void main() { gl_Position = textureBindless2D(1, 0, vec2(0)); }");
+        old[1] = 0x0001_0300;
+        assert!(with_checked_indices(&old, &plan()).unwrap_err().contains("1.5"));
+    }
+
+    proptest::proptest! {
+        #[test]
+        fn damaged_modules_never_panic(
+            at in proptest::prelude::any::<proptest::sample::Index>(), bit in 0u32..32, cut in 0usize..400
+        ) {
+            let mut words = compiled(ShaderStage::Vertex, "void main() { gl_Position = textureBindless2D(1, 0, vec2(0)); }");
+            let at = at.index(words.len());
+            words[at] ^= 1 << bit;
+            words.truncate(words.len().saturating_sub(cut / 8));
+            let _ = with_checked_indices(&words, &plan());
+        }
+    }
+}
