@@ -10,6 +10,7 @@ pub mod reflections;
 pub mod rtx;
 pub mod rtx_ao;
 pub mod rtx_hello;
+pub mod rtx_pipeline;
 pub mod rtx_textures;
 pub mod scene;
 pub mod shader_folder;

@@ -4,7 +4,7 @@ use lvk::{Context, Format, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderS
 
 use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
-use crate::{bench, hybrid, hybrid_oit, reflections, rtx_ao, rtx_hello, rtx_textures};
+use crate::{bench, hybrid, hybrid_oit, reflections, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures};
 
 /// A stage of a [`SamplePipeline`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,6 +66,7 @@ pub fn all() -> Vec<SamplePipeline> {
         reflections::pipelines(),
         rtx_ao::pipelines(),
         rtx_hello::pipelines(),
+        rtx_pipeline::pipelines(),
         rtx_textures::pipelines(),
         bench::pipelines(),
     ]

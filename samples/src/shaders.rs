@@ -5,6 +5,7 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("bench/view.glsl", include_str!("../../shaders/bench/view.glsl")),
     ("common/camera.glsl", include_str!("../../shaders/common/camera.glsl")),
     ("common/fresnel.glsl", include_str!("../../shaders/common/fresnel.glsl")),
+    ("common/lighting.glsl", include_str!("../../shaders/common/lighting.glsl")),
     ("common/octahedral.glsl", include_str!("../../shaders/common/octahedral.glsl")),
     ("common/phong.glsl", include_str!("../../shaders/common/phong.glsl")),
     ("common/ray_offset.glsl", include_str!("../../shaders/common/ray_offset.glsl")),
@@ -48,6 +49,11 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("rtx_ao/frame.glsl", include_str!("../../shaders/rtx_ao/frame.glsl")),
     ("rtx_ao/light.glsl", include_str!("../../shaders/rtx_ao/light.glsl")),
     ("rtx_hello/view.glsl", include_str!("../../shaders/rtx_hello/view.glsl")),
+    ("rtx_pipeline/frame.glsl", include_str!("../../shaders/rtx_pipeline/frame.glsl")),
+    ("rtx_pipeline/picture.glsl", include_str!("../../shaders/rtx_pipeline/picture.glsl")),
+    ("rtx_pipeline/radiance.glsl", include_str!("../../shaders/rtx_pipeline/radiance.glsl")),
+    ("rtx_pipeline/recursion.glsl", include_str!("../../shaders/rtx_pipeline/recursion.glsl")),
+    ("rtx_pipeline/shade.glsl", include_str!("../../shaders/rtx_pipeline/shade.glsl")),
     ("rtx_textures/frame.glsl", include_str!("../../shaders/rtx_textures/frame.glsl")),
     ("rtx_textures/shade.glsl", include_str!("../../shaders/rtx_textures/shade.glsl")),
     ("rtx_textures/surface.glsl", include_str!("../../shaders/rtx_textures/surface.glsl")),
@@ -229,6 +235,22 @@ pub mod rtx_textures {
     pub const GLAZED_RCHIT: &str = include_str!("../../shaders/rtx_textures/glazed.rchit.glsl");
     /// Rays of a pixel, by ray queries.
     pub const TEXTURES_COMP: &str = include_str!("../../shaders/rtx_textures/textures.comp.glsl");
+}
+
+/// Stages of the `rtx_pipeline` sample.
+pub mod rtx_pipeline {
+    /// A pixel by the ray tracing pipeline.
+    pub const PICTURE_RGEN: &str = include_str!("../../shaders/rtx_pipeline/picture.rgen.glsl");
+    /// A ray that left the scene.
+    pub const SKY_RMISS: &str = include_str!("../../shaders/rtx_pipeline/sky.rmiss.glsl");
+    /// A shadow ray that reached its light.
+    pub const LIGHT_RMISS: &str = include_str!("../../shaders/rtx_pipeline/light.rmiss.glsl");
+    /// The hit group of what stops light.
+    pub const SOLID_RCHIT: &str = include_str!("../../shaders/rtx_pipeline/solid.rchit.glsl");
+    /// The hit group of what light passes through.
+    pub const GLASS_RCHIT: &str = include_str!("../../shaders/rtx_pipeline/glass.rchit.glsl");
+    /// A pixel by ray queries.
+    pub const PICTURE_COMP: &str = include_str!("../../shaders/rtx_pipeline/picture.comp.glsl");
 }
 
 /// Stages of the `rtx_ao` sample.

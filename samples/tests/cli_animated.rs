@@ -17,7 +17,7 @@ struct Program {
     said: &'static [&'static str],
 }
 
-const PROGRAMS: [Program; 5] = [
+const PROGRAMS: [Program; 6] = [
     Program {
         path: env!("CARGO_BIN_EXE_reflections"),
         quick: &["--samples", "1"],
@@ -41,6 +41,12 @@ const PROGRAMS: [Program; 5] = [
         quick: &[],
         own: &["--list-scenes"],
         said: &["37 triangles", "TLAS update", "rays"],
+    },
+    Program {
+        path: env!("CARGO_BIN_EXE_rtx_pipeline"),
+        quick: &["--depth", "1"],
+        own: &["--depth", "--scene", "--camera"],
+        said: &["courtyard: ", "rays mirrored 1 times at most", "rays"],
     },
     Program {
         path: env!("CARGO_BIN_EXE_rtx_textures"),

@@ -8,7 +8,7 @@ use crate::scene::{GpuCamera, Scene};
 /// Addresses of a scene's arrays (`Scene` in `shaders/common/scene_buffers.glsl`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct SceneAddresses {
+pub(crate) struct SceneAddresses {
     pub(super) positions: u64,
     pub(super) normals: u64,
     pub(super) texcoords: u64,
@@ -30,7 +30,7 @@ pub(super) struct GpuLight {
 /// Lights and the like, which do not change with the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Lighting {
+pub(crate) struct Lighting {
     lights: [GpuLight; 2],
     ambient_above: [f32; 3],
     light_count: u32,
@@ -40,7 +40,7 @@ pub(super) struct Lighting {
 
 impl Lighting {
     /// The lamp and, where there is one, the sun of `scene`.
-    pub(super) fn new(scene: &Scene) -> Self {
+    pub(crate) fn new(scene: &Scene) -> Self {
         let lamp = &scene.light;
         let mut lights = [GpuLight::zeroed(); 2];
         lights[0] =
@@ -135,7 +135,7 @@ pub(super) struct Push {
 }
 
 /// Distance of the near plane in scene units: small against the scene, but not so small that depth suffers.
-pub(super) fn near_plane(scene: &Scene) -> f32 {
+pub(crate) fn near_plane(scene: &Scene) -> f32 {
     let (low, high) = scene.bounds();
     (Vec3::from(high).distance(Vec3::from(low)) * 1e-4).max(f32::MIN_POSITIVE)
 }

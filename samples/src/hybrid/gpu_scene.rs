@@ -28,19 +28,28 @@ const SKY_SIZE: u32 = 512;
 const NO_TEXTURE: u32 = u32::MAX;
 
 /// A scene on the GPU.
-pub(super) struct GpuScene {
-    pub(super) triangle_count: u32,
-    pub(super) sky: Holder<TextureHandle>,
-    pub(super) surface_sampler: Holder<SamplerHandle>,
-    pub(super) sky_sampler: Holder<SamplerHandle>,
-    pub(super) tlas: Holder<AccelStructHandle>,
+pub(crate) struct GpuScene {
+    pub(crate) triangle_count: u32,
+    pub(crate) sky: Holder<TextureHandle>,
+    pub(crate) surface_sampler: Holder<SamplerHandle>,
+    pub(crate) sky_sampler: Holder<SamplerHandle>,
+    pub(crate) tlas: Holder<AccelStructHandle>,
     /// Milliseconds that building the bottom-level structures took, submission and wait included.
-    pub(super) blas_build_ms: f64,
+    pub(crate) blas_build_ms: f64,
     /// Parts that the library made of the bottom-level structures, where they are too large for the device.
-    pub(super) blas_part_count: u32,
+    pub(crate) blas_part_count: u32,
     arrays: Arrays,
     _textures: Vec<Holder<TextureHandle>>,
     blas: Vec<Holder<AccelStructHandle>>,
+}
+
+/// Places of hit groups in the pipelines that trace the scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct HitGroups {
+    /// Of opaque triangles.
+    pub(crate) opaque: u32,
+    /// Of those that light passes through.
+    pub(crate) refractive: u32,
 }
 
 /// What the shaders reach by address; some of it is only held for them.
@@ -76,14 +85,14 @@ struct TriangleInfo {
 
 impl GpuScene {
     /// Uploads `scene` and builds its acceleration structures.
-    pub(super) fn new(ctx: &Context, scene: &Scene) -> Result<Self, HybridError> {
+    pub(crate) fn new(ctx: &Context, scene: &Scene, hit_groups: HitGroups) -> Result<Self, HybridError> {
         check(scene)?;
         let textures: Vec<_> =
             scene.textures.iter().map(|texture| upload_texture(ctx, texture)).collect::<Result<_, _>>()?;
         let arrays = Arrays::new(ctx, scene, &textures)?;
         ctx.wait_idle()?;
         let start = Instant::now();
-        let (blas, instances) = build_blas(ctx, scene, *arrays.positions, *arrays.triangles)?;
+        let (blas, instances) = build_blas(ctx, scene, hit_groups, [*arrays.positions, *arrays.triangles])?;
         ctx.wait_idle()?;
         let blas_build_ms = start.elapsed().as_secs_f64() * 1e3;
         let mut blas_part_count = 0;
@@ -107,17 +116,17 @@ impl GpuScene {
     }
 
     /// Where the shaders find the arrays.
-    pub(super) fn addresses(&self) -> SceneAddresses {
+    pub(crate) fn addresses(&self) -> SceneAddresses {
         self.arrays.addresses
     }
 
     /// Vertex indices, three per triangle.
-    pub(super) fn triangles(&self) -> BufferHandle {
+    pub(crate) fn triangles(&self) -> BufferHandle {
         self.arrays.triangles.handle()
     }
 
     /// How many bottom-level structures there are: one for opaque and one for refractive triangles.
-    pub(super) fn blas_count(&self) -> usize {
+    pub(crate) fn blas_count(&self) -> usize {
         self.blas.len()
     }
 }
@@ -208,28 +217,51 @@ fn upload_sky(ctx: &Context, sky: &Sky) -> lvk::Result<Holder<TextureHandle>> {
 fn build_blas(
     ctx: &Context,
     scene: &Scene,
-    positions: BufferHandle,
-    triangles: BufferHandle,
+    hit_groups: HitGroups,
+    [positions, triangles]: [BufferHandle; 2],
 ) -> lvk::Result<(Vec<Holder<AccelStructHandle>>, Vec<TlasInstance>)> {
     let total = scene.triangles.len() as u32;
     let opaque = scene.opaque_triangle_count.min(total);
-    let groups =
-        [("opaque blas", 0..opaque, MASK_OPAQUE), ("refractive blas", opaque..total, MASK_REFRACTIVE)];
-    let groups: Vec<_> = groups.into_iter().filter(|(_, range, _)| !range.is_empty()).collect();
+    let groups = [
+        Group { name: "opaque blas", range: 0..opaque, mask: MASK_OPAQUE, hit_group: hit_groups.opaque },
+        Group {
+            name: "refractive blas",
+            range: opaque..total,
+            mask: MASK_REFRACTIVE,
+            hit_group: hit_groups.refractive,
+        },
+    ];
+    let groups: Vec<_> = groups.into_iter().filter(|group| !group.range.is_empty()).collect();
     let vertex_count = scene.positions.len() as u32;
     let geometries: Vec<[BlasGeometry; 1]> =
-        groups.iter().map(|(_, range, _)| [geometry(positions, vertex_count, triangles, range)]).collect();
+        groups.iter().map(|group| [geometry(positions, vertex_count, triangles, &group.range)]).collect();
     let descs: Vec<BlasDesc<'_>> = groups
         .iter()
         .zip(&geometries)
-        .map(|((debug_name, ..), geometries)| BlasDesc { geometries, debug_name, ..BlasDesc::default() })
+        .map(|(group, geometries)| BlasDesc { geometries, debug_name: group.name, ..BlasDesc::default() })
         .collect();
     let blas = ctx.create_blas_batch(&descs)?;
-    let instance = |(_, range, mask): &(&str, Range<u32>, u8), blas: &Holder<AccelStructHandle>| {
-        TlasInstance { custom_index: range.start, mask: *mask, ..TlasInstance::new(blas.handle()) }
-    };
-    let instances = groups.iter().zip(&blas).map(|(group, blas)| instance(group, blas)).collect();
+    let instances = groups.iter().zip(&blas).map(|(group, blas)| group.instance(**blas)).collect();
     Ok((blas, instances))
+}
+
+/// Triangles that share a structure.
+struct Group {
+    name: &'static str,
+    range: Range<u32>,
+    mask: u8,
+    hit_group: u32,
+}
+
+impl Group {
+    fn instance(&self, blas: AccelStructHandle) -> TlasInstance {
+        TlasInstance {
+            custom_index: self.range.start,
+            mask: self.mask,
+            hit_group_offset: self.hit_group,
+            ..TlasInstance::new(blas)
+        }
+    }
 }
 
 fn geometry(

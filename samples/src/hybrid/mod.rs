@@ -36,7 +36,9 @@ mod visibility_pass;
 
 pub use config::{Bounces, Geometry, HybridConfig, Method, Raster, RasterTuning, RayPath};
 pub use error::HybridError;
+pub(crate) use frame::{Lighting, SceneAddresses, near_plane};
 pub use frame_timings::FrameTimings;
+pub(crate) use gpu_scene::{GpuScene, HitGroups};
 pub use pipelines::pipelines;
 pub use raster_choice::RasterChoice;
 pub use renderer::HybridRenderer;

@@ -6,7 +6,7 @@ use super::HybridError;
 use super::config::{Bounces, HybridConfig, Method, Raster, RayPath};
 use super::frame::{Lighting, near_plane};
 use super::frame_timings::{FrameTimings, GEOMETRY, RAYS};
-use super::gpu_scene::GpuScene;
+use super::gpu_scene::{GpuScene, HitGroups};
 use super::passes::Passes;
 use super::raster_choice::RasterChoice;
 use crate::app::frame::Frame;
@@ -33,7 +33,7 @@ impl HybridRenderer {
     pub fn new(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Result<Self, HybridError> {
         config.check(ctx.capabilities())?;
         let config = suited(config, scene, ctx.capabilities());
-        let gpu_scene = GpuScene::new(ctx, scene)?;
+        let gpu_scene = GpuScene::new(ctx, scene, HitGroups::default())?;
         Ok(Self {
             passes: Passes::new(ctx, &gpu_scene, &config)?,
             lighting: Lighting::new(scene),

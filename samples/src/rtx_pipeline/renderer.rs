@@ -1,0 +1,157 @@
+//! The sample as a type: say the moment, get a picture.
+
+use bytemuck::{Pod, Zeroable};
+use lvk::{BufferDesc, BufferHandle, Context, Dependencies, Holder, TextureHandle};
+
+use super::config::RtxPipelineConfig;
+use super::pipelines::RAYS;
+use crate::app::frame::Frame;
+use crate::app::sample::{Moment, Sample};
+use crate::hybrid::{GpuScene, HitGroups, Lighting, SceneAddresses, near_plane};
+use crate::rtx::{Canvas, RayStages, RtxError, Tracer};
+use crate::scene::{Camera, CameraPath, GpuCamera, Scene};
+
+/// Places of hit groups in the pipeline (`kSolid` and `kGlass` in `shaders/rtx_pipeline/radiance.glsl`).
+const HIT_GROUPS: HitGroups = HitGroups { opaque: 0, refractive: 1 };
+
+/// Renders a scene by rays whose hits trace on.
+pub struct RtxPipeline {
+    ctx: Context,
+    canvas: Canvas,
+    config: RtxPipelineConfig,
+    scene: GpuScene,
+    tracer: Tracer,
+    frame: Holder<BufferHandle>,
+    constants: FrameConstants,
+    path: CameraPath,
+    camera: Camera,
+    near_plane: f32,
+}
+
+/// `Frame` in `shaders/rtx_pipeline/frame.glsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct FrameConstants {
+    camera: GpuCamera,
+    scene: SceneAddresses,
+    lighting: Lighting,
+    tlas: u32,
+    sky: u32,
+    surface_sampler: u32,
+    sky_sampler: u32,
+    image: u32,
+    depth: u32,
+}
+
+impl RtxPipeline {
+    /// Uploads `scene`, builds its acceleration structures and makes the pipeline, of hit shaders that trace no deeper than
+    /// the device can.
+    ///
+    /// # Errors
+    /// [`RtxError`] when the configuration or the scene is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, scene: &Scene, config: &RtxPipelineConfig) -> Result<Self, RtxError> {
+        let config = config.suited(ctx.capabilities());
+        let canvas = Canvas::new(ctx, &config.rtx)?;
+        let gpu_scene = GpuScene::new(ctx, scene, HIT_GROUPS)?;
+        let path = CameraPath::tour(scene, 0);
+        let frame = ctx.create_buffer(&BufferDesc {
+            size_bytes: size_of::<FrameConstants>() as u64,
+            debug_name: "frame constants",
+            ..BufferDesc::default()
+        })?;
+        let constants = FrameConstants {
+            camera: GpuCamera::zeroed(),
+            scene: gpu_scene.addresses(),
+            lighting: Lighting::new(scene),
+            tlas: gpu_scene.tlas.index(),
+            sky: gpu_scene.sky.index(),
+            surface_sampler: gpu_scene.surface_sampler.index(),
+            sky_sampler: gpu_scene.sky_sampler.index(),
+            image: canvas.picture().index(),
+            depth: config.depth,
+        };
+        Ok(Self {
+            tracer: tracer(ctx, &config)?,
+            camera: path.at(0.0),
+            near_plane: near_plane(scene),
+            ctx: ctx.clone(),
+            scene: gpu_scene,
+            canvas,
+            config,
+            frame,
+            constants,
+            path,
+        })
+    }
+
+    /// Tours the scene's cameras from the one with this index on.
+    #[must_use]
+    pub fn from_camera(mut self, scene: &Scene, first: usize) -> Self {
+        self.path = CameraPath::tour(scene, first);
+        self.camera = self.path.at(0.0);
+        self
+    }
+
+    /// What is rendered, as far as the device can.
+    pub fn config(&self) -> &RtxPipelineConfig {
+        &self.config
+    }
+
+    /// Triangles of the scene.
+    pub fn triangle_count(&self) -> u32 {
+        self.scene.triangle_count
+    }
+
+    /// Parts that the library made of the bottom-level structures, which are two at most.
+    pub fn blas_part_count(&self) -> u32 {
+        self.scene.blas_part_count
+    }
+}
+
+impl Sample for RtxPipeline {
+    type Error = RtxError;
+
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
+    fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
+        self.camera = self.path.at(moment.phase());
+        Ok(())
+    }
+
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
+        let (extent, picture) = (self.config.rtx.extent(), **self.canvas.picture());
+        self.constants.camera = GpuCamera::new(&self.camera, extent[0], extent[1], self.near_plane);
+        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
+        let push = self.ctx.buffer_address(*self.frame)?;
+        let writes = Dependencies { storage_images: &[picture], ..Dependencies::default() };
+        frame.pass("rays", |cmd| self.tracer.record(cmd, &push, extent, &writes))?;
+        Ok(picture)
+    }
+
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RtxError> {
+        let rtx = self.config.rtx.sized(extent);
+        self.canvas = Canvas::new(&self.ctx, &rtx)?;
+        self.constants.image = self.canvas.picture().index();
+        self.config.rtx = rtx;
+        Ok(())
+    }
+
+    fn view(&self) -> Option<Camera> {
+        Some(self.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.camera = *camera;
+    }
+
+    fn reload(&mut self) -> Result<(), RtxError> {
+        self.tracer = tracer(&self.ctx, &self.config)?;
+        Ok(())
+    }
+}
+
+fn tracer(ctx: &Context, config: &RtxPipelineConfig) -> lvk::Result<Tracer> {
+    Tracer::new(ctx, config.rtx.path, &RayStages { max_recursion: config.max_recursion(), ..RAYS })
+}

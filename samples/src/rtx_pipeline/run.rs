@@ -1,0 +1,49 @@
+//! The sample on the command line: scene in, pictures and timings out.
+
+use std::process::ExitCode;
+
+use super::{RtxPipeline, RtxPipelineArgs, RtxPipelineConfig};
+use crate::app::device::DeviceNeeds;
+use crate::app::run::{self, Opened, Opening};
+use crate::app::run_error::RunError;
+use crate::app::say;
+use crate::hybrid::{fit_textures, textures_needed};
+use crate::rtx::{RtxConfig, headline};
+
+/// What the sample and its pictures are called.
+const NAME: &str = "rtx_pipeline";
+
+/// Does what the command line says. Prints to standard output, errors in one line to standard error; the status
+/// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
+#[must_use]
+pub fn run(args: &RtxPipelineArgs) -> ExitCode {
+    match args.scene.listing() {
+        Some(listing) => {
+            say(&listing);
+            ExitCode::SUCCESS
+        }
+        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+    }
+}
+
+fn open(args: &RtxPipelineArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxPipeline>, RunError> {
+    args.scene.check_out(&args.run.out_or(NAME))?;
+    let mut scene = args.scene.load(&mut opening.progress)?;
+    opening.warn(&scene.warnings);
+    let context = opening.device(&DeviceNeeds { textures: textures_needed(&scene) })?;
+    let capabilities = context.capabilities();
+    opening.warn(&fit_textures(&mut scene, &capabilities.limits)?);
+    let config = RtxPipelineConfig { rtx: RtxConfig::of(&args.run, capabilities)?, depth: args.depth };
+    opening.progress.stage("uploading the scene and building acceleration structures", 0);
+    let sample = RtxPipeline::new(&context, &scene, &config)?;
+    let sample = sample.from_camera(&scene, args.scene.camera as usize - 1);
+    let (count, parts) = (sample.triangle_count(), sample.blas_part_count());
+    let RtxPipelineConfig { rtx, depth } = *sample.config();
+    let told = format!(
+        "{}: {count} triangles in {parts} bottom-level structures, {} textures; rays mirrored {depth} times at most",
+        scene.name,
+        scene.textures.len()
+    );
+    let headline = headline(capabilities, rtx.path, "a compute shader", &told);
+    Ok(Opened { sample, headline })
+}

@@ -1,0 +1,6 @@
+// Hit group kSolid.
+#include "rtx_pipeline/recursion.glsl"
+
+void main() {
+    answer(shadeSolid(hitPoint(), gl_WorldRayDirectionEXT, payload.cone));
+}
