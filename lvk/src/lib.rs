@@ -42,7 +42,7 @@
 //! | open a device, ask what it can do | [`Context::new`], [`ContextDesc`], [`Capabilities`] |
 //! | make objects | `Context::create_*`, each with its `*Desc` |
 //! | show part of a texture, or as another format | [`Context::create_texture_view`], [`TextureViewDesc`] |
-//! | move data | [`Context::upload_buffer`], [`Context::download_texture`] and their kin |
+//! | move data | [`manual::queues_and_uploads`], [`Context::upload_buffer`], [`Context::download_texture`], [`Readback`] and their kin |
 //! | record | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
 //! | draw | [`CommandBuffer::begin_rendering`], [`RenderPass`] |
 //! | draw with task and mesh shaders | [`RenderPipelineDesc::mesh`], [`RenderPass::draw_mesh_tasks`] |
@@ -100,6 +100,7 @@ mod gpu;
 mod handle;
 mod kernel;
 mod leaks;
+mod lock;
 pub mod manual;
 mod pipeline;
 mod resource;
@@ -135,9 +136,11 @@ pub use context::config::ContextDesc;
 pub use context::destroy::Destroy;
 pub use context::frame::Frame;
 pub use context::holder::Holder;
+pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
 pub use error::{Error, Result};
 pub use format::{Aspect, Format, IndexFormat, VertexFormat};
+pub use gpu::budget::{MemoryBudget, MemoryHeap};
 pub use gpu::caps::{Capabilities, FeatureRequest, Limits};
 pub use gpu::clock::ClockPair;
 pub use gpu::debug::{Validation, ValidationMessage, ValidationSink};

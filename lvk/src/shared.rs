@@ -93,6 +93,8 @@ pub(crate) enum Garbage {
     Body(#[expect(dead_code, reason = "held only to be dropped")] Arc<BlasBody>),
     /// A buffer that a command buffer uses, whoever else holds it: its owner may fail to come into being.
     Held(Arc<Buffer>),
+    /// As [`Held`](Self::Held), one of those who [share](crate::resource::image::Image::share) the image.
+    HeldTexture(Arc<Texture>),
     /// A structure of the library's own that a command buffer fills, whoever else holds it.
     Software(#[expect(dead_code, reason = "held only to be dropped")] Arc<SoftwareBody>),
     /// Answered sizes, which may be there before the GPU is done with the command buffer that asked.
@@ -170,6 +172,11 @@ impl Shared {
             Garbage::Held(buffer) => {
                 if let Some(unused) = Arc::into_inner(buffer) {
                     self.submitter.forget(unused.id);
+                }
+            }
+            Garbage::HeldTexture(texture) => {
+                if texture.image.release() {
+                    self.submitter.forget(texture.image.id);
                 }
             }
             Garbage::RenderPipeline(_)

@@ -42,7 +42,7 @@ fn ranges_of_any_size_round_trip_in_every_memory() {
 }
 
 #[test]
-fn uploads_larger_than_the_staging_ring_arrive_whole() {
+fn uploads_larger_than_the_staging_memory_arrive_whole() {
     let Some(ctx) = device_with(|desc| desc.staging_bytes = 1) else { return };
     let expected = noise(1, (1 << 20) + 3);
     let large = buffer(&ctx, MemoryKind::Device, &expected);
@@ -54,7 +54,7 @@ fn uploads_larger_than_the_staging_ring_arrive_whole() {
 }
 
 #[test]
-fn a_ring_that_wraps_under_commands_in_flight_keeps_their_bytes() {
+fn pages_that_are_used_again_under_commands_in_flight_keep_their_bytes() {
     let Some(ctx) = device_with(|desc| desc.staging_bytes = 1) else { return };
     const PART: usize = 9_999;
     let targets: Vec<_> = (0..40).map(|seed| buffer(&ctx, MemoryKind::Device, &noise(seed, PART))).collect();

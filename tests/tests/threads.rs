@@ -1,12 +1,16 @@
 //! Threads: a context is shared by all of them, and command buffers move between them.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use lvk::test_hooks::waiting_objects;
 use lvk::{
-    BufferHandle, CommandBuffer, Context, Dependencies, Format, Holder, SubmitHandle, TextureDesc,
-    ValidationSink,
+    BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, BuildMode, ColorAttachment,
+    CommandBuffer, ComputePipelineDesc, Context, Dependencies, Format, Holder, QueryPoolDesc, RenderPassDesc,
+    RenderPipelineDesc, SamplerDesc, ShaderModuleHandle, ShaderStage, SubmitHandle, TextureDesc,
+    TextureUsage, TextureViewDesc, TlasDesc, TlasInstance, Triangles, ValidationSink,
 };
-use lvk_tests::compute::{Evaluator, read_vec4, read_words, vec4_buffer, words_buffer};
-use lvk_tests::device;
+use lvk_tests::compute::{Evaluator, module, read_vec4, read_words, vec4_buffer, words_buffer};
+use lvk_tests::noise::noise;
+use lvk_tests::{device, device_with};
 
 const fn is_send<T: Send>() {}
 const fn is_shared<T: Send + Sync + Clone>() {}
@@ -95,4 +99,160 @@ fn shaders_compile_side_by_side() {
         threads.into_iter().map(|thread| thread.join().unwrap()).collect()
     });
     assert_eq!(found, [1.0, 3.0, 5.0, 7.0]);
+}
+
+/// What the threads of [`eight_threads_use_every_kind_of_object`] share.
+struct Shared<'a> {
+    ctx: &'a Context,
+    evaluator: Evaluator,
+    modules: [Holder<ShaderModuleHandle>; 3],
+    /// Written by every thread, each its own part.
+    words: Holder<BufferHandle>,
+}
+
+/// A thread's words in the shared buffer.
+const SHARE: u64 = 64;
+
+impl Shared<'_> {
+    fn new(ctx: &Context) -> Shared<'_> {
+        let module = |stage, text| module(ctx, stage, text);
+        let vertex = "void main() { gl_Position = vec4(gl_VertexIndex == 1 ? 3 : -1, gl_VertexIndex == 2 ? 3 : -1, 0, 1); }";
+        let fragment = "layout(push_constant) uniform Push { float value; };
+             layout(location = 0) out vec4 color;
+             void main() { color = vec4(value); }";
+        let compute = "layout(local_size_x = 64) in;
+             layout(buffer_reference, scalar) buffer Words { uint at[]; };
+             layout(push_constant, scalar) uniform Push { Words words; uint value; uint unused; };
+             void main() { words.at[gl_LocalInvocationID.x] = value; }";
+        Shared {
+            ctx,
+            evaluator: Evaluator::new(ctx, "textureBindless2D(a, b, vec2(0.5))"),
+            modules: [
+                module(ShaderStage::Vertex, vertex),
+                module(ShaderStage::Fragment, fragment),
+                module(ShaderStage::Compute, compute),
+            ],
+            words: words_buffer(ctx, &[0; SHARE as usize * 8]),
+        }
+    }
+
+    /// A pipeline, a target and a view of it; a pass, a sampler, a query; what was drawn is sampled through the view.
+    fn draw(&self, value: f32) {
+        let ctx = self.ctx;
+        let format = Format::Rgba32Float;
+        let usage = TextureUsage::TARGET | TextureUsage::SAMPLED;
+        let target =
+            ctx.create_texture(&TextureDesc { format, extent: [4, 4], usage, ..Default::default() }).unwrap();
+        let view = TextureViewDesc { texture: Some(*target), ..Default::default() };
+        let view = ctx.create_texture_view(&view).unwrap();
+        let sampler = ctx.create_sampler(&SamplerDesc::default()).unwrap();
+        let times = QueryPoolDesc { count: 1, ..Default::default() };
+        let times = ctx.create_query_pool(&times).unwrap();
+        let color = [format.into()];
+        let desc = RenderPipelineDesc {
+            vertex: Some(*self.modules[0]),
+            fragment: Some(*self.modules[1]),
+            color: &color,
+            ..Default::default()
+        };
+        let pipeline = ctx.create_render_pipeline(&desc).unwrap();
+        let result = vec4_buffer(ctx, 1);
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        let color = [ColorAttachment::clear(*target, [0.0; 4])];
+        let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
+        pass.bind_render_pipeline(*pipeline).unwrap();
+        pass.push_constants(&value).unwrap();
+        pass.draw(0..3, 0..1).unwrap();
+        drop(pass);
+        cmd.write_timestamp(*times, 0).unwrap();
+        let images = [*view];
+        let sampled = Dependencies { sampled_images: &images, ..Default::default() };
+        self.evaluator.record(ctx, &mut cmd, [view.index(), sampler.index(), 0], (*result, 1), &sampled);
+        ctx.submit(cmd).unwrap();
+        drop((target, view, sampler, pipeline));
+        assert_eq!(read_vec4(ctx, *result, 1), [[value; 4]]);
+        let mut ticks = [None];
+        ctx.read_queries(*times, 0, &mut ticks).unwrap();
+        assert!(ticks[0].is_some());
+    }
+
+    /// A compute pipeline writes the thread's part of the shared buffer, which is read later.
+    fn compute(&self, thread: u64, value: u32) {
+        let ctx = self.ctx;
+        let desc = ComputePipelineDesc { module: Some(*self.modules[2]), ..Default::default() };
+        let pipeline = ctx.create_compute_pipeline(&desc).unwrap();
+        let address = ctx.buffer_address(*self.words).unwrap() + thread * SHARE * 4;
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        cmd.bind_compute_pipeline(*pipeline).unwrap();
+        cmd.push_constants(&[address, u64::from(value)]).unwrap();
+        let buffers = [*self.words];
+        cmd.dispatch([1, 1, 1], &Dependencies { buffers: &buffers, ..Default::default() }).unwrap();
+        ctx.submit(cmd).unwrap();
+        let own = thread * SHARE * 4..(thread + 1) * SHARE * 4;
+        let read = ctx.read_buffer_later(*self.words, own).unwrap();
+        drop(pipeline);
+        let found: Vec<u32> = bytemuck::pod_collect_to_vec(&read.wait().unwrap());
+        assert_eq!(found, [value; SHARE as usize]);
+    }
+
+    /// Structures of both levels, refitted and gone while they are in flight; one is never submitted.
+    fn trace(&self) {
+        let ctx = self.ctx;
+        if !ctx.capabilities().ray_query {
+            return;
+        }
+        let corners = [[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let desc = BufferDesc {
+            data: Some(bytemuck::cast_slice(&corners)),
+            usage: BufferUsage::ACCEL_INPUT,
+            ..Default::default()
+        };
+        let vertices = ctx.create_buffer(&desc).unwrap();
+        let geometries = [BlasGeometry::Triangles(Triangles::packed(*vertices, 3))];
+        let blas = ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() }).unwrap();
+        let instances = [TlasInstance::new(*blas)];
+        let flags = BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE;
+        let desc = TlasDesc { instances: &instances, flags, ..Default::default() };
+        let tlas = ctx.create_tlas(&desc).unwrap();
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        cmd.update_tlas(*tlas, &instances, BuildMode::Refit).unwrap();
+        ctx.submit(cmd).unwrap();
+        let mut given_up = ctx.acquire_command_buffer().unwrap();
+        given_up.update_tlas(*tlas, &instances, BuildMode::Rebuild).unwrap();
+        drop((tlas, blas, vertices, given_up));
+    }
+}
+
+/// Creates, uploads, records, submits, reads back and destroys, of every kind, while seven others do. The order of the
+/// library's locks is checked on the way.
+#[test]
+fn eight_threads_use_every_kind_of_object() {
+    let Some(ctx) = device_with(|desc| desc.staging_bytes = 1 << 20) else { return };
+    let shared = Shared::new(&ctx);
+    std::thread::scope(|scope| {
+        for thread in 0..8_u32 {
+            let shared = &shared;
+            scope.spawn(move || {
+                for round in 0..4 {
+                    let value = 10 * thread + round;
+                    match (thread + round) % 4 {
+                        0 => shared.draw(value as f32),
+                        1 => shared.compute(thread.into(), value),
+                        2 => shared.trace(),
+                        _ => {
+                            let noise = noise(value, 100_000);
+                            let desc = BufferDesc { data: Some(&noise), ..Default::default() };
+                            let buffer = shared.ctx.create_buffer(&desc).unwrap();
+                            let read = shared.ctx.read_buffer_later(*buffer, 0..100_000).unwrap();
+                            drop(buffer);
+                            assert!(read.wait().unwrap() == noise);
+                        }
+                    }
+                    shared.ctx.next_frame().unwrap();
+                }
+            });
+        }
+    });
+    ctx.wait_idle().unwrap();
+    assert_eq!(waiting_objects(&ctx).unwrap(), 0);
 }

@@ -52,7 +52,7 @@ impl Known {
         let body = blas.blas()?.body();
         let place = self.shown.len() as u32;
         let shown = Shown { blas, body };
-        self.needs_kernel |= shown.may_move() || shown.has_rows();
+        self.needs_kernel |= shown.needs_kernel();
         self.addresses.push(shown.body.structures.first().map_or(0, |structure| structure.address));
         self.shown.push(shown);
         self.places.insert(handle, place);
@@ -62,9 +62,10 @@ impl Known {
 
 /// Whether the first structure referred to needs no more than an address, as then mostly all do.
 pub(crate) fn starts_plain(instances: &[TlasInstance], find: Find<'_>) -> Result<bool> {
-    let mut known = Known::default();
-    instances.first().map(|instance| known.place(instance.blas, find)).transpose()?;
-    Ok(!known.needs_kernel)
+    let Some(first) = instances.first() else { return Ok(true) };
+    let blas = find(first.blas)?;
+    let body = blas.blas()?.body();
+    Ok(!Shown { blas, body }.needs_kernel())
 }
 
 /// Checks `instances` and writes them with addresses, on several threads where there are many. Answers the structures
@@ -77,7 +78,7 @@ pub(crate) fn write_addresses(
 ) -> Result<Option<Vec<Shown>>> {
     let threads = thread_count(instances.len());
     if threads == 1 {
-        return merge(vec![write_chunk(name, 0, instances, find, out)]);
+        return write_chunk(name, 0, instances, find, out);
     }
     let count = instances.len().div_ceil(threads).max(1);
     std::thread::scope(|scope| {

@@ -72,7 +72,7 @@ pub(crate) struct InstanceSource {
 #[derive(Clone)]
 pub(crate) struct SourceBytes {
     pub(crate) address: u64,
-    /// What holds them; `None` for the staging ring, which keeps them until the command buffer is done.
+    /// What holds them; `None` for staging memory, which keeps them until the command buffer is done.
     pub(crate) buffer: Option<Arc<Buffer>>,
 }
 
@@ -150,6 +150,11 @@ impl Shown {
     /// Whether it may yet be compacted, which gives it another address.
     pub(crate) fn may_move(&self) -> bool {
         self.blas.flags.contains(BuildFlags::ALLOW_COMPACTION) && self.body.compacted_from.is_none()
+    }
+
+    /// Whether its address does not do in an instance.
+    pub(crate) fn needs_kernel(&self) -> bool {
+        self.may_move() || self.has_rows()
     }
 
     /// Whether its hits need rows to become the caller's numbers.

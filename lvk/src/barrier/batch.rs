@@ -65,6 +65,7 @@ impl Barriers {
     }
 
     /// Adds a barrier without a layout transition.
+    #[inline]
     pub(crate) fn push_memory(&mut self, scopes: &Scopes) {
         let memory = self.memory.get_or_insert_default();
         memory.src_stages |= scopes.src_stages;
@@ -74,11 +75,12 @@ impl Barriers {
     }
 
     /// Adds a barrier of a part of a texture.
-    pub(crate) fn push_image(&mut self, id: ResourceId, subresources: Subresources, scopes: Scopes) {
+    #[inline]
+    pub(crate) fn push_image(&mut self, id: ResourceId, subresources: Subresources, scopes: &Scopes) {
         if scopes.old_layout == scopes.new_layout {
-            self.push_memory(&scopes);
+            self.push_memory(scopes);
         } else {
-            self.images.push(ImageBarrier { id, subresources, scopes });
+            self.images.push(ImageBarrier { id, subresources, scopes: *scopes });
         }
     }
 }

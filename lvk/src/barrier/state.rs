@@ -129,6 +129,7 @@ impl State {
         if seen.is_empty() { self.write } else { Scope::waiting(seen) }
     }
 
+    #[inline]
     fn overwrite(&mut self, next: Use) -> Option<Scopes> {
         let src = self.unfinished();
         let new_layout = if next.layout == Layout::Undefined { self.layout } else { next.layout };
@@ -136,11 +137,12 @@ impl State {
         let dst = Scope { stages: next.stages, access: next.access };
         let scopes = self.scopes(src, dst, new_layout);
         let write = Scope { stages: next.stages, access: next.access & Access::WRITES };
-        *self = Self { write, ..Self::untouched_in(new_layout) };
-        if !next.is_write() {
-            self.readers = next.stages;
-            self.visible = next.into();
-        }
+        let reads = !next.is_write();
+        self.layout = new_layout;
+        self.write = write;
+        self.readers = if reads { next.stages } else { Stages::empty() };
+        self.visible = if reads { next.into() } else { StageAccess::default() };
+        self.epoch = None;
         needed.then_some(scopes)
     }
 
@@ -162,12 +164,14 @@ impl State {
     }
 
     /// What a write has to wait for.
+    #[inline]
     fn unfinished(&self) -> Scope {
         if self.readers.is_empty() { self.write } else { self.through_readers(self.readers) }
     }
 
     /// Waits for `readers`, who have waited for the last write and its flush, so that waiting for them is enough. The
     /// host is the exception: no stage of the device waits for it.
+    #[inline]
     fn through_readers(&self, readers: Stages) -> Scope {
         if readers.contains(Stages::HOST) {
             return Scope { stages: readers | self.write.stages, access: self.write.access };
@@ -175,6 +179,7 @@ impl State {
         Scope::waiting(readers)
     }
 
+    #[inline]
     fn scopes(&self, src: Scope, dst: Scope, new_layout: Layout) -> Scopes {
         Scopes {
             src_stages: src.stages,
@@ -194,6 +199,7 @@ impl State {
 /// * A layout change is a write by the barrier itself, which later readers in other stages chain from.
 ///
 /// `next.layout` of [`Layout::Undefined`] asks for no layout.
+#[inline]
 pub(crate) fn transition(state: &mut State, next: Use) -> Option<Scopes> {
     let relayout = next.layout != Layout::Undefined && next.layout != state.layout;
     if relayout || next.is_write() { state.overwrite(next) } else { state.read(&next.into()) }

@@ -30,12 +30,12 @@ impl States {
             if let (Some(local), Some((whole, state))) = (local.uniform(), queue.whole(local.shape().whole()))
             {
                 if let Some(scopes) = settle(state, local) {
-                    out.push_image(*id, whole, scopes);
+                    out.push_image(*id, whole, &scopes);
                 }
                 continue;
             }
             for (range, scopes) in settle_texture(queue, local) {
-                out.push_image(*id, range, scopes);
+                out.push_image(*id, range, &scopes);
             }
         }
         out

@@ -17,6 +17,7 @@ impl TextureShape {
         Subresources { base_mip: 0, mip_count: self.mips, base_layer: 0, layer_count: self.layers }
     }
 
+    #[inline]
     fn clamp(self, range: Subresources) -> Subresources {
         let base_mip = range.base_mip.min(self.mips);
         let base_layer = range.base_layer.min(self.layers);
@@ -48,6 +49,7 @@ impl Subresources {
     }
 
     /// What both have, if anything.
+    #[inline]
     pub(crate) fn intersection(self, other: Self) -> Option<Self> {
         let (base_mip, mip_count) =
             common((self.base_mip, self.mip_count), (other.base_mip, other.mip_count))?;
@@ -153,6 +155,7 @@ impl<T: Copy + PartialEq> Cells<T> {
     }
 
     /// The one value of all subresources, where `range` has them all.
+    #[inline]
     pub(crate) fn whole(&mut self, range: Subresources) -> Option<(Subresources, &mut T)> {
         let whole = self.shape.whole();
         match self.values.as_mut_slice() {

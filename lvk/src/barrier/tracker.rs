@@ -42,6 +42,7 @@ pub(super) struct Local {
 }
 
 impl Local {
+    #[inline]
     fn step(&mut self, next: Use) -> Option<Scopes> {
         match &mut self.prefix {
             Prefix::Unused => self.begin(next),
@@ -55,6 +56,7 @@ impl Local {
         transition(&mut self.state, next)
     }
 
+    #[inline]
     fn begin(&mut self, next: Use) {
         self.state = State::untouched_in(next.layout);
         self.past_prefix = next.is_write();
@@ -82,10 +84,12 @@ struct Table<T> {
 }
 
 impl<T> Table<T> {
+    #[inline]
     fn get(&self, id: ResourceId) -> Option<&T> {
         self.rows.get(&id).map(|&row| &self.values[row].1)
     }
 
+    #[inline]
     fn entry(&mut self, id: ResourceId, fresh: impl FnOnce() -> T) -> &mut T {
         let row = *self.rows.entry(id).or_insert_with(|| {
             self.values.push((id, fresh()));
@@ -125,6 +129,7 @@ impl Tracker {
     }
 
     /// A command uses a buffer; adds the barrier that must stand in front of the command to `out`.
+    #[inline]
     pub(crate) fn use_buffer(&mut self, id: ResourceId, next: Use, out: &mut Barriers) {
         let next = next.with_layout(Layout::Undefined);
         if let Some(scopes) = self.buffers.entry(id, Local::default).step(next) {
@@ -144,6 +149,7 @@ impl Tracker {
     /// A command uses a part of a texture; adds the barriers that must stand in front of the command to `out`.
     ///
     /// `shape` is the same in every call for one texture; `subresources` outside of it are ignored.
+    #[inline]
     pub(crate) fn use_texture(
         &mut self,
         id: ResourceId,
@@ -152,17 +158,31 @@ impl Tracker {
         next: Use,
         out: &mut Barriers,
     ) {
+        if subresources == shape.whole() {
+            return self.use_whole_texture(id, shape, next, out);
+        }
         let next = with_some_layout(next);
         let cells = self.textures.entry(id, || Cells::new(shape, Local::default()));
-        // By far the most frequent: no list of barriers is made.
-        if let Some((whole, local)) = cells.whole(subresources) {
-            if let Some(scopes) = local.step(next) {
-                out.push_image(id, whole, scopes);
-            }
-            return;
-        }
         for (range, scopes) in cells.step(subresources, |local| local.step(next)) {
-            out.push_image(id, range, scopes);
+            out.push_image(id, range, &scopes);
+        }
+    }
+
+    /// By far the most frequent: no list of barriers is made.
+    fn use_whole_texture(&mut self, id: ResourceId, shape: TextureShape, next: Use, out: &mut Barriers) {
+        let next = with_some_layout(next);
+        let cells = self.textures.entry(id, || Cells::new(shape, Local::default()));
+        match cells.whole(shape.whole()) {
+            Some((whole, local)) => {
+                if let Some(scopes) = local.step(next) {
+                    out.push_image(id, whole, &scopes);
+                }
+            }
+            None => {
+                for (range, scopes) in cells.step(shape.whole(), |local| local.step(next)) {
+                    out.push_image(id, range, &scopes);
+                }
+            }
         }
     }
 

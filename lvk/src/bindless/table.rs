@@ -1,6 +1,6 @@
 //! The one descriptor set: who sits in which slot, and which slots must be written before the next submission.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use ash::vk;
 
@@ -9,6 +9,7 @@ use super::layout;
 use super::slots::Slots;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::lock::{Guard, Mutex, Rank};
 
 /// What a texture's slot shows to shaders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -112,7 +113,8 @@ impl Bindless {
             samplers: Array::new("number of samplers", limits.max_bindless_samplers),
             tlas: Array::new("number of top-level acceleration structures", slot_count(gpu)),
         };
-        Ok(Self { set_layout, set, pool, entries: Mutex::new(entries), checks, gpu: Arc::clone(gpu) })
+        let entries = Mutex::new(Rank::Bindless, entries);
+        Ok(Self { set_layout, set, pool, entries, checks, gpu: Arc::clone(gpu) })
     }
 
     /// Puts the dummies into every slot. Nothing has been submitted yet.
@@ -300,8 +302,8 @@ impl Bindless {
         vk::WriteDescriptorSet::default().dst_set(self.set).dst_binding(binding).dst_array_element(first)
     }
 
-    fn lock(&self) -> MutexGuard<'_, Entries> {
-        self.entries.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> Guard<'_, Entries> {
+        self.entries.lock()
     }
 }
 

@@ -185,7 +185,7 @@ impl CommandBuffer {
         let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
         let ext = shared.gpu.accel()?;
         let (scratch, replaced) = shared.scratch.get(&shared.gpu, most)?;
-        self.retire_temporary(replaced);
+        self.retire_replaced(replaced);
         for batch in batches {
             self.use_buffer(&scratch, Use::accel_build_write());
             let base = aligned_scratch_address(scratch.address, alignment);
@@ -227,9 +227,9 @@ impl CommandBuffer {
         }
     }
 
-    /// Keeps a buffer of its own that the staging ring had no room for until the GPU is done with it.
-    pub(super) fn retire_temporary(&self, temporary: Option<Arc<Buffer>>) {
-        if let Some(buffer) = temporary {
+    /// Keeps a scratch buffer that a larger one has replaced until the GPU is done with it.
+    pub(super) fn retire_replaced(&self, replaced: Option<Arc<Buffer>>) {
+        if let Some(buffer) = replaced {
             self.shared.retire(Garbage::Buffer(buffer));
         }
     }

@@ -129,9 +129,17 @@ impl CommandBuffer {
     /// Inlined where the caller knows how many bytes there are, which then need no call to be copied.
     #[inline]
     fn record_push(&mut self, offset: u32, bytes: &[u8]) {
+        let room = self.shared.layout.push_constant_bytes.saturating_sub(offset) as usize;
+        if bytes.len() <= room {
+            self.record_push_within(offset, bytes);
+        } else {
+            self.record_push_within(offset, &bytes[..room]);
+        }
+    }
+
+    #[inline]
+    fn record_push_within(&mut self, offset: u32, bytes: &[u8]) {
         let shared = &self.shared;
-        let room = shared.layout.push_constant_bytes.saturating_sub(offset) as usize;
-        let bytes = if bytes.len() <= room { bytes } else { &bytes[..room] };
         // SAFETY: the layout is alive and the range lies inside its push constants.
         unsafe {
             let stages = vk::ShaderStageFlags::ALL;

@@ -53,7 +53,7 @@ impl CommandBuffer {
         for handle in deps.storage_images {
             let texture = self.found_textures.get(&store.textures, *handle)?;
             texture.check_usage(TextureUsage::STORAGE)?;
-            self.uses.texture(texture, texture.stored_part(), Use::shader_write(stages))?;
+            self.uses.texture(texture, texture.stored_part, Use::shader_write(stages))?;
         }
         for handle in deps.buffers {
             let buffer = self.found_buffers.get(&store.buffers, *handle)?;

@@ -103,7 +103,7 @@ impl CommandBuffer {
         let batches = plan_scratch(sizes, alignment, shared.scratch.tiers.batch_bytes());
         let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
         let (scratch, replaced) = shared.scratch.get(&shared.gpu, most.saturating_add(alignment))?;
-        self.retire_temporary(replaced);
+        self.retire_replaced(replaced);
         let base = aligned_scratch_address(scratch.address, alignment);
         for batch in batches {
             let addresses: Vec<_> = batch.offsets.iter().map(|offset| base + offset).collect();
@@ -158,7 +158,6 @@ impl CommandBuffer {
     fn stage_table<T: bytemuck::NoUninit>(&mut self, records: &[T]) -> Result<u64> {
         let bytes = bytemuck::cast_slice(records);
         let region = self.shared.staging.write(bytes, TABLE_ALIGNMENT, self.recording.sequence)?;
-        self.retire_temporary(region.temporary);
         Ok(region.address)
     }
 }

@@ -83,7 +83,6 @@ impl CommandBuffer {
         let region = staging.write_with(bytes, INSTANCE_ALIGNMENT, self.recording.sequence, |out| {
             shown = write_addresses(name, instances, find, out);
         })?;
-        self.retire_temporary(region.temporary);
         let ready =
             |shown| Ready { address: region.address, built_count, shown, source: None, reads: Vec::new() };
         Ok(shown?.map(ready))
@@ -121,7 +120,7 @@ impl CommandBuffer {
         Ok((source, plan.shown))
     }
 
-    /// Bytes for the kernel to read: in a buffer of their own if they are to be kept, else in the staging ring.
+    /// Bytes for the kernel to read: in a buffer of their own if they are to be kept, else in staging memory.
     fn source_bytes(
         &mut self,
         name: &str,
@@ -132,7 +131,6 @@ impl CommandBuffer {
         if !keep {
             let staging = &self.shared.staging;
             let region = staging.write_with(size_bytes, INSTANCE_ALIGNMENT, self.recording.sequence, fill)?;
-            self.retire_temporary(region.temporary);
             return Ok(SourceBytes { address: region.address, buffer: None });
         }
         let size_bytes = size_bytes.max(INSTANCE_ALIGNMENT);
@@ -269,7 +267,6 @@ impl CommandBuffer {
     /// The address of bytes that the GPU may read until the command buffer is done.
     fn stage(&mut self, bytes: &[u8]) -> Result<u64> {
         let region = self.shared.staging.write(bytes, INSTANCE_ALIGNMENT, self.recording.sequence)?;
-        self.retire_temporary(region.temporary);
         Ok(region.address)
     }
 

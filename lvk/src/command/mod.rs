@@ -25,6 +25,7 @@ mod targets;
 pub(crate) mod tlas;
 pub(crate) mod trace;
 pub(crate) mod transfer;
+mod upload;
 pub(crate) mod uses;
 
 use std::collections::{HashMap, HashSet};

@@ -21,6 +21,7 @@ pub(super) struct PartUse<T> {
 
 impl<T: Clone> PartUses<T> {
     /// Adds a use. Fails with the owner of an earlier use of the same texels that excludes this one.
+    #[inline]
     pub(super) fn add(&mut self, new: PartUse<T>) -> Result<(), T> {
         let overlaps = |old: &PartUse<T>| old.id == new.id && old.part.intersection(new.part).is_some();
         let Some(place) = self.parts.iter().position(overlaps) else {
@@ -55,11 +56,6 @@ impl<T: Clone> PartUses<T> {
 
     pub(super) fn iter(&self) -> impl Iterator<Item = &PartUse<T>> {
         self.parts.iter()
-    }
-
-    /// Takes everything out and keeps the memory.
-    pub(super) fn drain(&mut self) -> impl Iterator<Item = PartUse<T>> {
-        self.parts.drain(..)
     }
 
     pub(super) fn clear(&mut self) {

@@ -65,7 +65,6 @@ impl CommandBuffer {
         bytes: &[u8],
     ) -> Result<()> {
         let region = self.shared.staging.write(bytes, ALIGNMENT, self.recording.sequence)?;
-        self.retire_temporary(region.temporary);
         self.uses.id(target.id, Use::transfer_write());
         self.uses.accumulate(all, Use::transfer_write());
         self.use_buffer(body.buffer(), Use::transfer_write());
@@ -214,7 +213,6 @@ impl CommandBuffer {
         let region = shared.staging.write_with(bytes, ALIGNMENT, self.recording.sequence, |out| {
             written = self.write_software_instances(target, instances, out);
         })?;
-        self.retire_temporary(region.temporary);
         written?;
         let count = instances.len() as u32;
         let source = BuildSource::Instances { records: region.address, count, table: None };
@@ -236,7 +234,6 @@ impl CommandBuffer {
         table.resize(table.len().max(1), 0);
         let bytes = bytemuck::cast_slice(&table);
         let region = self.shared.staging.write(bytes, ALIGNMENT, self.recording.sequence)?;
-        self.retire_temporary(region.temporary);
         let source = BuildSource::Instances {
             records: buffer.address + instances.offset,
             count: instances.count,

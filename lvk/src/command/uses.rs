@@ -30,6 +30,7 @@ pub(crate) struct Uses {
 
 impl Uses {
     /// The command uses a buffer, or what stands for one.
+    #[inline]
     pub(crate) fn id(&mut self, id: ResourceId, next: Use) {
         match self.place(id) {
             // Layouts mean nothing to buffers, so their uses always merge.
@@ -48,6 +49,7 @@ impl Uses {
     }
 
     /// Where a buffer that the command uses already is in the list.
+    #[inline]
     fn place(&mut self, id: ResourceId) -> Option<usize> {
         if self.buffers.len() < FEW {
             return self.buffers.iter().position(|(known, _)| *known == id);
@@ -59,6 +61,7 @@ impl Uses {
     }
 
     /// The command uses a buffer.
+    #[inline]
     pub(crate) fn buffer(&mut self, buffer: &Buffer, next: Use) {
         self.id(buffer.id, next);
     }
@@ -71,12 +74,14 @@ impl Uses {
     }
 
     /// The command uses a part of the image that a texture shows.
+    #[inline]
     pub(crate) fn texture(&mut self, texture: &Arc<Texture>, part: Subresources, next: Use) -> Result<()> {
         let new = PartUse { id: texture.image.id, part, next, owner: self.row(texture) };
         self.textures.add(new).map_err(|other| conflict(texture, &self.seen[other]))
     }
 
     /// Where a texture is in the list of those seen.
+    #[inline]
     fn row(&mut self, texture: &Arc<Texture>) -> usize {
         let last = self.seen.len().wrapping_sub(1);
         if self.seen.get(last).is_some_and(|last| Arc::ptr_eq(last, texture)) {
@@ -97,27 +102,31 @@ impl Uses {
     }
 
     /// Tells the tracker, which adds the barriers to `out`.
+    #[inline]
     pub(crate) fn track(&mut self, tracker: &mut Tracker, images: &mut Images, out: &mut Barriers) {
-        self.places.clear();
-        for (id, next) in self.buffers.drain(..) {
-            tracker.use_buffer(id, next, out);
+        // Read in place: what was just written is not yet in memory to be moved.
+        for (id, next) in &self.buffers {
+            tracker.use_buffer(*id, *next, out);
         }
-        for (id, write) in self.writers.drain(..) {
-            tracker.accumulate_buffer(id, write, out);
+        for (id, write) in &self.writers {
+            tracker.accumulate_buffer(*id, *write, out);
         }
         for texture in &self.seen[self.known_images..] {
             images.insert(texture.image.id, texture.image.for_barriers());
         }
         self.known_images = self.seen.len();
-        for PartUse { id, part, next, owner } in self.textures.drain() {
-            tracker.use_texture(id, self.seen[owner].image.shape, part, next, out);
+        for PartUse { id, part, next, owner } in self.textures.iter() {
+            tracker.use_texture(*id, self.seen[*owner].image.shape, *part, *next, out);
         }
+        self.clear();
     }
 
     /// Forgets a command that failed before it was recorded.
     pub(crate) fn clear(&mut self) {
         self.buffers.clear();
-        self.places.clear();
+        if !self.places.is_empty() {
+            self.places.clear();
+        }
         self.textures.clear();
         self.writers.clear();
     }

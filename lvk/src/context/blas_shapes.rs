@@ -1,7 +1,5 @@
 //! Decides of what parts a bottom-level structure consists, and in which order their primitives are built.
 
-use std::sync::Arc;
-
 use super::Context;
 use crate::accel::blas::PartShape;
 use crate::accel::bounds::Bounds;
@@ -15,7 +13,7 @@ use crate::accel::split::{PartLimits, PartPlan, PartSizes, plan_split};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::Limits;
-use crate::shared::{Garbage, Shared};
+use crate::shared::Shared;
 
 /// Meshes of fewer primitives are built as given: no order makes them slow.
 const ORDERED_FROM: u64 = 64;
@@ -96,11 +94,7 @@ impl Context {
         let boxes = desc.geometries.first().is_some_and(|geometry| geometry.is_boxes());
         let map = PrimitiveMap::new(&shared.gpu, desc.debug_name, &plan.geometries, boxes)?;
         let words = table_words(&plan.geometries);
-        let table = Arc::clone(&map.table);
-        let uploaded =
-            self.before_next_submission(|cmd| cmd.upload_buffer(&table, 0, bytemuck::cast_slice(&words)));
-        shared.retire(Garbage::Held(table));
-        uploaded?;
+        self.upload_object(&map.table, 0, bytemuck::cast_slice(&words))?;
         let counts: Vec<u32> = plan.geometries.iter().map(|list| list.len() as u32).collect();
         let mut input = input(shared, desc)?.gathered();
         input.set_counts(&counts);

@@ -1,6 +1,6 @@
 //! Compaction: asked for, carried out once the GPU has said how small structures can be.
 
-use std::sync::{Arc, MutexGuard, PoisonError, Weak};
+use std::sync::{Arc, Weak};
 
 use ash::vk;
 
@@ -12,6 +12,7 @@ use crate::accel::flags::BuildFlags;
 use crate::accel::raw_structure::RawStructure;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
+use crate::lock::Guard;
 use crate::resource::QueryPool;
 use crate::resource::query::QueryPoolDesc;
 use crate::shared::Garbage;
@@ -178,8 +179,8 @@ impl Context {
         Ok(())
     }
 
-    fn compactions(&self) -> MutexGuard<'_, Compactions> {
-        self.inner.compactions.lock().unwrap_or_else(PoisonError::into_inner)
+    fn compactions(&self) -> Guard<'_, Compactions> {
+        self.inner.compactions.lock()
     }
 }
 

@@ -46,7 +46,8 @@ pub struct ContextDesc<'a> {
     pub profile: Option<&'a DeviceProfile>,
     /// Frames the CPU may be ahead of the GPU; see [`Context::next_frame`](crate::Context::next_frame). 1 to 8.
     pub frames_in_flight: u32,
-    /// Size of the staging ring in bytes. Larger uploads get memory of their own.
+    /// Staging memory that is kept, in bytes. Uploads are submitted on their own once they fill half of it; single ones that
+    /// are larger take more for a while.
     pub staging_bytes: u64,
     /// Most scratch memory for the builds of acceleration structures, in bytes, buffers included that a larger one has
     /// replaced while the GPU still used them. One build that needs more gets it.

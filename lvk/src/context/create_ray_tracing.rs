@@ -33,7 +33,7 @@ impl Context {
         let (pipeline, table) = RayTracingPipeline::new(&shared.gpu, base, desc, &find, &libraries)?;
         let target = Arc::clone(&pipeline.table);
         let holder = Holder::new(self, shared.store.ray_tracing_pipelines.insert(pipeline), NO_SLOT);
-        self.before_next_submission(|cmd| cmd.upload_buffer(&target, table.offset, &table.bytes))?;
+        self.upload_object(&target, table.offset, &table.bytes)?;
         Ok(holder)
     }
 

@@ -2,7 +2,6 @@
 
 use super::Context;
 use super::holder::Holder;
-use crate::barrier::Subresources;
 use crate::bindless::TextureViews;
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
@@ -60,10 +59,7 @@ impl Context {
     fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>) -> Result<()> {
         let texture = self.shared().store.textures.get(handle)?;
         let Some(data) = desc.data else {
-            return self.before_next_submission(|cmd| {
-                cmd.settle_texture(&texture);
-                Ok(())
-            });
+            return self.settle_texture(&texture);
         };
         let mips = data_mips(desc, texture.mips());
         let mut regions = Vec::with_capacity(mips as usize);
@@ -74,11 +70,13 @@ impl Context {
             regions.push((region, bytes));
             rest = behind;
         }
-        let filled = Subresources { mip_count: mips, ..texture.range };
-        self.before_next_submission(|cmd| {
-            cmd.upload_regions(&texture, filled, &regions)?;
-            if desc.generate_mips { cmd.generate_mipmaps_object(&texture) } else { Ok(()) }
-        })
+        for (region, bytes) in regions {
+            self.upload_region(&texture, region, bytes)?;
+        }
+        if desc.generate_mips {
+            self.before_next_submission(|cmd| cmd.generate_mipmaps_object(&texture))?;
+        }
+        Ok(())
     }
 }
 

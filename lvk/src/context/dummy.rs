@@ -50,7 +50,7 @@ fn checker(ctx: &Context, usage: TextureUsage) -> Result<Arc<Texture>> {
     let desc = TextureDesc { extent: [2, 2], usage, debug_name: "dummy texture", ..Default::default() };
     let texture = Arc::new(Texture::new(&ctx.shared().gpu, &desc, SLOT)?);
     let pixels = [MAGENTA, BLACK, BLACK, MAGENTA].concat();
-    ctx.before_next_submission(|cmd| cmd.upload_texture(&texture, &TextureRegion::default(), &pixels))?;
+    ctx.upload_texture_object(&texture, &TextureRegion::default(), &pixels)?;
     Ok(texture)
 }
 

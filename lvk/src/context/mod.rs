@@ -16,9 +16,11 @@ pub(crate) mod holder;
 mod index_faults;
 mod interop;
 mod live_objects;
+mod pending;
 mod profile;
 mod queries;
 mod read_bounds;
+pub(crate) mod readback;
 pub(crate) mod serialize;
 mod software_blas;
 mod start;
@@ -27,16 +29,17 @@ mod support;
 #[cfg(feature = "test-hooks")]
 pub mod test_hooks;
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use crate::accel::compaction::Compactions;
-use crate::command::CommandBuffer;
-use crate::error::Result;
+use crate::gpu::budget::MemoryBudget;
 use crate::gpu::caps::Capabilities;
 use crate::gpu::debug::ValidationSink;
+use crate::lock::Mutex;
 use crate::shared::Shared;
 
 use frame::FrameRing;
+use pending::Pending;
 
 /// A Vulkan device with everything made from it.
 ///
@@ -50,8 +53,8 @@ pub struct Context {
 
 struct Inner {
     /// Uploads and builds that run before the next submission.
-    pending: Mutex<Option<CommandBuffer>>,
-    frames: Mutex<FrameRing>,
+    pending: Mutex<Pending>,
+    frames: std::sync::Mutex<FrameRing>,
     /// Compactions under way.
     compactions: Mutex<Compactions>,
     shared: Arc<Shared>,
@@ -63,6 +66,12 @@ impl Context {
         &self.shared().gpu.caps
     }
 
+    /// How much of each heap of memory there is, may be used and is used
+    /// (`vkGetPhysicalDeviceMemoryProperties2`, with `VK_EXT_memory_budget` where the device has it).
+    pub fn memory_budget(&self) -> MemoryBudget {
+        self.shared().gpu.memory_budget()
+    }
+
     /// The messages of the validation layer so far.
     pub fn validation(&self) -> &ValidationSink {
         self.shared().gpu.instance.sink()
@@ -70,33 +79,6 @@ impl Context {
 
     fn shared(&self) -> &Arc<Shared> {
         &self.inner.shared
-    }
-
-    /// Records into the command buffer that runs before the next submission. What it holds stays there whatever
-    /// becomes of `record`.
-    fn before_next_submission<T>(&self, record: impl FnOnce(&mut CommandBuffer) -> Result<T>) -> Result<T> {
-        let mut pending = self.pending();
-        let cmd = self.open(&mut pending)?;
-        let result = record(cmd);
-        // It goes before whatever is submitted next, so commands recorded from now on may rely on it.
-        cmd.apply_tlas_updates();
-        result
-    }
-
-    /// The command buffer that runs before the next submission. What it records next may be for those who have the slots
-    /// of structures that are gone.
-    fn open<'a>(&self, pending: &'a mut Option<CommandBuffer>) -> Result<&'a mut CommandBuffer> {
-        let cmd = match pending {
-            Some(cmd) => cmd,
-            none => none.insert(CommandBuffer::new(self.shared())?),
-        };
-        let freed = std::mem::take(&mut *self.shared().freed_tlas());
-        cmd.forget_tlas(&freed);
-        Ok(cmd)
-    }
-
-    fn pending(&self) -> MutexGuard<'_, Option<CommandBuffer>> {
-        self.inner.pending.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

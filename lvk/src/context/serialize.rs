@@ -229,12 +229,13 @@ impl Context {
         let buffer = self.blob_buffer(name, places.total)?;
         let base = buffer.address.next_multiple_of(ALIGNMENT);
         let addresses: Vec<_> = places.offsets.iter().map(|offset| base + offset).collect();
-        let recorded = self.before_next_submission(|cmd| {
-            for (part, offset) in blob.parts.iter().zip(&places.offsets) {
-                cmd.upload_buffer(&buffer, base - buffer.address + offset, &part.driver)?;
-            }
+        let mut drivers = blob.parts.iter().zip(&places.offsets);
+        let start = base - buffer.address;
+        let uploaded =
+            drivers.try_for_each(|(part, offset)| self.upload_object(&buffer, start + offset, &part.driver));
+        let recorded = uploaded.and_then(|()| {
             // SAFETY: the caller's promise; the structures have the sizes the data says, at addresses for them.
-            unsafe { cmd.deserialize_parts(&object, &buffer, &addresses) }
+            self.before_next_submission(|cmd| unsafe { cmd.deserialize_parts(&object, &buffer, &addresses) })
         });
         shared.retire(Garbage::Buffer(buffer));
         recorded.map(|()| holder)

@@ -7,7 +7,9 @@ use std::sync::{Arc, Mutex, OnceLock};
 use super::config::ContextDesc;
 use super::dummy::fill_dummies;
 use super::frame::FrameRing;
+use super::pending::Pending;
 use super::{Context, Inner};
+use crate::accel::compaction::Compactions;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
 use crate::barrier::{QueryStages, ResourceId};
@@ -20,6 +22,7 @@ use crate::gpu::debug::{Validation, ValidationSink};
 use crate::gpu::device::DeviceRequest;
 use crate::gpu::instance::{Instance, InstanceDesc};
 use crate::kernel::Kernels;
+use crate::lock::{self, Rank};
 use crate::pipeline::{PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
@@ -60,8 +63,8 @@ impl Context {
         let gpu = Arc::new(Gpu::new(instance, &request)?);
         let shared = Arc::new(new_shared(gpu, desc)?);
         let inner = Inner {
-            pending: Mutex::default(),
-            compactions: Mutex::default(),
+            pending: lock::Mutex::new(Rank::Pending, Pending::default()),
+            compactions: lock::Mutex::new(Rank::Compactions, Compactions::default()),
             frames: Mutex::new(FrameRing::new(desc.frames_in_flight)),
             shared,
         };
@@ -91,7 +94,7 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
     Ok(Shared {
         dummies: OnceLock::new(),
         store: Store::new(),
-        staging: Staging::new(&gpu, desc.staging_bytes)?,
+        staging: Staging::new(&gpu, desc.staging_bytes),
         scratch: new_scratch(&gpu, desc.scratch_budget_bytes),
         accel_storage: AccelStorage::new(desc.accel_budget_bytes),
         graphics_queries: QueryStages::default(),

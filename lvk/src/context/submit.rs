@@ -31,7 +31,8 @@ impl Context {
         if !self.shared().freed_tlas().is_empty() {
             self.open(&mut pending)?;
         }
-        self.send(pending.take().into_iter().chain([cmd]))
+        let before = self.take_pending(&mut pending)?;
+        self.send(before.into_iter().chain([cmd]))
     }
 
     fn send(&self, commands: impl Iterator<Item = CommandBuffer>) -> Result<SubmitHandle> {
@@ -49,7 +50,7 @@ impl Context {
     pub fn flush(&self) -> Result<SubmitHandle> {
         self.advance_compactions();
         let mut pending = self.pending();
-        let Some(cmd) = pending.take() else { return Ok(self.last_submission()) };
+        let Some(cmd) = self.take_pending(&mut pending)? else { return Ok(self.last_submission()) };
         self.send([cmd].into_iter())
     }
 

@@ -39,6 +39,22 @@ pub fn silent_context(desc: &ContextDesc<'_>) -> Result<Context> {
     silently(|| Context::new(desc))
 }
 
+/// How many submissions there were.
+pub fn submissions(ctx: &Context) -> u64 {
+    ctx.shared().submitter.submitted()
+}
+
+/// Bytes of the staging memory there is.
+pub fn staging_bytes(ctx: &Context) -> u64 {
+    ctx.shared().staging.total_bytes()
+}
+
+/// Objects that wait to be destroyed.
+pub fn waiting_objects(ctx: &Context) -> Result<usize> {
+    ctx.shared().collect()?;
+    Ok(ctx.shared().submitter.waiting())
+}
+
 /// A bottom-level structure to build.
 pub struct GpuBlasDesc<'a> {
     pub geometries: &'a [BlasGeometry],

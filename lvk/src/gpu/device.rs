@@ -2,12 +2,12 @@
 
 use std::ffi::CStr;
 use std::sync::atomic::AtomicU32;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 
+use super::budget::HeapUse;
 use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
 use super::clock::HostClock;
 use super::extra::ExtraExtensions;
@@ -19,6 +19,7 @@ use super::profile::DeviceProfile;
 use super::ray_query_path::RayQueryRequest;
 use super::select::{Candidate, choose};
 use crate::error::{Error, Result, check_limit};
+use crate::lock::{Guard, Mutex, Rank};
 
 /// What the caller asks of a device.
 #[derive(Debug, Clone, Copy)]
@@ -58,6 +59,7 @@ pub(crate) struct Gpu {
     pub(super) debug_utils: Option<ash::ext::debug_utils::Device>,
     pub(super) device_fault: Option<ash::ext::device_fault::Device>,
     allocator: Mutex<Option<Allocator>>,
+    pub(super) heap_use: HeapUse,
     queue: Mutex<vk::Queue>,
     /// Declared last: destroyed after the device.
     pub(crate) instance: Instance,
@@ -92,8 +94,9 @@ impl Gpu {
                 .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             device_fault: (features.ext.fault.device_fault == vk::TRUE)
                 .then(|| ash::ext::device_fault::Device::new(raw, &device)),
-            allocator: Mutex::new(Some(allocator)),
-            queue: Mutex::new(queue),
+            allocator: Mutex::new(Rank::Allocator, Some(allocator)),
+            heap_use: HeapUse::new(&instance, chosen.raw),
+            queue: Mutex::new(Rank::Queue, queue),
             custom_borders: AtomicU32::new(0),
             physical: chosen.raw,
             device,
@@ -106,13 +109,13 @@ impl Gpu {
     }
 
     /// The queue; Vulkan wants one thread at a time on it.
-    pub(crate) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(crate) fn queue(&self) -> Guard<'_, vk::Queue> {
+        self.queue.lock()
     }
 
     /// The memory allocator, `None` only while the context is being torn down.
-    pub(crate) fn allocator(&self) -> MutexGuard<'_, Option<Allocator>> {
-        self.allocator.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(crate) fn allocator(&self) -> Guard<'_, Option<Allocator>> {
+        self.allocator.lock()
     }
 
     /// The functions of `VK_KHR_acceleration_structure`, or the error that says what the device lacks.

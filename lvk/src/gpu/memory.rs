@@ -48,7 +48,8 @@ impl Gpu {
         let mut allocator = self.allocator();
         let allocator = allocator.as_mut().ok_or_else(out_of_memory)?;
         let desc = AllocationCreateDesc {
-            name,
+            // The allocator keeps a copy, which only its own reports show.
+            name: if self.names_objects() { name } else { "" },
             requirements,
             location: kind.location(),
             linear,
@@ -58,6 +59,7 @@ impl Gpu {
             gpu_allocator::AllocationError::OutOfMemory => out_of_memory(),
             other => Error::unsupported(format!("memory for '{name}' ({bytes} bytes)"), other.to_string()),
         })?;
+        self.heap_use.add(&allocated);
         self.name_block(&allocated, name);
         Ok(allocated)
     }
@@ -72,6 +74,7 @@ impl Gpu {
 
     /// Gives memory back.
     pub(crate) fn free(&self, allocation: Allocation) {
+        self.heap_use.remove(&allocation);
         if let Some(allocator) = self.allocator().as_mut()
             && let Err(error) = allocator.free(allocation)
         {

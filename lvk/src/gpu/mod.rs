@@ -1,5 +1,6 @@
 //! One logical device: instance, choice, features, memory, debugging. It knows no resource.
 
+pub(crate) mod budget;
 pub(crate) mod caps;
 pub(crate) mod clock;
 pub(crate) mod debug;

@@ -3,6 +3,9 @@
 #[doc = include_str!("textures.md")]
 pub mod textures {}
 
+#[doc = include_str!("queues_and_uploads.md")]
+pub mod queues_and_uploads {}
+
 #[doc = include_str!("acceleration_structures.md")]
 pub mod acceleration_structures {}
 

@@ -91,7 +91,7 @@ impl InternalUsage {
 
 impl Buffer {
     /// Matrices and instances of builds, and the largest texels, lie at multiples of this; drivers may ask for less.
-    const ALIGNMENT: u64 = 16;
+    pub(crate) const ALIGNMENT: u64 = 16;
     /// Memory behind each buffer under GPU-assisted validation, for which what lies in some other buffer is no error.
     const GAP_BYTES: u64 = 4096;
 

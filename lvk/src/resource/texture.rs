@@ -24,6 +24,8 @@ pub(crate) struct Texture {
     pub(crate) format: Format,
     /// The part of the image that is shown.
     pub(crate) range: Subresources,
+    /// The part of the image that storage accesses reach: one mip. Kept, as dispatches ask for it again and again.
+    pub(crate) stored_part: Subresources,
     pub(crate) usage: TextureUsage,
     pub(crate) slot: u32,
     pub(crate) name: String,
@@ -41,6 +43,7 @@ impl Texture {
             kind: desc.kind,
             format: desc.format,
             range: image.shape.whole(),
+            stored_part: one_mip(image.shape.whole()),
             usage: image.usage_in(desc.format),
             slot,
             name: desc.debug_name.to_owned(),
@@ -59,6 +62,7 @@ impl Texture {
             kind: shown.kind,
             format: shown.format,
             range: shown.range,
+            stored_part: one_mip(shown.range),
             usage: shown.usage,
             slot,
             name: desc.debug_name.to_owned(),
@@ -78,7 +82,7 @@ impl Texture {
             TextureKind::Cube | TextureKind::CubeArray { .. } => vk::ImageViewType::TYPE_2D_ARRAY,
             kind => raw_kind(kind),
         };
-        self.raw_view(self.stored_part(), kind, TextureUsage::STORAGE)
+        self.raw_view(self.stored_part, kind, TextureUsage::STORAGE)
     }
 
     /// The view a render pass draws to: a mip of a layer, or of a slice.
@@ -141,11 +145,6 @@ impl Texture {
     /// Number of layers.
     pub(crate) fn layers(&self) -> u32 {
         self.range.layer_count
-    }
-
-    /// The part of the image that storage accesses reach: one mip.
-    pub(crate) fn stored_part(&self) -> Subresources {
-        Subresources { mip_count: 1, ..self.range }
     }
 
     /// One mip of one layer, counted from the texture's own first ones, as part of the image.
@@ -218,6 +217,7 @@ impl Texture {
     }
 
     /// Fails unless the texture was created with `usage`.
+    #[inline]
     pub(crate) fn check_usage(&self, usage: TextureUsage) -> Result<()> {
         if self.usage.contains(usage) {
             return Ok(());
@@ -240,6 +240,18 @@ impl Texture {
         }
         let message =
             format!("{what} texels of one sample, not of {}; resolve them first", self.image.samples);
+        Err(Error::usage(&self.name, message))
+    }
+
+    /// Resolves a region to which `bytes` are uploaded, tightly packed.
+    pub(crate) fn check_upload(&self, region: &TextureRegion, bytes: u64) -> Result<Region> {
+        let region = self.resolve_region(region)?;
+        self.check_one_sample("uploads write")?;
+        let expected = region.bytes();
+        if bytes == expected {
+            return Ok(region);
+        }
+        let message = format!("{bytes} bytes were given for texels of {expected} bytes");
         Err(Error::usage(&self.name, message))
     }
 
@@ -334,4 +346,9 @@ struct Shown {
     range: Subresources,
     usage: TextureUsage,
     aspect: Aspect,
+}
+
+/// The first mip of a part.
+fn one_mip(part: Subresources) -> Subresources {
+    Subresources { mip_count: 1, ..part }
 }

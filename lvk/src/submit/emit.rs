@@ -15,7 +15,7 @@ pub(crate) fn emit(gpu: &Gpu, commands: vk::CommandBuffer, barriers: &Barriers, 
         return;
     }
     let mut memory = [vk::MemoryBarrier2::default(); 2];
-    let count = memory_barriers(gpu, barriers.memory, &mut memory);
+    let count = memory_barriers(gpu, barriers.memory.as_ref(), &mut memory);
     let images: Vec<_> =
         barriers.images.iter().filter_map(|barrier| image_barrier(gpu, barrier, images)).collect();
     if count == 0 && images.is_empty() {
@@ -27,20 +27,22 @@ pub(crate) fn emit(gpu: &Gpu, commands: vk::CommandBuffer, barriers: &Barriers, 
 }
 
 /// Writes the barrier, in two parts where one must not name all, and answers how many.
+#[inline]
 fn memory_barriers(
     gpu: &Gpu,
-    barrier: Option<MemoryBarrier>,
+    barrier: Option<&MemoryBarrier>,
     out: &mut [vk::MemoryBarrier2<'static>; 2],
 ) -> usize {
     let Some(barrier) = barrier else { return 0 };
-    if gpu.caps.hardware_ray_query() {
-        out[0] = memory_barrier(gpu, &barrier);
+    if !barrier.dst_access.contains(Access::ACCEL_READ) || gpu.caps.hardware_ray_query() {
+        out[0] = memory_barrier(gpu, barrier);
         return 1;
     }
     let parts = barrier.without_ray_queries().zip(&mut *out);
     parts.map(|(part, place)| *place = memory_barrier(gpu, &part)).count()
 }
 
+#[inline]
 fn memory_barrier(gpu: &Gpu, barrier: &MemoryBarrier) -> vk::MemoryBarrier2<'static> {
     vk::MemoryBarrier2::default()
         .src_stage_mask(stages(gpu, barrier.src_stages))

@@ -1,6 +1,6 @@
 //! Submission: command buffers go to the queue in order, with the barriers between them.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use ash::vk;
 
@@ -12,6 +12,7 @@ use super::timeline::Timeline;
 use crate::barrier::{Barriers, ResourceId, States, Tracker};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::lock::{Guard, Mutex, Rank};
 
 /// A command buffer being recorded, with what the tracker knows of it.
 pub(crate) struct Recording {
@@ -79,7 +80,11 @@ impl<T> Submitter<T> {
             submitted: 0,
             broken: None,
         };
-        Ok(Self { timeline: Timeline::new(gpu)?, inner: Mutex::new(inner), gpu: Arc::clone(gpu) })
+        Ok(Self {
+            timeline: Timeline::new(gpu)?,
+            inner: Mutex::new(Rank::Submitter, inner),
+            gpu: Arc::clone(gpu),
+        })
     }
 
     /// Starts recording a command buffer.
@@ -209,6 +214,12 @@ impl<T> Submitter<T> {
         self.lock().ring.newest()
     }
 
+    /// How many items wait to be destroyed.
+    #[cfg(feature = "test-hooks")]
+    pub(crate) fn waiting(&self) -> usize {
+        self.lock().deferred.len()
+    }
+
     /// Takes out what the GPU has finished with.
     pub(crate) fn collect(&self) -> Result<Finished<T>> {
         let completed = self.timeline.completed()?;
@@ -239,8 +250,8 @@ impl<T> Submitter<T> {
         inner.deferred.drain_all()
     }
 
-    fn lock(&self) -> MutexGuard<'_, Inner<T>> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> Guard<'_, Inner<T>> {
+        self.inner.lock()
     }
 }
 

@@ -1,8 +1,11 @@
 //! From host memory to the GPU.
 
-pub(crate) mod ring;
+mod pages;
+pub(crate) mod pending;
+pub(crate) mod pieces;
 pub(crate) mod spare;
 pub(crate) mod staging;
 
+pub(crate) use pending::PendingUploads;
 pub(crate) use spare::SpareBuffers;
 pub(crate) use staging::Staging;

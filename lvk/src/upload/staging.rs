@@ -1,37 +1,59 @@
-//! The staging ring in host-visible memory: what the host hands to commands.
+//! Staging memory: what the host hands to commands, in pages that are used again.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use ash::vk;
 
-use super::ring::Ring;
+use super::pages::{Found, Pages, Place};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::memory::MemoryKind;
+use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
-/// Bytes written by the host for one command buffer.
+/// Bytes that the host has written for commands.
+#[derive(Debug, Clone, Copy)]
 pub(crate) struct StagingRegion {
     pub(crate) buffer: vk::Buffer,
     pub(crate) offset: u64,
     pub(crate) address: u64,
-    /// A buffer of its own where the ring had no room; the caller retires it.
-    pub(crate) temporary: Option<Arc<Buffer>>,
+    /// Which page they lie in.
+    pub(crate) page: usize,
 }
 
-/// A ring of host-visible memory. A region lives until the command buffer it was taken for is done.
+/// Pages of host-visible memory. A region lives until the command buffer it was taken for is done.
 pub(crate) struct Staging {
-    buffer: Arc<Buffer>,
-    ring: Mutex<Ring>,
+    state: Mutex<State>,
+    kept_bytes: u64,
     gpu: Arc<Gpu>,
 }
 
+struct State {
+    pages: Pages,
+    /// By their numbers; `None` for those that are gone, or not made yet.
+    buffers: Vec<Option<Arc<Buffer>>>,
+}
+
 impl Staging {
-    pub(crate) fn new(gpu: &Arc<Gpu>, bytes: u64) -> Result<Self> {
-        let bytes = bytes.max(64 * 1024);
-        let buffer = Arc::new(new_buffer(gpu, bytes, "staging ring")?);
-        Ok(Self { buffer, ring: Mutex::new(Ring::new(bytes)), gpu: Arc::clone(gpu) })
+    /// Larger pieces get a page of their own.
+    const PAGE_BYTES: u64 = 4 << 20;
+    const LEAST_PAGE_BYTES: u64 = 64 << 10;
+
+    /// Keeps pages of `bytes` altogether.
+    pub(crate) fn new(gpu: &Arc<Gpu>, bytes: u64) -> Self {
+        let kept_bytes = bytes.max(Self::LEAST_PAGE_BYTES);
+        let pages = Pages::new(kept_bytes.min(Self::PAGE_BYTES), kept_bytes);
+        Self {
+            state: Mutex::new(Rank::Staging, State { pages, buffers: Vec::new() }),
+            kept_bytes,
+            gpu: Arc::clone(gpu),
+        }
+    }
+
+    /// Half of what is kept: so much may wait while as much is copied.
+    pub(crate) fn half_bytes(&self) -> u64 {
+        self.kept_bytes / 2
     }
 
     /// Copies `data` to where the command buffer `sequence` can read it, at an address of this alignment (a power of
@@ -50,41 +72,86 @@ impl Staging {
         sequence: u64,
         fill: impl FnOnce(&mut [u8]),
     ) -> Result<StagingRegion> {
-        let room = bytes + align;
-        let found = self.lock().alloc(room, align, sequence);
-        let (buffer, start, temporary) = match found {
-            Some(start) => (Arc::clone(&self.buffer), start, None),
-            None => {
-                let own = Arc::new(new_buffer(&self.gpu, room, "staging, too large for the ring")?);
-                (Arc::clone(&own), 0, Some(own))
-            }
-        };
-        let address = (buffer.address + start).next_multiple_of(align.max(1));
-        let offset = address - buffer.address;
-        let mapped = buffer.mapped().ok_or_else(|| Error::usage("staging", "the memory is not mapped"))?;
-        // SAFETY: `offset + bytes <= start + room` lies inside the mapping, and no other region overlaps this one.
-        fill(unsafe { std::slice::from_raw_parts_mut(mapped.as_ptr().add(offset as usize), bytes as usize) });
-        Ok(StagingRegion { buffer: buffer.raw, offset, address, temporary })
+        self.fill(bytes, align, Some(sequence), fill)
+    }
+
+    /// Copies `data` to where some command buffer will read it; see [`hold`](Self::hold).
+    pub(crate) fn keep(&self, data: &[u8], align: u64) -> Result<StagingRegion> {
+        self.fill(data.len() as u64, align, None, |region| region.copy_from_slice(data))
+    }
+
+    /// `count` regions of a page that were [kept](Self::keep) are read by the command buffer `sequence`.
+    pub(crate) fn hold(&self, page: usize, count: u32, sequence: u64) {
+        self.lock().pages.hold(page, count, sequence);
     }
 
     /// The command buffer is done with its regions.
     pub(crate) fn release(&self, sequence: u64) {
-        self.lock().release(sequence);
+        let mut state = self.lock();
+        let unwanted = state.pages.release(sequence);
+        let gone: Vec<_> = unwanted.into_iter().map(|page| state.buffers[page].take()).collect();
+        drop(state);
+        drop(gone);
     }
 
-    fn lock(&self) -> MutexGuard<'_, Ring> {
-        self.ring.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Bytes of all pages.
+    #[cfg(feature = "test-hooks")]
+    pub(crate) fn total_bytes(&self) -> u64 {
+        self.lock().pages.total_bytes()
+    }
+
+    /// The bytes are written without the lock.
+    fn fill(
+        &self,
+        bytes: u64,
+        align: u64,
+        sequence: Option<u64>,
+        fill: impl FnOnce(&mut [u8]),
+    ) -> Result<StagingRegion> {
+        // Pages begin at addresses that are multiples of less than some alignments.
+        let room = bytes + align.saturating_sub(Buffer::ALIGNMENT);
+        let (place, buffer) = self.place(room, align.min(Buffer::ALIGNMENT), sequence)?;
+        let address = (buffer.address + place.offset).next_multiple_of(align.max(1));
+        let offset = address - buffer.address;
+        let mapped = buffer.mapped().ok_or_else(|| Error::usage("staging", "the memory is not mapped"))?;
+        // SAFETY: `offset + bytes <= place.offset + room` lies inside the mapping, and no other region overlaps this one.
+        fill(unsafe { std::slice::from_raw_parts_mut(mapped.as_ptr().add(offset as usize), bytes as usize) });
+        Ok(StagingRegion { buffer: buffer.raw, offset, address, page: place.page })
+    }
+
+    /// A place, with the page it lies in.
+    fn place(&self, bytes: u64, align: u64, sequence: Option<u64>) -> Result<(Place, Arc<Buffer>)> {
+        let mut state = self.lock();
+        let State { pages, buffers } = &mut *state;
+        let place = match pages.take(bytes, align) {
+            Found::Here(place) => place,
+            Found::New(place, size) => {
+                let made = new_page(&self.gpu, size).inspect_err(|_| pages.forget(place.page))?;
+                buffers.resize_with(buffers.len().max(place.page + 1), || None);
+                buffers[place.page] = Some(Arc::new(made));
+                place
+            }
+        };
+        if let Some(sequence) = sequence {
+            pages.hold(place.page, 1, sequence);
+        }
+        let buffer = buffers.get(place.page).cloned().flatten();
+        Ok((place, buffer.ok_or_else(|| Error::usage("staging", "the page is gone"))?))
+    }
+
+    fn lock(&self) -> Guard<'_, State> {
+        self.state.lock()
     }
 }
 
-fn new_buffer(gpu: &Arc<Gpu>, bytes: u64, name: &str) -> Result<Buffer> {
+fn new_page(gpu: &Arc<Gpu>, bytes: u64) -> Result<Buffer> {
     let inputs = if gpu.accel.is_some() { BufferUsage::ACCEL_INPUT } else { BufferUsage::empty() };
     let desc = BufferDesc {
         size_bytes: bytes,
         usage: BufferUsage::STORAGE | inputs,
         memory: MemoryKind::HostVisible,
         data: None,
-        debug_name: name,
+        debug_name: "staging",
     };
     Buffer::new(gpu, &desc, InternalUsage::NONE)
 }

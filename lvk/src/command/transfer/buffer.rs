@@ -120,14 +120,13 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Copies host bytes into a buffer through the staging ring.
-    pub(crate) fn upload_buffer(&mut self, target: &Arc<Buffer>, offset: u64, bytes: &[u8]) -> Result<()> {
+    /// Copies host bytes into a buffer through staging memory.
+    fn upload_buffer(&mut self, target: &Arc<Buffer>, offset: u64, bytes: &[u8]) -> Result<()> {
         target.check_range(offset, bytes.len() as u64)?;
         if bytes.is_empty() {
             return Ok(());
         }
         let region = self.shared.staging.write(bytes, 16, self.recording.sequence)?;
-        self.retire_temporary(region.temporary);
         self.use_buffer(target, Use::transfer_write());
         self.flush();
         let copy = vk::BufferCopy { src_offset: region.offset, dst_offset: offset, size: bytes.len() as u64 };

@@ -16,11 +16,6 @@ pub(in crate::command) enum Settle {
 }
 
 impl CommandBuffer {
-    /// Gives a new texture the layout in which shaders read it.
-    pub(crate) fn settle_texture(&mut self, texture: &Arc<Texture>) {
-        self.settle.push(Settle::Texture(Arc::clone(texture)));
-    }
-
     /// Makes what copies touched readable by every shader and every input, with one barrier for all.
     pub(in crate::command) fn settle(&mut self) {
         if self.settle.is_empty() {

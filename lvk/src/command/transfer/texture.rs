@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::{SOURCE, Settle, TARGET};
-use crate::barrier::{Subresources, Use};
+use crate::barrier::Use;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::handle::{BufferHandle, TextureHandle};
@@ -103,47 +103,14 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Copies host bytes, tightly packed, into a region of a texture through the staging ring.
-    pub(crate) fn upload_texture(
-        &mut self,
-        target: &Arc<Texture>,
-        region: &TextureRegion,
-        bytes: &[u8],
-    ) -> Result<()> {
-        let region = target.resolve_region(region)?;
-        target.check_one_sample("uploads write")?;
-        let expected = region.bytes();
-        if bytes.len() as u64 != expected {
-            let message = format!("{} bytes were given for texels of {expected} bytes", bytes.len());
-            return Err(Error::usage(&target.name, message));
-        }
-        self.upload_regions(target, region.subresources(), &[(region, bytes)])
-    }
-
-    /// Copies host bytes into regions of `part` of a texture; each has as many bytes as its region.
-    pub(crate) fn upload_regions(
-        &mut self,
-        target: &Arc<Texture>,
-        part: Subresources,
-        regions: &[(Region, &[u8])],
-    ) -> Result<()> {
-        let mut staged = Vec::with_capacity(regions.len());
-        for (region, bytes) in regions {
-            // A multiple of 16 suits texels and blocks of every size.
-            let place = self.shared.staging.write(bytes, 16, self.recording.sequence)?;
-            self.retire_temporary(place.temporary);
-            staged.push((place.buffer, place.offset, region));
-        }
-        self.use_texture(target, part, Use::transfer_write())?;
-        self.flush();
-        for (buffer, offset, region) in staged {
-            self.record_fill_texture(buffer, offset, target, region);
-        }
-        self.settle.push(Settle::Texture(Arc::clone(target)));
-        Ok(())
-    }
-
-    fn record_fill_texture(&self, source: vk::Buffer, offset: u64, target: &Texture, region: &Region) {
+    /// The copy alone, of bytes to a region that is ready to be written.
+    pub(in crate::command) fn record_fill_texture(
+        &self,
+        source: vk::Buffer,
+        offset: u64,
+        target: &Texture,
+        region: &Region,
+    ) {
         let copy = region.buffer_copy(offset);
         // SAFETY: the bytes lie inside the buffer and the region inside the image.
         unsafe {

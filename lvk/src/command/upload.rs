@@ -1,0 +1,91 @@
+//! Uploads that were waiting become copies.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::CommandBuffer;
+use super::transfer::Settle;
+use crate::barrier::Use;
+use crate::error::Result;
+use crate::shared::Garbage;
+use crate::upload::PendingUploads;
+use crate::upload::pending::{BufferUploads, TextureUpload, UsedPage, round_ends};
+use crate::upload::pieces::Piece;
+
+impl CommandBuffer {
+    /// Records what was waiting: buffers with one barrier for all and one copy for each page of each, textures with one
+    /// barrier for all that do not write the same texels.
+    pub(crate) fn record_uploads(&mut self, uploads: PendingUploads) -> Result<()> {
+        let PendingUploads { buffers, mut textures, pages, .. } = uploads;
+        for used in &pages {
+            self.shared.staging.hold(used.page, used.count, self.recording.sequence);
+        }
+        self.record_buffer_uploads(buffers, &pages);
+        for gone in textures.extract_if(.., |upload| upload.is_gone()) {
+            self.shared.dispose(Garbage::HeldTexture(gone.target));
+        }
+        let part = |upload: &TextureUpload| {
+            let (region, _) = upload.texels.as_ref()?;
+            Some((upload.target.image.id, region.subresources()))
+        };
+        let mut start = 0;
+        for end in round_ends(textures.iter().map(part)) {
+            self.record_texture_uploads(&textures[start..end])?;
+            start = end;
+        }
+        for TextureUpload { target, .. } in textures {
+            self.shared.retire(Garbage::HeldTexture(target));
+        }
+        Ok(())
+    }
+
+    fn record_buffer_uploads(&mut self, mut buffers: Vec<BufferUploads>, pages: &[UsedPage]) {
+        buffers.retain(|upload| !upload.is_gone());
+        if buffers.is_empty() {
+            return;
+        }
+        for BufferUploads { target, .. } in &buffers {
+            self.use_buffer(target, Use::transfer_write());
+        }
+        self.flush();
+        for BufferUploads { target, pieces } in buffers {
+            for pieces in pieces.by_page().chunk_by(|a, b| a.page == b.page) {
+                self.copy_pieces(pieces, pages, target.raw);
+            }
+            self.settle.push(Settle::Buffer(Arc::clone(&target)));
+            self.shared.retire(Garbage::Held(target));
+        }
+    }
+
+    /// Copies pieces of one page.
+    fn copy_pieces(&self, pieces: &[Piece], pages: &[UsedPage], target: vk::Buffer) {
+        let page = pieces.first().and_then(|first| pages.iter().find(|used| used.page == first.page));
+        let Some(page) = page else { return };
+        let copy = |piece: &Piece| vk::BufferCopy {
+            src_offset: piece.source,
+            dst_offset: piece.target,
+            size: piece.bytes,
+        };
+        let copies: Vec<_> = pieces.iter().map(copy).collect();
+        // SAFETY: the pieces lie inside the page and the buffer, and none overlaps another.
+        unsafe { self.shared.gpu.device.cmd_copy_buffer(self.raw(), page.raw, target, &copies) };
+    }
+
+    /// Records uploads that write different texels.
+    fn record_texture_uploads(&mut self, uploads: &[TextureUpload]) -> Result<()> {
+        for TextureUpload { target, texels } in uploads {
+            if let Some((region, _)) = texels {
+                self.use_texture(target, region.subresources(), Use::transfer_write())?;
+            }
+        }
+        self.flush();
+        for TextureUpload { target, texels } in uploads {
+            if let Some((region, staged)) = texels {
+                self.record_fill_texture(staged.buffer, staged.offset, target, region);
+            }
+            self.settle.push(Settle::Texture(Arc::clone(target)));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,123 @@
+//! What runs before the next submission: uploads, then builds and the like.
+
+use std::sync::Arc;
+
+use super::Context;
+use crate::command::CommandBuffer;
+use crate::error::Result;
+use crate::lock::Guard;
+use crate::resource::region::{Region, TextureRegion};
+use crate::resource::{Buffer, Texture};
+use crate::submit::SubmitHandle;
+use crate::upload::PendingUploads;
+
+/// What runs before the next submission.
+#[derive(Default)]
+pub(super) struct Pending {
+    /// Run after what `commands` holds.
+    uploads: PendingUploads,
+    commands: Option<CommandBuffer>,
+    /// The last submission that was made to get staging memory back.
+    made_room: SubmitHandle,
+}
+
+impl Context {
+    /// Records into the command buffer that runs before the next submission. What it holds stays there whatever
+    /// becomes of `record`.
+    pub(super) fn before_next_submission<T>(
+        &self,
+        record: impl FnOnce(&mut CommandBuffer) -> Result<T>,
+    ) -> Result<T> {
+        let mut pending = self.pending();
+        let cmd = self.open(&mut pending)?;
+        let result = record(cmd);
+        // It goes before whatever is submitted next, so commands recorded from now on may rely on it.
+        cmd.apply_tlas_updates();
+        result
+    }
+
+    /// The command buffer that runs before the next submission, with all uploads so far. What it records next may be for
+    /// those who have the slots of structures that are gone.
+    pub(super) fn open<'a>(&self, pending: &'a mut Pending) -> Result<&'a mut CommandBuffer> {
+        let cmd = match &mut pending.commands {
+            Some(cmd) => cmd,
+            none => none.insert(CommandBuffer::new(self.shared())?),
+        };
+        let freed = std::mem::take(&mut *self.shared().freed_tlas());
+        cmd.forget_tlas(&freed);
+        if !pending.uploads.is_empty() {
+            cmd.record_uploads(std::mem::take(&mut pending.uploads))?;
+        }
+        Ok(cmd)
+    }
+
+    /// The command buffer that goes before the submission made next, if there is anything to be done.
+    pub(super) fn take_pending(&self, pending: &mut Pending) -> Result<Option<CommandBuffer>> {
+        if !pending.uploads.is_empty() {
+            self.open(pending)?;
+        }
+        Ok(pending.commands.take())
+    }
+
+    /// Writes bytes of a buffer before the next submission. They are copied before the lock is taken.
+    pub(super) fn upload_object(&self, target: &Arc<Buffer>, offset: u64, bytes: &[u8]) -> Result<()> {
+        // So that uploads side by side are side by side in staging memory, too, and become one copy.
+        const ALIGNMENT: u64 = 4;
+        target.check_range(offset, bytes.len() as u64)?;
+        if bytes.is_empty() {
+            return Ok(());
+        }
+        let staged = self.shared().staging.keep(bytes, ALIGNMENT)?;
+        let mut pending = self.pending();
+        pending.uploads.buffer(target, offset, bytes.len() as u64, staged);
+        self.keep_budget(pending)
+    }
+
+    /// Writes texels, tightly packed, before the next submission. They are copied before the lock is taken.
+    pub(super) fn upload_texture_object(
+        &self,
+        target: &Arc<Texture>,
+        region: &TextureRegion,
+        bytes: &[u8],
+    ) -> Result<()> {
+        let region = target.check_upload(region, bytes.len() as u64)?;
+        self.upload_region(target, region, bytes)
+    }
+
+    /// As [`upload_texture_object`](Self::upload_texture_object), with as many bytes as the region has.
+    pub(super) fn upload_region(&self, target: &Arc<Texture>, region: Region, bytes: &[u8]) -> Result<()> {
+        // A multiple of 16 suits texels and blocks of every size.
+        const ALIGNMENT: u64 = 16;
+        target.image.share()?;
+        let staged = self.shared().staging.keep(bytes, ALIGNMENT);
+        let staged = staged.inspect_err(|_| {
+            target.image.release();
+        })?;
+        let mut pending = self.pending();
+        pending.uploads.texture(Arc::clone(target), region, bytes.len() as u64, staged);
+        self.keep_budget(pending)
+    }
+
+    /// Lets shaders read a new texture that has no contents.
+    pub(super) fn settle_texture(&self, texture: &Arc<Texture>) -> Result<()> {
+        texture.image.share()?;
+        self.pending().uploads.fresh_texture(Arc::clone(texture));
+        Ok(())
+    }
+
+    /// Submits uploads that have come to fill half of the staging memory, so that it comes back while the other half is
+    /// filled. Where the GPU does not keep up, waits for the half before.
+    fn keep_budget(&self, pending: Guard<'_, Pending>) -> Result<()> {
+        if pending.uploads.bytes() < self.shared().staging.half_bytes() {
+            return Ok(());
+        }
+        drop(pending);
+        let submitted = self.flush()?;
+        let before = std::mem::replace(&mut self.pending().made_room, submitted);
+        self.wait(before)
+    }
+
+    pub(super) fn pending(&self) -> Guard<'_, Pending> {
+        self.inner.pending.lock()
+    }
+}

@@ -1,0 +1,113 @@
+//! Bytes on their way from the GPU to the host.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use super::Context;
+use crate::command::transfer::BufferCopy;
+use crate::error::Result;
+use crate::gpu::memory::MemoryKind;
+use crate::handle::{BufferHandle, TextureHandle};
+use crate::resource::Buffer;
+use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
+use crate::resource::region::TextureRegion;
+use crate::shared::Garbage;
+use crate::submit::SubmitHandle;
+
+/// Bytes that the GPU copies for the host, from [`Context::read_buffer_later`] and [`Context::read_texture_later`].
+///
+/// They are those of the moment of the call: what is submitted afterwards does not change them. Dropping it gives them
+/// up.
+#[derive(Clone)]
+pub struct Readback {
+    /// `None` for no bytes at all.
+    target: Option<Arc<Buffer>>,
+    submission: SubmitHandle,
+    ctx: Context,
+}
+
+impl Readback {
+    /// Whether the bytes are there. Does not wait (`vkGetSemaphoreCounterValue`).
+    pub fn is_ready(&self) -> Result<bool> {
+        self.ctx.is_done(self.submission)
+    }
+
+    /// The bytes; waits for the GPU where they are not there yet (`vkWaitSemaphores`).
+    pub fn wait(&self) -> Result<Vec<u8>> {
+        let mut bytes = vec![0; self.target.as_ref().map_or(0, |target| target.size_bytes as usize)];
+        self.wait_into(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// The submission that copies the bytes.
+    pub fn submission(&self) -> SubmitHandle {
+        self.submission
+    }
+
+    pub(super) fn wait_into(&self, bytes: &mut [u8]) -> Result<()> {
+        self.ctx.wait(self.submission)?;
+        if let Some(target) = &self.target {
+            target.read(0, bytes);
+        }
+        Ok(())
+    }
+}
+
+impl std::fmt::Debug for Readback {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let bytes = self.target.as_ref().map_or(0, |target| target.size_bytes);
+        f.debug_struct("Readback").field("bytes", &bytes).field("submission", &self.submission).finish()
+    }
+}
+
+impl Context {
+    /// Has bytes of a buffer in any memory copied for the host, after everything submitted so far, and does not wait for
+    /// them.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a range that ends before it begins or outside of the buffer;
+    /// [`StaleHandle`](crate::Error::StaleHandle).
+    pub fn read_buffer_later(&self, buffer: BufferHandle, range: Range<u64>) -> Result<Readback> {
+        let buffer = self.shared().store.buffers.get(buffer)?;
+        let size = range.end.checked_sub(range.start).unwrap_or(u64::MAX);
+        buffer.check_range(range.start, size)?;
+        let copy = BufferCopy { source_offset: range.start, target_offset: 0, size };
+        self.read_later(size, |cmd, target| cmd.copy_buffer_objects(&buffer, target, &[copy]))
+    }
+
+    /// Has texels copied for the host, tightly packed, row by row and layer by layer, after everything submitted so far, and does not wait for them.
+    ///
+    /// # Errors
+    /// As [`download_texture`](Self::download_texture).
+    pub fn read_texture_later(&self, texture: TextureHandle, region: &TextureRegion) -> Result<Readback> {
+        let texture = self.shared().store.textures.get(texture)?;
+        let size = texture.resolve_region(region)?.bytes();
+        self.read_later(size, |cmd, target| cmd.copy_texture_objects_to_buffer(&texture, region, target, 0))
+    }
+
+    /// Submits a copy into a new buffer.
+    pub(super) fn read_later(
+        &self,
+        size: u64,
+        record: impl FnOnce(&mut crate::CommandBuffer, &Arc<Buffer>) -> Result<()>,
+    ) -> Result<Readback> {
+        if size == 0 {
+            let submission = SubmitHandle::default();
+            return Ok(Readback { target: None, submission, ctx: self.clone() });
+        }
+        let desc = BufferDesc {
+            size_bytes: size,
+            usage: BufferUsage::empty(),
+            memory: MemoryKind::Readback,
+            data: None,
+            debug_name: "readback",
+        };
+        let target = Arc::new(Buffer::new(&self.shared().gpu, &desc, InternalUsage::NONE)?);
+        let mut cmd = self.acquire_command_buffer()?;
+        record(&mut cmd, &target)?;
+        // Before the submission: should that fail half-way, the GPU may yet write the buffer.
+        self.shared().retire(Garbage::Buffer(Arc::clone(&target)));
+        let submission = self.submit(cmd)?;
+        Ok(Readback { target: Some(target), submission, ctx: self.clone() })
+    }
+}

@@ -1,0 +1,112 @@
+//! How much of each heap of memory there is, may be used and is used.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use ash::vk;
+use gpu_allocator::vulkan::Allocation;
+
+use super::device::Gpu;
+use super::instance::Instance;
+use super::optional::OptionalFeature;
+
+/// The memory of a device, from [`Context::memory_budget`](crate::Context::memory_budget).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MemoryBudget {
+    /// In the order of Vulkan.
+    pub heaps: Vec<MemoryHeap>,
+    /// Whether the driver has told budgets and uses ([`OptionalFeature::MemoryBudget`]); without it the budgets are the
+    /// sizes, and only the objects of this context count as used.
+    pub is_measured: bool,
+}
+
+/// One heap of memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MemoryHeap {
+    /// All of it, in bytes.
+    pub size_bytes: u64,
+    /// What the process may use before allocations fail or slow everything down, in bytes. Other programs change it.
+    pub budget_bytes: u64,
+    /// What the process uses, in bytes: all that the driver has taken for it.
+    pub used_bytes: u64,
+    /// What the buffers and images of this context take of that, in bytes, those included that wait for the GPU to be done
+    /// with them. Where two heaps have memory of the same properties, both count in the first.
+    pub object_bytes: u64,
+    /// Whether it is the GPU's own memory (`VK_MEMORY_HEAP_DEVICE_LOCAL_BIT`).
+    pub device_local: bool,
+}
+
+/// Bytes of objects in each heap.
+pub(super) struct HeapUse {
+    types: Vec<vk::MemoryType>,
+    bytes: [AtomicU64; vk::MAX_MEMORY_HEAPS],
+}
+
+impl HeapUse {
+    /// Nothing yet.
+    pub(super) fn new(instance: &Instance, device: vk::PhysicalDevice) -> Self {
+        // SAFETY: the physical device belongs to the instance.
+        let memory = unsafe { instance.raw.get_physical_device_memory_properties(device) };
+        let types = memory.memory_types_as_slice().to_vec();
+        Self { types, bytes: Default::default() }
+    }
+
+    /// An object was allocated.
+    pub(super) fn add(&self, allocated: &Allocation) {
+        if let Some(heap) = heap_of(&self.types, allocated.memory_properties()) {
+            self.bytes[heap].fetch_add(allocated.size(), Ordering::Relaxed);
+        }
+    }
+
+    /// An object goes.
+    pub(super) fn remove(&self, allocated: &Allocation) {
+        if let Some(heap) = heap_of(&self.types, allocated.memory_properties()) {
+            self.bytes[heap].fetch_sub(allocated.size(), Ordering::Relaxed);
+        }
+    }
+}
+
+impl Gpu {
+    /// Asks the driver (`vkGetPhysicalDeviceMemoryProperties2`).
+    pub(crate) fn memory_budget(&self) -> MemoryBudget {
+        let is_measured = self.caps.has(OptionalFeature::MemoryBudget);
+        let mut told = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
+        let mut properties = vk::PhysicalDeviceMemoryProperties2::default();
+        if is_measured {
+            properties = properties.push_next(&mut told);
+        }
+        // SAFETY: the physical device belongs to the instance, and has what is chained.
+        unsafe { self.instance.raw.get_physical_device_memory_properties2(self.physical(), &mut properties) };
+        let memory = properties.memory_properties;
+        let heaps = memory.memory_heaps_as_slice().iter().enumerate().map(|(place, heap)| {
+            let object_bytes = self.heap_use.bytes[place].load(Ordering::Relaxed);
+            let (budget_bytes, used_bytes) = match is_measured {
+                true => (told.heap_budget[place], told.heap_usage[place]),
+                false => (heap.size, object_bytes),
+            };
+            let device_local = heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL);
+            MemoryHeap { size_bytes: heap.size, budget_bytes, used_bytes, object_bytes, device_local }
+        });
+        MemoryBudget { heaps: heaps.collect(), is_measured }
+    }
+}
+
+/// The heap of memory with these properties: the first, where several have the same.
+fn heap_of(types: &[vk::MemoryType], properties: vk::MemoryPropertyFlags) -> Option<usize> {
+    types.iter().find(|of| of.property_flags == properties).map(|of| of.heap_index as usize)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_heap_is_that_of_the_first_type_with_the_properties() {
+        use vk::MemoryPropertyFlags as Flags;
+        let of = |property_flags, heap_index| vk::MemoryType { property_flags, heap_index };
+        let host = Flags::HOST_VISIBLE | Flags::HOST_COHERENT;
+        let types = [of(Flags::empty(), 1), of(Flags::DEVICE_LOCAL, 0), of(host, 1), of(host, 2)];
+        assert_eq!(heap_of(&types, Flags::DEVICE_LOCAL), Some(0));
+        assert_eq!(heap_of(&types, host), Some(1));
+        assert_eq!(heap_of(&types, Flags::LAZILY_ALLOCATED), None);
+    }
+}

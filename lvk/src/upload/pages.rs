@@ -1,0 +1,262 @@
+//! Which bytes of which page of staging memory are taken, and by whom.
+
+/// A place in a page.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Place {
+    pub(crate) page: usize,
+    /// In the page, in bytes.
+    pub(crate) offset: u64,
+}
+
+/// What the caller has to do for a place.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Found {
+    /// The page is there.
+    Here(Place),
+    /// The page is to be made, with so many bytes.
+    New(Place, u64),
+}
+
+/// Pages that are filled from the front, and emptied once nobody reads any of their bytes.
+///
+/// A place belongs first to who took it; then to a command buffer, by its sequence number; then to nobody.
+#[derive(Debug)]
+pub(crate) struct Pages {
+    /// Bytes of a page, but for those that hold more in one piece.
+    page_bytes: u64,
+    /// Empty pages are kept up to so many bytes of all pages.
+    keep_bytes: u64,
+    /// `None` for numbers that no page has at the moment.
+    pages: Vec<Option<Page>>,
+    /// The page that is being filled.
+    current: Option<usize>,
+    /// Sequence numbers, the page of each, and how many of its places they have.
+    held: Vec<(u64, usize, u32)>,
+    total_bytes: u64,
+}
+
+#[derive(Debug)]
+struct Page {
+    bytes: u64,
+    used: u64,
+    /// Places that somebody has.
+    taken: u32,
+}
+
+impl Pages {
+    pub(crate) fn new(page_bytes: u64, keep_bytes: u64) -> Self {
+        Self { page_bytes, keep_bytes, pages: Vec::new(), current: None, held: Vec::new(), total_bytes: 0 }
+    }
+
+    /// Takes `bytes` whose offset is a multiple of `align`, a power of two.
+    pub(crate) fn take(&mut self, bytes: u64, align: u64) -> Found {
+        let fits = |page: &Page| page.place(bytes, align).map(|offset| (offset, bytes));
+        let current = self.current.and_then(|page| Some((page, fits(self.pages[page].as_ref()?)?)));
+        let empty = || {
+            let numbered = self.pages.iter().enumerate();
+            let mut empty = numbered.filter_map(|(number, page)| Some((number, page.as_ref()?)));
+            empty.find_map(|(number, page)| (page.taken == 0).then(|| Some((number, fits(page)?)))?)
+        };
+        if let Some((number, (offset, _))) = current.or_else(empty) {
+            if let Some(page) = &mut self.pages[number] {
+                page.used = offset + bytes;
+                page.taken += 1;
+            }
+            self.fill_next(number);
+            return Found::Here(Place { page: number, offset });
+        }
+        let size = bytes.max(self.page_bytes);
+        let number = self.pages.iter().position(Option::is_none).unwrap_or(self.pages.len());
+        if number == self.pages.len() {
+            self.pages.push(None);
+        }
+        self.pages[number] = Some(Page { bytes: size, used: bytes, taken: 1 });
+        self.total_bytes += size;
+        self.fill_next(number);
+        Found::New(Place { page: number, offset: 0 }, size)
+    }
+
+    /// The page that has most room left is filled next.
+    fn fill_next(&mut self, number: usize) {
+        let room = |number: usize| self.pages[number].as_ref().map_or(0, |page| page.bytes - page.used);
+        if self.current.is_none_or(|current| room(current) <= room(number)) {
+            self.current = Some(number);
+        }
+    }
+
+    /// `count` places of a page are read by the command buffer `sequence` from now on.
+    pub(crate) fn hold(&mut self, page: usize, count: u32, sequence: u64) {
+        match self.held.last_mut() {
+            Some((last, of, held)) if *last == sequence && *of == page => *held += count,
+            _ => self.held.push((sequence, page, count)),
+        }
+    }
+
+    /// The command buffer is done. Answers the pages that are no longer wanted.
+    pub(crate) fn release(&mut self, sequence: u64) -> Vec<usize> {
+        let mut held = std::mem::take(&mut self.held);
+        let mut unwanted = Vec::new();
+        held.retain(|(of, page, count)| {
+            if *of == sequence {
+                unwanted.extend(self.give_back(*page, *count));
+            }
+            *of != sequence
+        });
+        self.held = held;
+        unwanted
+    }
+
+    /// A page could not be made.
+    pub(crate) fn forget(&mut self, number: usize) {
+        if let Some(page) = self.pages.get_mut(number).and_then(Option::take) {
+            self.total_bytes -= page.bytes;
+            self.current = self.current.filter(|current| *current != number);
+        }
+    }
+
+    /// Gives back `count` places of a page. Answers the page if it is no longer wanted.
+    fn give_back(&mut self, number: usize, count: u32) -> Option<usize> {
+        let page = self.pages.get_mut(number)?.as_mut()?;
+        page.taken -= count;
+        if page.taken > 0 {
+            return None;
+        }
+        page.used = 0;
+        if self.total_bytes <= self.keep_bytes {
+            return None;
+        }
+        self.forget(number);
+        Some(number)
+    }
+
+    /// Bytes of all pages.
+    #[cfg(any(test, feature = "test-hooks"))]
+    pub(crate) fn total_bytes(&self) -> u64 {
+        self.total_bytes
+    }
+}
+
+impl Page {
+    fn place(&self, bytes: u64, align: u64) -> Option<u64> {
+        let offset = self.used.checked_next_multiple_of(align.max(1))?;
+        offset.checked_add(bytes).filter(|end| *end <= self.bytes).map(|_| offset)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[derive(Debug, Clone)]
+    enum Op {
+        Take { bytes: u64, align: u32 },
+        Hold { which: prop::sample::Index, sequence: u64 },
+        GiveBack(prop::sample::Index),
+        Release(u64),
+    }
+
+    fn op() -> impl Strategy<Value = Op> {
+        prop_oneof![
+            5 => (prop_oneof![9 => 0..70_u64, 1 => 100..300_u64], 0..5_u32)
+                .prop_map(|(bytes, align)| Op::Take { bytes, align }),
+            3 => (any::<prop::sample::Index>(), 0..4_u64)
+                .prop_map(|(which, sequence)| Op::Hold { which, sequence }),
+            1 => any::<prop::sample::Index>().prop_map(Op::GiveBack),
+            1 => (0..4_u64).prop_map(Op::Release),
+        ]
+    }
+
+    /// A place that somebody has, and the command buffer if it is one.
+    #[derive(Debug, Clone, Copy)]
+    struct Taken {
+        place: Place,
+        bytes: u64,
+        by: Option<u64>,
+    }
+
+    fn forget(sizes: &mut BTreeMap<usize, u64>, gone: impl IntoIterator<Item = usize>) {
+        gone.into_iter().for_each(|page| assert!(sizes.remove(&page).is_some(), "a page gone twice"));
+    }
+
+    proptest! {
+        #[test]
+        fn places_are_aligned_inside_and_apart_until_they_are_given_back(ops in prop::collection::vec(op(), 0..120)) {
+            let mut pages = Pages::new(100, 250);
+            let mut sizes: BTreeMap<usize, u64> = BTreeMap::new();
+            let mut taken: Vec<Taken> = Vec::new();
+            for op in ops {
+                match op {
+                    Op::Take { bytes, align } => {
+                        let align = 1_u64 << align;
+                        let place = match pages.take(bytes, align) {
+                            Found::Here(place) => place,
+                            Found::New(place, size) => {
+                                prop_assert!(sizes.insert(place.page, size).is_none(), "two pages of one number");
+                                place
+                            }
+                        };
+                        prop_assert_eq!(place.offset % align, 0);
+                        prop_assert!(place.offset + bytes <= sizes[&place.page]);
+                        let apart = |other: &Taken| {
+                            other.place.page != place.page
+                                || other.place.offset + other.bytes <= place.offset
+                                || place.offset + bytes <= other.place.offset
+                        };
+                        prop_assert!(taken.iter().all(apart));
+                        taken.push(Taken { place, bytes, by: None });
+                    }
+                    Op::Hold { which, sequence } => {
+                        let mut free: Vec<_> = taken.iter_mut().filter(|taken| taken.by.is_none()).collect();
+                        if !free.is_empty() {
+                            let place = which.index(free.len());
+                            free[place].by = Some(sequence);
+                            pages.hold(free[place].place.page, 1, sequence);
+                        }
+                    }
+                    Op::GiveBack(which) => {
+                        let free: Vec<_> = (0..taken.len()).filter(|place| taken[*place].by.is_none()).collect();
+                        if !free.is_empty() {
+                            let gone = taken.remove(*which.get(&free));
+                            forget(&mut sizes, pages.give_back(gone.place.page, 1));
+                        }
+                    }
+                    Op::Release(sequence) => {
+                        taken.retain(|taken| taken.by != Some(sequence));
+                        forget(&mut sizes, pages.release(sequence));
+                    }
+                }
+                prop_assert_eq!(pages.total_bytes(), sizes.values().sum::<u64>());
+                prop_assert!(taken.iter().all(|taken| sizes.contains_key(&taken.place.page)));
+            }
+            (0..4).for_each(|sequence| forget(&mut sizes, pages.release(sequence)));
+            for left in taken.iter().filter(|taken| taken.by.is_none()) {
+                forget(&mut sizes, pages.give_back(left.place.page, 1));
+            }
+            prop_assert!(pages.total_bytes() <= 250, "{} bytes are kept", pages.total_bytes());
+        }
+
+        /// What is filled and emptied again and again needs no more than two rounds take.
+        #[test]
+        fn steady_use_takes_no_more_pages(bytes in 1..100_u64, count in 1..20_u64, rounds in 3..60_u64) {
+            let mut pages = Pages::new(100, 0);
+            let mut most = 0;
+            for round in 0..rounds {
+                for _ in 0..count {
+                    let (Found::Here(place) | Found::New(place, _)) = pages.take(bytes, 4);
+                    pages.hold(place.page, 1, round);
+                }
+                if round == 1 {
+                    most = pages.total_bytes() + 100;
+                }
+                if round > 0 {
+                    prop_assert!(round == 1 || pages.total_bytes() <= most);
+                    pages.release(round - 1);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! Uploads that wait for the next submission: where bytes go, as plain values.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::pieces::{Piece, Pieces};
+use super::staging::StagingRegion;
+use crate::barrier::{IdMap, ResourceId, Subresources};
+use crate::resource::region::Region;
+use crate::resource::{Buffer, Texture};
+
+/// Uploads in their order, those of a buffer merged.
+#[derive(Default)]
+pub(crate) struct PendingUploads {
+    pub(crate) buffers: Vec<BufferUploads>,
+    rows: IdMap<usize>,
+    pub(crate) textures: Vec<TextureUpload>,
+    pub(crate) pages: Vec<UsedPage>,
+    bytes: u64,
+}
+
+/// What is to be written to a buffer.
+pub(crate) struct BufferUploads {
+    pub(crate) target: Arc<Buffer>,
+    pub(crate) pieces: Pieces,
+}
+
+/// What is to become of a texture.
+pub(crate) struct TextureUpload {
+    pub(crate) target: Arc<Texture>,
+    /// A region with its bytes; `None` for a new texture without contents, which shaders may read all the same.
+    pub(crate) texels: Option<(Region, StagingRegion)>,
+}
+
+impl BufferUploads {
+    /// Whether the buffer was destroyed, and the GPU is done with it: then nobody else holds it, and nobody can get it.
+    pub(crate) fn is_gone(&self) -> bool {
+        Arc::strong_count(&self.target) == 1
+    }
+}
+
+impl TextureUpload {
+    /// As [`BufferUploads::is_gone`], with all textures of the image. Listed twice it stays, which does no harm.
+    pub(crate) fn is_gone(&self) -> bool {
+        Arc::strong_count(&self.target) == 1 && Arc::strong_count(&self.target.image) == 1
+    }
+}
+
+/// A page of staging memory with how many of its regions are to be read.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct UsedPage {
+    pub(crate) page: usize,
+    pub(crate) raw: vk::Buffer,
+    pub(crate) count: u32,
+}
+
+impl PendingUploads {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.buffers.is_empty() && self.textures.is_empty()
+    }
+
+    /// Staged bytes that wait.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Writes staged bytes to a buffer, over what was to be written there before.
+    pub(crate) fn buffer(&mut self, target: &Arc<Buffer>, offset: u64, bytes: u64, staged: StagingRegion) {
+        let row = *self.rows.entry(target.id).or_insert_with(|| {
+            self.buffers.push(BufferUploads { target: Arc::clone(target), pieces: Pieces::default() });
+            self.buffers.len() - 1
+        });
+        let piece = Piece { target: offset, bytes, page: staged.page, source: staged.offset };
+        self.buffers[row].pieces.write(piece);
+        self.use_page(staged, bytes);
+    }
+
+    /// Writes staged bytes to a region of a texture.
+    pub(crate) fn texture(
+        &mut self,
+        target: Arc<Texture>,
+        region: Region,
+        bytes: u64,
+        staged: StagingRegion,
+    ) {
+        self.textures.push(TextureUpload { target, texels: Some((region, staged)) });
+        self.use_page(staged, bytes);
+    }
+
+    /// Makes a new texture readable.
+    pub(crate) fn fresh_texture(&mut self, target: Arc<Texture>) {
+        self.textures.push(TextureUpload { target, texels: None });
+    }
+
+    fn use_page(&mut self, staged: StagingRegion, bytes: u64) {
+        self.bytes += bytes;
+        match self.pages.iter_mut().rev().find(|used| used.page == staged.page) {
+            Some(used) => used.count += 1,
+            None => self.pages.push(UsedPage { page: staged.page, raw: staged.buffer, count: 1 }),
+        }
+    }
+}
+
+/// Cuts writes of parts of images into rounds, each up to one of the ends, in which no part is written twice.
+pub(crate) fn round_ends(parts: impl IntoIterator<Item = Option<(ResourceId, Subresources)>>) -> Vec<usize> {
+    let mut ends = Vec::new();
+    let mut written: IdMap<Vec<Subresources>> = IdMap::default();
+    let mut count = 0;
+    for (place, part) in parts.into_iter().enumerate() {
+        count = place + 1;
+        let Some((id, part)) = part else { continue };
+        let before = written.entry(id).or_default();
+        if before.iter().any(|other| other.intersection(part).is_some()) {
+            ends.push(place);
+            written.clear();
+            written.insert(id, vec![part]);
+        } else {
+            before.push(part);
+        }
+    }
+    ends.push(count);
+    ends
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn a_round_writes_no_part_twice_and_ends_only_where_it_must(
+            writes in prop::collection::vec(prop::option::of((0..3_u64, 0..4_u32, 1..3_u32, 0..3_u32)), 0..40)
+        ) {
+            let parts: Vec<_> = writes
+                .iter()
+                .map(|write| {
+                    let (id, base_mip, mip_count, base_layer) = (*write)?;
+                    Some((ResourceId(id), Subresources { base_mip, mip_count, base_layer, layer_count: 1 }))
+                })
+                .collect();
+            let overlap = |a: usize, b: usize| match (parts[a], parts[b]) {
+                (Some((a, x)), Some((b, y))) => a == b && x.intersection(y).is_some(),
+                _ => false,
+            };
+            let (mut start, ends) = (0, round_ends(parts.iter().copied()));
+            prop_assert_eq!(ends.last(), Some(&parts.len()));
+            for end in ends {
+                prop_assert!((start..end).all(|a| (start..a).all(|b| !overlap(a, b))));
+                if end < parts.len() {
+                    prop_assert!((start..end).any(|before| overlap(before, end)));
+                }
+                start = end;
+            }
+        }
+    }
+}

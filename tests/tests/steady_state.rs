@@ -1,0 +1,204 @@
+//! The same frame again and again: it takes nothing from the heap for a draw, and no memory grows.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+use lvk::test_hooks::{silent_context, staging_bytes, waiting_objects};
+use lvk::{
+    BufferDesc, BufferHandle, ColorAttachment, ComputePipelineHandle, Context, ContextDesc, Dependencies,
+    Format, Holder, OptionalFeature, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, ShaderStage,
+    TextureDesc, TextureHandle, TextureUsage,
+};
+use lvk_tests::compute::{compute_pipeline, module};
+use lvk_tests::device::vulkan;
+use lvk_tests::{device, device_with};
+
+static COUNT: AtomicU64 = AtomicU64::new(0);
+static BYTES: AtomicI64 = AtomicI64::new(0);
+
+/// The system's allocator, counting.
+struct Counting;
+
+// SAFETY: everything is the system allocator's own.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        COUNT.fetch_add(1, Ordering::Relaxed);
+        BYTES.fetch_add(layout.size() as i64, Ordering::Relaxed);
+        // SAFETY: the caller keeps the contract of `GlobalAlloc`.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        BYTES.fetch_sub(layout.size() as i64, Ordering::Relaxed);
+        // SAFETY: as above.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+/// The heap is counted for all threads: one test at a time.
+static ALONE: Mutex<()> = Mutex::new(());
+
+/// A dispatch that writes an image, and a pass that draws.
+struct Frame {
+    target: Holder<TextureHandle>,
+    image: Holder<TextureHandle>,
+    uploaded: Holder<BufferHandle>,
+    draw: Holder<RenderPipelineHandle>,
+    compute: Holder<ComputePipelineHandle>,
+}
+
+impl Frame {
+    fn new(ctx: &Context) -> Self {
+        let texture = |usage| {
+            let format = Format::Rgba8Unorm;
+            ctx.create_texture(&TextureDesc { format, extent: [8, 8], usage, ..Default::default() }).unwrap()
+        };
+        let vertex = module(
+            ctx,
+            ShaderStage::Vertex,
+            "layout(push_constant) uniform Push { uint words[2]; };
+             void main() { gl_Position = vec4(words[gl_VertexIndex & 1]); }",
+        );
+        let fragment = module(
+            ctx,
+            ShaderStage::Fragment,
+            "layout(location = 0) out vec4 color; void main() { color = vec4(1.0); }",
+        );
+        let color = [Format::Rgba8Unorm.into()];
+        let desc = RenderPipelineDesc {
+            vertex: Some(*vertex),
+            fragment: Some(*fragment),
+            color: &color,
+            ..Default::default()
+        };
+        Self {
+            target: texture(TextureUsage::TARGET | TextureUsage::SAMPLED),
+            image: texture(TextureUsage::STORAGE | TextureUsage::SAMPLED),
+            uploaded: ctx.create_buffer(&BufferDesc { size_bytes: 4096, ..Default::default() }).unwrap(),
+            draw: ctx.create_render_pipeline(&desc).unwrap(),
+            compute: compute_pipeline(
+                ctx,
+                "layout(local_size_x = 8, local_size_y = 8) in;
+                 layout(push_constant) uniform Push { uint words[2]; };
+                 void main() { imageStore(kImages2D[words[0]], ivec2(gl_LocalInvocationID.xy), vec4(1.0)); }",
+            ),
+        }
+    }
+
+    fn run(&self, ctx: &Context, number: u32, draws: u32) {
+        ctx.next_frame().unwrap();
+        let bytes = [number as u8; 256];
+        ctx.upload_buffer(*self.uploaded, u64::from(number % 16) * 256, &bytes).unwrap();
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        cmd.bind_compute_pipeline(*self.compute).unwrap();
+        cmd.push_constants(&[self.image.index(), 0]).unwrap();
+        let images = [*self.image];
+        cmd.dispatch([1, 1, 1], &Dependencies { storage_images: &images, ..Default::default() }).unwrap();
+        let color = [ColorAttachment::clear(*self.target, [0.0; 4])];
+        let read = [*self.uploaded];
+        let dependencies =
+            Dependencies { sampled_images: &images, read_buffers: &read, ..Default::default() };
+        let pass = RenderPassDesc { color: &color, dependencies, ..Default::default() };
+        let mut pass = cmd.begin_rendering(&pass).unwrap();
+        pass.bind_render_pipeline(*self.draw).unwrap();
+        for draw in 0..draws {
+            pass.push_constants(&[number, draw]).unwrap();
+            pass.draw(0..3, 0..1).unwrap();
+        }
+        drop(pass);
+        ctx.submit(cmd).unwrap();
+    }
+
+    fn run_many(&self, ctx: &Context, frames: u32, draws: u32) {
+        (0..frames).for_each(|number| self.run(ctx, number, draws));
+        ctx.wait_idle().unwrap();
+    }
+}
+
+/// Ten thousand frames whose recorded commands do nothing, so that only the library is seen.
+#[test]
+fn draws_take_nothing_from_the_heap_and_frames_leave_nothing_there() {
+    const DRAWS: u32 = 100;
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(vulkan_library) = vulkan() else { return };
+    let ctx = silent_context(&ContextDesc { vulkan_library, ..Default::default() }).unwrap();
+    let frame = Frame::new(&ctx);
+    let allocations = |frames, draws| {
+        let before = COUNT.load(Ordering::Relaxed);
+        frame.run_many(&ctx, frames, draws);
+        COUNT.load(Ordering::Relaxed) - before
+    };
+    allocations(200, DRAWS);
+    let bytes = BYTES.load(Ordering::Relaxed);
+    let (full, empty) = (allocations(1_000, DRAWS), allocations(1_000, 0));
+    // Lists grow now and then, as frames end when they end; a draw that allocates would make it a hundred thousand.
+    assert!(full.abs_diff(empty) < 100, "{full} with draws, {empty} without");
+    let (objects, staging) = (ctx.memory_budget(), staging_bytes(&ctx));
+    frame.run_many(&ctx, 8_000, 10);
+    let grown = BYTES.load(Ordering::Relaxed) - bytes;
+    assert!(grown.abs() < 4_096, "{grown} bytes of the heap were kept by 10,000 frames");
+    let object_bytes = |budget: &lvk::MemoryBudget| -> Vec<u64> {
+        budget.heaps.iter().map(|heap| heap.object_bytes).collect()
+    };
+    assert_eq!(object_bytes(&ctx.memory_budget()), object_bytes(&objects));
+    assert_eq!((staging_bytes(&ctx), waiting_objects(&ctx).unwrap()), (staging, 0));
+}
+
+#[test]
+fn frames_that_create_and_destroy_keep_no_memory() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(ctx) = device() else { return };
+    let frame = Frame::new(&ctx);
+    let run = |frames: u32| {
+        for number in 0..frames {
+            let data = [number; 300];
+            let data = Some(bytemuck::cast_slice(&data));
+            let buffer = ctx.create_buffer(&BufferDesc { data, ..Default::default() }).unwrap();
+            let desc = TextureDesc { extent: [32, 32], ..Default::default() };
+            let texture = ctx.create_texture(&desc).unwrap();
+            frame.run(&ctx, number, 2);
+            drop((buffer, texture));
+        }
+        ctx.wait_idle().unwrap();
+        assert_eq!(waiting_objects(&ctx).unwrap(), 0);
+        (ctx.memory_budget(), staging_bytes(&ctx))
+    };
+    let (early, late) = (run(40), run(160));
+    let bytes =
+        |budget: &lvk::MemoryBudget| budget.heaps.iter().map(|heap| heap.object_bytes).collect::<Vec<_>>();
+    assert_eq!(bytes(&early.0), bytes(&late.0));
+    assert_eq!(early.1, late.1);
+}
+
+#[test]
+fn the_memory_of_objects_is_counted_in_their_heap_until_they_are_gone() {
+    const SIZE: u64 = 3 << 20;
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let profile = lvk::DeviceProfile::core_only();
+    for hidden in [false, true] {
+        let Some(ctx) = device_with(|desc| desc.profile = hidden.then_some(&profile)) else { return };
+        let total = || ctx.memory_budget().heaps.iter().map(|heap| heap.object_bytes).sum::<u64>();
+        ctx.wait_idle().unwrap();
+        let before = total();
+        assert!(before > 0, "the library itself has buffers");
+        let buffer = ctx.create_buffer(&BufferDesc { size_bytes: SIZE, ..Default::default() }).unwrap();
+        assert!((SIZE..SIZE + 4096).contains(&(total() - before)), "{} of {SIZE}", total() - before);
+        let budget = ctx.memory_budget();
+        assert_eq!(budget.is_measured, ctx.capabilities().has(OptionalFeature::MemoryBudget));
+        assert!(!(hidden && budget.is_measured), "the profile hides the feature");
+        assert!(budget.heaps.iter().any(|heap| heap.device_local));
+        for heap in &budget.heaps {
+            assert!(heap.size_bytes > 0 && heap.object_bytes <= heap.size_bytes, "{heap:?}");
+            assert!(heap.budget_bytes > 0, "{heap:?}");
+            assert!(budget.is_measured || heap.used_bytes == heap.object_bytes, "{heap:?}");
+        }
+        drop(buffer);
+        ctx.wait_idle().unwrap();
+        assert_eq!(total(), before);
+    }
+}
