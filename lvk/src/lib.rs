@@ -58,7 +58,7 @@
 //! | submit, wait, keep frames apart | [`Context::submit`], [`Context::wait`], [`Context::next_frame`] |
 //! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
 //! | find what is wrong | [`manual::debugging`], [`Validation`], [`ValidationSink`] |
-//! | mix in Vulkan calls of your own | `Context::raw_*`, [`CommandBuffer::raw`] |
+//! | mix in Vulkan calls of your own, or live on another engine's device | [`manual::interop`] |
 //!
 //! # Barriers
 //!
@@ -136,6 +136,7 @@ pub use context::config::ContextDesc;
 pub use context::destroy::Destroy;
 pub use context::frame::Frame;
 pub use context::holder::Holder;
+pub use context::import::{ImportedBuffer, ImportedTexture, RawSignal, RawWait};
 pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
 pub use error::{Error, Result};
@@ -146,6 +147,7 @@ pub use gpu::clock::ClockPair;
 pub use gpu::debug::{Validation, ValidationMessage, ValidationSink};
 pub use gpu::extra::ExtraExtensions;
 pub use gpu::fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
+pub use gpu::foreign::RawContext;
 pub use gpu::memory::MemoryKind;
 pub use gpu::mesh_limits::MeshLimits;
 pub use gpu::optional::{FeatureSet, OptionalFeature};

@@ -77,6 +77,12 @@ impl State {
         Self { write: Scope::waiting(stages), ..Self::default() }
     }
 
+    /// Image of somebody else's, for whom a semaphore is waited for at any stage.
+    pub(crate) fn imported(layout: Layout) -> Self {
+        let stages = Stages::all() - Stages::HOST - Stages::SHADING_RATE;
+        Self { layout, write: Scope::waiting(stages), ..Self::default() }
+    }
+
     /// Layout after the last use.
     pub(crate) fn layout(&self) -> Layout {
         self.layout

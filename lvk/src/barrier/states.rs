@@ -47,6 +47,12 @@ impl States {
         self.textures.insert(id, Cells::new(shape, State::acquired(stages)));
     }
 
+    /// An image comes from somebody else, in this layout. Whatever the next submission waits for, the first barrier starts
+    /// there.
+    pub(crate) fn imported(&mut self, id: ResourceId, shape: TextureShape, layout: Layout) {
+        self.textures.insert(id, Cells::new(shape, State::imported(layout)));
+    }
+
     /// Drops what is known about a destroyed resource.
     pub(crate) fn forget(&mut self, id: ResourceId) {
         self.buffers.remove(&id);

@@ -60,7 +60,11 @@ impl Context {
             extra: desc.extra,
             debug_names: desc.debug_names,
         };
-        let gpu = Arc::new(Gpu::new(instance, &request)?);
+        Self::on(Arc::new(Gpu::new(instance, &request)?), desc)
+    }
+
+    /// Of `desc` what does not belong to the making of devices.
+    pub(super) fn on(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Self> {
         let shared = Arc::new(new_shared(gpu, desc)?);
         let inner = Inner {
             pending: lock::Mutex::new(Rank::Pending, Pending::default()),

@@ -1,9 +1,12 @@
 //! Hands command buffers to the GPU and waits for them.
 
+use ash::vk;
+
 use super::Context;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::submit::SubmitHandle;
+use crate::submit::queue::Submission;
 
 impl Context {
     /// Starts recording a command buffer. Any number may be recorded at once, on any threads.
@@ -20,6 +23,16 @@ impl Context {
     /// was written and not reset. A failure of Vulkan itself leaves
     /// the context without a known state: this and every later submission answers it, and a new context is needed.
     pub fn submit(&self, cmd: CommandBuffer) -> Result<SubmitHandle> {
+        self.submit_between(cmd, Vec::new(), Vec::new())
+    }
+
+    /// Submits between semaphores of somebody else's.
+    pub(super) fn submit_between(
+        &self,
+        cmd: CommandBuffer,
+        waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
+        signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
+    ) -> Result<SubmitHandle> {
         if !cmd.belongs_to(self.shared()) {
             return Err(Error::usage("submit", "the command buffer belongs to another context"));
         }
@@ -32,13 +45,19 @@ impl Context {
             self.open(&mut pending)?;
         }
         let before = self.take_pending(&mut pending)?;
-        self.send(before.into_iter().chain([cmd]))
+        self.send(before.into_iter().chain([cmd]), waits, signals)
     }
 
-    fn send(&self, commands: impl Iterator<Item = CommandBuffer>) -> Result<SubmitHandle> {
+    fn send(
+        &self,
+        commands: impl Iterator<Item = CommandBuffer>,
+        waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
+        signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
+    ) -> Result<SubmitHandle> {
         let (recordings, mut outcomes): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
         let shared = self.shared();
-        let value = shared.submitter.submit(recordings.into(), || shared.bindless.flush())?;
+        let value =
+            shared.submitter.submit(Submission { recordings, waits, signals }, || shared.bindless.flush())?;
         let scopes = outcomes.iter_mut().filter_map(|outcome| outcome.scopes.take());
         shared.profiler.submit(value, scopes.map(|scopes| *scopes).collect());
         outcomes.into_iter().for_each(|outcome| outcome.submit(shared, value));
@@ -51,7 +70,7 @@ impl Context {
         self.advance_compactions();
         let mut pending = self.pending();
         let Some(cmd) = self.take_pending(&mut pending)? else { return Ok(self.last_submission()) };
-        self.send([cmd].into_iter())
+        self.send([cmd].into_iter(), Vec::new(), Vec::new())
     }
 
     /// Waits until a submission is done (`vkWaitSemaphores`).

@@ -12,6 +12,7 @@ use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
 use super::clock::HostClock;
 use super::extra::ExtraExtensions;
 use super::features::Features;
+use super::foreign::RawContext;
 use super::instance::Instance;
 use super::naming;
 use super::optional::{OF_WINDOWS, OptionalFeature};
@@ -61,8 +62,21 @@ pub(crate) struct Gpu {
     allocator: Mutex<Option<Allocator>>,
     pub(super) heap_use: HeapUse,
     queue: Mutex<vk::Queue>,
+    /// Somebody else made the device, and destroys it.
+    is_foreign: bool,
     /// Declared last: destroyed after the device.
     pub(crate) instance: Instance,
+}
+
+/// What was made, or given.
+struct Made {
+    device: ash::Device,
+    caps: Capabilities,
+    features: Features,
+    allocator: Allocator,
+    queue: vk::Queue,
+    queue_family: u32,
+    is_foreign: bool,
 }
 
 impl Gpu {
@@ -80,32 +94,69 @@ impl Gpu {
         };
         // SAFETY: the device was created with one queue of this family.
         let queue = unsafe { device.get_device_queue(queue_family, 0) };
+        let made = Made { device, caps, features, allocator, queue, queue_family, is_foreign: false };
+        let mut gpu = Self::of(instance, chosen.raw, made, request.debug_names);
+        gpu.profile = request.profile.cloned().unwrap_or_default();
+        gpu.extra_capabilities = request.extra.capabilities().to_vec();
+        Ok(gpu)
+    }
+
+    /// On a device of somebody else's.
+    ///
+    /// # Safety
+    /// As of [`Context::from_raw`](crate::Context::from_raw).
+    pub(crate) unsafe fn from_raw(
+        raw: RawContext<'_>,
+        pipeline: FeatureRequest,
+        query: RayQueryRequest,
+        debug_names: Option<bool>,
+    ) -> Result<Self> {
+        let chosen = raw.physical()?;
+        let mut caps = chosen.capabilities.clone();
+        caps.choose_ray_tracing(pipeline, query);
+        let instance = Instance::foreign(raw.entry, raw.instance, raw.instance_extensions);
+        let features = enabled(&instance, &chosen, &caps);
+        let made = Made {
+            allocator: new_allocator(&instance, &raw.device, chosen.raw)?,
+            device: raw.device,
+            caps,
+            features,
+            queue: raw.queue,
+            queue_family: raw.queue_family,
+            is_foreign: true,
+        };
+        Ok(Self::of(instance, chosen.raw, made, debug_names))
+    }
+
+    fn of(instance: Instance, physical: vk::PhysicalDevice, made: Made, debug_names: Option<bool>) -> Self {
+        let Made { device, caps, features, allocator, queue, queue_family, is_foreign } = made;
         let raw = &instance.raw;
         let structures = caps.hardware_structures();
-        Ok(Self {
+        Self {
             queue_family,
             accel: structures.then(|| ash::khr::acceleration_structure::Device::new(raw, &device)),
             ray_tracing: caps
                 .ray_tracing_pipeline
                 .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
             mesh: caps.mesh_shader.then(|| ash::ext::mesh_shader::Device::new(raw, &device)),
-            host_clock: HostClock::new(&instance, &device, chosen.raw, features.calibration),
-            debug_utils: naming::is_wanted(&instance, chosen.raw, request.debug_names)
+            host_clock: HostClock::new(&instance, &device, physical, features.calibration),
+            debug_utils: naming::is_wanted(&instance, physical, debug_names)
                 .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             device_fault: (features.ext.fault.device_fault == vk::TRUE)
                 .then(|| ash::ext::device_fault::Device::new(raw, &device)),
             allocator: Mutex::new(Rank::Allocator, Some(allocator)),
-            heap_use: HeapUse::new(&instance, chosen.raw),
+            heap_use: HeapUse::new(&instance, physical),
             queue: Mutex::new(Rank::Queue, queue),
             custom_borders: AtomicU32::new(0),
-            physical: chosen.raw,
+            physical,
             device,
             caps,
             features,
-            profile: request.profile.cloned().unwrap_or_default(),
-            extra_capabilities: request.extra.capabilities().to_vec(),
+            profile: DeviceProfile::default(),
+            extra_capabilities: Vec::new(),
+            is_foreign,
             instance,
-        })
+        }
     }
 
     /// The queue; Vulkan wants one thread at a time on it.
@@ -224,6 +275,9 @@ impl Gpu {
 impl Drop for Gpu {
     fn drop(&mut self) {
         self.allocator().take();
+        if self.is_foreign {
+            return;
+        }
         // SAFETY: everything made from the device is gone: the context destroys its objects before its `Gpu`.
         unsafe { self.device.destroy_device(None) };
     }

@@ -20,6 +20,8 @@ pub(crate) struct Instance {
     /// Shaders are instrumented by the validation layer.
     pub(crate) gpu_assisted: bool,
     messenger: Messenger,
+    /// Somebody else made the instance, and destroys it.
+    is_foreign: bool,
 }
 
 /// What an instance is made with.
@@ -51,7 +53,20 @@ impl Instance {
         }
         let gpu_assisted = desc.validation == Validation::GpuAssisted;
         let (debug_utils, validated) = (extensions.debug_utils, layer.is_some());
-        Ok(Self { entry, raw, debug_utils, validated, gpu_assisted, messenger })
+        Ok(Self { entry, raw, debug_utils, validated, gpu_assisted, messenger, is_foreign: false })
+    }
+
+    /// Of somebody else's.
+    pub(super) fn foreign(entry: ash::Entry, raw: ash::Instance, extensions: &[&CStr]) -> Self {
+        Self {
+            entry,
+            raw,
+            debug_utils: extensions.contains(&ash::ext::debug_utils::NAME),
+            validated: false,
+            gpu_assisted: false,
+            messenger: Messenger::new(ValidationSink::default()),
+            is_foreign: true,
+        }
     }
 
     /// The messages of the validation layer.
@@ -70,6 +85,9 @@ impl Instance {
 impl Drop for Instance {
     fn drop(&mut self) {
         self.messenger.remove();
+        if self.is_foreign {
+            return;
+        }
         // SAFETY: the device is destroyed before, as `Gpu` declares it first.
         unsafe { self.raw.destroy_instance(None) };
     }

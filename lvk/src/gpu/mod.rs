@@ -9,6 +9,7 @@ pub(crate) mod extensions;
 pub(crate) mod extra;
 pub(crate) mod fault;
 pub(crate) mod features;
+pub(crate) mod foreign;
 pub(crate) mod format_features;
 pub(crate) mod instance;
 pub(crate) mod memory;

@@ -24,5 +24,8 @@ pub mod shaders {}
 #[doc = include_str!("debugging.md")]
 pub mod debugging {}
 
+#[doc = include_str!("interop.md")]
+pub mod interop {}
+
 #[doc = include_str!("measuring.md")]
 pub mod measuring {}

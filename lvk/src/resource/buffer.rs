@@ -66,6 +66,8 @@ pub(crate) struct Buffer {
     pub(crate) memory: MemoryKind,
     pub(crate) name: String,
     allocation: Option<Allocation>,
+    /// Somebody else made it, and destroys it.
+    is_foreign: bool,
     /// Held while the host copies to or from the mapping, so that threads do not race for the same bytes.
     copying: Mutex<()>,
     gpu: Arc<Gpu>,
@@ -113,12 +115,42 @@ impl Buffer {
             memory: desc.memory,
             name: name.to_owned(),
             allocation: None,
+            is_foreign: false,
             copying: Mutex::new(()),
             gpu: Arc::clone(gpu),
         };
         buffer.bind_memory(internal.alignment)?;
         gpu.name(raw, name);
         Ok(buffer)
+    }
+
+    /// A buffer of somebody else's.
+    ///
+    /// # Safety
+    /// It is as described, has memory and an address, and outlives what is made of it.
+    pub(crate) unsafe fn import(
+        gpu: &Arc<Gpu>,
+        raw: vk::Buffer,
+        size_bytes: u64,
+        usage: BufferUsage,
+        name: &str,
+    ) -> Self {
+        let info = vk::BufferDeviceAddressInfo::default().buffer(raw);
+        // SAFETY: by the caller.
+        let address = unsafe { gpu.device.get_buffer_device_address(&info) };
+        Self {
+            raw,
+            id: ResourceId::next(),
+            size_bytes,
+            address,
+            usage,
+            memory: MemoryKind::Device,
+            name: name.to_owned(),
+            allocation: None,
+            is_foreign: true,
+            copying: Mutex::new(()),
+            gpu: Arc::clone(gpu),
+        }
     }
 
     fn bind_memory(&mut self, alignment: u64) -> Result<()> {
@@ -203,6 +235,9 @@ impl Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
+        if self.is_foreign {
+            return;
+        }
         // SAFETY: the owner has waited until the GPU is done with the buffer.
         unsafe { self.gpu.device.destroy_buffer(self.raw, None) };
         if let Some(allocation) = self.allocation.take() {

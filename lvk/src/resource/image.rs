@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use ash::vk;
 use gpu_allocator::vulkan::Allocation;
 
-use super::image_check::check;
+use super::image_check::{ImagePlan, check};
 use super::texture_desc::{TextureDesc, TextureUsage};
 use crate::barrier::{ResourceId, Subresources, TextureShape};
 use crate::error::{Error, Result};
@@ -36,6 +36,8 @@ pub(crate) struct Image {
     /// Textures with a handle, or waiting to be destroyed, that show the image.
     handles: AtomicU32,
     allocation: Option<Allocation>,
+    /// Somebody else made it, and destroys it.
+    is_foreign: bool,
     gpu: Arc<Gpu>,
 }
 
@@ -67,7 +69,25 @@ impl Image {
         }
         // SAFETY: the description is checked against the limits of its format.
         let raw = unsafe { gpu.device.create_image(&info, None) }.map_err(Error::vulkan("vkCreateImage"))?;
-        let mut image = Self {
+        let mut image = Self::of(gpu, desc, &plan, raw, false);
+        image.bind_memory(desc.debug_name)?;
+        gpu.name(raw, desc.debug_name);
+        Ok(image)
+    }
+
+    /// An image of somebody else's, which is as described, for one texture.
+    pub(crate) fn import(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, raw: vk::Image) -> Result<Self> {
+        Ok(Self::of(gpu, desc, &check(gpu, desc)?, raw, true))
+    }
+
+    fn of(
+        gpu: &Arc<Gpu>,
+        desc: &TextureDesc<'_>,
+        plan: &ImagePlan,
+        raw: vk::Image,
+        is_foreign: bool,
+    ) -> Self {
+        Self {
             raw,
             id: ResourceId::next(),
             format: desc.format,
@@ -81,11 +101,9 @@ impl Image {
             cube_compatible: plan.flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE),
             handles: AtomicU32::new(1),
             allocation: None,
+            is_foreign,
             gpu: Arc::clone(gpu),
-        };
-        image.bind_memory(desc.debug_name)?;
-        gpu.name(raw, desc.debug_name);
-        Ok(image)
+        }
     }
 
     fn bind_memory(&mut self, name: &str) -> Result<()> {
@@ -138,6 +156,9 @@ impl Image {
 
 impl Drop for Image {
     fn drop(&mut self) {
+        if self.is_foreign {
+            return;
+        }
         // SAFETY: the owners have waited until the GPU is done with the image, and their views are gone.
         unsafe { self.gpu.device.destroy_image(self.raw, None) };
         if let Some(allocation) = self.allocation.take() {

@@ -37,8 +37,16 @@ pub(crate) struct Texture {
 impl Texture {
     /// A texture with an image of its own.
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, slot: u32) -> Result<Self> {
-        let image = Arc::new(Image::new(gpu, desc)?);
-        Ok(Self {
+        Ok(Self::of(gpu, desc, Image::new(gpu, desc)?, slot))
+    }
+
+    /// A texture with an image of somebody else's, which is as described.
+    pub(crate) fn import(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, raw: vk::Image, slot: u32) -> Result<Self> {
+        Ok(Self::of(gpu, desc, Image::import(gpu, desc, raw)?, slot))
+    }
+
+    fn of(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, image: Image, slot: u32) -> Self {
+        Self {
             views: ViewCache::new(gpu),
             kind: desc.kind,
             format: desc.format,
@@ -49,8 +57,8 @@ impl Texture {
             name: desc.debug_name.to_owned(),
             aspect: Aspect::Main,
             swizzle: desc.swizzle,
-            image,
-        })
+            image: Arc::new(image),
+        }
     }
 
     /// A texture that shows part of this one. The caller has the image [shared](Image::share) before it is used.

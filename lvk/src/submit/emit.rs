@@ -142,6 +142,16 @@ fn set_bits<T: Copy>(bits: u32, table: &[T]) -> impl Iterator<Item = T> {
     })
 }
 
+/// The layout of this name in Vulkan, where it can be that of an image of somebody else's.
+pub(crate) fn known_layout(raw: vk::ImageLayout) -> Result<Layout, String> {
+    use Layout::{ColorTarget, DepthTarget, General, ShaderRead, TransferDst, TransferSrc, Undefined};
+    let all = [Undefined, General, ShaderRead, ColorTarget, DepthTarget, TransferSrc, TransferDst];
+    all.into_iter().find(|known| layout(*known) == raw).ok_or_else(|| {
+        let names: Vec<_> = all.into_iter().map(|known| format!("{:?}", layout(known))).collect();
+        format!("the layout {raw:?} cannot be exchanged; take one of {}", names.join(", "))
+    })
+}
+
 /// A layout by its Vulkan name.
 pub(crate) fn layout(layout: Layout) -> vk::ImageLayout {
     match layout {

@@ -9,7 +9,7 @@ use super::deferred::Deferred;
 use super::emit::{Images, emit, stages};
 use super::presentable::Presentables;
 use super::timeline::Timeline;
-use crate::barrier::{Barriers, ResourceId, States, Tracker};
+use crate::barrier::{Barriers, Layout, ResourceId, States, TextureShape, Tracker};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::lock::{Guard, Mutex, Rank};
@@ -234,6 +234,11 @@ impl<T> Submitter<T> {
     #[allow(dead_code, reason = "swapchains come next")]
     pub(crate) fn with_presentables<R>(&self, change: impl FnOnce(&mut Presentables) -> R) -> R {
         change(&mut self.lock().presentables)
+    }
+
+    /// An image of somebody else's is in this layout now.
+    pub(crate) fn import_texture(&self, id: ResourceId, shape: TextureShape, layout: Layout) {
+        self.lock().states.imported(id, shape, layout);
     }
 
     /// Forgets the state of a destroyed resource.

@@ -20,6 +20,13 @@ pub struct SubmitHandle {
     pub(crate) context: u64,
 }
 
+impl SubmitHandle {
+    /// The value that [`Context::raw_timeline`](crate::Context::raw_timeline) reaches when the submission is done.
+    pub fn raw_value(self) -> u64 {
+        self.value
+    }
+}
+
 /// A timeline semaphore with the last value seen.
 pub(crate) struct Timeline {
     pub(crate) raw: vk::Semaphore,

@@ -3,6 +3,7 @@
 mod blit;
 mod buffer;
 mod clear;
+mod hand_over;
 mod resolve;
 mod settle;
 mod texture;

@@ -1,0 +1,33 @@
+//! Gives textures to others in the layout they want.
+
+use ash::vk;
+
+use crate::barrier::Use;
+use crate::command::CommandBuffer;
+use crate::error::{Error, Result};
+use crate::handle::TextureHandle;
+use crate::submit::emit::known_layout;
+
+impl CommandBuffer {
+    /// Brings all of a texture into a layout that others want it in, after everything recorded so far
+    /// (`vkCmdPipelineBarrier2`). The layouts are those of [`ImportedTexture::layout`](crate::ImportedTexture), without
+    /// `UNDEFINED`.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) for another layout.
+    pub fn hand_over_texture(&mut self, texture: TextureHandle, layout: vk::ImageLayout) -> Result<()> {
+        let texture = self.shared.store.textures.get(texture)?;
+        let known = known_layout(layout).map_err(|why| Error::usage(&texture.name, why))?;
+        if layout == vk::ImageLayout::UNDEFINED {
+            return Err(Error::usage(
+                &texture.name,
+                "nobody can be handed a texture in the layout UNDEFINED",
+            ));
+        }
+        // What copies touched is otherwise made readable by shaders later.
+        self.settle();
+        self.use_texture(&texture, texture.range, Use::transfer_read().with_layout(known))?;
+        self.flush();
+        Ok(())
+    }
+}

@@ -1,0 +1,110 @@
+//! A device that somebody else has made.
+
+use std::ffi::CStr;
+
+use ash::vk;
+
+use super::caps::PhysicalDevice;
+use super::optional::{FeatureSet, OptionalFeature};
+use crate::error::{Error, Result};
+
+/// An instance, a device and a queue of the caller's own, and what was turned on when they were made.
+#[derive(Clone)]
+pub struct RawContext<'a> {
+    /// The loader's entry points.
+    pub entry: ash::Entry,
+    /// The instance, of version 1.3 or later.
+    pub instance: ash::Instance,
+    /// Extensions that the instance was made with.
+    pub instance_extensions: &'a [&'a CStr],
+    /// The physical device.
+    pub physical_device: vk::PhysicalDevice,
+    /// The device.
+    pub device: ash::Device,
+    /// Extensions that the device was made with.
+    pub device_extensions: &'a [&'a CStr],
+    /// Features that are on, beside those that every context needs.
+    pub features: FeatureSet,
+    /// `accelerationStructure`, its `descriptorBindingAccelerationStructureUpdateAfterBind`, and `rayTracingPipeline` are on.
+    pub ray_tracing_pipeline: bool,
+    /// `accelerationStructure`, its `descriptorBindingAccelerationStructureUpdateAfterBind`, and `rayQuery` are on.
+    pub ray_query: bool,
+    /// `taskShader` and `meshShader` are on.
+    pub mesh_shader: bool,
+    /// A queue for graphics and compute.
+    pub queue: vk::Queue,
+    /// Its family.
+    pub queue_family: u32,
+}
+
+impl RawContext<'_> {
+    /// What the device can do as far as was told; fails where that cannot be true.
+    pub(super) fn physical(&self) -> Result<PhysicalDevice> {
+        let mut found = PhysicalDevice::query(&self.instance, self.physical_device)?;
+        if !found.missing.is_empty() {
+            let name = &found.capabilities.device_name;
+            return Err(Error::NoDevice { reasons: format!("{name}: {}", found.missing.join(", ")) });
+        }
+        self.check_queue()?;
+        self.check_features(&found)?;
+        let caps = &mut found.capabilities;
+        caps.mesh_shader &= self.mesh_shader;
+        caps.position_fetch = false;
+        caps.pipeline_libraries &= self.has(ash::khr::pipeline_library::NAME);
+        caps.limit_ray_tracing(self.ray_tracing_pipeline, self.ray_query);
+        caps.hide(FeatureSet::ALL.without(self.features));
+        found.queue_family = Some(self.queue_family);
+        Ok(found)
+    }
+
+    pub(super) fn has(&self, extension: &CStr) -> bool {
+        self.device_extensions.contains(&extension)
+    }
+
+    fn check_queue(&self) -> Result<()> {
+        // SAFETY: the physical device belongs to the instance, by the caller.
+        let families =
+            unsafe { self.instance.get_physical_device_queue_family_properties(self.physical_device) };
+        let needed = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+        match families.get(self.queue_family as usize) {
+            Some(family) if family.queue_flags.contains(needed) => Ok(()),
+            Some(_) => Err(wrong(format!("family {} has no graphics or no compute", self.queue_family))),
+            None => Err(wrong(format!("the device has no queue family {}", self.queue_family))),
+        }
+    }
+
+    /// Features need the device, their extensions, and what they build on.
+    fn check_features(&self, found: &PhysicalDevice) -> Result<()> {
+        let known: FeatureSet =
+            OptionalFeature::all().filter(|feature| self.features.contains(*feature)).collect();
+        let absent = known.without(found.capabilities.optional);
+        if let Some(feature) = absent.iter().next() {
+            let name = feature.vulkan_name();
+            return Err(wrong(format!("feature {name} cannot be on: the device does not have it")));
+        }
+        let mut extensions: Vec<&CStr> = known.extensions().collect();
+        if self.ray_tracing_pipeline || self.ray_query {
+            extensions
+                .extend([ash::khr::acceleration_structure::NAME, ash::khr::deferred_host_operations::NAME]);
+        }
+        let flags = [
+            (self.ray_tracing_pipeline, ash::khr::ray_tracing_pipeline::NAME),
+            (self.ray_query, ash::khr::ray_query::NAME),
+            (self.mesh_shader, ash::ext::mesh_shader::NAME),
+        ];
+        extensions.extend(flags.iter().filter(|(on, _)| *on).map(|(_, name)| *name));
+        match extensions.into_iter().find(|name| !self.has(name)) {
+            Some(name) => {
+                let name = name.to_string_lossy();
+                Err(wrong(format!(
+                    "a feature is said to be on whose extension {name} is not among device_extensions"
+                )))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+fn wrong(message: String) -> Error {
+    Error::usage("from_raw", message)
+}

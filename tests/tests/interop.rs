@@ -1,0 +1,469 @@
+//! The library inside of another engine: a device made by hand, whose images, buffers and semaphores go both ways, and of
+//! which nothing is destroyed.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::ffi::{CStr, c_void};
+use std::sync::Mutex;
+
+use lvk::ash::{self, vk};
+use lvk::{
+    BufferUsage, Context, ContextDesc, Dependencies, Error, FeatureSet, Format, ImportedBuffer,
+    ImportedTexture, OptionalFeature, RawContext, RawSignal, RawWait, TextureDesc, TextureUsage,
+};
+use lvk_tests::compute::compute_pipeline;
+use lvk_tests::device::vulkan;
+
+const SIDE: u32 = 4;
+const BYTES: u64 = (SIDE * SIDE * 4) as u64;
+const ALL: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::ALL_COMMANDS;
+
+/// What the layer said in this process.
+static MESSAGES: Mutex<Vec<String>> = Mutex::new(Vec::new());
+
+unsafe extern "system" fn on_message(
+    _: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    _: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: Vulkan gives a valid structure with a text.
+    let text = unsafe { CStr::from_ptr((*data).p_message) }.to_string_lossy().into_owned();
+    if !text.contains("vkGetDeviceProcAddr") && !text.contains("Setting") {
+        MESSAGES.lock().unwrap().push(text);
+    }
+    vk::FALSE
+}
+
+/// An engine that knows nothing of the library.
+struct Engine {
+    entry: ash::Entry,
+    instance: ash::Instance,
+    messenger: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    physical: vk::PhysicalDevice,
+    device: ash::Device,
+    queue: vk::Queue,
+    pool: vk::CommandPool,
+}
+
+impl Engine {
+    /// `None`, loudly, without a driver.
+    fn new() -> Option<Self> {
+        let library = vulkan()?;
+        // SAFETY: plain Vulkan by the book, as the layer confirms.
+        unsafe {
+            let entry = match library {
+                Some(path) => ash::Entry::load_from(path).unwrap(),
+                None => ash::Entry::load().unwrap(),
+            };
+            let validated = std::env::var("LVK_TEST_VALIDATION").as_deref() != Ok("off");
+            let layers = [c"VK_LAYER_KHRONOS_validation".as_ptr()];
+            let extensions = [ash::ext::debug_utils::NAME.as_ptr()];
+            let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+            let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+            let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+            let mut info = vk::InstanceCreateInfo::default().application_info(&application);
+            if validated {
+                info = info
+                    .enabled_layer_names(&layers)
+                    .enabled_extension_names(&extensions)
+                    .push_next(&mut features);
+            }
+            let instance = entry.create_instance(&info, None).unwrap();
+            let messenger = validated.then(|| {
+                let ext = ash::ext::debug_utils::Instance::new(&entry, &instance);
+                let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
+                    .message_severity(
+                        vk::DebugUtilsMessageSeverityFlagsEXT::ERROR
+                            | vk::DebugUtilsMessageSeverityFlagsEXT::WARNING,
+                    )
+                    .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
+                    .pfn_user_callback(Some(on_message));
+                let raw = ext.create_debug_utils_messenger(&info, None).unwrap();
+                (ext, raw)
+            });
+            let physical = instance.enumerate_physical_devices().unwrap()[0];
+            let mut v11 = vk::PhysicalDeviceVulkan11Features::default();
+            let mut v12 = vk::PhysicalDeviceVulkan12Features::default();
+            let mut v13 = vk::PhysicalDeviceVulkan13Features::default();
+            let mut all = vk::PhysicalDeviceFeatures2::default()
+                .push_next(&mut v11)
+                .push_next(&mut v12)
+                .push_next(&mut v13);
+            instance.get_physical_device_features2(physical, &mut all);
+            let queue = vk::DeviceQueueCreateInfo::default().queue_family_index(0).queue_priorities(&[1.0]);
+            let info = vk::DeviceCreateInfo::default()
+                .queue_create_infos(std::slice::from_ref(&queue))
+                .push_next(&mut all);
+            let device = instance.create_device(physical, &info, None).unwrap();
+            let queue = device.get_device_queue(0, 0);
+            let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).unwrap();
+            Some(Self { entry, instance, messenger, physical, device, queue, pool })
+        }
+    }
+
+    fn raw(&self) -> RawContext<'_> {
+        const DEBUG: [&CStr; 1] = [ash::ext::debug_utils::NAME];
+        RawContext {
+            entry: self.entry.clone(),
+            instance: self.instance.clone(),
+            instance_extensions: if self.messenger.is_some() { &DEBUG } else { &[] },
+            physical_device: self.physical,
+            device: self.device.clone(),
+            device_extensions: &[],
+            features: FeatureSet::NONE.with(OptionalFeature::FullDrawIndex),
+            ray_tracing_pipeline: false,
+            ray_query: false,
+            mesh_shader: false,
+            queue: self.queue,
+            queue_family: 0,
+        }
+    }
+
+    fn context(&self) -> Context {
+        // SAFETY: all of it belongs together, every feature is on, and the engine outlives the context in every test.
+        unsafe { Context::from_raw(self.raw(), &ContextDesc::default()).unwrap() }
+    }
+
+    fn memory(
+        &self,
+        needed: vk::MemoryRequirements,
+        wish: vk::MemoryPropertyFlags,
+        flags: vk::MemoryAllocateFlags,
+    ) -> vk::DeviceMemory {
+        // SAFETY: as above.
+        unsafe {
+            let types = self.instance.get_physical_device_memory_properties(self.physical);
+            let fits = |index: &u32| {
+                needed.memory_type_bits & 1 << index != 0
+                    && types.memory_types[*index as usize].property_flags.contains(wish)
+            };
+            let index = (0..types.memory_type_count).find(fits).unwrap();
+            let mut flags = vk::MemoryAllocateFlagsInfo::default().flags(flags);
+            let info = vk::MemoryAllocateInfo::default()
+                .allocation_size(needed.size)
+                .memory_type_index(index)
+                .push_next(&mut flags);
+            self.device.allocate_memory(&info, None).unwrap()
+        }
+    }
+
+    /// A texture of words that can be sampled, cleared and read.
+    fn image(&self) -> (vk::Image, vk::DeviceMemory) {
+        let info = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(vk::Format::R32_UINT)
+            .extent(vk::Extent3D { width: SIDE, height: SIDE, depth: 1 })
+            .mip_levels(1)
+            .array_layers(1)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .usage(
+                vk::ImageUsageFlags::SAMPLED
+                    | vk::ImageUsageFlags::TRANSFER_SRC
+                    | vk::ImageUsageFlags::TRANSFER_DST,
+            );
+        // SAFETY: as above.
+        unsafe {
+            let image = self.device.create_image(&info, None).unwrap();
+            let needed = self.device.get_image_memory_requirements(image);
+            let memory = self.memory(needed, vk::MemoryPropertyFlags::DEVICE_LOCAL, Default::default());
+            self.device.bind_image_memory(image, memory, 0).unwrap();
+            (image, memory)
+        }
+    }
+
+    /// A mapped buffer with an address.
+    fn buffer(&self) -> (vk::Buffer, vk::DeviceMemory) {
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        // SAFETY: as above.
+        unsafe {
+            let info = vk::BufferCreateInfo::default().size(BYTES).usage(usage);
+            let buffer = self.device.create_buffer(&info, None).unwrap();
+            let wish = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
+            let needed = self.device.get_buffer_memory_requirements(buffer);
+            let memory = self.memory(needed, wish, vk::MemoryAllocateFlags::DEVICE_ADDRESS);
+            self.device.bind_buffer_memory(buffer, memory, 0).unwrap();
+            (buffer, memory)
+        }
+    }
+
+    fn words(&self, memory: vk::DeviceMemory) -> Vec<u32> {
+        // SAFETY: the memory is mapped for the copy alone, and the GPU is done with it.
+        unsafe {
+            let start = self.device.map_memory(memory, 0, BYTES, Default::default()).unwrap();
+            let words = std::slice::from_raw_parts(start.cast::<u32>(), BYTES as usize / 4).to_vec();
+            self.device.unmap_memory(memory);
+            words
+        }
+    }
+
+    fn semaphore(&self, kind: vk::SemaphoreType) -> vk::Semaphore {
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(kind);
+        let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+        // SAFETY: as above.
+        unsafe { self.device.create_semaphore(&info, None).unwrap() }
+    }
+
+    /// Records, and submits between semaphores.
+    fn submit(
+        &self,
+        queue: vk::Queue,
+        waits: &[(vk::Semaphore, u64)],
+        signals: &[(vk::Semaphore, u64)],
+        record: impl FnOnce(vk::CommandBuffer),
+    ) {
+        let raw = |all: &[(vk::Semaphore, u64)]| {
+            let of = |(semaphore, value): &(vk::Semaphore, u64)| {
+                vk::SemaphoreSubmitInfo::default().semaphore(*semaphore).value(*value).stage_mask(ALL)
+            };
+            all.iter().map(of).collect::<Vec<_>>()
+        };
+        let (waits, signals) = (raw(waits), raw(signals));
+        // SAFETY: as above.
+        unsafe {
+            let info =
+                vk::CommandBufferAllocateInfo::default().command_pool(self.pool).command_buffer_count(1);
+            let commands = self.device.allocate_command_buffers(&info).unwrap()[0];
+            self.device.begin_command_buffer(commands, &vk::CommandBufferBeginInfo::default()).unwrap();
+            record(commands);
+            self.device.end_command_buffer(commands).unwrap();
+            let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(commands)];
+            let submit = vk::SubmitInfo2::default()
+                .wait_semaphore_infos(&waits)
+                .command_buffer_infos(&commands)
+                .signal_semaphore_infos(&signals);
+            self.device.queue_submit2(queue, &[submit], vk::Fence::null()).unwrap();
+        }
+    }
+
+    /// Moves the image from a layout into another.
+    fn change(
+        &self,
+        commands: vk::CommandBuffer,
+        image: vk::Image,
+        old: vk::ImageLayout,
+        new: vk::ImageLayout,
+    ) {
+        let all = vk::AccessFlags2::MEMORY_READ | vk::AccessFlags2::MEMORY_WRITE;
+        let barrier = [vk::ImageMemoryBarrier2::default()
+            .src_stage_mask(ALL)
+            .src_access_mask(all)
+            .dst_stage_mask(ALL)
+            .dst_access_mask(all)
+            .old_layout(old)
+            .new_layout(new)
+            .image(image)
+            .subresource_range(WHOLE)];
+        let info = vk::DependencyInfo::default().image_memory_barriers(&barrier);
+        // SAFETY: as above.
+        unsafe { self.device.cmd_pipeline_barrier2(commands, &info) };
+    }
+
+    /// Fills the image with a word; it is in the layout TRANSFER_DST_OPTIMAL then.
+    fn clear(&self, commands: vk::CommandBuffer, image: vk::Image, word: u32) {
+        let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+        self.change(commands, image, vk::ImageLayout::UNDEFINED, layout);
+        let color = vk::ClearColorValue { uint32: [word; 4] };
+        // SAFETY: as above.
+        unsafe { self.device.cmd_clear_color_image(commands, image, layout, &color, &[WHOLE]) };
+    }
+}
+
+const WHOLE: vk::ImageSubresourceRange = vk::ImageSubresourceRange {
+    aspect_mask: vk::ImageAspectFlags::COLOR,
+    base_mip_level: 0,
+    level_count: 1,
+    base_array_layer: 0,
+    layer_count: 1,
+};
+
+impl Drop for Engine {
+    /// The layer tells of everything that is left of the device.
+    fn drop(&mut self) {
+        // SAFETY: contexts and objects are gone.
+        unsafe {
+            self.device.destroy_command_pool(self.pool, None);
+            self.device.destroy_device(None);
+            if let Some((ext, raw)) = self.messenger.take() {
+                ext.destroy_debug_utils_messenger(raw, None);
+            }
+            self.instance.destroy_instance(None);
+        }
+        let messages = std::mem::take(&mut *MESSAGES.lock().unwrap());
+        if !std::thread::panicking() {
+            assert_eq!(messages, [""; 0]);
+        }
+    }
+}
+
+fn texture_desc() -> TextureDesc<'static> {
+    TextureDesc {
+        format: Format::R32Uint,
+        extent: [SIDE, SIDE],
+        mips: 1,
+        usage: TextureUsage::SAMPLED,
+        debug_name: "the engine's image",
+        ..Default::default()
+    }
+}
+
+const ADD_ONE: &str = "
+    layout(local_size_x = 16) in;
+    layout(buffer_reference, scalar) buffer Words { uint at[]; };
+    layout(push_constant, scalar) uniform Push { Words words; uint texture; };
+    void main() {
+        uint i = gl_LocalInvocationIndex;
+        words.at[i] = textureBindlessFetchU2D(texture, ivec2(i % 4, i / 4), 0).x + 1 + i;
+    }";
+
+/// The engine clears, the library reads and writes, the engine copies, clears again and gives back, twice.
+fn exchange() {
+    let Some(engine) = Engine::new() else { return };
+    let ((image, image_memory), (buffer, buffer_memory), (copy, copy_memory)) =
+        (engine.image(), engine.buffer(), engine.buffer());
+    let binary = engine.semaphore(vk::SemaphoreType::BINARY);
+    let timeline = engine.semaphore(vk::SemaphoreType::TIMELINE);
+    {
+        let ctx = engine.context();
+        assert!(ctx.capabilities().has(OptionalFeature::FullDrawIndex));
+        assert!(!ctx.capabilities().has(OptionalFeature::CubeArrays), "nobody said that it is on");
+        // SAFETY: the handles are as described and live on.
+        let (texture, words) = unsafe {
+            let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+            let texture =
+                ctx.import_texture(&ImportedTexture { image, desc: texture_desc(), layout }).unwrap();
+            let usage = BufferUsage::STORAGE;
+            let import =
+                ImportedBuffer { buffer, size_bytes: BYTES, usage, debug_name: "the engine's buffer" };
+            (texture, ctx.import_buffer(&import).unwrap())
+        };
+        let pipeline = compute_pipeline(&ctx, ADD_ONE);
+        for (round, word) in [(1, 100), (2, 7000)] {
+            ctx.with_raw_queue(|queue| {
+                engine.submit(queue, &[], &[(binary, 0)], |commands| engine.clear(commands, image, word));
+            });
+            if round > 1 {
+                // SAFETY: the clear leaves it so.
+                unsafe { ctx.texture_came_back(*texture, vk::ImageLayout::TRANSFER_DST_OPTIMAL).unwrap() };
+            }
+            let mut cmd = ctx.acquire_command_buffer().unwrap();
+            cmd.bind_compute_pipeline(*pipeline).unwrap();
+            let address = ctx.buffer_address(*words).unwrap();
+            cmd.push_constants(&[address as u32, (address >> 32) as u32, texture.index()]).unwrap();
+            let uses = Dependencies { buffers: &[*words], sampled_images: &[*texture], ..Default::default() };
+            cmd.dispatch([1, 1, 1], &uses).unwrap();
+            cmd.hand_over_texture(*texture, vk::ImageLayout::TRANSFER_SRC_OPTIMAL).unwrap();
+            let wait = RawWait { semaphore: binary, value: 0, stages: ALL };
+            let signal = RawSignal { semaphore: timeline, value: 10 * round };
+            // SAFETY: the binary semaphore has its signal under way, and the timeline rises.
+            let handle = unsafe { ctx.submit_with(cmd, &[wait], &[signal]).unwrap() };
+            ctx.with_raw_queue(|queue| {
+                engine.submit(queue, &[(timeline, 10 * round)], &[(timeline, 10 * round + 1)], |commands| {
+                    let region = vk::BufferImageCopy::default()
+                        .image_subresource(vk::ImageSubresourceLayers {
+                            aspect_mask: vk::ImageAspectFlags::COLOR,
+                            layer_count: 1,
+                            ..Default::default()
+                        })
+                        .image_extent(vk::Extent3D { width: SIDE, height: SIDE, depth: 1 });
+                    let source = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+                    // SAFETY: the image was handed over in that layout.
+                    unsafe {
+                        engine.device.cmd_copy_image_to_buffer(commands, image, source, copy, &[region])
+                    };
+                });
+            });
+            // SAFETY: both timelines reach these values.
+            unsafe {
+                let (semaphores, values) =
+                    ([timeline, ctx.raw_timeline()], [10 * round + 1, handle.raw_value()]);
+                let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+                engine.device.wait_semaphores(&info, u64::MAX).unwrap();
+            }
+            assert!(ctx.is_done(handle).unwrap());
+            assert_eq!(engine.words(copy_memory), [word; 16]);
+            assert_eq!(engine.words(buffer_memory), (0..16).map(|i| word + 1 + i).collect::<Vec<_>>());
+            let mut read = [0_u32; 16];
+            ctx.download_buffer(*words, 0, bytemuck::cast_slice_mut(&mut read)).unwrap();
+            assert_eq!(read[3], word + 4);
+        }
+        let refused = {
+            let mut cmd = ctx.acquire_command_buffer().unwrap();
+            cmd.hand_over_texture(*texture, vk::ImageLayout::UNDEFINED)
+        };
+        assert!(matches!(refused, Err(Error::InvalidUsage { .. })));
+    }
+    // The context is gone, and all of this is alive still.
+    engine.submit(engine.queue, &[], &[(timeline, 30)], |commands| engine.clear(commands, image, 1));
+    // SAFETY: the engine's own, once each.
+    unsafe {
+        engine.device.device_wait_idle().unwrap();
+        engine.device.destroy_semaphore(binary, None);
+        engine.device.destroy_semaphore(timeline, None);
+        engine.device.destroy_image(image, None);
+        [buffer, copy].into_iter().for_each(|buffer| engine.device.destroy_buffer(buffer, None));
+        [image_memory, buffer_memory, copy_memory]
+            .into_iter()
+            .for_each(|memory| engine.device.free_memory(memory, None));
+    }
+}
+
+fn refusals() {
+    let Some(engine) = Engine::new() else { return };
+    let refuse = |raw: RawContext<'_>, words: &str| {
+        // SAFETY: what is wrong is found before anything is made.
+        match unsafe { Context::from_raw(raw, &ContextDesc::default()) } {
+            Err(Error::InvalidUsage { object, message }) => {
+                assert!(object == "from_raw" && message.contains(words), "{object}: {message}");
+            }
+            other => unreachable!("{words}: {other:?}"),
+        }
+    };
+    refuse(RawContext { queue_family: 77, ..engine.raw() }, "no queue family 77");
+    refuse(RawContext { mesh_shader: true, ..engine.raw() }, "VK_EXT_mesh_shader is not among");
+    refuse(RawContext { ray_query: true, ..engine.raw() }, "is not among device_extensions");
+    let astc = FeatureSet::NONE.with(OptionalFeature::TextureCompressionAstcHdr);
+    refuse(RawContext { features: astc, ..engine.raw() }, "textureCompressionASTC_HDR cannot be on");
+
+    let ctx = engine.context();
+    let (image, memory) = engine.image();
+    let layout = vk::ImageLayout::GENERAL;
+    let import = |image: vk::Image, desc: TextureDesc<'_>, layout: vk::ImageLayout, words: &str| {
+        // SAFETY: what is wrong is found before the image is used.
+        match unsafe { ctx.import_texture(&ImportedTexture { image, desc, layout }) } {
+            Err(Error::InvalidUsage { message, .. }) => assert!(message.contains(words), "{message}"),
+            other => unreachable!("{words}: {other:?}"),
+        }
+    };
+    for _ in 0..3 {
+        import(vk::Image::null(), texture_desc(), layout, "is null");
+        import(image, texture_desc(), vk::ImageLayout::PREINITIALIZED, "cannot be exchanged");
+        import(image, TextureDesc { data: Some(&[0; 64]), ..texture_desc() }, layout, "has its contents");
+        import(image, TextureDesc { extent: [0, 4], ..texture_desc() }, layout, "needs texels");
+    }
+    let empty = ImportedBuffer {
+        buffer: vk::Buffer::null(),
+        size_bytes: 4,
+        usage: BufferUsage::STORAGE,
+        debug_name: "none",
+    };
+    // SAFETY: as above.
+    let refused = unsafe { ctx.import_buffer(&empty) };
+    assert!(matches!(&refused, Err(Error::InvalidUsage { object, .. }) if object == "none"));
+    drop(refused);
+    drop(ctx);
+    // SAFETY: the engine's own.
+    unsafe {
+        engine.device.destroy_image(image, None);
+        engine.device.free_memory(memory, None);
+    }
+}
+
+/// One after the other, as the messages of the layer are those of the process.
+#[test]
+fn images_buffers_and_semaphores_go_both_ways_and_wrong_descriptions_are_refused() {
+    exchange();
+    refusals();
+}
