@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use std::sync::Once;
 use std::time::{Duration, Instant};
@@ -129,7 +129,7 @@ fn hybrid(args: &[&str]) -> Command {
         command.arg(desk.picture()).output().unwrap();
     });
     let mut command = Command::new(env!("CARGO_BIN_EXE_hybrid"));
-    command.args(args).env_remove("LVK_DEVICE");
+    command.args(args).env_remove("LVK_DEVICE").env("LVK_CACHE", "");
     command
 }
 
@@ -209,6 +209,36 @@ fn a_picture_never_replaces_what_is_read() {
     }
     assert_eq!(fs::read_to_string(scene).unwrap(), TRIANGLE);
     assert_eq!(fs::read_to_string(cameras).unwrap(), "scene a 0 1 2\n");
+}
+
+#[test]
+fn caches_are_kept_dropped_when_damaged_and_never_needed() {
+    if !has_device() {
+        return;
+    }
+    let desk = Desk::new();
+    let (scene, cache) = (desk.file("triangle.obj", TRIANGLE), desk.input.path().join("kept"));
+    let run = |cache: &Path, more: &[&str]| {
+        let mut command = desk.command(&[&["--scene", scene.as_str(), "--rt", "software"], more].concat());
+        command.env("LVK_CACHE", cache);
+        let outcome = Outcome::of(command);
+        outcome.assert_success();
+        (fs::read(desk.picture()).unwrap(), outcome.err)
+    };
+    let (picture, _) = run(&cache, &["--no-cache"]);
+    assert!(!cache.exists(), "nothing is kept unasked");
+    let files = |name: &str| fs::read_dir(cache.join(name)).map_or(0, Iterator::count);
+    assert_eq!(run(&cache, &[]).0, picture);
+    assert!(cache.join("hybrid.pipelines").is_file() && files("shaders") > 0 && files("trees") > 0);
+    let (warm, said) = run(&cache, &[]);
+    assert_eq!((warm, said.contains("warning")), (picture.clone(), false), "{said}");
+    fs::write(cache.join("hybrid.pipelines"), "nonsense").unwrap();
+    let (mended, said) = run(&cache, &[]);
+    assert_eq!(mended, picture);
+    assert_names(&said, &["warning: the pipeline cache", "hybrid.pipelines", "dropped"]);
+    let (without, said) = run(&Path::new(&scene).join("below a file"), &[]);
+    assert_eq!(without, picture);
+    assert_names(&said, &["warning: nothing is kept for the next start", "below a file"]);
 }
 
 #[test]

@@ -56,7 +56,7 @@ const PROGRAMS: [Program; 6] = [
     },
 ];
 
-const SHARED: [&str; 14] = [
+const SHARED: [&str; 15] = [
     "--rt",
     "--frames",
     "--round",
@@ -68,6 +68,7 @@ const SHARED: [&str; 14] = [
     "--profile",
     "--list-devices",
     "--validate",
+    "--no-cache",
     "Examples:",
     "Exit status: 0",
     "130 after Ctrl-C",
@@ -84,7 +85,7 @@ struct Outcome {
 impl Program {
     fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(self.path);
-        command.args(args).env_remove("LVK_DEVICE");
+        command.args(args).env_remove("LVK_DEVICE").env("LVK_CACHE", "");
         command
     }
 

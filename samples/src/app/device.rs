@@ -5,6 +5,7 @@ use lvk::{
     ValidationSink,
 };
 
+use super::caches::Caches;
 use super::run_args::{RayTracing, RunArgs, Validation};
 use super::run_error::RunError;
 use super::say;
@@ -28,6 +29,7 @@ pub(super) fn open(
 ) -> Result<Context, RunError> {
     use FeatureRequest::{Off, Optional, Required};
     use RayQueryRequest::{Auto, Hardware, HardwareIfPresent, Software};
+    let caches = if args.no_cache { None } else { Caches::open(name) };
     let with = |ray_tracing_pipeline, ray_query| {
         Context::new(&ContextDesc {
             application_name: name,
@@ -39,7 +41,7 @@ pub(super) fn open(
             ray_tracing_pipeline,
             ray_query,
             max_textures: needs.textures.max(ContextDesc::default().max_textures),
-            ..ContextDesc::default()
+            ..Caches::desc(caches.as_ref())
         })
     };
     match args.rt {

@@ -4,12 +4,14 @@
 
 pub mod args;
 pub(crate) mod array_buffer;
+pub mod caches;
 pub mod device;
 pub mod frame;
 pub mod frame_name;
 pub mod frames;
 pub mod headless;
 pub mod interrupt;
+pub(crate) mod library_warnings;
 pub mod metrics;
 pub mod pass_times;
 pub mod play;

@@ -14,7 +14,7 @@ use super::progress::Progress;
 use super::run_args::RunArgs;
 use super::run_error::RunError;
 use super::sample::Sample;
-use super::say;
+use super::{library_warnings, say};
 use crate::driver::{DriverRequest, prepare};
 
 /// Frames to time where none are asked for, on a GPU.
@@ -71,6 +71,7 @@ pub fn run<S: Sample>(
     args: &RunArgs,
     make: impl FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
 ) -> ExitCode {
+    library_warnings::print();
     match attempt(name, args, make) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -76,6 +76,11 @@ pub struct RunArgs {
     )]
     pub profile: Option<DeviceProfile>,
 
+    /// Keep nothing for the next start, and take nothing from the last one: compiled shaders, pipelines and trees of rays in
+    /// software, which otherwise are in the folder of LVK_CACHE or in lvk in the user's folder for caches
+    #[arg(long, help_heading = "Device")]
+    pub no_cache: bool,
+
     /// Print the devices and what they can do, and exit
     #[arg(long, help_heading = "Device")]
     pub list_devices: bool,

@@ -1,0 +1,30 @@
+//! What the library warns of reaches the user: damaged caches, features that were refused, objects left behind.
+
+use log::{Level, LevelFilter, Log, Metadata, Record};
+
+/// Where the library logs validation messages, which programs count and print themselves.
+const VALIDATION: &str = "lvk::gpu::debug";
+
+struct ToStandardError;
+
+impl Log for ToStandardError {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        let target = metadata.target();
+        metadata.level() <= Level::Warn && target.starts_with("lvk") && target != VALIDATION
+    }
+
+    fn log(&self, record: &Record<'_>) {
+        if self.enabled(record.metadata()) {
+            eprintln!("warning: {}", record.args());
+        }
+    }
+
+    fn flush(&self) {}
+}
+
+/// Prints them to standard error from now on, unless the program has a logger already.
+pub(super) fn print() {
+    if log::set_logger(&ToStandardError).is_ok() {
+        log::set_max_level(LevelFilter::Warn);
+    }
+}
