@@ -125,8 +125,11 @@ pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, GeometryTransform,
 pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, transform_rows};
 pub use bindless::checks::{BindlessArray, IndexFault, SlotState};
 pub use command::CommandBuffer;
-pub use command::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, StencilLoad};
+pub use command::attachment::{
+    ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, DepthResolve, Resolve, StencilLoad,
+};
 pub use command::dependencies::Dependencies;
+pub use command::draw_count::CountedDraws;
 pub use command::render::RenderPass;
 pub use command::render_pass::RenderPassDesc;
 pub use command::transfer::{BufferCopy, ClearValue};
@@ -153,6 +156,7 @@ pub use gpu::mesh_limits::MeshLimits;
 pub use gpu::optional::{FeatureSet, OptionalFeature};
 pub use gpu::profile::DeviceProfile;
 pub use gpu::ray_query_path::{RayQueryPath, RayQueryRequest};
+pub use gpu::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
 pub use handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,

@@ -304,7 +304,7 @@ fn textures_keep_their_layout_when_recorded_and_submitted_in_different_orders() 
     let writes = Dependencies { storage_images: &[*texture], ..Default::default() };
     store.record(&ctx, &mut storing, [texture.index(), 50, 0], (*ones, 4), &writes);
     let load = ColorLoad::Clear([1.0; 4]);
-    let color = [ColorAttachment { texture: *texture, mip: 1, layer: 0, load, store: true }];
+    let color = [ColorAttachment { texture: *texture, mip: 1, layer: 0, load, store: true, resolve: None }];
     drop(clearing.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap());
     for cmd in [clearing, storing, sampling] {
         ctx.submit(cmd).unwrap();

@@ -136,6 +136,7 @@ impl Case {
         let offset = bytes.len() as u64;
         for index in mesh.triangles.iter().flatten() {
             match format {
+                IndexFormat::U8 => bytes.push(*index as u8),
                 IndexFormat::U16 => bytes.extend((*index as u16).to_le_bytes()),
                 IndexFormat::U32 => bytes.extend(index.to_le_bytes()),
             }

@@ -28,7 +28,7 @@ fn buffer<T: bytemuck::NoUninit>(ctx: &Context, usage: BufferUsage, data: &[T]) 
 }
 
 fn attachment(texture: TextureHandle, load: ColorLoad) -> ColorAttachment {
-    ColorAttachment { texture, mip: 0, layer: 0, load, store: true }
+    ColorAttachment { texture, mip: 0, layer: 0, load, store: true, resolve: None }
 }
 
 /// Runs one pass over `color` in a submission of its own.
@@ -433,7 +433,8 @@ fn mips_layers_and_faces_are_drawn_to_and_sampled() {
         let texture = ctx.create_texture(&desc).unwrap();
         for (layer, mip) in (0..layers).flat_map(|layer| (0..3).map(move |mip| (layer, mip))) {
             let load = ColorLoad::Clear([-1.0; 4]);
-            let attachment = ColorAttachment { texture: *texture, mip, layer, load, store: true };
+            let attachment =
+                ColorAttachment { texture: *texture, mip, layer, load, store: true, resolve: None };
             draw(&ctx, &[attachment], None, |pass| {
                 assert_eq!(pass.extent(), [4 >> mip; 2]);
                 pass.bind_render_pipeline(*pipeline)?;

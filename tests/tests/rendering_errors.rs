@@ -28,7 +28,8 @@ fn passes_with_unfit_targets_are_refused() {
     let ids = target(&ctx, Format::R32Uint, [4, 4]);
     let depth = target(&ctx, Format::D32Float, [4, 4]);
     let sampled = ctx.create_texture(&TextureDesc { extent: [4, 4], ..Default::default() }).unwrap();
-    let attach = |texture, load| ColorAttachment { texture, mip: 0, layer: 0, load, store: true };
+    let attach =
+        |texture, load| ColorAttachment { texture, mip: 0, layer: 0, load, store: true, resolve: None };
     let clear = |texture| ColorAttachment::clear(texture, [0.0; 4]);
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let mut begin = |color: &[ColorAttachment], depth: Option<DepthAttachment>, words: &str| {

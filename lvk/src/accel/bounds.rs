@@ -149,7 +149,8 @@ fn element(bytes: &[u8], stride: usize, packed: usize, index: u32) -> Option<&[u
     bytes.get(start..start.checked_add(packed)?)
 }
 
-/// Position in the bytes of one vertex; components a format lacks are 0. `None` if there are too few bytes.
+/// Position in the bytes of one vertex; components a format lacks are 0. `None` if there are too few bytes, and for formats
+/// that structures are not built from.
 fn decode(format: VertexFormat, bytes: &[u8]) -> Option<Vec3> {
     let snorm = |value: u16| (f32::from(value as i16) / 32767.0).max(-1.0);
     Some(match format {
@@ -164,6 +165,7 @@ fn decode(format: VertexFormat, bytes: &[u8]) -> Option<Vec3> {
             numbers::<3, 1, _>(bytes, u8::from_le_bytes)?.map(|value| f32::from(value) / 255.0),
         ),
         VertexFormat::U32 => Vec3::new(numbers::<1, 4, _>(bytes, u32::from_le_bytes)?[0] as f32, 0.0, 0.0),
+        _ => return None,
     })
 }
 

@@ -202,6 +202,10 @@ impl BlasGeometry {
 
 /// Checks what concerns the list as a whole.
 pub(crate) fn check_list(name: &str, geometries: &[BlasGeometry], limits: &Limits) -> Result<()> {
+    geometries.iter().try_for_each(|geometry| match geometry {
+        BlasGeometry::Triangles(triangles) => check_formats(name, triangles),
+        BlasGeometry::Aabbs(_) => Ok(()),
+    })?;
     if geometries.is_empty() {
         return Err(Error::usage(name, "a bottom-level structure needs at least one geometry"));
     }
@@ -209,6 +213,20 @@ pub(crate) fn check_list(name: &str, geometries: &[BlasGeometry], limits: &Limit
         return Err(Error::usage(name, "triangles and boxes cannot share a structure; make two"));
     }
     check_limit(name, "geometry count", geometries.len() as u64, limits.max_blas_geometries)
+}
+
+/// Fails for formats that draws alone can take.
+fn check_formats(name: &str, triangles: &Triangles) -> Result<()> {
+    let format = triangles.vertex_format;
+    if !format.is_position() {
+        let what = format!("vertex format {format:?} in acceleration structure '{name}'");
+        return Err(Error::unsupported(what, "structures are built from other formats; F32x3 always works"));
+    }
+    if triangles.indices.is_some_and(|indices| indices.format == IndexFormat::U8) {
+        let what = format!("8-bit indices in acceleration structure '{name}'");
+        return Err(Error::unsupported(what, "Vulkan builds from 16 and 32-bit indices"));
+    }
+    Ok(())
 }
 
 fn convert_triangles(

@@ -1,5 +1,6 @@
 //! Targets of a render pass, as callers describe them.
 
+use crate::gpu::resolve_modes::ResolveMode;
 use crate::handle::TextureHandle;
 
 /// What a colour target holds when the pass begins.
@@ -39,6 +40,36 @@ pub enum StencilLoad {
     DontCare,
 }
 
+/// What a multisampled colour target is resolved to at the end of the pass: the mean of a pixel's samples, or the first of
+/// them where they are integers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Resolve {
+    /// A texture of one sample a pixel and the same format, with
+    /// [`TextureUsage::TARGET`](crate::TextureUsage::TARGET).
+    pub texture: TextureHandle,
+    /// Mip level written; of a view, counted from its first.
+    pub mip: u32,
+    /// Layer written, the first of as many as the pass has.
+    pub layer: u32,
+}
+
+/// What a multisampled depth target is resolved to at the end of the pass;
+/// [`Limits::depth_resolve`](crate::Limits::depth_resolve) says how it can be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DepthResolve {
+    /// A texture of one sample a pixel and the same format, with
+    /// [`TextureUsage::TARGET`](crate::TextureUsage::TARGET).
+    pub texture: TextureHandle,
+    /// Mip level written; of a view, counted from its first.
+    pub mip: u32,
+    /// Layer written, the first of as many as the pass has.
+    pub layer: u32,
+    /// How depth is resolved; `None` leaves it alone.
+    pub depth: Option<ResolveMode>,
+    /// How stencil is resolved; `None` leaves it alone. Means nothing to formats without stencil.
+    pub stencil: Option<ResolveMode>,
+}
+
 /// A colour target of a render pass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ColorAttachment {
@@ -53,12 +84,14 @@ pub struct ColorAttachment {
     pub load: ColorLoad,
     /// Whether what was drawn is kept.
     pub store: bool,
+    /// What several samples a pixel are resolved to; the samples themselves need not be kept.
+    pub resolve: Option<Resolve>,
 }
 
 impl ColorAttachment {
     /// The first mip and layer, cleared to a colour and kept.
     pub fn clear(texture: TextureHandle, color: [f32; 4]) -> Self {
-        Self { texture, mip: 0, layer: 0, load: ColorLoad::Clear(color), store: true }
+        Self { texture, mip: 0, layer: 0, load: ColorLoad::Clear(color), store: true, resolve: None }
     }
 }
 
@@ -83,6 +116,8 @@ pub struct DepthAttachment {
     /// Depth and stencil are loaded and tested, and never written. The texture may be sampled meanwhile, where the pass's
     /// dependencies list it.
     pub read_only: bool,
+    /// What several samples a pixel are resolved to.
+    pub resolve: Option<DepthResolve>,
 }
 
 impl DepthAttachment {
@@ -97,6 +132,7 @@ impl DepthAttachment {
             stencil: StencilLoad::Clear(0),
             stencil_store: true,
             read_only: false,
+            resolve: None,
         }
     }
 

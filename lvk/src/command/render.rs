@@ -15,6 +15,7 @@ use crate::barrier::Use;
 use crate::error::{Error, Result, check_limit};
 use crate::format::IndexFormat;
 use crate::gpu::caps::Limits;
+use crate::gpu::optional::OptionalFeature;
 use crate::handle::{BufferHandle, RenderPipelineHandle};
 use crate::pipeline::{FrontEnd, RenderPipeline};
 use crate::resource::Buffer;
@@ -61,7 +62,7 @@ impl DrawNeeds {
 }
 
 /// The index buffer bound last.
-struct BoundIndices {
+pub(super) struct BoundIndices {
     buffer: Arc<Buffer>,
     count: u64,
 }
@@ -184,6 +185,9 @@ impl<'a> RenderPass<'a> {
     ) -> Result<()> {
         let buffer = self.cmd.shared.store.buffers.get(buffer)?;
         buffer.check_usage(BufferUsage::INDEX)?;
+        if format == IndexFormat::U8 {
+            self.cmd.shared.gpu.require(OptionalFeature::IndexTypeUint8, "a buffer of 8-bit indices")?;
+        }
         let size = u64::from(format.size_bytes());
         if !offset.is_multiple_of(size) {
             return Err(Error::usage(
@@ -313,12 +317,12 @@ impl<'a> RenderPass<'a> {
         Ok(buffer)
     }
 
-    fn bound_indices(&self) -> Result<&BoundIndices> {
+    pub(super) fn bound_indices(&self) -> Result<&BoundIndices> {
         self.indices.as_ref().ok_or_else(|| Error::usage("draw_indexed", "bind an index buffer first"))
     }
 
     /// Fails unless a pipeline with a vertex shader is bound with all it reads.
-    fn check_draw(&self) -> Result<()> {
+    pub(super) fn check_draw(&self) -> Result<()> {
         match &self.draws {
             Some(needs)
                 if self.vertex_slots & needs.vertex_slots == needs.vertex_slots
@@ -362,7 +366,7 @@ impl<'a> RenderPass<'a> {
     }
 
     /// The pass reads a buffer; no barrier can be placed any more.
-    fn read_inside(&mut self, buffer: &Buffer, next: Use) -> Result<()> {
+    pub(super) fn read_inside(&mut self, buffer: &Buffer, next: Use) -> Result<()> {
         self.cmd.use_buffer(buffer, next);
         self.track_inside("the buffer", &buffer.name, "list it in the pass's dependencies")
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, StencilLoad};
+use super::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, Resolve, StencilLoad};
 use super::pass_area::{PassArea, PassLayers};
 use super::render_pass::RenderPassDesc;
 use crate::barrier::{Subresources, Use};
@@ -30,15 +30,15 @@ pub(super) struct Targets {
 }
 
 /// A mip of some layers of a texture.
-struct Target {
-    texture: Arc<Texture>,
+pub(super) struct Target {
+    pub(super) texture: Arc<Texture>,
     mip: u32,
     layer: u32,
     layers: PassLayers,
 }
 
 impl Target {
-    fn view(&self) -> Result<vk::ImageView> {
+    pub(super) fn view(&self) -> Result<vk::ImageView> {
         match self.layers.is_layered() {
             false => self.texture.target_view(self.mip, self.layer),
             true => self.texture.layered_target_view(self.mip, self.layer, self.layers.count()),
@@ -51,8 +51,13 @@ impl Target {
         Subresources { layer_count: self.layers.count(), ..part }
     }
 
+    /// Width and height.
+    pub(super) fn extent(&self) -> [u32; 2] {
+        self.texture.mip_extent(self.mip)
+    }
+
     /// The same as barriers know it.
-    fn part(&self) -> Subresources {
+    pub(super) fn part(&self) -> Subresources {
         self.texture.drawn_part(self.mip, self.layer, self.layers.count())
     }
 }
@@ -77,7 +82,13 @@ impl CommandBuffer {
                 target.part(),
                 Use::color_target(attachment.load == ColorLoad::Load),
             )?;
-            colors.push(color_info(&target, attachment)?);
+            let mut info = color_info(&target, attachment)?;
+            if let Some(Resolve { texture, mip, layer }) = attachment.resolve {
+                let to = self.target(texture, mip, layer, layers, &mut None)?;
+                info = self.use_color_resolve(&target, &to, info)?;
+                check_apart(&to, &mut drawn)?;
+            }
+            colors.push(info);
             formats.push(target.texture.format);
         }
         let mut targets = Targets {
@@ -119,7 +130,9 @@ impl CommandBuffer {
         targets.depth = Some(depth_info(view, attachment));
         targets.stencil = texture.format.has_stencil().then(|| stencil_info(view, attachment));
         targets.read_only_depth = attachment.read_only;
-        Ok(())
+        let Some(resolve) = &attachment.resolve else { return Ok(()) };
+        let to = self.target(resolve.texture, resolve.mip, resolve.layer, target.layers, &mut None)?;
+        self.use_depth_resolve(target, &to, resolve, [&mut targets.depth, &mut targets.stencil])
     }
 
     /// Finds a target and checks that all targets are equally large, with equally many samples.

@@ -6,6 +6,7 @@ mod compact;
 pub(crate) mod config;
 mod create;
 mod create_accel;
+mod create_pipelines;
 mod create_ray_tracing;
 mod create_texture;
 mod data;

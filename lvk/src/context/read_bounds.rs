@@ -172,7 +172,8 @@ pub(super) fn geometry_bytes<'a>(geometry: &BlasGeometry, pieces: &'a Pieces) ->
             };
             let of_triangles = indices(triangles).map(|piece| pieces.get(piece)).unwrap_or_default();
             let indices = match triangles.indices.map(|indices| indices.format) {
-                None => IndexBytes::None,
+                // Structures are not built from 8-bit indices.
+                None | Some(IndexFormat::U8) => IndexBytes::None,
                 Some(IndexFormat::U16) => IndexBytes::U16(of_triangles),
                 Some(IndexFormat::U32) => IndexBytes::U32(of_triangles),
             };

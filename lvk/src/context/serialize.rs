@@ -305,7 +305,8 @@ fn blob_geometry(geometry: &BlasGeometry) -> BlobGeometry {
             vertex_format: triangles.vertex_format.raw().as_raw().cast_unsigned(),
             vertex_count: triangles.vertex_count,
             indices: match triangles.indices.map(|indices| indices.format) {
-                None => BlobIndices::None,
+                // Structures are not built from 8-bit indices.
+                None | Some(IndexFormat::U8) => BlobIndices::None,
                 Some(IndexFormat::U16) => BlobIndices::U16,
                 Some(IndexFormat::U32) => BlobIndices::U32,
             },

@@ -8,6 +8,7 @@ use super::features::{Calibration, Features, Subgroups, missing};
 use super::mesh_limits::MeshLimits;
 use super::optional::{FeatureSet, OF_MESH_SHADERS, OptionalFeature};
 use super::ray_query_path::{RayQueryPath, RayQueryRequest};
+use super::resolve_modes::{DepthResolveLimits, ResolveModes};
 use super::select::DeviceKind;
 use crate::error::{Error, Result};
 
@@ -198,6 +199,8 @@ pub struct Limits {
     pub max_target_layers: u32,
     /// Most views of a render pass that draws several at once (`maxMultiviewViewCount`).
     pub max_views: u32,
+    /// How multisampled depth and stencil can be resolved.
+    pub depth_resolve: DepthResolveLimits,
     /// Most vertices of a patch, before and behind the tessellation control stage (`maxTessellationPatchSize`).
     pub max_patch_points: u32,
     /// Least and greatest width of lines in pixels (`lineWidthRange`).
@@ -483,6 +486,12 @@ fn limits(
         max_color_targets: plain.max_color_attachments.min(8),
         max_target_layers: plain.max_framebuffer_layers,
         max_views: 0,
+        depth_resolve: DepthResolveLimits {
+            depth: ResolveModes::from_bits_truncate(v12.supported_depth_resolve_modes.as_raw()),
+            stencil: ResolveModes::from_bits_truncate(v12.supported_stencil_resolve_modes.as_raw()),
+            one_alone: v12.independent_resolve_none == vk::TRUE,
+            different: v12.independent_resolve == vk::TRUE,
+        },
         max_patch_points: plain.max_tessellation_patch_size,
         line_width: plain.line_width_range,
         max_dispatch_groups: plain.max_compute_work_group_count,

@@ -18,6 +18,7 @@ mod naming;
 pub(crate) mod optional;
 pub(crate) mod profile;
 pub(crate) mod ray_query_path;
+pub(crate) mod resolve_modes;
 pub(crate) mod select;
 #[cfg(feature = "test-hooks")]
 pub(crate) mod silent;

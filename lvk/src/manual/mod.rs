@@ -6,6 +6,9 @@ pub mod textures {}
 #[doc = include_str!("queues_and_uploads.md")]
 pub mod queues_and_uploads {}
 
+#[doc = include_str!("rendering.md")]
+pub mod rendering {}
+
 #[doc = include_str!("acceleration_structures.md")]
 pub mod acceleration_structures {}
 

@@ -87,6 +87,7 @@ pub(super) fn check(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderMo
     check_mesh(gpu, desc, modules)?;
     check_geometry(desc, modules)?;
     check_vertex_input(name, desc)?;
+    check_vertex_formats(gpu, desc)?;
     match &modules.vertex {
         Some(vertex) => check_locations(name, desc, &vertex.reflection.inputs),
         None => Ok(()),
@@ -166,6 +167,26 @@ fn check_locations(name: &str, desc: &RenderPipelineDesc<'_>, inputs: &[u32]) ->
             Err(Error::usage(name, message))
         }
     }
+}
+
+/// Fails unless the device fetches each format from where the attribute is.
+fn check_vertex_formats(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
+    for attribute in desc.vertex_attributes {
+        let (format, unit) = (attribute.format, attribute.format.component_bytes());
+        if !gpu.buffer_features(format.raw()).contains(vk::FormatFeatureFlags::VERTEX_BUFFER) {
+            let what = format!("vertex format {format:?} in pipeline '{}'", desc.debug_name);
+            return Err(Error::unsupported(what, "the device cannot fetch it; choose another format"));
+        }
+        let stride = desc.vertex_bindings.get(attribute.binding as usize).map_or(0, |binding| binding.stride);
+        if !stride.is_multiple_of(unit) || !attribute.offset.is_multiple_of(unit) {
+            let message = format!(
+                "vertex attribute {} lies at {} of {stride} bytes, its components of {format:?} at multiples of {unit}",
+                attribute.location, attribute.offset
+            );
+            return Err(Error::usage(desc.debug_name, message));
+        }
+    }
+    Ok(())
 }
 
 fn check_vertex_input(name: &str, desc: &RenderPipelineDesc<'_>) -> Result<()> {

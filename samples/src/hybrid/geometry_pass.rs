@@ -75,6 +75,7 @@ impl GBuffer {
             layer: 0,
             load,
             store: true,
+            resolve: None,
         };
         [
             target(&self.position, ColorLoad::DontCare),

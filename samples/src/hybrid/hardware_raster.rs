@@ -102,6 +102,7 @@ impl HardwareRaster {
             layer: 0,
             load: ColorLoad::ClearUint([NO_TRIANGLE; 4]),
             store: true,
+            resolve: None,
         };
         let read = [&left.indices, &left.triangles, &left.arguments].map(Holder::handle);
         let mut pass = cmd.begin_rendering(&RenderPassDesc {

@@ -93,6 +93,7 @@ fn begin_surfaces<'a>(
         layer: 0,
         load: ColorLoad::ClearUint([0; 4]),
         store: true,
+        resolve: None,
     };
     cmd.begin_rendering(&RenderPassDesc {
         color: &[color],

@@ -81,6 +81,9 @@ fn triangles_of(
     matrix: u64,
 ) -> Result<GpuGeometry> {
     let format = triangles.vertex_format;
+    let number = format_number(format).ok_or_else(|| {
+        Error::unsupported(format!("vertex format {format:?} in a build"), "F32x3 always works")
+    })?;
     let stride = match triangles.vertex_stride {
         0 => u64::from(format.size_bytes()),
         stride => stride,
@@ -98,16 +101,16 @@ fn triangles_of(
         indices,
         matrix,
         stride: stride as u32,
-        format: format_number(format),
+        format: number,
         index_bytes,
         vertex_count: triangles.vertex_count,
         ..Zeroable::zeroed()
     })
 }
 
-/// The number of a format in `positionAt` of `kernel/build/input.glsl`.
-fn format_number(format: VertexFormat) -> u32 {
-    match format {
+/// The number of a format that structures are built from, in `positionAt` of `kernel/build/input.glsl`.
+fn format_number(format: VertexFormat) -> Option<u32> {
+    Some(match format {
         VertexFormat::F32 => 0,
         VertexFormat::F32x2 => 1,
         VertexFormat::F32x3 => 2,
@@ -118,5 +121,6 @@ fn format_number(format: VertexFormat) -> u32 {
         VertexFormat::Snorm16x4 => 7,
         VertexFormat::Unorm8x4 => 8,
         VertexFormat::U32 => 9,
-    }
+        _ => return None,
+    })
 }

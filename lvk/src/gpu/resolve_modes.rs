@@ -1,0 +1,111 @@
+//! How the samples of a pixel become one.
+
+use bitflags::bitflags;
+
+/// How depth or stencil samples of a pixel become one (`VkResolveModeFlagBits`). Colours are averaged, integers take the
+/// first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ResolveMode {
+    /// The first; every device has it.
+    SampleZero,
+    /// The mean; never of stencil.
+    Average,
+    /// The least.
+    Min,
+    /// The greatest.
+    Max,
+}
+
+bitflags! {
+    /// Some of the [`ResolveMode`]s. The bits are Vulkan's.
+    #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+    pub struct ResolveModes: u32 {
+        /// [`ResolveMode::SampleZero`].
+        const SAMPLE_ZERO = 1 << 0;
+        /// [`ResolveMode::Average`].
+        const AVERAGE = 1 << 1;
+        /// [`ResolveMode::Min`].
+        const MIN = 1 << 2;
+        /// [`ResolveMode::Max`].
+        const MAX = 1 << 3;
+    }
+}
+
+impl ResolveMode {
+    pub(crate) fn bit(self) -> ResolveModes {
+        match self {
+            Self::SampleZero => ResolveModes::SAMPLE_ZERO,
+            Self::Average => ResolveModes::AVERAGE,
+            Self::Min => ResolveModes::MIN,
+            Self::Max => ResolveModes::MAX,
+        }
+    }
+}
+
+/// What a device can do with multisampled depth and stencil at the end of a pass
+/// (`VkPhysicalDeviceDepthStencilResolveProperties`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DepthResolveLimits {
+    /// Modes of depth.
+    pub depth: ResolveModes,
+    /// Modes of stencil.
+    pub stencil: ResolveModes,
+    /// One of both may be resolved without the other.
+    pub one_alone: bool,
+    /// Both may be resolved by different modes.
+    pub different: bool,
+}
+
+impl DepthResolveLimits {
+    /// Whether the device resolves a target with both parts this way.
+    pub(crate) fn allow(&self, depth: Option<ResolveMode>, stencil: Option<ResolveMode>) -> bool {
+        let known = |mode: Option<ResolveMode>, modes: ResolveModes| {
+            mode.is_none_or(|mode| modes.contains(mode.bit()))
+        };
+        let together =
+            depth == stencil || self.different || (self.one_alone && (depth.is_none() || stencil.is_none()));
+        known(depth, self.depth) && known(stencil, self.stencil) && together
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ash::vk;
+
+    use super::*;
+
+    #[test]
+    fn bits_are_those_of_vulkan() {
+        for (mode, raw) in [
+            (ResolveMode::SampleZero, vk::ResolveModeFlags::SAMPLE_ZERO),
+            (ResolveMode::Average, vk::ResolveModeFlags::AVERAGE),
+            (ResolveMode::Min, vk::ResolveModeFlags::MIN),
+            (ResolveMode::Max, vk::ResolveModeFlags::MAX),
+        ] {
+            assert_eq!(mode.bit().bits(), raw.as_raw());
+        }
+    }
+
+    #[test]
+    fn both_parts_go_together_unless_the_device_says_otherwise() {
+        use ResolveMode::{Min, SampleZero};
+        let plain = DepthResolveLimits {
+            depth: ResolveModes::all(),
+            stencil: ResolveModes::SAMPLE_ZERO,
+            ..Default::default()
+        };
+        let alone = DepthResolveLimits { one_alone: true, ..plain };
+        let different = DepthResolveLimits { different: true, ..plain };
+        let zero = Some(SampleZero);
+        for (depth, stencil, expected) in [
+            (zero, zero, [true, true, true]),
+            (None, None, [true, true, true]),
+            (zero, None, [false, true, true]),
+            (Some(Min), zero, [false, false, true]),
+            (zero, Some(Min), [false, false, false]),
+        ] {
+            let found = [plain, alone, different].map(|limits| limits.allow(depth, stencil));
+            assert_eq!(found, expected, "{depth:?} {stencil:?}");
+        }
+    }
+}
