@@ -177,6 +177,7 @@ pub use resource::sampler::{AddressMode, BorderColor, CompareOp, Filter, Reducti
 pub use resource::swizzle::{Channel, Swizzle};
 pub use resource::texture_desc::{TextureDesc, TextureKind, TextureUsage};
 pub use resource::view::TextureViewDesc;
+pub use resource::ycbcr::{ChromaSite, YuvConversion, YuvModel, YuvRange};
 #[cfg(feature = "glsl")]
 pub use shader::compile_glsl;
 pub use shader::{ShaderCacheCounts, ShaderModuleDesc, ShaderSource, ShaderStage};

@@ -72,7 +72,7 @@ pub(crate) struct Shared {
 
 /// Objects behind the dummy slots.
 pub(crate) struct DummyObjects {
-    pub(crate) _textures: [Arc<Texture>; 2],
+    pub(crate) _textures: Vec<Arc<Texture>>,
     pub(crate) _sampler: Sampler,
     pub(crate) _tlas: Option<Arc<AccelStruct>>,
 }
@@ -124,6 +124,8 @@ impl Shared {
     fn note_retired(&self, garbage: &Garbage) {
         let newest = || self.submitter.newest();
         match garbage {
+            // Indices of textures in Y'CbCr are constants, which nobody checks.
+            Garbage::Texture(texture) if texture.is_yuv() => {}
             Garbage::Texture(texture) => self.bindless.note_retired(&TEXTURE_ARRAYS, texture.slot, newest),
             Garbage::Sampler(sampler) => {
                 self.bindless.note_retired(&[BindlessArray::Samplers], sampler.slot, newest);
@@ -163,7 +165,11 @@ impl Shared {
                 if texture.image.release() {
                     self.submitter.forget(texture.image.id);
                 }
-                self.bindless.free_texture(texture.slot);
+                if texture.is_yuv() {
+                    self.bindless.free_yuv(texture.slot);
+                } else {
+                    self.bindless.free_texture(texture.slot);
+                }
             }
             Garbage::Sampler(sampler) => self.bindless.free_sampler(sampler.slot),
             Garbage::AccelStruct(object) => self.dispose_accel_struct(&object),

@@ -52,7 +52,8 @@ fn inner(format: Format) -> TextureRegion {
 }
 
 fn round_trips(ctx: &Context) {
-    for (seed, format) in (0..).zip(Format::ALL.iter().copied()) {
+    let plain = Format::ALL.iter().copied().filter(|format| !format.is_yuv());
+    for (seed, format) in (0..).zip(plain) {
         // The GPU-assisted layer takes texels of depth alone for 5 bytes here, and reads depths where there are none.
         if format == Format::D32FloatS8
             && std::env::var("LVK_TEST_VALIDATION").is_ok_and(|kind| kind == "gpu")

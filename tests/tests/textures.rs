@@ -34,7 +34,7 @@ fn download_floats(ctx: &Context, texture: TextureHandle, region: &TextureRegion
 fn every_usage_of_every_format_works_or_is_unsupported() {
     let Some(ctx) = device() else { return };
     let mut refused = 0;
-    for format in Format::ALL.iter().copied() {
+    for format in Format::ALL.iter().copied().filter(|format| !format.is_yuv()) {
         for usage in [TextureUsage::STORAGE, TextureUsage::TARGET, TextureUsage::all()] {
             for kind in KINDS {
                 let desc = TextureDesc { format, usage, kind, extent: [8, 8], mips: 0, ..Default::default() };

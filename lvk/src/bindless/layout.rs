@@ -10,7 +10,7 @@ pub(crate) const SAMPLED_IMAGES: u32 = 0;
 pub(crate) const SAMPLERS: u32 = 1;
 /// Storage images; a texture has the same index here as in [`SAMPLED_IMAGES`].
 pub(crate) const STORAGE_IMAGES: u32 = 2;
-/// Combined Y'CbCr image samplers; the number is reserved.
+/// Combined Y'CbCr image samplers: a range of slots for each conversion of the context.
 pub(crate) const YCBCR: u32 = 3;
 /// Top-level acceleration structures.
 pub(crate) const ACCEL_STRUCTS: u32 = 4;

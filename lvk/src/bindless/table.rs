@@ -4,12 +4,15 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::array::Array;
 use super::checks::{BindlessArray, CheckPlan, IndexChecks};
 use super::layout;
-use super::slots::Slots;
+use super::yuv::{YuvPlace, YuvSlots};
 use crate::error::{Error, Result};
+use crate::format::Format;
 use crate::gpu::Gpu;
 use crate::lock::{Guard, Mutex, Rank};
+use crate::resource::ycbcr::YuvConversion;
 
 /// What a texture's slot shows to shaders.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,48 +48,14 @@ struct Entries {
     textures: Array<TextureViews>,
     samplers: Array<vk::Sampler>,
     tlas: Array<vk::AccelerationStructureKHR>,
+    yuv: YuvSlots,
 }
 
 /// The arrays that the slot of a texture belongs to.
 pub(crate) const TEXTURE_ARRAYS: [BindlessArray; 2] = [BindlessArray::Textures, BindlessArray::StorageImages];
 
-/// Slots of one kind and who owns them.
-struct Array<T> {
-    kind: &'static str,
-    slots: Slots,
-    owners: Vec<Option<T>>,
-}
-
-impl<T: Copy> Array<T> {
-    fn new(kind: &'static str, capacity: u32) -> Self {
-        Self { kind, slots: Slots::new(capacity), owners: vec![None; capacity as usize] }
-    }
-
-    fn reserve(&mut self, object: &str) -> Result<u32> {
-        let limit = u64::from(self.slots.capacity()).saturating_sub(1);
-        self.slots.alloc().ok_or_else(|| Error::LimitExceeded {
-            object: object.to_owned(),
-            what: self.kind,
-            requested: limit + 1,
-            limit,
-        })
-    }
-
-    fn set(&mut self, slot: u32, owner: Option<T>) {
-        if let Some(entry) = self.owners.get_mut(slot as usize) {
-            *entry = owner;
-            self.slots.dirty(slot);
-        }
-    }
-
-    fn take_dirty(&mut self) -> Vec<(u32, Option<T>)> {
-        let dirty = self.slots.take_dirty();
-        dirty.into_iter().map(|slot| (slot, self.owners.get(slot as usize).copied().flatten())).collect()
-    }
-}
-
 impl Bindless {
-    pub(crate) fn new(gpu: &Arc<Gpu>, max_textures: u32, check_indices: bool) -> Result<Self> {
+    pub(crate) fn new(gpu: &Arc<Gpu>, max_textures: u32, yuv: YuvSlots, check_indices: bool) -> Result<Self> {
         let limits = &gpu.caps.limits;
         let textures = max_textures.clamp(2, limits.max_bindless_textures.max(2));
         let counts = [
@@ -98,8 +67,8 @@ impl Bindless {
         ];
         let capacities = [textures, limits.max_bindless_samplers, textures, slot_count(gpu)];
         let checks = if check_indices { Some(IndexChecks::new(gpu, capacities)?) } else { None };
-        let set_layout = create_layout(gpu, &counts)?;
-        let (pool, set) = match create_set(gpu, set_layout, &counts) {
+        let set_layout = create_layout(gpu, &counts, &yuv.samplers())?;
+        let (pool, set) = match create_set(gpu, set_layout, &counts, yuv.descriptors()) {
             Ok(made) => made,
             Err(error) => {
                 // SAFETY: the layout was just created and nothing uses it.
@@ -112,6 +81,7 @@ impl Bindless {
             textures: Array::new("number of textures", textures),
             samplers: Array::new("number of samplers", limits.max_bindless_samplers),
             tlas: Array::new("number of top-level acceleration structures", slot_count(gpu)),
+            yuv,
         };
         let entries = Mutex::new(Rank::Bindless, entries);
         Ok(Self { set_layout, set, pool, entries, checks, gpu: Arc::clone(gpu) })
@@ -130,6 +100,36 @@ impl Bindless {
         if let Some(table) = dummies.tlas_table {
             self.write_tlas_table(table);
         }
+        self.write_yuv(entries.yuv.all());
+    }
+
+    /// What stands in the slots of a conversion that nobody owns; before [`fill`](Self::fill).
+    pub(crate) fn set_yuv_dummy(&self, conversion: usize, view: vk::ImageView) {
+        self.lock().yuv.set_dummy(conversion, view);
+    }
+
+    /// The conversions that the device has.
+    pub(crate) fn yuv(&self) -> Vec<(usize, YuvConversion, vk::SamplerYcbcrConversion)> {
+        self.lock().yuv.made()
+    }
+
+    /// A slot for a texture in Y'CbCr, by this conversion or the first of its format.
+    pub(crate) fn reserve_yuv(
+        &self,
+        format: Format,
+        conversion: Option<usize>,
+        name: &str,
+    ) -> Result<YuvPlace> {
+        self.lock().yuv.reserve(format, conversion, name)
+    }
+
+    pub(crate) fn set_yuv(&self, slot: u32, view: vk::ImageView) {
+        self.lock().yuv.set(slot, view);
+    }
+
+    /// As [`free_texture`](Self::free_texture).
+    pub(crate) fn free_yuv(&self, slot: u32) {
+        self.lock().yuv.free(slot);
     }
 
     pub(crate) fn reserve_texture(&self, name: &str) -> Result<u32> {
@@ -231,6 +231,15 @@ impl Bindless {
         self.write_textures(dummies, entries.textures.take_dirty().into_iter());
         self.write_samplers(dummies, entries.samplers.take_dirty().into_iter());
         self.write_tlas(dummies, entries.tlas.take_dirty().into_iter());
+        self.write_yuv(entries.yuv.take_dirty());
+    }
+
+    fn write_yuv(&self, slots: Vec<(u32, vk::ImageView)>) {
+        let mut views = Runs::default();
+        for (slot, view) in slots {
+            views.push(slot, image(view, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL));
+        }
+        self.write(&views, layout::YCBCR, vk::DescriptorType::COMBINED_IMAGE_SAMPLER);
     }
 
     fn write_textures(&self, dummies: Dummies, slots: impl Iterator<Item = (u32, Option<TextureViews>)>) {
@@ -362,9 +371,9 @@ fn tlas_count(gpu: &Gpu) -> u32 {
 
 type Count = (u32, vk::DescriptorType, u32);
 
-fn create_layout(gpu: &Gpu, counts: &[Count]) -> Result<vk::DescriptorSetLayout> {
+fn create_layout(gpu: &Gpu, counts: &[Count], yuv: &[vk::Sampler]) -> Result<vk::DescriptorSetLayout> {
     let used: Vec<_> = counts.iter().filter(|(_, _, count)| *count > 0).collect();
-    let bindings: Vec<_> = used
+    let mut bindings: Vec<_> = used
         .iter()
         .map(|(binding, ty, count)| {
             vk::DescriptorSetLayoutBinding::default()
@@ -374,7 +383,16 @@ fn create_layout(gpu: &Gpu, counts: &[Count]) -> Result<vk::DescriptorSetLayout>
                 .stage_flags(vk::ShaderStageFlags::ALL)
         })
         .collect();
-    let flags: Vec<_> = used.iter().map(|(binding, _, _)| binding_flags(*binding)).collect();
+    let mut flags: Vec<_> = used.iter().map(|(binding, _, _)| binding_flags(*binding)).collect();
+    if !yuv.is_empty() {
+        let binding = vk::DescriptorSetLayoutBinding::default()
+            .binding(layout::YCBCR)
+            .descriptor_type(vk::DescriptorType::COMBINED_IMAGE_SAMPLER)
+            .immutable_samplers(yuv)
+            .stage_flags(vk::ShaderStageFlags::ALL);
+        bindings.push(binding);
+        flags.push(binding_flags(layout::YCBCR));
+    }
     let mut flags = vk::DescriptorSetLayoutBindingFlagsCreateInfo::default().binding_flags(&flags);
     let info = vk::DescriptorSetLayoutCreateInfo::default()
         .flags(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)
@@ -398,9 +416,12 @@ fn create_set(
     gpu: &Gpu,
     layout: vk::DescriptorSetLayout,
     counts: &[Count],
+    yuv: u32,
 ) -> Result<(vk::DescriptorPool, vk::DescriptorSet)> {
+    let yuv = (layout::YCBCR, vk::DescriptorType::COMBINED_IMAGE_SAMPLER, yuv);
     let sizes: Vec<_> = counts
         .iter()
+        .chain([&yuv])
         .filter(|(_, _, count)| *count > 0)
         .map(|(_, ty, count)| vk::DescriptorPoolSize::default().ty(*ty).descriptor_count(*count))
         .collect();

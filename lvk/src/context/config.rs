@@ -8,6 +8,7 @@ use crate::gpu::extra::ExtraExtensions;
 use crate::gpu::optional::OptionalFeature;
 use crate::gpu::profile::DeviceProfile;
 use crate::gpu::ray_query_path::RayQueryRequest;
+use crate::resource::ycbcr::YuvConversion;
 
 /// Describes a context.
 #[derive(Debug, Clone)]
@@ -62,6 +63,10 @@ pub struct ContextDesc<'a> {
     pub accel_budget_bytes: u64,
     /// Room for textures in the bindless set; clamped to what the device allows.
     pub max_textures: u32,
+    /// How textures in Y'CbCr may be converted. What the device lacks of it is an error only when such a texture is made.
+    pub yuv: &'a [YuvConversion],
+    /// Room for textures of each of these conversions, at most 1,024.
+    pub max_yuv_textures: u32,
     /// A file that keeps compiled pipelines from one run to the next (`VkPipelineCache`). It is read at the start,
     /// replaced by [`Context::save_pipeline_cache`](crate::Context::save_pipeline_cache) and at the end of the context.
     ///
@@ -105,6 +110,8 @@ impl Default for ContextDesc<'_> {
             scratch_budget_bytes: 64 << 20,
             accel_budget_bytes: u64::MAX,
             max_textures: 16_384,
+            yuv: &YuvConversion::DEFAULT,
+            max_yuv_textures: 7,
             pipeline_cache: None,
             shader_cache: None,
             tree_cache: None,

@@ -12,8 +12,14 @@ use crate::resource::view::TextureViewDesc;
 
 impl Context {
     /// Creates a texture (`vkCreateImage`). [`Holder::index`] is its element of `kTextures2D[]`, `kTextures3D[]`,
-    /// `kTexturesCube[]` and the storage images. Its first contents are there for every command submitted afterwards.
+    /// `kTexturesCube[]` and the storage images; of a texture in Y'CbCr it is the number for `textureBindlessYUV`. Its first contents are there for every command submitted afterwards.
     pub fn create_texture(&self, desc: &TextureDesc<'_>) -> Result<Holder<TextureHandle>> {
+        let holder = if desc.format.is_yuv() { self.new_yuv(desc)? } else { self.new_texture(desc)? };
+        self.fill_texture(holder.handle(), desc)?;
+        Ok(holder)
+    }
+
+    fn new_texture(&self, desc: &TextureDesc<'_>) -> Result<Holder<TextureHandle>> {
         let shared = self.shared();
         let slot = shared.reserve(|| shared.bindless.reserve_texture(desc.debug_name))?;
         let made = Texture::new(&shared.gpu, desc, slot).and_then(|texture| {
@@ -23,9 +29,26 @@ impl Context {
         });
         let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
         shared.bindless.set_texture(slot, views);
-        let holder = Holder::new(self, shared.store.textures.insert(texture), slot);
-        self.fill_texture(holder.handle(), desc)?;
-        Ok(holder)
+        Ok(Holder::new(self, shared.store.textures.insert(texture), slot))
+    }
+
+    fn new_yuv(&self, desc: &TextureDesc<'_>) -> Result<Holder<TextureHandle>> {
+        let shared = self.shared();
+        let bindless = &shared.bindless;
+        let reserve = || bindless.reserve_yuv(desc.format, desc.conversion, desc.debug_name);
+        let place = reserve().or_else(|_| {
+            shared.collect()?;
+            reserve()
+        })?;
+        let made =
+            Texture::with_conversion(&shared.gpu, desc, place.slot, place.conversion).and_then(|texture| {
+                check_data(desc, texture.mips())?;
+                let view = texture.sampled_view()?;
+                Ok((texture, view))
+            });
+        let (texture, view) = made.inspect_err(|_| bindless.free_yuv(place.slot))?;
+        bindless.set_yuv(place.slot, view);
+        Ok(Holder::new(self, shared.store.textures.insert(texture), place.slot))
     }
 
     /// Creates a view of a texture (`vkCreateImageView`): a texture that shows some mips and layers of another one, as
@@ -65,10 +88,13 @@ impl Context {
         let mut regions = Vec::with_capacity(mips as usize);
         let mut rest = data;
         for mip in 0..mips {
-            let region = texture.resolve_region(&TextureRegion { mip, layers: 0, ..Default::default() })?;
-            let (bytes, behind) = rest.split_at(region.bytes() as usize);
-            regions.push((region, bytes));
-            rest = behind;
+            for aspect in desc.format.uploaded() {
+                let region = TextureRegion { mip, layers: 0, aspect, ..Default::default() };
+                let region = texture.resolve_region(&region)?;
+                let (bytes, behind) = rest.split_at(region.bytes() as usize);
+                regions.push((region, bytes));
+                rest = behind;
+            }
         }
         for (region, bytes) in regions {
             self.upload_region(&texture, region, bytes)?;

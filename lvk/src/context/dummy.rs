@@ -32,6 +32,7 @@ pub(super) fn fill_dummies(ctx: &Context) -> Result<()> {
         Ok(())
     })?;
     let tlas = if shared.gpu.has_structures() { Some(empty_tlas(ctx)?) } else { None };
+    let mut textures = yuv_dummies(ctx)?;
     shared.bindless.fill(Dummies {
         sampled: sampled.sampled_view()?,
         storage: storage.storage_view()?,
@@ -39,7 +40,8 @@ pub(super) fn fill_dummies(ctx: &Context) -> Result<()> {
         tlas: tlas.as_ref().and_then(|tlas| Some(tlas.tlas().ok()?.structure.as_ref()?.raw)),
         tlas_table: shared.tlas_table.as_ref().map(|table| table.raw),
     });
-    let objects = DummyObjects { _textures: [sampled, storage], _sampler: sampler, _tlas: tlas };
+    textures.extend([sampled, storage]);
+    let objects = DummyObjects { _textures: textures, _sampler: sampler, _tlas: tlas };
     // The cell is empty: this runs once, while the context is made.
     let _ = shared.dummies.set(objects);
     Ok(())
@@ -52,6 +54,28 @@ fn checker(ctx: &Context, usage: TextureUsage) -> Result<Arc<Texture>> {
     let pixels = [MAGENTA, BLACK, BLACK, MAGENTA].concat();
     ctx.upload_texture_object(&texture, &TextureRegion::default(), &pixels)?;
     Ok(texture)
+}
+
+/// A black picture for each conversion.
+fn yuv_dummies(ctx: &Context) -> Result<Vec<Arc<Texture>>> {
+    let shared = ctx.shared();
+    let mut dummies = Vec::new();
+    for (number, conversion, raw) in shared.bindless.yuv() {
+        let format = conversion.format;
+        let desc = TextureDesc { format, extent: [2, 2], debug_name: "dummy texture", ..Default::default() };
+        let texture = Arc::new(Texture::with_conversion(&shared.gpu, &desc, SLOT, raw)?);
+        ctx.before_next_submission(|cmd| {
+            for aspect in format.uploaded() {
+                let region = TextureRegion { aspect, ..Default::default() };
+                let bytes = vec![0; texture.resolve_region(&region)?.bytes() as usize];
+                cmd.upload_texture(&texture, &region, &bytes)?;
+            }
+            Ok(())
+        })?;
+        shared.bindless.set_yuv_dummy(number, texture.sampled_view()?);
+        dummies.push(texture);
+    }
+    Ok(dummies)
 }
 
 fn empty_tlas(ctx: &Context) -> Result<Arc<AccelStruct>> {

@@ -13,8 +13,8 @@ use crate::accel::compaction::Compactions;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
 use crate::barrier::{QueryStages, ResourceId};
-use crate::bindless::Bindless;
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
+use crate::bindless::{Bindless, YuvSlots};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::{Capabilities, PhysicalDevice};
@@ -94,7 +94,8 @@ impl Context {
 }
 
 fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
-    let bindless = Bindless::new(&gpu, desc.max_textures, desc.check_indices)?;
+    let yuv = YuvSlots::new(&gpu, desc.yuv, desc.max_yuv_textures)?;
+    let bindless = Bindless::new(&gpu, desc.max_textures, yuv, desc.check_indices)?;
     Ok(Shared {
         dummies: OnceLock::new(),
         store: Store::new(),

@@ -18,6 +18,9 @@ pub enum Aspect {
     Main,
     /// The stencil, one byte a texel.
     Stencil,
+    /// A plane of a format in Y'CbCr, from 0 on. Its texels count by themselves: of colour differences there are half as many
+    /// columns and rows.
+    Plane(u8),
 }
 
 /// How shaders read colours.
@@ -35,6 +38,8 @@ pub(crate) struct Part {
     /// Width and height of the smallest piece that can be copied, in texels.
     pub(crate) block: [u32; 2],
     pub(crate) block_bytes: u32,
+    /// Texels of the image along x and y for one of the aspect.
+    pub(crate) shrink: u32,
 }
 
 impl Part {
@@ -45,6 +50,11 @@ impl Part {
         layers.into_iter().chain(blocks).fold(1, u64::saturating_mul)
     }
 
+    /// Width, height and depth of the aspect where the image has these.
+    pub(crate) fn shrunk(&self, [width, height, depth]: [u32; 3]) -> [u32; 3] {
+        [width.div_ceil(self.shrink), height.div_ceil(self.shrink), depth]
+    }
+
     /// Columns and rows of blocks that cover so many texels.
     pub(crate) fn blocks(&self, extent: [u32; 2]) -> [u32; 2] {
         [extent[0].div_ceil(self.block[0]), extent[1].div_ceil(self.block[1])]
@@ -53,9 +63,12 @@ impl Part {
 
 impl Format {
     /// Bytes of a box of texels, width x height x depth, as uploads and downloads move it, tightly packed: the colour, or
-    /// the depth without its stencil. Compressed formats round up to whole [blocks](Self::block_extent).
+    /// the depth without its stencil, or all planes one after the other. Compressed formats round up to whole [blocks](Self::block_extent).
     pub fn bytes(self, extent: [u32; 3]) -> u64 {
-        self.main().bytes(extent)
+        let Some(main) = self.part(Aspect::Main) else {
+            return self.planes().map(|plane| plane.bytes(plane.shrunk(extent))).sum();
+        };
+        main.bytes(extent)
     }
 
     /// Width and height of a block in texels: 4 x 4 of BC and ETC2, up to 12 x 12 of ASTC, and 1 x 1 of everything that is
@@ -67,6 +80,24 @@ impl Format {
     /// Whether texels are compressed in blocks.
     pub fn is_compressed(self) -> bool {
         self.class() == Class::Block
+    }
+
+    /// Whether texels are in Y'CbCr, in several planes.
+    pub fn is_yuv(self) -> bool {
+        matches!(self.class(), Class::TwoPlanes | Class::ThreePlanes)
+    }
+
+    /// The format in which a plane is seen by itself: numbers of 16 bits where 10 of them count. `None` where there is no such
+    /// plane.
+    pub fn plane_format(self, plane: u8) -> Option<Self> {
+        let wide = self.block().bytes == 2;
+        match (self.class(), plane) {
+            (Class::TwoPlanes | Class::ThreePlanes, 0) | (Class::ThreePlanes, 1 | 2) => {
+                Some(if wide { Self::R16Unorm } else { Self::R8Unorm })
+            }
+            (Class::TwoPlanes, 1) => Some(if wide { Self::Rg16Unorm } else { Self::Rg8Unorm }),
+            _ => None,
+        }
     }
 
     /// Whether texels hold depth, with or without stencil.
@@ -98,28 +129,30 @@ impl Format {
         match self.class() {
             Class::Uint | Class::Stencil => Numbers::Uint,
             Class::Sint => Numbers::Sint,
-            Class::Float | Class::Block | Class::Depth | Class::DepthStencil => Numbers::Float,
+            _ => Numbers::Float,
         }
     }
 
     /// All aspects, as barriers name them.
     pub(crate) fn aspects(self) -> vk::ImageAspectFlags {
         match self.class() {
-            Class::Float | Class::Uint | Class::Sint | Class::Block => vk::ImageAspectFlags::COLOR,
             Class::Depth => vk::ImageAspectFlags::DEPTH,
             Class::Stencil => vk::ImageAspectFlags::STENCIL,
             Class::DepthStencil => vk::ImageAspectFlags::DEPTH | vk::ImageAspectFlags::STENCIL,
+            _ => vk::ImageAspectFlags::COLOR,
         }
     }
 
     /// An aspect as copies move it, `None` where the format lacks it.
     pub(crate) fn part(self, aspect: Aspect) -> Option<Part> {
         match aspect {
-            Aspect::Main => Some(self.main()),
+            Aspect::Main => (!self.is_yuv()).then(|| self.main()),
+            Aspect::Plane(plane) => self.plane(plane),
             Aspect::Stencil => self.has_stencil().then_some(Part {
                 aspect: vk::ImageAspectFlags::STENCIL,
                 block: [1, 1],
                 block_bytes: 1,
+                shrink: 1,
             }),
         }
     }
@@ -128,7 +161,27 @@ impl Format {
         let block = self.block();
         let depth = vk::ImageAspectFlags::DEPTH;
         let aspect = if self.is_depth() { depth } else { self.aspects() };
-        Part { aspect, block: block.texels, block_bytes: block.bytes }
+        Part { aspect, block: block.texels, block_bytes: block.bytes, shrink: 1 }
+    }
+
+    /// A plane as copies name it.
+    fn plane(self, plane: u8) -> Option<Part> {
+        const ASPECTS: [vk::ImageAspectFlags; 3] =
+            [vk::ImageAspectFlags::PLANE_0, vk::ImageAspectFlags::PLANE_1, vk::ImageAspectFlags::PLANE_2];
+        let seen = self.plane_format(plane)?;
+        let aspect = *ASPECTS.get(usize::from(plane))?;
+        let shrink = if plane == 0 { 1 } else { 2 };
+        Some(Part { aspect, block: [1, 1], block_bytes: seen.block().bytes, shrink })
+    }
+
+    fn planes(self) -> impl Iterator<Item = Part> {
+        (0..3).filter_map(move |plane| self.plane(plane))
+    }
+
+    /// The aspects that together are all of the texels that uploads move.
+    pub(crate) fn uploaded(self) -> impl Iterator<Item = Aspect> {
+        let planes = (0..3).filter(move |plane| self.plane_format(*plane).is_some()).map(Aspect::Plane);
+        (!self.is_yuv()).then_some(Aspect::Main).into_iter().chain(planes)
     }
 
     /// Whether images of one format may be seen in the other: colours of the same number of bytes, and of compressed
@@ -172,6 +225,21 @@ mod tests {
         assert_eq!(Format::D32Float.part(Aspect::Stencil), None);
         assert_eq!(Format::S8Uint.part(Aspect::Main), Format::S8Uint.part(Aspect::Stencil));
         assert_eq!(Format::Rgba32Float.bytes([u32::MAX; 3]), u64::MAX);
+    }
+
+    #[test]
+    fn planes_of_differences_are_a_quarter_each() {
+        assert_eq!(Format::Nv12.bytes([8, 4, 1]), 32 + 16);
+        assert_eq!(Format::Yuv420p10.bytes([8, 4, 1]), 2 * (32 + 8 + 8));
+        assert_eq!(
+            Format::P010.part(Aspect::Plane(1)).map(|part| (part.block_bytes, part.shrink)),
+            Some((4, 2))
+        );
+        assert_eq!(Format::Nv12.part(Aspect::Plane(2)), None);
+        assert_eq!(Format::Nv12.part(Aspect::Main), None);
+        assert_eq!(Format::Rgba8Unorm.part(Aspect::Plane(0)), None);
+        assert_eq!(Format::Yuv420p8.uploaded().count(), 3);
+        assert_eq!(Format::D32FloatS8.uploaded().collect::<Vec<_>>(), [Aspect::Main]);
     }
 
     #[test]

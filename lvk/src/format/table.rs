@@ -7,7 +7,7 @@ use ash::vk;
 pub(super) struct Block {
     /// Width and height in texels: 1 for formats that are not compressed.
     pub(super) texels: [u32; 2],
-    /// Of depth with stencil those of the depth alone.
+    /// Of depth with stencil those of the depth alone, of planes those of Y.
     pub(super) bytes: u32,
 }
 
@@ -22,6 +22,10 @@ pub(super) enum Class {
     Depth,
     Stencil,
     DepthStencil,
+    /// Y'CbCr in a plane of Y and one of both differences, which have half the width and height.
+    TwoPlanes,
+    /// The same with a plane for each difference.
+    ThreePlanes,
 }
 
 const fn texel(bytes: u32) -> Block {
@@ -285,4 +289,12 @@ formats! {
     Astc12x12Unorm = ASTC_12X12_UNORM_BLOCK, block([12, 12], 16), Block;
     /// ASTC: blocks of 12 x 12 texels in 16 bytes, colour encoded as sRGB.
     Astc12x12Srgb = ASTC_12X12_SRGB_BLOCK, block([12, 12], 16), Block;
+    /// Y'CbCr, 8 bits: a plane of Y, and one of Cb and Cr with half the width and height.
+    Nv12 = G8_B8R8_2PLANE_420_UNORM, texel(1), TwoPlanes;
+    /// Y'CbCr, 8 bits: planes of Y, Cb and Cr, the last two with half the width and height.
+    Yuv420p8 = G8_B8_R8_3PLANE_420_UNORM, texel(1), ThreePlanes;
+    /// Y'CbCr, 10 bits in the upper ones of 16: a plane of Y, and one of Cb and Cr with half the width and height.
+    P010 = G10X6_B10X6R10X6_2PLANE_420_UNORM_3PACK16, texel(2), TwoPlanes;
+    /// Y'CbCr, 10 bits in the upper ones of 16: planes of Y, Cb and Cr, the last two with half the width and height.
+    Yuv420p10 = G10X6_B10X6_R10X6_3PLANE_420_UNORM_3PACK16, texel(2), ThreePlanes;
 }

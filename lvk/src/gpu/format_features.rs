@@ -39,6 +39,8 @@ fn needed(format: Format) -> Option<OptionalFeature> {
         Some(OptionalFeature::TextureCompressionAstcLdr)
     } else if matches!(format, Format::A8Unorm | Format::A1Bgr5Unorm) {
         Some(OptionalFeature::Maintenance5)
+    } else if format.is_yuv() {
+        Some(OptionalFeature::YcbcrConversion)
     } else {
         None
     }
@@ -51,8 +53,8 @@ mod tests {
     #[test]
     fn compressed_formats_need_features_of_their_own() {
         for format in Format::ALL {
-            let maintenance = needed(*format) == Some(OptionalFeature::Maintenance5);
-            assert_eq!(needed(*format).is_some() && !maintenance, format.is_compressed(), "{format:?}");
+            let other = [Some(OptionalFeature::Maintenance5), Some(OptionalFeature::YcbcrConversion), None];
+            assert_eq!(!other.contains(&needed(*format)), format.is_compressed(), "{format:?}");
         }
     }
 }

@@ -3,6 +3,7 @@
 use ash::vk;
 
 use super::image::{raw_usage, usage_of};
+use super::swizzle::Swizzle;
 use super::texture_desc::{TextureDesc, TextureKind, TextureUsage};
 use crate::error::{Error, Result, check_limit};
 use crate::format::Format;
@@ -45,6 +46,7 @@ fn check_shape(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<u32> {
     check_sides(gpu, desc)?;
     check_limit(name, "layer count", layers.into(), gpu.caps.limits.max_texture_layers.into())?;
     check_samples(desc)?;
+    check_yuv(desc)?;
     let full = 32 - width.max(height).max(depth).leading_zeros();
     if desc.mips > full {
         let message =
@@ -72,6 +74,27 @@ fn check_samples(desc: &TextureDesc<'_>) -> Result<()> {
     }
     if desc.data.is_some() {
         return wrong("data cannot be uploaded; draw to the texture, or clear it");
+    }
+    Ok(())
+}
+
+/// Fails where a texture in Y'CbCr is anything but a plain picture.
+fn check_yuv(desc: &TextureDesc<'_>) -> Result<()> {
+    if !desc.format.is_yuv() {
+        return Ok(());
+    }
+    let wrong = |message: &str| Err(Error::usage(desc.debug_name, format!("{:?}: {message}", desc.format)));
+    if desc.kind != TextureKind::D2 || desc.mips != 1 || desc.samples != 1 {
+        return wrong("textures in Y'CbCr are D2, with one mip and one sample");
+    }
+    if desc.extent.iter().any(|side| !side.is_multiple_of(2)) {
+        return wrong("two columns and two rows share a colour, so width and height are even");
+    }
+    if desc.usage != TextureUsage::SAMPLED || !desc.view_formats.is_empty() {
+        return wrong("textures in Y'CbCr are sampled only, and their planes seen in formats of their own");
+    }
+    if desc.swizzle != Swizzle::IDENTITY || desc.generate_mips {
+        return wrong("textures in Y'CbCr have neither a swizzle nor mips");
     }
     Ok(())
 }
@@ -125,6 +148,8 @@ fn check_view_formats(desc: &TextureDesc<'_>) -> Result<()> {
 fn flags(gpu: &Gpu, desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateFlags {
     use vk::ImageCreateFlags as Flags;
     let formats = match desc.view_formats {
+        // Its planes can be seen by themselves.
+        [] if desc.format.is_yuv() => Flags::MUTABLE_FORMAT,
         [] => Flags::empty(),
         _ => Flags::MUTABLE_FORMAT | Flags::EXTENDED_USAGE,
     };

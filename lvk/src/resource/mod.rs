@@ -12,6 +12,7 @@ pub(crate) mod swizzle;
 pub(crate) mod texture;
 pub(crate) mod texture_desc;
 pub(crate) mod view;
+pub(crate) mod ycbcr;
 
 pub(crate) use buffer::Buffer;
 pub(crate) use image_check::check as check_image;

@@ -89,7 +89,7 @@ impl Bounds {
         let (Some(layers), true) = (layers, region.mip < shown.mip_count) else {
             return Err(missing(region.mip, region.layer, region.layers, shown));
         };
-        let whole @ [width, height, slices] = self.mip_extent(region.mip);
+        let whole @ [width, height, slices] = part.shrunk(self.mip_extent(region.mip));
         let outside = || {
             format!("region {region:?} does not lie inside the mip's {width} x {height} x {slices} texels")
         };

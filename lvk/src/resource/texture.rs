@@ -32,12 +32,24 @@ pub(crate) struct Texture {
     /// Which part of the texels of the image.
     aspect: Aspect,
     swizzle: Swizzle,
+    /// How texels in Y'CbCr are converted; null for all others.
+    conversion: vk::SamplerYcbcrConversion,
 }
 
 impl Texture {
     /// A texture with an image of its own.
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, slot: u32) -> Result<Self> {
-        Ok(Self::of(gpu, desc, Image::new(gpu, desc)?, slot))
+        Self::with_conversion(gpu, desc, slot, vk::SamplerYcbcrConversion::null())
+    }
+
+    /// As [`new`](Self::new), for texels in Y'CbCr, which are converted so.
+    pub(crate) fn with_conversion(
+        gpu: &Arc<Gpu>,
+        desc: &TextureDesc<'_>,
+        slot: u32,
+        conversion: vk::SamplerYcbcrConversion,
+    ) -> Result<Self> {
+        Ok(Self { conversion, ..Self::of(gpu, desc, Image::new(gpu, desc)?, slot) })
     }
 
     /// A texture with an image of somebody else's, which is as described.
@@ -57,6 +69,7 @@ impl Texture {
             name: desc.debug_name.to_owned(),
             aspect: Aspect::Main,
             swizzle: desc.swizzle,
+            conversion: vk::SamplerYcbcrConversion::null(),
             image: Arc::new(image),
         }
     }
@@ -76,6 +89,7 @@ impl Texture {
             name: desc.debug_name.to_owned(),
             aspect: shown.aspect,
             swizzle: desc.swizzle.after(self.swizzle),
+            conversion: vk::SamplerYcbcrConversion::null(),
         })
     }
 
@@ -137,7 +151,12 @@ impl Texture {
         let info = ViewInfo {
             kind,
             format: self.format,
-            aspect: if drawn { self.shown_aspects() } else { self.part_of(Aspect::Main)?.aspect },
+            aspect: if drawn || self.is_yuv() {
+                self.shown_aspects()
+            } else {
+                self.part_of(Aspect::Main)?.aspect
+            },
+            conversion: self.conversion,
             range,
             swizzle: if sampled { self.swizzle } else { Swizzle::IDENTITY },
             usage: raw_usage(usage, self.format),
@@ -183,11 +202,17 @@ impl Texture {
         Bounds { shown: self.range, extent: [width, height, self.image.depth] }
     }
 
-    /// All aspects that the texture shows.
+    /// Whether shaders reach it through the sampler of its conversion.
+    pub(crate) fn is_yuv(&self) -> bool {
+        self.format.is_yuv()
+    }
+
+    /// All aspects that the texture shows; none of planes, which are only copied and sampled.
     pub(crate) fn shown_aspects(&self) -> vk::ImageAspectFlags {
         match self.aspect {
             Aspect::Main => self.image.format.aspects(),
             Aspect::Stencil => vk::ImageAspectFlags::STENCIL,
+            Aspect::Plane(_) => vk::ImageAspectFlags::empty(),
         }
     }
 
@@ -276,7 +301,12 @@ impl Texture {
             kind => kind,
         });
         let range = self.check_view_range(desc, kind)?;
-        let format = desc.format.unwrap_or(self.format);
+        let aspect = if desc.aspect == Aspect::Main { self.aspect } else { desc.aspect };
+        let plane = match aspect {
+            Aspect::Plane(plane) => self.image.format.plane_format(plane),
+            Aspect::Main | Aspect::Stencil => None,
+        };
+        let format = desc.format.or(plane).unwrap_or(self.format);
         let allowed = self.image.usage_in(format);
         let wrong = |message: String| Err(Error::usage(desc.debug_name, message));
         let volume = TextureKind::D3 { depth: self.mip_depth(desc.base_mip) };
@@ -295,10 +325,9 @@ impl Texture {
                 self.name
             ));
         }
-        if !self.image.has_format(format) {
+        if !self.image.has_format(format) && plane != Some(format) {
             return wrong(format!("list {format:?} in the view_formats of the texture of '{}'", self.name));
         }
-        let aspect = if desc.aspect == Aspect::Main { self.aspect } else { desc.aspect };
         if self.image.format.part(aspect).is_none() {
             return wrong(format!("'{}' is {:?}, which has no {aspect:?}", self.name, self.image.format));
         }

@@ -100,10 +100,12 @@ pub struct TextureDesc<'a> {
     /// Which channels of a texel the four that shaders sample are. Storage images and targets show the channels as they are.
     pub swizzle: Swizzle,
     /// First contents, tightly packed: of each mip in turn, from 0 on, all layers or slices one after the other. Of depth
-    /// with stencil the depth.
+    /// with stencil the depth; of Y'CbCr all planes one after the other.
     pub data: Option<&'a [u8]>,
     /// Number of mips that `data` has; 0 is all.
     pub data_mips: u32,
+    /// Which of [`ContextDesc::yuv`](crate::ContextDesc) converts a texture in Y'CbCr; `None` is the first of its format.
+    pub conversion: Option<usize>,
     /// Fills the other mips by halving the last of `data`, which holds one (colour formats the device can filter).
     pub generate_mips: bool,
     /// Name in error messages, validation messages and debuggers.
@@ -123,6 +125,7 @@ impl Default for TextureDesc<'_> {
             swizzle: Swizzle::IDENTITY,
             data: None,
             data_mips: 1,
+            conversion: None,
             generate_mips: false,
             debug_name: "texture",
         }

@@ -34,7 +34,8 @@ pub struct TextureViewDesc<'a> {
     /// Format shaders and passes take the texels for: the texture's own, or one of its
     /// [`view_formats`](crate::TextureDesc::view_formats). `None` is the texture's.
     pub format: Option<Format>,
-    /// Which part of the texels shaders sample: the stencil of a format that has it is an element of `kTexturesU2D[]`.
+    /// Which part of the texels shaders sample: the stencil of a format that has it is an element of `kTexturesU2D[]`. A
+    /// plane of a format in Y'CbCr is a texture of [its own format](Format::plane_format).
     pub aspect: Aspect,
     /// Channels as shaders sample them. Storage images and targets show the channels as they are.
     pub swizzle: Swizzle,
@@ -54,6 +55,8 @@ pub(crate) struct ViewInfo {
     pub(crate) range: Subresources,
     pub(crate) swizzle: Swizzle,
     pub(crate) usage: vk::ImageUsageFlags,
+    /// How texels in Y'CbCr are converted; null for all others.
+    pub(crate) conversion: vk::SamplerYcbcrConversion,
 }
 
 /// The Vulkan views of one texture, made when they are first needed and destroyed on drop.
@@ -74,13 +77,17 @@ impl ViewCache {
             return Ok(*view);
         }
         let mut usage = vk::ImageViewUsageCreateInfo::default().usage(info.usage);
-        let create = vk::ImageViewCreateInfo::default()
+        let mut conversion = vk::SamplerYcbcrConversionInfo::default().conversion(info.conversion);
+        let mut create = vk::ImageViewCreateInfo::default()
             .image(image.raw)
             .view_type(info.kind)
             .format(info.format.raw())
             .components(info.swizzle.raw())
             .subresource_range(raw_range(info.aspect, info.range))
             .push_next(&mut usage);
+        if info.conversion != vk::SamplerYcbcrConversion::null() {
+            create = create.push_next(&mut conversion);
+        }
         // SAFETY: the image is alive, the range lies inside it, and it allows the kind, the format and the usage.
         let view = unsafe { self.gpu.device.create_image_view(&create, None) }
             .map_err(Error::vulkan("vkCreateImageView"))?;

@@ -154,6 +154,8 @@ pub enum ShaderSource<'a> {
 ///   the cube as fourth coordinate, `textureBindlessCubeArrayShadow(tex, smp, dirCube, reference)` and
 ///   `textureBindlessSizeCubeArray(tex)`; after `LVK_TEXTURES(texture1D, kTextures1D);` there are `textureBindless1D[Lod]`,
 ///   `textureBindlessFetch1D(tex, texel, lod)` and `textureBindlessSize1D(tex)`.
+/// * Textures in Y'CbCr: `LVK_YUV_TEXTURES(kYuv);` at global scope, then `textureBindlessYUV(kYuv, index, uv)` answers a colour;
+///   the index must be a constant, for instance one of specialisation.
 /// * Storage images: `kImages2D`, `kImages2DArray`, `kImages3D`, `kImagesU2D`, `kImagesI2D` take stores of any format
 ///   (and loads where `LVK_FORMATLESS_READ` is defined, that is where the device can load without a format). To load
 ///   elsewhere, or to use atomics, name the format once at global scope:

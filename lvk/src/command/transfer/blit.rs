@@ -115,6 +115,9 @@ impl CommandBuffer {
 
 /// Whether Vulkan scales between the formats at all.
 fn scales(from: Format, to: Format, filter: Filter) -> bool {
+    if from.is_yuv() || to.is_yuv() {
+        return false;
+    }
     if from.is_color() && to.is_color() {
         return from.numbers() == to.numbers();
     }

@@ -104,8 +104,8 @@ fn check_value(texture: &Texture, value: ClearValue) -> Result<vk::ImageAspectFl
     if !texture.shown_aspects().contains(wanted) {
         return wrong("it does not hold that");
     }
-    if format.is_compressed() {
-        return wrong("blocks are only copied");
+    if format.is_compressed() || format.is_yuv() {
+        return wrong("its texels are only copied");
     }
     if numbers.is_some_and(|numbers| numbers != format.numbers()) {
         return wrong("its numbers are of another kind");

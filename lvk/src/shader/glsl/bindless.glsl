@@ -11,6 +11,11 @@ layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform texture2DMS 
 // textureCubeArray, utexture3D and so on.
 #define LVK_TEXTURES(type, name) layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform type name[]
 
+// Textures in Y'CbCr with their conversions, declared by the shaders that want them; the index is a constant, also one of
+// specialisation.
+#define LVK_YUV_TEXTURES(name) layout(set = LVK_SET, binding = LVK_BINDING_YCBCR) uniform sampler2D name[]
+#define textureBindlessYUV(name, index, uv) textureLod(name[index], uv, 0.0)
+
 layout(set = LVK_SET, binding = LVK_BINDING_SAMPLERS) uniform sampler kSamplers[];
 layout(set = LVK_SET, binding = LVK_BINDING_SAMPLERS) uniform samplerShadow kSamplersShadow[];
 

@@ -1,0 +1,146 @@
+//! Slots of textures in Y'CbCr: a range of one binding for each conversion, whose sampler lies in the layout.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::array::Array;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::resource::ycbcr::{YuvConversion, YuvSampler};
+
+/// Conversions of a context, each with its textures.
+pub(crate) struct YuvSlots {
+    ranges: Vec<Range>,
+    /// Slots of each conversion that the device has, its dummy included.
+    room: u32,
+}
+
+struct Range {
+    desc: YuvConversion,
+    /// The conversion, or what the device lacks for it.
+    sampler: Result<Arc<YuvSampler>, &'static str>,
+    /// First slot in the binding.
+    first: u32,
+    textures: Array<vk::ImageView>,
+    dummy: Option<vk::ImageView>,
+}
+
+/// Where a texture goes, and how it is converted.
+pub(crate) struct YuvPlace {
+    pub(crate) slot: u32,
+    pub(crate) conversion: vk::SamplerYcbcrConversion,
+}
+
+impl YuvSlots {
+    const MOST_TEXTURES: u32 = 1_024;
+
+    /// Makes the conversions that the device has, each with room for so many textures.
+    pub(crate) fn new(gpu: &Arc<Gpu>, descs: &[YuvConversion], textures: u32) -> Result<Self> {
+        let room = textures.min(Self::MOST_TEXTURES) + 1;
+        let (mut ranges, mut first) = (Vec::with_capacity(descs.len()), 0);
+        for desc in descs {
+            let sampler = YuvSampler::new(gpu, desc)?.map(Arc::new);
+            let own = if sampler.is_ok() { room } else { 0 };
+            let textures = Array::new("number of textures of a conversion", own);
+            ranges.push(Range { desc: *desc, sampler, first, textures, dummy: None });
+            first += own;
+        }
+        Ok(Self { ranges, room })
+    }
+
+    /// The immutable samplers of the binding, one a slot.
+    pub(super) fn samplers(&self) -> Vec<vk::Sampler> {
+        let made = self.ranges.iter().filter_map(|range| range.sampler.as_ref().ok());
+        made.flat_map(|made| std::iter::repeat_n(made.sampler, self.room as usize)).collect()
+    }
+
+    /// Descriptors that the slots take of a pool.
+    pub(super) fn descriptors(&self) -> u32 {
+        let made = self.ranges.iter().filter_map(|range| range.sampler.as_ref().ok());
+        made.map(|made| made.descriptors * self.room).sum()
+    }
+
+    /// The conversions that need a dummy, by their numbers.
+    pub(crate) fn made(&self) -> Vec<(usize, YuvConversion, vk::SamplerYcbcrConversion)> {
+        let made = |(number, range): (usize, &Range)| {
+            let sampler = range.sampler.as_ref().ok()?;
+            Some((number, range.desc, sampler.conversion))
+        };
+        self.ranges.iter().enumerate().filter_map(made).collect()
+    }
+
+    /// Takes a slot for a texture of `format` by this conversion, or by the first of its format.
+    pub(super) fn reserve(
+        &mut self,
+        format: crate::Format,
+        conversion: Option<usize>,
+        name: &str,
+    ) -> Result<YuvPlace> {
+        let first = self.ranges.iter().position(|range| range.desc.format == format);
+        let chosen = conversion.or(first).and_then(|number| self.ranges.get_mut(number));
+        let Some(range) = chosen.filter(|range| range.desc.format == format) else {
+            let message =
+                format!("list a conversion of {format:?} in ContextDesc::yuv, and name it by its number");
+            return Err(Error::usage(name, message));
+        };
+        let sampler = range.sampler.as_ref().map_err(|lack| {
+            Error::unsupported(format!("texture '{name}' converted by {:?}", range.desc), *lack)
+        })?;
+        let conversion = sampler.conversion;
+        let slot = range.first + range.textures.reserve(name)?;
+        Ok(YuvPlace { slot, conversion })
+    }
+
+    pub(super) fn set(&mut self, slot: u32, view: vk::ImageView) {
+        if let Some((range, own)) = self.range(slot) {
+            range.textures.set(own, Some(view));
+        }
+    }
+
+    pub(super) fn free(&mut self, slot: u32) {
+        if let Some((range, own)) = self.range(slot) {
+            range.textures.set(own, None);
+            range.textures.slots.free(own);
+        }
+    }
+
+    pub(super) fn set_dummy(&mut self, conversion: usize, view: vk::ImageView) {
+        if let Some(range) = self.ranges.get_mut(conversion) {
+            range.dummy = Some(view);
+        }
+    }
+
+    /// All slots with what stands in them, in rising order.
+    pub(super) fn all(&self) -> Vec<(u32, vk::ImageView)> {
+        let slots = |range: &Range| {
+            let slots = range.dummy.map(|dummy| (range.first..range.first + self.room, dummy));
+            slots
+                .into_iter()
+                .flat_map(|(slots, dummy)| slots.map(move |slot| (slot, dummy)))
+                .collect::<Vec<_>>()
+        };
+        self.ranges.iter().flat_map(slots).collect()
+    }
+
+    /// Slots to write again, in rising order.
+    pub(super) fn take_dirty(&mut self) -> Vec<(u32, vk::ImageView)> {
+        let mut dirty = Vec::new();
+        for range in &mut self.ranges {
+            let (first, dummy) = (range.first, range.dummy);
+            let own = range.textures.take_dirty();
+            dirty.extend(own.into_iter().filter_map(|(slot, view)| Some((first + slot, view.or(dummy)?))));
+        }
+        dirty
+    }
+
+    fn range(&mut self, slot: u32) -> Option<(&mut Range, u32)> {
+        let range = self
+            .ranges
+            .iter_mut()
+            .filter(|range| range.sampler.is_ok())
+            .rfind(|range| range.first <= slot)?;
+        let own = slot - range.first;
+        Some((range, own))
+    }
+}
