@@ -175,7 +175,7 @@ pub use resource::query::{PipelineStatistics, QueryKind, QueryPoolDesc};
 pub use resource::region::{TextureRange, TextureRegion};
 pub use resource::sampler::{AddressMode, BorderColor, CompareOp, Filter, Reduction, SamplerDesc};
 pub use resource::swizzle::{Channel, Swizzle};
-pub use resource::texture_desc::{TextureDesc, TextureKind, TextureUsage};
+pub use resource::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage};
 pub use resource::view::TextureViewDesc;
 pub use resource::ycbcr::{ChromaSite, YuvConversion, YuvModel, YuvRange};
 #[cfg(feature = "glsl")]

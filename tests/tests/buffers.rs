@@ -264,3 +264,51 @@ fn updates_of_any_size_and_copies_of_several_ranges_write_what_they_say() {
     let copied = [&expected[..10], &[0; 90], &expected[5..55], &[0; 10]].concat();
     assert_eq!(found[..160], copied);
 }
+
+#[test]
+fn mapped_buffers_are_written_and_read_in_place() {
+    let Some(ctx) = device() else { return };
+    let make = |memory| {
+        let desc = BufferDesc { memory, size_bytes: 10, debug_name: "in place", ..Default::default() };
+        ctx.create_buffer(&desc).unwrap()
+    };
+    let (source, target) = (make(MemoryKind::HostVisible), make(MemoryKind::Readback));
+    let bytes = ctx.map_buffer(*source).unwrap();
+    assert_eq!(bytes.len(), 10);
+    // SAFETY: the buffer is alive, and no command uses it yet.
+    unsafe { bytes.cast::<[u8; 10]>().write([7, 6, 5, 4, 3, 2, 1, 0, 255, 254]) };
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.copy_buffer(*source, 0, *target, 0, 10).unwrap();
+    ctx.wait(ctx.submit(cmd).unwrap()).unwrap();
+    // SAFETY: the copy is done, and nothing else writes the buffer.
+    let found = unsafe { ctx.map_buffer(*target).unwrap().cast::<[u8; 10]>().read() };
+    assert_eq!(found, [7, 6, 5, 4, 3, 2, 1, 0, 255, 254]);
+    let error = ctx.map_buffer(*make(MemoryKind::Device)).unwrap_err();
+    assert!(matches!(&error, Error::InvalidUsage { object, .. } if object == "in place"), "{error}");
+}
+
+#[test]
+fn addresses_inside_of_buffers_are_checked() {
+    let Some(ctx) = device() else { return };
+    let buffer = buffer(&ctx, MemoryKind::Device, &[0; 10]);
+    let start = ctx.buffer_address(*buffer).unwrap();
+    assert_eq!(ctx.buffer_address_at(*buffer, 0).unwrap(), start);
+    assert_eq!(ctx.buffer_address_at(*buffer, 9).unwrap(), start + 9);
+    for offset in [10, u64::MAX] {
+        let error = ctx.buffer_address_at(*buffer, offset).unwrap_err();
+        assert!(matches!(error, Error::InvalidUsage { .. }), "{error}");
+    }
+}
+
+#[test]
+fn more_memory_than_one_allocation_may_have_is_an_error() {
+    let Some(ctx) = device() else { return };
+    let limits = ctx.capabilities().limits;
+    if limits.max_allocation_bytes >= limits.max_buffer_bytes {
+        eprintln!("NOT TESTED, one allocation may be as large as the largest buffer");
+        return;
+    }
+    let size_bytes = limits.max_allocation_bytes + 1;
+    let error = ctx.create_buffer(&BufferDesc { size_bytes, ..Default::default() }).unwrap_err();
+    assert!(matches!(error, Error::LimitExceeded { .. }), "{error}");
+}

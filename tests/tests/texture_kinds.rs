@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    ClearValue, ColorAttachment, Context, Dependencies, DepthAttachment, Error, Filter, Format, Holder,
-    RenderPassDesc, TextureDesc, TextureHandle, TextureKind, TextureRange, TextureRegion, TextureUsage,
-    TextureViewDesc,
+    ClearValue, ColorAttachment, ColorLoad, Context, Dependencies, DepthAttachment, Error, Filter, Format,
+    Holder, RenderPassDesc, TextureDesc, TextureHandle, TextureKind, TextureMemory, TextureRange,
+    TextureRegion, TextureUsage, TextureViewDesc,
 };
 use lvk_tests::compute::{Evaluator, compute_pipeline};
 use lvk_tests::device;
@@ -522,4 +522,45 @@ fn what_several_samples_exclude_is_an_error() {
     for (index, result) in results.into_iter().enumerate() {
         assert!(matches!(result, Err(Error::InvalidUsage { .. })), "{index}: {result:?}");
     }
+}
+
+#[test]
+fn transient_targets_live_in_their_pass_only() {
+    let Some(ctx) = device() else { return };
+    let usage = TextureUsage::TARGET;
+    let memory = TextureMemory::Transient;
+    let plain = TextureDesc { usage, memory, extent: [4, 4], debug_name: "transient", ..Default::default() };
+    let color = texture(&ctx, &plain);
+    let depth = texture(&ctx, &TextureDesc { format: Format::D32Float, ..plain });
+    let cleared = ColorAttachment { store: false, ..ColorAttachment::clear(*color, [1.0; 4]) };
+    let deep = DepthAttachment { store: false, ..DepthAttachment::clear(*depth, 1.0) };
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let pass = RenderPassDesc { color: &[cleared], depth: Some(deep), ..Default::default() };
+    drop(cmd.begin_rendering(&pass).unwrap());
+    let whole = TextureRegion::default();
+    let stored =
+        RenderPassDesc { color: &[ColorAttachment { store: true, ..cleared }], ..Default::default() };
+    let loaded = ColorAttachment { load: ColorLoad::Load, ..cleared };
+    let loaded = RenderPassDesc { color: &[loaded], ..Default::default() };
+    let kept = RenderPassDesc { depth: Some(DepthAttachment { store: true, ..deep }), ..Default::default() };
+    let other = texture(&ctx, &TextureDesc { extent: [4, 4], ..Default::default() });
+    let results = [
+        cmd.begin_rendering(&stored).map(drop),
+        cmd.begin_rendering(&loaded).map(drop),
+        cmd.begin_rendering(&kept).map(drop),
+        cmd.copy_texture(*color, &whole, *other, &whole),
+        cmd.copy_texture(*other, &whole, *color, &whole),
+        cmd.clear_texture(*color, ClearValue::Color([0.0; 4]), &TextureRange::default()),
+        ctx.upload_texture(*color, &whole, &[0; 64]),
+        ctx.download_texture(*color, &whole).map(drop),
+        ctx.create_texture(&TextureDesc { usage: usage | TextureUsage::SAMPLED, ..plain }).map(drop),
+        ctx.create_texture(&TextureDesc { data: Some(&[0; 64]), ..plain }).map(drop),
+    ];
+    for (index, result) in results.into_iter().enumerate() {
+        assert!(
+            matches!(&result, Err(Error::InvalidUsage { object, .. }) if object == "transient"),
+            "{index}: {result:?}"
+        );
+    }
+    ctx.submit(cmd).unwrap();
 }

@@ -79,6 +79,7 @@ impl CommandBuffer {
 }
 
 fn check_resolve(source: &Target, to: &Target) -> Result<()> {
+    to.texture.check_kept()?;
     let name = &to.texture.name;
     let from = &source.texture;
     if from.image.samples == 1 || to.texture.image.samples != 1 {

@@ -76,6 +76,9 @@ impl CommandBuffer {
             let ColorAttachment { texture, mip, layer, .. } = *attachment;
             let target = self.target(texture, mip, layer, layers, &mut size)?;
             check_color(&target.texture, attachment.load)?;
+            if attachment.store || attachment.load == ColorLoad::Load {
+                target.texture.check_kept()?;
+            }
             check_apart(&target, &mut drawn)?;
             self.use_texture(
                 &target.texture,
@@ -124,6 +127,9 @@ impl CommandBuffer {
     ) -> Result<()> {
         let texture = &target.texture;
         check_depth(texture, attachment)?;
+        if is_kept(texture, attachment) {
+            texture.check_kept()?;
+        }
         let next = if attachment.read_only { Use::depth_read() } else { Use::depth_target() };
         self.use_texture(texture, target.part(), next)?;
         let view = target.view()?;
@@ -194,6 +200,13 @@ fn clear_name(format: Format) -> &'static str {
         Numbers::Uint => "ClearUint",
         Numbers::Sint => "ClearSint",
     }
+}
+
+/// Whether the pass needs what was in the target before it, or leaves something for after it.
+fn is_kept(texture: &Texture, attachment: &DepthAttachment) -> bool {
+    let stencil = attachment.stencil_store || attachment.stencil == StencilLoad::Load;
+    let depth = attachment.store || attachment.load == DepthLoad::Load;
+    depth || attachment.read_only || (texture.format.has_stencil() && stencil)
 }
 
 fn check_depth(texture: &Texture, attachment: &DepthAttachment) -> Result<()> {

@@ -26,9 +26,10 @@ impl Context {
     /// Creates a buffer (`vkCreateBuffer`). Its first contents are there for every command submitted afterwards.
     pub fn create_buffer(&self, desc: &BufferDesc<'_>) -> Result<Holder<BufferHandle>> {
         let buffer = Buffer::new(&self.shared().gpu, desc, InternalUsage::NONE)?;
+        let staged = desc.data.filter(|data| !buffer.write_first(data));
         let handle = self.shared().store.buffers.insert(buffer);
         let holder = Holder::new(self, handle, NO_SLOT);
-        if let Some(data) = desc.data {
+        if let Some(data) = staged {
             self.upload_buffer(handle, 0, data)?;
         }
         Ok(holder)

@@ -1,10 +1,11 @@
 //! Moves data between host and GPU.
 
+use std::ptr::NonNull;
 use std::sync::Arc;
 
 use super::Context;
 use crate::command::transfer::BufferCopy;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::Buffer;
 use crate::resource::region::TextureRegion;
@@ -13,6 +14,35 @@ impl Context {
     /// The address by which shaders reach a buffer (`vkGetBufferDeviceAddress`).
     pub fn buffer_address(&self, buffer: BufferHandle) -> Result<u64> {
         Ok(self.shared().store.buffers.get(buffer)?.address)
+    }
+
+    /// The address of a byte of a buffer.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for bytes behind its end.
+    pub fn buffer_address_at(&self, buffer: BufferHandle, offset: u64) -> Result<u64> {
+        let buffer = self.shared().store.buffers.get(buffer)?;
+        buffer.check_range(offset, 1)?;
+        Ok(buffer.address + offset)
+    }
+
+    /// The bytes of a buffer in [`HostVisible`](crate::MemoryKind::HostVisible) or [`Readback`](crate::MemoryKind::Readback) memory, for
+    /// callers that write or read in place.
+    ///
+    /// The pointer is good until the buffer's handle is destroyed. The memory is coherent: what the host writes is there for
+    /// every command submitted afterwards, and what commands wrote is there once their submission is
+    /// [waited](Self::wait) for, provided that they named the buffer; nothing has to be flushed or invalidated. The GPU may
+    /// use the bytes at any time, so it is the caller who keeps both apart, and no reference to them should be made while it
+    /// may write.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for buffers in device memory.
+    pub fn map_buffer(&self, buffer: BufferHandle) -> Result<NonNull<[u8]>> {
+        let buffer = self.shared().store.buffers.get(buffer)?;
+        let message =
+            "device memory is not mapped; create the buffer with MemoryKind::HostVisible or Readback";
+        let start = buffer.mapped().ok_or_else(|| Error::usage(&buffer.name, message))?;
+        Ok(NonNull::slice_from_raw_parts(start, buffer.size_bytes as usize))
     }
 
     /// Writes bytes into a buffer.

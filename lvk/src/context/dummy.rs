@@ -64,14 +64,11 @@ fn yuv_dummies(ctx: &Context) -> Result<Vec<Arc<Texture>>> {
         let format = conversion.format;
         let desc = TextureDesc { format, extent: [2, 2], debug_name: "dummy texture", ..Default::default() };
         let texture = Arc::new(Texture::with_conversion(&shared.gpu, &desc, SLOT, raw)?);
-        ctx.before_next_submission(|cmd| {
-            for aspect in format.uploaded() {
-                let region = TextureRegion { aspect, ..Default::default() };
-                let bytes = vec![0; texture.resolve_region(&region)?.bytes() as usize];
-                cmd.upload_texture(&texture, &region, &bytes)?;
-            }
-            Ok(())
-        })?;
+        for aspect in format.uploaded() {
+            let region = TextureRegion { aspect, ..Default::default() };
+            let bytes = vec![0; texture.resolve_region(&region)?.bytes() as usize];
+            ctx.upload_texture_object(&texture, &region, &bytes)?;
+        }
         shared.bindless.set_yuv_dummy(number, texture.sampled_view()?);
         dummies.push(texture);
     }

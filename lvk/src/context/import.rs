@@ -78,6 +78,10 @@ impl Context {
     /// [`create_texture`](Self::create_texture).
     pub unsafe fn import_texture(&self, import: &ImportedTexture<'_>) -> Result<Holder<TextureHandle>> {
         let (shared, desc) = (self.shared(), &import.desc);
+        if desc.format.is_yuv() {
+            let message = "textures in Y'CbCr are not imported; create one, and copy the planes to it";
+            return Err(Error::usage(desc.debug_name, message));
+        }
         if import.image == vk::Image::null() {
             return Err(Error::usage(desc.debug_name, "the image to import is null"));
         }

@@ -189,6 +189,8 @@ pub struct Limits {
     pub depth_samples: u32,
     /// Largest buffer in bytes (`maxBufferSize`).
     pub max_buffer_bytes: u64,
+    /// Most memory of one buffer or texture, in bytes (`maxMemoryAllocationSize`).
+    pub max_allocation_bytes: u64,
     /// Most bytes a shader reaches through one storage buffer descriptor (`maxStorageBufferRange`).
     pub max_storage_buffer_range: u64,
     /// Push constants in bytes (`maxPushConstantsSize`).
@@ -407,6 +409,7 @@ impl PhysicalDevice {
         caps.helpers_lose_arrays = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.limits = limits(&plain.limits, &v12, &v13, &accel, &pipeline);
         caps.limits.mesh = MeshLimits::of(&mesh);
+        caps.limits.max_allocation_bytes = v11.max_memory_allocation_size;
         caps.limits.max_custom_borders = borders.max_custom_border_color_samplers;
         caps.limits.max_views = v11.max_multiview_view_count;
     }
@@ -481,6 +484,7 @@ fn limits(
         color_samples: plain.framebuffer_color_sample_counts.as_raw(),
         depth_samples: plain.framebuffer_depth_sample_counts.as_raw(),
         max_buffer_bytes: v13.max_buffer_size,
+        max_allocation_bytes: 0,
         max_storage_buffer_range: plain.max_storage_buffer_range.into(),
         max_push_constant_bytes: plain.max_push_constants_size,
         max_color_targets: plain.max_color_attachments.min(8),

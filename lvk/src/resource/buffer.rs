@@ -199,6 +199,18 @@ impl Buffer {
         self.allocation.as_ref()?.mapped_ptr().map(NonNull::cast)
     }
 
+    /// Writes the first contents of a buffer that nothing has used yet, where its memory happens to be in reach of the host,
+    /// as device memory is on some devices. `false` if it is not; the bytes fit the buffer.
+    pub(crate) fn write_first(&self, bytes: &[u8]) -> bool {
+        let coherent = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
+        let reached = self.allocation.as_ref().filter(|own| own.memory_properties().contains(coherent));
+        let Some(start) = reached.and_then(Allocation::mapped_ptr) else { return false };
+        debug_assert!(bytes.len() as u64 <= self.size_bytes);
+        // SAFETY: the mapping has the buffer's size and lives as long as `self`, which nobody else knows yet.
+        unsafe { start.cast::<u8>().as_ptr().copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) };
+        true
+    }
+
     /// Has `fill` write all of the mapped memory. `false` if the buffer is not mapped.
     pub(crate) fn fill(&self, fill: impl FnOnce(&mut [u8])) -> bool {
         let Some(start) = self.mapped() else { return false };

@@ -7,7 +7,7 @@ use ash::vk;
 use gpu_allocator::vulkan::Allocation;
 
 use super::image_check::{ImagePlan, check};
-use super::texture_desc::{TextureDesc, TextureUsage};
+use super::texture_desc::{TextureDesc, TextureMemory, TextureUsage};
 use crate::barrier::{ResourceId, Subresources, TextureShape};
 use crate::error::{Error, Result};
 use crate::format::Format;
@@ -35,10 +35,19 @@ pub(crate) struct Image {
     pub(crate) cube_compatible: bool,
     /// Textures with a handle, or waiting to be destroyed, that show the image.
     handles: AtomicU32,
-    allocation: Option<Allocation>,
+    /// Whether the image lives in passes only.
+    pub(crate) transient: bool,
+    memory: Option<Memory>,
     /// Somebody else made it, and destroys it.
     is_foreign: bool,
     gpu: Arc<Gpu>,
+}
+
+/// Memory of an image.
+enum Memory {
+    Managed(Allocation),
+    /// Of its own, only there while a pass needs it.
+    Lazy(vk::DeviceMemory),
 }
 
 /// An image as barriers and clears name its parts.
@@ -100,7 +109,8 @@ impl Image {
             view_formats: desc.view_formats.to_vec(),
             cube_compatible: plan.flags.contains(vk::ImageCreateFlags::CUBE_COMPATIBLE),
             handles: AtomicU32::new(1),
-            allocation: None,
+            transient: desc.memory == TextureMemory::Transient,
+            memory: None,
             is_foreign,
             gpu: Arc::clone(gpu),
         }
@@ -110,10 +120,19 @@ impl Image {
         let device = &self.gpu.device;
         // SAFETY: the image was created by this device.
         let requirements = unsafe { device.get_image_memory_requirements(self.raw) };
-        let allocation = self.gpu.allocate(name, requirements, MemoryKind::Device, false)?;
-        // SAFETY: the allocation was made for this image's requirements and is bound once.
-        let bound = unsafe { device.bind_image_memory(self.raw, allocation.memory(), allocation.offset()) };
-        self.allocation = Some(allocation);
+        let lazy = if self.transient { self.gpu.allocate_lazy(name, requirements)? } else { None };
+        let memory = match lazy {
+            Some(memory) => Memory::Lazy(memory),
+            None => Memory::Managed(self.gpu.allocate(name, requirements, MemoryKind::Device, false)?),
+        };
+        let (raw, offset) = match &memory {
+            // SAFETY: the allocation lives until it is freed.
+            Memory::Managed(allocation) => (unsafe { allocation.memory() }, allocation.offset()),
+            Memory::Lazy(memory) => (*memory, 0),
+        };
+        self.memory = Some(memory);
+        // SAFETY: the memory was allocated for this image's requirements and is bound once.
+        let bound = unsafe { device.bind_image_memory(self.raw, raw, offset) };
         bound.map_err(Error::vulkan("vkBindImageMemory"))
     }
 
@@ -161,8 +180,11 @@ impl Drop for Image {
         }
         // SAFETY: the owners have waited until the GPU is done with the image, and their views are gone.
         unsafe { self.gpu.device.destroy_image(self.raw, None) };
-        if let Some(allocation) = self.allocation.take() {
-            self.gpu.free(allocation);
+        match self.memory.take() {
+            Some(Memory::Managed(allocation)) => self.gpu.free(allocation),
+            // SAFETY: the image that was bound to it is gone.
+            Some(Memory::Lazy(memory)) => unsafe { self.gpu.device.free_memory(memory, None) },
+            None => {}
         }
     }
 }

@@ -4,7 +4,7 @@ use ash::vk;
 
 use super::image::{raw_usage, usage_of};
 use super::swizzle::Swizzle;
-use super::texture_desc::{TextureDesc, TextureKind, TextureUsage};
+use super::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage};
 use crate::error::{Error, Result, check_limit};
 use crate::format::Format;
 use crate::gpu::Gpu;
@@ -47,6 +47,7 @@ fn check_shape(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<u32> {
     check_limit(name, "layer count", layers.into(), gpu.caps.limits.max_texture_layers.into())?;
     check_samples(desc)?;
     check_yuv(desc)?;
+    check_transient(desc)?;
     let full = 32 - width.max(height).max(depth).leading_zeros();
     if desc.mips > full {
         let message =
@@ -76,6 +77,16 @@ fn check_samples(desc: &TextureDesc<'_>) -> Result<()> {
         return wrong("data cannot be uploaded; draw to the texture, or clear it");
     }
     Ok(())
+}
+
+/// Fails where a texture that lives in passes only is anything but a target.
+fn check_transient(desc: &TextureDesc<'_>) -> Result<()> {
+    let target = desc.usage == TextureUsage::TARGET && desc.data.is_none();
+    if desc.memory == TextureMemory::Device || target {
+        return Ok(());
+    }
+    let message = "a transient texture has the usage TARGET and no other, and takes no data";
+    Err(Error::usage(desc.debug_name, message))
 }
 
 /// Fails where a texture in Y'CbCr is anything but a plain picture.
@@ -173,7 +184,10 @@ fn flags(gpu: &Gpu, desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateFlags {
 }
 
 fn image_info(desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateInfo<'static> {
-    let copies = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
+    let beside = match desc.memory {
+        TextureMemory::Device => vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST,
+        TextureMemory::Transient => vk::ImageUsageFlags::TRANSIENT_ATTACHMENT,
+    };
     vk::ImageCreateInfo::default()
         .image_type(match desc.kind {
             TextureKind::D1 => vk::ImageType::TYPE_1D,
@@ -186,7 +200,7 @@ fn image_info(desc: &TextureDesc<'_>, mips: u32) -> vk::ImageCreateInfo<'static>
         .array_layers(desc.kind.layers())
         .samples(vk::SampleCountFlags::from_raw(desc.samples))
         .tiling(vk::ImageTiling::OPTIMAL)
-        .usage(raw_usage(desc.usage, desc.format) | copies)
+        .usage(raw_usage(desc.usage, desc.format) | beside)
         .initial_layout(vk::ImageLayout::UNDEFINED)
 }
 

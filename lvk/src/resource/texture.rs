@@ -227,14 +227,26 @@ impl Texture {
         })
     }
 
+    /// Fails for textures that live in passes only.
+    pub(crate) fn check_kept(&self) -> Result<()> {
+        if !self.image.transient {
+            return Ok(());
+        }
+        let message =
+            "the texture is transient: passes clear it and do not store it, and nothing else touches it";
+        Err(Error::usage(&self.name, message))
+    }
+
     /// Checks a region and resolves its sizes.
     pub(crate) fn resolve_region(&self, region: &TextureRegion) -> Result<Region> {
+        self.check_kept()?;
         let part = self.part_of(region.aspect)?;
         self.bounds().resolve(region, part).map_err(|message| Error::usage(&self.name, message))
     }
 
     /// Checks a range of mips and layers and resolves it.
     pub(crate) fn resolve_range(&self, range: &TextureRange) -> Result<Subresources> {
+        self.check_kept()?;
         self.bounds().resolve_range(range).map_err(|message| Error::usage(&self.name, message))
     }
 

@@ -74,6 +74,18 @@ impl TextureKind {
     }
 }
 
+/// Where a texture lives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum TextureMemory {
+    /// In memory of its own.
+    #[default]
+    Device,
+    /// Only inside of render passes, on devices that can (`VK_MEMORY_PROPERTY_LAZILY_ALLOCATED_BIT`); elsewhere in memory of
+    /// its own. Such a texture is a [`TextureUsage::TARGET`] and nothing else: passes neither load nor store it, and it is
+    /// not copied, cleared by command or sampled.
+    Transient,
+}
+
 /// Describes a texture.
 #[derive(Debug, Clone, Copy)]
 pub struct TextureDesc<'a> {
@@ -91,6 +103,8 @@ pub struct TextureDesc<'a> {
     pub samples: u32,
     /// What the texture is used for.
     pub usage: TextureUsage,
+    /// Where the texture lives.
+    pub memory: TextureMemory,
     /// Other colour formats, of texels of the same size, in which
     /// [`Context::create_texture_view`](crate::Context::create_texture_view) may show the texels. A usage is then enough if
     /// one of all these formats has it; the texture itself keeps what its own format can.
@@ -121,6 +135,7 @@ impl Default for TextureDesc<'_> {
             mips: 1,
             samples: 1,
             usage: TextureUsage::SAMPLED,
+            memory: TextureMemory::Device,
             view_formats: &[],
             swizzle: Swizzle::IDENTITY,
             data: None,
