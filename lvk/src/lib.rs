@@ -46,6 +46,7 @@
 //! | record | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
 //! | draw | [`CommandBuffer::begin_rendering`], [`RenderPass`] |
 //! | draw with task and mesh shaders | [`RenderPipelineDesc::mesh`], [`RenderPass::draw_mesh_tasks`] |
+//! | show pictures in windows | [`manual::windows`], [`Context::create_swapchain`], [`Context::present`] |
 //! | compute | [`CommandBuffer::dispatch`] |
 //! | trace rays with a pipeline | [`RayTracingPipelineDesc`], [`CommandBuffer::trace_rays`] |
 //! | link compiled shaders into several pipelines | [`RayTracingLibraryDesc`] |
@@ -80,8 +81,7 @@
 //!
 //! # What `lvk` does not do (yet)
 //!
-//! Windows and swapchains, tessellation pipelines, multisampling, queues beside the main one. `lvk` is no
-//! scene graph and no renderer.
+//! Tessellation pipelines, multisampling, queues beside the main one. `lvk` is no scene graph and no renderer.
 //!
 //! # Features
 //!
@@ -109,6 +109,7 @@ mod shared;
 mod software;
 mod store;
 mod submit;
+mod swapchain;
 mod upload;
 
 #[cfg(feature = "test-hooks")]
@@ -117,6 +118,7 @@ pub use context::test_hooks;
 
 pub use ash;
 pub use glam;
+pub use raw_window_handle;
 
 pub use accel::culling::InstanceCulling;
 pub use accel::desc::{BlasDesc, PrimitiveOrder, TlasDesc};
@@ -157,9 +159,11 @@ pub use gpu::optional::{FeatureSet, OptionalFeature};
 pub use gpu::profile::DeviceProfile;
 pub use gpu::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use gpu::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
+pub use gpu::window::WindowHandles;
 pub use handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
-    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
+    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, SwapchainHandle,
+    TextureHandle,
 };
 pub use pipeline::blend::{Blend, BlendFactor, BlendOp, BlendPart, ColorWrites};
 pub use pipeline::compute::ComputePipelineDesc;
@@ -183,3 +187,6 @@ pub use shader::compile_glsl;
 pub use shader::{ShaderCacheCounts, ShaderModuleDesc, ShaderSource, ShaderStage};
 pub use store::LiveObject;
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};
+pub use swapchain::desc::{
+    ColorSpace, HdrMetadata, PresentMode, SwapchainDesc, SwapchainImage, SwapchainInfo,
+};

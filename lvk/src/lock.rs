@@ -7,6 +7,8 @@ use std::sync::{MutexGuard, PoisonError};
 /// Which lock: those further down may be taken while those further up are held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Rank {
+    /// A swapchain.
+    Swapchain,
     /// Compactions under way.
     Compactions,
     /// What runs before the next submission.

@@ -29,6 +29,7 @@ use crate::software::tree_cache::TreeCache;
 use crate::store::Store;
 use crate::submit::Submitter;
 use crate::submit::profiler::Profiler;
+use crate::swapchain::state::Swapchain;
 use crate::upload::{SpareBuffers, Staging};
 
 /// The parts of a context below the command layer. Fields are dropped in this order, the device last.
@@ -87,6 +88,7 @@ pub(crate) enum Garbage {
     RayTracingPipeline(Arc<RayTracingPipeline>),
     QueryPool(#[expect(dead_code, reason = "held only to be dropped")] Arc<QueryPool>),
     AccelStruct(Arc<AccelStruct>),
+    Swapchain(#[expect(dead_code, reason = "held only to be dropped")] Arc<Swapchain>),
     /// What a top-level structure showed; handles of it may still be in use.
     Contents(Box<TlasContents>),
     /// What a compacted structure took the place of, or what took its place.
@@ -188,6 +190,7 @@ impl Shared {
             Garbage::RenderPipeline(_)
             | Garbage::ComputePipeline(_)
             | Garbage::QueryPool(_)
+            | Garbage::Swapchain(_)
             | Garbage::Body(_)
             | Garbage::Software(_)
             | Garbage::SizeQuery(_) => {}

@@ -10,10 +10,12 @@ use crate::accel::AccelStruct;
 use crate::error::{Error, Result};
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
-    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
+    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, SwapchainHandle,
+    TextureHandle,
 };
 use crate::pipeline::{ComputePipeline, RayTracingLibrary, RayTracingPipeline, RenderPipeline, ShaderModule};
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
+use crate::swapchain::state::Swapchain;
 
 /// Every object of a context, by handle.
 pub(crate) struct Store {
@@ -29,6 +31,7 @@ pub(crate) struct Store {
     pub(crate) ray_tracing_libraries: Pool<RayTracingLibraryHandle, RayTracingLibrary>,
     pub(crate) query_pools: Pool<QueryPoolHandle, QueryPool>,
     pub(crate) accel_structs: Pool<AccelStructHandle, AccelStruct>,
+    pub(crate) swapchains: Pool<SwapchainHandle, Swapchain>,
 }
 
 impl Store {
@@ -46,6 +49,7 @@ impl Store {
             ray_tracing_libraries: Pool::new(mask),
             query_pools: Pool::new(mask),
             accel_structs: Pool::new(mask),
+            swapchains: Pool::new(mask),
         }
     }
 
@@ -62,6 +66,7 @@ impl Store {
             self.ray_tracing_libraries.live(),
             self.query_pools.live(),
             self.accel_structs.live(),
+            self.swapchains.live(),
         ]
         .concat()
     }
@@ -78,6 +83,7 @@ impl Store {
         self.ray_tracing_libraries.drain();
         self.query_pools.drain();
         self.accel_structs.drain();
+        self.swapchains.drain();
     }
 }
 
@@ -107,7 +113,7 @@ macro_rules! named {
 
 named! {
     Buffer Texture Sampler ShaderModule RenderPipeline ComputePipeline RayTracingPipeline RayTracingLibrary QueryPool
-    AccelStruct
+    AccelStruct Swapchain
 }
 
 /// Objects of one kind.

@@ -157,9 +157,13 @@ pub fn radv() -> Option<PathBuf> {
     fetched(radv_icd(), "driver for AMD cards")
 }
 
-fn fetched(icd: Result<PathBuf, DriverError>, what: &str) -> Option<PathBuf> {
-    match icd {
-        Ok(icd) => Some(icd),
+/// What could be fetched; `None`, loudly, where it cannot be.
+///
+/// # Panics
+/// As [`swiftshader`].
+pub(crate) fn fetched<T>(found: Result<T, DriverError>, what: &str) -> Option<T> {
+    match found {
+        Ok(found) => Some(found),
         Err(error) if is_set("LVK_REQUIRE_GPU") => unavailable(&error.to_string()),
         Err(error) => {
             eprintln!("SKIPPED, no {what}: {error}");
@@ -179,7 +183,7 @@ fn loader() -> Result<&'static Option<PathBuf>, &'static str> {
 }
 
 #[expect(clippy::panic, reason = "a test without its device has failed")]
-fn unavailable(reason: &str) -> ! {
+pub(crate) fn unavailable(reason: &str) -> ! {
     panic!("this test needs a Vulkan device: {reason}");
 }
 

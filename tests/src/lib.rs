@@ -25,5 +25,6 @@ pub mod sphere_scene;
 pub mod still_life;
 pub mod warnings;
 pub mod wide_tree;
+pub mod windows;
 
 pub use device::{TestDevice, device, device_with, without_software};

@@ -17,6 +17,7 @@ mod kernel;
 mod label;
 mod part_uses;
 mod pass_area;
+mod present;
 pub(crate) mod query;
 mod query_log;
 pub(crate) mod render;

@@ -1,6 +1,7 @@
 //! How a context is made.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use crate::gpu::caps::FeatureRequest;
 use crate::gpu::debug::{Validation, ValidationSink};
@@ -8,6 +9,7 @@ use crate::gpu::extra::ExtraExtensions;
 use crate::gpu::optional::OptionalFeature;
 use crate::gpu::profile::DeviceProfile;
 use crate::gpu::ray_query_path::RayQueryRequest;
+use crate::gpu::window::WindowHandles;
 use crate::resource::ycbcr::YuvConversion;
 
 /// Describes a context.
@@ -43,6 +45,10 @@ pub struct ContextDesc<'a> {
     pub required_features: &'a [OptionalFeature],
     /// Extensions and features of the caller's own; only devices that have the extensions are considered.
     pub extra: ExtraExtensions<'a>,
+    /// A window that the device must be able to show pictures in; swapchains without a window of their own take it, see
+    /// [`Context::create_swapchain`](crate::Context::create_swapchain). `None` for contexts without windows, which use no
+    /// extension of any window system.
+    pub window: Option<Arc<dyn WindowHandles>>,
     /// Another device to rehearse on this one, also by the requirements above; none for the device as it is.
     pub profile: Option<&'a DeviceProfile>,
     /// Frames the CPU may be ahead of the GPU; see [`Context::next_frame`](crate::Context::next_frame). 1 to 8.
@@ -104,6 +110,7 @@ impl Default for ContextDesc<'_> {
             ray_query: RayQueryRequest::default(),
             required_features: &[],
             extra: ExtraExtensions::default(),
+            window: None,
             profile: None,
             frames_in_flight: 2,
             staging_bytes: 16 << 20,

@@ -139,6 +139,7 @@ fn data_mips(desc: &TextureDesc<'_>, mips: u32) -> u32 {
     if desc.data_mips == 0 { mips } else { desc.data_mips }
 }
 
+/// What shaders see of a texture.
 pub(super) fn views(texture: &Texture) -> Result<TextureViews> {
     let sampled = texture.usage.contains(TextureUsage::SAMPLED);
     let storage = texture.usage.contains(TextureUsage::STORAGE);

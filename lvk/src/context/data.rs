@@ -83,6 +83,10 @@ impl Context {
     /// Writes texels, tightly packed, row by row and layer by layer, before the next submission.
     pub fn upload_texture(&self, texture: TextureHandle, region: &TextureRegion, bytes: &[u8]) -> Result<()> {
         let texture = self.shared().store.textures.get(texture)?;
+        if texture.lent {
+            let message = "images of windows come and go with frames; copy into it with a command buffer";
+            return Err(Error::usage(&texture.name, message));
+        }
         self.upload_texture_object(&texture, region, bytes)
     }
 

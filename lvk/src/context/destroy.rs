@@ -3,7 +3,8 @@
 use super::Context;
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
-    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
+    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, SwapchainHandle,
+    TextureHandle,
 };
 use crate::shared::{Garbage, Shared};
 
@@ -15,7 +16,7 @@ pub trait Destroy: Handle {
 
 impl Context {
     /// Destroys an object. Its handle is stale from now on; its memory goes when the last command buffer that may use
-    /// it is done. Does nothing for a stale handle.
+    /// it is done. Does nothing for a stale handle, nor for an image of a swapchain.
     pub fn destroy<H: Destroy>(&self, handle: H) {
         handle.take_from(self);
     }
@@ -36,7 +37,6 @@ macro_rules! destroy {
 
 destroy! {
     BufferHandle: buffers => Buffer;
-    TextureHandle: textures => Texture;
     SamplerHandle: samplers => Sampler;
     RenderPipelineHandle: render_pipelines => RenderPipeline;
     ComputePipelineHandle: compute_pipelines => ComputePipeline;
@@ -45,10 +45,33 @@ destroy! {
     AccelStructHandle: accel_structs => AccelStruct;
 }
 
+impl Destroy for TextureHandle {
+    /// Images of a swapchain go with it.
+    fn take_from(self, ctx: &Context) {
+        let shared: &Shared = ctx.shared();
+        let textures = &shared.store.textures;
+        if textures.get(self).is_ok_and(|texture| texture.lent) {
+            return;
+        }
+        if let Ok(texture) = textures.remove(self) {
+            shared.retire(Garbage::Texture(texture));
+        }
+    }
+}
+
 impl Destroy for ShaderModuleHandle {
     /// Pipelines do not need their modules once they are created.
     fn take_from(self, ctx: &Context) {
         drop(ctx.shared().store.shader_modules.remove(self));
+    }
+}
+
+impl Destroy for SwapchainHandle {
+    /// Its images go too, whoever has one.
+    fn take_from(self, ctx: &Context) {
+        if let Ok(swapchain) = ctx.shared().store.swapchains.remove(self) {
+            ctx.retire_swapchain(swapchain);
+        }
     }
 }
 

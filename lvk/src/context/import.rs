@@ -10,8 +10,8 @@ use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::buffer::BufferUsage;
 use crate::resource::texture_desc::TextureDesc;
 use crate::resource::{Buffer, Texture};
-use crate::submit::SubmitHandle;
 use crate::submit::emit::known_layout;
+use crate::submit::{Submission, SubmitHandle};
 
 /// Describes an image of somebody else's.
 #[derive(Debug, Clone)]
@@ -155,7 +155,8 @@ impl Context {
         let waits = waits.iter().map(|wait| info(wait.semaphore, wait.value).stage_mask(wait.stages));
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
         let signals = signals.iter().map(|signal| info(signal.semaphore, signal.value).stage_mask(all));
-        self.submit_between(cmd, waits.collect(), signals.collect())
+        let (waits, signals) = (waits.collect(), signals.collect());
+        self.submit_between(cmd, Submission { waits, signals, ..Submission::default() })
     }
 
     /// The timeline semaphore of everything that is submitted; [`SubmitHandle::raw_value`] is the value that a submission

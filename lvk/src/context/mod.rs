@@ -31,6 +31,7 @@ mod submit;
 mod support;
 #[cfg(feature = "test-hooks")]
 pub mod test_hooks;
+mod window;
 
 use std::sync::Arc;
 
@@ -38,6 +39,7 @@ use crate::accel::compaction::Compactions;
 use crate::gpu::budget::MemoryBudget;
 use crate::gpu::caps::Capabilities;
 use crate::gpu::debug::ValidationSink;
+use crate::gpu::window::WindowHandles;
 use crate::lock::Mutex;
 use crate::shared::Shared;
 
@@ -60,6 +62,8 @@ struct Inner {
     frames: std::sync::Mutex<FrameRing>,
     /// Compactions under way.
     compactions: Mutex<Compactions>,
+    /// For swapchains that name none.
+    window: Option<Arc<dyn WindowHandles>>,
     shared: Arc<Shared>,
 }
 

@@ -48,6 +48,7 @@ impl Context {
             library: desc.vulkan_library,
             validation: desc.validation,
             extra: desc.extra.of_instance(),
+            window: desc.window.as_deref(),
             sink,
         })?;
         let wish = std::env::var("LVK_DEVICE").ok().filter(|wish| !wish.is_empty());
@@ -59,6 +60,7 @@ impl Context {
             profile: desc.profile,
             extra: desc.extra,
             debug_names: desc.debug_names,
+            window: desc.window.as_deref(),
         };
         Self::on(Arc::new(Gpu::new(instance, &request)?), desc)
     }
@@ -70,6 +72,7 @@ impl Context {
             pending: lock::Mutex::new(Rank::Pending, Pending::default()),
             compactions: lock::Mutex::new(Rank::Compactions, Compactions::default()),
             frames: Mutex::new(FrameRing::new(desc.frames_in_flight)),
+            window: desc.window.clone(),
             shared,
         };
         let context = Self { inner: Arc::new(inner) };
@@ -86,6 +89,7 @@ impl Context {
             library: vulkan_library,
             validation: Validation::Off,
             extra: &[],
+            window: None,
             sink: ValidationSink::default(),
         })?;
         let devices = instance.physical_devices()?;

@@ -1,12 +1,9 @@
 //! Hands command buffers to the GPU and waits for them.
 
-use ash::vk;
-
 use super::Context;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
-use crate::submit::SubmitHandle;
-use crate::submit::queue::Submission;
+use crate::submit::{Submission, SubmitHandle};
 
 impl Context {
     /// Starts recording a command buffer. Any number may be recorded at once, on any threads.
@@ -19,23 +16,17 @@ impl Context {
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) if the command buffer belongs to another context, refits a top-level
-    /// structure whose number of instances another submission changed meanwhile, left a query open, or writes one that
-    /// was written and not reset. A failure of Vulkan itself leaves
-    /// the context without a known state: this and every later submission answers it, and a new context is needed.
+    /// structure whose number of instances another submission changed meanwhile, left a query open, writes one that was
+    /// written and not reset, or uses an image of a swapchain that is not [taken](Self::next_image). A failure of Vulkan
+    /// itself leaves the context without a known state: this and every later submission answers it, and a new context is
+    /// needed.
     pub fn submit(&self, cmd: CommandBuffer) -> Result<SubmitHandle> {
-        self.submit_between(cmd, Vec::new(), Vec::new())
+        self.submit_between(cmd, Submission::default())
     }
 
-    /// Submits between semaphores of somebody else's.
-    pub(super) fn submit_between(
-        &self,
-        cmd: CommandBuffer,
-        waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
-        signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
-    ) -> Result<SubmitHandle> {
-        if !cmd.belongs_to(self.shared()) {
-            return Err(Error::usage("submit", "the command buffer belongs to another context"));
-        }
+    /// As [`submit`](Self::submit), with what `more` has besides recordings.
+    pub(super) fn submit_between(&self, cmd: CommandBuffer, more: Submission) -> Result<SubmitHandle> {
+        self.check_own(&cmd)?;
         self.advance_compactions();
         let mut pending = self.pending();
         cmd.check_tlas_updates()?;
@@ -45,19 +36,22 @@ impl Context {
             self.open(&mut pending)?;
         }
         let before = self.take_pending(&mut pending)?;
-        self.send(before.into_iter().chain([cmd]), waits, signals)
+        self.send(before.into_iter().chain([cmd]), more)
     }
 
-    fn send(
-        &self,
-        commands: impl Iterator<Item = CommandBuffer>,
-        waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
-        signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
-    ) -> Result<SubmitHandle> {
+    /// Fails for a command buffer of another context.
+    pub(super) fn check_own(&self, cmd: &CommandBuffer) -> Result<()> {
+        if cmd.belongs_to(self.shared()) {
+            return Ok(());
+        }
+        Err(Error::usage("submit", "the command buffer belongs to another context"))
+    }
+
+    fn send(&self, commands: impl Iterator<Item = CommandBuffer>, more: Submission) -> Result<SubmitHandle> {
         let (recordings, mut outcomes): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
         let shared = self.shared();
-        let value =
-            shared.submitter.submit(Submission { recordings, waits, signals }, || shared.bindless.flush())?;
+        let submission = Submission { recordings, ..more };
+        let value = shared.submitter.submit(submission, || shared.bindless.flush())?;
         let scopes = outcomes.iter_mut().filter_map(|outcome| outcome.scopes.take());
         shared.profiler.submit(value, scopes.map(|scopes| *scopes).collect());
         outcomes.into_iter().for_each(|outcome| outcome.submit(shared, value));
@@ -70,7 +64,7 @@ impl Context {
         self.advance_compactions();
         let mut pending = self.pending();
         let Some(cmd) = self.take_pending(&mut pending)? else { return Ok(self.last_submission()) };
-        self.send([cmd].into_iter(), Vec::new(), Vec::new())
+        self.send([cmd].into_iter(), Submission::default())
     }
 
     /// Waits until a submission is done (`vkWaitSemaphores`).

@@ -10,6 +10,7 @@ use super::optional::{FeatureSet, OF_MESH_SHADERS, OptionalFeature};
 use super::ray_query_path::{RayQueryPath, RayQueryRequest};
 use super::resolve_modes::{DepthResolveLimits, ResolveModes};
 use super::select::DeviceKind;
+use super::window::Probe;
 use crate::error::{Error, Result};
 
 /// Whether the caller needs a feature.
@@ -446,6 +447,21 @@ fn calibration(has: &dyn Fn(&CStr) -> bool) -> Calibration {
 }
 
 /// A queue family for everything the library submits, with the bits of its timestamps.
+impl PhysicalDevice {
+    /// Takes a queue that presents to the window, or says that there is none.
+    pub(crate) fn present_to(&mut self, window: &Probe<'_>) {
+        match window.queue_family(self.raw) {
+            Some((family, timestamp_bits)) => {
+                self.queue_family = Some(family);
+                self.capabilities.limits.timestamp_bits = timestamp_bits;
+            }
+            None => {
+                self.missing.push("a queue for graphics and compute that presents to the window".to_owned())
+            }
+        }
+    }
+}
+
 fn queue_family(instance: &ash::Instance, raw: vk::PhysicalDevice) -> Option<(u32, u32)> {
     // SAFETY: `raw` was enumerated from `instance`.
     let families = unsafe { instance.get_physical_device_queue_family_properties(raw) };

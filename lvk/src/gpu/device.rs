@@ -15,10 +15,11 @@ use super::features::Features;
 use super::foreign::RawContext;
 use super::instance::Instance;
 use super::naming;
-use super::optional::{OF_WINDOWS, OptionalFeature};
+use super::optional::{FeatureSet, OF_WINDOWS, OptionalFeature};
 use super::profile::DeviceProfile;
 use super::ray_query_path::RayQueryRequest;
 use super::select::{Candidate, choose};
+use super::window::{Probe, WindowFunctions, WindowHandles};
 use crate::error::{Error, Result, check_limit};
 use crate::lock::{Guard, Mutex, Rank};
 
@@ -35,6 +36,8 @@ pub(crate) struct DeviceRequest<'a> {
     pub(crate) extra: ExtraExtensions<'a>,
     /// Whether objects get names for debuggers; where somebody reads them without it.
     pub(crate) debug_names: Option<bool>,
+    /// A window that the device has to present to.
+    pub(crate) window: Option<&'a dyn WindowHandles>,
 }
 
 /// One logical device with everything made from it that is not a resource. It knows no resource.
@@ -55,6 +58,8 @@ pub(crate) struct Gpu {
     pub(crate) host_clock: Option<HostClock>,
     /// Samplers alive with a border colour of their own, of which a device has few.
     pub(crate) custom_borders: AtomicU32,
+    /// Present where the context is for windows.
+    pub(crate) windows: Option<WindowFunctions>,
     physical: vk::PhysicalDevice,
     /// Takes names and labels; present where somebody reads them, as each name costs as much as a small buffer.
     pub(super) debug_utils: Option<ash::ext::debug_utils::Device>,
@@ -140,6 +145,7 @@ impl Gpu {
                 .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
             mesh: caps.mesh_shader.then(|| ash::ext::mesh_shader::Device::new(raw, &device)),
             host_clock: HostClock::new(&instance, &device, physical, features.calibration),
+            windows: WindowFunctions::new(&instance, &device, |feature| caps.has(feature)),
             debug_utils: naming::is_wanted(&instance, physical, debug_names)
                 .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             device_fault: (features.ext.fault.device_fault == vk::TRUE)
@@ -291,14 +297,30 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
     if devices.is_empty() {
         return Err(Error::NoVulkan { reason: "the loader found no device".to_owned() });
     }
+    let probe = request.window.map(|window| Probe::new(instance, window)).transpose()?;
+    let unknown = unknown_of_windows(instance);
+    for device in &mut devices {
+        device.capabilities.hide(unknown);
+        if let Some(probe) = &probe {
+            device.present_to(probe);
+        }
+    }
     let candidates: Vec<_> = devices.iter_mut().map(|device| candidate(device, request)).collect();
     let index = choose(&candidates, request.wish)?;
     Ok(devices.swap_remove(index))
 }
 
-/// The device as the choice sees it, under the profile and without windows, for which the instance has no extensions.
+/// What devices have for windows and cannot be turned on for want of an extension of the instance.
+fn unknown_of_windows(instance: &Instance) -> FeatureSet {
+    match &instance.windows {
+        None => OF_WINDOWS.into_iter().collect(),
+        Some(windows) if windows.maintenance => FeatureSet::NONE,
+        Some(_) => FeatureSet::NONE.with(OptionalFeature::SwapchainMaintenance1),
+    }
+}
+
+/// The device as the choice sees it, under the profile.
 fn candidate(device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candidate {
-    device.capabilities.hide(OF_WINDOWS.into_iter().collect());
     let found = device.capabilities.clone();
     if let Some(profile) = request.profile {
         profile.apply(&mut device.capabilities);
@@ -316,7 +338,8 @@ fn candidate(device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candid
     if request.query.requires_hardware() {
         demand("ray queries", found.ray_query, left.ray_query);
     }
-    for feature in request.required {
+    let swapchain = request.window.map(|_| OptionalFeature::Swapchain);
+    for feature in request.required.iter().chain(&swapchain) {
         demand(feature.vulkan_name(), found.has(*feature), left.has(*feature));
     }
     for name in request.extra.of_device() {

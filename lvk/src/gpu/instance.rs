@@ -6,6 +6,7 @@ use std::path::Path;
 use ash::vk;
 
 use super::debug::{Messenger, Validation, ValidationSink, c_name};
+use super::window::{WindowExtensions, WindowHandles};
 use crate::error::{Error, Result};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -19,6 +20,8 @@ pub(crate) struct Instance {
     pub(crate) validated: bool,
     /// Shaders are instrumented by the validation layer.
     pub(crate) gpu_assisted: bool,
+    /// Present where the context is for windows.
+    pub(crate) windows: Option<WindowExtensions>,
     messenger: Messenger,
     /// Somebody else made the instance, and destroys it.
     is_foreign: bool,
@@ -32,6 +35,8 @@ pub(crate) struct InstanceDesc<'a> {
     pub(crate) validation: Validation,
     /// Extensions of the caller's own.
     pub(crate) extra: &'a [&'a CStr],
+    /// A window that the instance has to know.
+    pub(crate) window: Option<&'a dyn WindowHandles>,
     pub(crate) sink: ValidationSink,
 }
 
@@ -40,7 +45,7 @@ impl Instance {
         let entry = load_entry(desc.library)?;
         check_version(&entry)?;
         let layer = find_layer(&entry, desc.validation)?;
-        let extensions = Extensions::of(&entry, layer, desc.extra)?;
+        let extensions = Extensions::of(&entry, layer, desc)?;
         let mut messenger = Messenger::new(desc.sink.clone());
         let raw = create(&entry, desc, layer, &extensions, &messenger)?;
         if extensions.debug_utils
@@ -52,8 +57,9 @@ impl Instance {
             return Err(Error::vulkan("vkCreateDebugUtilsMessengerEXT")(result));
         }
         let gpu_assisted = desc.validation == Validation::GpuAssisted;
-        let (debug_utils, validated) = (extensions.debug_utils, layer.is_some());
-        Ok(Self { entry, raw, debug_utils, validated, gpu_assisted, messenger, is_foreign: false })
+        let validated = layer.is_some();
+        let Extensions { debug_utils, windows, .. } = extensions;
+        Ok(Self { entry, raw, debug_utils, validated, gpu_assisted, windows, messenger, is_foreign: false })
     }
 
     /// Of somebody else's.
@@ -64,6 +70,7 @@ impl Instance {
             debug_utils: extensions.contains(&ash::ext::debug_utils::NAME),
             validated: false,
             gpu_assisted: false,
+            windows: None,
             messenger: Messenger::new(ValidationSink::default()),
             is_foreign: true,
         }
@@ -137,12 +144,13 @@ struct Extensions<'a> {
     debug_utils: bool,
     layer_settings: bool,
     extra: &'a [&'a CStr],
+    windows: Option<WindowExtensions>,
 }
 
 impl<'a> Extensions<'a> {
-    fn of(entry: &ash::Entry, layer: Option<&CStr>, extra: &'a [&'a CStr]) -> Result<Self> {
-        let mut found = Self { debug_utils: false, layer_settings: false, extra };
-        let mut missing = extra.to_vec();
+    fn of(entry: &ash::Entry, layer: Option<&CStr>, desc: &InstanceDesc<'a>) -> Result<Self> {
+        let mut found = Self { debug_utils: false, layer_settings: false, extra: desc.extra, windows: None };
+        let mut missing = desc.extra.to_vec();
         for source in [None, layer].into_iter().take(if layer.is_some() { 2 } else { 1 }) {
             // SAFETY: the layer, if any, was found above.
             let list = unsafe { entry.enumerate_instance_extension_properties(source) }
@@ -151,6 +159,9 @@ impl<'a> Extensions<'a> {
             found.debug_utils |= has(ash::ext::debug_utils::NAME);
             found.layer_settings |= has(ash::ext::layer_settings::NAME);
             missing.retain(|name| !has(name));
+            if source.is_none() {
+                found.windows = desc.window.map(|window| WindowExtensions::of(window, &has)).transpose()?;
+            }
         }
         if let Some(name) = missing.first() {
             let what = format!("the instance extension {}", name.to_string_lossy());
@@ -162,7 +173,9 @@ impl<'a> Extensions<'a> {
     /// The layer reads its settings without its extension being on, and loaders older than the extension refuse it.
     fn names(&self) -> Vec<*const std::ffi::c_char> {
         let own = self.debug_utils.then_some(ash::ext::debug_utils::NAME);
-        let mut names: Vec<&CStr> = own.into_iter().chain(self.extra.iter().copied()).collect();
+        let windows = self.windows.iter().flat_map(WindowExtensions::names).map(|name| -> &'a CStr { name });
+        let mut names: Vec<&CStr> =
+            own.into_iter().chain(self.extra.iter().copied()).chain(windows).collect();
         names.sort_unstable();
         names.dedup();
         names.into_iter().map(CStr::as_ptr).collect()

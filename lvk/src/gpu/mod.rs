@@ -22,5 +22,6 @@ pub(crate) mod resolve_modes;
 pub(crate) mod select;
 #[cfg(feature = "test-hooks")]
 pub(crate) mod silent;
+pub(crate) mod window;
 
 pub(crate) use device::Gpu;

@@ -32,3 +32,6 @@ pub mod interop {}
 
 #[doc = include_str!("measuring.md")]
 pub mod measuring {}
+
+#[doc = include_str!("windows.md")]
+pub mod windows {}

@@ -1,5 +1,6 @@
 //! An image with its memory, shared by the textures that show it or parts of it.
 
+use std::any::Any;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -40,6 +41,8 @@ pub(crate) struct Image {
     memory: Option<Memory>,
     /// Somebody else made it, and destroys it.
     is_foreign: bool,
+    /// Who that is, where it has to be kept.
+    owner: Option<Arc<dyn Any + Send + Sync>>,
     gpu: Arc<Gpu>,
 }
 
@@ -112,8 +115,20 @@ impl Image {
             transient: desc.memory == TextureMemory::Transient,
             memory: None,
             is_foreign,
+            owner: None,
             gpu: Arc::clone(gpu),
         }
+    }
+
+    /// The same, which keeps its owner as long as it is used.
+    pub(crate) fn lent_by(mut self, owner: Arc<dyn Any + Send + Sync>) -> Self {
+        self.owner = Some(owner);
+        self
+    }
+
+    /// Whether it comes and goes with its owner, which decides when it can be used.
+    pub(crate) fn is_lent(&self) -> bool {
+        self.owner.is_some()
     }
 
     fn bind_memory(&mut self, name: &str) -> Result<()> {

@@ -34,6 +34,8 @@ pub(crate) struct Texture {
     swizzle: Swizzle,
     /// How texels in Y'CbCr are converted; null for all others.
     conversion: vk::SamplerYcbcrConversion,
+    /// It belongs to the owner of its image, who alone destroys it.
+    pub(crate) lent: bool,
 }
 
 impl Texture {
@@ -57,7 +59,8 @@ impl Texture {
         Ok(Self::of(gpu, desc, Image::import(gpu, desc, raw)?, slot))
     }
 
-    fn of(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, image: Image, slot: u32) -> Self {
+    /// The texture of an image, which is as described.
+    pub(crate) fn of(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, image: Image, slot: u32) -> Self {
         Self {
             views: ViewCache::new(gpu),
             kind: desc.kind,
@@ -70,6 +73,7 @@ impl Texture {
             aspect: Aspect::Main,
             swizzle: desc.swizzle,
             conversion: vk::SamplerYcbcrConversion::null(),
+            lent: image.is_lent(),
             image: Arc::new(image),
         }
     }
@@ -90,6 +94,7 @@ impl Texture {
             aspect: shown.aspect,
             swizzle: desc.swizzle.after(self.swizzle),
             conversion: vk::SamplerYcbcrConversion::null(),
+            lent: false,
         })
     }
 

@@ -3,13 +3,12 @@
 pub(crate) mod command_ring;
 pub(crate) mod deferred;
 pub(crate) mod emit;
-#[allow(dead_code, reason = "swapchains come next")]
 pub(crate) mod presentable;
 pub(crate) mod profiler;
 pub(crate) mod queue;
 pub(crate) mod scope_tree;
 pub(crate) mod timeline;
 
-pub(crate) use queue::{Recording, Submitter};
+pub(crate) use queue::{Recording, Submission, Submitter};
 pub use scope_tree::{GpuProfile, GpuScope};
 pub use timeline::SubmitHandle;

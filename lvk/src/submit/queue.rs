@@ -33,6 +33,8 @@ pub(crate) struct Submission {
     pub(crate) waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
     /// What is signalled when all of them are done, besides the timeline.
     pub(crate) signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
+    /// The image of a swapchain that goes to the presentation engine with it: nothing submitted later may use it.
+    pub(crate) presented: Option<ResourceId>,
 }
 
 /// Command buffers that begin together, once all that they wait for is there.
@@ -109,7 +111,8 @@ impl<T> Submitter<T> {
     }
 
     /// Fails where a command buffer uses an image of a swapchain that the application does not have. That is to be known
-    /// before anything is submitted, as a failed submission breaks the queue.
+    /// before anything is submitted, as a failed submission breaks the queue. The caller keeps other submissions off until
+    /// its own is made.
     pub(crate) fn check(&self, tracker: &Tracker) -> Result<()> {
         self.lock().presentables.check(tracker)
     }
@@ -134,6 +137,7 @@ impl<T> Submitter<T> {
             return Err(error);
         }
         inner.submitted = value;
+        submission.presented.into_iter().for_each(|id| inner.presentables.present(id));
         for mut recording in submission.recordings {
             inner.ring.submitted(recording.sequence, recording.slot, value);
             recording.tracker.clear();
@@ -231,7 +235,6 @@ impl<T> Submitter<T> {
     }
 
     /// Changes who has the images of swapchains.
-    #[allow(dead_code, reason = "swapchains come next")]
     pub(crate) fn with_presentables<R>(&self, change: impl FnOnce(&mut Presentables) -> R) -> R {
         change(&mut self.lock().presentables)
     }
@@ -267,12 +270,6 @@ impl Batch {
 
     fn info(&self) -> vk::SubmitInfo2<'_> {
         vk::SubmitInfo2::default().wait_semaphore_infos(&self.waits).command_buffer_infos(&self.commands)
-    }
-}
-
-impl From<Vec<Recording>> for Submission {
-    fn from(recordings: Vec<Recording>) -> Self {
-        Self { recordings, ..Self::default() }
     }
 }
 

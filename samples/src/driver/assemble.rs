@@ -7,8 +7,8 @@ use super::elf;
 use super::error::FetchError;
 use super::layer_description;
 use super::prefix::{
-    DRIVER, DRIVER_JSON, LAYER, LAYER_FOLDER, LOADER, Manifest, Part, RADV, RADV_JSON, SWIFTSHADER,
-    SWIFTSHADER_JSON,
+    DRIVER, DRIVER_JSON, KEYBOARD_COMPILER, KEYBOARDS, LAYER, LAYER_FOLDER, LOADER, Manifest, Part, RADV,
+    RADV_JSON, SWIFTSHADER, SWIFTSHADER_JSON, X_SERVER,
 };
 
 const LIBRARY_FOLDERS: [&str; 3] = ["usr/lib/x86_64-linux-gnu", "lib/x86_64-linux-gnu", "usr/lib/chromium"];
@@ -27,6 +27,7 @@ pub(super) fn assemble(part: Part, tree: &Path, folder: &Path) -> Result<Manifes
         }
         Part::Radv => driver(tree, folder, RADV, RADV_JSON),
         Part::Validation => validation(tree, folder),
+        Part::Display => display(tree, folder),
     }
 }
 
@@ -55,6 +56,52 @@ fn validation(tree: &Path, folder: &Path) -> Result<Manifest, FetchError> {
     let description = layer_description::of(&folder.join(LAYER), &format!("../{LAYER}"))?;
     write(&folder.join(LAYER_FOLDER).join("VkLayer_khronos_validation.json"), &description)?;
     Ok(Manifest::default())
+}
+
+/// The X server and the program that it compiles keyboards with, which it shall find beside itself.
+fn display(tree: &Path, folder: &Path) -> Result<Manifest, FetchError> {
+    let bin = folder.join("bin");
+    fs::create_dir_all(&bin).map_err(FetchError::file("create", &bin))?;
+    let needed = |name: &str| match find(tree, name) {
+        Some(path) => read_needed(&path).map(Some),
+        None => Ok(None),
+    };
+    let mut libraries = Vec::new();
+    for program in [X_SERVER, KEYBOARD_COMPILER] {
+        let from = tree.join("usr").join(program);
+        for direct in read_needed(&from)? {
+            libraries.extend(elf::load_order(&direct, needed)?);
+        }
+        fs::rename(&from, folder.join(program)).map_err(FetchError::file("move", &from))?;
+    }
+    libraries.sort_unstable();
+    libraries.dedup();
+    for name in libraries {
+        take(tree, folder, &format!("lib/{name}"))?;
+    }
+    let keyboards = tree.join("usr/share/X11").join(KEYBOARDS);
+    fs::rename(&keyboards, folder.join(KEYBOARDS)).map_err(FetchError::file("move", &keyboards))?;
+    let server = folder.join(X_SERVER);
+    let image = fs::read(&server).map_err(FetchError::file("read", &server))?;
+    let image = with_own_programs(image).ok_or_else(|| missing("the folder of xkbcomp in Xvfb"))?;
+    fs::write(&server, image).map_err(FetchError::file("write", &server))?;
+    Ok(Manifest::default())
+}
+
+/// The X server with the folder of its programs, which no option names, made relative: it runs in its own folder, and no
+/// file of the system is asked for. `None` if the folder is not there, or not once.
+fn with_own_programs(mut image: Vec<u8>) -> Option<Vec<u8>> {
+    const SYSTEM: &[u8] = b"\0/usr/bin\0";
+    const OWN: &[u8] = b"\0bin\0\0\0\0\0\0";
+    let places: Vec<usize> = image
+        .windows(SYSTEM.len())
+        .enumerate()
+        .filter(|(_, bytes)| *bytes == SYSTEM)
+        .map(|(at, _)| at)
+        .collect();
+    let [place] = places[..] else { return None };
+    image[place..place + OWN.len()].copy_from_slice(OWN);
+    Some(image)
 }
 
 /// Moves the library `to` (relative to `folder`) there. Packages hold most libraries as a link to a file with
@@ -123,6 +170,15 @@ mod tests {
         assert_eq!(quoted_value(text, "api_version"), Some("1.4.305"));
         assert_eq!(quoted_value(text, "version"), None);
         assert_eq!(quoted_value("", "api_version"), None);
+    }
+
+    #[test]
+    fn the_x_server_asks_for_programs_in_its_own_folder() {
+        let image = |middle: &str| [&b"..\0"[..], middle.as_bytes(), b"\0.."].concat();
+        let own = with_own_programs(image("/usr/bin")).unwrap();
+        assert_eq!(own, image("bin\0\0\0\0\0"));
+        assert_eq!(with_own_programs(image("/usr/bin/other")), None);
+        assert_eq!(with_own_programs([image("/usr/bin"), image("/usr/bin")].concat()), None);
     }
 
     #[test]

@@ -35,6 +35,15 @@ pub enum DriverError {
         #[source]
         cause: FetchError,
     },
+    /// The X server without a screen cannot be fetched.
+    #[error(
+        "no Xvfb was found and none can be fetched because {cause}; install the packages xvfb and x11-xkb-utils"
+    )]
+    NoDisplay {
+        /// What stopped the fetch.
+        #[source]
+        cause: FetchError,
+    },
     /// `LVK_DRIVER=system` on a machine without a Vulkan loader.
     #[error(
         "LVK_DRIVER=system, but this machine has no Vulkan loader ({reason}); install `libvulkan1` and a driver, or \

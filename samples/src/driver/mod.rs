@@ -14,6 +14,7 @@
 
 mod apt;
 mod assemble;
+mod display;
 mod elf;
 mod environment;
 mod error;
@@ -27,6 +28,7 @@ mod settings;
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
 
+pub use display::VirtualDisplay;
 pub use error::{DriverError, FetchError};
 use prefix::{Manifest, Part};
 use probe::SystemVulkan;
@@ -110,6 +112,18 @@ pub fn radv_icd() -> Result<PathBuf, DriverError> {
     let prefix = folder_of(Part::Radv, &Settings::from_env()?)?;
     preload::preload(&prefix, &Manifest::read(&prefix).unwrap_or_default().preload)?;
     Ok(prefix.join(prefix::RADV_JSON))
+}
+
+/// Starts an X server without a screen, for programs that need windows: the machine's own Xvfb, or a fetched one.
+///
+/// # Errors
+/// [`DriverError::NoDisplay`] if there is none and the packages cannot be fetched, [`DriverError::Broken`] if it does not
+/// start.
+pub fn virtual_display() -> Result<VirtualDisplay, DriverError> {
+    match VirtualDisplay::of_machine() {
+        Some(display) => display,
+        None => VirtualDisplay::of_folder(&folder_of(Part::Display, &Settings::from_env()?)?),
+    }
 }
 
 impl Prepared {
@@ -202,6 +216,7 @@ fn refusal(part: Part, cause: FetchError) -> DriverError {
         Part::Driver => DriverError::NoDriver { cause },
         Part::Validation => DriverError::NoValidationLayer { cause },
         Part::Radv => DriverError::NoRadv { cause },
+        Part::Display => DriverError::NoDisplay { cause },
     }
 }
 

@@ -8,6 +8,9 @@
 //! <folder>/validation/icd.d/swiftshader_icd.json
 //! <folder>/radv/lib/*.so*                   driver for AMD cards and all it needs but a loader
 //! <folder>/radv/icd.d/radeon_icd.json
+//! <folder>/display/bin/Xvfb, xkbcomp         X server without a screen, and what it compiles keyboards with
+//! <folder>/display/lib/*.so*                all that both need
+//! <folder>/display/xkb/                     descriptions of keyboards
 //! <folder>/*/manifest                       written last; without it the folder does not count
 //! ```
 //! Every path inside is relative, so the folder can be moved and copied.
@@ -36,9 +39,54 @@ pub(super) const RADV: &str = "lib/libvulkan_radeon.so";
 /// Its description inside [`Part::Radv`].
 pub(super) const RADV_JSON: &str = "icd.d/radeon_icd.json";
 
+/// The X server inside [`Part::Display`].
+pub(super) const X_SERVER: &str = "bin/Xvfb";
+/// What it compiles keyboards with.
+pub(super) const KEYBOARD_COMPILER: &str = "bin/xkbcomp";
+/// What it compiles.
+pub(super) const KEYBOARDS: &str = "xkb";
+
 const MANIFEST: &str = "manifest";
 /// Counts layouts: a folder written for another one is fetched anew.
 const MANIFEST_HEAD: &str = "lvk vulkan folder 1";
+
+/// Xvfb with the libraries it is linked to. Its dependencies as packages would bring Mesa's OpenGL and LLVM along, ten
+/// times as much, for an extension that is off here.
+const DISPLAY_PACKAGES: [&str; 33] = [
+    "xvfb",
+    "x11-xkb-utils",
+    "xkb-data",
+    "libaudit1",
+    "libbrotli1",
+    "libbsd0",
+    "libbz2-1.0",
+    "libcap-ng0",
+    "libcap2",
+    "libfontenc1",
+    "libfreetype6",
+    "libgcrypt20",
+    "libgl1",
+    "libglvnd0",
+    "libglx0",
+    "libgpg-error0",
+    "liblz4-1",
+    "liblzma5",
+    "libmd0",
+    "libpcre2-8-0",
+    "libpixman-1-0",
+    "libpng16-16",
+    "libselinux1",
+    "libsystemd0",
+    "libunwind8",
+    "libx11-6",
+    "libxau6",
+    "libxcb1",
+    "libxdmcp6",
+    "libxfont2",
+    "libxkbfile1",
+    "libzstd1",
+    "zlib1g",
+];
 
 /// One of the things that can be fetched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,6 +97,8 @@ pub(super) enum Part {
     Validation,
     /// Mesa's driver for AMD cards, which compiles for them without one.
     Radv,
+    /// An X server without a screen.
+    Display,
 }
 
 impl Part {
@@ -58,6 +108,7 @@ impl Part {
             Self::Driver => "driver",
             Self::Validation => "validation",
             Self::Radv => "radv",
+            Self::Display => "display",
         })
     }
 
@@ -80,6 +131,9 @@ impl Part {
             Self::Validation => {
                 Order { packages: &["chromium-common"], with_dependencies: false, suite: Suite::Security }
             }
+            Self::Display => {
+                Order { packages: &DISPLAY_PACKAGES, with_dependencies: false, suite: Suite::Security }
+            }
         }
     }
 
@@ -89,11 +143,12 @@ impl Part {
             Self::Driver => "software driver lavapipe",
             Self::Validation => "validation layer",
             Self::Radv => "driver for AMD cards, RADV",
+            Self::Display => "X server without a screen, Xvfb",
         }
     }
 
     /// All of them.
-    pub(super) const ALL: [Self; 3] = [Self::Driver, Self::Validation, Self::Radv];
+    pub(super) const ALL: [Self; 4] = [Self::Driver, Self::Validation, Self::Radv, Self::Display];
 
     /// The complete folder of this part, if one of `roots` has it.
     pub(super) fn find(self, roots: &[PathBuf]) -> Option<PathBuf> {

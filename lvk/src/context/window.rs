@@ -1,0 +1,415 @@
+//! Swapchains: made, drawn into, shown.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::Context;
+use super::create_texture::views;
+use super::holder::Holder;
+use crate::command::CommandBuffer;
+use crate::error::{Error, Result};
+use crate::format::Format;
+use crate::handle::SwapchainHandle;
+use crate::resource::Texture;
+use crate::resource::image::{Image, raw_usage, usage_of};
+use crate::resource::texture_desc::TextureDesc;
+use crate::shared::Garbage;
+use crate::submit::{Submission, SubmitHandle};
+use crate::swapchain::chain::{Chain, ChainPlan, PresentSync};
+use crate::swapchain::course::{Acquired, Engine};
+use crate::swapchain::decide::{self, Failure};
+use crate::swapchain::desc::{PresentMode, SwapchainDesc, SwapchainImage, SwapchainInfo};
+use crate::swapchain::state::{ChainImage, Current, Parts, State, Swapchain, Wishes};
+use crate::swapchain::surface::{Surface, SurfaceState};
+
+impl Context {
+    /// Creates a swapchain for a window (`vkCreateSwapchainKHR`). See [`manual::windows`](crate::manual::windows).
+    ///
+    /// A window that is minimised may get its images later: then [`SwapchainInfo::extent`] is zero.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) without a window, and for a window that has a swapchain already;
+    /// [`Unsupported`](Error::Unsupported) where the context was made without a window, where the device cannot present to
+    /// it, and for usages that images of the window cannot have.
+    pub fn create_swapchain(&self, desc: &SwapchainDesc<'_>) -> Result<Holder<SwapchainHandle>> {
+        let shared = self.shared();
+        let name = desc.debug_name;
+        let no_window = || Error::usage(name, "give it a window, here or in ContextDesc::window");
+        let window = desc.window.as_ref().or(self.inner.window.as_ref()).ok_or_else(no_window)?;
+        if desc.usage.is_empty() {
+            return Err(Error::usage(name, "give its images at least one usage"));
+        }
+        let wishes = Wishes {
+            extent: desc.extent,
+            present_modes: desc.present_modes.to_vec(),
+            color_spaces: desc.color_spaces.to_vec(),
+            hdr: desc.hdr,
+            usage: desc.usage,
+            image_count: desc.image_count,
+        };
+        let surface = Surface::new(&shared.gpu, window, name)?;
+        let handle = shared.store.swapchains.insert(Swapchain::new(name, surface, wishes, &shared.gpu));
+        let holder = Holder::new(self, handle, 0);
+        let swapchain = shared.store.swapchains.get(handle)?;
+        let mut guard = swapchain.lock();
+        let State { course, parts } = &mut *guard;
+        course.prepare(name, &mut Live { ctx: self, name: &swapchain.name, parts })?;
+        drop(guard);
+        Ok(holder)
+    }
+
+    /// The next image to draw into (`vkAcquireNextImageKHR`), for one [`present`](Self::present). `None` where nothing can
+    /// be shown for now: the window is minimised, hidden, or being resized; go on with the next frame.
+    ///
+    /// Waits for the presentation engine where it has all images, a second at most. Makes the swapchain anew where the
+    /// window has changed, without waiting for the GPU. An image that was not presented comes again; the value that stood
+    /// for it is worth nothing from then on.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) when the window is gone, [`StaleHandle`](Error::StaleHandle).
+    pub fn next_image(&self, swapchain: SwapchainHandle) -> Result<Option<SwapchainImage>> {
+        let object = self.shared().store.swapchains.get(swapchain)?;
+        let mut guard = object.lock();
+        let State { course, parts } = &mut *guard;
+        self.check_alive(swapchain)?;
+        let mut live = Live { ctx: self, name: &object.name, parts };
+        let Some(taken) = course.next(&object.name, &mut live)? else { return Ok(None) };
+        let image = parts.current.as_ref().and_then(|current| {
+            let image = current.images.get(taken.index as usize)?;
+            Some(SwapchainImage {
+                swapchain,
+                texture: image.texture,
+                index: image.object.slot,
+                extent: current.plan.extent,
+                format: current.plan.format,
+                ticket: taken.ticket,
+            })
+        });
+        Ok(image)
+    }
+
+    /// Submits a command buffer that draws into an image, and shows the image when that is done (`vkQueuePresentKHR`).
+    ///
+    /// Other command buffers may have drawn into it before. A swapchain that no longer fits its window is not an error: it
+    /// is made anew by the next [`next_image`](Self::next_image).
+    ///
+    /// # Errors
+    /// Those of [`submit`](Self::submit), after which the image is as it was before; [`InvalidUsage`](Error::InvalidUsage)
+    /// for an image that was given out again, or whose swapchain was made anew.
+    pub fn present(&self, mut cmd: CommandBuffer, image: SwapchainImage) -> Result<SubmitHandle> {
+        let shared = self.shared();
+        self.check_own(&cmd)?;
+        let swapchain = shared.store.swapchains.get(image.swapchain)?;
+        let mut guard = swapchain.lock();
+        let State { course, parts } = &mut *guard;
+        let outdated = || {
+            let message = "the image was given out again, or the swapchain was made anew; present what next_image \
+                           answered last";
+            Error::usage(&*swapchain.name, message)
+        };
+        let index = course.taken(image.ticket).ok_or_else(outdated)?;
+        let current = parts.current.as_mut().ok_or_else(outdated)?;
+        let mode = current.mode;
+        let shown = current.images.get_mut(index as usize).ok_or_else(outdated)?;
+        cmd.release_image(&shown.object)?;
+        shown.sync.reset()?;
+        let came_back = std::mem::replace(&mut shown.sync.presented, false);
+        let drawn = vk::SemaphoreSubmitInfo::default()
+            .semaphore(shown.sync.drawn)
+            .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS);
+        let presented = Some(shown.object.image.id);
+        let more = Submission { signals: vec![drawn], presented, ..Submission::default() };
+        let submission = self.submit_between(cmd, more)?;
+        let answer = current.chain.present(index, mode, &shown.sync);
+        // Whatever the window has come to, the engine waits for the semaphore and signals the fence.
+        shown.sync.presented = !matches!(answer, Err(Failure::Other(_)));
+        if came_back {
+            parts.presents_are_over_at(submission.value);
+        }
+        if let Some(semaphore) = parts.signalled.take() {
+            parts.give_semaphore(semaphore, submission.value);
+        }
+        course.presented(answer)?;
+        Ok(submission)
+    }
+
+    /// The window has this size in pixels now; a 0 says that it is minimised. Costs nothing where nothing changed. Needed
+    /// on Wayland only, and for windows that are minimised without becoming small.
+    pub fn resize_swapchain(&self, swapchain: SwapchainHandle, extent: [u32; 2]) -> Result<()> {
+        let object = self.shared().store.swapchains.get(swapchain)?;
+        let mut state = object.lock();
+        let before = std::mem::replace(&mut state.parts.wishes.extent, extent);
+        if before != extent {
+            state.course.outdate();
+        }
+        Ok(())
+    }
+
+    /// Changes how pictures come to the screen, to the first of `wishes` that there is, or [`PresentMode::Fifo`]. Where the
+    /// device cannot change it for a single picture, the swapchain is made anew by the next
+    /// [`next_image`](Self::next_image).
+    pub fn set_present_mode(&self, swapchain: SwapchainHandle, wishes: &[PresentMode]) -> Result<()> {
+        let object = self.shared().store.swapchains.get(swapchain)?;
+        let mut state = object.lock();
+        let State { course, parts } = &mut *state;
+        parts.wishes.present_modes = wishes.to_vec();
+        if let Some(current) = &mut parts.current {
+            let mode = decide::present_mode(wishes, &current.offered_modes);
+            if current.plan.modes.contains(&mode) {
+                current.mode = mode;
+            } else {
+                course.outdate();
+            }
+        }
+        Ok(())
+    }
+
+    /// What the swapchain is like at the moment.
+    ///
+    /// # Errors
+    /// [`StaleHandle`](Error::StaleHandle); [`Unsupported`](Error::Unsupported) where it would have no images now, as its
+    /// window takes none of the formats.
+    pub fn swapchain_info(&self, swapchain: SwapchainHandle) -> Result<SwapchainInfo> {
+        let object = self.shared().store.swapchains.get(swapchain)?;
+        let mut guard = object.lock();
+        let State { course, parts } = &mut *guard;
+        let rebuilds = parts.rebuilds.saturating_sub(1);
+        if let Some(current) = &parts.current {
+            return Ok(SwapchainInfo {
+                extent: course.extent().unwrap_or_default(),
+                format: current.plan.format,
+                color_space: current.plan.color_space,
+                present_mode: current.mode,
+                present_modes: current.offered_modes.clone(),
+                image_count: current.images.len() as u32,
+                rebuilds,
+            });
+        }
+        let mut live = Live { ctx: self, name: &object.name, parts };
+        let planned = live.surface().and_then(|surface| live.plan(&surface, &surface.state()?, [0; 2]));
+        let (present_modes, plan) = planned.map_err(|failure| failure.into_error(&object.name))?;
+        Ok(SwapchainInfo {
+            extent: [0, 0],
+            format: plan.format,
+            color_space: plan.color_space,
+            present_mode: plan.modes.first().copied().unwrap_or_default(),
+            present_modes,
+            image_count: plan.image_count,
+            rebuilds,
+        })
+    }
+
+    /// Gives up the images of a swapchain, and what its handle named.
+    pub(super) fn retire_swapchain(&self, swapchain: Arc<Swapchain>) {
+        let mut guard = swapchain.lock();
+        let State { course, parts } = &mut *guard;
+        course.outdate();
+        Live { ctx: self, name: &swapchain.name, parts }.retire_current();
+        drop(guard);
+        self.shared().retire(Garbage::Swapchain(swapchain));
+    }
+
+    /// Another thread may have destroyed the swapchain while this one waited for its lock.
+    fn check_alive(&self, swapchain: SwapchainHandle) -> Result<()> {
+        self.shared().store.swapchains.get(swapchain).map(drop)
+    }
+}
+
+/// A swapchain under its lock, with what images are made of.
+struct Live<'a> {
+    ctx: &'a Context,
+    name: &'a Arc<str>,
+    parts: &'a mut Parts,
+}
+
+impl Engine for Live<'_> {
+    fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure> {
+        let state = self.surface()?.state()?;
+        Ok(decide::extent(&state.limits, self.parts.wishes.extent))
+    }
+
+    /// A lost surface is rare, and its swapchains have to be gone before the window can have another: here the GPU is
+    /// waited for.
+    fn renew_surface(&mut self) -> Result<(), Failure> {
+        self.parts.wait_for_presents()?;
+        self.retire_current();
+        self.ctx.wait_idle()?;
+        self.parts.clear_retired();
+        self.parts.surface = None;
+        self.surface().map(drop).map_err(|failure| match failure {
+            Failure::Other(error) => {
+                log::warn!("{}: its window takes no other surface: {error}", self.name);
+                Failure::SurfaceLost
+            }
+            failure => failure,
+        })
+    }
+
+    fn rebuild(&mut self, extent: [u32; 2]) -> Result<(), Failure> {
+        let surface = self.surface()?;
+        let (offered_modes, plan) = self.plan(&surface, &surface.state()?, extent)?;
+        let old = self.parts.current.as_ref().map(|current| Arc::clone(&current.chain));
+        let made = Chain::new(&surface, &plan, old.as_deref(), self.name);
+        self.retire_current();
+        let chain = Arc::new(made?);
+        if let Some(hdr) = &self.parts.wishes.hdr {
+            chain.set_hdr(hdr)?;
+        }
+        let mode = plan.modes.first().copied().unwrap_or_default();
+        let images = self.images(&chain, &plan)?;
+        self.parts.current = Some(Current { images, plan, mode, offered_modes, chain });
+        self.parts.rebuilds += 1;
+        Ok(())
+    }
+
+    fn acquire(&mut self) -> Result<Acquired, Failure> {
+        let submitter = &self.ctx.shared().submitter;
+        let completed = submitter.timeline.completed()?;
+        self.parts.collect(completed);
+        let Some(current) = &self.parts.current else { return Err(Failure::OutOfDate) };
+        let (chain, ids) = (Arc::clone(&current.chain), current.ids());
+        let semaphore = self.parts.take_semaphore(completed, self.name)?;
+        let answer = chain.acquire(semaphore);
+        let taken = match answer {
+            Ok(Acquired::Image { index, .. }) => ids.get(index as usize),
+            _ => None,
+        };
+        match taken {
+            Some(id) => {
+                submitter.with_presentables(|images| images.acquire(*id, semaphore));
+                self.parts.signalled = Some(semaphore);
+            }
+            None => self.parts.give_semaphore(semaphore, 0),
+        }
+        answer
+    }
+}
+
+impl Live<'_> {
+    /// The surface; another one where the last was lost.
+    fn surface(&mut self) -> Result<Arc<Surface>, Failure> {
+        if let Some(surface) = &self.parts.surface {
+            return Ok(Arc::clone(surface));
+        }
+        let surface = Arc::new(Surface::new(&self.parts.gpu, &self.parts.window, self.name)?);
+        Ok(Arc::clone(self.parts.surface.insert(surface)))
+    }
+
+    /// What the Vulkan swapchain is to be like, and the modes there are.
+    fn plan(
+        &self,
+        surface: &Surface,
+        state: &SurfaceState,
+        extent: [u32; 2],
+    ) -> Result<(Vec<PresentMode>, ChainPlan), Failure> {
+        let (gpu, wishes) = (&self.parts.gpu, &self.parts.wishes);
+        let refused = |why: String| Error::unsupported(format!("swapchain '{}'", self.name), why);
+        let usable = |format: Format| usage_of(gpu.format_features(format)).contains(wishes.usage);
+        let offered = surface.formats()?;
+        let (format, color_space) = decide::surface_format(&wishes.color_spaces, &offered, usable)
+            .ok_or_else(|| {
+                refused(format!("the window takes no format that can be used for {:?}", wishes.usage))
+            })?;
+        let copies = vk::ImageUsageFlags::TRANSFER_SRC | vk::ImageUsageFlags::TRANSFER_DST;
+        let usage = raw_usage(wishes.usage, format) | copies;
+        if !state.raw.supported_usage_flags.contains(usage) {
+            let why = format!("images of the window cannot be used for {:?} and copies", wishes.usage);
+            return Err(refused(why).into());
+        }
+        let modes = surface.present_modes()?;
+        let mode = decide::present_mode(&wishes.present_modes, &modes);
+        let identity = vk::SurfaceTransformFlagsKHR::IDENTITY;
+        let can_stay = state.raw.supported_transforms.contains(identity);
+        let plan = ChainPlan {
+            extent,
+            format,
+            color_space,
+            modes: surface.compatible_modes(mode)?,
+            image_count: decide::image_count(&state.limits, wishes.image_count, mode),
+            usage,
+            transform: if can_stay { identity } else { state.raw.current_transform },
+            alpha: decide::composite_alpha(state.raw.supported_composite_alpha),
+        };
+        Ok((modes, plan))
+    }
+
+    fn images(&mut self, chain: &Arc<Chain>, plan: &ChainPlan) -> Result<Vec<ChainImage>, Failure> {
+        let mut images = Vec::new();
+        for raw in chain.images()? {
+            match self.image(chain, plan, raw) {
+                Ok(image) => images.push(image),
+                Err(error) => {
+                    self.retire_images(images);
+                    return Err(error.into());
+                }
+            }
+        }
+        Ok(images)
+    }
+
+    /// One image as a texture with a number of its own.
+    fn image(&self, chain: &Arc<Chain>, plan: &ChainPlan, raw: vk::Image) -> Result<ChainImage> {
+        let shared = self.ctx.shared();
+        let sync = PresentSync::new(&shared.gpu, self.name)?;
+        let slot = shared.reserve(|| shared.bindless.reserve_texture(self.name))?;
+        let desc = TextureDesc {
+            format: plan.format,
+            extent: plan.extent,
+            usage: self.parts.wishes.usage,
+            debug_name: self.name,
+            ..Default::default()
+        };
+        let image =
+            Image::import(&shared.gpu, &desc, raw).inspect_err(|_| shared.bindless.free_texture(slot))?;
+        let texture = Texture::of(&shared.gpu, &desc, image.lent_by(Arc::clone(chain) as _), slot);
+        let views = views(&texture).inspect_err(|_| shared.bindless.free_texture(slot))?;
+        shared.bindless.set_texture(slot, views);
+        shared.submitter.with_presentables(|images| images.insert(texture.image.id, self.name));
+        let handle = shared.store.textures.insert(texture);
+        Ok(ChainImage { texture: handle, object: shared.store.textures.get(handle)?, sync })
+    }
+
+    /// Gives up the Vulkan swapchain. Its images and presents live on until nothing uses them.
+    fn retire_current(&mut self) {
+        let Some(current) = self.parts.current.take() else { return };
+        let syncs = self.retire_images(current.images);
+        self.parts.retire(current.chain, syncs);
+        if let Some(semaphore) = self.parts.signalled.take() {
+            self.parts.give_semaphore(semaphore, self.ctx.shared().submitter.submitted());
+        }
+    }
+
+    /// Destroys the textures of images, and waits on the GPU for those that were taken and not used.
+    fn retire_images(&mut self, images: Vec<ChainImage>) -> Vec<PresentSync> {
+        let shared = self.ctx.shared();
+        let mut waits = Vec::new();
+        let mut syncs = Vec::new();
+        for image in images {
+            let id = image.object.image.id;
+            waits.extend(shared.submitter.with_presentables(|presentables| presentables.retire(id)));
+            if shared.store.textures.remove(image.texture).is_ok() {
+                shared.retire(Garbage::Texture(image.object));
+            }
+            syncs.push(image.sync);
+        }
+        if !waits.is_empty() {
+            self.wait_on_gpu(&waits);
+        }
+        syncs
+    }
+
+    /// A semaphore that was signalled can be used again only after a wait.
+    fn wait_on_gpu(&self, semaphores: &[vk::Semaphore]) {
+        let wait = |semaphore: &vk::Semaphore| {
+            vk::SemaphoreSubmitInfo::default()
+                .semaphore(*semaphore)
+                .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+        };
+        let waits = semaphores.iter().map(wait).collect();
+        let submission = Submission { waits, ..Submission::default() };
+        if let Err(error) = self.ctx.shared().submitter.submit(submission, || {}) {
+            log::error!("{}: an image that was taken cannot be given back: {error}", self.name);
+        }
+    }
+}

@@ -1,0 +1,249 @@
+//! What a swapchain is made like, and what an answer of the presentation engine means. Knows no device.
+
+use ash::vk;
+
+use super::desc::{ColorSpace, PresentMode};
+use crate::error::Error;
+use crate::format::Format;
+
+/// What a surface says of its images.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct SurfaceLimits {
+    pub(crate) min_images: u32,
+    /// 0 where there is no limit.
+    pub(crate) max_images: u32,
+    /// Size of the window; [`ANY_EXTENT`] where the application chooses.
+    pub(crate) current: [u32; 2],
+    pub(crate) smallest: [u32; 2],
+    pub(crate) largest: [u32; 2],
+}
+
+/// The size of windows that take the size of their images.
+pub(crate) const ANY_EXTENT: [u32; 2] = [u32::MAX; 2];
+
+/// Size of the images; `None` where nothing can be shown.
+pub(crate) fn extent(limits: &SurfaceLimits, wished: [u32; 2]) -> Option<[u32; 2]> {
+    if wished.contains(&0) || limits.largest.contains(&0) {
+        return None;
+    }
+    let size = match limits.current {
+        ANY_EXTENT => {
+            std::array::from_fn(|side| wished[side].max(limits.smallest[side]).min(limits.largest[side]))
+        }
+        current => current,
+    };
+    (!size.contains(&0)).then_some(size)
+}
+
+/// Number of images.
+pub(crate) fn image_count(limits: &SurfaceLimits, wished: u32, mode: PresentMode) -> u32 {
+    let least = if mode == PresentMode::Mailbox { 3 } else { 0 };
+    let wished = if wished == 0 { limits.min_images.saturating_add(1).max(least) } else { wished };
+    let most = if limits.max_images == 0 { u32::MAX } else { limits.max_images };
+    wished.max(limits.min_images).min(most)
+}
+
+/// The first of the wishes that is offered.
+pub(crate) fn present_mode(wishes: &[PresentMode], offered: &[PresentMode]) -> PresentMode {
+    wishes.iter().copied().find(|wish| offered.contains(wish)).unwrap_or_default()
+}
+
+/// Format and colour space of the first wish that there is in a `usable` format.
+pub(crate) fn surface_format(
+    wishes: &[ColorSpace],
+    offered: &[vk::SurfaceFormatKHR],
+    usable: impl Fn(Format) -> bool,
+) -> Option<(Format, ColorSpace)> {
+    let is_offered = |format: Format, space: ColorSpace| {
+        offered.iter().any(|pair| pair.format == format.raw() && pair.color_space == space.raw())
+    };
+    wishes.iter().chain(&[ColorSpace::Srgb, ColorSpace::SrgbEncoded]).find_map(|space| {
+        let mut formats = space.formats().iter().copied();
+        let found = formats.find(|format| is_offered(*format, *space) && usable(*format));
+        found.map(|format| (format, *space))
+    })
+}
+
+/// The one bit of `offered` to use: the first of `wishes`, or the lowest.
+pub(crate) fn composite_alpha(offered: vk::CompositeAlphaFlagsKHR) -> vk::CompositeAlphaFlagsKHR {
+    if offered.contains(vk::CompositeAlphaFlagsKHR::OPAQUE) {
+        return vk::CompositeAlphaFlagsKHR::OPAQUE;
+    }
+    let raw = offered.as_raw();
+    vk::CompositeAlphaFlagsKHR::from_raw(raw & raw.wrapping_neg())
+}
+
+/// Why the presentation engine did not do what it was asked.
+#[derive(Debug, Clone)]
+pub(crate) enum Failure {
+    /// The swapchain no longer fits its window.
+    OutOfDate,
+    /// The surface is gone, though the window may still be there.
+    SurfaceLost,
+    /// Nothing that another swapchain would help with.
+    Other(Error),
+}
+
+impl Failure {
+    /// What an answer to `call` means.
+    pub(crate) fn of(call: &'static str) -> impl FnOnce(vk::Result) -> Self {
+        move |result| match result {
+            vk::Result::ERROR_OUT_OF_DATE_KHR | vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT => {
+                Self::OutOfDate
+            }
+            vk::Result::ERROR_SURFACE_LOST_KHR => Self::SurfaceLost,
+            vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR => {
+                let message =
+                    "the window has another swapchain, or another program draws to it; destroy that first";
+                Self::Other(Error::usage("window", message))
+            }
+            result => Self::Other(Error::vulkan(call)(result)),
+        }
+    }
+}
+
+impl Failure {
+    /// What a caller is told who asked for nothing that could be repeated.
+    pub(crate) fn into_error(self, name: &str) -> Error {
+        match self {
+            Self::OutOfDate => Error::usage(name, "its window changes at the moment; ask again"),
+            Self::SurfaceLost => {
+                let message =
+                    "its window is gone; destroy the swapchain before its window, and make another one";
+                Error::usage(name, message)
+            }
+            Self::Other(error) => error,
+        }
+    }
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        Self::Other(error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn limits() -> impl Strategy<Value = SurfaceLimits> {
+        let side = || prop_oneof![Just(0_u32), 1..5000_u32];
+        let current = prop_oneof![Just(ANY_EXTENT), [side(), side()]];
+        (1..5_u32, 0..9_u32, current, [0..64_u32, 0..64], [side(), side()]).prop_map(
+            |(min_images, extra, current, smallest, largest)| SurfaceLimits {
+                min_images,
+                max_images: if extra == 0 { 0 } else { min_images + extra - 1 },
+                current,
+                smallest,
+                largest: [largest[0].max(smallest[0]), largest[1].max(smallest[1])],
+            },
+        )
+    }
+
+    fn modes() -> impl Strategy<Value = Vec<PresentMode>> {
+        use PresentMode::{Fifo, FifoRelaxed, Immediate, Mailbox};
+        prop::collection::vec(prop::sample::select(vec![Fifo, FifoRelaxed, Immediate, Mailbox]), 0..5)
+    }
+
+    proptest! {
+        #[test]
+        fn images_have_the_size_of_the_window_or_one_it_takes(limits in limits(), wished in [0..6000_u32, 0..6000]) {
+            match extent(&limits, wished) {
+                Some(size) if limits.current == ANY_EXTENT => {
+                    for side in 0..2 {
+                        prop_assert!(size[side] >= limits.smallest[side] && size[side] <= limits.largest[side]);
+                        let inside = wished[side] >= limits.smallest[side] && wished[side] <= limits.largest[side];
+                        prop_assert!(!inside || size[side] == wished[side]);
+                    }
+                    prop_assert!(!size.contains(&0));
+                }
+                Some(size) => prop_assert!(size == limits.current && !size.contains(&0)),
+                None => {
+                    let sizes = [wished, limits.current, limits.largest];
+                    prop_assert!(sizes.iter().any(|size| size.contains(&0)));
+                }
+            }
+        }
+
+        #[test]
+        fn there_are_as_many_images_as_wished_where_there_can_be(
+            limits in limits(), wished in 0..20_u32, mode in modes()
+        ) {
+            let mode = present_mode(&mode, &mode);
+            let count = image_count(&limits, wished, mode);
+            prop_assert!(count >= limits.min_images && (limits.max_images == 0 || count <= limits.max_images));
+            let free = limits.max_images == 0 || limits.max_images > limits.min_images + 3;
+            if wished == 0 && free {
+                prop_assert!(count > limits.min_images && (mode != PresentMode::Mailbox || count >= 3));
+            }
+            if wished >= limits.min_images && (limits.max_images == 0 || wished <= limits.max_images) && wished > 0 {
+                prop_assert_eq!(count, wished);
+            }
+        }
+
+        #[test]
+        fn the_mode_is_the_first_wish_there_is(wishes in modes(), offered in modes()) {
+            let chosen = present_mode(&wishes, &offered);
+            let first = wishes.iter().find(|wish| offered.contains(wish));
+            prop_assert_eq!(chosen, first.copied().unwrap_or(PresentMode::Fifo));
+        }
+
+        #[test]
+        fn the_format_is_offered_and_usable_and_of_the_first_space_that_can_be(
+            wishes in prop::collection::vec(prop::sample::select(SPACES.to_vec()), 0..4),
+            offered in prop::collection::vec((prop::sample::select(SPACES.to_vec()), 0..3_usize), 0..6),
+            unusable in prop::sample::select(Format::ALL),
+        ) {
+            let pair = |(space, which): &(ColorSpace, usize)| {
+                let formats = space.formats();
+                let format = formats[which % formats.len()];
+                vk::SurfaceFormatKHR { format: format.raw(), color_space: space.raw() }
+            };
+            let offered: Vec<_> = offered.iter().map(pair).collect();
+            let can_be = |space: &ColorSpace| space.formats().iter().any(|format| {
+                let pair = vk::SurfaceFormatKHR { format: format.raw(), color_space: space.raw() };
+                *format != unusable && offered.contains(&pair)
+            });
+            let found = surface_format(&wishes, &offered, |format| format != unusable);
+            let expected = wishes.iter().chain(&[ColorSpace::Srgb, ColorSpace::SrgbEncoded]).find(|space| can_be(space));
+            prop_assert_eq!(found.map(|(_, space)| space), expected.copied());
+            if let Some((format, space)) = found {
+                let pair = vk::SurfaceFormatKHR { format: format.raw(), color_space: space.raw() };
+                prop_assert!(format != unusable && offered.contains(&pair));
+            }
+        }
+    }
+
+    const SPACES: [ColorSpace; 5] = [
+        ColorSpace::Srgb,
+        ColorSpace::SrgbEncoded,
+        ColorSpace::DisplayP3,
+        ColorSpace::ExtendedSrgbLinear,
+        ColorSpace::Hdr10,
+    ];
+
+    #[test]
+    fn one_way_of_blending_with_the_desktop_is_taken() {
+        use vk::CompositeAlphaFlagsKHR as Alpha;
+        assert_eq!(composite_alpha(Alpha::INHERIT | Alpha::OPAQUE), Alpha::OPAQUE);
+        assert_eq!(composite_alpha(Alpha::INHERIT | Alpha::PRE_MULTIPLIED), Alpha::PRE_MULTIPLIED);
+    }
+
+    #[test]
+    fn answers_mean_another_swapchain_another_surface_or_an_error() {
+        let of = |result| Failure::of("vkAcquireNextImageKHR")(result);
+        assert!(matches!(of(vk::Result::ERROR_OUT_OF_DATE_KHR), Failure::OutOfDate));
+        assert!(matches!(of(vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT), Failure::OutOfDate));
+        assert!(matches!(of(vk::Result::ERROR_SURFACE_LOST_KHR), Failure::SurfaceLost));
+        let text = |result| match of(result) {
+            Failure::Other(error) => error.to_string(),
+            other => panic!("{other:?}"),
+        };
+        assert!(text(vk::Result::ERROR_NATIVE_WINDOW_IN_USE_KHR).contains("another swapchain"));
+        assert!(text(vk::Result::ERROR_DEVICE_LOST).contains("vkAcquireNextImageKHR"));
+        assert!(text(vk::Result::ERROR_OUT_OF_HOST_MEMORY).contains("host memory"));
+    }
+}

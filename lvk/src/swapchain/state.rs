@@ -1,0 +1,190 @@
+//! A swapchain with everything that changes from frame to frame.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::chain::{Chain, ChainPlan, PresentSync, new_semaphore};
+use super::course::Course;
+use super::desc::{ColorSpace, HdrMetadata, PresentMode};
+use super::surface::Surface;
+use crate::barrier::ResourceId;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::gpu::window::WindowHandles;
+use crate::handle::TextureHandle;
+use crate::lock::{Guard, Mutex, Rank};
+use crate::resource::Texture;
+use crate::resource::texture_desc::TextureUsage;
+
+/// What the caller wants of every Vulkan swapchain that is made for this one.
+#[derive(Debug, Clone)]
+pub(crate) struct Wishes {
+    pub(crate) extent: [u32; 2],
+    pub(crate) present_modes: Vec<PresentMode>,
+    pub(crate) color_spaces: Vec<ColorSpace>,
+    pub(crate) hdr: Option<HdrMetadata>,
+    pub(crate) usage: TextureUsage,
+    pub(crate) image_count: u32,
+}
+
+/// A swapchain.
+pub(crate) struct Swapchain {
+    pub(crate) name: Arc<str>,
+    state: Mutex<State>,
+}
+
+/// What is locked together.
+pub(crate) struct State {
+    pub(crate) course: Course,
+    pub(crate) parts: Parts,
+}
+
+/// What the course is about.
+pub(crate) struct Parts {
+    pub(crate) wishes: Wishes,
+    pub(crate) window: Arc<dyn WindowHandles>,
+    /// `None` only after a surface was lost and no other could be made.
+    pub(crate) surface: Option<Arc<Surface>>,
+    /// `None` where there are no images, for example of a window that is minimised.
+    pub(crate) current: Option<Current>,
+    /// Semaphores for taking images, each with the value of the timeline from which on it is free.
+    semaphores: Vec<(vk::Semaphore, u64)>,
+    /// The one that was signalled for the image that is taken.
+    pub(crate) signalled: Option<vk::Semaphore>,
+    retired: Vec<Retired>,
+    pub(crate) rebuilds: u64,
+    pub(crate) gpu: Arc<Gpu>,
+}
+
+/// The Vulkan swapchain in use.
+pub(crate) struct Current {
+    pub(crate) images: Vec<ChainImage>,
+    pub(crate) plan: ChainPlan,
+    pub(crate) mode: PresentMode,
+    pub(crate) offered_modes: Vec<PresentMode>,
+    /// Dropped after its images.
+    pub(crate) chain: Arc<Chain>,
+}
+
+/// An image of it.
+pub(crate) struct ChainImage {
+    pub(crate) texture: TextureHandle,
+    pub(crate) object: Arc<Texture>,
+    pub(crate) sync: PresentSync,
+}
+
+/// A Vulkan swapchain that another has replaced, until its presents are over.
+struct Retired {
+    syncs: Vec<PresentSync>,
+    /// Value of the timeline from which on its presents are over, where fences do not tell.
+    over_at: Option<u64>,
+    _chain: Arc<Chain>,
+}
+
+impl Swapchain {
+    pub(crate) fn new(name: &str, surface: Surface, wishes: Wishes, gpu: &Arc<Gpu>) -> Self {
+        let parts = Parts {
+            wishes,
+            window: Arc::clone(&surface.window),
+            surface: Some(Arc::new(surface)),
+            current: None,
+            semaphores: Vec::new(),
+            signalled: None,
+            retired: Vec::new(),
+            rebuilds: 0,
+            gpu: Arc::clone(gpu),
+        };
+        let state = Mutex::new(Rank::Swapchain, State { course: Course::new(), parts });
+        Self { name: Arc::from(name), state }
+    }
+
+    pub(crate) fn lock(&self) -> Guard<'_, State> {
+        self.state.lock()
+    }
+}
+
+impl Current {
+    /// The images as barriers know them, in their order.
+    pub(crate) fn ids(&self) -> Vec<ResourceId> {
+        self.images.iter().map(|image| image.object.image.id).collect()
+    }
+}
+
+impl Parts {
+    /// A semaphore that nothing uses, as far as the timeline has come.
+    pub(crate) fn take_semaphore(&mut self, completed: u64, name: &str) -> Result<vk::Semaphore> {
+        match self.semaphores.iter().position(|(_, free_at)| *free_at <= completed) {
+            Some(place) => Ok(self.semaphores.swap_remove(place).0),
+            None => new_semaphore(&self.gpu, name),
+        }
+    }
+
+    /// Gives a semaphore back, which is free when the timeline reaches `free_at`.
+    pub(crate) fn give_semaphore(&mut self, semaphore: vk::Semaphore, free_at: u64) {
+        self.semaphores.push((semaphore, free_at));
+    }
+
+    /// Keeps the parts of a swapchain that was replaced until its presents are over.
+    pub(crate) fn retire(&mut self, chain: Arc<Chain>, syncs: Vec<PresentSync>) {
+        self.retired.push(Retired { syncs, over_at: None, _chain: chain });
+    }
+
+    /// An image that was presented is back, and the submission of this value waits for that: presents of the queue before
+    /// that one are over.
+    pub(crate) fn presents_are_over_at(&mut self, value: u64) {
+        for retired in &mut self.retired {
+            retired.over_at.get_or_insert(value);
+        }
+    }
+
+    /// Destroys what was replaced and is no longer presented.
+    pub(crate) fn collect(&mut self, completed: u64) {
+        self.retired.retain(|retired| !retired.is_over(completed));
+    }
+
+    /// Waits until all presents are over.
+    pub(crate) fn wait_for_presents(&self) -> Result<()> {
+        let current = self.current.iter().flat_map(|current| &current.images).map(|image| &image.sync);
+        let retired = self.retired.iter().flat_map(|retired| &retired.syncs);
+        let mut told = true;
+        for sync in current.chain(retired) {
+            told &= sync.is_over().is_some();
+            sync.wait()?;
+        }
+        if told {
+            return Ok(());
+        }
+        let queue = self.gpu.queue();
+        // SAFETY: the queue is locked.
+        unsafe { self.gpu.device.queue_wait_idle(*queue) }.map_err(Error::vulkan("vkQueueWaitIdle"))
+    }
+
+    /// Destroys what was replaced. Its presents are over.
+    pub(crate) fn clear_retired(&mut self) {
+        self.retired.clear();
+    }
+}
+
+impl Retired {
+    fn is_over(&self, completed: u64) -> bool {
+        let fences: Option<Vec<bool>> = self.syncs.iter().map(PresentSync::is_over).collect();
+        match fences {
+            Some(over) => over.into_iter().all(|over| over),
+            None => self.over_at.is_some_and(|value| value <= completed),
+        }
+    }
+}
+
+impl Drop for Parts {
+    fn drop(&mut self) {
+        if let Err(error) = self.wait_for_presents() {
+            log::error!("a swapchain ends before its last pictures were shown: {error}");
+        }
+        let all = self.semaphores.drain(..).map(|(semaphore, _)| semaphore).chain(self.signalled.take());
+        for semaphore in all {
+            // SAFETY: the owner has waited until the GPU is done with the swapchain.
+            unsafe { self.gpu.device.destroy_semaphore(semaphore, None) };
+        }
+    }
+}

@@ -1,0 +1,110 @@
+//! A window as Vulkan sees it.
+
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::decide::{Failure, SurfaceLimits};
+use super::desc::PresentMode;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::gpu::window::{WindowFunctions, WindowHandles, create_surface};
+
+/// A surface, destroyed on drop. It keeps its window.
+pub(crate) struct Surface {
+    pub(crate) raw: vk::SurfaceKHR,
+    pub(crate) gpu: Arc<Gpu>,
+    pub(crate) window: Arc<dyn WindowHandles>,
+}
+
+/// What a surface answers when a swapchain is to be made.
+pub(crate) struct SurfaceState {
+    pub(crate) limits: SurfaceLimits,
+    pub(crate) raw: vk::SurfaceCapabilitiesKHR,
+}
+
+impl Surface {
+    /// The surface of a window that the context's queue can present to.
+    pub(crate) fn new(gpu: &Arc<Gpu>, window: &Arc<dyn WindowHandles>, name: &str) -> Result<Self> {
+        let functions = gpu.windows()?;
+        let raw = create_surface(&gpu.instance, window.as_ref())?;
+        let surface = Self { raw, gpu: Arc::clone(gpu), window: Arc::clone(window) };
+        // SAFETY: the surface belongs to the instance of the device.
+        let presents = unsafe {
+            functions.surface.get_physical_device_surface_support(gpu.physical(), gpu.queue_family, raw)
+        };
+        if presents.map_err(Error::vulkan("vkGetPhysicalDeviceSurfaceSupportKHR"))? {
+            gpu.name(raw, name);
+            return Ok(surface);
+        }
+        Err(gpu.lacks("presentation to this window"))
+    }
+
+    /// Size and number of images.
+    pub(crate) fn state(&self) -> Result<SurfaceState, Failure> {
+        let functions = &self.functions()?.surface;
+        // SAFETY: the surface belongs to the instance of the device.
+        let raw =
+            unsafe { functions.get_physical_device_surface_capabilities(self.gpu.physical(), self.raw) }
+                .map_err(Failure::of("vkGetPhysicalDeviceSurfaceCapabilitiesKHR"))?;
+        let size = |extent: vk::Extent2D| [extent.width, extent.height];
+        let limits = SurfaceLimits {
+            min_images: raw.min_image_count,
+            max_images: raw.max_image_count,
+            current: size(raw.current_extent),
+            smallest: size(raw.min_image_extent),
+            largest: size(raw.max_image_extent),
+        };
+        Ok(SurfaceState { limits, raw })
+    }
+
+    /// Formats with their colour spaces.
+    pub(crate) fn formats(&self) -> Result<Vec<vk::SurfaceFormatKHR>, Failure> {
+        let functions = &self.functions()?.surface;
+        // SAFETY: as above.
+        unsafe { functions.get_physical_device_surface_formats(self.gpu.physical(), self.raw) }
+            .map_err(Failure::of("vkGetPhysicalDeviceSurfaceFormatsKHR"))
+    }
+
+    /// Modes that the library knows.
+    pub(crate) fn present_modes(&self) -> Result<Vec<PresentMode>, Failure> {
+        let functions = &self.functions()?.surface;
+        // SAFETY: as above.
+        let modes =
+            unsafe { functions.get_physical_device_surface_present_modes(self.gpu.physical(), self.raw) }
+                .map_err(Failure::of("vkGetPhysicalDeviceSurfacePresentModesKHR"))?;
+        Ok(modes.into_iter().filter_map(PresentMode::of).collect())
+    }
+
+    /// Modes that a swapchain in `mode` can change to without being made anew, `mode` first; nothing else where the device
+    /// cannot change modes.
+    pub(crate) fn compatible_modes(&self, mode: PresentMode) -> Result<Vec<PresentMode>, Failure> {
+        let Some(functions) = &self.functions()?.maintenance else { return Ok(vec![mode]) };
+        let mut asked = vk::SurfacePresentModeEXT::default().present_mode(mode.raw());
+        let info = vk::PhysicalDeviceSurfaceInfo2KHR::default().surface(self.raw).push_next(&mut asked);
+        let mut raw = [vk::PresentModeKHR::default(); 16];
+        let mut compatible = vk::SurfacePresentModeCompatibilityEXT::default().present_modes(&mut raw);
+        let mut capabilities = vk::SurfaceCapabilities2KHR::default().push_next(&mut compatible);
+        // SAFETY: the surface belongs to the instance of the device, which has the extensions of the chain.
+        unsafe {
+            functions.get_physical_device_surface_capabilities2(self.gpu.physical(), &info, &mut capabilities)
+        }
+        .map_err(Failure::of("vkGetPhysicalDeviceSurfaceCapabilities2KHR"))?;
+        let count = (compatible.present_mode_count as usize).min(raw.len());
+        let others = raw[..count].iter().filter_map(|raw| PresentMode::of(*raw));
+        Ok([mode].into_iter().chain(others.filter(|other| *other != mode)).collect())
+    }
+
+    fn functions(&self) -> Result<&WindowFunctions, Failure> {
+        Ok(self.gpu.windows()?)
+    }
+}
+
+impl Drop for Surface {
+    fn drop(&mut self) {
+        if let Ok(functions) = self.gpu.windows() {
+            // SAFETY: its swapchains keep it, so they are gone; the window is still there.
+            unsafe { functions.surface.destroy_surface(self.raw, None) };
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! Windows for tests, on an X server of their own that has no screen.
+#![expect(clippy::expect_used, reason = "a test whose X server fails has failed")]
+
+use std::ffi::c_void;
+use std::num::NonZeroU32;
+use std::ptr::NonNull;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, OnceLock};
+
+use lvk::raw_window_handle::{
+    DisplayHandle, HandleError, HasDisplayHandle, HasWindowHandle, RawDisplayHandle, RawWindowHandle,
+    WindowHandle, XcbDisplayHandle, XcbWindowHandle,
+};
+use lvk_samples::driver::{VirtualDisplay, virtual_display};
+use x11rb::connection::Connection;
+use x11rb::protocol::xproto::{ConfigureWindowAux, ConnectionExt, CreateWindowAux, ImageFormat, WindowClass};
+use x11rb::xcb_ffi::{XCBConnection, load_libxcb};
+
+use crate::device::{fetched, unavailable, vulkan};
+
+/// The X server of the test program, with a connection that keeps it running.
+pub struct Desktop {
+    connection: XCBConnection,
+    screen: usize,
+    _server: VirtualDisplay,
+}
+
+/// Pixels of a side of the place that a window has for itself.
+pub const ROOM: u32 = 200;
+
+/// Places side by side.
+const COLUMNS: u32 = 10;
+
+/// The desktop of this program; `None`, loudly, where there is no X server and none can be fetched.
+///
+/// # Panics
+/// When there is none although `LVK_REQUIRE_GPU=1` demands every test.
+pub fn desktop() -> Option<&'static Desktop> {
+    static DESKTOP: OnceLock<Option<Desktop>> = OnceLock::new();
+    DESKTOP.get_or_init(Desktop::new).as_ref()
+}
+
+impl Desktop {
+    fn new() -> Option<Self> {
+        // The driver brings libxcb along.
+        vulkan()?;
+        let server = fetched(virtual_display(), "X server for windows")?;
+        if let Err(error) = load_libxcb() {
+            unavailable(&format!("libxcb cannot be opened: {error}"));
+        }
+        let (connection, screen) =
+            XCBConnection::connect(Some(&c_string(server.name()))).expect("the X server has just started");
+        Some(Self { connection, screen, _server: server })
+    }
+
+    /// A visible window, of at most [`ROOM`] pixels a side: the first ones do not lie on each other, as a screen forgets
+    /// what lies beneath.
+    pub fn window(&'static self, extent: [u32; 2]) -> Arc<TestWindow> {
+        static WINDOWS: AtomicU32 = AtomicU32::new(0);
+        let place = WINDOWS.fetch_add(1, Ordering::Relaxed);
+        let screen = &self.connection.setup().roots[self.screen];
+        let id = self.connection.generate_id().expect("ids do not run out");
+        let [width, height] = extent.map(|side| side as u16);
+        self.connection
+            .create_window(
+                screen.root_depth,
+                id,
+                screen.root,
+                (place % COLUMNS * ROOM) as i16,
+                (place / COLUMNS * ROOM % u32::from(screen.height_in_pixels)) as i16,
+                width,
+                height,
+                0,
+                WindowClass::INPUT_OUTPUT,
+                screen.root_visual,
+                &CreateWindowAux::new(),
+            )
+            .expect("the connection is up");
+        self.connection.map_window(id).expect("the connection is up");
+        self.sync();
+        Arc::new(TestWindow { desktop: self, id })
+    }
+
+    /// Waits until the server has done everything asked so far.
+    fn sync(&self) {
+        let reply = self.connection.get_input_focus().expect("the connection is up").reply();
+        reply.expect("the server answers");
+    }
+}
+
+/// A window, closed on drop.
+pub struct TestWindow {
+    desktop: &'static Desktop,
+    id: u32,
+}
+
+impl TestWindow {
+    /// Gives it another size, at once.
+    pub fn resize(&self, extent: [u32; 2]) {
+        let size = ConfigureWindowAux::new().width(extent[0]).height(extent[1]);
+        self.desktop.connection.configure_window(self.id, &size).expect("the connection is up");
+        self.desktop.sync();
+    }
+
+    /// Closes it although others still use it.
+    pub fn close(&self) {
+        self.desktop.connection.destroy_window(self.id).expect("the connection is up");
+        self.desktop.sync();
+    }
+
+    /// Red, green and blue of a pixel, as the screen would show it.
+    pub fn pixel(&self, x: i16, y: i16) -> [u8; 3] {
+        let image = self.desktop.connection.get_image(ImageFormat::Z_PIXMAP, self.id, x, y, 1, 1, u32::MAX);
+        let data = image.expect("the connection is up").reply().expect("the pixel lies in the window").data;
+        [data[2], data[1], data[0]]
+    }
+}
+
+impl Drop for TestWindow {
+    fn drop(&mut self) {
+        // It may be closed already.
+        let _ = self.desktop.connection.destroy_window(self.id);
+        let _ = self.desktop.connection.flush();
+    }
+}
+
+impl HasWindowHandle for TestWindow {
+    fn window_handle(&self) -> Result<WindowHandle<'_>, HandleError> {
+        let id = NonZeroU32::new(self.id).ok_or(HandleError::Unavailable)?;
+        let raw = RawWindowHandle::Xcb(XcbWindowHandle::new(id));
+        // SAFETY: the window lives as long as `self`, unless a test closes it, which X servers take.
+        Ok(unsafe { WindowHandle::borrow_raw(raw) })
+    }
+}
+
+impl HasDisplayHandle for TestWindow {
+    fn display_handle(&self) -> Result<DisplayHandle<'_>, HandleError> {
+        let connection: NonNull<c_void> =
+            NonNull::new(self.desktop.connection.get_raw_xcb_connection()).ok_or(HandleError::Unavailable)?;
+        let raw = XcbDisplayHandle::new(Some(connection), self.desktop.screen as i32);
+        // SAFETY: the connection lives until the end of the program.
+        Ok(unsafe { DisplayHandle::borrow_raw(RawDisplayHandle::Xcb(raw)) })
+    }
+}
+
+fn c_string(text: &str) -> std::ffi::CString {
+    std::ffi::CString::new(text).expect("names of displays have no zero bytes")
+}

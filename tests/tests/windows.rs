@@ -1,0 +1,454 @@
+//! Swapchains in windows of an X server without a screen.
+#![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
+
+use std::sync::Arc;
+
+use lvk::*;
+use lvk_tests::child::without_ray_tracing;
+use lvk_tests::device::vulkan;
+use lvk_tests::random::Random;
+use lvk_tests::windows::{TestWindow, desktop};
+use lvk_tests::{TestDevice, device, device_with};
+
+const RED: [f32; 4] = [1.0, 0.0, 0.0, 1.0];
+const GREEN: [f32; 4] = [0.0, 1.0, 0.0, 1.0];
+const BLUE: [f32; 4] = [0.0, 0.0, 1.0, 1.0];
+
+/// A window and a context for it.
+fn window_with<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> Option<(Arc<TestWindow>, TestDevice)> {
+    let window = desktop()?.window([64, 48]);
+    let ctx = device_with(|desc| {
+        desc.window = Some(window.clone());
+        adjust(desc);
+    })?;
+    Some((window, ctx))
+}
+
+fn window() -> Option<(Arc<TestWindow>, TestDevice)> {
+    window_with(|_| {})
+}
+
+/// The device as it is without fences and modes of single presents.
+fn without_maintenance() -> DeviceProfile {
+    DeviceProfile {
+        name: "no swapchain maintenance".into(),
+        hidden: FeatureSet::NONE.with(OptionalFeature::SwapchainMaintenance1),
+        ..Default::default()
+    }
+}
+
+fn fill(ctx: &Context, texture: TextureHandle, color: [f32; 4]) -> Result<CommandBuffer> {
+    let mut cmd = ctx.acquire_command_buffer()?;
+    let target = ColorAttachment::clear(texture, color);
+    drop(cmd.begin_rendering(&RenderPassDesc { color: &[target], ..Default::default() })?);
+    Ok(cmd)
+}
+
+/// One frame of one colour; `None` where nothing could be shown.
+fn show(ctx: &Context, swapchain: SwapchainHandle, color: [f32; 4]) -> Result<Option<SubmitHandle>> {
+    let Some(image) = ctx.next_image(swapchain)? else { return Ok(None) };
+    let cmd = fill(ctx, image.texture(), color)?;
+    ctx.present(cmd, image).map(Some)
+}
+
+/// Shows frames until the window has the colour: presents come to the screen in their own time.
+fn show_until_seen(ctx: &Context, swapchain: SwapchainHandle, window: &TestWindow, color: [f32; 4]) {
+    let wanted = [color[0], color[1], color[2]].map(|part| (part * 255.0) as u8);
+    for _ in 0..200 {
+        show(ctx, swapchain, color).unwrap();
+        ctx.wait_idle().unwrap();
+        if window.pixel(3, 2) == wanted {
+            return;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    panic!("the window shows {:?}, not {wanted:?}", window.pixel(3, 2));
+}
+
+fn message<T: std::fmt::Debug>(result: Result<T>) -> String {
+    let error = result.unwrap_err();
+    assert!(matches!(error, Error::InvalidUsage { .. }), "{error:?}");
+    error.to_string()
+}
+
+#[test]
+fn contexts_without_a_window_use_no_extension_of_window_systems() {
+    let Some(ctx) = device() else { return };
+    for name in [c"vkDestroySurfaceKHR", c"vkGetPhysicalDeviceSurfaceSupportKHR"] {
+        let instance = ctx.raw_instance().handle();
+        // SAFETY: the instance is alive.
+        let found = unsafe { (ctx.raw_entry().static_fn().get_instance_proc_addr)(instance, name.as_ptr()) };
+        assert!(found.is_none(), "{name:?}");
+    }
+    assert!(!ctx.capabilities().has(OptionalFeature::Swapchain));
+    assert!(message(ctx.create_swapchain(&SwapchainDesc::default())).contains("ContextDesc::window"));
+    let Some(desktop) = desktop() else { return };
+    let desc = SwapchainDesc { window: Some(desktop.window([8, 8])), ..Default::default() };
+    let error = ctx.create_swapchain(&desc).unwrap_err();
+    assert!(matches!(error, Error::Unsupported { .. }), "{error:?}");
+}
+
+#[test]
+fn pictures_come_to_the_window_and_can_be_read_before() {
+    let Some((window, ctx)) = window() else { return };
+    assert!(ctx.capabilities().has(OptionalFeature::Swapchain));
+    let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
+    let info = ctx.swapchain_info(*swapchain).unwrap();
+    assert_eq!((info.extent, info.color_space, info.rebuilds), ([64, 48], ColorSpace::Srgb, 0));
+    assert!(info.image_count >= 2 && info.present_modes.contains(&PresentMode::Fifo));
+    let image = ctx.next_image(*swapchain).unwrap().unwrap();
+    assert_eq!((image.extent(), image.format()), ([64, 48], info.format));
+    let texture = image.texture();
+    ctx.submit(fill(&ctx, texture, GREEN).unwrap()).unwrap();
+    let texels = ctx.download_texture(texture, &TextureRegion::default()).unwrap();
+    assert!(texels.chunks(4).all(|texel| texel == [0, 255, 0, 255]));
+    // Drawn by an earlier submission, so this one has nothing to do but to present.
+    ctx.present(ctx.acquire_command_buffer().unwrap(), image).unwrap();
+    for color in [RED, GREEN, BLUE] {
+        show_until_seen(&ctx, *swapchain, &window, color);
+    }
+}
+
+/// Texture numbers are so few that those of swapchains that are gone have to come back.
+fn resize_often(window: &TestWindow, ctx: &Context, times: u32) {
+    let swapchain = ctx.create_swapchain(&SwapchainDesc { image_count: 3, ..Default::default() }).unwrap();
+    let mut random = Random::new(7);
+    let mut shown = 0;
+    for _ in 0..times {
+        window.resize([1 + random.bits() as u32 % 190, 1 + random.bits() as u32 % 190]);
+        ctx.next_frame().unwrap();
+        for _ in 0..random.bits() % 3 {
+            shown += u32::from(show(ctx, *swapchain, BLUE).unwrap().is_some());
+        }
+    }
+    assert!(shown > times / 2, "{shown} of {times}");
+    window.resize([33, 21]);
+    // Drivers may notice one picture too late.
+    let fits = |_: &u32| {
+        show(ctx, *swapchain, BLUE).unwrap();
+        ctx.swapchain_info(*swapchain).unwrap().extent == [33, 21]
+    };
+    assert!((0..50).find(fits).is_some(), "{:?}", ctx.swapchain_info(*swapchain));
+    show_until_seen(ctx, *swapchain, window, RED);
+    let info = ctx.swapchain_info(*swapchain).unwrap();
+    assert!(info.rebuilds > u64::from(times) / 3, "{info:?}");
+    // Left alone, it stays.
+    for _ in 0..5 {
+        show(ctx, *swapchain, GREEN).unwrap();
+    }
+    assert_eq!(ctx.swapchain_info(*swapchain).unwrap().rebuilds, info.rebuilds);
+}
+
+#[test]
+fn two_hundred_resizes_are_followed() {
+    let Some((window, ctx)) = window_with(|desc| desc.max_textures = 64) else { return };
+    resize_often(&window, &ctx, 200);
+}
+
+#[test]
+fn resizes_are_followed_without_fences_of_presents() {
+    let profile = without_maintenance();
+    let window = window_with(|desc| {
+        desc.max_textures = 64;
+        desc.profile = Some(&profile);
+    });
+    let Some((window, ctx)) = window else { return };
+    assert!(!ctx.capabilities().has(OptionalFeature::SwapchainMaintenance1));
+    resize_often(&window, &ctx, 60);
+}
+
+#[test]
+fn resizes_are_followed_on_another_driver() {
+    without_ray_tracing("resizes_are_followed_on_another_driver", || {
+        let Some((window, ctx)) = window_with(|desc| desc.max_textures = 64) else { return };
+        resize_often(&window, &ctx, 60);
+    });
+}
+
+#[test]
+fn three_windows_show_their_own_pictures() {
+    let Some((first, ctx)) = window() else { return };
+    let Some(desktop) = desktop() else { return };
+    let windows = [first, desktop.window([40, 30]), desktop.window([20, 50])];
+    let swapchains: Vec<_> = windows
+        .iter()
+        .map(|window| {
+            let desc = SwapchainDesc { window: Some(window.clone()), ..Default::default() };
+            ctx.create_swapchain(&desc).unwrap()
+        })
+        .collect();
+    // All three in one frame, and the images of two taken at once.
+    for _ in 0..4 {
+        ctx.next_frame().unwrap();
+        let images: Vec<_> = swapchains.iter().map(|one| ctx.next_image(**one).unwrap().unwrap()).collect();
+        for (image, color) in images.into_iter().zip([RED, GREEN, BLUE]) {
+            let cmd = fill(&ctx, image.texture(), color).unwrap();
+            ctx.present(cmd, image).unwrap();
+        }
+    }
+    for ((swapchain, window), color) in swapchains.iter().zip(&windows).zip([RED, GREEN, BLUE]) {
+        show_until_seen(&ctx, **swapchain, window, color);
+    }
+    for ((swapchain, window), extent) in swapchains.iter().zip(&windows).zip([[64, 48], [40, 30], [20, 50]]) {
+        assert_eq!(ctx.swapchain_info(**swapchain).unwrap().extent, extent);
+        assert_ne!(window.pixel(1, 1), [0, 0, 0]);
+    }
+}
+
+/// Every mode the window has, one after the other.
+fn switch_modes(ctx: &Context) -> (u64, usize) {
+    let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
+    assert_eq!(ctx.swapchain_info(*swapchain).unwrap().present_mode, PresentMode::Fifo);
+    let modes = ctx.swapchain_info(*swapchain).unwrap().present_modes;
+    for mode in modes.iter().rev().chain(&modes) {
+        ctx.set_present_mode(*swapchain, &[*mode]).unwrap();
+        for color in [RED, GREEN, BLUE] {
+            show(ctx, *swapchain, color).unwrap().unwrap();
+        }
+        assert_eq!(ctx.swapchain_info(*swapchain).unwrap().present_mode, *mode);
+    }
+    let all = [PresentMode::Mailbox, PresentMode::Immediate, PresentMode::FifoRelaxed, PresentMode::Fifo];
+    ctx.set_present_mode(*swapchain, &all).unwrap();
+    show(ctx, *swapchain, RED).unwrap().unwrap();
+    let info = ctx.swapchain_info(*swapchain).unwrap();
+    assert_eq!(Some(info.present_mode), all.into_iter().find(|mode| info.present_modes.contains(mode)));
+    (info.rebuilds, modes.len())
+}
+
+#[test]
+fn present_modes_are_switched() {
+    let Some((_window, ctx)) = window() else { return };
+    let (rebuilds, modes) = switch_modes(&ctx);
+    assert!(modes > 1, "the X server has several");
+    if ctx.capabilities().has(OptionalFeature::SwapchainMaintenance1) {
+        assert!(rebuilds < modes as u64, "some changes need no swapchain: {rebuilds} for {modes} modes");
+    }
+}
+
+#[test]
+fn present_modes_are_switched_by_new_swapchains() {
+    let profile = without_maintenance();
+    let Some((_window, ctx)) = window_with(|desc| desc.profile = Some(&profile)) else { return };
+    let (rebuilds, modes) = switch_modes(&ctx);
+    assert!(rebuilds >= modes as u64, "{rebuilds} for {modes} modes");
+}
+
+/// An image is a plain value: whether it is dropped or forgotten makes no difference.
+#[test]
+fn images_that_are_dropped_or_forgotten_come_again() {
+    let Some((window, ctx)) = window() else { return };
+    let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
+    for round in 0..12 {
+        let texture = ctx.next_image(*swapchain).unwrap().unwrap().texture();
+        if round % 3 == 0 {
+            // Used, and yet not presented.
+            ctx.submit(fill(&ctx, texture, RED).unwrap()).unwrap();
+        }
+        let again = ctx.next_image(*swapchain).unwrap().unwrap();
+        assert_eq!(again.texture(), texture);
+        let cmd = fill(&ctx, texture, GREEN).unwrap();
+        ctx.present(cmd, again).unwrap();
+    }
+    // The value of an image that was given out again is worth nothing, and the image is as it was.
+    let old = ctx.next_image(*swapchain).unwrap().unwrap();
+    let new = ctx.next_image(*swapchain).unwrap().unwrap();
+    let cmd = fill(&ctx, old.texture(), RED).unwrap();
+    assert!(message(ctx.present(cmd, old)).contains("given out again"));
+    let cmd = fill(&ctx, new.texture(), RED).unwrap();
+    ctx.present(cmd, new).unwrap();
+    // An image is taken when the window changes, and when the swapchain goes.
+    ctx.next_image(*swapchain).unwrap().unwrap();
+    ctx.resize_swapchain(*swapchain, [50, 50]).unwrap();
+    window.resize([50, 50]);
+    show_until_seen(&ctx, *swapchain, &window, BLUE);
+    let taken = ctx.next_image(*swapchain).unwrap().unwrap();
+    let cmd = fill(&ctx, taken.texture(), RED).unwrap();
+    drop(swapchain);
+    assert!(matches!(ctx.present(cmd, taken), Err(Error::StaleHandle { kind: "swapchain" })));
+}
+
+#[test]
+fn images_are_used_between_taking_and_presenting_only() {
+    let Some((_window, ctx)) = window() else { return };
+    let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
+    let image = ctx.next_image(*swapchain).unwrap().unwrap();
+    let texture = image.texture();
+    let early = fill(&ctx, texture, RED).unwrap();
+    let late = fill(&ctx, texture, RED).unwrap();
+    ctx.submit(early).unwrap();
+    ctx.present(ctx.acquire_command_buffer().unwrap(), image).unwrap();
+    assert!(message(ctx.submit(late)).contains("presentation engine"));
+    assert!(
+        message(ctx.download_texture(texture, &TextureRegion::default())).contains("presentation engine")
+    );
+    let upload = ctx.upload_texture(texture, &TextureRegion::default(), &[0; 64 * 48 * 4]);
+    assert!(message(upload).contains("command buffer"));
+    // The swapchain alone destroys its images.
+    ctx.destroy(texture);
+    let other = device().unwrap();
+    let image = ctx.next_image(*swapchain).unwrap().unwrap();
+    ctx.destroy(image.texture());
+    let foreign = other.acquire_command_buffer().unwrap();
+    assert!(message(ctx.present(foreign, image)).contains("another context"));
+    // Recorded for a swapchain that has been made anew since.
+    let image = ctx.next_image(*swapchain).unwrap().unwrap();
+    let stale = fill(&ctx, image.texture(), RED).unwrap();
+    ctx.resize_swapchain(*swapchain, [9, 9]).unwrap();
+    let next = ctx.next_image(*swapchain).unwrap().unwrap();
+    assert!(message(ctx.submit(stale)).contains("made anew"));
+    let cmd = fill(&ctx, next.texture(), RED).unwrap();
+    assert!(message(ctx.present(cmd, image)).contains("made anew"));
+    // None of that broke anything.
+    let cmd = fill(&ctx, next.texture(), RED).unwrap();
+    ctx.present(cmd, next).unwrap();
+}
+
+#[test]
+fn views_of_images_may_outlive_the_swapchain() {
+    let Some((window, ctx)) = window() else { return };
+    let desc = SwapchainDesc {
+        usage: TextureUsage::TARGET | TextureUsage::SAMPLED,
+        color_spaces: &[ColorSpace::SrgbEncoded],
+        ..Default::default()
+    };
+    let swapchain = ctx.create_swapchain(&desc).unwrap();
+    assert_eq!(ctx.swapchain_info(*swapchain).unwrap().color_space, ColorSpace::SrgbEncoded);
+    let image = ctx.next_image(*swapchain).unwrap().unwrap();
+    let view = TextureViewDesc { texture: Some(image.texture()), debug_name: "view", ..Default::default() };
+    let view = ctx.create_texture_view(&view).unwrap();
+    let cmd = fill(&ctx, *view, GREEN).unwrap();
+    ctx.present(cmd, image).unwrap();
+    show_until_seen(&ctx, *swapchain, &window, GREEN);
+    drop(swapchain);
+    ctx.wait_idle().unwrap();
+    assert!(message(ctx.submit(fill(&ctx, *view, RED).unwrap())).contains("made anew"));
+    drop(view);
+}
+
+#[test]
+fn minimised_windows_have_no_images() {
+    let Some((window, ctx)) = window() else { return };
+    let desc = SwapchainDesc { extent: [0, 0], ..Default::default() };
+    let swapchain = ctx.create_swapchain(&desc).unwrap();
+    assert_eq!(ctx.swapchain_info(*swapchain).unwrap().extent, [0, 0]);
+    assert!(ctx.next_image(*swapchain).unwrap().is_none());
+    ctx.resize_swapchain(*swapchain, [64, 48]).unwrap();
+    show_until_seen(&ctx, *swapchain, &window, RED);
+    for extent in [[0, 48], [64, 0], [0, 0]] {
+        ctx.resize_swapchain(*swapchain, extent).unwrap();
+        assert!(show(&ctx, *swapchain, BLUE).unwrap().is_none());
+        ctx.resize_swapchain(*swapchain, [64, 48]).unwrap();
+        assert!(show(&ctx, *swapchain, BLUE).unwrap().is_some());
+    }
+}
+
+/// The driver may wait in its own presents, as lavapipe does, so what is slow is not presented here.
+#[test]
+fn neither_an_image_nor_a_new_swapchain_waits_for_the_gpu() {
+    let Some((window, ctx)) = window() else { return };
+    let swapchain = ctx.create_swapchain(&SwapchainDesc { image_count: 3, ..Default::default() }).unwrap();
+    let desc = TextureDesc { extent: [2048, 2048], usage: TextureUsage::TARGET, ..Default::default() };
+    let heavy = ctx.create_texture(&desc).unwrap();
+    for _ in 0..3 {
+        show(&ctx, *swapchain, RED).unwrap().unwrap();
+    }
+    ctx.wait_idle().unwrap();
+    let slow = || {
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        for _ in 0..100 {
+            let target = ColorAttachment::clear(*heavy, RED);
+            drop(cmd.begin_rendering(&RenderPassDesc { color: &[target], ..Default::default() }).unwrap());
+        }
+        ctx.submit(cmd).unwrap()
+    };
+    // The frame before still runs: the next image is taken, and drawn into, meanwhile.
+    let first = slow();
+    let image = ctx.next_image(*swapchain).unwrap().unwrap();
+    let drawn = ctx.submit(fill(&ctx, image.texture(), GREEN).unwrap()).unwrap();
+    assert!(!ctx.is_done(first).unwrap() && !ctx.is_done(drawn).unwrap(), "an image waited for the GPU");
+    // So is a whole swapchain, although an image of the one before is drawn into.
+    window.resize([30, 20]);
+    ctx.resize_swapchain(*swapchain, [30, 20]).unwrap();
+    let image = ctx.next_image(*swapchain).unwrap().unwrap();
+    assert_eq!((image.extent(), ctx.swapchain_info(*swapchain).unwrap().rebuilds), ([30, 20], 1));
+    assert!(!ctx.is_done(first).unwrap(), "a new swapchain waited for the GPU");
+    let second = ctx.present(fill(&ctx, image.texture(), BLUE).unwrap(), image).unwrap();
+    assert!(second > drawn);
+    show_until_seen(&ctx, *swapchain, &window, BLUE);
+}
+
+#[test]
+fn frames_in_flight_overlap_with_one_image_each() {
+    let Some((window, ctx)) = window_with(|desc| desc.frames_in_flight = 2) else { return };
+    let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
+    let count = ctx.swapchain_info(*swapchain).unwrap().image_count as usize;
+    let mut textures = Vec::new();
+    for number in 0..20 {
+        ctx.next_frame().unwrap();
+        let image = ctx.next_image(*swapchain).unwrap().unwrap();
+        if !textures.contains(&image.texture()) {
+            textures.push(image.texture());
+        }
+        let color = if number % 2 == 0 { RED } else { GREEN };
+        ctx.present(fill(&ctx, image.texture(), color).unwrap(), image).unwrap();
+    }
+    assert!(textures.len() > 1 && textures.len() <= count, "{textures:?}");
+    show_until_seen(&ctx, *swapchain, &window, BLUE);
+}
+
+#[test]
+fn a_window_that_is_closed_too_early_is_an_error_and_no_more() {
+    let Some((window, ctx)) = window() else { return };
+    let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
+    show_until_seen(&ctx, *swapchain, &window, RED);
+    window.close();
+    let mut told = None;
+    for _ in 0..8 {
+        match show(&ctx, *swapchain, RED) {
+            Ok(_) => {}
+            Err(error) => told = Some(error),
+        }
+    }
+    let told = message::<()>(Err(told.expect("the window is gone")));
+    assert!(told.contains("window is gone"), "{told}");
+    // The context is as good as before.
+    drop(swapchain);
+    let Some(desktop) = desktop() else { return };
+    let other = desktop.window([16, 16]);
+    let desc = SwapchainDesc { window: Some(other.clone()), ..Default::default() };
+    let swapchain = ctx.create_swapchain(&desc).unwrap();
+    show_until_seen(&ctx, *swapchain, &other, GREEN);
+}
+
+#[test]
+fn what_windows_cannot_have_is_refused() {
+    let Some((window, ctx)) = window() else { return };
+    let refused = |desc: &SwapchainDesc<'_>| ctx.create_swapchain(desc).unwrap_err();
+    let none = SwapchainDesc { usage: TextureUsage::empty(), debug_name: "bare", ..Default::default() };
+    assert!(refused(&none).to_string().contains("bare"));
+    let profile = DeviceProfile::core_only();
+    let desc = ContextDesc {
+        vulkan_library: vulkan().unwrap(),
+        window: Some(window.clone()),
+        profile: Some(&profile),
+        ..Default::default()
+    };
+    let error = Context::new(&desc).unwrap_err().to_string();
+    assert!(error.contains("VK_KHR_swapchain (hidden by the device profile 'core-only')"), "{error}");
+    // Wishes are no demands.
+    let wishes = SwapchainDesc {
+        color_spaces: &[ColorSpace::Hdr10, ColorSpace::ExtendedSrgbLinear],
+        present_modes: &[PresentMode::Mailbox, PresentMode::Immediate],
+        hdr: Some(HdrMetadata::default()),
+        image_count: 1000,
+        ..Default::default()
+    };
+    let swapchain = ctx.create_swapchain(&wishes).unwrap();
+    show(&ctx, *swapchain, RED).unwrap();
+    let handle = *swapchain;
+    drop(swapchain);
+    assert!(matches!(ctx.next_image(handle), Err(Error::StaleHandle { kind: "swapchain" })));
+    assert!(matches!(ctx.swapchain_info(handle), Err(Error::StaleHandle { .. })));
+    assert!(matches!(ctx.resize_swapchain(handle, [1, 1]), Err(Error::StaleHandle { .. })));
+    assert!(matches!(ctx.set_present_mode(handle, &[]), Err(Error::StaleHandle { .. })));
+}
