@@ -4,7 +4,7 @@ use lvk::{Context, Format, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderS
 
 use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
-use crate::{bench, hybrid, hybrid_oit, reflections, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures};
+use crate::{app, bench, hybrid, hybrid_oit, reflections, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures};
 
 /// A stage of a [`SamplePipeline`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,6 +69,7 @@ pub fn all() -> Vec<SamplePipeline> {
         rtx_pipeline::pipelines(),
         rtx_textures::pipelines(),
         bench::pipelines(),
+        app::ui::pipelines(),
     ]
     .concat()
 }

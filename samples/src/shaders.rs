@@ -2,6 +2,7 @@
 
 /// Names as `#include` writes them, and texts, for every sample.
 pub const INCLUDES: &[(&str, &str)] = &[
+    ("app/ui.glsl", include_str!("../../shaders/app/ui.glsl")),
     ("bench/view.glsl", include_str!("../../shaders/bench/view.glsl")),
     ("common/camera.glsl", include_str!("../../shaders/common/camera.glsl")),
     ("common/fresnel.glsl", include_str!("../../shaders/common/fresnel.glsl")),
@@ -68,6 +69,14 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("hybrid_oit/sky.glsl", include_str!("../../shaders/hybrid_oit/sky.glsl")),
     ("hybrid_oit/sphere.glsl", include_str!("../../shaders/hybrid_oit/sphere.glsl")),
 ];
+
+/// Stages of the windows' user interface.
+pub mod app {
+    /// Corners of its triangles.
+    pub const UI_VERT: &str = include_str!("../../shaders/app/ui.vert.glsl");
+    /// Their colours.
+    pub const UI_FRAG: &str = include_str!("../../shaders/app/ui.frag.glsl");
+}
 
 /// Stages of the `bench` program.
 pub mod bench {

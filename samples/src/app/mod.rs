@@ -24,6 +24,7 @@ pub mod sample;
 pub mod scene_args;
 pub mod scene_list;
 pub mod timings;
+pub mod ui;
 
 use std::io::Write as _;
 
