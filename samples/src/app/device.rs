@@ -1,8 +1,10 @@
 //! Opens the device the user names, and lists what there is.
 
+use std::sync::Arc;
+
 use lvk::{
     Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryPath, RayQueryRequest,
-    ValidationSink,
+    ValidationSink, WindowHandles,
 };
 
 use super::caches::Caches;
@@ -26,6 +28,7 @@ pub(super) fn open(
     driver: &Driver,
     sink: &ValidationSink,
     needs: &DeviceNeeds,
+    window: Option<Arc<dyn WindowHandles>>,
 ) -> Result<Context, RunError> {
     use FeatureRequest::{Off, Optional, Required};
     use RayQueryRequest::{Auto, Hardware, HardwareIfPresent, Software};
@@ -36,6 +39,7 @@ pub(super) fn open(
             vulkan_library: driver.loader.as_deref(),
             device: args.device.as_deref(),
             profile: args.profile.as_ref(),
+            window: window.clone(),
             validation: validation(args.validate),
             validation_sink: args.validate.map(|_| sink.clone()),
             ray_tracing_pipeline,

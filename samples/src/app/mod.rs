@@ -6,10 +6,12 @@ pub mod args;
 pub(crate) mod array_buffer;
 pub mod caches;
 pub mod device;
+pub mod fly_camera;
 pub mod frame;
 pub mod frame_name;
 pub mod frames;
 pub mod headless;
+pub mod hot_reload;
 pub mod interrupt;
 pub(crate) mod library_warnings;
 pub mod metrics;
@@ -23,8 +25,10 @@ pub mod run_error;
 pub mod sample;
 pub mod scene_args;
 pub mod scene_list;
+pub mod screenshot;
 pub mod timings;
 pub mod ui;
+mod window;
 
 use std::io::Write as _;
 

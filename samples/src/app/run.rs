@@ -1,8 +1,9 @@
 //! The program of every sample: device, frames, pictures, timings and what is said about them.
 
 use std::process::ExitCode;
+use std::sync::Arc;
 
-use lvk::{Context, ValidationSink};
+use lvk::{Context, ValidationSink, WindowHandles};
 
 use super::device::{self, DeviceNeeds};
 use super::frame_name::FrameName;
@@ -14,8 +15,9 @@ use super::progress::Progress;
 use super::run_args::RunArgs;
 use super::run_error::RunError;
 use super::sample::Sample;
-use super::{library_warnings, say};
+use super::{library_warnings, png, say, window};
 use crate::driver::{DriverRequest, prepare};
+use crate::shader_folder;
 
 /// Frames to time where none are asked for, on a GPU.
 const GPU_FRAMES: u32 = 60;
@@ -26,6 +28,8 @@ const WARM_UP_FRAMES: u32 = 5;
 pub struct Opening<'a> {
     /// Shows which slow thing is under way.
     pub progress: Progress,
+    /// What the device must be able to show pictures in.
+    pub(super) window: Option<Arc<dyn WindowHandles>>,
     name: &'a str,
     args: &'a RunArgs,
     sink: &'a ValidationSink,
@@ -39,7 +43,11 @@ pub struct Opened<S> {
     pub headline: String,
 }
 
-impl Opening<'_> {
+impl<'a> Opening<'a> {
+    pub(super) fn new(name: &'a str, args: &'a RunArgs, sink: &'a ValidationSink) -> Self {
+        Self { progress: Progress::visible(), window: None, name, args, sink }
+    }
+
     /// Opens the device that the command line names, or the best.
     ///
     /// # Errors
@@ -48,7 +56,7 @@ impl Opening<'_> {
         self.progress.pause();
         let driver = prepare(&DriverRequest { validation: self.args.validate.is_some() })?;
         self.progress.stage("opening the device", 0);
-        device::open(self.name, self.args, &driver, self.sink, needs)
+        device::open(self.name, self.args, &driver, self.sink, needs, self.window.clone())
     }
 
     /// Prints warnings to standard error, past the progress bar.
@@ -89,6 +97,9 @@ fn attempt<S: Sample>(
     if args.list_devices {
         return device::list(args.profile.as_ref());
     }
+    if args.window {
+        return show(name, args, make);
+    }
     let out = args.out_or(name);
     let mut job = Job {
         frames: args.frames.clone().unwrap_or(Frames::Still(GPU_FRAMES)),
@@ -100,7 +111,7 @@ fn attempt<S: Sample>(
     };
     job.check()?;
     let sink = ValidationSink::default();
-    let mut opening = Opening { progress: Progress::visible(), name, args, sink: &sink };
+    let mut opening = Opening::new(name, args, &sink);
     let Opened { mut sample, headline } = make(&mut opening)?;
     let context = sample.context().clone();
     drop(opening);
@@ -119,6 +130,25 @@ fn attempt<S: Sample>(
     }
     say(&summary(&job, &played?, remark));
     Ok(())
+}
+
+fn show<S: Sample>(
+    name: &str,
+    args: &RunArgs,
+    make: impl FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
+) -> Result<(), RunError> {
+    if matches!(args.frames, Some(Frames::Sequence(_))) {
+        return Err(RunError::SequenceInWindow);
+    }
+    if let Some(out) = &args.out {
+        png::check_writable(out)?;
+    }
+    if let Some(folder) = &args.hot_reload {
+        shader_folder::take(folder).map_err(|folder| RunError::NoShaders { folder })?;
+    }
+    let sink = ValidationSink::default();
+    window::run(name, args, &sink, make)?;
+    args.validate.map_or(Ok(()), |_| device::report_validation(&sink))
 }
 
 fn summary(job: &Job, played: &Played, remark: Option<String>) -> String {

@@ -62,6 +62,22 @@ pub struct RunArgs {
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub out: Option<PathBuf>,
 
+    /// Show the sample in a window, where mouse and keys move the camera, in place of writing pictures; with --frames N for
+    /// so many frames, with --out the last one of them is written as the window shows it
+    #[arg(long, conflicts_with = "resume", help_heading = "Window")]
+    pub window: bool,
+
+    /// Take the shaders from a folder like `shaders`, and compile them again whenever one changes
+    #[arg(
+        long,
+        value_name = "FOLDER",
+        num_args = 0..=1,
+        default_missing_value = "shaders",
+        requires = "window",
+        help_heading = "Window"
+    )]
+    pub hot_reload: Option<PathBuf>,
+
     /// Device to use, by its number in --list-devices or part of its name
     /// [default: the most capable one that can trace rays]
     #[arg(long, value_name = "NUMBER|NAME", help_heading = "Device")]

@@ -44,6 +44,21 @@ pub enum RunError {
         /// The name as given.
         name: String,
     },
+    /// A window shows its frames as they come.
+    #[error("--frames with --window is a number of frames to show, as --frames 100, and no range")]
+    SequenceInWindow,
+    /// There is no folder of shaders.
+    #[error("--hot-reload {}: no such folder; name one like 'shaders' of the project", folder.display())]
+    NoShaders {
+        /// The folder as given.
+        folder: std::path::PathBuf,
+    },
+    /// There is no window to be had.
+    #[error("no window can be opened: {reason}; without --window the sample writes its picture")]
+    NoWindow {
+        /// What the window system said.
+        reason: String,
+    },
     /// A sequence cannot be resumed that is none.
     #[error("--resume is for sequences, as --frames 0..240 --out frame_####.png")]
     NothingToResume,
@@ -73,6 +88,11 @@ impl RunError {
         Self::Device(Box::new(error))
     }
 
+    /// There is no window to be had.
+    pub(super) fn window(error: &dyn std::error::Error) -> Self {
+        Self::NoWindow { reason: error.to_string() }
+    }
+
     /// The program's exit status: 2 when the user can mend it by other arguments or input, 130 after Ctrl-C, 1 for
     /// trouble with the device.
     #[must_use]
@@ -80,8 +100,10 @@ impl RunError {
         match self {
             Self::Input(_) | Self::Scene(_) | Self::Png(_) | Self::Driver(DriverError::Variable { .. }) => 2,
             Self::NoNumber { .. } | Self::NoSequence { .. } | Self::NothingToResume => 2,
+            Self::SequenceInWindow | Self::NoShaders { .. } => 2,
             Self::Interrupted { .. } => interrupt::STATUS,
-            Self::Device(_) | Self::NoRayQueries { .. } | Self::Driver(_) | Self::Validation(_) => 1,
+            Self::Device(_) | Self::NoRayQueries { .. } | Self::NoWindow { .. } => 1,
+            Self::Driver(_) | Self::Validation(_) => 1,
         }
     }
 }

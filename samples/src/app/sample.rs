@@ -46,7 +46,8 @@
 //! ```
 //!
 //! For a window it also says how to [`resize`](Sample::resize), to be looked at from elsewhere
-//! ([`view`](Sample::view), [`set_view`](Sample::set_view)), and to compile its shaders again ([`reload`](Sample::reload)).
+//! ([`view`](Sample::view), [`set_view`](Sample::set_view)), which switches it has ([`panel`](Sample::panel)), and to compile its
+//! shaders again ([`reload`](Sample::reload)).
 
 use lvk::{Context, TextureHandle};
 
@@ -111,8 +112,9 @@ pub trait Sample {
     /// The sample's own.
     fn update(&mut self, moment: Moment) -> Result<(), Self::Error>;
 
-    /// Records a frame, and answers the texture that shows it: red, green, blue and alpha of each pixel, 8 bits each, sRGB,
-    /// sampled. It holds the frame until the next one is recorded.
+    /// Records a frame, and answers the texture that shows it: red, green, blue and alpha of each pixel, 8 bits each, sRGB. It
+    /// can be sampled, which gives the numbers as they are encoded: its format is `Rgba8Unorm`, or it is a view of that format.
+    /// It holds the frame until the next one is recorded.
     ///
     /// # Errors
     /// The sample's own.
@@ -152,6 +154,9 @@ pub trait Sample {
 
     /// Looks from another place than the animation's, until the next [`update`](Self::update).
     fn set_view(&mut self, _camera: &Camera) {}
+
+    /// Lays out the sample's own switches in the panel of its window.
+    fn panel(&mut self, _ui: &mut egui::Ui) {}
 
     /// Makes all pipelines anew, of shaders that have changed.
     ///

@@ -122,6 +122,17 @@ impl HybridRenderer {
         Ok(self.passes.geometry.choice())
     }
 
+    /// The rasteriser in use, where there is a choice.
+    pub(super) fn raster_to_choose(&self) -> Option<Raster> {
+        let geometry = &self.passes.geometry;
+        geometry.choice().filter(|_| geometry.has_both()).map(|choice| choice.raster)
+    }
+
+    /// Takes a rasteriser, which must be there, from the next frame on.
+    pub(super) fn take_raster(&mut self, raster: Raster) {
+        self.passes.geometry.choose(RasterChoice { raster, why: "as asked for".to_owned() });
+    }
+
     /// The texture that shows the last frame.
     pub fn picture(&self) -> TextureHandle {
         *self.passes.film.picture

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use lvk::{Context, TextureHandle};
 
-use super::{HybridError, HybridRenderer};
+use super::{HybridError, HybridRenderer, Raster};
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::scene::{Camera, CameraPath, Scene};
@@ -15,7 +15,8 @@ const LAMP_SHARE: f32 = 0.04;
 pub struct HybridSequence {
     renderer: HybridRenderer,
     path: CameraPath,
-    lamp: Option<LampCircle>,
+    lamp: LampCircle,
+    lamp_moves: bool,
     camera: Camera,
 }
 
@@ -32,8 +33,7 @@ impl HybridSequence {
     #[must_use]
     pub fn new(renderer: HybridRenderer, scene: &Scene, first: usize, lamp_moves: bool) -> Self {
         let path = CameraPath::tour(scene, first);
-        let lamp = lamp_moves.then(|| LampCircle::of(scene));
-        Self { renderer, camera: path.at(0.0), path, lamp }
+        Self { renderer, camera: path.at(0.0), path, lamp: LampCircle::of(scene), lamp_moves }
     }
 }
 
@@ -46,8 +46,8 @@ impl Sample for HybridSequence {
 
     fn update(&mut self, moment: Moment) -> Result<(), HybridError> {
         self.camera = self.path.at(moment.phase());
-        if let Some(lamp) = &self.lamp {
-            self.renderer.move_lamp(lamp.at(moment.phase()));
+        if self.lamp_moves {
+            self.renderer.move_lamp(self.lamp.at(moment.phase()));
         }
         Ok(())
     }
@@ -70,6 +70,19 @@ impl Sample for HybridSequence {
 
     fn set_view(&mut self, camera: &Camera) {
         self.camera = *camera;
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        if ui.checkbox(&mut self.lamp_moves, "the lamp goes round").changed() && !self.lamp_moves {
+            self.renderer.move_lamp(self.lamp.at(0.0));
+        }
+        if let Some(mut raster) = self.renderer.raster_to_choose() {
+            ui.horizontal(|ui| {
+                ui.radio_value(&mut raster, Raster::Compute, "compute");
+                ui.radio_value(&mut raster, Raster::Hardware, "hardware rasteriser");
+            });
+            self.renderer.take_raster(raster);
+        }
     }
 
     fn reload(&mut self) -> Result<(), HybridError> {

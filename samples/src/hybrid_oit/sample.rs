@@ -83,6 +83,11 @@ impl HybridOit {
         &self.scene.camera
     }
 
+    /// Shadow rays a sample, to change them: 1 to [`HybridOitConfig::MAX_SHADOW_RAYS`].
+    pub(super) fn shadow_rays(&mut self) -> &mut u32 {
+        &mut self.config.shadow_rays
+    }
+
     /// Renders a frame, waits for it and answers the texture that shows it: 8 bits a channel, sRGB.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use lvk::{Context, TextureHandle};
 
-use super::{HybridOit, HybridOitError, NodeUse, PERIOD_SECONDS};
+use super::{HybridOit, HybridOitConfig, HybridOitError, NodeUse, PERIOD_SECONDS};
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::scene::Camera;
@@ -59,6 +59,11 @@ impl Sample for HybridOitSequence {
 
     fn set_view(&mut self, camera: &Camera) {
         self.sample.look(camera);
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        let most = HybridOitConfig::MAX_SHADOW_RAYS;
+        ui.add(egui::Slider::new(self.sample.shadow_rays(), 1..=most).text("shadow rays a sample"));
     }
 
     fn reload(&mut self) -> Result<(), HybridOitError> {

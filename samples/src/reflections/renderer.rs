@@ -239,6 +239,12 @@ impl Sample for Reflections {
         self.look(camera);
     }
 
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        ui.add(egui::Slider::new(&mut self.config.min_angle, 0.0..=0.2).text("least angle"));
+        let InstanceCount { kept, total } = self.instance_count();
+        ui.label(format!("rays meet {kept} of {total} instances"));
+    }
+
     fn reload(&mut self) -> Result<(), ReflectionsError> {
         let (raster, images) = (RasterPasses::new(&self.ctx)?, ImagePasses::new(&self.ctx)?);
         let rays = RayPasses::new(&self.ctx, self.config.path)?;

@@ -256,6 +256,15 @@ impl Sample for RtxAo {
         self.show(&View { camera: *camera, ..self.view });
     }
 
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        let RtxAoConfig { passes, rays, .. } = &mut self.config;
+        ui.add(egui::Slider::new(passes, 1..=64).text("passes a frame"));
+        if ui.add(egui::Slider::new(rays, 1..=RtxAoConfig::MAX_RAYS).text("rays a pass")).changed() {
+            self.passes = 0;
+        }
+        ui.label(format!("{} passes in the picture", self.passes));
+    }
+
     fn reload(&mut self) -> Result<(), RtxError> {
         let path = self.config.rtx.path;
         let (raster, rays) = (Raster::new(&self.ctx, path)?, light_rays(&self.ctx, path)?);

@@ -1,6 +1,8 @@
 //! The user interface of windows: egui, painted by `lvk`.
 
 mod atlas;
-pub(crate) mod painter;
+mod painter;
+mod panel;
 
 pub use painter::{Painter, pipelines};
+pub use panel::{Panel, Told};

@@ -224,7 +224,7 @@ fn pipeline(ctx: &Context, format: Format) -> lvk::Result<Holder<RenderPipelineH
         vertex: Some(*vertex),
         fragment: Some(*fragment),
         cull: CullMode::None,
-        color: &[ColorTarget { format, blend: Some(Blend::PremultipliedAlpha) }],
+        color: &[ColorTarget { blend: Some(Blend::PREMULTIPLIED_ALPHA), ..ColorTarget::from(format) }],
         debug_name: "user interface",
         ..RenderPipelineDesc::default()
     })

@@ -1,0 +1,368 @@
+//! The program of a sample that has a window: events in, frames out.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use egui::{Rect, ViewportInfo, vec2};
+use lvk::{Context, GpuProfile, ValidationSink};
+use winit::application::ApplicationHandler;
+use winit::dpi::PhysicalSize;
+use winit::event::{ElementState, MouseButton, WindowEvent};
+use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
+use winit::keyboard::PhysicalKey;
+use winit::window::{Window, WindowId};
+
+use super::controls::{Action, Controls, HELP};
+use super::resize::Follower;
+use super::screen::Screen;
+use super::ui_input::{UiInput, notches};
+use crate::app::fly_camera::FlyCamera;
+use crate::app::frame::Frame;
+use crate::app::frames::Frames;
+use crate::app::hot_reload::ShaderWatch;
+use crate::app::run::{Opened, Opening};
+use crate::app::run_args::RunArgs;
+use crate::app::run_error::RunError;
+use crate::app::sample::{Moment, Sample};
+use crate::app::say;
+use crate::app::screenshot::{Screenshot, free_name};
+use crate::app::ui::{Panel, Told};
+use crate::shader_folder;
+
+/// Time between two looks at a window that shows nothing.
+const NAP: Duration = Duration::from_millis(30);
+
+/// Shows the sample that `make` makes, until its window is closed or `--frames` are shown. Messages of the validation layer
+/// go into `sink`.
+pub(in crate::app) fn run<S, M>(
+    name: &str,
+    args: &RunArgs,
+    sink: &ValidationSink,
+    make: M,
+) -> Result<(), RunError>
+where
+    S: Sample,
+    M: FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
+{
+    let event_loop = EventLoop::new().map_err(|error| RunError::window(&error))?;
+    let mut program = Program { name, args, sink, make: Some(make), running: None, ended: Ok(()) };
+    event_loop.run_app(&mut program).map_err(|error| RunError::window(&error))?;
+    let Program { running, ended, .. } = program;
+    ended?;
+    Ok(running.map_or(Ok(()), |running| running.ctx.wait_idle())?)
+}
+
+/// What answers events.
+struct Program<'a, S, M> {
+    name: &'a str,
+    args: &'a RunArgs,
+    sink: &'a ValidationSink,
+    make: Option<M>,
+    running: Option<Running<S>>,
+    ended: Result<(), RunError>,
+}
+
+impl<S, M> ApplicationHandler for Program<'_, S, M>
+where
+    S: Sample,
+    M: FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
+{
+    fn resumed(&mut self, event_loop: &ActiveEventLoop) {
+        if let Some(make) = self.make.take() {
+            match self.open(event_loop, make) {
+                Ok(running) => self.running = Some(running),
+                Err(error) => self.end(event_loop, Err(error)),
+            }
+        }
+    }
+
+    fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
+        let Some(running) = &mut self.running else { return };
+        let done = match event {
+            WindowEvent::CloseRequested => Ok(Next::Close),
+            WindowEvent::RedrawRequested => running.redraw(self.name, self.args),
+            event => running.event(&event),
+        };
+        match done {
+            Ok(Next::Frame) => event_loop.set_control_flow(ControlFlow::Poll),
+            Ok(Next::Nap) => event_loop.set_control_flow(ControlFlow::wait_duration(NAP)),
+            Ok(Next::Close) => self.end(event_loop, Ok(())),
+            Err(error) => self.end(event_loop, Err(error)),
+        }
+    }
+
+    fn about_to_wait(&mut self, _: &ActiveEventLoop) {
+        if let Some(running) = &self.running {
+            running.window.request_redraw();
+        }
+    }
+}
+
+impl<S: Sample, M> Program<'_, S, M>
+where
+    M: FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
+{
+    fn open(&self, event_loop: &ActiveEventLoop, make: M) -> Result<Running<S>, RunError> {
+        let size = PhysicalSize::new(self.args.width, self.args.height);
+        let look = Window::default_attributes().with_title(self.name).with_inner_size(size);
+        let window = Arc::new(event_loop.create_window(look).map_err(|error| RunError::window(&error))?);
+        let mut opening = Opening::new(self.name, self.args, self.sink);
+        opening.window = Some(Arc::clone(&window) as Arc<_>);
+        let Opened { sample, headline } = make(&mut opening)?;
+        drop(opening);
+        say(&headline);
+        Running::new(window, sample, self.args)
+    }
+
+    fn end(&mut self, event_loop: &ActiveEventLoop, ended: Result<(), RunError>) {
+        if self.ended.is_ok() {
+            self.ended = ended;
+        }
+        event_loop.exit();
+    }
+}
+
+/// What to do next.
+enum Next {
+    /// A frame, at once.
+    Frame,
+    /// A frame, later: nothing is seen for now.
+    Nap,
+    /// Nothing any more.
+    Close,
+}
+
+/// A sample in its window.
+struct Running<S> {
+    sample: S,
+    screen: Screen,
+    panel: Panel,
+    controls: Controls,
+    ui_input: UiInput,
+    follower: Follower,
+    watch: Option<ShaderWatch>,
+    /// Where the camera is that a person has taken over.
+    fly: Option<FlyCamera>,
+    clock: Clock,
+    /// The moment that the sample shows.
+    at: Option<Moment>,
+    shown: u32,
+    wants_screenshot: bool,
+    ctx: Context,
+    window: Arc<Window>,
+}
+
+/// What time it is in the animation.
+struct Clock {
+    start: Instant,
+    latest: Instant,
+    animation: Duration,
+}
+
+impl Clock {
+    fn new() -> Self {
+        let now = Instant::now();
+        Self { start: now, latest: now, animation: Duration::ZERO }
+    }
+
+    /// Goes on to now; the animation too, if it goes on. Answers the seconds since the last time.
+    fn tick(&mut self, animates: bool) -> f32 {
+        let now = Instant::now();
+        let step = now.duration_since(self.latest);
+        self.latest = now;
+        self.animation += if animates { step } else { Duration::ZERO };
+        step.as_secs_f32()
+    }
+}
+
+impl<S: Sample> Running<S> {
+    fn new(window: Arc<Window>, sample: S, args: &RunArgs) -> Result<Self, RunError> {
+        let ctx = sample.context().clone();
+        let screen = Screen::new(&ctx, extent(&window))?;
+        let (mode, _) = screen.present_modes()?;
+        ctx.set_profiling(ctx.capabilities().limits.timestamp_bits > 0)?;
+        Ok(Self {
+            sample,
+            screen,
+            panel: Panel::new(mode),
+            controls: Controls::default(),
+            ui_input: UiInput::default(),
+            follower: Follower::new([args.width, args.height]),
+            watch: shader_folder::folder().map(|folder| ShaderWatch::new(&folder)),
+            fly: None,
+            clock: Clock::new(),
+            at: None,
+            shown: 0,
+            wants_screenshot: false,
+            ctx,
+            window,
+        })
+    }
+
+    fn event(&mut self, event: &WindowEvent) -> Result<Next, RunError> {
+        self.ui_input.push(event, self.per_point());
+        let ui = self.screen.ui();
+        match event {
+            WindowEvent::Resized(size) => self.screen.resize([size.width, size.height])?,
+            WindowEvent::Focused(false) => self.controls.let_go(),
+            WindowEvent::CursorMoved { position, .. } => {
+                self.controls.pointer([position.x as f32, position.y as f32]);
+            }
+            WindowEvent::MouseInput { state, button: MouseButton::Left, .. } => {
+                let is_down = *state == ElementState::Pressed;
+                self.controls.drag(is_down && !ui.is_pointer_over_area());
+            }
+            WindowEvent::MouseWheel { delta, .. } if !ui.is_pointer_over_area() => {
+                self.controls.wheel(notches(*delta));
+            }
+            WindowEvent::KeyboardInput { event, .. } => {
+                let PhysicalKey::Code(code) = event.physical_key else { return Ok(Next::Frame) };
+                // A key that goes up is let go, whoever it was meant for.
+                let is_down = event.state.is_pressed();
+                if (!is_down || !ui.wants_keyboard_input())
+                    && let Some(action) = self.controls.key(code, is_down)
+                {
+                    return Ok(self.act(action));
+                }
+            }
+            _ => {}
+        }
+        Ok(Next::Frame)
+    }
+
+    fn act(&mut self, action: Action) -> Next {
+        match action {
+            Action::Pause => self.panel.animates = !self.panel.animates,
+            Action::GiveBack => (self.fly, self.at) = (None, None),
+            Action::Panel => self.panel.is_open = !self.panel.is_open,
+            Action::Reload => self.reload(),
+            Action::Screenshot => self.wants_screenshot = true,
+            Action::Close => return Next::Close,
+        }
+        Next::Frame
+    }
+
+    /// Compiles all shaders again. Where one is wrong, the old pipelines stay.
+    fn reload(&mut self) {
+        let done = self.sample.reload().map_err(Into::into);
+        let done = done.and_then(|()| Ok(self.screen.reload()?));
+        self.panel.shader_error = done.err().map(|error: RunError| error.to_string());
+        match &self.panel.shader_error {
+            Some(error) => eprintln!("error: {error}\nthe shaders from before stay in use"),
+            None => eprintln!("shaders compiled anew"),
+        }
+    }
+
+    fn redraw(&mut self, name: &str, args: &RunArgs) -> Result<Next, RunError> {
+        self.ctx.next_frame()?;
+        let seconds = self.clock.tick(self.panel.animates);
+        self.follow(args, seconds)?;
+        let Some(image) = self.screen.next_image()? else { return Ok(Next::Nap) };
+        self.panel.count_frame(seconds);
+        let mut frame = Frame::free(&self.ctx)?;
+        let picture = self.sample.record(&mut frame).map_err(Into::into)?;
+        let mut cmd = frame.into_commands();
+        let (input, profile) = (self.input(image.extent()), self.ctx.last_profile()?);
+        let (_, modes) = self.screen.present_modes()?;
+        let before = self.panel.present_mode;
+        let told = told(&self.ctx, image.extent(), &modes, profile.as_deref());
+        let (panel, sample) = (&mut self.panel, &mut self.sample);
+        self.screen.record(&mut cmd, &image, picture, input, |ui| {
+            panel.show(ui, name, &told, |ui| sample.panel(ui));
+        })?;
+        let last = self.is_last(args);
+        let file = args.out.as_deref().filter(|_| last);
+        let shot = (self.wants_screenshot || file.is_some())
+            .then(|| Screenshot::record(&self.ctx, &mut cmd, &image))
+            .transpose()?;
+        self.ctx.present(cmd, image)?;
+        self.shown += 1;
+        if let Some(shot) = shot {
+            self.save(&shot, file, name)?;
+        }
+        if before != self.panel.present_mode {
+            self.screen.set_present_mode(self.panel.present_mode)?;
+        }
+        Ok(if last { Next::Close } else { Next::Frame })
+    }
+
+    /// Takes note of what has changed: size, shaders, time, camera.
+    fn follow(&mut self, args: &RunArgs, seconds: f32) -> Result<(), RunError> {
+        if let Some(size) = self.follower.next(extent(&self.window), Instant::now())
+            && let Err(error) = self.sample.resize(size).map_err(Into::into)
+        {
+            eprintln!("warning: pictures keep their size: {error}");
+        }
+        if self.watch.as_mut().is_some_and(|watch| watch.poll(Instant::now())) {
+            self.reload();
+        }
+        let steering = self.controls.take();
+        let mut fly = self.fly.or_else(|| self.sample.view().as_ref().map(FlyCamera::new));
+        let flies = fly.as_mut().is_some_and(|fly| fly.advance(&steering, seconds));
+        self.fly = if flies { fly } else { self.fly };
+        let moment = self.moment(args);
+        let is_later = self.at != Some(moment);
+        if is_later {
+            self.sample.update(moment).map_err(Into::into)?;
+            self.at = Some(moment);
+        }
+        if let (true, Some(fly)) = (flies || is_later, &self.fly) {
+            self.sample.set_view(&fly.camera());
+        }
+        Ok(())
+    }
+
+    /// By the clock, or as many frames as were shown where their number is asked for.
+    fn moment(&self, args: &RunArgs) -> Moment {
+        match args.frames {
+            Some(_) => Moment::of_frame(self.shown, args.round),
+            None => Moment::after(self.clock.animation.as_millis() as u32, args.round),
+        }
+    }
+
+    fn is_last(&self, args: &RunArgs) -> bool {
+        matches!(args.frames, Some(Frames::Still(count)) if self.shown + 1 >= count)
+    }
+
+    fn save(&mut self, shot: &Screenshot, file: Option<&Path>, name: &str) -> Result<(), RunError> {
+        self.wants_screenshot = false;
+        let path = file.map_or_else(|| free_name(Path::new(""), name), Path::to_owned);
+        shot.write(&self.ctx, &path)?;
+        say(&format!("wrote {}", path.display()));
+        Ok(())
+    }
+
+    fn input(&mut self, [width, height]: [u32; 2]) -> egui::RawInput {
+        let (events, modifiers) = self.ui_input.take();
+        let per_point = self.per_point();
+        let size = vec2(width as f32, height as f32) / per_point;
+        let viewport = ViewportInfo { native_pixels_per_point: Some(per_point), ..ViewportInfo::default() };
+        let mut input = egui::RawInput {
+            screen_rect: Some(Rect::from_min_size(egui::Pos2::ZERO, size)),
+            time: Some(self.clock.latest.duration_since(self.clock.start).as_secs_f64()),
+            modifiers,
+            events,
+            ..egui::RawInput::default()
+        };
+        input.viewports.insert(input.viewport_id, viewport);
+        input
+    }
+
+    fn per_point(&self) -> f32 {
+        self.window.scale_factor() as f32
+    }
+}
+
+fn told<'a>(
+    ctx: &'a Context,
+    extent: [u32; 2],
+    present_modes: &'a [lvk::PresentMode],
+    profile: Option<&'a GpuProfile>,
+) -> Told<'a> {
+    Told { device: &ctx.capabilities().device_name, extent, present_modes, profile, keys: &HELP }
+}
+
+fn extent(window: &Window) -> [u32; 2] {
+    window.inner_size().into()
+}

@@ -1,0 +1,320 @@
+//! The samples' windows as a user meets them, on an X server without a screen.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::mpsc::{Receiver, channel};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use image::RgbaImage;
+use lvk_samples::driver::{VirtualDisplay, virtual_display};
+use x11rb::connection::Connection;
+use x11rb::protocol::xproto::{
+    ConfigureWindowAux, ConnectionExt as _, InputFocus, KEY_PRESS_EVENT, KEY_RELEASE_EVENT,
+};
+use x11rb::protocol::xtest::ConnectionExt as _;
+use x11rb::rust_connection::RustConnection;
+
+const SIZE: [u32; 2] = [416, 224];
+/// Where the panel is not, at the right.
+const BESIDE_PANEL: u32 = 352;
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Of keys on X servers.
+const ESCAPE: u8 = 9;
+const KEY_W: u8 = 25;
+const SPACE: u8 = 65;
+const F1: u8 = 67;
+const F12: u8 = 96;
+
+/// The X server of a test; `None`, loudly, where there is none and none can be fetched.
+fn desktop() -> Option<VirtualDisplay> {
+    match virtual_display() {
+        Ok(display) => Some(display),
+        Err(error) => {
+            assert!(std::env::var_os("LVK_REQUIRE_GPU").is_none(), "{error}");
+            eprintln!("SKIPPED, no X server for windows: {error}");
+            None
+        }
+    }
+}
+
+fn sample(program: &str, args: &[&str], folder: &Path) -> Command {
+    let mut command = Command::new(program);
+    command.args(args).current_dir(folder);
+    command.args(["--width", &SIZE[0].to_string(), "--height", &SIZE[1].to_string()]);
+    command
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET")
+        .env_remove("DISPLAY")
+        .stdin(Stdio::null());
+    command
+}
+
+fn texts(output: &Output) -> (String, String) {
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    (text(&output.stdout), text(&output.stderr))
+}
+
+fn assert_success(output: &Output) {
+    let (out, err) = texts(output);
+    assert_eq!(output.status.code(), Some(0), "{out}{err}");
+}
+
+fn picture(path: &Path) -> RgbaImage {
+    image::open(path).unwrap().into_rgba8()
+}
+
+/// Share of the pixels right of `first` in which two pictures differ by more than rounding.
+fn differing(one: &RgbaImage, other: &RgbaImage, first: u32) -> f64 {
+    assert_eq!(one.dimensions(), other.dimensions());
+    let pairs: Vec<_> =
+        one.enumerate_pixels().zip(other.pixels()).filter(|((x, ..), _)| *x >= first).collect();
+    let differs = |((.., a), b): &&((u32, u32, &image::Rgba<u8>), &image::Rgba<u8>)| {
+        a.0.iter().zip(b.0).any(|(a, b)| a.abs_diff(b) > 1)
+    };
+    pairs.iter().filter(differs).count() as f64 / pairs.len() as f64
+}
+
+/// Shows a few frames, and compares the last with the same frame of a sequence without a window.
+fn shows_what_it_writes(program: &str, args: &[&str]) {
+    let Some(desktop) = desktop() else { return };
+    let folder = tempfile::tempdir().unwrap();
+    let windowed = [&["--window", "--frames", "3", "--validate", "--out", "window.png"], args].concat();
+    let output = sample(program, &windowed, folder.path()).env("DISPLAY", desktop.name()).output().unwrap();
+    assert_success(&output);
+    assert!(texts(&output).0.contains("validation messages: 0"), "{}", texts(&output).0);
+    let headless = [&["--frames", "2..3", "--out", "frame_#.png"], args].concat();
+    assert_success(&sample(program, &headless, folder.path()).output().unwrap());
+    let (window, frame) =
+        (picture(&folder.path().join("window.png")), picture(&folder.path().join("frame_2.png")));
+    assert_eq!(window.dimensions(), (SIZE[0], SIZE[1]));
+    let beside = differing(&window, &frame, BESIDE_PANEL);
+    assert!(beside < 1e-3, "{beside} of the picture beside the panel");
+    assert!(differing(&window, &frame, 0) > 0.1, "there is no panel");
+}
+
+#[test]
+fn rtx_hello_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_hello"), &[]);
+}
+
+#[test]
+fn rtx_textures_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_textures"), &[]);
+}
+
+#[test]
+fn rtx_pipeline_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_pipeline"), &[]);
+}
+
+#[test]
+fn rtx_ao_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_ao"), &["--passes", "1"]);
+}
+
+#[test]
+fn hybrid_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_hybrid"), &["--depth", "1"]);
+}
+
+#[test]
+fn hybrid_oit_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_hybrid_oit"), &["--supersampling", "1"]);
+}
+
+#[test]
+fn reflections_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_reflections"), &["--samples", "1"]);
+}
+
+/// A sample with a window of its own, somebody at its keys, and what it says on standard error.
+struct Session {
+    program: Child,
+    said: Receiver<String>,
+    keys: RustConnection,
+    root: u32,
+    window: u32,
+    _desktop: VirtualDisplay,
+}
+
+impl Session {
+    fn new(program: &str, args: &[&str], folder: &Path) -> Option<Self> {
+        let desktop = desktop()?;
+        let (keys, screen) = RustConnection::connect(Some(desktop.name())).unwrap();
+        let root = keys.setup().roots[screen].root;
+        let mut command = sample(program, &[&["--window", "--validate"], args].concat(), folder);
+        let mut program = command
+            .env("DISPLAY", desktop.name())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(program.stderr.take().unwrap()).lines();
+        let (say, said) = channel();
+        thread::spawn(move || lines.map_while(Result::ok).all(|line| say.send(line).is_ok()));
+        let mut session = Self { program, said, keys, root, window: 0, _desktop: desktop };
+        session.wait("its window", |session| session.find_window().is_some());
+        session.window = session.find_window().unwrap();
+        let time = x11rb::CURRENT_TIME;
+        session.keys.set_input_focus(InputFocus::PARENT, session.window, time).unwrap().check().unwrap();
+        Some(session)
+    }
+
+    /// The visible window of some size.
+    fn find_window(&self) -> Option<u32> {
+        let children = self.keys.query_tree(self.root).unwrap().reply().unwrap().children;
+        children.into_iter().find(|window| {
+            let size = self.keys.get_geometry(*window).unwrap().reply();
+            let is_seen = self.keys.get_window_attributes(*window).unwrap().reply();
+            size.is_ok_and(|size| size.width > 100)
+                && is_seen.is_ok_and(|seen| seen.map_state == x11rb::protocol::xproto::MapState::VIEWABLE)
+        })
+    }
+
+    fn wait(&mut self, what: &str, is_done: impl Fn(&mut Self) -> bool) {
+        let deadline = Instant::now() + PATIENCE;
+        while !is_done(self) {
+            let ended = self.program.try_wait().unwrap();
+            let said = || self.said.try_iter().collect::<Vec<_>>();
+            assert!(ended.is_none(), "{what}: the program has ended: {:?}", said());
+            assert!(Instant::now() < deadline, "{what}: {:?}", said());
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Waits for a line on standard error.
+    fn hear(&mut self, part: &str) {
+        self.wait(part, |session| session.said.try_iter().any(|line| line.contains(part)));
+    }
+
+    fn key(&self, key: u8, is_down: bool) {
+        let event = if is_down { KEY_PRESS_EVENT } else { KEY_RELEASE_EVENT };
+        self.keys
+            .xtest_fake_input(event, key, x11rb::CURRENT_TIME, self.root, 0, 0, 0)
+            .unwrap()
+            .check()
+            .unwrap();
+    }
+
+    fn press(&self, key: u8) {
+        self.key(key, true);
+        thread::sleep(Duration::from_millis(50));
+        self.key(key, false);
+    }
+
+    /// Presses the key for screenshots, and answers the picture.
+    fn shoot(&mut self, path: &Path) -> RgbaImage {
+        self.press(F12);
+        self.wait("a screenshot", |_| path.exists());
+        picture(path)
+    }
+
+    fn resize(&self, [width, height]: [u32; 2]) {
+        let size = ConfigureWindowAux::new().width(width).height(height);
+        self.keys.configure_window(self.window, &size).unwrap().check().unwrap();
+    }
+
+    /// Closes the window by its key.
+    fn close(mut self) {
+        self.press(ESCAPE);
+        let deadline = Instant::now() + PATIENCE;
+        while self.program.try_wait().unwrap().is_none() {
+            assert!(Instant::now() < deadline, "it does not close");
+            thread::sleep(Duration::from_millis(20));
+        }
+        let mut out = String::new();
+        std::io::Read::read_to_string(&mut self.program.stdout.take().unwrap(), &mut out).unwrap();
+        assert!(
+            out.contains("validation messages: 0"),
+            "{out}{:?}",
+            self.said.try_iter().collect::<Vec<_>>()
+        );
+        assert_eq!(self.program.wait().unwrap().code(), Some(0), "{out}");
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}
+
+#[test]
+fn keys_hide_the_panel_and_fly_and_the_picture_follows_the_window() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = env!("CARGO_BIN_EXE_rtx_textures");
+    let Some(mut session) = Session::new(program, &[], folder.path()) else { return };
+    let shot = |number: u32| folder.path().join(format!("rtx_textures_window_{number:04}.png"));
+    session.press(SPACE);
+    // The first frame lays the panel out and does not show it.
+    session.shoot(&shot(1));
+    let with_panel = session.shoot(&shot(2));
+    session.press(F1);
+    let without = session.shoot(&shot(3));
+    assert!(differing(&with_panel, &without, BESIDE_PANEL) < 1e-3, "the animation stands");
+    assert!(differing(&with_panel, &without, 0) > 0.1, "the panel is still there");
+    session.key(KEY_W, true);
+    thread::sleep(Duration::from_millis(500));
+    session.key(KEY_W, false);
+    let flown = session.shoot(&shot(4));
+    assert!(differing(&without, &flown, 0) > 0.1, "nothing has moved");
+    session.resize([300, 260]);
+    thread::sleep(Duration::from_millis(600));
+    assert_eq!(session.shoot(&shot(5)).dimensions(), (300, 260));
+    session.close();
+}
+
+#[test]
+fn shaders_are_compiled_as_they_change_and_wrong_ones_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let shaders = folder.path().join("shaders");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders");
+    for part in ["app", "rtx_hello", "common"] {
+        fs::create_dir_all(shaders.join(part)).unwrap();
+        for entry in fs::read_dir(source.join(part)).unwrap() {
+            let path = entry.unwrap().path();
+            fs::copy(&path, shaders.join(part).join(path.file_name().unwrap())).unwrap();
+        }
+    }
+    let program = env!("CARGO_BIN_EXE_rtx_hello");
+    let Some(mut session) = Session::new(program, &["--hot-reload", "shaders"], folder.path()) else {
+        return;
+    };
+    let shot = |number: u32| folder.path().join(format!("rtx_hello_window_{number:04}.png"));
+    session.press(SPACE);
+    session.press(F1);
+    let before = session.shoot(&shot(1));
+    let view = shaders.join("rtx_hello/view.glsl");
+    let text = fs::read_to_string(&view).unwrap();
+    fs::write(&view, text.replace("sqrt(corners)", "sqrt(corner)")).unwrap();
+    session.hear("corner");
+    assert!(session.shoot(&shot(2)) == before, "the old pipeline stays");
+    fs::write(&view, text.replace("sqrt(corners)", "vec3(1.0, 0.0, 0.0)")).unwrap();
+    session.hear("shaders compiled anew");
+    let red = session.shoot(&shot(3));
+    assert!(differing(&before, &red, 0) > 0.05, "the new shader is not in use");
+    session.close();
+}
+
+#[test]
+fn windows_that_cannot_be_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (args, status, part) in [
+        (&["--window"][..], 1, "no window can be opened"),
+        (&["--window", "--frames", "0..4"], 2, "--frames 100"),
+        (&["--window", "--hot-reload", "nowhere"], 2, "no such folder"),
+        (&["--hot-reload"], 2, "--window"),
+        (&["--window", "--out", "nowhere/a.png"], 2, "nowhere"),
+    ] {
+        let output = sample(env!("CARGO_BIN_EXE_rtx_hello"), args, folder.path()).output().unwrap();
+        let (out, err) = texts(&output);
+        assert_eq!(output.status.code(), Some(status), "{args:?}: {out}{err}");
+        assert!(err.contains(part), "{args:?}: {err}");
+    }
+}
