@@ -12,6 +12,7 @@ use lvk_samples::reflections::{Reflections, ReflectionsConfig};
 use lvk_samples::rtx::RtxConfig;
 use lvk_samples::rtx_ao::{RtxAo, RtxAoConfig};
 use lvk_samples::rtx_hello::RtxHello;
+use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig};
 use lvk_samples::rtx_textures::RtxTextures;
 use lvk_samples::scene::{Camera, Scene};
 use lvk_tests::device;
@@ -95,6 +96,16 @@ fn rtx_hello_goes_by_frames() {
 fn rtx_textures_goes_by_frames() {
     let Some(ctx) = device() else { return };
     check(|size| RtxTextures::new(&ctx, &rtx(&ctx, size)).unwrap());
+}
+
+#[test]
+fn rtx_pipeline_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    let scene = still_life();
+    check(|size| {
+        let config = RtxPipelineConfig { depth: 2, ..RtxPipelineConfig::new(rtx(&ctx, size)) };
+        RtxPipeline::new(&ctx, &scene, &config).unwrap()
+    });
 }
 
 #[test]
