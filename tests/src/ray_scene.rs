@@ -1,6 +1,6 @@
 //! A scene described once, for the GPU and for the reference.
 
-use lvk::glam::{Affine3A, DAffine3};
+use lvk::glam::{Affine3A, DAffine3, Quat, Vec3};
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, Context,
     GeometryFlags, GeometryTransform, Holder, IndexFormat, Indices, InstanceFlags, Result, TlasDesc,
@@ -115,6 +115,27 @@ impl RayScene {
     pub fn single(mesh: Mesh, layout: Layout) -> Self {
         let placed = vec![Placed::new(0, Affine3A::IDENTITY)];
         Self { models: vec![vec![Part::new(mesh, layout)]], placed }
+    }
+
+    /// Instances that reach into each other, turned, mirrored and of several masks, of eight geometries each with much room
+    /// between them: a structure that software may show in parts.
+    pub fn scattered(flags: GeometryFlags) -> Self {
+        let meshes = [Mesh::sphere(6), Mesh::cube_grid(2)];
+        let part = |mesh: &Mesh, corner: u32| {
+            let at = Vec3::new((corner & 1) as f32, (corner >> 1 & 1) as f32, (corner >> 2) as f32);
+            let transform = Some(Affine3A::from_translation(at * 5.0 - 2.5));
+            Part { flags, transform, ..Part::new(mesh.clone(), Layout::Indexed16) }
+        };
+        let models = meshes.iter().map(|mesh| (0..8).map(|corner| part(mesh, corner)).collect()).collect();
+        let place = |number: u32| {
+            let turn = Quat::from_axis_angle(Vec3::new(1.0, 0.3, -0.5).normalize(), 0.6 * number as f32);
+            let scale = Vec3::new(if number % 3 == 1 { -0.9 } else { 0.9 }, 1.0, 0.8);
+            let to = Vec3::new(0.4 * number as f32, 0.0, 0.2);
+            let transform = Affine3A::from_scale_rotation_translation(scale, turn, to);
+            let (custom_index, mask) = (900 - number, 1 << (number % 3));
+            Placed { custom_index, mask, ..Placed::new(number as usize % 2, transform) }
+        };
+        Self { models, placed: (0..10).map(place).collect() }
     }
 
     /// The scene for the CPU.

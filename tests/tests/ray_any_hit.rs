@@ -115,20 +115,27 @@ fn certain<'a>(
 
 #[test]
 fn every_candidate_is_seen_once_where_that_is_asked() -> Result<()> {
+    const ONCE: GeometryFlags = GeometryFlags::NO_DUPLICATE_ANY_HIT;
     for ctx in devices() {
-        let scene = scene([GeometryFlags::NO_DUPLICATE_ANY_HIT; 2]);
-        let gpu = scene.upload(&ctx)?;
-        let reference = scene.reference();
-        let rays = rays_for(&reference);
-        for method in Method::available(&ctx) {
-            let how = How::default();
-            let records = counter(&ctx, method, Verdict::Ignore)?.trace(&gpu.tlas, &rays, how)?;
-            for (record, hits) in certain(&reference, &rays, &records, how) {
-                let sum: u32 = hits.iter().map(|hit| tag(&hit.ids)).sum();
-                let expected = [hits.len() as f32, sum as f32];
-                assert_eq!(record.barycentrics, expected, "{method:?}: {hits:?}");
-                assert_eq!(record.kind, MISSED, "all were ignored");
-            }
+        for scene in [scene([ONCE; 2]), RayScene::scattered(ONCE)] {
+            candidates_are_seen_once(&ctx, &scene)?;
+        }
+    }
+    Ok(())
+}
+
+fn candidates_are_seen_once(ctx: &Context, scene: &RayScene) -> Result<()> {
+    let gpu = scene.upload(ctx)?;
+    let reference = scene.reference();
+    let rays = rays_for(&reference);
+    for method in Method::available(ctx) {
+        let how = How::default();
+        let records = counter(ctx, method, Verdict::Ignore)?.trace(&gpu.tlas, &rays, how)?;
+        for (record, hits) in certain(&reference, &rays, &records, how) {
+            let sum: u32 = hits.iter().map(|hit| tag(&hit.ids)).sum();
+            let expected = [hits.len() as f32, sum as f32];
+            assert_eq!(record.barycentrics, expected, "{method:?}: {hits:?}");
+            assert_eq!(record.kind, MISSED, "all were ignored");
         }
     }
     Ok(())

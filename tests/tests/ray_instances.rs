@@ -103,6 +103,26 @@ fn masks_choose_instances() -> Result<()> {
     Ok(())
 }
 
+#[test]
+fn instances_that_reach_into_each_other_keep_their_numbers() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let scene = RayScene::scattered(GeometryFlags::OPAQUE);
+    let gpu = scene.upload(&ctx)?;
+    let reference = scene.reference();
+    let rays = rays_for(&reference);
+    for method in Method::available(&ctx) {
+        let tracer = RayTracer::new(&ctx, method)?;
+        for mask in [0xff, 0b101] {
+            let what = format!("mask {mask:#b} by {method:?}");
+            let records = tracer.trace(&gpu.tlas, &rays, How { mask, ..How::default() })?;
+            Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, mask)).assert(&what);
+            let shadows = tracer.trace(&gpu.tlas, &rays, How { mask, ..How::shadows() })?;
+            Agreement::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, mask)).assert(&what);
+        }
+    }
+    Ok(())
+}
+
 /// Every build is over the scratch budget by itself, so each is a batch of its own.
 #[test]
 fn many_structures_are_built_whatever_the_scratch_budget() -> Result<()> {

@@ -12,7 +12,7 @@ use lvk_tests::agreement::Agreement;
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
-use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, upload_geometries};
+use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances, upload_geometries};
 use lvk_tests::ray_tracer::{HitRecord, How, MISSED, Method, OPAQUE, RayTracer, shader};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::{TestDevice, device, device_with};
@@ -452,6 +452,34 @@ fn compaction_has_nothing_to_do_and_says_so() -> Result<()> {
         ctx.submit(cmd)?;
     }
     ctx.wait_idle()
+}
+
+/// A top-level structure may show parts of trees that a rebuild has replaced: what it sees then stays within them, and is
+/// the same where nothing moved.
+#[test]
+fn rebuilds_below_parts_of_instances_are_seen() -> Result<()> {
+    let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
+    let scene = RayScene::scattered(GeometryFlags::OPAQUE);
+    let gpu = scene.upload(&ctx)?;
+    let reference = scene.reference();
+    let (low, high) = reference.bounds();
+    let rays = random_rays(31, 900, low.as_vec3(), high.as_vec3());
+    let tracer = RayTracer::new(&ctx, Method::Query)?;
+    let agrees = |what: &str| -> Result<()> {
+        let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
+        Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(what);
+        Ok(())
+    };
+    agrees("parts")?;
+    let models: Vec<_> = gpu.models.iter().map(|model| **model).collect();
+    let mut cmd = ctx.acquire_command_buffer()?;
+    cmd.build_blas(&models, BuildMode::Rebuild)?;
+    ctx.submit(cmd)?;
+    agrees("rebuilt below")?;
+    let mut cmd = ctx.acquire_command_buffer()?;
+    cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
+    ctx.submit(cmd)?;
+    agrees("rebuilt above")
 }
 
 /// What builds take of the scratch buffer, which has no more than the largest needs where the budget is nothing.

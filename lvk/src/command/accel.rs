@@ -73,7 +73,8 @@ impl CommandBuffer {
     /// indices.
     ///
     /// Rays traced later in the same command buffer, or in later submissions, see the result. Where the bounds of a
-    /// structure changed, top-level structures that show it need an update too.
+    /// structure changed, top-level structures that show it need an update too; and where anything in it did that was made
+    /// without [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), as software may show it in parts.
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for a refit without

@@ -205,7 +205,7 @@ impl CommandBuffer {
         if (shared.gpu.caps.is_cpu || instances.len() <= MOST_ON_CPU)
             && let Some(placed) = self.place_instances(target, instances)?
         {
-            let bytes = tlas_blob::build(&placed);
+            let bytes = tlas_blob::build(&placed, software.room);
             return self.fill_software(target, shared.all_tlas, &software.body, &bytes);
         }
         let mut written = Ok(());
@@ -259,8 +259,8 @@ impl CommandBuffer {
                     None => return Ok(None),
                 },
             };
-            last = Some((instance.blas, shown));
             placed.extend(place(number as u32, instance, &shown));
+            last = Some((instance.blas, shown));
         }
         Ok(Some(placed))
     }
@@ -268,8 +268,8 @@ impl CommandBuffer {
     fn shown_structure(&self, handle: AccelStructHandle) -> Result<Option<ShownStructure>> {
         let blas = self.shared.store.accel_structs.get(handle)?;
         let address = software_body(&blas)?.address;
-        let bounds = blas.blas()?.software.as_ref().and_then(SoftwareBlas::known_bounds);
-        Ok(bounds.map(|bounds| ShownStructure { address, bounds }))
+        let parts = blas.blas()?.software.as_ref().and_then(SoftwareBlas::known_parts);
+        Ok(parts.map(|parts| ShownStructure { address, parts: Arc::clone(parts) }))
     }
 
     fn write_software_instances(

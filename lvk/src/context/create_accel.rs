@@ -27,6 +27,7 @@ use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::shared::Shared;
+use crate::software::opening::room;
 
 impl Context {
     /// Creates a bottom-level structure from geometries and builds it before the next submission.
@@ -218,6 +219,8 @@ fn software_tlas(shared: &Shared, name: &str, capacity: u32) -> Result<Option<So
         return Ok(None);
     }
     let plan = GpuBuildPlan::tlas(name, capacity)?;
-    let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, plan.blob_bytes)?;
-    Ok(Some(SoftwareTlas { body: Arc::new(body), plan }))
+    let room = room(capacity);
+    let bytes = GpuBuildPlan::tlas(name, room)?.blob_bytes;
+    let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, bytes)?;
+    Ok(Some(SoftwareTlas { body: Arc::new(body), plan, room }))
 }

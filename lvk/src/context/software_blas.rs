@@ -14,12 +14,14 @@ use crate::accel::blob::Blob;
 use crate::accel::desc::BlasDesc;
 use crate::accel::software::blas::{Origin, SoftwareBlas, builds_on_gpu, gpu_plan, refit_plan};
 use crate::accel::software::body::SoftwareBody;
+use crate::accel::software::parts::Parts;
 use crate::command::transfer::BufferCopy;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::shared::Garbage;
 use crate::software::blas_blob::{self, BlasBlob};
 use crate::software::mesh::Mesh;
+use crate::software::parts::parts;
 use crate::software::quality::Quality;
 use crate::software::sound::{self, Expected};
 use crate::software::tree_cache::TreeKey;
@@ -71,7 +73,8 @@ impl Context {
         let (bytes, origin) = match blob {
             Some(blob) => {
                 let refit = refit_plan(&blob.header(), desc);
-                (blob.bytes.len() as u64, Origin::Cpu { refit, rebuild: plan, bounds: blob.bounds })
+                let parts = if refit.is_some() { Parts::whole(blob.bounds) } else { parts(blob) };
+                (blob.bytes.len() as u64, Origin::Cpu { refit, rebuild: plan, parts: Arc::new(parts) })
             }
             None => (plan.blob_bytes, Origin::Gpu(plan)),
         };

@@ -1,24 +1,28 @@
 //! Instances as the walk reads them.
 
+use std::sync::Arc;
+
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 
 use crate::accel::bounds::Bounds;
 use crate::accel::instance::TlasInstance;
 use crate::accel::software::layout::Instance;
+use crate::accel::software::parts::Parts;
 
 /// What an instance shows.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ShownStructure {
     pub(crate) address: u64,
-    /// In its own space.
-    pub(crate) bounds: Bounds,
+    pub(crate) parts: Arc<Parts>,
 }
 
-/// An instance and its box in the world.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// An instance or a part of one, and its box in the world.
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PlacedInstance {
     pub(crate) instance: Instance,
     pub(crate) bounds: Bounds,
+    /// Of what the instance shows.
+    pub(crate) parts: Arc<Parts>,
 }
 
 /// The instance with this number in the caller's list; `None` where no ray can meet it.
@@ -26,7 +30,8 @@ pub(crate) fn place(number: u32, instance: &TlasInstance, shown: &ShownStructure
     let matrix = matrix(&instance.transform);
     let inverse = rows(&matrix.inverse());
     let is_finite = inverse.iter().all(|number| number.is_finite());
-    let is_empty = shown.bounds.low.x > shown.bounds.high.x;
+    let bounds = shown.parts.whole.bounds;
+    let is_empty = bounds.low.x > bounds.high.x;
     if instance.mask == 0 || is_empty || !is_finite || matrix.matrix3.determinant() == 0.0 {
         return None;
     }
@@ -37,9 +42,16 @@ pub(crate) fn place(number: u32, instance: &TlasInstance, shown: &ShownStructure
         custom_index_and_mask: instance.custom_index | u32::from(instance.mask) << 24,
         hit_group_offset_and_flags: instance.hit_group_offset | u32::from(instance.flags.bits()) << 24,
         number,
-        reserved: [0; 3],
+        entry: 0,
+        reserved: [0; 2],
     };
-    Some(PlacedInstance { instance: record, bounds: moved(&matrix, shown.bounds) })
+    let bounds = moved(&matrix, bounds);
+    Some(PlacedInstance { instance: record, bounds, parts: Arc::clone(&shown.parts) })
+}
+
+/// Around a box of the object as rows of a matrix move it, as [`place`] does it for the whole.
+pub(super) fn moved_bounds(object_to_world: &[f32; 12], bounds: Bounds) -> Bounds {
+    moved(&matrix(object_to_world), bounds)
 }
 
 fn matrix(rows: &[f32; 12]) -> DAffine3 {

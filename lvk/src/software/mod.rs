@@ -8,6 +8,8 @@ pub(crate) mod blas_blob;
 pub(crate) mod gpu_build;
 pub(crate) mod instances;
 pub(crate) mod mesh;
+pub(crate) mod opening;
+pub(crate) mod parts;
 mod ploc;
 pub(crate) mod quality;
 pub(crate) mod sound;

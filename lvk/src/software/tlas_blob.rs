@@ -1,14 +1,15 @@
-//! The bytes of a top-level structure that the CPU builds. They fit wherever a build on the GPU of as many would.
+//! The bytes of a top-level structure that the CPU builds. They fit wherever a build on the GPU of as many records would.
 
 use super::binary_tree;
 use super::instances::PlacedInstance;
+use super::opening::open;
 use super::tree::Nodes;
 use crate::accel::bounds::Bounds;
 use crate::accel::software::layout::LeafKind;
 use crate::accel::software::layout::{BINARY, BLOCK_BYTES, BinaryNode, Header, Instance, NONE};
 
-/// Builds a tree over the instances and packs it.
-pub(crate) fn build(instances: &[PlacedInstance]) -> Vec<u8> {
+/// Builds a tree over the instances, or parts of them where there is room for so many records, and packs it.
+pub(crate) fn build(instances: &[PlacedInstance], room: u32) -> Vec<u8> {
     if instances.is_empty() {
         let nothing = Header {
             format: BINARY,
@@ -20,15 +21,15 @@ pub(crate) fn build(instances: &[PlacedInstance]) -> Vec<u8> {
         };
         return bytemuck::bytes_of(&nothing).to_vec();
     }
-    let bounds: Vec<Bounds> = instances.iter().map(|placed| placed.bounds).collect();
+    let records = open(instances, room as usize);
+    let bounds: Vec<Bounds> = records.iter().map(|placed| placed.bounds).collect();
     let tree = binary_tree::build(&bounds, 1);
     let whole = bounds.into_iter().fold(Bounds::EMPTY, Bounds::union);
     let nodes: &[BinaryNode] = match &tree.nodes {
         Nodes::Binary(nodes) => nodes,
         Nodes::Wide(_) => &[],
     };
-    let ordered: Vec<Instance> =
-        tree.order.iter().map(|number| instances[*number as usize].instance).collect();
+    let ordered: Vec<Instance> = tree.order.iter().map(|number| records[*number as usize].instance).collect();
     let places = size_of::<Header>() / BLOCK_BYTES;
     let header = Header {
         format: BINARY,

@@ -6,9 +6,9 @@ use super::body::SoftwareBody;
 use super::geometry::vertex_count;
 use super::layout::Header;
 use super::layout::LeafKind;
+use super::parts::Parts;
 use super::plan::{BlasShape, BlobPlaces, GpuBuildPlan};
 use super::refit_plan::{GpuRefitPlan, NodeFormat};
-use crate::accel::bounds::Bounds;
 use crate::accel::desc::BlasDesc;
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
 use crate::accel::geometry::BlasGeometry;
@@ -32,8 +32,8 @@ pub(crate) enum Origin {
         refit: Option<GpuRefitPlan>,
         /// How it is rebuilt.
         rebuild: GpuBuildPlan,
-        /// Around everything in it, as long as it is neither refitted nor rebuilt.
-        bounds: Bounds,
+        /// Where it lies, as long as it is neither refitted nor rebuilt.
+        parts: Arc<Parts>,
     },
     /// The GPU, as every build of it.
     Gpu(GpuBuildPlan),
@@ -62,9 +62,9 @@ impl SoftwareBlas {
     }
 
     /// Where it lies, if the host knows: then it never was nor will be refitted, nor was a rebuild recorded.
-    pub(crate) fn known_bounds(&self) -> Option<Bounds> {
-        match self.origin {
-            Origin::Cpu { refit: None, bounds, .. } if self.rebuilt.get().is_none() => Some(bounds),
+    pub(crate) fn known_parts(&self) -> Option<&Arc<Parts>> {
+        match &self.origin {
+            Origin::Cpu { refit: None, parts, .. } if self.rebuilt.get().is_none() => Some(parts),
             _ => None,
         }
     }

@@ -215,7 +215,9 @@ pub(crate) struct Instance {
     pub(crate) hit_group_offset_and_flags: u32,
     /// The caller's.
     pub(crate) number: u32,
-    pub(crate) reserved: [u32; 3],
+    /// Where rays start: a node but the first, or a leaf; 0 for the root.
+    pub(crate) entry: u32,
+    pub(crate) reserved: [u32; 2],
 }
 
 /// The reference to `count` primitives of leaves, 1 to [`LARGEST_LEAF`].

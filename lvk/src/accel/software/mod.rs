@@ -6,6 +6,7 @@ pub(crate) mod body;
 pub(crate) mod geometry;
 pub(crate) mod job;
 pub(crate) mod layout;
+pub(crate) mod parts;
 pub(crate) mod plan;
 pub(crate) mod refit_plan;
 pub(crate) mod tlas;

@@ -10,6 +10,8 @@ use crate::accel::flags::AccelStructSizes;
 pub(crate) struct SoftwareTlas {
     pub(crate) body: Arc<SoftwareBody>,
     pub(crate) plan: GpuBuildPlan,
+    /// Records that the body has room for: more than instances, as some may be shown in parts.
+    pub(crate) room: u32,
 }
 
 impl SoftwareTlas {

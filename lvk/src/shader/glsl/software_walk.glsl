@@ -148,7 +148,8 @@ uvec2 lvkSoftStructureOf(uvec2 instances, uint instance) {
     return head.x == LVK_SOFT_MOVED ? head.zw : structure;
 }
 
-// The structure of an instance with the ray in its space; answers its root, or LVK_SOFT_NONE if the ray passes it by.
+// The structure of an instance with the ray in its space; answers where in it to start, or LVK_SOFT_NONE if the ray passes
+// it by.
 uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSoftLevel level) {
     uint first = instance * LVK_SOFT_INSTANCE_BLOCKS;
     uvec4 numbers = LvkSoftBlocks(instances).at[first + 6u];
@@ -176,7 +177,10 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     uint skip = isBox ? LVK_RAY_FLAG_SKIP_AABBS : LVK_RAY_FLAG_SKIP_TRIANGLES;
     bool skipped = (state.flags & skip) != 0u || (isBox && !kLvkSoftHasCandidates);
     bool culled = level.opacity != LVK_SOFT_EACH && lvkSoftIsCulled(state.flags, level.opacity == LVK_SOFT_OPAQUE);
-    return culled || skipped ? LVK_SOFT_NONE : head.z;
+    // A part of it, unless the structure has moved, which has others.
+    uint entry = LvkSoftBlocks(instances).at[first + 7u].y;
+    uint start = entry != 0u && level.structure == numbers.xy ? entry : head.z;
+    return culled || skipped ? LVK_SOFT_NONE : start;
 }
 
 // Visits the next node of the group.
@@ -383,7 +387,7 @@ uint lvkSoftNextInstance(LvkSoftState state, inout LvkSoftPlace place) {
     return reference & LVK_SOFT_LEAF_FIRST;
 }
 
-// Goes on to the root of the next instance that the ray may hit; false where there is none.
+// Goes on to the root or part of the next instance that the ray may hit; false where there is none.
 bool lvkSoftFindInstance(LvkSoftState state, inout LvkSoftPlace place, out LvkSoftLevel level) {
     if (place.next == LVK_SOFT_NONE && place.top == 0u) {
         return false;

@@ -1,0 +1,35 @@
+//! The largest parts of a structure, from which rays may start in place of its root.
+
+use std::ops::Range;
+
+use crate::accel::bounds::Bounds;
+
+/// What is below one node or leaf.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Part {
+    /// The node or leaf; 0 for the whole.
+    pub(crate) reference: u32,
+    /// Around all of it, in the structure's own space.
+    pub(crate) bounds: Bounds,
+    /// Numbers of its own parts; none where it is not taken apart.
+    pub(crate) below: Range<u32>,
+}
+
+/// A structure that no GPU changes: the whole of it, and parts of it, each primitive in one of those of a part.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Parts {
+    pub(crate) whole: Part,
+    pub(crate) parts: Vec<Part>,
+}
+
+impl Parts {
+    /// A structure that is only taken whole.
+    pub(crate) fn whole(bounds: Bounds) -> Self {
+        Self { whole: Part { reference: 0, bounds, below: 0..0 }, parts: Vec::new() }
+    }
+
+    /// The parts of a part.
+    pub(crate) fn below(&self, part: &Part) -> &[Part] {
+        self.parts.get(part.below.start as usize..part.below.end as usize).unwrap_or_default()
+    }
+}

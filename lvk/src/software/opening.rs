@@ -1,0 +1,188 @@
+//! Instances that overlap, shown in parts (Benthin, Woop, Wald and Afra, "Improved Two-Level BVHs Using Partial
+//! Re-Braiding", 2017): a ray enters a part that it meets in place of every instance whose box it meets.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use super::instances::{PlacedInstance, moved_bounds};
+use crate::accel::bounds::Bounds;
+use crate::accel::software::parts::Part;
+
+/// More instances are shown whole: to look at them in pairs would take too long.
+const MOST_INSTANCES: u32 = 512;
+/// Records that may always come to those of the instances, so that a few can be taken apart.
+const LEAST_MORE: u32 = 16;
+
+/// Records that so many instances may make, and a structure with room for them has room for.
+pub(crate) fn room(instances: u32) -> u32 {
+    let may_be_apart = (2..=MOST_INSTANCES).contains(&instances);
+    instances + if may_be_apart { instances.max(LEAST_MORE) } else { 0 }
+}
+
+/// A record that may be taken apart.
+struct Shown<'a> {
+    of: &'a PlacedInstance,
+    part: &'a Part,
+    record: PlacedInstance,
+    is_open: bool,
+}
+
+/// Takes the largest of what overlaps others apart, where its parts leave room empty, until there are as many records as
+/// these instances may make, or the next would make more than `room`.
+pub(super) fn open<'a>(instances: &'a [PlacedInstance], room: usize) -> Vec<PlacedInstance> {
+    let most = room.min(self::room(instances.len() as u32) as usize);
+    if most <= instances.len() {
+        return instances.to_vec();
+    }
+    let whole =
+        |of: &'a PlacedInstance| Shown { of, part: &of.parts.whole, record: of.clone(), is_open: false };
+    let mut shown: Vec<_> = instances.iter().map(whole).collect();
+    let mut count = shown.len();
+    let area = |bounds: &Bounds| bounds.half_area().to_bits(); // in order, as none is negative
+    let overlapping = overlapping(instances).into_iter().enumerate().filter(|(_, overlaps)| *overlaps);
+    let mut largest: BinaryHeap<_> =
+        overlapping.map(|(number, _)| (area(&shown[number].record.bounds), Reverse(number))).collect();
+    while let Some((_, Reverse(number))) = largest.pop() {
+        let parts = parts(&shown[number]);
+        if count + parts.len() > most + 1 {
+            break;
+        }
+        let sum: f32 = parts.iter().map(|part| part.record.bounds.half_area()).sum();
+        if parts.len() < 2 || sum > shown[number].record.bounds.half_area() {
+            continue;
+        }
+        shown[number].is_open = true;
+        count += parts.len() - 1;
+        for part in parts {
+            largest.push((area(&part.record.bounds), Reverse(shown.len())));
+            shown.push(part);
+        }
+    }
+    shown.into_iter().filter(|shown| !shown.is_open).map(|shown| shown.record).collect()
+}
+
+/// Which of the instances overlap others, found along the axis on which they lie furthest apart.
+fn overlapping(instances: &[PlacedInstance]) -> Vec<bool> {
+    let whole = instances.iter().fold(Bounds::EMPTY, |all, of| all.union(of.bounds));
+    let axis = (whole.high - whole.low).max_position();
+    let bounds = |number: usize| &instances[number].bounds;
+    let mut order: Vec<_> = (0..instances.len()).collect();
+    order.sort_unstable_by(|a, b| bounds(*a).low[axis].total_cmp(&bounds(*b).low[axis]));
+    let mut overlap = vec![false; instances.len()];
+    for (place, one) in order.iter().enumerate() {
+        let near =
+            order[place + 1..].iter().take_while(|other| bounds(**other).low[axis] < bounds(*one).high[axis]);
+        for other in near {
+            if !(overlap[*one] && overlap[*other]) && meet(bounds(*one), bounds(*other)) {
+                (overlap[*one], overlap[*other]) = (true, true);
+            }
+        }
+    }
+    overlap
+}
+
+fn meet(one: &Bounds, other: &Bounds) -> bool {
+    one.low.cmplt(other.high).all() && other.low.cmplt(one.high).all()
+}
+
+/// A record for each part of what is shown.
+fn parts<'a>(shown: &Shown<'a>) -> Vec<Shown<'a>> {
+    let part = |part: &'a Part| {
+        let mut record = shown.of.clone();
+        record.instance.entry = part.reference;
+        record.bounds = moved_bounds(&record.instance.object_to_world, part.bounds);
+        Shown { of: shown.of, part, record, is_open: false }
+    };
+    shown.of.parts.below(shown.part).iter().map(part).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashMap;
+    use std::sync::Arc;
+
+    use glam::{Affine3A, Quat, Vec3};
+    use proptest::prelude::*;
+
+    use super::super::instances::{ShownStructure, place};
+    use super::super::parts::tests::{primitives, row, structure};
+    use super::*;
+    use crate::accel::instance::{TlasInstance, transform_rows};
+    use crate::handle::{AccelStructHandle, Handle};
+
+    /// Instances of one structure of 300 boxes.
+    fn placed(transforms: &[Affine3A]) -> (Vec<u8>, Vec<PlacedInstance>) {
+        let boxes = row(300, Vec3::ZERO);
+        let (bytes, parts) = structure(&boxes);
+        let shown = ShownStructure { address: 256, parts: Arc::new(parts) };
+        let instance = |transform: &Affine3A| TlasInstance {
+            transform: transform_rows(transform),
+            ..TlasInstance::new(AccelStructHandle::from_bits(1))
+        };
+        let all = (0..).zip(transforms).filter_map(|(number, of)| place(number, &instance(of), &shown));
+        (bytes, all.collect())
+    }
+
+    fn transforms() -> impl Strategy<Value = Vec<Affine3A>> {
+        let vector = |most: f32| prop::array::uniform3(-most..most).prop_map(Vec3::from_array);
+        let scale = prop::sample::select(vec![Vec3::ONE, Vec3::new(-1.0, 2.0, 0.5)]);
+        let one = (vector(1.0), 0.0..6.0_f32, vector(200.0), scale).prop_map(|(axis, angle, to, scale)| {
+            let turn = Quat::from_axis_angle((axis + 1e-3).normalize(), angle);
+            Affine3A::from_scale_rotation_translation(scale, turn, to)
+        });
+        prop::collection::vec(one, 0..20)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(30))]
+        #[test]
+        fn every_primitive_of_every_instance_is_in_one_record(transforms in transforms(), room in 0..60_usize) {
+            let (bytes, instances) = placed(&transforms);
+            let records = open(&instances, room);
+            prop_assert!(records.len() <= instances.len().max(room.min(super::room(instances.len() as u32) as usize)));
+            let mut seen = HashMap::new();
+            for record in &records {
+                let matrix = transforms[record.instance.number as usize];
+                for held in primitives(&bytes, record.instance.entry) {
+                    *seen.entry((record.instance.number, held.primitive)).or_insert(0) += 1;
+                    for corner in 0..8 {
+                        let pick = Vec3::new((corner & 1) as f32, (corner >> 1 & 1) as f32, (corner >> 2) as f32);
+                        let at = matrix.transform_point3(held.low + (held.high - held.low) * pick);
+                        prop_assert!(at.cmpge(record.bounds.low).all() && at.cmple(record.bounds.high).all());
+                    }
+                }
+            }
+            prop_assert_eq!(seen.len(), 300 * instances.len());
+            prop_assert!(seen.values().all(|count| *count == 1));
+        }
+    }
+
+    #[test]
+    fn only_instances_that_overlap_are_shown_in_parts() {
+        let at = |x: f32| Affine3A::from_translation(Vec3::new(x, 0.0, 0.0));
+        let apart = placed(&[at(0.0), at(400.0), at(800.0)]).1;
+        assert_eq!(open(&apart, 60).len(), 3);
+        assert_eq!(open(&placed(&[at(0.0)]).1, 60).len(), 1);
+        let records = open(&placed(&[at(0.0), at(20.0), at(10.0), at(900.0), at(30.0), at(5.0)]).1, 100);
+        assert!(records.len() > 6 && records.len() <= 22, "{}", records.len());
+        assert_eq!(records.iter().filter(|record| record.instance.number == 3).count(), 1);
+        assert!(records.iter().any(|record| record.instance.entry != 0));
+    }
+
+    #[test]
+    fn what_overlaps_is_found_whatever_the_axis() {
+        for axis in [Vec3::X, Vec3::Y, Vec3::Z] {
+            let at = |place: f32| Affine3A::from_translation(axis * place);
+            // The structure is 300 long, 900 high and 3 deep.
+            let instances =
+                placed(&[at(5_000.0), at(0.0), at(9_000.0), at(2.0), at(-4_000.0), at(8_999.0)]).1;
+            assert_eq!(overlapping(&instances), [false, true, true, true, false, true]);
+        }
+    }
+
+    #[test]
+    fn there_is_room_for_twice_the_instances_where_they_are_few() {
+        let rooms = [0, 1, 2, 128, 512, 513, 1024, 10_000, u32::MAX].map(room);
+        assert_eq!(rooms, [0, 1, 18, 256, 1024, 513, 1024, 10_000, u32::MAX]);
+    }
+}
