@@ -50,6 +50,7 @@ fn sample(program: &str, args: &[&str], folder: &Path) -> Command {
         .env_remove("WAYLAND_DISPLAY")
         .env_remove("WAYLAND_SOCKET")
         .env_remove("DISPLAY")
+        .env("LVK_CACHE", "")
         .stdin(Stdio::null());
     command
 }
@@ -84,7 +85,9 @@ fn shows_what_it_writes(program: &str, args: &[&str]) {
     let Some(desktop) = desktop() else { return };
     let folder = tempfile::tempdir().unwrap();
     let windowed = [&["--window", "--frames", "3", "--validate", "--out", "window.png"], args].concat();
-    let output = sample(program, &windowed, folder.path()).env("DISPLAY", desktop.name()).output().unwrap();
+    let mut shown = sample(program, &windowed, folder.path());
+    desktop.show(&mut shown);
+    let output = shown.output().unwrap();
     assert_success(&output);
     assert!(texts(&output).0.contains("validation messages: 0"), "{}", texts(&output).0);
     let headless = [&["--frames", "2..3", "--out", "frame_#.png"], args].concat();
@@ -148,12 +151,8 @@ impl Session {
         let (keys, screen) = RustConnection::connect(Some(desktop.name())).unwrap();
         let root = keys.setup().roots[screen].root;
         let mut command = sample(program, &[&["--window", "--validate"], args].concat(), folder);
-        let mut program = command
-            .env("DISPLAY", desktop.name())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        desktop.show(&mut command);
+        let mut program = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
         let lines = BufReader::new(program.stderr.take().unwrap()).lines();
         let (say, said) = channel();
         thread::spawn(move || lines.map_while(Result::ok).all(|line| say.send(line).is_ok()));

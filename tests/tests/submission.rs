@@ -39,7 +39,8 @@ fn flushing_runs_uploads_and_is_idle_without_any() {
     ctx.wait_idle().unwrap();
     let idle = ctx.flush().unwrap();
     assert_eq!(ctx.flush().unwrap(), idle);
-    let buffer = words_buffer(&ctx, &[3; 4]);
+    let buffer = words_buffer(&ctx, &[0; 4]);
+    ctx.upload_buffer(*buffer, 0, bytemuck::cast_slice(&[3_u32; 4])).unwrap();
     let flushed = ctx.flush().unwrap();
     assert!(flushed > idle);
     ctx.wait(flushed).unwrap();

@@ -7,8 +7,8 @@ use super::elf;
 use super::error::FetchError;
 use super::layer_description;
 use super::prefix::{
-    DRIVER, DRIVER_JSON, KEYBOARD_COMPILER, KEYBOARDS, LAYER, LAYER_FOLDER, LOADER, Manifest, Part, RADV,
-    RADV_JSON, SWIFTSHADER, SWIFTSHADER_JSON, X_SERVER,
+    CLIENT_LIBRARIES, DRIVER, DRIVER_JSON, KEYBOARD_COMPILER, KEYBOARDS, LAYER, LAYER_FOLDER, LOADER,
+    Manifest, Part, RADV, RADV_JSON, SWIFTSHADER, SWIFTSHADER_JSON, X_SERVER,
 };
 
 const LIBRARY_FOLDERS: [&str; 3] = ["usr/lib/x86_64-linux-gnu", "lib/x86_64-linux-gnu", "usr/lib/chromium"];
@@ -73,6 +73,9 @@ fn display(tree: &Path, folder: &Path) -> Result<Manifest, FetchError> {
             libraries.extend(elf::load_order(&direct, needed)?);
         }
         fs::rename(&from, folder.join(program)).map_err(FetchError::file("move", &from))?;
+    }
+    for name in CLIENT_LIBRARIES {
+        libraries.extend(elf::load_order(name, needed)?);
     }
     libraries.sort_unstable();
     libraries.dedup();

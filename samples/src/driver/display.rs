@@ -1,7 +1,7 @@
 //! An X server without a screen, for as long as somebody needs windows.
 
 use std::io::{BufRead, BufReader, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
 use super::error::DriverError;
@@ -12,12 +12,21 @@ use super::prefix::{KEYBOARDS, X_SERVER};
 pub struct VirtualDisplay {
     name: String,
     server: Child,
+    fetched: Option<PathBuf>,
 }
 
 impl VirtualDisplay {
     /// What programs call it: `:` and a number, as in `DISPLAY`.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Has `program` show its windows here. Where the server was fetched, the libraries that come with it are found too.
+    pub fn show(&self, program: &mut Command) {
+        program.env("DISPLAY", &self.name).env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
+        if let Some(folder) = &self.fetched {
+            program.env("LD_LIBRARY_PATH", folder.join("lib")).env("XKB_CONFIG_ROOT", folder.join(KEYBOARDS));
+        }
     }
 
     /// The machine's own server, where it is complete.
@@ -33,7 +42,9 @@ impl VirtualDisplay {
         let mut command = Command::new(&server);
         command.current_dir(folder).arg("-xkbdir").arg(folder.join(KEYBOARDS));
         command.env("LD_LIBRARY_PATH", folder.join("lib"));
-        Self::start(command, &server)
+        let mut display = Self::start(command, &server)?;
+        display.fetched = Some(folder.to_path_buf());
+        Ok(display)
     }
 
     fn start(mut command: Command, path: &Path) -> Result<Self, DriverError> {
@@ -48,7 +59,7 @@ impl VirtualDisplay {
             // A server that ends says nothing.
             let _ = BufReader::new(out).read_line(&mut number);
         }
-        let mut display = Self { name: format!(":{}", number.trim()), server };
+        let mut display = Self { name: format!(":{}", number.trim()), server, fetched: None };
         if !number.trim().is_empty() {
             return Ok(display);
         }

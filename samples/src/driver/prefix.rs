@@ -9,7 +9,7 @@
 //! <folder>/radv/lib/*.so*                   driver for AMD cards and all it needs but a loader
 //! <folder>/radv/icd.d/radeon_icd.json
 //! <folder>/display/bin/Xvfb, xkbcomp         X server without a screen, and what it compiles keyboards with
-//! <folder>/display/lib/*.so*                all that both need
+//! <folder>/display/lib/*.so*                all that both need, and what programs with windows open
 //! <folder>/display/xkb/                     descriptions of keyboards
 //! <folder>/*/manifest                       written last; without it the folder does not count
 //! ```
@@ -50,9 +50,19 @@ const MANIFEST: &str = "manifest";
 /// Counts layouts: a folder written for another one is fetched anew.
 const MANIFEST_HEAD: &str = "lvk vulkan folder 1";
 
-/// Xvfb with the libraries it is linked to. Its dependencies as packages would bring Mesa's OpenGL and LLVM along, ten
+/// Libraries that programs with windows open while they run.
+pub(super) const CLIENT_LIBRARIES: [&str; 6] = [
+    "libX11.so.6",
+    "libX11-xcb.so.1",
+    "libXcursor.so.1",
+    "libXi.so.6",
+    "libxkbcommon.so.0",
+    "libxkbcommon-x11.so.0",
+];
+
+/// Xvfb and the libraries above with those they are linked to. Its dependencies as packages would bring Mesa's OpenGL and LLVM along, ten
 /// times as much, for an extension that is off here.
-const DISPLAY_PACKAGES: [&str; 33] = [
+const DISPLAY_PACKAGES: [&str; 42] = [
     "xvfb",
     "x11-xkb-utils",
     "xkb-data",
@@ -79,11 +89,20 @@ const DISPLAY_PACKAGES: [&str; 33] = [
     "libsystemd0",
     "libunwind8",
     "libx11-6",
+    "libx11-xcb1",
     "libxau6",
+    "libxcb-xkb1",
     "libxcb1",
+    "libxcursor1",
     "libxdmcp6",
+    "libxext6",
+    "libxfixes3",
     "libxfont2",
+    "libxi6",
+    "libxkbcommon-x11-0",
+    "libxkbcommon0",
     "libxkbfile1",
+    "libxrender1",
     "libzstd1",
     "zlib1g",
 ];
