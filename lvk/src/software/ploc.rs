@@ -13,7 +13,7 @@ use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
 
 /// Rounds that look at the next neighbours only: most of what is small is paired by them.
-const NEAR_ROUNDS: usize = 3;
+const NEAR_ROUNDS: usize = 2;
 /// How far later rounds look to either side.
 const FAR: usize = 14;
 /// A round that pairs less than one in so many pairs those that stand beside each other too.

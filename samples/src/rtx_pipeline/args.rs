@@ -40,8 +40,7 @@ Examples:
   rtx_pipeline --profile mali-g715                        as on a phone: ray queries, split meshes
   rtx_pipeline --frames 0..240 --out dir/frame_####.png   one round through all cameras; ranges can be shared among machines
 
-Exit status: 0 when the pictures were written, 1 for trouble with the device, 2 for wrong arguments or input, 130 after
-Ctrl-C.";
+Exit status: 0 when the pictures were written, 1 for trouble with the device, 2 for wrong arguments, 130 after Ctrl-C.";
 
 #[cfg(test)]
 mod tests {
