@@ -279,9 +279,9 @@ impl Use {
 }
 
 /// Uses by render passes beyond plain targets, and by windows.
-#[allow(dead_code, reason = "each waits for the command that makes it")]
 impl Use {
     /// Attachment that fragment shaders of the same pass read; merges with a target in the same layout.
+    #[cfg_attr(not(test), expect(dead_code, reason = "waits for the command that makes it"))]
     pub(crate) const fn local_read() -> Self {
         Self::new(Stages::FRAGMENT, Access::INPUT_READ, Layout::LocalRead)
     }
@@ -297,6 +297,7 @@ impl Use {
     }
 
     /// Attachment that a pass takes its shading rates from.
+    #[cfg_attr(not(test), expect(dead_code, reason = "waits for the command that makes it"))]
     pub(crate) const fn shading_rate() -> Self {
         Self::new(Stages::SHADING_RATE, Access::SHADING_RATE_READ, Layout::ShadingRate)
     }

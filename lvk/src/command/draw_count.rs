@@ -39,16 +39,8 @@ impl RenderPass<'_> {
     /// the end there.
     pub fn draw_indirect_count(&mut self, draws: &CountedDraws) -> Result<()> {
         self.check_draw()?;
-        let size = size_of::<vk::DrawIndirectCommand>() as u64;
-        let [arguments, count] = self.counted(draws, size)?;
-        let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
-        let CountedDraws { offset, stride, count_offset, max_draws, .. } = *draws;
-        // SAFETY: as in `draw`, and the arguments and their number lie inside the buffers.
-        unsafe {
-            let (from, number) = (arguments.raw, count.raw);
-            device.cmd_draw_indirect_count(raw, from, offset, number, count_offset, max_draws, stride);
-        }
-        Ok(())
+        let command = self.cmd.shared.gpu.device.fp_v1_2().cmd_draw_indirect_count;
+        self.draw_counted(draws, size_of::<vk::DrawIndirectCommand>(), command)
     }
 
     /// As [`draw_indexed_indirect`](Self::draw_indexed_indirect), with the number of draws from a buffer
@@ -60,24 +52,8 @@ impl RenderPass<'_> {
     pub fn draw_indexed_indirect_count(&mut self, draws: &CountedDraws) -> Result<()> {
         self.check_draw()?;
         self.bound_indices()?;
-        let size = size_of::<vk::DrawIndexedIndirectCommand>() as u64;
-        let [arguments, count] = self.counted(draws, size)?;
-        let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
-        let CountedDraws { offset, stride, count_offset, max_draws, .. } = *draws;
-        // SAFETY: as in `draw_indexed_indirect`, and the number lies inside its buffer.
-        unsafe {
-            let (from, number) = (arguments.raw, count.raw);
-            device.cmd_draw_indexed_indirect_count(
-                raw,
-                from,
-                offset,
-                number,
-                count_offset,
-                max_draws,
-                stride,
-            );
-        }
-        Ok(())
+        let command = self.cmd.shared.gpu.device.fp_v1_2().cmd_draw_indexed_indirect_count;
+        self.draw_counted(draws, size_of::<vk::DrawIndexedIndirectCommand>(), command)
     }
 
     /// As [`draw_mesh_tasks_indirect`](Self::draw_mesh_tasks_indirect), with the number of draws from a buffer
@@ -88,22 +64,22 @@ impl RenderPass<'_> {
     /// [`draw_indirect_count`](Self::draw_indirect_count).
     pub fn draw_mesh_tasks_indirect_count(&mut self, draws: &CountedDraws) -> Result<()> {
         self.ready_mesh()?;
-        let size = size_of::<vk::DrawMeshTasksIndirectCommandEXT>() as u64;
-        let [arguments, count] = self.counted(draws, size)?;
-        let (ext, raw) = (self.cmd.shared.gpu.mesh()?, self.cmd.raw());
+        let command = self.cmd.shared.gpu.mesh()?.fp().cmd_draw_mesh_tasks_indirect_count_ext;
+        self.draw_counted(draws, size_of::<vk::DrawMeshTasksIndirectCommandEXT>(), command)
+    }
+
+    /// Records one of the three, which all take the same, for arguments of `size` bytes a draw.
+    fn draw_counted(
+        &mut self,
+        draws: &CountedDraws,
+        size: usize,
+        command: vk::PFN_vkCmdDrawIndirectCount,
+    ) -> Result<()> {
+        let [arguments, count] = self.counted(draws, size as u64)?;
         let CountedDraws { offset, stride, count_offset, max_draws, .. } = *draws;
-        // SAFETY: as in `draw_mesh_tasks_indirect`, and the number lies inside its buffer.
+        // SAFETY: the pass is ready for such a draw, as in `draw`, and the arguments and their number lie inside the buffers.
         unsafe {
-            let (from, number) = (arguments.raw, count.raw);
-            ext.cmd_draw_mesh_tasks_indirect_count(
-                raw,
-                from,
-                offset,
-                number,
-                count_offset,
-                max_draws,
-                stride,
-            );
+            command(self.cmd.raw(), arguments.raw, offset, count.raw, count_offset, max_draws, stride);
         }
         Ok(())
     }

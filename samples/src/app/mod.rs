@@ -25,6 +25,7 @@ pub mod run_error;
 pub mod sample;
 pub mod scene_args;
 pub mod scene_list;
+pub(crate) mod scene_textures;
 pub mod screenshot;
 pub mod timings;
 pub mod ui;

@@ -5,18 +5,18 @@ use std::time::Instant;
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    AccelStructHandle, AddressMode, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, Context, Format,
-    GeometryFlags, Holder, IndexFormat, Indices, SamplerDesc, SamplerHandle, TextureDesc, TextureHandle,
-    TextureKind, TextureUsage, TlasDesc, TlasInstance, Triangles, VertexFormat,
+    AccelStructHandle, AddressMode, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, Context,
+    GeometryFlags, Holder, IndexFormat, Indices, SamplerDesc, SamplerHandle, TextureHandle, TlasDesc,
+    TlasInstance, Triangles, VertexFormat,
 };
 
 use super::HybridError;
 use super::frame::SceneAddresses;
-use super::half_float::half_bits;
 use super::scene_check::check;
 use super::texture_density::lod_constant;
 use crate::app::array_buffer::array;
-use crate::scene::{Material, Scene, Sky, Texture};
+use crate::app::scene_textures;
+use crate::scene::{Material, Scene};
 
 /// Mask bit of instances that stop light (`kMaskOpaque` in `shaders/hybrid/hit.glsl`).
 const MASK_OPAQUE: u8 = 1;
@@ -87,8 +87,11 @@ impl GpuScene {
     /// Uploads `scene` and builds its acceleration structures.
     pub(crate) fn new(ctx: &Context, scene: &Scene, hit_groups: HitGroups) -> Result<Self, HybridError> {
         check(scene)?;
-        let textures: Vec<_> =
-            scene.textures.iter().map(|texture| upload_texture(ctx, texture)).collect::<Result<_, _>>()?;
+        let textures: Vec<_> = scene
+            .textures
+            .iter()
+            .map(|texture| scene_textures::picture(ctx, texture))
+            .collect::<Result<_, _>>()?;
         let arrays = Arrays::new(ctx, scene, &textures)?;
         ctx.wait_idle()?;
         let start = Instant::now();
@@ -103,7 +106,7 @@ impl GpuScene {
         let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, debug_name, ..TlasDesc::default() })?;
         Ok(Self {
             triangle_count: scene.triangles.len() as u32,
-            sky: upload_sky(ctx, &scene.sky)?,
+            sky: scene_textures::sky(ctx, &scene.sky, SKY_SIZE)?,
             surface_sampler: sampler(ctx, "surface sampler", AddressMode::Repeat)?,
             sky_sampler: sampler(ctx, "sky sampler", AddressMode::ClampToEdge)?,
             tlas,
@@ -185,32 +188,6 @@ fn gpu_material(material: &Material, textures: &[Holder<TextureHandle>]) -> GpuM
 
 fn sampler(ctx: &Context, debug_name: &str, address: AddressMode) -> lvk::Result<Holder<SamplerHandle>> {
     ctx.create_sampler(&SamplerDesc { address: [address; 3], debug_name, ..SamplerDesc::default() })
-}
-
-fn upload_texture(ctx: &Context, texture: &Texture) -> lvk::Result<Holder<TextureHandle>> {
-    ctx.create_texture(&TextureDesc {
-        format: Format::Rgba8Srgb,
-        extent: [texture.width, texture.height],
-        mips: 0,
-        data: Some(&texture.pixels),
-        generate_mips: true,
-        debug_name: &texture.name,
-        ..TextureDesc::default()
-    })
-}
-
-fn upload_sky(ctx: &Context, sky: &Sky) -> lvk::Result<Holder<TextureHandle>> {
-    let faces = sky.bake_cube(SKY_SIZE);
-    let texels: Vec<u16> = faces.iter().flatten().flatten().map(|&c| half_bits(c)).collect();
-    ctx.create_texture(&TextureDesc {
-        kind: TextureKind::Cube,
-        format: Format::Rgba16Float,
-        extent: [SKY_SIZE, SKY_SIZE],
-        usage: TextureUsage::SAMPLED,
-        data: Some(bytemuck::cast_slice(&texels)),
-        debug_name: "sky",
-        ..TextureDesc::default()
-    })
 }
 
 /// One structure for the opaque and one for the refractive triangles, whichever there are, and their instances.

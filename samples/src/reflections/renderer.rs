@@ -2,7 +2,7 @@
 
 use lvk::{
     AddressMode, BufferDesc, BufferHandle, Context, Format, Holder, SamplerDesc, SamplerHandle, TextureDesc,
-    TextureHandle, TextureKind, TextureUsage,
+    TextureHandle,
 };
 
 use super::config::ReflectionsConfig;
@@ -21,8 +21,8 @@ use super::world::{self, World};
 use crate::app::frame::Frame;
 use crate::app::pass_times::PassTimes;
 use crate::app::sample::{Moment, Sample};
-use crate::hybrid::half_float::half_bits;
-use crate::scene::{Camera, GpuCamera, Sky};
+use crate::app::scene_textures;
+use crate::scene::{Camera, GpuCamera};
 
 /// Names of the build of the top-level structure and of the ray passes.
 pub(super) const TLAS_BUILD: &str = "TLAS build";
@@ -74,7 +74,7 @@ impl Reflections {
             sampler(ctx, "surface sampler", AddressMode::Repeat)?,
             sampler(ctx, "sky sampler", AddressMode::ClampToEdge)?,
         ];
-        let sky = upload_sky(ctx, &world.sky)?;
+        let sky = scene_textures::sky(ctx, &world.sky, SKY_SIZE)?;
         let mut indices = Indices {
             tlas: top_level.tlas.index(),
             sky: sky.index(),
@@ -279,20 +279,6 @@ fn upload_textures(ctx: &Context, world: &World) -> lvk::Result<Vec<Holder<Textu
         })
     };
     world.textures.iter().map(upload).collect()
-}
-
-fn upload_sky(ctx: &Context, sky: &Sky) -> lvk::Result<Holder<TextureHandle>> {
-    let faces = sky.bake_cube(SKY_SIZE);
-    let texels: Vec<u16> = faces.iter().flatten().flatten().map(|&c| half_bits(c)).collect();
-    ctx.create_texture(&TextureDesc {
-        kind: TextureKind::Cube,
-        format: Format::Rgba16Float,
-        extent: [SKY_SIZE, SKY_SIZE],
-        usage: TextureUsage::SAMPLED,
-        data: Some(bytemuck::cast_slice(&texels)),
-        debug_name: "sky",
-        ..TextureDesc::default()
-    })
 }
 
 fn sampler(ctx: &Context, debug_name: &str, address: AddressMode) -> lvk::Result<Holder<SamplerHandle>> {

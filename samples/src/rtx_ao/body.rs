@@ -3,12 +3,13 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, Vec3};
 use lvk::{
-    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, Context, Format, GeometryFlags,
-    Holder, IndexFormat, Indices, TextureDesc, TextureHandle, Triangles, VertexFormat, transform_rows,
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, Context, GeometryFlags, Holder,
+    IndexFormat, Indices, TextureHandle, Triangles, VertexFormat, transform_rows,
 };
 
 use crate::app::array_buffer::array;
-use crate::scene::{Material, Scene, Texture};
+use crate::app::scene_textures;
+use crate::scene::{Material, Scene};
 
 /// `kNoTexture` in `shaders/rtx_ao/frame.glsl`.
 const NO_TEXTURE: u32 = u32::MAX;
@@ -41,8 +42,11 @@ pub(super) struct Body {
 impl Body {
     pub(super) fn new(ctx: &Context, scene: &Scene) -> lvk::Result<Self> {
         let count = scene.opaque_triangle_count as usize;
-        let textures: Vec<_> =
-            scene.textures.iter().map(|texture| upload(ctx, texture)).collect::<Result<_, _>>()?;
+        let textures: Vec<_> = scene
+            .textures
+            .iter()
+            .map(|texture| scene_textures::picture(ctx, texture))
+            .collect::<Result<_, _>>()?;
         let paint = |material: &u32| paint(&scene.materials[*material as usize], &textures);
         let paints: Vec<Paint> = scene.triangle_materials[..count].iter().map(paint).collect();
         let (read, input) = (BufferUsage::STORAGE, BufferUsage::STORAGE | BufferUsage::ACCEL_INPUT);
@@ -91,16 +95,4 @@ fn paint(material: &Material, textures: &[Holder<TextureHandle>]) -> Paint {
     let albedo = Vec3::from(material.albedo).lerp(0.8 * Vec3::from(material.tint), material.reflectivity);
     let texture = material.albedo_texture.map_or(NO_TEXTURE, |number| textures[number as usize].index());
     Paint { albedo: albedo.into(), texture }
-}
-
-fn upload(ctx: &Context, texture: &Texture) -> lvk::Result<Holder<TextureHandle>> {
-    ctx.create_texture(&TextureDesc {
-        format: Format::Rgba8Srgb,
-        extent: [texture.width, texture.height],
-        mips: 0,
-        data: Some(&texture.pixels),
-        generate_mips: true,
-        debug_name: &texture.name,
-        ..TextureDesc::default()
-    })
 }

@@ -21,6 +21,8 @@ pub struct RtxPipelineConfig {
 impl RtxPipelineConfig {
     /// The largest depth.
     pub const MAX_DEPTH: u32 = 16;
+    /// Levels of recursion at that depth.
+    pub(super) const MAX_RECURSION: u32 = Self::MAX_DEPTH + OTHER_LEVELS;
 
     /// As usual but for path and size.
     #[must_use]

@@ -22,7 +22,7 @@ pub(super) const RAYS: RayStages = RayStages {
         stage(ShaderStage::ClosestHit, texts::SOLID_RCHIT, "solid.rchit"),
         stage(ShaderStage::ClosestHit, texts::GLASS_RCHIT, "glass.rchit"),
     ],
-    max_recursion: RtxPipelineConfig::MAX_DEPTH + 2,
+    max_recursion: RtxPipelineConfig::MAX_RECURSION,
     query: stage(ShaderStage::Compute, texts::PICTURE_COMP, "picture.comp"),
 };
 

@@ -5,9 +5,8 @@ use std::f32::consts::TAU;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildMode,
-    CommandBuffer, ComputePipelineHandle, Context, Dependencies, DeviceInstances, Format, GeometryFlags,
-    Holder, IndexFormat, Indices, SamplerDesc, SamplerHandle, TextureDesc, TextureHandle, TlasDesc,
-    Triangles, VertexFormat,
+    CommandBuffer, ComputePipelineHandle, Context, Dependencies, DeviceInstances, GeometryFlags, Holder,
+    IndexFormat, Indices, SamplerDesc, SamplerHandle, TextureHandle, TlasDesc, Triangles, VertexFormat,
 };
 
 use super::models::{Models, Vertex};
@@ -15,8 +14,9 @@ use super::pipelines::{INSTANCES, RAYS};
 use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
+use crate::app::scene_textures;
 use crate::rtx::{Canvas, RtxConfig, RtxError, Tracer, compute_pipeline};
-use crate::scene::{Camera, GpuCamera, Texture, painted_textures};
+use crate::scene::{Camera, GpuCamera, painted_textures};
 
 /// Textures that the shaders have room for.
 const TEXTURES: usize = 6;
@@ -87,7 +87,7 @@ impl RtxTextures {
         let textures: Vec<_> = painted_textures()
             .iter()
             .take(TEXTURES)
-            .map(|picture| upload(ctx, picture))
+            .map(|picture| scene_textures::picture(ctx, picture))
             .collect::<Result<_, _>>()?;
         let sampler = ctx.create_sampler(&SamplerDesc::default())?;
         let records = buffer(ctx, "instances", RECORD_BYTES * u64::from(INSTANCE_COUNT))?;
@@ -238,18 +238,6 @@ fn build_blas(
     let desc = |geometries| BlasDesc { geometries, debug_name: "model", ..BlasDesc::default() };
     let descs: Vec<_> = geometries.iter().map(|geometries| desc(&geometries[..])).collect();
     ctx.create_blas_batch(&descs)
-}
-
-fn upload(ctx: &Context, picture: &Texture) -> lvk::Result<Holder<TextureHandle>> {
-    ctx.create_texture(&TextureDesc {
-        format: Format::Rgba8Srgb,
-        extent: [picture.width, picture.height],
-        mips: 0,
-        data: Some(&picture.pixels),
-        generate_mips: true,
-        debug_name: &picture.name,
-        ..TextureDesc::default()
-    })
 }
 
 fn buffer(ctx: &Context, debug_name: &str, size_bytes: u64) -> lvk::Result<Holder<BufferHandle>> {

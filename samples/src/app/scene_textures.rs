@@ -1,0 +1,34 @@
+//! Textures of scenes on the device.
+
+use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureKind, TextureUsage};
+
+use crate::hybrid::half_float::half_bits;
+use crate::scene::{Sky, Texture};
+
+/// A picture of a scene, with all its mips.
+pub(crate) fn picture(ctx: &Context, texture: &Texture) -> lvk::Result<Holder<TextureHandle>> {
+    ctx.create_texture(&TextureDesc {
+        format: Format::Rgba8Srgb,
+        extent: [texture.width, texture.height],
+        mips: 0,
+        data: Some(&texture.pixels),
+        generate_mips: true,
+        debug_name: &texture.name,
+        ..TextureDesc::default()
+    })
+}
+
+/// A sky as a cube with edges of `size` texels.
+pub(crate) fn sky(ctx: &Context, sky: &Sky, size: u32) -> lvk::Result<Holder<TextureHandle>> {
+    let faces = sky.bake_cube(size);
+    let texels: Vec<u16> = faces.iter().flatten().flatten().map(|&c| half_bits(c)).collect();
+    ctx.create_texture(&TextureDesc {
+        kind: TextureKind::Cube,
+        format: Format::Rgba16Float,
+        extent: [size, size],
+        usage: TextureUsage::SAMPLED,
+        data: Some(bytemuck::cast_slice(&texels)),
+        debug_name: "sky",
+        ..TextureDesc::default()
+    })
+}
