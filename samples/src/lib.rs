@@ -3,9 +3,11 @@
 pub mod app;
 pub mod bench;
 pub mod driver;
+pub mod hello_triangle;
 pub mod hybrid;
 pub mod hybrid_oit;
 pub mod pipelines;
+pub mod raster;
 pub mod reflections;
 pub mod rtx;
 pub mod rtx_ao;

@@ -4,7 +4,10 @@ use lvk::{Context, Format, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderS
 
 use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
-use crate::{app, bench, hybrid, hybrid_oit, reflections, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures};
+use crate::{
+    app, bench, hello_triangle, hybrid, hybrid_oit, reflections, rtx_ao, rtx_hello, rtx_pipeline,
+    rtx_textures,
+};
 
 /// A stage of a [`SamplePipeline`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,6 +64,7 @@ pub struct SamplePipeline {
 #[must_use]
 pub fn all() -> Vec<SamplePipeline> {
     [
+        hello_triangle::pipelines(),
         hybrid::pipelines(),
         hybrid_oit::pipelines(),
         reflections::pipelines(),

@@ -277,3 +277,11 @@ pub mod rtx_ao {
     /// The cache, and the picture.
     pub const ACCUMULATE_COMP: &str = include_str!("../../shaders/rtx_ao/accumulate.comp.glsl");
 }
+
+/// Stages of the `hello_triangle` sample.
+pub mod hello_triangle {
+    /// Corners of the triangle.
+    pub const TRIANGLE_VERT: &str = include_str!("../../shaders/hello_triangle/triangle.vert.glsl");
+    /// The colour between them.
+    pub const TRIANGLE_FRAG: &str = include_str!("../../shaders/hello_triangle/triangle.frag.glsl");
+}

@@ -15,49 +15,66 @@ struct Program {
     own: &'static [&'static str],
     /// What it says of the picture.
     said: &'static [&'static str],
+    /// Arguments for each way to draw it.
+    ways: &'static [&'static [&'static str]],
 }
 
-const PROGRAMS: [Program; 6] = [
+/// The ways of samples that trace rays.
+const RAYS: &[&[&str]] = &[&["--rt", "pipeline"], &["--rt", "query"]];
+
+const PROGRAMS: [Program; 7] = [
     Program {
         path: env!("CARGO_BIN_EXE_reflections"),
         quick: &["--samples", "1"],
         own: &["--samples", "--min-angle", "--compare-culling"],
         said: &["g-buffers, then reflected rays", "instances kept", "opaque rays", "transparent rays"],
+        ways: RAYS,
     },
     Program {
         path: env!("CARGO_BIN_EXE_hybrid_oit"),
         quick: &["--supersampling", "1", "--shadow-rays", "1"],
         own: &["--supersampling", "--shadow-rays", "--nodes", "--time"],
         said: &["list of glass", "spheres of glass", "composite", "nodes"],
+        ways: RAYS,
     },
     Program {
         path: env!("CARGO_BIN_EXE_rtx_ao"),
         quick: &["--passes", "1", "--rays", "1"],
         own: &["--passes", "--rays", "--radius", "--scene", "--camera"],
         said: &["town: 14962 triangles", "depth", "surfaces", "cache"],
+        ways: RAYS,
     },
     Program {
         path: env!("CARGO_BIN_EXE_rtx_hello"),
         quick: &[],
         own: &["--list-scenes"],
         said: &["37 triangles", "TLAS update", "rays"],
+        ways: RAYS,
     },
     Program {
         path: env!("CARGO_BIN_EXE_rtx_pipeline"),
         quick: &["--depth", "1"],
         own: &["--depth", "--scene", "--camera"],
         said: &["courtyard: ", "rays mirrored 1 times at most", "rays"],
+        ways: RAYS,
     },
     Program {
         path: env!("CARGO_BIN_EXE_rtx_textures"),
         quick: &[],
         own: &["--list-scenes"],
         said: &["170 instances", "6 textures", "TLAS build", "rays"],
+        ways: RAYS,
+    },
+    Program {
+        path: env!("CARGO_BIN_EXE_hello_triangle"),
+        quick: &[],
+        own: &[],
+        said: &["a turning triangle", "triangle"],
+        ways: &[&[]],
     },
 ];
 
-const SHARED: [&str; 15] = [
-    "--rt",
+const SHARED: [&str; 14] = [
     "--frames",
     "--round",
     "--resume",
@@ -143,6 +160,7 @@ fn the_help_teaches() {
         help.assert_success();
         assert_names(&help.out, &SHARED);
         assert_names(&help.out, program.own);
+        assert_eq!(help.out.contains("--rt "), program.ways == RAYS, "{}", help.out);
     }
 }
 
@@ -164,14 +182,14 @@ fn wrong_arguments_are_named() {
 }
 
 #[test]
-fn both_paths_write_a_picture_under_validation() {
+fn every_way_writes_a_picture_under_validation() {
     if !has_device() {
         return;
     }
     for program in PROGRAMS {
-        for rt in ["pipeline", "query"] {
+        for way in program.ways {
             let folder = tempfile::tempdir().unwrap();
-            let args = ["--rt", rt, "--frames", "1", "--validate"];
+            let args = [&["--frames", "1", "--validate"], *way].concat();
             let outcome = Outcome::of(program.small(folder.path(), "a.png", &args));
             outcome.assert_success();
             assert_names(&outcome.out, &["device  ", "GPU ms", "total", "validation messages: 0", "wrote "]);

@@ -101,6 +101,11 @@ fn shows_what_it_writes(program: &str, args: &[&str]) {
 }
 
 #[test]
+fn hello_triangle_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_hello_triangle"), &[]);
+}
+
+#[test]
 fn rtx_hello_has_a_window() {
     shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_hello"), &[]);
 }

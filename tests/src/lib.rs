@@ -16,6 +16,7 @@ pub mod picture;
 pub mod radv;
 pub mod random;
 pub mod raster;
+pub mod raster_sample;
 pub mod ray_scene;
 pub mod ray_tracer;
 pub mod rays;

@@ -256,6 +256,7 @@ fn groups(
 fn raw(format: Format) -> vk::Format {
     match format {
         Format::Rgba8Unorm => vk::Format::R8G8B8A8_UNORM,
+        Format::Rgba8Srgb => vk::Format::R8G8B8A8_SRGB,
         Format::Rgba16Float => vk::Format::R16G16B16A16_SFLOAT,
         Format::Rgba32Float => vk::Format::R32G32B32A32_SFLOAT,
         Format::Rgba32Uint => vk::Format::R32G32B32A32_UINT,

@@ -6,6 +6,7 @@ use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureRegion, Te
 use lvk_samples::app::frame::Frame;
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::hello_triangle::HelloTriangle;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence};
 use lvk_samples::hybrid_oit::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
@@ -84,6 +85,12 @@ fn check<S: Sample>(make: impl Fn([u32; 2]) -> S) {
 
 fn rtx(ctx: &Context, [width, height]: [u32; 2]) -> RtxConfig {
     RtxConfig { path: paths(ctx)[0], width, height }
+}
+
+#[test]
+fn hello_triangle_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    check(|size| HelloTriangle::new(&ctx, size).unwrap());
 }
 
 #[test]

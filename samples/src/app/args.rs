@@ -2,6 +2,7 @@
 
 use clap::{Parser, ValueEnum};
 
+use super::ray_args::RayArgs;
 use super::run_args::RunArgs;
 use super::scene_args::SceneArgs;
 
@@ -67,6 +68,10 @@ pub struct HybridArgs {
     /// What the lamp does in a sequence
     #[arg(long, value_enum, default_value_t = Lamp::Still, help_heading = "Frames")]
     pub lamp: Lamp,
+
+    /// By what rays are traced
+    #[command(flatten)]
+    pub tracing: RayArgs,
 
     /// Frames, pictures and device
     #[command(flatten)]
@@ -152,7 +157,8 @@ mod tests {
 
     use super::*;
     use crate::app::frames::Frames;
-    use crate::app::run_args::{RayTracing, Validation};
+    use crate::app::ray_args::RayTracing;
+    use crate::app::run_args::Validation;
 
     fn parsed(line: &str) -> Result<HybridArgs, clap::Error> {
         HybridArgs::try_parse_from(std::iter::once("hybrid").chain(line.split_whitespace()))
@@ -169,7 +175,7 @@ mod tests {
         let (run, scene) = (&args.run, &args.scene);
         assert_eq!((run.width, run.height, scene.camera, args.depth), (1280, 720, 1, 4));
         assert_eq!((run.frames.clone(), run.round, run.resume), (None, 240, false));
-        assert_eq!((args.method, run.rt, run.validate), (None, RayTracing::Auto, None));
+        assert_eq!((args.method, args.tracing.rt, run.validate), (None, RayTracing::Auto, None));
         assert_eq!((args.gbuffer, args.raster), (GBuffer::Visibility, Raster::Auto));
         assert_eq!((args.bounces, args.samples), (Bounces::Auto, 1));
         assert_eq!((scene.scene.clone(), args.lamp), (None, Lamp::Still));

@@ -3,25 +3,38 @@
 use std::sync::Arc;
 
 use lvk::{
-    Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryPath, RayQueryRequest,
-    ValidationSink, WindowHandles,
+    Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, OptionalFeature, RayQueryPath,
+    RayQueryRequest, ValidationSink, WindowHandles,
 };
 
 use super::caches::Caches;
-use super::run_args::{RayTracing, RunArgs, Validation};
+use super::ray_args::RayTracing;
+use super::run_args::{RunArgs, Validation};
 use super::run_error::RunError;
 use super::say;
 use crate::driver::{self, Driver, DriverRequest};
 
-/// What a sample needs beyond what the command line says.
+/// What a sample needs beyond the part of the command line that all share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DeviceNeeds {
+    /// How rays are traced; `None` where none are.
+    pub rays: Option<RayTracing>,
+    /// Features that the sample cannot do without: only devices that have them all are considered.
+    pub features: &'static [OptionalFeature],
     /// Places for textures; fewer than the library's default count as that.
     pub textures: u32,
 }
 
-/// Opens the device the user names, or the best one; where that is a CPU or has no ray tracing, rays are traced by queries
-/// in software. Messages of the validation layer, where it is asked for, go into `sink`.
+impl DeviceNeeds {
+    /// Of a sample that traces rays.
+    #[must_use]
+    pub fn tracing(wish: RayTracing) -> Self {
+        Self { rays: Some(wish), ..Self::default() }
+    }
+}
+
+/// Opens the device the user names, or the best one; where that is a CPU or has no ray tracing, rays, if any, are traced by
+/// queries in software. Messages of the validation layer, where it is asked for, go into `sink`.
 pub(super) fn open(
     name: &str,
     args: &RunArgs,
@@ -44,16 +57,18 @@ pub(super) fn open(
             validation_sink: args.validate.map(|_| sink.clone()),
             ray_tracing_pipeline,
             ray_query,
+            required_features: needs.features,
             max_textures: needs.textures.max(ContextDesc::default().max_textures),
             ..Caches::desc(caches.as_ref())
         })
     };
-    match args.rt {
-        RayTracing::Pipeline => Ok(with(Required, HardwareIfPresent)?),
-        RayTracing::Query => with(Optional, Hardware).map_err(without_queries),
-        RayTracing::Software => Ok(with(Off, Software)?),
+    match needs.rays {
+        None => Ok(with(Off, RayQueryRequest::Off)?),
+        Some(RayTracing::Pipeline) => Ok(with(Required, HardwareIfPresent)?),
+        Some(RayTracing::Query) => with(Optional, Hardware).map_err(without_queries),
+        Some(RayTracing::Software) => Ok(with(Off, Software)?),
         // A profile rehearses the device's own paths. These keep no structures for software beside theirs.
-        RayTracing::Auto => {
+        Some(RayTracing::Auto) => {
             let best = with(Optional, HardwareIfPresent)?;
             let caps = best.capabilities();
             let can_trace = caps.ray_tracing_pipeline || caps.ray_query;
@@ -96,6 +111,16 @@ pub(crate) fn list(profile: Option<&DeviceProfile>) -> Result<(), RunError> {
         say(&device_line(number, &device));
     }
     Ok(())
+}
+
+/// What a sample's program says of its device, in a line or two, each with its end.
+#[must_use]
+pub fn device_text(capabilities: &Capabilities) -> String {
+    let text = format!("device    {} ({})\n", capabilities.device_name, driver_text(capabilities));
+    match &capabilities.profile {
+        Some(profile) => text + &format!("profile   {profile}, rehearsed on this device\n"),
+        None => text,
+    }
 }
 
 /// Name and version of a device's driver, and of its Vulkan.

@@ -19,6 +19,7 @@ pub mod pass_times;
 pub mod play;
 pub mod png;
 pub mod progress;
+pub mod ray_args;
 pub mod run;
 pub mod run_args;
 pub mod run_error;

@@ -14,10 +14,6 @@ pub const MAX_SIZE: u32 = 16_384;
 /// Frames, pictures and device: what all samples share.
 #[derive(Debug, Clone, PartialEq, Args)]
 pub struct RunArgs {
-    /// How to trace rays
-    #[arg(long, value_enum, default_value_t = RayTracing::Auto, help_heading = "Rendering")]
-    pub rt: RayTracing,
-
     /// A number: render the first frame so often and time it [default: 60, or 1 on a driver that runs on the CPU].
     /// A range as 0..240, without its end: render each frame once as a picture of its own
     #[arg(long, value_name = "N|FIRST..END", help_heading = "Frames")]
@@ -79,7 +75,7 @@ pub struct RunArgs {
     pub hot_reload: Option<PathBuf>,
 
     /// Device to use, by its number in --list-devices or part of its name
-    /// [default: the most capable one that can trace rays]
+    /// [default: the most capable one]
     #[arg(long, value_name = "NUMBER|NAME", help_heading = "Device")]
     pub device: Option<String>,
 
@@ -121,19 +117,12 @@ impl RunArgs {
         let file = if is_sequence { format!("{name}_####.png") } else { format!("{name}.png") };
         self.out.clone().unwrap_or_else(|| Path::new(&file).to_owned())
     }
-}
 
-/// How to trace rays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum RayTracing {
-    /// A ray tracing pipeline where the device has one, else ray queries; on a CPU ray queries in software, the fastest.
-    Auto,
-    /// A ray tracing pipeline with shader binding table.
-    Pipeline,
-    /// Ray queries of the device in a compute shader; on devices that have none, see `software`.
-    Query,
-    /// Ray queries that the library walks in the shader itself, on any device.
-    Software,
+    /// Width and height of the pictures.
+    #[must_use]
+    pub fn extent(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
 }
 
 /// What Vulkan validation checks.

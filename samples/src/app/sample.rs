@@ -22,7 +22,8 @@
 //! ```
 //!
 //! where `CloudArgs` holds `#[command(flatten)] pub run: RunArgs`, `CloudError: Into<RunError>` says which errors the
-//! user can mend, and `Cloud` implements [`Sample`]:
+//! user can mend, and `Cloud` implements [`Sample`]. Samples that trace rays have [`RayArgs`](super::ray_args::RayArgs) beside
+//! it, and ask for a device by `DeviceNeeds::tracing`; those that only rasterise share `crate::raster`.
 //!
 //! ```ignore
 //! impl Sample for Cloud {
@@ -39,7 +40,7 @@
 //!
 //!     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, CloudError> {
 //!         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
-//!         frame.pass("cloud", |cmd| self.trace(cmd))?;
+//!         frame.pass("cloud", |cmd| self.draw(cmd))?;
 //!         Ok(*self.picture)
 //!     }
 //! }

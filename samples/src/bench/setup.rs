@@ -6,7 +6,7 @@ use lvk::{Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryRequest, 
 
 use super::args::{BenchArgs, Benchmark, PictureArgs};
 use super::error::BenchError;
-use crate::app::run_args::RayTracing;
+use crate::app::ray_args::RayTracing;
 use crate::driver::{DriverRequest, prepare};
 use crate::hybrid::RayPath;
 

@@ -4,7 +4,7 @@ use lvk::{Capabilities, RayQueryPath};
 
 use super::HybridError;
 use crate::app::args;
-use crate::app::run_args::RayTracing;
+use crate::app::ray_args::RayTracing;
 
 /// How primary visibility is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -11,7 +11,7 @@ use super::{
     Bounces, Geometry, HybridConfig, HybridError, HybridRenderer, Method, Raster, RasterTuning, RayPath,
 };
 use crate::app::args::{self, HybridArgs};
-use crate::app::device::{DeviceNeeds, driver_text, query_text};
+use crate::app::device::{DeviceNeeds, device_text, query_text};
 use crate::app::frames::Frames;
 use crate::app::run::{self, Opened, Opening};
 use crate::app::run_error::RunError;
@@ -53,8 +53,9 @@ fn open(args: &HybridArgs, opening: &mut Opening<'_>) -> Result<Opened<HybridSeq
     args.scene.check_out(&args.run.out_or(NAME))?;
     let mut scene = args.scene.load(&mut opening.progress)?;
     opening.warn(&scene.warnings);
-    let context = opening.device(&DeviceNeeds { textures: textures_needed(&scene) })?;
-    let path = RayPath::choose(RayPath::wished(args.run.rt), context.capabilities())?;
+    let tracing = DeviceNeeds::tracing(args.tracing.rt);
+    let context = opening.device(&DeviceNeeds { textures: textures_needed(&scene), ..tracing })?;
+    let path = RayPath::choose(RayPath::wished(args.tracing.rt), context.capabilities())?;
     let wish = wished_method(args);
     let method = Method::choose(wish, context.capabilities());
     if wish.is_none() && method == Method::Standalone {
@@ -135,10 +136,7 @@ fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &Hybr
         RayPath::Pipeline => "ray tracing pipeline",
         RayPath::Query => &query_text(capabilities, "a compute shader"),
     };
-    let mut text = format!("device    {} ({})\n", capabilities.device_name, driver_text(capabilities));
-    if let Some(profile) = &capabilities.profile {
-        let _ = writeln!(text, "profile   {profile}, rehearsed on this device");
-    }
+    let mut text = device_text(capabilities);
     let _ = write!(text, "method    {method}; {path}; depth {}", config.max_depth);
     let _ = match config.samples {
         1 => writeln!(text),

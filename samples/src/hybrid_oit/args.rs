@@ -3,6 +3,7 @@
 use clap::Parser;
 
 use super::HybridOitConfig;
+use crate::app::ray_args::RayArgs;
 use crate::app::run_args::RunArgs;
 use crate::app::scene_args::BuiltInSceneArgs;
 
@@ -53,6 +54,10 @@ pub struct HybridOitArgs {
     /// The built-in scene
     #[command(flatten)]
     pub scene: BuiltInSceneArgs,
+
+    /// By what rays are traced
+    #[command(flatten)]
+    pub tracing: RayArgs,
 
     /// Frames, pictures and device
     #[command(flatten)]

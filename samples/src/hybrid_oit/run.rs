@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use lvk::Context;
 
 use super::{HybridOit, HybridOitArgs, HybridOitConfig, HybridOitError, HybridOitSequence, OitScene};
-use crate::app::device::{DeviceNeeds, driver_text, query_text};
+use crate::app::device::{DeviceNeeds, device_text, query_text};
 use crate::app::run::{self, Opened, Opening};
 use crate::app::run_error::RunError;
 use crate::app::say;
@@ -39,8 +39,8 @@ pub fn run(args: &HybridOitArgs) -> ExitCode {
 }
 
 fn open(args: &HybridOitArgs, opening: &mut Opening<'_>) -> Result<Opened<HybridOitSequence>, RunError> {
-    let context = opening.device(&DeviceNeeds::default())?;
-    let path = RayPath::choose(RayPath::wished(args.run.rt), context.capabilities())?;
+    let context = opening.device(&DeviceNeeds::tracing(args.tracing.rt))?;
+    let path = RayPath::choose(RayPath::wished(args.tracing.rt), context.capabilities())?;
     let scene = OitScene::default();
     let config = HybridOitConfig {
         supersampling: args.supersampling,
@@ -57,10 +57,7 @@ fn open(args: &HybridOitArgs, opening: &mut Opening<'_>) -> Result<Opened<Hybrid
 
 fn headline(ctx: &Context, scene: &OitScene, config: &HybridOitConfig) -> String {
     let capabilities = ctx.capabilities();
-    let mut text = format!("device    {} ({})\n", capabilities.device_name, driver_text(capabilities));
-    if let Some(profile) = &capabilities.profile {
-        let _ = writeln!(text, "profile   {profile}, rehearsed on this device");
-    }
+    let mut text = device_text(capabilities);
     let path = match config.path {
         RayPath::Pipeline => "a ray tracing pipeline",
         RayPath::Query => &query_text(capabilities, "a compute shader"),

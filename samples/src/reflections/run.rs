@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use lvk::Context;
 
 use super::{CullingCost, Reflections, ReflectionsArgs, ReflectionsConfig, ReflectionsError};
-use crate::app::device::{DeviceNeeds, driver_text, query_text};
+use crate::app::device::{DeviceNeeds, device_text, query_text};
 use crate::app::run::{self, Opened, Opening};
 use crate::app::run_error::RunError;
 use crate::app::say;
@@ -43,8 +43,8 @@ pub fn run(args: &ReflectionsArgs) -> ExitCode {
 }
 
 fn open(args: &ReflectionsArgs, opening: &mut Opening<'_>) -> Result<Opened<Reflections>, RunError> {
-    let context = opening.device(&DeviceNeeds::default())?;
-    let path = RayPath::choose(RayPath::wished(args.run.rt), context.capabilities())?;
+    let context = opening.device(&DeviceNeeds::tracing(args.tracing.rt))?;
+    let path = RayPath::choose(RayPath::wished(args.tracing.rt), context.capabilities())?;
     let config = ReflectionsConfig {
         samples: args.samples,
         min_angle: args.min_angle,
@@ -65,10 +65,7 @@ fn open(args: &ReflectionsArgs, opening: &mut Opening<'_>) -> Result<Opened<Refl
 
 fn headline(ctx: &Context, sample: &Reflections) -> String {
     let capabilities = ctx.capabilities();
-    let mut text = format!("device    {} ({})\n", capabilities.device_name, driver_text(capabilities));
-    if let Some(profile) = &capabilities.profile {
-        let _ = writeln!(text, "profile   {profile}, rehearsed on this device");
-    }
+    let mut text = device_text(capabilities);
     let path = match sample.config().path {
         RayPath::Pipeline => "ray tracing pipeline",
         RayPath::Query => &query_text(capabilities, "compute shaders"),

@@ -3,7 +3,7 @@
 use lvk::Capabilities;
 
 use super::RtxError;
-use crate::app::run_args::RunArgs;
+use crate::app::ray_args::RayTracing;
 use crate::hybrid::RayPath;
 
 /// What to render.
@@ -19,9 +19,13 @@ pub struct RtxConfig {
 
 impl RtxConfig {
     /// What the command line asks for.
-    pub(crate) fn of(args: &RunArgs, capabilities: &Capabilities) -> Result<Self, RtxError> {
-        let path = RayPath::choose(RayPath::wished(args.rt), capabilities)?;
-        Ok(Self { path, width: args.width, height: args.height })
+    pub(crate) fn of(
+        wish: RayTracing,
+        [width, height]: [u32; 2],
+        capabilities: &Capabilities,
+    ) -> Result<Self, RtxError> {
+        let path = RayPath::choose(RayPath::wished(wish), capabilities)?;
+        Ok(Self { path, width, height })
     }
 
     /// The same for a picture of `extent` pixels.

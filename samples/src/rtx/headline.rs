@@ -4,15 +4,12 @@ use std::fmt::Write as _;
 
 use lvk::Capabilities;
 
-use crate::app::device::{driver_text, query_text};
+use crate::app::device::{device_text, query_text};
 use crate::hybrid::RayPath;
 
 /// The device, how rays are traced on it - by queries in `stages`, where by those -, and what the picture shows.
 pub(crate) fn headline(capabilities: &Capabilities, path: RayPath, stages: &str, scene: &str) -> String {
-    let mut text = format!("device    {} ({})\n", capabilities.device_name, driver_text(capabilities));
-    if let Some(profile) = &capabilities.profile {
-        let _ = writeln!(text, "profile   {profile}, rehearsed on this device");
-    }
+    let mut text = device_text(capabilities);
     let path = match path {
         RayPath::Pipeline => "ray tracing pipeline",
         RayPath::Query => &query_text(capabilities, stages),

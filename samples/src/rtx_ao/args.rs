@@ -3,6 +3,7 @@
 use clap::Parser;
 
 use super::RtxAoConfig;
+use crate::app::ray_args::RayArgs;
 use crate::app::run_args::RunArgs;
 use crate::app::scene_args::SceneArgs;
 
@@ -39,6 +40,10 @@ pub struct RtxAoArgs {
     /// Which scene, and from where it is seen
     #[command(flatten)]
     pub scene: SceneArgs,
+
+    /// By what rays are traced
+    #[command(flatten)]
+    pub tracing: RayArgs,
 
     /// Frames, pictures and device
     #[command(flatten)]

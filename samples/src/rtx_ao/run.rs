@@ -33,11 +33,18 @@ fn open(args: &RtxAoArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxAo>, Ru
     args.scene.check_out(&args.run.out_or(NAME))?;
     let (scene, turning) = load(args, opening)?;
     opening.warn(&scene.warnings);
-    let context = opening.device(&DeviceNeeds { textures: scene.textures.len() as u32 + 16 })?;
+    let textures = scene.textures.len() as u32 + 16;
+    let needs = DeviceNeeds { textures, ..DeviceNeeds::tracing(args.tracing.rt) };
+    let context = opening.device(&needs)?;
     let capabilities = context.capabilities();
     let radius = args.radius.or(turning.is_some().then_some(TOWN_RADIUS));
     let (passes, rays) = (args.passes, args.rays);
-    let config = RtxAoConfig { rtx: RtxConfig::of(&args.run, capabilities)?, passes, rays, radius };
+    let config = RtxAoConfig {
+        rtx: RtxConfig::of(args.tracing.rt, args.run.extent(), capabilities)?,
+        passes,
+        rays,
+        radius,
+    };
     opening.progress.stage("uploading the scene and building acceleration structures", 0);
     let sample = RtxAo::new(&context, &scene, turning.as_ref(), &config)?;
     let sample = sample.from_camera(&scene, args.scene.camera as usize - 1);

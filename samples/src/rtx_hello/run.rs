@@ -26,9 +26,9 @@ pub fn run(args: &RtxHelloArgs) -> ExitCode {
 }
 
 fn open(args: &RtxHelloArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxHello>, RunError> {
-    let context = opening.device(&DeviceNeeds::default())?;
+    let context = opening.device(&DeviceNeeds::tracing(args.tracing.rt))?;
     let capabilities = context.capabilities();
-    let config = RtxConfig::of(&args.run, capabilities)?;
+    let config = RtxConfig::of(args.tracing.rt, args.run.extent(), capabilities)?;
     let sample = RtxHello::new(&context, &config)?;
     let scene = format!("{} triangles, each an instance of the same one", sample.triangle_count());
     let headline = headline(capabilities, config.path, "a compute shader", &scene);

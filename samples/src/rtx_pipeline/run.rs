@@ -30,10 +30,14 @@ fn open(args: &RtxPipelineArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxP
     args.scene.check_out(&args.run.out_or(NAME))?;
     let mut scene = args.scene.load(&mut opening.progress)?;
     opening.warn(&scene.warnings);
-    let context = opening.device(&DeviceNeeds { textures: textures_needed(&scene) })?;
+    let tracing = DeviceNeeds::tracing(args.tracing.rt);
+    let context = opening.device(&DeviceNeeds { textures: textures_needed(&scene), ..tracing })?;
     let capabilities = context.capabilities();
     opening.warn(&fit_textures(&mut scene, &capabilities.limits)?);
-    let config = RtxPipelineConfig { rtx: RtxConfig::of(&args.run, capabilities)?, depth: args.depth };
+    let config = RtxPipelineConfig {
+        rtx: RtxConfig::of(args.tracing.rt, args.run.extent(), capabilities)?,
+        depth: args.depth,
+    };
     opening.progress.stage("uploading the scene and building acceleration structures", 0);
     let sample = RtxPipeline::new(&context, &scene, &config)?;
     let sample = sample.from_camera(&scene, args.scene.camera as usize - 1);

@@ -2,6 +2,7 @@
 
 use clap::Parser;
 
+use crate::app::ray_args::RayArgs;
 use crate::app::run_args::RunArgs;
 use crate::app::scene_args::BuiltInSceneArgs;
 
@@ -12,6 +13,10 @@ pub struct RtxTexturesArgs {
     /// The built-in scene
     #[command(flatten)]
     pub scene: BuiltInSceneArgs,
+
+    /// By what rays are traced
+    #[command(flatten)]
+    pub tracing: RayArgs,
 
     /// Frames, pictures and device
     #[command(flatten)]

@@ -26,9 +26,9 @@ pub fn run(args: &RtxTexturesArgs) -> ExitCode {
 }
 
 fn open(args: &RtxTexturesArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxTextures>, RunError> {
-    let context = opening.device(&DeviceNeeds::default())?;
+    let context = opening.device(&DeviceNeeds::tracing(args.tracing.rt))?;
     let capabilities = context.capabilities();
-    let config = RtxConfig::of(&args.run, capabilities)?;
+    let config = RtxConfig::of(args.tracing.rt, args.run.extent(), capabilities)?;
     let sample = RtxTextures::new(&context, &config)?;
     let scene = format!("{} instances, {} textures", sample.instance_count(), sample.texture_count());
     let headline = headline(capabilities, config.path, "a compute shader", &scene);

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::app::frames::Frames;
-use crate::app::run_args::{MAX_SIZE, RayTracing};
+use crate::app::ray_args::RayTracing;
+use crate::app::run_args::MAX_SIZE;
 
 /// The paper's experiment.
 #[derive(Debug, Clone, PartialEq, Args)]

@@ -16,7 +16,7 @@ use super::tables;
 use super::trace_path::TracePath;
 use crate::app::interrupt::Interrupt;
 use crate::app::progress::Progress;
-use crate::app::run_args::RayTracing;
+use crate::app::ray_args::RayTracing;
 use crate::app::scene_list::{self, FOLDER_VARIABLE as VARIABLE};
 use crate::hybrid::{RayPath, fit_textures, textures_needed};
 use crate::scene::{ObjOptions, Scene};

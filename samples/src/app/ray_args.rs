@@ -1,0 +1,24 @@
+//! The part of the command line that all samples share that trace rays.
+
+use clap::{Args, ValueEnum};
+
+/// By what rays are traced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
+pub struct RayArgs {
+    /// How to trace rays
+    #[arg(long, value_enum, default_value_t = RayTracing::Auto, help_heading = "Rendering")]
+    pub rt: RayTracing,
+}
+
+/// How to trace rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum RayTracing {
+    /// A ray tracing pipeline where the device has one, else ray queries; on a CPU ray queries in software, the fastest.
+    Auto,
+    /// A ray tracing pipeline with shader binding table.
+    Pipeline,
+    /// Ray queries of the device in a compute shader; on devices that have none, see `software`.
+    Query,
+    /// Ray queries that the library walks in the shader itself, on any device.
+    Software,
+}

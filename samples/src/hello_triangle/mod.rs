@@ -1,0 +1,14 @@
+//! The `hello_triangle` sample: a turning triangle by the rasteriser, the smallest whole sample. `renderer.rs` is all of what
+//! it does with `lvk`.
+//!
+//! [`HelloTriangle`] is the sample for programs and tests, [`run`] the one for the command line.
+
+mod args;
+mod pipelines;
+mod renderer;
+mod run;
+
+pub use args::HelloTriangleArgs;
+pub use pipelines::pipelines;
+pub use renderer::HelloTriangle;
+pub use run::run;

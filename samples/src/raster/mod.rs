@@ -1,0 +1,12 @@
+//! What the samples share that only rasterise: a picture to draw on, pipelines as data, why a sample cannot render, and
+//! what their programs say.
+
+mod canvas;
+mod error;
+mod headline;
+mod pipeline;
+
+pub use canvas::Canvas;
+pub use error::RasterError;
+pub use headline::headline;
+pub use pipeline::{RasterPipeline, fragment_stage, vertex_stage};

@@ -1,0 +1,118 @@
+//! Pipelines as data, to be made, made again of shaders that have changed, and compiled by those who run nothing.
+
+use lvk::{
+    ColorTarget, Context, DepthTest, Format, Holder, RenderPipelineDesc, RenderPipelineHandle,
+    ShaderModuleHandle, ShaderStage,
+};
+
+use super::Canvas;
+use crate::pipelines::{SamplePipeline, SampleStage};
+
+/// A pipeline that draws on a [`Canvas`], or on targets of another kind.
+#[derive(Debug, Clone, Copy)]
+pub struct RasterPipeline {
+    /// The sample, whose folder of `shaders/` the stages lie in.
+    pub sample: &'static str,
+    /// For messages.
+    pub name: &'static str,
+    /// One for each part of the pipeline.
+    pub stages: &'static [SampleStage],
+    /// Formats of the colour targets.
+    pub color: &'static [Format],
+    /// Test against the depth target, if there is one.
+    pub depth: Option<DepthTest>,
+    /// Samples a pixel.
+    pub samples: u32,
+    /// As [`RenderPipelineDesc::view_mask`].
+    pub view_mask: u32,
+}
+
+impl RasterPipeline {
+    /// For a [`Canvas::flat`].
+    #[must_use]
+    pub const fn flat(sample: &'static str, name: &'static str, stages: &'static [SampleStage]) -> Self {
+        let samples = Canvas::SAMPLES;
+        Self { sample, name, stages, color: &[Canvas::COLOR], depth: None, samples, view_mask: 0 }
+    }
+
+    /// For a [`Canvas::with_depth`].
+    #[must_use]
+    pub const fn with_depth(
+        sample: &'static str,
+        name: &'static str,
+        stages: &'static [SampleStage],
+    ) -> Self {
+        Self { depth: Some(Canvas::NEAREST), ..Self::flat(sample, name, stages) }
+    }
+
+    /// The pipeline for those who compile it without running it.
+    #[must_use]
+    pub fn data(&self) -> SamplePipeline {
+        SamplePipeline {
+            name: self.name,
+            stages: self.stages.to_vec(),
+            color: self.color.to_vec(),
+            depth: self.depth.map(|depth| depth.format),
+        }
+    }
+
+    /// Compiles it.
+    ///
+    /// # Errors
+    /// Those of its shaders, and what Vulkan answers.
+    pub fn create(&self, ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
+        self.create_with(ctx, &RenderPipelineDesc::default())
+    }
+
+    /// The same with the state that `desc` has beside stages and targets: culling, topology, vertices and so on.
+    ///
+    /// # Errors
+    /// As [`create`](Self::create).
+    pub fn create_with(
+        &self,
+        ctx: &Context,
+        desc: &RenderPipelineDesc<'_>,
+    ) -> lvk::Result<Holder<RenderPipelineHandle>> {
+        let modules = self.stages.iter().map(|stage| stage.create(ctx, self.sample));
+        let modules = modules.collect::<lvk::Result<Vec<_>>>()?;
+        let color: Vec<_> = self.color.iter().copied().map(ColorTarget::from).collect();
+        let mut desc = RenderPipelineDesc {
+            color: &color,
+            depth: self.depth,
+            samples: self.samples,
+            view_mask: self.view_mask,
+            debug_name: self.name,
+            ..*desc
+        };
+        for (stage, module) in self.stages.iter().zip(&modules) {
+            *place(&mut desc, stage.stage) = Some(**module);
+        }
+        ctx.create_render_pipeline(&desc)
+    }
+}
+
+/// A vertex stage without macros, in the file of that name.
+#[must_use]
+pub const fn vertex_stage(text: &'static str, name: &'static str) -> SampleStage {
+    SampleStage { stage: ShaderStage::Vertex, text, defines: &[], name }
+}
+
+/// The same as a fragment stage.
+#[must_use]
+pub const fn fragment_stage(text: &'static str, name: &'static str) -> SampleStage {
+    SampleStage { stage: ShaderStage::Fragment, text, defines: &[], name }
+}
+
+/// Where a description has its module for a stage. A stage that does not rasterise takes the place of the vertex stage, where
+/// `lvk` refuses it by name.
+fn place<'a>(desc: &'a mut RenderPipelineDesc<'_>, stage: ShaderStage) -> &'a mut Option<ShaderModuleHandle> {
+    match stage {
+        ShaderStage::Task => &mut desc.task,
+        ShaderStage::Mesh => &mut desc.mesh,
+        ShaderStage::TessControl => &mut desc.tess_control,
+        ShaderStage::TessEval => &mut desc.tess_eval,
+        ShaderStage::Geometry => &mut desc.geometry,
+        ShaderStage::Fragment => &mut desc.fragment,
+        _ => &mut desc.vertex,
+    }
+}
