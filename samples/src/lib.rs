@@ -17,3 +17,4 @@ pub mod rtx_textures;
 pub mod scene;
 pub mod shader_folder;
 pub mod shaders;
+mod shapes;

@@ -24,7 +24,6 @@ mod error;
 mod frame;
 mod image_passes;
 mod layers;
-mod mesh;
 mod models;
 mod moving;
 mod paint;

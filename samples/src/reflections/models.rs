@@ -4,9 +4,9 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3};
 
-use super::mesh::Mesh;
 use super::world::{Model, material};
 use crate::scene::noise;
+use crate::shapes::Mesh;
 
 /// Texture coordinates of the floor repeat after this many scene units.
 const FLOOR_TILE: f32 = 4.0;

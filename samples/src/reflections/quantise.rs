@@ -3,8 +3,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, Vec2, Vec3};
 
-use super::mesh::Vertex;
 use crate::hybrid::half_float::half_bits;
+use crate::shapes::Vertex;
 
 /// What one stands for.
 const ONE: f32 = 32767.0;

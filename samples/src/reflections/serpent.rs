@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, Mat3A, Vec3, Vec3A};
 use lvk::transform_rows;
 
-use super::mesh::Mesh;
+use crate::shapes::Mesh;
 
 /// Bones of the chain, from the neck to the tip of the tail.
 pub(super) const BONE_COUNT: usize = 40;

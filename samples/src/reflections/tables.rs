@@ -10,11 +10,11 @@ use lvk::{
 };
 
 use super::layers::{Layer, farthest_first};
-use super::mesh::Mesh;
 use super::moving::Moving;
 use super::quantise::{Grid, PackedVertex};
 use super::world::{Material, Model, Placed, World};
 use crate::app::array_buffer::array;
+use crate::shapes::Mesh;
 
 /// `kNoTexture` in `shaders/reflections/frame.glsl`.
 const NO_TEXTURE: u32 = u32::MAX;

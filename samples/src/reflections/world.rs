@@ -4,10 +4,10 @@ use std::f32::consts::TAU;
 
 use glam::{Affine3A, Quat, Vec3};
 
-use super::mesh::Mesh;
 use super::models;
 use super::paint::Picture;
 use crate::scene::{Camera, Sky};
+use crate::shapes::Mesh;
 
 /// A surface.
 #[derive(Debug, Clone, Copy, PartialEq)]

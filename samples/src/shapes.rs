@@ -4,24 +4,24 @@ use glam::{Vec2, Vec3};
 
 /// A corner of triangles.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Vertex {
-    pub(super) position: Vec3,
+pub(crate) struct Vertex {
+    pub(crate) position: Vec3,
     /// Unit length, outwards.
-    pub(super) normal: Vec3,
-    pub(super) texcoord: Vec2,
+    pub(crate) normal: Vec3,
+    pub(crate) texcoord: Vec2,
 }
 
 /// Triangles of fewer than 65,536 vertices.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Mesh {
-    pub(super) vertices: Vec<Vertex>,
-    pub(super) triangles: Vec<[u16; 3]>,
+pub(crate) struct Mesh {
+    pub(crate) vertices: Vec<Vertex>,
+    pub(crate) triangles: Vec<[u16; 3]>,
 }
 
 impl Mesh {
     /// Adds a parallelogram from `corner` along `u` and `v`, seen from `u x v`. Texture coordinates are those of the
     /// plane that it lies in, one unit of them being `texture_extent` units of length.
-    pub(super) fn quad(mut self, corner: Vec3, u: Vec3, v: Vec3, texture_extent: f32) -> Self {
+    pub(crate) fn quad(mut self, corner: Vec3, u: Vec3, v: Vec3, texture_extent: f32) -> Self {
         let normal = u.cross(v).normalize();
         let base = self.vertices.len() as u16;
         for position in [corner, corner + u, corner + v, corner + u + v] {
@@ -37,7 +37,7 @@ impl Mesh {
     }
 
     /// Adds a box.
-    pub(super) fn cuboid(mut self, low: [f32; 3], high: [f32; 3], texture_extent: f32) -> Self {
+    pub(crate) fn cuboid(mut self, low: [f32; 3], high: [f32; 3], texture_extent: f32) -> Self {
         let (low, high) = (Vec3::from(low), Vec3::from(high));
         let size = high - low;
         let [x, y, z] = [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z];
@@ -51,7 +51,7 @@ impl Mesh {
 
     /// Adds a surface of `columns` times `rows` cells through `point`, which takes coordinates from 0 to 1. Normals
     /// follow from neighbouring points, on the side of the derivative along the second times that along the first.
-    pub(super) fn grid(mut self, columns: u16, rows: u16, point: impl Fn(f32, f32) -> Vec3) -> Self {
+    pub(crate) fn grid(mut self, columns: u16, rows: u16, point: impl Fn(f32, f32) -> Vec3) -> Self {
         const STEP: f32 = 1e-3;
         let base = self.vertices.len() as u16;
         for row in 0..=rows {
@@ -77,7 +77,7 @@ impl Mesh {
     }
 
     /// Adds a body of revolution about the y axis. `profile` lists radii and heights upwards; corners stay sharp.
-    pub(super) fn lathe(mut self, profile: &[[f32; 2]], segments: u16) -> Self {
+    pub(crate) fn lathe(mut self, profile: &[[f32; 2]], segments: u16) -> Self {
         for pair in profile.windows(2) {
             let ([r0, y0], [r1, y1]) = (pair[0], pair[1]);
             self = self.grid(segments, 1, |u, v| {
@@ -90,7 +90,7 @@ impl Mesh {
     }
 
     /// Adds a sphere, or an ellipsoid of the radii `size`.
-    pub(super) fn ball(self, centre: Vec3, size: Vec3, segments: u16) -> Self {
+    pub(crate) fn ball(self, centre: Vec3, size: Vec3, segments: u16) -> Self {
         self.grid(segments, segments / 2, |u, v| {
             let (sine, cosine) = (u * std::f32::consts::TAU).sin_cos();
             let (ring, height) = (v * std::f32::consts::PI).sin_cos();
@@ -99,7 +99,7 @@ impl Mesh {
     }
 
     /// The smallest and the largest coordinates.
-    pub(super) fn bounds(&self) -> (Vec3, Vec3) {
+    pub(crate) fn bounds(&self) -> (Vec3, Vec3) {
         let start = (Vec3::splat(f32::INFINITY), Vec3::splat(f32::NEG_INFINITY));
         self.vertices.iter().fold(start, |(low, high), v| (low.min(v.position), high.max(v.position)))
     }
