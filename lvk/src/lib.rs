@@ -45,6 +45,7 @@
 //! | move data | [`manual::queues_and_uploads`], [`Context::upload_buffer`], [`Context::download_texture`], [`Readback`] and their kin |
 //! | record | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
 //! | draw | [`CommandBuffer::begin_rendering`], [`RenderPass`] |
+//! | read targets in their own pass | [`RenderPassDesc::local_read`], [`TextureUsage::INPUT`], [`RenderPass::read_targets`] |
 //! | draw with task and mesh shaders | [`RenderPipelineDesc::mesh`], [`RenderPass::draw_mesh_tasks`] |
 //! | show pictures in windows | [`manual::windows`], [`Context::create_swapchain`], [`Context::present`] |
 //! | compute | [`CommandBuffer::dispatch`] |

@@ -281,7 +281,6 @@ impl Use {
 /// Uses by render passes beyond plain targets, and by windows.
 impl Use {
     /// Attachment that fragment shaders of the same pass read; merges with a target in the same layout.
-    #[cfg_attr(not(test), expect(dead_code, reason = "waits for the command that makes it"))]
     pub(crate) const fn local_read() -> Self {
         Self::new(Stages::FRAGMENT, Access::INPUT_READ, Layout::LocalRead)
     }

@@ -1,9 +1,12 @@
-//! The binding numbers of the one descriptor set, for Rust and for GLSL.
+//! The binding numbers of the bindless descriptor set, for Rust and for GLSL.
 //!
 //! The shader preamble and the check of foreign SPIR-V are both generated from these constants.
 
 /// The descriptor set that holds everything.
 pub(crate) const SET: u32 = 0;
+/// The set of the pass's own targets as fragment shaders read them; its bindings are
+/// [`Input`](super::inputs::Input)s.
+pub(crate) const INPUT_SET: u32 = 1;
 /// Sampled images: every texture, seen as 2D, array, 3D or cube through aliased declarations.
 pub(crate) const SAMPLED_IMAGES: u32 = 0;
 /// Samplers, with and without depth comparison.

@@ -2,6 +2,7 @@
 
 mod array;
 pub(crate) mod checks;
+pub(crate) mod inputs;
 pub(crate) mod layout;
 pub(crate) mod slots;
 pub(crate) mod table;

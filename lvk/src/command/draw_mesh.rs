@@ -16,7 +16,8 @@ impl RenderPass<'_> {
     /// [`InvalidUsage`](crate::Error::InvalidUsage) unless a pipeline with a mesh shader is bound, with its push
     /// constants; [`LimitExceeded`](crate::Error::LimitExceeded) for more groups than [`MeshLimits`] allows.
     pub fn draw_mesh_tasks(&mut self, groups: [u32; 3]) -> Result<()> {
-        let pipeline = self.ready_mesh()?;
+        self.ready_mesh()?;
+        let pipeline = self.bound("draw_mesh_tasks")?;
         check_groups(&pipeline.name, groups, pipeline.front_end, &self.cmd.shared.gpu.caps.limits.mesh)?;
         let (ext, [x, y, z]) = (self.cmd.shared.gpu.mesh()?, groups);
         // SAFETY: a mesh pipeline is bound with its push constants, and the counts are within the limits.

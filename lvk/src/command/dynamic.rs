@@ -86,6 +86,9 @@ impl RenderPass<'_> {
         if state.write && self.targets.read_only_depth {
             return Err(Error::usage(&*pipeline.name, WRITES_READ_ONLY));
         }
+        if state.write {
+            self.write_depth()?;
+        }
         let values = Values { depth: Some(state), ..Default::default() };
         self.dynamic.held.depth = values.depth;
         self.set(&values);

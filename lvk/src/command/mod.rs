@@ -15,6 +15,7 @@ pub(crate) mod gpu_build;
 mod instances;
 mod kernel;
 mod label;
+mod local_read;
 mod part_uses;
 mod pass_area;
 mod present;

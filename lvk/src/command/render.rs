@@ -9,6 +9,7 @@ use super::CommandBuffer;
 use super::bind::words;
 use super::compute::check_arguments;
 use super::dynamic::{DynamicState, WRITES_READ_ONLY};
+use super::local_read::TargetHazards;
 use super::pass_area::PassArea;
 use super::targets::Targets;
 use crate::barrier::Use;
@@ -38,7 +39,8 @@ pub struct RenderPass<'a> {
     pub(super) labelled: bool,
     /// Labels open around the pass.
     pub(super) labels_outside: u32,
-    pipeline: Option<Arc<RenderPipeline>>,
+    pub(super) hazards: TargetHazards,
+    pub(super) pipeline: Option<Arc<RenderPipeline>>,
     draws: Option<DrawNeeds>,
     indices: Option<BoundIndices>,
     vertex_slots: u32,
@@ -77,6 +79,7 @@ impl<'a> RenderPass<'a> {
             dynamic: DynamicState::default(),
             labelled,
             labels_outside,
+            hazards: TargetHazards::default(),
             pipeline: None,
             draws: None,
             indices: None,
@@ -105,12 +108,14 @@ impl<'a> RenderPass<'a> {
         if targets.read_only_depth && writes {
             return Err(Error::usage(&*pipeline.name, WRITES_READ_ONLY));
         }
+        targets.inputs.check_reads(&pipeline)?;
         if !pipeline.query_stages.is_empty() {
             self.cmd.use_structures(pipeline.query_stages);
             let remedy =
                 "create the pipeline before the pass begins, or list a structure in the pass's dependencies";
             self.track_inside("what the pipeline's ray queries see", &pipeline.name, remedy)?;
         }
+        self.order_targets(&pipeline);
         let point = vk::PipelineBindPoint::GRAPHICS;
         self.cmd.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
         self.draws = DrawNeeds::of(&pipeline);
@@ -322,7 +327,8 @@ impl<'a> RenderPass<'a> {
     }
 
     /// Fails unless a pipeline with a vertex shader is bound with all it reads.
-    pub(super) fn check_draw(&self) -> Result<()> {
+    pub(super) fn check_draw(&mut self) -> Result<()> {
+        self.hazards.drawn = true;
         match &self.draws {
             Some(needs)
                 if self.vertex_slots & needs.vertex_slots == needs.vertex_slots
@@ -350,15 +356,15 @@ impl<'a> RenderPass<'a> {
         self.cmd.check_pushed(&pipeline.name, pipeline.push_constant_bytes)
     }
 
-    /// The bound pipeline, which has a mesh shader and all it reads.
-    pub(super) fn ready_mesh(&self) -> Result<&RenderPipeline> {
+    /// Fails unless a pipeline with a mesh shader is bound with all it reads.
+    pub(super) fn ready_mesh(&mut self) -> Result<()> {
+        self.hazards.drawn = true;
         let pipeline = self.bound("draw_mesh_tasks")?;
         if pipeline.front_end == FrontEnd::Vertex {
             let message = "it has no mesh shader; draw with draw, draw_indexed or their indirect forms";
             return Err(Error::usage(&*pipeline.name, message));
         }
-        self.cmd.check_pushed(&pipeline.name, pipeline.push_constant_bytes)?;
-        Ok(pipeline)
+        self.cmd.check_pushed(&pipeline.name, pipeline.push_constant_bytes)
     }
 
     pub(super) fn bound(&self, call: &str) -> Result<&RenderPipeline> {

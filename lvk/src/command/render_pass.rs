@@ -38,6 +38,10 @@ pub struct RenderPassDesc<'a> {
     pub view_mask: u32,
     /// The pixels that are loaded, cleared, drawn and stored: x, y, width and height. `None` for all.
     pub area: Option<[u32; 4]>,
+    /// Fragment shaders read those targets that have [`TextureUsage::INPUT`](crate::TextureUsage::INPUT), each at its own
+    /// pixel: what earlier draws of the pass have put there (`LVK_INPUT`, `LVK_DEPTH_INPUT`, `LVK_STENCIL_INPUT` and
+    /// `subpassLoad`). Needs [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
+    pub local_read: bool,
     /// What the pass's shaders reach bindlessly, and what its draws read that was written earlier in the same command
     /// buffer: no barrier can be placed inside a pass. Acceleration structures need not be listed.
     pub dependencies: Dependencies<'a>,
@@ -52,7 +56,8 @@ impl CommandBuffer {
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for targets that do not go together, do not exist, or are named twice;
     /// [`LimitExceeded`](Error::LimitExceeded) for too many colours, layers or views; [`Unsupported`](Error::Unsupported)
-    /// for views without [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview).
+    /// for views without [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview), and for local reads without
+    /// [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
     pub fn begin_rendering(&mut self, desc: &RenderPassDesc<'_>) -> Result<RenderPass<'_>> {
         let mut targets = None;
         self.flush_after(|cmd| {
@@ -64,6 +69,7 @@ impl CommandBuffer {
         let Some(targets) = targets else {
             return Err(Error::usage("begin_rendering", "the pass has no targets"));
         };
+        self.bind_inputs(&targets)?;
         if !desc.debug_name.is_empty() {
             self.push_label(desc.debug_name);
         }

@@ -6,6 +6,7 @@ use ash::vk;
 
 use super::CommandBuffer;
 use super::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, Resolve, StencilLoad};
+use super::local_read::PassInputs;
 use super::pass_area::{PassArea, PassLayers};
 use super::render_pass::RenderPassDesc;
 use crate::barrier::{Subresources, Use};
@@ -24,6 +25,7 @@ pub(super) struct Targets {
     pub(super) layers: PassLayers,
     pub(super) shape: PassShape,
     pub(super) read_only_depth: bool,
+    pub(super) inputs: PassInputs,
     pub(super) colors: Vec<vk::RenderingAttachmentInfo<'static>>,
     pub(super) depth: Option<vk::RenderingAttachmentInfo<'static>>,
     pub(super) stencil: Option<vk::RenderingAttachmentInfo<'static>>,
@@ -43,6 +45,11 @@ impl Target {
             false => self.texture.target_view(self.mip, self.layer),
             true => self.texture.layered_target_view(self.mip, self.layer, self.layers.count()),
         }
+    }
+
+    /// One aspect of what the pass draws to.
+    pub(super) fn input_view(&self, aspect: vk::ImageAspectFlags) -> Result<vk::ImageView> {
+        self.texture.input_view(self.part(), self.layers.is_layered(), aspect)
     }
 
     /// Mip and layers, or slices.
@@ -69,6 +76,7 @@ impl CommandBuffer {
         let limit = gpu.caps.limits.max_color_targets;
         check_limit("begin_rendering", "colour target count", desc.color.len() as u64, limit.into())?;
         let layers = PassLayers::of(gpu, desc)?;
+        let mut inputs = PassInputs::of(gpu, desc)?;
         let mut size = None;
         let (mut colors, mut formats) = (Vec::new(), Vec::new());
         let mut drawn = Vec::with_capacity(desc.color.len());
@@ -80,12 +88,10 @@ impl CommandBuffer {
                 target.texture.check_kept()?;
             }
             check_apart(&target, &mut drawn)?;
-            self.use_texture(
-                &target.texture,
-                target.part(),
-                Use::color_target(attachment.load == ColorLoad::Load),
-            )?;
-            let mut info = color_info(&target, attachment)?;
+            let used = inputs.target_use(&target, Use::color_target(attachment.load == ColorLoad::Load));
+            self.use_texture(&target.texture, target.part(), used)?;
+            inputs.add_color(colors.len() as u32, &target)?;
+            let mut info = color_info(&target, attachment, used)?;
             if let Some(Resolve { texture, mip, layer }) = attachment.resolve {
                 let to = self.target(texture, mip, layer, layers, &mut None)?;
                 info = self.use_color_resolve(&target, &to, info)?;
@@ -100,6 +106,7 @@ impl CommandBuffer {
             layers,
             shape: PassShape::default(),
             read_only_depth: false,
+            inputs,
             colors,
             depth: None,
             stencil: None,
@@ -116,6 +123,7 @@ impl CommandBuffer {
         targets.extent = extent;
         targets.shape = PassShape::new(formats, depth_format, samples, desc.view_mask);
         targets.area = PassArea::of(desc.area, extent)?;
+        targets.inputs.check(desc)?;
         Ok(targets)
     }
 
@@ -130,11 +138,14 @@ impl CommandBuffer {
         if is_kept(texture, attachment) {
             texture.check_kept()?;
         }
-        let next = if attachment.read_only { Use::depth_read() } else { Use::depth_target() };
-        self.use_texture(texture, target.part(), next)?;
+        let plain = if attachment.read_only { Use::depth_read() } else { Use::depth_target() };
+        let used = targets.inputs.target_use(target, plain);
+        self.use_texture(texture, target.part(), used)?;
+        targets.inputs.add_depth(target)?;
         let view = target.view()?;
-        targets.depth = Some(depth_info(view, attachment));
-        targets.stencil = texture.format.has_stencil().then(|| stencil_info(view, attachment));
+        targets.depth = Some(depth_info(view, attachment).image_layout(layout(used.layout)));
+        let stencil = || stencil_info(view, attachment).image_layout(layout(used.layout));
+        targets.stencil = texture.format.has_stencil().then(stencil);
         targets.read_only_depth = attachment.read_only;
         let Some(resolve) = &attachment.resolve else { return Ok(()) };
         let to = self.target(resolve.texture, resolve.mip, resolve.layer, target.layers, &mut None)?;
@@ -226,7 +237,11 @@ fn check_depth(texture: &Texture, attachment: &DepthAttachment) -> Result<()> {
     }
 }
 
-fn color_info(target: &Target, attachment: &ColorAttachment) -> Result<vk::RenderingAttachmentInfo<'static>> {
+fn color_info(
+    target: &Target,
+    attachment: &ColorAttachment,
+    used: Use,
+) -> Result<vk::RenderingAttachmentInfo<'static>> {
     let (op, color) = match attachment.load {
         ColorLoad::Load => (vk::AttachmentLoadOp::LOAD, vk::ClearColorValue::default()),
         ColorLoad::DontCare => (vk::AttachmentLoadOp::DONT_CARE, vk::ClearColorValue::default()),
@@ -236,7 +251,7 @@ fn color_info(target: &Target, attachment: &ColorAttachment) -> Result<vk::Rende
     };
     Ok(vk::RenderingAttachmentInfo::default()
         .image_view(target.view()?)
-        .image_layout(layout(Use::color_target(false).layout))
+        .image_layout(layout(used.layout))
         .load_op(op)
         .store_op(store_op(attachment.store))
         .clear_value(vk::ClearValue { color }))
@@ -271,11 +286,8 @@ fn aspect_info(
     attachment: &DepthAttachment,
     store: bool,
 ) -> vk::RenderingAttachmentInfo<'static> {
-    let (used, store) = match attachment.read_only {
-        true => (Use::depth_read(), vk::AttachmentStoreOp::NONE),
-        false => (Use::depth_target(), store_op(store)),
-    };
-    vk::RenderingAttachmentInfo::default().image_view(view).image_layout(layout(used.layout)).store_op(store)
+    let store = if attachment.read_only { vk::AttachmentStoreOp::NONE } else { store_op(store) };
+    vk::RenderingAttachmentInfo::default().image_view(view).store_op(store)
 }
 
 fn store_op(store: bool) -> vk::AttachmentStoreOp {

@@ -121,6 +121,9 @@ impl Capabilities {
         self.precise_occlusion = self.has(OptionalFeature::OcclusionQueryPrecise);
         self.pipeline_statistics = self.has(OptionalFeature::PipelineStatisticsQuery);
         self.calibrated_timestamps = self.has(OptionalFeature::CalibratedTimestamps);
+        if !self.has(OptionalFeature::LocalRead) {
+            self.limits.max_input_attachments = 0;
+        }
         if !self.has(OptionalFeature::SamplerAnisotropy) {
             self.max_anisotropy = 1.0;
         }
@@ -198,6 +201,10 @@ pub struct Limits {
     pub max_push_constant_bytes: u32,
     /// Most colour targets of a render pass (`maxColorAttachments`).
     pub max_color_targets: u32,
+    /// Targets of a pass that its own fragment shaders can read: of these, depth is the first, and colour targets follow in
+    /// their order; stencil is the tenth (`maxPerStageDescriptorInputAttachments`). 0 without
+    /// [`OptionalFeature::LocalRead`].
+    pub max_input_attachments: u32,
     /// Most layers of a render pass (`maxFramebufferLayers`).
     pub max_target_layers: u32,
     /// Most views of a render pass that draws several at once (`maxMultiviewViewCount`).
@@ -504,6 +511,10 @@ fn limits(
         max_storage_buffer_range: plain.max_storage_buffer_range.into(),
         max_push_constant_bytes: plain.max_push_constants_size,
         max_color_targets: plain.max_color_attachments.min(8),
+        max_input_attachments: plain
+            .max_per_stage_descriptor_input_attachments
+            .min(plain.max_descriptor_set_input_attachments)
+            .min(10),
         max_target_layers: plain.max_framebuffer_layers,
         max_views: 0,
         depth_resolve: DepthResolveLimits {
@@ -569,7 +580,8 @@ fn size_bindless(
         .min(v12.max_descriptor_set_update_after_bind_samplers);
     let left = v12
         .max_per_stage_update_after_bind_resources
-        .saturating_sub(limits.max_bindless_tlas + limits.max_bindless_samplers + limits.max_color_targets);
+        .saturating_sub(limits.max_bindless_tlas + limits.max_bindless_samplers + limits.max_color_targets)
+        .saturating_sub(limits.max_input_attachments);
     limits.max_bindless_textures = v12
         .max_per_stage_descriptor_update_after_bind_sampled_images
         .min(v12.max_descriptor_set_update_after_bind_sampled_images)

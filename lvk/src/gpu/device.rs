@@ -54,6 +54,7 @@ pub(crate) struct Gpu {
     pub(crate) accel: Option<ash::khr::acceleration_structure::Device>,
     pub(crate) ray_tracing: Option<ash::khr::ray_tracing_pipeline::Device>,
     pub(crate) mesh: Option<ash::ext::mesh_shader::Device>,
+    pub(crate) local_read: Option<ash::khr::dynamic_rendering_local_read::Device>,
     /// Reads the clocks of device and host together.
     pub(crate) host_clock: Option<HostClock>,
     /// Samplers alive with a border colour of their own, of which a device has few.
@@ -144,6 +145,9 @@ impl Gpu {
                 .ray_tracing_pipeline
                 .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
             mesh: caps.mesh_shader.then(|| ash::ext::mesh_shader::Device::new(raw, &device)),
+            local_read: caps
+                .has(OptionalFeature::LocalRead)
+                .then(|| ash::khr::dynamic_rendering_local_read::Device::new(raw, &device)),
             host_clock: HostClock::new(&instance, &device, physical, features.calibration),
             windows: WindowFunctions::new(&instance, &device, |feature| caps.has(feature)),
             debug_utils: naming::is_wanted(&instance, physical, debug_names)

@@ -4,16 +4,18 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::blend::{Blend, blend_state};
+use super::blend::{Blend, ColorWrites, blend_state};
 use super::depth_stencil::{DepthState, DepthTest, depth_stencil_state};
 use super::graphics_check::{check, check_stages};
-use super::graphics_desc::{RenderPipelineDesc, VertexAttribute};
+use super::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute};
 use super::layout::PipelineBase;
+use super::local_read::{InputIndices, reads, writes, writes_color};
 use super::raster::{DepthBias, multisampling, rasterization};
 use super::shader_module::ShaderModule;
 use super::shape::PassShape;
 use super::stage::{Specialization, stage};
 use crate::barrier::Stages;
+use crate::bindless::inputs::InputMask;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::handle::ShaderModuleHandle;
@@ -125,6 +127,10 @@ pub(crate) struct RenderPipeline {
     /// Stencil values may change.
     pub(crate) writes_stencil: bool,
     pub(crate) vertex_binding_count: u32,
+    /// Targets that the fragment shader reads.
+    pub(crate) reads: InputMask,
+    /// Targets that draws may change.
+    pub(crate) writes: InputMask,
     pub(crate) name: Arc<str>,
     gpu: Arc<Gpu>,
 }
@@ -155,6 +161,8 @@ impl RenderPipeline {
             pass_state: PassState::of(desc),
             writes_stencil: desc.stencil.is_some_and(|test| test.writes()),
             vertex_binding_count: desc.vertex_bindings.len() as u32,
+            reads: reads(&modules),
+            writes: writes(desc, &modules),
             name: desc.debug_name.into(),
             gpu: Arc::clone(gpu),
         })
@@ -188,13 +196,15 @@ fn create(
     let raster = rasterization(desc);
     let samples = multisampling(desc);
     let depth = depth_stencil_state(desc.depth, desc.stencil);
-    let blends: Vec<_> = desc.color.iter().map(|target| blend_state(target.blend, target.write)).collect();
+    let blends = blend_states(desc, modules);
     let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
     let dynamic = PassState::of(desc).dynamic_states();
     let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
     let colors: Vec<_> = desc.color.iter().map(|target| target.format.raw()).collect();
     let mut rendering = rendering_info(&colors, desc);
-    let info = vk::GraphicsPipelineCreateInfo::default()
+    let indices = InputIndices::new(colors.len() as u32, gpu.caps.limits.max_input_attachments);
+    let mut indices = indices.raw();
+    let mut info = vk::GraphicsPipelineCreateInfo::default()
         .stages(&stages)
         .vertex_input_state(&input)
         .input_assembly_state(&assembly)
@@ -207,6 +217,9 @@ fn create(
         .dynamic_state(&dynamic)
         .layout(base.layout)
         .push_next(&mut rendering);
+    if !reads(modules).is_empty() {
+        info = info.push_next(&mut indices);
+    }
     // SAFETY: the modules and the layout are alive; everything `info` points to lives until the call returns.
     let made = unsafe { gpu.device.create_graphics_pipelines(base.cache, &[info], None) };
     Ok(made.map_err(|(_, result)| Error::vulkan("vkCreateGraphicsPipelines")(result))?[0])
@@ -235,6 +248,18 @@ fn vertex_attributes(desc: &RenderPipelineDesc<'_>) -> Vec<vk::VertexInputAttrib
         offset: attribute.offset,
     };
     desc.vertex_attributes.iter().map(raw).collect()
+}
+
+/// Targets that the shader puts nothing out for are left alone.
+fn blend_states(
+    desc: &RenderPipelineDesc<'_>,
+    modules: &RenderModules,
+) -> Vec<vk::PipelineColorBlendAttachmentState> {
+    let write = |place, target: &ColorTarget| {
+        if writes_color(modules, place, target) { target.write } else { ColorWrites::empty() }
+    };
+    let targets = (0..).zip(desc.color);
+    targets.map(|(place, target)| blend_state(target.blend, write(place, target))).collect()
 }
 
 fn rendering_info<'a>(

@@ -5,6 +5,7 @@ use ash::vk;
 use super::graphics::RenderModules;
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
 use super::group_size::{GroupLimits, check_group_size};
+use super::local_read::check_inputs;
 use super::raster::Topology;
 use super::state_check::check_state;
 use crate::error::{Error, Result, check_limit};
@@ -86,6 +87,7 @@ pub(super) fn check(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderMo
     check_state(gpu, desc, modules)?;
     check_mesh(gpu, desc, modules)?;
     check_geometry(desc, modules)?;
+    check_inputs(desc, modules)?;
     check_vertex_input(name, desc)?;
     check_vertex_formats(gpu, desc)?;
     match &modules.vertex {

@@ -100,7 +100,7 @@ pub struct RenderPipelineDesc<'a> {
     pub vertex_bindings: &'a [VertexBinding],
     /// Attributes read from the vertex buffers.
     pub vertex_attributes: &'a [VertexAttribute],
-    /// Colour targets, in the order of the shader's outputs.
+    /// Colour targets, in the order of the shader's outputs. Those it has no output for are left as they are.
     pub color: &'a [ColorTarget],
     /// Depth test; `None` draws without depth.
     pub depth: Option<DepthTest>,

@@ -1,12 +1,13 @@
-//! The one pipeline layout: the bindless set, and push constants for every stage.
+//! The one pipeline layout: the bindless set, the set of a pass's own targets, and push constants for every stage.
 //!
-//! Because all pipelines share it, the set is bound once for each bind point of a command buffer, and push constants
+//! Because all pipelines share it, the bindless set is bound once for each bind point of a command buffer, and push constants
 //! survive a change of pipeline.
 
 use std::sync::Arc;
 
 use ash::vk;
 
+use crate::bindless::inputs::InputLayout;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
@@ -22,6 +23,8 @@ pub(crate) struct PipelineBase {
 pub(crate) struct PipelineLayout {
     pub(crate) raw: vk::PipelineLayout,
     pub(crate) push_constant_bytes: u32,
+    /// Of the second set; none on devices whose shaders cannot read what their pass draws.
+    pub(crate) inputs: Option<InputLayout>,
     gpu: Arc<Gpu>,
 }
 
@@ -31,14 +34,15 @@ impl PipelineLayout {
 
     pub(crate) fn new(gpu: &Arc<Gpu>, set: vk::DescriptorSetLayout) -> Result<Self> {
         let bytes = gpu.caps.limits.max_push_constant_bytes.min(Self::MAX_PUSH_CONSTANT_BYTES);
-        let sets = [set];
+        let inputs = InputLayout::new(gpu)?;
+        let sets: Vec<_> = [set].into_iter().chain(inputs.as_ref().map(|inputs| inputs.raw)).collect();
         let ranges =
             [vk::PushConstantRange { stage_flags: vk::ShaderStageFlags::ALL, offset: 0, size: bytes }];
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&ranges);
-        // SAFETY: the set layout is alive and the range is within the limit.
+        // SAFETY: the set layouts are alive and the range is within the limit.
         let raw = unsafe { gpu.device.create_pipeline_layout(&info, None) }
             .map_err(Error::vulkan("vkCreatePipelineLayout"))?;
-        Ok(Self { raw, push_constant_bytes: bytes, gpu: Arc::clone(gpu) })
+        Ok(Self { raw, push_constant_bytes: bytes, inputs, gpu: Arc::clone(gpu) })
     }
 }
 

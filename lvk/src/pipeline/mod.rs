@@ -13,6 +13,7 @@ mod group_size;
 mod groups;
 pub(crate) mod layout;
 pub(crate) mod library;
+pub(crate) mod local_read;
 pub(crate) mod raster;
 pub(crate) mod ray_tracing;
 mod sbt;

@@ -6,7 +6,7 @@ use ash::vk;
 
 use crate::bindless::Bindless;
 use crate::bindless::checks::CheckPlan;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::shader::{CompileOptions, Reflection, ShaderCache, ShaderModuleDesc, ShaderStage};
 use crate::shader::{check_capabilities, check_stage, compile, reflect, with_checked_indices};
@@ -35,6 +35,10 @@ impl ShaderModule {
         check_features(gpu, desc.debug_name, &reflection)?;
         let extra = &gpu.extra_capabilities;
         check_capabilities(desc.debug_name, desc.stage, &reflection, &gpu.features, extra)?;
+        if let Some(last) = reflection.input_reads.last() {
+            let (what, limit) = ("place of an input attachment", gpu.caps.limits.max_input_attachments);
+            check_limit(desc.debug_name, what, u64::from(last.input.place()) + 1, limit.into())?;
+        }
         if reflection.push_constant_bytes > max_push_bytes {
             return Err(Error::LimitExceeded {
                 object: desc.debug_name.to_owned(),

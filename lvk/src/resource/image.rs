@@ -226,6 +226,7 @@ pub(crate) fn raw_usage(usage: TextureUsage, format: Format) -> vk::ImageUsageFl
         (TextureUsage::SAMPLED, vk::ImageUsageFlags::SAMPLED),
         (TextureUsage::STORAGE, vk::ImageUsageFlags::STORAGE),
         (TextureUsage::TARGET, target),
+        (TextureUsage::INPUT, vk::ImageUsageFlags::INPUT_ATTACHMENT),
     ];
     let none = vk::ImageUsageFlags::empty();
     pairs.iter().filter(|(bit, _)| usage.contains(*bit)).fold(none, |all, (_, raw)| all | *raw)
@@ -234,10 +235,12 @@ pub(crate) fn raw_usage(usage: TextureUsage, format: Format) -> vk::ImageUsageFl
 /// What a format with these features can be used for.
 pub(crate) fn usage_of(features: vk::FormatFeatureFlags) -> TextureUsage {
     use vk::FormatFeatureFlags as Features;
+    let attachment = Features::COLOR_ATTACHMENT | Features::DEPTH_STENCIL_ATTACHMENT;
     let pairs = [
         (TextureUsage::SAMPLED, Features::SAMPLED_IMAGE),
         (TextureUsage::STORAGE, Features::STORAGE_IMAGE),
-        (TextureUsage::TARGET, Features::COLOR_ATTACHMENT | Features::DEPTH_STENCIL_ATTACHMENT),
+        (TextureUsage::TARGET, attachment),
+        (TextureUsage::INPUT, attachment),
     ];
     pairs.iter().filter(|(_, any)| features.intersects(*any)).map(|(usage, _)| *usage).collect()
 }

@@ -8,6 +8,7 @@ use super::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage}
 use crate::error::{Error, Result, check_limit};
 use crate::format::Format;
 use crate::gpu::Gpu;
+use crate::gpu::optional::OptionalFeature;
 
 /// What follows from a description that the device can make an image of.
 pub(crate) struct ImagePlan {
@@ -48,6 +49,7 @@ fn check_shape(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<u32> {
     check_samples(desc)?;
     check_yuv(desc)?;
     check_transient(desc)?;
+    check_input(gpu, desc)?;
     let full = 32 - width.max(height).max(depth).leading_zeros();
     if desc.mips > full {
         let message =
@@ -81,12 +83,35 @@ fn check_samples(desc: &TextureDesc<'_>) -> Result<()> {
 
 /// Fails where a texture that lives in passes only is anything but a target.
 fn check_transient(desc: &TextureDesc<'_>) -> Result<()> {
-    let target = desc.usage == TextureUsage::TARGET && desc.data.is_none();
+    let target = desc.usage - TextureUsage::INPUT == TextureUsage::TARGET && desc.data.is_none();
     if desc.memory == TextureMemory::Device || target {
         return Ok(());
     }
-    let message = "a transient texture has the usage TARGET and no other, and takes no data";
+    let message =
+        "a transient texture has the usage TARGET, or TARGET and INPUT, and no other, and takes no data";
     Err(Error::usage(desc.debug_name, message))
+}
+
+/// Fails where fragment shaders could not read the target in its own pass.
+fn check_input(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<()> {
+    let name = desc.debug_name;
+    if !desc.usage.contains(TextureUsage::INPUT) {
+        return Ok(());
+    }
+    gpu.require(OptionalFeature::LocalRead, &format!("the usage INPUT of texture '{name}'"))?;
+    if !desc.usage.contains(TextureUsage::TARGET) {
+        return Err(Error::usage(
+            name,
+            "INPUT is for what a pass draws to; give the texture the usage TARGET too",
+        ));
+    }
+    if desc.kind.is_3d() {
+        return Err(Error::usage(
+            name,
+            "slices of a volume cannot be read in their own pass; take a D2Array",
+        ));
+    }
+    Ok(())
 }
 
 /// Fails where a texture in Y'CbCr is anything but a plain picture.

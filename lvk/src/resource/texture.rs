@@ -114,13 +114,37 @@ impl Texture {
 
     /// The view a render pass draws to: a mip of a layer, or of a slice.
     pub(crate) fn target_view(&self, mip: u32, layer: u32) -> Result<vk::ImageView> {
-        self.raw_view(self.part(mip, layer), vk::ImageViewType::TYPE_2D, TextureUsage::TARGET)
+        self.raw_view(self.part(mip, layer), vk::ImageViewType::TYPE_2D, self.target_usage())
     }
 
     /// The view a render pass draws several layers or slices to.
     pub(crate) fn layered_target_view(&self, mip: u32, layer: u32, count: u32) -> Result<vk::ImageView> {
         let range = Subresources { layer_count: count, ..self.part(mip, layer) };
-        self.raw_view(range, vk::ImageViewType::TYPE_2D_ARRAY, TextureUsage::TARGET)
+        self.raw_view(range, vk::ImageViewType::TYPE_2D_ARRAY, self.target_usage())
+    }
+
+    /// One view serves both as a target and as what shaders read of it.
+    fn target_usage(&self) -> TextureUsage {
+        TextureUsage::TARGET | (self.usage & TextureUsage::INPUT)
+    }
+
+    /// The view that fragment shaders of a pass read, which draws to it: one aspect.
+    pub(crate) fn input_view(
+        &self,
+        part: Subresources,
+        layered: bool,
+        aspect: vk::ImageAspectFlags,
+    ) -> Result<vk::ImageView> {
+        let info = ViewInfo {
+            kind: if layered { vk::ImageViewType::TYPE_2D_ARRAY } else { vk::ImageViewType::TYPE_2D },
+            format: self.format,
+            aspect,
+            conversion: vk::SamplerYcbcrConversion::null(),
+            range: part,
+            swizzle: Swizzle::IDENTITY,
+            usage: raw_usage(self.target_usage(), self.format),
+        };
+        self.views.get(&self.image, info, &self.name)
     }
 
     /// Fails unless a pass can draw to the mip of `count` layers, or slices, from `layer` on.
@@ -151,7 +175,7 @@ impl Texture {
         kind: vk::ImageViewType,
         usage: TextureUsage,
     ) -> Result<vk::ImageView> {
-        let drawn = usage == TextureUsage::TARGET;
+        let drawn = usage.contains(TextureUsage::TARGET);
         let sampled = usage == TextureUsage::SAMPLED;
         let info = ViewInfo {
             kind,

@@ -15,6 +15,10 @@ bitflags! {
         const STORAGE = 1 << 1;
         /// A colour or depth target of render passes.
         const TARGET = 1 << 2;
+        /// A target that fragment shaders of its own pass read too, by
+        /// [`RenderPassDesc::local_read`](crate::RenderPassDesc::local_read). Goes with `TARGET`; needs
+        /// [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
+        const INPUT = 1 << 3;
     }
 }
 
@@ -81,7 +85,7 @@ pub enum TextureMemory {
     #[default]
     Device,
     /// Only inside of render passes, on devices that can (`VK_MEMORY_PROPERTY_LAZILY_ALLOCATED_BIT`); elsewhere in memory of
-    /// its own. Such a texture is a [`TextureUsage::TARGET`] and nothing else: passes neither load nor store it, and it is
+    /// its own. Such a texture is a [`TextureUsage::TARGET`], perhaps an [`INPUT`](TextureUsage::INPUT) too, and nothing else: passes neither load nor store it, and it is
     /// not copied, cleared by command or sampled.
     Transient,
 }

@@ -16,6 +16,7 @@ mod idle_culling;
 mod import;
 #[cfg(feature = "glsl")]
 mod include;
+mod input_read;
 mod instrument;
 mod module;
 #[cfg(feature = "glsl")]
@@ -40,6 +41,7 @@ pub(crate) use compile::{CompileOptions, compile};
 pub(crate) use disk_cache::ShaderCache;
 pub use disk_cache::ShaderCacheCounts;
 pub(crate) use hit_numbers::raw_hit_number;
+pub(crate) use input_read::InputRead;
 pub(crate) use instrument::with_checked_indices;
 #[cfg(feature = "glsl")]
 pub use offline::compile_glsl;

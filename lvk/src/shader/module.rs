@@ -5,6 +5,7 @@ use std::collections::{HashMap, HashSet};
 use ::spirv::{BuiltIn, Capability, Decoration, Dim, Op, StorageClass};
 
 use super::spirv::{self, Instruction};
+use crate::format::Numbers;
 
 /// A buffer address in a push-constant block.
 const ADDRESS_BYTES: u64 = 8;
@@ -48,14 +49,39 @@ pub(super) struct Mode {
 #[derive(Debug)]
 pub(super) enum Type {
     Bool,
-    Number { bytes: u32 },
-    Vector { element: u32, count: u32 },
-    Matrix { column: u32, count: u32 },
-    Array { element: u32, length: u32 },
-    RuntimeArray { element: u32 },
-    Struct { members: Vec<u32> },
-    Pointer { target: u32 },
-    Image { storage: bool },
+    Number {
+        bytes: u32,
+        numbers: Numbers,
+    },
+    Vector {
+        element: u32,
+        count: u32,
+    },
+    Matrix {
+        column: u32,
+        count: u32,
+    },
+    Array {
+        element: u32,
+        length: u32,
+    },
+    RuntimeArray {
+        element: u32,
+    },
+    Struct {
+        members: Vec<u32>,
+    },
+    Pointer {
+        target: u32,
+    },
+    Image {
+        storage: bool,
+    },
+    /// What a pass draws, as its own fragment shaders read it: of numbers of this type.
+    SubpassInput {
+        texel: u32,
+        multisampled: bool,
+    },
     Opaque(Op),
 }
 
@@ -163,7 +189,7 @@ impl Module {
         }
         let nesting = nesting.checked_sub(1).ok_or("the types are nested too deeply")?;
         let bytes = match self.types.get(&ty).ok_or("a type is missing")? {
-            Type::Number { bytes } => u64::from(*bytes),
+            Type::Number { bytes, .. } => u64::from(*bytes),
             Type::Pointer { .. } => ADDRESS_BYTES,
             Type::Vector { element, count } => {
                 self.size(*element, None, nesting, known)?.saturating_mul(u64::from(*count))
@@ -178,7 +204,7 @@ impl Module {
             }
             Type::Struct { members } => self.struct_size(ty, members, nesting, known)?,
             Type::RuntimeArray { .. } => return Err("an array has no length".to_owned()),
-            Type::Bool | Type::Image { .. } | Type::Opaque(_) => {
+            Type::Bool | Type::Image { .. } | Type::SubpassInput { .. } | Type::Opaque(_) => {
                 return Err("a member has no size".to_owned());
             }
         };
@@ -228,7 +254,7 @@ impl Module {
         Ok(end)
     }
 
-    fn length(&self, id: u32) -> Result<u64, String> {
+    pub(super) fn length(&self, id: u32) -> Result<u64, String> {
         let constant = self.constants.get(&id).ok_or("an array's length is not a plain constant")?;
         Ok(u64::from(constant.value))
     }
@@ -267,7 +293,11 @@ impl Module {
     fn collect_type(&mut self, op: Op, i: &Instruction<'_>) {
         let ty = match op {
             Op::TypeBool => Type::Bool,
-            Op::TypeInt | Op::TypeFloat => Type::Number { bytes: i.operand(1).div_ceil(8) },
+            Op::TypeFloat => Type::Number { bytes: i.operand(1).div_ceil(8), numbers: Numbers::Float },
+            Op::TypeInt => Type::Number {
+                bytes: i.operand(1).div_ceil(8),
+                numbers: if i.operand(2) == 0 { Numbers::Uint } else { Numbers::Sint },
+            },
             Op::TypeVector => Type::Vector { element: i.operand(1), count: i.operand(2) },
             Op::TypeMatrix => Type::Matrix { column: i.operand(1), count: i.operand(2) },
             Op::TypeArray => Type::Array { element: i.operand(1), length: i.operand(2) },
@@ -288,13 +318,16 @@ fn entry(i: &Instruction<'_>) -> Entry {
     Entry { model: i.operand(0), function: i.operand(1), name, interface }
 }
 
-/// Texel buffers and subpass inputs have no binding in the library.
+/// Texel buffers have no binding in the library.
 fn image(i: &Instruction<'_>) -> Type {
     const SAMPLED: u32 = 1;
     const STORAGE: u32 = 2;
     let dim = i.operand(2);
     match i.operand(6) {
-        _ if dim == Dim::DimBuffer as u32 || dim == Dim::DimSubpassData as u32 => Type::Opaque(Op::TypeImage),
+        _ if dim == Dim::DimSubpassData as u32 => {
+            Type::SubpassInput { texel: i.operand(1), multisampled: i.operand(5) == 1 }
+        }
+        _ if dim == Dim::DimBuffer as u32 => Type::Opaque(Op::TypeImage),
         SAMPLED => Type::Image { storage: false },
         STORAGE => Type::Image { storage: true },
         _ => Type::Opaque(Op::TypeImage),

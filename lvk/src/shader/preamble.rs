@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::{CompileOptions, ShaderStage};
+use crate::bindless::inputs::Input;
 use crate::bindless::layout;
 
 /// Helpers and resource arrays for every stage.
@@ -61,6 +62,7 @@ pub(super) fn preamble(stage: ShaderStage, options: &CompileOptions, defines: &[
     }
     define(&mut text, stage_macro(stage), "1");
     define(&mut text, "LVK_SET", &layout::SET.to_string());
+    inputs(&mut text);
     for (binding, name, _) in layout::BINDINGS {
         define(&mut text, name, &binding.to_string());
     }
@@ -93,6 +95,14 @@ pub(super) fn preamble(stage: ShaderStage, options: &CompileOptions, defines: &[
     }
     text.push_str("#line 1 0\n");
     text
+}
+
+/// How fragment shaders declare the targets of their pass that they read.
+fn inputs(text: &mut String) {
+    define(text, "LVK_INPUT_SET", &layout::INPUT_SET.to_string());
+    for (name, input) in [("COLOR", Input::Color(0)), ("DEPTH", Input::Depth), ("STENCIL", Input::Stencil)] {
+        define(text, &format!("LVK_PLACE_OF_{name}"), &input.place().to_string());
+    }
 }
 
 fn require(text: &mut String, extension: &str) {

@@ -64,7 +64,7 @@ fn extent(
     let times = |(bytes, scalar): Extent, count: u32| (bytes.saturating_mul(count.into()), scalar);
     let found = match module.types.get(&ty)? {
         Type::Bool => (BOOL_BYTES, BOOL_BYTES),
-        Type::Number { bytes } => (u64::from(*bytes), u64::from(*bytes)),
+        Type::Number { bytes, .. } => (u64::from(*bytes), u64::from(*bytes)),
         Type::Pointer { .. } => (ADDRESS_BYTES, ADDRESS_BYTES),
         Type::Vector { element, count } => times(of(*element)?, *count),
         Type::Matrix { column, count } => times(of(*column)?, *count),
@@ -74,7 +74,9 @@ fn extent(
             let bytes = bytes.checked_next_multiple_of(alignment.max(1))?;
             Some((end.saturating_add(bytes), scalar.max(own)))
         })?,
-        Type::RuntimeArray { .. } | Type::Image { .. } | Type::Opaque(_) => return None,
+        Type::RuntimeArray { .. } | Type::Image { .. } | Type::SubpassInput { .. } | Type::Opaque(_) => {
+            return None;
+        }
     };
     known.insert(ty, found);
     Some(found)

@@ -1,8 +1,9 @@
-//! What a SPIR-V module tells about itself, and whether it fits the one descriptor set.
+//! What a SPIR-V module tells about itself, and whether it fits the library's descriptor sets.
 
 use ::spirv::{Capability, Decoration, ExecutionMode, ExecutionModel, Op, StorageClass};
 
 use super::atomics::{Atomic, atomics};
+use super::input_read::{InputRead, input_read, outputs};
 use super::module::{Mode, Module, Type, Variable};
 use super::ray_interface::RayInterface;
 use super::{ShaderStage, spirv};
@@ -52,6 +53,10 @@ pub(crate) struct Reflection {
     pub(crate) capabilities: Vec<u32>,
     /// Atomic operations that need a device feature.
     pub(crate) atomics: Vec<Atomic>,
+    /// Targets of the pass that a fragment stage reads, sorted by place.
+    pub(crate) input_reads: Vec<InputRead>,
+    /// Locations that a fragment stage puts colours out at, a bit for each.
+    pub(crate) outputs: u32,
     /// First locations of the inputs; those of a vertex stage are its attributes.
     pub(crate) inputs: Vec<u32>,
 }
@@ -68,19 +73,23 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
     let function = module.entries[entry].function;
     check_function(words, function)?;
     let (local_size, local_size_ids) = local_size(&module, function);
-    let (mut bindings, mut inputs) = (Vec::new(), Vec::new());
-    let (mut push_constant_bytes, mut second_output) = (0, false);
+    let (mut bindings, mut inputs, mut input_reads) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut push_constant_bytes, mut second_output, mut colors) = (0, false, 0);
     for variable in module.variables.iter().filter(|variable| module.in_interface(entry, variable)) {
         if variable.storage == StorageClass::PushConstant as u32 {
             push_constant_bytes = push_constant_bytes.max(block_bytes(&module, variable)?);
+        } else if let Some(read) = input_read(&module, variable)? {
+            input_reads.push(read);
         } else if is_descriptor(variable) {
             bindings.push(binding(&module, variable)?);
         } else if variable.storage == StorageClass::Input as u32 {
             inputs.extend(module.decoration(variable.id, Decoration::Location));
         } else if variable.storage == StorageClass::Output as u32 {
             second_output |= module.decoration(variable.id, Decoration::Index) == Some(1);
+            colors |= outputs(&module, variable);
         }
     }
+    input_reads.sort_unstable_by_key(|read| read.input.place());
     bindings.sort_unstable();
     bindings.dedup();
     let hardware_ray_query = module.has(Capability::RayQueryKHR);
@@ -103,6 +112,8 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
         bindings,
         capabilities: module.capabilities(),
         atomics: atomics(words)?,
+        input_reads,
+        outputs: if stage == ShaderStage::Fragment { colors } else { 0 },
         inputs,
     })
 }
@@ -213,7 +224,7 @@ fn specialization(module: &Module) -> Vec<(u32, u32)> {
         .filter_map(|(id, constant)| {
             let bytes = match module.types.get(&constant.ty)? {
                 Type::Bool => 4,
-                Type::Number { bytes } => *bytes,
+                Type::Number { bytes, .. } => *bytes,
                 _ => return None,
             };
             Some((module.decoration(*id, Decoration::SpecId)?, bytes))

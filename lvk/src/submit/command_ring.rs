@@ -4,17 +4,20 @@ use std::collections::{BTreeSet, VecDeque};
 
 use ash::vk;
 
+use super::input_sets::InputSets;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
 /// A command pool of its own for each command buffer, so that any thread may record without a lock.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 pub(crate) struct CommandSlot {
     pub(crate) pool: vk::CommandPool,
     /// Runs before `main` and holds the barriers between the queue's state and the first uses in `main`.
     pub(crate) prologue: vk::CommandBuffer,
     /// What the caller records.
     pub(crate) main: vk::CommandBuffer,
+    /// Of passes in `main`.
+    pub(crate) inputs: InputSets,
 }
 
 impl CommandSlot {
@@ -34,7 +37,7 @@ impl CommandSlot {
             Ok(buffers) => {
                 gpu.name(pool, "command pool");
                 gpu.name(buffers[0], "barriers before a command buffer");
-                Ok(Self { pool, prologue: buffers[0], main: buffers[1] })
+                Ok(Self { pool, prologue: buffers[0], main: buffers[1], inputs: InputSets::default() })
             }
             Err(result) => {
                 // SAFETY: the pool is unused.
@@ -44,7 +47,8 @@ impl CommandSlot {
         }
     }
 
-    fn reset(self, gpu: &Gpu) -> Result<()> {
+    fn reset(&mut self, gpu: &Gpu) -> Result<()> {
+        self.inputs.reset();
         // SAFETY: the GPU is done with the pool's command buffers, and nobody records them.
         unsafe { gpu.device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
             .map_err(Error::vulkan("vkResetCommandPool"))
@@ -53,6 +57,7 @@ impl CommandSlot {
     fn destroy(self, gpu: &Gpu) {
         // SAFETY: as in `reset`.
         unsafe { gpu.device.destroy_command_pool(self.pool, None) };
+        self.inputs.destroy(gpu);
     }
 }
 
@@ -133,7 +138,7 @@ impl CommandRing {
         self.free.drain(..).chain(in_flight).for_each(|slot| slot.destroy(gpu));
     }
 
-    fn recycle(&mut self, gpu: &Gpu, slot: CommandSlot) {
+    fn recycle(&mut self, gpu: &Gpu, mut slot: CommandSlot) {
         match slot.reset(gpu) {
             Ok(()) => self.free.push(slot),
             Err(_) => slot.destroy(gpu),

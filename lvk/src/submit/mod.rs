@@ -3,6 +3,7 @@
 pub(crate) mod command_ring;
 pub(crate) mod deferred;
 pub(crate) mod emit;
+pub(crate) mod input_sets;
 pub(crate) mod presentable;
 pub(crate) mod profiler;
 pub(crate) mod queue;

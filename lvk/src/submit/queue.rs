@@ -24,6 +24,18 @@ pub(crate) struct Recording {
     slot: CommandSlot,
 }
 
+impl Recording {
+    /// A set of `count` input attachments for a pass of the command buffer.
+    pub(crate) fn input_set(
+        &mut self,
+        gpu: &Gpu,
+        layout: vk::DescriptorSetLayout,
+        count: u32,
+    ) -> Result<vk::DescriptorSet> {
+        self.slot.inputs.take(gpu, layout, count)
+    }
+}
+
 /// What goes to the queue at once: one value of the timeline.
 #[derive(Default)]
 pub(crate) struct Submission {
@@ -96,7 +108,7 @@ impl<T> Submitter<T> {
         let (tracker, images) = inner.spare.pop().unwrap_or_default();
         drop(inner);
         let recording = Recording { sequence, commands: slot.main, tracker, images, slot };
-        match begin(&self.gpu, slot.main) {
+        match begin(&self.gpu, recording.commands) {
             Ok(()) => Ok(recording),
             Err(error) => {
                 self.discard(recording);

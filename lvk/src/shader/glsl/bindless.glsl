@@ -16,6 +16,14 @@ layout(set = LVK_SET, binding = LVK_BINDING_SAMPLED_IMAGES) uniform texture2DMS 
 #define LVK_YUV_TEXTURES(name) layout(set = LVK_SET, binding = LVK_BINDING_YCBCR) uniform sampler2D name[]
 #define textureBindlessYUV(name, index, uv) textureLod(name[index], uv, 0.0)
 
+// Targets of the pass as its own fragment shaders read them, at the fragment's pixel, by subpassLoad: a colour target by its
+// place among them, depth and stencil. `type` is subpassInput, usubpassInput, isubpassInput, or one of these with MS.
+#define LVK_INPUT_AT(place, type, name) \
+    layout(input_attachment_index = place, set = LVK_INPUT_SET, binding = place) uniform type name
+#define LVK_INPUT(target, type, name) LVK_INPUT_AT(LVK_PLACE_OF_COLOR + target, type, name)
+#define LVK_DEPTH_INPUT(type, name) LVK_INPUT_AT(LVK_PLACE_OF_DEPTH, type, name)
+#define LVK_STENCIL_INPUT(type, name) LVK_INPUT_AT(LVK_PLACE_OF_STENCIL, type, name)
+
 layout(set = LVK_SET, binding = LVK_BINDING_SAMPLERS) uniform sampler kSamplers[];
 layout(set = LVK_SET, binding = LVK_BINDING_SAMPLERS) uniform samplerShadow kSamplersShadow[];
 

@@ -1,0 +1,64 @@
+//! What a fragment stage reads of its pass's targets, and where it puts colours out.
+
+use ::spirv::{Decoration, StorageClass};
+
+use super::module::{Module, Type, Variable};
+use crate::bindless::inputs::Input;
+use crate::bindless::layout;
+use crate::format::Numbers;
+
+/// A target of the pass that a module reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct InputRead {
+    pub(crate) input: Input,
+    pub(crate) numbers: Numbers,
+    pub(crate) multisampled: bool,
+}
+
+/// What a variable reads of the targets; `None` where it is something else.
+pub(super) fn input_read(module: &Module, variable: &Variable) -> Result<Option<InputRead>, String> {
+    if variable.storage != StorageClass::UniformConstant as u32 {
+        return Ok(None);
+    }
+    let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else { return Ok(None) };
+    let what = module.names.get(&variable.id).map_or("an input".to_owned(), |name| format!("'{name}'"));
+    match module.types.get(target) {
+        Some(Type::SubpassInput { texel, multisampled }) => {
+            let input = place(module, variable).ok_or_else(|| format!("{what} {MISPLACED}"))?;
+            let Some(Type::Number { numbers, .. }) = module.types.get(texel) else {
+                return Err(format!("{what} has texels of no numbers"));
+            };
+            Ok(Some(InputRead { input, numbers: *numbers, multisampled: *multisampled }))
+        }
+        Some(Type::Array { element, .. } | Type::RuntimeArray { element })
+            if matches!(module.types.get(element), Some(Type::SubpassInput { .. })) =>
+        {
+            Err(format!("{what} is an array of targets of the pass; declare each with LVK_INPUT"))
+        }
+        _ => Ok(None),
+    }
+}
+
+const MISPLACED: &str = "reads a target of the pass, but not at its place; declare it with LVK_INPUT, LVK_DEPTH_INPUT or \
+                         LVK_STENCIL_INPUT";
+
+/// The target that set, binding and index agree on.
+fn place(module: &Module, variable: &Variable) -> Option<Input> {
+    let get = |decoration| module.decoration(variable.id, decoration);
+    let input = Input::at(get(Decoration::Binding)?)?;
+    let agrees = get(Decoration::DescriptorSet) == Some(layout::INPUT_SET)
+        && get(Decoration::InputAttachmentIndex) == Some(input.place());
+    agrees.then_some(input)
+}
+
+/// The locations of an output, a bit for each; arrays take several.
+pub(super) fn outputs(module: &Module, variable: &Variable) -> u32 {
+    let Some(first) = module.decoration(variable.id, Decoration::Location) else { return 0 };
+    let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else { return 0 };
+    let count = match module.types.get(target) {
+        Some(Type::Array { length, .. }) => module.length(*length).unwrap_or(1),
+        _ => 1,
+    };
+    let last = u64::from(first).saturating_add(count);
+    (u64::from(first)..last.min(u32::BITS.into())).fold(0, |all, location| all | 1 << location)
+}

@@ -1,0 +1,66 @@
+//! Descriptor sets of the passes of one command buffer that read their own targets.
+
+use ash::vk;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+
+/// Sets that live as long as the command buffer they stand in, and are written anew when it is recorded again.
+#[derive(Debug, Default)]
+pub(crate) struct InputSets {
+    pools: Vec<vk::DescriptorPool>,
+    sets: Vec<vk::DescriptorSet>,
+    /// How many of them the command buffer has taken.
+    taken: usize,
+}
+
+impl InputSets {
+    /// Sets that are made at once.
+    const BATCH: usize = 8;
+
+    /// A set of `count` input attachments that nobody uses.
+    pub(crate) fn take(
+        &mut self,
+        gpu: &Gpu,
+        layout: vk::DescriptorSetLayout,
+        count: u32,
+    ) -> Result<vk::DescriptorSet> {
+        if self.taken == self.sets.len() {
+            self.grow(gpu, layout, count)?;
+        }
+        self.taken += 1;
+        Ok(self.sets[self.taken - 1])
+    }
+
+    /// The GPU is done with all of them.
+    pub(crate) fn reset(&mut self) {
+        self.taken = 0;
+    }
+
+    fn grow(&mut self, gpu: &Gpu, layout: vk::DescriptorSetLayout, count: u32) -> Result<()> {
+        let sizes = [vk::DescriptorPoolSize::default()
+            .ty(vk::DescriptorType::INPUT_ATTACHMENT)
+            .descriptor_count(count * Self::BATCH as u32)];
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(Self::BATCH as u32).pool_sizes(&sizes);
+        // SAFETY: the description is valid.
+        let pool = unsafe { gpu.device.create_descriptor_pool(&info, None) }
+            .map_err(Error::vulkan("vkCreateDescriptorPool"))?;
+        self.pools.push(pool);
+        gpu.name(pool, "input attachments of a command buffer");
+        let layouts = [layout; Self::BATCH];
+        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
+        // SAFETY: the pool is new and has room for these sets.
+        let sets = unsafe { gpu.device.allocate_descriptor_sets(&info) }
+            .map_err(Error::vulkan("vkAllocateDescriptorSets"))?;
+        self.sets.extend(sets);
+        Ok(())
+    }
+
+    /// Destroys all of them. The GPU is done with them.
+    pub(crate) fn destroy(self, gpu: &Gpu) {
+        for pool in self.pools {
+            // SAFETY: the sets of the pool are in no command buffer that runs.
+            unsafe { gpu.device.destroy_descriptor_pool(pool, None) };
+        }
+    }
+}

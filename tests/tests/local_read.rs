@@ -1,0 +1,644 @@
+//! Fragment shaders that read what their own pass has drawn: the same bits as a second pass, orders of draws, samples, views,
+//! and what is refused.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use lvk::{
+    ColorAttachment, ColorLoad, ColorTarget, CompareOp, Context, Dependencies, DepthAttachment, DepthState,
+    DepthTest, DeviceProfile, Error, Format, Holder, OptionalFeature, RenderPassDesc, RenderPipelineDesc,
+    RenderPipelineHandle, Resolve, ShaderStage, StencilFace, StencilOp, StencilTest, TextureDesc,
+    TextureHandle, TextureKind, TextureMemory, TextureRegion, TextureUsage,
+};
+use lvk_tests::child::without_ray_tracing;
+use lvk_tests::compute::module;
+use lvk_tests::raster::{
+    COVER, PAINT, has, paint, pixels, run_pass, staged_pipeline, target, unsupported, usage_error,
+};
+use lvk_tests::{device, device_with};
+
+const SIZE: [u32; 2] = [23, 17];
+
+/// A colour, a number and a depth that differ from pixel to pixel.
+const PATTERN: &str = "
+    layout(location = 0) out vec4 color;
+    layout(location = 1) out uint number;
+    void main() {
+        uvec2 at = uvec2(gl_FragCoord.xy);
+        color = vec4(at.x * 7u % 23u, at.y * 5u % 17u, (at.x + at.y) % 11u, 40u) / 40.0;
+        number = at.x * 2654435761u ^ at.y * 40503u;
+        gl_FragDepth = float((at.x * 13u + at.y * 29u) % 101u) / 128.0 + 0.1;
+    }";
+
+/// What both ways make of it.
+const COMBINE: &str = "
+    vec4 combine(vec4 color, uint number, float depth) {
+        return vec4(sqrt(color.rg) * depth, float(number >> 8) / 16777216.0, color.b - 1.0 / (depth + color.a));
+    }";
+
+const BY_INPUTS: &str = "
+    LVK_INPUT(0, subpassInput, gColor);
+    LVK_INPUT(1, usubpassInput, gNumber);
+    LVK_DEPTH_INPUT(subpassInput, gDepth);
+    layout(location = 2) out vec4 result;
+    void main() {
+        result = combine(subpassLoad(gColor), subpassLoad(gNumber).r, subpassLoad(gDepth).r);
+    }";
+
+const BY_TEXTURES: &str = "
+    layout(push_constant, scalar) uniform Push { uvec3 textures; uint sam; };
+    layout(location = 0) out vec4 result;
+    void main() {
+        ivec2 at = ivec2(gl_FragCoord.xy);
+        vec4 color = texelFetch(sampler2D(kTextures2D[textures.x], kSamplers[sam]), at, 0);
+        uint number = texelFetch(usampler2D(kTexturesU2D[textures.y], kSamplers[sam]), at, 0).r;
+        result = combine(color, number, texelFetch(sampler2D(kTextures2D[textures.z], kSamplers[sam]), at, 0).r);
+    }";
+
+/// A triangle over all pixels, without push constants.
+const ALL: &str = "
+    void main() { gl_Position = vec4(vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1) * 4.0 - 1.0, 0, 1); }";
+
+const READ: TextureUsage = TextureUsage::TARGET.union(TextureUsage::INPUT);
+
+/// A target that its own pass reads, and whom tests sample.
+fn input(ctx: &Context, format: Format) -> Holder<TextureHandle> {
+    let usage = READ | TextureUsage::SAMPLED;
+    let desc = TextureDesc { format, extent: SIZE, usage, debug_name: "input", ..Default::default() };
+    ctx.create_texture(&desc).unwrap()
+}
+
+fn color_pipeline(
+    ctx: &Context,
+    fragment: &str,
+    desc: &RenderPipelineDesc<'_>,
+) -> lvk::Result<Holder<RenderPipelineHandle>> {
+    staged_pipeline(ctx, &[(ShaderStage::Vertex, ALL), (ShaderStage::Fragment, fragment)], desc)
+}
+
+fn depth_test(format: Format, write: bool) -> Option<DepthTest> {
+    Some(DepthTest { format, compare: CompareOp::Always, write })
+}
+
+fn cleared(texture: TextureHandle, format: Format) -> ColorAttachment {
+    let load =
+        if format == Format::R32Uint { ColorLoad::ClearUint([9; 4]) } else { ColorLoad::Clear([0.5; 4]) };
+    ColorAttachment { load, ..ColorAttachment::clear(texture, [0.0; 4]) }
+}
+
+const TARGETS: [Format; 3] = [Format::Rgba8Unorm, Format::R32Uint, Format::Rgba32Float];
+
+/// The picture of one pass that draws the pattern and reads it.
+fn in_one_pass(ctx: &Context, depth: Format) -> Vec<u32> {
+    let textures = [input(ctx, TARGETS[0]), input(ctx, TARGETS[1]), target(ctx, TARGETS[2], SIZE)];
+    let deep = input(ctx, depth);
+    let targets = TARGETS.map(ColorTarget::new);
+    let desc = RenderPipelineDesc { color: &targets, debug_name: "one pass", ..Default::default() };
+    let draw = RenderPipelineDesc { depth: depth_test(depth, true), ..desc };
+    let read = RenderPipelineDesc { depth: depth_test(depth, false), ..desc };
+    let draw = color_pipeline(ctx, PATTERN, &draw).unwrap();
+    let read = color_pipeline(ctx, &format!("{COMBINE}{BY_INPUTS}"), &read).unwrap();
+    let color = [0, 1, 2].map(|place| cleared(*textures[place], TARGETS[place]));
+    let desc = RenderPassDesc {
+        color: &color,
+        depth: Some(DepthAttachment::clear(*deep, 1.0)),
+        local_read: true,
+        debug_name: "draw and read",
+        ..Default::default()
+    };
+    run_pass(ctx, &desc, |pass| {
+        pass.bind_render_pipeline(*draw)?;
+        pass.draw(0..3, 0..1)?;
+        pass.bind_render_pipeline(*read)?;
+        pass.draw(0..3, 0..1)
+    });
+    pixels(ctx, *textures[2])
+}
+
+/// The same by a second pass, which samples what the first has drawn.
+fn in_two_passes(ctx: &Context, depth: Format) -> Vec<u32> {
+    let textures = TARGETS.map(|format| target(ctx, format, SIZE));
+    let deep = target(ctx, depth, SIZE);
+    let [first, number, last] = TARGETS.map(ColorTarget::new);
+    let drawn = [first, number];
+    let draw = RenderPipelineDesc { color: &drawn, depth: depth_test(depth, true), ..Default::default() };
+    let draw = color_pipeline(ctx, PATTERN, &draw).unwrap();
+    let last = [last];
+    let read = RenderPipelineDesc { color: &last, ..Default::default() };
+    let read = color_pipeline(ctx, &format!("{COMBINE}{BY_TEXTURES}"), &read).unwrap();
+    let sampler = ctx.create_sampler(&Default::default()).unwrap();
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let color = [0, 1].map(|place| cleared(*textures[place], TARGETS[place]));
+    let depth = Some(DepthAttachment::clear(*deep, 1.0));
+    let mut pass =
+        cmd.begin_rendering(&RenderPassDesc { color: &color, depth, ..Default::default() }).unwrap();
+    pass.bind_render_pipeline(*draw).unwrap();
+    pass.draw(0..3, 0..1).unwrap();
+    drop(pass);
+    let color = [cleared(*textures[2], TARGETS[2])];
+    let dependencies =
+        Dependencies { sampled_images: &[*textures[0], *textures[1], *deep], ..Default::default() };
+    let mut pass =
+        cmd.begin_rendering(&RenderPassDesc { color: &color, dependencies, ..Default::default() }).unwrap();
+    pass.bind_render_pipeline(*read).unwrap();
+    pass.push_constants(&[textures[0].index(), textures[1].index(), deep.index(), sampler.index()]).unwrap();
+    pass.draw(0..3, 0..1).unwrap();
+    drop(pass);
+    ctx.submit(cmd).unwrap();
+    pixels(ctx, *textures[2])
+}
+
+fn one_pass_is_two(ctx: &Context) {
+    if !has(ctx, OptionalFeature::LocalRead) {
+        return;
+    }
+    for depth in [Format::D32Float, Format::D16Unorm, Format::D32FloatS8] {
+        if ctx.format_support(depth).target {
+            let (one, two) = (in_one_pass(ctx, depth), in_two_passes(ctx, depth));
+            assert!(one == two, "{depth:?}");
+            let mut kinds = one.clone();
+            kinds.sort_unstable();
+            kinds.dedup();
+            assert!(kinds.len() > 300, "{depth:?}: {} values", kinds.len());
+        }
+    }
+}
+
+#[test]
+fn one_pass_has_the_bits_of_two() {
+    let Some(ctx) = device() else { return };
+    one_pass_is_two(&ctx);
+}
+
+/// Another driver, which has fewer inputs at least than ten or is right in another way.
+#[test]
+fn one_pass_has_the_bits_of_two_on_another_driver() {
+    without_ray_tracing("one_pass_has_the_bits_of_two_on_another_driver", || {
+        let Some(ctx) = device() else { return };
+        one_pass_is_two(&ctx);
+    });
+}
+
+/// Modules whose indices are looked up read targets too.
+#[test]
+fn one_pass_has_the_bits_of_two_where_indices_are_checked() {
+    let Some(ctx) = device_with(|desc| desc.check_indices = true) else { return };
+    one_pass_is_two(&ctx);
+    assert_eq!(ctx.index_faults().unwrap(), []);
+}
+
+/// A pipeline that reads and writes one target: by `read_targets` each draw sees the one before. More passes than are made
+/// ready at once, in several command buffers.
+#[test]
+fn draws_see_those_before_them() {
+    let Some(ctx) = device() else { return };
+    if !has(&ctx, OptionalFeature::LocalRead) {
+        return;
+    }
+    let fragment = "
+        LVK_INPUT(0, subpassInput, gBefore);
+        layout(push_constant, scalar) uniform Push { vec4 color; float depth; };
+        layout(location = 0) out vec4 result;
+        void main() { result = subpassLoad(gBefore) * 2.0 + color; }";
+    let color = [Format::Rgba32Float.into()];
+    let desc = RenderPipelineDesc { color: &color, ..Default::default() };
+    let stages = [(ShaderStage::Vertex, COVER), (ShaderStage::Fragment, fragment)];
+    let pipeline = staged_pipeline(&ctx, &stages, &desc).unwrap();
+    let drawn = input(&ctx, Format::Rgba32Float);
+    let mut expected = [1.0_f32, 2.0, 3.0, 4.0];
+    let mut load = ColorLoad::Clear(expected);
+    for round in 0..3 {
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        for step in 0..5 {
+            let color = [ColorAttachment { load, ..ColorAttachment::clear(*drawn, [0.0; 4]) }];
+            load = ColorLoad::Load;
+            let desc = RenderPassDesc { color: &color, local_read: true, ..Default::default() };
+            let mut pass = cmd.begin_rendering(&desc).unwrap();
+            pass.bind_render_pipeline(*pipeline).unwrap();
+            for draw in 0..2 {
+                let added = [round, step, draw, 1].map(|value| value as f32);
+                paint(&mut pass, added, 0.0).unwrap();
+                pass.read_targets().unwrap();
+                expected = std::array::from_fn(|channel| expected[channel] * 2.0 + added[channel]);
+            }
+        }
+        ctx.submit(cmd).unwrap();
+    }
+    let found = pixels::<[f32; 4]>(&ctx, *drawn);
+    assert!(found.iter().all(|pixel| *pixel == expected), "{:?} is not {expected:?}", found[0]);
+}
+
+/// Two pipelines in turns, each of which reads what the other writes: nobody says when to wait.
+#[test]
+fn pipelines_wait_for_each_other() {
+    let Some(ctx) = device() else { return };
+    if !has(&ctx, OptionalFeature::LocalRead) {
+        return;
+    }
+    let text = |from: u32, to: u32| {
+        format!(
+            "LVK_INPUT({from}, subpassInput, gOther);
+             layout(location = {to}) out vec4 result;
+             void main() {{ result = subpassLoad(gOther) * vec4(3, 2, 1, 1) + vec4(1, {to}, 0, 0); }}"
+        )
+    };
+    let color = [Format::Rgba32Float.into(); 2];
+    let desc = RenderPipelineDesc { color: &color, ..Default::default() };
+    let pipelines = [(0, 1), (1, 0)].map(|(from, to)| color_pipeline(&ctx, &text(from, to), &desc).unwrap());
+    let textures = [input(&ctx, Format::Rgba32Float), input(&ctx, Format::Rgba32Float)];
+    let color = [0, 1].map(|place| ColorAttachment::clear(*textures[place], [place as f32, 1.0, 2.0, 3.0]));
+    let mut expected = color.map(|attachment| match attachment.load {
+        ColorLoad::Clear(color) => color,
+        _ => unreachable!("the targets are cleared"),
+    });
+    run_pass(&ctx, &RenderPassDesc { color: &color, local_read: true, ..Default::default() }, |pass| {
+        for turn in 0..6 {
+            pass.bind_render_pipeline(*pipelines[turn % 2])?;
+            pass.draw(0..3, 0..1)?;
+            let (from, to) = (turn % 2, 1 - turn % 2);
+            let [x, y, z, w] = expected[from];
+            expected[to] = [x * 3.0 + 1.0, y * 2.0 + to as f32, z, w];
+        }
+        Ok(())
+    });
+    for (texture, expected) in textures.iter().zip(expected) {
+        assert!(pixels::<[f32; 4]>(&ctx, **texture).iter().all(|pixel| *pixel == expected));
+    }
+}
+
+/// Each fragment of a sample reads that sample, as a fetch from the texture does; nothing of the samples is kept.
+#[test]
+fn samples_are_read_one_by_one() {
+    let Some(ctx) = device() else { return };
+    if !has(&ctx, OptionalFeature::LocalRead) || !has(&ctx, OptionalFeature::SampleRateShading) {
+        return;
+    }
+    let by_sample = "
+        layout(location = 0) out vec4 result;
+        void main() { result = vec4(gl_FragCoord.xy + gl_SampleID * 100.0, gl_SampleID, 1); }";
+    let read = "
+        LVK_INPUT(0, subpassInputMS, gSamples);
+        layout(location = 1) out vec4 result;
+        void main() { result = subpassLoad(gSamples, gl_SampleID) * vec4(1, 1, gl_SampleID, 1); }";
+    let formats = [Format::Rgba32Float.into(); 2];
+    let desc = RenderPipelineDesc { color: &formats, samples: 4, ..Default::default() };
+    let [draw, read] = [by_sample, read].map(|text| color_pipeline(&ctx, text, &desc).unwrap());
+    let many = |usage| {
+        let desc = TextureDesc {
+            format: Format::Rgba32Float,
+            extent: SIZE,
+            samples: 4,
+            usage,
+            memory: TextureMemory::Transient,
+            debug_name: "samples",
+            ..Default::default()
+        };
+        ctx.create_texture(&desc).unwrap()
+    };
+    let (samples, lit) = (many(READ), many(TextureUsage::TARGET));
+    let picture = target(&ctx, Format::Rgba32Float, SIZE);
+    let gone = ColorAttachment { store: false, ..ColorAttachment::clear(*samples, [0.0; 4]) };
+    let resolve = Some(Resolve { texture: *picture, mip: 0, layer: 0 });
+    let color = [gone, ColorAttachment { texture: *lit, resolve, ..gone }];
+    run_pass(&ctx, &RenderPassDesc { color: &color, local_read: true, ..Default::default() }, |pass| {
+        for pipeline in [&draw, &read] {
+            pass.bind_render_pipeline(**pipeline)?;
+            pass.draw(0..3, 0..1)?;
+        }
+        Ok(())
+    });
+    let found = pixels::<[f32; 4]>(&ctx, *picture);
+    for (at, [_, _, square, one]) in found.iter().enumerate() {
+        assert_eq!(([*square, *one], at), ([(1.0 + 4.0 + 9.0) / 4.0, 1.0], at));
+    }
+    // Samples lie around the middle of a pixel, so that their mean is near.
+    let [x, y, ..] = found[(3 * SIZE[0] + 5) as usize];
+    assert!((x - 155.5).abs() < 0.3 && (y - 153.5).abs() < 0.3, "{x} {y}");
+}
+
+/// Every view and every layer reads its own.
+#[test]
+fn views_read_their_own_layer() {
+    let Some(ctx) = device() else { return };
+    if !has(&ctx, OptionalFeature::LocalRead) || !has(&ctx, OptionalFeature::Multiview) {
+        return;
+    }
+    let draw = "
+        #extension GL_EXT_multiview : require
+        layout(location = 0) out vec4 result;
+        void main() { result = vec4(10 + gl_ViewIndex, gl_FragCoord.x, 0, 1); }";
+    let read = "
+        LVK_INPUT(0, subpassInput, gDrawn);
+        layout(location = 1) out vec4 result;
+        void main() { result = subpassLoad(gDrawn) * 2.0; }";
+    let formats = [Format::Rgba32Float.into(); 2];
+    let desc = RenderPipelineDesc { color: &formats, view_mask: 0b101, ..Default::default() };
+    let [draw, read] = [draw, read].map(|text| color_pipeline(&ctx, text, &desc).unwrap());
+    let textures = [READ, TextureUsage::TARGET].map(|usage| {
+        let kind = TextureKind::D2Array { layers: 4 };
+        let desc =
+            TextureDesc { kind, format: Format::Rgba32Float, extent: [4, 4], usage, ..Default::default() };
+        ctx.create_texture(&desc).unwrap()
+    });
+    let color = textures.each_ref().map(|texture| ColorAttachment::clear(**texture, [7.0; 4]));
+    let color = color.map(|color| ColorAttachment { layer: 1, ..color });
+    let pass = RenderPassDesc { color: &color, view_mask: 0b101, local_read: true, ..Default::default() };
+    run_pass(&ctx, &pass, |pass| {
+        for pipeline in [&draw, &read] {
+            pass.bind_render_pipeline(**pipeline)?;
+            pass.draw(0..3, 0..1)?;
+        }
+        Ok(())
+    });
+    for (layer, view) in [(1, 0.0), (3, 2.0)] {
+        let region = TextureRegion { layer, ..Default::default() };
+        let bytes = ctx.download_texture(*textures[1], &region).unwrap();
+        let texels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes);
+        for (at, texel) in texels.iter().enumerate() {
+            assert_eq!(*texel, [20.0 + 2.0 * view, (at % 4) as f32 * 2.0 + 1.0, 0.0, 2.0], "layer {layer}");
+        }
+    }
+}
+
+/// Stencil as numbers, beside depth of the same texture.
+#[test]
+fn stencil_is_read() {
+    let Some(ctx) = device() else { return };
+    if !has(&ctx, OptionalFeature::LocalRead) || !ctx.format_support(Format::D32FloatS8).target {
+        return;
+    }
+    if ctx.capabilities().limits.max_input_attachments < 10 {
+        eprintln!("NOT TESTED, {} has too few input attachments", ctx.capabilities().device_name);
+        return;
+    }
+    let text = "
+        LVK_DEPTH_INPUT(subpassInput, gDepth);
+        LVK_STENCIL_INPUT(usubpassInput, gStencil);
+        layout(location = 0) out vec4 result;
+        void main() { result = vec4(subpassLoad(gDepth).r, subpassLoad(gStencil).r, 0, 1); }";
+    let format = Format::D32FloatS8;
+    let formats = [Format::Rgba32Float.into()];
+    let desc = RenderPipelineDesc { color: &formats, ..Default::default() };
+    let face = StencilFace { pass: StencilOp::Replace, ..StencilFace::default() };
+    let stages = [(ShaderStage::Vertex, COVER), (ShaderStage::Fragment, "void main() {}")];
+    let stencil = Some(StencilTest::both(face));
+    let mark = RenderPipelineDesc { depth: depth_test(format, true), stencil, ..desc };
+    let mark = staged_pipeline(&ctx, &stages, &mark).unwrap();
+    let read = RenderPipelineDesc { depth: depth_test(format, false), ..desc };
+    let read = color_pipeline(&ctx, text, &read).unwrap();
+    let (drawn, deep) = (target(&ctx, Format::Rgba32Float, SIZE), input(&ctx, format));
+    let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
+    let depth = Some(DepthAttachment::clear(*deep, 1.0));
+    let [width, height] = SIZE;
+    run_pass(
+        &ctx,
+        &RenderPassDesc { color: &color, depth, local_read: true, ..Default::default() },
+        |pass| {
+            pass.bind_render_pipeline(*mark)?;
+            for column in 0..width {
+                pass.stencil_reference(column as u8 * 11, column as u8 * 11);
+                pass.scissor([column, 0], [1, height])?;
+                paint(pass, [0.0; 4], column as f32 / 32.0)?;
+            }
+            pass.scissor([0, 0], SIZE)?;
+            pass.bind_render_pipeline(*read)?;
+            pass.draw(0..3, 0..1)
+        },
+    );
+    for (at, pixel) in pixels::<[f32; 4]>(&ctx, *drawn).iter().enumerate() {
+        let column = (at % width as usize) as f32;
+        assert_eq!(*pixel, [column / 32.0, column * 11.0, 0.0, 1.0], "{at}");
+    }
+}
+
+/// What another command wrote before the pass is read in it too, and a target that is only tested.
+#[test]
+fn what_is_loaded_is_read() {
+    let Some(ctx) = device() else { return };
+    if !has(&ctx, OptionalFeature::LocalRead) {
+        return;
+    }
+    let read = "
+        LVK_INPUT(0, subpassInput, gLoaded);
+        LVK_DEPTH_INPUT(subpassInput, gDepth);
+        layout(location = 1) out vec4 result;
+        void main() { result = subpassLoad(gLoaded) + subpassLoad(gDepth).r; }";
+    let formats = [Format::Rgba32Float.into(); 2];
+    let depth = depth_test(Format::D32Float, false);
+    let desc = RenderPipelineDesc { color: &formats, depth, ..Default::default() };
+    let read = color_pipeline(&ctx, read, &desc).unwrap();
+    let (loaded, drawn) = (input(&ctx, Format::Rgba32Float), target(&ctx, Format::Rgba32Float, SIZE));
+    let deep = input(&ctx, Format::D32Float);
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.clear_texture(*loaded, lvk::ClearValue::Color([1.0, 2.0, 3.0, 4.0]), &Default::default()).unwrap();
+    cmd.clear_texture(*deep, lvk::ClearValue::Depth(0.25), &Default::default()).unwrap();
+    for _ in 0..2 {
+        let kept = ColorAttachment { load: ColorLoad::Load, ..ColorAttachment::clear(*loaded, [0.0; 4]) };
+        let color = [kept, ColorAttachment::clear(*drawn, [9.0; 4])];
+        let depth = Some(DepthAttachment::read_only(*deep));
+        let desc = RenderPassDesc { color: &color, depth, local_read: true, ..Default::default() };
+        let mut pass = cmd.begin_rendering(&desc).unwrap();
+        pass.bind_render_pipeline(*read).unwrap();
+        pass.draw(0..3, 0..1).unwrap();
+    }
+    ctx.submit(cmd).unwrap();
+    let found = pixels::<[f32; 4]>(&ctx, *drawn);
+    assert!(found.iter().all(|pixel| *pixel == [1.25, 2.25, 3.25, 4.25]), "{:?}", found[0]);
+    let kept = pixels::<[f32; 4]>(&ctx, *loaded);
+    assert!(kept.iter().all(|pixel| *pixel == [1.0, 2.0, 3.0, 4.0]), "no output, so nothing was written");
+}
+
+const READS_FIRST: &str = "
+    LVK_INPUT(0, subpassInput, gFirst);
+    layout(location = 0) out vec4 result;
+    void main() { result = subpassLoad(gFirst); }";
+
+#[test]
+fn modules_that_read_nothing_of_the_pass_are_refused() {
+    let Some(ctx) = device() else { return };
+    if !has(&ctx, OptionalFeature::LocalRead) {
+        return;
+    }
+    let refused = |declaration: &str, words: &str| {
+        let text = format!(
+            "{declaration}
+             layout(location = 0) out vec4 result;
+             void main() {{ result = subpassLoad(gIn); }}"
+        );
+        let source = lvk::ShaderSource::Glsl(&text);
+        let stage = ShaderStage::Fragment;
+        let desc = lvk::ShaderModuleDesc { stage, source, debug_name: "reads", ..Default::default() };
+        match ctx.create_shader_module(&desc) {
+            Err(Error::Shader { name, log }) => {
+                assert!(name == "reads" && log.contains(words) && log.contains("'gIn'"), "{name}: {log}");
+            }
+            other => unreachable!("{words}: {other:?}"),
+        }
+    };
+    let wrong_place = "declare it with LVK_INPUT, LVK_DEPTH_INPUT or LVK_STENCIL_INPUT";
+    refused(
+        "layout(input_attachment_index = 0, set = 0, binding = 1) uniform subpassInput gIn;",
+        wrong_place,
+    );
+    refused(
+        "layout(input_attachment_index = 2, set = 1, binding = 1) uniform subpassInput gIn;",
+        wrong_place,
+    );
+    refused(
+        "layout(input_attachment_index = 11, set = 1, binding = 12) uniform subpassInput gIn;",
+        wrong_place,
+    );
+    let sampled =
+        "layout(set = 1, binding = 1) uniform sampler2D gIn;\n#define subpassLoad(x) texture(x, vec2(0))";
+    refused(sampled, "set 1, binding 1");
+}
+
+#[test]
+fn pipelines_have_what_their_shaders_read() {
+    let Some(ctx) = device() else { return };
+    if !has(&ctx, OptionalFeature::LocalRead) {
+        return;
+    }
+    let formats = [Format::Rgba8Unorm.into(), Format::R32Uint.into()];
+    let plain = RenderPipelineDesc { color: &formats, debug_name: "reader", ..Default::default() };
+    let refused = |declaration: &str, desc: &RenderPipelineDesc<'_>, words: &str| {
+        let load = if declaration.contains("MS") { "subpassLoad(gIn, 0)" } else { "subpassLoad(gIn)" };
+        let text = format!(
+            "{declaration} layout(location = 0) out vec4 result; void main() {{ result = vec4({load}); }}"
+        );
+        let made = color_pipeline(&ctx, &text, desc);
+        usage_error(made.map(drop), words);
+    };
+    let at = |target: u32, ty: &str| format!("LVK_INPUT({target}, {ty}, gIn);");
+    refused(
+        &at(2, "subpassInput"),
+        &plain,
+        "reader: its fragment shader 'test shader' reads colour target 2",
+    );
+    refused(&at(1, "subpassInput"), &plain, "which is a usubpassInput, as a subpassInput");
+    refused(&at(0, "isubpassInput"), &plain, "which is a subpassInput, as a isubpassInput");
+    refused(&at(0, "subpassInputMS"), &plain, "take a type without MS");
+    let four = RenderPipelineDesc { samples: 4, ..plain };
+    refused(&at(0, "subpassInput"), &four, "take a type with MS");
+    let depth = "LVK_DEPTH_INPUT(subpassInput, gIn);";
+    refused(depth, &plain, "reads the depth target, but it draws to no depth target");
+    let writes = RenderPipelineDesc { depth: depth_test(Format::D32Float, true), ..plain };
+    refused(depth, &writes, "which the pipeline also writes; turn the writes off");
+    if ctx.capabilities().limits.max_input_attachments == 10 {
+        let stencil = "LVK_STENCIL_INPUT(usubpassInput, gIn);";
+        refused(
+            stencil,
+            &writes,
+            "reads the stencil of the depth target, but it draws to a depth target without stencil",
+        );
+    }
+}
+
+#[test]
+fn passes_have_what_their_pipelines_read() {
+    let Some(ctx) = device() else { return };
+    if !has(&ctx, OptionalFeature::LocalRead) {
+        return;
+    }
+    let formats = [Format::Rgba8Unorm.into()];
+    let desc = RenderPipelineDesc { color: &formats, debug_name: "reader", ..Default::default() };
+    let reader = color_pipeline(&ctx, READS_FIRST, &desc).unwrap();
+    let (with, without) = (input(&ctx, Format::Rgba8Unorm), target(&ctx, Format::Rgba8Unorm, SIZE));
+    let begin = |color: &[ColorAttachment], local_read: bool, words: &str| {
+        let mut cmd = ctx.acquire_command_buffer().unwrap();
+        let desc = RenderPassDesc { color, local_read, debug_name: "lit", ..Default::default() };
+        let mut pass = match cmd.begin_rendering(&desc) {
+            Ok(pass) => pass,
+            Err(error) => return usage_error(Err::<(), _>(error), words),
+        };
+        usage_error(pass.bind_render_pipeline(*reader), words);
+        if !local_read {
+            usage_error(pass.read_targets(), "the pass was begun without RenderPassDesc::local_read");
+        }
+    };
+    let cleared = |texture| [ColorAttachment::clear(texture, [0.0; 4])];
+    begin(
+        &cleared(*with),
+        false,
+        "reader: its fragment shader reads colour target 0, but the pass was begun without",
+    );
+    begin(&cleared(*without), true, "lit: local_read is on, but no target has TextureUsage::INPUT");
+    let two = [cleared(*without)[0], cleared(*with)[0]];
+    let formats = [Format::Rgba8Unorm.into(); 2];
+    let both = RenderPipelineDesc { color: &formats, debug_name: "reader", ..Default::default() };
+    let reader = color_pipeline(&ctx, READS_FIRST, &both).unwrap();
+    let desc = RenderPassDesc { color: &two, local_read: true, ..Default::default() };
+    run_pass(&ctx, &desc, |pass| {
+        usage_error(
+            pass.bind_render_pipeline(*reader),
+            "colour target 0, whose texture lacks TextureUsage::INPUT",
+        );
+        Ok(())
+    });
+    let reads_depth = "
+        LVK_DEPTH_INPUT(subpassInput, gDepth);
+        layout(location = 0) out vec4 result;
+        void main() { result = subpassLoad(gDepth); }";
+    let formats = [Format::Rgba8Unorm.into()];
+    let depth = depth_test(Format::D32Float, false);
+    let desc =
+        RenderPipelineDesc { color: &formats, depth, debug_name: "depth reader", ..Default::default() };
+    let reader = color_pipeline(&ctx, reads_depth, &desc).unwrap();
+    let deep = input(&ctx, Format::D32Float);
+    let color = cleared(*without);
+    let depth = Some(DepthAttachment::clear(*deep, 1.0));
+    run_pass(
+        &ctx,
+        &RenderPassDesc { color: &color, depth, local_read: true, ..Default::default() },
+        |pass| {
+            pass.bind_render_pipeline(*reader)?;
+            let write = DepthState { compare: CompareOp::Always, write: true };
+            usage_error(pass.depth_state(write), "depth reader: its fragment shader reads the depth target");
+            pass.depth_state(DepthState { write: false, ..write })
+        },
+    );
+}
+
+#[test]
+fn textures_that_cannot_be_inputs_are_refused() {
+    let Some(ctx) = device() else { return };
+    if !has(&ctx, OptionalFeature::LocalRead) {
+        return;
+    }
+    let plain = TextureDesc { usage: READ, debug_name: "made", ..Default::default() };
+    let alone = TextureDesc { usage: TextureUsage::INPUT | TextureUsage::SAMPLED, ..plain };
+    usage_error(ctx.create_texture(&alone), "made: INPUT is for what a pass draws to");
+    let volume = TextureDesc { kind: TextureKind::D3 { depth: 2 }, ..plain };
+    usage_error(ctx.create_texture(&volume), "made: slices of a volume");
+    let transient =
+        TextureDesc { memory: TextureMemory::Transient, usage: READ | TextureUsage::SAMPLED, ..plain };
+    usage_error(ctx.create_texture(&transient), "TARGET and INPUT, and no other");
+    // A pass that reads a texture as a target cannot sample it too.
+    let both = input(&ctx, Format::Rgba8Unorm);
+    let color = [ColorAttachment::clear(*both, [0.0; 4])];
+    let dependencies = Dependencies { sampled_images: &[*both], ..Default::default() };
+    let desc = RenderPassDesc { color: &color, dependencies, local_read: true, ..Default::default() };
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    usage_error(cmd.begin_rendering(&desc).map(drop), "input");
+}
+
+/// Without the feature everything says so, and passes and pipelines without inputs are what they were.
+#[test]
+fn devices_without_local_reads_say_so() {
+    let profile = DeviceProfile::core_only();
+    let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
+    assert_eq!(ctx.capabilities().limits.max_input_attachments, 0);
+    let desc = TextureDesc { usage: READ, debug_name: "albedo", ..Default::default() };
+    unsupported(ctx.create_texture(&desc), "the usage INPUT of texture 'albedo'");
+    let source = lvk::ShaderSource::Glsl(READS_FIRST);
+    let stage = ShaderStage::Fragment;
+    let desc = lvk::ShaderModuleDesc { stage, source, debug_name: "lighting", ..Default::default() };
+    unsupported(ctx.create_shader_module(&desc), "InputAttachment of shader 'lighting'");
+    let plain = target(&ctx, Format::Rgba8Unorm, SIZE);
+    let color = [ColorAttachment::clear(*plain, [0.0; 4])];
+    let desc = RenderPassDesc { color: &color, local_read: true, debug_name: "lit", ..Default::default() };
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    unsupported(cmd.begin_rendering(&desc).map(drop), "local_read of the pass 'lit' is not supported");
+    drop(cmd);
+    let picture = in_two_passes(&ctx, Format::D32Float);
+    assert_eq!(picture.len(), (SIZE[0] * SIZE[1] * 4) as usize);
+    drop(module(&ctx, ShaderStage::Fragment, PAINT));
+}
