@@ -9,6 +9,7 @@ pub mod hybrid_oit;
 pub mod pipelines;
 pub mod raster;
 pub mod reflections;
+pub mod render_to_cube_map;
 pub mod rtx;
 pub mod rtx_ao;
 pub mod rtx_hello;

@@ -47,6 +47,10 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("reflections/trace_query.glsl", include_str!("../../shaders/reflections/trace_query.glsl")),
     ("reflections/visibility.glsl", include_str!("../../shaders/reflections/visibility.glsl")),
     ("reflections/waves.glsl", include_str!("../../shaders/reflections/waves.glsl")),
+    ("render_to_cube_map/drop.glsl", include_str!("../../shaders/render_to_cube_map/drop.glsl")),
+    ("render_to_cube_map/frame.glsl", include_str!("../../shaders/render_to_cube_map/frame.glsl")),
+    ("render_to_cube_map/light.glsl", include_str!("../../shaders/render_to_cube_map/light.glsl")),
+    ("render_to_cube_map/view.glsl", include_str!("../../shaders/render_to_cube_map/view.glsl")),
     ("rtx_ao/frame.glsl", include_str!("../../shaders/rtx_ao/frame.glsl")),
     ("rtx_ao/light.glsl", include_str!("../../shaders/rtx_ao/light.glsl")),
     ("rtx_hello/view.glsl", include_str!("../../shaders/rtx_hello/view.glsl")),
@@ -284,4 +288,24 @@ pub mod hello_triangle {
     pub const TRIANGLE_VERT: &str = include_str!("../../shaders/hello_triangle/triangle.vert.glsl");
     /// The colour between them.
     pub const TRIANGLE_FRAG: &str = include_str!("../../shaders/hello_triangle/triangle.frag.glsl");
+}
+
+/// Stages of the `render_to_cube_map` sample.
+pub mod render_to_cube_map {
+    /// Macros of the fragment stages that draw the picture in place of the cube map.
+    pub const OF_PICTURE: &[(&str, &str)] = &[("PICTURE", "1")];
+    /// Macros of the vertex stages that draw all faces at once.
+    pub const OF_ALL_FACES: &[(&str, &str)] = &[("ALL_FACES", "1")];
+    /// Corners of the blocks.
+    pub const BLOCK_VERT: &str = include_str!("../../shaders/render_to_cube_map/block.vert.glsl");
+    /// Their colours, and those of the floor.
+    pub const BLOCK_FRAG: &str = include_str!("../../shaders/render_to_cube_map/block.frag.glsl");
+    /// A triangle behind everything.
+    pub const SKY_VERT: &str = include_str!("../../shaders/render_to_cube_map/sky.vert.glsl");
+    /// The sky.
+    pub const SKY_FRAG: &str = include_str!("../../shaders/render_to_cube_map/sky.frag.glsl");
+    /// Corners of the drop.
+    pub const DROP_VERT: &str = include_str!("../../shaders/render_to_cube_map/drop.vert.glsl");
+    /// What it mirrors.
+    pub const DROP_FRAG: &str = include_str!("../../shaders/render_to_cube_map/drop.frag.glsl");
 }

@@ -22,7 +22,7 @@ struct Program {
 /// The ways of samples that trace rays.
 const RAYS: &[&[&str]] = &[&["--rt", "pipeline"], &["--rt", "query"]];
 
-const PROGRAMS: [Program; 7] = [
+const PROGRAMS: [Program; 8] = [
     Program {
         path: env!("CARGO_BIN_EXE_reflections"),
         quick: &["--samples", "1"],
@@ -71,6 +71,13 @@ const PROGRAMS: [Program; 7] = [
         own: &[],
         said: &["a turning triangle", "triangle"],
         ways: &[&[]],
+    },
+    Program {
+        path: env!("CARGO_BIN_EXE_render_to_cube_map"),
+        quick: &["--face-size", "32"],
+        own: &["--faces", "--face-size", "--roughness"],
+        said: &["48 blocks", "6 x 32 x 32", "cube map", "picture"],
+        ways: &[&["--faces", "six-passes"], &["--faces", "one-pass"]],
     },
 ];
 

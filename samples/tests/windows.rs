@@ -106,6 +106,11 @@ fn hello_triangle_has_a_window() {
 }
 
 #[test]
+fn render_to_cube_map_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_render_to_cube_map"), &["--face-size", "64"]);
+}
+
+#[test]
 fn rtx_hello_has_a_window() {
     shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_hello"), &[]);
 }

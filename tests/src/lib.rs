@@ -8,6 +8,7 @@ pub mod compute;
 pub mod device;
 pub mod glass_room;
 pub mod gpu_built;
+pub mod half;
 pub mod hit_check;
 pub mod hybrid;
 pub mod meshes;

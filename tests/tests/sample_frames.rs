@@ -10,6 +10,7 @@ use lvk_samples::hello_triangle::HelloTriangle;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence};
 use lvk_samples::hybrid_oit::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
+use lvk_samples::render_to_cube_map::{Faces, RenderToCubeMap, RenderToCubeMapConfig};
 use lvk_samples::rtx::RtxConfig;
 use lvk_samples::rtx_ao::{RtxAo, RtxAoConfig};
 use lvk_samples::rtx_hello::RtxHello;
@@ -91,6 +92,16 @@ fn rtx(ctx: &Context, [width, height]: [u32; 2]) -> RtxConfig {
 fn hello_triangle_goes_by_frames() {
     let Some(ctx) = device() else { return };
     check(|size| HelloTriangle::new(&ctx, size).unwrap());
+}
+
+#[test]
+fn render_to_cube_map_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    check(|extent| {
+        let config =
+            RenderToCubeMapConfig { face_size: 32, ..RenderToCubeMapConfig::new(extent, Faces::SixPasses) };
+        RenderToCubeMap::new(&ctx, &config).unwrap()
+    });
 }
 
 #[test]

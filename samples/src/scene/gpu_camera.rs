@@ -44,6 +44,37 @@ impl GpuCamera {
         }
     }
 
+    /// Cameras of the six faces of a cube map that is drawn from `eye`, with `size` pixels a side, in Vulkan's order of faces.
+    /// They look at the cube from inside, as samplers do: left and right are those of a mirror.
+    pub(crate) fn cube_faces(eye: [f32; 3], size: u32, near_plane: f32) -> [Self; 6] {
+        use glam::Vec3 as V;
+        // Forward, right and down of each face: the specification's major axis, s and t.
+        let faces = [
+            [V::X, V::NEG_Z, V::NEG_Y],
+            [V::NEG_X, V::Z, V::NEG_Y],
+            [V::Y, V::X, V::Z],
+            [V::NEG_Y, V::X, V::NEG_Z],
+            [V::Z, V::X, V::NEG_Y],
+            [V::NEG_Z, V::NEG_X, V::NEG_Y],
+        ];
+        faces.map(|axes| {
+            let [forward, right, down] = axes.map(|axis| axis.to_array());
+            Self {
+                eye,
+                near_plane,
+                forward,
+                pixel_spread: 2.0 / size as f32,
+                right,
+                width: size,
+                down,
+                height: size,
+                clip_right: right,
+                clip_down: down,
+                shift: [0.0; 2],
+            }
+        })
+    }
+
     /// The same camera for sample `number` of `count`: evenly spread over each pixel, the only one in the middle.
     pub(crate) fn for_sample(self, number: u32, count: u32) -> Self {
         if count <= 1 {
@@ -87,6 +118,33 @@ mod tests {
         let point = Vec3::from(camera().eye) + 7.0 * direction(&gpu, [0.4, -0.8]);
         let clip = clip_from_world.project_point3(point);
         assert!((clip.x - 0.4).abs() < 1e-4 && (clip.y + 0.8).abs() < 1e-4, "{clip}");
+    }
+
+    /// The face and the place on it, from -1 to 1, that the specification of Vulkan gives a direction.
+    fn face_of(direction: Vec3) -> (usize, [f32; 2]) {
+        let Vec3 { x, y, z } = direction;
+        let largest = direction.abs().max_element();
+        let (face, s, t) = if x.abs() == largest {
+            if x > 0.0 { (0, -z, -y) } else { (1, z, -y) }
+        } else if y.abs() == largest {
+            if y > 0.0 { (2, x, z) } else { (3, x, -z) }
+        } else if z > 0.0 {
+            (4, x, -y)
+        } else {
+            (5, -x, -y)
+        };
+        (face, [s / largest, t / largest])
+    }
+
+    #[test]
+    fn faces_of_cubes_are_where_samplers_look_for_them() {
+        for (number, face) in GpuCamera::cube_faces([1.0, 2.0, 3.0], 16, 0.1).iter().enumerate() {
+            for ndc in [[0.0, 0.0], [0.7, -0.3], [-0.9, 0.5]] {
+                let (found, place) = face_of(direction(face, ndc));
+                assert_eq!(found, number);
+                assert!((place[0] - ndc[0]).abs() + (place[1] - ndc[1]).abs() < 1e-6, "{number}: {place:?}");
+            }
+        }
     }
 
     #[test]

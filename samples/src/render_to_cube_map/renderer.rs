@@ -1,0 +1,243 @@
+//! The sample as a type: say the moment, get a picture.
+
+use bytemuck::{Pod, Zeroable};
+use lvk::{
+    BufferDesc, BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, RenderPass,
+    RenderPipelineDesc, RenderPipelineHandle, TextureHandle,
+};
+
+use super::config::{Faces, RenderToCubeMapConfig, has_six_views};
+use super::cube_map::{CubeMap, FACES};
+use super::pipelines::{self, IN_PICTURE, ON_ALL_FACES, ON_FACE};
+use super::surroundings::{Block, DROP, blocks, camera};
+use crate::app::array_buffer::array;
+use crate::app::frame::Frame;
+use crate::app::sample::{Moment, Sample};
+use crate::raster::{Canvas, RasterError};
+use crate::scene::{Camera, GpuCamera};
+
+/// Corners of a block, of the sky, and of the drop (`kGrid` in `shaders/render_to_cube_map/drop.glsl`).
+const BLOCK_CORNERS: u32 = 36;
+const SKY_CORNERS: u32 = 3;
+const DROP_CORNERS: u32 = 6 * 96 * 48;
+/// Number of the picture's camera, behind those of the faces.
+const PICTURE: u32 = FACES;
+const NEAR_PLANE: f32 = 0.1;
+
+/// Draws a drop and what it mirrors.
+pub struct RenderToCubeMap {
+    ctx: Context,
+    canvas: Canvas,
+    config: RenderToCubeMapConfig,
+    cube_map: CubeMap,
+    pipelines: Pipelines,
+    blocks: Vec<Block>,
+    camera: Camera,
+    phase: f32,
+    waves: f32,
+    blocks_buffer: Holder<BufferHandle>,
+    frame: Holder<BufferHandle>,
+    push: Push,
+}
+
+/// All of them; none for six views where the device has none.
+struct Pipelines {
+    in_picture: Surroundings,
+    on_face: Surroundings,
+    on_all_faces: Option<Surroundings>,
+    drop: Holder<RenderPipelineHandle>,
+}
+
+/// What stands around the drop, for one kind of target.
+struct Surroundings {
+    blocks: Holder<RenderPipelineHandle>,
+    sky: Holder<RenderPipelineHandle>,
+}
+
+/// `Frame` in `shaders/render_to_cube_map/frame.glsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct FrameConstants {
+    cameras: [GpuCamera; FACES as usize + 1],
+    blocks: u64,
+    cube_map: u32,
+    sampler: u32,
+    phase: f32,
+    waves: f32,
+    lod: f32,
+    padding: u32,
+}
+
+/// `Push` there.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Push {
+    frame: u64,
+    view: u32,
+    padding: u32,
+}
+
+impl RenderToCubeMap {
+    /// Makes the cube map and the pipelines. The animation stands at its beginning.
+    ///
+    /// # Errors
+    /// [`RasterError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, config: &RenderToCubeMapConfig) -> Result<Self, RasterError> {
+        config.faces.check(ctx)?;
+        let canvas = Canvas::with_depth(ctx, config.extent)?;
+        let blocks = blocks(0.0);
+        let frame = ctx.create_buffer(&BufferDesc {
+            size_bytes: size_of::<FrameConstants>() as u64,
+            debug_name: "frame constants",
+            ..BufferDesc::default()
+        })?;
+        Ok(Self {
+            canvas,
+            config: *config,
+            cube_map: CubeMap::new(ctx, config.face_size)?,
+            pipelines: Pipelines::new(ctx)?,
+            blocks_buffer: array(ctx, "blocks", BufferUsage::STORAGE, &blocks)?,
+            blocks,
+            camera: camera(0.0),
+            phase: 0.0,
+            waves: 0.16,
+            push: Push { frame: ctx.buffer_address(*frame)?, view: PICTURE, padding: 0 },
+            frame,
+            ctx: ctx.clone(),
+        })
+    }
+
+    /// The floor and the blocks, as they are at the moment.
+    #[must_use]
+    pub fn blocks(&self) -> &[Block] {
+        &self.blocks
+    }
+
+    /// The cube map: six faces with all mips, in linear light.
+    #[must_use]
+    pub fn cube_map(&self) -> TextureHandle {
+        *self.cube_map.texture
+    }
+
+    /// What is rendered, and how.
+    #[must_use]
+    pub fn config(&self) -> &RenderToCubeMapConfig {
+        &self.config
+    }
+
+    fn upload(&self) -> lvk::Result<()> {
+        let [width, height] = self.config.extent;
+        let [a, b, c, d, e, f] = GpuCamera::cube_faces(DROP, self.config.face_size, NEAR_PLANE);
+        let constants = FrameConstants {
+            cameras: [a, b, c, d, e, f, GpuCamera::new(&self.camera, width, height, NEAR_PLANE)],
+            blocks: self.ctx.buffer_address(*self.blocks_buffer)?,
+            cube_map: self.cube_map.texture.index(),
+            sampler: self.cube_map.sampler.index(),
+            phase: self.phase,
+            waves: self.waves,
+            lod: self.config.roughness * (self.cube_map.mips - 1) as f32,
+            padding: 0,
+        };
+        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&constants))?;
+        self.ctx.upload_buffer(*self.blocks_buffer, 0, bytemuck::cast_slice(&self.blocks))
+    }
+
+    /// Draws what stands around the drop, seen by the camera `view`.
+    fn draw(&self, pass: &mut RenderPass<'_>, by: &Surroundings, view: u32) -> lvk::Result<()> {
+        pass.bind_render_pipeline(*by.blocks)?;
+        pass.push_constants(&Push { view, ..self.push })?;
+        pass.draw(0..BLOCK_CORNERS, 0..self.blocks.len() as u32)?;
+        pass.bind_render_pipeline(*by.sky)?;
+        pass.draw(0..SKY_CORNERS, 0..1)
+    }
+}
+
+impl Sample for RenderToCubeMap {
+    type Error = RasterError;
+
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
+    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
+        self.phase = moment.phase();
+        self.blocks = blocks(self.phase);
+        self.camera = camera(self.phase);
+        Ok(())
+    }
+
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+        self.upload()?;
+        let (faces, on_faces) = self.pipelines.faces(self.config.faces);
+        frame.pass("cube map", |cmd| {
+            self.cube_map.record(cmd, faces, |pass, view| self.draw(pass, on_faces, view))
+        })?;
+        let reads = Dependencies { sampled_images: &[self.cube_map()], ..Dependencies::default() };
+        let mut pass = self.canvas.begin(&mut frame.cmd, "picture", [0.0; 3], &reads)?;
+        self.draw(&mut pass, &self.pipelines.in_picture, PICTURE)?;
+        pass.bind_render_pipeline(*self.pipelines.drop)?;
+        pass.draw(0..DROP_CORNERS, 0..1)?;
+        Ok(self.canvas.picture())
+    }
+
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
+        self.canvas = Canvas::with_depth(&self.ctx, extent)?;
+        self.config.extent = extent;
+        Ok(())
+    }
+
+    fn view(&self) -> Option<Camera> {
+        Some(self.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.camera = *camera;
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        let RenderToCubeMapConfig { faces, roughness, .. } = &mut self.config;
+        ui.radio_value(faces, Faces::SixPasses, "six passes");
+        ui.add_enabled_ui(self.pipelines.on_all_faces.is_some(), |ui| {
+            ui.radio_value(faces, Faces::OnePass, "one pass of six views");
+        });
+        ui.add(egui::Slider::new(roughness, 0.0..=1.0).text("roughness"));
+        ui.add(egui::Slider::new(&mut self.waves, 0.0..=0.3).text("waves"));
+    }
+
+    fn reload(&mut self) -> Result<(), RasterError> {
+        self.pipelines = Pipelines::new(&self.ctx)?;
+        Ok(())
+    }
+}
+
+impl Pipelines {
+    fn new(ctx: &Context) -> lvk::Result<Self> {
+        let has_six_views = has_six_views(ctx.capabilities());
+        let culled = RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() };
+        Ok(Self {
+            in_picture: Surroundings::new(ctx, &IN_PICTURE)?,
+            on_face: Surroundings::new(ctx, &ON_FACE)?,
+            on_all_faces: has_six_views.then(|| Surroundings::new(ctx, &ON_ALL_FACES)).transpose()?,
+            drop: pipelines::DROP.create_with(ctx, &culled)?,
+        })
+    }
+
+    /// How faces are drawn where `wish` is possible, and otherwise.
+    fn faces(&self, wish: Faces) -> (Faces, &Surroundings) {
+        match (wish, &self.on_all_faces) {
+            (Faces::OnePass, Some(all)) => (Faces::OnePass, all),
+            _ => (Faces::SixPasses, &self.on_face),
+        }
+    }
+}
+
+impl Surroundings {
+    fn new(ctx: &Context, of: &pipelines::Surroundings) -> lvk::Result<Self> {
+        let state = RenderPipelineDesc {
+            cull: CullMode::Back,
+            front_face: of.front,
+            ..RenderPipelineDesc::default()
+        };
+        Ok(Self { blocks: of.blocks.create_with(ctx, &state)?, sky: of.sky.create(ctx)? })
+    }
+}

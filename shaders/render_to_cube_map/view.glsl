@@ -1,0 +1,13 @@
+// Which camera a vertex is seen by: that of its face where one pass draws all of them, else the one that the pass is told.
+#ifdef ALL_FACES
+#extension GL_EXT_multiview : require
+#endif
+#include "render_to_cube_map/frame.glsl"
+
+Camera viewCamera() {
+#ifdef ALL_FACES
+    return frame.cameras[gl_ViewIndex];
+#else
+    return frame.cameras[view];
+#endif
+}
