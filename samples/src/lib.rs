@@ -6,6 +6,7 @@ pub mod driver;
 pub mod hello_triangle;
 pub mod hybrid;
 pub mod hybrid_oit;
+pub mod large_scene;
 pub mod pipelines;
 pub mod raster;
 pub mod reflections;

@@ -30,6 +30,9 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("hybrid/trace_query.glsl", include_str!("../../shaders/hybrid/trace_query.glsl")),
     ("hybrid/visibility.glsl", include_str!("../../shaders/hybrid/visibility.glsl")),
     ("hybrid/visible_triangle.glsl", include_str!("../../shaders/hybrid/visible_triangle.glsl")),
+    ("large_scene/frame.glsl", include_str!("../../shaders/large_scene/frame.glsl")),
+    ("large_scene/hit.glsl", include_str!("../../shaders/large_scene/hit.glsl")),
+    ("large_scene/picture.glsl", include_str!("../../shaders/large_scene/picture.glsl")),
     ("reflections/ambient.glsl", include_str!("../../shaders/reflections/ambient.glsl")),
     ("reflections/fragment.glsl", include_str!("../../shaders/reflections/fragment.glsl")),
     ("reflections/frame.glsl", include_str!("../../shaders/reflections/frame.glsl")),
@@ -220,6 +223,20 @@ pub mod hybrid_oit {
     pub const SHADOW_COMP: &str = include_str!("../../shaders/hybrid_oit/shadow.comp.glsl");
     /// The picture.
     pub const COMPOSITE_COMP: &str = include_str!("../../shaders/hybrid_oit/composite.comp.glsl");
+}
+
+/// Stages of the `large_scene` sample.
+pub mod large_scene {
+    /// A pixel by the ray tracing pipeline.
+    pub const PICTURE_RGEN: &str = include_str!("../../shaders/large_scene/picture.rgen.glsl");
+    /// The nearest triangle of a ray.
+    pub const NEAREST_RCHIT: &str = include_str!("../../shaders/large_scene/nearest.rchit.glsl");
+    /// A ray that left the world.
+    pub const NEAREST_RMISS: &str = include_str!("../../shaders/large_scene/nearest.rmiss.glsl");
+    /// A shadow ray with nothing in its way.
+    pub const OPEN_RMISS: &str = include_str!("../../shaders/large_scene/open.rmiss.glsl");
+    /// A pixel by ray queries.
+    pub const PICTURE_COMP: &str = include_str!("../../shaders/large_scene/picture.comp.glsl");
 }
 
 /// Stages of the `rtx_hello` sample.

@@ -22,7 +22,7 @@ struct Program {
 /// The ways of samples that trace rays.
 const RAYS: &[&[&str]] = &[&["--rt", "pipeline"], &["--rt", "query"]];
 
-const PROGRAMS: [Program; 8] = [
+const PROGRAMS: [Program; 9] = [
     Program {
         path: env!("CARGO_BIN_EXE_reflections"),
         quick: &["--samples", "1"],
@@ -35,6 +35,30 @@ const PROGRAMS: [Program; 8] = [
         quick: &["--supersampling", "1", "--shadow-rays", "1"],
         own: &["--supersampling", "--shadow-rays", "--nodes", "--time"],
         said: &["list of glass", "spheres of glass", "composite", "nodes"],
+        ways: RAYS,
+    },
+    Program {
+        path: env!("CARGO_BIN_EXE_large_scene"),
+        quick: &["--triangles", "4000", "--copies", "20", "--samples", "1"],
+        own: &[
+            "--triangles",
+            "--copies",
+            "--layout",
+            "--scene",
+            "--archive",
+            "--camera",
+            "--show",
+            "--no-compaction",
+        ],
+        said: &[
+            "valley",
+            "with all instances",
+            "instances 21",
+            "5 built",
+            "structures 5 in ",
+            "compacted from",
+            "rays",
+        ],
         ways: RAYS,
     },
     Program {
@@ -278,5 +302,59 @@ fn ctrl_c_leaves_whole_pictures_that_can_be_resumed() {
             Outcome::of(program.small(folder.path(), "frame_######.png", &["--resume", "--frames", &range]));
         resumed.assert_success();
         assert_names(&resumed.out, &["wrote 1 frames", &format!("{} were there", written.len())]);
+    }
+}
+
+/// Two OBJ files along a street: built by the first start, loaded by the second, and again what is damaged.
+#[test]
+fn structures_are_kept_from_one_start_to_the_next() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    for name in ["wedge.obj", "other.obj"] {
+        std::fs::write(
+            folder.path().join(name),
+            text.replace("0 1 0", if name == "other.obj" { "0 2 0" } else { "0 1 0" }),
+        )
+        .unwrap();
+    }
+    let program =
+        Program { path: env!("CARGO_BIN_EXE_large_scene"), quick: &[], own: &[], said: &[], ways: RAYS };
+    let start = |expected: &str| {
+        let mut command = program.small(folder.path(), "a.png", &["--archive", "--copies", "3"]);
+        command.env("LVK_CACHE", folder.path().join("cache")).env("LVK_SCENES", folder.path());
+        let outcome = Outcome::of(command);
+        outcome.assert_success();
+        assert_names(&outcome.out, &["instances 7", expected]);
+        outcome.err
+    };
+    start("0 from files, 3 built, 0 built anew");
+    start("3 from files, 0 built, 0 built anew");
+    let kept = files(&folder.path().join("cache/structures"));
+    std::fs::write(&kept[0], "damaged").unwrap();
+    let err = start("2 from files, 0 built, 1 built anew");
+    assert_names(&err, &["warning: the structure", "is dropped", &kept[0].display().to_string()]);
+    start("3 from files, 0 built, 0 built anew");
+}
+
+#[test]
+fn scenes_that_are_not_there_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let program =
+        Program { path: env!("CARGO_BIN_EXE_large_scene"), quick: &[], own: &[], said: &[], ways: RAYS };
+    let empty = folder.path().display().to_string();
+    for (args, part) in [
+        (&["--scene", "nowhere.obj"][..], "no such file"),
+        (&["--archive", &empty][..], "no OBJ file in"),
+        (&["--archive"][..], "LVK_SCENES"),
+        (&["--layout", "combined", "--triangles", "400000", "--copies", "2000"][..], "--layout instanced"),
+    ] {
+        let mut command = program.small(folder.path(), "a.png", args);
+        command.env_remove("LVK_SCENES");
+        let outcome = Outcome::of(command);
+        assert_eq!(outcome.status, Some(2), "{args:?}: {}", outcome.err);
+        assert_names(&outcome.err, &[part]);
     }
 }

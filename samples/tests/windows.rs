@@ -131,6 +131,12 @@ fn rtx_ao_has_a_window() {
 }
 
 #[test]
+fn large_scene_has_a_window() {
+    let args = ["--triangles", "20000", "--copies", "30", "--samples", "1"];
+    shows_what_it_writes(env!("CARGO_BIN_EXE_large_scene"), &args);
+}
+
+#[test]
 fn hybrid_has_a_window() {
     shows_what_it_writes(env!("CARGO_BIN_EXE_hybrid"), &["--depth", "1"]);
 }

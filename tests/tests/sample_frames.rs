@@ -5,10 +5,12 @@
 use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureRegion, TextureUsage};
 use lvk_samples::app::frame::Frame;
 use lvk_samples::app::headless;
+use lvk_samples::app::progress::Progress;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hello_triangle::HelloTriangle;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence};
 use lvk_samples::hybrid_oit::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene};
+use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, World};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
 use lvk_samples::render_to_cube_map::{Faces, RenderToCubeMap, RenderToCubeMapConfig};
 use lvk_samples::rtx::RtxConfig;
@@ -132,6 +134,16 @@ fn rtx_ao_goes_by_frames() {
     check(|size| {
         let config = RtxAoConfig { passes: 2, rays: 1, ..RtxAoConfig::new(rtx(&ctx, size)) };
         RtxAo::new(&ctx, &Scene::town(), Some(&Scene::carousel()), &config).unwrap()
+    });
+}
+
+#[test]
+fn large_scene_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    let world = World::valley(4_000, 12);
+    check(|size| {
+        let config = LargeSceneConfig { depth: 1, samples: 2, ..LargeSceneConfig::new(rtx(&ctx, size)) };
+        LargeScene::new(&ctx, &world, &config, &mut Progress::hidden()).unwrap()
     });
 }
 

@@ -1,5 +1,5 @@
-//! Where a sample keeps what takes long to make, from one start to the next: compiled shaders, pipelines, and the trees
-//! that software walks.
+//! Where a sample keeps what takes long to make, from one start to the next: compiled shaders, pipelines, the trees that
+//! software walks, and acceleration structures.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -14,6 +14,7 @@ pub(super) struct Caches {
     pipelines: PathBuf,
     shaders: PathBuf,
     trees: PathBuf,
+    structures: PathBuf,
 }
 
 impl Caches {
@@ -36,7 +37,13 @@ impl Caches {
             pipelines: folder.join(format!("{name}.pipelines")),
             shaders: folder.join("shaders"),
             trees: folder.join("trees"),
+            structures: folder.join("structures"),
         }
+    }
+
+    /// The folder of structures that samples keep by themselves, which need not exist.
+    pub(super) fn structures(&self) -> &Path {
+        &self.structures
     }
 
     /// A description of a context that uses them.

@@ -1,10 +1,12 @@
 //! The program of every sample: device, frames, pictures, timings and what is said about them.
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
 use lvk::{Context, ValidationSink, WindowHandles};
 
+use super::caches::Caches;
 use super::device::{self, DeviceNeeds};
 use super::frame_name::FrameName;
 use super::frames::Frames;
@@ -57,6 +59,14 @@ impl<'a> Opening<'a> {
         let driver = prepare(&DriverRequest { validation: self.args.validate.is_some() })?;
         self.progress.stage("opening the device", 0);
         device::open(self.name, self.args, &driver, self.sink, needs, self.window.clone())
+    }
+
+    /// The folder of built acceleration structures, for samples that keep them, unless the user wants nothing kept. It need
+    /// not exist.
+    #[must_use]
+    pub fn structure_cache(&self) -> Option<PathBuf> {
+        let caches = if self.args.no_cache { None } else { Caches::open(self.name) };
+        caches.map(|caches| caches.structures().to_owned())
     }
 
     /// Prints warnings to standard error, past the progress bar.

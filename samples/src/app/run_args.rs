@@ -88,8 +88,8 @@ pub struct RunArgs {
     )]
     pub profile: Option<DeviceProfile>,
 
-    /// Keep nothing for the next start, and take nothing from the last one: compiled shaders, pipelines and trees of rays in
-    /// software, which otherwise are in the folder of LVK_CACHE or in lvk in the user's folder for caches
+    /// Keep nothing for the next start, and take nothing from the last one: compiled shaders, pipelines, trees of rays in
+    /// software and acceleration structures, which otherwise are in the folder of LVK_CACHE or in lvk in the user's folder for caches
     #[arg(long, help_heading = "Device")]
     pub no_cache: bool,
 

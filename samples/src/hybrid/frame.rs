@@ -3,7 +3,10 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
-use crate::scene::{GpuCamera, Scene};
+use crate::scene::{Ambient, DirectionalLight, GpuCamera, Scene};
+
+/// A scene's largest coordinate over the extent that rounding errors near the origin are measured by.
+const OFFSET_SHARE: f32 = 8.0;
 
 /// Addresses of a scene's arrays (`Scene` in `shaders/common/scene_buffers.glsl`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
@@ -54,6 +57,19 @@ impl Lighting {
             light_count: 1 + u32::from(scene.sun.is_some()),
             ambient_below: scene.ambient.below,
             offset_extent: offset_extent(scene),
+        }
+    }
+
+    /// The sun alone, in a world whose largest coordinate is `farthest`.
+    pub(crate) fn sunlit(sun: &DirectionalLight, ambient: &Ambient, farthest: f32) -> Self {
+        let mut lights = [GpuLight::zeroed(); 2];
+        lights[0] = GpuLight { position: sun.direction, is_distant: 1.0, color: sun.color, reach: 1.0 };
+        Self {
+            lights,
+            ambient_above: ambient.above,
+            light_count: 1,
+            ambient_below: ambient.below,
+            offset_extent: farthest / OFFSET_SHARE,
         }
     }
 
@@ -145,7 +161,7 @@ pub(crate) fn near_plane(scene: &Scene) -> f32 {
 fn offset_extent(scene: &Scene) -> f32 {
     let (low, high) = scene.bounds();
     let largest = low.iter().chain(&high).fold(0.0_f32, |largest, c| largest.max(c.abs()));
-    largest / 8.0
+    largest / OFFSET_SHARE
 }
 
 #[cfg(test)]

@@ -9,6 +9,16 @@ const CUSTOM_INDEX_LIMIT: u32 = 1 << 24;
 /// Fails where drawing `scene` would read outside of its arrays. Scenes that were loaded always pass, but for
 /// their size.
 pub(super) fn check(scene: &Scene) -> Result<(), HybridError> {
+    check_promises(scene)?;
+    let count = scene.opaque_triangle_count;
+    if count >= CUSTOM_INDEX_LIMIT {
+        return Err(HybridError::TooManyTriangles { count, limit: CUSTOM_INDEX_LIMIT });
+    }
+    Ok(())
+}
+
+/// As [`check`], for any number of triangles that 32 bits count.
+pub(crate) fn check_promises(scene: &Scene) -> Result<(), HybridError> {
     let vertices = scene.positions.len();
     let triangles = scene.triangles.len();
     let is_vertex = |&vertex: &u32| (vertex as usize) < vertices;
@@ -29,14 +39,10 @@ pub(super) fn check(scene: &Scene) -> Result<(), HybridError> {
             "a material names a texture that is not there",
         ),
     ];
-    if let Some((_, what)) = promises.into_iter().find(|(is_kept, _)| !is_kept) {
-        return Err(HybridError::BrokenScene(what));
+    match promises.into_iter().find(|(is_kept, _)| !is_kept) {
+        Some((_, what)) => Err(HybridError::BrokenScene(what)),
+        None => Ok(()),
     }
-    let count = scene.opaque_triangle_count;
-    if count >= CUSTOM_INDEX_LIMIT {
-        return Err(HybridError::TooManyTriangles { count, limit: CUSTOM_INDEX_LIMIT });
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -56,7 +56,8 @@ pub use error::SceneError;
 pub(crate) use gpu_camera::GpuCamera;
 pub use light::{Ambient, DirectionalLight, PointLight, display};
 pub use material::Material;
-pub(crate) use procedural::painted_textures;
+pub(crate) use procedural::{Valley, painted_textures};
+
 pub use sky::Sky;
 pub use texture::Texture;
 
@@ -145,6 +146,23 @@ impl Scene {
     /// Builds what turns around the vertical in the middle of the [`town`](Self::town).
     pub fn carousel() -> Self {
         procedural::carousel()
+    }
+
+    /// A scene without triangles under the usual sky, without light, to be completed.
+    pub(crate) fn empty() -> Self {
+        let setting = setting::Setting {
+            light: PointLight { position: [0.0; 3], color: [0.0; 3], reach: 1.0 },
+            sun: None,
+            ambient: Ambient { above: [0.0; 3], below: [0.0; 3] },
+            sky: Sky::day(),
+            cameras: [Camera::looking_at([0.0; 3], [0.0, 0.0, -1.0], 60.0); 5],
+        };
+        setting.into_scene(String::new(), mesh::Mesh::default(), Vec::new())
+    }
+
+    /// Whether it surrounds its middle, as rooms do.
+    pub(crate) fn is_room(&self) -> bool {
+        framing::is_room(&self.positions, &self.triangles)
     }
 
     /// Smallest box around all positions, as (minimum, maximum) in scene units.

@@ -6,11 +6,14 @@ mod paint;
 mod sculpture;
 mod solid;
 mod town;
+mod tree;
+mod valley;
 
 use glam::Vec3;
 
 use self::solid::Solids;
 pub(super) use self::town::{carousel, town};
+pub(crate) use self::valley::Valley;
 use super::mesh::Mesh;
 use super::setting::Setting;
 use super::{Ambient, Camera, DirectionalLight, Material, PointLight, Scene, Sky, Texture, normals};

@@ -1,0 +1,92 @@
+//! A world on the GPU.
+
+use lvk::{
+    AddressMode, BufferHandle, BufferUsage, Context, Holder, SamplerDesc, SamplerHandle, TextureHandle,
+    transform_rows,
+};
+
+use super::figures::Figures;
+use super::structure_cache::StructureCache;
+use super::structures::{Plan, Structures};
+use super::world::World;
+use super::{LargeSceneConfig, LargeSceneError};
+use crate::app::array_buffer::array;
+use crate::app::progress::Progress;
+use crate::app::scene_textures;
+use crate::hybrid::{SceneAddresses, SceneArrays, check_promises};
+
+/// Texels on an edge of the sky's cube map.
+const SKY_SIZE: u32 = 512;
+
+/// A world on the GPU.
+pub(super) struct GpuWorld {
+    pub(super) figures: Figures,
+    pub(super) sky: Holder<TextureHandle>,
+    pub(super) surface_sampler: Holder<SamplerHandle>,
+    pub(super) sky_sampler: Holder<SamplerHandle>,
+    pub(super) structures: Structures,
+    arrays: SceneArrays,
+    places: Holder<BufferHandle>,
+    firsts: Holder<BufferHandle>,
+    _textures: Vec<Holder<TextureHandle>>,
+}
+
+impl GpuWorld {
+    pub(super) fn new(
+        ctx: &Context,
+        world: &World,
+        config: &LargeSceneConfig,
+        progress: &mut Progress,
+    ) -> Result<Self, LargeSceneError> {
+        check_promises(&world.scene)?;
+        progress.stage("uploading the scene", 0);
+        let pictures = world.scene.textures.iter().map(|texture| scene_textures::picture(ctx, texture));
+        let textures: Vec<_> = pictures.collect::<Result<_, _>>()?;
+        let arrays = SceneArrays::new(ctx, &world.scene, &textures)?;
+        let rows: Vec<_> = world.instances.iter().map(|instance| transform_rows(&instance.place)).collect();
+        let firsts: Vec<_> = world.pieces.iter().map(|piece| piece.triangles.start).collect();
+        let sampler = |debug_name, address| {
+            ctx.create_sampler(&SamplerDesc { address: [address; 3], debug_name, ..SamplerDesc::default() })
+        };
+        let cache = config.cache.as_deref().map(StructureCache::new);
+        let plan = Plan { ctx, world, arrays: &arrays, cache, compact: config.compact };
+        let structures = Structures::new(&plan, progress)?;
+        Ok(Self {
+            figures: figures(ctx, world, &structures)?,
+            sky: scene_textures::sky(ctx, &world.scene.sky, SKY_SIZE)?,
+            surface_sampler: sampler("surface sampler", AddressMode::Repeat)?,
+            sky_sampler: sampler("sky sampler", AddressMode::ClampToEdge)?,
+            structures,
+            arrays,
+            places: array(ctx, "places of instances", BufferUsage::STORAGE, &rows)?,
+            firsts: array(ctx, "first triangles of pieces", BufferUsage::STORAGE, &firsts)?,
+            _textures: textures,
+        })
+    }
+
+    /// Where the shaders find the scene's arrays.
+    pub(super) fn scene(&self) -> SceneAddresses {
+        self.arrays.addresses()
+    }
+
+    /// Where the shaders find places of instances and first triangles of pieces.
+    pub(super) fn tables(&self, ctx: &Context) -> lvk::Result<[u64; 2]> {
+        Ok([ctx.buffer_address(*self.places)?, ctx.buffer_address(*self.firsts)?])
+    }
+}
+
+fn figures(ctx: &Context, world: &World, structures: &Structures) -> lvk::Result<Figures> {
+    let top_level = ctx.accel_struct_info(*structures.tlas)?;
+    let scene = &world.scene;
+    let vertex_bytes = 2 * size_of::<[f32; 3]>() + size_of::<[f32; 2]>();
+    let triangle_bytes = size_of::<[u32; 3]>() + size_of::<[u32; 2]>();
+    Ok(Figures {
+        structures: structures.figures(ctx, world)?,
+        triangles: world.triangle_count(),
+        shown_triangles: world.shown_triangle_count(),
+        instances: world.instances.len(),
+        scene_bytes: (scene.positions.len() * vertex_bytes + scene.triangles.len() * triangle_bytes) as u64,
+        top_level_bytes: top_level.structure_bytes + top_level.table_bytes,
+        scratch_bytes: ctx.accel_memory().scratch_bytes,
+    })
+}

@@ -1,0 +1,224 @@
+//! The sample as a type: say the moment, get a picture.
+
+use bytemuck::{Pod, Zeroable};
+use lvk::{BufferDesc, BufferHandle, Context, Dependencies, Holder, TextureHandle};
+
+use super::figures::{Figures, Origin, bytes, number};
+use super::gpu_world::GpuWorld;
+use super::pipelines::RAYS;
+use super::world::World;
+use super::{LargeSceneConfig, LargeSceneError, Show};
+use crate::app::frame::Frame;
+use crate::app::progress::Progress;
+use crate::app::sample::{Moment, Sample};
+use crate::hybrid::{Lighting, SceneAddresses};
+use crate::rtx::{Canvas, Tracer};
+use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, Scene};
+
+/// Distance of the near plane as a share of the world's farthest coordinate; rays start at the eye.
+const NEAR_SHARE: f32 = 1e-4;
+
+/// Renders a world of millions of triangles.
+pub struct LargeScene {
+    ctx: Context,
+    canvas: Canvas,
+    config: LargeSceneConfig,
+    world: GpuWorld,
+    tracer: Tracer,
+    frame: Holder<BufferHandle>,
+    constants: FrameConstants,
+    path: CameraPath,
+    camera: Camera,
+    near_plane: f32,
+}
+
+/// `Frame` in `shaders/large_scene/frame.glsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct FrameConstants {
+    camera: GpuCamera,
+    scene: SceneAddresses,
+    lighting: Lighting,
+    places: u64,
+    firsts: u64,
+    tlas: u32,
+    sky: u32,
+    surface_sampler: u32,
+    sky_sampler: u32,
+    image: u32,
+    depth: u32,
+    samples: u32,
+    show: u32,
+}
+
+impl LargeScene {
+    /// Uploads `world`, loads or builds its acceleration structures and makes the pipeline; `progress` shows how far that is.
+    ///
+    /// # Errors
+    /// [`LargeSceneError`] when the configuration or the world is beyond the device, or the device fails. Trouble with files of
+    /// the cache is none, but a warning.
+    pub fn new(
+        ctx: &Context,
+        world: &World,
+        config: &LargeSceneConfig,
+        progress: &mut Progress,
+    ) -> Result<Self, LargeSceneError> {
+        let config = config.clone().clamped();
+        let canvas = Canvas::new(ctx, &config.rtx)?;
+        let gpu_world = GpuWorld::new(ctx, world, &config, progress)?;
+        progress.stage("compiling shaders", 0);
+        let frame = ctx.create_buffer(&BufferDesc {
+            size_bytes: size_of::<FrameConstants>() as u64,
+            debug_name: "frame constants",
+            ..BufferDesc::default()
+        })?;
+        let [places, firsts] = gpu_world.tables(ctx)?;
+        let farthest = world.farthest();
+        let constants = FrameConstants {
+            camera: GpuCamera::zeroed(),
+            scene: gpu_world.scene(),
+            lighting: lighting(world.scene(), farthest),
+            places,
+            firsts,
+            tlas: gpu_world.structures.tlas.index(),
+            sky: gpu_world.sky.index(),
+            surface_sampler: gpu_world.surface_sampler.index(),
+            sky_sampler: gpu_world.sky_sampler.index(),
+            image: canvas.picture().index(),
+            depth: 0,
+            samples: 0,
+            show: 0,
+        };
+        let path = CameraPath::tour(world.scene(), 0);
+        Ok(Self {
+            tracer: Tracer::new(ctx, config.rtx.path, &RAYS)?,
+            camera: path.at(0.0),
+            near_plane: (NEAR_SHARE * farthest).max(f32::MIN_POSITIVE),
+            ctx: ctx.clone(),
+            world: gpu_world,
+            canvas,
+            config,
+            frame,
+            constants,
+            path,
+        })
+    }
+
+    /// Tours the world's cameras from the one with this index on.
+    #[must_use]
+    pub fn from_camera(mut self, world: &World, first: usize) -> Self {
+        self.path = CameraPath::tour(world.scene(), first);
+        self.camera = self.path.at(0.0);
+        self
+    }
+
+    /// What is rendered.
+    pub fn config(&self) -> &LargeSceneConfig {
+        &self.config
+    }
+
+    /// What the world takes on the device, and where its structures came from.
+    pub fn figures(&self) -> &Figures {
+        &self.world.figures
+    }
+
+    fn upload_frame(&mut self) -> lvk::Result<()> {
+        let [width, height] = self.config.rtx.extent();
+        let constants = FrameConstants {
+            camera: GpuCamera::new(&self.camera, width, height, self.near_plane),
+            image: self.canvas.picture().index(),
+            depth: self.config.depth,
+            samples: self.config.samples,
+            show: self.config.show.number(),
+            ..self.constants
+        };
+        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&constants))
+    }
+}
+
+impl Sample for LargeScene {
+    type Error = LargeSceneError;
+
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
+    fn update(&mut self, moment: Moment) -> Result<(), LargeSceneError> {
+        self.camera = self.path.at(moment.phase());
+        Ok(())
+    }
+
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, LargeSceneError> {
+        self.upload_frame()?;
+        let (extent, picture) = (self.config.rtx.extent(), **self.canvas.picture());
+        let push = self.ctx.buffer_address(*self.frame)?;
+        let writes = Dependencies { storage_images: &[picture], ..Dependencies::default() };
+        frame.pass("rays", |cmd| self.tracer.record(cmd, &push, extent, &writes))?;
+        Ok(picture)
+    }
+
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), LargeSceneError> {
+        let rtx = self.config.rtx.sized(extent);
+        self.canvas = Canvas::new(&self.ctx, &rtx)?;
+        self.config.rtx = rtx;
+        Ok(())
+    }
+
+    fn view(&self) -> Option<Camera> {
+        Some(self.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.camera = *camera;
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        let LargeSceneConfig { depth, samples, show, .. } = &mut self.config;
+        ui.horizontal(|ui| {
+            for which in Show::ALL {
+                ui.selectable_value(show, which, format!("{which:?}").to_lowercase());
+            }
+        });
+        ui.add(egui::Slider::new(depth, 0..=LargeSceneConfig::MAX_DEPTH).text("mirrored or bent"));
+        ui.add(egui::Slider::new(samples, 1..=16).text("samples a pixel"));
+        show_figures(ui, &self.world.figures);
+    }
+
+    fn reload(&mut self) -> Result<(), LargeSceneError> {
+        self.tracer = Tracer::new(&self.ctx, self.config.rtx.path, &RAYS)?;
+        Ok(())
+    }
+}
+
+fn show_figures(ui: &mut egui::Ui, figures: &Figures) {
+    egui::CollapsingHeader::new("Memory").default_open(true).show(ui, |ui| {
+        for (name, value) in figures.rows() {
+            ui.label(format!("{name} {value}"));
+        }
+    });
+    egui::CollapsingHeader::new("Structures").show(ui, |ui| {
+        egui::Grid::new("structures").striped(true).num_columns(5).show(ui, |ui| {
+            for structure in &figures.structures {
+                let origin = match structure.origin {
+                    Origin::Loaded => "from a file",
+                    Origin::Built => "built",
+                    Origin::Rebuilt => "built anew",
+                };
+                ui.label(&structure.name);
+                ui.monospace(number(structure.triangles));
+                ui.label(format!("{} parts", structure.parts));
+                ui.monospace(format!("{} of {}", bytes(structure.bytes), bytes(structure.built_bytes)));
+                ui.label(origin);
+                ui.end_row();
+            }
+        });
+    });
+}
+
+fn lighting(scene: &Scene, farthest: f32) -> Lighting {
+    let Ambient { above, below } = scene.ambient;
+    let no_sun = DirectionalLight { direction: [0.0, 1.0, 0.0], color: [0.0; 3] };
+    Lighting::sunlit(&scene.sun.unwrap_or(no_sun), &Ambient { above, below }, farthest)
+}
+
+const _: () = assert!(std::mem::offset_of!(FrameConstants, places) == 240);

@@ -1,0 +1,118 @@
+//! Built bottom-level structures, kept in a folder from one start to the next.
+
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::io::{self, Write as _};
+use std::path::{Path, PathBuf};
+
+use lvk::{BuildFlags, Capabilities};
+
+use super::world::{Piece, World};
+
+/// A folder of built structures, each in a file named after what it was built from.
+pub(super) struct StructureCache {
+    folder: PathBuf,
+}
+
+/// What a structure is built from: the triangles of a piece, the device and its limits, and the flags.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct StructureKey(u64);
+
+impl StructureKey {
+    pub(super) fn of(world: &World, piece: &Piece, capabilities: &Capabilities, flags: BuildFlags) -> Self {
+        let mut hasher = DefaultHasher::new();
+        let Capabilities { device_name, driver_name, driver_info, profile, limits, .. } = capabilities;
+        (device_name, driver_name, driver_info, profile).hash(&mut hasher);
+        (capabilities.ray_tracing_pipeline, format!("{:?}", capabilities.ray_query_path)).hash(&mut hasher);
+        let bounds =
+            [limits.max_accel_scratch_bytes, limits.max_accel_structure_bytes, limits.max_blas_primitives];
+        (bounds, flags.bits(), piece.vertices.end).hash(&mut hasher);
+        let range = |range: &std::ops::Range<u32>| range.start as usize..range.end as usize;
+        hasher.write(bytemuck::cast_slice(&world.scene.positions[range(&piece.vertices)]));
+        hasher.write(bytemuck::cast_slice(&world.scene.triangles[range(&piece.triangles)]));
+        Self(hasher.finish())
+    }
+}
+
+impl StructureCache {
+    /// In this folder, which need not exist.
+    pub(super) fn new(folder: &Path) -> Self {
+        Self { folder: folder.to_owned() }
+    }
+
+    /// Where the structure is kept.
+    pub(super) fn path(&self, StructureKey(key): StructureKey) -> PathBuf {
+        self.folder.join(format!("{key:016x}.blas"))
+    }
+
+    /// The bytes of an earlier start, if there are any. A file that cannot be read is warned of.
+    pub(super) fn read(&self, key: StructureKey) -> Option<Vec<u8>> {
+        let path = self.path(key);
+        match std::fs::read(&path) {
+            Ok(bytes) => Some(bytes),
+            Err(error) if error.kind() == io::ErrorKind::NotFound => None,
+            Err(error) => {
+                log::warn!("the structure '{}' cannot be read: {error}", path.display());
+                None
+            }
+        }
+    }
+
+    /// Keeps the bytes for the next start, or warns.
+    pub(super) fn keep(&self, key: StructureKey, bytes: &[u8]) {
+        let path = self.path(key);
+        if let Err(error) = self.replace(&path, bytes) {
+            log::warn!("the structure '{}' cannot be kept: {error}", path.display());
+        }
+    }
+
+    /// Replaces a file at once: whoever reads it finds the old bytes or the new ones.
+    fn replace(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
+        std::fs::create_dir_all(&self.folder)?;
+        let mut file = tempfile::NamedTempFile::new_in(&self.folder)?;
+        file.write_all(bytes)?;
+        file.persist(path)?;
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn other_triangles_devices_and_flags_have_other_keys() {
+        let world = World::valley(2_000, 3);
+        let (first, second) = (&world.pieces[0], &world.pieces[1]);
+        let caps = Capabilities::default();
+        let phone = Capabilities { profile: Some("mali-g715".to_owned()), ..Capabilities::default() };
+        let flags = BuildFlags::FAST_TRACE;
+        let key = |piece, caps: &Capabilities, flags| StructureKey::of(&world, piece, caps, flags);
+        let all = [
+            key(first, &caps, flags),
+            key(second, &caps, flags),
+            key(first, &phone, flags),
+            key(first, &caps, flags | BuildFlags::ALLOW_COMPACTION),
+        ];
+        for (index, key) in all.iter().enumerate() {
+            assert!(!all[..index].contains(key), "{index}");
+        }
+        assert_eq!(
+            all[0],
+            StructureKey::of(&World::valley(2_000, 9), first, &caps, flags),
+            "the same ground"
+        );
+    }
+
+    #[test]
+    fn what_is_kept_is_read_and_replaced() {
+        let folder = tempfile::tempdir().unwrap();
+        let cache = StructureCache::new(&folder.path().join("made"));
+        let key = StructureKey(7);
+        assert_eq!(cache.read(key), None);
+        for bytes in [&b"first"[..], b"second"] {
+            cache.keep(key, bytes);
+            assert_eq!(cache.read(key).as_deref(), Some(bytes));
+        }
+        assert_eq!(std::fs::read_dir(folder.path().join("made")).unwrap().count(), 1);
+    }
+}

@@ -1,0 +1,207 @@
+//! The acceleration structures of a world: from files where they were kept, else built, compacted, and kept.
+
+use lvk::{
+    AccelStructHandle, BlasDesc, BlasGeometry, BuildFlags, Compaction, Context, Error, Holder, TlasDesc,
+    TlasInstance, transform_rows,
+};
+
+use super::figures::{Origin, StructureFigures};
+use super::structure_cache::{StructureCache, StructureKey};
+use super::world::{Instance, World};
+use crate::app::progress::Progress;
+use crate::hybrid::SceneArrays;
+
+/// Structures that are built together, and whose progress is then told.
+const BATCH: usize = 8;
+/// Rounds after which a compaction counts as not to be had.
+const ROUNDS: u32 = 16;
+/// Mask bits of instances (`kMaskSolid` in `shaders/rtx_pipeline/radiance.glsl`).
+const MASK_SOLID: u8 = 1;
+const MASK_GLASS: u8 = 2;
+
+/// The acceleration structures of a world.
+pub(super) struct Structures {
+    pub(super) tlas: Holder<AccelStructHandle>,
+    blas: Vec<Blas>,
+}
+
+struct Blas {
+    holder: Holder<AccelStructHandle>,
+    origin: Origin,
+    built_bytes: u64,
+}
+
+/// What structures are made of.
+pub(super) struct Plan<'a> {
+    pub(super) ctx: &'a Context,
+    pub(super) world: &'a World,
+    pub(super) arrays: &'a SceneArrays,
+    pub(super) cache: Option<StructureCache>,
+    pub(super) compact: bool,
+}
+
+/// What became of the file of a piece.
+enum Found {
+    Loaded(Holder<AccelStructHandle>),
+    Nothing,
+    Refused,
+}
+
+impl Structures {
+    /// Loads, builds, compacts and keeps; `progress` counts pieces.
+    pub(super) fn new(plan: &Plan<'_>, progress: &mut Progress) -> lvk::Result<Self> {
+        let geometries: Vec<_> = plan.world.pieces.iter().map(|piece| [plan.geometry(piece)]).collect();
+        let descs: Vec<_> = geometries
+            .iter()
+            .zip(&plan.world.pieces)
+            .map(|(geometries, piece)| plan.desc(geometries, &piece.name))
+            .collect();
+        let keys = plan.keys();
+        progress.stage("loading acceleration structures", descs.len() as u64);
+        let mut found = Vec::with_capacity(descs.len());
+        for (index, desc) in descs.iter().enumerate() {
+            found.push(plan.load(desc, keys.get(index).copied())?);
+            progress.set(index as u64 + 1);
+        }
+        let mut blas = plan.build_missing(&descs, found, progress)?;
+        plan.compact(&mut blas, progress)?;
+        plan.keep(&blas, &keys, progress)?;
+        Ok(Self { tlas: plan.top_level(&blas)?, blas })
+    }
+
+    /// What is known of each structure now.
+    pub(super) fn figures(&self, ctx: &Context, world: &World) -> lvk::Result<Vec<StructureFigures>> {
+        let of_piece = |(blas, piece): (&Blas, &super::Piece)| {
+            let info = ctx.accel_struct_info(*blas.holder)?;
+            Ok(StructureFigures {
+                name: piece.name.clone(),
+                triangles: piece.triangles.len() as u64,
+                parts: info.parts,
+                built_bytes: blas.built_bytes,
+                bytes: info.structure_bytes + info.table_bytes,
+                origin: blas.origin,
+            })
+        };
+        self.blas.iter().zip(&world.pieces).map(of_piece).collect()
+    }
+}
+
+impl Plan<'_> {
+    fn geometry(&self, piece: &super::Piece) -> BlasGeometry {
+        self.arrays.geometry(&piece.triangles, piece.vertices.end)
+    }
+
+    fn desc<'a>(&self, geometries: &'a [BlasGeometry], name: &'a str) -> BlasDesc<'a> {
+        BlasDesc { geometries, flags: self.flags(), debug_name: name, ..BlasDesc::default() }
+    }
+
+    fn flags(&self) -> BuildFlags {
+        let compaction = if self.compact { BuildFlags::ALLOW_COMPACTION } else { BuildFlags::empty() };
+        BuildFlags::FAST_TRACE | compaction
+    }
+
+    /// Of the files, where there are any.
+    fn keys(&self) -> Vec<StructureKey> {
+        let key = |piece| StructureKey::of(self.world, piece, self.ctx.capabilities(), self.flags());
+        self.cache.iter().flat_map(|_| self.world.pieces.iter().map(key)).collect()
+    }
+
+    /// The structure of an earlier start. Files that are of no use are dropped with a warning.
+    fn load(&self, desc: &BlasDesc<'_>, key: Option<StructureKey>) -> lvk::Result<Found> {
+        let Some((cache, key)) = self.cache.as_ref().zip(key) else { return Ok(Found::Nothing) };
+        let Some(bytes) = cache.read(key) else { return Ok(Found::Nothing) };
+        // SAFETY: the folder is the program's own, whose files `keep` alone writes.
+        match unsafe { self.ctx.load_blas(desc, &bytes) } {
+            Ok(blas) => Ok(Found::Loaded(blas)),
+            Err(error @ Error::Serialized { .. }) => {
+                log::warn!("the structure '{}' is dropped: {error}", cache.path(key).display());
+                Ok(Found::Refused)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Builds what was not found, some structures at a time.
+    fn build_missing(
+        &self,
+        descs: &[BlasDesc<'_>],
+        found: Vec<Found>,
+        progress: &mut Progress,
+    ) -> lvk::Result<Vec<Blas>> {
+        let missing: Vec<_> = (0..found.len()).filter(|&i| !matches!(found[i], Found::Loaded(_))).collect();
+        progress.stage("building acceleration structures", missing.len() as u64);
+        let mut built = Vec::with_capacity(missing.len());
+        for batch in missing.chunks(BATCH) {
+            let batch: Vec<_> = batch.iter().map(|&index| descs[index]).collect();
+            built.extend(self.ctx.create_blas_batch(&batch)?);
+            self.ctx.wait_idle()?;
+            progress.set(built.len() as u64);
+        }
+        let mut built = built.into_iter();
+        let mut all = Vec::with_capacity(found.len());
+        for found in found {
+            let origin = match found {
+                Found::Loaded(_) => Origin::Loaded,
+                Found::Nothing => Origin::Built,
+                Found::Refused => Origin::Rebuilt,
+            };
+            let loaded = if let Found::Loaded(blas) = found { Some(blas) } else { None };
+            let Some(holder) = loaded.or_else(|| built.next()) else { break };
+            let info = self.ctx.accel_struct_info(*holder)?;
+            all.push(Blas { built_bytes: info.structure_bytes + info.table_bytes, holder, origin });
+        }
+        Ok(all)
+    }
+
+    /// Compacts what was built; what came from a file was compacted before.
+    fn compact(&self, blas: &mut [Blas], progress: &mut Progress) -> lvk::Result<()> {
+        let built: Vec<_> =
+            blas.iter().filter(|blas| blas.origin != Origin::Loaded).map(|blas| *blas.holder).collect();
+        if !self.compact || built.is_empty() {
+            return Ok(());
+        }
+        progress.stage("compacting acceleration structures", 0);
+        self.ctx.compact(&built)?;
+        for _ in 0..ROUNDS {
+            self.ctx.wait_idle()?;
+            let mut pending = false;
+            for handle in &built {
+                pending |= self.ctx.accel_struct_info(*handle)?.compaction == Compaction::Pending;
+            }
+            if !pending {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Keeps what was built for the next start.
+    fn keep(&self, blas: &[Blas], keys: &[StructureKey], progress: &mut Progress) -> lvk::Result<()> {
+        let Some(cache) = &self.cache else { return Ok(()) };
+        let built: Vec<_> = blas.iter().zip(keys).filter(|(blas, _)| blas.origin != Origin::Loaded).collect();
+        progress.stage("keeping acceleration structures", built.len() as u64);
+        for (done, (blas, key)) in (1..).zip(built) {
+            cache.keep(*key, &self.ctx.serialize_blas(*blas.holder)?);
+            progress.set(done);
+        }
+        Ok(())
+    }
+
+    fn top_level(&self, blas: &[Blas]) -> lvk::Result<Holder<AccelStructHandle>> {
+        let shown = |instance: &Instance| {
+            let is_glass = self.world.pieces[instance.piece].is_refractive;
+            TlasInstance {
+                transform: transform_rows(&instance.place),
+                custom_index: instance.piece as u32,
+                mask: if is_glass { MASK_GLASS } else { MASK_SOLID },
+                ..TlasInstance::new(*blas[instance.piece].holder)
+            }
+        };
+        let instances: Vec<_> = self.world.instances.iter().map(shown).collect();
+        self.ctx.create_tlas(&TlasDesc {
+            instances: &instances,
+            debug_name: "world tlas",
+            ..TlasDesc::default()
+        })
+    }
+}

@@ -1,0 +1,41 @@
+// A pixel by ray queries.
+#define LVK_OPAQUE_TRIANGLES_ONLY
+#include <lvk/ray_query.glsl>
+
+#include "large_scene/frame.glsl"
+#include "large_scene/hit.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+Hit traceNearest(uint mask, vec3 origin, vec3 direction, float tmax) {
+    LvkRayQuery query;
+    lvkRayQueryInitialize(query, frame.tlas, LVK_RAY_FLAG_OPAQUE, mask, origin, 0.0, direction, tmax);
+    while (lvkRayQueryProceed(query)) {
+    }
+    Hit hit = Hit(kNothing, 0u, vec2(0.0));
+    if (lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE) {
+        uint first = frame.firsts.at[lvkRayQueryInstanceCustomIndex(query, LVK_COMMITTED)];
+        hit.triangle = first + uint(lvkRayQueryPrimitiveIndex(query, LVK_COMMITTED, frame.tlas));
+        hit.instance = uint(lvkRayQueryInstanceId(query, LVK_COMMITTED, frame.tlas));
+        hit.barycentrics = lvkRayQueryBarycentrics(query, LVK_COMMITTED);
+    }
+    return hit;
+}
+
+bool occludedBy(uint mask, vec3 origin, float tmin, vec3 direction, float tmax) {
+    LvkRayQuery query;
+    const uint flags = LVK_RAY_FLAG_OPAQUE | LVK_RAY_FLAG_TERMINATE_ON_FIRST_HIT;
+    lvkRayQueryInitialize(query, frame.tlas, flags, mask, origin, tmin, direction, tmax);
+    while (lvkRayQueryProceed(query)) {
+    }
+    return lvkRayQueryType(query, LVK_COMMITTED) != LVK_COMMITTED_NONE;
+}
+
+#include "large_scene/picture.glsl"
+
+void main() {
+    uvec2 pixel = gl_GlobalInvocationID.xy;
+    if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
+        storePixel(pixel);
+    }
+}
