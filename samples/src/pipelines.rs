@@ -5,8 +5,8 @@ use lvk::{Context, Format, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderS
 use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
 use crate::{
-    app, bench, hello_triangle, hybrid, hybrid_oit, large_scene, reflections, render_to_cube_map, rtx_ao,
-    rtx_hello, rtx_pipeline, rtx_textures,
+    app, bench, hello_triangle, hybrid, hybrid_oit, large_scene, omni_shadows, reflections,
+    render_to_cube_map, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures,
 };
 
 /// A stage of a [`SamplePipeline`].
@@ -68,6 +68,7 @@ pub fn all() -> Vec<SamplePipeline> {
         hybrid::pipelines(),
         hybrid_oit::pipelines(),
         large_scene::pipelines(),
+        omni_shadows::pipelines(),
         reflections::pipelines(),
         render_to_cube_map::pipelines(),
         rtx_ao::pipelines(),

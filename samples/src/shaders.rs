@@ -33,6 +33,10 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("large_scene/frame.glsl", include_str!("../../shaders/large_scene/frame.glsl")),
     ("large_scene/hit.glsl", include_str!("../../shaders/large_scene/hit.glsl")),
     ("large_scene/picture.glsl", include_str!("../../shaders/large_scene/picture.glsl")),
+    ("omni_shadows/frame.glsl", include_str!("../../shaders/omni_shadows/frame.glsl")),
+    ("omni_shadows/haze.glsl", include_str!("../../shaders/omni_shadows/haze.glsl")),
+    ("omni_shadows/material.glsl", include_str!("../../shaders/omni_shadows/material.glsl")),
+    ("omni_shadows/shadow.glsl", include_str!("../../shaders/omni_shadows/shadow.glsl")),
     ("reflections/ambient.glsl", include_str!("../../shaders/reflections/ambient.glsl")),
     ("reflections/fragment.glsl", include_str!("../../shaders/reflections/fragment.glsl")),
     ("reflections/frame.glsl", include_str!("../../shaders/reflections/frame.glsl")),
@@ -325,4 +329,21 @@ pub mod render_to_cube_map {
     pub const DROP_VERT: &str = include_str!("../../shaders/render_to_cube_map/drop.vert.glsl");
     /// What it mirrors.
     pub const DROP_FRAG: &str = include_str!("../../shaders/render_to_cube_map/drop.frag.glsl");
+}
+
+/// Stages of the `omni_shadows` sample.
+pub mod omni_shadows {
+    /// Macros of the stage that draws all faces of the cube map at once.
+    pub const MULTIVIEW: &[(&str, &str)] = &[("OMNI_MULTIVIEW", "1")];
+
+    /// What throws shadows.
+    pub const CASTER_VERT: &str = include_str!("../../shaders/omni_shadows/caster.vert.glsl");
+    /// Surfaces.
+    pub const SURFACE_VERT: &str = include_str!("../../shaders/omni_shadows/surface.vert.glsl");
+    /// Their colours in the light of the lamp.
+    pub const SURFACE_FRAG: &str = include_str!("../../shaders/omni_shadows/surface.frag.glsl");
+    /// The unfolded cube map.
+    pub const CUBE_VIEW_VERT: &str = include_str!("../../shaders/omni_shadows/cube_view.vert.glsl");
+    /// Its depths.
+    pub const CUBE_VIEW_FRAG: &str = include_str!("../../shaders/omni_shadows/cube_view.frag.glsl");
 }

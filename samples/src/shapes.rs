@@ -37,12 +37,17 @@ impl Mesh {
     }
 
     /// Adds a box.
-    pub(crate) fn cuboid(mut self, low: [f32; 3], high: [f32; 3], texture_extent: f32) -> Self {
+    pub(crate) fn cuboid(self, low: [f32; 3], high: [f32; 3], texture_extent: f32) -> Self {
         let (low, high) = (Vec3::from(low), Vec3::from(high));
         let size = high - low;
-        let [x, y, z] = [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z];
+        self.parallelepiped(low, [Vec3::X * size.x, Vec3::Y * size.y, Vec3::Z * size.z], texture_extent)
+    }
+
+    /// Adds a parallelepiped with edges `[u, v, w]` from its corner `low`, where `w` is on the side of `u x v`.
+    pub(crate) fn parallelepiped(mut self, low: Vec3, [u, v, w]: [Vec3; 3], texture_extent: f32) -> Self {
+        let high = low + u + v + w;
         for (corner, u, v) in
-            [(low, y, x), (low, z, y), (low, x, z), (high, -x, -y), (high, -y, -z), (high, -z, -x)]
+            [(low, v, u), (low, w, v), (low, u, w), (high, -u, -v), (high, -v, -w), (high, -w, -u)]
         {
             self = self.quad(corner, u, v, texture_extent);
         }

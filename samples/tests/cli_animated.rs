@@ -22,7 +22,7 @@ struct Program {
 /// The ways of samples that trace rays.
 const RAYS: &[&[&str]] = &[&["--rt", "pipeline"], &["--rt", "query"]];
 
-const PROGRAMS: [Program; 9] = [
+const PROGRAMS: [Program; 10] = [
     Program {
         path: env!("CARGO_BIN_EXE_reflections"),
         quick: &["--samples", "1"],
@@ -88,6 +88,13 @@ const PROGRAMS: [Program; 9] = [
         own: &["--list-scenes"],
         said: &["170 instances", "6 textures", "TLAS build", "rays"],
         ways: RAYS,
+    },
+    Program {
+        path: env!("CARGO_BIN_EXE_omni_shadows"),
+        quick: &["--shadow-size", "64"],
+        own: &["--faces", "--filter", "--shadow-size", "--lamp-radius", "--haze", "--show-cube"],
+        said: &["a lamp in a lattice", "cube of 64 texels", "shadow cube", "surfaces"],
+        ways: &[&[], &["--faces", "single", "--show-cube"]],
     },
     Program {
         path: env!("CARGO_BIN_EXE_hello_triangle"),

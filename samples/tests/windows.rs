@@ -111,6 +111,11 @@ fn render_to_cube_map_has_a_window() {
 }
 
 #[test]
+fn omni_shadows_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_omni_shadows"), &["--show-cube"]);
+}
+
+#[test]
 fn rtx_hello_has_a_window() {
     shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_hello"), &[]);
 }

@@ -11,6 +11,7 @@ use lvk_samples::hello_triangle::HelloTriangle;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence};
 use lvk_samples::hybrid_oit::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene};
 use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, World};
+use lvk_samples::omni_shadows::{OmniShadows, OmniShadowsConfig};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
 use lvk_samples::render_to_cube_map::{Faces, RenderToCubeMap, RenderToCubeMapConfig};
 use lvk_samples::rtx::RtxConfig;
@@ -103,6 +104,15 @@ fn render_to_cube_map_goes_by_frames() {
         let config =
             RenderToCubeMapConfig { face_size: 32, ..RenderToCubeMapConfig::new(extent, Faces::SixPasses) };
         RenderToCubeMap::new(&ctx, &config).unwrap()
+    });
+}
+
+#[test]
+fn omni_shadows_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    check(|size| {
+        let config = OmniShadowsConfig { shadow_size: 64, shows_cube: true, ..OmniShadowsConfig::new(size) };
+        OmniShadows::new(&ctx, &config).unwrap()
     });
 }
 

@@ -1,0 +1,215 @@
+//! The sample as a type: say the moment, get a picture.
+
+use bytemuck::Zeroable;
+use lvk::{BufferDesc, BufferHandle, BufferUsage, Context, Holder, SamplerHandle, TextureHandle};
+
+use super::config::{Faces, OmniShadowsConfig, ShadowFilter};
+use super::frame::FrameConstants;
+use super::models::{self, Draw, Instance, Models};
+use super::scene_pass::ScenePass;
+use super::shadow_cube::{CubePass, ShadowCube, samplers};
+use crate::app::array_buffer::array;
+use crate::app::frame::Frame;
+use crate::app::sample::{Moment, Sample};
+use crate::raster::{Canvas, RasterError};
+use crate::scene::{Camera, GpuCamera};
+
+/// Where the depth of the lamp's map is 1, in metres.
+const LAMP_NEAR: f32 = 0.05;
+const NEAR_PLANE: f32 = 0.05;
+/// What the lamp sends to a square metre at a distance of one metre.
+const INTENSITY: [f32; 3] = [27.0, 18.8, 11.0];
+/// Edges of the cube map that the panel offers.
+const SHADOW_SIZES: [u32; 4] = [256, 512, 1024, 2048];
+
+/// Renders the lamp in its room.
+pub struct OmniShadows {
+    ctx: Context,
+    config: OmniShadowsConfig,
+    canvas: Canvas,
+    cube: ShadowCube,
+    cube_pass: CubePass,
+    scene_pass: ScenePass,
+    draws: Vec<Draw>,
+    triangle_count: u32,
+    instances: Holder<BufferHandle>,
+    frame: Holder<BufferHandle>,
+    frame_address: u64,
+    constants: FrameConstants,
+    camera: Camera,
+    phase: f32,
+    _held: ([Holder<BufferHandle>; 2], [Holder<SamplerHandle>; 3]),
+}
+
+impl OmniShadows {
+    /// Makes models, textures and pipelines. The animation stands at its beginning.
+    ///
+    /// # Errors
+    /// [`RasterError`] when the picture is beyond the device, the device cannot draw as asked, or fails.
+    pub fn new(ctx: &Context, config: &OmniShadowsConfig) -> Result<Self, RasterError> {
+        let config = config.clamped();
+        let models = Models::new();
+        let vertices = array(ctx, "vertices", BufferUsage::STORAGE, &models.vertices)?;
+        let corners = array(ctx, "corners", BufferUsage::STORAGE, &models.corners)?;
+        let size = u64::from(models.instance_count()) * size_of::<Instance>() as u64;
+        let instances = buffer(ctx, "instances", size)?;
+        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
+        let samplers = samplers(ctx)?;
+        let constants = FrameConstants {
+            vertices: ctx.buffer_address(*vertices)?,
+            corners: ctx.buffer_address(*corners)?,
+            instances: ctx.buffer_address(*instances)?,
+            lamp_near: LAMP_NEAR,
+            intensity: INTENSITY,
+            room: models::ROOM,
+            samplers: samplers.each_ref().map(Holder::index),
+            ..FrameConstants::zeroed()
+        };
+        Ok(Self {
+            canvas: Canvas::with_depth(ctx, config.extent)?,
+            cube: ShadowCube::new(ctx, config.shadow_size)?,
+            cube_pass: CubePass::new(ctx, config.faces.are_one_pass(ctx)?)?,
+            scene_pass: ScenePass::new(ctx)?,
+            ctx: ctx.clone(),
+            config,
+            triangle_count: models.triangle_count(),
+            draws: models.draws,
+            instances,
+            frame_address: ctx.buffer_address(*frame)?,
+            frame,
+            constants,
+            camera: models::camera(0.0),
+            phase: 0.0,
+            _held: ([vertices, corners], samplers),
+        })
+    }
+
+    /// Moves everything to where it is at `phase` of the animation's round, 0 to 1.
+    pub fn show(&mut self, phase: f32) {
+        self.phase = phase;
+        self.camera = models::camera(phase);
+    }
+
+    /// Triangles of the picture.
+    pub fn triangle_count(&self) -> u32 {
+        self.triangle_count
+    }
+
+    /// Where the lamp is.
+    pub fn lamp(&self) -> [f32; 3] {
+        models::lamp(self.phase).into()
+    }
+
+    /// Corners of all triangles in their places, of those in the lamp's way and of the others.
+    pub fn triangles(&self) -> [Vec<[[f32; 3]; 3]>; 2] {
+        Models::new().triangles(self.phase)
+    }
+
+    /// Whether all faces of the cube map are drawn in one pass.
+    pub fn is_multiview(&self) -> bool {
+        self.cube_pass.is_multiview()
+    }
+
+    fn upload(&mut self) -> lvk::Result<()> {
+        let OmniShadowsConfig { extent: [width, height], filter, lamp_radius, haze, .. } = self.config;
+        self.constants = FrameConstants {
+            camera: GpuCamera::new(&self.camera, width, height, NEAR_PLANE),
+            light: models::lamp(self.phase).into(),
+            bulb: lamp_radius,
+            haze,
+            cube: self.cube.texture.index(),
+            faces: self.cube.faces.each_ref().map(Holder::index),
+            filtering: filter as u32,
+            texel: 2.0 / self.cube.size as f32,
+            ..self.constants
+        };
+        let instances = models::instances(self.phase);
+        self.ctx.upload_buffer(*self.instances, 0, bytemuck::cast_slice(&instances))?;
+        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))
+    }
+
+    /// Takes over what the panel has set.
+    fn apply(&mut self) -> Result<(), RasterError> {
+        let OmniShadowsConfig { shadow_size, faces, .. } = self.config;
+        if self.cube.size != shadow_size {
+            self.cube = ShadowCube::new(&self.ctx, shadow_size)?;
+        }
+        let is_multiview = faces.are_one_pass(&self.ctx)?;
+        if self.is_multiview() != is_multiview {
+            self.cube_pass = CubePass::new(&self.ctx, is_multiview)?;
+        }
+        Ok(())
+    }
+}
+
+impl Sample for OmniShadows {
+    type Error = RasterError;
+
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
+    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
+        self.show(moment.phase());
+        Ok(())
+    }
+
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+        self.apply()?;
+        self.upload()?;
+        let Self { canvas, cube, cube_pass, scene_pass, draws, frame_address, config, .. } = &*self;
+        frame.pass("shadow cube", |cmd| cube_pass.record(cmd, cube, draws, *frame_address))?;
+        let shown = (*frame_address, config.shows_cube);
+        scene_pass.record(&mut frame.cmd, canvas, *cube.texture, draws, shown)?;
+        Ok(canvas.picture())
+    }
+
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
+        self.canvas = Canvas::with_depth(&self.ctx, extent)?;
+        self.config.extent = extent;
+        Ok(())
+    }
+
+    fn view(&self) -> Option<Camera> {
+        Some(self.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.camera = *camera;
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        let mut is_multiview = self.is_multiview();
+        let can = Faces::can_be_one_pass(&self.ctx);
+        let config = &mut self.config;
+        let switch = egui::Checkbox::new(&mut is_multiview, "six faces in one pass");
+        if ui.add_enabled(can, switch).changed() {
+            config.faces = if is_multiview { Faces::Multiview } else { Faces::Single };
+        }
+        let sizes = egui::ComboBox::from_label("texels on an edge");
+        sizes.selected_text(config.shadow_size.to_string()).show_ui(ui, |ui| {
+            for size in SHADOW_SIZES {
+                ui.selectable_value(&mut config.shadow_size, size, size.to_string());
+            }
+        });
+        ui.horizontal(|ui| {
+            for filter in [ShadowFilter::Off, ShadowFilter::Hard, ShadowFilter::Linear, ShadowFilter::Soft] {
+                ui.selectable_value(&mut config.filter, filter, format!("{filter:?}"));
+            }
+        });
+        ui.add(egui::Slider::new(&mut config.lamp_radius, 0.0..=0.06).text("radius of the lamp, m"));
+        ui.add(egui::Slider::new(&mut config.haze, 0.0..=0.2).text("haze"));
+        ui.checkbox(&mut config.shows_cube, "cube map");
+    }
+
+    fn reload(&mut self) -> Result<(), RasterError> {
+        let scene_pass = ScenePass::new(&self.ctx)?;
+        self.cube_pass = CubePass::new(&self.ctx, self.cube_pass.is_multiview())?;
+        self.scene_pass = scene_pass;
+        Ok(())
+    }
+}
+
+fn buffer(ctx: &Context, debug_name: &str, size_bytes: u64) -> lvk::Result<Holder<BufferHandle>> {
+    ctx.create_buffer(&BufferDesc { size_bytes, debug_name, ..BufferDesc::default() })
+}

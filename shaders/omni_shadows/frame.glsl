@@ -1,0 +1,73 @@
+// What every shader of the sample is told.
+#ifndef OMNI_SHADOWS_FRAME
+#define OMNI_SHADOWS_FRAME
+
+#include "common/camera.glsl"
+
+struct Vertex {
+    vec3 position;
+    vec3 normal;
+};
+
+struct Instance {
+    vec4 rows[3]; // world from model
+    vec3 color;
+    uint material;
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer VertexArray {
+    Vertex at[];
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer CornerArray {
+    uint at[]; // numbers of vertices, three for each triangle
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer InstanceArray {
+    Instance at[];
+};
+
+// Materials.
+const uint kPlaster = 0u;
+const uint kTiles = 1u;
+const uint kMetal = 2u;
+const uint kGlaze = 3u;
+const uint kGlow = 4u;
+
+// Ways to filter the shadow.
+const uint kUnshadowed = 0u;
+const uint kHard = 1u;
+const uint kLinear = 2u;
+const uint kSoft = 3u;
+
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
+    Camera camera;
+    VertexArray vertices;
+    CornerArray corners;
+    InstanceArray instances;
+    vec3 light; // where the lamp is
+    float lampNear; // distance from the lamp at which its depth is 1; it falls to 0 far away
+    vec3 intensity;
+    float bulb; // radius of the lamp, which makes soft shadows
+    vec3 room; // half its width, its height, half its length
+    float haze; // how thick the air is
+    uint cube; // depth around the lamp
+    uint nearestComparing; // samplers
+    uint linearComparing;
+    uint reading;
+    uint faces[6]; // the cube's, one by one
+    uint filtering;
+    float texel; // width of the cube's texels at distance 1
+};
+
+layout(push_constant, scalar) uniform PushConstants {
+    Frame frame;
+    uint face; // of the cube, where each is drawn by itself
+};
+
+vec3 toWorld(Instance thing, vec3 point) {
+    vec4 p = vec4(point, 1.0);
+    return vec3(dot(thing.rows[0], p), dot(thing.rows[1], p), dot(thing.rows[2], p));
+}
+
+#endif
