@@ -7,6 +7,7 @@ pub mod hello_triangle;
 pub mod hybrid;
 pub mod hybrid_oit;
 pub mod large_scene;
+pub mod mesh_shaders;
 pub mod omni_shadows;
 pub mod pipelines;
 pub mod raster;

@@ -5,7 +5,7 @@ use lvk::{Context, Format, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderS
 use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
 use crate::{
-    app, bench, hello_triangle, hybrid, hybrid_oit, large_scene, omni_shadows, reflections,
+    app, bench, hello_triangle, hybrid, hybrid_oit, large_scene, mesh_shaders, omni_shadows, reflections,
     render_to_cube_map, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures,
 };
 
@@ -69,6 +69,7 @@ pub fn all() -> Vec<SamplePipeline> {
         hybrid_oit::pipelines(),
         large_scene::pipelines(),
         omni_shadows::pipelines(),
+        mesh_shaders::pipelines(),
         reflections::pipelines(),
         render_to_cube_map::pipelines(),
         rtx_ao::pipelines(),

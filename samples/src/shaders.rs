@@ -37,6 +37,9 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("omni_shadows/haze.glsl", include_str!("../../shaders/omni_shadows/haze.glsl")),
     ("omni_shadows/material.glsl", include_str!("../../shaders/omni_shadows/material.glsl")),
     ("omni_shadows/shadow.glsl", include_str!("../../shaders/omni_shadows/shadow.glsl")),
+    ("mesh_shaders/frame.glsl", include_str!("../../shaders/mesh_shaders/frame.glsl")),
+    ("mesh_shaders/payload.glsl", include_str!("../../shaders/mesh_shaders/payload.glsl")),
+    ("mesh_shaders/shade.glsl", include_str!("../../shaders/mesh_shaders/shade.glsl")),
     ("reflections/ambient.glsl", include_str!("../../shaders/reflections/ambient.glsl")),
     ("reflections/fragment.glsl", include_str!("../../shaders/reflections/fragment.glsl")),
     ("reflections/frame.glsl", include_str!("../../shaders/reflections/frame.glsl")),
@@ -346,4 +349,14 @@ pub mod omni_shadows {
     pub const CUBE_VIEW_VERT: &str = include_str!("../../shaders/omni_shadows/cube_view.vert.glsl");
     /// Its depths.
     pub const CUBE_VIEW_FRAG: &str = include_str!("../../shaders/omni_shadows/cube_view.frag.glsl");
+}
+
+/// Stages of the `mesh_shaders` sample.
+pub mod mesh_shaders {
+    /// Chooses the meshlets that can be seen.
+    pub const MESHLET_TASK: &str = include_str!("../../shaders/mesh_shaders/meshlet.task.glsl");
+    /// Corners and triangles of a meshlet.
+    pub const MESHLET_MESH: &str = include_str!("../../shaders/mesh_shaders/meshlet.mesh.glsl");
+    /// Their colours.
+    pub const MESHLET_FRAG: &str = include_str!("../../shaders/mesh_shaders/meshlet.frag.glsl");
 }

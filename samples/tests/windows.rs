@@ -116,6 +116,11 @@ fn omni_shadows_has_a_window() {
 }
 
 #[test]
+fn mesh_shaders_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_mesh_shaders"), &[]);
+}
+
+#[test]
 fn rtx_hello_has_a_window() {
     shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_hello"), &[]);
 }

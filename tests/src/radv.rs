@@ -21,7 +21,8 @@ const BINDINGS: [(u32, vk::DescriptorType, u32); 5] = [
 /// Bytes of push constants that the library's one pipeline layout has for all stages.
 const PUSH_BYTES: u32 = 256;
 
-const EXTENSIONS: [&std::ffi::CStr; 6] = [
+const EXTENSIONS: [&std::ffi::CStr; 7] = [
+    ash::ext::mesh_shader::NAME,
     ash::khr::acceleration_structure::NAME,
     ash::khr::deferred_host_operations::NAME,
     ash::khr::ray_tracing_pipeline::NAME,
@@ -287,11 +288,13 @@ fn open_device(instance: &ash::Instance, physical: vk::PhysicalDevice) -> ash::D
         .push_next(&mut executables);
     // SAFETY: the driver knows all structures of the chain, which lives until the end of the function.
     unsafe { instance.get_physical_device_features2(physical, &mut all) };
+    let mut mesh = vk::PhysicalDeviceMeshShaderFeaturesEXT::default().task_shader(true).mesh_shader(true);
     let names = EXTENSIONS.map(std::ffi::CStr::as_ptr);
     let queue = vk::DeviceQueueCreateInfo::default().queue_family_index(0).queue_priorities(&[1.0]);
     let info = vk::DeviceCreateInfo::default()
         .queue_create_infos(std::slice::from_ref(&queue))
         .enabled_extension_names(&names)
+        .push_next(&mut mesh)
         .push_next(&mut all);
     // SAFETY: as above.
     unsafe { instance.create_device(physical, &info, None) }.unwrap()

@@ -11,6 +11,7 @@ use lvk_samples::hello_triangle::HelloTriangle;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence};
 use lvk_samples::hybrid_oit::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene};
 use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, World};
+use lvk_samples::mesh_shaders::MeshShaders;
 use lvk_samples::omni_shadows::{OmniShadows, OmniShadowsConfig};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
 use lvk_samples::render_to_cube_map::{Faces, RenderToCubeMap, RenderToCubeMapConfig};
@@ -114,6 +115,16 @@ fn omni_shadows_goes_by_frames() {
         let config = OmniShadowsConfig { shadow_size: 64, shows_cube: true, ..OmniShadowsConfig::new(size) };
         OmniShadows::new(&ctx, &config).unwrap()
     });
+}
+
+#[test]
+fn mesh_shaders_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    if !ctx.capabilities().mesh_shader {
+        eprintln!("NOT TESTED, {} has no mesh shaders", ctx.capabilities().device_name);
+        return;
+    }
+    check(|size| MeshShaders::new(&ctx, size, true).unwrap());
 }
 
 #[test]

@@ -52,3 +52,16 @@ impl From<RasterError> for RunError {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn programs_tell_wrong_input_from_devices_that_cannot() {
+        let size = RasterError::BadSize { width: 0, height: 1, limit: 2 };
+        let missing = RasterError::Missing { device: "Toy".to_owned(), what: "wings", remedy: "walk" };
+        assert_eq!(missing.to_string(), "Toy has no wings; walk");
+        assert_eq!([size, missing].map(|error| RunError::from(error).status()), [2, 1]);
+    }
+}

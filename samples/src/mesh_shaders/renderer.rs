@@ -1,0 +1,246 @@
+//! The sample as a type: say the moment, get a picture.
+
+use std::f32::consts::TAU;
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+use lvk::{
+    BufferDesc, BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, RenderPipelineDesc,
+    RenderPipelineHandle, TextureHandle,
+};
+
+use super::counter::Counter;
+use super::knot::knot;
+use super::meshlets::Meshlets;
+use super::pipelines::MESHLETS;
+use crate::app::array_buffer::array;
+use crate::app::frame::Frame;
+use crate::app::sample::{Moment, Sample};
+use crate::raster::{Canvas, RasterError};
+use crate::scene::{Camera, GpuCamera};
+
+/// Meshlets that a task workgroup looks at (`kMeshletsPerTask` in `shaders/mesh_shaders/payload.glsl`).
+const MESHLETS_PER_TASK: u32 = 32;
+const BACKDROP: [f32; 3] = [0.010, 0.012, 0.020];
+const NEAR_PLANE: f32 = 0.05;
+
+/// Draws the knot.
+pub struct MeshShaders {
+    ctx: Context,
+    canvas: Canvas,
+    pipeline: Holder<RenderPipelineHandle>,
+    corners: Vec<Corner>,
+    meshlets: Meshlets,
+    counter: Counter,
+    frame: Holder<BufferHandle>,
+    constants: FrameConstants,
+    camera: Camera,
+    /// From where meshlets are culled, if not from where they are seen.
+    held: Option<Camera>,
+    _buffers: [Holder<BufferHandle>; 4],
+}
+
+/// A corner of the knot's triangles (`Vertex` in `shaders/mesh_shaders/frame.glsl`).
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Corner {
+    /// Where it is.
+    pub position: [f32; 3],
+    /// Outwards, of length 1.
+    pub normal: [f32; 3],
+}
+
+/// `Frame` there.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct FrameConstants {
+    camera: GpuCamera,
+    culling_camera: GpuCamera,
+    meshlets: u64,
+    vertices: u64,
+    vertex_numbers: u64,
+    triangles: u64,
+    counter: u64,
+    count: u32,
+    culls: u32,
+    phase: f32,
+    apart: f32,
+}
+
+impl MeshShaders {
+    /// Cuts the knot and makes the pipeline, for pictures of `extent` pixels. Meshlets that cannot be seen are left out if it
+    /// `culls`. The animation stands at its beginning.
+    ///
+    /// # Errors
+    /// [`RasterError::Missing`] on devices without mesh shaders, and otherwise when the picture is beyond the device, or the
+    /// device fails.
+    pub fn new(ctx: &Context, extent: [u32; 2], culls: bool) -> Result<Self, RasterError> {
+        let remedy = "take another device by --device; --list-devices says which there are";
+        RasterError::unless(ctx.capabilities().mesh_shader, ctx, "mesh shaders", remedy)?;
+        let canvas = Canvas::with_depth(ctx, extent)?;
+        let (corners, meshlets) = model();
+        let counter = Counter::new(ctx)?;
+        let frame = ctx.create_buffer(&BufferDesc {
+            size_bytes: size_of::<FrameConstants>() as u64,
+            debug_name: "frame constants",
+            ..BufferDesc::default()
+        })?;
+        let usage = BufferUsage::STORAGE;
+        let buffers = [
+            array(ctx, "meshlets", usage, &meshlets.meshlets)?,
+            array(ctx, "vertices", usage, &corners)?,
+            array(ctx, "vertex numbers", usage, &meshlets.vertices)?,
+            array(ctx, "triangles", usage, &meshlets.triangles)?,
+        ];
+        let constants = FrameConstants {
+            camera: GpuCamera::zeroed(),
+            culling_camera: GpuCamera::zeroed(),
+            meshlets: ctx.buffer_address(*buffers[0])?,
+            vertices: ctx.buffer_address(*buffers[1])?,
+            vertex_numbers: ctx.buffer_address(*buffers[2])?,
+            triangles: ctx.buffer_address(*buffers[3])?,
+            counter: ctx.buffer_address(*counter.buffer)?,
+            count: meshlets.meshlets.len() as u32,
+            culls: culls.into(),
+            phase: 0.0,
+            apart: 0.16,
+        };
+        Ok(Self {
+            ctx: ctx.clone(),
+            canvas,
+            pipeline: pipeline(ctx)?,
+            corners,
+            meshlets,
+            counter,
+            frame,
+            constants,
+            camera: camera(0.0),
+            held: None,
+            _buffers: buffers,
+        })
+    }
+
+    /// The knot in pieces, whose vertices are [`corners`](Self::corners).
+    #[must_use]
+    pub fn meshlets(&self) -> &Meshlets {
+        &self.meshlets
+    }
+
+    /// Corners of the knot, at rest.
+    #[must_use]
+    pub fn corners(&self) -> &[Corner] {
+        &self.corners
+    }
+
+    /// How many meshlets the last frame drew that is known.
+    #[must_use]
+    pub fn drawn(&self) -> Option<u32> {
+        self.counter.latest()
+    }
+
+    /// The buffer that all stages are told of (`Frame` in `shaders/mesh_shaders/frame.glsl`).
+    #[must_use]
+    pub fn frame_buffer(&self) -> BufferHandle {
+        *self.frame
+    }
+
+    fn upload(&mut self) -> lvk::Result<()> {
+        let [width, height] = self.canvas.extent();
+        let seen_by = |camera: &Camera| GpuCamera::new(camera, width, height, NEAR_PLANE);
+        self.constants.camera = seen_by(&self.camera);
+        self.constants.culling_camera = seen_by(self.held.as_ref().unwrap_or(&self.camera));
+        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))
+    }
+
+    fn told(&self) -> String {
+        let count = self.meshlets.meshlets.len();
+        match self.drawn() {
+            Some(drawn) => format!("{drawn} of {count} meshlets drawn"),
+            None => format!("{count} meshlets"),
+        }
+    }
+}
+
+impl Sample for MeshShaders {
+    type Error = RasterError;
+
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
+    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
+        self.constants.phase = moment.phase();
+        self.camera = camera(moment.phase());
+        Ok(())
+    }
+
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+        self.upload()?;
+        self.counter.begin(&self.ctx, &mut frame.cmd)?;
+        let counts = Dependencies { buffers: &[*self.counter.buffer], ..Dependencies::default() };
+        let mut pass = self.canvas.begin(&mut frame.cmd, "meshlets", BACKDROP, &counts)?;
+        pass.bind_render_pipeline(*self.pipeline)?;
+        pass.push_constants(&self.ctx.buffer_address(*self.frame)?)?;
+        pass.draw_mesh_tasks([self.constants.count.div_ceil(MESHLETS_PER_TASK), 1, 1])?;
+        Ok(self.canvas.picture())
+    }
+
+    fn after_frame(&mut self) -> Result<(), RasterError> {
+        Ok(self.counter.read(&self.ctx)?)
+    }
+
+    fn remark(&self) -> Option<String> {
+        Some(format!("culling   {}", self.told()))
+    }
+
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
+        self.canvas = Canvas::with_depth(&self.ctx, extent)?;
+        Ok(())
+    }
+
+    fn view(&self) -> Option<Camera> {
+        Some(self.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.camera = *camera;
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        ui.label(self.told());
+        let (mut culls, mut is_held) = (self.constants.culls == 1, self.held.is_some());
+        ui.checkbox(&mut culls, "leave out what cannot be seen");
+        if ui.checkbox(&mut is_held, "from here, wherever the camera goes").changed() {
+            self.held = is_held.then_some(self.camera);
+        }
+        self.constants.culls = culls.into();
+        ui.add(egui::Slider::new(&mut self.constants.apart, 0.0..=0.6).text("apart"));
+    }
+
+    fn reload(&mut self) -> Result<(), RasterError> {
+        self.pipeline = pipeline(&self.ctx)?;
+        Ok(())
+    }
+}
+
+/// The knot's corners, and its pieces.
+fn model() -> (Vec<Corner>, Meshlets) {
+    let knot = knot();
+    let corners = knot
+        .vertices
+        .iter()
+        .map(|vertex| Corner { position: vertex.position.into(), normal: vertex.normal.into() });
+    let positions: Vec<Vec3> = knot.vertices.iter().map(|vertex| vertex.position).collect();
+    let triangles: Vec<_> = knot.triangles.iter().map(|corners| corners.map(u32::from)).collect();
+    (corners.collect(), Meshlets::cut(&positions, &triangles))
+}
+
+fn pipeline(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
+    MESHLETS.create_with(ctx, &RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() })
+}
+
+/// Where the animation looks from.
+fn camera(phase: f32) -> Camera {
+    let eye = [0.0, 3.4 + 0.6 * (TAU * phase).sin(), 4.3];
+    Camera::looking_at(eye, [0.0, -0.22, 0.0], 43.0)
+}
