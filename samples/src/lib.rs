@@ -22,3 +22,4 @@ pub mod scene;
 pub mod shader_folder;
 pub mod shaders;
 mod shapes;
+pub mod yuv;

@@ -6,7 +6,7 @@ use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
 use crate::{
     app, bench, hello_triangle, hybrid, hybrid_oit, large_scene, mesh_shaders, omni_shadows, reflections,
-    render_to_cube_map, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures,
+    render_to_cube_map, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures, yuv,
 };
 
 /// A stage of a [`SamplePipeline`].
@@ -76,6 +76,7 @@ pub fn all() -> Vec<SamplePipeline> {
         rtx_hello::pipelines(),
         rtx_pipeline::pipelines(),
         rtx_textures::pipelines(),
+        yuv::pipelines(),
         bench::pipelines(),
         app::ui::pipelines(),
     ]

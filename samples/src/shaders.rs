@@ -82,6 +82,7 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("hybrid_oit/shadow.glsl", include_str!("../../shaders/hybrid_oit/shadow.glsl")),
     ("hybrid_oit/sky.glsl", include_str!("../../shaders/hybrid_oit/sky.glsl")),
     ("hybrid_oit/sphere.glsl", include_str!("../../shaders/hybrid_oit/sphere.glsl")),
+    ("yuv/push.glsl", include_str!("../../shaders/yuv/push.glsl")),
 ];
 
 /// Stages of the windows' user interface.
@@ -359,4 +360,16 @@ pub mod mesh_shaders {
     pub const MESHLET_MESH: &str = include_str!("../../shaders/mesh_shaders/meshlet.mesh.glsl");
     /// Their colours.
     pub const MESHLET_FRAG: &str = include_str!("../../shaders/mesh_shaders/meshlet.frag.glsl");
+}
+
+/// Stages of the `yuv` sample.
+pub mod yuv {
+    /// Corners of the moving picture.
+    pub const PICTURE_VERT: &str = include_str!("../../shaders/yuv/picture.vert.glsl");
+    /// Its colours.
+    pub const PICTURE_FRAG: &str = include_str!("../../shaders/yuv/picture.frag.glsl");
+    /// Corners of its planes.
+    pub const PLANES_VERT: &str = include_str!("../../shaders/yuv/planes.vert.glsl");
+    /// Their greys.
+    pub const PLANES_FRAG: &str = include_str!("../../shaders/yuv/planes.frag.glsl");
 }

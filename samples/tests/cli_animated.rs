@@ -97,6 +97,13 @@ const PROGRAMS: &[Program] = &[
         ways: &[&[], &["--faces", "single", "--show-cube"]],
     },
     Program {
+        path: env!("CARGO_BIN_EXE_yuv"),
+        quick: &[],
+        own: &["--format", "--model", "--range", "--show-planes"],
+        said: &["a moving picture of 640x360", "the device has [Nv12, I420", "picture"],
+        ways: &[&[], &["--format", "i420", "--model", "bt601", "--range", "full", "--show-planes"]],
+    },
+    Program {
         path: env!("CARGO_BIN_EXE_hello_triangle"),
         quick: &[],
         own: &[],

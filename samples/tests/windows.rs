@@ -26,6 +26,7 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// Of keys on X servers.
 const ESCAPE: u8 = 9;
 const KEY_W: u8 = 25;
+const KEY_N: u8 = 57;
 const SPACE: u8 = 65;
 const F1: u8 = 67;
 const F12: u8 = 96;
@@ -118,6 +119,11 @@ fn omni_shadows_has_a_window() {
 #[test]
 fn mesh_shaders_has_a_window() {
     shows_what_it_writes(env!("CARGO_BIN_EXE_mesh_shaders"), &[]);
+}
+
+#[test]
+fn yuv_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_yuv"), &[]);
 }
 
 #[test]
@@ -292,6 +298,23 @@ fn keys_hide_the_panel_and_fly_and_the_picture_follows_the_window() {
     session.resize([300, 260]);
     thread::sleep(Duration::from_millis(600));
     assert_eq!(session.shoot(&shot(5)).dimensions(), (300, 260));
+    session.close();
+}
+
+#[test]
+fn a_key_goes_on_to_the_next_format() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = env!("CARGO_BIN_EXE_yuv");
+    let Some(mut session) = Session::new(program, &["--model", "bt601"], folder.path()) else { return };
+    let shot = |number: u32| folder.path().join(format!("yuv_window_{number:04}.png"));
+    session.press(SPACE);
+    session.shoot(&shot(1));
+    let first = session.shoot(&shot(2));
+    session.press(KEY_N);
+    thread::sleep(Duration::from_millis(300));
+    let next = session.shoot(&shot(3));
+    assert!(differing(&first, &next, BESIDE_PANEL) < 0.05, "the same picture in other planes");
+    assert!(differing(&first, &next, 0) > 1e-4, "the panel does not say so");
     session.close();
 }
 

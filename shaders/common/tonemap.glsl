@@ -14,4 +14,11 @@ vec3 encodeSrgb(vec3 linear) {
     return mix(high, low, lessThanEqual(linear, vec3(0.0031308)));
 }
 
+// The reverse.
+vec3 decodeSrgb(vec3 encoded) {
+    vec3 low = encoded / 12.92;
+    vec3 high = pow((encoded + 0.055) / 1.055, vec3(2.4));
+    return mix(high, low, lessThanEqual(encoded, vec3(0.04045)));
+}
+
 #endif

@@ -11,10 +11,11 @@ use lvk_samples::pipelines::{SamplePipeline, SampleStage};
 use crate::device::vulkan;
 
 /// Bindings of the library's one descriptor set: number, type, how many.
-const BINDINGS: [(u32, vk::DescriptorType, u32); 5] = [
+const BINDINGS: [(u32, vk::DescriptorType, u32); 6] = [
     (0, vk::DescriptorType::SAMPLED_IMAGE, 16_384),
     (1, vk::DescriptorType::SAMPLER, 1_024),
     (2, vk::DescriptorType::STORAGE_IMAGE, 16_384),
+    (3, vk::DescriptorType::COMBINED_IMAGE_SAMPLER, 28),
     (4, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, 256),
     (5, vk::DescriptorType::STORAGE_BUFFER, 1),
 ];
@@ -310,7 +311,7 @@ fn set_layout(device: &ash::Device) -> vk::DescriptorSetLayout {
     });
     use vk::DescriptorBindingFlags as Flags;
     let mut flags = [Flags::PARTIALLY_BOUND | Flags::UPDATE_AFTER_BIND; BINDINGS.len()];
-    flags[4] = Flags::PARTIALLY_BOUND;
+    flags[5] = Flags::PARTIALLY_BOUND;
     let mut flags = vk::DescriptorSetLayoutBindingFlagsCreateInfo::default().binding_flags(&flags);
     let info = vk::DescriptorSetLayoutCreateInfo::default()
         .flags(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)

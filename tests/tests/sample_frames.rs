@@ -21,9 +21,10 @@ use lvk_samples::rtx_hello::RtxHello;
 use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig};
 use lvk_samples::rtx_textures::RtxTextures;
 use lvk_samples::scene::{Camera, Scene};
-use lvk_tests::device;
+use lvk_samples::yuv::{CONVERSIONS, Yuv, YuvConfig};
 use lvk_tests::hybrid::paths;
 use lvk_tests::still_life::still_life;
+use lvk_tests::{device, device_with};
 
 const SIZE: [u32; 2] = [40, 24];
 const OTHER_SIZE: [u32; 2] = [24, 40];
@@ -125,6 +126,12 @@ fn mesh_shaders_goes_by_frames() {
         return;
     }
     check(|size| MeshShaders::new(&ctx, size, true).unwrap());
+}
+
+#[test]
+fn yuv_goes_by_frames() {
+    let Some(ctx) = device_with(|desc| desc.yuv = &CONVERSIONS) else { return };
+    check(|extent| Yuv::new(&ctx, &YuvConfig { film: [80, 48], ..YuvConfig::new(extent) }).unwrap());
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use lvk::{
     Capabilities, Context, ContextDesc, DeviceProfile, FeatureRequest, OptionalFeature, RayQueryPath,
-    RayQueryRequest, ValidationSink, WindowHandles,
+    RayQueryRequest, ValidationSink, WindowHandles, YuvConversion,
 };
 
 use super::caches::Caches;
@@ -23,6 +23,8 @@ pub struct DeviceNeeds {
     pub features: &'static [OptionalFeature],
     /// Places for textures; fewer than the library's default count as that.
     pub textures: u32,
+    /// Conversions of textures in Y'CbCr; where there are none, the library's own.
+    pub yuv: &'static [YuvConversion],
 }
 
 impl DeviceNeeds {
@@ -59,6 +61,7 @@ pub(super) fn open(
             ray_query,
             required_features: needs.features,
             max_textures: needs.textures.max(ContextDesc::default().max_textures),
+            yuv: if needs.yuv.is_empty() { &YuvConversion::DEFAULT } else { needs.yuv },
             ..Caches::desc(caches.as_ref())
         })
     };

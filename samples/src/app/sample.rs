@@ -159,6 +159,9 @@ pub trait Sample {
     /// Lays out the sample's own switches in the panel of its window.
     fn panel(&mut self, _ui: &mut egui::Ui) {}
 
+    /// Goes on to the next of what the sample can show, from the next frame on: what the key N of its window asks.
+    fn next(&mut self) {}
+
     /// Makes all pipelines anew, of shaders that have changed.
     ///
     /// # Errors

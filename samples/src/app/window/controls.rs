@@ -18,6 +18,8 @@ pub(super) enum Action {
     GiveBack,
     /// Shows or hides the panel.
     Panel,
+    /// Goes on to the next of what the sample shows.
+    Next,
     /// Compiles all shaders again.
     Reload,
     /// Saves what the window shows.
@@ -66,6 +68,7 @@ impl Controls {
             KeyCode::Space => Some(Action::Pause),
             KeyCode::KeyC => Some(Action::GiveBack),
             KeyCode::F1 => Some(Action::Panel),
+            KeyCode::KeyN => Some(Action::Next),
             KeyCode::F5 => Some(Action::Reload),
             KeyCode::F12 => Some(Action::Screenshot),
             KeyCode::Escape => Some(Action::Close),

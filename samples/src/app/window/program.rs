@@ -236,6 +236,7 @@ impl<S: Sample> Running<S> {
             Action::Pause => self.panel.animates = !self.panel.animates,
             Action::GiveBack => (self.fly, self.at) = (None, None),
             Action::Panel => self.panel.is_open = !self.panel.is_open,
+            Action::Next => self.sample.next(),
             Action::Reload => self.reload(),
             Action::Screenshot => self.wants_screenshot = true,
             Action::Close => return Next::Close,

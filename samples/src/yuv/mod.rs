@@ -1,0 +1,21 @@
+//! The `yuv` sample: a moving picture in Y'CbCr, made by code, as decoders give it out: two or three planes of 8 or 10 bits, whose
+//! colour differences have half the size. Shaders sample it as colours, by the conversion that its texture was made with, and
+//! its planes one by one.
+//!
+//! [`Yuv`] is the sample for programs and tests, [`run`] the one for the command line.
+
+mod args;
+mod config;
+mod encode;
+mod film;
+mod pipelines;
+mod renderer;
+mod run;
+mod shown;
+
+pub use args::YuvArgs;
+pub use config::{CONVERSIONS, YuvConfig, YuvFormat, YuvModel, YuvRange};
+pub use film::Film;
+pub use pipelines::pipelines;
+pub use renderer::Yuv;
+pub use run::run;

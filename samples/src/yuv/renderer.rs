@@ -1,0 +1,190 @@
+//! The sample as a type: say the moment, get a picture.
+
+use bytemuck::{Pod, Zeroable};
+use lvk::{
+    AddressMode, Context, Dependencies, Holder, RenderPipelineDesc, RenderPipelineHandle, SamplerDesc,
+    SamplerHandle, TextureHandle, Topology,
+};
+
+use super::config::{YuvConfig, YuvFormat, YuvModel, YuvRange};
+use super::pipelines::PLANES;
+use super::shown::{Choice, Shown, supported};
+use crate::app::frame::Frame;
+use crate::app::sample::{Moment, Sample};
+use crate::raster::{Canvas, RasterError};
+
+/// Beside and above the picture.
+const BACKDROP: [f32; 3] = [0.006, 0.007, 0.009];
+
+/// Shows the moving picture.
+pub struct Yuv {
+    ctx: Context,
+    config: YuvConfig,
+    canvas: Canvas,
+    formats: Vec<YuvFormat>,
+    shown: Shown,
+    planes: Holder<RenderPipelineHandle>,
+    sampler: Holder<SamplerHandle>,
+    phase: f32,
+}
+
+/// `Push` in `shaders/yuv/push.glsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Push {
+    /// Of the whole canvas, the part that the picture covers.
+    covered: [f32; 2],
+    /// Textures of Y, Cb and Cr, and the channels that hold them.
+    planes: [u32; 3],
+    channels: [u32; 3],
+    sampler: u32,
+}
+
+impl Yuv {
+    /// Makes textures and pipelines. The animation stands at its beginning. The context is made with
+    /// [`CONVERSIONS`](super::CONVERSIONS).
+    ///
+    /// # Errors
+    /// [`RasterError`] when the picture is beyond the device, the device lacks the format ([`lvk::Error::Unsupported`]), or it
+    /// fails.
+    pub fn new(ctx: &Context, config: &YuvConfig) -> Result<Self, RasterError> {
+        let mut config = config.clamped();
+        let canvas = Canvas::flat(ctx, config.extent)?;
+        let choice = choice(&config, config.format.unwrap_or(YuvFormat::Nv12));
+        let formats = supported(ctx, choice)?;
+        let format = config.format.or(formats.first().copied()).unwrap_or(choice.format);
+        config.format = Some(format);
+        Ok(Self {
+            canvas,
+            shown: Shown::new(ctx, Choice { format, ..choice })?,
+            planes: planes(ctx)?,
+            sampler: ctx.create_sampler(&SamplerDesc {
+                address: [AddressMode::ClampToEdge; 3],
+                ..SamplerDesc::default()
+            })?,
+            ctx: ctx.clone(),
+            config,
+            formats,
+            phase: 0.0,
+        })
+    }
+
+    /// The formats that the device has.
+    pub fn formats(&self) -> &[YuvFormat] {
+        &self.formats
+    }
+
+    /// The format that is shown.
+    pub fn format(&self) -> YuvFormat {
+        self.shown.choice.format
+    }
+
+    /// The planes of the moment, as they were uploaded.
+    pub fn planes(&self) -> Vec<Vec<u8>> {
+        self.shown.encode(self.phase)
+    }
+
+    /// Takes over what the panel or a key has chosen.
+    fn apply(&mut self) -> Result<(), RasterError> {
+        let wanted = choice(&self.config, self.config.format.unwrap_or(self.shown.choice.format));
+        if wanted != self.shown.choice {
+            self.shown = Shown::new(&self.ctx, wanted)?;
+        }
+        Ok(())
+    }
+
+    fn push(&self) -> Push {
+        let film = self.config.film;
+        let relative = film[0] as f32 / film[1] as f32 / self.canvas.aspect();
+        let planes = &self.shown.planes;
+        let [y, cb] = [planes[0].index(), planes[1].index()];
+        let (cr, channel) = planes.get(2).map_or((cb, 1), |plane| (plane.index(), 0));
+        Push {
+            covered: [relative.min(1.0), relative.recip().min(1.0)],
+            planes: [y, cb, cr],
+            channels: [0, 0, channel],
+            sampler: self.sampler.index(),
+        }
+    }
+}
+
+impl Sample for Yuv {
+    type Error = RasterError;
+
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
+    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
+        self.phase = moment.phase();
+        Ok(())
+    }
+
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+        self.apply()?;
+        self.shown.upload(&self.ctx, self.phase)?;
+        let sampled = [*self.shown.texture];
+        let reads = Dependencies { sampled_images: &sampled, ..Dependencies::default() };
+        let mut pass = self.canvas.begin(&mut frame.cmd, "picture", BACKDROP, &reads)?;
+        pass.bind_render_pipeline(*self.shown.pipeline)?;
+        pass.push_constants(&self.push())?;
+        pass.draw(0..4, 0..1)?;
+        if self.config.shows_planes {
+            pass.bind_render_pipeline(*self.planes)?;
+            pass.draw(0..4, 0..3)?;
+        }
+        Ok(self.canvas.picture())
+    }
+
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
+        self.canvas = Canvas::flat(&self.ctx, extent)?;
+        self.config.extent = extent;
+        Ok(())
+    }
+
+    fn next(&mut self) {
+        let at = self.formats.iter().position(|format| *format == self.format());
+        let next = at.map_or(0, |at| (at + 1) % self.formats.len());
+        self.config.format = self.formats.get(next).copied();
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        let config = &mut self.config;
+        ui.horizontal(|ui| {
+            for format in YuvFormat::ALL {
+                let label = egui::Button::selectable(config.format == Some(format), format!("{format:?}"));
+                if ui.add_enabled(self.formats.contains(&format), label).clicked() {
+                    config.format = Some(format);
+                }
+            }
+        });
+        ui.horizontal(|ui| {
+            for model in YuvModel::ALL {
+                ui.selectable_value(&mut config.model, model, format!("{model:?}"));
+            }
+        });
+        ui.horizontal(|ui| {
+            for range in [YuvRange::Narrow, YuvRange::Full] {
+                ui.selectable_value(&mut config.range, range, format!("{range:?}"));
+            }
+        });
+        ui.checkbox(&mut config.shows_planes, "planes");
+        ui.label("N is the next format");
+    }
+
+    fn reload(&mut self) -> Result<(), RasterError> {
+        let planes = planes(&self.ctx)?;
+        self.shown.reload(&self.ctx)?;
+        self.planes = planes;
+        Ok(())
+    }
+}
+
+fn choice(config: &YuvConfig, format: YuvFormat) -> Choice {
+    Choice { format, model: config.model, range: config.range, size: config.film }
+}
+
+fn planes(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
+    let strip = RenderPipelineDesc { topology: Topology::TriangleStrip, ..RenderPipelineDesc::default() };
+    PLANES.create_with(ctx, &strip)
+}

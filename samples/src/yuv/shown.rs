@@ -1,0 +1,106 @@
+//! The texture of a picture in one format and conversion, and the pipeline that samples it.
+
+use lvk::{
+    Aspect, Context, Holder, RenderPipelineDesc, RenderPipelineHandle, SpecializationConstant,
+    SpecializationValue, TextureDesc, TextureHandle, TextureRegion, TextureViewDesc, Topology,
+};
+
+use super::config::{YuvFormat, YuvModel, YuvRange, conversion};
+use super::encode;
+use super::film::Film;
+use super::pipelines::PICTURE;
+
+/// What a texture and its conversion are chosen by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Choice {
+    pub(super) format: YuvFormat,
+    pub(super) model: YuvModel,
+    pub(super) range: YuvRange,
+    pub(super) size: [u32; 2],
+}
+
+/// A texture with its conversion.
+pub(super) struct Shown {
+    pub(super) choice: Choice,
+    pub(super) texture: Holder<TextureHandle>,
+    /// Its planes, as textures of one or two channels.
+    pub(super) planes: Vec<Holder<TextureHandle>>,
+    /// For this texture alone: shaders know it by a constant.
+    pub(super) pipeline: Holder<RenderPipelineHandle>,
+}
+
+impl Shown {
+    /// Fails with [`lvk::Error::Unsupported`] where the device lacks the format or the conversion.
+    pub(super) fn new(ctx: &Context, choice: Choice) -> lvk::Result<Self> {
+        let texture = texture(ctx, choice)?;
+        let plane = |number: usize| {
+            ctx.create_texture_view(&TextureViewDesc {
+                texture: Some(*texture),
+                aspect: Aspect::Plane(number as u8),
+                debug_name: "plane",
+                ..TextureViewDesc::default()
+            })
+        };
+        let count = if choice.format.has_two_planes() { 2 } else { 3 };
+        let planes = (0..count).map(plane).collect::<lvk::Result<_>>()?;
+        let pipeline = pipeline(ctx, texture.index())?;
+        Ok(Self { choice, texture, planes, pipeline })
+    }
+
+    /// Compiles the pipeline again.
+    pub(super) fn reload(&mut self, ctx: &Context) -> lvk::Result<()> {
+        self.pipeline = pipeline(ctx, self.texture.index())?;
+        Ok(())
+    }
+
+    /// The planes of the moment, as they lie in memory.
+    pub(super) fn encode(&self, phase: f32) -> Vec<Vec<u8>> {
+        let Choice { format, model, range, size } = self.choice;
+        encode::planes(&Film { size, phase }, format, model, range)
+    }
+
+    /// Shows the moment.
+    pub(super) fn upload(&self, ctx: &Context, phase: f32) -> lvk::Result<()> {
+        for (number, plane) in self.encode(phase).iter().enumerate() {
+            let region = TextureRegion { aspect: Aspect::Plane(number as u8), ..TextureRegion::default() };
+            ctx.upload_texture(*self.texture, &region, plane)?;
+        }
+        Ok(())
+    }
+}
+
+/// Which formats the device has, with this matrix and range.
+pub(super) fn supported(ctx: &Context, choice: Choice) -> lvk::Result<Vec<YuvFormat>> {
+    let mut found = Vec::new();
+    for format in YuvFormat::ALL {
+        match texture(ctx, Choice { format, size: [2, 2], ..choice }) {
+            Ok(_) => found.push(format),
+            Err(lvk::Error::Unsupported { .. }) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(found)
+}
+
+fn texture(ctx: &Context, choice: Choice) -> lvk::Result<Holder<TextureHandle>> {
+    let Choice { format, model, range, size } = choice;
+    ctx.create_texture(&TextureDesc {
+        format: format.raw(),
+        extent: size,
+        conversion: Some(conversion(format, model, range)),
+        debug_name: "moving picture",
+        ..TextureDesc::default()
+    })
+}
+
+fn pipeline(ctx: &Context, index: u32) -> lvk::Result<Holder<RenderPipelineHandle>> {
+    let constant = SpecializationConstant { id: 0, value: SpecializationValue::U32(index) };
+    PICTURE.create_with(
+        ctx,
+        &RenderPipelineDesc {
+            topology: Topology::TriangleStrip,
+            specialization: &[constant],
+            ..RenderPipelineDesc::default()
+        },
+    )
+}

@@ -1,0 +1,208 @@
+//! The pictures of the `yuv` sample: what shaders sample is what arithmetic makes of the planes, in every format and by every
+//! conversion, and it looks as ever.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use image::RgbaImage;
+use lvk::{Context, DeviceProfile, Error};
+use lvk_samples::app::sample::Sample;
+use lvk_samples::raster::RasterError;
+use lvk_samples::yuv::{CONVERSIONS, Film, Yuv, YuvConfig, YuvFormat, YuvModel, YuvRange};
+use lvk_tests::child::without_ray_tracing;
+use lvk_tests::device::TestDevice;
+use lvk_tests::device_with;
+use lvk_tests::picture::{Likeness, Tolerance, assert_alike, assert_as_ever, keep, reference};
+use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, picture_now, picture_of};
+
+/// As computed: but for the weights of colour differences between texels, which drivers round.
+const AS_COMPUTED: Tolerance = Tolerance { psnr: 46.0, ssim: 0.998, differing_share: 0.2, flip: 0.025 };
+/// As it was before it was encoded, when colour differences had the same size as the picture.
+const AS_FILMED: Tolerance = Tolerance { psnr: 24.0, ssim: 0.9, differing_share: 1.0, flip: 0.1 };
+const FRAME: u32 = 30;
+
+fn yuv_device() -> Option<TestDevice> {
+    device_with(|desc| desc.yuv = &CONVERSIONS)
+}
+
+/// A texel for each pixel.
+fn usual() -> YuvConfig {
+    YuvConfig { film: SIZE, ..YuvConfig::new(SIZE) }
+}
+
+fn sample(ctx: &Context, config: &YuvConfig) -> Yuv {
+    Yuv::new(ctx, config).unwrap()
+}
+
+/// Numbers of a plane, 0 to 1.
+fn numbers(plane: &[u8], format: YuvFormat) -> Vec<f64> {
+    match format.bits() {
+        8 => plane.iter().map(|byte| f64::from(*byte)).collect(),
+        _ => plane.chunks(2).map(|two| f64::from(u16::from_le_bytes([two[0], two[1]]) >> 6)).collect(),
+    }
+}
+
+/// What the planes show: colour differences lie at every second texel of every second row.
+fn computed(planes: &[Vec<u8>], config: &YuvConfig, format: YuvFormat) -> RgbaImage {
+    let all: Vec<_> = planes.iter().map(|plane| numbers(plane, format)).collect();
+    let [width, height] = config.film.map(|side| side as usize);
+    let difference = |number: usize, column: usize, row: usize| {
+        let at = row.min(height / 2 - 1) * (width / 2) + column.min(width / 2 - 1);
+        if all.len() == 2 { all[1][2 * at + number] } else { all[1 + number][at] }
+    };
+    let between = |number: usize, x: usize, y: usize| {
+        let corners = [(x / 2, y / 2), (x.div_ceil(2), y / 2), (x / 2, y.div_ceil(2))];
+        let last = (x.div_ceil(2), y.div_ceil(2));
+        corners.into_iter().chain([last]).map(|(x, y)| difference(number, x, y)).sum::<f64>() / 4.0
+    };
+    RgbaImage::from_fn(width as u32, height as u32, |x, y| {
+        let (x, y) = (x as usize, y as usize);
+        let code = [all[0][y * width + x], between(0, x, y), between(1, x, y)];
+        let [red, green, blue] =
+            decoded(code, config, format).map(|value| (255.0 * value.clamp(0.0, 1.0)).round() as u8);
+        image::Rgba([red, green, blue, 255])
+    })
+}
+
+/// The equations of BT.601, BT.709 and BT.2020.
+fn decoded([y, cb, cr]: [f64; 3], config: &YuvConfig, format: YuvFormat) -> [f64; 3] {
+    let step = f64::from(1 << (format.bits() - 8));
+    let most = f64::from((1 << format.bits()) - 1);
+    let (y, cb, cr) = match config.range {
+        YuvRange::Narrow => {
+            let part = |c: f64| (c / step - 128.0) / 224.0;
+            ((y / step - 16.0) / 219.0, part(cb), part(cr))
+        }
+        YuvRange::Full => (y / most, (cb - 128.0 * step) / most, (cr - 128.0 * step) / most),
+    };
+    let (red, blue) = match config.model {
+        YuvModel::Bt601 => (0.299, 0.114),
+        YuvModel::Bt709 => (0.2126, 0.0722),
+        YuvModel::Bt2020 => (0.2627, 0.0593),
+    };
+    let (r, b) = (y + 2.0 * (1.0 - red) * cr, y + 2.0 * (1.0 - blue) * cb);
+    [r, (y - red * r - blue * b) / (1.0 - red - blue), b]
+}
+
+fn filmed() -> RgbaImage {
+    let film = Film { size: SIZE, phase: FRAME as f32 / ROUND as f32 };
+    RgbaImage::from_fn(SIZE[0], SIZE[1], |x, y| {
+        let [red, green, blue] = (255.0 * film.color(x, y)).to_array().map(|value| value.round() as u8);
+        image::Rgba([red, green, blue, 255])
+    })
+}
+
+#[test]
+fn every_format_and_conversion_is_as_computed() {
+    let Some(ctx) = yuv_device() else { return };
+    let formats = sample(&ctx, &usual()).formats().to_vec();
+    assert!(formats.contains(&YuvFormat::Nv12) && formats.contains(&YuvFormat::I420), "{formats:?}");
+    for missing in YuvFormat::ALL.iter().filter(|format| !formats.contains(format)) {
+        eprintln!("NOT TESTED, the device has no {missing:?}");
+    }
+    let filmed = filmed();
+    for format in formats {
+        for model in YuvModel::ALL {
+            for range in [YuvRange::Narrow, YuvRange::Full] {
+                let config = YuvConfig { format: Some(format), model, range, ..usual() };
+                let mut sample = sample(&ctx, &config);
+                let picture = picture_of(&mut sample, FRAME);
+                let what = format!("{format:?} {model:?} {range:?}");
+                assert_alike(&what, &picture, &computed(&sample.planes(), &config, format), &AS_COMPUTED);
+                assert_alike(&format!("{what} filmed"), &picture, &filmed, &AS_FILMED);
+            }
+        }
+    }
+}
+
+/// That the comparison above would notice a wrong matrix or range.
+#[test]
+fn other_conversions_show_other_pictures() {
+    let Some(ctx) = yuv_device() else { return };
+    let mut sample = sample(&ctx, &usual());
+    let (picture, planes, format) = (picture_of(&mut sample, FRAME), sample.planes(), sample.format());
+    for (model, range) in [
+        (YuvModel::Bt601, YuvRange::Narrow),
+        (YuvModel::Bt2020, YuvRange::Narrow),
+        (YuvModel::Bt709, YuvRange::Full),
+    ] {
+        let other = computed(&planes, &YuvConfig { model, range, ..usual() }, format);
+        let likeness = Likeness::of(&picture, &other);
+        assert!(!likeness.is_within(&AS_COMPUTED), "{model:?} {range:?}: {likeness}");
+    }
+}
+
+#[test]
+fn the_next_format_follows_and_the_first_comes_again() {
+    let Some(ctx) = yuv_device() else { return };
+    let mut sample = sample(&ctx, &usual());
+    let formats = sample.formats().to_vec();
+    let first = picture_of(&mut sample, FRAME);
+    for number in 1..=formats.len() {
+        sample.next();
+        let picture = picture_now(&mut sample);
+        assert_eq!(sample.format(), formats[number % formats.len()]);
+        assert_alike("the next format", &picture, &filmed(), &AS_FILMED);
+    }
+    assert!(picture_now(&mut sample) == first);
+}
+
+/// Where the planes are shown, the picture is covered by greys.
+#[test]
+fn planes_are_shown_as_greys() {
+    let Some(ctx) = yuv_device() else { return };
+    let picture = picture_of(&mut sample(&ctx, &YuvConfig { shows_planes: true, ..usual() }), FRAME);
+    keep("yuv planes", &picture);
+    let place = |share: f32, side: u32| (share * side as f32) as u32;
+    for which in [0.1, 0.4, 0.7] {
+        for across in [0.06, 0.15, 0.25] {
+            let pixel = picture.get_pixel(place(across, SIZE[0]), place(which, SIZE[1]));
+            let [red, green, blue, _] = pixel.0;
+            assert!(red.abs_diff(green) <= 1 && green.abs_diff(blue) <= 1, "{which} {across}: {pixel:?}");
+        }
+    }
+}
+
+#[test]
+fn a_round_has_no_seam() {
+    let Some(ctx) = yuv_device() else { return };
+    let mut sample = sample(&ctx, &usual());
+    let first = picture_of(&mut sample, 0);
+    assert_ne!(picture_of(&mut sample, 33), first, "it moves");
+    assert_eq!(picture_of(&mut sample, ROUND), first);
+}
+
+#[test]
+fn the_card_looks_as_it_always_did() {
+    let Some(ctx) = yuv_device() else { return };
+    let config = YuvConfig { shows_planes: true, ..usual() };
+    assert_as_ever("yuv_small", &picture_of(&mut sample(&ctx, &config), FRAME));
+}
+
+#[test]
+fn another_driver_shows_it() {
+    without_ray_tracing("another_driver_shows_it", || {
+        let Some(ctx) = yuv_device() else { return };
+        let mut sample = sample(&ctx, &YuvConfig { shows_planes: true, ..usual() });
+        let picture = picture_of(&mut sample, FRAME);
+        assert_alike("SwiftShader card", &picture, &reference("yuv_small"), &AS_COMPUTED);
+    });
+}
+
+#[test]
+fn devices_without_conversions_are_refused_by_name() {
+    let profile = DeviceProfile::core_only();
+    let Some(ctx) = device_with(|desc| (desc.yuv, desc.profile) = (&CONVERSIONS, Some(&profile))) else {
+        return;
+    };
+    for format in [None, Some(YuvFormat::P010)] {
+        match Yuv::new(&ctx, &YuvConfig { format, ..usual() }).err() {
+            Some(RasterError::Device(Error::Unsupported { .. })) => {}
+            other => unreachable!("{format:?}: {other:?}"),
+        }
+    }
+}
+
+#[test]
+fn impossible_pictures_are_refused() {
+    let Some(ctx) = yuv_device() else { return };
+    assert_refuses_impossible_sizes(|extent| Yuv::new(&ctx, &YuvConfig { extent, ..usual() }));
+}
