@@ -61,6 +61,7 @@
 //! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
 //! | find what is wrong | [`manual::debugging`], [`Validation`], [`ValidationSink`] |
 //! | mix in Vulkan calls of your own, or live on another engine's device | [`manual::interop`] |
+//! | see what LightweightVK has and what became of it here | [`manual::parity`] |
 //!
 //! # Barriers
 //!

@@ -35,3 +35,6 @@ pub mod measuring {}
 
 #[doc = include_str!("windows.md")]
 pub mod windows {}
+
+#[doc = include_str!("parity.md")]
+pub mod parity {}
