@@ -46,6 +46,7 @@
 //! | record | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
 //! | draw | [`CommandBuffer::begin_rendering`], [`RenderPass`] |
 //! | read targets in their own pass | [`RenderPassDesc::local_read`], [`TextureUsage::INPUT`], [`RenderPass::read_targets`] |
+//! | shade several pixels at once | [`RenderPipelineDesc::shading_rate`], [`Context::shading_rates`] |
 //! | draw with task and mesh shaders | [`RenderPipelineDesc::mesh`], [`RenderPass::draw_mesh_tasks`] |
 //! | show pictures in windows | [`manual::windows`], [`Context::create_swapchain`], [`Context::present`] |
 //! | compute | [`CommandBuffer::dispatch`] |
@@ -130,7 +131,8 @@ pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, transfor
 pub use bindless::checks::{BindlessArray, IndexFault, SlotState};
 pub use command::CommandBuffer;
 pub use command::attachment::{
-    ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, DepthResolve, Resolve, StencilLoad,
+    ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, DepthResolve, Resolve, ShadingRateAttachment,
+    StencilLoad,
 };
 pub use command::dependencies::Dependencies;
 pub use command::draw_count::CountedDraws;
@@ -161,6 +163,7 @@ pub use gpu::optional::{FeatureSet, OptionalFeature};
 pub use gpu::profile::DeviceProfile;
 pub use gpu::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use gpu::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
+pub use gpu::shading_rate::{FragmentSize, RateCombine, ShadingRate, ShadingRateLimits};
 pub use gpu::window::WindowHandles;
 pub use handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,

@@ -296,7 +296,6 @@ impl Use {
     }
 
     /// Attachment that a pass takes its shading rates from.
-    #[cfg_attr(not(test), expect(dead_code, reason = "waits for the command that makes it"))]
     pub(crate) const fn shading_rate() -> Self {
         Self::new(Stages::SHADING_RATE, Access::SHADING_RATE_READ, Layout::ShadingRate)
     }

@@ -120,6 +120,27 @@ pub struct DepthAttachment {
     pub resolve: Option<DepthResolve>,
 }
 
+/// Where a render pass takes shading rates from: a texel for each few pixels of the targets, of all layers and views alike.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ShadingRateAttachment {
+    /// A texture with [`TextureUsage::SHADING_RATE`](crate::TextureUsage::SHADING_RATE), whose texels are as
+    /// [`ShadingRate::texel`](crate::ShadingRate::texel) answers.
+    pub texture: TextureHandle,
+    /// Mip level read; of a view, counted from its first.
+    pub mip: u32,
+    /// Layer read; of a view, counted from its first.
+    pub layer: u32,
+    /// How many pixels a texel stands for, as [`Limits::shading_rate`](crate::Limits::shading_rate) allows.
+    pub texel: [u32; 2],
+}
+
+impl ShadingRateAttachment {
+    /// The first mip and layer.
+    pub fn new(texture: TextureHandle, texel: [u32; 2]) -> Self {
+        Self { texture, mip: 0, layer: 0, texel }
+    }
+}
+
 impl DepthAttachment {
     /// The first mip and layer, cleared to a depth and the stencil 0, and kept.
     pub fn clear(texture: TextureHandle, depth: f32) -> Self {

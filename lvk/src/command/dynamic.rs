@@ -5,6 +5,7 @@ use ash::vk;
 use super::render::RenderPass;
 use crate::error::{Error, Result};
 use crate::gpu::optional::OptionalFeature;
+use crate::gpu::shading_rate::ShadingRate;
 use crate::pipeline::PassState;
 use crate::pipeline::depth_stencil::DepthState;
 use crate::pipeline::raster::DepthBias;
@@ -24,6 +25,7 @@ struct Values {
     bias: Option<DepthBias>,
     stencil_reference: Option<[u8; 2]>,
     blend_constants: Option<[f32; 4]>,
+    shading_rate: Option<ShadingRate>,
 }
 
 impl DynamicState {
@@ -35,6 +37,7 @@ impl DynamicState {
             bias: state.bias,
             stencil_reference: state.stencil.then_some(self.stencil_reference),
             blend_constants: state.blend_constants.then_some(self.blend_constants),
+            shading_rate: state.shading_rate,
         };
         let held = std::mem::replace(&mut self.held, wanted);
         Values {
@@ -42,6 +45,7 @@ impl DynamicState {
             bias: changed(wanted.bias, held.bias),
             stencil_reference: changed(wanted.stencil_reference, held.stencil_reference),
             blend_constants: changed(wanted.blend_constants, held.blend_constants),
+            shading_rate: changed(wanted.shading_rate, held.shading_rate),
         }
     }
 }
@@ -117,6 +121,13 @@ impl RenderPass<'_> {
         Ok(())
     }
 
+    /// The rate of the draws that follow, which the device has.
+    pub(super) fn set_shading_rate(&mut self, rate: ShadingRate) {
+        let values = Values { shading_rate: Some(rate), ..Default::default() };
+        self.dynamic.held.shading_rate = values.shading_rate;
+        self.set(&values);
+    }
+
     /// Sets what the pipeline that was bound now leaves to the pass.
     pub(super) fn set_state_of(&mut self, state: &PassState) {
         let values = self.dynamic.bind(state);
@@ -144,6 +155,10 @@ impl RenderPass<'_> {
             if let Some(constants) = values.blend_constants {
                 device.cmd_set_blend_constants(raw, &constants);
             }
+            if let (Some(rate), Some(rates)) = (values.shading_rate, &self.cmd.shared.gpu.shading_rates) {
+                let set = rates.functions.fp().cmd_set_fragment_shading_rate_khr;
+                set(raw, &rate.raw_size(), &rate.raw_combine());
+            }
         }
     }
 }
@@ -162,13 +177,14 @@ mod tests {
     fn state() -> impl Strategy<Value = PassState> {
         let depth = prop::option::of(any::<bool>());
         let bias = prop::option::of(0..2_u8);
-        (depth, bias, any::<bool>(), any::<bool>()).prop_map(|(depth, bias, stencil, blend_constants)| {
-            PassState {
-                depth: depth.map(|write| DepthState { compare: CompareOp::Less, write }),
-                bias: bias.map(|constant| DepthBias { constant: constant.into(), ..Default::default() }),
-                stencil,
-                blend_constants,
-            }
+        let rate = prop::option::of(0..2_u32);
+        let flags = (any::<bool>(), any::<bool>());
+        (depth, bias, flags, rate).prop_map(|(depth, bias, (stencil, blend_constants), rate)| PassState {
+            shading_rate: rate.map(|exponent| ShadingRate::of([1 << exponent, 1])),
+            depth: depth.map(|write| DepthState { compare: CompareOp::Less, write }),
+            bias: bias.map(|constant| DepthBias { constant: constant.into(), ..Default::default() }),
+            stencil,
+            blend_constants,
         })
     }
 
@@ -188,6 +204,9 @@ mod tests {
                     set.stencil_reference.or(vulkan.stencil_reference.filter(|_| state.stencil));
                 vulkan.blend_constants =
                     set.blend_constants.or(vulkan.blend_constants.filter(|_| state.blend_constants));
+                vulkan.shading_rate =
+                    set.shading_rate.or(vulkan.shading_rate.filter(|_| state.shading_rate.is_some()));
+                prop_assert_eq!(vulkan.shading_rate, state.shading_rate);
                 prop_assert_eq!(vulkan.depth, state.depth);
                 prop_assert_eq!(vulkan.bias, state.bias);
                 prop_assert_eq!(vulkan.stencil_reference, state.stencil.then_some([reference; 2]));

@@ -24,6 +24,7 @@ mod query_log;
 pub(crate) mod render;
 pub(crate) mod render_pass;
 mod resolve;
+mod shading_rate;
 mod software;
 mod targets;
 pub(crate) mod tlas;

@@ -109,6 +109,7 @@ impl<'a> RenderPass<'a> {
             return Err(Error::usage(&*pipeline.name, WRITES_READ_ONLY));
         }
         targets.inputs.check_reads(&pipeline)?;
+        self.check_rates(&pipeline)?;
         if !pipeline.query_stages.is_empty() {
             self.cmd.use_structures(pipeline.query_stages);
             let remedy =

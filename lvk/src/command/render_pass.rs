@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::attachment::{ColorAttachment, DepthAttachment};
+use super::attachment::{ColorAttachment, DepthAttachment, ShadingRateAttachment};
 use super::dependencies::Dependencies;
 use super::render::RenderPass;
 use super::targets::Targets;
@@ -42,6 +42,9 @@ pub struct RenderPassDesc<'a> {
     /// pixel: what earlier draws of the pass have put there (`LVK_INPUT`, `LVK_DEPTH_INPUT`, `LVK_STENCIL_INPUT` and
     /// `subpassLoad`). Needs [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
     pub local_read: bool,
+    /// Where pipelines take the sizes of fragments from that combine their
+    /// [`shading_rate`](crate::RenderPipelineDesc::shading_rate) with it.
+    pub shading_rate: Option<ShadingRateAttachment>,
     /// What the pass's shaders reach bindlessly, and what its draws read that was written earlier in the same command
     /// buffer: no barrier can be placed inside a pass. Acceleration structures need not be listed.
     pub dependencies: Dependencies<'a>,
@@ -89,6 +92,10 @@ impl CommandBuffer {
         }
         if let Some(stencil) = &targets.stencil {
             info = info.stencil_attachment(stencil);
+        }
+        let mut rates = targets.rates.unwrap_or_default();
+        if targets.rates.is_some() {
+            info = info.push_next(&mut rates);
         }
         // SAFETY: the views are alive and in the layouts named; no other pass is open, as passes borrow `self`.
         unsafe { self.shared.gpu.device.cmd_begin_rendering(self.raw(), &info) };

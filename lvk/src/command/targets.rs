@@ -26,6 +26,7 @@ pub(super) struct Targets {
     pub(super) shape: PassShape,
     pub(super) read_only_depth: bool,
     pub(super) inputs: PassInputs,
+    pub(super) rates: Option<vk::RenderingFragmentShadingRateAttachmentInfoKHR<'static>>,
     pub(super) colors: Vec<vk::RenderingAttachmentInfo<'static>>,
     pub(super) depth: Option<vk::RenderingAttachmentInfo<'static>>,
     pub(super) stencil: Option<vk::RenderingAttachmentInfo<'static>>,
@@ -107,6 +108,7 @@ impl CommandBuffer {
             shape: PassShape::default(),
             read_only_depth: false,
             inputs,
+            rates: None,
             colors,
             depth: None,
             stencil: None,
@@ -124,6 +126,7 @@ impl CommandBuffer {
         targets.shape = PassShape::new(formats, depth_format, samples, desc.view_mask);
         targets.area = PassArea::of(desc.area, extent)?;
         targets.inputs.check(desc)?;
+        targets.rates = self.use_rates(desc, targets.area)?;
         Ok(targets)
     }
 

@@ -4,6 +4,7 @@ use super::Context;
 use super::create_texture::check_data;
 use crate::error::Result;
 use crate::format::Format;
+use crate::gpu::shading_rate::FragmentSize;
 use crate::resource::check_image;
 use crate::resource::format_support::FormatSupport;
 use crate::resource::texture_desc::TextureDesc;
@@ -27,6 +28,13 @@ impl Context {
     pub fn supports_texture(&self, desc: &TextureDesc<'_>) -> Result<()> {
         let plan = check_image(&self.shared().gpu, desc)?;
         check_data(desc, plan.mips)
+    }
+
+    /// The sizes of fragments that the device has, from large to small; empty where it lacks
+    /// [`OptionalFeature::PipelineShadingRate`](crate::OptionalFeature::PipelineShadingRate)
+    /// (`vkGetPhysicalDeviceFragmentShadingRatesKHR`).
+    pub fn shading_rates(&self) -> &[FragmentSize] {
+        self.shared().gpu.shading_rates.as_ref().map_or(&[], |rates| &rates.sizes)
     }
 
     /// The best format of depth, with stencil or without, that can be drawn to and sampled here; `None` where there is none.

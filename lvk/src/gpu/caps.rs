@@ -10,6 +10,7 @@ use super::optional::{FeatureSet, OF_MESH_SHADERS, OptionalFeature};
 use super::ray_query_path::{RayQueryPath, RayQueryRequest};
 use super::resolve_modes::{DepthResolveLimits, ResolveModes};
 use super::select::DeviceKind;
+use super::shading_rate::ShadingRateLimits;
 use super::window::Probe;
 use crate::error::{Error, Result};
 
@@ -124,6 +125,9 @@ impl Capabilities {
         if !self.has(OptionalFeature::LocalRead) {
             self.limits.max_input_attachments = 0;
         }
+        if !self.has(OptionalFeature::PipelineShadingRate) {
+            self.limits.shading_rate = ShadingRateLimits::default();
+        }
         if !self.has(OptionalFeature::SamplerAnisotropy) {
             self.max_anisotropy = 1.0;
         }
@@ -211,6 +215,8 @@ pub struct Limits {
     pub max_views: u32,
     /// How multisampled depth and stencil can be resolved.
     pub depth_resolve: DepthResolveLimits,
+    /// Of fragments of several pixels.
+    pub shading_rate: ShadingRateLimits,
     /// Most vertices of a patch, before and behind the tessellation control stage (`maxTessellationPatchSize`).
     pub max_patch_points: u32,
     /// Least and greatest width of lines in pixels (`lineWidthRange`).
@@ -382,6 +388,7 @@ impl PhysicalDevice {
         let mut accel = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
         let mut pipeline = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
         let mut mesh = vk::PhysicalDeviceMeshShaderPropertiesEXT::default();
+        let mut rates = vk::PhysicalDeviceFragmentShadingRatePropertiesKHR::default();
         let mut borders = vk::PhysicalDeviceCustomBorderColorPropertiesEXT::default();
         let mut v11 = vk::PhysicalDeviceVulkan11Properties::default();
         let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
@@ -398,6 +405,9 @@ impl PhysicalDevice {
         }
         if self.capabilities.mesh_shader {
             all = all.push_next(&mut mesh);
+        }
+        if self.capabilities.has(OptionalFeature::PipelineShadingRate) {
+            all = all.push_next(&mut rates);
         }
         if self.capabilities.has(OptionalFeature::CustomBorderColors) {
             all = all.push_next(&mut borders);
@@ -417,6 +427,7 @@ impl PhysicalDevice {
         caps.helpers_lose_arrays = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.limits = limits(&plain.limits, &v12, &v13, &accel, &pipeline);
         caps.limits.mesh = MeshLimits::of(&mesh);
+        caps.limits.shading_rate = ShadingRateLimits::of(&rates);
         caps.limits.max_allocation_bytes = v11.max_memory_allocation_size;
         caps.limits.max_custom_borders = borders.max_custom_border_color_samplers;
         caps.limits.max_views = v11.max_multiview_view_count;
@@ -523,6 +534,7 @@ fn limits(
             one_alone: v12.independent_resolve_none == vk::TRUE,
             different: v12.independent_resolve == vk::TRUE,
         },
+        shading_rate: ShadingRateLimits::default(),
         max_patch_points: plain.max_tessellation_patch_size,
         line_width: plain.line_width_range,
         max_dispatch_groups: plain.max_compute_work_group_count,

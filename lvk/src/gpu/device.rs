@@ -19,6 +19,7 @@ use super::optional::{FeatureSet, OF_WINDOWS, OptionalFeature};
 use super::profile::DeviceProfile;
 use super::ray_query_path::RayQueryRequest;
 use super::select::{Candidate, choose};
+use super::shading_rate::ShadingRates;
 use super::window::{Probe, WindowFunctions, WindowHandles};
 use crate::error::{Error, Result, check_limit};
 use crate::lock::{Guard, Mutex, Rank};
@@ -54,6 +55,7 @@ pub(crate) struct Gpu {
     pub(crate) accel: Option<ash::khr::acceleration_structure::Device>,
     pub(crate) ray_tracing: Option<ash::khr::ray_tracing_pipeline::Device>,
     pub(crate) mesh: Option<ash::ext::mesh_shader::Device>,
+    pub(crate) shading_rates: Option<ShadingRates>,
     pub(crate) local_read: Option<ash::khr::dynamic_rendering_local_read::Device>,
     /// Reads the clocks of device and host together.
     pub(crate) host_clock: Option<HostClock>,
@@ -145,6 +147,7 @@ impl Gpu {
                 .ray_tracing_pipeline
                 .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
             mesh: caps.mesh_shader.then(|| ash::ext::mesh_shader::Device::new(raw, &device)),
+            shading_rates: ShadingRates::new(&instance, &device, physical, &caps),
             local_read: caps
                 .has(OptionalFeature::LocalRead)
                 .then(|| ash::khr::dynamic_rendering_local_read::Device::new(raw, &device)),

@@ -20,6 +20,7 @@ pub(crate) mod profile;
 pub(crate) mod ray_query_path;
 pub(crate) mod resolve_modes;
 pub(crate) mod select;
+pub(crate) mod shading_rate;
 #[cfg(feature = "test-hooks")]
 pub(crate) mod silent;
 pub(crate) mod window;

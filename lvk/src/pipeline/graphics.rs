@@ -18,6 +18,8 @@ use crate::barrier::Stages;
 use crate::bindless::inputs::InputMask;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::optional::OptionalFeature;
+use crate::gpu::shading_rate::ShadingRate;
 use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;
 
@@ -86,6 +88,8 @@ pub(crate) struct PassState {
     pub(crate) stencil: bool,
     /// It blends with the pass's constants.
     pub(crate) blend_constants: bool,
+    /// Its fragments have a size, this by default.
+    pub(crate) shading_rate: Option<ShadingRate>,
 }
 
 impl PassState {
@@ -96,6 +100,7 @@ impl PassState {
             bias: desc.depth_bias,
             stencil: desc.stencil.is_some(),
             blend_constants: blends.into_iter().any(Blend::takes_constants),
+            shading_rate: desc.shading_rate,
         }
     }
 
@@ -109,6 +114,7 @@ impl PassState {
             (self.bias.is_some(), Raw::DEPTH_BIAS),
             (self.stencil, Raw::STENCIL_REFERENCE),
             (self.blend_constants, Raw::BLEND_CONSTANTS),
+            (self.shading_rate.is_some(), Raw::FRAGMENT_SHADING_RATE_KHR),
         ];
         states.extend(rest.iter().filter(|(on, _)| *on).map(|(_, state)| *state));
         states
@@ -216,6 +222,7 @@ fn create(
         .color_blend_state(&blend)
         .dynamic_state(&dynamic)
         .layout(base.layout)
+        .flags(flags(gpu, desc))
         .push_next(&mut rendering);
     if !reads(modules).is_empty() {
         info = info.push_next(&mut indices);
@@ -223,6 +230,15 @@ fn create(
     // SAFETY: the modules and the layout are alive; everything `info` points to lives until the call returns.
     let made = unsafe { gpu.device.create_graphics_pipelines(base.cache, &[info], None) };
     Ok(made.map_err(|(_, result)| Error::vulkan("vkCreateGraphicsPipelines")(result))?[0])
+}
+
+/// Pipelines with a rate draw in passes that have rates too.
+fn flags(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> vk::PipelineCreateFlags {
+    let rates = desc.shading_rate.is_some() && gpu.caps.has(OptionalFeature::AttachmentShadingRate);
+    match rates {
+        true => vk::PipelineCreateFlags::RENDERING_FRAGMENT_SHADING_RATE_ATTACHMENT_KHR,
+        false => vk::PipelineCreateFlags::empty(),
+    }
 }
 
 fn vertex_bindings(desc: &RenderPipelineDesc<'_>) -> Vec<vk::VertexInputBindingDescription> {

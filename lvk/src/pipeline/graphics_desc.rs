@@ -6,6 +6,7 @@ use super::raster::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
 use super::shape::PassShape;
 use super::stage::SpecializationConstant;
 use crate::format::{Format, VertexFormat};
+use crate::gpu::shading_rate::ShadingRate;
 use crate::handle::ShaderModuleHandle;
 
 /// A buffer slot of vertex attributes.
@@ -116,6 +117,10 @@ pub struct RenderPipelineDesc<'a> {
     /// Views that each draw makes at once, a bit for each, as the pass has them
     /// ([`RenderPassDesc::view_mask`](crate::RenderPassDesc::view_mask)); 0 for one picture.
     pub view_mask: u32,
+    /// How many pixels a fragment covers, which [`RenderPass::shading_rate`](crate::RenderPass::shading_rate) may replace;
+    /// `None` for one, and for passes without [`RenderPassDesc::shading_rate`](crate::RenderPassDesc::shading_rate). Needs
+    /// [`OptionalFeature::PipelineShadingRate`](crate::OptionalFeature::PipelineShadingRate).
+    pub shading_rate: Option<ShadingRate>,
     /// Values of specialization constants.
     pub specialization: &'a [SpecializationConstant],
     /// Name in error messages, validation messages and debuggers.
@@ -156,6 +161,7 @@ impl Default for RenderPipelineDesc<'_> {
             alpha_to_coverage: false,
             sample_shading: 0.0,
             view_mask: 0,
+            shading_rate: None,
             specialization: &[],
             debug_name: "render pipeline",
         }

@@ -1,6 +1,7 @@
 //! Whether the fixed state of a graphics pipeline can be: raster, stencil and blending, against each other and the device.
 
 use ash::vk;
+use spirv::Capability;
 
 use super::graphics::RenderModules;
 use super::graphics_desc::RenderPipelineDesc;
@@ -8,6 +9,7 @@ use super::raster::PolygonMode;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::optional::OptionalFeature;
+use crate::shader::ShaderStage;
 
 /// Fails unless the device has what the state asks for.
 pub(super) fn check_state(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
@@ -15,6 +17,7 @@ pub(super) fn check_state(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &Re
     check_samples(gpu, desc)?;
     check_stencil(desc)?;
     check_views(gpu, desc, modules)?;
+    check_rates(gpu, desc, modules)?;
     check_second_source(gpu, desc, modules)
 }
 
@@ -106,6 +109,22 @@ fn check_views(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules
             Err(Error::usage(name, message))
         }
     }
+}
+
+/// Stages before rasterisation say rates by primitive, which is a feature of its own.
+fn check_rates(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
+    let name = desc.debug_name;
+    for module in modules.iter().filter(|module| module.stage != ShaderStage::Fragment) {
+        let capability = Capability::FragmentShadingRateKHR as u32;
+        if module.reflection.capabilities.contains(&capability) {
+            let feature = match module.stage {
+                ShaderStage::Mesh => OptionalFeature::MeshPrimitiveShadingRate,
+                _ => OptionalFeature::PrimitiveShadingRate,
+            };
+            gpu.require(feature, &format!("gl_PrimitiveShadingRateEXT in '{}' of '{name}'", module.name))?;
+        }
+    }
+    desc.shading_rate.map_or(Ok(()), |rate| gpu.check_shading_rate(name, &rate, desc.samples))
 }
 
 /// A second source stands in one target alone, and the fragment shader has to put it out.

@@ -227,6 +227,7 @@ pub(crate) fn raw_usage(usage: TextureUsage, format: Format) -> vk::ImageUsageFl
         (TextureUsage::STORAGE, vk::ImageUsageFlags::STORAGE),
         (TextureUsage::TARGET, target),
         (TextureUsage::INPUT, vk::ImageUsageFlags::INPUT_ATTACHMENT),
+        (TextureUsage::SHADING_RATE, vk::ImageUsageFlags::FRAGMENT_SHADING_RATE_ATTACHMENT_KHR),
     ];
     let none = vk::ImageUsageFlags::empty();
     pairs.iter().filter(|(bit, _)| usage.contains(*bit)).fold(none, |all, (_, raw)| all | *raw)
@@ -241,6 +242,7 @@ pub(crate) fn usage_of(features: vk::FormatFeatureFlags) -> TextureUsage {
         (TextureUsage::STORAGE, Features::STORAGE_IMAGE),
         (TextureUsage::TARGET, attachment),
         (TextureUsage::INPUT, attachment),
+        (TextureUsage::SHADING_RATE, Features::FRAGMENT_SHADING_RATE_ATTACHMENT_KHR),
     ];
     pairs.iter().filter(|(_, any)| features.intersects(*any)).map(|(usage, _)| *usage).collect()
 }

@@ -50,6 +50,7 @@ fn check_shape(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<u32> {
     check_yuv(desc)?;
     check_transient(desc)?;
     check_input(gpu, desc)?;
+    check_rates(gpu, desc)?;
     let full = 32 - width.max(height).max(depth).leading_zeros();
     if desc.mips > full {
         let message =
@@ -112,6 +113,24 @@ fn check_input(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// Fails where the texture cannot hold shading rates.
+fn check_rates(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<()> {
+    let name = desc.debug_name;
+    if !desc.usage.contains(TextureUsage::SHADING_RATE) {
+        return Ok(());
+    }
+    let feature = OptionalFeature::AttachmentShadingRate;
+    gpu.require(feature, &format!("the usage SHADING_RATE of texture '{name}'"))?;
+    let flat = matches!(desc.kind, TextureKind::D2 | TextureKind::D2Array { .. });
+    if desc.format == Format::R8Uint && desc.samples == 1 && flat {
+        return Ok(());
+    }
+    Err(Error::usage(
+        name,
+        "textures of shading rates are D2 or D2Array, of the format R8Uint and one sample",
+    ))
 }
 
 /// Fails where a texture in Y'CbCr is anything but a plain picture.

@@ -123,6 +123,11 @@ impl Texture {
         self.raw_view(range, vk::ImageViewType::TYPE_2D_ARRAY, self.target_usage())
     }
 
+    /// The view a render pass takes its shading rates from.
+    pub(crate) fn rate_view(&self, mip: u32, layer: u32) -> Result<vk::ImageView> {
+        self.raw_view(self.part(mip, layer), vk::ImageViewType::TYPE_2D, TextureUsage::SHADING_RATE)
+    }
+
     /// One view serves both as a target and as what shaders read of it.
     fn target_usage(&self) -> TextureUsage {
         TextureUsage::TARGET | (self.usage & TextureUsage::INPUT)

@@ -19,6 +19,11 @@ bitflags! {
         /// [`RenderPassDesc::local_read`](crate::RenderPassDesc::local_read). Goes with `TARGET`; needs
         /// [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
         const INPUT = 1 << 3;
+        /// Shading rates of passes
+        /// ([`RenderPassDesc::shading_rate`](crate::RenderPassDesc::shading_rate)), of one sample and the format
+        /// [`R8Uint`](Format::R8Uint). Needs
+        /// [`OptionalFeature::AttachmentShadingRate`](crate::OptionalFeature::AttachmentShadingRate).
+        const SHADING_RATE = 1 << 4;
     }
 }
 

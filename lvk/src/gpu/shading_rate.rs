@@ -1,0 +1,335 @@
+//! Fragments of several pixels: how their sizes are told, put together, and what devices have of them.
+
+use ash::vk;
+
+use super::Gpu;
+use super::caps::Capabilities;
+use super::instance::Instance;
+use super::optional::OptionalFeature;
+use crate::error::{Error, Result};
+
+/// How two rates become one (`VkFragmentShadingRateCombinerOpKHR`), width and height each for itself. All but
+/// [`Keep`](Self::Keep) and [`Replace`](Self::Replace) need [`ShadingRateLimits::combines`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum RateCombine {
+    /// The first.
+    #[default]
+    Keep,
+    /// The second.
+    Replace,
+    /// The finer of both.
+    Min,
+    /// The coarser of both.
+    Max,
+    /// The product; the sum of exponents where [`ShadingRateLimits::multiplies`] is not set.
+    Multiply,
+}
+
+impl RateCombine {
+    pub(crate) fn raw(self) -> vk::FragmentShadingRateCombinerOpKHR {
+        use vk::FragmentShadingRateCombinerOpKHR as Raw;
+        match self {
+            Self::Keep => Raw::KEEP,
+            Self::Replace => Raw::REPLACE,
+            Self::Min => Raw::MIN,
+            Self::Max => Raw::MAX,
+            Self::Multiply => Raw::MUL,
+        }
+    }
+}
+
+/// How many pixels a fragment covers, which its shader runs once for: coverage and depth stay those of pixels.
+///
+/// Three rates come together: that of the pipeline or draw, that of the primitive (`gl_PrimitiveShadingRateEXT`), and that of
+/// the pass's attachment. The device takes the coarsest size it has that is no coarser than the outcome. Where shaders run
+/// once a sample, or write depth and [`ShadingRateLimits::with_depth_writes`] is not set, fragments are single pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct ShadingRate {
+    /// Width and height in pixels, each 1, 2 or 4: one of [`Context::shading_rates`](crate::Context::shading_rates).
+    pub size: [u32; 2],
+    /// How the primitive's rate comes in.
+    pub primitive: RateCombine,
+    /// How the attachment's rate comes in then.
+    pub attachment: RateCombine,
+}
+
+impl Default for ShadingRate {
+    fn default() -> Self {
+        Self::of([1, 1])
+    }
+}
+
+impl ShadingRate {
+    /// Fragments of this size, whatever primitives and attachments say.
+    pub const fn of(size: [u32; 2]) -> Self {
+        Self { size, primitive: RateCombine::Keep, attachment: RateCombine::Keep }
+    }
+
+    /// Fragments of the sizes that the pass's attachment says.
+    pub const fn by_attachment() -> Self {
+        Self { attachment: RateCombine::Replace, ..Self::of([1, 1]) }
+    }
+
+    /// Fragments of the sizes that primitives say.
+    pub const fn by_primitive() -> Self {
+        Self { primitive: RateCombine::Replace, ..Self::of([1, 1]) }
+    }
+
+    /// A texel of an attachment, and a `gl_PrimitiveShadingRateEXT`, that stands for this size; `None` for sides other than 1,
+    /// 2 and 4.
+    pub fn texel(size: [u32; 2]) -> Option<u8> {
+        let [width, height] = [exponent(size[0])?, exponent(size[1])?];
+        Some(width << 2 | height)
+    }
+
+    pub(crate) fn raw_size(&self) -> vk::Extent2D {
+        vk::Extent2D { width: self.size[0], height: self.size[1] }
+    }
+
+    pub(crate) fn raw_combine(&self) -> [vk::FragmentShadingRateCombinerOpKHR; 2] {
+        [self.primitive.raw(), self.attachment.raw()]
+    }
+}
+
+fn exponent(side: u32) -> Option<u8> {
+    match side {
+        1 => Some(0),
+        2 => Some(1),
+        4 => Some(2),
+        _ => None,
+    }
+}
+
+/// A size of fragments that a device has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct FragmentSize {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Numbers of samples a pixel that targets may have with it, added up: 5 is 1 and 4.
+    pub samples: u32,
+}
+
+/// What a device can do with rates (`VkPhysicalDeviceFragmentShadingRatePropertiesKHR`); zeros where it has none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ShadingRateLimits {
+    /// Largest fragments, in pixels.
+    pub max_size: [u32; 2],
+    /// Fewest pixels that a texel of an attachment stands for.
+    pub min_texel: [u32; 2],
+    /// Most pixels that it stands for.
+    pub max_texel: [u32; 2],
+    /// How much longer than the other one side of such a texel may be.
+    pub max_texel_aspect: u32,
+    /// Rates can be put together by [`RateCombine::Min`], [`Max`](RateCombine::Max) and
+    /// [`Multiply`](RateCombine::Multiply).
+    pub combines: bool,
+    /// Products are products.
+    pub multiplies: bool,
+    /// Shaders that write depth run for fragments of several pixels too.
+    pub with_depth_writes: bool,
+}
+
+impl ShadingRateLimits {
+    pub(crate) fn of(raw: &vk::PhysicalDeviceFragmentShadingRatePropertiesKHR<'_>) -> Self {
+        let size = |extent: vk::Extent2D| [extent.width, extent.height];
+        Self {
+            max_size: size(raw.max_fragment_size),
+            min_texel: size(raw.min_fragment_shading_rate_attachment_texel_size),
+            max_texel: size(raw.max_fragment_shading_rate_attachment_texel_size),
+            max_texel_aspect: raw.max_fragment_shading_rate_attachment_texel_size_aspect_ratio,
+            combines: raw.fragment_shading_rate_non_trivial_combiner_ops == vk::TRUE,
+            multiplies: raw.fragment_shading_rate_strict_multiply_combiner == vk::TRUE,
+            with_depth_writes: raw.fragment_shading_rate_with_shader_depth_stencil_writes == vk::TRUE,
+        }
+    }
+
+    /// Fails unless a texel of an attachment may stand for so many pixels.
+    pub(crate) fn check_texel(&self, texel: [u32; 2]) -> Result<(), String> {
+        let fits = (0..2).all(|axis| {
+            let range = self.min_texel[axis]..=self.max_texel[axis];
+            texel[axis].is_power_of_two() && range.contains(&texel[axis])
+        });
+        let [short, long] = [texel[0].min(texel[1]), texel[0].max(texel[1])];
+        if fits && long / short.max(1) <= self.max_texel_aspect {
+            return Ok(());
+        }
+        Err(format!(
+            "a texel stands for {texel:?} pixels, but the device takes powers of two from {:?} to {:?}, one side at most {} \
+             times the other",
+            self.min_texel, self.max_texel, self.max_texel_aspect
+        ))
+    }
+}
+
+/// Why a rate cannot be.
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Refusal {
+    /// Nowhere.
+    Wrong(String),
+    /// Not here.
+    Lacks(String),
+}
+
+/// Fails unless the device has the rate's size for so many samples, and puts rates together this way.
+fn check(rate: &ShadingRate, samples: u32, sizes: &[FragmentSize], combines: bool) -> Result<(), Refusal> {
+    if ShadingRate::texel(rate.size).is_none() {
+        let message = format!("fragments are 1, 2 or 4 pixels wide and high, not {:?}", rate.size);
+        return Err(Refusal::Wrong(message));
+    }
+    let fits = |known: &&FragmentSize| known.samples & samples != 0 || known.size == [1, 1];
+    let there: Vec<[u32; 2]> = sizes.iter().filter(fits).map(|known| known.size).collect();
+    if rate.size != [1, 1] && !there.contains(&rate.size) {
+        return Err(Refusal::Lacks(format!("with {samples} samples a pixel it has {there:?}")));
+    }
+    let simple = |by: RateCombine| matches!(by, RateCombine::Keep | RateCombine::Replace);
+    if combines || [rate.primitive, rate.attachment].into_iter().all(simple) {
+        return Ok(());
+    }
+    Err(Refusal::Lacks(
+        "it only keeps or replaces rates (fragmentShadingRateNonTrivialCombinerOps)".to_owned(),
+    ))
+}
+
+/// The functions of `VK_KHR_fragment_shading_rate`, and the sizes of the device.
+pub(crate) struct ShadingRates {
+    pub(crate) functions: ash::khr::fragment_shading_rate::Device,
+    pub(crate) sizes: Vec<FragmentSize>,
+}
+
+impl ShadingRates {
+    /// `None` where the device has no rates, or they are hidden.
+    pub(crate) fn new(
+        instance: &Instance,
+        device: &ash::Device,
+        physical: vk::PhysicalDevice,
+        caps: &Capabilities,
+    ) -> Option<Self> {
+        if !caps.has(OptionalFeature::PipelineShadingRate) {
+            return None;
+        }
+        let functions = ash::khr::fragment_shading_rate::Device::new(&instance.raw, device);
+        Some(Self { functions, sizes: sizes(instance, physical) })
+    }
+}
+
+/// None where the driver does not answer.
+fn sizes(instance: &Instance, physical: vk::PhysicalDevice) -> Vec<FragmentSize> {
+    let functions = ash::khr::fragment_shading_rate::Instance::new(&instance.entry, &instance.raw);
+    let ask = functions.fp().get_physical_device_fragment_shading_rates_khr;
+    let mut count = 0;
+    // SAFETY: the physical device belongs to the instance and has the extension; without a list the count is answered.
+    if unsafe { ask(physical, &mut count, std::ptr::null_mut()) } != vk::Result::SUCCESS {
+        return Vec::new();
+    }
+    let mut found = vec![vk::PhysicalDeviceFragmentShadingRateKHR::default(); count as usize];
+    // SAFETY: as above, and the list has room for so many.
+    if unsafe { ask(physical, &mut count, found.as_mut_ptr()) } != vk::Result::SUCCESS {
+        return Vec::new();
+    }
+    found.truncate(count as usize);
+    let size = |raw: &vk::PhysicalDeviceFragmentShadingRateKHR<'_>| FragmentSize {
+        size: [raw.fragment_size.width, raw.fragment_size.height],
+        // Of single pixels, which any number of samples can have, drivers set all bits.
+        samples: raw.sample_counts.as_raw() & 0x7f,
+    };
+    found.iter().map(size).collect()
+}
+
+impl Gpu {
+    /// Fails unless the device has the rate with so many samples a pixel; `name` is refused.
+    pub(crate) fn check_shading_rate(&self, name: &str, rate: &ShadingRate, samples: u32) -> Result<()> {
+        let what = format!("the shading rate {:?} of '{name}'", rate.size);
+        self.require(OptionalFeature::PipelineShadingRate, &what)?;
+        if rate.primitive != RateCombine::Keep {
+            self.require(OptionalFeature::PrimitiveShadingRate, &format!("primitives in {what}"))?;
+        }
+        if rate.attachment != RateCombine::Keep {
+            self.require(OptionalFeature::AttachmentShadingRate, &format!("the attachment in {what}"))?;
+        }
+        let sizes = self.shading_rates.as_ref().map_or(&[][..], |rates| &rates.sizes);
+        match check(rate, samples, sizes, self.caps.limits.shading_rate.combines) {
+            Ok(()) => Ok(()),
+            Err(Refusal::Wrong(message)) => Err(Error::usage(name, message)),
+            Err(Refusal::Lacks(why)) => {
+                Err(Error::unsupported(what, format!("the device '{}': {why}", self.caps.device_name)))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// As a desktop GPU answers, coarse to fine.
+    const SIZES: [FragmentSize; 4] = [
+        FragmentSize { size: [4, 4], samples: 1 },
+        FragmentSize { size: [2, 2], samples: 7 },
+        FragmentSize { size: [1, 2], samples: 7 },
+        FragmentSize { size: [1, 1], samples: 127 },
+    ];
+
+    #[test]
+    fn texels_are_exponents_of_two() {
+        for (size, texel) in [([1, 1], 0), ([1, 2], 1), ([2, 1], 4), ([2, 2], 5), ([4, 2], 9), ([4, 4], 10)] {
+            assert_eq!(ShadingRate::texel(size), Some(texel));
+        }
+        for size in [[0, 1], [3, 1], [1, 8]] {
+            assert_eq!(ShadingRate::texel(size), None);
+        }
+    }
+
+    #[test]
+    fn sizes_are_those_of_the_device_for_the_samples() {
+        let of = |size, samples| check(&ShadingRate::of(size), samples, &SIZES, true);
+        assert_eq!(of([4, 4], 1), Ok(()));
+        assert_eq!(of([2, 2], 4), Ok(()));
+        assert_eq!(of([1, 1], 64), Ok(()));
+        let lacks = "with 4 samples a pixel it has [[2, 2], [1, 2], [1, 1]]".to_owned();
+        assert_eq!(of([4, 4], 4), Err(Refusal::Lacks(lacks)));
+        assert!(matches!(of([2, 1], 1), Err(Refusal::Lacks(_))));
+        assert!(matches!(of([3, 1], 1), Err(Refusal::Wrong(why)) if why.ends_with("not [3, 1]")));
+        assert_eq!(check(&ShadingRate::default(), 1, &[], false), Ok(()), "single pixels are everywhere");
+    }
+
+    #[test]
+    fn only_some_devices_compare_rates() {
+        use RateCombine::{Keep, Max, Min, Multiply, Replace};
+        for (by, simple) in [(Keep, true), (Replace, true), (Min, false), (Max, false), (Multiply, false)] {
+            for rate in [
+                ShadingRate { primitive: by, ..ShadingRate::default() },
+                ShadingRate { attachment: by, ..ShadingRate::default() },
+            ] {
+                assert_eq!(check(&rate, 1, &SIZES, false).is_ok(), simple, "{by:?}");
+                assert_eq!(check(&rate, 1, &SIZES, true), Ok(()));
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn texels_of_attachments_are_within_the_limits(
+            texel in prop::array::uniform2(0..40_u32), least in 0..4_u32, more in 0..3_u32, aspect in 1..5_u32,
+        ) {
+            let limits = ShadingRateLimits {
+                min_texel: [1 << least; 2],
+                max_texel: [1 << (least + more); 2],
+                max_texel_aspect: aspect,
+                ..Default::default()
+            };
+            let sides = texel.iter().all(|side| {
+                (least..=least + more).any(|exponent| *side == 1 << exponent)
+            });
+            let square = texel[0].max(texel[1]) <= aspect * texel[0].min(texel[1]);
+            prop_assert_eq!(limits.check_texel(texel).is_ok(), sides && square);
+        }
+    }
+
+    #[test]
+    fn a_device_without_attachments_takes_no_texel() {
+        assert!(ShadingRateLimits::default().check_texel([16, 16]).is_err());
+        assert!(ShadingRateLimits::default().check_texel([0, 0]).is_err());
+    }
+}
