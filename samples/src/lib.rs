@@ -2,6 +2,7 @@
 
 pub mod app;
 pub mod bench;
+pub mod deferred;
 pub mod driver;
 pub mod hello_triangle;
 pub mod hybrid;

@@ -5,8 +5,8 @@ use lvk::{Context, Format, Holder, ShaderModuleDesc, ShaderModuleHandle, ShaderS
 use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
 use crate::{
-    app, bench, hello_triangle, hybrid, hybrid_oit, large_scene, mesh_shaders, omni_shadows, reflections,
-    render_to_cube_map, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures, yuv,
+    app, bench, deferred, hello_triangle, hybrid, hybrid_oit, large_scene, mesh_shaders, omni_shadows,
+    reflections, render_to_cube_map, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures, yuv,
 };
 
 /// A stage of a [`SamplePipeline`].
@@ -64,6 +64,7 @@ pub struct SamplePipeline {
 #[must_use]
 pub fn all() -> Vec<SamplePipeline> {
     [
+        deferred::pipelines(),
         hello_triangle::pipelines(),
         hybrid::pipelines(),
         hybrid_oit::pipelines(),

@@ -15,6 +15,8 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("common/surface.glsl", include_str!("../../shaders/common/surface.glsl")),
     ("common/texture_lod.glsl", include_str!("../../shaders/common/texture_lod.glsl")),
     ("common/tonemap.glsl", include_str!("../../shaders/common/tonemap.glsl")),
+    ("deferred/frame.glsl", include_str!("../../shaders/deferred/frame.glsl")),
+    ("deferred/targets.glsl", include_str!("../../shaders/deferred/targets.glsl")),
     ("hybrid/bounce_queue.glsl", include_str!("../../shaders/hybrid/bounce_queue.glsl")),
     ("hybrid/coverage.glsl", include_str!("../../shaders/hybrid/coverage.glsl")),
     ("hybrid/footprint.glsl", include_str!("../../shaders/hybrid/footprint.glsl")),
@@ -372,4 +374,28 @@ pub mod yuv {
     pub const PLANES_VERT: &str = include_str!("../../shaders/yuv/planes.vert.glsl");
     /// Their greys.
     pub const PLANES_FRAG: &str = include_str!("../../shaders/yuv/planes.frag.glsl");
+}
+
+/// Stages of the `deferred` sample.
+pub mod deferred {
+    /// Corners of everything solid.
+    pub const SURFACES_VERT: &str = include_str!("../../shaders/deferred/surfaces.vert.glsl");
+    /// What surfaces are like.
+    pub const SURFACES_FRAG: &str = include_str!("../../shaders/deferred/surfaces.frag.glsl");
+    /// A square for each light, or with `GLOW` for the shine around it.
+    pub const ORBS_VERT: &str = include_str!("../../shaders/deferred/orbs.vert.glsl");
+    /// A light itself.
+    pub const ORBS_FRAG: &str = include_str!("../../shaders/deferred/orbs.frag.glsl");
+    /// The shine around a light.
+    pub const GLOW_FRAG: &str = include_str!("../../shaders/deferred/glow.frag.glsl");
+    /// A triangle over all pixels.
+    pub const SCREEN_VERT: &str = include_str!("../../shaders/deferred/screen.vert.glsl");
+    /// Light from nowhere in particular, and the sky.
+    pub const AMBIENT_FRAG: &str = include_str!("../../shaders/deferred/ambient.frag.glsl");
+    /// A body around all that a light reaches.
+    pub const LIGHT_VERT: &str = include_str!("../../shaders/deferred/light.vert.glsl");
+    /// What a light does to a surface.
+    pub const LIGHT_FRAG: &str = include_str!("../../shaders/deferred/light.frag.glsl");
+    /// From light to the picture.
+    pub const RESOLVE_FRAG: &str = include_str!("../../shaders/deferred/resolve.frag.glsl");
 }

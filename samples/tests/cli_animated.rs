@@ -104,6 +104,13 @@ const PROGRAMS: &[Program] = &[
         ways: &[&[], &["--format", "i420", "--model", "bt601", "--range", "full", "--show-planes"]],
     },
     Program {
+        path: env!("CARGO_BIN_EXE_deferred"),
+        quick: &["--lights", "40"],
+        own: &["--passes", "--lights", "--view"],
+        said: &["40 lights", "triangles"],
+        ways: &[&[], &["--passes", "several"]],
+    },
+    Program {
         path: env!("CARGO_BIN_EXE_hello_triangle"),
         quick: &[],
         own: &[],

@@ -102,6 +102,11 @@ fn shows_what_it_writes(program: &str, args: &[&str]) {
 }
 
 #[test]
+fn deferred_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_deferred"), &["--lights", "60"]);
+}
+
+#[test]
 fn hello_triangle_has_a_window() {
     shows_what_it_writes(env!("CARGO_BIN_EXE_hello_triangle"), &[]);
 }

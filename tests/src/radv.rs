@@ -19,6 +19,8 @@ const BINDINGS: [(u32, vk::DescriptorType, u32); 6] = [
     (4, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, 256),
     (5, vk::DescriptorType::STORAGE_BUFFER, 1),
 ];
+/// Bindings of the set of input attachments behind it.
+const INPUTS: u32 = 10;
 /// Bytes of push constants that the library's one pipeline layout has for all stages.
 const PUSH_BYTES: u32 = 256;
 
@@ -37,7 +39,7 @@ pub struct Radv {
     /// What the chip can do.
     pub capabilities: Capabilities,
     layout: vk::PipelineLayout,
-    set_layout: vk::DescriptorSetLayout,
+    set_layouts: [vk::DescriptorSetLayout; 2],
     device: ash::Device,
     instance: ash::Instance,
     _entry: ash::Entry,
@@ -65,9 +67,9 @@ impl Radv {
             let instance = entry.create_instance(&info, None).unwrap();
             let physical = instance.enumerate_physical_devices().unwrap()[0];
             let device = open_device(&instance, physical);
-            let set_layout = set_layout(&device);
-            let layout = pipeline_layout(&device, set_layout);
-            Self { capabilities, layout, set_layout, device, instance, _entry: entry }
+            let set_layouts = [set_layout(&device), input_layout(&device)];
+            let layout = pipeline_layout(&device, &set_layouts);
+            Self { capabilities, layout, set_layouts, device, instance, _entry: entry }
         }
     }
 
@@ -220,7 +222,9 @@ impl Drop for Radv {
         // SAFETY: everything else made from the device is gone.
         unsafe {
             self.device.destroy_pipeline_layout(self.layout, None);
-            self.device.destroy_descriptor_set_layout(self.set_layout, None);
+            for layout in self.set_layouts {
+                self.device.destroy_descriptor_set_layout(layout, None);
+            }
             self.device.destroy_device(None);
             self.instance.destroy_instance(None);
         }
@@ -321,10 +325,24 @@ fn set_layout(device: &ash::Device) -> vk::DescriptorSetLayout {
     unsafe { device.create_descriptor_set_layout(&info, None) }.unwrap()
 }
 
-fn pipeline_layout(device: &ash::Device, set: vk::DescriptorSetLayout) -> vk::PipelineLayout {
+fn input_layout(device: &ash::Device) -> vk::DescriptorSetLayout {
+    let binding = |binding| {
+        vk::DescriptorSetLayoutBinding::default()
+            .binding(binding)
+            .descriptor_type(vk::DescriptorType::INPUT_ATTACHMENT)
+            .descriptor_count(1)
+            .stage_flags(vk::ShaderStageFlags::FRAGMENT)
+    };
+    let bindings: Vec<_> = (0..INPUTS).map(binding).collect();
+    let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+    // SAFETY: the chip's limits are far above these counts.
+    unsafe { device.create_descriptor_set_layout(&info, None) }.unwrap()
+}
+
+fn pipeline_layout(device: &ash::Device, sets: &[vk::DescriptorSetLayout]) -> vk::PipelineLayout {
     let push = vk::PushConstantRange { stage_flags: vk::ShaderStageFlags::ALL, offset: 0, size: PUSH_BYTES };
-    let (sets, ranges) = ([set], [push]);
-    let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets).push_constant_ranges(&ranges);
-    // SAFETY: the set layout is alive.
+    let ranges = [push];
+    let info = vk::PipelineLayoutCreateInfo::default().set_layouts(sets).push_constant_ranges(&ranges);
+    // SAFETY: the set layouts are alive.
     unsafe { device.create_pipeline_layout(&info, None) }.unwrap()
 }

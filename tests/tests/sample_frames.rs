@@ -7,6 +7,7 @@ use lvk_samples::app::frame::Frame;
 use lvk_samples::app::headless;
 use lvk_samples::app::progress::Progress;
 use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::deferred::{Deferred, DeferredConfig};
 use lvk_samples::hello_triangle::HelloTriangle;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence};
 use lvk_samples::hybrid_oit::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene};
@@ -91,6 +92,12 @@ fn check<S: Sample>(make: impl Fn([u32; 2]) -> S) {
 
 fn rtx(ctx: &Context, [width, height]: [u32; 2]) -> RtxConfig {
     RtxConfig { path: paths(ctx)[0], width, height }
+}
+
+#[test]
+fn deferred_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    check(|size| Deferred::new(&ctx, &DeferredConfig { lights: 60, ..DeferredConfig::new(size) }).unwrap());
 }
 
 #[test]

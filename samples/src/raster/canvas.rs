@@ -134,7 +134,8 @@ fn target(
     })
 }
 
-fn check_size(ctx: &Context, [width, height]: [u32; 2]) -> Result<(), RasterError> {
+/// Fails unless the device has pictures of so many pixels.
+pub(crate) fn check_size(ctx: &Context, [width, height]: [u32; 2]) -> Result<(), RasterError> {
     let limit = ctx.capabilities().limits.max_texture_2d;
     let is_possible = |side| (1..=limit).contains(&side);
     match is_possible(width) && is_possible(height) {

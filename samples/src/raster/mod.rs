@@ -7,6 +7,7 @@ mod headline;
 mod pipeline;
 
 pub use canvas::Canvas;
+pub(crate) use canvas::check_size;
 pub use error::RasterError;
 pub use headline::headline;
 pub use pipeline::{RasterPipeline, fragment_stage, vertex_stage};

@@ -1,0 +1,80 @@
+//! What to render, and how.
+
+use clap::ValueEnum;
+use lvk::{Context, OptionalFeature};
+
+use crate::raster::RasterError;
+
+/// How surfaces come to those who light them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Passes {
+    /// In one pass, whose shaders read its own targets
+    One,
+    /// As textures, which earlier passes have drawn
+    Several,
+}
+
+impl Passes {
+    /// All of them that a device can do, the best first.
+    #[must_use]
+    pub fn of(ctx: &Context) -> &'static [Self] {
+        let one = ctx.capabilities().has(OptionalFeature::LocalRead);
+        if one { &[Self::One, Self::Several] } else { &[Self::Several] }
+    }
+
+    /// What was asked for, or the best.
+    pub(super) fn choose(asked: Option<Self>, ctx: &Context) -> Result<Self, RasterError> {
+        let there = Self::of(ctx);
+        let passes = asked.unwrap_or(there[0]);
+        let what = "shaders that read what their own pass has drawn (dynamicRenderingLocalRead)";
+        RasterError::unless(there.contains(&passes), ctx, what, "--passes several shows the same picture")?;
+        Ok(passes)
+    }
+}
+
+/// What pictures show.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum View {
+    /// Surfaces in the light
+    #[default]
+    Picture,
+    /// Their colours
+    Albedo,
+    /// Where they face
+    Normals,
+    /// How rough they are
+    Roughness,
+    /// How near they are
+    Depth,
+}
+
+impl View {
+    /// All of them, as shaders number them.
+    pub const ALL: [Self; 5] = [Self::Picture, Self::Albedo, Self::Normals, Self::Roughness, Self::Depth];
+}
+
+/// What to render, and how.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DeferredConfig {
+    /// Width and height of the picture in pixels.
+    pub extent: [u32; 2],
+    /// `None` for the best that the device can do.
+    pub passes: Option<Passes>,
+    /// Number of lights, 1 to [`DeferredConfig::MAX_LIGHTS`].
+    pub lights: u32,
+    /// What the picture shows.
+    pub view: View,
+}
+
+impl DeferredConfig {
+    /// The largest number of lights.
+    pub const MAX_LIGHTS: u32 = 4096;
+    /// As many as the picture was made for.
+    pub const LIGHTS: u32 = 700;
+
+    /// As usual but for the size.
+    #[must_use]
+    pub fn new(extent: [u32; 2]) -> Self {
+        Self { extent, passes: None, lights: Self::LIGHTS, view: View::Picture }
+    }
+}

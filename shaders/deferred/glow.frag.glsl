@@ -1,0 +1,17 @@
+// The shine around a light, in front of all that is behind it.
+layout(location = 0) in vec2 place;
+layout(location = 1) flat in vec3 color;
+#ifdef ONE_PASS
+layout(location = 2) out vec4 lit;
+#else
+layout(location = 0) out vec4 lit;
+#endif
+
+void main() {
+    float from = dot(place, place);
+    if (from > 1.0) {
+        discard;
+    }
+    float shine = exp(-9.0 * from) * (1.0 - from);
+    lit = vec4(0.2 * shine * color, 0.0);
+}

@@ -1,0 +1,114 @@
+//! Pictures of the `deferred` sample: the same by one pass and by several, as ever, with few lights and many, on devices with
+//! and without shaders that read their own targets.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use image::RgbaImage;
+use lvk::{Context, DeviceProfile};
+use lvk_samples::deferred::{Deferred, DeferredConfig, Passes, View};
+use lvk_samples::raster::RasterError;
+use lvk_tests::child::without_ray_tracing;
+use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
+use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, picture_of};
+use lvk_tests::{device, device_with};
+
+/// On SwiftShader: the same but for the rounding of colours and the edges of triangles, which lights are made of that are a
+/// pixel or two wide and as bright as can be.
+const OTHER_DRIVER: Tolerance = Tolerance { psnr: 32.0, ssim: 0.98, differing_share: 0.1, flip: 0.03 };
+
+fn config(passes: Passes) -> DeferredConfig {
+    DeferredConfig { passes: Some(passes), ..DeferredConfig::new(SIZE) }
+}
+
+fn picture(ctx: &Context, config: &DeferredConfig, frame: u32) -> RgbaImage {
+    picture_of(&mut Deferred::new(ctx, config).unwrap(), frame)
+}
+
+/// Whether the device has both; says so where it has not.
+fn has_both(ctx: &Context) -> bool {
+    let both = Passes::of(ctx).len() == 2;
+    if !both {
+        eprintln!("NOT TESTED, {} lacks dynamicRenderingLocalRead", ctx.capabilities().device_name);
+    }
+    both
+}
+
+fn assert_same_pictures(ctx: &Context, moments: &[(u32, View)]) {
+    for (frame, view) in moments.iter().copied() {
+        let [one, several] = [Passes::One, Passes::Several]
+            .map(|passes| picture(ctx, &DeferredConfig { view, ..config(passes) }, frame));
+        assert!(one == several, "frame {frame}, {view:?}");
+    }
+}
+
+#[test]
+fn one_pass_shows_what_several_do() {
+    let Some(ctx) = device() else { return };
+    if has_both(&ctx) {
+        let pictures = [(0, View::Picture), (37, View::Picture)];
+        assert_same_pictures(&ctx, &pictures);
+        let others = [View::Albedo, View::Normals, View::Roughness, View::Depth];
+        assert_same_pictures(&ctx, &others.map(|view| (0, view)));
+    }
+}
+
+#[test]
+fn the_hall_looks_as_it_always_did() {
+    let Some(ctx) = device() else { return };
+    let passes = Passes::of(&ctx)[0];
+    assert_as_ever("deferred_small", &picture(&ctx, &config(passes), 0));
+}
+
+#[test]
+fn another_driver_shows_it() {
+    without_ray_tracing("another_driver_shows_it", || {
+        let Some(ctx) = device() else { return };
+        let picture = picture(&ctx, &DeferredConfig::new(SIZE), 0);
+        assert_alike("SwiftShader hall", &picture, &reference("deferred_small"), &OTHER_DRIVER);
+        if has_both(&ctx) {
+            assert_same_pictures(&ctx, &[(0, View::Picture)]);
+        }
+    });
+}
+
+/// Sum of all channels of all pixels.
+fn light_of(picture: &RgbaImage) -> u64 {
+    picture.pixels().map(|pixel| pixel.0[..3].iter().map(|channel| u64::from(*channel)).sum::<u64>()).sum()
+}
+
+#[test]
+fn every_light_adds_to_the_picture() {
+    let Some(ctx) = device() else { return };
+    let with = |lights| light_of(&picture(&ctx, &DeferredConfig { lights, ..DeferredConfig::new(SIZE) }, 0));
+    let light = [1, 60, 700, 2000].map(with);
+    assert!(light.is_sorted_by(|fewer, more| fewer < more), "{light:?}");
+}
+
+#[test]
+fn a_round_has_no_seam_and_ways_can_be_changed() {
+    let Some(ctx) = device() else { return };
+    let mut sample = Deferred::new(&ctx, &DeferredConfig::new(SIZE)).unwrap();
+    let first = picture_of(&mut sample, 0);
+    assert_ne!(picture_of(&mut sample, 33), first);
+    assert_eq!(picture_of(&mut sample, ROUND), first);
+}
+
+#[test]
+fn a_device_without_local_reads_goes_by_several_passes() {
+    let profile = DeviceProfile::core_only();
+    let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
+    let sample = Deferred::new(&ctx, &DeferredConfig::new(SIZE)).unwrap();
+    assert_eq!(sample.passes(), Passes::Several);
+    let error = Deferred::new(&ctx, &config(Passes::One)).err();
+    match error {
+        Some(RasterError::Missing { what, remedy, .. }) => {
+            assert!(what.contains("dynamicRenderingLocalRead") && remedy.contains("--passes several"));
+        }
+        other => unreachable!("{other:?}"),
+    }
+}
+
+#[test]
+fn impossible_pictures_are_refused() {
+    let Some(ctx) = device() else { return };
+    assert_refuses_impossible_sizes(|extent| Deferred::new(&ctx, &DeferredConfig::new(extent)));
+}
