@@ -174,7 +174,26 @@ fn one_pass_has_the_bits_of_two_on_another_driver() {
     without_ray_tracing("one_pass_has_the_bits_of_two_on_another_driver", || {
         let Some(ctx) = device() else { return };
         one_pass_is_two(&ctx);
+        assert_places_are_limited(&ctx);
     });
+}
+
+/// What a shader reads beyond the device's places, here stencil, which is the last of ten.
+fn assert_places_are_limited(ctx: &Context) {
+    let places = u64::from(ctx.capabilities().limits.max_input_attachments);
+    let source = lvk::ShaderSource::Glsl(
+        "LVK_STENCIL_INPUT(usubpassInput, gStencil);
+         layout(location = 0) out vec4 result;
+         void main() { result = vec4(subpassLoad(gStencil)); }",
+    );
+    let stage = ShaderStage::Fragment;
+    let desc = lvk::ShaderModuleDesc { stage, source, debug_name: "marks", ..Default::default() };
+    match ctx.create_shader_module(&desc) {
+        Err(Error::LimitExceeded { object, requested: 10, limit, .. }) if places < 10 => {
+            assert_eq!((object.as_str(), limit), ("marks", places));
+        }
+        made => assert!(places == 10 && made.is_ok(), "{places} places: {made:?}"),
+    }
 }
 
 /// Modules whose indices are looked up read targets too.

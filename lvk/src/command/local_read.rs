@@ -88,20 +88,19 @@ impl PassInputs {
 
     /// Fails unless the pass has what a pipeline reads.
     pub(super) fn check_reads(&self, pipeline: &RenderPipeline) -> Result<()> {
-        match pipeline.reads.without(self.mask).iter().next() {
-            None => Ok(()),
-            Some(input) => Err(self.explain(pipeline, input)),
-        }
+        let missing = pipeline.reads.without(self.mask);
+        if missing.is_empty() { Ok(()) } else { self.explain(pipeline, missing) }
     }
 
     #[cold]
-    fn explain(&self, pipeline: &RenderPipeline, input: Input) -> Error {
+    fn explain(&self, pipeline: &RenderPipeline, missing: InputMask) -> Result<()> {
+        let Some(input) = missing.iter().next() else { return Ok(()) };
         let remedy = if self.on {
             "whose texture lacks TextureUsage::INPUT"
         } else {
             "but the pass was begun without local_read"
         };
-        Error::usage(&*pipeline.name, format!("its fragment shader reads {input}, {remedy}"))
+        Err(Error::usage(&*pipeline.name, format!("its fragment shader reads {input}, {remedy}")))
     }
 }
 
