@@ -6,6 +6,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::gpu::fault::DeviceFault;
+use crate::gpu::queues::Queue;
 
 /// Result of every fallible call of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -13,6 +14,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 /// What went wrong, separated by who can mend it.
 ///
 /// * the caller: [`StaleHandle`](Error::StaleHandle), [`InvalidUsage`](Error::InvalidUsage),
+///   [`WrongQueue`](Error::WrongQueue),
 ///   [`Shader`](Error::Shader), [`PushConstants`](Error::PushConstants), [`Serialized`](Error::Serialized),
 ///   [`OverBudget`](Error::OverBudget);
 /// * the device or its driver lacks something: [`NoVulkan`](Error::NoVulkan), [`NoDevice`](Error::NoDevice),
@@ -67,6 +69,16 @@ pub enum Error {
         object: String,
         /// What is wrong and what to do.
         message: String,
+    },
+    /// The queue of a command buffer does not take a command.
+    #[error("{command} cannot be recorded for the {} queue; acquire a command buffer on {remedy}", queue.words())]
+    WrongQueue {
+        /// The command.
+        command: &'static str,
+        /// The queue of the command buffer.
+        queue: Queue,
+        /// Which queues take it.
+        remedy: &'static str,
     },
     /// The bytes pushed do not fit the push-constant block of the bound pipeline.
     #[error(

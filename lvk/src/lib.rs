@@ -59,6 +59,7 @@
 //! | build what rays hit | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
 //! | say what a shader reaches | [`Dependencies`] |
 //! | submit, wait, keep frames apart | [`Context::submit`], [`Context::wait`], [`Context::next_frame`] |
+//! | compute, build and copy beside what is drawn | [`Context::acquire_command_buffer_on`] a [`Queue`], [`Context::create_blas_batch_on`], [`manual::queues_and_uploads`] |
 //! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
 //! | find what is wrong | [`manual::debugging`], [`Validation`], [`ValidationSink`] |
 //! | mix in Vulkan calls of your own, or live on another engine's device | [`manual::interop`] |
@@ -84,7 +85,7 @@
 //!
 //! # What `lvk` does not do (yet)
 //!
-//! Tessellation pipelines, multisampling, queues beside the main one. `lvk` is no scene graph and no renderer.
+//! The pages of the [manual] each end with what is left out. `lvk` is no scene graph and no renderer.
 //!
 //! # Features
 //!
@@ -161,6 +162,7 @@ pub use gpu::memory::MemoryKind;
 pub use gpu::mesh_limits::MeshLimits;
 pub use gpu::optional::{FeatureSet, OptionalFeature};
 pub use gpu::profile::DeviceProfile;
+pub use gpu::queues::{Queue, QueueInfo, QueueRequest};
 pub use gpu::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use gpu::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
 pub use gpu::shading_rate::{FragmentSize, RateCombine, ShadingRate, ShadingRateLimits};

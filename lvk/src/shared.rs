@@ -38,7 +38,8 @@ pub(crate) struct Shared {
     pub(crate) dummies: OnceLock<DummyObjects>,
     pub(crate) store: Store,
     pub(crate) staging: Staging,
-    pub(crate) scratch: ScratchBuffer,
+    /// One for each lane, so that builds on one queue do not wait for those on another.
+    pub(crate) scratch: [ScratchBuffer; 3],
     pub(crate) accel_storage: AccelStorage,
     pub(crate) kernels: Kernels,
     /// Mapped buffers for lists of instances that are kept for a while.
@@ -60,6 +61,9 @@ pub(crate) struct Shared {
     /// Stands for every bottom-level structure at once: their builds add to it; builds of top levels, traces and
     /// queries read it.
     pub(crate) all_blas: ResourceId,
+    /// As `all_blas`, for first builds of structures that nothing shows yet: only what comes later on the same queue is kept
+    /// behind them. Other queues wait for the structures they name.
+    pub(crate) new_blas: [ResourceId; 3],
     /// Stands for every top-level structure at once: their builds add to it, traces and queries read it.
     pub(crate) all_tlas: ResourceId,
     /// Stands for the table of top-level structures and all rows.
@@ -156,7 +160,7 @@ impl Shared {
             self.staging.release(sequence);
         }
         finished.garbage.into_iter().for_each(|garbage| self.dispose(garbage));
-        self.profiler.collect(self.submitter.timeline.seen())
+        self.profiler.collect(finished.passed)
     }
 
     /// Drops an object the GPU is done with, and frees its slot.

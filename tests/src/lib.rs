@@ -14,6 +14,7 @@ pub mod hybrid;
 pub mod meshes;
 pub mod noise;
 pub mod picture;
+pub mod queues;
 pub mod radv;
 pub mod random;
 pub mod raster;

@@ -116,6 +116,8 @@ impl Engine {
             mesh_shader: false,
             queue: self.queue,
             queue_family: 0,
+            compute_queue: None,
+            transfer_queue: None,
         }
     }
 
@@ -332,11 +334,17 @@ fn exchange() {
         // SAFETY: the handles are as described and live on.
         let (texture, words) = unsafe {
             let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
-            let texture =
-                ctx.import_texture(&ImportedTexture { image, desc: texture_desc(), layout }).unwrap();
+            let texture = ctx
+                .import_texture(&ImportedTexture { image, desc: texture_desc(), layout, concurrent: false })
+                .unwrap();
             let usage = BufferUsage::STORAGE;
-            let import =
-                ImportedBuffer { buffer, size_bytes: BYTES, usage, debug_name: "the engine's buffer" };
+            let import = ImportedBuffer {
+                buffer,
+                size_bytes: BYTES,
+                usage,
+                concurrent: false,
+                debug_name: "the engine's buffer",
+            };
             (texture, ctx.import_buffer(&import).unwrap())
         };
         let pipeline = compute_pipeline(&ctx, ADD_ONE);
@@ -422,6 +430,8 @@ fn refusals() {
         }
     };
     refuse(RawContext { queue_family: 77, ..engine.raw() }, "no queue family 77");
+    refuse(RawContext { compute_queue: Some((engine.queue, 78)), ..engine.raw() }, "no queue family 78");
+    refuse(RawContext { transfer_queue: Some((engine.queue, 79)), ..engine.raw() }, "no queue family 79");
     refuse(RawContext { mesh_shader: true, ..engine.raw() }, "VK_EXT_mesh_shader is not among");
     refuse(RawContext { ray_query: true, ..engine.raw() }, "is not among device_extensions");
     let astc = FeatureSet::NONE.with(OptionalFeature::TextureCompressionAstcHdr);
@@ -432,7 +442,7 @@ fn refusals() {
     let layout = vk::ImageLayout::GENERAL;
     let import = |image: vk::Image, desc: TextureDesc<'_>, layout: vk::ImageLayout, words: &str| {
         // SAFETY: what is wrong is found before the image is used.
-        match unsafe { ctx.import_texture(&ImportedTexture { image, desc, layout }) } {
+        match unsafe { ctx.import_texture(&ImportedTexture { image, desc, layout, concurrent: false }) } {
             Err(Error::InvalidUsage { message, .. }) => assert!(message.contains(words), "{message}"),
             other => unreachable!("{words}: {other:?}"),
         }
@@ -447,6 +457,7 @@ fn refusals() {
         buffer: vk::Buffer::null(),
         size_bytes: 4,
         usage: BufferUsage::STORAGE,
+        concurrent: false,
         debug_name: "none",
     };
     // SAFETY: as above.

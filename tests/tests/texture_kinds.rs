@@ -17,6 +17,7 @@ const NONE: Dependencies<'_> = Dependencies {
     buffers: &[],
     read_buffers: &[],
     acceleration_structures: &[],
+    wait_for: &[],
 };
 
 fn texture(ctx: &Context, desc: &TextureDesc<'_>) -> Holder<TextureHandle> {

@@ -261,6 +261,13 @@ impl Use {
         self.access.intersects(Access::WRITES)
     }
 
+    /// What of it the given stages do.
+    pub(crate) fn limited_to(self, stages: Stages) -> Self {
+        let stages = self.stages & stages;
+        let possible = stages.iter().fold(Access::empty(), |all, stage| all | stage.possible_access());
+        Self { stages, access: self.access & possible, ..self }
+    }
+
     /// The same accesses in another layout.
     pub(crate) const fn with_layout(self, layout: Layout) -> Self {
         Self { layout, ..self }

@@ -13,7 +13,7 @@ mod subresource;
 mod tracker;
 
 #[cfg(test)]
-mod model;
+pub(crate) mod model;
 #[cfg(test)]
 mod model_tests;
 
@@ -23,4 +23,4 @@ pub(crate) use query_stages::QueryStages;
 pub(crate) use resource_id::{IdHasher, IdMap, ResourceId};
 pub(crate) use states::States;
 pub(crate) use subresource::{Subresources, TextureShape};
-pub(crate) use tracker::Tracker;
+pub(crate) use tracker::{Tracker, Used};

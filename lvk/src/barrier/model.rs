@@ -10,17 +10,17 @@ use super::*;
 
 /// One use of one resource by one command.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Op {
-    pub(super) id: ResourceId,
+pub(crate) struct Op {
+    pub(crate) id: ResourceId,
     /// `None` for buffers.
-    pub(super) texture: Option<(TextureShape, Subresources)>,
-    pub(super) touch: Use,
+    pub(crate) texture: Option<(TextureShape, Subresources)>,
+    pub(crate) touch: Use,
     /// Whether it does not conflict with other accumulated writes.
-    pub(super) accumulated: bool,
+    pub(crate) accumulated: bool,
 }
 
 impl Op {
-    pub(super) fn covers(&self, cell: Cell) -> bool {
+    pub(crate) fn covers(&self, cell: Cell) -> bool {
         let inside = self.texture.is_none_or(|(_, range)| contains(range, cell));
         self.id == cell.id && inside
     }
@@ -28,30 +28,30 @@ impl Op {
 
 /// One buffer, or one subresource of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Cell {
-    pub(super) id: ResourceId,
-    pub(super) mip: u32,
-    pub(super) layer: u32,
+pub(crate) struct Cell {
+    pub(crate) id: ResourceId,
+    pub(crate) mip: u32,
+    pub(crate) layer: u32,
 }
 
 /// What one command does, at most one thing to a resource.
-pub(super) type Command = Vec<Op>;
+pub(crate) type Command = Vec<Op>;
 
 /// What the queue executes.
 #[derive(Debug, Clone)]
-pub(super) enum Event {
+pub(crate) enum Event {
     Barriers(Barriers),
     Command(Command),
 }
 
 /// One dependency, as far as it concerns one cell.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Edge {
+pub(crate) struct Edge {
     src_stages: Stages,
     src_access: Access,
     dst_stages: Stages,
     dst_access: Access,
-    pub(super) relayout: Option<(Layout, Layout)>,
+    pub(crate) relayout: Option<(Layout, Layout)>,
 }
 
 fn contains(range: Subresources, cell: Cell) -> bool {
@@ -60,7 +60,7 @@ fn contains(range: Subresources, cell: Cell) -> bool {
 }
 
 /// Dependencies that reach one cell.
-pub(super) fn edges(barriers: &Barriers, cell: Cell) -> Vec<Edge> {
+pub(crate) fn edges(barriers: &Barriers, cell: Cell) -> Vec<Edge> {
     let memory = barriers.memory.iter().map(|m| Edge {
         src_stages: m.src_stages,
         src_access: m.src_access,
@@ -103,10 +103,10 @@ fn steps(log: &[Event], cell: Cell) -> Vec<Step> {
 
 /// How far one earlier access, at one of its stages, has been waited for.
 #[derive(Debug, Clone)]
-struct Wait {
+pub(crate) struct Wait {
     origin: Stages,
     /// What the access wrote; a stage has only one way to write.
-    written: Access,
+    pub(crate) written: Access,
     /// Stages that start after it.
     chain: Stages,
     /// Stages that start after its writes were flushed.
@@ -115,7 +115,7 @@ struct Wait {
 }
 
 impl Wait {
-    fn for_access(origin: Stages, access: Access) -> Self {
+    pub(crate) fn for_access(origin: Stages, access: Access) -> Self {
         Self {
             origin,
             written: access & origin.possible_access() & Access::WRITES,
@@ -125,8 +125,17 @@ impl Wait {
         }
     }
 
+    /// A semaphore stands in between, which holds up everything behind it and shows it everything before.
+    pub(crate) fn behind_semaphore(&self) -> Self {
+        let mut wait = self.clone();
+        wait.chain = Stages::all();
+        wait.flushed = Stages::all();
+        wait.visible.insert(Use { stages: Stages::all(), access: Access::all(), layout: Layout::Undefined });
+        wait
+    }
+
     /// A transition is flushed by the barrier that performs it.
-    fn for_transition(edge: &Edge) -> Self {
+    pub(crate) fn for_transition(edge: &Edge) -> Self {
         let mut wait = Self::for_access(Stages::empty(), Access::empty());
         wait.chain = edge.dst_stages;
         wait.see(edge);
@@ -142,7 +151,7 @@ impl Wait {
         });
     }
 
-    fn is_waited_by(&self, edge: &Edge) -> bool {
+    pub(crate) fn is_waited_by(&self, edge: &Edge) -> bool {
         edge.src_stages.intersects(self.origin | self.chain)
     }
 
@@ -152,7 +161,7 @@ impl Wait {
     }
 
     /// Passes one place with barriers: they run side by side and do not chain with each other.
-    fn pass(&mut self, edges: &[Edge]) {
+    pub(crate) fn pass(&mut self, edges: &[Edge]) {
         let before = self.clone();
         for edge in edges.iter().filter(|edge| before.is_waited_by(edge)) {
             self.chain |= edge.dst_stages;
@@ -163,7 +172,7 @@ impl Wait {
     }
 
     /// A layout transition may follow.
-    fn allows_transition(&self, edge: &Edge) -> bool {
+    pub(crate) fn allows_transition(&self, edge: &Edge) -> bool {
         self.is_waited_by(edge) && (self.written.is_empty() || self.is_flushed_by(edge))
     }
 
@@ -240,7 +249,7 @@ fn first_unordered(steps: &[Step], mut wait: Wait, independent: bool, writes: bo
     None
 }
 
-fn may_follow(wait: &Wait, earlier_writes: bool, stage: Stages, access: Access) -> bool {
+pub(crate) fn may_follow(wait: &Wait, earlier_writes: bool, stage: Stages, access: Access) -> bool {
     let later_writes = access.intersects(stage.possible_access() & Access::WRITES);
     if earlier_writes {
         wait.ordered_before(stage) && wait.visible_to(stage, access)
@@ -267,7 +276,7 @@ fn cells_of(log: &[Event]) -> Vec<Cell> {
 }
 
 /// The first violation in a queue's log, with what happens to the cell concerned.
-pub(super) fn any_violation(log: &[Event]) -> Option<String> {
+pub(crate) fn any_violation(log: &[Event]) -> Option<String> {
     cells_of(log).into_iter().find_map(|cell| {
         violation(&steps(log, cell)).map(|what| format!("{cell:?}: {what}\n{:#?}", steps(log, cell)))
     })

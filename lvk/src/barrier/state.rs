@@ -77,9 +77,8 @@ impl State {
         Self { write: Scope::waiting(stages), ..Self::default() }
     }
 
-    /// Image of somebody else's, for whom a semaphore is waited for at any stage.
-    pub(crate) fn imported(layout: Layout) -> Self {
-        let stages = Stages::all() - Stages::HOST - Stages::SHADING_RATE;
+    /// Image of somebody else's, or of another queue's, for which a semaphore is waited for at `stages`.
+    pub(crate) fn imported(layout: Layout, stages: Stages) -> Self {
         Self { layout, write: Scope::waiting(stages), ..Self::default() }
     }
 

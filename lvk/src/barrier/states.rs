@@ -5,7 +5,7 @@ use super::batch::Barriers;
 use super::resource_id::{IdMap, ResourceId};
 use super::state::{Scopes, State, accumulate, transition};
 use super::subresource::{Cells, Subresources, TextureShape};
-use super::tracker::{Local, Prefix, Tracker};
+use super::tracker::{Arrived, Local, Prefix, Tracker, Used};
 
 /// State of every resource after everything submitted to one queue so far.
 #[derive(Debug, Default)]
@@ -50,7 +50,31 @@ impl States {
     /// An image comes from somebody else, in this layout. Whatever the next submission waits for, the first barrier starts
     /// there.
     pub(crate) fn imported(&mut self, id: ResourceId, shape: TextureShape, layout: Layout) {
-        self.textures.insert(id, Cells::new(shape, State::imported(layout)));
+        let stages = Stages::all() - Stages::HOST - Stages::SHADING_RATE;
+        self.textures.insert(id, Cells::new(shape, State::imported(layout, stages)));
+    }
+
+    /// The layouts that a texture is in; none for buffers, and for what was never used.
+    pub(crate) fn layouts(&self, id: ResourceId) -> Option<Cells<Layout>> {
+        self.textures.get(&id).map(|cells| cells.map(State::layout))
+    }
+
+    /// The next submission takes a resource over from another queue, which left it in these layouts, and waits for a semaphore
+    /// at `stages`.
+    pub(crate) fn take_over(&mut self, used: Used<'_>, before: Option<&Cells<Layout>>, stages: Stages) {
+        match used.arrived(before, stages) {
+            Arrived::Buffer => {
+                self.buffers.insert(used.id, State::default());
+            }
+            Arrived::Texture(cells) => {
+                self.textures.insert(used.id, cells);
+            }
+        }
+    }
+
+    /// Everything that was ever used.
+    pub(crate) fn ids(&self) -> impl Iterator<Item = ResourceId> {
+        self.buffers.keys().chain(self.textures.keys()).copied()
     }
 
     /// Drops what is known about a destroyed resource.

@@ -117,6 +117,32 @@ impl<T: Copy + PartialEq> Cells<T> {
         Self { shape, values: vec![value] }
     }
 
+    /// A value for each mip and layer.
+    pub(crate) fn from_fn(shape: TextureShape, value: impl Fn(u32, u32) -> T) -> Self {
+        let mut cells = Self::new(shape, value(0, 0));
+        cells.values = positions(cells.shape.whole()).map(|(mip, layer)| value(mip, layer)).collect();
+        cells.join();
+        cells
+    }
+
+    /// Another value for each of them.
+    pub(crate) fn map<U: Copy + PartialEq>(&self, value: impl Fn(&T) -> U) -> Cells<U> {
+        let mut cells = Cells { shape: self.shape, values: self.values.iter().map(value).collect() };
+        cells.join();
+        cells
+    }
+
+    /// Parts of one value each.
+    pub(crate) fn runs(&self) -> Vec<(Subresources, T)> {
+        let mut runs = Vec::new();
+        match self.uniform() {
+            Some(value) => return vec![(self.shape.whole(), *value)],
+            None => positions(self.shape.whole())
+                .for_each(|(mip, layer)| push_single(&mut runs, mip, layer, *self.at(mip, layer))),
+        }
+        join_layers(runs)
+    }
+
     /// Mips and layers.
     pub(crate) fn shape(&self) -> TextureShape {
         self.shape
@@ -212,24 +238,24 @@ fn positions(range: Subresources) -> impl Iterator<Item = (u32, u32)> {
     layers.flat_map(move |layer| mips.clone().map(move |mip| (mip, layer)))
 }
 
-fn push_single(runs: &mut Vec<(Subresources, Scopes)>, mip: u32, layer: u32, scopes: Scopes) {
+fn push_single<S: PartialEq>(runs: &mut Vec<(Subresources, S)>, mip: u32, layer: u32, value: S) {
     if let Some((run, last)) = runs.last_mut()
-        && *last == scopes
+        && *last == value
         && run.extend_mips(mip, layer)
     {
         return;
     }
     let single = Subresources { base_mip: mip, mip_count: 1, base_layer: layer, layer_count: 1 };
-    runs.push((single, scopes));
+    runs.push((single, value));
 }
 
-fn join_layers(runs: Vec<(Subresources, Scopes)>) -> Vec<(Subresources, Scopes)> {
-    let mut joined: Vec<(Subresources, Scopes)> = Vec::with_capacity(runs.len());
-    for (run, scopes) in runs {
+fn join_layers<S: PartialEq>(runs: Vec<(Subresources, S)>) -> Vec<(Subresources, S)> {
+    let mut joined: Vec<(Subresources, S)> = Vec::with_capacity(runs.len());
+    for (run, value) in runs {
         let extended =
-            joined.iter_mut().rev().any(|(range, same)| *same == scopes && range.extend_layers(run));
+            joined.iter_mut().rev().any(|(range, same)| *same == value && range.extend_layers(run));
         if !extended {
-            joined.push((run, scopes));
+            joined.push((run, value));
         }
     }
     joined

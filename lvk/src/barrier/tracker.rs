@@ -30,6 +30,16 @@ impl Prefix {
             Self::Write(first) => first.stages,
         }
     }
+
+    /// The layout an image has to be in; none where it is not used.
+    fn layout(&self) -> Option<Layout> {
+        match self {
+            Self::Unused => None,
+            Self::Reads(layout, _) => Some(*layout),
+            Self::Write(first) => Some(first.layout),
+            Self::Accumulated(_) => Some(Layout::Undefined),
+        }
+    }
 }
 
 /// One (sub)resource inside one command buffer.
@@ -62,6 +72,15 @@ impl Local {
         self.past_prefix = next.is_write();
         self.prefix =
             if next.is_write() { Prefix::Write(next) } else { Prefix::Reads(next.layout, next.into()) };
+    }
+
+    /// Whether contents change, or the layout that is found.
+    fn changes(&self, found: Layout) -> bool {
+        match self.prefix {
+            Prefix::Unused => false,
+            Prefix::Write(_) | Prefix::Accumulated(_) => true,
+            Prefix::Reads(layout, _) => self.past_prefix || layout != found,
+        }
     }
 
     fn accumulate(&mut self, write: Use) -> Option<Scopes> {
@@ -217,6 +236,75 @@ impl Tracker {
     pub(super) fn textures(&self) -> &[(ResourceId, Cells<Local>)] {
         &self.textures.values
     }
+}
+
+/// A resource that a command buffer uses, as queues hand it to each other.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Used<'a> {
+    pub(crate) id: ResourceId,
+    parts: UsedParts<'a>,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum UsedParts<'a> {
+    Buffer(&'a Local),
+    Texture(&'a Cells<Local>),
+}
+
+impl Tracker {
+    /// Everything the command buffer uses.
+    pub(crate) fn used(&self) -> impl Iterator<Item = Used<'_>> {
+        let buffers =
+            self.buffers.values.iter().map(|(id, local)| Used { id: *id, parts: UsedParts::Buffer(local) });
+        let textures =
+            self.textures.values.iter().map(|(id, cells)| Used { id: *id, parts: UsedParts::Texture(cells) });
+        buffers.chain(textures)
+    }
+
+    /// Whether the command buffer uses a resource.
+    pub(crate) fn uses(&self, id: ResourceId) -> bool {
+        self.buffers.get(id).is_some() || self.textures.get(id).is_some()
+    }
+}
+
+impl Used<'_> {
+    /// Whether contents or layouts change, where a texture is in these layouts before.
+    pub(crate) fn changes(&self, before: Option<&Cells<Layout>>) -> bool {
+        match self.parts {
+            UsedParts::Buffer(local) => local.changes(Layout::Undefined),
+            UsedParts::Texture(cells) => {
+                let layout = |mip, layer| before.map_or(Layout::Undefined, |cells| *cells.at(mip, layer));
+                let alike =
+                    cells.uniform().is_some() && before.is_none_or(|before| before.uniform().is_some());
+                let shape = if alike { TextureShape { mips: 1, layers: 1 } } else { cells.shape() };
+                positions(shape).any(|(mip, layer)| cells.at(mip, layer).changes(layout(mip, layer)))
+            }
+        }
+    }
+
+    /// The state in which another queue, which waits for a semaphore at `stages`, finds a buffer, or a texture in these
+    /// layouts. Only what changes its layout first has to be told of the semaphore: everything else begins behind it.
+    pub(super) fn arrived(&self, before: Option<&Cells<Layout>>, stages: Stages) -> Arrived {
+        let UsedParts::Texture(cells) = self.parts else { return Arrived::Buffer };
+        let state = |mip, layer| {
+            let layout = before.map_or(Layout::Undefined, |before| *before.at(mip, layer));
+            match cells.at(mip, layer).prefix.layout() {
+                Some(first) if first == layout => State::untouched_in(layout),
+                _ => State::imported(layout, stages),
+            }
+        };
+        Arrived::Texture(Cells::from_fn(cells.shape(), state))
+    }
+}
+
+/// What another queue finds.
+pub(super) enum Arrived {
+    Buffer,
+    Texture(Cells<State>),
+}
+
+fn positions(shape: TextureShape) -> impl Iterator<Item = (u32, u32)> {
+    (0..shape.layers).flat_map(move |layer| (0..shape.mips).map(move |mip| (mip, layer)))
 }
 
 fn would_wait(local: &Local, next: Use) -> bool {

@@ -7,6 +7,7 @@ use ash::khr::acceleration_structure::Device as ExtDevice;
 use ash::vk;
 
 use super::CommandBuffer;
+use super::queue_check::BUILD;
 use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasBody, PartShape};
 use crate::accel::build::BuildInput;
@@ -79,8 +80,9 @@ impl CommandBuffer {
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for a refit without
     /// [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), a rebuild of a structure that was compacted, or
-    /// compacted before it was saved, and a structure listed twice.
+    /// compacted before it was saved, and a structure listed twice; [`WrongQueue`](Error::WrongQueue) on the transfer queue.
     pub fn build_blas(&mut self, structures: &[AccelStructHandle], mode: BuildMode) -> Result<()> {
+        self.needs_compute(BUILD)?;
         let found: Result<Vec<_>> =
             structures.iter().map(|handle| self.shared.store.accel_structs.get(*handle)).collect();
         let found = found?;
@@ -93,7 +95,10 @@ impl CommandBuffer {
 
     /// Builds structures for the first time. Those of the library's own come ready from the CPU.
     pub(crate) fn build_first(&mut self, structures: &[Arc<AccelStruct>]) -> Result<()> {
-        self.build_form(structures, BuildMode::Rebuild, Self::build_software_first)
+        self.first_builds = true;
+        let built = self.build_form(structures, BuildMode::Rebuild, Self::build_software_first);
+        self.first_builds = false;
+        built
     }
 
     /// As [`build_blas`](Self::build_blas), by object.
@@ -182,10 +187,11 @@ impl CommandBuffer {
         let shared = Arc::clone(&self.shared);
         let alignment = shared.gpu.caps.limits.scratch_alignment.into();
         let sizes: Vec<_> = builds.iter().map(|build| build.scratch_bytes).collect();
-        let batches = plan_scratch(&sizes, alignment, shared.scratch.tiers.batch_bytes());
+        let own = &shared.scratch[self.recording.lane];
+        let batches = plan_scratch(&sizes, alignment, own.tiers.batch_bytes());
         let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
         let ext = shared.gpu.accel()?;
-        let (scratch, replaced) = shared.scratch.get(&shared.gpu, most)?;
+        let (scratch, replaced) = own.get(&shared.gpu, most)?;
         self.retire_replaced(replaced);
         for batch in batches {
             self.use_buffer(&scratch, Use::accel_build_write());
@@ -212,20 +218,26 @@ impl CommandBuffer {
     }
 
     fn use_build(&mut self, build: &Build) {
-        let (all_blas, all_tlas) = (self.shared.all_blas, self.shared.all_tlas);
+        let all_tlas = self.shared.all_tlas;
         self.uses.id(build.target.id, Use::accel_build_write());
         match build.target.kind {
             AccelKind::Blas(_) => {
-                self.uses.accumulate(all_blas, Use::accel_build_write());
+                self.uses.accumulate(self.built_group(), Use::accel_build_write());
             }
             AccelKind::Tlas(_) => {
-                self.uses.id(all_blas, Use::accel_read(Stages::ACCEL_BUILD));
+                self.use_shown(Use::accel_read(Stages::ACCEL_BUILD));
                 self.uses.accumulate(all_tlas, Use::accel_build_write());
             }
         }
         for buffer in &build.reads {
             self.use_buffer(buffer, Use::accel_build_input());
         }
+    }
+
+    /// The next command reads bottom-level structures, whichever it may be.
+    pub(super) fn use_shown(&mut self, read: Use) {
+        self.uses.id(self.shared.all_blas, read);
+        self.uses.id(self.shared.new_blas[self.recording.lane], read);
     }
 
     /// Keeps a scratch buffer that a larger one has replaced until the GPU is done with it.

@@ -12,7 +12,11 @@ use crate::resource::buffer::BufferUsage;
 
 impl CommandBuffer {
     /// Binds a compute pipeline for the dispatches that follow (`vkCmdBindPipeline`).
+    ///
+    /// # Errors
+    /// [`WrongQueue`](Error::WrongQueue) on the transfer queue; [`StaleHandle`](Error::StaleHandle).
     pub fn bind_compute_pipeline(&mut self, pipeline: ComputePipelineHandle) -> Result<()> {
+        self.needs_compute("a dispatch")?;
         let pipeline = self.shared.store.compute_pipelines.get(pipeline)?;
         let point = vk::PipelineBindPoint::COMPUTE;
         self.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);

@@ -1,11 +1,13 @@
 //! What a command reaches through the bindless set or by address, beyond what its arguments say.
 
 use crate::handle::{AccelStructHandle, BufferHandle, TextureHandle};
+use crate::submit::SubmitHandle;
 
 /// Names resources a draw, dispatch or trace reaches bindlessly, so that the library can place barriers.
 ///
 /// Nothing needs to be declared for resources that were only uploaded: they are readable everywhere. Declare what an
 /// earlier command wrote (storage images, buffers, render targets now sampled) and what this command writes.
+/// What another queue wrote, copies included, is named by who reads it here.
 /// Acceleration structures need no declaration: the library reads from the shaders whether they trace rays, and lets a
 /// render pass see what was built before it wherever a graphics pipeline queries rays.
 #[derive(Debug, Clone, Copy, Default)]
@@ -21,4 +23,7 @@ pub struct Dependencies<'a> {
     /// Acceleration structures that shaders query. Needed only by a render pass, in the same command buffer as the
     /// build, whose pipelines are made after it began.
     pub acceleration_structures: &'a [AccelStructHandle],
+    /// Submissions, of whatever queue, that the whole command buffer begins after. Rarely needed: what is named above, and what
+    /// commands name, is waited for without being told.
+    pub wait_for: &'a [SubmitHandle],
 }

@@ -30,13 +30,14 @@ impl CommandBuffer {
 
     /// The next command's shaders trace rays in these stages.
     pub(super) fn use_structures(&mut self, stages: Stages) {
-        structure_reads(&self.shared, stages).into_iter().for_each(|(id, read)| self.uses.id(id, read));
+        let reads = structure_reads(&self.shared, self.recording.lane, stages);
+        reads.into_iter().for_each(|(id, read)| self.uses.id(id, read));
     }
 
     /// The pass that begins sees what this command buffer has built: no barrier can be placed once it is open, and only
     /// then is a pipeline bound that may query rays.
     pub(super) fn use_built_structures(&mut self) {
-        let reads = |stages| structure_reads(&self.shared, stages);
+        let reads = |stages| structure_reads(&self.shared, self.recording.lane, stages);
         if let Some(stages) = self.shared.graphics_queries.waiting(&self.recording.tracker, reads) {
             self.use_structures(stages);
         }
@@ -67,7 +68,7 @@ impl CommandBuffer {
             self.shared.store.accel_structs.get(*handle)?;
             self.use_structures(stages);
         }
-        Ok(())
+        if deps.wait_for.is_empty() { Ok(()) } else { self.wait_for(deps.wait_for) }
     }
 
     /// Records the barriers in front of the next command.
@@ -105,10 +106,11 @@ fn use_buffer(uses: &mut Uses, host_reads: &mut Vec<ResourceId>, buffer: &Buffer
 }
 
 /// Everything that shaders of `stages` read when they trace rays.
-fn structure_reads(shared: &Shared, stages: Stages) -> [(ResourceId, Use); 3] {
+fn structure_reads(shared: &Shared, lane: usize, stages: Stages) -> [(ResourceId, Use); 4] {
     let read = match shared.gpu.caps.software_ray_query() {
         true => Use::structure_walk(stages),
         false => Use::accel_read(stages),
     };
-    [(shared.all_blas, read), (shared.all_tlas, read), (shared.tlas_tables, Use::shader_read(stages))]
+    let tables = (shared.tlas_tables, Use::shader_read(stages));
+    [(shared.all_blas, read), (shared.new_blas[lane], read), (shared.all_tlas, read), tables]
 }

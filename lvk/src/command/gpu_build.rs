@@ -100,9 +100,10 @@ impl CommandBuffer {
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
         let alignment = u64::from(shared.gpu.caps.limits.scratch_alignment).max(SCRATCH_ALIGNMENT);
-        let batches = plan_scratch(sizes, alignment, shared.scratch.tiers.batch_bytes());
+        let own = &shared.scratch[self.recording.lane];
+        let batches = plan_scratch(sizes, alignment, own.tiers.batch_bytes());
         let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
-        let (scratch, replaced) = shared.scratch.get(&shared.gpu, most.saturating_add(alignment))?;
+        let (scratch, replaced) = own.get(&shared.gpu, most.saturating_add(alignment))?;
         self.retire_replaced(replaced);
         let base = aligned_scratch_address(scratch.address, alignment);
         for batch in batches {

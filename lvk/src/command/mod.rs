@@ -21,6 +21,7 @@ mod pass_area;
 mod present;
 pub(crate) mod query;
 mod query_log;
+pub(crate) mod queue_check;
 pub(crate) mod render;
 pub(crate) mod render_pass;
 mod resolve;
@@ -42,6 +43,7 @@ use ash::vk;
 use crate::accel::compaction::SizeQuery;
 use crate::barrier::{Barriers, ResourceId, Use};
 use crate::error::Result;
+use crate::gpu::queues::Queue;
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::pipeline::{ComputePipeline, RayTracingPipeline};
 use crate::resource::{Buffer, Texture};
@@ -59,13 +61,15 @@ use uses::Uses;
 
 /// Records commands for one submission.
 ///
-/// Take one from [`Context::acquire_command_buffer`](crate::Context::acquire_command_buffer) and hand it to
+/// Take one from [`Context::acquire_command_buffer`](crate::Context::acquire_command_buffer) or
+/// [`acquire_command_buffer_on`](crate::Context::acquire_command_buffer_on) a queue, and hand it to
 /// [`Context::submit`](crate::Context::submit). Several may be recorded side by side on different threads; the GPU
 /// sees them in the order of submission. Barriers, descriptor sets and the lifetime of everything used are the
 /// library's business. A command that answers an error has recorded nothing; the command buffer stays usable.
 /// Dropping a command buffer gives it up.
 pub struct CommandBuffer {
     shared: Arc<Shared>,
+    queue: Queue,
     recording: ManuallyDrop<Recording>,
     finished: bool,
     found_buffers: Found<BufferHandle, Buffer>,
@@ -93,6 +97,8 @@ pub struct CommandBuffer {
     queries: QueryLog,
     /// Present where the command buffer is profiled.
     scopes: Option<Box<Scopes>>,
+    /// Whether structures are built that nothing can show yet.
+    first_builds: bool,
     /// Bottom-level structures that are built elsewhere from here on, by their ids.
     moved: HashSet<u64>,
 }
@@ -118,13 +124,14 @@ impl Outcome {
 }
 
 impl CommandBuffer {
-    pub(crate) fn new(shared: &Arc<Shared>) -> Result<Self> {
-        let recording = shared.submitter.acquire()?;
+    pub(crate) fn new(shared: &Arc<Shared>, queue: Queue) -> Result<Self> {
+        let recording = shared.submitter.acquire(queue)?;
         if let Some(checks) = &shared.bindless.checks {
             checks.begin(&shared.gpu, recording.commands, recording.sequence);
         }
         Ok(Self {
-            scopes: shared.profiler.begin(recording.commands),
+            scopes: shared.profiler.begin(recording.commands, queue),
+            queue,
             recording: ManuallyDrop::new(recording),
             shared: Arc::clone(shared),
             finished: false,
@@ -147,6 +154,7 @@ impl CommandBuffer {
             refits: HashMap::new(),
             size_queries: Vec::new(),
             queries: QueryLog::default(),
+            first_builds: false,
             moved: HashSet::new(),
         })
     }
@@ -165,8 +173,12 @@ impl CommandBuffer {
         Arc::ptr_eq(&self.shared, shared)
     }
 
-    /// Fails where images of a swapchain are used that the presentation engine has.
+    /// Fails where images of a swapchain are used that the presentation engine has, and where another queue uses what only the
+    /// graphics queue may.
     pub(crate) fn check_images(&self) -> Result<()> {
+        if self.queue != Queue::Graphics {
+            self.shared.submitter.check_queue(&self.recording.tracker)?;
+        }
         self.shared.submitter.check(&self.recording.tracker)
     }
 
@@ -180,6 +192,7 @@ impl CommandBuffer {
         }
         self.flush();
         self.stamp(None);
+        self.refer_to_queries();
         self.finished = true;
         // SAFETY: `finished` keeps `drop` from taking the recording again.
         let recording = unsafe { ManuallyDrop::take(&mut self.recording) };

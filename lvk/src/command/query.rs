@@ -11,13 +11,16 @@ use crate::error::{Error, Result};
 use crate::handle::QueryPoolHandle;
 use crate::resource::QueryPool;
 use crate::resource::query::QueryKind;
+use crate::submit::ownership::Access;
 
 impl CommandBuffer {
     /// Makes queries ready to be written again (`vkCmdResetQueryPool`).
     ///
     /// # Errors
-    /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for open ones.
+    /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for open ones;
+    /// [`WrongQueue`](Error::WrongQueue) on the transfer queue, which may use new pools, and those reset on others.
     pub fn reset_queries(&mut self, pool: QueryPoolHandle, queries: Range<u32>) -> Result<()> {
+        self.needs_compute("a reset of queries")?;
         let pool = self.shared.store.query_pools.get(pool)?;
         let count = queries.end.saturating_sub(queries.start);
         pool.check_range(queries.start, count)?;
@@ -39,11 +42,13 @@ impl CommandBuffer {
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for a query outside of the pool, for pools of another kind, and
     /// where this command buffer has written the query already. What earlier command buffers have written,
-    /// [`Context::submit`](crate::Context::submit) checks.
+    /// [`Context::submit`](crate::Context::submit) checks. [`Unsupported`](Error::Unsupported) on queues of the device that
+    /// have no timestamps ([`QueueInfo::timestamp_bits`](crate::QueueInfo::timestamp_bits)).
     pub fn write_timestamp(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         let pool = self.shared.store.query_pools.get(pool)?;
         pool.check_range(query, self.views)?;
         pool.check_kind(pool.kind == QueryKind::Timestamps, "measure with begin_query and end_query")?;
+        self.needs_timestamps()?;
         self.queries.check_ready(&pool, query, self.views)?;
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         // SAFETY: the query exists and is ready.
@@ -59,7 +64,8 @@ impl CommandBuffer {
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for a query outside of the pool, for pools of timestamps, while
     /// another query of the same kind is open, and where this command buffer has used the query already. What earlier
     /// command buffers have used, [`Context::submit`](crate::Context::submit) checks.
-    /// [`Unsupported`](Error::Unsupported) for statistics behind a render pass on lavapipe, which crashes there.
+    /// [`Unsupported`](Error::Unsupported) for statistics behind a render pass on lavapipe, which crashes there;
+    /// [`WrongQueue`](Error::WrongQueue) on another queue than the graphics queue.
     pub fn begin_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         self.end_rendering();
         self.begin_query_here(pool, query)
@@ -75,6 +81,7 @@ impl CommandBuffer {
     }
 
     fn begin_query_here(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
+        self.needs_graphics("a query of samples or statistics")?;
         let pool = self.shared.store.query_pools.get(pool)?;
         pool.check_range(query, self.views)?;
         pool.check_kind(pool.kind != QueryKind::Timestamps, "write them with write_timestamp")?;
@@ -126,6 +133,13 @@ impl CommandBuffer {
     fn record_end_query(&self, pool: &Arc<QueryPool>, query: u32) {
         // SAFETY: the query was begun on this side of the pass and has not been ended.
         unsafe { self.shared.gpu.device.cmd_end_query(self.raw(), pool.raw, query) };
+    }
+
+    /// Other queues wait for what this one does to pools.
+    pub(super) fn refer_to_queries(&mut self) {
+        if self.shared.gpu.queues.several_lanes() {
+            self.recording.references.extend(self.queries.pools().map(|id| (id, Access::Write)));
+        }
     }
 
     /// Fails where a query is open, or is written again without a reset.

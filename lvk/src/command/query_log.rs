@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::barrier::ResourceId;
 use crate::error::{Error, Result};
 use crate::resource::QueryPool;
 use crate::resource::query_marks::QueryMarks;
@@ -117,6 +118,11 @@ impl QueryLog {
     /// The command buffer was submitted.
     pub(super) fn submit(self) {
         self.pools.iter().for_each(|(pool, marks)| pool.submit(marks));
+    }
+
+    /// The pools that the command buffer writes or resets.
+    pub(super) fn pools(&self) -> impl Iterator<Item = ResourceId> {
+        self.pools.iter().map(|(pool, _)| pool.id)
     }
 
     fn marks(&mut self, pool: &Arc<QueryPool>) -> &mut QueryMarks {

@@ -60,8 +60,10 @@ impl CommandBuffer {
     /// [`InvalidUsage`](Error::InvalidUsage) for targets that do not go together, do not exist, or are named twice;
     /// [`LimitExceeded`](Error::LimitExceeded) for too many colours, layers or views; [`Unsupported`](Error::Unsupported)
     /// for views without [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview), and for local reads without
-    /// [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
+    /// [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead); [`WrongQueue`](Error::WrongQueue) on another queue than
+    /// the graphics queue.
     pub fn begin_rendering(&mut self, desc: &RenderPassDesc<'_>) -> Result<RenderPass<'_>> {
+        self.needs_graphics("a render pass")?;
         let mut targets = None;
         self.flush_after(|cmd| {
             targets = Some(cmd.use_targets(desc)?);

@@ -48,12 +48,12 @@ impl CommandBuffer {
         body: &SoftwareBody,
         bytes: &[u8],
     ) -> Result<()> {
-        self.fill_software(target, self.shared.all_blas, body, bytes)
+        self.fill_software(target, self.shared.new_blas[self.recording.lane], body, bytes)
     }
 
     /// The next command copies what software traces.
     pub(crate) fn read_software_blas(&mut self, body: &SoftwareBody) {
-        self.uses.id(self.shared.all_blas, Use::transfer_read());
+        self.use_shown(Use::transfer_read());
         self.use_buffer(body.buffer(), Use::transfer_read());
     }
 
@@ -108,7 +108,7 @@ impl CommandBuffer {
         }
         let write = Use::shader_write(Stages::COMPUTE);
         structures.iter().for_each(|target| self.uses.id(target.id, write));
-        self.uses.accumulate(self.shared.all_blas, write);
+        self.uses.accumulate(self.built_group(), write);
         if !work.builds.is_empty() {
             self.record_gpu_builds(&work.builds)?;
         }
@@ -301,7 +301,7 @@ impl CommandBuffer {
     ) -> Result<()> {
         let write = Use::shader_write(Stages::COMPUTE);
         self.uses.id(target.id, write);
-        self.uses.id(self.shared.all_blas, Use::shader_read(Stages::COMPUTE));
+        self.use_shown(Use::shader_read(Stages::COMPUTE));
         self.uses.accumulate(self.shared.all_tlas, write);
         self.record_gpu_builds(&[GpuBuild {
             plan: software.plan.clone(),

@@ -18,6 +18,7 @@ use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::error::{Error, Result, check_limit};
 use crate::handle::AccelStructHandle;
 use crate::shared::{Garbage, Shared};
+use crate::submit::ownership::Access;
 
 /// What a top-level structure shows once the command buffer is submitted.
 pub(crate) struct TlasUpdate {
@@ -56,13 +57,15 @@ impl CommandBuffer {
     ///
     /// # Errors
     /// [`LimitExceeded`](Error::LimitExceeded) over the capacity; [`InvalidUsage`](Error::InvalidUsage) for numbers
-    /// that do not fit their bits, transforms that are not finite, and refits that are not allowed.
+    /// that do not fit their bits, transforms that are not finite, and refits that are not allowed;
+    /// [`WrongQueue`](Error::WrongQueue) on the transfer queue.
     pub fn update_tlas(
         &mut self,
         tlas: AccelStructHandle,
         instances: &[TlasInstance],
         mode: BuildMode,
     ) -> Result<()> {
+        self.needs_compute("an update of a top-level structure")?;
         let target = self.shared.store.accel_structs.get(tlas)?;
         self.update_tlas_object(&target, instances, mode)
     }
@@ -83,6 +86,7 @@ impl CommandBuffer {
         instances: &DeviceInstances<'_>,
         mode: BuildMode,
     ) -> Result<()> {
+        self.needs_compute("an update of a top-level structure")?;
         let target = self.shared.store.accel_structs.get(tlas)?;
         let object = target.tlas()?;
         check_limit(&target.name, "instance count", instances.count.into(), object.capacity.into())?;
@@ -252,6 +256,8 @@ impl CommandBuffer {
         source: Option<InstanceSource>,
         refit: bool,
     ) -> Result<()> {
+        // New ones may come from another queue.
+        shown.iter().for_each(|shown| self.refer(shown.blas.id, Access::Read));
         let tlas = target.tlas()?;
         // At first the entry is that of the slot's last owner.
         let is_first = self.last_update(target, tlas).0.is_none();

@@ -16,7 +16,11 @@ use crate::pipeline::ray_tracing::TraceRegions;
 
 impl CommandBuffer {
     /// Binds a ray tracing pipeline for the traces that follow (`vkCmdBindPipeline`).
+    ///
+    /// # Errors
+    /// [`WrongQueue`](Error::WrongQueue) on the transfer queue; [`StaleHandle`](Error::StaleHandle).
     pub fn bind_ray_tracing_pipeline(&mut self, pipeline: RayTracingPipelineHandle) -> Result<()> {
+        self.needs_compute("a trace")?;
         let pipeline = self.shared.store.ray_tracing_pipelines.get(pipeline)?;
         let point = vk::PipelineBindPoint::RAY_TRACING_KHR;
         self.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);

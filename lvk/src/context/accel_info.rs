@@ -4,6 +4,7 @@ use super::Context;
 use crate::accel::AccelStruct;
 use crate::accel::blas::CompactionWish;
 use crate::accel::flags::AccelStructSizes;
+use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::structure::AccelKind;
 use crate::error::Result;
 use crate::handle::AccelStructHandle;
@@ -88,17 +89,19 @@ impl Context {
             structures: shared.store.accel_structs.all().iter().map(|object| info(object)).collect(),
             structure_bytes: shared.accel_storage.used_bytes(),
             spare_bytes: shared.accel_storage.spare_bytes(),
-            scratch_bytes: shared.scratch.bytes(),
+            scratch_bytes: shared.scratch.iter().map(ScratchBuffer::bytes).sum(),
         }
     }
 
     /// How many of these structures the GPU has built for the first time. Does not wait.
     pub fn build_progress(&self, structures: &[AccelStructHandle]) -> Result<BuildProgress> {
-        let completed = self.shared().submitter.timeline.completed()?;
+        let submitter = &self.shared().submitter;
         let mut built = 0;
         for handle in structures {
             let object = self.shared().store.accel_structs.get(*handle)?;
-            built += usize::from(object.built_by().is_some_and(|value| value <= completed));
+            if let Some(value) = object.built_by() {
+                built += usize::from(submitter.is_done(value)?);
+            }
         }
         Ok(BuildProgress { built, total: structures.len() })
     }

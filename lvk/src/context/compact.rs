@@ -103,7 +103,7 @@ impl Context {
     /// Copies that have no room wait for those that have, which give memory back.
     fn advance(&self, compactions: &mut Compactions) -> Result<()> {
         let shared = self.shared();
-        let (submitted, completed) = (shared.submitter.submitted(), shared.submitter.timeline.completed()?);
+        let (submitted, completed) = (shared.submitter.submitted(), shared.submitter.passed()?);
         shared.collect()?;
         compactions.forget_freed();
         for query in std::mem::take(&mut compactions.asked) {

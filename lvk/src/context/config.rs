@@ -8,6 +8,7 @@ use crate::gpu::debug::{Validation, ValidationSink};
 use crate::gpu::extra::ExtraExtensions;
 use crate::gpu::optional::OptionalFeature;
 use crate::gpu::profile::DeviceProfile;
+use crate::gpu::queues::QueueRequest;
 use crate::gpu::ray_query_path::RayQueryRequest;
 use crate::gpu::window::WindowHandles;
 use crate::resource::ycbcr::YuvConversion;
@@ -41,6 +42,8 @@ pub struct ContextDesc<'a> {
     /// Ray queries in any shader stage, and who walks their trees; [`Capabilities`](crate::Capabilities) says which it
     /// became and why.
     pub ray_query: RayQueryRequest,
+    /// Whether queues for compute and transfer run beside the one for everything; with `check_indices` they never do.
+    pub queues: QueueRequest,
     /// Optional features that are needed: only devices that have them all are considered.
     pub required_features: &'a [OptionalFeature],
     /// Extensions and features of the caller's own; only devices that have the extensions are considered.
@@ -108,6 +111,7 @@ impl Default for ContextDesc<'_> {
             check_indices: false,
             ray_tracing_pipeline: FeatureRequest::Optional,
             ray_query: RayQueryRequest::default(),
+            queues: QueueRequest::default(),
             required_features: &[],
             extra: ExtraExtensions::default(),
             window: None,

@@ -1,4 +1,4 @@
-//! Creates acceleration structures. Their builds run before the next submission.
+//! Creates acceleration structures. Their builds run before the next submission, or at once on a queue.
 
 use std::sync::Arc;
 
@@ -21,13 +21,16 @@ use crate::accel::software::tlas::SoftwareTlas;
 use crate::accel::split::PartLimits;
 use crate::accel::structure::AccelKind;
 use crate::accel::tlas::Tlas;
+use crate::command::queue_check::{BUILD, needs_compute};
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::memory::MemoryKind;
+use crate::gpu::queues::Queue;
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::shared::Shared;
 use crate::software::opening::room;
+use crate::submit::SubmitHandle;
 
 impl Context {
     /// Creates a bottom-level structure from geometries and builds it before the next submission.
@@ -55,6 +58,41 @@ impl Context {
     /// buffers that are too small or lack [`BufferUsage::ACCEL_INPUT`], a memory budget that is used up
     /// ([`ContextDesc::accel_budget_bytes`](crate::ContextDesc)).
     pub fn create_blas_batch(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Holder<AccelStructHandle>>> {
+        let (holders, objects) = self.new_batch(descs)?;
+        self.build_batch(&objects, |chunk, is_last| {
+            self.before_next_submission(|cmd| cmd.build_first(chunk))?;
+            if is_last { Ok(()) } else { self.flush().map(drop) }
+        })?;
+        Ok(holders)
+    }
+
+    /// As [`create_blas_batch`](Self::create_blas_batch), but built at once, on a queue: on [`Queue::Compute`] beside what is
+    /// drawn and traced meanwhile, which does not wait for it. What shows the structures afterwards
+    /// ([`update_tlas`](crate::CommandBuffer::update_tlas)) does, on any queue. Who would rather not have a frame wait asks
+    /// [`is_done`](Self::is_done) for the answered submission first. Frames do not wait for it, as for any that is
+    /// [in the background](Self::submit_in_background).
+    ///
+    /// # Errors
+    /// As [`create_blas_batch`](Self::create_blas_batch), and [`WrongQueue`](crate::Error::WrongQueue) for the transfer queue.
+    pub fn create_blas_batch_on(
+        &self,
+        queue: Queue,
+        descs: &[BlasDesc<'_>],
+    ) -> Result<(Vec<Holder<AccelStructHandle>>, SubmitHandle)> {
+        needs_compute(queue, BUILD)?;
+        let (holders, objects) = self.new_batch(descs)?;
+        let mut built = SubmitHandle::default();
+        self.build_batch(&objects, |chunk, _| {
+            let mut cmd = self.acquire_command_buffer_on(queue)?;
+            cmd.build_first(chunk)?;
+            built = self.submit_in_background(cmd)?;
+            Ok(())
+        })?;
+        Ok((holders, built))
+    }
+
+    /// The structures of a batch, not built yet.
+    fn new_batch(&self, descs: &[BlasDesc<'_>]) -> Result<NewBatch> {
         let shapes = self.blas_shapes(descs)?;
         let blobs = self.software_blobs(descs)?;
         let mut holders = Vec::with_capacity(descs.len());
@@ -69,25 +107,26 @@ impl Context {
         for (object, blob) in objects.iter().zip(blobs) {
             blob.map(|blob| self.fill_software(object, &blob)).transpose()?;
         }
-        self.build_batch(&objects)?;
-        Ok(holders)
+        Ok((holders, objects))
     }
 
-    /// Builds structures for the first time: one submission for each scratch budget that they fill.
-    fn build_batch(&self, objects: &[Arc<AccelStruct>]) -> Result<()> {
-        let budget = self.shared().scratch.tiers.batch_bytes();
+    /// Builds structures for the first time: calls `build` for each scratch budget that they fill, the last time with `true`.
+    fn build_batch(
+        &self,
+        objects: &[Arc<AccelStruct>],
+        mut build: impl FnMut(&[Arc<AccelStruct>], bool) -> Result<()>,
+    ) -> Result<()> {
+        let budget = self.shared().scratch[0].tiers.batch_bytes();
         let (mut first, mut scratch) = (0, 0_u64);
         for (index, object) in objects.iter().enumerate() {
             let next: u64 = object.blas()?.parts.iter().map(|part| part.sizes.build_scratch_bytes).sum();
             if index > first && scratch.saturating_add(next) > budget {
-                let chunk = &objects[first..index];
-                self.before_next_submission(|cmd| cmd.build_first(chunk))?;
-                self.flush()?;
+                build(&objects[first..index], false)?;
                 (first, scratch) = (index, 0);
             }
             scratch = scratch.saturating_add(next);
         }
-        self.before_next_submission(|cmd| cmd.build_first(&objects[first..]))
+        build(&objects[first..], true)
     }
 
     /// Creates a top-level structure and builds it before the next submission. [`Holder::index`] is its element of
@@ -113,6 +152,9 @@ impl Context {
         Ok(holder)
     }
 }
+
+/// Handles of structures, and what they name.
+type NewBatch = (Vec<Holder<AccelStructHandle>>, Vec<Arc<AccelStruct>>);
 
 /// Makes a bottom-level structure of these parts; nothing is built yet.
 fn new_blas(

@@ -5,6 +5,7 @@ use std::sync::PoisonError;
 
 use super::Context;
 use crate::error::Result;
+use crate::submit::ownership::PerLane;
 
 /// A frame about to be recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +21,7 @@ pub struct Frame {
 pub(super) struct FrameRing {
     in_flight: usize,
     next: u64,
-    ends: VecDeque<u64>,
+    ends: VecDeque<PerLane<u64>>,
 }
 
 impl FrameRing {
@@ -31,9 +32,9 @@ impl FrameRing {
         Self { in_flight, next: 0, ends: VecDeque::with_capacity(in_flight) }
     }
 
-    /// Starts a frame, with `submitted` the last submission before it. Answers the frame and the submission to wait
-    /// for: the last one of the frame that used its index before.
-    fn start(&mut self, submitted: u64) -> (Frame, u64) {
+    /// Starts a frame, with `submitted` the last submissions before it, one for each lane. Answers the frame and the
+    /// submissions to wait for: the last ones of the frame that used its index before.
+    fn start(&mut self, submitted: PerLane<u64>) -> (Frame, PerLane<u64>) {
         if self.next > 0 {
             self.ends.push_back(submitted);
         }
@@ -41,21 +42,23 @@ impl FrameRing {
         let wait_for = if full { self.ends.pop_front() } else { None };
         let frame = Frame { number: self.next, index: (self.next % self.in_flight as u64) as usize };
         self.next += 1;
-        (frame, wait_for.unwrap_or(0))
+        (frame, wait_for.unwrap_or_default())
     }
 }
 
 impl Context {
     /// Starts a frame: waits until the GPU is done with the frame that last had the same index, so that one set of
-    /// per-frame buffers for each index is enough.
+    /// per-frame buffers for each index is enough. On other queues that is so for what was [submitted](Self::submit), not for
+    /// what was [in the background](Self::submit_in_background).
     pub fn next_frame(&self) -> Result<Frame> {
-        let submitted = self.shared().submitter.submitted();
+        let submitted = self.shared().submitter.foreground();
         let (frame, wait_for) = {
             let mut frames = self.inner.frames.lock().unwrap_or_else(PoisonError::into_inner);
             frames.start(submitted)
         };
         self.shared().profiler.begin_frame(frame.number);
-        self.wait(self.submission(wait_for))?;
+        self.shared().submitter.wait_for_lanes(&wait_for)?;
+        self.shared().collect()?;
         self.advance_compactions();
         Ok(frame)
     }
@@ -73,17 +76,17 @@ mod tests {
     #[test]
     fn a_frame_waits_for_the_last_submission_of_the_frame_with_its_index() {
         let mut ring = FrameRing::new(2);
-        assert_eq!(ring.start(3), (Frame { number: 0, index: 0 }, 0));
-        assert_eq!(ring.start(5), (Frame { number: 1, index: 1 }, 0));
-        assert_eq!(ring.start(9), (Frame { number: 2, index: 0 }, 5));
-        assert_eq!(ring.start(9), (Frame { number: 3, index: 1 }, 9));
+        assert_eq!(ring.start([3, 0, 0]), (Frame { number: 0, index: 0 }, [0; 3]));
+        assert_eq!(ring.start([5, 4, 0]), (Frame { number: 1, index: 1 }, [0; 3]));
+        assert_eq!(ring.start([9, 4, 7]), (Frame { number: 2, index: 0 }, [5, 4, 0]));
+        assert_eq!(ring.start([9, 4, 7]), (Frame { number: 3, index: 1 }, [9, 4, 7]));
     }
 
     #[test]
     fn one_frame_in_flight_waits_for_the_frame_before() {
         let mut ring = FrameRing::new(0);
-        assert_eq!(ring.start(0).1, 0);
-        assert_eq!(ring.start(7).1, 7);
-        assert_eq!(ring.start(8).1, 8);
+        assert_eq!(ring.start([0; 3]).1, [0; 3]);
+        assert_eq!(ring.start([7, 0, 0]).1, [7, 0, 0]);
+        assert_eq!(ring.start([8, 0, 0]).1, [8, 0, 0]);
     }
 }

@@ -4,12 +4,13 @@ use std::sync::Arc;
 
 use super::Context;
 use super::config::ContextDesc;
+use super::start::requested_queues;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::foreign::RawContext;
 
 impl Context {
-    /// Makes a context on an instance, device and queue of the caller's own, which stay the caller's: nothing of them is
+    /// Makes a context on an instance, device and queues of the caller's own, which stay the caller's: nothing of them is
     /// destroyed.
     ///
     /// Of `desc` what belongs to the making of devices is ignored: the library, the device, validation and its sink,
@@ -26,16 +27,19 @@ impl Context {
     /// `shaderSampledImageArrayDynamicIndexing`, `shaderStorageImageArrayDynamicIndexing`,
     /// `shaderStorageImageWriteWithoutFormat` and `fragmentStoresAndAtomics`; and what shaders use of
     /// `shaderTerminateInvocation`, `shaderDemoteToHelperInvocation`, `shaderZeroInitializeWorkgroupMemory`,
-    /// `shaderIntegerDotProduct`, `shaderSubgroupExtendedTypes` and `vulkanMemoryModel`, which every such device has. Whoever else uses the queue does so within
-    /// [`with_raw_queue`](Self::with_raw_queue), or while nobody uses the context.
+    /// `shaderIntegerDotProduct`, `shaderSubgroupExtendedTypes` and `vulkanMemoryModel`, which every such device has. Whoever else uses one of the queues does so within
+    /// [`with_raw_queue`](Self::with_raw_queue) or [`with_raw_queue_of`](Self::with_raw_queue_of), or while nobody uses the context.
     ///
     /// # Errors
     /// [`NoDevice`](crate::Error::NoDevice) where the device lacks what the library needs;
     /// [`InvalidUsage`](crate::Error::InvalidUsage) where the device cannot have what it is said to have, an extension is
-    /// missing from the list, or the queue family is none for graphics and compute.
+    /// missing from the list, or a queue family cannot do what its queue is for.
     pub unsafe fn from_raw(raw: RawContext<'_>, desc: &ContextDesc<'_>) -> Result<Self> {
+        let queues = requested_queues(desc);
         // SAFETY: by the caller.
-        let gpu = unsafe { Gpu::from_raw(raw, desc.ray_tracing_pipeline, desc.ray_query, desc.debug_names)? };
+        let gpu = unsafe {
+            Gpu::from_raw(raw, desc.ray_tracing_pipeline, desc.ray_query, desc.debug_names, queues)?
+        };
         Self::on(Arc::new(gpu), desc)
     }
 }

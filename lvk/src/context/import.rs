@@ -6,6 +6,7 @@ use super::Context;
 use super::holder::Holder;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
+use crate::gpu::queues::Queue;
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::buffer::BufferUsage;
 use crate::resource::texture_desc::TextureDesc;
@@ -24,6 +25,9 @@ pub struct ImportedTexture<'a> {
     /// The layout all of it is in when the context may first use it: `UNDEFINED`, `GENERAL`, `READ_ONLY_OPTIMAL`,
     /// `COLOR_ATTACHMENT_OPTIMAL`, `DEPTH_STENCIL_ATTACHMENT_OPTIMAL`, `TRANSFER_SRC_OPTIMAL` or `TRANSFER_DST_OPTIMAL`.
     pub layout: vk::ImageLayout,
+    /// It was made with `VK_SHARING_MODE_CONCURRENT` for the families of all queues
+    /// ([`Context::raw_queue_family_of`]). Otherwise it belongs to that of the graphics queue, and no other queue uses it.
+    pub concurrent: bool,
 }
 
 /// Describes a buffer of somebody else's.
@@ -35,6 +39,8 @@ pub struct ImportedBuffer<'a> {
     pub size_bytes: u64,
     /// What it was made for.
     pub usage: BufferUsage,
+    /// As [`ImportedTexture::concurrent`].
+    pub concurrent: bool,
     /// Name in error messages.
     pub debug_name: &'a str,
 }
@@ -68,7 +74,7 @@ impl Context {
     /// [`texture_came_back`](Self::texture_came_back) says in which one it is.
     ///
     /// # Safety
-    /// The image belongs to this device and the queue's family, or was made for concurrent use, is as described, and lives
+    /// The image belongs to this device and the graphics queue's family, or was made for concurrent use, is as described, and lives
     /// until the handle is destroyed and the GPU is done with it. What others did to it is waited for, by a semaphore of
     /// [`submit_with`](Self::submit_with) or by having finished.
     ///
@@ -95,6 +101,9 @@ impl Context {
             .and_then(|texture| super::create_texture::views(&texture).map(|views| (texture, views)));
         let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
         shared.submitter.import_texture(texture.image.id, texture.image.shape, layout);
+        if !import.concurrent {
+            shared.submitter.keep_to_graphics(texture.image.id, desc.debug_name);
+        }
         shared.bindless.set_texture(slot, views);
         Ok(Holder::new(self, shared.store.textures.insert(texture), slot))
     }
@@ -117,6 +126,9 @@ impl Context {
         let buffer = unsafe {
             Buffer::import(&self.shared().gpu, import.buffer, import.size_bytes, import.usage, name)
         };
+        if !import.concurrent {
+            self.shared().submitter.keep_to_graphics(buffer.id, name);
+        }
         let handle = self.shared().store.buffers.insert(buffer);
         Ok(Holder::new(self, handle, super::create::NO_SLOT))
     }
@@ -159,9 +171,15 @@ impl Context {
         self.submit_between(cmd, Submission { waits, signals, ..Submission::default() })
     }
 
-    /// The timeline semaphore of everything that is submitted; [`SubmitHandle::raw_value`] is the value that a submission
-    /// reaches. Others may wait for it, and must not signal it.
+    /// The timeline semaphore of what is submitted to the graphics queue; [`SubmitHandle::raw_value`] is the value that a
+    /// submission reaches. Others may wait for it, and must not signal it.
     pub fn raw_timeline(&self) -> vk::Semaphore {
-        self.shared().submitter.timeline.raw
+        self.raw_timeline_of(Queue::Graphics)
+    }
+
+    /// As [`raw_timeline`](Self::raw_timeline), of another queue; queues that share hardware share it too.
+    pub fn raw_timeline_of(&self, queue: Queue) -> vk::Semaphore {
+        let shared = self.shared();
+        shared.submitter.timeline(shared.gpu.queues.lane(queue)).raw
     }
 }

@@ -5,6 +5,7 @@ use ash::vk;
 use super::Context;
 use crate::accel::structure::AccelKind;
 use crate::error::Result;
+use crate::gpu::queues::Queue;
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, RayTracingPipelineHandle, RenderPipelineHandle,
     SamplerHandle, TextureHandle,
@@ -32,15 +33,25 @@ impl Context {
         self.shared().gpu.physical()
     }
 
-    /// Family of the one queue.
+    /// Family of the queue for everything.
     pub fn raw_queue_family(&self) -> u32 {
-        self.shared().gpu.queue_family
+        self.raw_queue_family_of(Queue::Graphics)
     }
 
-    /// Runs `call` with the queue locked, so that it may submit. It must neither use the context nor drop holders or
-    /// command buffers: these wait for the queue.
+    /// Family of the device's queue behind one of the library's.
+    pub fn raw_queue_family_of(&self, queue: Queue) -> u32 {
+        self.shared().gpu.queues.family(queue.index())
+    }
+
+    /// Runs `call` with the queue for everything locked, so that it may submit. It must neither use the context nor drop
+    /// holders or command buffers: these wait for the queue.
     pub fn with_raw_queue<T>(&self, call: impl FnOnce(vk::Queue) -> T) -> T {
-        call(*self.shared().gpu.queue())
+        self.with_raw_queue_of(Queue::Graphics, call)
+    }
+
+    /// As [`with_raw_queue`](Self::with_raw_queue), with the device's queue behind one of the library's, which others may share.
+    pub fn with_raw_queue_of<T>(&self, queue: Queue, call: impl FnOnce(vk::Queue) -> T) -> T {
+        call(*self.shared().gpu.queues.raw(queue.index()))
     }
 
     /// The layout all pipelines share: the bindless set and the push constants of every stage.

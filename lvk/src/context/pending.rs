@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::Context;
 use crate::command::CommandBuffer;
 use crate::error::Result;
+use crate::gpu::queues::Queue;
 use crate::lock::Guard;
 use crate::resource::region::{Region, TextureRegion};
 use crate::resource::{Buffer, Texture};
@@ -41,7 +42,7 @@ impl Context {
     pub(super) fn open<'a>(&self, pending: &'a mut Pending) -> Result<&'a mut CommandBuffer> {
         let cmd = match &mut pending.commands {
             Some(cmd) => cmd,
-            none => none.insert(CommandBuffer::new(self.shared())?),
+            none => none.insert(CommandBuffer::new(self.shared(), Queue::Graphics)?),
         };
         let freed = std::mem::take(&mut *self.shared().freed_tlas());
         cmd.forget_tlas(&freed);

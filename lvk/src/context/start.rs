@@ -21,6 +21,7 @@ use crate::gpu::caps::{Capabilities, PhysicalDevice};
 use crate::gpu::debug::{Validation, ValidationSink};
 use crate::gpu::device::DeviceRequest;
 use crate::gpu::instance::{Instance, InstanceDesc};
+use crate::gpu::queues::QueueRequest;
 use crate::kernel::Kernels;
 use crate::lock::{self, Rank};
 use crate::pipeline::{PipelineCache, PipelineLayout};
@@ -60,6 +61,7 @@ impl Context {
             profile: desc.profile,
             extra: desc.extra,
             debug_names: desc.debug_names,
+            queues: requested_queues(desc),
             window: desc.window.as_deref(),
         };
         Self::on(Arc::new(Gpu::new(instance, &request)?), desc)
@@ -97,14 +99,20 @@ impl Context {
     }
 }
 
+/// The shaders' looks at indices are written down by one command buffer after the other.
+pub(super) fn requested_queues(desc: &ContextDesc<'_>) -> QueueRequest {
+    if desc.check_indices { QueueRequest::Shared } else { desc.queues }
+}
+
 fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
     let yuv = YuvSlots::new(&gpu, desc.yuv, desc.max_yuv_textures)?;
+    let (several, all_blas) = (gpu.queues.several_lanes(), ResourceId::next());
     let bindless = Bindless::new(&gpu, desc.max_textures, yuv, desc.check_indices)?;
     Ok(Shared {
         dummies: OnceLock::new(),
         store: Store::new(),
         staging: Staging::new(&gpu, desc.staging_bytes),
-        scratch: new_scratch(&gpu, desc.scratch_budget_bytes),
+        scratch: std::array::from_fn(|_| new_scratch(&gpu, desc.scratch_budget_bytes)),
         accel_storage: AccelStorage::new(desc.accel_budget_bytes),
         graphics_queries: QueryStages::default(),
         kernels: Kernels::default(),
@@ -117,7 +125,8 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         bindless,
         submitter: Submitter::new(&gpu)?,
         profiler: Profiler::new(&gpu),
-        all_blas: ResourceId::next(),
+        all_blas,
+        new_blas: std::array::from_fn(|_| if several { ResourceId::next() } else { all_blas }),
         all_tlas: ResourceId::next(),
         tlas_tables: ResourceId::next(),
         outdated_tlas: AtomicBool::new(false),

@@ -3,25 +3,45 @@
 use super::Context;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
-use crate::submit::{Submission, SubmitHandle};
+use crate::gpu::queues::Queue;
+use crate::submit::{Submission, SubmitHandle, Values};
 
 impl Context {
-    /// Starts recording a command buffer. Any number may be recorded at once, on any threads.
+    /// Starts recording a command buffer for the graphics queue, which takes every command. Any number may be recorded at once, on
+    /// any threads.
     pub fn acquire_command_buffer(&self) -> Result<CommandBuffer> {
-        self.shared().collect()?;
-        CommandBuffer::new(self.shared())
+        self.acquire_command_buffer_on(Queue::Graphics)
     }
 
-    /// Submits a command buffer, after uploads and builds made before (`vkQueueSubmit2`). Does not wait.
+    /// As [`acquire_command_buffer`](Self::acquire_command_buffer), for a queue.
+    ///
+    /// All queues exist on every device. [`Capabilities::queue`](crate::Capabilities::queue) says which have hardware of their
+    /// own; what goes to the others runs on the graphics queue, one after the other. What a command buffer uses is waited for
+    /// and moved between queues when it is submitted; see the manual's page on
+    /// [queues](crate::manual::queues_and_uploads).
+    pub fn acquire_command_buffer_on(&self, queue: Queue) -> Result<CommandBuffer> {
+        self.shared().collect()?;
+        CommandBuffer::new(self.shared(), queue)
+    }
+
+    /// Submits a command buffer to the queue it was acquired for, after uploads and builds made before (`vkQueueSubmit2`). Does
+    /// not wait.
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) if the command buffer belongs to another context, refits a top-level
     /// structure whose number of instances another submission changed meanwhile, left a query open, writes one that was
-    /// written and not reset, or uses an image of a swapchain that is not [taken](Self::next_image). A failure of Vulkan
+    /// written and not reset, or uses an image of a swapchain that is not [taken](Self::next_image); and on other queues
+    /// than the graphics queue for images of windows, and for what was [imported](Self::import_texture) without being concurrent. A failure of Vulkan
     /// itself leaves the context without a known state: this and every later submission answers it, and a new context is
     /// needed.
     pub fn submit(&self, cmd: CommandBuffer) -> Result<SubmitHandle> {
         self.submit_between(cmd, Submission::default())
+    }
+
+    /// As [`submit`](Self::submit), but [`next_frame`](Self::next_frame) never waits for it: for work on other queues that goes on
+    /// over several frames. Buffers for each [`Frame::index`](crate::Frame::index) are not for such work.
+    pub fn submit_in_background(&self, cmd: CommandBuffer) -> Result<SubmitHandle> {
+        self.submit_between(cmd, Submission { in_background: true, ..Submission::default() })
     }
 
     /// As [`submit`](Self::submit), with what `more` has besides recordings.
@@ -36,7 +56,14 @@ impl Context {
             self.open(&mut pending)?;
         }
         let before = self.take_pending(&mut pending)?;
-        self.send(before.into_iter().chain([cmd]), more)
+        let has_prelude = before.is_some();
+        if cmd.is_on_first_lane() {
+            return self.send(before.into_iter().chain([cmd]), Submission { has_prelude, ..more });
+        }
+        if has_prelude {
+            self.send(before.into_iter(), Submission { has_prelude, ..Submission::default() })?;
+        }
+        self.send([cmd].into_iter(), more)
     }
 
     /// Fails for a command buffer of another context.
@@ -51,20 +78,26 @@ impl Context {
         let (recordings, mut outcomes): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
         let shared = self.shared();
         let submission = Submission { recordings, ..more };
-        let value = shared.submitter.submit(submission, || shared.bindless.flush())?;
+        let Values { first, last } = shared.submitter.submit(submission, || shared.bindless.flush())?;
         let scopes = outcomes.iter_mut().filter_map(|outcome| outcome.scopes.take());
-        shared.profiler.submit(value, scopes.map(|scopes| *scopes).collect());
-        outcomes.into_iter().for_each(|outcome| outcome.submit(shared, value));
+        shared.profiler.submit(last, scopes.map(|scopes| *scopes).collect());
+        let end = outcomes.len().saturating_sub(1);
+        for (place, outcome) in outcomes.into_iter().enumerate() {
+            outcome.submit(shared, if place == end { last } else { first });
+        }
         shared.collect()?;
-        Ok(self.submission(value))
+        Ok(self.submission(last))
     }
 
-    /// Submits uploads and builds that wait for the next submission, if there are any.
+    /// Submits uploads and builds that wait for the next submission, if there are any, to the graphics queue. Answers the last
+    /// submission there.
     pub fn flush(&self) -> Result<SubmitHandle> {
         self.advance_compactions();
         let mut pending = self.pending();
-        let Some(cmd) = self.take_pending(&mut pending)? else { return Ok(self.last_submission()) };
-        self.send([cmd].into_iter(), Submission::default())
+        let Some(cmd) = self.take_pending(&mut pending)? else {
+            return Ok(self.submission(self.shared().submitter.last_of_lanes()[0]));
+        };
+        self.send([cmd].into_iter(), Submission { has_prelude: true, ..Submission::default() })
     }
 
     /// Waits until a submission is done (`vkWaitSemaphores`).
@@ -73,14 +106,14 @@ impl Context {
     /// [`InvalidUsage`](Error::InvalidUsage) if the handle belongs to another context.
     pub fn wait(&self, submission: SubmitHandle) -> Result<()> {
         self.check_submitted(submission)?;
-        self.shared().submitter.timeline.wait(submission.value)?;
+        self.shared().submitter.wait(submission.value)?;
         self.shared().collect()
     }
 
     /// Whether a submission is done. Does not wait.
     pub fn is_done(&self, submission: SubmitHandle) -> Result<bool> {
         self.check_submitted(submission)?;
-        Ok(self.shared().submitter.timeline.completed()? >= submission.value)
+        self.shared().submitter.is_done(submission.value)
     }
 
     /// Submits what waits for the next submission, and waits until the GPU has nothing left to do.
@@ -89,18 +122,16 @@ impl Context {
         self.wait_submitted()
     }
 
-    /// Waits for everything submitted so far.
+    /// Waits for everything submitted so far, on all queues.
     pub(super) fn wait_submitted(&self) -> Result<()> {
-        self.wait(self.last_submission())
+        let submitter = &self.shared().submitter;
+        submitter.wait_for_lanes(&submitter.last_of_lanes())?;
+        self.shared().collect()
     }
 
     /// Names the submission with this value of the timeline.
     pub(super) fn submission(&self, value: u64) -> SubmitHandle {
         SubmitHandle { value, context: self.shared().store.context_id }
-    }
-
-    fn last_submission(&self) -> SubmitHandle {
-        self.submission(self.shared().submitter.submitted())
     }
 
     fn check_submitted(&self, submission: SubmitHandle) -> Result<()> {

@@ -41,7 +41,7 @@ pub fn silent_context(desc: &ContextDesc<'_>) -> Result<Context> {
 
 /// How many submissions there were.
 pub fn submissions(ctx: &Context) -> u64 {
-    ctx.shared().submitter.submitted()
+    ctx.shared().submitter.count()
 }
 
 /// Bytes of the staging memory there is.

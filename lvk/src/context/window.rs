@@ -265,7 +265,7 @@ impl Engine for Live<'_> {
 
     fn acquire(&mut self) -> Result<Acquired, Failure> {
         let submitter = &self.ctx.shared().submitter;
-        let completed = submitter.timeline.completed()?;
+        let completed = submitter.passed()?;
         self.parts.collect(completed);
         let Some(current) = &self.parts.current else { return Err(Failure::OutOfDate) };
         let (chain, ids) = (Arc::clone(&current.chain), current.ids());
@@ -366,6 +366,7 @@ impl Live<'_> {
         let views = views(&texture).inspect_err(|_| shared.bindless.free_texture(slot))?;
         shared.bindless.set_texture(slot, views);
         shared.submitter.with_presentables(|images| images.insert(texture.image.id, self.name));
+        shared.submitter.keep_to_graphics(texture.image.id, self.name);
         let handle = shared.store.textures.insert(texture);
         Ok(ChainImage { texture: handle, object: shared.store.textures.get(handle)?, sync })
     }

@@ -7,6 +7,9 @@ use ash::vk;
 use super::features::{Calibration, Features, Subgroups, missing};
 use super::mesh_limits::MeshLimits;
 use super::optional::{FeatureSet, OF_MESH_SHADERS, OptionalFeature};
+use super::queues::{
+    Queue, QueueFamily, QueueInfo, QueuePlace, describe_queues, place_queues, queue_families,
+};
 use super::ray_query_path::{RayQueryPath, RayQueryRequest};
 use super::resolve_modes::{DepthResolveLimits, ResolveModes};
 use super::select::DeviceKind;
@@ -96,11 +99,18 @@ pub struct Capabilities {
     /// Arrays that helper invocations of fragment shaders write keep nothing (lavapipe): there, ray queries in software see
     /// nothing in helper invocations.
     pub helpers_lose_arrays: bool,
+    /// What stands behind each queue, in the order of [`Queue::ALL`]; [`queue`](Self::queue) asks for one.
+    pub queues: [QueueInfo; 3],
     /// The numbers behind the limits.
     pub limits: Limits,
 }
 
 impl Capabilities {
+    /// What stands behind a queue.
+    pub fn queue(&self, queue: Queue) -> &QueueInfo {
+        &self.queues[queue.index()]
+    }
+
     /// Whether the device has `feature`, and it is on.
     pub fn has(&self, feature: OptionalFeature) -> bool {
         self.optional.contains(feature)
@@ -302,7 +312,11 @@ pub(crate) struct PhysicalDevice {
     pub(crate) capabilities: Capabilities,
     pub(crate) kind: DeviceKind,
     pub(crate) local_memory_bytes: u64,
+    /// The family for everything.
     pub(crate) queue_family: Option<u32>,
+    pub(crate) families: Vec<QueueFamily>,
+    /// The queue of the device for each of the library's.
+    pub(crate) places: [QueuePlace; 3],
     /// Core features the library cannot do without and the device lacks.
     pub(crate) missing: Vec<String>,
     /// As found.
@@ -318,7 +332,9 @@ impl PhysicalDevice {
         let extensions = unsafe { instance.enumerate_device_extension_properties(raw) }
             .map_err(Error::vulkan("vkEnumerateDeviceExtensionProperties"))?;
         let names = extensions.iter().filter_map(|extension| extension.extension_name_as_c_str().ok());
-        let queue = queue_family(instance, raw);
+        let families = queue_families(instance, raw);
+        let everything = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+        let queue = families.iter().position(|family| family.flags.contains(everything));
         let mut found = Self {
             raw,
             capabilities: Capabilities {
@@ -329,7 +345,9 @@ impl PhysicalDevice {
             },
             kind: kind(plain.device_type),
             local_memory_bytes: local_memory(instance, raw),
-            queue_family: queue.map(|(family, _)| family),
+            queue_family: None,
+            families,
+            places: Default::default(),
             missing: Vec::new(),
             features: Features::default(),
             extensions: names.map(CStr::to_owned).collect(),
@@ -338,14 +356,27 @@ impl PhysicalDevice {
             found.missing.push("Vulkan 1.3".to_owned());
             return Ok(found);
         }
-        if queue.is_none() {
-            found.missing.push("a queue for graphics and compute".to_owned());
-        }
         let ray_tracing = found.read_features(instance);
         found.read_properties(instance, &plain, ray_tracing);
-        found.capabilities.limits.timestamp_bits = queue.map_or(0, |(_, bits)| bits);
+        match queue {
+            Some(family) => found.take_family(family as u32),
+            None => found.missing.push("a queue for graphics and compute".to_owned()),
+        }
         found.capabilities.hide(FeatureSet::NONE);
         Ok(found)
+    }
+
+    /// Has this family for everything, and others beside it.
+    pub(crate) fn take_family(&mut self, family: u32) {
+        self.queue_family = Some(family);
+        self.place(place_queues(&self.families, family));
+    }
+
+    /// Has these queues.
+    pub(crate) fn place(&mut self, places: [QueuePlace; 3]) {
+        self.places = places;
+        self.capabilities.queues = describe_queues(&self.families, &places);
+        self.capabilities.limits.timestamp_bits = self.capabilities.queues[0].timestamp_bits;
     }
 
     /// Whether the device has an extension.
@@ -464,28 +495,16 @@ fn calibration(has: &dyn Fn(&CStr) -> bool) -> Calibration {
     }
 }
 
-/// A queue family for everything the library submits, with the bits of its timestamps.
 impl PhysicalDevice {
     /// Takes a queue that presents to the window, or says that there is none.
     pub(crate) fn present_to(&mut self, window: &Probe<'_>) {
         match window.queue_family(self.raw) {
-            Some((family, timestamp_bits)) => {
-                self.queue_family = Some(family);
-                self.capabilities.limits.timestamp_bits = timestamp_bits;
-            }
+            Some(family) => self.take_family(family),
             None => {
                 self.missing.push("a queue for graphics and compute that presents to the window".to_owned())
             }
         }
     }
-}
-
-fn queue_family(instance: &ash::Instance, raw: vk::PhysicalDevice) -> Option<(u32, u32)> {
-    // SAFETY: `raw` was enumerated from `instance`.
-    let families = unsafe { instance.get_physical_device_queue_family_properties(raw) };
-    let needed = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
-    let index = families.iter().position(|family| family.queue_flags.contains(needed))?;
-    Some((index as u32, families[index].timestamp_valid_bits))
 }
 
 fn local_memory(instance: &ash::Instance, raw: vk::PhysicalDevice) -> u64 {

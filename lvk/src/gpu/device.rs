@@ -17,6 +17,7 @@ use super::instance::Instance;
 use super::naming;
 use super::optional::{FeatureSet, OF_WINDOWS, OptionalFeature};
 use super::profile::DeviceProfile;
+use super::queues::{QueuePlace, QueueRequest, Queues};
 use super::ray_query_path::RayQueryRequest;
 use super::select::{Candidate, choose};
 use super::shading_rate::ShadingRates;
@@ -37,6 +38,7 @@ pub(crate) struct DeviceRequest<'a> {
     pub(crate) extra: ExtraExtensions<'a>,
     /// Whether objects get names for debuggers; where somebody reads them without it.
     pub(crate) debug_names: Option<bool>,
+    pub(crate) queues: QueueRequest,
     /// A window that the device has to present to.
     pub(crate) window: Option<&'a dyn WindowHandles>,
 }
@@ -51,7 +53,7 @@ pub(crate) struct Gpu {
     pub(crate) profile: DeviceProfile,
     /// SPIR-V capabilities that the caller's own extensions allow.
     pub(crate) extra_capabilities: Vec<u32>,
-    pub(crate) queue_family: u32,
+    pub(crate) queues: Queues,
     pub(crate) accel: Option<ash::khr::acceleration_structure::Device>,
     pub(crate) ray_tracing: Option<ash::khr::ray_tracing_pipeline::Device>,
     pub(crate) mesh: Option<ash::ext::mesh_shader::Device>,
@@ -69,7 +71,6 @@ pub(crate) struct Gpu {
     pub(super) device_fault: Option<ash::ext::device_fault::Device>,
     allocator: Mutex<Option<Allocator>>,
     pub(super) heap_use: HeapUse,
-    queue: Mutex<vk::Queue>,
     /// Somebody else made the device, and destroys it.
     is_foreign: bool,
     /// Declared last: destroyed after the device.
@@ -82,8 +83,7 @@ struct Made {
     caps: Capabilities,
     features: Features,
     allocator: Allocator,
-    queue: vk::Queue,
-    queue_family: u32,
+    queues: Queues,
     is_foreign: bool,
 }
 
@@ -91,7 +91,6 @@ impl Gpu {
     pub(crate) fn new(instance: Instance, request: &DeviceRequest<'_>) -> Result<Self> {
         let chosen = choose_device(&instance, request)?;
         let (device, caps, features) = create_with_fallback(&instance, &chosen, request)?;
-        let queue_family = chosen.queue_family.unwrap_or_default();
         let allocator = match new_allocator(&instance, &device, chosen.raw) {
             Ok(allocator) => allocator,
             Err(error) => {
@@ -100,9 +99,12 @@ impl Gpu {
                 return Err(error);
             }
         };
-        // SAFETY: the device was created with one queue of this family.
-        let queue = unsafe { device.get_device_queue(queue_family, 0) };
-        let made = Made { device, caps, features, allocator, queue, queue_family, is_foreign: false };
+        let raw = chosen.places.map(|QueuePlace { family, index }| {
+            // SAFETY: the device was created with this queue of the family.
+            (unsafe { device.get_device_queue(family, index) }, family)
+        });
+        let queues = Queues::new(raw, request.queues);
+        let made = Made { device, caps, features, allocator, queues, is_foreign: false };
         let mut gpu = Self::of(instance, chosen.raw, made, request.debug_names);
         gpu.profile = request.profile.cloned().unwrap_or_default();
         gpu.extra_capabilities = request.extra.capabilities().to_vec();
@@ -118,10 +120,13 @@ impl Gpu {
         pipeline: FeatureRequest,
         query: RayQueryRequest,
         debug_names: Option<bool>,
+        queues: QueueRequest,
     ) -> Result<Self> {
-        let chosen = raw.physical()?;
+        let mut chosen = raw.physical()?;
+        share_queues(&mut chosen, queues);
         let mut caps = chosen.capabilities.clone();
         caps.choose_ray_tracing(pipeline, query);
+        let given = raw.queues();
         let instance = Instance::foreign(raw.entry, raw.instance, raw.instance_extensions);
         let features = enabled(&instance, &chosen, &caps);
         let made = Made {
@@ -129,19 +134,18 @@ impl Gpu {
             device: raw.device,
             caps,
             features,
-            queue: raw.queue,
-            queue_family: raw.queue_family,
+            queues: Queues::new(given, queues),
             is_foreign: true,
         };
         Ok(Self::of(instance, chosen.raw, made, debug_names))
     }
 
     fn of(instance: Instance, physical: vk::PhysicalDevice, made: Made, debug_names: Option<bool>) -> Self {
-        let Made { device, caps, features, allocator, queue, queue_family, is_foreign } = made;
+        let Made { device, caps, features, allocator, queues, is_foreign } = made;
         let raw = &instance.raw;
         let structures = caps.hardware_structures();
         Self {
-            queue_family,
+            queues,
             accel: structures.then(|| ash::khr::acceleration_structure::Device::new(raw, &device)),
             ray_tracing: caps
                 .ray_tracing_pipeline
@@ -159,7 +163,6 @@ impl Gpu {
                 .then(|| ash::ext::device_fault::Device::new(raw, &device)),
             allocator: Mutex::new(Rank::Allocator, Some(allocator)),
             heap_use: HeapUse::new(&instance, physical),
-            queue: Mutex::new(Rank::Queue, queue),
             custom_borders: AtomicU32::new(0),
             physical,
             device,
@@ -172,9 +175,9 @@ impl Gpu {
         }
     }
 
-    /// The queue; Vulkan wants one thread at a time on it.
+    /// The queue for everything; Vulkan wants one thread at a time on it.
     pub(crate) fn queue(&self) -> Guard<'_, vk::Queue> {
-        self.queue.lock()
+        self.queues.raw(0)
     }
 
     /// The memory allocator, `None` only while the context is being torn down.
@@ -246,6 +249,13 @@ impl Gpu {
         (ticks & mask) as f64 * f64::from(limits.timestamp_period_ns) * 1e-6
     }
 
+    /// How many ticks of what a timestamp counts `earlier` is before `later`; `None` where it is not.
+    pub(crate) fn ticks_until(&self, earlier: u64, later: u64) -> Option<u64> {
+        let mask = u64::MAX >> (64 - self.caps.limits.timestamp_bits.clamp(1, 64));
+        let ticks = later.wrapping_sub(earlier) & mask;
+        (ticks > 0 && ticks <= mask / 2).then_some(ticks)
+    }
+
     /// The physical device.
     pub(crate) fn physical(&self) -> vk::PhysicalDevice {
         self.physical
@@ -314,7 +324,16 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
     }
     let candidates: Vec<_> = devices.iter_mut().map(|device| candidate(device, request)).collect();
     let index = choose(&candidates, request.wish)?;
-    Ok(devices.swap_remove(index))
+    let mut chosen = devices.swap_remove(index);
+    share_queues(&mut chosen, request.queues);
+    Ok(chosen)
+}
+
+/// Has one queue for all where that is asked for.
+fn share_queues(device: &mut PhysicalDevice, request: QueueRequest) {
+    if request == QueueRequest::Shared {
+        device.place([device.places[0]; 3]);
+    }
 }
 
 /// What devices have for windows and cannot be turned on for want of an extension of the instance.
@@ -412,17 +431,30 @@ fn create(
     all.p_next = extra.chain();
     let all = all.push_next(&mut chain.v11).push_next(&mut chain.v12).push_next(&mut chain.v13);
     let mut all = chain.ext.chain(all, &|name| extensions.contains(&name));
-    let queue = vk::DeviceQueueCreateInfo::default()
-        .queue_family_index(chosen.queue_family.unwrap_or_default())
-        .queue_priorities(&[1.0]);
+    let priorities = [1.0; 3];
+    let queues = queue_infos(&chosen.places, &priorities);
     let names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
     let info = vk::DeviceCreateInfo::default()
-        .queue_create_infos(std::slice::from_ref(&queue))
+        .queue_create_infos(&queues)
         .enabled_extension_names(&names)
         .push_next(&mut all);
     // SAFETY: every pointer in `info` lives until the end of this function; the caller vouches for its own chain.
     let device = unsafe { instance.raw.create_device(chosen.raw, &info, None) }?;
     Ok((device, features))
+}
+
+/// Each family once, with as many queues as are needed to have the last one.
+fn queue_infos<'a>(places: &[QueuePlace; 3], priorities: &'a [f32; 3]) -> Vec<vk::DeviceQueueCreateInfo<'a>> {
+    let mut lasts = std::collections::BTreeMap::new();
+    for place in places {
+        let last = lasts.entry(place.family).or_insert(0);
+        *last = place.index.max(*last);
+    }
+    let info = |(family, last): (u32, u32)| {
+        let queues = &priorities[..=(last as usize).min(2)];
+        vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(queues)
+    };
+    lasts.into_iter().map(info).collect()
 }
 
 /// GPU-assisted validation finds no access out of bounds where the driver has to make it harmless.

@@ -6,6 +6,7 @@ use ash::vk;
 
 use super::caps::PhysicalDevice;
 use super::optional::{FeatureSet, OptionalFeature};
+use super::queues::{QueueFamily, QueuePlace};
 use crate::error::{Error, Result};
 
 /// An instance, a device and a queue of the caller's own, and what was turned on when they were made.
@@ -35,6 +36,11 @@ pub struct RawContext<'a> {
     pub queue: vk::Queue,
     /// Its family.
     pub queue_family: u32,
+    /// Another queue, for compute, and its family, that [`Queue::Compute`](crate::Queue::Compute) is to be. Without it, and
+    /// where it is the same queue, that shares `queue`.
+    pub compute_queue: Option<(vk::Queue, u32)>,
+    /// As `compute_queue`, for [`Queue::Transfer`](crate::Queue::Transfer). It may be the one for compute.
+    pub transfer_queue: Option<(vk::Queue, u32)>,
 }
 
 impl RawContext<'_> {
@@ -45,7 +51,7 @@ impl RawContext<'_> {
             let name = &found.capabilities.device_name;
             return Err(Error::NoDevice { reasons: format!("{name}: {}", found.missing.join(", ")) });
         }
-        self.check_queue()?;
+        self.check_queues(&found.families)?;
         self.check_features(&found)?;
         let caps = &mut found.capabilities;
         caps.mesh_shader &= self.mesh_shader;
@@ -54,6 +60,7 @@ impl RawContext<'_> {
         caps.limit_ray_tracing(self.ray_tracing_pipeline, self.ray_query);
         caps.hide(FeatureSet::ALL.without(self.features));
         found.queue_family = Some(self.queue_family);
+        found.place(self.places());
         Ok(found)
     }
 
@@ -61,16 +68,27 @@ impl RawContext<'_> {
         self.device_extensions.contains(&extension)
     }
 
-    fn check_queue(&self) -> Result<()> {
-        // SAFETY: the physical device belongs to the instance, by the caller.
-        let families =
-            unsafe { self.instance.get_physical_device_queue_family_properties(self.physical_device) };
-        let needed = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
-        match families.get(self.queue_family as usize) {
-            Some(family) if family.queue_flags.contains(needed) => Ok(()),
-            Some(_) => Err(wrong(format!("family {} has no graphics or no compute", self.queue_family))),
-            None => Err(wrong(format!("the device has no queue family {}", self.queue_family))),
-        }
+    /// The queue of each, and its family.
+    pub(super) fn queues(&self) -> [(vk::Queue, u32); 3] {
+        let first = (self.queue, self.queue_family);
+        [first, self.compute_queue.unwrap_or(first), self.transfer_queue.unwrap_or(first)]
+    }
+
+    /// Where they are; their numbers in their families are not known, and only tell whether they are the same.
+    fn places(&self) -> [QueuePlace; 3] {
+        let queues = self.queues();
+        let number = |raw| queues.iter().position(|(queue, _)| *queue == raw).unwrap_or_default();
+        queues.map(|(queue, family)| QueuePlace { family, index: number(queue) as u32 })
+    }
+
+    fn check_queues(&self, families: &[QueueFamily]) -> Result<()> {
+        use vk::QueueFlags as Flags;
+        let [graphics, compute, transfer] = self.queues().map(|(_, family)| family);
+        let everything = Flags::GRAPHICS | Flags::COMPUTE;
+        check_family(families, graphics, |flags| flags.contains(everything), "graphics or no compute")?;
+        check_family(families, compute, |flags| flags.contains(Flags::COMPUTE), "compute")?;
+        let copies = everything | Flags::TRANSFER;
+        check_family(families, transfer, |flags| flags.intersects(copies), "transfer")
     }
 
     /// Features need the device, their extensions, and what they build on.
@@ -102,6 +120,19 @@ impl RawContext<'_> {
             }
             None => Ok(()),
         }
+    }
+}
+
+fn check_family(
+    families: &[QueueFamily],
+    number: u32,
+    fits: impl Fn(vk::QueueFlags) -> bool,
+    lacks: &str,
+) -> Result<()> {
+    match families.get(number as usize) {
+        Some(family) if fits(family.flags) => Ok(()),
+        Some(_) => Err(wrong(format!("family {number} has no {lacks}"))),
+        None => Err(wrong(format!("the device has no queue family {number}"))),
     }
 }
 

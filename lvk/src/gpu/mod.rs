@@ -17,6 +17,7 @@ pub(crate) mod mesh_limits;
 mod naming;
 pub(crate) mod optional;
 pub(crate) mod profile;
+pub(crate) mod queues;
 pub(crate) mod ray_query_path;
 pub(crate) mod resolve_modes;
 pub(crate) mod select;

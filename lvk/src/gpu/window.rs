@@ -117,8 +117,8 @@ impl<'a> Probe<'a> {
         })
     }
 
-    /// The first queue family of the device for graphics, compute and this window, with its bits of timestamps.
-    pub(crate) fn queue_family(&self, device: vk::PhysicalDevice) -> Option<(u32, u32)> {
+    /// The first queue family of the device for graphics, compute and this window.
+    pub(crate) fn queue_family(&self, device: vk::PhysicalDevice) -> Option<u32> {
         let needed = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
         // SAFETY: the device belongs to the instance.
         let families = unsafe { self.instance.get_physical_device_queue_family_properties(device) };
@@ -129,7 +129,7 @@ impl<'a> Probe<'a> {
         };
         (0..).zip(&families).find_map(|(index, family)| {
             let fits = family.queue_flags.contains(needed) && presents(index);
-            fits.then_some((index, family.timestamp_valid_bits))
+            fits.then_some(index)
         })
     }
 }

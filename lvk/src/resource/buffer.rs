@@ -102,7 +102,11 @@ impl Buffer {
         let size = check_size(gpu, desc)?;
         let usage = raw_usage(gpu, desc.usage, name)? | internal.raw;
         // Kernels read 16-bit indices by whole words.
-        let info = vk::BufferCreateInfo::default().size(size.next_multiple_of(4)).usage(usage);
+        let mut info = vk::BufferCreateInfo::default().size(size.next_multiple_of(4)).usage(usage);
+        let families = gpu.queues.families();
+        if families.len() > 1 {
+            info = info.sharing_mode(vk::SharingMode::CONCURRENT).queue_family_indices(families);
+        }
         // SAFETY: the description is valid: the size is checked, the usage belongs to enabled features.
         let raw =
             unsafe { gpu.device.create_buffer(&info, None) }.map_err(Error::vulkan("vkCreateBuffer"))?;

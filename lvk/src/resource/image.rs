@@ -39,6 +39,8 @@ pub(crate) struct Image {
     /// Whether the image lives in passes only.
     pub(crate) transient: bool,
     memory: Option<Memory>,
+    /// Whether it belongs to one family of queues at a time.
+    is_exclusive: bool,
     /// Somebody else made it, and destroys it.
     is_foreign: bool,
     /// Who that is, where it has to be kept.
@@ -57,6 +59,8 @@ enum Memory {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct BarrierImage {
     pub(crate) raw: vk::Image,
+    /// Whether it belongs to one family of queues at a time.
+    pub(crate) is_exclusive: bool,
     aspects: vk::ImageAspectFlags,
     volume: bool,
 }
@@ -76,6 +80,10 @@ impl Image {
         let formats: Vec<_> = [desc.format].iter().chain(desc.view_formats).map(|f| f.raw()).collect();
         let mut list = vk::ImageFormatListCreateInfo::default().view_formats(&formats);
         let mut info = plan.info(desc);
+        let families = gpu.queues.families();
+        if families.len() > 1 && is_shared(desc) {
+            info = info.sharing_mode(vk::SharingMode::CONCURRENT).queue_family_indices(families);
+        }
         if !desc.view_formats.is_empty() {
             info = info.push_next(&mut list);
         }
@@ -114,6 +122,7 @@ impl Image {
             handles: AtomicU32::new(1),
             transient: desc.memory == TextureMemory::Transient,
             memory: None,
+            is_exclusive: !is_foreign && gpu.queues.has_domains() && !is_shared(desc),
             is_foreign,
             owner: None,
             gpu: Arc::clone(gpu),
@@ -173,6 +182,12 @@ impl Image {
         self.usage & usage_of(self.gpu.format_features(format))
     }
 
+    /// Width, height and slices of a mip.
+    pub(crate) fn mip_extent(&self, mip: u32) -> [u32; 3] {
+        let [width, height] = self.extent;
+        [width, height, self.depth].map(|side| (side >> mip.min(31)).max(1))
+    }
+
     /// Whether views may have this format.
     pub(crate) fn has_format(&self, format: Format) -> bool {
         format == self.format || self.view_formats.contains(&format)
@@ -180,7 +195,12 @@ impl Image {
 
     /// What barriers have to know of the image.
     pub(crate) fn for_barriers(&self) -> BarrierImage {
-        BarrierImage { raw: self.raw, aspects: self.format.aspects(), volume: self.volume }
+        BarrierImage {
+            raw: self.raw,
+            is_exclusive: self.is_exclusive,
+            aspects: self.format.aspects(),
+            volume: self.volume,
+        }
     }
 
     pub(crate) fn gpu(&self) -> &Arc<Gpu> {
@@ -202,6 +222,11 @@ impl Drop for Image {
             None => {}
         }
     }
+}
+
+/// Whether all queues may use an image without moving it: what is only copied and sampled loses nothing by that.
+fn is_shared(desc: &TextureDesc<'_>) -> bool {
+    desc.usage == TextureUsage::SAMPLED
 }
 
 /// A part of an image by its Vulkan name.

@@ -6,6 +6,7 @@ use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
 use super::query_marks::QueryMarks;
+use crate::barrier::ResourceId;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::optional::OptionalFeature;
@@ -131,6 +132,8 @@ impl PipelineStatistics {
 /// A query pool, destroyed on drop.
 pub(crate) struct QueryPool {
     pub(crate) raw: vk::QueryPool,
+    /// For waits between queues.
+    pub(crate) id: ResourceId,
     pub(crate) kind: QueryKind,
     pub(crate) count: u32,
     pub(crate) name: String,
@@ -165,6 +168,7 @@ impl QueryPool {
         gpu.name(raw, desc.debug_name);
         Ok(Self {
             raw,
+            id: ResourceId::next(),
             kind: desc.kind,
             count: desc.count,
             name: desc.debug_name.to_owned(),

@@ -5,6 +5,7 @@ use std::collections::{BTreeSet, VecDeque};
 use ash::vk;
 
 use super::input_sets::InputSets;
+use super::ownership::PerLane;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
@@ -21,10 +22,10 @@ pub(crate) struct CommandSlot {
 }
 
 impl CommandSlot {
-    fn new(gpu: &Gpu) -> Result<Self> {
+    fn new(gpu: &Gpu, lane: usize) -> Result<Self> {
         let info = vk::CommandPoolCreateInfo::default()
             .flags(vk::CommandPoolCreateFlags::TRANSIENT)
-            .queue_family_index(gpu.queue_family);
+            .queue_family_index(gpu.queues.family(lane));
         // SAFETY: the queue family is the device's own.
         let pool = unsafe { gpu.device.create_command_pool(&info, None) }
             .map_err(Error::vulkan("vkCreateCommandPool"))?;
@@ -64,12 +65,18 @@ impl CommandSlot {
 /// Which command buffers are free, being recorded, or with the GPU.
 #[derive(Debug, Default)]
 pub(crate) struct CommandRing {
-    free: Vec<CommandSlot>,
+    lanes: PerLane<LaneSlots>,
     open: BTreeSet<u64>,
-    in_flight: VecDeque<InFlight>,
     /// Sequence numbers of command buffers that never reached the GPU, until the next collection.
     given_up: Vec<u64>,
     last_sequence: u64,
+}
+
+/// Command buffers of one family, and what the lane has under way.
+#[derive(Debug, Default)]
+struct LaneSlots {
+    free: Vec<CommandSlot>,
+    in_flight: VecDeque<InFlight>,
 }
 
 #[derive(Debug)]
@@ -80,39 +87,39 @@ struct InFlight {
 }
 
 impl CommandRing {
-    /// Takes a command buffer to record, with its sequence number.
-    pub(crate) fn acquire(&mut self, gpu: &Gpu) -> Result<(u64, CommandSlot)> {
-        let slot = match self.free.pop() {
+    /// Takes a command buffer of a lane to record, with its sequence number.
+    pub(crate) fn acquire(&mut self, gpu: &Gpu, lane: usize) -> Result<(u64, CommandSlot)> {
+        let slot = match self.lanes[lane].free.pop() {
             Some(slot) => slot,
-            None => CommandSlot::new(gpu)?,
+            None => CommandSlot::new(gpu, lane)?,
         };
         self.last_sequence += 1;
         self.open.insert(self.last_sequence);
         Ok((self.last_sequence, slot))
     }
 
-    /// The command buffer was submitted and is done when the timeline reaches `value`.
-    pub(crate) fn submitted(&mut self, sequence: u64, slot: CommandSlot, value: u64) {
+    /// The command buffer was submitted and is done when the lane's timeline reaches `value`.
+    pub(crate) fn submitted(&mut self, lane: usize, sequence: u64, slot: CommandSlot, value: u64) {
         self.open.remove(&sequence);
-        self.in_flight.push_back(InFlight { value, sequence, slot });
+        self.lanes[lane].in_flight.push_back(InFlight { value, sequence, slot });
     }
 
     /// The command buffer was given up before submission.
-    pub(crate) fn discard(&mut self, gpu: &Gpu, sequence: u64, slot: CommandSlot) {
+    pub(crate) fn discard(&mut self, gpu: &Gpu, lane: usize, sequence: u64, slot: CommandSlot) {
         self.open.remove(&sequence);
         self.given_up.push(sequence);
-        self.recycle(gpu, slot);
+        self.lanes[lane].recycle(gpu, slot);
     }
 
-    /// Takes command buffers back that the GPU is done with; answers their sequence numbers, and those given up.
-    pub(crate) fn collect(&mut self, gpu: &Gpu, completed: u64) -> Vec<u64> {
+    /// Takes command buffers back that the lanes are done with; answers their sequence numbers, and those given up.
+    pub(crate) fn collect(&mut self, gpu: &Gpu, completed: &PerLane<u64>) -> Vec<u64> {
         let mut done = std::mem::take(&mut self.given_up);
-        while let Some(oldest) = self.in_flight.front()
-            && oldest.value <= completed
-        {
-            let Some(oldest) = self.in_flight.pop_front() else { break };
-            done.push(oldest.sequence);
-            self.recycle(gpu, oldest.slot);
+        for (lane, completed) in self.lanes.iter_mut().zip(completed) {
+            while lane.in_flight.front().is_some_and(|oldest| oldest.value <= *completed) {
+                let Some(oldest) = lane.in_flight.pop_front() else { break };
+                done.push(oldest.sequence);
+                lane.recycle(gpu, oldest.slot);
+            }
         }
         done
     }
@@ -134,10 +141,14 @@ impl CommandRing {
 
     /// Destroys everything. The GPU is idle and nothing is being recorded.
     pub(crate) fn destroy(&mut self, gpu: &Gpu) {
-        let in_flight = self.in_flight.drain(..).map(|entry| entry.slot);
-        self.free.drain(..).chain(in_flight).for_each(|slot| slot.destroy(gpu));
+        for lane in &mut self.lanes {
+            let in_flight = lane.in_flight.drain(..).map(|entry| entry.slot);
+            lane.free.drain(..).chain(in_flight).for_each(|slot| slot.destroy(gpu));
+        }
     }
+}
 
+impl LaneSlots {
     fn recycle(&mut self, gpu: &Gpu, mut slot: CommandSlot) {
         match slot.reset(gpu) {
             Ok(()) => self.free.push(slot),

@@ -2,6 +2,7 @@
 
 use ash::vk;
 
+use super::lanes::MovedPart;
 use crate::barrier::{Access, Barriers, IdMap, ImageBarrier, Layout, MemoryBarrier, Stages};
 use crate::gpu::Gpu;
 use crate::resource::image::BarrierImage;
@@ -22,6 +23,51 @@ pub(crate) fn emit(gpu: &Gpu, commands: vk::CommandBuffer, barriers: &Barriers, 
         return;
     }
     let info = vk::DependencyInfo::default().memory_barriers(&memory[..count]).image_memory_barriers(&images);
+    // SAFETY: the command buffer is being recorded outside of a render pass, and the images are alive.
+    unsafe { gpu.device.cmd_pipeline_barrier2(commands, &info) };
+}
+
+/// Which side of a change of owner.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Side {
+    /// The lane gives away, behind everything it has got.
+    Release,
+    /// The lane takes, in front of everything it gets.
+    Acquire,
+}
+
+/// Records one side of changes of owner; the layouts stay, and a semaphore stands between both sides.
+pub(crate) fn emit_moves(
+    gpu: &Gpu,
+    commands: vk::CommandBuffer,
+    parts: &[MovedPart],
+    images: &Images,
+    side: Side,
+) {
+    use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+    let (src_access, dst_stages, dst_access) = match side {
+        Side::Release => (Access::MEMORY_WRITE, Stage::NONE, Access::NONE),
+        Side::Acquire => (Access::NONE, Stage::ALL_COMMANDS, Access::MEMORY_READ | Access::MEMORY_WRITE),
+    };
+    let barrier = |moved: &MovedPart| {
+        let image = images.get(&moved.id)?;
+        let families = [moved.from, moved.to].map(|lane| gpu.queues.family(lane));
+        let [from, to] = if families[0] == families[1] { [vk::QUEUE_FAMILY_IGNORED; 2] } else { families };
+        let barrier = vk::ImageMemoryBarrier2::default()
+            .src_stage_mask(Stage::ALL_COMMANDS)
+            .src_access_mask(src_access)
+            .dst_stage_mask(dst_stages)
+            .dst_access_mask(dst_access)
+            .old_layout(layout(moved.layout))
+            .new_layout(layout(moved.layout))
+            .src_queue_family_index(from)
+            .dst_queue_family_index(to)
+            .image(image.raw)
+            .subresource_range(image.range(moved.part));
+        Some(barrier)
+    };
+    let barriers: Vec<_> = parts.iter().filter_map(barrier).collect();
+    let info = vk::DependencyInfo::default().image_memory_barriers(&barriers);
     // SAFETY: the command buffer is being recorded outside of a render pass, and the images are alive.
     unsafe { gpu.device.cmd_pipeline_barrier2(commands, &info) };
 }

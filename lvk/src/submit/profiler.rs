@@ -9,6 +9,7 @@ use ash::vk;
 use super::scope_tree::{GpuProfile, Stamps, scope_tree};
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::gpu::queues::Queue;
 use crate::resource::QueryPool;
 use crate::resource::query::QueryPoolDesc;
 
@@ -88,8 +89,8 @@ impl Profiler {
     }
 
     /// Begins to measure a command buffer, if that is wanted.
-    pub(crate) fn begin(&self, commands: vk::CommandBuffer) -> Option<Box<Scopes>> {
-        if !self.on.load(Ordering::Relaxed) {
+    pub(crate) fn begin(&self, commands: vk::CommandBuffer, queue: Queue) -> Option<Box<Scopes>> {
+        if !self.on.load(Ordering::Relaxed) || self.gpu.caps.queue(queue).timestamp_bits == 0 {
             return None;
         }
         let mut scopes = Box::default();
@@ -213,6 +214,11 @@ impl Inner {
         let frame = if let Part::Frame(number) = part { Some(number) } else { None };
         let fresh = || (part, begin, GpuProfile { frame, ..Default::default() });
         let (_, first, profile) = self.open.get_or_insert_with(fresh);
+        // What another queue has begun before all that is known.
+        if let Some(earlier) = gpu.ticks_until(begin, *first) {
+            profile.delay(gpu.milliseconds(earlier));
+            *first = begin;
+        }
         let ms: Vec<f64> = ticks.iter().map(|tick| gpu.milliseconds(tick.wrapping_sub(*first))).collect();
         if let Some(root) = scope_tree(stamps, &ms) {
             profile.ms = profile.ms.max(root.start_ms + root.ms);

@@ -1,4 +1,4 @@
-//! Submission: command buffers go to the queue in order, with the barriers between them.
+//! Submission: command buffers go to their queues in order, with the barriers between them.
 
 use std::sync::Arc;
 
@@ -6,12 +6,15 @@ use ash::vk;
 
 use super::command_ring::{CommandRing, CommandSlot};
 use super::deferred::Deferred;
-use super::emit::{Images, emit, stages};
+use super::emit::{Images, Side, emit, emit_moves, stages};
+use super::lanes::{Departure, Lanes, Sent, Site, Step};
+use super::ownership::{Access, Clock, LANES, PerLane};
 use super::presentable::Presentables;
 use super::timeline::Timeline;
-use crate::barrier::{Barriers, Layout, ResourceId, States, TextureShape, Tracker};
+use crate::barrier::{IdMap, Layout, ResourceId, Stages, TextureShape, Tracker};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::queues::Queue;
 use crate::lock::{Guard, Mutex, Rank};
 
 /// A command buffer being recorded, with what the tracker knows of it.
@@ -21,6 +24,12 @@ pub(crate) struct Recording {
     pub(crate) commands: vk::CommandBuffer,
     pub(crate) tracker: Tracker,
     pub(crate) images: Images,
+    /// What it uses that needs no barriers on one queue, and waits between several.
+    pub(crate) references: Vec<(ResourceId, Access)>,
+    /// What the caller has it wait for on other queues.
+    pub(crate) after: Clock,
+    /// The queue's.
+    pub(crate) lane: usize,
     slot: CommandSlot,
 }
 
@@ -36,10 +45,10 @@ impl Recording {
     }
 }
 
-/// What goes to the queue at once: one value of the timeline.
+/// What goes to a queue at once.
 #[derive(Default)]
 pub(crate) struct Submission {
-    /// In their order.
+    /// In their order, all of one lane.
     pub(crate) recordings: Vec<Recording>,
     /// What the first of them waits for, besides images that the presentation engine still has.
     pub(crate) waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
@@ -47,6 +56,17 @@ pub(crate) struct Submission {
     pub(crate) signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
     /// The image of a swapchain that goes to the presentation engine with it: nothing submitted later may use it.
     pub(crate) presented: Option<ResourceId>,
+    /// The first recording is what everything submitted later relies on.
+    pub(crate) has_prelude: bool,
+    /// Frames do not wait for it.
+    pub(crate) in_background: bool,
+}
+
+/// Values of the timeline at which the first and the last recording of a submission are done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Values {
+    pub(crate) first: u64,
+    pub(crate) last: u64,
 }
 
 /// Command buffers that begin together, once all that they wait for is there.
@@ -54,11 +74,13 @@ pub(crate) struct Submission {
 struct Batch {
     waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
     commands: Vec<vk::CommandBufferSubmitInfo<'static>>,
+    signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
 }
 
-/// The queue with everything that changes when something is submitted. `T` is what is destroyed later.
+/// The queues with everything that changes when something is submitted. `T` is what is destroyed later.
 pub(crate) struct Submitter<T> {
-    pub(crate) timeline: Timeline,
+    /// One for each lane: one or all.
+    timelines: Vec<Timeline>,
     inner: Mutex<Inner<T>>,
     gpu: Arc<Gpu>,
 }
@@ -66,11 +88,14 @@ pub(crate) struct Submitter<T> {
 struct Inner<T> {
     /// Trackers of command buffers that were submitted, emptied for the next ones.
     spare: Vec<(Tracker, Images)>,
-    states: States,
+    lanes: Lanes,
     presentables: Presentables,
+    /// What only the graphics queue may use, with names for messages.
+    graphics_only: IdMap<Box<str>>,
     ring: CommandRing,
     deferred: Deferred<T>,
-    submitted: u64,
+    /// The last value of each lane that frames wait for.
+    foreground: PerLane<u64>,
     /// Why a submission failed: what the states say has not happened on the GPU, so nothing more is submitted.
     broken: Option<Error>,
 }
@@ -81,34 +106,45 @@ pub(crate) struct Finished<T> {
     pub(crate) sequences: Vec<u64>,
     /// Things to destroy now.
     pub(crate) garbage: Vec<T>,
+    /// Everything up to this value is done, on all queues.
+    pub(crate) passed: u64,
 }
 
 impl<T> Submitter<T> {
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self> {
+        const NAMES: [&str; LANES] = ["queue timeline", "compute queue timeline", "transfer queue timeline"];
+        let has_several = gpu.queues.several_lanes();
+        let count = if has_several { LANES } else { 1 };
+        let timelines =
+            NAMES.iter().take(count).map(|name| Timeline::new(gpu, name)).collect::<Result<_>>()?;
+        let site = |lane| Site { domain: gpu.queues.domain(lane), stages: Queue::ALL.map(stages_of)[lane] };
         let inner = Inner {
             spare: Vec::new(),
-            states: States::default(),
+            lanes: Lanes::new([site(0), site(1), site(2)], has_several),
             presentables: Presentables::default(),
+            graphics_only: IdMap::default(),
             ring: CommandRing::default(),
             deferred: Deferred::default(),
-            submitted: 0,
+            foreground: [0; LANES],
             broken: None,
         };
-        Ok(Self {
-            timeline: Timeline::new(gpu)?,
-            inner: Mutex::new(Rank::Submitter, inner),
-            gpu: Arc::clone(gpu),
-        })
+        Ok(Self { timelines, inner: Mutex::new(Rank::Submitter, inner), gpu: Arc::clone(gpu) })
     }
 
     /// Starts recording a command buffer.
-    pub(crate) fn acquire(&self) -> Result<Recording> {
+    pub(crate) fn acquire(&self, queue: Queue) -> Result<Recording> {
+        let lane = self.gpu.queues.lane(queue);
         let mut inner = self.lock();
-        let (sequence, slot) = inner.ring.acquire(&self.gpu)?;
+        if lane != 0 {
+            inner.lanes.begin_several();
+        }
+        let (sequence, slot) = inner.ring.acquire(&self.gpu, lane)?;
         let (tracker, images) = inner.spare.pop().unwrap_or_default();
         drop(inner);
-        let recording = Recording { sequence, commands: slot.main, tracker, images, slot };
-        match begin(&self.gpu, recording.commands) {
+        let (references, after) = (Vec::new(), Clock::default());
+        let commands = slot.main;
+        let recording = Recording { sequence, commands, tracker, images, references, after, lane, slot };
+        match begin(&self.gpu, commands) {
             Ok(()) => Ok(recording),
             Err(error) => {
                 self.discard(recording);
@@ -119,7 +155,25 @@ impl<T> Submitter<T> {
 
     /// Gives a command buffer up.
     pub(crate) fn discard(&self, recording: Recording) {
-        self.lock().ring.discard(&self.gpu, recording.sequence, recording.slot);
+        self.lock().ring.discard(&self.gpu, recording.lane, recording.sequence, recording.slot);
+    }
+
+    /// Only the graphics queue may use a resource from now on.
+    pub(crate) fn keep_to_graphics(&self, id: ResourceId, name: &str) {
+        self.lock().graphics_only.insert(id, name.into());
+    }
+
+    /// Fails where a command buffer, for another queue, uses what only the graphics queue may.
+    pub(crate) fn check_queue(&self, tracker: &Tracker) -> Result<()> {
+        let inner = self.lock();
+        match inner.graphics_only.iter().find(|(id, _)| tracker.uses(**id)) {
+            None => Ok(()),
+            Some((_, name)) => {
+                let message = "images of windows, and what was imported without being concurrent, belong to the graphics queue; \
+                               use it there";
+                Err(Error::usage(&**name, message))
+            }
+        }
     }
 
     /// Fails where a command buffer uses an image of a swapchain that the application does not have. That is to be known
@@ -130,57 +184,69 @@ impl<T> Submitter<T> {
     }
 
     /// Submits command buffers in order. `prepare` runs under the lock, right before.
-    pub(crate) fn submit(&self, submission: Submission, prepare: impl FnOnce()) -> Result<u64> {
+    pub(crate) fn submit(&self, mut submission: Submission, prepare: impl FnOnce()) -> Result<Values> {
         let mut guard = self.lock();
         let inner = &mut *guard;
-        let value = inner.submitted + 1;
         let sent = match inner.broken.clone() {
             Some(error) => Err(error),
-            None => self.finish(inner, submission.waits, &submission.recordings).and_then(|batches| {
-                prepare();
-                self.send(&batches, submission.signals, value)
-            }),
+            None => self.submit_all(inner, &mut submission, prepare),
         };
-        if let Err(error) = sent {
-            inner.broken = Some(error.clone());
-            for recording in submission.recordings {
-                inner.ring.discard(&self.gpu, recording.sequence, recording.slot);
+        let values = match sent {
+            Ok(values) => values,
+            Err(error) => {
+                inner.broken = Some(error.clone());
+                for recording in submission.recordings {
+                    inner.ring.discard(&self.gpu, recording.lane, recording.sequence, recording.slot);
+                }
+                return Err(error);
             }
-            return Err(error);
-        }
-        inner.submitted = value;
+        };
         submission.presented.into_iter().for_each(|id| inner.presentables.present(id));
-        for mut recording in submission.recordings {
-            inner.ring.submitted(recording.sequence, recording.slot, value);
+        let lane = submission.recordings.first().map_or(0, |first| first.lane);
+        if !submission.in_background {
+            inner.foreground[lane] = values.last;
+        }
+        let last = submission.recordings.len().saturating_sub(1);
+        for (place, mut recording) in submission.recordings.into_iter().enumerate() {
+            let value = if place == last { values.last } else { values.first };
+            inner.ring.submitted(lane, recording.sequence, recording.slot, value);
             recording.tracker.clear();
             recording.images.clear();
             inner.spare.push((recording.tracker, recording.images));
         }
-        Ok(value)
+        Ok(values)
     }
 
-    /// Ends the command buffers and puts the barriers from the queue's state in front of each. A new batch begins where
-    /// an image is waited for, so that what comes before need not wait.
-    fn finish(
+    fn submit_all(
         &self,
         inner: &mut Inner<T>,
-        waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
-        recordings: &[Recording],
-    ) -> Result<Vec<Batch>> {
+        submission: &mut Submission,
+        prepare: impl FnOnce(),
+    ) -> Result<Values> {
+        submission.recordings.iter().try_for_each(|recording| end(&self.gpu, recording.commands))?;
+        if inner.lanes.are_several() && !submission.recordings.is_empty() {
+            prepare();
+            return self.submit_to_several(inner, submission);
+        }
+        let batches = self.finish(inner, submission)?;
+        prepare();
+        let value = inner.lanes.signal();
+        self.send(0, batches, std::mem::take(&mut submission.signals), value)?;
+        Ok(Values { first: value, last: value })
+    }
+
+    /// Puts the barriers from the queue's state in front of each command buffer. A new batch begins where an image is waited
+    /// for, so that what comes before need not wait.
+    fn finish(&self, inner: &mut Inner<T>, submission: &mut Submission) -> Result<Vec<Batch>> {
         let mut batches = Vec::new();
-        let mut batch = Batch { waits, ..Batch::default() };
-        for recording in recordings {
-            end(&self.gpu, recording.commands)?;
-            let images = inner.presentables.take_waits(&recording.tracker, &mut inner.states);
+        let mut batch = Batch { waits: std::mem::take(&mut submission.waits), ..Batch::default() };
+        for recording in &submission.recordings {
+            let images = self.image_waits(inner, recording);
             if !images.is_empty() && !batch.commands.is_empty() {
                 batches.push(std::mem::take(&mut batch));
             }
-            batch.waits.extend(images.iter().map(|wait| {
-                vk::SemaphoreSubmitInfo::default()
-                    .semaphore(wait.semaphore)
-                    .stage_mask(stages(&self.gpu, wait.stages))
-            }));
-            let barriers: Barriers = inner.states.submit(&recording.tracker);
+            batch.waits.extend(images);
+            let barriers = inner.lanes.submit_alone(&recording.tracker);
             if !barriers.is_empty() {
                 begin(&self.gpu, recording.slot.prologue)?;
                 emit(&self.gpu, recording.slot.prologue, &barriers, &recording.images);
@@ -193,28 +259,180 @@ impl<T> Submitter<T> {
         Ok(batches)
     }
 
+    /// Each command buffer with its own waits, and a value of its own that others may wait for.
+    fn submit_to_several(&self, inner: &mut Inner<T>, submission: &mut Submission) -> Result<Values> {
+        let mut values = Values::default();
+        let mut waits = std::mem::take(&mut submission.waits);
+        let last = submission.recordings.len() - 1;
+        for (place, recording) in submission.recordings.iter().enumerate() {
+            waits.extend(self.image_waits(inner, recording));
+            let is_prelude = submission.has_prelude && place == 0;
+            let step = self.step(inner, recording, is_prelude);
+            for departure in &step.departures {
+                self.depart(inner, departure, &recording.images)?;
+            }
+            waits.extend(self.lane_waits(&step.waits));
+            let mut batch = Batch { waits: std::mem::take(&mut waits), ..Batch::default() };
+            if !step.arrivals.is_empty() || !step.barriers.is_empty() {
+                self.record_prologue(recording, &step)?;
+                batch.push(recording.slot.prologue);
+            }
+            batch.push(recording.commands);
+            let signals = if place == last { std::mem::take(&mut submission.signals) } else { Vec::new() };
+            self.send(recording.lane, vec![batch], signals, step.value)?;
+            values = Values { first: if place == 0 { step.value } else { values.first }, last: step.value };
+        }
+        Ok(values)
+    }
+
+    fn step(&self, inner: &mut Inner<T>, recording: &Recording, is_prelude: bool) -> Step {
+        let sent = Sent {
+            lane: recording.lane,
+            tracker: &recording.tracker,
+            references: &recording.references,
+            after: recording.after,
+            is_prelude,
+        };
+        let images = &recording.images;
+        inner.lanes.submit(&sent, |id| images.get(&id).is_some_and(|image| image.is_exclusive))
+    }
+
+    fn record_prologue(&self, recording: &Recording, step: &Step) -> Result<()> {
+        let (commands, images) = (recording.slot.prologue, &recording.images);
+        begin(&self.gpu, commands)?;
+        if !step.arrivals.is_empty() {
+            emit_moves(&self.gpu, commands, &step.arrivals, images, Side::Acquire);
+        }
+        emit(&self.gpu, commands, &step.barriers, images);
+        end(&self.gpu, commands)
+    }
+
+    /// Has a lane give images away.
+    fn depart(&self, inner: &mut Inner<T>, departure: &Departure, images: &Images) -> Result<()> {
+        let lane = departure.lane;
+        let (sequence, slot) = inner.ring.acquire(&self.gpu, lane)?;
+        let sent = self.send_moves(departure, slot.main, images);
+        match sent {
+            Ok(()) => inner.ring.submitted(lane, sequence, slot, departure.value),
+            Err(_) => inner.ring.discard(&self.gpu, lane, sequence, slot),
+        }
+        sent
+    }
+
+    fn send_moves(&self, departure: &Departure, commands: vk::CommandBuffer, images: &Images) -> Result<()> {
+        begin(&self.gpu, commands)?;
+        emit_moves(&self.gpu, commands, &departure.parts, images, Side::Release);
+        end(&self.gpu, commands)?;
+        let waits = self.lane_waits(&departure.waits).collect();
+        let mut batch = Batch { waits, ..Batch::default() };
+        batch.push(commands);
+        self.send(departure.lane, vec![batch], Vec::new(), departure.value)
+    }
+
+    /// Waits for images that the presentation engine still has.
+    fn image_waits(
+        &self,
+        inner: &mut Inner<T>,
+        recording: &Recording,
+    ) -> Vec<vk::SemaphoreSubmitInfo<'static>> {
+        let found = inner.presentables.take_waits(&recording.tracker, inner.lanes.first_states());
+        let wait = |wait: &super::presentable::AcquireWait| {
+            vk::SemaphoreSubmitInfo::default()
+                .semaphore(wait.semaphore)
+                .stage_mask(stages(&self.gpu, wait.stages))
+        };
+        found.iter().map(wait).collect()
+    }
+
+    /// Waits for other lanes, at every stage: everything the lane gets later stands behind them too.
+    fn lane_waits(&self, clock: &Clock) -> impl Iterator<Item = vk::SemaphoreSubmitInfo<'static>> {
+        clock.values().map(|(lane, value)| {
+            vk::SemaphoreSubmitInfo::default()
+                .semaphore(self.timelines[lane].raw)
+                .value(value)
+                .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
+        })
+    }
+
     /// The last batch signals.
     fn send(
         &self,
-        batches: &[Batch],
+        lane: usize,
+        mut batches: Vec<Batch>,
         mut signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
         value: u64,
     ) -> Result<()> {
-        let timeline = vk::SemaphoreSubmitInfo::default().semaphore(self.timeline.raw).value(value);
+        let timeline = vk::SemaphoreSubmitInfo::default().semaphore(self.timelines[lane].raw).value(value);
         signals.push(timeline.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS));
-        let mut submits: Vec<_> = batches.iter().map(Batch::info).collect();
-        if let Some(last) = submits.last_mut() {
-            *last = last.signal_semaphore_infos(&signals);
+        if let Some(last) = batches.last_mut() {
+            last.signals = signals;
         }
-        let queue = self.gpu.queue();
+        let submits: Vec<_> = batches.iter().map(Batch::info).collect();
+        let queue = self.gpu.queues.raw(lane);
         // SAFETY: the command buffers are complete and used once; the queue is locked.
         unsafe { self.gpu.device.queue_submit2(*queue, &submits, vk::Fence::null()) }
             .map_err(self.gpu.failed("vkQueueSubmit2"))
     }
 
-    /// Timeline value of the last submission.
+    /// The value of the last submission of all.
     pub(crate) fn submitted(&self) -> u64 {
-        self.lock().submitted
+        self.lock().lanes.last().iter().copied().max().unwrap_or_default()
+    }
+
+    /// The values of the last submission of each lane.
+    pub(crate) fn last_of_lanes(&self) -> PerLane<u64> {
+        *self.lock().lanes.last()
+    }
+
+    /// The same, of those that frames wait for.
+    pub(crate) fn foreground(&self) -> PerLane<u64> {
+        self.lock().foreground
+    }
+
+    /// How many values there were.
+    #[cfg(feature = "test-hooks")]
+    pub(crate) fn count(&self) -> u64 {
+        self.lock().lanes.sent()
+    }
+
+    /// The lane of a value.
+    pub(crate) fn lane_of(&self, value: u64) -> usize {
+        Lanes::lane_of(value, self.timelines.len() > 1)
+    }
+
+    /// The timeline of a lane.
+    pub(crate) fn timeline(&self, lane: usize) -> &Timeline {
+        &self.timelines[lane.min(self.timelines.len() - 1)]
+    }
+
+    /// Blocks until the submission of this value is done.
+    pub(crate) fn wait(&self, value: u64) -> Result<()> {
+        self.timeline(self.lane_of(value)).wait(value)
+    }
+
+    /// Blocks until all these are done.
+    pub(crate) fn wait_for_lanes(&self, values: &PerLane<u64>) -> Result<()> {
+        self.timelines.iter().zip(values).try_for_each(|(timeline, value)| timeline.wait(*value))
+    }
+
+    /// Whether the submission of this value is done.
+    pub(crate) fn is_done(&self, value: u64) -> Result<bool> {
+        Ok(self.timeline(self.lane_of(value)).completed()? >= value)
+    }
+
+    /// Up to which value everything is done.
+    pub(crate) fn passed(&self) -> Result<u64> {
+        let completed = self.completed()?;
+        Ok(self.lock().lanes.passed(&completed))
+    }
+
+    /// Asks how far the lanes are.
+    fn completed(&self) -> Result<PerLane<u64>> {
+        let mut completed = [0; LANES];
+        for (timeline, completed) in self.timelines.iter().zip(&mut completed) {
+            *completed = timeline.completed()?;
+        }
+        Ok(completed)
     }
 
     /// Destroys `item` once no command buffer can use it any more. Answers how many items wait.
@@ -238,12 +456,15 @@ impl<T> Submitter<T> {
 
     /// Takes out what the GPU has finished with.
     pub(crate) fn collect(&self) -> Result<Finished<T>> {
-        let completed = self.timeline.completed()?;
+        let completed = self.completed()?;
         let mut inner = self.lock();
-        let sequences = inner.ring.collect(&self.gpu, completed);
-        let (oldest, submitted) = (inner.ring.oldest_open(), inner.submitted);
-        let garbage = inner.deferred.collect(oldest, submitted, completed);
-        Ok(Finished { sequences, garbage })
+        inner.lanes.reached(&completed);
+        let sequences = inner.ring.collect(&self.gpu, &completed);
+        let oldest = inner.ring.oldest_open();
+        let submitted = inner.lanes.last().iter().copied().max().unwrap_or_default();
+        let passed = inner.lanes.passed(&completed);
+        let garbage = inner.deferred.collect(oldest, submitted, passed);
+        Ok(Finished { sequences, garbage, passed })
     }
 
     /// Changes who has the images of swapchains.
@@ -253,14 +474,17 @@ impl<T> Submitter<T> {
 
     /// An image of somebody else's is in this layout now.
     pub(crate) fn import_texture(&self, id: ResourceId, shape: TextureShape, layout: Layout) {
-        self.lock().states.imported(id, shape, layout);
+        self.lock().lanes.import(id, shape, layout);
     }
 
     /// Forgets the state of a destroyed resource.
     pub(crate) fn forget(&self, id: ResourceId) {
         let mut inner = self.lock();
-        inner.states.forget(id);
+        inner.lanes.forget(id);
         inner.presentables.forget(id);
+        if !inner.graphics_only.is_empty() {
+            inner.graphics_only.remove(&id);
+        }
     }
 
     /// Takes everything out that waits for destruction. The GPU is idle.
@@ -281,7 +505,26 @@ impl Batch {
     }
 
     fn info(&self) -> vk::SubmitInfo2<'_> {
-        vk::SubmitInfo2::default().wait_semaphore_infos(&self.waits).command_buffer_infos(&self.commands)
+        vk::SubmitInfo2::default()
+            .wait_semaphore_infos(&self.waits)
+            .command_buffer_infos(&self.commands)
+            .signal_semaphore_infos(&self.signals)
+    }
+}
+
+/// What the command buffers of a queue can do.
+pub(crate) fn stages_of(queue: Queue) -> Stages {
+    match queue {
+        Queue::Graphics => Stages::all() - Stages::SHADING_RATE,
+        Queue::Compute => {
+            Stages::HOST
+                | Stages::TRANSFER
+                | Stages::DRAW_INDIRECT
+                | Stages::COMPUTE
+                | Stages::RAY_TRACING
+                | Stages::ACCEL_BUILD
+        }
+        Queue::Transfer => Stages::HOST | Stages::TRANSFER,
     }
 }
 

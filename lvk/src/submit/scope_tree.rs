@@ -39,7 +39,20 @@ impl fmt::Display for GpuProfile {
     }
 }
 
+impl GpuProfile {
+    /// Begins so many milliseconds earlier.
+    pub(super) fn delay(&mut self, ms: f64) {
+        self.ms += ms;
+        self.scopes.iter_mut().for_each(|scope| scope.delay(ms));
+    }
+}
+
 impl GpuScope {
+    fn delay(&mut self, ms: f64) {
+        self.start_ms += ms;
+        self.children.iter_mut().for_each(|child| child.delay(ms));
+    }
+
     fn print(&self, f: &mut fmt::Formatter<'_>, depth: usize) -> fmt::Result {
         writeln!(f, "{:10.3} ms  {:indent$}{}", self.ms, "", self.name, indent = 2 * depth)?;
         self.children.iter().try_for_each(|child| child.print(f, depth + 1))
@@ -97,6 +110,16 @@ mod tests {
         let profile = GpuProfile { frame: Some(3), ms: root.ms, scopes: root.children };
         let text = "     9.000 ms  frame 3\n     3.000 ms    a\n     1.500 ms      b\n     4.000 ms    c\n";
         assert_eq!(profile.to_string(), text);
+    }
+
+    #[test]
+    fn a_profile_that_begins_earlier_has_all_its_scopes_later() {
+        let scopes = scope_tree(&stamps("root a b ) ) )"), &[0.0, 1.0, 2.0, 3.0, 4.0, 5.0]).unwrap().children;
+        let mut profile = GpuProfile { frame: None, ms: 5.0, scopes };
+        profile.delay(2.5);
+        let outer = &profile.scopes[0];
+        assert_eq!((profile.ms, outer.start_ms, outer.ms), (7.5, 3.5, 3.0));
+        assert_eq!((outer.children[0].start_ms, outer.children[0].ms), (4.5, 1.0));
     }
 
     #[test]

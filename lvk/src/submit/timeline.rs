@@ -1,4 +1,4 @@
-//! The timeline semaphore of the queue: one rising number for everything submitted.
+//! Timeline semaphores: one for each lane, a rising number for everything submitted to it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -14,14 +14,15 @@ use crate::gpu::Gpu;
 /// Of one context, later submissions are greater.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct SubmitHandle {
-    /// Value of the timeline once the submission is done.
+    /// Value of its queue's timeline once the submission is done.
     pub(crate) value: u64,
     /// Which context submitted it.
     pub(crate) context: u64,
 }
 
 impl SubmitHandle {
-    /// The value that [`Context::raw_timeline`](crate::Context::raw_timeline) reaches when the submission is done.
+    /// The value that [`Context::raw_timeline`](crate::Context::raw_timeline), or
+    /// [`raw_timeline_of`](crate::Context::raw_timeline_of) the queue, reaches when the submission is done.
     pub fn raw_value(self) -> u64 {
         self.value
     }
@@ -35,13 +36,13 @@ pub(crate) struct Timeline {
 }
 
 impl Timeline {
-    pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self> {
+    pub(crate) fn new(gpu: &Arc<Gpu>, name: &str) -> Result<Self> {
         let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
         let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         // SAFETY: timeline semaphores are turned on.
         let raw = unsafe { gpu.device.create_semaphore(&info, None) }
             .map_err(Error::vulkan("vkCreateSemaphore"))?;
-        gpu.name(raw, "queue timeline");
+        gpu.name(raw, name);
         Ok(Self { raw, seen: AtomicU64::new(0), gpu: Arc::clone(gpu) })
     }
 

@@ -31,7 +31,7 @@ impl Surface {
         let surface = Self { raw, gpu: Arc::clone(gpu), window: Arc::clone(window) };
         // SAFETY: the surface belongs to the instance of the device.
         let presents = unsafe {
-            functions.surface.get_physical_device_surface_support(gpu.physical(), gpu.queue_family, raw)
+            functions.surface.get_physical_device_surface_support(gpu.physical(), gpu.queues.family(0), raw)
         };
         if presents.map_err(Error::vulkan("vkGetPhysicalDeviceSurfaceSupportKHR"))? {
             gpu.name(raw, name);

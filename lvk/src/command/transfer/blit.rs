@@ -21,7 +21,8 @@ impl CommandBuffer {
     /// # Errors
     /// [`Unsupported`](Error::Unsupported) for formats that the device cannot scale; depth and stencil are scaled one at a
     /// time, to the nearest texel of the same format. [`InvalidUsage`](Error::InvalidUsage) for regions that do not
-    /// exist or have different numbers of layers, and for multisampled textures.
+    /// exist or have different numbers of layers, and for multisampled textures; [`WrongQueue`](Error::WrongQueue) on another
+    /// queue than the graphics queue.
     pub fn blit_texture(
         &mut self,
         source: TextureHandle,
@@ -30,6 +31,7 @@ impl CommandBuffer {
         to: &TextureRegion,
         filter: Filter,
     ) -> Result<()> {
+        self.needs_graphics("a blit")?;
         let source = self.shared.store.textures.get(source)?;
         let target = self.shared.store.textures.get(target)?;
         let from = source.resolve_region(from)?;
@@ -53,7 +55,11 @@ impl CommandBuffer {
     }
 
     /// Fills every mip but the first by halving the one before, for all layers, volumes in depth too.
+    ///
+    /// # Errors
+    /// As [`blit_texture`](Self::blit_texture).
     pub fn generate_mipmaps(&mut self, texture: TextureHandle) -> Result<()> {
+        self.needs_graphics("the generation of mips")?;
         let texture = self.shared.store.textures.get(texture)?;
         self.generate_mipmaps_object(&texture)
     }

@@ -34,7 +34,8 @@ impl CommandBuffer {
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for mips and layers that do not exist, for values that the format does not
-    /// hold or that are out of range, and for compressed formats.
+    /// hold or that are out of range, and for compressed formats; [`WrongQueue`](Error::WrongQueue) on the transfer queue, and
+    /// for depth and stencil on another queue than the graphics queue.
     pub fn clear_texture(
         &mut self,
         texture: TextureHandle,
@@ -44,6 +45,11 @@ impl CommandBuffer {
         let texture = self.shared.store.textures.get(texture)?;
         let part = texture.resolve_range(range)?;
         let aspects = check_value(&texture, value)?;
+        if aspects == vk::ImageAspectFlags::COLOR {
+            self.needs_compute("a clear of a texture")?;
+        } else {
+            self.needs_graphics("a clear of depth or stencil")?;
+        }
         self.use_texture(&texture, part, Use::transfer_write())?;
         self.flush();
         let range =

@@ -17,7 +17,8 @@ impl CommandBuffer {
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for other numbers of samples, for different formats, for depth, and for
-    /// regions that do not exist; [`Unsupported`](Error::Unsupported) where the format cannot be resolved to.
+    /// regions that do not exist; [`Unsupported`](Error::Unsupported) where the format cannot be resolved to;
+    /// [`WrongQueue`](Error::WrongQueue) on another queue than the graphics queue.
     pub fn resolve_texture(
         &mut self,
         source: TextureHandle,
@@ -25,6 +26,7 @@ impl CommandBuffer {
         target: TextureHandle,
         to: &TextureRegion,
     ) -> Result<()> {
+        self.needs_graphics("a resolve")?;
         let source = self.shared.store.textures.get(source)?;
         let target = self.shared.store.textures.get(target)?;
         let from = source.resolve_region(from)?;

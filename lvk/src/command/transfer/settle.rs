@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::barrier::{Layout, Stages, Use};
 use crate::command::CommandBuffer;
+use crate::command::queue_check::on_lane;
 use crate::resource::texture_desc::TextureUsage;
 use crate::resource::{Buffer, Texture};
 use crate::submit::Recording;
@@ -21,16 +22,18 @@ impl CommandBuffer {
         if self.settle.is_empty() {
             return;
         }
+        let lane = self.recording.lane;
         let Recording { tracker, images, commands, .. } = &mut *self.recording;
         self.barriers.clear();
         // What was written twice is listed twice; the second read needs no barrier any more.
         for written in self.settle.drain(..) {
             match written {
                 Settle::Buffer(buffer) => {
-                    tracker.use_buffer(buffer.id, Use::everything_read(), &mut self.barriers);
+                    tracker.use_buffer(buffer.id, on_lane(lane, Use::everything_read()), &mut self.barriers);
                 }
                 Settle::Texture(texture) => {
                     let Some(read) = resting_use(texture.image.usage) else { continue };
+                    let read = on_lane(lane, read);
                     let image = &texture.image;
                     images.insert(image.id, image.for_barriers());
                     tracker.use_texture(image.id, image.shape, texture.range, read, &mut self.barriers);

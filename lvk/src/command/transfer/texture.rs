@@ -25,10 +25,38 @@ impl CommandBuffer {
         let source = self.shared.store.buffers.get(source)?;
         let target = self.shared.store.textures.get(target)?;
         let region = check_packed(&source, offset, &target, region)?;
+        self.check_copy(&target, &region)?;
         self.use_buffer(&source, Use::transfer_read());
         self.use_texture(&target, region.subresources(), Use::transfer_write())?;
         self.flush();
         self.record_fill_texture(source.raw, offset, &target, &region);
+        self.settle.push(Settle::Texture(target));
+        Ok(())
+    }
+
+    /// Writes texels that the command buffer takes along by way of the staging memory, tightly packed, row by row and layer by
+    /// layer (`vkCmdCopyBufferToImage`). On the transfer queue this streams textures beside what is drawn.
+    ///
+    /// # Errors
+    /// [`InvalidUsage`](Error::InvalidUsage) for a region that does not exist, another number of bytes than it has, multisampled
+    /// textures, images of windows, and regions that copies on the queue cannot have
+    /// ([`QueueInfo::copy_granularity`](crate::QueueInfo::copy_granularity)); [`WrongQueue`](Error::WrongQueue) for depth and
+    /// stencil on another queue than the graphics queue.
+    pub fn update_texture(
+        &mut self,
+        target: TextureHandle,
+        region: &TextureRegion,
+        bytes: &[u8],
+    ) -> Result<()> {
+        // A multiple of 16 suits texels and blocks of every size.
+        const ALIGNMENT: u64 = 16;
+        let target = self.shared.store.textures.get(target)?;
+        let region = target.check_upload(region, bytes.len() as u64)?;
+        self.check_copy(&target, &region)?;
+        let staged = self.shared.staging.write(bytes, ALIGNMENT, self.recording.sequence)?;
+        self.use_texture(&target, region.subresources(), Use::transfer_write())?;
+        self.flush();
+        self.record_fill_texture(staged.buffer, staged.offset, &target, &region);
         self.settle.push(Settle::Texture(target));
         Ok(())
     }
@@ -56,6 +84,7 @@ impl CommandBuffer {
         offset: u64,
     ) -> Result<()> {
         let region = check_packed(target, offset, source, region)?;
+        self.check_copy(source, &region)?;
         self.use_texture(source, region.subresources(), Use::transfer_read())?;
         self.use_buffer(target, Use::transfer_write());
         self.flush();
@@ -85,6 +114,8 @@ impl CommandBuffer {
         let target = self.shared.store.textures.get(target)?;
         let from = source.resolve_region(from)?;
         let to = counterpart(&source, &from, &target, to)?;
+        self.check_copy(&source, &from)?;
+        self.check_copy(&target, &to)?;
         self.use_texture_pair(&source, &from, &target, &to)?;
         let depth = from.extent[2].max(to.extent[2]);
         let copy = vk::ImageCopy {

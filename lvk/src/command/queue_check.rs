@@ -1,0 +1,142 @@
+//! What the command buffers of a queue cannot do. Refused alike everywhere, whether the device would do it or not.
+
+use ash::vk;
+
+use super::CommandBuffer;
+use crate::barrier::{ResourceId, Use};
+use crate::error::{Error, Result};
+use crate::gpu::queues::Queue;
+use crate::resource::Texture;
+use crate::resource::region::Region;
+use crate::submit::SubmitHandle;
+use crate::submit::ownership::Access;
+use crate::submit::queue::stages_of;
+
+/// What builds are called.
+pub(crate) const BUILD: &str = "a build of acceleration structures";
+
+impl CommandBuffer {
+    /// The queue that the command buffer was acquired for.
+    pub fn queue(&self) -> Queue {
+        self.queue
+    }
+
+    /// Whether it runs in order with what the graphics queue gets.
+    pub(crate) fn is_on_first_lane(&self) -> bool {
+        self.recording.lane == 0
+    }
+
+    /// Fails unless this is for the graphics queue.
+    pub(super) fn needs_graphics(&self, command: &'static str) -> Result<()> {
+        match self.queue {
+            Queue::Graphics => Ok(()),
+            queue => Err(Error::WrongQueue { command, queue, remedy: "Queue::Graphics" }),
+        }
+    }
+
+    /// Fails if this is for the transfer queue.
+    pub(super) fn needs_compute(&self, command: &'static str) -> Result<()> {
+        needs_compute(self.queue, command)
+    }
+
+    /// Fails where the device's queue has no timestamps.
+    pub(super) fn needs_timestamps(&self) -> Result<()> {
+        if self.shared.gpu.caps.queue(self.queue).timestamp_bits > 0 {
+            return Ok(());
+        }
+        Err(self.shared.gpu.lacks(&format!("timestamps on the {} queue", self.queue.words())))
+    }
+
+    /// Fails where copies on this queue cannot have such a region.
+    pub(super) fn check_copy(&self, texture: &Texture, region: &Region) -> Result<()> {
+        if self.queue == Queue::Graphics {
+            return Ok(());
+        }
+        if region.part.aspect.intersects(vk::ImageAspectFlags::DEPTH | vk::ImageAspectFlags::STENCIL) {
+            return self.needs_graphics("a copy of depth or stencil");
+        }
+        let granularity = self.shared.gpu.caps.queue(self.queue).copy_granularity;
+        let mip = region.part.shrunk(texture.image.mip_extent(region.mip));
+        let [width, height] = region.part.block;
+        let side = |axis: usize| (region.offset[axis], region.extent[axis], mip[axis]);
+        let blocks = [width, height, 1];
+        if (0..3).all(|axis| fits(granularity[axis], blocks[axis], side(axis))) {
+            return Ok(());
+        }
+        let message = format!(
+            "copies on the {} queue of this device begin and end at multiples of {granularity:?} texels or blocks (0: whole \
+             mips), not at {:?} + {:?}; take another queue",
+            self.queue.words(),
+            region.offset,
+            region.extent
+        );
+        Err(Error::usage(&texture.name, message))
+    }
+
+    /// The command buffer begins after these submissions.
+    pub(super) fn wait_for(&mut self, submissions: &[SubmitHandle]) -> Result<()> {
+        for submission in submissions.iter().filter(|submission| **submission != SubmitHandle::default()) {
+            if submission.context != self.shared.store.context_id {
+                return Err(Error::usage("wait_for", "the submission belongs to another context"));
+            }
+            let lane = self.shared.submitter.lane_of(submission.value);
+            self.recording.after.raise(lane, submission.value);
+        }
+        Ok(())
+    }
+
+    /// The command buffer uses something that needs no barriers within a queue.
+    pub(super) fn refer(&mut self, id: ResourceId, access: Access) {
+        if self.shared.gpu.queues.several_lanes() {
+            self.recording.references.push((id, access));
+        }
+    }
+
+    /// What stands for bottom-level structures that are built now: all of them, or the new ones, which nothing shows.
+    pub(super) fn built_group(&self) -> ResourceId {
+        if self.first_builds { self.shared.new_blas[self.recording.lane] } else { self.shared.all_blas }
+    }
+}
+
+/// Fails for the transfer queue.
+pub(crate) fn needs_compute(queue: Queue, command: &'static str) -> Result<()> {
+    match queue {
+        Queue::Graphics | Queue::Compute => Ok(()),
+        Queue::Transfer => {
+            Err(Error::WrongQueue { command, queue, remedy: "Queue::Compute or Queue::Graphics" })
+        }
+    }
+}
+
+/// Copies leave things readable everywhere: by what the queue can name, and on others by a semaphore.
+pub(super) fn on_lane(lane: usize, read: Use) -> Use {
+    if lane == 0 {
+        return read;
+    }
+    let own = read.limited_to(stages_of(Queue::ALL[lane]));
+    // A queue that runs no shaders reads in its own way.
+    if own.stages.is_empty() { Use::transfer_read().with_layout(read.layout) } else { own }
+}
+
+/// Whether a copy may have this offset and extent of a mip's side, where a granularity counts blocks of so many texels.
+fn fits(granularity: u32, block: u32, (offset, extent, side): (u32, u32, u32)) -> bool {
+    if granularity == 0 {
+        return offset == 0 && extent == side;
+    }
+    let step = granularity * block;
+    offset.is_multiple_of(step) && (extent.is_multiple_of(step) || offset + extent == side)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regions_of_copies_stand_on_the_granularity_or_reach_the_edge() {
+        assert!(fits(1, 1, (3, 5, 9)));
+        assert!(fits(8, 1, (8, 16, 30)) && fits(8, 1, (24, 6, 30)));
+        assert!(!fits(8, 1, (4, 8, 30)) && !fits(8, 1, (8, 6, 30)));
+        assert!(fits(2, 4, (8, 8, 20)) && fits(2, 4, (16, 4, 20)) && !fits(2, 4, (4, 8, 20)));
+        assert!(fits(0, 1, (0, 30, 30)) && !fits(0, 1, (0, 29, 30)) && !fits(0, 1, (1, 29, 30)));
+    }
+}

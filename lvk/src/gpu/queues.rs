@@ -1,0 +1,263 @@
+//! The three queues of the library, and which queues of the device stand behind them.
+
+use ash::vk;
+
+use crate::lock::{Guard, Mutex, Rank};
+
+/// Where command buffers run. All three exist on every device and refuse the same commands everywhere; those without
+/// hardware of their own share that of [`Graphics`](Self::Graphics).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
+pub enum Queue {
+    /// Takes every command, and shows pictures in windows. Uploads run here.
+    #[default]
+    Graphics,
+    /// Takes dispatches, traces, builds of acceleration structures, clears of colours, and copies: beside what is drawn.
+    Compute,
+    /// Takes copies, fills and updates of buffers, beside everything else.
+    Transfer,
+}
+
+impl Queue {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Graphics, Self::Compute, Self::Transfer];
+
+    /// Its place in [`ALL`](Self::ALL).
+    pub(crate) fn index(self) -> usize {
+        self as usize
+    }
+
+    /// As messages say it.
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            Self::Graphics => "graphics",
+            Self::Compute => "compute",
+            Self::Transfer => "transfer",
+        }
+    }
+}
+
+/// Whether queues are kept apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum QueueRequest {
+    /// Where the device has queues for them.
+    #[default]
+    OwnHardware,
+    /// Never: all run one after the other on one queue of the device.
+    Shared,
+    /// Always: those that share a queue of the device wait for each other, and move what they own, as if each had its own.
+    /// It shows on any device, and to its validation layer, what several queues do; it makes nothing faster.
+    Rehearsed,
+}
+
+/// What stands behind a [`Queue`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct QueueInfo {
+    /// Whether the device has a queue for it alone.
+    pub own_hardware: bool,
+    /// The family of the device's queue.
+    pub family: u32,
+    /// Bits of a timestamp that count (`timestampValidBits`); 0 where the queue has none.
+    pub timestamp_bits: u32,
+    /// Offsets and extents of copies from and to textures are multiples of this, in texels or blocks, or reach the edge;
+    /// zeros where only whole mips can be copied (`minImageTransferGranularity`).
+    pub copy_granularity: [u32; 3],
+}
+
+/// A family of queues, as the device tells of it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct QueueFamily {
+    pub(crate) flags: vk::QueueFlags,
+    pub(crate) count: u32,
+    pub(crate) timestamp_bits: u32,
+    pub(crate) copy_granularity: [u32; 3],
+}
+
+/// A queue of the device.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct QueuePlace {
+    pub(crate) family: u32,
+    pub(crate) index: u32,
+}
+
+/// The families of a device, in their order.
+pub(crate) fn queue_families(instance: &ash::Instance, raw: vk::PhysicalDevice) -> Vec<QueueFamily> {
+    // SAFETY: `raw` was enumerated from `instance`.
+    let families = unsafe { instance.get_physical_device_queue_family_properties(raw) };
+    let family = |found: &vk::QueueFamilyProperties| {
+        let vk::Extent3D { width, height, depth } = found.min_image_transfer_granularity;
+        QueueFamily {
+            flags: found.queue_flags,
+            count: found.queue_count,
+            timestamp_bits: found.timestamp_valid_bits,
+            copy_granularity: [width, height, depth],
+        }
+    };
+    families.iter().map(family).collect()
+}
+
+/// A queue of the device for each of the library's, where `graphics` is the family for everything. Families that can do
+/// least else come first; then further queues of the families in use; then the graphics queue itself.
+pub(crate) fn place_queues(families: &[QueueFamily], graphics: u32) -> [QueuePlace; 3] {
+    use vk::QueueFlags as Flags;
+    let first = QueuePlace { family: graphics, index: 0 };
+    let find = |fits: &dyn Fn(Flags) -> bool| {
+        let found = families.iter().position(|family| family.count > 0 && fits(family.flags));
+        found.map(|family| QueuePlace { family: family as u32, index: 0 })
+    };
+    let spare = |family: u32, index: u32| {
+        let count = families.get(family as usize).map_or(0, |family| family.count);
+        (index < count).then_some(QueuePlace { family, index })
+    };
+    let compute = find(&|flags| flags.contains(Flags::COMPUTE) && !flags.contains(Flags::GRAPHICS));
+    let compute = compute.or_else(|| spare(graphics, 1)).unwrap_or(first);
+    let beside = Flags::TRANSFER | Flags::SPARSE_BINDING | Flags::PROTECTED;
+    let transfer = find(&|flags| flags.contains(Flags::TRANSFER) && beside.contains(flags));
+    let next = || if compute == first { None } else { spare(compute.family, compute.index + 1) };
+    [first, compute, transfer.or_else(next).unwrap_or(first)]
+}
+
+/// What is told of queues at these places.
+pub(crate) fn describe_queues(families: &[QueueFamily], places: &[QueuePlace; 3]) -> [QueueInfo; 3] {
+    let info = |queue: Queue| {
+        let place = places[queue.index()];
+        let family = families.get(place.family as usize);
+        QueueInfo {
+            own_hardware: queue == Queue::Graphics || place != places[0],
+            family: place.family,
+            timestamp_bits: family.map_or(0, |family| family.timestamp_bits),
+            copy_granularity: family.map_or([1; 3], |family| family.copy_granularity),
+        }
+    };
+    Queue::ALL.map(info)
+}
+
+/// The queues of a device that are in use.
+///
+/// Command buffers that are kept in one order run in a *lane*: lane 0 is that of the graphics queue, and a queue that is kept
+/// apart has the lane of its own number.
+pub(crate) struct Queues {
+    raw: Vec<Mutex<vk::Queue>>,
+    /// Which of `raw` each lane submits to.
+    places: [usize; 3],
+    families: [u32; 3],
+    /// Whether a queue has a lane of its own.
+    apart: [bool; 3],
+    rehearsed: bool,
+    /// Each once.
+    distinct: Vec<u32>,
+}
+
+impl Queues {
+    /// By the device's queue of each, and its family. Those of one handle share it.
+    pub(crate) fn new(raw: [(vk::Queue, u32); 3], request: QueueRequest) -> Self {
+        let raw = if request == QueueRequest::Shared { [raw[0]; 3] } else { raw };
+        let mut queues: Vec<vk::Queue> = Vec::new();
+        let places = raw.map(|(queue, _)| {
+            queues.iter().position(|known| *known == queue).unwrap_or_else(|| {
+                queues.push(queue);
+                queues.len() - 1
+            })
+        });
+        let families = raw.map(|(_, family)| family);
+        let rehearsed = request == QueueRequest::Rehearsed;
+        let apart = [0, 1, 2].map(|lane: usize| lane > 0 && (rehearsed || places[lane] != places[0]));
+        let mut distinct = families.to_vec();
+        distinct.sort_unstable();
+        distinct.dedup();
+        let raw = queues.into_iter().map(|queue| Mutex::new(Rank::Queue, queue)).collect();
+        Self { raw, places, families, apart, rehearsed, distinct }
+    }
+
+    /// The lane of a queue.
+    pub(crate) fn lane(&self, queue: Queue) -> usize {
+        if self.apart[queue.index()] { queue.index() } else { 0 }
+    }
+
+    /// Whether there is more than one lane.
+    pub(crate) fn several_lanes(&self) -> bool {
+        self.apart.contains(&true)
+    }
+
+    /// The device's queue of a lane; Vulkan wants one thread at a time on it.
+    pub(crate) fn raw(&self, lane: usize) -> Guard<'_, vk::Queue> {
+        self.raw[self.places[lane]].lock()
+    }
+
+    /// The family of a lane.
+    pub(crate) fn family(&self, lane: usize) -> u32 {
+        self.families[lane]
+    }
+
+    /// All families in use, each once.
+    pub(crate) fn families(&self) -> &[u32] {
+        &self.distinct
+    }
+
+    /// Lanes of one domain own images together.
+    pub(crate) fn domain(&self, lane: usize) -> u32 {
+        if self.rehearsed { lane as u32 } else { self.families[lane] }
+    }
+
+    /// Whether images can belong to one lane and not to another.
+    pub(crate) fn has_domains(&self) -> bool {
+        (1..3).any(|lane| self.apart[lane] && self.domain(lane) != self.domain(0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ash::vk::Handle;
+
+    use super::*;
+
+    const ALL: vk::QueueFlags = vk::QueueFlags::from_raw(0b1111);
+    const COMPUTE: vk::QueueFlags = vk::QueueFlags::from_raw(0b1110);
+    const COPIES: vk::QueueFlags = vk::QueueFlags::from_raw(0b1100);
+    const DECODER: vk::QueueFlags = vk::QueueFlags::from_raw(0b10_1100);
+
+    fn place(list: &[(vk::QueueFlags, u32)], graphics: u32) -> [(u32, u32); 3] {
+        let family = |(flags, count): &(vk::QueueFlags, u32)| QueueFamily {
+            flags: *flags,
+            count: *count,
+            timestamp_bits: 64,
+            copy_granularity: [1; 3],
+        };
+        let families: Vec<_> = list.iter().map(family).collect();
+        place_queues(&families, graphics).map(|place| (place.family, place.index))
+    }
+
+    #[test]
+    fn families_that_can_do_least_else_come_first() {
+        let nvidia = [(ALL, 16), (COPIES, 2), (COMPUTE, 8), (DECODER, 1)];
+        assert_eq!(place(&nvidia, 0), [(0, 0), (2, 0), (1, 0)]);
+        let video_before = [(ALL, 16), (DECODER, 1), (COPIES, 2), (COMPUTE, 8)];
+        assert_eq!(place(&video_before, 0), [(0, 0), (3, 0), (2, 0)]);
+    }
+
+    #[test]
+    fn further_queues_of_a_family_are_taken_before_one_is_shared() {
+        assert_eq!(place(&[(ALL, 1)], 0), [(0, 0), (0, 0), (0, 0)]);
+        assert_eq!(place(&[(ALL, 2)], 0), [(0, 0), (0, 1), (0, 0)]);
+        assert_eq!(place(&[(ALL, 3)], 0), [(0, 0), (0, 1), (0, 2)]);
+        assert_eq!(place(&[(COMPUTE, 2), (ALL, 1)], 1), [(1, 0), (0, 0), (0, 1)]);
+        assert_eq!(place(&[(ALL, 1), (COMPUTE, 1)], 0), [(0, 0), (1, 0), (0, 0)]);
+        assert_eq!(place(&[(ALL, 1), (COPIES, 1)], 0), [(0, 0), (0, 0), (1, 0)]);
+    }
+
+    #[test]
+    fn queues_of_one_handle_share_a_lane_unless_several_are_rehearsed() {
+        let raw = |number: u64, family| (vk::Queue::from_raw(number), family);
+        let one = [raw(1, 0); 3];
+        let three = [raw(1, 0), raw(2, 4), raw(3, 2)];
+        let lanes = |raw, request| {
+            let queues = Queues::new(raw, request);
+            (Queue::ALL.map(|queue| queues.lane(queue)), queues.has_domains(), queues.families().to_vec())
+        };
+        assert_eq!(lanes(one, QueueRequest::OwnHardware), ([0; 3], false, vec![0]));
+        assert_eq!(lanes(one, QueueRequest::Rehearsed), ([0, 1, 2], true, vec![0]));
+        assert_eq!(lanes(three, QueueRequest::OwnHardware), ([0, 1, 2], true, vec![0, 2, 4]));
+        assert_eq!(lanes(three, QueueRequest::Shared), ([0; 3], false, vec![0]));
+        let one_family = [raw(1, 0), raw(2, 0), raw(1, 0)];
+        assert_eq!(lanes(one_family, QueueRequest::OwnHardware), ([0, 1, 0], false, vec![0]));
+    }
+}

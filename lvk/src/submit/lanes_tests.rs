@@ -1,0 +1,359 @@
+//! Lanes against the naive [`model`](super::lanes_model), over random programs on one to three queues of made-up families.
+
+use proptest::prelude::*;
+
+use super::lanes::{Lanes, Sent, Site};
+use super::lanes_model::{History, Sent as Logged, foreign_stages, weaker};
+use super::ownership::{Access, Clock, LANES};
+use super::queue::stages_of;
+use crate::barrier::model::{Cell, Command, Event, Op};
+use crate::barrier::{Barriers, Layout, ResourceId, Stages, Subresources, TextureShape, Tracker, Use};
+use crate::gpu::queues::Queue;
+
+const ONE: TextureShape = TextureShape { mips: 1, layers: 1 };
+/// Two buffers, one that is written side by side, and three textures. Of these the last two belong to one domain at a time.
+const TEXTURES: [(u64, TextureShape); 3] = [(3, ONE), (4, ONE), (5, TextureShape { mips: 2, layers: 2 })];
+const ACCUMULATED: u64 = 2;
+
+fn is_exclusive(id: ResourceId) -> bool {
+    id.0 >= 4
+}
+
+#[derive(Debug, Clone)]
+struct Program {
+    domains: [u32; LANES],
+    /// Lane and commands of each command buffer, in the order of submission.
+    buffers: Vec<(usize, Vec<Command>)>,
+}
+
+impl Program {
+    fn run(&self) -> History {
+        let site = |lane: usize| Site { domain: self.domains[lane], stages: stages_of(Queue::ALL[lane]) };
+        let sites = [site(0), site(1), site(2)];
+        let mut lanes = Lanes::new(sites, true);
+        let mut sent = Vec::new();
+        for (lane, commands) in &self.buffers {
+            let (tracker, mut recorded) = record(commands);
+            if *lane != 0 {
+                lanes.begin_several();
+            }
+            if !lanes.are_several() {
+                let barriers = lanes.submit_alone(&tracker);
+                recorded.insert(0, Event::Barriers(barriers));
+                sent.push(logged(0, lanes.signal(), Clock::default(), recorded));
+                continue;
+            }
+            let step = lanes.submit(&plain(*lane, &tracker), is_exclusive);
+            for departure in step.departures {
+                let releases = departure.parts;
+                let log = logged(departure.lane, departure.value, departure.waits, Vec::new());
+                sent.push(Logged { releases, ..log });
+            }
+            recorded.insert(0, Event::Barriers(step.barriers));
+            sent.push(Logged { acquires: step.arrivals, ..logged(*lane, step.value, step.waits, recorded) });
+        }
+        History { sites, sent }
+    }
+}
+
+fn plain(lane: usize, tracker: &Tracker) -> Sent<'_> {
+    Sent { lane, tracker, references: &[], after: Clock::default(), is_prelude: false }
+}
+
+fn logged(lane: usize, value: u64, waits: Clock, events: Vec<Event>) -> Logged {
+    Logged {
+        lane,
+        value,
+        waits: waits.values().collect(),
+        releases: Vec::new(),
+        acquires: Vec::new(),
+        events,
+    }
+}
+
+fn record(commands: &[Command]) -> (Tracker, Vec<Event>) {
+    let (mut tracker, mut log) = (Tracker::default(), Vec::new());
+    for command in commands {
+        let mut out = Barriers::default();
+        for op in command {
+            match op.texture {
+                Some((shape, range)) => tracker.use_texture(op.id, shape, range, op.touch, &mut out),
+                None if op.accumulated => tracker.accumulate_buffer(op.id, op.touch, &mut out),
+                None => tracker.use_buffer(op.id, op.touch, &mut out),
+            }
+        }
+        log.push(Event::Barriers(out));
+        log.push(Event::Command(command.clone()));
+    }
+    (tracker, log)
+}
+
+fn cells() -> Vec<Cell> {
+    let cell = |id, mip, layer| Cell { id: ResourceId(id), mip, layer };
+    let textures = TEXTURES.into_iter().flat_map(|(id, shape)| {
+        (0..shape.mips).flat_map(move |mip| (0..shape.layers).map(move |layer| cell(id, mip, layer)))
+    });
+    (0..3).map(|id| cell(id, 0, 0)).chain(textures).collect()
+}
+
+/// Stages of shaders on a lane.
+fn shaders(lane: usize) -> impl Strategy<Value = Stages> {
+    let of_lane = [
+        vec![Stages::COMPUTE, Stages::FRAGMENT, Stages::FRAGMENT | Stages::PRE_RASTER],
+        vec![Stages::COMPUTE, Stages::RAY_TRACING, Stages::COMPUTE | Stages::RAY_TRACING],
+        vec![Stages::TRANSFER],
+    ];
+    prop::sample::select(of_lane[lane].clone())
+}
+
+/// What commands of a lane do to a buffer or a texture.
+fn touch(lane: usize, texture: bool) -> BoxedStrategy<Use> {
+    let copies = prop_oneof![Just(Use::transfer_read()), Just(Use::transfer_write())];
+    let uses = match (lane, texture) {
+        (2, _) => copies.boxed(),
+        (0, true) => prop_oneof![
+            2 => copies,
+            3 => shaders(0).prop_map(Use::shader_read),
+            2 => shaders(0).prop_map(Use::shader_write),
+            1 => any::<bool>().prop_map(Use::color_target),
+        ]
+        .boxed(),
+        (lane, _) => prop_oneof![
+            2 => copies,
+            3 => shaders(lane).prop_map(Use::shader_read),
+            2 => shaders(lane).prop_map(Use::shader_write),
+        ]
+        .boxed(),
+    };
+    uses.prop_map(move |touch| if texture { touch } else { touch.with_layout(Layout::Undefined) }).boxed()
+}
+
+fn op(lane: usize, simple: bool) -> BoxedStrategy<Op> {
+    let buffer = (0..2_u64, touch(lane, false)).prop_map(|(id, touch)| Op {
+        id: ResourceId(id),
+        texture: None,
+        touch,
+        accumulated: false,
+    });
+    let texture = (0..if simple { 2 } else { 3_usize }, touch(lane, true), 0..2_u32, 0..2_u32, any::<bool>());
+    let texture = texture.prop_map(|(which, touch, mip, layer, whole)| {
+        let (id, shape) = TEXTURES[which];
+        let part = Subresources {
+            base_mip: mip.min(shape.mips - 1),
+            mip_count: 1,
+            base_layer: layer.min(shape.layers - 1),
+            layer_count: 1,
+        };
+        let part = if whole { shape.whole() } else { part };
+        Op { id: ResourceId(id), texture: Some((shape, part)), touch, accumulated: false }
+    });
+    if simple || lane == 2 {
+        return prop_oneof![buffer, texture].boxed();
+    }
+    let write = Use::shader_write(Stages::COMPUTE).with_layout(Layout::Undefined);
+    let accumulated = any::<bool>().prop_map(move |accumulated| Op {
+        id: ResourceId(ACCUMULATED),
+        texture: None,
+        touch: if accumulated { write } else { Use::accel_read(Stages::COMPUTE) },
+        accumulated,
+    });
+    prop_oneof![2 => buffer, 2 => texture, 1 => accumulated].boxed()
+}
+
+fn command_buffer(lane: usize, simple: bool) -> impl Strategy<Value = (usize, Vec<Command>)> {
+    // At most one thing to a resource.
+    let command = prop::collection::vec(op(lane, simple), 1..3).prop_map(|mut ops| {
+        ops.sort_by_key(|op| op.id);
+        ops.dedup_by_key(|op| op.id);
+        ops
+    });
+    prop::collection::vec(command, 1..4).prop_map(move |commands| (lane, commands))
+}
+
+/// Families: all alike, one beside two, three.
+fn domains() -> impl Strategy<Value = [u32; LANES]> {
+    prop::sample::select(vec![[0, 0, 0], [0, 1, 1], [0, 1, 0], [0, 0, 2], [0, 1, 2]])
+}
+
+fn program(simple: bool) -> impl Strategy<Value = Program> {
+    (domains(), 1..=LANES).prop_flat_map(move |(domains, lanes)| {
+        let buffer = (0..lanes).prop_flat_map(move |lane| command_buffer(lane, simple));
+        prop::collection::vec(buffer, 0..9).prop_map(move |buffers| Program { domains, buffers })
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// No hazard, no wrong layout, no use by another than the owner, no wait for what is still to come, and no stage that a
+    /// queue does not have.
+    #[test]
+    fn everything_between_queues_is_waited_for_and_moved(program in program(false)) {
+        let history = program.run();
+        prop_assert_eq!(history.violation(&cells(), &|cell| is_exclusive(cell.id)), None);
+        for sent in &history.sent {
+            prop_assert_eq!(foreign_stages(&history.sites, sent), Stages::empty());
+        }
+    }
+
+    /// No wait can be left out, and none can be for anything earlier on its queue: none repeats what another implies, and
+    /// nobody waits for the latest of a queue where an earlier submission is all that matters. Once several queues are kept
+    /// apart, that is: what a queue has done before is taken together.
+    #[test]
+    fn no_wait_is_longer_than_it_must_be(mut program in program(true)) {
+        program.buffers.insert(0, (1, Vec::new()));
+        let history = program.run();
+        for (words, weaker) in weaker(&history) {
+            let violation = weaker.violation(&cells(), &|cell| is_exclusive(cell.id));
+            prop_assert!(violation.is_some(), "{}", words);
+        }
+    }
+
+    /// As long as only the first queue is used, nothing waits and nothing moves.
+    #[test]
+    fn one_queue_waits_for_nothing(program in program(false)) {
+        let mut program = program;
+        program.buffers.retain(|(lane, _)| *lane == 0);
+        let history = program.run();
+        prop_assert!(history.sent.iter().all(|sent| sent.waits.is_empty() && sent.releases.is_empty()));
+        let values: Vec<_> = history.sent.iter().map(|sent| sent.value).collect();
+        prop_assert!(values.is_sorted());
+    }
+}
+
+fn buffer_op(id: u64, touch: Use) -> Command {
+    let touch = touch.with_layout(Layout::Undefined);
+    vec![Op { id: ResourceId(id), texture: None, touch, accumulated: false }]
+}
+
+fn texture_op(id: u64, touch: Use) -> Command {
+    let texture = Some((ONE, ONE.whole()));
+    vec![Op { id: ResourceId(id), texture, touch, accumulated: false }]
+}
+
+fn run(buffers: Vec<(usize, Command)>) -> History {
+    let buffers = buffers.into_iter().map(|(lane, command)| (lane, vec![command])).collect();
+    Program { domains: [0, 1, 2], buffers }.run()
+}
+
+/// The model must be able to fail, in each of its ways.
+#[test]
+fn the_model_finds_what_is_wrong() {
+    let write = Use::shader_write(Stages::COMPUTE);
+    let violation = |history: &History| history.violation(&cells(), &|cell| is_exclusive(cell.id));
+    let good = run(vec![(1, texture_op(4, write)), (0, texture_op(4, write)), (1, buffer_op(0, write))]);
+    assert_eq!(violation(&good), None);
+    let last = good.sent.len() - 2;
+    let mut bad = good.clone();
+    bad.sent[last].waits.clear();
+    assert!(violation(&bad).is_some(), "a wait is missing");
+    let mut bad = good.clone();
+    bad.sent[last].acquires.clear();
+    assert!(violation(&bad).unwrap().contains("owner"));
+    let mut bad = good.clone();
+    bad.sent[last - 1].releases[0].layout = Layout::ShaderRead;
+    assert!(violation(&bad).unwrap().contains("moves"));
+    let mut bad = good.clone();
+    bad.sent[last].waits[0].1 += 30;
+    assert!(violation(&bad).unwrap().contains("waits for"));
+    let mut bad = good;
+    bad.sent[last].waits[0].0 = 0;
+    assert!(violation(&bad).is_some(), "a lane waits for itself");
+}
+
+#[test]
+fn compute_waits_for_what_it_reads_and_not_for_the_latest_of_graphics() {
+    let (write, read) = (Use::shader_write(Stages::FRAGMENT), Use::shader_read(Stages::COMPUTE));
+    let history = run(vec![
+        (1, Vec::new()),
+        (0, buffer_op(0, write)),
+        (0, buffer_op(1, write)),
+        (1, buffer_op(0, read)),
+        (1, buffer_op(7, read)),
+    ]);
+    let [_, wanted, latest, reader, other] = &history.sent[..] else { panic!("five submissions") };
+    assert_eq!(reader.waits, [(0, wanted.value)]);
+    assert!(latest.value > wanted.value && other.waits.is_empty());
+}
+
+#[test]
+fn what_is_only_read_is_read_side_by_side() {
+    let (write, read) = (Use::transfer_write(), Use::transfer_read());
+    let readers = |lane| (lane, buffer_op(0, read));
+    let mut order = vec![(2, Vec::new()), (0, buffer_op(0, write)), readers(1), readers(2), readers(0)];
+    order.extend([readers(1), readers(2), (1, buffer_op(0, write))]);
+    let history = run(order);
+    let values: Vec<_> = history.sent.iter().map(|sent| sent.value).collect();
+    let waits: Vec<_> = history.sent.iter().map(|sent| sent.waits.clone()).collect();
+    let first = (0, values[1]);
+    assert_eq!(waits[2..4], [[first], [first]]);
+    assert!(waits[4..7].iter().all(Vec::is_empty));
+    assert_eq!(waits[7], [(0, values[4]), (2, values[6])]);
+}
+
+#[test]
+fn images_of_one_domain_move_once_and_keep_their_layout() {
+    let store = Use::shader_write(Stages::COMPUTE);
+    let sample = Use::shader_read(Stages::FRAGMENT);
+    let history =
+        run(vec![(1, texture_op(4, store)), (0, texture_op(4, sample)), (0, texture_op(4, sample))]);
+    let [writer, release, reader, again] = &history.sent[..] else { panic!("four submissions") };
+    assert_eq!((release.lane, release.releases.len()), (1, 1));
+    assert_eq!(release.releases, reader.acquires);
+    assert_eq!(release.releases[0].layout, Layout::General);
+    assert_eq!(reader.waits, [(1, release.value)]);
+    assert!(writer.value < release.value && again.acquires.is_empty() && again.waits.is_empty());
+    let shared = run(vec![(1, texture_op(3, store)), (0, texture_op(3, sample))]);
+    assert_eq!(shared.sent.len(), 2);
+}
+
+#[test]
+fn what_everybody_relies_on_is_waited_for_where_shaders_run() {
+    let site = |lane: usize| Site { domain: 0, stages: stages_of(Queue::ALL[lane]) };
+    let mut lanes = Lanes::new([site(0), site(1), site(2)], true);
+    lanes.begin_several();
+    let nothing = Tracker::default();
+    let prelude = lanes.submit(&Sent { is_prelude: true, ..plain(0, &nothing) }, |_| false).value;
+    let latest = lanes.submit(&plain(0, &nothing), |_| false).value;
+    let waits = |lanes: &mut Lanes, lane| lanes.submit(&plain(lane, &nothing), |_| false).waits;
+    assert_eq!(waits(&mut lanes, 1).values().collect::<Vec<_>>(), [(0, prelude)]);
+    assert_eq!(waits(&mut lanes, 1).values().count(), 0);
+    assert_eq!(waits(&mut lanes, 2).values().count(), 0);
+    let mut after = Clock::default();
+    after.raise(0, latest);
+    let told = lanes.submit(&Sent { after, ..plain(1, &nothing) }, |_| false);
+    assert_eq!(told.waits.values().collect::<Vec<_>>(), [(0, latest)]);
+}
+
+#[test]
+fn references_are_waited_for_without_barriers() {
+    let site = |lane: usize| Site { domain: 0, stages: stages_of(Queue::ALL[lane]) };
+    let mut lanes = Lanes::new([site(0), site(1), site(2)], true);
+    lanes.begin_several();
+    let id = ResourceId(9);
+    let (built, _) = record(&[buffer_op(9, Use::accel_build_write())]);
+    let built = lanes.submit(&plain(1, &built), |_| false).value;
+    let nothing = Tracker::default();
+    let sent = Sent { references: &[(id, Access::Read)], ..plain(0, &nothing) };
+    let step = lanes.submit(&sent, |_| false);
+    assert_eq!(step.waits.values().collect::<Vec<_>>(), [(1, built)]);
+    assert!(step.barriers.is_empty());
+    assert_eq!(lanes.submit(&sent, |_| false).waits.values().count(), 0);
+}
+
+#[test]
+fn garbage_waits_for_every_queue_that_is_busy() {
+    let site = |lane: usize| Site { domain: 0, stages: stages_of(Queue::ALL[lane]) };
+    let mut lanes = Lanes::new([site(0), site(1), site(2)], true);
+    lanes.begin_several();
+    let [a, b, c] = [0, 1, 0].map(|lane| lanes.next_value(lane));
+    assert!(a < b && b < c);
+    assert_eq!([a, b, c].map(|value| Lanes::lane_of(value, true)), [0, 1, 0]);
+    assert_eq!(lanes.passed(&[a, 0, 0]), 0);
+    assert_eq!(lanes.passed(&[c, 0, 0]), 0);
+    assert_eq!(lanes.passed(&[a, b, 0]), a);
+    assert_eq!(lanes.passed(&[c, b, 0]), c);
+    let mut one = Lanes::new([site(0), site(1), site(2)], false);
+    assert_eq!([one.next_value(0), one.next_value(0)], [1, 2]);
+    assert_eq!((one.passed(&[1, 0, 0]), Lanes::lane_of(2, false)), (1, 0));
+}
