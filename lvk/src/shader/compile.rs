@@ -25,6 +25,9 @@ pub(crate) struct CompileOptions {
     /// The device is a CPU.
     #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
     pub(crate) is_cpu: bool,
+    /// It gathers 64 bits for each lane as fast as 32.
+    #[cfg_attr(not(feature = "glsl"), expect(dead_code, reason = "only the GLSL preamble asks"))]
+    pub(crate) gathers_pairs: bool,
 }
 
 impl CompileOptions {
@@ -36,6 +39,7 @@ impl CompileOptions {
             software_ray_query: device.ray_query_path == RayQueryPath::Software,
             helpers_lose_arrays: device.helpers_lose_arrays,
             is_cpu: device.is_cpu,
+            gathers_pairs: device.is_cpu && device.shader_int64,
         }
     }
 }

@@ -82,6 +82,9 @@ pub(super) fn preamble(stage: ShaderStage, options: &CompileOptions, defines: &[
     if options.is_cpu {
         define(&mut text, "LVK_DEVICE_IS_CPU", "1");
     }
+    if options.gathers_pairs {
+        define(&mut text, "LVK_GATHERS_PAIRS", "1");
+    }
     if options.helpers_lose_arrays {
         define(&mut text, "LVK_HELPERS_LOSE_ARRAYS", "1");
     }

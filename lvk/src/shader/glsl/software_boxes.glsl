@@ -48,10 +48,10 @@ vec2 lvkSoftCross(LvkSoftSlabs ray, vec3 low, vec3 high, vec2 range) {
 // block where nodes begin.
 uvec2 lvkSoftMeet2(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint nodes, uint node, vec2 range) {
     uint first = nodes + node * LVK_SOFT_BINARY_NODE_BLOCKS;
-    uvec4 a = blocks.at[first];
-    uvec4 b = blocks.at[first + 1u];
-    uvec4 c = blocks.at[first + 2u];
-    uvec4 d = blocks.at[first + 3u];
+    uvec4 a = lvkSoftBlock(blocks, first);
+    uvec4 b = lvkSoftBlock(blocks, first + 1u);
+    uvec4 c = lvkSoftBlock(blocks, first + 2u);
+    uvec4 d = lvkSoftBlock(blocks, first + 3u);
     vec2 one = lvkSoftCross(ray, uintBitsToFloat(a.xyz), uintBitsToFloat(b.xyz), range);
     vec2 two = lvkSoftCross(ray, uintBitsToFloat(c.xyz), uintBitsToFloat(d.xyz), range);
     uint left = one.x <= one.y ? a.w : LVK_SOFT_NONE;
@@ -77,11 +77,11 @@ uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, v
 // each from bit 24 on; and its leaves as a group of primitives, first one and a bit for each.
 uvec4 lvkSoftMeet8(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint nodes, uint node, vec2 range) {
     uint first = nodes + node * LVK_SOFT_WIDE_NODE_BLOCKS;
-    uvec4 head = blocks.at[first];
-    uvec4 children = blocks.at[first + 1u];
-    uvec4 x = blocks.at[first + 2u];
-    uvec4 y = blocks.at[first + 3u];
-    uvec4 z = blocks.at[first + 4u];
+    uvec4 head = lvkSoftBlock(blocks, first);
+    uvec4 children = lvkSoftBlock(blocks, first + 1u);
+    uvec4 x = lvkSoftBlock(blocks, first + 2u);
+    uvec4 y = lvkSoftBlock(blocks, first + 3u);
+    uvec4 z = lvkSoftBlock(blocks, first + 4u);
     vec3 scale = uintBitsToFloat((head.www >> uvec3(0u, 8u, 16u) & 255u) << 23) * ray.inverse;
     vec3 start = (uintBitsToFloat(head.xyz) - ray.origin) * ray.inverse;
     vec3 error = (abs(start) + 256.0 * abs(scale)) * 1e-6;

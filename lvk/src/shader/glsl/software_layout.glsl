@@ -4,6 +4,9 @@
 // How structures lie in memory; the same numbers as in lvk/src/accel/software/layout.rs. Everything is read in blocks of
 // 16 bytes by address, and a structure says by numbers of blocks from its own start where its parts lie.
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer LvkSoftBlocks { uvec4 at[]; };
+#ifdef LVK_GATHERS_PAIRS
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer LvkSoftPairs { u64vec2 at[]; };
+#endif
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LvkSoftVertices { vec3 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LvkSoftTriples { uvec3 at[]; };
 
@@ -48,8 +51,19 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lvk
 #define LVK_SOFT_REST_BITS 11
 #define LVK_SOFT_NAME 0x001FFFFFu
 
-// Paths have at most 64 binary nodes in either level, or 32 wide ones, and an instance may leave others of its leaf.
-#define LVK_SOFT_STACK_WORDS 130u
+// Paths have at most 64 binary nodes in either level, or 32 wide ones, each of which leaves one entry, and an instance may
+// leave others of its leaf.
+#define LVK_SOFT_STACK_ENTRIES 130u
+
+// A block of a node or leaf.
+uvec4 lvkSoftBlock(LvkSoftBlocks blocks, uint at) {
+#ifdef LVK_GATHERS_PAIRS
+    u64vec2 pairs = LvkSoftPairs(uvec2(blocks)).at[at];
+    return uvec4(unpackUint2x32(pairs.x), unpackUint2x32(pairs.y));
+#else
+    return blocks.at[at];
+#endif
+}
 
 // The address `blocks` blocks behind another one.
 uvec2 lvkSoftBehind(uvec2 base, uint blocks) {

@@ -5,7 +5,7 @@
 #include <lvk/software_walk.glsl>
 #include <lvk/tlas_table.glsl>
 
-// A query: its state, and the words of its stack while it waits with a candidate, if there are such.
+// A query: its state, and the entries of its stack while it waits with a candidate, if there are such.
 #ifdef LVK_OPAQUE_TRIANGLES_ONLY
 struct LvkRayQuery {
     LvkSoftState state;
@@ -13,7 +13,7 @@ struct LvkRayQuery {
 #else
 struct LvkRayQuery {
     LvkSoftState state;
-    uint stack[LVK_SOFT_STACK_WORDS];
+    uvec2 stack[LVK_SOFT_STACK_ENTRIES];
 };
 #endif
 
@@ -33,17 +33,17 @@ void lvkSoftInitialize(out LvkSoftState state, uint tlas, uint flags, uint mask,
 }
 
 // Keeps the stack while the shader judges a candidate.
-bool lvkSoftSave(LvkSoftState state, inout uint stack[LVK_SOFT_STACK_WORDS]) {
-    for (uint word = 0u; word < state.place.top; ++word) {
-        stack[word] = lvkSoftStack[word];
+bool lvkSoftSave(LvkSoftState state, inout uvec2 stack[LVK_SOFT_STACK_ENTRIES]) {
+    for (uint entry = 0u; entry < state.place.top; ++entry) {
+        stack[entry] = lvkSoftStack[entry];
     }
     return true;
 }
 
 // Takes the stack back that another query has used meanwhile.
-bool lvkSoftRestore(LvkSoftState state, uint stack[LVK_SOFT_STACK_WORDS]) {
-    for (uint word = 0u; word < state.place.top; ++word) {
-        lvkSoftStack[word] = stack[word];
+bool lvkSoftRestore(LvkSoftState state, uvec2 stack[LVK_SOFT_STACK_ENTRIES]) {
+    for (uint entry = 0u; entry < state.place.top; ++entry) {
+        lvkSoftStack[entry] = stack[entry];
     }
     return true;
 }

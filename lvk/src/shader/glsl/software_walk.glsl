@@ -22,7 +22,7 @@ struct LvkSoftHit {
     bool opaque;
 };
 
-// What is left to visit. Words behind `top` are of others; those below `floor` are references of the top level.
+// What is left to visit. Entries behind `top` are of others; those below `floor` are references of the top level.
 struct LvkSoftPlace {
     uint next;     // reference of the top level to go to before those on the stack, or LVK_SOFT_NONE
     uint instance; // the one whose structure is walked, or LVK_SOFT_NONE
@@ -92,17 +92,18 @@ const bool kLvkSoftStepByStep = false;
 
 #define LVK_SOFT_CULL_FACES (LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES | LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES)
 
-// The stack of the query that is walking. Queries take turns: one that waits with a candidate keeps its words itself.
-uint lvkSoftStack[LVK_SOFT_STACK_WORDS];
+// The stack of the query that is walking. Queries take turns: one that waits with a candidate keeps its entries itself.
+// They are groups of nodes, written as one, or references with nothing beside them.
+uvec2 lvkSoftStack[LVK_SOFT_STACK_ENTRIES];
 uint lvkSoftOwner = 0u;
 uint lvkSoftQueries = 0u;
 
-void lvkSoftPush(inout LvkSoftPlace place, uint word) {
-    lvkSoftStack[place.top] = word;
+void lvkSoftPush(inout LvkSoftPlace place, uvec2 entry) {
+    lvkSoftStack[place.top] = entry;
     place.top += 1u;
 }
 
-uint lvkSoftPop(inout LvkSoftPlace place) {
+uvec2 lvkSoftPop(inout LvkSoftPlace place) {
     place.top -= 1u;
     return lvkSoftStack[place.top];
 }
@@ -192,8 +193,7 @@ void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
         uint node = place.group.x + before;
         place.group.y ^= 1u << bit;
         if (place.group.y >= LVK_SOFT_ANY_NODE) {
-            lvkSoftPush(place, place.group.x);
-            lvkSoftPush(place, place.group.y);
+            lvkSoftPush(place, place.group);
         }
         uvec4 met = lvkSoftMeet8(level.slabs, LvkSoftBlocks(level.structure), level.nodes, node, range);
         place.group = met.xy;
@@ -203,7 +203,7 @@ void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
             lvkSoftMeet2(level.slabs, LvkSoftBlocks(level.structure), level.nodes, place.group.x, range);
         place.group = uvec2(0u);
         if (met.y != LVK_SOFT_NONE) {
-            lvkSoftPush(place, met.y);
+            lvkSoftPush(place, uvec2(met.y, 0u));
         }
         if (met.x != LVK_SOFT_NONE) {
             lvkSoftGo(place, met.x);
@@ -213,11 +213,11 @@ void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
 
 // Takes from the stack what was put aside last in this level.
 void lvkSoftResume(inout LvkSoftPlace place, LvkSoftLevel level) {
-    uint word = lvkSoftPop(place);
+    uvec2 entry = lvkSoftPop(place);
     if (level.wide) {
-        place.group = uvec2(lvkSoftPop(place), word);
+        place.group = entry;
     } else {
-        lvkSoftGo(place, word);
+        lvkSoftGo(place, entry.x);
     }
 }
 
@@ -262,9 +262,9 @@ void lvkSoftCorners(uvec2 structure, uint primitives, uint kind, uint primitive,
         words = uvec3(vertices.w, 0u, 0u);
     } else {
         uint first = primitives + primitive * LVK_SOFT_TRIANGLE_BLOCKS;
-        uvec4 a = blocks.at[first];
-        uvec4 b = blocks.at[first + 1u];
-        uvec4 c = blocks.at[first + 2u];
+        uvec4 a = lvkSoftBlock(blocks, first);
+        uvec4 b = lvkSoftBlock(blocks, first + 1u);
+        uvec4 c = lvkSoftBlock(blocks, first + 2u);
         corners[0] = uintBitsToFloat(a.xyz);
         corners[1] = uintBitsToFloat(b.xyz);
         corners[2] = uintBitsToFloat(c.xyz);
@@ -291,8 +291,8 @@ bool lvkSoftSaysOpaque(LvkSoftLevel level, LvkSoftHit hit) {
 // Whether the ray meets the box of a primitive.
 bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hit) {
     uint first = level.primitives + hit.primitive * LVK_SOFT_BOX_BLOCKS;
-    uvec4 low = LvkSoftBlocks(level.structure).at[first];
-    uvec4 high = LvkSoftBlocks(level.structure).at[first + 1u];
+    uvec4 low = lvkSoftBlock(LvkSoftBlocks(level.structure), first);
+    uvec4 high = lvkSoftBlock(LvkSoftBlocks(level.structure), first + 1u);
     hit.numbers = uvec2(high.w & 0x7FFFFFFFu, low.w);
     hit.opaque = (high.w & 0x80000000u) != 0u;
     vec2 range = lvkSoftCross(level.slabs, uintBitsToFloat(low.xyz), uintBitsToFloat(high.xyz),
@@ -354,7 +354,7 @@ bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLeve
 uint lvkSoftNextReference(inout LvkSoftPlace place) {
     uint next = place.next;
     place.next = LVK_SOFT_NONE;
-    return next != LVK_SOFT_NONE || place.top == 0u ? next : lvkSoftPop(place);
+    return next != LVK_SOFT_NONE || place.top == 0u ? next : lvkSoftPop(place).x;
 }
 
 // The next leaf of the top level that the ray meets, from a node on; LVK_SOFT_NONE where none is left.
@@ -365,7 +365,7 @@ uint lvkSoftDescend(LvkSoftState state, inout LvkSoftPlace place, uint reference
     while ((reference & LVK_SOFT_LEAF) == 0u) {
         uvec2 met = lvkSoftMeet2(slabs, tlas, nodes, reference, vec2(state.tMin, state.committed.t));
         if (met.y != LVK_SOFT_NONE) {
-            lvkSoftPush(place, met.y);
+            lvkSoftPush(place, uvec2(met.y, 0u));
         }
         reference = met.x != LVK_SOFT_NONE ? met.x : lvkSoftNextReference(place);
     }
@@ -382,7 +382,7 @@ uint lvkSoftNextInstance(LvkSoftState state, inout LvkSoftPlace place) {
         return reference;
     }
     if ((reference & LVK_SOFT_LEAF_COUNT) != 0u) {
-        lvkSoftPush(place, reference + 1u - LVK_SOFT_LEAF_ONE); // the leaf without its first instance
+        lvkSoftPush(place, uvec2(reference + 1u - LVK_SOFT_LEAF_ONE, 0u)); // the leaf without its first instance
     }
     return reference & LVK_SOFT_LEAF_FIRST;
 }
