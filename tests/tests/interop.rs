@@ -7,14 +7,17 @@ use std::sync::Mutex;
 
 use lvk::ash::{self, vk};
 use lvk::{
-    BufferUsage, Context, ContextDesc, Dependencies, Error, FeatureSet, Format, ImportedBuffer,
-    ImportedTexture, OptionalFeature, RawContext, RawSignal, RawWait, TextureDesc, TextureUsage,
+    BufferUsage, ColorAttachment, Context, ContextDesc, Dependencies, Error, FeatureSet, Format,
+    ImportedBuffer, ImportedTexture, OptionalFeature, RawContext, RawSignal, RawWait, RenderPassDesc,
+    RenderPipelineDesc, ShaderStage, TextureDesc, TextureUsage,
 };
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::device::vulkan;
+use lvk_tests::raster::{pixels, run_pass, staged_pipeline};
 
 const SIDE: u32 = 4;
 const BYTES: u64 = (SIDE * SIDE * 4) as u64;
+const LOCAL_READ: [&CStr; 1] = [ash::khr::dynamic_rendering_local_read::NAME];
 const ALL: vk::PipelineStageFlags2 = vk::PipelineStageFlags2::ALL_COMMANDS;
 
 /// What the layer said in this process.
@@ -43,6 +46,8 @@ struct Engine {
     device: ash::Device,
     queue: vk::Queue,
     pool: vk::CommandPool,
+    /// Its device has the extension and the feature on.
+    local_read: bool,
 }
 
 impl Engine {
@@ -90,14 +95,24 @@ impl Engine {
                 .push_next(&mut v12)
                 .push_next(&mut v13);
             instance.get_physical_device_features2(physical, &mut all);
+            let there = instance.enumerate_device_extension_properties(physical).unwrap();
+            let local_read = there.iter().any(|known| known.extension_name_as_c_str() == Ok(LOCAL_READ[0]));
+            let extensions = if local_read { &LOCAL_READ[..] } else { &[] };
+            let extensions: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
+            let mut reads = vk::PhysicalDeviceDynamicRenderingLocalReadFeaturesKHR::default()
+                .dynamic_rendering_local_read(true);
             let queue = vk::DeviceQueueCreateInfo::default().queue_family_index(0).queue_priorities(&[1.0]);
-            let info = vk::DeviceCreateInfo::default()
+            let mut info = vk::DeviceCreateInfo::default()
                 .queue_create_infos(std::slice::from_ref(&queue))
+                .enabled_extension_names(&extensions)
                 .push_next(&mut all);
+            if local_read {
+                info = info.push_next(&mut reads);
+            }
             let device = instance.create_device(physical, &info, None).unwrap();
             let queue = device.get_device_queue(0, 0);
             let pool = device.create_command_pool(&vk::CommandPoolCreateInfo::default(), None).unwrap();
-            Some(Self { entry, instance, messenger, physical, device, queue, pool })
+            Some(Self { entry, instance, messenger, physical, device, queue, pool, local_read })
         }
     }
 
@@ -418,6 +433,54 @@ fn exchange() {
     }
 }
 
+/// What the engine's device has on is used where it is said, and refused where it is not.
+fn local_reads() {
+    let Some(engine) = Engine::new() else { return };
+    let usage = TextureUsage::TARGET | TextureUsage::INPUT;
+    let read = TextureDesc { format: Format::Rgba32Float, extent: [SIDE, SIDE], usage, ..Default::default() };
+    let unsaid = engine.context();
+    assert!(
+        matches!(unsaid.create_texture(&read), Err(Error::Unsupported { .. })),
+        "nobody said that it is on"
+    );
+    drop(unsaid);
+    if !engine.local_read {
+        return eprintln!("NOT TESTED, the engine's device lacks dynamicRenderingLocalRead");
+    }
+    let features = engine.raw().features.with(OptionalFeature::LocalRead);
+    let raw = RawContext { features, device_extensions: &LOCAL_READ, ..engine.raw() };
+    // SAFETY: as of `Engine::context`, and the extension is on with its feature.
+    let ctx = unsafe { Context::from_raw(raw, &ContextDesc::default()).unwrap() };
+    let usage = TextureUsage::TARGET | TextureUsage::SAMPLED;
+    let (read, drawn) = (ctx.create_texture(&read), ctx.create_texture(&TextureDesc { usage, ..read }));
+    let (read, drawn) = (read.unwrap(), drawn.unwrap());
+    let color = [Format::Rgba32Float.into(); 2];
+    let desc = RenderPipelineDesc { color: &color, ..Default::default() };
+    let [first, second] = [
+        "layout(location = 0) out vec4 result; void main() { result = vec4(gl_FragCoord.xy, 3, 4); }",
+        "LVK_INPUT(0, subpassInput, gRead); layout(location = 1) out vec4 result;
+         void main() { result = subpassLoad(gRead) * 2.0; }",
+    ]
+    .map(|fragment| {
+        let vertex = "void main() {
+            gl_Position = vec4(vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1) * 4.0 - 1.0, 0, 1); }";
+        let stages = [(ShaderStage::Vertex, vertex), (ShaderStage::Fragment, fragment)];
+        staged_pipeline(&ctx, &stages, &desc).unwrap()
+    });
+    let color = [*read, *drawn].map(|texture| ColorAttachment::clear(texture, [0.0; 4]));
+    run_pass(&ctx, &RenderPassDesc { color: &color, local_read: true, ..Default::default() }, |pass| {
+        for pipeline in [*first, *second] {
+            pass.bind_render_pipeline(pipeline)?;
+            pass.draw(0..3, 0..1)?;
+        }
+        Ok(())
+    });
+    for (at, pixel) in pixels::<[f32; 4]>(&ctx, *drawn).iter().enumerate() {
+        let (x, y) = (at as u32 % SIDE, at as u32 / SIDE);
+        assert_eq!(*pixel, [2.0 * x as f32 + 1.0, 2.0 * y as f32 + 1.0, 6.0, 8.0]);
+    }
+}
+
 fn refusals() {
     let Some(engine) = Engine::new() else { return };
     let refuse = |raw: RawContext<'_>, words: &str| {
@@ -476,5 +539,6 @@ fn refusals() {
 #[test]
 fn images_buffers_and_semaphores_go_both_ways_and_wrong_descriptions_are_refused() {
     exchange();
+    local_reads();
     refusals();
 }

@@ -90,8 +90,8 @@ pub enum TextureMemory {
     #[default]
     Device,
     /// Only inside of render passes, on devices that can (`VK_MEMORY_PROPERTY_LAZILY_ALLOCATED_BIT`); elsewhere in memory of
-    /// its own. Such a texture is a [`TextureUsage::TARGET`], perhaps an [`INPUT`](TextureUsage::INPUT) too, and nothing else: passes neither load nor store it, and it is
-    /// not copied, cleared by command or sampled.
+    /// its own. Such a texture is a [`TextureUsage::TARGET`], perhaps an [`INPUT`](TextureUsage::INPUT) too, and nothing else:
+    /// passes neither load nor store it, and it is not copied, cleared by command or sampled.
     Transient,
 }
 
