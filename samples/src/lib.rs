@@ -23,4 +23,5 @@ pub mod scene;
 pub mod shader_folder;
 pub mod shaders;
 mod shapes;
+pub mod triplanar;
 pub mod yuv;

@@ -6,7 +6,7 @@ use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
 use crate::{
     app, bench, deferred, hello_triangle, hybrid, hybrid_oit, large_scene, mesh_shaders, omni_shadows,
-    reflections, render_to_cube_map, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures, yuv,
+    reflections, render_to_cube_map, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures, triplanar, yuv,
 };
 
 /// A stage of a [`SamplePipeline`].
@@ -78,6 +78,7 @@ pub fn all() -> Vec<SamplePipeline> {
         rtx_pipeline::pipelines(),
         rtx_textures::pipelines(),
         yuv::pipelines(),
+        triplanar::pipelines(),
         bench::pipelines(),
         app::ui::pipelines(),
     ]

@@ -85,6 +85,8 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("hybrid_oit/sky.glsl", include_str!("../../shaders/hybrid_oit/sky.glsl")),
     ("hybrid_oit/sphere.glsl", include_str!("../../shaders/hybrid_oit/sphere.glsl")),
     ("yuv/push.glsl", include_str!("../../shaders/yuv/push.glsl")),
+    ("triplanar/frame.glsl", include_str!("../../shaders/triplanar/frame.glsl")),
+    ("triplanar/triplanar.glsl", include_str!("../../shaders/triplanar/triplanar.glsl")),
 ];
 
 /// Stages of the windows' user interface.
@@ -398,4 +400,12 @@ pub mod deferred {
     pub const LIGHT_FRAG: &str = include_str!("../../shaders/deferred/light.frag.glsl");
     /// From light to the picture.
     pub const RESOLVE_FRAG: &str = include_str!("../../shaders/deferred/resolve.frag.glsl");
+}
+
+/// Stages of the `triplanar` sample.
+pub mod triplanar {
+    /// Corners of the models.
+    pub const BODY_VERT: &str = include_str!("../../shaders/triplanar/body.vert.glsl");
+    /// Colour and light of what is nearest.
+    pub const BODY_FRAG: &str = include_str!("../../shaders/triplanar/body.frag.glsl");
 }

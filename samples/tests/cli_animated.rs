@@ -131,6 +131,13 @@ const PROGRAMS: &[Program] = &[
         said: &["a knot of 61600 triangles", "of 655 meshlets drawn", "meshlets  "],
         ways: &[&[], &["--no-culling"]],
     },
+    Program {
+        path: env!("CARGO_BIN_EXE_triplanar"),
+        quick: &[],
+        own: &["--unload"],
+        said: &["7 textures", "of them unloaded", "bodies  "],
+        ways: &[&[], &["--unload", "brick,leaves"]],
+    },
 ];
 
 const SHARED: [&str; 14] = [

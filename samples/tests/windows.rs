@@ -132,6 +132,11 @@ fn yuv_has_a_window() {
 }
 
 #[test]
+fn triplanar_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_triplanar"), &[]);
+}
+
+#[test]
 fn rtx_hello_has_a_window() {
     shows_what_it_writes(env!("CARGO_BIN_EXE_rtx_hello"), &[]);
 }

@@ -22,6 +22,7 @@ use lvk_samples::rtx_hello::RtxHello;
 use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig};
 use lvk_samples::rtx_textures::RtxTextures;
 use lvk_samples::scene::{Camera, Scene};
+use lvk_samples::triplanar::Triplanar;
 use lvk_samples::yuv::{CONVERSIONS, Yuv, YuvConfig};
 use lvk_tests::hybrid::paths;
 use lvk_tests::still_life::still_life;
@@ -139,6 +140,12 @@ fn mesh_shaders_goes_by_frames() {
 fn yuv_goes_by_frames() {
     let Some(ctx) = device_with(|desc| desc.yuv = &CONVERSIONS) else { return };
     check(|extent| Yuv::new(&ctx, &YuvConfig { film: [80, 48], ..YuvConfig::new(extent) }).unwrap());
+}
+
+#[test]
+fn triplanar_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    check(|size| Triplanar::new(&ctx, size).unwrap());
 }
 
 #[test]

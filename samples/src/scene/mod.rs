@@ -56,7 +56,7 @@ pub use error::SceneError;
 pub(crate) use gpu_camera::GpuCamera;
 pub use light::{Ambient, DirectionalLight, PointLight, display};
 pub use material::Material;
-pub(crate) use procedural::{Valley, painted_textures};
+pub(crate) use procedural::{PAINTED, Valley, painted_textures};
 
 pub use sky::Sky;
 pub use texture::Texture;

@@ -26,15 +26,7 @@ pub(super) const LEAVES: u32 = 18;
 
 /// The images, in the order that [`all`] refers to.
 pub(super) fn textures() -> Vec<Texture> {
-    vec![
-        paint::paving(),
-        paint::sandstone(),
-        paint::marble(),
-        paint::brick(),
-        paint::wood(),
-        paint::mosaic(),
-        paint::leaves(),
-    ]
+    paint::PAINTED.iter().map(|painted| (painted.paint)()).collect()
 }
 
 /// The materials, in the order of the constants.

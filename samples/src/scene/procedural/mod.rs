@@ -11,6 +11,7 @@ mod valley;
 
 use glam::Vec3;
 
+pub(crate) use self::paint::PAINTED;
 use self::solid::Solids;
 pub(super) use self::town::{carousel, town};
 pub(crate) use self::valley::Valley;

@@ -9,8 +9,26 @@ use crate::scene::noise::{lattice, tiled};
 /// Texels on an edge.
 const SIZE: u32 = 512;
 
+/// An image that is painted by code, and how.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Painted {
+    pub(crate) name: &'static str,
+    pub(crate) paint: fn() -> Texture,
+}
+
+/// All of them.
+pub(crate) const PAINTED: [Painted; 7] = [
+    Painted { name: "paving", paint: paving },
+    Painted { name: "sandstone", paint: sandstone },
+    Painted { name: "marble", paint: marble },
+    Painted { name: "brick", paint: brick },
+    Painted { name: "wood", paint: wood },
+    Painted { name: "mosaic", paint: mosaic },
+    Painted { name: "leaves", paint: leaves },
+];
+
 /// Large square slabs in two kinds of limestone, laid like a chess board.
-pub(super) fn paving() -> Texture {
+fn paving() -> Texture {
     painted("paving", |u, v| {
         let (x, y) = (u * 4.0, v * 4.0);
         let (column, row) = (x.floor(), y.floor());
@@ -27,7 +45,7 @@ pub(super) fn paving() -> Texture {
 }
 
 /// Bricks in running bond.
-pub(super) fn brick() -> Texture {
+fn brick() -> Texture {
     painted("brick", |u, v| {
         let y = v * 16.0;
         let row = y.floor();
@@ -43,7 +61,7 @@ pub(super) fn brick() -> Texture {
 }
 
 /// White marble with grey veins.
-pub(super) fn marble() -> Texture {
+fn marble() -> Texture {
     painted("marble", |u, v| {
         let bend = tiled(u * 4.0, v * 4.0, [4; 2], 5);
         let wide = vein(tiled(u * 3.0 + 0.9 * bend, v * 3.0 + 0.6 * bend, [3; 2], 4), 0.05);
@@ -54,7 +72,7 @@ pub(super) fn marble() -> Texture {
 }
 
 /// Sandstone in soft layers.
-pub(super) fn sandstone() -> Texture {
+fn sandstone() -> Texture {
     painted("sandstone", |u, v| {
         let warp = tiled(u * 3.0, v * 3.0, [3; 2], 4);
         let layers = tiled(u * 2.0, v * 24.0 + 2.0 * warp, [2, 24], 2);
@@ -66,7 +84,7 @@ pub(super) fn sandstone() -> Texture {
 }
 
 /// Planks whose grain runs along `u`.
-pub(super) fn wood() -> Texture {
+fn wood() -> Texture {
     painted("wood", |u, v| {
         let y = v * 6.0;
         let plank = y.floor();
@@ -80,7 +98,7 @@ pub(super) fn wood() -> Texture {
 }
 
 /// Small glazed tiles in blue and green.
-pub(super) fn mosaic() -> Texture {
+fn mosaic() -> Texture {
     painted("mosaic", |u, v| {
         let (x, y) = (u * 16.0, v * 16.0);
         let own = lattice(x as i32, y as i32, 21);
@@ -92,7 +110,7 @@ pub(super) fn mosaic() -> Texture {
 }
 
 /// Clipped leaves in many greens.
-pub(super) fn leaves() -> Texture {
+fn leaves() -> Texture {
     painted("leaves", |u, v| {
         let clumps = tiled(u * 12.0, v * 12.0, [12; 2], 3);
         let blades = tiled(u * 90.0, v * 45.0, [90, 45], 2);
@@ -138,7 +156,9 @@ mod tests {
 
     #[test]
     fn pictures_repeat_without_a_seam() {
-        for texture in [paving(), brick(), marble(), sandstone(), wood(), mosaic(), leaves()] {
+        for Painted { name, paint } in PAINTED {
+            let texture = paint();
+            assert_eq!(texture.name, name);
             assert_eq!(texture.pixels.len(), (SIZE * SIZE * 4) as usize);
             let texel = |x: u32, y: u32| &texture.pixels[4 * (y * SIZE + x) as usize..][..3];
             let step =

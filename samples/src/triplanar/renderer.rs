@@ -1,0 +1,233 @@
+//! The sample as a type: say the moment, get a picture.
+
+use std::f32::consts::TAU;
+
+use bytemuck::{Pod, Zeroable};
+use lvk::{
+    BufferDesc, BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, IndexFormat,
+    RenderPipelineDesc, RenderPipelineHandle, SamplerDesc, SamplerHandle, TextureHandle,
+};
+
+use super::bodies::Bodies;
+use super::pipelines::BODIES;
+use super::streamed::{COUNT, Presence, Streamed};
+use crate::app::array_buffer::array;
+use crate::app::frame::Frame;
+use crate::app::sample::{Moment, Sample};
+use crate::raster::{Canvas, RasterError};
+use crate::scene::{Camera, GpuCamera, PAINTED};
+
+/// Colour of what is far away, in linear light (`kBackdrop` in `shaders/triplanar/frame.glsl`).
+const BACKDROP: [f32; 3] = [0.78, 0.80, 0.82];
+const NEAR_PLANE: f32 = 0.05;
+/// Frames between two textures that go or come, where they do so by themselves.
+const FRAMES_PER_TURN: u32 = 30;
+
+/// Draws bodies by textures along three axes.
+pub struct Triplanar {
+    ctx: Context,
+    canvas: Canvas,
+    pipeline: Holder<RenderPipelineHandle>,
+    textures: Streamed,
+    bodies: Bodies,
+    triangles: Holder<BufferHandle>,
+    frame: Holder<BufferHandle>,
+    constants: FrameConstants,
+    camera: Camera,
+    /// Frames since textures come and go by themselves, if they do.
+    turns: Option<u32>,
+    _held: ([Holder<BufferHandle>; 2], Holder<SamplerHandle>),
+}
+
+/// `Frame` in `shaders/triplanar/frame.glsl`.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct FrameConstants {
+    camera: GpuCamera,
+    vertices: u64,
+    bodies: u64,
+    textures: [u32; COUNT],
+    sampler: u32,
+    body_count: u32,
+    phase: f32,
+    sharpness: f32,
+    by_angles: u32,
+}
+
+impl Triplanar {
+    /// Makes the bodies, all textures and the pipeline, for pictures of `extent` pixels. The animation stands at its beginning.
+    ///
+    /// # Errors
+    /// [`RasterError`] when the picture is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, extent: [u32; 2]) -> Result<Self, RasterError> {
+        let canvas = Canvas::with_depth(ctx, extent)?;
+        let mut textures = Streamed::new(ctx)?;
+        (0..COUNT).for_each(|number| textures.load(number));
+        let bodies = Bodies::new();
+        let vertices = array(ctx, "vertices", BufferUsage::STORAGE, &bodies.vertices)?;
+        let placed = array(ctx, "bodies", BufferUsage::STORAGE, &bodies.bodies)?;
+        let sampler = ctx.create_sampler(&SamplerDesc { max_anisotropy: 8.0, ..SamplerDesc::default() })?;
+        let frame = ctx.create_buffer(&BufferDesc {
+            size_bytes: size_of::<FrameConstants>() as u64,
+            debug_name: "frame constants",
+            ..BufferDesc::default()
+        })?;
+        let constants = FrameConstants {
+            vertices: ctx.buffer_address(*vertices)?,
+            bodies: ctx.buffer_address(*placed)?,
+            sampler: sampler.index(),
+            body_count: bodies.bodies.len() as u32,
+            sharpness: 6.0,
+            ..FrameConstants::zeroed()
+        };
+        textures.wait()?;
+        Ok(Self {
+            ctx: ctx.clone(),
+            canvas,
+            pipeline: pipeline(ctx)?,
+            textures,
+            triangles: array(ctx, "triangles", BufferUsage::INDEX, &bodies.triangles)?,
+            bodies,
+            frame,
+            constants,
+            camera: camera(0.0),
+            turns: None,
+            _held: ([vertices, placed], sampler),
+        })
+    }
+
+    /// Names of the textures, in the order of their numbers.
+    #[must_use]
+    pub fn texture_names() -> [&'static str; COUNT] {
+        PAINTED.map(|painted| painted.name)
+    }
+
+    /// Where the texture with this number is; there is none of a number that is too large.
+    #[must_use]
+    pub fn presence(&self, number: usize) -> Presence {
+        self.textures.presence(number)
+    }
+
+    /// Gives a texture up at once, whatever frames are on their way; from the next frame on the placeholder is shown.
+    pub fn unload(&mut self, number: usize) {
+        self.textures.unload(number);
+    }
+
+    /// Has a texture made again that is away; frames show the placeholder until it is there.
+    pub fn load(&mut self, number: usize) {
+        self.textures.load(number);
+    }
+
+    /// Waits for the textures that are coming.
+    ///
+    /// # Errors
+    /// What Vulkan answers.
+    pub fn wait_for_textures(&mut self) -> lvk::Result<()> {
+        self.textures.wait()
+    }
+
+    fn upload(&mut self) -> lvk::Result<()> {
+        let [width, height] = self.canvas.extent();
+        self.constants.camera = GpuCamera::new(&self.camera, width, height, NEAR_PLANE);
+        self.constants.textures = self.textures.indices();
+        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))
+    }
+
+    /// Lets one texture after the other go and come back.
+    fn take_turns(&mut self) {
+        let Some(frames) = &mut self.turns else { return };
+        *frames += 1;
+        if frames.is_multiple_of(FRAMES_PER_TURN) {
+            let turn = *frames / FRAMES_PER_TURN;
+            let number = turn as usize % COUNT;
+            self.textures.load((number + COUNT - 1) % COUNT);
+            self.textures.unload(number);
+        }
+    }
+
+    fn texture_switch(&mut self, ui: &mut egui::Ui, number: usize) {
+        let presence = self.textures.presence(number);
+        ui.horizontal(|ui| match presence {
+            Presence::There if ui.button("unload").clicked() => self.textures.unload(number),
+            Presence::Away if ui.button("load").clicked() => self.textures.load(number),
+            Presence::Coming => drop(ui.spinner()),
+            _ => {}
+        });
+    }
+}
+
+impl Sample for Triplanar {
+    type Error = RasterError;
+
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
+    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
+        self.constants.phase = moment.phase();
+        self.camera = camera(moment.phase());
+        Ok(())
+    }
+
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+        self.take_turns();
+        self.textures.take_in()?;
+        self.upload()?;
+        let nothing = Dependencies::default();
+        let mut pass = self.canvas.begin(&mut frame.cmd, "bodies", BACKDROP, &nothing)?;
+        pass.bind_render_pipeline(*self.pipeline)?;
+        pass.bind_index_buffer(*self.triangles, 0, IndexFormat::U32)?;
+        pass.push_constants(&self.ctx.buffer_address(*self.frame)?)?;
+        for (number, corners) in (0..).zip(&self.bodies.corners) {
+            pass.draw_indexed(corners.clone(), 0, number..number + 1)?;
+        }
+        Ok(self.canvas.picture())
+    }
+
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
+        self.canvas = Canvas::with_depth(&self.ctx, extent)?;
+        Ok(())
+    }
+
+    fn view(&self) -> Option<Camera> {
+        Some(self.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.camera = *camera;
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        egui::Grid::new("textures").show(ui, |ui| {
+            for (number, name) in Self::texture_names().into_iter().enumerate() {
+                ui.label(name);
+                self.texture_switch(ui, number);
+                ui.end_row();
+            }
+        });
+        let mut takes_turns = self.turns.is_some();
+        if ui.checkbox(&mut takes_turns, "one after the other, by themselves").changed() {
+            self.turns = takes_turns.then_some(0);
+        }
+        ui.add(egui::Slider::new(&mut self.constants.sharpness, 1.0..=32.0).text("sharpness"));
+        let mut by_angles = self.constants.by_angles == 1;
+        ui.checkbox(&mut by_angles, "by longitude and latitude");
+        self.constants.by_angles = by_angles.into();
+    }
+
+    fn reload(&mut self) -> Result<(), RasterError> {
+        self.pipeline = pipeline(&self.ctx)?;
+        Ok(())
+    }
+}
+
+fn pipeline(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
+    BODIES.create_with(ctx, &RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() })
+}
+
+/// Where the animation looks from.
+fn camera(phase: f32) -> Camera {
+    let around = 0.25 + 0.35 * (TAU * phase).sin();
+    let eye = [6.2 * around.sin(), 2.9, 6.2 * around.cos()];
+    Camera::looking_at(eye, [0.0, 0.75, 0.0], 40.0)
+}

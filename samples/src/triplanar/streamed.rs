@@ -1,0 +1,120 @@
+//! Textures that come and go, and what is shown in place of those that are not there.
+
+use lvk::{Context, Format, Holder, TextureDesc, TextureHandle};
+
+use super::loader::{Loader, Wish};
+use crate::scene::PAINTED;
+
+/// How many textures there are.
+pub(super) const COUNT: usize = PAINTED.len();
+
+/// Where a texture is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Presence {
+    /// It is shown.
+    There,
+    /// It is being made, and the placeholder shown.
+    Coming,
+    /// It is not, and the placeholder shown.
+    Away,
+}
+
+/// All textures, by their number.
+pub(super) struct Streamed {
+    loader: Loader,
+    placeholder: Holder<TextureHandle>,
+    slots: [Slot; COUNT],
+    tickets: u64,
+}
+
+enum Slot {
+    There(Holder<TextureHandle>),
+    /// With the ticket of the wish.
+    Coming(u64),
+    Away,
+}
+
+impl Streamed {
+    /// With no texture but the placeholder.
+    pub(super) fn new(ctx: &Context) -> lvk::Result<Self> {
+        let slots = [const { Slot::Away }; COUNT];
+        Ok(Self { loader: Loader::new(ctx)?, placeholder: placeholder(ctx)?, slots, tickets: 0 })
+    }
+
+    pub(super) fn presence(&self, number: usize) -> Presence {
+        match self.slots.get(number) {
+            Some(Slot::There(_)) => Presence::There,
+            Some(Slot::Coming(_)) => Presence::Coming,
+            Some(Slot::Away) | None => Presence::Away,
+        }
+    }
+
+    /// What shaders know each texture by at the moment.
+    pub(super) fn indices(&self) -> [u32; COUNT] {
+        std::array::from_fn(|number| match &self.slots[number] {
+            Slot::There(texture) => texture.index(),
+            Slot::Coming(_) | Slot::Away => self.placeholder.index(),
+        })
+    }
+
+    /// Gives a texture up at once. The frames on their way keep what they show: the library destroys it behind them, and
+    /// nobody gets its number before.
+    pub(super) fn unload(&mut self, number: usize) {
+        if let Some(slot) = self.slots.get_mut(number) {
+            *slot = Slot::Away;
+        }
+    }
+
+    /// Has a texture made that is away; some later frame shows it.
+    pub(super) fn load(&mut self, number: usize) {
+        if let Some(slot @ Slot::Away) = self.slots.get_mut(number) {
+            self.tickets += 1;
+            *slot = Slot::Coming(self.tickets);
+            self.loader.ask(Wish { number, ticket: self.tickets });
+        }
+    }
+
+    /// Takes in what has been made since the last time.
+    pub(super) fn take_in(&mut self) -> lvk::Result<()> {
+        while let Some((wish, texture)) = self.loader.poll() {
+            self.place(wish, texture)?;
+        }
+        Ok(())
+    }
+
+    /// Waits for everything that is coming.
+    pub(super) fn wait(&mut self) -> lvk::Result<()> {
+        while self.slots.iter().any(|slot| matches!(slot, Slot::Coming(_))) {
+            let Some((wish, texture)) = self.loader.wait() else { break };
+            self.place(wish, texture)?;
+        }
+        Ok(())
+    }
+
+    /// A texture that was given up meanwhile has another ticket, or none, and is dropped.
+    fn place(&mut self, wish: Wish, texture: lvk::Result<Holder<TextureHandle>>) -> lvk::Result<()> {
+        let slot = &mut self.slots[wish.number];
+        if matches!(slot, Slot::Coming(ticket) if *ticket == wish.ticket) {
+            *slot = Slot::Away;
+            *slot = Slot::There(texture?);
+        }
+        Ok(())
+    }
+}
+
+/// Squares in two greys.
+fn placeholder(ctx: &Context) -> lvk::Result<Holder<TextureHandle>> {
+    const SIDE: u32 = 64;
+    let is_dark = |texel: u32| (texel % SIDE / 8 + texel / SIDE / 8).is_multiple_of(2);
+    let texels = (0..SIDE * SIDE)
+        .flat_map(|texel| if is_dark(texel) { [70, 70, 78, 255] } else { [150, 150, 158, 255] });
+    ctx.create_texture(&TextureDesc {
+        format: Format::Rgba8Srgb,
+        extent: [SIDE; 2],
+        mips: 0,
+        data: Some(&texels.collect::<Vec<_>>()),
+        generate_mips: true,
+        debug_name: "placeholder",
+        ..TextureDesc::default()
+    })
+}

@@ -1,0 +1,170 @@
+//! The pictures of the `triplanar` sample: textures go and come while frames are on their way, what shows them changes and nothing
+//! else, and nothing is left behind.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use image::RgbaImage;
+use lvk::{Context, DeviceProfile};
+use lvk_samples::app::frame::Frame;
+use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::triplanar::{Presence, Triplanar};
+use lvk_tests::child::without_ray_tracing;
+use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
+use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, picture_of};
+use lvk_tests::{device, device_with};
+
+/// On SwiftShader: its filters have fewer bits, and are not anisotropic in the same way.
+const OTHER_DRIVER: Tolerance = Tolerance { psnr: 30.0, ssim: 0.95, differing_share: 0.9, flip: 0.06 };
+
+fn sample(ctx: &Context) -> Triplanar {
+    Triplanar::new(ctx, SIZE).unwrap()
+}
+
+fn number_of(name: &str) -> usize {
+    Triplanar::texture_names().iter().position(|known| *known == name).unwrap()
+}
+
+fn all() -> std::ops::Range<usize> {
+    0..Triplanar::texture_names().len()
+}
+
+/// Submits a frame that nobody waits for.
+fn send(sample: &mut Triplanar, frame: u32) {
+    sample.update(Moment::of_frame(frame, ROUND)).unwrap();
+    let mut frame = Frame::free(&sample.context().clone()).unwrap();
+    sample.record(&mut frame).unwrap();
+    frame.finish().unwrap();
+}
+
+/// The share of pixels in some columns that differ.
+fn differing(one: &RgbaImage, other: &RgbaImage, columns: std::ops::Range<u32>) -> f32 {
+    let pixels = columns.clone().flat_map(|x| (0..SIZE[1]).map(move |y| (x, y)));
+    let count = pixels.filter(|(x, y)| one.get_pixel(*x, *y) != other.get_pixel(*x, *y)).count();
+    count as f32 / (columns.len() as f32 * SIZE[1] as f32)
+}
+
+/// Images of the context that have a handle.
+fn textures(ctx: &Context) -> usize {
+    ctx.live_objects().iter().filter(|object| object.kind == "texture").count()
+}
+
+#[test]
+fn textures_go_and_come_while_frames_are_on_their_way() {
+    let Some(ctx) = device() else { return };
+    let mut sample = sample(&ctx);
+    let first = picture_of(&mut sample, 0);
+    let count = textures(&ctx);
+    for round in 0..4 {
+        send(&mut sample, round);
+        all().for_each(|number| sample.unload(number));
+        send(&mut sample, round);
+        assert_eq!(textures(&ctx), count - all().len(), "all but the targets and the placeholder");
+        all().for_each(|number| sample.load(number));
+        assert!(all().all(|number| sample.presence(number) == Presence::Coming));
+        send(&mut sample, round);
+        // One that is given up before it has come, and asked for again.
+        sample.unload(1);
+        send(&mut sample, round);
+        sample.load(1);
+        sample.wait_for_textures().unwrap();
+        send(&mut sample, round);
+    }
+    assert!(all().all(|number| sample.presence(number) == Presence::There));
+    assert!(picture_of(&mut sample, 0) == first, "what came back is what had gone");
+    assert_eq!(textures(&ctx), count);
+}
+
+#[test]
+fn a_frame_on_its_way_keeps_the_textures_it_shows() {
+    let Some(ctx) = device() else { return };
+    let mut sample = sample(&ctx);
+    let whole = picture_of(&mut sample, 0);
+    sample.update(Moment::of_frame(0, ROUND)).unwrap();
+    let mut frame = Frame::free(&ctx).unwrap();
+    let picture = sample.record(&mut frame).unwrap();
+    frame.finish().unwrap();
+    all().for_each(|number| sample.unload(number));
+    let pixels = ctx.download_texture(picture, &lvk::TextureRegion::default()).unwrap();
+    assert!(pixels == *whole.as_raw());
+}
+
+#[test]
+fn only_what_a_texture_is_on_shows_the_placeholder() {
+    let Some(ctx) = device() else { return };
+    let mut sample = sample(&ctx);
+    let whole = picture_of(&mut sample, 0);
+    // Bricks are on the left, marble on the right.
+    let (left, right) = (0..SIZE[0] / 3, 2 * SIZE[0] / 3..SIZE[0]);
+    for (name, on, off) in [("brick", left.clone(), right.clone()), ("marble", right, left)] {
+        sample.unload(number_of(name));
+        let without = picture_of(&mut sample, 0);
+        assert!(differing(&whole, &without, on) > 0.1 && differing(&whole, &without, off) == 0.0, "{name}");
+        sample.load(number_of(name));
+        assert_eq!(sample.presence(number_of(name)), Presence::Coming);
+        sample.wait_for_textures().unwrap();
+        assert!(picture_of(&mut sample, 0) == whole, "{name} is back");
+    }
+}
+
+/// A texture that has been given up stays away, though its thread has made it.
+#[test]
+fn what_comes_too_late_is_dropped() {
+    let Some(ctx) = device() else { return };
+    let mut sample = sample(&ctx);
+    let (brick, wood) = (number_of("brick"), number_of("wood"));
+    let count = textures(&ctx);
+    [brick, wood].into_iter().for_each(|number| sample.unload(number));
+    sample.load(brick);
+    sample.unload(brick);
+    // Made after it, by the same thread.
+    sample.load(wood);
+    sample.wait_for_textures().unwrap();
+    picture_of(&mut sample, 0);
+    assert_eq!((sample.presence(brick), sample.presence(wood)), (Presence::Away, Presence::There));
+    assert_eq!(textures(&ctx), count - 1);
+    sample.load(brick);
+    sample.load(999);
+    sample.unload(999);
+    assert_eq!(sample.presence(999), Presence::Away);
+    // The thread ends with the sample, whatever it is at.
+    drop(sample);
+    assert_eq!(textures(&ctx), 0);
+}
+
+#[test]
+fn bodies_look_as_they_always_did() {
+    let Some(ctx) = device() else { return };
+    let mut sample = sample(&ctx);
+    assert_as_ever("triplanar_small", &picture_of(&mut sample, 0));
+    ["brick", "leaves"].into_iter().for_each(|name| sample.unload(number_of(name)));
+    assert_as_ever("triplanar_unloaded_small", &picture_of(&mut sample, 0));
+}
+
+#[test]
+fn a_device_without_optional_features_shows_them() {
+    let profile = DeviceProfile::core_only();
+    let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
+    let picture = picture_of(&mut sample(&ctx), 0);
+    assert_alike("bodies without features", &picture, &reference("triplanar_small"), &OTHER_DRIVER);
+}
+
+#[test]
+fn another_driver_shows_them() {
+    without_ray_tracing("another_driver_shows_them", || {
+        let Some(ctx) = device() else { return };
+        let mut sample = sample(&ctx);
+        let picture = picture_of(&mut sample, 0);
+        all().for_each(|number| sample.unload(number));
+        send(&mut sample, 5);
+        all().for_each(|number| sample.load(number));
+        send(&mut sample, 6);
+        sample.wait_for_textures().unwrap();
+        assert!(picture_of(&mut sample, 0) == picture);
+        assert_alike("SwiftShader bodies", &picture, &reference("triplanar_small"), &OTHER_DRIVER);
+    });
+}
+
+#[test]
+fn impossible_pictures_are_refused() {
+    let Some(ctx) = device() else { return };
+    assert_refuses_impossible_sizes(|size| Triplanar::new(&ctx, size));
+}
