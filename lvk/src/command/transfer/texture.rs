@@ -39,7 +39,7 @@ impl CommandBuffer {
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for a region that does not exist, another number of bytes than it has, multisampled
-    /// textures, images of windows, and regions that copies on the queue cannot have
+    /// textures, and regions that copies on the queue cannot have
     /// ([`QueueInfo::copy_granularity`](crate::QueueInfo::copy_granularity)); [`WrongQueue`](Error::WrongQueue) for depth and
     /// stencil on another queue than the graphics queue.
     pub fn update_texture(
