@@ -23,5 +23,6 @@ pub mod scene;
 pub mod shader_folder;
 pub mod shaders;
 mod shapes;
+pub mod sponza;
 pub mod triplanar;
 pub mod yuv;

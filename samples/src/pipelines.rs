@@ -6,7 +6,7 @@ use crate::shader_folder::create_module;
 use crate::shaders::INCLUDES;
 use crate::{
     app, bench, deferred, hello_triangle, hybrid, hybrid_oit, large_scene, mesh_shaders, omni_shadows,
-    reflections, render_to_cube_map, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures, triplanar, yuv,
+    reflections, render_to_cube_map, rtx_ao, rtx_hello, rtx_pipeline, rtx_textures, sponza, triplanar, yuv,
 };
 
 /// A stage of a [`SamplePipeline`].
@@ -79,6 +79,7 @@ pub fn all() -> Vec<SamplePipeline> {
         rtx_textures::pipelines(),
         yuv::pipelines(),
         triplanar::pipelines(),
+        sponza::pipelines(),
         bench::pipelines(),
         app::ui::pipelines(),
     ]

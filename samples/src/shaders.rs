@@ -74,6 +74,8 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("rtx_textures/frame.glsl", include_str!("../../shaders/rtx_textures/frame.glsl")),
     ("rtx_textures/shade.glsl", include_str!("../../shaders/rtx_textures/shade.glsl")),
     ("rtx_textures/surface.glsl", include_str!("../../shaders/rtx_textures/surface.glsl")),
+    ("sponza/frame.glsl", include_str!("../../shaders/sponza/frame.glsl")),
+    ("sponza/mask.glsl", include_str!("../../shaders/sponza/mask.glsl")),
     ("hybrid_oit/ball.glsl", include_str!("../../shaders/hybrid_oit/ball.glsl")),
     ("hybrid_oit/frame.glsl", include_str!("../../shaders/hybrid_oit/frame.glsl")),
     ("hybrid_oit/gbuffer.glsl", include_str!("../../shaders/hybrid_oit/gbuffer.glsl")),
@@ -408,4 +410,22 @@ pub mod triplanar {
     pub const BODY_VERT: &str = include_str!("../../shaders/triplanar/body.vert.glsl");
     /// Colour and light of what is nearest.
     pub const BODY_FRAG: &str = include_str!("../../shaders/triplanar/body.frag.glsl");
+}
+
+/// Stages of the `sponza` sample.
+pub mod sponza {
+    /// Culls draws for the camera and the sun.
+    pub const CULL_COMP: &str = include_str!("../../shaders/sponza/cull.comp.glsl");
+    /// Corners as the sun sees them.
+    pub const SHADOW_VERT: &str = include_str!("../../shaders/sponza/shadow.vert.glsl");
+    /// Holes that cast no shadow.
+    pub const SHADOW_FRAG: &str = include_str!("../../shaders/sponza/shadow.frag.glsl");
+    /// Corners as the camera sees them.
+    pub const SURFACE_VERT: &str = include_str!("../../shaders/sponza/surface.vert.glsl");
+    /// A surface in the sun and under the sky.
+    pub const SURFACE_FRAG: &str = include_str!("../../shaders/sponza/surface.frag.glsl");
+    /// A triangle that covers the picture.
+    pub const SKY_VERT: &str = include_str!("../../shaders/sponza/sky.vert.glsl");
+    /// The sky where nothing hides it.
+    pub const SKY_FRAG: &str = include_str!("../../shaders/sponza/sky.frag.glsl");
 }

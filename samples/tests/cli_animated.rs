@@ -62,6 +62,13 @@ const PROGRAMS: &[Program] = &[
         ways: RAYS,
     },
     Program {
+        path: env!("CARGO_BIN_EXE_sponza"),
+        quick: &["--shadow-size", "256"],
+        own: &["--msaa", "--no-culling", "--draws", "--shadow-size", "--filter", "--scene", "--camera"],
+        said: &["atrium: ", "draws  ", "culling", "shadow map", "surfaces", "draws in the picture"],
+        ways: &[&["--msaa", "1"], &["--draws", "padded"]],
+    },
+    Program {
         path: env!("CARGO_BIN_EXE_rtx_ao"),
         quick: &["--passes", "1", "--rays", "1"],
         own: &["--passes", "--rays", "--radius", "--scene", "--camera"],

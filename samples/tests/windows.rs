@@ -157,6 +157,11 @@ fn rtx_ao_has_a_window() {
 }
 
 #[test]
+fn sponza_has_a_window() {
+    shows_what_it_writes(env!("CARGO_BIN_EXE_sponza"), &["--shadow-size", "512"]);
+}
+
+#[test]
 fn large_scene_has_a_window() {
     let args = ["--triangles", "20000", "--copies", "30", "--samples", "1"];
     shows_what_it_writes(env!("CARGO_BIN_EXE_large_scene"), &args);

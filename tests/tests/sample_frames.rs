@@ -22,6 +22,7 @@ use lvk_samples::rtx_hello::RtxHello;
 use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig};
 use lvk_samples::rtx_textures::RtxTextures;
 use lvk_samples::scene::{Camera, Scene};
+use lvk_samples::sponza::{Sponza, SponzaConfig};
 use lvk_samples::triplanar::Triplanar;
 use lvk_samples::yuv::{CONVERSIONS, Yuv, YuvConfig};
 use lvk_tests::hybrid::paths;
@@ -220,5 +221,15 @@ fn reflections_goes_by_frames() {
         let config =
             ReflectionsConfig { samples: 2, ..ReflectionsConfig::new(paths(&ctx)[0], width, height) };
         Reflections::new(&ctx, &config).unwrap()
+    });
+}
+
+#[test]
+fn sponza_goes_by_frames() {
+    let Some(ctx) = device() else { return };
+    let scene = still_life();
+    check(|size| {
+        let config = SponzaConfig { shadow_size: 256, triangles_per_draw: 32, ..SponzaConfig::new(size) };
+        Sponza::new(&ctx, scene.clone(), &config).unwrap()
     });
 }

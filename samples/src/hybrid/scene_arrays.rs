@@ -54,7 +54,9 @@ impl SceneArrays {
         let materials: Vec<_> = scene.materials.iter().map(|m| gpu_material(m, textures)).collect();
 
         let read = BufferUsage::STORAGE;
-        let input = read | BufferUsage::ACCEL_INPUT;
+        let caps = ctx.capabilities();
+        let traces = caps.ray_tracing_pipeline || caps.ray_query;
+        let input = if traces { read | BufferUsage::ACCEL_INPUT } else { read };
         let positions = array(ctx, "scene positions", input, &scene.positions)?;
         let normals = array(ctx, "scene normals", read, &scene.normals)?;
         let texcoords = array(ctx, "scene texture coordinates", read, &scene.texcoords)?;

@@ -21,6 +21,9 @@ pub enum RasterError {
         /// Most pixels a side.
         limit: u32,
     },
+    /// A scene made by hand breaks the invariants of [`Scene`](crate::scene::Scene).
+    #[error("{0}")]
+    Scene(String),
     /// The device lacks what the sample, or the way to draw that was asked for, is about.
     #[error("{device} has no {what}; {remedy}")]
     Missing {
@@ -34,6 +37,11 @@ pub enum RasterError {
 }
 
 impl RasterError {
+    /// A scene that cannot be drawn.
+    pub(crate) fn scene(error: crate::hybrid::HybridError) -> Self {
+        Self::Scene(error.to_string())
+    }
+
     /// Fails unless the device `has` something.
     ///
     /// # Errors
@@ -47,7 +55,7 @@ impl RasterError {
 impl From<RasterError> for RunError {
     fn from(error: RasterError) -> Self {
         match error {
-            RasterError::BadSize { .. } => Self::input(error),
+            RasterError::BadSize { .. } | RasterError::Scene(_) => Self::input(error),
             RasterError::Device(_) | RasterError::Missing { .. } => Self::device(error),
         }
     }

@@ -9,6 +9,8 @@ pub struct Material {
     pub albedo: [f32; 3],
     /// Index into [`super::Scene::textures`].
     pub albedo_texture: Option<u32>,
+    /// Whether its texture has holes where alpha is below one half. Only rasterisers heed it.
+    pub is_masked: bool,
     /// Colour of the highlight, linear RGB, 0 to 1.
     pub specular: [f32; 3],
     /// Phong exponent of the highlight, 1 to 10,000.
@@ -32,6 +34,7 @@ impl Material {
             name: name.to_owned(),
             albedo,
             albedo_texture: None,
+            is_masked: false,
             specular: [0.0; 3],
             shininess: 1.0,
             reflectivity: 0.0,

@@ -138,6 +138,11 @@ impl Scene {
         procedural::courtyard()
     }
 
+    /// Builds a columned atrium for rasterisers: opaque surfaces with painted textures. The same everywhere.
+    pub fn atrium() -> Self {
+        procedural::atrium()
+    }
+
     /// Builds a town of paper, a scene of plain surfaces for light and shade. The same everywhere.
     pub fn town() -> Self {
         procedural::town()

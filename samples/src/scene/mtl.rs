@@ -15,7 +15,7 @@ use super::warnings::Warnings;
 pub(super) struct Library {
     materials: HashMap<String, Definition>,
     textures: Vec<Texture>,
-    texture_numbers: HashMap<PathBuf, u32>,
+    texture_numbers: HashMap<(PathBuf, Option<PathBuf>), u32>,
     warnings: Warnings,
 }
 
@@ -24,6 +24,8 @@ pub(super) struct Library {
 struct Definition {
     material: Material,
     image: Option<Image>,
+    /// Where it is dark the image has holes.
+    mask: Option<Image>,
 }
 
 /// An image as a library names it, and the folder of that library.
@@ -71,19 +73,22 @@ impl Library {
         }
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut material = convert(source);
-        let image = source.diffuse_texture.clone().map(|name| Image { folder: folder.to_path_buf(), name });
+        let image =
+            |name: &Option<String>| name.clone().map(|name| Image { folder: folder.to_path_buf(), name });
+        let (image, mask) = (image(&source.diffuse_texture), image(&source.dissolve_texture));
         // Exporters often leave Kd black beside a texture, meaning the texture alone.
         if image.is_some() && material.albedo == [0.0; 3] && !material.is_refractive() {
             material.albedo = [1.0; 3];
         }
-        self.materials.insert(source.name.clone(), Definition { material, image });
+        self.materials.insert(source.name.clone(), Definition { material, image, mask });
     }
 
     /// Number of the image, which is read on first use; a stand-in and a warning when that fails.
-    fn texture(&mut self, folder: &Path, name: &str) -> u32 {
+    fn texture(&mut self, Image { folder, name }: &Image, mask: Option<PathBuf>) -> u32 {
         let name = &name.replace('\\', "/");
         let found = find_image(folder, name);
-        let key = found.clone().unwrap_or_else(|| folder.join(name));
+        let path = found.clone().unwrap_or_else(|| folder.join(name));
+        let key = (path.clone(), mask.clone());
         if let Some(&number) = self.texture_numbers.get(&key) {
             return number;
         }
@@ -92,14 +97,30 @@ impl Library {
             None => Err("no such file".to_owned()),
         };
         let texture = texture.unwrap_or_else(|why| {
-            let line = format!("texture {}: {why}; magenta checks stand in", key.display());
+            let line = format!("texture {}: {why}; magenta checks stand in", path.display());
             self.warnings.push("textures", line);
             Texture::stand_in(name)
         });
+        let texture = match &mask {
+            Some(mask) => self.with_holes(texture, mask),
+            None => texture,
+        };
         let number = self.textures.len() as u32;
         self.textures.push(texture);
         self.texture_numbers.insert(key, number);
         number
+    }
+
+    /// The texture with alpha from the mask; as it is, with a warning, where the mask cannot be read.
+    fn with_holes(&mut self, texture: Texture, mask: &Path) -> Texture {
+        match Texture::read(mask) {
+            Ok(mask) => texture.masked(&mask),
+            Err(why) => {
+                let line = format!("mask {}: {why}; there are no holes", mask.display());
+                self.warnings.push("textures", line);
+                texture
+            }
+        }
     }
 
     /// The materials that `names` ask for, in that order, with stand-ins for undefined ones; then the images
@@ -117,13 +138,15 @@ impl Library {
     }
 
     fn material(&mut self, name: &str) -> Material {
-        let Some(Definition { material, image }) = self.materials.get(name).cloned() else {
+        let Some(Definition { material, image, mask }) = self.materials.get(name).cloned() else {
             let line = format!("material `{name}` is not defined; glaring orange stands in");
             self.warnings.push("materials", line);
             return Material::stand_in(name);
         };
-        let albedo_texture = image.map(|image| self.texture(&image.folder, &image.name));
-        Material { albedo_texture, ..material }
+        let mask = mask.and_then(|mask| find_image(&mask.folder, &mask.name));
+        let is_masked = image.is_some() && mask.is_some();
+        let albedo_texture = image.map(|image| self.texture(&image, mask));
+        Material { albedo_texture, is_masked, ..material }
     }
 }
 
@@ -158,6 +181,7 @@ fn clean(text: &str) -> String {
             "tr" => number(rest).map(|n| format!("Tr {n}")),
             "illum" => number(rest).map(|n| format!("illum {}", n.clamp(0.0, 10.0) as u8)),
             "map_kd" => image_name(rest).map(|name| format!("map_Kd {name}")),
+            "map_d" => image_name(rest).map(|name| format!("map_d {name}")),
             _ => None,
         };
         inside |= keyword.eq_ignore_ascii_case("newmtl");

@@ -37,6 +37,17 @@ impl Texture {
         Ok(Self { name: path.display().to_string(), width, height, pixels: decoded.into_raw() })
     }
 
+    /// The same with holes where `mask`, stretched over it, is dark: its red becomes alpha.
+    pub(super) fn masked(mut self, mask: &Self) -> Self {
+        let (width, height) = (self.width as usize, self.height as usize);
+        let (mask_width, mask_height) = (mask.width as usize, mask.height as usize);
+        for (number, texel) in self.pixels.chunks_exact_mut(4).enumerate() {
+            let (x, y) = (number % width * mask_width / width, number / width * mask_height / height);
+            texel[3] = mask.pixels[4 * (y * mask_width + x)];
+        }
+        self
+    }
+
     /// The magenta and black checks that stand in for an image that cannot be had.
     pub(super) fn stand_in(name: &str) -> Self {
         let texel = |i: u32| match (i % STAND_IN_SIZE / 4 + i / STAND_IN_SIZE / 4) % 2 {
@@ -91,6 +102,18 @@ mod tests {
         std::fs::write(&path, b"\x89PNG\r\n\x1a\nnothing").unwrap();
         assert!(Texture::read(&path).is_err());
         assert!(Texture::read(&folder.path().join("absent.png")).is_err());
+    }
+
+    #[test]
+    fn a_mask_of_another_size_is_stretched() {
+        let picture = |width, height, reds: &[u8]| {
+            let pixels = reds.iter().flat_map(|&red| [red, 7, 7, 255]).collect();
+            Texture { name: String::new(), width, height, pixels }
+        };
+        let masked = picture(4, 2, &[9; 8]).masked(&picture(2, 1, &[0, 200]));
+        let alphas: Vec<_> = masked.pixels.chunks(4).map(|texel| [texel[0], texel[3]]).collect();
+        let row = [[9, 0], [9, 0], [9, 200], [9, 200]];
+        assert_eq!(alphas, [row, row].concat());
     }
 
     #[test]

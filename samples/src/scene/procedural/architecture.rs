@@ -10,6 +10,9 @@ use super::solid::{Solids, smooth_profile};
 /// Distance between the axes of neighbouring columns, in metres.
 pub(super) const BAY: f32 = 2.4;
 
+/// Sides of columns that show every flute.
+const FLUTED: u32 = 120;
+
 /// Height of the column axis's top, where the arches spring.
 const SPRING: f32 = 2.75;
 
@@ -27,8 +30,8 @@ pub(super) fn build(solids: &mut Solids) {
     floor(solids);
     pool(solids);
     // The back arcade runs along x, the left one along z; they share the column in the corner.
-    arcade(solids, [-6.0, 0.0, -4.8], 0.0, 6, true);
-    arcade(solids, [-6.0, 0.0, 4.8], 90.0, 4, false);
+    arcade(solids, [-6.0, 0.0, -4.8], 0.0, [6, FLUTED], true);
+    arcade(solids, [-6.0, 0.0, 4.8], 90.0, [4, FLUTED], false);
     walls(solids);
     lantern(solids, [0.0, 2.55, -6.1]);
     lantern_chain(solids, [0.0, 2.55, -6.1]);
@@ -95,15 +98,22 @@ fn water(solids: &mut Solids) {
     });
 }
 
-/// A row of `bays` arches that starts at `origin` and runs along local x, turned by `turn` degrees.
-fn arcade(solids: &mut Solids, origin: [f32; 3], turn: f32, bays: u32, has_last_column: bool) {
+/// A row of `bays` arches that starts at `origin` and runs along local x, turned by `turn` degrees; columns have so many
+/// `sides`.
+pub(super) fn arcade(
+    solids: &mut Solids,
+    origin: [f32; 3],
+    turn: f32,
+    [bays, sides]: [u32; 2],
+    has_last_column: bool,
+) {
     let local = |x: f32| {
         let (sin, cos) = turn.to_radians().sin_cos();
         [origin[0] + x * cos, origin[1], origin[2] - x * sin]
     };
     for i in 0..bays + u32::from(has_last_column) {
         solids.at(local(i as f32 * BAY), turn);
-        column(solids);
+        column(solids, sides);
     }
     for i in 0..bays {
         solids.at(local((i as f32 + 0.5) * BAY), turn).of(of::SANDSTONE);
@@ -118,7 +128,7 @@ fn arcade(solids: &mut Solids, origin: [f32; 3], turn: f32, bays: u32, has_last_
     cornice(solids, length + 1.0);
 }
 
-fn column(solids: &mut Solids) {
+fn column(solids: &mut Solids, sides: u32) {
     solids.of(of::SANDSTONE);
     solids.block([-0.34, 0.0, -0.34], [0.34, 0.12, 0.34]);
     solids.block([-0.36, SPRING - 0.12, -0.36], [0.36, SPRING, 0.36]);
@@ -126,19 +136,19 @@ fn column(solids: &mut Solids) {
         &[(0.34, 0.12), (0.36, 0.17), (0.33, 0.22), (0.285, 0.25), (0.30, 0.29), (0.31, 0.32), (0.26, 0.36)],
         18,
     );
-    solids.of(of::MARBLE).lathe(&base, 40, |_, _| 1.0);
+    solids.of(of::MARBLE).lathe(&base, sides / 3, |_, _| 1.0);
     let capital = smooth_profile(
         &[(0.20, 2.28), (0.235, 2.31), (0.205, 2.35), (0.21, 2.42), (0.28, 2.55), (0.34, SPRING - 0.12)],
         18,
     );
-    solids.lathe(&capital, 40, |_, _| 1.0);
+    solids.lathe(&capital, sides / 3, |_, _| 1.0);
     let shaft: Vec<(f32, f32)> = (0..=14)
         .map(|i| {
             let t = i as f32 / 14.0;
             (0.262 - 0.055 * t - 0.02 * t * (1.0 - t), 0.34 + 1.98 * t)
         })
         .collect();
-    solids.lathe(&shaft, 120, |angle, height| {
+    solids.lathe(&shaft, sides, |angle, height| {
         let fade = ((height - 0.34) * 8.0).min((2.32 - height) * 8.0).clamp(0.0, 1.0);
         1.0 - 0.075 * fade * (10.0 * angle).sin().abs().sqrt()
     });

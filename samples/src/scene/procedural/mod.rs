@@ -1,6 +1,7 @@
 //! The scene that needs no file: a sunny courtyard with a pool, arcades, statues, mirrors and glass.
 
 mod architecture;
+mod atrium;
 mod materials;
 mod paint;
 mod sculpture;
@@ -11,6 +12,7 @@ mod valley;
 
 use glam::Vec3;
 
+pub(super) use self::atrium::atrium;
 pub(crate) use self::paint::PAINTED;
 use self::solid::Solids;
 pub(super) use self::town::{carousel, town};

@@ -35,7 +35,7 @@ fn fountain(solids: &mut Solids) {
 }
 
 /// A trefoil knot around the origin, its plane facing local z.
-fn knot(solids: &mut Solids, radius: f32, thickness: f32) {
+pub(super) fn knot(solids: &mut Solids, radius: f32, thickness: f32) {
     const ALONG: u32 = 420;
     const AROUND: u32 = 36;
     let line = |t: f32| {
@@ -156,7 +156,7 @@ fn glasses(solids: &mut Solids) {
     solids.lathe(&bowl, 72, |_, _| 1.0);
 }
 
-fn plinth(solids: &mut Solids, position: [f32; 3], half: f32, height: f32) {
+pub(super) fn plinth(solids: &mut Solids, position: [f32; 3], half: f32, height: f32) {
     solids.at(position, 0.0).of(of::SANDSTONE);
     solids.block([-half, 0.0, -half], [half, 0.12, half]);
     let inner = half - 0.05;

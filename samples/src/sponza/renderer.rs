@@ -1,0 +1,368 @@
+//! The sample as a type: say the moment, get a picture.
+
+use glam::{Quat, Vec3};
+use lvk::{
+    AddressMode, BufferDesc, BufferHandle, BufferUsage, Context, Dependencies, Holder, Readback,
+    RenderPipelineHandle, SamplerDesc, SamplerHandle, TextureHandle,
+};
+
+use super::config::{DrawPath, SponzaConfig};
+use super::culling::{Culling, VIEWS};
+use super::draws::{Draw, cut};
+use super::frame::{FrameConstants, GpuSun, GpuView};
+use super::frustum::Frustum;
+use super::pipelines::{SKY, SURFACES};
+use super::shadow::Shadow;
+use super::sun_view::SunView;
+use super::targets::Targets;
+use crate::app::array_buffer::array;
+use crate::app::frame::Frame;
+use crate::app::sample::{Moment, Sample};
+use crate::app::scene_textures;
+use crate::hybrid::{SceneArrays, check_promises, near_plane};
+use crate::raster::{RasterError, RasterPipeline};
+use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, PointLight, Scene};
+
+/// Texels on an edge of the sky's cube map.
+const SKY_SIZE: u32 = 256;
+/// Where scenes without a sun have one.
+const USUAL_SUN: ([f32; 3], [f32; 3]) = ([0.28, 0.9, 0.33], [2.6, 2.35, 1.95]);
+
+/// Renders a scene of many draws.
+pub struct Sponza {
+    ctx: Context,
+    config: SponzaConfig,
+    path_of_draws: DrawPath,
+    targets: Targets,
+    culling: Culling,
+    shadow: Shadow,
+    surfaces: Holder<RenderPipelineHandle>,
+    sky: Holder<RenderPipelineHandle>,
+    scene: OnDevice,
+    draws: Vec<Draw>,
+    bounds: ([f32; 3], [f32; 3]),
+    light: Light,
+    frame: Holder<BufferHandle>,
+    path: CameraPath,
+    camera: Camera,
+    near_plane: f32,
+    /// The frustum of a view that is kept while the camera goes on, to look at what was culled.
+    kept: Option<Frustum>,
+    turn: f32,
+    told: Told,
+}
+
+/// What shaders reach of the scene.
+struct OnDevice {
+    arrays: SceneArrays,
+    masks: Holder<BufferHandle>,
+    sky: Holder<TextureHandle>,
+    surface_sampler: Holder<SamplerHandle>,
+    sky_sampler: Holder<SamplerHandle>,
+    _textures: Vec<Holder<TextureHandle>>,
+}
+
+/// What lights the scene.
+struct Light {
+    sun: DirectionalLight,
+    ambient: Ambient,
+    lamp: PointLight,
+}
+
+/// What is known of how many draws were left.
+#[derive(Default)]
+struct Told {
+    counts: Option<[u32; VIEWS]>,
+    coming: Option<Readback>,
+}
+
+impl Sponza {
+    /// Uploads `scene`, whose triangles it cuts into draws, and makes all pipelines.
+    ///
+    /// # Errors
+    /// [`RasterError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, mut scene: Scene, config: &SponzaConfig) -> Result<Self, RasterError> {
+        check_promises(&scene).map_err(RasterError::scene)?;
+        let config = config.suited(ctx)?;
+        let targets = Targets::new(ctx, config.extent, config.samples)?;
+        let draws = cut(&mut scene, config.triangles_per_draw);
+        let path = CameraPath::tour(&scene, 0);
+        let frame = ctx.create_buffer(&BufferDesc {
+            size_bytes: size_of::<FrameConstants>() as u64,
+            debug_name: "frame constants",
+            ..BufferDesc::default()
+        })?;
+        Ok(Self {
+            targets,
+            culling: Culling::new(ctx, &draws)?,
+            shadow: Shadow::new(ctx, config.shadow_size)?,
+            surfaces: pipeline(ctx, &SURFACES, config.samples)?,
+            sky: pipeline(ctx, &SKY, config.samples)?,
+            scene: OnDevice::new(ctx, &scene)?,
+            draws,
+            bounds: scene.bounds(),
+            light: Light::of(&scene),
+            frame,
+            camera: path.at(0.0),
+            path,
+            near_plane: near_plane(&scene),
+            ctx: ctx.clone(),
+            path_of_draws: config.draws.unwrap_or(DrawPath::Padded),
+            config,
+            kept: None,
+            turn: 0.0,
+            told: Told::default(),
+        })
+    }
+
+    /// Tours the scene's cameras from the one with this index on.
+    #[must_use]
+    pub fn from_camera(mut self, scene: &Scene, first: usize) -> Self {
+        self.path = CameraPath::tour(scene, first);
+        self.camera = self.path.at(0.0);
+        self
+    }
+
+    /// What is rendered.
+    pub fn config(&self) -> &SponzaConfig {
+        &self.config
+    }
+
+    /// How draws are taken from the buffers that culling writes.
+    pub fn draw_path(&self) -> DrawPath {
+        self.path_of_draws
+    }
+
+    /// All draws, in the order in which they are drawn.
+    pub fn draws(&self) -> &[Draw] {
+        &self.draws
+    }
+
+    /// What the next frame culls the draws of the camera and of the sun by.
+    pub fn frusta(&self) -> [Frustum; 2] {
+        if !self.config.culls {
+            return [Frustum::ALL; 2];
+        }
+        let [width, height] = self.targets.extent();
+        let seen = || Frustum::of_camera(&self.camera, width as f32 / height as f32, self.near_plane);
+        [self.kept.unwrap_or_else(seen), Frustum::of_rows(self.sun_view().rows)]
+    }
+
+    /// How many draws of the camera and of the sun the last frame has left. Waits for it.
+    ///
+    /// # Errors
+    /// [`RasterError::Device`].
+    pub fn counts(&self) -> Result<[u32; 2], RasterError> {
+        Ok(self.culling.counts(&self.ctx)?)
+    }
+
+    /// First triangles of the draws that the last frame has left, of the camera (0) or the sun (1). Waits for it.
+    ///
+    /// # Errors
+    /// [`RasterError::Device`].
+    pub fn survivors(&self, view: usize) -> Result<Vec<u32>, RasterError> {
+        Ok(self.culling.survivors(&self.ctx, view.min(VIEWS - 1), self.path_of_draws)?)
+    }
+
+    fn to_sun(&self) -> Vec3 {
+        let turned = Quat::from_rotation_y(self.turn.to_radians()) * Vec3::from(self.light.sun.direction);
+        turned.normalize_or(Vec3::Y)
+    }
+
+    fn sun_view(&self) -> SunView {
+        SunView::new(self.to_sun(), self.bounds)
+    }
+
+    fn sun(&self) -> GpuSun {
+        let (view, Light { sun, ambient, lamp }) = (self.sun_view(), &self.light);
+        let size = self.config.shadow_size as f32;
+        GpuSun {
+            rows: view.rows,
+            to_sun: self.to_sun().into(),
+            map: self.shadow.map.index(),
+            color: sun.color,
+            sampler: self.shadow.sampler.index(),
+            ambient_above: ambient.above,
+            filter: self.config.filter,
+            ambient_below: ambient.below,
+            texel: 1.0 / size,
+            lamp: lamp.position,
+            lamp_reach: lamp.reach,
+            lamp_color: lamp.color,
+            texel_size: view.size[0].max(view.size[1]) / size,
+        }
+    }
+
+    fn upload_frame(&self) -> lvk::Result<()> {
+        let [width, height] = self.targets.extent();
+        let (draws, arguments, counts) = self.culling.addresses(&self.ctx)?;
+        let frusta = self.frusta();
+        let constants = FrameConstants {
+            camera: GpuCamera::new(&self.camera, width, height, self.near_plane),
+            scene: self.scene.arrays.addresses(),
+            masks: self.ctx.buffer_address(*self.scene.masks)?,
+            draws,
+            views: [0, 1].map(|view| GpuView::new(&frusta[view], arguments[view])),
+            counts,
+            draw_count: self.culling.draw_count(),
+            is_packed: u32::from(self.path_of_draws == DrawPath::Counted),
+            sun: self.sun(),
+            surface_sampler: self.scene.surface_sampler.index(),
+            sky: self.scene.sky.index(),
+            sky_sampler: self.scene.sky_sampler.index(),
+            padding: 0,
+        };
+        self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&constants))
+    }
+
+    fn draw_surfaces(&self, to: &mut Frame<'_>, address: u64) -> lvk::Result<()> {
+        let reads = Dependencies {
+            sampled_images: &[*self.shadow.map],
+            read_buffers: &self.culling.reads(0),
+            ..Dependencies::default()
+        };
+        let mut pass = self.targets.begin(&mut to.cmd, &reads)?;
+        pass.bind_render_pipeline(*self.surfaces)?;
+        pass.push_constants(&address)?;
+        self.culling.draw(&mut pass, 0, self.path_of_draws)?;
+        pass.bind_render_pipeline(*self.sky)?;
+        pass.push_constants(&address)?;
+        pass.draw(0..3, 0..1)
+    }
+
+    /// Keeps the last counts that have arrived, and asks for the next.
+    fn listen(&mut self) -> lvk::Result<()> {
+        if let Some(coming) = self.told.coming.take() {
+            if !coming.is_ready()? {
+                self.told.coming = Some(coming);
+                return Ok(());
+            }
+            self.told.counts = bytemuck::try_pod_read_unaligned(&coming.wait()?).ok();
+        }
+        let range = 0..(VIEWS * size_of::<u32>()) as u64;
+        self.told.coming = Some(self.ctx.read_buffer_later(self.culling.counts_buffer(), range)?);
+        Ok(())
+    }
+
+    fn told(&self, counts: [u32; VIEWS]) -> String {
+        let all = self.culling.draw_count();
+        format!("{} of {all} draws in the picture, {} in the shadow map", counts[0], counts[1])
+    }
+}
+
+impl Sample for Sponza {
+    type Error = RasterError;
+
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
+    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
+        self.camera = self.path.at(moment.phase());
+        Ok(())
+    }
+
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+        self.upload_frame()?;
+        let address = self.ctx.buffer_address(*self.frame)?;
+        frame.pass("culling", |cmd| self.culling.record(cmd, address))?;
+        self.shadow.record(&mut frame.cmd, &self.culling, self.path_of_draws, address)?;
+        self.draw_surfaces(frame, address)?;
+        Ok(self.targets.picture())
+    }
+
+    fn after_frame(&mut self) -> Result<(), RasterError> {
+        self.told.counts = Some(self.counts()?);
+        Ok(())
+    }
+
+    fn remark(&self) -> Option<String> {
+        self.told.counts.map(|counts| format!("culling   {}", self.told(counts)))
+    }
+
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
+        self.targets = Targets::new(&self.ctx, extent, self.config.samples)?;
+        self.config.extent = extent;
+        Ok(())
+    }
+
+    fn view(&self) -> Option<Camera> {
+        Some(self.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.camera = *camera;
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        ui.checkbox(&mut self.config.culls, "culling");
+        let mut keeps = self.kept.is_some();
+        let keep = ui.checkbox(&mut keeps, "keep the frustum");
+        if keep.on_hover_text("shows from elsewhere what culling leaves").changed() {
+            self.kept = None;
+            self.kept = keeps.then(|| self.frusta()[0]);
+        }
+        ui.add(
+            egui::Slider::new(&mut self.config.filter, 0..=SponzaConfig::MAX_FILTER).text("texels of filter"),
+        );
+        ui.add(egui::Slider::new(&mut self.shadow.bias.constant, 0.0..=20.0).text("depth bias"));
+        ui.add(egui::Slider::new(&mut self.shadow.bias.slope, 0.0..=10.0).text("slope bias"));
+        ui.add(egui::Slider::new(&mut self.turn, -180.0..=180.0).text("turn of the sun"));
+        // The figures are those of a frame some time ago; without them the panel tells nothing.
+        if self.listen().is_ok()
+            && let Some(counts) = self.told.counts
+        {
+            let all = self.culling.draw_count();
+            ui.label(format!("{} of {all} draws in the picture", counts[0]));
+            ui.label(format!("{} in the shadow map", counts[1]));
+        }
+    }
+
+    fn reload(&mut self) -> Result<(), RasterError> {
+        let samples = self.config.samples;
+        let (surfaces, sky) = (pipeline(&self.ctx, &SURFACES, samples)?, pipeline(&self.ctx, &SKY, samples)?);
+        let (culling, shadow) = (Culling::pipeline(&self.ctx)?, Shadow::pipeline(&self.ctx)?);
+        (self.surfaces, self.sky, self.culling.pipeline, self.shadow.pipeline) =
+            (surfaces, sky, culling, shadow);
+        Ok(())
+    }
+}
+
+impl OnDevice {
+    fn new(ctx: &Context, scene: &Scene) -> lvk::Result<Self> {
+        let pictures = scene.textures.iter().map(|texture| scene_textures::picture(ctx, texture));
+        let textures: Vec<_> = pictures.collect::<Result<_, _>>()?;
+        let masks: Vec<u32> = scene.materials.iter().map(|material| u32::from(material.is_masked)).collect();
+        let sampler = |debug_name, address, max_anisotropy| {
+            let address = [address; 3];
+            ctx.create_sampler(&SamplerDesc { address, max_anisotropy, debug_name, ..SamplerDesc::default() })
+        };
+        Ok(Self {
+            arrays: SceneArrays::new(ctx, scene, &textures)?,
+            masks: array(ctx, "masks of materials", BufferUsage::STORAGE, &masks)?,
+            sky: scene_textures::sky(ctx, &scene.sky, SKY_SIZE)?,
+            surface_sampler: sampler("surface sampler", AddressMode::Repeat, 8.0)?,
+            sky_sampler: sampler(
+                "sky sampler",
+                AddressMode::ClampToEdge,
+                SamplerDesc::default().max_anisotropy,
+            )?,
+            _textures: textures,
+        })
+    }
+}
+
+fn pipeline(ctx: &Context, data: &RasterPipeline, samples: u32) -> lvk::Result<Holder<RenderPipelineHandle>> {
+    RasterPipeline { samples, ..*data }.create(ctx)
+}
+
+impl Light {
+    /// The lights of a scene: its sun, or the usual one and the lamp.
+    fn of(scene: &Scene) -> Self {
+        let (direction, color) = USUAL_SUN;
+        let usual = DirectionalLight { direction: Vec3::from(direction).normalize().into(), color };
+        let dark = PointLight { color: [0.0; 3], ..scene.light };
+        let lamp = if scene.sun.is_some() { dark } else { scene.light };
+        Self { sun: scene.sun.unwrap_or(usual), ambient: scene.ambient, lamp }
+    }
+}

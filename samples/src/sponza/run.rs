@@ -1,0 +1,61 @@
+//! The sample on the command line: scene in, pictures and timings out.
+
+use std::process::ExitCode;
+
+use super::{DrawPath, Sponza, SponzaArgs};
+use crate::app::device::DeviceNeeds;
+use crate::app::run::{self, Opened, Opening};
+use crate::app::run_error::RunError;
+use crate::app::say;
+use crate::hybrid::{fit_textures, textures_needed};
+use crate::raster::headline;
+use crate::scene::Scene;
+
+/// What the sample and its pictures are called.
+const NAME: &str = "sponza";
+
+/// Does what the command line says. Prints to standard output, errors in one line to standard error; the status
+/// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
+#[must_use]
+pub fn run(args: &SponzaArgs) -> ExitCode {
+    match args.scene.listing() {
+        Some(listing) => {
+            let others = listing.replace("; the default", "");
+            say(&format!("atrium  built in: a columned atrium made by code; the default\n{others}"));
+            ExitCode::SUCCESS
+        }
+        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+    }
+}
+
+fn open(args: &SponzaArgs, opening: &mut Opening<'_>) -> Result<Opened<Sponza>, RunError> {
+    args.scene.check_out(&args.run.out_or(NAME))?;
+    let mut scene = load(args, opening)?;
+    opening.warn(&scene.warnings);
+    let context =
+        opening.device(&DeviceNeeds { textures: textures_needed(&scene), ..DeviceNeeds::default() })?;
+    let capabilities = context.capabilities();
+    opening.warn(&fit_textures(&mut scene, &capabilities.limits)?);
+    opening.progress.stage("uploading the scene", 0);
+    let told =
+        format!("{}: {} triangles, {} textures", scene.name, scene.triangles.len(), scene.textures.len());
+    let cameras = Scene { cameras: scene.cameras, ..Scene::empty() };
+    let sample = Sponza::new(&context, scene, &args.config())?;
+    let sample = sample.from_camera(&cameras, args.scene.camera as usize - 1);
+    let path = match sample.draw_path() {
+        DrawPath::Counted => "as many as the GPU has counted",
+        DrawPath::Padded => "those that are culled without vertices",
+    };
+    let draws =
+        format!("draws     {}, {path}; {} samples a pixel", sample.draws().len(), sample.config().samples);
+    let headline = format!("{}\n{draws}", headline(capabilities, &told));
+    Ok(Opened { sample, headline })
+}
+
+fn load(args: &SponzaArgs, opening: &mut Opening<'_>) -> Result<Scene, RunError> {
+    if args.scene.scene.is_some() {
+        return Ok(args.scene.load(&mut opening.progress)?);
+    }
+    opening.progress.stage("making the atrium", 0);
+    Ok(Scene::atrium())
+}

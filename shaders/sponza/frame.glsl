@@ -1,0 +1,79 @@
+// What every shader of the sample is told.
+#ifndef SPONZA_FRAME
+#define SPONZA_FRAME
+
+#include "common/camera.glsl"
+#include "common/scene_buffers.glsl"
+
+// Triangles that are drawn together, and the box around them.
+struct Draw {
+    vec3 low;
+    uint firstVertex;
+    vec3 high;
+    uint vertexCount;
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer DrawArray {
+    Draw at[];
+};
+
+// Vertices, instances, first vertex and first instance of an indirect draw.
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer ArgumentArray {
+    uvec4 at[];
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) buffer CountArray {
+    uint at[]; // of each view
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MaskArray {
+    uint at[]; // of each material: whether its texture's alpha cuts holes
+};
+
+struct View {
+    vec4 planes[6]; // whose inner side is seen
+    ArgumentArray arguments;
+};
+
+struct Sun {
+    vec4 rows[3]; // from the world to clip coordinates of the shadow map
+    vec3 direction; // towards it
+    uint map;
+    vec3 color;
+    uint smp; // compares
+    vec3 ambientAbove;
+    uint pcf; // texels to each side that shadows are filtered over
+    vec3 ambientBelow;
+    float texel; // of the map, of its width
+    vec3 lamp; // where scenes without a sun of their own have it; it casts no shadows
+    float lampReach;
+    vec3 lampColor;
+    float texelSize; // in scene units
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
+    Camera camera;
+    Scene scene;
+    MaskArray masks;
+    DrawArray draws;
+    View views[2]; // of the camera and of the sun
+    CountArray counts;
+    uint drawCount;
+    uint isPacked; // whether draws that are culled leave no gaps
+    Sun sun;
+    uint surfaceSampler;
+    uint sky; // index into kTexturesCube
+    uint skySampler;
+    uint padding;
+};
+
+layout(push_constant, scalar) uniform PushConstants {
+    Frame frame;
+};
+
+vec3 sunClip(vec3 position) {
+    vec4 p = vec4(position, 1.0);
+    return vec3(dot(frame.sun.rows[0], p), dot(frame.sun.rows[1], p), dot(frame.sun.rows[2], p));
+}
+
+#endif
