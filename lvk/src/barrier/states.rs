@@ -77,6 +77,11 @@ impl States {
         self.buffers.keys().chain(self.textures.keys()).copied()
     }
 
+    /// The host has written a new image, and left it in the layout that shaders sample: nothing is pending.
+    pub(crate) fn filled(&mut self, id: ResourceId, shape: TextureShape) {
+        self.textures.insert(id, Cells::new(shape, State::untouched_in(Layout::ShaderRead)));
+    }
+
     /// Drops what is known about a destroyed resource.
     pub(crate) fn forget(&mut self, id: ResourceId) {
         self.buffers.remove(&id);

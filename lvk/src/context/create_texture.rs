@@ -6,7 +6,8 @@ use crate::bindless::TextureViews;
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
 use crate::resource::Texture;
-use crate::resource::region::TextureRegion;
+use crate::resource::host_copy;
+use crate::resource::region::{Region, TextureRegion};
 use crate::resource::texture_desc::{TextureDesc, TextureUsage};
 use crate::resource::view::TextureViewDesc;
 
@@ -78,6 +79,14 @@ impl Context {
         Ok(Holder::new(self, shared.store.textures.insert(texture), slot))
     }
 
+    /// Writes the first contents at once, which nothing has to wait for then.
+    fn fill_by_host(&self, texture: &Texture, contents: &[(Region, &[u8])]) -> Result<()> {
+        let (shared, image) = (self.shared(), &texture.image);
+        host_copy::fill(&shared.gpu, image, contents)?;
+        shared.submitter.filled_texture(image.id, image.shape);
+        Ok(())
+    }
+
     /// Uploads the first contents; without any, shaders may still read what is there.
     fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>) -> Result<()> {
         let texture = self.shared().store.textures.get(handle)?;
@@ -95,6 +104,9 @@ impl Context {
                 regions.push((region, bytes));
                 rest = behind;
             }
+        }
+        if texture.image.host_filled {
+            return self.fill_by_host(&texture, &regions);
         }
         for (region, bytes) in regions {
             self.upload_region(&texture, region, bytes)?;

@@ -13,6 +13,7 @@ use super::clock::HostClock;
 use super::extra::ExtraExtensions;
 use super::features::Features;
 use super::foreign::RawContext;
+use super::host_copy::HostCopies;
 use super::instance::Instance;
 use super::naming;
 use super::optional::{FeatureSet, OF_WINDOWS, OptionalFeature};
@@ -59,6 +60,8 @@ pub(crate) struct Gpu {
     pub(crate) mesh: Option<ash::ext::mesh_shader::Device>,
     pub(crate) shading_rates: Option<ShadingRates>,
     pub(crate) local_read: Option<ash::khr::dynamic_rendering_local_read::Device>,
+    /// Writes first contents of images, where that is the faster way.
+    pub(crate) host_copies: Option<HostCopies>,
     /// Reads the clocks of device and host together.
     pub(crate) host_clock: Option<HostClock>,
     /// Samplers alive with a border colour of their own, of which a device has few.
@@ -141,9 +144,11 @@ impl Gpu {
     }
 
     fn of(instance: Instance, physical: vk::PhysicalDevice, made: Made, debug_names: Option<bool>) -> Self {
-        let Made { device, caps, features, allocator, queues, is_foreign } = made;
+        let Made { device, mut caps, features, allocator, queues, is_foreign } = made;
         let raw = &instance.raw;
         let structures = caps.hardware_structures();
+        let host_copies = HostCopies::new(&instance, &device, physical, &caps);
+        caps.host_image_copy = host_copies.is_some();
         Self {
             queues,
             accel: structures.then(|| ash::khr::acceleration_structure::Device::new(raw, &device)),
@@ -155,6 +160,7 @@ impl Gpu {
             local_read: caps
                 .has(OptionalFeature::LocalRead)
                 .then(|| ash::khr::dynamic_rendering_local_read::Device::new(raw, &device)),
+            host_copies,
             host_clock: HostClock::new(&instance, &device, physical, features.calibration),
             windows: WindowFunctions::new(&instance, &device, |feature| caps.has(feature)),
             debug_utils: naming::is_wanted(&instance, physical, debug_names)

@@ -11,6 +11,7 @@ pub(crate) mod fault;
 pub(crate) mod features;
 pub(crate) mod foreign;
 pub(crate) mod format_features;
+pub(crate) mod host_copy;
 pub(crate) mod instance;
 pub(crate) mod memory;
 pub(crate) mod mesh_limits;

@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use ash::vk;
 use gpu_allocator::vulkan::Allocation;
 
+use super::host_copy;
 use super::image_check::{ImagePlan, check};
 use super::texture_desc::{TextureDesc, TextureMemory, TextureUsage};
 use crate::barrier::{ResourceId, Subresources, TextureShape};
@@ -41,6 +42,8 @@ pub(crate) struct Image {
     memory: Option<Memory>,
     /// Whether it belongs to one family of queues at a time.
     is_exclusive: bool,
+    /// Whether the host writes its first contents.
+    pub(crate) host_filled: bool,
     /// Somebody else made it, and destroys it.
     is_foreign: bool,
     /// Who that is, where it has to be kept.
@@ -87,9 +90,14 @@ impl Image {
         if !desc.view_formats.is_empty() {
             info = info.push_next(&mut list);
         }
+        let host_filled = host_copy::suits(gpu, desc, &info);
+        if host_filled {
+            info.usage |= vk::ImageUsageFlags::HOST_TRANSFER_EXT;
+        }
         // SAFETY: the description is checked against the limits of its format.
         let raw = unsafe { gpu.device.create_image(&info, None) }.map_err(Error::vulkan("vkCreateImage"))?;
         let mut image = Self::of(gpu, desc, &plan, raw, false);
+        image.host_filled = host_filled;
         image.bind_memory(desc.debug_name)?;
         gpu.name(raw, desc.debug_name);
         Ok(image)
@@ -123,6 +131,7 @@ impl Image {
             transient: desc.memory == TextureMemory::Transient,
             memory: None,
             is_exclusive: !is_foreign && gpu.queues.has_domains() && !is_shared(desc),
+            host_filled: false,
             is_foreign,
             owner: None,
             gpu: Arc::clone(gpu),

@@ -2,6 +2,7 @@
 
 pub(crate) mod buffer;
 pub(crate) mod format_support;
+pub(crate) mod host_copy;
 pub(crate) mod image;
 mod image_check;
 pub(crate) mod query;

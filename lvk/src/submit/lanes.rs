@@ -237,6 +237,14 @@ impl Lanes {
         }
     }
 
+    /// The host has written a new image, which is ready to be sampled, and belongs to lane 0.
+    pub(crate) fn fill(&mut self, id: ResourceId, shape: TextureShape) {
+        self.states[0].filled(id, shape);
+        if self.several {
+            self.ownership.claim(id, 0, 0);
+        }
+    }
+
     /// The lanes are there.
     pub(crate) fn reached(&mut self, completed: &PerLane<u64>) {
         if self.several {

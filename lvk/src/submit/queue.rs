@@ -477,6 +477,11 @@ impl<T> Submitter<T> {
         self.lock().lanes.import(id, shape, layout);
     }
 
+    /// The host has written a new image, which is ready to be sampled.
+    pub(crate) fn filled_texture(&self, id: ResourceId, shape: TextureShape) {
+        self.lock().lanes.fill(id, shape);
+    }
+
     /// Forgets the state of a destroyed resource.
     pub(crate) fn forget(&self, id: ResourceId) {
         let mut inner = self.lock();

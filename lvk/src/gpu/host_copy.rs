@@ -1,0 +1,109 @@
+//! Images written by the host itself (`VK_EXT_host_image_copy`), past staging memory and queue.
+
+use ash::vk;
+
+use super::caps::Capabilities;
+use super::device::Gpu;
+use super::instance::Instance;
+use crate::error::{Error, Result};
+
+/// The layout that images are written in and stay in: what shaders sample.
+const LAYOUT: vk::ImageLayout = vk::ImageLayout::READ_ONLY_OPTIMAL;
+
+/// The functions of the extension, where first contents go by them.
+pub(crate) struct HostCopies {
+    device: ash::ext::host_image_copy::Device,
+}
+
+impl HostCopies {
+    /// `None` where the device has none, where staging is the faster way, or where it does not write images in the layout that
+    /// shaders sample.
+    pub(super) fn new(
+        instance: &Instance,
+        device: &ash::Device,
+        physical: vk::PhysicalDevice,
+        caps: &Capabilities,
+    ) -> Option<Self> {
+        let is_wanted = caps.host_image_copy && written_layouts(instance, physical).contains(&LAYOUT);
+        is_wanted.then(|| Self { device: ash::ext::host_image_copy::Device::new(&instance.raw, device) })
+    }
+
+    /// Writes the first contents of an image, after which all of `range` is ready to be sampled.
+    ///
+    /// # Safety
+    /// The image is new, was made with [`vk::ImageUsageFlags::HOST_TRANSFER_EXT`], and `range` is all of it. The regions lie
+    /// inside of it, do not overlap, and each points to as many bytes as it has.
+    pub(crate) unsafe fn fill(
+        &self,
+        image: vk::Image,
+        range: vk::ImageSubresourceRange,
+        regions: &[vk::MemoryToImageCopyEXT<'_>],
+    ) -> Result<()> {
+        let transition = vk::HostImageLayoutTransitionInfoEXT::default()
+            .image(image)
+            .old_layout(vk::ImageLayout::UNDEFINED)
+            .new_layout(LAYOUT)
+            .subresource_range(range);
+        // SAFETY: the image is new, so its layout is undefined and the GPU does not use it.
+        unsafe { self.device.transition_image_layout(&[transition]) }
+            .map_err(Error::vulkan("vkTransitionImageLayoutEXT"))?;
+        let copy = vk::CopyMemoryToImageInfoEXT::default()
+            .dst_image(image)
+            .dst_image_layout(LAYOUT)
+            .regions(regions);
+        // SAFETY: by the caller; the layout is one that the device writes in.
+        unsafe { self.device.copy_memory_to_image(&copy) }.map_err(Error::vulkan("vkCopyMemoryToImageEXT"))
+    }
+}
+
+impl Gpu {
+    /// Whether the host can write images of this description, and the device samples them as fast as others.
+    pub(crate) fn host_copies_stay_optimal(&self, info: &vk::ImageCreateInfo<'_>) -> bool {
+        self.has_host_transfer(info.format) && self.is_optimal(info)
+    }
+
+    fn has_host_transfer(&self, format: vk::Format) -> bool {
+        let mut more = vk::FormatProperties3::default();
+        let mut all = vk::FormatProperties2::default().push_next(&mut more);
+        // SAFETY: the physical device belongs to the instance, and the extension of the format is on.
+        unsafe {
+            self.instance.raw.get_physical_device_format_properties2(self.physical(), format, &mut all);
+        }
+        more.optimal_tiling_features.contains(vk::FormatFeatureFlags2::HOST_IMAGE_TRANSFER_EXT)
+    }
+
+    fn is_optimal(&self, info: &vk::ImageCreateInfo<'_>) -> bool {
+        let asked = vk::PhysicalDeviceImageFormatInfo2::default()
+            .format(info.format)
+            .ty(info.image_type)
+            .tiling(info.tiling)
+            .usage(info.usage | vk::ImageUsageFlags::HOST_TRANSFER_EXT)
+            .flags(info.flags);
+        let mut access = vk::HostImageCopyDevicePerformanceQueryEXT::default();
+        let mut all = vk::ImageFormatProperties2::default().push_next(&mut access);
+        // SAFETY: as above; where it refuses, nothing was written.
+        let answer = unsafe {
+            let raw = &self.instance.raw;
+            raw.get_physical_device_image_format_properties2(self.physical(), &asked, &mut all)
+        };
+        answer.is_ok() && access.optimal_device_access == vk::TRUE
+    }
+}
+
+/// Layouts in which the host writes images.
+fn written_layouts(instance: &Instance, physical: vk::PhysicalDevice) -> Vec<vk::ImageLayout> {
+    let mut count = vk::PhysicalDeviceHostImageCopyPropertiesEXT::default();
+    let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut count);
+    // SAFETY: the physical device belongs to the instance and has the extension; without arrays the counts are written.
+    unsafe { instance.raw.get_physical_device_properties2(physical, &mut all) };
+    let (read, written) = (count.copy_src_layout_count, count.copy_dst_layout_count);
+    let mut source = vec![vk::ImageLayout::UNDEFINED; read as usize];
+    let mut target = vec![vk::ImageLayout::UNDEFINED; written as usize];
+    let mut lists = vk::PhysicalDeviceHostImageCopyPropertiesEXT::default()
+        .copy_src_layouts(&mut source)
+        .copy_dst_layouts(&mut target);
+    let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut lists);
+    // SAFETY: as above, with arrays of the sizes that were answered.
+    unsafe { instance.raw.get_physical_device_properties2(physical, &mut all) };
+    target
+}
