@@ -43,14 +43,20 @@ impl Draw {
     const ALL: [Self; 6] =
         [Self::Surfaces, Self::Orbs, Self::Ambient, Self::Lights, Self::Glow, Self::Resolve];
 
-    fn name(self) -> &'static str {
-        match self {
-            Self::Surfaces => "deferred: surfaces",
-            Self::Orbs => "deferred: orbs",
-            Self::Ambient => "deferred: ambient light",
-            Self::Lights => "deferred: lights",
-            Self::Glow => "deferred: glow",
-            Self::Resolve => "deferred: resolve",
+    fn name(self, passes: Passes) -> &'static str {
+        match (self, passes) {
+            (Self::Surfaces, Passes::One) => "deferred: surfaces in one pass",
+            (Self::Surfaces, Passes::Several) => "deferred: surfaces",
+            (Self::Orbs, Passes::One) => "deferred: orbs in one pass",
+            (Self::Orbs, Passes::Several) => "deferred: orbs",
+            (Self::Ambient, Passes::One) => "deferred: ambient light in one pass",
+            (Self::Ambient, Passes::Several) => "deferred: ambient light",
+            (Self::Lights, Passes::One) => "deferred: lights in one pass",
+            (Self::Lights, Passes::Several) => "deferred: lights",
+            (Self::Glow, Passes::One) => "deferred: glow in one pass",
+            (Self::Glow, Passes::Several) => "deferred: glow",
+            (Self::Resolve, Passes::One) => "deferred: resolve in one pass",
+            (Self::Resolve, Passes::Several) => "deferred: resolve",
         }
     }
 
@@ -127,7 +133,7 @@ impl Draw {
 
     fn data(self, passes: Passes) -> SamplePipeline {
         SamplePipeline {
-            name: self.name(),
+            name: self.name(passes),
             stages: self.stages(passes).to_vec(),
             color: self.targets(passes).iter().map(|target| target.format).collect(),
             depth: self.depth(passes).map(|depth| depth.format),
@@ -144,7 +150,7 @@ impl Draw {
             depth: self.depth(passes),
             topology: self.topology(),
             cull: self.cull(),
-            debug_name: self.name(),
+            debug_name: self.name(passes),
             ..RenderPipelineDesc::default()
         })
     }
