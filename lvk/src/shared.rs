@@ -90,7 +90,7 @@ pub(crate) enum Garbage {
     RenderPipeline(#[expect(dead_code, reason = "held only to be dropped")] Arc<RenderPipeline>),
     ComputePipeline(#[expect(dead_code, reason = "held only to be dropped")] Arc<ComputePipeline>),
     RayTracingPipeline(Arc<RayTracingPipeline>),
-    QueryPool(#[expect(dead_code, reason = "held only to be dropped")] Arc<QueryPool>),
+    QueryPool(Arc<QueryPool>),
     AccelStruct(Arc<AccelStruct>),
     Swapchain(#[expect(dead_code, reason = "held only to be dropped")] Arc<Swapchain>),
     /// What a top-level structure showed; handles of it may still be in use.
@@ -167,6 +167,7 @@ impl Shared {
     pub(crate) fn dispose(&self, garbage: Garbage) {
         match garbage {
             Garbage::Buffer(buffer) => self.submitter.forget(buffer.id),
+            Garbage::QueryPool(pool) => self.submitter.forget(pool.id),
             Garbage::Texture(texture) => {
                 if texture.image.release() {
                     self.submitter.forget(texture.image.id);
@@ -193,7 +194,6 @@ impl Shared {
             }
             Garbage::RenderPipeline(_)
             | Garbage::ComputePipeline(_)
-            | Garbage::QueryPool(_)
             | Garbage::Swapchain(_)
             | Garbage::Body(_)
             | Garbage::Software(_)

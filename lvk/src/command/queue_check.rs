@@ -85,8 +85,13 @@ impl CommandBuffer {
         Ok(())
     }
 
+    /// The command buffer begins after a submission of the first lane.
+    pub(crate) fn begin_after(&mut self, value: u64) {
+        self.recording.after.raise(0, value);
+    }
+
     /// The command buffer uses something that needs no barriers within a queue.
-    pub(super) fn refer(&mut self, id: ResourceId, access: Access) {
+    pub(crate) fn refer(&mut self, id: ResourceId, access: Access) {
         if self.shared.gpu.queues.several_lanes() {
             self.recording.references.push((id, access));
         }

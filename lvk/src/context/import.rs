@@ -167,8 +167,9 @@ impl Context {
         let waits = waits.iter().map(|wait| info(wait.semaphore, wait.value).stage_mask(wait.stages));
         let all = vk::PipelineStageFlags2::ALL_COMMANDS;
         let signals = signals.iter().map(|signal| info(signal.semaphore, signal.value).stage_mask(all));
-        let (waits, signals) = (waits.collect(), signals.collect());
-        self.submit_between(cmd, Submission { waits, signals, ..Submission::default() })
+        let (waits, signals): (Vec<_>, Vec<_>) = (waits.collect(), signals.collect());
+        let exchanges = !waits.is_empty() || !signals.is_empty();
+        self.submit_between(cmd, Submission { waits, signals, exchanges, ..Submission::default() })
     }
 
     /// The timeline semaphore of what is submitted to the graphics queue; [`SubmitHandle::raw_value`] is the value that a

@@ -45,7 +45,11 @@ impl Context {
     }
 
     /// As [`submit`](Self::submit), with what `more` has besides recordings.
-    pub(super) fn submit_between(&self, cmd: CommandBuffer, more: Submission) -> Result<SubmitHandle> {
+    pub(super) fn submit_between(
+        &self,
+        mut cmd: CommandBuffer,
+        mut more: Submission,
+    ) -> Result<SubmitHandle> {
         self.check_own(&cmd)?;
         self.advance_compactions();
         let mut pending = self.pending();
@@ -61,7 +65,10 @@ impl Context {
             return self.send(before.into_iter().chain([cmd]), Submission { has_prelude, ..more });
         }
         if has_prelude {
-            self.send(before.into_iter(), Submission { has_prelude, ..Submission::default() })?;
+            // The first of it all waits, and the rest behind it.
+            let waits = std::mem::take(&mut more.waits);
+            let prelude = Submission { has_prelude, waits, ..Submission::default() };
+            cmd.begin_after(self.send(before.into_iter(), prelude)?.value);
         }
         self.send([cmd].into_iter(), more)
     }
@@ -78,13 +85,17 @@ impl Context {
         let (recordings, mut outcomes): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
         let shared = self.shared();
         let submission = Submission { recordings, ..more };
-        let Values { first, last } = shared.submitter.submit(submission, || shared.bindless.flush())?;
+        let (Values { first, last }, sent) = shared.submitter.submit(submission, || shared.bindless.flush());
         let scopes = outcomes.iter_mut().filter_map(|outcome| outcome.scopes.take());
-        shared.profiler.submit(last, scopes.map(|scopes| *scopes).collect());
+        shared.profiler.submit(first.max(last), scopes.map(|scopes| *scopes).collect());
         let end = outcomes.len().saturating_sub(1);
         for (place, outcome) in outcomes.into_iter().enumerate() {
-            outcome.submit(shared, if place == end { last } else { first });
+            let value = if place == end { last } else { first };
+            if value > 0 {
+                outcome.submit(shared, value);
+            }
         }
+        sent?;
         shared.collect()?;
         Ok(self.submission(last))
     }

@@ -14,6 +14,7 @@ use crate::command::gpu_build::{GpuBuild, GpuRefit};
 use crate::context::config::ContextDesc;
 use crate::context::holder::Holder;
 use crate::error::Result;
+use crate::gpu::failing;
 use crate::gpu::silent::silently;
 use crate::handle::BufferHandle;
 use crate::kernel::Kernel;
@@ -37,6 +38,16 @@ pub enum Leaves {
 /// A context whose recorded commands do nothing, to measure what the library takes to record them.
 pub fn silent_context(desc: &ContextDesc<'_>) -> Result<Context> {
     silently(|| Context::new(desc))
+}
+
+/// The context that `make` makes and uses on this thread can have submissions fail.
+pub fn fallibly<T>(make: impl FnOnce() -> T) -> T {
+    failing::fallibly(make)
+}
+
+/// After so many submissions to queues, one that this thread makes of a context made [`fallibly`] is refused.
+pub fn fail_submission_after(submissions: u32) {
+    failing::fail_after(submissions);
 }
 
 /// How many submissions there were.

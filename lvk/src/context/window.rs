@@ -409,7 +409,7 @@ impl Live<'_> {
         };
         let waits = semaphores.iter().map(wait).collect();
         let submission = Submission { waits, ..Submission::default() };
-        if let Err(error) = self.ctx.shared().submitter.submit(submission, || {}) {
+        if let Err(error) = self.ctx.shared().submitter.submit(submission, || {}).1 {
             log::error!("{}: an image that was taken cannot be given back: {error}", self.name);
         }
     }

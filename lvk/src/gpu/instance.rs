@@ -215,7 +215,7 @@ fn create(
     // SAFETY: every pointer in `info` lives until the end of this function.
     let made = unsafe { entry.create_instance(&info, None) };
     #[cfg(feature = "test-hooks")]
-    let made = made.map(super::silent::silenced);
+    let made = made.map(super::silent::silenced).map(super::failing::fallible);
     made.map_err(|result| Error::NoVulkan { reason: format!("vkCreateInstance answered {result}") })
 }
 

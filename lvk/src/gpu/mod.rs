@@ -7,6 +7,8 @@ pub(crate) mod debug;
 pub(crate) mod device;
 pub(crate) mod extensions;
 pub(crate) mod extra;
+#[cfg(feature = "test-hooks")]
+pub(crate) mod failing;
 pub(crate) mod fault;
 pub(crate) mod features;
 pub(crate) mod foreign;

@@ -27,6 +27,8 @@ pub(crate) struct Lanes {
     has_several: bool,
     sent: u64,
     last: PerLane<u64>,
+    /// The last of lane 0 before lanes were kept apart.
+    alone: u64,
     /// The last of lane 0 that everybody relies on.
     prelude: u64,
 }
@@ -73,6 +75,8 @@ pub(crate) struct Sent<'a> {
     pub(crate) after: Clock,
     /// Whether all that is sent later, on lanes that run shaders, relies on it.
     pub(crate) is_prelude: bool,
+    /// Whether it waits for others than the lanes, or others wait for it: what it uses may have been written by them, or will be.
+    pub(crate) exchanges: bool,
 }
 
 impl Lanes {
@@ -85,6 +89,7 @@ impl Lanes {
             has_several,
             sent: 0,
             last: [0; LANES],
+            alone: 0,
             prelude: 0,
         }
     }
@@ -101,6 +106,7 @@ impl Lanes {
         }
         let ids: Vec<_> = self.states[0].ids().collect();
         ids.into_iter().for_each(|id| self.ownership.claim(id, 0, self.last[0]));
+        self.alone = self.last[0];
         self.prelude = self.last[0];
     }
 
@@ -112,12 +118,15 @@ impl Lanes {
     /// The value for what `lane` gets next. Values rise over all lanes, and each lane has its own.
     pub(crate) fn next_value(&mut self, lane: usize) -> u64 {
         self.sent += 1;
-        let value = if self.has_several { self.sent * LANES as u64 + lane as u64 } else { self.sent };
-        self.last[lane] = value;
-        value
+        if self.has_several { self.sent * LANES as u64 + lane as u64 } else { self.sent }
     }
 
-    /// The last value of each lane.
+    /// What signals this value went to the lane: from now on it may be waited for. A value whose submission failed never comes.
+    pub(crate) fn submitted(&mut self, lane: usize, value: u64) {
+        self.last[lane] = value;
+    }
+
+    /// The last value of each lane that will come.
     pub(crate) fn last(&self) -> &PerLane<u64> {
         &self.last
     }
@@ -128,11 +137,18 @@ impl Lanes {
         self.sent
     }
 
-    /// Up to which value everything is done, with the lanes as far as `completed`.
+    /// Up to which value everything is done, with the lanes as far as `completed`: to right before the first that is not.
     pub(crate) fn passed(&self, completed: &PerLane<u64>) -> u64 {
-        let busy = completed.iter().zip(&self.last).filter(|(completed, last)| completed < last);
         let newest = self.last.iter().copied().max().unwrap_or_default();
-        busy.map(|(completed, _)| *completed).min().unwrap_or(newest)
+        let busy = (0..LANES).filter(|lane| completed[*lane] < self.last[*lane]);
+        busy.map(|lane| self.first_after(lane, completed[lane]) - 1).min().unwrap_or(newest)
+    }
+
+    /// The first value of a busy lane behind one that it has reached; no value is noted as long as lanes are not kept apart.
+    fn first_after(&self, lane: usize, completed: u64) -> u64 {
+        let noted = self.several && (lane != 0 || completed >= self.alone);
+        let first = if noted { self.ownership.first_after(lane, completed) } else { None };
+        first.unwrap_or(completed + 1)
     }
 
     /// The states of lane 0, as long as it is the only one, or for what no other lane has.
@@ -152,7 +168,9 @@ impl Lanes {
         let value = self.next_value(lane);
         let mut waits = sent.after;
         for used in sent.tracker.used() {
-            self.touch((lane, value), used, &arrivals, &mut waits);
+            let given = sent.exchanges || sent.references.contains(&(used.id, Access::Write));
+            let writes = given || arrivals.iter().any(|moved| moved.id == used.id);
+            self.touch((lane, value), used, writes, &mut waits);
         }
         for (id, access) in sent.references {
             if !sent.tracker.uses(*id) {
@@ -170,12 +188,12 @@ impl Lanes {
         Step { departures, value, waits, arrivals, barriers }
     }
 
-    /// The command buffer uses a resource: what it waits for, and what the lane knows of the resource from now on.
-    fn touch(&mut self, at: (usize, u64), used: Used<'_>, arrivals: &[MovedPart], waits: &mut Clock) {
+    /// The command buffer uses a resource: what it waits for, and what the lane knows of the resource from now on. What it
+    /// `writes` changes for others, whether its commands change it or not.
+    fn touch(&mut self, at: (usize, u64), used: Used<'_>, writes: bool, waits: &mut Clock) {
         let owner = self.ownership.owner(used.id);
         let before = owner.and_then(|owner| self.states[owner].layouts(used.id));
-        let moves = arrivals.iter().any(|moved| moved.id == used.id);
-        let writes = moves || used.changes(before.as_ref());
+        let writes = writes || used.changes(before.as_ref());
         let access = if writes { Access::Write } else { Access::Read };
         if self.ownership.touch(at, used.id, access, waits).is_some() {
             let lane = at.0;

@@ -40,10 +40,13 @@ impl Program {
             if !lanes.are_several() {
                 let barriers = lanes.submit_alone(&tracker);
                 recorded.insert(0, Event::Barriers(barriers));
-                sent.push(logged(0, lanes.signal(), Clock::default(), recorded));
+                let value = lanes.signal();
+                lanes.submitted(0, value);
+                sent.push(logged(0, value, Clock::default(), recorded));
                 continue;
             }
             let step = lanes.submit(&plain(*lane, &tracker), is_exclusive);
+            lanes.submitted(*lane, step.value);
             for departure in step.departures {
                 let releases = departure.parts;
                 let log = logged(departure.lane, departure.value, departure.waits, Vec::new());
@@ -57,7 +60,7 @@ impl Program {
 }
 
 fn plain(lane: usize, tracker: &Tracker) -> Sent<'_> {
-    Sent { lane, tracker, references: &[], after: Clock::default(), is_prelude: false }
+    Sent { lane, tracker, references: &[], after: Clock::default(), is_prelude: false, exchanges: false }
 }
 
 fn logged(lane: usize, value: u64, waits: Clock, events: Vec<Event>) -> Logged {
@@ -342,18 +345,79 @@ fn references_are_waited_for_without_barriers() {
 }
 
 #[test]
-fn garbage_waits_for_every_queue_that_is_busy() {
+fn what_others_wrote_or_will_write_is_waited_for_as_if_it_were_written() {
+    let site = |lane: usize| Site { domain: 0, stages: stages_of(Queue::ALL[lane]) };
+    let (id, all) = (ResourceId(3), ONE);
+    let reader = |stages| record(&[texture_op(3, Use::shader_read(stages))]).0;
+    let (computed, drawn) = (reader(Stages::COMPUTE), reader(Stages::FRAGMENT));
+    let waits = |step: super::lanes::Step| step.waits.values().collect::<Vec<_>>();
+    let fresh = || {
+        let mut lanes = Lanes::new([site(0), site(1), site(2)], true);
+        lanes.begin_several();
+        lanes.import(id, all, Layout::ShaderRead);
+        lanes
+    };
+    // Others signal the first reader, on another queue; the next reader knows nothing of their semaphore.
+    let mut lanes = fresh();
+    let taken = lanes.submit(&Sent { exchanges: true, ..plain(1, &computed) }, |_| false).value;
+    assert_eq!(waits(lanes.submit(&plain(0, &drawn), |_| false)), [(1, taken)]);
+    // Others write once the last reader signals, or once what was handed over to them is there.
+    let given: [&[_]; 2] = [&[], &[(id, Access::Write)]];
+    for references in given {
+        let mut lanes = fresh();
+        let read = lanes.submit(&plain(1, &computed), |_| false).value;
+        let sent = Sent { exchanges: references.is_empty(), references, ..plain(0, &drawn) };
+        assert_eq!(waits(lanes.submit(&sent, |_| false)), [(1, read)]);
+    }
+    // Nobody else is told of it: reads go side by side.
+    let mut lanes = fresh();
+    lanes.submit(&plain(1, &computed), |_| false);
+    assert_eq!(waits(lanes.submit(&plain(0, &drawn), |_| false)), []);
+}
+
+#[test]
+fn garbage_waits_for_every_queue_that_is_busy_and_for_nothing_before() {
+    let site = |lane: usize| Site { domain: 0, stages: stages_of(Queue::ALL[lane]) };
+    let mut lanes = Lanes::new([site(0), site(1), site(2)], true);
+    let nothing = Tracker::default();
+    let alone = [(); 2].map(|()| lanes.signal());
+    lanes.submitted(0, alone[1]);
+    lanes.begin_several();
+    let send = |lanes: &mut Lanes, lane| {
+        let value = lanes.submit(&plain(lane, &nothing), |_| false).value;
+        lanes.submitted(lane, value);
+        value
+    };
+    let [a, b, c] = [0, 1, 0].map(|lane| send(&mut lanes, lane));
+    assert!(alone[1] < a && a < b && b < c);
+    assert_eq!([a, b, c].map(|value| Lanes::lane_of(value, true)), [0, 1, 0]);
+    // What was sent before lanes were kept apart is not noted one by one.
+    assert_eq!(lanes.passed(&[0, 0, 0]), 0);
+    assert_eq!(lanes.passed(&[alone[0], b, 0]), alone[0]);
+    // Up to right before the first that is not done, however long the other queue has done nothing.
+    assert_eq!(lanes.passed(&[alone[1], 0, 0]), a - 1);
+    assert_eq!(lanes.passed(&[a, 0, 0]), b - 1);
+    assert_eq!(lanes.passed(&[c, 0, 0]), b - 1);
+    assert_eq!(lanes.passed(&[a, b, 0]), c - 1);
+    assert_eq!(lanes.passed(&[c, b, 0]), c);
+    lanes.reached(&[c, 0, 0]);
+    assert_eq!(lanes.passed(&[c, 0, 0]), b - 1);
+    let mut one = Lanes::new([site(0), site(1), site(2)], false);
+    assert_eq!([one.next_value(0), one.next_value(0)], [1, 2]);
+    one.submitted(0, 2);
+    assert_eq!((one.passed(&[1, 0, 0]), Lanes::lane_of(2, false)), (1, 0));
+}
+
+/// A value whose submission failed never comes, so nothing waits for it.
+#[test]
+fn what_no_queue_got_is_not_among_what_comes() {
     let site = |lane: usize| Site { domain: 0, stages: stages_of(Queue::ALL[lane]) };
     let mut lanes = Lanes::new([site(0), site(1), site(2)], true);
     lanes.begin_several();
-    let [a, b, c] = [0, 1, 0].map(|lane| lanes.next_value(lane));
-    assert!(a < b && b < c);
-    assert_eq!([a, b, c].map(|value| Lanes::lane_of(value, true)), [0, 1, 0]);
-    assert_eq!(lanes.passed(&[a, 0, 0]), 0);
-    assert_eq!(lanes.passed(&[c, 0, 0]), 0);
-    assert_eq!(lanes.passed(&[a, b, 0]), a);
-    assert_eq!(lanes.passed(&[c, b, 0]), c);
-    let mut one = Lanes::new([site(0), site(1), site(2)], false);
-    assert_eq!([one.next_value(0), one.next_value(0)], [1, 2]);
-    assert_eq!((one.passed(&[1, 0, 0]), Lanes::lane_of(2, false)), (1, 0));
+    let nothing = Tracker::default();
+    let sent = lanes.submit(&plain(1, &nothing), |_| false).value;
+    lanes.submitted(1, sent);
+    let refused = lanes.submit(&plain(1, &nothing), |_| false).value;
+    assert!(refused > sent);
+    assert_eq!((*lanes.last(), lanes.passed(&[0, sent, 0])), ([0, sent, 0], sent));
 }

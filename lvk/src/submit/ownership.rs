@@ -144,6 +144,12 @@ impl Ownership {
         }
     }
 
+    /// The first value behind this one that the lane was sent.
+    pub(crate) fn first_after(&self, lane: usize, value: u64) -> Option<u64> {
+        let sent = &self.sent[lane];
+        sent.get(sent.partition_point(|(sent, _)| *sent <= value)).map(|(sent, _)| *sent)
+    }
+
     /// What a lane has done and waited for at a value, as far as that is still known.
     fn behind(&self, lane: usize, value: u64) -> Clock {
         let sent = &self.sent[lane];

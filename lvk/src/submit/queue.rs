@@ -30,6 +30,8 @@ pub(crate) struct Recording {
     pub(crate) after: Clock,
     /// The queue's.
     pub(crate) lane: usize,
+    /// Of the timeline, once the queue has it; 0 before.
+    value: u64,
     slot: CommandSlot,
 }
 
@@ -60,9 +62,11 @@ pub(crate) struct Submission {
     pub(crate) has_prelude: bool,
     /// Frames do not wait for it.
     pub(crate) in_background: bool,
+    /// It takes from others what it uses, or gives it to them.
+    pub(crate) exchanges: bool,
 }
 
-/// Values of the timeline at which the first and the last recording of a submission are done.
+/// Values of the timeline at which the first and the last recording of a submission are done; 0 for what no queue got.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Values {
     pub(crate) first: u64,
@@ -143,7 +147,8 @@ impl<T> Submitter<T> {
         drop(inner);
         let (references, after) = (Vec::new(), Clock::default());
         let commands = slot.main;
-        let recording = Recording { sequence, commands, tracker, images, references, after, lane, slot };
+        let recording =
+            Recording { sequence, commands, tracker, images, references, after, lane, value: 0, slot };
         match begin(&self.gpu, commands) {
             Ok(()) => Ok(recording),
             Err(error) => {
@@ -183,46 +188,45 @@ impl<T> Submitter<T> {
         self.lock().presentables.check(tracker)
     }
 
-    /// Submits command buffers in order. `prepare` runs under the lock, right before.
-    pub(crate) fn submit(&self, mut submission: Submission, prepare: impl FnOnce()) -> Result<Values> {
+    /// Submits command buffers in order. `prepare` runs under the lock, right before. Where that fails halfway, queues may have
+    /// got the first of them, as the values tell.
+    pub(crate) fn submit(&self, mut submission: Submission, prepare: impl FnOnce()) -> (Values, Result<()>) {
         let mut guard = self.lock();
         let inner = &mut *guard;
         let sent = match inner.broken.clone() {
             Some(error) => Err(error),
             None => self.submit_all(inner, &mut submission, prepare),
         };
-        let values = match sent {
-            Ok(values) => values,
-            Err(error) => {
-                inner.broken = Some(error.clone());
-                for recording in submission.recordings {
-                    inner.ring.discard(&self.gpu, recording.lane, recording.sequence, recording.slot);
-                }
-                return Err(error);
-            }
-        };
-        submission.presented.into_iter().for_each(|id| inner.presentables.present(id));
-        let lane = submission.recordings.first().map_or(0, |first| first.lane);
-        if !submission.in_background {
-            inner.foreground[lane] = values.last;
+        match &sent {
+            Ok(last) => inner.note(&submission, *last),
+            Err(error) => inner.broken = Some(error.clone()),
         }
-        let last = submission.recordings.len().saturating_sub(1);
-        for (place, mut recording) in submission.recordings.into_iter().enumerate() {
-            let value = if place == last { values.last } else { values.first };
-            inner.ring.submitted(lane, recording.sequence, recording.slot, value);
-            recording.tracker.clear();
-            recording.images.clear();
-            inner.spare.push((recording.tracker, recording.images));
-        }
-        Ok(values)
+        let recordings = submission.recordings;
+        let value = |recording: Option<&Recording>| recording.map_or(0, |recording| recording.value);
+        let values = Values { first: value(recordings.first()), last: value(recordings.last()) };
+        recordings.into_iter().for_each(|recording| self.put_away(inner, recording));
+        (values, sent.map(drop))
     }
 
+    /// Keeps what a queue got until that is done with it, and takes back what none got.
+    fn put_away(&self, inner: &mut Inner<T>, mut recording: Recording) {
+        let Recording { lane, sequence, slot, value, .. } = recording;
+        if value == 0 {
+            return inner.ring.discard(&self.gpu, lane, sequence, slot);
+        }
+        inner.ring.submitted(lane, sequence, slot, value);
+        recording.tracker.clear();
+        recording.images.clear();
+        inner.spare.push((recording.tracker, recording.images));
+    }
+
+    /// Answers the value of the last.
     fn submit_all(
         &self,
         inner: &mut Inner<T>,
         submission: &mut Submission,
         prepare: impl FnOnce(),
-    ) -> Result<Values> {
+    ) -> Result<u64> {
         submission.recordings.iter().try_for_each(|recording| end(&self.gpu, recording.commands))?;
         if inner.lanes.are_several() && !submission.recordings.is_empty() {
             prepare();
@@ -231,8 +235,9 @@ impl<T> Submitter<T> {
         let batches = self.finish(inner, submission)?;
         prepare();
         let value = inner.lanes.signal();
-        self.send(0, batches, std::mem::take(&mut submission.signals), value)?;
-        Ok(Values { first: value, last: value })
+        self.send(&mut inner.lanes, (0, value), batches, std::mem::take(&mut submission.signals))?;
+        submission.recordings.iter_mut().for_each(|recording| recording.value = value);
+        Ok(value)
     }
 
     /// Puts the barriers from the queue's state in front of each command buffer. A new batch begins where an image is waited
@@ -260,14 +265,13 @@ impl<T> Submitter<T> {
     }
 
     /// Each command buffer with its own waits, and a value of its own that others may wait for.
-    fn submit_to_several(&self, inner: &mut Inner<T>, submission: &mut Submission) -> Result<Values> {
-        let mut values = Values::default();
+    fn submit_to_several(&self, inner: &mut Inner<T>, submission: &mut Submission) -> Result<u64> {
         let mut waits = std::mem::take(&mut submission.waits);
         let last = submission.recordings.len() - 1;
-        for (place, recording) in submission.recordings.iter().enumerate() {
+        for (place, recording) in submission.recordings.iter_mut().enumerate() {
             waits.extend(self.image_waits(inner, recording));
             let is_prelude = submission.has_prelude && place == 0;
-            let step = self.step(inner, recording, is_prelude);
+            let step = self.step(inner, recording, is_prelude, submission.exchanges);
             for departure in &step.departures {
                 self.depart(inner, departure, &recording.images)?;
             }
@@ -279,19 +283,20 @@ impl<T> Submitter<T> {
             }
             batch.push(recording.commands);
             let signals = if place == last { std::mem::take(&mut submission.signals) } else { Vec::new() };
-            self.send(recording.lane, vec![batch], signals, step.value)?;
-            values = Values { first: if place == 0 { step.value } else { values.first }, last: step.value };
+            self.send(&mut inner.lanes, (recording.lane, step.value), vec![batch], signals)?;
+            recording.value = step.value;
         }
-        Ok(values)
+        Ok(submission.recordings[last].value)
     }
 
-    fn step(&self, inner: &mut Inner<T>, recording: &Recording, is_prelude: bool) -> Step {
+    fn step(&self, inner: &mut Inner<T>, recording: &Recording, is_prelude: bool, exchanges: bool) -> Step {
         let sent = Sent {
             lane: recording.lane,
             tracker: &recording.tracker,
             references: &recording.references,
             after: recording.after,
             is_prelude,
+            exchanges,
         };
         let images = &recording.images;
         inner.lanes.submit(&sent, |id| images.get(&id).is_some_and(|image| image.is_exclusive))
@@ -311,7 +316,7 @@ impl<T> Submitter<T> {
     fn depart(&self, inner: &mut Inner<T>, departure: &Departure, images: &Images) -> Result<()> {
         let lane = departure.lane;
         let (sequence, slot) = inner.ring.acquire(&self.gpu, lane)?;
-        let sent = self.send_moves(departure, slot.main, images);
+        let sent = self.send_moves(&mut inner.lanes, departure, slot.main, images);
         match sent {
             Ok(()) => inner.ring.submitted(lane, sequence, slot, departure.value),
             Err(_) => inner.ring.discard(&self.gpu, lane, sequence, slot),
@@ -319,14 +324,20 @@ impl<T> Submitter<T> {
         sent
     }
 
-    fn send_moves(&self, departure: &Departure, commands: vk::CommandBuffer, images: &Images) -> Result<()> {
+    fn send_moves(
+        &self,
+        lanes: &mut Lanes,
+        departure: &Departure,
+        commands: vk::CommandBuffer,
+        images: &Images,
+    ) -> Result<()> {
         begin(&self.gpu, commands)?;
         emit_moves(&self.gpu, commands, &departure.parts, images, Side::Release);
         end(&self.gpu, commands)?;
         let waits = self.lane_waits(&departure.waits).collect();
         let mut batch = Batch { waits, ..Batch::default() };
         batch.push(commands);
-        self.send(departure.lane, vec![batch], Vec::new(), departure.value)
+        self.send(lanes, (departure.lane, departure.value), vec![batch], Vec::new())
     }
 
     /// Waits for images that the presentation engine still has.
@@ -354,13 +365,13 @@ impl<T> Submitter<T> {
         })
     }
 
-    /// The last batch signals.
+    /// The last batch signals. A value that the queue did not take is not one of those that come.
     fn send(
         &self,
-        lane: usize,
+        lanes: &mut Lanes,
+        (lane, value): (usize, u64),
         mut batches: Vec<Batch>,
         mut signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
-        value: u64,
     ) -> Result<()> {
         let timeline = vk::SemaphoreSubmitInfo::default().semaphore(self.timelines[lane].raw).value(value);
         signals.push(timeline.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS));
@@ -371,7 +382,9 @@ impl<T> Submitter<T> {
         let queue = self.gpu.queues.raw(lane);
         // SAFETY: the command buffers are complete and used once; the queue is locked.
         unsafe { self.gpu.device.queue_submit2(*queue, &submits, vk::Fence::null()) }
-            .map_err(self.gpu.failed("vkQueueSubmit2"))
+            .map_err(self.gpu.failed("vkQueueSubmit2"))?;
+        lanes.submitted(lane, value);
+        Ok(())
     }
 
     /// The value of the last submission of all.
@@ -501,6 +514,16 @@ impl<T> Submitter<T> {
 
     fn lock(&self) -> Guard<'_, Inner<T>> {
         self.inner.lock()
+    }
+}
+
+impl<T> Inner<T> {
+    /// All of a submission went to its queue.
+    fn note(&mut self, submission: &Submission, last: u64) {
+        submission.presented.into_iter().for_each(|id| self.presentables.present(id));
+        if !submission.in_background {
+            self.foreground[submission.recordings.first().map_or(0, |first| first.lane)] = last;
+        }
     }
 }
 

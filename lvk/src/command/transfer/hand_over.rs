@@ -7,6 +7,7 @@ use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
 use crate::submit::emit::known_layout;
+use crate::submit::ownership::Access;
 
 impl CommandBuffer {
     /// Brings all of a texture into a layout that others want it in, after everything recorded so far
@@ -28,6 +29,8 @@ impl CommandBuffer {
         self.settle();
         self.use_texture(&texture, texture.range, Use::transfer_read().with_layout(known))?;
         self.flush();
+        // Others may write it, so it waits for those who read it on other queues.
+        self.refer(texture.image.id, Access::Write);
         Ok(())
     }
 }

@@ -1,0 +1,71 @@
+//! Devices whose queues refuse a submission when they are told to, to see what the library makes of it.
+
+use std::cell::Cell;
+use std::ffi::{CStr, c_char};
+
+use ash::vk;
+
+thread_local! {
+    static FALLIBLE: Cell<bool> = const { Cell::new(false) };
+    static REAL: Cell<Option<vk::PFN_vkGetDeviceProcAddr>> = const { Cell::new(None) };
+    static SUBMIT: Cell<Option<vk::PFN_vkQueueSubmit2>> = const { Cell::new(None) };
+    /// Submissions of this thread until one fails.
+    static LEFT: Cell<Option<u32>> = const { Cell::new(None) };
+}
+
+/// The queues of the device that `make` makes can fail on this thread, until another device is made so.
+pub(crate) fn fallibly<T>(make: impl FnOnce() -> T) -> T {
+    FALLIBLE.set(true);
+    let made = make();
+    FALLIBLE.set(false);
+    made
+}
+
+/// After so many submissions of this thread one fails.
+pub(crate) fn fail_after(submissions: u32) {
+    LEFT.set(Some(submissions));
+}
+
+/// The instance as it is, or one whose devices can fail.
+pub(crate) fn fallible(raw: ash::Instance) -> ash::Instance {
+    if !FALLIBLE.get() {
+        return raw;
+    }
+    let mut functions = raw.fp_v1_0().clone();
+    REAL.set(Some(functions.get_device_proc_addr));
+    functions.get_device_proc_addr = look_up;
+    ash::Instance::from_parts_1_3(raw.handle(), functions, raw.fp_v1_1().clone(), raw.fp_v1_3().clone())
+}
+
+/// # Safety
+/// As `vkGetDeviceProcAddr`.
+unsafe extern "system" fn look_up(device: vk::Device, name: *const c_char) -> vk::PFN_vkVoidFunction {
+    let real = REAL.get()?;
+    // SAFETY: the caller's device and name go on to the real function; the name ends with a zero.
+    let (found, name) = unsafe { (real(device, name), CStr::from_ptr(name)) };
+    if name != c"vkQueueSubmit2" {
+        return found;
+    }
+    // SAFETY: the function of this name has this type, and both have the size of a pointer.
+    unsafe {
+        SUBMIT.set(std::mem::transmute::<vk::PFN_vkVoidFunction, Option<vk::PFN_vkQueueSubmit2>>(found));
+        Some(std::mem::transmute::<vk::PFN_vkQueueSubmit2, unsafe extern "system" fn()>(submit))
+    }
+}
+
+/// # Safety
+/// As `vkQueueSubmit2`, on the thread that made the device.
+unsafe extern "system" fn submit(
+    queue: vk::Queue,
+    count: u32,
+    infos: *const vk::SubmitInfo2<'_>,
+    fence: vk::Fence,
+) -> vk::Result {
+    let left = LEFT.get();
+    LEFT.set(left.and_then(|left| left.checked_sub(1)));
+    match SUBMIT.get() {
+        // SAFETY: the caller's.
+        Some(real) if left != Some(0) => unsafe { real(queue, count, infos, fence) },
+        _ => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
+    }
+}
