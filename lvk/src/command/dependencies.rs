@@ -7,7 +7,8 @@ use crate::submit::SubmitHandle;
 ///
 /// Nothing needs to be declared for resources that were only uploaded: they are readable everywhere. Declare what an
 /// earlier command wrote (storage images, buffers, render targets now sampled) and what this command writes.
-/// What another queue wrote, copies included, is named by who reads it here.
+/// What another queue wrote, copies included, is named by who reads it here, and so are textures that another queue copies
+/// from meanwhile, and, where another queue used them last, textures with more usages than `SAMPLED`.
 /// Acceleration structures need no declaration: the library reads from the shaders whether they trace rays, and lets a
 /// render pass see what was built before it wherever a graphics pipeline queries rays.
 #[derive(Debug, Clone, Copy, Default)]
@@ -24,6 +25,7 @@ pub struct Dependencies<'a> {
     /// build, whose pipelines are made after it began.
     pub acceleration_structures: &'a [AccelStructHandle],
     /// Submissions, of whatever queue, that the whole command buffer begins after. Rarely needed: what is named above, and what
-    /// commands name, is waited for without being told.
+    /// commands name, is waited for without being told. They move no texture to this queue: those with more usages than `SAMPLED`
+    /// are named above.
     pub wait_for: &'a [SubmitHandle],
 }

@@ -1,4 +1,5 @@
-//! What the command buffers of a queue cannot do. Refused alike everywhere, whether the device would do it or not.
+//! What the command buffers of a queue cannot do. Refused alike everywhere, whether the device would do it or not, but for
+//! steps of copies and timestamps, which are the device's.
 
 use ash::vk;
 

@@ -265,7 +265,8 @@ impl Engine for Live<'_> {
 
     fn acquire(&mut self) -> Result<Acquired, Failure> {
         let submitter = &self.ctx.shared().submitter;
-        let completed = submitter.passed()?;
+        // Only the graphics queue has anything of windows, so work of others in the background holds nothing up.
+        let completed = submitter.timeline(0).completed()?;
         self.parts.collect(completed);
         let Some(current) = &self.parts.current else { return Err(Failure::OutOfDate) };
         let (chain, ids) = (Arc::clone(&current.chain), current.ids());
@@ -377,7 +378,7 @@ impl Live<'_> {
         let syncs = self.retire_images(current.images);
         self.parts.retire(current.chain, syncs);
         if let Some(semaphore) = self.parts.signalled.take() {
-            self.parts.give_semaphore(semaphore, self.ctx.shared().submitter.submitted());
+            self.parts.give_semaphore(semaphore, self.ctx.shared().submitter.last_of_lanes()[0]);
         }
     }
 

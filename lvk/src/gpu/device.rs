@@ -18,7 +18,7 @@ use super::instance::Instance;
 use super::naming;
 use super::optional::{FeatureSet, OF_WINDOWS, OptionalFeature};
 use super::profile::DeviceProfile;
-use super::queues::{QueuePlace, QueueRequest, Queues};
+use super::queues::{Queue, QueuePlace, QueueRequest, Queues, shared_ticks};
 use super::ray_query_path::RayQueryRequest;
 use super::select::{Candidate, choose};
 use super::shading_rate::ShadingRates;
@@ -255,11 +255,16 @@ impl Gpu {
         (ticks & mask) as f64 * f64::from(limits.timestamp_period_ns) * 1e-6
     }
 
-    /// How many ticks of what a timestamp counts `earlier` is before `later`; `None` where it is not.
+    /// How many ticks `later` is behind `earlier`, of whatever queues both are; the clock begins anew in between.
+    pub(crate) fn ticks_since(&self, earlier: u64, later: u64) -> u64 {
+        let bits = Queue::ALL.map(|queue| self.caps.queue(queue).timestamp_bits);
+        later.wrapping_sub(earlier) & shared_ticks(bits)
+    }
+
+    /// How many ticks `earlier` is before `later`, of whatever queues both are; `None` where it is not.
     pub(crate) fn ticks_until(&self, earlier: u64, later: u64) -> Option<u64> {
-        let mask = u64::MAX >> (64 - self.caps.limits.timestamp_bits.clamp(1, 64));
-        let ticks = later.wrapping_sub(earlier) & mask;
-        (ticks > 0 && ticks <= mask / 2).then_some(ticks)
+        let (ticks, back) = (self.ticks_since(earlier, later), self.ticks_since(later, earlier));
+        (ticks > 0 && ticks <= back).then_some(ticks)
     }
 
     /// The physical device.

@@ -4,8 +4,8 @@ use ash::vk;
 
 use crate::lock::{Guard, Mutex, Rank};
 
-/// Where command buffers run. All three exist on every device and refuse the same commands everywhere; those without
-/// hardware of their own share that of [`Graphics`](Self::Graphics).
+/// Where command buffers run. All three exist on every device and refuse the same commands everywhere, but for what
+/// [`QueueInfo`] says of timestamps and copies; those without hardware of their own share it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub enum Queue {
     /// Takes every command, and shows pictures in windows. Uploads run here.
@@ -49,10 +49,16 @@ pub enum QueueRequest {
     Rehearsed,
 }
 
+/// What counts of timestamps of several queues, which have so many bits each: the bits that all have that have any.
+pub(crate) fn shared_ticks(bits: [u32; 3]) -> u64 {
+    let least = bits.into_iter().filter(|bits| *bits > 0).min().unwrap_or(1);
+    u64::MAX >> (64 - least.min(64))
+}
+
 /// What stands behind a [`Queue`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct QueueInfo {
-    /// Whether the device has a queue for it alone.
+    /// Whether the device has a queue for it alone; that of the graphics queue is its own, whoever else uses it.
     pub own_hardware: bool,
     /// The family of the device's queue.
     pub family: u32,
@@ -120,9 +126,10 @@ pub(crate) fn place_queues(families: &[QueueFamily], graphics: u32) -> [QueuePla
 pub(crate) fn describe_queues(families: &[QueueFamily], places: &[QueuePlace; 3]) -> [QueueInfo; 3] {
     let info = |queue: Queue| {
         let place = places[queue.index()];
+        let alone = places.iter().filter(|other| **other == place).count() == 1;
         let family = families.get(place.family as usize);
         QueueInfo {
-            own_hardware: queue == Queue::Graphics || place != places[0],
+            own_hardware: queue == Queue::Graphics || alone,
             family: place.family,
             timestamp_bits: family.map_or(0, |family| family.timestamp_bits),
             copy_granularity: family.map_or([1; 3], |family| family.copy_granularity),
@@ -242,6 +249,24 @@ mod tests {
         assert_eq!(place(&[(COMPUTE, 2), (ALL, 1)], 1), [(1, 0), (0, 0), (0, 1)]);
         assert_eq!(place(&[(ALL, 1), (COMPUTE, 1)], 0), [(0, 0), (1, 0), (0, 0)]);
         assert_eq!(place(&[(ALL, 1), (COPIES, 1)], 0), [(0, 0), (0, 0), (1, 0)]);
+    }
+
+    #[test]
+    fn own_hardware_is_shared_with_nobody() {
+        let own = |places: [u32; 3]| {
+            let places = places.map(|index| QueuePlace { family: 0, index });
+            describe_queues(&[], &places).map(|info| info.own_hardware)
+        };
+        assert_eq!(own([0, 1, 2]), [true; 3]);
+        assert_eq!(own([0, 0, 1]), [true, false, true]);
+        assert_eq!(own([0, 1, 1]), [true, false, false]);
+    }
+
+    #[test]
+    fn timestamps_are_compared_in_the_bits_that_all_have() {
+        assert_eq!(shared_ticks([64, 64, 64]), u64::MAX);
+        assert_eq!(shared_ticks([64, 36, 0]), (1 << 36) - 1);
+        assert_eq!(shared_ticks([32, 64, 48]), u64::from(u32::MAX));
     }
 
     #[test]

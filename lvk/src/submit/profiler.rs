@@ -219,7 +219,8 @@ impl Inner {
             profile.delay(gpu.milliseconds(earlier));
             *first = begin;
         }
-        let ms: Vec<f64> = ticks.iter().map(|tick| gpu.milliseconds(tick.wrapping_sub(*first))).collect();
+        let ms: Vec<f64> =
+            ticks.iter().map(|tick| gpu.milliseconds(gpu.ticks_since(*first, *tick))).collect();
         if let Some(root) = scope_tree(stamps, &ms) {
             profile.ms = profile.ms.max(root.start_ms + root.ms);
             profile.scopes.extend(root.children);

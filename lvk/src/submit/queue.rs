@@ -90,8 +90,8 @@ pub(crate) struct Submitter<T> {
 }
 
 struct Inner<T> {
-    /// Trackers of command buffers that were submitted, emptied for the next ones.
-    spare: Vec<(Tracker, Images)>,
+    /// What command buffers that were submitted used, emptied for the next ones.
+    spare: Vec<(Tracker, Images, Vec<(ResourceId, Access)>)>,
     lanes: Lanes,
     presentables: Presentables,
     /// What only the graphics queue may use, with names for messages.
@@ -143,9 +143,9 @@ impl<T> Submitter<T> {
             inner.lanes.begin_several();
         }
         let (sequence, slot) = inner.ring.acquire(&self.gpu, lane)?;
-        let (tracker, images) = inner.spare.pop().unwrap_or_default();
+        let (tracker, images, references) = inner.spare.pop().unwrap_or_default();
         drop(inner);
-        let (references, after) = (Vec::new(), Clock::default());
+        let after = Clock::default();
         let commands = slot.main;
         let recording =
             Recording { sequence, commands, tracker, images, references, after, lane, value: 0, slot };
@@ -217,7 +217,8 @@ impl<T> Submitter<T> {
         inner.ring.submitted(lane, sequence, slot, value);
         recording.tracker.clear();
         recording.images.clear();
-        inner.spare.push((recording.tracker, recording.images));
+        recording.references.clear();
+        inner.spare.push((recording.tracker, recording.images, recording.references));
     }
 
     /// Answers the value of the last.
@@ -384,6 +385,7 @@ impl<T> Submitter<T> {
         unsafe { self.gpu.device.queue_submit2(*queue, &submits, vk::Fence::null()) }
             .map_err(self.gpu.failed("vkQueueSubmit2"))?;
         lanes.submitted(lane, value);
+        self.timelines[lane].submitted(value);
         Ok(())
     }
 
