@@ -3,11 +3,13 @@
 //! them, with queues that are only rehearsed, and with one for all.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use lvk::ash::vk;
 use lvk::glam::Vec3;
 use lvk::{
     BlasDesc, BufferDesc, BuildFlags, BuildMode, ClearValue, ColorAttachment, Dependencies, Format, Holder,
-    MemoryKind, Queue, QueueRequest, RayQueryRequest, RenderPassDesc, RenderPipelineDesc, SubmitHandle,
-    TextureDesc, TextureHandle, TextureKind, TextureRange, TextureRegion, TextureUsage, TlasDesc,
+    MemoryKind, Queue, QueueRequest, RawWait, RayQueryRequest, RenderPassDesc, RenderPipelineDesc,
+    SubmitHandle, TextureDesc, TextureHandle, TextureKind, TextureRange, TextureRegion, TextureUsage,
+    TlasDesc,
 };
 use lvk_tests::agreement::Agreement;
 use lvk_tests::bender::{Bender, bent};
@@ -234,6 +236,40 @@ fn uploads_are_there_for_the_next_submission_on_any_queue() {
         }
         on(ctx, Queue::Transfer, |cmd| cmd.copy_buffer(*source, 0, *result, 0, 256).unwrap());
         assert_eq!(read_words(ctx, *result, WORDS), [5; WORDS]);
+    });
+}
+
+/// An upload goes out on the graphics queue, whichever queue the submission behind it is for: neither begins before the semaphore.
+#[test]
+fn semaphores_of_others_hold_up_uploads_on_every_queue() {
+    each(|ctx| {
+        let device = ctx.raw_device();
+        let words = words_buffer(ctx, &[1; WORDS]);
+        for queue in Queue::ALL {
+            on(ctx, queue, |_| {});
+            ctx.wait_idle().unwrap();
+            let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+            let info = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
+            // SAFETY: the device is alive, and timeline semaphores are turned on.
+            let semaphore = unsafe { device.create_semaphore(&info, None) }.unwrap();
+            ctx.upload_buffer(*words, 0, &[2; 4 * WORDS]).unwrap();
+            let cmd = ctx.acquire_command_buffer_on(queue).unwrap();
+            let wait = RawWait { semaphore, value: 1, stages: vk::PipelineStageFlags2::ALL_COMMANDS };
+            // SAFETY: the semaphore is signalled below.
+            let sent = unsafe { ctx.submit_with(cmd, &[wait], &[]) }.unwrap();
+            let upload = ctx.flush().unwrap();
+            std::thread::sleep(std::time::Duration::from_millis(50));
+            let early = [upload, sent].map(|submission| ctx.is_done(submission).unwrap());
+            // SAFETY: the value rises, and the GPU is done with the semaphore before it goes.
+            unsafe {
+                let info = vk::SemaphoreSignalInfo::default().semaphore(semaphore).value(1);
+                device.signal_semaphore(&info).unwrap();
+                ctx.wait_idle().unwrap();
+                device.destroy_semaphore(semaphore, None);
+            }
+            assert_eq!(early, [false; 2], "{queue:?}");
+            assert!(ctx.is_done(upload).unwrap() && ctx.is_done(sent).unwrap());
+        }
     });
 }
 

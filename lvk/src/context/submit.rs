@@ -1,5 +1,7 @@
 //! Hands command buffers to the GPU and waits for them.
 
+use ash::vk;
+
 use super::Context;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
@@ -61,6 +63,11 @@ impl Context {
         }
         let before = self.take_pending(&mut pending)?;
         let has_prelude = before.is_some();
+        if has_prelude {
+            // Uploads wait as well, whichever stages were named.
+            let all = vk::PipelineStageFlags2::ALL_COMMANDS;
+            more.waits.iter_mut().for_each(|wait| wait.stage_mask = all);
+        }
         if cmd.is_on_first_lane() {
             return self.send(before.into_iter().chain([cmd]), Submission { has_prelude, ..more });
         }
