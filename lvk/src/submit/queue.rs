@@ -17,6 +17,9 @@ use crate::gpu::Gpu;
 use crate::gpu::queues::Queue;
 use crate::lock::{Guard, Mutex, Rank};
 
+/// What command buffers use without barriers.
+type References = Vec<(ResourceId, Access)>;
+
 /// A command buffer being recorded, with what the tracker knows of it.
 pub(crate) struct Recording {
     /// Rises with every command buffer of the context.
@@ -25,7 +28,7 @@ pub(crate) struct Recording {
     pub(crate) tracker: Tracker,
     pub(crate) images: Images,
     /// What it uses that needs no barriers on one queue, and waits between several.
-    pub(crate) references: Vec<(ResourceId, Access)>,
+    pub(crate) references: References,
     /// What the caller has it wait for on other queues.
     pub(crate) after: Clock,
     /// The queue's.
@@ -91,7 +94,7 @@ pub(crate) struct Submitter<T> {
 
 struct Inner<T> {
     /// What command buffers that were submitted used, emptied for the next ones.
-    spare: Vec<(Tracker, Images, Vec<(ResourceId, Access)>)>,
+    spare: Vec<(Tracker, Images, References)>,
     lanes: Lanes,
     presentables: Presentables,
     /// What only the graphics queue may use, with names for messages.
