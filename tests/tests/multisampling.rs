@@ -1,4 +1,5 @@
-//! Several samples a pixel: coverage, resolves of colour, depth and stencil, sample shading, and what is refused.
+//! Several samples a pixel: coverage, also by alpha, resolves of colour, depth and stencil, sample shading, and what is
+//! refused.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -125,6 +126,53 @@ fn fragments_run_for_each_sample_that_they_ask_for() {
         });
         let found = lvk_tests::compute::read_words(&ctx, *counter, 1)[0];
         assert!(invocations.contains(&found), "{sample_shading}: {found}");
+    }
+}
+
+/// Strips of a picture, 8 pixels wide, of alphas from 0 to 1.
+const STRIPS: usize = 9;
+
+/// The red and the alpha of each strip of a picture, as the sum over its 8 x 8 pixels; red is 1 where it is drawn.
+fn strips(ctx: &Context, alpha_to_coverage: bool) -> [[f32; 2]; STRIPS] {
+    let fragment = "
+        layout(location = 0) out vec4 result;
+        void main() { result = vec4(1, 1, 1, float(int(gl_FragCoord.x) / 8) / 8.0); }";
+    let (format, size) = (Format::Rgba8Unorm, [8 * STRIPS as u32, 8]);
+    let color = [format.into()];
+    let desc = RenderPipelineDesc { color: &color, alpha_to_coverage, ..Default::default() };
+    let pipeline = make(ctx, fragment, &desc).unwrap();
+    let (drawn, one) = (many(ctx, format, size), target(ctx, format, size));
+    let color = [resolved(*drawn, *one)];
+    run_pass(ctx, &RenderPassDesc { color: &color, ..Default::default() }, |pass| {
+        pass.bind_render_pipeline(*pipeline)?;
+        paint(pass, [0.0; 4], 0.0)
+    });
+    let mut sums = [[0.0; 2]; STRIPS];
+    for (at, [red, _, _, alpha]) in pixels::<[u8; 4]>(ctx, *one).into_iter().enumerate() {
+        // Quarters of 255 are rounded.
+        let samples = f32::from(red) * SAMPLES as f32 / 255.0;
+        assert!((samples - samples.round()).abs() < 0.02, "{red} is no number of {SAMPLES} samples");
+        let sum = &mut sums[at % size[0] as usize / 8];
+        *sum = [sum[0] + samples.round() / SAMPLES as f32, sum[1] + f32::from(alpha) / 255.0];
+    }
+    sums
+}
+
+/// Which samples an alpha covers, and whether pixels differ in them, is the device's affair; how many is not.
+#[test]
+fn coverage_grows_with_alpha_where_it_is_asked_for() {
+    let Some(ctx) = device() else { return };
+    let covered = strips(&ctx, true).map(|[red, _]| red / 64.0);
+    assert_eq!((covered[0], covered[STRIPS - 1]), (0.0, 1.0), "{covered:?}");
+    assert!(covered.is_sorted(), "{covered:?}");
+    for (strip, share) in covered.iter().enumerate() {
+        let alpha = strip as f32 / 8.0;
+        assert!((share - alpha).abs() <= 1.0 / SAMPLES as f32, "alpha {alpha} covers {share}: {covered:?}");
+    }
+    let plain = strips(&ctx, false);
+    for (strip, [red, alpha]) in plain.into_iter().enumerate() {
+        assert_eq!(red, 64.0, "strip {strip} of {plain:?}");
+        assert!((alpha / 64.0 - strip as f32 / 8.0).abs() < 1.0 / 255.0, "strip {strip} of {plain:?}");
     }
 }
 
