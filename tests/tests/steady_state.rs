@@ -136,8 +136,9 @@ fn draws_take_nothing_from_the_heap_and_frames_leave_nothing_there() {
     allocations(200, DRAWS);
     let bytes = BYTES.load(Ordering::Relaxed);
     let (full, empty) = (allocations(1_000, DRAWS), allocations(1_000, 0));
-    // Lists grow now and then, as frames end when they end; a draw that allocates would make it a hundred thousand.
-    assert!(full.abs_diff(empty) < 100, "{full} with draws, {empty} without");
+    // Lists grow now and then, as frames end when they end, and more often on a busy machine; a draw that allocates would
+    // make it a hundred thousand.
+    assert!(full.abs_diff(empty) < 1_000, "{full} with draws, {empty} without");
     let (objects, staging) = (ctx.memory_budget(), staging_bytes(&ctx));
     frame.run_many(&ctx, 8_000, 10);
     let grown = BYTES.load(Ordering::Relaxed) - bytes;
