@@ -88,11 +88,16 @@ const TARGETS: [Format; 3] = [Format::Rgba8Unorm, Format::R32Uint, Format::Rgba3
 
 /// The picture of one pass that draws the pattern and reads it.
 fn in_one_pass(ctx: &Context, depth: Format) -> Vec<u32> {
+    drawn_and_read(ctx, depth, true)
+}
+
+/// The same, where depth is written by the pipeline, or else by the state of the pass, twice with a wait between.
+fn drawn_and_read(ctx: &Context, depth: Format, by_pipeline: bool) -> Vec<u32> {
     let textures = [input(ctx, TARGETS[0]), input(ctx, TARGETS[1]), target(ctx, TARGETS[2], SIZE)];
     let deep = input(ctx, depth);
     let targets = TARGETS.map(ColorTarget::new);
     let desc = RenderPipelineDesc { color: &targets, debug_name: "one pass", ..Default::default() };
-    let draw = RenderPipelineDesc { depth: depth_test(depth, true), ..desc };
+    let draw = RenderPipelineDesc { depth: depth_test(depth, by_pipeline), ..desc };
     let read = RenderPipelineDesc { depth: depth_test(depth, false), ..desc };
     let draw = color_pipeline(ctx, PATTERN, &draw).unwrap();
     let read = color_pipeline(ctx, &format!("{COMBINE}{BY_INPUTS}"), &read).unwrap();
@@ -106,6 +111,11 @@ fn in_one_pass(ctx: &Context, depth: Format) -> Vec<u32> {
     };
     run_pass(ctx, &desc, |pass| {
         pass.bind_render_pipeline(*draw)?;
+        if !by_pipeline {
+            pass.depth_state(DepthState { compare: CompareOp::Always, write: true })?;
+            pass.draw(0..3, 0..1)?;
+            pass.read_targets()?;
+        }
         pass.draw(0..3, 0..1)?;
         pass.bind_render_pipeline(*read)?;
         pass.draw(0..3, 0..1)
@@ -614,6 +624,16 @@ fn passes_have_what_their_pipelines_read() {
             pass.depth_state(DepthState { write: false, ..write })
         },
     );
+}
+
+/// Also behind a wait, after which the state still is what was set.
+#[test]
+fn depth_that_the_state_of_a_pass_writes_is_waited_for() {
+    let Some(ctx) = device() else { return };
+    if has(&ctx, OptionalFeature::LocalRead) {
+        let depth = Format::D32Float;
+        assert_eq!(drawn_and_read(&ctx, depth, false), in_two_passes(&ctx, depth));
+    }
 }
 
 #[test]

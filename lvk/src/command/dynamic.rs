@@ -29,6 +29,11 @@ struct Values {
 }
 
 impl DynamicState {
+    /// Whether draws write depth as things stand.
+    pub(super) fn writes_depth(&self) -> bool {
+        self.held.depth.is_some_and(|state| state.write)
+    }
+
     /// What has to be set for a pipeline that leaves `state` to the pass. What a pipeline does not leave is its own, and
     /// forgotten behind it.
     fn bind(&mut self, state: &PassState) -> Values {

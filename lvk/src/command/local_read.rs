@@ -116,11 +116,14 @@ pub(super) struct TargetHazards {
 }
 
 impl TargetHazards {
-    /// Counts what `pipeline` has drawn.
-    fn settle(&mut self, pipeline: Option<&RenderPipeline>) {
+    /// Counts what `pipeline` has drawn, while depth was written or not.
+    fn settle(&mut self, pipeline: Option<&RenderPipeline>, writes_depth: bool) {
         if let Some(pipeline) = pipeline.filter(|_| self.drawn) {
             self.read = self.read.union(pipeline.reads);
             self.written = self.written.union(pipeline.writes);
+            if writes_depth {
+                self.written.insert(Input::Depth);
+            }
         }
         self.drawn = false;
     }
@@ -193,7 +196,7 @@ impl RenderPass<'_> {
         if !self.targets.inputs.on {
             return;
         }
-        self.hazards.settle(self.pipeline.as_deref());
+        self.hazards.settle(self.pipeline.as_deref(), self.dynamic.writes_depth());
         if self.hazards.hold_up(next.reads, next.writes) {
             self.wait_for_targets();
         }
