@@ -8,13 +8,13 @@ use lvk::{
 
 use super::RasterError;
 
-/// The picture that a sample draws: colours in linear light, four samples a pixel, which become one encoded as sRGB at the
-/// end of the pass; with depth where things hide each other.
+/// The picture that a sample draws: colours in linear light, mostly of four samples a pixel, which become one encoded as sRGB
+/// at the end of the pass; with depth where things hide each other.
 ///
 /// Every device has four samples a pixel in these formats.
 pub struct Canvas {
     extent: [u32; 2],
-    samples: Holder<TextureHandle>,
+    samples: Option<Holder<TextureHandle>>,
     depth: Option<Holder<TextureHandle>>,
     picture: Holder<TextureHandle>,
     encoded: Holder<TextureHandle>,
@@ -28,7 +28,7 @@ impl Canvas {
     /// Of what is nearest.
     pub const NEAREST: DepthTest =
         DepthTest { format: Self::DEPTH, compare: CompareOp::Greater, write: true };
-    /// Samples a pixel.
+    /// Samples a pixel, where nobody asks for others.
     pub const SAMPLES: u32 = 4;
 
     /// A picture of `extent` pixels for what hides nothing, or is drawn in the order in which it lies.
@@ -36,6 +36,27 @@ impl Canvas {
     /// # Errors
     /// [`RasterError::BadSize`], and what Vulkan answers.
     pub fn flat(ctx: &Context, extent: [u32; 2]) -> Result<Self, RasterError> {
+        Self::of_samples(ctx, extent, Self::SAMPLES)
+    }
+
+    /// The same with depth.
+    ///
+    /// # Errors
+    /// As [`flat`](Self::flat).
+    pub fn with_depth(ctx: &Context, extent: [u32; 2]) -> Result<Self, RasterError> {
+        Self::with_samples(ctx, extent, Self::SAMPLES)
+    }
+
+    /// The same with this many samples a pixel. One is drawn right into the picture, and nothing becomes one at the end.
+    ///
+    /// # Errors
+    /// As [`flat`](Self::flat), also where the device has not so many samples a pixel.
+    pub fn with_samples(ctx: &Context, extent: [u32; 2], samples: u32) -> Result<Self, RasterError> {
+        let flat = Self::of_samples(ctx, extent, samples)?;
+        Ok(Self { depth: Some(target(ctx, Self::DEPTH, extent, samples, "depth")?), ..flat })
+    }
+
+    fn of_samples(ctx: &Context, extent: [u32; 2], samples: u32) -> Result<Self, RasterError> {
         check_size(ctx, extent)?;
         let picture = ctx.create_texture(&TextureDesc {
             format: Self::COLOR,
@@ -52,17 +73,9 @@ impl Canvas {
             debug_name: "encoded picture",
             ..TextureViewDesc::default()
         })?;
-        let samples = target(ctx, Self::COLOR, extent, "samples")?;
-        Ok(Self { extent, samples, depth: None, picture, encoded })
-    }
-
-    /// The same with depth.
-    ///
-    /// # Errors
-    /// As [`flat`](Self::flat).
-    pub fn with_depth(ctx: &Context, extent: [u32; 2]) -> Result<Self, RasterError> {
-        let flat = Self::flat(ctx, extent)?;
-        Ok(Self { depth: Some(target(ctx, Self::DEPTH, extent, "depth")?), ..flat })
+        let is_multisampled = samples != 1;
+        let samples = is_multisampled.then(|| target(ctx, Self::COLOR, extent, samples, "samples"));
+        Ok(Self { extent, samples: samples.transpose()?, depth: None, picture, encoded })
     }
 
     /// Pixels in a row, and rows.
@@ -96,10 +109,14 @@ impl Canvas {
         reads: &Dependencies<'_>,
     ) -> lvk::Result<RenderPass<'c>> {
         let [red, green, blue] = backdrop;
-        let color = ColorAttachment {
-            store: false,
-            resolve: Some(Resolve { texture: *self.picture, mip: 0, layer: 0 }),
-            ..ColorAttachment::clear(*self.samples, [red, green, blue, 1.0])
+        let cleared = |texture| ColorAttachment::clear(texture, [red, green, blue, 1.0]);
+        let color = match &self.samples {
+            Some(samples) => ColorAttachment {
+                store: false,
+                resolve: Some(Resolve { texture: *self.picture, mip: 0, layer: 0 }),
+                ..cleared(**samples)
+            },
+            None => cleared(*self.picture),
         };
         let depth = self.depth.as_ref().map(|depth| DepthAttachment {
             store: false,
@@ -121,12 +138,13 @@ fn target(
     ctx: &Context,
     format: Format,
     extent: [u32; 2],
+    samples: u32,
     debug_name: &str,
 ) -> lvk::Result<Holder<TextureHandle>> {
     ctx.create_texture(&TextureDesc {
         format,
         extent,
-        samples: Canvas::SAMPLES,
+        samples,
         usage: TextureUsage::TARGET,
         memory: TextureMemory::Transient,
         debug_name,

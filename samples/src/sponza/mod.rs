@@ -15,7 +15,6 @@ mod renderer;
 mod run;
 mod shadow;
 mod sun_view;
-mod targets;
 
 pub use args::SponzaArgs;
 pub use config::{DrawPath, SponzaConfig};

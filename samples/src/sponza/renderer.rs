@@ -14,13 +14,12 @@ use super::frustum::Frustum;
 use super::pipelines::{SKY, SURFACES};
 use super::shadow::Shadow;
 use super::sun_view::SunView;
-use super::targets::Targets;
 use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::app::scene_textures;
 use crate::hybrid::{SceneArrays, check_promises, near_plane};
-use crate::raster::{RasterError, RasterPipeline};
+use crate::raster::{Canvas, RasterError, RasterPipeline};
 use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, PointLight, Scene};
 
 /// Texels on an edge of the sky's cube map.
@@ -33,7 +32,7 @@ pub struct Sponza {
     ctx: Context,
     config: SponzaConfig,
     path_of_draws: DrawPath,
-    targets: Targets,
+    canvas: Canvas,
     culling: Culling,
     shadow: Shadow,
     surfaces: Holder<RenderPipelineHandle>,
@@ -84,7 +83,7 @@ impl Sponza {
     pub fn new(ctx: &Context, mut scene: Scene, config: &SponzaConfig) -> Result<Self, RasterError> {
         check_promises(&scene).map_err(RasterError::scene)?;
         let config = config.suited(ctx)?;
-        let targets = Targets::new(ctx, config.extent, config.samples)?;
+        let canvas = Canvas::with_samples(ctx, config.extent, config.samples)?;
         let draws = cut(&mut scene, config.triangles_per_draw);
         let path = CameraPath::tour(&scene, 0);
         let frame = ctx.create_buffer(&BufferDesc {
@@ -93,7 +92,7 @@ impl Sponza {
             ..BufferDesc::default()
         })?;
         Ok(Self {
-            targets,
+            canvas,
             culling: Culling::new(ctx, &draws)?,
             shadow: Shadow::new(ctx, config.shadow_size)?,
             surfaces: pipeline(ctx, &SURFACES, config.samples)?,
@@ -143,8 +142,7 @@ impl Sponza {
         if !self.config.culls {
             return [Frustum::ALL; 2];
         }
-        let [width, height] = self.targets.extent();
-        let seen = || Frustum::of_camera(&self.camera, width as f32 / height as f32, self.near_plane);
+        let seen = || Frustum::of_camera(&self.camera, self.canvas.aspect(), self.near_plane);
         [self.kept.unwrap_or_else(seen), Frustum::of_rows(self.sun_view().rows)]
     }
 
@@ -194,7 +192,7 @@ impl Sponza {
     }
 
     fn upload_frame(&self) -> lvk::Result<()> {
-        let [width, height] = self.targets.extent();
+        let [width, height] = self.canvas.extent();
         let (draws, arguments, counts) = self.culling.addresses(&self.ctx)?;
         let frusta = self.frusta();
         let constants = FrameConstants {
@@ -221,7 +219,7 @@ impl Sponza {
             read_buffers: &self.culling.reads(0),
             ..Dependencies::default()
         };
-        let mut pass = self.targets.begin(&mut to.cmd, &reads)?;
+        let mut pass = self.canvas.begin(&mut to.cmd, "surfaces", [0.0; 3], &reads)?;
         pass.bind_render_pipeline(*self.surfaces)?;
         pass.push_constants(&address)?;
         self.culling.draw(&mut pass, 0, self.path_of_draws)?;
@@ -268,7 +266,7 @@ impl Sample for Sponza {
         frame.pass("culling", |cmd| self.culling.record(cmd, address))?;
         self.shadow.record(&mut frame.cmd, &self.culling, self.path_of_draws, address)?;
         self.draw_surfaces(frame, address)?;
-        Ok(self.targets.picture())
+        Ok(self.canvas.picture())
     }
 
     fn after_frame(&mut self) -> Result<(), RasterError> {
@@ -281,7 +279,7 @@ impl Sample for Sponza {
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.targets = Targets::new(&self.ctx, extent, self.config.samples)?;
+        self.canvas = Canvas::with_samples(&self.ctx, extent, self.config.samples)?;
         self.config.extent = extent;
         Ok(())
     }
