@@ -1,6 +1,11 @@
-//! Arrays of plain elements on the device.
+//! Buffers on the device, for plain elements.
 
 use lvk::{BufferDesc, BufferHandle, BufferUsage, Context, Holder};
+
+/// Room for this many bytes, which shaders reach.
+pub(crate) fn buffer(ctx: &Context, debug_name: &str, size_bytes: u64) -> lvk::Result<Holder<BufferHandle>> {
+    ctx.create_buffer(&BufferDesc { size_bytes, debug_name, ..BufferDesc::default() })
+}
 
 /// A buffer with these elements.
 pub(crate) fn array<T: bytemuck::NoUninit>(

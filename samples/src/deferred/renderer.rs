@@ -4,15 +4,15 @@ use std::f32::consts::TAU;
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context, Dependencies, DepthAttachment, Filter,
-    Holder, IndexFormat, RenderPass, RenderPassDesc, SamplerDesc, SamplerHandle, TextureHandle,
+    BufferHandle, BufferUsage, CommandBuffer, Context, Dependencies, DepthAttachment, Filter, Holder,
+    IndexFormat, RenderPass, RenderPassDesc, SamplerDesc, SamplerHandle, TextureHandle,
 };
 
 use super::hall::{Hall, MATERIALS};
 use super::pipelines::{Draw, Pipelines};
 use super::targets::Targets;
 use super::{DeferredConfig, Passes, View};
-use crate::app::array_buffer::array;
+use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::raster::RasterError;
@@ -79,11 +79,7 @@ impl Deferred {
     pub fn new(ctx: &Context, config: &DeferredConfig) -> Result<Self, RasterError> {
         let passes = Passes::choose(config.passes, ctx)?;
         let hall = Hall::new();
-        let frame = ctx.create_buffer(&BufferDesc {
-            size_bytes: size_of::<FrameConstants>() as u64,
-            debug_name: "frame constants",
-            ..BufferDesc::default()
-        })?;
+        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let nearest = SamplerDesc {
             mag_filter: Filter::Nearest,
             min_filter: Filter::Nearest,

@@ -4,6 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use lvk::{BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context, Holder};
 
 use super::frame::BouncePlaces;
+use crate::app::array_buffer::buffer;
 
 /// Bytes of `BouncePixel` in `shaders/hybrid/bounce_queue.glsl`.
 const PIXEL_BYTES: u64 = 28;
@@ -40,11 +41,7 @@ impl BounceQueue {
                 debug_name: "bounce queue's head",
                 ..BufferDesc::default()
             })?,
-            pixels: ctx.create_buffer(&BufferDesc {
-                size_bytes: u64::from(capacity) * PIXEL_BYTES,
-                debug_name: "bounce queue",
-                ..BufferDesc::default()
-            })?,
+            pixels: buffer(ctx, "bounce queue", u64::from(capacity) * PIXEL_BYTES)?,
         })
     }
 

@@ -10,6 +10,7 @@ use lvk::{
 use super::config::RasterTuning;
 use super::frame::{Push, VisibilityPlaces};
 use super::shader_module::module;
+use crate::app::array_buffer::buffer;
 use crate::shaders::hybrid as texts;
 
 /// Triangles of a workgroup of the first pass (`shaders/hybrid/raster_small.comp.glsl`).
@@ -69,11 +70,7 @@ impl ComputeRaster {
             small: pipeline(ctx, texts::RASTER_SMALL_COMP, &small_pixels, "raster_small.comp")?,
             medium: pipeline(ctx, texts::RASTER_MEDIUM_COMP, &medium_pixels, "raster_medium.comp")?,
             tiles: pipeline(ctx, texts::RASTER_TILE_COMP, &[], "raster_tile.comp")?,
-            words: ctx.create_buffer(&BufferDesc {
-                size_bytes: words_bytes,
-                debug_name: "visibility words",
-                ..BufferDesc::default()
-            })?,
+            words: buffer(ctx, "visibility words", words_bytes)?,
             words_bytes,
             set_triangles: list(ctx, u64::from(set_capacity) * TRIANGLE_BYTES, "triangles set aside")?,
             set_capacity,

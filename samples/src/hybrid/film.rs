@@ -1,6 +1,8 @@
 //! Where the light of pixels ends: the picture, and the sums of samples on the way to it.
 
-use lvk::{BufferDesc, BufferHandle, Context, Format, Holder, TextureDesc, TextureHandle, TextureUsage};
+use lvk::{BufferHandle, Context, Format, Holder, TextureDesc, TextureHandle, TextureUsage};
+
+use crate::app::array_buffer::buffer;
 
 /// The picture, and a colour a pixel where it has several samples.
 pub(super) struct Film {
@@ -19,8 +21,7 @@ impl Film {
             ..TextureDesc::default()
         })?;
         let size_bytes = u64::from(extent[0]) * u64::from(extent[1]) * size_of::<[f32; 3]>() as u64;
-        let desc = BufferDesc { size_bytes, debug_name: "sums of samples", ..BufferDesc::default() };
-        let sums = (samples > 1).then(|| ctx.create_buffer(&desc)).transpose()?;
+        let sums = (samples > 1).then(|| buffer(ctx, "sums of samples", size_bytes)).transpose()?;
         Ok(Self { picture, sums })
     }
 

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use lvk::{BufferDesc, BufferHandle, CommandBuffer, Context, Holder};
+use lvk::{BufferHandle, CommandBuffer, Context, Holder};
 
 use super::bands::bands;
 use super::config::{Bounces, HybridConfig};
@@ -12,6 +12,7 @@ use super::geometry_stage::GeometryStage;
 use super::gpu_scene::GpuScene;
 use super::pixel_order::PixelOrder;
 use super::ray_pass::{GeometryLeft, RayPass};
+use crate::app::array_buffer::buffer;
 use crate::scene::GpuCamera;
 
 /// Rows that a CPU renders in one go: short enough to show progress, long enough to keep every core busy.
@@ -47,7 +48,7 @@ struct Places {
 impl Passes {
     pub(super) fn new(ctx: &Context, scene: &GpuScene, config: &HybridConfig) -> lvk::Result<Self> {
         let HybridConfig { width, height, samples, .. } = *config;
-        let frame_buffer = frame_buffer(ctx, samples)?;
+        let frame_buffer = buffer(ctx, "frame constants", FRAME_BYTES * u64::from(samples))?;
         let film = Film::new(ctx, [width, height], samples)?;
         let geometry = GeometryStage::new(ctx, scene, config)?;
         let is_ordered = config.bounces == Some(Bounces::First) && config.max_depth > 0;
@@ -134,11 +135,6 @@ impl Passes {
 
 fn band_rows(config: &HybridConfig, is_cpu: bool) -> u32 {
     if is_cpu { CPU_BAND_ROWS } else { GPU_BAND_PIXELS / config.width }
-}
-
-fn frame_buffer(ctx: &Context, samples: u32) -> lvk::Result<Holder<BufferHandle>> {
-    let size_bytes = FRAME_BYTES * u64::from(samples);
-    ctx.create_buffer(&BufferDesc { size_bytes, debug_name: "frame constants", ..BufferDesc::default() })
 }
 
 fn indices(scene: &GpuScene, geometry: &GeometryStage, output: u32) -> Indices {

@@ -1,13 +1,14 @@
 //! The order in which pixels are rendered: those with mirrors and glass first.
 
 use lvk::{
-    BufferDesc, BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context,
-    Dependencies, Holder, ShaderStage,
+    BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, Holder,
+    ShaderStage,
 };
 
 use super::frame::Push;
 use super::ray_pass::GeometryLeft;
 use super::shader_module::module;
+use crate::app::array_buffer::buffer;
 use crate::shaders::hybrid as texts;
 
 /// Side in pixels of the square of a workgroup (`shaders/hybrid/order.comp.glsl`).
@@ -34,11 +35,7 @@ impl PixelOrder {
                 debug_name: "order of pixels",
                 ..ComputePipelineDesc::default()
             })?,
-            order: ctx.create_buffer(&BufferDesc {
-                size_bytes: HEAD_BYTES + pixels * PIXEL_BYTES,
-                debug_name: "order of pixels",
-                ..BufferDesc::default()
-            })?,
+            order: buffer(ctx, "order of pixels", HEAD_BYTES + pixels * PIXEL_BYTES)?,
             groups: [extent[0].div_ceil(SQUARE), extent[1].div_ceil(SQUARE), 1],
         })
     }

@@ -1,6 +1,6 @@
 //! The sample as a type: give it a scene and a time, get a picture.
 
-use lvk::{BufferDesc, BufferHandle, Context, Holder, TextureHandle, TextureRegion};
+use lvk::{BufferHandle, Context, Holder, TextureHandle, TextureRegion};
 
 use super::buffers::Buffers;
 use super::config::HybridOitConfig;
@@ -13,6 +13,7 @@ use super::scene::{OitScene, PERIOD_SECONDS};
 use super::shadow_pass::ShadowPass;
 use super::structures::Structures;
 use super::targets::Targets;
+use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::scene::Camera;
 
@@ -44,11 +45,7 @@ impl HybridOit {
         let buffers = Buffers::new(ctx, scene, samples(extent), config.nodes())?;
         let structures = Structures::new(ctx, scene, &buffers)?;
         let targets = Targets::new(ctx, extent, [config.width, config.height])?;
-        let constants = ctx.create_buffer(&BufferDesc {
-            size_bytes: size_of::<FrameConstants>() as u64,
-            debug_name: "frame constants",
-            ..BufferDesc::default()
-        })?;
+        let constants = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         Ok(Self {
             images: ImagePasses::new(ctx)?,
             raster: RasterPasses::new(ctx, scene, &buffers)?,

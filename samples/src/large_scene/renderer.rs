@@ -1,13 +1,14 @@
 //! The sample as a type: say the moment, get a picture.
 
 use bytemuck::{Pod, Zeroable};
-use lvk::{BufferDesc, BufferHandle, Context, Dependencies, Holder, TextureHandle};
+use lvk::{BufferHandle, Context, Dependencies, Holder, TextureHandle};
 
 use super::figures::{Figures, Origin, bytes, number};
 use super::gpu_world::GpuWorld;
 use super::pipelines::RAYS;
 use super::world::World;
 use super::{LargeSceneConfig, LargeSceneError, Show};
+use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::progress::Progress;
 use crate::app::sample::{Moment, Sample};
@@ -67,11 +68,7 @@ impl LargeScene {
         let canvas = Canvas::new(ctx, &config.rtx)?;
         let gpu_world = GpuWorld::new(ctx, world, &config, progress)?;
         progress.stage("compiling shaders", 0);
-        let frame = ctx.create_buffer(&BufferDesc {
-            size_bytes: size_of::<FrameConstants>() as u64,
-            debug_name: "frame constants",
-            ..BufferDesc::default()
-        })?;
+        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let [places, firsts] = gpu_world.tables(ctx)?;
         let farthest = world.farthest();
         let constants = FrameConstants {

@@ -5,7 +5,7 @@ use std::f32::consts::TAU;
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, RenderPipelineDesc,
+    BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, RenderPipelineDesc,
     RenderPipelineHandle, TextureHandle,
 };
 
@@ -13,7 +13,7 @@ use super::counter::Counter;
 use super::knot::knot;
 use super::meshlets::Meshlets;
 use super::pipelines::MESHLETS;
-use crate::app::array_buffer::array;
+use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::raster::{Canvas, RasterError};
@@ -80,11 +80,7 @@ impl MeshShaders {
         let canvas = Canvas::with_depth(ctx, extent)?;
         let (corners, meshlets) = model();
         let counter = Counter::new(ctx)?;
-        let frame = ctx.create_buffer(&BufferDesc {
-            size_bytes: size_of::<FrameConstants>() as u64,
-            debug_name: "frame constants",
-            ..BufferDesc::default()
-        })?;
+        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let usage = BufferUsage::STORAGE;
         let buffers = [
             array(ctx, "meshlets", usage, &meshlets.meshlets)?,

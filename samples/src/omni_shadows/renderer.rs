@@ -1,14 +1,14 @@
 //! The sample as a type: say the moment, get a picture.
 
 use bytemuck::Zeroable;
-use lvk::{BufferDesc, BufferHandle, BufferUsage, Context, Holder, SamplerHandle, TextureHandle};
+use lvk::{BufferHandle, BufferUsage, Context, Holder, SamplerHandle, TextureHandle};
 
 use super::config::{Faces, OmniShadowsConfig, ShadowFilter};
 use super::frame::FrameConstants;
 use super::models::{self, Draw, Instance, Models};
 use super::scene_pass::ScenePass;
 use super::shadow_cube::{CubePass, ShadowCube, samplers};
-use crate::app::array_buffer::array;
+use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::raster::{Canvas, RasterError};
@@ -208,8 +208,4 @@ impl Sample for OmniShadows {
         self.scene_pass = scene_pass;
         Ok(())
     }
-}
-
-fn buffer(ctx: &Context, debug_name: &str, size_bytes: u64) -> lvk::Result<Holder<BufferHandle>> {
-    ctx.create_buffer(&BufferDesc { size_bytes, debug_name, ..BufferDesc::default() })
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, BuildMode,
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, BuildFlags, BuildMode,
     CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, GeometryFlags, Holder,
     PrimitiveOrder, Triangles,
 };
@@ -16,7 +16,7 @@ use super::pipelines::{LEAVES, SKIN};
 use super::quantise::pack_normal;
 use super::serpent::{self, BONE_COUNT, Skin};
 use super::tables::{Arena, index_range};
-use crate::app::array_buffer::array;
+use crate::app::array_buffer::{array, buffer};
 use crate::pipelines::SampleStage;
 
 /// Invocations of a work group of both compute shaders.
@@ -100,11 +100,7 @@ impl Moving {
             leaf_indices: arena.add_indices(&quads),
             leaf_count,
             rest: array(ctx, "skin at rest", BufferUsage::STORAGE, &rest)?,
-            bones: ctx.create_buffer(&BufferDesc {
-                size_bytes: (BONE_COUNT * size_of::<[f32; 12]>()) as u64,
-                debug_name: "bones",
-                ..BufferDesc::default()
-            })?,
+            bones: buffer(ctx, "bones", (BONE_COUNT * size_of::<[f32; 12]>()) as u64)?,
             positions,
             normals,
             leaves,

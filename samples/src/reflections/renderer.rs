@@ -1,7 +1,7 @@
 //! The sample as a type: say the moment, get a picture.
 
 use lvk::{
-    AddressMode, BufferDesc, BufferHandle, Context, Format, Holder, SamplerDesc, SamplerHandle, TextureDesc,
+    AddressMode, BufferHandle, Context, Format, Holder, SamplerDesc, SamplerHandle, TextureDesc,
     TextureHandle,
 };
 
@@ -18,6 +18,7 @@ use super::tables::{Arena, Tables};
 use super::targets::Targets;
 use super::top_level::{InstanceCount, TopLevel};
 use super::world::{self, World};
+use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::pass_times::PassTimes;
 use crate::app::sample::{Moment, Sample};
@@ -84,11 +85,7 @@ impl Reflections {
         };
         targets.name_in(&mut indices);
         textures.push(sky);
-        let frame_buffer = ctx.create_buffer(&BufferDesc {
-            size_bytes: FRAME_BYTES * u64::from(config.samples),
-            debug_name: "frame constants",
-            ..BufferDesc::default()
-        })?;
+        let frame_buffer = buffer(ctx, "frame constants", FRAME_BYTES * u64::from(config.samples))?;
         Ok(Self {
             constants: world_constants(&world, &tables),
             raster: RasterPasses::new(ctx)?,

@@ -1,8 +1,9 @@
 //! The pictures that the passes hand to each other.
 
-use lvk::{BufferDesc, BufferHandle, Context, Format, Holder, TextureDesc, TextureHandle, TextureUsage};
+use lvk::{BufferHandle, Context, Format, Holder, TextureDesc, TextureHandle, TextureUsage};
 
 use super::frame::Indices;
+use crate::app::array_buffer::buffer;
 
 /// Normals, colour, roughness and material of a g-buffer (`shaders/reflections/gbuffer.glsl`).
 pub(super) const SURFACE_FORMAT: Format = Format::Rgba32Uint;
@@ -44,8 +45,7 @@ impl Targets {
         };
         let target = |format, name| make(format, TextureUsage::TARGET, name);
         let size_bytes = u64::from(extent[0]) * u64::from(extent[1]) * size_of::<[f32; 4]>() as u64;
-        let sums =
-            ctx.create_buffer(&BufferDesc { size_bytes, debug_name: "sums", ..BufferDesc::default() })?;
+        let sums = buffer(ctx, "sums", size_bytes)?;
         let light = |name| make(Format::Rgba16Float, TextureUsage::STORAGE, name);
         Ok(Self {
             opaque_surface: target(SURFACE_FORMAT, "opaque surface")?,

@@ -2,15 +2,15 @@
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, RenderPass,
-    RenderPipelineDesc, RenderPipelineHandle, TextureHandle,
+    BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, RenderPass, RenderPipelineDesc,
+    RenderPipelineHandle, TextureHandle,
 };
 
 use super::config::{Faces, RenderToCubeMapConfig, has_six_views};
 use super::cube_map::{CubeMap, FACES};
 use super::pipelines::{self, IN_PICTURE, ON_ALL_FACES, ON_FACE};
 use super::surroundings::{Block, DROP, blocks, camera};
-use crate::app::array_buffer::array;
+use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::raster::{Canvas, RasterError};
@@ -86,11 +86,7 @@ impl RenderToCubeMap {
         config.faces.check(ctx)?;
         let canvas = Canvas::with_depth(ctx, config.extent)?;
         let blocks = blocks(0.0);
-        let frame = ctx.create_buffer(&BufferDesc {
-            size_bytes: size_of::<FrameConstants>() as u64,
-            debug_name: "frame constants",
-            ..BufferDesc::default()
-        })?;
+        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         Ok(Self {
             canvas,
             config: *config,

@@ -1,13 +1,14 @@
 //! The passes over pixels: rays by pipeline from what was rasterised, and the cache.
 
 use lvk::{
-    BufferDesc, BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder,
+    BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder,
     RayTracingPipelineDesc, RayTracingPipelineHandle, TextureHandle,
 };
 
 use super::frame::Push;
 use super::pipelines::{ACCUMULATE, LIGHT_RAYS, OPEN_MISS, SAMPLE};
 use super::targets::Targets;
+use crate::app::array_buffer::buffer;
 use crate::rtx::{compute_pipeline, groups};
 
 /// Rays from the targets of the rasteriser.
@@ -66,7 +67,7 @@ impl Cache {
     /// Room for the sums of a picture.
     pub(super) fn sums(ctx: &Context, [width, height]: [u32; 2]) -> lvk::Result<Holder<BufferHandle>> {
         let size_bytes = u64::from(width) * u64::from(height) * size_of::<[f32; 4]>() as u64;
-        ctx.create_buffer(&BufferDesc { size_bytes, debug_name: "cache", ..BufferDesc::default() })
+        buffer(ctx, "cache", size_bytes)
     }
 
     /// Adds what was drawn, and writes the picture.

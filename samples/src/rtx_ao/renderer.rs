@@ -2,8 +2,8 @@
 
 use glam::{Affine3A, Vec3};
 use lvk::{
-    AccelStructHandle, BufferDesc, BufferHandle, BuildMode, CommandBuffer, Context, Holder, SamplerDesc,
-    SamplerHandle, TextureHandle, TlasDesc, TlasInstance, transform_rows,
+    AccelStructHandle, BufferHandle, BuildMode, CommandBuffer, Context, Holder, SamplerDesc, SamplerHandle,
+    TextureHandle, TlasDesc, TlasInstance, transform_rows,
 };
 
 use super::body::{Body, BodyConstants};
@@ -12,6 +12,7 @@ use super::frame::{FrameConstants, Lighting};
 use super::light_pass::{Cache, LightRays};
 use super::raster::Raster;
 use super::targets::Targets;
+use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::hybrid::RayPath;
@@ -73,9 +74,6 @@ impl RtxAo {
             .map(|scene| Body::new(ctx, scene))
             .collect::<Result<_, _>>()?;
         let tlas = ctx.create_tlas(&TlasDesc { capacity: bodies.len() as u32, ..TlasDesc::default() })?;
-        let buffer = |debug_name, size: usize| {
-            ctx.create_buffer(&BufferDesc { size_bytes: size as u64, debug_name, ..BufferDesc::default() })
-        };
         let path = CameraPath::tour(scene, 0);
         let radius = config.radius.unwrap_or_else(|| usual_radius(scene));
         Ok(Self {
@@ -85,8 +83,8 @@ impl RtxAo {
             cache: Cache::new(ctx, extent)?,
             lighting: Lighting::new(scene, radius, tlas.index()),
             sampler: ctx.create_sampler(&SamplerDesc { max_anisotropy: 8.0, ..SamplerDesc::default() })?,
-            frame: buffer("frame constants", size_of::<FrameConstants>())?,
-            tables: buffer("bodies", bodies.len() * size_of::<BodyConstants>())?,
+            frame: buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?,
+            tables: buffer(ctx, "bodies", (bodies.len() * size_of::<BodyConstants>()) as u64)?,
             view: View { camera: path.at(0.0), turns: 0.0 },
             path,
             ctx: ctx.clone(),

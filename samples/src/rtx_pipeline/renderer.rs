@@ -1,10 +1,11 @@
 //! The sample as a type: say the moment, get a picture.
 
 use bytemuck::{Pod, Zeroable};
-use lvk::{BufferDesc, BufferHandle, Context, Dependencies, Holder, TextureHandle};
+use lvk::{BufferHandle, Context, Dependencies, Holder, TextureHandle};
 
 use super::config::RtxPipelineConfig;
 use super::pipelines::RAYS;
+use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::hybrid::{GpuScene, HitGroups, Lighting, SceneAddresses, near_plane};
@@ -54,11 +55,7 @@ impl RtxPipeline {
         let canvas = Canvas::new(ctx, &config.rtx)?;
         let gpu_scene = GpuScene::new(ctx, scene, HIT_GROUPS)?;
         let path = CameraPath::tour(scene, 0);
-        let frame = ctx.create_buffer(&BufferDesc {
-            size_bytes: size_of::<FrameConstants>() as u64,
-            debug_name: "frame constants",
-            ..BufferDesc::default()
-        })?;
+        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let constants = FrameConstants {
             camera: GpuCamera::zeroed(),
             scene: gpu_scene.addresses(),

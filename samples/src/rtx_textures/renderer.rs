@@ -4,14 +4,14 @@ use std::f32::consts::TAU;
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildMode,
-    CommandBuffer, ComputePipelineHandle, Context, Dependencies, DeviceInstances, GeometryFlags, Holder,
-    IndexFormat, Indices, SamplerDesc, SamplerHandle, TextureHandle, TlasDesc, Triangles, VertexFormat,
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, BuildMode, CommandBuffer,
+    ComputePipelineHandle, Context, Dependencies, DeviceInstances, GeometryFlags, Holder, IndexFormat,
+    Indices, SamplerDesc, SamplerHandle, TextureHandle, TlasDesc, Triangles, VertexFormat,
 };
 
 use super::models::{Models, Vertex};
 use super::pipelines::{INSTANCES, RAYS};
-use crate::app::array_buffer::array;
+use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::app::scene_textures;
@@ -238,8 +238,4 @@ fn build_blas(
     let desc = |geometries| BlasDesc { geometries, debug_name: "model", ..BlasDesc::default() };
     let descs: Vec<_> = geometries.iter().map(|geometries| desc(&geometries[..])).collect();
     ctx.create_blas_batch(&descs)
-}
-
-fn buffer(ctx: &Context, debug_name: &str, size_bytes: u64) -> lvk::Result<Holder<BufferHandle>> {
-    ctx.create_buffer(&BufferDesc { size_bytes, debug_name, ..BufferDesc::default() })
 }

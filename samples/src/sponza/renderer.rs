@@ -2,8 +2,8 @@
 
 use glam::{Quat, Vec3};
 use lvk::{
-    AddressMode, BufferDesc, BufferHandle, BufferUsage, Context, Dependencies, Holder, Readback,
-    RenderPipelineHandle, SamplerDesc, SamplerHandle, TextureHandle,
+    AddressMode, BufferHandle, BufferUsage, Context, Dependencies, Holder, Readback, RenderPipelineHandle,
+    SamplerDesc, SamplerHandle, TextureHandle,
 };
 
 use super::config::{DrawPath, SponzaConfig};
@@ -14,7 +14,7 @@ use super::frustum::Frustum;
 use super::pipelines::{SKY, SURFACES};
 use super::shadow::Shadow;
 use super::sun_view::SunView;
-use crate::app::array_buffer::array;
+use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::app::scene_textures;
@@ -86,11 +86,7 @@ impl Sponza {
         let canvas = Canvas::with_samples(ctx, config.extent, config.samples)?;
         let draws = cut(&mut scene, config.triangles_per_draw);
         let path = CameraPath::tour(&scene, 0);
-        let frame = ctx.create_buffer(&BufferDesc {
-            size_bytes: size_of::<FrameConstants>() as u64,
-            debug_name: "frame constants",
-            ..BufferDesc::default()
-        })?;
+        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         Ok(Self {
             canvas,
             culling: Culling::new(ctx, &draws)?,

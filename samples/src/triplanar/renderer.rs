@@ -4,14 +4,14 @@ use std::f32::consts::TAU;
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, IndexFormat,
-    RenderPipelineDesc, RenderPipelineHandle, SamplerDesc, SamplerHandle, TextureHandle,
+    BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, IndexFormat, RenderPipelineDesc,
+    RenderPipelineHandle, SamplerDesc, SamplerHandle, TextureHandle,
 };
 
 use super::bodies::Bodies;
 use super::pipelines::BODIES;
 use super::streamed::{COUNT, Presence, Streamed};
-use crate::app::array_buffer::array;
+use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::raster::{Canvas, RasterError};
@@ -67,11 +67,7 @@ impl Triplanar {
         let vertices = array(ctx, "vertices", BufferUsage::STORAGE, &bodies.vertices)?;
         let placed = array(ctx, "bodies", BufferUsage::STORAGE, &bodies.bodies)?;
         let sampler = ctx.create_sampler(&SamplerDesc { max_anisotropy: 8.0, ..SamplerDesc::default() })?;
-        let frame = ctx.create_buffer(&BufferDesc {
-            size_bytes: size_of::<FrameConstants>() as u64,
-            debug_name: "frame constants",
-            ..BufferDesc::default()
-        })?;
+        let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let constants = FrameConstants {
             vertices: ctx.buffer_address(*vertices)?,
             bodies: ctx.buffer_address(*placed)?,
