@@ -173,7 +173,7 @@ mod tests {
     fn defaults_are_those_of_the_help() {
         let args = parsed("").unwrap();
         let (run, scene) = (&args.run, &args.scene);
-        assert_eq!((run.width, run.height, scene.camera, args.depth), (1280, 720, 1, 4));
+        assert_eq!((run.width, run.height, scene.camera.number, args.depth), (1280, 720, 1, 4));
         assert_eq!((run.frames.clone(), run.round, run.resume), (None, 240, false));
         assert_eq!((args.method, args.tracing.rt, run.validate), (None, RayTracing::Auto, None));
         assert_eq!((args.gbuffer, args.raster), (GBuffer::Visibility, Raster::Auto));

@@ -1,5 +1,6 @@
 //! The part of the command line that samples with scenes share.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -26,26 +27,42 @@ pub struct SceneArgs {
     #[arg(long, value_name = "FILE", requires = "scene", help_heading = "Scene")]
     pub cameras: Option<PathBuf>,
 
+    /// From where it is seen
+    #[command(flatten)]
+    pub camera: CameraArgs,
+
+    /// What is known by name
+    #[command(flatten)]
+    pub list: ListArgs,
+}
+
+/// Through which camera a scene is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
+pub struct CameraArgs {
     /// Which of the scene's five cameras to look through; a sequence starts there and passes through all five
     #[arg(
-        long,
+        long = "camera",
         value_name = "1-5",
         default_value_t = 1,
         value_parser = clap::value_parser!(u32).range(1..=5),
         help_heading = "Scene"
     )]
-    pub camera: u32,
+    pub number: u32,
+}
 
+/// The question for scenes.
+#[derive(Debug, Clone, PartialEq, Eq, Args)]
+pub struct ListArgs {
     /// Print the scenes that --scene knows by name, and exit; FOLDER is searched, else that in LVK_SCENES
     #[arg(
         long,
         value_name = "FOLDER",
         num_args = 0..=1,
         default_missing_value = "",
-        value_parser = clap::value_parser!(std::ffi::OsString),
+        value_parser = clap::value_parser!(OsString),
         help_heading = "Scene"
     )]
-    pub list_scenes: Option<std::ffi::OsString>,
+    pub list_scenes: Option<OsString>,
 }
 
 impl SceneArgs {
@@ -79,17 +96,27 @@ impl SceneArgs {
         Ok(())
     }
 
-    /// What `--list-scenes` prints, where it was given.
-    #[must_use]
-    pub fn listing(&self) -> Option<String> {
-        self.list_scenes.as_ref().map(|folder| scene_list::listing(Some(Path::new(folder))))
-    }
-
     fn file(&self) -> Option<PathBuf> {
         let wish = self.scene.as_ref()?;
         let file = scene_list::resolve(wish, scene_list::folder().as_deref());
         let is_built_in = file == Path::new(scene_list::BUILT_IN) && !file.exists();
         if is_built_in { None } else { Some(file) }
+    }
+}
+
+impl CameraArgs {
+    /// Place of the camera among the scene's five, 0 to 4.
+    #[must_use]
+    pub fn place(&self) -> usize {
+        self.number.clamp(1, 5) as usize - 1
+    }
+}
+
+impl ListArgs {
+    /// What `--list-scenes` prints, where it was given.
+    #[must_use]
+    pub fn listing(&self) -> Option<String> {
+        self.list_scenes.as_ref().map(|folder| scene_list::listing(Some(Path::new(folder))))
     }
 }
 

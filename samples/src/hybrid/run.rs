@@ -40,7 +40,7 @@ impl From<HybridError> for RunError {
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &HybridArgs) -> ExitCode {
-    match args.scene.listing() {
+    match args.scene.list.listing() {
         Some(listing) => {
             say(&listing);
             ExitCode::SUCCESS
@@ -67,7 +67,7 @@ fn open(args: &HybridArgs, opening: &mut Opening<'_>) -> Result<Opened<HybridSeq
     opening.progress.stage("uploading the scene and building acceleration structures", 0);
     let mut renderer = HybridRenderer::new(&context, &scene, &config)?;
     let mut headline = headline(&context, &scene, &config, &renderer);
-    let first = (args.scene.camera as usize).clamp(1, 5) - 1;
+    let first = args.scene.camera.place();
     // A sequence needs no telling which rasteriser would be faster.
     if !matches!(args.run.frames, Some(Frames::Sequence(_)))
         && let Some(choice) = renderer.choose_raster(&scene.cameras[first])?

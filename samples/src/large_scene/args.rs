@@ -8,6 +8,7 @@ use clap::{Parser, ValueEnum};
 use super::{LargeSceneConfig, Show};
 use crate::app::ray_args::RayArgs;
 use crate::app::run_args::RunArgs;
+use crate::app::scene_args::{CameraArgs, ListArgs};
 
 /// Renders millions of triangles by rays, and writes pictures as PNG.
 ///
@@ -49,26 +50,13 @@ pub struct LargeSceneArgs {
     #[arg(long, value_enum, default_value_t = Layout::Instanced, help_heading = "Scene")]
     pub layout: Layout,
 
-    /// Which of the world's five cameras to look through; a sequence starts there and passes through all five
-    #[arg(
-        long,
-        value_name = "1-5",
-        default_value_t = 1,
-        value_parser = clap::value_parser!(u32).range(1..=5),
-        help_heading = "Scene"
-    )]
-    pub camera: u32,
+    /// From where it is seen
+    #[command(flatten)]
+    pub camera: CameraArgs,
 
-    /// Print the scenes that --scene knows by name, and exit; FOLDER is searched, else that in LVK_SCENES
-    #[arg(
-        long,
-        value_name = "FOLDER",
-        num_args = 0..=1,
-        default_missing_value = "",
-        value_parser = clap::value_parser!(OsString),
-        help_heading = "Scene"
-    )]
-    pub list_scenes: Option<OsString>,
+    /// What is known by name
+    #[command(flatten)]
+    pub list: ListArgs,
 
     /// What pixels show
     #[arg(long, value_enum, default_value_t = Show::Picture, help_heading = "Rendering")]

@@ -1,6 +1,6 @@
 //! The sample on the command line: scenes in, pictures, timings and figures out.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use super::args::Layout;
@@ -21,10 +21,9 @@ const NAME: &str = "large_scene";
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &LargeSceneArgs) -> ExitCode {
-    match &args.list_scenes {
-        Some(folder) => {
-            let others = scene_list::listing(Some(Path::new(folder)));
-            let others = others.split_once('\n').map_or("", |(_, others)| others);
+    match args.list.listing() {
+        Some(listing) => {
+            let others = listing.split_once('\n').map_or("", |(_, others)| others);
             say(&format!("valley  built in: a wooded valley made by code; the default\n{others}"));
             ExitCode::SUCCESS
         }
@@ -48,7 +47,7 @@ fn open(args: &LargeSceneArgs, opening: &mut Opening<'_>) -> Result<Opened<Large
         ..LargeSceneConfig::new(RtxConfig::of(args.tracing.rt, args.run.extent(), capabilities)?)
     };
     let sample = LargeScene::new(&context, &world, &config, &mut opening.progress)?;
-    let sample = sample.from_camera(&world, args.camera as usize - 1);
+    let sample = sample.from_camera(&world, args.camera.place());
     opening.progress.pause();
     let told = format!("{}, {} textures", world.name(), world.scene().textures.len());
     let headline = headline(capabilities, config.rtx.path, "a compute shader", &told);

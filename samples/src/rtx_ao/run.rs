@@ -19,7 +19,7 @@ const TOWN_RADIUS: f32 = 1.8;
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &RtxAoArgs) -> ExitCode {
-    match args.scene.listing() {
+    match args.scene.list.listing() {
         Some(listing) => {
             let others = listing.replace("; the default", "");
             say(&format!("town  built in: paper houses around a carousel; the default\n{others}"));
@@ -47,7 +47,7 @@ fn open(args: &RtxAoArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxAo>, Ru
     };
     opening.progress.stage("uploading the scene and building acceleration structures", 0);
     let sample = RtxAo::new(&context, &scene, turning.as_ref(), &config)?;
-    let sample = sample.from_camera(&scene, args.scene.camera as usize - 1);
+    let sample = sample.from_camera(&scene, args.scene.camera.place());
     let (name, count, radius) = (&scene.name, sample.triangle_count(), sample.radius());
     let told =
         format!("{name}: {count} triangles; {passes} passes a frame, {rays} rays within {radius:.2} units");

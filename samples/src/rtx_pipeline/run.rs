@@ -17,7 +17,7 @@ const NAME: &str = "rtx_pipeline";
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &RtxPipelineArgs) -> ExitCode {
-    match args.scene.listing() {
+    match args.scene.list.listing() {
         Some(listing) => {
             say(&listing);
             ExitCode::SUCCESS
@@ -40,7 +40,7 @@ fn open(args: &RtxPipelineArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxP
     };
     opening.progress.stage("uploading the scene and building acceleration structures", 0);
     let sample = RtxPipeline::new(&context, &scene, &config)?;
-    let sample = sample.from_camera(&scene, args.scene.camera as usize - 1);
+    let sample = sample.from_camera(&scene, args.scene.camera.place());
     let (count, parts) = (sample.triangle_count(), sample.blas_part_count());
     let RtxPipelineConfig { rtx, depth } = *sample.config();
     let told = format!(

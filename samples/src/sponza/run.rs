@@ -18,7 +18,7 @@ const NAME: &str = "sponza";
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &SponzaArgs) -> ExitCode {
-    match args.scene.listing() {
+    match args.scene.list.listing() {
         Some(listing) => {
             let others = listing.replace("; the default", "");
             say(&format!("atrium  built in: a columned atrium made by code; the default\n{others}"));
@@ -41,7 +41,7 @@ fn open(args: &SponzaArgs, opening: &mut Opening<'_>) -> Result<Opened<Sponza>, 
         format!("{}: {} triangles, {} textures", scene.name, scene.triangles.len(), scene.textures.len());
     let cameras = Scene { cameras: scene.cameras, ..Scene::empty() };
     let sample = Sponza::new(&context, scene, &args.config())?;
-    let sample = sample.from_camera(&cameras, args.scene.camera as usize - 1);
+    let sample = sample.from_camera(&cameras, args.scene.camera.place());
     let path = match sample.draw_path() {
         DrawPath::Counted => "as many as the GPU has counted",
         DrawPath::Padded => "those that are culled without vertices",
