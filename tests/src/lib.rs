@@ -11,6 +11,7 @@ pub mod gpu_built;
 pub mod half;
 pub mod hit_check;
 pub mod hybrid;
+pub mod local_read;
 pub mod meshes;
 pub mod noise;
 pub mod picture;
