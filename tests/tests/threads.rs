@@ -1,15 +1,19 @@
 //! Threads: a context is shared by all of them, and command buffers move between them.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use std::sync::Barrier;
+
 use lvk::test_hooks::waiting_objects;
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, BuildMode, ColorAttachment,
-    CommandBuffer, ComputePipelineDesc, Context, Dependencies, Format, Holder, QueryPoolDesc, RenderPassDesc,
-    RenderPipelineDesc, SamplerDesc, ShaderModuleHandle, ShaderStage, SubmitHandle, TextureDesc,
-    TextureUsage, TextureViewDesc, TlasDesc, TlasInstance, Triangles, ValidationSink,
+    CommandBuffer, ComputePipelineDesc, Context, Dependencies, Format, HitGroup, Holder, QueryPoolDesc,
+    RayTracingPipelineDesc, RenderPassDesc, RenderPipelineDesc, SamplerDesc, ShaderModuleHandle, ShaderStage,
+    SpecializationConstant, SpecializationValue, SubmitHandle, TextureDesc, TextureUsage, TextureViewDesc,
+    TlasDesc, TlasInstance, Triangles, ValidationSink,
 };
 use lvk_tests::compute::{Evaluator, module, read_vec4, read_words, vec4_buffer, words_buffer};
 use lvk_tests::noise::noise;
+use lvk_tests::shader_groups::{Counts, GroupScene, answering, ray_gen};
 use lvk_tests::{device, device_with};
 
 const fn is_send<T: Send>() {}
@@ -108,6 +112,7 @@ struct Shared<'a> {
     modules: [Holder<ShaderModuleHandle>; 3],
     /// Written by every thread, each its own part.
     words: Holder<BufferHandle>,
+    rays: Option<Rays<'a>>,
 }
 
 /// A thread's words in the shared buffer.
@@ -133,6 +138,7 @@ impl Shared<'_> {
                 module(ShaderStage::Compute, compute),
             ],
             words: words_buffer(ctx, &[0; SHARE as usize * 8]),
+            rays: Rays::new(ctx),
         }
     }
 
@@ -223,6 +229,90 @@ impl Shared<'_> {
     }
 }
 
+/// Shaders of ray tracing pipelines, and what their rays meet.
+struct Rays<'a> {
+    ctx: &'a Context,
+    scene: GroupScene,
+    ray_gen: Holder<ShaderModuleHandle>,
+    /// Each answers its place, above what its pipeline is specialised with.
+    hits: Vec<Holder<ShaderModuleHandle>>,
+    misses: Vec<Holder<ShaderModuleHandle>>,
+    callables: Vec<Holder<ShaderModuleHandle>>,
+}
+
+impl Rays<'_> {
+    /// `None`, loudly, where the device has no such pipelines.
+    fn new(ctx: &Context) -> Option<Rays<'_>> {
+        if !ctx.capabilities().ray_tracing_pipeline {
+            eprintln!("NOT TESTED, {} has no ray tracing pipelines", ctx.capabilities().device_name);
+            return None;
+        }
+        let constant = "layout(constant_id = 3) const uint kOwn = 0;";
+        let answer =
+            |stage, place: u32| answering(ctx, stage, constant, &format!("kOwn + {place}u")).unwrap();
+        let all = |stage, places: std::ops::Range<u32>| places.map(|place| answer(stage, place)).collect();
+        Some(Rays {
+            ctx,
+            scene: GroupScene::new(ctx).unwrap(),
+            ray_gen: ray_gen(ctx, "", "0u").unwrap(),
+            hits: all(ShaderStage::ClosestHit, 0..4),
+            misses: all(ShaderStage::Miss, 4..6),
+            callables: all(ShaderStage::Callable, 6..7),
+        })
+    }
+
+    /// A pipeline that answers numbers of its own, with its hit groups turned by as many places; gone while it is in flight.
+    fn trace(&self, value: u32) {
+        let handles = |modules: &[Holder<ShaderModuleHandle>]| -> Vec<_> {
+            modules.iter().map(|module| **module).collect()
+        };
+        let mut order: Vec<usize> = (0..self.hits.len()).collect();
+        order.rotate_left(value as usize % self.hits.len());
+        let hit = |at: &usize| HitGroup { closest_hit: Some(*self.hits[*at]), ..Default::default() };
+        let own = SpecializationValue::U32(100 * value);
+        let pipeline = self.ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+            ray_gen: &[*self.ray_gen],
+            miss: &handles(&self.misses),
+            hit_groups: &order.iter().map(hit).collect::<Vec<_>>(),
+            callable: &handles(&self.callables),
+            specialization: &[SpecializationConstant { id: 3, value: own }],
+            ..Default::default()
+        });
+        let pipeline = pipeline.unwrap();
+        let counts = Counts { hits: 4, misses: 2, callables: 1 };
+        let results = words_buffer(self.ctx, &[u32::MAX; 7]);
+        let mut cmd = self.ctx.acquire_command_buffer().unwrap();
+        self.scene.bind(&mut cmd, *pipeline, counts, *results).unwrap();
+        let buffers = [*results];
+        let writes = Dependencies { buffers: &buffers, ..Default::default() };
+        cmd.trace_rays([counts.all(), 1, 1], &writes).unwrap();
+        self.ctx.submit(cmd).unwrap();
+        drop(pipeline);
+        let places = order.iter().map(|at| *at as u32).chain(4..7);
+        let expected: Vec<u32> = places.map(|place| 100 * value + place).collect();
+        assert_eq!(read_words(self.ctx, *results, 7), expected, "pipeline {value}");
+    }
+}
+
+/// Eight threads begin at once, and each makes some.
+#[test]
+fn ray_tracing_pipelines_are_made_side_by_side() {
+    let Some(ctx) = device() else { return };
+    let Some(rays) = Rays::new(&ctx) else { return };
+    let start = Barrier::new(8);
+    std::thread::scope(|scope| {
+        for thread in 0..8_u32 {
+            let (rays, start) = (&rays, &start);
+            scope.spawn(move || {
+                start.wait();
+                (0..4).for_each(|round| rays.trace(4 * thread + round));
+            });
+        }
+    });
+    ctx.wait_idle().unwrap();
+    assert_eq!(waiting_objects(&ctx).unwrap(), 0);
+}
+
 /// Creates, uploads, records, submits, reads back and destroys, of every kind, while seven others do. The order of the
 /// library's locks is checked on the way.
 #[test]
@@ -233,12 +323,13 @@ fn eight_threads_use_every_kind_of_object() {
         for thread in 0..8_u32 {
             let shared = &shared;
             scope.spawn(move || {
-                for round in 0..4 {
+                for round in 0..5 {
                     let value = 10 * thread + round;
-                    match (thread + round) % 4 {
+                    match (thread + round) % 5 {
                         0 => shared.draw(value as f32),
                         1 => shared.compute(thread.into(), value),
                         2 => shared.trace(),
+                        3 => shared.rays.iter().for_each(|rays| rays.trace(value)),
                         _ => {
                             let noise = noise(value, 100_000);
                             let desc = BufferDesc { data: Some(&noise), ..Default::default() };
