@@ -4,6 +4,8 @@
 
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile};
+use lvk_samples::app::frame::Frame;
+use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::deferred::{Deferred, DeferredConfig, Passes, View};
 use lvk_samples::raster::RasterError;
 use lvk_tests::child::without_ray_tracing;
@@ -83,8 +85,37 @@ fn every_light_adds_to_the_picture() {
     assert!(light.is_sorted_by(|fewer, more| fewer < more), "{light:?}");
 }
 
+/// Each time behind a frame of the other way that nobody has waited for.
 #[test]
-fn a_round_has_no_seam_and_ways_can_be_changed() {
+fn ways_are_changed_in_a_sample_that_runs() {
+    let Some(ctx) = device() else { return };
+    if !has_both(&ctx) {
+        return;
+    }
+    let mut sample = Deferred::new(&ctx, &config(Passes::One)).unwrap();
+    let turns = [[Passes::One, Passes::Several], [Passes::Several, Passes::One]];
+    for (round, [before, passes]) in (0..).zip(turns.repeat(2)) {
+        let frame = 23 * round;
+        sample.set_passes(Some(before));
+        send(&mut sample, frame);
+        assert_eq!(sample.passes(), before);
+        sample.set_passes(Some(passes));
+        let found = picture_of(&mut sample, frame);
+        assert_eq!(sample.passes(), passes);
+        assert!(found == picture(&ctx, &config(passes), frame), "frame {frame} by {passes:?}");
+    }
+}
+
+/// Submits a frame that nobody waits for.
+fn send(sample: &mut Deferred, frame: u32) {
+    sample.update(Moment::of_frame(frame, ROUND)).unwrap();
+    let mut frame = Frame::free(&sample.context().clone()).unwrap();
+    sample.record(&mut frame).unwrap();
+    frame.finish().unwrap();
+}
+
+#[test]
+fn a_round_has_no_seam() {
     let Some(ctx) = device() else { return };
     let mut sample = Deferred::new(&ctx, &DeferredConfig::new(SIZE)).unwrap();
     let first = picture_of(&mut sample, 0);

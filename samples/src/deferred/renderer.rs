@@ -103,9 +103,14 @@ impl Deferred {
         })
     }
 
-    /// How surfaces come to those who light them.
+    /// How surfaces come to those who light them: in the last frame, or in the first where there was none yet.
     pub fn passes(&self) -> Passes {
         self.way.passes
+    }
+
+    /// The next frames go by `passes`, or by what the device has.
+    pub fn set_passes(&mut self, passes: Option<Passes>) {
+        self.config.passes = passes;
     }
 
     /// Triangles of the hall.
@@ -252,7 +257,7 @@ impl Sample for Deferred {
                 ui.radio_value(&mut passes, Passes::One, "one pass");
                 ui.radio_value(&mut passes, Passes::Several, "several");
             });
-            self.config.passes = Some(passes);
+            self.set_passes(Some(passes));
         }
         ui.horizontal_wrapped(|ui| {
             for view in View::ALL {
