@@ -5,12 +5,13 @@ use std::time::{Duration, Instant};
 
 use lvk::{
     ColorAttachment, ColorTarget, CommandBuffer, CompareOp, Context, Dependencies, DepthAttachment,
-    DepthTest, Error, Format, Holder, PipelineStatistics, QueryKind, QueryPoolDesc, QueryPoolHandle,
-    RenderPass, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, TextureHandle,
+    DepthTest, Error, Format, Holder, OptionalFeature, PipelineStatistics, QueryKind, QueryPoolDesc,
+    QueryPoolHandle, RenderPass, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, ShaderStage,
+    TextureHandle,
 };
 use lvk_tests::compute::compute_pipeline;
 use lvk_tests::device;
-use lvk_tests::raster::{COVER, PAINT, render_pipeline, target};
+use lvk_tests::raster::{COVER, PAINT, has, pixels, render_pipeline, run_pass, staged_pipeline, target};
 
 const SIDE: u32 = 64;
 
@@ -209,6 +210,101 @@ fn stages_are_counted_beside_samples() {
     let nothing = ctx.statistics(*stages, 2).unwrap();
     assert!(nothing.is_none_or(|found| found == PipelineStatistics::default()), "{nothing:?}");
     assert!(read(&ctx, *samples, 1)[0].is_some_and(|count| count > 0));
+}
+
+/// One triangle over the target, by a mesh workgroup of 8 invocations.
+const MESH: &str = "layout(local_size_x = 8) in;
+    layout(triangles, max_vertices = 3, max_primitives = 1) out;
+    void main() {
+        SetMeshOutputsEXT(3, 1);
+        uint i = gl_LocalInvocationIndex;
+        if (i < 3) {
+            gl_MeshVerticesEXT[i].gl_Position = vec4(vec2(i & 1, i >> 1) * 4.0 - 1.0, 0.5, 1.0);
+        }
+        gl_PrimitiveTriangleIndicesEXT[0] = uvec3(0, 1, 2);
+    }";
+const WHITE: (ShaderStage, &str) =
+    (ShaderStage::Fragment, "layout(location = 0) out vec4 c; void main() { c = vec4(1.0); }");
+
+fn mesh_pipeline(ctx: &Context, stages: &[(ShaderStage, &str)]) -> Holder<RenderPipelineHandle> {
+    let color = [ColorTarget::new(Format::Rgba8Unorm)];
+    let desc = RenderPipelineDesc { color: &color, ..Default::default() };
+    staged_pipeline(ctx, stages, &desc).unwrap()
+}
+
+/// Three task workgroups of 4 invocations ask for two mesh workgroups each; then five of those without a task, of which a half
+/// is scissored away; then an ordinary draw.
+#[test]
+fn task_and_mesh_shaders_are_counted() {
+    let Some(ctx) = device() else { return };
+    if !ctx.capabilities().mesh_shader || !has(&ctx, OptionalFeature::MeshShaderQueries) {
+        let desc = QueryPoolDesc { kind: QueryKind::MeshStatistics, ..Default::default() };
+        assert!(matches!(ctx.create_query_pool(&desc), Err(Error::Unsupported { .. })));
+        return eprintln!("NOT TESTED, {} counts no mesh shaders", ctx.capabilities().device_name);
+    }
+    let task = (ShaderStage::Task, "layout(local_size_x = 4) in; void main() { EmitMeshTasksEXT(2, 1, 1); }");
+    let with_task = mesh_pipeline(&ctx, &[task, (ShaderStage::Mesh, MESH), WHITE]);
+    let alone = mesh_pipeline(&ctx, &[(ShaderStage::Mesh, MESH), WHITE]);
+    let (canvas, stages) = (Canvas::new(&ctx), pool(&ctx, QueryKind::MeshStatistics, 3));
+    let drawn = target(&ctx, Format::Rgba8Unorm, [SIDE; 2]);
+    let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
+    run_pass(&ctx, &RenderPassDesc { color: &color, ..Default::default() }, |pass| {
+        for (query, pipeline, groups, height) in [(0, &with_task, 3, SIDE), (1, &alone, 5, SIDE / 2)] {
+            pass.scissor([0, 0], [SIDE, height])?;
+            pass.begin_query(*stages, query)?;
+            pass.bind_render_pipeline(**pipeline)?;
+            pass.draw_mesh_tasks([groups, 1, 1])?;
+            pass.end_query(*stages, query)?;
+        }
+        Ok(())
+    });
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    let mut pass = canvas.pass(&mut cmd);
+    pass.begin_query(*stages, 2).unwrap();
+    draw(&mut pass, [0, 0], [SIDE; 2], 0.5);
+    pass.end_query(*stages, 2).unwrap();
+    drop(pass);
+    finish(&ctx, cmd);
+    let full = u64::from(SIDE * SIDE);
+    for (query, tasks, meshes, fragments) in
+        [(0, 3 * 4, 3 * 2 * 8, 6 * full), (1, 0, 5 * 8, 5 * full / 2), (2, 0, 0, full)]
+    {
+        let found = ctx.statistics(*stages, query).unwrap().unwrap();
+        assert_eq!((found.task_invocations, found.mesh_invocations), (tasks, meshes), "{found:?}");
+        assert!(found.fragment_invocations >= fragments, "{found:?}");
+        let none = (found.input_vertices, found.vertex_invocations, found.compute_invocations);
+        assert_eq!(none, (0, 0, 0), "{found:?}");
+    }
+}
+
+/// Vulkan forbids it, wherever the query was begun; behind its end draws go on.
+#[test]
+fn mesh_shaders_do_not_draw_while_vertices_are_counted() {
+    let Some(ctx) = device() else { return };
+    if !ctx.capabilities().mesh_shader || !ctx.capabilities().pipeline_statistics {
+        return eprintln!("NOT TESTED, {} lacks mesh shaders or statistics", ctx.capabilities().device_name);
+    }
+    let pipeline = mesh_pipeline(&ctx, &[(ShaderStage::Mesh, MESH), WHITE]);
+    let drawn = target(&ctx, Format::Rgba8Unorm, [SIDE; 2]);
+    let stages = pool(&ctx, QueryKind::PipelineStatistics, 2);
+    let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
+    let desc = RenderPassDesc { color: &color, ..Default::default() };
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.begin_query(*stages, 0).unwrap();
+    let mut pass = cmd.begin_rendering(&desc).unwrap();
+    pass.bind_render_pipeline(*pipeline).unwrap();
+    refused(pass.draw_mesh_tasks([1, 1, 1]), "QueryKind::MeshStatistics");
+    drop(pass);
+    cmd.end_query(*stages, 0).unwrap();
+    let mut pass = cmd.begin_rendering(&desc).unwrap();
+    pass.bind_render_pipeline(*pipeline).unwrap();
+    pass.begin_query(*stages, 1).unwrap();
+    refused(pass.draw_mesh_tasks([1, 1, 1]), "query 1 is open");
+    pass.end_query(*stages, 1).unwrap();
+    pass.draw_mesh_tasks([1, 1, 1]).unwrap();
+    drop(pass);
+    finish(&ctx, cmd);
+    assert!(pixels::<u32>(&ctx, *drawn).iter().all(|pixel| *pixel == u32::MAX));
 }
 
 #[test]

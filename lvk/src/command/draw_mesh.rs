@@ -14,7 +14,8 @@ impl RenderPass<'_> {
     ///
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) unless a pipeline with a mesh shader is bound, with its push
-    /// constants; [`LimitExceeded`](crate::Error::LimitExceeded) for more groups than [`MeshLimits`] allows.
+    /// constants, and while a query of [`PipelineStatistics`](crate::QueryKind::PipelineStatistics) is open;
+    /// [`LimitExceeded`](crate::Error::LimitExceeded) for more groups than [`MeshLimits`] allows.
     pub fn draw_mesh_tasks(&mut self, groups: [u32; 3]) -> Result<()> {
         self.ready_mesh()?;
         let pipeline = self.bound("draw_mesh_tasks")?;

@@ -101,7 +101,7 @@ impl CommandBuffer {
     fn check_statistics(&self, kind: QueryKind) -> Result<()> {
         let gpu = &self.shared.gpu;
         let outside = self.had_pass && !self.rendering;
-        if kind != QueryKind::PipelineStatistics || !outside || gpu.caps.driver_name != "llvmpipe" {
+        if kind.statistics().is_empty() || !outside || gpu.caps.driver_name != "llvmpipe" {
             return Ok(());
         }
         let why = "lavapipe cannot; begin them inside of a pass, before the first pass, or in a command buffer of their own";

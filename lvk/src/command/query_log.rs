@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::barrier::ResourceId;
 use crate::error::{Error, Result};
 use crate::resource::QueryPool;
+use crate::resource::query::QueryKind;
 use crate::resource::query_marks::QueryMarks;
 
 /// The queries a command buffer writes and resets, and those it has begun.
@@ -68,6 +69,21 @@ impl QueryLog {
                     "queries of {kind} cannot be nested: query {query} of '{name}' is open, end it first"
                 );
                 Err(Error::usage(&pool.name, message))
+            }
+        }
+    }
+
+    /// Fails where an open query counts stages that pipelines with mesh shaders do not have.
+    pub(super) fn check_mesh_draw(&self) -> Result<()> {
+        match self.open.iter().find(|open| open.pool.kind == QueryKind::PipelineStatistics) {
+            None => Ok(()),
+            Some(open) => {
+                let message = format!(
+                    "query {} is open and counts stages that pipelines with mesh shaders do not have; count with \
+                     QueryKind::MeshStatistics",
+                    open.query
+                );
+                Err(Error::usage(&open.pool.name, message))
             }
         }
     }

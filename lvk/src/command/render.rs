@@ -365,6 +365,7 @@ impl<'a> RenderPass<'a> {
             let message = "it has no mesh shader; draw with draw, draw_indexed or their indirect forms";
             return Err(Error::usage(&*pipeline.name, message));
         }
+        self.cmd.queries.check_mesh_draw()?;
         self.cmd.check_pushed(&pipeline.name, pipeline.push_constant_bytes)
     }
 

@@ -6,7 +6,7 @@ use super::Context;
 use crate::error::Result;
 use crate::gpu::clock::ClockPair;
 use crate::handle::QueryPoolHandle;
-use crate::resource::query::{PipelineStatistics, QueryKind};
+use crate::resource::query::PipelineStatistics;
 
 impl Context {
     /// Milliseconds of `count` timestamps since an arbitrary start that all share; `None` where none was written yet
@@ -29,8 +29,7 @@ impl Context {
     /// statistics.
     pub fn read_queries(&self, pool: QueryPoolHandle, first: u32, out: &mut [Option<u64>]) -> Result<()> {
         let pool = self.shared().store.query_pools.get(pool)?;
-        let fits = pool.kind != QueryKind::PipelineStatistics;
-        pool.check_kind(fits, "read them with Context::statistics")?;
+        pool.check_kind(pool.kind.statistics().is_empty(), "read them with Context::statistics")?;
         pool.read(first, out)
     }
 

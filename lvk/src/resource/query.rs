@@ -25,8 +25,12 @@ pub enum QueryKind {
         precise: bool,
     },
     /// How often the stages ran between begin and end (`VK_QUERY_TYPE_PIPELINE_STATISTICS`), as
-    /// [`PipelineStatistics`]. Needs [`Capabilities::pipeline_statistics`](crate::Capabilities::pipeline_statistics).
+    /// [`PipelineStatistics`] without task and mesh shaders, which may not draw in between. Needs
+    /// [`Capabilities::pipeline_statistics`](crate::Capabilities::pipeline_statistics).
     PipelineStatistics,
+    /// The same of fragment, compute, task and mesh shaders alone, which is all that Vulkan counts of pipelines with mesh
+    /// shaders. Needs [`OptionalFeature::MeshShaderQueries`].
+    MeshStatistics,
 }
 
 impl QueryKind {
@@ -34,7 +38,7 @@ impl QueryKind {
         match self {
             Self::Timestamps => vk::QueryType::TIMESTAMP,
             Self::Occlusion { .. } => vk::QueryType::OCCLUSION,
-            Self::PipelineStatistics => vk::QueryType::PIPELINE_STATISTICS,
+            Self::PipelineStatistics | Self::MeshStatistics => vk::QueryType::PIPELINE_STATISTICS,
         }
     }
 
@@ -51,7 +55,18 @@ impl QueryKind {
             Self::Timestamps => "timestamps",
             Self::Occlusion { .. } => "occlusion",
             Self::PipelineStatistics => "pipeline statistics",
+            Self::MeshStatistics => "mesh statistics",
         }
+    }
+
+    /// The bits of what is counted, in the order of the fields of [`PipelineStatistics`]; none where it is no statistics.
+    pub(crate) fn statistics(self) -> vk::QueryPipelineStatisticFlags {
+        let bits = match self {
+            Self::Timestamps | Self::Occlusion { .. } => 0,
+            Self::PipelineStatistics => PipelineStatistics::PLAIN_BITS,
+            Self::MeshStatistics => PipelineStatistics::MESH_BITS,
+        };
+        vk::QueryPipelineStatisticFlags::from_raw(bits)
     }
 
     fn check_supported(self, gpu: &Gpu) -> Result<()> {
@@ -64,6 +79,9 @@ impl QueryKind {
             }
             Self::PipelineStatistics => {
                 gpu.require(OptionalFeature::PipelineStatisticsQuery, "a query of pipeline statistics")
+            }
+            Self::MeshStatistics => {
+                gpu.require(OptionalFeature::MeshShaderQueries, "a query of mesh statistics")
             }
             Self::Timestamps | Self::Occlusion { .. } => Ok(()),
         }
@@ -116,17 +134,26 @@ pub struct PipelineStatistics {
     pub tessellation_invocations: u64,
     /// Invocations of compute shaders, those of the library's own kernels included.
     pub compute_invocations: u64,
-    /// Invocations of task shaders; 0 where the device does not count them (`meshShaderQueries`).
+    /// Invocations of task shaders; only [`QueryKind::MeshStatistics`] counts them.
     pub task_invocations: u64,
-    /// Invocations of mesh shaders; 0 where the device does not count them (`meshShaderQueries`).
+    /// Invocations of mesh shaders; only [`QueryKind::MeshStatistics`] counts them.
     pub mesh_invocations: u64,
 }
 
 impl PipelineStatistics {
+    const FIELDS: usize = 13;
     /// The bits of the fields down to the compute shaders.
     const PLAIN_BITS: u32 = (1 << 11) - 1;
-    /// The bits of all fields.
-    const ALL_BITS: u32 = (1 << 13) - 1;
+    /// The bits of fragment, compute, task and mesh shaders.
+    const MESH_BITS: u32 = 1 << 7 | 0b111 << 10;
+
+    /// From the numbers of these bits, the lowest first.
+    fn of(bits: u32, numbers: &[u64]) -> Self {
+        let mut fields = [0; Self::FIELDS];
+        let counted = fields.iter_mut().enumerate().filter(|(bit, _)| bits >> bit & 1 != 0);
+        counted.zip(numbers).for_each(|((_, field), number)| *field = *number);
+        bytemuck::cast(fields)
+    }
 }
 
 /// A query pool, destroyed on drop.
@@ -158,7 +185,7 @@ impl QueryPool {
     pub(crate) fn of(gpu: &Arc<Gpu>, desc: &QueryPoolDesc<'_>, ty: vk::QueryType) -> Result<Self> {
         let mut info = vk::QueryPoolCreateInfo::default().query_type(ty).query_count(desc.count);
         if ty == vk::QueryType::PIPELINE_STATISTICS {
-            info = info.pipeline_statistics(statistics_bits(gpu));
+            info = info.pipeline_statistics(desc.kind.statistics());
         }
         // SAFETY: the description is valid.
         let raw = unsafe { gpu.device.create_query_pool(&info, None) }
@@ -245,25 +272,21 @@ impl QueryPool {
 
     /// What the stages did; `None` where it is not there yet.
     pub(crate) fn statistics(&self, query: u32) -> Result<Option<PipelineStatistics>> {
-        let fits = self.kind == QueryKind::PipelineStatistics;
-        self.check_kind(fits, "statistics come from a pool of pipeline statistics")?;
+        let bits = self.kind.statistics().as_raw();
+        self.check_kind(bits != 0, "statistics come from a pool of pipeline or mesh statistics")?;
         self.check_range(query, 1)?;
-        let mut values = [0; 13];
-        let ready = if self.gpu.features.ext.mesh.mesh_shader_queries == vk::TRUE {
-            self.statistic_values::<14>(query, &mut values)?
-        } else {
-            self.statistic_values::<12>(query, &mut values)?
-        };
-        Ok(ready.then(|| bytemuck::cast(values)))
+        match self.kind {
+            QueryKind::MeshStatistics => self.statistic_values::<5>(query, bits),
+            _ => self.statistic_values::<12>(query, bits),
+        }
     }
 
-    /// Reads `N - 1` numbers and whether they are there.
-    fn statistic_values<const N: usize>(&self, query: u32, values: &mut [u64; 13]) -> Result<bool> {
+    /// Reads the `N - 1` numbers of these bits, where they are there.
+    fn statistic_values<const N: usize>(&self, query: u32, bits: u32) -> Result<Option<PipelineStatistics>> {
         let mut raw = [[0_u64; N]];
         self.results(query, &mut raw)?;
         let [(ready, numbers)] = raw.each_ref().map(|row| row.split_last().unwrap_or((&0, &[])));
-        values[..numbers.len()].copy_from_slice(numbers);
-        Ok(*ready != 0)
+        Ok((*ready != 0).then(|| PipelineStatistics::of(bits, numbers)))
     }
 
     /// Numbers with their availability behind them, for queries of the pool.
@@ -281,15 +304,40 @@ impl QueryPool {
     }
 }
 
-fn statistics_bits(gpu: &Gpu) -> vk::QueryPipelineStatisticFlags {
-    let counted = gpu.features.ext.mesh.mesh_shader_queries == vk::TRUE;
-    let bits = if counted { PipelineStatistics::ALL_BITS } else { PipelineStatistics::PLAIN_BITS };
-    vk::QueryPipelineStatisticFlags::from_raw(bits)
-}
-
 impl Drop for QueryPool {
     fn drop(&mut self) {
         // SAFETY: the owner has waited until the GPU is done with the pool.
         unsafe { self.gpu.device.destroy_query_pool(self.raw, None) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_come_to_the_fields_of_their_bits() {
+        type Flags = vk::QueryPipelineStatisticFlags;
+        let of = |kind: QueryKind, numbers: &[u64]| {
+            assert_eq!(kind.statistics().as_raw().count_ones() as usize, numbers.len(), "{kind:?}");
+            PipelineStatistics::of(kind.statistics().as_raw(), numbers)
+        };
+        let mesh = of(QueryKind::MeshStatistics, &[1, 2, 3, 4]);
+        let expected = PipelineStatistics {
+            fragment_invocations: 1,
+            compute_invocations: 2,
+            task_invocations: 3,
+            mesh_invocations: 4,
+            ..Default::default()
+        };
+        assert_eq!(mesh, expected);
+        let bits = QueryKind::MeshStatistics.statistics();
+        let named = [Flags::FRAGMENT_SHADER_INVOCATIONS, Flags::COMPUTE_SHADER_INVOCATIONS];
+        let named = named.into_iter().fold(Flags::TASK_SHADER_INVOCATIONS_EXT, |all, bit| all | bit);
+        assert_eq!(bits, named | Flags::MESH_SHADER_INVOCATIONS_EXT);
+        let plain = of(QueryKind::PipelineStatistics, &[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
+        assert_eq!((plain.input_vertices, plain.clipped_primitives), (1, 6));
+        assert_eq!((plain.compute_invocations, plain.task_invocations, plain.mesh_invocations), (11, 0, 0));
+        assert!(QueryKind::Timestamps.statistics().is_empty());
     }
 }
