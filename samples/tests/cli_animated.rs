@@ -1,6 +1,8 @@
 //! The animated programs as a user meets them: help, pictures, sequences and Ctrl-C.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "a test that cannot go on has failed")]
 
+mod lacking;
+
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -132,7 +134,7 @@ const PROGRAMS: &[Program] = &[
         ways: &[&["--faces", "six-passes"], &["--faces", "one-pass"]],
     },
     Program {
-        path: env!("CARGO_BIN_EXE_mesh_shaders"),
+        path: MESH_SHADERS,
         quick: &[],
         own: &["--no-culling"],
         said: &["a knot of 61600 triangles", "of 655 meshlets drawn", "meshlets  "],
@@ -146,6 +148,9 @@ const PROGRAMS: &[Program] = &[
         ways: &[&[], &["--unload", "brick,leaves"]],
     },
 ];
+
+/// The one program that cannot do without something that devices lack.
+const MESH_SHADERS: &str = env!("CARGO_BIN_EXE_mesh_shaders");
 
 const SHARED: [&str; 14] = [
     "--frames",
@@ -220,6 +225,18 @@ fn has_device() -> bool {
     }
 }
 
+/// The programs that the device is enough for; says of the other that it is not tested.
+fn possible() -> impl Iterator<Item = &'static Program> {
+    let folder = tempfile::tempdir().unwrap();
+    let lacks = |program: &&Program| {
+        let picture = program.small(folder.path(), "a.png", &["--frames", "1"]);
+        let lack = (program.path == MESH_SHADERS).then(|| lacking::mesh_shaders(picture)).flatten();
+        lack.inspect(|lack| eprintln!("NOT TESTED, {lack}")).is_some()
+    };
+    let all: Vec<_> = PROGRAMS.iter().filter(|program| !lacks(program)).collect();
+    all.into_iter()
+}
+
 fn files(folder: &Path) -> Vec<PathBuf> {
     let mut files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     files.sort();
@@ -259,7 +276,7 @@ fn every_way_writes_a_picture_under_validation() {
     if !has_device() {
         return;
     }
-    for program in PROGRAMS {
+    for program in possible() {
         for way in program.ways {
             let folder = tempfile::tempdir().unwrap();
             let args = [&["--frames", "1", "--validate"], *way].concat();
@@ -271,6 +288,24 @@ fn every_way_writes_a_picture_under_validation() {
             assert_eq!(image::open(picture).unwrap().into_rgba8().dimensions(), SIZE.into());
         }
     }
+}
+
+/// What the other tests leave a program out for.
+#[test]
+fn a_device_without_mesh_shaders_is_told_from_other_trouble() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let program = PROGRAMS.iter().find(|program| program.path == MESH_SHADERS).unwrap();
+    let small = |args: &[&str]| program.small(folder.path(), "a.png", args);
+    let without = ["--frames", "1", "--profile", "core-only"];
+    let outcome = Outcome::of(small(&without));
+    assert_eq!(outcome.status, Some(1), "{}", outcome.err);
+    let lack = lacking::mesh_shaders(small(&without)).unwrap();
+    assert_names(&lack, &["mesh shaders", "--device"]);
+    assert!(files(folder.path()).is_empty());
+    assert_eq!(lacking::mesh_shaders(small(&["--frames", "1", "--device", "nobody's"])), None);
 }
 
 #[test]
@@ -290,7 +325,7 @@ fn sequences_repeat_and_can_be_shared_among_processes() {
     if !has_device() {
         return;
     }
-    for program in PROGRAMS {
+    for program in possible() {
         let (whole, parts) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
         let play = |folder: &Path, frames: &str| {
             let args = ["--round", "3", "--frames", frames];
@@ -315,7 +350,7 @@ fn ctrl_c_leaves_whole_pictures_that_can_be_resumed() {
     if !has_device() {
         return;
     }
-    for program in PROGRAMS {
+    for program in possible() {
         let folder = tempfile::tempdir().unwrap();
         let mut command = program.small(folder.path(), "frame_######.png", &["--frames", "0..1000000"]);
         let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
