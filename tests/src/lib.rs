@@ -2,6 +2,7 @@
 
 pub mod agreement;
 pub mod bender;
+pub mod board;
 pub mod broken_shaders;
 pub mod child;
 pub mod compute;

@@ -7,11 +7,11 @@ use std::sync::LazyLock;
 use image::{Rgba, RgbaImage};
 use lvk::{Context, DeviceProfile, FeatureSet, OptionalFeature};
 use lvk_samples::app::headless;
-use lvk_samples::app::progress::Progress;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::raster::RasterError;
-use lvk_samples::scene::{ObjOptions, Scene};
+use lvk_samples::scene::Scene;
 use lvk_samples::sponza::{DrawPath, Frustum, Sponza, SponzaConfig};
+use lvk_tests::board::board;
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
 use lvk_tests::raster::has;
@@ -56,11 +56,12 @@ fn culling_changes_no_pixel() {
             assert_eq!(culled.draw_path(), path);
             for frame in [0, 20, 33, 60] {
                 let (picture, expected) = (picture_of(&mut culled, frame), picture_of(&mut whole, frame));
-                assert!(picture == expected, "frame {frame}, {samples} samples, {path:?}");
                 let all = whole.draws().len() as u32;
                 assert_eq!(whole.counts().unwrap(), [all; 2], "nothing is culled");
-                let [camera, _] = culled.counts().unwrap();
+                let [camera, sun] = culled.counts().unwrap();
                 assert!(camera > 0 && camera < all, "{camera} of {all} draws in frame {frame}");
+                assert_eq!(sun, all, "the shadow map shows the whole scene");
+                assert!(picture == expected, "frame {frame}, {samples} samples, {path:?}");
             }
         }
     }
@@ -117,32 +118,11 @@ fn the_atrium_looks_as_it_always_did() {
     }
 }
 
-/// A board over a floor, seen from above, with the sun straight above too: the floor beneath is dark exactly where the board is,
-/// but for its hole.
+/// The floor is dark exactly where the board takes the sun from it, but for the hole.
 #[test]
 fn shadows_and_holes_are_where_they_belong() {
     let Some(ctx) = device() else { return };
-    let folder = tempfile::tempdir().unwrap();
-    let mask = image::RgbImage::from_fn(64, 64, |x, y| {
-        let is_hole = (24..40).contains(&x) && (24..40).contains(&y);
-        image::Rgb([if is_hole { 0 } else { 255 }; 3])
-    });
-    mask.save(folder.path().join("mask.png")).unwrap();
-    image::RgbImage::from_pixel(64, 64, image::Rgb([220, 40, 40]))
-        .save(folder.path().join("red.png"))
-        .unwrap();
-    let mtl = "newmtl floor\nKd 0.8 0.8 0.8\nnewmtl board\nKd 1 1 1\nmap_Kd red.png\nmap_d mask.png\n";
-    std::fs::write(folder.path().join("a.mtl"), mtl).unwrap();
-    let obj = "mtllib a.mtl
-vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1
-v -4 0 4\nv 4 0 4\nv 4 0 -4\nv -4 0 -4\nusemtl floor\nf 1/1 2/2 3/3 4/4
-v -1 2 1\nv 1 2 1\nv 1 2 -1\nv -1 2 -1\nusemtl board\nf 5/1 6/2 7/3 8/4\n";
-    std::fs::write(folder.path().join("a.obj"), obj).unwrap();
-    let views = "scene a 0 3 0\nsun 0.6 0.8 0\ndir 0 9 0 0.0001 -1 0 60\n";
-    std::fs::write(folder.path().join("views.txt"), views).unwrap();
-    let options = ObjOptions { scale: None, cameras: Some(folder.path().join("views.txt")) };
-    let scene = Scene::from_obj(&folder.path().join("a.obj"), &options, &mut Progress::hidden()).unwrap();
-    assert_eq!(scene.warnings, Vec::<String>::new());
+    let scene = board();
     let mut sample = make(&ctx, &scene, &config(1));
     let picture = picture_of(&mut sample, 0);
     // Where a point in the plane at this height is seen, from 9 above.
