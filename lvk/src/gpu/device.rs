@@ -13,7 +13,9 @@ use super::clock::HostClock;
 use super::extra::ExtraExtensions;
 use super::features::Features;
 use super::foreign::RawContext;
+use super::format_features::FormatAnswers;
 use super::host_copy::HostCopies;
+use super::image_limits::ImageLimits;
 use super::instance::Instance;
 use super::naming;
 use super::optional::{FeatureSet, OF_WINDOWS, OptionalFeature};
@@ -74,6 +76,8 @@ pub(crate) struct Gpu {
     pub(super) device_fault: Option<ash::ext::device_fault::Device>,
     allocator: Mutex<Option<Allocator>>,
     pub(super) heap_use: HeapUse,
+    pub(super) format_answers: FormatAnswers,
+    pub(super) image_limits: ImageLimits,
     /// Somebody else made the device, and destroys it.
     is_foreign: bool,
     /// Declared last: destroyed after the device.
@@ -169,6 +173,8 @@ impl Gpu {
                 .then(|| ash::ext::device_fault::Device::new(raw, &device)),
             allocator: Mutex::new(Rank::Allocator, Some(allocator)),
             heap_use: HeapUse::new(&instance, physical),
+            format_answers: FormatAnswers::default(),
+            image_limits: ImageLimits::default(),
             custom_borders: AtomicU32::new(0),
             physical,
             device,
@@ -270,39 +276,6 @@ impl Gpu {
     /// The physical device.
     pub(crate) fn physical(&self) -> vk::PhysicalDevice {
         self.physical
-    }
-
-    /// What the device allows for an image of this description, or the driver's refusal.
-    pub(crate) fn image_limits(
-        &self,
-        info: &vk::ImageCreateInfo<'_>,
-    ) -> Result<vk::ImageFormatProperties, vk::Result> {
-        let instance = &self.instance.raw;
-        // SAFETY: the physical device belongs to the instance.
-        unsafe {
-            instance.get_physical_device_image_format_properties(
-                self.physical,
-                info.format,
-                info.image_type,
-                info.tiling,
-                info.usage,
-                info.flags,
-            )
-        }
-    }
-
-    /// How many samples a pixel a plain target of `format` may have; none where it cannot be a target.
-    pub(crate) fn target_samples(
-        &self,
-        format: vk::Format,
-        usage: vk::ImageUsageFlags,
-    ) -> vk::SampleCountFlags {
-        let info = vk::ImageCreateInfo::default()
-            .image_type(vk::ImageType::TYPE_2D)
-            .format(format)
-            .tiling(vk::ImageTiling::OPTIMAL)
-            .usage(usage);
-        self.image_limits(&info).map_or(vk::SampleCountFlags::empty(), |limits| limits.sample_counts)
     }
 }
 

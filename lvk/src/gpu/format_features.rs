@@ -1,4 +1,6 @@
-//! What the device can do with formats.
+//! What the device can do with formats. Each is asked for once: a device never changes its answer.
+
+use std::sync::OnceLock;
 
 use ash::vk;
 
@@ -6,14 +8,23 @@ use super::device::Gpu;
 use super::optional::OptionalFeature;
 use crate::format::Format;
 
+/// The answers so far, by [`Format::ALL`].
+pub(super) struct FormatAnswers([OnceLock<vk::FormatFeatureFlags>; Format::ALL.len()]);
+
+impl Default for FormatAnswers {
+    fn default() -> Self {
+        Self([const { OnceLock::new() }; Format::ALL.len()])
+    }
+}
+
 impl Gpu {
     /// What the device can do with images of `format` in optimal tiling; nothing where a feature that the format needs is
     /// off.
     pub(crate) fn format_features(&self, format: Format) -> vk::FormatFeatureFlags {
-        match needed(format) {
+        *self.format_answers.0[format as usize].get_or_init(|| match needed(format) {
             Some(feature) if !self.caps.has(feature) => vk::FormatFeatureFlags::empty(),
             _ => self.format_properties(format.raw()).optimal_tiling_features,
-        }
+        })
     }
 
     /// What the device can do with buffers of `format`.
@@ -49,6 +60,13 @@ fn needed(format: Format) -> Option<OptionalFeature> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_format_has_an_answer_of_its_own() {
+        for (place, format) in Format::ALL.iter().enumerate() {
+            assert_eq!(*format as usize, place, "{format:?}");
+        }
+    }
 
     #[test]
     fn compressed_formats_need_features_of_their_own() {

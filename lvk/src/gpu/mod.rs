@@ -14,6 +14,7 @@ pub(crate) mod features;
 pub(crate) mod foreign;
 pub(crate) mod format_features;
 pub(crate) mod host_copy;
+mod image_limits;
 pub(crate) mod instance;
 pub(crate) mod memory;
 pub(crate) mod mesh_limits;

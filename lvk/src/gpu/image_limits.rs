@@ -1,0 +1,137 @@
+//! What the device allows for images, by what they are. Each kind of image is asked for once: a device never changes its
+//! answer, and an answer costs as much as making the image.
+
+use std::collections::HashMap;
+use std::sync::{PoisonError, RwLock};
+
+use ash::vk;
+
+use super::device::Gpu;
+
+/// What the limits of an image depend on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct ImageKind {
+    format: vk::Format,
+    ty: vk::ImageType,
+    tiling: vk::ImageTiling,
+    usage: vk::ImageUsageFlags,
+    flags: vk::ImageCreateFlags,
+}
+
+/// The limits of a kind, or why there are no such images.
+type Answer = Result<vk::ImageFormatProperties, vk::Result>;
+
+/// The answers so far.
+#[derive(Default)]
+pub(super) struct ImageLimits(RwLock<HashMap<ImageKind, Answer>>);
+
+impl ImageLimits {
+    fn get(&self, kind: ImageKind, ask: impl FnOnce() -> Answer) -> Answer {
+        let known = self.0.read().unwrap_or_else(PoisonError::into_inner).get(&kind).copied();
+        known.unwrap_or_else(|| {
+            let answer = ask();
+            if lasts(&answer) {
+                self.0.write().unwrap_or_else(PoisonError::into_inner).insert(kind, answer);
+            }
+            answer
+        })
+    }
+}
+
+/// Whether the device will answer the same again: it may also have been short of memory.
+fn lasts(answer: &Answer) -> bool {
+    matches!(answer, Ok(_) | Err(vk::Result::ERROR_FORMAT_NOT_SUPPORTED))
+}
+
+impl Gpu {
+    /// What the device allows for an image of this description, or the driver's refusal.
+    pub(crate) fn image_limits(&self, info: &vk::ImageCreateInfo<'_>) -> Answer {
+        let kind = ImageKind {
+            format: info.format,
+            ty: info.image_type,
+            tiling: info.tiling,
+            usage: info.usage,
+            flags: info.flags,
+        };
+        self.image_limits.get(kind, || {
+            let instance = &self.instance.raw;
+            // SAFETY: the physical device belongs to the instance.
+            unsafe {
+                instance.get_physical_device_image_format_properties(
+                    self.physical(),
+                    kind.format,
+                    kind.ty,
+                    kind.tiling,
+                    kind.usage,
+                    kind.flags,
+                )
+            }
+        })
+    }
+
+    /// How many samples a pixel a plain target of `format` may have; none where it cannot be a target.
+    pub(crate) fn target_samples(
+        &self,
+        format: vk::Format,
+        usage: vk::ImageUsageFlags,
+    ) -> vk::SampleCountFlags {
+        let info = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(format)
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(usage);
+        self.image_limits(&info).map_or(vk::SampleCountFlags::empty(), |limits| limits.sample_counts)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLAIN: ImageKind = ImageKind {
+        format: vk::Format::R8G8B8A8_UNORM,
+        ty: vk::ImageType::TYPE_2D,
+        tiling: vk::ImageTiling::OPTIMAL,
+        usage: vk::ImageUsageFlags::SAMPLED,
+        flags: vk::ImageCreateFlags::empty(),
+    };
+
+    /// What is known of each kind after each was asked for twice, and how often the device was.
+    fn ask_twice(kinds: &[ImageKind], answer: impl Fn(&ImageKind) -> Answer) -> (Vec<bool>, u32) {
+        let (limits, mut asked) = (ImageLimits::default(), 0);
+        let mut get = |kind: &ImageKind| {
+            limits.get(*kind, || {
+                asked += 1;
+                answer(kind)
+            })
+        };
+        let right = [kinds, kinds].concat().iter().map(|kind| get(kind).ok() == answer(kind).ok()).collect();
+        (right, asked)
+    }
+
+    #[test]
+    fn each_kind_of_image_has_its_own_answer_and_is_asked_for_once() {
+        let kinds = [
+            PLAIN,
+            ImageKind { format: vk::Format::R8_UNORM, ..PLAIN },
+            ImageKind { ty: vk::ImageType::TYPE_3D, ..PLAIN },
+            ImageKind { tiling: vk::ImageTiling::LINEAR, ..PLAIN },
+            ImageKind { usage: vk::ImageUsageFlags::STORAGE, ..PLAIN },
+            ImageKind { flags: vk::ImageCreateFlags::CUBE_COMPATIBLE, ..PLAIN },
+        ];
+        let place = |kind: &ImageKind| kinds.iter().position(|other| other == kind).unwrap() as u64;
+        let answer = |kind: &ImageKind| match place(kind) {
+            0 => Err(vk::Result::ERROR_FORMAT_NOT_SUPPORTED),
+            place => Ok(vk::ImageFormatProperties { max_resource_size: place, ..Default::default() }),
+        };
+        let (right, asked) = ask_twice(&kinds, answer);
+        assert!(right.iter().all(|right| *right), "{right:?}");
+        assert_eq!(asked, kinds.len() as u32);
+    }
+
+    #[test]
+    fn a_device_that_was_short_of_memory_is_asked_again() {
+        let (_, asked) = ask_twice(&[PLAIN], |_| Err(vk::Result::ERROR_OUT_OF_HOST_MEMORY));
+        assert_eq!(asked, 2);
+    }
+}
