@@ -1,7 +1,7 @@
 //! Views: how shaders and passes see a part of an image.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use ash::vk;
 
@@ -61,21 +61,39 @@ pub(crate) struct ViewInfo {
 
 /// The Vulkan views of one texture, made when they are first needed and destroyed on drop.
 pub(crate) struct ViewCache {
-    made: Mutex<HashMap<ViewInfo, vk::ImageView>>,
+    /// The one that was needed first, of most textures the only one.
+    first: OnceLock<(ViewInfo, vk::ImageView)>,
+    others: Mutex<HashMap<ViewInfo, vk::ImageView>>,
     gpu: Arc<Gpu>,
 }
 
 impl ViewCache {
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Self {
-        Self { made: Mutex::default(), gpu: Arc::clone(gpu) }
+        Self { first: OnceLock::new(), others: Mutex::default(), gpu: Arc::clone(gpu) }
     }
 
     /// The view of this description, of the image that all views of the cache are of.
     pub(crate) fn get(&self, image: &Image, info: ViewInfo, name: &str) -> Result<vk::ImageView> {
-        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(view) = made.get(&info) {
-            return Ok(*view);
+        if let Some(view) = self.first(&info) {
+            return Ok(view);
         }
+        let mut others = self.others.lock().unwrap_or_else(PoisonError::into_inner);
+        // Another thread may have made it while this one waited.
+        if let Some(view) = self.first(&info).or_else(|| others.get(&info).copied()) {
+            return Ok(view);
+        }
+        let view = self.make(image, info, name)?;
+        if self.first.set((info, view)).is_err() {
+            others.insert(info, view);
+        }
+        Ok(view)
+    }
+
+    fn first(&self, info: &ViewInfo) -> Option<vk::ImageView> {
+        self.first.get().filter(|(known, _)| known == info).map(|(_, view)| *view)
+    }
+
+    fn make(&self, image: &Image, info: ViewInfo, name: &str) -> Result<vk::ImageView> {
         let mut usage = vk::ImageViewUsageCreateInfo::default().usage(info.usage);
         let mut conversion = vk::SamplerYcbcrConversionInfo::default().conversion(info.conversion);
         let mut create = vk::ImageViewCreateInfo::default()
@@ -92,15 +110,15 @@ impl ViewCache {
         let view = unsafe { self.gpu.device.create_image_view(&create, None) }
             .map_err(Error::vulkan("vkCreateImageView"))?;
         self.gpu.name(view, name);
-        made.insert(info, view);
         Ok(view)
     }
 }
 
 impl Drop for ViewCache {
     fn drop(&mut self) {
-        let made = self.made.get_mut().unwrap_or_else(PoisonError::into_inner);
-        for (_, view) in made.drain() {
+        let others = self.others.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let others = others.drain().map(|(_, view)| view);
+        for view in self.first.take().map(|(_, view)| view).into_iter().chain(others) {
             // SAFETY: the owner has waited until the GPU is done with the texture and its views.
             unsafe { self.gpu.device.destroy_image_view(view, None) };
         }
