@@ -22,7 +22,7 @@ pub(crate) enum Rank {
     /// A queue of the device.
     Queue,
     /// Device memory.
-    Allocator,
+    Memory,
 }
 
 /// A mutex with a place in the order. A thread that panicked with it does not close it to others.
@@ -136,7 +136,7 @@ mod tests {
         Rank::Submitter,
         Rank::Bindless,
         Rank::Queue,
-        Rank::Allocator,
+        Rank::Memory,
     ];
 
     #[test]

@@ -3,10 +3,10 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use ash::vk;
-use gpu_allocator::vulkan::Allocation;
 
 use super::device::Gpu;
 use super::instance::Instance;
+use super::memory::ObjectMemory;
 use super::optional::OptionalFeature;
 
 /// The memory of a device, from [`Context::memory_budget`](crate::Context::memory_budget).
@@ -51,16 +51,16 @@ impl HeapUse {
     }
 
     /// An object was allocated.
-    pub(super) fn add(&self, allocated: &Allocation) {
-        if let Some(heap) = heap_of(&self.types, allocated.memory_properties()) {
-            self.bytes[heap].fetch_add(allocated.size(), Ordering::Relaxed);
+    pub(super) fn add(&self, allocated: &ObjectMemory) {
+        if let Some(heap) = heap_of(&self.types, allocated.properties) {
+            self.bytes[heap].fetch_add(allocated.size, Ordering::Relaxed);
         }
     }
 
     /// An object goes.
-    pub(super) fn remove(&self, allocated: &Allocation) {
-        if let Some(heap) = heap_of(&self.types, allocated.memory_properties()) {
-            self.bytes[heap].fetch_sub(allocated.size(), Ordering::Relaxed);
+    pub(super) fn remove(&self, allocated: &ObjectMemory) {
+        if let Some(heap) = heap_of(&self.types, allocated.properties) {
+            self.bytes[heap].fetch_sub(allocated.size, Ordering::Relaxed);
         }
     }
 }

@@ -4,8 +4,6 @@ use std::ffi::CStr;
 use std::sync::atomic::AtomicU32;
 
 use ash::vk;
-use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
-use gpu_allocator::{AllocationSizes, AllocatorDebugSettings};
 
 use super::budget::HeapUse;
 use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
@@ -17,6 +15,7 @@ use super::format_features::FormatAnswers;
 use super::host_copy::HostCopies;
 use super::image_limits::ImageLimits;
 use super::instance::Instance;
+use super::memory::DeviceMemory;
 use super::naming;
 use super::optional::{FeatureSet, OF_WINDOWS, OptionalFeature};
 use super::profile::DeviceProfile;
@@ -74,7 +73,7 @@ pub(crate) struct Gpu {
     /// Takes names and labels; present where somebody reads them, as each name costs as much as a small buffer.
     pub(super) debug_utils: Option<ash::ext::debug_utils::Device>,
     pub(super) device_fault: Option<ash::ext::device_fault::Device>,
-    allocator: Mutex<Option<Allocator>>,
+    memory: Mutex<Option<DeviceMemory>>,
     pub(super) heap_use: HeapUse,
     pub(super) format_answers: FormatAnswers,
     pub(super) image_limits: ImageLimits,
@@ -89,7 +88,7 @@ struct Made {
     device: ash::Device,
     caps: Capabilities,
     features: Features,
-    allocator: Allocator,
+    memory: DeviceMemory,
     queues: Queues,
     is_foreign: bool,
 }
@@ -98,8 +97,8 @@ impl Gpu {
     pub(crate) fn new(instance: Instance, request: &DeviceRequest<'_>) -> Result<Self> {
         let chosen = choose_device(&instance, request)?;
         let (device, caps, features) = create_with_fallback(&instance, &chosen, request)?;
-        let allocator = match new_allocator(&instance, &device, chosen.raw) {
-            Ok(allocator) => allocator,
+        let memory = match DeviceMemory::new(&instance, &device, chosen.raw) {
+            Ok(memory) => memory,
             Err(error) => {
                 // SAFETY: nothing was made from the device yet.
                 unsafe { device.destroy_device(None) };
@@ -111,7 +110,7 @@ impl Gpu {
             (unsafe { device.get_device_queue(family, index) }, family)
         });
         let queues = Queues::new(raw, request.queues);
-        let made = Made { device, caps, features, allocator, queues, is_foreign: false };
+        let made = Made { device, caps, features, memory, queues, is_foreign: false };
         let mut gpu = Self::of(instance, chosen.raw, made, request.debug_names);
         gpu.profile = request.profile.cloned().unwrap_or_default();
         gpu.extra_capabilities = request.extra.capabilities().to_vec();
@@ -137,7 +136,7 @@ impl Gpu {
         let instance = Instance::foreign(raw.entry, raw.instance, raw.instance_extensions);
         let features = enabled(&instance, &chosen, &caps);
         let made = Made {
-            allocator: new_allocator(&instance, &raw.device, chosen.raw)?,
+            memory: DeviceMemory::new(&instance, &raw.device, chosen.raw)?,
             device: raw.device,
             caps,
             features,
@@ -148,7 +147,7 @@ impl Gpu {
     }
 
     fn of(instance: Instance, physical: vk::PhysicalDevice, made: Made, debug_names: Option<bool>) -> Self {
-        let Made { device, mut caps, features, allocator, queues, is_foreign } = made;
+        let Made { device, mut caps, features, memory, queues, is_foreign } = made;
         let raw = &instance.raw;
         let structures = caps.hardware_structures();
         let host_copies = HostCopies::new(&instance, &device, physical, &caps);
@@ -171,7 +170,7 @@ impl Gpu {
                 .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             device_fault: (features.ext.fault.device_fault == vk::TRUE)
                 .then(|| ash::ext::device_fault::Device::new(raw, &device)),
-            allocator: Mutex::new(Rank::Allocator, Some(allocator)),
+            memory: Mutex::new(Rank::Memory, Some(memory)),
             heap_use: HeapUse::new(&instance, physical),
             format_answers: FormatAnswers::default(),
             image_limits: ImageLimits::default(),
@@ -192,9 +191,9 @@ impl Gpu {
         self.queues.raw(0)
     }
 
-    /// The memory allocator, `None` only while the context is being torn down.
-    pub(crate) fn allocator(&self) -> Guard<'_, Option<Allocator>> {
-        self.allocator.lock()
+    /// The memory of objects, `None` only while the context is being torn down.
+    pub(super) fn memory(&self) -> Guard<'_, Option<DeviceMemory>> {
+        self.memory.lock()
     }
 
     /// The functions of `VK_KHR_acceleration_structure`, or the error that says what the device lacks.
@@ -281,7 +280,7 @@ impl Gpu {
 
 impl Drop for Gpu {
     fn drop(&mut self) {
-        self.allocator().take();
+        self.memory().take();
         if self.is_foreign {
             return;
         }
@@ -462,23 +461,4 @@ fn extensions<'a>(features: &Features, caps: &Capabilities, extra: &ExtraExtensi
     names.sort_unstable();
     names.dedup();
     names
-}
-
-fn new_allocator(
-    instance: &Instance,
-    device: &ash::Device,
-    physical: vk::PhysicalDevice,
-) -> Result<Allocator> {
-    let mut debug_settings = AllocatorDebugSettings::default();
-    // The context reports by name what is left over.
-    debug_settings.log_leaks_on_shutdown = false;
-    Allocator::new(&AllocatorCreateDesc {
-        instance: instance.raw.clone(),
-        device: device.clone(),
-        physical_device: physical,
-        debug_settings,
-        buffer_device_address: true,
-        allocation_sizes: AllocationSizes::default(),
-    })
-    .map_err(|error| Error::unsupported("memory allocation", error.to_string()))
 }

@@ -1,10 +1,16 @@
-//! Memory of buffers and images, by `gpu-allocator`.
+//! Memory of buffers and images, by `gpu-allocator`. Small objects take slots of blocks that they share.
+
+use std::ptr::NonNull;
 
 use ash::vk;
-use gpu_allocator::MemoryLocation;
-use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use gpu_allocator::vulkan::{
+    Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc,
+};
+use gpu_allocator::{AllocationError, AllocationSizes, AllocatorDebugSettings, MemoryLocation};
 
 use super::device::Gpu;
+use super::instance::Instance;
+use super::slab::{Slab, Slot};
 use crate::error::{Error, Result, check_limit};
 
 /// Where a buffer lives.
@@ -34,6 +40,207 @@ impl MemoryKind {
     }
 }
 
+/// Memory of a buffer or an image.
+pub(crate) struct ObjectMemory {
+    pub(crate) raw: vk::DeviceMemory,
+    /// Where the object's part of it begins, in bytes.
+    pub(crate) offset: u64,
+    /// Of the object's part, in bytes.
+    pub(super) size: u64,
+    pub(crate) properties: vk::MemoryPropertyFlags,
+    mapped: Option<Mapping>,
+    source: Source,
+}
+
+/// Where memory came from and goes back to.
+enum Source {
+    Own(Box<Allocation>),
+    /// A slot of a [`Shelf`], by its number.
+    Shared(usize, Slot),
+}
+
+/// Where the host sees memory.
+#[derive(Clone, Copy)]
+struct Mapping(NonNull<u8>);
+
+// SAFETY: the address is the same in every thread, and what is done with it is the business of those who ask for it.
+unsafe impl Send for Mapping {}
+// SAFETY: as above.
+unsafe impl Sync for Mapping {}
+
+impl ObjectMemory {
+    fn own(allocation: Allocation) -> Self {
+        let place = Place::of(&allocation);
+        Self::at(place, allocation.size(), Source::Own(Box::new(allocation)))
+    }
+
+    fn at(place: Place, size: u64, source: Source) -> Self {
+        let Place { raw, offset, properties, mapped } = place;
+        Self { raw, offset, size, properties, mapped, source }
+    }
+
+    /// Where the host sees the object's part, if it does.
+    pub(crate) fn mapped(&self) -> Option<NonNull<u8>> {
+        self.mapped.map(|mapping| mapping.0)
+    }
+}
+
+/// Where a piece of memory lies.
+struct Place {
+    raw: vk::DeviceMemory,
+    offset: u64,
+    properties: vk::MemoryPropertyFlags,
+    mapped: Option<Mapping>,
+}
+
+impl Place {
+    fn of(allocation: &Allocation) -> Self {
+        Self {
+            // SAFETY: the memory is only named here; it lives until the allocation is freed.
+            raw: unsafe { allocation.memory() },
+            offset: allocation.offset(),
+            properties: allocation.memory_properties(),
+            mapped: allocation.mapped_ptr().map(|start| Mapping(start.cast())),
+        }
+    }
+
+    /// A slot of a block.
+    fn in_block(block: &Allocation, slot: Slot, slot_bytes: u64) -> Self {
+        let whole = Self::of(block);
+        let offset = u64::from(slot.number) * slot_bytes;
+        // SAFETY: the slot lies inside the block, all of which is mapped.
+        let inside = |start: Mapping| Mapping(unsafe { start.0.add(offset as usize) });
+        Self { offset: whole.offset + offset, mapped: whole.mapped.map(inside), ..whole }
+    }
+}
+
+/// The memory of a device: large objects have pieces of their own from the allocator, small ones share blocks.
+pub(super) struct DeviceMemory {
+    allocator: Allocator,
+    shelves: Vec<Shelf>,
+}
+
+/// Slots for objects that are alike.
+struct Shelf {
+    kind: ShelfKind,
+    slab: Slab<Allocation>,
+}
+
+/// What objects that share blocks have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct ShelfKind {
+    slot_bytes: u64,
+    /// Kinds of memory that will do.
+    type_bits: u32,
+    memory: MemoryKind,
+    linear: bool,
+}
+
+impl ShelfKind {
+    /// The least and the most bytes of a slot; with these a block has 16 KiB to 1 MiB.
+    const LEAST: u64 = 256;
+    const MOST: u64 = 16 << 10;
+
+    /// For an object with these requirements; `None` if it is large enough for memory of its own. Slots are powers of two, so
+    /// that each lies as it has to in a block that does.
+    fn of(requirements: &vk::MemoryRequirements, memory: MemoryKind, linear: bool) -> Option<Self> {
+        let bytes = requirements.size.max(requirements.alignment).max(Self::LEAST);
+        (bytes <= Self::MOST).then(|| Self {
+            slot_bytes: bytes.next_power_of_two(),
+            type_bits: requirements.memory_type_bits,
+            memory,
+            linear,
+        })
+    }
+
+    /// What a block of slots requires.
+    fn block(&self) -> vk::MemoryRequirements {
+        vk::MemoryRequirements {
+            size: self.slot_bytes * Slab::<Allocation>::SLOTS,
+            alignment: self.slot_bytes,
+            memory_type_bits: self.type_bits,
+        }
+    }
+}
+
+/// What the allocator answers.
+type Allocated<T> = Result<T, AllocationError>;
+
+impl DeviceMemory {
+    pub(super) fn new(
+        instance: &Instance,
+        device: &ash::Device,
+        physical_device: vk::PhysicalDevice,
+    ) -> Result<Self> {
+        let mut debug_settings = AllocatorDebugSettings::default();
+        // The context reports by name what is left over.
+        debug_settings.log_leaks_on_shutdown = false;
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw.clone(),
+            device: device.clone(),
+            physical_device,
+            debug_settings,
+            buffer_device_address: true,
+            allocation_sizes: AllocationSizes::default(),
+        })
+        .map_err(|error| Error::unsupported("memory allocation", error.to_string()))?;
+        Ok(Self { allocator, shelves: Vec::new() })
+    }
+
+    /// Memory for one object; where a block for small ones cannot be had, a piece of its own.
+    fn allocate(
+        &mut self,
+        name: &str,
+        requirements: vk::MemoryRequirements,
+        memory: MemoryKind,
+        linear: bool,
+    ) -> Allocated<ObjectMemory> {
+        if let Some(kind) = ShelfKind::of(&requirements, memory, linear)
+            && let Ok(shared) = self.share(name, kind, requirements.size)
+        {
+            return Ok(shared);
+        }
+        Ok(ObjectMemory::own(piece(&mut self.allocator, name, requirements, memory, linear)?))
+    }
+
+    /// A slot of a block.
+    fn share(&mut self, name: &str, kind: ShelfKind, size: u64) -> Allocated<ObjectMemory> {
+        let number = self.shelves.iter().position(|shelf| shelf.kind == kind).unwrap_or_else(|| {
+            self.shelves.push(Shelf { kind, slab: Slab::default() });
+            self.shelves.len() - 1
+        });
+        let new = || piece(&mut self.allocator, name, kind.block(), kind.memory, kind.linear);
+        let (slot, block) = self.shelves[number].slab.take(new)?;
+        let place = Place::in_block(block, slot, kind.slot_bytes);
+        Ok(ObjectMemory::at(place, size, Source::Shared(number, slot)))
+    }
+
+    fn free(&mut self, memory: ObjectMemory) -> Allocated<()> {
+        let unused = match memory.source {
+            Source::Own(allocation) => Some(*allocation),
+            Source::Shared(shelf, slot) => self.shelves[shelf].slab.give(slot),
+        };
+        unused.map_or(Ok(()), |allocation| self.allocator.free(allocation))
+    }
+}
+
+/// A piece of memory from the allocator, which keeps a copy of the name that only its own reports show.
+fn piece(
+    allocator: &mut Allocator,
+    name: &str,
+    requirements: vk::MemoryRequirements,
+    memory: MemoryKind,
+    linear: bool,
+) -> Allocated<Allocation> {
+    allocator.allocate(&AllocationCreateDesc {
+        name,
+        requirements,
+        location: memory.location(),
+        linear,
+        allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+    })
+}
+
 impl Gpu {
     /// Allocates memory for a buffer (`linear`) or an image.
     pub(crate) fn allocate(
@@ -42,35 +249,30 @@ impl Gpu {
         requirements: vk::MemoryRequirements,
         kind: MemoryKind,
         linear: bool,
-    ) -> Result<Allocation> {
+    ) -> Result<ObjectMemory> {
         let bytes = requirements.size;
         let limit = self.caps.limits.max_allocation_bytes;
         check_limit(name, "memory of one object in bytes", bytes, limit)?;
         let out_of_memory = || Error::OutOfDeviceMemory { object: name.to_owned(), bytes };
-        let mut allocator = self.allocator();
-        let allocator = allocator.as_mut().ok_or_else(out_of_memory)?;
-        let desc = AllocationCreateDesc {
-            // The allocator keeps a copy, which only its own reports show.
-            name: if self.names_objects() { name } else { "" },
-            requirements,
-            location: kind.location(),
-            linear,
-            allocation_scheme: AllocationScheme::GpuAllocatorManaged,
-        };
-        let allocated = allocator.allocate(&desc).map_err(|error| match error {
-            gpu_allocator::AllocationError::OutOfMemory => out_of_memory(),
-            other => Error::unsupported(format!("memory for '{name}' ({bytes} bytes)"), other.to_string()),
-        })?;
+        let mut memory = self.memory();
+        let memory = memory.as_mut().ok_or_else(out_of_memory)?;
+        let kept_name = if self.names_objects() { name } else { "" };
+        let allocated =
+            memory.allocate(kept_name, requirements, kind, linear).map_err(|error| match error {
+                AllocationError::OutOfMemory => out_of_memory(),
+                other => {
+                    Error::unsupported(format!("memory for '{name}' ({bytes} bytes)"), other.to_string())
+                }
+            })?;
         self.heap_use.add(&allocated);
         self.name_block(&allocated, name);
         Ok(allocated)
     }
 
     /// Names a block of memory after what lies at its start.
-    fn name_block(&self, allocated: &Allocation, name: &str) {
-        if self.names_objects() && allocated.offset() == 0 {
-            // SAFETY: the memory is only named, while the allocator is locked.
-            self.name(unsafe { allocated.memory() }, &format!("memory from '{name}' on"));
+    fn name_block(&self, allocated: &ObjectMemory, name: &str) {
+        if self.names_objects() && allocated.offset == 0 {
+            self.name(allocated.raw, &format!("memory from '{name}' on"));
         }
     }
 
@@ -97,10 +299,10 @@ impl Gpu {
     }
 
     /// Gives memory back.
-    pub(crate) fn free(&self, allocation: Allocation) {
-        self.heap_use.remove(&allocation);
-        if let Some(allocator) = self.allocator().as_mut()
-            && let Err(error) = allocator.free(allocation)
+    pub(crate) fn free(&self, memory: ObjectMemory) {
+        self.heap_use.remove(&memory);
+        if let Some(all) = self.memory().as_mut()
+            && let Err(error) = all.free(memory)
         {
             log::error!("freeing device memory failed: {error}");
         }
@@ -116,7 +318,43 @@ fn lazy_type(types: &[vk::MemoryType], bits: u32) -> Option<u32> {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    proptest! {
+        /// Wherever a block lies as it has to, so do its slots, and each has room for its object.
+        #[test]
+        fn slots_suit_their_objects(
+            size in 1..40_000_u64, alignment in 0..17_u32, start in 0..8_u64, number in 0..64_u64
+        ) {
+            let requirements = vk::MemoryRequirements { size, alignment: 1 << alignment, memory_type_bits: 5 };
+            let large = size.max(requirements.alignment) > ShelfKind::MOST;
+            let kind = ShelfKind::of(&requirements, MemoryKind::Readback, true);
+            prop_assert_eq!(kind.is_none(), large);
+            if let Some(kind) = kind {
+                let block = kind.block();
+                let offset = start * block.alignment + number * kind.slot_bytes;
+                prop_assert!(offset.is_multiple_of(requirements.alignment));
+                prop_assert!(kind.slot_bytes >= size && (number + 1) * kind.slot_bytes <= block.size);
+                prop_assert_eq!(block.memory_type_bits, 5);
+                prop_assert!(block.size <= 1 << 20);
+            }
+        }
+
+        /// Objects share blocks only where they may have the same memory.
+        #[test]
+        fn objects_of_different_kinds_share_nothing(bits in 1..4_u32, other_bits in 1..4_u32, linear: bool) {
+            let of = |memory_type_bits, memory, linear| {
+                let requirements = vk::MemoryRequirements { size: 300, alignment: 16, memory_type_bits };
+                ShelfKind::of(&requirements, memory, linear)
+            };
+            let kind = of(bits, MemoryKind::Device, linear);
+            prop_assert_eq!(kind == of(other_bits, MemoryKind::Device, linear), bits == other_bits);
+            prop_assert_ne!(kind, of(bits, MemoryKind::HostVisible, linear));
+            prop_assert_ne!(kind, of(bits, MemoryKind::Device, !linear));
+        }
+    }
 
     #[test]
     fn lazy_memory_is_found_among_the_kinds_that_will_do() {

@@ -28,6 +28,7 @@ pub(crate) mod select;
 pub(crate) mod shading_rate;
 #[cfg(feature = "test-hooks")]
 pub(crate) mod silent;
+mod slab;
 pub(crate) mod window;
 
 pub(crate) use device::Gpu;

@@ -5,12 +5,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::vk;
 use bitflags::bitflags;
-use gpu_allocator::vulkan::Allocation;
 
 use crate::barrier::ResourceId;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
-use crate::gpu::memory::MemoryKind;
+use crate::gpu::memory::{MemoryKind, ObjectMemory};
 
 bitflags! {
     /// What a buffer is used for, besides copies and access by address, which are always allowed.
@@ -65,7 +64,7 @@ pub(crate) struct Buffer {
     pub(crate) usage: BufferUsage,
     pub(crate) memory: MemoryKind,
     pub(crate) name: String,
-    allocation: Option<Allocation>,
+    allocation: Option<ObjectMemory>,
     /// Somebody else made it, and destroys it.
     is_foreign: bool,
     /// Held while the host copies to or from the mapping, so that threads do not race for the same bytes.
@@ -167,7 +166,7 @@ impl Buffer {
         }
         let allocation = self.gpu.allocate(&self.name, requirements, self.memory, true)?;
         // SAFETY: the allocation was made for this buffer's requirements and is bound once.
-        let bound = unsafe { device.bind_buffer_memory(self.raw, allocation.memory(), allocation.offset()) };
+        let bound = unsafe { device.bind_buffer_memory(self.raw, allocation.raw, allocation.offset) };
         self.allocation = Some(allocation);
         bound.map_err(Error::vulkan("vkBindBufferMemory"))?;
         let info = vk::BufferDeviceAddressInfo::default().buffer(self.raw);
@@ -200,18 +199,18 @@ impl Buffer {
         if !self.memory.mapped() {
             return None;
         }
-        self.allocation.as_ref()?.mapped_ptr().map(NonNull::cast)
+        self.allocation.as_ref()?.mapped()
     }
 
     /// Writes the first contents of a buffer that nothing has used yet, where its memory happens to be in reach of the host,
     /// as device memory is on some devices. `false` if it is not; the bytes fit the buffer.
     pub(crate) fn write_first(&self, bytes: &[u8]) -> bool {
         let coherent = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-        let reached = self.allocation.as_ref().filter(|own| own.memory_properties().contains(coherent));
-        let Some(start) = reached.and_then(Allocation::mapped_ptr) else { return false };
+        let reached = self.allocation.as_ref().filter(|own| own.properties.contains(coherent));
+        let Some(start) = reached.and_then(ObjectMemory::mapped) else { return false };
         debug_assert!(bytes.len() as u64 <= self.size_bytes);
         // SAFETY: the mapping has the buffer's size and lives as long as `self`, which nobody else knows yet.
-        unsafe { start.cast::<u8>().as_ptr().copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) };
+        unsafe { start.as_ptr().copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) };
         true
     }
 

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use ash::vk;
-use gpu_allocator::vulkan::Allocation;
 
 use super::host_copy;
 use super::image_check::{ImagePlan, check};
@@ -14,7 +13,7 @@ use crate::barrier::{ResourceId, Subresources, TextureShape};
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
-use crate::gpu::memory::MemoryKind;
+use crate::gpu::memory::{MemoryKind, ObjectMemory};
 use crate::handle::{Handle, TextureHandle};
 
 /// An image with memory, destroyed on drop. The tracker knows it by `id`, whichever texture names it.
@@ -53,7 +52,7 @@ pub(crate) struct Image {
 
 /// Memory of an image.
 enum Memory {
-    Managed(Allocation),
+    Managed(ObjectMemory),
     /// Of its own, only there while a pass needs it.
     Lazy(vk::DeviceMemory),
 }
@@ -159,8 +158,7 @@ impl Image {
             None => Memory::Managed(self.gpu.allocate(name, requirements, MemoryKind::Device, false)?),
         };
         let (raw, offset) = match &memory {
-            // SAFETY: the allocation lives until it is freed.
-            Memory::Managed(allocation) => (unsafe { allocation.memory() }, allocation.offset()),
+            Memory::Managed(memory) => (memory.raw, memory.offset),
             Memory::Lazy(memory) => (*memory, 0),
         };
         self.memory = Some(memory);
@@ -225,7 +223,7 @@ impl Drop for Image {
         // SAFETY: the owners have waited until the GPU is done with the image, and their views are gone.
         unsafe { self.gpu.device.destroy_image(self.raw, None) };
         match self.memory.take() {
-            Some(Memory::Managed(allocation)) => self.gpu.free(allocation),
+            Some(Memory::Managed(memory)) => self.gpu.free(memory),
             // SAFETY: the image that was bound to it is gone.
             Some(Memory::Lazy(memory)) => unsafe { self.gpu.device.free_memory(memory, None) },
             None => {}

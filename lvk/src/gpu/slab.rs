@@ -1,0 +1,200 @@
+//! Small pieces of memory out of blocks of 64 slots: which slots are taken, as plain values.
+//!
+//! A slot is found without a search, however many there are. An allocator for pieces of any size looks through all that is free
+//! for what fits best, which takes longer than the driver does to make a small buffer.
+
+use slotmap::{DefaultKey, SlotMap};
+
+/// Slots of one size. `B` is the memory of a block of them.
+pub(super) struct Slab<B> {
+    blocks: SlotMap<DefaultKey, Block<B>>,
+    /// The blocks that have both taken and free slots.
+    open: Vec<DefaultKey>,
+    /// A block that has no taken slot, kept for the next one.
+    spare: Option<DefaultKey>,
+}
+
+struct Block<B> {
+    memory: B,
+    /// A bit for each free slot.
+    free: u64,
+    /// Where it stands in `open`, while it does.
+    place: usize,
+}
+
+/// A slot that is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Slot {
+    block: DefaultKey,
+    /// Its place in the block, below [`Slab::SLOTS`].
+    pub(super) number: u32,
+}
+
+impl<B> Default for Slab<B> {
+    fn default() -> Self {
+        Self { blocks: SlotMap::default(), open: Vec::new(), spare: None }
+    }
+}
+
+impl<B> Slab<B> {
+    /// Slots of a block.
+    pub(super) const SLOTS: u64 = u64::BITS as u64;
+
+    /// Takes a slot, with the memory of its block; `new` makes that of another block where all slots are taken.
+    pub(super) fn take<E>(&mut self, new: impl FnOnce() -> Result<B, E>) -> Result<(Slot, &B), E> {
+        let key = match self.open.last() {
+            Some(key) => *key,
+            None => {
+                let key = match self.spare.take() {
+                    Some(key) => key,
+                    None => self.blocks.insert(Block { memory: new()?, free: u64::MAX, place: 0 }),
+                };
+                self.open(key);
+                key
+            }
+        };
+        let block = &mut self.blocks[key];
+        let number = block.free.trailing_zeros();
+        block.free &= !(1 << number);
+        if block.free == 0 {
+            self.open.pop();
+        }
+        Ok((Slot { block: key, number }, &self.blocks[key].memory))
+    }
+
+    /// Gives a slot back, once; answers the memory of a block that is not needed any more.
+    pub(super) fn give(&mut self, slot: Slot) -> Option<B> {
+        let block = self.blocks.get_mut(slot.block)?;
+        let was_full = block.free == 0;
+        block.free |= 1 << slot.number;
+        let is_empty = block.free == u64::MAX;
+        if was_full {
+            self.open(slot.block);
+        }
+        if !is_empty {
+            return None;
+        }
+        self.close(slot.block);
+        if self.spare.is_none() {
+            self.spare = Some(slot.block);
+            return None;
+        }
+        self.blocks.remove(slot.block).map(|block| block.memory)
+    }
+
+    fn open(&mut self, key: DefaultKey) {
+        self.blocks[key].place = self.open.len();
+        self.open.push(key);
+    }
+
+    fn close(&mut self, key: DefaultKey) {
+        let place = self.blocks[key].place;
+        self.open.swap_remove(place);
+        if let Some(moved) = self.open.get(place) {
+            self.blocks[*moved].place = place;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+    use std::convert::Infallible;
+
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[derive(Debug, Clone)]
+    enum Op {
+        Take(usize),
+        Give(Vec<prop::sample::Index>),
+        GiveAll,
+    }
+
+    fn op() -> impl Strategy<Value = Op> {
+        let index = any::<prop::sample::Index>;
+        prop_oneof![
+            3 => (1..200_usize).prop_map(Op::Take),
+            3 => prop::collection::vec(index(), 1..150).prop_map(Op::Give),
+            1 => Just(Op::GiveAll),
+        ]
+    }
+
+    /// A slab whose blocks are numbers, with all that it should have.
+    #[derive(Default)]
+    struct Model {
+        slab: Slab<u32>,
+        blocks: BTreeSet<u32>,
+        last: u32,
+        taken: Vec<(Slot, u32)>,
+    }
+
+    impl Model {
+        fn take(&mut self) {
+            let has_room = (self.blocks.len() * 64) > self.taken.len();
+            let mut is_new = false;
+            let new = || -> Result<u32, Infallible> {
+                is_new = true;
+                self.last += 1;
+                Ok(self.last)
+            };
+            let (slot, block) = self.slab.take(new).unwrap();
+            let block = *block;
+            assert_eq!(is_new, !has_room, "a block is made where all slots are taken, and only there");
+            assert_eq!(is_new, self.blocks.insert(block));
+            let place = (block, slot.number);
+            assert!(slot.number < 64 && self.places().all(|other| other != place), "{place:?} is taken");
+            self.taken.push((slot, block));
+        }
+
+        fn places(&self) -> impl Iterator<Item = (u32, u32)> {
+            self.taken.iter().map(|(slot, block)| (*block, slot.number))
+        }
+
+        fn give(&mut self, place: usize) {
+            let (slot, block) = self.taken.swap_remove(place);
+            if let Some(gone) = self.slab.give(slot) {
+                assert_eq!(gone, block);
+                assert!(self.places().all(|(other, _)| other != gone), "block {gone} is still used");
+                assert!(self.blocks.remove(&gone));
+            }
+        }
+
+        fn empty_blocks(&self) -> usize {
+            let used: BTreeSet<u32> = self.places().map(|(block, _)| block).collect();
+            self.blocks.len() - used.len()
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn no_slot_is_taken_twice_and_one_empty_block_at_most_is_kept(
+            ops in prop::collection::vec(op(), 0..30)
+        ) {
+            let mut model = Model::default();
+            for op in ops {
+                match op {
+                    Op::Take(count) => (0..count).for_each(|_| model.take()),
+                    Op::Give(which) => {
+                        for index in which {
+                            if !model.taken.is_empty() {
+                                model.give(index.index(model.taken.len()));
+                            }
+                        }
+                    }
+                    Op::GiveAll => (0..model.taken.len()).rev().for_each(|place| model.give(place)),
+                }
+                prop_assert!(model.empty_blocks() <= 1);
+            }
+        }
+    }
+
+    #[test]
+    fn a_block_that_cannot_be_made_changes_nothing() {
+        let mut slab = Slab::default();
+        assert_eq!(slab.take(|| Err::<u32, _>("full")).unwrap_err(), "full");
+        let (slot, block) = slab.take(|| Ok::<_, &str>(7)).unwrap();
+        assert_eq!((slot.number, *block), (0, 7));
+    }
+}
