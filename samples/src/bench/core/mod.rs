@@ -57,7 +57,11 @@ pub(super) fn measure(setup: &Setup) -> Result<Table, BenchError> {
         "medians of {} rounds, the ways taken in turns; by hand: the same calls in ash",
         amount.runs
     ));
-    table.note("own share: with every vkCmd* replaced by an empty function");
+    table.note("own share of what is recorded: with every vkCmd* replaced by an empty function");
+    table.note(
+        "objects by hand: with memory from gpu-allocator; own share: without the driver's part, which is the same with memory \
+         that is there already",
+    );
     Ok(table)
 }
 

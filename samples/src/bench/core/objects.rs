@@ -7,37 +7,54 @@ use lvk::{BufferDesc, Context, Format, TextureDesc, TextureUsage};
 use super::row::{Limit, Row};
 use super::{Amount, each_ns};
 use crate::bench::error::BenchError;
+use crate::bench::hand_written::{Memory, RawObjects};
 use crate::bench::measure::{median_of, since, take_turns};
 use crate::bench::setup::Setup;
 
 const AT_ONCE: u32 = 1_000;
+const BUFFER_BYTES: u64 = 256;
 const FEW: u32 = 10;
 
 pub(super) fn measure(setup: &Setup, ctx: &Context, amount: Amount) -> Result<Vec<Row>, BenchError> {
-    let [buffers, textures, thousand] = take_turns(amount.runs, |which| match which {
-        0 => come_and_go(ctx, || buffer(ctx).map(drop)),
-        1 => come_and_go(ctx, || texture(ctx).map(drop)),
-        _ => many_buffers(ctx),
+    let mut raw = RawObjects::new(ctx)?;
+    let buffers = take_turns(amount.runs, |which| match memory(which) {
+        None => come_and_go(ctx, || buffer(ctx).map(drop)),
+        Some(memory) => raw.buffers(AT_ONCE, BUFFER_BYTES, memory),
     })?;
-    let each = |samples: &[f64]| each_ns(median_of(samples, |ms| *ms), AT_ONCE) * 1e-3;
-    let row =
-        |what: &str, ours: f64, unit, limit| Row { what: what.to_owned(), ours, other: None, unit, limit };
-    let mut rows = vec![
-        row("buffer created + destroyed, frees included", each(&buffers), "us", Limit::Most(0.6)),
-        row("texture created + destroyed, frees included", each(&textures), "us", Limit::Most(1.8)),
-        row(
-            "1,000 buffers of 256 B, without a submission",
-            median_of(&thousand, |ms| *ms),
-            "ms",
-            Limit::None,
-        ),
-    ];
+    let textures = take_turns(amount.runs, |which| match memory(which) {
+        None => come_and_go(ctx, || texture(ctx).map(drop)),
+        Some(memory) => raw.pictures(AT_ONCE, memory),
+    })?;
+    let [thousand] = take_turns(amount.runs, |_| many_buffers(ctx))?;
+    let mut rows = Vec::new();
+    rows.extend(beside_by_hand("buffer created + destroyed, frees included", &buffers, 0.6));
+    rows.extend(beside_by_hand("texture created + destroyed, frees included", &textures, 1.8));
+    rows.push(Row {
+        what: "1,000 buffers of 256 B, without a submission".to_owned(),
+        ours: median_of(&thousand, |ms| *ms),
+        other: None,
+        unit: "ms",
+        limit: Limit::None,
+    });
     rows.extend(crowded(setup, amount)?);
     Ok(rows)
 }
 
+/// Whose turn it is: the library's, or that of the same calls by hand with memory from there.
+fn memory(turn: usize) -> Option<Memory> {
+    [None, Some(Memory::Allocated), Some(Memory::There)].get(turn).copied().flatten()
+}
+
+/// A thousand by the library, by hand, and by hand without their memory: what that takes is the driver's.
+fn beside_by_hand(what: &str, samples: &[Vec<f64>; 3], limit: f64) -> [Row; 2] {
+    let [ours, by_hand, driver] =
+        samples.each_ref().map(|samples| each_ns(median_of(samples, |ms| *ms), AT_ONCE) * 1e-3);
+    let row = |what: &str, ours, other, limit| Row { what: what.to_owned(), ours, other, unit: "us", limit };
+    [row(what, ours, Some(by_hand), Limit::Most(limit)), row("- own share", ours - driver, None, Limit::None)]
+}
+
 fn buffer(ctx: &Context) -> lvk::Result<lvk::Holder<lvk::BufferHandle>> {
-    ctx.create_buffer(&BufferDesc { size_bytes: 256, ..BufferDesc::default() })
+    ctx.create_buffer(&BufferDesc { size_bytes: BUFFER_BYTES, ..BufferDesc::default() })
 }
 
 fn texture(ctx: &Context) -> lvk::Result<lvk::Holder<lvk::TextureHandle>> {
