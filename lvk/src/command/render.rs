@@ -15,7 +15,7 @@ use super::targets::Targets;
 use crate::barrier::Use;
 use crate::error::{Error, Result, check_limit};
 use crate::format::IndexFormat;
-use crate::gpu::caps::Limits;
+use crate::gpu::limits::Limits;
 use crate::gpu::optional::OptionalFeature;
 use crate::handle::{BufferHandle, RenderPipelineHandle};
 use crate::pipeline::{FrontEnd, RenderPipeline};

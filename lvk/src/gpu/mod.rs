@@ -16,6 +16,7 @@ pub(crate) mod format_features;
 pub(crate) mod host_copy;
 mod image_limits;
 pub(crate) mod instance;
+pub(crate) mod limits;
 pub(crate) mod memory;
 pub(crate) mod mesh_limits;
 mod naming;

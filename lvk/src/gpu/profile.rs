@@ -210,7 +210,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::gpu::caps::Limits;
+    use crate::gpu::limits::Limits;
     use crate::gpu::optional::OptionalFeature;
 
     fn device() -> Capabilities {

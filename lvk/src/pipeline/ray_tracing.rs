@@ -15,7 +15,7 @@ use super::stage::{Specialization, SpecializationConstant, stage};
 use super::table_order::{PerRegion, table_order};
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
-use crate::gpu::caps::Limits;
+use crate::gpu::limits::Limits;
 use crate::handle::{RayTracingLibraryHandle, ShaderModuleHandle};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
