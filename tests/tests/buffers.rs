@@ -159,6 +159,40 @@ fn addresses_differ_and_sizes_come_from_the_data() {
     assert_eq!((a.index(), b.index()), (0, 0));
 }
 
+/// Small buffers share blocks of memory with each other, and with those that come in the place of others.
+#[test]
+fn small_buffers_that_come_and_go_keep_bytes_of_their_own() {
+    const SIZES: [usize; 7] = [1, 255, 256, 257, 1_000, 5_000, 20_000];
+    let Some(ctx) = device() else { return };
+    let make = |number: u32| {
+        let size = SIZES[number as usize % SIZES.len()];
+        let bytes = noise(number, size);
+        (buffer(&ctx, MEMORY[number as usize % MEMORY.len()], &bytes), bytes)
+    };
+    let mut buffers: Vec<_> = (0..400).map(make).collect();
+    for round in 0..3_usize {
+        let mut place = 0;
+        buffers.retain(|_| {
+            place += 1;
+            !(place + round).is_multiple_of(3)
+        });
+        ctx.wait_idle().unwrap();
+        let next = 1_000 * (round as u32 + 1);
+        buffers.extend((next..next + 130).map(make));
+    }
+    let address = |buffer: &Holder<_>| ctx.buffer_address(**buffer).unwrap();
+    let mut ranges: Vec<_> =
+        buffers.iter().map(|(buffer, bytes)| (address(buffer), bytes.len() as u64)).collect();
+    ranges.sort_unstable();
+    for pair in ranges.windows(2) {
+        let [(first, bytes), (second, _)] = pair else { continue };
+        assert!(first + bytes <= *second, "{bytes} bytes at {first:#x} reach into those at {second:#x}");
+    }
+    for (buffer, bytes) in &buffers {
+        assert_eq!(download(&ctx, **buffer, 0, bytes.len()), *bytes);
+    }
+}
+
 #[test]
 fn impossible_sizes_are_typed_errors() {
     let Some(ctx) = device() else { return };
