@@ -6,6 +6,7 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("bench/view.glsl", include_str!("../../shaders/bench/view.glsl")),
     ("common/camera.glsl", include_str!("../../shaders/common/camera.glsl")),
     ("common/fresnel.glsl", include_str!("../../shaders/common/fresnel.glsl")),
+    ("common/group_pixel.glsl", include_str!("../../shaders/common/group_pixel.glsl")),
     ("common/lighting.glsl", include_str!("../../shaders/common/lighting.glsl")),
     ("common/octahedral.glsl", include_str!("../../shaders/common/octahedral.glsl")),
     ("common/phong.glsl", include_str!("../../shaders/common/phong.glsl")),

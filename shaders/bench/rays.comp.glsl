@@ -1,9 +1,8 @@
 // Primary rays by query, or with BENCH_SHADOW those towards the light.
 #define LVK_OPAQUE_TRIANGLES_ONLY
 #include <lvk/ray_query.glsl>
+#include "common/group_pixel.glsl"
 #include "bench/view.glsl"
-
-layout(local_size_x = 8, local_size_y = 8) in;
 
 #ifdef BENCH_SHADOW
 void trace(uvec2 pixel, uint index) {
@@ -33,7 +32,7 @@ void trace(uvec2 pixel, uint index) {
 #endif
 
 void main() {
-    uvec2 pixel = gl_GlobalInvocationID.xy;
+    uvec2 pixel = groupPixel();
     if (pixel.x < width && pixel.y < height) {
         trace(pixel, pixel.y * width + pixel.x);
     }

@@ -1,9 +1,8 @@
 // Sunlight by ray queries: what intersection, any-hit and miss shader do, in one loop.
 #include <lvk/ray_query.glsl>
 
+#include "common/group_pixel.glsl"
 #include "hybrid_oit/sphere.glsl"
-
-layout(local_size_x = 8, local_size_y = 8) in;
 
 vec3 traceSunlight(vec3 origin, vec3 direction) {
     LvkRayQuery rq;
@@ -33,7 +32,8 @@ vec3 traceSunlight(vec3 origin, vec3 direction) {
 #include "hybrid_oit/shadow.glsl"
 
 void main() {
-    if (gl_GlobalInvocationID.x < frame.camera.width && gl_GlobalInvocationID.y <= frame.camera.height) {
-        shadowAt(gl_GlobalInvocationID.xy);
+    uvec2 pixel = groupPixel();
+    if (pixel.x < frame.camera.width && pixel.y <= frame.camera.height) {
+        shadowAt(pixel);
     }
 }

@@ -2,10 +2,9 @@
 #define LVK_OPAQUE_TRIANGLES_ONLY
 #include <lvk/ray_query.glsl>
 
+#include "common/group_pixel.glsl"
 #include "large_scene/frame.glsl"
 #include "large_scene/hit.glsl"
-
-layout(local_size_x = 8, local_size_y = 8) in;
 
 Hit traceNearest(uint mask, vec3 origin, vec3 direction, float tmax) {
     LvkRayQuery query;
@@ -34,7 +33,7 @@ bool occludedBy(uint mask, vec3 origin, float tmin, vec3 direction, float tmax) 
 #include "large_scene/picture.glsl"
 
 void main() {
-    uvec2 pixel = gl_GlobalInvocationID.xy;
+    uvec2 pixel = groupPixel();
     if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
         storePixel(pixel);
     }

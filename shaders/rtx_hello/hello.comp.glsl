@@ -1,8 +1,8 @@
 // Rays of a pixel, by ray queries.
 #define LVK_OPAQUE_TRIANGLES_ONLY
 #include <lvk/ray_query.glsl>
+#include "common/group_pixel.glsl"
 #include "rtx_hello/view.glsl"
-layout(local_size_x = 8, local_size_y = 8) in;
 
 vec3 colorAlong(vec3 direction) {
     LvkRayQuery query;
@@ -17,7 +17,7 @@ vec3 colorAlong(vec3 direction) {
 }
 
 void main() {
-    uvec2 pixel = gl_GlobalInvocationID.xy;
+    uvec2 pixel = groupPixel();
     if (pixel.x >= size.x || pixel.y >= size.y) {
         return;
     }

@@ -2,10 +2,9 @@
 #define LVK_OPAQUE_TRIANGLES_ONLY
 #include <lvk/ray_query.glsl>
 
+#include "common/group_pixel.glsl"
 #include "rtx_pipeline/picture.glsl"
 #include "rtx_pipeline/radiance.glsl"
-
-layout(local_size_x = 8, local_size_y = 8) in;
 
 bool traceOccluded(vec3 origin, float tmin, vec3 direction, float tmax) {
     LvkRayQuery query;
@@ -58,7 +57,7 @@ vec3 lightAlong(Onward ray) {
 }
 
 void main() {
-    uvec2 pixel = gl_GlobalInvocationID.xy;
+    uvec2 pixel = groupPixel();
     if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
         Onward ray = Onward(vec3(1.0), frame.camera.eye, cameraDirection(frame.camera, pixel), 0.0);
         store(pixel, lightAlong(ray));

@@ -2,9 +2,8 @@
 #define LVK_OPAQUE_TRIANGLES_ONLY
 #include <lvk/ray_query.glsl>
 
+#include "common/group_pixel.glsl"
 #include "rtx_textures/surface.glsl"
-
-layout(local_size_x = 8, local_size_y = 8) in;
 
 Found traceNearest(vec3 origin, vec3 direction, float travelled) {
     LvkRayQuery query;
@@ -34,7 +33,7 @@ bool reachesSky(vec3 origin, vec3 direction) {
 #include "rtx_textures/shade.glsl"
 
 void main() {
-    uvec2 pixel = gl_GlobalInvocationID.xy;
+    uvec2 pixel = groupPixel();
     if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
         renderPixel(pixel);
     }

@@ -72,11 +72,11 @@ const bool kLvkSoftHasCandidates = false;
 const bool kLvkSoftHasCandidates = true;
 #endif
 
-// A loop costs CPUs more than lanes that wait for one another: there, each turn tests a primitive or visits a node.
+// Loops and branches cost CPUs more than lanes that wait for one another.
 #ifdef LVK_DEVICE_IS_CPU
-const bool kLvkSoftStepByStep = true;
+const bool kLvkSoftIsCpu = true;
 #else
-const bool kLvkSoftStepByStep = false;
+const bool kLvkSoftIsCpu = false;
 #endif
 
 // lavapipe drops what helper invocations write to arrays of their own (mesa 25.0), so these have no stack.
@@ -152,17 +152,26 @@ uvec2 lvkSoftStructureOf(uvec2 instances, uint instance) {
 // The structure of an instance with the ray in its space; answers where in it to start, or LVK_SOFT_NONE if the ray passes
 // it by.
 uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSoftLevel level) {
+    LvkSoftBlocks blocks = LvkSoftBlocks(instances);
     uint first = instance * LVK_SOFT_INSTANCE_BLOCKS;
-    uvec4 numbers = LvkSoftBlocks(instances).at[first + 6u];
-    vec3 origin = lvkSoftTransform(instances, first, vec4(state.origin, 1.0));
-    vec3 direction = lvkSoftTransform(instances, first, vec4(state.direction, 0.0));
+    uvec4 numbers = lvkSoftBlock(blocks, first + 6u);
+    vec4 x = uintBitsToFloat(lvkSoftBlock(blocks, first));
+    vec4 y = uintBitsToFloat(lvkSoftBlock(blocks, first + 1u));
+    vec4 z = uintBitsToFloat(lvkSoftBlock(blocks, first + 2u));
+    vec4 from = vec4(state.origin, 1.0);
+    vec3 origin = vec3(dot(x, from), dot(y, from), dot(z, from));
+    vec3 direction = vec3(dot(x.xyz, state.direction), dot(y.xyz, state.direction), dot(z.xyz, state.direction));
     if ((numbers.z >> 24 & state.mask) == 0u) {
         return LVK_SOFT_NONE;
     }
-    level.structure = lvkSoftStructureOf(instances, instance);
-    uvec4 head = LvkSoftBlocks(level.structure).at[0];
-    uvec4 places = LvkSoftBlocks(level.structure).at[1];
-    uvec4 counts = LvkSoftBlocks(level.structure).at[2];
+    level.structure = numbers.xy;
+    uvec4 head = lvkSoftBlock(LvkSoftBlocks(level.structure), 0u);
+    if (head.x == LVK_SOFT_MOVED) {
+        level.structure = head.zw;
+        head = lvkSoftBlock(LvkSoftBlocks(level.structure), 0u);
+    }
+    uvec4 places = lvkSoftBlock(LvkSoftBlocks(level.structure), 1u);
+    uvec4 counts = lvkSoftBlock(LvkSoftBlocks(level.structure), 2u);
     uint flags = numbers.w >> 24;
     level.wide = head.x == LVK_SOFT_WIDE;
     level.several = counts.y > 1u;
@@ -406,18 +415,18 @@ bool lvkSoftFindInstance(LvkSoftState state, inout LvkSoftPlace place, out LvkSo
     return true;
 }
 
-// Walks through the structure of the instance. Answers whether a candidate waits that the shader must judge.
-bool lvkSoftWalk(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
+// Walks through the structure of a level. Answers whether a candidate waits that the shader must judge.
+bool lvkSoftWalkLevel(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
     while (true) {
         while (place.leaves.y != 0u) {
             if (lvkSoftTest(state, place, level)) {
                 return true;
             }
-            if (kLvkSoftStepByStep) {
+            if (kLvkSoftIsCpu) { // each turn tests a primitive or visits a node
                 break;
             }
         }
-        if (kLvkSoftStepByStep && place.leaves.y != 0u) {
+        if (kLvkSoftIsCpu && place.leaves.y != 0u) {
             continue;
         }
         if (place.group.y < LVK_SOFT_ANY_NODE) {
@@ -432,6 +441,19 @@ bool lvkSoftWalk(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLeve
     }
     place.instance = LVK_SOFT_NONE;
     return false;
+}
+
+// Walks through the structure of the instance. Answers whether a candidate waits that the shader must judge. On CPUs, what
+// most scenes are made of has code of its own, without the branches that other structures need; where there are
+// candidates, that code would take longer to compile than it saves.
+bool lvkSoftWalk(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
+    if (kLvkSoftIsCpu && !kLvkSoftHasCandidates && level.wide && level.kind == LVK_SOFT_TRIANGLES) {
+        LvkSoftLevel usual = level;
+        usual.wide = true;
+        usual.kind = LVK_SOFT_TRIANGLES;
+        return lvkSoftWalkLevel(state, place, usual);
+    }
+    return lvkSoftWalkLevel(state, place, level);
 }
 
 // Walks on to the next candidate; false when there is none.
