@@ -77,6 +77,7 @@ pub const INCLUDES: &[(&str, &str)] = &[
     ("rtx_textures/surface.glsl", include_str!("../../shaders/rtx_textures/surface.glsl")),
     ("sponza/frame.glsl", include_str!("../../shaders/sponza/frame.glsl")),
     ("sponza/mask.glsl", include_str!("../../shaders/sponza/mask.glsl")),
+    ("sponza/relief.glsl", include_str!("../../shaders/sponza/relief.glsl")),
     ("hybrid_oit/ball.glsl", include_str!("../../shaders/hybrid_oit/ball.glsl")),
     ("hybrid_oit/frame.glsl", include_str!("../../shaders/hybrid_oit/frame.glsl")),
     ("hybrid_oit/gbuffer.glsl", include_str!("../../shaders/hybrid_oit/gbuffer.glsl")),

@@ -26,8 +26,14 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) buffer CountArray {
     uint at[]; // of each view
 };
 
-layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer MaskArray {
-    uint at[]; // of each material: whether its texture's alpha cuts holes
+// What the sample has of a material beside what all samples have.
+struct Finish {
+    uint isMasked; // whether its texture's alpha cuts holes
+    uint normalMap; // or kNoTexture
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer FinishArray {
+    Finish at[]; // of each material
 };
 
 struct View {
@@ -54,7 +60,7 @@ struct Sun {
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Frame {
     Camera camera;
     Scene scene;
-    MaskArray masks;
+    FinishArray finishes;
     DrawArray draws;
     View views[2]; // of the camera and of the sun
     CountArray counts;
@@ -64,7 +70,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer Fr
     uint surfaceSampler;
     uint sky; // index into kTexturesCube
     uint skySampler;
-    uint padding;
+    uint hasRelief; // whether normal maps count
 };
 
 layout(push_constant, scalar) uniform PushConstants {

@@ -16,7 +16,7 @@ vec4 texelOf(uint material, vec2 texcoord) {
 }
 
 bool isHole(uint material, float alpha) {
-    return frame.masks.at[material] != 0u && alpha < 0.5;
+    return frame.finishes.at[material].isMasked != 0u && alpha < 0.5;
 }
 
 #endif

@@ -2,6 +2,7 @@
 #include "common/phong.glsl"
 #include "common/tonemap.glsl"
 #include "sponza/mask.glsl"
+#include "sponza/relief.glsl"
 
 layout(location = 0) in vec3 inPosition;
 layout(location = 1) in vec3 inNormal;
@@ -36,19 +37,21 @@ vec3 lamplight(vec3 position, vec3 normal) {
 
 void main() {
     vec4 texel = texelOf(inMaterial, inTexcoord);
+    vec3 view = normalize(frame.camera.eye - inPosition);
+    vec3 smoothNormal = normalize(inNormal);
+    smoothNormal = dot(smoothNormal, view) < 0.0 ? -smoothNormal : smoothNormal;
+    vec3 normal = reliefNormal(inMaterial, smoothNormal, inPosition, inTexcoord);
     if (isHole(inMaterial, texel.a)) {
         discard;
     }
     Material material = frame.scene.materials.at[inMaterial];
-    vec3 view = normalize(frame.camera.eye - inPosition);
-    vec3 normal = normalize(inNormal);
-    normal = dot(normal, view) < 0.0 ? -normal : normal;
     vec3 albedo = material.albedo * texel.rgb;
     vec3 ambient = mix(frame.sun.ambientBelow, frame.sun.ambientAbove, 0.5 + 0.5 * normal.y);
     vec3 light = material.emission + albedo * ambient;
     float cosine = dot(normal, frame.sun.direction);
     if (cosine > 0.0) {
-        vec3 sun = frame.sun.color * sunlight(inPosition, normal, cosine);
+        float steepness = max(dot(smoothNormal, frame.sun.direction), 0.0);
+        vec3 sun = frame.sun.color * sunlight(inPosition, smoothNormal, steepness);
         light += sun * phong(albedo, material.specular, material.shininess, normal, view, frame.sun.direction);
     }
     light += albedo * lamplight(inPosition, normal);

@@ -49,7 +49,7 @@ dir 0 9 0 0.0001 -1 0 60
 pub fn board() -> Scene {
     let folder = tempfile::tempdir().expect("temporary folders can be made");
     write_files(folder.path()).expect("files can be written");
-    let options = ObjOptions { scale: None, cameras: Some(folder.path().join("views.txt")) };
+    let options = ObjOptions { cameras: Some(folder.path().join("views.txt")), ..ObjOptions::default() };
     let scene = Scene::from_obj(&folder.path().join("a.obj"), &options, &mut Progress::hidden());
     let scene = scene.expect("the scene is sound");
     assert_eq!(scene.warnings, Vec::<String>::new());

@@ -25,6 +25,7 @@ pub mod ray_scene;
 pub mod ray_tracer;
 pub mod rays;
 pub mod reference;
+pub mod relief;
 pub mod shader_groups;
 pub mod sphere_scene;
 pub mod still_life;

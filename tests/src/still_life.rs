@@ -60,7 +60,7 @@ dir -0.2 0.5 1.8 0.2 0 -1 70
 pub fn still_life() -> Scene {
     let folder = tempfile::tempdir().expect("temporary folders can be made");
     let (obj, cameras) = write_files(folder.path()).expect("files can be written to a temporary folder");
-    let options = ObjOptions { scale: None, cameras: Some(cameras) };
+    let options = ObjOptions { cameras: Some(cameras), ..ObjOptions::default() };
     let scene = Scene::from_obj(&obj, &options, &mut Progress::hidden()).expect("the scene can be loaded");
     assert_eq!(scene.warnings, Vec::<String>::new());
     scene

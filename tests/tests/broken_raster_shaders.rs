@@ -17,6 +17,7 @@ use lvk_tests::broken_shaders::{BrokenShaders, Mistake, mistake};
 use lvk_tests::picture::Tolerance;
 use lvk_tests::raster::has;
 use lvk_tests::raster_sample::{SIZE, picture_of};
+use lvk_tests::relief::{Tilt, tiles};
 use lvk_tests::still_life::still_life;
 use lvk_tests::{device, device_with};
 
@@ -221,6 +222,17 @@ const BOARD: [Mistake; 2] = [
     mistake("no holes", "sponza/mask.glsl", "alpha < 0.5", "alpha < -1.0"),
     mistake("holes cast shadows", "sponza/shadow.frag.glsl", "if (isHole(", "if (false && isHole("),
 ];
+/// Of tilted tiles.
+const TILES: [Mistake; 3] = [
+    mistake("no relief", "sponza/relief.glsl", "kNoTexture || frame.hasRelief == 0u", "0u || true"),
+    mistake("upside down", "sponza/relief.glsl", "found.y * upwards", "-found.y * upwards"),
+    mistake(
+        "turned by neighbours",
+        "sponza/relief.glsl",
+        "sign(dot(right, acrossDown))",
+        "-1.0 * sign(dot(right, acrossDown))",
+    ),
+];
 /// Of things with highlights and a mirror.
 const STILL_LIFE: [Mistake; 2] = [
     mistake(
@@ -332,6 +344,8 @@ fn sponza_notices() {
         check(shaders, "padded", &ATRIUM_PADDED, || sponza(&ctx, &atrium, DrawPath::Padded));
         let board = board();
         check(shaders, "board", &BOARD, || sponza(&ctx, &board, DrawPath::Padded));
+        let tiles = tiles(Tilt::Map);
+        check(shaders, "tiles", &TILES, || sponza(&ctx, &tiles, DrawPath::Padded));
         let sunny = still_life();
         check(shaders, "still life", &STILL_LIFE, || sponza(&ctx, &sunny, DrawPath::Padded));
         let dark = Scene { sun: None, ..sunny.clone() };

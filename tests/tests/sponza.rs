@@ -1,5 +1,5 @@
 //! The pictures of the `sponza` sample: culling leaves what a reference on the CPU leaves and changes no pixel, with one and with
-//! four samples a pixel, by counted and by padded draws; shadows and holes are where they belong, and the atrium looks as ever.
+//! four samples a pixel, by counted and by padded draws; shadows, holes and relief are where they belong, and the atrium looks as ever.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::sync::LazyLock;
@@ -9,12 +9,13 @@ use lvk::{Context, DeviceProfile, FeatureSet, OptionalFeature};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::raster::RasterError;
-use lvk_samples::scene::Scene;
+use lvk_samples::scene::{Camera, Scene};
 use lvk_samples::sponza::{DrawPath, Frustum, Sponza, SponzaConfig};
 use lvk_tests::board::board;
 use lvk_tests::child::without_ray_tracing;
-use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
+use lvk_tests::picture::{Likeness, Tolerance, assert_alike, assert_as_ever, reference};
 use lvk_tests::raster::has;
+use lvk_tests::relief::{Tilt, tiles};
 use lvk_tests::still_life::still_life;
 use lvk_tests::{device, device_with};
 
@@ -36,6 +37,10 @@ fn make(ctx: &Context, scene: &Scene, config: &SponzaConfig) -> Sponza {
 
 fn picture_of(sample: &mut Sponza, frame: u32) -> RgbaImage {
     sample.update(Moment::of_frame(frame, 100)).unwrap();
+    picture_now(sample)
+}
+
+fn picture_now(sample: &mut Sponza) -> RgbaImage {
     RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(sample).unwrap()).unwrap()
 }
 
@@ -147,6 +152,31 @@ fn shadows_and_holes_are_where_they_belong() {
     assert!(bright(pixel(-3.0, 0.0, 0.0)) && bright(pixel(-1.5, 0.0, 1.5)), "beside the shadow");
 }
 
+/// However their images lie, also seen from aside; and without maps they are level.
+#[test]
+fn normal_maps_tilt_surfaces_as_normals_of_corners_do() {
+    let Some(ctx) = device() else { return };
+    check_tilt(&ctx, &Tolerance::SAME_AS_EVER);
+}
+
+fn check_tilt(ctx: &Context, tolerance: &Tolerance) {
+    let [by_map, by_corners] = [Tilt::Map, Tilt::Corners].map(tiles);
+    assert_eq!((by_map.normal_maps.len(), by_corners.normal_maps.len()), (1, 0));
+    let level = SponzaConfig { normal_maps: false, ..config(4) };
+    let mut samples = [(&by_map, config(4)), (&by_corners, config(4)), (&by_map, level)]
+        .map(|(scene, config)| make(ctx, scene, &config));
+    let aside = Camera::looking_at([3.0, 4.0, 5.0], [0.0, 0.0, 0.0], 60.0);
+    for camera in [by_map.cameras[0], aside] {
+        let [map, corners, level] = samples.each_mut().map(|sample| {
+            sample.set_view(&camera);
+            picture_now(sample)
+        });
+        assert_alike("tilted tiles", &map, &corners, tolerance);
+        let likeness = Likeness::of(&map, &level);
+        assert!(!likeness.is_within(&Tolerance { psnr: 35.0, ..Tolerance::default() }), "{likeness}");
+    }
+}
+
 #[test]
 fn samples_filter_shadows_and_moment_count() {
     let Some(ctx) = device() else { return };
@@ -202,6 +232,7 @@ fn a_driver_without_ray_tracing_and_counts_shows_the_atrium() {
             &reference("sponza_small"),
             &OTHER_FILTERS,
         );
+        check_tilt(&ctx, &Tolerance::SAME_AS_EVER);
         let frustum = sample.frusta()[0];
         check_survivors(&sample, &frustum, &sample.survivors(0).unwrap());
     });

@@ -71,13 +71,25 @@ impl SceneArgs {
     /// # Errors
     /// [`SceneError`].
     pub fn load(&self, progress: &mut Progress) -> Result<Scene, SceneError> {
+        self.load_with(progress, false)
+    }
+
+    /// The same, where OBJ files have their normal maps.
+    ///
+    /// # Errors
+    /// [`SceneError`].
+    pub fn load_with_normal_maps(&self, progress: &mut Progress) -> Result<Scene, SceneError> {
+        self.load_with(progress, true)
+    }
+
+    fn load_with(&self, progress: &mut Progress, normal_maps: bool) -> Result<Scene, SceneError> {
         match self.file() {
             None => {
                 progress.stage("making the courtyard", 0);
                 Ok(Scene::procedural())
             }
             Some(path) => {
-                let options = ObjOptions { scale: self.scale, cameras: self.cameras.clone() };
+                let options = ObjOptions { scale: self.scale, cameras: self.cameras.clone(), normal_maps };
                 Scene::from_obj(&path, &options, progress)
             }
         }

@@ -7,8 +7,17 @@ use crate::scene::{Sky, Texture};
 
 /// A picture of a scene, with all its mips.
 pub(crate) fn picture(ctx: &Context, texture: &Texture) -> lvk::Result<Holder<TextureHandle>> {
+    with_mips(ctx, texture, Format::Rgba8Srgb)
+}
+
+/// A normal map of a scene, with all its mips.
+pub(crate) fn normal_map(ctx: &Context, texture: &Texture) -> lvk::Result<Holder<TextureHandle>> {
+    with_mips(ctx, texture, Format::Rgba8Unorm)
+}
+
+fn with_mips(ctx: &Context, texture: &Texture, format: Format) -> lvk::Result<Holder<TextureHandle>> {
     ctx.create_texture(&TextureDesc {
-        format: Format::Rgba8Srgb,
+        format,
         extent: [texture.width, texture.height],
         mips: 0,
         data: Some(&texture.pixels),

@@ -24,6 +24,7 @@ pub(crate) fn check_promises(scene: &Scene) -> Result<(), HybridError> {
     let is_vertex = |&vertex: &u32| (vertex as usize) < vertices;
     let is_material = |&material: &u32| (material as usize) < scene.materials.len();
     let is_texture = |texture: u32| (texture as usize) < scene.textures.len();
+    let is_normal_map = |map: u32| (map as usize) < scene.normal_maps.len();
     let promises = [
         (triangles > 0, "it has no triangles"),
         (u32::try_from(triangles).is_ok_and(|count| count <= u32::MAX / 3), "it has too many triangles"),
@@ -37,6 +38,10 @@ pub(crate) fn check_promises(scene: &Scene) -> Result<(), HybridError> {
         (
             scene.materials.iter().filter_map(|material| material.albedo_texture).all(is_texture),
             "a material names a texture that is not there",
+        ),
+        (
+            scene.materials.iter().filter_map(|material| material.normal_map).all(is_normal_map),
+            "a material names a normal map that is not there",
         ),
     ];
     match promises.into_iter().find(|(is_kept, _)| !is_kept) {
@@ -53,7 +58,7 @@ mod tests {
     fn a_broken_scene_is_refused_and_a_whole_one_is_not() {
         let whole = Scene::procedural();
         assert!(check(&whole).is_ok());
-        let breakers: [fn(&mut Scene); 8] = [
+        let breakers: [fn(&mut Scene); 9] = [
             |scene| scene.triangles.clear(),
             |scene| scene.opaque_triangle_count = u32::MAX,
             |scene| scene.normals.clear(),
@@ -62,6 +67,7 @@ mod tests {
             |scene| scene.triangles[5][2] = scene.positions.len() as u32,
             |scene| scene.triangle_materials[7] = 1000,
             |scene| scene.materials[0].albedo_texture = Some(1000),
+            |scene| scene.materials[0].normal_map = Some(0),
         ];
         for breaker in breakers {
             let mut scene = whole.clone();

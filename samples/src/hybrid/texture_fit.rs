@@ -10,23 +10,26 @@ use crate::scene::{Scene, Texture};
 /// Textures that the sample has beside those of the scene: sky, picture, G-buffer, and what `lvk` keeps for itself.
 const OWN_TEXTURES: u32 = 16;
 
-/// Shrinks the textures of `scene` that are larger than `limits` allow, and returns a warning for each.
+/// Shrinks the textures and normal maps of `scene` that are larger than `limits` allow, and returns a warning for each.
 ///
 /// # Errors
 /// [`HybridError::TooManyTextures`].
 pub fn fit_textures(scene: &mut Scene, limits: &Limits) -> Result<Vec<String>, HybridError> {
     let limit = limits.max_bindless_textures.saturating_sub(OWN_TEXTURES);
-    let count = scene.textures.len();
+    let count = scene.textures.len() + scene.normal_maps.len();
     if count > limit as usize {
         return Err(HybridError::TooManyTextures { count, limit });
     }
     let side = limits.max_texture_2d.max(1);
-    Ok(scene.textures.iter_mut().filter_map(|texture| fit(texture, side)).collect())
+    let all = scene.textures.iter_mut().chain(&mut scene.normal_maps);
+    Ok(all.filter_map(|texture| fit(texture, side)).collect())
 }
 
 /// How many textures the context for `scene` must have room for.
 pub fn textures_needed(scene: &Scene) -> u32 {
-    u32::try_from(scene.textures.len()).unwrap_or(u32::MAX).saturating_add(OWN_TEXTURES)
+    u32::try_from(scene.textures.len() + scene.normal_maps.len())
+        .unwrap_or(u32::MAX)
+        .saturating_add(OWN_TEXTURES)
 }
 
 fn fit(texture: &mut Texture, side: u32) -> Option<String> {

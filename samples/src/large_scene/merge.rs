@@ -37,6 +37,7 @@ fn empty_like(scene: &Scene) -> Scene {
         source_triangles: Vec::new(),
         materials: Vec::new(),
         textures: Vec::new(),
+        normal_maps: Vec::new(),
         warnings: Vec::new(),
         opaque_triangle_count: 0,
         degenerate_triangle_count: 0,
@@ -46,9 +47,10 @@ fn empty_like(scene: &Scene) -> Scene {
 
 /// Moves vertices, materials and textures; triangles stay.
 fn append_surfaces(all: &mut Scene, scene: &mut Scene) {
-    let first_texture = all.textures.len() as u32;
+    let (first_texture, first_map) = (all.textures.len() as u32, all.normal_maps.len() as u32);
     let renumbered = |material: Material| Material {
         albedo_texture: material.albedo_texture.map(|texture| first_texture + texture),
+        normal_map: material.normal_map.map(|map| first_map + map),
         ..material
     };
     all.materials.extend(std::mem::take(&mut scene.materials).into_iter().map(renumbered));
@@ -56,6 +58,7 @@ fn append_surfaces(all: &mut Scene, scene: &mut Scene) {
     all.normals.append(&mut scene.normals);
     all.texcoords.append(&mut scene.texcoords);
     all.textures.append(&mut scene.textures);
+    all.normal_maps.append(&mut scene.normal_maps);
     all.warnings.append(&mut scene.warnings);
     all.degenerate_triangle_count += scene.degenerate_triangle_count;
 }

@@ -11,6 +11,8 @@ pub struct Material {
     pub albedo_texture: Option<u32>,
     /// Whether its texture has holes where alpha is below one half. Only rasterisers heed it.
     pub is_masked: bool,
+    /// Index into [`super::Scene::normal_maps`]. Only the `sponza` sample heeds it.
+    pub normal_map: Option<u32>,
     /// Colour of the highlight, linear RGB, 0 to 1.
     pub specular: [f32; 3],
     /// Phong exponent of the highlight, 1 to 10,000.
@@ -35,6 +37,7 @@ impl Material {
             albedo,
             albedo_texture: None,
             is_masked: false,
+            normal_map: None,
             specular: [0.0; 3],
             shininess: 1.0,
             reflectivity: 0.0,

@@ -41,6 +41,7 @@ mod obj_text;
 mod polygon;
 mod procedural;
 mod recentre;
+mod relief;
 mod setting;
 mod sky;
 mod texture;
@@ -89,6 +90,9 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Images, each once, however many materials use it.
     pub textures: Vec<Texture>,
+    /// Images of directions on surfaces, each once: red to the right, green up, blue off the surface, 0 to 255 for -1 to 1.
+    /// Empty unless they were asked for.
+    pub normal_maps: Vec<Texture>,
     /// The lamp.
     pub light: PointLight,
     /// A second, directional light, where the scene has one.
@@ -113,6 +117,8 @@ pub struct ObjOptions {
     /// A camera file (see [`SceneError::CameraFile`]); `None` takes the built-in cameras of a benchmark scene,
     /// else cameras computed from the geometry.
     pub cameras: Option<PathBuf>,
+    /// Whether normal maps are read (`norm`, `map_bump`, `bump`).
+    pub normal_maps: bool,
 }
 
 impl Scene {

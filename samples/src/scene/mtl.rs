@@ -16,7 +16,19 @@ pub(super) struct Library {
     materials: HashMap<String, Definition>,
     textures: Vec<Texture>,
     texture_numbers: HashMap<(PathBuf, Option<PathBuf>), u32>,
+    wants_normal_maps: bool,
+    normal_maps: Vec<Texture>,
+    /// `None` for images that cannot be read.
+    normal_map_numbers: HashMap<PathBuf, Option<u32>>,
     warnings: Warnings,
+}
+
+/// What [`Library::select`] answers.
+pub(super) struct Selection {
+    pub(super) materials: Vec<Material>,
+    pub(super) textures: Vec<Texture>,
+    pub(super) normal_maps: Vec<Texture>,
+    pub(super) warnings: Vec<String>,
 }
 
 /// A material and its image, which is read when a face turns out to need it.
@@ -26,6 +38,7 @@ struct Definition {
     image: Option<Image>,
     /// Where it is dark the image has holes.
     mask: Option<Image>,
+    relief: Option<Image>,
 }
 
 /// An image as a library names it, and the folder of that library.
@@ -47,6 +60,11 @@ impl Library {
             }
         }
         library
+    }
+
+    /// Materials have their normal maps too.
+    pub(super) fn with_normal_maps(self) -> Self {
+        Self { wants_normal_maps: true, ..self }
     }
 
     fn read_file(&mut self, path: &Path) {
@@ -75,12 +93,13 @@ impl Library {
         let mut material = convert(source);
         let image =
             |name: &Option<String>| name.clone().map(|name| Image { folder: folder.to_path_buf(), name });
+        let relief = image(&source.normal_texture);
         let (image, mask) = (image(&source.diffuse_texture), image(&source.dissolve_texture));
         // Exporters often leave Kd black beside a texture, meaning the texture alone.
         if image.is_some() && material.albedo == [0.0; 3] && !material.is_refractive() {
             material.albedo = [1.0; 3];
         }
-        self.materials.insert(source.name.clone(), Definition { material, image, mask });
+        self.materials.insert(source.name.clone(), Definition { material, image, mask, relief });
     }
 
     /// Number of the image, which is read on first use; a stand-in and a warning when that fails.
@@ -111,6 +130,32 @@ impl Library {
         number
     }
 
+    /// Number of the normal map, which is read on first use; none, and a warning, when that fails.
+    fn normal_map(&mut self, Image { folder, name }: &Image) -> Option<u32> {
+        let found = find_image(folder, name);
+        let path = found.clone().unwrap_or_else(|| folder.join(name));
+        if let Some(&number) = self.normal_map_numbers.get(&path) {
+            return number;
+        }
+        let read = match &found {
+            Some(path) => Texture::read_relief(path),
+            None => Err("no such file".to_owned()),
+        };
+        let number = match read {
+            Ok(map) => {
+                self.normal_maps.push(map);
+                Some(self.normal_maps.len() as u32 - 1)
+            }
+            Err(why) => {
+                let line = format!("normal map {}: {why}; the surface is smooth", path.display());
+                self.warnings.push("textures", line);
+                None
+            }
+        };
+        self.normal_map_numbers.insert(path, number);
+        number
+    }
+
     /// The texture with alpha from the mask; as it is, with a warning, where the mask cannot be read.
     fn with_holes(&mut self, texture: Texture, mask: &Path) -> Texture {
         match Texture::read(mask) {
@@ -125,7 +170,7 @@ impl Library {
 
     /// The materials that `names` ask for, in that order, with stand-ins for undefined ones; then the images
     /// of these and the warnings.
-    pub(super) fn select(mut self, names: &[Option<String>]) -> (Vec<Material>, Vec<Texture>, Vec<String>) {
+    pub(super) fn select(mut self, names: &[Option<String>]) -> Selection {
         let mut selected = Vec::with_capacity(names.len());
         for name in names {
             let Some(name) = name else {
@@ -134,11 +179,12 @@ impl Library {
             };
             selected.push(self.material(name));
         }
-        (selected, self.textures, self.warnings.into_lines())
+        let Self { textures, normal_maps, warnings, .. } = self;
+        Selection { materials: selected, textures, normal_maps, warnings: warnings.into_lines() }
     }
 
     fn material(&mut self, name: &str) -> Material {
-        let Some(Definition { material, image, mask }) = self.materials.get(name).cloned() else {
+        let Some(Definition { material, image, mask, relief }) = self.materials.get(name).cloned() else {
             let line = format!("material `{name}` is not defined; glaring orange stands in");
             self.warnings.push("materials", line);
             return Material::stand_in(name);
@@ -146,7 +192,9 @@ impl Library {
         let mask = mask.and_then(|mask| find_image(&mask.folder, &mask.name));
         let is_masked = image.is_some() && mask.is_some();
         let albedo_texture = image.map(|image| self.texture(&image, mask));
-        Material { albedo_texture, is_masked, ..material }
+        let relief = relief.filter(|_| self.wants_normal_maps);
+        let normal_map = relief.and_then(|relief| self.normal_map(&relief));
+        Material { albedo_texture, is_masked, normal_map, ..material }
     }
 }
 
@@ -182,6 +230,7 @@ fn clean(text: &str) -> String {
             "illum" => number(rest).map(|n| format!("illum {}", n.clamp(0.0, 10.0) as u8)),
             "map_kd" => image_name(rest).map(|name| format!("map_Kd {name}")),
             "map_d" => image_name(rest).map(|name| format!("map_d {name}")),
+            "norm" | "map_bump" | "bump" => image_name(rest).map(|name| format!("map_Bump {name}")),
             _ => None,
         };
         inside |= keyword.eq_ignore_ascii_case("newmtl");
@@ -312,7 +361,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.mtl"), text).unwrap();
         let library = Library::read(&folder.path().join("a.obj"), &["a.mtl".to_owned()]);
-        let (materials, _, warnings) = library.select(&[Some("m".to_owned())]);
+        let Selection { materials, warnings, .. } = library.select(&[Some("m".to_owned())]);
         (materials, warnings)
     }
 
@@ -380,7 +429,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("a.mtl"), "newmtl m\nnewmtl other\nmap_Kd absent.png\n").unwrap();
         let library = Library::read(&folder.path().join("a.obj"), &["a.mtl".to_owned()]);
-        let (_, textures, warnings) = library.select(&[Some("m".to_owned())]);
+        let Selection { textures, warnings, .. } = library.select(&[Some("m".to_owned())]);
         assert_eq!((textures.len(), warnings.len()), (0, 0), "{warnings:?}");
     }
 
@@ -397,6 +446,28 @@ mod tests {
         assert!(warnings[0].contains("`m`"));
 
         let library = Library::read(Path::new("/nowhere/a.obj"), &["absent.mtl".to_owned()]);
-        assert!(library.select(&[]).2[0].contains("absent.mtl"));
+        assert!(library.select(&[]).warnings[0].contains("absent.mtl"));
+    }
+
+    #[test]
+    fn normal_maps_are_read_where_they_are_wanted() {
+        let folder = tempfile::tempdir().unwrap();
+        image::RgbImage::from_pixel(2, 2, image::Rgb([128, 128, 255]))
+            .save(folder.path().join("n.png"))
+            .unwrap();
+        let text =
+            "newmtl a\nnorm n.png\nnewmtl b\nmap_Bump -bm 0.3 n.png\nnewmtl c\nbump absent.png\nnewmtl d\n";
+        std::fs::write(folder.path().join("a.mtl"), text).unwrap();
+        let library = || Library::read(&folder.path().join("a.obj"), &["a.mtl".to_owned()]);
+        let names = ["a", "b", "c", "d"].map(|name| Some(name.to_owned()));
+        let with = library().with_normal_maps().select(&names);
+        let numbers =
+            |found: &Selection| -> Vec<_> { found.materials.iter().map(|m| m.normal_map).collect() };
+        assert_eq!(numbers(&with), [Some(0), Some(0), None, None]);
+        assert_eq!((with.normal_maps.len(), with.warnings.len()), (1, 1), "{:?}", with.warnings);
+        assert!(with.warnings[0].contains("absent.png"));
+        let without = library().select(&names);
+        assert_eq!((numbers(&without), without.normal_maps.len()), (vec![None; 4], 0));
+        assert!(without.warnings.is_empty(), "{:?}", without.warnings);
     }
 }

@@ -4,7 +4,7 @@ use std::io::{BufRead, Read};
 use std::path::Path;
 
 use super::mesh::Mesh;
-use super::mtl::Library;
+use super::mtl::{Library, Selection};
 use super::obj_text::{CleanObj, clean};
 use super::setting::Setting;
 use super::{Material, ObjOptions, Scene, SceneError, benchmark, camera_file, normals};
@@ -23,6 +23,7 @@ pub(super) fn load(path: &Path, options: &ObjOptions, progress: &mut Progress) -
     own_views.iter_mut().for_each(|views| views.move_by(obj.origin.map(|x| -x * f64::from(scale))));
     let views = own_views.or(benchmark.map(|known| known.views));
     let library = Library::read(path, &obj.libraries);
+    let library = if options.normal_maps { library.with_normal_maps() } else { library };
     let mut mesh = parse(path, &obj, scale, &format!("{name}: parsing"), progress)?;
     let degenerate = mesh.drop_degenerate();
     if mesh.triangles.is_empty() {
@@ -30,7 +31,7 @@ pub(super) fn load(path: &Path, options: &ObjOptions, progress: &mut Progress) -
     }
     let names = names_in_use(&mut mesh, &obj.materials);
     progress.stage(&format!("{name}: textures"), 0);
-    let (materials, textures, warnings) = library.select(&names);
+    let Selection { materials, textures, normal_maps, warnings } = library.select(&names);
     obj.warnings.extend(warnings);
     progress.stage(&format!("{name}: arranging triangles"), 0);
     let opaque_triangle_count = finish(&mut mesh, &materials, &mut obj.warnings, degenerate);
@@ -38,6 +39,7 @@ pub(super) fn load(path: &Path, options: &ObjOptions, progress: &mut Progress) -
     Ok(Scene {
         opaque_triangle_count,
         textures,
+        normal_maps,
         degenerate_triangle_count: degenerate as u32,
         warnings: obj.warnings,
         ..setting.into_scene(name, mesh, materials)
@@ -285,7 +287,7 @@ mod tests {
         let path = folder.path().join("conference.obj");
         std::fs::write(&path, format!("{TRIANGLE}f 1 2 3\n")).unwrap();
         let width = |scale| {
-            let options = ObjOptions { scale, cameras: None };
+            let options = ObjOptions { scale, ..ObjOptions::default() };
             load(&path, &options, &mut Progress::hidden()).map(|scene| scene.bounds().1[0])
         };
         assert_eq!(width(Some(2.0)).unwrap(), 2.0);

@@ -54,6 +54,7 @@ impl Setting {
             source_triangles: mesh.source_triangles,
             materials,
             textures: Vec::new(),
+            normal_maps: Vec::new(),
             light: self.light,
             sun: self.sun,
             ambient: self.ambient,

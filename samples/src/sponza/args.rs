@@ -61,6 +61,10 @@ pub struct SponzaArgs {
     )]
     pub filter: u32,
 
+    /// Leave normal maps (`norm`, `map_bump`) out
+    #[arg(long, help_heading = "Rendering")]
+    pub no_normal_maps: bool,
+
     /// Which scene, and from where it is seen
     #[command(flatten)]
     pub scene: SceneArgs,
@@ -90,6 +94,7 @@ impl SponzaArgs {
             shadow_size: self.shadow_size,
             filter: self.filter,
             triangles_per_draw: self.draw_triangles,
+            normal_maps: !self.no_normal_maps,
             ..SponzaConfig::new(self.run.extent())
         }
     }

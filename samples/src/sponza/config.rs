@@ -22,6 +22,8 @@ pub struct SponzaConfig {
     pub filter: u32,
     /// Most triangles of a draw, at least 1.
     pub triangles_per_draw: u32,
+    /// Whether surfaces have the relief of their normal maps.
+    pub normal_maps: bool,
 }
 
 /// How draws are taken from the buffers that culling writes.
@@ -43,7 +45,16 @@ impl SponzaConfig {
     #[must_use]
     pub fn new(extent: [u32; 2]) -> Self {
         let (shadow_size, filter) = (2048, 2);
-        Self { extent, samples: 4, culls: true, draws: None, shadow_size, filter, triangles_per_draw: 256 }
+        Self {
+            extent,
+            samples: 4,
+            culls: true,
+            draws: None,
+            shadow_size,
+            filter,
+            triangles_per_draw: 256,
+            normal_maps: true,
+        }
     }
 
     /// Within the bounds of its numbers, with draws that the device has.

@@ -12,7 +12,7 @@ use crate::scene::GpuCamera;
 pub(super) struct FrameConstants {
     pub(super) camera: GpuCamera,
     pub(super) scene: SceneAddresses,
-    pub(super) masks: u64,
+    pub(super) finishes: u64,
     pub(super) draws: u64,
     pub(super) views: [GpuView; 2],
     pub(super) counts: u64,
@@ -22,7 +22,7 @@ pub(super) struct FrameConstants {
     pub(super) surface_sampler: u32,
     pub(super) sky: u32,
     pub(super) sky_sampler: u32,
-    pub(super) padding: u32,
+    pub(super) has_relief: u32,
 }
 
 /// `View`: what a view culls by, and where it writes its draws.
@@ -50,6 +50,19 @@ pub(super) struct GpuSun {
     pub(super) lamp_reach: f32,
     pub(super) lamp_color: [f32; 3],
     pub(super) texel_size: f32,
+}
+
+/// `Finish`: what the sample has of a material beside what all samples have.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct GpuFinish {
+    pub(super) is_masked: u32,
+    pub(super) normal_map: u32,
+}
+
+impl GpuFinish {
+    /// `kNoTexture` in `shaders/common/scene_buffers.glsl`.
+    pub(super) const NO_TEXTURE: u32 = u32::MAX;
 }
 
 /// `Draw`.

@@ -9,7 +9,7 @@ use lvk::{
 use super::config::{DrawPath, SponzaConfig};
 use super::culling::{Culling, VIEWS};
 use super::draws::{Draw, cut};
-use super::frame::{FrameConstants, GpuSun, GpuView};
+use super::frame::{FrameConstants, GpuFinish, GpuSun, GpuView};
 use super::frustum::Frustum;
 use super::pipelines::{SKY, SURFACES};
 use super::shadow::Shadow;
@@ -20,7 +20,7 @@ use crate::app::sample::{Moment, Sample};
 use crate::app::scene_textures;
 use crate::hybrid::{SceneArrays, check_promises, near_plane};
 use crate::raster::{Canvas, RasterError, RasterPipeline};
-use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, PointLight, Scene};
+use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, Material, PointLight, Scene};
 
 /// Texels on an edge of the sky's cube map.
 const SKY_SIZE: u32 = 256;
@@ -54,11 +54,11 @@ pub struct Sponza {
 /// What shaders reach of the scene.
 struct OnDevice {
     arrays: SceneArrays,
-    masks: Holder<BufferHandle>,
+    finishes: Holder<BufferHandle>,
     sky: Holder<TextureHandle>,
     surface_sampler: Holder<SamplerHandle>,
     sky_sampler: Holder<SamplerHandle>,
-    _textures: Vec<Holder<TextureHandle>>,
+    _textures: [Vec<Holder<TextureHandle>>; 2],
 }
 
 /// What lights the scene.
@@ -194,7 +194,7 @@ impl Sponza {
         let constants = FrameConstants {
             camera: GpuCamera::new(&self.camera, width, height, self.near_plane),
             scene: self.scene.arrays.addresses(),
-            masks: self.ctx.buffer_address(*self.scene.masks)?,
+            finishes: self.ctx.buffer_address(*self.scene.finishes)?,
             draws,
             views: [0, 1].map(|view| GpuView::new(&frusta[view], arguments[view])),
             counts,
@@ -204,7 +204,7 @@ impl Sponza {
             surface_sampler: self.scene.surface_sampler.index(),
             sky: self.scene.sky.index(),
             sky_sampler: self.scene.sky_sampler.index(),
-            padding: 0,
+            has_relief: self.config.normal_maps.into(),
         };
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&constants))
     }
@@ -290,6 +290,7 @@ impl Sample for Sponza {
 
     fn panel(&mut self, ui: &mut egui::Ui) {
         ui.checkbox(&mut self.config.culls, "culling");
+        ui.checkbox(&mut self.config.normal_maps, "normal maps");
         let mut keeps = self.kept.is_some();
         let keep = ui.checkbox(&mut keeps, "keep the frustum");
         if keep.on_hover_text("shows from elsewhere what culling leaves").changed() {
@@ -326,14 +327,21 @@ impl OnDevice {
     fn new(ctx: &Context, scene: &Scene) -> lvk::Result<Self> {
         let pictures = scene.textures.iter().map(|texture| scene_textures::picture(ctx, texture));
         let textures: Vec<_> = pictures.collect::<Result<_, _>>()?;
-        let masks: Vec<u32> = scene.materials.iter().map(|material| u32::from(material.is_masked)).collect();
+        let maps = scene.normal_maps.iter().map(|map| scene_textures::normal_map(ctx, map));
+        let maps: Vec<_> = maps.collect::<Result<_, _>>()?;
+        let number = |map: u32| maps[map as usize].index();
+        let finish = |material: &Material| GpuFinish {
+            is_masked: material.is_masked.into(),
+            normal_map: material.normal_map.map_or(GpuFinish::NO_TEXTURE, number),
+        };
+        let finishes: Vec<_> = scene.materials.iter().map(finish).collect();
         let sampler = |debug_name, address, max_anisotropy| {
             let address = [address; 3];
             ctx.create_sampler(&SamplerDesc { address, max_anisotropy, debug_name, ..SamplerDesc::default() })
         };
         Ok(Self {
             arrays: SceneArrays::new(ctx, scene, &textures)?,
-            masks: array(ctx, "masks of materials", BufferUsage::STORAGE, &masks)?,
+            finishes: array(ctx, "finishes of materials", BufferUsage::STORAGE, &finishes)?,
             sky: scene_textures::sky(ctx, &scene.sky, SKY_SIZE)?,
             surface_sampler: sampler("surface sampler", AddressMode::Repeat, 8.0)?,
             sky_sampler: sampler(
@@ -341,7 +349,7 @@ impl OnDevice {
                 AddressMode::ClampToEdge,
                 SamplerDesc::default().max_anisotropy,
             )?,
-            _textures: textures,
+            _textures: [textures, maps],
         })
     }
 }

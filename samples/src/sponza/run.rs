@@ -37,8 +37,8 @@ fn open(args: &SponzaArgs, opening: &mut Opening<'_>) -> Result<Opened<Sponza>, 
     let capabilities = context.capabilities();
     opening.warn(&fit_textures(&mut scene, &capabilities.limits)?);
     opening.progress.stage("uploading the scene", 0);
-    let told =
-        format!("{}: {} triangles, {} textures", scene.name, scene.triangles.len(), scene.textures.len());
+    let (triangles, textures, maps) = (scene.triangles.len(), scene.textures.len(), scene.normal_maps.len());
+    let told = format!("{}: {triangles} triangles, {textures} textures, {maps} normal maps", scene.name);
     let cameras = Scene { cameras: scene.cameras, ..Scene::empty() };
     let sample = Sponza::new(&context, scene, &args.config())?;
     let sample = sample.from_camera(&cameras, args.scene.camera.place());
@@ -54,7 +54,10 @@ fn open(args: &SponzaArgs, opening: &mut Opening<'_>) -> Result<Opened<Sponza>, 
 
 fn load(args: &SponzaArgs, opening: &mut Opening<'_>) -> Result<Scene, RunError> {
     if args.scene.scene.is_some() {
-        return Ok(args.scene.load(&mut opening.progress)?);
+        return Ok(match args.no_normal_maps {
+            true => args.scene.load(&mut opening.progress)?,
+            false => args.scene.load_with_normal_maps(&mut opening.progress)?,
+        });
     }
     opening.progress.stage("making the atrium", 0);
     Ok(Scene::atrium())

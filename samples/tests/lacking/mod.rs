@@ -7,5 +7,6 @@ use std::process::Command;
 pub fn mesh_shaders(mut picture: Command) -> Option<String> {
     let said = picture.output().map(|output| String::from_utf8_lossy(&output.stderr).into_owned());
     let said = said.unwrap_or_default();
-    said.lines().find(|line| line.contains(" has no mesh shaders; ")).map(str::to_owned)
+    let lack = said.lines().find(|line| line.contains(" has no mesh shaders; "));
+    lack.map(|line| line.trim_start_matches("error: ").to_owned())
 }
