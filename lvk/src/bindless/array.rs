@@ -37,3 +37,51 @@ impl<T: Copy> Array<T> {
         dirty.into_iter().map(|slot| (slot, self.owners.get(slot as usize).copied().flatten())).collect()
     }
 }
+
+/// Which descriptors of an array show an owner, and not the dummy that all were filled with.
+pub(super) struct Shown(Vec<bool>);
+
+impl Shown {
+    pub(super) fn new(capacity: u32) -> Self {
+        Self(vec![false; capacity as usize])
+    }
+
+    /// Whether the descriptor of a slot has to be written, now that the slot has an owner to show or none. It counts as
+    /// written from now on.
+    pub(super) fn must_write(&mut self, slot: u32, has_owner: bool) -> bool {
+        match self.0.get_mut(slot as usize) {
+            Some(shown) => std::mem::replace(shown, has_owner) || has_owner,
+            None => false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn descriptors_show_their_owners_and_no_dummy_is_written_over_a_dummy(
+            changes in prop::collection::vec((0..6_u32, prop::option::of(1..4_u32)), 0..60)
+        ) {
+            const DUMMY: u32 = 0;
+            let (mut shown, mut descriptors) = (Shown::new(5), [DUMMY; 5]);
+            for (slot, owner) in changes {
+                let must_write = shown.must_write(slot, owner.is_some());
+                let Some(descriptor) = descriptors.get_mut(slot as usize) else {
+                    prop_assert!(!must_write);
+                    continue;
+                };
+                let wanted = owner.unwrap_or(DUMMY);
+                prop_assert!(must_write != (wanted == DUMMY && *descriptor == DUMMY));
+                if must_write {
+                    *descriptor = wanted;
+                }
+                prop_assert_eq!(*descriptor, wanted);
+            }
+        }
+    }
+}

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::array::Array;
+use super::array::{Array, Shown};
 use super::checks::{BindlessArray, CheckPlan, IndexChecks};
 use super::layout;
 use super::yuv::{YuvPlace, YuvSlots};
@@ -46,6 +46,8 @@ pub(crate) struct Bindless {
 struct Entries {
     dummies: Option<Dummies>,
     textures: Array<TextureViews>,
+    /// Of sampled and of storage images: most textures are only one of both.
+    shown: [Shown; 2],
     samplers: Array<vk::Sampler>,
     tlas: Array<vk::AccelerationStructureKHR>,
     yuv: YuvSlots,
@@ -79,6 +81,7 @@ impl Bindless {
         let entries = Entries {
             dummies: None,
             textures: Array::new("number of textures", textures),
+            shown: [Shown::new(textures), Shown::new(textures)],
             samplers: Array::new("number of samplers", limits.max_bindless_samplers),
             tlas: Array::new("number of top-level acceleration structures", slot_count(gpu)),
             yuv,
@@ -91,8 +94,7 @@ impl Bindless {
     pub(crate) fn fill(&self, dummies: Dummies) {
         let mut entries = self.lock();
         entries.dummies = Some(dummies);
-        let textures = (0..entries.textures.owners.len() as u32).map(|slot| (slot, None));
-        self.write_textures(dummies, textures);
+        self.fill_textures(dummies, entries.textures.owners.len() as u32);
         let samplers = (0..entries.samplers.owners.len() as u32).map(|slot| (slot, None));
         self.write_samplers(dummies, samplers);
         let tlas = (0..entries.tlas.owners.len() as u32).map(|slot| (slot, None));
@@ -228,7 +230,7 @@ impl Bindless {
     pub(crate) fn flush(&self) {
         let mut entries = self.lock();
         let Some(dummies) = entries.dummies else { return };
-        self.write_textures(dummies, entries.textures.take_dirty().into_iter());
+        self.write_textures(dummies, &mut entries);
         self.write_samplers(dummies, entries.samplers.take_dirty().into_iter());
         self.write_tlas(dummies, entries.tlas.take_dirty().into_iter());
         self.write_yuv(entries.yuv.take_dirty());
@@ -242,16 +244,33 @@ impl Bindless {
         self.write(&views, layout::YCBCR, vk::DescriptorType::COMBINED_IMAGE_SAMPLER);
     }
 
-    fn write_textures(&self, dummies: Dummies, slots: impl Iterator<Item = (u32, Option<TextureViews>)>) {
+    fn fill_textures(&self, dummies: Dummies, count: u32) {
         let (mut sampled, mut storage) = (Runs::default(), Runs::default());
-        for (slot, views) in slots {
-            let (read, written) = views.map_or((None, None), |views| (views.sampled, views.storage));
-            let layout = vk::ImageLayout::READ_ONLY_OPTIMAL;
-            sampled.push(slot, image(read.unwrap_or(dummies.sampled), layout));
-            storage.push(slot, image(written.unwrap_or(dummies.storage), vk::ImageLayout::GENERAL));
+        for slot in 0..count {
+            sampled.push(slot, sampled_image(dummies.sampled));
+            storage.push(slot, storage_image(dummies.storage));
         }
-        self.write(&sampled, layout::SAMPLED_IMAGES, vk::DescriptorType::SAMPLED_IMAGE);
-        self.write(&storage, layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE);
+        self.write_images(&sampled, &storage);
+    }
+
+    fn write_textures(&self, dummies: Dummies, entries: &mut Entries) {
+        let (mut sampled, mut storage) = (Runs::default(), Runs::default());
+        let [shown_sampled, shown_storage] = &mut entries.shown;
+        for (slot, views) in entries.textures.take_dirty() {
+            let (read, written) = views.map_or((None, None), |views| (views.sampled, views.storage));
+            if shown_sampled.must_write(slot, read.is_some()) {
+                sampled.push(slot, sampled_image(read.unwrap_or(dummies.sampled)));
+            }
+            if shown_storage.must_write(slot, written.is_some()) {
+                storage.push(slot, storage_image(written.unwrap_or(dummies.storage)));
+            }
+        }
+        self.write_images(&sampled, &storage);
+    }
+
+    fn write_images(&self, sampled: &Runs<vk::DescriptorImageInfo>, storage: &Runs<vk::DescriptorImageInfo>) {
+        self.write(sampled, layout::SAMPLED_IMAGES, vk::DescriptorType::SAMPLED_IMAGE);
+        self.write(storage, layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE);
     }
 
     fn write_samplers(&self, dummies: Dummies, slots: impl Iterator<Item = (u32, Option<vk::Sampler>)>) {
@@ -353,6 +372,14 @@ impl<T> Runs<T> {
         let ends = self.starts.iter().skip(1).map(|(_, start)| *start).chain([self.infos.len()]);
         self.starts.iter().zip(ends).map(|((slot, start), end)| (*slot, &self.infos[*start..end]))
     }
+}
+
+fn sampled_image(view: vk::ImageView) -> vk::DescriptorImageInfo {
+    image(view, vk::ImageLayout::READ_ONLY_OPTIMAL)
+}
+
+fn storage_image(view: vk::ImageView) -> vk::DescriptorImageInfo {
+    image(view, vk::ImageLayout::GENERAL)
 }
 
 fn image(view: vk::ImageView, layout: vk::ImageLayout) -> vk::DescriptorImageInfo {
