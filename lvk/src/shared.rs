@@ -1,6 +1,6 @@
 //! Everything a context and its command buffers share.
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use ash::vk;
@@ -9,10 +9,12 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::BlasBody;
 use crate::accel::compaction::SizeQuery;
 use crate::accel::scratch_buffer::ScratchBuffer;
+use crate::accel::shown::Revision;
 use crate::accel::software::body::SoftwareBody;
 use crate::accel::storage::AccelStorage;
 use crate::accel::structure::AccelKind;
 use crate::accel::tlas::TlasContents;
+use crate::accel::tlas_updates::{SpareUpdates, TlasUpdate};
 use crate::barrier::{QueryStages, ResourceId};
 use crate::bindless::checks::BindlessArray;
 use crate::bindless::{Bindless, TEXTURE_ARRAYS};
@@ -70,6 +72,9 @@ pub(crate) struct Shared {
     pub(crate) tlas_tables: ResourceId,
     /// Some top-level structure shows what compaction has replaced.
     pub(crate) outdated_tlas: AtomicBool,
+    /// How often a bottom-level structure has moved.
+    pub(crate) moves: AtomicU64,
+    pub(crate) spare_updates: SpareUpdates,
     /// Slots of top-level structures that are gone, where the table still says what software traced.
     pub(crate) freed_tlas: Mutex<Vec<u32>>,
     pub(crate) gpu: Arc<Gpu>,
@@ -234,12 +239,42 @@ impl Shared {
 
     /// A source that was kept lies in buffers of the library's own; the next one may have the mapped one.
     fn take_source(&self, contents: TlasContents) {
-        let Some(source) = contents.source else { return };
+        // Contents written again share the source.
+        let Some(source) = contents.source.and_then(Arc::into_inner) else { return };
         let bytes = [Some(source.instances), source.owners];
         for buffer in bytes.into_iter().flatten().filter_map(|bytes| bytes.buffer) {
             self.submitter.forget(buffer.id);
             self.instance_buffers.give(buffer);
         }
+    }
+
+    /// What an update says is submitted. Answers the structure.
+    pub(crate) fn show(&self, update: TlasUpdate) -> Arc<AccelStruct> {
+        let contents = &update.contents;
+        let is_outdated = contents.revision.moves != self.moves() && contents.shown.is_outdated();
+        let (target, before) = update.apply();
+        if is_outdated {
+            self.note_outdated_tlas();
+        }
+        before.into_iter().for_each(|before| self.retire(Garbage::Contents(Box::new(before))));
+        target
+    }
+
+    /// Rises with every structure that is destroyed or moves.
+    #[inline]
+    pub(crate) fn accel_revision(&self) -> Revision {
+        Revision { removals: self.store.accel_structs.removals(), moves: self.moves() }
+    }
+
+    /// How often a bottom-level structure has moved.
+    #[inline]
+    pub(crate) fn moves(&self) -> u64 {
+        self.moves.load(Ordering::Acquire)
+    }
+
+    /// A bottom-level structure has moved.
+    pub(crate) fn note_moved(&self) {
+        self.moves.fetch_add(1, Ordering::Release);
     }
 
     /// Some top-level structure shows what compaction has replaced.

@@ -150,6 +150,7 @@ impl<H: Handle, T> Pool<H, T> {
     }
 
     /// Rises whenever an object is taken out.
+    #[inline]
     pub(crate) fn removals(&self) -> u64 {
         self.removals.load(Ordering::Acquire)
     }

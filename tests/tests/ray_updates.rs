@@ -92,6 +92,56 @@ fn a_refit_moves_instances() -> Result<()> {
     Ok(())
 }
 
+/// Refits that need not wait for each other, and two of one structure, which must; what they show before and after that
+/// is built, traced and destroyed in between.
+#[test]
+fn many_structures_are_refitted_in_one_command_buffer() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    for method in Method::available(&ctx) {
+        let tracer = RayTracer::new(&ctx, method)?;
+        let upload = |turn| spiral(8, turn).upload_with(&ctx, UPDATABLE, UPDATABLE, 0);
+        let all = [0.0, 0.3, 0.6].into_iter().map(upload).collect::<Result<Vec<_>>>()?;
+        let rays = rays();
+        let jobs = all.iter().map(|_| tracer.job(&rays)).collect::<Result<Vec<_>>>()?;
+        let shown = instances(&spiral(8, 0.0).placed, &all[0].models);
+        for round in [1.0, 2.0] {
+            let scene = |number: usize, step: f32| spiral(8, round + number as f32 * 0.5 + step);
+            let refit = |cmd: &mut lvk::CommandBuffer, number: usize, step| {
+                let list = instances(&scene(number, step).placed, &all[number].models);
+                cmd.update_tlas(*all[number].tlas, &list, BuildMode::Refit)
+            };
+            let mut cmd = ctx.acquire_command_buffer()?;
+            (0..3).try_for_each(|number| refit(&mut cmd, number, 0.1))?;
+            refit(&mut cmd, 0, 0.2)?;
+            tracer.record(&mut cmd, &all[0].tlas, &jobs[0], How::default())?;
+            refit(&mut cmd, 1, 0.2)?;
+            cmd.build_blas(&[*all[2].models[0]], BuildMode::Refit)?;
+            refit(&mut cmd, 2, 0.2)?;
+            tracer.record(&mut cmd, &all[1].tlas, &jobs[1], How::default())?;
+            tracer.record(&mut cmd, &all[2].tlas, &jobs[2], How::default())?;
+            ctx.submit(cmd)?;
+            for (number, job) in jobs.iter().enumerate() {
+                let what = format!("structure {number} in round {round} by {method:?}");
+                agree(&what, &rays, &tracer.read(job)?, &scene(number, 0.2));
+            }
+        }
+        // The same structures shown by another one, and then no longer there.
+        let mut cmd = ctx.acquire_command_buffer()?;
+        cmd.update_tlas(*all[1].tlas, &shown, BuildMode::Refit)?;
+        ctx.submit(cmd)?;
+        check("shown by another", &tracer, &all[1], &spiral(8, 0.0))?;
+        let mut all = all;
+        all[0].models.clear();
+        let mut cmd = ctx.acquire_command_buffer()?;
+        let refused = cmd.update_tlas(*all[1].tlas, &shown, BuildMode::Refit);
+        assert!(matches!(refused, Err(lvk::Error::StaleHandle { .. })), "{refused:?}");
+        cmd.update_tlas(*all[1].tlas, &instances(&spiral(8, 0.4).placed, &all[1].models), BuildMode::Refit)?;
+        ctx.submit(cmd)?;
+        check("after its models are gone", &tracer, &all[1], &spiral(8, 0.4))?;
+    }
+    Ok(())
+}
+
 #[test]
 fn a_structure_is_refitted_to_vertices_written_by_a_dispatch() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };

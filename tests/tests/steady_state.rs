@@ -7,9 +7,11 @@ use std::sync::{Mutex, PoisonError};
 
 use lvk::test_hooks::{silent_context, staging_bytes, waiting_objects};
 use lvk::{
-    BufferDesc, BufferHandle, ColorAttachment, ComputePipelineHandle, Context, ContextDesc, Dependencies,
-    Format, Holder, OptionalFeature, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, ShaderStage,
-    TextureDesc, TextureHandle, TextureUsage,
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BuildFlags, BuildMode,
+    ColorAttachment, ComputePipelineHandle, Context, ContextDesc, Dependencies, DeviceInstances, Format,
+    Holder, OptionalFeature, PrimitiveOrder, RayQueryRequest, RenderPassDesc, RenderPipelineDesc,
+    RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle, TextureUsage, TlasDesc, TlasInstance,
+    Triangles,
 };
 use lvk_tests::compute::{compute_pipeline, module};
 use lvk_tests::device::vulkan;
@@ -148,6 +150,66 @@ fn draws_take_nothing_from_the_heap_and_frames_leave_nothing_there() {
     };
     assert_eq!(object_bytes(&ctx.memory_budget()), object_bytes(&objects));
     assert_eq!((staging_bytes(&ctx), waiting_objects(&ctx).unwrap()), (staging, 0));
+}
+
+/// Top-level structures that show the same meshes in every frame, by instances of the host or from a buffer.
+#[test]
+fn refits_that_show_the_same_take_nothing_from_the_heap() {
+    const MESHES: usize = 100;
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(vulkan_library) = vulkan() else { return };
+    let ray_query = RayQueryRequest::Hardware;
+    let desc = ContextDesc { vulkan_library, ray_query, ..Default::default() };
+    let ctx = match silent_context(&desc) {
+        Ok(ctx) => ctx,
+        Err(error) => return eprintln!("SKIPPED, no ray queries by hardware: {error}"),
+    };
+    let meshes: Vec<_> = (0..MESHES).map(|_| triangle(&ctx)).collect();
+    let shown: Vec<_> = meshes.iter().map(|mesh| *mesh.blas).collect();
+    let instances: Vec<_> = (0..1_000).map(|number| TlasInstance::new(shown[number * 7 % MESHES])).collect();
+    let flags = BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE;
+    let desc = TlasDesc { instances: &instances, flags, ..Default::default() };
+    let structures: Vec<_> = (0..16).map(|_| ctx.create_tlas(&desc).unwrap()).collect();
+    let desc = BufferDesc { size_bytes: 64 * 1_000, usage: lvk::BufferUsage::STORAGE, ..Default::default() };
+    let records = ctx.create_buffer(&desc).unwrap();
+    let buffer = DeviceInstances { buffer: *records, offset: 0, count: 1_000, blas: &shown };
+    for from_buffer in [false, true] {
+        let allocations = |refits: usize| {
+            let before = COUNT.load(Ordering::Relaxed);
+            for _ in 0..200 {
+                ctx.next_frame().unwrap();
+                let mut cmd = ctx.acquire_command_buffer().unwrap();
+                for tlas in structures.iter().take(refits) {
+                    match from_buffer {
+                        true => cmd.update_tlas_from(**tlas, &buffer, BuildMode::Refit).unwrap(),
+                        false => cmd.update_tlas(**tlas, &instances, BuildMode::Refit).unwrap(),
+                    }
+                }
+                ctx.submit(cmd).unwrap();
+            }
+            ctx.wait_idle().unwrap();
+            COUNT.load(Ordering::Relaxed) - before
+        };
+        allocations(16);
+        let (many, one) = (allocations(16), allocations(1));
+        // Three thousand refits more; lists grow now and then.
+        assert!(many.abs_diff(one) < 300, "{many} with 16 refits a frame, {one} with one, {from_buffer}");
+    }
+}
+
+/// A bottom-level structure of one triangle, and the buffer it is built from.
+struct Mesh {
+    blas: Holder<AccelStructHandle>,
+    _vertices: Holder<BufferHandle>,
+}
+
+fn triangle(ctx: &Context) -> Mesh {
+    let usage = lvk::BufferUsage::ACCEL_INPUT;
+    let vertices = ctx.create_buffer(&BufferDesc { size_bytes: 36, usage, ..Default::default() }).unwrap();
+    let geometries = [BlasGeometry::Triangles(Triangles::packed(*vertices, 3))];
+    let order = PrimitiveOrder::Given;
+    let desc = BlasDesc { geometries: &geometries, order, ..Default::default() };
+    Mesh { blas: ctx.create_blas(&desc).unwrap(), _vertices: vertices }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use ash::khr::acceleration_structure::Device as ExtDevice;
 use ash::vk;
 
 use super::blas::PartShape;
@@ -70,12 +71,7 @@ impl BuildInput {
 
     /// The input of a top-level structure: `count` instances at `instances`, an address that is a multiple of 16.
     pub(crate) fn tlas(flags: BuildFlags, instances: u64, count: u32) -> Self {
-        debug_assert!(instances.is_multiple_of(16));
-        let data = vk::AccelerationStructureGeometryInstancesDataKHR::default().data(address(instances));
-        let raw = vk::AccelerationStructureGeometryKHR::default()
-            .geometry_type(vk::GeometryTypeKHR::INSTANCES)
-            .geometry(vk::AccelerationStructureGeometryDataKHR { instances: data });
-        let converted = [Converted { raw, primitive_count: count }];
+        let converted = [Converted { raw: instances_geometry(instances), primitive_count: count }];
         Self::new(vk::AccelerationStructureTypeKHR::TOP_LEVEL, flags, &converted)
     }
 
@@ -123,24 +119,84 @@ impl BuildInput {
         refit: bool,
         scratch: u64,
     ) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
-        let info = self
-            .info(refit)
-            .dst_acceleration_structure(target)
-            .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch });
-        if refit { info.src_acceleration_structure(target) } else { info }
+        build_of(self.info(refit), target, refit, scratch)
     }
 
     fn info(&self, refit: bool) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
-        let mode = match refit {
-            false => vk::BuildAccelerationStructureModeKHR::BUILD,
-            true => vk::BuildAccelerationStructureModeKHR::UPDATE,
-        };
-        vk::AccelerationStructureBuildGeometryInfoKHR::default()
-            .ty(self.ty)
-            .flags(self.flags.raw())
-            .mode(mode)
-            .geometries(&self.geometries)
+        build_info(self.ty, self.flags, &self.geometries, refit)
     }
+}
+
+/// The build of a top-level structure, as [`BuildInput`] would have it, without lists.
+pub(crate) struct TlasBuild {
+    pub(crate) flags: BuildFlags,
+    /// Where the instances lie, a multiple of 16.
+    pub(crate) instances: u64,
+    pub(crate) count: u32,
+    pub(crate) refit: bool,
+    pub(crate) target: vk::AccelerationStructureKHR,
+    /// The address of its scratch memory.
+    pub(crate) scratch: u64,
+}
+
+impl TlasBuild {
+    /// Records it (`vkCmdBuildAccelerationStructuresKHR`).
+    ///
+    /// # Safety
+    /// The command buffer is being recorded; instances, structure and scratch memory are alive, checked, aligned and large
+    /// enough, and barriers keep them apart from other commands.
+    #[inline]
+    pub(crate) unsafe fn record(&self, ext: &ExtDevice, commands: vk::CommandBuffer) {
+        let geometry = [instances_geometry(self.instances)];
+        let info = build_info(vk::AccelerationStructureTypeKHR::TOP_LEVEL, self.flags, &geometry, self.refit);
+        let info = build_of(info, self.target, self.refit, self.scratch);
+        let range =
+            vk::AccelerationStructureBuildRangeInfoKHR { primitive_count: self.count, ..Default::default() };
+        let build = ext.fp().cmd_build_acceleration_structures_khr;
+        // SAFETY: the caller's promise; one structure with one geometry and its one range.
+        unsafe { build(commands, 1, &info, &std::ptr::from_ref(&range)) };
+    }
+}
+
+#[inline]
+fn build_info<'a>(
+    ty: vk::AccelerationStructureTypeKHR,
+    flags: BuildFlags,
+    geometries: &'a [vk::AccelerationStructureGeometryKHR<'a>],
+    refit: bool,
+) -> vk::AccelerationStructureBuildGeometryInfoKHR<'a> {
+    let mode = match refit {
+        false => vk::BuildAccelerationStructureModeKHR::BUILD,
+        true => vk::BuildAccelerationStructureModeKHR::UPDATE,
+    };
+    vk::AccelerationStructureBuildGeometryInfoKHR::default()
+        .ty(ty)
+        .flags(flags.raw())
+        .mode(mode)
+        .geometries(geometries)
+}
+
+#[inline]
+fn build_of(
+    info: vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
+    target: vk::AccelerationStructureKHR,
+    refit: bool,
+    scratch: u64,
+) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
+    let info = info
+        .dst_acceleration_structure(target)
+        .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch });
+    if refit { info.src_acceleration_structure(target) } else { info }
+}
+
+/// Instances at an address that is a multiple of 16.
+#[inline]
+fn instances_geometry(instances: u64) -> vk::AccelerationStructureGeometryKHR<'static> {
+    debug_assert!(instances.is_multiple_of(16));
+    let data = vk::AccelerationStructureGeometryInstancesDataKHR::default().data(address(instances));
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::INSTANCES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { instances: data })
 }
 
 /// Makes a geometry read its indices, or its boxes, from where they were gathered.
@@ -175,6 +231,7 @@ pub(crate) fn transforms(geometries: &[BlasGeometry]) -> Option<Vec<f32>> {
 }
 
 /// Bytes of `count` instances.
+#[inline]
 pub(crate) fn instance_bytes(count: u32) -> u64 {
     u64::from(count) * INSTANCE_BYTES as u64
 }

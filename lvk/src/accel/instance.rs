@@ -89,6 +89,7 @@ pub struct DeviceInstances<'a> {
 }
 
 /// Fails unless every number of the instance fits. Quick where it does: there may be millions.
+#[inline]
 pub(crate) fn check(name: &str, index: usize, instance: &TlasInstance) -> Result<()> {
     const BOTH: InstanceFlags = InstanceFlags::FORCE_OPAQUE.union(InstanceFlags::FORCE_NO_OPAQUE);
     let fits = (instance.custom_index | instance.hit_group_offset) >> 24 == 0;
@@ -99,6 +100,7 @@ pub(crate) fn check(name: &str, index: usize, instance: &TlasInstance) -> Result
 }
 
 /// Whether no exponent is all ones, without a branch for each number.
+#[inline]
 fn is_finite(transform: &[f32; 12]) -> bool {
     let all = transform.iter().fold(0, |all, number| all | ((number.to_bits() & 0x7fff_ffff) + 0x0080_0000));
     all >> 31 == 0
@@ -119,6 +121,7 @@ fn complaint(name: &str, index: usize, instance: &TlasInstance) -> Error {
     Error::usage(name, format!("instance {index}: choose either FORCE_OPAQUE or FORCE_NO_OPAQUE"))
 }
 
+#[inline]
 pub(crate) fn pack(instance: &TlasInstance, blas_address: u64) -> RawInstance {
     RawInstance {
         transform: instance.transform,

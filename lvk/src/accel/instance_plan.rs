@@ -1,18 +1,10 @@
 //! From the caller's instances to the records Vulkan reads.
 
-use std::collections::HashMap;
-use std::hash::BuildHasherDefault;
 use std::sync::Arc;
 
 use super::instance::{INSTANCE_BYTES, TlasInstance, check, pack};
-use super::structure::AccelStruct;
-use super::tlas::{Entry, Shown};
-use crate::barrier::IdHasher;
+use super::shown::{Find, Gather, Marks, Shown, ShownSet};
 use crate::error::{Error, Result, check_limit};
-use crate::handle::AccelStructHandle;
-
-/// Finds the structure of a handle.
-pub(crate) type Find<'a> = &'a (dyn Fn(AccelStructHandle) -> Result<Arc<AccelStruct>> + Sync);
 
 /// A thread gets at least so many instances: one converts 200 of them in a microsecond, and takes tens of microseconds to
 /// start.
@@ -20,78 +12,72 @@ const INSTANCES_PER_THREAD: usize = 1 << 17;
 /// More threads than this do not write faster.
 const MOST_THREADS: usize = 8;
 
-/// Structures that were referred to, each once.
-#[derive(Default)]
-struct Known {
-    places: HashMap<AccelStructHandle, u32, BuildHasherDefault<IdHasher>>,
-    last: Option<(AccelStructHandle, u32)>,
-    shown: Vec<Shown>,
-    /// What instances refer to, where they refer to an address.
-    addresses: Vec<u64>,
-    /// Whether an address does not do for some: it has parts, maps, or may move.
-    needs_kernel: bool,
-}
-
-impl Known {
-    /// The place of a structure among those shown.
-    fn place(&mut self, handle: AccelStructHandle, find: Find<'_>) -> Result<u32> {
-        if let Some((last, place)) = self.last
-            && last == handle
-        {
-            return Ok(place);
-        }
-        let place = match self.places.get(&handle) {
-            Some(place) => *place,
-            None => self.add(handle, find(handle)?)?,
-        };
-        self.last = Some((handle, place));
-        Ok(place)
-    }
-
-    fn add(&mut self, handle: AccelStructHandle, blas: Arc<AccelStruct>) -> Result<u32> {
-        let body = blas.blas()?.body();
-        let place = self.shown.len() as u32;
-        let shown = Shown { blas, body };
-        self.needs_kernel |= shown.needs_kernel();
-        self.addresses.push(shown.body.structures.first().map_or(0, |structure| structure.address));
-        self.shown.push(shown);
-        self.places.insert(handle, place);
-        Ok(place)
-    }
-}
-
 /// Whether the first structure referred to needs no more than an address, as then mostly all do.
 pub(crate) fn starts_plain(instances: &[TlasInstance], find: Find<'_>) -> Result<bool> {
     let Some(first) = instances.first() else { return Ok(true) };
-    let blas = find(first.blas)?;
-    let body = blas.blas()?.body();
-    Ok(!Shown { blas, body }.needs_kernel())
+    Ok(!Shown::new(first.blas, find(first.blas)?)?.needs_kernel())
 }
 
-/// Checks `instances` and writes them with addresses, on several threads where there are many. Answers the structures
-/// they refer to, or nothing where some need more than an address; then what was written means nothing.
+/// What instances refer to that were written with addresses.
+pub(crate) enum Written {
+    /// What was known, all of it.
+    Same,
+    /// Something else.
+    Other(Arc<ShownSet>),
+    /// Some need more than an address; what was written means nothing.
+    Nothing,
+}
+
+/// Checks `instances` and writes them with addresses, on several threads where there are many. `known` is what was shown
+/// before, if that still stands.
+#[inline]
 pub(crate) fn write_addresses(
     name: &str,
     instances: &[TlasInstance],
+    known: &ShownSet,
+    marks: &mut Marks,
+    find: Find<'_>,
+    out: &mut [u8],
+) -> Result<Written> {
+    let threads = thread_count(instances.len());
+    if threads > 1 {
+        let shown = write_chunks(name, instances, threads, find, out)?;
+        let other = |shown| Written::Other(Arc::new(ShownSet::new(shown)));
+        return Ok(shown.map_or(Written::Nothing, other));
+    }
+    let mut gather = Gather::new(known, marks, find);
+    if !write_chunk(name, 0, instances, &mut gather, out)? {
+        return Ok(Written::Nothing);
+    }
+    if gather.is_unchanged() {
+        return Ok(Written::Same);
+    }
+    Ok(Written::Other(Arc::new(gather.finish().0)))
+}
+
+fn write_chunks(
+    name: &str,
+    instances: &[TlasInstance],
+    threads: usize,
     find: Find<'_>,
     out: &mut [u8],
 ) -> Result<Option<Vec<Shown>>> {
-    let threads = thread_count(instances.len());
-    if threads == 1 {
-        return write_chunk(name, 0, instances, find, out);
-    }
     let count = instances.len().div_ceil(threads).max(1);
+    let write = move |index: usize, instances: &[TlasInstance], out: &mut [u8]| {
+        let (known, mut marks) = (ShownSet::default(), Marks::default());
+        let mut gather = Gather::new(&known, &mut marks, find);
+        let plain = write_chunk(name, index * count, instances, &mut gather, out)?;
+        Ok(plain.then(|| gather.into_new()))
+    };
     std::thread::scope(|scope| {
         let mut chunks = instances.chunks(count).zip(out.chunks_mut(count * INSTANCE_BYTES)).enumerate();
         let own = chunks.next();
         let workers: Vec<_> = chunks
-            .map(|(index, (instances, out))| {
-                scope.spawn(move || write_chunk(name, index * count, instances, find, out))
-            })
+            .map(|(index, (instances, out))| scope.spawn(move || write(index, instances, out)))
             .collect();
         let mut all = Vec::new();
         if let Some((index, (instances, out))) = own {
-            all.push(write_chunk(name, index * count, instances, find, out));
+            all.push(write(index, instances, out));
         }
         let lost = |_| Err(Error::usage(name, "a thread that converted instances ended early"));
         all.extend(workers.into_iter().map(|worker| worker.join().unwrap_or_else(lost)));
@@ -100,6 +86,7 @@ pub(crate) fn write_addresses(
 }
 
 /// Counting cores reads files on Linux, some 10 us: only where there is work for several.
+#[inline]
 fn thread_count(instances: usize) -> usize {
     let wanted = (instances / INSTANCES_PER_THREAD).min(MOST_THREADS);
     if wanted < 2 {
@@ -108,24 +95,33 @@ fn thread_count(instances: usize) -> usize {
     std::thread::available_parallelism().map_or(1, usize::from).min(wanted)
 }
 
+/// Answers `false` where some need more than an address.
+#[inline]
 fn write_chunk(
     name: &str,
     first: usize,
     instances: &[TlasInstance],
-    find: Find<'_>,
+    gather: &mut Gather<'_>,
     out: &mut [u8],
-) -> Result<Option<Vec<Shown>>> {
-    let mut known = Known::default();
+) -> Result<bool> {
+    let mut last = None;
     for (index, (instance, out)) in instances.iter().zip(out.chunks_exact_mut(INSTANCE_BYTES)).enumerate() {
-        let place = known.place(instance.blas, find)?;
-        if known.needs_kernel {
-            return Ok(None);
-        }
+        let address = match last {
+            Some((handle, address)) if handle == instance.blas => address,
+            _ => {
+                let address = gather.address(instance.blas)?;
+                if gather.needs_kernel {
+                    return Ok(false);
+                }
+                address
+            }
+        };
+        last = Some((instance.blas, address));
         check(name, first + index, instance)?;
-        let raw = pack(instance, known.addresses[place as usize]);
+        let raw = pack(instance, address);
         out.copy_from_slice(bytemuck::bytes_of(&raw));
     }
-    Ok(Some(known.shown))
+    Ok(true)
 }
 
 /// What all chunks show, each structure once; the first error where there is one.
@@ -144,82 +140,95 @@ fn merge(chunks: Vec<Result<Option<Vec<Shown>>>>) -> Result<Option<Vec<Shown>>> 
 
 /// What a list of instances refers to, and how many Vulkan is given.
 pub(crate) struct InstancePlan {
-    /// Each structure once.
-    pub(crate) shown: Vec<Shown>,
+    pub(crate) shown: Arc<ShownSet>,
     /// For each instance its place in `shown`.
     refers: Vec<u32>,
     /// Instances with those for further parts of split meshes.
     pub(crate) built_count: u32,
 }
 
-/// Instances that name entries, see [`InstanceSource`](super::tlas::InstanceSource).
-pub(crate) struct EntryList {
-    /// One for each part of each structure.
-    pub(crate) entries: Vec<Entry>,
-    /// Of the instances behind the caller's: whose further parts they are.
-    pub(crate) owners: Vec<u32>,
-    /// Of the same: the entry.
-    further: Vec<u32>,
-    /// First entry of each structure.
-    firsts: Vec<u32>,
-}
-
 impl InstancePlan {
-    /// Finds the structures of `instances`, which are to be shown by the structure `name`.
-    pub(crate) fn new(name: &str, instances: &[TlasInstance], find: Find<'_>) -> Result<Self> {
-        let mut known = Known::default();
-        let places = instances.iter().map(|instance| known.place(instance.blas, find));
-        let refers = places.collect::<Result<Vec<_>>>()?;
-        let shown = known.shown;
-        let parts: Vec<u64> = shown.iter().map(|shown| shown.body.structures.len() as u64).collect();
-        let built: u64 = if parts.iter().all(|count| *count == 1) {
+    /// Finds the structures of `instances`, which are to be shown by the structure `name`. `known` is what was shown
+    /// before, if that still stands; `refers` is only memory to use again.
+    pub(crate) fn new(
+        name: &str,
+        instances: &[TlasInstance],
+        known: Arc<ShownSet>,
+        marks: &mut Marks,
+        mut refers: Vec<u32>,
+        find: Find<'_>,
+    ) -> Result<Self> {
+        let mut gather = Gather::new(&known, marks, find);
+        refers.clear();
+        refers.reserve(instances.len());
+        let mut last = None;
+        for instance in instances {
+            let place = match last {
+                Some((handle, place)) if handle == instance.blas => place,
+                _ => gather.place(instance.blas)? as u32,
+            };
+            last = Some((instance.blas, place));
+            refers.push(place);
+        }
+        let shown = if gather.is_unchanged() {
+            known
+        } else {
+            let (shown, moved) = gather.finish();
+            refers.iter_mut().for_each(|place| *place = moved[*place as usize]);
+            Arc::new(shown)
+        };
+        let spans = shown.spans();
+        let built: u64 = if spans.iter().all(|[_, parts]| *parts == 1) {
             refers.len() as u64
         } else {
-            refers.iter().map(|place| parts[*place as usize]).sum()
+            refers.iter().map(|place| u64::from(spans[*place as usize][1])).sum()
         };
         check_limit(name, "number of instances, parts of split meshes included", built, u32::MAX.into())?;
         Ok(Self { shown, refers, built_count: built as u32 })
     }
 
-    /// Numbers the parts of everything shown, and the instances behind the caller's own.
-    pub(crate) fn entries(&self) -> EntryList {
-        let mut list =
-            EntryList { entries: Vec::new(), owners: Vec::new(), further: Vec::new(), firsts: Vec::new() };
-        for (shown, of) in (0..).zip(&self.shown) {
-            list.firsts.push(list.entries.len() as u32);
-            let parts = 0..of.body.structures.len() as u32;
-            list.entries.extend(parts.map(|first| Entry { shown, first, count: 1 }));
-        }
-        for (owner, place) in (0..).zip(&self.refers) {
-            let first = list.firsts[*place as usize];
-            let parts = self.shown[*place as usize].body.structures.len() as u32;
-            for part in 1..parts {
-                list.owners.push(owner);
-                list.further.push(first + part);
-            }
-        }
-        list
+    /// The memory of the plan, to be used again.
+    pub(crate) fn into_refers(self) -> Vec<u32> {
+        self.refers
     }
 
-    /// Checks the instances and writes them with entry numbers, those of further parts behind the caller's.
-    pub(crate) fn write_entries(
-        &self,
-        name: &str,
-        instances: &[TlasInstance],
-        list: &EntryList,
-        out: &mut [u8],
-    ) -> Result<()> {
-        let firsts: Vec<u64> = list.firsts.iter().map(|first| u64::from(*first)).collect();
+    /// Of the instances behind the caller's: whose further parts they are, and which.
+    fn further(&self) -> impl Iterator<Item = (u32, u32)> + '_ {
+        let owners = (0..).zip(&self.refers);
+        owners.flat_map(|(owner, place)| {
+            let [first, parts] = self.shown.spans()[*place as usize];
+            (1..parts).map(move |part| (owner, first + part))
+        })
+    }
+
+    /// How many instances stand behind the caller's.
+    pub(crate) fn further_count(&self) -> u32 {
+        self.built_count.saturating_sub(self.refers.len() as u32)
+    }
+
+    /// Writes whose further parts the instances behind the caller's are.
+    pub(crate) fn write_owners(&self, out: &mut [u8]) {
+        for ((owner, _), out) in self.further().zip(out.chunks_exact_mut(size_of::<u32>())) {
+            out.copy_from_slice(bytemuck::bytes_of(&owner));
+        }
+    }
+
+    /// Checks the instances and writes them with numbers of [parts](ShownSet::parts), those of further parts behind the
+    /// caller's.
+    pub(crate) fn write_numbers(&self, name: &str, instances: &[TlasInstance], out: &mut [u8]) -> Result<()> {
         let (own, further) = out.split_at_mut(instances.len() * INSTANCE_BYTES);
+        let spans = self.shown.spans();
         let records = instances.iter().zip(&self.refers).zip(own.chunks_exact_mut(INSTANCE_BYTES));
         for (index, ((instance, place), out)) in records.enumerate() {
             check(name, index, instance)?;
-            let raw = pack(instance, firsts[*place as usize]);
-            out.copy_from_slice(bytemuck::bytes_of(&raw));
+            let [first, _] = spans[*place as usize];
+            out.copy_from_slice(bytemuck::bytes_of(&pack(instance, first.into())));
         }
-        let places = list.owners.iter().zip(&list.further);
-        for ((owner, entry), out) in places.zip(further.chunks_exact_mut(INSTANCE_BYTES)) {
-            let raw = pack(&instances[*owner as usize], u64::from(*entry));
+        if self.further_count() == 0 {
+            return Ok(());
+        }
+        for ((owner, part), out) in self.further().zip(further.chunks_exact_mut(INSTANCE_BYTES)) {
+            let raw = pack(&instances[owner as usize], part.into());
             out.copy_from_slice(bytemuck::bytes_of(&raw));
         }
         Ok(())

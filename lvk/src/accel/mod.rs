@@ -18,11 +18,13 @@ pub(crate) mod ranges;
 pub(crate) mod raw_structure;
 pub(crate) mod scratch;
 pub(crate) mod scratch_buffer;
+pub(crate) mod shown;
 mod size_model;
 pub(crate) mod software;
 pub(crate) mod split;
 pub(crate) mod storage;
 pub(crate) mod structure;
 pub(crate) mod tlas;
+pub(crate) mod tlas_updates;
 
 pub(crate) use structure::AccelStruct;

@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::scratch::{ScratchTiers, scratch_buffer_bytes};
+use crate::barrier::ResourceId;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::resource::Buffer;
@@ -10,6 +11,9 @@ use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
 /// The pooled scratch buffer. Builds that share it are kept apart by the tracker like any other writes.
 pub(crate) struct ScratchBuffer {
+    /// Stands for the memory, whichever buffer it is at present: all builds of a lane use it, so that they come in order
+    /// unless they are recorded side by side.
+    pub(crate) id: ResourceId,
     pub(crate) tiers: ScratchTiers,
     current: Mutex<Option<Arc<Buffer>>>,
 }
@@ -17,7 +21,11 @@ pub(crate) struct ScratchBuffer {
 impl ScratchBuffer {
     /// Takes at most `budget` bytes, unless a single build needs more.
     pub(crate) fn new(budget: u64, alignment: u64) -> Self {
-        Self { tiers: ScratchTiers::new(budget, alignment), current: Mutex::default() }
+        Self {
+            id: ResourceId::next(),
+            tiers: ScratchTiers::new(budget, alignment),
+            current: Mutex::default(),
+        }
     }
 
     /// A buffer with room for `bytes` at an aligned address, and the smaller one it replaces, to be retired.

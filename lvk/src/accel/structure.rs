@@ -46,6 +46,7 @@ impl AccelStruct {
     }
 
     /// The top level, or an error that says what the handle names instead.
+    #[inline]
     pub(crate) fn tlas(&self) -> Result<&Tlas> {
         match &self.kind {
             AccelKind::Tlas(tlas) => Ok(tlas),
@@ -55,9 +56,15 @@ impl AccelStruct {
         }
     }
 
+    /// Whether the structure may be refitted.
+    #[inline]
+    pub(crate) fn allows_refit(&self) -> bool {
+        self.flags.contains(BuildFlags::ALLOW_UPDATE)
+    }
+
     /// Fails unless the structure may be refitted.
     pub(crate) fn check_refit(&self) -> Result<()> {
-        if self.flags.contains(BuildFlags::ALLOW_UPDATE) {
+        if self.allows_refit() {
             return Ok(());
         }
         let message = "a refit needs BuildFlags::ALLOW_UPDATE when the structure is created";
@@ -65,9 +72,11 @@ impl AccelStruct {
     }
 
     /// A build of it went to the GPU with this timeline value.
+    #[inline]
     pub(crate) fn submitted(&self, value: u64) {
-        let first = |before| if before == 0 { Some(value) } else { None };
-        let _ = self.built_by.fetch_update(Ordering::Relaxed, Ordering::Relaxed, first);
+        if self.built_by.load(Ordering::Relaxed) == 0 {
+            let _ = self.built_by.compare_exchange(0, value, Ordering::Relaxed, Ordering::Relaxed);
+        }
     }
 
     /// Timeline value at which it is built, once that is submitted.

@@ -14,7 +14,7 @@ use crate::accel::build::BuildInput;
 use crate::accel::flags::BuildMode;
 use crate::accel::scratch::{ScratchBatch, aligned_scratch_address, plan_scratch};
 use crate::accel::structure::AccelKind;
-use crate::barrier::{Stages, Use};
+use crate::barrier::Use;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
@@ -23,15 +23,15 @@ use crate::shared::Garbage;
 /// Records the builds or refits of what software traces.
 type BuildSoftware = fn(&mut CommandBuffer, &[Arc<AccelStruct>], &[bool]) -> Result<()>;
 
-/// One build to record.
-pub(super) struct Build {
-    pub(super) target: Arc<AccelStruct>,
+/// One build of a part of a bottom-level structure to record.
+struct Build {
+    target: Arc<AccelStruct>,
     /// The structure that is built, one of the target's.
-    pub(super) raw: vk::AccelerationStructureKHR,
-    pub(super) input: BuildInput,
-    pub(super) refit: bool,
-    pub(super) scratch_bytes: u64,
-    pub(super) reads: Vec<Arc<Buffer>>,
+    raw: vk::AccelerationStructureKHR,
+    input: BuildInput,
+    refit: bool,
+    scratch_bytes: u64,
+    reads: Vec<Arc<Buffer>>,
 }
 
 /// A build that is recorded; until it is submitted the body must not be replaced by a compacted one.
@@ -49,8 +49,8 @@ impl OpenBuild {
     }
 
     /// A top-level structure stays what it is.
-    pub(super) fn of_tlas(target: &Arc<AccelStruct>) -> Self {
-        Self { target: Arc::clone(target), refit: false, submitted: false }
+    pub(super) fn of_tlas(target: Arc<AccelStruct>) -> Self {
+        Self { target, refit: false, submitted: false }
     }
 
     /// It went to the GPU with this timeline value.
@@ -183,7 +183,7 @@ impl CommandBuffer {
     }
 
     /// Records builds in batches that share the scratch buffer.
-    pub(super) fn record_builds(&mut self, builds: &[Build]) -> Result<()> {
+    fn record_builds(&mut self, builds: &[Build]) -> Result<()> {
         let shared = Arc::clone(&self.shared);
         let alignment = shared.gpu.caps.limits.scratch_alignment.into();
         let sizes: Vec<_> = builds.iter().map(|build| build.scratch_bytes).collect();
@@ -194,7 +194,7 @@ impl CommandBuffer {
         let (scratch, replaced) = own.get(&shared.gpu, most)?;
         self.retire_replaced(replaced);
         for batch in batches {
-            self.use_buffer(&scratch, Use::accel_build_write());
+            self.uses.id(own.id, Use::accel_build_write());
             let base = aligned_scratch_address(scratch.address, alignment);
             self.record_batch(ext, &builds[batch.builds.clone()], &batch, base);
         }
@@ -218,17 +218,8 @@ impl CommandBuffer {
     }
 
     fn use_build(&mut self, build: &Build) {
-        let all_tlas = self.shared.all_tlas;
         self.uses.id(build.target.id, Use::accel_build_write());
-        match build.target.kind {
-            AccelKind::Blas(_) => {
-                self.uses.accumulate(self.built_group(), Use::accel_build_write());
-            }
-            AccelKind::Tlas(_) => {
-                self.use_shown(Use::accel_read(Stages::ACCEL_BUILD));
-                self.uses.accumulate(all_tlas, Use::accel_build_write());
-            }
-        }
+        self.uses.accumulate(self.built_group(), Use::accel_build_write());
         for buffer in &build.reads {
             self.use_buffer(buffer, Use::accel_build_input());
         }

@@ -74,6 +74,7 @@ impl CommandBuffer {
     /// Records the barriers in front of the next command.
     pub(super) fn flush(&mut self) {
         self.end_rendering();
+        self.scratch_run.stop();
         let recording = &mut *self.recording;
         self.barriers.clear();
         self.uses.track(&mut recording.tracker, &mut recording.images, &mut self.barriers);

@@ -108,7 +108,7 @@ impl CommandBuffer {
         let base = aligned_scratch_address(scratch.address, alignment);
         for batch in batches {
             let addresses: Vec<_> = batch.offsets.iter().map(|offset| base + offset).collect();
-            self.use_buffer(&scratch, Use::shader_write(Stages::COMPUTE));
+            self.uses.id(own.id, Use::shader_write(Stages::COMPUTE));
             record(self, batch.builds, &addresses).inspect_err(|_| self.uses.clear())?;
         }
         Ok(())

@@ -9,8 +9,9 @@ use crate::accel::AccelStruct;
 use crate::accel::build::instance_bytes;
 use crate::accel::flags::BuildFlags;
 use crate::accel::instance::{DeviceInstances, TlasInstance};
-use crate::accel::instance_plan::{Find, InstancePlan, starts_plain, write_addresses};
-use crate::accel::tlas::{Entry, InstanceSource, InstanceTables, Shown, SourceBytes, Tlas};
+use crate::accel::instance_plan::{InstancePlan, Written, starts_plain, write_addresses};
+use crate::accel::shown::{Shown, ShownSet};
+use crate::accel::tlas::{InstanceSource, Numbers, SourceBytes, Tlas};
 use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result};
 use crate::kernel::{InstancesPush, Kernel};
@@ -29,9 +30,10 @@ pub(super) struct Ready {
     /// Where Vulkan reads them.
     pub(super) address: u64,
     pub(super) built_count: u32,
-    pub(super) shown: Vec<Shown>,
-    pub(super) source: Option<InstanceSource>,
-    pub(super) reads: Vec<Arc<Buffer>>,
+    pub(super) shown: Arc<ShownSet>,
+    pub(super) source: Option<Arc<InstanceSource>>,
+    /// Whether a kernel writes them, into the structure's own records.
+    pub(super) is_from_kernel: bool,
 }
 
 /// Instances of the host, as far as they are prepared before the counts are checked.
@@ -53,39 +55,65 @@ impl Planned {
 }
 
 impl CommandBuffer {
-    /// The instances, ready to be built.
+    /// The instances, ready to be built. `known` is what was shown before, if that still stands.
+    #[inline]
     pub(super) fn host_instances(
         &mut self,
-        target: &AccelStruct,
+        name: &str,
         instances: &[TlasInstance],
+        known: Arc<ShownSet>,
     ) -> Result<Planned> {
-        let shared = Arc::clone(&self.shared);
-        let find = |handle| shared.store.accel_structs.get(handle);
-        if starts_plain(instances, &find)?
-            && let Some(ready) = self.stage_instances(&target.name, instances, &find)?
-        {
-            return Ok(Planned::Ready(ready));
+        if known.list().is_empty() {
+            let find = |handle| self.shared.store.accel_structs.get(handle);
+            if !starts_plain(instances, &find)? {
+                return Ok(Planned::Kernel(self.plan_instances(name, instances, known)?));
+            }
         }
-        Ok(Planned::Kernel(InstancePlan::new(&target.name, instances, &find)?))
+        if known.needs_kernel {
+            return Ok(Planned::Kernel(self.plan_instances(name, instances, known)?));
+        }
+        self.stage_instances(name, instances, known)
     }
 
-    /// Instances whose addresses the host knows; nothing where a kernel is needed.
+    /// Instances with addresses, unless it turns out that a kernel is needed.
+    #[inline(always)]
     fn stage_instances(
         &mut self,
         name: &str,
         instances: &[TlasInstance],
-        find: Find<'_>,
-    ) -> Result<Option<Ready>> {
+        known: Arc<ShownSet>,
+    ) -> Result<Planned> {
         let built_count = instances.len() as u32;
         let bytes = instance_bytes(built_count.max(1));
-        let mut shown = Ok(None);
-        let staging = &self.shared.staging;
-        let region = staging.write_with(bytes, INSTANCE_ALIGNMENT, self.recording.sequence, |out| {
-            shown = write_addresses(name, instances, find, out);
-        })?;
-        let ready =
-            |shown| Ready { address: region.address, built_count, shown, source: None, reads: Vec::new() };
-        Ok(shown?.map(ready))
+        let (shared, sequence) = (&self.shared, self.recording.sequence);
+        let find = |handle| shared.store.accel_structs.get(handle);
+        let marks = &mut self.tlas_updates.marks;
+        let mut written = Ok(Written::Nothing);
+        let region =
+            shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, |out| {
+                written = write_addresses(name, instances, &known, marks, &find, out);
+            })?;
+        let shown = match written? {
+            Written::Same => known,
+            Written::Other(shown) => shown,
+            Written::Nothing => return Ok(Planned::Kernel(self.plan_instances(name, instances, known)?)),
+        };
+        let address = region.address;
+        Ok(Planned::Ready(Ready { address, built_count, shown, source: None, is_from_kernel: false }))
+    }
+
+    /// What the instances refer to.
+    pub(super) fn plan_instances(
+        &mut self,
+        name: &str,
+        instances: &[TlasInstance],
+        known: Arc<ShownSet>,
+    ) -> Result<InstancePlan> {
+        let shared = &self.shared;
+        let find = |handle| shared.store.accel_structs.get(handle);
+        let updates = &mut self.tlas_updates;
+        let refers = std::mem::take(&mut updates.refers);
+        InstancePlan::new(name, instances, known, &mut updates.marks, refers, &find)
     }
 
     /// Instances for the kernel, and the owners of those for further parts.
@@ -94,19 +122,18 @@ impl CommandBuffer {
         name: &str,
         instances: &[TlasInstance],
         plan: InstancePlan,
-    ) -> Result<(InstanceSource, Vec<Shown>)> {
-        let list = plan.entries();
-        let keep = plan.shown.iter().any(Shown::may_move);
+    ) -> Result<(InstanceSource, Arc<ShownSet>)> {
+        let keep = plan.shown.may_move;
         let mut written = Ok(());
         let records = self.source_bytes(name, instance_bytes(plan.built_count), keep, |out| {
-            written = plan.write_entries(name, instances, &list, out);
+            written = plan.write_numbers(name, instances, out);
         })?;
         written?;
-        let owners: &[u8] = bytemuck::cast_slice(&list.owners);
-        let owners = match owners.len() as u64 {
+        let owners = match plan.further_count() {
             0 => None,
-            bytes => {
-                Some(self.source_bytes(name, bytes, keep, |out| out[..owners.len()].copy_from_slice(owners))?)
+            count => {
+                let bytes = u64::from(count) * size_of::<u32>() as u64;
+                Some(self.source_bytes(name, bytes, keep, |out| plan.write_owners(out))?)
             }
         };
         let source = InstanceSource {
@@ -115,9 +142,11 @@ impl CommandBuffer {
             owners,
             user_count: instances.len() as u32,
             copies: 1,
-            entries: list.entries,
+            numbers: Numbers::Parts,
         };
-        Ok((source, plan.shown))
+        let shown = Arc::clone(&plan.shown);
+        self.tlas_updates.refers = plan.into_refers();
+        Ok((source, shown))
     }
 
     /// Bytes for the kernel to read: in a buffer of their own if they are to be kept, else in staging memory.
@@ -129,9 +158,7 @@ impl CommandBuffer {
         fill: impl FnOnce(&mut [u8]),
     ) -> Result<SourceBytes> {
         if !keep {
-            let staging = &self.shared.staging;
-            let region = staging.write_with(size_bytes, INSTANCE_ALIGNMENT, self.recording.sequence, fill)?;
-            return Ok(SourceBytes { address: region.address, buffer: None });
+            return Ok(SourceBytes { address: self.stage(size_bytes, fill)?, buffer: None });
         }
         let size_bytes = size_bytes.max(INSTANCE_ALIGNMENT);
         let buffer = self.shared.instance_buffers.take(&self.shared.gpu, name, size_bytes)?;
@@ -145,9 +172,10 @@ impl CommandBuffer {
         &self,
         name: &str,
         instances: &DeviceInstances<'_>,
-    ) -> Result<(Vec<Shown>, InstanceSource)> {
-        let shared = Arc::clone(&self.shared);
-        let buffer = shared.store.buffers.get(instances.buffer)?;
+        known: Arc<ShownSet>,
+    ) -> Result<(Arc<ShownSet>, InstanceSource)> {
+        let store = &self.shared.store;
+        let buffer = store.buffers.get(instances.buffer)?;
         buffer.check_usage(BufferUsage::STORAGE)?;
         if !instances.offset.is_multiple_of(INSTANCE_ALIGNMENT) {
             let message = format!("instances start at a multiple of 16 bytes, not at {}", instances.offset);
@@ -155,23 +183,20 @@ impl CommandBuffer {
         }
         let bytes = instance_bytes(instances.count);
         buffer.check_range(instances.offset, bytes)?;
-        let mut shown = Vec::with_capacity(instances.blas.len());
-        for handle in instances.blas {
-            let blas = shared.store.accel_structs.get(*handle)?;
-            let body = blas.blas()?.body();
-            shown.push(Shown { blas, body });
-        }
-        let parts = |shown: &Shown| shown.body.structures.len() as u32;
-        let entry = |(place, of): (u32, &Shown)| Entry { shown: place, first: 0, count: parts(of) };
-        let own =
-            SourceBytes { address: buffer.address + instances.offset, buffer: Some(Arc::clone(&buffer)) };
+        let shown = if known.is_listed_as(instances.blas) {
+            known
+        } else {
+            let find = |handle: &_| Shown::new(*handle, store.accel_structs.get(*handle)?);
+            Arc::new(ShownSet::new(instances.blas.iter().map(find).collect::<Result<_>>()?))
+        };
+        let own = SourceBytes { address: buffer.address + instances.offset, buffer: Some(buffer) };
         let source = InstanceSource {
             instances: own,
             count: instances.count,
             owners: None,
             user_count: instances.count,
-            copies: shown.iter().map(parts).max().unwrap_or(1),
-            entries: (0..).zip(&shown).map(entry).collect(),
+            copies: shown.spans().iter().map(|[_, parts]| *parts).max().unwrap_or(1),
+            numbers: Numbers::Structures,
         };
         Ok((shown, source))
     }
@@ -181,11 +206,11 @@ impl CommandBuffer {
         &mut self,
         name: &str,
         instances: &DeviceInstances<'_>,
-        shown: &[Shown],
+        shown: &ShownSet,
         source: &mut InstanceSource,
     ) -> Result<()> {
         let bytes = instance_bytes(instances.count);
-        if bytes == 0 || !shown.iter().any(Shown::may_move) {
+        if bytes == 0 || !shown.may_move {
             return Ok(());
         }
         let shared = Arc::clone(&self.shared);
@@ -207,34 +232,36 @@ impl CommandBuffer {
         &mut self,
         target: &AccelStruct,
         tlas: &Tlas,
-        shown: Vec<Shown>,
+        shown: Arc<ShownSet>,
         source: InstanceSource,
         built_count: u32,
     ) -> Result<Ready> {
         let records = self.kept_buffer(&tlas.records, target, u64::from(tlas.room) * instance_bytes(1))?;
-        let mapped = shown.iter().any(Shown::has_rows);
-        let rows = match mapped || tlas.rows.get().is_some() {
+        let rows = match shown.has_rows || tlas.rows.get().is_some() {
             true => Some(self.kept_buffer(&tlas.rows, target, u64::from(tlas.room) * ROW_BYTES)?),
             false => None,
         };
         // A refit may neither add nor remove instances, but records may come to name meshes of other parts.
         let keep_active = source.copies > 1 && target.flags.contains(BuildFlags::ALLOW_UPDATE);
         self.record_instances(&source, &shown, &records, rows.as_deref(), keep_active)?;
-        let source = shown.iter().any(Shown::may_move).then_some(source);
-        Ok(Ready { address: records.address, built_count, shown, source, reads: vec![records] })
+        let source = shown.may_move.then(|| Arc::new(source));
+        Ok(Ready { address: records.address, built_count, shown, source, is_from_kernel: true })
     }
 
     fn record_instances(
         &mut self,
         source: &InstanceSource,
-        shown: &[Shown],
+        shown: &ShownSet,
         records: &Buffer,
         rows: Option<&Buffer>,
         keep_active: bool,
     ) -> Result<()> {
-        let tables = InstanceTables::new(shown, &source.entries);
-        let entries = self.stage(bytemuck::cast_slice(&tables.entries))?;
-        let parts = self.stage(bytemuck::cast_slice(&tables.parts))?;
+        let numbers = source.numbers;
+        let entry_count = numbers.count(shown);
+        let entries =
+            self.stage((entry_count * size_of::<[u32; 2]>()) as u64, |out| numbers.write(shown, out))?;
+        let parts: &[u8] = bytemuck::cast_slice(shown.parts());
+        let parts = self.stage(parts.len() as u64, |out| out.copy_from_slice(parts))?;
         let push = InstancesPush {
             source: source.instances.address,
             target: records.address,
@@ -244,7 +271,7 @@ impl CommandBuffer {
             owners: source.owners.as_ref().map_or(0, |owners| owners.address),
             count: source.count,
             copies: source.copies,
-            entry_count: tables.entries.len() as u32,
+            entry_count: entry_count as u32,
             user_count: source.user_count,
             keep_active: keep_active.into(),
             unused: 0,
@@ -265,8 +292,10 @@ impl CommandBuffer {
     }
 
     /// The address of bytes that the GPU may read until the command buffer is done.
-    fn stage(&mut self, bytes: &[u8]) -> Result<u64> {
-        let region = self.shared.staging.write(bytes, INSTANCE_ALIGNMENT, self.recording.sequence)?;
+    fn stage(&mut self, bytes: u64, fill: impl FnOnce(&mut [u8])) -> Result<u64> {
+        let sequence = self.recording.sequence;
+        let region =
+            self.shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, fill)?;
         Ok(region.address)
     }
 

@@ -41,6 +41,8 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::accel::compaction::SizeQuery;
+use crate::accel::scratch::ScratchRun;
+use crate::accel::tlas_updates::TlasUpdates;
 use crate::barrier::{Barriers, ResourceId, Use};
 use crate::error::Result;
 use crate::gpu::queues::Queue;
@@ -50,12 +52,12 @@ use crate::resource::{Buffer, Texture};
 use crate::shared::Shared;
 use crate::submit::Recording;
 use crate::submit::profiler::Scopes;
+use crate::upload::staging::StagingChunk;
 
 use accel::OpenBuild;
 use bind::PushConstants;
 use found::Found;
 use query_log::QueryLog;
-use tlas::TlasUpdate;
 use transfer::Settle;
 use uses::Uses;
 
@@ -89,7 +91,11 @@ pub struct CommandBuffer {
     /// Views that the open pass draws at once: every query takes so many. 1 outside of passes.
     views: u32,
     settle: Vec<Settle>,
-    tlas_updates: Vec<TlasUpdate>,
+    tlas_updates: TlasUpdates,
+    /// Builds of top-level structures side by side.
+    scratch_run: ScratchRun,
+    /// Small regions of staging memory come from here.
+    staged: StagingChunk,
     open_builds: Vec<OpenBuild>,
     /// Refits since the last rebuild of each bottom-level structure that is built here, by its id.
     refits: HashMap<u64, u32>,
@@ -105,7 +111,7 @@ pub struct CommandBuffer {
 
 /// What becomes true once a command buffer is submitted.
 pub(crate) struct Outcome {
-    pub(crate) tlas_updates: Vec<TlasUpdate>,
+    pub(crate) tlas_updates: TlasUpdates,
     pub(crate) builds: Vec<OpenBuild>,
     pub(crate) size_queries: Vec<Arc<SizeQuery>>,
     queries: QueryLog,
@@ -115,8 +121,9 @@ pub(crate) struct Outcome {
 
 impl Outcome {
     /// The command buffer went to the GPU with this timeline value.
-    pub(crate) fn submit(self, shared: &Shared, value: u64) {
-        self.tlas_updates.into_iter().for_each(|update| update.apply(shared));
+    pub(crate) fn submit(mut self, shared: &Shared, value: u64) {
+        self.tlas_updates.drain().for_each(|update| shared.show(update).submitted(value));
+        shared.spare_updates.give(self.tlas_updates);
         self.builds.into_iter().for_each(|build| build.submit(value));
         self.size_queries.iter().for_each(|query| query.submit());
         self.queries.submit();
@@ -149,7 +156,9 @@ impl CommandBuffer {
             views: 1,
             had_pass: false,
             settle: Vec::new(),
-            tlas_updates: Vec::new(),
+            tlas_updates: TlasUpdates::default(),
+            scratch_run: ScratchRun::default(),
+            staged: StagingChunk::default(),
             open_builds: Vec::new(),
             refits: HashMap::new(),
             size_queries: Vec::new(),
@@ -164,6 +173,7 @@ impl CommandBuffer {
     /// What is recorded this way is not tracked: the caller places its barriers, and leaves images in the layout it
     /// found them in. Pipelines and push constants must be bound again afterwards, and so must the bindless set
     /// ([`Context::raw_descriptor_set`](crate::Context::raw_descriptor_set)) where another set took its place.
+    #[inline]
     pub fn raw(&self) -> vk::CommandBuffer {
         self.recording.commands
     }

@@ -92,6 +92,7 @@ impl CommandBuffer {
     }
 
     /// The command buffer uses something that needs no barriers within a queue.
+    #[inline]
     pub(crate) fn refer(&mut self, id: ResourceId, access: Access) {
         if self.shared.gpu.queues.several_lanes() {
             self.recording.references.push((id, access));

@@ -10,6 +10,7 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::Blas;
 use crate::accel::build::instance_bytes;
 use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance, check, pack};
+use crate::accel::shown::{Shown, ShownSet};
 use crate::accel::software::blas::{Origin, SoftwareBlas};
 use crate::accel::software::body::SoftwareBody;
 use crate::accel::software::geometry::{GpuGeometry, gpu_geometries};
@@ -17,7 +18,7 @@ use crate::accel::software::layout::{MOVED, MovedHeader};
 use crate::accel::software::plan::{BuildSource, GpuBuildPlan};
 use crate::accel::software::refit_plan::GpuRefitPlan;
 use crate::accel::software::tlas::SoftwareTlas;
-use crate::accel::tlas::Shown;
+
 use crate::barrier::{ResourceId, Stages, Use};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
@@ -225,11 +226,11 @@ impl CommandBuffer {
         target: &AccelStruct,
         software: &SoftwareTlas,
         instances: &DeviceInstances<'_>,
-        shown: &[Shown],
+        shown: &ShownSet,
     ) -> Result<()> {
         let buffer = self.shared.store.buffers.get(instances.buffer)?;
         let address = |shown: &Shown| Ok(software_body(&shown.blas)?.address);
-        let mut table = shown.iter().map(address).collect::<Result<Vec<u64>>>()?;
+        let mut table = shown.list().iter().map(address).collect::<Result<Vec<u64>>>()?;
         let entries = table.len() as u32;
         table.resize(table.len().max(1), 0);
         let bytes = bytemuck::cast_slice(&table);

@@ -5,50 +5,42 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::accel::{Build, OpenBuild};
+use super::accel::OpenBuild;
 use super::instances::{Planned, Ready};
 use crate::accel::AccelStruct;
-use crate::accel::build::BuildInput;
+use crate::accel::build::TlasBuild;
 use crate::accel::flags::BuildMode;
 use crate::accel::instance::{DeviceInstances, TlasInstance};
-use crate::accel::instance_plan::InstancePlan;
-use crate::accel::tlas::{InstanceSource, Shown, Tlas, TlasContents};
-use crate::barrier::Use;
+use crate::accel::scratch::aligned_scratch_address;
+use crate::accel::shown::{Revision, ShownSet};
+use crate::accel::tlas::{InstanceSource, Tlas, TlasContents};
+use crate::accel::tlas_updates::TlasUpdate;
+use crate::barrier::{Stages, Use};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::error::{Error, Result, check_limit};
 use crate::handle::AccelStructHandle;
-use crate::shared::{Garbage, Shared};
+use crate::resource::Buffer;
 use crate::submit::ownership::Access;
 
-/// What a top-level structure shows once the command buffer is submitted.
-pub(crate) struct TlasUpdate {
-    target: Arc<AccelStruct>,
-    contents: TlasContents,
-    /// Moves what is shown when the command buffer is submitted, so that must have as many instances.
-    refits_submitted: bool,
+/// What is known of a structure before the next command.
+#[derive(Clone, Copy)]
+struct Before {
+    /// Instances of the caller and of Vulkan, `None` before the first build.
+    counts: Option<(u32, u32)>,
+    refits: u32,
+    /// Whether this command buffer has updated it.
+    is_own: bool,
+    /// When what is shown was looked at.
+    revision: Revision,
 }
 
-impl TlasUpdate {
-    /// Fails if another submission changed the number of instances since the refit was recorded.
-    fn check(&self) -> Result<()> {
-        let tlas = self.target.tlas()?;
-        if !self.refits_submitted || tlas.contents().counts() == self.contents.counts() {
-            return Ok(());
-        }
-        let message =
-            "a refit was recorded, but a submission since then changed the number of instances; rebuild";
-        Err(Error::usage(&self.target.name, message))
-    }
-
-    /// Makes it so. What was shown before may go once the GPU is done with it.
-    pub(crate) fn apply(self, shared: &Shared) {
-        let Ok(tlas) = self.target.tlas() else { return };
-        if self.contents.is_outdated() {
-            shared.note_outdated_tlas();
-        }
-        let before = std::mem::replace(&mut *tlas.contents(), self.contents);
-        shared.retire(Garbage::Contents(Box::new(before)));
-    }
+/// What is recorded of a structure.
+struct After {
+    count: u32,
+    built_count: u32,
+    shown: Arc<ShownSet>,
+    source: Option<Arc<InstanceSource>>,
+    refit: bool,
 }
 
 impl CommandBuffer {
@@ -67,7 +59,7 @@ impl CommandBuffer {
     ) -> Result<()> {
         self.needs_compute("an update of a top-level structure")?;
         let target = self.shared.store.accel_structs.get(tlas)?;
-        self.update_tlas_object(&target, instances, mode)
+        self.update_tlas_object(target, instances, mode)
     }
 
     /// As [`update_tlas`](Self::update_tlas), with instances that lie in a buffer: written by a compute shader, say,
@@ -90,23 +82,25 @@ impl CommandBuffer {
         let target = self.shared.store.accel_structs.get(tlas)?;
         let object = target.tlas()?;
         check_limit(&target.name, "instance count", instances.count.into(), object.capacity.into())?;
-        let (shown, mut source) = self.device_source(&target.name, instances)?;
+        let (before, known) = self.before(&target, object);
+        let (shown, mut source) = self.device_source(&target.name, instances, known)?;
+        let count = instances.count;
         if object.structure.is_none() {
-            let refit = self.check_update(&target, instances.count, instances.count, mode)?;
+            let refit = self.check_update(&target, object, count, count, mode, before)?;
             if let Some(software) = &object.software {
                 self.build_software_tlas_from(&target, software, instances, &shown)?;
             }
-            self.open_builds.push(OpenBuild::of_tlas(&target));
-            return self.note_contents(&target, instances.count, instances.count, shown, None, refit);
+            let after = After { count, built_count: count, shown, source: None, refit };
+            return self.note_contents(Arc::clone(&target), before, after);
         }
         let built_count = source.built_count(&target.name)?;
-        let refit = self.check_update(&target, instances.count, built_count, mode)?;
+        let refit = self.check_update(&target, object, count, built_count, mode, before)?;
         self.keep_source(&target.name, instances, &shown, &mut source)?;
-        let software_shown = object.software.as_ref().map(|_| shown.clone()).unwrap_or_default();
         let ready = self.run_instances(&target, object, shown, source, built_count)?;
-        self.record_tlas(&target, ready, instances.count, refit)?;
-        match &object.software {
-            Some(software) => self.build_software_tlas_from(&target, software, instances, &software_shown),
+        let shown = object.software.as_ref().map(|software| (software, Arc::clone(&ready.shown)));
+        self.record_tlas(Arc::clone(&target), before, ready, count, refit)?;
+        match shown {
+            Some((software, shown)) => self.build_software_tlas_from(&target, software, instances, &shown),
             None => Ok(()),
         }
     }
@@ -114,7 +108,7 @@ impl CommandBuffer {
     /// As [`update_tlas`](Self::update_tlas), by object.
     pub(crate) fn update_tlas_object(
         &mut self,
-        target: &Arc<AccelStruct>,
+        target: Arc<AccelStruct>,
         instances: &[TlasInstance],
         mode: BuildMode,
     ) -> Result<()> {
@@ -122,22 +116,26 @@ impl CommandBuffer {
         let count = instances.len() as u64;
         check_limit(&target.name, "instance count", count, tlas.capacity.into())?;
         let count = count as u32;
+        let (before, known) = self.before(&target, tlas);
         if tlas.structure.is_none() {
-            return self.update_software_tlas(target, instances, mode);
+            return self.update_software_tlas(&target, instances, mode, before, known);
         }
-        let planned = self.host_instances(target, instances)?;
-        let refit = self.check_update(target, count, planned.built_count(), mode)?;
+        let planned = self.host_instances(&target.name, instances, known)?;
+        let refit = self.check_update(&target, tlas, count, planned.built_count(), mode, before)?;
         let ready = match planned {
             Planned::Ready(ready) => ready,
             Planned::Kernel(plan) => {
                 let (source, shown) = self.host_source(&target.name, instances, plan)?;
                 let built_count = source.built_count(&target.name)?;
-                self.run_instances(target, tlas, shown, source, built_count)?
+                self.run_instances(&target, tlas, shown, source, built_count)?
             }
         };
-        self.record_tlas(target, ready, count, refit)?;
-        match &tlas.software {
-            Some(software) => self.build_software_tlas(target, software, instances),
+        if tlas.software.is_none() {
+            return self.record_tlas(target, before, ready, count, refit);
+        }
+        self.record_tlas(Arc::clone(&target), before, ready, count, refit)?;
+        match &target.tlas()?.software {
+            Some(software) => self.build_software_tlas(&target, software, instances),
             None => Ok(()),
         }
     }
@@ -148,18 +146,20 @@ impl CommandBuffer {
         target: &Arc<AccelStruct>,
         instances: &[TlasInstance],
         mode: BuildMode,
+        before: Before,
+        known: Arc<ShownSet>,
     ) -> Result<()> {
         let tlas = target.tlas()?;
-        let shared = Arc::clone(&self.shared);
-        let find = |handle| shared.store.accel_structs.get(handle);
-        let plan = InstancePlan::new(&target.name, instances, &find)?;
+        let plan = self.plan_instances(&target.name, instances, known)?;
+        let shown = Arc::clone(&plan.shown);
+        self.tlas_updates.refers = plan.into_refers();
         let count = instances.len() as u32;
-        let refit = self.check_update(target, count, count, mode)?;
+        let refit = self.check_update(target, tlas, count, count, mode, before)?;
         if let Some(software) = &tlas.software {
             self.build_software_tlas(target, software, instances)?;
         }
-        self.open_builds.push(OpenBuild::of_tlas(target));
-        self.note_contents(target, count, count, plan.shown, None, refit)
+        let after = After { count, built_count: count, shown, source: None, refit };
+        self.note_contents(Arc::clone(target), before, after)
     }
 
     /// Writes the instances of a structure again, as what it shows has moved, and builds it.
@@ -167,29 +167,37 @@ impl CommandBuffer {
         let tlas = target.tlas()?;
         let contents = tlas.contents().clone();
         let (Some(source), Some(count)) = (contents.source, contents.instance_count) else { return Ok(()) };
-        let now = |shown: Shown| {
-            let body = shown.blas.blas()?.body();
-            Ok(Shown { body, ..shown })
-        };
-        let shown: Result<Vec<_>> = contents.shown.into_iter().map(now).collect();
-        let ready = self.run_instances(target, tlas, shown?, source, contents.built_count)?;
-        self.record_tlas(target, ready, count, false)
+        let (before, _) = self.before(target, tlas);
+        let shown = Arc::new(contents.shown.renewed()?);
+        let source = InstanceSource::clone(&source);
+        let ready = self.run_instances(target, tlas, shown, source, contents.built_count)?;
+        self.record_tlas(Arc::clone(target), before, ready, count, false)
     }
 
     /// Takes the updates so far for submitted: for the command buffer that goes before every other one.
     pub(crate) fn apply_tlas_updates(&mut self) {
-        let shared = Arc::clone(&self.shared);
-        std::mem::take(&mut self.tlas_updates).into_iter().for_each(|update| update.apply(&shared));
+        // They are not known to be this command buffer's own any more.
+        self.scratch_run.stop();
+        let shown = self.tlas_updates.drain().map(|update| self.shared.show(update));
+        self.open_builds.extend(shown.map(OpenBuild::of_tlas));
     }
 
     /// Fails if what was recorded no longer fits what was submitted since.
     pub(crate) fn check_tlas_updates(&self) -> Result<()> {
-        self.tlas_updates.iter().try_for_each(TlasUpdate::check)
+        self.tlas_updates.check()
     }
 
     /// Checks the counts; answers whether the update is a refit.
-    fn check_update(&self, target: &AccelStruct, count: u32, built: u32, mode: BuildMode) -> Result<bool> {
-        let tlas = target.tlas()?;
+    #[inline(always)]
+    fn check_update(
+        &self,
+        target: &AccelStruct,
+        tlas: &Tlas,
+        count: u32,
+        built: u32,
+        mode: BuildMode,
+        before: Before,
+    ) -> Result<bool> {
         if built > tlas.room {
             let message = format!(
                 "its {count} instances of split meshes stand for {built}, but there is room for {}; create it with a \
@@ -198,9 +206,8 @@ impl CommandBuffer {
             );
             return Err(Error::usage(&target.name, message));
         }
-        let (counts, refits) = self.last_update(target, tlas);
-        let same = counts == Some((count, built));
-        let refit = mode.refits(same && target.check_refit().is_ok(), refits);
+        let same = before.counts == Some((count, built));
+        let refit = mode.refits(same && target.allows_refit(), before.refits);
         if refit {
             target.check_refit()?;
         }
@@ -211,66 +218,109 @@ impl CommandBuffer {
         Ok(refit)
     }
 
-    /// Counts and refits of the last build before the next command.
-    fn last_update(&self, target: &AccelStruct, tlas: &Tlas) -> (Option<(u32, u32)>, u32) {
-        let of = |contents: &TlasContents| (contents.counts(), contents.refits);
-        self.own_update(target).map_or_else(|| of(&tlas.contents()), |update| of(&update.contents))
-    }
-
-    /// The last update recorded in this command buffer.
-    fn own_update(&self, target: &AccelStruct) -> Option<&TlasUpdate> {
-        self.tlas_updates.iter().rev().find(|update| update.target.id == target.id)
+    /// What is known of the structure before the next command; and what it shows, or nothing where some of that is gone or
+    /// has moved.
+    #[inline(always)]
+    fn before(&mut self, target: &AccelStruct, tlas: &Tlas) -> (Before, Arc<ShownSet>) {
+        if self.tlas_updates.is_new() {
+            self.tlas_updates = self.shared.spare_updates.take();
+        }
+        let revision = self.shared.accel_revision();
+        let of = |contents: &TlasContents, is_own| {
+            let before = Before { counts: contents.counts(), refits: contents.refits, is_own, revision };
+            (before, Arc::clone(&contents.shown), contents.revision == revision)
+        };
+        let (before, shown, stands) = match self.tlas_updates.last_of(target) {
+            Some(update) => of(&update.contents, true),
+            None => of(&tlas.contents(), false),
+        };
+        if stands || shown.stands(&|handle| self.shared.store.accel_structs.get(handle)) {
+            return (before, shown);
+        }
+        (before, Arc::default())
     }
 
     /// Records the build, and remembers what it shows.
+    #[inline(always)]
     fn record_tlas(
         &mut self,
-        target: &Arc<AccelStruct>,
+        target: Arc<AccelStruct>,
+        before: Before,
         ready: Ready,
         count: u32,
         refit: bool,
     ) -> Result<()> {
         let tlas = target.tlas()?;
-        let scratch = &target.sizes;
-        let build = Build {
-            target: Arc::clone(target),
-            raw: tlas.structure.as_ref().map_or(vk::AccelerationStructureKHR::null(), |of| of.raw),
-            input: BuildInput::tlas(target.flags, ready.address, ready.built_count),
+        let sizes = &target.sizes;
+        let scratch_bytes = if refit { sizes.update_scratch_bytes } else { sizes.build_scratch_bytes };
+        let records = tlas.records.get().filter(|_| ready.is_from_kernel);
+        let scratch = self.join_builds(scratch_bytes, !before.is_own, records.map(|records| &**records))?;
+        let build = TlasBuild {
+            flags: target.flags,
+            instances: ready.address,
+            count: ready.built_count,
             refit,
-            scratch_bytes: if refit { scratch.update_scratch_bytes } else { scratch.build_scratch_bytes },
-            reads: ready.reads,
+            target: tlas.structure.as_ref().map_or(vk::AccelerationStructureKHR::null(), |of| of.raw),
+            scratch,
         };
-        self.record_builds(&[build])?;
-        self.open_builds.push(OpenBuild::of_tlas(target));
+        // SAFETY: instances, structure and scratch memory are alive, checked, aligned and large enough; barriers keep them
+        // apart from other commands.
+        unsafe { build.record(self.shared.gpu.accel()?, self.raw()) };
+        self.refer(target.id, Access::Write);
         let Ready { built_count, shown, source, .. } = ready;
-        self.note_contents(target, count, built_count, shown, source, refit)
+        self.note_contents(target, before, After { count, built_count, shown, source, refit })
+    }
+
+    /// Scratch memory for a build of a top-level structure, behind the barriers it needs. There are none where the command
+    /// before was such a build too, of another structure, and there is memory left beside its own; then both may run at
+    /// once.
+    #[inline]
+    fn join_builds(&mut self, bytes: u64, may_join: bool, records: Option<&Buffer>) -> Result<u64> {
+        let alignment = self.shared.gpu.caps.limits.scratch_alignment.into();
+        if may_join
+            && records.is_none()
+            && let Some(scratch) = self.scratch_run.join(bytes, alignment)
+        {
+            return Ok(scratch);
+        }
+        let shared = &self.shared;
+        let own = &shared.scratch[self.recording.lane];
+        let (buffer, replaced) = own.get(&shared.gpu, bytes)?;
+        self.retire_replaced(replaced);
+        self.uses.id(own.id, Use::accel_build_write());
+        self.uses.accumulate(shared.all_tlas, Use::accel_build_write());
+        self.use_shown(Use::accel_read(Stages::ACCEL_BUILD));
+        if let Some(records) = records {
+            self.use_buffer(records, Use::accel_build_input());
+        }
+        self.flush();
+        let (start, end) =
+            (aligned_scratch_address(buffer.address, alignment), buffer.address + buffer.size_bytes);
+        self.scratch_run.begin(start, end, bytes, alignment);
+        Ok(start)
     }
 
     /// Tells shaders what is known of the structure, and remembers what it shows.
-    fn note_contents(
-        &mut self,
-        target: &Arc<AccelStruct>,
-        count: u32,
-        built_count: u32,
-        shown: Vec<Shown>,
-        source: Option<InstanceSource>,
-        refit: bool,
-    ) -> Result<()> {
-        // New ones may come from another queue.
-        shown.iter().for_each(|shown| self.refer(shown.blas.id, Access::Read));
+    #[inline(always)]
+    fn note_contents(&mut self, target: Arc<AccelStruct>, before: Before, after: After) -> Result<()> {
+        let After { count, built_count, shown, source, refit } = after;
+        if self.shared.gpu.queues.several_lanes() {
+            // New ones may come from another queue.
+            shown.list().iter().for_each(|shown| self.refer(shown.blas.id, Access::Read));
+        }
         let tlas = target.tlas()?;
         // At first the entry is that of the slot's last owner.
-        let is_first = self.last_update(target, tlas).0.is_none();
-        if is_first || tlas.rows.get().is_some() {
-            let mapped = shown.iter().any(Shown::has_rows);
-            let rows = tlas.rows.get().filter(|_| mapped).map_or(0, |rows| rows.address);
+        if before.counts.is_none() || tlas.rows.get().is_some() {
+            let rows = tlas.rows.get().filter(|_| shown.has_rows).map_or(0, |rows| rows.address);
             let software = tlas.software.as_ref().map_or(0, |software| software.body.address);
             self.write_tlas_table(tlas.slot, [rows, software]);
         }
-        let refits = if refit { self.last_update(target, tlas).1.saturating_add(1) } else { 0 };
-        let refits_submitted = refit && self.own_update(target).is_none();
-        let contents = TlasContents { instance_count: Some(count), built_count, shown, source, refits };
-        self.tlas_updates.push(TlasUpdate { target: Arc::clone(target), contents, refits_submitted });
+        let refits = if refit { before.refits.saturating_add(1) } else { 0 };
+        let refits_submitted = refit && !before.is_own;
+        let revision = before.revision;
+        let contents =
+            TlasContents { instance_count: Some(count), built_count, refits, shown, revision, source };
+        self.tlas_updates.push(TlasUpdate { target, contents, refits_submitted });
         Ok(())
     }
 

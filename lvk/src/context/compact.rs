@@ -157,6 +157,7 @@ impl Context {
         let body = BlasBody { structures, compacted_from, rebuildable: false };
         let replaced = self.before_next_submission(|cmd| {
             let Some(old) = blas.replace_body(body, copy.builds) else { return Ok(None) };
+            shared.note_moved();
             cmd.copy_compacted(target, &old, &blas.body())?;
             Ok(Some(old))
         })?;
@@ -172,7 +173,7 @@ impl Context {
 
     fn rewrite_outdated(&self) -> Result<()> {
         let outdated =
-            |object: &Arc<AccelStruct>| object.tlas().is_ok_and(|tlas| tlas.contents().is_outdated());
+            |object: &Arc<AccelStruct>| object.tlas().is_ok_and(|tlas| tlas.contents().shown.is_outdated());
         for object in self.shared().store.accel_structs.all().into_iter().filter(outdated) {
             self.before_next_submission(|cmd| cmd.rewrite_tlas(&object))?;
         }

@@ -14,6 +14,7 @@ use crate::accel::desc::{BlasDesc, TlasDesc};
 use crate::accel::flags::{AccelStructSizes, BuildMode};
 use crate::accel::instance_plan::InstancePlan;
 use crate::accel::raw_structure::RawStructure;
+use crate::accel::shown::Marks;
 use crate::accel::software::blas::SoftwareBlas;
 use crate::accel::software::body::SoftwareBody;
 use crate::accel::software::plan::GpuBuildPlan;
@@ -220,8 +221,7 @@ fn tlas_within(shared: &Shared, desc: &TlasDesc<'_>, slot: u32, limits: &PartLim
     desc.flags.check_tlas(name)?;
     let count = u32::try_from(desc.instances.len()).unwrap_or(u32::MAX);
     let capacity = desc.capacity.max(count);
-    let plan = InstancePlan::new(name, desc.instances, &|handle| shared.store.accel_structs.get(handle))?;
-    let average = u64::from(plan.built_count).div_ceil(u64::from(count.max(1)));
+    let average = u64::from(built_count(shared, desc)?).div_ceil(u64::from(count.max(1)));
     let room = u64::from(capacity) * average.max(desc.parts_per_instance.into());
     check_limit(name, "instance capacity", room, shared.gpu.caps.limits.max_tlas_instances)?;
     let room = u32::try_from(room).unwrap_or(u32::MAX);
@@ -236,6 +236,14 @@ fn tlas_within(shared: &Shared, desc: &TlasDesc<'_>, slot: u32, limits: &PartLim
     let sizes = software.as_ref().map_or(sizes, |software| sizes.join(software.sizes()));
     let tlas = Tlas::new(slot, capacity, room, structure, software);
     Ok(AccelStruct::new(name, desc.flags, sizes, AccelKind::Tlas(tlas)))
+}
+
+/// Instances Vulkan will be given.
+fn built_count(shared: &Shared, desc: &TlasDesc<'_>) -> Result<u32> {
+    let find = |handle| shared.store.accel_structs.get(handle);
+    let (known, mut marks) = (Arc::default(), Marks::default());
+    let plan = InstancePlan::new(desc.debug_name, desc.instances, known, &mut marks, Vec::new(), &find)?;
+    Ok(plan.built_count)
 }
 
 /// Room for what the device traces.

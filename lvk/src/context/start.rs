@@ -1,7 +1,7 @@
 //! Makes a context.
 
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, Mutex, OnceLock};
 
 use super::config::ContextDesc;
@@ -12,6 +12,7 @@ use super::{Context, Inner};
 use crate::accel::compaction::Compactions;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
+use crate::accel::tlas_updates::SpareUpdates;
 use crate::barrier::{QueryStages, ResourceId};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::bindless::{Bindless, YuvSlots};
@@ -130,6 +131,8 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         all_tlas: ResourceId::next(),
         tlas_tables: ResourceId::next(),
         outdated_tlas: AtomicBool::new(false),
+        moves: AtomicU64::new(0),
+        spare_updates: SpareUpdates::default(),
         freed_tlas: Mutex::default(),
         gpu,
     })

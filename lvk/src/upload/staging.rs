@@ -22,6 +22,32 @@ pub(crate) struct StagingRegion {
     pub(crate) page: usize,
 }
 
+/// A piece of a page that one command buffer cuts small regions from, without the lock. No other region overlaps it.
+#[derive(Default)]
+pub(crate) struct StagingChunk {
+    page: Option<(Arc<Buffer>, usize)>,
+    /// Where the next region may begin, in the page.
+    next: u64,
+    end: u64,
+}
+
+impl StagingChunk {
+    const BYTES: u64 = 4 << 10;
+    /// Larger regions are taken from pages.
+    const MOST_BYTES: u64 = Self::BYTES / 4;
+
+    /// A region at an address of this alignment, if the chunk has room for it.
+    #[inline]
+    fn cut(&mut self, bytes: u64, align: u64) -> Option<(StagingRegion, &Buffer)> {
+        let (buffer, page) = self.page.as_ref()?;
+        let address = (buffer.address + self.next).next_multiple_of(align);
+        let offset = address - buffer.address;
+        let end = offset.checked_add(bytes).filter(|end| *end <= self.end)?;
+        self.next = end;
+        Some((StagingRegion { buffer: buffer.raw, offset, address, page: *page }, buffer))
+    }
+}
+
 /// Pages of host-visible memory. A region lives until the command buffer it was taken for is done.
 pub(crate) struct Staging {
     state: Mutex<State>,
@@ -75,6 +101,33 @@ impl Staging {
         self.fill(bytes, align, Some(sequence), fill)
     }
 
+    /// As [`write_with`](Self::write_with), small regions from a chunk that belongs to the same command buffer.
+    #[inline]
+    pub(crate) fn write_in(
+        &self,
+        chunk: &mut StagingChunk,
+        bytes: u64,
+        align: u64,
+        sequence: u64,
+        fill: impl FnOnce(&mut [u8]),
+    ) -> Result<StagingRegion> {
+        if bytes > StagingChunk::MOST_BYTES || align > StagingChunk::MOST_BYTES {
+            return self.write_with(bytes, align, sequence, fill);
+        }
+        if let Some((region, buffer)) = chunk.cut(bytes, align.max(1)) {
+            // SAFETY: the region lies inside the chunk, and no other one cut from it overlaps it.
+            return unsafe { fill_region(region, bytes, buffer, fill) };
+        }
+        let (place, buffer) = self.place(StagingChunk::BYTES, Buffer::ALIGNMENT, Some(sequence))?;
+        let (next, end) = (place.offset, place.offset + StagingChunk::BYTES);
+        *chunk = StagingChunk { page: Some((buffer, place.page)), next, end };
+        match chunk.cut(bytes, align.max(1)) {
+            // SAFETY: as above.
+            Some((region, buffer)) => unsafe { fill_region(region, bytes, buffer, fill) },
+            None => Err(Error::usage("staging", "a new chunk has no room")),
+        }
+    }
+
     /// Copies `data` to where some command buffer will read it; see [`hold`](Self::hold).
     pub(crate) fn keep(&self, data: &[u8], align: u64) -> Result<StagingRegion> {
         self.fill(data.len() as u64, align, None, |region| region.copy_from_slice(data))
@@ -113,10 +166,9 @@ impl Staging {
         let (place, buffer) = self.place(room, align.min(Buffer::ALIGNMENT), sequence)?;
         let address = (buffer.address + place.offset).next_multiple_of(align.max(1));
         let offset = address - buffer.address;
-        let mapped = buffer.mapped().ok_or_else(|| Error::usage("staging", "the memory is not mapped"))?;
+        let region = StagingRegion { buffer: buffer.raw, offset, address, page: place.page };
         // SAFETY: `offset + bytes <= place.offset + room` lies inside the mapping, and no other region overlaps this one.
-        fill(unsafe { std::slice::from_raw_parts_mut(mapped.as_ptr().add(offset as usize), bytes as usize) });
-        Ok(StagingRegion { buffer: buffer.raw, offset, address, page: place.page })
+        unsafe { fill_region(region, bytes, &buffer, fill) }
     }
 
     /// A place, with the page it lies in.
@@ -142,6 +194,25 @@ impl Staging {
     fn lock(&self) -> Guard<'_, State> {
         self.state.lock()
     }
+}
+
+/// Has the bytes of a region written.
+///
+/// # Safety
+/// The region lies inside the mapping of its page, `buffer`, and nobody else has it.
+#[inline]
+unsafe fn fill_region(
+    region: StagingRegion,
+    bytes: u64,
+    buffer: &Buffer,
+    fill: impl FnOnce(&mut [u8]),
+) -> Result<StagingRegion> {
+    let mapped = buffer.mapped().ok_or_else(|| Error::usage("staging", "the memory is not mapped"))?;
+    // SAFETY: the caller's promise.
+    fill(unsafe {
+        std::slice::from_raw_parts_mut(mapped.as_ptr().add(region.offset as usize), bytes as usize)
+    });
+    Ok(region)
 }
 
 fn new_page(gpu: &Arc<Gpu>, bytes: u64) -> Result<Buffer> {

@@ -1,0 +1,120 @@
+//! What top-level structures show once a command buffer is submitted.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::AccelStruct;
+use super::shown::Marks;
+use super::tlas::TlasContents;
+use crate::error::{Error, Result};
+
+/// What a top-level structure shows once the command buffer is submitted.
+pub(crate) struct TlasUpdate {
+    pub(crate) target: Arc<AccelStruct>,
+    pub(crate) contents: TlasContents,
+    /// Moves what is shown when the command buffer is submitted, so that must have as many instances.
+    pub(crate) refits_submitted: bool,
+}
+
+impl TlasUpdate {
+    /// Fails if another submission changed the number of instances since the refit was recorded.
+    fn check(&self) -> Result<()> {
+        let tlas = self.target.tlas()?;
+        if !self.refits_submitted || tlas.contents().counts() == self.contents.counts() {
+            return Ok(());
+        }
+        let message =
+            "a refit was recorded, but a submission since then changed the number of instances; rebuild";
+        Err(Error::usage(&self.target.name, message))
+    }
+
+    /// Makes it so. Answers the structure, and what has to stay until the GPU is done with it: what was shown before,
+    /// unless that is still shown.
+    pub(crate) fn apply(self) -> (Arc<AccelStruct>, Option<TlasContents>) {
+        let Self { target, contents, .. } = self;
+        let Ok(tlas) = target.tlas() else { return (target, None) };
+        let mut place = tlas.contents();
+        let shows_the_same = Arc::ptr_eq(&place.shown, &contents.shown);
+        let before = std::mem::replace(&mut *place, contents);
+        drop(place);
+        let garbage = (!shows_the_same || before.source.is_some()).then_some(before);
+        (target, garbage)
+    }
+}
+
+/// The updates of one command buffer in their order, with memory that is used again.
+#[derive(Default)]
+pub(crate) struct TlasUpdates {
+    list: Vec<TlasUpdate>,
+    /// A bit for each target, which several may share.
+    targets: u64,
+    pub(crate) marks: Marks,
+    /// The place of what each instance refers to.
+    pub(crate) refers: Vec<u32>,
+}
+
+impl TlasUpdates {
+    const ROOM: usize = 8;
+
+    /// The last one of a structure.
+    #[inline]
+    pub(crate) fn last_of(&self, target: &AccelStruct) -> Option<&TlasUpdate> {
+        if self.targets & bit(target) == 0 {
+            return None;
+        }
+        self.list.iter().rev().find(|update| update.target.id == target.id)
+    }
+
+    #[inline]
+    pub(crate) fn push(&mut self, update: TlasUpdate) {
+        if self.list.capacity() == 0 {
+            self.list.reserve(Self::ROOM);
+        }
+        self.targets |= bit(&update.target);
+        self.list.push(update);
+    }
+
+    /// Whether nothing was ever recorded here, so that memory may be taken over from others.
+    #[inline]
+    pub(crate) fn is_new(&self) -> bool {
+        self.list.capacity() == 0
+    }
+
+    /// Fails if what was recorded no longer fits what was submitted since.
+    pub(crate) fn check(&self) -> Result<()> {
+        self.list.iter().try_for_each(TlasUpdate::check)
+    }
+
+    /// Takes them all, and keeps the memory.
+    pub(crate) fn drain(&mut self) -> impl Iterator<Item = TlasUpdate> + '_ {
+        self.targets = 0;
+        self.list.drain(..)
+    }
+}
+
+/// Identities are consecutive, so few structures share a bit.
+#[inline]
+fn bit(target: &AccelStruct) -> u64 {
+    1 << (target.id.0 % 64)
+}
+
+/// Lists that no command buffer has at the moment.
+#[derive(Default)]
+pub(crate) struct SpareUpdates(Mutex<Vec<TlasUpdates>>);
+
+impl SpareUpdates {
+    /// More than this are let go, and so are lists for more instances.
+    const MOST: usize = 8;
+    const MOST_INSTANCES: usize = 1 << 16;
+
+    pub(crate) fn take(&self) -> TlasUpdates {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
+    }
+
+    pub(crate) fn give(&self, updates: TlasUpdates) {
+        let mut spare = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if !updates.is_new() && spare.len() < Self::MOST && updates.refers.capacity() <= Self::MOST_INSTANCES
+        {
+            spare.push(updates);
+        }
+    }
+}
