@@ -9,14 +9,40 @@ const STEEPNESS: f32 = 2.0;
 
 impl Texture {
     /// Reads an image of directions (red to the right, green up, blue off the surface; 0 to 255 for -1 to 1), or of heights,
-    /// from which directions are made. `map_bump` of MTL files names both.
+    /// from which directions are made. `map_bump` of MTL files names both, and tools differ in whether green points up or down:
+    /// what fits together as slopes of one surface counts.
     ///
     /// # Errors
     /// As [`read`](Self::read).
     pub(super) fn read_relief(path: &Path) -> Result<Self, String> {
         let image = Self::read(path)?;
-        Ok(if shows_directions(&image) { image } else { directions_of_heights(&image) })
+        Ok(if shows_directions(&image) { with_green_up(image) } else { directions_of_heights(&image) })
     }
+}
+
+/// The image with green turned round where it points down.
+fn with_green_up(mut image: Texture) -> Texture {
+    if rise_of_green(&image) < 0.0 {
+        image.pixels.iter_mut().skip(1).step_by(4).for_each(|green| *green = 255 - *green);
+    }
+    image
+}
+
+/// Above 0 where green points up, below 0 where it points down: a surface's slope to the right changes upwards as its slope
+/// upwards changes to the right.
+fn rise_of_green(image: &Texture) -> f32 {
+    let [width, height] = [image.width as usize, image.height as usize];
+    let texels = image.pixels.as_chunks::<4>().0;
+    let slope = |x: usize, y: usize, channel: usize| {
+        let [across, off] = [channel, 2].map(|c| f32::from(texels[y * width + x][c]) / 127.5 - 1.0);
+        if off > 0.2 { across / off } else { 0.0 }
+    };
+    let change = |x: usize, y: usize| {
+        let upwards = slope(x, y - 1, 0) - slope(x, y + 1, 0);
+        upwards * (slope(x + 1, y, 1) - slope(x - 1, y, 1))
+    };
+    let inside = (1..height.max(2) - 1).flat_map(|y| (1..width.max(2) - 1).map(move |x| (x, y)));
+    inside.map(|(x, y)| change(x, y)).sum()
 }
 
 /// Whether most of an image are directions of about unit length off the surface. Black, which some images have where nothing
@@ -79,6 +105,22 @@ mod tests {
     fn a_level_surface_points_straight_up() {
         let level = directions_of_heights(&image(2, &[[77; 3]; 4]));
         assert_eq!(level.pixels, [128, 128, 255, 255].repeat(4));
+    }
+
+    /// A hill, by directions of both kinds.
+    #[test]
+    fn green_comes_to_point_up() {
+        let hill = |i: i32| {
+            let (x, y) = (i % 16 - 8, i / 16 - 8);
+            [(255.0 * (-0.05 * (x * x + y * y) as f32).exp()) as u8; 3]
+        };
+        let up = directions_of_heights(&image(16, &(0..256).map(hill).collect::<Vec<_>>()));
+        let mut down = up.clone();
+        down.pixels.iter_mut().skip(1).step_by(4).for_each(|green| *green = 255 - *green);
+        assert!(rise_of_green(&up) > 1.0 && rise_of_green(&down) < -1.0);
+        assert_eq!((with_green_up(up.clone()), with_green_up(down)), (up.clone(), up));
+        let even = image(3, &[[192, 90, 226]; 9]);
+        assert_eq!(with_green_up(even.clone()), even, "nothing tells");
     }
 
     /// A wall along each axis: left and below of it surfaces look away from it.
