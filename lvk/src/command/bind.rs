@@ -1,6 +1,6 @@
 //! The bindless set, pipelines and push constants of a command buffer.
 
-use std::ops::RangeInclusive;
+use std::ops::Range;
 use std::sync::Arc;
 
 use ash::vk;
@@ -15,17 +15,15 @@ pub(super) struct PushConstants {
     pushed: u64,
     /// The bytes themselves, for the library to push again what it overwrote.
     bytes: [u8; Self::MOST_BYTES],
-    /// How many of them, from the first on.
-    length: usize,
     wanted: Option<(Arc<str>, u32)>,
-    /// How many bytes make up the whole block of the last bound pipeline, padding included; none where it has none.
-    whole: RangeInclusive<u32>,
+    /// How many bytes make up the whole block of the last bound pipeline, padding included that the layout has; none where it
+    /// has none.
+    whole: Range<u32>,
 }
 
 impl Default for PushConstants {
     fn default() -> Self {
-        let bytes = [0; Self::MOST_BYTES];
-        Self { pushed: 0, bytes, length: 0, wanted: None, whole: Self::NOTHING }
+        Self { pushed: 0, bytes: [0; Self::MOST_BYTES], wanted: None, whole: 0..0 }
     }
 }
 
@@ -36,19 +34,17 @@ impl PushConstants {
     /// Rust structs end on their alignment, GLSL blocks on their last member; 16 bytes is the largest alignment.
     const TAIL_BYTES: u32 = 16;
 
-    #[expect(clippy::reversed_empty_ranges, reason = "no number is in it")]
-    const NOTHING: RangeInclusive<u32> = 1..=0;
-
-    /// A pipeline with a block of so many bytes is bound.
-    fn want(&mut self, pipeline: &Arc<str>, expected: u32) {
+    /// A pipeline with a block of so many bytes is bound, of a layout with so many.
+    fn want(&mut self, pipeline: &Arc<str>, expected: u32, room: u32) {
         self.wanted = Some((Arc::clone(pipeline), expected));
-        let whole = expected..=expected.next_multiple_of(Self::TAIL_BYTES);
-        self.whole = if expected > 0 { whole } else { Self::NOTHING };
+        let most = expected.next_multiple_of(Self::TAIL_BYTES).min(room);
+        self.whole = if expected > 0 { expected..most + 1 } else { 0..0 };
     }
 
     /// Everything pushed so far, zero where nothing was.
     pub(super) fn pushed_bytes(&self) -> &[u8] {
-        &self.bytes[..self.length]
+        let words = u64::BITS - self.pushed.leading_zeros();
+        &self.bytes[..4 * words as usize]
     }
 
     #[inline]
@@ -56,8 +52,11 @@ impl PushConstants {
         let start = offset as usize;
         let Some(kept) = self.bytes.get_mut(start..start + bytes.len()) else { return };
         kept.copy_from_slice(bytes);
-        self.length = self.length.max(start + bytes.len());
-        self.pushed |= words(offset, bytes.len() as u32);
+        // Written only where it changes: draws ask for it right away.
+        let words = words(offset, bytes.len() as u32);
+        if self.pushed & words != words {
+            self.pushed |= words;
+        }
     }
 
     fn check(&self, offset: u32, size: u32) -> Result<()> {
@@ -90,15 +89,19 @@ impl PushConstants {
     }
 
     /// Fails if the pipeline reads bytes that were never pushed.
+    #[inline]
     fn check_pushed(&self, pipeline: &str, expected: u32) -> Result<()> {
         let needed = words(0, expected);
-        if self.pushed & needed == needed {
-            return Ok(());
-        }
-        let pushed = 4 * (self.pushed & needed).count_ones();
+        if self.pushed & needed == needed { Ok(()) } else { Err(self.missing(pipeline, expected)) }
+    }
+
+    /// Says how many bytes the pipeline reads and how many of them were pushed.
+    #[cold]
+    fn missing(&self, pipeline: &str, expected: u32) -> Error {
+        let pushed = 4 * (self.pushed & words(0, expected)).count_ones();
         let message =
             format!("its shaders read {expected} bytes of push constants, but {pushed} were pushed");
-        Err(Error::usage(pipeline, message))
+        Error::usage(pipeline, message)
     }
 }
 
@@ -110,35 +113,33 @@ impl CommandBuffer {
     pub fn push_constants<T: bytemuck::NoUninit>(&mut self, constants: &T) -> Result<()> {
         let bytes = bytemuck::bytes_of(constants);
         let size = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
-        if !self.push_constants.whole.contains(&size) || !size.is_multiple_of(4) {
-            self.push_constants.check_whole(bytes.len())?;
-            self.push_constants.check(0, size)?;
+        if self.push_constants.whole.contains(&size) && size.is_multiple_of(4) {
+            self.record_push(0, bytes);
+            return Ok(());
         }
-        self.record_push(0, bytes);
-        Ok(())
+        self.push_unlike_whole(bytes)
+    }
+
+    /// Pushes bytes that are not as many as the bound pipeline's block has, or says what is wrong with them.
+    #[cold]
+    fn push_unlike_whole(&mut self, bytes: &[u8]) -> Result<()> {
+        self.push_constants.check_whole(bytes.len())?;
+        self.push_constant_bytes(0, bytes)
     }
 
     /// Sets part of the push constants: `bytes` from `offset` on, both multiples of 4.
     pub fn push_constant_bytes(&mut self, offset: u32, bytes: &[u8]) -> Result<()> {
         let size = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
         self.push_constants.check(offset, size)?;
-        self.record_push(offset, bytes);
+        let room = self.shared.layout.push_constant_bytes.saturating_sub(offset) as usize;
+        self.record_push(offset, &bytes[..bytes.len().min(room)]);
         Ok(())
     }
 
-    /// Inlined where the caller knows how many bytes there are, which then need no call to be copied.
+    /// Pushes bytes that the layout has. Inlined where the caller knows how many there are, which then need no call to be
+    /// copied.
     #[inline]
     fn record_push(&mut self, offset: u32, bytes: &[u8]) {
-        let room = self.shared.layout.push_constant_bytes.saturating_sub(offset) as usize;
-        if bytes.len() <= room {
-            self.record_push_within(offset, bytes);
-        } else {
-            self.record_push_within(offset, &bytes[..room]);
-        }
-    }
-
-    #[inline]
-    fn record_push_within(&mut self, offset: u32, bytes: &[u8]) {
         let shared = &self.shared;
         // SAFETY: the layout is alive and the range lies inside its push constants.
         unsafe {
@@ -166,17 +167,24 @@ impl CommandBuffer {
                 self.sets_bound.push(point);
             }
         }
-        self.push_constants.want(name, push_constant_bytes);
+        self.push_constants.want(name, push_constant_bytes, self.shared.layout.push_constant_bytes);
     }
 
     /// Whether all these were pushed; see [`words`].
+    #[inline]
     pub(super) fn has_pushed(&self, needed: u64) -> bool {
         self.push_constants.pushed & needed == needed
     }
 
     /// Fails if a pipeline about to run reads bytes that were never pushed.
+    #[inline]
     pub(super) fn check_pushed(&self, pipeline: &str, expected: u32) -> Result<()> {
         self.push_constants.check_pushed(pipeline, expected)
+    }
+
+    /// Says which of them were never pushed.
+    pub(super) fn missing_constants(&self, pipeline: &str, expected: u32) -> Error {
+        self.push_constants.missing(pipeline, expected)
     }
 }
 

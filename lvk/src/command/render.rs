@@ -328,6 +328,7 @@ impl<'a> RenderPass<'a> {
     }
 
     /// Fails unless a pipeline with a vertex shader is bound with all it reads.
+    #[inline]
     pub(super) fn check_draw(&mut self) -> Result<()> {
         self.hazards.drawn = true;
         match &self.draws {
@@ -337,24 +338,27 @@ impl<'a> RenderPass<'a> {
             {
                 Ok(())
             }
-            _ => self.explain_draw(),
+            _ => Err(self.refuse_draw()),
         }
     }
 
     /// What is missing for a draw.
     #[cold]
-    fn explain_draw(&self) -> Result<()> {
-        let pipeline = self.bound("draw")?;
+    fn refuse_draw(&self) -> Error {
+        let pipeline = match self.bound("draw") {
+            Ok(pipeline) => pipeline,
+            Err(nothing_bound) => return nothing_bound,
+        };
         if pipeline.front_end != FrontEnd::Vertex {
             let message = "it has a mesh shader; draw with draw_mesh_tasks or draw_mesh_tasks_indirect";
-            return Err(Error::usage(&*pipeline.name, message));
+            return Error::usage(&*pipeline.name, message);
         }
         let needed = (1_u32 << pipeline.vertex_binding_count) - 1;
         if self.vertex_slots & needed != needed {
             let message = format!("it reads {} vertex buffers; bind them all", pipeline.vertex_binding_count);
-            return Err(Error::usage(&*pipeline.name, message));
+            return Error::usage(&*pipeline.name, message);
         }
-        self.cmd.check_pushed(&pipeline.name, pipeline.push_constant_bytes)
+        self.cmd.missing_constants(&pipeline.name, pipeline.push_constant_bytes)
     }
 
     /// Fails unless a pipeline with a mesh shader is bound with all it reads.
