@@ -87,7 +87,7 @@ impl Stages {
     pub(crate) const COUNT: usize = 12;
 
     /// The accesses that a single stage can perform; Vulkan forbids masks that name any other.
-    pub(crate) fn possible_access(self) -> Access {
+    pub(crate) const fn possible_access(self) -> Access {
         const SHADER: Access = Access::SHADER_READ.union(Access::SHADER_WRITE).union(Access::ACCEL_READ);
         const ACCEL: Access = Access::SHADER_READ
             .union(Access::INDIRECT_READ)
@@ -96,14 +96,14 @@ impl Stages {
             .union(Access::TRANSFER_READ)
             .union(Access::TRANSFER_WRITE);
         match self {
-            Self::HOST => Access::HOST_READ | Access::HOST_WRITE,
-            Self::TRANSFER => Access::TRANSFER_READ | Access::TRANSFER_WRITE,
+            Self::HOST => Access::HOST_READ.union(Access::HOST_WRITE),
+            Self::TRANSFER => Access::TRANSFER_READ.union(Access::TRANSFER_WRITE),
             Self::DRAW_INDIRECT => Access::INDIRECT_READ,
-            Self::VERTEX_INPUT => Access::INDEX_READ | Access::VERTEX_READ,
+            Self::VERTEX_INPUT => Access::INDEX_READ.union(Access::VERTEX_READ),
             Self::PRE_RASTER | Self::COMPUTE | Self::RAY_TRACING => SHADER,
-            Self::FRAGMENT => SHADER | Access::INPUT_READ,
-            Self::DEPTH => Access::DEPTH_READ | Access::DEPTH_WRITE,
-            Self::COLOR => Access::COLOR_READ | Access::COLOR_WRITE,
+            Self::FRAGMENT => SHADER.union(Access::INPUT_READ),
+            Self::DEPTH => Access::DEPTH_READ.union(Access::DEPTH_WRITE),
+            Self::COLOR => Access::COLOR_READ.union(Access::COLOR_WRITE),
             Self::ACCEL_BUILD => ACCEL,
             Self::SHADING_RATE => Access::SHADING_RATE_READ,
             _ => Access::empty(),
@@ -111,10 +111,32 @@ impl Stages {
     }
 
     /// Position of a single stage in a table of [`Stages::COUNT`] rows.
+    #[cfg(test)]
     fn row(self) -> usize {
         (self.bits().trailing_zeros() as usize).min(Self::COUNT - 1)
     }
+
+    /// The rows of all of them, in rising order.
+    fn rows(self) -> impl Iterator<Item = usize> {
+        let mut left = self.bits();
+        std::iter::from_fn(move || {
+            let row = left.trailing_zeros() as usize;
+            left &= left.wrapping_sub(1);
+            (row < Self::COUNT).then_some(row)
+        })
+    }
 }
+
+/// What each single stage can perform, by its row.
+const POSSIBLE: [Access; Stages::COUNT] = {
+    let mut possible = [Access::empty(); Stages::COUNT];
+    let mut row = 0;
+    while row < Stages::COUNT {
+        possible[row] = Stages::from_bits_retain(1 << row).possible_access();
+        row += 1;
+    }
+    possible
+};
 
 /// Image layouts that the library uses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -264,7 +286,7 @@ impl Use {
     /// What of it the given stages do.
     pub(crate) fn limited_to(self, stages: Stages) -> Self {
         let stages = self.stages & stages;
-        let possible = stages.iter().fold(Access::empty(), |all, stage| all | stage.possible_access());
+        let possible = stages.rows().fold(Access::empty(), |all, row| all | POSSIBLE[row]);
         Self { stages, access: self.access & possible, ..self }
     }
 
@@ -319,9 +341,10 @@ pub(crate) struct StageAccess([Access; Stages::COUNT]);
 
 impl StageAccess {
     /// Adds what `touch` does at each of its stages.
+    #[inline(never)]
     pub(crate) fn insert(&mut self, touch: Use) {
-        for stage in touch.stages.iter() {
-            self.0[stage.row()] |= touch.access & stage.possible_access();
+        for row in touch.stages.rows() {
+            self.0[row] |= touch.access & POSSIBLE[row];
         }
     }
 
@@ -331,13 +354,15 @@ impl StageAccess {
     }
 
     /// Accesses of a single stage.
+    #[cfg(test)]
     pub(crate) fn at(&self, stage: Stages) -> Access {
         self.0[stage.row()]
     }
 
     /// Stages with at least one access.
     pub(crate) fn stages(&self) -> Stages {
-        Stages::all().iter().filter(|stage| !self.at(*stage).is_empty()).collect()
+        let bit = |(row, access): (usize, &Access)| u16::from(!access.is_empty()) << row;
+        Stages::from_bits_retain(self.0.iter().enumerate().map(bit).fold(0, |all, bit| all | bit))
     }
 
     /// Accesses of all stages together.

@@ -54,11 +54,13 @@ pub(crate) struct Barriers {
 
 impl Barriers {
     /// Whether there is nothing to record.
+    #[inline]
     pub(crate) fn is_empty(&self) -> bool {
         self.memory.is_none() && self.images.is_empty()
     }
 
     /// Empties the batch but keeps its memory.
+    #[inline]
     pub(crate) fn clear(&mut self) {
         self.memory = None;
         self.images.clear();

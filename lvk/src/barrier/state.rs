@@ -97,6 +97,18 @@ impl State {
         stages.contains(self.write.stages) && access.contains(self.write.access)
     }
 
+    /// Whether a use writes, or changes the layout, so that others have to wait for it.
+    #[inline]
+    pub(crate) fn is_changed_by(&self, next: Use) -> bool {
+        next.is_write() || (next.layout != Layout::Undefined && next.layout != self.layout)
+    }
+
+    /// Adds a read in the current layout.
+    #[inline(never)]
+    pub(crate) fn read_by(&mut self, next: Use) -> Option<Scopes> {
+        self.read(&next.into())
+    }
+
     /// Adds reads in the current layout; a barrier is needed for those that do not see the last write yet.
     pub(crate) fn read(&mut self, reads: &StageAccess) -> Option<Scopes> {
         let src = self.flushed_write();
@@ -134,20 +146,25 @@ impl State {
         if seen.is_empty() { self.write } else { Scope::waiting(seen) }
     }
 
+    /// A use that waits for everything before it.
     #[inline]
-    fn overwrite(&mut self, next: Use) -> Option<Scopes> {
+    pub(crate) fn overwrite(&mut self, next: Use) -> Option<Scopes> {
         let src = self.unfinished();
         let new_layout = if next.layout == Layout::Undefined { self.layout } else { next.layout };
         let needed = !src.stages.is_empty() || new_layout != self.layout;
         let dst = Scope { stages: next.stages, access: next.access };
         let scopes = self.scopes(src, dst, new_layout);
         let write = Scope { stages: next.stages, access: next.access & Access::WRITES };
-        let reads = !next.is_write();
+        // One by one, so that no state is put together elsewhere and moved here.
         self.layout = new_layout;
         self.write = write;
-        self.readers = if reads { next.stages } else { Stages::empty() };
-        self.visible = if reads { next.into() } else { StageAccess::default() };
+        self.readers = Stages::empty();
+        self.visible = StageAccess::default();
         self.epoch = None;
+        if !next.is_write() {
+            self.readers = next.stages;
+            self.visible.insert(next);
+        }
         needed.then_some(scopes)
     }
 
@@ -206,8 +223,7 @@ impl State {
 /// `next.layout` of [`Layout::Undefined`] asks for no layout.
 #[inline]
 pub(crate) fn transition(state: &mut State, next: Use) -> Option<Scopes> {
-    let relayout = next.layout != Layout::Undefined && next.layout != state.layout;
-    if relayout || next.is_write() { state.overwrite(next) } else { state.read(&next.into()) }
+    if state.is_changed_by(next) { state.overwrite(next) } else { state.read_by(next) }
 }
 
 /// Advances `state` by some of several writes that touch disjoint parts of the resource, so that they need not wait for
@@ -221,7 +237,7 @@ pub(crate) fn accumulate(state: &mut State, writes: &StageAccess) -> Option<Scop
 
 /// Where one stage is enough to wait for or to chain through, the last one holds up the least.
 fn last_of(stages: Stages) -> Stages {
-    stages.iter().last().unwrap_or_default()
+    Stages::from_bits_retain(stages.bits().checked_ilog2().map_or(0, |last| 1 << last))
 }
 
 #[cfg(test)]

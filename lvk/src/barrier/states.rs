@@ -27,8 +27,8 @@ impl States {
         for (id, local) in local.textures() {
             let fresh = || Cells::new(local.shape(), State::default());
             let queue = self.textures.entry(*id).or_insert_with(fresh);
-            if let (Some(local), Some((whole, state))) = (local.uniform(), queue.whole(local.shape().whole()))
-            {
+            let whole = local.shape().whole();
+            if let (Some(local), Some(state)) = (local.uniform(), queue.whole(whole)) {
                 if let Some(scopes) = settle(state, local) {
                     out.push_image(*id, whole, &scopes);
                 }

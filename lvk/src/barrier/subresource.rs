@@ -13,6 +13,7 @@ pub(crate) struct TextureShape {
 
 impl TextureShape {
     /// All mips of all layers.
+    #[inline]
     pub(crate) fn whole(self) -> Subresources {
         Subresources { base_mip: 0, mip_count: self.mips, base_layer: 0, layer_count: self.layers }
     }
@@ -106,30 +107,39 @@ fn common((a, a_count): (u32, u32), (b, b_count): (u32, u32)) -> Option<(u32, u3
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Cells<T> {
     shape: TextureShape,
-    /// One value for all, or one for each subresource, layer by layer.
-    values: Vec<T>,
+    values: Values<T>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+enum Values<T> {
+    /// One for all.
+    Same(T),
+    /// One for each subresource, layer by layer; not all are equal.
+    Each(Vec<T>),
 }
 
 impl<T: Copy + PartialEq> Cells<T> {
     /// The same value everywhere. A shape of zero counts as one.
     pub(crate) fn new(shape: TextureShape, value: T) -> Self {
         let shape = TextureShape { mips: shape.mips.max(1), layers: shape.layers.max(1) };
-        Self { shape, values: vec![value] }
+        Self { shape, values: Values::Same(value) }
     }
 
     /// A value for each mip and layer.
     pub(crate) fn from_fn(shape: TextureShape, value: impl Fn(u32, u32) -> T) -> Self {
         let mut cells = Self::new(shape, value(0, 0));
-        cells.values = positions(cells.shape.whole()).map(|(mip, layer)| value(mip, layer)).collect();
-        cells.join();
+        let each = positions(cells.shape.whole()).map(|(mip, layer)| value(mip, layer)).collect();
+        cells.values = Values::of(each);
         cells
     }
 
     /// Another value for each of them.
     pub(crate) fn map<U: Copy + PartialEq>(&self, value: impl Fn(&T) -> U) -> Cells<U> {
-        let mut cells = Cells { shape: self.shape, values: self.values.iter().map(value).collect() };
-        cells.join();
-        cells
+        let values = match &self.values {
+            Values::Same(same) => Values::Same(value(same)),
+            Values::Each(each) => Values::of(each.iter().map(value).collect()),
+        };
+        Cells { shape: self.shape, values }
     }
 
     /// Parts of one value each.
@@ -150,12 +160,18 @@ impl<T: Copy + PartialEq> Cells<T> {
 
     /// The value all subresources share, if they do.
     pub(crate) fn uniform(&self) -> Option<&T> {
-        if self.values.len() == 1 { self.values.first() } else { None }
+        match &self.values {
+            Values::Same(value) => Some(value),
+            Values::Each(_) => None,
+        }
     }
 
     /// Value of one subresource; positions outside the texture read its last one.
     pub(crate) fn at(&self, mip: u32, layer: u32) -> &T {
-        &self.values[self.index(mip, layer)]
+        match &self.values {
+            Values::Same(value) => value,
+            Values::Each(each) => &each[index(self.shape, mip, layer)],
+        }
     }
 
     /// Whether `test` holds for any subresource in `range`.
@@ -174,18 +190,18 @@ impl<T: Copy + PartialEq> Cells<T> {
         range: Subresources,
         mut step: impl FnMut(&mut T) -> Option<Scopes>,
     ) -> Vec<(Subresources, Scopes)> {
+        let (whole, range) = (self.shape.whole(), self.shape.clamp(range));
         match self.whole(range) {
-            Some((whole, value)) => step(value).map(|scopes| (whole, scopes)).into_iter().collect(),
+            Some(value) => step(value).map(|scopes| (whole, scopes)).into_iter().collect(),
             None => self.step_each(range, |value, _, _| step(value)),
         }
     }
 
-    /// The one value of all subresources, where `range` has them all.
+    /// The one value of all subresources, where `range` names them all and no others.
     #[inline]
-    pub(crate) fn whole(&mut self, range: Subresources) -> Option<(Subresources, &mut T)> {
-        let whole = self.shape.whole();
-        match self.values.as_mut_slice() {
-            [value] if self.shape.clamp(range) == whole => Some((whole, value)),
+    pub(crate) fn whole(&mut self, range: Subresources) -> Option<&mut T> {
+        match &mut self.values {
+            Values::Same(value) if range == self.shape.whole() => Some(value),
             _ => None,
         }
     }
@@ -196,40 +212,41 @@ impl<T: Copy + PartialEq> Cells<T> {
         range: Subresources,
         mut step: impl FnMut(&mut T, u32, u32) -> Option<Scopes>,
     ) -> Vec<(Subresources, Scopes)> {
-        let range = self.shape.clamp(range);
+        let (shape, range) = (self.shape, self.shape.clamp(range));
         if range.is_empty() {
             return Vec::new();
         }
-        self.split();
+        let mut each = self.split();
         let mut runs = Vec::new();
         for (mip, layer) in positions(range) {
-            let index = self.index(mip, layer);
-            if let Some(scopes) = step(&mut self.values[index], mip, layer) {
+            if let Some(scopes) = step(&mut each[index(shape, mip, layer)], mip, layer) {
                 push_single(&mut runs, mip, layer, scopes);
             }
         }
-        self.join();
+        self.values = Values::of(each);
         join_layers(runs)
     }
 
-    /// Gives every subresource a value of its own.
-    fn split(&mut self) {
-        if let Some(&value) = self.uniform() {
-            let count = self.shape.mips as usize * self.shape.layers as usize;
-            self.values = vec![value; count];
+    /// A value for every subresource.
+    fn split(&mut self) -> Vec<T> {
+        match &mut self.values {
+            Values::Same(value) => vec![*value; self.shape.mips as usize * self.shape.layers as usize],
+            Values::Each(each) => std::mem::take(each),
         }
     }
+}
 
-    fn join(&mut self) {
-        if self.values.windows(2).all(|pair| pair[0] == pair[1]) {
-            self.values.truncate(1);
-        }
+impl<T: Copy + PartialEq> Values<T> {
+    /// As one where all are equal. There is at least one.
+    fn of(each: Vec<T>) -> Self {
+        if each.windows(2).all(|pair| pair[0] == pair[1]) { Self::Same(each[0]) } else { Self::Each(each) }
     }
+}
 
-    fn index(&self, mip: u32, layer: u32) -> usize {
-        let index = layer as usize * self.shape.mips as usize + mip as usize;
-        index.min(self.values.len() - 1)
-    }
+/// Where the value of a subresource stands; positions outside the texture mean its last one.
+fn index(shape: TextureShape, mip: u32, layer: u32) -> usize {
+    let (mips, layers) = (shape.mips as usize, shape.layers as usize);
+    (layer as usize * mips + mip as usize).min(mips * layers - 1)
 }
 
 fn positions(range: Subresources) -> impl Iterator<Item = (u32, u32)> {

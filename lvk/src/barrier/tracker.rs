@@ -3,7 +3,7 @@
 use super::access::{Layout, StageAccess, Stages, Use};
 use super::batch::Barriers;
 use super::resource_id::{IdMap, ResourceId};
-use super::state::{Scopes, State, accumulate, transition};
+use super::state::{Scopes, State, accumulate};
 use super::subresource::{Cells, Subresources, TextureShape};
 
 /// How a command buffer uses a (sub)resource before anything in it must wait for anything else in it.
@@ -52,21 +52,40 @@ pub(super) struct Local {
 }
 
 impl Local {
-    #[inline]
-    fn step(&mut self, next: Use) -> Option<Scopes> {
-        match &mut self.prefix {
+    /// Adds a use; `wait` gets the barrier in front of it, if one is needed. That is called from two places, so that a barrier is
+    /// told in registers.
+    #[inline(always)]
+    fn step(&mut self, next: Use, wait: impl FnMut(Scopes)) {
+        match &self.prefix {
             Prefix::Unused => self.begin(next),
-            Prefix::Reads(layout, reads)
-                if !self.past_prefix && !next.is_write() && *layout == next.layout =>
-            {
-                reads.insert(next);
+            Prefix::Reads(layout, _) if !self.past_prefix && !next.is_write() && *layout == next.layout => {
+                self.read_first(next);
             }
             _ => self.past_prefix = true,
         }
-        transition(&mut self.state, next)
+        if self.state.is_changed_by(next) {
+            self.state.overwrite(next).into_iter().for_each(wait);
+        } else {
+            self.state.read_by(next).into_iter().for_each(wait);
+        }
     }
 
-    #[inline]
+    /// As [`step`](Self::step), and answers the barrier.
+    fn barrier(&mut self, next: Use) -> Option<Scopes> {
+        let mut barrier = None;
+        self.step(next, |scopes| barrier = Some(scopes));
+        barrier
+    }
+
+    /// One more read that waits for nothing in the command buffer.
+    #[inline(never)]
+    fn read_first(&mut self, next: Use) {
+        if let Prefix::Reads(_, reads) = &mut self.prefix {
+            reads.insert(next);
+        }
+    }
+
+    #[inline(never)]
     fn begin(&mut self, next: Use) {
         self.state = State::untouched_in(next.layout);
         self.past_prefix = next.is_write();
@@ -95,26 +114,41 @@ impl Local {
     }
 }
 
+/// How many rows of a table are kept in reach; a power of two.
+const PLACES: usize = 8;
+
 /// Values in the order of their first use, found by id.
 #[derive(Debug, Clone)]
 struct Table<T> {
     rows: IdMap<usize>,
     values: Vec<(ResourceId, T)>,
+    /// Rows asked for lately, each at a place that follows from the id: commands use the same few resources again and again.
+    /// What stands in the row tells whether it is the one.
+    lately: [usize; PLACES],
 }
 
 impl<T> Table<T> {
-    #[inline]
     fn get(&self, id: ResourceId) -> Option<&T> {
         self.rows.get(&id).map(|&row| &self.values[row].1)
     }
 
     #[inline]
     fn entry(&mut self, id: ResourceId, fresh: impl FnOnce() -> T) -> &mut T {
-        let row = *self.rows.entry(id).or_insert_with(|| {
+        let place = id.0 as usize % PLACES;
+        let mut row = self.lately[place];
+        if self.values.get(row).is_none_or(|(known, _)| *known != id) {
+            row = self.look_up(id, fresh);
+            self.lately[place] = row;
+        }
+        &mut self.values[row].1
+    }
+
+    #[inline(never)]
+    fn look_up(&mut self, id: ResourceId, fresh: impl FnOnce() -> T) -> usize {
+        *self.rows.entry(id).or_insert_with(|| {
             self.values.push((id, fresh()));
             self.values.len() - 1
-        });
-        &mut self.values[row].1
+        })
     }
 
     fn clear(&mut self) {
@@ -125,7 +159,7 @@ impl<T> Table<T> {
 
 impl<T> Default for Table<T> {
     fn default() -> Self {
-        Self { rows: IdMap::default(), values: Vec::new() }
+        Self { rows: IdMap::default(), values: Vec::new(), lately: [0; PLACES] }
     }
 }
 
@@ -148,12 +182,10 @@ impl Tracker {
     }
 
     /// A command uses a buffer; adds the barrier that must stand in front of the command to `out`.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn use_buffer(&mut self, id: ResourceId, next: Use, out: &mut Barriers) {
         let next = next.with_layout(Layout::Undefined);
-        if let Some(scopes) = self.buffers.entry(id, Local::default).step(next) {
-            out.push_memory(&scopes);
-        }
+        self.buffers.entry(id, Local::default).step(next, |scopes| out.push_memory(&scopes));
     }
 
     /// A command writes a part of a resource that no other such command writes without a use in between, for example
@@ -168,7 +200,7 @@ impl Tracker {
     /// A command uses a part of a texture; adds the barriers that must stand in front of the command to `out`.
     ///
     /// `shape` is the same in every call for one texture; `subresources` outside of it are ignored.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn use_texture(
         &mut self,
         id: ResourceId,
@@ -177,31 +209,11 @@ impl Tracker {
         next: Use,
         out: &mut Barriers,
     ) {
-        if subresources == shape.whole() {
-            return self.use_whole_texture(id, shape, next, out);
-        }
         let next = with_some_layout(next);
         let cells = self.textures.entry(id, || Cells::new(shape, Local::default()));
-        for (range, scopes) in cells.step(subresources, |local| local.step(next)) {
-            out.push_image(id, range, &scopes);
-        }
-    }
-
-    /// By far the most frequent: no list of barriers is made.
-    fn use_whole_texture(&mut self, id: ResourceId, shape: TextureShape, next: Use, out: &mut Barriers) {
-        let next = with_some_layout(next);
-        let cells = self.textures.entry(id, || Cells::new(shape, Local::default()));
-        match cells.whole(shape.whole()) {
-            Some((whole, local)) => {
-                if let Some(scopes) = local.step(next) {
-                    out.push_image(id, whole, &scopes);
-                }
-            }
-            None => {
-                for (range, scopes) in cells.step(shape.whole(), |local| local.step(next)) {
-                    out.push_image(id, range, &scopes);
-                }
-            }
+        match cells.whole(subresources) {
+            Some(local) => local.step(next, |scopes| out.push_image(id, subresources, &scopes)),
+            None => use_each(id, cells, subresources, next, out),
         }
     }
 
@@ -307,9 +319,17 @@ fn positions(shape: TextureShape) -> impl Iterator<Item = (u32, u32)> {
     (0..shape.layers).flat_map(move |layer| (0..shape.mips).map(move |mip| (mip, layer)))
 }
 
+/// Uses a part of a texture whose parts differ, or come to differ: by far less frequent than all of it at once.
+#[inline(never)]
+fn use_each(id: ResourceId, cells: &mut Cells<Local>, part: Subresources, next: Use, out: &mut Barriers) {
+    for (range, scopes) in cells.step(part, |local| local.barrier(next)) {
+        out.push_image(id, range, &scopes);
+    }
+}
+
 fn would_wait(local: &Local, next: Use) -> bool {
     let mut after = *local;
-    after.step(next).is_some()
+    after.barrier(next).is_some()
 }
 
 /// A texture always needs a layout; one that every access allows stands in for none.

@@ -27,10 +27,7 @@ impl CommandBuffer {
     /// Runs `groups` workgroups along x, y and z (`vkCmdDispatch`).
     pub fn dispatch(&mut self, groups: [u32; 3], dependencies: &Dependencies<'_>) -> Result<()> {
         let pipeline = self.ready_compute()?;
-        let limits = self.shared.gpu.caps.limits.max_dispatch_groups;
-        for (count, limit) in groups.into_iter().zip(limits) {
-            check_limit(&pipeline.name, "workgroup count", count.into(), limit.into())?;
-        }
+        check_groups(&pipeline.name, groups, self.shared.gpu.caps.limits.max_dispatch_groups)?;
         let ray_query = pipeline.ray_query;
         self.flush_after(|cmd| cmd.use_compute(ray_query, dependencies))?;
         // SAFETY: a compute pipeline is bound and the counts are within the limits.
@@ -60,9 +57,11 @@ impl CommandBuffer {
         Ok(())
     }
 
+    #[inline]
     fn ready_compute(&self) -> Result<&ComputePipeline> {
-        let pipeline = self.compute.as_deref();
-        let pipeline = pipeline.ok_or_else(|| Error::usage("dispatch", "bind a compute pipeline first"))?;
+        let Some(pipeline) = self.compute.as_deref() else {
+            return Err(Error::usage("dispatch", "bind a compute pipeline first"));
+        };
         self.check_pushed(&pipeline.name, pipeline.push_constant_bytes)?;
         Ok(pipeline)
     }
@@ -73,6 +72,17 @@ impl CommandBuffer {
         }
         self.use_dependencies(dependencies, Stages::COMPUTE)
     }
+}
+
+/// Fails where there are more workgroups along an axis than the device takes.
+#[inline]
+fn check_groups(pipeline: &str, groups: [u32; 3], limits: [u32; 3]) -> Result<()> {
+    if groups.iter().zip(&limits).all(|(count, limit)| count <= limit) {
+        return Ok(());
+    }
+    let check =
+        |(count, limit): (u32, u32)| check_limit(pipeline, "workgroup count", count.into(), limit.into());
+    groups.into_iter().zip(limits).try_for_each(check)
 }
 
 /// Fails unless indirect arguments of `bytes` lie at `offset`.

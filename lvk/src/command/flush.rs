@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::resource::texture_desc::TextureUsage;
 use crate::resource::{Buffer, Texture};
 use crate::shared::Shared;
+use crate::submit::Recording;
 use crate::submit::emit::emit;
 
 impl CommandBuffer {
@@ -25,7 +26,8 @@ impl CommandBuffer {
         part: Subresources,
         next: Use,
     ) -> Result<()> {
-        self.uses.texture(texture, part, next)
+        let row = self.found_textures.row(texture);
+        self.uses.texture(&self.found_textures, row, part, next)
     }
 
     /// The next command's shaders trace rays in these stages.
@@ -45,24 +47,27 @@ impl CommandBuffer {
 
     /// The next command's shaders reach these in `stages`.
     pub(super) fn use_dependencies(&mut self, deps: &Dependencies<'_>, stages: Stages) -> Result<()> {
-        let store = &self.shared.store;
+        let (store, found) = (&self.shared.store, &mut self.found_textures);
         for handle in deps.sampled_images {
-            let texture = self.found_textures.get(&store.textures, *handle)?;
+            let row = found.find(&store.textures, *handle)?;
+            let texture = found.at(row);
             texture.check_usage(TextureUsage::SAMPLED)?;
-            self.uses.texture(texture, texture.range, Use::shader_read(stages))?;
+            self.uses.texture(found, row, texture.range, Use::shader_read(stages))?;
         }
         for handle in deps.storage_images {
-            let texture = self.found_textures.get(&store.textures, *handle)?;
+            let row = found.find(&store.textures, *handle)?;
+            let texture = found.at(row);
             texture.check_usage(TextureUsage::STORAGE)?;
-            self.uses.texture(texture, texture.stored_part, Use::shader_write(stages))?;
+            self.uses.texture(found, row, texture.stored_part, Use::shader_write(stages))?;
         }
+        let found = &mut self.found_buffers;
         for handle in deps.buffers {
-            let buffer = self.found_buffers.get(&store.buffers, *handle)?;
-            use_buffer(&mut self.uses, &mut self.host_reads, buffer, Use::shader_write(stages));
+            let row = found.find(&store.buffers, *handle)?;
+            use_buffer(&mut self.uses, &mut self.host_reads, found.at(row), Use::shader_write(stages));
         }
         for handle in deps.read_buffers {
-            let buffer = self.found_buffers.get(&store.buffers, *handle)?;
-            use_buffer(&mut self.uses, &mut self.host_reads, buffer, Use::shader_read(stages));
+            let row = found.find(&store.buffers, *handle)?;
+            use_buffer(&mut self.uses, &mut self.host_reads, found.at(row), Use::shader_read(stages));
         }
         for handle in deps.acceleration_structures {
             self.shared.store.accel_structs.get(*handle)?;
@@ -72,13 +77,14 @@ impl CommandBuffer {
     }
 
     /// Records the barriers in front of the next command.
+    #[inline]
     pub(super) fn flush(&mut self) {
         self.end_rendering();
         self.scratch_run.stop();
-        let recording = &mut *self.recording;
+        let Recording { commands, tracker, images, .. } = &mut *self.recording;
         self.barriers.clear();
-        self.uses.track(&mut recording.tracker, &mut recording.images, &mut self.barriers);
-        emit(&self.shared.gpu, recording.commands, &self.barriers, &recording.images);
+        self.uses.track(&self.found_textures, tracker, images, &mut self.barriers);
+        emit(&self.shared.gpu, *commands, &self.barriers, images);
     }
 
     /// In front of a command that runs shaders: makes what copies wrote readable, runs `gather`, then records the

@@ -1,41 +1,77 @@
-//! Objects that a command buffer has found lately, to find them again without the pool's lock.
+//! Objects that a command buffer has found so far, to find them again without the pool's lock.
 
 use std::sync::Arc;
 
-use crate::error::{Error, Result};
+use crate::barrier::{IdMap, ResourceId};
+use crate::error::Result;
 use crate::handle::Handle;
 use crate::store::Pool;
 
-/// How many are kept; a power of two.
+/// How many are kept in reach; a power of two.
 const PLACES: usize = 8;
 
-/// The last objects found, each at a place that follows from its handle.
+/// Every object that a command buffer has used, once, in a row of its own. Commands name rows, and count no references.
 ///
-/// Nothing is found here that the pool would not find: once anything was taken out of the pool, all is forgotten.
+/// Nothing is found here by its handle that the pool would not find: once anything was taken out of the pool, all handles are
+/// forgotten. The objects are not.
 pub(super) struct Found<H, T> {
-    places: [Option<(H, Arc<T>)>; PLACES],
-    /// How many objects had been taken out of the pool when the first of them was found.
+    objects: Vec<Arc<T>>,
+    /// Rows by where the object lies, which no other one does while it is held.
+    rows: IdMap<usize>,
+    /// Rows of the last handles, each at a place that follows from the handle.
+    places: [Option<(H, usize)>; PLACES],
+    /// How many objects had been taken out of the pool when the first of these was found.
     removals: u64,
 }
 
 impl<H: Handle, T> Found<H, T> {
-    /// The object of a handle.
-    pub(super) fn get(&mut self, pool: &Pool<H, T>, handle: H) -> Result<&Arc<T>> {
+    /// The row of the object of a handle.
+    #[inline]
+    pub(super) fn find(&mut self, pool: &Pool<H, T>, handle: H) -> Result<usize> {
+        match self.places[place_of(handle)] {
+            Some((known, row)) if known == handle && self.removals == pool.removals() => Ok(row),
+            _ => self.ask(pool, handle),
+        }
+    }
+
+    /// Finds by the pool.
+    #[inline(never)]
+    fn ask(&mut self, pool: &Pool<H, T>, handle: H) -> Result<usize> {
         let removals = pool.removals();
         if self.removals != removals {
-            *self = Self { removals, ..Self::default() };
+            self.places = [None; PLACES];
+            self.removals = removals;
         }
-        let place = &mut self.places[place_of(handle)];
-        if place.as_ref().is_none_or(|(known, _)| *known != handle) {
-            *place = Some((handle, pool.get(handle)?));
-        }
-        place.as_ref().map(|(_, object)| object).ok_or(Error::StaleHandle { kind: H::KIND })
+        let row = self.row(&pool.get(handle)?);
+        self.places[place_of(handle)] = Some((handle, row));
+        Ok(row)
+    }
+
+    /// The row of an object.
+    pub(super) fn row(&mut self, object: &Arc<T>) -> usize {
+        let place = ResourceId(Arc::as_ptr(object) as u64);
+        *self.rows.entry(place).or_insert_with(|| {
+            self.objects.push(Arc::clone(object));
+            self.objects.len() - 1
+        })
+    }
+
+    /// The objects of this row and those behind it.
+    #[inline]
+    pub(super) fn from(&self, row: usize) -> &[Arc<T>] {
+        &self.objects[row..]
+    }
+
+    /// The object of a row.
+    #[inline]
+    pub(super) fn at(&self, row: usize) -> &Arc<T> {
+        &self.objects[row]
     }
 }
 
-impl<H, T> Default for Found<H, T> {
+impl<H: Copy, T> Default for Found<H, T> {
     fn default() -> Self {
-        Self { places: std::array::from_fn(|_| None), removals: 0 }
+        Self { objects: Vec::new(), rows: IdMap::default(), places: [None; PLACES], removals: 0 }
     }
 }
 
@@ -66,7 +102,7 @@ mod tests {
                     0 => handles.push(pool.insert(handles.len() as u32)),
                     1 => drop(pool.remove(handle)),
                     _ => {
-                        let ours = found.get(&pool, handle).map(|object| **object).ok();
+                        let ours = found.find(&pool, handle).map(|row| **found.at(row)).ok();
                         prop_assert_eq!(ours, pool.get(handle).map(|object| *object).ok());
                     }
                 }

@@ -22,12 +22,28 @@ pub(super) struct PartUse<T> {
 impl<T: Clone> PartUses<T> {
     /// Adds a use. Fails with the owner of an earlier use of the same texels that excludes this one.
     #[inline]
-    pub(super) fn add(&mut self, new: PartUse<T>) -> Result<(), T> {
-        let overlaps = |old: &PartUse<T>| old.id == new.id && old.part.intersection(new.part).is_some();
-        let Some(place) = self.parts.iter().position(overlaps) else {
-            self.parts.push(new);
+    pub(super) fn add(&mut self, id: ResourceId, part: Subresources, next: Use, owner: T) -> Result<(), T> {
+        // Most commands use one image; what is written here and in the list at once need not wait in memory between.
+        if self.parts.is_empty() {
+            self.parts.push(PartUse { id, part, next, owner });
             return Ok(());
-        };
+        }
+        self.add_beside(PartUse { id, part, next, owner })
+    }
+
+    fn add_beside(&mut self, new: PartUse<T>) -> Result<(), T> {
+        let overlaps = |old: &PartUse<T>| old.id == new.id && old.part.intersection(new.part).is_some();
+        match self.parts.iter().position(overlaps) {
+            None => {
+                self.parts.push(new);
+                Ok(())
+            }
+            Some(place) => self.add_over(place, new),
+        }
+    }
+
+    /// Adds a use of texels of which the part at this place is the first to have some.
+    fn add_over(&mut self, place: usize, new: PartUse<T>) -> Result<(), T> {
         let first = &mut self.parts[place];
         if first.part == new.part {
             first.next = first.next.merge(new.next).ok_or_else(|| first.owner.clone())?;
@@ -52,6 +68,10 @@ impl<T: Clone> PartUses<T> {
         }
         self.parts.extend(rest.into_iter().map(|part| PartUse { part, ..new.clone() }));
         Ok(())
+    }
+
+    pub(super) fn is_empty(&self) -> bool {
+        self.parts.is_empty()
     }
 
     pub(super) fn iter(&self) -> impl Iterator<Item = &PartUse<T>> {
@@ -114,7 +134,7 @@ mod tests {
                 };
                 let keys: Vec<_> = cells(part).map(|(mip, layer)| (id, mip, layer)).collect();
                 let conflict = keys.iter().any(excluded);
-                let answer = found.add(PartUse { id: ResourceId(id), part, next, owner });
+                let answer = found.add(ResourceId(id), part, next, owner);
                 prop_assert_eq!(answer.is_err(), conflict);
                 if conflict {
                     return Ok(());
@@ -139,9 +159,8 @@ mod tests {
         let whole = Subresources { base_mip: 0, mip_count: 4, base_layer: 0, layer_count: 1 };
         let tail = Subresources { base_mip: 2, mip_count: 2, ..whole };
         let mut found = PartUses::default();
-        let use_of = |part, next, owner| PartUse { id: ResourceId(1), part, next, owner };
-        found.add(use_of(tail, Use::shader_write(Stages::COMPUTE), "tail")).unwrap();
-        let read = use_of(whole, Use::shader_read(Stages::COMPUTE), "whole");
-        assert_eq!(found.add(read), Err("tail"));
+        let id = ResourceId(1);
+        found.add(id, tail, Use::shader_write(Stages::COMPUTE), "tail").unwrap();
+        assert_eq!(found.add(id, whole, Use::shader_read(Stages::COMPUTE), "whole"), Err("tail"));
     }
 }

@@ -21,6 +21,7 @@ use crate::handle::{BufferHandle, RenderPipelineHandle};
 use crate::pipeline::{FrontEnd, RenderPipeline};
 use crate::resource::Buffer;
 use crate::resource::buffer::BufferUsage;
+use crate::submit::Recording;
 
 /// A render pass being recorded. It borrows the command buffer, so nothing but draws can be recorded until it is
 /// dropped, which ends the pass (`vkCmdEndRendering`).
@@ -391,7 +392,8 @@ impl<'a> RenderPass<'a> {
             return Err(Error::usage(name, message));
         }
         self.cmd.barriers.clear();
-        self.cmd.uses.track(&mut recording.tracker, &mut recording.images, &mut self.cmd.barriers);
+        let Recording { tracker, images, .. } = recording;
+        self.cmd.uses.track(&self.cmd.found_textures, tracker, images, &mut self.cmd.barriers);
         Ok(())
     }
 

@@ -107,14 +107,19 @@ impl CommandBuffer {
     }
 
     /// Ends the pass that is open, if any: everything but draws happens outside of passes.
+    #[inline]
     pub(super) fn end_rendering(&mut self) {
         if self.rendering {
-            self.end_pass_queries();
-            self.rendering = false;
-            self.views = 1;
-            // SAFETY: a pass was begun and has not been ended.
-            unsafe { self.shared.gpu.device.cmd_end_rendering(self.raw()) };
+            self.end_pass();
         }
+    }
+
+    fn end_pass(&mut self) {
+        self.end_pass_queries();
+        self.rendering = false;
+        self.views = 1;
+        // SAFETY: a pass was begun and has not been ended.
+        unsafe { self.shared.gpu.device.cmd_end_rendering(self.raw()) };
     }
 
     /// Buffers the pass depends on may also be its indices, vertices and indirect arguments.

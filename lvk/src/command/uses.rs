@@ -2,9 +2,11 @@
 
 use std::sync::Arc;
 
+use super::found::Found;
 use super::part_uses::{PartUse, PartUses};
 use crate::barrier::{Barriers, IdMap, ResourceId, Subresources, Tracker, Use};
 use crate::error::{Error, Result};
+use crate::handle::TextureHandle;
 use crate::resource::{Buffer, Texture};
 use crate::submit::emit::Images;
 
@@ -17,16 +19,15 @@ pub(crate) struct Uses {
     buffers: Vec<(ResourceId, Use)>,
     /// Where each of `buffers` is, once they are more than a few; empty before.
     places: IdMap<usize>,
-    /// Parts of images, with rows of `seen`.
+    /// Parts of images, with the rows of their textures.
     textures: PartUses<usize>,
     writers: Vec<(ResourceId, Use)>,
-    /// Every texture that a command has used so far, so that a command does not count references.
-    seen: Vec<Arc<Texture>>,
-    /// Rows of `seen` by where the texture lies, which nobody else does while it is held.
-    rows: IdMap<usize>,
-    /// How many of `seen` the images of the command buffer have.
+    /// How many of the textures found the images of the command buffer have.
     known_images: usize,
 }
+
+/// Textures that a command buffer has found.
+pub(super) type Textures = Found<TextureHandle, Texture>;
 
 impl Uses {
     /// The command uses a buffer, or what stands for one.
@@ -73,25 +74,17 @@ impl Uses {
         }
     }
 
-    /// The command uses a part of the image that a texture shows.
-    #[inline]
-    pub(crate) fn texture(&mut self, texture: &Arc<Texture>, part: Subresources, next: Use) -> Result<()> {
-        let new = PartUse { id: texture.image.id, part, next, owner: self.row(texture) };
-        self.textures.add(new).map_err(|other| conflict(texture, &self.seen[other]))
-    }
-
-    /// Where a texture is in the list of those seen.
-    #[inline]
-    fn row(&mut self, texture: &Arc<Texture>) -> usize {
-        let last = self.seen.len().wrapping_sub(1);
-        if self.seen.get(last).is_some_and(|last| Arc::ptr_eq(last, texture)) {
-            return last;
-        }
-        let place = ResourceId(Arc::as_ptr(texture) as u64);
-        *self.rows.entry(place).or_insert_with(|| {
-            self.seen.push(Arc::clone(texture));
-            self.seen.len() - 1
-        })
+    /// The command uses a part of the image that the texture of a row shows.
+    #[inline(always)]
+    pub(super) fn texture(
+        &mut self,
+        found: &Textures,
+        row: usize,
+        part: Subresources,
+        next: Use,
+    ) -> Result<()> {
+        let id = found.at(row).image.id;
+        self.textures.add(id, part, next, row).map_err(|other| conflict(found.at(row), found.at(other)))
     }
 
     /// Whether the command needs a barrier behind earlier commands of the same command buffer.
@@ -103,32 +96,60 @@ impl Uses {
 
     /// Tells the tracker, which adds the barriers to `out`.
     #[inline]
-    pub(crate) fn track(&mut self, tracker: &mut Tracker, images: &mut Images, out: &mut Barriers) {
-        // Read in place: what was just written is not yet in memory to be moved.
+    pub(super) fn track(
+        &mut self,
+        found: &Textures,
+        tracker: &mut Tracker,
+        images: &mut Images,
+        out: &mut Barriers,
+    ) {
+        if !(self.buffers.is_empty() && self.writers.is_empty()) {
+            self.track_buffers(tracker, out);
+        }
+        if !self.textures.is_empty() {
+            self.track_textures(found, tracker, images, out);
+        }
+    }
+
+    fn track_buffers(&mut self, tracker: &mut Tracker, out: &mut Barriers) {
         for (id, next) in &self.buffers {
             tracker.use_buffer(*id, *next, out);
         }
         for (id, write) in &self.writers {
             tracker.accumulate_buffer(*id, *write, out);
         }
-        for texture in &self.seen[self.known_images..] {
+        self.clear_buffers();
+    }
+
+    fn track_textures(
+        &mut self,
+        found: &Textures,
+        tracker: &mut Tracker,
+        images: &mut Images,
+        out: &mut Barriers,
+    ) {
+        for texture in found.from(self.known_images) {
             images.insert(texture.image.id, texture.image.for_barriers());
+            self.known_images += 1;
         }
-        self.known_images = self.seen.len();
         for PartUse { id, part, next, owner } in self.textures.iter() {
-            tracker.use_texture(*id, self.seen[*owner].image.shape, *part, *next, out);
+            tracker.use_texture(*id, found.at(*owner).image.shape, *part, *next, out);
         }
-        self.clear();
+        self.textures.clear();
     }
 
     /// Forgets a command that failed before it was recorded.
     pub(crate) fn clear(&mut self) {
+        self.clear_buffers();
+        self.textures.clear();
+    }
+
+    fn clear_buffers(&mut self) {
         self.buffers.clear();
+        self.writers.clear();
         if !self.places.is_empty() {
             self.places.clear();
         }
-        self.textures.clear();
-        self.writers.clear();
     }
 }
 

@@ -11,18 +11,54 @@ use crate::resource::image::BarrierImage;
 pub(crate) type Images = IdMap<BarrierImage>;
 
 /// Records the barriers, if there are any.
+#[inline]
 pub(crate) fn emit(gpu: &Gpu, commands: vk::CommandBuffer, barriers: &Barriers, images: &Images) {
-    if barriers.is_empty() {
+    match &barriers.memory {
+        None if barriers.images.is_empty() => {}
+        Some(memory) if barriers.images.is_empty() && is_whole(gpu, memory) => {
+            record(gpu, commands, &[memory_barrier(gpu, memory)], &[]);
+        }
+        memory => emit_all(gpu, commands, memory.as_ref(), &barriers.images, images),
+    }
+}
+
+fn emit_all(
+    gpu: &Gpu,
+    commands: vk::CommandBuffer,
+    memory: Option<&MemoryBarrier>,
+    barriers: &[ImageBarrier],
+    images: &Images,
+) {
+    let images: Vec<_> = barriers.iter().filter_map(|barrier| image_barrier(gpu, barrier, images)).collect();
+    match memory {
+        None => record(gpu, commands, &[], &images),
+        Some(memory) if is_whole(gpu, memory) => {
+            record(gpu, commands, &[memory_barrier(gpu, memory)], &images);
+        }
+        Some(memory) => {
+            let parts: Vec<_> = memory.without_ray_queries().map(|part| memory_barrier(gpu, &part)).collect();
+            record(gpu, commands, &parts, &images);
+        }
+    }
+}
+
+/// Whether one Vulkan barrier may name all of it.
+#[inline]
+fn is_whole(gpu: &Gpu, memory: &MemoryBarrier) -> bool {
+    gpu.caps.hardware_ray_query() || !memory.dst_access.contains(Access::ACCEL_READ)
+}
+
+#[inline]
+fn record(
+    gpu: &Gpu,
+    commands: vk::CommandBuffer,
+    memory: &[vk::MemoryBarrier2<'_>],
+    images: &[vk::ImageMemoryBarrier2<'_>],
+) {
+    if memory.is_empty() && images.is_empty() {
         return;
     }
-    let mut memory = [vk::MemoryBarrier2::default(); 2];
-    let count = memory_barriers(gpu, barriers.memory.as_ref(), &mut memory);
-    let images: Vec<_> =
-        barriers.images.iter().filter_map(|barrier| image_barrier(gpu, barrier, images)).collect();
-    if count == 0 && images.is_empty() {
-        return;
-    }
-    let info = vk::DependencyInfo::default().memory_barriers(&memory[..count]).image_memory_barriers(&images);
+    let info = vk::DependencyInfo::default().memory_barriers(memory).image_memory_barriers(images);
     // SAFETY: the command buffer is being recorded outside of a render pass, and the images are alive.
     unsafe { gpu.device.cmd_pipeline_barrier2(commands, &info) };
 }
@@ -72,22 +108,6 @@ pub(crate) fn emit_moves(
     unsafe { gpu.device.cmd_pipeline_barrier2(commands, &info) };
 }
 
-/// Writes the barrier, in two parts where one must not name all, and answers how many.
-#[inline]
-fn memory_barriers(
-    gpu: &Gpu,
-    barrier: Option<&MemoryBarrier>,
-    out: &mut [vk::MemoryBarrier2<'static>; 2],
-) -> usize {
-    let Some(barrier) = barrier else { return 0 };
-    if !barrier.dst_access.contains(Access::ACCEL_READ) || gpu.caps.hardware_ray_query() {
-        out[0] = memory_barrier(gpu, barrier);
-        return 1;
-    }
-    let parts = barrier.without_ray_queries().zip(&mut *out);
-    parts.map(|(part, place)| *place = memory_barrier(gpu, &part)).count()
-}
-
 #[inline]
 fn memory_barrier(gpu: &Gpu, barrier: &MemoryBarrier) -> vk::MemoryBarrier2<'static> {
     vk::MemoryBarrier2::default()
@@ -119,73 +139,97 @@ fn image_barrier(
 }
 
 /// Stages by their Vulkan names, in the order of their bits.
-const STAGES: [vk::PipelineStageFlags2; Stages::COUNT] = {
+const STAGES: [u64; Stages::COUNT] = {
     use vk::PipelineStageFlags2 as Raw;
     [
-        Raw::HOST,
-        Raw::ALL_TRANSFER,
-        Raw::DRAW_INDIRECT,
-        Raw::VERTEX_INPUT,
-        Raw::PRE_RASTERIZATION_SHADERS,
-        Raw::FRAGMENT_SHADER,
-        Raw::from_raw(Raw::EARLY_FRAGMENT_TESTS.as_raw() | Raw::LATE_FRAGMENT_TESTS.as_raw()),
-        Raw::COLOR_ATTACHMENT_OUTPUT,
-        Raw::COMPUTE_SHADER,
-        Raw::RAY_TRACING_SHADER_KHR,
-        Raw::ACCELERATION_STRUCTURE_BUILD_KHR,
-        Raw::FRAGMENT_SHADING_RATE_ATTACHMENT_KHR,
+        Raw::HOST.as_raw(),
+        Raw::ALL_TRANSFER.as_raw(),
+        Raw::DRAW_INDIRECT.as_raw(),
+        Raw::VERTEX_INPUT.as_raw(),
+        Raw::PRE_RASTERIZATION_SHADERS.as_raw(),
+        Raw::FRAGMENT_SHADER.as_raw(),
+        Raw::EARLY_FRAGMENT_TESTS.as_raw() | Raw::LATE_FRAGMENT_TESTS.as_raw(),
+        Raw::COLOR_ATTACHMENT_OUTPUT.as_raw(),
+        Raw::COMPUTE_SHADER.as_raw(),
+        Raw::RAY_TRACING_SHADER_KHR.as_raw(),
+        Raw::ACCELERATION_STRUCTURE_BUILD_KHR.as_raw(),
+        Raw::FRAGMENT_SHADING_RATE_ATTACHMENT_KHR.as_raw(),
     ]
 };
 
 /// Accesses by their Vulkan names, in the order of their bits.
-const ACCESSES: [vk::AccessFlags2; 17] = {
+const ACCESSES: [u64; 17] = {
     use vk::AccessFlags2 as Raw;
     [
-        Raw::INDIRECT_COMMAND_READ,
-        Raw::INDEX_READ,
-        Raw::VERTEX_ATTRIBUTE_READ,
-        Raw::SHADER_READ,
-        Raw::SHADER_WRITE,
-        Raw::COLOR_ATTACHMENT_READ,
-        Raw::COLOR_ATTACHMENT_WRITE,
-        Raw::DEPTH_STENCIL_ATTACHMENT_READ,
-        Raw::DEPTH_STENCIL_ATTACHMENT_WRITE,
-        Raw::TRANSFER_READ,
-        Raw::TRANSFER_WRITE,
-        Raw::ACCELERATION_STRUCTURE_READ_KHR,
-        Raw::ACCELERATION_STRUCTURE_WRITE_KHR,
-        Raw::HOST_READ,
-        Raw::HOST_WRITE,
-        Raw::INPUT_ATTACHMENT_READ,
-        Raw::FRAGMENT_SHADING_RATE_ATTACHMENT_READ_KHR,
+        Raw::INDIRECT_COMMAND_READ.as_raw(),
+        Raw::INDEX_READ.as_raw(),
+        Raw::VERTEX_ATTRIBUTE_READ.as_raw(),
+        Raw::SHADER_READ.as_raw(),
+        Raw::SHADER_WRITE.as_raw(),
+        Raw::COLOR_ATTACHMENT_READ.as_raw(),
+        Raw::COLOR_ATTACHMENT_WRITE.as_raw(),
+        Raw::DEPTH_STENCIL_ATTACHMENT_READ.as_raw(),
+        Raw::DEPTH_STENCIL_ATTACHMENT_WRITE.as_raw(),
+        Raw::TRANSFER_READ.as_raw(),
+        Raw::TRANSFER_WRITE.as_raw(),
+        Raw::ACCELERATION_STRUCTURE_READ_KHR.as_raw(),
+        Raw::ACCELERATION_STRUCTURE_WRITE_KHR.as_raw(),
+        Raw::HOST_READ.as_raw(),
+        Raw::HOST_WRITE.as_raw(),
+        Raw::INPUT_ATTACHMENT_READ.as_raw(),
+        Raw::FRAGMENT_SHADING_RATE_ATTACHMENT_READ_KHR.as_raw(),
     ]
 };
 
+/// Bits that are translated at once.
+const AT_ONCE: usize = 6;
+
+/// What each set of so many neighbouring bits is called in Vulkan.
+type Names<const N: usize> = [[u64; 1 << AT_ONCE]; N];
+
+static STAGE_NAMES: Names<2> = names(&STAGES);
+static ACCESS_NAMES: Names<3> = names(&ACCESSES);
+
+const fn names<const N: usize>(single: &[u64]) -> Names<N> {
+    let mut names = [[0; 1 << AT_ONCE]; N];
+    let mut bit = 0;
+    while bit < single.len() {
+        let mut set = 0;
+        while set < 1 << AT_ONCE {
+            if set >> (bit % AT_ONCE) & 1 == 1 {
+                names[bit / AT_ONCE][set] |= single[bit];
+            }
+            set += 1;
+        }
+        bit += 1;
+    }
+    names
+}
+
+#[inline]
+fn named<const N: usize>(names: &Names<N>, bits: u32) -> u64 {
+    let mut all = 0;
+    for (group, names) in names.iter().enumerate() {
+        all |= names[(bits >> (group * AT_ONCE)) as usize % names.len()];
+    }
+    all
+}
+
 /// Stages by their Vulkan names, without those whose feature is off.
+#[inline]
 pub(super) fn stages(gpu: &Gpu, stages: Stages) -> vk::PipelineStageFlags2 {
     let mut off = Stages::empty();
     off.set(Stages::RAY_TRACING, gpu.ray_tracing.is_none());
     off.set(Stages::ACCEL_BUILD, gpu.accel.is_none());
-    let all = set_bits((stages - off).bits().into(), &STAGES);
-    all.fold(vk::PipelineStageFlags2::NONE, |all, raw| all | raw)
+    vk::PipelineStageFlags2::from_raw(named(&STAGE_NAMES, (stages - off).bits().into()))
 }
 
 /// Accesses by their Vulkan names, without those whose feature is off.
+#[inline]
 fn access(gpu: &Gpu, access: Access) -> vk::AccessFlags2 {
     let mut off = Access::empty();
     off.set(Access::ACCEL_READ | Access::ACCEL_WRITE, gpu.accel.is_none());
-    let all = set_bits((access - off).bits(), &ACCESSES);
-    all.fold(vk::AccessFlags2::NONE, |all, raw| all | raw)
-}
-
-/// What the table has for each bit that is set: mostly one or two.
-fn set_bits<T: Copy>(bits: u32, table: &[T]) -> impl Iterator<Item = T> {
-    let mut left = bits;
-    std::iter::from_fn(move || {
-        let place = left.trailing_zeros() as usize;
-        left &= left.wrapping_sub(1);
-        table.get(place).copied()
-    })
+    vk::AccessFlags2::from_raw(named(&ACCESS_NAMES, (access - off).bits()))
 }
 
 /// The layout of this name in Vulkan, where it can be that of an image of somebody else's.
@@ -216,6 +260,8 @@ pub(crate) fn layout(layout: Layout) -> vk::ImageLayout {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     #[test]
@@ -223,21 +269,33 @@ mod tests {
         use vk::{AccessFlags2, PipelineStageFlags2};
         assert_eq!(Stages::all().bits(), (1 << STAGES.len()) - 1);
         assert_eq!(Access::all().bits(), (1 << ACCESSES.len()) - 1);
-        let stage = |stages: Stages| set_bits(stages.bits().into(), &STAGES).collect::<Vec<_>>();
+        let stage = |stages: Stages| PipelineStageFlags2::from_raw(named(&STAGE_NAMES, stages.bits().into()));
         assert_eq!(
             stage(Stages::COMPUTE | Stages::HOST),
-            [PipelineStageFlags2::HOST, PipelineStageFlags2::COMPUTE_SHADER]
+            PipelineStageFlags2::HOST | PipelineStageFlags2::COMPUTE_SHADER
         );
-        assert_eq!(stage(Stages::COLOR), [PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT]);
-        assert_eq!(stage(Stages::ACCEL_BUILD), [PipelineStageFlags2::ACCELERATION_STRUCTURE_BUILD_KHR]);
-        let access = |access: Access| set_bits(access.bits(), &ACCESSES).collect::<Vec<_>>();
-        assert_eq!(access(Access::SHADER_WRITE), [AccessFlags2::SHADER_WRITE]);
-        assert_eq!(access(Access::DEPTH_WRITE), [AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE]);
-        assert_eq!(access(Access::ACCEL_READ), [AccessFlags2::ACCELERATION_STRUCTURE_READ_KHR]);
-        assert_eq!(access(Access::HOST_WRITE), [AccessFlags2::HOST_WRITE]);
-        assert_eq!(access(Access::INPUT_READ), [AccessFlags2::INPUT_ATTACHMENT_READ]);
+        assert_eq!(stage(Stages::COLOR), PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT);
+        assert_eq!(stage(Stages::ACCEL_BUILD), PipelineStageFlags2::ACCELERATION_STRUCTURE_BUILD_KHR);
+        let access = |access: Access| AccessFlags2::from_raw(named(&ACCESS_NAMES, access.bits()));
+        assert_eq!(access(Access::SHADER_WRITE), AccessFlags2::SHADER_WRITE);
+        assert_eq!(access(Access::DEPTH_WRITE), AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE);
+        assert_eq!(access(Access::ACCEL_READ), AccessFlags2::ACCELERATION_STRUCTURE_READ_KHR);
+        assert_eq!(access(Access::HOST_WRITE), AccessFlags2::HOST_WRITE);
+        assert_eq!(access(Access::INPUT_READ), AccessFlags2::INPUT_ATTACHMENT_READ);
         let rates = AccessFlags2::FRAGMENT_SHADING_RATE_ATTACHMENT_READ_KHR;
-        assert_eq!(access(Access::SHADING_RATE_READ), [rates]);
+        assert_eq!(access(Access::SHADING_RATE_READ), rates);
         assert!(access(Access::empty()).is_empty());
+    }
+
+    proptest! {
+        #[test]
+        fn a_mask_has_the_names_of_all_its_bits(bits in 0..1_u32 << ACCESSES.len()) {
+            let of = |single: &[u64]| {
+                let set = single.iter().enumerate().filter(|(bit, _)| bits >> bit & 1 == 1);
+                set.fold(0, |all, (_, name)| all | name)
+            };
+            prop_assert_eq!(named(&ACCESS_NAMES, bits), of(&ACCESSES));
+            prop_assert_eq!(named(&STAGE_NAMES, bits % (1 << STAGES.len())), of(&STAGES));
+        }
     }
 }

@@ -18,10 +18,14 @@ pub(in crate::command) enum Settle {
 
 impl CommandBuffer {
     /// Makes what copies touched readable by every shader and every input, with one barrier for all.
+    #[inline]
     pub(in crate::command) fn settle(&mut self) {
-        if self.settle.is_empty() {
-            return;
+        if !self.settle.is_empty() {
+            self.settle_all();
         }
+    }
+
+    fn settle_all(&mut self) {
         let lane = self.recording.lane;
         let Recording { tracker, images, commands, .. } = &mut *self.recording;
         self.barriers.clear();
