@@ -29,8 +29,8 @@ use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::shader::ShaderCache;
 use crate::software::tree_cache::TreeCache;
 use crate::store::Store;
-use crate::submit::Submitter;
 use crate::submit::profiler::Profiler;
+use crate::submit::{Finished, Submitter};
 use crate::swapchain::state::Swapchain;
 use crate::upload::{SpareBuffers, Staging};
 
@@ -160,7 +160,15 @@ impl Shared {
 
     /// Takes back what the GPU has finished with.
     pub(crate) fn collect(&self) -> Result<()> {
-        let finished = self.submitter.collect()?;
+        self.take_back(self.submitter.collect()?)
+    }
+
+    /// The same, as far as is known without asking the GPU: for who has just waited.
+    pub(crate) fn collect_known(&self) -> Result<()> {
+        self.take_back(self.submitter.collect_known())
+    }
+
+    fn take_back(&self, finished: Finished<Garbage>) -> Result<()> {
         for sequence in finished.sequences {
             self.staging.release(sequence);
         }

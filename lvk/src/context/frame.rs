@@ -58,7 +58,7 @@ impl Context {
         };
         self.shared().profiler.begin_frame(frame.number);
         self.shared().submitter.wait_for_lanes(&wait_for)?;
-        self.shared().collect()?;
+        self.shared().collect_known()?;
         self.advance_compactions();
         Ok(frame)
     }

@@ -103,7 +103,6 @@ impl Context {
             }
         }
         sent?;
-        shared.collect()?;
         Ok(self.submission(last))
     }
 
@@ -115,7 +114,11 @@ impl Context {
         let Some(cmd) = self.take_pending(&mut pending)? else {
             return Ok(self.submission(self.shared().submitter.last_of_lanes()[0]));
         };
-        self.send([cmd].into_iter(), Submission { has_prelude: true, ..Submission::default() })
+        let flushed =
+            self.send([cmd].into_iter(), Submission { has_prelude: true, ..Submission::default() })?;
+        // Command buffers that are acquired ask how far the GPU is; this one was not.
+        self.shared().collect()?;
+        Ok(flushed)
     }
 
     /// Waits until a submission is done (`vkWaitSemaphores`).
@@ -125,7 +128,7 @@ impl Context {
     pub fn wait(&self, submission: SubmitHandle) -> Result<()> {
         self.check_submitted(submission)?;
         self.shared().submitter.wait(submission.value)?;
-        self.shared().collect()
+        self.shared().collect_known()
     }
 
     /// Whether a submission is done. Does not wait.
@@ -144,7 +147,7 @@ impl Context {
     pub(super) fn wait_submitted(&self) -> Result<()> {
         let submitter = &self.shared().submitter;
         submitter.wait_for_lanes(&submitter.last_of_lanes())?;
-        self.shared().collect()
+        self.shared().collect_known()
     }
 
     /// Names the submission with this value of the timeline.

@@ -16,6 +16,6 @@ pub(crate) mod queue;
 pub(crate) mod scope_tree;
 pub(crate) mod timeline;
 
-pub(crate) use queue::{Recording, Submission, Submitter, Values};
+pub(crate) use queue::{Finished, Recording, Submission, Submitter, Values};
 pub use scope_tree::{GpuProfile, GpuScope};
 pub use timeline::SubmitHandle;

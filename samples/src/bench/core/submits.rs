@@ -15,20 +15,25 @@ const UPLOAD_BYTES: usize = 4096;
 pub(super) fn measure(ctx: &Context, amount: Amount) -> Result<Vec<Row>, BenchError> {
     let raw = RawCommands::new(&RawDevice::new(ctx))?;
     let count = (amount.many / 10).max(1);
-    let samples: [Vec<f64>; 2] = take_turns(amount.runs, |which| {
+    let samples: [Vec<f64>; 3] = take_turns(amount.runs, |which| {
         let start = Instant::now();
         for _ in 0..count {
             match which {
                 0 => ctx.wait(ctx.submit(ctx.acquire_command_buffer()?)?)?,
-                _ => raw.submit_empty()?,
+                1 => raw.submit_empty()?,
+                _ => raw.submit_empty_on_timeline()?,
             }
         }
         Ok(since(start) * 1e3 / f64::from(count))
     })?;
-    let [ours, other] = samples.map(|samples| median_of(&samples, |us| *us));
-    let what = "empty submission + wait".to_owned();
-    let empty = Row { what, ours, other: Some(other), unit: "us", limit: Limit::Ratio(1.0) };
-    Ok(vec![empty, uploads(ctx, amount)?])
+    let [ours, fence, timeline] = samples.map(|samples| median_of(&samples, |us| *us));
+    let row =
+        |what: &str, other, limit| Row { what: what.to_owned(), ours, other: Some(other), unit: "us", limit };
+    Ok(vec![
+        row("empty submission + wait, by hand with a fence", fence, Limit::Ratio(1.0)),
+        row("- by hand with a timeline semaphore", timeline, Limit::None),
+        uploads(ctx, amount)?,
+    ])
 }
 
 fn uploads(ctx: &Context, amount: Amount) -> Result<Row, BenchError> {

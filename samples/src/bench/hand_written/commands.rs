@@ -1,5 +1,6 @@
 //! A command buffer that is recorded, submitted and waited for, again and again, with its times.
 
+use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Instant;
 
@@ -14,6 +15,9 @@ pub(in crate::bench) struct RawCommands {
     pool: vk::CommandPool,
     commands: vk::CommandBuffer,
     fence: vk::Fence,
+    timeline: vk::Semaphore,
+    /// What the timeline has reached.
+    reached: Cell<u64>,
     queries: vk::QueryPool,
     device: Rc<RawDevice>,
 }
@@ -24,6 +28,8 @@ impl RawCommands {
             pool: vk::CommandPool::null(),
             commands: vk::CommandBuffer::null(),
             fence: vk::Fence::null(),
+            timeline: vk::Semaphore::null(),
+            reached: Cell::new(0),
             queries: vk::QueryPool::null(),
             device: Rc::clone(device),
         };
@@ -36,6 +42,8 @@ impl RawCommands {
         let pool = vk::CommandPoolCreateInfo::default()
             .flags(vk::CommandPoolCreateFlags::TRANSIENT)
             .queue_family_index(self.device.ctx.raw_queue_family());
+        let mut kind = vk::SemaphoreTypeCreateInfo::default().semaphore_type(vk::SemaphoreType::TIMELINE);
+        let timeline = vk::SemaphoreCreateInfo::default().push_next(&mut kind);
         let queries = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2);
         // SAFETY: the descriptions are valid; the queue family is that of the device.
         unsafe {
@@ -47,6 +55,8 @@ impl RawCommands {
             self.commands = allocated.map_err(BenchError::of("vkAllocateCommandBuffers"))?[0];
             let fence = vk::FenceCreateInfo::default();
             self.fence = device.create_fence(&fence, None).map_err(BenchError::of("vkCreateFence"))?;
+            let made = device.create_semaphore(&timeline, None);
+            self.timeline = made.map_err(BenchError::of("vkCreateSemaphore"))?;
             let made = device.create_query_pool(&queries, None);
             self.queries = made.map_err(BenchError::of("vkCreateQueryPool"))?;
         }
@@ -67,11 +77,27 @@ impl RawCommands {
         Ok(Timed { gpu: self.read()?, cpu, record, total })
     }
 
-    /// Submits nothing and waits for it.
+    /// Submits nothing and waits for it by a fence.
     pub(in crate::bench) fn submit_empty(&self) -> Result<(), BenchError> {
         self.begin_bare()?;
         self.submit()?;
         self.wait()
+    }
+
+    /// Submits nothing and waits for it by a timeline semaphore.
+    pub(in crate::bench) fn submit_empty_on_timeline(&self) -> Result<(), BenchError> {
+        let next = self.reached.get() + 1;
+        let signal = vk::SemaphoreSubmitInfo::default().semaphore(self.timeline).value(next);
+        let signals = [signal.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)];
+        let (semaphores, values) = ([self.timeline], [next]);
+        let wait = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
+        self.begin_bare()?;
+        self.submit_with(&signals, vk::Fence::null())?;
+        // SAFETY: the semaphore is a timeline, and its next value was submitted.
+        let waited = unsafe { self.device.device.wait_semaphores(&wait, u64::MAX) };
+        waited.map_err(BenchError::of("vkWaitSemaphores"))?;
+        self.reached.set(next);
+        Ok(())
     }
 
     fn begin(&self) -> Result<(), BenchError> {
@@ -106,13 +132,22 @@ impl RawCommands {
     }
 
     fn submit(&self) -> Result<(), BenchError> {
+        self.submit_with(&[], self.fence)
+    }
+
+    fn submit_with(
+        &self,
+        signals: &[vk::SemaphoreSubmitInfo<'_>],
+        fence: vk::Fence,
+    ) -> Result<(), BenchError> {
         let device = &self.device.device;
         let commands = [vk::CommandBufferSubmitInfo::default().command_buffer(self.commands)];
-        let submits = [vk::SubmitInfo2::default().command_buffer_infos(&commands)];
+        let submit = vk::SubmitInfo2::default().command_buffer_infos(&commands);
+        let submits = [submit.signal_semaphore_infos(signals)];
         // SAFETY: recording ends here; the fence is not signalled; the context holds the queue's lock for the call.
         unsafe {
             device.end_command_buffer(self.commands).map_err(BenchError::of("vkEndCommandBuffer"))?;
-            let submit = |queue| device.queue_submit2(queue, &submits, self.fence);
+            let submit = |queue| device.queue_submit2(queue, &submits, fence);
             self.device.ctx.with_raw_queue(submit).map_err(BenchError::of("vkQueueSubmit2"))
         }
     }
@@ -147,6 +182,7 @@ impl Drop for RawCommands {
         // SAFETY: the last submission was waited for; what was never made is null, which is allowed.
         unsafe {
             device.destroy_query_pool(self.queries, None);
+            device.destroy_semaphore(self.timeline, None);
             device.destroy_fence(self.fence, None);
             device.destroy_command_pool(self.pool, None);
         }
