@@ -2,9 +2,11 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use lvk::test_hooks::{EMPTY, GpuBlasDesc, Leaves, build_blas, place, refit};
-use lvk_tests::device;
+use lvk::{Dependencies, RayQueryRequest};
+use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::gpu_built::{boxes, build, check_contents, facts, input, numbered, scattered, triangles};
 use lvk_tests::wide_tree::wide_structure;
+use lvk_tests::{device, device_with};
 
 #[test]
 fn binary_nodes_follow_moved_triangles() {
@@ -59,6 +61,34 @@ fn triangles_that_are_lost_are_in_no_box() {
     ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&vec![[[f32::NAN; 3]; 3]; count])).unwrap();
     refit(&ctx, &[(&structure, &geometries)]).unwrap();
     assert_eq!(facts(&ctx, &structure).bounds, EMPTY);
+}
+
+/// What holds nothing has the box of [`EMPTY`], which rays in every direction miss, so that they visit nothing below it.
+#[test]
+fn no_ray_enters_an_empty_box() {
+    let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return };
+    let pipeline = compute_pipeline(
+        &ctx,
+        "#include <lvk/ray_query.glsl>
+         layout(local_size_x = 27) in;
+         layout(buffer_reference, scalar) writeonly buffer Entered { uint at[]; };
+         layout(push_constant, scalar) uniform Push { Entered entered; };
+         void main() {
+             uint i = gl_LocalInvocationIndex;
+             vec3 direction = vec3(uvec3(i, i / 3u, i / 9u) % 3u) - 1.0;
+             LvkSoftSlabs ray = lvkSoftSlabsOf(vec3(0.5), direction);
+             vec2 none = lvkSoftCross(ray, vec3(3.4e38), vec3(-3.4e38), vec2(0.0, 1e30));
+             vec2 around = lvkSoftCross(ray, vec3(0.0), vec3(1.0), vec2(0.0, 1e30));
+             entered.at[i] = uint(none.x <= none.y) + 2u * uint(around.x <= around.y);
+         }",
+    );
+    let entered = words_buffer(&ctx, &[9; 27]);
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.bind_compute_pipeline(*pipeline).unwrap();
+    cmd.push_constants(&ctx.buffer_address(*entered).unwrap()).unwrap();
+    cmd.dispatch([1; 3], &Dependencies { buffers: &[*entered], ..Default::default() }).unwrap();
+    ctx.submit(cmd).unwrap();
+    assert_eq!(read_words(&ctx, *entered, 27), [2; 27]);
 }
 
 #[test]

@@ -175,7 +175,7 @@ fn garbage_in_files_is_refused_or_harmless() -> Result<()> {
             }
             build(&ctx, *blas, BuildMode::Rebuild)?;
         }
-        eprintln!("{flags:?}: {accepted} of 40 are harmless");
+        assert!((1..40).contains(&accepted), "{flags:?}: {accepted} of 40 are harmless");
     }
     Ok(())
 }
@@ -384,7 +384,7 @@ fn rays_of_garbage_come_to_an_end() -> Result<()> {
         }
     }
     rays.extend([f32::NAN, -1.0].map(|t_max| Ray { t_max, ..Ray::new(Vec3::ZERO, Vec3::X) }));
-    rays.push(Ray { t_min: f32::NAN, ..Ray::new(Vec3::ZERO, Vec3::X) });
+    rays.extend([f32::NAN, -f32::NAN].map(|t_min| Ray { t_min, ..Ray::new(Vec3::ZERO, Vec3::X) }));
     let opaque = shapes();
     let mut glass = shapes();
     glass.iter_mut().for_each(|part| part.flags = GeometryFlags::empty());

@@ -96,7 +96,9 @@ impl CommandBuffer {
     /// Builds structures for the first time. Those of the library's own come ready from the CPU.
     pub(crate) fn build_first(&mut self, structures: &[Arc<AccelStruct>]) -> Result<()> {
         self.first_builds = true;
-        let built = self.build_form(structures, BuildMode::Rebuild, Self::build_software_first);
+        let built = self.build_form(structures, BuildMode::Rebuild, |cmd, structures, _| {
+            cmd.build_software_first(structures)
+        });
         self.first_builds = false;
         built
     }

@@ -80,7 +80,7 @@ impl CommandBuffer {
     }
 
     /// Builds structures on the GPU that have none yet; those that the CPU built are ready.
-    pub(super) fn build_software_first(&mut self, structures: &[Arc<AccelStruct>], _: &[bool]) -> Result<()> {
+    pub(super) fn build_software_first(&mut self, structures: &[Arc<AccelStruct>]) -> Result<()> {
         let is_of_gpu = |target: &&Arc<AccelStruct>| {
             let software = target.blas().ok().and_then(|blas| blas.software.as_ref());
             software.is_some_and(|software| matches!(software.origin, Origin::Gpu(_)))
@@ -92,7 +92,7 @@ impl CommandBuffer {
 
     /// As [`build_software_first`](Self::build_software_first), of one structure.
     pub(crate) fn build_software_of(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
-        self.build_software_first(std::slice::from_ref(target), &[false])
+        self.build_software_first(std::slice::from_ref(target))
     }
 
     /// Builds or refits what software traces of these structures.

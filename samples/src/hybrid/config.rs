@@ -193,8 +193,8 @@ impl RayPath {
         }
     }
 
-    /// The path to take: `wish`, or what is fastest: the pipeline where there is one, else the query; on a CPU queries in
-    /// software, if those are on.
+    /// The path to take: `wish`; else the pipeline where there is one, which scenes of all kinds do well by, else the query; on
+    /// a CPU queries in software, if those are on, which are faster there for every scene.
     ///
     /// # Errors
     /// [`HybridError::NoRayTracing`] and [`HybridError::PathMissing`] say what the device lacks.

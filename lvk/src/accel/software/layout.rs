@@ -14,9 +14,9 @@ pub(crate) const NONE: u32 = u32::MAX;
 pub(crate) const LEAF: u32 = 1 << 31;
 /// Most primitives of a leaf that a reference names.
 pub(crate) const LARGEST_LEAF: usize = 16;
-/// Most nodes on a path of a binary tree: the walk pushes a word for each.
+/// Most nodes on a path of a binary tree: the walk pushes an entry for each.
 pub(crate) const DEEPEST_BINARY: usize = 64;
-/// Most nodes on a path of a wide tree: the walk pushes two words for each.
+/// Most nodes on a path of a wide tree: the walk pushes an entry for each.
 pub(crate) const DEEPEST_WIDE: usize = 32;
 
 /// [`Header::format`]: nodes of eight compressed children.

@@ -34,13 +34,15 @@ float lvkSoftFirst(vec3 leave, float tMax) {
     return intBitsToFloat(min(min(min(all.x, all.y), all.z), floatBitsToInt(tMax)));
 }
 
-// Where the ray enters and leaves a box, of the range it has left.
+// Where the ray enters and leaves a box, of the range it has left. Which corner is near follows from the direction: a box that
+// holds nothing, whose low corner lies above the high one, is left before it is entered.
 vec2 lvkSoftCross(LvkSoftSlabs ray, vec3 low, vec3 high, vec2 range) {
     const float kLess = 1.0 - 5e-7, kMore = 1.0 + 5e-7;
     vec3 a = (low - ray.origin) * ray.inverse;
     vec3 b = (high - ray.origin) * ray.inverse;
-    vec3 near = min(a, b);
-    vec3 far = max(a, b);
+    bvec3 along = greaterThan(ray.inverse, vec3(0.0));
+    vec3 near = mix(b, a, along);
+    vec3 far = mix(a, b, along);
     return vec2(lvkSoftLast(near, range.x) * kLess, lvkSoftFirst(far, range.y) * kMore);
 }
 

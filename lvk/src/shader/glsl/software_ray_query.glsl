@@ -24,7 +24,9 @@ void lvkSoftInitialize(out LvkSoftState state, uint tlas, uint flags, uint mask,
     lvkSoftFinish(start);
     lvkSoftQueries += 1u;
     flags |= LVK_RAY_FLAGS_ALWAYS;
-    float from = intBitsToFloat(max(floatBitsToInt(tMin), 0)); // what is no number stays so: nothing is behind it
+    // What is no number stays so, whatever its sign: nothing is behind it.
+    bool isNumber = (floatBitsToUint(tMin) & 0x7FFFFFFFu) <= 0x7F800000u;
+    float from = intBitsToFloat(isNumber ? max(floatBitsToInt(tMin), 0) : 0x7FC00000);
     state = LvkSoftState(kLvkTlasTable.entry[tlas].software, origin, from, direction, flags, mask & 0xFFu,
                          lvkSoftQueries, false, start, none, none);
     if (state.tlas != uvec2(0u)) {
