@@ -1,0 +1,66 @@
+// Everything a query tells of its ray, of the closest hit and of the last candidate. Triangles with odd numbers are looked
+// through where they are not opaque. OPAQUE_ONLY is a module without candidates.
+#ifdef OPAQUE_ONLY
+#define LVK_OPAQUE_TRIANGLES_ONLY
+#endif
+#include <lvk/ray_query.glsl>
+#include "ray_records.glsl"
+
+layout(local_size_x = 64) in;
+
+struct Found {
+    HitRecord hit;
+    uint type;
+    uint sbtOffset;
+    vec3 objectOrigin;
+    vec3 objectDirection;
+    mat4x3 objectToWorld;
+    mat4x3 worldToObject;
+};
+
+struct Told {
+    uint flags;
+    float tMin;
+    vec3 origin;
+    vec3 direction;
+    Found committed;
+    Found candidate;
+};
+
+layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer AllTold {
+    Told at[];
+};
+
+#define FOUND(rq, which) \
+    Found(HitRecord(lvkRayQueryT(rq, which), lvkRayQueryBarycentrics(rq, which), \
+                    lvkRayQueryFrontFace(rq, which) ? kFront : kBack, \
+                    uint(lvkRayQueryInstanceId(rq, which, tlas)), uint(lvkRayQueryInstanceCustomIndex(rq, which)), \
+                    uint(lvkRayQueryGeometryIndex(rq, which)), uint(lvkRayQueryPrimitiveIndex(rq, which, tlas))), \
+          uint(lvkRayQueryType(rq, which)), uint(lvkRayQuerySbtOffset(rq, which)), \
+          lvkRayQueryObjectRayOrigin(rq, which), lvkRayQueryObjectRayDirection(rq, which), \
+          lvkRayQueryObjectToWorld(rq, which), lvkRayQueryWorldToObject(rq, which))
+
+void main() {
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= count) {
+        return;
+    }
+    Ray ray = rays.at[index];
+    Found none = Found(kNoHit, 0u, 0u, vec3(0.0), vec3(0.0), mat4x3(0.0), mat4x3(0.0));
+    Found committed = none;
+    Found candidate = none;
+    LvkRayQuery rq;
+    lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
+    while (lvkRayQueryProceed(rq)) {
+        candidate = FOUND(rq, LVK_CANDIDATE);
+        if ((candidate.hit.primitive & 1u) == 0u) {
+            lvkRayQueryConfirmIntersection(rq);
+        }
+    }
+    if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_TRIANGLE) {
+        committed = FOUND(rq, LVK_COMMITTED);
+    }
+    AllTold told = AllTold(hits);
+    told.at[index] = Told(lvkRayQueryFlags(rq), lvkRayQueryTMin(rq), lvkRayQueryWorldRayOrigin(rq),
+                          lvkRayQueryWorldRayDirection(rq), committed, candidate);
+}
