@@ -10,6 +10,16 @@ use lvk::{
 use crate::meshes::Mesh;
 use crate::reference::{self, Reference};
 
+/// Flags of builds in software: trees of the CPU and of the GPU, all kinds of leaves.
+pub const BUILD_FLAGS: [BuildFlags; 6] = [
+    BuildFlags::FAST_TRACE,
+    BuildFlags::FAST_BUILD,
+    BuildFlags::LOW_MEMORY,
+    BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE),
+    BuildFlags::LOW_MEMORY.union(BuildFlags::ALLOW_UPDATE),
+    BuildFlags::LOW_MEMORY.union(BuildFlags::FAST_BUILD),
+];
+
 /// How the vertices and indices of a geometry lie in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Layout {

@@ -1,7 +1,4 @@
-//! Ray queries that the library walks itself: on devices without ray tracing, beside those that have it, and at the seams
-//! of closed meshes.
-
-use std::collections::HashMap;
+//! Ray queries that the library walks itself: on devices without ray tracing, and beside those that have it.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
@@ -12,20 +9,10 @@ use lvk_tests::agreement::Agreement;
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
-use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances, upload_geometries};
+use lvk_tests::ray_scene::{BUILD_FLAGS, Layout, Part, Placed, RayScene, instances, upload_geometries};
 use lvk_tests::ray_tracer::{HitRecord, How, MISSED, Method, OPAQUE, RayTracer, shader};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::{TestDevice, device, device_with};
-
-/// Whatever the flags ask for: trees of the CPU and of the GPU, all kinds of leaves.
-const FLAGS: [BuildFlags; 6] = [
-    BuildFlags::FAST_TRACE,
-    BuildFlags::FAST_BUILD,
-    BuildFlags::LOW_MEMORY,
-    BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE),
-    BuildFlags::LOW_MEMORY.union(BuildFlags::ALLOW_UPDATE),
-    BuildFlags::LOW_MEMORY.union(BuildFlags::FAST_BUILD),
-];
 
 fn software() -> Option<TestDevice> {
     device_with(|desc| desc.ray_query = RayQueryRequest::Software)
@@ -77,7 +64,7 @@ fn bare_device(ray_query: RayQueryRequest) -> Option<TestDevice> {
 fn every_kind_of_build_is_hit_as_the_reference_says() -> Result<()> {
     let Some(ctx) = software() else { return Ok(()) };
     assert_eq!(ctx.capabilities().ray_query_path, RayQueryPath::Software);
-    FLAGS.into_iter().try_for_each(|flags| check_crowd(&ctx, flags, 3_000))
+    BUILD_FLAGS.into_iter().try_for_each(|flags| check_crowd(&ctx, flags, 3_000))
 }
 
 #[test]
@@ -86,7 +73,7 @@ fn a_device_without_structures_of_its_own_has_everything() -> Result<()> {
     let caps = ctx.capabilities();
     assert!(caps.ray_query && !caps.ray_tracing_pipeline && !caps.ray_query_reason.is_empty());
     assert_eq!(caps.ray_query_path, RayQueryPath::Software);
-    FLAGS.into_iter().try_for_each(|flags| check_crowd(&ctx, flags, 1_000))
+    BUILD_FLAGS.into_iter().try_for_each(|flags| check_crowd(&ctx, flags, 1_000))
 }
 
 #[test]
@@ -94,7 +81,7 @@ fn a_driver_without_ray_tracing_traces() {
     without_ray_tracing("a_driver_without_ray_tracing_traces", || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
         assert!(ctx.capabilities().device_name.contains("SwiftShader"));
-        for flags in FLAGS {
+        for flags in BUILD_FLAGS {
             if let Err(error) = check_crowd(&ctx, flags, 600) {
                 unreachable!("{flags:?}: {error}");
             }
@@ -138,168 +125,6 @@ fn modules_without_candidates_see_the_same() -> Result<()> {
         assert_eq!(found, missed(plain.trace(&gpu.tlas, &rays, opaque(How::shadows()))?), "{path:?}");
     }
     Ok(())
-}
-
-/// A closed mesh around the origin whose triangles share their vertices to the bit.
-fn closed_ball(rounds: u32) -> Mesh {
-    let t = (1.0 + 5.0_f32.sqrt()) / 2.0;
-    let corners = [(-1.0, t), (1.0, t), (-1.0, -t), (1.0, -t)];
-    let mut positions: Vec<Vec3> = Vec::new();
-    positions.extend(corners.map(|(a, b)| Vec3::new(a, b, 0.0)));
-    positions.extend(corners.map(|(a, b)| Vec3::new(0.0, a, b)));
-    positions.extend(corners.map(|(a, b)| Vec3::new(b, 0.0, a)));
-    positions.iter_mut().for_each(|position| *position = position.normalize());
-    let mut triangles = vec![
-        [0, 11, 5],
-        [0, 5, 1],
-        [0, 1, 7],
-        [0, 7, 10],
-        [0, 10, 11],
-        [1, 5, 9],
-        [5, 11, 4],
-        [11, 10, 2],
-        [10, 7, 6],
-        [7, 1, 8],
-        [3, 9, 4],
-        [3, 4, 2],
-        [3, 2, 6],
-        [3, 6, 8],
-        [3, 8, 9],
-        [4, 9, 5],
-        [2, 4, 11],
-        [6, 2, 10],
-        [8, 6, 7],
-        [9, 8, 1],
-    ];
-    for _ in 0..rounds {
-        let mut middles: HashMap<[u32; 2], u32> = HashMap::new();
-        let mut middle = |a: u32, b: u32| {
-            *middles.entry([a.min(b), a.max(b)]).or_insert_with(|| {
-                positions.push((positions[a as usize] + positions[b as usize]).normalize() * 0.999);
-                positions.len() as u32 - 1
-            })
-        };
-        let mut finer = Vec::with_capacity(triangles.len() * 4);
-        for [a, b, c] in triangles {
-            let (ab, bc, ca) = (middle(a, b), middle(b, c), middle(c, a));
-            finer.extend([[a, ab, ca], [b, bc, ab], [c, ca, bc], [ab, bc, ca]]);
-        }
-        triangles = finer;
-    }
-    Mesh { positions: positions.iter().map(|position| position.to_array()).collect(), triangles }
-}
-
-/// Rays from inside of one of the [`closed_meshes`] at its corners, along its edges' points, and anywhere.
-fn rays_at_seams(mesh: &Mesh, seed: u64, count: usize) -> Vec<Ray> {
-    let mut random = Random::new(seed);
-    let corner = |index: u32| Vec3::from(mesh.positions[index as usize]);
-    let mut ray = |number: usize| {
-        let [a, b, c] =
-            mesh.triangles[(random.between(0.0, 1.0) * 0.999 * mesh.triangles.len() as f32) as usize];
-        let share = random.between(0.0, 1.0);
-        let at = match number % 3 {
-            0 => corner(a),
-            1 => corner(a).lerp(corner(b), share),
-            _ => corner(a).lerp(corner(b), share).lerp(corner(c), random.between(0.0, 1.0)),
-        };
-        let [inside, ..] = mesh.triangles[number % mesh.triangles.len()];
-        let from = match number % 5 {
-            0 => Vec3::ZERO,
-            _ => corner(inside) * random.between(0.0, 0.8),
-        };
-        Ray::new(from, at - from)
-    };
-    (0..count).map(&mut ray).collect()
-}
-
-/// Closed meshes whose surface every ray from the origin meets once: an even one, one of thin triangles that all meet at
-/// two poles, one of very different triangles, and one a thousand times as wide as it is thick.
-fn closed_meshes() -> [(&'static str, Mesh); 4] {
-    let spike = |number, at| if number % 5 == 0 { at * 4.0 } else { at };
-    [
-        ("ball", closed_ball(4)),
-        ("spindle", spindle(600)),
-        ("spikes", moved(closed_ball(3), spike)),
-        ("flake", moved(closed_ball(4), |_, at| at * Vec3::new(1.0, 1e-3, 1.0))),
-    ]
-}
-
-/// Triangles around an axis, as thin as there are many.
-fn spindle(sides: u32) -> Mesh {
-    let angle = |side: u32| side as f32 / sides as f32 * std::f32::consts::TAU;
-    let rim = (0..sides).map(|side| [angle(side).cos(), angle(side).sin(), 0.0]);
-    let next = |side: u32| (side + 1) % sides;
-    let triangles = (0..sides).flat_map(|side| [[side, next(side), sides], [next(side), side, sides + 1]]);
-    Mesh {
-        triangles: triangles.collect(),
-        positions: rim.chain([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]).collect(),
-    }
-}
-
-/// The mesh with every corner elsewhere, so that it stays closed.
-fn moved(mut mesh: Mesh, place: impl Fn(usize, Vec3) -> Vec3) -> Mesh {
-    for (number, position) in mesh.positions.iter_mut().enumerate() {
-        *position = place(number, Vec3::from(*position)).to_array();
-    }
-    mesh
-}
-
-/// How many of `count` rays from inside leave a closed mesh without a hit, as it is and turned and stretched.
-fn leaks(ctx: &Context, tracer: &RayTracer, mesh: &Mesh, count: usize, flags: BuildFlags) -> Result<usize> {
-    let odd = Affine3A::from_scale_rotation_translation(
-        Vec3::new(3.0, 0.5, -1.25),
-        Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.1),
-        Vec3::new(7.0, -3.0, 11.0),
-    );
-    let mut leaks = 0;
-    for transform in [Affine3A::IDENTITY, odd] {
-        let part = Part::new(mesh.clone(), Layout::Indexed32);
-        let scene = RayScene { models: vec![vec![part]], placed: vec![Placed::new(0, transform)] };
-        let gpu: GpuScene = scene.upload_with(ctx, flags, BuildFlags::default(), 0)?;
-        let moved = |ray: Ray| Ray {
-            origin: transform.transform_point3(ray.origin.into()).into(),
-            direction: transform.transform_vector3(ray.direction.into()).into(),
-            ..ray
-        };
-        let mut left = count / 2;
-        for part in 0.. {
-            if left == 0 {
-                break;
-            }
-            let rays = rays_at_seams(mesh, part, CHUNK.min(left));
-            left -= rays.len();
-            let rays: Vec<_> = rays.into_iter().map(moved).collect();
-            let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
-            leaks += records.iter().filter(|record| record.kind == MISSED).count();
-        }
-    }
-    Ok(leaks)
-}
-
-const CHUNK: usize = 1 << 20;
-
-/// So many rays in each of the meshes, built with each of the flags.
-fn check_seams(count: usize) -> Result<()> {
-    let Some(ctx) = software() else { return Ok(()) };
-    let tracer = RayTracer::new(&ctx, Method::Query)?;
-    for (name, mesh) in closed_meshes() {
-        for flags in FLAGS {
-            assert_eq!(leaks(&ctx, &tracer, &mesh, count, flags)?, 0, "{name}, {flags:?}");
-        }
-    }
-    Ok(())
-}
-
-#[test]
-fn no_ray_slips_through_a_seam() -> Result<()> {
-    check_seams(50_000)
-}
-
-/// A lane of its own in `CONTRIBUTING.md`.
-#[test]
-#[ignore = "takes minutes on a CPU"]
-fn none_of_ten_million_rays_slips_through_a_seam() -> Result<()> {
-    check_seams(10_000_000)
 }
 
 /// Two queries that take turns, each with candidates of its own.
@@ -377,7 +202,7 @@ fn a_structure_is_the_same_after_a_file() -> Result<()> {
     let (_buffers, geometries) = upload_geometries(&ctx, &parts)?;
     let rays = random_rays(9, 2_000, Vec3::splat(-1.5), Vec3::splat(1.5));
     let tracer = RayTracer::new(&ctx, Method::Query)?;
-    for flags in FLAGS {
+    for flags in BUILD_FLAGS {
         let desc = BlasDesc { geometries: &geometries, flags, ..Default::default() };
         let built = ctx.create_blas(&desc)?;
         let bytes = ctx.serialize_blas(*built)?;
@@ -494,7 +319,7 @@ fn scratch_memory_is_what_the_sizes_say() -> Result<()> {
             desc.scratch_budget_bytes = 0;
         })
     };
-    for flags in FLAGS {
+    for flags in BUILD_FLAGS {
         let may_refit = flags.contains(BuildFlags::ALLOW_UPDATE);
         for mode in [BuildMode::Refit, BuildMode::Rebuild].into_iter().skip(usize::from(!may_refit)) {
             let Some(ctx) = fresh() else { return Ok(()) };
