@@ -71,23 +71,26 @@ uvec4 lvkSoftInstanceBlock(LvkSoftState state, uint instance, uint block) {
     return LvkSoftBlocks(lvkSoftInstances(state)).at[instance * LVK_SOFT_INSTANCE_BLOCKS + block];
 }
 
+// The rows of the instance's matrix in its blocks from `first` on.
+mat3x4 lvkSoftInstanceRows(LvkSoftState state, LvkSoftHit hit, uint first) {
+    return lvkSoftRows(lvkSoftInstances(state), hit.instance * LVK_SOFT_INSTANCE_BLOCKS + first);
+}
+
 vec3 lvkSoftObject(LvkSoftState state, LvkSoftHit hit, vec4 v) {
-    return lvkSoftTransform(lvkSoftInstances(state), hit.instance * LVK_SOFT_INSTANCE_BLOCKS, v);
+    return lvkSoftTransform(lvkSoftInstanceRows(state, hit, 0u), v);
 }
 
 // The matrix in the instance's blocks from `first` on.
 mat4x3 lvkSoftMatrix(LvkSoftState state, LvkSoftHit hit, uint first) {
-    vec4 x = uintBitsToFloat(lvkSoftInstanceBlock(state, hit.instance, first));
-    vec4 y = uintBitsToFloat(lvkSoftInstanceBlock(state, hit.instance, first + 1u));
-    vec4 z = uintBitsToFloat(lvkSoftInstanceBlock(state, hit.instance, first + 2u));
-    return transpose(mat3x4(x, y, z));
+    return transpose(lvkSoftInstanceRows(state, hit, first));
 }
 
 void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3]) {
-    uvec2 structure = lvkSoftStructureOf(lvkSoftInstances(state), hit.instance);
-    LvkSoftBlocks head = LvkSoftBlocks(structure);
+    uvec4 head;
+    uvec2 structure = lvkSoftStructureOf(lvkSoftInstanceBlock(state, hit.instance, 6u).xy, head);
+    uint primitives = LvkSoftBlocks(structure).at[1].y;
     uvec3 words;
-    lvkSoftCorners(structure, head.at[1].y, head.at[0].y, hit.primitive, positions, words);
+    lvkSoftCorners(structure, primitives, head.y, hit.primitive, positions, words);
 }
 
 // The hit that `which` means.

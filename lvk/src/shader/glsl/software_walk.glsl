@@ -129,47 +129,45 @@ uint lvkSoftOpacity(uint marks, uint instanceFlags, uint rayFlags) {
     return (rayFlags & LVK_RAY_FLAG_NO_OPAQUE) != 0u ? LVK_SOFT_CLEAR : opacity;
 }
 
-// Three rows of a matrix by a vector.
-vec3 lvkSoftTransform(uvec2 blocks, uint first, vec4 v) {
-    vec4 x = uintBitsToFloat(LvkSoftBlocks(blocks).at[first]);
-    vec4 y = uintBitsToFloat(LvkSoftBlocks(blocks).at[first + 1u]);
-    vec4 z = uintBitsToFloat(LvkSoftBlocks(blocks).at[first + 2u]);
-    return vec3(dot(x, v), dot(y, v), dot(z, v));
+// The three rows of a matrix, each in a block.
+mat3x4 lvkSoftRows(uvec2 base, uint first) {
+    LvkSoftBlocks blocks = LvkSoftBlocks(base);
+    return mat3x4(uintBitsToFloat(lvkSoftBlock(blocks, first)), uintBitsToFloat(lvkSoftBlock(blocks, first + 1u)),
+                  uintBitsToFloat(lvkSoftBlock(blocks, first + 2u)));
 }
+
+// Three rows of a matrix by a vector.
+vec3 lvkSoftTransform(mat3x4 rows, vec4 v) { return vec3(dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)); }
 
 // Where the instances of the structure that is traced lie.
 uvec2 lvkSoftInstances(LvkSoftState state) {
     return lvkSoftBehind(state.tlas, LvkSoftBlocks(state.tlas).at[1].y);
 }
 
-// The structure of an instance.
-uvec2 lvkSoftStructureOf(uvec2 instances, uint instance) {
-    uvec2 structure = LvkSoftBlocks(instances).at[instance * LVK_SOFT_INSTANCE_BLOCKS + 6u].xy;
-    uvec4 head = LvkSoftBlocks(structure).at[0];
-    return head.x == LVK_SOFT_MOVED ? head.zw : structure;
+// The structure that an instance means where it names this one, and its first block.
+uvec2 lvkSoftStructureOf(uvec2 named, out uvec4 head) {
+    head = lvkSoftBlock(LvkSoftBlocks(named), 0u);
+    if (head.x != LVK_SOFT_MOVED) {
+        return named;
+    }
+    uvec2 moved = head.zw;
+    head = lvkSoftBlock(LvkSoftBlocks(moved), 0u);
+    return moved;
 }
 
 // The structure of an instance with the ray in its space; answers where in it to start, or LVK_SOFT_NONE if the ray passes
 // it by.
 uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSoftLevel level) {
-    LvkSoftBlocks blocks = LvkSoftBlocks(instances);
     uint first = instance * LVK_SOFT_INSTANCE_BLOCKS;
-    uvec4 numbers = lvkSoftBlock(blocks, first + 6u);
-    vec4 x = uintBitsToFloat(lvkSoftBlock(blocks, first));
-    vec4 y = uintBitsToFloat(lvkSoftBlock(blocks, first + 1u));
-    vec4 z = uintBitsToFloat(lvkSoftBlock(blocks, first + 2u));
-    vec4 from = vec4(state.origin, 1.0);
-    vec3 origin = vec3(dot(x, from), dot(y, from), dot(z, from));
-    vec3 direction = vec3(dot(x.xyz, state.direction), dot(y.xyz, state.direction), dot(z.xyz, state.direction));
+    uvec4 numbers = lvkSoftBlock(LvkSoftBlocks(instances), first + 6u);
+    mat3x4 rows = lvkSoftRows(instances, first);
+    vec3 origin = lvkSoftTransform(rows, vec4(state.origin, 1.0));
+    vec3 direction = lvkSoftTransform(rows, vec4(state.direction, 0.0));
     if ((numbers.z >> 24 & state.mask) == 0u) {
         return LVK_SOFT_NONE;
     }
-    level.structure = numbers.xy;
-    uvec4 head = lvkSoftBlock(LvkSoftBlocks(level.structure), 0u);
-    if (head.x == LVK_SOFT_MOVED) {
-        level.structure = head.zw;
-        head = lvkSoftBlock(LvkSoftBlocks(level.structure), 0u);
-    }
+    uvec4 head;
+    level.structure = lvkSoftStructureOf(numbers.xy, head);
     uvec4 places = lvkSoftBlock(LvkSoftBlocks(level.structure), 1u);
     uvec4 counts = lvkSoftBlock(LvkSoftBlocks(level.structure), 2u);
     uint flags = numbers.w >> 24;
