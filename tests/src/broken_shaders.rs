@@ -48,7 +48,7 @@ impl BrokenShaders {
     ///
     /// # Panics
     /// As [`in_child`], and when the files cannot be copied.
-    pub fn in_child(test: &str, body: impl FnOnce(&Self)) {
+    pub fn in_child(test: impl Fn(), body: impl FnOnce(&Self)) {
         let folder = tempfile::tempdir().expect("temporary folders can be made");
         let [shaders, compiled] = ["shaders", "compiled"].map(|name| folder.path().join(name));
         copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders"), &shaders)

@@ -11,12 +11,12 @@ const MARK: &str = "LVK_TEST_CHILD";
 
 /// Runs `body` in a new process with `variables` set, or taken away where there is no value.
 ///
-/// `test` is the path of the calling test inside its file: the new process runs that test alone, which calls this
-/// function again and gets to `body`.
+/// `test` is the calling test itself: the new process runs it alone, which calls this function again and gets to `body`.
 ///
 /// # Panics
 /// When the process fails, with what it wrote.
-pub fn in_child(test: &str, variables: &[(&str, Option<&OsStr>)], body: impl FnOnce()) {
+pub fn in_child(test: impl Fn(), variables: &[(&str, Option<&OsStr>)], body: impl FnOnce()) {
+    let test = path_in_program(&test);
     if std::env::var_os(MARK).is_some_and(|name| name == test) {
         return body();
     }
@@ -39,7 +39,7 @@ pub fn in_child(test: &str, variables: &[(&str, Option<&OsStr>)], body: impl FnO
 ///
 /// # Panics
 /// As [`in_child`] and [`swiftshader`].
-pub fn without_ray_tracing(test: &str, body: impl FnOnce()) {
+pub fn without_ray_tracing(test: impl Fn(), body: impl FnOnce()) {
     let Some(icd) = swiftshader() else { return };
     in_child(test, &only_driver(&icd), body);
 }
@@ -49,13 +49,19 @@ pub fn without_ray_tracing(test: &str, body: impl FnOnce()) {
 ///
 /// # Panics
 /// As [`in_child`] and [`radv`].
-pub fn on_radv(test: &str, family: &str, body: impl FnOnce()) {
+pub fn on_radv(test: impl Fn(), family: &str, body: impl FnOnce()) {
     let Some(icd) = radv() else { return };
     let mut variables = only_driver(&icd).to_vec();
     variables.push(("RADV_FORCE_FAMILY", Some(OsStr::new(family))));
     // What was compiled before is to be compiled again.
     variables.push(("MESA_SHADER_CACHE_DISABLE", Some(OsStr::new("true"))));
     in_child(test, &variables, body);
+}
+
+/// The path by which the program of a test runs it alone: its modules and its name, without the program's.
+pub fn path_in_program<T: Fn()>(_: &T) -> &'static str {
+    let path = std::any::type_name::<T>();
+    path.split_once("::").map_or(path, |(_, inside)| inside)
 }
 
 fn only_driver(icd: &Path) -> [(&str, Option<&OsStr>); 4] {

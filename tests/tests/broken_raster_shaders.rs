@@ -275,7 +275,7 @@ fn sponza(ctx: &Context, scene: &Scene, draws: DrawPath) -> Sponza {
 #[test]
 #[ignore = "half a minute: cargo test -p lvk-tests --test broken_raster_shaders -- --ignored"]
 fn samples_that_rasterise_notice() {
-    BrokenShaders::in_child("samples_that_rasterise_notice", |shaders| {
+    BrokenShaders::in_child(samples_that_rasterise_notice, |shaders| {
         let Some(ctx) = device() else { return };
         check(shaders, "hello_triangle", &TRIANGLE, || HelloTriangle::new(&ctx, SIZE).unwrap());
         check(shaders, "six faces", &CUBE_MAP, || cube_map(&ctx, Faces::SixPasses));
@@ -294,7 +294,7 @@ fn samples_that_rasterise_notice() {
 #[test]
 #[ignore = "a minute: cargo test -p lvk-tests --test broken_raster_shaders -- --ignored"]
 fn deferred_notices() {
-    BrokenShaders::in_child("deferred_notices", |shaders| {
+    BrokenShaders::in_child(deferred_notices, |shaders| {
         let Some(ctx) = device() else { return };
         check(shaders, "by several passes", &[&HALL[..], &HALL_SEVERAL].concat(), || {
             hall(&ctx, Passes::Several)
@@ -308,7 +308,7 @@ fn deferred_notices() {
 #[test]
 #[ignore = "a minute: cargo test -p lvk-tests --test broken_raster_shaders -- --ignored"]
 fn omni_shadows_notices() {
-    BrokenShaders::in_child("omni_shadows_notices", |shaders| {
+    BrokenShaders::in_child(omni_shadows_notices, |shaders| {
         let Some(ctx) = device() else { return };
         let usual = OmniShadowsConfig { shows_cube: true, ..OmniShadowsConfig::new(SIZE) };
         if has(&ctx, OptionalFeature::Multiview) {
@@ -325,7 +325,7 @@ fn omni_shadows_notices() {
 #[test]
 #[ignore = "seconds: cargo test -p lvk-tests --test broken_raster_shaders -- --ignored"]
 fn yuv_notices() {
-    BrokenShaders::in_child("yuv_notices", |shaders| {
+    BrokenShaders::in_child(yuv_notices, |shaders| {
         let Some(ctx) = device_with(|desc| desc.yuv = &CONVERSIONS) else { return };
         let config = YuvConfig { film: [96, 64], shows_planes: true, ..YuvConfig::new(SIZE) };
         check(shaders, "yuv", &FILM, || Yuv::new(&ctx, &config).unwrap());
@@ -335,7 +335,7 @@ fn yuv_notices() {
 #[test]
 #[ignore = "a minute: cargo test -p lvk-tests --test broken_raster_shaders -- --ignored"]
 fn sponza_notices() {
-    BrokenShaders::in_child("sponza_notices", |shaders| {
+    BrokenShaders::in_child(sponza_notices, |shaders| {
         let Some(ctx) = device() else { return };
         let atrium = Scene::atrium();
         if has(&ctx, OptionalFeature::DrawIndirectCount) {

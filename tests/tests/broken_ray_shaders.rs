@@ -238,7 +238,7 @@ fn check(
 #[test]
 #[ignore = "seconds: cargo test -p lvk-tests --test broken_ray_shaders -- --ignored"]
 fn rtx_hello_notices() {
-    BrokenShaders::in_child("rtx_hello_notices", |shaders| {
+    BrokenShaders::in_child(rtx_hello_notices, |shaders| {
         let Some(ctx) = device() else { return };
         check(shaders, "hello", &ctx, [&HELLO, &HELLO_QUERY], |config| {
             picture_of(&mut RtxHello::new(&ctx, config).unwrap(), FRAME)
@@ -249,7 +249,7 @@ fn rtx_hello_notices() {
 #[test]
 #[ignore = "a minute: cargo test -p lvk-tests --test broken_ray_shaders -- --ignored"]
 fn rtx_ao_notices() {
-    BrokenShaders::in_child("rtx_ao_notices", |shaders| {
+    BrokenShaders::in_child(rtx_ao_notices, |shaders| {
         let Some(ctx) = device() else { return };
         let (town, carousel) = (Scene::town(), Scene::carousel());
         let make = |config: &RtxConfig| {
@@ -270,7 +270,7 @@ fn rtx_ao_notices() {
 #[test]
 #[ignore = "a minute: cargo test -p lvk-tests --test broken_ray_shaders -- --ignored"]
 fn rtx_pipeline_notices() {
-    BrokenShaders::in_child("rtx_pipeline_notices", |shaders| {
+    BrokenShaders::in_child(rtx_pipeline_notices, |shaders| {
         let Some(ctx) = device() else { return };
         let scene = still_life();
         check(shaders, "still life", &ctx, [&RECURSION, &LOOP], |config| {
@@ -283,7 +283,7 @@ fn rtx_pipeline_notices() {
 #[test]
 #[ignore = "a minute: cargo test -p lvk-tests --test broken_ray_shaders -- --ignored"]
 fn rtx_textures_notices() {
-    BrokenShaders::in_child("rtx_textures_notices", |shaders| {
+    BrokenShaders::in_child(rtx_textures_notices, |shaders| {
         let Some(ctx) = device() else { return };
         check(shaders, "waves", &ctx, [&WAVES, &WAVES_QUERY], |config| {
             picture_of(&mut RtxTextures::new(&ctx, config).unwrap(), FRAME)
@@ -294,7 +294,7 @@ fn rtx_textures_notices() {
 #[test]
 #[ignore = "a minute: cargo test -p lvk-tests --test broken_ray_shaders -- --ignored"]
 fn large_scene_notices() {
-    BrokenShaders::in_child("large_scene_notices", |shaders| {
+    BrokenShaders::in_child(large_scene_notices, |shaders| {
         let Some(ctx) = device() else { return };
         let show = |world: &World, rtx: &RtxConfig, show| {
             let config = LargeSceneConfig { show, ..LargeSceneConfig::new(*rtx) };

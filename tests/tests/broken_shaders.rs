@@ -168,7 +168,7 @@ fn hybrid_ways() -> [HybridWay<'static>; 9] {
 #[test]
 #[ignore = "minutes for each: cargo test -p lvk-tests --test broken_shaders -- --ignored"]
 fn hybrid_notices() {
-    BrokenShaders::in_child("hybrid_notices", |shaders| {
+    BrokenShaders::in_child(hybrid_notices, |shaders| {
         let Some(ctx) = device() else { return };
         let (scene, paths) = (still_life(), paths(&ctx));
         assert_eq!(HybridConfig::default().method, Method::Hybrid);
@@ -268,7 +268,7 @@ fn room(ctx: &Context, path: RayPath, [width, height]: [u32; 2], scene: &OitScen
 #[test]
 #[ignore = "minutes for each: cargo test -p lvk-tests --test broken_shaders -- --ignored"]
 fn hybrid_oit_notices() {
-    BrokenShaders::in_child("hybrid_oit_notices", |shaders| {
+    BrokenShaders::in_child(hybrid_oit_notices, |shaders| {
         let Some(ctx) = device() else { return };
         let (scene, expected) = (OitScene::default(), reference("hybrid_oit_small"));
         for path in paths(&ctx) {
@@ -408,7 +408,7 @@ fn hall_of(ctx: &Context, config: &ReflectionsConfig, view: Option<&Camera>) -> 
 #[test]
 #[ignore = "minutes for each: cargo test -p lvk-tests --test broken_shaders -- --ignored"]
 fn reflections_notices() {
-    BrokenShaders::in_child("reflections_notices", |shaders| {
+    BrokenShaders::in_child(reflections_notices, |shaders| {
         let Some(ctx) = device() else { return };
         // Smaller than the picture that is as ever: there are many.
         let expected = hall(&ctx, paths(&ctx)[0], None);

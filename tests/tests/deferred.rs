@@ -62,7 +62,7 @@ fn the_hall_looks_as_it_always_did() {
 
 #[test]
 fn another_driver_shows_it() {
-    without_ray_tracing("another_driver_shows_it", || {
+    without_ray_tracing(another_driver_shows_it, || {
         let Some(ctx) = device() else { return };
         let picture = picture(&ctx, &DeferredConfig::new(SIZE), 0);
         assert_alike("SwiftShader hall", &picture, &reference("deferred_small"), &OTHER_DRIVER);

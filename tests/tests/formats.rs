@@ -144,8 +144,7 @@ fn every_format_keeps_its_texels_or_is_unsupported() {
 
 #[test]
 fn compressed_formats_of_phones_keep_their_blocks_and_are_decoded() {
-    let name = "compressed_formats_of_phones_keep_their_blocks_and_are_decoded";
-    without_ray_tracing(name, || {
+    without_ray_tracing(compressed_formats_of_phones_keep_their_blocks_and_are_decoded, || {
         let Some(ctx) = device() else { return };
         let wanted =
             [Format::Etc2Rgb8Unorm, Format::Etc2Rgba8Unorm, Format::EacR11Unorm, Format::Astc8x5Unorm];
@@ -339,7 +338,7 @@ fn depth_stencil_and_integers_are_copied_and_scaled() {
 
 #[test]
 fn depth_and_stencil_are_copied_one_at_a_time() {
-    without_ray_tracing("depth_and_stencil_are_copied_one_at_a_time", || {
+    without_ray_tracing(depth_and_stencil_are_copied_one_at_a_time, || {
         let Some(ctx) = device() else { return };
         copies_and_scales(&ctx);
     });

@@ -20,7 +20,7 @@ fn record(x: f32, structure: u64) -> [u32; 16] {
 
 #[test]
 fn structures_are_built_and_refitted_without_ray_tracing() {
-    without_ray_tracing("structures_are_built_and_refitted_without_ray_tracing", || {
+    without_ray_tracing(structures_are_built_and_refitted_without_ray_tracing, || {
         let Some(ctx) = device() else { return };
         // A driver that dies of a kernel leaves its name behind.
         compile_kernels(&ctx, &mut |name| eprintln!("{name}")).unwrap();

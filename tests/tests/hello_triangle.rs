@@ -95,7 +95,7 @@ fn a_device_without_optional_features_shows_it() {
 
 #[test]
 fn another_driver_shows_it() {
-    without_ray_tracing("another_driver_shows_it", || {
+    without_ray_tracing(another_driver_shows_it, || {
         let Some(ctx) = device() else { return };
         let picture = picture_of(&mut triangle(&ctx), 0);
         assert_painted(&picture, 0.0);

@@ -113,7 +113,7 @@ fn every_format_and_kind_is_filled_alike() {
 
 #[test]
 fn another_driver_fills_alike() {
-    without_ray_tracing("another_driver_fills_alike", || {
+    without_ray_tracing(another_driver_fills_alike, || {
         let Some(pair) = both() else { return };
         let compared = compare(&pair);
         assert!(compared > 200, "{compared}");

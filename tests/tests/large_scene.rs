@@ -273,7 +273,7 @@ fn the_archives_make_a_street() {
 
 #[test]
 fn a_driver_without_ray_tracing_shows_the_street() {
-    without_ray_tracing("a_driver_without_ray_tracing_shows_the_street", || {
+    without_ray_tracing(a_driver_without_ray_tracing_shows_the_street, || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
         let picture = picture_of(&mut make(&ctx, &street(), &config(RayPath::Query)), 0);
         assert_alike("SwiftShader street", &picture, &reference("large_scene_street"), &OTHER_FILTERS);

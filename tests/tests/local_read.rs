@@ -152,7 +152,7 @@ fn one_pass_has_the_bits_of_two() {
 /// Another driver, which has fewer inputs at least than ten or is right in another way.
 #[test]
 fn one_pass_has_the_bits_of_two_on_another_driver() {
-    without_ray_tracing("one_pass_has_the_bits_of_two_on_another_driver", || {
+    without_ray_tracing(one_pass_has_the_bits_of_two_on_another_driver, || {
         let Some(ctx) = device() else { return };
         one_pass_is_two(&ctx);
         assert_places_are_limited(&ctx);

@@ -152,7 +152,7 @@ fn devices_without_mesh_shaders_are_told() {
     let profile = DeviceProfile::core_only();
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
     assert_missing(&ctx);
-    without_ray_tracing("devices_without_mesh_shaders_are_told", || {
+    without_ray_tracing(devices_without_mesh_shaders_are_told, || {
         let Some(ctx) = device() else { return };
         assert_missing(&ctx);
     });

@@ -111,7 +111,7 @@ fn commands(ctx: &Context) {
 
 #[test]
 fn a_driver_without_ray_tracing_refuses_clearly() {
-    without_ray_tracing("a_driver_without_ray_tracing_refuses_clearly", || {
+    without_ray_tracing(a_driver_without_ray_tracing_refuses_clearly, || {
         let Some(ctx) = device() else { return };
         let name = ctx.capabilities().device_name.clone();
         for text in creations(&ctx).into_iter().chain(shaders(&ctx)).chain(pipelines(&ctx)) {

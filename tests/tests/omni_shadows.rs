@@ -206,7 +206,7 @@ fn the_lamp_looks_as_it_always_did() {
 
 #[test]
 fn another_driver_shows_it() {
-    without_ray_tracing("another_driver_shows_it", || {
+    without_ray_tracing(another_driver_shows_it, || {
         let Some(ctx) = device() else { return };
         let picture = picture_of(&mut lamp(&ctx, &usual()), 0);
         assert_alike("SwiftShader lamp", &picture, &reference("omni_shadows_small"), &OTHER_DRIVER);

@@ -135,7 +135,6 @@ fn damaged_files_are_dropped_and_replaced() {
 #[test]
 fn a_file_of_another_device_is_dropped_and_replaced() {
     const FILE: &str = "LVK_TEST_PIPELINE_CACHE";
-    const TEST: &str = "a_file_of_another_device_is_dropped_and_replaced";
     let Some(icd) = swiftshader() else { return };
     let folder = folder();
     let inherited = std::env::var_os(FILE).map(PathBuf::from);
@@ -147,7 +146,7 @@ fn a_file_of_another_device_is_dropped_and_replaced() {
         ("LVK_DEVICE", None),
         (FILE, Some(path.as_os_str())),
     ];
-    in_child(TEST, &variables, || {
+    in_child(a_file_of_another_device_is_dropped_and_replaced, &variables, || {
         let ctx = start(&path).unwrap();
         assert!(ctx.capabilities().device_name.contains("SwiftShader"), "{:?}", ctx.capabilities());
         make_pipelines(&ctx);

@@ -70,22 +70,22 @@ fn every_kernel_of_the_library_is_compiled() {
 
 #[test]
 fn shipped_pipelines_compile_for_rdna_2() {
-    on_radv("shipped_pipelines_compile_for_rdna_2", "navi21", || compile_all("NAVI21"));
+    on_radv(shipped_pipelines_compile_for_rdna_2, "navi21", || compile_all("NAVI21"));
 }
 
 #[test]
 fn shipped_pipelines_compile_for_rdna_3() {
-    on_radv("shipped_pipelines_compile_for_rdna_3", "navi31", || compile_all("NAVI31"));
+    on_radv(shipped_pipelines_compile_for_rdna_3, "navi31", || compile_all("NAVI31"));
 }
 
 #[test]
 fn shipped_pipelines_compile_for_rdna_4() {
-    on_radv("shipped_pipelines_compile_for_rdna_4", "gfx1201", || compile_all("GFX1201"));
+    on_radv(shipped_pipelines_compile_for_rdna_4, "gfx1201", || compile_all("GFX1201"));
 }
 
 #[test]
 fn a_device_without_memory_is_an_error() {
-    on_radv("a_device_without_memory_is_an_error", "navi31", || {
+    on_radv(a_device_without_memory_is_an_error, "navi31", || {
         let library: Option<&Path> = vulkan().flatten();
         let context = Context::new(&ContextDesc { vulkan_library: library, ..Default::default() });
         assert!(context.is_err());

@@ -182,7 +182,7 @@ fn six_passes_need_no_feature_and_one_pass_says_which() {
 
 #[test]
 fn another_driver_shows_it_both_ways() {
-    without_ray_tracing("another_driver_shows_it_both_ways", || {
+    without_ray_tracing(another_driver_shows_it_both_ways, || {
         let Some(ctx) = device() else { return };
         assert_one_pass_equals_six(&ctx);
         let picture = picture_of(&mut sample(&ctx, Faces::OnePass), 0);

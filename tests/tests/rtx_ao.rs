@@ -232,7 +232,7 @@ fn few_passes_show_the_same_but_for_noise_and_nothing_else_does() {
 /// Rays take SwiftShader seconds for each pass.
 #[test]
 fn a_driver_without_ray_tracing_shows_the_town() {
-    without_ray_tracing("a_driver_without_ray_tracing_shows_the_town", || {
+    without_ray_tracing(a_driver_without_ray_tracing_shows_the_town, || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
         let picture = picture(&mut town(&ctx, RayPath::Query, 2, 2));
         assert_alike("SwiftShader town", &small(&picture), &small(&reference("rtx_ao_small")), &OTHER_NOISE);

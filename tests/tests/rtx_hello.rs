@@ -65,7 +65,7 @@ fn the_triangles_look_as_they_always_did() {
 
 #[test]
 fn a_driver_without_ray_tracing_shows_the_triangles() {
-    without_ray_tracing("a_driver_without_ray_tracing_shows_the_triangles", || {
+    without_ray_tracing(a_driver_without_ray_tracing_shows_the_triangles, || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
         let picture = picture_of(&mut hello(&ctx, RayPath::Query), 0);
         assert_alike("SwiftShader triangles", &picture, &reference("rtx_hello_small"), &SAME_RAYS);

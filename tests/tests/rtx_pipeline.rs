@@ -88,7 +88,7 @@ fn no_deeper_than_the_device_can() {
 
 #[test]
 fn a_driver_without_ray_tracing_shows_the_still_life() {
-    without_ray_tracing("a_driver_without_ray_tracing_shows_the_still_life", || {
+    without_ray_tracing(a_driver_without_ray_tracing_shows_the_still_life, || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
         let picture = picture_of(&mut still(&ctx, RayPath::Query, 4), 0);
         assert_alike("SwiftShader still life", &picture, &reference("rtx_pipeline_small"), &OTHER_FILTERS);

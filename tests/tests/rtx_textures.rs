@@ -66,7 +66,7 @@ fn the_waves_look_as_they_always_did() {
 
 #[test]
 fn a_driver_without_ray_tracing_shows_the_waves() {
-    without_ray_tracing("a_driver_without_ray_tracing_shows_the_waves", || {
+    without_ray_tracing(a_driver_without_ray_tracing_shows_the_waves, || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
         let picture = picture_of(&mut waves(&ctx, RayPath::Query), 0);
         assert_alike("SwiftShader waves", &picture, &reference("rtx_textures_small"), &OTHER_FILTERS);

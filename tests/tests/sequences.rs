@@ -81,12 +81,12 @@ mod interrupted {
 
     use clap::Parser as _;
     use lvk_samples::app::args::HybridArgs;
+    use lvk_tests::child::path_in_program;
     use rustix::process::{Pid, Signal, kill_process};
 
     use super::*;
 
     const FOLDER: &str = "LVK_TEST_SEQUENCE_FOLDER";
-    const TEST: &str = "interrupted::an_interrupted_program_leaves_whole_pictures_and_says_so";
 
     /// A triangle before a wall.
     const OBJ: &str = "v -2 -2 0\nv 2 -2 0\nv 0 2 0\nv -9 -9 -3\nv 9 -9 -3\nv 9 9 -3\nv -9 9 -3\n\
@@ -119,8 +119,9 @@ mod interrupted {
             return;
         }
         let folder = tempfile::tempdir().unwrap();
+        let test = path_in_program(&an_interrupted_program_leaves_whole_pictures_and_says_so);
         let mut child = Command::new(std::env::current_exe().unwrap())
-            .args([TEST, "--exact", "--nocapture"])
+            .args([test, "--exact", "--nocapture"])
             .env(FOLDER, folder.path())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())

@@ -240,7 +240,7 @@ fn features_work_or_are_refused_by_name() {
 /// SwiftShader lacks several of the features.
 #[test]
 fn features_that_are_missing_are_refused_by_name() {
-    without_ray_tracing("features_that_are_missing_are_refused_by_name", || {
+    without_ray_tracing(features_that_are_missing_are_refused_by_name, || {
         let Some(ctx) = device() else { return };
         let found = Found::of(&ctx);
         let lacks = |shader: &&Use| !missing(&found, shader.needs).is_empty();
@@ -252,7 +252,7 @@ fn features_that_are_missing_are_refused_by_name() {
 /// SwiftShader has no mesh shaders.
 #[test]
 fn mesh_and_task_stages_are_refused_where_there_are_none() {
-    without_ray_tracing("mesh_and_task_stages_are_refused_where_there_are_none", || {
+    without_ray_tracing(mesh_and_task_stages_are_refused_where_there_are_none, || {
         let Some(ctx) = device() else { return };
         assert!(!ctx.capabilities().mesh_shader);
         let mesh = "layout(local_size_x = 1) in; layout(triangles, max_vertices = 3, max_primitives = 1) out;

@@ -75,7 +75,7 @@ fn without() -> Option<TestDevice> {
 
 #[test]
 fn a_driver_without_ray_tracing_shows_the_still_life() {
-    without_ray_tracing("a_driver_without_ray_tracing_shows_the_still_life", || {
+    without_ray_tracing(a_driver_without_ray_tracing_shows_the_still_life, || {
         let Some(ctx) = without() else { return };
         let (scene, expected) = (still_life(), reference("hybrid_small"));
         let plain = HybridConfig { path: RayPath::Query, ..sized(&expected) };
@@ -93,7 +93,7 @@ fn a_driver_without_ray_tracing_shows_the_still_life() {
 
 #[test]
 fn a_driver_without_ray_tracing_shows_the_room_of_glass() {
-    without_ray_tracing("a_driver_without_ray_tracing_shows_the_room_of_glass", || {
+    without_ray_tracing(a_driver_without_ray_tracing_shows_the_room_of_glass, || {
         let Some(ctx) = without() else { return };
         let expected = reference("hybrid_oit_small");
         assert_alike("SwiftShader glass", &room_of_glass(&ctx, &expected), &expected, &OTHER_EDGES);
@@ -102,7 +102,7 @@ fn a_driver_without_ray_tracing_shows_the_room_of_glass() {
 
 #[test]
 fn a_driver_without_ray_tracing_shows_the_hall() {
-    without_ray_tracing("a_driver_without_ray_tracing_shows_the_hall", || {
+    without_ray_tracing(a_driver_without_ray_tracing_shows_the_hall, || {
         let Some(ctx) = without() else { return };
         let expected = reference("reflections_small");
         let picture = hall(&ctx, [expected.width(), expected.height()]);

@@ -78,7 +78,7 @@ fn a_device_without_structures_of_its_own_has_everything() -> Result<()> {
 
 #[test]
 fn a_driver_without_ray_tracing_traces() {
-    without_ray_tracing("a_driver_without_ray_tracing_traces", || {
+    without_ray_tracing(a_driver_without_ray_tracing_traces, || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
         assert!(ctx.capabilities().device_name.contains("SwiftShader"));
         for flags in BUILD_FLAGS {

@@ -221,7 +221,7 @@ fn devices_without_counts_pad_their_draws_and_refuse_to_count() {
 
 #[test]
 fn a_driver_without_ray_tracing_and_counts_shows_the_atrium() {
-    without_ray_tracing("a_driver_without_ray_tracing_and_counts_shows_the_atrium", || {
+    without_ray_tracing(a_driver_without_ray_tracing_and_counts_shows_the_atrium, || {
         let Some(ctx) = device() else { return };
         assert!(!ctx.capabilities().has(OptionalFeature::DrawIndirectCount));
         let mut sample = make(&ctx, &ATRIUM, &SponzaConfig { shadow_size: 1024, ..config(4) });

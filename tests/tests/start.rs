@@ -53,7 +53,7 @@ fn a_wrong_library_is_no_vulkan() {
 
 #[test]
 fn the_device_can_be_chosen_by_number_and_name() {
-    in_child("the_device_can_be_chosen_by_number_and_name", &[("LVK_DEVICE", None)], || {
+    in_child(the_device_can_be_chosen_by_number_and_name, &[("LVK_DEVICE", None)], || {
         let Some(ctx) = device() else { return };
         let name = ctx.capabilities().device_name.clone();
         let chosen = start(|desc| desc.device = Some("0")).unwrap();
@@ -81,7 +81,7 @@ fn the_device_can_be_chosen_by_number_and_name() {
 fn the_environment_goes_before_the_description() {
     let Some(_) = vulkan() else { return };
     let wish = Some(OsStr::new("somewhere else"));
-    in_child("the_environment_goes_before_the_description", &[("LVK_DEVICE", wish)], || {
+    in_child(the_environment_goes_before_the_description, &[("LVK_DEVICE", wish)], || {
         match start(|desc| desc.device = Some("0")) {
             Err(Error::NoDevice { reasons }) => assert!(reasons.contains("'somewhere else'"), "{reasons}"),
             other => unreachable!("{other:?}"),
@@ -174,7 +174,7 @@ fn everything_else_works_with_ray_tracing_turned_off() {
 
 #[test]
 fn a_device_without_ray_tracing_does_everything_else() {
-    without_ray_tracing("a_device_without_ray_tracing_does_everything_else", || {
+    without_ray_tracing(a_device_without_ray_tracing_does_everything_else, || {
         let Some(ctx) = device() else { return };
         assert!(ctx.capabilities().device_name.contains("SwiftShader"), "{:?}", ctx.capabilities());
         expect_no_ray_tracing(&ctx);

@@ -149,7 +149,7 @@ fn a_device_without_optional_features_shows_them() {
 
 #[test]
 fn another_driver_shows_them() {
-    without_ray_tracing("another_driver_shows_them", || {
+    without_ray_tracing(another_driver_shows_them, || {
         let Some(ctx) = device() else { return };
         let mut sample = sample(&ctx);
         let picture = picture_of(&mut sample, 0);

@@ -159,7 +159,7 @@ fn resizes_are_followed_without_fences_of_presents() {
 
 #[test]
 fn resizes_are_followed_on_another_driver() {
-    without_ray_tracing("resizes_are_followed_on_another_driver", || {
+    without_ray_tracing(resizes_are_followed_on_another_driver, || {
         let Some((window, ctx)) = window_with(|desc| desc.max_textures = 64) else { return };
         resize_often(&window, &ctx, 60);
     });

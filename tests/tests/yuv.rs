@@ -191,7 +191,7 @@ fn colours_are_those_of_the_standards() {
 
 #[test]
 fn colours_are_those_of_the_standards_on_another_driver() {
-    without_ray_tracing("colours_are_those_of_the_standards_on_another_driver", || {
+    without_ray_tracing(colours_are_those_of_the_standards_on_another_driver, || {
         let Some((ctx, all)) = yuv_device() else { return };
         check_conversions(&ctx, &all[..12]);
     });

@@ -179,7 +179,7 @@ fn the_card_looks_as_it_always_did() {
 
 #[test]
 fn another_driver_shows_it() {
-    without_ray_tracing("another_driver_shows_it", || {
+    without_ray_tracing(another_driver_shows_it, || {
         let Some(ctx) = yuv_device() else { return };
         let mut sample = sample(&ctx, &YuvConfig { shows_planes: true, ..usual() });
         let picture = picture_of(&mut sample, FRAME);
