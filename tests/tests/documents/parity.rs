@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
-const PAGE: &str = include_str!("../../lvk/src/manual/parity.md");
+const PAGE: &str = include_str!("../../../lvk/src/manual/parity.md");
 
 /// Features that LightweightVK has, area by area, of which none is forgotten.
 const AREAS: [&str; 20] = [
@@ -138,16 +138,16 @@ fn rows_that_promise_without_holding_are_noticed() {
     for (here, held_by) in [
         ("the same", "-"),
         ("the same", ""),
-        ("the same", "parity"),
-        ("the same", "t: parity, nowhere"),
-        ("the same", "t: parity; u: manual/mod"),
+        ("the same", "documents/parity"),
+        ("the same", "t: documents/parity, nowhere"),
+        ("the same", "t: documents/parity; u: manual/mod"),
         ("Left out", "-"),
         ("Left out: later", "-"),
-        ("", "t: parity"),
+        ("", "t: documents/parity"),
     ] {
         assert!(complaint(&row(here, held_by)).is_some(), "{here} {held_by}");
     }
-    assert_eq!(complaint(&row("the same", "t: parity; s: windows; u: barrier/batch")), None);
+    assert_eq!(complaint(&row("the same", "t: documents/parity; s: windows; u: barrier/batch")), None);
     assert_eq!(complaint(&row("Left out: as long as nobody has a device that could", "-")), None);
     assert!(rows("| a | b |").is_err() && rows("| a | b | c | d |").is_err());
 }

@@ -14,9 +14,9 @@ use lvk_tests::ray_scene::{GpuScene, Layout, Placed, RayScene, instances};
 use lvk_tests::ray_tracer::{How, Method, RayTracer, shader};
 use lvk_tests::rays::random_rays;
 
-const RAY_GEN: &str = include_str!("../shaders/closest.rgen.glsl");
-const MISS: &str = include_str!("../shaders/record.rmiss.glsl");
-const HIT: &str = include_str!("../shaders/record.rchit.glsl");
+const RAY_GEN: &str = include_str!("../../shaders/closest.rgen.glsl");
+const MISS: &str = include_str!("../../shaders/record.rmiss.glsl");
+const HIT: &str = include_str!("../../shaders/record.rchit.glsl");
 
 /// A scene that traces right as long as the context is in order.
 struct Intact {

@@ -15,9 +15,9 @@ use lvk_tests::reference::{Reference, Sphere};
 use lvk_tests::sphere_scene::{GROUPS, SphereModel};
 use lvk_tests::{TestDevice, device};
 
-const RAY_GEN: &str = include_str!("../shaders/closest.rgen.glsl");
-const MISS: &str = include_str!("../shaders/record.rmiss.glsl");
-const HIT: &str = include_str!("../shaders/record.rchit.glsl");
+const RAY_GEN: &str = include_str!("../../shaders/closest.rgen.glsl");
+const MISS: &str = include_str!("../../shaders/record.rmiss.glsl");
+const HIT: &str = include_str!("../../shaders/record.rchit.glsl");
 
 /// The tag is read from the group's record, 1000 is added by the second of the two shaders.
 const TAGGED_HIT: &str = r#"

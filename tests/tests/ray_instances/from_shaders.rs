@@ -39,7 +39,7 @@ struct Writer {
 
 impl Writer {
     fn new(ctx: &Context, room: u32) -> Result<Self> {
-        let module = shader(ctx, ShaderStage::Compute, include_str!("../shaders/instances.comp.glsl"))?;
+        let module = shader(ctx, ShaderStage::Compute, include_str!("../../shaders/instances.comp.glsl"))?;
         let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
         let pipeline = ctx.create_compute_pipeline(&desc)?;
         let size_bytes = OFFSET + u64::from(room) * RECORD_BYTES;

@@ -187,14 +187,14 @@ fn parts_keep_hit_groups() -> Result<()> {
             record = HitRecord(gl_HitTEXT, vec2(0), tag, lvkInstanceId(tlas), gl_InstanceCustomIndexEXT,
                                lvkGeometryIndex(), lvkPrimitiveIndex(tlas));
         }"#;
-    const RAY_GEN: &str = include_str!("../shaders/closest.rgen.glsl");
+    const RAY_GEN: &str = include_str!("../../shaders/closest.rgen.glsl");
     let Some(ctx) = device_of(24) else { return Ok(()) };
     if !Method::available(&ctx).contains(&Method::Pipeline) {
         return Ok(());
     }
     let defines = [("SBT_STRIDE", "1")];
     let ray_gen = shader_with(&ctx, ShaderStage::RayGen, RAY_GEN, &defines)?;
-    let miss = shader(&ctx, ShaderStage::Miss, include_str!("../shaders/record.rmiss.glsl"))?;
+    let miss = shader(&ctx, ShaderStage::Miss, include_str!("../../shaders/record.rmiss.glsl"))?;
     let hit = shader(&ctx, ShaderStage::ClosestHit, TAGGED_HIT)?;
     let records: Vec<_> = (0..13_u32).map(|group| (100 + group).to_ne_bytes()).collect();
     let group = |record| HitGroup { closest_hit: Some(*hit), record, ..Default::default() };

@@ -42,19 +42,19 @@ fn tracer(ctx: &Context, method: Method, culling: bool) -> Result<RayTracer> {
         defines.push(("PRIMITIVE_CULLING", ""));
     }
     if method == Method::Query {
-        let text = include_str!("../shaders/shell_query.comp.glsl");
+        let text = include_str!("../../shaders/shell_query.comp.glsl");
         let module = shader_with(ctx, ShaderStage::Compute, text, &defines)?;
         let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
         return Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?));
     }
-    let text = include_str!("../shaders/closest.rgen.glsl");
+    let text = include_str!("../../shaders/closest.rgen.glsl");
     let ray_gen = shader_with(ctx, ShaderStage::RayGen, text, &defines)?;
-    let miss = shader(ctx, ShaderStage::Miss, include_str!("../shaders/record.rmiss.glsl"))?;
-    let hit = shader(ctx, ShaderStage::ClosestHit, include_str!("../shaders/shell.rchit.glsl"))?;
-    let any_hit = shader(ctx, ShaderStage::AnyHit, include_str!("../shaders/shell.rahit.glsl"))?;
-    let text = include_str!("../shaders/shell.rint.glsl");
+    let miss = shader(ctx, ShaderStage::Miss, include_str!("../../shaders/record.rmiss.glsl"))?;
+    let hit = shader(ctx, ShaderStage::ClosestHit, include_str!("../../shaders/shell.rchit.glsl"))?;
+    let any_hit = shader(ctx, ShaderStage::AnyHit, include_str!("../../shaders/shell.rahit.glsl"))?;
+    let text = include_str!("../../shaders/shell.rint.glsl");
     let shell = shader_with(ctx, ShaderStage::Intersection, text, &defines)?;
-    let of_triangles = shader(ctx, ShaderStage::ClosestHit, include_str!("../shaders/record.rchit.glsl"))?;
+    let of_triangles = shader(ctx, ShaderStage::ClosestHit, include_str!("../../shaders/record.rchit.glsl"))?;
     let boxes = HitGroup {
         closest_hit: Some(*hit),
         any_hit: Some(*any_hit),
@@ -281,9 +281,9 @@ fn a_report_at_an_end_of_the_ray_is_accepted() -> Result<()> {
         eprintln!("NOT TESTED, {} has no ray tracing pipelines", ctx.capabilities().device_name);
         return Ok(());
     }
-    let ray_gen = shader(&ctx, ShaderStage::RayGen, include_str!("../shaders/closest.rgen.glsl"))?;
-    let miss = shader(&ctx, ShaderStage::Miss, include_str!("../shaders/record.rmiss.glsl"))?;
-    let hit = shader(&ctx, ShaderStage::ClosestHit, include_str!("../shaders/shell.rchit.glsl"))?;
+    let ray_gen = shader(&ctx, ShaderStage::RayGen, include_str!("../../shaders/closest.rgen.glsl"))?;
+    let miss = shader(&ctx, ShaderStage::Miss, include_str!("../../shaders/record.rmiss.glsl"))?;
+    let hit = shader(&ctx, ShaderStage::ClosestHit, include_str!("../../shaders/shell.rchit.glsl"))?;
     let report = shader(&ctx, ShaderStage::Intersection, REPORT)?;
     let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
         ray_gen: &[*ray_gen],

@@ -19,16 +19,16 @@ fn tracer(ctx: &Context, method: Method, corner: usize) -> Result<RayTracer> {
     let number = corner.to_string();
     let defines: &[_] = &[("CORNER", number.as_str())];
     if method == Method::Query {
-        let text = include_str!("../shaders/corner_query.comp.glsl");
+        let text = include_str!("../../shaders/corner_query.comp.glsl");
         let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
         let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
         return Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?));
     }
-    let ray_gen = shader(ctx, ShaderStage::RayGen, include_str!("../shaders/closest.rgen.glsl"))?;
-    let miss = shader(ctx, ShaderStage::Miss, include_str!("../shaders/record.rmiss.glsl"))?;
-    let text = include_str!("../shaders/corner.rchit.glsl");
+    let ray_gen = shader(ctx, ShaderStage::RayGen, include_str!("../../shaders/closest.rgen.glsl"))?;
+    let miss = shader(ctx, ShaderStage::Miss, include_str!("../../shaders/record.rmiss.glsl"))?;
+    let text = include_str!("../../shaders/corner.rchit.glsl");
     let hit = shader_with(ctx, ShaderStage::ClosestHit, text, defines)?;
-    let any_hit = shader(ctx, ShaderStage::AnyHit, include_str!("../shaders/corner.rahit.glsl"))?;
+    let any_hit = shader(ctx, ShaderStage::AnyHit, include_str!("../../shaders/corner.rahit.glsl"))?;
     let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
         ray_gen: &[*ray_gen],
         miss: &[*miss],

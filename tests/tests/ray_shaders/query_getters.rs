@@ -115,7 +115,7 @@ fn place(index: u32) -> Placed {
 }
 
 fn pipeline(ctx: &Context, defines: &[(&str, &str)]) -> Result<Holder<ComputePipelineHandle>> {
-    let text = include_str!("../shaders/getters_query.comp.glsl");
+    let text = include_str!("../../shaders/getters_query.comp.glsl");
     let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
     ctx.create_compute_pipeline(&ComputePipelineDesc { module: Some(*module), ..Default::default() })
 }

@@ -39,15 +39,15 @@ impl Verdict {
 fn counter(ctx: &Context, method: Method, verdict: Verdict) -> Result<RayTracer> {
     let defines = &[verdict.define()];
     if method == Method::Query {
-        let text = include_str!("../shaders/any_hit_query.comp.glsl");
+        let text = include_str!("../../shaders/any_hit_query.comp.glsl");
         let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
         let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
         return Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?));
     }
-    let ray_gen = shader(ctx, ShaderStage::RayGen, include_str!("../shaders/any_hit.rgen.glsl"))?;
-    let miss = shader(ctx, ShaderStage::Miss, include_str!("../shaders/any_hit_keep.rmiss.glsl"))?;
-    let closest = shader(ctx, ShaderStage::ClosestHit, include_str!("../shaders/any_hit.rchit.glsl"))?;
-    let text = include_str!("../shaders/any_hit.rahit.glsl");
+    let ray_gen = shader(ctx, ShaderStage::RayGen, include_str!("../../shaders/any_hit.rgen.glsl"))?;
+    let miss = shader(ctx, ShaderStage::Miss, include_str!("../../shaders/any_hit_keep.rmiss.glsl"))?;
+    let closest = shader(ctx, ShaderStage::ClosestHit, include_str!("../../shaders/any_hit.rchit.glsl"))?;
+    let text = include_str!("../../shaders/any_hit.rahit.glsl");
     let any = shader_with(ctx, ShaderStage::AnyHit, text, defines)?;
     let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
         ray_gen: &[*ray_gen],

@@ -1,0 +1,5 @@
+//! Documents that must say what is there.
+
+mod parity;
+mod programs;
+mod readme;

@@ -1,0 +1,7 @@
+//! Structures that the library builds and refits itself, on the GPU.
+
+mod anywhere;
+mod blas;
+mod refit;
+mod sort;
+mod tlas;

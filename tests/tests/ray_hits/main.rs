@@ -1,0 +1,10 @@
+//! What rays hit: triangles and boxes in every format, at every place, with every flag.
+
+mod boxes;
+mod flags;
+mod inactive;
+mod meshes;
+mod position_fetch;
+mod range;
+mod transforms;
+mod vertex_formats;

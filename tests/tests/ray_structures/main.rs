@@ -1,0 +1,11 @@
+//! Acceleration structures: built, ordered, split, changed, compacted and kept as bytes; what goes wrong, and what is left.
+
+mod batches;
+mod compaction;
+mod errors;
+mod leftovers;
+mod order;
+mod serialize;
+mod split;
+mod split_updates;
+mod updates;

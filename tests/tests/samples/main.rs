@@ -1,0 +1,24 @@
+//! The samples: their pictures, their frames, their sequences, and the report of the experiment.
+
+mod deferred;
+mod frames;
+mod hello_triangle;
+mod hybrid_images;
+mod hybrid_oit;
+mod hybrid_reference;
+mod hybrid_visibility;
+mod large_scene;
+mod mesh_shaders;
+mod omni_shadows;
+mod paper;
+mod reflections;
+mod render_to_cube_map;
+mod rtx_ao;
+mod rtx_hello;
+mod rtx_pipeline;
+mod rtx_textures;
+mod sequences;
+mod sponza;
+mod triplanar;
+mod ui_painter;
+mod yuv;

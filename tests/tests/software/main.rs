@@ -1,0 +1,6 @@
+//! Ray queries that the library walks itself.
+
+mod corrupt;
+mod pictures;
+mod queries;
+mod seams;
