@@ -4,6 +4,7 @@ use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
+use lvk::ash::{Entry, vk};
 use lvk::{Context, ContextDesc, RayQueryRequest, Validation, ValidationSink};
 use lvk_samples::driver::{DriverError, DriverRequest, prepare, radv_icd, swiftshader_icd};
 
@@ -177,9 +178,26 @@ fn loader() -> Result<&'static Option<PathBuf>, &'static str> {
     static LOADER: OnceLock<Result<Option<PathBuf>, String>> = OnceLock::new();
     let found = LOADER.get_or_init(|| {
         let driver = prepare(&DriverRequest { validation: true }).map_err(|error| error.to_string())?;
+        keep_driver(driver.loader.as_deref());
         Ok(driver.loader)
     });
     found.as_ref().map_err(String::as_str)
+}
+
+/// Keeps the driver loaded as long as the process runs, by an instance that is never destroyed: NVIDIA's can be loaded some
+/// thirty times by one, and no more. Where there is no driver, contexts say so.
+fn keep_driver(library: Option<&Path>) {
+    // SAFETY: the library is a Vulkan loader, and stays open.
+    let entry = unsafe { library.map_or_else(|| Entry::load(), |path| Entry::load_from(path)) };
+    let Ok(entry) = entry else { return };
+    let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_3);
+    let info = vk::InstanceCreateInfo::default().application_info(&application);
+    // SAFETY: the description is valid, and the entry is kept with the instance.
+    if let Ok(instance) = unsafe { entry.create_instance(&info, None) } {
+        // SAFETY: the instance is alive. Drivers are loaded by then.
+        drop(unsafe { instance.enumerate_physical_devices() });
+        std::mem::forget((entry, instance));
+    }
 }
 
 #[expect(clippy::panic, reason = "a test without its device has failed")]

@@ -1,15 +1,12 @@
 //! Tests of queues: each runs with queues of the device's own, with queues that are rehearsed on one, and with one for all.
 #![expect(clippy::unwrap_used, reason = "a test whose set-up fails has failed")]
 
-use std::sync::OnceLock;
-
 use lvk::{
     BufferHandle, CommandBuffer, ComputePipelineHandle, Context, Dependencies, Holder, Queue, QueueRequest,
-    SubmitHandle, ash,
+    SubmitHandle,
 };
 
 use crate::compute::compute_pipeline;
-use crate::device::vulkan;
 use crate::{TestDevice, device_with};
 
 /// Each way to have queues.
@@ -18,27 +15,8 @@ pub const REQUESTS: [QueueRequest; 3] =
 /// Words of the buffers that steps go through.
 pub const WORDS: usize = 64;
 
-/// Keeps the driver loaded as long as the process runs: NVIDIA's can be loaded some thirty times by one, and no more.
-fn keep_driver() {
-    static KEPT: OnceLock<Option<(ash::Entry, ash::Instance)>> = OnceLock::new();
-    KEPT.get_or_init(|| {
-        let library = vulkan()?;
-        // SAFETY: the library is a Vulkan loader, and stays open.
-        let entry =
-            unsafe { library.map_or_else(|| ash::Entry::load(), |path| ash::Entry::load_from(path)) }.ok()?;
-        let application = ash::vk::ApplicationInfo::default().api_version(ash::vk::API_VERSION_1_3);
-        let info = ash::vk::InstanceCreateInfo::default().application_info(&application);
-        // SAFETY: the description is valid, and the entry is kept with the instance.
-        let instance = unsafe { entry.create_instance(&info, None) }.ok()?;
-        // SAFETY: the instance is alive. Drivers are loaded by then.
-        drop(unsafe { instance.enumerate_physical_devices() });
-        Some((entry, instance))
-    });
-}
-
 /// Runs a test with each request, and says what stands behind the queues.
 pub fn each(test: impl Fn(&TestDevice)) {
-    keep_driver();
     for queues in REQUESTS {
         let Some(ctx) = device_with(|desc| desc.queues = queues) else { return };
         describe(&ctx, queues);
