@@ -14,11 +14,14 @@ pub(crate) fn lattice(x: i32, y: i32, seed: u32) -> f32 {
 pub(crate) fn smooth(x: f32, y: f32, period: [i32; 2], seed: u32) -> f32 {
     let (cell_x, cell_y) = (x.floor(), y.floor());
     let (fx, fy) = (fade(x - cell_x), fade(y - cell_y));
-    let wrapped = |k: f32, by: i32, period: i32| match period {
-        0 => (k as i32).wrapping_add(by),
-        _ => (k as i32).wrapping_add(by).rem_euclid(period),
+    let corners = |cell: f32, period: i32| {
+        [0, 1].map(|by| match (cell as i32).wrapping_add(by) {
+            k if period == 0 => k,
+            k => k.rem_euclid(period),
+        })
     };
-    let at = |i: i32, j: i32| lattice(wrapped(cell_x, i, period[0]), wrapped(cell_y, j, period[1]), seed);
+    let (xs, ys) = (corners(cell_x, period[0]), corners(cell_y, period[1]));
+    let at = |i: usize, j: usize| lattice(xs[i], ys[j], seed);
     at(0, 0).lerp(at(1, 0), fx).lerp(at(0, 1).lerp(at(1, 1), fx), fy)
 }
 
