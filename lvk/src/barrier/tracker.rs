@@ -56,12 +56,8 @@ impl Local {
     /// told in registers.
     #[inline(always)]
     fn step(&mut self, next: Use, wait: impl FnMut(Scopes)) {
-        match &self.prefix {
-            Prefix::Unused => self.begin(next),
-            Prefix::Reads(layout, _) if !self.past_prefix && !next.is_write() && *layout == next.layout => {
-                self.read_first(next);
-            }
-            _ => self.past_prefix = true,
+        if !self.past_prefix {
+            self.step_prefix(next);
         }
         if self.state.is_changed_by(next) {
             self.state.overwrite(next).into_iter().for_each(wait);
@@ -77,15 +73,16 @@ impl Local {
         barrier
     }
 
-    /// One more read that waits for nothing in the command buffer.
+    /// A use that may wait for nothing in the command buffer.
     #[inline(never)]
-    fn read_first(&mut self, next: Use) {
-        if let Prefix::Reads(_, reads) = &mut self.prefix {
-            reads.insert(next);
+    fn step_prefix(&mut self, next: Use) {
+        match &mut self.prefix {
+            Prefix::Unused => self.begin(next),
+            Prefix::Reads(layout, reads) if !next.is_write() && *layout == next.layout => reads.insert(next),
+            _ => self.past_prefix = true,
         }
     }
 
-    #[inline(never)]
     fn begin(&mut self, next: Use) {
         self.state = State::untouched_in(next.layout);
         self.past_prefix = next.is_write();

@@ -7,6 +7,7 @@ use super::dependencies::Dependencies;
 use super::uses::Uses;
 use crate::barrier::{ResourceId, Stages, Subresources, Use};
 use crate::error::Result;
+use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::texture_desc::TextureUsage;
 use crate::resource::{Buffer, Texture};
 use crate::shared::Shared;
@@ -47,33 +48,56 @@ impl CommandBuffer {
 
     /// The next command's shaders reach these in `stages`.
     pub(super) fn use_dependencies(&mut self, deps: &Dependencies<'_>, stages: Stages) -> Result<()> {
-        let (store, found) = (&self.shared.store, &mut self.found_textures);
-        for handle in deps.sampled_images {
-            let row = found.find(&store.textures, *handle)?;
-            let texture = found.at(row);
-            texture.check_usage(TextureUsage::SAMPLED)?;
-            self.uses.texture(found, row, texture.range, Use::shader_read(stages))?;
+        // Most lists are empty: asked here, where that is quick.
+        if !deps.sampled_images.is_empty() {
+            let (usage, next) = (TextureUsage::SAMPLED, Use::shader_read(stages));
+            self.use_images(deps.sampled_images, usage, next, |texture| texture.range)?;
         }
-        for handle in deps.storage_images {
-            let row = found.find(&store.textures, *handle)?;
-            let texture = found.at(row);
-            texture.check_usage(TextureUsage::STORAGE)?;
-            self.uses.texture(found, row, texture.stored_part, Use::shader_write(stages))?;
+        if !deps.storage_images.is_empty() {
+            let (usage, next) = (TextureUsage::STORAGE, Use::shader_write(stages));
+            self.use_images(deps.storage_images, usage, next, |texture| texture.stored_part)?;
         }
-        let found = &mut self.found_buffers;
-        for handle in deps.buffers {
-            let row = found.find(&store.buffers, *handle)?;
-            use_buffer(&mut self.uses, &mut self.host_reads, found.at(row), Use::shader_write(stages));
+        if !deps.buffers.is_empty() {
+            self.use_buffers(deps.buffers, Use::shader_write(stages))?;
         }
-        for handle in deps.read_buffers {
-            let row = found.find(&store.buffers, *handle)?;
-            use_buffer(&mut self.uses, &mut self.host_reads, found.at(row), Use::shader_read(stages));
+        if !deps.read_buffers.is_empty() {
+            self.use_buffers(deps.read_buffers, Use::shader_read(stages))?;
         }
         for handle in deps.acceleration_structures {
             self.shared.store.accel_structs.get(*handle)?;
             self.use_structures(stages);
         }
         if deps.wait_for.is_empty() { Ok(()) } else { self.wait_for(deps.wait_for) }
+    }
+
+    /// The next command's shaders reach a part of each texture, which must have the usage.
+    #[inline(never)]
+    fn use_images(
+        &mut self,
+        handles: &[TextureHandle],
+        usage: TextureUsage,
+        next: Use,
+        part: impl Fn(&Texture) -> Subresources,
+    ) -> Result<()> {
+        let (pool, found) = (&self.shared.store.textures, &mut self.found_textures);
+        for handle in handles {
+            let row = found.find(pool, *handle)?;
+            let texture = found.at(row);
+            texture.check_usage(usage)?;
+            self.uses.texture(found, row, part(texture), next)?;
+        }
+        Ok(())
+    }
+
+    /// The next command's shaders reach these buffers.
+    #[inline(never)]
+    fn use_buffers(&mut self, handles: &[BufferHandle], next: Use) -> Result<()> {
+        let (pool, found) = (&self.shared.store.buffers, &mut self.found_buffers);
+        for handle in handles {
+            let row = found.find(pool, *handle)?;
+            use_buffer(&mut self.uses, &mut self.host_reads, found.at(row), next);
+        }
+        Ok(())
     }
 
     /// Records the barriers in front of the next command.
@@ -84,7 +108,7 @@ impl CommandBuffer {
         let Recording { commands, tracker, images, .. } = &mut *self.recording;
         self.barriers.clear();
         self.uses.track(&self.found_textures, tracker, images, &mut self.barriers);
-        emit(&self.shared.gpu, *commands, &self.barriers, images);
+        emit(&self.shared.gpu, *commands, &self.barriers, images, &mut self.last_barrier);
     }
 
     /// In front of a command that runs shaders: makes what copies wrote readable, runs `gather`, then records the

@@ -56,8 +56,13 @@ impl<H: Handle, T> Found<H, T> {
         })
     }
 
-    /// The objects of this row and those behind it.
+    /// How many there are.
     #[inline]
+    pub(super) fn count(&self) -> usize {
+        self.objects.len()
+    }
+
+    /// The objects of this row and those behind it.
     pub(super) fn from(&self, row: usize) -> &[Arc<T>] {
         &self.objects[row..]
     }

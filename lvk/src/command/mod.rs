@@ -51,6 +51,7 @@ use crate::pipeline::{ComputePipeline, RayTracingPipeline};
 use crate::resource::{Buffer, Texture};
 use crate::shared::Shared;
 use crate::submit::Recording;
+use crate::submit::emit::LastBarrier;
 use crate::submit::profiler::Scopes;
 use crate::upload::staging::StagingChunk;
 
@@ -78,6 +79,7 @@ pub struct CommandBuffer {
     found_textures: Found<TextureHandle, Texture>,
     uses: Uses,
     barriers: Barriers,
+    last_barrier: LastBarrier,
     compute: Option<Arc<ComputePipeline>>,
     ray_tracing: Option<Arc<RayTracingPipeline>>,
     sets_bound: Vec<vk::PipelineBindPoint>,
@@ -146,6 +148,7 @@ impl CommandBuffer {
             found_textures: Found::default(),
             uses: Uses::default(),
             barriers: Barriers::default(),
+            last_barrier: LastBarrier::default(),
             compute: None,
             ray_tracing: None,
             sets_bound: Vec::new(),

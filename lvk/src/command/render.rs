@@ -214,6 +214,7 @@ impl<'a> RenderPass<'a> {
     }
 
     /// Draws vertices (`vkCmdDraw`).
+    #[inline]
     pub fn draw(&mut self, vertices: Range<u32>, instances: Range<u32>) -> Result<()> {
         self.check_draw()?;
         let (count, instance_count) = (length(&vertices), length(&instances));
@@ -431,6 +432,7 @@ fn viewport_fits([x, y, width, height]: [f32; 4], limits: &Limits) -> bool {
     sides && [x, x + width, y, y + height].iter().all(|at| (low..=high).contains(at))
 }
 
+#[inline]
 fn length(range: &Range<u32>) -> u32 {
     range.end.saturating_sub(range.start)
 }

@@ -128,14 +128,22 @@ impl Uses {
         images: &mut Images,
         out: &mut Barriers,
     ) {
-        for texture in found.from(self.known_images) {
-            images.insert(texture.image.id, texture.image.for_barriers());
-            self.known_images += 1;
+        if self.known_images < found.count() {
+            self.learn_images(found, images);
         }
         for PartUse { id, part, next, owner } in self.textures.iter() {
             tracker.use_texture(*id, found.at(*owner).image.shape, *part, *next, out);
         }
         self.textures.clear();
+    }
+
+    /// Tells the images of textures that were found since. Apart, as most commands find none.
+    #[inline(never)]
+    fn learn_images(&mut self, found: &Textures, images: &mut Images) {
+        for texture in found.from(self.known_images) {
+            images.insert(texture.image.id, texture.image.for_barriers());
+        }
+        self.known_images = found.count();
     }
 
     /// Forgets a command that failed before it was recorded.

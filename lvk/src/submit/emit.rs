@@ -10,13 +10,51 @@ use crate::resource::image::BarrierImage;
 /// Images a command buffer touches, by the id the tracker knows them by.
 pub(crate) type Images = IdMap<BarrierImage>;
 
-/// Records the barriers, if there are any.
+/// The memory barrier that was translated last, with its names in Vulkan: the next one is mostly the same.
+#[derive(Debug, Default)]
+pub(crate) struct LastBarrier {
+    barrier: MemoryBarrier,
+    names: BarrierNames,
+}
+
+/// Both sides of a memory barrier by their Vulkan names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+struct BarrierNames {
+    src_stages: vk::PipelineStageFlags2,
+    src_access: vk::AccessFlags2,
+    dst_stages: vk::PipelineStageFlags2,
+    dst_access: vk::AccessFlags2,
+}
+
+impl LastBarrier {
+    /// A barrier by its Vulkan names, as `translate` finds them where it is another than the last one.
+    #[inline]
+    fn names_of(
+        &mut self,
+        barrier: &MemoryBarrier,
+        translate: impl FnOnce(&MemoryBarrier) -> BarrierNames,
+    ) -> &BarrierNames {
+        if self.barrier != *barrier {
+            *self = Self { barrier: *barrier, names: translate(barrier) };
+        }
+        &self.names
+    }
+}
+
+/// Records the barriers, if there are any. `last` is kept from one call to the next, of one device.
 #[inline]
-pub(crate) fn emit(gpu: &Gpu, commands: vk::CommandBuffer, barriers: &Barriers, images: &Images) {
+pub(crate) fn emit(
+    gpu: &Gpu,
+    commands: vk::CommandBuffer,
+    barriers: &Barriers,
+    images: &Images,
+    last: &mut LastBarrier,
+) {
     match &barriers.memory {
         None if barriers.images.is_empty() => {}
         Some(memory) if barriers.images.is_empty() && is_whole(gpu, memory) => {
-            record(gpu, commands, &[memory_barrier(gpu, memory)], &[]);
+            let names = last.names_of(memory, |barrier| barrier_names(gpu, barrier));
+            record(gpu, commands, &[names.barrier()], &[]);
         }
         memory => emit_all(gpu, commands, memory.as_ref(), &barriers.images, images),
     }
@@ -33,10 +71,11 @@ fn emit_all(
     match memory {
         None => record(gpu, commands, &[], &images),
         Some(memory) if is_whole(gpu, memory) => {
-            record(gpu, commands, &[memory_barrier(gpu, memory)], &images);
+            record(gpu, commands, &[barrier_names(gpu, memory).barrier()], &images);
         }
         Some(memory) => {
-            let parts: Vec<_> = memory.without_ray_queries().map(|part| memory_barrier(gpu, &part)).collect();
+            let parts: Vec<_> =
+                memory.without_ray_queries().map(|part| barrier_names(gpu, &part).barrier()).collect();
             record(gpu, commands, &parts, &images);
         }
     }
@@ -108,13 +147,25 @@ pub(crate) fn emit_moves(
     unsafe { gpu.device.cmd_pipeline_barrier2(commands, &info) };
 }
 
-#[inline]
-fn memory_barrier(gpu: &Gpu, barrier: &MemoryBarrier) -> vk::MemoryBarrier2<'static> {
-    vk::MemoryBarrier2::default()
-        .src_stage_mask(stages(gpu, barrier.src_stages))
-        .src_access_mask(access(gpu, barrier.src_access))
-        .dst_stage_mask(stages(gpu, barrier.dst_stages))
-        .dst_access_mask(access(gpu, barrier.dst_access))
+impl BarrierNames {
+    #[inline]
+    fn barrier(&self) -> vk::MemoryBarrier2<'static> {
+        vk::MemoryBarrier2::default()
+            .src_stage_mask(self.src_stages)
+            .src_access_mask(self.src_access)
+            .dst_stage_mask(self.dst_stages)
+            .dst_access_mask(self.dst_access)
+    }
+}
+
+#[inline(never)]
+fn barrier_names(gpu: &Gpu, barrier: &MemoryBarrier) -> BarrierNames {
+    BarrierNames {
+        src_stages: stages(gpu, barrier.src_stages),
+        src_access: access(gpu, barrier.src_access),
+        dst_stages: stages(gpu, barrier.dst_stages),
+        dst_access: access(gpu, barrier.dst_access),
+    }
 }
 
 fn image_barrier(
@@ -287,7 +338,42 @@ mod tests {
         assert!(access(Access::empty()).is_empty());
     }
 
+    fn some_barrier() -> impl Strategy<Value = MemoryBarrier> {
+        (0..3_u16, 0..3_u32, 0..3_u16, 0..3_u32).prop_map(
+            |(src_stages, src_access, dst_stages, dst_access)| MemoryBarrier {
+                src_stages: Stages::from_bits_retain(src_stages),
+                src_access: Access::from_bits_retain(src_access),
+                dst_stages: Stages::from_bits_retain(dst_stages),
+                dst_access: Access::from_bits_retain(dst_access),
+            },
+        )
+    }
+
+    /// As [`barrier_names`], where the device has everything.
+    fn all_names(barrier: &MemoryBarrier) -> BarrierNames {
+        let stages =
+            |stages: Stages| vk::PipelineStageFlags2::from_raw(named(&STAGE_NAMES, stages.bits().into()));
+        let access = |access: Access| vk::AccessFlags2::from_raw(named(&ACCESS_NAMES, access.bits()));
+        BarrierNames {
+            src_stages: stages(barrier.src_stages),
+            src_access: access(barrier.src_access),
+            dst_stages: stages(barrier.dst_stages),
+            dst_access: access(barrier.dst_access),
+        }
+    }
+
     proptest! {
+        /// Also for one that differs from the last in a single mask.
+        #[test]
+        fn a_barrier_has_its_own_names_whatever_came_before(
+            barriers in prop::collection::vec(some_barrier(), 0..40)
+        ) {
+            let mut last = LastBarrier::default();
+            for barrier in barriers {
+                prop_assert_eq!(*last.names_of(&barrier, all_names), all_names(&barrier));
+            }
+        }
+
         #[test]
         fn a_mask_has_the_names_of_all_its_bits(bits in 0..1_u32 << ACCESSES.len()) {
             let of = |single: &[u64]| {

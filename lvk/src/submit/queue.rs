@@ -6,7 +6,7 @@ use ash::vk;
 
 use super::command_ring::{CommandRing, CommandSlot};
 use super::deferred::Deferred;
-use super::emit::{Images, Side, emit, emit_moves, stages};
+use super::emit::{Images, LastBarrier, Side, emit, emit_moves, stages};
 use super::lanes::{Departure, Lanes, Sent, Site, Step};
 use super::ownership::{Access, Clock, LANES, PerLane};
 use super::presentable::Presentables;
@@ -258,7 +258,13 @@ impl<T> Submitter<T> {
             let barriers = inner.lanes.submit_alone(&recording.tracker);
             if !barriers.is_empty() {
                 begin(&self.gpu, recording.slot.prologue)?;
-                emit(&self.gpu, recording.slot.prologue, &barriers, &recording.images);
+                emit(
+                    &self.gpu,
+                    recording.slot.prologue,
+                    &barriers,
+                    &recording.images,
+                    &mut LastBarrier::default(),
+                );
                 end(&self.gpu, recording.slot.prologue)?;
                 batch.push(recording.slot.prologue);
             }
@@ -312,7 +318,7 @@ impl<T> Submitter<T> {
         if !step.arrivals.is_empty() {
             emit_moves(&self.gpu, commands, &step.arrivals, images, Side::Acquire);
         }
-        emit(&self.gpu, commands, &step.barriers, images);
+        emit(&self.gpu, commands, &step.barriers, images, &mut LastBarrier::default());
         end(&self.gpu, commands)
     }
 

@@ -44,7 +44,7 @@ impl CommandBuffer {
                 }
             }
         }
-        emit(&self.shared.gpu, *commands, &self.barriers, images);
+        emit(&self.shared.gpu, *commands, &self.barriers, images, &mut self.last_barrier);
     }
 }
 
