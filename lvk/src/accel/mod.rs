@@ -4,6 +4,7 @@ pub(crate) mod blas;
 pub(crate) mod blob;
 pub(crate) mod bounds;
 pub(crate) mod build;
+pub(crate) mod build_run;
 pub(crate) mod compaction;
 pub(crate) mod culling;
 pub(crate) mod cut;

@@ -62,49 +62,6 @@ impl ScratchTiers {
     }
 }
 
-/// Builds one after the other that do not wait for each other, as each works in scratch memory of its own. Alignments are
-/// powers of two.
-#[derive(Debug, Default)]
-pub(crate) struct ScratchRun {
-    /// Where the next build may work.
-    next: u64,
-    /// Where the memory ends; at `next` or before where no run is under way.
-    end: u64,
-}
-
-impl ScratchRun {
-    /// Begins with a build at `start`, an aligned address; those that follow may work up to `end`.
-    pub(crate) fn begin(&mut self, start: u64, end: u64, bytes: u64, alignment: u64) {
-        let after = behind(start, bytes, alignment);
-        (self.next, self.end) = (after.unwrap_or(u64::MAX), end);
-    }
-
-    /// The address at which the next build works, unless it has to wait for those before.
-    #[inline]
-    pub(crate) fn join(&mut self, bytes: u64, alignment: u64) -> Option<u64> {
-        let address = self.next;
-        let after = behind(address, bytes, alignment).filter(|after| *after <= self.end)?;
-        // A build that needs no memory tells nobody whether a run is under way.
-        (after > address).then(|| {
-            self.next = after;
-            address
-        })
-    }
-
-    /// Whatever comes next waits.
-    #[inline]
-    pub(crate) fn stop(&mut self) {
-        self.end = 0;
-    }
-}
-
-/// The first aligned address behind so many bytes.
-#[inline]
-fn behind(address: u64, bytes: u64, alignment: u64) -> Option<u64> {
-    let mask = alignment.saturating_sub(1);
-    Some(address.checked_add(bytes)?.checked_add(mask)? & !mask)
-}
-
 /// Bytes to allocate for `bytes` of scratch, so that they still fit once the address is rounded up: Vulkan aligns the
 /// address a build is given, and a buffer's address need not be aligned that far.
 pub(crate) fn scratch_buffer_bytes(bytes: u64, alignment: u64) -> u64 {
@@ -163,34 +120,6 @@ mod tests {
             for pair in batches.windows(2) {
                 let next = sizes[pair[1].builds.start].next_multiple_of(alignment);
                 prop_assert!(pair[0].bytes + next > budget);
-            }
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn builds_of_a_run_lie_behind_each_other_and_within_the_memory(
-            start in 1..1_000_u64,
-            room in 0..20_000_u64,
-            alignment in (0..9_u32).prop_map(|bit| 1_u64 << bit),
-            sizes in prop::collection::vec(prop_oneof![9 => 0..3_000_u64, 1 => Just(u64::MAX)], 1..30),
-            stop in 1..40_usize,
-        ) {
-            let start = start.next_multiple_of(alignment);
-            let mut run = ScratchRun::default();
-            prop_assert_eq!(run.join(sizes[0], alignment), None, "nothing is under way");
-            run.begin(start, start + room, sizes[0], alignment);
-            let mut free = start.saturating_add(sizes[0]);
-            for (place, size) in sizes.iter().enumerate().skip(1) {
-                if place == stop {
-                    run.stop();
-                }
-                let next = free.checked_next_multiple_of(alignment);
-                let end = next.and_then(|next| next.checked_add(*size)?.checked_next_multiple_of(alignment));
-                let fits = place < stop && *size > 0 && end.is_some_and(|end| end <= start + room);
-                let joined = run.join(*size, alignment);
-                prop_assert_eq!(joined, next.filter(|_| fits));
-                free = joined.map_or(free, |address| address + size);
             }
         }
     }

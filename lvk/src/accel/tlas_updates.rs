@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::AccelStruct;
+use super::build_run::BuildRun;
 use super::shown::Marks;
 use super::tlas::TlasContents;
 use crate::error::{Error, Result};
@@ -47,6 +48,8 @@ pub(crate) struct TlasUpdates {
     list: Vec<TlasUpdate>,
     /// A bit for each target, which several may share.
     targets: u64,
+    /// Those that run side by side.
+    pub(crate) run: BuildRun,
     pub(crate) marks: Marks,
     /// The place of what each instance refers to.
     pub(crate) refers: Vec<u32>,
@@ -64,7 +67,7 @@ impl TlasUpdates {
         self.list.iter().rev().find(|update| update.target.id == target.id)
     }
 
-    #[inline]
+    #[inline(always)]
     pub(crate) fn push(&mut self, update: TlasUpdate) {
         if self.list.capacity() == 0 {
             self.list.reserve(Self::ROOM);
@@ -87,6 +90,7 @@ impl TlasUpdates {
     /// Takes them all, and keeps the memory.
     pub(crate) fn drain(&mut self) -> impl Iterator<Item = TlasUpdate> + '_ {
         self.targets = 0;
+        self.run.stop();
         self.list.drain(..)
     }
 }

@@ -47,6 +47,7 @@ impl CommandBuffer {
     }
 
     /// The next command's shaders reach these in `stages`.
+    #[inline]
     pub(super) fn use_dependencies(&mut self, deps: &Dependencies<'_>, stages: Stages) -> Result<()> {
         // Most lists are empty: asked here, where that is quick.
         if !deps.sampled_images.is_empty() {
@@ -104,7 +105,7 @@ impl CommandBuffer {
     #[inline]
     pub(super) fn flush(&mut self) {
         self.end_rendering();
-        self.scratch_run.stop();
+        self.tlas_updates.run.stop();
         let Recording { commands, tracker, images, .. } = &mut *self.recording;
         self.barriers.clear();
         self.uses.track(&self.found_textures, tracker, images, &mut self.barriers);

@@ -41,7 +41,6 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::accel::compaction::SizeQuery;
-use crate::accel::scratch::ScratchRun;
 use crate::accel::tlas_updates::TlasUpdates;
 use crate::barrier::{Barriers, ResourceId, Use};
 use crate::error::Result;
@@ -94,8 +93,6 @@ pub struct CommandBuffer {
     views: u32,
     settle: Vec<Settle>,
     tlas_updates: TlasUpdates,
-    /// Builds of top-level structures side by side.
-    scratch_run: ScratchRun,
     /// Small regions of staging memory come from here.
     staged: StagingChunk,
     open_builds: Vec<OpenBuild>,
@@ -160,7 +157,6 @@ impl CommandBuffer {
             had_pass: false,
             settle: Vec::new(),
             tlas_updates: TlasUpdates::default(),
-            scratch_run: ScratchRun::default(),
             staged: StagingChunk::default(),
             open_builds: Vec::new(),
             refits: HashMap::new(),

@@ -15,7 +15,7 @@ use crate::accel::scratch::aligned_scratch_address;
 use crate::accel::shown::{Revision, ShownSet};
 use crate::accel::tlas::{InstanceSource, Tlas, TlasContents};
 use crate::accel::tlas_updates::TlasUpdate;
-use crate::barrier::{Stages, Use};
+use crate::barrier::{ResourceId, Stages, Use};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::error::{Error, Result, check_limit};
 use crate::handle::AccelStructHandle;
@@ -176,8 +176,6 @@ impl CommandBuffer {
 
     /// Takes the updates so far for submitted: for the command buffer that goes before every other one.
     pub(crate) fn apply_tlas_updates(&mut self) {
-        // They are not known to be this command buffer's own any more.
-        self.scratch_run.stop();
         let shown = self.tlas_updates.drain().map(|update| self.shared.show(update));
         self.open_builds.extend(shown.map(OpenBuild::of_tlas));
     }
@@ -254,7 +252,7 @@ impl CommandBuffer {
         let sizes = &target.sizes;
         let scratch_bytes = if refit { sizes.update_scratch_bytes } else { sizes.build_scratch_bytes };
         let records = tlas.records.get().filter(|_| ready.is_from_kernel);
-        let scratch = self.join_builds(scratch_bytes, !before.is_own, records.map(|records| &**records))?;
+        let scratch = self.join_builds(target.id, scratch_bytes, records.map(|records| &**records))?;
         let build = TlasBuild {
             flags: target.flags,
             instances: ready.address,
@@ -271,18 +269,28 @@ impl CommandBuffer {
         self.note_contents(target, before, After { count, built_count, shown, source, refit })
     }
 
-    /// Scratch memory for a build of a top-level structure, behind the barriers it needs. There are none where the command
-    /// before was such a build too, of another structure, and there is memory left beside its own; then both may run at
-    /// once.
+    /// Scratch memory for a build of a top-level structure, behind the barriers it needs. There are none where the commands
+    /// before were such builds too, of other structures, and there is memory left beside theirs; then all may run at once.
     #[inline]
-    fn join_builds(&mut self, bytes: u64, may_join: bool, records: Option<&Buffer>) -> Result<u64> {
+    fn join_builds(&mut self, target: ResourceId, bytes: u64, records: Option<&Buffer>) -> Result<u64> {
         let alignment = self.shared.gpu.caps.limits.scratch_alignment.into();
-        if may_join
-            && records.is_none()
-            && let Some(scratch) = self.scratch_run.join(bytes, alignment)
+        if records.is_none()
+            && let Some(scratch) = self.tlas_updates.run.join(target, bytes, alignment)
         {
             return Ok(scratch);
         }
+        self.begin_builds(target, bytes, alignment, records)
+    }
+
+    /// The same for a build that waits for those before.
+    #[inline(never)]
+    fn begin_builds(
+        &mut self,
+        target: ResourceId,
+        bytes: u64,
+        alignment: u64,
+        records: Option<&Buffer>,
+    ) -> Result<u64> {
         let shared = &self.shared;
         let own = &shared.scratch[self.recording.lane];
         let (buffer, replaced) = own.get(&shared.gpu, bytes)?;
@@ -296,7 +304,7 @@ impl CommandBuffer {
         self.flush();
         let (start, end) =
             (aligned_scratch_address(buffer.address, alignment), buffer.address + buffer.size_bytes);
-        self.scratch_run.begin(start, end, bytes, alignment);
+        self.tlas_updates.run.begin(target, start..end, bytes, alignment);
         Ok(start)
     }
 

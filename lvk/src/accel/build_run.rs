@@ -1,0 +1,170 @@
+//! Builds of top-level structures one after the other: which of them need not wait for those before. Decisions only.
+
+use std::ops::Range;
+
+use crate::barrier::ResourceId;
+
+/// Builds that may run at once: each of another structure, in scratch memory of its own. Alignments are powers of two.
+#[derive(Debug, Default)]
+pub(crate) struct BuildRun {
+    /// Where the next build may work.
+    next: u64,
+    /// Where the memory ends; at `next` or before where no run is under way.
+    end: u64,
+    targets: Targets,
+}
+
+impl BuildRun {
+    /// Begins with a build of `target` at the start of `memory`, an aligned address; it waits for everything before.
+    pub(crate) fn begin(&mut self, target: ResourceId, memory: Range<u64>, bytes: u64, alignment: u64) {
+        let after = behind(memory.start, bytes, alignment);
+        (self.next, self.end) = (after.unwrap_or(u64::MAX), memory.end);
+        self.targets.clear();
+        self.targets.insert(target);
+    }
+
+    /// The address at which the next build works, of `target`, unless it has to wait for those before.
+    #[inline]
+    pub(crate) fn join(&mut self, target: ResourceId, bytes: u64, alignment: u64) -> Option<u64> {
+        let address = self.next;
+        let after = behind(address, bytes, alignment).filter(|after| *after <= self.end)?;
+        // A build that needs no memory tells nobody whether a run is under way.
+        if after == address || !self.targets.insert(target) {
+            return None;
+        }
+        self.next = after;
+        Some(address)
+    }
+
+    /// Whatever comes next waits.
+    #[inline]
+    pub(crate) fn stop(&mut self) {
+        self.end = 0;
+    }
+}
+
+/// What a run builds, each once.
+#[derive(Debug, Default)]
+struct Targets {
+    /// A bit for each, which several may share. Identities are consecutive, so few do.
+    bits: u64,
+    ids: Vec<ResourceId>,
+}
+
+impl Targets {
+    fn clear(&mut self) {
+        self.bits = 0;
+        self.ids.clear();
+    }
+
+    /// Whether it is new.
+    #[inline]
+    fn insert(&mut self, id: ResourceId) -> bool {
+        let bit = 1 << (id.0 % 64);
+        if self.bits & bit != 0 && self.ids.contains(&id) {
+            return false;
+        }
+        self.bits |= bit;
+        self.ids.push(id);
+        true
+    }
+}
+
+/// The first aligned address behind so many bytes.
+#[inline]
+fn behind(address: u64, bytes: u64, alignment: u64) -> Option<u64> {
+    let mask = alignment.saturating_sub(1);
+    Some(address.checked_add(bytes)?.checked_add(mask)? & !mask)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    #[derive(Debug, Clone)]
+    enum Command {
+        /// A build of one of a few structures.
+        Build { target: u64, bytes: u64 },
+        /// Something else, in front of which there may be a barrier.
+        Other,
+    }
+
+    fn command() -> impl Strategy<Value = Command> {
+        let bytes = prop_oneof![9 => 0..900_u64, 1 => Just(u64::MAX)];
+        // Some share a bit.
+        let target = prop_oneof![0..6_u64, 64..70_u64];
+        prop_oneof![
+            9 => (target, bytes).prop_map(|(target, bytes)| Command::Build { target, bytes }),
+            1 => Just(Command::Other),
+        ]
+    }
+
+    /// What nothing keeps apart: structures, each with its scratch memory.
+    type Unordered = Vec<(u64, Range<u64>)>;
+
+    fn clash(unordered: &Unordered, target: u64, memory: &Range<u64>) -> bool {
+        unordered
+            .iter()
+            .any(|(other, taken)| *other == target || (taken.start < memory.end && memory.start < taken.end))
+    }
+
+    proptest! {
+        /// Two builds of one structure wait for each other, and so do two in the same memory; nothing else does.
+        #[test]
+        fn builds_wait_for_the_same_structure_and_for_memory_and_for_nothing_else(
+            commands in prop::collection::vec(command(), 1..60),
+            start in 1..1_000_u64,
+            room in 0..6_000_u64,
+            alignment in (0..9_u32).prop_map(|bit| 1_u64 << bit),
+        ) {
+            let start = start.next_multiple_of(alignment);
+            let (mut run, mut unordered) = (BuildRun::default(), None::<Unordered>);
+            for command in commands {
+                let Command::Build { target, bytes } = command else {
+                    run.stop();
+                    unordered = None;
+                    continue;
+                };
+                let next = unordered.iter().flatten().last().map(|(_, last)| {
+                    last.end.checked_next_multiple_of(alignment)
+                });
+                let end = next.flatten().and_then(|next| {
+                    next.checked_add(bytes)?.checked_next_multiple_of(alignment)
+                });
+                let fits = bytes > 0 && end.is_some_and(|end| end <= start + room);
+                match run.join(ResourceId(target), bytes, alignment) {
+                    Some(address) => {
+                        let memory = address..address + bytes;
+                        prop_assert!(fits && address.is_multiple_of(alignment));
+                        prop_assert!(unordered.is_some(), "the first waits");
+                        let before = unordered.get_or_insert_default();
+                        prop_assert!(!clash(before, target, &memory), "{target} at {memory:?} beside {before:?}");
+                        before.push((target, memory));
+                    }
+                    None => {
+                        let is_new = unordered.iter().flatten().all(|(other, _)| *other != target);
+                        prop_assert!(!(fits && is_new), "{target} waits for nothing");
+                        run.begin(ResourceId(target), start..start + room, bytes, alignment);
+                        unordered = Some(vec![(target, start..start.saturating_add(bytes))]);
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_second_update_of_one_structure_waits_and_one_of_another_does_not() {
+        let [first, second] = [ResourceId(1), ResourceId(2)];
+        let mut run = BuildRun::default();
+        assert_eq!(run.join(first, 16, 16), None);
+        run.begin(first, 0..256, 16, 16);
+        assert_eq!(run.join(second, 16, 16), Some(16));
+        assert_eq!(run.join(first, 16, 16), None);
+        run.begin(first, 0..256, 16, 16);
+        assert_eq!(run.join(second, 16, 16), Some(16), "what was before waits already");
+        run.stop();
+        assert_eq!(run.join(ResourceId(3), 16, 16), None);
+    }
+}
