@@ -63,6 +63,7 @@ impl AccelStruct {
     }
 
     /// Fails unless the structure may be refitted.
+    #[inline]
     pub(crate) fn check_refit(&self) -> Result<()> {
         if self.allows_refit() {
             return Ok(());

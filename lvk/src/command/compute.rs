@@ -66,6 +66,7 @@ impl CommandBuffer {
         Ok(pipeline)
     }
 
+    #[inline]
     fn use_compute(&mut self, ray_query: bool, dependencies: &Dependencies<'_>) -> Result<()> {
         if ray_query {
             self.use_structures(Stages::COMPUTE);

@@ -88,17 +88,15 @@ impl CommandBuffer {
         let (shared, sequence) = (&self.shared, self.recording.sequence);
         let find = |handle| shared.store.accel_structs.get(handle);
         let marks = &mut self.tlas_updates.marks;
-        let mut written = Ok(Written::Nothing);
-        let region =
+        let (address, written) =
             shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, |out| {
-                written = write_addresses(name, instances, &known, marks, &find, out);
+                write_addresses(name, instances, &known, marks, &find, out)
             })?;
         let shown = match written? {
             Written::Same => known,
             Written::Other(shown) => shown,
             Written::Nothing => return Ok(Planned::Kernel(self.plan_instances(name, instances, known)?)),
         };
-        let address = region.address;
         Ok(Planned::Ready(Ready { address, built_count, shown, source: None, is_from_kernel: false }))
     }
 
@@ -294,9 +292,9 @@ impl CommandBuffer {
     /// The address of bytes that the GPU may read until the command buffer is done.
     fn stage(&mut self, bytes: u64, fill: impl FnOnce(&mut [u8])) -> Result<u64> {
         let sequence = self.recording.sequence;
-        let region =
+        let (address, ()) =
             self.shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, fill)?;
-        Ok(region.address)
+        Ok(address)
     }
 
     /// A buffer that lives as long as the structure, made when it is first needed.

@@ -36,6 +36,7 @@ impl CommandBuffer {
     }
 
     /// Fails if this is for the transfer queue.
+    #[inline]
     pub(super) fn needs_compute(&self, command: &'static str) -> Result<()> {
         needs_compute(self.queue, command)
     }
@@ -106,6 +107,7 @@ impl CommandBuffer {
 }
 
 /// Fails for the transfer queue.
+#[inline]
 pub(crate) fn needs_compute(queue: Queue, command: &'static str) -> Result<()> {
     match queue {
         Queue::Graphics | Queue::Compute => Ok(()),

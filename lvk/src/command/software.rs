@@ -209,11 +209,11 @@ impl CommandBuffer {
             let bytes = tlas_blob::build(&placed, software.room);
             return self.fill_software(target, shared.all_tlas, &software.body, &bytes);
         }
-        let mut written = Ok(());
         let bytes = instance_bytes(instances.len().max(1) as u32);
-        let region = shared.staging.write_with(bytes, ALIGNMENT, self.recording.sequence, |out| {
-            written = self.write_software_instances(target, instances, out);
-        })?;
+        let (region, written) =
+            shared.staging.write_with(bytes, ALIGNMENT, self.recording.sequence, |out| {
+                self.write_software_instances(target, instances, out)
+            })?;
         written?;
         let count = instances.len() as u32;
         let source = BuildSource::Instances { records: region.address, count, table: None };

@@ -25,7 +25,7 @@ pub(crate) struct StagingRegion {
 /// A piece of a page that one command buffer cuts small regions from, without the lock. No other region overlaps it.
 #[derive(Default)]
 pub(crate) struct StagingChunk {
-    page: Option<(Arc<Buffer>, usize)>,
+    page: Option<Arc<Buffer>>,
     /// Where the next region may begin, in the page.
     next: u64,
     end: u64,
@@ -36,15 +36,14 @@ impl StagingChunk {
     /// Larger regions are taken from pages.
     const MOST_BYTES: u64 = Self::BYTES / 4;
 
-    /// A region at an address of this alignment, if the chunk has room for it.
+    /// Where in the page a region begins at an address of this alignment, if the chunk has room for it.
     #[inline]
-    fn cut(&mut self, bytes: u64, align: u64) -> Option<(StagingRegion, &Buffer)> {
-        let (buffer, page) = self.page.as_ref()?;
-        let address = (buffer.address + self.next).next_multiple_of(align);
-        let offset = address - buffer.address;
+    fn cut(&mut self, bytes: u64, align: u64) -> Option<u64> {
+        let buffer = self.page.as_ref()?;
+        let offset = (buffer.address + self.next).next_multiple_of(align.max(1)) - buffer.address;
         let end = offset.checked_add(bytes).filter(|end| *end <= self.end)?;
         self.next = end;
-        Some((StagingRegion { buffer: buffer.raw, offset, address, page: *page }, buffer))
+        Some(offset)
     }
 }
 
@@ -85,52 +84,61 @@ impl Staging {
     /// Copies `data` to where the command buffer `sequence` can read it, at an address of this alignment (a power of
     /// two).
     pub(crate) fn write(&self, data: &[u8], align: u64, sequence: u64) -> Result<StagingRegion> {
-        self.write_with(data.len() as u64, align, sequence, |region| {
-            region.copy_from_slice(data);
-        })
+        let (region, ()) =
+            self.write_with(data.len() as u64, align, sequence, |region| region.copy_from_slice(data))?;
+        Ok(region)
     }
 
-    /// As [`write`](Self::write), but `fill` writes the bytes in place.
-    pub(crate) fn write_with(
+    /// As [`write`](Self::write), but `fill` writes the bytes in place. Answers what it does.
+    pub(crate) fn write_with<R>(
         &self,
         bytes: u64,
         align: u64,
         sequence: u64,
-        fill: impl FnOnce(&mut [u8]),
-    ) -> Result<StagingRegion> {
+        fill: impl FnOnce(&mut [u8]) -> R,
+    ) -> Result<(StagingRegion, R)> {
         self.fill(bytes, align, Some(sequence), fill)
     }
 
-    /// As [`write_with`](Self::write_with), small regions from a chunk that belongs to the same command buffer.
+    /// As [`write_with`](Self::write_with), small regions from a chunk that belongs to the same command buffer. Answers the
+    /// address.
     #[inline]
-    pub(crate) fn write_in(
+    pub(crate) fn write_in<R>(
         &self,
         chunk: &mut StagingChunk,
         bytes: u64,
         align: u64,
         sequence: u64,
-        fill: impl FnOnce(&mut [u8]),
-    ) -> Result<StagingRegion> {
+        fill: impl FnOnce(&mut [u8]) -> R,
+    ) -> Result<(u64, R)> {
         if bytes > StagingChunk::MOST_BYTES || align > StagingChunk::MOST_BYTES {
-            return self.write_with(bytes, align, sequence, fill);
+            let (region, answer) = self.write_with(bytes, align, sequence, fill)?;
+            return Ok((region.address, answer));
         }
-        if let Some((region, buffer)) = chunk.cut(bytes, align.max(1)) {
-            // SAFETY: the region lies inside the chunk, and no other one cut from it overlaps it.
-            return unsafe { fill_region(region, bytes, buffer, fill) };
-        }
+        let offset = match chunk.cut(bytes, align) {
+            Some(offset) => offset,
+            None => self.renew(chunk, sequence, (bytes, align))?,
+        };
+        let Some(buffer) = &chunk.page else { return Err(no_room()) };
+        // SAFETY: the region lies inside the chunk, and no other one cut from it overlaps it.
+        let answer = unsafe { fill_region(offset, bytes, buffer, fill) }?;
+        Ok((buffer.address + offset, answer))
+    }
+
+    /// Takes a new chunk in place of a full one, and cuts the region from it.
+    #[inline(never)]
+    fn renew(&self, chunk: &mut StagingChunk, sequence: u64, (bytes, align): (u64, u64)) -> Result<u64> {
         let (place, buffer) = self.place(StagingChunk::BYTES, Buffer::ALIGNMENT, Some(sequence))?;
         let (next, end) = (place.offset, place.offset + StagingChunk::BYTES);
-        *chunk = StagingChunk { page: Some((buffer, place.page)), next, end };
-        match chunk.cut(bytes, align.max(1)) {
-            // SAFETY: as above.
-            Some((region, buffer)) => unsafe { fill_region(region, bytes, buffer, fill) },
-            None => Err(Error::usage("staging", "a new chunk has no room")),
-        }
+        *chunk = StagingChunk { page: Some(buffer), next, end };
+        chunk.cut(bytes, align).ok_or_else(no_room)
     }
 
     /// Copies `data` to where some command buffer will read it; see [`hold`](Self::hold).
     pub(crate) fn keep(&self, data: &[u8], align: u64) -> Result<StagingRegion> {
-        self.fill(data.len() as u64, align, None, |region| region.copy_from_slice(data))
+        let (region, ()) =
+            self.fill(data.len() as u64, align, None, |region| region.copy_from_slice(data))?;
+        Ok(region)
     }
 
     /// `count` regions of a page that were [kept](Self::keep) are read by the command buffer `sequence`.
@@ -154,13 +162,13 @@ impl Staging {
     }
 
     /// The bytes are written without the lock.
-    fn fill(
+    fn fill<R>(
         &self,
         bytes: u64,
         align: u64,
         sequence: Option<u64>,
-        fill: impl FnOnce(&mut [u8]),
-    ) -> Result<StagingRegion> {
+        fill: impl FnOnce(&mut [u8]) -> R,
+    ) -> Result<(StagingRegion, R)> {
         // Pages begin at addresses that are multiples of less than some alignments.
         let room = bytes + align.saturating_sub(Buffer::ALIGNMENT);
         let (place, buffer) = self.place(room, align.min(Buffer::ALIGNMENT), sequence)?;
@@ -168,7 +176,8 @@ impl Staging {
         let offset = address - buffer.address;
         let region = StagingRegion { buffer: buffer.raw, offset, address, page: place.page };
         // SAFETY: `offset + bytes <= place.offset + room` lies inside the mapping, and no other region overlaps this one.
-        unsafe { fill_region(region, bytes, &buffer, fill) }
+        let answer = unsafe { fill_region(offset, bytes, &buffer, fill) }?;
+        Ok((region, answer))
     }
 
     /// A place, with the page it lies in.
@@ -196,23 +205,25 @@ impl Staging {
     }
 }
 
-/// Has the bytes of a region written.
+/// Has `bytes` of a page written from `offset` on. Answers what `fill` does.
 ///
 /// # Safety
-/// The region lies inside the mapping of its page, `buffer`, and nobody else has it.
+/// They lie inside the mapping of the page, `buffer`, and nobody else has them.
 #[inline]
-unsafe fn fill_region(
-    region: StagingRegion,
+unsafe fn fill_region<R>(
+    offset: u64,
     bytes: u64,
     buffer: &Buffer,
-    fill: impl FnOnce(&mut [u8]),
-) -> Result<StagingRegion> {
+    fill: impl FnOnce(&mut [u8]) -> R,
+) -> Result<R> {
     let mapped = buffer.mapped().ok_or_else(|| Error::usage("staging", "the memory is not mapped"))?;
     // SAFETY: the caller's promise.
-    fill(unsafe {
-        std::slice::from_raw_parts_mut(mapped.as_ptr().add(region.offset as usize), bytes as usize)
-    });
-    Ok(region)
+    Ok(fill(unsafe { std::slice::from_raw_parts_mut(mapped.as_ptr().add(offset as usize), bytes as usize) }))
+}
+
+#[cold]
+fn no_room() -> Error {
+    Error::usage("staging", "a new chunk has no room")
 }
 
 fn new_page(gpu: &Arc<Gpu>, bytes: u64) -> Result<Buffer> {
