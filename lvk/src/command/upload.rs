@@ -17,14 +17,11 @@ impl CommandBuffer {
     /// Records what was waiting: buffers with one barrier for all and one copy for each page of each, textures with one
     /// barrier for all that do not write the same texels.
     pub(crate) fn record_uploads(&mut self, uploads: PendingUploads) -> Result<()> {
-        let PendingUploads { buffers, mut textures, pages, .. } = uploads;
+        let PendingUploads { buffers, textures, pages, .. } = uploads;
         for used in &pages {
             self.shared.staging.hold(used.page, used.count, self.recording.sequence);
         }
         self.record_buffer_uploads(buffers, &pages);
-        for gone in textures.extract_if(.., |upload| upload.is_gone()) {
-            self.shared.dispose(Garbage::HeldTexture(gone.target));
-        }
         let part = |upload: &TextureUpload| {
             let (region, _) = upload.texels.as_ref()?;
             Some((upload.target.image.id, region.subresources()))

@@ -9,6 +9,7 @@ use crate::gpu::queues::Queue;
 use crate::lock::Guard;
 use crate::resource::region::{Region, TextureRegion};
 use crate::resource::{Buffer, Texture};
+use crate::shared::Garbage;
 use crate::submit::SubmitHandle;
 use crate::upload::PendingUploads;
 
@@ -46,6 +47,7 @@ impl Context {
         };
         let freed = std::mem::take(&mut *self.shared().freed_tlas());
         cmd.forget_tlas(&freed);
+        self.forget_gone(&mut pending.uploads);
         if !pending.uploads.is_empty() {
             cmd.record_uploads(std::mem::take(&mut pending.uploads))?;
         }
@@ -54,10 +56,18 @@ impl Context {
 
     /// The command buffer that goes before the submission made next, if there is anything to be done.
     pub(super) fn take_pending(&self, pending: &mut Pending) -> Result<Option<CommandBuffer>> {
+        self.forget_gone(&mut pending.uploads);
         if !pending.uploads.is_empty() {
             self.open(pending)?;
         }
         Ok(pending.commands.take())
+    }
+
+    /// Textures that are gone need no contents.
+    fn forget_gone(&self, uploads: &mut PendingUploads) {
+        for gone in uploads.take_gone() {
+            self.shared().dispose(Garbage::HeldTexture(gone));
+        }
     }
 
     /// Writes bytes of a buffer before the next submission. They are copied before the lock is taken.

@@ -110,6 +110,8 @@ impl Context {
     /// submission there.
     pub fn flush(&self) -> Result<SubmitHandle> {
         self.advance_compactions();
+        // What was destroyed before it was used needs nothing submitted.
+        self.shared().collect_known()?;
         let mut pending = self.pending();
         let Some(cmd) = self.take_pending(&mut pending)? else {
             return Ok(self.submission(self.shared().submitter.last_of_lanes()[0]));

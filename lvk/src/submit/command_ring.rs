@@ -13,10 +13,10 @@ use crate::gpu::Gpu;
 #[derive(Debug)]
 pub(crate) struct CommandSlot {
     pub(crate) pool: vk::CommandPool,
-    /// Runs before `main` and holds the barriers between the queue's state and the first uses in `main`.
-    pub(crate) prologue: vk::CommandBuffer,
     /// What the caller records.
     pub(crate) main: vk::CommandBuffer,
+    /// See [`prologue`](Self::prologue); made when there is the first barrier for it.
+    prologue: Option<vk::CommandBuffer>,
     /// Of passes in `main`.
     pub(crate) inputs: InputSets,
 }
@@ -29,23 +29,26 @@ impl CommandSlot {
         // SAFETY: the queue family is the device's own.
         let pool = unsafe { gpu.device.create_command_pool(&info, None) }
             .map_err(Error::vulkan("vkCreateCommandPool"))?;
-        let info = vk::CommandBufferAllocateInfo::default()
-            .command_pool(pool)
-            .level(vk::CommandBufferLevel::PRIMARY)
-            .command_buffer_count(2);
-        // SAFETY: the pool was just created.
-        match unsafe { gpu.device.allocate_command_buffers(&info) } {
-            Ok(buffers) => {
-                gpu.name(pool, "command pool");
-                gpu.name(buffers[0], "barriers before a command buffer");
-                Ok(Self { pool, prologue: buffers[0], main: buffers[1], inputs: InputSets::default() })
-            }
-            Err(result) => {
+        gpu.name(pool, "command pool");
+        match allocate(gpu, pool) {
+            Ok(main) => Ok(Self { pool, main, prologue: None, inputs: InputSets::default() }),
+            Err(error) => {
                 // SAFETY: the pool is unused.
                 unsafe { gpu.device.destroy_command_pool(pool, None) };
-                Err(Error::vulkan("vkAllocateCommandBuffers")(result))
+                Err(error)
             }
         }
+    }
+
+    /// Runs before `main` and holds the barriers between the queue's state and the first uses in `main`.
+    pub(crate) fn prologue(&mut self, gpu: &Gpu) -> Result<vk::CommandBuffer> {
+        if let Some(made) = self.prologue {
+            return Ok(made);
+        }
+        let made = allocate(gpu, self.pool)?;
+        gpu.name(made, "barriers before a command buffer");
+        self.prologue = Some(made);
+        Ok(made)
     }
 
     fn reset(&mut self, gpu: &Gpu) -> Result<()> {
@@ -60,6 +63,16 @@ impl CommandSlot {
         unsafe { gpu.device.destroy_command_pool(self.pool, None) };
         self.inputs.destroy(gpu);
     }
+}
+
+fn allocate(gpu: &Gpu, pool: vk::CommandPool) -> Result<vk::CommandBuffer> {
+    let info = vk::CommandBufferAllocateInfo::default()
+        .command_pool(pool)
+        .level(vk::CommandBufferLevel::PRIMARY)
+        .command_buffer_count(1);
+    // SAFETY: the pool is alive, and nobody else uses it.
+    let made = unsafe { gpu.device.allocate_command_buffers(&info) };
+    made.map(|buffers| buffers[0]).map_err(Error::vulkan("vkAllocateCommandBuffers"))
 }
 
 /// Which command buffers are free, being recorded, or with the GPU.

@@ -249,7 +249,7 @@ impl<T> Submitter<T> {
     fn finish(&self, inner: &mut Inner<T>, submission: &mut Submission) -> Result<Vec<Batch>> {
         let mut batches = Vec::new();
         let mut batch = Batch { waits: std::mem::take(&mut submission.waits), ..Batch::default() };
-        for recording in &submission.recordings {
+        for recording in &mut submission.recordings {
             let images = self.image_waits(inner, recording);
             if !images.is_empty() && !batch.commands.is_empty() {
                 batches.push(std::mem::take(&mut batch));
@@ -257,16 +257,11 @@ impl<T> Submitter<T> {
             batch.waits.extend(images);
             let barriers = inner.lanes.submit_alone(&recording.tracker);
             if !barriers.is_empty() {
-                begin(&self.gpu, recording.slot.prologue)?;
-                emit(
-                    &self.gpu,
-                    recording.slot.prologue,
-                    &barriers,
-                    &recording.images,
-                    &mut LastBarrier::default(),
-                );
-                end(&self.gpu, recording.slot.prologue)?;
-                batch.push(recording.slot.prologue);
+                let prologue = recording.slot.prologue(&self.gpu)?;
+                begin(&self.gpu, prologue)?;
+                emit(&self.gpu, prologue, &barriers, &recording.images, &mut LastBarrier::default());
+                end(&self.gpu, prologue)?;
+                batch.push(prologue);
             }
             batch.push(recording.commands);
         }
@@ -288,8 +283,7 @@ impl<T> Submitter<T> {
             waits.extend(self.lane_waits(&step.waits));
             let mut batch = Batch { waits: std::mem::take(&mut waits), ..Batch::default() };
             if !step.arrivals.is_empty() || !step.barriers.is_empty() {
-                self.record_prologue(recording, &step)?;
-                batch.push(recording.slot.prologue);
+                batch.push(self.record_prologue(recording, &step)?);
             }
             batch.push(recording.commands);
             let signals = if place == last { std::mem::take(&mut submission.signals) } else { Vec::new() };
@@ -312,14 +306,16 @@ impl<T> Submitter<T> {
         inner.lanes.submit(&sent, |id| images.get(&id).is_some_and(|image| image.is_exclusive))
     }
 
-    fn record_prologue(&self, recording: &Recording, step: &Step) -> Result<()> {
-        let (commands, images) = (recording.slot.prologue, &recording.images);
+    fn record_prologue(&self, recording: &mut Recording, step: &Step) -> Result<vk::CommandBuffer> {
+        let commands = recording.slot.prologue(&self.gpu)?;
+        let images = &recording.images;
         begin(&self.gpu, commands)?;
         if !step.arrivals.is_empty() {
             emit_moves(&self.gpu, commands, &step.arrivals, images, Side::Acquire);
         }
         emit(&self.gpu, commands, &step.barriers, images, &mut LastBarrier::default());
-        end(&self.gpu, commands)
+        end(&self.gpu, commands)?;
+        Ok(commands)
     }
 
     /// Has a lane give images away.

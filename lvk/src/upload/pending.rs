@@ -42,7 +42,7 @@ impl BufferUploads {
 
 impl TextureUpload {
     /// As [`BufferUploads::is_gone`], with all textures of the image. Listed twice it stays, which does no harm.
-    pub(crate) fn is_gone(&self) -> bool {
+    fn is_gone(&self) -> bool {
         Arc::strong_count(&self.target) == 1 && Arc::strong_count(&self.target.image) == 1
     }
 }
@@ -57,7 +57,12 @@ pub(crate) struct UsedPage {
 
 impl PendingUploads {
     pub(crate) fn is_empty(&self) -> bool {
-        self.buffers.is_empty() && self.textures.is_empty()
+        self.buffers.is_empty() && self.textures.is_empty() && self.pages.is_empty()
+    }
+
+    /// Takes out the textures that are gone.
+    pub(crate) fn take_gone(&mut self) -> impl Iterator<Item = Arc<Texture>> {
+        self.textures.extract_if(.., |upload| upload.is_gone()).map(|upload| upload.target)
     }
 
     /// Staged bytes that wait.

@@ -1,7 +1,7 @@
 //! Submission: waiting, asking whether something is done, and frames in flight.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use lvk::{Dependencies, Error, SubmitHandle};
+use lvk::{Dependencies, Error, Format, SubmitHandle, TextureDesc, TextureUsage};
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::{device, device_with};
 
@@ -45,6 +45,28 @@ fn flushing_runs_uploads_and_is_idle_without_any() {
     assert!(flushed > idle);
     ctx.wait(flushed).unwrap();
     assert_eq!(read_words(&ctx, *buffer, 4), [3; 4]);
+}
+
+#[test]
+fn textures_that_are_gone_submit_nothing() {
+    let Some(ctx) = device() else { return };
+    let come_and_go = || {
+        let desc = TextureDesc {
+            format: Format::Rgba8Unorm,
+            extent: [4, 4],
+            usage: TextureUsage::SAMPLED,
+            ..Default::default()
+        };
+        drop(ctx.create_texture(&desc).unwrap());
+    };
+    ctx.wait_idle().unwrap();
+    let idle = ctx.flush().unwrap();
+    (0..10).for_each(|_| come_and_go());
+    assert_eq!(ctx.flush().unwrap(), idle);
+    let open = ctx.acquire_command_buffer().unwrap();
+    come_and_go();
+    assert!(ctx.flush().unwrap() > idle, "what is being recorded may read it");
+    ctx.submit(open).unwrap();
 }
 
 #[test]
