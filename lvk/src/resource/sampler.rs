@@ -62,8 +62,8 @@ pub enum BorderColor {
     OpaqueBlackInteger,
     /// All channels 1, of integers.
     OpaqueWhiteInteger,
-    /// Any colour ([`OptionalFeature::CustomBorderColorWithoutFormat`](crate::OptionalFeature)); a device has
-    /// [few](crate::Limits::max_custom_borders) such samplers at a time.
+    /// Any colour ([`OptionalFeature::CustomBorderColorWithoutFormat`](crate::OptionalFeature)), which devices may round to the
+    /// precision of the texture that is sampled; a device has [few](crate::Limits::max_custom_borders) such samplers at a time.
     Custom([f32; 4]),
     /// The same of integers.
     CustomInteger([u32; 4]),

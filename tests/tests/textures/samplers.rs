@@ -202,13 +202,16 @@ fn borders_have_the_colour_asked_for() {
     for (border, expected) in colors {
         assert_eq!(beyond(&ctx, border), expected, "{border:?}");
     }
-    let own = SamplerDesc { border: BorderColor::Custom([0.25, 0.5, 0.75, 0.125]), ..Default::default() };
+    // What the texels can be: some devices round to that.
+    let color = [64.0, 127.0, 191.0, 32.0].map(|byte: f32| byte / 255.0);
+    let own = SamplerDesc { border: BorderColor::Custom(color), ..Default::default() };
     if !ctx.capabilities().has(OptionalFeature::CustomBorderColorWithoutFormat) {
         let error = ctx.create_sampler(&own).unwrap_err();
         assert!(matches!(error, Error::Unsupported { .. }), "{error}");
         return;
     }
-    assert_eq!(beyond(&ctx, own.border), [0.25, 0.5, 0.75, 0.125]);
+    let found = beyond(&ctx, own.border);
+    assert!(found.iter().zip(color).all(|(found, asked)| (found - asked).abs() < 1e-5), "{found:?}");
     let limit = ctx.capabilities().limits.max_custom_borders;
     let few = limit.min(ctx.capabilities().limits.max_bindless_samplers - 2);
     ctx.wait_idle().unwrap();
