@@ -52,16 +52,19 @@ struct Targets {
 }
 
 impl Targets {
+    /// So many builds keep a device busy; one more waits, so that each is looked for among few.
+    const MOST: usize = 64;
+
     fn clear(&mut self) {
         self.bits = 0;
         self.ids.clear();
     }
 
-    /// Whether it is new.
+    /// Whether it is new, and there is room for it.
     #[inline]
     fn insert(&mut self, id: ResourceId) -> bool {
         let bit = 1 << (id.0 % 64);
-        if self.bits & bit != 0 && self.ids.contains(&id) {
+        if self.ids.len() == Self::MOST || (self.bits & bit != 0 && self.ids.contains(&id)) {
             return false;
         }
         self.bits |= bit;
@@ -166,5 +169,22 @@ mod tests {
         assert_eq!(run.join(second, 16, 16), Some(16), "what was before waits already");
         run.stop();
         assert_eq!(run.join(ResourceId(3), 16, 16), None);
+    }
+
+    #[test]
+    fn a_build_without_memory_leaves_its_address_to_the_next() {
+        let [first, second] = [ResourceId(1), ResourceId(2)];
+        let mut run = BuildRun::default();
+        run.begin(first, 1..2956, 0, 1);
+        assert_eq!(run.join(second, 1, 1), Some(1));
+    }
+
+    #[test]
+    fn a_long_run_ends_where_its_targets_are_many() {
+        let mut run = BuildRun::default();
+        run.begin(ResourceId(0), 0..u64::MAX, 16, 16);
+        let most = Targets::MOST as u64;
+        assert!((1..most).all(|id| run.join(ResourceId(id), 16, 16).is_some()));
+        assert_eq!(run.join(ResourceId(most), 16, 16), None);
     }
 }

@@ -48,7 +48,7 @@ pub(crate) struct TlasUpdates {
     list: Vec<TlasUpdate>,
     /// A bit for each target, which several may share.
     targets: u64,
-    /// Those that run side by side.
+    /// Those that run side by side, while they are recorded.
     pub(crate) run: BuildRun,
     pub(crate) marks: Marks,
     /// The place of what each instance refers to.
@@ -87,7 +87,7 @@ impl TlasUpdates {
         self.list.iter().try_for_each(TlasUpdate::check)
     }
 
-    /// Takes them all, and keeps the memory.
+    /// Takes them all, and keeps the memory; whoever gets that next waits for what is under way.
     pub(crate) fn drain(&mut self) -> impl Iterator<Item = TlasUpdate> + '_ {
         self.targets = 0;
         self.run.stop();

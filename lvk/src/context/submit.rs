@@ -110,7 +110,7 @@ impl Context {
     /// submission there.
     pub fn flush(&self) -> Result<SubmitHandle> {
         self.advance_compactions();
-        // What was destroyed before it was used needs nothing submitted.
+        // Textures without contents that are gone by now need nothing submitted.
         self.shared().collect_known()?;
         let mut pending = self.pending();
         let Some(cmd) = self.take_pending(&mut pending)? else {

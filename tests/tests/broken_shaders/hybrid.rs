@@ -166,7 +166,7 @@ fn hybrid_ways() -> [HybridWay<'static>; 9] {
 }
 
 #[test]
-#[ignore = "minutes for each: cargo test -p lvk-tests --test broken_shaders hybrid:: -- --ignored"]
+#[ignore = "minutes for each: cargo test --test broken_shaders hybrid:: -- --ignored"]
 fn hybrid_notices() {
     BrokenShaders::in_child(hybrid_notices, |shaders| {
         let Some(ctx) = device() else { return };
@@ -266,7 +266,7 @@ fn room(ctx: &Context, path: RayPath, [width, height]: [u32; 2], scene: &OitScen
 }
 
 #[test]
-#[ignore = "minutes for each: cargo test -p lvk-tests --test broken_shaders hybrid:: -- --ignored"]
+#[ignore = "minutes for each: cargo test --test broken_shaders hybrid:: -- --ignored"]
 fn hybrid_oit_notices() {
     BrokenShaders::in_child(hybrid_oit_notices, |shaders| {
         let Some(ctx) = device() else { return };
@@ -406,7 +406,7 @@ fn hall_of(ctx: &Context, config: &ReflectionsConfig, view: Option<&Camera>) -> 
 }
 
 #[test]
-#[ignore = "minutes for each: cargo test -p lvk-tests --test broken_shaders hybrid:: -- --ignored"]
+#[ignore = "minutes for each: cargo test --test broken_shaders hybrid:: -- --ignored"]
 fn reflections_notices() {
     BrokenShaders::in_child(reflections_notices, |shaders| {
         let Some(ctx) = device() else { return };

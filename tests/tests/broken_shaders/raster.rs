@@ -273,7 +273,7 @@ fn sponza(ctx: &Context, scene: &Scene, draws: DrawPath) -> Sponza {
 }
 
 #[test]
-#[ignore = "half a minute: cargo test -p lvk-tests --test broken_shaders raster:: -- --ignored"]
+#[ignore = "half a minute: cargo test --test broken_shaders raster:: -- --ignored"]
 fn samples_that_rasterise_notice() {
     BrokenShaders::in_child(samples_that_rasterise_notice, |shaders| {
         let Some(ctx) = device() else { return };
@@ -292,7 +292,7 @@ fn samples_that_rasterise_notice() {
 }
 
 #[test]
-#[ignore = "a minute: cargo test -p lvk-tests --test broken_shaders raster:: -- --ignored"]
+#[ignore = "a minute: cargo test --test broken_shaders raster:: -- --ignored"]
 fn deferred_notices() {
     BrokenShaders::in_child(deferred_notices, |shaders| {
         let Some(ctx) = device() else { return };
@@ -306,7 +306,7 @@ fn deferred_notices() {
 }
 
 #[test]
-#[ignore = "a minute: cargo test -p lvk-tests --test broken_shaders raster:: -- --ignored"]
+#[ignore = "a minute: cargo test --test broken_shaders raster:: -- --ignored"]
 fn omni_shadows_notices() {
     BrokenShaders::in_child(omni_shadows_notices, |shaders| {
         let Some(ctx) = device() else { return };
@@ -323,7 +323,7 @@ fn omni_shadows_notices() {
 }
 
 #[test]
-#[ignore = "seconds: cargo test -p lvk-tests --test broken_shaders raster:: -- --ignored"]
+#[ignore = "seconds: cargo test --test broken_shaders raster:: -- --ignored"]
 fn yuv_notices() {
     BrokenShaders::in_child(yuv_notices, |shaders| {
         let Some(ctx) = device_with(|desc| desc.yuv = &CONVERSIONS) else { return };
@@ -333,7 +333,7 @@ fn yuv_notices() {
 }
 
 #[test]
-#[ignore = "a minute: cargo test -p lvk-tests --test broken_shaders raster:: -- --ignored"]
+#[ignore = "a minute: cargo test --test broken_shaders raster:: -- --ignored"]
 fn sponza_notices() {
     BrokenShaders::in_child(sponza_notices, |shaders| {
         let Some(ctx) = device() else { return };

@@ -236,7 +236,7 @@ fn check(
 }
 
 #[test]
-#[ignore = "seconds: cargo test -p lvk-tests --test broken_shaders rays:: -- --ignored"]
+#[ignore = "seconds: cargo test --test broken_shaders rays:: -- --ignored"]
 fn rtx_hello_notices() {
     BrokenShaders::in_child(rtx_hello_notices, |shaders| {
         let Some(ctx) = device() else { return };
@@ -247,7 +247,7 @@ fn rtx_hello_notices() {
 }
 
 #[test]
-#[ignore = "a minute: cargo test -p lvk-tests --test broken_shaders rays:: -- --ignored"]
+#[ignore = "a minute: cargo test --test broken_shaders rays:: -- --ignored"]
 fn rtx_ao_notices() {
     BrokenShaders::in_child(rtx_ao_notices, |shaders| {
         let Some(ctx) = device() else { return };
@@ -268,7 +268,7 @@ fn rtx_ao_notices() {
 }
 
 #[test]
-#[ignore = "a minute: cargo test -p lvk-tests --test broken_shaders rays:: -- --ignored"]
+#[ignore = "a minute: cargo test --test broken_shaders rays:: -- --ignored"]
 fn rtx_pipeline_notices() {
     BrokenShaders::in_child(rtx_pipeline_notices, |shaders| {
         let Some(ctx) = device() else { return };
@@ -281,7 +281,7 @@ fn rtx_pipeline_notices() {
 }
 
 #[test]
-#[ignore = "a minute: cargo test -p lvk-tests --test broken_shaders rays:: -- --ignored"]
+#[ignore = "a minute: cargo test --test broken_shaders rays:: -- --ignored"]
 fn rtx_textures_notices() {
     BrokenShaders::in_child(rtx_textures_notices, |shaders| {
         let Some(ctx) = device() else { return };
@@ -292,7 +292,7 @@ fn rtx_textures_notices() {
 }
 
 #[test]
-#[ignore = "a minute: cargo test -p lvk-tests --test broken_shaders rays:: -- --ignored"]
+#[ignore = "a minute: cargo test --test broken_shaders rays:: -- --ignored"]
 fn large_scene_notices() {
     BrokenShaders::in_child(large_scene_notices, |shaders| {
         let Some(ctx) = device() else { return };

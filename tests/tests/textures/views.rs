@@ -399,7 +399,10 @@ fn a_layer_is_drawn_to_while_another_is_sampled() {
 fn a_view_outlives_the_handle_of_its_texture() {
     let Some(ctx) = device() else { return };
     for round in 0..4_u8 {
-        let base = texture(&ctx, &TextureDesc { data: Some(&[51 * round; 4]), ..Default::default() });
+        // Contents of the one may be written at once, those of the other wait for a submission.
+        let usage =
+            [TextureUsage::SAMPLED, TextureUsage::SAMPLED | TextureUsage::STORAGE][round as usize % 2];
+        let base = texture(&ctx, &TextureDesc { data: Some(&[51 * round; 4]), usage, ..Default::default() });
         let first = view(&ctx, *base, TextureViewDesc::default());
         let second = view(&ctx, *first, TextureViewDesc::default());
         let handle = *base;
