@@ -23,15 +23,15 @@ const MAIN: &str = "void main() {";
 const NOTHING: &str = "void main() {\n    return;";
 
 const HYBRID: [Mistake; 17] = [
-    mistake("no shadows", "hybrid/integrator.glsl", "if (!traceOccluded(", "if (true || !traceOccluded("),
+    mistake("no shadows", "common/lighting.glsl", "if (!traceOccluded(", "if (true || !traceOccluded("),
     mistake(
         "no sun",
-        "hybrid/integrator.glsl",
+        "common/lighting.glsl",
         "if (light.isDistant != 0.0) {",
         "if (light.isDistant > 5.0) {",
     ),
-    mistake("no lamp", "hybrid/integrator.glsl", "return light.color / (", "return 0.0 * light.color / ("),
-    mistake("even ambient light", "hybrid/integrator.glsl", "0.5 + 0.5 * facing.normal.y", "0.5"),
+    mistake("no lamp", "common/lighting.glsl", "return light.color / (", "return 0.0 * light.color / ("),
+    mistake("even ambient light", "common/lighting.glsl", "0.5 + 0.5 * facing.normal.y", "0.5"),
     mistake(
         "light bent the wrong way",
         "hybrid/integrator.glsl",
