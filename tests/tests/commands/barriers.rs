@@ -2,55 +2,17 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoad, ComputePipelineHandle, Context,
-    Dependencies, Error, Format, Holder, IndexFormat, MemoryKind, RenderPassDesc, RenderPipelineDesc,
-    TextureDesc, TextureRegion, TextureUsage,
+    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoad, Context, Dependencies, Error, Format,
+    Holder, IndexFormat, MemoryKind, RenderPassDesc, RenderPipelineDesc, TextureDesc, TextureRegion,
+    TextureUsage,
 };
 use lvk_tests::compute::{Evaluator, compute_pipeline, read_vec4, read_words, vec4_buffer, words_buffer};
 use lvk_tests::device;
+use lvk_tests::queues::{step, step_pipeline, stepped};
 use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, target};
 
 fn buffer(ctx: &Context, usage: BufferUsage, size_bytes: u64) -> Holder<BufferHandle> {
     ctx.create_buffer(&BufferDesc { size_bytes, usage, ..Default::default() }).unwrap()
-}
-
-/// `to[i] = 3 * from[i + 1] + number` for 64 words in a ring: each word needs its neighbour's last value.
-fn step_pipeline(ctx: &Context) -> Holder<ComputePipelineHandle> {
-    compute_pipeline(
-        ctx,
-        "layout(local_size_x = 8) in;
-         layout(buffer_reference, scalar) buffer Words { uint at[]; };
-         layout(push_constant, scalar) uniform Push { Words from; Words to; uint number; };
-         void main() {
-             uint i = gl_GlobalInvocationID.x;
-             to.at[i] = 3 * from.at[(i + 1) % 64] + number;
-         }",
-    )
-}
-
-fn step(
-    ctx: &Context,
-    cmd: &mut lvk::CommandBuffer,
-    pipeline: ComputePipelineHandle,
-    [from, to]: [BufferHandle; 2],
-    number: u32,
-) {
-    #[repr(C)]
-    #[derive(Clone, Copy, bytemuck::NoUninit)]
-    struct Push {
-        addresses: [u64; 2],
-        number: u32,
-        pad: u32,
-    }
-    let addresses = [from, to].map(|buffer| ctx.buffer_address(buffer).unwrap());
-    cmd.bind_compute_pipeline(pipeline).unwrap();
-    cmd.push_constants(&Push { addresses, number, pad: 0 }).unwrap();
-    let dependencies = Dependencies { buffers: &[to], read_buffers: &[from], ..Default::default() };
-    cmd.dispatch([8, 1, 1], &dependencies).unwrap();
-}
-
-fn stepped(words: &[u32], number: u32) -> Vec<u32> {
-    (0..64).map(|i| words[(i + 1) % 64].wrapping_mul(3).wrapping_add(number)).collect()
 }
 
 #[test]
