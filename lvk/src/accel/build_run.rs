@@ -46,7 +46,7 @@ impl BuildRun {
 /// What a run builds, each once.
 #[derive(Debug, Default)]
 struct Targets {
-    /// A bit for each, which several may share. Identities are consecutive, so few do.
+    /// A bit for each, which several may share.
     bits: u64,
     ids: Vec<ResourceId>,
 }
@@ -63,7 +63,7 @@ impl Targets {
     /// Whether it is new, and there is room for it.
     #[inline]
     fn insert(&mut self, id: ResourceId) -> bool {
-        let bit = 1 << (id.0 % 64);
+        let bit = id.bit();
         if self.ids.len() == Self::MOST || (self.bits & bit != 0 && self.ids.contains(&id)) {
             return false;
         }

@@ -61,7 +61,7 @@ impl TlasUpdates {
     /// The last one of a structure.
     #[inline]
     pub(crate) fn last_of(&self, target: &AccelStruct) -> Option<&TlasUpdate> {
-        if self.targets & bit(target) == 0 {
+        if self.targets & target.id.bit() == 0 {
             return None;
         }
         self.list.iter().rev().find(|update| update.target.id == target.id)
@@ -72,7 +72,7 @@ impl TlasUpdates {
         if self.list.capacity() == 0 {
             self.list.reserve(Self::ROOM);
         }
-        self.targets |= bit(&update.target);
+        self.targets |= update.target.id.bit();
         self.list.push(update);
     }
 
@@ -93,12 +93,6 @@ impl TlasUpdates {
         self.run.stop();
         self.list.drain(..)
     }
-}
-
-/// Identities are consecutive, so few structures share a bit.
-#[inline]
-fn bit(target: &AccelStruct) -> u64 {
-    1 << (target.id.0 % 64)
 }
 
 /// Lists that no command buffer has at the moment.

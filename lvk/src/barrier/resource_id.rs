@@ -14,6 +14,12 @@ impl ResourceId {
         static LAST: AtomicU64 = AtomicU64::new(0);
         Self(LAST.fetch_add(1, Ordering::Relaxed) + 1)
     }
+
+    /// One of 64 bits, for sets that rule out most. Identities are consecutive, so few of a small set share a bit.
+    #[inline]
+    pub(crate) fn bit(self) -> u64 {
+        1 << (self.0 % 64)
+    }
 }
 
 /// A map keyed by [`ResourceId`].
