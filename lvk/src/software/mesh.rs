@@ -6,8 +6,8 @@ use crate::accel::bounds::{Bounds, BoxBytes, TriangleBytes};
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::software::layout::{LeafBox, LeafTriangle};
 
-/// Bounds end here: the sums of areas that a build compares still are numbers.
-const FARTHEST: f32 = 1e15;
+/// Bounds end here: the sums of areas that a build compares still are numbers. Kernels have it in `build/box.glsl`.
+pub(crate) const FARTHEST: f32 = 1e15;
 
 /// The primitives of all geometries.
 #[derive(Debug, Clone, PartialEq)]

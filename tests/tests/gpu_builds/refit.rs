@@ -107,6 +107,57 @@ fn wide_nodes_follow_moved_triangles() {
     }
 }
 
+/// Scattered triangles of which every third lies far out, every sixth with one corner only, on all six sides.
+fn partly_far(count: usize, reach: f32) -> Vec<[[f32; 3]; 3]> {
+    let mut triangles = scattered(count, 1);
+    for number in (0..count).step_by(3) {
+        let corners = if number % 2 == 0 { 1 } else { 3 };
+        for corner in &mut triangles[number][..corners] {
+            corner[number / 6 % 3] = if number % 4 < 2 { reach } else { -reach };
+        }
+    }
+    triangles
+}
+
+#[test]
+fn boxes_of_what_lies_far_out_end_as_those_of_the_cpu_do() {
+    let Some(ctx) = device() else { return };
+    for count in [1, 4, 25, 2000] {
+        let vertices = input(&ctx, &scattered(count, 1));
+        let geometries = [triangles(*vertices, count)];
+        let binary = build(&ctx, &geometries, 2);
+        let wide = place(&ctx, &wide_structure(count)).unwrap();
+        for reach in [1e14, 1e16, 1e30, 3e38, 0.0] {
+            let moved = partly_far(count, reach);
+            ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&moved)).unwrap();
+            refit(&ctx, &[(&binary, &geometries), (&wide, &geometries)]).unwrap();
+            for structure in [&binary, &wide, &build(&ctx, &geometries, 2)] {
+                check_contents(&facts(&ctx, structure), &numbered(&moved));
+            }
+        }
+    }
+}
+
+/// Boxes themselves end there, as those that the CPU reads do.
+#[test]
+fn boxes_far_out_end_too() {
+    let Some(ctx) = device() else { return };
+    let count = 200;
+    let list = |reach: f32| -> Vec<[[f32; 3]; 2]> {
+        scattered(count, 5).iter().map(|t| [t[0], t[0].map(|n| n.abs() + reach)]).collect()
+    };
+    let buffer = input(&ctx, &list(1.0));
+    let geometries = [boxes(*buffer, count)];
+    let structure = build(&ctx, &geometries, 1);
+    for reach in [1e16, 3e38, f32::INFINITY] {
+        ctx.upload_buffer(*buffer, 0, bytemuck::cast_slice(&list(reach))).unwrap();
+        refit(&ctx, &[(&structure, &geometries)]).unwrap();
+        let ended = list(reach).into_iter().map(|[low, _]| vec![low, [1e15; 3]]);
+        let expected: Vec<_> = (0..).zip(ended).map(|(index, corners)| ((0, index), corners)).collect();
+        check_contents(&facts(&ctx, &structure), &expected);
+    }
+}
+
 #[test]
 fn structures_are_refitted_side_by_side() {
     let Some(ctx) = device() else { return };

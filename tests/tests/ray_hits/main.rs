@@ -1,6 +1,7 @@
 //! What rays hit: triangles and boxes in every format, at every place, with every flag.
 
 mod boxes;
+mod far;
 mod flags;
 mod inactive;
 mod meshes;

@@ -7,6 +7,14 @@ Box emptyBox() { return Box(vec3(kFar), vec3(-kFar)); }
 
 bool isEmpty(Box box) { return box.lo.x > box.hi.x; }
 
+// As builds on the CPU end them (FARTHEST in lvk/src/software/mesh.rs): sides and areas of all still are numbers.
+vec3 ended(vec3 v) {
+    const float kFarthest = 1e15;
+    return clamp(v, vec3(-kFarthest), vec3(kFarthest));
+}
+
+Box around(vec3 a, vec3 b, vec3 c) { return Box(ended(min(a, min(b, c))), ended(max(a, max(b, c)))); }
+
 Box join(Box a, Box b) { return Box(min(a.lo, b.lo), max(a.hi, b.hi)); }
 
 // By bits: compilers may take it that no number is infinite or none at all.

@@ -107,8 +107,8 @@ Primitive readBoxInput(Geometry g, uint index) {
     found.b = uintBitsToFloat(corners.triple[1]);
     found.c = vec3(0);
     found.isActive = isNumber(found.a) && isNumber(found.b) && all(lessThanEqual(found.a, found.b));
-    found.a = clamp(found.a, vec3(-kFar), vec3(kFar));
-    found.b = clamp(found.b, vec3(-kFar), vec3(kFar));
+    found.a = ended(found.a);
+    found.b = ended(found.b);
     return found;
 }
 
@@ -119,7 +119,7 @@ Primitive readPrimitive(Geometry g, uint index) {
 Box boxOf(Primitive found) {
     if (!found.isActive) return emptyBox();
     if (job.leafKind == kBoxes) return Box(found.a, found.b);
-    return Box(min(found.a, min(found.b, found.c)), max(found.a, max(found.b, found.c)));
+    return around(found.a, found.b, found.c);
 }
 
 // The last geometry that starts at or before number `i`, counted in primitives or vertices.

@@ -1,7 +1,7 @@
 // Boxes of what leaves hold.
 Box cornersBox(vec3 a, vec3 b, vec3 c) {
     if (!(isFinite(a) && isFinite(b) && isFinite(c))) return emptyBox();
-    return Box(min(a, min(b, c)), max(a, max(b, c)));
+    return around(a, b, c);
 }
 
 Box keptBox(uint slot) {

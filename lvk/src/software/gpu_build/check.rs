@@ -2,6 +2,8 @@
 
 use std::fmt::Debug;
 
+use crate::software::mesh::FARTHEST;
+
 /// Smallest corner, largest corner.
 pub type Bounds = [[f32; 3]; 2];
 
@@ -317,7 +319,8 @@ fn around(corners: &[[f32; 3]]) -> Bounds {
     if corners.iter().flatten().any(|number| number.is_nan()) {
         return EMPTY;
     }
-    corners.iter().fold(EMPTY, |all, corner| join(all, [*corner, *corner]))
+    let ended = |corner: &[f32; 3]| corner.map(|number| number.clamp(-FARTHEST, FARTHEST));
+    corners.iter().map(ended).fold(EMPTY, |all, corner| join(all, [corner, corner]))
 }
 
 fn join(a: Bounds, b: Bounds) -> Bounds {
