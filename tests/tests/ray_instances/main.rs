@@ -5,3 +5,4 @@ mod from_shaders;
 mod geometries;
 mod lists;
 mod many;
+mod overlaps;
