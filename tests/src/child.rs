@@ -20,15 +20,8 @@ pub fn in_child(test: impl Fn(), variables: &[(&str, Option<&OsStr>)], body: imp
     if std::env::var_os(MARK).is_some_and(|name| name == test) {
         return body();
     }
-    let program = std::env::current_exe().expect("the program of the test has a path");
-    let mut command = Command::new(program);
+    let mut command = program(variables);
     command.args([test, "--exact", "--nocapture", "--include-ignored"]).env(MARK, test);
-    for (name, value) in variables {
-        match value {
-            Some(value) => command.env(name, value),
-            None => command.env_remove(name),
-        };
-    }
     let output = command.output().expect("the program of the test can be started again");
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let (out, err) = (text(&output.stdout), text(&output.stderr));
@@ -42,6 +35,20 @@ pub fn in_child(test: impl Fn(), variables: &[(&str, Option<&OsStr>)], body: imp
 pub fn without_ray_tracing(test: impl Fn(), body: impl FnOnce()) {
     let Some(icd) = swiftshader() else { return };
     in_child(test, &only_driver(&icd), body);
+}
+
+/// Runs the program's tests, but for those that are ignored or have one of `skipped` in their names, in a process that has no
+/// device but the one without ray tracing, by ray queries in software; skipped loudly where that cannot be had.
+///
+/// # Panics
+/// When one of them fails, and as [`swiftshader`].
+pub fn program_without_ray_tracing(skipped: &[&str]) {
+    let Some(icd) = swiftshader() else { return };
+    let mut command = program(&only_driver(&icd));
+    command.env("LVK_TEST_RAY_QUERY", "software");
+    command.args(skipped.iter().flat_map(|name| ["--skip", name]));
+    let status = command.status().expect("the program of the tests can be started again");
+    assert!(status.success(), "tests fail on the device without ray tracing, see above");
 }
 
 /// As [`in_child`], with no device but an AMD chip of this `family` (`RADV_FORCE_FAMILY`), which compiles and does nothing
@@ -62,6 +69,18 @@ pub fn on_radv(test: impl Fn(), family: &str, body: impl FnOnce()) {
 pub fn path_in_program<T: Fn()>(_: &T) -> &'static str {
     let path = std::any::type_name::<T>();
     path.split_once("::").map_or(path, |(_, inside)| inside)
+}
+
+/// The program of the tests, to be started again with `variables` as [`in_child`] takes them.
+fn program(variables: &[(&str, Option<&OsStr>)]) -> Command {
+    let mut command = Command::new(std::env::current_exe().expect("the program of the test has a path"));
+    for (name, value) in variables {
+        match value {
+            Some(value) => command.env(name, value),
+            None => command.env_remove(name),
+        };
+    }
+    command
 }
 
 fn only_driver(icd: &Path) -> [(&str, Option<&OsStr>); 4] {

@@ -1,5 +1,6 @@
 //! What rays hit: triangles and boxes in every format, at every place, with every flag.
 
+mod anywhere;
 mod boxes;
 mod far;
 mod flags;
