@@ -1,5 +1,6 @@
 // Everything a query tells of its ray, of the closest hit and of the last candidate. Triangles with odd numbers are looked
-// through where they are not opaque. OPAQUE_ONLY is a module without candidates.
+// through where they are not opaque. OPAQUE_ONLY is a module without candidates. OF_MISSES asks of a hit whether there is one or
+// not, and takes the corners of the triangle, added up, for the origin in the candidate's space.
 #ifdef OPAQUE_ONLY
 #define LVK_OPAQUE_TRIANGLES_ONLY
 #endif
@@ -57,9 +58,19 @@ void main() {
             lvkRayQueryConfirmIntersection(rq);
         }
     }
+#ifdef OF_MISSES
+    committed = FOUND(rq, LVK_COMMITTED);
+    candidate = FOUND(rq, LVK_CANDIDATE);
+#ifdef LVK_POSITION_FETCH
+    vec3 corners[3];
+    lvkRayQueryTrianglePositions(rq, LVK_COMMITTED, corners);
+    candidate.objectOrigin = abs(corners[0]) + abs(corners[1]) + abs(corners[2]);
+#endif
+#else
     if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_TRIANGLE) {
         committed = FOUND(rq, LVK_COMMITTED);
     }
+#endif
     AllTold told = AllTold(hits);
     told.at[index] = Told(lvkRayQueryFlags(rq), lvkRayQueryTMin(rq), lvkRayQueryWorldRayOrigin(rq),
                           lvkRayQueryWorldRayDirection(rq), committed, candidate);

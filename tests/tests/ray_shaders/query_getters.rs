@@ -9,7 +9,9 @@ use lvk::{
 use lvk_tests::agreement::Agreement;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene};
-use lvk_tests::ray_tracer::{CULL_BACK, CULL_FRONT, HitRecord, How, MISSED, NO_OPAQUE, OPAQUE, shader_with};
+use lvk_tests::ray_tracer::{
+    BACK, CULL_BACK, CULL_FRONT, HitRecord, How, MISSED, NO_OPAQUE, OPAQUE, shader_with,
+};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::reference::{HitIds, Reference};
 use lvk_tests::{TestDevice, device, device_with};
@@ -250,6 +252,30 @@ fn queries_tell_the_ray_the_hit_and_the_instance() -> Result<()> {
                         assert_eq!(found.kind, kind, "{what}: Type");
                         check_instance(&scene, ray, found, &what);
                     }
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// What nobody may rely on is defined where the library walks itself: it reads no memory that is not there.
+#[test]
+fn misses_are_told_as_zeros_in_software() -> Result<()> {
+    let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return Ok(()) };
+    let gpu = scene().upload(&ctx)?;
+    let empty = RayScene { placed: Vec::new(), ..scene() }.upload(&ctx)?;
+    let away = Ray { t_max: 77.0, ..Ray::new(Vec3::splat(50.0), Vec3::X) };
+    let backwards = Ray { t_min: 9.0, t_max: 2.0, ..Ray::new(Vec3::ZERO, Vec3::Y) };
+    let rays = [away, backwards];
+    for defines in [&[("OF_MISSES", "")][..], &[("OF_MISSES", ""), ("OPAQUE_ONLY", "")]] {
+        let pipeline = pipeline(&ctx, defines)?;
+        for gpu in [&gpu, &empty] {
+            for (ray, told) in rays.iter().zip(ask(&ctx, &pipeline, gpu, &rays, 0)?) {
+                for found in [told.committed, told.candidate] {
+                    let hit = HitRecord { t: ray.t_max, kind: BACK, ..Zeroable::zeroed() };
+                    let expected = Found { hit, ..Zeroable::zeroed() };
+                    assert_eq!(bytemuck::bytes_of(&found), bytemuck::bytes_of(&expected), "{found:?}");
                 }
             }
         }

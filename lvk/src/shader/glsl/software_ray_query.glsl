@@ -67,12 +67,19 @@ void lvkSoftGenerate(inout LvkSoftState state, float t) {
     }
 }
 
+// Zeros where nothing was hit: no instance has that number, and no memory lies there.
 uvec4 lvkSoftInstanceBlock(LvkSoftState state, uint instance, uint block) {
+    if (instance == LVK_SOFT_NONE) {
+        return uvec4(0u);
+    }
     return LvkSoftBlocks(lvkSoftInstances(state)).at[instance * LVK_SOFT_INSTANCE_BLOCKS + block];
 }
 
-// The rows of the instance's matrix in its blocks from `first` on.
+// The rows of the instance's matrix in its blocks from `first` on; zeros where nothing was hit.
 mat3x4 lvkSoftInstanceRows(LvkSoftState state, LvkSoftHit hit, uint first) {
+    if (hit.instance == LVK_SOFT_NONE) {
+        return mat3x4(0.0);
+    }
     return lvkSoftRows(lvkSoftInstances(state), hit.instance * LVK_SOFT_INSTANCE_BLOCKS + first);
 }
 
@@ -85,9 +92,17 @@ mat4x3 lvkSoftMatrix(LvkSoftState state, LvkSoftHit hit, uint first) {
     return transpose(lvkSoftInstanceRows(state, hit, first));
 }
 
+// Zeros where no triangle was hit.
 void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3]) {
+    positions = vec3[3](vec3(0.0), vec3(0.0), vec3(0.0));
+    if (hit.instance == LVK_SOFT_NONE) {
+        return;
+    }
     uvec4 head;
     uvec2 structure = lvkSoftStructureOf(lvkSoftInstanceBlock(state, hit.instance, 6u).xy, head);
+    if (head.y == LVK_SOFT_BOXES) {
+        return;
+    }
     uint primitives = LvkSoftBlocks(structure).at[1].y;
     uvec3 words;
     lvkSoftCorners(structure, primitives, head.y, hit.primitive, positions, words);
