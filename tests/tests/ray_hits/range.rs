@@ -1,9 +1,11 @@
 //! Where a ray starts and ends: hits at its ends, a hair beside them, and rays without length. Every number is exact in
 //! f32.
 
-use lvk::glam::{Affine3A, Vec3};
+use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{GeometryFlags, Result};
+use lvk_tests::agreement::Agreement;
 use lvk_tests::device;
+use lvk_tests::hit_check::{HitCheck, rays_for};
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene};
 use lvk_tests::ray_tracer::{How, MISSED, Method, RayTracer};
@@ -91,4 +93,35 @@ fn a_ray_without_length_hits_nothing() -> Result<()> {
 fn a_ray_may_be_endless() -> Result<()> {
     let endless = DISTANCES.iter().flat_map(|t| [(t.next_down(), f32::INFINITY), (*t, f32::MAX)]);
     check(&endless.chain([(0.0, f32::INFINITY), (65.0, f32::INFINITY)]).collect::<Vec<_>>())
+}
+
+/// Distances are as long as directions are short.
+#[test]
+fn directions_may_be_very_short() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let check = HitCheck::new(&ctx)?;
+    let turned =
+        Affine3A::from_scale_rotation_translation(Vec3::splat(0.7), Quat::from_rotation_x(0.8), Vec3::ONE);
+    let placed = vec![Placed::new(0, Affine3A::IDENTITY), Placed::new(0, turned)];
+    let scene = RayScene { placed, ..RayScene::single(Mesh::torus(8), Layout::Indexed16) };
+    let gpu = scene.upload(&ctx)?;
+    let reference = scene.reference();
+    let along_axis = (0..90).map(|i| Ray::new(Vec3::new(0.03 * i as f32 - 1.3, -4.0, 0.2), Vec3::Y));
+    let rays: Vec<_> = rays_for(&reference).into_iter().chain(along_axis).collect();
+    for length in [1e-10, 1e-6, 1e-3] {
+        let shortened = |ray: &Ray| Ray {
+            t_min: ray.t_min / length,
+            t_max: ray.t_max / length,
+            direction: ray.direction.map(|part| part * length),
+            ..*ray
+        };
+        let short: Vec<_> = rays.iter().map(shortened).collect();
+        for (method, tracer) in check.tracers() {
+            let mut records = tracer.trace(&gpu.tlas, &short, How::default())?;
+            records.iter_mut().for_each(|record| record.t *= length);
+            let what = format!("directions of {length:e} by {method:?}");
+            Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(&what);
+        }
+    }
+    Ok(())
 }
