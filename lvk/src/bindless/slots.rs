@@ -59,6 +59,11 @@ impl Slots {
         self.dirty.push(slot);
     }
 
+    /// Whether no slot is to be written.
+    pub(crate) fn is_clean(&self) -> bool {
+        self.dirty.is_empty()
+    }
+
     /// The slots to write, in ascending order, each once; they count as written from now on.
     pub(crate) fn take_dirty(&mut self) -> Vec<u32> {
         let mut dirty = std::mem::take(&mut self.dirty);
@@ -147,6 +152,7 @@ mod tests {
                         dirty.clear();
                     }
                 }
+                prop_assert_eq!(slots.is_clean(), dirty.is_empty());
                 prop_assert!((0..14).all(|slot| slot == 0 || slots.is_taken(slot) == taken.contains(&slot)));
             }
         }

@@ -7,6 +7,7 @@ use ash::vk;
 use super::array::{Array, Shown};
 use super::checks::{BindlessArray, CheckPlan, IndexChecks};
 use super::layout;
+use super::slots::Slots;
 use super::yuv::{YuvPlace, YuvSlots};
 use crate::error::{Error, Result};
 use crate::format::Format;
@@ -51,6 +52,14 @@ struct Entries {
     samplers: Array<vk::Sampler>,
     tlas: Array<vk::AccelerationStructureKHR>,
     yuv: YuvSlots,
+}
+
+impl Entries {
+    /// Whether nothing is to be written, as before most submissions.
+    fn is_clean(&self) -> bool {
+        let arrays = [&self.textures.slots, &self.samplers.slots, &self.tlas.slots];
+        arrays.into_iter().all(Slots::is_clean) && self.yuv.is_clean()
+    }
 }
 
 /// The arrays that the slot of a texture belongs to.
@@ -229,7 +238,7 @@ impl Bindless {
     /// Writes the dirty slots. Called before every submission.
     pub(crate) fn flush(&self) {
         let mut entries = self.lock();
-        let Some(dummies) = entries.dummies else { return };
+        let Some(dummies) = entries.dummies.filter(|_| !entries.is_clean()) else { return };
         self.write_textures(dummies, &mut entries);
         self.write_samplers(dummies, entries.samplers.take_dirty().into_iter());
         self.write_tlas(dummies, entries.tlas.take_dirty().into_iter());

@@ -123,6 +123,11 @@ impl YuvSlots {
         self.ranges.iter().flat_map(slots).collect()
     }
 
+    /// Whether no slot is to be written.
+    pub(super) fn is_clean(&self) -> bool {
+        self.ranges.iter().all(|range| range.textures.slots.is_clean())
+    }
+
     /// Slots to write again, in rising order.
     pub(super) fn take_dirty(&mut self) -> Vec<(u32, vk::ImageView)> {
         let mut dirty = Vec::new();

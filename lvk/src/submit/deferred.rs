@@ -38,6 +38,9 @@ impl<T> Deferred<T> {
     /// `oldest_open` is the sequence number of the oldest command buffer still being recorded, `submitted` the timeline
     /// value of the last submission and `completed` the one the GPU has reached.
     pub(crate) fn collect(&mut self, oldest_open: Option<u64>, submitted: u64, completed: u64) -> Vec<T> {
+        if self.len() == 0 {
+            return Vec::new();
+        }
         let blocked =
             |newest: Option<u64>| newest.zip(oldest_open).is_some_and(|(newest, open)| open <= newest);
         let stamp = self.stamped.back().map_or(submitted, |(_, last)| submitted.max(*last));
