@@ -14,7 +14,7 @@ use crate::accel::software::body::SoftwareBody;
 use crate::accel::storage::AccelStorage;
 use crate::accel::structure::AccelKind;
 use crate::accel::tlas::TlasContents;
-use crate::accel::tlas_updates::{SpareUpdates, TlasUpdate};
+use crate::accel::tlas_updates::TlasUpdate;
 use crate::barrier::{QueryStages, ResourceId};
 use crate::bindless::checks::BindlessArray;
 use crate::bindless::{Bindless, TEXTURE_ARRAYS};
@@ -74,7 +74,6 @@ pub(crate) struct Shared {
     pub(crate) outdated_tlas: AtomicBool,
     /// How often a bottom-level structure has moved.
     pub(crate) moves: AtomicU64,
-    pub(crate) spare_updates: SpareUpdates,
     /// Slots of top-level structures that are gone, where the table still says what software traced.
     pub(crate) freed_tlas: Mutex<Vec<u32>>,
     pub(crate) gpu: Arc<Gpu>,
@@ -168,10 +167,8 @@ impl Shared {
         self.take_back(self.submitter.collect_known())
     }
 
-    fn take_back(&self, finished: Finished<Garbage>) -> Result<()> {
-        for sequence in finished.sequences {
-            self.staging.release(sequence);
-        }
+    pub(crate) fn take_back(&self, finished: Finished<Garbage>) -> Result<()> {
+        finished.staged.into_iter().for_each(|sequence| self.staging.release(sequence));
         finished.garbage.into_iter().for_each(|garbage| self.dispose(garbage));
         self.profiler.collect(finished.passed)
     }

@@ -1,6 +1,6 @@
 //! What top-level structures show once a command buffer is submitted.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use super::AccelStruct;
 use super::build_run::BuildRun;
@@ -57,6 +57,8 @@ pub(crate) struct TlasUpdates {
 
 impl TlasUpdates {
     const ROOM: usize = 8;
+    /// Lists for more instances are let go.
+    const MOST_KEPT: usize = 1 << 16;
 
     /// The last one of a structure.
     #[inline]
@@ -76,10 +78,9 @@ impl TlasUpdates {
         self.list.push(update);
     }
 
-    /// Whether nothing was ever recorded here, so that memory may be taken over from others.
-    #[inline]
-    pub(crate) fn is_new(&self) -> bool {
-        self.list.capacity() == 0
+    /// Whether the memory is not too much to keep for what is recorded next.
+    pub(crate) fn is_worth_keeping(&self) -> bool {
+        self.refers.capacity() <= Self::MOST_KEPT
     }
 
     /// Fails if what was recorded no longer fits what was submitted since.
@@ -92,27 +93,5 @@ impl TlasUpdates {
         self.targets = 0;
         self.run.stop();
         self.list.drain(..)
-    }
-}
-
-/// Lists that no command buffer has at the moment.
-#[derive(Default)]
-pub(crate) struct SpareUpdates(Mutex<Vec<TlasUpdates>>);
-
-impl SpareUpdates {
-    /// More than this are let go, and so are lists for more instances.
-    const MOST: usize = 8;
-    const MOST_INSTANCES: usize = 1 << 16;
-
-    pub(crate) fn take(&self) -> TlasUpdates {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default()
-    }
-
-    pub(crate) fn give(&self, updates: TlasUpdates) {
-        let mut spare = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if !updates.is_new() && spare.len() < Self::MOST && updates.refers.capacity() <= Self::MOST_INSTANCES
-        {
-            spare.push(updates);
-        }
     }
 }

@@ -134,16 +134,16 @@ impl CommandBuffer {
         software(self, structures, &refits)?;
         for build in &open {
             let refits = if build.refit { self.refits_of(&build.target)?.saturating_add(1) } else { 0 };
-            self.refits.insert(build.target.id.0, refits);
+            self.notes.refits.insert(build.target.id.0, refits);
         }
-        self.open_builds.extend(open);
+        self.notes.open_builds.extend(open);
         Ok(())
     }
 
     /// Refits since the last rebuild of a bottom-level structure, before the next command.
     fn refits_of(&self, target: &AccelStruct) -> Result<u32> {
         let submitted = target.blas()?.refits();
-        Ok(self.refits.get(&target.id.0).copied().unwrap_or(submitted))
+        Ok(self.notes.refits.get(&target.id.0).copied().unwrap_or(submitted))
     }
 
     /// Adds a build for each part.
@@ -196,7 +196,7 @@ impl CommandBuffer {
         let (scratch, replaced) = own.get(&shared.gpu, most)?;
         self.retire_replaced(replaced);
         for batch in batches {
-            self.uses.id(own.id, Use::accel_build_write());
+            self.notes.uses.id(own.id, Use::accel_build_write());
             let base = aligned_scratch_address(scratch.address, alignment);
             self.record_batch(ext, &builds[batch.builds.clone()], &batch, base);
         }
@@ -220,8 +220,9 @@ impl CommandBuffer {
     }
 
     fn use_build(&mut self, build: &Build) {
-        self.uses.id(build.target.id, Use::accel_build_write());
-        self.uses.accumulate(self.built_group(), Use::accel_build_write());
+        self.notes.uses.id(build.target.id, Use::accel_build_write());
+        let group = self.built_group();
+        self.notes.uses.accumulate(group, Use::accel_build_write());
         for buffer in &build.reads {
             self.use_buffer(buffer, Use::accel_build_input());
         }
@@ -229,8 +230,8 @@ impl CommandBuffer {
 
     /// The next command reads bottom-level structures, whichever it may be.
     pub(super) fn use_shown(&mut self, read: Use) {
-        self.uses.id(self.shared.all_blas, read);
-        self.uses.id(self.shared.new_blas[self.recording.lane], read);
+        self.notes.uses.id(self.shared.all_blas, read);
+        self.notes.uses.id(self.shared.new_blas[self.recording.lane], read);
     }
 
     /// Keeps a scratch buffer that a larger one has replaced until the GPU is done with it.

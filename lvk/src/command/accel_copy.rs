@@ -22,7 +22,7 @@ impl CommandBuffer {
             let ty = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
             self.write_sizes(target, &body, &query.pool, *first, ty)?;
         }
-        self.size_queries.push(Arc::clone(query));
+        self.notes.size_queries.push(Arc::clone(query));
         Ok(())
     }
 
@@ -39,7 +39,7 @@ impl CommandBuffer {
         let ext = shared.gpu.accel()?;
         pool.check_range(first, body.structures.len() as u32)?;
         let structures: Vec<_> = body.structures.iter().map(|part| part.raw).collect();
-        self.uses.id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
+        self.notes.uses.id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
         self.flush();
         // SAFETY: the structures are alive and built; the queries exist and were reset when the pool was made.
         unsafe {
@@ -84,7 +84,7 @@ impl CommandBuffer {
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
         let ext = shared.gpu.accel()?;
-        self.uses.id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
+        self.notes.uses.id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
         self.use_buffer(buffer, Use::accel_to_memory());
         self.flush();
         for (part, address) in body.structures.iter().zip(addresses) {
@@ -139,8 +139,8 @@ impl CommandBuffer {
     }
 
     fn use_copy(&mut self, target: &AccelStruct) {
-        self.uses.id(target.id, Use::accel_build_write());
-        self.uses.accumulate(self.shared.all_blas, Use::accel_build_write());
+        self.notes.uses.id(target.id, Use::accel_build_write());
+        self.notes.uses.accumulate(self.shared.all_blas, Use::accel_build_write());
     }
 }
 

@@ -34,6 +34,16 @@ impl PushConstants {
     /// Rust structs end on their alignment, GLSL blocks on their last member; 16 bytes is the largest alignment.
     const TAIL_BYTES: u32 = 16;
 
+    /// Nothing is bound, and nothing pushed.
+    pub(super) fn clear(&mut self) {
+        if self.pushed != 0 {
+            self.pushed = 0;
+            self.bytes = [0; Self::MOST_BYTES];
+        }
+        self.wanted = None;
+        self.whole = 0..0;
+    }
+
     /// A pipeline with a block of so many bytes is bound, of a layout with so many.
     fn want(&mut self, pipeline: &Arc<str>, expected: u32, room: u32) {
         self.wanted = Some((Arc::clone(pipeline), expected));
@@ -113,7 +123,7 @@ impl CommandBuffer {
     pub fn push_constants<T: bytemuck::NoUninit>(&mut self, constants: &T) -> Result<()> {
         let bytes = bytemuck::bytes_of(constants);
         let size = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
-        if self.push_constants.whole.contains(&size) && size.is_multiple_of(4) {
+        if self.notes.push_constants.whole.contains(&size) && size.is_multiple_of(4) {
             self.record_push(0, bytes);
             return Ok(());
         }
@@ -123,14 +133,14 @@ impl CommandBuffer {
     /// Pushes bytes that are not as many as the bound pipeline's block has, or says what is wrong with them.
     #[cold]
     fn push_unlike_whole(&mut self, bytes: &[u8]) -> Result<()> {
-        self.push_constants.check_whole(bytes.len())?;
+        self.notes.push_constants.check_whole(bytes.len())?;
         self.push_constant_bytes(0, bytes)
     }
 
     /// Sets part of the push constants: `bytes` from `offset` on, both multiples of 4.
     pub fn push_constant_bytes(&mut self, offset: u32, bytes: &[u8]) -> Result<()> {
         let size = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
-        self.push_constants.check(offset, size)?;
+        self.notes.push_constants.check(offset, size)?;
         let room = self.shared.layout.push_constant_bytes.saturating_sub(offset) as usize;
         self.record_push(offset, &bytes[..bytes.len().min(room)]);
         Ok(())
@@ -146,7 +156,7 @@ impl CommandBuffer {
             let stages = vk::ShaderStageFlags::ALL;
             shared.gpu.device.cmd_push_constants(self.raw(), shared.layout.raw, stages, offset, bytes);
         }
-        self.push_constants.keep(offset, bytes);
+        self.notes.push_constants.keep(offset, bytes);
     }
 
     /// Binds a pipeline, and the bindless set the first time at its bind point.
@@ -161,30 +171,30 @@ impl CommandBuffer {
         // SAFETY: the pipeline and the set are alive and share one layout.
         unsafe {
             shared.gpu.device.cmd_bind_pipeline(raw, point, pipeline);
-            if !self.sets_bound.contains(&point) {
+            if !self.notes.sets_bound.contains(&point) {
                 let sets = [shared.bindless.set];
                 shared.gpu.device.cmd_bind_descriptor_sets(raw, point, shared.layout.raw, 0, &sets, &[]);
-                self.sets_bound.push(point);
+                self.notes.sets_bound.push(point);
             }
         }
-        self.push_constants.want(name, push_constant_bytes, self.shared.layout.push_constant_bytes);
+        self.notes.push_constants.want(name, push_constant_bytes, self.shared.layout.push_constant_bytes);
     }
 
     /// Whether all these were pushed; see [`words`].
     #[inline]
     pub(super) fn has_pushed(&self, needed: u64) -> bool {
-        self.push_constants.pushed & needed == needed
+        self.notes.push_constants.pushed & needed == needed
     }
 
     /// Fails if a pipeline about to run reads bytes that were never pushed.
     #[inline]
     pub(super) fn check_pushed(&self, pipeline: &str, expected: u32) -> Result<()> {
-        self.push_constants.check_pushed(pipeline, expected)
+        self.notes.push_constants.check_pushed(pipeline, expected)
     }
 
     /// Says which of them were never pushed.
     pub(super) fn missing_constants(&self, pipeline: &str, expected: u32) -> Error {
-        self.push_constants.missing(pipeline, expected)
+        self.notes.push_constants.missing(pipeline, expected)
     }
 }
 

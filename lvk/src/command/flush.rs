@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::CommandBuffer;
 use super::dependencies::Dependencies;
+use super::notes::Notes;
 use super::uses::Uses;
 use crate::barrier::{ResourceId, Stages, Subresources, Use};
 use crate::error::Result;
@@ -17,7 +18,8 @@ use crate::submit::emit::emit;
 impl CommandBuffer {
     /// The next command uses a buffer.
     pub(super) fn use_buffer(&mut self, buffer: &Buffer, next: Use) {
-        use_buffer(&mut self.uses, &mut self.host_reads, buffer, next);
+        let Notes { uses, host_reads, .. } = &mut **self.notes;
+        use_buffer(uses, host_reads, buffer, next);
     }
 
     /// The next command uses a part of the image that a texture shows.
@@ -27,14 +29,15 @@ impl CommandBuffer {
         part: Subresources,
         next: Use,
     ) -> Result<()> {
-        let row = self.found_textures.row(texture);
-        self.uses.texture(&self.found_textures, row, part, next)
+        let Notes { uses, found_textures, .. } = &mut **self.notes;
+        let row = found_textures.row(texture);
+        uses.texture(found_textures, row, part, next)
     }
 
     /// The next command's shaders trace rays in these stages.
     pub(super) fn use_structures(&mut self, stages: Stages) {
         let reads = structure_reads(&self.shared, self.recording.lane, stages);
-        reads.into_iter().for_each(|(id, read)| self.uses.id(id, read));
+        reads.into_iter().for_each(|(id, read)| self.notes.uses.id(id, read));
     }
 
     /// The pass that begins sees what this command buffer has built: no barrier can be placed once it is open, and only
@@ -80,12 +83,13 @@ impl CommandBuffer {
         next: Use,
         part: impl Fn(&Texture) -> Subresources,
     ) -> Result<()> {
-        let (pool, found) = (&self.shared.store.textures, &mut self.found_textures);
+        let pool = &self.shared.store.textures;
+        let Notes { uses, found_textures: found, .. } = &mut **self.notes;
         for handle in handles {
             let row = found.find(pool, *handle)?;
             let texture = found.at(row);
             texture.check_usage(usage)?;
-            self.uses.texture(found, row, part(texture), next)?;
+            uses.texture(found, row, part(texture), next)?;
         }
         Ok(())
     }
@@ -93,10 +97,11 @@ impl CommandBuffer {
     /// The next command's shaders reach these buffers.
     #[inline(never)]
     fn use_buffers(&mut self, handles: &[BufferHandle], next: Use) -> Result<()> {
-        let (pool, found) = (&self.shared.store.buffers, &mut self.found_buffers);
+        let pool = &self.shared.store.buffers;
+        let Notes { uses, host_reads, found_buffers: found, .. } = &mut **self.notes;
         for handle in handles {
             let row = found.find(pool, *handle)?;
-            use_buffer(&mut self.uses, &mut self.host_reads, found.at(row), next);
+            use_buffer(uses, host_reads, found.at(row), next);
         }
         Ok(())
     }
@@ -105,11 +110,12 @@ impl CommandBuffer {
     #[inline]
     pub(super) fn flush(&mut self) {
         self.end_rendering();
-        self.tlas_updates.run.stop();
-        let Recording { commands, tracker, images, .. } = &mut *self.recording;
-        self.barriers.clear();
-        self.uses.track(&self.found_textures, tracker, images, &mut self.barriers);
-        emit(&self.shared.gpu, *commands, &self.barriers, images, &mut self.last_barrier);
+        let Recording { commands, tracker, images, .. } = &mut **self.recording;
+        let Notes { uses, found_textures, barriers, last_barrier, tlas_updates, .. } = &mut **self.notes;
+        tlas_updates.run.stop();
+        barriers.clear();
+        uses.track(found_textures, tracker, images, barriers);
+        emit(&self.shared.gpu, *commands, barriers, images, last_barrier);
     }
 
     /// In front of a command that runs shaders: makes what copies wrote readable, runs `gather`, then records the
@@ -122,7 +128,7 @@ impl CommandBuffer {
                 Ok(())
             }
             Err(error) => {
-                self.uses.clear();
+                self.notes.uses.clear();
                 Err(error)
             }
         }

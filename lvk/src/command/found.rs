@@ -56,6 +56,15 @@ impl<H: Handle, T> Found<H, T> {
         })
     }
 
+    /// Forgets everything; keeps the memory.
+    pub(super) fn clear(&mut self) {
+        if !self.objects.is_empty() {
+            self.objects.clear();
+            self.rows.clear();
+            self.places = [None; PLACES];
+        }
+    }
+
     /// How many there are.
     #[inline]
     pub(super) fn count(&self) -> usize {

@@ -108,8 +108,8 @@ impl CommandBuffer {
         let base = aligned_scratch_address(scratch.address, alignment);
         for batch in batches {
             let addresses: Vec<_> = batch.offsets.iter().map(|offset| base + offset).collect();
-            self.uses.id(own.id, Use::shader_write(Stages::COMPUTE));
-            record(self, batch.builds, &addresses).inspect_err(|_| self.uses.clear())?;
+            self.notes.uses.id(own.id, Use::shader_write(Stages::COMPUTE));
+            record(self, batch.builds, &addresses).inspect_err(|_| self.notes.uses.clear())?;
         }
         Ok(())
     }
@@ -158,7 +158,7 @@ impl CommandBuffer {
     /// The address of records that the GPU may read until the command buffer is done.
     fn stage_table<T: bytemuck::NoUninit>(&mut self, records: &[T]) -> Result<u64> {
         let bytes = bytemuck::cast_slice(records);
-        let region = self.shared.staging.write(bytes, TABLE_ALIGNMENT, self.recording.sequence)?;
+        let region = self.shared.staging.write(bytes, TABLE_ALIGNMENT, self.recording.staging_key())?;
         Ok(region.address)
     }
 }

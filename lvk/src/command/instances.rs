@@ -85,9 +85,9 @@ impl CommandBuffer {
     ) -> Result<Planned> {
         let built_count = instances.len() as u32;
         let bytes = instance_bytes(built_count.max(1));
-        let (shared, sequence) = (&self.shared, self.recording.sequence);
+        let (shared, sequence) = (&self.shared, self.recording.staging_key());
         let find = |handle| shared.store.accel_structs.get(handle);
-        let marks = &mut self.tlas_updates.marks;
+        let marks = &mut self.notes.tlas_updates.marks;
         let (address, written) =
             shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, |out| {
                 write_addresses(name, instances, &known, marks, &find, out)
@@ -109,7 +109,7 @@ impl CommandBuffer {
     ) -> Result<InstancePlan> {
         let shared = &self.shared;
         let find = |handle| shared.store.accel_structs.get(handle);
-        let updates = &mut self.tlas_updates;
+        let updates = &mut self.notes.tlas_updates;
         let refers = std::mem::take(&mut updates.refers);
         InstancePlan::new(name, instances, known, &mut updates.marks, refers, &find)
     }
@@ -143,7 +143,7 @@ impl CommandBuffer {
             numbers: Numbers::Parts,
         };
         let shown = Arc::clone(&plan.shown);
-        self.tlas_updates.refers = plan.into_refers();
+        self.notes.tlas_updates.refers = plan.into_refers();
         Ok((source, shown))
     }
 
@@ -279,7 +279,7 @@ impl CommandBuffer {
         }
         self.use_buffer(records, Use::shader_write(Stages::COMPUTE));
         if rows.is_some() {
-            self.uses.id(self.shared.tlas_tables, Use::shader_write(Stages::COMPUTE));
+            self.notes.uses.id(self.shared.tlas_tables, Use::shader_write(Stages::COMPUTE));
         }
         self.flush();
         let invocations = source.count.saturating_mul(source.copies);
@@ -291,7 +291,7 @@ impl CommandBuffer {
 
     /// The address of bytes that the GPU may read until the command buffer is done.
     fn stage(&mut self, bytes: u64, fill: impl FnOnce(&mut [u8])) -> Result<u64> {
-        let sequence = self.recording.sequence;
+        let sequence = self.recording.staging_key();
         let (address, ()) =
             self.shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, fill)?;
         Ok(address)

@@ -26,7 +26,7 @@ impl CommandBuffer {
     pub(super) fn gather_inputs(&mut self, structures: &[Arc<AccelStruct>], refits: &[bool]) -> Result<()> {
         let mut runs = Vec::new();
         for (target, refit) in structures.iter().zip(refits) {
-            self.plan_gathers(target, *refit, &mut runs).inspect_err(|_| self.uses.clear())?;
+            self.plan_gathers(target, *refit, &mut runs).inspect_err(|_| self.notes.uses.clear())?;
         }
         if runs.is_empty() {
             return Ok(());
@@ -147,7 +147,7 @@ impl CommandBuffer {
             if let Some(own) = &self.compute {
                 device.cmd_bind_pipeline(raw, vk::PipelineBindPoint::COMPUTE, own.raw);
             }
-            let pushed = self.push_constants.pushed_bytes();
+            let pushed = self.notes.push_constants.pushed_bytes();
             if !pushed.is_empty() {
                 let stages = vk::ShaderStageFlags::ALL;
                 device.cmd_push_constants(raw, self.shared.layout.raw, stages, 0, pushed);

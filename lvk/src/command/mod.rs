@@ -16,6 +16,7 @@ mod instances;
 mod kernel;
 mod label;
 mod local_read;
+mod notes;
 mod part_uses;
 mod pass_area;
 mod present;
@@ -34,32 +35,22 @@ pub(crate) mod transfer;
 mod upload;
 pub(crate) mod uses;
 
-use std::collections::{HashMap, HashSet};
 use std::mem::ManuallyDrop;
 use std::sync::Arc;
 
 use ash::vk;
 
-use crate::accel::compaction::SizeQuery;
-use crate::accel::tlas_updates::TlasUpdates;
-use crate::barrier::{Barriers, ResourceId, Use};
+use crate::barrier::Use;
 use crate::error::Result;
 use crate::gpu::queues::Queue;
-use crate::handle::{BufferHandle, TextureHandle};
 use crate::pipeline::{ComputePipeline, RayTracingPipeline};
-use crate::resource::{Buffer, Texture};
 use crate::shared::Shared;
 use crate::submit::Recording;
-use crate::submit::emit::LastBarrier;
 use crate::submit::profiler::Scopes;
 use crate::upload::staging::StagingChunk;
 
-use accel::OpenBuild;
-use bind::PushConstants;
-use found::Found;
-use query_log::QueryLog;
-use transfer::Settle;
-use uses::Uses;
+use notes::Notes;
+pub(crate) use notes::SpareNotes;
 
 /// Records commands for one submission.
 ///
@@ -72,18 +63,11 @@ use uses::Uses;
 pub struct CommandBuffer {
     shared: Arc<Shared>,
     queue: Queue,
-    recording: ManuallyDrop<Recording>,
     finished: bool,
-    found_buffers: Found<BufferHandle, Buffer>,
-    found_textures: Found<TextureHandle, Texture>,
-    uses: Uses,
-    barriers: Barriers,
-    last_barrier: LastBarrier,
+    recording: ManuallyDrop<Box<Recording>>,
+    notes: ManuallyDrop<Box<Notes>>,
     compute: Option<Arc<ComputePipeline>>,
     ray_tracing: Option<Arc<RayTracingPipeline>>,
-    sets_bound: Vec<vk::PipelineBindPoint>,
-    push_constants: PushConstants,
-    host_reads: Vec<ResourceId>,
     open_labels: u32,
     /// Whether a render pass is open; it stays so where its value was forgotten instead of dropped.
     rendering: bool,
@@ -91,80 +75,49 @@ pub struct CommandBuffer {
     had_pass: bool,
     /// Views that the open pass draws at once: every query takes so many. 1 outside of passes.
     views: u32,
-    settle: Vec<Settle>,
-    tlas_updates: TlasUpdates,
     /// Small regions of staging memory come from here.
     staged: StagingChunk,
-    open_builds: Vec<OpenBuild>,
-    /// Refits since the last rebuild of each bottom-level structure that is built here, by its id.
-    refits: HashMap<u64, u32>,
-    size_queries: Vec<Arc<SizeQuery>>,
-    queries: QueryLog,
     /// Present where the command buffer is profiled.
     scopes: Option<Box<Scopes>>,
     /// Whether structures are built that nothing can show yet.
     first_builds: bool,
-    /// Bottom-level structures that are built elsewhere from here on, by their ids.
-    moved: HashSet<u64>,
 }
 
-/// What becomes true once a command buffer is submitted.
+/// What is left of a command buffer once it is complete.
 pub(crate) struct Outcome {
-    pub(crate) tlas_updates: TlasUpdates,
-    pub(crate) builds: Vec<OpenBuild>,
-    pub(crate) size_queries: Vec<Arc<SizeQuery>>,
-    queries: QueryLog,
-    /// Present where the command buffer was profiled.
+    /// What becomes true when it is submitted.
+    pub(crate) notes: Box<Notes>,
+    /// Present where it was profiled.
     pub(crate) scopes: Option<Box<Scopes>>,
 }
 
-impl Outcome {
-    /// The command buffer went to the GPU with this timeline value.
-    pub(crate) fn submit(mut self, shared: &Shared, value: u64) {
-        self.tlas_updates.drain().for_each(|update| shared.show(update).submitted(value));
-        shared.spare_updates.give(self.tlas_updates);
-        self.builds.into_iter().for_each(|build| build.submit(value));
-        self.size_queries.iter().for_each(|query| query.submit());
-        self.queries.submit();
-    }
-}
-
 impl CommandBuffer {
-    pub(crate) fn new(shared: &Arc<Shared>, queue: Queue) -> Result<Self> {
-        let recording = shared.submitter.acquire(queue)?;
+    /// Commands go to `recording`, and what is to be remembered of them to `notes`, which are empty.
+    pub(crate) fn new(
+        shared: &Arc<Shared>,
+        queue: Queue,
+        recording: Box<Recording>,
+        notes: Box<Notes>,
+    ) -> Self {
         if let Some(checks) = &shared.bindless.checks {
             checks.begin(&shared.gpu, recording.commands, recording.sequence);
         }
-        Ok(Self {
+        Self {
             scopes: shared.profiler.begin(recording.commands, queue),
-            queue,
-            recording: ManuallyDrop::new(recording),
             shared: Arc::clone(shared),
+            queue,
             finished: false,
-            found_buffers: Found::default(),
-            found_textures: Found::default(),
-            uses: Uses::default(),
-            barriers: Barriers::default(),
-            last_barrier: LastBarrier::default(),
+            recording: ManuallyDrop::new(recording),
+            notes: ManuallyDrop::new(notes),
             compute: None,
             ray_tracing: None,
-            sets_bound: Vec::new(),
-            push_constants: PushConstants::default(),
-            host_reads: Vec::new(),
             open_labels: 0,
             rendering: false,
-            views: 1,
             had_pass: false,
-            settle: Vec::new(),
-            tlas_updates: TlasUpdates::default(),
+            views: 1,
             staged: StagingChunk::default(),
-            open_builds: Vec::new(),
-            refits: HashMap::new(),
-            size_queries: Vec::new(),
-            queries: QueryLog::default(),
             first_builds: false,
-            moved: HashSet::new(),
-        })
+        }
     }
 
     /// The Vulkan command buffer, for commands the library does not have.
@@ -191,36 +144,35 @@ impl CommandBuffer {
         self.shared.submitter.check(&self.recording.tracker)
     }
 
-    /// Ends the recording. Answers also what becomes true once it is submitted.
-    pub(crate) fn finish(mut self) -> (Recording, Outcome) {
+    /// Ends the recording.
+    pub(crate) fn finish(mut self) -> (Box<Recording>, Outcome) {
         self.pop_labels(0);
         self.end_open_queries();
         self.settle();
-        for id in std::mem::take(&mut self.host_reads) {
-            self.uses.id(id, Use::host_read());
-        }
+        self.show_host();
         self.flush();
         self.stamp(None);
         self.refer_to_queries();
         self.finished = true;
-        // SAFETY: `finished` keeps `drop` from taking the recording again.
-        let recording = unsafe { ManuallyDrop::take(&mut self.recording) };
-        let outcome = Outcome {
-            tlas_updates: std::mem::take(&mut self.tlas_updates),
-            builds: std::mem::take(&mut self.open_builds),
-            size_queries: std::mem::take(&mut self.size_queries),
-            queries: std::mem::take(&mut self.queries),
-            scopes: self.scopes.take(),
-        };
-        (recording, outcome)
+        // SAFETY: `finished` keeps `drop` from taking both again.
+        let (recording, notes) =
+            unsafe { (ManuallyDrop::take(&mut self.recording), ManuallyDrop::take(&mut self.notes)) };
+        (recording, Outcome { notes, scopes: self.scopes.take() })
+    }
+
+    /// The host sees what was written in mapped memory.
+    fn show_host(&mut self) {
+        let Notes { uses, host_reads, .. } = &mut **self.notes;
+        host_reads.drain(..).for_each(|id| uses.id(id, Use::host_read()));
     }
 }
 
 impl Drop for CommandBuffer {
     fn drop(&mut self) {
         if !self.finished {
-            // SAFETY: only `finish` takes the recording too, and it sets `finished`.
-            let recording = unsafe { ManuallyDrop::take(&mut self.recording) };
+            // SAFETY: only `finish` takes these too, and it sets `finished`.
+            let (recording, _notes) =
+                unsafe { (ManuallyDrop::take(&mut self.recording), ManuallyDrop::take(&mut self.notes)) };
             self.shared.submitter.discard(recording);
             if let Some(scopes) = self.scopes.take() {
                 self.shared.profiler.discard(*scopes);

@@ -24,14 +24,14 @@ impl CommandBuffer {
         let pool = self.shared.store.query_pools.get(pool)?;
         let count = queries.end.saturating_sub(queries.start);
         pool.check_range(queries.start, count)?;
-        self.queries.check_reset(&pool, queries.clone())?;
+        self.notes.queries.check_reset(&pool, queries.clone())?;
         if count > 0 {
             self.end_rendering();
             // SAFETY: the queries exist and are not open, and no pass is open.
             unsafe {
                 self.shared.gpu.device.cmd_reset_query_pool(self.raw(), pool.raw, queries.start, count)
             };
-            self.queries.reset(&pool, queries);
+            self.notes.queries.reset(&pool, queries);
         }
         Ok(())
     }
@@ -49,11 +49,11 @@ impl CommandBuffer {
         pool.check_range(query, self.views)?;
         pool.check_kind(pool.kind == QueryKind::Timestamps, "measure with begin_query and end_query")?;
         self.needs_timestamps()?;
-        self.queries.check_ready(&pool, query, self.views)?;
+        self.notes.queries.check_ready(&pool, query, self.views)?;
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         // SAFETY: the query exists and is ready.
         unsafe { self.shared.gpu.device.cmd_write_timestamp2(self.raw(), stage, pool.raw, query) };
-        self.queries.write(&pool, query, self.views);
+        self.notes.queries.write(&pool, query, self.views);
         Ok(())
     }
 
@@ -85,15 +85,15 @@ impl CommandBuffer {
         let pool = self.shared.store.query_pools.get(pool)?;
         pool.check_range(query, self.views)?;
         pool.check_kind(pool.kind != QueryKind::Timestamps, "write them with write_timestamp")?;
-        self.queries.check_begin(&pool)?;
-        self.queries.check_ready(&pool, query, self.views)?;
+        self.notes.queries.check_begin(&pool)?;
+        self.notes.queries.check_ready(&pool, query, self.views)?;
         self.check_statistics(pool.kind)?;
         // SAFETY: the query exists and is ready, and none of its type is open.
         unsafe {
             let device = &self.shared.gpu.device;
             device.cmd_begin_query(self.raw(), pool.raw, query, pool.kind.control());
         }
-        self.queries.begin(pool, query, self.views, self.rendering);
+        self.notes.queries.begin(pool, query, self.views, self.rendering);
         Ok(())
     }
 
@@ -110,14 +110,14 @@ impl CommandBuffer {
 
     fn end_query_here(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         let pool = self.shared.store.query_pools.get(pool)?;
-        self.queries.end(&pool, query, self.rendering)?;
+        self.notes.queries.end(&pool, query, self.rendering)?;
         self.record_end_query(&pool, query);
         Ok(())
     }
 
     /// Ends what was begun in the pass that ends now; that it is open is an error of the submission.
     pub(super) fn end_pass_queries(&mut self) {
-        for open in self.queries.take_pass_queries() {
+        for open in self.notes.queries.take_pass_queries() {
             self.record_end_query(&open.pool, open.query);
         }
     }
@@ -125,7 +125,7 @@ impl CommandBuffer {
     /// Ends what is still open.
     pub(super) fn end_open_queries(&mut self) {
         self.end_rendering();
-        for open in self.queries.take_open() {
+        for open in self.notes.queries.take_open() {
             self.record_end_query(&open.pool, open.query);
         }
     }
@@ -138,13 +138,13 @@ impl CommandBuffer {
     /// Other queues wait for what this one does to pools.
     pub(super) fn refer_to_queries(&mut self) {
         if self.shared.gpu.queues.several_lanes() {
-            self.recording.references.extend(self.queries.pools().map(|id| (id, Access::Write)));
+            self.recording.references.extend(self.notes.queries.pools().map(|id| (id, Access::Write)));
         }
     }
 
     /// Fails where a query is open, or is written again without a reset.
     pub(crate) fn check_queries(&self) -> Result<()> {
-        self.queries.check_submit()
+        self.notes.queries.check_submit()
     }
 }
 

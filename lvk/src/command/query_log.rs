@@ -132,8 +132,15 @@ impl QueryLog {
     }
 
     /// The command buffer was submitted.
-    pub(super) fn submit(self) {
+    pub(super) fn submit(&self) {
         self.pools.iter().for_each(|(pool, marks)| pool.submit(marks));
+    }
+
+    /// Forgets everything; keeps the memory.
+    pub(super) fn clear(&mut self) {
+        self.pools.clear();
+        self.open.clear();
+        self.left_open = None;
     }
 
     /// The pools that the command buffer writes or resets.

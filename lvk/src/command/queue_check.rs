@@ -22,9 +22,9 @@ impl CommandBuffer {
         self.queue
     }
 
-    /// Whether it runs in order with what the graphics queue gets.
-    pub(crate) fn is_on_first_lane(&self) -> bool {
-        self.recording.lane == 0
+    /// Its queue's. What is on lane 0 runs in order with what the graphics queue gets.
+    pub(crate) fn lane(&self) -> usize {
+        self.recording.lane
     }
 
     /// Fails unless this is for the graphics queue.

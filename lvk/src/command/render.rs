@@ -10,6 +10,7 @@ use super::bind::words;
 use super::compute::check_arguments;
 use super::dynamic::{DynamicState, WRITES_READ_ONLY};
 use super::local_read::TargetHazards;
+use super::notes::Notes;
 use super::pass_area::PassArea;
 use super::targets::Targets;
 use crate::barrier::Use;
@@ -371,7 +372,7 @@ impl<'a> RenderPass<'a> {
             let message = "it has no mesh shader; draw with draw, draw_indexed or their indirect forms";
             return Err(Error::usage(&*pipeline.name, message));
         }
-        self.cmd.queries.check_mesh_draw()?;
+        self.cmd.notes.queries.check_mesh_draw()?;
         self.cmd.check_pushed(&pipeline.name, pipeline.push_constant_bytes)
     }
 
@@ -386,15 +387,15 @@ impl<'a> RenderPass<'a> {
     }
 
     fn track_inside(&mut self, what: &str, name: &str, remedy: &str) -> Result<()> {
-        let recording = &mut *self.cmd.recording;
-        if self.cmd.uses.need_barriers(&recording.tracker) {
-            self.cmd.uses.clear();
+        let Recording { tracker, images, .. } = &mut **self.cmd.recording;
+        let Notes { uses, found_textures, barriers, .. } = &mut **self.cmd.notes;
+        if uses.need_barriers(tracker) {
+            uses.clear();
             let message = format!("{what} was written earlier in this command buffer; {remedy}");
             return Err(Error::usage(name, message));
         }
-        self.cmd.barriers.clear();
-        let Recording { tracker, images, .. } = recording;
-        self.cmd.uses.track(&self.cmd.found_textures, tracker, images, &mut self.cmd.barriers);
+        barriers.clear();
+        uses.track(found_textures, tracker, images, barriers);
         Ok(())
     }
 

@@ -65,9 +65,9 @@ impl CommandBuffer {
         body: &SoftwareBody,
         bytes: &[u8],
     ) -> Result<()> {
-        let region = self.shared.staging.write(bytes, ALIGNMENT, self.recording.sequence)?;
-        self.uses.id(target.id, Use::transfer_write());
-        self.uses.accumulate(all, Use::transfer_write());
+        let region = self.shared.staging.write(bytes, ALIGNMENT, self.recording.staging_key())?;
+        self.notes.uses.id(target.id, Use::transfer_write());
+        self.notes.uses.accumulate(all, Use::transfer_write());
         self.use_buffer(body.buffer(), Use::transfer_write());
         self.flush();
         let copy =
@@ -108,8 +108,9 @@ impl CommandBuffer {
             return Ok(());
         }
         let write = Use::shader_write(Stages::COMPUTE);
-        structures.iter().for_each(|target| self.uses.id(target.id, write));
-        self.uses.accumulate(self.built_group(), write);
+        structures.iter().for_each(|target| self.notes.uses.id(target.id, write));
+        let group = self.built_group();
+        self.notes.uses.accumulate(group, write);
         if !work.builds.is_empty() {
             self.record_gpu_builds(&work.builds)?;
         }
@@ -130,7 +131,8 @@ impl CommandBuffer {
     ) -> Result<()> {
         let geometries = self.gpu_geometries(target, blas)?;
         let reads = self.reads(blas)?;
-        let moved = software.rebuilt().filter(|_| blas.builds() > 1 || self.moved.contains(&target.id.0));
+        let moved =
+            software.rebuilt().filter(|_| blas.builds() > 1 || self.notes.moved.contains(&target.id.0));
         let refit_of = |plan: GpuRefitPlan, body: &SoftwareBody| GpuRefit {
             plan,
             geometries: geometries.clone(),
@@ -162,7 +164,7 @@ impl CommandBuffer {
                 work.builds.push(build_of(rebuild, rebuilt));
                 let header = MovedHeader { format: MOVED, leaf_kind: 0, address: rebuilt.address };
                 work.moves.push((Arc::clone(&software.body), header));
-                self.moved.insert(target.id.0);
+                self.notes.moved.insert(target.id.0);
             }
         }
         Ok(())
@@ -184,7 +186,7 @@ impl CommandBuffer {
     fn record_moves(&mut self, moves: &[(Arc<SoftwareBody>, MovedHeader)]) {
         for (body, header) in moves {
             self.use_buffer(body.buffer(), Use::transfer_write());
-            self.uses.accumulate(self.shared.all_blas, Use::transfer_write());
+            self.notes.uses.accumulate(self.shared.all_blas, Use::transfer_write());
             self.flush();
             let bytes = bytemuck::bytes_of(header);
             // SAFETY: the body begins with a header, at a multiple of 4.
@@ -211,7 +213,7 @@ impl CommandBuffer {
         }
         let bytes = instance_bytes(instances.len().max(1) as u32);
         let (region, written) =
-            shared.staging.write_with(bytes, ALIGNMENT, self.recording.sequence, |out| {
+            shared.staging.write_with(bytes, ALIGNMENT, self.recording.staging_key(), |out| {
                 self.write_software_instances(target, instances, out)
             })?;
         written?;
@@ -234,7 +236,7 @@ impl CommandBuffer {
         let entries = table.len() as u32;
         table.resize(table.len().max(1), 0);
         let bytes = bytemuck::cast_slice(&table);
-        let region = self.shared.staging.write(bytes, ALIGNMENT, self.recording.sequence)?;
+        let region = self.shared.staging.write(bytes, ALIGNMENT, self.recording.staging_key())?;
         let source = BuildSource::Instances {
             records: buffer.address + instances.offset,
             count: instances.count,
@@ -301,9 +303,9 @@ impl CommandBuffer {
         reads: Vec<Arc<Buffer>>,
     ) -> Result<()> {
         let write = Use::shader_write(Stages::COMPUTE);
-        self.uses.id(target.id, write);
+        self.notes.uses.id(target.id, write);
         self.use_shown(Use::shader_read(Stages::COMPUTE));
-        self.uses.accumulate(self.shared.all_tlas, write);
+        self.notes.uses.accumulate(self.shared.all_tlas, write);
         self.record_gpu_builds(&[GpuBuild {
             plan: software.plan.clone(),
             source,

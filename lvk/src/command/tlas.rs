@@ -7,6 +7,7 @@ use ash::vk;
 use super::CommandBuffer;
 use super::accel::OpenBuild;
 use super::instances::{Planned, Ready};
+use super::notes::Notes;
 use crate::accel::AccelStruct;
 use crate::accel::build::TlasBuild;
 use crate::accel::flags::BuildMode;
@@ -152,7 +153,7 @@ impl CommandBuffer {
         let tlas = target.tlas()?;
         let plan = self.plan_instances(&target.name, instances, known)?;
         let shown = Arc::clone(&plan.shown);
-        self.tlas_updates.refers = plan.into_refers();
+        self.notes.tlas_updates.refers = plan.into_refers();
         let count = instances.len() as u32;
         let refit = self.check_update(target, tlas, count, count, mode, before)?;
         if let Some(software) = &tlas.software {
@@ -176,13 +177,14 @@ impl CommandBuffer {
 
     /// Takes the updates so far for submitted: for the command buffer that goes before every other one.
     pub(crate) fn apply_tlas_updates(&mut self) {
-        let shown = self.tlas_updates.drain().map(|update| self.shared.show(update));
-        self.open_builds.extend(shown.map(OpenBuild::of_tlas));
+        let Notes { tlas_updates, open_builds, .. } = &mut **self.notes;
+        let shown = tlas_updates.drain().map(|update| self.shared.show(update));
+        open_builds.extend(shown.map(OpenBuild::of_tlas));
     }
 
     /// Fails if what was recorded no longer fits what was submitted since.
     pub(crate) fn check_tlas_updates(&self) -> Result<()> {
-        self.tlas_updates.check()
+        self.notes.tlas_updates.check()
     }
 
     /// Checks the counts; answers whether the update is a refit.
@@ -220,15 +222,12 @@ impl CommandBuffer {
     /// has moved.
     #[inline(always)]
     fn before(&mut self, target: &AccelStruct, tlas: &Tlas) -> (Before, Arc<ShownSet>) {
-        if self.tlas_updates.is_new() {
-            self.tlas_updates = self.shared.spare_updates.take();
-        }
         let revision = self.shared.accel_revision();
         let of = |contents: &TlasContents, is_own| {
             let before = Before { counts: contents.counts(), refits: contents.refits, is_own, revision };
             (before, Arc::clone(&contents.shown), contents.revision == revision)
         };
-        let (before, shown, stands) = match self.tlas_updates.last_of(target) {
+        let (before, shown, stands) = match self.notes.tlas_updates.last_of(target) {
             Some(update) => of(&update.contents, true),
             None => of(&tlas.contents(), false),
         };
@@ -275,7 +274,7 @@ impl CommandBuffer {
     fn join_builds(&mut self, target: ResourceId, bytes: u64, records: Option<&Buffer>) -> Result<u64> {
         let alignment = self.shared.gpu.caps.limits.scratch_alignment.into();
         if records.is_none()
-            && let Some(scratch) = self.tlas_updates.run.join(target, bytes, alignment)
+            && let Some(scratch) = self.notes.tlas_updates.run.join(target, bytes, alignment)
         {
             return Ok(scratch);
         }
@@ -295,8 +294,8 @@ impl CommandBuffer {
         let own = &shared.scratch[self.recording.lane];
         let (buffer, replaced) = own.get(&shared.gpu, bytes)?;
         self.retire_replaced(replaced);
-        self.uses.id(own.id, Use::accel_build_write());
-        self.uses.accumulate(shared.all_tlas, Use::accel_build_write());
+        self.notes.uses.id(own.id, Use::accel_build_write());
+        self.notes.uses.accumulate(shared.all_tlas, Use::accel_build_write());
         self.use_shown(Use::accel_read(Stages::ACCEL_BUILD));
         if let Some(records) = records {
             self.use_buffer(records, Use::accel_build_input());
@@ -304,7 +303,7 @@ impl CommandBuffer {
         self.flush();
         let (start, end) =
             (aligned_scratch_address(buffer.address, alignment), buffer.address + buffer.size_bytes);
-        self.tlas_updates.run.begin(target, start..end, bytes, alignment);
+        self.notes.tlas_updates.run.begin(target, start..end, bytes, alignment);
         Ok(start)
     }
 
@@ -328,7 +327,7 @@ impl CommandBuffer {
         let revision = before.revision;
         let contents =
             TlasContents { instance_count: Some(count), built_count, refits, shown, revision, source };
-        self.tlas_updates.push(TlasUpdate { target, contents, refits_submitted });
+        self.notes.tlas_updates.push(TlasUpdate { target, contents, refits_submitted });
         Ok(())
     }
 
@@ -336,7 +335,7 @@ impl CommandBuffer {
     fn write_tlas_table(&mut self, slot: u32, entry: [u64; 2]) {
         let shared = Arc::clone(&self.shared);
         let Some(table) = shared.tlas_table.as_ref() else { return };
-        self.uses.id(shared.tlas_tables, Use::transfer_write());
+        self.notes.uses.id(shared.tlas_tables, Use::transfer_write());
         self.flush();
         let offset = u64::from(slot) * TLAS_TABLE_ENTRY_BYTES;
         // SAFETY: the table has an entry for every slot.
@@ -354,7 +353,7 @@ impl CommandBuffer {
     pub(crate) fn clear_tlas_table(&mut self) {
         let shared = Arc::clone(&self.shared);
         let Some(table) = shared.tlas_table.as_ref() else { return };
-        self.uses.id(shared.tlas_tables, Use::transfer_write());
+        self.notes.uses.id(shared.tlas_tables, Use::transfer_write());
         self.flush();
         // SAFETY: the whole buffer is filled.
         unsafe { shared.gpu.device.cmd_fill_buffer(self.raw(), table.raw, 0, vk::WHOLE_SIZE, 0) };

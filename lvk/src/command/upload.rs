@@ -19,7 +19,7 @@ impl CommandBuffer {
     pub(crate) fn record_uploads(&mut self, uploads: PendingUploads) -> Result<()> {
         let PendingUploads { buffers, textures, pages, .. } = uploads;
         for used in &pages {
-            self.shared.staging.hold(used.page, used.count, self.recording.sequence);
+            self.shared.staging.hold(used.page, used.count, self.recording.staging_key());
         }
         self.record_buffer_uploads(buffers, &pages);
         let part = |upload: &TextureUpload| {
@@ -50,7 +50,7 @@ impl CommandBuffer {
             for pieces in pieces.by_page().chunk_by(|a, b| a.page == b.page) {
                 self.copy_pieces(pieces, pages, target.raw);
             }
-            self.settle.push(Settle::Buffer(Arc::clone(&target)));
+            self.notes.settle.push(Settle::Buffer(Arc::clone(&target)));
             self.shared.retire(Garbage::Held(target));
         }
     }
@@ -81,7 +81,7 @@ impl CommandBuffer {
             if let Some((region, staged)) = texels {
                 self.record_fill_texture(staged.buffer, staged.offset, target, region);
             }
-            self.settle.push(Settle::Texture(Arc::clone(target)));
+            self.notes.settle.push(Settle::Texture(Arc::clone(target)));
         }
         Ok(())
     }

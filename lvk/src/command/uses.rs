@@ -152,6 +152,12 @@ impl Uses {
         self.textures.clear();
     }
 
+    /// Forgets the command buffer, for the next one.
+    pub(super) fn forget(&mut self) {
+        self.clear();
+        self.known_images = 0;
+    }
+
     fn clear_buffers(&mut self) {
         self.buffers.clear();
         self.writers.clear();

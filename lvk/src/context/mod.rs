@@ -36,6 +36,7 @@ mod window;
 use std::sync::Arc;
 
 use crate::accel::compaction::Compactions;
+use crate::command::SpareNotes;
 use crate::gpu::budget::MemoryBudget;
 use crate::gpu::caps::Capabilities;
 use crate::gpu::debug::ValidationSink;
@@ -60,6 +61,7 @@ struct Inner {
     /// Uploads and builds that run before the next submission.
     pending: Mutex<Pending>,
     frames: std::sync::Mutex<FrameRing>,
+    spare_notes: SpareNotes,
     /// Compactions under way.
     compactions: Mutex<Compactions>,
     /// For swapchains that name none.

@@ -43,7 +43,10 @@ impl Context {
     pub(super) fn open<'a>(&self, pending: &'a mut Pending) -> Result<&'a mut CommandBuffer> {
         let cmd = match &mut pending.commands {
             Some(cmd) => cmd,
-            none => none.insert(CommandBuffer::new(self.shared(), Queue::Graphics)?),
+            none => {
+                let recording = self.shared().submitter.acquire(Queue::Graphics)?;
+                none.insert(self.record(Queue::Graphics, recording))
+            }
         };
         let freed = std::mem::take(&mut *self.shared().freed_tlas());
         cmd.forget_tlas(&freed);

@@ -12,10 +12,10 @@ use super::{Context, Inner};
 use crate::accel::compaction::Compactions;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
-use crate::accel::tlas_updates::SpareUpdates;
 use crate::barrier::{QueryStages, ResourceId};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::bindless::{Bindless, YuvSlots};
+use crate::command::SpareNotes;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::{Capabilities, PhysicalDevice};
@@ -75,6 +75,7 @@ impl Context {
             pending: lock::Mutex::new(Rank::Pending, Pending::default()),
             compactions: lock::Mutex::new(Rank::Compactions, Compactions::default()),
             frames: Mutex::new(FrameRing::new(desc.frames_in_flight)),
+            spare_notes: SpareNotes::default(),
             window: desc.window.clone(),
             shared,
         };
@@ -132,7 +133,6 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         tlas_tables: ResourceId::next(),
         outdated_tlas: AtomicBool::new(false),
         moves: AtomicU64::new(0),
-        spare_updates: SpareUpdates::default(),
         freed_tlas: Mutex::default(),
         gpu,
     })

@@ -3,10 +3,10 @@
 use ash::vk;
 
 use super::Context;
-use crate::command::CommandBuffer;
+use crate::command::{CommandBuffer, Outcome};
 use crate::error::{Error, Result};
 use crate::gpu::queues::Queue;
-use crate::submit::{Submission, SubmitHandle, Values};
+use crate::submit::{Recording, Submission, SubmitHandle};
 
 impl Context {
     /// Starts recording a command buffer for the graphics queue, which takes every command. Any number may be recorded at once, on
@@ -22,8 +22,16 @@ impl Context {
     /// and moved between queues when it is submitted; see the manual's page on
     /// [queues](crate::manual::queues_and_uploads).
     pub fn acquire_command_buffer_on(&self, queue: Queue) -> Result<CommandBuffer> {
-        self.shared().collect()?;
-        CommandBuffer::new(self.shared(), queue)
+        let shared = self.shared();
+        let (finished, recording) = shared.submitter.collect_and_acquire(queue)?;
+        let cmd = recording.map(|recording| self.record(queue, recording));
+        shared.take_back(finished)?;
+        cmd
+    }
+
+    /// A command buffer without commands.
+    pub(super) fn record(&self, queue: Queue, recording: Box<Recording>) -> CommandBuffer {
+        CommandBuffer::new(self.shared(), queue, recording, self.inner.spare_notes.take())
     }
 
     /// Submits a command buffer to the queue it was acquired for, after uploads and builds made before (`vkQueueSubmit2`). Does
@@ -61,23 +69,22 @@ impl Context {
         if !self.shared().freed_tlas().is_empty() {
             self.open(&mut pending)?;
         }
-        let before = self.take_pending(&mut pending)?;
-        let has_prelude = before.is_some();
-        if has_prelude {
+        let prelude = self.take_pending(&mut pending)?;
+        if prelude.is_some() {
             // Uploads wait as well, whichever stages were named.
             let all = vk::PipelineStageFlags2::ALL_COMMANDS;
             more.waits.iter_mut().for_each(|wait| wait.stage_mask = all);
         }
-        if cmd.is_on_first_lane() {
-            return self.send(before.into_iter().chain([cmd]), Submission { has_prelude, ..more });
+        if cmd.lane() == 0 {
+            return self.send(prelude, Some(cmd), more);
         }
-        if has_prelude {
+        if prelude.is_some() {
             // The first of it all waits, and the rest behind it.
             let waits = std::mem::take(&mut more.waits);
-            let prelude = Submission { has_prelude, waits, ..Submission::default() };
-            cmd.begin_after(self.send(before.into_iter(), prelude)?.value);
+            let before = self.send(prelude, None, Submission { waits, ..Submission::default() })?;
+            cmd.begin_after(before.value);
         }
-        self.send([cmd].into_iter(), more)
+        self.send(None, Some(cmd), more)
     }
 
     /// Fails for a command buffer of another context.
@@ -88,22 +95,29 @@ impl Context {
         Err(Error::usage("submit", "the command buffer belongs to another context"))
     }
 
-    fn send(&self, commands: impl Iterator<Item = CommandBuffer>, more: Submission) -> Result<SubmitHandle> {
-        let (recordings, mut outcomes): (Vec<_>, Vec<_>) = commands.map(CommandBuffer::finish).unzip();
+    fn send(
+        &self,
+        prelude: Option<CommandBuffer>,
+        main: Option<CommandBuffer>,
+        more: Submission,
+    ) -> Result<SubmitHandle> {
         let shared = self.shared();
-        let submission = Submission { recordings, ..more };
-        let (Values { first, last }, sent) = shared.submitter.submit(submission, || shared.bindless.flush());
-        let scopes = outcomes.iter_mut().filter_map(|outcome| outcome.scopes.take());
-        shared.profiler.submit(first.max(last), scopes.map(|scopes| *scopes).collect());
-        let end = outcomes.len().saturating_sub(1);
-        for (place, outcome) in outcomes.into_iter().enumerate() {
-            let value = if place == end { last } else { first };
+        let (prelude, before) = prelude.map(CommandBuffer::finish).unzip();
+        let (main, own) = main.map(CommandBuffer::finish).unzip();
+        let submission = Submission { prelude, main, ..more };
+        let (values, sent) = shared.submitter.submit(submission, || shared.bindless.flush());
+        let mut outcomes = [(before, values.prelude), (own, values.main)];
+        let scopes = outcomes.iter_mut().filter_map(|(outcome, _)| outcome.as_mut()?.scopes.take());
+        shared.profiler.submit(values.last(), scopes.map(|scopes| *scopes).collect());
+        for (outcome, value) in outcomes {
+            let Some(Outcome { mut notes, .. }) = outcome else { continue };
             if value > 0 {
-                outcome.submit(shared, value);
+                notes.submitted(shared, value);
             }
+            self.inner.spare_notes.give(notes);
         }
         sent?;
-        Ok(self.submission(last))
+        Ok(self.submission(values.last()))
     }
 
     /// Submits uploads and builds that wait for the next submission, if there are any, to the graphics queue. Answers the last
@@ -116,8 +130,7 @@ impl Context {
         let Some(cmd) = self.take_pending(&mut pending)? else {
             return Ok(self.submission(self.shared().submitter.last_of_lanes()[0]));
         };
-        let flushed =
-            self.send([cmd].into_iter(), Submission { has_prelude: true, ..Submission::default() })?;
+        let flushed = self.send(Some(cmd), None, Submission::default())?;
         // Command buffers that are acquired ask how far the GPU is; this one was not.
         self.shared().collect()?;
         Ok(flushed)

@@ -1,140 +1,90 @@
-//! Command buffers that are recorded, run by the GPU and recorded again.
+//! Which command buffers are free, being recorded, or with the GPU.
 
-use std::collections::{BTreeSet, VecDeque};
+use std::collections::VecDeque;
 
-use ash::vk;
-
-use super::input_sets::InputSets;
 use super::ownership::PerLane;
-use crate::error::{Error, Result};
+use super::recording::Recording;
+use crate::error::Result;
 use crate::gpu::Gpu;
 
-/// A command pool of its own for each command buffer, so that any thread may record without a lock.
-#[derive(Debug)]
-pub(crate) struct CommandSlot {
-    pub(crate) pool: vk::CommandPool,
-    /// What the caller records.
-    pub(crate) main: vk::CommandBuffer,
-    /// See [`prologue`](Self::prologue); made when there is the first barrier for it.
-    prologue: Option<vk::CommandBuffer>,
-    /// Of passes in `main`.
-    pub(crate) inputs: InputSets,
-}
-
-impl CommandSlot {
-    fn new(gpu: &Gpu, lane: usize) -> Result<Self> {
-        let info = vk::CommandPoolCreateInfo::default()
-            .flags(vk::CommandPoolCreateFlags::TRANSIENT)
-            .queue_family_index(gpu.queues.family(lane));
-        // SAFETY: the queue family is the device's own.
-        let pool = unsafe { gpu.device.create_command_pool(&info, None) }
-            .map_err(Error::vulkan("vkCreateCommandPool"))?;
-        gpu.name(pool, "command pool");
-        match allocate(gpu, pool) {
-            Ok(main) => Ok(Self { pool, main, prologue: None, inputs: InputSets::default() }),
-            Err(error) => {
-                // SAFETY: the pool is unused.
-                unsafe { gpu.device.destroy_command_pool(pool, None) };
-                Err(error)
-            }
-        }
-    }
-
-    /// Runs before `main` and holds the barriers between the queue's state and the first uses in `main`.
-    pub(crate) fn prologue(&mut self, gpu: &Gpu) -> Result<vk::CommandBuffer> {
-        if let Some(made) = self.prologue {
-            return Ok(made);
-        }
-        let made = allocate(gpu, self.pool)?;
-        gpu.name(made, "barriers before a command buffer");
-        self.prologue = Some(made);
-        Ok(made)
-    }
-
-    fn reset(&mut self, gpu: &Gpu) -> Result<()> {
-        self.inputs.reset();
-        // SAFETY: the GPU is done with the pool's command buffers, and nobody records them.
-        unsafe { gpu.device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
-            .map_err(Error::vulkan("vkResetCommandPool"))
-    }
-
-    fn destroy(self, gpu: &Gpu) {
-        // SAFETY: as in `reset`.
-        unsafe { gpu.device.destroy_command_pool(self.pool, None) };
-        self.inputs.destroy(gpu);
-    }
-}
-
-fn allocate(gpu: &Gpu, pool: vk::CommandPool) -> Result<vk::CommandBuffer> {
-    let info = vk::CommandBufferAllocateInfo::default()
-        .command_pool(pool)
-        .level(vk::CommandBufferLevel::PRIMARY)
-        .command_buffer_count(1);
-    // SAFETY: the pool is alive, and nobody else uses it.
-    let made = unsafe { gpu.device.allocate_command_buffers(&info) };
-    made.map(|buffers| buffers[0]).map_err(Error::vulkan("vkAllocateCommandBuffers"))
-}
-
-/// Which command buffers are free, being recorded, or with the GPU.
-#[derive(Debug, Default)]
+/// Command buffers of all lanes.
+#[derive(Default)]
 pub(crate) struct CommandRing {
-    lanes: PerLane<LaneSlots>,
-    open: BTreeSet<u64>,
-    /// Sequence numbers of command buffers that never reached the GPU, until the next collection.
+    lanes: PerLane<Lane>,
+    /// Sequence numbers of those being recorded, in rising order.
+    open: Vec<u64>,
+    /// Of those that never reached the GPU, but have staging memory; until the next collection.
     given_up: Vec<u64>,
     last_sequence: u64,
 }
 
-/// Command buffers of one family, and what the lane has under way.
-#[derive(Debug, Default)]
-struct LaneSlots {
-    free: Vec<CommandSlot>,
-    in_flight: VecDeque<InFlight>,
+/// Command buffers of one lane.
+#[derive(Default)]
+struct Lane {
+    #[expect(clippy::vec_box, reason = "handed on as pointers")]
+    free: Vec<Box<Recording>>,
+    /// In the order of their values.
+    in_flight: VecDeque<Box<Recording>>,
 }
 
-#[derive(Debug)]
-struct InFlight {
-    value: u64,
-    sequence: u64,
-    slot: CommandSlot,
+/// Leave to record a command buffer.
+pub(crate) struct Ticket {
+    pub(crate) sequence: u64,
+    lane: usize,
+    /// What is recorded again, if there is any.
+    free: Option<Box<Recording>>,
+}
+
+impl Ticket {
+    /// Begins the command buffer, which needs no lock. Where that fails, the ring is to be [told](CommandRing::close).
+    pub(crate) fn begin(self, gpu: &Gpu) -> Result<Box<Recording>> {
+        let free = self.free.map_or_else(|| Recording::new(gpu, self.lane), Ok)?;
+        let mut recording = free.begin(gpu)?;
+        recording.sequence = self.sequence;
+        Ok(recording)
+    }
 }
 
 impl CommandRing {
-    /// Takes a command buffer of a lane to record, with its sequence number.
-    pub(crate) fn acquire(&mut self, gpu: &Gpu, lane: usize) -> Result<(u64, CommandSlot)> {
-        let slot = match self.lanes[lane].free.pop() {
-            Some(slot) => slot,
-            None => CommandSlot::new(gpu, lane)?,
-        };
+    /// Takes a command buffer of a lane to record.
+    pub(crate) fn take(&mut self, lane: usize) -> Ticket {
         self.last_sequence += 1;
-        self.open.insert(self.last_sequence);
-        Ok((self.last_sequence, slot))
+        self.open.push(self.last_sequence);
+        Ticket { sequence: self.last_sequence, lane, free: self.lanes[lane].free.pop() }
     }
 
-    /// The command buffer was submitted and is done when the lane's timeline reaches `value`.
-    pub(crate) fn submitted(&mut self, lane: usize, sequence: u64, slot: CommandSlot, value: u64) {
-        self.open.remove(&sequence);
-        self.lanes[lane].in_flight.push_back(InFlight { value, sequence, slot });
+    /// The command buffer of this number is recorded no longer.
+    pub(crate) fn close(&mut self, sequence: u64) {
+        if let Ok(place) = self.open.binary_search(&sequence) {
+            self.open.remove(place);
+        }
+    }
+
+    /// The command buffer was submitted, and is done when the lane's timeline reaches its value.
+    pub(crate) fn submitted(&mut self, recording: Box<Recording>) {
+        self.close(recording.sequence);
+        self.lanes[recording.lane].in_flight.push_back(recording);
     }
 
     /// The command buffer was given up before submission.
-    pub(crate) fn discard(&mut self, gpu: &Gpu, lane: usize, sequence: u64, slot: CommandSlot) {
-        self.open.remove(&sequence);
-        self.given_up.push(sequence);
-        self.lanes[lane].recycle(gpu, slot);
+    pub(crate) fn discard(&mut self, recording: Box<Recording>) {
+        self.close(recording.sequence);
+        self.given_up.extend(recording.is_staged.then_some(recording.sequence));
+        self.lanes[recording.lane].free.push(recording);
     }
 
-    /// Takes command buffers back that the lanes are done with; answers their sequence numbers, and those given up.
-    pub(crate) fn collect(&mut self, gpu: &Gpu, completed: &PerLane<u64>) -> Vec<u64> {
-        let mut done = std::mem::take(&mut self.given_up);
-        for (lane, completed) in self.lanes.iter_mut().zip(completed) {
-            while lane.in_flight.front().is_some_and(|oldest| oldest.value <= *completed) {
-                let Some(oldest) = lane.in_flight.pop_front() else { break };
-                done.push(oldest.sequence);
-                lane.recycle(gpu, oldest.slot);
+    /// Takes command buffers back that the lanes are done with; answers the sequence numbers of those that have staging
+    /// memory, and those given up.
+    pub(crate) fn collect(&mut self, completed: &PerLane<u64>) -> Vec<u64> {
+        let mut staged = std::mem::take(&mut self.given_up);
+        for (Lane { free, in_flight }, completed) in self.lanes.iter_mut().zip(completed) {
+            while in_flight.front().is_some_and(|oldest| oldest.value <= *completed) {
+                let Some(done) = in_flight.pop_front() else { break };
+                staged.extend(done.is_staged.then_some(done.sequence));
+                free.push(done);
             }
         }
-        done
+        staged
     }
 
     /// Sequence number of the command buffer that was taken last.
@@ -154,18 +104,8 @@ impl CommandRing {
 
     /// Destroys everything. The GPU is idle and nothing is being recorded.
     pub(crate) fn destroy(&mut self, gpu: &Gpu) {
-        for lane in &mut self.lanes {
-            let in_flight = lane.in_flight.drain(..).map(|entry| entry.slot);
-            lane.free.drain(..).chain(in_flight).for_each(|slot| slot.destroy(gpu));
-        }
-    }
-}
-
-impl LaneSlots {
-    fn recycle(&mut self, gpu: &Gpu, mut slot: CommandSlot) {
-        match slot.reset(gpu) {
-            Ok(()) => self.free.push(slot),
-            Err(_) => slot.destroy(gpu),
+        for Lane { free, in_flight } in &mut self.lanes {
+            free.drain(..).chain(in_flight.drain(..)).for_each(|recording| recording.destroy(gpu));
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Submission to queues: command buffers, the timeline, barriers between command buffers, deferred destruction.
 
+mod batches;
 pub(crate) mod command_ring;
 pub(crate) mod deferred;
 pub(crate) mod emit;
@@ -13,9 +14,11 @@ pub(crate) mod ownership;
 pub(crate) mod presentable;
 pub(crate) mod profiler;
 pub(crate) mod queue;
+pub(crate) mod recording;
 pub(crate) mod scope_tree;
 pub(crate) mod timeline;
 
-pub(crate) use queue::{Finished, Recording, Submission, Submitter, Values};
+pub(crate) use queue::{Finished, Submission, Submitter};
+pub(crate) use recording::Recording;
 pub use scope_tree::{GpuProfile, GpuScope};
 pub use timeline::SubmitHandle;

@@ -4,12 +4,14 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::command_ring::{CommandRing, CommandSlot};
+use super::batches::Batches;
+use super::command_ring::{CommandRing, Ticket};
 use super::deferred::Deferred;
 use super::emit::{Images, LastBarrier, Side, emit, emit_moves, stages};
 use super::lanes::{Departure, Lanes, Sent, Site, Step};
-use super::ownership::{Access, Clock, LANES, PerLane};
-use super::presentable::Presentables;
+use super::ownership::{Clock, LANES, PerLane};
+use super::presentable::{AcquireWait, Presentables};
+use super::recording::{Recording, begin, end};
 use super::timeline::Timeline;
 use crate::barrier::{IdMap, Layout, ResourceId, Stages, TextureShape, Tracker};
 use crate::error::{Error, Result};
@@ -17,71 +19,37 @@ use crate::gpu::Gpu;
 use crate::gpu::queues::Queue;
 use crate::lock::{Guard, Mutex, Rank};
 
-/// What command buffers use without barriers.
-type References = Vec<(ResourceId, Access)>;
-
-/// A command buffer being recorded, with what the tracker knows of it.
-pub(crate) struct Recording {
-    /// Rises with every command buffer of the context.
-    pub(crate) sequence: u64,
-    pub(crate) commands: vk::CommandBuffer,
-    pub(crate) tracker: Tracker,
-    pub(crate) images: Images,
-    /// What it uses that needs no barriers on one queue, and waits between several.
-    pub(crate) references: References,
-    /// What the caller has it wait for on other queues.
-    pub(crate) after: Clock,
-    /// The queue's.
-    pub(crate) lane: usize,
-    /// Of the timeline, once the queue has it; 0 before.
-    value: u64,
-    slot: CommandSlot,
-}
-
-impl Recording {
-    /// A set of `count` input attachments for a pass of the command buffer.
-    pub(crate) fn input_set(
-        &mut self,
-        gpu: &Gpu,
-        layout: vk::DescriptorSetLayout,
-        count: u32,
-    ) -> Result<vk::DescriptorSet> {
-        self.slot.inputs.take(gpu, layout, count)
-    }
-}
-
 /// What goes to a queue at once.
 #[derive(Default)]
 pub(crate) struct Submission {
-    /// In their order, all of one lane.
-    pub(crate) recordings: Vec<Recording>,
-    /// What the first of them waits for, besides images that the presentation engine still has.
+    /// What everything submitted later relies on.
+    pub(crate) prelude: Option<Box<Recording>>,
+    /// Runs behind the prelude, on the same lane if there is one.
+    pub(crate) main: Option<Box<Recording>>,
+    /// What the first of both waits for, besides images that the presentation engine still has.
     pub(crate) waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
-    /// What is signalled when all of them are done, besides the timeline.
+    /// What is signalled when both are done, besides the timeline.
     pub(crate) signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
     /// The image of a swapchain that goes to the presentation engine with it: nothing submitted later may use it.
     pub(crate) presented: Option<ResourceId>,
-    /// The first recording is what everything submitted later relies on.
-    pub(crate) has_prelude: bool,
     /// Frames do not wait for it.
     pub(crate) in_background: bool,
     /// It takes from others what it uses, or gives it to them.
     pub(crate) exchanges: bool,
 }
 
-/// Values of the timeline at which the first and the last recording of a submission are done; 0 for what no queue got.
+/// Values of the timeline at which the parts of a submission are done; 0 for what no queue got.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Values {
-    pub(crate) first: u64,
-    pub(crate) last: u64,
+    pub(crate) prelude: u64,
+    pub(crate) main: u64,
 }
 
-/// Command buffers that begin together, once all that they wait for is there.
-#[derive(Default)]
-struct Batch {
-    waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
-    commands: Vec<vk::CommandBufferSubmitInfo<'static>>,
-    signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
+impl Values {
+    /// The value at which everything is done.
+    pub(crate) fn last(self) -> u64 {
+        self.prelude.max(self.main)
+    }
 }
 
 /// The queues with everything that changes when something is submitted. `T` is what is destroyed later.
@@ -93,9 +61,9 @@ pub(crate) struct Submitter<T> {
 }
 
 struct Inner<T> {
-    /// What command buffers that were submitted used, emptied for the next ones.
-    spare: Vec<(Tracker, Images, References)>,
     lanes: Lanes,
+    /// What goes to a queue next; empty between submissions.
+    batches: Batches,
     presentables: Presentables,
     /// What only the graphics queue may use, with names for messages.
     graphics_only: IdMap<Box<str>>,
@@ -109,8 +77,8 @@ struct Inner<T> {
 
 /// What the GPU has finished with.
 pub(crate) struct Finished<T> {
-    /// Sequence numbers of command buffers.
-    pub(crate) sequences: Vec<u64>,
+    /// Sequence numbers of command buffers that have staging memory.
+    pub(crate) staged: Vec<u64>,
     /// Things to destroy now.
     pub(crate) garbage: Vec<T>,
     /// Everything up to this value is done, on all queues.
@@ -126,8 +94,8 @@ impl<T> Submitter<T> {
             NAMES.iter().take(count).map(|name| Timeline::new(gpu, name)).collect::<Result<_>>()?;
         let site = |lane| Site { domain: gpu.queues.domain(lane), stages: Queue::ALL.map(stages_of)[lane] };
         let inner = Inner {
-            spare: Vec::new(),
             lanes: Lanes::new([site(0), site(1), site(2)], has_several),
+            batches: Batches::default(),
             presentables: Presentables::default(),
             graphics_only: IdMap::default(),
             ring: CommandRing::default(),
@@ -139,31 +107,29 @@ impl<T> Submitter<T> {
     }
 
     /// Starts recording a command buffer.
-    pub(crate) fn acquire(&self, queue: Queue) -> Result<Recording> {
-        let lane = self.gpu.queues.lane(queue);
+    pub(crate) fn acquire(&self, queue: Queue) -> Result<Box<Recording>> {
+        let ticket = self.lock().take(self.gpu.queues.lane(queue));
+        self.begin(ticket)
+    }
+
+    /// As [`acquire`](Self::acquire), and takes out what the GPU has finished with.
+    pub(crate) fn collect_and_acquire(&self, queue: Queue) -> Result<(Finished<T>, Result<Box<Recording>>)> {
+        let completed = self.completed()?;
         let mut inner = self.lock();
-        if lane != 0 {
-            inner.lanes.begin_several();
-        }
-        let (sequence, slot) = inner.ring.acquire(&self.gpu, lane)?;
-        let (tracker, images, references) = inner.spare.pop().unwrap_or_default();
+        let finished = inner.take_finished(&completed);
+        let ticket = inner.take(self.gpu.queues.lane(queue));
         drop(inner);
-        let after = Clock::default();
-        let commands = slot.main;
-        let recording =
-            Recording { sequence, commands, tracker, images, references, after, lane, value: 0, slot };
-        match begin(&self.gpu, commands) {
-            Ok(()) => Ok(recording),
-            Err(error) => {
-                self.discard(recording);
-                Err(error)
-            }
-        }
+        Ok((finished, self.begin(ticket)))
+    }
+
+    fn begin(&self, ticket: Ticket) -> Result<Box<Recording>> {
+        let sequence = ticket.sequence;
+        ticket.begin(&self.gpu).inspect_err(|_| self.lock().ring.close(sequence))
     }
 
     /// Gives a command buffer up.
-    pub(crate) fn discard(&self, recording: Recording) {
-        self.lock().ring.discard(&self.gpu, recording.lane, recording.sequence, recording.slot);
+    pub(crate) fn discard(&self, recording: Box<Recording>) {
+        self.lock().ring.discard(recording);
     }
 
     /// Only the graphics queue may use a resource from now on.
@@ -200,28 +166,14 @@ impl<T> Submitter<T> {
             Some(error) => Err(error),
             None => self.submit_all(inner, &mut submission, prepare),
         };
+        inner.batches.clear();
         match &sent {
             Ok(last) => inner.note(&submission, *last),
             Err(error) => inner.broken = Some(error.clone()),
         }
-        let recordings = submission.recordings;
-        let value = |recording: Option<&Recording>| recording.map_or(0, |recording| recording.value);
-        let values = Values { first: value(recordings.first()), last: value(recordings.last()) };
-        recordings.into_iter().for_each(|recording| self.put_away(inner, recording));
+        let mut put_away = |part: Option<Box<Recording>>| part.map_or(0, |part| inner.put_away(part));
+        let values = Values { prelude: put_away(submission.prelude), main: put_away(submission.main) };
         (values, sent.map(drop))
-    }
-
-    /// Keeps what a queue got until that is done with it, and takes back what none got.
-    fn put_away(&self, inner: &mut Inner<T>, mut recording: Recording) {
-        let Recording { lane, sequence, slot, value, .. } = recording;
-        if value == 0 {
-            return inner.ring.discard(&self.gpu, lane, sequence, slot);
-        }
-        inner.ring.submitted(lane, sequence, slot, value);
-        recording.tracker.clear();
-        recording.images.clear();
-        recording.references.clear();
-        inner.spare.push((recording.tracker, recording.images, recording.references));
     }
 
     /// Answers the value of the last.
@@ -231,83 +183,67 @@ impl<T> Submitter<T> {
         submission: &mut Submission,
         prepare: impl FnOnce(),
     ) -> Result<u64> {
-        submission.recordings.iter().try_for_each(|recording| end(&self.gpu, recording.commands))?;
-        if inner.lanes.are_several() && !submission.recordings.is_empty() {
+        submission.parts().try_for_each(|part| end(&self.gpu, part.commands))?;
+        if inner.lanes.are_several() && submission.parts().next().is_some() {
             prepare();
             return self.submit_to_several(inner, submission);
         }
-        let batches = self.finish(inner, submission)?;
+        self.fill_batches(inner, submission)?;
         prepare();
         let value = inner.lanes.signal();
-        self.send(&mut inner.lanes, (0, value), batches, std::mem::take(&mut submission.signals))?;
-        submission.recordings.iter_mut().for_each(|recording| recording.value = value);
+        self.send(inner, 0, value)?;
+        submission.parts().for_each(|part| part.value = value);
         Ok(value)
     }
 
-    /// Puts the barriers from the queue's state in front of each command buffer. A new batch begins where an image is waited
-    /// for, so that what comes before need not wait.
-    fn finish(&self, inner: &mut Inner<T>, submission: &mut Submission) -> Result<Vec<Batch>> {
-        let mut batches = Vec::new();
-        let mut batch = Batch { waits: std::mem::take(&mut submission.waits), ..Batch::default() };
-        for recording in &mut submission.recordings {
-            let images = self.image_waits(inner, recording);
-            if !images.is_empty() && !batch.commands.is_empty() {
-                batches.push(std::mem::take(&mut batch));
-            }
-            batch.waits.extend(images);
+    /// Puts the barriers from the queue's state in front of each command buffer.
+    fn fill_batches(&self, inner: &mut Inner<T>, submission: &mut Submission) -> Result<()> {
+        inner.batches.wait(submission.waits.drain(..));
+        inner.batches.signal(submission.signals.drain(..));
+        for recording in submission.parts() {
+            let images = inner.image_waits(recording);
+            inner.batches.wait(images.iter().map(|image| self.image_wait(image)));
             let barriers = inner.lanes.submit_alone(&recording.tracker);
             if !barriers.is_empty() {
-                let prologue = recording.slot.prologue(&self.gpu)?;
+                let prologue = recording.prologue(&self.gpu)?;
                 begin(&self.gpu, prologue)?;
                 emit(&self.gpu, prologue, &barriers, &recording.images, &mut LastBarrier::default());
                 end(&self.gpu, prologue)?;
-                batch.push(prologue);
+                inner.batches.push(prologue);
             }
-            batch.push(recording.commands);
+            inner.batches.push(recording.commands);
         }
-        batches.push(batch);
-        Ok(batches)
+        Ok(())
     }
 
-    /// Each command buffer with its own waits, and a value of its own that others may wait for.
+    /// Each command buffer with its own waits, and a value of its own that others may wait for. Answers the last.
     fn submit_to_several(&self, inner: &mut Inner<T>, submission: &mut Submission) -> Result<u64> {
+        let (has_prelude, exchanges) = (submission.prelude.is_some(), submission.exchanges);
         let mut waits = std::mem::take(&mut submission.waits);
-        let last = submission.recordings.len() - 1;
-        for (place, recording) in submission.recordings.iter_mut().enumerate() {
-            waits.extend(self.image_waits(inner, recording));
-            let is_prelude = submission.has_prelude && place == 0;
-            let step = self.step(inner, recording, is_prelude, submission.exchanges);
+        let mut signals = std::mem::take(&mut submission.signals);
+        let (mut last, count) = (0, submission.parts().count());
+        for (place, recording) in submission.parts().enumerate() {
+            waits.extend(inner.image_waits(recording).iter().map(|image| self.image_wait(image)));
+            let step = inner.step(recording, has_prelude && place == 0, exchanges);
             for departure in &step.departures {
                 self.depart(inner, departure, &recording.images)?;
             }
-            waits.extend(self.lane_waits(&step.waits));
-            let mut batch = Batch { waits: std::mem::take(&mut waits), ..Batch::default() };
+            inner.batches.wait(waits.drain(..).chain(self.lane_waits(&step.waits)));
             if !step.arrivals.is_empty() || !step.barriers.is_empty() {
-                batch.push(self.record_prologue(recording, &step)?);
+                inner.batches.push(self.record_prologue(recording, &step)?);
             }
-            batch.push(recording.commands);
-            let signals = if place == last { std::mem::take(&mut submission.signals) } else { Vec::new() };
-            self.send(&mut inner.lanes, (recording.lane, step.value), vec![batch], signals)?;
-            recording.value = step.value;
+            inner.batches.push(recording.commands);
+            if place + 1 == count {
+                inner.batches.signal(signals.drain(..));
+            }
+            self.send(inner, recording.lane, step.value)?;
+            (recording.value, last) = (step.value, step.value);
         }
-        Ok(submission.recordings[last].value)
-    }
-
-    fn step(&self, inner: &mut Inner<T>, recording: &Recording, is_prelude: bool, exchanges: bool) -> Step {
-        let sent = Sent {
-            lane: recording.lane,
-            tracker: &recording.tracker,
-            references: &recording.references,
-            after: recording.after,
-            is_prelude,
-            exchanges,
-        };
-        let images = &recording.images;
-        inner.lanes.submit(&sent, |id| images.get(&id).is_some_and(|image| image.is_exclusive))
+        Ok(last)
     }
 
     fn record_prologue(&self, recording: &mut Recording, step: &Step) -> Result<vk::CommandBuffer> {
-        let commands = recording.slot.prologue(&self.gpu)?;
+        let commands = recording.prologue(&self.gpu)?;
         let images = &recording.images;
         begin(&self.gpu, commands)?;
         if !step.arrivals.is_empty() {
@@ -320,45 +256,33 @@ impl<T> Submitter<T> {
 
     /// Has a lane give images away.
     fn depart(&self, inner: &mut Inner<T>, departure: &Departure, images: &Images) -> Result<()> {
-        let lane = departure.lane;
-        let (sequence, slot) = inner.ring.acquire(&self.gpu, lane)?;
-        let sent = self.send_moves(&mut inner.lanes, departure, slot.main, images);
-        match sent {
-            Ok(()) => inner.ring.submitted(lane, sequence, slot, departure.value),
-            Err(_) => inner.ring.discard(&self.gpu, lane, sequence, slot),
-        }
+        let ticket = inner.ring.take(departure.lane);
+        let sequence = ticket.sequence;
+        let mut recording = ticket.begin(&self.gpu).inspect_err(|_| inner.ring.close(sequence))?;
+        let sent = self.send_moves(inner, departure, recording.commands, images);
+        recording.value = if sent.is_ok() { departure.value } else { 0 };
+        inner.put_away(recording);
         sent
     }
 
     fn send_moves(
         &self,
-        lanes: &mut Lanes,
+        inner: &mut Inner<T>,
         departure: &Departure,
         commands: vk::CommandBuffer,
         images: &Images,
     ) -> Result<()> {
-        begin(&self.gpu, commands)?;
         emit_moves(&self.gpu, commands, &departure.parts, images, Side::Release);
         end(&self.gpu, commands)?;
-        let waits = self.lane_waits(&departure.waits).collect();
-        let mut batch = Batch { waits, ..Batch::default() };
-        batch.push(commands);
-        self.send(lanes, (departure.lane, departure.value), vec![batch], Vec::new())
+        inner.batches.wait(self.lane_waits(&departure.waits));
+        inner.batches.push(commands);
+        self.send(inner, departure.lane, departure.value)
     }
 
-    /// Waits for images that the presentation engine still has.
-    fn image_waits(
-        &self,
-        inner: &mut Inner<T>,
-        recording: &Recording,
-    ) -> Vec<vk::SemaphoreSubmitInfo<'static>> {
-        let found = inner.presentables.take_waits(&recording.tracker, inner.lanes.first_states());
-        let wait = |wait: &super::presentable::AcquireWait| {
-            vk::SemaphoreSubmitInfo::default()
-                .semaphore(wait.semaphore)
-                .stage_mask(stages(&self.gpu, wait.stages))
-        };
-        found.iter().map(wait).collect()
+    /// Waits for an image that the presentation engine still has.
+    fn image_wait(&self, wait: &AcquireWait) -> vk::SemaphoreSubmitInfo<'static> {
+        let stages = stages(&self.gpu, wait.stages);
+        vk::SemaphoreSubmitInfo::default().semaphore(wait.semaphore).stage_mask(stages)
     }
 
     /// Waits for other lanes, at every stage: everything the lane gets later stands behind them too.
@@ -371,25 +295,14 @@ impl<T> Submitter<T> {
         })
     }
 
-    /// The last batch signals. A value that the queue did not take is not one of those that come.
-    fn send(
-        &self,
-        lanes: &mut Lanes,
-        (lane, value): (usize, u64),
-        mut batches: Vec<Batch>,
-        mut signals: Vec<vk::SemaphoreSubmitInfo<'static>>,
-    ) -> Result<()> {
+    /// Hands the batches to a lane, which signals `value` behind them. A value that the queue did not take is not one of those
+    /// that come.
+    fn send(&self, inner: &mut Inner<T>, lane: usize, value: u64) -> Result<()> {
         let timeline = vk::SemaphoreSubmitInfo::default().semaphore(self.timelines[lane].raw).value(value);
-        signals.push(timeline.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS));
-        if let Some(last) = batches.last_mut() {
-            last.signals = signals;
-        }
-        let submits: Vec<_> = batches.iter().map(Batch::info).collect();
-        let queue = self.gpu.queues.raw(lane);
-        // SAFETY: the command buffers are complete and used once; the queue is locked.
-        unsafe { self.gpu.device.queue_submit2(*queue, &submits, vk::Fence::null()) }
-            .map_err(self.gpu.failed("vkQueueSubmit2"))?;
-        lanes.submitted(lane, value);
+        inner.batches.signal([timeline.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)]);
+        inner.batches.submit(&self.gpu, lane)?;
+        inner.batches.clear();
+        inner.lanes.submitted(lane, value);
         self.timelines[lane].submitted(value);
         Ok(())
     }
@@ -476,7 +389,8 @@ impl<T> Submitter<T> {
 
     /// Takes out what the GPU has finished with.
     pub(crate) fn collect(&self) -> Result<Finished<T>> {
-        Ok(self.take_finished(&self.completed()?))
+        let completed = self.completed()?;
+        Ok(self.lock().take_finished(&completed))
     }
 
     /// As [`collect`](Self::collect), as far as is known without asking the GPU: all that was waited for, at least.
@@ -485,18 +399,7 @@ impl<T> Submitter<T> {
         for (timeline, completed) in self.timelines.iter().zip(&mut completed) {
             *completed = timeline.seen();
         }
-        self.take_finished(&completed)
-    }
-
-    fn take_finished(&self, completed: &PerLane<u64>) -> Finished<T> {
-        let mut inner = self.lock();
-        inner.lanes.reached(completed);
-        let sequences = inner.ring.collect(&self.gpu, completed);
-        let oldest = inner.ring.oldest_open();
-        let submitted = inner.lanes.last().iter().copied().max().unwrap_or_default();
-        let passed = inner.lanes.passed(completed);
-        let garbage = inner.deferred.collect(oldest, submitted, passed);
-        Finished { sequences, garbage, passed }
+        self.lock().take_finished(&completed)
     }
 
     /// Changes who has the images of swapchains.
@@ -536,26 +439,66 @@ impl<T> Submitter<T> {
     }
 }
 
+impl Submission {
+    fn parts(&mut self) -> impl Iterator<Item = &mut Recording> {
+        self.prelude.iter_mut().chain(&mut self.main).map(|part| &mut **part)
+    }
+}
+
 impl<T> Inner<T> {
+    /// A command buffer of a lane is about to be recorded.
+    fn take(&mut self, lane: usize) -> Ticket {
+        if lane != 0 {
+            self.lanes.begin_several();
+        }
+        self.ring.take(lane)
+    }
+
+    /// Keeps what a queue got until that is done with it, and takes back what none got. Answers the value.
+    fn put_away(&mut self, recording: Box<Recording>) -> u64 {
+        let value = recording.value;
+        match value {
+            0 => self.ring.discard(recording),
+            _ => self.ring.submitted(recording),
+        }
+        value
+    }
+
+    fn take_finished(&mut self, completed: &PerLane<u64>) -> Finished<T> {
+        self.lanes.reached(completed);
+        let staged = self.ring.collect(completed);
+        let oldest = self.ring.oldest_open();
+        let submitted = self.lanes.last().iter().copied().max().unwrap_or_default();
+        let passed = self.lanes.passed(completed);
+        let garbage = self.deferred.collect(oldest, submitted, passed);
+        Finished { staged, garbage, passed }
+    }
+
+    /// Images that the presentation engine still has and a command buffer is the first to use.
+    fn image_waits(&mut self, recording: &Recording) -> Vec<AcquireWait> {
+        self.presentables.take_waits(&recording.tracker, self.lanes.first_states())
+    }
+
+    fn step(&mut self, recording: &Recording, is_prelude: bool, exchanges: bool) -> Step {
+        let sent = Sent {
+            lane: recording.lane,
+            tracker: &recording.tracker,
+            references: &recording.references,
+            after: recording.after,
+            is_prelude,
+            exchanges,
+        };
+        let images = &recording.images;
+        self.lanes.submit(&sent, |id| images.get(&id).is_some_and(|image| image.is_exclusive))
+    }
+
     /// All of a submission went to its queue.
     fn note(&mut self, submission: &Submission, last: u64) {
         submission.presented.into_iter().for_each(|id| self.presentables.present(id));
         if !submission.in_background {
-            self.foreground[submission.recordings.first().map_or(0, |first| first.lane)] = last;
+            let part = submission.main.as_ref().or(submission.prelude.as_ref());
+            self.foreground[part.map_or(0, |part| part.lane)] = last;
         }
-    }
-}
-
-impl Batch {
-    fn push(&mut self, raw: vk::CommandBuffer) {
-        self.commands.push(vk::CommandBufferSubmitInfo::default().command_buffer(raw));
-    }
-
-    fn info(&self) -> vk::SubmitInfo2<'_> {
-        vk::SubmitInfo2::default()
-            .wait_semaphore_infos(&self.waits)
-            .command_buffer_infos(&self.commands)
-            .signal_semaphore_infos(&self.signals)
     }
 }
 
@@ -573,15 +516,4 @@ pub(crate) fn stages_of(queue: Queue) -> Stages {
         }
         Queue::Transfer => Stages::HOST | Stages::TRANSFER,
     }
-}
-
-fn begin(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {
-    let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-    // SAFETY: the command buffer is new or was reset with its pool.
-    unsafe { gpu.device.begin_command_buffer(commands, &info) }.map_err(Error::vulkan("vkBeginCommandBuffer"))
-}
-
-fn end(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {
-    // SAFETY: the command buffer is being recorded, outside of a render pass.
-    unsafe { gpu.device.end_command_buffer(commands) }.map_err(Error::vulkan("vkEndCommandBuffer"))
 }

@@ -74,7 +74,7 @@ impl CommandBuffer {
             self.use_texture_pair(texture, &from, texture, &to)?;
             self.record_blit((texture, &from), (texture, &to), Filter::Linear);
         }
-        self.settle.push(Settle::Texture(Arc::clone(texture)));
+        self.notes.settle.push(Settle::Texture(Arc::clone(texture)));
         Ok(())
     }
 

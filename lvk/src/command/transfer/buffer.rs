@@ -75,7 +75,7 @@ impl CommandBuffer {
         self.use_buffer(source, Use::transfer_read());
         self.use_buffer(target, Use::transfer_write());
         self.flush();
-        self.settle.push(Settle::Buffer(Arc::clone(target)));
+        self.notes.settle.push(Settle::Buffer(Arc::clone(target)));
         // SAFETY: all ranges lie inside their buffers, and no target overlaps another or a source.
         unsafe { self.shared.gpu.device.cmd_copy_buffer(self.raw(), source.raw, target.raw, &raw) };
         Ok(())
@@ -95,7 +95,7 @@ impl CommandBuffer {
         self.flush();
         // SAFETY: the range lies inside the buffer and is aligned.
         unsafe { self.shared.gpu.device.cmd_fill_buffer(self.raw(), buffer.raw, offset, size, value) };
-        self.settle.push(Settle::Buffer(buffer));
+        self.notes.settle.push(Settle::Buffer(buffer));
         Ok(())
     }
 
@@ -116,7 +116,7 @@ impl CommandBuffer {
         self.flush();
         // SAFETY: the range lies inside the buffer, is aligned, and not too large.
         unsafe { self.shared.gpu.device.cmd_update_buffer(self.raw(), buffer.raw, offset, bytes) };
-        self.settle.push(Settle::Buffer(buffer));
+        self.notes.settle.push(Settle::Buffer(buffer));
         Ok(())
     }
 
@@ -126,13 +126,13 @@ impl CommandBuffer {
         if bytes.is_empty() {
             return Ok(());
         }
-        let region = self.shared.staging.write(bytes, 16, self.recording.sequence)?;
+        let region = self.shared.staging.write(bytes, 16, self.recording.staging_key())?;
         self.use_buffer(target, Use::transfer_write());
         self.flush();
         let copy = vk::BufferCopy { src_offset: region.offset, dst_offset: offset, size: bytes.len() as u64 };
         // SAFETY: both ranges lie inside their buffers.
         unsafe { self.shared.gpu.device.cmd_copy_buffer(self.raw(), region.buffer, target.raw, &[copy]) };
-        self.settle.push(Settle::Buffer(Arc::clone(target)));
+        self.notes.settle.push(Settle::Buffer(Arc::clone(target)));
         Ok(())
     }
 }

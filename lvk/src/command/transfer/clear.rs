@@ -66,7 +66,7 @@ impl CommandBuffer {
                 }
             }
         }
-        self.settle.push(Settle::Texture(texture));
+        self.notes.settle.push(Settle::Texture(texture));
         Ok(())
     }
 }

@@ -36,10 +36,10 @@ impl CommandBuffer {
         target: &Arc<Texture>,
         to: &Region,
     ) -> Result<()> {
-        self.uses.clear();
+        self.notes.uses.clear();
         self.use_texture(source, from.subresources(), Use::transfer_read())?;
         if let Err(error) = self.use_texture(target, to.subresources(), Use::transfer_write()) {
-            self.uses.clear();
+            self.notes.uses.clear();
             return Err(error);
         }
         self.flush();
@@ -48,6 +48,6 @@ impl CommandBuffer {
 
     /// Both are read by shaders next, where nobody says otherwise.
     fn settle_pair(&mut self, source: Arc<Texture>, target: Arc<Texture>) {
-        self.settle.extend([source, target].map(Settle::Texture));
+        self.notes.settle.extend([source, target].map(Settle::Texture));
     }
 }

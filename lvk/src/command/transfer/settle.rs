@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::barrier::{Layout, Stages, Use};
 use crate::command::CommandBuffer;
+use crate::command::notes::Notes;
 use crate::command::queue_check::on_lane;
 use crate::resource::texture_desc::TextureUsage;
 use crate::resource::{Buffer, Texture};
@@ -20,31 +21,32 @@ impl CommandBuffer {
     /// Makes what copies touched readable by every shader and every input, with one barrier for all.
     #[inline]
     pub(in crate::command) fn settle(&mut self) {
-        if !self.settle.is_empty() {
+        if !self.notes.settle.is_empty() {
             self.settle_all();
         }
     }
 
     fn settle_all(&mut self) {
         let lane = self.recording.lane;
-        let Recording { tracker, images, commands, .. } = &mut *self.recording;
-        self.barriers.clear();
+        let Recording { tracker, images, commands, .. } = &mut **self.recording;
+        let Notes { settle, barriers, last_barrier, .. } = &mut **self.notes;
+        barriers.clear();
         // What was written twice is listed twice; the second read needs no barrier any more.
-        for written in self.settle.drain(..) {
+        for written in settle.drain(..) {
             match written {
                 Settle::Buffer(buffer) => {
-                    tracker.use_buffer(buffer.id, on_lane(lane, Use::everything_read()), &mut self.barriers);
+                    tracker.use_buffer(buffer.id, on_lane(lane, Use::everything_read()), barriers);
                 }
                 Settle::Texture(texture) => {
                     let Some(read) = resting_use(texture.image.usage) else { continue };
                     let read = on_lane(lane, read);
                     let image = &texture.image;
                     images.insert(image.id, image.for_barriers());
-                    tracker.use_texture(image.id, image.shape, texture.range, read, &mut self.barriers);
+                    tracker.use_texture(image.id, image.shape, texture.range, read, barriers);
                 }
             }
         }
-        emit(&self.shared.gpu, *commands, &self.barriers, images, &mut self.last_barrier);
+        emit(&self.shared.gpu, *commands, barriers, images, last_barrier);
     }
 }
 

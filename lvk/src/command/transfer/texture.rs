@@ -30,7 +30,7 @@ impl CommandBuffer {
         self.use_texture(&target, region.subresources(), Use::transfer_write())?;
         self.flush();
         self.record_fill_texture(source.raw, offset, &target, &region);
-        self.settle.push(Settle::Texture(target));
+        self.notes.settle.push(Settle::Texture(target));
         Ok(())
     }
 
@@ -53,11 +53,11 @@ impl CommandBuffer {
         let target = self.shared.store.textures.get(target)?;
         let region = target.check_upload(region, bytes.len() as u64)?;
         self.check_copy(&target, &region)?;
-        let staged = self.shared.staging.write(bytes, ALIGNMENT, self.recording.sequence)?;
+        let staged = self.shared.staging.write(bytes, ALIGNMENT, self.recording.staging_key())?;
         self.use_texture(&target, region.subresources(), Use::transfer_write())?;
         self.flush();
         self.record_fill_texture(staged.buffer, staged.offset, &target, &region);
-        self.settle.push(Settle::Texture(target));
+        self.notes.settle.push(Settle::Texture(target));
         Ok(())
     }
 
@@ -94,8 +94,8 @@ impl CommandBuffer {
             let device = &self.shared.gpu.device;
             device.cmd_copy_image_to_buffer(self.raw(), source.image.raw, SOURCE, target.raw, &[copy]);
         }
-        self.settle.push(Settle::Texture(Arc::clone(source)));
-        self.settle.push(Settle::Buffer(Arc::clone(target)));
+        self.notes.settle.push(Settle::Texture(Arc::clone(source)));
+        self.notes.settle.push(Settle::Buffer(Arc::clone(target)));
         Ok(())
     }
 

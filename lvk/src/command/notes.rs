@@ -1,0 +1,111 @@
+//! What a command buffer notes while it is recorded, with memory that is used again.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use ash::vk;
+
+use super::accel::OpenBuild;
+use super::bind::PushConstants;
+use super::found::Found;
+use super::query_log::QueryLog;
+use super::transfer::Settle;
+use super::uses::Uses;
+use crate::accel::compaction::SizeQuery;
+use crate::accel::tlas_updates::TlasUpdates;
+use crate::barrier::{Barriers, ResourceId};
+use crate::handle::{BufferHandle, TextureHandle};
+use crate::resource::{Buffer, Texture};
+use crate::shared::Shared;
+use crate::submit::emit::LastBarrier;
+
+/// Lists and maps of one command buffer.
+#[derive(Default)]
+pub(crate) struct Notes {
+    pub(super) found_buffers: Found<BufferHandle, Buffer>,
+    pub(super) found_textures: Found<TextureHandle, Texture>,
+    pub(super) uses: Uses,
+    pub(super) barriers: Barriers,
+    pub(super) last_barrier: LastBarrier,
+    pub(super) sets_bound: Vec<vk::PipelineBindPoint>,
+    pub(super) push_constants: PushConstants,
+    pub(super) host_reads: Vec<ResourceId>,
+    pub(super) settle: Vec<Settle>,
+    pub(super) tlas_updates: TlasUpdates,
+    pub(super) open_builds: Vec<OpenBuild>,
+    /// Refits since the last rebuild of each bottom-level structure that is built here, by its id.
+    pub(super) refits: HashMap<u64, u32>,
+    pub(super) size_queries: Vec<Arc<SizeQuery>>,
+    pub(super) queries: QueryLog,
+    /// Bottom-level structures that are built elsewhere from here on, by their ids.
+    pub(super) moved: HashSet<u64>,
+}
+
+impl Notes {
+    /// The command buffer went to the GPU with this timeline value: what it noted becomes true.
+    pub(crate) fn submitted(&mut self, shared: &Shared, value: u64) {
+        self.tlas_updates.drain().for_each(|update| shared.show(update).submitted(value));
+        self.open_builds.drain(..).for_each(|build| build.submit(value));
+        self.size_queries.drain(..).for_each(|query| query.submit());
+        self.queries.submit();
+    }
+
+    /// Forgets everything, and keeps the memory.
+    fn clear(&mut self) {
+        let Self {
+            found_buffers,
+            found_textures,
+            uses,
+            barriers,
+            // Holds of every command buffer of the device.
+            last_barrier: _,
+            sets_bound,
+            push_constants,
+            host_reads,
+            settle,
+            tlas_updates,
+            open_builds,
+            refits,
+            size_queries,
+            queries,
+            moved,
+        } = self;
+        found_buffers.clear();
+        found_textures.clear();
+        uses.forget();
+        barriers.clear();
+        sets_bound.clear();
+        push_constants.clear();
+        host_reads.clear();
+        settle.clear();
+        drop(tlas_updates.drain());
+        open_builds.clear();
+        refits.clear();
+        size_queries.clear();
+        queries.clear();
+        moved.clear();
+    }
+}
+
+/// Notes that no command buffer has at the moment, empty.
+#[derive(Default)]
+#[expect(clippy::vec_box, reason = "handed on as pointers")]
+pub(crate) struct SpareNotes(Mutex<Vec<Box<Notes>>>);
+
+impl SpareNotes {
+    /// More than this are let go, and so are those of very many instances.
+    const MOST: usize = 8;
+
+    pub(crate) fn take(&self) -> Box<Notes> {
+        let spare = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        spare.unwrap_or_default()
+    }
+
+    pub(crate) fn give(&self, mut notes: Box<Notes>) {
+        notes.clear();
+        let mut spare = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if spare.len() < Self::MOST && notes.tlas_updates.is_worth_keeping() {
+            spare.push(notes);
+        }
+    }
+}

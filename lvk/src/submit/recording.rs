@@ -1,0 +1,144 @@
+//! Command buffers with what the tracker knows of them: recorded, run by the GPU, and recorded again with all their memory.
+
+use ash::vk;
+
+use super::emit::Images;
+use super::input_sets::InputSets;
+use super::ownership::{Access, Clock};
+use crate::barrier::{ResourceId, Tracker};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+
+/// A command buffer being recorded, with the GPU, or free.
+pub(crate) struct Recording {
+    /// Rises with every command buffer that is begun in the context.
+    pub(crate) sequence: u64,
+    /// What the caller records.
+    pub(crate) commands: vk::CommandBuffer,
+    pub(crate) tracker: Tracker,
+    pub(crate) images: Images,
+    /// What it uses that needs no barriers on one queue, and waits between several.
+    pub(crate) references: Vec<(ResourceId, Access)>,
+    /// What the caller has it wait for on other queues.
+    pub(crate) after: Clock,
+    /// The queue's.
+    pub(crate) lane: usize,
+    /// Of the timeline, once the queue has it; 0 before.
+    pub(super) value: u64,
+    /// Whether staging memory is kept for it.
+    pub(super) is_staged: bool,
+    /// Of its own, so that any thread may record without a lock.
+    pool: vk::CommandPool,
+    /// See [`prologue`](Self::prologue); made when there is the first barrier for it.
+    prologue: Option<vk::CommandBuffer>,
+    /// Of passes.
+    inputs: InputSets,
+}
+
+impl Recording {
+    pub(super) fn new(gpu: &Gpu, lane: usize) -> Result<Box<Self>> {
+        let info = vk::CommandPoolCreateInfo::default()
+            .flags(vk::CommandPoolCreateFlags::TRANSIENT)
+            .queue_family_index(gpu.queues.family(lane));
+        // SAFETY: the queue family is the device's own.
+        let pool = unsafe { gpu.device.create_command_pool(&info, None) }
+            .map_err(Error::vulkan("vkCreateCommandPool"))?;
+        gpu.name(pool, "command pool");
+        // SAFETY: where there is no command buffer, the pool is unused.
+        let commands =
+            allocate(gpu, pool).inspect_err(|_| unsafe { gpu.device.destroy_command_pool(pool, None) })?;
+        Ok(Box::new(Self {
+            sequence: 0,
+            commands,
+            tracker: Tracker::default(),
+            images: Images::default(),
+            references: Vec::new(),
+            after: Clock::default(),
+            lane,
+            value: 0,
+            is_staged: false,
+            pool,
+            prologue: None,
+            inputs: InputSets::default(),
+        }))
+    }
+
+    /// Begins anew. Neither the GPU nor anybody else has the command buffer, and where that fails it is gone.
+    pub(super) fn begin(mut self: Box<Self>, gpu: &Gpu) -> Result<Box<Self>> {
+        match self.reset(gpu).and_then(|()| begin(gpu, self.commands)) {
+            Ok(()) => Ok(self),
+            Err(error) => {
+                self.destroy(gpu);
+                Err(error)
+            }
+        }
+    }
+
+    fn reset(&mut self, gpu: &Gpu) -> Result<()> {
+        (self.value, self.is_staged) = (0, false);
+        self.after = Clock::default();
+        self.tracker.clear();
+        self.images.clear();
+        self.references.clear();
+        self.inputs.reset();
+        // SAFETY: nobody has the command buffers of the pool.
+        unsafe { gpu.device.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
+            .map_err(Error::vulkan("vkResetCommandPool"))
+    }
+
+    /// The number under which staging memory is kept for the command buffer, from now on.
+    #[inline]
+    pub(crate) fn staging_key(&mut self) -> u64 {
+        self.is_staged = true;
+        self.sequence
+    }
+
+    /// A set of `count` input attachments for a pass of the command buffer.
+    pub(crate) fn input_set(
+        &mut self,
+        gpu: &Gpu,
+        layout: vk::DescriptorSetLayout,
+        count: u32,
+    ) -> Result<vk::DescriptorSet> {
+        self.inputs.take(gpu, layout, count)
+    }
+
+    /// Runs before the caller's commands and holds the barriers between the queue's state and the first uses there.
+    pub(super) fn prologue(&mut self, gpu: &Gpu) -> Result<vk::CommandBuffer> {
+        if let Some(made) = self.prologue {
+            return Ok(made);
+        }
+        let made = allocate(gpu, self.pool)?;
+        gpu.name(made, "barriers before a command buffer");
+        self.prologue = Some(made);
+        Ok(made)
+    }
+
+    /// Neither the GPU nor anybody else has the command buffer.
+    pub(super) fn destroy(self, gpu: &Gpu) {
+        // SAFETY: nobody has the command buffers of the pool.
+        unsafe { gpu.device.destroy_command_pool(self.pool, None) };
+        self.inputs.destroy(gpu);
+    }
+}
+
+fn allocate(gpu: &Gpu, pool: vk::CommandPool) -> Result<vk::CommandBuffer> {
+    let info = vk::CommandBufferAllocateInfo::default()
+        .command_pool(pool)
+        .level(vk::CommandBufferLevel::PRIMARY)
+        .command_buffer_count(1);
+    // SAFETY: the pool is alive, and nobody else uses it.
+    let made = unsafe { gpu.device.allocate_command_buffers(&info) };
+    made.map(|buffers| buffers[0]).map_err(Error::vulkan("vkAllocateCommandBuffers"))
+}
+
+pub(super) fn begin(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {
+    let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+    // SAFETY: the command buffer is new or was reset with its pool.
+    unsafe { gpu.device.begin_command_buffer(commands, &info) }.map_err(Error::vulkan("vkBeginCommandBuffer"))
+}
+
+pub(super) fn end(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {
+    // SAFETY: the command buffer is being recorded, outside of a render pass.
+    unsafe { gpu.device.end_command_buffer(commands) }.map_err(Error::vulkan("vkEndCommandBuffer"))
+}
