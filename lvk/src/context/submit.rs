@@ -55,13 +55,16 @@ impl Context {
     }
 
     /// As [`submit`](Self::submit), with what `more` has besides recordings.
-    pub(super) fn submit_between(
-        &self,
-        mut cmd: CommandBuffer,
-        mut more: Submission,
-    ) -> Result<SubmitHandle> {
+    pub(super) fn submit_between(&self, cmd: CommandBuffer, more: Submission) -> Result<SubmitHandle> {
         self.check_own(&cmd)?;
+        let lane = cmd.lane();
         self.advance_compactions();
+        let submitted = self.submit_behind_pending(cmd, more)?;
+        self.shared().submitter.begin_ahead(lane);
+        Ok(submitted)
+    }
+
+    fn submit_behind_pending(&self, mut cmd: CommandBuffer, mut more: Submission) -> Result<SubmitHandle> {
         let mut pending = self.pending();
         cmd.check_tlas_updates()?;
         cmd.check_queries()?;

@@ -21,6 +21,8 @@ pub(crate) struct CommandRing {
 /// Command buffers of one lane.
 #[derive(Default)]
 struct Lane {
+    /// Begun already, for who comes next.
+    begun: Option<Box<Recording>>,
     #[expect(clippy::vec_box, reason = "handed on as pointers")]
     free: Vec<Box<Recording>>,
     /// In the order of their values.
@@ -31,6 +33,7 @@ struct Lane {
 pub(crate) struct Ticket {
     pub(crate) sequence: u64,
     lane: usize,
+    begun: Option<Box<Recording>>,
     /// What is recorded again, if there is any.
     free: Option<Box<Recording>>,
 }
@@ -38,11 +41,18 @@ pub(crate) struct Ticket {
 impl Ticket {
     /// Begins the command buffer, which needs no lock. Where that fails, the ring is to be [told](CommandRing::close).
     pub(crate) fn begin(self, gpu: &Gpu) -> Result<Box<Recording>> {
-        let free = self.free.map_or_else(|| Recording::new(gpu, self.lane), Ok)?;
-        let mut recording = free.begin(gpu)?;
+        let mut recording = match self.begun {
+            Some(begun) => begun,
+            None => begin(gpu, self.lane, self.free)?,
+        };
         recording.sequence = self.sequence;
         Ok(recording)
     }
+}
+
+/// Begins what is free, or a new one.
+pub(crate) fn begin(gpu: &Gpu, lane: usize, free: Option<Box<Recording>>) -> Result<Box<Recording>> {
+    free.map_or_else(|| Recording::new(gpu, lane), Ok)?.begin(gpu)
 }
 
 impl CommandRing {
@@ -50,7 +60,25 @@ impl CommandRing {
     pub(crate) fn take(&mut self, lane: usize) -> Ticket {
         self.last_sequence += 1;
         self.open.push(self.last_sequence);
-        Ticket { sequence: self.last_sequence, lane, free: self.lanes[lane].free.pop() }
+        let begun = self.lanes[lane].begun.take();
+        let free = if begun.is_none() { self.take_free(lane) } else { None };
+        Ticket { sequence: self.last_sequence, lane, begun, free }
+    }
+
+    /// Whether a command buffer of the lane is begun already, for who comes next.
+    pub(crate) fn has_begun(&self, lane: usize) -> bool {
+        self.lanes[lane].begun.is_some()
+    }
+
+    /// A command buffer of the lane to begin.
+    pub(crate) fn take_free(&mut self, lane: usize) -> Option<Box<Recording>> {
+        self.lanes[lane].free.pop()
+    }
+
+    /// A command buffer is begun for who comes next, as others may have been meanwhile.
+    pub(crate) fn give_begun(&mut self, recording: Box<Recording>) {
+        let Lane { begun, free, .. } = &mut self.lanes[recording.lane];
+        free.extend(begun.replace(recording));
     }
 
     /// The command buffer of this number is recorded no longer.
@@ -77,7 +105,7 @@ impl CommandRing {
     /// memory, and those given up.
     pub(crate) fn collect(&mut self, completed: &PerLane<u64>) -> Vec<u64> {
         let mut staged = std::mem::take(&mut self.given_up);
-        for (Lane { free, in_flight }, completed) in self.lanes.iter_mut().zip(completed) {
+        for (Lane { free, in_flight, .. }, completed) in self.lanes.iter_mut().zip(completed) {
             while in_flight.front().is_some_and(|oldest| oldest.value <= *completed) {
                 let Some(done) = in_flight.pop_front() else { break };
                 staged.extend(done.is_staged.then_some(done.sequence));
@@ -104,8 +132,9 @@ impl CommandRing {
 
     /// Destroys everything. The GPU is idle and nothing is being recorded.
     pub(crate) fn destroy(&mut self, gpu: &Gpu) {
-        for Lane { free, in_flight } in &mut self.lanes {
-            free.drain(..).chain(in_flight.drain(..)).for_each(|recording| recording.destroy(gpu));
+        for Lane { begun, free, in_flight } in &mut self.lanes {
+            let all = begun.take().into_iter().chain(free.drain(..)).chain(in_flight.drain(..));
+            all.for_each(|recording| recording.destroy(gpu));
         }
     }
 }

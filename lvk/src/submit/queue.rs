@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::batches::Batches;
-use super::command_ring::{CommandRing, Ticket};
+use super::command_ring::{self, CommandRing, Ticket};
 use super::deferred::Deferred;
 use super::emit::{Images, LastBarrier, Side, emit, emit_moves, stages};
 use super::lanes::{Departure, Lanes, Sent, Site, Step};
@@ -120,6 +120,20 @@ impl<T> Submitter<T> {
         let ticket = inner.take(self.gpu.queues.lane(queue));
         drop(inner);
         Ok((finished, self.begin(ticket)))
+    }
+
+    /// Begins the command buffer that somebody will acquire next, while the GPU is at work.
+    pub(crate) fn begin_ahead(&self, lane: usize) {
+        let mut inner = self.lock();
+        if inner.ring.has_begun(lane) {
+            return;
+        }
+        let free = inner.ring.take_free(lane);
+        drop(inner);
+        // Where that fails, who acquires it hears of it.
+        if let Ok(begun) = command_ring::begin(&self.gpu, lane, free) {
+            self.lock().ring.give_begun(begun);
+        }
     }
 
     fn begin(&self, ticket: Ticket) -> Result<Box<Recording>> {
