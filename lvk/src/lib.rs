@@ -100,6 +100,7 @@ mod context;
 mod disk;
 mod error;
 mod format;
+mod found;
 mod gpu;
 mod handle;
 mod kernel;

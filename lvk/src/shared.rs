@@ -14,7 +14,7 @@ use crate::accel::software::body::SoftwareBody;
 use crate::accel::storage::AccelStorage;
 use crate::accel::structure::AccelKind;
 use crate::accel::tlas::TlasContents;
-use crate::accel::tlas_updates::TlasUpdate;
+use crate::accel::tlas_updates::TlasUpdates;
 use crate::barrier::{QueryStages, ResourceId};
 use crate::bindless::checks::BindlessArray;
 use crate::bindless::{Bindless, TEXTURE_ARRAYS};
@@ -253,16 +253,15 @@ impl Shared {
         }
     }
 
-    /// What an update says is submitted. Answers the structure.
-    pub(crate) fn show(&self, update: TlasUpdate) -> Arc<AccelStruct> {
-        let contents = &update.contents;
-        let is_outdated = contents.revision.moves != self.moves() && contents.shown.is_outdated();
-        let (target, before) = update.apply();
-        if is_outdated {
-            self.note_outdated_tlas();
-        }
-        before.into_iter().for_each(|before| self.retire(Garbage::Contents(Box::new(before))));
-        target
+    /// What updates say is submitted; `note` is told of each structure.
+    pub(crate) fn show(&self, updates: &mut TlasUpdates, mut note: impl FnMut(&Arc<AccelStruct>)) {
+        updates.apply(|target, contents| {
+            if contents.revision.moves != self.moves() && contents.shown.is_outdated() {
+                self.note_outdated_tlas();
+            }
+            note(target);
+        });
+        updates.take_replaced().for_each(|contents| self.retire(Garbage::Contents(Box::new(contents))));
     }
 
     /// Rises with every structure that is destroyed or moves.

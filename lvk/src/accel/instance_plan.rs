@@ -19,13 +19,13 @@ pub(crate) fn starts_plain(instances: &[TlasInstance], find: Find<'_>) -> Result
 }
 
 /// What instances refer to that were written with addresses.
-pub(crate) enum Written {
+pub(crate) enum Addresses {
     /// What was known, all of it.
-    Same,
+    OfKnown,
     /// Something else.
-    Other(Arc<ShownSet>),
+    OfOthers(Arc<ShownSet>),
     /// Some need more than an address; what was written means nothing.
-    Nothing,
+    Insufficient,
 }
 
 /// Checks `instances` and writes them with addresses, on several threads where there are many. `known` is what was shown
@@ -38,21 +38,21 @@ pub(crate) fn write_addresses(
     marks: &mut Marks,
     find: Find<'_>,
     out: &mut [u8],
-) -> Result<Written> {
+) -> Result<Addresses> {
     let threads = thread_count(instances.len());
     if threads > 1 {
         let shown = write_chunks(name, instances, threads, find, out)?;
-        let other = |shown| Written::Other(Arc::new(ShownSet::new(shown)));
-        return Ok(shown.map_or(Written::Nothing, other));
+        let other = |shown| Addresses::OfOthers(Arc::new(ShownSet::new(shown)));
+        return Ok(shown.map_or(Addresses::Insufficient, other));
     }
     let mut gather = Gather::new(known, marks, find);
     if !write_chunk(name, 0, instances, &mut gather, out)? {
-        return Ok(Written::Nothing);
+        return Ok(Addresses::Insufficient);
     }
     if gather.is_unchanged() {
-        return Ok(Written::Same);
+        return Ok(Addresses::OfKnown);
     }
-    Ok(Written::Other(Arc::new(gather.finish().0)))
+    Ok(Addresses::OfOthers(Arc::new(gather.finish().0)))
 }
 
 fn write_chunks(
@@ -138,6 +138,14 @@ fn merge(chunks: Vec<Result<Option<Vec<Shown>>>>) -> Result<Option<Vec<Shown>>> 
     Ok((!needs_kernel).then_some(all))
 }
 
+/// Memory for plans, used again.
+#[derive(Default)]
+pub(crate) struct PlanMemory {
+    pub(crate) marks: Marks,
+    /// The place of what each instance refers to.
+    pub(crate) refers: Vec<u32>,
+}
+
 /// What a list of instances refers to, and how many Vulkan is given.
 pub(crate) struct InstancePlan {
     pub(crate) shown: Arc<ShownSet>,
@@ -149,16 +157,16 @@ pub(crate) struct InstancePlan {
 
 impl InstancePlan {
     /// Finds the structures of `instances`, which are to be shown by the structure `name`. `known` is what was shown
-    /// before, if that still stands; `refers` is only memory to use again.
+    /// before, if that still stands.
     pub(crate) fn new(
         name: &str,
         instances: &[TlasInstance],
-        known: Arc<ShownSet>,
-        marks: &mut Marks,
-        mut refers: Vec<u32>,
+        known: &Arc<ShownSet>,
+        memory: &mut PlanMemory,
         find: Find<'_>,
     ) -> Result<Self> {
-        let mut gather = Gather::new(&known, marks, find);
+        let mut refers = std::mem::take(&mut memory.refers);
+        let mut gather = Gather::new(known, &mut memory.marks, find);
         refers.clear();
         refers.reserve(instances.len());
         let mut last = None;
@@ -171,7 +179,7 @@ impl InstancePlan {
             refers.push(place);
         }
         let shown = if gather.is_unchanged() {
-            known
+            Arc::clone(known)
         } else {
             let (shown, moved) = gather.finish();
             refers.iter_mut().for_each(|place| *place = moved[*place as usize]);

@@ -162,27 +162,40 @@ impl ShownSet {
 /// Which of those known were met. Kept and emptied, so that it seldom allocates.
 #[derive(Debug, Default)]
 pub(crate) struct Marks {
-    words: Vec<u64>,
+    first: u64,
+    /// Of those behind the first 64.
+    more: Vec<u64>,
     count: usize,
 }
 
 impl Marks {
     #[inline]
     fn reset(&mut self, len: usize) {
-        self.words.clear();
-        self.words.resize(len.div_ceil(64), 0);
+        self.first = 0;
         self.count = 0;
+        if len > 64 {
+            self.more.clear();
+            self.more.resize(len.div_ceil(64) - 1, 0);
+        }
     }
 
     #[inline]
     fn insert(&mut self, place: usize) {
-        let (word, bit) = (&mut self.words[place / 64], 1 << (place % 64));
+        let word = match place / 64 {
+            0 => &mut self.first,
+            word => &mut self.more[word - 1],
+        };
+        let bit = 1 << (place % 64);
         self.count += usize::from(*word & bit == 0);
         *word |= bit;
     }
 
     fn contains(&self, place: usize) -> bool {
-        self.words[place / 64] >> (place % 64) & 1 == 1
+        let word = match place / 64 {
+            0 => self.first,
+            word => self.more[word - 1],
+        };
+        word >> (place % 64) & 1 == 1
     }
 }
 

@@ -117,6 +117,12 @@ impl Tlas {
 }
 
 impl TlasContents {
+    /// The same, but for what the instances can be written from.
+    #[inline]
+    pub(crate) fn without_source(&self) -> Self {
+        Self { shown: Arc::clone(&self.shown), source: None, ..*self }
+    }
+
     /// Instances of the caller and of Vulkan, `None` before the first build.
     #[inline]
     pub(crate) fn counts(&self) -> Option<(u32, u32)> {

@@ -3,95 +3,196 @@
 use std::sync::Arc;
 
 use super::AccelStruct;
-use super::build_run::BuildRun;
-use super::shown::Marks;
-use super::tlas::TlasContents;
+use super::instance_plan::PlanMemory;
+use super::shown::{Revision, ShownSet};
+use super::tlas::{InstanceSource, Tlas, TlasContents};
 use crate::error::{Error, Result};
+use crate::found::Found;
+use crate::handle::AccelStructHandle;
+use crate::store::Pool;
 
-/// What a top-level structure shows once the command buffer is submitted.
+/// What a command buffer makes of one top-level structure.
+#[derive(Default)]
 pub(crate) struct TlasUpdate {
-    pub(crate) target: Arc<AccelStruct>,
-    pub(crate) contents: TlasContents,
-    /// Moves what is shown when the command buffer is submitted, so that must have as many instances.
-    pub(crate) refits_submitted: bool,
+    /// What it shows after the last command; where there was none yet, by the last submission that was looked at.
+    contents: Option<TlasContents>,
+    /// Whether a command has updated it.
+    is_recorded: bool,
+    /// The counts that a first command relies on which moves what is shown when the command buffer is submitted.
+    relies_on: Option<(u32, u32)>,
+}
+
+/// What a command has a structure show.
+pub(crate) struct Change {
+    /// Instances of the caller.
+    pub(crate) count: u32,
+    /// Instances Vulkan is given.
+    pub(crate) built_count: u32,
+    /// What the instances refer to; `None` for the same as before.
+    pub(crate) shown: Option<Arc<ShownSet>>,
+    pub(crate) source: Option<Arc<InstanceSource>>,
+    pub(crate) refit: bool,
 }
 
 impl TlasUpdate {
+    /// What the structure shows before the next command.
+    #[inline(always)]
+    pub(crate) fn look(&mut self, tlas: &Tlas) -> &TlasContents {
+        if !self.is_recorded {
+            self.contents = None;
+        }
+        self.contents.get_or_insert_with(|| tlas.contents().without_source())
+    }
+
+    /// Whether a command has updated it.
+    #[inline]
+    pub(crate) fn is_recorded(&self) -> bool {
+        self.is_recorded
+    }
+
+    /// A command was recorded, with what is shown looked at by then. Answers what is shown no longer, though the commands before
+    /// are to read it.
+    #[inline(always)]
+    fn record(&mut self, change: Change, revision: Revision) -> Option<TlasContents> {
+        let Change { count, built_count, shown, source, refit } = change;
+        let was_recorded = std::mem::replace(&mut self.is_recorded, true);
+        if refit && !was_recorded {
+            self.relies_on = Some((count, built_count));
+        }
+        let contents = self.contents.get_or_insert_default();
+        let refits = if refit { contents.refits.saturating_add(1) } else { 0 };
+        (contents.instance_count, contents.built_count, contents.refits) = (Some(count), built_count, refits);
+        contents.revision = revision;
+        if shown.is_none() && source.is_none() && contents.source.is_none() {
+            return None;
+        }
+        let source = std::mem::replace(&mut contents.source, source);
+        let shown = shown.map(|shown| std::mem::replace(&mut contents.shown, shown));
+        // What was submitted stays with the structure until this is submitted, too.
+        if !was_recorded || (source.is_none() && shown.is_none()) {
+            return None;
+        }
+        Some(TlasContents { shown: shown.unwrap_or_default(), source, ..TlasContents::default() })
+    }
+
     /// Fails if another submission changed the number of instances since the refit was recorded.
-    fn check(&self) -> Result<()> {
-        let tlas = self.target.tlas()?;
-        if !self.refits_submitted || tlas.contents().counts() == self.contents.counts() {
+    fn check(&self, target: &AccelStruct) -> Result<()> {
+        let Some(counts) = self.relies_on else { return Ok(()) };
+        if target.tlas()?.contents().counts() == Some(counts) {
             return Ok(());
         }
         let message =
             "a refit was recorded, but a submission since then changed the number of instances; rebuild";
-        Err(Error::usage(&self.target.name, message))
+        Err(Error::usage(&target.name, message))
     }
 
-    /// Makes it so. Answers the structure, and what has to stay until the GPU is done with it: what was shown before,
-    /// unless that is still shown.
-    pub(crate) fn apply(self) -> (Arc<AccelStruct>, Option<TlasContents>) {
-        let Self { target, contents, .. } = self;
-        let Ok(tlas) = target.tlas() else { return (target, None) };
+    /// Makes it so. Answers what was shown before, unless that is still shown.
+    fn apply(&mut self, tlas: &Tlas) -> Option<TlasContents> {
+        let contents = std::mem::take(self).contents?;
         let mut place = tlas.contents();
         let shows_the_same = Arc::ptr_eq(&place.shown, &contents.shown);
         let before = std::mem::replace(&mut *place, contents);
         drop(place);
-        let garbage = (!shows_the_same || before.source.is_some()).then_some(before);
-        (target, garbage)
+        (!shows_the_same || before.source.is_some()).then_some(before)
     }
 }
 
-/// The updates of one command buffer in their order, with memory that is used again.
+/// The updates of one command buffer, with memory that is used again.
 #[derive(Default)]
 pub(crate) struct TlasUpdates {
+    /// Structures that were named.
+    found: Found<AccelStructHandle, AccelStruct, 32>,
+    /// One for each of them.
     list: Vec<TlasUpdate>,
-    /// A bit for each target, which several may share.
-    targets: u64,
-    /// Those that run side by side, while they are recorded.
-    pub(crate) run: BuildRun,
-    pub(crate) marks: Marks,
-    /// The place of what each instance refers to.
-    pub(crate) refers: Vec<u32>,
+    /// What commands were to read and later ones have replaced.
+    replaced: Vec<TlasContents>,
+    /// What structures show of which nothing is known.
+    nothing: Arc<ShownSet>,
+    memory: PlanMemory,
+}
+
+/// One structure and what becomes of it.
+pub(crate) struct Row<'a> {
+    pub(crate) target: &'a Arc<AccelStruct>,
+    pub(crate) update: &'a mut TlasUpdate,
+    pub(crate) nothing: &'a Arc<ShownSet>,
+    pub(crate) memory: &'a mut PlanMemory,
 }
 
 impl TlasUpdates {
-    const ROOM: usize = 8;
-    /// Lists for more instances are let go.
+    /// Memory for more instances is let go.
     const MOST_KEPT: usize = 1 << 16;
 
-    /// The last one of a structure.
+    /// The row of a structure.
     #[inline]
-    pub(crate) fn last_of(&self, target: &AccelStruct) -> Option<&TlasUpdate> {
-        if self.targets & target.id.bit() == 0 {
-            return None;
-        }
-        self.list.iter().rev().find(|update| update.target.id == target.id)
+    pub(crate) fn find(
+        &mut self,
+        pool: &Pool<AccelStructHandle, AccelStruct>,
+        handle: AccelStructHandle,
+    ) -> Result<usize> {
+        let row = self.found.find(pool, handle)?;
+        self.make_room();
+        Ok(row)
     }
 
+    /// The row of a structure.
+    pub(crate) fn row(&mut self, target: &Arc<AccelStruct>) -> usize {
+        let row = self.found.row(target);
+        self.make_room();
+        row
+    }
+
+    #[inline]
+    fn make_room(&mut self) {
+        if self.list.len() < self.found.count() {
+            self.list.resize_with(self.found.count(), TlasUpdate::default);
+        }
+    }
+
+    /// What is in a row.
+    #[inline]
+    pub(crate) fn at(&mut self, row: usize) -> Row<'_> {
+        let Self { found, list, nothing, memory, .. } = self;
+        Row { target: found.at(row), update: &mut list[row], nothing, memory }
+    }
+
+    /// A command was recorded that updates the structure of a row, with what is shown looked at by `revision`.
     #[inline(always)]
-    pub(crate) fn push(&mut self, update: TlasUpdate) {
-        if self.list.capacity() == 0 {
-            self.list.reserve(Self::ROOM);
+    pub(crate) fn record(&mut self, row: usize, change: Change, revision: Revision) {
+        if let Some(replaced) = self.list[row].record(change, revision) {
+            self.replaced.push(replaced);
         }
-        self.targets |= update.target.id.bit();
-        self.list.push(update);
-    }
-
-    /// Whether the memory is not too much to keep for what is recorded next.
-    pub(crate) fn is_worth_keeping(&self) -> bool {
-        self.refers.capacity() <= Self::MOST_KEPT
     }
 
     /// Fails if what was recorded no longer fits what was submitted since.
     pub(crate) fn check(&self) -> Result<()> {
-        self.list.iter().try_for_each(TlasUpdate::check)
+        self.found.from(0).iter().zip(&self.list).try_for_each(|(target, update)| update.check(target))
     }
 
-    /// Takes them all, and keeps the memory; whoever gets that next waits for what is under way.
-    pub(crate) fn drain(&mut self) -> impl Iterator<Item = TlasUpdate> + '_ {
-        self.targets = 0;
-        self.run.stop();
-        self.list.drain(..)
+    /// Makes it all so; `before` is told of each structure with what it is to show.
+    pub(crate) fn apply(&mut self, mut before: impl FnMut(&Arc<AccelStruct>, &TlasContents)) {
+        for (target, update) in self.found.from(0).iter().zip(&mut self.list) {
+            if let (Ok(tlas), true, Some(contents)) = (target.tlas(), update.is_recorded, &update.contents) {
+                before(target, contents);
+                self.replaced.extend(update.apply(tlas));
+            }
+        }
+    }
+
+    /// What has to stay until the GPU is done with what was applied.
+    pub(crate) fn take_replaced(&mut self) -> impl Iterator<Item = TlasContents> + '_ {
+        self.replaced.drain(..)
+    }
+
+    /// Whether the memory is not too much to keep for what is recorded next.
+    pub(crate) fn is_worth_keeping(&self) -> bool {
+        self.memory.refers.capacity() <= Self::MOST_KEPT
+    }
+
+    /// Forgets everything, and keeps the memory.
+    pub(crate) fn clear(&mut self) {
+        self.found.clear();
+        self.list.clear();
+        self.replaced.clear();
     }
 }

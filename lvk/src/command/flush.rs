@@ -111,8 +111,8 @@ impl CommandBuffer {
     pub(super) fn flush(&mut self) {
         self.end_rendering();
         let Recording { commands, tracker, images, .. } = &mut **self.recording;
-        let Notes { uses, found_textures, barriers, last_barrier, tlas_updates, .. } = &mut **self.notes;
-        tlas_updates.run.stop();
+        let Notes { uses, found_textures, barriers, last_barrier, build_run, .. } = &mut **self.notes;
+        build_run.stop();
         barriers.clear();
         uses.track(found_textures, tracker, images, barriers);
         emit(&self.shared.gpu, *commands, barriers, images, last_barrier);

@@ -9,9 +9,10 @@ use crate::accel::AccelStruct;
 use crate::accel::build::instance_bytes;
 use crate::accel::flags::BuildFlags;
 use crate::accel::instance::{DeviceInstances, TlasInstance};
-use crate::accel::instance_plan::{InstancePlan, Written, starts_plain, write_addresses};
-use crate::accel::shown::{Shown, ShownSet};
+use crate::accel::instance_plan::{Addresses, InstancePlan, PlanMemory, starts_plain, write_addresses};
+use crate::accel::shown::{Marks, Shown, ShownSet};
 use crate::accel::tlas::{InstanceSource, Numbers, SourceBytes, Tlas};
+use crate::accel::tlas_updates::Change;
 use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result};
 use crate::kernel::{InstancesPush, Kernel};
@@ -25,93 +26,81 @@ const INSTANCE_ALIGNMENT: u64 = 16;
 /// Bytes of `LvkTlasRow` in `shader/glsl/hit_numbers.glsl`.
 pub(crate) const ROW_BYTES: u64 = 16;
 
-/// Instances on their way into a build.
-pub(super) struct Ready {
-    /// Where Vulkan reads them.
+/// Instances that the host has written as Vulkan reads them.
+pub(super) struct Staged {
     pub(super) address: u64,
-    pub(super) built_count: u32,
-    pub(super) shown: Arc<ShownSet>,
-    pub(super) source: Option<Arc<InstanceSource>>,
+    /// What they refer to; `None` for what was known.
+    pub(super) shown: Option<Arc<ShownSet>>,
+}
+
+/// Instances that Vulkan is given.
+#[derive(Clone, Copy)]
+pub(super) struct GivenInstances {
+    pub(super) address: u64,
+    pub(super) count: u32,
     /// Whether a kernel writes them, into the structure's own records.
     pub(super) is_from_kernel: bool,
 }
 
-/// Instances of the host, as far as they are prepared before the counts are checked.
-pub(super) enum Planned {
-    /// Vulkan can read them.
-    Ready(Ready),
-    /// A kernel has to write them.
-    Kernel(InstancePlan),
+/// Instances that a kernel writes.
+pub(super) struct Written {
+    address: u64,
+    built_count: u32,
+    shown: Arc<ShownSet>,
+    /// Kept where they may have to be written again.
+    source: Option<Arc<InstanceSource>>,
 }
 
-impl Planned {
-    /// Instances Vulkan will be given.
-    pub(super) fn built_count(&self) -> u32 {
-        match self {
-            Self::Ready(ready) => ready.built_count,
-            Self::Kernel(plan) => plan.built_count,
-        }
+impl Written {
+    /// What Vulkan is given.
+    pub(super) fn instances(&self) -> GivenInstances {
+        GivenInstances { address: self.address, count: self.built_count, is_from_kernel: true }
+    }
+
+    /// What a structure shows with them.
+    pub(super) fn change(self, count: u32, refit: bool) -> Change {
+        let Self { built_count, shown, source, .. } = self;
+        Change { count, built_count, shown: Some(shown), source, refit }
     }
 }
 
 impl CommandBuffer {
-    /// The instances, ready to be built. `known` is what was shown before, if that still stands.
-    #[inline]
-    pub(super) fn host_instances(
-        &mut self,
-        name: &str,
-        instances: &[TlasInstance],
-        known: Arc<ShownSet>,
-    ) -> Result<Planned> {
-        if known.list().is_empty() {
-            let find = |handle| self.shared.store.accel_structs.get(handle);
-            if !starts_plain(instances, &find)? {
-                return Ok(Planned::Kernel(self.plan_instances(name, instances, known)?));
-            }
-        }
-        if known.needs_kernel {
-            return Ok(Planned::Kernel(self.plan_instances(name, instances, known)?));
-        }
-        self.stage_instances(name, instances, known)
-    }
-
-    /// Instances with addresses, unless it turns out that a kernel is needed.
+    /// Writes instances with addresses; `None` where a kernel is needed. `known` is what was shown before, if that still stands.
     #[inline(always)]
-    fn stage_instances(
+    pub(super) fn stage_instances(
         &mut self,
         name: &str,
         instances: &[TlasInstance],
-        known: Arc<ShownSet>,
-    ) -> Result<Planned> {
-        let built_count = instances.len() as u32;
-        let bytes = instance_bytes(built_count.max(1));
+        known: &ShownSet,
+        marks: &mut Marks,
+    ) -> Result<Option<Staged>> {
         let (shared, sequence) = (&self.shared, self.recording.staging_key());
         let find = |handle| shared.store.accel_structs.get(handle);
-        let marks = &mut self.notes.tlas_updates.marks;
+        if known.needs_kernel || (known.list().is_empty() && !starts_plain(instances, &find)?) {
+            return Ok(None);
+        }
+        let bytes = instance_bytes(instances.len().max(1) as u32);
         let (address, written) =
             shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, |out| {
-                write_addresses(name, instances, &known, marks, &find, out)
+                write_addresses(name, instances, known, marks, &find, out)
             })?;
-        let shown = match written? {
-            Written::Same => known,
-            Written::Other(shown) => shown,
-            Written::Nothing => return Ok(Planned::Kernel(self.plan_instances(name, instances, known)?)),
-        };
-        Ok(Planned::Ready(Ready { address, built_count, shown, source: None, is_from_kernel: false }))
+        Ok(match written? {
+            Addresses::OfKnown => Some(Staged { address, shown: None }),
+            Addresses::OfOthers(shown) => Some(Staged { address, shown: Some(shown) }),
+            Addresses::Insufficient => None,
+        })
     }
 
     /// What the instances refer to.
     pub(super) fn plan_instances(
-        &mut self,
+        &self,
         name: &str,
         instances: &[TlasInstance],
-        known: Arc<ShownSet>,
+        known: &Arc<ShownSet>,
+        memory: &mut PlanMemory,
     ) -> Result<InstancePlan> {
-        let shared = &self.shared;
-        let find = |handle| shared.store.accel_structs.get(handle);
-        let updates = &mut self.notes.tlas_updates;
-        let refers = std::mem::take(&mut updates.refers);
-        InstancePlan::new(name, instances, known, &mut updates.marks, refers, &find)
+        let find = |handle| self.shared.store.accel_structs.get(handle);
+        InstancePlan::new(name, instances, known, memory, &find)
     }
 
     /// Instances for the kernel, and the owners of those for further parts.
@@ -120,6 +109,7 @@ impl CommandBuffer {
         name: &str,
         instances: &[TlasInstance],
         plan: InstancePlan,
+        memory: &mut PlanMemory,
     ) -> Result<(InstanceSource, Arc<ShownSet>)> {
         let keep = plan.shown.may_move;
         let mut written = Ok(());
@@ -143,7 +133,7 @@ impl CommandBuffer {
             numbers: Numbers::Parts,
         };
         let shown = Arc::clone(&plan.shown);
-        self.notes.tlas_updates.refers = plan.into_refers();
+        memory.refers = plan.into_refers();
         Ok((source, shown))
     }
 
@@ -170,7 +160,7 @@ impl CommandBuffer {
         &self,
         name: &str,
         instances: &DeviceInstances<'_>,
-        known: Arc<ShownSet>,
+        known: &Arc<ShownSet>,
     ) -> Result<(Arc<ShownSet>, InstanceSource)> {
         let store = &self.shared.store;
         let buffer = store.buffers.get(instances.buffer)?;
@@ -182,7 +172,7 @@ impl CommandBuffer {
         let bytes = instance_bytes(instances.count);
         buffer.check_range(instances.offset, bytes)?;
         let shown = if known.is_listed_as(instances.blas) {
-            known
+            Arc::clone(known)
         } else {
             let find = |handle: &_| Shown::new(*handle, store.accel_structs.get(*handle)?);
             Arc::new(ShownSet::new(instances.blas.iter().map(find).collect::<Result<_>>()?))
@@ -233,7 +223,7 @@ impl CommandBuffer {
         shown: Arc<ShownSet>,
         source: InstanceSource,
         built_count: u32,
-    ) -> Result<Ready> {
+    ) -> Result<Written> {
         let records = self.kept_buffer(&tlas.records, target, u64::from(tlas.room) * instance_bytes(1))?;
         let rows = match shown.has_rows || tlas.rows.get().is_some() {
             true => Some(self.kept_buffer(&tlas.rows, target, u64::from(tlas.room) * ROW_BYTES)?),
@@ -243,7 +233,7 @@ impl CommandBuffer {
         let keep_active = source.copies > 1 && target.flags.contains(BuildFlags::ALLOW_UPDATE);
         self.record_instances(&source, &shown, &records, rows.as_deref(), keep_active)?;
         let source = shown.may_move.then(|| Arc::new(source));
-        Ok(Ready { address: records.address, built_count, shown, source, is_from_kernel: true })
+        Ok(Written { address: records.address, built_count, shown, source })
     }
 
     fn record_instances(

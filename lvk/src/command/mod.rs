@@ -10,7 +10,6 @@ pub(crate) mod draw_count;
 mod draw_mesh;
 mod dynamic;
 pub(crate) mod flush;
-mod found;
 pub(crate) mod gpu_build;
 mod instances;
 mod kernel;

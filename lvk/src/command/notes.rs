@@ -7,13 +7,14 @@ use ash::vk;
 
 use super::accel::OpenBuild;
 use super::bind::PushConstants;
-use super::found::Found;
 use super::query_log::QueryLog;
 use super::transfer::Settle;
 use super::uses::Uses;
+use crate::accel::build_run::BuildRun;
 use crate::accel::compaction::SizeQuery;
 use crate::accel::tlas_updates::TlasUpdates;
 use crate::barrier::{Barriers, ResourceId};
+use crate::found::Found;
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::{Buffer, Texture};
 use crate::shared::Shared;
@@ -31,7 +32,10 @@ pub(crate) struct Notes {
     pub(super) push_constants: PushConstants,
     pub(super) host_reads: Vec<ResourceId>,
     pub(super) settle: Vec<Settle>,
-    pub(super) tlas_updates: TlasUpdates,
+    /// Present once a top-level structure was updated.
+    pub(super) tlas_updates: Option<Box<TlasUpdates>>,
+    /// Builds of top-level structures that run side by side.
+    pub(super) build_run: BuildRun,
     pub(super) open_builds: Vec<OpenBuild>,
     /// Refits since the last rebuild of each bottom-level structure that is built here, by its id.
     pub(super) refits: HashMap<u64, u32>,
@@ -44,7 +48,9 @@ pub(crate) struct Notes {
 impl Notes {
     /// The command buffer went to the GPU with this timeline value: what it noted becomes true.
     pub(crate) fn submitted(&mut self, shared: &Shared, value: u64) {
-        self.tlas_updates.drain().for_each(|update| shared.show(update).submitted(value));
+        if let Some(updates) = &mut self.tlas_updates {
+            shared.show(updates, |target| target.submitted(value));
+        }
         self.open_builds.drain(..).for_each(|build| build.submit(value));
         self.size_queries.drain(..).for_each(|query| query.submit());
         self.queries.submit();
@@ -64,6 +70,7 @@ impl Notes {
             host_reads,
             settle,
             tlas_updates,
+            build_run,
             open_builds,
             refits,
             size_queries,
@@ -78,7 +85,8 @@ impl Notes {
         push_constants.clear();
         host_reads.clear();
         settle.clear();
-        drop(tlas_updates.drain());
+        tlas_updates.iter_mut().for_each(|updates| updates.clear());
+        build_run.stop();
         open_builds.clear();
         refits.clear();
         size_queries.clear();
@@ -104,7 +112,8 @@ impl SpareNotes {
     pub(crate) fn give(&self, mut notes: Box<Notes>) {
         notes.clear();
         let mut spare = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if spare.len() < Self::MOST && notes.tlas_updates.is_worth_keeping() {
+        let is_small = notes.tlas_updates.as_ref().is_none_or(|updates| updates.is_worth_keeping());
+        if spare.len() < Self::MOST && is_small {
             spare.push(notes);
         }
     }

@@ -6,16 +6,17 @@ use ash::vk;
 
 use super::CommandBuffer;
 use super::accel::OpenBuild;
-use super::instances::{Planned, Ready};
+use super::instances::{GivenInstances, Staged};
 use super::notes::Notes;
 use crate::accel::AccelStruct;
 use crate::accel::build::TlasBuild;
 use crate::accel::flags::BuildMode;
 use crate::accel::instance::{DeviceInstances, TlasInstance};
+use crate::accel::instance_plan::PlanMemory;
 use crate::accel::scratch::aligned_scratch_address;
 use crate::accel::shown::{Revision, ShownSet};
-use crate::accel::tlas::{InstanceSource, Tlas, TlasContents};
-use crate::accel::tlas_updates::TlasUpdate;
+use crate::accel::tlas::{InstanceSource, Tlas};
+use crate::accel::tlas_updates::{Change, Row, TlasUpdate, TlasUpdates};
 use crate::barrier::{ResourceId, Stages, Use};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::error::{Error, Result, check_limit};
@@ -24,24 +25,27 @@ use crate::resource::Buffer;
 use crate::submit::ownership::Access;
 
 /// What is known of a structure before the next command.
-#[derive(Clone, Copy)]
-struct Before {
+struct Before<'a> {
     /// Instances of the caller and of Vulkan, `None` before the first build.
     counts: Option<(u32, u32)>,
     refits: u32,
-    /// Whether this command buffer has updated it.
-    is_own: bool,
-    /// When what is shown was looked at.
+    /// Whether this command buffer has not updated it.
+    is_first: bool,
+    /// What it shows, or nothing where some of that is gone or has moved.
+    shown: &'a Arc<ShownSet>,
+    /// Whether it shows that.
+    stands: bool,
+    /// When that was looked at.
     revision: Revision,
 }
 
-/// What is recorded of a structure.
-struct After {
-    count: u32,
-    built_count: u32,
-    shown: Arc<ShownSet>,
-    source: Option<Arc<InstanceSource>>,
-    refit: bool,
+/// Instances on their way into the build of one structure.
+#[derive(Clone, Copy)]
+struct Update<'a> {
+    target: &'a AccelStruct,
+    tlas: &'a Tlas,
+    before: &'a Before<'a>,
+    mode: BuildMode,
 }
 
 impl CommandBuffer {
@@ -59,8 +63,10 @@ impl CommandBuffer {
         mode: BuildMode,
     ) -> Result<()> {
         self.needs_compute("an update of a top-level structure")?;
-        let target = self.shared.store.accel_structs.get(tlas)?;
-        self.update_tlas_object(target, instances, mode)
+        self.with_updates(|cmd, updates| {
+            let row = updates.find(&cmd.shared.store.accel_structs, tlas)?;
+            cmd.update_row(updates, row, instances, mode)
+        })
     }
 
     /// As [`update_tlas`](Self::update_tlas), with instances that lie in a buffer: written by a compute shader, say,
@@ -80,87 +86,23 @@ impl CommandBuffer {
         mode: BuildMode,
     ) -> Result<()> {
         self.needs_compute("an update of a top-level structure")?;
-        let target = self.shared.store.accel_structs.get(tlas)?;
-        let object = target.tlas()?;
-        check_limit(&target.name, "instance count", instances.count.into(), object.capacity.into())?;
-        let (before, known) = self.before(&target, object);
-        let (shown, mut source) = self.device_source(&target.name, instances, known)?;
-        let count = instances.count;
-        if object.structure.is_none() {
-            let refit = self.check_update(&target, object, count, count, mode, before)?;
-            if let Some(software) = &object.software {
-                self.build_software_tlas_from(&target, software, instances, &shown)?;
-            }
-            let after = After { count, built_count: count, shown, source: None, refit };
-            return self.note_contents(Arc::clone(&target), before, after);
-        }
-        let built_count = source.built_count(&target.name)?;
-        let refit = self.check_update(&target, object, count, built_count, mode, before)?;
-        self.keep_source(&target.name, instances, &shown, &mut source)?;
-        let ready = self.run_instances(&target, object, shown, source, built_count)?;
-        let shown = object.software.as_ref().map(|software| (software, Arc::clone(&ready.shown)));
-        self.record_tlas(Arc::clone(&target), before, ready, count, refit)?;
-        match shown {
-            Some((software, shown)) => self.build_software_tlas_from(&target, software, instances, &shown),
-            None => Ok(()),
-        }
+        self.with_updates(|cmd, updates| {
+            let row = updates.find(&cmd.shared.store.accel_structs, tlas)?;
+            cmd.update_row_from(updates, row, instances, mode)
+        })
     }
 
     /// As [`update_tlas`](Self::update_tlas), by object.
     pub(crate) fn update_tlas_object(
         &mut self,
-        target: Arc<AccelStruct>,
-        instances: &[TlasInstance],
-        mode: BuildMode,
-    ) -> Result<()> {
-        let tlas = target.tlas()?;
-        let count = instances.len() as u64;
-        check_limit(&target.name, "instance count", count, tlas.capacity.into())?;
-        let count = count as u32;
-        let (before, known) = self.before(&target, tlas);
-        if tlas.structure.is_none() {
-            return self.update_software_tlas(&target, instances, mode, before, known);
-        }
-        let planned = self.host_instances(&target.name, instances, known)?;
-        let refit = self.check_update(&target, tlas, count, planned.built_count(), mode, before)?;
-        let ready = match planned {
-            Planned::Ready(ready) => ready,
-            Planned::Kernel(plan) => {
-                let (source, shown) = self.host_source(&target.name, instances, plan)?;
-                let built_count = source.built_count(&target.name)?;
-                self.run_instances(&target, tlas, shown, source, built_count)?
-            }
-        };
-        if tlas.software.is_none() {
-            return self.record_tlas(target, before, ready, count, refit);
-        }
-        self.record_tlas(Arc::clone(&target), before, ready, count, refit)?;
-        match &target.tlas()?.software {
-            Some(software) => self.build_software_tlas(&target, software, instances),
-            None => Ok(()),
-        }
-    }
-
-    /// As [`update_tlas`](Self::update_tlas), where the device has no structures of its own.
-    fn update_software_tlas(
-        &mut self,
         target: &Arc<AccelStruct>,
         instances: &[TlasInstance],
         mode: BuildMode,
-        before: Before,
-        known: Arc<ShownSet>,
     ) -> Result<()> {
-        let tlas = target.tlas()?;
-        let plan = self.plan_instances(&target.name, instances, known)?;
-        let shown = Arc::clone(&plan.shown);
-        self.notes.tlas_updates.refers = plan.into_refers();
-        let count = instances.len() as u32;
-        let refit = self.check_update(target, tlas, count, count, mode, before)?;
-        if let Some(software) = &tlas.software {
-            self.build_software_tlas(target, software, instances)?;
-        }
-        let after = After { count, built_count: count, shown, source: None, refit };
-        self.note_contents(Arc::clone(target), before, after)
+        self.with_updates(|cmd, updates| {
+            let row = updates.row(target);
+            cmd.update_row(updates, row, instances, mode)
+        })
     }
 
     /// Writes the instances of a structure again, as what it shows has moved, and builds it.
@@ -168,94 +110,190 @@ impl CommandBuffer {
         let tlas = target.tlas()?;
         let contents = tlas.contents().clone();
         let (Some(source), Some(count)) = (contents.source, contents.instance_count) else { return Ok(()) };
-        let (before, _) = self.before(target, tlas);
         let shown = Arc::new(contents.shown.renewed()?);
         let source = InstanceSource::clone(&source);
-        let ready = self.run_instances(target, tlas, shown, source, contents.built_count)?;
-        self.record_tlas(Arc::clone(target), before, ready, count, false)
+        self.with_updates(|cmd, updates| {
+            let row = updates.row(target);
+            let Row { target, update, nothing, .. } = updates.at(row);
+            let before = cmd.before(tlas, update, nothing);
+            let given = cmd.run_instances(target, tlas, shown, source, contents.built_count)?;
+            cmd.build_tlas(target, tlas, given.instances(), before.is_first, false)?;
+            let change = cmd.tell(tlas, &before, given.change(count, false));
+            let revision = before.revision;
+            updates.record(row, change, revision);
+            Ok(())
+        })
+    }
+
+    /// Has `record` keep what it updates.
+    #[inline(always)]
+    fn with_updates(&mut self, record: impl FnOnce(&mut Self, &mut TlasUpdates) -> Result<()>) -> Result<()> {
+        let mut updates = self.notes.tlas_updates.take().unwrap_or_default();
+        let recorded = record(self, &mut updates);
+        self.notes.tlas_updates = Some(updates);
+        recorded
+    }
+
+    /// Shows instances of the host in the structure of a row.
+    fn update_row(
+        &mut self,
+        updates: &mut TlasUpdates,
+        row: usize,
+        instances: &[TlasInstance],
+        mode: BuildMode,
+    ) -> Result<()> {
+        let Row { target, update, nothing, memory } = updates.at(row);
+        let tlas = target.tlas()?;
+        if instances.len() > tlas.capacity as usize {
+            return check_capacity(target, tlas, instances.len() as u64);
+        }
+        let before = self.before(tlas, update, nothing);
+        let update = Update { target, tlas, before: &before, mode };
+        let name = &target.name;
+        let staged = match tlas.structure {
+            Some(_) => self.stage_instances(name, instances, before.shown, &mut memory.marks)?,
+            None => None,
+        };
+        let change = match staged {
+            Some(staged) => self.build_staged(update, instances.len() as u32, staged)?,
+            None => self.update_by_plan(update, instances, memory)?,
+        };
+        if let Some(software) = &tlas.software {
+            self.build_software_tlas(target, software, instances)?;
+        }
+        let change = self.tell(tlas, &before, change);
+        let revision = before.revision;
+        updates.record(row, change, revision);
+        Ok(())
+    }
+
+    /// Builds from instances that Vulkan can read.
+    #[inline(always)]
+    fn build_staged(&mut self, update: Update<'_>, count: u32, staged: Staged) -> Result<Change> {
+        let refit = update.check(count, count)?;
+        let Staged { address, shown } = staged;
+        let instances = GivenInstances { address, count, is_from_kernel: false };
+        self.build_tlas(update.target, update.tlas, instances, update.before.is_first, refit)?;
+        Ok(Change { count, built_count: count, shown, source: None, refit })
+    }
+
+    /// Builds from instances that a kernel writes; where the device has no structures of its own, only checks.
+    #[inline(never)]
+    fn update_by_plan(
+        &mut self,
+        update: Update<'_>,
+        instances: &[TlasInstance],
+        memory: &mut PlanMemory,
+    ) -> Result<Change> {
+        let Update { target, tlas, before, .. } = update;
+        let count = instances.len() as u32;
+        let plan = self.plan_instances(&target.name, instances, before.shown, memory)?;
+        if tlas.structure.is_none() {
+            let shown = Some(Arc::clone(&plan.shown));
+            memory.refers = plan.into_refers();
+            let refit = update.check(count, count)?;
+            return Ok(Change { count, built_count: count, shown, source: None, refit });
+        }
+        let refit = update.check(count, plan.built_count)?;
+        let (source, shown) = self.host_source(&target.name, instances, plan, memory)?;
+        let built_count = source.built_count(&target.name)?;
+        let given = self.run_instances(target, tlas, shown, source, built_count)?;
+        self.build_tlas(target, tlas, given.instances(), before.is_first, refit)?;
+        Ok(given.change(count, refit))
+    }
+
+    /// Shows instances that lie in a buffer in the structure of a row.
+    fn update_row_from(
+        &mut self,
+        updates: &mut TlasUpdates,
+        row: usize,
+        instances: &DeviceInstances<'_>,
+        mode: BuildMode,
+    ) -> Result<()> {
+        let Row { target, update, nothing, .. } = updates.at(row);
+        let tlas = target.tlas()?;
+        let count = instances.count;
+        check_capacity(target, tlas, count.into())?;
+        let before = self.before(tlas, update, nothing);
+        let update = Update { target, tlas, before: &before, mode };
+        let (shown, source) = self.device_source(&target.name, instances, before.shown)?;
+        let change = match tlas.structure {
+            Some(_) => self.build_from(update, instances, Arc::clone(&shown), source)?,
+            None => {
+                let refit = update.check(count, count)?;
+                Change { count, built_count: count, shown: Some(Arc::clone(&shown)), source: None, refit }
+            }
+        };
+        if let Some(software) = &tlas.software {
+            self.build_software_tlas_from(target, software, instances, &shown)?;
+        }
+        let change = self.tell(tlas, &before, change);
+        let revision = before.revision;
+        updates.record(row, change, revision);
+        Ok(())
+    }
+
+    /// Builds what the device traces from instances that lie in a buffer.
+    fn build_from(
+        &mut self,
+        update: Update<'_>,
+        instances: &DeviceInstances<'_>,
+        shown: Arc<ShownSet>,
+        mut source: InstanceSource,
+    ) -> Result<Change> {
+        let Update { target, tlas, before, .. } = update;
+        let built_count = source.built_count(&target.name)?;
+        let refit = update.check(instances.count, built_count)?;
+        self.keep_source(&target.name, instances, &shown, &mut source)?;
+        let given = self.run_instances(target, tlas, shown, source, built_count)?;
+        self.build_tlas(target, tlas, given.instances(), before.is_first, refit)?;
+        Ok(given.change(instances.count, refit))
     }
 
     /// Takes the updates so far for submitted: for the command buffer that goes before every other one.
     pub(crate) fn apply_tlas_updates(&mut self) {
-        let Notes { tlas_updates, open_builds, .. } = &mut **self.notes;
-        let shown = tlas_updates.drain().map(|update| self.shared.show(update));
-        open_builds.extend(shown.map(OpenBuild::of_tlas));
+        let Notes { tlas_updates, build_run, open_builds, .. } = &mut **self.notes;
+        build_run.stop();
+        if let Some(updates) = tlas_updates {
+            self.shared.show(updates, |target| open_builds.push(OpenBuild::of_tlas(Arc::clone(target))));
+        }
     }
 
     /// Fails if what was recorded no longer fits what was submitted since.
     pub(crate) fn check_tlas_updates(&self) -> Result<()> {
-        self.notes.tlas_updates.check()
+        self.notes.tlas_updates.as_ref().map_or(Ok(()), |updates| updates.check())
     }
 
-    /// Checks the counts; answers whether the update is a refit.
+    /// What is known of a structure before the next command.
     #[inline(always)]
-    fn check_update(
-        &self,
+    fn before<'a>(&self, tlas: &Tlas, update: &'a mut TlasUpdate, nothing: &'a Arc<ShownSet>) -> Before<'a> {
+        let revision = self.shared.accel_revision();
+        let is_first = !update.is_recorded();
+        let contents = update.look(tlas);
+        let find = |handle| self.shared.store.accel_structs.get(handle);
+        let stands = contents.revision == revision || contents.shown.stands(&find);
+        let shown = if stands { &contents.shown } else { nothing };
+        Before { counts: contents.counts(), refits: contents.refits, is_first, shown, stands, revision }
+    }
+
+    /// Records the build of what the device traces.
+    #[inline(always)]
+    fn build_tlas(
+        &mut self,
         target: &AccelStruct,
         tlas: &Tlas,
-        count: u32,
-        built: u32,
-        mode: BuildMode,
-        before: Before,
-    ) -> Result<bool> {
-        if built > tlas.room {
-            let message = format!(
-                "its {count} instances of split meshes stand for {built}, but there is room for {}; create it with a \
-                 larger capacity or more TlasDesc::parts_per_instance",
-                tlas.room
-            );
-            return Err(Error::usage(&target.name, message));
-        }
-        let same = before.counts == Some((count, built));
-        let refit = mode.refits(same && target.allows_refit(), before.refits);
-        if refit {
-            target.check_refit()?;
-        }
-        if refit && !same {
-            let message = format!("a refit keeps the number of instances; {count} are new, so rebuild");
-            return Err(Error::usage(&target.name, message));
-        }
-        Ok(refit)
-    }
-
-    /// What is known of the structure before the next command; and what it shows, or nothing where some of that is gone or
-    /// has moved.
-    #[inline(always)]
-    fn before(&mut self, target: &AccelStruct, tlas: &Tlas) -> (Before, Arc<ShownSet>) {
-        let revision = self.shared.accel_revision();
-        let of = |contents: &TlasContents, is_own| {
-            let before = Before { counts: contents.counts(), refits: contents.refits, is_own, revision };
-            (before, Arc::clone(&contents.shown), contents.revision == revision)
-        };
-        let (before, shown, stands) = match self.notes.tlas_updates.last_of(target) {
-            Some(update) => of(&update.contents, true),
-            None => of(&tlas.contents(), false),
-        };
-        if stands || shown.stands(&|handle| self.shared.store.accel_structs.get(handle)) {
-            return (before, shown);
-        }
-        (before, Arc::default())
-    }
-
-    /// Records the build, and remembers what it shows.
-    #[inline(always)]
-    fn record_tlas(
-        &mut self,
-        target: Arc<AccelStruct>,
-        before: Before,
-        ready: Ready,
-        count: u32,
+        instances: GivenInstances,
+        is_first: bool,
         refit: bool,
     ) -> Result<()> {
-        let tlas = target.tlas()?;
         let sizes = &target.sizes;
         let scratch_bytes = if refit { sizes.update_scratch_bytes } else { sizes.build_scratch_bytes };
-        let records = tlas.records.get().filter(|_| ready.is_from_kernel);
+        let records = if instances.is_from_kernel { tlas.records.get() } else { None };
         let scratch = self.join_builds(target.id, scratch_bytes, records.map(|records| &**records))?;
         let build = TlasBuild {
             flags: target.flags,
-            instances: ready.address,
-            count: ready.built_count,
+            instances: instances.address,
+            count: instances.count,
             refit,
             target: tlas.structure.as_ref().map_or(vk::AccelerationStructureKHR::null(), |of| of.raw),
             scratch,
@@ -263,9 +301,10 @@ impl CommandBuffer {
         // SAFETY: instances, structure and scratch memory are alive, checked, aligned and large enough; barriers keep them
         // apart from other commands.
         unsafe { build.record(self.shared.gpu.accel()?, self.raw()) };
-        self.refer(target.id, Access::Write);
-        let Ready { built_count, shown, source, .. } = ready;
-        self.note_contents(target, before, After { count, built_count, shown, source, refit })
+        if is_first {
+            self.refer(target.id, Access::Write);
+        }
+        Ok(())
     }
 
     /// Scratch memory for a build of a top-level structure, behind the barriers it needs. There are none where the commands
@@ -274,7 +313,7 @@ impl CommandBuffer {
     fn join_builds(&mut self, target: ResourceId, bytes: u64, records: Option<&Buffer>) -> Result<u64> {
         let alignment = self.shared.gpu.caps.limits.scratch_alignment.into();
         if records.is_none()
-            && let Some(scratch) = self.notes.tlas_updates.run.join(target, bytes, alignment)
+            && let Some(scratch) = self.notes.build_run.join(target, bytes, alignment)
         {
             return Ok(scratch);
         }
@@ -303,32 +342,28 @@ impl CommandBuffer {
         self.flush();
         let (start, end) =
             (aligned_scratch_address(buffer.address, alignment), buffer.address + buffer.size_bytes);
-        self.notes.tlas_updates.run.begin(target, start..end, bytes, alignment);
+        self.notes.build_run.begin(target, start..end, bytes, alignment);
         Ok(start)
     }
 
-    /// Tells shaders what is known of the structure, and remembers what it shows.
+    /// Tells queues and shaders what the structure shows from now on.
     #[inline(always)]
-    fn note_contents(&mut self, target: Arc<AccelStruct>, before: Before, after: After) -> Result<()> {
-        let After { count, built_count, shown, source, refit } = after;
-        if self.shared.gpu.queues.several_lanes() {
+    fn tell(&mut self, tlas: &Tlas, before: &Before<'_>, mut change: Change) -> Change {
+        if change.shown.is_none() && !before.stands {
+            change.shown = Some(Arc::clone(before.shown));
+        }
+        let shown = change.shown.as_ref().unwrap_or(before.shown);
+        if (before.is_first || change.shown.is_some()) && self.shared.gpu.queues.several_lanes() {
             // New ones may come from another queue.
             shown.list().iter().for_each(|shown| self.refer(shown.blas.id, Access::Read));
         }
-        let tlas = target.tlas()?;
         // At first the entry is that of the slot's last owner.
         if before.counts.is_none() || tlas.rows.get().is_some() {
             let rows = tlas.rows.get().filter(|_| shown.has_rows).map_or(0, |rows| rows.address);
             let software = tlas.software.as_ref().map_or(0, |software| software.body.address);
             self.write_tlas_table(tlas.slot, [rows, software]);
         }
-        let refits = if refit { before.refits.saturating_add(1) } else { 0 };
-        let refits_submitted = refit && !before.is_own;
-        let revision = before.revision;
-        let contents =
-            TlasContents { instance_count: Some(count), built_count, refits, shown, revision, source };
-        self.notes.tlas_updates.push(TlasUpdate { target, contents, refits_submitted });
-        Ok(())
+        change
     }
 
     /// Tells shaders where the rows of a structure lie, and what software traces; 0 where there is nothing.
@@ -358,4 +393,40 @@ impl CommandBuffer {
         // SAFETY: the whole buffer is filled.
         unsafe { shared.gpu.device.cmd_fill_buffer(self.raw(), table.raw, 0, vk::WHOLE_SIZE, 0) };
     }
+}
+
+impl Update<'_> {
+    /// Checks the counts; answers whether it is a refit.
+    #[inline(always)]
+    fn check(&self, count: u32, built: u32) -> Result<bool> {
+        let Self { target, tlas, before, mode } = self;
+        if built > tlas.room {
+            return Err(no_room(target, tlas, count, built));
+        }
+        let same = before.counts == Some((count, built));
+        let refit = mode.refits(same && target.allows_refit(), before.refits);
+        if refit {
+            target.check_refit()?;
+        }
+        if refit && !same {
+            let message = format!("a refit keeps the number of instances; {count} are new, so rebuild");
+            return Err(Error::usage(&target.name, message));
+        }
+        Ok(refit)
+    }
+}
+
+/// Fails where there are more instances of the caller than the structure was made for.
+fn check_capacity(target: &AccelStruct, tlas: &Tlas, count: u64) -> Result<()> {
+    check_limit(&target.name, "instance count", count, tlas.capacity.into())
+}
+
+#[cold]
+fn no_room(target: &AccelStruct, tlas: &Tlas, count: u32, built: u32) -> Error {
+    let message = format!(
+        "its {count} instances of split meshes stand for {built}, but there is room for {}; create it with a larger \
+         capacity or more TlasDesc::parts_per_instance",
+        tlas.room
+    );
+    Error::usage(&target.name, message)
 }

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use super::found::Found;
 use super::part_uses::{PartUse, PartUses};
 use crate::barrier::{Barriers, IdMap, ResourceId, Subresources, Tracker, Use};
 use crate::error::{Error, Result};
+use crate::found::Found;
 use crate::handle::TextureHandle;
 use crate::resource::{Buffer, Texture};
 use crate::submit::emit::Images;

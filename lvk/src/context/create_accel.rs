@@ -12,9 +12,8 @@ use crate::accel::blas::{Blas, BlasBody, PartShape};
 use crate::accel::build::{BuildInput, transforms};
 use crate::accel::desc::{BlasDesc, TlasDesc};
 use crate::accel::flags::{AccelStructSizes, BuildMode};
-use crate::accel::instance_plan::InstancePlan;
+use crate::accel::instance_plan::{InstancePlan, PlanMemory};
 use crate::accel::raw_structure::RawStructure;
-use crate::accel::shown::Marks;
 use crate::accel::software::blas::SoftwareBlas;
 use crate::accel::software::body::SoftwareBody;
 use crate::accel::software::plan::GpuBuildPlan;
@@ -241,8 +240,8 @@ fn tlas_within(shared: &Shared, desc: &TlasDesc<'_>, slot: u32, limits: &PartLim
 /// Instances Vulkan will be given.
 fn built_count(shared: &Shared, desc: &TlasDesc<'_>) -> Result<u32> {
     let find = |handle| shared.store.accel_structs.get(handle);
-    let (known, mut marks) = (Arc::default(), Marks::default());
-    let plan = InstancePlan::new(desc.debug_name, desc.instances, known, &mut marks, Vec::new(), &find)?;
+    let (known, mut memory) = (Arc::default(), PlanMemory::default());
+    let plan = InstancePlan::new(desc.debug_name, desc.instances, &known, &mut memory, &find)?;
     Ok(plan.built_count)
 }
 

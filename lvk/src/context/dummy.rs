@@ -78,6 +78,6 @@ fn yuv_dummies(ctx: &Context) -> Result<Vec<Arc<Texture>>> {
 fn empty_tlas(ctx: &Context) -> Result<Arc<AccelStruct>> {
     let desc = TlasDesc { debug_name: "dummy tlas", ..Default::default() };
     let tlas = Arc::new(new_tlas(ctx.shared(), &desc, SLOT)?);
-    ctx.before_next_submission(|cmd| cmd.update_tlas_object(Arc::clone(&tlas), &[], BuildMode::Rebuild))?;
+    ctx.before_next_submission(|cmd| cmd.update_tlas_object(&tlas, &[], BuildMode::Rebuild))?;
     Ok(tlas)
 }

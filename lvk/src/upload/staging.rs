@@ -55,25 +55,71 @@ pub(crate) struct Staging {
 }
 
 struct State {
+    /// As near to the GPU as the host can write.
+    pages: PageSet,
+    /// Chunks are cut from these. Small writes beyond the host's caches cost far more than their bytes: the next lock that is
+    /// taken waits until they have gone across the bus.
+    cached: PageSet,
+}
+
+/// Pages of one kind of memory.
+struct PageSet {
     pages: Pages,
     /// By their numbers; `None` for those that are gone, or not made yet.
     buffers: Vec<Option<Arc<Buffer>>>,
+    memory: MemoryKind,
+}
+
+impl PageSet {
+    fn new(page_bytes: u64, kept_bytes: u64, memory: MemoryKind) -> Self {
+        Self { pages: Pages::new(page_bytes, kept_bytes), buffers: Vec::new(), memory }
+    }
+
+    /// A place, with the page it lies in.
+    fn place(
+        &mut self,
+        gpu: &Arc<Gpu>,
+        bytes: u64,
+        align: u64,
+        sequence: Option<u64>,
+    ) -> Result<(Place, Arc<Buffer>)> {
+        let Self { pages, buffers, memory } = self;
+        let place = match pages.take(bytes, align) {
+            Found::Here(place) => place,
+            Found::New(place, size) => {
+                let made = new_page(gpu, size, *memory).inspect_err(|_| pages.forget(place.page))?;
+                buffers.resize_with(buffers.len().max(place.page + 1), || None);
+                buffers[place.page] = Some(Arc::new(made));
+                place
+            }
+        };
+        if let Some(sequence) = sequence {
+            pages.hold(place.page, 1, sequence);
+        }
+        let buffer = buffers.get(place.page).cloned().flatten();
+        Ok((place, buffer.ok_or_else(|| Error::usage("staging", "the page is gone"))?))
+    }
+
+    /// The command buffer is done with its regions. Answers pages that nobody wants any more.
+    fn release(&mut self, sequence: u64) -> Vec<Option<Arc<Buffer>>> {
+        let unwanted = self.pages.release(sequence);
+        unwanted.into_iter().map(|page| self.buffers[page].take()).collect()
+    }
 }
 
 impl Staging {
     /// Larger pieces get a page of their own.
     const PAGE_BYTES: u64 = 4 << 20;
     const LEAST_PAGE_BYTES: u64 = 64 << 10;
+    /// Of cached memory.
+    const KEPT_CACHED_BYTES: u64 = 1 << 20;
 
     /// Keeps pages of `bytes` altogether.
     pub(crate) fn new(gpu: &Arc<Gpu>, bytes: u64) -> Self {
         let kept_bytes = bytes.max(Self::LEAST_PAGE_BYTES);
-        let pages = Pages::new(kept_bytes.min(Self::PAGE_BYTES), kept_bytes);
-        Self {
-            state: Mutex::new(Rank::Staging, State { pages, buffers: Vec::new() }),
-            kept_bytes,
-            gpu: Arc::clone(gpu),
-        }
+        let pages = PageSet::new(kept_bytes.min(Self::PAGE_BYTES), kept_bytes, MemoryKind::HostVisible);
+        let cached = PageSet::new(Self::LEAST_PAGE_BYTES, Self::KEPT_CACHED_BYTES, MemoryKind::Readback);
+        Self { state: Mutex::new(Rank::Staging, State { pages, cached }), kept_bytes, gpu: Arc::clone(gpu) }
     }
 
     /// Half of what is kept: so much may wait while as much is copied.
@@ -128,7 +174,8 @@ impl Staging {
     /// Takes a new chunk in place of a full one, and cuts the region from it.
     #[inline(never)]
     fn renew(&self, chunk: &mut StagingChunk, sequence: u64, (bytes, align): (u64, u64)) -> Result<u64> {
-        let (place, buffer) = self.place(StagingChunk::BYTES, Buffer::ALIGNMENT, Some(sequence))?;
+        let (place, buffer) =
+            self.lock().cached.place(&self.gpu, StagingChunk::BYTES, Buffer::ALIGNMENT, Some(sequence))?;
         let (next, end) = (place.offset, place.offset + StagingChunk::BYTES);
         *chunk = StagingChunk { page: Some(buffer), next, end };
         chunk.cut(bytes, align).ok_or_else(no_room)
@@ -143,14 +190,13 @@ impl Staging {
 
     /// `count` regions of a page that were [kept](Self::keep) are read by the command buffer `sequence`.
     pub(crate) fn hold(&self, page: usize, count: u32, sequence: u64) {
-        self.lock().pages.hold(page, count, sequence);
+        self.lock().pages.pages.hold(page, count, sequence);
     }
 
     /// The command buffer is done with its regions.
     pub(crate) fn release(&self, sequence: u64) {
         let mut state = self.lock();
-        let unwanted = state.pages.release(sequence);
-        let gone: Vec<_> = unwanted.into_iter().map(|page| state.buffers[page].take()).collect();
+        let gone = [state.pages.release(sequence), state.cached.release(sequence)];
         drop(state);
         drop(gone);
     }
@@ -158,7 +204,8 @@ impl Staging {
     /// Bytes of all pages.
     #[cfg(feature = "test-hooks")]
     pub(crate) fn total_bytes(&self) -> u64 {
-        self.lock().pages.total_bytes()
+        let state = self.lock();
+        state.pages.pages.total_bytes() + state.cached.pages.total_bytes()
     }
 
     /// The bytes are written without the lock.
@@ -171,33 +218,14 @@ impl Staging {
     ) -> Result<(StagingRegion, R)> {
         // Pages begin at addresses that are multiples of less than some alignments.
         let room = bytes + align.saturating_sub(Buffer::ALIGNMENT);
-        let (place, buffer) = self.place(room, align.min(Buffer::ALIGNMENT), sequence)?;
+        let (place, buffer) =
+            self.lock().pages.place(&self.gpu, room, align.min(Buffer::ALIGNMENT), sequence)?;
         let address = (buffer.address + place.offset).next_multiple_of(align.max(1));
         let offset = address - buffer.address;
         let region = StagingRegion { buffer: buffer.raw, offset, address, page: place.page };
         // SAFETY: `offset + bytes <= place.offset + room` lies inside the mapping, and no other region overlaps this one.
         let answer = unsafe { fill_region(offset, bytes, &buffer, fill) }?;
         Ok((region, answer))
-    }
-
-    /// A place, with the page it lies in.
-    fn place(&self, bytes: u64, align: u64, sequence: Option<u64>) -> Result<(Place, Arc<Buffer>)> {
-        let mut state = self.lock();
-        let State { pages, buffers } = &mut *state;
-        let place = match pages.take(bytes, align) {
-            Found::Here(place) => place,
-            Found::New(place, size) => {
-                let made = new_page(&self.gpu, size).inspect_err(|_| pages.forget(place.page))?;
-                buffers.resize_with(buffers.len().max(place.page + 1), || None);
-                buffers[place.page] = Some(Arc::new(made));
-                place
-            }
-        };
-        if let Some(sequence) = sequence {
-            pages.hold(place.page, 1, sequence);
-        }
-        let buffer = buffers.get(place.page).cloned().flatten();
-        Ok((place, buffer.ok_or_else(|| Error::usage("staging", "the page is gone"))?))
     }
 
     fn lock(&self) -> Guard<'_, State> {
@@ -226,12 +254,12 @@ fn no_room() -> Error {
     Error::usage("staging", "a new chunk has no room")
 }
 
-fn new_page(gpu: &Arc<Gpu>, bytes: u64) -> Result<Buffer> {
+fn new_page(gpu: &Arc<Gpu>, bytes: u64, memory: MemoryKind) -> Result<Buffer> {
     let inputs = if gpu.accel.is_some() { BufferUsage::ACCEL_INPUT } else { BufferUsage::empty() };
     let desc = BufferDesc {
         size_bytes: bytes,
         usage: BufferUsage::STORAGE | inputs,
-        memory: MemoryKind::HostVisible,
+        memory,
         data: None,
         debug_name: "staging",
     };

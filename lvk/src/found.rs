@@ -7,16 +7,13 @@ use crate::error::Result;
 use crate::handle::Handle;
 use crate::store::Pool;
 
-/// How many are kept in reach; a power of two.
-const PLACES: usize = 8;
-
 /// Every object that a command buffer has used, once, in a row of its own. Commands name rows, and count no references.
 ///
 /// Nothing is found here by its handle that the pool would not find: once anything was taken out of the pool, all handles are
-/// forgotten. The objects are not.
-pub(super) struct Found<H, T> {
+/// forgotten. The objects are not. `PLACES`, a power of two, says how many are kept in reach.
+pub(crate) struct Found<H, T, const PLACES: usize = 8> {
     objects: Vec<Arc<T>>,
-    /// Rows by where the object lies, which no other one does while it is held.
+    /// Rows by where the object lies, which no other one does while it is held; where they are more than a few.
     rows: IdMap<usize>,
     /// Rows of the last handles, each at a place that follows from the handle.
     places: [Option<(H, usize)>; PLACES],
@@ -24,11 +21,14 @@ pub(super) struct Found<H, T> {
     removals: u64,
 }
 
-impl<H: Handle, T> Found<H, T> {
+impl<H: Handle, T, const PLACES: usize> Found<H, T, PLACES> {
+    /// So many are searched one by one, which is faster than a map.
+    const FEW: usize = 16;
+
     /// The row of the object of a handle.
     #[inline]
-    pub(super) fn find(&mut self, pool: &Pool<H, T>, handle: H) -> Result<usize> {
-        match self.places[place_of(handle)] {
+    pub(crate) fn find(&mut self, pool: &Pool<H, T>, handle: H) -> Result<usize> {
+        match self.places[Self::place_of(handle)] {
             Some((known, row)) if known == handle && self.removals == pool.removals() => Ok(row),
             _ => self.ask(pool, handle),
         }
@@ -42,22 +42,39 @@ impl<H: Handle, T> Found<H, T> {
             self.places = [None; PLACES];
             self.removals = removals;
         }
-        let row = self.row(&pool.get(handle)?);
-        self.places[place_of(handle)] = Some((handle, row));
+        let object = pool.get(handle)?;
+        let row = self.position(&object).unwrap_or_else(|| self.push(object));
+        self.places[Self::place_of(handle)] = Some((handle, row));
         Ok(row)
     }
 
     /// The row of an object.
-    pub(super) fn row(&mut self, object: &Arc<T>) -> usize {
-        let place = ResourceId(Arc::as_ptr(object) as u64);
-        *self.rows.entry(place).or_insert_with(|| {
-            self.objects.push(Arc::clone(object));
-            self.objects.len() - 1
-        })
+    pub(crate) fn row(&mut self, object: &Arc<T>) -> usize {
+        self.position(object).unwrap_or_else(|| self.push(Arc::clone(object)))
+    }
+
+    fn position(&self, object: &Arc<T>) -> Option<usize> {
+        if self.objects.len() <= Self::FEW {
+            return self.objects.iter().position(|known| Arc::ptr_eq(known, object));
+        }
+        self.rows.get(&identity(object)).copied()
+    }
+
+    fn push(&mut self, object: Arc<T>) -> usize {
+        self.objects.push(object);
+        let first = if self.objects.len() > Self::FEW { self.rows.len() } else { self.objects.len() };
+        let new = self.objects.iter().enumerate().skip(first);
+        self.rows.extend(new.map(|(row, object)| (identity(object), row)));
+        self.objects.len() - 1
+    }
+
+    /// Handles of one pool differ most in their low bits, which count objects.
+    fn place_of(handle: H) -> usize {
+        handle.bits() as usize % PLACES
     }
 
     /// Forgets everything; keeps the memory.
-    pub(super) fn clear(&mut self) {
+    pub(crate) fn clear(&mut self) {
         if !self.objects.is_empty() {
             self.objects.clear();
             self.rows.clear();
@@ -67,31 +84,31 @@ impl<H: Handle, T> Found<H, T> {
 
     /// How many there are.
     #[inline]
-    pub(super) fn count(&self) -> usize {
+    pub(crate) fn count(&self) -> usize {
         self.objects.len()
     }
 
     /// The objects of this row and those behind it.
-    pub(super) fn from(&self, row: usize) -> &[Arc<T>] {
+    pub(crate) fn from(&self, row: usize) -> &[Arc<T>] {
         &self.objects[row..]
     }
 
     /// The object of a row.
     #[inline]
-    pub(super) fn at(&self, row: usize) -> &Arc<T> {
+    pub(crate) fn at(&self, row: usize) -> &Arc<T> {
         &self.objects[row]
     }
 }
 
-impl<H: Copy, T> Default for Found<H, T> {
+impl<H: Copy, T, const PLACES: usize> Default for Found<H, T, PLACES> {
     fn default() -> Self {
         Self { objects: Vec::new(), rows: IdMap::default(), places: [None; PLACES], removals: 0 }
     }
 }
 
-/// Handles of one pool differ most in their low bits, which count objects.
-fn place_of(handle: impl Handle) -> usize {
-    handle.bits() as usize % PLACES
+/// Where an object lies names it, as long as it is held.
+fn identity<T>(object: &Arc<T>) -> ResourceId {
+    ResourceId(Arc::as_ptr(object) as u64)
 }
 
 #[cfg(test)]
@@ -108,7 +125,7 @@ mod tests {
             steps in prop::collection::vec((0..3_u8, any::<prop::sample::Index>()), 1..120)
         ) {
             let pool = Pool::<BufferHandle, u32>::new(0x9e37_79b9_7f4a_7c15);
-            let mut found = Found::default();
+            let mut found = Found::<BufferHandle, u32>::default();
             let mut handles = vec![pool.insert(0)];
             for (kind, which) in steps {
                 let handle = *which.get(&handles);
