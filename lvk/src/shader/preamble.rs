@@ -10,7 +10,7 @@ use crate::bindless::layout;
 const BINDLESS: &str = include_str!("glsl/bindless.glsl");
 
 /// The files behind `#include <lvk/..>`.
-pub(super) const LIBRARY: [(&str, &str); 12] = [
+pub(super) const LIBRARY: [(&str, &str); 13] = [
     ("lvk/hardware_ray_query.glsl", include_str!("glsl/hardware_ray_query.glsl")),
     ("lvk/hit_numbers.glsl", include_str!("glsl/hit_numbers.glsl")),
     ("lvk/ray_flags.glsl", include_str!("glsl/ray_flags.glsl")),
@@ -19,6 +19,7 @@ pub(super) const LIBRARY: [(&str, &str); 12] = [
     ("lvk/software_boxes.glsl", include_str!("glsl/software_boxes.glsl")),
     ("lvk/software_layout.glsl", include_str!("glsl/software_layout.glsl")),
     ("lvk/software_ray_query.glsl", include_str!("glsl/software_ray_query.glsl")),
+    ("lvk/software_stack.glsl", include_str!("glsl/software_stack.glsl")),
     ("lvk/software_triangle.glsl", include_str!("glsl/software_triangle.glsl")),
     ("lvk/software_walk.glsl", include_str!("glsl/software_walk.glsl")),
     ("lvk/tlas.glsl", include_str!("glsl/tlas.glsl")),

@@ -52,8 +52,12 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lvk
 #define LVK_SOFT_NAME 0x001FFFFFu
 
 // Paths have at most 64 binary nodes in either level, or 32 wide ones, each of which leaves one entry, and an instance may
-// leave others of its leaf.
+// leave others of its leaf. On CPUs binary nodes leave half an entry.
+#ifdef LVK_DEVICE_IS_CPU
+#define LVK_SOFT_STACK_ENTRIES 66u
+#else
 #define LVK_SOFT_STACK_ENTRIES 130u
+#endif
 
 // A block of a node or leaf.
 uvec4 lvkSoftBlock(LvkSoftBlocks blocks, uint at) {

@@ -36,7 +36,7 @@ void lvkSoftInitialize(out LvkSoftState state, uint tlas, uint flags, uint mask,
 
 // Keeps the stack while the shader judges a candidate.
 bool lvkSoftSave(LvkSoftState state, inout uvec2 stack[LVK_SOFT_STACK_ENTRIES]) {
-    for (uint entry = 0u; entry < state.place.top; ++entry) {
+    for (uint entry = 0u; entry < lvkSoftEntries(state.place.top); ++entry) {
         stack[entry] = lvkSoftStack[entry];
     }
     return true;
@@ -44,7 +44,7 @@ bool lvkSoftSave(LvkSoftState state, inout uvec2 stack[LVK_SOFT_STACK_ENTRIES]) 
 
 // Takes the stack back that another query has used meanwhile.
 bool lvkSoftRestore(LvkSoftState state, uvec2 stack[LVK_SOFT_STACK_ENTRIES]) {
-    for (uint entry = 0u; entry < state.place.top; ++entry) {
+    for (uint entry = 0u; entry < lvkSoftEntries(state.place.top); ++entry) {
         lvkSoftStack[entry] = stack[entry];
     }
     return true;

@@ -5,6 +5,7 @@
 #include <lvk/ray_flags.glsl>
 #include <lvk/software_boxes.glsl>
 #include <lvk/software_layout.glsl>
+#include <lvk/software_stack.glsl>
 #include <lvk/software_triangle.glsl>
 
 // LvkSoftHit.kind of candidates. Committed ones have LVK_COMMITTED_*.
@@ -92,21 +93,9 @@ const bool kLvkSoftIsCpu = false;
 
 #define LVK_SOFT_CULL_FACES (LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES | LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES)
 
-// The stack of the query that is walking. Queries take turns: one that waits with a candidate keeps its entries itself.
-// They are groups of nodes, written as one, or references with nothing beside them.
-uvec2 lvkSoftStack[LVK_SOFT_STACK_ENTRIES];
+// Whose the stack is, and how many queries there were.
 uint lvkSoftOwner = 0u;
 uint lvkSoftQueries = 0u;
-
-void lvkSoftPush(inout LvkSoftPlace place, uvec2 entry) {
-    lvkSoftStack[place.top] = entry;
-    place.top += 1u;
-}
-
-uvec2 lvkSoftPop(inout LvkSoftPlace place) {
-    place.top -= 1u;
-    return lvkSoftStack[place.top];
-}
 
 // Goes to a node or leaf that a reference names.
 void lvkSoftGo(inout LvkSoftPlace place, uint reference) {
@@ -200,7 +189,7 @@ void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
         uint node = place.group.x + before;
         place.group.y ^= 1u << bit;
         if (place.group.y >= LVK_SOFT_ANY_NODE) {
-            lvkSoftPush(place, place.group);
+            lvkSoftPushGroup(place.top, place.group);
         }
         uvec4 met = lvkSoftMeet8(level.slabs, LvkSoftBlocks(level.structure), level.nodes, node, range);
         place.group = met.xy;
@@ -210,7 +199,7 @@ void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
             lvkSoftMeet2(level.slabs, LvkSoftBlocks(level.structure), level.nodes, place.group.x, range);
         place.group = uvec2(0u);
         if (met.y != LVK_SOFT_NONE) {
-            lvkSoftPush(place, uvec2(met.y, 0u));
+            lvkSoftPushReference(place.top, met.y);
         }
         if (met.x != LVK_SOFT_NONE) {
             lvkSoftGo(place, met.x);
@@ -220,7 +209,7 @@ void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
 
 // Takes from the stack what was put aside last in this level.
 void lvkSoftResume(inout LvkSoftPlace place, LvkSoftLevel level) {
-    uvec2 entry = lvkSoftPop(place);
+    uvec2 entry = lvkSoftPop(place.top, level.wide);
     if (level.wide) {
         place.group = entry;
     } else {
@@ -361,7 +350,7 @@ bool lvkSoftTest(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLeve
 uint lvkSoftNextReference(inout LvkSoftPlace place) {
     uint next = place.next;
     place.next = LVK_SOFT_NONE;
-    return next != LVK_SOFT_NONE || place.top == 0u ? next : lvkSoftPop(place).x;
+    return next != LVK_SOFT_NONE || place.top == 0u ? next : lvkSoftPopReference(place.top);
 }
 
 // The next leaf of the top level that the ray meets, from a node on; LVK_SOFT_NONE where none is left.
@@ -372,7 +361,7 @@ uint lvkSoftDescend(LvkSoftState state, inout LvkSoftPlace place, uint reference
     while ((reference & LVK_SOFT_LEAF) == 0u) {
         uvec2 met = lvkSoftMeet2(slabs, tlas, nodes, reference, vec2(state.tMin, state.committed.t));
         if (met.y != LVK_SOFT_NONE) {
-            lvkSoftPush(place, uvec2(met.y, 0u));
+            lvkSoftPushReference(place.top, met.y);
         }
         reference = met.x != LVK_SOFT_NONE ? met.x : lvkSoftNextReference(place);
     }
@@ -389,7 +378,7 @@ uint lvkSoftNextInstance(LvkSoftState state, inout LvkSoftPlace place) {
         return reference;
     }
     if ((reference & LVK_SOFT_LEAF_COUNT) != 0u) {
-        lvkSoftPush(place, uvec2(reference + 1u - LVK_SOFT_LEAF_ONE, 0u)); // the leaf without its first instance
+        lvkSoftPushReference(place.top, reference + 1u - LVK_SOFT_LEAF_ONE); // the leaf without its first instance
     }
     return reference & LVK_SOFT_LEAF_FIRST;
 }
