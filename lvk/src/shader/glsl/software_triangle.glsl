@@ -48,15 +48,20 @@ bool lvkSoftPasses(LvkSoftShear ray, vec3 origin, vec3 corners[3], out LvkSoftPa
     float whole = areas.x + areas.y + areas.z;
     float least = min(min(areas.x, areas.y), areas.z);
     float most = max(max(areas.x, areas.y), areas.z);
+#ifdef LVK_DEVICE_IS_CPU // which loses more by a branch that it guesses wrong than by the rest of the test
+    bool passes = (least >= 0.0 || most <= 0.0) && whole != 0.0;
+#else
+    const bool passes = true;
     if ((least < 0.0 && most > 0.0) || whole == 0.0) {
         return false;
     }
+#endif
     float share = 1.0 / whole;
     passage.t = (areas.x * p.z + areas.y * q.z + areas.z * r.z) * ray.scale * share;
     passage.barycentrics = areas.yz * share;
     bool mirrors = !ray.alongX && !ray.alongZ;
     passage.front = ((whole < 0.0) == (ray.scale > 0.0)) != mirrors;
-    return true;
+    return passes;
 }
 
 #endif

@@ -296,6 +296,11 @@ bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hi
     return range.x <= range.y;
 }
 
+// The flag that leaves out triangles seen from this side.
+uint lvkSoftCulling(bool front) {
+    return front ? LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES : LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES;
+}
+
 // Whether the ray hits a triangle between its ends, which do not count themselves, and from a side that counts.
 bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hit) {
     vec3 corners[3];
@@ -313,8 +318,7 @@ bool lvkSoftHitsTriangle(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHi
     hit.opaque = (words.z & 1u) != 0u;
     hit.barycentrics = passage.barycentrics;
     hit.front = passage.front != level.flip;
-    uint culls = hit.front ? LVK_RAY_FLAG_CULL_FRONT_FACING_TRIANGLES : LVK_RAY_FLAG_CULL_BACK_FACING_TRIANGLES;
-    return (level.cull & culls) == 0u;
+    return (level.cull & lvkSoftCulling(hit.front)) == 0u;
 }
 
 // Tests the next primitive. Answers whether it is a candidate that the shader must judge.
@@ -430,16 +434,20 @@ bool lvkSoftWalkLevel(inout LvkSoftState state, inout LvkSoftPlace place, LvkSof
     return false;
 }
 
-// Walks through the structure of the instance. Answers whether a candidate waits that the shader must judge. On CPUs, what
-// most scenes are made of has code of its own, without the branches that other structures need; where there are
-// candidates, that code would take longer to compile than it saves.
+// Where there are candidates, a walk of its own would take longer to compile than it saves.
+#if defined(LVK_DEVICE_IS_CPU) && defined(LVK_OPAQUE_TRIANGLES_ONLY)
+#define LVK_SOFT_HAS_CPU_WALK
+#include <lvk/software_cpu_walk.glsl>
+#endif
+
+// Walks through the structure of the instance. Answers whether a candidate waits that the shader must judge.
 bool lvkSoftWalk(inout LvkSoftState state, inout LvkSoftPlace place, LvkSoftLevel level) {
-    if (kLvkSoftIsCpu && !kLvkSoftHasCandidates && level.wide && level.kind == LVK_SOFT_TRIANGLES) {
-        LvkSoftLevel usual = level;
-        usual.wide = true;
-        usual.kind = LVK_SOFT_TRIANGLES;
-        return lvkSoftWalkLevel(state, place, usual);
+#ifdef LVK_SOFT_HAS_CPU_WALK
+    if (level.wide && level.kind == LVK_SOFT_TRIANGLES) {
+        lvkSoftWalkTriangles(state, place, level);
+        return false;
     }
+#endif
     return lvkSoftWalkLevel(state, place, level);
 }
 
