@@ -78,7 +78,7 @@ uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, v
 // Compressed Wide BVHs", 2017): its inner children as a group of nodes, first node and, in the order of the ray, a bit for
 // each from bit 24 on; and its leaves as a group of primitives, first one and a bit for each.
 uvec4 lvkSoftMeet8(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint nodes, uint node, vec2 range) {
-    uint first = nodes + node * LVK_SOFT_WIDE_NODE_BLOCKS;
+    uint first = lvkSoftBegin(blocks, nodes + node * LVK_SOFT_WIDE_NODE_BLOCKS);
     uvec4 head = lvkSoftBlock(blocks, first);
     uvec4 children = lvkSoftBlock(blocks, first + 1u);
     uvec4 x = lvkSoftBlock(blocks, first + 2u);

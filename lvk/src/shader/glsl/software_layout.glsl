@@ -69,6 +69,17 @@ uvec4 lvkSoftBlock(LvkSoftBlocks blocks, uint at) {
 #endif
 }
 
+// The number of a block from which on some are read. Where addresses are counted by 64 bits, `blocks` begin with it afterwards,
+// so that one address serves all of them.
+uint lvkSoftBegin(inout LvkSoftBlocks blocks, uint first) {
+#ifdef LVK_GATHERS_PAIRS
+    blocks = LvkSoftBlocks(unpackUint2x32(packUint2x32(uvec2(blocks)) + uint64_t(first) * 16ul));
+    return 0u;
+#else
+    return first;
+#endif
+}
+
 // The address `blocks` blocks behind another one.
 uvec2 lvkSoftBehind(uvec2 base, uint blocks) {
     uint carry;

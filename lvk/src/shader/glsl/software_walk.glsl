@@ -257,7 +257,7 @@ void lvkSoftCorners(uvec2 structure, uint primitives, uint kind, uint primitive,
         corners[2] = LvkSoftVertices(points).at[vertices.z];
         words = uvec3(vertices.w, 0u, 0u);
     } else {
-        uint first = primitives + primitive * LVK_SOFT_TRIANGLE_BLOCKS;
+        uint first = lvkSoftBegin(blocks, primitives + primitive * LVK_SOFT_TRIANGLE_BLOCKS);
         uvec4 a = lvkSoftBlock(blocks, first);
         uvec4 b = lvkSoftBlock(blocks, first + 1u);
         uvec4 c = lvkSoftBlock(blocks, first + 2u);
