@@ -227,6 +227,7 @@ impl Shared {
                 tlas.software.iter().for_each(|_| self.freed_tlas().push(tlas.slot));
                 self.bindless.free_tlas(tlas.slot);
                 tlas.records.get().into_iter().for_each(|buffer| self.submitter.forget(buffer.id));
+                self.take_source(std::mem::take(&mut *tlas.contents()));
             }
             AccelKind::Blas(blas) => {
                 for map in blas.parts.iter().filter_map(|part| part.map.as_ref()) {

@@ -265,3 +265,36 @@ fn the_memory_of_objects_is_counted_in_their_heap_until_they_are_gone() {
         assert_eq!(total(), before);
     }
 }
+
+/// Also where the instances are kept for the time when a mesh has moved.
+#[test]
+fn top_level_structures_leave_nothing_on_the_heap() {
+    const EACH: usize = 300;
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(ctx) = device() else { return };
+    let corners: [f32; 9] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    let desc = BufferDesc {
+        size_bytes: 36,
+        usage: lvk::BufferUsage::ACCEL_INPUT | lvk::BufferUsage::STORAGE,
+        data: Some(bytemuck::cast_slice(&corners)),
+        ..Default::default()
+    };
+    let buffer = ctx.create_buffer(&desc).unwrap();
+    let geometries = [BlasGeometry::Triangles(Triangles::packed(*buffer, 3))];
+    let flags = BuildFlags::FAST_TRACE | BuildFlags::ALLOW_COMPACTION;
+    let order = PrimitiveOrder::Given;
+    let blas =
+        ctx.create_blas(&BlasDesc { geometries: &geometries, flags, order, ..Default::default() }).unwrap();
+    let instances = [TlasInstance::new(*blas)];
+    let grown = [0; 4].map(|_: usize| {
+        let before = BYTES.load(Ordering::Relaxed);
+        for _ in 0..EACH {
+            let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() }).unwrap();
+            ctx.wait_idle().unwrap();
+            drop(tlas);
+        }
+        ctx.wait_idle().unwrap();
+        BYTES.load(Ordering::Relaxed) - before
+    });
+    assert!(grown[1..].iter().sum::<i64>() < 4096, "{grown:?}");
+}

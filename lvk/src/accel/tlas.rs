@@ -41,6 +41,8 @@ pub(crate) struct TlasContents {
     pub(crate) shown: Arc<ShownSet>,
     /// When that was last known to stand as it is.
     pub(crate) revision: Revision,
+    /// The address of the rows that the table of structures names for it; 0 for none.
+    pub(crate) named_rows: u64,
     /// From what the instances can be written again once a structure they refer to has moved.
     pub(crate) source: Option<Arc<InstanceSource>>,
 }

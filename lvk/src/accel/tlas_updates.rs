@@ -18,8 +18,21 @@ pub(crate) struct TlasUpdate {
     contents: Option<TlasContents>,
     /// Whether a command has updated it.
     is_recorded: bool,
+    /// The rows that the last command to do so has the table name; `None` where none did, and all rely on the table naming none.
+    named_rows: Option<u64>,
+    /// Whether a command was recorded before any had the table name rows: it relies on the table naming none.
+    relies_on_no_rows: bool,
     /// The counts that a first command relies on which moves what is shown when the command buffer is submitted.
     relies_on: Option<(u32, u32)>,
+}
+
+/// A command as it was recorded.
+pub(crate) struct Recorded {
+    pub(crate) change: Change,
+    /// The rows that it has the table of structures name, where it writes that.
+    pub(crate) named_rows: Option<u64>,
+    /// When what is shown was looked at.
+    pub(crate) revision: Revision,
 }
 
 /// What a command has a structure show.
@@ -50,11 +63,13 @@ impl TlasUpdate {
         self.is_recorded
     }
 
-    /// A command was recorded, with what is shown looked at by then. Answers what is shown no longer, though the commands before
-    /// are to read it.
+    /// A command was recorded. Answers what is shown no longer, though the commands before are to read it.
     #[inline(always)]
-    fn record(&mut self, change: Change, revision: Revision) -> Option<TlasContents> {
+    fn record(&mut self, recorded: Recorded) -> Option<TlasContents> {
+        let Recorded { change, named_rows, revision } = recorded;
         let Change { count, built_count, shown, source, refit } = change;
+        self.named_rows = named_rows.or(self.named_rows);
+        self.relies_on_no_rows |= self.named_rows.is_none();
         let was_recorded = std::mem::replace(&mut self.is_recorded, true);
         if refit && !was_recorded {
             self.relies_on = Some((count, built_count));
@@ -88,7 +103,8 @@ impl TlasUpdate {
 
     /// Makes it so. Answers what was shown before, unless that is still shown.
     fn apply(&mut self, tlas: &Tlas) -> Option<TlasContents> {
-        let contents = std::mem::take(self).contents?;
+        let Self { contents, named_rows, .. } = std::mem::take(self);
+        let contents = TlasContents { named_rows: named_rows.unwrap_or(0), ..contents? };
         let mut place = tlas.contents();
         let shows_the_same = Arc::ptr_eq(&place.shown, &contents.shown);
         let before = std::mem::replace(&mut *place, contents);
@@ -156,10 +172,10 @@ impl TlasUpdates {
         Row { target: found.at(row), update: &mut list[row], nothing, memory }
     }
 
-    /// A command was recorded that updates the structure of a row, with what is shown looked at by `revision`.
+    /// A command was recorded that updates the structure of a row.
     #[inline(always)]
-    pub(crate) fn record(&mut self, row: usize, change: Change, revision: Revision) {
-        if let Some(replaced) = self.list[row].record(change, revision) {
+    pub(crate) fn record(&mut self, row: usize, recorded: Recorded) {
+        if let Some(replaced) = self.list[row].record(recorded) {
             self.replaced.push(replaced);
         }
     }
@@ -167,6 +183,13 @@ impl TlasUpdates {
     /// Fails if what was recorded no longer fits what was submitted since.
     pub(crate) fn check(&self) -> Result<()> {
         self.found.from(0).iter().zip(&self.list).try_for_each(|(target, update)| update.check(target))
+    }
+
+    /// Structures for which the table names rows by now, though a command relies on there being none.
+    pub(crate) fn with_unknown_rows(&self) -> impl Iterator<Item = &Tlas> {
+        let relying =
+            self.found.from(0).iter().zip(&self.list).filter(|(_, update)| update.relies_on_no_rows);
+        relying.filter_map(|(target, _)| target.tlas().ok()).filter(|tlas| tlas.contents().named_rows != 0)
     }
 
     /// Makes it all so; `before` is told of each structure with what it is to show.

@@ -63,7 +63,7 @@ impl Notes {
             found_textures,
             uses,
             barriers,
-            // Holds of every command buffer of the device.
+            // What barriers are called is the same for every command buffer.
             last_barrier: _,
             sets_bound,
             push_constants,

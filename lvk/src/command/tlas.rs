@@ -16,7 +16,7 @@ use crate::accel::instance_plan::PlanMemory;
 use crate::accel::scratch::aligned_scratch_address;
 use crate::accel::shown::{Revision, ShownSet};
 use crate::accel::tlas::{InstanceSource, Tlas};
-use crate::accel::tlas_updates::{Change, Row, TlasUpdate, TlasUpdates};
+use crate::accel::tlas_updates::{Change, Recorded, Row, TlasUpdate, TlasUpdates};
 use crate::barrier::{ResourceId, Stages, Use};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::error::{Error, Result, check_limit};
@@ -118,9 +118,8 @@ impl CommandBuffer {
             let before = cmd.before(tlas, update, nothing);
             let given = cmd.run_instances(target, tlas, shown, source, contents.built_count)?;
             cmd.build_tlas(target, tlas, given.instances(), before.is_first, false)?;
-            let change = cmd.tell(tlas, &before, given.change(count, false));
-            let revision = before.revision;
-            updates.record(row, change, revision);
+            let recorded = cmd.tell(tlas, &before, given.change(count, false));
+            updates.record(row, recorded);
             Ok(())
         })
     }
@@ -161,9 +160,8 @@ impl CommandBuffer {
         if let Some(software) = &tlas.software {
             self.build_software_tlas(target, software, instances)?;
         }
-        let change = self.tell(tlas, &before, change);
-        let revision = before.revision;
-        updates.record(row, change, revision);
+        let recorded = self.tell(tlas, &before, change);
+        updates.record(row, recorded);
         Ok(())
     }
 
@@ -227,9 +225,8 @@ impl CommandBuffer {
         if let Some(software) = &tlas.software {
             self.build_software_tlas_from(target, software, instances, &shown)?;
         }
-        let change = self.tell(tlas, &before, change);
-        let revision = before.revision;
-        updates.record(row, change, revision);
+        let recorded = self.tell(tlas, &before, change);
+        updates.record(row, recorded);
         Ok(())
     }
 
@@ -348,7 +345,7 @@ impl CommandBuffer {
 
     /// Tells queues and shaders what the structure shows from now on.
     #[inline(always)]
-    fn tell(&mut self, tlas: &Tlas, before: &Before<'_>, mut change: Change) -> Change {
+    fn tell(&mut self, tlas: &Tlas, before: &Before<'_>, mut change: Change) -> Recorded {
         if change.shown.is_none() && !before.stands {
             change.shown = Some(Arc::clone(before.shown));
         }
@@ -358,16 +355,28 @@ impl CommandBuffer {
             shown.list().iter().for_each(|shown| self.refer(shown.blas.id, Access::Read));
         }
         // At first the entry is that of the slot's last owner.
-        if before.counts.is_none() || tlas.rows.get().is_some() {
-            let rows = tlas.rows.get().filter(|_| shown.has_rows).map_or(0, |rows| rows.address);
-            let software = tlas.software.as_ref().map_or(0, |software| software.body.address);
-            self.write_tlas_table(tlas.slot, [rows, software]);
+        let is_told = before.counts.is_none() || tlas.rows.get().is_some();
+        let rows = tlas.rows.get().filter(|_| shown.has_rows).map_or(0, |rows| rows.address);
+        if is_told {
+            self.name_rows(tlas, rows);
         }
-        change
+        Recorded { change, named_rows: is_told.then_some(rows), revision: before.revision }
+    }
+
+    /// Structures that this command buffer takes to have no rows, though a submission since it was recorded has given them some:
+    /// their slots, with what the table has to say of them first.
+    pub(crate) fn entries_without_rows(&self) -> Vec<(u32, [u64; 2])> {
+        let Some(updates) = &self.notes.tlas_updates else { return Vec::new() };
+        updates.with_unknown_rows().map(|tlas| (tlas.slot, entry(tlas, 0))).collect()
+    }
+
+    /// Tells shaders where the rows of a structure lie; 0 where it has none.
+    fn name_rows(&mut self, tlas: &Tlas, rows: u64) {
+        self.write_tlas_table(tlas.slot, entry(tlas, rows));
     }
 
     /// Tells shaders where the rows of a structure lie, and what software traces; 0 where there is nothing.
-    fn write_tlas_table(&mut self, slot: u32, entry: [u64; 2]) {
+    pub(crate) fn write_tlas_table(&mut self, slot: u32, entry: [u64; 2]) {
         let shared = Arc::clone(&self.shared);
         let Some(table) = shared.tlas_table.as_ref() else { return };
         self.notes.uses.id(shared.tlas_tables, Use::transfer_write());
@@ -414,6 +423,11 @@ impl Update<'_> {
         }
         Ok(refit)
     }
+}
+
+/// What the table says of a structure with these rows.
+fn entry(tlas: &Tlas, rows: u64) -> [u64; 2] {
+    [rows, tlas.software.as_ref().map_or(0, |software| software.body.address)]
 }
 
 /// Fails where there are more instances of the caller than the structure was made for.

@@ -69,8 +69,10 @@ impl Context {
         cmd.check_tlas_updates()?;
         cmd.check_queries()?;
         cmd.check_images()?;
-        if !self.shared().freed_tlas().is_empty() {
-            self.open(&mut pending)?;
+        let entries = cmd.entries_without_rows();
+        if !entries.is_empty() || !self.shared().freed_tlas().is_empty() {
+            let before = self.open(&mut pending)?;
+            entries.into_iter().for_each(|(slot, entry)| before.write_tlas_table(slot, entry));
         }
         let prelude = self.take_pending(&mut pending)?;
         if prelude.is_some() {

@@ -1,4 +1,4 @@
-//! Which command buffers are free, being recorded, or with the GPU.
+//! Which command buffers are free, begun ahead, being recorded, or with the GPU.
 
 use std::collections::VecDeque;
 
@@ -75,7 +75,7 @@ impl CommandRing {
         self.lanes[lane].free.pop()
     }
 
-    /// A command buffer is begun for who comes next, as others may have been meanwhile.
+    /// A command buffer is begun for who comes next. One that another thread began meanwhile is free again.
     pub(crate) fn give_begun(&mut self, recording: Box<Recording>) {
         let Lane { begun, free, .. } = &mut self.lanes[recording.lane];
         free.extend(begun.replace(recording));

@@ -130,7 +130,7 @@ impl<T> Submitter<T> {
         }
         let free = inner.ring.take_free(lane);
         drop(inner);
-        // Where that fails, who acquires it hears of it.
+        // Where that fails, whoever acquires one begins another.
         if let Ok(begun) = command_ring::begin(&self.gpu, lane, free) {
             self.lock().ring.give_begun(begun);
         }
@@ -390,7 +390,7 @@ impl<T> Submitter<T> {
         inner.deferred.len()
     }
 
-    /// Number of the command buffer that was begun last.
+    /// Number of the command buffer that was last given out to record.
     pub(crate) fn newest(&self) -> u64 {
         self.lock().ring.newest()
     }

@@ -11,7 +11,7 @@ use crate::gpu::Gpu;
 
 /// A command buffer being recorded, with the GPU, or free.
 pub(crate) struct Recording {
-    /// Rises with every command buffer that is begun in the context.
+    /// Rises with every command buffer that somebody is given to record; of one begun ahead that of its last time.
     pub(crate) sequence: u64,
     /// What the caller records.
     pub(crate) commands: vk::CommandBuffer,

@@ -5,6 +5,7 @@ mod compaction;
 mod errors;
 mod leftovers;
 mod order;
+mod recorded_apart;
 mod serialize;
 mod split;
 mod split_updates;

@@ -50,6 +50,6 @@ pub(super) fn measure(silent: &Context, amount: Amount) -> Result<Vec<Row>, Benc
     };
     Ok(vec![
         row("refit of a TLAS recorded, own share".to_owned(), &often, TURNS, Limit::Most(50.0)),
-        row(format!("- the first of each of {STRUCTURES} in a command buffer"), &once, 1, Limit::None),
+        row(format!("- the first of each of {STRUCTURES} in a command buffer"), &once, 1, Limit::Most(50.0)),
     ])
 }
