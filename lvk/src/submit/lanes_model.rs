@@ -150,10 +150,12 @@ impl History {
         None
     }
 
-    /// Images that have contents are used by their owner, and both sides of a move match, the second behind the first.
+    /// Images that have contents are used by their owner, and both sides of a move match, the second behind the first, which is
+    /// behind what other queues of the owner have done.
     fn wrong_owner(&self, cell: Cell) -> Option<String> {
         let mut owner: Option<u32> = None;
         let mut moving: Option<(MovedPart, u64)> = None;
+        let mut uses = Vec::new();
         for (at, sent) in self.sent.iter().enumerate() {
             let domain = self.sites[sent.lane].domain;
             let wrong = |what: &str| Some(format!("{cell:?} in {}: {what}", sent.value));
@@ -176,8 +178,14 @@ impl History {
                 if matters && (moving.is_some() || owner.is_some_and(|owner| owner != domain)) {
                     return wrong("used by another than its owner");
                 }
+                uses.extend(matters.then_some((sent.lane, sent.value)));
             }
             for moved in sent.releases.iter().filter(|moved| covers(moved, cell)) {
+                let is_over =
+                    |(lane, value): (usize, u64)| lane == sent.lane || self.is_behind(at, lane, value);
+                if !uses.drain(..).all(is_over) {
+                    return wrong("released while another queue uses it");
+                }
                 if owner != Some(domain) || moving.replace((*moved, sent.value)).is_some() {
                     return wrong("released by another than its owner");
                 }
