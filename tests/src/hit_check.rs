@@ -4,22 +4,30 @@ use lvk::{AccelStructHandle, Context, Holder, Result};
 
 use crate::agreement::Agreement;
 use crate::ray_scene::RayScene;
-use crate::ray_tracer::{HitRecord, How, MISSED, Method, RayTracer};
+use crate::ray_tracer::{CULL_NO_OPAQUE, CULL_OPAQUE, HitRecord, How, MISSED, Method, NO_OPAQUE, RayTracer};
 use crate::rays::{Ray, random_rays};
 use crate::reference::{Answer, Reference};
 
 /// Relative to the distance, or to 1 where that is larger.
 const DISTANCE: f32 = 1e-5;
 
+/// Flags that exclude [`OPAQUE`](crate::ray_tracer::OPAQUE), which a module that takes all triangles for opaque adds.
+const NOT_WITH_OPAQUE: u32 = NO_OPAQUE | CULL_OPAQUE | CULL_NO_OPAQUE;
+
 /// The pipelines of every method.
 pub struct HitCheck {
     tracers: Vec<(Method, RayTracer)>,
+    /// Where all triangles may be taken for opaque, unless the ray says otherwise.
+    opaque: Option<RayTracer>,
 }
 
 impl HitCheck {
-    /// Hits count as the geometry and the ray say.
+    /// Hits of triangles count as the geometry and the ray say. Nothing is looked through, so a module that takes all of them
+    /// for opaque has to find the same.
     pub fn new(ctx: &Context) -> Result<Self> {
-        Self::with(ctx, RayTracer::new)
+        let opaque =
+            ctx.capabilities().ray_query.then(|| RayTracer::for_opaque_triangles(ctx)).transpose()?;
+        Ok(Self { opaque, ..Self::with(ctx, RayTracer::new)? })
     }
 
     /// Looks through triangles with odd numbers, where they are not opaque.
@@ -30,12 +38,19 @@ impl HitCheck {
     /// Traces with what `make` answers for every method.
     pub fn with(ctx: &Context, make: impl Fn(&Context, Method) -> Result<RayTracer>) -> Result<Self> {
         let tracer = |method| Ok((method, make(ctx, method)?));
-        Ok(Self { tracers: Method::available(ctx).into_iter().map(tracer).collect::<Result<_>>()? })
+        let tracers = Method::available(ctx).into_iter().map(tracer).collect::<Result<_>>()?;
+        Ok(Self { tracers, opaque: None })
     }
 
     /// The pipelines.
     pub fn tracers(&self) -> impl Iterator<Item = (Method, &RayTracer)> {
         self.tracers.iter().map(|(method, tracer)| (*method, tracer))
+    }
+
+    /// The pipeline that takes all triangles for opaque, if rays with such flags have to hit the same by it: none for checks
+    /// that look through triangles or meet other shapes.
+    pub fn opaque_tracer(&self, flags: u32) -> Option<&RayTracer> {
+        self.opaque.as_ref().filter(|_| flags & NOT_WITH_OPAQUE == 0)
     }
 
     /// Traces rays through and around the scene, and compares closest hits.
@@ -63,6 +78,10 @@ impl HitCheck {
         for (method, tracer) in self.tracers() {
             let records = tracer.trace(tlas, rays, how)?;
             Agreement::of_triangles(rays, &records, &answer).assert(&format!("{what}, by {method:?}"));
+        }
+        if let Some(tracer) = self.opaque_tracer(how.flags) {
+            let records = tracer.trace(tlas, rays, how)?;
+            Agreement::of_triangles(rays, &records, &answer).assert(&format!("{what}, all taken for opaque"));
         }
         Ok(())
     }

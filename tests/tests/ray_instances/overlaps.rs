@@ -88,10 +88,12 @@ fn check(check: &HitCheck, what: &str, scene: &RayScene, gpu: &GpuScene) -> Resu
         let what = format!("{what}, mask {mask:#x}, flags {flags:#x}");
         check.closest(&what, &gpu.tlas, &rays, how, |ray| reference.closest_by(ray, how))?;
     }
-    for (method, tracer) in check.tracers() {
-        let how = How { mask: 0x73, ..How::shadows() };
+    let how = How { mask: 0x73, ..How::shadows() };
+    let opaque = check.opaque_tracer(how.flags).map(|tracer| ("all taken for opaque".to_owned(), tracer));
+    let tracers = check.tracers().map(|(method, tracer)| (format!("by {method:?}"), tracer));
+    for (by, tracer) in tracers.chain(opaque) {
         let records = tracer.trace(&gpu.tlas, &rays, how)?;
-        let what = format!("{what}, shadows by {method:?}");
+        let what = format!("{what}, shadows {by}");
         Agreement::of_occlusion(&rays, &records, |ray| reference.occluded(ray, how.mask)).assert(&what);
     }
     Ok(())
