@@ -71,7 +71,7 @@ void main() {
         committed = FOUND(rq, LVK_COMMITTED);
     }
 #endif
-    AllTold told = AllTold(hits);
+    AllTold told = AllTold(uvec2(hits));
     told.at[index] = Told(lvkRayQueryFlags(rq), lvkRayQueryTMin(rq), lvkRayQueryWorldRayOrigin(rq),
                           lvkRayQueryWorldRayDirection(rq), committed, candidate);
 }
