@@ -78,6 +78,7 @@ impl TlasUpdate {
         let refits = if refit { contents.refits.saturating_add(1) } else { 0 };
         (contents.instance_count, contents.built_count, contents.refits) = (Some(count), built_count, refits);
         contents.revision = revision;
+        let shown = shown.filter(|shown| !Arc::ptr_eq(shown, &contents.shown));
         if shown.is_none() && source.is_none() && contents.source.is_none() {
             return None;
         }
