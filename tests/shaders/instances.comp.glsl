@@ -1,5 +1,5 @@
 // Writes instance records as Vulkan reads them, with the place of a structure instead of its address: a grid of
-// instances that `turn` turns about the x axis.
+// instances that are turned about the x axis. WIDTH is that of the grid.
 layout(local_size_x = 64) in;
 
 struct Record {
@@ -15,9 +15,8 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) writeonly buffer Re
 layout(push_constant, scalar) uniform Push {
     Records records;
     uint count;
-    uint models;   // the places 0 to models - 1 exist
-    uint width;    // of the grid
-    float turn;
+    uint models; // the places 0 to models - 1 exist
+    vec2 turn;   // cosine and sine of the angle, as devices' own are not exact
 };
 
 void main() {
@@ -25,8 +24,8 @@ void main() {
     if (i >= count) {
         return;
     }
-    float c = cos(turn), s = sin(turn);
-    vec3 to = vec3(i % width, i / width, i % 3) * 3.0;
+    float c = turn.x, s = turn.y;
+    vec3 to = vec3(i % WIDTH, i / WIDTH, i % 3) * 3.0;
     Record record;
     record.rows = float[](1, 0, 0, to.x, 0, c, -s, to.y, 0, s, c, to.z);
     record.customIndexAndMask = (0xffffffu - i) & 0xffffffu | (1u + i % 255u) << 24;

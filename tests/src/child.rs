@@ -16,9 +16,22 @@ const MARK: &str = "LVK_TEST_CHILD";
 /// # Panics
 /// When the process fails, with what it wrote.
 pub fn in_child(test: impl Fn(), variables: &[(&str, Option<&OsStr>)], body: impl FnOnce()) {
+    said_in_child(test, variables, body);
+}
+
+/// As [`in_child`]; answers what the new process wrote to standard output, and in that process nothing.
+///
+/// # Panics
+/// As [`in_child`].
+pub fn said_in_child(
+    test: impl Fn(),
+    variables: &[(&str, Option<&OsStr>)],
+    body: impl FnOnce(),
+) -> Option<String> {
     let test = path_in_program(&test);
     if std::env::var_os(MARK).is_some_and(|name| name == test) {
-        return body();
+        body();
+        return None;
     }
     let mut command = program(variables);
     command.args([test, "--exact", "--nocapture", "--include-ignored"]).env(MARK, test);
@@ -26,6 +39,7 @@ pub fn in_child(test: impl Fn(), variables: &[(&str, Option<&OsStr>)], body: imp
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let (out, err) = (text(&output.stdout), text(&output.stderr));
     assert!(output.status.success() && out.contains("1 passed"), "in a process of its own:\n{out}\n{err}");
+    Some(out)
 }
 
 /// As [`in_child`], on the device without ray tracing; skipped loudly where that cannot be had.

@@ -54,7 +54,7 @@ pub fn boxes(buffer: BufferHandle, count: usize) -> BlasGeometry {
 
 /// Builds one structure.
 pub fn build(ctx: &Context, geometries: &[BlasGeometry], leaf_size: u32) -> GpuStructure {
-    let desc = GpuBlasDesc { geometries, leaf_size, improvements: 1, leaves: Leaves::Corners, refit: true };
+    let desc = GpuBlasDesc { geometries, leaf_size, improvements: 1, leaves: Leaves::Corners };
     build_blas(ctx, &[desc]).expect("the build is recorded").remove(0)
 }
 

@@ -29,6 +29,7 @@ pub mod relief;
 pub mod shader_groups;
 pub mod sphere_scene;
 pub mod still_life;
+pub mod structures;
 pub mod warnings;
 pub mod wide_tree;
 pub mod windows;

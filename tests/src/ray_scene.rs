@@ -17,7 +17,7 @@ pub const BUILD_FLAGS: [BuildFlags; 6] = [
     BuildFlags::LOW_MEMORY,
     BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE),
     BuildFlags::LOW_MEMORY.union(BuildFlags::ALLOW_UPDATE),
-    BuildFlags::LOW_MEMORY.union(BuildFlags::FAST_BUILD),
+    BuildFlags::LOW_MEMORY.union(BuildFlags::FAST_BUILD).union(BuildFlags::ALLOW_UPDATE),
 ];
 
 /// How the vertices and indices of a geometry lie in memory.

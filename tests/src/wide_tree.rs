@@ -1,4 +1,4 @@
-//! A tree of wide nodes without boxes, as a refit finds it: order, ids and parents are there, places are not.
+//! A tree of wide nodes without boxes, as a refit finds it: order and ids are there, places are not.
 
 /// Primitives of a leaf.
 const LEAF: usize = 3;
@@ -10,9 +10,8 @@ const HEADER_WORDS: usize = 32;
 /// leaves below them, and some children that are missing.
 pub fn wide_structure(count: usize) -> Vec<u32> {
     let mut nodes: Vec<[u32; NODE_WORDS]> = Vec::new();
-    let mut parents = Vec::new();
-    let mut open = std::collections::VecDeque::from([(0, count, u32::MAX)]);
-    while let Some((first, count, parent)) = open.pop_front() {
+    let mut open = std::collections::VecDeque::from([(0, count)]);
+    while let Some((first, count)) = open.pop_front() {
         let mut node = [0; NODE_WORDS];
         let own = nodes.len() as u32;
         node[4] = own + 1 + open.len() as u32;
@@ -25,7 +24,7 @@ pub fn wide_structure(count: usize) -> Vec<u32> {
                 leaf_slots += size;
                 ((1 << size) - 1) << 5 | (first + taken - node[5] as usize) as u32
             } else {
-                open.push_back((first + taken, size, own | (child as u32) << 29));
+                open.push_back((first + taken, size));
                 node[3] |= 1 << (24 + child);
                 0x20 | (24 + child as u32)
             };
@@ -34,9 +33,8 @@ pub fn wide_structure(count: usize) -> Vec<u32> {
         }
         assert_eq!(taken, count, "children have all triangles");
         nodes.push(node);
-        parents.push(parent);
     }
-    assemble(count, &nodes, &parents)
+    assemble(count, &nodes)
 }
 
 /// Leaves only where all fits into them, else six nodes and two leaves behind them, as far as there are triangles.
@@ -54,7 +52,7 @@ fn child_sizes(count: usize) -> [usize; CHILDREN] {
     std::array::from_fn(|child| take(if child < CHILDREN - 2 { share.min(count) } else { LEAF }))
 }
 
-fn assemble(count: usize, nodes: &[[u32; NODE_WORDS]], parents: &[u32]) -> Vec<u32> {
+fn assemble(count: usize, nodes: &[[u32; NODE_WORDS]]) -> Vec<u32> {
     let mut words = vec![0; HEADER_WORDS];
     let mut add = |part: &mut dyn Iterator<Item = u32>| -> u32 {
         words.resize(words.len().next_multiple_of(4), 0);
@@ -65,13 +63,11 @@ fn assemble(count: usize, nodes: &[[u32; NODE_WORDS]], parents: &[u32]) -> Vec<u
     let node_place = add(&mut nodes.iter().flatten().copied());
     let triangle = |index: u32| [0, 0, 0, index, 0, 0, 0, 0, 0, 0, 0, 1];
     let primitives = add(&mut (0..count as u32).flat_map(triangle));
-    let parents_place = add(&mut parents.iter().copied());
     words.resize(words.len().next_multiple_of(64), 0);
     words[3] = count as u32;
     words[4] = node_place;
     words[5] = primitives;
     words[8] = nodes.len() as u32;
     words[9] = 1;
-    words[10] = parents_place;
     words
 }

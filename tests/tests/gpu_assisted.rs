@@ -1,6 +1,11 @@
-//! Whether validation in shaders sees anything: its silence elsewhere says nothing where it does not.
+//! Whether validation in shaders sees anything: its silence elsewhere says nothing where it does not. And whether it shows what
+//! shaders print.
+#![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use lvk::{Dependencies, Result, Validation};
+use std::ffi::OsStr;
+
+use lvk::{ComputePipelineHandle, Context, Dependencies, Result, Validation};
+use lvk_tests::child::said_in_child;
 use lvk_tests::compute::{compute_pipeline, words_buffer};
 use lvk_tests::device_with;
 
@@ -37,4 +42,33 @@ fn a_read_beyond_a_buffer_is_a_message() -> Result<()> {
         assert_eq!(!found.is_empty(), messages, "{found:?}");
     }
     Ok(())
+}
+
+/// Printed once for each invocation.
+const PRINT: &str = r#"
+    layout(local_size_x = 3) in;
+    void main() { debugPrintfEXT("sheep %u of %u", gl_LocalInvocationID.x + 1u, gl_WorkGroupSize.x); }"#;
+
+#[test]
+fn the_layer_shows_what_shaders_print() {
+    let on = Some(OsStr::new("1"));
+    let variables = [("VK_LAYER_PRINTF_ENABLE", on), ("VK_LAYER_PRINTF_TO_STDOUT", on)];
+    let said = said_in_child(the_layer_shows_what_shaders_print, &variables, || {
+        let Some(ctx) = device_with(|desc| desc.validation = Validation::Standard) else { return };
+        let pipeline = compute_pipeline(&ctx, PRINT);
+        dispatch_once(&ctx, *pipeline).unwrap();
+        println!("dispatched");
+    });
+    let Some(said) = said.filter(|said| said.contains("dispatched")) else { return };
+    for number in 1..=3 {
+        assert!(said.contains(&format!("sheep {number} of 3")), "{said}");
+    }
+}
+
+fn dispatch_once(ctx: &Context, pipeline: ComputePipelineHandle) -> Result<()> {
+    let mut cmd = ctx.acquire_command_buffer()?;
+    cmd.bind_compute_pipeline(pipeline)?;
+    cmd.dispatch([1, 1, 1], &Dependencies::default())?;
+    ctx.submit(cmd)?;
+    ctx.wait_idle()
 }

@@ -1,4 +1,5 @@
-//! The same frame again and again: it takes nothing from the heap for a draw, and no memory grows.
+//! The same frame again and again: it takes nothing from the heap for a draw, and no memory grows, neither the library's nor
+//! the driver's nor the process's.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -11,7 +12,7 @@ use lvk::{
     ColorAttachment, ComputePipelineHandle, Context, ContextDesc, Dependencies, DeviceInstances, Format,
     Holder, OptionalFeature, PrimitiveOrder, RayQueryRequest, RenderPassDesc, RenderPipelineDesc,
     RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle, TextureUsage, TlasDesc, TlasInstance,
-    Triangles,
+    Triangles, Validation,
 };
 use lvk_tests::compute::{compute_pipeline, module};
 use lvk_tests::device::vulkan;
@@ -236,6 +237,56 @@ fn frames_that_create_and_destroy_keep_no_memory() {
         |budget: &lvk::MemoryBudget| budget.heaps.iter().map(|heap| heap.object_bytes).collect::<Vec<_>>();
     assert_eq!(bytes(&early.0), bytes(&late.0));
     assert_eq!(early.1, late.1);
+}
+
+/// What the heap of the process holds, the driver's own included; `None` where the C library does not tell it as glibc does.
+fn heap_bytes() -> Option<i64> {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    {
+        // SAFETY: no preconditions; it locks each arena while it counts.
+        let heap = unsafe { libc::mallinfo2() };
+        Some(heap.uordblks as i64 + heap.hblkhd as i64)
+    }
+    #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+    None
+}
+
+/// What of the process is in memory, `None` on systems that do not tell it as Linux does.
+fn resident_bytes() -> Option<i64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmRSS:"))?;
+    Some(1024 * line.split_whitespace().nth(1)?.parse::<i64>().ok()?)
+}
+
+/// What the driver says the process uses of all heaps, where it says that. Software drivers tell what all processes of the
+/// machine use, which changes at any time, and theirs is memory of the process anyway.
+fn driver_bytes(ctx: &Context) -> Option<i64> {
+    let budget = ctx.memory_budget();
+    let used = budget.heaps.iter().map(|heap| heap.used_bytes as i64).sum();
+    (budget.is_measured && !ctx.capabilities().is_cpu).then_some(used)
+}
+
+/// Frames that the driver records and runs, without the layer, which keeps memory of its own.
+#[test]
+fn frames_that_run_grow_neither_the_process_nor_what_the_driver_counts() {
+    /// A few bytes a frame on the heap, and some pages of it.
+    const SLACK: [i64; 2] = [16 << 10, 128 << 10];
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let Some(ctx) = device_with(|desc| desc.validation = Validation::Off) else { return };
+    let frame = Frame::new(&ctx);
+    let grown = |frames, bytes: &dyn Fn() -> Option<i64>| {
+        let before = bytes();
+        frame.run_many(&ctx, frames, 10);
+        bytes().zip(before).map_or(0, |(after, before)| after - before)
+    };
+    frame.run_many(&ctx, 3_000, 10);
+    // What is leaked grows every time; threads and allocators that take some pages more do so once.
+    let heap = [0; 3].map(|_| grown(3_000, &heap_bytes));
+    assert!(heap.iter().any(|grown| *grown < SLACK[0]), "the heap grows by {heap:?} bytes");
+    let process = [0; 3].map(|_| grown(1_000, &resident_bytes));
+    assert!(process.iter().any(|grown| *grown < SLACK[1]), "the process grows by {process:?} bytes");
+    let driver = [0; 3].map(|_| grown(3_000, &|| driver_bytes(&ctx)));
+    assert!(driver.iter().any(|grown| *grown < SLACK[1]), "what the driver counts grows by {driver:?} bytes");
 }
 
 #[test]

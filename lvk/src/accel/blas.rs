@@ -107,6 +107,13 @@ impl Blas {
         self.software.as_ref().map_or(0, SoftwareBlas::memory_bytes)
     }
 
+    /// Scratch bytes of the first builds of all parts and of what software traces.
+    pub(crate) fn first_build_scratch_bytes(&self) -> u64 {
+        let parts: u64 = self.parts.iter().map(|part| part.sizes.build_scratch_bytes).sum();
+        let software = self.software.as_ref().map_or(0, SoftwareBlas::first_build_scratch_bytes);
+        parts.saturating_add(software)
+    }
+
     /// Buffers the library keeps for it, in bytes: maps of primitives and matrices.
     pub(crate) fn table_bytes(&self) -> u64 {
         let maps = self.parts.iter().filter_map(|part| part.map.as_ref());

@@ -71,7 +71,8 @@ pub(crate) enum IndexBytes<'a> {
 }
 
 impl IndexBytes<'_> {
-    fn corners(&self, triangle: u32) -> Option<[u32; 3]> {
+    /// The vertices of a triangle; `None` beyond the last one.
+    pub(crate) fn corners(&self, triangle: u32) -> Option<[u32; 3]> {
         match self {
             Self::None => {
                 let first = triangle.checked_mul(3)?;

@@ -145,7 +145,7 @@ impl TlasBuild {
     /// # Safety
     /// The command buffer is being recorded; instances, structure and scratch memory are alive, checked, aligned and large
     /// enough, and barriers keep them apart from other commands.
-    #[inline]
+    #[inline(always)]
     pub(crate) unsafe fn record(&self, ext: &ExtDevice, commands: vk::CommandBuffer) {
         let geometry = [instances_geometry(self.instances)];
         let info = build_info(vk::AccelerationStructureTypeKHR::TOP_LEVEL, self.flags, &geometry, self.refit);

@@ -91,12 +91,15 @@ pub struct DeviceInstances<'a> {
 /// Fails unless every number of the instance fits. Quick where it does: there may be millions.
 #[inline]
 pub(crate) fn check(name: &str, index: usize, instance: &TlasInstance) -> Result<()> {
+    if is_right(instance) { Ok(()) } else { Err(complaint(name, index, instance)) }
+}
+
+/// Whether [`check`] finds nothing wrong.
+#[inline]
+pub(crate) fn is_right(instance: &TlasInstance) -> bool {
     const BOTH: InstanceFlags = InstanceFlags::FORCE_OPAQUE.union(InstanceFlags::FORCE_NO_OPAQUE);
     let fits = (instance.custom_index | instance.hit_group_offset) >> 24 == 0;
-    if fits && is_finite(&instance.transform) && !instance.flags.contains(BOTH) {
-        return Ok(());
-    }
-    Err(complaint(name, index, instance))
+    fits && is_finite(&instance.transform) && !instance.flags.contains(BOTH)
 }
 
 /// Whether no exponent is all ones, without a branch for each number.

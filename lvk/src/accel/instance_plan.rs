@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::instance::{INSTANCE_BYTES, TlasInstance, check, pack};
+use super::instance::{INSTANCE_BYTES, TlasInstance, check, is_right, pack};
 use super::shown::{Find, Gather, Marks, Shown, ShownSet};
 use crate::error::{Error, Result, check_limit};
 
@@ -53,6 +53,25 @@ pub(crate) fn write_addresses(
         return Ok(Addresses::OfKnown);
     }
     Ok(Addresses::OfOthers(Arc::new(gather.finish().0)))
+}
+
+/// As [`write_addresses`], of a few instances. Answers `false` unless they are as they should, and refer to all that is known,
+/// which needs no more than addresses, and to nothing else; then what was written means nothing.
+#[inline(never)]
+pub(crate) fn write_alike(instances: &[TlasInstance], known: &ShownSet, out: &mut [u8]) -> bool {
+    // A bit for each structure that is known. More than there are bits are never all met by a few.
+    let mut unmet = match known.list().len() {
+        count @ 1..=64 => u64::MAX >> (64 - count),
+        _ => return false,
+    };
+    for (instance, out) in instances.iter().zip(out.chunks_exact_mut(INSTANCE_BYTES)) {
+        let Some((place, address)) = known.address(instance.blas).filter(|_| is_right(instance)) else {
+            return false;
+        };
+        unmet &= !(1 << place);
+        out.copy_from_slice(bytemuck::bytes_of(&pack(instance, address)));
+    }
+    unmet == 0
 }
 
 fn write_chunks(
@@ -240,5 +259,59 @@ impl InstancePlan {
             out.copy_from_slice(bytemuck::bytes_of(&raw));
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::accel::blas::{Blas, BlasBody};
+    use crate::accel::flags::{AccelStructSizes, BuildFlags};
+    use crate::accel::structure::{AccelKind, AccelStruct};
+    use crate::handle::AccelStructHandle;
+    use crate::store::Pool;
+
+    fn blas() -> AccelStruct {
+        let body = BlasBody { structures: Vec::new(), compacted_from: None, rebuildable: true };
+        let blas = Blas::new(Vec::new(), None, Vec::new(), body, None);
+        AccelStruct::new("mesh", BuildFlags::empty(), AccelStructSizes::default(), AccelKind::Blas(blas))
+    }
+
+    proptest! {
+        /// Against the general way, from what any list before has shown.
+        #[test]
+        fn a_few_instances_are_written_alike_only_if_they_show_what_is_known(
+            count in 1..20_usize,
+            before in prop::collection::vec(any::<prop::sample::Index>(), 0..20),
+            after in prop::collection::vec(any::<prop::sample::Index>(), 1..17),
+            same in any::<bool>(),
+            wrong in prop::option::weighted(0.2, any::<prop::sample::Index>()),
+        ) {
+            let pool = Pool::<AccelStructHandle, AccelStruct>::new(7);
+            let handles: Vec<_> = (0..count).map(|_| pool.insert(blas())).collect();
+            let find = |handle| pool.get(handle);
+            let handle = |index: &prop::sample::Index| *index.get(&handles);
+            let shown = before.iter().map(handle);
+            let known = {
+                let (nothing, mut marks) = (ShownSet::default(), Marks::default());
+                let mut gather = Gather::new(&nothing, &mut marks, &find);
+                shown.clone().for_each(|handle| drop(gather.place(handle)));
+                gather.finish().0
+            };
+            let list: Vec<_> = if same && !before.is_empty() { shown.collect() } else { after.iter().map(handle).collect() };
+            let mut instances: Vec<_> = list.into_iter().map(TlasInstance::new).collect();
+            if let Some(index) = wrong {
+                let place = index.index(instances.len());
+                instances[place].custom_index = 1 << 24;
+            }
+            let room = || vec![0; instances.len() * INSTANCE_BYTES];
+            let (mut ours, mut general, mut marks) = (room(), room(), Marks::default());
+            let expected = write_addresses("t", &instances, &known, &mut marks, &find, &mut general);
+            let is_known = matches!(expected, Ok(Addresses::OfKnown));
+            prop_assert_eq!(write_alike(&instances, &known, &mut ours), is_known);
+            prop_assert!(!is_known || ours == general);
+        }
     }
 }

@@ -150,11 +150,23 @@ impl ShownSet {
         self.handles == handles
     }
 
+    /// The place of a structure, and what an instance of it refers to.
+    #[inline]
+    pub(crate) fn address(&self, handle: AccelStructHandle) -> Option<(u32, u64)> {
+        let place = self.place(handle)?;
+        Some((place as u32, self.addresses[place]))
+    }
+
     #[inline]
     fn place(&self, handle: AccelStructHandle) -> Option<usize> {
         if self.handles.len() <= Self::FEW {
             return self.handles.iter().position(|known| *known == handle);
         }
+        self.place_among_many(handle)
+    }
+
+    #[inline(never)]
+    fn place_among_many(&self, handle: AccelStructHandle) -> Option<usize> {
         self.places.get(&handle).map(|place| *place as usize)
     }
 }

@@ -28,7 +28,9 @@ pub(crate) struct TlasUpdate {
 
 /// A command as it was recorded.
 pub(crate) struct Recorded {
-    pub(crate) change: Change,
+    /// Instances of the caller, and those Vulkan is given.
+    pub(crate) counts: (u32, u32),
+    pub(crate) refit: bool,
     /// The rows that it has the table of structures name, where it writes that.
     pub(crate) named_rows: Option<u64>,
     /// When what is shown was looked at.
@@ -52,9 +54,15 @@ impl TlasUpdate {
     #[inline(always)]
     pub(crate) fn look(&mut self, tlas: &Tlas) -> &TlasContents {
         if !self.is_recorded {
-            self.contents = None;
+            self.look_at_submitted(tlas);
         }
-        self.contents.get_or_insert_with(|| tlas.contents().without_source())
+        self.contents.get_or_insert_default()
+    }
+
+    /// Looks at what the last submission has it show.
+    #[inline(never)]
+    fn look_at_submitted(&mut self, tlas: &Tlas) {
+        self.contents = Some(tlas.contents().without_source());
     }
 
     /// Whether a command has updated it.
@@ -63,25 +71,33 @@ impl TlasUpdate {
         self.is_recorded
     }
 
-    /// A command was recorded. Answers what is shown no longer, though the commands before are to read it.
+    /// A command was recorded. Answers whether one was before.
     #[inline(always)]
-    fn record(&mut self, recorded: Recorded) -> Option<TlasContents> {
-        let Recorded { change, named_rows, revision } = recorded;
-        let Change { count, built_count, shown, source, refit } = change;
+    fn note(&mut self, recorded: &Recorded) -> bool {
+        let Recorded { counts, refit, named_rows, revision } = *recorded;
         self.named_rows = named_rows.or(self.named_rows);
         self.relies_on_no_rows |= self.named_rows.is_none();
         let was_recorded = std::mem::replace(&mut self.is_recorded, true);
         if refit && !was_recorded {
-            self.relies_on = Some((count, built_count));
+            self.relies_on = Some(counts);
         }
         let contents = self.contents.get_or_insert_default();
         let refits = if refit { contents.refits.saturating_add(1) } else { 0 };
-        (contents.instance_count, contents.built_count, contents.refits) = (Some(count), built_count, refits);
+        (contents.instance_count, contents.built_count, contents.refits) = (Some(counts.0), counts.1, refits);
         contents.revision = revision;
+        was_recorded
+    }
+
+    /// A command has it show this from now on, and where it is `None` what was shown before, written from this source. Answers
+    /// what is shown no longer, though commands of this command buffer are to read it.
+    fn replace(
+        &mut self,
+        shown: Option<Arc<ShownSet>>,
+        source: Option<Arc<InstanceSource>>,
+        was_recorded: bool,
+    ) -> Option<TlasContents> {
+        let contents = self.contents.get_or_insert_default();
         let shown = shown.filter(|shown| !Arc::ptr_eq(shown, &contents.shown));
-        if shown.is_none() && source.is_none() && contents.source.is_none() {
-            return None;
-        }
         let source = std::mem::replace(&mut contents.source, source);
         let shown = shown.map(|shown| std::mem::replace(&mut contents.shown, shown));
         // What was submitted stays with the structure until this is submitted, too.
@@ -89,6 +105,12 @@ impl TlasUpdate {
             return None;
         }
         Some(TlasContents { shown: shown.unwrap_or_default(), source, ..TlasContents::default() })
+    }
+
+    /// Whether what it shows can be written again from a source of its own.
+    #[inline(always)]
+    fn has_source(&self) -> bool {
+        self.contents.as_ref().is_some_and(|contents| contents.source.is_some())
     }
 
     /// Fails if another submission changed the number of instances since the refit was recorded.
@@ -173,11 +195,26 @@ impl TlasUpdates {
         Row { target: found.at(row), update: &mut list[row], nothing, memory }
     }
 
-    /// A command was recorded that updates the structure of a row.
+    /// A command was recorded that has the structure of a row show something.
+    pub(crate) fn record(
+        &mut self,
+        row: usize,
+        recorded: &Recorded,
+        shown: Option<Arc<ShownSet>>,
+        source: Option<Arc<InstanceSource>>,
+    ) {
+        let update = &mut self.list[row];
+        let was_recorded = update.note(recorded);
+        self.replaced.extend(update.replace(shown, source, was_recorded));
+    }
+
+    /// As [`record`](Self::record), where the same is shown as before, and instances were written with addresses.
     #[inline(always)]
-    pub(crate) fn record(&mut self, row: usize, recorded: Recorded) {
-        if let Some(replaced) = self.list[row].record(recorded) {
-            self.replaced.push(replaced);
+    pub(crate) fn record_alike(&mut self, row: usize, recorded: &Recorded) {
+        let update = &mut self.list[row];
+        let was_recorded = update.note(recorded);
+        if update.has_source() {
+            self.replaced.extend(update.replace(None, None, was_recorded));
         }
     }
 
@@ -218,5 +255,113 @@ impl TlasUpdates {
         self.found.clear();
         self.list.clear();
         self.replaced.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Weak;
+
+    use super::super::flags::{AccelStructSizes, BuildFlags, BuildMode};
+    use super::super::structure::AccelKind;
+    use super::*;
+
+    fn structure() -> Arc<AccelStruct> {
+        let kind = AccelKind::Tlas(Tlas::new(0, 4, 4, None, None));
+        Arc::new(AccelStruct::new("scene", BuildFlags::empty(), AccelStructSizes::default(), kind))
+    }
+
+    fn recorded(count: u32, refit: bool) -> Recorded {
+        Recorded { counts: (count, count), refit, named_rows: None, revision: Revision::default() }
+    }
+
+    fn set() -> (Option<Arc<ShownSet>>, Weak<ShownSet>) {
+        let set = Arc::new(ShownSet::default());
+        let watch = Arc::downgrade(&set);
+        (Some(set), watch)
+    }
+
+    fn submit(updates: &mut TlasUpdates) {
+        updates.check().unwrap();
+        updates.apply(|_, _| {});
+    }
+
+    /// Over several command buffers, as each begins with what was submitted.
+    #[test]
+    fn auto_counts_the_refits_since_the_last_rebuild() {
+        let (target, auto) = (structure(), BuildMode::Auto { max_refits: 2 });
+        let mut refits = Vec::new();
+        for _ in 0..4 {
+            let mut updates = TlasUpdates::default();
+            let row = updates.row(&target);
+            for _ in 0..2 {
+                let Row { target, update, .. } = updates.at(row);
+                let contents = update.look(target.tlas().unwrap());
+                let refit = auto.refits(contents.counts() == Some((1, 1)), contents.refits);
+                updates.record_alike(row, &recorded(1, refit));
+                refits.push(refit);
+            }
+            submit(&mut updates);
+        }
+        assert_eq!(refits, [false, true, true, false, true, true, false, true]);
+    }
+
+    /// What a command shows, and the next of the same command buffer no longer, is still read by the first.
+    #[test]
+    fn what_is_shown_is_kept_until_the_gpu_is_done_with_it() {
+        let target = structure();
+        let [(first, is_first), (second, is_second), (third, is_third)] = [set(), set(), set()];
+        let mut updates = TlasUpdates::default();
+        let row = updates.row(&target);
+        updates.record(row, &recorded(1, false), first, None);
+        submit(&mut updates);
+        drop(updates.take_replaced());
+        updates.clear();
+        assert!(is_first.strong_count() > 0);
+        let row = updates.row(&target);
+        updates.record(row, &recorded(1, false), second, None);
+        updates.record(row, &recorded(1, false), third, None);
+        updates.record_alike(row, &recorded(1, true));
+        let is_alive = || [&is_first, &is_second, &is_third].map(|set| set.strong_count() > 0);
+        assert_eq!(is_alive(), [true; 3]);
+        submit(&mut updates);
+        assert_eq!(is_alive(), [true; 3]);
+        let kept: Vec<_> = updates.take_replaced().collect();
+        updates.clear();
+        assert_eq!(is_alive(), [true; 3]);
+        drop(kept);
+        assert_eq!(is_alive(), [false, false, true]);
+    }
+
+    /// Those that are not submitted change nothing, and leave nothing behind.
+    #[test]
+    fn a_command_buffer_that_is_given_up_keeps_nothing() {
+        let target = structure();
+        let mut updates = TlasUpdates::default();
+        let [(first, is_first), (second, is_second)] = [set(), set()];
+        let row = updates.row(&target);
+        updates.record(row, &recorded(1, false), first, None);
+        updates.record(row, &recorded(2, false), second, None);
+        updates.clear();
+        assert_eq!((is_first.strong_count(), is_second.strong_count()), (0, 0));
+        assert_eq!(target.tlas().unwrap().contents().counts(), None);
+    }
+
+    #[test]
+    fn a_refit_needs_the_number_of_instances_it_was_recorded_for() {
+        let target = structure();
+        let [mut first, mut other, mut late] = [(); 3].map(|()| TlasUpdates::default());
+        let record = |updates: &mut TlasUpdates, count, refit| {
+            let row = updates.row(&target);
+            updates.record_alike(row, &recorded(count, refit));
+        };
+        record(&mut first, 2, false);
+        submit(&mut first);
+        record(&mut late, 2, true);
+        assert!(late.check().is_ok());
+        record(&mut other, 3, false);
+        submit(&mut other);
+        let message = late.check().unwrap_err().to_string();
+        assert!(message.contains("scene") && message.contains("rebuild"), "{message}");
     }
 }

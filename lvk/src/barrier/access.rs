@@ -110,6 +110,11 @@ impl Stages {
         }
     }
 
+    /// The accesses that any of these stages can perform.
+    pub(crate) fn possible_accesses(self) -> Access {
+        self.rows().fold(Access::empty(), |all, row| all | POSSIBLE[row])
+    }
+
     /// Position of a single stage in a table of [`Stages::COUNT`] rows.
     #[cfg(test)]
     fn row(self) -> usize {
@@ -286,8 +291,7 @@ impl Use {
     /// What of it the given stages do.
     pub(crate) fn limited_to(self, stages: Stages) -> Self {
         let stages = self.stages & stages;
-        let possible = stages.rows().fold(Access::empty(), |all, row| all | POSSIBLE[row]);
-        Self { stages, access: self.access & possible, ..self }
+        Self { stages, access: self.access & stages.possible_accesses(), ..self }
     }
 
     /// The same accesses in another layout.

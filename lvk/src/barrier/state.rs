@@ -103,8 +103,18 @@ impl State {
         next.is_write() || (next.layout != Layout::Undefined && next.layout != self.layout)
     }
 
+    /// The barrier in front of a use that writes as the last one did, with nothing between, after which all stands as before.
+    /// `None` for every other use.
+    #[inline(always)]
+    pub(crate) fn repeated(&self, next: Use) -> Option<Scopes> {
+        let write = Scope { stages: next.stages, access: next.access & Access::WRITES };
+        let is_last = self.write == write && self.layout == next.layout && self.readers.is_empty();
+        let is_repeated = is_last && !write.access.is_empty() && self.epoch.is_none();
+        is_repeated
+            .then(|| self.scopes(write, Scope { stages: next.stages, access: next.access }, self.layout))
+    }
+
     /// Adds a read in the current layout.
-    #[inline(never)]
     pub(crate) fn read_by(&mut self, next: Use) -> Option<Scopes> {
         self.read(&next.into())
     }
@@ -242,6 +252,8 @@ fn last_of(stages: Stages) -> Stages {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     const COMPUTE_WRITE: Use = on_buffer(Use::shader_write(Stages::COMPUTE));
@@ -249,6 +261,44 @@ mod tests {
 
     const fn on_buffer(touch: Use) -> Use {
         touch.with_layout(Layout::Undefined)
+    }
+
+    fn uses() -> impl Strategy<Value = Use> {
+        let stages = || {
+            prop::sample::select(vec![Stages::COMPUTE, Stages::FRAGMENT, Stages::COMPUTE | Stages::FRAGMENT])
+        };
+        prop_oneof![
+            3 => stages().prop_map(Use::shader_write),
+            1 => stages().prop_map(Use::shader_read),
+            1 => Just(Use::transfer_write()),
+            1 => Just(Use::present()),
+            1 => Just(COMPUTE_WRITE),
+            1 => Just(Use::host_read()),
+        ]
+    }
+
+    proptest! {
+        /// From any state that uses lead to: nothing is taken for a repetition that is none.
+        #[test]
+        fn a_repeated_use_has_the_barrier_of_any_other_and_changes_nothing(
+            before in prop::collection::vec((uses(), any::<bool>()), 0..5), next in uses()
+        ) {
+            let mut state = State::default();
+            for (touch, accumulated) in before {
+                let _ = match accumulated {
+                    true => accumulate(&mut state, &touch.into()),
+                    false => transition(&mut state, touch),
+                };
+            }
+            let (repeated, was) = (state.repeated(next), state);
+            let barrier = transition(&mut state, next);
+            if repeated.is_some() {
+                prop_assert_eq!(repeated, barrier);
+                prop_assert_eq!(state, was);
+            }
+            // Twice the same write is one.
+            prop_assert_eq!(state.repeated(next).is_some(), next.is_write() && next.layout == state.layout);
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::access::{Layout, StageAccess, Stages, Use};
 use super::batch::Barriers;
 use super::resource_id::{IdMap, ResourceId};
-use super::state::{Scopes, State, accumulate};
+use super::state::{Scopes, State, accumulate, transition};
 use super::subresource::{Cells, Subresources, TextureShape};
 
 /// How a command buffer uses a (sub)resource before anything in it must wait for anything else in it.
@@ -52,29 +52,22 @@ pub(super) struct Local {
 }
 
 impl Local {
-    /// Adds a use; `wait` gets the barrier in front of it, if one is needed. That is called from two places, so that a barrier is
-    /// told in registers.
+    /// The barrier in front of a use that is the last one again, and changes nothing here; `None` for every other use.
     #[inline(always)]
-    fn step(&mut self, next: Use, wait: impl FnMut(Scopes)) {
+    fn repeated(&self, next: Use) -> Option<Scopes> {
+        if self.past_prefix { self.state.repeated(next) } else { None }
+    }
+
+    /// Adds a use; answers the barrier in front of it, if one is needed.
+    #[inline(never)]
+    fn step(&mut self, next: Use) -> Option<Scopes> {
         if !self.past_prefix {
             self.step_prefix(next);
         }
-        if self.state.is_changed_by(next) {
-            self.state.overwrite(next).into_iter().for_each(wait);
-        } else {
-            self.state.read_by(next).into_iter().for_each(wait);
-        }
-    }
-
-    /// As [`step`](Self::step), and answers the barrier.
-    fn barrier(&mut self, next: Use) -> Option<Scopes> {
-        let mut barrier = None;
-        self.step(next, |scopes| barrier = Some(scopes));
-        barrier
+        transition(&mut self.state, next)
     }
 
     /// A use that may wait for nothing in the command buffer.
-    #[inline(never)]
     fn step_prefix(&mut self, next: Use) {
         match &mut self.prefix {
             Prefix::Unused => self.begin(next),
@@ -182,7 +175,10 @@ impl Tracker {
     #[inline(always)]
     pub(crate) fn use_buffer(&mut self, id: ResourceId, next: Use, out: &mut Barriers) {
         let next = next.with_layout(Layout::Undefined);
-        self.buffers.entry(id, Local::default).step(next, |scopes| out.push_memory(&scopes));
+        let local = self.buffers.entry(id, Local::default);
+        if let Some(scopes) = local.repeated(next).or_else(|| local.step(next)) {
+            out.push_memory(&scopes);
+        }
     }
 
     /// A command writes a part of a resource that no other such command writes without a use in between, for example
@@ -208,9 +204,9 @@ impl Tracker {
     ) {
         let next = with_some_layout(next);
         let cells = self.textures.entry(id, || Cells::new(shape, Local::default()));
-        match cells.whole(subresources) {
-            Some(local) => local.step(next, |scopes| out.push_image(id, subresources, &scopes)),
-            None => use_each(id, cells, subresources, next, out),
+        match cells.whole(subresources).and_then(|local| local.repeated(next)) {
+            Some(scopes) => out.push_memory(&scopes),
+            None => use_parts(id, cells, subresources, next, out),
         }
     }
 
@@ -316,17 +312,21 @@ fn positions(shape: TextureShape) -> impl Iterator<Item = (u32, u32)> {
     (0..shape.layers).flat_map(move |layer| (0..shape.mips).map(move |mip| (mip, layer)))
 }
 
-/// Uses a part of a texture whose parts differ, or come to differ: by far less frequent than all of it at once.
+/// Uses a part of a texture otherwise than the last time.
 #[inline(never)]
-fn use_each(id: ResourceId, cells: &mut Cells<Local>, part: Subresources, next: Use, out: &mut Barriers) {
-    for (range, scopes) in cells.step(part, |local| local.barrier(next)) {
-        out.push_image(id, range, &scopes);
+fn use_parts(id: ResourceId, cells: &mut Cells<Local>, part: Subresources, next: Use, out: &mut Barriers) {
+    match cells.whole(part) {
+        Some(local) => local.step(next).iter().for_each(|scopes| out.push_image(id, part, scopes)),
+        None => cells
+            .step(part, |local| local.step(next))
+            .iter()
+            .for_each(|(part, scopes)| out.push_image(id, *part, scopes)),
     }
 }
 
 fn would_wait(local: &Local, next: Use) -> bool {
     let mut after = *local;
-    after.barrier(next).is_some()
+    after.step(next).is_some()
 }
 
 /// A texture always needs a layout; one that every access allows stands in for none.

@@ -38,25 +38,51 @@ struct Build {
 pub(crate) struct OpenBuild {
     target: Arc<AccelStruct>,
     refit: bool,
+    tree: TreeUse,
     submitted: bool,
+}
+
+/// What a build does to the tree that the CPU made of a structure for software to trace.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum TreeUse {
+    /// Nothing: there is none, or it was moved before.
+    None,
+    /// Refits it where it lies.
+    Refits,
+    /// Puts one of the GPU in its place, elsewhere.
+    Moves,
 }
 
 impl OpenBuild {
     /// Keeps what stands for a bottom-level structure in place, and answers it.
     fn of_blas(target: &Arc<AccelStruct>) -> Result<(Self, Arc<BlasBody>)> {
         let body = target.blas()?.open_build();
-        Ok((Self { target: Arc::clone(target), refit: false, submitted: false }, body))
+        Ok((Self { target: Arc::clone(target), refit: false, tree: TreeUse::None, submitted: false }, body))
     }
 
     /// A top-level structure stays what it is.
     pub(super) fn of_tlas(target: Arc<AccelStruct>) -> Self {
-        Self { target, refit: false, submitted: false }
+        Self { target, refit: false, tree: TreeUse::None, submitted: false }
+    }
+
+    /// Fails if a submission since it was recorded has moved the tree that it refits.
+    pub(super) fn check(&self) -> Result<()> {
+        let software = self.target.blas().ok().and_then(|blas| blas.software.as_ref());
+        if self.tree == TreeUse::Refits && software.is_some_and(|software| software.moved().is_some()) {
+            let message =
+                "a refit was recorded, but a submission since then has rebuilt the structure; record it anew";
+            return Err(Error::usage(&self.target.name, message));
+        }
+        Ok(())
     }
 
     /// It went to the GPU with this timeline value.
     pub(crate) fn submit(mut self, value: u64) {
         self.target.submitted(value);
         self.submitted = true;
+        if let (TreeUse::Moves, Ok(Blas { software: Some(software), .. })) = (self.tree, self.target.blas()) {
+            software.set_moved();
+        }
     }
 }
 
@@ -81,6 +107,7 @@ impl CommandBuffer {
     /// [`InvalidUsage`](Error::InvalidUsage) for a refit without
     /// [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), a rebuild of a structure that was compacted, or
     /// compacted before it was saved, and a structure listed twice; [`WrongQueue`](Error::WrongQueue) on the transfer queue.
+    /// Where there is no memory for what software traces, the command buffer can no longer be submitted.
     pub fn build_blas(&mut self, structures: &[AccelStructHandle], mode: BuildMode) -> Result<()> {
         self.needs_compute(BUILD)?;
         let found: Result<Vec<_>> =
@@ -122,7 +149,7 @@ impl CommandBuffer {
         for target in structures {
             let (mut build, body) = OpenBuild::of_blas(target)?;
             let refit = resolve_mode(target, &body, mode, self.refits_of(target)?)?;
-            build.refit = refit;
+            (build.refit, build.tree) = (refit, self.tree_use(target, refit)?);
             open.push(build);
             self.plan_blas(target, &body, refit, &mut builds)?;
             refits.push(refit);
@@ -131,13 +158,47 @@ impl CommandBuffer {
             self.gather_inputs(structures, &refits)?;
             self.record_builds(&builds)?;
         }
-        software(self, structures, &refits)?;
+        if let Err(error) = software(self, structures, &refits) {
+            let name = structures.first().map_or("build_blas", |target| &target.name);
+            return Err(self.tear(name, error));
+        }
         for build in &open {
             let refits = if build.refit { self.refits_of(&build.target)?.saturating_add(1) } else { 0 };
             self.notes.refits.insert(build.target.id.0, refits);
         }
         self.notes.open_builds.extend(open);
         Ok(())
+    }
+
+    /// What the next build does to the tree that the CPU made.
+    fn tree_use(&self, target: &AccelStruct, refit: bool) -> Result<TreeUse> {
+        let software = target.blas()?.software.as_ref();
+        let Some(software) = software.filter(|software| software.is_of_cpu() && !self.first_builds) else {
+            return Ok(TreeUse::None);
+        };
+        Ok(match (refit, self.moved_tree(target, software).is_some()) {
+            (true, false) => TreeUse::Refits,
+            (true, true) => TreeUse::None,
+            (false, _) => TreeUse::Moves,
+        })
+    }
+
+    /// A command failed with a part of it recorded: the command buffer cannot be submitted any more.
+    #[cold]
+    pub(super) fn tear(&mut self, name: &str, error: Error) -> Error {
+        self.notes.torn.get_or_insert_with(|| name.to_owned());
+        error
+    }
+
+    /// Fails if what was recorded is not whole, or no longer fits what was submitted since.
+    pub(crate) fn check_recorded(&self) -> Result<()> {
+        if let Some(name) = &self.notes.torn {
+            let message =
+                "a command on it failed half recorded; give the command buffer up and record it anew";
+            return Err(Error::usage(name, message));
+        }
+        self.notes.open_builds.iter().try_for_each(OpenBuild::check)?;
+        self.notes.tlas_updates.as_ref().map_or(Ok(()), |updates| updates.check())
     }
 
     /// Refits since the last rebuild of a bottom-level structure, before the next command.

@@ -50,7 +50,7 @@ impl CommandBuffer {
     }
 
     /// The next command's shaders reach these in `stages`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn use_dependencies(&mut self, deps: &Dependencies<'_>, stages: Stages) -> Result<()> {
         // Most lists are empty: asked here, where that is quick.
         if !deps.sampled_images.is_empty() {
@@ -75,7 +75,7 @@ impl CommandBuffer {
     }
 
     /// The next command's shaders reach a part of each texture, which must have the usage.
-    #[inline(never)]
+    #[inline(always)]
     fn use_images(
         &mut self,
         handles: &[TextureHandle],
@@ -107,7 +107,7 @@ impl CommandBuffer {
     }
 
     /// Records the barriers in front of the next command.
-    #[inline]
+    #[inline(never)]
     pub(super) fn flush(&mut self) {
         self.end_rendering();
         let Recording { commands, tracker, images, .. } = &mut **self.recording;

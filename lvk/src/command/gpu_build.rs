@@ -51,7 +51,7 @@ pub(crate) struct GpuRefit {
 
 impl CommandBuffer {
     /// Records builds, side by side as far as the scratch memory has room. A top-level structure goes into a later call
-    /// than what it shows. On an error nothing is recorded.
+    /// than what it shows. On an error nothing of the batch that failed is recorded, nor of those behind it.
     pub(crate) fn record_gpu_builds(&mut self, builds: &[GpuBuild]) -> Result<()> {
         let sizes: Vec<_> = builds.iter().map(|build| build.plan.scratch_bytes).collect();
         self.in_scratch_batches(&sizes, |cmd, range, scratch| {
@@ -72,12 +72,9 @@ impl CommandBuffer {
         })
     }
 
-    /// Records refits, side by side as far as the scratch memory has room. On an error nothing is recorded.
-    ///
-    /// # Errors
-    /// [`InvalidUsage`](crate::Error::InvalidUsage) for a structure that keeps no parents.
+    /// Records refits, side by side as far as the scratch memory has room; errors as of
+    /// [`record_gpu_builds`](Self::record_gpu_builds).
     pub(crate) fn record_gpu_refits(&mut self, refits: &[GpuRefit]) -> Result<()> {
-        refits.iter().try_for_each(|refit| refit.plan.check(&refit.target.name))?;
         let sizes: Vec<_> = refits.iter().map(|refit| refit.plan.scratch_bytes()).collect();
         self.in_scratch_batches(&sizes, |cmd, range, scratch| {
             let refits = &refits[range];
@@ -101,7 +98,8 @@ impl CommandBuffer {
         let shared = Arc::clone(&self.shared);
         let alignment = u64::from(shared.gpu.caps.limits.scratch_alignment).max(SCRATCH_ALIGNMENT);
         let own = &shared.scratch[self.recording.lane];
-        let batches = plan_scratch(sizes, alignment, own.tiers.batch_bytes());
+        let budget = own.tiers.batch_bytes().saturating_sub(alignment);
+        let batches = plan_scratch(sizes, alignment, budget);
         let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
         let (scratch, replaced) = own.get(&shared.gpu, most.saturating_add(alignment))?;
         self.retire_replaced(replaced);

@@ -8,8 +8,10 @@ use super::transfer::BufferCopy;
 use crate::accel::AccelStruct;
 use crate::accel::build::instance_bytes;
 use crate::accel::flags::BuildFlags;
-use crate::accel::instance::{DeviceInstances, TlasInstance};
-use crate::accel::instance_plan::{Addresses, InstancePlan, PlanMemory, starts_plain, write_addresses};
+use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance};
+use crate::accel::instance_plan::{
+    Addresses, InstancePlan, PlanMemory, starts_plain, write_addresses, write_alike,
+};
 use crate::accel::shown::{Marks, Shown, ShownSet};
 use crate::accel::tlas::{InstanceSource, Numbers, SourceBytes, Tlas};
 use crate::accel::tlas_updates::Change;
@@ -19,6 +21,7 @@ use crate::kernel::{InstancesPush, Kernel};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::shared::Garbage;
+use crate::upload::staging::StagingChunk;
 
 /// Addresses of instances must be a multiple of this.
 const INSTANCE_ALIGNMENT: u64 = 16;
@@ -64,9 +67,31 @@ impl Written {
     }
 }
 
+/// So many instances are written without a list of what they refer to.
+const FEW_INSTANCES: usize = StagingChunk::MOST_BYTES as usize / INSTANCE_BYTES;
+
 impl CommandBuffer {
-    /// Writes instances with addresses; `None` where a kernel is needed. `known` is what was shown before, if that still stands.
+    /// Writes a few instances of just what is `known`, which still stands. Answers their address; `None` for any others, wrong
+    /// ones among them.
     #[inline(always)]
+    pub(super) fn stage_alike(
+        &mut self,
+        instances: &[TlasInstance],
+        known: &ShownSet,
+    ) -> Result<Option<u64>> {
+        if known.needs_kernel || instances.is_empty() || instances.len() > FEW_INSTANCES {
+            return Ok(None);
+        }
+        let sequence = self.recording.staging_key();
+        let bytes = (instances.len() * INSTANCE_BYTES) as u64;
+        let (address, alike) =
+            self.shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, |out| {
+                write_alike(instances, known, out)
+            })?;
+        Ok(alike.then_some(address))
+    }
+
+    /// Writes instances with addresses; `None` where a kernel is needed. `known` is what was shown before, if that still stands.
     pub(super) fn stage_instances(
         &mut self,
         name: &str,

@@ -57,7 +57,8 @@ pub(crate) use notes::SpareNotes;
 /// [`acquire_command_buffer_on`](crate::Context::acquire_command_buffer_on) a queue, and hand it to
 /// [`Context::submit`](crate::Context::submit). Several may be recorded side by side on different threads; the GPU
 /// sees them in the order of submission. Barriers, descriptor sets and the lifetime of everything used are the
-/// library's business. A command that answers an error has recorded nothing; the command buffer stays usable.
+/// library's business. A command that answers an error has recorded nothing; the command buffer stays usable. The exceptions are
+/// builds that run out of memory half way: they say so, and [`Context::submit`](crate::Context::submit) refuses the command buffer.
 /// Dropping a command buffer gives it up.
 pub struct CommandBuffer {
     shared: Arc<Shared>,

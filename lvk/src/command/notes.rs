@@ -43,6 +43,8 @@ pub(crate) struct Notes {
     pub(super) queries: QueryLog,
     /// Bottom-level structures that are built elsewhere from here on, by their ids.
     pub(super) moved: HashSet<u64>,
+    /// What a command failed on with only a part of it recorded.
+    pub(super) torn: Option<String>,
 }
 
 impl Notes {
@@ -76,6 +78,7 @@ impl Notes {
             size_queries,
             queries,
             moved,
+            torn,
         } = self;
         found_buffers.clear();
         found_textures.clear();
@@ -92,6 +95,7 @@ impl Notes {
         size_queries.clear();
         queries.clear();
         moved.clear();
+        *torn = None;
     }
 }
 

@@ -131,8 +131,7 @@ impl CommandBuffer {
     ) -> Result<()> {
         let geometries = self.gpu_geometries(target, blas)?;
         let reads = self.reads(blas)?;
-        let moved =
-            software.rebuilt().filter(|_| blas.builds() > 1 || self.notes.moved.contains(&target.id.0));
+        let moved = self.moved_tree(target, software);
         let refit_of = |plan: GpuRefitPlan, body: &SoftwareBody| GpuRefit {
             plan,
             geometries: geometries.clone(),
@@ -168,6 +167,16 @@ impl CommandBuffer {
             }
         }
         Ok(())
+    }
+
+    /// Where a structure that the CPU built lies at the next command, if a rebuild has moved it.
+    pub(super) fn moved_tree<'a>(
+        &self,
+        target: &AccelStruct,
+        software: &'a SoftwareBlas,
+    ) -> Option<&'a Arc<SoftwareBody>> {
+        let here = software.rebuilt().filter(|_| self.notes.moved.contains(&target.id.0));
+        here.or(software.moved())
     }
 
     /// Room for builds on the GPU of what the CPU built first.

@@ -6,7 +6,7 @@ use ash::vk;
 
 use super::CommandBuffer;
 use super::accel::OpenBuild;
-use super::instances::{GivenInstances, Staged};
+use super::instances::{GivenInstances, Staged, Written};
 use super::notes::Notes;
 use crate::accel::AccelStruct;
 use crate::accel::build::TlasBuild;
@@ -55,7 +55,8 @@ impl CommandBuffer {
     /// # Errors
     /// [`LimitExceeded`](Error::LimitExceeded) over the capacity; [`InvalidUsage`](Error::InvalidUsage) for numbers
     /// that do not fit their bits, transforms that are not finite, and refits that are not allowed;
-    /// [`WrongQueue`](Error::WrongQueue) on the transfer queue.
+    /// [`WrongQueue`](Error::WrongQueue) on the transfer queue. Where the device and software both trace, and there is no memory
+    /// for software's half of the update, the command buffer can no longer be submitted.
     pub fn update_tlas(
         &mut self,
         tlas: AccelStructHandle,
@@ -117,9 +118,9 @@ impl CommandBuffer {
             let Row { target, update, nothing, .. } = updates.at(row);
             let before = cmd.before(tlas, update, nothing);
             let given = cmd.run_instances(target, tlas, shown, source, contents.built_count)?;
-            cmd.build_tlas(target, tlas, given.instances(), before.is_first, false)?;
-            let recorded = cmd.tell(tlas, &before, given.change(count, false));
-            updates.record(row, recorded);
+            cmd.build_written(target, tlas, &given, before.is_first, false)?;
+            let (recorded, shown, source) = cmd.tell(tlas, &before, given.change(count, false));
+            updates.record(row, &recorded, shown, source);
             Ok(())
         })
     }
@@ -133,8 +134,56 @@ impl CommandBuffer {
         recorded
     }
 
-    /// Shows instances of the host in the structure of a row.
+    /// Shows instances of the host in the structure of a row. Mostly few, and of the same structures as before.
+    #[inline(always)]
     fn update_row(
+        &mut self,
+        updates: &mut TlasUpdates,
+        row: usize,
+        instances: &[TlasInstance],
+        mode: BuildMode,
+    ) -> Result<()> {
+        let Row { target, update, nothing, .. } = updates.at(row);
+        let tlas = target.tlas()?;
+        if instances.len() > tlas.capacity as usize {
+            return check_capacity(target, tlas, instances.len() as u64);
+        }
+        let before = self.before(tlas, update, nothing);
+        if tlas.software.is_none()
+            && let Some(address) = self.stage_alike(instances, before.shown)?
+        {
+            let update = Update { target, tlas, before: &before, mode };
+            let recorded = self.build_staged(update, instances.len() as u32, address)?;
+            updates.record_alike(row, &recorded);
+            return Ok(());
+        }
+        self.update_otherwise(updates, row, instances, mode)
+    }
+
+    /// Builds from instances that Vulkan can read, of what was shown before.
+    #[inline(always)]
+    fn build_staged(&mut self, update: Update<'_>, count: u32, address: u64) -> Result<Recorded> {
+        let Update { tlas, before, .. } = update;
+        let refit = self.build_addressed(update, count, address)?;
+        if before.is_first {
+            self.refer_to(before.shown);
+        }
+        let named_rows = self.tell_rows(tlas, before, before.shown);
+        Ok(Recorded { counts: (count, count), refit, named_rows, revision: before.revision })
+    }
+
+    /// Builds from instances that the host has written with addresses. Answers whether it is a refit.
+    #[inline(always)]
+    fn build_addressed(&mut self, update: Update<'_>, count: u32, address: u64) -> Result<bool> {
+        let refit = update.check(count, count)?;
+        let instances = GivenInstances { address, count, is_from_kernel: false };
+        self.build_tlas(update.target, update.tlas, instances, update.before.is_first, refit)?;
+        Ok(refit)
+    }
+
+    /// As [`update_row`](Self::update_row), of whatever structures.
+    #[inline(never)]
+    fn update_otherwise(
         &mut self,
         updates: &mut TlasUpdates,
         row: usize,
@@ -143,36 +192,28 @@ impl CommandBuffer {
     ) -> Result<()> {
         let Row { target, update, nothing, memory } = updates.at(row);
         let tlas = target.tlas()?;
-        if instances.len() > tlas.capacity as usize {
-            return check_capacity(target, tlas, instances.len() as u64);
-        }
         let before = self.before(tlas, update, nothing);
         let update = Update { target, tlas, before: &before, mode };
-        let name = &target.name;
+        let count = instances.len() as u32;
         let staged = match tlas.structure {
-            Some(_) => self.stage_instances(name, instances, before.shown, &mut memory.marks)?,
+            Some(_) => self.stage_instances(&target.name, instances, before.shown, &mut memory.marks)?,
             None => None,
         };
         let change = match staged {
-            Some(staged) => self.build_staged(update, instances.len() as u32, staged)?,
+            Some(Staged { address, shown }) => {
+                let refit = self.build_addressed(update, count, address)?;
+                Change { count, built_count: count, shown, source: None, refit }
+            }
             None => self.update_by_plan(update, instances, memory)?,
         };
-        if let Some(software) = &tlas.software {
-            self.build_software_tlas(target, software, instances)?;
+        if let Some(software) = &tlas.software
+            && let Err(error) = self.build_software_tlas(target, software, instances)
+        {
+            return Err(self.fail_beside_device(target, tlas, error));
         }
-        let recorded = self.tell(tlas, &before, change);
-        updates.record(row, recorded);
+        let (recorded, shown, source) = self.tell(tlas, &before, change);
+        updates.record(row, &recorded, shown, source);
         Ok(())
-    }
-
-    /// Builds from instances that Vulkan can read.
-    #[inline(always)]
-    fn build_staged(&mut self, update: Update<'_>, count: u32, staged: Staged) -> Result<Change> {
-        let refit = update.check(count, count)?;
-        let Staged { address, shown } = staged;
-        let instances = GivenInstances { address, count, is_from_kernel: false };
-        self.build_tlas(update.target, update.tlas, instances, update.before.is_first, refit)?;
-        Ok(Change { count, built_count: count, shown, source: None, refit })
     }
 
     /// Builds from instances that a kernel writes; where the device has no structures of its own, only checks.
@@ -196,7 +237,7 @@ impl CommandBuffer {
         let (source, shown) = self.host_source(&target.name, instances, plan, memory)?;
         let built_count = source.built_count(&target.name)?;
         let given = self.run_instances(target, tlas, shown, source, built_count)?;
-        self.build_tlas(target, tlas, given.instances(), before.is_first, refit)?;
+        self.build_written(target, tlas, &given, before.is_first, refit)?;
         Ok(given.change(count, refit))
     }
 
@@ -222,11 +263,13 @@ impl CommandBuffer {
                 Change { count, built_count: count, shown: Some(Arc::clone(&shown)), source: None, refit }
             }
         };
-        if let Some(software) = &tlas.software {
-            self.build_software_tlas_from(target, software, instances, &shown)?;
+        if let Some(software) = &tlas.software
+            && let Err(error) = self.build_software_tlas_from(target, software, instances, &shown)
+        {
+            return Err(self.fail_beside_device(target, tlas, error));
         }
-        let recorded = self.tell(tlas, &before, change);
-        updates.record(row, recorded);
+        let (recorded, shown, source) = self.tell(tlas, &before, change);
+        updates.record(row, &recorded, shown, source);
         Ok(())
     }
 
@@ -243,7 +286,7 @@ impl CommandBuffer {
         let refit = update.check(instances.count, built_count)?;
         self.keep_source(&target.name, instances, &shown, &mut source)?;
         let given = self.run_instances(target, tlas, shown, source, built_count)?;
-        self.build_tlas(target, tlas, given.instances(), before.is_first, refit)?;
+        self.build_written(target, tlas, &given, before.is_first, refit)?;
         Ok(given.change(instances.count, refit))
     }
 
@@ -256,11 +299,6 @@ impl CommandBuffer {
         }
     }
 
-    /// Fails if what was recorded no longer fits what was submitted since.
-    pub(crate) fn check_tlas_updates(&self) -> Result<()> {
-        self.notes.tlas_updates.as_ref().map_or(Ok(()), |updates| updates.check())
-    }
-
     /// What is known of a structure before the next command.
     #[inline(always)]
     fn before<'a>(&self, tlas: &Tlas, update: &'a mut TlasUpdate, nothing: &'a Arc<ShownSet>) -> Before<'a> {
@@ -271,6 +309,25 @@ impl CommandBuffer {
         let stands = contents.revision == revision || contents.shown.stands(&find);
         let shown = if stands { &contents.shown } else { nothing };
         Before { counts: contents.counts(), refits: contents.refits, is_first, shown, stands, revision }
+    }
+
+    /// Builds from what a kernel writes, which is recorded.
+    fn build_written(
+        &mut self,
+        target: &AccelStruct,
+        tlas: &Tlas,
+        given: &Written,
+        is_first: bool,
+        refit: bool,
+    ) -> Result<()> {
+        let built = self.build_tlas(target, tlas, given.instances(), is_first, refit);
+        built.map_err(|error| self.tear(&target.name, error))
+    }
+
+    /// Software's half of an update failed. Where the device has one, that is recorded.
+    #[cold]
+    fn fail_beside_device(&mut self, target: &AccelStruct, tlas: &Tlas, error: Error) -> Error {
+        if tlas.structure.is_some() { self.tear(&target.name, error) } else { error }
     }
 
     /// Records the build of what the device traces.
@@ -306,7 +363,7 @@ impl CommandBuffer {
 
     /// Scratch memory for a build of a top-level structure, behind the barriers it needs. There are none where the commands
     /// before were such builds too, of other structures, and there is memory left beside theirs; then all may run at once.
-    #[inline]
+    #[inline(always)]
     fn join_builds(&mut self, target: ResourceId, bytes: u64, records: Option<&Buffer>) -> Result<u64> {
         let alignment = self.shared.gpu.caps.limits.scratch_alignment.into();
         if records.is_none()
@@ -343,24 +400,41 @@ impl CommandBuffer {
         Ok(start)
     }
 
-    /// Tells queues and shaders what the structure shows from now on.
-    #[inline(always)]
-    fn tell(&mut self, tlas: &Tlas, before: &Before<'_>, mut change: Change) -> Recorded {
-        if change.shown.is_none() && !before.stands {
-            change.shown = Some(Arc::clone(before.shown));
+    /// Tells queues and shaders what the structure shows from now on; `None` for what is shown the same as before.
+    fn tell(
+        &mut self,
+        tlas: &Tlas,
+        before: &Before<'_>,
+        change: Change,
+    ) -> (Recorded, Option<Arc<ShownSet>>, Option<Arc<InstanceSource>>) {
+        let Change { count, built_count, shown: new, source, refit } = change;
+        let new = new.or_else(|| (!before.stands).then(|| Arc::clone(before.shown)));
+        let shown = new.as_ref().unwrap_or(before.shown);
+        if before.is_first || new.is_some() {
+            self.refer_to(shown);
         }
-        let shown = change.shown.as_ref().unwrap_or(before.shown);
-        if (before.is_first || change.shown.is_some()) && self.shared.gpu.queues.several_lanes() {
-            // New ones may come from another queue.
+        let named_rows = self.tell_rows(tlas, before, shown);
+        let counts = (count, built_count);
+        (Recorded { counts, refit, named_rows, revision: before.revision }, new, source)
+    }
+
+    /// Has other queues be done with what is shown, which may come from them.
+    fn refer_to(&mut self, shown: &ShownSet) {
+        if self.shared.gpu.queues.several_lanes() {
             shown.list().iter().for_each(|shown| self.refer(shown.blas.id, Access::Read));
         }
+    }
+
+    /// Tells shaders where the rows of the structure lie, unless they know. Answers what it tells.
+    #[inline(always)]
+    fn tell_rows(&mut self, tlas: &Tlas, before: &Before<'_>, shown: &ShownSet) -> Option<u64> {
         // At first the entry is that of the slot's last owner.
-        let is_told = before.counts.is_none() || tlas.rows.get().is_some();
-        let rows = tlas.rows.get().filter(|_| shown.has_rows).map_or(0, |rows| rows.address);
-        if is_told {
-            self.name_rows(tlas, rows);
+        if before.counts.is_some() && tlas.rows.get().is_none() {
+            return None;
         }
-        Recorded { change, named_rows: is_told.then_some(rows), revision: before.revision }
+        let rows = tlas.rows.get().filter(|_| shown.has_rows).map_or(0, |rows| rows.address);
+        self.write_tlas_table(tlas.slot, entry(tlas, rows));
+        Some(rows)
     }
 
     /// Structures that this command buffer takes to have no rows, though a submission since it was recorded has given them some:
@@ -368,11 +442,6 @@ impl CommandBuffer {
     pub(crate) fn entries_without_rows(&self) -> Vec<(u32, [u64; 2])> {
         let Some(updates) = &self.notes.tlas_updates else { return Vec::new() };
         updates.with_unknown_rows().map(|tlas| (tlas.slot, entry(tlas, 0))).collect()
-    }
-
-    /// Tells shaders where the rows of a structure lie; 0 where it has none.
-    fn name_rows(&mut self, tlas: &Tlas, rows: u64) {
-        self.write_tlas_table(tlas.slot, entry(tlas, rows));
     }
 
     /// Tells shaders where the rows of a structure lie, and what software traces; 0 where there is nothing.

@@ -95,7 +95,7 @@ impl Uses {
     }
 
     /// Tells the tracker, which adds the barriers to `out`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn track(
         &mut self,
         found: &Textures,
@@ -121,6 +121,7 @@ impl Uses {
         self.clear_buffers();
     }
 
+    #[inline(always)]
     fn track_textures(
         &mut self,
         found: &Textures,

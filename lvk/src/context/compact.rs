@@ -30,7 +30,7 @@ impl Context {
     /// A copy needs room beside what it replaces. One that has none waits for the others, whose memory comes back, and
     /// [fails](crate::Compaction::Failed) when there is still none then; nothing else does for it. Structures that are
     /// compacted already, or about to be, are left alone. What software traces is never larger than it needs to be: where
-    /// nothing else is traced, compaction is done at once and saves nothing.
+    /// nothing else is traced, compaction is done at once, saves nothing, and leaves rebuilds possible.
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for a structure without [`BuildFlags::ALLOW_COMPACTION`], and then nothing

@@ -119,7 +119,7 @@ impl Context {
         let budget = self.shared().scratch[0].tiers.batch_bytes();
         let (mut first, mut scratch) = (0, 0_u64);
         for (index, object) in objects.iter().enumerate() {
-            let next: u64 = object.blas()?.parts.iter().map(|part| part.sizes.build_scratch_bytes).sum();
+            let next = object.blas()?.first_build_scratch_bytes();
             if index > first && scratch.saturating_add(next) > budget {
                 build(&objects[first..index], false)?;
                 (first, scratch) = (index, 0);
@@ -189,7 +189,7 @@ pub(super) fn blas_object(
         None => None,
     };
     let hardware = parts.iter().map(|part| part.sizes);
-    let all = hardware.chain(software.as_ref().map(SoftwareBlas::sizes));
+    let all = hardware.chain(software.as_ref().map(|software| software.sizes(desc.flags)));
     let sizes = all.fold(AccelStructSizes::default(), AccelStructSizes::join);
     let blas = Blas::new(desc.geometries.to_vec(), transforms, parts, body, software);
     Ok(AccelStruct::new(desc.debug_name, desc.flags, sizes, AccelKind::Blas(blas)))

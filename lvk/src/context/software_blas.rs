@@ -27,7 +27,7 @@ use crate::software::sound::{self, Expected};
 use crate::software::tree_cache::TreeKey;
 
 /// Stands in front of structures that no driver wrote; as long as what drivers begin with.
-const MARK: [u8; 32] = *b"lvk software structure, form 2\0\0";
+const MARK: [u8; 32] = *b"lvk software structure, form 3\0\0";
 
 impl Context {
     /// The structures of meshes that the CPU builds, on all its cores; nothing for those that the GPU builds, and where
@@ -39,11 +39,13 @@ impl Context {
         let is_of_cpu = |desc: &&BlasDesc<'_>| !builds_on_gpu(desc.flags);
         let read: Vec<_> = descs.iter().filter(is_of_cpu).collect();
         let pieces = self.read_inputs(&read)?;
-        let mesh = |desc: &BlasDesc<'_>| {
+        let build = |desc: &BlasDesc<'_>| {
             let bytes = |geometry| (geometry_bytes(geometry, &pieces), geometry.flags());
-            Mesh::new(&desc.geometries.iter().map(bytes).collect::<Vec<_>>())
+            let quality = Quality::of(desc.flags);
+            let mesh = Mesh::new(&desc.geometries.iter().map(bytes).collect::<Vec<_>>(), quality);
+            self.built(&mesh, quality)
         };
-        on_all_cores(descs, |desc| is_of_cpu(&desc).then(|| self.built(&mesh(desc), Quality::of(desc.flags))))
+        on_all_cores(descs, |desc| is_of_cpu(&desc).then(|| build(desc)))
     }
 
     /// The structure of a mesh, of an earlier run where trees are kept.
@@ -51,7 +53,7 @@ impl Context {
         let build = || blas_blob::build(mesh, quality);
         match &self.shared().tree_cache {
             Some(cache) => {
-                let expected = Expected::of_mesh(mesh, quality.refit);
+                let expected = Expected::of_mesh(mesh);
                 cache.get_or(TreeKey::of(mesh, quality), &expected, build)
             }
             None => build(),
@@ -85,8 +87,7 @@ impl Context {
     /// The bytes of what software traces, behind a mark that no driver writes. Waits for the GPU.
     pub(super) fn software_bytes(&self, blas: &Blas) -> Result<Vec<u8>> {
         let Some(software) = &blas.software else { return Ok(Vec::new()) };
-        let moved = software.rebuilt().filter(|_| blas.builds() > 1);
-        let body = moved.unwrap_or(&software.body);
+        let body = software.moved().unwrap_or(&software.body);
         let size = body.memory_bytes();
         let mut bytes = vec![0; MARK.len() + size as usize];
         bytes[..MARK.len()].copy_from_slice(&MARK);

@@ -66,7 +66,7 @@ impl Context {
 
     fn submit_behind_pending(&self, mut cmd: CommandBuffer, mut more: Submission) -> Result<SubmitHandle> {
         let mut pending = self.pending();
-        cmd.check_tlas_updates()?;
+        cmd.check_recorded()?;
         cmd.check_queries()?;
         cmd.check_images()?;
         let entries = cmd.entries_without_rows();

@@ -72,7 +72,6 @@ pub struct GpuBlasDesc<'a> {
     pub leaf_size: u32,
     pub improvements: u32,
     pub leaves: Leaves,
-    pub refit: bool,
 }
 
 /// A structure and the buffer it lies in.
@@ -102,7 +101,6 @@ pub fn build_blas(ctx: &Context, descs: &[GpuBlasDesc<'_>]) -> Result<Vec<GpuStr
             geometry_count: geometries.len() as u32,
             leaf_size: desc.leaf_size,
             improvements: desc.improvements,
-            refit: desc.refit,
         };
         let plan = GpuBuildPlan::blas("test", &shape)?;
         let (structure, target) = room(ctx, &plan)?;
@@ -181,11 +179,9 @@ pub fn place(ctx: &Context, words: &[u32]) -> Result<GpuStructure> {
             primitives: words[5],
             vertices: words[6],
             geometries: words[7],
-            parents: words[10],
         },
         node_count: words[8],
         primitive_count: words[3],
-        vertex_count: 0,
     };
     Ok(GpuStructure { buffer, address, most_height: u32::MAX, bytes, plan })
 }

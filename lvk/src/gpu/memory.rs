@@ -61,7 +61,7 @@ enum Source {
 
 /// Where the host sees memory.
 #[derive(Clone, Copy)]
-struct Mapping(NonNull<u8>);
+pub(crate) struct Mapping(pub(crate) NonNull<u8>);
 
 // SAFETY: the address is the same in every thread, and what is done with it is the business of those who ask for it.
 unsafe impl Send for Mapping {}
@@ -81,7 +81,12 @@ impl ObjectMemory {
 
     /// Where the host sees the object's part, if it does.
     pub(crate) fn mapped(&self) -> Option<NonNull<u8>> {
-        self.mapped.map(|mapping| mapping.0)
+        self.mapping().map(|mapping| mapping.0)
+    }
+
+    /// The same, to be kept with what the memory belongs to.
+    pub(crate) fn mapping(&self) -> Option<Mapping> {
+        self.mapped
     }
 }
 

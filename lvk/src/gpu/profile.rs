@@ -10,7 +10,8 @@ use crate::error::{Error, Result};
 /// Clamps what the real device reports, so that the path of another one runs on it.
 ///
 /// A profile hides and tightens, it never adds: on a device that is worse than the profile the device's own answers
-/// stay. The logical device is created without the extensions that are hidden. The default clamps nothing; a profile of
+/// stay. The logical device is created without the extensions that are hidden. Limits of structures and builds are those of
+/// the device's own: where there is only what software traces, they bind nothing. The default clamps nothing; a profile of
 /// one's own is made from it, or from a built-in one:
 ///
 /// ```

@@ -90,11 +90,11 @@ kernels! {
     /// Boxes of wide nodes.
     FitWide = "build/fit_wide",
         ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
-         "build/fit_wide.glsl", "build/fit_wide.comp.glsl"];
+         "build/wide.glsl", "build/fit_wide.glsl", "build/fit_wide.comp.glsl"];
     /// Primitives of leaves from inputs that moved.
     RefitLeaves = "build/refit",
         ["build/job.glsl", "build/box.glsl", "build/input.glsl", "build/leaf.glsl", "build/leaf_write.glsl",
-         "build/arrivals.glsl", "build/refit.glsl", "build/refit.comp.glsl"];
+         "build/arrivals.glsl", "build/wide.glsl", "build/refit.glsl", "build/refit.comp.glsl"];
     /// A whole bottom-level structure by one workgroup.
     BuildSmallBlas = "build/small_blas",
         ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/input.glsl",

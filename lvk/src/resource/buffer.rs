@@ -9,7 +9,7 @@ use bitflags::bitflags;
 use crate::barrier::ResourceId;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
-use crate::gpu::memory::{MemoryKind, ObjectMemory};
+use crate::gpu::memory::{Mapping, MemoryKind, ObjectMemory};
 
 bitflags! {
     /// What a buffer is used for, besides copies and access by address, which are always allowed.
@@ -196,10 +196,15 @@ impl Buffer {
 
     /// Start of the mapped memory, `None` in device memory.
     pub(crate) fn mapped(&self) -> Option<NonNull<u8>> {
+        self.mapping().map(|mapping| mapping.0)
+    }
+
+    /// The same, to be kept with the buffer.
+    pub(crate) fn mapping(&self) -> Option<Mapping> {
         if !self.memory.mapped() {
             return None;
         }
-        self.allocation.as_ref()?.mapped()
+        self.allocation.as_ref()?.mapping()
     }
 
     /// Writes the first contents of a buffer that nothing has used yet, where its memory happens to be in reach of the host,

@@ -164,21 +164,6 @@ fn partition(numbers: &mut [u32], first: impl Fn(&u32) -> bool) -> usize {
     count
 }
 
-/// For each node its parent and, in the highest three bits, which child it is.
-pub(super) fn parents(nodes: &[BinaryNode]) -> Vec<u32> {
-    let mut parents = vec![NONE; nodes.len()];
-    for (number, node) in (0_u32..).zip(nodes) {
-        for (child, place) in [node.child0, node.child1].into_iter().enumerate() {
-            if place & LEAF == 0
-                && let Some(parent) = parents.get_mut(place as usize)
-            {
-                *parent = number | (child as u32) << 29;
-            }
-        }
-    }
-    parents
-}
-
 /// Whether every path from the first node ends in primitives that exist, none is too long, no two meet, and all nodes are
 /// on one. Nodes stand in any order.
 pub(super) fn is_sound(nodes: &[BinaryNode], primitives: usize) -> bool {

@@ -36,6 +36,13 @@ struct Leaves {
     vertices: Vec<Vec3>,
 }
 
+impl Leaves {
+    /// Bytes of all parts.
+    fn size(&self) -> usize {
+        self.bytes.len() + size_of_val(&self.vertices[..])
+    }
+}
+
 /// Builds a tree over the mesh and packs it.
 pub(crate) fn build(mesh: &Mesh, quality: Quality) -> BlasBlob {
     let bounds = mesh.bounds();
@@ -52,7 +59,6 @@ pub(super) fn pack(mesh: &Mesh, tree: &Tree, quality: Quality, bounds: Bounds) -
     let leaves = leaves(mesh, &tree.order, quality);
     let row = |flags: &GeometryFlags| GeometryRow { flags: flags.bits(), reserved: [0; 3] };
     let geometries: Vec<_> = mesh.flags.iter().map(row).collect();
-    let parents = if quality.refit { tree.parents() } else { Vec::new() };
     let mut bytes = vec![0; size_of::<Header>()];
     let header = Header {
         format,
@@ -65,7 +71,6 @@ pub(super) fn pack(mesh: &Mesh, tree: &Tree, quality: Quality, bounds: Bounds) -
         geometries: append(&mut bytes, bytemuck::cast_slice(&geometries)),
         node_count: node_count as u32,
         geometry_count: geometries.len() as u32,
-        parents: if parents.is_empty() { 0 } else { append(&mut bytes, bytemuck::cast_slice(&parents)) },
         marks: marks(&mesh.flags),
         low: bounds.low.to_array(),
         high: bounds.high.to_array(),
@@ -94,22 +99,17 @@ fn leaves(mesh: &Mesh, order: &[u32], quality: Quality) -> Leaves {
             }
         }
         Primitives::Triangles(triangles) => {
-            let small = if quality.low_memory && !quality.refit {
-                indexed(triangles, order, mesh.flags.len())
-            } else {
-                None
-            };
-            match small {
-                Some(indexed) => naming(indexed),
-                None => {
-                    let ordered: Vec<LeafTriangle> =
-                        order.iter().map(|number| triangles[*number as usize]).collect();
-                    let bytes = bytemuck::cast_slice(&ordered).to_vec();
-                    Leaves { kind: LeafKind::Triangles, bytes, vertices: Vec::new() }
-                }
-            }
+            let copies = size_of_val(&triangles[..]);
+            let small = quality.low_memory.then(|| indexed(mesh, triangles, order)).flatten().map(naming);
+            small.filter(|small| small.size() < copies).unwrap_or_else(|| copied(triangles, order))
         }
     }
+}
+
+/// Leaves with copies of the corners.
+fn copied(triangles: &[LeafTriangle], order: &[u32]) -> Leaves {
+    let ordered: Vec<LeafTriangle> = order.iter().map(|number| triangles[*number as usize]).collect();
+    Leaves { kind: LeafKind::Triangles, bytes: bytemuck::cast_slice(&ordered).to_vec(), vertices: Vec::new() }
 }
 
 /// Leaves that name vertices, as small as their numbers allow.
@@ -137,6 +137,58 @@ fn marks(flags: &[GeometryFlags]) -> u32 {
 mod tests {
     use super::*;
     use crate::accel::software::layout::LeafIndexed;
+
+    const SMALL: Quality = Quality { low_memory: true, refit: false };
+    const SMALL_MOVING: Quality = Quality { low_memory: true, refit: true };
+
+    /// Cells of two triangles each that share their vertices, which have so many numbers for each position.
+    fn grid(side: u32, numbers: u32) -> Mesh {
+        let corner = |x: u32, y: u32, cell: u32| (y * (side + 1) + x) * numbers + cell % numbers;
+        let cell = |cell: u32| {
+            let (x, y) = (cell % side, cell / side);
+            let [a, b, c, d] = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| corner(x + i, y + j, cell));
+            [[a, b, c], [b, d, c]]
+        };
+        let vertices: Vec<_> = (0..side * side).flat_map(cell).collect();
+        let position = |vertex: u32| {
+            let (x, y) = (vertex / numbers % (side + 1), vertex / numbers / (side + 1));
+            Vec3::new(x as f32, y as f32, (x * y % 5) as f32)
+        };
+        let triangle = |(primitive, named): (u32, &[u32; 3])| {
+            let [a, b, c] = named.map(position);
+            LeafTriangle { a, primitive, b, geometry: 0, c, opaque: 1 }
+        };
+        let primitives = Primitives::Triangles((0..).zip(&vertices).map(triangle).collect());
+        Mesh { primitives, vertices, flags: vec![GeometryFlags::OPAQUE] }
+    }
+
+    fn bytes_each(mesh: &Mesh, quality: Quality) -> (u32, f64) {
+        let blob = build(mesh, quality);
+        (blob.header().leaf_kind, blob.bytes.len() as f64 / f64::from(blob.header().primitive_count))
+    }
+
+    /// Nodes take about 8 bytes of that, the leaf 12, and vertices, of which there are half as many, 6.
+    #[test]
+    fn a_triangle_takes_less_than_28_bytes_with_low_memory() {
+        let shared = grid(80, 1);
+        let (kind, bytes) = bytes_each(&shared, SMALL_MOVING);
+        assert!(kind == LeafKind::PackedTriangles as u32 && bytes < 28.0, "{bytes} with updates");
+        assert_eq!(bytes_each(&Mesh { vertices: Vec::new(), ..shared }, SMALL), (kind, bytes), "without");
+    }
+
+    /// Where a position has a number for each of its cells, only what never moves shares it.
+    #[test]
+    fn leaves_name_vertices_where_copies_take_more() {
+        let apart = grid(30, 900);
+        let (kind, with_updates) = bytes_each(&apart, SMALL_MOVING);
+        assert!(kind == LeafKind::PackedTriangles as u32, "four vertices for two triangles");
+        let Primitives::Triangles(all) = &apart.primitives else { unreachable!("triangles") };
+        let unshared = (0..all.len() as u32).map(|number| [0, 1, 2].map(|step| number * 3 + step)).collect();
+        let (kind, copies) = bytes_each(&Mesh { vertices: unshared, ..apart.clone() }, SMALL_MOVING);
+        assert!(kind == LeafKind::Triangles as u32 && copies > with_updates, "three for each");
+        let (kind, shared) = bytes_each(&Mesh { vertices: Vec::new(), ..apart }, SMALL);
+        assert!(kind == LeafKind::PackedTriangles as u32 && shared < with_updates, "one for both");
+    }
 
     /// The leaves of one triangle that names the last of so many vertices.
     fn last_of(count: usize) -> (LeafIndexed, Leaves) {

@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::quality::Quality;
 use crate::accel::bounds::{Bounds, BoxBytes, TriangleBytes};
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::software::layout::{LeafBox, LeafTriangle};
@@ -20,6 +21,8 @@ pub(crate) enum Primitives {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Mesh {
     pub(crate) primitives: Primitives,
+    /// Of each triangle the vertices of its geometry, where leaves share them as they are given; else none.
+    pub(crate) vertices: Vec<[u32; 3]>,
     /// Of each geometry.
     pub(crate) flags: Vec<GeometryFlags>,
 }
@@ -31,16 +34,17 @@ pub(crate) enum GeometryBytes<'a> {
 }
 
 impl Mesh {
-    /// Takes the primitives out of the geometries, which are all of one kind.
-    pub(crate) fn new(geometries: &[(GeometryBytes<'_>, GeometryFlags)]) -> Self {
+    /// Takes the primitives out of the geometries, which are all of one kind, for a tree of this quality.
+    pub(crate) fn new(geometries: &[(GeometryBytes<'_>, GeometryFlags)], quality: Quality) -> Self {
         let flags = geometries.iter().map(|(_, flags)| *flags).collect();
         let boxes = matches!(geometries.first(), Some((GeometryBytes::Boxes(_), _)));
         let mut mesh = Self {
             primitives: if boxes { Primitives::Boxes(Vec::new()) } else { Primitives::Triangles(Vec::new()) },
+            vertices: Vec::new(),
             flags,
         };
         for (number, (bytes, flags)) in (0..).zip(geometries) {
-            mesh.add(number, bytes, flags.contains(GeometryFlags::OPAQUE));
+            mesh.add(number, bytes, flags.contains(GeometryFlags::OPAQUE), quality);
         }
         mesh
     }
@@ -58,11 +62,16 @@ impl Mesh {
         }
     }
 
-    fn add(&mut self, geometry: u32, bytes: &GeometryBytes<'_>, opaque: bool) {
+    fn add(&mut self, geometry: u32, bytes: &GeometryBytes<'_>, opaque: bool, quality: Quality) {
         match (&mut self.primitives, bytes) {
             (Primitives::Triangles(all), GeometryBytes::Triangles(triangles)) => {
                 let leaf = |number| triangle(triangles.corners(number)?, number, geometry, opaque);
+                let first = all.len();
                 all.extend((0..triangles.count).filter_map(leaf));
+                if quality.shares_as_given() {
+                    let vertices = |of: &LeafTriangle| triangles.indices.corners(of.primitive);
+                    self.vertices.extend(all[first..].iter().filter_map(vertices));
+                }
             }
             (Primitives::Boxes(all), GeometryBytes::Boxes(boxes)) => {
                 let leaf = |number| place(boxes.bounds(number)?, number, geometry, opaque);
@@ -92,4 +101,44 @@ fn place(bounds: Bounds, primitive: u32, geometry: u32, opaque: bool) -> Option<
 /// Boxes may reach to infinity; the walk wants numbers.
 fn clamped(corner: Vec3) -> Vec3 {
     corner.clamp(Vec3::splat(-FARTHEST), Vec3::splat(FARTHEST))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::bounds::{IndexBytes, VertexBytes};
+    use crate::format::VertexFormat;
+
+    /// Vertices of which the fourth is none.
+    const PLACES: [[f32; 3]; 5] =
+        [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [f32::NAN; 3], [1.0, 1.0, 0.0]];
+    /// Triangles of which one names that, and one a vertex that is not there.
+    const TRIANGLES: [[u16; 3]; 4] = [[0, 1, 2], [1, 3, 2], [1, 5, 2], [1, 4, 2]];
+
+    fn numbers(mesh: &Mesh) -> Vec<(u32, u32)> {
+        match &mesh.primitives {
+            Primitives::Triangles(all) => all.iter().map(|of| (of.geometry, of.primitive)).collect(),
+            Primitives::Boxes(_) => Vec::new(),
+        }
+    }
+
+    #[test]
+    fn every_triangle_has_its_vertices_where_leaves_share_them_as_given() {
+        let places: Vec<u8> = PLACES.as_flattened().iter().flat_map(|number| number.to_le_bytes()).collect();
+        let indices: Vec<u8> =
+            TRIANGLES.as_flattened().iter().flat_map(|number| number.to_le_bytes()).collect();
+        let triangles = |indices, count| {
+            let (stride, format) = (0, VertexFormat::F32x3);
+            let vertices = VertexBytes { bytes: &places, stride, format, count: PLACES.len() as u32 };
+            let bytes = TriangleBytes { vertices, indices, count, transform: None };
+            (GeometryBytes::Triangles(bytes), GeometryFlags::empty())
+        };
+        let all = [triangles(IndexBytes::U16(&indices), 4), triangles(IndexBytes::None, 1)];
+        for (low_memory, refit) in [(false, false), (false, true), (true, false), (true, true)] {
+            let mesh = Mesh::new(&all, Quality { low_memory, refit });
+            assert_eq!(numbers(&mesh), [(0, 0), (0, 3), (1, 0)], "without those that no ray can hit");
+            let expected: &[_] = if low_memory && refit { &[[0, 1, 2], [1, 4, 2], [0, 1, 2]] } else { &[] };
+            assert_eq!(mesh.vertices, expected);
+        }
+    }
 }

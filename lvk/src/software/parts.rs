@@ -93,7 +93,8 @@ pub(super) mod tests {
         let place =
             |(primitive, of): (u32, &Bounds)| LeafBox { low: of.low, primitive, high: of.high, geometry: 0 };
         let primitives = Primitives::Boxes((0..).zip(boxes).map(place).collect());
-        let blob = blas_blob::build(&Mesh { primitives, flags: vec![GeometryFlags::empty()] }, QUALITY);
+        let mesh = Mesh { primitives, vertices: Vec::new(), flags: vec![GeometryFlags::empty()] };
+        let blob = blas_blob::build(&mesh, QUALITY);
         let parts = parts(&blob);
         (blob.bytes, parts)
     }

@@ -7,9 +7,7 @@ use super::mesh::{Mesh, Primitives};
 use super::{binary_tree, wide_tree};
 use crate::accel::bounds::Bounds;
 use crate::accel::desc::BlasDesc;
-use crate::accel::flags::BuildFlags;
 use crate::accel::geometry::BlasGeometry;
-use crate::accel::software::geometry::vertex_count;
 use crate::accel::software::layout::LeafKind;
 use crate::accel::software::layout::{
     BINARY, BLOCK_BYTES, BinaryNode, Header, LeafBox, LeafIndexed, LeafPacked, NONE, WIDE,
@@ -22,15 +20,11 @@ pub(crate) struct Expected {
     pub(crate) boxes: bool,
     /// Primitives of each geometry.
     pub(crate) counts: Vec<u32>,
-    /// Vertices of all geometries, where refits are to copy them.
-    pub(crate) vertices: u32,
-    /// Whether it is to be refitted.
-    pub(crate) refit: bool,
 }
 
 impl Expected {
     /// What a build of this mesh is of.
-    pub(crate) fn of_mesh(mesh: &Mesh, refit: bool) -> Self {
+    pub(crate) fn of_mesh(mesh: &Mesh) -> Self {
         let mut counts = vec![0; mesh.flags.len()];
         let mut add = |geometry: u32, primitive: u32| {
             if let Some(count) = counts.get_mut(geometry as usize) {
@@ -47,7 +41,7 @@ impl Expected {
                 true
             }
         };
-        Self { boxes, counts, vertices: 0, refit }
+        Self { boxes, counts }
     }
 
     /// What a structure of this description is of.
@@ -55,8 +49,6 @@ impl Expected {
         Self {
             boxes: desc.geometries.first().is_some_and(BlasGeometry::is_boxes),
             counts: desc.geometries.iter().map(BlasGeometry::primitive_count).collect(),
-            vertices: desc.geometries.iter().map(vertex_count).fold(0, u32::saturating_add),
-            refit: desc.flags.contains(BuildFlags::ALLOW_UPDATE),
         }
     }
 }
@@ -77,13 +69,12 @@ pub(crate) fn check(bytes: &[u8], expected: &Expected) -> Result<Sound, &'static
     {
         return Err("it is of other geometries");
     }
-    let parts = Parts::new(bytes, &header, kind, expected).ok_or("parts of it are cut off")?;
+    let parts = Parts::new(bytes, &header, kind).ok_or("parts of it are cut off")?;
     if !parts.lie_apart() {
         return Err("parts of it lie over each other");
     }
-    let parents = parents_of_sound_tree(&parts, &header).ok_or("its tree is damaged")?;
-    if expected.refit && !parts.parents().eq(parents) {
-        return Err("its nodes have other parents");
+    if !tree_is_sound(&parts, &header) {
+        return Err("its tree is damaged");
     }
     if !parts.leaves().all(|leaf| names_primitive(leaf, kind, &expected.counts)) {
         return Err("its leaves name primitives that are not there");
@@ -111,19 +102,15 @@ struct Parts<'a> {
     leaves: Range<usize>,
     vertices: Range<usize>,
     geometries: Range<usize>,
-    parents: Range<usize>,
 }
 
 impl<'a> Parts<'a> {
-    fn new(bytes: &'a [u8], header: &Header, kind: LeafKind, expected: &Expected) -> Option<Self> {
+    fn new(bytes: &'a [u8], header: &Header, kind: LeafKind) -> Option<Self> {
         const VERTEX_BYTES: usize = 12;
-        const PARENT_BYTES: usize = 4;
         let leaf_bytes = kind.primitive_bytes() as usize;
         let leaves = part(bytes, header.primitives, header.primitive_count as usize, leaf_bytes)?;
-        let copied = if expected.refit && kind.names_vertices() { expected.vertices as usize } else { 0 };
-        let vertices = vertices_named(&bytes[leaves.clone()], kind).max(copied);
+        let vertices = vertices_named(&bytes[leaves.clone()], kind);
         let nodes = header.node_count as usize;
-        let parents = if expected.refit { nodes } else { 0 };
         Some(Self {
             bytes,
             leaf_bytes,
@@ -131,13 +118,12 @@ impl<'a> Parts<'a> {
             leaves,
             vertices: part(bytes, header.vertices, vertices, VERTEX_BYTES)?,
             geometries: part(bytes, header.geometries, header.geometry_count as usize, BLOCK_BYTES)?,
-            parents: part(bytes, header.parents, parents, PARENT_BYTES)?,
         })
     }
 
     /// Refits write to one part what they must not find in another.
     fn lie_apart(&self) -> bool {
-        let mut parts = [&self.nodes, &self.leaves, &self.vertices, &self.geometries, &self.parents];
+        let mut parts = [&self.nodes, &self.leaves, &self.vertices, &self.geometries];
         parts.sort_by_key(|part| (part.start, part.end));
         let mut free = size_of::<Header>();
         parts.into_iter().filter(|part| !part.is_empty()).all(|part| {
@@ -155,27 +141,17 @@ impl<'a> Parts<'a> {
     fn leaves(&self) -> impl Iterator<Item = &'a [u8]> {
         self.bytes[self.leaves.clone()].chunks_exact(self.leaf_bytes)
     }
-
-    fn parents(&self) -> impl Iterator<Item = u32> {
-        self.bytes[self.parents.clone()].as_chunks().0.iter().map(|bytes| u32::from_le_bytes(*bytes))
-    }
 }
 
-/// The parents of all nodes, where every path from the root ends in leaves that exist, none is too long and no two meet.
-fn parents_of_sound_tree(parts: &Parts<'_>, header: &Header) -> Option<Vec<u32>> {
+/// Whether every path from the root ends in leaves that exist, none is too long and no two meet.
+fn tree_is_sound(parts: &Parts<'_>, header: &Header) -> bool {
     let primitives = header.primitive_count as usize;
     match (header.root, header.node_count) {
-        (NONE, 0) => (primitives == 0).then(Vec::new),
-        (root, 0) => binary_tree::names_primitives(root, primitives).then(Vec::new),
-        (0, _) if header.format == WIDE => {
-            let nodes = parts.nodes();
-            wide_tree::is_sound(&nodes, primitives).then(|| wide_tree::parents(&nodes))
-        }
-        (0, _) => {
-            let nodes = parts.nodes();
-            binary_tree::is_sound(&nodes, primitives).then(|| binary_tree::parents(&nodes))
-        }
-        _ => None,
+        (NONE, 0) => primitives == 0,
+        (root, 0) => binary_tree::names_primitives(root, primitives),
+        (0, _) if header.format == WIDE => wide_tree::is_sound(&parts.nodes(), primitives),
+        (0, _) => binary_tree::is_sound(&parts.nodes(), primitives),
+        _ => false,
     }
 }
 
@@ -241,15 +217,25 @@ mod tests {
 
     const SMALL: Quality = Quality { low_memory: true, refit: false };
     const MOVING: Quality = Quality { low_memory: false, refit: true };
+    const SMALL_MOVING: Quality = Quality { low_memory: true, refit: true };
 
-    /// Triangles of two geometries in turn.
+    /// A closed strip through these corners, as triangles of two geometries in turn.
     fn mesh(corners: &[[f32; 3]]) -> Mesh {
-        let triangle = |(number, at): (u32, &[f32; 3])| {
-            let (a, primitive, geometry) = (Vec3::from(*at), number / 2, number % 2);
-            LeafTriangle { a, primitive, b: a + Vec3::X, geometry, c: a + Vec3::Y, opaque: 1 }
+        let count = corners.len() as u32;
+        let vertices: Vec<_> =
+            (0..count).map(|number| [0, 1, 2].map(|step| (number + step) % count)).collect();
+        let triangle = |(number, named): (u32, &[u32; 3])| {
+            let [a, b, c] = named.map(|vertex| Vec3::from(corners[vertex as usize]));
+            LeafTriangle { a, primitive: number / 2, b, geometry: number % 2, c, opaque: 1 }
         };
-        let triangles = (0..).zip(corners).map(triangle).collect();
-        Mesh { primitives: Primitives::Triangles(triangles), flags: vec![GeometryFlags::OPAQUE; 2] }
+        let triangles = (0..).zip(&vertices).map(triangle).collect();
+        Mesh { primitives: Primitives::Triangles(triangles), vertices, flags: vec![GeometryFlags::OPAQUE; 2] }
+    }
+
+    /// With the vertices that a build of this quality is told.
+    fn told(mesh: &Mesh, quality: Quality) -> Mesh {
+        let vertices = if quality.shares_as_given() { mesh.vertices.clone() } else { Vec::new() };
+        Mesh { vertices, ..mesh.clone() }
     }
 
     fn boxes(count: u32) -> Mesh {
@@ -258,7 +244,7 @@ mod tests {
             LeafBox { low, primitive, high: low + Vec3::ONE, geometry: LeafBox::OPAQUE }
         };
         let primitives = Primitives::Boxes((0..count).map(place).collect());
-        Mesh { primitives, flags: vec![GeometryFlags::OPAQUE] }
+        Mesh { primitives, vertices: Vec::new(), flags: vec![GeometryFlags::OPAQUE] }
     }
 
     fn row(count: u8) -> Mesh {
@@ -274,8 +260,8 @@ mod tests {
     fn built_binary(mesh: &Mesh, quality: Quality) -> (Vec<u8>, Expected) {
         let bounds = mesh.bounds();
         let whole = bounds.iter().fold(Bounds::EMPTY, |all, one| all.union(*one));
-        let bytes = blas_blob::pack(mesh, &binary_tree::build(&bounds, 3), quality, whole);
-        let expected = Expected::of_mesh(mesh, quality.refit);
+        let bytes = blas_blob::pack(&told(mesh, quality), &binary_tree::build(&bounds, 3), quality, whole);
+        let expected = Expected::of_mesh(mesh);
         check(&bytes, &expected).unwrap();
         (bytes, expected)
     }
@@ -286,7 +272,8 @@ mod tests {
 
     /// A sound structure with what it is to be of.
     fn built(mesh: &Mesh, quality: Quality) -> (Vec<u8>, Expected) {
-        let (blob, expected) = (blas_blob::build(mesh, quality), Expected::of_mesh(mesh, quality.refit));
+        let blob = blas_blob::build(&told(mesh, quality), quality);
+        let expected = Expected::of_mesh(mesh);
         check(&blob.bytes, &expected).unwrap();
         (blob.bytes, expected)
     }
@@ -333,8 +320,18 @@ mod tests {
         check(&bytes, expected).unwrap_err()
     }
 
-    /// Walks every path as shaders do, and refits as kernels do, but fails where these would read anything else.
-    fn walk(bytes: &[u8], expected: &Expected) -> usize {
+    /// Walks every path as shaders do, from the root and from every part that may be shown alone, but fails where these would read
+    /// anything else.
+    fn walk(bytes: &[u8]) -> usize {
+        let bounds = Bounds { low: Vec3::splat(-9.0), high: Vec3::splat(9.0) };
+        let blob = blas_blob::BlasBlob { bytes: bytes.to_vec(), bounds };
+        for part in &super::super::parts::parts(&blob).parts {
+            walk_from(bytes, part.reference);
+        }
+        walk_from(bytes, header(bytes).root)
+    }
+
+    fn walk_from(bytes: &[u8], start: u32) -> usize {
         let header = header(bytes);
         let word = |place: u32, word: usize| -> u32 {
             let at = place as usize * BLOCK_BYTES + word * 4;
@@ -350,7 +347,7 @@ mod tests {
                 }
             }
         };
-        let (mut open, mut steps) = (vec![(header.root, 0)], 0);
+        let (mut open, mut steps) = (vec![(start, 0)], 0);
         while let Some((reference, pushed)) = open.pop() {
             steps += 1;
             assert!(steps <= header.node_count as usize * 9 + 1 && pushed < 64, "it would not end");
@@ -372,16 +369,6 @@ mod tests {
                 }
             }
         }
-        if expected.refit {
-            for node in 0..header.node_count as usize {
-                let (mut node, mut steps) = (node, 0);
-                while word(header.parents, node) != NONE {
-                    node = (word(header.parents, node) & 0x1fff_ffff) as usize;
-                    steps += 1;
-                    assert!(steps <= header.node_count, "it would not end");
-                }
-            }
-        }
         steps
     }
 
@@ -393,18 +380,18 @@ mod tests {
             corners in prop::collection::vec(prop::array::uniform3(-9.0_f32..9.0), 0..300), quality in quality()
         ) {
             let mesh = mesh(&corners);
-            let (bytes, expected) = built(&mesh, quality);
+            let (bytes, _) = built(&mesh, quality);
             let header = header(&bytes);
             prop_assert_eq!(header.primitive_count as usize, corners.len());
             let kind = leaf_kind(&header).unwrap();
-            let parts = Parts::new(&bytes, &header, kind, &expected).unwrap();
+            let parts = Parts::new(&bytes, &header, kind).unwrap();
             let mut numbers: Vec<(u32, u32)> = parts.leaves().map(|leaf| {
                 let word = |at: usize| -> u32 { bytemuck::pod_read_unaligned(&leaf[at..at + 4]) };
                 if kind == LeafKind::Triangles { (word(28), word(12)) } else { (word(8) >> 24, word(8) & 0xff_ffff) }
             }).collect();
             numbers.sort_unstable_by_key(|(geometry, primitive)| (*primitive, *geometry));
             prop_assert!(numbers.into_iter().eq((0..corners.len() as u32).map(|number| (number % 2, number / 2))));
-            walk(&bytes, &expected);
+            walk(&bytes);
         }
 
         /// As large and as small as numbers are that builds take, many of them in one place.
@@ -415,16 +402,16 @@ mod tests {
             )), 0..60),
             quality in quality(),
         ) {
-            let (bytes, expected) = built(&mesh(&corners), quality);
-            walk(&bytes, &expected);
-            let (bytes, expected) = built_binary(&mesh(&corners), quality);
-            walk(&bytes, &expected);
+            let (bytes, _) = built(&mesh(&corners), quality);
+            walk(&bytes);
+            let (bytes, _) = built_binary(&mesh(&corners), quality);
+            walk(&bytes);
         }
 
         /// With every length cut off, and words that are wrong by little, by much, or those of others.
         #[test]
         fn damage_is_refused_or_harmless(
-            small in any::<bool>(),
+            quality in prop::sample::select(vec![SMALL, MOVING, SMALL_MOVING]),
             wide in any::<bool>(),
             loose in any::<bool>(),
             changes in prop::collection::vec((any::<prop::sample::Index>(), prop_oneof![
@@ -433,10 +420,9 @@ mod tests {
             in_header in any::<bool>(),
             cut in prop::option::of(any::<prop::sample::Index>()),
         ) {
-            let quality = if small { SMALL } else { MOVING };
             let (mut bytes, expected) =
                 if wide { built(&row(120), quality) } else { built_binary(&row(120), quality) };
-            if small && loose {
+            if quality.low_memory && loose {
                 (bytes, _) = unpacked((bytes, expected.clone()));
             }
             for (place, value, from) in changes {
@@ -449,7 +435,21 @@ mod tests {
                 bytes.truncate(cut.index(bytes.len()));
             }
             if check(&bytes, &expected).is_ok() {
-                walk(&bytes, &expected);
+                walk(&bytes);
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_bit_in_a_node_is_refused_or_harmless() {
+        let (bytes, expected) = built(&row(40), SMALL);
+        let header = header(&bytes);
+        let nodes = header.nodes as usize * BLOCK_BYTES;
+        for bit in nodes * 8..(nodes + header.node_count as usize * 80) * 8 {
+            let mut damaged = bytes.clone();
+            damaged[bit / 8] ^= 1 << (bit % 8);
+            if check(&damaged, &expected).is_ok() {
+                walk(&damaged);
             }
         }
     }
@@ -465,9 +465,11 @@ mod tests {
         let structures = [
             (built(&row(200), MOVING), MOVING),
             (built(&row(200), SMALL), SMALL),
+            (built(&row(200), SMALL_MOVING), SMALL_MOVING),
             (built_binary(&row(200), MOVING), MOVING),
             (built_binary(&row(200), SMALL), SMALL),
             (unpacked(built(&row(200), SMALL)), SMALL),
+            (unpacked(built(&row(200), SMALL_MOVING)), SMALL_MOVING),
             (built(&boxes(50), MOVING), MOVING),
         ];
         for ((bytes, expected), quality) in structures {
@@ -490,11 +492,7 @@ mod tests {
             refuses(|header| header.geometries = 0);
             refuses(|header| header.low[1] = f32::NAN);
             refuses(|header| header.high = [f32::INFINITY; 3]);
-            if quality.refit {
-                refuses(|header| header.parents = 0);
-                refuses(|header| header.parents = header.nodes);
-                refuses(|header| header.parents = u32::MAX);
-            } else {
+            if quality.low_memory {
                 refuses(|header| header.vertices = u32::MAX);
                 refuses(|header| header.vertices = header.geometries);
             }
@@ -551,8 +549,9 @@ mod tests {
             let reason = refused_word(triangles.clone(), &expected, at.primitives, word, value);
             assert_eq!(reason, "its leaves name primitives that are not there");
         }
-        let packed = built(&row(200), SMALL);
-        for ((bytes, expected), last) in [(packed.clone(), 2), (unpacked(packed), 3)] {
+        let [packed, moving] = [SMALL, SMALL_MOVING].map(|quality| built(&row(200), quality));
+        let all = [(packed.clone(), 2), (moving.clone(), 2), (unpacked(packed), 3), (unpacked(moving), 3)];
+        for ((bytes, expected), last) in all {
             let at = header(&bytes);
             for value in [2 << 24, 100, NONE] {
                 let reason = refused_word(bytes.clone(), &expected, at.primitives, last, value);
@@ -576,7 +575,5 @@ mod tests {
         refuses(Expected { counts: vec![200], ..expected.clone() });
         refuses(Expected { counts: vec![100, 99], ..expected.clone() });
         refuses(Expected { counts: vec![100, 100, 0], ..expected.clone() });
-        let (unmoving, _) = built(&row(200), Quality { refit: false, ..MOVING });
-        assert!(check(&unmoving, &expected).is_err(), "it has no parents");
     }
 }

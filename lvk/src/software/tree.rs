@@ -35,12 +35,4 @@ impl Tree {
             _ => wide_tree::build(bounds).unwrap_or_else(|| binary_tree::build(bounds, ONE_LEAF)),
         }
     }
-
-    /// For each node its parent, with which child of it in the highest three bits; [`NONE`] for the root.
-    pub(super) fn parents(&self) -> Vec<u32> {
-        match &self.nodes {
-            Nodes::Wide(nodes) => wide_tree::parents(nodes),
-            Nodes::Binary(nodes) => binary_tree::parents(nodes),
-        }
-    }
 }

@@ -10,7 +10,7 @@ use crate::disk::{fingerprint, read, replace};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
 /// Changes with the builders and with the form of structures.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// Magic, version, reserved, length of the structure, checksum of it.
 const HEADER_BYTES: usize = 32;
 
@@ -30,14 +30,14 @@ impl TreeKey {
             Primitives::Boxes(all) => bytemuck::cast_slice(all),
         };
         let boxes = matches!(mesh.primitives, Primitives::Boxes(_));
-        let bits = [boxes, quality.low_memory, quality.refit];
+        let bits = [boxes, quality.low_memory, quality.shares_as_given()];
         let settings = bits.iter().fold(u64::from(VERSION), |all, bit| all << 1 | u64::from(*bit));
         let flags: Vec<u32> = mesh.flags.iter().map(|flags| flags.bits()).collect();
+        let vertices = bytemuck::cast_slice(&mesh.vertices);
         Self([1, 2].map(|seed| {
-            fingerprint(
-                bytes,
-                fingerprint(bytemuck::cast_slice(&flags), fingerprint(&settings.to_le_bytes(), seed)),
-            )
+            let seed = fingerprint(&settings.to_le_bytes(), seed);
+            let seed = fingerprint(bytemuck::cast_slice(&flags), seed);
+            fingerprint(vertices, fingerprint(bytes, seed))
         }))
     }
 }
@@ -116,6 +116,7 @@ mod tests {
         };
         Mesh {
             primitives: Primitives::Boxes((0..count).map(place).collect()),
+            vertices: Vec::new(),
             flags: vec![GeometryFlags::empty()],
         }
     }
@@ -127,7 +128,7 @@ mod tests {
         let (mesh, key) = (mesh(50), TreeKey::of(&mesh(50), QUALITY));
         let built = blas_blob::build(&mesh, QUALITY);
         let mut builds = 0;
-        let expected = Expected::of_mesh(&mesh, QUALITY.refit);
+        let expected = Expected::of_mesh(&mesh);
         let mut get = || {
             cache.get_or(key, &expected, || {
                 builds += 1;
@@ -159,8 +160,18 @@ mod tests {
     #[test]
     fn other_contents_and_settings_have_other_keys() {
         let small = Quality { low_memory: true, ..QUALITY };
-        let keys =
-            [TreeKey::of(&mesh(5), QUALITY), TreeKey::of(&mesh(6), QUALITY), TreeKey::of(&mesh(5), small)];
-        assert!(keys[0] != keys[1] && keys[0] != keys[2] && keys[1] != keys[2]);
+        let moving = Quality { refit: true, ..small };
+        let naming = |vertices| Mesh { vertices, ..mesh(5) };
+        let keys = [
+            TreeKey::of(&mesh(5), QUALITY),
+            TreeKey::of(&mesh(6), QUALITY),
+            TreeKey::of(&mesh(5), small),
+            TreeKey::of(&mesh(5), moving),
+            TreeKey::of(&naming(vec![[0, 1, 2]; 5]), moving),
+            TreeKey::of(&naming(vec![[0, 2, 1]; 5]), moving),
+        ];
+        for (number, key) in keys.iter().enumerate() {
+            assert!(!keys[..number].contains(key), "key {number}");
+        }
     }
 }

@@ -11,7 +11,7 @@ use obvhs::cwbvh::node::CwBvhNode;
 use super::ploc;
 use super::tree::{Nodes, Tree};
 use crate::accel::bounds::Bounds;
-use crate::accel::software::layout::{DEEPEST_WIDE, NONE};
+use crate::accel::software::layout::DEEPEST_WIDE;
 
 /// Most primitives of a leaf: they are counted in three bits, one by one.
 const LARGEST_LEAF: u32 = 3;
@@ -60,20 +60,6 @@ pub(super) fn children(node: &CwBvhNode) -> std::ops::Range<u32> {
     node.child_base_idx..node.child_base_idx.saturating_add(node.imask.count_ones())
 }
 
-/// For each node its parent and, in the highest three bits, which child it is.
-pub(super) fn parents(nodes: &[CwBvhNode]) -> Vec<u32> {
-    let mut parents = vec![NONE; nodes.len()];
-    for (number, node) in (0_u32..).zip(nodes) {
-        let inner = (0..8_u32).filter(|child| node.imask >> child & 1 == 1);
-        for (child, place) in inner.zip(children(node)) {
-            if let Some(parent) = parents.get_mut(place as usize) {
-                *parent = number | child << 29;
-            }
-        }
-    }
-    parents
-}
-
 /// Whether all children and primitives exist, children behind their parents and each below but one, and no path is too
 /// long.
 pub(super) fn is_sound(nodes: &[CwBvhNode], primitives: usize) -> bool {
@@ -109,7 +95,8 @@ fn leaf_is_sound(node: &CwBvhNode, child: usize, primitives: usize) -> bool {
     }
     let count = (meta >> 5).count_ones();
     let end = u64::from(node.primitive_base_idx) + u64::from(meta & 0x1f) + u64::from(count);
-    let unary = matches!(meta >> 5, 0 | 1 | 3 | 7);
+    // One with a place but no primitives would stand for others.
+    let unary = matches!(meta >> 5, 1 | 3 | 7);
     meta == 0 || (unary && u32::from(meta & 0x1f) + count <= 24 && end <= primitives as u64)
 }
 

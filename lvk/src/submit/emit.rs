@@ -10,39 +10,30 @@ use crate::resource::image::BarrierImage;
 /// Images a command buffer touches, by the id the tracker knows them by.
 pub(crate) type Images = IdMap<BarrierImage>;
 
-/// The memory barrier that was translated last, with its names in Vulkan: the next one is mostly the same.
+/// The memory barrier that was translated last, as Vulkan reads it: the next one is mostly the same.
 #[derive(Debug, Default)]
 pub(crate) struct LastBarrier {
     barrier: MemoryBarrier,
-    names: BarrierNames,
-}
-
-/// Both sides of a memory barrier by their Vulkan names.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-struct BarrierNames {
-    src_stages: vk::PipelineStageFlags2,
-    src_access: vk::AccessFlags2,
-    dst_stages: vk::PipelineStageFlags2,
-    dst_access: vk::AccessFlags2,
+    named: vk::MemoryBarrier2<'static>,
 }
 
 impl LastBarrier {
     /// A barrier by its Vulkan names, as `translate` finds them where it is another than the last one.
     #[inline]
-    fn names_of(
+    fn named(
         &mut self,
         barrier: &MemoryBarrier,
-        translate: impl FnOnce(&MemoryBarrier) -> BarrierNames,
-    ) -> &BarrierNames {
+        translate: impl FnOnce(&MemoryBarrier) -> vk::MemoryBarrier2<'static>,
+    ) -> &vk::MemoryBarrier2<'static> {
         if self.barrier != *barrier {
-            *self = Self { barrier: *barrier, names: translate(barrier) };
+            *self = Self { barrier: *barrier, named: translate(barrier) };
         }
-        &self.names
+        &self.named
     }
 }
 
 /// Records the barriers, if there are any. `last` is kept from one call to the next, of one device.
-#[inline]
+#[inline(always)]
 pub(crate) fn emit(
     gpu: &Gpu,
     commands: vk::CommandBuffer,
@@ -53,13 +44,14 @@ pub(crate) fn emit(
     match &barriers.memory {
         None if barriers.images.is_empty() => {}
         Some(memory) if barriers.images.is_empty() && is_whole(gpu, memory) => {
-            let names = last.names_of(memory, |barrier| barrier_names(gpu, barrier));
-            record(gpu, commands, &[names.barrier()], &[]);
+            let named = last.named(memory, |barrier| memory_barrier(gpu, barrier));
+            record(gpu, commands, std::slice::from_ref(named), &[]);
         }
         memory => emit_all(gpu, commands, memory.as_ref(), &barriers.images, images),
     }
 }
 
+#[inline(never)]
 fn emit_all(
     gpu: &Gpu,
     commands: vk::CommandBuffer,
@@ -71,11 +63,10 @@ fn emit_all(
     match memory {
         None => record(gpu, commands, &[], &images),
         Some(memory) if is_whole(gpu, memory) => {
-            record(gpu, commands, &[barrier_names(gpu, memory).barrier()], &images);
+            record(gpu, commands, &[memory_barrier(gpu, memory)], &images);
         }
         Some(memory) => {
-            let parts: Vec<_> =
-                memory.without_ray_queries().map(|part| barrier_names(gpu, &part).barrier()).collect();
+            let parts: Vec<_> = memory.without_ray_queries().map(|part| memory_barrier(gpu, &part)).collect();
             record(gpu, commands, &parts, &images);
         }
     }
@@ -147,25 +138,15 @@ pub(crate) fn emit_moves(
     unsafe { gpu.device.cmd_pipeline_barrier2(commands, &info) };
 }
 
-impl BarrierNames {
-    #[inline]
-    fn barrier(&self) -> vk::MemoryBarrier2<'static> {
-        vk::MemoryBarrier2::default()
-            .src_stage_mask(self.src_stages)
-            .src_access_mask(self.src_access)
-            .dst_stage_mask(self.dst_stages)
-            .dst_access_mask(self.dst_access)
-    }
-}
-
 #[inline(never)]
-fn barrier_names(gpu: &Gpu, barrier: &MemoryBarrier) -> BarrierNames {
-    BarrierNames {
-        src_stages: stages(gpu, barrier.src_stages),
-        src_access: access(gpu, barrier.src_access),
-        dst_stages: stages(gpu, barrier.dst_stages),
-        dst_access: access(gpu, barrier.dst_access),
-    }
+fn memory_barrier(gpu: &Gpu, barrier: &MemoryBarrier) -> vk::MemoryBarrier2<'static> {
+    let (src_stages, src_access) = scope(gpu, barrier.src_stages, barrier.src_access);
+    let (dst_stages, dst_access) = scope(gpu, barrier.dst_stages, barrier.dst_access);
+    vk::MemoryBarrier2::default()
+        .src_stage_mask(src_stages)
+        .src_access_mask(src_access)
+        .dst_stage_mask(dst_stages)
+        .dst_access_mask(dst_access)
 }
 
 fn image_barrier(
@@ -175,11 +156,13 @@ fn image_barrier(
 ) -> Option<vk::ImageMemoryBarrier2<'static>> {
     let image = images.get(&barrier.id)?;
     let scopes = &barrier.scopes;
+    let (src_stages, src_access) = scope(gpu, scopes.src_stages, scopes.src_access);
+    let (dst_stages, dst_access) = scope(gpu, scopes.dst_stages, scopes.dst_access);
     let barrier = vk::ImageMemoryBarrier2::default()
-        .src_stage_mask(stages(gpu, scopes.src_stages))
-        .src_access_mask(access(gpu, scopes.src_access))
-        .dst_stage_mask(stages(gpu, scopes.dst_stages))
-        .dst_access_mask(access(gpu, scopes.dst_access))
+        .src_stage_mask(src_stages)
+        .src_access_mask(src_access)
+        .dst_stage_mask(dst_stages)
+        .dst_access_mask(dst_access)
         .old_layout(layout(scopes.old_layout))
         .new_layout(layout(scopes.new_layout))
         .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
@@ -269,18 +252,36 @@ fn named<const N: usize>(names: &Names<N>, bits: u32) -> u64 {
 /// Stages by their Vulkan names, without those whose feature is off.
 #[inline]
 pub(super) fn stages(gpu: &Gpu, stages: Stages) -> vk::PipelineStageFlags2 {
+    stage_names(stages - stages_off(gpu))
+}
+
+/// One side of a barrier by its Vulkan names, without what features that are off would do.
+#[inline]
+fn scope(gpu: &Gpu, stages: Stages, access: Access) -> (vk::PipelineStageFlags2, vk::AccessFlags2) {
+    let mut off = Access::empty();
+    off.set(Access::ACCEL_READ | Access::ACCEL_WRITE, gpu.accel.is_none());
+    let (stages, access) = without_stages(stages, access - off, stages_off(gpu));
+    (stage_names(stages), vk::AccessFlags2::from_raw(named(&ACCESS_NAMES, access.bits())))
+}
+
+/// Stages whose feature is off.
+#[inline]
+fn stages_off(gpu: &Gpu) -> Stages {
     let mut off = Stages::empty();
     off.set(Stages::RAY_TRACING, gpu.ray_tracing.is_none());
     off.set(Stages::ACCEL_BUILD, gpu.accel.is_none());
-    vk::PipelineStageFlags2::from_raw(named(&STAGE_NAMES, (stages - off).bits().into()))
+    off
 }
 
-/// Accesses by their Vulkan names, without those whose feature is off.
+/// Without the stages that are `off`, and without accesses that only these perform: builds copy too.
 #[inline]
-fn access(gpu: &Gpu, access: Access) -> vk::AccessFlags2 {
-    let mut off = Access::empty();
-    off.set(Access::ACCEL_READ | Access::ACCEL_WRITE, gpu.accel.is_none());
-    vk::AccessFlags2::from_raw(named(&ACCESS_NAMES, (access - off).bits()))
+fn without_stages(stages: Stages, access: Access, off: Stages) -> (Stages, Access) {
+    let left = stages - off;
+    if left == stages { (stages, access) } else { (left, access & left.possible_accesses()) }
+}
+
+fn stage_names(stages: Stages) -> vk::PipelineStageFlags2 {
+    vk::PipelineStageFlags2::from_raw(named(&STAGE_NAMES, stages.bits().into()))
 }
 
 /// The layout of this name in Vulkan, where it can be that of an image of somebody else's.
@@ -338,6 +339,23 @@ mod tests {
         assert!(access(Access::empty()).is_empty());
     }
 
+    #[test]
+    fn what_only_stages_that_are_off_would_do_goes_with_them() {
+        let build = Stages::ACCEL_BUILD;
+        let read = Access::SHADER_READ | Access::TRANSFER_READ;
+        assert_eq!(
+            without_stages(Stages::COMPUTE | build, read, build),
+            (Stages::COMPUTE, Access::SHADER_READ)
+        );
+        assert_eq!(without_stages(build, read, build), (Stages::empty(), Access::empty()));
+        let both = Stages::TRANSFER | build;
+        assert_eq!(
+            without_stages(both, Access::TRANSFER_READ, build),
+            (Stages::TRANSFER, Access::TRANSFER_READ)
+        );
+        assert_eq!(without_stages(both, read, Stages::RAY_TRACING), (both, read));
+    }
+
     fn some_barrier() -> impl Strategy<Value = MemoryBarrier> {
         (0..3_u16, 0..3_u32, 0..3_u16, 0..3_u32).prop_map(
             |(src_stages, src_access, dst_stages, dst_access)| MemoryBarrier {
@@ -349,17 +367,21 @@ mod tests {
         )
     }
 
-    /// As [`barrier_names`], where the device has everything.
-    fn all_names(barrier: &MemoryBarrier) -> BarrierNames {
+    /// As [`memory_barrier`], where the device has everything.
+    fn all_named(barrier: &MemoryBarrier) -> vk::MemoryBarrier2<'static> {
         let stages =
             |stages: Stages| vk::PipelineStageFlags2::from_raw(named(&STAGE_NAMES, stages.bits().into()));
         let access = |access: Access| vk::AccessFlags2::from_raw(named(&ACCESS_NAMES, access.bits()));
-        BarrierNames {
-            src_stages: stages(barrier.src_stages),
-            src_access: access(barrier.src_access),
-            dst_stages: stages(barrier.dst_stages),
-            dst_access: access(barrier.dst_access),
-        }
+        vk::MemoryBarrier2::default()
+            .src_stage_mask(stages(barrier.src_stages))
+            .src_access_mask(access(barrier.src_access))
+            .dst_stage_mask(stages(barrier.dst_stages))
+            .dst_access_mask(access(barrier.dst_access))
+    }
+
+    fn masks(barrier: &vk::MemoryBarrier2<'_>) -> [u64; 4] {
+        let (src, dst) = (barrier.src_stage_mask, barrier.dst_stage_mask);
+        [src.as_raw(), barrier.src_access_mask.as_raw(), dst.as_raw(), barrier.dst_access_mask.as_raw()]
     }
 
     proptest! {
@@ -370,7 +392,7 @@ mod tests {
         ) {
             let mut last = LastBarrier::default();
             for barrier in barriers {
-                prop_assert_eq!(*last.names_of(&barrier, all_names), all_names(&barrier));
+                prop_assert_eq!(masks(last.named(&barrier, all_named)), masks(&all_named(&barrier)));
             }
         }
 

@@ -150,11 +150,12 @@ impl History {
         None
     }
 
-    /// Images that have contents are used by their owner, and both sides of a move match, the second behind the first, which is
-    /// behind what other queues of the owner have done.
+    /// Images that have contents are used by their owner, behind the move that made it so, and both sides of a move match, the
+    /// second behind the first, which is behind what other queues of the owner have done.
     fn wrong_owner(&self, cell: Cell) -> Option<String> {
         let mut owner: Option<u32> = None;
         let mut moving: Option<(MovedPart, u64)> = None;
+        let mut acquired: Option<(usize, u64)> = None;
         let mut uses = Vec::new();
         for (at, sent) in self.sent.iter().enumerate() {
             let domain = self.sites[sent.lane].domain;
@@ -163,6 +164,7 @@ impl History {
                 match moving.take() {
                     Some((part, value)) if part == *moved && self.is_behind(at, part.from, value) => {
                         owner = Some(domain);
+                        acquired = Some((sent.lane, sent.value));
                     }
                     _ => return wrong("acquired without a release that was waited for"),
                 }
@@ -173,10 +175,13 @@ impl History {
                 let matters = matches!(&step, Step::Barrier(edges) if edges.iter().any(|edge| edge.relayout.is_some()))
                     || matches!(step, Step::Access { .. });
                 if discards {
-                    owner = Some(domain);
+                    (owner, acquired) = (Some(domain), None);
                 }
                 if matters && (moving.is_some() || owner.is_some_and(|owner| owner != domain)) {
                     return wrong("used by another than its owner");
+                }
+                if matters && acquired.is_some_and(|(lane, value)| !self.is_behind(at, lane, value)) {
+                    return wrong("used beside the move to its owner");
                 }
                 uses.extend(matters.then_some((sent.lane, sent.value)));
             }

@@ -7,7 +7,7 @@ use ash::vk;
 use super::pages::{Found, Pages, Place};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::memory::MemoryKind;
+use crate::gpu::memory::{Mapping, MemoryKind};
 use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
@@ -25,8 +25,11 @@ pub(crate) struct StagingRegion {
 /// A piece of a page that one command buffer cuts small regions from, without the lock. No other region overlaps it.
 #[derive(Default)]
 pub(crate) struct StagingChunk {
-    page: Option<Arc<Buffer>>,
-    /// Where the next region may begin, in the page.
+    /// Keeps the mapping.
+    _page: Option<Arc<Buffer>>,
+    /// Where the host sees the first byte of the page, and the address of that.
+    mapping: Option<(Mapping, u64)>,
+    /// Addresses where the next region may begin, and where the chunk ends.
     next: u64,
     end: u64,
 }
@@ -34,16 +37,27 @@ pub(crate) struct StagingChunk {
 impl StagingChunk {
     const BYTES: u64 = 4 << 10;
     /// Larger regions are taken from pages.
-    const MOST_BYTES: u64 = Self::BYTES / 4;
+    pub(crate) const MOST_BYTES: u64 = Self::BYTES / 4;
 
-    /// Where in the page a region begins at an address of this alignment, if the chunk has room for it.
-    #[inline]
-    fn cut(&mut self, bytes: u64, align: u64) -> Option<u64> {
-        let buffer = self.page.as_ref()?;
-        let offset = (buffer.address + self.next).next_multiple_of(align.max(1)) - buffer.address;
-        let end = offset.checked_add(bytes).filter(|end| *end <= self.end)?;
+    /// A chunk that begins at this place of a page.
+    fn new(page: Arc<Buffer>, offset: u64) -> Self {
+        let next = page.address + offset;
+        let mapping = page.mapping().map(|mapping| (mapping, page.address));
+        Self { _page: Some(page), mapping, next, end: next + Self::BYTES }
+    }
+
+    /// A region at an address of this alignment, a power of two, as the GPU and the host see it, if the chunk has room for it.
+    #[inline(always)]
+    fn cut(&mut self, bytes: u64, align: u64) -> Option<(u64, &mut [u8])> {
+        let (mapping, start) = self.mapping?;
+        let address = self.next.checked_add(align - 1)? & !(align - 1);
+        let end = address.checked_add(bytes).filter(|end| *end <= self.end)?;
         self.next = end;
-        Some(offset)
+        // SAFETY: the page lives as long as the chunk, which lies in its mapping; no other region overlaps this one.
+        let out = unsafe {
+            std::slice::from_raw_parts_mut(mapping.0.as_ptr().add((address - start) as usize), bytes as usize)
+        };
+        Some((address, out))
     }
 }
 
@@ -148,7 +162,7 @@ impl Staging {
 
     /// As [`write_with`](Self::write_with), small regions from a chunk that belongs to the same command buffer. Answers the
     /// address.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn write_in<R>(
         &self,
         chunk: &mut StagingChunk,
@@ -161,24 +175,21 @@ impl Staging {
             let (region, answer) = self.write_with(bytes, align, sequence, fill)?;
             return Ok((region.address, answer));
         }
-        let offset = match chunk.cut(bytes, align) {
-            Some(offset) => offset,
-            None => self.renew(chunk, sequence, (bytes, align))?,
-        };
-        let Some(buffer) = &chunk.page else { return Err(no_room()) };
-        // SAFETY: the region lies inside the chunk, and no other one cut from it overlaps it.
-        let answer = unsafe { fill_region(offset, bytes, buffer, fill) }?;
-        Ok((buffer.address + offset, answer))
+        if let Some((address, out)) = chunk.cut(bytes, align) {
+            return Ok((address, fill(out)));
+        }
+        self.renew(chunk, sequence)?;
+        let (address, out) = chunk.cut(bytes, align).ok_or_else(no_room)?;
+        Ok((address, fill(out)))
     }
 
-    /// Takes a new chunk in place of a full one, and cuts the region from it.
+    /// Takes a new chunk in place of a full one.
     #[inline(never)]
-    fn renew(&self, chunk: &mut StagingChunk, sequence: u64, (bytes, align): (u64, u64)) -> Result<u64> {
+    fn renew(&self, chunk: &mut StagingChunk, sequence: u64) -> Result<()> {
         let (place, buffer) =
             self.lock().cached.place(&self.gpu, StagingChunk::BYTES, Buffer::ALIGNMENT, Some(sequence))?;
-        let (next, end) = (place.offset, place.offset + StagingChunk::BYTES);
-        *chunk = StagingChunk { page: Some(buffer), next, end };
-        chunk.cut(bytes, align).ok_or_else(no_room)
+        *chunk = StagingChunk::new(buffer, place.offset);
+        Ok(())
     }
 
     /// Copies `data` to where some command buffer will read it; see [`hold`](Self::hold).

@@ -73,6 +73,16 @@ impl Lighting {
         }
     }
 
+    /// How many lights there are.
+    pub(crate) fn light_count(&self) -> u32 {
+        self.light_count
+    }
+
+    /// With no more than the first `count` of them.
+    pub(crate) fn with_lights(self, count: u32) -> Self {
+        Self { light_count: self.light_count.min(count), ..self }
+    }
+
     /// Puts the lamp somewhere else.
     pub(super) fn move_lamp(&mut self, position: [f32; 3]) {
         self.lights[0].position = position;

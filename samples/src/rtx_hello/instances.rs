@@ -1,6 +1,7 @@
 //! Where the triangles are: a large one that turns, and two rings around it that turn against each other.
 
 use std::f32::consts::TAU;
+use std::iter::{once, repeat_n};
 
 use glam::{Affine3A, Quat, Vec3};
 
@@ -20,6 +21,15 @@ const RINGS: [Ring; 2] = [
 /// Corners of a triangle around the origin that points up, at distance 1.
 pub(super) const CORNERS: [[f32; 3]; 3] = [[-0.866, -0.5, 0.0], [0.866, -0.5, 0.0], [0.0, 1.0, 0.0]];
 
+/// Groups of triangles: the one in the middle, and each ring.
+pub(super) const GROUPS: usize = 1 + RINGS.len();
+
+/// The group of each triangle, in the order of [`places`].
+pub(super) fn groups() -> impl Iterator<Item = usize> {
+    let rings = (1..).zip(&RINGS).flat_map(|(group, ring)| repeat_n(group, ring.count as usize));
+    once(0).chain(rings)
+}
+
 /// Where each triangle is at `phase` of the animation's round, 0 to 1.
 pub(super) fn places(phase: f32) -> Vec<Affine3A> {
     let middle = Affine3A::from_scale_rotation_translation(
@@ -28,7 +38,7 @@ pub(super) fn places(phase: f32) -> Vec<Affine3A> {
         Vec3::ZERO,
     );
     let rings = RINGS.iter().flat_map(|ring| (0..ring.count).map(|number| on_ring(ring, number, phase)));
-    std::iter::once(middle).chain(rings).collect()
+    once(middle).chain(rings).collect()
 }
 
 /// Points outwards, and turns about that direction too.
@@ -50,6 +60,19 @@ mod tests {
             assert!(first.abs_diff_eq(last, 1e-5), "{first} {last}");
         }
         assert!(!places(0.0)[5].abs_diff_eq(places(0.3)[5], 0.1));
+    }
+
+    #[test]
+    fn each_triangle_has_its_group() {
+        let counts = [1, 12, 24];
+        let of = |group| groups().filter(|other| *other == group).count();
+        assert_eq!(std::array::from_fn::<_, GROUPS, _>(of), counts);
+        assert_eq!(groups().count(), places(0.0).len());
+        for (group, place) in groups().zip(places(0.2)) {
+            let from_middle = place.translation.length();
+            let radius = [0.0, RINGS[0].radius, RINGS[1].radius][group];
+            assert!((from_middle - radius).abs() < 1e-5, "{group}: {from_middle}");
+        }
     }
 
     #[test]

@@ -8,8 +8,10 @@ mod instances;
 mod pipelines;
 mod renderer;
 mod run;
+mod switches;
 
 pub use args::RtxHelloArgs;
 pub use pipelines::pipelines;
 pub use renderer::RtxHello;
 pub use run::run;
+pub use switches::{Following, RtxHelloSwitches};

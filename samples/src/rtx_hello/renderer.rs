@@ -2,19 +2,17 @@
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, BuildFlags, BuildMode, Context,
-    Dependencies, Holder, TextureHandle, TlasDesc, TlasInstance, Triangles, transform_rows,
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, BuildFlags, Context, Dependencies,
+    Holder, TextureHandle, TlasDesc, TlasInstance, Triangles, transform_rows,
 };
 
-use super::instances::{CORNERS, places};
+use super::instances::{CORNERS, groups, places};
 use super::pipelines::RAYS;
+use super::switches::RtxHelloSwitches;
 use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::rtx::{Canvas, RtxConfig, RtxError, Tracer};
-
-/// Refits of the top-level structure between two rebuilds.
-const MAX_REFITS: u32 = 32;
 
 /// Renders the triangles.
 pub struct RtxHello {
@@ -23,8 +21,10 @@ pub struct RtxHello {
     config: RtxConfig,
     tracer: Tracer,
     tlas: Holder<AccelStructHandle>,
-    instances: Vec<TlasInstance>,
-    _held: (Holder<AccelStructHandle>, Holder<BufferHandle>),
+    blas: Holder<AccelStructHandle>,
+    switches: RtxHelloSwitches,
+    phase: f32,
+    _vertices: Holder<BufferHandle>,
 }
 
 /// `Push` in `shaders/rtx_hello/view.glsl`.
@@ -48,9 +48,9 @@ impl RtxHello {
             geometries: &[BlasGeometry::Triangles(Triangles::packed(*vertices, 3))],
             ..BlasDesc::default()
         })?;
-        let instances = instances(*blas, 0.0);
+        let switches = RtxHelloSwitches::default();
         let tlas = ctx.create_tlas(&TlasDesc {
-            instances: &instances,
+            instances: &instances(*blas, 0.0, &switches),
             flags: BuildFlags::ALLOW_UPDATE,
             ..TlasDesc::default()
         })?;
@@ -61,14 +61,21 @@ impl RtxHello {
             config: *config,
             tracer,
             tlas,
-            instances,
-            _held: (blas, vertices),
+            blas,
+            switches,
+            phase: 0.0,
+            _vertices: vertices,
         })
     }
 
     /// How many triangles there are.
     pub fn triangle_count(&self) -> usize {
-        self.instances.len()
+        groups().count()
+    }
+
+    /// What its panel changes, from the next frame on.
+    pub fn switches(&mut self) -> &mut RtxHelloSwitches {
+        &mut self.switches
     }
 }
 
@@ -80,16 +87,16 @@ impl Sample for RtxHello {
     }
 
     fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
-        self.instances = instances(self.instances[0].blas, moment.phase());
+        self.phase = moment.phase();
         Ok(())
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
         let (size, image) = (self.config.extent(), self.canvas.picture());
         let push = Push { size, tlas: self.tlas.index(), image: image.index() };
-        let mode = BuildMode::Auto { max_refits: MAX_REFITS };
+        let instances = instances(*self.blas, self.phase, &self.switches);
         let writes = Dependencies { storage_images: &[**image], ..Dependencies::default() };
-        frame.pass("TLAS update", |cmd| cmd.update_tlas(*self.tlas, &self.instances, mode))?;
+        frame.pass("TLAS update", |cmd| cmd.update_tlas(*self.tlas, &instances, self.switches.mode()))?;
         frame.pass("rays", |cmd| self.tracer.record(cmd, &push, size, &writes))?;
         Ok(**image)
     }
@@ -101,13 +108,21 @@ impl Sample for RtxHello {
         Ok(())
     }
 
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        self.switches.show(ui);
+    }
+
     fn reload(&mut self) -> Result<(), RtxError> {
         self.tracer = Tracer::new(&self.ctx, self.config.path, &RAYS)?;
         Ok(())
     }
 }
 
-fn instances(blas: AccelStructHandle, phase: f32) -> Vec<TlasInstance> {
-    let instance = |place| TlasInstance { transform: transform_rows(&place), ..TlasInstance::new(blas) };
-    places(phase).into_iter().map(instance).collect()
+fn instances(blas: AccelStructHandle, phase: f32, switches: &RtxHelloSwitches) -> Vec<TlasInstance> {
+    let instance = |(place, group)| TlasInstance {
+        transform: transform_rows(&place),
+        mask: switches.mask(group),
+        ..TlasInstance::new(blas)
+    };
+    places(phase).into_iter().zip(groups()).map(instance).collect()
 }

@@ -9,9 +9,11 @@ mod config;
 mod pipelines;
 mod renderer;
 mod run;
+mod switches;
 
 pub use args::RtxPipelineArgs;
 pub use config::RtxPipelineConfig;
 pub use pipelines::pipelines;
 pub use renderer::RtxPipeline;
 pub use run::run;
+pub use switches::RtxPipelineSwitches;

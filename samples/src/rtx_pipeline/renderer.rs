@@ -5,6 +5,7 @@ use lvk::{BufferHandle, Context, Dependencies, Holder, TextureHandle};
 
 use super::config::RtxPipelineConfig;
 use super::pipelines::RAYS;
+use super::switches::RtxPipelineSwitches;
 use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
@@ -24,6 +25,8 @@ pub struct RtxPipeline {
     tracer: Tracer,
     frame: Holder<BufferHandle>,
     constants: FrameConstants,
+    lighting: Lighting,
+    switches: RtxPipelineSwitches,
     path: CameraPath,
     camera: Camera,
     near_plane: f32,
@@ -56,10 +59,12 @@ impl RtxPipeline {
         let gpu_scene = GpuScene::new(ctx, scene, HIT_GROUPS)?;
         let path = CameraPath::tour(scene, 0);
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
+        let lighting = Lighting::new(scene);
+        let switches = RtxPipelineSwitches { depth: config.depth, lights: lighting.light_count() };
         let constants = FrameConstants {
             camera: GpuCamera::zeroed(),
             scene: gpu_scene.addresses(),
-            lighting: Lighting::new(scene),
+            lighting,
             tlas: gpu_scene.tlas.index(),
             sky: gpu_scene.sky.index(),
             surface_sampler: gpu_scene.surface_sampler.index(),
@@ -77,6 +82,8 @@ impl RtxPipeline {
             config,
             frame,
             constants,
+            lighting,
+            switches,
             path,
         })
     }
@@ -99,6 +106,16 @@ impl RtxPipeline {
         self.scene.triangle_count
     }
 
+    /// What its panel changes, from the next frame on.
+    pub fn switches(&mut self) -> &mut RtxPipelineSwitches {
+        &mut self.switches
+    }
+
+    /// What the switches begin with, and the most that they can be.
+    fn all_switches(&self) -> RtxPipelineSwitches {
+        RtxPipelineSwitches { depth: self.config.depth, lights: self.lighting.light_count() }
+    }
+
     /// Parts that the library made of the bottom-level structures, which are two at most.
     pub fn blas_part_count(&self) -> u32 {
         self.scene.blas_part_count
@@ -119,6 +136,8 @@ impl Sample for RtxPipeline {
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
         let (extent, picture) = (self.config.rtx.extent(), **self.canvas.picture());
+        self.constants.depth = self.switches.depth.min(self.config.depth);
+        self.constants.lighting = self.lighting.with_lights(self.switches.lights);
         self.constants.camera = GpuCamera::new(&self.camera, extent[0], extent[1], self.near_plane);
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
         let push = self.ctx.buffer_address(*self.frame)?;
@@ -141,6 +160,12 @@ impl Sample for RtxPipeline {
 
     fn set_view(&mut self, camera: &Camera) {
         self.camera = *camera;
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        let most = self.all_switches();
+        self.switches.show(ui, &most);
+        ui.label(format!("{} triangles", self.triangle_count()));
     }
 
     fn reload(&mut self) -> Result<(), RtxError> {

@@ -9,8 +9,10 @@ mod models;
 mod pipelines;
 mod renderer;
 mod run;
+mod switches;
 
 pub use args::RtxTexturesArgs;
 pub use pipelines::pipelines;
 pub use renderer::RtxTextures;
 pub use run::run;
+pub use switches::RtxTexturesSwitches;

@@ -5,12 +5,13 @@ use std::f32::consts::TAU;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, BuildMode, CommandBuffer,
-    ComputePipelineHandle, Context, Dependencies, DeviceInstances, GeometryFlags, Holder, IndexFormat,
-    Indices, SamplerDesc, SamplerHandle, TextureHandle, TlasDesc, Triangles, VertexFormat,
+    ComputePipelineHandle, Context, Dependencies, DeviceInstances, Filter, GeometryFlags, Holder,
+    IndexFormat, Indices, SamplerDesc, SamplerHandle, TextureHandle, TlasDesc, Triangles, VertexFormat,
 };
 
 use super::models::{Models, Vertex};
 use super::pipelines::{INSTANCES, RAYS};
+use super::switches::RtxTexturesSwitches;
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
@@ -19,11 +20,11 @@ use crate::rtx::{Canvas, RtxConfig, RtxError, Tracer, compute_pipeline};
 use crate::scene::{Camera, GpuCamera, painted_textures};
 
 /// Textures that the shaders have room for.
-const TEXTURES: usize = 6;
+pub(super) const TEXTURES: usize = 6;
 /// Things in a row and in a column (`kColumns` in `shaders/rtx_textures/instances.comp.glsl`).
 const COLUMNS: u32 = 13;
 /// They and the ground.
-const INSTANCE_COUNT: u32 = COLUMNS * COLUMNS + 1;
+pub(super) const INSTANCE_COUNT: u32 = COLUMNS * COLUMNS + 1;
 /// Bytes of an instance.
 const RECORD_BYTES: u64 = 64;
 /// Instances that a work group writes.
@@ -43,6 +44,9 @@ pub struct RtxTextures {
     frame_address: u64,
     constants: FrameConstants,
     camera: Camera,
+    textures: [u32; TEXTURES],
+    samplers: [Holder<SamplerHandle>; 2],
+    switches: RtxTexturesSwitches,
     _held: Held,
 }
 
@@ -51,7 +55,6 @@ struct Held {
     _blas: Vec<Holder<AccelStructHandle>>,
     _buffers: [Holder<BufferHandle>; 2],
     _textures: Vec<Holder<TextureHandle>>,
-    _sampler: Holder<SamplerHandle>,
 }
 
 /// `Frame` in `shaders/rtx_textures/frame.glsl`.
@@ -89,7 +92,6 @@ impl RtxTextures {
             .take(TEXTURES)
             .map(|picture| scene_textures::picture(ctx, picture))
             .collect::<Result<_, _>>()?;
-        let sampler = ctx.create_sampler(&SamplerDesc::default())?;
         let records = buffer(ctx, "instances", RECORD_BYTES * u64::from(INSTANCE_COUNT))?;
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let constants = FrameConstants {
@@ -97,12 +99,12 @@ impl RtxTextures {
             vertices: ctx.buffer_address(*vertices)?,
             triangles: ctx.buffer_address(*triangles)?,
             records: ctx.buffer_address(*records)?,
-            textures: std::array::from_fn(|number| textures[number % textures.len()].index()),
+            textures: [0; TEXTURES],
             first_triangle: std::array::from_fn(|model| models.ranges[model].start),
             tlas: tlas.index(),
             image: canvas.picture().index(),
-            sampler: sampler.index(),
-            count: INSTANCE_COUNT,
+            sampler: 0,
+            count: 0,
             phase: 0.0,
         };
         Ok(Self {
@@ -118,12 +120,10 @@ impl RtxTextures {
             frame,
             constants,
             camera: camera(0.0),
-            _held: Held {
-                _blas: blas,
-                _buffers: [vertices, triangles],
-                _textures: textures,
-                _sampler: sampler,
-            },
+            textures: std::array::from_fn(|number| textures[number % textures.len()].index()),
+            samplers: [sampler(ctx, Filter::Nearest)?, sampler(ctx, Filter::Linear)?],
+            switches: RtxTexturesSwitches::default(),
+            _held: Held { _blas: blas, _buffers: [vertices, triangles], _textures: textures },
         })
     }
 
@@ -133,9 +133,21 @@ impl RtxTextures {
         self.camera = camera(phase);
     }
 
-    /// Instances that the compute shader writes.
+    /// Instances that the compute shader writes where the switches take none away.
     pub fn instance_count(&self) -> u32 {
-        self.constants.count
+        INSTANCE_COUNT
+    }
+
+    /// What its panel changes, from the next frame on.
+    pub fn switches(&mut self) -> &mut RtxTexturesSwitches {
+        &mut self.switches
+    }
+
+    fn apply_switches(&mut self) {
+        let switches = &self.switches;
+        self.constants.count = switches.instance_count();
+        self.constants.textures = switches.ordered(&self.textures);
+        self.constants.sampler = self.samplers[usize::from(switches.is_filtered)].index();
     }
 
     /// Textures that they show.
@@ -147,12 +159,12 @@ impl RtxTextures {
         cmd.bind_compute_pipeline(*self.writer)?;
         cmd.push_constants(&self.frame_address)?;
         let writes = Dependencies { buffers: &[*self.records], ..Dependencies::default() };
-        cmd.dispatch([INSTANCE_COUNT.div_ceil(GROUP), 1, 1], &writes)
+        cmd.dispatch([self.constants.count.div_ceil(GROUP), 1, 1], &writes)
     }
 
     fn build_tlas(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
-        let instances =
-            DeviceInstances { buffer: *self.records, offset: 0, count: INSTANCE_COUNT, blas: &self.blas };
+        let count = self.constants.count;
+        let instances = DeviceInstances { buffer: *self.records, offset: 0, count, blas: &self.blas };
         cmd.update_tlas_from(*self.tlas, &instances, BuildMode::Rebuild)
     }
 
@@ -176,6 +188,7 @@ impl Sample for RtxTextures {
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
         let [width, height] = self.config.extent();
+        self.apply_switches();
         self.constants.camera = GpuCamera::new(&self.camera, width, height, 0.1);
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
         frame.pass("instances", |cmd| self.write_instances(cmd))?;
@@ -200,12 +213,26 @@ impl Sample for RtxTextures {
         self.camera = *camera;
     }
 
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        self.switches.show(ui);
+    }
+
     fn reload(&mut self) -> Result<(), RtxError> {
         let writer = compute_pipeline(&self.ctx, RAYS.sample, INSTANCES)?;
         self.tracer = Tracer::new(&self.ctx, self.config.path, &RAYS)?;
         self.writer = writer;
         Ok(())
     }
+}
+
+/// Between texels, or of the nearest one.
+fn sampler(ctx: &Context, filter: Filter) -> lvk::Result<Holder<SamplerHandle>> {
+    ctx.create_sampler(&SamplerDesc {
+        mag_filter: filter,
+        min_filter: filter,
+        mip_filter: filter,
+        ..SamplerDesc::default()
+    })
 }
 
 /// Where the animation looks from.

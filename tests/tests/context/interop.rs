@@ -95,6 +95,8 @@ impl Engine {
                 .push_next(&mut v12)
                 .push_next(&mut v13);
             instance.get_physical_device_features2(physical, &mut all);
+            // Not every device has it together with descriptors that are updated after they are bound.
+            all.features.robust_buffer_access = vk::FALSE;
             let there = instance.enumerate_device_extension_properties(physical).unwrap();
             let local_read = there.iter().any(|known| known.extension_name_as_c_str() == Ok(LOCAL_READ[0]));
             let extensions = if local_read { &LOCAL_READ[..] } else { &[] };

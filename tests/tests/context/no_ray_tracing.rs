@@ -12,7 +12,7 @@ use lvk::{
 };
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::compute::words_buffer;
-use lvk_tests::{device, device_with};
+use lvk_tests::without_software;
 
 const QUERY: &str = "
     #include <lvk/ray_query.glsl>
@@ -112,7 +112,7 @@ fn commands(ctx: &Context) {
 #[test]
 fn a_driver_without_ray_tracing_refuses_clearly() {
     without_ray_tracing(a_driver_without_ray_tracing_refuses_clearly, || {
-        let Some(ctx) = device() else { return };
+        let Some(ctx) = without_software(|_| ()) else { return };
         let name = ctx.capabilities().device_name.clone();
         for text in creations(&ctx).into_iter().chain(shaders(&ctx)).chain(pipelines(&ctx)) {
             assert!(text.contains("not supported") && text.contains(&name), "{text}");
@@ -125,7 +125,7 @@ fn a_driver_without_ray_tracing_refuses_clearly() {
 #[test]
 fn a_profile_without_ray_tracing_refuses_clearly() {
     let profile = DeviceProfile::no_ray_tracing();
-    let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
+    let Some(ctx) = without_software(|desc| desc.profile = Some(&profile)) else { return };
     for text in creations(&ctx).into_iter().chain(shaders(&ctx)).chain(pipelines(&ctx)) {
         assert!(text.contains("not supported") && text.contains("profile 'no-ray-tracing'"), "{text}");
     }

@@ -14,7 +14,7 @@ use lvk_tests::child::{in_child, without_ray_tracing};
 use lvk_tests::compute::{Evaluator, words_buffer};
 use lvk_tests::device::vulkan;
 use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, target};
-use lvk_tests::{device, device_with};
+use lvk_tests::{device, device_with, without_software};
 
 /// A context with the loader of the tests and nothing else asked for.
 fn start<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> lvk::Result<Context> {
@@ -25,7 +25,7 @@ fn start<'a>(adjust: impl FnOnce(&mut ContextDesc<'a>)) -> lvk::Result<Context> 
 
 #[test]
 fn devices_are_listed_with_what_they_can_do() {
-    let Some(ctx) = device() else { return };
+    let Some(ctx) = without_software(|_| ()) else { return };
     let devices = Context::devices(vulkan().flatten()).unwrap();
     let own = ctx.capabilities();
     let listed = devices.iter().find(|device| device.device_name == own.device_name).unwrap();
@@ -175,7 +175,7 @@ fn everything_else_works_with_ray_tracing_turned_off() {
 #[test]
 fn a_device_without_ray_tracing_does_everything_else() {
     without_ray_tracing(a_device_without_ray_tracing_does_everything_else, || {
-        let Some(ctx) = device() else { return };
+        let Some(ctx) = without_software(|_| ()) else { return };
         assert!(ctx.capabilities().device_name.contains("SwiftShader"), "{:?}", ctx.capabilities());
         expect_no_ray_tracing(&ctx);
         expect_drawing(&ctx);

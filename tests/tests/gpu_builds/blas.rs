@@ -42,7 +42,7 @@ fn many_structures_are_built_side_by_side() {
     let geometries: Vec<_> =
         vertices.iter().zip(counts).map(|(vertices, count)| [triangles(**vertices, count)]).collect();
     let leaves = Leaves::Corners;
-    let desc = |geometries| GpuBlasDesc { geometries, leaf_size: 2, improvements: 1, leaves, refit: false };
+    let desc = |geometries| GpuBlasDesc { geometries, leaf_size: 2, improvements: 1, leaves };
     let descs: Vec<_> = geometries.iter().map(|geometries| desc(&geometries[..])).collect();
     for (structure, corners) in build_blas(&ctx, &descs).unwrap().iter().zip(&meshes) {
         check_contents(&facts(&ctx, structure), &numbered(corners));
@@ -247,8 +247,7 @@ fn several_geometries_keep_their_numbers() {
             expected.extend(numbered(mesh).into_iter().map(|((_, index), c)| ((geometry, index), c)));
         }
         for leaves in [Leaves::Corners, Leaves::Indexed, Leaves::Packed] {
-            let desc =
-                GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, leaves, refit: true };
+            let desc = GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, leaves };
             let built = build_blas(&ctx, &[desc]).unwrap();
             check_contents(&facts(&ctx, &built[0]), &expected);
         }
@@ -268,7 +267,6 @@ fn better_places_cost_rays_less() {
         leaf_size: 1,
         improvements,
         leaves: Leaves::Corners,
-        refit: true,
     };
     let built = build_blas(&ctx, &[0, 1, 2].map(desc)).unwrap();
     let costs: Vec<f64> = built.iter().map(|structure| facts(&ctx, structure).cost).collect();

@@ -2,6 +2,7 @@
 
 mod anywhere;
 mod blas;
+mod kernels;
 mod refit;
 mod sort;
 mod tlas;

@@ -2,9 +2,14 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use lvk::test_hooks::{EMPTY, GpuBlasDesc, Leaves, build_blas, place, refit};
-use lvk::{Dependencies, RayQueryRequest};
+use lvk::{
+    BlasDesc, BlasGeometry, BuildFlags, Context, Dependencies, DeviceProfile, RayQueryRequest, Result,
+};
+use lvk_tests::bender::bent;
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::gpu_built::{boxes, build, check_contents, facts, input, numbered, scattered, triangles};
+use lvk_tests::meshes::Mesh;
+use lvk_tests::ray_scene::{Layout, Part, PartBuffers, upload_geometries, vertex_bytes};
 use lvk_tests::wide_tree::wide_structure;
 use lvk_tests::{device, device_with};
 
@@ -15,8 +20,7 @@ fn binary_nodes_follow_moved_triangles() {
         for leaves in [Leaves::Corners, Leaves::Indexed, Leaves::Packed] {
             let vertices = input(&ctx, &scattered(count, 1));
             let geometries = [triangles(*vertices, count)];
-            let desc =
-                GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, leaves, refit: true };
+            let desc = GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, leaves };
             let structure = build_blas(&ctx, &[desc]).unwrap().remove(0);
             let before = facts(&ctx, &structure);
             for seed in [2, 3] {
@@ -103,6 +107,50 @@ fn wide_nodes_follow_moved_triangles() {
             ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&moved)).unwrap();
             refit(&ctx, &[(&structure, &geometries)]).unwrap();
             check_contents(&facts(&ctx, &structure), &numbered(&moved));
+        }
+    }
+}
+
+/// The words of a tree that the CPU built of a mesh, and its input.
+fn tree_of_the_cpu(
+    ctx: &Context,
+    mesh: &Mesh,
+    flags: BuildFlags,
+) -> Result<(Vec<u32>, Vec<PartBuffers>, Vec<BlasGeometry>)> {
+    const MARK: &[u8] = b"lvk software structure, form 3\0\0";
+    let parts = [Part::new(mesh.clone(), Layout::Indexed16)];
+    let (buffers, geometries) = upload_geometries(ctx, &parts)?;
+    let blas = ctx.create_blas(&BlasDesc { geometries: &geometries, flags, ..Default::default() })?;
+    let bytes = ctx.serialize_blas(*blas)?;
+    let start = bytes.windows(MARK.len()).position(|window| window == MARK).unwrap() + MARK.len();
+    let words = bytes[start..].as_chunks().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
+    Ok((words, buffers, geometries))
+}
+
+/// With leaves that share vertices, and others.
+#[test]
+fn trees_of_the_cpu_follow_moved_triangles() {
+    let profile = DeviceProfile::no_ray_tracing();
+    let bare = device_with(|desc| {
+        desc.profile = Some(&profile);
+        desc.ray_query = RayQueryRequest::Software;
+    });
+    let Some(ctx) = bare else { return };
+    for mesh in [Mesh::torus(1), Mesh::cube_grid(1), Mesh::terrain(40)] {
+        for (flags, leaf_kind) in [(BuildFlags::FAST_TRACE, 0), (BuildFlags::LOW_MEMORY, 4)] {
+            let flags = flags | BuildFlags::ALLOW_UPDATE;
+            let (words, buffers, geometries) = tree_of_the_cpu(&ctx, &mesh, flags).unwrap();
+            assert_eq!(words[1], leaf_kind, "{flags:?}");
+            let structure = place(&ctx, &words).unwrap();
+            for amount in [0.0, 0.8] {
+                let moved = bent(&mesh, amount);
+                let bytes = vertex_bytes(&moved, Layout::Indexed16);
+                ctx.upload_buffer(*buffers[0].vertices, 0, &bytes).unwrap();
+                refit(&ctx, &[(&structure, &geometries)]).unwrap();
+                let corners = |named: &[u32; 3]| named.map(|vertex| moved.positions[vertex as usize]);
+                let expected: Vec<_> = moved.triangles.iter().map(corners).collect();
+                check_contents(&facts(&ctx, &structure), &numbered(&expected));
+            }
         }
     }
 }

@@ -13,27 +13,55 @@ use lvk_tests::rays::Ray;
 const COUNT: usize = 600;
 
 /// Trees of the CPU and of the GPU, and leaves of every kind that can be refitted.
-const FLAGS: [BuildFlags; 3] = [
+const FLAGS: [BuildFlags; 4] = [
     BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE),
     BuildFlags::FAST_BUILD.union(BuildFlags::ALLOW_UPDATE),
     BuildFlags::LOW_MEMORY.union(BuildFlags::ALLOW_UPDATE),
+    BuildFlags::LOW_MEMORY.union(BuildFlags::FAST_BUILD).union(BuildFlags::ALLOW_UPDATE),
 ];
 
-fn leaves(primitive: usize) -> bool {
-    primitive.is_multiple_of(3)
+/// What the triangles make up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Pieces {
+    /// Each by itself.
+    Triangles,
+    /// Two share an edge, so that leaves may share vertices.
+    Quads,
 }
 
-/// The triangles, with those that leave so far out on one side or the other.
-fn moved(reach: f32) -> Vec<[[f32; 3]; 3]> {
-    let mut triangles = scattered(COUNT, 1);
-    for (number, triangle) in triangles.iter_mut().enumerate().filter(|(number, _)| leaves(*number)) {
-        let way = if number % 2 == 0 { reach } else { -reach };
-        triangle.iter_mut().for_each(|corner| corner[number / 6 % 3] += way);
+impl Pieces {
+    fn leaves(self, primitive: u32) -> bool {
+        let piece = if self == Self::Quads { primitive / 2 } else { primitive };
+        piece.is_multiple_of(3)
     }
-    triangles
+
+    /// The corners of one of these three.
+    fn corners(self, [a, b, c]: [[f32; 3]; 3]) -> Vec<[f32; 3]> {
+        let opposite = (Vec3::from(a) + Vec3::from(b) - Vec3::from(c)).to_array();
+        if self == Self::Quads { vec![a, b, c, opposite] } else { vec![a, b, c] }
+    }
+
+    /// All vertices, with those that leave so far out on one side or the other.
+    fn moved(self, reach: f32) -> Vec<[f32; 3]> {
+        let mut triangles = scattered(COUNT, 1);
+        for (number, triangle) in triangles.iter_mut().enumerate().step_by(3) {
+            let way = if number % 2 == 0 { reach } else { -reach };
+            triangle.iter_mut().for_each(|corner| corner[number / 6 % 3] += way);
+        }
+        triangles.into_iter().flat_map(|triangle| self.corners(triangle)).collect()
+    }
+
+    fn scene(self) -> RayScene {
+        let triangles = (0..COUNT as u32).flat_map(|number| match self {
+            Self::Triangles => vec![[0, 1, 2].map(|corner| number * 3 + corner)],
+            Self::Quads => [[0, 1, 2], [1, 0, 3]].map(|corners| corners.map(|it| number * 4 + it)).to_vec(),
+        });
+        let layout = if self == Self::Quads { Layout::Indexed32 } else { Layout::Unshared };
+        RayScene::single(Mesh { positions: self.moved(0.0), triangles: triangles.collect() }, layout)
+    }
 }
 
-/// One towards each triangle.
+/// One towards each of the scattered triangles.
 fn rays() -> Vec<Ray> {
     let mut random = Random::new(131);
     let towards = |[a, b, c]: [[f32; 3]; 3]| {
@@ -44,8 +72,8 @@ fn rays() -> Vec<Ray> {
     scattered(COUNT, 1).into_iter().map(towards).collect()
 }
 
-fn refit(ctx: &Context, gpu: &GpuScene, scene: &RayScene, reach: f32) -> Result<()> {
-    ctx.upload_buffer(*gpu.buffers[0].vertices, 0, bytemuck::cast_slice(&moved(reach)))?;
+fn refit(ctx: &Context, gpu: &GpuScene, scene: &RayScene, vertices: &[[f32; 3]]) -> Result<()> {
+    ctx.upload_buffer(*gpu.buffers[0].vertices, 0, bytemuck::cast_slice(vertices))?;
     let mut cmd = ctx.acquire_command_buffer()?;
     cmd.build_blas(&[*gpu.models[0]], BuildMode::Refit)?;
     cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
@@ -54,10 +82,10 @@ fn refit(ctx: &Context, gpu: &GpuScene, scene: &RayScene, reach: f32) -> Result<
 }
 
 /// What hit a triangle that stays hits it still, to the bit; what hit another may hit one behind it.
-fn check_near(what: &str, before: &[HitRecord], after: &[HitRecord]) {
+fn check_near(what: &str, pieces: Pieces, before: &[HitRecord], after: &[HitRecord]) {
     for (number, (before, after)) in before.iter().zip(after).enumerate() {
-        if leaves(before.primitive as usize) {
-            let is_behind = !leaves(after.primitive as usize) && after.t > before.t;
+        if pieces.leaves(before.primitive) {
+            let is_behind = !pieces.leaves(after.primitive) && after.t > before.t;
             assert!(after.kind == MISSED || is_behind, "{what}, ray {number}: {after:?} after {before:?}");
         } else {
             assert_eq!(before, after, "{what}, ray {number}");
@@ -65,25 +93,21 @@ fn check_near(what: &str, before: &[HitRecord], after: &[HitRecord]) {
     }
 }
 
-fn check_all(ctx: &Context, tracer: &RayTracer, by: &str) -> Result<()> {
-    let positions = moved(0.0).concat();
-    let triangles = (0..COUNT as u32).map(|number| [0, 1, 2].map(|corner| number * 3 + corner)).collect();
-    let scene = RayScene::single(Mesh { positions, triangles }, Layout::Unshared);
-    let rays = rays();
+fn check_all(ctx: &Context, tracer: &RayTracer, pieces: Pieces, by: &str) -> Result<()> {
+    let (scene, rays) = (pieces.scene(), rays());
     for flags in FLAGS {
+        let what = format!("{pieces:?}, {flags:?}, {by}");
         let gpu = scene.upload_with(ctx, flags, BuildFlags::default(), 0)?;
         let before = tracer.trace(&gpu.tlas, &rays, How::default())?;
-        assert!(
-            before.iter().all(|record| record.kind != MISSED),
-            "{flags:?}, {by}: a ray misses its triangle"
-        );
+        assert!(before.iter().all(|record| record.kind != MISSED), "{what}: a ray misses its triangle");
         for reach in [1e16, 1e30, 3e38] {
-            refit(ctx, &gpu, &scene, reach)?;
+            refit(ctx, &gpu, &scene, &pieces.moved(reach))?;
             let after = tracer.trace(&gpu.tlas, &rays, How::default())?;
-            check_near(&format!("{flags:?}, {reach:e}, {by}"), &before, &after);
+            check_near(&format!("{what}, {reach:e}"), pieces, &before, &after);
         }
-        refit(ctx, &gpu, &scene, 0.0)?;
-        assert_eq!(tracer.trace(&gpu.tlas, &rays, How::default())?, before, "{flags:?}, back again, {by}");
+        refit(ctx, &gpu, &scene, &pieces.moved(0.0))?;
+        let again = tracer.trace(&gpu.tlas, &rays, How::default())?;
+        assert_eq!(again, before, "{what}, back again");
     }
     Ok(())
 }
@@ -91,6 +115,10 @@ fn check_all(ctx: &Context, tracer: &RayTracer, by: &str) -> Result<()> {
 #[test]
 fn what_stays_is_hit_while_neighbours_move_far_out() -> Result<()> {
     let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return Ok(()) };
-    check_all(&ctx, &RayTracer::new(&ctx, Method::Query)?, "by query")?;
-    check_all(&ctx, &RayTracer::for_opaque_triangles(&ctx)?, "all taken for opaque")
+    let (plain, opaque) = (RayTracer::new(&ctx, Method::Query)?, RayTracer::for_opaque_triangles(&ctx)?);
+    for pieces in [Pieces::Triangles, Pieces::Quads] {
+        check_all(&ctx, &plain, pieces, "by query")?;
+        check_all(&ctx, &opaque, pieces, "all taken for opaque")?;
+    }
+    Ok(())
 }

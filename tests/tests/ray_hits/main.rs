@@ -8,5 +8,6 @@ mod inactive;
 mod meshes;
 mod position_fetch;
 mod range;
+mod shared_vertices;
 mod transforms;
 mod vertex_formats;

@@ -11,7 +11,8 @@ use lvk_tests::agreement::Agreement;
 use lvk_tests::hit_check::{HitCheck, rays_for};
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene};
-use lvk_tests::ray_tracer::{How, shader};
+use lvk_tests::ray_tracer::{How, shader_with};
+use lvk_tests::structures::has_own_structures;
 use lvk_tests::{TestDevice, device, device_with};
 
 const RECORD_BYTES: u64 = 64;
@@ -26,8 +27,7 @@ struct Push {
     records: u64,
     count: u32,
     models: u32,
-    width: u32,
-    turn: f32,
+    turn: [f32; 2],
 }
 
 /// Writes records into a buffer of its own.
@@ -39,7 +39,9 @@ struct Writer {
 
 impl Writer {
     fn new(ctx: &Context, room: u32) -> Result<Self> {
-        let module = shader(ctx, ShaderStage::Compute, include_str!("../../shaders/instances.comp.glsl"))?;
+        let text = include_str!("../../shaders/instances.comp.glsl");
+        let width = WIDTH.to_string();
+        let module = shader_with(ctx, ShaderStage::Compute, text, &[("WIDTH", &width)])?;
         let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
         let pipeline = ctx.create_compute_pipeline(&desc)?;
         let size_bytes = OFFSET + u64::from(room) * RECORD_BYTES;
@@ -61,7 +63,9 @@ impl Writer {
         let blas: Vec<_> = gpu.models.iter().map(|model| **model).collect();
         let models = blas.len() as u32;
         cmd.bind_compute_pipeline(*self.pipeline)?;
-        cmd.push_constants(&Push { records: self.address, count, models, width: WIDTH, turn })?;
+        let (sine, cosine) = turn.sin_cos();
+        let turn = [cosine, sine];
+        cmd.push_constants(&Push { records: self.address, count, models, turn })?;
         let writes = Dependencies { buffers: &[*self.records], ..Default::default() };
         cmd.dispatch([count.div_ceil(64), 1, 1], &writes)?;
         let instances = DeviceInstances { buffer: *self.records, offset: OFFSET, count, blas: &blas };
@@ -92,14 +96,16 @@ fn models() -> Vec<Vec<Part>> {
     ]
 }
 
-/// Plain structures; some that are cut into many parts, where the device has room for them all; some that may move.
+/// Plain structures; where the device has its own, some that are cut into many parts, with room for them all, and some that may
+/// move.
 fn devices() -> Vec<(TestDevice, BuildFlags, u32)> {
     let profile = DeviceProfile { max_blas_primitives: 32, ..DeviceProfile::default() };
     let (trace, build) = (BuildFlags::FAST_TRACE, BuildFlags::FAST_BUILD);
     let plain = device().map(|ctx| (ctx, build, 1));
     let ordered = device().map(|ctx| (ctx, trace, 1));
-    let moving = device().map(|ctx| (ctx, trace | BuildFlags::ALLOW_COMPACTION, 1));
-    let cut = device_with(|desc| desc.profile = Some(&profile)).map(|ctx| (ctx, trace, 16));
+    let has_own = |ctx: &TestDevice| has_own_structures(ctx);
+    let moving = device().filter(has_own).map(|ctx| (ctx, trace | BuildFlags::ALLOW_COMPACTION, 1));
+    let cut = device_with(|desc| desc.profile = Some(&profile)).filter(has_own).map(|ctx| (ctx, trace, 16));
     [plain, ordered, moving, cut].into_iter().flatten().collect()
 }
 

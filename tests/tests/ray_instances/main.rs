@@ -1,5 +1,6 @@
 //! Instances in top-level structures: from the host, from lists, by shaders, in great numbers.
 
+mod anywhere;
 mod culling;
 mod from_shaders;
 mod geometries;

@@ -3,8 +3,7 @@
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
-    ComputePipelineDesc, Context, DeviceProfile, GeometryFlags, HitGroup, RayTracingPipelineDesc, Result,
-    ShaderStage,
+    ComputePipelineDesc, Context, GeometryFlags, HitGroup, RayTracingPipelineDesc, Result, ShaderStage,
 };
 use lvk_tests::agreement::Agreement;
 use lvk_tests::meshes::Mesh;
@@ -15,7 +14,7 @@ use lvk_tests::ray_tracer::{
 };
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::reference::{Hit, HitIds, Reference};
-use lvk_tests::{TestDevice, device, device_with};
+use lvk_tests::structures::whole_and_split;
 
 /// What the shaders do with a candidate.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -56,11 +55,6 @@ fn counter(ctx: &Context, method: Method, verdict: Verdict) -> Result<RayTracer>
         ..Default::default()
     })?;
     Ok(RayTracer::of_pipeline(ctx, pipeline))
-}
-
-fn devices() -> Vec<TestDevice> {
-    let profile = DeviceProfile { max_blas_primitives: 50, ..DeviceProfile::default() };
-    device().into_iter().chain(device_with(|desc| desc.profile = Some(&profile))).collect()
 }
 
 /// Overlapping models of two geometries with these flags.
@@ -116,7 +110,7 @@ fn certain<'a>(
 #[test]
 fn every_candidate_is_seen_once_where_that_is_asked() -> Result<()> {
     const ONCE: GeometryFlags = GeometryFlags::NO_DUPLICATE_ANY_HIT;
-    for ctx in devices() {
+    for ctx in whole_and_split(50) {
         for scene in [scene([ONCE; 2]), RayScene::scattered(ONCE)] {
             candidates_are_seen_once(&ctx, &scene)?;
         }
@@ -144,7 +138,7 @@ fn candidates_are_seen_once(ctx: &Context, scene: &RayScene) -> Result<()> {
 /// Without the flag a driver may show a candidate again, but leaves none out.
 #[test]
 fn every_candidate_is_seen_at_least_once() -> Result<()> {
-    for ctx in devices() {
+    for ctx in whole_and_split(50) {
         let scene = scene([GeometryFlags::empty(); 2]);
         let gpu = scene.upload(&ctx)?;
         let reference = scene.reference();
@@ -169,7 +163,7 @@ fn every_candidate_is_seen_at_least_once() -> Result<()> {
 /// The closest hit does not depend on the order in which candidates were accepted.
 #[test]
 fn accepted_candidates_leave_the_closest() -> Result<()> {
-    for ctx in devices() {
+    for ctx in whole_and_split(50) {
         let scene = scene([GeometryFlags::empty(), GeometryFlags::OPAQUE]);
         let gpu = scene.upload(&ctx)?;
         let reference = scene.reference();
@@ -195,7 +189,7 @@ fn accepted_candidates_leave_the_closest() -> Result<()> {
 /// Which hit ends the ray is the driver's choice, but it is one of the hits, and there is none after it.
 #[test]
 fn a_terminated_ray_keeps_one_of_its_hits() -> Result<()> {
-    for ctx in devices() {
+    for ctx in whole_and_split(50) {
         let scene = scene([GeometryFlags::empty(); 2]);
         let gpu = scene.upload(&ctx)?;
         let reference = scene.reference();
@@ -226,7 +220,7 @@ fn a_terminated_ray_keeps_one_of_its_hits() -> Result<()> {
 /// Ignored candidates in front of opaque ones: those are hit as if nothing stood before them.
 #[test]
 fn what_is_ignored_hides_nothing() -> Result<()> {
-    for ctx in devices() {
+    for ctx in whole_and_split(50) {
         let scene = scene([GeometryFlags::empty(), GeometryFlags::OPAQUE]);
         let gpu = scene.upload(&ctx)?;
         let reference = scene.reference();

@@ -9,6 +9,7 @@ use lvk_tests::compute::words_buffer;
 use lvk_tests::hit_check::HitCheck;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances};
+use lvk_tests::structures::{has_own_structures, software_alone, tests_own_structures};
 use lvk_tests::warnings::{listen, take_warnings};
 use lvk_tests::{TestDevice, device, device_with, without_software};
 
@@ -48,6 +49,24 @@ fn done(ctx: &Context, handle: AccelStructHandle) -> Result<(u64, u64)> {
     }
 }
 
+/// Fails unless a structure that is asked for waits for the GPU; what software traces has the size it needs, and is done at
+/// once.
+fn expect_pending(ctx: &Context, handle: AccelStructHandle) -> Result<()> {
+    if has_own_structures(ctx) {
+        assert_eq!(compaction(ctx, handle)?, Compaction::Pending);
+    } else {
+        expect_unchanged(ctx, handle)?;
+    }
+    Ok(())
+}
+
+/// Fails unless a structure is done, and takes what it took before.
+fn expect_unchanged(ctx: &Context, handle: AccelStructHandle) -> Result<()> {
+    let (before_bytes, after_bytes) = done(ctx, handle)?;
+    assert_eq!((before_bytes, after_bytes), (after_bytes, ctx.accel_struct_info(handle)?.structure_bytes));
+    Ok(())
+}
+
 /// Lets the sizes arrive, the copies be made, and what they replaced go.
 fn settle(ctx: &Context) -> Result<()> {
     (0..3).try_for_each(|_| ctx.wait_idle())
@@ -70,7 +89,7 @@ fn memory_goes_back_to_the_byte() -> Result<()> {
         handles(&gpu).into_iter().map(|handle| ctx.accel_struct_info(handle)).collect::<Result<_>>()?;
     let (all_before, own_before) = memory(&ctx);
     ctx.compact(&handles(&gpu)[..1])?;
-    assert_eq!(compaction(&ctx, *gpu.models[0])?, Compaction::Pending);
+    expect_pending(&ctx, *gpu.models[0])?;
     assert_eq!(compaction(&ctx, *gpu.models[1])?, Compaction::None);
     settle(&ctx)?;
     check.scene("one compacted", &gpu.tlas, &scene)?;
@@ -165,7 +184,7 @@ fn compaction_waits_for_builds_that_are_recorded() -> Result<()> {
         cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
         ctx.compact(&handles(&gpu))?;
         settle(&ctx)?;
-        assert_eq!(compaction(&ctx, *gpu.models[0])?, Compaction::Pending);
+        expect_pending(&ctx, *gpu.models[0])?;
         done(&ctx, *gpu.models[2])?;
         if submits {
             ctx.submit(cmd)?;
@@ -233,20 +252,29 @@ fn a_mesh_is_compacted_while_it_moves() -> Result<()> {
     Ok(())
 }
 
+/// The copy has no room for a build. What software traces alone was not copied: then the rebuild is as any other.
 #[test]
 fn a_compacted_structure_cannot_be_rebuilt() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let scene = scene();
+    let (mut scene, bender) = (scene(), Bender::new(&ctx)?);
     let gpu = upload(&ctx, &scene, MOVING)?;
     ctx.compact(&handles(&gpu))?;
     settle(&ctx)?;
     done(&ctx, *gpu.models[0])?;
+    let mesh = scene.models[0][0].mesh.clone();
     let mut cmd = ctx.acquire_command_buffer()?;
-    let refused = cmd.build_blas(&[*gpu.models[1]], BuildMode::Rebuild);
-    let Err(Error::InvalidUsage { object, message }) = refused else { unreachable!("{refused:?}") };
-    assert!(object == "model" && message.contains("compacted"), "{object}: {message}");
+    if has_own_structures(&ctx) {
+        let refused = cmd.build_blas(&[*gpu.models[0]], BuildMode::Rebuild);
+        let Err(Error::InvalidUsage { object, message }) = refused else { unreachable!("{refused:?}") };
+        assert!(object == "model" && message.contains("compacted"), "{object}: {message}");
+    } else {
+        bender.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, 0.4)?;
+        cmd.build_blas(&[*gpu.models[0]], BuildMode::Rebuild)?;
+        cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
+        scene.models[0][0].mesh = bent(&mesh, 0.4);
+    }
     ctx.submit(cmd)?;
-    HitCheck::new(&ctx)?.scene("after a refusal", &gpu.tlas, &scene)
+    HitCheck::new(&ctx)?.scene("after a refusal, or rebuilt", &gpu.tlas, &scene)
 }
 
 /// Worn out or not: another refit is all that can be done.
@@ -273,9 +301,15 @@ fn automatic_builds_refit_on_what_is_compacted() -> Result<()> {
     ctx.compact(&handles(&still))?;
     settle(&ctx)?;
     let mut cmd = ctx.acquire_command_buffer()?;
-    let refused = cmd.build_blas(&handles(&still), BuildMode::Auto { max_refits: 2 });
-    assert!(matches!(refused, Err(Error::InvalidUsage { .. })), "neither way is open: {refused:?}");
-    Ok(())
+    let built = cmd.build_blas(&handles(&still), BuildMode::Auto { max_refits: 2 });
+    if has_own_structures(&ctx) {
+        assert!(matches!(built, Err(Error::InvalidUsage { .. })), "neither way is open: {built:?}");
+        return Ok(());
+    }
+    built?;
+    cmd.update_tlas(*still.tlas, &instances(&scene.placed, &still.models), BuildMode::Rebuild)?;
+    ctx.submit(cmd)?;
+    check.scene("rebuilt, as refits are not allowed", &still.tlas, &scene)
 }
 
 #[test]
@@ -402,9 +436,12 @@ fn threads_compact_side_by_side() -> Result<()> {
 /// Bytes before and after compaction.
 type Sizes = (u64, u64);
 
-/// Bytes of all structures, and of each of the [`scene`]'s.
+/// Bytes of all structures, and of each of the [`scene`]'s; nothing, loudly, where there are no copies.
 fn measured(ctx: Option<TestDevice>) -> Result<Option<(u64, Vec<Sizes>)>> {
     let Some(ctx) = ctx else { return Ok(None) };
+    if !tests_own_structures(&ctx, "copies that need room") {
+        return Ok(None);
+    }
     let gpu = upload(&ctx, &scene(), COMPACTABLE)?;
     ctx.wait_idle()?;
     let needed = memory(&ctx).0;
@@ -412,6 +449,25 @@ fn measured(ctx: Option<TestDevice>) -> Result<Option<(u64, Vec<Sizes>)>> {
     settle(&ctx)?;
     let sizes = handles(&gpu).into_iter().map(|handle| done(&ctx, handle));
     Ok(Some((needed, sizes.collect::<Result<_>>()?)))
+}
+
+/// What software traces is not copied, so a budget for the structures themselves is enough.
+#[test]
+fn what_only_software_traces_is_compacted_without_room_for_copies() -> Result<()> {
+    let scene = scene();
+    let needed = {
+        let Some(ctx) = software_alone(|_| ()) else { return Ok(()) };
+        let _gpu = upload(&ctx, &scene, COMPACTABLE)?;
+        ctx.wait_idle()?;
+        memory(&ctx).0
+    };
+    let Some(ctx) = software_alone(|desc| desc.accel_budget_bytes = needed) else { return Ok(()) };
+    let gpu = upload(&ctx, &scene, COMPACTABLE)?;
+    ctx.compact(&handles(&gpu))?;
+    handles(&gpu).into_iter().try_for_each(|handle| expect_unchanged(&ctx, handle))?;
+    settle(&ctx)?;
+    assert_eq!(memory(&ctx).0, needed);
+    HitCheck::new(&ctx)?.scene("compacted, and as before", &gpu.tlas, &scene)
 }
 
 /// Copies need room beside what they replace. Without it everything stays as it is, with a warning for each.

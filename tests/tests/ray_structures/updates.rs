@@ -14,6 +14,7 @@ use lvk_tests::ray_scene::{
 };
 use lvk_tests::ray_tracer::{How, Method, RayTracer};
 use lvk_tests::rays::{Ray, random_rays};
+use lvk_tests::structures::{software_alone, tests_own_structures};
 
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
 
@@ -295,6 +296,9 @@ fn a_refit_overtaken_by_a_rebuild_of_another_count_is_refused() -> Result<()> {
 #[test]
 fn builds_given_up_do_not_count_as_wear() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
+    if !tests_own_structures(&ctx, "indices that a refit does not read") {
+        return Ok(());
+    }
     let tracer = RayTracer::new(&ctx, Method::available(&ctx)[0])?;
     let ring = Mesh::torus(10);
     let count = ring.triangles.len();
@@ -339,6 +343,32 @@ fn builds_given_up_do_not_count_as_wear() -> Result<()> {
     assert!(is_there(&[auto], true)?, "both refits of the command buffer counted");
     ctx.upload_buffer(indices.buffer, indices.offset, &vec![0; count * 3 * 2])?;
     assert!(!is_there(&[auto, auto, auto], true)?, "and do so within one");
+    Ok(())
+}
+
+/// What software traces moves to another place with its first rebuild, so its bytes tell the two apart.
+#[test]
+fn builds_of_software_given_up_do_not_count_as_wear() -> Result<()> {
+    let Some(ctx) = software_alone(|_| ()) else { return Ok(()) };
+    let gpu = deformable().upload_with(&ctx, UPDATABLE, UPDATABLE, 0)?;
+    let blas = *gpu.models[0];
+    let first_length = ctx.serialize_blas(blas)?.len();
+    let auto = BuildMode::Auto { max_refits: 2 };
+    let is_rebuilt = |modes: &[BuildMode], submits: bool| -> Result<bool> {
+        let mut cmd = ctx.acquire_command_buffer()?;
+        modes.iter().try_for_each(|mode| cmd.build_blas(&[blas], *mode))?;
+        if submits {
+            ctx.submit(cmd)?;
+        } else {
+            drop(cmd);
+        }
+        Ok(ctx.serialize_blas(blas)?.len() != first_length)
+    };
+    assert!(!is_rebuilt(&[auto], true)?, "the first refit");
+    assert!(!is_rebuilt(&[BuildMode::Refit, BuildMode::Refit], false)?);
+    assert!(!is_rebuilt(&[auto], true)?, "the second");
+    assert!(!is_rebuilt(&[BuildMode::Rebuild], false)?);
+    assert!(is_rebuilt(&[auto], true)?, "worn out, so it was rebuilt");
     Ok(())
 }
 

@@ -125,19 +125,22 @@ fn shaders_follow_addresses_of_addresses() {
         rows.iter().zip(skipped).map(|(row, words)| ctx.buffer_address(**row).unwrap() + 4 * words).collect();
     let table = buffer(&ctx, MemoryKind::HostVisible, bytemuck::cast_slice(&table));
     let result = words_buffer(&ctx, &[99; 6]);
-    let pipeline = compute_pipeline(
-        &ctx,
-        "layout(local_size_x = 6) in;
-         layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Word { uint value; };
+    // Sums of addresses need numbers of 64 bits.
+    let (word, next) = match ctx.capabilities().shader_int64 {
+        true => ("uint value;", "(row + (i % 2)).value"),
+        false => ("uint values[];", "row.values[i % 2]"),
+    };
+    let text = "layout(local_size_x = 6) in;
+         layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Word { WORD };
          layout(buffer_reference, scalar) readonly buffer Table { Word rows[]; };
          layout(buffer_reference, scalar) writeonly buffer Result { uint values[]; };
          layout(push_constant, scalar) uniform Push { Table table; Result result; };
          void main() {
              uint i = gl_LocalInvocationIndex;
              Word row = table.rows[i / 2];
-             result.values[i] = (row + (i % 2)).value;
-         }",
-    );
+             result.values[i] = NEXT;
+         }";
+    let pipeline = compute_pipeline(&ctx, &text.replace("WORD", word).replace("NEXT", next));
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     cmd.bind_compute_pipeline(*pipeline).unwrap();
     cmd.push_constants(&[*table, *result].map(|buffer| ctx.buffer_address(buffer).unwrap())).unwrap();

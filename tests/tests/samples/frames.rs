@@ -9,7 +9,7 @@ use lvk_samples::app::progress::Progress;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::deferred::{Deferred, DeferredConfig};
 use lvk_samples::hello_triangle::HelloTriangle;
-use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence};
+use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence, Method};
 use lvk_samples::hybrid_oit::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene};
 use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, World};
 use lvk_samples::mesh_shaders::MeshShaders;
@@ -195,9 +195,9 @@ fn hybrid_goes_by_frames() {
     let Some(ctx) = device() else { return };
     let scene = still_life();
     check(|[width, height]| {
-        let path = paths(&ctx)[0];
-        let config =
-            HybridConfig { path, width, height, max_depth: 1, samples: 2, ..HybridConfig::default() };
+        let (path, method) = (paths(&ctx)[0], Method::choose(None, ctx.capabilities()));
+        let few = HybridConfig { max_depth: 1, samples: 2, ..HybridConfig::default() };
+        let config = HybridConfig { path, method, width, height, ..few };
         let renderer = HybridRenderer::new(&ctx, &scene, &config).unwrap();
         HybridSequence::new(renderer, &scene, 0, true)
     });

@@ -7,7 +7,7 @@ use lvk_samples::app::headless;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
-use lvk_samples::rtx_hello::RtxHello;
+use lvk_samples::rtx_hello::{Following, RtxHello};
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::hybrid::paths;
 use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
@@ -55,6 +55,25 @@ fn a_frame_depends_on_its_moment_alone() {
     }
     assert_eq!(picture_of(&mut hello(&ctx, paths(&ctx)[0]), 40), picture_of(&mut sequence, 40), "alone");
     assert_eq!(picture_of(&mut sequence, ROUND), first, "a round has no seam");
+}
+
+#[test]
+fn switches_of_the_panel_hide_triangles_and_choose_the_update() {
+    let Some(ctx) = device() else { return };
+    let mut sample = hello(&ctx, paths(&ctx)[0]);
+    let all = picture_of(&mut sample, 40);
+    let without = [0, 1, 2].map(|group| {
+        sample.switches().is_seen[group] = false;
+        let picture = picture_of(&mut sample, 40);
+        sample.switches().is_seen[group] = true;
+        picture
+    });
+    assert!(without.iter().all(|picture| *picture != all), "each hides something");
+    assert!(without[0] != without[1] && without[1] != without[2] && without[2] != without[0]);
+    for following in [Following::Refits, Following::Rebuilds, Following::Both] {
+        sample.switches().following = following;
+        assert_eq!(picture_of(&mut sample, 40), all, "{following:?}");
+    }
 }
 
 #[test]

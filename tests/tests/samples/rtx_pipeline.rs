@@ -8,7 +8,7 @@ use lvk_samples::app::headless;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
-use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig};
+use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig, RtxPipelineSwitches};
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::hybrid::paths;
 use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
@@ -56,6 +56,21 @@ fn depth_and_moment_count() {
     assert_ne!(picture_of(&mut flat, 0), first, "mirrors show something");
     assert_ne!(picture_of(&mut deep, 30), first, "the camera moves");
     assert_eq!(picture_of(&mut deep, 100), first, "a round has no seam");
+}
+
+#[test]
+fn switches_of_the_panel_take_depth_and_lights_away() {
+    let Some(ctx) = device() else { return };
+    for path in paths(&ctx) {
+        let mut sample = still(&ctx, path, 3);
+        let (first, all) = (picture_of(&mut sample, 0), *sample.switches());
+        *sample.switches() = RtxPipelineSwitches { lights: 0, ..all };
+        assert_ne!(picture_of(&mut sample, 0), first, "there is light");
+        *sample.switches() = RtxPipelineSwitches { depth: 0, ..all };
+        assert_eq!(picture_of(&mut sample, 0), picture_of(&mut still(&ctx, path, 0), 0), "{path:?}");
+        *sample.switches() = RtxPipelineSwitches { depth: u32::MAX, lights: u32::MAX };
+        assert_eq!(picture_of(&mut sample, 0), first, "no more than there is");
+    }
 }
 
 #[test]

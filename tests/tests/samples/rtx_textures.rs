@@ -7,7 +7,7 @@ use lvk_samples::app::headless;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
-use lvk_samples::rtx_textures::RtxTextures;
+use lvk_samples::rtx_textures::{RtxTextures, RtxTexturesSwitches};
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::hybrid::paths;
 use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
@@ -56,6 +56,30 @@ fn a_frame_depends_on_its_moment_alone() {
     }
     assert_eq!(picture_of(&mut waves(&ctx, paths(&ctx)[0]), 40), picture_of(&mut sequence, 40), "alone");
     assert_eq!(picture_of(&mut sequence, ROUND), first, "a round has no seam");
+}
+
+#[test]
+fn switches_of_the_panel_change_the_picture_and_back() {
+    let Some(ctx) = device() else { return };
+    let mut sample = waves(&ctx, paths(&ctx)[0]);
+    let (first, all) = (picture_of(&mut sample, 0), *sample.switches());
+    assert_eq!(all.instances, sample.instance_count());
+    for other in [
+        RtxTexturesSwitches { instances: 1, ..all },
+        RtxTexturesSwitches { handed_on: 1, ..all },
+        RtxTexturesSwitches { is_filtered: false, ..all },
+    ] {
+        *sample.switches() = other;
+        assert_ne!(picture_of(&mut sample, 0), first, "{other:?}");
+    }
+    // As many as there are textures hand each one back, and what is beyond the range is the nearest in it.
+    let texture_count = sample.texture_count() as u32;
+    *sample.switches() = RtxTexturesSwitches { instances: u32::MAX, handed_on: texture_count, ..all };
+    assert_eq!(picture_of(&mut sample, 0), first);
+    sample.switches().instances = 1;
+    let ground = picture_of(&mut sample, 0);
+    sample.switches().instances = 0;
+    assert_eq!(picture_of(&mut sample, 0), ground);
 }
 
 #[test]

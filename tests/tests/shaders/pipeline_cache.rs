@@ -153,6 +153,11 @@ fn a_file_of_another_device_is_dropped_and_replaced() {
     });
     if inherited.is_none() {
         assert!(path.exists());
+        let Some(ctx) = device() else { return };
+        let name = &ctx.capabilities().device_name;
+        if name.contains("SwiftShader") {
+            return eprintln!("NOT TESTED, {name} is the other device");
+        }
         expect_replacement(&path, "driver");
     }
 }

@@ -18,13 +18,14 @@ use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::{TestDevice, device, device_with};
 
 /// Trees of the CPU and of the GPU, that are refitted or not, over all kinds of leaves of triangles.
-const FLAGS: [BuildFlags; 6] = [
+const FLAGS: [BuildFlags; 7] = [
     BuildFlags::FAST_TRACE,
     BuildFlags::LOW_MEMORY,
     BuildFlags::FAST_BUILD,
     BuildFlags::LOW_MEMORY.union(BuildFlags::FAST_BUILD),
     BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE),
     BuildFlags::LOW_MEMORY.union(BuildFlags::ALLOW_UPDATE),
+    BuildFlags::LOW_MEMORY.union(BuildFlags::FAST_BUILD).union(BuildFlags::ALLOW_UPDATE),
 ];
 
 /// A device on which only software traces.
@@ -54,7 +55,7 @@ struct File {
 
 impl File {
     fn new(bytes: &[u8]) -> Self {
-        const MARK: &[u8] = b"lvk software structure, form 2\0\0";
+        const MARK: &[u8] = b"lvk software structure, form 3\0\0";
         let at = bytes.windows(MARK.len()).position(|window| window == MARK);
         Self { bytes: bytes.to_vec(), start: at.map_or(0, |at| at + MARK.len()) }
     }
@@ -131,10 +132,14 @@ fn made_up_numbers_in_files_are_refused() -> Result<()> {
         for node in [0, 77_777, 0x7fff_ffff] {
             refuse("a child", &|file| file.set(file.word(4) as usize * 4 + child, node));
         }
-        if flags.contains(BuildFlags::ALLOW_UPDATE) {
-            refuse("no parents", &|file| file.set(10, 0));
-            refuse("parents", &|file| file.set(10, file_blocks(&bytes)));
-            refuse("a parent", &|file| file.set(file.word(10) as usize * 4 + 1, 1));
+        if flags.contains(BuildFlags::LOW_MEMORY) {
+            // The first leaf's words are the names of three vertices.
+            for (word, name) in [(0, u32::MAX), (1, u32::MAX), (0, 0x001f_ffff)] {
+                refuse("a vertex", &|file| file.set(file.word(5) as usize * 4 + word, name));
+            }
+            for place in [0, 1, u32::MAX, file_blocks(&bytes)] {
+                refuse("vertices", &|file| file.set(6, place));
+            }
         }
     }
     Ok(())

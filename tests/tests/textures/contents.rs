@@ -3,12 +3,12 @@
 
 use lvk::ash::vk;
 use lvk::{
-    BufferDesc, ClearValue, Context, Dependencies, Error, Filter, Format, Holder, MemoryKind, TextureDesc,
-    TextureHandle, TextureKind, TextureRange, TextureRegion, TextureUsage,
+    BufferDesc, ClearValue, Context, Dependencies, DeviceProfile, Error, Filter, Format, Holder, MemoryKind,
+    TextureDesc, TextureHandle, TextureKind, TextureRange, TextureRegion, TextureUsage,
 };
 use lvk_tests::compute::{Evaluator, read_vec4, vec4_buffer};
-use lvk_tests::device;
 use lvk_tests::noise::noise;
+use lvk_tests::{device, device_with};
 
 const KINDS: [TextureKind; 3] = [TextureKind::D2, TextureKind::D2Array { layers: 3 }, TextureKind::Cube];
 
@@ -404,11 +404,18 @@ fn clearing_fills_every_mip_and_layer() {
 
 #[test]
 fn regions_are_copied_between_textures_mips_and_buffers() {
-    let Some(ctx) = device() else { return };
+    let profile = DeviceProfile::no_ray_tracing();
+    for profile in [None, Some(&profile)] {
+        let Some(ctx) = device_with(|desc| desc.profile = profile) else { return };
+        copy_regions(&ctx);
+    }
+}
+
+fn copy_regions(ctx: &Context) {
     let values: Vec<f32> = (0..64).map(|i| i as f32).collect();
-    let source = floats(&ctx, [8, 8], &values);
+    let source = floats(ctx, [8, 8], &values);
     let target = TextureDesc { format: Format::R32Uint, extent: [8, 8], mips: 2, ..Default::default() };
-    let target = texture(&ctx, &target);
+    let target = texture(ctx, &target);
     let from = TextureRegion { offset: [2, 3], extent: [2, 2], ..Default::default() };
     let to = TextureRegion { mip: 1, offset: [1, 0], ..Default::default() };
     let bytes = BufferDesc { size_bytes: 64, memory: MemoryKind::Readback, ..Default::default() };
@@ -422,7 +429,7 @@ fn regions_are_copied_between_textures_mips_and_buffers() {
     let mut copied = [0.0_f32; 4];
     ctx.download_buffer(*bytes, 16, bytemuck::cast_slice_mut(&mut copied)).unwrap();
     assert_eq!(copied, [26.0, 27.0, 34.0, 35.0]);
-    assert_eq!(download_floats(&ctx, *source, &whole(0, 0))[..6], [26.0, 27.0, 34.0, 35.0, 4.0, 5.0]);
+    assert_eq!(download_floats(ctx, *source, &whole(0, 0))[..6], [26.0, 27.0, 34.0, 35.0, 4.0, 5.0]);
 }
 
 #[test]

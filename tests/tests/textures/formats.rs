@@ -196,6 +196,10 @@ fn decodes(ctx: &Context, format: Format, block: &[u8], expected: [f32; 4]) {
 #[test]
 fn blocks_of_bc_are_decoded() {
     let Some(ctx) = device() else { return };
+    let name = &ctx.capabilities().device_name;
+    if name.contains("SwiftShader") {
+        return eprintln!("NOT TESTED, {name} decodes no blocks for arrays that may be updated");
+    }
     if !ctx.format_support(Format::Bc1RgbUnorm).sampled {
         eprintln!("NOT TESTED, the device has no BC formats");
         return;

@@ -1,5 +1,6 @@
 //! A bottom-level structure of the library's own.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use super::body::SoftwareBody;
@@ -22,6 +23,8 @@ pub(crate) struct SoftwareBlas {
     /// Where a structure that the CPU built is built again on the GPU; its body says then that it has moved there. Made
     /// when first needed.
     rebuilt: OnceLock<Arc<SoftwareBody>>,
+    /// Whether a submission moves it there.
+    has_moved: AtomicBool,
 }
 
 /// Who built it first.
@@ -41,12 +44,27 @@ pub(crate) enum Origin {
 
 impl SoftwareBlas {
     pub(crate) fn new(body: Arc<SoftwareBody>, origin: Origin) -> Self {
-        Self { body, origin, rebuilt: OnceLock::new() }
+        Self { body, origin, rebuilt: OnceLock::new(), has_moved: AtomicBool::new(false) }
     }
 
-    /// Where it has been rebuilt, if it ever was.
+    /// Where it is rebuilt, once a rebuild was recorded.
     pub(crate) fn rebuilt(&self) -> Option<&Arc<SoftwareBody>> {
         self.rebuilt.get()
+    }
+
+    /// Where it lies after everything submitted, if a rebuild has moved it.
+    pub(crate) fn moved(&self) -> Option<&Arc<SoftwareBody>> {
+        self.rebuilt.get().filter(|_| self.has_moved.load(Ordering::Acquire))
+    }
+
+    /// A rebuild was submitted.
+    pub(crate) fn set_moved(&self) {
+        self.has_moved.store(true, Ordering::Release);
+    }
+
+    /// Whether the CPU has built it first, so that a rebuild moves it.
+    pub(crate) fn is_of_cpu(&self) -> bool {
+        matches!(self.origin, Origin::Cpu { .. })
     }
 
     /// Where it is rebuilt; `make` makes room the first time.
@@ -75,8 +93,16 @@ impl SoftwareBlas {
         self.body.memory_bytes() + rebuilt
     }
 
-    /// What it takes and its builds take.
-    pub(crate) fn sizes(&self) -> AccelStructSizes {
+    /// Scratch bytes of the first build: none where the CPU has made it.
+    pub(crate) fn first_build_scratch_bytes(&self) -> u64 {
+        match &self.origin {
+            Origin::Cpu { .. } => 0,
+            Origin::Gpu(plan) => plan.scratch_bytes,
+        }
+    }
+
+    /// What it takes and its builds take, with the flags it was made with.
+    pub(crate) fn sizes(&self, flags: BuildFlags) -> AccelStructSizes {
         let (rebuild, refit) = match &self.origin {
             Origin::Cpu { rebuild, refit, .. } => (rebuild, refit.as_ref()),
             Origin::Gpu(plan) => (plan, None),
@@ -84,7 +110,7 @@ impl SoftwareBlas {
         AccelStructSizes {
             structure_bytes: self.body.memory_bytes(),
             build_scratch_bytes: rebuild.scratch_bytes,
-            update_scratch_bytes: refit_scratch_bytes(rebuild)
+            update_scratch_bytes: refit_scratch_bytes(rebuild, flags)
                 .max(refit.map_or(0, GpuRefitPlan::scratch_bytes)),
         }
     }
@@ -97,7 +123,7 @@ pub(crate) fn most_sizes(
     flags: BuildFlags,
 ) -> Result<AccelStructSizes> {
     let plan = gpu_plan(name, geometries, flags)?;
-    let of_gpu = refit_scratch_bytes(&plan);
+    let of_gpu = refit_scratch_bytes(&plan, flags);
     // A tree of the CPU has no more nodes than one of two children and one primitive in each leaf.
     let of_cpu = match builds_on_gpu(flags) || !flags.contains(BuildFlags::ALLOW_UPDATE) {
         true => 0,
@@ -116,15 +142,13 @@ pub(crate) fn most_sizes(
 }
 
 /// Scratch bytes of the refit of what the GPU built; 0 where it cannot be refitted.
-fn refit_scratch_bytes(plan: &GpuBuildPlan) -> u64 {
-    if plan.places.parents == 0 { 0 } else { GpuRefitPlan::of_build(plan).scratch_bytes() }
+fn refit_scratch_bytes(plan: &GpuBuildPlan, flags: BuildFlags) -> u64 {
+    if flags.contains(BuildFlags::ALLOW_UPDATE) { GpuRefitPlan::of_build(plan).scratch_bytes() } else { 0 }
 }
 
-/// Whether the GPU makes the first build too: where builds are to be fast, and where refits are to find the vertices of
-/// indexed leaves as it lays them out.
+/// Whether the GPU makes the first build too.
 pub(crate) fn builds_on_gpu(flags: BuildFlags) -> bool {
     flags.contains(BuildFlags::FAST_BUILD)
-        || flags.contains(BuildFlags::LOW_MEMORY | BuildFlags::ALLOW_UPDATE)
 }
 
 /// A build on the GPU of these geometries, which have been checked.
@@ -143,7 +167,6 @@ pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlag
         vertex_count,
         geometry_count: geometries.len() as u32,
         leaf_size: if flags.contains(BuildFlags::LOW_MEMORY) { 2 } else { 1 },
-        refit: flags.contains(BuildFlags::ALLOW_UPDATE),
         improvements: if flags.contains(BuildFlags::FAST_TRACE) { IMPROVEMENTS } else { 0 },
     };
     GpuBuildPlan::blas(name, &shape)
@@ -157,7 +180,7 @@ fn numbers_fit(geometries: &[BlasGeometry]) -> bool {
     geometries.len() <= 1 || (geometries.len() <= MOST_GEOMETRIES && geometries.iter().all(few))
 }
 
-/// How a structure with this header, which the CPU built for refits or not, is refitted.
+/// How a structure with this header, which the CPU built, is refitted; `None` where it may not be.
 pub(crate) fn refit_plan(header: &Header, desc: &BlasDesc<'_>) -> Option<GpuRefitPlan> {
     if !desc.flags.contains(BuildFlags::ALLOW_UPDATE) {
         return None;
@@ -165,7 +188,6 @@ pub(crate) fn refit_plan(header: &Header, desc: &BlasDesc<'_>) -> Option<GpuRefi
     let kinds = [LeafKind::Boxes, LeafKind::IndexedTriangles, LeafKind::PackedTriangles];
     let kind = kinds.into_iter().find(|kind| *kind as u32 == header.leaf_kind);
     let leaf_kind = kind.unwrap_or(LeafKind::Triangles);
-    let vertices = desc.geometries.iter().map(vertex_count).fold(0_u32, u32::saturating_add);
     Some(GpuRefitPlan {
         format: if header.format == NodeFormat::Wide as u32 { NodeFormat::Wide } else { NodeFormat::Binary },
         leaf_kind,
@@ -174,10 +196,8 @@ pub(crate) fn refit_plan(header: &Header, desc: &BlasDesc<'_>) -> Option<GpuRefi
             primitives: header.primitives,
             vertices: header.vertices,
             geometries: header.geometries,
-            parents: header.parents,
         },
         node_count: header.node_count,
         primitive_count: header.primitive_count,
-        vertex_count: if leaf_kind.names_vertices() { vertices } else { 0 },
     })
 }

@@ -20,7 +20,6 @@ pub(crate) struct Job {
     pub(crate) primitives: u32,
     pub(crate) vertices: u32,
     pub(crate) geometries: u32,
-    pub(crate) saved_parents: u32,
     pub(crate) vertex_count: u32,
     pub(crate) boxes: u32,
     pub(crate) keys: u32,
@@ -32,7 +31,7 @@ pub(crate) struct Job {
     pub(crate) reserved: u32,
     pub(crate) header_flags: u32,
     /// Fills the record to a multiple of 16 bytes.
-    pub(crate) unused: [u32; 2],
+    pub(crate) unused: [u32; 3],
 }
 
 /// Push constants of every kernel of a build.

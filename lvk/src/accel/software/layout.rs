@@ -82,8 +82,7 @@ pub(crate) struct Header {
     pub(crate) geometries: u32,
     pub(crate) node_count: u32,
     pub(crate) geometry_count: u32,
-    /// In blocks; 0 for none.
-    pub(crate) parents: u32,
+    pub(crate) reserved0: u32,
     /// [`Header::ALL_OPAQUE`], [`Header::NONE_OPAQUE`].
     pub(crate) marks: u32,
     pub(crate) low: [f32; 3],

@@ -45,8 +45,6 @@ pub(crate) struct BlasShape {
     pub(crate) leaf_size: u32,
     /// How often nodes are given better places, 0 to 8. Each makes builds a little slower and rays faster.
     pub(crate) improvements: u32,
-    /// Whether the structure can be refitted.
-    pub(crate) refit: bool,
 }
 
 /// Where the parts of a structure lie, in units of 16 bytes from its start; 0 where there is no such part.
@@ -56,7 +54,6 @@ pub(crate) struct BlobPlaces {
     pub(crate) primitives: u32,
     pub(crate) vertices: u32,
     pub(crate) geometries: u32,
-    pub(crate) parents: u32,
 }
 
 /// Where the parts of the scratch memory of a build lie, in words from its start.
@@ -136,7 +133,6 @@ impl GpuBuildPlan {
             geometry_count: 0,
             leaf_size: 1,
             improvements: TLAS_IMPROVEMENTS,
-            refit: false,
         };
         Self::new(name, &shape)
     }
@@ -190,16 +186,12 @@ impl GpuBuildPlan {
                 (*records, table, *count, entries)
             }
         };
-        let parents = match self.places.parents {
-            0 => scratch + u64::from(self.scratch.parents) * 4,
-            saved => blob + u64::from(saved) * 16,
-        };
         Job {
             inputs,
             table,
             blob,
             scratch,
-            parents,
+            parents: scratch + u64::from(self.scratch.parents) * 4,
             count,
             input_count,
             leaf_kind: self.leaf_kind as u32,
@@ -209,7 +201,6 @@ impl GpuBuildPlan {
             primitives: self.places.primitives,
             vertices: self.places.vertices,
             geometries: self.places.geometries,
-            saved_parents: self.places.parents,
             vertex_count: self.vertex_count,
             boxes: self.scratch.boxes,
             keys: self.scratch.keys,
@@ -220,7 +211,7 @@ impl GpuBuildPlan {
             improvements: self.improvements,
             reserved: 0,
             header_flags: header_flags(source),
-            unused: [0; 2],
+            unused: [0; 3],
         }
     }
 }
@@ -292,12 +283,11 @@ fn blob_places(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(Blob
         part(primitives, 16),
         part(u64::from(vertex_count) * VERTEX_BYTES, 16),
         part(u64::from(shape.geometry_count) * GEOMETRY_BYTES, 16),
-        part(if shape.refit { nodes * 4 } else { 0 }, 16),
     ];
     let bytes = layout.end.next_multiple_of(BLOB_ALIGNMENT);
     check_limit(name, "structure size in bytes", bytes, u64::from(u32::MAX) * 16)?;
-    let [nodes, primitives, vertices, geometries, parents] = places.map(|place| place as u32);
-    Ok((BlobPlaces { nodes, primitives, vertices, geometries, parents }, bytes))
+    let [nodes, primitives, vertices, geometries] = places.map(|place| place as u32);
+    Ok((BlobPlaces { nodes, primitives, vertices, geometries }, bytes))
 }
 
 /// All of it is below 2^31 words, as kernels number them: a primitive takes at most 13 and a sixty-fourth.
@@ -314,7 +304,7 @@ fn scratch_places(shape: &BlasShape, long_codes: bool) -> (ScratchPlaces, u64) {
         spare_keys: part(keys),
         digits: part(blocks * u64::from(DIGITS)),
         arrivals: part(nodes),
-        parents: part(if shape.refit { 0 } else { nodes }),
+        parents: part(nodes),
     };
     (places, layout.end.next_multiple_of(16))
 }
@@ -332,15 +322,14 @@ mod tests {
 
     fn shapes() -> impl Strategy<Value = BlasShape> {
         let counts = prop_oneof![0..10_u32, 0..10_000_u32, 0..=(1_u32 << 27)];
-        (kinds(), counts, 0..1_000_000_u32, 0..3000_u32, 1..=8_u32, any::<bool>()).prop_map(
-            |(leaf_kind, primitive_count, vertex_count, geometry_count, leaf_size, refit)| BlasShape {
+        (kinds(), counts, 0..1_000_000_u32, 0..3000_u32, 1..=8_u32).prop_map(
+            |(leaf_kind, primitive_count, vertex_count, geometry_count, leaf_size)| BlasShape {
                 leaf_kind,
                 primitive_count,
                 vertex_count,
                 geometry_count,
                 leaf_size,
                 improvements: 1,
-                refit,
             },
         )
     }
@@ -369,7 +358,6 @@ mod tests {
                 (at(plan.places.primitives), count * shape.leaf_kind.primitive_bytes()),
                 (at(plan.places.vertices), u64::from(plan.vertex_count) * 12),
                 (at(plan.places.geometries), u64::from(shape.geometry_count) * 16),
-                (at(plan.places.parents), if shape.refit { nodes * 4 } else { 0 }),
             ], HEADER_BYTES, plan.blob_bytes);
             prop_assert_eq!(plan.blob_bytes % 256, 0);
         }
@@ -387,7 +375,7 @@ mod tests {
                 (at(plan.scratch.spare_keys), keys),
                 (at(plan.scratch.digits), count.div_ceil(1024) * 64),
                 (at(plan.scratch.arrivals), nodes * 4),
-                (at(plan.scratch.parents), if shape.refit { 0 } else { nodes * 4 }),
+                (at(plan.scratch.parents), nodes * 4),
             ], 32, plan.scratch_bytes);
             prop_assert!(plan.scratch_bytes < 1 << 33);
         }
@@ -402,7 +390,6 @@ mod tests {
             geometry_count: 1,
             leaf_size: 2,
             improvements: 1,
-            refit: true,
         };
         assert!(GpuBuildPlan::blas("s", &shape).is_err());
         assert!(GpuBuildPlan::blas("s", &BlasShape { primitive_count: 1, leaf_size: 9, ..shape }).is_err());
@@ -424,7 +411,6 @@ mod tests {
                 geometry_count: 1,
                 leaf_size,
                 improvements: 1,
-                refit: false,
             };
             let bytes = GpuBuildPlan::blas("s", &shape).unwrap().blob_bytes;
             assert_eq!(bytes / u64::from(count), each, "{leaf_kind:?}");

@@ -5,9 +5,9 @@ use bytemuck::Zeroable;
 use super::job::Job;
 use super::layout::LeafKind;
 use super::plan::{BlobPlaces, GpuBuildPlan};
-use crate::error::{Error, Result};
 
 const ARRIVAL_BYTES: u64 = 4;
+const PARENT_BYTES: u64 = 4;
 const BOX_BYTES: u64 = 24;
 
 /// How nodes are kept, by the numbers of the structure's header.
@@ -20,7 +20,7 @@ pub(crate) enum NodeFormat {
     Binary = 1,
 }
 
-/// A bottom-level structure that is to be refitted; it has parents.
+/// A bottom-level structure that is to be refitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct GpuRefitPlan {
     pub(crate) format: NodeFormat,
@@ -30,8 +30,6 @@ pub(crate) struct GpuRefitPlan {
     pub(crate) node_count: u32,
     /// Primitives in leaves, or at most.
     pub(crate) primitive_count: u32,
-    /// Vertices of the copy of indexed leaves.
-    pub(crate) vertex_count: u32,
 }
 
 impl GpuRefitPlan {
@@ -43,25 +41,13 @@ impl GpuRefitPlan {
             places: plan.places,
             node_count: plan.node_capacity(),
             primitive_count: plan.capacity,
-            vertex_count: plan.vertex_count,
         }
-    }
-
-    /// Fails where the structure keeps no parents.
-    ///
-    /// # Errors
-    /// [`InvalidUsage`](Error::InvalidUsage).
-    pub(crate) fn check(&self, name: &str) -> Result<()> {
-        if self.places.parents != 0 || self.node_count == 0 {
-            return Ok(());
-        }
-        Err(Error::usage(name, "the structure was built without ALLOW_UPDATE: it cannot be refitted"))
     }
 
     /// Bytes of scratch memory, at an address that is a multiple of 16.
     pub(crate) fn scratch_bytes(&self) -> u64 {
         let boxes = if self.format == NodeFormat::Wide { BOX_BYTES } else { 0 };
-        (u64::from(self.node_count) * (ARRIVAL_BYTES + boxes)).next_multiple_of(16)
+        (u64::from(self.node_count) * (ARRIVAL_BYTES + PARENT_BYTES + boxes)).next_multiple_of(16)
     }
 
     /// What the kernels of one refit are told. `inputs` is the address of `input_count` geometries.
@@ -70,7 +56,7 @@ impl GpuRefitPlan {
             inputs,
             blob,
             scratch,
-            parents: blob + u64::from(self.places.parents) * 16,
+            parents: scratch + u64::from(self.node_count) * ARRIVAL_BYTES,
             count: self.primitive_count,
             input_count,
             leaf_kind: self.leaf_kind as u32,
@@ -78,9 +64,7 @@ impl GpuRefitPlan {
             primitives: self.places.primitives,
             vertices: self.places.vertices,
             geometries: self.places.geometries,
-            saved_parents: self.places.parents,
-            vertex_count: self.vertex_count,
-            boxes: self.node_count,
+            boxes: 2 * self.node_count,
             node_capacity: self.node_count,
             ..Zeroable::zeroed()
         }

@@ -1,3 +1,6 @@
+// The parent of each node, and which child of it the node is.
+void writeParent(uint child, uint parent, uint which) { Words(job.parents).word[child] = parent | which << 29; }
+
 // Counts of the children that arrived at each node. Fitting starts where both children are leaves, which has to be known
 // beforehand: others may change a node before its own invocation looks at it.
 const uint kStart = 0x80000000u;

@@ -1,9 +1,6 @@
 // Fits the boxes of wide nodes, bottom up, and encodes them anew so that no box loses anything: Ylitie, Karras, Laine,
 // "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017. What is below each child stays.
-const uint kWideWords = 20u;
 const uint kChildren = 8u;
-
-Words wideAt(uint node) { return Words(element(place(job.nodes), node, kWideWords * 4u)); }
 
 uint byteOf(Words node, uint word, uint child) { return node.word[word + child / 4] >> (child & 3u) * 8u & 0xffu; }
 

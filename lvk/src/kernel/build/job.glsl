@@ -34,7 +34,7 @@ struct Job {
     uvec2 table;         // addresses of structures that records name by place; 0 where they hold addresses
     uvec2 blob;          // the structure
     uvec2 scratch;
-    uvec2 parents;       // a word for each node
+    uvec2 parents;       // of each node, a word in the scratch memory
     uint count;          // primitives of the inputs, inactive ones included
     uint inputCount;     // geometries, or addresses in `table`
     uint leafKind;
@@ -44,7 +44,6 @@ struct Job {
     uint primitives;
     uint vertices;
     uint geometries;
-    uint savedParents;   // as `parents`; 0 if they are not part of the structure
     uint vertexCount;    // vertices of the copy that leaves name
     uint boxes;          // places in the scratch memory, in words: six floats for each primitive or wide node
     uint keys;           // codes and numbers of primitives
@@ -109,5 +108,5 @@ void readJob(uint number) {
     uvec4 a = from.quad[0], b = from.quad[1], c = from.quad[2], d = from.quad[3];
     uvec4 e = from.quad[4], f = from.quad[5], g = from.quad[6], h = from.quad[7];
     job = Job(a.xy, a.zw, b.xy, b.zw, c.xy, c.z, c.w, d.x, d.y, d.z, d.w, e.x, e.y, e.z, e.w, f.x, f.y, f.z, f.w, g.x,
-              g.y, g.z, g.w, h.x, h.y);
+              g.y, g.z, g.w, h.x);
 }

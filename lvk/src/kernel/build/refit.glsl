@@ -1,24 +1,61 @@
-// Rewrites the primitives of leaves from the caller's current buffers; their order and their ids stay.
-void refitPrimitive(uint slot) {
+// Rewrites what leaves hold from the caller's current buffers; their order and their ids stay.
+
+// Numbers of the geometry and of the primitive that lies in a slot.
+uvec2 numbersAt(uint slot) {
+    if (namesVertices()) {
+        uint both = job.leafKind == kIndexedTriangles ? slotAt(slot, 16u).quad[0].w : packedAt(slot).triple[0].z;
+        return job.inputCount > 1u ? uvec2(both >> 24, both & 0x00ffffffu) : uvec2(0u, both);
+    }
     Quads kept = slotAt(slot, job.leafKind == kBoxes ? 32u : 48u);
-    uint index = kept.quad[0].w;
-    uint geometry = kept.quad[1].w & 0x7fffffffu;
-    if (geometry >= job.inputCount) return;
-    Geometry g = readGeometry(geometry);
-    Primitive found = readPrimitive(g, index);
+    return uvec2(kept.quad[1].w & 0x7fffffffu, kept.quad[0].w);
+}
+
+// Moves the vertices that a slot names. Whoever names them too writes the same numbers.
+void moveVertices(uint slot, Geometry g, Primitive from) {
+    if (any(greaterThanEqual(from.corner, uvec3(g.vertexCount)))) return;
+    uvec3 named = namedVertices(slot);
+    Corners kept = Corners(place(job.vertices));
+    kept.corner[named.x] = from.a;
+    kept.corner[named.y] = from.b;
+    kept.corner[named.z] = from.c;
+}
+
+void refitPrimitive(uint slot) {
+    uvec2 numbers = numbersAt(slot);
+    if (numbers.x >= job.inputCount) return;
+    Geometry g = readGeometry(numbers.x);
+    Primitive found = readPrimitive(g, numbers.y);
+    if (namesVertices()) {
+        moveVertices(slot, g, found);
+        return;
+    }
     if (!found.isActive) found.a = found.b = found.c = uintBitsToFloat(uvec3(0x7fc00000u));
-    writePrimitive(slot, geometry, index, g, found);
+    writePrimitive(slot, numbers.x, numbers.y, g, found);
+}
+
+// What a node knows of those below it, which then know it as their parent. Nobody has arrived there.
+void prepareBinary(uint node) {
+    resetArrivals(node);
+    Words from = Words(element(place(job.nodes), node, 64u));
+    for (uint which = 0; which < 2; ++which) {
+        uint child = from.word[3 + which * 4];
+        if (child < job.nodeCapacity) writeParent(child, node, which);
+    }
+}
+
+void prepareWide(uint node) {
+    writeArrivals(node, false);
+    uint first = wideAt(node).word[4];
+    uint end = min(first + bitCount(wideAt(node).word[3] >> 24), job.nodeCapacity);
+    [[dont_unroll]] for (uint child = first; child < end; ++child) writeParent(child, node, 0u);
 }
 
 // Everything that must be ready before boxes are fitted and has number `i`.
 void refitFrom(uint i) {
     if (i < min(header().word[8], job.nodeCapacity)) {
-        if (header().word[0] == kBinary) resetArrivals(i);
-        else Words(work(job.arrivals)).word[i] = 0u;
+        if (header().word[0] == kBinary) prepareBinary(i);
+        else prepareWide(i);
+        if (i == 0u) Words(job.parents).word[0] = kNone;
     }
-    if (namesVertices()) {
-        if (i < job.vertexCount) copyVertex(i);
-    } else if (i < min(header().word[3], job.count)) {
-        refitPrimitive(i);
-    }
+    if (i < min(header().word[3], job.count)) refitPrimitive(i);
 }

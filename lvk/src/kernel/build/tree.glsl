@@ -24,8 +24,6 @@ int sameBits(uint i, uvec2 own, int j, uint leaves) {
     return 95 - findMSB(i ^ uint(j));
 }
 
-void writeParent(uint child, uint parent, uint which) { Words(job.parents).word[child] = parent | which << 29; }
-
 void writeNode(uint i, uint leaves) {
     Words keys = Words(work(job.keys));
     uint at = i * job.leafSize;
@@ -64,7 +62,7 @@ void writeHeader(uint leaves) {
     uint geometries = job.leafKind == kInstances ? 0u : job.inputCount;
     to.quad[0] = uvec4(kBinary, job.leafKind, root, state().word[kActive]);
     to.quad[1] = uvec4(job.nodes, job.primitives, job.vertices, job.geometries);
-    to.quad[2] = uvec4(leaves == 0u ? 0u : leaves - 1, geometries, job.savedParents, job.headerFlags);
+    to.quad[2] = uvec4(leaves == 0u ? 0u : leaves - 1, geometries, 0u, job.headerFlags);
     for (uint k = 3; k < 8; ++k) to.quad[k] = uvec4(0);
 }
 

@@ -28,16 +28,13 @@ bool lvkSoftTestTriangle(inout LvkSoftState state, inout LvkSoftPlace place, Lvk
 
 // Visits the next node of the group. The rest of the group goes on the stack only if it has inner children that the ray meets.
 void lvkSoftVisitWide(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
-    uint bit = uint(findMSB(place.group.y));
-    uint slot = bit - 24u ^ level.slabs.octant;
-    uint node = place.group.x + bitCount(place.group.y & 0xFFu & (1u << slot) - 1u);
-    uvec2 rest = uvec2(place.group.x, place.group.y ^ 1u << bit);
+    uint node = lvkSoftTakeNode(place, level);
     uvec4 met = lvkSoftMeet8(level.slabs, LvkSoftBlocks(level.structure), level.nodes, node, range);
     bool goesIn = met.y >= LVK_SOFT_ANY_NODE;
-    if (goesIn && rest.y >= LVK_SOFT_ANY_NODE) {
-        lvkSoftPushGroup(place.top, rest);
+    if (goesIn && place.group.y >= LVK_SOFT_ANY_NODE) {
+        lvkSoftPushGroup(place.top, place.group);
     }
-    place.group = goesIn ? met.xy : rest;
+    place.group = goesIn ? met.xy : place.group;
     place.leaves = met.zw;
 }
 

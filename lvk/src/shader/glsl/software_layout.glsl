@@ -51,6 +51,13 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer Lvk
 #define LVK_SOFT_REST_BITS 11
 #define LVK_SOFT_NAME 0x001FFFFFu
 
+// Loops and branches cost CPUs more than lanes that wait for one another.
+#ifdef LVK_DEVICE_IS_CPU
+const bool kLvkSoftIsCpu = true;
+#else
+const bool kLvkSoftIsCpu = false;
+#endif
+
 // Paths have at most 64 binary nodes in either level, or 32 wide ones, each of which leaves one entry, and an instance may
 // leave others of its leaf. On CPUs binary nodes leave half an entry.
 #ifdef LVK_DEVICE_IS_CPU

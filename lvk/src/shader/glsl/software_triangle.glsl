@@ -1,6 +1,8 @@
 #ifndef LVK_SOFTWARE_TRIANGLE_GLSL
 #define LVK_SOFTWARE_TRIANGLE_GLSL
 
+#include <lvk/software_layout.glsl>
+
 // A ray against a triangle without leaks at shared edges and corners (Woop, Benthin and Wald, "Watertight Ray/Triangle
 // Intersection", 2013). Triangles that share an edge compute its area from the same numbers by the same operations, so
 // that none of a ray's areas can be wrong on both sides; an area of 0 counts as inside on either.
@@ -48,14 +50,10 @@ bool lvkSoftPasses(LvkSoftShear ray, vec3 origin, vec3 corners[3], out LvkSoftPa
     float whole = areas.x + areas.y + areas.z;
     float least = min(min(areas.x, areas.y), areas.z);
     float most = max(max(areas.x, areas.y), areas.z);
-#ifdef LVK_DEVICE_IS_CPU // which loses more by a branch that it guesses wrong than by the rest of the test
     bool passes = (least >= 0.0 || most <= 0.0) && whole != 0.0;
-#else
-    const bool passes = true;
-    if ((least < 0.0 && most > 0.0) || whole == 0.0) {
+    if (!kLvkSoftIsCpu && !passes) { // a CPU loses more by a branch that it guesses wrong than by the rest
         return false;
     }
-#endif
     float share = 1.0 / whole;
     passage.t = (areas.x * p.z + areas.y * q.z + areas.z * r.z) * ray.scale * share;
     passage.barycentrics = areas.yz * share;

@@ -73,13 +73,6 @@ const bool kLvkSoftHasCandidates = false;
 const bool kLvkSoftHasCandidates = true;
 #endif
 
-// Loops and branches cost CPUs more than lanes that wait for one another.
-#ifdef LVK_DEVICE_IS_CPU
-const bool kLvkSoftIsCpu = true;
-#else
-const bool kLvkSoftIsCpu = false;
-#endif
-
 // lavapipe drops what helper invocations write to arrays of their own (mesa 25.0), so these have no stack.
 #if defined(LVK_STAGE_FRAGMENT) && defined(LVK_HELPERS_LOSE_ARRAYS)
 #define LVK_SOFT_IS_STACKLESS gl_HelperInvocation
@@ -180,14 +173,19 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     return culled || skipped ? LVK_SOFT_NONE : start;
 }
 
+// Takes the next node, of a wide tree, out of the group.
+uint lvkSoftTakeNode(inout LvkSoftPlace place, LvkSoftLevel level) {
+    uint bit = uint(findMSB(place.group.y));
+    uint slot = bit - 24u ^ level.slabs.octant;
+    uint before = bitCount(place.group.y & 0xFFu & (1u << slot) - 1u);
+    place.group.y ^= 1u << bit;
+    return place.group.x + before;
+}
+
 // Visits the next node of the group.
 void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
     if (level.wide) {
-        uint bit = uint(findMSB(place.group.y));
-        uint slot = bit - 24u ^ level.slabs.octant;
-        uint before = bitCount(place.group.y & 0xFFu & (1u << slot) - 1u);
-        uint node = place.group.x + before;
-        place.group.y ^= 1u << bit;
+        uint node = lvkSoftTakeNode(place, level);
         if (place.group.y >= LVK_SOFT_ANY_NODE) {
             lvkSoftPushGroup(place.top, place.group);
         }

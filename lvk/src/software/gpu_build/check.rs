@@ -41,8 +41,7 @@ type Checked<T> = Result<T, String>;
 /// Checks a structure, given as words from its header on. `instance` answers the box in the world that an instance needs
 /// at least; it is asked for top-level structures only.
 ///
-/// Every node and every slot must be reached once, parents must lead back, and boxes must hold what is below them:
-/// exactly in binary nodes, to two and a half steps in wide ones.
+/// Every node and every slot must be reached once, and boxes must hold what is below them: exactly in binary nodes, to two and a half steps in wide ones.
 ///
 /// # Errors
 /// What is wrong, in words.
@@ -51,7 +50,7 @@ pub fn check_structure(words: &[u32], instance: &dyn Fn(u32) -> Bounds) -> Check
     let root = walk.header(2);
     let (bounds, height) = match root {
         NONE => (EMPTY, 0),
-        root => walk.visit(root, NONE, None)?,
+        root => walk.visit(root, None)?,
     };
     expect("nodes", walk.header(8), walk.node_count)?;
     expect("primitives", walk.header(3), walk.primitives.iter().flatten().count() as u32)?;
@@ -138,7 +137,7 @@ impl<'a> Walk<'a> {
     }
 
     /// What is below a reference, and how high it is.
-    fn visit(&mut self, reference: u32, parent: u32, slots: Option<(u32, u32)>) -> Checked<(Bounds, u32)> {
+    fn visit(&mut self, reference: u32, slots: Option<(u32, u32)>) -> Checked<(Bounds, u32)> {
         if slots.is_some() || reference & LEAF != 0 {
             let (first, count) = slots.unwrap_or((reference & 0x07ff_ffff, (reference >> 27 & 15) + 1));
             return Ok((self.leaf(first, count)?, 0));
@@ -150,15 +149,10 @@ impl<'a> Walk<'a> {
             Some(seen) => *seen = true,
         }
         self.node_count += 1;
-        if self.header(10) != 0 {
-            let kept = self.word(self.place(10) + node)?;
-            expect(&format!("parent of node {node}"), kept, parent)?;
-        }
         let children = if self.header(0) == FORMAT_WIDE { self.wide(node)? } else { self.binary(node)? };
         let (mut bounds, mut height) = (EMPTY, 0);
         for child in children {
-            let own = node as u32 | child.number << 29;
-            let (below, child_height) = self.visit(child.reference, own, child.slots)?;
+            let (below, child_height) = self.visit(child.reference, child.slots)?;
             let loose = self.header(1) == KIND_INSTANCES && child.reference & LEAF != 0;
             let slack = if loose { [reach(child.kept) * 1e-5; 3] } else { child.slack };
             check_box(&format!("node {node}, child {}", child.number), child.kept, below, slack)?;

@@ -105,7 +105,7 @@ pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<Step> {
 pub(crate) fn refit_steps(refits: &[GpuRefitPlan]) -> Vec<Step> {
     let mut steps = Vec::new();
     for (job, plan) in (0..).zip(refits) {
-        let written = plan.primitive_count.max(plan.node_count).max(plan.vertex_count);
+        let written = plan.primitive_count.max(plan.node_count);
         let fit = match plan.format {
             NodeFormat::Wide => Kernel::FitWide,
             NodeFormat::Binary => Kernel::FitBinary,
@@ -134,7 +134,6 @@ mod tests {
             geometry_count: 1,
             leaf_size: 2,
             improvements: 1,
-            refit: true,
         };
         GpuBuildPlan::blas("s", &shape).unwrap()
     }

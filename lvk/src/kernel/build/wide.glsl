@@ -1,0 +1,4 @@
+// Nodes of eight children, of which those that are nodes follow each other.
+const uint kWideWords = 20u;
+
+Words wideAt(uint node) { return Words(element(place(job.nodes), node, kWideWords * 4u)); }

@@ -1,0 +1,65 @@
+//! What the panel of the window changes.
+
+use lvk::BuildMode;
+
+use super::instances::GROUPS;
+
+/// Refits of the top-level structure between two rebuilds.
+const MAX_REFITS: u32 = 32;
+
+/// How the top-level structure follows its triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Following {
+    /// By refits, and by a rebuild after some of them.
+    #[default]
+    Both,
+    /// By refits alone.
+    Refits,
+    /// By a rebuild in every frame.
+    Rebuilds,
+}
+
+/// What can be changed while the sample runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RtxHelloSwitches {
+    /// Whether rays see the triangle in the middle, the inner ring, and the outer one.
+    pub is_seen: [bool; GROUPS],
+    /// How the top-level structure follows them.
+    pub following: Following,
+}
+
+impl Default for RtxHelloSwitches {
+    fn default() -> Self {
+        Self { is_seen: [true; GROUPS], following: Following::default() }
+    }
+}
+
+impl RtxHelloSwitches {
+    /// The mask of instances of a group.
+    pub(super) fn mask(&self, group: usize) -> u8 {
+        if self.is_seen[group] { 0xff } else { 0 }
+    }
+
+    pub(super) fn mode(&self) -> BuildMode {
+        match self.following {
+            Following::Both => BuildMode::Auto { max_refits: MAX_REFITS },
+            Following::Refits => BuildMode::Refit,
+            Following::Rebuilds => BuildMode::Rebuild,
+        }
+    }
+
+    /// Lays them out.
+    pub(super) fn show(&mut self, ui: &mut egui::Ui) {
+        for (is_seen, name) in
+            self.is_seen.iter_mut().zip(["triangle in the middle", "inner ring", "outer ring"])
+        {
+            ui.checkbox(is_seen, name);
+        }
+        ui.label("top-level structure");
+        ui.horizontal(|ui| {
+            ui.radio_value(&mut self.following, Following::Both, "by policy");
+            ui.radio_value(&mut self.following, Following::Refits, "refitted");
+            ui.radio_value(&mut self.following, Following::Rebuilds, "rebuilt");
+        });
+    }
+}

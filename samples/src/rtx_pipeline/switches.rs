@@ -1,0 +1,18 @@
+//! What the panel of the window changes.
+
+/// What can be changed while the sample runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RtxPipelineSwitches {
+    /// How often a ray may be mirrored or bent, 0 to the depth of the [configuration](super::RtxPipelineConfig).
+    pub depth: u32,
+    /// How many of the scene's lights shine, and are looked for by shadow rays: the lamp, then the sun where there is one.
+    pub lights: u32,
+}
+
+impl RtxPipelineSwitches {
+    /// Lays them out; `most` is what they begin with.
+    pub(super) fn show(&mut self, ui: &mut egui::Ui, most: &Self) {
+        ui.add(egui::Slider::new(&mut self.depth, 0..=most.depth).text("mirrored or bent"));
+        ui.add(egui::Slider::new(&mut self.lights, 0..=most.lights).text("lights"));
+    }
+}

@@ -1,0 +1,77 @@
+//! What software traces lies elsewhere once a structure that the CPU built is rebuilt: refits follow it there, whatever came
+//! before. Where the device traces, the same commands do the same.
+
+use lvk::{BlasDesc, BuildFlags, BuildMode, Context, Error, RayQueryPath, Result, TlasDesc, TlasInstance};
+use lvk_tests::bender::bent;
+use lvk_tests::device;
+use lvk_tests::hit_check::HitCheck;
+use lvk_tests::meshes::Mesh;
+use lvk_tests::ray_scene::{Layout, PartBuffers, RayScene, upload_geometries, vertex_bytes};
+
+const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
+
+fn ring() -> RayScene {
+    RayScene::single(Mesh::torus(10), Layout::Indexed16)
+}
+
+/// Bends the mesh, on the GPU too.
+fn bend(ctx: &Context, scene: &mut RayScene, buffers: &[PartBuffers], amount: f32) -> Result<()> {
+    let part = &mut scene.models[0][0];
+    part.mesh = bent(&part.mesh, amount);
+    ctx.upload_buffer(*buffers[0].vertices, 0, &vertex_bytes(&part.mesh, Layout::Indexed16))
+}
+
+#[test]
+fn a_loaded_structure_is_refitted_where_it_was_rebuilt() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let mut scene = ring();
+    let gpu = scene.upload_with(&ctx, UPDATABLE, UPDATABLE, 0)?;
+    ctx.wait_idle()?;
+    let bytes = ctx.serialize_blas(*gpu.models[0])?;
+    let (buffers, geometries) = upload_geometries(&ctx, &scene.models[0])?;
+    // SAFETY: the library wrote the bytes just now.
+    let loaded = unsafe {
+        ctx.load_blas(&BlasDesc { geometries: &geometries, flags: UPDATABLE, ..Default::default() }, &bytes)
+    }?;
+    let shown = [TlasInstance::new(*loaded)];
+    let tlas = ctx.create_tlas(&TlasDesc { instances: &shown, flags: UPDATABLE, ..Default::default() })?;
+    let check = HitCheck::new(&ctx)?;
+    for (amount, mode) in [(0.3, BuildMode::Rebuild), (-0.5, BuildMode::Refit), (0.4, BuildMode::Refit)] {
+        bend(&ctx, &mut scene, &buffers, amount)?;
+        let mut cmd = ctx.acquire_command_buffer()?;
+        cmd.build_blas(&[*loaded], mode)?;
+        cmd.update_tlas(*tlas, &shown, mode)?;
+        ctx.submit(cmd)?;
+        check.scene(&format!("loaded, then {mode:?} and bent by {amount}"), &tlas, &scene)?;
+    }
+    Ok(())
+}
+
+/// Two command buffers are recorded side by side: the second refits a tree that the first has moved by then.
+#[test]
+fn a_refit_overtaken_by_the_first_rebuild_is_refused_by_software() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let mut scene = ring();
+    let gpu = scene.upload_with(&ctx, UPDATABLE, UPDATABLE, 0)?;
+    ctx.wait_idle()?;
+    bend(&ctx, &mut scene, &gpu.buffers, 0.4)?;
+    let shown = [TlasInstance::new(*gpu.models[0])];
+    let record = |mode| {
+        let mut cmd = ctx.acquire_command_buffer()?;
+        cmd.build_blas(&[*gpu.models[0]], mode)?;
+        cmd.update_tlas(*gpu.tlas, &shown, BuildMode::Rebuild)?;
+        Ok(cmd)
+    };
+    let (rebuild, late): (_, Result<_>) = (record(BuildMode::Rebuild)?, record(BuildMode::Refit));
+    ctx.submit(rebuild)?;
+    bend(&ctx, &mut scene, &gpu.buffers, -0.3)?;
+    let refused = ctx.submit(late?);
+    if ctx.capabilities().ray_query_path == RayQueryPath::Software {
+        let Err(Error::InvalidUsage { message, .. }) = refused else { unreachable!("{refused:?}") };
+        assert!(message.contains("record it anew"), "{message}");
+        ctx.submit(record(BuildMode::Refit)?)?;
+    } else {
+        refused?;
+    }
+    HitCheck::new(&ctx)?.scene("refitted after all", &gpu.tlas, &scene)
+}
