@@ -8,6 +8,7 @@ use ash::vk;
 
 use super::CommandBuffer;
 use super::queue_check::BUILD;
+use super::software::check_placed;
 use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasBody, PartShape};
 use crate::accel::build::BuildInput;
@@ -198,6 +199,7 @@ impl CommandBuffer {
             return Err(Error::usage(name, message));
         }
         self.notes.open_builds.iter().try_for_each(OpenBuild::check)?;
+        self.notes.placed.values().try_for_each(|blas| check_placed(blas))?;
         self.notes.tlas_updates.as_ref().map_or(Ok(()), |updates| updates.check())
     }
 

@@ -10,6 +10,7 @@ use super::bind::PushConstants;
 use super::query_log::QueryLog;
 use super::transfer::Settle;
 use super::uses::Uses;
+use crate::accel::AccelStruct;
 use crate::accel::build_run::BuildRun;
 use crate::accel::compaction::SizeQuery;
 use crate::accel::tlas_updates::TlasUpdates;
@@ -43,6 +44,8 @@ pub(crate) struct Notes {
     pub(super) queries: QueryLog,
     /// Bottom-level structures that are built elsewhere from here on, by their ids.
     pub(super) moved: HashSet<u64>,
+    /// Bottom-level structures that the host placed in top-level ones where it knew them to lie, by their ids.
+    pub(super) placed: HashMap<u64, Arc<AccelStruct>>,
     /// What a command failed on with only a part of it recorded.
     pub(super) torn: Option<String>,
 }
@@ -78,6 +81,7 @@ impl Notes {
             size_queries,
             queries,
             moved,
+            placed,
             torn,
         } = self;
         found_buffers.clear();
@@ -95,6 +99,7 @@ impl Notes {
         size_queries.clear();
         queries.clear();
         moved.clear();
+        placed.clear();
         *torn = None;
     }
 }

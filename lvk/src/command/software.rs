@@ -218,6 +218,7 @@ impl CommandBuffer {
             && let Some(placed) = self.place_instances(target, instances)?
         {
             let bytes = tlas_blob::build(&placed, software.room);
+            self.rely_on_places(instances)?;
             return self.fill_software(target, shared.all_tlas, &software.body, &bytes);
         }
         let bytes = instance_bytes(instances.len().max(1) as u32);
@@ -277,6 +278,18 @@ impl CommandBuffer {
         Ok(Some(placed))
     }
 
+    /// What the instances show must not be rebuilt before this is submitted.
+    fn rely_on_places(&mut self, instances: &[TlasInstance]) -> Result<()> {
+        let mut last = None;
+        for handle in instances.iter().map(|instance| instance.blas) {
+            if last.replace(handle) != Some(handle) {
+                let blas = self.shared.store.accel_structs.get(handle)?;
+                self.notes.placed.entry(blas.id.0).or_insert(blas);
+            }
+        }
+        Ok(())
+    }
+
     fn shown_structure(&self, handle: AccelStructHandle) -> Result<Option<ShownStructure>> {
         let blas = self.shared.store.accel_structs.get(handle)?;
         let address = software_body(&blas)?.address;
@@ -323,6 +336,17 @@ impl CommandBuffer {
             reads,
         }])
     }
+}
+
+/// Fails if a submission has moved the tree of a structure that the host placed when it recorded an update.
+pub(super) fn check_placed(blas: &AccelStruct) -> Result<()> {
+    let software = blas.blas()?.software.as_ref();
+    if software.is_none_or(|software| software.moved().is_none()) {
+        return Ok(());
+    }
+    let message = "a top-level structure was updated to show it, but a submission since then has rebuilt it; record \
+                   the update anew";
+    Err(Error::usage(&blas.name, message))
 }
 
 /// What software traces of a bottom-level structure.

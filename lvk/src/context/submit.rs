@@ -39,7 +39,8 @@ impl Context {
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) if the command buffer belongs to another context, refits a top-level
-    /// structure whose number of instances another submission changed meanwhile, left a query open, writes one that was
+    /// structure whose number of instances another submission changed meanwhile, refits or shows what software traces and
+    /// another submission rebuilt meanwhile, left a query open, writes one that was
     /// written and not reset, or uses an image of a swapchain that is not [taken](Self::next_image); and on other queues
     /// than the graphics queue for images of windows, and for what was [imported](Self::import_texture) without being concurrent. A failure of Vulkan
     /// itself leaves the context without a known state: this and every later submission answers it, and a new context is

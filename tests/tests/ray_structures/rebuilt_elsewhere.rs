@@ -75,3 +75,33 @@ fn a_refit_overtaken_by_the_first_rebuild_is_refused_by_software() -> Result<()>
     }
     HitCheck::new(&ctx)?.scene("refitted after all", &gpu.tlas, &scene)
 }
+
+/// The CPU builds a top-level structure from where it knows its structures to lie, which a rebuild may change.
+#[test]
+fn an_update_overtaken_by_the_first_rebuild_is_refused_by_software() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    let mut scene = ring();
+    let gpu = scene.upload_with(&ctx, BuildFlags::FAST_TRACE, BuildFlags::FAST_TRACE, 0)?;
+    ctx.wait_idle()?;
+    bend(&ctx, &mut scene, &gpu.buffers, 0.4)?;
+    let shown = [TlasInstance::new(*gpu.models[0])];
+    let update = || {
+        let mut cmd = ctx.acquire_command_buffer()?;
+        cmd.update_tlas(*gpu.tlas, &shown, BuildMode::Rebuild)?;
+        Ok(cmd)
+    };
+    let (before, late): (_, Result<_>) = (update()?, update());
+    ctx.submit(before)?;
+    let mut rebuild = ctx.acquire_command_buffer()?;
+    rebuild.build_blas(&[*gpu.models[0]], BuildMode::Rebuild)?;
+    ctx.submit(rebuild)?;
+    let refused = ctx.submit(late?);
+    if ctx.capabilities().ray_query_path == RayQueryPath::Software {
+        let Err(Error::InvalidUsage { message, .. }) = refused else { unreachable!("{refused:?}") };
+        assert!(message.contains("record the update anew"), "{message}");
+        ctx.submit(update()?)?;
+    } else {
+        refused?;
+    }
+    HitCheck::new(&ctx)?.scene("rebuilt, then shown anew", &gpu.tlas, &scene)
+}
