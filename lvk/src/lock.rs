@@ -1,53 +1,52 @@
 //! Locks that are taken in one order, so that no two threads ever wait for each other. Where debug assertions are on, each
 //! thread knows what it holds, and taking a lock out of order is an error: every test checks the order along its way.
+//! Otherwise these are the locks of the standard library, which are used nowhere else.
+//!
+//! A `OnceLock` is a lock only while it is initialised. Those of the library are made of values that exist by then, or by a
+//! question to the driver, and so take no lock but that of [`Rank::ValidationMessages`]; keep it so.
+
+#![expect(clippy::disallowed_types, reason = "everybody else is to use these")]
+
+mod held;
+mod rank;
+#[cfg(all(test, debug_assertions))]
+mod tests;
 
 use std::ops::{Deref, DerefMut};
-use std::sync::{MutexGuard, PoisonError};
+use std::sync::{MutexGuard, PoisonError, RwLockReadGuard, RwLockWriteGuard};
 
-/// Which lock: those further down may be taken while those further up are held.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Rank {
-    /// A swapchain.
-    Swapchain,
-    /// Compactions under way.
-    Compactions,
-    /// What runs before the next submission.
-    Pending,
-    /// Staging memory.
-    Staging,
-    /// States, command buffers and garbage of what is submitted.
-    Submitter,
-    /// The bindless set.
-    Bindless,
-    /// A queue of the device.
-    Queue,
-    /// Device memory.
-    Memory,
-}
+use held::{Held, Place};
+
+pub(crate) use rank::Rank;
 
 /// A mutex with a place in the order. A thread that panicked with it does not close it to others.
 #[derive(Debug)]
 pub(crate) struct Mutex<T> {
     inner: std::sync::Mutex<T>,
-    rank: Rank,
+    place: Place,
 }
 
 /// Access to what a [`Mutex`] holds.
 pub(crate) struct Guard<'a, T> {
     inner: MutexGuard<'a, T>,
-    _held: held::Held,
+    _held: Held,
 }
 
 impl<T> Mutex<T> {
     pub(crate) const fn new(rank: Rank, value: T) -> Self {
-        Self { inner: std::sync::Mutex::new(value), rank }
+        Self { inner: std::sync::Mutex::new(value), place: Place::new(rank) }
     }
 
     /// Waits for the lock.
     #[inline]
     pub(crate) fn lock(&self) -> Guard<'_, T> {
-        let _held = held::Held::new(self.rank);
+        let _held = Held::new(self.place);
         Guard { inner: self.inner.lock().unwrap_or_else(PoisonError::into_inner), _held }
+    }
+
+    /// What nobody else can have.
+    pub(crate) fn get_mut(&mut self) -> &mut T {
+        self.inner.get_mut().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -67,153 +66,99 @@ impl<T> DerefMut for Guard<'_, T> {
     }
 }
 
-#[cfg(debug_assertions)]
-mod held {
-    use std::cell::RefCell;
+/// A lock for many readers or one writer, with a place in the order. A thread that panicked with it does not close it to
+/// others.
+#[derive(Debug)]
+pub(crate) struct RwLock<T> {
+    inner: std::sync::RwLock<T>,
+    place: Place,
+}
 
-    use super::Rank;
+/// Shared access to what an [`RwLock`] holds.
+pub(crate) struct ReadGuard<'a, T> {
+    inner: RwLockReadGuard<'a, T>,
+    _held: Held,
+}
 
-    thread_local! {
-        static RANKS: RefCell<Vec<Rank>> = const { RefCell::new(Vec::new()) };
+/// Access to what an [`RwLock`] holds.
+pub(crate) struct WriteGuard<'a, T> {
+    inner: RwLockWriteGuard<'a, T>,
+    _held: Held,
+}
+
+impl<T> RwLock<T> {
+    pub(crate) const fn new(rank: Rank, value: T) -> Self {
+        Self { inner: std::sync::RwLock::new(value), place: Place::new(rank) }
     }
 
-    /// A lock that this thread has, or waits for.
-    pub(super) struct Held(Rank);
-
-    impl Held {
-        pub(super) fn new(rank: Rank) -> Self {
-            RANKS.with_borrow_mut(|held| {
-                assert!(may_take(held, rank), "the lock of {rank:?} is taken while {held:?} are held");
-                held.push(rank);
-            });
-            Self(rank)
-        }
+    /// Waits until nobody writes.
+    #[inline]
+    pub(crate) fn read(&self) -> ReadGuard<'_, T> {
+        let _held = Held::new(self.place);
+        ReadGuard { inner: self.inner.read().unwrap_or_else(PoisonError::into_inner), _held }
     }
 
-    impl Drop for Held {
-        fn drop(&mut self) {
-            // Guards need not go in the order in which they came.
-            RANKS.with_borrow_mut(|held| {
-                if let Some(place) = held.iter().rposition(|rank| *rank == self.0) {
-                    held.remove(place);
-                }
-            });
-        }
-    }
-
-    /// Whether a thread that has these may wait for another one.
-    pub(super) fn may_take(held: &[Rank], next: Rank) -> bool {
-        held.iter().all(|held| *held < next)
+    /// Waits until nobody reads or writes.
+    #[inline]
+    pub(crate) fn write(&self) -> WriteGuard<'_, T> {
+        let _held = Held::new(self.place);
+        WriteGuard { inner: self.inner.write().unwrap_or_else(PoisonError::into_inner), _held }
     }
 }
 
+impl<T> Deref for ReadGuard<'_, T> {
+    type Target = T;
+
+    #[inline]
+    fn deref(&self) -> &T {
+        &self.inner
+    }
+}
+
+impl<T> Deref for WriteGuard<'_, T> {
+    type Target = T;
+
+    #[inline]
+    fn deref(&self) -> &T {
+        &self.inner
+    }
+}
+
+impl<T> DerefMut for WriteGuard<'_, T> {
+    #[inline]
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.inner
+    }
+}
+
+/// What a thread holds while it waits for threads that work for it: locks that these must not wait for.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Waiting(held::Waiting);
+
+impl Waiting {
+    /// Of this thread.
+    #[inline]
+    pub(crate) fn here() -> Self {
+        Self(held::Waiting::here())
+    }
+
+    /// Works for the one who waits.
+    #[inline]
+    pub(crate) fn work<R>(self, work: impl FnOnce() -> R) -> R {
+        let _assumed = self.0.assume();
+        work()
+    }
+}
+
+/// Without the check, locks and guards are what they are made of.
 #[cfg(not(debug_assertions))]
-mod held {
-    /// Nothing is checked.
-    pub(super) struct Held;
+const _: () = {
+    use std::mem::{needs_drop, size_of};
 
-    impl Held {
-        #[inline]
-        pub(super) fn new(_: super::Rank) -> Self {
-            Self
-        }
-    }
-}
-
-#[cfg(all(test, debug_assertions))]
-mod tests {
-    use std::panic::{AssertUnwindSafe, catch_unwind};
-
-    use proptest::prelude::*;
-
-    use super::held::may_take;
-    use super::*;
-
-    const RANKS: [Rank; 7] = [
-        Rank::Compactions,
-        Rank::Pending,
-        Rank::Staging,
-        Rank::Submitter,
-        Rank::Bindless,
-        Rank::Queue,
-        Rank::Memory,
-    ];
-
-    #[test]
-    fn locks_are_taken_in_their_order_alone() {
-        let locks = RANKS.map(|rank| Mutex::new(rank, ()));
-        let guards: Vec<_> = locks.iter().map(Mutex::lock).collect();
-        drop(guards);
-        let takes = |first: &Mutex<()>, second: &Mutex<()>| {
-            catch_unwind(AssertUnwindSafe(|| {
-                let _first = first.lock();
-                let _second = second.lock();
-            }))
-            .is_ok()
-        };
-        for first in &locks {
-            for second in &locks {
-                let (a, b) = (first.rank, second.rank);
-                assert_eq!(takes(first, second), a < b, "{a:?}, {b:?}");
-            }
-        }
-    }
-
-    /// Which lock each thread has reached in its list, and which locks are held.
-    struct Threads {
-        wanted: Vec<Vec<usize>>,
-        held: Vec<Vec<usize>>,
-    }
-
-    impl Threads {
-        /// Lets a thread take its next lock, or give all back; `false` where it has to wait.
-        fn step(&mut self, thread: usize) -> bool {
-            let Some(&next) = self.wanted[thread].get(self.held[thread].len()) else {
-                self.held[thread].clear();
-                self.wanted[thread].clear();
-                return true;
-            };
-            if self.held.iter().any(|held| held.contains(&next)) {
-                return false;
-            }
-            self.held[thread].push(next);
-            true
-        }
-
-        fn is_done(&self) -> bool {
-            self.wanted.iter().all(Vec::is_empty)
-        }
-    }
-
-    proptest! {
-        /// Any schedule of threads whose every step the check allows comes to its end.
-        #[test]
-        fn what_the_check_allows_never_stands_still(
-            lists in prop::collection::vec(prop::collection::vec(0..RANKS.len(), 0..5), 1..6),
-            schedule in prop::collection::vec(any::<prop::sample::Index>(), 0..60)
-        ) {
-            let allowed = |list: &Vec<usize>| {
-                (0..list.len()).all(|place| {
-                    let held: Vec<_> = list[..place].iter().map(|rank| RANKS[*rank]).collect();
-                    may_take(&held, RANKS[list[place]])
-                })
-            };
-            let wanted: Vec<_> = lists.into_iter().filter(allowed).collect();
-            let mut threads = Threads { held: vec![Vec::new(); wanted.len()], wanted };
-            for which in schedule {
-                if !threads.wanted.is_empty() {
-                    let thread = which.index(threads.wanted.len());
-                    threads.step(thread);
-                }
-            }
-            while !threads.is_done() {
-                let moved = (0..threads.wanted.len())
-                    .filter(|thread| !threads.wanted[*thread].is_empty())
-                    .collect::<Vec<_>>()
-                    .into_iter()
-                    .any(|thread| threads.step(thread));
-                prop_assert!(moved, "all wait: {:?} have {:?}", threads.wanted, threads.held);
-            }
-        }
-    }
-}
+    assert!(size_of::<Mutex<u64>>() == size_of::<std::sync::Mutex<u64>>());
+    assert!(size_of::<RwLock<u64>>() == size_of::<std::sync::RwLock<u64>>());
+    assert!(size_of::<Guard<'_, u64>>() == size_of::<MutexGuard<'_, u64>>());
+    assert!(size_of::<ReadGuard<'_, u64>>() == size_of::<RwLockReadGuard<'_, u64>>());
+    assert!(size_of::<WriteGuard<'_, u64>>() == size_of::<RwLockWriteGuard<'_, u64>>());
+    assert!(size_of::<Waiting>() == 0 && !needs_drop::<Held>() && !needs_drop::<Waiting>());
+};

@@ -1,7 +1,7 @@
 //! Everything a context and its command buffers share.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock};
 
 use ash::vk;
 
@@ -22,6 +22,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::kernel::Kernels;
 use crate::leaks;
+use crate::lock::{Guard, Mutex};
 use crate::pipeline::{
     ComputePipeline, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline, RenderPipeline,
 };
@@ -227,7 +228,8 @@ impl Shared {
                 tlas.software.iter().for_each(|_| self.freed_tlas().push(tlas.slot));
                 self.bindless.free_tlas(tlas.slot);
                 tlas.records.get().into_iter().for_each(|buffer| self.submitter.forget(buffer.id));
-                self.take_source(std::mem::take(&mut *tlas.contents()));
+                let contents = std::mem::take(&mut *tlas.contents());
+                self.take_source(contents);
             }
             AccelKind::Blas(blas) => {
                 for map in blas.parts.iter().filter_map(|part| part.map.as_ref()) {
@@ -239,8 +241,8 @@ impl Shared {
     }
 
     /// Slots whose entry in the table is to be emptied before anything else is submitted.
-    pub(crate) fn freed_tlas(&self) -> MutexGuard<'_, Vec<u32>> {
-        self.freed_tlas.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(crate) fn freed_tlas(&self) -> Guard<'_, Vec<u32>> {
+        self.freed_tlas.lock()
     }
 
     /// A source that was kept lies in buffers of the library's own; the next one may have the mapped one.

@@ -1,8 +1,8 @@
 //! All pools: handle to object, or [`Error::StaleHandle`].
 
 use std::marker::PhantomData;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, PoisonError, RwLock};
 
 use slotmap::{DefaultKey, Key, KeyData, SlotMap};
 
@@ -13,6 +13,7 @@ use crate::handle::{
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, SwapchainHandle,
     TextureHandle,
 };
+use crate::lock::{Rank, RwLock};
 use crate::pipeline::{ComputePipeline, RayTracingLibrary, RayTracingPipeline, RenderPipeline, ShaderModule};
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::swapchain::state::Swapchain;
@@ -129,21 +130,22 @@ pub(crate) struct Pool<H, T> {
 
 impl<H: Handle, T> Pool<H, T> {
     pub(crate) fn new(mask: u64) -> Self {
-        Self { objects: RwLock::default(), removals: AtomicU64::new(0), mask, handle: PhantomData }
+        let objects = RwLock::new(Rank::Store, SlotMap::new());
+        Self { objects, removals: AtomicU64::new(0), mask, handle: PhantomData }
     }
 
     pub(crate) fn insert(&self, object: T) -> H {
-        let mut objects = self.objects.write().unwrap_or_else(PoisonError::into_inner);
+        let mut objects = self.objects.write();
         H::from_bits(objects.insert(Arc::new(object)).data().as_ffi() ^ self.mask)
     }
 
     pub(crate) fn get(&self, handle: H) -> Result<Arc<T>> {
-        let objects = self.objects.read().unwrap_or_else(PoisonError::into_inner);
+        let objects = self.objects.read();
         objects.get(self.key(handle)).cloned().ok_or(Error::StaleHandle { kind: H::KIND })
     }
 
     pub(crate) fn remove(&self, handle: H) -> Result<Arc<T>> {
-        let mut objects = self.objects.write().unwrap_or_else(PoisonError::into_inner);
+        let mut objects = self.objects.write();
         let object = objects.remove(self.key(handle)).ok_or(Error::StaleHandle { kind: H::KIND })?;
         self.removals.fetch_add(1, Ordering::Release);
         Ok(object)
@@ -165,13 +167,13 @@ impl<H: Handle, T> Pool<H, T> {
 
     /// Everything there is.
     pub(crate) fn all(&self) -> Vec<Arc<T>> {
-        let objects = self.objects.read().unwrap_or_else(PoisonError::into_inner);
+        let objects = self.objects.read();
         objects.values().cloned().collect()
     }
 
     /// Takes everything out.
     pub(crate) fn drain(&self) -> Vec<Arc<T>> {
-        let mut objects = self.objects.write().unwrap_or_else(PoisonError::into_inner);
+        let mut objects = self.objects.write();
         objects.drain().map(|(_, object)| object).collect()
     }
 

@@ -1,12 +1,13 @@
 //! A bottom-level structure: one for the caller, one or more for Vulkan.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use super::flags::AccelStructSizes;
 use super::geometry::BlasGeometry;
 use super::primitive_map::PrimitiveMap;
 use super::raw_structure::RawStructure;
 use crate::accel::software::blas::SoftwareBlas;
+use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 
 /// What a bottom-level structure is built from, and what was built.
@@ -86,7 +87,7 @@ impl Blas {
             refits: 0,
             wish: CompactionWish::None,
         };
-        Self { geometries, transforms, parts, software, state: Mutex::new(state) }
+        Self { geometries, transforms, parts, software, state: Mutex::new(Rank::BlasState, state) }
     }
 
     /// What stands for it now.
@@ -167,8 +168,8 @@ impl Blas {
         std::mem::replace(&mut self.lock().wish, wish)
     }
 
-    fn lock(&self) -> MutexGuard<'_, BlasState> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> Guard<'_, BlasState> {
+        self.state.lock()
     }
 }
 

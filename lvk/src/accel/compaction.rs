@@ -1,10 +1,11 @@
 //! Compactions under way: sizes are asked of the GPU, and the copies made once it has answered.
 
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::{Arc, Weak};
 
 use super::blas::BlasBody;
 use super::structure::AccelStruct;
 use crate::error::{Error, Result};
+use crate::lock::{Mutex, Rank};
 use crate::resource::QueryPool;
 
 /// All compactions of a context.
@@ -76,14 +77,13 @@ pub(crate) struct SizeQuery {
 
 impl SizeQuery {
     pub(crate) fn new(pool: QueryPool, targets: Vec<(Arc<AccelStruct>, u32)>) -> Self {
-        Self { pool, targets, builds: Mutex::default() }
+        Self { pool, targets, builds: Mutex::new(Rank::SizeQuery, Vec::new()) }
     }
 
     /// The query went to the GPU, behind all builds submitted so far.
     pub(crate) fn submit(&self) {
         let builds = |(target, _): &(Arc<AccelStruct>, u32)| target.blas().map_or(0, |blas| blas.builds());
-        *self.builds.lock().unwrap_or_else(PoisonError::into_inner) =
-            self.targets.iter().map(builds).collect();
+        *self.builds.lock() = self.targets.iter().map(builds).collect();
     }
 
     /// The copies to be made, once the GPU has answered.
@@ -101,7 +101,7 @@ impl SizeQuery {
 
     /// The builds each target's size is of; `None` before the submission.
     fn builds(&self) -> Option<Vec<u64>> {
-        let builds = self.builds.lock().unwrap_or_else(PoisonError::into_inner);
+        let builds = self.builds.lock();
         (builds.len() == self.targets.len()).then(|| builds.clone())
     }
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::instance::{INSTANCE_BYTES, TlasInstance, check, is_right, pack};
 use super::shown::{Find, Gather, Marks, Shown, ShownSet};
 use crate::error::{Error, Result, check_limit};
+use crate::lock::Waiting;
 
 /// A thread gets at least so many instances: one converts 200 of them in a microsecond, and takes tens of microseconds to
 /// start.
@@ -88,11 +89,14 @@ fn write_chunks(
         let plain = write_chunk(name, index * count, instances, &mut gather, out)?;
         Ok(plain.then(|| gather.into_new()))
     };
+    let waiting = Waiting::here();
     std::thread::scope(|scope| {
         let mut chunks = instances.chunks(count).zip(out.chunks_mut(count * INSTANCE_BYTES)).enumerate();
         let own = chunks.next();
         let workers: Vec<_> = chunks
-            .map(|(index, (instances, out))| scope.spawn(move || write(index, instances, out)))
+            .map(|(index, (instances, out))| {
+                scope.spawn(move || waiting.work(|| write(index, instances, out)))
+            })
             .collect();
         let mut all = Vec::new();
         if let Some((index, (instances, out))) = own {

@@ -1,9 +1,10 @@
 //! Which of the caller's primitives a part holds, and the inputs gathered for it.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use crate::error::{Result, check_limit};
 use crate::gpu::Gpu;
+use crate::lock::{Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
@@ -37,7 +38,7 @@ impl PrimitiveMap {
         Ok(Self {
             table: Arc::new(new_buffer(gpu, name, words * 4, BufferUsage::STORAGE)?),
             inputs_address: inputs.address,
-            inputs: Mutex::new(Some(inputs)),
+            inputs: Mutex::new(Rank::GatheredInputs, Some(inputs)),
             firsts: firsts(geometries),
             primitive_bytes,
         })
@@ -45,12 +46,12 @@ impl PrimitiveMap {
 
     /// The gathered inputs, unless they were taken.
     pub(crate) fn inputs(&self) -> Option<Arc<Buffer>> {
-        self.inputs.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        self.inputs.lock().clone()
     }
 
     /// Takes the gathered inputs away from a part that is never built again, to be retired.
     pub(crate) fn take_inputs(&self) -> Option<Arc<Buffer>> {
-        self.inputs.lock().unwrap_or_else(PoisonError::into_inner).take()
+        self.inputs.lock().take()
     }
 
     /// Address of the gathered inputs of a geometry.

@@ -1,11 +1,12 @@
 //! The scratch memory of builds: one buffer for all of them, as large as the largest batch so far.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use super::scratch::{ScratchTiers, scratch_buffer_bytes};
 use crate::barrier::ResourceId;
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::lock::{Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
@@ -24,7 +25,7 @@ impl ScratchBuffer {
         Self {
             id: ResourceId::next(),
             tiers: ScratchTiers::new(budget, alignment),
-            current: Mutex::default(),
+            current: Mutex::new(Rank::Scratch, None),
         }
     }
 
@@ -32,7 +33,7 @@ impl ScratchBuffer {
     pub(crate) fn get(&self, gpu: &Arc<Gpu>, bytes: u64) -> Result<(Arc<Buffer>, Option<Arc<Buffer>>)> {
         let alignment = gpu.caps.limits.scratch_alignment.into();
         let needed = scratch_buffer_bytes(bytes, alignment);
-        let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut current = self.current.lock();
         match &*current {
             Some(buffer) if buffer.size_bytes >= needed => Ok((Arc::clone(buffer), None)),
             _ => {
@@ -46,7 +47,7 @@ impl ScratchBuffer {
 
     /// Bytes of the buffer at present.
     pub(crate) fn bytes(&self) -> u64 {
-        let current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
+        let current = self.current.lock();
         current.as_ref().map_or(0, |buffer| buffer.size_bytes)
     }
 }

@@ -1,11 +1,12 @@
 //! The memory of acceleration structures: small ones share buffers, large ones have their own.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
 
 use super::ranges::Ranges;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::lock::{Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
@@ -22,7 +23,6 @@ pub(crate) struct AccelStorage {
     budget_bytes: u64,
 }
 
-#[derive(Default)]
 struct Pool {
     blocks: Mutex<Vec<Block>>,
     used_bytes: AtomicU64,
@@ -47,7 +47,8 @@ pub(crate) struct StorageRange {
 impl AccelStorage {
     /// Never holds more than `budget_bytes` at once.
     pub(crate) fn new(budget_bytes: u64) -> Self {
-        Self { pool: Arc::default(), budget_bytes }
+        let blocks = Mutex::new(Rank::AccelBlocks, Vec::new());
+        Self { pool: Arc::new(Pool { blocks, used_bytes: AtomicU64::new(0) }), budget_bytes }
     }
 
     /// Memory for the structure `name`.
@@ -72,7 +73,7 @@ impl AccelStorage {
 
     /// Bytes of shared buffers that no structure uses.
     pub(crate) fn spare_bytes(&self) -> u64 {
-        let blocks = self.pool.blocks.lock().unwrap_or_else(PoisonError::into_inner);
+        let blocks = self.pool.blocks.lock();
         blocks.iter().map(|block| BLOCK_BYTES - block.ranges.used_bytes()).sum()
     }
 
@@ -85,7 +86,7 @@ impl AccelStorage {
     }
 
     fn alloc_shared(&self, gpu: &Arc<Gpu>, bytes: u64) -> Result<(Arc<Buffer>, u64)> {
-        let mut blocks = self.pool.blocks.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut blocks = self.pool.blocks.lock();
         for block in blocks.iter_mut() {
             if let Some(offset) = block.ranges.alloc(bytes) {
                 return Ok((Arc::clone(&block.buffer), offset));
@@ -106,7 +107,7 @@ impl Pool {
 
     /// Takes a range of a shared buffer back; the buffer goes with its last structure.
     fn free_shared(&self, range: &StorageRange) {
-        let mut blocks = self.blocks.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut blocks = self.blocks.lock();
         let Some(index) = blocks.iter().position(|block| block.buffer.id == range.buffer.id) else { return };
         blocks[index].ranges.free(range.offset, range.bytes);
         if blocks[index].ranges.is_empty() {

@@ -1,11 +1,12 @@
 //! A top-level structure and what it shows.
 
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock};
 
 use super::raw_structure::RawStructure;
 use super::shown::{Revision, ShownSet};
 use crate::accel::software::tlas::SoftwareTlas;
 use crate::error::{Result, check_limit};
+use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 
 /// A top-level structure.
@@ -96,13 +97,13 @@ impl Tlas {
             software,
             rows: OnceLock::new(),
             records: OnceLock::new(),
-            contents: Mutex::default(),
+            contents: Mutex::new(Rank::TlasContents, TlasContents::default()),
         }
     }
 
     #[inline]
-    pub(crate) fn contents(&self) -> MutexGuard<'_, TlasContents> {
-        self.contents.lock().unwrap_or_else(PoisonError::into_inner)
+    pub(crate) fn contents(&self) -> Guard<'_, TlasContents> {
+        self.contents.lock()
     }
 
     /// Bytes of the structure.

@@ -6,13 +6,14 @@
 //! alive may still reach it, and what came later may not.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use ash::vk;
 
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::memory::MemoryKind;
+use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 
@@ -119,7 +120,7 @@ impl IndexChecks {
         };
         let buffer = Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?);
         buffer.fill(|bytes| bytes.fill(0));
-        let checks = Self { buffer, arrays, known: Mutex::default() };
+        let checks = Self { buffer, arrays, known: Mutex::new(Rank::SlotOwners, Known::default()) };
         BindlessArray::ALL.into_iter().for_each(|array| checks.write(array, 0, ALIVE));
         Ok(checks)
     }
@@ -225,8 +226,8 @@ impl IndexChecks {
         (slot < count).then(|| u64::from(first + slot) * 4)
     }
 
-    fn known(&self) -> MutexGuard<'_, Known> {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    fn known(&self) -> Guard<'_, Known> {
+        self.known.lock()
     }
 }
 

@@ -1,7 +1,7 @@
 //! What a command buffer notes while it is recorded, with memory that is used again.
 
 use std::collections::{HashMap, HashSet};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use ash::vk;
 
@@ -17,6 +17,7 @@ use crate::accel::tlas_updates::TlasUpdates;
 use crate::barrier::{Barriers, ResourceId};
 use crate::found::Found;
 use crate::handle::{BufferHandle, TextureHandle};
+use crate::lock::{Mutex, Rank};
 use crate::resource::{Buffer, Texture};
 use crate::shared::Shared;
 use crate::submit::emit::LastBarrier;
@@ -105,7 +106,6 @@ impl Notes {
 }
 
 /// Notes that no command buffer has at the moment, empty.
-#[derive(Default)]
 #[expect(clippy::vec_box, reason = "handed on as pointers")]
 pub(crate) struct SpareNotes(Mutex<Vec<Box<Notes>>>);
 
@@ -113,14 +113,18 @@ impl SpareNotes {
     /// More than this are let go, and so are those of very many instances.
     const MOST: usize = 8;
 
+    pub(crate) fn new() -> Self {
+        Self(Mutex::new(Rank::SpareNotes, Vec::new()))
+    }
+
     pub(crate) fn take(&self) -> Box<Notes> {
-        let spare = self.0.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        let spare = self.0.lock().pop();
         spare.unwrap_or_default()
     }
 
     pub(crate) fn give(&self, mut notes: Box<Notes>) {
         notes.clear();
-        let mut spare = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut spare = self.0.lock();
         let is_small = notes.tlas_updates.as_ref().is_none_or(|updates| updates.is_worth_keeping());
         if spare.len() < Self::MOST && is_small {
             spare.push(notes);

@@ -87,12 +87,11 @@ impl Context {
     /// replaced. What fails stays as it was, with a warning: no submission of the caller fails for it.
     pub(super) fn advance_compactions(&self) {
         let mut compactions = self.compactions();
-        if !compactions.is_empty()
-            && let Err(error) = self.advance(&mut compactions)
-        {
+        let advanced = if compactions.is_empty() { Ok(()) } else { self.advance(&mut compactions) };
+        drop(compactions);
+        if let Err(error) = advanced {
             log::warn!("compaction does not go on: {error}");
         }
-        drop(compactions);
         if self.shared().take_outdated_tlas()
             && let Err(error) = self.rewrite_outdated()
         {

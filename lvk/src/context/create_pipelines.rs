@@ -8,6 +8,7 @@ use super::Context;
 use super::holder::Holder;
 use crate::error::Result;
 use crate::handle::{ComputePipelineHandle, RenderPipelineHandle};
+use crate::lock::Waiting;
 use crate::pipeline::compute::ComputePipelineDesc;
 use crate::pipeline::graphics_desc::RenderPipelineDesc;
 
@@ -45,8 +46,9 @@ fn on_all_cores<T: Sync, R: Send>(items: &[T], make: impl Fn(&T) -> R + Sync) ->
         }
         made
     };
+    let waiting = Waiting::here();
     let mut made: Vec<(usize, R)> = thread::scope(|scope| {
-        let others: Vec<_> = (1..cores).map(|_| scope.spawn(work)).collect();
+        let others: Vec<_> = (1..cores).map(|_| scope.spawn(|| waiting.work(work))).collect();
         let mut made = work();
         for other in others {
             made.extend(other.join().unwrap_or_else(|panic| resume_unwind(panic)));

@@ -1,7 +1,6 @@
 //! Frames in flight: the CPU may be so many frames ahead of the GPU, and no more.
 
 use std::collections::VecDeque;
-use std::sync::PoisonError;
 
 use super::Context;
 use crate::error::Result;
@@ -53,7 +52,7 @@ impl Context {
     pub fn next_frame(&self) -> Result<Frame> {
         let submitted = self.shared().submitter.foreground();
         let (frame, wait_for) = {
-            let mut frames = self.inner.frames.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut frames = self.inner.frames.lock();
             frames.start(submitted)
         };
         self.shared().profiler.begin_frame(frame.number);
@@ -65,7 +64,7 @@ impl Context {
 
     /// How many frames the CPU may be ahead of the GPU.
     pub fn frames_in_flight(&self) -> usize {
-        self.inner.frames.lock().unwrap_or_else(PoisonError::into_inner).in_flight
+        self.inner.frames.lock().in_flight
     }
 }
 

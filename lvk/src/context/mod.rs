@@ -60,7 +60,7 @@ pub struct Context {
 struct Inner {
     /// Uploads and builds that run before the next submission.
     pending: Mutex<Pending>,
-    frames: std::sync::Mutex<FrameRing>,
+    frames: Mutex<FrameRing>,
     spare_notes: SpareNotes,
     /// Compactions under way.
     compactions: Mutex<Compactions>,

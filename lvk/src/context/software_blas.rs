@@ -18,6 +18,7 @@ use crate::accel::software::parts::Parts;
 use crate::command::transfer::BufferCopy;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
+use crate::lock::Waiting;
 use crate::shared::Garbage;
 use crate::software::blas_blob::{self, BlasBlob};
 use crate::software::mesh::Mesh;
@@ -158,8 +159,10 @@ fn on_all_cores<T: Send>(
     };
     let mut all: Vec<Option<T>> = descs.iter().map(|_| None).collect();
     let lost = |_| Error::usage("create_blas", "a thread that built a tree ended early");
+    let waiting = Waiting::here();
     std::thread::scope(|scope| {
-        let helpers: Vec<_> = (1..cores.min(descs.len())).map(|_| scope.spawn(work)).collect();
+        let helpers: Vec<_> =
+            (1..cores.min(descs.len())).map(|_| scope.spawn(|| waiting.work(work))).collect();
         let mut made = work();
         for helper in helpers {
             made.extend(helper.join().map_err(lost)?);

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64};
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, OnceLock};
 
 use super::config::ContextDesc;
 use super::dummy::fill_dummies;
@@ -24,7 +24,7 @@ use crate::gpu::device::DeviceRequest;
 use crate::gpu::instance::{Instance, InstanceDesc};
 use crate::gpu::queues::QueueRequest;
 use crate::kernel::Kernels;
-use crate::lock::{self, Rank};
+use crate::lock::{Mutex, Rank};
 use crate::pipeline::{PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
@@ -72,10 +72,10 @@ impl Context {
     pub(super) fn on(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Self> {
         let shared = Arc::new(new_shared(gpu, desc)?);
         let inner = Inner {
-            pending: lock::Mutex::new(Rank::Pending, Pending::default()),
-            compactions: lock::Mutex::new(Rank::Compactions, Compactions::default()),
-            frames: Mutex::new(FrameRing::new(desc.frames_in_flight)),
-            spare_notes: SpareNotes::default(),
+            pending: Mutex::new(Rank::Pending, Pending::default()),
+            compactions: Mutex::new(Rank::Compactions, Compactions::default()),
+            frames: Mutex::new(Rank::Frames, FrameRing::new(desc.frames_in_flight)),
+            spare_notes: SpareNotes::new(),
             window: desc.window.clone(),
             shared,
         };
@@ -117,8 +117,8 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         scratch: std::array::from_fn(|_| new_scratch(&gpu, desc.scratch_budget_bytes)),
         accel_storage: AccelStorage::new(desc.accel_budget_bytes),
         graphics_queries: QueryStages::default(),
-        kernels: Kernels::default(),
-        instance_buffers: SpareBuffers::default(),
+        kernels: Kernels::new(),
+        instance_buffers: SpareBuffers::new(),
         tlas_table: new_tlas_table(&gpu)?,
         layout: PipelineLayout::new(&gpu, bindless.set_layout)?,
         pipeline_cache: desc.pipeline_cache.map(|path| PipelineCache::new(&gpu, path)).transpose()?,
@@ -133,7 +133,7 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         tlas_tables: ResourceId::next(),
         outdated_tlas: AtomicBool::new(false),
         moves: AtomicU64::new(0),
-        freed_tlas: Mutex::default(),
+        freed_tlas: Mutex::new(Rank::FreedTlas, Vec::new()),
         gpu,
     })
 }

@@ -2,9 +2,11 @@
 
 use std::ffi::{CStr, CString, c_void};
 use std::fmt;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use ash::vk;
+
+use crate::lock::{Guard, Mutex, Rank};
 
 /// How much the validation layer checks. The layer must be installed; see [`Validation::Standard`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -38,10 +40,16 @@ impl fmt::Display for ValidationMessage {
 }
 
 /// Collects the messages of the validation layer. A cheap clone shares the same messages, so a test can keep one
-/// and read it after the context is gone.
-#[derive(Debug, Clone, Default)]
+/// and read it after the context is gone, and a logger may read it while it is given a message.
+#[derive(Debug, Clone)]
 pub struct ValidationSink {
     messages: Arc<Mutex<Vec<ValidationMessage>>>,
+}
+
+impl Default for ValidationSink {
+    fn default() -> Self {
+        Self { messages: Arc::new(Mutex::new(Rank::ValidationMessages, Vec::new())) }
+    }
 }
 
 impl ValidationSink {
@@ -70,8 +78,8 @@ impl ValidationSink {
         }
     }
 
-    fn lock(&self) -> MutexGuard<'_, Vec<ValidationMessage>> {
-        self.messages.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> Guard<'_, Vec<ValidationMessage>> {
+        self.messages.lock()
     }
 }
 

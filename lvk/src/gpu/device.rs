@@ -173,7 +173,7 @@ impl Gpu {
             memory: Mutex::new(Rank::Memory, Some(memory)),
             heap_use: HeapUse::new(&instance, physical),
             format_answers: FormatAnswers::default(),
-            image_limits: ImageLimits::default(),
+            image_limits: ImageLimits::new(),
             custom_borders: AtomicU32::new(0),
             physical,
             device,

@@ -2,11 +2,11 @@
 //! answer, and an answer costs as much as making the image.
 
 use std::collections::HashMap;
-use std::sync::{PoisonError, RwLock};
 
 use ash::vk;
 
 use super::device::Gpu;
+use crate::lock::{Rank, RwLock};
 
 /// What the limits of an image depend on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -22,16 +22,19 @@ struct ImageKind {
 type Answer = Result<vk::ImageFormatProperties, vk::Result>;
 
 /// The answers so far.
-#[derive(Default)]
 pub(super) struct ImageLimits(RwLock<HashMap<ImageKind, Answer>>);
 
 impl ImageLimits {
+    pub(super) fn new() -> Self {
+        Self(RwLock::new(Rank::ImageLimits, HashMap::new()))
+    }
+
     fn get(&self, kind: ImageKind, ask: impl FnOnce() -> Answer) -> Answer {
-        let known = self.0.read().unwrap_or_else(PoisonError::into_inner).get(&kind).copied();
+        let known = self.0.read().get(&kind).copied();
         known.unwrap_or_else(|| {
             let answer = ask();
             if lasts(&answer) {
-                self.0.write().unwrap_or_else(PoisonError::into_inner).insert(kind, answer);
+                self.0.write().insert(kind, answer);
             }
             answer
         })
@@ -98,7 +101,7 @@ mod tests {
 
     /// What is known of each kind after each was asked for twice, and how often the device was.
     fn ask_twice(kinds: &[ImageKind], answer: impl Fn(&ImageKind) -> Answer) -> (Vec<bool>, u32) {
-        let (limits, mut asked) = (ImageLimits::default(), 0);
+        let (limits, mut asked) = (ImageLimits::new(), 0);
         let mut get = |kind: &ImageKind| {
             limits.get(*kind, || {
                 asked += 1;

@@ -306,9 +306,8 @@ impl Gpu {
     /// Gives memory back.
     pub(crate) fn free(&self, memory: ObjectMemory) {
         self.heap_use.remove(&memory);
-        if let Some(all) = self.memory().as_mut()
-            && let Err(error) = all.free(memory)
-        {
+        let freed = self.memory().as_mut().map_or(Ok(()), |all| all.free(memory));
+        if let Err(error) = freed {
             log::error!("freeing device memory failed: {error}");
         }
     }

@@ -12,6 +12,9 @@ use super::optional::OptionalFeature;
 use crate::error::{Error, Result};
 
 /// A window, of whatever library made it: everything with the handles of the crate `raw-window-handle` is one.
+///
+/// Locks of the library may be held while its handles are asked for, and while the last reference to it goes: neither may use a
+/// context.
 pub trait WindowHandles: HasDisplayHandle + HasWindowHandle + Send + Sync {}
 
 impl<T: HasDisplayHandle + HasWindowHandle + Send + Sync> WindowHandles for T {}

@@ -1,12 +1,13 @@
 //! The library's own compute shaders. Their SPIR-V is kept beside their GLSL, so that no compiler is needed.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::lock::{Mutex, Rank};
 use crate::pipeline::compute::ComputePipelineDesc;
 use crate::pipeline::{ComputePipeline, PipelineBase, PipelineLayout, ShaderModule};
 use crate::shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
@@ -143,12 +144,15 @@ pub(crate) struct InstancesPush {
 }
 
 /// The pipelines, each made when first needed.
-#[derive(Default)]
 pub(crate) struct Kernels {
     made: Mutex<[Option<Arc<ComputePipeline>>; Kernel::ALL.len()]>,
 }
 
 impl Kernels {
+    pub(crate) fn new() -> Self {
+        Self { made: Mutex::new(Rank::Kernels, [const { None }; Kernel::ALL.len()]) }
+    }
+
     /// The pipeline of a kernel.
     pub(crate) fn get(
         &self,
@@ -157,7 +161,7 @@ impl Kernels {
         cache: vk::PipelineCache,
         kernel: Kernel,
     ) -> Result<Arc<ComputePipeline>> {
-        let mut made = self.made.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut made = self.made.lock();
         let place = &mut made[kernel as usize];
         match place {
             Some(pipeline) => Ok(Arc::clone(pipeline)),

@@ -2,7 +2,7 @@
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use ash::vk;
 
@@ -10,6 +10,7 @@ use super::cache_file::{CacheOwner, seal, unseal};
 use crate::disk::{checksum, read, replace};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::lock::{Mutex, Rank};
 
 /// The cache of a context that was given a file. Written and destroyed on drop.
 pub(crate) struct PipelineCache {
@@ -37,12 +38,13 @@ impl PipelineCache {
         });
         let (raw, data) = create_from(gpu, path, data.unwrap_or_default())?;
         gpu.name(raw, "pipeline cache");
+        let on_disk = (!data.is_empty()).then(|| checksum(&[data]));
         Ok(Self {
             raw,
             loaded_bytes: data.len() as u64,
             path: path.to_owned(),
             owner,
-            on_disk: Mutex::new((!data.is_empty()).then(|| checksum(&[data]))),
+            on_disk: Mutex::new(Rank::PipelineCacheFile, on_disk),
             gpu: Arc::clone(gpu),
         })
     }
@@ -58,7 +60,7 @@ impl PipelineCache {
         let data = unsafe { self.gpu.device.get_pipeline_cache_data(self.raw) }
             .map_err(Error::vulkan("vkGetPipelineCacheData"))?;
         let sum = checksum(&[&data]);
-        let mut on_disk = self.on_disk.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut on_disk = self.on_disk.lock();
         if !always && *on_disk == Some(sum) && self.path.exists() {
             return Ok(());
         }

@@ -8,6 +8,7 @@ use ash::vk;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::lock::Waiting;
 
 /// Creates the pipeline (`vkCreateRayTracingPipelinesKHR`), with as many threads as the driver and the machine have
 /// use for.
@@ -89,10 +90,11 @@ fn complete(
     join: &(impl Fn() -> vk::Result + Sync),
     result: &impl Fn() -> vk::Result,
 ) -> vk::Result {
+    let waiting = Waiting::here();
     thread::scope(|scope| {
         for _ in 1..threads {
             let worker = thread::Builder::new().name("lvk compile".to_owned());
-            if worker.spawn_scoped(scope, || work(join)).is_err() {
+            if worker.spawn_scoped(scope, || waiting.work(|| work(join))).is_err() {
                 break;
             }
         }
@@ -115,6 +117,7 @@ fn work(join: &impl Fn() -> vk::Result) {
 }
 
 #[cfg(test)]
+#[expect(clippy::disallowed_types, reason = "no lock of the library")]
 mod tests {
     use std::collections::HashSet;
     use std::sync::Mutex;

@@ -1,7 +1,7 @@
 //! Buffers: every one has a device address, and shaders reach it by that alone.
 
 use std::ptr::NonNull;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use ash::vk;
 use bitflags::bitflags;
@@ -10,6 +10,7 @@ use crate::barrier::ResourceId;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::memory::{Mapping, MemoryKind, ObjectMemory};
+use crate::lock::{Mutex, Rank};
 
 bitflags! {
     /// What a buffer is used for, besides copies and access by address, which are always allowed.
@@ -119,7 +120,7 @@ impl Buffer {
             name: name.to_owned(),
             allocation: None,
             is_foreign: false,
-            copying: Mutex::new(()),
+            copying: Mutex::new(Rank::BufferBytes, ()),
             gpu: Arc::clone(gpu),
         };
         buffer.bind_memory(internal.alignment)?;
@@ -151,7 +152,7 @@ impl Buffer {
             name: name.to_owned(),
             allocation: None,
             is_foreign: true,
-            copying: Mutex::new(()),
+            copying: Mutex::new(Rank::BufferBytes, ()),
             gpu: Arc::clone(gpu),
         }
     }
@@ -222,7 +223,7 @@ impl Buffer {
     /// Has `fill` write all of the mapped memory. `false` if the buffer is not mapped.
     pub(crate) fn fill(&self, fill: impl FnOnce(&mut [u8])) -> bool {
         let Some(start) = self.mapped() else { return false };
-        let _copying = self.copying.lock().unwrap_or_else(PoisonError::into_inner);
+        let _copying = self.copying.lock();
         // SAFETY: the mapping has the buffer's size and lives as long as `self`; other threads wait.
         fill(unsafe { std::slice::from_raw_parts_mut(start.as_ptr(), self.size_bytes as usize) });
         true
@@ -232,7 +233,7 @@ impl Buffer {
     pub(crate) fn write(&self, offset: u64, bytes: &[u8]) -> bool {
         let Some(start) = self.mapped() else { return false };
         debug_assert!(offset + bytes.len() as u64 <= self.size_bytes);
-        let _copying = self.copying.lock().unwrap_or_else(PoisonError::into_inner);
+        let _copying = self.copying.lock();
         // SAFETY: the range lies inside the mapping, which lives as long as `self`; other threads wait.
         unsafe {
             start.as_ptr().add(offset as usize).copy_from_nonoverlapping(bytes.as_ptr(), bytes.len());
@@ -244,7 +245,7 @@ impl Buffer {
     pub(crate) fn read(&self, offset: u64, bytes: &mut [u8]) -> bool {
         let Some(start) = self.mapped() else { return false };
         debug_assert!(offset + bytes.len() as u64 <= self.size_bytes);
-        let _copying = self.copying.lock().unwrap_or_else(PoisonError::into_inner);
+        let _copying = self.copying.lock();
         // SAFETY: the range lies inside the mapping, which lives as long as `self`; other threads wait.
         unsafe {
             start.as_ptr().add(offset as usize).copy_to_nonoverlapping(bytes.as_mut_ptr(), bytes.len());

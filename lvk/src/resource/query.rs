@@ -1,6 +1,6 @@
 //! Pools of queries: times, samples that passed, and what the pipeline's stages did.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
@@ -10,6 +10,7 @@ use crate::barrier::ResourceId;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::optional::OptionalFeature;
+use crate::lock::{Guard, Mutex, Rank};
 
 /// What the queries of a pool measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -199,7 +200,7 @@ impl QueryPool {
             kind: desc.kind,
             count: desc.count,
             name: desc.debug_name.to_owned(),
-            marks: Mutex::new(QueryMarks::new(desc.count)),
+            marks: Mutex::new(Rank::QueryMarks, QueryMarks::new(desc.count)),
             gpu: Arc::clone(gpu),
         })
     }
@@ -299,8 +300,8 @@ impl QueryPool {
         }
     }
 
-    fn marks(&self) -> MutexGuard<'_, QueryMarks> {
-        self.marks.lock().unwrap_or_else(PoisonError::into_inner)
+    fn marks(&self) -> Guard<'_, QueryMarks> {
+        self.marks.lock()
     }
 }
 

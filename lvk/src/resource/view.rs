@@ -1,7 +1,7 @@
 //! Views: how shaders and passes see a part of an image.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, OnceLock};
 
 use ash::vk;
 
@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 use crate::format::{Aspect, Format};
 use crate::gpu::Gpu;
 use crate::handle::TextureHandle;
+use crate::lock::{Mutex, Rank};
 
 /// Describes a view: a texture that shows mips and layers of another one, perhaps as another kind or format.
 #[derive(Debug, Clone, Copy, Default)]
@@ -69,7 +70,8 @@ pub(crate) struct ViewCache {
 
 impl ViewCache {
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Self {
-        Self { first: OnceLock::new(), others: Mutex::default(), gpu: Arc::clone(gpu) }
+        let others = Mutex::new(Rank::Views, HashMap::new());
+        Self { first: OnceLock::new(), others, gpu: Arc::clone(gpu) }
     }
 
     /// The view of this description, of the image that all views of the cache are of.
@@ -77,7 +79,7 @@ impl ViewCache {
         if let Some(view) = self.first(&info) {
             return Ok(view);
         }
-        let mut others = self.others.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut others = self.others.lock();
         // Another thread may have made it while this one waited.
         if let Some(view) = self.first(&info).or_else(|| others.get(&info).copied()) {
             return Ok(view);
@@ -116,8 +118,7 @@ impl ViewCache {
 
 impl Drop for ViewCache {
     fn drop(&mut self) {
-        let others = self.others.get_mut().unwrap_or_else(PoisonError::into_inner);
-        let others = others.drain().map(|(_, view)| view);
+        let others = self.others.get_mut().drain().map(|(_, view)| view);
         for view in self.first.take().map(|(_, view)| view).into_iter().chain(others) {
             // SAFETY: the owner has waited until the GPU is done with the texture and its views.
             unsafe { self.gpu.device.destroy_image_view(view, None) };

@@ -3,11 +3,11 @@
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 use std::time::SystemTime;
 
 use super::disk_file::{Entry, Fingerprint, Included, open, seal};
 use crate::disk::{read, replace};
+use crate::lock::{Mutex, Rank};
 
 /// A folder holds at most this; beyond it what was not used for longest goes until three quarters are left.
 const MOST_BYTES: u64 = 64 << 20;
@@ -40,7 +40,7 @@ impl ShaderCache {
         Self {
             folder: folder.to_owned(),
             most_bytes: MOST_BYTES,
-            bytes: Mutex::default(),
+            bytes: Mutex::new(Rank::ShaderCacheFolder, None),
             found: AtomicU64::new(0),
             compiled: AtomicU64::new(0),
         }
@@ -97,7 +97,7 @@ impl ShaderCache {
 
     /// Counts a new file, and removes old ones where there are too many.
     fn grow(&self, bytes: u64) {
-        let mut total = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut total = self.bytes.lock();
         let now = match *total {
             Some(known) => known + bytes,
             None => files_of(&self.folder).iter().map(|file| file.bytes).sum(),

@@ -4,13 +4,13 @@
 //! area, and those that find each other become one. Where each looks at the next, as among boxes that lie in one another,
 //! a round would make one pair; such a round pairs by place instead, so that every round leaves a share of boxes less.
 
-use std::sync::{Mutex, PoisonError};
-
 use glam::DVec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
+
+use crate::lock::{Mutex, Rank, Waiting};
 
 /// Rounds that look at the next neighbours only: most of what is small is paired by them.
 const NEAR_ROUNDS: usize = 2;
@@ -90,15 +90,16 @@ fn find_partners(nodes: &[Bvh2Node], reach: usize, partners: &mut [u32]) {
         return search(nodes, reach, 0, partners);
     }
     let length = nodes.len().div_ceil(threads * 4);
-    let queue = Mutex::new(partners.chunks_mut(length).enumerate());
-    let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let queue = Mutex::new(Rank::TreeWork, partners.chunks_mut(length).enumerate());
+    let next = || queue.lock().next();
     let work = || {
         while let Some((chunk, partners)) = next() {
             search(nodes, reach, chunk * length, partners);
         }
     };
+    let waiting = Waiting::here();
     std::thread::scope(|scope| {
-        (1..threads).for_each(|_| drop(scope.spawn(work)));
+        (1..threads).for_each(|_| drop(scope.spawn(|| waiting.work(work))));
         work();
     });
 }

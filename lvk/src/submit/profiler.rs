@@ -1,8 +1,8 @@
 //! Stamps the scopes of command buffers while they are recorded, and reads them once the GPU is done.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
 
@@ -10,6 +10,7 @@ use super::scope_tree::{GpuProfile, Stamps, scope_tree};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::queues::Queue;
+use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::QueryPool;
 use crate::resource::query::QueryPoolDesc;
 
@@ -69,7 +70,7 @@ impl Profiler {
             on: AtomicBool::new(false),
             busy: AtomicBool::new(false),
             frames: AtomicU64::new(0),
-            inner: Mutex::default(),
+            inner: Mutex::new(Rank::Profiler, Inner::default()),
             gpu: Arc::clone(gpu),
         }
     }
@@ -189,8 +190,8 @@ impl Profiler {
         self.lock().last.clone()
     }
 
-    fn lock(&self) -> MutexGuard<'_, Inner> {
-        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> Guard<'_, Inner> {
+        self.inner.lock()
     }
 }
 

@@ -1,15 +1,15 @@
 //! Mapped buffers that are used again instead of made anew.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::memory::MemoryKind;
+use crate::lock::{Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 
 /// A few mapped buffers that nobody uses at the moment.
-#[derive(Default)]
 pub(crate) struct SpareBuffers {
     buffers: Mutex<Vec<Arc<Buffer>>>,
 }
@@ -20,9 +20,13 @@ impl SpareBuffers {
     /// A buffer this many times too large is not worth its memory.
     const WASTE: u64 = 4;
 
+    pub(crate) fn new() -> Self {
+        Self { buffers: Mutex::new(Rank::SpareBuffers, Vec::new()) }
+    }
+
     /// A mapped buffer of at least `bytes`.
     pub(crate) fn take(&self, gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Arc<Buffer>> {
-        let mut buffers = self.buffers.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut buffers = self.buffers.lock();
         let fits = |buffer: &Arc<Buffer>| {
             buffer.size_bytes >= bytes && buffer.size_bytes <= bytes.saturating_mul(Self::WASTE)
         };
@@ -36,7 +40,7 @@ impl SpareBuffers {
 
     /// Takes a buffer back that neither the GPU nor anybody else uses any more.
     pub(crate) fn give(&self, buffer: Arc<Buffer>) {
-        let mut buffers = self.buffers.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut buffers = self.buffers.lock();
         if buffer.mapped().is_some() && Arc::strong_count(&buffer) == 1 && buffers.len() < Self::MOST {
             buffers.push(buffer);
         }

@@ -1,0 +1,146 @@
+//! What this thread holds, where debug assertions are on; nothing otherwise.
+
+#[cfg(debug_assertions)]
+pub(super) use checked::*;
+#[cfg(not(debug_assertions))]
+pub(super) use unchecked::*;
+
+#[cfg(debug_assertions)]
+mod checked {
+    use std::cell::Cell;
+    use std::fmt;
+
+    use crate::lock::Rank;
+
+    thread_local! {
+        // Without a destructor, so that objects of other thread-local variables can still be destroyed.
+        static HELD: Cell<Ranks> = const { Cell::new(Ranks::NONE) };
+    }
+
+    /// The place of one lock in the order.
+    #[derive(Debug, Clone, Copy)]
+    pub(in crate::lock) struct Place(Rank);
+
+    impl Place {
+        pub(in crate::lock) const fn new(rank: Rank) -> Self {
+            Self(rank)
+        }
+    }
+
+    /// A set of ranks, a bit for each.
+    #[derive(Clone, Copy, PartialEq, Eq)]
+    pub(in crate::lock) struct Ranks(u64);
+
+    impl Ranks {
+        pub(in crate::lock) const NONE: Self = Self(0);
+
+        pub(in crate::lock) const fn of(rank: Rank) -> Self {
+            Self(1 << rank as u8)
+        }
+
+        pub(in crate::lock) const fn and(self, other: Self) -> Self {
+            Self(self.0 | other.0)
+        }
+
+        const fn without(self, other: Self) -> Self {
+            Self(self.0 & !other.0)
+        }
+
+        /// Whether a thread that has these may wait for another one.
+        pub(in crate::lock) const fn may_take(self, next: Rank) -> bool {
+            self.0 >> next.first_in_the_way() == 0
+        }
+    }
+
+    impl fmt::Debug for Ranks {
+        fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.debug_list().entries(Rank::ALL.iter().filter(|rank| self.0 >> **rank as u8 & 1 != 0)).finish()
+        }
+    }
+
+    /// A lock that this thread has, or waits for.
+    pub(in crate::lock) struct Held(Ranks);
+
+    impl Held {
+        pub(in crate::lock) fn new(Place(rank): Place) -> Self {
+            let held = HELD.get();
+            assert!(held.may_take(rank), "the lock of {rank:?} is taken while {held:?} are held");
+            HELD.set(held.and(Ranks::of(rank)));
+            Self(Ranks::of(rank))
+        }
+    }
+
+    impl Drop for Held {
+        fn drop(&mut self) {
+            // Guards need not go in the order in which they came.
+            HELD.set(HELD.get().without(self.0));
+        }
+    }
+
+    /// What a thread holds that waits for others.
+    #[derive(Debug, Clone, Copy)]
+    pub(in crate::lock) struct Waiting(Ranks);
+
+    impl Waiting {
+        pub(in crate::lock) fn here() -> Self {
+            Self(HELD.get())
+        }
+
+        /// As long as the answer lives, this thread is taken to hold it, too.
+        pub(in crate::lock) fn assume(self) -> Assumed {
+            Assumed { before: HELD.replace(HELD.get().and(self.0)) }
+        }
+    }
+
+    /// Locks that somebody else holds.
+    pub(in crate::lock) struct Assumed {
+        before: Ranks,
+    }
+
+    impl Drop for Assumed {
+        fn drop(&mut self) {
+            HELD.set(self.before);
+        }
+    }
+}
+
+#[cfg(not(debug_assertions))]
+mod unchecked {
+    use crate::lock::Rank;
+
+    #[derive(Debug, Clone, Copy)]
+    pub(in crate::lock) struct Place;
+
+    impl Place {
+        #[inline]
+        pub(in crate::lock) const fn new(_: Rank) -> Self {
+            Self
+        }
+    }
+
+    pub(in crate::lock) struct Held;
+
+    impl Held {
+        #[inline]
+        pub(in crate::lock) fn new(_: Place) -> Self {
+            Self
+        }
+    }
+
+    pub(in crate::lock) struct Assumed;
+
+    #[derive(Debug, Clone, Copy)]
+    pub(in crate::lock) struct Waiting;
+
+    impl Waiting {
+        #[inline]
+        pub(in crate::lock) fn here() -> Self {
+            Self
+        }
+
+        #[inline]
+        pub(in crate::lock) fn assume(self) -> Assumed {
+            Assumed
+        }
+    }
+}
