@@ -58,11 +58,23 @@ impl FlyCamera {
         }
     }
 
+    /// The same camera at a multiple of the usual speed.
+    #[must_use]
+    pub fn at_pace(mut self, pace: f32) -> Self {
+        self.set_speed(pace * self.first_speed);
+        self
+    }
+
+    /// How fast it flies, as a multiple of the usual speed.
+    #[must_use]
+    pub fn pace(&self) -> f32 {
+        self.speed / self.first_speed
+    }
+
     /// Goes on for `seconds`. Answers whether it has moved or turned.
     pub fn advance(&mut self, steering: &Steering, seconds: f32) -> bool {
         let before = *self;
-        let [slowest, fastest] = SPEED_RANGE.map(|factor| factor * self.first_speed);
-        self.speed = (self.speed * SPEED_STEP.powf(steering.faster)).clamp(slowest, fastest);
+        self.set_speed(self.speed * SPEED_STEP.powf(steering.faster));
         self.turn(steering.turn);
         let [right, up, forward] = self.camera().frame().map(Vec3::from);
         let [x, y, z] = steering.direction;
@@ -84,6 +96,11 @@ impl FlyCamera {
     #[must_use]
     pub fn speed(&self) -> f32 {
         self.speed
+    }
+
+    fn set_speed(&mut self, speed: f32) {
+        let [slowest, fastest] = SPEED_RANGE.map(|factor| factor * self.first_speed);
+        self.speed = speed.clamp(slowest, fastest);
     }
 
     fn turn(&mut self, [right, down]: [f32; 2]) {

@@ -59,7 +59,8 @@ pub struct RunArgs {
     pub out: Option<PathBuf>,
 
     /// Show the sample in a window, where mouse and keys move the camera, in place of writing pictures; with --frames N for
-    /// so many frames, with --out the last one of them is written as the window shows it
+    /// so many frames, each a 30th of a second of the animation however long it takes (none while Space lets that stand); with
+    /// --out the last one of them is written as the window shows it
     #[arg(long, conflicts_with = "resume", help_heading = "Window")]
     pub window: bool,
 

@@ -23,9 +23,6 @@ pub enum RunError {
         /// Each device with what it lacks.
         reasons: String,
     },
-    /// Nobody waits for the sample any more.
-    #[error(transparent)]
-    Stopped(#[from] super::loading::Stopped),
     /// The scene could not be loaded.
     #[error(transparent)]
     Scene(#[from] SceneError),
@@ -61,6 +58,14 @@ pub enum RunError {
     NoWindow {
         /// What the window system said.
         reason: String,
+    },
+    /// The window holds its pixels in a way that no picture is made of.
+    #[error(
+        "no screenshot of a window whose format is {format:?}; without --window the sample writes its picture"
+    )]
+    NoScreenshot {
+        /// The format.
+        format: lvk::Format,
     },
     /// A sequence cannot be resumed that is none.
     #[error("--resume is for sequences, as --frames 0..240 --out frame_####.png")]
@@ -104,8 +109,9 @@ impl RunError {
             Self::Input(_) | Self::Scene(_) | Self::Png(_) | Self::Driver(DriverError::Variable { .. }) => 2,
             Self::NoNumber { .. } | Self::NoSequence { .. } | Self::NothingToResume => 2,
             Self::SequenceInWindow | Self::NoShaders { .. } => 2,
-            Self::Interrupted { .. } | Self::Stopped(_) => interrupt::STATUS,
+            Self::Interrupted { .. } => interrupt::STATUS,
             Self::Device(_) | Self::NoRayQueries { .. } | Self::NoWindow { .. } => 1,
+            Self::NoScreenshot { .. } => 1,
             Self::Driver(_) | Self::Validation(_) => 1,
         }
     }

@@ -21,16 +21,28 @@ pub fn free_name(folder: &Path, sample: &str) -> PathBuf {
 pub struct Screenshot {
     copy: Holder<TextureHandle>,
     extent: [u32; 2],
-    format: Format,
+    texels: Texels,
+}
+
+/// How a pixel lies in memory.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Texels {
+    /// A byte a channel, red first.
+    RedFirst,
+    /// A byte a channel, blue first.
+    BlueFirst,
+    /// Ten bits for red, green and blue, from the lowest on.
+    TenBits,
 }
 
 impl Screenshot {
     /// Records the copy, after everything that is drawn.
     ///
     /// # Errors
-    /// What Vulkan answers.
-    pub fn record(ctx: &Context, cmd: &mut CommandBuffer, image: &SwapchainImage) -> lvk::Result<Self> {
+    /// [`RunError::NoScreenshot`] of formats that no PNG is made of, and what Vulkan answers.
+    pub fn record(ctx: &Context, cmd: &mut CommandBuffer, image: &SwapchainImage) -> Result<Self, RunError> {
         let (extent, format) = (image.extent(), image.format());
+        let texels = Texels::of(format).ok_or(RunError::NoScreenshot { format })?;
         let copy = ctx.create_texture(&TextureDesc {
             format,
             extent,
@@ -40,7 +52,7 @@ impl Screenshot {
         })?;
         let region = TextureRegion::default();
         cmd.copy_texture(image.texture(), &region, *copy, &region)?;
-        Ok(Self { copy, extent, format })
+        Ok(Self { copy, extent, texels })
     }
 
     /// Waits for the copy and writes it.
@@ -49,15 +61,38 @@ impl Screenshot {
     /// [`RunError::Png`], and what Vulkan answers.
     pub fn write(&self, ctx: &Context, path: &Path) -> Result<(), RunError> {
         let mut pixels = ctx.download_texture(*self.copy, &TextureRegion::default())?;
-        let is_blue_first = matches!(self.format, Format::Bgra8Unorm | Format::Bgra8Srgb);
-        for pixel in pixels.chunks_exact_mut(4) {
-            if is_blue_first {
-                pixel.swap(0, 2);
-            }
-            pixel[3] = u8::MAX;
+        for pixel in pixels.as_chunks_mut().0 {
+            *pixel = self.texels.rgba(*pixel);
         }
         Ok(png::write(path, self.extent[0], self.extent[1], &pixels)?)
     }
+}
+
+impl Texels {
+    fn of(format: Format) -> Option<Self> {
+        match format {
+            Format::Rgba8Unorm | Format::Rgba8Srgb => Some(Self::RedFirst),
+            Format::Bgra8Unorm | Format::Bgra8Srgb => Some(Self::BlueFirst),
+            Format::Rgb10A2Unorm => Some(Self::TenBits),
+            _ => None,
+        }
+    }
+
+    /// Red, green and blue with 8 bits each, and nothing seen through it.
+    fn rgba(self, texel: [u8; 4]) -> [u8; 4] {
+        let [a, b, c, _] = texel;
+        let [red, green, blue] = match self {
+            Self::RedFirst => [a, b, c],
+            Self::BlueFirst => [c, b, a],
+            Self::TenBits => [0, 10, 20].map(|shift| eight_bits(u32::from_le_bytes(texel) >> shift)),
+        };
+        [red, green, blue, u8::MAX]
+    }
+}
+
+/// The nearest of 8 bits to the lowest ten of `value`.
+fn eight_bits(value: u32) -> u8 {
+    (((value & 0x3ff) * 255 + 511) / 1023) as u8
 }
 
 #[cfg(test)]
@@ -71,5 +106,32 @@ mod tests {
         assert_eq!(first, folder.path().join("hall_window_0001.png"));
         std::fs::write(&first, "").unwrap();
         assert_eq!(free_name(folder.path(), "hall"), folder.path().join("hall_window_0002.png"));
+    }
+
+    #[test]
+    fn channels_are_found_in_every_format_that_windows_of_samples_have() {
+        for format in [Format::Rgba8Unorm, Format::Rgba8Srgb] {
+            assert_eq!(Texels::of(format).unwrap().rgba([1, 2, 3, 4]), [1, 2, 3, 255]);
+        }
+        for format in [Format::Bgra8Unorm, Format::Bgra8Srgb] {
+            assert_eq!(Texels::of(format).unwrap().rgba([1, 2, 3, 4]), [3, 2, 1, 255]);
+        }
+        let packed = (1 << 30 | 1023 << 20 | 512 << 10 | 4_u32).to_le_bytes();
+        assert_eq!(Texels::of(Format::Rgb10A2Unorm).unwrap().rgba(packed), [1, 128, 255, 255]);
+    }
+
+    #[test]
+    fn ten_bits_become_the_nearest_eight() {
+        for value in 0..1024_u32 {
+            let exact = f64::from(value) * 255.0 / 1023.0;
+            assert_eq!(f64::from(eight_bits(value)), exact.round(), "{value}");
+        }
+    }
+
+    #[test]
+    fn other_formats_are_refused_by_name() {
+        assert_eq!(Texels::of(Format::Rgba16Float), None);
+        let told = RunError::NoScreenshot { format: Format::Rgba16Float }.to_string();
+        assert!(told.contains("Rgba16Float"), "{told}");
     }
 }

@@ -1,6 +1,6 @@
 //! The `yuv` sample: a moving picture in Y'CbCr, made by code, as decoders give it out: two or three planes of 8 or 10 bits, whose
 //! colour differences have half the size. Shaders sample it as colours, by the conversion that its texture was made with, and
-//! its planes one by one.
+//! its planes one by one. The picture is flat and fills the canvas, so there is no camera that a window could move.
 //!
 //! [`Yuv`] is the sample for programs and tests, [`run`] the one for the command line.
 

@@ -28,18 +28,26 @@ pub(super) enum Action {
     Close,
 }
 
-/// The keys, as the panel tells them.
-pub(super) const HELP: [(&str, &str); 9] = [
+/// The keys, as the panel tells them; those of the camera first.
+const HELP: [(&str, &str); 9] = [
     ("drag", "look around"),
     ("W A S D", "fly"),
     ("Q E", "down, up"),
     ("Shift, wheel", "in a hurry, faster"),
-    ("Space", "animation"),
     ("C", "the animation's camera"),
+    ("Space", "animation"),
     ("F1", "this panel"),
     ("F5", "shaders anew"),
     ("F12, Esc", "screenshot, close"),
 ];
+
+/// How many of them are the camera's.
+const CAMERA_KEYS: usize = 5;
+
+/// What keys and mouse do in the window of a sample with a camera, or without one.
+pub(super) fn help(has_camera: bool) -> &'static [(&'static str, &'static str)] {
+    &HELP[if has_camera { 0 } else { CAMERA_KEYS }..]
+}
 
 /// Keys that are held and how far the mouse was moved: what steers the camera.
 #[derive(Debug, Default)]
@@ -156,6 +164,13 @@ mod tests {
         assert_eq!(controls.key(KeyCode::F12, true), None, "repeated while it is held");
         assert_eq!(controls.key(KeyCode::F12, false), None);
         assert_eq!(controls.key(KeyCode::F12, true), Some(Action::Screenshot));
+    }
+
+    #[test]
+    fn nobody_is_told_to_fly_without_a_camera() {
+        let keys = |has_camera| help(has_camera).iter().map(|(key, _)| *key).collect::<Vec<_>>();
+        assert_eq!(keys(true)[..CAMERA_KEYS], ["drag", "W A S D", "Q E", "Shift, wheel", "C"]);
+        assert_eq!(keys(false), ["Space", "F1", "F5", "F12, Esc"]);
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Rect, ViewportInfo, vec2};
-use lvk::{Context, GpuProfile, SubmitHandle, ValidationSink};
+use lvk::{Context, ValidationSink};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, MouseButton, WindowEvent};
@@ -13,11 +13,12 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::PhysicalKey;
 use winit::window::{Window, WindowId};
 
-use super::controls::{Action, Controls, HELP};
+use super::clock::Clock;
+use super::controls::{Action, Controls, help};
+use super::pilot::Pilot;
 use super::resize::Follower;
 use super::screen::Screen;
 use super::ui_input::{UiInput, notches};
-use crate::app::fly_camera::FlyCamera;
 use crate::app::frame::Frame;
 use crate::app::frames::Frames;
 use crate::app::hot_reload::ShaderWatch;
@@ -46,13 +47,11 @@ where
     M: FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
 {
     let event_loop = EventLoop::new().map_err(|error| RunError::window(&error))?;
-    let mut program =
-        Program { name, args, sink, make: Some(make), running: None, rests_until: None, ended: Ok(()) };
+    let mut program = Program { name, args, sink, make: Some(make), running: None, ended: Ok(()) };
     event_loop.run_app(&mut program).map_err(|error| RunError::window(&error))?;
     let Program { running, ended, .. } = program;
-    let closed = running.map_or(Ok(()), Running::close);
     ended?;
-    closed
+    Ok(running.map_or(Ok(()), |running| running.ctx.wait_idle())?)
 }
 
 /// What answers events.
@@ -62,8 +61,6 @@ struct Program<'a, S, M> {
     sink: &'a ValidationSink,
     make: Option<M>,
     running: Option<Running<S>>,
-    /// No frame before, unless something happens to the window.
-    rests_until: Option<Instant>,
     ended: Result<(), RunError>,
 }
 
@@ -89,24 +86,15 @@ where
             event => running.event(&event),
         };
         match done {
-            Ok(Next::Frame) => {
-                self.rests_until = None;
-                event_loop.set_control_flow(ControlFlow::Poll);
-            }
-            Ok(Next::Nap) => {
-                let until = Instant::now() + NAP;
-                self.rests_until = Some(until);
-                event_loop.set_control_flow(ControlFlow::WaitUntil(until));
-            }
+            Ok(Next::Frame) => event_loop.set_control_flow(ControlFlow::Poll),
+            Ok(Next::Nap) => event_loop.set_control_flow(ControlFlow::wait_duration(NAP)),
             Ok(Next::Close) => self.end(event_loop, Ok(())),
             Err(error) => self.end(event_loop, Err(error)),
         }
     }
 
     fn about_to_wait(&mut self, _: &ActiveEventLoop) {
-        // A redraw that is asked for comes at once, whatever is waited for.
-        let is_due = self.rests_until.is_none_or(|until| Instant::now() >= until);
-        if let Some(running) = self.running.as_ref().filter(|_| is_due) {
+        if let Some(running) = &self.running {
             running.window.request_redraw();
         }
     }
@@ -124,9 +112,7 @@ where
         opening.window = Some(Arc::clone(&window) as Arc<_>);
         let Opened { sample, headline } = make(&mut opening)?;
         drop(opening);
-        if !headline.is_empty() {
-            say(&headline);
-        }
+        say(&headline);
         Running::new(window, sample, self.args)
     }
 
@@ -134,8 +120,6 @@ where
         if self.ended.is_ok() {
             self.ended = ended;
         }
-        // What is still being loaded may take a moment to end.
-        self.running.iter().for_each(|running| running.window.set_visible(false));
         event_loop.exit();
     }
 }
@@ -159,40 +143,14 @@ struct Running<S> {
     ui_input: UiInput,
     follower: Follower,
     watch: Option<ShaderWatch>,
-    /// Where the camera is that a person has taken over.
-    fly: Option<FlyCamera>,
+    pilot: Pilot,
     clock: Clock,
     /// The moment that the sample shows.
     at: Option<Moment>,
     shown: u32,
     wants_screenshot: bool,
-    /// The latest frame.
-    latest: SubmitHandle,
     ctx: Context,
     window: Arc<Window>,
-}
-
-/// What time it is in the animation.
-struct Clock {
-    start: Instant,
-    latest: Instant,
-    animation: Duration,
-}
-
-impl Clock {
-    fn new() -> Self {
-        let now = Instant::now();
-        Self { start: now, latest: now, animation: Duration::ZERO }
-    }
-
-    /// Goes on to now; the animation too, if it goes on. Answers the seconds since the last time.
-    fn tick(&mut self, animates: bool) -> f32 {
-        let now = Instant::now();
-        let step = now.duration_since(self.latest);
-        self.latest = now;
-        self.animation += if animates { step } else { Duration::ZERO };
-        step.as_secs_f32()
-    }
 }
 
 impl<S: Sample> Running<S> {
@@ -209,12 +167,11 @@ impl<S: Sample> Running<S> {
             ui_input: UiInput::default(),
             follower: Follower::new([args.width, args.height]),
             watch: shader_folder::folder().map(|folder| ShaderWatch::new(&folder)),
-            fly: None,
-            clock: Clock::new(),
+            pilot: Pilot::new(),
+            clock: Clock::new(Instant::now()),
             at: None,
             shown: 0,
             wants_screenshot: false,
-            latest: SubmitHandle::default(),
             ctx,
             window,
         })
@@ -254,7 +211,10 @@ impl<S: Sample> Running<S> {
     fn act(&mut self, action: Action) -> Next {
         match action {
             Action::Pause => self.panel.animates = !self.panel.animates,
-            Action::GiveBack => (self.fly, self.at) = (None, None),
+            Action::GiveBack => {
+                self.pilot.give_back();
+                self.at = None;
+            }
             Action::Panel => self.panel.is_open = !self.panel.is_open,
             Action::Next => self.sample.next(),
             Action::Reload => self.reload(),
@@ -275,19 +235,9 @@ impl<S: Sample> Running<S> {
         }
     }
 
-    /// Ends what is loading, and waits for the GPU.
-    fn close(self) -> Result<(), RunError> {
-        let Self { sample, ctx, .. } = self;
-        drop(sample);
-        Ok(ctx.wait_idle()?)
-    }
-
     fn redraw(&mut self, name: &str, args: &RunArgs) -> Result<Next, RunError> {
-        if self.sample.is_loading().map_err(Into::into)? {
-            return self.redraw_loading(name);
-        }
         self.ctx.next_frame()?;
-        let seconds = self.clock.tick(self.panel.animates);
+        let seconds = self.clock.tick(Instant::now(), self.panel.animates);
         self.follow(args, seconds)?;
         let Some(image) = self.screen.next_image()? else { return Ok(Next::Nap) };
         self.panel.count_frame(seconds);
@@ -297,21 +247,26 @@ impl<S: Sample> Running<S> {
         let (input, profile) = (self.input(image.extent()), self.ctx.last_profile()?);
         let (_, modes) = self.screen.present_modes()?;
         let before = self.panel.present_mode;
-        let told = told(&self.ctx, image.extent(), &modes, profile.as_deref());
+        let told = Told {
+            device: &self.ctx.capabilities().device_name,
+            extent: image.extent(),
+            present_modes: &modes,
+            profile: profile.as_deref(),
+            keys: help(self.sample.view().is_some()),
+        };
         let (panel, sample) = (&mut self.panel, &mut self.sample);
         self.screen.record(&mut cmd, &image, picture, input, |ui| {
             panel.show(ui, name, &told, |ui| sample.panel(ui));
-            sample.overlay(ui);
         })?;
         let last = self.is_last(args);
         let file = args.out.as_deref().filter(|_| last);
         let shot = (self.wants_screenshot || file.is_some())
-            .then(|| Screenshot::record(&self.ctx, &mut cmd, &image))
-            .transpose()?;
-        self.latest = self.ctx.present(cmd, image)?;
+            .then(|| Screenshot::record(&self.ctx, &mut cmd, &image));
+        self.ctx.present(cmd, image)?;
         self.shown += 1;
+        self.clock.count_frame(self.panel.animates);
         if let Some(shot) = shot {
-            self.save(&shot, file, name)?;
+            self.save(shot, file, name)?;
         }
         if before != self.panel.present_mode {
             self.screen.set_present_mode(self.panel.present_mode)?;
@@ -319,80 +274,48 @@ impl<S: Sample> Running<S> {
         Ok(if last { Next::Close } else { Next::Frame })
     }
 
-    /// A frame without a picture, now and then, so that whoever loads is not held up; none while the GPU is at work for that
-    /// one, so that the window is not held up either.
-    fn redraw_loading(&mut self, name: &str) -> Result<Next, RunError> {
-        self.follow_size();
-        if !self.ctx.is_done(self.latest)? {
-            return Ok(Next::Nap);
-        }
-        self.ctx.next_frame()?;
-        let Some(image) = self.screen.next_image()? else { return Ok(Next::Nap) };
-        // The animation begins with the picture.
-        self.clock.tick(false);
-        let mut frame = Frame::free(&self.ctx)?;
-        let picture = self.sample.record(&mut frame).map_err(Into::into)?;
-        let mut cmd = frame.into_commands();
-        let input = self.input(image.extent());
-        let sample = &mut self.sample;
-        self.screen.record(&mut cmd, &image, picture, input, |ui| sample.overlay(ui))?;
-        let shot =
-            self.wants_screenshot.then(|| Screenshot::record(&self.ctx, &mut cmd, &image)).transpose()?;
-        self.latest = self.ctx.present(cmd, image)?;
-        if let Some(shot) = shot {
-            self.save(&shot, None, name)?;
-        }
-        Ok(Next::Nap)
-    }
-
-    /// Gives pictures the size that the window has had for a while.
-    fn follow_size(&mut self) {
+    /// Takes note of what has changed: size, shaders, time, camera.
+    fn follow(&mut self, args: &RunArgs, seconds: f32) -> Result<(), RunError> {
         if let Some(size) = self.follower.next(extent(&self.window), Instant::now())
             && let Err(error) = self.sample.resize(size).map_err(Into::into)
         {
             eprintln!("warning: pictures keep their size: {error}");
         }
-    }
-
-    /// Takes note of what has changed: size, shaders, time, camera.
-    fn follow(&mut self, args: &RunArgs, seconds: f32) -> Result<(), RunError> {
-        self.follow_size();
         if self.watch.as_mut().is_some_and(|watch| watch.poll(Instant::now())) {
             self.reload();
         }
         let steering = self.controls.take();
-        let mut fly = self.fly.or_else(|| self.sample.view().as_ref().map(FlyCamera::new));
-        let flies = fly.as_mut().is_some_and(|fly| fly.advance(&steering, seconds));
-        self.fly = if flies { fly } else { self.fly };
-        let moment = self.moment(args);
+        let is_steered = self.pilot.steer(self.sample.view().as_ref(), &steering, seconds);
+        let moment = self.clock.moment(args.frames.is_some(), args.round);
         let is_later = self.at != Some(moment);
         if is_later {
             self.sample.update(moment).map_err(Into::into)?;
             self.at = Some(moment);
         }
-        if let (true, Some(fly)) = (flies || is_later, &self.fly) {
-            self.sample.set_view(&fly.camera());
+        if let (true, Some(camera)) = (is_steered || is_later, self.pilot.camera()) {
+            self.sample.set_view(&camera);
         }
         Ok(())
-    }
-
-    /// By the clock, or as many frames as were shown where their number is asked for.
-    fn moment(&self, args: &RunArgs) -> Moment {
-        match args.frames {
-            Some(_) => Moment::of_frame(self.shown, args.round),
-            None => Moment::after(self.clock.animation.as_millis() as u32, args.round),
-        }
     }
 
     fn is_last(&self, args: &RunArgs) -> bool {
         matches!(args.frames, Some(Frames::Still(count)) if self.shown + 1 >= count)
     }
 
-    fn save(&mut self, shot: &Screenshot, file: Option<&Path>, name: &str) -> Result<(), RunError> {
+    /// Writes `shot`. A picture that only a key has asked for is no reason to end.
+    fn save(
+        &mut self,
+        shot: Result<Screenshot, RunError>,
+        file: Option<&Path>,
+        name: &str,
+    ) -> Result<(), RunError> {
         self.wants_screenshot = false;
         let path = file.map_or_else(|| free_name(Path::new(""), name), Path::to_owned);
-        shot.write(&self.ctx, &path)?;
-        say(&format!("wrote {}", path.display()));
+        match shot.and_then(|shot| shot.write(&self.ctx, &path)) {
+            Ok(()) => say(&format!("wrote {}", path.display())),
+            Err(error) if file.is_some() => return Err(error),
+            Err(error) => eprintln!("error: {error}"),
+        }
         Ok(())
     }
 
@@ -403,7 +326,7 @@ impl<S: Sample> Running<S> {
         let viewport = ViewportInfo { native_pixels_per_point: Some(per_point), ..ViewportInfo::default() };
         let mut input = egui::RawInput {
             screen_rect: Some(Rect::from_min_size(egui::Pos2::ZERO, size)),
-            time: Some(self.clock.latest.duration_since(self.clock.start).as_secs_f64()),
+            time: Some(self.clock.seconds()),
             modifiers,
             events,
             ..egui::RawInput::default()
@@ -415,15 +338,6 @@ impl<S: Sample> Running<S> {
     fn per_point(&self) -> f32 {
         self.window.scale_factor() as f32
     }
-}
-
-fn told<'a>(
-    ctx: &'a Context,
-    extent: [u32; 2],
-    present_modes: &'a [lvk::PresentMode],
-    profile: Option<&'a GpuProfile>,
-) -> Told<'a> {
-    Told { device: &ctx.capabilities().device_name, extent, present_modes, profile, keys: &HELP }
 }
 
 fn extent(window: &Window) -> [u32; 2] {
