@@ -1,6 +1,7 @@
 //! Where the samples' GLSL comes from: the binary, or the folder that `LVK_SHADERS` names, so that a shader can be changed
 //! and tried without a build; or the one that `--hot-reload` names, which is watched too.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -22,10 +23,29 @@ pub(crate) fn take(folder: &Path) -> Result<(), PathBuf> {
     Ok(())
 }
 
+thread_local! {
+    /// What [`with`] names.
+    static LENT: RefCell<Option<PathBuf>> = const { RefCell::new(None) };
+}
+
+/// Does `work`, for which this thread takes texts from `folder`, whatever else is named: for tests, whose neighbours in the
+/// same process keep theirs.
+pub fn with<R>(folder: &Path, work: impl FnOnce() -> R) -> R {
+    /// Puts back what was there, also where `work` panics.
+    struct Restored(Option<PathBuf>);
+    impl Drop for Restored {
+        fn drop(&mut self) {
+            LENT.set(self.0.take());
+        }
+    }
+    let _before = Restored(LENT.replace(Some(folder.to_owned())));
+    work()
+}
+
 /// The folder that texts are taken from, if it is not the binary.
 pub(crate) fn folder() -> Option<PathBuf> {
     let named = || std::env::var_os(VARIABLE).filter(|folder| !folder.is_empty()).map(PathBuf::from);
-    TAKEN.get().cloned().or_else(named)
+    LENT.with_borrow(Clone::clone).or_else(|| TAKEN.get().cloned()).or_else(named)
 }
 
 /// Compiles a stage of `sample`, whose GLSL is the file `<sample>/<debug name>.glsl` of the folder if one is named, and
@@ -61,4 +81,26 @@ fn create_from(
         include_dirs: &[folder],
         ..*desc
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_is_lent_to_one_thread_until_its_work_is_done() {
+        let (outer, inner) = (Path::new("outer"), Path::new("inner"));
+        let before = folder();
+        with(outer, || {
+            assert_eq!(folder().as_deref(), Some(outer));
+            with(inner, || assert_eq!(folder().as_deref(), Some(inner)));
+            assert_eq!(folder().as_deref(), Some(outer));
+            let elsewhere = std::thread::spawn(folder).join().unwrap();
+            assert_eq!(elsewhere, before);
+            let fails = || with(inner, || std::panic::resume_unwind(Box::new(())));
+            assert!(std::panic::catch_unwind(fails).is_err());
+            assert_eq!(folder().as_deref(), Some(outer));
+        });
+        assert_eq!(folder(), before);
+    }
 }

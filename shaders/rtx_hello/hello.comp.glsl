@@ -6,7 +6,7 @@
 
 vec3 colorAlong(vec3 direction) {
     LvkRayQuery query;
-    lvkRayQueryInitialize(query, tlas, LVK_RAY_FLAG_OPAQUE, 0xffu, kEye, 0.0, direction, 99.0);
+    lvkRayQueryInitialize(query, tlas, LVK_RAY_FLAG_OPAQUE, 0xffu, camera.eye, 0.0, direction, 99.0);
     while (lvkRayQueryProceed(query)) {
     }
     if (lvkRayQueryType(query, LVK_COMMITTED) == LVK_COMMITTED_NONE) {
@@ -18,7 +18,7 @@ vec3 colorAlong(vec3 direction) {
 
 void main() {
     uvec2 pixel = groupPixel();
-    if (pixel.x >= size.x || pixel.y >= size.y) {
+    if (pixel.x >= camera.width || pixel.y >= camera.height) {
         return;
     }
     vec3 sum = vec3(0.0);

@@ -13,6 +13,10 @@ use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
 use crate::rtx::{Canvas, RtxConfig, RtxError, Tracer};
+use crate::scene::{Camera, GpuCamera};
+
+/// Half the height of what is seen at distance 1.
+const HALF_HEIGHT: f32 = 0.55;
 
 /// Renders the triangles.
 pub struct RtxHello {
@@ -24,6 +28,7 @@ pub struct RtxHello {
     blas: Holder<AccelStructHandle>,
     switches: RtxHelloSwitches,
     phase: f32,
+    camera: Camera,
     _vertices: Holder<BufferHandle>,
 }
 
@@ -31,7 +36,7 @@ pub struct RtxHello {
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Push {
-    size: [u32; 2],
+    camera: GpuCamera,
     tlas: u32,
     image: u32,
 }
@@ -64,6 +69,7 @@ impl RtxHello {
             blas,
             switches,
             phase: 0.0,
+            camera: camera(),
             _vertices: vertices,
         })
     }
@@ -88,12 +94,14 @@ impl Sample for RtxHello {
 
     fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
         self.phase = moment.phase();
+        self.camera = camera();
         Ok(())
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
         let (size, image) = (self.config.extent(), self.canvas.picture());
-        let push = Push { size, tlas: self.tlas.index(), image: image.index() };
+        let camera = GpuCamera::new(&self.camera, size[0], size[1], 0.0);
+        let push = Push { camera, tlas: self.tlas.index(), image: image.index() };
         let instances = instances(*self.blas, self.phase, &self.switches);
         let writes = Dependencies { storage_images: &[**image], ..Dependencies::default() };
         frame.pass("TLAS update", |cmd| cmd.update_tlas(*self.tlas, &instances, self.switches.mode()))?;
@@ -108,6 +116,14 @@ impl Sample for RtxHello {
         Ok(())
     }
 
+    fn view(&self) -> Option<Camera> {
+        Some(self.camera)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        self.camera = *camera;
+    }
+
     fn panel(&mut self, ui: &mut egui::Ui) {
         self.switches.show(ui);
     }
@@ -116,6 +132,11 @@ impl Sample for RtxHello {
         self.tracer = Tracer::new(&self.ctx, self.config.path, &RAYS)?;
         Ok(())
     }
+}
+
+/// Where the triangles are seen from until somebody looks from elsewhere.
+fn camera() -> Camera {
+    Camera::looking_at([0.0, 0.0, 3.2], [0.0; 3], 2.0 * HALF_HEIGHT.atan().to_degrees())
 }
 
 fn instances(blas: AccelStructHandle, phase: f32, switches: &RtxHelloSwitches) -> Vec<TlasInstance> {

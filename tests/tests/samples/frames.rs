@@ -1,6 +1,9 @@
 //! Frames of samples: pictures are the same whether frames are waited for or not, and after changes of size, view and
-//! shaders they are those of a sample made so.
+//! shaders they are those of a sample made so. Shaders that are changed show, and wrong ones leave the old in use.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
+
+use std::fs;
+use std::path::Path;
 
 use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureRegion, TextureUsage};
 use lvk_samples::app::frame::Frame;
@@ -22,12 +25,14 @@ use lvk_samples::rtx_hello::RtxHello;
 use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig};
 use lvk_samples::rtx_textures::RtxTextures;
 use lvk_samples::scene::{Camera, Scene};
+use lvk_samples::shader_folder;
 use lvk_samples::sponza::{Sponza, SponzaConfig};
 use lvk_samples::triplanar::Triplanar;
 use lvk_samples::yuv::{CONVERSIONS, Yuv, YuvConfig};
 use lvk_tests::hybrid::paths;
 use lvk_tests::still_life::still_life;
 use lvk_tests::{device, device_with};
+use tempfile::TempDir;
 
 const SIZE: [u32; 2] = [40, 24];
 const OTHER_SIZE: [u32; 2] = [24, 40];
@@ -67,8 +72,16 @@ fn texture(ctx: &Context, extent: [u32; 2]) -> Holder<TextureHandle> {
     ctx.create_texture(&TextureDesc { format, extent, usage, ..TextureDesc::default() }).unwrap()
 }
 
+/// Whether a sample can be looked at from elsewhere.
+#[derive(PartialEq)]
+enum Seen {
+    FromAnywhere,
+    /// What it shows is flat.
+    Flat,
+}
+
 /// Asks of the sample that `make` makes what a window will.
-fn check<S: Sample>(make: impl Fn([u32; 2]) -> S) {
+fn check<S: Sample>(seen: Seen, make: impl Fn([u32; 2]) -> S) {
     let mut sample = make(SIZE);
     let expected = one_by_one(&mut sample);
     assert!(expected[0] != expected[1], "nothing moves");
@@ -76,20 +89,69 @@ fn check<S: Sample>(make: impl Fn([u32; 2]) -> S) {
 
     sample.resize(OTHER_SIZE).map_err(Into::into).unwrap();
     assert!(one_by_one(&mut sample) == one_by_one(&mut make(OTHER_SIZE)), "another size");
-    sample.reload().map_err(Into::into).unwrap();
     assert!(sample.resize([0, 9]).is_err() && sample.resize([9, 1 << 20]).is_err());
     sample.resize(SIZE).map_err(Into::into).unwrap();
-    assert!(one_by_one(&mut sample) == expected, "back again, by new pipelines");
+    check_reload(&mut sample, &expected);
+    check_view(&mut sample, seen, &expected[0]);
+}
 
-    sample.update(moment(0)).map_err(Into::into).unwrap();
+/// What `sample` shows at the first of the moments.
+fn first<S: Sample>(sample: &mut S) -> Vec<u8> {
+    sample.update(moment(MOMENTS[0])).map_err(Into::into).unwrap();
+    headless::picture(sample).map_err(Into::into).unwrap()
+}
+
+fn check_reload<S: Sample>(sample: &mut S, expected: &[Vec<u8>]) {
+    let wrong = changed_shaders("noSuchValue + ");
+    let told = shader_folder::with(wrong.path(), || sample.reload()).map_err(Into::into).unwrap_err();
+    assert!(told.to_string().contains("noSuchValue"), "{told}");
+    assert!(first(sample) == expected[0], "the old pipelines stay");
+    let inverted = changed_shaders("1.0 - ");
+    shader_folder::with(inverted.path(), || sample.reload()).map_err(Into::into).unwrap();
+    assert!(first(sample) != expected[0], "the new shaders are not in use");
+    sample.reload().map_err(Into::into).unwrap();
+    assert!(one_by_one(sample) == expected, "back again, by new pipelines");
+}
+
+/// A copy of the folder of shaders with `change` before what the last one of each sample makes of light.
+fn changed_shaders(change: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    copy_folder(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders"), folder.path());
+    for (file, before) in [
+        ("common/tonemap.glsl", "vec3 high = 1.055 * pow(max(linear, 0.0), "),
+        ("common/tonemap.glsl", "    return 1.0 - exp("),
+        ("hello_triangle/triangle.frag.glsl", "    result = vec4("),
+        ("rtx_hello/view.glsl", "    return sqrt("),
+        ("yuv/picture.frag.glsl", "    color = vec4(decodeSrgb(clamp("),
+    ] {
+        let path = folder.path().join(file);
+        let text = fs::read_to_string(&path).unwrap();
+        assert_eq!(text.matches(before).count(), 1, "`{before}` in {file}");
+        fs::write(&path, text.replace(before, &format!("{before}{change}"))).unwrap();
+    }
+    folder
+}
+
+fn copy_folder(from: &Path, to: &Path) {
+    for entry in fs::read_dir(from).unwrap() {
+        let (path, to) = (entry.as_ref().unwrap().path(), to.join(entry.unwrap().file_name()));
+        if path.is_dir() {
+            fs::create_dir(&to).unwrap();
+            copy_folder(&path, &to);
+        } else {
+            fs::copy(&path, &to).unwrap();
+        }
+    }
+}
+
+fn check_view<S: Sample>(sample: &mut S, seen: Seen, expected: &[u8]) {
+    sample.update(moment(MOMENTS[0])).map_err(Into::into).unwrap();
+    assert!(sample.view().is_some() == (seen == Seen::FromAnywhere), "has it a camera?");
     let Some(view) = sample.view() else { return };
     sample.set_view(&Camera { vertical_fov_degrees: 0.5 * view.vertical_fov_degrees, ..view });
-    assert!(headless::picture(&mut sample).map_err(Into::into).unwrap() != expected[0], "another view");
+    assert!(headless::picture(sample).map_err(Into::into).unwrap() != expected, "another view");
     sample.set_view(&view);
-    assert!(
-        headless::picture(&mut sample).map_err(Into::into).unwrap() == expected[0],
-        "the first view again"
-    );
+    assert!(headless::picture(sample).map_err(Into::into).unwrap() == expected, "the first view again");
 }
 
 fn rtx(ctx: &Context, [width, height]: [u32; 2]) -> RtxConfig {
@@ -99,19 +161,21 @@ fn rtx(ctx: &Context, [width, height]: [u32; 2]) -> RtxConfig {
 #[test]
 fn deferred_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    check(|size| Deferred::new(&ctx, &DeferredConfig { lights: 60, ..DeferredConfig::new(size) }).unwrap());
+    check(Seen::FromAnywhere, |size| {
+        Deferred::new(&ctx, &DeferredConfig { lights: 60, ..DeferredConfig::new(size) }).unwrap()
+    });
 }
 
 #[test]
 fn hello_triangle_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    check(|size| HelloTriangle::new(&ctx, size).unwrap());
+    check(Seen::Flat, |size| HelloTriangle::new(&ctx, size).unwrap());
 }
 
 #[test]
 fn render_to_cube_map_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    check(|extent| {
+    check(Seen::FromAnywhere, |extent| {
         let config =
             RenderToCubeMapConfig { face_size: 32, ..RenderToCubeMapConfig::new(extent, Faces::SixPasses) };
         RenderToCubeMap::new(&ctx, &config).unwrap()
@@ -121,7 +185,7 @@ fn render_to_cube_map_goes_by_frames() {
 #[test]
 fn omni_shadows_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    check(|size| {
+    check(Seen::FromAnywhere, |size| {
         let config = OmniShadowsConfig { shadow_size: 64, shows_cube: true, ..OmniShadowsConfig::new(size) };
         OmniShadows::new(&ctx, &config).unwrap()
     });
@@ -134,38 +198,40 @@ fn mesh_shaders_goes_by_frames() {
         eprintln!("NOT TESTED, {} has no mesh shaders", ctx.capabilities().device_name);
         return;
     }
-    check(|size| MeshShaders::new(&ctx, size, true).unwrap());
+    check(Seen::FromAnywhere, |size| MeshShaders::new(&ctx, size, true).unwrap());
 }
 
 #[test]
 fn yuv_goes_by_frames() {
     let Some(ctx) = device_with(|desc| desc.yuv = &CONVERSIONS) else { return };
-    check(|extent| Yuv::new(&ctx, &YuvConfig { film: [80, 48], ..YuvConfig::new(extent) }).unwrap());
+    check(Seen::Flat, |extent| {
+        Yuv::new(&ctx, &YuvConfig { film: [80, 48], ..YuvConfig::new(extent) }).unwrap()
+    });
 }
 
 #[test]
 fn triplanar_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    check(|size| Triplanar::new(&ctx, size).unwrap());
+    check(Seen::FromAnywhere, |size| Triplanar::new(&ctx, size).unwrap());
 }
 
 #[test]
 fn rtx_hello_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    check(|size| RtxHello::new(&ctx, &rtx(&ctx, size)).unwrap());
+    check(Seen::FromAnywhere, |size| RtxHello::new(&ctx, &rtx(&ctx, size)).unwrap());
 }
 
 #[test]
 fn rtx_textures_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    check(|size| RtxTextures::new(&ctx, &rtx(&ctx, size)).unwrap());
+    check(Seen::FromAnywhere, |size| RtxTextures::new(&ctx, &rtx(&ctx, size)).unwrap());
 }
 
 #[test]
 fn rtx_pipeline_goes_by_frames() {
     let Some(ctx) = device() else { return };
     let scene = still_life();
-    check(|size| {
+    check(Seen::FromAnywhere, |size| {
         let config = RtxPipelineConfig { depth: 2, ..RtxPipelineConfig::new(rtx(&ctx, size)) };
         RtxPipeline::new(&ctx, &scene, &config).unwrap()
     });
@@ -174,7 +240,7 @@ fn rtx_pipeline_goes_by_frames() {
 #[test]
 fn rtx_ao_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    check(|size| {
+    check(Seen::FromAnywhere, |size| {
         let config = RtxAoConfig { passes: 2, rays: 1, ..RtxAoConfig::new(rtx(&ctx, size)) };
         RtxAo::new(&ctx, &Scene::town(), Some(&Scene::carousel()), &config).unwrap()
     });
@@ -183,8 +249,8 @@ fn rtx_ao_goes_by_frames() {
 #[test]
 fn large_scene_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    let world = World::valley(4_000, 12, &mut Progress::hidden()).unwrap();
-    check(|size| {
+    let world = World::valley(4_000, 12);
+    check(Seen::FromAnywhere, |size| {
         let config = LargeSceneConfig { depth: 1, samples: 2, ..LargeSceneConfig::new(rtx(&ctx, size)) };
         LargeScene::new(&ctx, &world, &config, &mut Progress::hidden()).unwrap()
     });
@@ -194,7 +260,7 @@ fn large_scene_goes_by_frames() {
 fn hybrid_goes_by_frames() {
     let Some(ctx) = device() else { return };
     let scene = still_life();
-    check(|[width, height]| {
+    check(Seen::FromAnywhere, |[width, height]| {
         let (path, method) = (paths(&ctx)[0], Method::choose(None, ctx.capabilities()));
         let few = HybridConfig { max_depth: 1, samples: 2, ..HybridConfig::default() };
         let config = HybridConfig { path, method, width, height, ..few };
@@ -206,7 +272,7 @@ fn hybrid_goes_by_frames() {
 #[test]
 fn hybrid_oit_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    check(|[width, height]| {
+    check(Seen::FromAnywhere, |[width, height]| {
         let config =
             HybridOitConfig { supersampling: 1, ..HybridOitConfig::new(paths(&ctx)[0], width, height) };
         let sample = HybridOit::new(&ctx, &OitScene::default(), &config).unwrap();
@@ -217,7 +283,7 @@ fn hybrid_oit_goes_by_frames() {
 #[test]
 fn reflections_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    check(|[width, height]| {
+    check(Seen::FromAnywhere, |[width, height]| {
         let config =
             ReflectionsConfig { samples: 2, ..ReflectionsConfig::new(paths(&ctx)[0], width, height) };
         Reflections::new(&ctx, &config).unwrap()
@@ -228,7 +294,7 @@ fn reflections_goes_by_frames() {
 fn sponza_goes_by_frames() {
     let Some(ctx) = device() else { return };
     let scene = still_life();
-    check(|size| {
+    check(Seen::FromAnywhere, |size| {
         let config = SponzaConfig { shadow_size: 256, triangles_per_draw: 32, ..SponzaConfig::new(size) };
         Sponza::new(&ctx, scene.clone(), &config).unwrap()
     });
