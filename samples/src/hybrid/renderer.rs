@@ -86,9 +86,21 @@ impl HybridRenderer {
     /// # Errors
     /// [`HybridError`] when that is beyond the device; the extent is then what it was.
     pub fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), HybridError> {
-        let config = HybridConfig { width, height, ..self.config };
+        self.change(&HybridConfig { width, height, ..self.config })
+    }
+
+    /// What is rendered, with all that the configuration left open decided.
+    pub fn config(&self) -> &HybridConfig {
+        &self.config
+    }
+
+    /// Renders by another configuration from now on.
+    ///
+    /// # Errors
+    /// [`HybridError`] when that is beyond the device; the configuration is then what it was.
+    pub fn change(&mut self, config: &HybridConfig) -> Result<(), HybridError> {
         config.check(self.ctx.capabilities())?;
-        self.make_passes(config)
+        self.make_passes(*config)
     }
 
     /// Makes all pipelines anew, of shaders that have changed.
@@ -122,10 +134,14 @@ impl HybridRenderer {
         Ok(self.passes.geometry.choice())
     }
 
-    /// The rasteriser in use, where there is a choice.
-    pub(super) fn raster_to_choose(&self) -> Option<Raster> {
-        let geometry = &self.passes.geometry;
-        geometry.choice().filter(|_| geometry.has_both()).map(|choice| choice.raster)
+    /// The rasteriser in use, where visible triangles are rasterised.
+    pub(super) fn raster(&self) -> Option<Raster> {
+        self.passes.geometry.choice().map(|choice| choice.raster)
+    }
+
+    /// Whether another one could be.
+    pub(super) fn can_choose_raster(&self) -> bool {
+        self.passes.geometry.has_both()
     }
 
     /// Takes a rasteriser, which must be there, from the next frame on.
@@ -199,7 +215,6 @@ impl HybridRenderer {
 
 /// The configuration with what it leaves open decided, and without bounces where nothing mirrors or refracts.
 fn suited(config: &HybridConfig, scene: &Scene, capabilities: &Capabilities) -> HybridConfig {
-    let goes_on = scene.materials.iter().any(|m| m.reflectivity > 0.0 || m.is_refractive());
     let can_queue = config.path == RayPath::Query || capabilities.trace_rays_indirect;
     let suits = match (capabilities.is_cpu, config.knows_triangles()) {
         (true, _) if can_queue => Bounces::Queued,
@@ -207,8 +222,13 @@ fn suited(config: &HybridConfig, scene: &Scene, capabilities: &Capabilities) -> 
         _ => Bounces::Inline,
     };
     HybridConfig {
-        max_depth: if goes_on { config.max_depth } else { 0 },
+        max_depth: if goes_on(scene) { config.max_depth } else { 0 },
         bounces: Some(config.bounces.unwrap_or(suits)),
         ..*config
     }
+}
+
+/// Whether anything in the scene mirrors or refracts.
+pub(super) fn goes_on(scene: &Scene) -> bool {
+    scene.materials.iter().any(|material| material.reflectivity > 0.0 || material.is_refractive())
 }

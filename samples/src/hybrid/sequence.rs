@@ -3,9 +3,11 @@
 use glam::Vec3;
 use lvk::{Context, TextureHandle};
 
-use super::{HybridError, HybridRenderer, Raster};
+use super::renderer::goes_on;
+use super::{HybridConfig, HybridError, HybridRenderer, Raster, switches};
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
+use crate::app::ui::Wanted;
 use crate::scene::{Camera, CameraPath, Scene};
 
 /// Radius of the lamp's circle, as a share of the diagonal of the scene's bounding box.
@@ -18,6 +20,10 @@ pub struct HybridSequence {
     lamp: LampCircle,
     lamp_moves: bool,
     camera: Camera,
+    wanted: Wanted<HybridConfig>,
+    goes_on: bool,
+    /// Which scene it is, as the panel tells.
+    scene: String,
 }
 
 /// A level circle that passes through the lamp's own place at phase 0.
@@ -33,7 +39,33 @@ impl HybridSequence {
     #[must_use]
     pub fn new(renderer: HybridRenderer, scene: &Scene, first: usize, lamp_moves: bool) -> Self {
         let path = CameraPath::tour(scene, first);
-        Self { renderer, camera: path.at(0.0), path, lamp: LampCircle::of(scene), lamp_moves }
+        Self {
+            wanted: Wanted::new(*renderer.config()),
+            goes_on: goes_on(scene),
+            scene: format!("{}: {} triangles", scene.name, scene.triangles.len()),
+            renderer,
+            camera: path.at(0.0),
+            path,
+            lamp: LampCircle::of(scene),
+            lamp_moves,
+        }
+    }
+
+    fn show_rasters(&mut self, ui: &mut egui::Ui, mut raster: Raster) {
+        ui.add_enabled_ui(self.renderer.can_choose_raster(), |ui| {
+            ui.horizontal(|ui| {
+                ui.radio_value(&mut raster, Raster::Compute, "compute");
+                ui.radio_value(&mut raster, Raster::Hardware, "hardware rasteriser");
+            });
+        });
+        if self.renderer.can_choose_raster() {
+            self.renderer.take_raster(raster);
+        }
+    }
+
+    /// What its panel changes, from the next frame on.
+    pub fn wanted(&mut self) -> &mut HybridConfig {
+        &mut self.wanted.config
     }
 }
 
@@ -57,11 +89,17 @@ impl Sample for HybridSequence {
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, HybridError> {
+        if let Some(config) = self.wanted.news(*self.renderer.config()) {
+            let done = self.renderer.change(&config);
+            self.wanted.settle(done, *self.renderer.config());
+        }
         self.renderer.record(frame, &self.camera)
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), HybridError> {
-        self.renderer.resize(extent)
+        self.renderer.resize(extent)?;
+        [self.wanted.config.width, self.wanted.config.height] = extent;
+        Ok(())
     }
 
     fn view(&self) -> Option<Camera> {
@@ -76,13 +114,12 @@ impl Sample for HybridSequence {
         if ui.checkbox(&mut self.lamp_moves, "the lamp goes round").changed() && !self.lamp_moves {
             self.renderer.move_lamp(self.lamp.at(0.0));
         }
-        if let Some(mut raster) = self.renderer.raster_to_choose() {
-            ui.horizontal(|ui| {
-                ui.radio_value(&mut raster, Raster::Compute, "compute");
-                ui.radio_value(&mut raster, Raster::Hardware, "hardware rasteriser");
-            });
-            self.renderer.take_raster(raster);
+        let capabilities = self.renderer.context().capabilities();
+        self.wanted.show(ui, |ui, config| switches::show(ui, config, capabilities, self.goes_on));
+        if let Some(raster) = self.renderer.raster() {
+            self.show_rasters(ui, raster);
         }
+        ui.label(&self.scene);
     }
 
     fn reload(&mut self) -> Result<(), HybridError> {

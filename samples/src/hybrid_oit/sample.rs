@@ -80,9 +80,32 @@ impl HybridOit {
         &self.scene.camera
     }
 
-    /// Shadow rays a sample, to change them: 1 to [`HybridOitConfig::MAX_SHADOW_RAYS`].
-    pub(super) fn shadow_rays(&mut self) -> &mut u32 {
-        &mut self.config.shadow_rays
+    /// What is rendered.
+    #[must_use]
+    pub fn config(&self) -> &HybridOitConfig {
+        &self.config
+    }
+
+    /// Whether the device can render by `config`.
+    pub(super) fn can_be(&self, config: &HybridOitConfig) -> bool {
+        config.check(self.ctx.capabilities(), self.scene.glass.len()).is_ok()
+    }
+
+    /// Renders by another configuration from now on.
+    ///
+    /// # Errors
+    /// [`HybridOitError`] when that is beyond the device; the configuration is then what it was.
+    pub fn change(&mut self, config: &HybridOitConfig) -> Result<(), HybridOitError> {
+        config.check(self.ctx.capabilities(), self.scene.glass.len())?;
+        let other_path = config.path != self.config.path;
+        let shadows = other_path.then(|| ShadowPass::new(&self.ctx, config.path)).transpose()?;
+        let targets = Targets::new(&self.ctx, config.extent(), [config.width, config.height])?;
+        self.buffers.resize(&self.ctx, samples(config.extent()), config.nodes())?;
+        if let Some(shadows) = shadows {
+            self.shadows = shadows;
+        }
+        (self.targets, self.config) = (targets, *config);
+        Ok(())
     }
 
     /// Renders a frame, waits for it and answers the texture that shows it: 8 bits a channel, sRGB.
@@ -122,12 +145,7 @@ impl HybridOit {
     /// # Errors
     /// [`HybridOitError`] when that is beyond the device; the extent is then what it was.
     pub fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), HybridOitError> {
-        let config = HybridOitConfig { width, height, ..self.config };
-        config.check(self.ctx.capabilities(), self.scene.glass.len())?;
-        let targets = Targets::new(&self.ctx, config.extent(), [width, height])?;
-        self.buffers.resize(&self.ctx, samples(config.extent()), config.nodes())?;
-        (self.targets, self.config) = (targets, config);
-        Ok(())
+        self.change(&HybridOitConfig { width, height, ..self.config })
     }
 
     /// Makes all pipelines anew, of shaders that have changed.

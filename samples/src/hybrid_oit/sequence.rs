@@ -1,10 +1,13 @@
 //! The sample as an animation.
 
+use egui::Slider;
 use lvk::{Context, TextureHandle};
 
 use super::{HybridOit, HybridOitConfig, HybridOitError, NodeUse, PERIOD_SECONDS};
 use crate::app::frame::Frame;
 use crate::app::sample::{Moment, Sample};
+use crate::app::ui::Wanted;
+use crate::hybrid::show_path;
 use crate::scene::Camera;
 
 /// The sample in an animation.
@@ -12,17 +15,36 @@ pub struct HybridOitSequence {
     sample: HybridOit,
     /// What frame 0 shows, in seconds.
     start: f64,
+    /// How far the animation is from there, in seconds.
+    gone: f64,
     /// Where the scene says that it is seen from.
     camera: Camera,
     /// Of the frame that asked for most.
     nodes: NodeUse,
+    wanted: Wanted<HybridOitConfig>,
 }
 
 impl HybridOitSequence {
     /// An animation of `sample` whose frame 0 shows what is there after `start` seconds.
     #[must_use]
     pub fn new(sample: HybridOit, start: f64) -> Self {
-        Self { camera: *sample.camera(), sample, start, nodes: NodeUse::default() }
+        Self {
+            camera: *sample.camera(),
+            wanted: Wanted::new(*sample.config()),
+            sample,
+            start: if start.is_finite() { start.rem_euclid(PERIOD_SECONDS) } else { 0.0 },
+            gone: 0.0,
+            nodes: NodeUse::default(),
+        }
+    }
+
+    /// What its panel changes, from the next frame on.
+    pub fn wanted(&mut self) -> &mut HybridOitConfig {
+        &mut self.wanted.config
+    }
+
+    fn pose(&mut self) {
+        self.sample.update(self.start + self.gone);
     }
 }
 
@@ -34,12 +56,17 @@ impl Sample for HybridOitSequence {
     }
 
     fn update(&mut self, moment: Moment) -> Result<(), HybridOitError> {
-        self.sample.update(self.start + PERIOD_SECONDS * f64::from(moment.phase()));
+        self.gone = PERIOD_SECONDS * f64::from(moment.phase());
+        self.pose();
         self.sample.look(&self.camera);
         Ok(())
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, HybridOitError> {
+        if let Some(config) = self.wanted.news(*self.sample.config()) {
+            let done = self.sample.change(&config);
+            self.wanted.settle(done, *self.sample.config());
+        }
         self.sample.record(frame)
     }
 
@@ -50,7 +77,9 @@ impl Sample for HybridOitSequence {
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), HybridOitError> {
-        self.sample.resize(extent)
+        self.sample.resize(extent)?;
+        [self.wanted.config.width, self.wanted.config.height] = extent;
+        Ok(())
     }
 
     fn view(&self) -> Option<Camera> {
@@ -62,8 +91,12 @@ impl Sample for HybridOitSequence {
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
-        let most = HybridOitConfig::MAX_SHADOW_RAYS;
-        ui.add(egui::Slider::new(self.sample.shadow_rays(), 1..=most).text("shadow rays a sample"));
+        let can_be = |config: &HybridOitConfig| self.sample.can_be(config);
+        self.wanted.show(ui, |ui, config| show_switches(ui, config, can_be));
+        let start = Slider::new(&mut self.start, 0.0..=PERIOD_SECONDS);
+        if ui.add(start.text("seconds ahead").fixed_decimals(1)).changed() {
+            self.pose();
+        }
     }
 
     fn reload(&mut self) -> Result<(), HybridOitError> {
@@ -73,4 +106,19 @@ impl Sample for HybridOitSequence {
     fn remark(&self) -> Option<String> {
         Some(format!("glass     {}", self.nodes))
     }
+}
+
+fn show_switches(ui: &mut egui::Ui, config: &mut HybridOitConfig, can_be: impl Fn(&HybridOitConfig) -> bool) {
+    let before = *config;
+    show_path(ui, &mut config.path, |path| can_be(&HybridOitConfig { path, ..before }));
+    let most = HybridOitConfig::MAX_SUPERSAMPLING;
+    ui.add(Slider::new(&mut config.supersampling, 1..=most).text("samples a side of a pixel"));
+    let most = HybridOitConfig::MAX_SHADOW_RAYS;
+    ui.add(Slider::new(&mut config.shadow_rays, 1..=most).text("shadow rays a sample"));
+    let mut is_bounded = config.node_capacity.is_some();
+    ui.checkbox(&mut is_bounded, "so many nodes for glass:");
+    let (mut nodes, usual) = (config.nodes(), HybridOitConfig { node_capacity: None, ..*config }.nodes());
+    let slider = Slider::new(&mut nodes, 0..=usual.max(config.nodes())).logarithmic(true).text("nodes");
+    ui.add_enabled(is_bounded, slider);
+    config.node_capacity = is_bounded.then_some(nodes);
 }

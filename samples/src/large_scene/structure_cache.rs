@@ -78,11 +78,10 @@ impl StructureCache {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::progress::Progress;
 
     #[test]
     fn other_triangles_devices_and_flags_have_other_keys() {
-        let world = World::valley(2_000, 3, &mut Progress::hidden()).unwrap();
+        let world = World::valley(2_000, 3);
         let (first, second) = (&world.pieces[0], &world.pieces[1]);
         let caps = Capabilities::default();
         let phone = Capabilities { profile: Some("mali-g715".to_owned()), ..Capabilities::default() };
@@ -99,7 +98,7 @@ mod tests {
         }
         assert_eq!(
             all[0],
-            StructureKey::of(&World::valley(2_000, 9, &mut Progress::hidden()).unwrap(), first, &caps, flags),
+            StructureKey::of(&World::valley(2_000, 9), first, &caps, flags),
             "the same ground"
         );
     }

@@ -36,6 +36,7 @@ mod renderer;
 mod run;
 mod serpent;
 mod sky_light;
+mod switches;
 mod tables;
 mod targets;
 mod top_level;

@@ -148,10 +148,6 @@ impl MovingPasses {
         indices: BufferHandle,
         update: SkinUpdate,
     ) -> lvk::Result<Self> {
-        let skin_mode = match update {
-            SkinUpdate::Refit => BuildMode::Refit,
-            SkinUpdate::Rebuild => BuildMode::Rebuild,
-        };
         let serpent = ctx.create_blas(&BlasDesc {
             geometries: &moving.skin_geometries(indices),
             flags: BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE,
@@ -164,7 +160,13 @@ impl MovingPasses {
             order: PrimitiveOrder::Given,
             debug_name: "leaves",
         })?;
-        Ok(Self { skin: compute(ctx, SKIN)?, turn: compute(ctx, LEAVES)?, serpent, leaves, skin_mode })
+        let (skin, turn) = (compute(ctx, SKIN)?, compute(ctx, LEAVES)?);
+        Ok(Self { skin, turn, serpent, leaves, skin_mode: mode(update) })
+    }
+
+    /// Has the serpent's structure follow its skin so from now on.
+    pub(super) fn follow(&mut self, update: SkinUpdate) {
+        self.skin_mode = mode(update);
     }
 
     /// Compiles the pipelines again.
@@ -203,6 +205,13 @@ impl MovingPasses {
         cmd.pop_label();
         cmd.build_blas(&[*self.serpent], self.skin_mode)?;
         cmd.build_blas(&[*self.leaves], BuildMode::Rebuild)
+    }
+}
+
+fn mode(update: SkinUpdate) -> BuildMode {
+    match update {
+        SkinUpdate::Refit => BuildMode::Refit,
+        SkinUpdate::Rebuild => BuildMode::Rebuild,
     }
 }
 

@@ -14,6 +14,7 @@ use super::paint::Picture;
 use super::raster_passes::{Drawn, RasterPasses};
 use super::ray_passes::{RayPasses, Surfaces};
 use super::sky_light::harmonics;
+use super::switches;
 use super::tables::{Arena, Tables};
 use super::targets::Targets;
 use super::top_level::{InstanceCount, TopLevel};
@@ -23,6 +24,7 @@ use crate::app::frame::Frame;
 use crate::app::pass_times::PassTimes;
 use crate::app::sample::{Moment, Sample};
 use crate::app::scene_textures;
+use crate::app::ui::Wanted;
 use crate::scene::{Camera, GpuCamera};
 
 /// Names of the build of the top-level structure and of the ray passes.
@@ -50,6 +52,7 @@ pub struct Reflections {
     frame_address: u64,
     camera: Camera,
     phase: f32,
+    wanted: Wanted<ReflectionsConfig>,
     _held: (Vec<Holder<TextureHandle>>, [Holder<SamplerHandle>; 2]),
 }
 
@@ -85,7 +88,7 @@ impl Reflections {
         };
         targets.name_in(&mut indices);
         textures.push(sky);
-        let frame_buffer = buffer(ctx, "frame constants", FRAME_BYTES * u64::from(config.samples))?;
+        let frame_buffer = frame_buffer(ctx, config.samples)?;
         Ok(Self {
             constants: world_constants(&world, &tables),
             raster: RasterPasses::new(ctx)?,
@@ -103,6 +106,7 @@ impl Reflections {
             frame_buffer,
             camera: world::camera(0.0),
             phase: 0.0,
+            wanted: Wanted::new(*config),
             _held: (textures, samplers),
         })
     }
@@ -142,6 +146,37 @@ impl Reflections {
     /// What is rendered.
     pub fn config(&self) -> &ReflectionsConfig {
         &self.config
+    }
+
+    /// What its panel changes, from the next frame on.
+    pub fn wanted(&mut self) -> &mut ReflectionsConfig {
+        &mut self.wanted.config
+    }
+
+    /// Renders by another configuration from now on; by the old one where this fails.
+    fn change(&mut self, config: ReflectionsConfig) -> Result<(), ReflectionsError> {
+        config.check(self.ctx.capabilities())?;
+        let (before, extent) = (self.config, [config.width, config.height]);
+        let changed = |is_new: bool| is_new.then_some(&self.ctx);
+        let rays =
+            changed(config.path != before.path).map(|ctx| RayPasses::new(ctx, config.path)).transpose()?;
+        let frames = changed(config.samples != before.samples).map(|ctx| frame_buffer(ctx, config.samples));
+        let frames = frames.transpose()?;
+        let targets = changed(extent != [before.width, before.height]).map(|ctx| Targets::new(ctx, extent));
+        if let Some(targets) = targets.transpose()? {
+            self.targets = targets;
+            self.targets.name_in(&mut self.indices);
+        }
+        if let Some(frames) = frames {
+            self.frame_address = self.ctx.buffer_address(*frames)?;
+            self.frame_buffer = frames;
+        }
+        if let Some(rays) = rays {
+            self.rays = rays;
+        }
+        self.moving_passes.follow(config.skin_update);
+        self.config = config;
+        Ok(())
     }
 
     fn upload_constants(&self) -> lvk::Result<()> {
@@ -205,6 +240,10 @@ impl Sample for Reflections {
 
     /// A step for each sample.
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, ReflectionsError> {
+        if let Some(config) = self.wanted.news(self.config) {
+            let done = self.change(config);
+            self.wanted.settle(done, self.config);
+        }
         self.upload_constants()?;
         for sample in 0..self.config.samples {
             if sample > 0 {
@@ -220,11 +259,8 @@ impl Sample for Reflections {
     }
 
     fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), ReflectionsError> {
-        let config = ReflectionsConfig { width, height, ..self.config };
-        config.check(self.ctx.capabilities())?;
-        self.targets = Targets::new(&self.ctx, [width, height])?;
-        self.targets.name_in(&mut self.indices);
-        self.config = config;
+        self.change(ReflectionsConfig { width, height, ..self.config })?;
+        (self.wanted.config.width, self.wanted.config.height) = (width, height);
         Ok(())
     }
 
@@ -237,7 +273,10 @@ impl Sample for Reflections {
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
-        ui.add(egui::Slider::new(&mut self.config.min_angle, 0.0..=0.2).text("least angle"));
+        let capabilities = self.ctx.capabilities();
+        self.wanted.show(ui, |ui, config| switches::show(ui, config, capabilities));
+        // Nothing is made anew for this one.
+        self.config.min_angle = self.wanted.config.min_angle;
         let InstanceCount { kept, total } = self.instance_count();
         ui.label(format!("rays meet {kept} of {total} instances"));
     }
@@ -249,6 +288,11 @@ impl Sample for Reflections {
         (self.raster, self.rays, self.images) = (raster, rays, images);
         Ok(())
     }
+}
+
+/// Constants of each sample.
+fn frame_buffer(ctx: &Context, samples: u32) -> lvk::Result<Holder<BufferHandle>> {
+    buffer(ctx, "frame constants", FRAME_BYTES * u64::from(samples))
 }
 
 fn world_constants(world: &World, tables: &Tables) -> WorldConstants {

@@ -93,6 +93,7 @@ fn check<S: Sample>(seen: Seen, make: impl Fn([u32; 2]) -> S) {
     sample.resize(SIZE).map_err(Into::into).unwrap();
     check_reload(&mut sample, &expected);
     check_view(&mut sample, seen, &expected[0]);
+    check_panel(&mut sample, &expected[0]);
 }
 
 /// What `sample` shows at the first of the moments.
@@ -152,6 +153,16 @@ fn check_view<S: Sample>(sample: &mut S, seen: Seen, expected: &[u8]) {
     assert!(headless::picture(sample).map_err(Into::into).unwrap() != expected, "another view");
     sample.set_view(&view);
     assert!(headless::picture(sample).map_err(Into::into).unwrap() == expected, "the first view again");
+}
+
+fn check_panel<S: Sample>(sample: &mut S, expected: &[u8]) {
+    let ui = egui::Context::default();
+    for _ in 0..2 {
+        let _ = ui.run(egui::RawInput::default(), |ui| {
+            egui::Window::new("panel").show(ui, |ui| sample.panel(ui));
+        });
+    }
+    assert!(first(sample) == expected, "a panel changes what nobody has touched");
 }
 
 fn rtx(ctx: &Context, [width, height]: [u32; 2]) -> RtxConfig {

@@ -10,6 +10,7 @@ mod hybrid_visibility;
 mod large_scene;
 mod mesh_shaders;
 mod omni_shadows;
+mod panels;
 mod paper;
 mod reflections;
 mod render_to_cube_map;
