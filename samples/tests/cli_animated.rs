@@ -405,6 +405,7 @@ fn structures_are_kept_from_one_start_to_the_next() {
         let outcome = Outcome::of(command);
         outcome.assert_success();
         assert_names(&outcome.out, &["instances 7", expected]);
+        assert_names(&outcome.err, &[" s] uploading the scene", " s] loading acceleration structures"]);
         outcome.err
     };
     start("0 from files, 3 built, 0 built anew");

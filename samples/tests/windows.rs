@@ -295,8 +295,8 @@ impl Session {
         data.chunks_exact(4).map(|pixel| [pixel[2], pixel[1], pixel[0]]).collect()
     }
 
-    /// Closes the window by its key.
-    fn close(mut self) {
+    /// Closes the window by its key. Answers what was said since somebody last listened.
+    fn close(mut self) -> Vec<String> {
         self.press(ESCAPE);
         let deadline = Instant::now() + PATIENCE;
         while self.program.try_wait().unwrap().is_none() {
@@ -305,12 +305,11 @@ impl Session {
         }
         let mut out = String::new();
         std::io::Read::read_to_string(&mut self.program.stdout.take().unwrap(), &mut out).unwrap();
-        assert!(
-            out.contains("validation messages: 0"),
-            "{out}{:?}",
-            self.said.try_iter().collect::<Vec<_>>()
-        );
-        assert_eq!(self.program.wait().unwrap().code(), Some(0), "{out}");
+        // The program has ended, and so do its lines.
+        let said: Vec<_> = self.said.iter().collect();
+        assert!(out.contains("validation messages: 0"), "{out}{said:?}");
+        assert_eq!(self.program.wait().unwrap().code(), Some(0), "{out}{said:?}");
+        said
     }
 }
 
@@ -361,6 +360,90 @@ fn an_animation_by_frames_stands_too() {
     session.press(SPACE);
     assert!(session.shoot(&shot(5)) != first, "it still stands");
     session.close();
+}
+
+/// How many frames were shown while a sample was loaded, once it is there.
+fn frames_while_loading(session: &mut Session) -> u32 {
+    let mut frames = None;
+    let deadline = Instant::now() + PATIENCE;
+    while frames.is_none() {
+        let line = session.said.recv_timeout(deadline.saturating_duration_since(Instant::now())).unwrap();
+        let rest = line.split_once("loaded in").and_then(|(_, rest)| rest.split_once("with "));
+        frames = rest.and_then(|(_, rest)| rest.split_once(" frames")?.0.parse().ok());
+    }
+    frames.unwrap()
+}
+
+#[test]
+fn a_window_shows_how_far_loading_is_and_answers_keys_meanwhile() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = env!("CARGO_BIN_EXE_large_scene");
+    let args = ["--triangles", "400000", "--samples", "1", "--depth", "0"];
+    let Some(mut session) = Session::new(program, &args, folder.path()) else { return };
+    let shot = |number: u32| folder.path().join(format!("large_scene_window_{number:04}.png"));
+    session.hear("making the valley");
+    // The progress fades in.
+    thread::sleep(Duration::from_millis(500));
+    let loading = session.shoot(&shot(1));
+    let background = loading.get_pixel(2, 2);
+    let share = |is: &dyn Fn(&image::Rgba<u8>) -> bool| {
+        loading.pixels().filter(|pixel| is(pixel)).count() as f64 / f64::from(SIZE[0] * SIZE[1])
+    };
+    let (bare, bright) = (share(&|pixel| pixel == background), share(&|pixel| pixel[1] > 120));
+    assert!((0.2..0.95).contains(&bare), "{bare} of the window is bare");
+    assert!(bright > 1e-3, "{bright} of the window is bright: no progress is to be read");
+    session.hear("building acceleration structures");
+    let frames = frames_while_loading(&mut session);
+    assert!(frames > 5, "{frames} frames");
+    session.press(F1);
+    let picture = session.shoot(&shot(2));
+    assert!(differing(&loading, &picture, 0) > 0.9, "there is no picture yet");
+    session.close();
+}
+
+#[test]
+fn a_window_closes_while_it_loads_and_leaves_nothing_behind() {
+    let folder = tempfile::tempdir().unwrap();
+    let program = env!("CARGO_BIN_EXE_large_scene");
+    let stages = ["making the valley", "uploading the scene", "building acceleration structures"];
+    for (number, stage) in stages.into_iter().enumerate() {
+        let Some(mut session) = Session::new(program, &["--triangles", "1000000"], folder.path()) else {
+            return;
+        };
+        session.hear(stage);
+        let said = session.close();
+        // The first stage takes so long anywhere that the others are not come to.
+        let later = if number == 0 { &stages[1..] } else { &[] };
+        let wrong = [&["warning", "error", "alive"], later].concat();
+        let is_wrong = |line: &&String| wrong.iter().any(|word| line.contains(word));
+        assert_eq!(said.iter().find(is_wrong), None, "{stage}");
+    }
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
+
+#[test]
+fn what_cannot_be_loaded_is_said_as_without_a_window() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("bad.obj"), "v 0 0 0\nf 1 2 3\n").unwrap();
+    for args in [
+        &["--scene", "nowhere.obj"][..],
+        &["--scene", "bad.obj"],
+        &["--layout", "combined", "--triangles", "400000", "--copies", "2000"],
+    ] {
+        // One for each, as a server begins anew when the last program has gone.
+        let Some(desktop) = desktop() else { return };
+        let run = |window: &[&str]| {
+            let mut command =
+                sample(env!("CARGO_BIN_EXE_large_scene"), &[window, args].concat(), folder.path());
+            desktop.show(&mut command);
+            let output = command.output().unwrap();
+            let (_, err) = texts(&output);
+            let error = err.lines().find(|line| line.starts_with("error: ")).map(str::to_owned);
+            (output.status.code(), error.unwrap_or(err))
+        };
+        let (status, error) = run(&["--window"]);
+        assert_eq!((status, &error), (Some(2), &run(&[]).1), "{args:?}");
+    }
 }
 
 /// Sizes without a pattern, the same in each run: up to 400 pixels, and each eighth one up to 4.

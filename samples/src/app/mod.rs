@@ -14,6 +14,7 @@ pub mod headless;
 pub mod hot_reload;
 pub mod interrupt;
 pub(crate) mod library_warnings;
+pub mod loading;
 pub mod metrics;
 pub mod pass_times;
 pub mod play;

@@ -7,19 +7,26 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use super::loading::{Status, Stopped};
+
 /// How long work may take before anything is shown.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Time between two looks at the clock, and two steps of the spinner.
 const TICK: Duration = Duration::from_millis(100);
+/// Time between two lines about one stage.
+const PAUSE: Duration = Duration::from_secs(5);
 
 /// A progress bar on standard error, which appears when the work has taken more than two seconds, even amid a stage
-/// that says nothing, is gone when it ends, and is never drawn where standard error is no terminal.
+/// that says nothing, is gone when it ends, and is never drawn where standard error is no terminal. There it may be lines
+/// instead, and a window may show it, too.
 #[derive(Debug)]
 pub struct Progress {
     timing: Timing,
     is_seen: bool,
     target: fn() -> ProgressDrawTarget,
     shown: Option<Shown>,
+    lines: Option<Lines>,
+    status: Option<Status>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -43,14 +50,42 @@ impl Progress {
         Self { is_seen: std::io::stderr().is_terminal(), ..Self::hidden() }
     }
 
+    /// As [`visible`](Self::visible), but where standard error is no terminal each stage is a line there, with more lines for
+    /// one that takes long.
+    pub fn spoken() -> Self {
+        let visible = Self::visible();
+        Self { lines: (!visible.is_seen).then(Lines::default), ..visible }
+    }
+
     /// Progress that nobody sees.
     pub fn hidden() -> Self {
         let timing = Timing { start: Instant::now(), patience: PATIENCE, tick: TICK };
-        Self { timing, is_seen: false, target: ProgressDrawTarget::stderr, shown: None }
+        let target = ProgressDrawTarget::stderr;
+        Self { timing, is_seen: false, target, shown: None, lines: None, status: None }
+    }
+
+    /// Tells `status` of everything, too, and ends the work when that is asked to stop.
+    #[must_use]
+    pub fn told_to(self, status: &Status) -> Self {
+        Self { status: Some(status.clone()), ..self }
+    }
+
+    /// Fails when the work is wanted no longer; to be asked from time to time.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn go_on(&self) -> Result<(), Stopped> {
+        if self.status.as_ref().is_some_and(Status::is_stopped) { Err(Stopped) } else { Ok(()) }
     }
 
     /// Starts the next stage, called `name`, of `total` steps; 0 steps for a stage that cannot be counted.
     pub fn stage(&mut self, name: &str, total: u64) {
+        if let Some(status) = &self.status {
+            status.begin(name, total);
+        }
+        if let Some(line) = self.lines.as_mut().map(|lines| lines.begin(name, total)) {
+            self.say(&line);
+        }
         if !self.is_seen {
             return;
         }
@@ -64,6 +99,12 @@ impl Progress {
 
     /// Says how many steps of the stage are done.
     pub fn set(&mut self, done: u64) {
+        if let Some(status) = &self.status {
+            status.set(done);
+        }
+        if let Some(line) = self.lines.as_mut().and_then(|lines| lines.set(done, Instant::now())) {
+            self.say(&line);
+        }
         if let Some(Shown { bar, .. }) = &self.shown {
             bar.set_position(done);
         }
@@ -73,6 +114,42 @@ impl Progress {
     /// meanwhile.
     pub fn pause(&mut self) {
         self.shown = None;
+    }
+
+    /// Prints a line, with the seconds since the beginning.
+    fn say(&self, line: &str) {
+        eprintln!("[{:6.1} s] {line}", self.timing.start.elapsed().as_secs_f32());
+    }
+}
+
+/// Progress as lines.
+#[derive(Debug)]
+struct Lines {
+    name: String,
+    total: u64,
+    latest: Instant,
+}
+
+impl Default for Lines {
+    fn default() -> Self {
+        Self { name: String::new(), total: 0, latest: Instant::now() }
+    }
+}
+
+impl Lines {
+    /// The line of a stage that begins.
+    fn begin(&mut self, name: &str, total: u64) -> String {
+        *self = Self { name: name.to_owned(), total, latest: Instant::now() };
+        name.to_owned()
+    }
+
+    /// A line about a stage that goes on, if the last one is a while ago.
+    fn set(&mut self, done: u64, now: Instant) -> Option<String> {
+        if self.total == 0 || now.duration_since(self.latest) < PAUSE {
+            return None;
+        }
+        self.latest = now;
+        Some(format!("{}: {} %", self.name, 100 * done.min(self.total) / self.total))
     }
 }
 
@@ -152,7 +229,7 @@ mod tests {
     fn progress(patience: Duration) -> Progress {
         let timing = Timing { start: Instant::now(), patience, tick: Duration::from_millis(1) };
         let target = || ProgressDrawTarget::term_like(Box::new(Terminal));
-        Progress { timing, is_seen: true, target, shown: None }
+        Progress { timing, is_seen: true, target, ..Progress::hidden() }
     }
 
     fn bar(progress: &Progress) -> ProgressBar {
@@ -192,6 +269,32 @@ mod tests {
             progress.pause();
             assert!(bar.is_finished());
         }
+    }
+
+    #[test]
+    fn stages_are_lines_and_long_ones_several() {
+        let mut lines = Lines::default();
+        assert_eq!(lines.begin("reading", 40), "reading");
+        let begun = Instant::now();
+        let at = |seconds| begun + Duration::from_secs(seconds);
+        assert_eq!(lines.set(10, at(1)), None);
+        assert_eq!(lines.set(20, at(6)).as_deref(), Some("reading: 50 %"));
+        assert_eq!(lines.set(30, at(7)), None, "said a second ago");
+        assert_eq!(lines.set(50, at(13)).as_deref(), Some("reading: 100 %"));
+        lines.begin("shaders", 0);
+        assert_eq!(lines.set(1, at(99)), None, "nothing is counted");
+    }
+
+    #[test]
+    fn whoever_is_told_can_stop_the_work() {
+        let status = Status::default();
+        let mut progress = Progress::hidden().told_to(&status);
+        progress.stage("a", 10);
+        progress.set(5);
+        assert_eq!(progress.go_on(), Ok(()));
+        status.stop();
+        assert_eq!(progress.go_on(), Err(Stopped));
+        assert_eq!(Progress::hidden().go_on(), Ok(()), "that nobody can stop");
     }
 
     #[test]

@@ -41,7 +41,7 @@ pub struct Opening<'a> {
 pub struct Opened<S> {
     /// The sample.
     pub sample: S,
-    /// What is said about it, in a line or several.
+    /// What is said about it, in a line or several; nothing where it says that itself.
     pub headline: String,
 }
 
@@ -61,6 +61,12 @@ impl<'a> Opening<'a> {
         device::open(self.name, self.args, &driver, self.sink, needs, self.window.clone())
     }
 
+    /// Whether the sample is for a window, where it may be [loading](super::loading::Loading) while others are shown.
+    #[must_use]
+    pub fn is_for_window(&self) -> bool {
+        self.window.is_some()
+    }
+
     /// The folder of built acceleration structures, for samples that keep them, unless the user wants nothing kept. It need
     /// not exist.
     #[must_use]
@@ -74,9 +80,14 @@ impl<'a> Opening<'a> {
         if !warnings.is_empty() {
             self.progress.pause();
         }
-        for warning in warnings {
-            eprintln!("warning: {warning}");
-        }
+        warn(warnings);
+    }
+}
+
+/// Prints warnings to standard error.
+pub(crate) fn warn(warnings: &[String]) {
+    for warning in warnings {
+        eprintln!("warning: {warning}");
     }
 }
 

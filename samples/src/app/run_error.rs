@@ -23,6 +23,9 @@ pub enum RunError {
         /// Each device with what it lacks.
         reasons: String,
     },
+    /// Nobody waits for the sample any more.
+    #[error(transparent)]
+    Stopped(#[from] super::loading::Stopped),
     /// The scene could not be loaded.
     #[error(transparent)]
     Scene(#[from] SceneError),
@@ -109,7 +112,7 @@ impl RunError {
             Self::Input(_) | Self::Scene(_) | Self::Png(_) | Self::Driver(DriverError::Variable { .. }) => 2,
             Self::NoNumber { .. } | Self::NoSequence { .. } | Self::NothingToResume => 2,
             Self::SequenceInWindow | Self::NoShaders { .. } => 2,
-            Self::Interrupted { .. } => interrupt::STATUS,
+            Self::Interrupted { .. } | Self::Stopped(_) => interrupt::STATUS,
             Self::Device(_) | Self::NoRayQueries { .. } | Self::NoWindow { .. } => 1,
             Self::NoScreenshot { .. } => 1,
             Self::Driver(_) | Self::Validation(_) => 1,

@@ -48,7 +48,8 @@
 //!
 //! For a window it also says how to [`resize`](Sample::resize), to be looked at from elsewhere
 //! ([`view`](Sample::view), [`set_view`](Sample::set_view)), which switches it has ([`panel`](Sample::panel)), and to compile its
-//! shaders again ([`reload`](Sample::reload)).
+//! shaders again ([`reload`](Sample::reload)). One that takes long to make is [`Loading`](super::loading::Loading) there: a thread
+//! makes it while the window shows how far that is.
 
 use lvk::{Context, TextureHandle};
 
@@ -158,6 +159,18 @@ pub trait Sample {
 
     /// Lays out the sample's own switches in the panel of its window.
     fn panel(&mut self, _ui: &mut egui::Ui) {}
+
+    /// Lays out what stands over the picture and beside the panel, seen or not.
+    fn overlay(&mut self, _ui: &egui::Context) {}
+
+    /// Whether it is still being loaded by another thread, asked before every frame of a window: then its frames are no
+    /// pictures of it yet, and are not counted.
+    ///
+    /// # Errors
+    /// What kept it from being loaded.
+    fn is_loading(&mut self) -> Result<bool, Self::Error> {
+        Ok(false)
+    }
 
     /// Goes on to the next of what the sample can show, from the next frame on: what the key N of its window asks.
     fn next(&mut self) {}

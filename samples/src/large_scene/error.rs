@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::app::loading::Stopped;
 use crate::app::run_error::RunError;
 use crate::hybrid::HybridError;
 use crate::rtx::RtxError;
@@ -13,6 +14,9 @@ pub enum LargeSceneError {
     /// The picture or the path is not possible, or `lvk` reported an error.
     #[error(transparent)]
     Rtx(#[from] RtxError),
+    /// Nobody waits for it any more.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
     /// A street needs something that stands in it.
     #[error("there is no scene to show; name an OBJ file with --scene")]
     NoScenes,
@@ -54,6 +58,7 @@ impl From<LargeSceneError> for RunError {
     fn from(error: LargeSceneError) -> Self {
         match error {
             LargeSceneError::Rtx(error) => error.into(),
+            LargeSceneError::Stopped(stopped) => stopped.into(),
             _ => Self::input(error),
         }
     }

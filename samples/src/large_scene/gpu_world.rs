@@ -39,9 +39,8 @@ impl GpuWorld {
         progress: &mut Progress,
     ) -> Result<Self, LargeSceneError> {
         check_promises(&world.scene)?;
+        let textures = textures(ctx, world, progress)?;
         progress.stage("uploading the scene", 0);
-        let pictures = world.scene.textures.iter().map(|texture| scene_textures::picture(ctx, texture));
-        let textures: Vec<_> = pictures.collect::<Result<_, _>>()?;
         let arrays = SceneArrays::new(ctx, &world.scene, &textures)?;
         let rows: Vec<_> = world.instances.iter().map(|instance| transform_rows(&instance.place)).collect();
         let firsts: Vec<_> = world.pieces.iter().map(|piece| piece.triangles.start).collect();
@@ -73,6 +72,22 @@ impl GpuWorld {
     pub(super) fn tables(&self, ctx: &Context) -> lvk::Result<[u64; 2]> {
         Ok([ctx.buffer_address(*self.places)?, ctx.buffer_address(*self.firsts)?])
     }
+}
+
+fn textures(
+    ctx: &Context,
+    world: &World,
+    progress: &mut Progress,
+) -> Result<Vec<Holder<TextureHandle>>, LargeSceneError> {
+    let textures = &world.scene.textures;
+    progress.stage("uploading textures", textures.len() as u64);
+    let mut made = Vec::with_capacity(textures.len());
+    for texture in textures {
+        progress.go_on()?;
+        made.push(scene_textures::picture(ctx, texture)?);
+        progress.set(made.len() as u64);
+    }
+    Ok(made)
 }
 
 fn figures(ctx: &Context, world: &World, structures: &Structures) -> lvk::Result<Figures> {

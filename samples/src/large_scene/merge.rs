@@ -139,6 +139,7 @@ fn bake_instance(to: &mut Scene, world: &World, instance: &Instance) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::progress::Progress;
 
     /// A street of two kinds of courtyards, one of them without glass.
     fn world() -> World {
@@ -181,7 +182,9 @@ mod tests {
 
     #[test]
     fn merged_scenes_keep_the_promises_of_scenes() {
-        for world in [world(), world().combined().unwrap(), World::valley(2_000, 9)] {
+        for world in
+            [world(), world().combined().unwrap(), World::valley(2_000, 9, &mut Progress::hidden()).unwrap()]
+        {
             crate::hybrid::check_promises(&world.scene).unwrap();
             let glass = |triangle: usize| {
                 world.scene.materials[world.scene.triangle_materials[triangle] as usize].is_refractive()

@@ -9,6 +9,7 @@ mod config;
 mod error;
 mod figures;
 mod gpu_world;
+mod load;
 mod merge;
 mod pipelines;
 mod renderer;

@@ -3,21 +3,21 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use super::args::Layout;
-use super::{LargeScene, LargeSceneArgs, LargeSceneConfig, LargeSceneError, World};
+use super::load::Load;
+use super::{LargeScene, LargeSceneArgs, LargeSceneError};
 use crate::app::device::DeviceNeeds;
+use crate::app::loading::Loading;
 use crate::app::progress::Progress;
 use crate::app::run::{self, Opened, Opening};
 use crate::app::run_error::RunError;
 use crate::app::{png, say, scene_list};
-use crate::hybrid::{fit_textures, textures_needed};
-use crate::rtx::{RtxConfig, headline};
-use crate::scene::{ObjOptions, Scene};
 
 /// What the sample and its pictures are called.
 const NAME: &str = "large_scene";
+/// Room for textures in a window, whose device is opened before anything is known of the scene.
+const ROOM: u32 = 1 << 16;
 
-/// Does what the command line says. Prints to standard output, errors in one line to standard error; the status
+/// Does what the command line says. Prints to standard output, progress and errors in lines to standard error; the status
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &LargeSceneArgs) -> ExitCode {
@@ -31,55 +31,37 @@ pub fn run(args: &LargeSceneArgs) -> ExitCode {
     }
 }
 
-fn open(args: &LargeSceneArgs, opening: &mut Opening<'_>) -> Result<Opened<LargeScene>, RunError> {
-    let mut world = world(args, opening)?;
-    opening.warn(&world.scene().warnings.clone());
-    let tracing = DeviceNeeds::tracing(args.tracing.rt);
-    let context = opening.device(&DeviceNeeds { textures: textures_needed(world.scene()), ..tracing })?;
-    let capabilities = context.capabilities();
-    opening.warn(&fit_textures(world.scene_mut(), &capabilities.limits)?);
-    let config = LargeSceneConfig {
-        depth: args.depth,
-        samples: args.samples,
-        show: args.show,
-        compact: !args.no_compaction,
-        cache: opening.structure_cache(),
-        ..LargeSceneConfig::new(RtxConfig::of(args.tracing.rt, args.run.extent(), capabilities)?)
-    };
-    let sample = LargeScene::new(&context, &world, &config, &mut opening.progress)?;
-    let sample = sample.from_camera(&world, args.camera.place());
+fn open(args: &LargeSceneArgs, opening: &mut Opening<'_>) -> Result<Opened<Loading<LargeScene>>, RunError> {
+    let load = Load { args: args.clone(), files: files(args)?, cache: opening.structure_cache() };
+    if opening.is_for_window() { in_background(load, opening) } else { at_once(&load, opening) }
+}
+
+/// A window is there before the world: a thread loads that while frames show how far it is.
+fn in_background(load: Load, opening: &mut Opening<'_>) -> Result<Opened<Loading<LargeScene>>, RunError> {
+    let tracing = DeviceNeeds::tracing(load.args.tracing.rt);
+    let context = opening.device(&DeviceNeeds { textures: ROOM, ..tracing })?;
     opening.progress.pause();
-    let told = format!("{}, {} textures", world.name(), world.scene().textures.len());
-    let headline = headline(capabilities, config.rtx.path, "a compute shader", &told);
-    let headline = format!("{headline}\n{}", sample.figures());
-    Ok(Opened { sample, headline })
+    let ctx = context.clone();
+    let sample = Loading::start(&context, move |progress| {
+        let world = load.world(progress)?;
+        load.sample(&ctx, world, ROOM, progress)
+    })?;
+    Ok(Opened { sample, headline: String::new() })
 }
 
-/// The world that the command line asks for.
-fn world(args: &LargeSceneArgs, opening: &mut Opening<'_>) -> Result<World, RunError> {
-    let files = files(args)?;
-    let out = args.run.out_or(NAME);
-    files.iter().try_for_each(|file| png::check_not_input(&out, "--scene", file))?;
-    let world = match &files[..] {
-        [] => {
-            opening.progress.stage("making the valley", 0);
-            World::valley(args.triangles, args.trees())
-        }
-        files => World::street(load(files, &mut opening.progress)?, args.copies_of_scenes())?,
-    };
-    Ok(match args.layout {
-        Layout::Instanced => world,
-        Layout::Combined => world.combined()?,
-    })
-}
-
-fn load(files: &[PathBuf], progress: &mut Progress) -> Result<Vec<Scene>, RunError> {
-    let options = ObjOptions::default();
-    Ok(files.iter().map(|file| Scene::from_obj(file, &options, progress)).collect::<Result<_, _>>()?)
+/// The device is opened when it is known how many textures it is to have room for.
+fn at_once(load: &Load, opening: &mut Opening<'_>) -> Result<Opened<Loading<LargeScene>>, RunError> {
+    opening.progress = Progress::spoken();
+    let world = load.world(&mut opening.progress)?;
+    let textures = world.textures_needed();
+    let tracing = DeviceNeeds::tracing(load.args.tracing.rt);
+    let context = opening.device(&DeviceNeeds { textures, ..tracing })?;
+    let Opened { sample, headline } = load.sample(&context, world, textures, &mut opening.progress)?;
+    Ok(Opened { sample: Loading::ready(sample), headline })
 }
 
 /// The OBJ files that are named, by themselves or by their folder.
-fn files(args: &LargeSceneArgs) -> Result<Vec<PathBuf>, LargeSceneError> {
+fn files(args: &LargeSceneArgs) -> Result<Vec<PathBuf>, RunError> {
     let folder = scene_list::folder();
     let mut files: Vec<_> =
         args.scenes.iter().map(|wish| scene_list::resolve(wish, folder.as_deref())).collect();
@@ -88,9 +70,11 @@ fn files(args: &LargeSceneArgs) -> Result<Vec<PathBuf>, LargeSceneError> {
         let folder = named.or(folder).ok_or(LargeSceneError::NoFolder)?;
         let found = scene_list::find(&folder);
         if found.is_empty() {
-            return Err(LargeSceneError::EmptyFolder { folder });
+            return Err(LargeSceneError::EmptyFolder { folder }.into());
         }
         files.extend(found.into_iter().map(|scene| scene.path));
     }
+    let out = args.run.out_or(NAME);
+    files.iter().try_for_each(|file| png::check_not_input(&out, "--scene", file))?;
     Ok(files)
 }

@@ -78,10 +78,11 @@ impl StructureCache {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::progress::Progress;
 
     #[test]
     fn other_triangles_devices_and_flags_have_other_keys() {
-        let world = World::valley(2_000, 3);
+        let world = World::valley(2_000, 3, &mut Progress::hidden()).unwrap();
         let (first, second) = (&world.pieces[0], &world.pieces[1]);
         let caps = Capabilities::default();
         let phone = Capabilities { profile: Some("mali-g715".to_owned()), ..Capabilities::default() };
@@ -98,7 +99,7 @@ mod tests {
         }
         assert_eq!(
             all[0],
-            StructureKey::of(&World::valley(2_000, 9), first, &caps, flags),
+            StructureKey::of(&World::valley(2_000, 9, &mut Progress::hidden()).unwrap(), first, &caps, flags),
             "the same ground"
         );
     }

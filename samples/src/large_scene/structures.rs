@@ -1,18 +1,22 @@
 //! The acceleration structures of a world: from files where they were kept, else built, compacted, and kept.
 
+use std::ops::Range;
+
 use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BuildFlags, Compaction, Context, Error, Holder, TlasDesc,
     TlasInstance, transform_rows,
 };
 
+use super::LargeSceneError;
 use super::figures::{Origin, StructureFigures};
 use super::structure_cache::{StructureCache, StructureKey};
 use super::world::{Instance, World};
 use crate::app::progress::Progress;
 use crate::hybrid::SceneArrays;
 
-/// Structures that are built together, and whose progress is then told.
+/// Structures that are built together, and whose progress is then told: so many, of so many triangles, or a larger one alone.
 const BATCH: usize = 8;
+const BATCH_TRIANGLES: u64 = 1 << 19;
 /// Rounds after which a compaction counts as not to be had.
 const ROUNDS: u32 = 16;
 /// Mask bits of instances (`kMaskSolid` in `shaders/rtx_pipeline/radiance.glsl`).
@@ -49,7 +53,7 @@ enum Found {
 
 impl Structures {
     /// Loads, builds, compacts and keeps; `progress` counts pieces.
-    pub(super) fn new(plan: &Plan<'_>, progress: &mut Progress) -> lvk::Result<Self> {
+    pub(super) fn new(plan: &Plan<'_>, progress: &mut Progress) -> Result<Self, LargeSceneError> {
         let geometries: Vec<_> = plan.world.pieces.iter().map(|piece| [plan.geometry(piece)]).collect();
         let descs: Vec<_> = geometries
             .iter()
@@ -60,6 +64,7 @@ impl Structures {
         progress.stage("loading acceleration structures", descs.len() as u64);
         let mut found = Vec::with_capacity(descs.len());
         for (index, desc) in descs.iter().enumerate() {
+            progress.go_on()?;
             found.push(plan.load(desc, keys.get(index).copied())?);
             progress.set(index as u64 + 1);
         }
@@ -127,15 +132,19 @@ impl Plan<'_> {
         descs: &[BlasDesc<'_>],
         found: Vec<Found>,
         progress: &mut Progress,
-    ) -> lvk::Result<Vec<Blas>> {
+    ) -> Result<Vec<Blas>, LargeSceneError> {
         let missing: Vec<_> = (0..found.len()).filter(|&i| !matches!(found[i], Found::Loaded(_))).collect();
-        progress.stage("building acceleration structures", missing.len() as u64);
-        let mut built = Vec::with_capacity(missing.len());
-        for batch in missing.chunks(BATCH) {
-            let batch: Vec<_> = batch.iter().map(|&index| descs[index]).collect();
-            built.extend(self.ctx.create_blas_batch(&batch)?);
+        let triangles: Vec<_> =
+            missing.iter().map(|&index| self.world.pieces[index].triangles.len() as u64).collect();
+        progress.stage("building acceleration structures", triangles.iter().sum());
+        let (mut built, mut done) = (Vec::with_capacity(missing.len()), 0);
+        for batch in batches(&triangles) {
+            progress.go_on()?;
+            let of_batch: Vec<_> = missing[batch.clone()].iter().map(|&index| descs[index]).collect();
+            built.extend(self.ctx.create_blas_batch(&of_batch)?);
             self.ctx.wait_idle()?;
-            progress.set(built.len() as u64);
+            done += triangles[batch].iter().sum::<u64>();
+            progress.set(done);
         }
         let mut built = built.into_iter();
         let mut all = Vec::with_capacity(found.len());
@@ -154,7 +163,7 @@ impl Plan<'_> {
     }
 
     /// Compacts what was built; what came from a file was compacted before.
-    fn compact(&self, blas: &mut [Blas], progress: &mut Progress) -> lvk::Result<()> {
+    fn compact(&self, blas: &mut [Blas], progress: &mut Progress) -> Result<(), LargeSceneError> {
         let built: Vec<_> =
             blas.iter().filter(|blas| blas.origin != Origin::Loaded).map(|blas| *blas.holder).collect();
         if !self.compact || built.is_empty() {
@@ -163,6 +172,7 @@ impl Plan<'_> {
         progress.stage("compacting acceleration structures", 0);
         self.ctx.compact(&built)?;
         for _ in 0..ROUNDS {
+            progress.go_on()?;
             self.ctx.wait_idle()?;
             let mut pending = false;
             for handle in &built {
@@ -176,11 +186,17 @@ impl Plan<'_> {
     }
 
     /// Keeps what was built for the next start.
-    fn keep(&self, blas: &[Blas], keys: &[StructureKey], progress: &mut Progress) -> lvk::Result<()> {
+    fn keep(
+        &self,
+        blas: &[Blas],
+        keys: &[StructureKey],
+        progress: &mut Progress,
+    ) -> Result<(), LargeSceneError> {
         let Some(cache) = &self.cache else { return Ok(()) };
         let built: Vec<_> = blas.iter().zip(keys).filter(|(blas, _)| blas.origin != Origin::Loaded).collect();
         progress.stage("keeping acceleration structures", built.len() as u64);
         for (done, (blas, key)) in (1..).zip(built) {
+            progress.go_on()?;
             cache.keep(*key, &self.ctx.serialize_blas(*blas.holder)?);
             progress.set(done);
         }
@@ -203,5 +219,36 @@ impl Plan<'_> {
             debug_name: "world tlas",
             ..TlasDesc::default()
         })
+    }
+}
+
+/// Structures of so many triangles each, cut into batches in their order.
+fn batches(triangles: &[u64]) -> Vec<Range<usize>> {
+    let (mut batches, mut start, mut sum) = (Vec::new(), 0, 0);
+    for (index, count) in triangles.iter().enumerate() {
+        if index > start && (index - start == BATCH || sum + count > BATCH_TRIANGLES) {
+            batches.push(start..index);
+            (start, sum) = (index, 0);
+        }
+        sum += count;
+    }
+    if start < triangles.len() {
+        batches.push(start..triangles.len());
+    }
+    batches
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn batches_have_everything_once_and_no_more_than_they_may() {
+        const LARGE: u64 = BATCH_TRIANGLES + 1;
+        assert!(batches(&[]).is_empty());
+        assert_eq!(batches(&[5, 6, 7]).first(), Some(&(0..3)));
+        assert_eq!(batches(&[1; 17]), [0..8, 8..16, 16..17]);
+        assert_eq!(batches(&[LARGE, 1, 1, LARGE, LARGE]), [0..1, 1..3, 3..4, 4..5]);
+        assert_eq!(batches(&[BATCH_TRIANGLES / 2; 5]), [0..2, 2..4, 4..5]);
     }
 }

@@ -7,6 +7,8 @@ use glam::{Affine3A, Vec3, Vec3A};
 use super::LargeSceneError;
 use super::merge::{bake, merge};
 use super::street;
+use crate::app::progress::Progress;
+use crate::hybrid::textures_needed;
 use crate::scene::{Scene, Valley};
 
 /// Most triangles that are put into one mesh.
@@ -45,12 +47,14 @@ pub struct Instance {
 impl World {
     /// A wooded valley made by code: about `triangles` triangles in ground, water and a few kinds of trees, of which `copies`
     /// are shown, or as many as find room. The same everywhere.
-    #[must_use]
-    pub fn valley(triangles: u32, copies: u32) -> Self {
-        let Valley { ground, trees, places } = Valley::new(triangles, copies);
+    ///
+    /// # Errors
+    /// [`LargeSceneError::Stopped`].
+    pub fn valley(triangles: u32, copies: u32, progress: &mut Progress) -> Result<Self, LargeSceneError> {
+        let Valley { ground, trees, places } = Valley::new(triangles, copies, progress)?;
         let mut placed = vec![(0, Affine3A::IDENTITY)];
         placed.extend(places.into_iter().map(|(kind, place)| (kind + 1, place)));
-        Self::of(std::iter::once(ground).chain(trees).collect(), &placed)
+        Ok(Self::of(std::iter::once(ground).chain(trees).collect(), &placed))
     }
 
     /// Rows of plots along streets, in each a scene, turned to another side from plot to plot; `copies` of each scene. Scenes
@@ -101,6 +105,11 @@ impl World {
     #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// How many textures a context must have room for.
+    pub(super) fn textures_needed(&self) -> u32 {
+        textures_needed(&self.scene)
     }
 
     /// The scene, to make its textures fit a device.

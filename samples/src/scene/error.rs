@@ -5,6 +5,9 @@ use std::path::PathBuf;
 /// Why a scene could not be loaded. Every message names the file and says what to change.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
+    /// Nobody waits for it any more.
+    #[error(transparent)]
+    Stopped(#[from] crate::app::loading::Stopped),
     /// There is no such file.
     #[error("no such file: {}", path.display())]
     NotFound {

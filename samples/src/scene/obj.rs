@@ -33,6 +33,7 @@ pub(super) fn load(path: &Path, options: &ObjOptions, progress: &mut Progress) -
     progress.stage(&format!("{name}: textures"), 0);
     let Selection { materials, textures, normal_maps, warnings } = library.select(&names);
     obj.warnings.extend(warnings);
+    progress.go_on()?;
     progress.stage(&format!("{name}: arranging triangles"), 0);
     let opaque_triangle_count = finish(&mut mesh, &materials, &mut obj.warnings, degenerate);
     let setting = Setting::of(&mesh, views);
@@ -63,8 +64,10 @@ fn parse(
     let options = tobj::LoadOptions { single_index: true, triangulate: true, ..Default::default() };
     progress.stage(stage, obj.text.len() as u64);
     let mut reader = Watched { rest: obj.text.as_bytes(), total: obj.text.len(), progress };
-    let (models, _) = tobj::load_obj_buf(&mut reader, &options, |_| numbered(obj.materials.len()))
-        .map_err(|source| SceneError::Parse { path: path.into(), source })?;
+    let parsed = tobj::load_obj_buf(&mut reader, &options, |_| numbered(obj.materials.len()))
+        .map_err(|source| SceneError::Parse { path: path.into(), source });
+    reader.progress.go_on()?;
+    let (models, _) = parsed?;
     let mut mesh = Mesh::default();
     for model in &models {
         append(&mut mesh, &model.mesh, scale);
@@ -120,7 +123,7 @@ fn finish(mesh: &mut Mesh, materials: &[Material], warnings: &mut Vec<String>, d
     mesh.arrange(materials)
 }
 
-/// A reader that reports how far it has come.
+/// A reader that reports how far it has come, and fails where nobody wants it to go on.
 struct Watched<'a> {
     rest: &'a [u8],
     total: usize,
@@ -138,6 +141,7 @@ impl Read for Watched<'_> {
 impl BufRead for Watched<'_> {
     fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
         const BLOCK: usize = 1 << 16;
+        self.progress.go_on().map_err(std::io::Error::other)?;
         Ok(&self.rest[..self.rest.len().min(BLOCK)])
     }
 

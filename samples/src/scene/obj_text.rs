@@ -49,6 +49,7 @@ pub(super) fn clean(path: &Path, content: &[u8], progress: &mut Progress) -> Res
         rest = after;
         if cleaner.line_number.is_multiple_of(65_536) {
             progress.set((content.len() - rest.len()) as u64);
+            progress.go_on()?;
         }
     }
     cleaner.finish()

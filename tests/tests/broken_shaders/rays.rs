@@ -301,7 +301,10 @@ fn large_scene_notices() {
             let sample = LargeScene::new(&ctx, world, &config, &mut Progress::hidden());
             picture_of(&mut sample.unwrap(), FRAME)
         };
-        let (valley, street) = (World::valley(12_000, 40), World::street(vec![still_life()], 2).unwrap());
+        let (valley, street) = (
+            World::valley(12_000, 40, &mut Progress::hidden()).unwrap(),
+            World::street(vec![still_life()], 2).unwrap(),
+        );
         check(shaders, "valley", &ctx, [&VALLEY, &VALLEY_QUERY], |rtx| show(&valley, rtx, Show::Picture));
         check(shaders, "street", &ctx, [&STREET; 2], |rtx| show(&street, rtx, Show::Picture));
         let mistakes = [&VALLEY_NUMBERS, &VALLEY_QUERY[1..2]];

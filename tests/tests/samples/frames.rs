@@ -260,7 +260,7 @@ fn rtx_ao_goes_by_frames() {
 #[test]
 fn large_scene_goes_by_frames() {
     let Some(ctx) = device() else { return };
-    let world = World::valley(4_000, 12);
+    let world = World::valley(4_000, 12, &mut Progress::hidden()).unwrap();
     check(Seen::FromAnywhere, |size| {
         let config = LargeSceneConfig { depth: 1, samples: 2, ..LargeSceneConfig::new(rtx(&ctx, size)) };
         LargeScene::new(&ctx, &world, &config, &mut Progress::hidden()).unwrap()

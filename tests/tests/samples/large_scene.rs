@@ -41,7 +41,7 @@ fn picture_of(sample: &mut LargeScene, frame: u32) -> RgbaImage {
 }
 
 fn valley() -> World {
-    World::valley(12_000, 40)
+    World::valley(12_000, 40, &mut Progress::hidden()).unwrap()
 }
 
 /// Two still lives, one of them turned.
@@ -221,7 +221,10 @@ fn the_valley_and_the_street_look_as_they_always_did() {
     let path = paths(&ctx)[0];
     assert_as_ever(
         "large_scene_small",
-        &picture_of(&mut make(&ctx, &World::valley(60_000, 300), &config(path)), 0),
+        &picture_of(
+            &mut make(&ctx, &World::valley(60_000, 300, &mut Progress::hidden()).unwrap(), &config(path)),
+            0,
+        ),
     );
     assert_as_ever("large_scene_street", &picture_of(&mut make(&ctx, &street(), &config(path)), 0));
 }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use egui::{Rect, ViewportInfo, vec2};
-use lvk::{Context, ValidationSink};
+use lvk::{Context, SubmitHandle, ValidationSink};
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
 use winit::event::{ElementState, MouseButton, WindowEvent};
@@ -47,11 +47,13 @@ where
     M: FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
 {
     let event_loop = EventLoop::new().map_err(|error| RunError::window(&error))?;
-    let mut program = Program { name, args, sink, make: Some(make), running: None, ended: Ok(()) };
+    let mut program =
+        Program { name, args, sink, make: Some(make), running: None, rests_until: None, ended: Ok(()) };
     event_loop.run_app(&mut program).map_err(|error| RunError::window(&error))?;
     let Program { running, ended, .. } = program;
+    let closed = running.map_or(Ok(()), Running::close);
     ended?;
-    Ok(running.map_or(Ok(()), |running| running.ctx.wait_idle())?)
+    closed
 }
 
 /// What answers events.
@@ -61,6 +63,8 @@ struct Program<'a, S, M> {
     sink: &'a ValidationSink,
     make: Option<M>,
     running: Option<Running<S>>,
+    /// No frame before, unless something happens to the window.
+    rests_until: Option<Instant>,
     ended: Result<(), RunError>,
 }
 
@@ -86,15 +90,24 @@ where
             event => running.event(&event),
         };
         match done {
-            Ok(Next::Frame) => event_loop.set_control_flow(ControlFlow::Poll),
-            Ok(Next::Nap) => event_loop.set_control_flow(ControlFlow::wait_duration(NAP)),
+            Ok(Next::Frame) => {
+                self.rests_until = None;
+                event_loop.set_control_flow(ControlFlow::Poll);
+            }
+            Ok(Next::Nap) => {
+                let until = Instant::now() + NAP;
+                self.rests_until = Some(until);
+                event_loop.set_control_flow(ControlFlow::WaitUntil(until));
+            }
             Ok(Next::Close) => self.end(event_loop, Ok(())),
             Err(error) => self.end(event_loop, Err(error)),
         }
     }
 
     fn about_to_wait(&mut self, _: &ActiveEventLoop) {
-        if let Some(running) = &self.running {
+        // A redraw that is asked for comes at once, whatever is waited for.
+        let is_due = self.rests_until.is_none_or(|until| Instant::now() >= until);
+        if let Some(running) = self.running.as_ref().filter(|_| is_due) {
             running.window.request_redraw();
         }
     }
@@ -112,7 +125,9 @@ where
         opening.window = Some(Arc::clone(&window) as Arc<_>);
         let Opened { sample, headline } = make(&mut opening)?;
         drop(opening);
-        say(&headline);
+        if !headline.is_empty() {
+            say(&headline);
+        }
         Running::new(window, sample, self.args)
     }
 
@@ -120,6 +135,8 @@ where
         if self.ended.is_ok() {
             self.ended = ended;
         }
+        // What is still being loaded may take a moment to end.
+        self.running.iter().for_each(|running| running.window.set_visible(false));
         event_loop.exit();
     }
 }
@@ -149,6 +166,8 @@ struct Running<S> {
     at: Option<Moment>,
     shown: u32,
     wants_screenshot: bool,
+    /// The latest frame.
+    latest: SubmitHandle,
     ctx: Context,
     window: Arc<Window>,
 }
@@ -172,6 +191,7 @@ impl<S: Sample> Running<S> {
             at: None,
             shown: 0,
             wants_screenshot: false,
+            latest: SubmitHandle::default(),
             ctx,
             window,
         })
@@ -235,7 +255,17 @@ impl<S: Sample> Running<S> {
         }
     }
 
+    /// Ends what is loading, and waits for the GPU.
+    fn close(self) -> Result<(), RunError> {
+        let Self { sample, ctx, .. } = self;
+        drop(sample);
+        Ok(ctx.wait_idle()?)
+    }
+
     fn redraw(&mut self, name: &str, args: &RunArgs) -> Result<Next, RunError> {
+        if self.sample.is_loading().map_err(Into::into)? {
+            return self.redraw_loading(name);
+        }
         self.ctx.next_frame()?;
         let seconds = self.clock.tick(Instant::now(), self.panel.animates);
         self.follow(args, seconds)?;
@@ -257,12 +287,13 @@ impl<S: Sample> Running<S> {
         let (panel, sample) = (&mut self.panel, &mut self.sample);
         self.screen.record(&mut cmd, &image, picture, input, |ui| {
             panel.show(ui, name, &told, |ui| sample.panel(ui));
+            sample.overlay(ui);
         })?;
         let last = self.is_last(args);
         let file = args.out.as_deref().filter(|_| last);
         let shot = (self.wants_screenshot || file.is_some())
             .then(|| Screenshot::record(&self.ctx, &mut cmd, &image));
-        self.ctx.present(cmd, image)?;
+        self.latest = self.ctx.present(cmd, image)?;
         self.shown += 1;
         self.clock.count_frame(self.panel.animates);
         if let Some(shot) = shot {
@@ -274,13 +305,43 @@ impl<S: Sample> Running<S> {
         Ok(if last { Next::Close } else { Next::Frame })
     }
 
-    /// Takes note of what has changed: size, shaders, time, camera.
-    fn follow(&mut self, args: &RunArgs, seconds: f32) -> Result<(), RunError> {
+    /// A frame without a picture, now and then, so that whoever loads is not held up; none while the GPU is at work for that
+    /// one, so that the window is not held up either.
+    fn redraw_loading(&mut self, name: &str) -> Result<Next, RunError> {
+        self.follow_size();
+        if !self.ctx.is_done(self.latest)? {
+            return Ok(Next::Nap);
+        }
+        self.ctx.next_frame()?;
+        let Some(image) = self.screen.next_image()? else { return Ok(Next::Nap) };
+        // The animation begins with the picture.
+        self.clock.tick(Instant::now(), false);
+        let mut frame = Frame::free(&self.ctx)?;
+        let picture = self.sample.record(&mut frame).map_err(Into::into)?;
+        let mut cmd = frame.into_commands();
+        let input = self.input(image.extent());
+        let sample = &mut self.sample;
+        self.screen.record(&mut cmd, &image, picture, input, |ui| sample.overlay(ui))?;
+        let shot = self.wants_screenshot.then(|| Screenshot::record(&self.ctx, &mut cmd, &image));
+        self.latest = self.ctx.present(cmd, image)?;
+        if let Some(shot) = shot {
+            self.save(shot, None, name)?;
+        }
+        Ok(Next::Nap)
+    }
+
+    /// Gives pictures the size that the window has had for a while.
+    fn follow_size(&mut self) {
         if let Some(size) = self.follower.next(extent(&self.window), Instant::now())
             && let Err(error) = self.sample.resize(size).map_err(Into::into)
         {
             eprintln!("warning: pictures keep their size: {error}");
         }
+    }
+
+    /// Takes note of what has changed: size, shaders, time, camera.
+    fn follow(&mut self, args: &RunArgs, seconds: f32) -> Result<(), RunError> {
+        self.follow_size();
         if self.watch.as_mut().is_some_and(|watch| watch.poll(Instant::now())) {
             self.reload();
         }

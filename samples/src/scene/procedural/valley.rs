@@ -3,6 +3,8 @@
 use glam::{Affine3A, Quat, Vec2, Vec3};
 
 use super::tree;
+use crate::app::loading::Stopped;
+use crate::app::progress::Progress;
 use crate::scene::mesh::Mesh;
 use crate::scene::noise::{fractal, lattice};
 use crate::scene::setting::Setting;
@@ -37,18 +39,24 @@ pub(crate) struct Valley {
 impl Valley {
     /// A valley whose ground and kinds of trees have about `triangles` triangles in all, with `trees` trees, or as many as find
     /// room. The same everywhere.
-    pub(crate) fn new(triangles: u32, trees: u32) -> Self {
+    pub(crate) fn new(triangles: u32, trees: u32, progress: &mut Progress) -> Result<Self, Stopped> {
+        progress.stage("making the valley", triangles.into());
         let budget = triangles as f32;
         let of_tree = (1.0 - GROUND_SHARE - WATER_SHARE) * budget / tree::KINDS.len() as f32;
         let mut mesh = Mesh::default();
-        ground(&mut mesh, cells(GROUND_SHARE * budget));
-        water(&mut mesh, cells(WATER_SHARE * budget));
-        let kinds = 0..tree::KINDS.len();
-        Self {
-            ground: setting().into_scene("valley".to_owned(), mesh, materials()),
-            trees: kinds.map(|kind| tree_scene(kind, of_tree as u32)).collect(),
-            places: places(trees),
-        }
+        ground(&mut mesh, cells(GROUND_SHARE * budget), progress)?;
+        water(&mut mesh, cells(WATER_SHARE * budget), progress)?;
+        let mut done = mesh.triangles.len();
+        let grow = |kind| {
+            progress.go_on()?;
+            let tree = tree_scene(kind, of_tree as u32);
+            done += tree.triangles.len();
+            progress.set(done as u64);
+            Ok(tree)
+        };
+        let kinds = (0..tree::KINDS.len()).map(grow).collect::<Result<_, _>>()?;
+        let ground = setting().into_scene("valley".to_owned(), mesh, materials());
+        Ok(Self { ground, trees: kinds, places: places(trees) })
     }
 }
 
@@ -82,21 +90,21 @@ fn slope(x: f32, z: f32) -> Vec3 {
     Vec3::new(-along_x, 2.0 * STEP, -along_z).normalize()
 }
 
-fn ground(mesh: &mut Mesh, cells: u32) {
+fn ground(mesh: &mut Mesh, cells: u32, progress: &mut Progress) -> Result<(), Stopped> {
     let material = |x: f32, z: f32| material_at(x, z, height(x, z), slope(x, z).y);
     let point = |x: f32, z: f32| (Vec3::new(x, height(x, z), z), slope(x, z));
-    field(mesh, cells, HALF, point, material);
+    field(mesh, cells, HALF, point, material, progress)
 }
 
 /// The lake: flat, with ripples in its normals.
-fn water(mesh: &mut Mesh, cells: u32) {
+fn water(mesh: &mut Mesh, cells: u32, progress: &mut Progress) -> Result<(), Stopped> {
     let ripple = |x: f32, z: f32| fractal(0.8 * x + 5.0, 2.1 * z, 3);
     let point = |x: f32, z: f32| {
         let here = ripple(x, z);
         let [side, along] = [ripple(x + 0.1, z) - here, ripple(x, z + 0.1) - here];
         (Vec3::new(x, 0.0, z), Vec3::new(-0.10 * side, 1.0, -0.10 * along).normalize())
     };
-    field(mesh, cells, 0.75 * HALF, point, |_, _| WATER);
+    field(mesh, cells, 0.75 * HALF, point, |_, _| WATER, progress)
 }
 
 /// A square of `cells` x `cells` cells, from `-half` to `half`.
@@ -106,20 +114,34 @@ fn field(
     half: f32,
     point: impl Fn(f32, f32) -> (Vec3, Vec3),
     material: impl Fn(f32, f32) -> u32,
-) {
+    progress: &mut Progress,
+) -> Result<(), Stopped> {
     let at = |i: f32| half * (2.0 * i / cells as f32 - 1.0);
     let first = mesh.positions.len() as u32;
-    for (row, column) in (0..=cells).flat_map(|row| (0..=cells).map(move |column| (row, column))) {
-        let (position, normal) = point(at(column as f32), at(row as f32));
-        mesh.add_vertex(position.to_array(), normal.to_array(), [0.0; 2]);
+    // A row has two triangles a cell, which count half when their vertices are there.
+    let before = mesh.triangles.len() as u64;
+    let mut tell = |rows: u32| {
+        progress.set(before + u64::from(rows) * u64::from(cells));
+        progress.go_on()
+    };
+    for row in 0..=cells {
+        tell(row)?;
+        for column in 0..=cells {
+            let (position, normal) = point(at(column as f32), at(row as f32));
+            mesh.add_vertex(position.to_array(), normal.to_array(), [0.0; 2]);
+        }
     }
     for (row, column) in (0..cells).flat_map(|row| (0..cells).map(move |column| (row, column))) {
+        if column == 0 {
+            tell(cells + row)?;
+        }
         let near = first + row * (cells + 1) + column;
         let far = near + cells + 1;
         let material = material(at(column as f32 + 0.5), at(row as f32 + 0.5));
         mesh.add_triangle([near, far, far + 1], material);
         mesh.add_triangle([near, far + 1, near + 1], material);
     }
+    Ok(())
 }
 
 fn material_at(x: f32, z: f32, height: f32, upright: f32) -> u32 {
@@ -211,11 +233,12 @@ mod tests {
     #[test]
     fn the_valley_has_as_many_triangles_as_are_wished_for_and_is_the_same_every_time() {
         for wished in [3_000, 60_000] {
-            let valley = Valley::new(wished, 40);
+            let make = || Valley::new(wished, 40, &mut Progress::hidden()).unwrap();
+            let valley = make();
             let trees = valley.trees.iter().map(|tree| tree.triangles.len());
             let count = valley.ground.triangles.len() + trees.sum::<usize>();
             assert!(count.abs_diff(wished as usize) < wished as usize / 8, "{count} instead of {wished}");
-            let again = Valley::new(wished, 40);
+            let again = make();
             assert_eq!(valley.ground.positions, again.ground.positions);
             assert_eq!(valley.trees[1].triangles, again.trees[1].triangles);
             assert_eq!((valley.places.len(), valley.places), (40, again.places));

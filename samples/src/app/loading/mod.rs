@@ -1,0 +1,9 @@
+//! Samples that take long to load, in a window: a thread loads while frames show how far it is.
+
+mod background;
+mod overlay;
+mod sample;
+mod status;
+
+pub use sample::Loading;
+pub use status::{Status, Stopped};

@@ -1,0 +1,208 @@
+//! A sample that may still be loading.
+
+use std::panic::resume_unwind;
+use std::thread::{self, JoinHandle};
+use std::time::Instant;
+
+use lvk::{Context, Holder, TextureHandle};
+
+use super::background::background;
+use super::overlay;
+use super::status::Status;
+use crate::app::frame::Frame;
+use crate::app::progress::Progress;
+use crate::app::run::Opened;
+use crate::app::run_error::RunError;
+use crate::app::sample::{Moment, Sample};
+use crate::app::say;
+use crate::scene::Camera;
+
+/// A sample that a thread may still be loading. Until it is there, frames are empty, with the progress over them.
+pub struct Loading<S> {
+    ctx: Context,
+    state: State<S>,
+}
+
+enum State<S> {
+    UnderWay(UnderWay<S>),
+    Ready(S),
+}
+
+/// The thread that loads. Dropping this asks it to end, and waits for that.
+struct UnderWay<S> {
+    status: Status,
+    thread: Option<JoinHandle<Made<S>>>,
+    background: Holder<TextureHandle>,
+    /// The size that pictures are to have by now, if not that from the beginning.
+    extent: Option<[u32; 2]>,
+    start: Instant,
+    frames: u32,
+}
+
+type Made<S> = Result<Opened<S>, RunError>;
+
+impl<S: Sample> Loading<S> {
+    /// One that is there.
+    #[must_use]
+    pub fn ready(sample: S) -> Self {
+        Self { ctx: sample.context().clone(), state: State::Ready(sample) }
+    }
+
+    /// Has `load` make it on a thread of its own. It is to look at [`Progress::go_on`] from time to time; what is said about
+    /// the sample is printed when it is there.
+    ///
+    /// # Errors
+    /// [`RunError`] where there is no thread or no texture to be had. Those of `load` come from [`Sample::is_loading`].
+    pub fn start(
+        ctx: &Context,
+        load: impl FnOnce(&mut Progress) -> Made<S> + Send + 'static,
+    ) -> Result<Self, RunError>
+    where
+        S: Send + 'static,
+    {
+        let background = background(ctx)?;
+        let status = Status::default();
+        let mut progress = Progress::spoken().told_to(&status);
+        let thread = thread::Builder::new()
+            .name("loading".to_owned())
+            .spawn(move || load(&mut progress))
+            .map_err(RunError::device)?;
+        let thread = Some(thread);
+        let start = Instant::now();
+        let under_way = UnderWay { status, thread, background, extent: None, start, frames: 0 };
+        Ok(Self { ctx: ctx.clone(), state: State::UnderWay(under_way) })
+    }
+
+    /// The sample, if it is there.
+    fn sample(&self) -> Option<&S> {
+        match &self.state {
+            State::UnderWay(_) => None,
+            State::Ready(sample) => Some(sample),
+        }
+    }
+
+    fn sample_mut(&mut self) -> Option<&mut S> {
+        match &mut self.state {
+            State::UnderWay(_) => None,
+            State::Ready(sample) => Some(sample),
+        }
+    }
+}
+
+impl<S: Sample> UnderWay<S> {
+    /// What the thread has made, once it has ended.
+    fn take(&mut self) -> Option<Made<S>> {
+        let thread = self.thread.take_if(|thread| thread.is_finished())?;
+        let Opened { mut sample, headline } = match thread.join().unwrap_or_else(|panic| resume_unwind(panic))
+        {
+            Ok(opened) => opened,
+            Err(error) => return Some(Err(error)),
+        };
+        if let Some(extent) = self.extent
+            && let Err(error) = sample.resize(extent).map_err(Into::into)
+        {
+            return Some(Err(error));
+        }
+        let seconds = self.start.elapsed().as_secs_f32();
+        eprintln!("loaded in {seconds:.1} s, with {} frames shown meanwhile", self.frames);
+        Some(Ok(Opened { sample, headline }))
+    }
+}
+
+impl<S> Drop for UnderWay<S> {
+    fn drop(&mut self) {
+        self.status.stop();
+        if let Some(thread) = self.thread.take() {
+            // What it has made, or why it has not, concerns nobody any more.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl<S: Sample> Sample for Loading<S> {
+    type Error = RunError;
+
+    fn context(&self) -> &Context {
+        &self.ctx
+    }
+
+    fn is_loading(&mut self) -> Result<bool, RunError> {
+        let State::UnderWay(under_way) = &mut self.state else { return Ok(false) };
+        let Some(made) = under_way.take() else { return Ok(true) };
+        let Opened { sample, headline } = made?;
+        say(&headline);
+        self.state = State::Ready(sample);
+        Ok(false)
+    }
+
+    fn update(&mut self, moment: Moment) -> Result<(), RunError> {
+        self.sample_mut().map_or(Ok(()), |sample| sample.update(moment).map_err(Into::into))
+    }
+
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RunError> {
+        match &mut self.state {
+            State::Ready(sample) => sample.record(frame).map_err(Into::into),
+            State::UnderWay(under_way) => {
+                under_way.frames += 1;
+                Ok(*under_way.background)
+            }
+        }
+    }
+
+    fn steps_per_frame(&self) -> u64 {
+        self.sample().map_or(1, S::steps_per_frame)
+    }
+
+    fn after_frame(&mut self) -> Result<(), RunError> {
+        self.sample_mut().map_or(Ok(()), |sample| sample.after_frame().map_err(Into::into))
+    }
+
+    fn remark(&self) -> Option<String> {
+        self.sample().and_then(S::remark)
+    }
+
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RunError> {
+        match &mut self.state {
+            State::Ready(sample) => sample.resize(extent).map_err(Into::into),
+            State::UnderWay(under_way) => {
+                under_way.extent = Some(extent);
+                Ok(())
+            }
+        }
+    }
+
+    fn view(&self) -> Option<Camera> {
+        self.sample().and_then(S::view)
+    }
+
+    fn set_view(&mut self, camera: &Camera) {
+        if let Some(sample) = self.sample_mut() {
+            sample.set_view(camera);
+        }
+    }
+
+    fn panel(&mut self, ui: &mut egui::Ui) {
+        if let Some(sample) = self.sample_mut() {
+            sample.panel(ui);
+        }
+    }
+
+    fn overlay(&mut self, ui: &egui::Context) {
+        match &mut self.state {
+            State::Ready(sample) => sample.overlay(ui),
+            State::UnderWay(under_way) => {
+                overlay::show(ui, &under_way.status.stage(), under_way.start.elapsed());
+            }
+        }
+    }
+
+    fn next(&mut self) {
+        if let Some(sample) = self.sample_mut() {
+            sample.next();
+        }
+    }
+
+    fn reload(&mut self) -> Result<(), RunError> {
+        self.sample_mut().map_or(Ok(()), |sample| sample.reload().map_err(Into::into))
+    }
+}
