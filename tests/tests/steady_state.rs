@@ -301,7 +301,7 @@ fn the_memory_of_objects_is_counted_in_their_heap_until_they_are_gone() {
         let before = total();
         assert!(before > 0, "the library itself has buffers");
         let buffer = ctx.create_buffer(&BufferDesc { size_bytes: SIZE, ..Default::default() }).unwrap();
-        assert!((SIZE..SIZE + 4096).contains(&(total() - before)), "{} of {SIZE}", total() - before);
+        assert!((SIZE..=SIZE + 4096).contains(&(total() - before)), "{} of {SIZE}", total() - before);
         let budget = ctx.memory_budget();
         assert_eq!(budget.is_measured, ctx.capabilities().has(OptionalFeature::MemoryBudget));
         assert!(!(hidden && budget.is_measured), "the profile hides the feature");
