@@ -8,7 +8,7 @@ use ash::vk;
 
 use super::CommandBuffer;
 use super::queue_check::BUILD;
-use super::software::check_placed;
+use super::software::{SoftwareWork, check_placed};
 use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasBody, PartShape};
 use crate::accel::build::BuildInput;
@@ -21,8 +21,8 @@ use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
 use crate::shared::Garbage;
 
-/// Records the builds or refits of what software traces.
-type BuildSoftware = fn(&mut CommandBuffer, &[Arc<AccelStruct>], &[bool]) -> Result<()>;
+/// Plans the builds or refits of what software traces.
+type PlanSoftware = fn(&CommandBuffer, &[Arc<AccelStruct>], &[bool]) -> Result<SoftwareWork>;
 
 /// One build of a part of a bottom-level structure to record.
 struct Build {
@@ -108,7 +108,8 @@ impl CommandBuffer {
     /// [`InvalidUsage`](Error::InvalidUsage) for a refit without
     /// [`BuildFlags::ALLOW_UPDATE`](crate::BuildFlags::ALLOW_UPDATE), a rebuild of a structure that was compacted, or
     /// compacted before it was saved, and a structure listed twice; [`WrongQueue`](Error::WrongQueue) on the transfer queue.
-    /// Where there is no memory for what software traces, the command buffer can no longer be submitted.
+    /// Where there is no memory left for the scratch or tables of what software traces, the command buffer can no longer be
+    /// submitted; for structures themselves it is taken before anything is recorded.
     pub fn build_blas(&mut self, structures: &[AccelStructHandle], mode: BuildMode) -> Result<()> {
         self.needs_compute(BUILD)?;
         let found: Result<Vec<_>> =
@@ -125,7 +126,7 @@ impl CommandBuffer {
     pub(crate) fn build_first(&mut self, structures: &[Arc<AccelStruct>]) -> Result<()> {
         self.first_builds = true;
         let built = self.build_form(structures, BuildMode::Rebuild, |cmd, structures, _| {
-            cmd.build_software_first(structures)
+            cmd.plan_software_first(structures)
         });
         self.first_builds = false;
         built
@@ -134,15 +135,15 @@ impl CommandBuffer {
     /// As [`build_blas`](Self::build_blas), by object.
     pub(crate) fn build_all(&mut self, structures: &[Arc<AccelStruct>], mode: BuildMode) -> Result<()> {
         self.shared.gpu.check_structures()?;
-        self.build_form(structures, mode, Self::build_software)
+        self.build_form(structures, mode, Self::plan_software)
     }
 
-    /// Builds what the device traces, and by `software` what software does.
+    /// Builds what the device traces, and what software does as `plan_software` says.
     fn build_form(
         &mut self,
         structures: &[Arc<AccelStruct>],
         mode: BuildMode,
-        software: BuildSoftware,
+        plan_software: PlanSoftware,
     ) -> Result<()> {
         let mut open = Vec::with_capacity(structures.len());
         let mut builds = Vec::with_capacity(structures.len());
@@ -155,11 +156,12 @@ impl CommandBuffer {
             self.plan_blas(target, &body, refit, &mut builds)?;
             refits.push(refit);
         }
+        let software = plan_software(self, structures, &refits)?;
         if self.shared.gpu.accel.is_some() {
             self.gather_inputs(structures, &refits)?;
             self.record_builds(&builds)?;
         }
-        if let Err(error) = software(self, structures, &refits) {
+        if let Err(error) = self.record_software(software) {
             let name = structures.first().map_or("build_blas", |target| &target.name);
             return Err(self.tear(name, error));
         }

@@ -34,11 +34,18 @@ const ALIGNMENT: u64 = 16;
 
 /// Builds and refits to record side by side.
 #[derive(Default)]
-struct SoftwareWork {
+pub(super) struct SoftwareWork {
+    targets: Vec<ResourceId>,
     builds: Vec<GpuBuild>,
     refits: Vec<GpuRefit>,
-    /// Bodies that refer to others from now on.
-    moves: Vec<(Arc<SoftwareBody>, MovedHeader)>,
+    moves: Vec<Move>,
+}
+
+/// A structure that the CPU built and that lies elsewhere from now on.
+struct Move {
+    target: ResourceId,
+    body: Arc<SoftwareBody>,
+    header: MovedHeader,
 }
 
 impl CommandBuffer {
@@ -79,50 +86,62 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Builds structures on the GPU that have none yet; those that the CPU built are ready.
-    pub(super) fn build_software_first(&mut self, structures: &[Arc<AccelStruct>]) -> Result<()> {
+    /// What has to be built on the GPU of structures that have nothing yet; what the CPU built is ready.
+    pub(super) fn plan_software_first(&self, structures: &[Arc<AccelStruct>]) -> Result<SoftwareWork> {
         let is_of_gpu = |target: &&Arc<AccelStruct>| {
             let software = target.blas().ok().and_then(|blas| blas.software.as_ref());
             software.is_some_and(|software| matches!(software.origin, Origin::Gpu(_)))
         };
         let structures: Vec<_> = structures.iter().filter(is_of_gpu).cloned().collect();
         let rebuilds = vec![false; structures.len()];
-        self.build_software(&structures, &rebuilds)
+        self.plan_software(&structures, &rebuilds)
     }
 
-    /// As [`build_software_first`](Self::build_software_first), of one structure.
+    /// Builds what software traces of a structure for the first time.
     pub(crate) fn build_software_of(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
-        self.build_software_first(std::slice::from_ref(target))
+        let work = self.plan_software_first(std::slice::from_ref(target))?;
+        self.record_software(work)
     }
 
-    /// Builds or refits what software traces of these structures.
-    pub(super) fn build_software(&mut self, structures: &[Arc<AccelStruct>], refits: &[bool]) -> Result<()> {
+    /// Makes room for builds or refits of what software traces of these structures; records nothing.
+    pub(super) fn plan_software(
+        &self,
+        structures: &[Arc<AccelStruct>],
+        refits: &[bool],
+    ) -> Result<SoftwareWork> {
         let mut work = SoftwareWork::default();
         for (target, refit) in structures.iter().zip(refits) {
             let blas = target.blas()?;
             if let Some(software) = &blas.software {
-                self.plan_software(target, blas, software, *refit, &mut work)?;
+                work.targets.push(target.id);
+                self.plan_one(target, blas, software, *refit, &mut work)?;
             }
         }
-        if work.builds.is_empty() && work.refits.is_empty() {
+        Ok(work)
+    }
+
+    /// Records what was planned.
+    pub(super) fn record_software(&mut self, work: SoftwareWork) -> Result<()> {
+        let SoftwareWork { targets, builds, refits, moves } = work;
+        if builds.is_empty() && refits.is_empty() {
             return Ok(());
         }
         let write = Use::shader_write(Stages::COMPUTE);
-        structures.iter().for_each(|target| self.notes.uses.id(target.id, write));
+        targets.into_iter().for_each(|target| self.notes.uses.id(target, write));
         let group = self.built_group();
         self.notes.uses.accumulate(group, write);
-        if !work.builds.is_empty() {
-            self.record_gpu_builds(&work.builds)?;
+        if !builds.is_empty() {
+            self.record_gpu_builds(&builds)?;
         }
-        if !work.refits.is_empty() {
-            self.record_gpu_refits(&work.refits)?;
+        if !refits.is_empty() {
+            self.record_gpu_refits(&refits)?;
         }
-        self.record_moves(&work.moves);
+        moves.iter().for_each(|moved| self.record_move(moved));
         Ok(())
     }
 
-    fn plan_software(
-        &mut self,
+    fn plan_one(
+        &self,
         target: &Arc<AccelStruct>,
         blas: &Blas,
         software: &SoftwareBlas,
@@ -162,8 +181,7 @@ impl CommandBuffer {
                 let rebuilt = software.rebuilt_or(|| self.room_for(target, rebuild))?;
                 work.builds.push(build_of(rebuild, rebuilt));
                 let header = MovedHeader { format: MOVED, leaf_kind: 0, address: rebuilt.address };
-                work.moves.push((Arc::clone(&software.body), header));
-                self.notes.moved.insert(target.id.0);
+                work.moves.push(Move { target: target.id, body: Arc::clone(&software.body), header });
             }
         }
         Ok(())
@@ -191,18 +209,18 @@ impl CommandBuffer {
         gpu_geometries(&target.name, &blas.geometries, &find, matrices)
     }
 
-    /// Has bodies refer to others.
-    fn record_moves(&mut self, moves: &[(Arc<SoftwareBody>, MovedHeader)]) {
-        for (body, header) in moves {
-            self.use_buffer(body.buffer(), Use::transfer_write());
-            self.notes.uses.accumulate(self.shared.all_blas, Use::transfer_write());
-            self.flush();
-            let bytes = bytemuck::bytes_of(header);
-            // SAFETY: the body begins with a header, at a multiple of 4.
-            unsafe {
-                let device = &self.shared.gpu.device;
-                device.cmd_update_buffer(self.raw(), body.buffer().raw, body.offset(), bytes);
-            }
+    /// Has a body refer to another.
+    fn record_move(&mut self, moved: &Move) {
+        let Move { target, body, header } = moved;
+        self.notes.moved.insert(target.0);
+        self.use_buffer(body.buffer(), Use::transfer_write());
+        self.notes.uses.accumulate(self.shared.all_blas, Use::transfer_write());
+        self.flush();
+        let bytes = bytemuck::bytes_of(header);
+        // SAFETY: the body begins with a header, at a multiple of 4.
+        unsafe {
+            let device = &self.shared.gpu.device;
+            device.cmd_update_buffer(self.raw(), body.buffer().raw, body.offset(), bytes);
         }
     }
 

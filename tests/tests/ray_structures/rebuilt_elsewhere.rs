@@ -1,12 +1,15 @@
 //! What software traces lies elsewhere once a structure that the CPU built is rebuilt: refits follow it there, whatever came
 //! before. Where the device traces, the same commands do the same.
 
-use lvk::{BlasDesc, BuildFlags, BuildMode, Context, Error, RayQueryPath, Result, TlasDesc, TlasInstance};
+use lvk::{
+    BlasDesc, BuildFlags, BuildMode, Context, Error, RayQueryPath, RayQueryRequest, Result, TlasDesc,
+    TlasInstance,
+};
 use lvk_tests::bender::bent;
-use lvk_tests::device;
 use lvk_tests::hit_check::HitCheck;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, PartBuffers, RayScene, upload_geometries, vertex_bytes};
+use lvk_tests::{device, device_with};
 
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
 
@@ -104,4 +107,32 @@ fn an_update_overtaken_by_the_first_rebuild_is_refused_by_software() -> Result<(
         refused?;
     }
     HitCheck::new(&ctx)?.scene("rebuilt, then shown anew", &gpu.tlas, &scene)
+}
+
+/// Room for the tree is made before anything is recorded, of the device's own structures too.
+#[test]
+fn a_rebuild_without_room_leaves_what_is_recorded_around_it() -> Result<()> {
+    let of_budget = |bytes| {
+        device_with(|desc| (desc.ray_query, desc.accel_budget_bytes) = (RayQueryRequest::Software, bytes))
+    };
+    let mut scene = ring();
+    let needed = {
+        let Some(ctx) = of_budget(u64::MAX) else { return Ok(()) };
+        let _gpu = scene.upload_with(&ctx, UPDATABLE, UPDATABLE, 0)?;
+        ctx.wait_idle()?;
+        ctx.accel_memory().structure_bytes
+    };
+    let Some(ctx) = of_budget(needed) else { return Ok(()) };
+    let gpu = scene.upload_with(&ctx, UPDATABLE, UPDATABLE, 0)?;
+    ctx.wait_idle()?;
+    bend(&ctx, &mut scene, &gpu.buffers, 0.4)?;
+    let mut cmd = ctx.acquire_command_buffer()?;
+    let refused = cmd.build_blas(&[*gpu.models[0]], BuildMode::Rebuild);
+    assert!(matches!(refused, Err(Error::OverBudget { budget, .. }) if budget == needed), "{refused:?}");
+    cmd.build_blas(&[*gpu.models[0]], BuildMode::Refit)?;
+    cmd.update_tlas(*gpu.tlas, &[TlasInstance::new(*gpu.models[0])], BuildMode::Rebuild)?;
+    ctx.submit(cmd)?;
+    ctx.wait_idle()?;
+    assert_eq!(ctx.accel_memory().structure_bytes, needed);
+    HitCheck::new(&ctx)?.scene("refitted in place of rebuilt", &gpu.tlas, &scene)
 }
