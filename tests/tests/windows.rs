@@ -167,6 +167,26 @@ fn resizes_are_followed_on_another_driver() {
     });
 }
 
+/// Also while a command buffer that was never submitted keeps the old swapchain.
+#[test]
+fn a_lost_surface_is_replaced() {
+    let Some((window, ctx)) = window() else { return };
+    let swapchain = ctx.create_swapchain(&SwapchainDesc::default()).unwrap();
+    for (lost, color) in [(1, RED), (2, GREEN), (3, BLUE)] {
+        let image = ctx.next_image(*swapchain).unwrap().unwrap();
+        let stale = fill(&ctx, image.texture(), RED).unwrap();
+        let stale = if lost == 2 { None } else { Some(stale) };
+        lvk::test_hooks::lose_surface(&ctx, *swapchain).unwrap();
+        show_until_seen(&ctx, *swapchain, &window, color);
+        assert_eq!(ctx.swapchain_info(*swapchain).unwrap().rebuilds, lost);
+        let late = ctx.present(ctx.acquire_command_buffer().unwrap(), image);
+        assert!(message(late).contains("made anew"));
+        if let Some(stale) = stale {
+            assert!(message(ctx.submit(stale)).contains("made anew"));
+        }
+    }
+}
+
 #[test]
 fn three_windows_show_their_own_pictures() {
     let Some((first, ctx)) = window() else { return };

@@ -162,12 +162,19 @@ impl<'a> RenderPass<'a> {
         Ok(())
     }
 
-    /// Binds a buffer to a vertex binding of the pipeline, from `offset` bytes on (`vkCmdBindVertexBuffers`).
+    /// Binds a buffer to a vertex binding of the pipeline, from `offset` bytes on (`vkCmdBindVertexBuffers`): a multiple of 4, so
+    /// that whatever attributes the pipeline has are aligned.
     pub fn bind_vertex_buffer(&mut self, slot: u32, buffer: BufferHandle, offset: u64) -> Result<()> {
         const SLOTS: u32 = 16;
         let buffer = self.cmd.shared.store.buffers.get(buffer)?;
         buffer.check_usage(BufferUsage::VERTEX)?;
         buffer.check_range(offset, 1)?;
+        if !offset.is_multiple_of(4) {
+            return Err(Error::usage(
+                &buffer.name,
+                format!("the vertex offset {offset} is no multiple of 4"),
+            ));
+        }
         if slot >= SLOTS {
             return Err(Error::usage(
                 &buffer.name,

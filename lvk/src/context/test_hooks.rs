@@ -16,11 +16,12 @@ use crate::context::holder::Holder;
 use crate::error::Result;
 use crate::gpu::failing;
 use crate::gpu::silent::silently;
-use crate::handle::BufferHandle;
+use crate::handle::{BufferHandle, SwapchainHandle};
 use crate::kernel::Kernel;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage};
 pub use crate::software::gpu_build::check::{Bounds, EMPTY, Facts, check_structure};
+use crate::swapchain::decide::Failure;
 
 const ALIGNMENT: u64 = 256;
 
@@ -48,6 +49,12 @@ pub fn fallibly<T>(make: impl FnOnce() -> T) -> T {
 /// After so many submissions to queues, one that this thread makes of a context made [`fallibly`] is refused.
 pub fn fail_submission_after(submissions: u32) {
     failing::fail_after(submissions);
+}
+
+/// The presentation engine has lost the surface of a window, as far as the library is told.
+pub fn lose_surface(ctx: &Context, swapchain: SwapchainHandle) -> Result<()> {
+    let swapchain = ctx.shared().store.swapchains.get(swapchain)?;
+    swapchain.lock().course.presented(Err(Failure::SurfaceLost))
 }
 
 /// How many submissions there were.

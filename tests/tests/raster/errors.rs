@@ -122,6 +122,7 @@ fn draws_without_their_inputs_are_refused() {
     usage_error(pass.draw(0..3, 0..1), "two buffers: it reads 2 vertex buffers");
     usage_error(pass.bind_vertex_buffer(0, *plain, 0), "VERTEX");
     usage_error(pass.bind_vertex_buffer(0, *vertices, 64), "outside");
+    usage_error(pass.bind_vertex_buffer(0, *vertices, 2), "no multiple of 4");
     usage_error(pass.bind_vertex_buffer(16, *vertices, 0), "vertex slot 16");
     usage_error(pass.bind_vertex_buffer(u32::MAX, *vertices, 0), "vertex slot");
     pass.bind_vertex_buffer(1, *vertices, 0).unwrap();

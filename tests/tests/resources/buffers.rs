@@ -337,6 +337,58 @@ fn addresses_inside_of_buffers_are_checked() {
     }
 }
 
+/// Beyond what 32 bits count.
+#[test]
+fn large_buffers_are_reached_to_their_ends() {
+    const SIZE: u64 = (5 << 30) + 64;
+    const FAR: u64 = (4 << 30) + 1000;
+    let Some(ctx) = device() else { return };
+    let desc = BufferDesc { size_bytes: SIZE, debug_name: "large", ..Default::default() };
+    let large = match ctx.create_buffer(&desc) {
+        Ok(large) => large,
+        Err(error) => {
+            assert!(
+                matches!(error, Error::LimitExceeded { .. } | Error::OutOfDeviceMemory { .. }),
+                "{error}"
+            );
+            assert!(error.to_string().contains("large"), "{error}");
+            eprintln!("NOT TESTED, the device has no buffers of 5 GiB: {error}");
+            return;
+        }
+    };
+    let bytes = noise(9, 100);
+    ctx.upload_buffer(*large, FAR, &bytes).unwrap();
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.fill_buffer(*large, SIZE - 32, 32, 0x0102_0304).unwrap();
+    cmd.copy_buffer(*large, FAR, *large, 0, 100).unwrap();
+    ctx.submit(cmd).unwrap();
+    assert_eq!(download(&ctx, *large, FAR, 100), bytes);
+    assert_eq!(download(&ctx, *large, 0, 100), bytes);
+    assert_eq!(download(&ctx, *large, SIZE - 8, 8), [4, 3, 2, 1, 4, 3, 2, 1]);
+    let word = u32::from_le_bytes([bytes[4], bytes[5], bytes[6], bytes[7]]);
+    assert_eq!(read_by_address(&ctx, *large, FAR + 4), word);
+}
+
+/// A word of a buffer, as a shader finds it.
+fn read_by_address(ctx: &Context, buffer: lvk::BufferHandle, offset: u64) -> u32 {
+    let pipeline = compute_pipeline(
+        ctx,
+        "layout(local_size_x = 1) in;
+         layout(buffer_reference, scalar) buffer Word { uint value; };
+         layout(push_constant, scalar) uniform Push { Word source; Word target; };
+         void main() { target.value = source.value; }",
+    );
+    let target = words_buffer(ctx, &[0]);
+    let push = [ctx.buffer_address_at(buffer, offset).unwrap(), ctx.buffer_address(*target).unwrap()];
+    let mut cmd = ctx.acquire_command_buffer().unwrap();
+    cmd.bind_compute_pipeline(*pipeline).unwrap();
+    cmd.push_constants(&push).unwrap();
+    let dependencies = Dependencies { read_buffers: &[buffer], buffers: &[*target], ..Default::default() };
+    cmd.dispatch([1, 1, 1], &dependencies).unwrap();
+    ctx.submit(cmd).unwrap();
+    read_words(ctx, *target, 1)[0]
+}
+
 #[test]
 fn more_memory_than_one_allocation_may_have_is_an_error() {
     let Some(ctx) = device() else { return };
