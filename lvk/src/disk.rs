@@ -5,8 +5,8 @@ use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Files beyond this are taken for damage.
-const MOST_BYTES: u64 = 1 << 30;
+/// Caches beyond this are taken for damage.
+pub(crate) const MOST_BYTES: u64 = 1 << 30;
 
 /// FNV-1a with 64 bits: tells damage, not malice.
 pub(crate) fn checksum(parts: &[&[u8]]) -> u64 {
@@ -16,10 +16,10 @@ pub(crate) fn checksum(parts: &[&[u8]]) -> u64 {
     bytes.fold(BASIS, |sum, byte| (sum ^ u64::from(*byte)).wrapping_mul(PRIME))
 }
 
-/// Reads a file; of one that is too large to be a cache only the start, which is then refused as cut off.
-pub(crate) fn read(path: &Path) -> io::Result<Vec<u8>> {
+/// Reads a file; of one that is larger than it can be only the start, which is then refused as cut off.
+pub(crate) fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(MOST_BYTES).read_to_end(&mut bytes)?;
+    File::open(path)?.take(most_bytes).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 

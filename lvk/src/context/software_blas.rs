@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread::Builder;
 
 use super::Context;
 use super::blas_shapes::input;
@@ -161,8 +162,9 @@ fn on_all_cores<T: Send>(
     let lost = |_| Error::usage("create_blas", "a thread that built a tree ended early");
     let waiting = Waiting::here();
     std::thread::scope(|scope| {
-        let helpers: Vec<_> =
-            (1..cores.min(descs.len())).map(|_| scope.spawn(|| waiting.work(work))).collect();
+        let helpers: Vec<_> = (1..cores.min(descs.len()))
+            .map_while(|_| Builder::new().spawn_scoped(scope, || waiting.work(work)).ok())
+            .collect();
         let mut made = work();
         for helper in helpers {
             made.extend(helper.join().map_err(lost)?);

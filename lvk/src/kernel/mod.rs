@@ -222,29 +222,39 @@ mod tests {
         }
     }
 
+    /// Compares the words of a file with its source, or writes them anew.
+    #[cfg(feature = "glsl")]
+    fn expect_words(path: &std::path::Path, text: &str) {
+        let desc = ShaderModuleDesc {
+            stage: ShaderStage::Compute,
+            source: ShaderSource::Glsl(text),
+            debug_name: path.to_str().unwrap(),
+            ..Default::default()
+        };
+        let words = crate::shader::compile(&desc, &Default::default(), None)
+            .unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+        let bytes: &[u8] = bytemuck::cast_slice(&words);
+        if std::env::var("LVK_UPDATE_KERNELS").is_ok() {
+            std::fs::write(path, bytes).unwrap();
+        } else {
+            let same = std::fs::read(path).is_ok_and(|kept| kept == bytes);
+            assert!(same, "{}: set LVK_UPDATE_KERNELS=1 once", path.display());
+        }
+    }
+
     /// `LVK_UPDATE_KERNELS=1 cargo test -p lvk kernel` writes the words anew.
     #[cfg(feature = "glsl")]
     #[test]
     fn the_words_are_those_of_the_source() {
-        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/kernel");
+        let crate_folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+        let folder = crate_folder.join("src/kernel");
+        let read = |path: &std::path::Path| std::fs::read_to_string(path).unwrap();
         for kernel in Kernel::ALL {
             let (file, pieces) = kernel.source();
-            let text: String =
-                pieces.iter().map(|piece| std::fs::read_to_string(folder.join(piece)).unwrap()).collect();
-            let desc = ShaderModuleDesc {
-                stage: ShaderStage::Compute,
-                source: ShaderSource::Glsl(&text),
-                debug_name: file,
-                ..Default::default()
-            };
-            let words = crate::shader::compile(&desc, &Default::default(), None)
-                .unwrap_or_else(|error| panic!("{file}: {error}"));
-            if std::env::var("LVK_UPDATE_KERNELS").is_ok() {
-                let path = folder.join(format!("{file}.comp.spv"));
-                std::fs::write(path, bytemuck::cast_slice::<u32, u8>(&words)).unwrap();
-            } else {
-                assert!(words == kernel.spirv(), "{file}: set LVK_UPDATE_KERNELS=1 once");
-            }
+            let text: String = pieces.iter().map(|piece| read(&folder.join(piece))).collect();
+            expect_words(&folder.join(format!("{file}.comp.spv")), &text);
         }
+        let tests = crate_folder.join("tests");
+        expect_words(&tests.join("spirv_only.comp.spv"), &read(&tests.join("spirv_only.comp.glsl")));
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::cache_file::{CacheOwner, seal, unseal};
-use crate::disk::{checksum, read, replace};
+use crate::disk::{MOST_BYTES, checksum, read, replace};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::lock::{Mutex, Rank};
@@ -85,7 +85,7 @@ impl Drop for PipelineCache {
 
 /// The bytes of the file, if it can be read. A first run has none.
 fn load(path: &Path) -> Option<Vec<u8>> {
-    let error = match read(path) {
+    let error = match read(path, MOST_BYTES) {
         Ok(file) => return Some(file),
         Err(error) => error,
     };

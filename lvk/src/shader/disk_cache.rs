@@ -58,7 +58,7 @@ impl ShaderCache {
         is_same: impl FnOnce(&[Included]) -> bool,
     ) -> Option<Vec<u32>> {
         let path = self.path(key);
-        let file = match read(&path) {
+        let file = match read(&path, MOST_BYTES) {
             Ok(file) => file,
             Err(error) => {
                 if error.kind() != ErrorKind::NotFound {

@@ -13,6 +13,7 @@ pub(crate) mod parts;
 mod ploc;
 pub(crate) mod quality;
 pub(crate) mod sound;
+mod threads;
 pub(crate) mod tlas_blob;
 pub(crate) mod tree;
 pub(crate) mod tree_cache;

@@ -10,7 +10,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
 
-use crate::lock::{Mutex, Rank, Waiting};
+use super::threads::{Build, share_out};
 
 /// Rounds that look at the next neighbours only: most of what is small is paired by them.
 const NEAR_ROUNDS: usize = 2;
@@ -20,8 +20,6 @@ const FAR: usize = 14;
 const FEWEST: usize = 32;
 /// The last so many are left to the rule.
 const LAST: usize = 32;
-/// So many boxes are worth a thread.
-const PER_THREAD: usize = 16_384;
 
 /// A tree of boxes, at least one, with one in each leaf.
 pub(super) fn build(boxes: &[Aabb]) -> Bvh2 {
@@ -32,13 +30,14 @@ pub(super) fn build(boxes: &[Aabb]) -> Bvh2 {
 fn cluster(boxes: &[Aabb]) -> (Bvh2, usize) {
     let mut tree = Bvh2::zeroed(boxes.len());
     tree.primitive_indices = (0..boxes.len() as u32).collect();
-    let mut nodes = sorted(boxes);
+    let build = Build::begin();
+    let mut nodes = sorted(&build, boxes);
     let mut next = Vec::with_capacity(nodes.len());
     let mut partners = vec![0; nodes.len()];
     let (mut rounds, mut searches, mut free) = (0, 0, tree.nodes.len());
     while nodes.len() > 1 {
         let partners = &mut partners[..nodes.len()];
-        find_partners(&nodes, if rounds < NEAR_ROUNDS { 1 } else { FAR }, partners);
+        find_partners(&build, &nodes, if rounds < NEAR_ROUNDS { 1 } else { FAR }, partners);
         pair_more(partners);
         merge(&nodes, partners, &mut tree.nodes[..free], &mut next);
         free -= 2 * (nodes.len() - next.len());
@@ -53,54 +52,34 @@ fn cluster(boxes: &[Aabb]) -> (Bvh2, usize) {
 }
 
 /// The leaves along a Morton curve through their centers.
-fn sorted(boxes: &[Aabb]) -> Vec<Bvh2Node> {
+fn sorted(build: &Build, boxes: &[Aabb]) -> Vec<Bvh2Node> {
     let whole = boxes.iter().fold(Aabb::empty(), |whole, place| whole.union(place));
     let scale = 1.0 / whole.diagonal().as_dvec3().max(DVec3::splat(f64::MIN_POSITIVE));
     let low = whole.min.as_dvec3();
     let mut codes = vec![(0_u64, 0_u32); boxes.len()];
-    let threads = threads(boxes.len());
+    let threads = build.threads(boxes.len());
     let length = boxes.len().div_ceil(threads).max(1);
-    std::thread::scope(|scope| {
-        for (chunk, codes) in codes.chunks_mut(length).enumerate() {
-            let mut work = move || {
-                for (place, number) in codes.iter_mut().zip((chunk * length) as u32..) {
-                    let center = boxes[number as usize].center().as_dvec3();
-                    *place = (morton_encode_u64_unorm((center - low) * scale), number);
-                }
-                codes.sort_unstable();
-            };
-            if threads == 1 { work() } else { drop(scope.spawn(work)) }
+    share_out(threads, codes.chunks_mut(length).enumerate(), |(chunk, codes)| {
+        for (place, number) in codes.iter_mut().zip((chunk * length) as u32..) {
+            let center = boxes[number as usize].center().as_dvec3();
+            *place = (morton_encode_u64_unorm((center - low) * scale), number);
         }
+        codes.sort_unstable();
     });
     // Finds the sorted chunks and merges them.
     codes.sort();
     codes.iter().map(|(_, number)| Bvh2Node::new(boxes[*number as usize], 1, *number)).collect()
 }
 
-fn threads(boxes: usize) -> usize {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    cores.min(boxes / PER_THREAD).max(1)
-}
-
 /// For each node which other, at most `reach` places away, makes the smallest box with it. Of equals the one beside it with
 /// which it makes an even and an odd place, so that boxes that are alike find each other.
-fn find_partners(nodes: &[Bvh2Node], reach: usize, partners: &mut [u32]) {
-    let threads = threads(nodes.len());
-    if threads == 1 {
-        return search(nodes, reach, 0, partners);
-    }
-    let length = nodes.len().div_ceil(threads * 4);
-    let queue = Mutex::new(Rank::TreeWork, partners.chunks_mut(length).enumerate());
-    let next = || queue.lock().next();
-    let work = || {
-        while let Some((chunk, partners)) = next() {
-            search(nodes, reach, chunk * length, partners);
-        }
-    };
-    let waiting = Waiting::here();
-    std::thread::scope(|scope| {
-        (1..threads).for_each(|_| drop(scope.spawn(|| waiting.work(work))));
-        work();
+fn find_partners(build: &Build, nodes: &[Bvh2Node], reach: usize, partners: &mut [u32]) {
+    let threads = build.threads(nodes.len());
+    // More pieces than threads, as some take longer.
+    let pieces = if threads == 1 { 1 } else { threads * 4 };
+    let length = nodes.len().div_ceil(pieces);
+    share_out(threads, partners.chunks_mut(length).enumerate(), |(chunk, partners)| {
+        search(nodes, reach, chunk * length, partners);
     });
 }
 
@@ -265,9 +244,8 @@ mod tests {
 
     #[test]
     fn threads_find_what_one_finds() {
-        let boxes: Vec<_> =
-            (0..5 * PER_THREAD / 2).map(|it| place(somewhere(it), Vec3A::splat(share(it)))).collect();
-        let nodes = sorted(&boxes);
+        let boxes: Vec<_> = (0..40_960).map(|it| place(somewhere(it), Vec3A::splat(share(it)))).collect();
+        let nodes = sorted(&Build::begin(), &boxes);
         for reach in [1, FAR] {
             let [mut one, mut many] = [vec![0; nodes.len()], vec![0; nodes.len()]];
             search(&nodes, reach, 0, &mut one);

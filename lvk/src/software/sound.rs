@@ -51,6 +51,14 @@ impl Expected {
             counts: desc.geometries.iter().map(BlasGeometry::primitive_count).collect(),
         }
     }
+
+    /// More bytes than it has.
+    pub(crate) fn most_bytes(&self) -> u64 {
+        /// A node of eight children, a leaf and three vertices, or a geometry.
+        const EACH: u64 = 256;
+        let primitives: u64 = self.counts.iter().map(|count| u64::from(*count)).sum();
+        (primitives + self.counts.len() as u64 + 16) * EACH
+    }
 }
 
 /// What a sound structure says of itself.

@@ -57,7 +57,7 @@ impl TreeCache {
         build: impl FnOnce() -> BlasBlob,
     ) -> BlasBlob {
         let path = self.folder.join(format!("{:016x}{:016x}.tree", key.0[0], key.0[1]));
-        match read(&path) {
+        match read(&path, HEADER_BYTES as u64 + expected.most_bytes()) {
             Ok(file) => match open(&file, expected) {
                 Ok(blob) => return blob,
                 Err(reason) => log::warn!("the tree '{}' is dropped: {reason}", path.display()),

@@ -122,3 +122,39 @@ fn what_stays_is_hit_while_neighbours_move_far_out() -> Result<()> {
     }
     Ok(())
 }
+
+/// Eight triangles side by side, as large as `size`, and rays down on their middles from as far.
+fn row(size: f32) -> (RayScene, Vec<Ray>) {
+    let corner = |number: u32, x: f32, y: f32| [(number as f32 * 1.5 + x) * size, y * size, 0.25 * size];
+    let positions = (0..8).flat_map(|at| [corner(at, 0.0, 0.0), corner(at, 1.0, 0.0), corner(at, 0.0, 1.0)]);
+    let triangles = (0..8).map(|at| [0, 1, 2].map(|of| at * 3 + of));
+    let mesh = Mesh { positions: positions.collect(), triangles: triangles.collect() };
+    let ray = |at: u32| {
+        let from = Vec3::new((at as f32 * 1.5 + 0.25) * size, 0.25 * size, 1.25 * size);
+        Ray { t_max: 1e30, ..Ray::new(from, -Vec3::Z) }
+    };
+    (RayScene::single(mesh, Layout::Unshared), (0..8).map(ray).collect())
+}
+
+/// Areas by lengths are beyond what floats hold long before either is.
+#[test]
+fn hits_are_as_far_as_triangles_are_large() -> Result<()> {
+    let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return Ok(()) };
+    let tracers = [RayTracer::new(&ctx, Method::Query)?, RayTracer::for_opaque_triangles(&ctx)?];
+    for size in [1e-15, 1e-12, 1e-6, 1.0, 1e6, 1e12, 1e13, 5e13] {
+        let (scene, rays) = row(size);
+        for flags in FLAGS {
+            let gpu = scene.upload_with(&ctx, flags, BuildFlags::default(), 0)?;
+            for tracer in &tracers {
+                for (number, hit) in (0..).zip(tracer.trace(&gpu.tlas, &rays, How::default())?) {
+                    let is_near = (hit.t / size - 1.0).abs() < 1e-5;
+                    assert!(
+                        hit.kind != MISSED && hit.primitive == number && is_near,
+                        "{size}, {flags:?}: {hit:?}"
+                    );
+                }
+            }
+        }
+    }
+    Ok(())
+}

@@ -5,6 +5,7 @@ mod batches;
 mod compaction;
 mod errors;
 mod leftovers;
+mod many_geometries;
 mod order;
 mod rebuilt_elsewhere;
 mod recorded_apart;

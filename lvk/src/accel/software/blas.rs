@@ -8,7 +8,7 @@ use super::geometry::vertex_count;
 use super::layout::Header;
 use super::layout::LeafKind;
 use super::parts::Parts;
-use super::plan::{BlasShape, BlobPlaces, GpuBuildPlan};
+use super::plan::{BlasShape, BlobPlaces, GpuBuildPlan, VERTEX_BYTES};
 use super::refit_plan::{GpuRefitPlan, NodeFormat};
 use crate::accel::desc::BlasDesc;
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
@@ -156,20 +156,27 @@ pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlag
     const IMPROVEMENTS: u32 = 2;
     let boxes = geometries.first().is_some_and(BlasGeometry::is_boxes);
     let sum = |of: fn(&BlasGeometry) -> u32| geometries.iter().map(of).fold(0_u32, u32::saturating_add);
-    let vertex_count = sum(vertex_count);
+    let (primitive_count, vertex_count) = (sum(BlasGeometry::primitive_count), sum(vertex_count));
+    let naming = LeafKind::naming(vertex_count as usize);
     let shape = BlasShape {
         leaf_kind: match (boxes, flags.contains(BuildFlags::LOW_MEMORY) && numbers_fit(geometries)) {
             (true, _) => LeafKind::Boxes,
-            (false, true) => LeafKind::naming(vertex_count as usize),
-            (false, false) => LeafKind::Triangles,
+            (false, true) if saves_memory(naming, primitive_count, vertex_count) => naming,
+            (false, _) => LeafKind::Triangles,
         },
-        primitive_count: sum(BlasGeometry::primitive_count),
+        primitive_count,
         vertex_count,
         geometry_count: geometries.len() as u32,
         leaf_size: if flags.contains(BuildFlags::LOW_MEMORY) { 2 } else { 1 },
         improvements: if flags.contains(BuildFlags::FAST_TRACE) { IMPROVEMENTS } else { 0 },
     };
     GpuBuildPlan::blas(name, &shape)
+}
+
+/// Whether leaves that name vertices, of which all are copied, take less than copies of the corners.
+fn saves_memory(naming: LeafKind, primitives: u32, vertices: u32) -> bool {
+    let leaves = |kind: LeafKind| u64::from(primitives) * kind.primitive_bytes();
+    leaves(naming) + u64::from(vertices) * VERTEX_BYTES < leaves(LeafKind::Triangles)
 }
 
 /// Whether a leaf that names vertices has room for the numbers of geometry and primitive.

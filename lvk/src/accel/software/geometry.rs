@@ -35,7 +35,7 @@ pub(crate) struct GpuGeometry {
 /// matrices that are given by value, a multiple of 16, with 48 bytes for each geometry; `None` where there are none.
 ///
 /// # Errors
-/// A buffer that is gone; more primitives or vertices than 32 bits count.
+/// A buffer that is gone; more primitives than 32 bits count.
 pub(crate) fn gpu_geometries(
     name: &str,
     geometries: &[BlasGeometry],
@@ -59,10 +59,10 @@ pub(crate) fn gpu_geometries(
         };
         let flags = geometry.flags().bits();
         list.push(GpuGeometry { first_primitive: primitives, first_vertex: vertices, flags, ..read });
-        let too_many =
-            || Error::usage(name, "the geometries have more primitives or vertices than 32 bits count");
+        let too_many = || Error::usage(name, "the geometries have more primitives than 32 bits count");
         primitives = primitives.checked_add(geometry.primitive_count()).ok_or_else(too_many)?;
-        vertices = vertices.checked_add(read.vertex_count).ok_or_else(too_many)?;
+        // Of more vertices than this counts leaves hold copies.
+        vertices = vertices.saturating_add(read.vertex_count);
     }
     Ok(list)
 }

@@ -11,7 +11,8 @@ pub(crate) const HEADER_BYTES: u64 = 128;
 /// Bytes of a binary node.
 pub(crate) const NODE_BYTES: u64 = 64;
 const GEOMETRY_BYTES: u64 = 16;
-const VERTEX_BYTES: u64 = 12;
+/// Bytes of a vertex that leaves name.
+pub(crate) const VERTEX_BYTES: u64 = 12;
 const BLOB_ALIGNMENT: u64 = 256;
 /// A leaf's first primitive has 27 bits.
 const MOST_PRIMITIVES: u64 = 1 << 27;

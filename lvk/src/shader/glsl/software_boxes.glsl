@@ -21,6 +21,14 @@ LvkSoftSlabs lvkSoftSlabsOf(vec3 origin, vec3 direction) {
     return LvkSoftSlabs(origin, 1.0 / mix(direction, least, isFlat), octant);
 }
 
+// How much wider boxes in the world must be, as the time a ray takes for it along each axis: in the space of an instance the ray
+// begins elsewhere by some roundings of its origin's coordinates.
+vec3 lvkSoftSlack(LvkSoftSlabs ray) {
+    const float kRoundings = 2e-6;
+    vec3 far = abs(ray.origin);
+    return abs(ray.inverse) * (max(max(far.x, far.y), far.z) * kRoundings);
+}
+
 // The last of the distances at which a ray enters, of which tMin is not negative. As integers, positive floats are in order
 // and before them all negative ones, and devices may have instructions for the most of three integers.
 float lvkSoftLast(vec3 enter, float tMin) {
@@ -35,27 +43,28 @@ float lvkSoftFirst(vec3 leave, float tMax) {
 }
 
 // Where the ray enters and leaves a box, of the range it has left. Which corner is near follows from the direction: a box that
-// holds nothing, whose low corner lies above the high one, is left before it is entered.
-vec2 lvkSoftCross(LvkSoftSlabs ray, vec3 low, vec3 high, vec2 range) {
+// holds nothing, whose low corner lies above the high one, is left before it is entered. Along each axis the box is wider by
+// what a ray takes `slack` for.
+vec2 lvkSoftCross(LvkSoftSlabs ray, vec3 low, vec3 high, vec2 range, vec3 slack) {
     const float kLess = 1.0 - 5e-7, kMore = 1.0 + 5e-7;
     vec3 a = (low - ray.origin) * ray.inverse;
     vec3 b = (high - ray.origin) * ray.inverse;
     bvec3 along = greaterThan(ray.inverse, vec3(0.0));
-    vec3 near = mix(b, a, along);
-    vec3 far = mix(a, b, along);
+    vec3 near = mix(b, a, along) - slack;
+    vec3 far = mix(a, b, along) + slack;
     return vec2(lvkSoftLast(near, range.x) * kLess, lvkSoftFirst(far, range.y) * kMore);
 }
 
 // The children of a binary node that the ray meets, the nearer one first; LVK_SOFT_NONE for each it misses. `nodes` is the
 // block where nodes begin.
-uvec2 lvkSoftMeet2(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint nodes, uint node, vec2 range) {
+uvec2 lvkSoftMeet2(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint nodes, uint node, vec2 range, vec3 slack) {
     uint first = nodes + node * LVK_SOFT_BINARY_NODE_BLOCKS;
     uvec4 a = lvkSoftBlock(blocks, first);
     uvec4 b = lvkSoftBlock(blocks, first + 1u);
     uvec4 c = lvkSoftBlock(blocks, first + 2u);
     uvec4 d = lvkSoftBlock(blocks, first + 3u);
-    vec2 one = lvkSoftCross(ray, uintBitsToFloat(a.xyz), uintBitsToFloat(b.xyz), range);
-    vec2 two = lvkSoftCross(ray, uintBitsToFloat(c.xyz), uintBitsToFloat(d.xyz), range);
+    vec2 one = lvkSoftCross(ray, uintBitsToFloat(a.xyz), uintBitsToFloat(b.xyz), range, slack);
+    vec2 two = lvkSoftCross(ray, uintBitsToFloat(c.xyz), uintBitsToFloat(d.xyz), range, slack);
     uint left = one.x <= one.y ? a.w : LVK_SOFT_NONE;
     uint right = two.x <= two.y ? b.w : LVK_SOFT_NONE;
     bool swap = left == LVK_SOFT_NONE || (right != LVK_SOFT_NONE && two.x < one.x);

@@ -54,9 +54,9 @@ bool lvkSoftPasses(LvkSoftShear ray, vec3 origin, vec3 corners[3], out LvkSoftPa
     if (!kLvkSoftIsCpu && !passes) { // a CPU loses more by a branch that it guesses wrong than by the rest
         return false;
     }
-    float share = 1.0 / whole;
-    passage.t = (areas.x * p.z + areas.y * q.z + areas.z * r.z) * ray.scale * share;
-    passage.barycentrics = areas.yz * share;
+    vec3 shares = areas * (1.0 / whole); // first, as areas by lengths would leave the range of floats
+    passage.t = (shares.x * p.z + shares.y * q.z + shares.z * r.z) * ray.scale;
+    passage.barycentrics = shares.yz;
     bool mirrors = !ray.alongX && !ray.alongZ;
     passage.front = ((whole < 0.0) == (ray.scale > 0.0)) != mirrors;
     return passes;

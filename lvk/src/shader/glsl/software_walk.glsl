@@ -194,7 +194,7 @@ void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
         place.leaves = met.zw;
     } else {
         uvec2 met =
-            lvkSoftMeet2(level.slabs, LvkSoftBlocks(level.structure), level.nodes, place.group.x, range);
+            lvkSoftMeet2(level.slabs, LvkSoftBlocks(level.structure), level.nodes, place.group.x, range, vec3(0.0));
         place.group = uvec2(0u);
         if (met.y != LVK_SOFT_NONE) {
             lvkSoftPushReference(place.top, met.y);
@@ -290,7 +290,7 @@ bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hi
     hit.numbers = uvec2(high.w & 0x7FFFFFFFu, low.w);
     hit.opaque = (high.w & 0x80000000u) != 0u;
     vec2 range = lvkSoftCross(level.slabs, uintBitsToFloat(low.xyz), uintBitsToFloat(high.xyz),
-                              vec2(state.tMin, state.committed.t));
+                              vec2(state.tMin, state.committed.t), vec3(0.0));
     return range.x <= range.y;
 }
 
@@ -359,9 +359,10 @@ uint lvkSoftNextReference(inout LvkSoftPlace place) {
 uint lvkSoftDescend(LvkSoftState state, inout LvkSoftPlace place, uint reference) {
     LvkSoftBlocks tlas = LvkSoftBlocks(state.tlas);
     LvkSoftSlabs slabs = lvkSoftSlabsOf(state.origin, state.direction);
+    vec3 slack = lvkSoftSlack(slabs);
     uint nodes = tlas.at[1].x;
     while ((reference & LVK_SOFT_LEAF) == 0u) {
-        uvec2 met = lvkSoftMeet2(slabs, tlas, nodes, reference, vec2(state.tMin, state.committed.t));
+        uvec2 met = lvkSoftMeet2(slabs, tlas, nodes, reference, vec2(state.tMin, state.committed.t), slack);
         if (met.y != LVK_SOFT_NONE) {
             lvkSoftPushReference(place.top, met.y);
         }
