@@ -9,6 +9,7 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::BlasBody;
 use crate::accel::compaction::SizeQuery;
 use crate::accel::primitive_map::PrimitiveMap;
+use crate::accel::raw_structure::RawStructure;
 use crate::barrier::{Stages, Use};
 use crate::error::Result;
 use crate::resource::{Buffer, QueryPool};
@@ -73,12 +74,12 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Writes each part as bytes to its address, a multiple of 256 in `buffer`
+    /// Writes each of `structures`, parts of `target`, as bytes to its address, a multiple of 256 in `buffer`
     /// (`vkCmdCopyAccelerationStructureToMemoryKHR`).
     pub(crate) fn serialize_parts(
         &mut self,
         target: &AccelStruct,
-        body: &BlasBody,
+        structures: &[RawStructure],
         buffer: &Buffer,
         addresses: &[u64],
     ) -> Result<()> {
@@ -87,7 +88,7 @@ impl CommandBuffer {
         self.notes.uses.id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
         self.use_buffer(buffer, Use::accel_to_memory());
         self.flush();
-        for (part, address) in body.structures.iter().zip(addresses) {
+        for (part, address) in structures.iter().zip(addresses) {
             let info = vk::CopyAccelerationStructureToMemoryInfoKHR::default()
                 .src(part.raw)
                 .dst(vk::DeviceOrHostAddressKHR { device_address: *address })
@@ -98,7 +99,7 @@ impl CommandBuffer {
         Ok(())
     }
 
-    /// Makes each part from bytes at its address, a multiple of 256 in `buffer`
+    /// Makes the parts from `first` on from bytes at an address for each, a multiple of 256 in `buffer`
     /// (`vkCmdCopyMemoryToAccelerationStructureKHR`).
     ///
     /// # Safety
@@ -106,6 +107,7 @@ impl CommandBuffer {
     pub(crate) unsafe fn deserialize_parts(
         &mut self,
         target: &Arc<AccelStruct>,
+        first: usize,
         buffer: &Buffer,
         addresses: &[u64],
     ) -> Result<()> {
@@ -115,7 +117,7 @@ impl CommandBuffer {
         self.use_copy(target);
         self.use_buffer(buffer, Use::accel_from_memory());
         self.flush();
-        for (part, address) in body.structures.iter().zip(addresses) {
+        for (part, address) in body.structures.iter().skip(first).zip(addresses) {
             let info = vk::CopyMemoryToAccelerationStructureInfoKHR::default()
                 .src(vk::DeviceOrHostAddressConstKHR { device_address: *address })
                 .dst(part.raw)
@@ -123,6 +125,12 @@ impl CommandBuffer {
             // SAFETY: the caller's promise, and the driver said that it can read the bytes.
             unsafe { ext.cmd_copy_memory_to_acceleration_structure(self.raw(), &info) };
         }
+        Ok(())
+    }
+
+    /// Readies a structure whose parts were all made from bytes for what may come.
+    pub(crate) fn prepare_deserialized(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
+        let body = target.blas()?.body();
         if is_ever_built(target, &body) {
             // A refit reads the same indices as the build did.
             return self.gather_inputs(std::slice::from_ref(target), &[false]);

@@ -1,5 +1,6 @@
 //! Bottom-level structures as bytes, so that a scene can be kept on disk.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use ash::vk;
@@ -28,6 +29,8 @@ use crate::shared::Garbage;
 
 /// Addresses of serialised structures are multiples of this.
 const ALIGNMENT: u64 = 256;
+/// Bytes of parts that go through one buffer, which devices bound; a larger part goes alone.
+const MOST_AT_ONCE: u64 = 256 << 20;
 
 /// A structure from [`Context::load_or_create_blas`].
 pub struct LoadedBlas {
@@ -131,6 +134,21 @@ impl Context {
     }
 
     fn serialized_parts(&self, object: &AccelStruct, body: &BlasBody, sizes: &[u64]) -> Result<Vec<Vec<u8>>> {
+        let mut all = Vec::with_capacity(sizes.len());
+        for group in groups(sizes, self.most_at_once()) {
+            let structures = &body.structures[group.clone()];
+            all.extend(self.serialized_group(object, structures, &sizes[group])?);
+        }
+        Ok(all)
+    }
+
+    /// Parts that go through one buffer.
+    fn serialized_group(
+        &self,
+        object: &AccelStruct,
+        structures: &[RawStructure],
+        sizes: &[u64],
+    ) -> Result<Vec<Vec<u8>>> {
         let places = Places::new(sizes);
         let buffer = self.blob_buffer(&object.name, places.total)?;
         let base = buffer.address.next_multiple_of(ALIGNMENT);
@@ -138,7 +156,7 @@ impl Context {
         let mut bytes = vec![0; places.total as usize];
         self.read_back(places.total, &mut bytes, |cmd, target| {
             self.shared().retire(Garbage::Buffer(Arc::clone(&buffer)));
-            cmd.serialize_parts(object, body, &buffer, &addresses)?;
+            cmd.serialize_parts(object, structures, &buffer, &addresses)?;
             cmd.copy_buffer_objects(
                 &buffer,
                 target,
@@ -225,20 +243,47 @@ impl Context {
         built.map(|built| self.fill_software(&object, &built)).transpose()?;
         self.before_next_submission(|cmd| cmd.build_software_of(&object))?;
         let sizes: Vec<_> = blob.parts.iter().map(|part| part.driver.len() as u64).collect();
-        let places = Places::new(&sizes);
-        let buffer = self.blob_buffer(name, places.total)?;
+        for group in groups(&sizes, self.most_at_once()) {
+            let (first, parts) = (group.start, &blob.parts[group.clone()]);
+            // SAFETY: the caller's promise; the structures have the sizes the data says.
+            unsafe { self.deserialize_group(&object, first, parts, &sizes[group]) }?;
+        }
+        self.before_next_submission(|cmd| cmd.prepare_deserialized(&object))?;
+        Ok(holder)
+    }
+
+    /// Parts from `first` on, which go through one buffer.
+    ///
+    /// # Safety
+    /// The driver wrote the parts' data, and the structures have the sizes it says.
+    unsafe fn deserialize_group(
+        &self,
+        object: &Arc<AccelStruct>,
+        first: usize,
+        parts: &[BlobPart],
+        sizes: &[u64],
+    ) -> Result<()> {
+        let places = Places::new(sizes);
+        let buffer = self.blob_buffer(&object.name, places.total)?;
         let base = buffer.address.next_multiple_of(ALIGNMENT);
         let addresses: Vec<_> = places.offsets.iter().map(|offset| base + offset).collect();
-        let mut drivers = blob.parts.iter().zip(&places.offsets);
         let start = base - buffer.address;
+        let mut drivers = parts.iter().zip(&places.offsets);
         let uploaded =
             drivers.try_for_each(|(part, offset)| self.upload_object(&buffer, start + offset, &part.driver));
         let recorded = uploaded.and_then(|()| {
-            // SAFETY: the caller's promise; the structures have the sizes the data says, at addresses for them.
-            self.before_next_submission(|cmd| unsafe { cmd.deserialize_parts(&object, &buffer, &addresses) })
+            // SAFETY: the caller's promise; the addresses are those of the parts.
+            self.before_next_submission(|cmd| unsafe {
+                cmd.deserialize_parts(object, first, &buffer, &addresses)
+            })
         });
-        shared.retire(Garbage::Buffer(buffer));
-        recorded.map(|()| holder)
+        self.shared().retire(Garbage::Buffer(buffer));
+        recorded
+    }
+
+    /// Bytes of parts that go through one buffer.
+    fn most_at_once(&self) -> u64 {
+        MOST_AT_ONCE.min(self.shared().gpu.caps.limits.max_accel_structure_bytes)
     }
 
     /// The shapes of loaded parts, with their tables. `bytes` is how large each part will be.
@@ -278,6 +323,22 @@ fn loaded_plans(blob: &Blob, counts: &[u32]) -> Option<Vec<Option<PartPlan>>> {
 
 fn rejected(desc: &BlasDesc<'_>, reason: impl Into<String>) -> Error {
     Error::Serialized { object: desc.debug_name.to_owned(), reason: reason.into() }
+}
+
+/// Parts of these sizes in groups of at most so many bytes, or of one part that is larger.
+fn groups(sizes: &[u64], most: u64) -> Vec<Range<usize>> {
+    let (mut groups, mut start, mut sum) = (Vec::new(), 0, 0_u64);
+    for (index, size) in sizes.iter().map(|size| size.next_multiple_of(ALIGNMENT)).enumerate() {
+        sum = sum.saturating_add(size);
+        if index > start && sum > most {
+            groups.push(start..index);
+            (start, sum) = (index, size);
+        }
+    }
+    if start < sizes.len() {
+        groups.push(start..sizes.len());
+    }
+    groups
 }
 
 /// Where each of several blobs starts.
@@ -328,4 +389,31 @@ fn check_same_mesh(desc: &BlasDesc<'_>, blob: &Blob) -> Result<(), String> {
         return Err("it was built from other geometries".to_owned());
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        /// Groups have each part once and in order, take as many as they may, and no group more than one part for nothing.
+        #[test]
+        fn groups_are_as_large_as_they_may_be(
+            sizes in prop::collection::vec(1..5_000_u64, 0..40),
+            most in 256..20_000_u64
+        ) {
+            let groups = groups(&sizes, most);
+            let listed: Vec<usize> = groups.iter().cloned().flatten().collect();
+            prop_assert_eq!(listed, (0..sizes.len()).collect::<Vec<_>>());
+            let bytes = |group: Range<usize>| Places::new(&sizes[group]).total;
+            for group in &groups {
+                prop_assert!(group.len() == 1 || bytes(group.clone()) <= most);
+            }
+            for pair in groups.windows(2) {
+                prop_assert!(bytes(pair[0].start..pair[1].start + 1) > most, "there was room for one more");
+            }
+        }
+    }
 }

@@ -118,7 +118,7 @@ impl Plan<'_> {
         // SAFETY: the folder is the program's own, whose files `keep` alone writes.
         match unsafe { self.ctx.load_blas(desc, &bytes) } {
             Ok(blas) => Ok(Found::Loaded(blas)),
-            Err(error @ Error::Serialized { .. }) => {
+            Err(error) if is_of_file(&error) => {
                 log::warn!("the structure '{}' is dropped: {error}", cache.path(key).display());
                 Ok(Found::Refused)
             }
@@ -197,7 +197,13 @@ impl Plan<'_> {
         progress.stage("keeping acceleration structures", built.len() as u64);
         for (done, (blas, key)) in (1..).zip(built) {
             progress.go_on()?;
-            cache.keep(*key, &self.ctx.serialize_blas(*blas.holder)?);
+            match self.ctx.serialize_blas(*blas.holder) {
+                Ok(bytes) => cache.keep(*key, &bytes),
+                Err(error) if is_of_file(&error) => {
+                    log::warn!("the structure '{}' cannot be kept: {error}", cache.path(*key).display());
+                }
+                Err(error) => return Err(error.into()),
+            }
             progress.set(done);
         }
         Ok(())
@@ -220,6 +226,12 @@ impl Plan<'_> {
             ..TlasDesc::default()
         })
     }
+}
+
+/// Whether only the next start is slower for it: what is in a file, or has no room beside the structure.
+fn is_of_file(error: &Error) -> bool {
+    use Error::{LimitExceeded, OutOfDeviceMemory, Serialized};
+    matches!(error, Serialized { .. } | LimitExceeded { .. } | OutOfDeviceMemory { .. })
 }
 
 /// Structures of so many triangles each, cut into batches in their order.

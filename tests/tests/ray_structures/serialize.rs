@@ -30,6 +30,8 @@ fn split_device() -> Option<TestDevice> {
     let profile = DeviceProfile {
         name: "small structures".into(),
         max_blas_primitives: MOST_PRIMITIVES,
+        // A few parts: they go through several buffers.
+        max_accel_structure_bytes: 64 << 10,
         ..DeviceProfile::default()
     };
     device_with(|desc| desc.profile = Some(&profile))
