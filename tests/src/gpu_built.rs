@@ -41,6 +41,24 @@ pub fn scattered(count: usize, seed: u64) -> Vec<[[f32; 3]; 3]> {
     (0..count).map(|_| triangle()).collect()
 }
 
+/// Triangles whose codes make a tree of paths that lose one at a time: wide nodes of it have only eight triangles, for which
+/// there is no room.
+pub fn uneven(side: u16) -> Vec<[[f32; 3]; 3]> {
+    const LONG: u16 = 24;
+    const SIZE: f32 = 0.25;
+    let mut triangles = Vec::new();
+    for place in 0..side.pow(3) {
+        let cell = [place % side, place / side % side, place / side / side].map(f32::from);
+        for step in 0..LONG {
+            let mut corner = cell;
+            corner[usize::from(step % 3)] += 0.5_f32.powi(i32::from(step / 3) + 1);
+            let [x, y, z] = corner;
+            triangles.push([corner, [x + SIZE, y, z], [x, y + SIZE, z + SIZE]]);
+        }
+    }
+    triangles
+}
+
 /// One geometry of triangles without indices.
 pub fn triangles(vertices: BufferHandle, count: usize) -> BlasGeometry {
     BlasGeometry::Triangles(Triangles::packed(vertices, count as u32 * 3))
@@ -53,8 +71,8 @@ pub fn boxes(buffer: BufferHandle, count: usize) -> BlasGeometry {
 }
 
 /// Builds one structure.
-pub fn build(ctx: &Context, geometries: &[BlasGeometry], leaf_size: u32) -> GpuStructure {
-    let desc = GpuBlasDesc { geometries, leaf_size, improvements: 1, leaves: Leaves::Corners };
+pub fn build(ctx: &Context, geometries: &[BlasGeometry]) -> GpuStructure {
+    let desc = GpuBlasDesc { geometries, improvements: 1, leaves: Leaves::Corners };
     build_blas(ctx, &[desc]).expect("the build is recorded").remove(0)
 }
 

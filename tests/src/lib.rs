@@ -2,6 +2,7 @@
 
 pub mod agreement;
 pub mod bender;
+pub mod binary_tree;
 pub mod board;
 pub mod broken_shaders;
 pub mod child;

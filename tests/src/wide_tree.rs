@@ -52,7 +52,8 @@ fn child_sizes(count: usize) -> [usize; CHILDREN] {
     std::array::from_fn(|child| take(if child < CHILDREN - 2 { share.min(count) } else { LEAF }))
 }
 
-fn assemble(count: usize, nodes: &[[u32; NODE_WORDS]]) -> Vec<u32> {
+/// A structure of these nodes, the root of which is the first.
+pub(crate) fn assemble<const WORDS: usize>(count: usize, nodes: &[[u32; WORDS]]) -> Vec<u32> {
     let mut words = vec![0; HEADER_WORDS];
     let mut add = |part: &mut dyn Iterator<Item = u32>| -> u32 {
         words.resize(words.len().next_multiple_of(4), 0);

@@ -17,6 +17,9 @@ use crate::resource::Buffer;
 use crate::software::gpu_build::steps::{Step, build_steps, refit_steps};
 
 #[cfg(feature = "test-hooks")]
+#[path = "collapse_test.rs"]
+pub(crate) mod collapse_test;
+#[cfg(feature = "test-hooks")]
 #[path = "sort_test.rs"]
 pub(crate) mod sort_test;
 

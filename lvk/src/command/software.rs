@@ -41,11 +41,11 @@ pub(super) struct SoftwareWork {
     moves: Vec<Move>,
 }
 
-/// A structure that the CPU built and that lies elsewhere from now on.
+/// A structure that the CPU built and that has a tree of the GPU from now on.
 struct Move {
     target: ResourceId,
-    body: Arc<SoftwareBody>,
-    header: MovedHeader,
+    /// What it leaves if that lies elsewhere, and what has to be said there.
+    left: Option<(Arc<SoftwareBody>, MovedHeader)>,
 }
 
 impl CommandBuffer {
@@ -180,14 +180,16 @@ impl CommandBuffer {
             (false, Origin::Cpu { rebuild, .. }, _) => {
                 let rebuilt = software.rebuilt_or(|| self.room_for(target, rebuild))?;
                 work.builds.push(build_of(rebuild, rebuilt));
+                let is_elsewhere = !Arc::ptr_eq(rebuilt, &software.body);
                 let header = MovedHeader { format: MOVED, leaf_kind: 0, address: rebuilt.address };
-                work.moves.push(Move { target: target.id, body: Arc::clone(&software.body), header });
+                let left = is_elsewhere.then(|| (Arc::clone(&software.body), header));
+                work.moves.push(Move { target: target.id, left });
             }
         }
         Ok(())
     }
 
-    /// Where a structure that the CPU built lies at the next command, if a rebuild has moved it.
+    /// Where a structure that the CPU built lies at the next command, if it was rebuilt.
     pub(super) fn moved_tree<'a>(
         &self,
         target: &AccelStruct,
@@ -209,10 +211,10 @@ impl CommandBuffer {
         gpu_geometries(&target.name, &blas.geometries, &find, matrices)
     }
 
-    /// Has a body refer to another.
+    /// Has the body that a structure leaves refer to the other one.
     fn record_move(&mut self, moved: &Move) {
-        let Move { target, body, header } = moved;
-        self.notes.moved.insert(target.0);
+        self.notes.moved.insert(moved.target.0);
+        let Some((body, header)) = &moved.left else { return };
         self.use_buffer(body.buffer(), Use::transfer_write());
         self.notes.uses.accumulate(self.shared.all_blas, Use::transfer_write());
         self.flush();

@@ -13,7 +13,7 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasBody};
 use crate::accel::blob::Blob;
 use crate::accel::desc::BlasDesc;
-use crate::accel::software::blas::{Origin, SoftwareBlas, builds_on_gpu, gpu_plan, refit_plan};
+use crate::accel::software::blas::{Origin, SoftwareBlas, body_bytes, builds_on_gpu, gpu_plan, refit_plan};
 use crate::accel::software::body::SoftwareBody;
 use crate::accel::software::parts::Parts;
 use crate::command::transfer::BufferCopy;
@@ -78,7 +78,8 @@ impl Context {
             Some(blob) => {
                 let refit = refit_plan(&blob.header(), desc);
                 let parts = if refit.is_some() { Parts::whole(blob.bounds) } else { parts(blob) };
-                (blob.bytes.len() as u64, Origin::Cpu { refit, rebuild: plan, parts: Arc::new(parts) })
+                let bytes = body_bytes(blob.bytes.len() as u64, refit.as_ref(), &plan);
+                (bytes, Origin::Cpu { refit, rebuild: plan, parts: Arc::new(parts) })
             }
             None => (plan.blob_bytes, Origin::Gpu(plan)),
         };

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::Context;
 use crate::accel::geometry::BlasGeometry;
 use crate::accel::software::geometry::gpu_geometries;
-use crate::accel::software::layout::LeafKind;
+use crate::accel::software::layout::{DEEPEST_WIDE, LeafKind};
 use crate::accel::software::plan::{BlasShape, BlobPlaces, BuildSource, GpuBuildPlan};
 use crate::accel::software::refit_plan::{GpuRefitPlan, NodeFormat};
 use crate::command::gpu_build::{GpuBuild, GpuRefit};
@@ -21,6 +21,9 @@ use crate::kernel::Kernel;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage};
 pub use crate::software::gpu_build::check::{Bounds, EMPTY, Facts, check_structure};
+pub use crate::software::gpu_build::collapse::{
+    Below, BinaryChild, BinaryTree, WideChild, WideTree, any_tree,
+};
 use crate::swapchain::decide::Failure;
 
 const ALIGNMENT: u64 = 256;
@@ -76,7 +79,6 @@ pub fn waiting_objects(ctx: &Context) -> Result<usize> {
 /// A bottom-level structure to build.
 pub struct GpuBlasDesc<'a> {
     pub geometries: &'a [BlasGeometry],
-    pub leaf_size: u32,
     pub improvements: u32,
     pub leaves: Leaves,
 }
@@ -106,7 +108,6 @@ pub fn build_blas(ctx: &Context, descs: &[GpuBlasDesc<'_>]) -> Result<Vec<GpuStr
             primitive_count: desc.geometries.iter().map(BlasGeometry::primitive_count).sum(),
             vertex_count: geometries.iter().map(|geometry| geometry.vertex_count).sum(),
             geometry_count: geometries.len() as u32,
-            leaf_size: desc.leaf_size,
             improvements: desc.improvements,
         };
         let plan = GpuBuildPlan::blas("test", &shape)?;
@@ -207,6 +208,20 @@ pub fn sort(ctx: &Context, keys: &[u64], low_bits: u32) -> Result<Vec<(u64, u32)
     Ok(sorter.sorted(&words))
 }
 
+/// The wide tree that the kernels make of a binary one of more than three primitives, `None` where it had no room; and how many
+/// nodes have.
+pub fn collapse(ctx: &Context, tree: &BinaryTree) -> Result<(Option<WideTree>, usize)> {
+    let collapser = crate::command::gpu_build::collapse_test::Collapser::new(tree)?;
+    let (buffer, address) = memory(ctx, collapser.bytes())?;
+    let offset = address - ctx.buffer_address(*buffer)?;
+    ctx.upload_buffer(*buffer, offset, bytemuck::cast_slice(&collapser.words()))?;
+    let target = ctx.shared().store.buffers.get(*buffer)?;
+    record(ctx, |cmd| collapser.record(cmd, &target, address))?;
+    let mut words = vec![0_u32; (collapser.bytes() / 4) as usize];
+    ctx.download_buffer(*buffer, offset, bytemuck::cast_slice_mut(&mut words))?;
+    Ok((collapser.collapsed(&words), collapser.room()))
+}
+
 /// Compiles every kernel, after telling its name.
 pub fn compile_kernels(ctx: &Context, tell: &mut dyn FnMut(&str)) -> Result<()> {
     let shared = ctx.shared();
@@ -239,7 +254,10 @@ fn memory(ctx: &Context, bytes: u64) -> Result<(Holder<BufferHandle>, u64)> {
 fn room(ctx: &Context, plan: &GpuBuildPlan) -> Result<(GpuStructure, Arc<Buffer>)> {
     let (buffer, address) = memory(ctx, plan.blob_bytes)?;
     let target = ctx.shared().store.buffers.get(*buffer)?;
-    let most_height = plan.most_height();
+    let most_height = match plan.leaf_kind {
+        LeafKind::Instances => plan.most_height(),
+        _ => DEEPEST_WIDE as u32,
+    };
     let refit = GpuRefitPlan::of_build(plan);
     Ok((GpuStructure { buffer, address, most_height, bytes: plan.blob_bytes, plan: refit }, target))
 }

@@ -71,19 +71,29 @@ kernels! {
     SortScan = "build/sort_scan", ["build/job.glsl", "build/rank.glsl", "build/sort_scan.comp.glsl"];
     /// Moves codes to where they belong.
     SortScatter = "build/sort_scatter", ["build/job.glsl", "build/rank.glsl", "build/sort_scatter.comp.glsl"];
-    /// The hierarchy and the leaves of triangles and boxes.
+    /// The hierarchy.
     BuildTree = "build/tree",
-        ["build/job.glsl", "build/box.glsl", "build/input.glsl", "build/leaf.glsl", "build/leaf_write.glsl",
-         "build/arrivals.glsl", "build/tree.glsl", "build/contents.glsl", "build/tree.comp.glsl"];
-    /// The hierarchy of instances.
-    BuildTlasTree = "build/tlas_tree",
-        ["build/job.glsl", "build/arrivals.glsl", "build/tree.glsl", "build/tlas_tree.comp.glsl"];
+        ["build/job.glsl", "build/arrivals.glsl", "build/tree.glsl", "build/tree.comp.glsl"];
     /// No child has arrived at any node.
     ResetArrivals = "build/arrivals", ["build/job.glsl", "build/arrivals.glsl", "build/arrivals.comp.glsl"];
     /// Boxes of binary nodes, and better places for them.
     BuildImprove = "build/improve",
-        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
+        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_input.glsl",
          "build/arrivals.glsl", "build/node.glsl", "build/rotate.glsl", "build/fit.glsl", "build/improve.comp.glsl"];
+    /// A level of wide nodes, of binary ones.
+    Collapse = "build/collapse",
+        ["build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_input.glsl", "build/node.glsl",
+         "build/wide.glsl", "build/encode.glsl", "build/collapse.glsl", "build/collapse.comp.glsl"];
+    /// Everything of a bottom-level structure but its nodes.
+    Place = "build/place",
+        ["build/job.glsl", "build/box.glsl", "build/input.glsl", "build/leaf.glsl", "build/leaf_write.glsl",
+         "build/arrivals.glsl", "build/node.glsl", "build/wide.glsl", "build/packed.glsl", "build/place.glsl",
+         "build/place.comp.glsl"];
+    /// Boxes of wide nodes, where there was no room for those made of binary ones.
+    FitPacked = "build/fit_packed",
+        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
+         "build/arrivals.glsl", "build/node.glsl", "build/wide.glsl", "build/encode.glsl", "build/packed.glsl",
+         "build/fit_wide.glsl", "build/fit_packed.comp.glsl"];
     /// Boxes of binary nodes.
     FitBinary = "build/fit",
         ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
@@ -91,22 +101,28 @@ kernels! {
     /// Boxes of wide nodes.
     FitWide = "build/fit_wide",
         ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
-         "build/wide.glsl", "build/fit_wide.glsl", "build/fit_wide.comp.glsl"];
+         "build/wide.glsl", "build/encode.glsl", "build/fit_wide.glsl", "build/fit_wide.comp.glsl"];
     /// Primitives of leaves from inputs that moved.
     RefitLeaves = "build/refit",
         ["build/job.glsl", "build/box.glsl", "build/input.glsl", "build/leaf.glsl", "build/leaf_write.glsl",
          "build/arrivals.glsl", "build/wide.glsl", "build/refit.glsl", "build/refit.comp.glsl"];
-    /// A whole bottom-level structure by one workgroup.
+    /// The binary tree of a whole bottom-level structure by one workgroup.
     BuildSmallBlas = "build/small_blas",
         ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/input.glsl",
-         "build/code.glsl", "build/rank.glsl", "build/leaf.glsl", "build/kept_any.glsl", "build/leaf_write.glsl",
-         "build/arrivals.glsl", "build/tree.glsl", "build/contents.glsl", "build/node.glsl", "build/rotate.glsl",
-         "build/fit.glsl", "build/small_blas.comp.glsl", "build/small.glsl"];
+         "build/code.glsl", "build/rank.glsl", "build/leaf.glsl", "build/kept_input.glsl", "build/arrivals.glsl",
+         "build/tree.glsl", "build/node.glsl", "build/rotate.glsl", "build/fit.glsl", "build/meet.glsl",
+         "build/small_blas.comp.glsl", "build/small.glsl"];
+    /// The rest of such a structure by one workgroup.
+    BuildSmallWide = "build/small_wide",
+        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/input.glsl", "build/leaf.glsl",
+         "build/kept_any.glsl", "build/leaf_write.glsl", "build/arrivals.glsl", "build/node.glsl", "build/wide.glsl",
+         "build/encode.glsl", "build/collapse.glsl", "build/packed.glsl", "build/place.glsl", "build/fit_wide.glsl",
+         "build/meet.glsl", "build/small_wide.comp.glsl"];
     /// A whole top-level structure by one workgroup.
     BuildSmallTlas = "build/small_tlas",
         ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/instance.glsl",
-         "build/code.glsl", "build/rank.glsl", "build/leaf.glsl", "build/kept_instance.glsl", "build/arrivals.glsl",
-         "build/tree.glsl", "build/node.glsl", "build/rotate.glsl", "build/fit.glsl",
+         "build/code.glsl", "build/rank.glsl", "build/leaf.glsl", "build/kept_input.glsl", "build/arrivals.glsl",
+         "build/tree.glsl", "build/node.glsl", "build/rotate.glsl", "build/fit.glsl", "build/meet.glsl",
          "build/small_tlas.comp.glsl", "build/small.glsl"];
 }
 

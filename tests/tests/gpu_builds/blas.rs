@@ -4,29 +4,20 @@
 use lvk::test_hooks::{EMPTY, GpuBlasDesc, Leaves, build_blas};
 use lvk::{BlasGeometry, GeometryFlags, GeometryTransform, IndexFormat, Indices, Triangles, VertexFormat};
 use lvk_tests::device;
-use lvk_tests::gpu_built::{boxes, build, check_contents, facts, input, numbered, scattered, triangles};
+use lvk_tests::gpu_built::{
+    boxes, build, check_contents, facts, input, numbered, scattered, triangles, uneven,
+};
 
 #[test]
 fn every_triangle_is_in_one_leaf() {
     let Some(ctx) = device() else { return };
-    for (count, leaf_size) in [
-        (0, 2),
-        (1, 2),
-        (2, 2),
-        (3, 2),
-        (3, 1),
-        (100, 4),
-        (2048, 2),
-        (2049, 2),
-        (2049, 8),
-        (5000, 1),
-        (30_000, 3),
-    ] {
+    for count in [0, 1, 2, 3, 4, 5, 24, 25, 100, 2048, 2049, 5000, 30_000] {
         let corners = scattered(count, 7);
         let vertices = input(&ctx, &corners);
-        let found = facts(&ctx, &build(&ctx, &[triangles(*vertices, count)], leaf_size));
+        let found = facts(&ctx, &build(&ctx, &[triangles(*vertices, count)]));
         check_contents(&found, &numbered(&corners));
-        assert_eq!(found.node_count, (count as u32).div_ceil(leaf_size).saturating_sub(1));
+        let nodes = found.node_count as usize;
+        assert!(nodes <= if count > 3 { count / 10 + 2 } else { 0 }, "{nodes} nodes of {count}");
         if count == 0 {
             assert_eq!(found.bounds, EMPTY);
         }
@@ -42,7 +33,7 @@ fn many_structures_are_built_side_by_side() {
     let geometries: Vec<_> =
         vertices.iter().zip(counts).map(|(vertices, count)| [triangles(**vertices, count)]).collect();
     let leaves = Leaves::Corners;
-    let desc = |geometries| GpuBlasDesc { geometries, leaf_size: 2, improvements: 1, leaves };
+    let desc = |geometries| GpuBlasDesc { geometries, improvements: 1, leaves };
     let descs: Vec<_> = geometries.iter().map(|geometries| desc(&geometries[..])).collect();
     for (structure, corners) in build_blas(&ctx, &descs).unwrap().iter().zip(&meshes) {
         check_contents(&facts(&ctx, structure), &numbered(corners));
@@ -55,9 +46,36 @@ fn equal_triangles_make_a_low_tree() {
     for count in [2000, 6000] {
         let corners = vec![[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, -9.0]]; count];
         let vertices = input(&ctx, &corners);
-        let found = facts(&ctx, &build(&ctx, &[triangles(*vertices, count)], 1));
+        let found = facts(&ctx, &build(&ctx, &[triangles(*vertices, count)]));
         check_contents(&found, &numbered(&corners));
-        assert!(found.height <= 13, "{}", found.height);
+        assert!(found.height <= 7, "{}", found.height);
+    }
+}
+
+/// How many nodes it takes if all of them are full.
+fn full_nodes(count: usize) -> u32 {
+    let mut level = count.div_ceil(24);
+    let mut all = level;
+    while level > 1 {
+        level = level.div_ceil(8);
+        all += level;
+    }
+    all as u32
+}
+
+#[test]
+fn trees_that_leave_nodes_empty_are_packed() {
+    let Some(ctx) = device() else { return };
+    for side in [4, 8] {
+        let corners = uneven(side);
+        let vertices = input(&ctx, &corners);
+        let geometries = [triangles(*vertices, corners.len())];
+        for leaves in [Leaves::Corners, Leaves::Indexed, Leaves::Packed] {
+            let desc = GpuBlasDesc { geometries: &geometries, improvements: 0, leaves };
+            let found = facts(&ctx, &build_blas(&ctx, &[desc]).unwrap()[0]);
+            check_contents(&found, &numbered(&corners));
+            assert_eq!(found.node_count, full_nodes(corners.len()));
+        }
     }
 }
 
@@ -70,12 +88,12 @@ fn inactive_triangles_are_left_out() {
             corners[i][i % 2][0] = f32::NAN;
         }
         let vertices = input(&ctx, &corners);
-        let found = facts(&ctx, &build(&ctx, &[triangles(*vertices, count)], 2));
+        let found = facts(&ctx, &build(&ctx, &[triangles(*vertices, count)]));
         let mut expected = numbered(&corners);
         expected.retain(|(_, corners)| corners.iter().flatten().all(|number| number.is_finite()));
         check_contents(&found, &expected);
         let nothing = input(&ctx, &vec![[[f32::NAN; 3]; 3]; count]);
-        assert_eq!(facts(&ctx, &build(&ctx, &[triangles(*nothing, count)], 2)).bounds, EMPTY);
+        assert_eq!(facts(&ctx, &build(&ctx, &[triangles(*nothing, count)])).bounds, EMPTY);
     }
 }
 
@@ -84,7 +102,7 @@ fn degenerate_triangles_are_kept() {
     let Some(ctx) = device() else { return };
     let corners = [[[1.0; 3]; 3], [[0.0; 3]; 3], [[2.0; 3], [2.0; 3], [3.0; 3]]];
     let vertices = input(&ctx, &corners);
-    check_contents(&facts(&ctx, &build(&ctx, &[triangles(*vertices, 3)], 1)), &numbered(&corners));
+    check_contents(&facts(&ctx, &build(&ctx, &[triangles(*vertices, 3)])), &numbered(&corners));
 }
 
 #[test]
@@ -102,7 +120,7 @@ fn boxes_are_built_around() {
             list[7][0][0] = f32::NAN;
         }
         let buffer = input(&ctx, &list);
-        let found = facts(&ctx, &build(&ctx, &[boxes(*buffer, count)], 2));
+        let found = facts(&ctx, &build(&ctx, &[boxes(*buffer, count)]));
         let expected: Vec<_> = (0..)
             .zip(&list)
             .filter(|(_, corners)| !corners[0][0].is_nan())
@@ -213,7 +231,7 @@ fn all_formats_strides_indices_and_matrices_are_read() {
                 flags: GeometryFlags::OPAQUE,
                 ..Triangles::packed(*vertices, 3)
             };
-            let found = facts(&ctx, &build(&ctx, &[BlasGeometry::Triangles(geometry)], 2));
+            let found = facts(&ctx, &build(&ctx, &[BlasGeometry::Triangles(geometry)]));
             let [a, b, c] = corners.map(moved);
             let expected = match index {
                 None => vec![((0, 0), vec![a, b, c])],
@@ -230,7 +248,7 @@ fn indices_beyond_the_vertices_make_inactive_triangles() {
     let vertices = input(&ctx, &scattered(1, 1));
     let indices = input(&ctx, &[0_u32, 1, 2, 0, 1, 3, u32::MAX, 0, 0]);
     let geometry = BlasGeometry::Triangles(Triangles::indexed(*vertices, 3, *indices, 3));
-    check_contents(&facts(&ctx, &build(&ctx, &[geometry], 2)), &numbered(&scattered(1, 1)));
+    check_contents(&facts(&ctx, &build(&ctx, &[geometry])), &numbered(&scattered(1, 1)));
 }
 
 #[test]
@@ -247,7 +265,7 @@ fn several_geometries_keep_their_numbers() {
             expected.extend(numbered(mesh).into_iter().map(|((_, index), c)| ((geometry, index), c)));
         }
         for leaves in [Leaves::Corners, Leaves::Indexed, Leaves::Packed] {
-            let desc = GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, leaves };
+            let desc = GpuBlasDesc { geometries: &geometries, improvements: 1, leaves };
             let built = build_blas(&ctx, &[desc]).unwrap();
             check_contents(&facts(&ctx, &built[0]), &expected);
         }
@@ -262,12 +280,7 @@ fn better_places_cost_rays_less() {
     corners.iter_mut().step_by(16).for_each(|triangle| triangle[1] = triangle[1].map(|n| n * 0.5));
     let vertices = input(&ctx, &corners);
     let geometries = [triangles(*vertices, corners.len())];
-    let desc = |improvements| GpuBlasDesc {
-        geometries: &geometries,
-        leaf_size: 1,
-        improvements,
-        leaves: Leaves::Corners,
-    };
+    let desc = |improvements| GpuBlasDesc { geometries: &geometries, improvements, leaves: Leaves::Corners };
     let built = build_blas(&ctx, &[0, 1, 2].map(desc)).unwrap();
     let costs: Vec<f64> = built.iter().map(|structure| facts(&ctx, structure).cost).collect();
     assert!(costs[1] < costs[0] && costs[2] <= costs[1] * 1.001, "{costs:?}");

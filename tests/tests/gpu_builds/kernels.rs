@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use lvk::test_hooks::{build_tlas, check_structure, compile_kernels, place, read, refit};
+use lvk_tests::binary_tree::binary_structure;
 use lvk_tests::device;
 use lvk_tests::gpu_built::{build, check_contents, facts, input, numbered, scattered, triangles};
 use lvk_tests::wide_tree::wide_structure;
@@ -25,18 +26,19 @@ fn every_kernel_compiles_and_builds_or_refits() {
     for count in [100, 5000] {
         let vertices = input(&ctx, &scattered(count, 1));
         let geometries = [triangles(*vertices, count)];
-        let binary = build(&ctx, &geometries, 1);
-        check_contents(&facts(&ctx, &binary), &numbered(&scattered(count, 1)));
+        let built = build(&ctx, &geometries);
+        check_contents(&facts(&ctx, &built), &numbered(&scattered(count, 1)));
+        let binary = place(&ctx, &binary_structure(count)).unwrap();
         let wide = place(&ctx, &wide_structure(count)).unwrap();
         ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&scattered(count, 2))).unwrap();
-        refit(&ctx, &[(&binary, &geometries), (&wide, &geometries)]).unwrap();
-        for structure in [&binary, &wide] {
+        refit(&ctx, &[(&built, &geometries), (&binary, &geometries), (&wide, &geometries)]).unwrap();
+        for structure in [&built, &binary, &wide] {
             check_contents(&facts(&ctx, structure), &numbered(&scattered(count, 2)));
         }
-        let records: Vec<_> = (0..count).map(|i| record(i as f32, binary.address)).collect();
+        let records: Vec<_> = (0..count).map(|i| record(i as f32, built.address)).collect();
         let records = input(&ctx, &records);
         let tlas = build_tlas(&ctx, *records, count as u32, count as u32, None).unwrap();
-        let [lo, hi] = facts(&ctx, &binary).bounds;
+        let [lo, hi] = facts(&ctx, &built).bounds;
         let world = |i: u32| [[lo[0] + i as f32, lo[1], lo[2]], [hi[0] + i as f32, hi[1], hi[2]]];
         let words = read(&ctx, &tlas).unwrap();
         let found = check_structure(&words, &world).unwrap_or_else(|what| panic!("{what}"));

@@ -2,6 +2,7 @@
 
 mod anywhere;
 mod blas;
+mod collapse;
 mod kernels;
 mod refit;
 mod sort;

@@ -1,11 +1,12 @@
-//! Refits on the GPU of both node formats: new places in the old tree, with boxes as a fresh fit has them.
+//! Refits on the GPU, whoever built the tree: new places in the old tree, with boxes as a fresh fit has them.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use lvk::test_hooks::{EMPTY, GpuBlasDesc, Leaves, build_blas, place, refit};
+use lvk::test_hooks::{EMPTY, GpuBlasDesc, Leaves, build_blas, place, read, refit};
 use lvk::{
     BlasDesc, BlasGeometry, BuildFlags, Context, Dependencies, DeviceProfile, RayQueryRequest, Result,
 };
 use lvk_tests::bender::bent;
+use lvk_tests::binary_tree::binary_structure;
 use lvk_tests::compute::{compute_pipeline, read_words, words_buffer};
 use lvk_tests::gpu_built::{boxes, build, check_contents, facts, input, numbered, scattered, triangles};
 use lvk_tests::meshes::Mesh;
@@ -14,13 +15,13 @@ use lvk_tests::wide_tree::wide_structure;
 use lvk_tests::{device, device_with};
 
 #[test]
-fn binary_nodes_follow_moved_triangles() {
+fn trees_of_the_gpu_follow_moved_triangles() {
     let Some(ctx) = device() else { return };
     for count in [0, 1, 2, 3, 1000, 20_000] {
         for leaves in [Leaves::Corners, Leaves::Indexed, Leaves::Packed] {
             let vertices = input(&ctx, &scattered(count, 1));
             let geometries = [triangles(*vertices, count)];
-            let desc = GpuBlasDesc { geometries: &geometries, leaf_size: 2, improvements: 1, leaves };
+            let desc = GpuBlasDesc { geometries: &geometries, improvements: 1, leaves };
             let structure = build_blas(&ctx, &[desc]).unwrap().remove(0);
             let before = facts(&ctx, &structure);
             for seed in [2, 3] {
@@ -38,6 +39,20 @@ fn binary_nodes_follow_moved_triangles() {
     }
 }
 
+/// Collapsed ones are encoded by the kernel that refits them, from boxes that came another way.
+#[test]
+fn a_refit_of_what_did_not_move_changes_nothing() {
+    let Some(ctx) = device() else { return };
+    for count in [1, 3, 4, 30, 2000, 5000] {
+        let vertices = input(&ctx, &scattered(count, 6));
+        let geometries = [triangles(*vertices, count)];
+        let structure = build(&ctx, &geometries);
+        let words = read(&ctx, &structure).unwrap();
+        refit(&ctx, &[(&structure, &geometries)]).unwrap();
+        assert!(read(&ctx, &structure).unwrap() == words, "{count}");
+    }
+}
+
 #[test]
 fn boxes_follow_too() {
     let Some(ctx) = device() else { return };
@@ -47,7 +62,7 @@ fn boxes_follow_too() {
     };
     let buffer = input(&ctx, &list(0.0));
     let geometries = [boxes(*buffer, count)];
-    let structure = build(&ctx, &geometries, 4);
+    let structure = build(&ctx, &geometries);
     ctx.upload_buffer(*buffer, 0, bytemuck::cast_slice(&list(50.0))).unwrap();
     refit(&ctx, &[(&structure, &geometries)]).unwrap();
     let expected: Vec<_> =
@@ -61,7 +76,7 @@ fn triangles_that_are_lost_are_in_no_box() {
     let count = 100;
     let vertices = input(&ctx, &scattered(count, 1));
     let geometries = [triangles(*vertices, count)];
-    let structure = build(&ctx, &geometries, 2);
+    let structure = build(&ctx, &geometries);
     ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&vec![[[f32::NAN; 3]; 3]; count])).unwrap();
     refit(&ctx, &[(&structure, &geometries)]).unwrap();
     assert_eq!(facts(&ctx, &structure).bounds, EMPTY);
@@ -93,6 +108,22 @@ fn no_ray_enters_an_empty_box() {
     cmd.dispatch([1; 3], &Dependencies { buffers: &[*entered], ..Default::default() }).unwrap();
     ctx.submit(cmd).unwrap();
     assert_eq!(read_words(&ctx, *entered, 27), [2; 27]);
+}
+
+#[test]
+fn binary_nodes_follow_moved_triangles() {
+    let Some(ctx) = device() else { return };
+    for count in [1, 3, 4, 7, 200, 5000] {
+        let vertices = input(&ctx, &scattered(count, 1));
+        let geometries = [triangles(*vertices, count)];
+        let structure = place(&ctx, &binary_structure(count)).unwrap();
+        for seed in [1, 4] {
+            let moved = scattered(count, seed);
+            ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&moved)).unwrap();
+            refit(&ctx, &[(&structure, &geometries)]).unwrap();
+            check_contents(&facts(&ctx, &structure), &numbered(&moved));
+        }
+    }
 }
 
 #[test]
@@ -173,13 +204,14 @@ fn boxes_of_what_lies_far_out_end_as_those_of_the_cpu_do() {
     for count in [1, 4, 25, 2000] {
         let vertices = input(&ctx, &scattered(count, 1));
         let geometries = [triangles(*vertices, count)];
-        let binary = build(&ctx, &geometries, 2);
+        let built = build(&ctx, &geometries);
+        let binary = place(&ctx, &binary_structure(count)).unwrap();
         let wide = place(&ctx, &wide_structure(count)).unwrap();
         for reach in [1e14, 1e16, 1e30, 3e38, 0.0] {
             let moved = partly_far(count, reach);
             ctx.upload_buffer(*vertices, 0, bytemuck::cast_slice(&moved)).unwrap();
-            refit(&ctx, &[(&binary, &geometries), (&wide, &geometries)]).unwrap();
-            for structure in [&binary, &wide, &build(&ctx, &geometries, 2)] {
+            refit(&ctx, &[(&built, &geometries), (&binary, &geometries), (&wide, &geometries)]).unwrap();
+            for structure in [&built, &binary, &wide, &build(&ctx, &geometries)] {
                 check_contents(&facts(&ctx, structure), &numbered(&moved));
             }
         }
@@ -196,7 +228,7 @@ fn boxes_far_out_end_too() {
     };
     let buffer = input(&ctx, &list(1.0));
     let geometries = [boxes(*buffer, count)];
-    let structure = build(&ctx, &geometries, 1);
+    let structure = build(&ctx, &geometries);
     for reach in [1e16, 3e38, f32::INFINITY] {
         ctx.upload_buffer(*buffer, 0, bytemuck::cast_slice(&list(reach))).unwrap();
         refit(&ctx, &[(&structure, &geometries)]).unwrap();
@@ -209,13 +241,13 @@ fn boxes_far_out_end_too() {
 #[test]
 fn structures_are_refitted_side_by_side() {
     let Some(ctx) = device() else { return };
-    let counts = [50, 3000, 900];
+    let counts = [50, 3000, 900, 400];
     let vertices: Vec<_> = counts.iter().map(|count| input(&ctx, &scattered(*count, 1))).collect();
     let geometries: Vec<_> =
         vertices.iter().zip(counts).map(|(vertices, count)| [triangles(**vertices, count)]).collect();
-    let mut structures: Vec<_> =
-        geometries[..2].iter().map(|geometries| build(&ctx, geometries, 2)).collect();
+    let mut structures: Vec<_> = geometries[..2].iter().map(|geometries| build(&ctx, geometries)).collect();
     structures.push(place(&ctx, &wide_structure(counts[2])).unwrap());
+    structures.push(place(&ctx, &binary_structure(counts[3])).unwrap());
     for (vertices, count) in vertices.iter().zip(counts) {
         ctx.upload_buffer(**vertices, 0, bytemuck::cast_slice(&scattered(count, 9))).unwrap();
     }

@@ -27,7 +27,7 @@ impl Shown {
     fn new(ctx: &TestDevice) -> Self {
         let one = |count: usize| {
             let vertices = input(ctx, &scattered(count, count as u64));
-            let structure = build(ctx, &[triangles(*vertices, count)], 2);
+            let structure = build(ctx, &[triangles(*vertices, count)]);
             let bounds = facts(ctx, &structure).bounds;
             (structure, bounds)
         };

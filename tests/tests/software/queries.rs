@@ -7,6 +7,7 @@ use lvk::{
 };
 use lvk_tests::agreement::Agreement;
 use lvk_tests::child::without_ray_tracing;
+use lvk_tests::gpu_built::uneven;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
 use lvk_tests::ray_scene::{BUILD_FLAGS, Layout, Part, Placed, RayScene, instances, upload_geometries};
@@ -223,6 +224,39 @@ fn a_structure_is_the_same_after_a_file() -> Result<()> {
     Ok(())
 }
 
+/// What has no room for its own nodes gets full ones: rays hit the same, from a file too.
+#[test]
+fn uneven_trees_are_hit_as_even_ones() -> Result<()> {
+    let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
+    let positions: Vec<_> = uneven(8).into_iter().flatten().collect();
+    let triangles =
+        (0..positions.len() as u32 / 3).map(|number| [0, 1, 2].map(|step| number * 3 + step)).collect();
+    let parts = [Part::new(Mesh { positions, triangles }, Layout::Indexed32)];
+    let (_buffers, geometries) = upload_geometries(&ctx, &parts)?;
+    let rays = random_rays(5, 2_000, Vec3::splat(-1.0), Vec3::splat(9.0));
+    let tracer = RayTracer::new(&ctx, Method::Query)?;
+    let trace = |blas| -> Result<Vec<f32>> {
+        let instances = [TlasInstance::new(blas)];
+        let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() })?;
+        let found = tracer.trace(&tlas, &rays, How::default())?;
+        Ok(found.iter().map(|it| if it.kind == MISSED { -1.0 } else { it.t }).collect())
+    };
+    let of_cpu = trace(*ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?)?;
+    assert!(of_cpu.iter().filter(|t| **t > 0.0).count() > 500);
+    let close = |found: &[f32]| found.iter().zip(&of_cpu).all(|(a, b)| (a - b).abs() < 1e-4);
+    for more in [BuildFlags::ALLOW_UPDATE, BuildFlags::LOW_MEMORY] {
+        let desc =
+            BlasDesc { geometries: &geometries, flags: BuildFlags::FAST_BUILD | more, ..Default::default() };
+        let built = ctx.create_blas(&desc)?;
+        assert!(close(&trace(*built)?), "{more:?}");
+        let bytes = ctx.serialize_blas(*built)?;
+        // SAFETY: nobody made the bytes up.
+        let loaded = unsafe { ctx.load_blas(&desc, &bytes) }?;
+        assert!(close(&trace(*loaded)?), "{more:?}, from a file");
+    }
+    Ok(())
+}
+
 /// Three triangles side by side whose corners lie far apart in a list of so many vertices, and so many more that are points.
 fn among_many(count: usize, points: u32) -> Mesh {
     let named = [[0, 1 << 11, count - 1], [count - 2, 5, 1 << 20], [count / 2 + 1, count - 3, (1 << 11) - 1]];
@@ -386,5 +420,41 @@ fn low_memory_is_low_with_updates_too() -> Result<()> {
     let shared = bytes_of(&ctx, &mesh, Layout::Indexed32, small)?;
     let fixed = bytes_of(&ctx, &mesh, Layout::Unshared, BuildFlags::LOW_MEMORY)?;
     assert_eq!(fixed, shared, "positions are, where none may move");
+    Ok(())
+}
+
+/// What the GPU builds takes no more than what the CPU does, though nobody knows beforehand how many nodes there will be.
+#[test]
+fn structures_of_the_gpu_are_small() -> Result<()> {
+    const FIRST: u64 = 1024;
+    let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
+    let mesh = Mesh::terrain(90);
+    let count = mesh.triangles.len() as u64;
+    for (more, most) in [(BuildFlags::ALLOW_UPDATE, 56), (BuildFlags::LOW_MEMORY, 28)] {
+        let bytes = bytes_of(&ctx, &mesh, Layout::Indexed32, BuildFlags::FAST_BUILD | more)?;
+        assert!(bytes <= most * count + FIRST, "{more:?}: {bytes} bytes of {count} triangles");
+    }
+    Ok(())
+}
+
+/// Where it may be refitted, and so is never shown in parts.
+#[test]
+fn what_the_cpu_built_is_rebuilt_in_its_place() -> Result<()> {
+    let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
+    let mesh = Mesh::terrain(90);
+    let count = mesh.triangles.len() as u64;
+    let (_buffers, geometries) = upload_geometries(&ctx, &[Part::new(mesh, Layout::Indexed32)])?;
+    for (flags, most) in [(BuildFlags::ALLOW_UPDATE, 58), (BuildFlags::FAST_TRACE, 116)] {
+        let blas = ctx.create_blas(&BlasDesc { geometries: &geometries, flags, ..Default::default() })?;
+        let before = ctx.accel_struct_info(*blas)?.structure_bytes;
+        for mode in [BuildMode::Rebuild, BuildMode::Auto { max_refits: 4 }, BuildMode::Rebuild] {
+            let mut cmd = ctx.acquire_command_buffer()?;
+            cmd.build_blas(&[*blas], mode)?;
+            ctx.wait(ctx.submit(cmd)?)?;
+        }
+        let after = ctx.accel_struct_info(*blas)?.structure_bytes;
+        assert_eq!(after == before, flags == BuildFlags::ALLOW_UPDATE, "{before} and {after} bytes");
+        assert!(after <= most * count, "{flags:?}: {after} bytes of {count} triangles");
+    }
     Ok(())
 }

@@ -20,10 +20,10 @@ pub(crate) struct SoftwareBlas {
     /// What instances refer to as long as the handle lives.
     pub(crate) body: Arc<SoftwareBody>,
     pub(crate) origin: Origin,
-    /// Where a structure that the CPU built is built again on the GPU; its body says then that it has moved there. Made
-    /// when first needed.
+    /// Where a structure that the CPU built is built again on the GPU: its own body where that has room, else another one, to
+    /// which the body refers then. Made when first needed.
     rebuilt: OnceLock<Arc<SoftwareBody>>,
-    /// Whether a submission moves it there.
+    /// Whether a submission builds it there.
     has_moved: AtomicBool,
 }
 
@@ -52,7 +52,7 @@ impl SoftwareBlas {
         self.rebuilt.get()
     }
 
-    /// Where it lies after everything submitted, if a rebuild has moved it.
+    /// Where it lies after everything submitted, if it was rebuilt.
     pub(crate) fn moved(&self) -> Option<&Arc<SoftwareBody>> {
         self.rebuilt.get().filter(|_| self.has_moved.load(Ordering::Acquire))
     }
@@ -62,7 +62,7 @@ impl SoftwareBlas {
         self.has_moved.store(true, Ordering::Release);
     }
 
-    /// Whether the CPU has built it first, so that a rebuild moves it.
+    /// Whether the CPU has built it first, so that a rebuild puts another tree in its place.
     pub(crate) fn is_of_cpu(&self) -> bool {
         matches!(self.origin, Origin::Cpu { .. })
     }
@@ -75,8 +75,15 @@ impl SoftwareBlas {
         if let Some(rebuilt) = self.rebuilt.get() {
             return Ok(rebuilt);
         }
-        let rebuilt = make()?;
-        Ok(self.rebuilt.get_or_init(|| Arc::new(rebuilt)))
+        let rebuilt = if self.rebuilds_in_place() { Arc::clone(&self.body) } else { Arc::new(make()?) };
+        Ok(self.rebuilt.get_or_init(|| rebuilt))
+    }
+
+    /// Whether the body has room for what a rebuild makes. Of what may not be refitted, top-level structures may show parts of
+    /// the first tree, which must stay what it was.
+    fn rebuilds_in_place(&self) -> bool {
+        let room = self.body.memory_bytes();
+        matches!(&self.origin, Origin::Cpu { refit: Some(_), rebuild, .. } if rebuild.blob_bytes <= room)
     }
 
     /// Where it lies, if the host knows: then it never was nor will be refitted, nor was a rebuild recorded.
@@ -89,7 +96,8 @@ impl SoftwareBlas {
 
     /// Bytes of memory.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        let rebuilt = self.rebuilt.get().map_or(0, |rebuilt| rebuilt.memory_bytes());
+        let elsewhere = self.rebuilt.get().filter(|rebuilt| !Arc::ptr_eq(rebuilt, &self.body));
+        let rebuilt = elsewhere.map_or(0, |rebuilt| rebuilt.memory_bytes());
         self.body.memory_bytes() + rebuilt
     }
 
@@ -116,6 +124,14 @@ impl SoftwareBlas {
     }
 }
 
+/// Bytes for a structure that the CPU built in so many: as many as its rebuild takes, where it may be refitted and that makes
+/// little difference.
+pub(crate) fn body_bytes(blob_bytes: u64, refit: Option<&GpuRefitPlan>, rebuild: &GpuBuildPlan) -> u64 {
+    const SHARE: u64 = 32;
+    let in_place = refit.is_some() && rebuild.blob_bytes <= blob_bytes + blob_bytes / SHARE;
+    if in_place { blob_bytes.max(rebuild.blob_bytes) } else { blob_bytes }
+}
+
 /// What structures of these geometries, which have been checked, take at most.
 pub(crate) fn most_sizes(
     name: &str,
@@ -135,7 +151,7 @@ pub(crate) fn most_sizes(
         .scratch_bytes(),
     };
     Ok(AccelStructSizes {
-        structure_bytes: plan.blob_bytes,
+        structure_bytes: plan.blob_bytes + if builds_on_gpu(flags) { 0 } else { plan.binary_excess_bytes() },
         build_scratch_bytes: plan.scratch_bytes,
         update_scratch_bytes: of_gpu.max(of_cpu),
     })
@@ -167,7 +183,6 @@ pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlag
         primitive_count,
         vertex_count,
         geometry_count: geometries.len() as u32,
-        leaf_size: if flags.contains(BuildFlags::LOW_MEMORY) { 2 } else { 1 },
         improvements: if flags.contains(BuildFlags::FAST_TRACE) { IMPROVEMENTS } else { 0 },
     };
     GpuBuildPlan::blas(name, &shape)

@@ -11,10 +11,10 @@ pub(crate) struct Job {
     pub(crate) blob: u64,
     pub(crate) scratch: u64,
     pub(crate) parents: u64,
+    pub(crate) binary: u64,
     pub(crate) count: u32,
     pub(crate) input_count: u32,
     pub(crate) leaf_kind: u32,
-    pub(crate) leaf_size: u32,
     pub(crate) low_bits: u32,
     pub(crate) nodes: u32,
     pub(crate) primitives: u32,
@@ -28,10 +28,10 @@ pub(crate) struct Job {
     pub(crate) arrivals: u32,
     pub(crate) node_capacity: u32,
     pub(crate) improvements: u32,
-    pub(crate) reserved: u32,
+    pub(crate) wide_capacity: u32,
     pub(crate) header_flags: u32,
     /// Fills the record to a multiple of 16 bytes.
-    pub(crate) unused: [u32; 3],
+    pub(crate) unused: [u32; 2],
 }
 
 /// Push constants of every kernel of a build.

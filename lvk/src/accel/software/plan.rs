@@ -2,22 +2,26 @@
 
 use super::geometry::GpuGeometry;
 use super::job::Job;
-use super::layout::LeafKind;
+use super::layout::{BLOCK_BYTES, LeafKind};
 use crate::accel::geometry::GeometryFlags;
-use crate::error::{Error, Result, check_limit};
+use crate::error::{Result, check_limit};
 
 /// Bytes of the header of a structure.
 pub(crate) const HEADER_BYTES: u64 = 128;
 /// Bytes of a binary node.
-pub(crate) const NODE_BYTES: u64 = 64;
+const BINARY_NODE_BYTES: u64 = 64;
+/// Bytes of a wide node.
+const WIDE_NODE_BYTES: u64 = 80;
+/// Up to so many primitives are one leaf, without nodes.
+const ONE_LEAF: u32 = 3;
+/// Wide nodes that a thousand primitives have room for, besides the first: what a triangle takes is then 56 bytes with the header.
+const WIDE_OF_THOUSAND: u64 = 99;
 const GEOMETRY_BYTES: u64 = 16;
 /// Bytes of a vertex that leaves name.
 pub(crate) const VERTEX_BYTES: u64 = 12;
 const BLOB_ALIGNMENT: u64 = 256;
 /// A leaf's first primitive has 27 bits.
 const MOST_PRIMITIVES: u64 = 1 << 27;
-/// Of a leaf, as its reference and the kernels have it.
-const MOST_LEAF_SIZE: u32 = 8;
 /// Up to so many primitives one workgroup makes the whole build.
 const MOST_SMALL: u32 = 2048;
 /// Keys that a workgroup sorts, `kBlock` of `kernel/build/job.glsl`.
@@ -30,7 +34,8 @@ const CODE_BITS: u32 = 30;
 const MOST_IMPROVEMENTS: u32 = 8;
 /// Of top-level structures.
 const TLAS_IMPROVEMENTS: u32 = 1;
-const STATE_WORDS: u64 = 8;
+/// Words that say how far a build is, `kStateWords` of `kernel/build/job.glsl`.
+pub(crate) const STATE_WORDS: u64 = 48;
 const BOX_WORDS: u64 = 6;
 
 /// What a bottom-level structure is to hold.
@@ -42,8 +47,6 @@ pub(crate) struct BlasShape {
     /// Of all geometries; they count only where leaves name them.
     pub(crate) vertex_count: u32,
     pub(crate) geometry_count: u32,
-    /// Most primitives of a leaf, 1 to 8. More make smaller structures and faster builds, fewer make faster rays.
-    pub(crate) leaf_size: u32,
     /// How often nodes are given better places, 0 to 8. Each makes builds a little slower and rays faster.
     pub(crate) improvements: u32,
 }
@@ -66,6 +69,8 @@ pub(crate) struct ScratchPlaces {
     pub(crate) digits: u32,
     pub(crate) arrivals: u32,
     pub(crate) parents: u32,
+    /// Binary nodes, where the structure has wide ones.
+    pub(crate) binary: u32,
 }
 
 /// A build on the GPU, as far as counts decide it.
@@ -76,7 +81,8 @@ pub(crate) struct GpuBuildPlan {
     pub(crate) capacity: u32,
     pub(crate) vertex_count: u32,
     pub(crate) geometry_count: u32,
-    pub(crate) leaf_size: u32,
+    /// Most nodes of a bottom-level structure; 0 for a top-level one, whose nodes stay binary.
+    pub(crate) wide_capacity: u32,
     /// Where the parts of the structure lie.
     pub(crate) places: BlobPlaces,
     /// Bytes of the structure, a multiple of 256.
@@ -111,14 +117,8 @@ impl GpuBuildPlan {
     /// Of a bottom-level structure.
     ///
     /// # Errors
-    /// [`LimitExceeded`](Error::LimitExceeded) for more primitives than the format has numbers for;
-    /// [`InvalidUsage`](Error::InvalidUsage) for leaves of a size that does not exist.
+    /// [`LimitExceeded`](Error::LimitExceeded) for more primitives than the format has numbers for.
     pub(crate) fn blas(name: &str, shape: &BlasShape) -> Result<Self> {
-        if shape.leaf_kind == LeafKind::Instances || !(1..=MOST_LEAF_SIZE).contains(&shape.leaf_size) {
-            let message =
-                format!("leaves hold 1 to {MOST_LEAF_SIZE} triangles or boxes, not {}", shape.leaf_size);
-            return Err(Error::usage(name, message));
-        }
         Self::new(name, shape)
     }
 
@@ -132,7 +132,6 @@ impl GpuBuildPlan {
             primitive_count: capacity,
             vertex_count: 0,
             geometry_count: 0,
-            leaf_size: 1,
             improvements: TLAS_IMPROVEMENTS,
         };
         Self::new(name, &shape)
@@ -150,7 +149,7 @@ impl GpuBuildPlan {
             capacity: shape.primitive_count,
             vertex_count,
             geometry_count: shape.geometry_count,
-            leaf_size: shape.leaf_size,
+            wide_capacity: wide_capacity(shape),
             places,
             blob_bytes,
             scratch_bytes,
@@ -160,17 +159,23 @@ impl GpuBuildPlan {
         })
     }
 
-    /// Most nodes of the structure.
+    /// Most binary nodes of the build.
     pub(crate) fn node_capacity(&self) -> u32 {
-        node_capacity(self.capacity, self.leaf_size)
+        self.capacity.saturating_sub(1)
     }
 
-    /// Most nodes on a path from the root to a leaf, at most [`MOST_HEIGHT`]: every node splits at a bit of the code, or,
-    /// where codes are equal, of the leaf's number. What a path really has stands in the header.
+    /// What a structure has to have room for beyond [`blob_bytes`](Self::blob_bytes), if all its nodes may be binary, as those
+    /// of some trees of the CPU are.
+    pub(crate) fn binary_excess_bytes(&self) -> u64 {
+        let wide = u64::from(self.wide_capacity) * WIDE_NODE_BYTES;
+        (u64::from(self.node_capacity()) * BINARY_NODE_BYTES).saturating_sub(wide)
+    }
+
+    /// Most binary nodes on a path from the root to a leaf, at most [`MOST_HEIGHT`]: every node splits at a bit of the code, or,
+    /// where codes are equal, of the leaf's number. What a path of a top-level structure really has stands in its header.
     #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn most_height(&self) -> u32 {
-        let number_bits = number_bits(self.capacity, self.leaf_size);
-        (CODE_BITS + self.low_bits + number_bits).min(self.node_capacity())
+        (CODE_BITS + self.low_bits + number_bits(self.capacity)).min(self.node_capacity())
     }
 
     /// Whether one workgroup makes the whole build of `count` primitives or instances.
@@ -193,10 +198,13 @@ impl GpuBuildPlan {
             blob,
             scratch,
             parents: scratch + u64::from(self.scratch.parents) * 4,
+            binary: match self.leaf_kind {
+                LeafKind::Instances => blob + u64::from(self.places.nodes) * BLOCK_BYTES as u64,
+                _ => scratch + u64::from(self.scratch.binary) * 4,
+            },
             count,
             input_count,
             leaf_kind: self.leaf_kind as u32,
-            leaf_size: self.leaf_size,
             low_bits: self.low_bits,
             nodes: self.places.nodes,
             primitives: self.places.primitives,
@@ -208,11 +216,11 @@ impl GpuBuildPlan {
             spare_keys: self.scratch.spare_keys,
             digits: self.scratch.digits,
             arrivals: self.scratch.arrivals,
-            node_capacity: node_capacity(count, self.leaf_size),
+            node_capacity: count.saturating_sub(1),
             improvements: self.improvements,
-            reserved: 0,
+            wide_capacity: self.wide_capacity,
             header_flags: header_flags(source),
-            unused: [0; 3],
+            unused: [0; 2],
         }
     }
 }
@@ -248,12 +256,12 @@ fn low_bits(shape: &BlasShape) -> u32 {
     if shape.primitive_count <= few {
         return 0;
     }
-    MOST_HEIGHT - CODE_BITS - number_bits(shape.primitive_count, shape.leaf_size)
+    MOST_HEIGHT - CODE_BITS - number_bits(shape.primitive_count)
 }
 
 /// Bits that the number of a leaf has.
-fn number_bits(count: u32, leaf_size: u32) -> u32 {
-    u32::BITS - count.div_ceil(leaf_size).saturating_sub(1).leading_zeros()
+fn number_bits(count: u32) -> u32 {
+    u32::BITS - count.saturating_sub(1).leading_zeros()
 }
 
 /// Bit 0: every geometry is opaque; bit 1: none is.
@@ -267,12 +275,20 @@ fn header_flags(source: &BuildSource) -> u32 {
     }
 }
 
-fn node_capacity(count: u32, leaf_size: u32) -> u32 {
-    count.div_ceil(leaf_size).saturating_sub(1)
+/// Room for wide nodes: more than most meshes need, and than the full nodes need that any mesh may have in their place.
+fn wide_capacity(shape: &BlasShape) -> u32 {
+    const FIRST: u32 = 2;
+    match (shape.leaf_kind, shape.primitive_count) {
+        (LeafKind::Instances, _) | (_, ..=ONE_LEAF) => 0,
+        (_, count) => (u64::from(count) * WIDE_OF_THOUSAND / 1000) as u32 + FIRST,
+    }
 }
 
 fn blob_places(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(BlobPlaces, u64)> {
-    let nodes = u64::from(node_capacity(shape.primitive_count, shape.leaf_size));
+    let nodes = match shape.leaf_kind {
+        LeafKind::Instances => u64::from(shape.primitive_count.saturating_sub(1)) * BINARY_NODE_BYTES,
+        _ => u64::from(wide_capacity(shape)) * WIDE_NODE_BYTES,
+    };
     let primitives = u64::from(shape.primitive_count) * shape.leaf_kind.primitive_bytes();
     let mut layout = Layout { end: HEADER_BYTES };
     let mut part = |bytes: u64, alignment| match bytes {
@@ -280,7 +296,7 @@ fn blob_places(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(Blob
         bytes => layout.add(bytes, alignment, 16),
     };
     let places = [
-        part(nodes * NODE_BYTES, 64),
+        part(nodes, 64),
         part(primitives, 16),
         part(u64::from(vertex_count) * VERTEX_BYTES, 16),
         part(u64::from(shape.geometry_count) * GEOMETRY_BYTES, 16),
@@ -291,10 +307,11 @@ fn blob_places(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(Blob
     Ok((BlobPlaces { nodes, primitives, vertices, geometries }, bytes))
 }
 
-/// All of it is below 2^31 words, as kernels number them: a primitive takes at most 13 and a sixty-fourth.
+/// All of it is below 2^32 words, as kernels number them: a primitive takes at most 30 and a sixty-fourth.
 fn scratch_places(shape: &BlasShape, long_codes: bool) -> (ScratchPlaces, u64) {
     let count = u64::from(shape.primitive_count);
-    let nodes = u64::from(node_capacity(shape.primitive_count, shape.leaf_size));
+    let nodes = u64::from(shape.primitive_count.saturating_sub(1));
+    let binary = if shape.leaf_kind == LeafKind::Instances { 0 } else { nodes * BINARY_NODE_BYTES / 4 };
     let keys = count * if long_codes { 3 } else { 2 };
     let blocks = u64::from(shape.primitive_count.div_ceil(SORT_BLOCK));
     let mut layout = Layout { end: STATE_WORDS * 4 };
@@ -306,6 +323,7 @@ fn scratch_places(shape: &BlasShape, long_codes: bool) -> (ScratchPlaces, u64) {
         digits: part(blocks * u64::from(DIGITS)),
         arrivals: part(nodes),
         parents: part(nodes),
+        binary: part(binary),
     };
     (places, layout.end.next_multiple_of(16))
 }
@@ -316,6 +334,14 @@ mod tests {
 
     use super::*;
 
+    const MESH: BlasShape = BlasShape {
+        leaf_kind: LeafKind::Triangles,
+        primitive_count: 0,
+        vertex_count: 0,
+        geometry_count: 1,
+        improvements: 1,
+    };
+
     fn kinds() -> impl Strategy<Value = LeafKind> {
         use LeafKind::{Boxes, IndexedTriangles, PackedTriangles, Triangles};
         prop::sample::select(vec![Triangles, IndexedTriangles, PackedTriangles, Boxes])
@@ -323,13 +349,12 @@ mod tests {
 
     fn shapes() -> impl Strategy<Value = BlasShape> {
         let counts = prop_oneof![0..10_u32, 0..10_000_u32, 0..=(1_u32 << 27)];
-        (kinds(), counts, 0..1_000_000_u32, 0..3000_u32, 1..=8_u32).prop_map(
-            |(leaf_kind, primitive_count, vertex_count, geometry_count, leaf_size)| BlasShape {
+        (kinds(), counts, 0..1_000_000_u32, 0..3000_u32).prop_map(
+            |(leaf_kind, primitive_count, vertex_count, geometry_count)| BlasShape {
                 leaf_kind,
                 primitive_count,
                 vertex_count,
                 geometry_count,
-                leaf_size,
                 improvements: 1,
             },
         )
@@ -351,11 +376,11 @@ mod tests {
         #[test]
         fn parts_of_a_structure_lie_apart(shape in shapes()) {
             let plan = GpuBuildPlan::blas("s", &shape).unwrap();
-            let nodes = u64::from(plan.node_capacity());
+            let nodes = u64::from(plan.wide_capacity);
             let at = |place: u32| u64::from(place) * 16;
             let count = u64::from(shape.primitive_count);
             check_parts(vec![
-                (at(plan.places.nodes), nodes * 64),
+                (at(plan.places.nodes), nodes * 80),
                 (at(plan.places.primitives), count * shape.leaf_kind.primitive_bytes()),
                 (at(plan.places.vertices), u64::from(plan.vertex_count) * 12),
                 (at(plan.places.geometries), u64::from(shape.geometry_count) * 16),
@@ -377,44 +402,48 @@ mod tests {
                 (at(plan.scratch.digits), count.div_ceil(1024) * 64),
                 (at(plan.scratch.arrivals), nodes * 4),
                 (at(plan.scratch.parents), nodes * 4),
-            ], 32, plan.scratch_bytes);
-            prop_assert!(plan.scratch_bytes < 1 << 33);
+                (at(plan.scratch.binary), nodes * 64),
+            ], STATE_WORDS * 4, plan.scratch_bytes);
+            prop_assert!(plan.scratch_bytes < 1 << 34);
         }
     }
 
     #[test]
     fn what_has_no_numbers_is_refused() {
-        let shape = BlasShape {
-            leaf_kind: LeafKind::Triangles,
-            primitive_count: (1 << 27) + 1,
-            vertex_count: 0,
-            geometry_count: 1,
-            leaf_size: 2,
-            improvements: 1,
-        };
+        let shape = BlasShape { primitive_count: (1 << 27) + 1, ..MESH };
         assert!(GpuBuildPlan::blas("s", &shape).is_err());
-        assert!(GpuBuildPlan::blas("s", &BlasShape { primitive_count: 1, leaf_size: 9, ..shape }).is_err());
+        assert!(GpuBuildPlan::blas("s", &BlasShape { primitive_count: 1 << 27, ..shape }).is_ok());
         assert!(GpuBuildPlan::tlas("s", u32::MAX).is_err());
         assert!(GpuBuildPlan::tlas("s", 0).is_ok());
     }
 
-    /// Of the shapes that flags lead to: one triangle in a leaf, or two that name vertices.
+    /// Wherever wide nodes may be made anew because they had no room, there is room for as many as that takes.
     #[test]
-    fn a_triangle_takes_112_bytes_or_50_with_low_memory() {
+    fn there_is_room_for_full_nodes_of_any_count() {
+        let full = |count: u32| {
+            let mut level = count.div_ceil(24);
+            let mut all = level;
+            while level > 1 {
+                level = level.div_ceil(8);
+                all += level;
+            }
+            all
+        };
+        for primitive_count in (4..100_000).chain([1 << 20, 12_345_678, 1 << 27]) {
+            let room = wide_capacity(&BlasShape { primitive_count, ..MESH });
+            assert!(room >= full(primitive_count) && room < primitive_count, "{primitive_count}: {room}");
+        }
+    }
+
+    /// Of the shapes that flags lead to, with half as many vertices as triangles.
+    #[test]
+    fn a_triangle_takes_56_bytes_or_26_with_low_memory() {
         let count = 1_000_000;
-        for (leaf_kind, leaf_size, each) in
-            [(LeafKind::Triangles, 1, 112), (LeafKind::PackedTriangles, 2, 50)]
-        {
-            let shape = BlasShape {
-                leaf_kind,
-                primitive_count: count,
-                vertex_count: count / 2,
-                geometry_count: 1,
-                leaf_size,
-                improvements: 1,
-            };
+        for (leaf_kind, each) in [(LeafKind::Triangles, 56.0), (LeafKind::PackedTriangles, 26.0)] {
+            let shape = BlasShape { leaf_kind, primitive_count: count, vertex_count: count / 2, ..MESH };
             let bytes = GpuBuildPlan::blas("s", &shape).unwrap().blob_bytes;
-            assert_eq!(bytes / u64::from(count), each, "{leaf_kind:?}");
+            let bytes = bytes as f64 / f64::from(count);
+            assert!((each - 0.1..=each).contains(&bytes), "{leaf_kind:?}: {bytes}");
         }
     }
 }

@@ -3,7 +3,7 @@
 use bytemuck::Zeroable;
 
 use super::job::Job;
-use super::layout::LeafKind;
+use super::layout::{BLOCK_BYTES, LeafKind};
 use super::plan::{BlobPlaces, GpuBuildPlan};
 
 const ARRIVAL_BYTES: u64 = 4;
@@ -33,13 +33,13 @@ pub(crate) struct GpuRefitPlan {
 }
 
 impl GpuRefitPlan {
-    /// Of what was built on the GPU.
+    /// Of a bottom-level structure that was built on the GPU.
     pub(crate) fn of_build(plan: &GpuBuildPlan) -> Self {
         Self {
-            format: NodeFormat::Binary,
+            format: NodeFormat::Wide,
             leaf_kind: plan.leaf_kind,
             places: plan.places,
-            node_count: plan.node_capacity(),
+            node_count: plan.wide_capacity,
             primitive_count: plan.capacity,
         }
     }
@@ -57,6 +57,7 @@ impl GpuRefitPlan {
             blob,
             scratch,
             parents: scratch + u64::from(self.node_count) * ARRIVAL_BYTES,
+            binary: blob + u64::from(self.places.nodes) * BLOCK_BYTES as u64,
             count: self.primitive_count,
             input_count,
             leaf_kind: self.leaf_kind as u32,

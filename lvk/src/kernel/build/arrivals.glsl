@@ -8,6 +8,6 @@ const uint kStart = 0x80000000u;
 void writeArrivals(uint node, bool start) { Words(work(job.arrivals)).word[node] = start ? kStart : 0u; }
 
 void resetArrivals(uint node) {
-    Quads at = Quads(element(place(job.nodes), node, 64u));
+    Quads at = Quads(element(job.binary, node, 64u));
     writeArrivals(node, (at.quad[0].w & at.quad[1].w & kLeaf) != 0u);
 }

@@ -26,6 +26,11 @@ bool isNumber(vec3 v) {
     return all(lessThanEqual(floatBitsToUint(v) & uvec3(0x7fffffffu), uvec3(0x7f800000u)));
 }
 
+float areaOf(Box box) {
+    vec3 side = max(box.hi - box.lo, vec3(0));
+    return side.x * side.y + side.y * side.z + side.z * side.x;
+}
+
 vec3 centre(Box box) { return box.lo * 0.5 + box.hi * 0.5; }
 
 // Floats as integers of the same order.

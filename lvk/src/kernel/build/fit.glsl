@@ -4,7 +4,7 @@ void finish(Fitted root) {
     Corners to = Corners(plus(job.blob, 48u, 0u));
     to.corner[0] = root.box.lo;
     to.corner[1] = root.box.hi;
-    header().word[18] = root.height;
+    header().word[18] = heightOf(root.shape);
 }
 
 // Fits what can be fitted from node `i` up to the root.
@@ -28,7 +28,7 @@ void fitFrom(uint i) {
         }
         Node node = readNode(number);
         Fitted whole = Fitted(join(childOf(node, 0u).box, childOf(node, 1u).box), 0u);
-        whole.height = rotate(number, node);
+        whole.shape = rotate(number, node);
         uint parent = Words(job.parents).word[number];
         if (parent == kNone) {
             finish(whole);

@@ -1,7 +1,4 @@
-// Fits the boxes of wide nodes, bottom up, and encodes them anew so that no box loses anything: Ylitie, Karras, Laine,
-// "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017. What is below each child stays.
-const uint kChildren = 8u;
-
+// Fits the boxes of wide nodes, bottom up, and encodes them anew. What is below each child stays.
 uint byteOf(Words node, uint word, uint child) { return node.word[word + child / 4] >> (child & 3u) * 8u & 0xffu; }
 
 Box wideChild(Words node, uint child) {
@@ -14,50 +11,11 @@ Box wideChild(Words node, uint child) {
     return readBox(Corners(work(job.boxes)), number);
 }
 
-// The smallest power of two by whose 255 steps the extent is covered, as an exponent with its bias.
-uint exponentOf(float extent) {
-    const float kSlack = 1e-4;
-    uint exponent = clamp(floatBitsToUint(extent / 255.0) >> 23, 1u, 253u);
-    return ceil(extent / uintBitsToFloat(exponent << 23) + kSlack) > 255.0 ? exponent + 1 : exponent;
-}
-
-// Steps from the corner of the node, with what rounding may take away.
-uint stepsDown(float distance_, float unit) { return uint(clamp(floor(distance_ / unit - 1e-4), 0.0, 255.0)); }
-
-uint stepsUp(float distance_, float unit) { return uint(clamp(ceil(distance_ / unit + 1e-4), 0.0, 255.0)); }
-
-// Boxes of all children, and what they have in common.
-Box encode(Words node) {
+// Encodes a node anew around its children; answers the box of them all.
+Box encodeAnew(Words node) {
     Box child[kChildren];
-    Box all_ = emptyBox();
-    [[dont_unroll]] for (uint i = 0; i < kChildren; ++i) {
-        child[i] = wideChild(node, i);
-        all_ = join(all_, child[i]);
-    }
-    vec3 corner = isEmpty(all_) ? vec3(0) : all_.lo;
-    vec3 extent = isEmpty(all_) ? vec3(0) : all_.hi - all_.lo;
-    uint exponents = 0u;
-    [[dont_unroll]] for (uint axis = 0; axis < 3; ++axis) {
-        uint exponent = exponentOf(extent[axis]);
-        float unit = uintBitsToFloat(exponent << 23);
-        exponents |= exponent << axis * 8;
-        uvec2 low = uvec2(0), high = uvec2(0);
-        [[dont_unroll]] for (uint i = 0; i < kChildren; ++i) {
-            bool none = isEmpty(child[i]);
-            uint down = none ? 255u : stepsDown(child[i].lo[axis] - corner[axis], unit);
-            uint up = none ? 0u : stepsUp(child[i].hi[axis] - corner[axis], unit);
-            low[i / 4] |= down << (i & 3u) * 8u;
-            high[i / 4] |= up << (i & 3u) * 8u;
-        }
-        uint at = 8 + axis * 4;
-        node.word[at] = low.x;
-        node.word[at + 1] = low.y;
-        node.word[at + 2] = high.x;
-        node.word[at + 3] = high.y;
-    }
-    [[dont_unroll]] for (uint axis = 0; axis < 3; ++axis) node.word[axis] = floatBitsToUint(corner[axis]);
-    node.word[3] = exponents | (node.word[3] & 0xff000000u);
-    return all_;
+    [[dont_unroll]] for (uint i = 0; i < kChildren; ++i) child[i] = wideChild(node, i);
+    return encode(node, child);
 }
 
 void finishWide(Box box) {
@@ -73,7 +31,7 @@ void fitWideFrom(uint i) {
     if (i >= nodes || wideAt(i).word[3] >> 24 != 0u) return;
     uint node = i;
     [[dont_unroll]] for (uint steps = 0; steps < nodes; ++steps) {
-        Box box = encode(wideAt(node));
+        Box box = encodeAnew(wideAt(node));
         writeBox(Corners(work(job.boxes)), node, box);
         uint parent = Words(job.parents).word[node];
         if (parent == kNone) {

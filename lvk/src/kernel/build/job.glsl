@@ -22,6 +22,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 4) LVK_SHARED buffer T
 layout(buffer_reference, scalar, buffer_reference_align = 16) LVK_SHARED buffer Quads { uvec4 quad[]; };
 
 // Formats and leaf kinds as the header has them.
+const uint kWide = 0u;
 const uint kBinary = 1u;
 const uint kTriangles = 0u;
 const uint kIndexedTriangles = 1u;
@@ -35,24 +36,24 @@ struct Job {
     uvec2 blob;          // the structure
     uvec2 scratch;
     uvec2 parents;       // of each node, a word in the scratch memory
+    uvec2 binary;        // nodes of two children: of what ends with wide nodes in the scratch memory
     uint count;          // primitives of the inputs, inactive ones included
     uint inputCount;     // geometries, or addresses in `table`
     uint leafKind;
-    uint leafSize;       // primitives of a leaf
     uint lowBits;        // of the second word of a code; 0 where codes have but one
-    uint nodes;          // places in the structure, in units of 16 bytes
+    uint nodes;          // places in the structure, in units of 16 bytes; these are of the nodes it ends with
     uint primitives;
     uint vertices;
     uint geometries;
     uint vertexCount;    // vertices of the copy that leaves name
     uint boxes;          // places in the scratch memory, in words: six floats for each primitive or wide node
     uint keys;           // codes and numbers of primitives
-    uint spareKeys;
+    uint spareKeys;      // afterwards the number of the primitive in each slot of the leaves
     uint digits;         // how often each digit occurs in each block
     uint arrivals;       // a counter for each node
-    uint nodeCapacity;
+    uint nodeCapacity;   // most binary nodes of a build, most nodes of a refit
     uint improvements;   // how often places are made better
-    uint reserved;
+    uint wideCapacity;   // most wide nodes of a build; 0 where nodes stay binary
     uint headerFlags;    // bit 0: every geometry is opaque, bit 1: none is
 };
 
@@ -98,8 +99,11 @@ uint passes() { return lowPasses() + 8; }
 Words keysBefore(uint pass) { return Words(work((passes() - pass & 1u) != 0u ? job.spareKeys : job.keys)); }
 
 // The scratch memory starts with these words. Bounds are kept as numbers that only grow from 0.
-const uint kStateWords = 8u;
+const uint kStateWords = 48u;
 const uint kActive = 6u;
+const uint kPlaced = 7u;     // slots of leaves that have a primitive
+const uint kWideNodes = 8u;  // more than there is room for where they did not fit
+const uint kEnds = 9u;       // of each level the number behind its last wide node
 
 Words state() { return Words(job.scratch); }
 
@@ -107,6 +111,6 @@ void readJob(uint number) {
     InputQuads from = InputQuads(element(jobs, number, kJobBytes));
     uvec4 a = from.quad[0], b = from.quad[1], c = from.quad[2], d = from.quad[3];
     uvec4 e = from.quad[4], f = from.quad[5], g = from.quad[6], h = from.quad[7];
-    job = Job(a.xy, a.zw, b.xy, b.zw, c.xy, c.z, c.w, d.x, d.y, d.z, d.w, e.x, e.y, e.z, e.w, f.x, f.y, f.z, f.w, g.x,
-              g.y, g.z, g.w, h.x);
+    job = Job(a.xy, a.zw, b.xy, b.zw, c.xy, c.zw, d.x, d.y, d.z, d.w, e.x, e.y, e.z, e.w, f.x, f.y, f.z, f.w, g.x, g.y,
+              g.z, g.w, h.x, h.y);
 }

@@ -5,7 +5,6 @@ Box cornersBox(vec3 a, vec3 b, vec3 c) {
 }
 
 Box keptBox(uint slot) {
-    if (job.leafKind == kInstances) return readBox(Corners(work(job.boxes)), slot);
     if (job.leafKind == kBoxes) {
         Quads kept = slotAt(slot, 32u);
         Box box = Box(uintBitsToFloat(kept.quad[0].xyz), uintBitsToFloat(kept.quad[1].xyz));

@@ -1,2 +1,2 @@
 // A node keeps its children.
-uint rotate(uint number, Node node) { return max(node.part[2].w, node.part[3].w) + 1; }
+uint rotate(uint number, Node node) { return above(node.part[2].w, node.part[3].w); }

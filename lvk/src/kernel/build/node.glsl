@@ -1,10 +1,28 @@
-// Binary nodes: corners of both children in turn, and beside them what the children are and how high they are.
+// Binary nodes: corners of both children in turn, and beside them what the children are and their shapes.
 struct Node { uvec4 part[4]; };
 
-// A child's box and the nodes on the longest path below it.
-struct Fitted { Box box; uint height; };
+// A child's box and shape.
+struct Fitted { Box box; uint shape; };
 
-uvec2 nodeAt(uint node) { return element(place(job.nodes), node, 64u); }
+// The shape of a subtree, in one word: nodes on its longest path (8 bits), groups that its primitives fall into where it is
+// taken apart until none has more than a leaf of a wide node holds (8), and primitives (16). No number grows beyond its bits.
+const uint kMostOfGroup = 3u;
+const uint kLeafShape = 0x00010100u;
+
+uint heightOf(uint shape) { return shape & 0xffu; }
+
+uint groupsOf(uint shape) { return shape >> 8 & 0xffu; }
+
+uint countOf(uint shape) { return shape >> 16; }
+
+// The shape of a node of two children.
+uint above(uint one, uint two) {
+    uint count = min(countOf(one) + countOf(two), 0xffffu);
+    uint groups = count <= kMostOfGroup ? 1u : min(groupsOf(one) + groupsOf(two), 0xffu);
+    return max(heightOf(one), heightOf(two)) + 1u | groups << 8 | count << 16;
+}
+
+uvec2 nodeAt(uint node) { return element(job.binary, node, 64u); }
 
 Node readNode(uint node) {
     Quads from = Quads(nodeAt(node));
@@ -16,8 +34,8 @@ uint referenceOf(Node node, uint which) { return which == 0u ? node.part[0].w : 
 Fitted childOf(Node node, uint which) {
     uvec3 lo = which == 0u ? node.part[0].xyz : node.part[2].xyz;
     uvec3 hi = which == 0u ? node.part[1].xyz : node.part[3].xyz;
-    uint height = which == 0u ? node.part[2].w : node.part[3].w;
-    return Fitted(Box(uintBitsToFloat(lo), uintBitsToFloat(hi)), height);
+    uint shape = which == 0u ? node.part[2].w : node.part[3].w;
+    return Fitted(Box(uintBitsToFloat(lo), uintBitsToFloat(hi)), shape);
 }
 
 // Touches nothing of the other child: that may be written at the same time.
@@ -25,9 +43,9 @@ void writeChild(uint node, uint which, Fitted child) {
     uvec2 at = nodeAt(node);
     Corners(plus(at, which * 32u, 0u)).corner[0] = child.box.lo;
     Corners(plus(at, which * 32u + 16u, 0u)).corner[0] = child.box.hi;
-    Words(at).word[11 + which * 4] = child.height;
+    Words(at).word[11 + which * 4] = child.shape;
 }
 
 bool isLeaf(uint reference) { return (reference & kLeaf) != 0u; }
 
-void fitLeaf(uint node, uint which, uint reference) { writeChild(node, which, Fitted(leafBox(reference), 0u)); }
+void fitLeaf(uint node, uint which, uint reference) { writeChild(node, which, Fitted(leafBox(reference), kLeafShape)); }

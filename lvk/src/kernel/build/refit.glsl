@@ -36,7 +36,7 @@ void refitPrimitive(uint slot) {
 // What a node knows of those below it, which then know it as their parent. Nobody has arrived there.
 void prepareBinary(uint node) {
     resetArrivals(node);
-    Words from = Words(element(place(job.nodes), node, 64u));
+    Words from = Words(element(job.binary, node, 64u));
     for (uint which = 0; which < 2; ++which) {
         uint child = from.word[3 + which * 4];
         if (child < job.nodeCapacity) writeParent(child, node, which);

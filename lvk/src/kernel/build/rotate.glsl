@@ -1,19 +1,15 @@
 // Makes a node better while both its children are at hand: Kopta et al., "Fast, Effective BVH Updates for Animated Scenes",
 // I3D 2012. A child changes places with a child of the other where that makes boxes smaller and no path longer.
-float areaOf(Box box) {
-    vec3 side = max(box.hi - box.lo, vec3(0));
-    return side.x * side.y + side.y * side.z + side.z * side.x;
-}
-
 void writeReference(uint node, uint which, uint reference) {
     Words(nodeAt(node)).word[3 + which * 4] = reference;
     if (!isLeaf(reference)) Words(job.parents).word[reference] = node | which << 29;
 }
 
-// Answers how high the node then is.
+// Answers the shape of the node then.
 uint rotate(uint number, Node node) {
-    uint height = max(node.part[2].w, node.part[3].w) + 1;
-    if (job.improvements == 0u) return height;
+    uint shape = above(node.part[2].w, node.part[3].w);
+    if (job.improvements == 0u) return shape;
+    uint height = heightOf(shape);
     float gain = 0.0;
     uint side = 0u, given = kNone;  // grandchild `given` below `side` changes places with the other side
     Node lower;
@@ -27,7 +23,7 @@ uint rotate(uint number, Node node) {
             Fitted raised = childOf(below, up);
             Fitted kept = childOf(below, 1 - up);
             float saved = before - areaOf(join(sibling.box, kept.box));
-            uint after = max(max(sibling.height, kept.height) + 1, raised.height) + 1;
+            uint after = heightOf(above(above(sibling.shape, kept.shape), raised.shape));
             if (saved > gain && after <= height) {
                 gain = saved;
                 side = inner;
@@ -36,7 +32,7 @@ uint rotate(uint number, Node node) {
             }
         }
     }
-    if (given == kNone) return height;
+    if (given == kNone) return shape;
     uint inner = referenceOf(node, side);
     Fitted sibling = childOf(node, 1 - side);
     Fitted raised = childOf(lower, given);
@@ -45,7 +41,7 @@ uint rotate(uint number, Node node) {
     writeChild(inner, given, sibling);
     writeReference(number, 1 - side, referenceOf(lower, given));
     writeChild(number, 1 - side, raised);
-    Fitted made = Fitted(join(sibling.box, kept.box), max(sibling.height, kept.height) + 1);
+    Fitted made = Fitted(join(sibling.box, kept.box), above(sibling.shape, kept.shape));
     writeChild(number, side, made);
-    return max(made.height, raised.height) + 1;
+    return above(made.shape, raised.shape);
 }

@@ -1,9 +1,4 @@
-// A whole build by one workgroup, one for each job: dispatches cost more than the work of few primitives.
-void meet() {
-    memoryBarrierBuffer();
-    barrier();
-}
-
+// A build up to its binary tree by one workgroup, one for each job: dispatches cost more than the work of few primitives.
 void boundAll() {
     uint actives = 0;
     Box centres = emptyBox();
@@ -40,7 +35,7 @@ void main() {
     [[dont_unroll]] for (uint i = t; i < job.count; i += kGroup) writeKey(i);
     meet();
     sortAll();
-    [[dont_unroll]] for (uint i = t; i < smallParts(); i += kGroup) writeTree(i);
+    [[dont_unroll]] for (uint i = t; i < max(job.count, 1u); i += kGroup) writeHierarchy(i);
     meet();
     [[dont_unroll]] for (uint round_ = 1;; ++round_) {
         [[dont_unroll]] for (uint i = t; i < max(job.nodeCapacity, 1u); i += kGroup) fitFrom(i);

@@ -1,5 +1,5 @@
-// The hierarchy, and everything else of the structure but its boxes.
+// The hierarchy.
 void main() {
     readJob(firstJob);
-    writeTree(invocation());
+    writeHierarchy(invocation());
 }

@@ -1,20 +1,12 @@
 // The hierarchy of sorted codes: Karras, "Maximizing Parallelism in the Construction of BVHs, Octrees, and k-d Trees",
 // HPG 2012. Every node finds its range by itself; leaves with equal codes differ by their numbers.
-uint leafCount() { return (state().word[kActive] + job.leafSize - 1) / job.leafSize; }
-
-uint leafReference(uint leaf) {
-    Words keys = Words(work(job.keys));
-    if (job.leafKind == kInstances) return kLeaf | keys.word[job.count + leaf];
-    uint first = leaf * job.leafSize;
-    uint count = min(job.leafSize, state().word[kActive] - first);
-    return kLeaf | (count - 1) << 27 | first;
-}
+uint leafReference(uint leaf) { return kLeaf | Words(work(job.keys)).word[job.count + leaf]; }
 
 // Leading bits that leaf `i`, whose key is `own`, has in common with leaf `j`; -1 where there is no such leaf.
 int sameBits(uint i, uvec2 own, int j, uint leaves) {
     if (j < 0 || j >= int(leaves)) return -1;
     Words keys = Words(work(job.keys));
-    uint at = uint(j) * job.leafSize;
+    uint at = uint(j);
     uint other = keys.word[at];
     if (own.x != other) return 31 - findMSB(own.x ^ other);
     if (job.lowBits != 0u) {
@@ -26,8 +18,7 @@ int sameBits(uint i, uvec2 own, int j, uint leaves) {
 
 void writeNode(uint i, uint leaves) {
     Words keys = Words(work(job.keys));
-    uint at = i * job.leafSize;
-    uvec2 own = uvec2(keys.word[at], job.lowBits != 0u ? keys.word[2 * job.count + at] : 0u);
+    uvec2 own = uvec2(keys.word[i], job.lowBits != 0u ? keys.word[2 * job.count + i] : 0u);
     int n = int(i);
     int direction = sameBits(i, own, n + 1, leaves) > sameBits(i, own, n - 1, leaves) ? 1 : -1;
     int least = sameBits(i, own, n - direction, leaves);
@@ -47,7 +38,7 @@ void writeNode(uint i, uint leaves) {
     int left = n + split * direction + min(direction, 0);
     bool leftLeaf = min(n, last) == left;
     bool rightLeaf = max(n, last) == left + 1;
-    Quads node = Quads(element(place(job.nodes), i, 64u));
+    Quads node = Quads(element(job.binary, i, 64u));
     node.quad[0] = uvec4(uvec3(0), leftLeaf ? leafReference(uint(left)) : uint(left));
     node.quad[1] = uvec4(uvec3(0), rightLeaf ? leafReference(uint(left + 1)) : uint(left + 1));
     writeArrivals(i, leftLeaf && rightLeaf);
@@ -66,9 +57,21 @@ void writeHeader(uint leaves) {
     for (uint k = 3; k < 8; ++k) to.quad[k] = uvec4(0);
 }
 
-// The hierarchy and the header.
+// Wide nodes begin with the root; each says by its first word which binary node it is made of.
+void writeWideRoot(uint leaves) {
+    const uint kOneLeaf = 3u;
+    if (job.wideCapacity == 0u || leaves <= kOneLeaf) return;
+    Words(place(job.nodes)).word[0] = 0u;
+    state().word[kWideNodes] = 1u;
+    state().word[kEnds] = 1u;
+}
+
+// The hierarchy, and a header for it. Leaves are single primitives, by their numbers.
 void writeHierarchy(uint i) {
-    uint leaves = leafCount();
+    uint leaves = state().word[kActive];
     if (i + 1 < leaves) writeNode(i, leaves);
-    if (i == 0u) writeHeader(leaves);
+    if (i == 0u) {
+        writeHeader(leaves);
+        writeWideRoot(leaves);
+    }
 }

@@ -1,8 +1,11 @@
 //! Builds and refits of software structures on the GPU: which kernels run, in which order.
 //!
 //! A build sorts primitives along a space-filling curve, finds the hierarchy of their codes, and fits boxes from the
-//! leaves up; see [`steps`] for the order of the kernels. Many builds are recorded side by side.
+//! leaves up. Of bottom-level structures eight children at a time then become one node; see [`steps`] for the order of the
+//! kernels. Many builds are recorded side by side.
 
-#[cfg(feature = "test-hooks")]
+#[cfg(any(test, feature = "test-hooks"))]
 pub(crate) mod check;
+#[cfg(any(test, feature = "test-hooks"))]
+pub(crate) mod collapse;
 pub(crate) mod steps;

@@ -1,6 +1,6 @@
 //! Which kernels run in which order, and which of them side by side.
 
-use crate::accel::software::layout::LeafKind;
+use crate::accel::software::layout::{DEEPEST_WIDE, LeafKind};
 use crate::accel::software::plan::{BuildSource, GpuBuildPlan, SORT_BLOCK};
 use crate::accel::software::refit_plan::{GpuRefitPlan, NodeFormat};
 use crate::kernel::Kernel;
@@ -51,6 +51,8 @@ pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usiz
             (Some(kernel), _) => steps.push(Step { phase: 0, kernel, job, pass_or_jobs: 1, groups: 1 }),
         }
     }
+    let small_blas = steps.iter().find(|step| step.kernel == Kernel::BuildSmallBlas).copied();
+    steps.extend(small_blas.map(|step| Step { phase: 1, kernel: Kernel::BuildSmallWide, ..step }));
     steps.sort_by_key(|step| (step.phase, step.kernel));
     (order, steps)
 }
@@ -58,26 +60,47 @@ pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usiz
 fn large_build(job: u32, plan: &GpuBuildPlan, count: u32, steps: &mut Vec<Step>) {
     let groups = |invocations: u32| invocations.div_ceil(GROUP).max(1);
     let mut add = |phase, kernel, groups| steps.push(Step { phase, kernel, job, pass_or_jobs: 0, groups });
-    let (read, tree) = match plan.leaf_kind {
-        LeafKind::Instances => (Kernel::BuildInstances, Kernel::BuildTlasTree),
-        _ => (Kernel::BuildPrimitives, Kernel::BuildTree),
+    let read = match plan.leaf_kind {
+        LeafKind::Instances => Kernel::BuildInstances,
+        _ => Kernel::BuildPrimitives,
     };
     add(0, Kernel::BuildReset, 1);
     add(1, read, groups(count));
     add(2, Kernel::BuildCodes, groups(count));
-    let written = count.max(plan.geometry_count).max(plan.vertex_count);
-    add(3 + MOST_PASSES * 3, tree, groups(written));
+    add(3 + MOST_PASSES * 3, Kernel::BuildTree, groups(count));
     let nodes = groups(plan.node_capacity());
-    if plan.improvements == 0 {
-        add(4 + MOST_PASSES * 3, Kernel::FitBinary, nodes);
-    }
-    for round in 0..plan.improvements {
+    let rounds = plan.improvements.max(1);
+    for round in 0..rounds {
         if round > 0 {
             add(3 + MOST_PASSES * 3 + 2 * round, Kernel::ResetArrivals, nodes);
         }
         add(4 + MOST_PASSES * 3 + 2 * round, Kernel::BuildImprove, nodes);
     }
     steps.extend(sort_steps(job, count, plan.low_bits));
+    if plan.leaf_kind != LeafKind::Instances {
+        steps.extend(wide_steps(3 + MOST_PASSES * 3 + 2 * rounds, job, plan));
+    }
+}
+
+/// The steps from a binary tree to the structure, from a phase on. Whether wide nodes had room only the last two know.
+pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Step> {
+    let groups = |invocations: u32| invocations.div_ceil(GROUP).max(1);
+    let step = |nth, kernel, level, invocations| Step {
+        phase: phase + nth,
+        kernel,
+        job,
+        pass_or_jobs: level,
+        groups: groups(invocations),
+    };
+    // Eight times as many nodes as in the level above, as long as there can be so many.
+    let nodes = |level: u32| 1_u32.checked_shl(3 * level).unwrap_or(u32::MAX).min(plan.wide_capacity);
+    let levels = if plan.wide_capacity > 0 { DEEPEST_WIDE as u32 } else { 0 };
+    let written = plan.capacity.max(plan.geometry_count).max(plan.vertex_count);
+    let mut steps: Vec<_> =
+        (0..levels).map(|level| step(level, Kernel::Collapse, level, nodes(level))).collect();
+    steps.push(step(levels, Kernel::Place, 0, written));
+    steps.push(step(levels + 1, Kernel::FitPacked, 0, plan.wide_capacity));
+    steps
 }
 
 /// The steps that sort the keys of a build, the low words first.
@@ -132,7 +155,6 @@ mod tests {
             primitive_count,
             vertex_count: 0,
             geometry_count: 1,
-            leaf_size: 2,
             improvements: 1,
         };
         GpuBuildPlan::blas("s", &shape).unwrap()
@@ -151,14 +173,14 @@ mod tests {
             prop_assert!(steps.is_sorted_by_key(|step| step.phase));
             for (job, build) in order.iter().enumerate() {
                 let covers = |step: &&Step| match step.kernel {
-                    Kernel::BuildSmallBlas => job < step.groups as usize,
+                    Kernel::BuildSmallBlas | Kernel::BuildSmallWide => job < step.groups as usize,
                     _ => step.job as usize == job,
                 };
                 let own: Vec<_> = steps.iter().filter(covers).collect();
                 let expected = match counts[*build] {
-                    0..=2048 => 1,
-                    2049..=4096 => 5 + 8 * 3,
-                    _ => 3 + 2 * plans[*build].improvements as usize + 3 * (plans[*build].low_bits.div_ceil(4) as usize + 8),
+                    0..=2048 => 2,
+                    2049..=4096 => 5 + 8 * 3 + 34,
+                    _ => 5 + 3 * (plans[*build].low_bits.div_ceil(4) as usize + 8) + 34,
                 };
                 prop_assert_eq!(own.len(), expected);
             }

@@ -134,7 +134,7 @@ fn notes(runs: u32, table: &mut Table) {
         "builds by the CPU: {cores} cores, host time of a creation, which reads the mesh back; by the GPU: GPU time; \
          medians of up to {runs} runs"
     ));
-    table.note("after a rebuild a structure that the CPU built keeps the room of its first tree");
+    table.note("a structure that the CPU built with updates allowed is rebuilt in its own room");
     table.note("aim: at most 56 B a triangle, with low memory 28 B; a build of living_room by two cores of the CPU at most 600 ms");
     table.note("aim on the H200: a rebuild at most 5 ms, a refit 1 ms, the 10,000 instances 0.5 ms");
 }

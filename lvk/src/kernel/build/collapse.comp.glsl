@@ -1,0 +1,7 @@
+// The wide nodes of a level.
+void main() {
+    readJob(firstJob);
+    uvec2 nodes = nodesOfLevel(passOrJobs);
+    uint i = nodes.x + invocation();
+    if (i < nodes.y) collapse(i, passOrJobs);
+}

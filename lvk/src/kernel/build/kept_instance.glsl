@@ -1,2 +1,0 @@
-// Boxes of instances stay where they were found.
-Box keptBox(uint slot) { return readBox(Corners(work(job.boxes)), slot); }

@@ -1,0 +1,5 @@
+// All invocations of the workgroup see what each of them wrote.
+void meet() {
+    memoryBarrierBuffer();
+    barrier();
+}

@@ -1,0 +1,18 @@
+// What follows a small binary tree, by one workgroup, one for each job: its wide nodes and everything else of the structure.
+uint parts() { return max(max(job.count, job.inputCount), max(job.vertexCount, 1u)); }
+
+void main() {
+    if (groupNumber() >= passOrJobs) return;
+    readJob(firstJob + groupNumber());
+    uint t = gl_LocalInvocationIndex;
+    [[dont_unroll]] for (uint level = 0; level < kLevels; ++level) {
+        uvec2 nodes = nodesOfLevel(level);
+        if (nodes.x >= nodes.y) break;
+        [[dont_unroll]] for (uint i = nodes.x + t; i < nodes.y; i += kGroup) collapse(i, level);
+        meet();
+    }
+    [[dont_unroll]] for (uint i = t; i < parts(); i += kGroup) placePart(i);
+    if (!isPacked()) return;
+    meet();
+    [[dont_unroll]] for (uint i = t; i < job.nodeCapacity; i += kGroup) fitWideFrom(i);
+}

@@ -1,5 +1,0 @@
-// The hierarchy of instances; those stand where they were read.
-void main() {
-    readJob(firstJob);
-    writeHierarchy(invocation());
-}

@@ -1,0 +1,352 @@
+//! How a binary tree becomes a wide one, as `kernel/build/collapse.glsl` does it: what tests hold the kernel against.
+
+use super::check::Bounds;
+use crate::accel::software::layout::DEEPEST_WIDE;
+
+const CHILDREN: u32 = 8;
+const MOST_OF_GROUP: u32 = 3;
+const FEW_GROUPS: u32 = 4;
+const GROUP_WORTH: f32 = 0.5;
+
+/// Nodes of two children each, the root first.
+#[derive(Debug, Clone, Default)]
+pub struct BinaryTree {
+    /// Both children of each.
+    pub nodes: Vec<[BinaryChild; 2]>,
+}
+
+/// A child of a binary node.
+#[derive(Debug, Clone, Copy)]
+pub struct BinaryChild {
+    /// Around all below it.
+    pub bounds: Bounds,
+    /// What it is.
+    pub below: Below,
+}
+
+/// What a child is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Below {
+    /// Another node.
+    Node(usize),
+    /// A primitive, by its number.
+    Leaf(u32),
+}
+
+/// A wide node with all that is below it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WideTree {
+    /// In the order of the node.
+    pub children: [WideChild; 8],
+}
+
+/// A child of a wide node.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum WideChild {
+    /// There is none.
+    None,
+    /// Another node.
+    Node(Box<WideTree>),
+    /// Numbers of primitives, in the order of their slots.
+    Leaf(Vec<u32>),
+}
+
+/// What `Fitted::shape` of the kernels says of a subtree.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Shape {
+    pub(crate) height: u32,
+    pub(crate) groups: u32,
+    pub(crate) count: u32,
+}
+
+#[derive(Clone, Copy)]
+struct Part {
+    child: BinaryChild,
+    shape: Shape,
+}
+
+impl Shape {
+    const LEAF: Self = Self { height: 0, groups: 1, count: 1 };
+
+    fn above(self, other: Self) -> Self {
+        let count = (self.count + other.count).min(0xffff);
+        let groups = if count <= MOST_OF_GROUP { 1 } else { (self.groups + other.groups).min(0xff) };
+        Self { height: self.height.max(other.height) + 1, groups, count }
+    }
+
+    /// As the kernels have it in a word.
+    pub(crate) fn packed(self) -> u32 {
+        self.height | self.groups << 8 | self.count << 16
+    }
+
+    fn is_group(self) -> bool {
+        self.count <= MOST_OF_GROUP
+    }
+
+    fn least_children(self, is_tall: bool) -> u32 {
+        if is_tall || self.groups > FEW_GROUPS { 1 } else { self.groups }
+    }
+}
+
+impl BinaryTree {
+    /// The shape of what is below a child.
+    pub(crate) fn shape(&self, below: Below) -> Shape {
+        match below {
+            Below::Leaf(_) => Shape::LEAF,
+            Below::Node(node) => {
+                let [one, two] = self.nodes[node].map(|child| self.shape(child.below));
+                one.above(two)
+            }
+        }
+    }
+
+    /// The shape of each node, which its children stand behind.
+    fn shapes(&self) -> Vec<Shape> {
+        let mut shapes = vec![Shape::LEAF; self.nodes.len()];
+        for (index, node) in self.nodes.iter().enumerate().rev() {
+            let [one, two] = node.map(|child| known(&shapes, child.below));
+            shapes[index] = one.above(two);
+        }
+        shapes
+    }
+
+    /// The wide tree of a tree of more than three primitives.
+    pub fn collapse(&self) -> WideTree {
+        self.wide(&self.shapes(), 0, 0)
+    }
+
+    fn wide(&self, shapes: &[Shape], node: usize, level: usize) -> WideTree {
+        let cut = self.cut(shapes, node, level);
+        let order = ordered(&cut);
+        let child = |part: Option<usize>| {
+            let Some(part) = part.map(|part| cut[part]) else { return WideChild::None };
+            match part.child.below {
+                Below::Node(below) if !part.shape.is_group() => {
+                    WideChild::Node(Box::new(self.wide(shapes, below, level + 1)))
+                }
+                below => WideChild::Leaf(self.primitives(below)),
+            }
+        };
+        WideTree { children: order.map(child) }
+    }
+
+    /// What becomes children of the wide node that stands for a binary one.
+    fn cut(&self, shapes: &[Shape], node: usize, level: usize) -> Vec<Part> {
+        let part = |child: BinaryChild| Part { child, shape: known(shapes, child.below) };
+        let mut cut: Vec<Part> = self.nodes[node].map(part).to_vec();
+        let is_tall = (shapes[node].height as usize + 1) / 3 > DEEPEST_WIDE - 1 - level;
+        let mut taken: u32 = cut.iter().map(|part| part.shape.least_children(is_tall)).sum();
+        let mut closed = [false; CHILDREN as usize];
+        while cut.len() < CHILDREN as usize {
+            let Some((next, below)) = next_to_open(&cut, &closed, is_tall) else { break };
+            let parts = self.nodes[below].map(part);
+            let more: u32 = parts.iter().map(|part| part.shape.least_children(is_tall)).sum();
+            let after = taken + more - cut[next].shape.least_children(is_tall);
+            if after > CHILDREN {
+                closed[next] = true;
+                continue;
+            }
+            taken = after;
+            cut[next] = parts[0];
+            cut.push(parts[1]);
+        }
+        cut
+    }
+
+    fn primitives(&self, below: Below) -> Vec<u32> {
+        match below {
+            Below::Leaf(number) => vec![number],
+            Below::Node(node) => {
+                self.nodes[node].iter().flat_map(|child| self.primitives(child.below)).collect()
+            }
+        }
+    }
+}
+
+impl WideTree {
+    /// Nodes on the longest path.
+    pub fn depth(&self) -> usize {
+        let depth = |child: &WideChild| if let WideChild::Node(below) = child { below.depth() } else { 0 };
+        1 + self.children.iter().map(depth).max().unwrap_or(0)
+    }
+
+    /// Nodes of all levels.
+    pub fn node_count(&self) -> usize {
+        let count =
+            |child: &WideChild| if let WideChild::Node(below) = child { below.node_count() } else { 0 };
+        1 + self.children.iter().map(count).sum::<usize>()
+    }
+
+    /// Numbers of all primitives.
+    pub fn primitives(&self) -> Vec<u32> {
+        let below = |child: &WideChild| match child {
+            WideChild::None => Vec::new(),
+            WideChild::Node(below) => below.primitives(),
+            WideChild::Leaf(numbers) => numbers.clone(),
+        };
+        self.children.iter().flat_map(below).collect()
+    }
+}
+
+fn known(shapes: &[Shape], below: Below) -> Shape {
+    match below {
+        Below::Leaf(_) => Shape::LEAF,
+        Below::Node(node) => shapes[node],
+    }
+}
+
+fn next_to_open(cut: &[Part], closed: &[bool], is_tall: bool) -> Option<(usize, usize)> {
+    let (mut next, mut most) = (None, -1.0);
+    for (index, part) in cut.iter().enumerate() {
+        let Below::Node(node) = part.child.below else { continue };
+        let area = half_area(&part.child.bounds) * if part.shape.is_group() { GROUP_WORTH } else { 1.0 };
+        let worth = if is_tall { part.shape.height as f32 } else { area };
+        if !closed[index] && worth > most {
+            (next, most) = (Some((index, node)), worth);
+        }
+    }
+    next
+}
+
+/// Which part each child is.
+fn ordered(cut: &[Part]) -> [Option<usize>; 8] {
+    let centre = |bounds: &Bounds| -> [f32; 3] {
+        std::array::from_fn(|axis| bounds[0][axis] * 0.5 + bounds[1][axis] * 0.5)
+    };
+    let all = |which: usize, best: fn(f32, f32) -> f32| -> [f32; 3] {
+        let first = cut[0].child.bounds[which];
+        cut.iter().fold(first, |all, part| {
+            std::array::from_fn(|axis| best(all[axis], part.child.bounds[which][axis]))
+        })
+    };
+    let middle = centre(&[all(0, f32::min), all(1, f32::max)]);
+    let mut children = [None; 8];
+    let mut waiting: Vec<usize> = (0..cut.len()).collect();
+    while !waiting.is_empty() {
+        let (mut least, mut chosen) = (f32::MAX, (0, 0));
+        for (place, part) in waiting.iter().enumerate() {
+            let at = centre(&cut[*part].child.bounds);
+            for child in (0..8).filter(|child| children[*child].is_none()) {
+                let along: f32 = (0..3)
+                    .map(|axis| {
+                        let offset = at[axis] - middle[axis];
+                        if child & 4 >> axis == 0 { offset } else { -offset }
+                    })
+                    .sum();
+                if along < least {
+                    (least, chosen) = (along, (place, child));
+                }
+            }
+        }
+        children[chosen.1] = Some(waiting.remove(chosen.0));
+    }
+    children
+}
+
+fn half_area(bounds: &Bounds) -> f32 {
+    let [x, y, z] = std::array::from_fn(|axis| (bounds[1][axis] - bounds[0][axis]).max(0.0));
+    x * y + y * z + z * x
+}
+
+/// A tree of `count` primitives, at least two, with corners at small integers. `choose` answers a number below its argument;
+/// `even` is how many times of eight halves have about the same number of primitives, else one of them has only one. No path
+/// has more than `height` nodes, of which there must be enough.
+pub fn any_tree(
+    count: usize,
+    even: usize,
+    height: u32,
+    choose: &mut dyn FnMut(usize) -> usize,
+) -> BinaryTree {
+    let mut tree = BinaryTree::default();
+    let leaves: Vec<u32> = (0..count as u32).collect();
+    grow(&mut tree, &leaves, even, height, choose);
+    tree
+}
+
+fn grow(
+    tree: &mut BinaryTree,
+    leaves: &[u32],
+    even: usize,
+    height: u32,
+    choose: &mut dyn FnMut(usize) -> usize,
+) -> BinaryChild {
+    if let [number] = leaves {
+        let low: [usize; 3] = std::array::from_fn(|_| choose(1000));
+        let high: [usize; 3] = std::array::from_fn(|axis| low[axis] + choose(8));
+        let bounds = [low, high].map(|corner| corner.map(|number| number as f32));
+        return BinaryChild { bounds, below: Below::Leaf(*number) };
+    }
+    let node = tree.nodes.len();
+    let empty = BinaryChild { bounds: super::check::EMPTY, below: Below::Leaf(0) };
+    tree.nodes.push([empty; 2]);
+    let most = 1_usize.checked_shl(height - 1).unwrap_or(usize::MAX);
+    let half = leaves.len() / 2;
+    let wanted = if choose(8) < even { half - choose(half.div_ceil(4)) } else { 1 };
+    let middle = wanted.max(leaves.len().saturating_sub(most)).min(leaves.len() - 1);
+    let (one, two) = leaves.split_at(middle);
+    let mut parts = [one, two];
+    if choose(2) == 0 {
+        parts.reverse();
+    }
+    let children = parts.map(|part| grow(tree, part, even, height - 1, choose));
+    tree.nodes[node] = children;
+    let [one, two] = children.map(|child| child.bounds);
+    let bounds = [
+        std::array::from_fn(|axis| one[0][axis].min(two[0][axis])),
+        std::array::from_fn(|axis| one[1][axis].max(two[1][axis])),
+    ];
+    BinaryChild { bounds, below: Below::Node(node) }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn tree(count: usize, even: usize, height: u32, seed: u64) -> BinaryTree {
+        let mut state = seed;
+        any_tree(count, even, height, &mut |below| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) as usize % below
+        })
+    }
+
+    /// Fewest children of any node but the root.
+    fn fewest(tree: &WideTree) -> usize {
+        let own = |tree: &WideTree| tree.children.iter().filter(|child| **child != WideChild::None).count();
+        let below = tree.children.iter().filter_map(|child| match child {
+            WideChild::Node(below) => Some(own(below).min(fewest(below))),
+            _ => None,
+        });
+        below.min().unwrap_or(8)
+    }
+
+    proptest! {
+        #[test]
+        fn every_primitive_is_in_one_leaf(count in 4..3000_usize, even in 0..=8_usize, seed: u64, height in 12..=64_u32) {
+            let wide = tree(count, even, height, seed).collapse();
+            let mut found = wide.primitives();
+            found.sort_unstable();
+            prop_assert!(found.into_iter().eq(0..count as u32));
+            prop_assert!(wide.depth() <= DEEPEST_WIDE, "{}", wide.depth());
+        }
+
+        #[test]
+        fn even_trees_have_room(count in 4..5000_usize, even in 7..=8_usize, seed: u64) {
+            let wide = tree(count, even, 64, seed).collapse();
+            prop_assert!(wide.node_count() <= count * 99 / 1000 + 2, "{} of {count}", wide.node_count());
+            prop_assert!(fewest(&wide) >= 2);
+        }
+    }
+
+    /// A path as long as codes make them, of which every node has something large beside it.
+    #[test]
+    fn the_longest_paths_are_short_enough() {
+        for seed in 0..200 {
+            let deep = tree(4_000, 0, 64, seed);
+            assert_eq!(deep.shape(Below::Node(0)).height, 64);
+            assert!(deep.collapse().depth() <= DEEPEST_WIDE);
+        }
+    }
+}
