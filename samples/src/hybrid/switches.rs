@@ -12,7 +12,8 @@ const MOST_SAMPLES: u32 = 16;
 /// Lays out the switches of `config`. Without `goes_on` nothing in the scene mirrors or refracts.
 pub(super) fn show(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabilities, goes_on: bool) {
     show_method(ui, config, capabilities);
-    show_path(ui, &mut config.path, |path| HybridConfig { path, ..*config }.check(capabilities).is_ok());
+    let before = *config;
+    show_path(ui, &mut config.path, |path| can_be(&HybridConfig { path, ..before }, capabilities));
     if goes_on {
         show_bounces(ui, config, capabilities);
         ui.add(Slider::new(&mut config.max_depth, 0..=HybridConfig::MAX_DEPTH).text("mirrored or bent"));
@@ -33,23 +34,12 @@ pub(crate) fn show_path(ui: &mut Ui, path: &mut RayPath, can_be: impl Fn(RayPath
 }
 
 fn show_method(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabilities) {
-    let can_be = |config: &HybridConfig| config.check(capabilities).is_ok();
+    let can_be = |config: &HybridConfig| can_be(config, capabilities);
     ui.horizontal(|ui| {
         ui.label("seen");
-        option(
-            ui,
-            config,
-            "by rays",
-            |config| mended(HybridConfig { method: Method::Standalone, ..config }),
-            can_be,
-        );
-        option(
-            ui,
-            config,
-            "by rasteriser",
-            |config| HybridConfig { method: Method::Hybrid, ..config },
-            can_be,
-        );
+        let by = |method| move |config| mended(HybridConfig { method, ..config });
+        option(ui, config, "by rays", by(Method::Standalone), can_be);
+        option(ui, config, "by rasteriser", by(Method::Hybrid), can_be);
     });
     if config.method == Method::Standalone {
         return;
@@ -67,10 +57,7 @@ fn show_method(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabiliti
 }
 
 fn show_bounces(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabilities) {
-    let can_be = |config: &HybridConfig| {
-        let can_queue = config.path == RayPath::Query || capabilities.trace_rays_indirect;
-        config.check(capabilities).is_ok() && (can_queue || config.bounces != Some(Bounces::Queued))
-    };
+    let can_be = |config: &HybridConfig| can_be(config, capabilities);
     ui.horizontal(|ui| {
         ui.label("bounces");
         for (text, bounces) in
@@ -79,6 +66,12 @@ fn show_bounces(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabilit
             option(ui, config, text, |config| HybridConfig { bounces: Some(bounces), ..config }, can_be);
         }
     });
+}
+
+/// Whether the device can render by `config`.
+fn can_be(config: &HybridConfig, capabilities: &Capabilities) -> bool {
+    let can_queue = config.path == RayPath::Query || capabilities.trace_rays_indirect;
+    config.check(capabilities).is_ok() && (can_queue || config.bounces != Some(Bounces::Queued))
 }
 
 /// The configuration with bounces that its method has.

@@ -156,20 +156,18 @@ impl Reflections {
     /// Renders by another configuration from now on; by the old one where this fails.
     fn change(&mut self, config: ReflectionsConfig) -> Result<(), ReflectionsError> {
         config.check(self.ctx.capabilities())?;
-        let (before, extent) = (self.config, [config.width, config.height]);
-        let changed = |is_new: bool| is_new.then_some(&self.ctx);
-        let rays =
-            changed(config.path != before.path).map(|ctx| RayPasses::new(ctx, config.path)).transpose()?;
-        let frames = changed(config.samples != before.samples).map(|ctx| frame_buffer(ctx, config.samples));
+        let (ctx, before, extent) = (&self.ctx, self.config, [config.width, config.height]);
+        let rays = (config.path != before.path).then(|| RayPasses::new(ctx, config.path)).transpose()?;
+        let frames = (config.samples != before.samples).then(|| frame_buffer(ctx, config.samples));
         let frames = frames.transpose()?;
-        let targets = changed(extent != [before.width, before.height]).map(|ctx| Targets::new(ctx, extent));
+        let address = frames.as_ref().map(|frames| ctx.buffer_address(**frames)).transpose()?;
+        let targets = (extent != [before.width, before.height]).then(|| Targets::new(ctx, extent));
         if let Some(targets) = targets.transpose()? {
             self.targets = targets;
             self.targets.name_in(&mut self.indices);
         }
-        if let Some(frames) = frames {
-            self.frame_address = self.ctx.buffer_address(*frames)?;
-            self.frame_buffer = frames;
+        if let (Some(frames), Some(address)) = (frames, address) {
+            (self.frame_buffer, self.frame_address) = (frames, address);
         }
         if let Some(rays) = rays {
             self.rays = rays;
