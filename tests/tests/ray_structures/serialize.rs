@@ -31,7 +31,7 @@ fn split_device() -> Option<TestDevice> {
         name: "small structures".into(),
         max_blas_primitives: MOST_PRIMITIVES,
         // A few parts: they go through several buffers.
-        max_accel_structure_bytes: 64 << 10,
+        max_accel_structure_bytes: 16 << 10,
         ..DeviceProfile::default()
     };
     device_with(|desc| desc.profile = Some(&profile))
