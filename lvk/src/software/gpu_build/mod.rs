@@ -5,7 +5,9 @@
 //! kernels. Many builds are recorded side by side.
 
 #[cfg(any(test, feature = "test-hooks"))]
+#[cfg_attr(not(feature = "test-hooks"), expect(dead_code, reason = "tests of the workspace ask for more"))]
 pub(crate) mod check;
 #[cfg(any(test, feature = "test-hooks"))]
+#[cfg_attr(not(feature = "test-hooks"), expect(dead_code, reason = "tests of the workspace ask for more"))]
 pub(crate) mod collapse;
 pub(crate) mod steps;
