@@ -114,10 +114,7 @@ fn timed(
     mode: BuildMode,
     runs: u32,
 ) -> Result<Vec<String>, BenchError> {
-    let build = |which: usize| {
-        let time = makers[which].stopwatch.time(|cmd| cmd.build_blas(&[*blas[which]], mode));
-        time.map_err(BenchError::from)
-    };
+    let build = |which: usize| makers[which].stopwatch.time(|cmd| cmd.build_blas(&[*blas[which]], mode));
     raise_clocks(&makers[0].ctx, || build(0).map(drop))?;
     let samples = all_take_turns(makers.len(), runs, build)?;
     Ok(samples.iter().map(|samples| ms(median_of(samples, |timed| timed.gpu))).collect())
