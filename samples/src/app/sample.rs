@@ -149,6 +149,11 @@ pub trait Sample {
         Ok(())
     }
 
+    /// Whether the animation of its window waits for the space key: for pictures that get better while nothing moves.
+    fn stands_at_first(&self) -> bool {
+        false
+    }
+
     /// From where the next frame is seen; `None` where the sample has no camera that could be elsewhere.
     fn view(&self) -> Option<Camera> {
         None

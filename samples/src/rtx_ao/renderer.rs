@@ -225,6 +225,11 @@ impl Sample for RtxAo {
         self.config.passes.into()
     }
 
+    /// Each frame adds to those before as long as nothing moves.
+    fn stands_at_first(&self) -> bool {
+        true
+    }
+
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RtxError> {
         self.upload_bodies()?;
         for pass in 0..self.config.passes {

@@ -196,6 +196,59 @@ fn queries_that_take_turns_do_not_disturb_each_other() -> Result<()> {
     Ok(())
 }
 
+/// A query that is given up with a candidate waiting, or terminated, and begins anew with another ray.
+const ANEW: &str = r#"
+    #include <lvk/ray_query.glsl>
+    #include "ray_records.glsl"
+    layout(local_size_x = 64) in;
+
+    void main() {
+        uint index = gl_GlobalInvocationID.x;
+        if (index >= count) return;
+        Ray one = rays.at[index];
+        Ray two = rays.at[count - 1u - index];
+        LvkRayQuery query;
+        lvkRayQueryInitialize(query, tlas, flags, mask, two.origin, two.tMin, two.direction, two.tMax);
+        for (uint turn = 0u; turn < TURNS(index) && lvkRayQueryProceed(query); ++turn) {
+            lvkRayQueryConfirmIntersection(query);
+        }
+        if (index % 3u == 0u) lvkRayQueryTerminate(query);
+        lvkRayQueryInitialize(query, tlas, flags, mask, one.origin, one.tMin, one.direction, one.tMax);
+        uint seen = 0u;
+        while (lvkRayQueryProceed(query)) {
+            seen += 1u;
+            if (lvkRayQueryPrimitiveIndex(query, LVK_CANDIDATE, tlas) % 2u == 0u) lvkRayQueryConfirmIntersection(query);
+        }
+        HitRecord record = kNoHit;
+        record.customIndex = seen;
+        if (lvkRayQueryType(query, LVK_COMMITTED) != 0u) {
+            record.t = lvkRayQueryT(query, LVK_COMMITTED);
+            record.instance = lvkRayQueryInstanceId(query, LVK_COMMITTED, tlas);
+            record.primitive = lvkRayQueryPrimitiveIndex(query, LVK_COMMITTED, tlas);
+        }
+        hits.at[index] = record;
+    }"#;
+
+#[test]
+fn a_query_may_begin_anew_wherever_it_was() -> Result<()> {
+    let Some(ctx) = software() else { return Ok(()) };
+    let mut scene = crowd();
+    scene.models.iter_mut().flatten().for_each(|part| part.flags = GeometryFlags::NO_DUPLICATE_ANY_HIT);
+    let gpu = scene.upload(&ctx)?;
+    let rays = random_rays(9, 2_000, Vec3::splat(-2.0), Vec3::splat(2.0));
+    let records = |turns: &str| -> Result<Vec<HitRecord>> {
+        let module = shader(&ctx, ShaderStage::Compute, &ANEW.replace("TURNS(index)", turns))?;
+        let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
+        let tracer = RayTracer::of_query(&ctx, ctx.create_compute_pipeline(&desc)?);
+        tracer.trace(&gpu.tlas, &rays, How::default())
+    };
+    let fresh = records("0u")?;
+    assert!(fresh.iter().any(|record| record.custom_index > 3), "there are candidates");
+    assert_eq!(fresh, records("(index % 5u)")?, "after some candidates");
+    assert_eq!(fresh, records("1000u")?, "after all");
+    Ok(())
+}
+
 #[test]
 fn a_structure_is_the_same_after_a_file() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };

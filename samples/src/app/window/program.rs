@@ -178,10 +178,13 @@ impl<S: Sample> Running<S> {
         let screen = Screen::new(&ctx, extent(&window))?;
         let (mode, _) = screen.present_modes()?;
         ctx.set_profiling(ctx.capabilities().limits.timestamp_bits > 0)?;
+        let mut panel = Panel::new(mode);
+        // Frames that are counted are those of the animation.
+        panel.animates = args.frames.is_some() || !sample.stands_at_first();
         Ok(Self {
             sample,
             screen,
-            panel: Panel::new(mode),
+            panel,
             controls: Controls::default(),
             ui_input: UiInput::default(),
             follower: Follower::new([args.width, args.height]),
