@@ -37,7 +37,7 @@ impl<'a> Collapser<'a> {
         Ok(Self { tree, plan: GpuBuildPlan::blas("collapse", &shape)? })
     }
 
-    pub(crate) fn bytes(&self) -> u64 {
+    fn bytes(&self) -> u64 {
         self.plan.blob_bytes + self.plan.scratch_bytes
     }
 

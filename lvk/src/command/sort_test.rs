@@ -31,7 +31,7 @@ impl<'a> Sorter<'a> {
         Self { keys, job }
     }
 
-    pub(crate) fn bytes(&self) -> u64 {
+    fn bytes(&self) -> u64 {
         4 * (u64::from(self.job.digits) + 16 * u64::from(self.job.count.div_ceil(1024)) + 1)
     }
 

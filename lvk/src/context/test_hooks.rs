@@ -198,13 +198,7 @@ pub fn place(ctx: &Context, words: &[u32]) -> Result<GpuStructure> {
 /// with `low_bits` in a second word below them.
 pub fn sort(ctx: &Context, keys: &[u64], low_bits: u32) -> Result<Vec<(u64, u32)>> {
     let sorter = crate::command::gpu_build::sort_test::Sorter::new(keys, low_bits);
-    let (buffer, address) = memory(ctx, sorter.bytes())?;
-    let offset = address - ctx.buffer_address(*buffer)?;
-    ctx.upload_buffer(*buffer, offset, bytemuck::cast_slice(&sorter.words()))?;
-    let target = ctx.shared().store.buffers.get(*buffer)?;
-    record(ctx, |cmd| sorter.record(cmd, &target, address))?;
-    let mut words = vec![0_u32; (sorter.bytes() / 4) as usize];
-    ctx.download_buffer(*buffer, offset, bytemuck::cast_slice_mut(&mut words))?;
+    let words = run_on(ctx, &sorter.words(), |cmd, target, address| sorter.record(cmd, target, address))?;
     Ok(sorter.sorted(&words))
 }
 
@@ -212,13 +206,8 @@ pub fn sort(ctx: &Context, keys: &[u64], low_bits: u32) -> Result<Vec<(u64, u32)
 /// nodes have.
 pub fn collapse(ctx: &Context, tree: &BinaryTree) -> Result<(Option<WideTree>, usize)> {
     let collapser = crate::command::gpu_build::collapse_test::Collapser::new(tree)?;
-    let (buffer, address) = memory(ctx, collapser.bytes())?;
-    let offset = address - ctx.buffer_address(*buffer)?;
-    ctx.upload_buffer(*buffer, offset, bytemuck::cast_slice(&collapser.words()))?;
-    let target = ctx.shared().store.buffers.get(*buffer)?;
-    record(ctx, |cmd| collapser.record(cmd, &target, address))?;
-    let mut words = vec![0_u32; (collapser.bytes() / 4) as usize];
-    ctx.download_buffer(*buffer, offset, bytemuck::cast_slice_mut(&mut words))?;
+    let words =
+        run_on(ctx, &collapser.words(), |cmd, target, address| collapser.record(cmd, target, address))?;
     Ok((collapser.collapsed(&words), collapser.room()))
 }
 
@@ -237,6 +226,22 @@ fn record(ctx: &Context, record: impl FnOnce(&mut crate::CommandBuffer) -> Resul
     record(&mut cmd)?;
     ctx.submit(cmd)?;
     Ok(())
+}
+
+/// The words that commands leave of these, which they find in a buffer at an address.
+fn run_on(
+    ctx: &Context,
+    words: &[u32],
+    commands: impl FnOnce(&mut crate::CommandBuffer, &Arc<Buffer>, u64) -> Result<()>,
+) -> Result<Vec<u32>> {
+    let (buffer, address) = memory(ctx, size_of_val(words) as u64)?;
+    let offset = address - ctx.buffer_address(*buffer)?;
+    ctx.upload_buffer(*buffer, offset, bytemuck::cast_slice(words))?;
+    let target = ctx.shared().store.buffers.get(*buffer)?;
+    record(ctx, |cmd| commands(cmd, &target, address))?;
+    let mut after = vec![0_u32; words.len()];
+    ctx.download_buffer(*buffer, offset, bytemuck::cast_slice_mut(&mut after))?;
+    Ok(after)
 }
 
 fn memory(ctx: &Context, bytes: u64) -> Result<(Holder<BufferHandle>, u64)> {

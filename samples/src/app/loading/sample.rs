@@ -171,6 +171,10 @@ impl<S: Sample> Sample for Loading<S> {
         }
     }
 
+    fn stands_at_first(&self) -> bool {
+        self.sample().is_some_and(S::stands_at_first)
+    }
+
     fn view(&self) -> Option<Camera> {
         self.sample().and_then(S::view)
     }
