@@ -88,7 +88,14 @@ fn record(
     if memory.is_empty() && images.is_empty() {
         return;
     }
-    let info = vk::DependencyInfo::default().memory_barriers(memory).image_memory_barriers(images);
+    // A list without barriers stays null: drivers that keep what they are given (Mesa's common code) allocate for others.
+    let mut info = vk::DependencyInfo::default();
+    if !memory.is_empty() {
+        info = info.memory_barriers(memory);
+    }
+    if !images.is_empty() {
+        info = info.image_memory_barriers(images);
+    }
     // SAFETY: the command buffer is being recorded outside of a render pass, and the images are alive.
     unsafe { gpu.device.cmd_pipeline_barrier2(commands, &info) };
 }
