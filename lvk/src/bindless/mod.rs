@@ -4,6 +4,7 @@ mod array;
 pub(crate) mod checks;
 pub(crate) mod inputs;
 pub(crate) mod layout;
+mod room;
 pub(crate) mod slots;
 pub(crate) mod table;
 mod yuv;

@@ -7,11 +7,13 @@ use ash::vk;
 use super::array::{Array, Shown};
 use super::checks::{BindlessArray, CheckPlan, IndexChecks};
 use super::layout;
+use super::room;
 use super::slots::Slots;
 use super::yuv::{YuvPlace, YuvSlots};
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
+use crate::gpu::descriptor_limits::fitting;
 use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::ycbcr::YuvConversion;
 
@@ -67,18 +69,16 @@ pub(crate) const TEXTURE_ARRAYS: [BindlessArray; 2] = [BindlessArray::Textures, 
 
 impl Bindless {
     pub(crate) fn new(gpu: &Arc<Gpu>, max_textures: u32, yuv: YuvSlots, check_indices: bool) -> Result<Self> {
-        let limits = &gpu.caps.limits;
-        let textures = max_textures.clamp(2, limits.max_bindless_textures.max(2));
-        let counts = [
-            (layout::SAMPLED_IMAGES, vk::DescriptorType::SAMPLED_IMAGE, textures),
-            (layout::SAMPLERS, vk::DescriptorType::SAMPLER, limits.max_bindless_samplers),
-            (layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE, textures),
-            (layout::ACCEL_STRUCTS, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, tlas_count(gpu)),
-            (layout::TLAS_TABLE, vk::DescriptorType::STORAGE_BUFFER, slot_count(gpu).min(1)),
-        ];
-        let capacities = [textures, limits.max_bindless_samplers, textures, slot_count(gpu)];
+        let left = gpu.descriptor_limits().room(&room::others(gpu), yuv.descriptors());
+        let conversions = yuv.samplers();
+        let textures = fitting(left.textures_of(max_textures)?, |textures| {
+            is_supported(gpu, &counts(gpu, textures, left.samplers), &conversions)
+        })?;
+        let slots = room::slot_count(gpu);
+        let counts = counts(gpu, textures, left.samplers);
+        let capacities = [textures, left.samplers, textures, slots];
         let checks = if check_indices { Some(IndexChecks::new(gpu, capacities)?) } else { None };
-        let set_layout = create_layout(gpu, &counts, &yuv.samplers())?;
+        let set_layout = create_layout(gpu, &counts, &conversions)?;
         let (pool, set) = match create_set(gpu, set_layout, &counts, yuv.descriptors()) {
             Ok(made) => made,
             Err(error) => {
@@ -91,8 +91,8 @@ impl Bindless {
             dummies: None,
             textures: Array::new("number of textures", textures),
             shown: [Shown::new(textures), Shown::new(textures)],
-            samplers: Array::new("number of samplers", limits.max_bindless_samplers),
-            tlas: Array::new("number of top-level acceleration structures", slot_count(gpu)),
+            samplers: Array::new("number of samplers", left.samplers),
+            tlas: Array::new("number of top-level acceleration structures", slots),
             yuv,
         };
         let entries = Mutex::new(Rank::Bindless, entries);
@@ -395,19 +395,42 @@ fn image(view: vk::ImageView, layout: vk::ImageLayout) -> vk::DescriptorImageInf
     vk::DescriptorImageInfo::default().image_view(view).image_layout(layout)
 }
 
-/// Top-level structures there may be, of either form.
-fn slot_count(gpu: &Gpu) -> u32 {
-    if gpu.has_structures() { gpu.caps.limits.max_bindless_tlas } else { 0 }
-}
-
-/// Those of the device.
-fn tlas_count(gpu: &Gpu) -> u32 {
-    if gpu.accel.is_some() { gpu.caps.limits.max_bindless_tlas } else { 0 }
-}
-
 type Count = (u32, vk::DescriptorType, u32);
 
+/// The bindings with so many textures and samplers, without those of Y'CbCr.
+fn counts(gpu: &Gpu, textures: u32, samplers: u32) -> [Count; 5] {
+    [
+        (layout::SAMPLED_IMAGES, vk::DescriptorType::SAMPLED_IMAGE, textures),
+        (layout::SAMPLERS, vk::DescriptorType::SAMPLER, samplers),
+        (layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE, textures),
+        (layout::ACCEL_STRUCTS, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, room::tlas_count(gpu)),
+        (layout::TLAS_TABLE, vk::DescriptorType::STORAGE_BUFFER, room::table_count(gpu)),
+    ]
+}
+
+/// Whether the device takes a set of this size: its limits of descriptors say nothing of their bytes.
+fn is_supported(gpu: &Gpu, counts: &[Count], yuv: &[vk::Sampler]) -> bool {
+    with_layout(counts, yuv, |info| {
+        let mut support = vk::DescriptorSetLayoutSupport::default();
+        // SAFETY: the counts are within the limits of descriptors, and the samplers are alive.
+        unsafe { gpu.device.get_descriptor_set_layout_support(info, &mut support) };
+        support.supported == vk::TRUE
+    })
+}
+
 fn create_layout(gpu: &Gpu, counts: &[Count], yuv: &[vk::Sampler]) -> Result<vk::DescriptorSetLayout> {
+    // SAFETY: the counts are within the limits of descriptors beside everything else that they count for (`room`), and the
+    // device was asked whether it supports the layout.
+    with_layout(counts, yuv, |info| unsafe { gpu.device.create_descriptor_set_layout(info, None) })
+        .map_err(Error::vulkan("vkCreateDescriptorSetLayout"))
+}
+
+/// Hands the description of the layout on.
+fn with_layout<T>(
+    counts: &[Count],
+    yuv: &[vk::Sampler],
+    then: impl FnOnce(&vk::DescriptorSetLayoutCreateInfo<'_>) -> T,
+) -> T {
     let used: Vec<_> = counts.iter().filter(|(_, _, count)| *count > 0).collect();
     let mut bindings: Vec<_> = used
         .iter()
@@ -434,9 +457,7 @@ fn create_layout(gpu: &Gpu, counts: &[Count], yuv: &[vk::Sampler]) -> Result<vk:
         .flags(vk::DescriptorSetLayoutCreateFlags::UPDATE_AFTER_BIND_POOL)
         .bindings(&bindings)
         .push_next(&mut flags);
-    // SAFETY: the counts are within the device's limits.
-    unsafe { gpu.device.create_descriptor_set_layout(&info, None) }
-        .map_err(Error::vulkan("vkCreateDescriptorSetLayout"))
+    then(&info)
 }
 
 /// The table is written once; slots of everything else change while others are in use.

@@ -5,8 +5,10 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::array::Array;
+use super::room;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::descriptor_limits::YuvWish;
 use crate::resource::ycbcr::{YuvConversion, YuvSampler};
 
 /// Conversions of a context, each with its textures.
@@ -14,6 +16,8 @@ pub(crate) struct YuvSlots {
     ranges: Vec<Range>,
     /// Slots of each conversion that the device has, its dummy included.
     room: u32,
+    /// Descriptors that all slots take: each as many as one of the conversion that takes most.
+    descriptors: u32,
 }
 
 struct Range {
@@ -35,18 +39,31 @@ pub(crate) struct YuvPlace {
 impl YuvSlots {
     const MOST_TEXTURES: u32 = 1_024;
 
-    /// Makes the conversions that the device has, each with room for so many textures.
+    /// Makes the conversions that the device has, each with room for so many textures, or for as many as the device
+    /// allows.
+    ///
+    /// # Errors
+    /// [`Error::LimitExceeded`] where the device does not even allow one for each.
     pub(crate) fn new(gpu: &Arc<Gpu>, descs: &[YuvConversion], textures: u32) -> Result<Self> {
-        let room = textures.min(Self::MOST_TEXTURES) + 1;
-        let (mut ranges, mut first) = (Vec::with_capacity(descs.len()), 0);
+        let mut samplers = Vec::with_capacity(descs.len());
         for desc in descs {
-            let sampler = YuvSampler::new(gpu, desc)?.map(Arc::new);
+            samplers.push((*desc, YuvSampler::new(gpu, desc)?.map(Arc::new)));
+        }
+        let made = || samplers.iter().filter_map(|(_, sampler)| sampler.as_ref().ok());
+        let wish = YuvWish {
+            conversions: made().count() as u32,
+            textures: textures.min(Self::MOST_TEXTURES) + 1,
+            descriptors: made().map(|sampler| sampler.descriptors).max().unwrap_or(1),
+        };
+        let room = gpu.descriptor_limits().yuv_textures(&room::others(gpu), &wish)?;
+        let (mut ranges, mut first) = (Vec::with_capacity(descs.len()), 0);
+        for (desc, sampler) in samplers {
             let own = if sampler.is_ok() { room } else { 0 };
             let textures = Array::new("number of textures of a conversion", own);
-            ranges.push(Range { desc: *desc, sampler, first, textures, dummy: None });
+            ranges.push(Range { desc, sampler, first, textures, dummy: None });
             first += own;
         }
-        Ok(Self { ranges, room })
+        Ok(Self { ranges, room, descriptors: wish.descriptors * first })
     }
 
     /// The immutable samplers of the binding, one a slot.
@@ -55,10 +72,9 @@ impl YuvSlots {
         made.flat_map(|made| std::iter::repeat_n(made.sampler, self.room as usize)).collect()
     }
 
-    /// Descriptors that the slots take of a pool.
+    /// Descriptors that the slots take of the set, of a stage and of a pool.
     pub(super) fn descriptors(&self) -> u32 {
-        let made = self.ranges.iter().filter_map(|range| range.sampler.as_ref().ok());
-        made.map(|made| made.descriptors * self.room).sum()
+        self.descriptors
     }
 
     /// The conversions that need a dummy, by their numbers.

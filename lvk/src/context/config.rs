@@ -70,11 +70,13 @@ pub struct ContextDesc<'a> {
     /// ([`AccelMemory`](crate::AccelMemory) tells both), and the tables and gathered inputs of meshes that are split or
     /// reordered ([`AccelStructInfo::table_bytes`](crate::AccelStructInfo::table_bytes)).
     pub accel_budget_bytes: u64,
-    /// Room for textures in the bindless set; clamped to what the device allows.
+    /// Room for textures in the bindless set; clamped to what the device allows beside everything else in the set, and
+    /// to [`Limits::max_bindless_textures`](crate::Limits::max_bindless_textures).
     pub max_textures: u32,
     /// How textures in Y'CbCr may be converted. What the device lacks of it is an error only when such a texture is made.
     pub yuv: &'a [YuvConversion],
-    /// Room for textures of each of these conversions, at most 1,024.
+    /// Room for textures of each of these conversions, at most 1,024, and at most what half of the device's descriptors
+    /// make.
     pub max_yuv_textures: u32,
     /// A file that keeps compiled pipelines from one run to the next (`VkPipelineCache`). It is read at the start,
     /// replaced by [`Context::save_pipeline_cache`](crate::Context::save_pipeline_cache) and at the end of the context.

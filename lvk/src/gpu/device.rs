@@ -8,6 +8,7 @@ use ash::vk;
 use super::budget::HeapUse;
 use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
 use super::clock::HostClock;
+use super::descriptor_limits::DescriptorLimits;
 use super::extra::ExtraExtensions;
 use super::features::Features;
 use super::foreign::RawContext;
@@ -194,6 +195,11 @@ impl Gpu {
     /// The memory of objects, `None` only while the context is being torn down.
     pub(super) fn memory(&self) -> Guard<'_, Option<DeviceMemory>> {
         self.memory.lock()
+    }
+
+    /// How many descriptors a context may have.
+    pub(crate) fn descriptor_limits(&self) -> DescriptorLimits {
+        DescriptorLimits::query(&self.instance.raw, self.physical)
     }
 
     /// The functions of `VK_KHR_acceleration_structure`, or the error that says what the device lacks.

@@ -2,12 +2,12 @@
 
 use ash::vk;
 
+use super::descriptor_limits::{DescriptorLimits, OtherDescriptors};
 use super::mesh_limits::MeshLimits;
 use super::resolve_modes::{DepthResolveLimits, ResolveModes};
 use super::shading_rate::ShadingRateLimits;
 
-/// Slots the library asks for where the device allows more; textures are bounded by the context's description.
-const WANTED_SAMPLERS: u32 = 1_024;
+/// Top-level structures the library asks for where the device allows more.
 const WANTED_TLAS: u32 = 256;
 
 /// Limits of the device, in the unit of each name.
@@ -73,9 +73,10 @@ pub struct Limits {
     pub timestamp_period_ns: f32,
     /// Bits of a timestamp that count (`timestampValidBits`).
     pub timestamp_bits: u32,
-    /// Most elements of `kTextures2D[]` and the storage images.
+    /// Most elements of `kTextures2D[]` and the storage images: what the device's limits of descriptors leave, and no
+    /// more than 1,048,576. Textures in Y'CbCr ([`ContextDesc::yuv`](crate::ContextDesc::yuv)) take some of it.
     pub max_bindless_textures: u32,
-    /// Most elements of `kSamplers[]`.
+    /// Most elements of `kSamplers[]`. Textures in Y'CbCr take of it where samplers are few.
     pub max_bindless_samplers: u32,
     /// Most elements of `kTLAS[]`.
     pub max_bindless_tlas: u32,
@@ -211,8 +212,7 @@ fn accel_bytes(driver: vk::DriverId, storage_range: u32, buffer_bytes: u64) -> u
     }
 }
 
-/// Sizes the arrays of the one descriptor set. A texture takes a sampled and a storage slot, and all slots of a
-/// stage together have a limit of their own.
+/// Sizes the arrays of the one descriptor set, as they are without conversions of Y'CbCr.
 fn size_bindless(
     limits: &mut Limits,
     v12: &vk::PhysicalDeviceVulkan12Properties<'_>,
@@ -221,19 +221,13 @@ fn size_bindless(
     limits.max_bindless_tlas = WANTED_TLAS
         .min(accel.max_per_stage_descriptor_update_after_bind_acceleration_structures)
         .min(accel.max_descriptor_set_update_after_bind_acceleration_structures);
-    limits.max_bindless_samplers = WANTED_SAMPLERS
-        .min(v12.max_per_stage_descriptor_update_after_bind_samplers)
-        .min(v12.max_descriptor_set_update_after_bind_samplers);
-    let left = v12
-        .max_per_stage_update_after_bind_resources
-        .saturating_sub(limits.max_bindless_tlas + limits.max_bindless_samplers + limits.max_color_targets)
-        .saturating_sub(limits.max_input_attachments);
-    limits.max_bindless_textures = v12
-        .max_per_stage_descriptor_update_after_bind_sampled_images
-        .min(v12.max_descriptor_set_update_after_bind_sampled_images)
-        .min(v12.max_per_stage_descriptor_update_after_bind_storage_images)
-        .min(v12.max_descriptor_set_update_after_bind_storage_images)
-        .min(left / 2);
+    let others = OtherDescriptors {
+        in_set: limits.max_bindless_tlas + 1,
+        targets: limits.max_color_targets + limits.max_input_attachments,
+    };
+    let room = DescriptorLimits::of(v12).room(&others, 0);
+    limits.max_bindless_samplers = room.samplers;
+    limits.max_bindless_textures = room.textures;
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ pub(crate) mod budget;
 pub(crate) mod caps;
 pub(crate) mod clock;
 pub(crate) mod debug;
+pub(crate) mod descriptor_limits;
 pub(crate) mod device;
 pub(crate) mod extensions;
 pub(crate) mod extra;

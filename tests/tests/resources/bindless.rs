@@ -85,6 +85,22 @@ fn textures_that_come_and_go_with_frames_in_flight_keep_their_contents() {
     }
 }
 
+/// The layout, its pool and the pipelines' layout are made at the edge of the device's limits, with more than the usual of
+/// everything else in them.
+#[test]
+fn as_many_textures_as_the_device_allows_are_there_beside_everything_else() {
+    let Some(ctx) = device_with(|desc| {
+        desc.max_textures = u32::MAX;
+        desc.max_yuv_textures = 1_024;
+    }) else {
+        return;
+    };
+    let fetch = Evaluator::new(&ctx, FETCH);
+    let texture = flat(&ctx, 3.0).unwrap();
+    let found = fetch.run(&ctx, [texture.index(), 0, 0], 1, &Dependencies::default());
+    assert_eq!(found[0][0], 3.0);
+}
+
 /// A command buffer that is still open may use a texture destroyed meanwhile.
 #[test]
 fn open_command_buffers_hold_slots() {
