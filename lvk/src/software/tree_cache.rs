@@ -10,7 +10,7 @@ use crate::disk::{fingerprint, read, replace};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
 /// Changes with the builders and with the form of structures.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// Magic, version, reserved, length of the structure, checksum of it.
 const HEADER_BYTES: usize = 32;
 

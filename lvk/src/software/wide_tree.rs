@@ -33,11 +33,33 @@ pub(super) fn build(bounds: &[Bounds]) -> Option<Tree> {
     if !is_at_most(&binary, DEEPEST_WIDE * LEVELS) {
         return None;
     }
-    let wide = bvh2_to_cwbvh(&binary, LARGEST_LEAF, true, false);
+    let mut wide = bvh2_to_cwbvh(&binary, LARGEST_LEAF, true, false);
+    wide.nodes.iter_mut().for_each(widen);
     // Boxes without area cost nothing, so that nothing is gained by nodes of more than two children.
     let is_small = size_of_val(&wide.nodes[..]) <= (bounds.len() - 1) * size_of::<BinaryNode>();
     let is_fit = is_small && depth(&wide.nodes) <= DEEPEST_WIDE;
     is_fit.then_some(Tree { nodes: Nodes::Wide(wide.nodes), root: 0, order: wide.primitive_indices })
+}
+
+/// Makes steps larger where a node is much thinner than it is wide, so that rays which run along it and touch it take longer to
+/// leave the outermost step than to get there. Kernels have it in `build/encode.glsl`.
+fn widen(node: &mut CwBvhNode) {
+    const THIN: u8 = 20;
+    const OF_POINT: u8 = 87;
+    let highs = [node.child_max_x, node.child_max_y, node.child_max_z];
+    let is_point = highs.as_flattened().iter().all(|high| *high == 0);
+    let widest = node.e.into_iter().max().unwrap_or(0);
+    let least = if is_point { OF_POINT } else { widest.saturating_sub(THIN) };
+    let lows = [&mut node.child_min_x, &mut node.child_min_y, &mut node.child_min_z];
+    let highs = [&mut node.child_max_x, &mut node.child_max_y, &mut node.child_max_z];
+    for ((exponent, lows), highs) in node.e.iter_mut().zip(lows).zip(highs) {
+        let shift = u32::from(least.saturating_sub(*exponent));
+        if shift > 0 {
+            *exponent = least;
+            lows.iter_mut().for_each(|low| *low = low.checked_shr(shift).unwrap_or(0));
+            highs.iter_mut().for_each(|high| *high = high.checked_shr(shift).unwrap_or(0) + 1);
+        }
+    }
 }
 
 /// Whether no path of a binary tree has more nodes.

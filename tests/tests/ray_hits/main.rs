@@ -9,5 +9,6 @@ mod meshes;
 mod position_fetch;
 mod range;
 mod shared_vertices;
+mod touched_boxes;
 mod transforms;
 mod vertex_formats;

@@ -8,6 +8,16 @@ uint exponentOf(float extent) {
     return ceil(extent / uintBitsToFloat(exponent << 23) + kSlack) > 255.0 ? exponent + 1 : exponent;
 }
 
+// The same for each axis. Where a node is much thinner than it is wide, its thickness counts as more, so that rays which run along
+// it and touch it take longer to leave the outermost step than to get there. The CPU's nodes are alike (`widen` in wide_tree.rs).
+uvec3 exponentsOf(vec3 extent) {
+    const uint kThin = 20u, kOfPoint = 87u;
+    uvec3 each = uvec3(exponentOf(extent.x), exponentOf(extent.y), exponentOf(extent.z));
+    uint most = max(each.x, max(each.y, each.z));
+    bool isPoint = all(lessThanEqual(extent, vec3(0)));
+    return max(each, uvec3(isPoint ? kOfPoint : max(most, kThin + 1u) - kThin));
+}
+
 // Steps from the corner of the node, with what rounding may take away.
 uint stepsDown(float distance_, float unit) { return uint(clamp(floor(distance_ / unit - 1e-4), 0.0, 255.0)); }
 
@@ -19,9 +29,10 @@ Box encode(Words node, Box child[kChildren]) {
     [[dont_unroll]] for (uint i = 0; i < kChildren; ++i) all_ = join(all_, child[i]);
     vec3 corner = isEmpty(all_) ? vec3(0) : all_.lo;
     vec3 extent = isEmpty(all_) ? vec3(0) : all_.hi - all_.lo;
+    uvec3 exponentOfAxis = exponentsOf(extent);
     uint exponents = 0u;
     [[dont_unroll]] for (uint axis = 0; axis < 3; ++axis) {
-        uint exponent = exponentOf(extent[axis]);
+        uint exponent = exponentOfAxis[axis];
         float unit = uintBitsToFloat(exponent << 23);
         exponents |= exponent << axis * 8;
         uvec2 low = uvec2(0), high = uvec2(0);

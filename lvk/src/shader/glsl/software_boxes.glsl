@@ -21,12 +21,22 @@ LvkSoftSlabs lvkSoftSlabsOf(vec3 origin, vec3 direction) {
     return LvkSoftSlabs(origin, 1.0 / mix(direction, least, isFlat), octant);
 }
 
-// How much wider boxes in the world must be, as the time a ray takes for it along each axis: in the space of an instance the ray
-// begins elsewhere by some roundings of its origin's coordinates.
-vec3 lvkSoftSlack(LvkSoftSlabs ray) {
-    const float kRoundings = 2e-6;
-    vec3 far = abs(ray.origin);
-    return abs(ray.inverse) * (max(max(far.x, far.y), far.z) * kRoundings);
+// How much wider boxes must be, as the time a ray takes for it along each axis, for a share of the furthest coordinate.
+vec3 lvkSoftSlack(LvkSoftSlabs ray, vec3 far, float share) {
+    return abs(ray.inverse) * (max(max(far.x, far.y), far.z) * share);
+}
+
+// Of boxes in the world: in the space of an instance the ray begins elsewhere by some roundings of its origin's coordinates.
+vec3 lvkSoftWorldSlack(LvkSoftSlabs ray) {
+    return lvkSoftSlack(ray, abs(ray.origin), 2e-6);
+}
+
+// Of a box that the ray may touch without entering it: it runs along a face, or the box is flat and the ray in its plane. Such a
+// box is left when it is entered, however long the ray takes to get there.
+vec3 lvkSoftTouchSlack(LvkSoftSlabs ray, vec3 low, vec3 high) {
+    const float kFarthest = 1e16; // behind all corners but those of boxes that hold nothing
+    vec3 far = max(abs(low - ray.origin), abs(high - ray.origin));
+    return lvkSoftSlack(ray, min(far, vec3(kFarthest)), 1e-7);
 }
 
 // The last of the distances at which a ray enters, of which tMin is not negative. As integers, positive floats are in order
@@ -56,15 +66,17 @@ vec2 lvkSoftCross(LvkSoftSlabs ray, vec3 low, vec3 high, vec2 range, vec3 slack)
 }
 
 // The children of a binary node that the ray meets, the nearer one first; LVK_SOFT_NONE for each it misses. `nodes` is the
-// block where nodes begin.
-uvec2 lvkSoftMeet2(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint nodes, uint node, vec2 range, vec3 slack) {
+// block where nodes begin. Boxes in the world are wider by `slack`; others, which are exact, by what a touch needs.
+uvec2 lvkSoftMeet2(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint nodes, uint node, vec2 range, bool inWorld, vec3 slack) {
     uint first = nodes + node * LVK_SOFT_BINARY_NODE_BLOCKS;
     uvec4 a = lvkSoftBlock(blocks, first);
     uvec4 b = lvkSoftBlock(blocks, first + 1u);
     uvec4 c = lvkSoftBlock(blocks, first + 2u);
     uvec4 d = lvkSoftBlock(blocks, first + 3u);
-    vec2 one = lvkSoftCross(ray, uintBitsToFloat(a.xyz), uintBitsToFloat(b.xyz), range, slack);
-    vec2 two = lvkSoftCross(ray, uintBitsToFloat(c.xyz), uintBitsToFloat(d.xyz), range, slack);
+    vec3 low1 = uintBitsToFloat(a.xyz), high1 = uintBitsToFloat(b.xyz);
+    vec3 low2 = uintBitsToFloat(c.xyz), high2 = uintBitsToFloat(d.xyz);
+    vec2 one = lvkSoftCross(ray, low1, high1, range, inWorld ? slack : lvkSoftTouchSlack(ray, low1, high1));
+    vec2 two = lvkSoftCross(ray, low2, high2, range, inWorld ? slack : lvkSoftTouchSlack(ray, low2, high2));
     uint left = one.x <= one.y ? a.w : LVK_SOFT_NONE;
     uint right = two.x <= two.y ? b.w : LVK_SOFT_NONE;
     bool swap = left == LVK_SOFT_NONE || (right != LVK_SOFT_NONE && two.x < one.x);

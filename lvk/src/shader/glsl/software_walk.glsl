@@ -193,8 +193,8 @@ void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
         place.group = met.xy;
         place.leaves = met.zw;
     } else {
-        uvec2 met =
-            lvkSoftMeet2(level.slabs, LvkSoftBlocks(level.structure), level.nodes, place.group.x, range, vec3(0.0));
+        uvec2 met = lvkSoftMeet2(level.slabs, LvkSoftBlocks(level.structure), level.nodes, place.group.x, range, false,
+                                 vec3(0.0));
         place.group = uvec2(0u);
         if (met.y != LVK_SOFT_NONE) {
             lvkSoftPushReference(place.top, met.y);
@@ -282,16 +282,17 @@ bool lvkSoftSaysOpaque(LvkSoftLevel level, LvkSoftHit hit) {
     return (LvkSoftBlocks(geometries).at[hit.numbers.x].x & 1u) != 0u;
 }
 
-// Whether the ray meets the box of a primitive.
+// Whether the ray meets or touches the box of a primitive, which holds nothing if its corners are in the wrong order.
 bool lvkSoftMeetsBox(LvkSoftState state, LvkSoftLevel level, inout LvkSoftHit hit) {
     uint first = level.primitives + hit.primitive * LVK_SOFT_BOX_BLOCKS;
-    uvec4 low = lvkSoftBlock(LvkSoftBlocks(level.structure), first);
-    uvec4 high = lvkSoftBlock(LvkSoftBlocks(level.structure), first + 1u);
-    hit.numbers = uvec2(high.w & 0x7FFFFFFFu, low.w);
-    hit.opaque = (high.w & 0x80000000u) != 0u;
-    vec2 range = lvkSoftCross(level.slabs, uintBitsToFloat(low.xyz), uintBitsToFloat(high.xyz),
-                              vec2(state.tMin, state.committed.t), vec3(0.0));
-    return range.x <= range.y;
+    uvec4 a = lvkSoftBlock(LvkSoftBlocks(level.structure), first);
+    uvec4 b = lvkSoftBlock(LvkSoftBlocks(level.structure), first + 1u);
+    hit.numbers = uvec2(b.w & 0x7FFFFFFFu, a.w);
+    hit.opaque = (b.w & 0x80000000u) != 0u;
+    vec3 low = uintBitsToFloat(a.xyz), high = uintBitsToFloat(b.xyz);
+    vec2 range = lvkSoftCross(level.slabs, low, high, vec2(state.tMin, state.committed.t),
+                              lvkSoftTouchSlack(level.slabs, low, high));
+    return all(lessThanEqual(low, high)) && range.x <= range.y;
 }
 
 // The flag that leaves out triangles seen from this side.
@@ -359,10 +360,10 @@ uint lvkSoftNextReference(inout LvkSoftPlace place) {
 uint lvkSoftDescend(LvkSoftState state, inout LvkSoftPlace place, uint reference) {
     LvkSoftBlocks tlas = LvkSoftBlocks(state.tlas);
     LvkSoftSlabs slabs = lvkSoftSlabsOf(state.origin, state.direction);
-    vec3 slack = lvkSoftSlack(slabs);
+    vec3 slack = lvkSoftWorldSlack(slabs);
     uint nodes = tlas.at[1].x;
     while ((reference & LVK_SOFT_LEAF) == 0u) {
-        uvec2 met = lvkSoftMeet2(slabs, tlas, nodes, reference, vec2(state.tMin, state.committed.t), slack);
+        uvec2 met = lvkSoftMeet2(slabs, tlas, nodes, reference, vec2(state.tMin, state.committed.t), true, slack);
         if (met.y != LVK_SOFT_NONE) {
             lvkSoftPushReference(place.top, met.y);
         }
