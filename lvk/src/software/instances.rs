@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DVec3, Vec3, Vec3Swizzles};
 
 use crate::accel::bounds::Bounds;
 use crate::accel::instance::TlasInstance;
@@ -32,7 +32,7 @@ pub(crate) fn place(number: u32, instance: &TlasInstance, shown: &ShownStructure
     let is_finite = inverse.iter().all(|number| number.is_finite());
     let bounds = shown.parts.whole.bounds;
     let is_empty = bounds.low.x > bounds.high.x;
-    if instance.mask == 0 || is_empty || !is_finite || matrix.matrix3.determinant() == 0.0 {
+    if instance.mask == 0 || is_empty || !is_finite || is_singular(&matrix.matrix3) {
         return None;
     }
     let record = Instance {
@@ -47,6 +47,15 @@ pub(crate) fn place(number: u32, instance: &TlasInstance, shown: &ShownStructure
     };
     let bounds = moved(&matrix, bounds);
     Some(PlacedInstance { instance: record, bounds, parts: Arc::clone(&shown.parts) })
+}
+
+/// Whether the determinant is nothing but what rounding of the matrix, and of the products that the kernel in
+/// `build/instance.glsl` makes of it, may leave.
+fn is_singular(matrix: &DMat3) -> bool {
+    const NOTHING: f64 = 4.0 * f32::EPSILON as f64;
+    let DMat3 { x_axis: x, y_axis: y, z_axis: z } = *matrix;
+    let products = x.abs().dot((y.yzx() * z.zxy()).abs() + (y.zxy() * z.yzx()).abs());
+    matrix.determinant().abs() <= products * NOTHING
 }
 
 /// Around a box of the object as rows of a matrix move it, as [`place`] does it for the whole.
@@ -79,4 +88,33 @@ fn moved(matrix: &DAffine3, bounds: Bounds) -> Bounds {
     let reach = reach + DVec3::splat(most * ROUNDING);
     let finite = |v: DVec3| v.as_vec3().clamp(Vec3::splat(-f32::MAX), Vec3::splat(f32::MAX));
     Bounds { low: finite(center - reach), high: finite(center + reach) }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Affine3A, Quat};
+
+    use super::*;
+    use crate::accel::instance::transform_rows;
+
+    #[test]
+    fn a_matrix_is_singular_however_its_numbers_were_rounded() {
+        let nine = [1.0, 2.0, 3.0, 0.0, 4.0, 5.0, 6.0, 0.0, 7.0, 8.0, 9.0, 0.0];
+        for scale in [1e-6, 0.1, 1.0 / 3.0, 1.0, 7.7, 1e6_f32] {
+            assert!(is_singular(&matrix(&nine.map(|number| number * scale)).matrix3), "{scale}");
+        }
+        assert!(is_singular(&DMat3::ZERO));
+    }
+
+    #[test]
+    fn scales_of_all_sizes_have_an_inverse() {
+        let turn = Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.1);
+        for scale in [[1e-6; 3], [1e6; 3], [1e-12; 3], [1.0, 1e-12, 1e12], [1.0, 1e-4, 1.0], [-3.0, 0.5, 1.0]]
+        {
+            for turn in [Quat::IDENTITY, turn] {
+                let of = Affine3A::from_scale_rotation_translation(scale.into(), turn, Vec3::ONE);
+                assert!(!is_singular(&matrix(&transform_rows(&of)).matrix3), "{scale:?}, {turn}");
+            }
+        }
+    }
 }

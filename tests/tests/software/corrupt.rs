@@ -418,19 +418,23 @@ fn record(placed: &Placed, place: [u32; 2]) -> Vec<u32> {
 fn garbage(number: u32) -> Vec<u32> {
     let whole = Placed::new(0, Affine3A::IDENTITY);
     let mut words = record(&whole, [0, 0]);
-    let rows = |words: &mut Vec<u32>, of: fn(usize) -> f32| {
+    let rows = |words: &mut Vec<u32>, of: &dyn Fn(usize) -> f32| {
         (0..12).for_each(|row| words[row] = of(row).to_bits());
     };
-    match number % 10 {
+    // The shape becomes flat, amid the others.
+    let flat = |row: usize| [1.0, 2.0, 3.0, 9.0, 4.0, 5.0, 6.0, -30.0, 7.0, 8.0, 9.0, -60.0][row];
+    let tenths = |row: usize| flat(row) * 0.1;
+    match number % 11 {
         0 => return vec![0; RECORD_WORDS],
         1 => return vec![u32::MAX; RECORD_WORDS],
         2 => words[14] = 1,
         3 => words[14] = u32::MAX,
         4 => words[15] = 1,
-        5 => rows(&mut words, |_| f32::NAN),
-        6 => rows(&mut words, |_| f32::INFINITY),
-        7 => rows(&mut words, |row| row as f32),
-        8 => rows(&mut words, |row| if row % 5 == 0 { 3e38 } else { 0.0 }),
+        5 => rows(&mut words, &|_| f32::NAN),
+        6 => rows(&mut words, &|_| f32::INFINITY),
+        7 => rows(&mut words, &flat),
+        8 => rows(&mut words, &|row| if row % 5 == 0 { 3e38 } else { 0.0 }),
+        9 => rows(&mut words, &tenths),
         _ => words[12] = 0,
     }
     words

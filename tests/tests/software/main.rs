@@ -4,3 +4,4 @@ mod corrupt;
 mod pictures;
 mod queries;
 mod seams;
+mod singular;

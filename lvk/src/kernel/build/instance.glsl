@@ -8,16 +8,22 @@ struct Affine { vec3 x; vec3 y; vec3 z; vec3 t; };
 
 vec3 apply(Affine m, vec3 p) { return m.x * p.x + m.y * p.y + m.z * p.z + m.t; }
 
-// The inverse, by cofactors of the matrix over its largest number; false where there is none.
+// The largest power of two that is no larger, of a positive number.
+float powerBelow(float v) { return uintBitsToFloat(floatBitsToUint(v) & 0x7f800000u); }
+
+// The inverse, by cofactors of the matrix over about its largest number; false where there is none, but for what rounding may
+// make of it. `NOTHING` in lvk/src/software/instances.rs is the same share.
 bool invert(Affine m, out Affine inverse) {
+    const float kNothing = 4.76837158e-7;
     vec3 most = max(abs(m.x), max(abs(m.y), abs(m.z)));
-    float largest = max(most.x, max(most.y, most.z));
+    float largest = powerBelow(max(most.x, max(most.y, most.z)));
     inverse = Affine(vec3(0), vec3(0), vec3(0), vec3(0));
     if (!(largest > 0.0)) return false;
     vec3 x = m.x / largest, y = m.y / largest, z = m.z / largest;
     vec3 yz = cross(y, z), zx = cross(z, x), xy = cross(x, y);
     float determinant = dot(x, yz);
-    if (determinant == 0.0) return false;
+    float products = dot(abs(x), abs(y.yzx * z.zxy) + abs(y.zxy * z.yzx));
+    if (!(abs(determinant) > products * kNothing)) return false;
     float scale = 1.0 / determinant / largest;
     inverse.x = vec3(yz.x, zx.x, xy.x) * scale;
     inverse.y = vec3(yz.y, zx.y, xy.y) * scale;
