@@ -1,8 +1,12 @@
-//! Notices that shaders have changed.
+//! Notices that shaders have changed, and compiles them anew.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
+
+use super::run_error::RunError;
+use super::sample::Sample;
+use super::ui::Painter;
 
 /// Time between two looks at the folder.
 const PERIOD: Duration = Duration::from_millis(300);
@@ -36,6 +40,17 @@ impl ShaderWatch {
         self.files = found;
         changed
     }
+}
+
+/// Compiles the shaders of `sample` and of what paints over it anew. All of them are taken over, or none.
+///
+/// # Errors
+/// Those of the shaders; the old pipelines then stay, of both.
+pub fn reload<S: Sample>(sample: &mut S, painter: &mut Painter) -> Result<(), RunError> {
+    let recompiled = painter.recompiled()?;
+    sample.reload().map_err(Into::into)?;
+    painter.take_over(recompiled);
+    Ok(())
 }
 
 /// What cannot be read is left out: whoever compiles it says so.

@@ -1,14 +1,24 @@
 //! The painter of user interfaces: colours, clip rectangles, textures and text are where egui puts them.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use std::fs;
+use std::path::Path;
+
 use egui::{Align2, Color32, FontId, LayerId, RawInput, Rect, pos2, vec2};
 use image::{Rgba, RgbaImage};
 use lvk::{
     ColorAttachment, Context, Dependencies, Format, Holder, RenderPassDesc, TextureDesc, TextureHandle,
     TextureRegion, TextureUsage,
 };
+use lvk_samples::app::headless;
+use lvk_samples::app::hot_reload::reload;
 use lvk_samples::app::ui::Painter;
+use lvk_samples::hello_triangle::HelloTriangle;
+use lvk_samples::shader_folder;
 use lvk_tests::device;
+use tempfile::TempDir;
+
+use crate::frames::copy_folder;
 
 const SIZE: [u32; 2] = [64, 48];
 const GROUND: [u8; 4] = [10, 20, 30, 255];
@@ -172,6 +182,49 @@ fn text_is_in_its_place_and_new_letters_come_to_the_atlas() {
     let second = easel.paint(&[], write("Wxyz"));
     assert!(second == Easel::new(&ctx, Format::Rgba8Unorm).paint(&[], write("Wxyz")));
     assert!(easel.paint(&[], write("Abc")) == first && first != second);
+}
+
+/// A copy of the folder of shaders in which the triangle's and the painter's colours begin with these words.
+fn shaders(triangle: &str, painter: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    copy_folder(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders"), folder.path());
+    for (file, before, change) in [
+        ("hello_triangle/triangle.frag.glsl", "    result = vec4(", triangle),
+        ("app/ui.frag.glsl", "    result = ", painter),
+    ] {
+        let path = folder.path().join(file);
+        let text = fs::read_to_string(&path).unwrap();
+        assert_eq!(text.matches(before).count(), 1, "`{before}` in {file}");
+        fs::write(&path, text.replace(before, &format!("{before}{change}"))).unwrap();
+    }
+    folder
+}
+
+#[test]
+fn a_reload_takes_over_the_shaders_of_sample_and_painter_or_neither() {
+    let Some(ctx) = device() else { return };
+    let mut easel = Easel::new(&ctx, Format::Rgba8Unorm);
+    let mut sample = HelloTriangle::new(&ctx, SIZE).unwrap();
+    let shown = |sample: &mut HelloTriangle, easel: &mut Easel| {
+        let painted = easel.paint(&[], |painter| {
+            painter.rect_filled(rect([5.0, 6.0], [20.0, 16.0]), 0.0, Color32::WHITE);
+        });
+        (headless::picture(sample).unwrap(), painted)
+    };
+    let before = shown(&mut sample, &mut easel);
+    for (triangle, painter, wrong) in
+        [("1.0 - ", "noSuchValue * ", "ui.frag"), ("noSuchValue * ", "0.5 * ", "triangle.frag")]
+    {
+        let folder = shaders(triangle, painter);
+        let told = shader_folder::with(folder.path(), || reload(&mut sample, &mut easel.painter));
+        let told = told.unwrap_err().to_string();
+        assert!(told.contains("noSuchValue") && told.contains(wrong), "{told}");
+        assert!(shown(&mut sample, &mut easel) == before, "{wrong}: a part is new");
+    }
+    let folder = shaders("1.0 - ", "0.5 * ");
+    shader_folder::with(folder.path(), || reload(&mut sample, &mut easel.painter)).unwrap();
+    let after = shown(&mut sample, &mut easel);
+    assert!(after.0 != before.0 && after.1 != before.1, "a part is old");
 }
 
 #[test]

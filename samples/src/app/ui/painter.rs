@@ -131,15 +131,19 @@ impl Painter {
         Ok(())
     }
 
-    /// Compiles the pipeline again.
+    /// The pipeline compiled again, for [`take_over`](Self::take_over); none where there is none yet.
     ///
     /// # Errors
-    /// Those of the shaders; the pipeline is then the one that was.
-    pub fn reload(&mut self) -> lvk::Result<()> {
-        if let Some((format, made)) = &mut self.pipeline {
-            *made = pipeline(&self.ctx, *format)?;
+    /// Those of the shaders.
+    pub fn recompiled(&self) -> lvk::Result<Option<Holder<RenderPipelineHandle>>> {
+        self.pipeline.as_ref().map(|(format, _)| pipeline(&self.ctx, *format)).transpose()
+    }
+
+    /// Paints by a pipeline that was [compiled again](Self::recompiled) for the same format.
+    pub fn take_over(&mut self, recompiled: Option<Holder<RenderPipelineHandle>>) {
+        if let (Some((_, made)), Some(recompiled)) = (&mut self.pipeline, recompiled) {
+            *made = recompiled;
         }
-        Ok(())
     }
 
     /// Paints what was uploaded, on a target with the format that [`prepare`](Self::prepare) was told. The pass must

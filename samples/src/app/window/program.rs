@@ -21,7 +21,7 @@ use super::screen::Screen;
 use super::ui_input::{UiInput, notches};
 use crate::app::frame::Frame;
 use crate::app::frames::Frames;
-use crate::app::hot_reload::ShaderWatch;
+use crate::app::hot_reload::{ShaderWatch, reload};
 use crate::app::run::{Opened, Opening};
 use crate::app::run_args::RunArgs;
 use crate::app::run_error::RunError;
@@ -247,11 +247,10 @@ impl<S: Sample> Running<S> {
         Next::Frame
     }
 
-    /// Compiles all shaders again. Where one is wrong, the old pipelines stay.
+    /// Compiles all shaders again. Where one is wrong, all old pipelines stay.
     fn reload(&mut self) {
-        let done = self.sample.reload().map_err(Into::into);
-        let done = done.and_then(|()| Ok(self.screen.reload()?));
-        self.panel.shader_error = done.err().map(|error: RunError| error.to_string());
+        let done = reload(&mut self.sample, self.screen.painter());
+        self.panel.shader_error = done.err().map(|error| error.to_string());
         match &self.panel.shader_error {
             Some(error) => eprintln!("error: {error}\nthe shaders from before stay in use"),
             None => eprintln!("shaders compiled anew"),

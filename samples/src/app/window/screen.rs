@@ -51,9 +51,9 @@ impl Screen {
         self.ctx.resize_swapchain(*self.swapchain, extent)
     }
 
-    /// Compiles the painter's shaders again.
-    pub(super) fn reload(&mut self) -> lvk::Result<()> {
-        self.painter.reload()
+    /// What paints.
+    pub(super) fn painter(&mut self) -> &mut Painter {
+        &mut self.painter
     }
 
     /// What to draw to; `None` where nothing can be shown for now.
