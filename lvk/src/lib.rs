@@ -83,6 +83,11 @@
 //! visible dummy, a 2D one among the textures. Nor are vertices, which indices and draws may ask for beyond the end of
 //! a vertex buffer.
 //!
+//! Memory of workgroups is checked as far as it is declared: shared variables and task payloads against the limits of their
+//! stage, with the constants of each pipeline, except arrays whose lengths are worked out by more than operations on
+//! 32-bit integers and booleans. What the vertices and primitives of mesh shaders take is not (`maxMeshOutputMemorySize`,
+//! `maxMeshPayloadAndOutputMemorySize`, `maxMeshOutputComponents`), as it hangs on how a driver stores them.
+//!
 //! # What `lvk` does not do (yet)
 //!
 //! The pages of the [manual] each end with what is left out. `lvk` is no scene graph and no renderer.

@@ -76,8 +76,12 @@ mod tests {
         max_task_group_size: [0; 3],
         max_task_invocations: 0,
         max_task_payload_bytes: 0,
+        max_task_shared_bytes: 0,
+        max_task_payload_and_shared_bytes: 0,
         max_mesh_group_size: [0; 3],
         max_mesh_invocations: 0,
+        max_mesh_shared_bytes: 0,
+        max_mesh_payload_and_shared_bytes: 0,
         max_output_vertices: 0,
         max_output_primitives: 0,
     };

@@ -45,6 +45,9 @@ pub struct Limits {
     /// their order; stencil is the tenth (`maxPerStageDescriptorInputAttachments`). 0 without
     /// [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
     pub max_input_attachments: u32,
+    /// Largest width and height of a texture that render passes draw to, in pixels (`maxFramebufferWidth`,
+    /// `maxFramebufferHeight`).
+    pub max_target_size: [u32; 2],
     /// Most layers of a render pass (`maxFramebufferLayers`).
     pub max_target_layers: u32,
     /// Most views of a render pass that draws several at once (`maxMultiviewViewCount`).
@@ -63,6 +66,9 @@ pub struct Limits {
     pub max_group_size: [u32; 3],
     /// Most invocations of a workgroup altogether (`maxComputeWorkGroupInvocations`).
     pub max_group_invocations: u32,
+    /// Most bytes that the invocations of a compute workgroup share (`maxComputeSharedMemorySize`), counted by the rules of
+    /// std430.
+    pub max_shared_bytes: u32,
     /// Most draws of one indirect call (`maxDrawIndirectCount`).
     pub max_indirect_draws: u32,
     /// Largest width and height of a viewport in pixels (`maxViewportDimensions`).
@@ -141,6 +147,7 @@ impl Limits {
                 .max_per_stage_descriptor_input_attachments
                 .min(plain.max_descriptor_set_input_attachments)
                 .min(10),
+            max_target_size: [plain.max_framebuffer_width, plain.max_framebuffer_height],
             max_target_layers: plain.max_framebuffer_layers,
             max_views: 0,
             depth_resolve: DepthResolveLimits {
@@ -155,6 +162,7 @@ impl Limits {
             max_dispatch_groups: plain.max_compute_work_group_count,
             max_group_size: plain.max_compute_work_group_size,
             max_group_invocations: plain.max_compute_work_group_invocations,
+            max_shared_bytes: plain.max_compute_shared_memory_size,
             max_indirect_draws: plain.max_draw_indirect_count,
             max_viewport: plain.max_viewport_dimensions,
             viewport_bounds: plain.viewport_bounds_range,

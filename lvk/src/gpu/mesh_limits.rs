@@ -19,10 +19,18 @@ pub struct MeshLimits {
     pub max_task_invocations: u32,
     /// Bytes a task workgroup may hand to its mesh workgroups (`maxTaskPayloadSize`).
     pub max_task_payload_bytes: u32,
+    /// Bytes that the invocations of a task workgroup may share (`maxTaskSharedMemorySize`).
+    pub max_task_shared_bytes: u32,
+    /// Bytes of both together (`maxTaskPayloadAndSharedMemorySize`).
+    pub max_task_payload_and_shared_bytes: u32,
     /// Most invocations of a mesh workgroup for each axis (`maxMeshWorkGroupSize`).
     pub max_mesh_group_size: [u32; 3],
     /// Most invocations of a mesh workgroup altogether (`maxMeshWorkGroupInvocations`).
     pub max_mesh_invocations: u32,
+    /// Bytes that the invocations of a mesh workgroup may share (`maxMeshSharedMemorySize`).
+    pub max_mesh_shared_bytes: u32,
+    /// Bytes of those and of the payload it takes (`maxMeshPayloadAndSharedMemorySize`).
+    pub max_mesh_payload_and_shared_bytes: u32,
     /// Most vertices a mesh workgroup puts out (`maxMeshOutputVertices`).
     pub max_output_vertices: u32,
     /// Most primitives a mesh workgroup puts out (`maxMeshOutputPrimitives`).
@@ -40,8 +48,12 @@ impl MeshLimits {
             max_task_group_size: found.max_task_work_group_size,
             max_task_invocations: found.max_task_work_group_invocations,
             max_task_payload_bytes: found.max_task_payload_size,
+            max_task_shared_bytes: found.max_task_shared_memory_size,
+            max_task_payload_and_shared_bytes: found.max_task_payload_and_shared_memory_size,
             max_mesh_group_size: found.max_mesh_work_group_size,
             max_mesh_invocations: found.max_mesh_work_group_invocations,
+            max_mesh_shared_bytes: found.max_mesh_shared_memory_size,
+            max_mesh_payload_and_shared_bytes: found.max_mesh_payload_and_shared_memory_size,
             max_output_vertices: found.max_mesh_output_vertices,
             max_output_primitives: found.max_mesh_output_primitives,
         }

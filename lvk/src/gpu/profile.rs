@@ -50,6 +50,8 @@ pub struct DeviceProfile {
     pub max_accel_structure_bytes: u64,
     /// Most bytes of scratch for one build, with the same consequences.
     pub max_accel_scratch_bytes: u64,
+    /// Most bytes that the invocations of a compute, task or mesh workgroup share.
+    pub max_shared_bytes: u32,
     /// Most primitives of one bottom-level structure.
     pub max_blas_primitives: u64,
     /// Bytes of a bottom-level structure for each primitive where the driver asks for fewer; 0 leaves the driver's
@@ -73,12 +75,16 @@ impl Default for DeviceProfile {
             max_storage_buffer_range: u64::MAX,
             max_accel_structure_bytes: u64::MAX,
             max_accel_scratch_bytes: u64::MAX,
+            max_shared_bytes: u32::MAX,
             max_blas_primitives: u64::MAX,
             structure_bytes_per_primitive: 0,
             scratch_bytes_per_primitive: 0,
         }
     }
 }
+
+/// What the invocations of a workgroup share on phones.
+const PHONE_SHARED_BYTES: u32 = 32 << 10;
 
 type BuiltIn = (&'static str, fn() -> DeviceProfile);
 
@@ -95,7 +101,8 @@ const BUILT_IN: [BuiltIn; 6] = [
 impl DeviceProfile {
     /// `mali-g715`: Arm Mali-G715-Immortalis MC11 with driver r38p1. Ray queries only; neither a structure nor the
     /// scratch of a build may exceed the 256 MiB range of a storage buffer; the driver asks for 7,852,992,128 bytes of
-    /// scratch and 612,837,208 of structure for a mesh of 2.8 million triangles, which makes 2,805 and 219 for each.
+    /// scratch and 612,837,208 of structure for a mesh of 2.8 million triangles, which makes 2,805 and 219 for each. A
+    /// workgroup shares at most 32 KiB.
     pub fn mali_g715() -> Self {
         const RANGE: u64 = 256 << 20;
         Self {
@@ -109,17 +116,20 @@ impl DeviceProfile {
             max_accel_scratch_bytes: RANGE,
             structure_bytes_per_primitive: 219,
             scratch_bytes_per_primitive: 2_805,
+            max_shared_bytes: PHONE_SHARED_BYTES,
             ..Self::default()
         }
     }
 
     /// `xclipse-940`: Samsung Xclipse 940. Pipelines and queries, no limit of the storage range; the driver asks for
-    /// 601,488,316 bytes of scratch and 461,519,536 of structure for the same mesh, which makes 215 and 165 for each.
+    /// 601,488,316 bytes of scratch and 461,519,536 of structure for the same mesh, which makes 215 and 165 for each. A workgroup
+    /// is held to the 32 KiB that phones commonly share.
     pub fn xclipse_940() -> Self {
         Self {
             name: Cow::Borrowed("xclipse-940"),
             structure_bytes_per_primitive: 165,
             scratch_bytes_per_primitive: 215,
+            max_shared_bytes: PHONE_SHARED_BYTES,
             ..Self::default()
         }
     }
@@ -194,6 +204,12 @@ impl DeviceProfile {
         ] {
             *limit = most.min(*limit);
         }
+        let mesh = &mut limits.mesh;
+        for limit in
+            [&mut limits.max_shared_bytes, &mut mesh.max_task_shared_bytes, &mut mesh.max_mesh_shared_bytes]
+        {
+            *limit = self.max_shared_bytes.min(*limit);
+        }
         if !capabilities.mesh_shader {
             capabilities.limits.mesh = MeshLimits::default();
         }
@@ -226,6 +242,12 @@ mod tests {
                 max_accel_structure_bytes: 1 << 40,
                 max_accel_scratch_bytes: 1 << 40,
                 max_blas_primitives: 1 << 24,
+                max_shared_bytes: 64 << 10,
+                mesh: MeshLimits {
+                    max_task_shared_bytes: 64 << 10,
+                    max_mesh_shared_bytes: 16 << 10,
+                    ..MeshLimits::default()
+                },
                 ..Limits::default()
             },
             ..Capabilities::default()
@@ -271,6 +293,17 @@ mod tests {
         assert_eq!(limits.max_storage_buffer_range, range);
         assert_eq!((limits.max_accel_structure_bytes, limits.max_accel_scratch_bytes), (range, range));
         assert_eq!(limits.max_blas_primitives, 1 << 24);
+    }
+
+    #[test]
+    fn workgroups_share_less_on_phones() {
+        let shared = |profile: &DeviceProfile| {
+            let limits = under(profile).limits;
+            [limits.max_shared_bytes, limits.mesh.max_task_shared_bytes, limits.mesh.max_mesh_shared_bytes]
+        };
+        assert_eq!(shared(&DeviceProfile::default()), [64 << 10, 64 << 10, 16 << 10]);
+        assert_eq!(shared(&DeviceProfile::xclipse_940()), [32 << 10, 32 << 10, 16 << 10]);
+        assert_eq!(shared(&DeviceProfile::mali_g715()), [32 << 10, 0, 0]);
     }
 
     #[test]
@@ -333,6 +366,7 @@ mod tests {
                 max_accel_structure_bytes: limits[1],
                 max_accel_scratch_bytes: limits[2],
                 max_blas_primitives: limits[3],
+                max_shared_bytes: limits[0] as u32,
                 structure_bytes_per_primitive: factors[0].into(),
                 scratch_bytes_per_primitive: factors[1].into(),
             }
@@ -357,8 +391,9 @@ mod tests {
         }
     }
 
-    fn amounts(limits: &Limits) -> [u64; 4] {
+    fn amounts(limits: &Limits) -> [u64; 5] {
         [
+            limits.max_shared_bytes.into(),
             limits.max_storage_buffer_range,
             limits.max_accel_structure_bytes,
             limits.max_accel_scratch_bytes,

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
+use super::group_memory::{MemoryLimits, check_group_memory};
 use super::group_size::{GroupLimits, check_group_size};
 use super::layout::PipelineBase;
 use super::shader_module::ShaderModule;
@@ -51,6 +52,9 @@ impl ComputePipeline {
         let limits = &gpu.caps.limits;
         let largest = GroupLimits { size: limits.max_group_size, invocations: limits.max_group_invocations };
         check_group_size(name, module, desc.specialization, &largest)?;
+        let shared = limits.max_shared_bytes;
+        let most = MemoryLimits { shared, payload: 0, together: shared };
+        check_group_memory(name, module, desc.specialization, &most)?;
         let constants = Specialization::new(name, desc.specialization, std::iter::once(module))?;
         let constants = constants.info();
         let info =

@@ -4,6 +4,7 @@ use ash::vk;
 
 use super::graphics::RenderModules;
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
+use super::group_memory::{MemoryLimits, check_group_memory};
 use super::group_size::{GroupLimits, check_group_size};
 use super::local_read::check_inputs;
 use super::raster::Topology;
@@ -11,6 +12,7 @@ use super::state_check::check_state;
 use crate::error::{Error, Result, check_limit};
 use crate::format::Format;
 use crate::gpu::Gpu;
+use crate::gpu::mesh_limits::MeshLimits;
 use crate::gpu::optional::OptionalFeature;
 use crate::shader::{Primitive, ShaderStage};
 
@@ -123,15 +125,34 @@ fn check_mesh(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules)
     if let Some(task) = &modules.task {
         let most = GroupLimits { size: limits.max_task_group_size, invocations: limits.max_task_invocations };
         check_group_size(name, task, desc.specialization, &most)?;
+        check_group_memory(name, task, desc.specialization, &task_memory(limits))?;
     }
     let Some(mesh) = &modules.mesh else { return Ok(()) };
     let most = GroupLimits { size: limits.max_mesh_group_size, invocations: limits.max_mesh_invocations };
     check_group_size(name, mesh, desc.specialization, &most)?;
+    check_group_memory(name, mesh, desc.specialization, &mesh_memory(limits))?;
     let [vertices, primitives] = mesh.reflection.mesh_outputs;
     let most = limits.max_output_vertices;
     check_limit(name, "count of vertices of a mesh workgroup", vertices.into(), most.into())?;
     let most = limits.max_output_primitives;
     check_limit(name, "count of primitives of a mesh workgroup", primitives.into(), most.into())
+}
+
+fn task_memory(limits: &MeshLimits) -> MemoryLimits {
+    MemoryLimits {
+        shared: limits.max_task_shared_bytes,
+        payload: limits.max_task_payload_bytes,
+        together: limits.max_task_payload_and_shared_bytes,
+    }
+}
+
+/// A mesh workgroup has the payload of its task workgroup.
+fn mesh_memory(limits: &MeshLimits) -> MemoryLimits {
+    MemoryLimits {
+        shared: limits.max_mesh_shared_bytes,
+        payload: limits.max_task_payload_bytes,
+        together: limits.max_mesh_payload_and_shared_bytes,
+    }
 }
 
 /// Fails unless the geometry shader takes the primitives that come to it.

@@ -9,6 +9,7 @@ pub(crate) mod depth_stencil;
 pub(crate) mod graphics;
 mod graphics_check;
 pub(crate) mod graphics_desc;
+mod group_memory;
 mod group_size;
 mod groups;
 pub(crate) mod layout;

@@ -8,6 +8,7 @@ use super::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage}
 use crate::error::{Error, Result, check_limit};
 use crate::format::Format;
 use crate::gpu::Gpu;
+use crate::gpu::limits::Limits;
 use crate::gpu::optional::OptionalFeature;
 
 /// What follows from a description that the device can make an image of.
@@ -45,6 +46,7 @@ fn check_shape(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<u32> {
         return Err(Error::usage(name, "give the texture at least one usage"));
     }
     check_sides(gpu, desc)?;
+    check_target_size(desc, &gpu.caps.limits)?;
     check_limit(name, "layer count", layers.into(), gpu.caps.limits.max_texture_layers.into())?;
     check_samples(desc)?;
     check_yuv(desc)?;
@@ -178,6 +180,16 @@ fn check_sides(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<()> {
     if matches!(desc.kind, TextureKind::CubeArray { .. }) { check_cube_arrays(gpu) } else { Ok(()) }
 }
 
+/// Fails if the texture is larger than what passes draw to.
+fn check_target_size(desc: &TextureDesc<'_>, limits: &Limits) -> Result<()> {
+    if !desc.usage.contains(TextureUsage::TARGET) {
+        return Ok(());
+    }
+    let [width, height] = limits.max_target_size;
+    check_limit(desc.debug_name, "width of a target in pixels", desc.extent[0].into(), width.into())?;
+    check_limit(desc.debug_name, "height of a target in pixels", desc.extent[1].into(), height.into())
+}
+
 /// Fails unless the device has arrays of cubes.
 pub(crate) fn check_cube_arrays(gpu: &Gpu) -> Result<()> {
     if gpu.caps.cube_arrays { Ok(()) } else { Err(gpu.lacks("arrays of cubes (imageCubeArray)")) }
@@ -291,4 +303,22 @@ fn check_format(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_
     let copies = layers.saturating_mul(desc.samples.into());
     let bytes = desc.format.bytes([width, height, desc.kind.depth()]).saturating_mul(copies);
     check_limit(name, "texture size in bytes", bytes, limits.max_resource_size)
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test")]
+    use super::*;
+
+    #[test]
+    fn targets_are_no_larger_than_passes() {
+        let limits = Limits { max_target_size: [64, 32], ..Limits::default() };
+        let check =
+            |usage, extent| check_target_size(&TextureDesc { usage, extent, ..Default::default() }, &limits);
+        let drawn = TextureUsage::TARGET | TextureUsage::SAMPLED;
+        check(drawn, [64, 32]).unwrap();
+        assert!(check(drawn, [65, 1]).unwrap_err().to_string().contains("width of a target"));
+        assert!(check(drawn, [1, 33]).unwrap_err().to_string().contains("height of a target"));
+        check(TextureUsage::SAMPLED, [65, 33]).unwrap();
+    }
 }

@@ -9,6 +9,7 @@ mod diagnostics;
 mod disk_cache;
 #[cfg_attr(not(any(feature = "glsl", test)), expect(dead_code, reason = "only what is compiled is kept"))]
 mod disk_file;
+mod fold;
 #[cfg(feature = "glsl")]
 mod front_end;
 mod hit_numbers;
@@ -27,6 +28,7 @@ mod ray_interface;
 mod reflect;
 #[cfg(feature = "glsl")]
 mod sampled_copies;
+mod shared_memory;
 #[cfg(feature = "glsl")]
 mod source;
 #[cfg(feature = "glsl")]
@@ -46,6 +48,7 @@ pub(crate) use instrument::with_checked_indices;
 #[cfg(feature = "glsl")]
 pub use offline::compile_glsl;
 pub(crate) use reflect::{Primitive, Reflection, reflect};
+pub(crate) use shared_memory::SharedBytes;
 pub use stage::{ShaderModuleDesc, ShaderSource, ShaderStage};
 
 #[cfg(all(test, feature = "glsl"))]

@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use ::spirv::{BuiltIn, Capability, Decoration, Dim, Op, StorageClass};
 
+use super::fold::fold;
 use super::spirv::{self, Instruction};
 use crate::format::Numbers;
 
@@ -22,6 +23,8 @@ pub(super) struct Module {
     pub(super) names: HashMap<u32, String>,
     pub(super) types: HashMap<u32, Type>,
     pub(super) constants: HashMap<u32, Constant>,
+    /// What operations on constants come to.
+    folded: HashMap<u32, u32>,
     composites: HashMap<u32, [u32; 3]>,
     pub(super) variables: Vec<Variable>,
     decorations: HashMap<(u32, u32), u32>,
@@ -103,12 +106,17 @@ pub(super) struct Variable {
 
 impl Module {
     pub(super) fn read(words: &[u32]) -> Result<Self, String> {
+        Self::specialized(words, &HashMap::new())
+    }
+
+    /// As [`read`](Self::read), with these values of specialization constants, by their ids.
+    pub(super) fn specialized(words: &[u32], values: &HashMap<u32, u32>) -> Result<Self, String> {
         let mut module = Self { version: spirv::version(words), ..Self::default() };
         for instruction in spirv::instructions(words) {
             let instruction = instruction?;
             match instruction.op {
                 Some(Op::Function) => break,
-                Some(op) => module.collect(op, &instruction),
+                Some(op) => module.collect(op, &instruction, values),
                 None => {}
             }
         }
@@ -128,6 +136,10 @@ impl Module {
 
     pub(super) fn decoration(&self, id: u32, decoration: Decoration) -> Option<u32> {
         self.decorations.get(&(id, decoration as u32)).copied()
+    }
+
+    pub(super) fn member_decoration(&self, ty: u32, member: u32, decoration: Decoration) -> Option<u32> {
+        self.member_decorations.get(&(ty, member, decoration as u32)).copied()
     }
 
     /// Whether `variable` belongs to the entry point; before SPIR-V 1.4 interfaces do not list resources.
@@ -242,9 +254,7 @@ impl Module {
     ) -> Result<u64, String> {
         let mut end = 0;
         for (index, member) in (0..).zip(members) {
-            let get = |decoration: Decoration| {
-                self.member_decorations.get(&(ty, index, decoration as u32)).copied()
-            };
+            let get = |decoration| self.member_decoration(ty, index, decoration);
             let offset = get(Decoration::Offset).ok_or("a member has no offset")?;
             let matrix =
                 get(Decoration::MatrixStride).map(|stride| (stride, get(Decoration::RowMajor).is_some()));
@@ -259,7 +269,7 @@ impl Module {
         Ok(u64::from(constant.value))
     }
 
-    fn collect(&mut self, op: Op, i: &Instruction<'_>) {
+    fn collect(&mut self, op: Op, i: &Instruction<'_>, values: &HashMap<u32, u32>) {
         match op {
             Op::Capability => _ = self.capabilities.insert(i.operand(0)),
             Op::EntryPoint => self.entries.push(entry(i)),
@@ -277,8 +287,16 @@ impl Module {
             Op::Variable => {
                 self.variables.push(Variable { ty: i.operand(0), id: i.operand(1), storage: i.operand(2) });
             }
-            Op::Constant | Op::ConstantTrue | Op::ConstantFalse => self.constant(i, false),
-            Op::SpecConstant | Op::SpecConstantTrue | Op::SpecConstantFalse => self.constant(i, true),
+            Op::Constant => self.constant(i, i.operand(2), false),
+            Op::ConstantTrue => self.constant(i, 1, false),
+            Op::ConstantFalse => self.constant(i, 0, false),
+            Op::SpecConstant | Op::SpecConstantTrue | Op::SpecConstantFalse => {
+                let own =
+                    if op == Op::SpecConstant { i.operand(2) } else { (op == Op::SpecConstantTrue).into() };
+                let given = self.decoration(i.operand(1), Decoration::SpecId).and_then(|id| values.get(&id));
+                self.constant(i, given.copied().unwrap_or(own), true);
+            }
+            Op::SpecConstantOp => self.fold(i),
             Op::ConstantComposite | Op::SpecConstantComposite => {
                 self.composites.insert(i.operand(1), [i.operand(2), i.operand(3), i.operand(4)]);
             }
@@ -286,8 +304,36 @@ impl Module {
         }
     }
 
-    fn constant(&mut self, i: &Instruction<'_>, is_spec: bool) {
-        self.constants.insert(i.operand(1), Constant { ty: i.operand(0), value: i.operand(2), is_spec });
+    fn constant(&mut self, i: &Instruction<'_>, value: u32, is_spec: bool) {
+        self.constants.insert(i.operand(1), Constant { ty: i.operand(0), value, is_spec });
+    }
+
+    /// What it is made of stands before it.
+    fn fold(&mut self, i: &Instruction<'_>) {
+        let operands = i.operands().get(3..).unwrap_or(&[]);
+        let value = match Op::from_u32(i.operand(2)) {
+            Some(Op::CompositeExtract) => self.part(i.operand(3), i.operand(4)),
+            Some(op) => {
+                let values: Option<Vec<u32>> = operands.iter().map(|id| self.value(*id)).collect();
+                values.and_then(|values| fold(op, &values))
+            }
+            None => None,
+        };
+        if let Some(value) = value {
+            self.folded.insert(i.operand(1), value);
+        }
+    }
+
+    /// One of the first three parts of a composite constant.
+    fn part(&self, composite: u32, index: u32) -> Option<u32> {
+        let part = self.composites.get(&composite)?.get(index as usize)?;
+        self.value(*part)
+    }
+
+    /// The low word of a constant, or what an operation on constants comes to.
+    pub(super) fn value(&self, id: u32) -> Option<u32> {
+        let plain = self.constants.get(&id).map(|constant| constant.value);
+        plain.or_else(|| self.folded.get(&id).copied())
     }
 
     fn collect_type(&mut self, op: Op, i: &Instruction<'_>) {

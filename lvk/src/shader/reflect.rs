@@ -6,6 +6,7 @@ use super::atomics::{Atomic, atomics};
 use super::input_read::{InputRead, input_read, outputs};
 use super::module::{Mode, Module, Type, Variable};
 use super::ray_interface::RayInterface;
+use super::shared_memory::SharedMemory;
 use super::{ShaderStage, spirv};
 use crate::bindless::layout;
 use crate::error::{Error, Result};
@@ -45,6 +46,8 @@ pub(crate) struct Reflection {
     pub(crate) second_output: bool,
     /// Most vertices and primitives that a workgroup of a mesh stage puts out; else zeros.
     pub(crate) mesh_outputs: [u32; 2],
+    /// What the invocations of a workgroup share (compute, task, mesh).
+    pub(crate) shared_memory: SharedMemory,
     /// Specialization constants: id and bytes (1 to 8; booleans take 4), sorted by id.
     pub(crate) specialization: Vec<(u32, u32)>,
     /// Bindings that the module declares, sorted, each once.
@@ -108,6 +111,7 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
         writes_layer: module.writes_layer(entry),
         second_output,
         mesh_outputs: if stage == ShaderStage::Mesh { mesh_outputs(&module, function) } else { [0; 2] },
+        shared_memory: SharedMemory::of(words, &module, entry),
         specialization: specialization(&module),
         bindings,
         capabilities: module.capabilities(),

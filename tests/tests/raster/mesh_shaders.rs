@@ -442,6 +442,40 @@ fn workgroups_and_outputs_beyond_the_device_are_refused() {
 }
 
 #[test]
+fn payloads_and_shared_memory_beyond_the_device_are_refused() {
+    let Some(ctx) = mesh_device() else { return };
+    let limits = ctx.capabilities().limits.mesh;
+    let task = "layout(local_size_x = 1) in;
+        layout(constant_id = 5) const uint kHanded = 1;
+        layout(constant_id = 6) const uint kShared = 1;
+        struct Payload { uint words[kHanded]; };
+        taskPayloadSharedEXT Payload payload;
+        shared uint own[kShared];
+        void main() { own[0] = 1; payload.words[0] = own[0]; EmitMeshTasksEXT(1, 1, 1); }";
+    let mesh = "layout(local_size_x = 1) in;
+        layout(points, max_vertices = 1, max_primitives = 1) out;
+        layout(constant_id = 7) const uint kMeshShared = 1;
+        shared uint own[kMeshShared];
+        void main() { own[0] = 1; SetMeshOutputsEXT(own[0] - 1u, 0u); }";
+    let shaders = Shaders::new(&ctx, "", task, mesh, WHITE);
+    let make = |words: [u32; 3]| {
+        let constant = |(id, words)| SpecializationConstant { id, value: SpecializationValue::U32(words) };
+        let specialization: Vec<_> = (5..).zip(words).map(constant).collect();
+        let desc =
+            RenderPipelineDesc { color: &[PLAIN], specialization: &specialization, ..Default::default() };
+        ctx.create_render_pipeline(&shaders.desc(&desc)).map(drop)
+    };
+    make([1; 3]).unwrap();
+    let most = [limits.max_task_payload_bytes, limits.max_task_shared_bytes, limits.max_mesh_shared_bytes];
+    for (part, bytes) in most.into_iter().enumerate() {
+        let mut words = [1; 3];
+        words[part] = bytes / 4 + 1;
+        let made = make(words);
+        assert!(matches!(made, Err(Error::LimitExceeded { .. })), "{words:?}: {made:?}");
+    }
+}
+
+#[test]
 fn draws_that_do_not_fit_the_pipeline_are_refused() {
     let Some(ctx) = mesh_device() else { return };
     let limits = ctx.capabilities().limits.mesh;

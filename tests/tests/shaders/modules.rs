@@ -1,9 +1,12 @@
 //! Shader modules: errors carry the user's own lines, SPIR-V is taken and checked, bindings and stages must fit.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use lvk::{ComputePipelineDesc, Context, Dependencies, Error, ShaderModuleDesc, ShaderSource, ShaderStage};
+use lvk::{
+    ComputePipelineDesc, Context, Dependencies, DeviceProfile, Error, ShaderModuleDesc, ShaderSource,
+    ShaderStage, SpecializationConstant, SpecializationValue,
+};
 use lvk_tests::compute::{compute_pipeline, module, read_words, words_buffer};
-use lvk_tests::device;
+use lvk_tests::{device, device_with};
 
 /// The error of GLSL that must not compile.
 fn refused(ctx: &Context, desc: &ShaderModuleDesc<'_>) -> String {
@@ -232,4 +235,38 @@ fn work_groups_over_the_limit_are_refused() {
     let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
     let made = ctx.create_compute_pipeline(&desc);
     assert!(matches!(made, Err(Error::LimitExceeded { .. })), "{made:?}");
+}
+
+/// As on phones, by a profile; a constant of the pipeline may make the memory larger.
+#[test]
+fn shared_memory_over_the_limit_is_refused() {
+    let phone = DeviceProfile { max_shared_bytes: 16 << 10, ..DeviceProfile::default() };
+    let Some(ctx) = device_with(|desc| desc.profile = Some(&phone)) else { return };
+    let module = module(
+        &ctx,
+        ShaderStage::Compute,
+        "layout(local_size_x = 8) in;
+        layout(constant_id = 1) const uint kVectors = 4;
+        shared vec4 vectors[kVectors];
+        void main() {
+            vectors[gl_LocalInvocationIndex] = vec4(1);
+            barrier();
+            imageStore(kImages2D[0], ivec2(0), vectors[7u - gl_LocalInvocationIndex]);
+        }",
+    );
+    let make = |vectors: u32| {
+        let constants = [SpecializationConstant { id: 1, value: SpecializationValue::U32(vectors) }];
+        let desc =
+            ComputePipelineDesc { module: Some(*module), specialization: &constants, ..Default::default() };
+        ctx.create_compute_pipeline(&desc).map(drop)
+    };
+    make(1_024).unwrap();
+    match make(1_025) {
+        Err(Error::LimitExceeded { requested, limit, .. }) => {
+            assert_eq!((requested, limit), (16_400, 16_384))
+        }
+        other => unreachable!("{other:?}"),
+    }
+    let most = ctx.capabilities().limits.max_shared_bytes;
+    assert_eq!(most, 16_384, "every device shares so much");
 }

@@ -4,6 +4,7 @@
 mod damage;
 mod modules;
 mod preamble;
+mod shared;
 mod sources;
 
 use ::spirv::Op;

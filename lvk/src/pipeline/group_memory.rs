@@ -1,0 +1,59 @@
+//! Whether what the invocations of a workgroup share, with the specialization constants at hand, fits the device.
+
+use super::shader_module::ShaderModule;
+use super::stage::SpecializationConstant;
+use crate::error::{Result, check_limit};
+use crate::shader::SharedBytes;
+
+/// The most bytes of a workgroup of a stage.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MemoryLimits {
+    /// What its invocations share.
+    pub(super) shared: u32,
+    /// What goes from a task to its mesh workgroups.
+    pub(super) payload: u32,
+    /// Both together.
+    pub(super) together: u32,
+}
+
+/// Fails if a workgroup of `module` shares more than `limits` allow.
+pub(super) fn check_group_memory(
+    pipeline: &str,
+    module: &ShaderModule,
+    specialization: &[SpecializationConstant],
+    limits: &MemoryLimits,
+) -> Result<()> {
+    let given = specialization.iter().map(|constant| (constant.id, constant.value.bits() as u32));
+    check(pipeline, module.reflection.shared_memory.bytes(&given.collect()), limits)
+}
+
+fn check(pipeline: &str, found: SharedBytes, limits: &MemoryLimits) -> Result<()> {
+    let SharedBytes { shared, payload } = found;
+    check_limit(pipeline, "shared memory of a workgroup in bytes", shared, limits.shared.into())?;
+    check_limit(pipeline, "payload of a task workgroup in bytes", payload, limits.payload.into())?;
+    let both = shared.saturating_add(payload);
+    check_limit(pipeline, "shared memory and payload of a workgroup in bytes", both, limits.together.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_limit_counts_and_both_together() {
+        let limits = MemoryLimits { shared: 100, payload: 50, together: 120 };
+        for (shared, payload, told) in [
+            (100, 20, None),
+            (70, 50, None),
+            (101, 0, Some("shared memory of a workgroup")),
+            (0, 51, Some("payload of a task")),
+            (100, 21, Some("shared memory and payload")),
+            (u64::MAX, u64::MAX, Some("shared memory of a workgroup")),
+        ] {
+            let found =
+                check("p", SharedBytes { shared, payload }, &limits).err().map(|error| error.to_string());
+            assert!(found.is_some() == told.is_some(), "{found:?}");
+            assert!(told.is_none_or(|told| found.is_some_and(|found| found.contains(told))), "{told:?}");
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! Bytes that the invocations of a workgroup share, and those that a task workgroup hands to its mesh workgroups.
+//!
+//! They are counted as Vulkan bounds them: variables one after the other by the rules of std430, booleans as 32 bits
+//! (`maxComputeSharedMemorySize`).
+
+use std::collections::HashMap;
+
+use ::spirv::{Decoration, Op, StorageClass};
+
+use super::module::{MAX_NESTING, Module, Type, Variable};
+use super::spirv;
+
+/// Declarations of a module with such memory, whose arrays every pipeline may size by its own constants.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(crate) struct SharedMemory {
+    /// The module up to its first function; empty where nothing is shared.
+    declarations: Vec<u32>,
+    /// Which of its entry points.
+    entry: usize,
+}
+
+/// Bytes of one workgroup.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(crate) struct SharedBytes {
+    /// What its invocations share (`shared`).
+    pub(crate) shared: u64,
+    /// What goes from a task to its mesh workgroups (`taskPayloadSharedEXT`).
+    pub(crate) payload: u64,
+}
+
+/// Size and alignment in bytes.
+type Room = (u64, u64);
+
+impl SharedMemory {
+    pub(super) fn of(words: &[u32], module: &Module, entry: usize) -> Self {
+        let shares = |variable: &Variable| is_of(variable, SHARED) || is_of(variable, PAYLOAD);
+        let any = module.variables.iter().any(|it| shares(it) && module.in_interface(entry, it));
+        let declarations = if any { declarations(words).to_vec() } else { Vec::new() };
+        Self { declarations, entry }
+    }
+
+    /// With these values of specialization constants, by their ids; others have their defaults. Variables whose size cannot
+    /// be known count nothing.
+    pub(crate) fn bytes(&self, constants: &HashMap<u32, u32>) -> SharedBytes {
+        if self.declarations.is_empty() {
+            return SharedBytes::default();
+        }
+        let Ok(module) = Module::specialized(&self.declarations, constants) else {
+            return SharedBytes::default();
+        };
+        let of = |storage| Sizes { module: &module, known: HashMap::new() }.of_all(self.entry, storage);
+        SharedBytes { shared: of(SHARED), payload: of(PAYLOAD) }
+    }
+}
+
+const SHARED: StorageClass = StorageClass::Workgroup;
+const PAYLOAD: StorageClass = StorageClass::TaskPayloadWorkgroupEXT;
+
+fn is_of(variable: &Variable, storage: StorageClass) -> bool {
+    variable.storage == storage as u32
+}
+
+/// All before the first function.
+fn declarations(words: &[u32]) -> &[u32] {
+    let before = spirv::instructions(words)
+        .map_while(Result::ok)
+        .take_while(|instruction| instruction.op != Some(Op::Function));
+    let length: usize = before.map(|instruction| instruction.words.len()).sum();
+    words.get(..spirv::HEADER_WORDS + length).unwrap_or(words)
+}
+
+/// Sizes of the types of a module; each is worked out once.
+struct Sizes<'a> {
+    module: &'a Module,
+    known: HashMap<u32, Option<Room>>,
+}
+
+impl Sizes<'_> {
+    /// Blocks lie in one another, everything else one after the other.
+    fn of_all(&mut self, entry: usize, storage: StorageClass) -> u64 {
+        let (mut end, mut blocks) = (0, 0);
+        let module = self.module;
+        for variable in
+            module.variables.iter().filter(|it| is_of(it, storage) && module.in_interface(entry, it))
+        {
+            let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else { continue };
+            let Some(room) = self.of(*target, MAX_NESTING) else { continue };
+            if module.decoration(*target, Decoration::Block).is_some() {
+                blocks = room.0.max(blocks);
+            } else {
+                end = behind(end, room);
+            }
+        }
+        end.max(blocks)
+    }
+
+    fn of(&mut self, ty: u32, nesting: u32) -> Option<Room> {
+        if let Some(known) = self.known.get(&ty) {
+            return *known;
+        }
+        let nesting = nesting.checked_sub(1)?;
+        let found = self.work_out(ty, nesting);
+        self.known.insert(ty, found);
+        found
+    }
+
+    fn work_out(&mut self, ty: u32, nesting: u32) -> Option<Room> {
+        match self.module.types.get(&ty)? {
+            Type::Bool => Some((4, 4)),
+            Type::Number { bytes, .. } => Some(((*bytes).into(), (*bytes).max(1).into())),
+            Type::Pointer { .. } => Some((8, 8)),
+            Type::Vector { element, count } => {
+                let (bytes, _) = self.of(*element, nesting)?;
+                let count = u64::from(*count);
+                Some((bytes.saturating_mul(count), bytes.saturating_mul(count.next_power_of_two()).max(1)))
+            }
+            Type::Matrix { column, count } => {
+                let column = self.of(*column, nesting)?;
+                Some((padded(column).saturating_mul((*count).into()), column.1))
+            }
+            Type::Array { element, length } => {
+                let element = self.of(*element, nesting)?;
+                let stride = self.module.decoration(ty, Decoration::ArrayStride).map(u64::from);
+                let stride = stride.unwrap_or_else(|| padded(element));
+                Some((stride.saturating_mul(self.module.value(*length)?.into()), element.1))
+            }
+            Type::Struct { members } => self.of_struct(ty, members, nesting),
+            Type::RuntimeArray { .. } | Type::Image { .. } | Type::SubpassInput { .. } | Type::Opaque(_) => {
+                None
+            }
+        }
+    }
+
+    fn of_struct(&mut self, ty: u32, members: &[u32], nesting: u32) -> Option<Room> {
+        let (mut end, mut align) = (0, 1);
+        for (index, member) in (0..).zip(members) {
+            let room = self.of(*member, nesting)?;
+            end = match self.module.member_decoration(ty, index, Decoration::Offset) {
+                Some(offset) => room.0.saturating_add(offset.into()).max(end),
+                None => behind(end, room),
+            };
+            align = room.1.max(align);
+        }
+        Some((padded((end, align)), align))
+    }
+}
+
+/// The end of what lies as soon behind `end` as its alignment allows.
+fn behind(end: u64, room: Room) -> u64 {
+    padded((end, room.1)).saturating_add(room.0)
+}
+
+/// The size as a multiple of the alignment.
+fn padded((bytes, align): Room) -> u64 {
+    bytes.checked_next_multiple_of(align).unwrap_or(u64::MAX)
+}
