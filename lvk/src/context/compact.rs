@@ -170,13 +170,22 @@ impl Context {
         Ok(Step::Copied(freed))
     }
 
+    /// Structures are looked for again once the command buffer is open: what another thread destroys before does not wait
+    /// for it.
     fn rewrite_outdated(&self) -> Result<()> {
-        let outdated =
-            |object: &Arc<AccelStruct>| object.tlas().is_ok_and(|tlas| tlas.contents().shown.is_outdated());
-        for object in self.shared().store.accel_structs.all().into_iter().filter(outdated) {
-            self.before_next_submission(|cmd| cmd.rewrite_tlas(&object))?;
+        if self.outdated_tlas().is_empty() {
+            return Ok(());
         }
-        Ok(())
+        self.before_next_submission(|cmd| {
+            self.outdated_tlas().iter().try_for_each(|object| cmd.rewrite_tlas(object))
+        })
+    }
+
+    /// Top-level structures that refer to what compaction has replaced.
+    fn outdated_tlas(&self) -> Vec<Arc<AccelStruct>> {
+        let mut all = self.shared().store.accel_structs.all();
+        all.retain(|object| object.tlas().is_ok_and(|tlas| tlas.contents().shown.is_outdated()));
+        all
     }
 
     fn compactions(&self) -> Guard<'_, Compactions> {

@@ -62,22 +62,18 @@ impl Context {
 
     /// Reads bytes of a buffer in any memory, after everything submitted so far. Waits for the GPU.
     pub fn download_buffer(&self, buffer: BufferHandle, offset: u64, bytes: &mut [u8]) -> Result<()> {
-        let buffer = self.shared().store.buffers.get(buffer)?;
-        buffer.check_range(offset, bytes.len() as u64)?;
-        if buffer.mapped().is_some() {
+        let find = || self.shared().store.buffers.get(buffer);
+        let found = find()?;
+        found.check_range(offset, bytes.len() as u64)?;
+        if found.mapped().is_some() {
             self.flush()?;
             self.wait_submitted()?;
-            buffer.read(offset, bytes);
+            found.read(offset, bytes);
             return Ok(());
         }
         let size = bytes.len() as u64;
-        self.read_back(size, bytes, |cmd, target| {
-            cmd.copy_buffer_objects(
-                &buffer,
-                target,
-                &[BufferCopy { source_offset: offset, target_offset: 0, size }],
-            )
-        })
+        let copy = BufferCopy { source_offset: offset, target_offset: 0, size };
+        self.read_back(size, bytes, |cmd, target| cmd.copy_buffer_objects(&find()?, target, &[copy]))
     }
 
     /// Writes texels, tightly packed, row by row and layer by layer, before the next submission.
@@ -95,7 +91,8 @@ impl Context {
         self.read_texture_later(texture, region)?.wait()
     }
 
-    /// Runs a copy into a readback buffer, waits, and reads it.
+    /// Runs a copy into a readback buffer, waits, and reads it. For `record` the same goes as in
+    /// [`read_later`](Self::read_later).
     pub(super) fn read_back(
         &self,
         size: u64,

@@ -68,11 +68,11 @@ impl Context {
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for a range that ends before it begins or outside of the buffer;
     /// [`StaleHandle`](crate::Error::StaleHandle).
     pub fn read_buffer_later(&self, buffer: BufferHandle, range: Range<u64>) -> Result<Readback> {
-        let buffer = self.shared().store.buffers.get(buffer)?;
+        let find = || self.shared().store.buffers.get(buffer);
         let size = range.end.checked_sub(range.start).unwrap_or(u64::MAX);
-        buffer.check_range(range.start, size)?;
+        find()?.check_range(range.start, size)?;
         let copy = BufferCopy { source_offset: range.start, target_offset: 0, size };
-        self.read_later(size, |cmd, target| cmd.copy_buffer_objects(&buffer, target, &[copy]))
+        self.read_later(size, |cmd, target| cmd.copy_buffer_objects(&find()?, target, &[copy]))
     }
 
     /// Has texels copied for the host, tightly packed, row by row and layer by layer, after everything submitted so far, and does not wait for them.
@@ -80,12 +80,13 @@ impl Context {
     /// # Errors
     /// As [`download_texture`](Self::download_texture).
     pub fn read_texture_later(&self, texture: TextureHandle, region: &TextureRegion) -> Result<Readback> {
-        let texture = self.shared().store.textures.get(texture)?;
-        let size = texture.resolve_region(region)?.bytes();
-        self.read_later(size, |cmd, target| cmd.copy_texture_objects_to_buffer(&texture, region, target, 0))
+        let find = || self.shared().store.textures.get(texture);
+        let size = find()?.resolve_region(region)?.bytes();
+        self.read_later(size, |cmd, target| cmd.copy_texture_objects_to_buffer(&find()?, region, target, 0))
     }
 
-    /// Submits a copy into a new buffer.
+    /// Submits a copy into a new buffer. What `record` copies it finds by its handle, or the caller holds it until the copy is
+    /// done: what another thread destroys before the command buffer is open does not wait for that.
     pub(super) fn read_later(
         &self,
         size: u64,

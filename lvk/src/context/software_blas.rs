@@ -138,8 +138,10 @@ impl Context {
     pub(super) fn fill_software(&self, target: &Arc<AccelStruct>, blob: &BlasBlob) -> Result<()> {
         let Some(software) = target.blas()?.software.as_ref() else { return Ok(()) };
         let body = &software.body;
-        self.shared().retire(Garbage::Software(Arc::clone(body)));
-        self.before_next_submission(|cmd| cmd.fill_software_blas(target, body, &blob.bytes))
+        self.before_next_submission(|cmd| {
+            self.shared().retire(Garbage::Software(Arc::clone(body)));
+            cmd.fill_software_blas(target, body, &blob.bytes)
+        })
     }
 }
 

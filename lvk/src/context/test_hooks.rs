@@ -24,6 +24,7 @@ pub use crate::software::gpu_build::check::{Bounds, EMPTY, Facts, check_structur
 pub use crate::software::gpu_build::collapse::{
     Below, BinaryChild, BinaryTree, WideChild, WideTree, any_tree,
 };
+use crate::submit::interruption;
 use crate::swapchain::decide::Failure;
 
 const ALIGNMENT: u64 = 256;
@@ -52,6 +53,12 @@ pub fn fallibly<T>(make: impl FnOnce() -> T) -> T {
 /// After so many submissions to queues, one that this thread makes of a context made [`fallibly`] is refused.
 pub fn fail_submission_after(submissions: u32) {
     failing::fail_after(submissions);
+}
+
+/// This thread does something that another might do, right before it takes its next command buffer. Locks may be held then:
+/// objects may be destroyed, and nothing submitted.
+pub fn before_next_command_buffer(deed: impl FnOnce() + 'static) {
+    interruption::before_next_command_buffer(Box::new(deed));
 }
 
 /// The presentation engine has lost the surface of a window, as far as the library is told.

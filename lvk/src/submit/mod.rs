@@ -5,6 +5,8 @@ pub(crate) mod command_ring;
 pub(crate) mod deferred;
 pub(crate) mod emit;
 pub(crate) mod input_sets;
+#[cfg(feature = "test-hooks")]
+pub(crate) mod interruption;
 pub(crate) mod lanes;
 #[cfg(test)]
 mod lanes_model;

@@ -108,12 +108,16 @@ impl<T> Submitter<T> {
 
     /// Starts recording a command buffer.
     pub(crate) fn acquire(&self, queue: Queue) -> Result<Box<Recording>> {
+        #[cfg(feature = "test-hooks")]
+        super::interruption::interrupt();
         let ticket = self.lock().take(self.gpu.queues.lane(queue));
         self.begin(ticket)
     }
 
     /// As [`acquire`](Self::acquire), and takes out what the GPU has finished with.
     pub(crate) fn collect_and_acquire(&self, queue: Queue) -> Result<(Finished<T>, Result<Box<Recording>>)> {
+        #[cfg(feature = "test-hooks")]
+        super::interruption::interrupt();
         let completed = self.completed()?;
         let mut inner = self.lock();
         let finished = inner.take_finished(&completed);

@@ -3,13 +3,13 @@
 
 use std::sync::Barrier;
 
-use lvk::test_hooks::waiting_objects;
+use lvk::test_hooks::{before_next_command_buffer, waiting_objects};
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, BuildMode, ColorAttachment,
-    CommandBuffer, ComputePipelineDesc, Context, Dependencies, Format, HitGroup, Holder, QueryPoolDesc,
-    RayTracingPipelineDesc, RenderPassDesc, RenderPipelineDesc, SamplerDesc, ShaderModuleHandle, ShaderStage,
-    SpecializationConstant, SpecializationValue, SubmitHandle, TextureDesc, TextureUsage, TextureViewDesc,
-    TlasDesc, TlasInstance, Triangles, ValidationSink,
+    CommandBuffer, ComputePipelineDesc, Context, Dependencies, Error, Format, HitGroup, Holder,
+    QueryPoolDesc, RayTracingPipelineDesc, RenderPassDesc, RenderPipelineDesc, SamplerDesc,
+    ShaderModuleHandle, ShaderStage, SpecializationConstant, SpecializationValue, SubmitHandle, TextureDesc,
+    TextureRegion, TextureUsage, TextureViewDesc, TlasDesc, TlasInstance, Triangles, ValidationSink,
 };
 use lvk_tests::compute::{Evaluator, module, read_vec4, read_words, vec4_buffer, words_buffer};
 use lvk_tests::noise::noise;
@@ -344,6 +344,44 @@ fn eight_threads_use_every_kind_of_object() {
             });
         }
     });
+    ctx.wait_idle().unwrap();
+    assert_eq!(waiting_objects(&ctx).unwrap(), 0);
+}
+
+/// Destroys an object as another thread may, right before the library takes a command buffer to use it with.
+fn destroy_before_use<T: 'static>(object: T) {
+    before_next_command_buffer(move || drop(object));
+}
+
+/// Fails unless the object was found to be gone. The GPU would still read it otherwise, when its memory goes.
+#[track_caller]
+fn expect_stale<T: std::fmt::Debug>(found: lvk::Result<T>) {
+    assert!(matches!(found, Err(Error::StaleHandle { .. })), "{found:?}");
+}
+
+#[test]
+fn what_another_thread_destroys_as_a_read_begins_is_not_read() {
+    let Some(ctx) = device() else { return };
+    let buffer = || {
+        let buffer = words_buffer(&ctx, &[7; 64]);
+        ctx.wait_idle().unwrap();
+        let handle = *buffer;
+        destroy_before_use(buffer);
+        handle
+    };
+    expect_stale(ctx.read_buffer_later(buffer(), 0..256));
+    expect_stale(ctx.download_buffer(buffer(), 0, &mut [0; 256]));
+    let texture = || {
+        let data: Option<&[u8]> = Some(&[9; 64]);
+        let desc = TextureDesc { format: Format::Rgba8Unorm, extent: [4, 4], data, ..Default::default() };
+        let texture = ctx.create_texture(&desc).unwrap();
+        ctx.wait_idle().unwrap();
+        let handle = *texture;
+        destroy_before_use(texture);
+        handle
+    };
+    expect_stale(ctx.read_texture_later(texture(), &TextureRegion::default()));
+    expect_stale(ctx.download_texture(texture(), &TextureRegion::default()));
     ctx.wait_idle().unwrap();
     assert_eq!(waiting_objects(&ctx).unwrap(), 0);
 }

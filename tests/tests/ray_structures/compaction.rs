@@ -1,6 +1,7 @@
 //! Compaction: an asynchronous second step that keeps the handle and what shows it, and gives memory back.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
+use lvk::test_hooks::{before_next_command_buffer, waiting_objects};
 use lvk::{
     AccelStructHandle, BuildFlags, BuildMode, Compaction, Context, DeviceInstances, Error, Result, TlasDesc,
 };
@@ -110,6 +111,36 @@ fn memory_goes_back_to_the_byte() -> Result<()> {
     drop(gpu);
     ctx.wait_idle()?;
     assert_eq!(memory(&ctx), (all_before - own_before, 0), "only the library's own structure is left");
+    Ok(())
+}
+
+/// An update that was recorded before the copies is submitted behind them. Another thread destroys the top-level structure
+/// just when it is to be written again.
+#[test]
+fn a_structure_that_goes_as_it_is_rewritten_is_left_alone() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    if !tests_own_structures(&ctx, "structures that are written again") {
+        return Ok(());
+    }
+    let scene = scene();
+    let gpu = upload(&ctx, &scene, COMPACTABLE)?;
+    let mut late = ctx.acquire_command_buffer()?;
+    late.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
+    ctx.compact(&handles(&gpu))?;
+    settle(&ctx)?;
+    done(&ctx, *gpu.models[0])?;
+    ctx.wait(ctx.submit(late)?)?;
+    let tlas = gpu.tlas;
+    let (goes, gone) = std::sync::mpsc::channel();
+    before_next_command_buffer(move || {
+        drop(tlas);
+        let _ = goes.send(());
+    });
+    ctx.next_frame()?;
+    assert!(gone.try_recv().is_ok(), "it was to be written again");
+    waiting_objects(&ctx)?;
+    ctx.wait_idle()?;
+    assert_eq!(waiting_objects(&ctx)?, 0);
     Ok(())
 }
 
