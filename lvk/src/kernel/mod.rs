@@ -161,12 +161,12 @@ pub(crate) struct InstancesPush {
 
 /// The pipelines, each made when first needed.
 pub(crate) struct Kernels {
-    made: Mutex<[Option<Arc<ComputePipeline>>; Kernel::ALL.len()]>,
+    made: [Mutex<Option<Arc<ComputePipeline>>>; Kernel::ALL.len()],
 }
 
 impl Kernels {
     pub(crate) fn new() -> Self {
-        Self { made: Mutex::new(Rank::Kernels, [const { None }; Kernel::ALL.len()]) }
+        Self { made: [const { Mutex::new(Rank::Kernels, None) }; Kernel::ALL.len()] }
     }
 
     /// The pipeline of a kernel.
@@ -177,9 +177,8 @@ impl Kernels {
         cache: vk::PipelineCache,
         kernel: Kernel,
     ) -> Result<Arc<ComputePipeline>> {
-        let mut made = self.made.lock();
-        let place = &mut made[kernel as usize];
-        match place {
+        let mut place = self.made[kernel as usize].lock();
+        match &*place {
             Some(pipeline) => Ok(Arc::clone(pipeline)),
             None => Ok(Arc::clone(place.insert(Arc::new(kernel.pipeline(gpu, layout, cache)?)))),
         }

@@ -19,10 +19,6 @@ pub(crate) enum Rank {
     TlasContents,
     /// The scratch buffer of builds, which may be made anew.
     Scratch,
-    /// Mapped buffers that nobody uses, one of which may be made.
-    SpareBuffers,
-    /// Staging memory, whose pages are made under the lock.
-    Staging,
     /// States, command buffers and garbage of what is submitted.
     Submitter,
     /// The bindless set, written right before a submission.
@@ -31,6 +27,10 @@ pub(crate) enum Rank {
     AccelBlocks,
     /// Frames in flight. The first leaf.
     Frames,
+    /// Mapped buffers that nobody uses.
+    SpareBuffers,
+    /// Which bytes of staging memory are taken.
+    Staging,
     /// The objects of one kind, by handle.
     Store,
     /// What changes in a bottom-level structure with builds and compaction.
@@ -47,7 +47,7 @@ pub(crate) enum Rank {
     QueryMarks,
     /// The bytes of a mapped buffer.
     BufferBytes,
-    /// The library's own pipelines.
+    /// A pipeline of the library's own, which is made under the lock.
     Kernels,
     /// The file of a pipeline cache.
     PipelineCacheFile,
@@ -80,12 +80,12 @@ impl Rank {
         Self::Pending,
         Self::TlasContents,
         Self::Scratch,
-        Self::SpareBuffers,
-        Self::Staging,
         Self::Submitter,
         Self::Bindless,
         Self::AccelBlocks,
         Self::Frames,
+        Self::SpareBuffers,
+        Self::Staging,
         Self::Store,
         Self::BlasState,
         Self::SizeQuery,

@@ -1,5 +1,6 @@
 //! From host memory to the GPU.
 
+mod page_set;
 mod pages;
 pub(crate) mod pending;
 pub(crate) mod pieces;

@@ -13,7 +13,7 @@ pub(crate) struct Place {
 pub(crate) enum Found {
     /// The page is there.
     Here(Place),
-    /// The page is to be made, with so many bytes.
+    /// The page is to be made, with so many bytes, and [opened](Pages::open) or [forgotten](Pages::forget).
     New(Place, u64),
 }
 
@@ -72,8 +72,12 @@ impl Pages {
         }
         self.pages[number] = Some(Page { bytes: size, used: bytes, taken: 1 });
         self.total_bytes += size;
-        self.fill_next(number);
         Found::New(Place { page: number, offset: 0 }, size)
+    }
+
+    /// A new page is made: others may have places of it, too.
+    pub(crate) fn open(&mut self, number: usize) {
+        self.fill_next(number);
     }
 
     /// The page that has most room left is filled next.
@@ -153,10 +157,21 @@ mod tests {
 
     #[derive(Debug, Clone)]
     enum Op {
-        Take { bytes: u64, align: u32 },
-        Hold { which: prop::sample::Index, sequence: u64 },
+        Take {
+            bytes: u64,
+            align: u32,
+        },
+        Hold {
+            which: prop::sample::Index,
+            sequence: u64,
+        },
         GiveBack(prop::sample::Index),
         Release(u64),
+        /// A page that was to be made is there, or cannot be had.
+        Made {
+            which: prop::sample::Index,
+            succeeds: bool,
+        },
     }
 
     fn op() -> impl Strategy<Value = Op> {
@@ -167,6 +182,8 @@ mod tests {
                 .prop_map(|(which, sequence)| Op::Hold { which, sequence }),
             1 => any::<prop::sample::Index>().prop_map(Op::GiveBack),
             1 => (0..4_u64).prop_map(Op::Release),
+            2 => (any::<prop::sample::Index>(), prop::bool::weighted(0.8))
+                .prop_map(|(which, succeeds)| Op::Made { which, succeeds }),
         ]
     }
 
@@ -188,15 +205,17 @@ mod tests {
             let mut pages = Pages::new(100, 250);
             let mut sizes: BTreeMap<usize, u64> = BTreeMap::new();
             let mut taken: Vec<Taken> = Vec::new();
+            // Nobody uses their places before they are made.
+            let mut unmade: Vec<Taken> = Vec::new();
             for op in ops {
                 match op {
                     Op::Take { bytes, align } => {
                         let align = 1_u64 << align;
-                        let place = match pages.take(bytes, align) {
-                            Found::Here(place) => place,
+                        let (place, list) = match pages.take(bytes, align) {
+                            Found::Here(place) => (place, &mut taken),
                             Found::New(place, size) => {
                                 prop_assert!(sizes.insert(place.page, size).is_none(), "two pages of one number");
-                                place
+                                (place, &mut unmade)
                             }
                         };
                         prop_assert_eq!(place.offset % align, 0);
@@ -206,8 +225,10 @@ mod tests {
                                 || other.place.offset + other.bytes <= place.offset
                                 || place.offset + bytes <= other.place.offset
                         };
-                        prop_assert!(taken.iter().all(apart));
-                        taken.push(Taken { place, bytes, by: None });
+                        prop_assert!(list.iter().all(apart));
+                        list.push(Taken { place, bytes, by: None });
+                        let is_unmade = |used: &Taken| unmade.iter().any(|page| page.place.page == used.place.page);
+                        prop_assert!(!taken.iter().any(is_unmade), "a page is used before it is made");
                     }
                     Op::Hold { which, sequence } => {
                         let mut free: Vec<_> = taken.iter_mut().filter(|taken| taken.by.is_none()).collect();
@@ -224,6 +245,18 @@ mod tests {
                             forget(&mut sizes, pages.give_back(gone.place.page, 1));
                         }
                     }
+                    Op::Made { which, succeeds } => {
+                        if !unmade.is_empty() {
+                            let page = unmade.swap_remove(which.index(unmade.len()));
+                            if succeeds {
+                                pages.open(page.place.page);
+                                taken.push(page);
+                            } else {
+                                pages.forget(page.place.page);
+                                forget(&mut sizes, [page.place.page]);
+                            }
+                        }
+                    }
                     Op::Release(sequence) => {
                         taken.retain(|taken| taken.by != Some(sequence));
                         forget(&mut sizes, pages.release(sequence));
@@ -231,6 +264,10 @@ mod tests {
                 }
                 prop_assert_eq!(pages.total_bytes(), sizes.values().sum::<u64>());
                 prop_assert!(taken.iter().all(|taken| sizes.contains_key(&taken.place.page)));
+            }
+            for page in unmade {
+                pages.forget(page.place.page);
+                forget(&mut sizes, [page.place.page]);
             }
             (0..4).for_each(|sequence| forget(&mut sizes, pages.release(sequence)));
             for left in taken.iter().filter(|taken| taken.by.is_none()) {
@@ -246,7 +283,11 @@ mod tests {
             let mut most = 0;
             for round in 0..rounds {
                 for _ in 0..count {
-                    let (Found::Here(place) | Found::New(place, _)) = pages.take(bytes, 4);
+                    let found = pages.take(bytes, 4);
+                    let (Found::Here(place) | Found::New(place, _)) = found;
+                    if matches!(found, Found::New(..)) {
+                        pages.open(place.page);
+                    }
                     pages.hold(place.page, 1, round);
                 }
                 if round == 1 {

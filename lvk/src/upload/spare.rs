@@ -26,16 +26,21 @@ impl SpareBuffers {
 
     /// A mapped buffer of at least `bytes`.
     pub(crate) fn take(&self, gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Arc<Buffer>> {
-        let mut buffers = self.buffers.lock();
-        let fits = |buffer: &Arc<Buffer>| {
-            buffer.size_bytes >= bytes && buffer.size_bytes <= bytes.saturating_mul(Self::WASTE)
-        };
-        if let Some(place) = buffers.iter().position(fits) {
-            return Ok(buffers.swap_remove(place));
+        if let Some(spare) = self.find(bytes) {
+            return Ok(spare);
         }
         let memory = MemoryKind::HostVisible;
         let desc = BufferDesc { size_bytes: bytes.max(1), memory, debug_name: name, ..Default::default() };
         Ok(Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?))
+    }
+
+    fn find(&self, bytes: u64) -> Option<Arc<Buffer>> {
+        let mut buffers = self.buffers.lock();
+        let fits = |buffer: &Arc<Buffer>| {
+            buffer.size_bytes >= bytes && buffer.size_bytes <= bytes.saturating_mul(Self::WASTE)
+        };
+        let place = buffers.iter().position(fits)?;
+        Some(buffers.swap_remove(place))
     }
 
     /// Takes a buffer back that neither the GPU nor anybody else uses any more.

@@ -4,11 +4,10 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::pages::{Found, Pages, Place};
+use super::page_set::PageSet;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::memory::{Mapping, MemoryKind};
-use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
@@ -63,62 +62,13 @@ impl StagingChunk {
 
 /// Pages of host-visible memory. A region lives until the command buffer it was taken for is done.
 pub(crate) struct Staging {
-    state: Mutex<State>,
-    kept_bytes: u64,
-    gpu: Arc<Gpu>,
-}
-
-struct State {
     /// As near to the GPU as the host can write.
-    pages: PageSet,
+    pages: PageSet<Buffer>,
     /// Chunks are cut from these. Small writes beyond the host's caches cost far more than their bytes: the next lock that is
     /// taken waits until they have gone across the bus.
-    cached: PageSet,
-}
-
-/// Pages of one kind of memory.
-struct PageSet {
-    pages: Pages,
-    /// By their numbers; `None` for those that are gone, or not made yet.
-    buffers: Vec<Option<Arc<Buffer>>>,
-    memory: MemoryKind,
-}
-
-impl PageSet {
-    fn new(page_bytes: u64, kept_bytes: u64, memory: MemoryKind) -> Self {
-        Self { pages: Pages::new(page_bytes, kept_bytes), buffers: Vec::new(), memory }
-    }
-
-    /// A place, with the page it lies in.
-    fn place(
-        &mut self,
-        gpu: &Arc<Gpu>,
-        bytes: u64,
-        align: u64,
-        sequence: Option<u64>,
-    ) -> Result<(Place, Arc<Buffer>)> {
-        let Self { pages, buffers, memory } = self;
-        let place = match pages.take(bytes, align) {
-            Found::Here(place) => place,
-            Found::New(place, size) => {
-                let made = new_page(gpu, size, *memory).inspect_err(|_| pages.forget(place.page))?;
-                buffers.resize_with(buffers.len().max(place.page + 1), || None);
-                buffers[place.page] = Some(Arc::new(made));
-                place
-            }
-        };
-        if let Some(sequence) = sequence {
-            pages.hold(place.page, 1, sequence);
-        }
-        let buffer = buffers.get(place.page).cloned().flatten();
-        Ok((place, buffer.ok_or_else(|| Error::usage("staging", "the page is gone"))?))
-    }
-
-    /// The command buffer is done with its regions. Answers pages that nobody wants any more.
-    fn release(&mut self, sequence: u64) -> Vec<Option<Arc<Buffer>>> {
-        let unwanted = self.pages.release(sequence);
-        unwanted.into_iter().map(|page| self.buffers[page].take()).collect()
-    }
+    cached: PageSet<Buffer>,
+    kept_bytes: u64,
+    gpu: Arc<Gpu>,
 }
 
 impl Staging {
@@ -131,9 +81,9 @@ impl Staging {
     /// Keeps pages of `bytes` altogether.
     pub(crate) fn new(gpu: &Arc<Gpu>, bytes: u64) -> Self {
         let kept_bytes = bytes.max(Self::LEAST_PAGE_BYTES);
-        let pages = PageSet::new(kept_bytes.min(Self::PAGE_BYTES), kept_bytes, MemoryKind::HostVisible);
-        let cached = PageSet::new(Self::LEAST_PAGE_BYTES, Self::KEPT_CACHED_BYTES, MemoryKind::Readback);
-        Self { state: Mutex::new(Rank::Staging, State { pages, cached }), kept_bytes, gpu: Arc::clone(gpu) }
+        let pages = PageSet::new(kept_bytes.min(Self::PAGE_BYTES), kept_bytes);
+        let cached = PageSet::new(Self::LEAST_PAGE_BYTES, Self::KEPT_CACHED_BYTES);
+        Self { pages, cached, kept_bytes, gpu: Arc::clone(gpu) }
     }
 
     /// Half of what is kept: so much may wait while as much is copied.
@@ -186,8 +136,9 @@ impl Staging {
     /// Takes a new chunk in place of a full one.
     #[inline(never)]
     fn renew(&self, chunk: &mut StagingChunk, sequence: u64) -> Result<()> {
+        let make = |size| new_page(&self.gpu, size, MemoryKind::Readback);
         let (place, buffer) =
-            self.lock().cached.place(&self.gpu, StagingChunk::BYTES, Buffer::ALIGNMENT, Some(sequence))?;
+            self.cached.place(StagingChunk::BYTES, Buffer::ALIGNMENT, Some(sequence), make)?;
         *chunk = StagingChunk::new(buffer, place.offset);
         Ok(())
     }
@@ -201,22 +152,19 @@ impl Staging {
 
     /// `count` regions of a page that were [kept](Self::keep) are read by the command buffer `sequence`.
     pub(crate) fn hold(&self, page: usize, count: u32, sequence: u64) {
-        self.lock().pages.pages.hold(page, count, sequence);
+        self.pages.hold(page, count, sequence);
     }
 
     /// The command buffer is done with its regions.
     pub(crate) fn release(&self, sequence: u64) {
-        let mut state = self.lock();
-        let gone = [state.pages.release(sequence), state.cached.release(sequence)];
-        drop(state);
-        drop(gone);
+        drop(self.pages.release(sequence));
+        drop(self.cached.release(sequence));
     }
 
     /// Bytes of all pages.
     #[cfg(feature = "test-hooks")]
     pub(crate) fn total_bytes(&self) -> u64 {
-        let state = self.lock();
-        state.pages.pages.total_bytes() + state.cached.pages.total_bytes()
+        self.pages.total_bytes() + self.cached.total_bytes()
     }
 
     /// The bytes are written without the lock.
@@ -229,18 +177,14 @@ impl Staging {
     ) -> Result<(StagingRegion, R)> {
         // Pages begin at addresses that are multiples of less than some alignments.
         let room = bytes + align.saturating_sub(Buffer::ALIGNMENT);
-        let (place, buffer) =
-            self.lock().pages.place(&self.gpu, room, align.min(Buffer::ALIGNMENT), sequence)?;
+        let make = |size| new_page(&self.gpu, size, MemoryKind::HostVisible);
+        let (place, buffer) = self.pages.place(room, align.min(Buffer::ALIGNMENT), sequence, make)?;
         let address = (buffer.address + place.offset).next_multiple_of(align.max(1));
         let offset = address - buffer.address;
         let region = StagingRegion { buffer: buffer.raw, offset, address, page: place.page };
         // SAFETY: `offset + bytes <= place.offset + room` lies inside the mapping, and no other region overlaps this one.
         let answer = unsafe { fill_region(offset, bytes, &buffer, fill) }?;
         Ok((region, answer))
-    }
-
-    fn lock(&self) -> Guard<'_, State> {
-        self.state.lock()
     }
 }
 

@@ -1,0 +1,127 @@
+//! Pages of staging memory that threads share: which bytes are taken is decided under a lock, and pages are made without it.
+
+use std::sync::Arc;
+
+use super::pages::{Found, Pages, Place};
+use crate::error::{Error, Result};
+use crate::lock::{Guard, Mutex, Rank};
+
+/// Pages of one kind of memory; `P` is such a page.
+pub(super) struct PageSet<P> {
+    listed: Mutex<Listed<P>>,
+}
+
+struct Listed<P> {
+    pages: Pages,
+    /// By their numbers; `None` for those that are gone, or being made.
+    made: Vec<Option<Arc<P>>>,
+}
+
+impl<P> PageSet<P> {
+    pub(super) fn new(page_bytes: u64, kept_bytes: u64) -> Self {
+        let listed = Listed { pages: Pages::new(page_bytes, kept_bytes), made: Vec::new() };
+        Self { listed: Mutex::new(Rank::Staging, listed) }
+    }
+
+    /// A place, with the page it lies in, for the command buffer `sequence`, or for whoever [holds](Self::hold) it later. Where no
+    /// page has room, `make` makes one of so many bytes; other threads take places meanwhile.
+    pub(super) fn place(
+        &self,
+        bytes: u64,
+        align: u64,
+        sequence: Option<u64>,
+        make: impl FnOnce(u64) -> Result<P>,
+    ) -> Result<(Place, Arc<P>)> {
+        let mut listed = self.lock();
+        let place = match listed.pages.take(bytes, align) {
+            Found::Here(place) => place,
+            Found::New(place, size) => {
+                drop(listed);
+                let made = make(size);
+                listed = self.lock();
+                listed.add(place.page, made)?;
+                place
+            }
+        };
+        if let Some(sequence) = sequence {
+            listed.pages.hold(place.page, 1, sequence);
+        }
+        let page = listed.made.get(place.page).cloned().flatten();
+        Ok((place, page.ok_or_else(|| Error::usage("staging", "the page is gone"))?))
+    }
+
+    /// `count` places of a page that nobody held yet are read by the command buffer `sequence`.
+    pub(super) fn hold(&self, page: usize, count: u32, sequence: u64) {
+        self.lock().pages.hold(page, count, sequence);
+    }
+
+    /// The command buffer is done with its places. Answers pages that nobody wants any more.
+    pub(super) fn release(&self, sequence: u64) -> Vec<Arc<P>> {
+        let Listed { pages, made } = &mut *self.lock();
+        let unwanted = pages.release(sequence);
+        unwanted.into_iter().filter_map(|page| made.get_mut(page)?.take()).collect()
+    }
+
+    /// Bytes of all pages.
+    #[cfg(any(test, feature = "test-hooks"))]
+    pub(super) fn total_bytes(&self) -> u64 {
+        self.lock().pages.total_bytes()
+    }
+
+    fn lock(&self) -> Guard<'_, Listed<P>> {
+        self.listed.lock()
+    }
+}
+
+impl<P> Listed<P> {
+    /// A page is made, or could not be.
+    fn add(&mut self, number: usize, made: Result<P>) -> Result<()> {
+        let page = made.inspect_err(|_| self.pages.forget(number))?;
+        self.made.resize_with(self.made.len().max(number + 1), || None);
+        self.made[number] = Some(Arc::new(page));
+        self.pages.open(number);
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn no_memory() -> Error {
+        Error::OutOfDeviceMemory { object: "staging".to_owned(), bytes: 100 }
+    }
+
+    #[test]
+    fn other_threads_take_places_while_a_page_is_made() {
+        let set = PageSet::new(100, 100);
+        let mut other = None;
+        let (first, size) = set
+            .place(60, 1, Some(1), |size| {
+                other = Some(set.place(10, 1, Some(2), Ok)?);
+                Ok(size)
+            })
+            .unwrap();
+        let (other, _) = other.unwrap();
+        assert_ne!(first.page, other.page, "the page that is being made is not there yet");
+        assert_eq!((*size, set.total_bytes()), (100, 200));
+        let (next, _) = set.place(60, 1, Some(2), |_| Err(no_memory())).unwrap();
+        assert_eq!(next, Place { page: other.page, offset: 10 }, "the other has more room");
+        assert!(set.release(1).len() == 1 && set.release(2).is_empty());
+        assert_eq!(set.total_bytes(), 100);
+    }
+
+    #[test]
+    fn a_page_that_cannot_be_made_is_forgotten_and_takes_nobody_elses() {
+        let set = PageSet::new(100, 0);
+        let refused = set.place(60, 1, Some(1), |_| {
+            set.place(60, 1, Some(2), Ok)?;
+            Err(no_memory())
+        });
+        assert!(matches!(refused, Err(Error::OutOfDeviceMemory { .. })));
+        assert_eq!(set.total_bytes(), 100);
+        assert!(set.release(1).is_empty() && set.release(2).len() == 1);
+        let (again, _) = set.place(60, 1, Some(3), Ok).unwrap();
+        assert_eq!((again, set.total_bytes()), (Place { page: 0, offset: 0 }, 100));
+    }
+}
