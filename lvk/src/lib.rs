@@ -120,6 +120,7 @@ mod software;
 mod store;
 mod submit;
 mod swapchain;
+mod threads;
 mod upload;
 
 #[cfg(feature = "test-hooks")]

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::instance::{INSTANCE_BYTES, TlasInstance, check, is_right, pack};
 use super::shown::{Find, Gather, Marks, Shown, ShownSet};
-use crate::error::{Error, Result, check_limit};
-use crate::lock::Waiting;
+use crate::error::{Result, check_limit};
+use crate::threads::{cores, share_out};
 
 /// A thread gets at least so many instances: one converts 200 of them in a microsecond, and takes tens of microseconds to
 /// start.
@@ -89,23 +89,13 @@ fn write_chunks(
         let plain = write_chunk(name, index * count, instances, &mut gather, out)?;
         Ok(plain.then(|| gather.into_new()))
     };
-    let waiting = Waiting::here();
-    std::thread::scope(|scope| {
-        let mut chunks = instances.chunks(count).zip(out.chunks_mut(count * INSTANCE_BYTES)).enumerate();
-        let own = chunks.next();
-        let workers: Vec<_> = chunks
-            .map(|(index, (instances, out))| {
-                scope.spawn(move || waiting.work(|| write(index, instances, out)))
-            })
-            .collect();
-        let mut all = Vec::new();
-        if let Some((index, (instances, out))) = own {
-            all.push(write(index, instances, out));
-        }
-        let lost = |_| Err(Error::usage(name, "a thread that converted instances ended early"));
-        all.extend(workers.into_iter().map(|worker| worker.join().unwrap_or_else(lost)));
-        merge(all)
-    })
+    let mut all: Vec<_> = instances.chunks(count).map(|_| None).collect();
+    let chunks =
+        instances.chunks(count).zip(out.chunks_mut(count * INSTANCE_BYTES)).zip(&mut all).enumerate();
+    share_out(threads, chunks, |(index, ((instances, out), written))| {
+        *written = Some(write(index, instances, out));
+    });
+    merge(all.into_iter().flatten())
 }
 
 /// Counting cores reads files on Linux, some 10 us: only where there is work for several.
@@ -115,7 +105,7 @@ fn thread_count(instances: usize) -> usize {
     if wanted < 2 {
         return 1;
     }
-    std::thread::available_parallelism().map_or(1, usize::from).min(wanted)
+    cores().min(wanted)
 }
 
 /// Answers `false` where some need more than an address.
@@ -148,7 +138,7 @@ fn write_chunk(
 }
 
 /// What all chunks show, each structure once; the first error where there is one.
-fn merge(chunks: Vec<Result<Option<Vec<Shown>>>>) -> Result<Option<Vec<Shown>>> {
+fn merge(chunks: impl Iterator<Item = Result<Option<Vec<Shown>>>>) -> Result<Option<Vec<Shown>>> {
     let mut all: Vec<Shown> = Vec::new();
     let mut seen = std::collections::HashSet::new();
     let mut needs_kernel = false;

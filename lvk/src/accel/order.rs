@@ -6,6 +6,7 @@
 
 use super::bounds::Bounds;
 use super::cut::{Item, cut, items};
+use crate::threads::{cores, share_out};
 
 /// Another order is worth its number map and its time if its tree costs this many times less than the given one.
 pub(crate) const WORTH_GAIN: f64 = 1.1;
@@ -19,8 +20,7 @@ const PARALLEL_COUNT: usize = 1 << 16;
 /// Takes O(n log n) time.
 pub(crate) fn spatial_order(bounds: &[Bounds]) -> Vec<u32> {
     let mut items = items(bounds);
-    let threads = std::thread::available_parallelism().map_or(1, usize::from);
-    arrange(&mut items, threads);
+    arrange(&mut items, cores());
     items.into_iter().map(|item| item.index).collect()
 }
 
@@ -59,10 +59,8 @@ fn arrange(mut items: &mut [Item], threads: usize) {
         cut(items, middle);
         let (left, right) = items.split_at_mut(middle);
         if threads > 1 && left.len() > PARALLEL_COUNT {
-            std::thread::scope(|scope| {
-                scope.spawn(|| arrange(left, threads / 2));
-                arrange(right, threads - threads / 2);
-            });
+            let halves = [(left, threads / 2), (right, threads - threads / 2)];
+            share_out(2, halves.into_iter(), |(items, threads)| arrange(items, threads));
             return;
         }
         arrange(left, 1);

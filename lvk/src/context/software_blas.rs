@@ -1,8 +1,6 @@
 //! Bottom-level structures of the library's own, built by the CPU when they are created.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread::Builder;
 
 use super::Context;
 use super::blas_shapes::input;
@@ -19,7 +17,6 @@ use crate::accel::software::parts::Parts;
 use crate::command::transfer::BufferCopy;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
-use crate::lock::Waiting;
 use crate::shared::Garbage;
 use crate::software::blas_blob::{self, BlasBlob};
 use crate::software::mesh::Mesh;
@@ -27,6 +24,7 @@ use crate::software::parts::parts;
 use crate::software::quality::Quality;
 use crate::software::sound::{self, Expected};
 use crate::software::tree_cache::TreeKey;
+use crate::threads::make_all;
 
 /// Stands in front of structures that no driver wrote; as long as what drivers begin with.
 const MARK: [u8; 32] = *b"lvk software structure, form 3\0\0";
@@ -47,7 +45,7 @@ impl Context {
             let mesh = Mesh::new(&desc.geometries.iter().map(bytes).collect::<Vec<_>>(), quality);
             self.built(&mesh, quality)
         };
-        on_all_cores(descs, |desc| is_of_cpu(&desc).then(|| build(desc)))
+        Ok(make_all(descs, |desc| is_of_cpu(&desc).then(|| build(desc))))
     }
 
     /// The structure of a mesh, of an earlier run where trees are kept.
@@ -143,36 +141,4 @@ impl Context {
             cmd.fill_software_blas(target, body, &blob.bytes)
         })
     }
-}
-
-/// Each desc by whichever thread is free.
-fn on_all_cores<T: Send>(
-    descs: &[BlasDesc<'_>],
-    build: impl Fn(&BlasDesc<'_>) -> Option<T> + Sync,
-) -> Result<Vec<Option<T>>> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let next = AtomicUsize::new(0);
-    let work = || {
-        let mut made = Vec::new();
-        while let index = next.fetch_add(1, Ordering::Relaxed)
-            && let Some(desc) = descs.get(index)
-        {
-            made.push((index, build(desc)));
-        }
-        made
-    };
-    let mut all: Vec<Option<T>> = descs.iter().map(|_| None).collect();
-    let lost = |_| Error::usage("create_blas", "a thread that built a tree ended early");
-    let waiting = Waiting::here();
-    std::thread::scope(|scope| {
-        let helpers: Vec<_> = (1..cores.min(descs.len()))
-            .map_while(|_| Builder::new().spawn_scoped(scope, || waiting.work(work)).ok())
-            .collect();
-        let mut made = work();
-        for helper in helpers {
-            made.extend(helper.join().map_err(lost)?);
-        }
-        made.into_iter().for_each(|(index, built)| all[index] = built);
-        Ok(all)
-    })
 }

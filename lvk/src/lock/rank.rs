@@ -61,8 +61,8 @@ pub(crate) enum Rank {
     ImageLimits,
     /// Who has which bindless slot, where indices are checked.
     SlotOwners,
-    /// Work that threads share while a tree is built.
-    TreeWork,
+    /// Work that threads share.
+    SharedWork,
     /// A queue of the device.
     Queue,
     /// Device memory.
@@ -101,7 +101,7 @@ impl Rank {
         Self::SpareNotes,
         Self::ImageLimits,
         Self::SlotOwners,
-        Self::TreeWork,
+        Self::SharedWork,
         Self::Queue,
         Self::Memory,
         Self::ValidationMessages,

@@ -1,6 +1,5 @@
 //! Compiles a ray tracing pipeline on all cores, by a deferred host operation of Vulkan.
 
-use std::num::NonZero;
 use std::thread;
 
 use ash::khr::deferred_host_operations::Device;
@@ -8,7 +7,7 @@ use ash::vk;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::lock::Waiting;
+use crate::threads::{cores, run_on};
 
 /// Creates the pipeline (`vkCreateRayTracingPipelinesKHR`), with as many threads as the driver and the machine have
 /// use for.
@@ -57,7 +56,6 @@ impl Operation {
     fn finish(&self) -> vk::Result {
         // SAFETY: the operation is alive until `self` is dropped.
         let useful = unsafe { self.ext.get_deferred_operation_max_concurrency(self.raw) };
-        let cores = thread::available_parallelism().map_or(1, NonZero::get);
         let join = || {
             // SAFETY: as above; any number of threads may join.
             code(unsafe { self.ext.deferred_operation_join(self.raw) })
@@ -66,7 +64,7 @@ impl Operation {
             // SAFETY: as above.
             code(unsafe { self.ext.get_deferred_operation_result(self.raw) })
         };
-        complete(cores.min(useful as usize), &join, &result)
+        complete(cores().min(useful as usize), &join, &result)
     }
 }
 
@@ -90,16 +88,7 @@ fn complete(
     join: &(impl Fn() -> vk::Result + Sync),
     result: &impl Fn() -> vk::Result,
 ) -> vk::Result {
-    let waiting = Waiting::here();
-    thread::scope(|scope| {
-        for _ in 1..threads {
-            let worker = thread::Builder::new().name("lvk compile".to_owned());
-            if worker.spawn_scoped(scope, || waiting.work(|| work(join))).is_err() {
-                break;
-            }
-        }
-        work(join);
-    });
+    run_on(threads, || work(join));
     loop {
         match result() {
             vk::Result::NOT_READY => work(join),

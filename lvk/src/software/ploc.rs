@@ -10,7 +10,8 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
 
-use super::threads::{Build, share_out};
+use super::threads::Build;
+use crate::threads::share_out;
 
 /// Rounds that look at the next neighbours only: most of what is small is paired by them.
 const NEAR_ROUNDS: usize = 2;

@@ -1,0 +1,91 @@
+//! Work that threads share. The system may give fewer than are asked for: then those that there are do all of it.
+
+use std::num::NonZero;
+use std::thread::{Builder, available_parallelism, scope};
+
+use crate::lock::{Mutex, Rank, Waiting};
+
+/// Threads that are worth having for work of any number of pieces.
+pub(crate) fn cores() -> usize {
+    available_parallelism().map_or(1, NonZero::get)
+}
+
+/// Has so many threads do the same, this one among them, or as many of them as the system gives.
+pub(crate) fn run_on(threads: usize, work: impl Fn() + Sync) {
+    run_on_made(threads, || Builder::new().name("lvk".to_owned()), work);
+}
+
+/// The others are made as `thread` says.
+fn run_on_made(threads: usize, thread: impl Fn() -> Builder, work: impl Fn() + Sync) {
+    let waiting = Waiting::here();
+    scope(|scope| {
+        for _ in 1..threads {
+            if thread().spawn_scoped(scope, || waiting.work(&work)).is_err() {
+                break;
+            }
+        }
+        work();
+    });
+}
+
+/// Has so many threads work on the items until none is left. Who is done takes the next, as items take very different times.
+pub(crate) fn share_out<T: Send>(
+    threads: usize,
+    items: impl Iterator<Item = T> + Send,
+    work: impl Fn(T) + Sync,
+) {
+    let queue = Mutex::new(Rank::SharedWork, items);
+    let next = || queue.lock().next();
+    run_on(threads, || {
+        while let Some(item) = next() {
+            work(item);
+        }
+    });
+}
+
+/// What `make` makes of each item, in their order, on all cores.
+pub(crate) fn make_all<T: Sync, R: Send>(items: &[T], make: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let mut made: Vec<Option<R>> = items.iter().map(|_| None).collect();
+    let places = items.iter().zip(&mut made);
+    share_out(cores().min(items.len()), places, |(item, place)| *place = Some(make(item)));
+    made.into_iter().flatten().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn threads_that_the_system_refuses_are_done_without() {
+        const TOO_LARGE: usize = 1 << 60;
+        let (asked, runs) = (AtomicUsize::new(0), AtomicUsize::new(0));
+        let thread = || {
+            let is_first = asked.fetch_add(1, Ordering::Relaxed) == 0;
+            Builder::new().stack_size(if is_first { 64 << 10 } else { TOO_LARGE })
+        };
+        run_on_made(7, thread, || {
+            runs.fetch_add(1, Ordering::Relaxed);
+        });
+        assert_eq!((asked.into_inner(), runs.into_inner()), (2, 2), "one is given, the next is not");
+    }
+
+    #[test]
+    fn every_item_is_worked_on_once() {
+        for threads in [0, 1, 2, 7] {
+            let mut items = vec![0_u32; 1000];
+            share_out(threads, items.chunks_mut(3), |chunk| chunk.iter_mut().for_each(|item| *item += 1));
+            assert!(items.iter().all(|item| *item == 1));
+        }
+    }
+
+    #[test]
+    fn answers_stand_in_the_order_of_the_items() {
+        for count in [0, 1, 2, 1_000_u64] {
+            let items: Vec<u64> = (0..count).collect();
+            let expected: Vec<u64> = items.iter().map(|item| item * item).collect();
+            assert_eq!(make_all(&items, |item| item * item), expected);
+        }
+    }
+}
