@@ -7,6 +7,7 @@ use lvk::*;
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::device::vulkan;
 use lvk_tests::random::Random;
+use lvk_tests::warnings::{listen, take_warnings};
 use lvk_tests::windows::{TestWindow, desktop};
 use lvk_tests::{TestDevice, device, device_with};
 
@@ -185,6 +186,28 @@ fn a_lost_surface_is_replaced() {
             assert!(message(ctx.submit(stale)).contains("made anew"));
         }
     }
+}
+
+/// Nothing waits for the window system for ever.
+#[test]
+fn a_lost_surface_is_replaced_though_a_present_never_ends() {
+    let Some((window, ctx)) = window() else { return };
+    let desc = SwapchainDesc { debug_name: "stalling window", ..Default::default() };
+    let swapchain = ctx.create_swapchain(&desc).unwrap();
+    show(&ctx, *swapchain, RED).unwrap().unwrap();
+    if !lvk::test_hooks::stall_present(&ctx, *swapchain).unwrap() {
+        return eprintln!("NOT TESTED, {} tells of no presents", ctx.capabilities().device_name);
+    }
+    listen();
+    lvk::test_hooks::lose_surface(&ctx, *swapchain).unwrap();
+    show(&ctx, *swapchain, GREEN).unwrap().unwrap();
+    assert_eq!(take_warnings("stalling window").len(), 1);
+    show_until_seen(&ctx, *swapchain, &window, BLUE);
+    // Nor does its end.
+    assert!(lvk::test_hooks::stall_present(&ctx, *swapchain).unwrap());
+    drop(swapchain);
+    ctx.wait_idle().unwrap();
+    assert_eq!(take_warnings("stalling window").len(), 1);
 }
 
 #[test]

@@ -67,6 +67,19 @@ pub fn lose_surface(ctx: &Context, swapchain: SwapchainHandle) -> Result<()> {
     swapchain.lock().course.presented(Err(Failure::SurfaceLost))
 }
 
+/// The presentation engine never says that one of the pictures that were presented last is shown, as far as the library is told.
+/// Answers whether there is one, and the device could tell.
+pub fn stall_present(ctx: &Context, swapchain: SwapchainHandle) -> Result<bool> {
+    let swapchain = ctx.shared().store.swapchains.get(swapchain)?;
+    let mut state = swapchain.lock();
+    let images = state.parts.current.iter_mut().flat_map(|current| &mut current.images);
+    let presented = images.map(|image| &mut image.sync).find(|sync| sync.presented);
+    Ok(presented.is_some_and(|sync| {
+        sync.stalls = true;
+        sync.is_over().is_some()
+    }))
+}
+
 /// How many submissions there were.
 pub fn submissions(ctx: &Context) -> u64 {
     ctx.shared().submitter.count()

@@ -7,6 +7,7 @@ use ash::vk;
 use super::course::Acquired;
 use super::decide::Failure;
 use super::desc::{ColorSpace, HdrMetadata, PresentMode};
+use super::patience::PATIENCE_NS;
 use super::surface::Surface;
 use crate::error::{Error, Result};
 use crate::format::Format;
@@ -31,9 +32,6 @@ pub(crate) struct Chain {
     pub(crate) raw: vk::SwapchainKHR,
     surface: Arc<Surface>,
 }
-
-/// A hidden window may never have an image free: the application is not to stand still for it.
-const PATIENCE_NS: u64 = 1_000_000_000;
 
 impl Chain {
     /// A new swapchain in place of `old`, which can then only present what was taken from it, also where this fails.
@@ -142,13 +140,23 @@ pub(crate) struct PresentSync {
     shown: Option<vk::Fence>,
     /// Whether it was presented since it was made.
     pub(crate) presented: bool,
+    /// Whether the engine never ends its presents, as far as the library is told.
+    #[cfg(feature = "test-hooks")]
+    pub(crate) stalls: bool,
     gpu: Arc<Gpu>,
 }
 
 impl PresentSync {
     pub(crate) fn new(gpu: &Arc<Gpu>, name: &str) -> Result<Self> {
         let drawn = new_semaphore(gpu, name)?;
-        let mut sync = Self { drawn, shown: None, presented: false, gpu: Arc::clone(gpu) };
+        let mut sync = Self {
+            drawn,
+            shown: None,
+            presented: false,
+            #[cfg(feature = "test-hooks")]
+            stalls: false,
+            gpu: Arc::clone(gpu),
+        };
         if gpu.windows()?.maintenance.is_some() {
             // SAFETY: no preconditions.
             let fence = unsafe { gpu.device.create_fence(&vk::FenceCreateInfo::default(), None) };
@@ -160,7 +168,9 @@ impl PresentSync {
     /// Readies it for the next present. The engine has given the image back since the last one, so nothing is waited for.
     pub(crate) fn reset(&self) -> Result<()> {
         let Some(fence) = self.shown.filter(|_| self.presented) else { return Ok(()) };
-        self.wait()?;
+        if !self.wait(PATIENCE_NS)? {
+            return Err(Error::vulkan("vkWaitForFences")(vk::Result::TIMEOUT));
+        }
         // SAFETY: the fence is alive and no longer in use.
         unsafe { self.gpu.device.reset_fences(&[fence]) }.map_err(Error::vulkan("vkResetFences"))
     }
@@ -174,12 +184,17 @@ impl PresentSync {
         self.shown.map(|fence| unsafe { self.gpu.device.get_fence_status(fence) }.unwrap_or(true))
     }
 
-    /// Waits until its presents are over, where the device can tell, but not for an engine that never answers.
-    pub(crate) fn wait(&self) -> Result<()> {
-        let Some(fence) = self.shown.filter(|_| self.presented) else { return Ok(()) };
+    /// Waits until its presents are over, where the device can tell, so many nanoseconds at most. Answers whether they are.
+    pub(crate) fn wait(&self, patience_ns: u64) -> Result<bool> {
+        let Some(fence) = self.shown.filter(|_| self.presented) else { return Ok(true) };
         // SAFETY: the fence is alive and belongs to a present.
-        unsafe { self.gpu.device.wait_for_fences(&[fence], true, PATIENCE_NS) }
-            .map_err(Error::vulkan("vkWaitForFences"))
+        match unsafe { self.gpu.device.wait_for_fences(&[fence], true, patience_ns) } {
+            #[cfg(feature = "test-hooks")]
+            Ok(()) if self.stalls => Ok(false),
+            Ok(()) => Ok(true),
+            Err(vk::Result::TIMEOUT) => Ok(false),
+            Err(result) => Err(Error::vulkan("vkWaitForFences")(result)),
+        }
     }
 }
 

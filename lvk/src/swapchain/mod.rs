@@ -4,5 +4,6 @@ pub(crate) mod chain;
 pub(crate) mod course;
 pub(crate) mod decide;
 pub(crate) mod desc;
+mod patience;
 pub(crate) mod state;
 pub(crate) mod surface;

@@ -6,7 +6,9 @@ use ash::vk;
 
 use super::chain::{Chain, ChainPlan, PresentSync, new_semaphore};
 use super::course::Course;
+
 use super::desc::{ColorSpace, HdrMetadata, PresentMode};
+use super::patience::wait_for_all;
 use super::surface::Surface;
 use crate::barrier::ResourceId;
 use crate::error::{Error, Result};
@@ -42,6 +44,7 @@ pub(crate) struct State {
 
 /// What the course is about.
 pub(crate) struct Parts {
+    name: Arc<str>,
     pub(crate) wishes: Wishes,
     pub(crate) window: Arc<dyn WindowHandles>,
     /// `None` only after a surface was lost and no other could be made.
@@ -84,7 +87,9 @@ struct Retired {
 
 impl Swapchain {
     pub(crate) fn new(name: &str, surface: Surface, wishes: Wishes, gpu: &Arc<Gpu>) -> Self {
+        let name: Arc<str> = Arc::from(name);
         let parts = Parts {
+            name: Arc::clone(&name),
             wishes,
             window: Arc::clone(&surface.window),
             surface: Some(Arc::new(surface)),
@@ -96,7 +101,7 @@ impl Swapchain {
             gpu: Arc::clone(gpu),
         };
         let state = Mutex::new(Rank::Swapchain, State { course: Course::new(), parts });
-        Self { name: Arc::from(name), state }
+        Self { name, state }
     }
 
     pub(crate) fn lock(&self) -> Guard<'_, State> {
@@ -143,16 +148,18 @@ impl Parts {
         self.retired.retain(|retired| !retired.is_over(completed));
     }
 
-    /// Waits until all presents are over.
+    /// Waits until all presents are over, but not for an engine that never answers.
     pub(crate) fn wait_for_presents(&self) -> Result<()> {
         let current = self.current.iter().flat_map(|current| &current.images).map(|image| &image.sync);
         let retired = self.retired.iter().flat_map(|retired| &retired.syncs);
         let mut told = true;
-        for sync in current.chain(retired) {
+        let given_up = wait_for_all(current.chain(retired), |sync, patience_ns| {
             told &= sync.is_over().is_some();
-            sync.wait()?;
-        }
-        if told {
+            sync.wait(patience_ns)
+        })?;
+        if given_up > 0 {
+            log::warn!("{}: presents that the window system never ends are given up: {given_up}", self.name);
+        } else if told {
             return Ok(());
         }
         let queue = self.gpu.queue();
@@ -160,7 +167,7 @@ impl Parts {
         unsafe { self.gpu.device.queue_wait_idle(*queue) }.map_err(Error::vulkan("vkQueueWaitIdle"))
     }
 
-    /// Destroys what was replaced. Its presents are over.
+    /// Destroys what was replaced. Its presents are over, or given up.
     pub(crate) fn clear_retired(&mut self) {
         self.retired.clear();
     }
@@ -179,7 +186,7 @@ impl Retired {
 impl Drop for Parts {
     fn drop(&mut self) {
         if let Err(error) = self.wait_for_presents() {
-            log::error!("a swapchain ends before its last pictures were shown: {error}");
+            log::error!("{}: it ends before its last pictures were shown: {error}", self.name);
         }
         let all = self.semaphores.drain(..).map(|(semaphore, _)| semaphore).chain(self.signalled.take());
         for semaphore in all {
