@@ -95,9 +95,11 @@ fn no_ray_enters_an_empty_box() {
          void main() {
              uint i = gl_LocalInvocationIndex;
              vec3 direction = vec3(uvec3(i, i / 3u, i / 9u) % 3u) - 1.0;
-             LvkSoftSlabs ray = lvkSoftSlabsOf(vec3(0.5), direction);
-             vec2 none = lvkSoftCross(ray, vec3(3.4e38), vec3(-3.4e38), vec2(0.0, 1e30), vec3(0.0));
-             vec2 around = lvkSoftCross(ray, vec3(0.0), vec3(1.0), vec2(0.0, 1e30), vec3(0.0));
+             LvkSoftSlabs ray = lvkSoftSlabsOf(vec3(0.5), direction, LVK_SOFT_LEAST);
+             vec2 none = lvkSoftCross(ray, vec3(3.4e38), vec3(-3.4e38), vec2(0.0, 1e30),
+                                      lvkSoftTouchSlack(ray, vec3(3.4e38), vec3(-3.4e38)));
+             vec2 around = lvkSoftCross(ray, vec3(0.0), vec3(1.0), vec2(0.0, 1e30),
+                                        lvkSoftTouchSlack(ray, vec3(0.0), vec3(1.0)));
              entered.at[i] = uint(none.x <= none.y) + 2u * uint(around.x <= around.y);
          }",
     );

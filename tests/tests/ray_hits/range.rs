@@ -95,33 +95,41 @@ fn a_ray_may_be_endless() -> Result<()> {
     check(&endless.chain([(0.0, f32::INFINITY), (65.0, f32::INFINITY)]).collect::<Vec<_>>())
 }
 
-/// Distances are as long as directions are short.
+/// Distances are as long as directions are short, and in the space of a large instance directions are shorter.
 #[test]
 fn directions_may_be_very_short() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
-    let turned =
-        Affine3A::from_scale_rotation_translation(Vec3::splat(0.7), Quat::from_rotation_x(0.8), Vec3::ONE);
-    let placed = vec![Placed::new(0, Affine3A::IDENTITY), Placed::new(0, turned)];
-    let scene = RayScene { placed, ..RayScene::single(Mesh::torus(8), Layout::Indexed16) };
-    let gpu = scene.upload(&ctx)?;
-    let reference = scene.reference();
-    let along_axis = (0..90).map(|i| Ray::new(Vec3::new(0.03 * i as f32 - 1.3, -4.0, 0.2), Vec3::Y));
-    let rays: Vec<_> = rays_for(&reference).into_iter().chain(along_axis).collect();
-    for length in [1e-10, 1e-6, 1e-3] {
-        let shortened = |ray: &Ray| Ray {
-            t_min: ray.t_min / length,
-            t_max: ray.t_max / length,
-            direction: ray.direction.map(|part| part * length),
-            ..*ray
-        };
-        let short: Vec<_> = rays.iter().map(shortened).collect();
-        for (method, tracer) in check.tracers() {
-            let mut records = tracer.trace(&gpu.tlas, &short, How::default())?;
-            records.iter_mut().for_each(|record| record.t *= length);
-            let what = format!("directions of {length:e} by {method:?}");
-            Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(&what);
+    for scale in [1.0, 1e6] {
+        let scaled = Affine3A::from_scale(Vec3::splat(scale));
+        let rotation = Quat::from_rotation_x(0.8);
+        let turned = Affine3A::from_scale_rotation_translation(Vec3::splat(0.7), rotation, Vec3::ONE);
+        let placed = vec![Placed::new(0, scaled), Placed::new(0, scaled * turned)];
+        let scene = RayScene { placed, ..RayScene::single(Mesh::torus(8), Layout::Indexed16) };
+        let gpu = scene.upload(&ctx)?;
+        let reference = scene.reference();
+        let across = |i: u16| Vec3::new(0.03 * f32::from(i) - 1.3, -4.0, 0.2) * scale;
+        let along_axis = (0..90).map(|i| Ray { t_max: 1e8, ..Ray::new(across(i), Vec3::Y) });
+        let rays: Vec<_> = rays_for(&reference).into_iter().chain(along_axis).collect();
+        for length in [1e-10, 1e-6, 1e-3] {
+            for (method, tracer) in check.tracers() {
+                let mut records = tracer.trace(&gpu.tlas, &shortened(&rays, length), How::default())?;
+                records.iter_mut().for_each(|record| record.t *= length);
+                let what = format!("directions of {length:e}, scaled by {scale:e}, by {method:?}");
+                Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(&what);
+            }
         }
     }
     Ok(())
+}
+
+/// Rays as long as these by directions that are so much shorter.
+fn shortened(rays: &[Ray], length: f32) -> Vec<Ray> {
+    let short = |ray: &Ray| Ray {
+        t_min: ray.t_min / length,
+        t_max: ray.t_max / length,
+        direction: ray.direction.map(|part| part * length),
+        ..*ray
+    };
+    rays.iter().map(short).collect()
 }

@@ -13,17 +13,41 @@ struct LvkSoftSlabs {
     uint octant;  // a bit for each axis the ray follows: x 4, y 2, z 1
 };
 
-LvkSoftSlabs lvkSoftSlabsOf(vec3 origin, vec3 direction) {
-    const float kLeast = 1e-18;
-    bvec3 isFlat = lessThan(abs(direction), vec3(kLeast));
-    vec3 least = mix(vec3(kLeast), vec3(-kLeast), lessThan(direction, vec3(0.0)));
+// What a component of a direction counts as at least: times to the ends of boxes, at 1e15, are finite numbers.
+#define LVK_SOFT_LEAST 1e-22
+
+// The same, as a share of the longest component.
+#define LVK_SOFT_LEAST_SHARE 1e-18
+
+float lvkSoftLongest(vec3 v) {
+    vec3 size = abs(v);
+    return max(max(size.x, size.y), size.z);
+}
+
+// What LVK_SOFT_LEAST is for a ray in the space of a structure. In that of a large instance directions are so short that it would be
+// too much of them; there it follows from how far away the structure's own corners are.
+float lvkSoftLeast(uvec2 structure, vec3 origin, vec3 direction) {
+    if (lvkSoftLongest(direction) * LVK_SOFT_LEAST_SHARE >= LVK_SOFT_LEAST) {
+        return LVK_SOFT_LEAST;
+    }
+    uvec4 a = lvkSoftBlock(LvkSoftBlocks(structure), 3u);
+    uvec4 b = lvkSoftBlock(LvkSoftBlocks(structure), 4u);
+    vec3 low = uintBitsToFloat(a.xyz), high = uintBitsToFloat(uvec3(a.w, b.xy));
+    vec3 far = max(abs(origin), max(abs(low), abs(high)));
+    return min(max(lvkSoftLongest(far), 1.0) * 1e-37, LVK_SOFT_LEAST);
+}
+
+LvkSoftSlabs lvkSoftSlabsOf(vec3 origin, vec3 direction, float least) {
+    least = max(least, lvkSoftLongest(direction) * LVK_SOFT_LEAST_SHARE);
+    bvec3 isFlat = lessThan(abs(direction), vec3(least));
+    vec3 replaced = mix(vec3(least), vec3(-least), lessThan(direction, vec3(0.0)));
     uint octant = (direction.x < 0.0 ? 0u : 4u) | (direction.y < 0.0 ? 0u : 2u) | (direction.z < 0.0 ? 0u : 1u);
-    return LvkSoftSlabs(origin, 1.0 / mix(direction, least, isFlat), octant);
+    return LvkSoftSlabs(origin, 1.0 / mix(direction, replaced, isFlat), octant);
 }
 
 // How much wider boxes must be, as the time a ray takes for it along each axis, for a share of the furthest coordinate.
 vec3 lvkSoftSlack(LvkSoftSlabs ray, vec3 far, float share) {
-    return abs(ray.inverse) * (max(max(far.x, far.y), far.z) * share);
+    return abs(ray.inverse) * (lvkSoftLongest(far) * share);
 }
 
 // Of boxes in the world: in the space of an instance the ray begins elsewhere by some roundings of its origin's coordinates.

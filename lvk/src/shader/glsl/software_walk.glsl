@@ -161,7 +161,7 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     level.flip = (flags & LVK_SOFT_FLIP_FACING) != 0u;
     level.nodes = places.x;
     level.primitives = places.y;
-    level.slabs = lvkSoftSlabsOf(origin, direction);
+    level.slabs = lvkSoftSlabsOf(origin, direction, lvkSoftLeast(level.structure, origin, direction));
     level.shear = lvkSoftShearOf(direction);
     bool isBox = level.kind == LVK_SOFT_BOXES;
     uint skip = isBox ? LVK_RAY_FLAG_SKIP_AABBS : LVK_RAY_FLAG_SKIP_TRIANGLES;
@@ -359,7 +359,7 @@ uint lvkSoftNextReference(inout LvkSoftPlace place) {
 // The next leaf of the top level that the ray meets, from a node on; LVK_SOFT_NONE where none is left.
 uint lvkSoftDescend(LvkSoftState state, inout LvkSoftPlace place, uint reference) {
     LvkSoftBlocks tlas = LvkSoftBlocks(state.tlas);
-    LvkSoftSlabs slabs = lvkSoftSlabsOf(state.origin, state.direction);
+    LvkSoftSlabs slabs = lvkSoftSlabsOf(state.origin, state.direction, LVK_SOFT_LEAST);
     vec3 slack = lvkSoftWorldSlack(slabs);
     uint nodes = tlas.at[1].x;
     while ((reference & LVK_SOFT_LEAF) == 0u) {
