@@ -32,8 +32,10 @@ LvkSoftShear lvkSoftShearOf(vec3 direction) {
     shear.alongX = size.x >= size.y && size.x >= size.z;
     shear.alongZ = !shear.alongX && size.z > size.y;
     vec3 turned = lvkSoftTurn(shear, direction);
-    shear.scale = 1.0 / turned.z;
-    shear.lean = turned.xy * shear.scale;
+    precise float scale = 1.0 / turned.z; // as the ray's place in lvkSoftTransform
+    precise vec2 lean = turned.xy * scale;
+    shear.scale = scale;
+    shear.lean = lean;
     return shear;
 }
 

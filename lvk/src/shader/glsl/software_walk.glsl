@@ -118,8 +118,14 @@ mat3x4 lvkSoftRows(uvec2 base, uint first) {
                   uintBitsToFloat(lvkSoftBlock(blocks, first + 2u)));
 }
 
-// Three rows of a matrix by a vector.
-vec3 lvkSoftTransform(mat3x4 rows, vec4 v) { return vec3(dot(rows[0], v), dot(rows[1], v), dot(rows[2], v)); }
+// Three rows of a matrix by a vector. A ray that goes on in an instance it has left must be the same to the bit, so compilers may
+// not do it in other ways in other places.
+vec3 lvkSoftTransform(mat3x4 rows, vec4 v) {
+    mat4x3 columns = transpose(rows);
+    precise vec3 last = columns[3] * v.w;
+    precise vec3 moved = fma(columns[0], v.xxx, fma(columns[1], v.yyy, fma(columns[2], v.zzz, last)));
+    return moved;
+}
 
 // Where the instances of the structure that is traced lie.
 uvec2 lvkSoftInstances(LvkSoftState state) {
