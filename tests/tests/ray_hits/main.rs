@@ -4,6 +4,7 @@ mod anywhere;
 mod boxes;
 mod far;
 mod flags;
+mod generated;
 mod inactive;
 mod meshes;
 mod position_fetch;

@@ -19,7 +19,7 @@
 #define lvkRayQueryProceed(rq) rayQueryProceedEXT(rq)
 // Ends the walk; what was committed stays.
 #define lvkRayQueryTerminate(rq) rayQueryTerminateEXT(rq)
-// Commits the candidate box at distance `t`.
+// Commits the candidate box at distance `t`, within the range that is left.
 #define lvkRayQueryGenerateIntersection(rq, t) rayQueryGenerateIntersectionEXT(rq, t)
 // Commits the candidate triangle.
 #define lvkRayQueryConfirmIntersection(rq) rayQueryConfirmIntersectionEXT(rq)

@@ -12,6 +12,8 @@
 // `which` is LVK_CANDIDATE (inside the loop) or LVK_COMMITTED (the closest hit so far), written as a constant.
 // Where the type of the committed hit is LVK_COMMITTED_NONE, ask for nothing else of it: a device may answer anything. The
 // library's own walk answers the ray's tMax as the distance, and zeros.
+// lvkRayQueryGenerateIntersection wants a distance from the ray's tMin to the closest hit so far, or to tMax where there is none,
+// both included: compare before, as a device may do anything with others. The library's own walk leaves them out.
 // `rq` and `which` may be evaluated more than once or not at all: pass plain names.
 //
 // A module whose rays take all triangles for opaque and meet no boxes defines LVK_OPAQUE_TRIANGLES_ONLY before the include:

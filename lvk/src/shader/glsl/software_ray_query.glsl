@@ -124,7 +124,7 @@ void lvkSoftPositions(LvkSoftState state, LvkSoftHit hit, out vec3 positions[3])
 #endif
 // Ends the walk; what was committed stays.
 #define lvkRayQueryTerminate(rq) lvkSoftFinish((rq).state.place)
-// Commits the candidate box at distance `t`.
+// Commits the candidate box at distance `t`, within the range that is left.
 #define lvkRayQueryGenerateIntersection(rq, t) lvkSoftGenerate((rq).state, t)
 // Commits the candidate triangle.
 #define lvkRayQueryConfirmIntersection(rq) lvkSoftConfirm((rq).state)

@@ -1,0 +1,79 @@
+//! Hits of boxes that shaders generate by query: at the ends of the ray, and beside them, which only the library's own walk answers.
+
+use lvk::glam::{Affine3A, Vec3};
+use lvk::{
+    Aabbs, BlasDesc, BlasGeometry, BufferDesc, BufferUsage, ComputePipelineDesc, Context, GeometryFlags,
+    RayQueryPath, Result, ShaderStage, TlasDesc,
+};
+use lvk_tests::device;
+use lvk_tests::ray_scene::{Placed, instances};
+use lvk_tests::ray_tracer::{How, MISSED, RayTracer, shader_with};
+use lvk_tests::rays::Ray;
+
+/// Generates hits at two distances in turn.
+const TEXT: &str = r#"
+    #include <lvk/ray_query.glsl>
+    #include "ray_records.glsl"
+    layout(local_size_x = 64) in;
+    void main() {
+        uint index = gl_GlobalInvocationID.x;
+        if (index >= count) {
+            return;
+        }
+        Ray ray = rays.at[index];
+        LvkRayQuery rq;
+        lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
+        while (lvkRayQueryProceed(rq)) {
+            lvkRayQueryGenerateIntersection(rq, FIRST);
+            lvkRayQueryGenerateIntersection(rq, SECOND);
+        }
+        HitRecord record = kNoHit;
+        if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_GENERATED) {
+            record.kind = 1u;
+            record.t = lvkRayQueryT(rq, LVK_COMMITTED);
+        }
+        hits.at[index] = record;
+    }"#;
+
+/// Where rays with these ends hit a box in which hits are generated at `reports` in turn.
+fn hits(ctx: &Context, reports: [f32; 2], ends: &[(f32, f32)]) -> Result<Vec<Option<f32>>> {
+    let [first, second] = reports.map(|t| format!("{t:?}"));
+    let module = shader_with(ctx, ShaderStage::Compute, TEXT, &[("FIRST", &first), ("SECOND", &second)])?;
+    let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
+    let tracer = RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?);
+    let corners = [[-1.0, -1.0, 0.0], [1.0, 1.0, 20.0_f32]];
+    let (data, usage) = (Some(bytemuck::cast_slice(&corners)), BufferUsage::ACCEL_INPUT);
+    let buffer = ctx.create_buffer(&BufferDesc { data, usage, ..Default::default() })?;
+    let flags = GeometryFlags::OPAQUE;
+    let geometries = [BlasGeometry::Aabbs(Aabbs { buffer: *buffer, offset: 0, stride: 0, count: 1, flags })];
+    let model = [ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?];
+    let placed = instances(&[Placed::new(0, Affine3A::IDENTITY)], &model);
+    let tlas = ctx.create_tlas(&TlasDesc { instances: &placed, ..Default::default() })?;
+    let ray = |(t_min, t_max): &(f32, f32)| Ray {
+        t_min: *t_min,
+        t_max: *t_max,
+        ..Ray::new(Vec3::new(0.25, 0.5, -1.0), Vec3::Z)
+    };
+    let records = tracer.trace(&tlas, &ends.iter().map(ray).collect::<Vec<_>>(), How::default())?;
+    Ok(records.iter().map(|record| (record.kind != MISSED).then_some(record.t)).collect())
+}
+
+#[test]
+fn a_generated_hit_within_the_ray_counts_its_ends_included() -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    if !ctx.capabilities().ray_query {
+        eprintln!("NOT TESTED, {} has no ray queries", ctx.capabilities().device_name);
+        return Ok(());
+    }
+    let (before, after) = (4.0_f32.next_down(), 4.0_f32.next_up());
+    let around = [(4.0, 10.0), (0.0, 4.0), (4.0, 4.0), (before, after)];
+    assert_eq!(hits(&ctx, [4.0, 4.0], &around)?, [Some(4.0); 4]);
+    assert_eq!(hits(&ctx, [4.0, 2.0], &[(0.0, 10.0), (2.0, 4.0)])?, [Some(2.0); 2], "a nearer one");
+    if ctx.capabilities().ray_query_path != RayQueryPath::Software {
+        return Ok(());
+    }
+    assert_eq!(hits(&ctx, [4.0, 4.0], &[(after, 10.0), (0.0, before)])?, [None; 2]);
+    assert_eq!(hits(&ctx, [2.0, 4.0], &[(0.0, 10.0), (0.0, 2.0)])?, [Some(2.0); 2], "behind another");
+    assert_eq!(hits(&ctx, [2.0, 4.0], &[(after, 10.0), (3.0, 10.0)])?, [None, Some(4.0)]);
+    Ok(())
+}
