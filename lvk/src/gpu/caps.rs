@@ -103,6 +103,8 @@ pub struct Capabilities {
     /// Arrays that helper invocations of fragment shaders write keep nothing (lavapipe): there, ray queries in software see
     /// nothing in helper invocations.
     pub helpers_lose_arrays: bool,
+    /// Who made the driver (`VkPhysicalDeviceVulkan12Properties::driverID`); 0 below Vulkan 1.2.
+    pub driver_id: vk::DriverId,
     /// What stands behind each queue, in the order of [`Queue::ALL`]; [`queue`](Self::queue) asks for one.
     pub queues: [QueueInfo; 3],
     /// The numbers behind the limits.
@@ -338,6 +340,7 @@ impl PhysicalDevice {
         caps.driver_info = v12.driver_info_as_c_str().map(to_string).unwrap_or_default();
         caps.max_anisotropy = plain.limits.max_sampler_anisotropy;
         caps.prefers_spatial_order = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
+        caps.driver_id = v12.driver_id;
         caps.helpers_lose_arrays = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.limits = Limits::of(&plain.limits, &v12, &v13, &accel, &pipeline);
         caps.limits.mesh = MeshLimits::of(&mesh);

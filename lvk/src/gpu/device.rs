@@ -9,6 +9,7 @@ use super::budget::HeapUse;
 use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
 use super::clock::HostClock;
 use super::descriptor_limits::DescriptorLimits;
+use super::device_changes::change_devices;
 use super::extra::ExtraExtensions;
 use super::features::Features;
 use super::foreign::RawContext;
@@ -102,7 +103,7 @@ impl Gpu {
             Ok(memory) => memory,
             Err(error) => {
                 // SAFETY: nothing was made from the device yet.
-                unsafe { device.destroy_device(None) };
+                change_devices(caps.driver_id, || unsafe { device.destroy_device(None) });
                 return Err(error);
             }
         };
@@ -291,7 +292,8 @@ impl Drop for Gpu {
             return;
         }
         // SAFETY: everything made from the device is gone: the context destroys its objects before its `Gpu`.
-        unsafe { self.device.destroy_device(None) };
+        let destroy = || unsafe { self.device.destroy_device(None) };
+        change_devices(self.caps.driver_id, destroy);
     }
 }
 
@@ -428,7 +430,8 @@ fn create(
         .enabled_extension_names(&names)
         .push_next(&mut all);
     // SAFETY: every pointer in `info` lives until the end of this function; the caller vouches for its own chain.
-    let device = unsafe { instance.raw.create_device(chosen.raw, &info, None) }?;
+    let make = || unsafe { instance.raw.create_device(chosen.raw, &info, None) };
+    let device = change_devices(caps.driver_id, make)?;
     Ok((device, features))
 }
 

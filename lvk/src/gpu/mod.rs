@@ -6,6 +6,7 @@ pub(crate) mod clock;
 pub(crate) mod debug;
 pub(crate) mod descriptor_limits;
 pub(crate) mod device;
+pub(crate) mod device_changes;
 pub(crate) mod extensions;
 pub(crate) mod extra;
 #[cfg(feature = "test-hooks")]

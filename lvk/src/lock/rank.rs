@@ -67,6 +67,8 @@ pub(crate) enum Rank {
     Queue,
     /// Device memory.
     Memory,
+    /// Devices that come and go, beside ray tracing pipelines that do: of a driver that locks up over them.
+    DeviceChanges,
     /// Messages of the validation layer, which come while Vulkan is called: under any other lock.
     ValidationMessages,
 }
@@ -74,7 +76,7 @@ pub(crate) enum Rank {
 #[cfg(debug_assertions)]
 impl Rank {
     /// All of them, in their order.
-    pub(super) const ALL: [Self; 30] = [
+    pub(super) const ALL: [Self; 31] = [
         Self::Swapchain,
         Self::Compactions,
         Self::Pending,
@@ -104,6 +106,7 @@ impl Rank {
         Self::SharedWork,
         Self::Queue,
         Self::Memory,
+        Self::DeviceChanges,
         Self::ValidationMessages,
     ];
 

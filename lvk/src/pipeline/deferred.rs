@@ -7,6 +7,7 @@ use ash::vk;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::device_changes::beside_devices;
 use crate::threads::{cores, run_on};
 
 /// Creates the pipeline (`vkCreateRayTracingPipelinesKHR`), with as many threads as the driver and the machine have
@@ -27,12 +28,13 @@ pub(crate) unsafe fn compile(
     let mut raw = vk::Pipeline::null();
     // SAFETY: the caller vouches for the description. It and `raw` stay where they are until the driver is done with
     // them, since `finish` returns no sooner.
-    let started = unsafe { create(ext.device(), deferred, cache, 1, info, std::ptr::null(), &raw mut raw) };
-    let result = match (started, &operation) {
+    let mut start =
+        || unsafe { create(ext.device(), deferred, cache, 1, info, std::ptr::null(), &raw mut raw) };
+    let result = beside_devices(gpu.caps.driver_id, || match (start(), &operation) {
         (vk::Result::OPERATION_DEFERRED_KHR, Some(operation)) => operation.finish(),
         (vk::Result::OPERATION_NOT_DEFERRED_KHR, _) => vk::Result::SUCCESS,
         (result, _) => result,
-    };
+    });
     result.result().map_err(Error::vulkan("vkCreateRayTracingPipelinesKHR"))?;
     Ok(raw)
 }

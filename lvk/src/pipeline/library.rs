@@ -11,6 +11,7 @@ use super::shader_module::ShaderModule;
 use super::stage::SpecializationConstant;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::gpu::device_changes::beside_devices;
 use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;
 
@@ -171,6 +172,7 @@ impl RayTracingLibrary {
 impl Drop for RayTracingLibrary {
     fn drop(&mut self) {
         // SAFETY: pipelines linked from the library hold it.
-        unsafe { self.gpu.device.destroy_pipeline(self.raw, None) };
+        let destroy = || unsafe { self.gpu.device.destroy_pipeline(self.raw, None) };
+        beside_devices(self.gpu.caps.driver_id, destroy);
     }
 }

@@ -15,6 +15,7 @@ use super::stage::{Specialization, SpecializationConstant, stage};
 use super::table_order::{PerRegion, table_order};
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
+use crate::gpu::device_changes::beside_devices;
 use crate::gpu::limits::Limits;
 use crate::handle::{RayTracingLibraryHandle, ShaderModuleHandle};
 use crate::resource::Buffer;
@@ -212,7 +213,8 @@ impl RayTracingPipeline {
 impl Drop for RayTracingPipeline {
     fn drop(&mut self) {
         // SAFETY: the owner has waited until the GPU is done with the pipeline.
-        unsafe { self.gpu.device.destroy_pipeline(self.raw, None) };
+        let destroy = || unsafe { self.gpu.device.destroy_pipeline(self.raw, None) };
+        beside_devices(self.gpu.caps.driver_id, destroy);
     }
 }
 

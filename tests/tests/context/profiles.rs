@@ -224,7 +224,14 @@ fn optional_features_are_those_of_the_device() {
             has(&ctx, command) || !there || feature == OptionalFeature::CalibratedTimestamps,
             "{feature:?}"
         );
-        let hidden = FeatureSet::NONE.with(feature);
+        // Where the device has others of its extension, that stays on for them.
+        let others = match feature {
+            OptionalFeature::PipelineShadingRate => {
+                &[OptionalFeature::PrimitiveShadingRate, OptionalFeature::AttachmentShadingRate][..]
+            }
+            _ => &[],
+        };
+        let hidden = others.iter().fold(FeatureSet::NONE.with(feature), |set, other| set.with(*other));
         let profile = DeviceProfile { hidden, ..DeviceProfile::default() };
         let Some(ctx) = under(&profile) else { return };
         assert!(!ctx.capabilities().has(feature) && !has(&ctx, command), "{feature:?}");

@@ -1,0 +1,66 @@
+//! What must not happen at once, on whatever devices of the process.
+//!
+//! NVIDIA's driver (580.159.04) locks up where one thread makes or destroys a device and another one makes or destroys a ray
+//! tracing pipeline: each waits for a lock of the driver that the other one has. So there devices come and go alone.
+
+use ash::vk;
+
+use crate::lock::{Rank, RwLock};
+
+static DEVICE_CHANGES: RwLock<()> = RwLock::new(Rank::DeviceChanges, ());
+
+/// Makes or destroys a device of this driver.
+pub(super) fn change_devices<R>(driver: vk::DriverId, change: impl FnOnce() -> R) -> R {
+    let _alone = needs_turns(driver).then(|| DEVICE_CHANGES.write());
+    change()
+}
+
+/// Makes or destroys a ray tracing pipeline of this driver.
+pub(crate) fn beside_devices<R>(driver: vk::DriverId, change: impl FnOnce() -> R) -> R {
+    let _beside_others = needs_turns(driver).then(|| DEVICE_CHANGES.read());
+    change()
+}
+
+/// Where debug assertions are on, any driver: so tests see on each that the lock is taken in its order.
+fn needs_turns(driver: vk::DriverId) -> bool {
+    cfg!(debug_assertions) || driver == vk::DriverId::NVIDIA_PROPRIETARY
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Barrier;
+    use std::sync::atomic::{AtomicU32, Ordering};
+    use std::thread;
+
+    use super::*;
+
+    const NVIDIA: vk::DriverId = vk::DriverId::NVIDIA_PROPRIETARY;
+
+    #[test]
+    fn pipelines_are_made_side_by_side() {
+        let together = Barrier::new(2);
+        thread::scope(|scope| {
+            for _ in 0..2 {
+                scope.spawn(|| beside_devices(NVIDIA, || together.wait()));
+            }
+        });
+    }
+
+    #[test]
+    fn no_pipeline_is_made_while_a_device_comes_or_goes() {
+        let made = AtomicU32::new(0);
+        let make = || {
+            made.fetch_add(1, Ordering::SeqCst);
+            thread::yield_now();
+            made.fetch_sub(1, Ordering::SeqCst);
+        };
+        thread::scope(|scope| {
+            for _ in 0..3 {
+                scope.spawn(|| (0..500).for_each(|_| beside_devices(NVIDIA, make)));
+            }
+            for _ in 0..500 {
+                assert_eq!(change_devices(NVIDIA, || made.load(Ordering::SeqCst)), 0);
+            }
+        });
+    }
+}
