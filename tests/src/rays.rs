@@ -37,7 +37,7 @@ pub fn camera_rays(side: u32, eye: Vec3, target: Vec3) -> Vec<Ray> {
 }
 
 /// Rays from around and inside of a box towards points of it. Their directions are half to twice unit length; a
-/// third each start late, end early, and do neither.
+/// third each start late, end early, and do neither. Those that do not end early reach through the box.
 pub fn random_rays(seed: u64, count: usize, low: Vec3, high: Vec3) -> Vec<Ray> {
     let mut random = Random::new(seed);
     let (center, reach) = ((low + high) * 0.5, (high - low).length());
@@ -45,6 +45,7 @@ pub fn random_rays(seed: u64, count: usize, low: Vec3, high: Vec3) -> Vec<Ray> {
         let origin = center + random.direction() * random.between(0.1, 1.2) * reach;
         let way = random.point(low, high) - origin;
         let ray = Ray::new(origin, way.normalize_or(Vec3::X) * random.between(0.5, 2.0));
+        let ray = Ray { t_max: ray.t_max.max(4.0 * reach), ..ray };
         let limit = random.between(0.1, 1.0) * reach;
         match kind % 3 {
             0 => Ray { t_min: limit, ..ray },
