@@ -126,15 +126,10 @@ impl DescriptorRoom {
 /// # Errors
 /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where not even one texture fits beside the dummy.
 pub(crate) fn fitting(wanted: u32, fits: impl Fn(u32) -> bool) -> Result<u32> {
-    let mut textures = wanted;
-    while textures >= FEWEST_TEXTURES {
-        if fits(textures) {
-            return Ok(textures);
-        }
-        textures = if textures > FEWEST_TEXTURES { (textures / 2).max(FEWEST_TEXTURES) } else { 0 };
-    }
-    check_limit(OBJECT, "number of textures", FEWEST_TEXTURES.into(), 0)?;
-    Ok(0)
+    let half = |textures: &u32| (*textures > FEWEST_TEXTURES).then(|| (textures / 2).max(FEWEST_TEXTURES));
+    let found = std::iter::successors(Some(wanted), half).find(|textures| fits(*textures)).unwrap_or(0);
+    check_limit(OBJECT, "number of textures", FEWEST_TEXTURES.into(), found.into())?;
+    Ok(found)
 }
 
 #[cfg(test)]

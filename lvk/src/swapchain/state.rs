@@ -6,7 +6,6 @@ use ash::vk;
 
 use super::chain::{Chain, ChainPlan, PresentSync, new_semaphore};
 use super::course::Course;
-
 use super::desc::{ColorSpace, HdrMetadata, PresentMode};
 use super::patience::wait_for_all;
 use super::surface::Surface;
