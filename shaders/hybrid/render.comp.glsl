@@ -13,10 +13,10 @@ void main() {
     }
 }
 #else
-layout(local_size_x = 8, local_size_y = 8) in;
+#include "common/group_pixel.glsl"
 
 void main() {
-    uvec2 pixel = uvec2(gl_GlobalInvocationID.x, first + gl_GlobalInvocationID.y);
+    uvec2 pixel = groupPixel() + uvec2(0u, first);
     if (pixel.x < frame.camera.width && pixel.y < end) {
         renderPixel(pixel);
     }

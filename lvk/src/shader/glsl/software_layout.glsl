@@ -6,6 +6,7 @@
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer LvkSoftBlocks { uvec4 at[]; };
 #ifdef LVK_GATHERS_PAIRS
 layout(buffer_reference, scalar, buffer_reference_align = 16) readonly buffer LvkSoftPairs { u64vec2 at[]; };
+layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer LvkSoftPair { uint64_t at; };
 #endif
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LvkSoftVertices { vec3 at[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer LvkSoftTriples { uvec3 at[]; };
@@ -93,5 +94,26 @@ uvec2 lvkSoftBehind(uvec2 base, uint blocks) {
     uint low = uaddCarry(base.x, blocks << 4, carry);
     return uvec2(low, base.y + (blocks >> 28) + carry);
 }
+
+// Where nodes or primitives begin, as an address that one of them is soon found from.
+#ifdef LVK_GATHERS_PAIRS
+#define LvkSoftItems uint64_t
+LvkSoftItems lvkSoftItems(uvec2 structure, uint first) {
+    return packUint2x32(structure) + uint64_t(first) * 16ul;
+}
+
+LvkSoftBlocks lvkSoftItem(LvkSoftItems items, uint item, uint blocks) {
+    return LvkSoftBlocks(unpackUint2x32(items + uint64_t(item) * uint64_t(blocks * 16u)));
+}
+#else
+#define LvkSoftItems uvec2
+LvkSoftItems lvkSoftItems(uvec2 structure, uint first) {
+    return lvkSoftBehind(structure, first);
+}
+
+LvkSoftBlocks lvkSoftItem(LvkSoftItems items, uint item, uint blocks) {
+    return LvkSoftBlocks(lvkSoftBehind(items, item * blocks));
+}
+#endif
 
 #endif

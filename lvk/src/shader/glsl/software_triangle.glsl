@@ -39,8 +39,8 @@ LvkSoftShear lvkSoftShearOf(vec3 direction) {
     return shear;
 }
 
-// Whether the ray's line passes the triangle, and where.
-bool lvkSoftPasses(LvkSoftShear ray, vec3 origin, vec3 corners[3], out LvkSoftPassage passage) {
+// Twice the areas between the ray's line and the edges, as seen along it; `lengths` of the corners along the ray's longest axis.
+vec3 lvkSoftAreas(LvkSoftShear ray, vec3 origin, vec3 corners[3], out vec3 lengths) {
     precise vec3 p = lvkSoftTurn(ray, corners[0] - origin);
     precise vec3 q = lvkSoftTurn(ray, corners[1] - origin);
     precise vec3 r = lvkSoftTurn(ray, corners[2] - origin);
@@ -49,6 +49,29 @@ bool lvkSoftPasses(LvkSoftShear ray, vec3 origin, vec3 corners[3], out LvkSoftPa
     precise vec2 rf = fma(-ray.lean, r.zz, r.xy);
     precise vec3 areas =
         vec3(qf.x * rf.y - qf.y * rf.x, rf.x * pf.y - rf.y * pf.x, pf.x * qf.y - pf.y * qf.x);
+    lengths = vec3(p.z, q.z, r.z);
+    return areas;
+}
+
+// What of the whole each area is; first of all, as areas by lengths would leave the range of floats.
+vec3 lvkSoftShares(vec3 areas, float whole) {
+    return areas * (1.0 / whole);
+}
+
+float lvkSoftDistance(LvkSoftShear ray, vec3 shares, vec3 lengths) {
+    return (shares.x * lengths.x + shares.y * lengths.y + shares.z * lengths.z) * ray.scale;
+}
+
+// Whether the ray sees the front of a triangle whose areas come to `whole`.
+bool lvkSoftIsFront(LvkSoftShear ray, float whole) {
+    bool mirrors = !ray.alongX && !ray.alongZ;
+    return ((whole < 0.0) == (ray.scale > 0.0)) != mirrors;
+}
+
+// Whether the ray's line passes the triangle, and where.
+bool lvkSoftPasses(LvkSoftShear ray, vec3 origin, vec3 corners[3], out LvkSoftPassage passage) {
+    vec3 lengths;
+    vec3 areas = lvkSoftAreas(ray, origin, corners, lengths);
     float whole = areas.x + areas.y + areas.z;
     float least = min(min(areas.x, areas.y), areas.z);
     float most = max(max(areas.x, areas.y), areas.z);
@@ -56,11 +79,10 @@ bool lvkSoftPasses(LvkSoftShear ray, vec3 origin, vec3 corners[3], out LvkSoftPa
     if (!kLvkSoftIsCpu && !passes) { // a CPU loses more by a branch that it guesses wrong than by the rest
         return false;
     }
-    vec3 shares = areas * (1.0 / whole); // first, as areas by lengths would leave the range of floats
-    passage.t = (shares.x * p.z + shares.y * q.z + shares.z * r.z) * ray.scale;
+    vec3 shares = lvkSoftShares(areas, whole);
+    passage.t = lvkSoftDistance(ray, shares, lengths);
     passage.barycentrics = shares.yz;
-    bool mirrors = !ray.alongX && !ray.alongZ;
-    passage.front = ((whole < 0.0) == (ray.scale > 0.0)) != mirrors;
+    passage.front = lvkSoftIsFront(ray, whole);
     return passes;
 }
 

@@ -7,6 +7,11 @@
 #include <lvk/software_layout.glsl>
 #include <lvk/software_stack.glsl>
 #include <lvk/software_triangle.glsl>
+#ifdef LVK_DEVICE_IS_CPU
+#include <lvk/software_cpu_node.glsl>
+#else
+#include <lvk/software_wide_node.glsl>
+#endif
 
 // LvkSoftHit.kind of candidates. Committed ones have LVK_COMMITTED_*.
 #define LVK_SOFT_CANDIDATE_TRIANGLE 0u
@@ -148,6 +153,7 @@ uvec2 lvkSoftStructureOf(uvec2 named, out uvec4 head) {
 uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSoftLevel level) {
     uint first = instance * LVK_SOFT_INSTANCE_BLOCKS;
     uvec4 numbers = lvkSoftBlock(LvkSoftBlocks(instances), first + 6u);
+    uint entry = lvkSoftBlock(LvkSoftBlocks(instances), first + 7u).y;
     mat3x4 rows = lvkSoftRows(instances, first);
     vec3 origin = lvkSoftTransform(rows, vec4(state.origin, 1.0));
     vec3 direction = lvkSoftTransform(rows, vec4(state.direction, 0.0));
@@ -174,7 +180,6 @@ uint lvkSoftEnter(LvkSoftState state, uvec2 instances, uint instance, out LvkSof
     bool skipped = (state.flags & skip) != 0u || (isBox && !kLvkSoftHasCandidates);
     bool culled = level.opacity != LVK_SOFT_EACH && lvkSoftIsCulled(state.flags, level.opacity == LVK_SOFT_OPAQUE);
     // A part of it, unless the structure has moved, which has others.
-    uint entry = LvkSoftBlocks(instances).at[first + 7u].y;
     uint start = entry != 0u && level.structure == numbers.xy ? entry : head.z;
     return culled || skipped ? LVK_SOFT_NONE : start;
 }
@@ -195,7 +200,14 @@ void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
         if (place.group.y >= LVK_SOFT_ANY_NODE) {
             lvkSoftPushGroup(place.top, place.group);
         }
-        uvec4 met = lvkSoftMeet8(level.slabs, LvkSoftBlocks(level.structure), level.nodes, node, range);
+#ifdef LVK_DEVICE_IS_CPU
+        LvkSoftItems nodes = lvkSoftItems(level.structure, level.nodes);
+        uvec4 met = lvkSoftMeet8(level.slabs, lvkSoftOrderOf(level.slabs),
+                                 lvkSoftItem(nodes, node, LVK_SOFT_WIDE_NODE_BLOCKS), range);
+#else
+        uint first = level.nodes + node * LVK_SOFT_WIDE_NODE_BLOCKS;
+        uvec4 met = lvkSoftMeet8(level.slabs, LvkSoftBlocks(level.structure), first, range);
+#endif
         place.group = met.xy;
         place.leaves = met.zw;
     } else {
@@ -249,7 +261,18 @@ uvec4 lvkSoftNames(uvec2 structure, uint primitives, uint kind, uint primitive) 
     return uvec4(leaf.xy & LVK_SOFT_NAME, rest.x | rest.y << LVK_SOFT_REST_BITS, leaf.z);
 }
 
-// The corners of a triangle, and in its last three words what its leaf says besides.
+// The corners of a triangle whose leaf begins with block `first`, and in its last three words what the leaf says besides.
+void lvkSoftReadTriangle(LvkSoftBlocks blocks, uint first, out vec3 corners[3], out uvec3 words) {
+    uvec4 a = lvkSoftBlock(blocks, first);
+    uvec4 b = lvkSoftBlock(blocks, first + 1u);
+    uvec4 c = lvkSoftBlock(blocks, first + 2u);
+    corners[0] = uintBitsToFloat(a.xyz);
+    corners[1] = uintBitsToFloat(b.xyz);
+    corners[2] = uintBitsToFloat(c.xyz);
+    words = uvec3(a.w, b.w, c.w);
+}
+
+// The same of any kind of leaf.
 void lvkSoftCorners(uvec2 structure, uint primitives, uint kind, uint primitive, out vec3 corners[3],
                     out uvec3 words) {
     LvkSoftBlocks blocks = LvkSoftBlocks(structure);
@@ -262,13 +285,7 @@ void lvkSoftCorners(uvec2 structure, uint primitives, uint kind, uint primitive,
         words = uvec3(vertices.w, 0u, 0u);
     } else {
         uint first = lvkSoftBegin(blocks, primitives + primitive * LVK_SOFT_TRIANGLE_BLOCKS);
-        uvec4 a = lvkSoftBlock(blocks, first);
-        uvec4 b = lvkSoftBlock(blocks, first + 1u);
-        uvec4 c = lvkSoftBlock(blocks, first + 2u);
-        corners[0] = uintBitsToFloat(a.xyz);
-        corners[1] = uintBitsToFloat(b.xyz);
-        corners[2] = uintBitsToFloat(c.xyz);
-        words = uvec3(a.w, b.w, c.w);
+        lvkSoftReadTriangle(blocks, first, corners, words);
     }
 }
 

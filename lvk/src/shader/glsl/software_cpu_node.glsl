@@ -1,0 +1,98 @@
+#ifndef LVK_SOFTWARE_CPU_NODE_GLSL
+#define LVK_SOFTWARE_CPU_NODE_GLSL
+
+#include <lvk/software_boxes.glsl>
+
+// A ray against the boxes of a wide node, as <lvk/software_wide_node.glsl> does it on GPUs. What counts on a CPU is how many
+// instructions there are, above all those that only the unit that adds and multiplies has: conversions, minima and maxima.
+
+// Where along each axis the planes lie that a ray enters by: bytes from a node's start, or with blocks of 16 bytes whether they are
+// the first half of a block. The planes it leaves by are the other half.
+#ifdef LVK_GATHERS_PAIRS
+#define LvkSoftOrder u64vec3
+LvkSoftOrder lvkSoftOrderOf(LvkSoftSlabs ray) {
+    return u64vec3((ray.octant & 4u) != 0u ? 32ul : 40ul, (ray.octant & 2u) != 0u ? 48ul : 56ul,
+                   (ray.octant & 1u) != 0u ? 64ul : 72ul);
+}
+
+// Of eight children, in two words, the planes of the axis whose block is named.
+void lvkSoftPlanes(LvkSoftBlocks node, uint block, uint64_t order, out uvec2 near, out uvec2 far) {
+    uint64_t start = packUint2x32(uvec2(node));
+    near = unpackUint2x32(LvkSoftPair(start + order).at);
+    far = unpackUint2x32(LvkSoftPair(start + (uint64_t(block) * 32ul + 8ul - order)).at);
+}
+#else
+#define LvkSoftOrder bvec3
+LvkSoftOrder lvkSoftOrderOf(LvkSoftSlabs ray) {
+    return bvec3((ray.octant & 4u) != 0u, (ray.octant & 2u) != 0u, (ray.octant & 1u) != 0u);
+}
+
+void lvkSoftPlanes(LvkSoftBlocks node, uint block, bool order, out uvec2 near, out uvec2 far) {
+    uvec4 planes = node.at[block];
+    near = order ? planes.xy : planes.zw;
+    far = order ? planes.zw : planes.xy;
+}
+#endif
+
+// Planes of a child, bytes in each word, as numbers without a conversion: as bits of numbers from 1 to 2, of which they are
+// steps of 1 / 32768.
+vec3 lvkSoftSteps(uvec3 words, uint child) {
+    uvec3 moved = child == 0u ? words << 8 : words >> (child - 8u);
+    return uintBitsToFloat(moved & 0xFF00u | 0x3F800000u);
+}
+
+// The last of the distances at which a ray enters, or any negative one if all are; compare lvkSoftLast.
+float lvkSoftLastEntry(vec3 enter) {
+    ivec3 all = floatBitsToInt(enter);
+    return intBitsToFloat(max(max(all.x, all.y), all.z));
+}
+
+// The first of the distances at which it leaves; any negative one if there are such.
+float lvkSoftFirstExit(vec3 leave) {
+    ivec3 all = floatBitsToInt(leave);
+    return intBitsToFloat(min(min(all.x, all.y), all.z));
+}
+
+// Bits moved to the left, those that leave there coming in again at the right. Of `by` the lowest five bits count, so nothing has to
+// clear what is above them.
+uint lvkSoftRotate(uint bits, uint by) {
+    return bits << (by & 31u) | bits >> (-by & 31u);
+}
+
+// Of four children of a wide node, those the ray meets, as bits at their places. `start` and `end` are of the step 1.
+uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, vec3 start, vec3 end, vec2 range) {
+    uint met = 0u;
+    [[unroll]] for (uint child = 0u; child < 32u; child += 8u) {
+        float enter = lvkSoftLastEntry(lvkSoftSteps(near, child) * scale + start);
+        float leave = lvkSoftFirstExit(lvkSoftSteps(far, child) * scale + end);
+        bool meets = enter <= leave && enter <= range.y && leave >= range.x;
+        met |= meets ? lvkSoftRotate(counts >> child & 7u, places >> child) : 0u;
+    }
+    return met;
+}
+
+// What of a wide node the ray meets, as lvkSoftMeet8 of <lvk/software_wide_node.glsl> tells it.
+uvec4 lvkSoftMeet8(LvkSoftSlabs ray, LvkSoftOrder order, LvkSoftBlocks node, vec2 range) {
+    uvec4 head = lvkSoftBlock(node, 0u);
+    uvec4 children = lvkSoftBlock(node, 1u);
+    uvec2 nearX, nearY, nearZ, farX, farY, farZ;
+    lvkSoftPlanes(node, 2u, order.x, nearX, farX);
+    lvkSoftPlanes(node, 3u, order.y, nearY, farY);
+    lvkSoftPlanes(node, 4u, order.z, nearZ, farZ);
+    // Exponents are larger by the 15 bits of lvkSoftSteps. None is near the end of its byte, as boxes end at 1e15.
+    vec3 scale = uintBitsToFloat((head.www + 0x0F0F0Fu >> uvec3(0u, 8u, 16u) & 255u) << 23) * ray.inverse;
+    vec3 start = (uintBitsToFloat(head.xyz) - ray.origin) * ray.inverse;
+    vec3 error = (abs(start) + abs(scale)) * 1e-6;
+    vec3 enter = start - scale - error, leave = start - scale + error;
+    // Inner children have 24 and more for their place, which then follows the order of the ray.
+    uvec2 inner = children.zw & (children.zw << 1) & 0x10101010u;
+    uvec2 places = children.zw ^ ((inner >> 1) - (inner >> 4) & ray.octant * 0x01010101u);
+    uvec2 counts = children.zw >> 5 & 0x07070707u;
+    uint met = lvkSoftMeet4(uvec3(nearX.x, nearY.x, nearZ.x), uvec3(farX.x, farY.x, farZ.x), counts.x, places.x,
+                            scale, enter, leave, range);
+    met |= lvkSoftMeet4(uvec3(nearX.y, nearY.y, nearZ.y), uvec3(farX.y, farY.y, farZ.y), counts.y, places.y,
+                        scale, enter, leave, range);
+    return uvec4(children.x, met & 0xFF000000u | head.w >> 24, children.y, met & 0x00FFFFFFu);
+}
+
+#endif

@@ -1,0 +1,48 @@
+#ifndef LVK_SOFTWARE_WIDE_NODE_GLSL
+#define LVK_SOFTWARE_WIDE_NODE_GLSL
+
+#include <lvk/software_boxes.glsl>
+
+// A ray against the boxes of a wide node; on CPUs see <lvk/software_cpu_node.glsl>.
+
+// Of four children of a wide node, those the ray meets, as bits at their places.
+uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, vec3 start, vec3 end, vec2 range) {
+    uint met = 0u;
+    [[unroll]] for (uint child = 0u; child < 32u; child += 8u) {
+        vec3 enter = vec3(near >> child & 255u) * scale + start;
+        vec3 leave = vec3(far >> child & 255u) * scale + end;
+        bool meets = lvkSoftLast(enter, range.x) <= lvkSoftFirst(leave, range.y);
+        met |= meets ? (counts >> child & 7u) << (places >> child & 31u) : 0u;
+    }
+    return met;
+}
+
+// What of a wide node the ray meets (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through
+// Compressed Wide BVHs", 2017): its inner children as a group of nodes, first node and, in the order of the ray, a bit for
+// each from bit 24 on; and its leaves as a group of primitives, first one and a bit for each. `first` is the node's
+// first block.
+uvec4 lvkSoftMeet8(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint first, vec2 range) {
+    uvec4 head = lvkSoftBlock(blocks, first);
+    uvec4 children = lvkSoftBlock(blocks, first + 1u);
+    uvec4 x = lvkSoftBlock(blocks, first + 2u);
+    uvec4 y = lvkSoftBlock(blocks, first + 3u);
+    uvec4 z = lvkSoftBlock(blocks, first + 4u);
+    vec3 scale = uintBitsToFloat((head.www >> uvec3(0u, 8u, 16u) & 255u) << 23) * ray.inverse;
+    vec3 start = (uintBitsToFloat(head.xyz) - ray.origin) * ray.inverse;
+    vec3 error = (abs(start) + 256.0 * abs(scale)) * 1e-6;
+    bvec3 along = bvec3(ray.octant & 4u, ray.octant & 2u, ray.octant & 1u);
+    uvec4 nearX = along.x ? x : x.zwxy;
+    uvec4 nearY = along.y ? y : y.zwxy;
+    uvec4 nearZ = along.z ? z : z.zwxy;
+    // Inner children have 24 and more for their place, which then follows the order of the ray.
+    uvec2 inner = (children.zw & (children.zw << 1) & 0x10101010u) >> 4;
+    uvec2 counts = children.zw >> 5 & 0x07070707u;
+    uvec2 places = (children.zw ^ inner * ray.octant) & 0x1F1F1F1Fu;
+    uint met = lvkSoftMeet4(uvec3(nearX.x, nearY.x, nearZ.x), uvec3(nearX.z, nearY.z, nearZ.z), counts.x, places.x,
+                            scale, start - error, start + error, range);
+    met |= lvkSoftMeet4(uvec3(nearX.y, nearY.y, nearZ.y), uvec3(nearX.w, nearY.w, nearZ.w), counts.y, places.y,
+                        scale, start - error, start + error, range);
+    return uvec4(children.x, met & 0xFF000000u | head.w >> 24, children.y, met & 0x00FFFFFFu);
+}
+
+#endif
