@@ -87,7 +87,7 @@ uvec4 lvkSoftMeet8(LvkSoftSlabs ray, LvkSoftOrder order, LvkSoftBlocks node, vec
     // Inner children have 24 and more for their place, which then follows the order of the ray.
     uvec2 inner = children.zw & (children.zw << 1) & 0x10101010u;
     uvec2 places = children.zw ^ ((inner >> 1) - (inner >> 4) & ray.octant * 0x01010101u);
-    uvec2 counts = children.zw >> 5 & 0x07070707u;
+    uvec2 counts = children.zw >> 5;
     uint met = lvkSoftMeet4(uvec3(nearX.x, nearY.x, nearZ.x), uvec3(farX.x, farY.x, farZ.x), counts.x, places.x,
                             scale, enter, leave, range);
     met |= lvkSoftMeet4(uvec3(nearX.y, nearY.y, nearZ.y), uvec3(farX.y, farY.y, farZ.y), counts.y, places.y,
