@@ -32,8 +32,11 @@ void trace(uvec2 pixel, uint index) {
 #endif
 
 void main() {
-    uvec2 pixel = groupPixel();
-    if (pixel.x < width && pixel.y < height) {
-        trace(pixel, pixel.y * width + pixel.x);
+    uvec2 first = groupPixel();
+    [[dont_unroll]] for (uint i = 0u; i < kGroupPixels; ++i) {
+        uvec2 pixel = first + groupStep(i);
+        if (pixel.x < width && pixel.y < height) {
+            trace(pixel, pixel.y * width + pixel.x);
+        }
     }
 }

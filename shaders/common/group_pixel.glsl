@@ -1,10 +1,14 @@
-// Work groups of 8 x 8, and the pixel of an invocation of theirs.
+// Work groups for 8 x 8 pixels, and the pixels of an invocation of theirs: kGroupPixels, of which groupPixel() is the first and
+// groupStep() leads from there to each.
 #ifndef COMMON_GROUP_PIXEL_GLSL
 #define COMMON_GROUP_PIXEL_GLSL
 
-layout(local_size_x = 8, local_size_y = 8) in;
-
 #ifdef LVK_DEVICE_IS_CPU
+
+// A CPU runs eight invocations at once. A work group is no more than that and goes through its pixels in blocks of 4 x 2, whose rays
+// keep closer together than those of a row: so what starting it costs, lavapipe clearing the stack of queries above all, is paid once.
+layout(local_size_x = 8) in;
+const uint kGroupPixels = 8u;
 
 // The row of the picture's work groups that one of the launch takes. lavapipe hands each thread a run of work groups, all as long,
 // and waits for the last: so each run has rows from all over the picture, and none the costly half. First come rows whose numbers
@@ -19,19 +23,26 @@ uint groupRow() {
     return row;
 }
 
-// A CPU runs eight invocations at once: they see a block of 4 x 2 pixels, whose rays keep closer together than those of a row.
-// Numbered by their subgroups, as lavapipe divides for each one to find its place in the work group otherwise.
 uvec2 groupPixel() {
-    uint index = gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID;
-    uvec2 block = uvec2(index >> 3 & 1u, index >> 4);
-    uvec2 group = uvec2(gl_WorkGroupID.x, groupRow());
-    return group * 8u + block * uvec2(4u, 2u) + uvec2(index & 3u, index >> 2 & 1u);
+    uint index = gl_LocalInvocationID.x;
+    return uvec2(gl_WorkGroupID.x, groupRow()) * 8u + uvec2(index & 3u, index >> 2);
+}
+
+uvec2 groupStep(uint place) {
+    return uvec2(place & 1u, place >> 1) * uvec2(4u, 2u);
 }
 
 #else
 
+layout(local_size_x = 8, local_size_y = 8) in;
+const uint kGroupPixels = 1u;
+
 uvec2 groupPixel() {
     return gl_GlobalInvocationID.xy;
+}
+
+uvec2 groupStep(uint place) {
+    return uvec2(0u);
 }
 
 #endif

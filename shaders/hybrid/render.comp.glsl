@@ -16,9 +16,12 @@ void main() {
 #include "common/group_pixel.glsl"
 
 void main() {
-    uvec2 pixel = groupPixel() + uvec2(0u, first);
-    if (pixel.x < frame.camera.width && pixel.y < end) {
-        renderPixel(pixel);
+    uvec2 start = groupPixel() + uvec2(0u, first);
+    [[dont_unroll]] for (uint i = 0u; i < kGroupPixels; ++i) {
+        uvec2 pixel = start + groupStep(i);
+        if (pixel.x < frame.camera.width && pixel.y < end) {
+            renderPixel(pixel);
+        }
     }
 }
 #endif

@@ -32,8 +32,11 @@ vec3 traceSunlight(vec3 origin, vec3 direction) {
 #include "hybrid_oit/shadow.glsl"
 
 void main() {
-    uvec2 pixel = groupPixel();
-    if (pixel.x < frame.camera.width && pixel.y <= frame.camera.height) {
-        shadowAt(pixel);
+    uvec2 first = groupPixel();
+    [[dont_unroll]] for (uint i = 0u; i < kGroupPixels; ++i) {
+        uvec2 pixel = first + groupStep(i);
+        if (pixel.x < frame.camera.width && pixel.y <= frame.camera.height) {
+            shadowAt(pixel);
+        }
     }
 }

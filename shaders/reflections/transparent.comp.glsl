@@ -4,8 +4,11 @@
 #include "reflections/reflect.glsl"
 
 void main() {
-    uvec2 pixel = groupPixel();
-    if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
-        transparentPixel(pixel);
+    uvec2 first = groupPixel();
+    [[dont_unroll]] for (uint i = 0u; i < kGroupPixels; ++i) {
+        uvec2 pixel = first + groupStep(i);
+        if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
+            transparentPixel(pixel);
+        }
     }
 }

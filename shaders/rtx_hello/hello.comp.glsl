@@ -16,14 +16,20 @@ vec3 colorAlong(vec3 direction) {
     return triangleColor(lvkRayQueryBarycentrics(query, LVK_COMMITTED), normal);
 }
 
-void main() {
-    uvec2 pixel = groupPixel();
-    if (pixel.x >= camera.width || pixel.y >= camera.height) {
-        return;
-    }
+void renderPixel(uvec2 pixel) {
     vec3 sum = vec3(0.0);
     for (uint place = 0u; place < 4u; ++place) {
         sum += colorAlong(rayDirection(pixel, place));
     }
     imageStore(kImages2D[image], ivec2(pixel), vec4(sum / 4.0, 1.0));
+}
+
+void main() {
+    uvec2 first = groupPixel();
+    [[dont_unroll]] for (uint i = 0u; i < kGroupPixels; ++i) {
+        uvec2 pixel = first + groupStep(i);
+        if (pixel.x < camera.width && pixel.y < camera.height) {
+            renderPixel(pixel);
+        }
+    }
 }

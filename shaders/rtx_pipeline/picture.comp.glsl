@@ -57,9 +57,12 @@ vec3 lightAlong(Onward ray) {
 }
 
 void main() {
-    uvec2 pixel = groupPixel();
-    if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
-        Onward ray = Onward(vec3(1.0), frame.camera.eye, cameraDirection(frame.camera, pixel), 0.0);
-        store(pixel, lightAlong(ray));
+    uvec2 first = groupPixel();
+    [[dont_unroll]] for (uint i = 0u; i < kGroupPixels; ++i) {
+        uvec2 pixel = first + groupStep(i);
+        if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
+            Onward ray = Onward(vec3(1.0), frame.camera.eye, cameraDirection(frame.camera, pixel), 0.0);
+            store(pixel, lightAlong(ray));
+        }
     }
 }

@@ -33,8 +33,11 @@ bool reachesSky(vec3 origin, vec3 direction) {
 #include "rtx_textures/shade.glsl"
 
 void main() {
-    uvec2 pixel = groupPixel();
-    if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
-        renderPixel(pixel);
+    uvec2 first = groupPixel();
+    [[dont_unroll]] for (uint i = 0u; i < kGroupPixels; ++i) {
+        uvec2 pixel = first + groupStep(i);
+        if (pixel.x < frame.camera.width && pixel.y < frame.camera.height) {
+            renderPixel(pixel);
+        }
     }
 }

@@ -2,6 +2,7 @@
 
 mod deferred;
 mod frames;
+mod group_pixel;
 mod hello_triangle;
 mod hybrid_images;
 mod hybrid_oit;

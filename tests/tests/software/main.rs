@@ -4,4 +4,5 @@ mod corrupt;
 mod pictures;
 mod queries;
 mod seams;
+mod short;
 mod singular;

@@ -19,22 +19,30 @@ struct LvkSoftSlabs {
 // The same, as a share of the longest component.
 #define LVK_SOFT_LEAST_SHARE 1e-18
 
+// The same, as a share of how far away the corners of a structure are. On CPUs nodes count with times that are up to 520 times as long.
+#ifdef LVK_DEVICE_IS_CPU
+#define LVK_SOFT_LEAST_OF_FAR 1e-35
+#else
+#define LVK_SOFT_LEAST_OF_FAR 1e-37
+#endif
+
 float lvkSoftLongest(vec3 v) {
     vec3 size = abs(v);
     return max(max(size.x, size.y), size.z);
 }
 
-// What LVK_SOFT_LEAST is for a ray in the space of a structure. In that of a large instance directions are so short that it would be
-// too much of them; there it follows from how far away the structure's own corners are.
+// The least for a ray in the space of a structure. What suits corners at 1e15 would be too much of short directions, as they are in
+// large instances; there it follows from how far away the structure's own corners are.
 float lvkSoftLeast(uvec2 structure, vec3 origin, vec3 direction) {
-    if (lvkSoftLongest(direction) * LVK_SOFT_LEAST_SHARE >= LVK_SOFT_LEAST) {
-        return LVK_SOFT_LEAST;
+    const float kMost = 1e15 * LVK_SOFT_LEAST_OF_FAR;
+    if (lvkSoftLongest(direction) * LVK_SOFT_LEAST_SHARE >= kMost) {
+        return kMost;
     }
     uvec4 a = lvkSoftBlock(LvkSoftBlocks(structure), 3u);
     uvec4 b = lvkSoftBlock(LvkSoftBlocks(structure), 4u);
     vec3 low = uintBitsToFloat(a.xyz), high = uintBitsToFloat(uvec3(a.w, b.xy));
     vec3 far = max(abs(origin), max(abs(low), abs(high)));
-    return min(max(lvkSoftLongest(far), 1.0) * 1e-37, LVK_SOFT_LEAST);
+    return min(max(lvkSoftLongest(far), 1.0) * LVK_SOFT_LEAST_OF_FAR, kMost);
 }
 
 LvkSoftSlabs lvkSoftSlabsOf(vec3 origin, vec3 direction, float least) {
@@ -63,17 +71,26 @@ vec3 lvkSoftTouchSlack(LvkSoftSlabs ray, vec3 low, vec3 high) {
     return lvkSoftSlack(ray, min(far, vec3(kFarthest)), 1e-7);
 }
 
-// The last of the distances at which a ray enters, of which tMin is not negative. As integers, positive floats are in order
-// and before them all negative ones, and devices may have instructions for the most of three integers.
-float lvkSoftLast(vec3 enter, float tMin) {
+// The last of the distances at which a ray enters, or any negative one if all are. As integers, positive floats are in order and
+// before them all negative ones, and devices may have instructions for the most of three integers.
+float lvkSoftLastEntry(vec3 enter) {
     ivec3 all = floatBitsToInt(enter);
-    return intBitsToFloat(max(max(max(all.x, all.y), all.z), floatBitsToInt(tMin)));
+    return intBitsToFloat(max(max(all.x, all.y), all.z));
 }
 
 // The first of the distances at which it leaves; any negative one if there are such.
-float lvkSoftFirst(vec3 leave, float tMax) {
+float lvkSoftFirstExit(vec3 leave) {
     ivec3 all = floatBitsToInt(leave);
-    return intBitsToFloat(min(min(min(all.x, all.y), all.z), floatBitsToInt(tMax)));
+    return intBitsToFloat(min(min(all.x, all.y), all.z));
+}
+
+// The same within the range of a ray, whose tMin is not negative.
+float lvkSoftLast(vec3 enter, float tMin) {
+    return intBitsToFloat(max(floatBitsToInt(lvkSoftLastEntry(enter)), floatBitsToInt(tMin)));
+}
+
+float lvkSoftFirst(vec3 leave, float tMax) {
+    return intBitsToFloat(min(floatBitsToInt(lvkSoftFirstExit(leave)), floatBitsToInt(tMax)));
 }
 
 // Where the ray enters and leaves a box, of the range it has left. Which corner is near follows from the direction: a box that

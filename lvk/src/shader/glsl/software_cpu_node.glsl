@@ -18,8 +18,9 @@ LvkSoftOrder lvkSoftOrderOf(LvkSoftSlabs ray) {
 // Of eight children, in two words, the planes of the axis whose block is named.
 void lvkSoftPlanes(LvkSoftBlocks node, uint block, uint64_t order, out uvec2 near, out uvec2 far) {
     uint64_t start = packUint2x32(uvec2(node));
+    uint64_t halves = uint64_t(block) * 32ul + 8ul; // where one half of the block begins and where the other does, added up
     near = unpackUint2x32(LvkSoftPair(start + order).at);
-    far = unpackUint2x32(LvkSoftPair(start + (uint64_t(block) * 32ul + 8ul - order)).at);
+    far = unpackUint2x32(LvkSoftPair(start + (halves - order)).at);
 }
 #else
 #define LvkSoftOrder bvec3
@@ -41,25 +42,14 @@ vec3 lvkSoftSteps(uvec3 words, uint child) {
     return uintBitsToFloat(moved & 0xFF00u | 0x3F800000u);
 }
 
-// The last of the distances at which a ray enters, or any negative one if all are; compare lvkSoftLast.
-float lvkSoftLastEntry(vec3 enter) {
-    ivec3 all = floatBitsToInt(enter);
-    return intBitsToFloat(max(max(all.x, all.y), all.z));
-}
-
-// The first of the distances at which it leaves; any negative one if there are such.
-float lvkSoftFirstExit(vec3 leave) {
-    ivec3 all = floatBitsToInt(leave);
-    return intBitsToFloat(min(min(all.x, all.y), all.z));
-}
-
 // Bits moved to the left, those that leave there coming in again at the right. Of `by` the lowest five bits count, so nothing has to
 // clear what is above them.
 uint lvkSoftRotate(uint bits, uint by) {
     return bits << (by & 31u) | bits >> (-by & 31u);
 }
 
-// Of four children of a wide node, those the ray meets, as bits at their places. `start` and `end` are of the step 1.
+// Of four children of a wide node, those the ray meets, as bits at their places. The number of a plane times `scale` is how much later
+// than `start` the ray enters by it, or than `end` leaves.
 uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, vec3 start, vec3 end, vec2 range) {
     uint met = 0u;
     [[unroll]] for (uint child = 0u; child < 32u; child += 8u) {
@@ -71,15 +61,16 @@ uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, v
     return met;
 }
 
-// What of a wide node the ray meets, as lvkSoftMeet8 of <lvk/software_wide_node.glsl> tells it.
-uvec4 lvkSoftMeet8(LvkSoftSlabs ray, LvkSoftOrder order, LvkSoftBlocks node, vec2 range) {
+// What of a wide node the ray meets, as lvkSoftMeet8 tells it.
+uvec4 lvkSoftMeetNode(LvkSoftSlabs ray, LvkSoftOrder order, LvkSoftBlocks node, vec2 range) {
     uvec4 head = lvkSoftBlock(node, 0u);
     uvec4 children = lvkSoftBlock(node, 1u);
     uvec2 nearX, nearY, nearZ, farX, farY, farZ;
     lvkSoftPlanes(node, 2u, order.x, nearX, farX);
     lvkSoftPlanes(node, 3u, order.y, nearY, farY);
     lvkSoftPlanes(node, 4u, order.z, nearZ, farZ);
-    // Exponents are larger by the 15 bits of lvkSoftSteps. None is near the end of its byte, as boxes end at 1e15.
+    // Exponents are larger by the 15 bits of lvkSoftSteps. None is near the end of its byte, as boxes end at 1e15, and no time is
+    // infinite by LVK_SOFT_LEAST_OF_FAR. What is rounded is `start`, and at the size of `scale` all that follows.
     vec3 scale = uintBitsToFloat((head.www + 0x0F0F0Fu >> uvec3(0u, 8u, 16u) & 255u) << 23) * ray.inverse;
     vec3 start = (uintBitsToFloat(head.xyz) - ray.origin) * ray.inverse;
     vec3 error = (abs(start) + abs(scale)) * 1e-6;
@@ -93,6 +84,12 @@ uvec4 lvkSoftMeet8(LvkSoftSlabs ray, LvkSoftOrder order, LvkSoftBlocks node, vec
     met |= lvkSoftMeet4(uvec3(nearX.y, nearY.y, nearZ.y), uvec3(farX.y, farY.y, farZ.y), counts.y, places.y,
                         scale, enter, leave, range);
     return uvec4(children.x, met & 0xFF000000u | head.w >> 24, children.y, met & 0x00FFFFFFu);
+}
+
+// The same as in <lvk/software_wide_node.glsl>.
+uvec4 lvkSoftMeet8(LvkSoftSlabs ray, uvec2 structure, uint nodes, uint node, vec2 range) {
+    LvkSoftItems items = lvkSoftItems(structure, nodes);
+    return lvkSoftMeetNode(ray, lvkSoftOrderOf(ray), lvkSoftItem(items, node, LVK_SOFT_WIDE_NODE_BLOCKS), range);
 }
 
 #endif

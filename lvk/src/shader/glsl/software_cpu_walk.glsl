@@ -55,8 +55,8 @@ bool lvkSoftTestTriangle(inout LvkSoftState state, inout LvkSoftPlace place, Lvk
 // Visits the next node of the group. The rest of the group goes on the stack only if it has inner children that the ray meets.
 void lvkSoftVisitWide(inout LvkSoftPlace place, LvkSoftLevel level, LvkSoftTriangleLevel triangles, vec2 range) {
     uint node = lvkSoftTakeNode(place, level);
-    uvec4 met = lvkSoftMeet8(level.slabs, triangles.order,
-                             lvkSoftItem(triangles.nodes, node, LVK_SOFT_WIDE_NODE_BLOCKS), range);
+    uvec4 met = lvkSoftMeetNode(level.slabs, triangles.order,
+                                lvkSoftItem(triangles.nodes, node, LVK_SOFT_WIDE_NODE_BLOCKS), range);
     bool goesIn = met.y >= LVK_SOFT_ANY_NODE;
     if (goesIn && place.group.y >= LVK_SOFT_ANY_NODE) {
         lvkSoftPushGroup(place.top, place.group);

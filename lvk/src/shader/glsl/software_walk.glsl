@@ -200,14 +200,7 @@ void lvkSoftVisit(inout LvkSoftPlace place, LvkSoftLevel level, vec2 range) {
         if (place.group.y >= LVK_SOFT_ANY_NODE) {
             lvkSoftPushGroup(place.top, place.group);
         }
-#ifdef LVK_DEVICE_IS_CPU
-        LvkSoftItems nodes = lvkSoftItems(level.structure, level.nodes);
-        uvec4 met = lvkSoftMeet8(level.slabs, lvkSoftOrderOf(level.slabs),
-                                 lvkSoftItem(nodes, node, LVK_SOFT_WIDE_NODE_BLOCKS), range);
-#else
-        uint first = level.nodes + node * LVK_SOFT_WIDE_NODE_BLOCKS;
-        uvec4 met = lvkSoftMeet8(level.slabs, LvkSoftBlocks(level.structure), first, range);
-#endif
+        uvec4 met = lvkSoftMeet8(level.slabs, level.structure, level.nodes, node, range);
         place.group = met.xy;
         place.leaves = met.zw;
     } else {

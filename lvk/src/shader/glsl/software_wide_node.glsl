@@ -19,9 +19,11 @@ uint lvkSoftMeet4(uvec3 near, uvec3 far, uint counts, uint places, vec3 scale, v
 
 // What of a wide node the ray meets (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through
 // Compressed Wide BVHs", 2017): its inner children as a group of nodes, first node and, in the order of the ray, a bit for
-// each from bit 24 on; and its leaves as a group of primitives, first one and a bit for each. `first` is the node's
-// first block.
-uvec4 lvkSoftMeet8(LvkSoftSlabs ray, LvkSoftBlocks blocks, uint first, vec2 range) {
+// each from bit 24 on; and its leaves as a group of primitives, first one and a bit for each. `nodes` is the block where
+// nodes begin.
+uvec4 lvkSoftMeet8(LvkSoftSlabs ray, uvec2 structure, uint nodes, uint node, vec2 range) {
+    LvkSoftBlocks blocks = LvkSoftBlocks(structure);
+    uint first = nodes + node * LVK_SOFT_WIDE_NODE_BLOCKS;
     uvec4 head = lvkSoftBlock(blocks, first);
     uvec4 children = lvkSoftBlock(blocks, first + 1u);
     uvec4 x = lvkSoftBlock(blocks, first + 2u);
