@@ -10,7 +10,7 @@ use crate::accel::bounds::Bounds;
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::software::layout::LeafKind;
 use crate::accel::software::layout::{
-    BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafPacked, LeafTriangle, WIDE,
+    BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafIndexed, LeafPacked, LeafTriangle, WIDE,
 };
 
 /// A structure, ready to be copied to the GPU.
@@ -29,17 +29,54 @@ impl BlasBlob {
     }
 }
 
-/// The leaves of a structure.
-struct Leaves {
-    kind: LeafKind,
-    bytes: Vec<u8>,
+/// The leaves of a structure: primitives of the mesh that are still to be put in order, or what names vertices, which is.
+enum LeafList<'a> {
+    Boxes(&'a [LeafBox]),
+    Triangles(&'a [LeafTriangle]),
+    Indexed(Vec<LeafIndexed>),
+    Packed(Vec<LeafPacked>),
+}
+
+impl LeafList<'_> {
+    fn kind(&self) -> LeafKind {
+        match self {
+            Self::Boxes(_) => LeafKind::Boxes,
+            Self::Triangles(_) => LeafKind::Triangles,
+            Self::Indexed(_) => LeafKind::IndexedTriangles,
+            Self::Packed(_) => LeafKind::PackedTriangles,
+        }
+    }
+
+    fn size(&self) -> usize {
+        match self {
+            Self::Boxes(leaves) => size_of_val(*leaves),
+            Self::Triangles(leaves) => size_of_val(*leaves),
+            Self::Indexed(leaves) => size_of_val(&leaves[..]),
+            Self::Packed(leaves) => size_of_val(&leaves[..]),
+        }
+    }
+
+    /// Appends them in their order; answers their place in blocks.
+    fn append(&self, bytes: &mut Vec<u8>, order: &[u32]) -> u32 {
+        match self {
+            Self::Boxes(leaves) => append_ordered(bytes, leaves, order),
+            Self::Triangles(leaves) => append_ordered(bytes, leaves, order),
+            Self::Indexed(leaves) => append(bytes, bytemuck::cast_slice(leaves)),
+            Self::Packed(leaves) => append(bytes, bytemuck::cast_slice(leaves)),
+        }
+    }
+}
+
+/// Leaves, and the vertices that they name.
+struct Leaves<'a> {
+    list: LeafList<'a>,
     vertices: Vec<Vec3>,
 }
 
-impl Leaves {
+impl Leaves<'_> {
     /// Bytes of all parts.
     fn size(&self) -> usize {
-        self.bytes.len() + size_of_val(&self.vertices[..])
+        self.list.size() + size_of_val(&self.vertices[..])
     }
 }
 
@@ -59,14 +96,16 @@ pub(super) fn pack(mesh: &Mesh, tree: &Tree, quality: Quality, bounds: Bounds) -
     let leaves = leaves(mesh, &tree.order, quality);
     let row = |flags: &GeometryFlags| GeometryRow { flags: flags.bits(), reserved: [0; 3] };
     let geometries: Vec<_> = mesh.flags.iter().map(row).collect();
-    let mut bytes = vec![0; size_of::<Header>()];
+    let parts = nodes.len() + leaves.size() + size_of_val(&geometries[..]);
+    let mut bytes = Vec::with_capacity(size_of::<Header>() + parts + 4 * BLOCK_BYTES);
+    bytes.resize(size_of::<Header>(), 0);
     let header = Header {
         format,
-        leaf_kind: leaves.kind as u32,
+        leaf_kind: leaves.list.kind() as u32,
         root: tree.root,
         primitive_count: tree.order.len() as u32,
         nodes: append(&mut bytes, nodes),
-        primitives: append(&mut bytes, &leaves.bytes),
+        primitives: leaves.list.append(&mut bytes, &tree.order),
         vertices: append(&mut bytes, bytemuck::cast_slice(&leaves.vertices)),
         geometries: append(&mut bytes, bytemuck::cast_slice(&geometries)),
         node_count: node_count as u32,
@@ -88,40 +127,35 @@ fn append(bytes: &mut Vec<u8>, part: &[u8]) -> u32 {
     place as u32
 }
 
-fn leaves(mesh: &Mesh, order: &[u32], quality: Quality) -> Leaves {
+/// Appends primitives, which are whole blocks, in the order of a tree; answers their place in blocks.
+fn append_ordered<T: bytemuck::NoUninit>(bytes: &mut Vec<u8>, primitives: &[T], order: &[u32]) -> u32 {
+    let place = bytes.len() / BLOCK_BYTES;
+    for number in order {
+        bytes.extend_from_slice(bytemuck::bytes_of(&primitives[*number as usize]));
+    }
+    place as u32
+}
+
+fn leaves<'a>(mesh: &'a Mesh, order: &[u32], quality: Quality) -> Leaves<'a> {
+    let copies = |list| Leaves { list, vertices: Vec::new() };
     match &mesh.primitives {
-        Primitives::Boxes(boxes) => {
-            let ordered: Vec<LeafBox> = order.iter().map(|number| boxes[*number as usize]).collect();
-            Leaves {
-                kind: LeafKind::Boxes,
-                bytes: bytemuck::cast_slice(&ordered).to_vec(),
-                vertices: Vec::new(),
-            }
-        }
+        Primitives::Boxes(boxes) => copies(LeafList::Boxes(boxes)),
         Primitives::Triangles(triangles) => {
-            let copies = size_of_val(&triangles[..]);
+            let copies = copies(LeafList::Triangles(triangles));
             let small = quality.low_memory.then(|| indexed(mesh, triangles, order)).flatten().map(naming);
-            small.filter(|small| small.size() < copies).unwrap_or_else(|| copied(triangles, order))
+            small.filter(|small| small.size() < copies.size()).unwrap_or(copies)
         }
     }
 }
 
-/// Leaves with copies of the corners.
-fn copied(triangles: &[LeafTriangle], order: &[u32]) -> Leaves {
-    let ordered: Vec<LeafTriangle> = order.iter().map(|number| triangles[*number as usize]).collect();
-    Leaves { kind: LeafKind::Triangles, bytes: bytemuck::cast_slice(&ordered).to_vec(), vertices: Vec::new() }
-}
-
 /// Leaves that name vertices, as small as their numbers allow.
-fn naming(Indexed { triangles, vertices }: Indexed) -> Leaves {
-    let kind = LeafKind::naming(vertices.len());
-    let bytes = if kind == LeafKind::PackedTriangles {
-        let packed: Vec<_> = triangles.iter().map(LeafPacked::of).collect();
-        bytemuck::cast_slice(&packed).to_vec()
+fn naming(Indexed { triangles, vertices }: Indexed) -> Leaves<'static> {
+    let list = if LeafKind::naming(vertices.len()) == LeafKind::PackedTriangles {
+        LeafList::Packed(triangles.iter().map(LeafPacked::of).collect())
     } else {
-        bytemuck::cast_slice(&triangles).to_vec()
+        LeafList::Indexed(triangles)
     };
-    Leaves { kind, bytes, vertices }
+    Leaves { list, vertices }
 }
 
 fn marks(flags: &[GeometryFlags]) -> u32 {
@@ -136,7 +170,6 @@ fn marks(flags: &[GeometryFlags]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::software::layout::LeafIndexed;
 
     const SMALL: Quality = Quality { low_memory: true, refit: false };
     const SMALL_MOVING: Quality = Quality { low_memory: true, refit: true };
@@ -191,19 +224,25 @@ mod tests {
     }
 
     /// The leaves of one triangle that names the last of so many vertices.
-    fn last_of(count: usize) -> (LeafIndexed, Leaves) {
+    fn last_of(count: usize) -> (LeafIndexed, Leaves<'static>) {
         let vertices = [0, 1, count as u32 - 1];
         let triangle = LeafIndexed { vertices, primitive: 7 };
         (triangle, naming(Indexed { triangles: vec![triangle], vertices: vec![Vec3::ZERO; count] }))
     }
 
+    fn bytes_of(leaves: &Leaves<'_>) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        leaves.list.append(&mut bytes, &[]);
+        bytes
+    }
+
     #[test]
     fn leaves_are_packed_where_all_vertices_have_names() {
         let (triangle, leaves) = last_of(LeafPacked::MOST_VERTICES);
-        assert_eq!(leaves.kind, LeafKind::PackedTriangles);
-        assert_eq!(leaves.bytes, bytemuck::bytes_of(&LeafPacked::of(&triangle)));
+        assert_eq!(leaves.list.kind(), LeafKind::PackedTriangles);
+        assert!(bytes_of(&leaves).starts_with(bytemuck::bytes_of(&LeafPacked::of(&triangle))));
         let (triangle, leaves) = last_of(LeafPacked::MOST_VERTICES + 1);
-        assert_eq!(leaves.kind, LeafKind::IndexedTriangles);
-        assert_eq!(leaves.bytes, bytemuck::bytes_of(&triangle));
+        assert_eq!(leaves.list.kind(), LeafKind::IndexedTriangles);
+        assert_eq!(bytes_of(&leaves), bytemuck::bytes_of(&triangle));
     }
 }

@@ -4,13 +4,14 @@
 //! area, and those that find each other become one. Where each looks at the next, as among boxes that lie in one another,
 //! a round would make one pair; such a round pairs by place instead, so that every round leaves a share of boxes less.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
 
 use super::threads::Build;
+use crate::accel::bounds::Bounds;
 use crate::threads::share_out;
 
 /// Rounds that look at the next neighbours only: most of what is small is paired by them.
@@ -23,12 +24,12 @@ const FEWEST: usize = 32;
 const LAST: usize = 32;
 
 /// A tree of boxes, at least one, with one in each leaf.
-pub(super) fn build(boxes: &[Aabb]) -> Bvh2 {
+pub(super) fn build(boxes: &[Bounds]) -> Bvh2 {
     cluster(boxes).0
 }
 
 /// The tree, and how many boxes looked for a neighbour over all rounds: at most [`FEWEST`] for each.
-fn cluster(boxes: &[Aabb]) -> (Bvh2, usize) {
+fn cluster(boxes: &[Bounds]) -> (Bvh2, usize) {
     let mut tree = Bvh2::zeroed(boxes.len());
     tree.primitive_indices = (0..boxes.len() as u32).collect();
     let build = Build::begin();
@@ -52,9 +53,13 @@ fn cluster(boxes: &[Aabb]) -> (Bvh2, usize) {
     (tree, searches)
 }
 
+fn aabb(bounds: &Bounds) -> Aabb {
+    Aabb { min: Vec3A::from(bounds.low), max: Vec3A::from(bounds.high) }
+}
+
 /// The leaves along a Morton curve through their centers.
-fn sorted(build: &Build, boxes: &[Aabb]) -> Vec<Bvh2Node> {
-    let whole = boxes.iter().fold(Aabb::empty(), |whole, place| whole.union(place));
+fn sorted(build: &Build, boxes: &[Bounds]) -> Vec<Bvh2Node> {
+    let whole = aabb(&boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union));
     let scale = 1.0 / whole.diagonal().as_dvec3().max(DVec3::splat(f64::MIN_POSITIVE));
     let low = whole.min.as_dvec3();
     let mut codes = vec![(0_u64, 0_u32); boxes.len()];
@@ -62,14 +67,14 @@ fn sorted(build: &Build, boxes: &[Aabb]) -> Vec<Bvh2Node> {
     let length = boxes.len().div_ceil(threads).max(1);
     share_out(threads, codes.chunks_mut(length).enumerate(), |(chunk, codes)| {
         for (place, number) in codes.iter_mut().zip((chunk * length) as u32..) {
-            let center = boxes[number as usize].center().as_dvec3();
+            let center = aabb(&boxes[number as usize]).center().as_dvec3();
             *place = (morton_encode_u64_unorm((center - low) * scale), number);
         }
         codes.sort_unstable();
     });
     // Finds the sorted chunks and merges them.
     codes.sort();
-    codes.iter().map(|(_, number)| Bvh2Node::new(boxes[*number as usize], 1, *number)).collect()
+    codes.iter().map(|(_, number)| Bvh2Node::new(aabb(&boxes[*number as usize]), 1, *number)).collect()
 }
 
 /// For each node which other, at most `reach` places away, makes the smallest box with it. Of equals the one beside it with
@@ -157,15 +162,15 @@ fn merge(nodes: &[Bvh2Node], partners: &[u32], free: &mut [Bvh2Node], next: &mut
 
 #[cfg(test)]
 mod tests {
-    use glam::{Vec3A, vec3a};
+    use glam::vec3a;
     use proptest::prelude::*;
 
     use super::*;
 
     const COUNT: usize = 24_000;
 
-    fn place(low: Vec3A, size: Vec3A) -> Aabb {
-        Aabb { min: low, max: low + size }
+    fn place(low: Vec3A, size: Vec3A) -> Bounds {
+        Bounds { low: low.into(), high: (low + size).into() }
     }
 
     /// A number below 1 for each other number.
@@ -178,9 +183,9 @@ mod tests {
     }
 
     /// Boxes in which each may look at the next, `kinds` times side by side.
-    fn worst(kinds: usize) -> [(&'static str, Vec<Aabb>); 6] {
+    fn worst(kinds: usize) -> [(&'static str, Vec<Bounds>); 6] {
         let each = COUNT / kinds;
-        let make = |of: &dyn Fn(usize, f32) -> Aabb| {
+        let make = |of: &dyn Fn(usize, f32) -> Bounds| {
             (0..COUNT).map(|number| of(number / each, (number % each) as f32)).collect::<Vec<_>>()
         };
         let part = |at: f32| 1.0 + at / each as f32;
@@ -212,7 +217,7 @@ mod tests {
     }
 
     /// Fails unless each box is in one leaf and in every box above it.
-    fn check(boxes: &[Aabb], tree: &Bvh2) {
+    fn check(boxes: &[Bounds], tree: &Bvh2) {
         let (mut open, mut found) = (vec![(0, 1)], vec![false; boxes.len()]);
         while let Some((number, depth)) = open.pop() {
             let node: &Bvh2Node = &tree.nodes[number];
@@ -220,7 +225,7 @@ mod tests {
             if node.is_leaf() {
                 let primitive = tree.primitive_indices[node.first_index as usize] as usize;
                 assert!(!std::mem::replace(&mut found[primitive], true));
-                assert_eq!(*node.aabb(), boxes[primitive]);
+                assert_eq!(*node.aabb(), aabb(&boxes[primitive]));
                 continue;
             }
             for child in [0, 1].map(|side| node.first_index as usize + side) {

@@ -1,7 +1,5 @@
 //! Wide trees: [`ploc`] with reinsertion, collapsed to eight compressed children, the latter two by the crate `obvhs`.
 
-use glam::Vec3A;
-use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
@@ -25,14 +23,11 @@ const LOOKS: f32 = 100.0;
 
 /// A wide tree of primitives, at least two; `None` where it would be too deep, or larger than one of two children.
 pub(super) fn build(bounds: &[Bounds]) -> Option<Tree> {
-    let place = |bounds: &Bounds| Aabb { min: Vec3A::from(bounds.low), max: Vec3A::from(bounds.high) };
-    let mut binary = ploc::build(&bounds.iter().map(place).collect::<Vec<_>>());
+    let mut binary = ploc::build(bounds);
     let moved = share_moved(&binary);
     ReinsertionOptimizer::default().run(&mut binary, moved, None);
     // What collapses it calls itself for each level, and boxes within each other may have thousands.
-    if !is_at_most(&binary, DEEPEST_WIDE * LEVELS) {
-        return None;
-    }
+    binary.nodes = in_order_of_walk(&binary, DEEPEST_WIDE * LEVELS)?;
     let mut wide = bvh2_to_cwbvh(&binary, LARGEST_LEAF, true, false);
     wide.nodes.iter_mut().for_each(widen);
     // Boxes without area cost nothing, so that nothing is gained by nodes of more than two children.
@@ -62,20 +57,25 @@ fn widen(node: &mut CwBvhNode) {
     }
 }
 
-/// Whether no path of a binary tree has more nodes.
-fn is_at_most(binary: &Bvh2, most: usize) -> bool {
+/// The nodes of a binary tree, children behind their parent and what is below the first before what is below the second: what
+/// collapses the tree goes that way, and reads memory in order. `None` where a path has more than `most`.
+fn in_order_of_walk(binary: &Bvh2, most: usize) -> Option<Vec<Bvh2Node>> {
+    let mut nodes: Vec<Bvh2Node> = Vec::with_capacity(binary.nodes.len());
+    nodes.push(binary.nodes[0]);
     let mut open = vec![(0, 1)];
     while let Some((number, depth)) = open.pop() {
-        let node: &Bvh2Node = &binary.nodes[number];
-        if node.is_leaf() {
+        if nodes[number].is_leaf() {
             continue;
         }
         if depth >= most {
-            return false;
+            return None;
         }
-        open.extend([0, 1].map(|side| (node.first_index as usize + side, depth + 1)));
+        let end = nodes.len();
+        let children = std::mem::replace(&mut nodes[number].first_index, end as u32) as usize;
+        nodes.extend_from_slice(&binary.nodes[children..children + 2]);
+        open.extend([(end + 1, depth + 1), (end, depth + 1)]);
     }
-    true
+    Some(nodes)
 }
 
 /// The share of nodes to move. A place is searched for among the nodes that one overlaps: about as many as a ray meets, which
@@ -160,8 +160,8 @@ mod tests {
     }
 
     fn share(bounds: impl Iterator<Item = [f32; 2]>) -> f32 {
-        let aabb = |[low, high]: [f32; 2]| Aabb { min: Vec3A::splat(low), max: Vec3A::splat(high) };
-        share_moved(&ploc::build(&bounds.map(aabb).collect::<Vec<_>>()))
+        let bounds = bounds.map(|[low, high]| Bounds { low: Vec3::splat(low), high: Vec3::splat(high) });
+        share_moved(&ploc::build(&bounds.collect::<Vec<_>>()))
     }
 
     #[test]
