@@ -29,7 +29,7 @@ impl BlasBlob {
     }
 }
 
-/// The leaves of a structure: primitives of the mesh that are still to be put in order, or what names vertices, which is.
+/// The leaves of a structure: primitives in the order of the mesh, or, in the order of the tree, what names vertices.
 enum LeafList<'a> {
     Boxes(&'a [LeafBox]),
     Triangles(&'a [LeafTriangle]),
@@ -56,7 +56,7 @@ impl LeafList<'_> {
         }
     }
 
-    /// Appends them in their order; answers their place in blocks.
+    /// Appends them in the order of the tree, which those that name vertices have already; answers their place in blocks.
     fn append(&self, bytes: &mut Vec<u8>, order: &[u32]) -> u32 {
         match self {
             Self::Boxes(leaves) => append_ordered(bytes, leaves, order),
@@ -129,6 +129,7 @@ fn append(bytes: &mut Vec<u8>, part: &[u8]) -> u32 {
 
 /// Appends primitives, which are whole blocks, in the order of a tree; answers their place in blocks.
 fn append_ordered<T: bytemuck::NoUninit>(bytes: &mut Vec<u8>, primitives: &[T], order: &[u32]) -> u32 {
+    const { assert!(size_of::<T>().is_multiple_of(BLOCK_BYTES)) };
     let place = bytes.len() / BLOCK_BYTES;
     for number in order {
         bytes.extend_from_slice(bytemuck::bytes_of(&primitives[*number as usize]));

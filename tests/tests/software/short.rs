@@ -24,14 +24,16 @@ const CASES: [[f32; 3]; 11] = [
     [1e6, 1e6, 1e-4],
 ];
 
-/// Rays across a scene of the given size, along an axis and a little askew, of unit length.
+/// Rays across a scene of the given size, along an axis and a little askew, of unit length, from outside and from within.
 fn rays_across(size: f32) -> Vec<Ray> {
-    let across = |along: Vec3, i: u16| {
-        let place = Vec3::new(0.03 * f32::from(i) - 1.3, 0.0, 0.2);
-        Ray { t_max: 10.0 * size, ..Ray::new((place - 4.0 * along) * size, along) }
-    };
     let askew = Vec3::new(0.01, 1.0, 0.02).normalize();
-    [Vec3::Y, -Vec3::Y, askew].into_iter().flat_map(|along| (0..90).map(move |i| across(along, i))).collect()
+    let across = |i: u16| {
+        let along = [Vec3::Y, -Vec3::Y, askew][usize::from(i % 3)];
+        let from = if i % 2 == 0 { 4.0 } else { 0.1 };
+        let place = Vec3::new(0.01 * f32::from(i) - 1.3, 0.0, 0.2);
+        Ray { t_max: 10.0 * size, ..Ray::new((place - from * along) * size, along) }
+    };
+    (0..270).map(across).collect()
 }
 
 fn check(ctx: &Context, tracers: &[RayTracer], case: [f32; 3]) -> Result<()> {

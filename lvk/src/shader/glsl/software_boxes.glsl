@@ -13,7 +13,7 @@ struct LvkSoftSlabs {
     uint octant;  // a bit for each axis the ray follows: x 4, y 2, z 1
 };
 
-// What a component of a direction counts as at least: times to the ends of boxes, at 1e15, are finite numbers.
+// What a component of a direction in the world counts as at least: times to the ends of boxes, at 1e15, are finite numbers.
 #define LVK_SOFT_LEAST 1e-22
 
 // The same, as a share of the longest component.
