@@ -29,7 +29,7 @@ fn rays_across(size: f32) -> Vec<Ray> {
     let askew = Vec3::new(0.01, 1.0, 0.02).normalize();
     let across = |i: u16| {
         let along = [Vec3::Y, -Vec3::Y, askew][usize::from(i % 3)];
-        let from = if i % 2 == 0 { 4.0 } else { 0.1 };
+        let from = if i.is_multiple_of(2) { 4.0 } else { 0.1 };
         let place = Vec3::new(0.01 * f32::from(i) - 1.3, 0.0, 0.2);
         Ray { t_max: 10.0 * size, ..Ray::new((place - from * along) * size, along) }
     };
