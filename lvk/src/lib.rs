@@ -61,7 +61,7 @@
 //! | submit, wait, keep frames apart | [`Context::submit`], [`Context::wait`], [`Context::next_frame`] |
 //! | compute, build and copy beside what is drawn | [`Context::acquire_command_buffer_on`] a [`Queue`], [`Context::create_blas_batch_on`], [`manual::queues_and_uploads`] |
 //! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
-//! | find what is wrong | [`manual::debugging`], [`Validation`], [`ValidationSink`] |
+//! | find what is wrong | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`] |
 //! | mix in Vulkan calls of your own, or live on another engine's device | [`manual::interop`] |
 //! | see what LightweightVK has and what became of it here | [`manual::parity`] |
 //!
@@ -139,11 +139,11 @@ pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, transfor
 pub use bindless::checks::{BindlessArray, IndexFault, SlotState};
 pub use command::CommandBuffer;
 pub use command::attachment::{
-    ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, DepthResolve, Resolve, ShadingRateAttachment,
-    StencilLoad,
+    ColorAttachment, ColorLoadOp, DepthAttachment, DepthLoadOp, DepthResolve, Resolve, ShadingRateAttachment,
+    StencilLoadOp,
 };
 pub use command::dependencies::Dependencies;
-pub use command::draw_count::CountedDraws;
+pub use command::indirect_count::IndirectCount;
 pub use command::render::RenderPass;
 pub use command::render_pass::RenderPassDesc;
 pub use command::transfer::{BufferCopy, ClearValue};
@@ -160,9 +160,9 @@ pub use error::{Error, Result};
 pub use format::{Aspect, Format, IndexFormat, VertexFormat};
 pub use gpu::budget::{MemoryBudget, MemoryHeap};
 pub use gpu::caps::{Capabilities, FeatureRequest};
-pub use gpu::clock::ClockPair;
-pub use gpu::debug::{Validation, ValidationMessage, ValidationSink};
-pub use gpu::extra::ExtraExtensions;
+pub use gpu::clock::CalibratedTimestamps;
+pub use gpu::debug::{ValidationMessage, ValidationMode, ValidationSink};
+pub use gpu::extra::UserExtensions;
 pub use gpu::fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
 pub use gpu::foreign::RawContext;
 pub use gpu::limits::Limits;
@@ -173,14 +173,14 @@ pub use gpu::profile::DeviceProfile;
 pub use gpu::queues::{Queue, QueueInfo, QueueRequest};
 pub use gpu::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use gpu::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
-pub use gpu::shading_rate::{FragmentSize, RateCombine, ShadingRate, ShadingRateLimits};
+pub use gpu::shading_rate::{FragmentSize, ShadingRate, ShadingRateCombiner, ShadingRateLimits};
 pub use gpu::window::WindowHandles;
 pub use handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, SwapchainHandle,
     TextureHandle,
 };
-pub use pipeline::blend::{Blend, BlendFactor, BlendOp, BlendPart, ColorWrites};
+pub use pipeline::blend::{Blend, BlendComponent, BlendFactor, BlendOp, ColorWriteMask};
 pub use pipeline::compute::ComputePipelineDesc;
 pub use pipeline::depth_stencil::{DepthState, DepthTest, StencilFace, StencilOp, StencilTest};
 pub use pipeline::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute, VertexBinding};
@@ -192,14 +192,14 @@ pub use resource::buffer::{BufferDesc, BufferUsage};
 pub use resource::format_support::FormatSupport;
 pub use resource::query::{PipelineStatistics, QueryKind, QueryPoolDesc};
 pub use resource::region::{TextureRange, TextureRegion};
-pub use resource::sampler::{AddressMode, BorderColor, CompareOp, Filter, Reduction, SamplerDesc};
+pub use resource::sampler::{AddressMode, BorderColor, CompareOp, Filter, SamplerDesc, SamplerReductionMode};
 pub use resource::swizzle::{Channel, Swizzle};
 pub use resource::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage};
 pub use resource::view::TextureViewDesc;
 pub use resource::ycbcr::{ChromaSite, YuvConversion, YuvModel, YuvRange};
 #[cfg(feature = "glsl")]
 pub use shader::compile_glsl;
-pub use shader::{ShaderCacheCounts, ShaderModuleDesc, ShaderSource, ShaderStage};
+pub use shader::{ShaderCacheStats, ShaderModuleDesc, ShaderSource, ShaderStage};
 pub use store::LiveObject;
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};
 pub use swapchain::desc::{

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use lvk::ash::{Entry, vk};
-use lvk::{Context, ContextDesc, RayQueryRequest, Validation, ValidationSink};
+use lvk::{Context, ContextDesc, RayQueryRequest, ValidationMode, ValidationSink};
 use lvk_samples::driver::{DriverError, DriverRequest, prepare, radv_icd, swiftshader_icd};
 
 /// A context under core and synchronization validation. Dropping it fails the test on any message, those of the
@@ -107,11 +107,11 @@ fn ray_query() -> RayQueryRequest {
 }
 
 /// What `LVK_TEST_VALIDATION` says: `gpu`, `off`, or core and synchronization validation.
-fn validation() -> Validation {
+fn validation() -> ValidationMode {
     match std::env::var("LVK_TEST_VALIDATION").as_deref() {
-        Ok("gpu") => Validation::GpuAssisted,
-        Ok("off") => Validation::Off,
-        _ => Validation::Standard,
+        Ok("gpu") => ValidationMode::GpuAssisted,
+        Ok("off") => ValidationMode::Off,
+        _ => ValidationMode::Standard,
     }
 }
 

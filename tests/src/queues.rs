@@ -11,7 +11,7 @@ use crate::{TestDevice, device_with};
 
 /// Each way to have queues.
 pub const REQUESTS: [QueueRequest; 3] =
-    [QueueRequest::OwnHardware, QueueRequest::Rehearsed, QueueRequest::Shared];
+    [QueueRequest::OwnHardware, QueueRequest::Emulated, QueueRequest::Shared];
 /// Words of the buffers that steps go through.
 pub const WORDS: usize = 64;
 

@@ -226,7 +226,7 @@ impl RayTracer {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
                 cmd.push_constants(&push)?;
                 let size = [LAUNCH_WIDTH, job.count.div_ceil(LAUNCH_WIDTH), 1];
-                cmd.trace_rays_from(how.ray_gen, size, &writes)
+                cmd.trace_rays_with(how.ray_gen, size, &writes)
             }
             AnyPipeline::Compute(pipeline) => {
                 cmd.bind_compute_pipeline(**pipeline)?;

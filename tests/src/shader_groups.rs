@@ -116,7 +116,7 @@ impl GroupScene {
         let mut cmd = self.ctx.acquire_command_buffer()?;
         self.bind(&mut cmd, pipeline, counts, *results)?;
         let writes = Dependencies { buffers: &[*results], ..Default::default() };
-        cmd.trace_rays_from(ray_gen, [counts.all(), 1, 1], &writes)?;
+        cmd.trace_rays_with(ray_gen, [counts.all(), 1, 1], &writes)?;
         self.ctx.submit(cmd)?;
         Ok(read_words(&self.ctx, *results, counts.all() as usize))
     }

@@ -4,7 +4,7 @@
 
 use std::ffi::OsStr;
 
-use lvk::{ComputePipelineHandle, Context, Dependencies, Result, Validation};
+use lvk::{ComputePipelineHandle, Context, Dependencies, Result, ValidationMode};
 use lvk_tests::child::said_in_child;
 use lvk_tests::compute::{compute_pipeline, words_buffer};
 use lvk_tests::device_with;
@@ -27,7 +27,7 @@ struct Push {
 
 #[test]
 fn a_read_beyond_a_buffer_is_a_message() -> Result<()> {
-    let Some(ctx) = device_with(|desc| desc.validation = Validation::GpuAssisted) else { return Ok(()) };
+    let Some(ctx) = device_with(|desc| desc.validation = ValidationMode::GpuAssisted) else { return Ok(()) };
     let (from, to) = (words_buffer(&ctx, &[7; 16]), words_buffer(&ctx, &[0; 16]));
     let pipeline = compute_pipeline(&ctx, COPY);
     for (place, messages) in [(15, false), (16, true), (1000, true)] {
@@ -54,7 +54,7 @@ fn the_layer_shows_what_shaders_print() {
     let on = Some(OsStr::new("1"));
     let variables = [("VK_LAYER_PRINTF_ENABLE", on), ("VK_LAYER_PRINTF_TO_STDOUT", on)];
     let said = said_in_child(the_layer_shows_what_shaders_print, &variables, || {
-        let Some(ctx) = device_with(|desc| desc.validation = Validation::Standard) else { return };
+        let Some(ctx) = device_with(|desc| desc.validation = ValidationMode::Standard) else { return };
         let pipeline = compute_pipeline(&ctx, PRINT);
         dispatch_once(&ctx, *pipeline).unwrap();
         println!("dispatched");

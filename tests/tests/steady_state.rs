@@ -12,7 +12,7 @@ use lvk::{
     ColorAttachment, ComputePipelineHandle, Context, ContextDesc, Dependencies, DeviceInstances, Format,
     Holder, OptionalFeature, PrimitiveOrder, RayQueryRequest, RenderPassDesc, RenderPipelineDesc,
     RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle, TextureUsage, TlasDesc, TlasInstance,
-    Triangles, Validation,
+    Triangles, ValidationMode,
 };
 use lvk_tests::compute::{compute_pipeline, module};
 use lvk_tests::device::vulkan;
@@ -182,7 +182,7 @@ fn refits_that_show_the_same_take_nothing_from_the_heap() {
                 let mut cmd = ctx.acquire_command_buffer().unwrap();
                 for tlas in structures.iter().take(refits) {
                     match from_buffer {
-                        true => cmd.update_tlas_from(**tlas, &buffer, BuildMode::Refit).unwrap(),
+                        true => cmd.update_tlas_from_buffer(**tlas, &buffer, BuildMode::Refit).unwrap(),
                         false => cmd.update_tlas(**tlas, &instances, BuildMode::Refit).unwrap(),
                     }
                 }
@@ -272,7 +272,7 @@ fn frames_that_run_grow_neither_the_process_nor_what_the_driver_counts() {
     /// A few bytes a frame on the heap, and some pages of it.
     const SLACK: [i64; 2] = [16 << 10, 128 << 10];
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
-    let Some(ctx) = device_with(|desc| desc.validation = Validation::Off) else { return };
+    let Some(ctx) = device_with(|desc| desc.validation = ValidationMode::Off) else { return };
     let frame = Frame::new(&ctx);
     let grown = |frames, bytes: &dyn Fn() -> Option<i64>| {
         let before = bytes();

@@ -55,7 +55,7 @@ impl AccelStorage {
     pub(crate) fn alloc(&self, gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<StorageRange> {
         let bytes = bytes.max(1).checked_next_multiple_of(ALIGNMENT).unwrap_or(u64::MAX);
         self.reserve(name, bytes)?;
-        // Validation in shaders knows where buffers end, but not where structures do.
+        // ValidationMode in shaders knows where buffers end, but not where structures do.
         let alone = bytes > LARGEST_SHARED || gpu.instance.gpu_assisted;
         let made = if alone {
             new_buffer(gpu, name, bytes).map(|buffer| (Arc::new(buffer), 0, false))

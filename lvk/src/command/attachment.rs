@@ -5,7 +5,7 @@ use crate::handle::TextureHandle;
 
 /// What a colour target holds when the pass begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ColorLoad {
+pub enum ColorLoadOp {
     /// What was in it.
     Load,
     /// This colour.
@@ -20,7 +20,7 @@ pub enum ColorLoad {
 
 /// What a depth target holds when the pass begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum DepthLoad {
+pub enum DepthLoadOp {
     /// What was in it.
     Load,
     /// This depth, 0 to 1.
@@ -31,7 +31,7 @@ pub enum DepthLoad {
 
 /// What the stencil of a depth target holds when the pass begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StencilLoad {
+pub enum StencilLoadOp {
     /// What was in it.
     Load,
     /// This value.
@@ -81,7 +81,7 @@ pub struct ColorAttachment {
     /// from its first.
     pub layer: u32,
     /// What it holds when the pass begins.
-    pub load: ColorLoad,
+    pub load: ColorLoadOp,
     /// Whether what was drawn is kept.
     pub store: bool,
     /// What several samples a pixel are resolved to; the samples themselves need not be kept.
@@ -91,7 +91,7 @@ pub struct ColorAttachment {
 impl ColorAttachment {
     /// The first mip and layer, cleared to a colour and kept.
     pub fn clear(texture: TextureHandle, color: [f32; 4]) -> Self {
-        Self { texture, mip: 0, layer: 0, load: ColorLoad::Clear(color), store: true, resolve: None }
+        Self { texture, mip: 0, layer: 0, load: ColorLoadOp::Clear(color), store: true, resolve: None }
     }
 }
 
@@ -106,11 +106,11 @@ pub struct DepthAttachment {
     /// from its first.
     pub layer: u32,
     /// What it holds when the pass begins.
-    pub load: DepthLoad,
+    pub load: DepthLoadOp,
     /// Whether the depth is kept.
     pub store: bool,
     /// What its stencil holds when the pass begins; means nothing to formats without stencil.
-    pub stencil: StencilLoad,
+    pub stencil: StencilLoadOp,
     /// Whether the stencil is kept.
     pub stencil_store: bool,
     /// Depth and stencil are loaded and tested, and never written. The texture may be sampled meanwhile, where the pass's
@@ -148,9 +148,9 @@ impl DepthAttachment {
             texture,
             mip: 0,
             layer: 0,
-            load: DepthLoad::Clear(depth),
+            load: DepthLoadOp::Clear(depth),
             store: true,
-            stencil: StencilLoad::Clear(0),
+            stencil: StencilLoadOp::Clear(0),
             stencil_store: true,
             read_only: false,
             resolve: None,
@@ -159,7 +159,7 @@ impl DepthAttachment {
 
     /// The first mip and layer, with what is in them, and kept.
     pub fn load(texture: TextureHandle) -> Self {
-        Self { load: DepthLoad::Load, stencil: StencilLoad::Load, ..Self::clear(texture, 0.0) }
+        Self { load: DepthLoadOp::Load, stencil: StencilLoadOp::Load, ..Self::clear(texture, 0.0) }
     }
 
     /// The first mip and layer, tested and not written.

@@ -71,7 +71,7 @@ impl RenderPass<'_> {
         }
     }
 
-    /// The constants of [`BlendFactor::Constant`](crate::BlendFactor::Constant) and its kin, for this and later pipelines
+    /// The constants of [`BlendFactor::ConstantColor`](crate::BlendFactor::ConstantColor) and its kin, for this and later pipelines
     /// of the pass (`vkCmdSetBlendConstants`). 0 at the begin of a pass.
     pub fn blend_constants(&mut self, constants: [f32; 4]) {
         self.dynamic.blend_constants = constants;

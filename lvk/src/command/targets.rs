@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::attachment::{ColorAttachment, ColorLoad, DepthAttachment, DepthLoad, Resolve, StencilLoad};
+use super::attachment::{ColorAttachment, ColorLoadOp, DepthAttachment, DepthLoadOp, Resolve, StencilLoadOp};
 use super::local_read::PassInputs;
 use super::pass_area::{PassArea, PassLayers};
 use super::render_pass::RenderPassDesc;
@@ -85,11 +85,11 @@ impl CommandBuffer {
             let ColorAttachment { texture, mip, layer, .. } = *attachment;
             let target = self.target(texture, mip, layer, layers, &mut size)?;
             check_color(&target.texture, attachment.load)?;
-            if attachment.store || attachment.load == ColorLoad::Load {
+            if attachment.store || attachment.load == ColorLoadOp::Load {
                 target.texture.check_kept()?;
             }
             check_apart(&target, &mut drawn)?;
-            let used = inputs.target_use(&target, Use::color_target(attachment.load == ColorLoad::Load));
+            let used = inputs.target_use(&target, Use::color_target(attachment.load == ColorLoadOp::Load));
             self.use_texture(&target.texture, target.part(), used)?;
             inputs.add_color(colors.len() as u32, &target)?;
             let mut info = color_info(&target, attachment, used)?;
@@ -190,21 +190,21 @@ fn check_apart(target: &Target, drawn: &mut Vec<(crate::barrier::ResourceId, Sub
     Ok(())
 }
 
-fn check_color(texture: &Texture, load: ColorLoad) -> Result<()> {
+fn check_color(texture: &Texture, load: ColorLoadOp) -> Result<()> {
     if !texture.format.is_color() {
         return Err(Error::usage(&texture.name, "a depth format cannot be a colour target"));
     }
     let numbers = texture.format.numbers();
     let fits = match load {
-        ColorLoad::Clear(_) => numbers == Numbers::Float,
-        ColorLoad::ClearUint(_) => numbers == Numbers::Uint,
-        ColorLoad::ClearSint(_) => numbers == Numbers::Sint,
-        ColorLoad::Load | ColorLoad::DontCare => true,
+        ColorLoadOp::Clear(_) => numbers == Numbers::Float,
+        ColorLoadOp::ClearUint(_) => numbers == Numbers::Uint,
+        ColorLoadOp::ClearSint(_) => numbers == Numbers::Sint,
+        ColorLoadOp::Load | ColorLoadOp::DontCare => true,
     };
     if fits {
         return Ok(());
     }
-    let message = format!("{:?} is cleared with ColorLoad::{}", texture.format, clear_name(texture.format));
+    let message = format!("{:?} is cleared with ColorLoadOp::{}", texture.format, clear_name(texture.format));
     Err(Error::usage(&texture.name, message))
 }
 
@@ -218,8 +218,8 @@ fn clear_name(format: Format) -> &'static str {
 
 /// Whether the pass needs what was in the target before it, or leaves something for after it.
 fn is_kept(texture: &Texture, attachment: &DepthAttachment) -> bool {
-    let stencil = attachment.stencil_store || attachment.stencil == StencilLoad::Load;
-    let depth = attachment.store || attachment.load == DepthLoad::Load;
+    let stencil = attachment.stencil_store || attachment.stencil == StencilLoadOp::Load;
+    let depth = attachment.store || attachment.load == DepthLoadOp::Load;
     depth || attachment.read_only || (texture.format.has_stencil() && stencil)
 }
 
@@ -227,13 +227,13 @@ fn check_depth(texture: &Texture, attachment: &DepthAttachment) -> Result<()> {
     if !texture.format.is_depth() {
         return Err(Error::usage(&texture.name, "the depth target needs a depth format"));
     }
-    let stencil_loads = attachment.stencil == StencilLoad::Load || !texture.format.has_stencil();
-    if attachment.read_only && !(attachment.load == DepthLoad::Load && stencil_loads) {
+    let stencil_loads = attachment.stencil == StencilLoadOp::Load || !texture.format.has_stencil();
+    if attachment.read_only && !(attachment.load == DepthLoadOp::Load && stencil_loads) {
         let message = "a read-only depth target is loaded, depth and stencil; use DepthAttachment::read_only";
         return Err(Error::usage(&texture.name, message));
     }
     match attachment.load {
-        DepthLoad::Clear(depth) if !(0.0..=1.0).contains(&depth) => {
+        DepthLoadOp::Clear(depth) if !(0.0..=1.0).contains(&depth) => {
             Err(Error::usage(&texture.name, format!("the clear depth {depth} is not between 0 and 1")))
         }
         _ => Ok(()),
@@ -246,11 +246,11 @@ fn color_info(
     used: Use,
 ) -> Result<vk::RenderingAttachmentInfo<'static>> {
     let (op, color) = match attachment.load {
-        ColorLoad::Load => (vk::AttachmentLoadOp::LOAD, vk::ClearColorValue::default()),
-        ColorLoad::DontCare => (vk::AttachmentLoadOp::DONT_CARE, vk::ClearColorValue::default()),
-        ColorLoad::Clear(float32) => (vk::AttachmentLoadOp::CLEAR, vk::ClearColorValue { float32 }),
-        ColorLoad::ClearSint(int32) => (vk::AttachmentLoadOp::CLEAR, vk::ClearColorValue { int32 }),
-        ColorLoad::ClearUint(uint32) => (vk::AttachmentLoadOp::CLEAR, vk::ClearColorValue { uint32 }),
+        ColorLoadOp::Load => (vk::AttachmentLoadOp::LOAD, vk::ClearColorValue::default()),
+        ColorLoadOp::DontCare => (vk::AttachmentLoadOp::DONT_CARE, vk::ClearColorValue::default()),
+        ColorLoadOp::Clear(float32) => (vk::AttachmentLoadOp::CLEAR, vk::ClearColorValue { float32 }),
+        ColorLoadOp::ClearSint(int32) => (vk::AttachmentLoadOp::CLEAR, vk::ClearColorValue { int32 }),
+        ColorLoadOp::ClearUint(uint32) => (vk::AttachmentLoadOp::CLEAR, vk::ClearColorValue { uint32 }),
     };
     Ok(vk::RenderingAttachmentInfo::default()
         .image_view(target.view()?)
@@ -262,9 +262,9 @@ fn color_info(
 
 fn depth_info(view: vk::ImageView, attachment: &DepthAttachment) -> vk::RenderingAttachmentInfo<'static> {
     let (op, depth) = match attachment.load {
-        DepthLoad::Load => (vk::AttachmentLoadOp::LOAD, 0.0),
-        DepthLoad::DontCare => (vk::AttachmentLoadOp::DONT_CARE, 0.0),
-        DepthLoad::Clear(depth) => (vk::AttachmentLoadOp::CLEAR, depth),
+        DepthLoadOp::Load => (vk::AttachmentLoadOp::LOAD, 0.0),
+        DepthLoadOp::DontCare => (vk::AttachmentLoadOp::DONT_CARE, 0.0),
+        DepthLoadOp::Clear(depth) => (vk::AttachmentLoadOp::CLEAR, depth),
     };
     aspect_info(view, attachment, attachment.store)
         .load_op(op)
@@ -273,9 +273,9 @@ fn depth_info(view: vk::ImageView, attachment: &DepthAttachment) -> vk::Renderin
 
 fn stencil_info(view: vk::ImageView, attachment: &DepthAttachment) -> vk::RenderingAttachmentInfo<'static> {
     let (op, value) = match attachment.stencil {
-        StencilLoad::Load => (vk::AttachmentLoadOp::LOAD, 0),
-        StencilLoad::DontCare => (vk::AttachmentLoadOp::DONT_CARE, 0),
-        StencilLoad::Clear(value) => (vk::AttachmentLoadOp::CLEAR, value),
+        StencilLoadOp::Load => (vk::AttachmentLoadOp::LOAD, 0),
+        StencilLoadOp::DontCare => (vk::AttachmentLoadOp::DONT_CARE, 0),
+        StencilLoadOp::Clear(value) => (vk::AttachmentLoadOp::CLEAR, value),
     };
     let depth_stencil = vk::ClearDepthStencilValue { depth: 0.0, stencil: value.into() };
     aspect_info(view, attachment, attachment.stencil_store)

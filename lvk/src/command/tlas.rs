@@ -80,7 +80,7 @@ impl CommandBuffer {
     /// # Errors
     /// As [`update_tlas`](Self::update_tlas), but the records themselves are not checked; and
     /// [`InvalidUsage`](Error::InvalidUsage) for a buffer without the usage, or too small.
-    pub fn update_tlas_from(
+    pub fn update_tlas_from_buffer(
         &mut self,
         tlas: AccelStructHandle,
         instances: &DeviceInstances<'_>,

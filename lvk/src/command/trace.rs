@@ -33,11 +33,11 @@ impl CommandBuffer {
 
     /// Runs the first ray generation shader `size[0] * size[1] * size[2]` times (`vkCmdTraceRaysKHR`).
     pub fn trace_rays(&mut self, size: [u32; 3], dependencies: &Dependencies<'_>) -> Result<()> {
-        self.trace_rays_from(0, size, dependencies)
+        self.trace_rays_with(0, size, dependencies)
     }
 
     /// As [`trace_rays`](Self::trace_rays), with the ray generation shader at place `ray_gen` of the pipeline's list.
-    pub fn trace_rays_from(
+    pub fn trace_rays_with(
         &mut self,
         ray_gen: u32,
         size: [u32; 3],

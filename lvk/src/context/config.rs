@@ -4,8 +4,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::gpu::caps::FeatureRequest;
-use crate::gpu::debug::{Validation, ValidationSink};
-use crate::gpu::extra::ExtraExtensions;
+use crate::gpu::debug::{ValidationMode, ValidationSink};
+use crate::gpu::extra::UserExtensions;
 use crate::gpu::optional::OptionalFeature;
 use crate::gpu::profile::DeviceProfile;
 use crate::gpu::queues::QueueRequest;
@@ -24,7 +24,7 @@ pub struct ContextDesc<'a> {
     /// environment variable `LVK_DEVICE` goes before it. Without either the best device that has what is required.
     pub device: Option<&'a str>,
     /// How much the validation layer checks.
-    pub validation: Validation,
+    pub validation: ValidationMode,
     /// Where messages of the layer go; all go to the `log` crate too.
     pub validation_sink: Option<ValidationSink>,
     /// Whether Vulkan objects get their debug names, and command buffers their labels. Without an answer they do where
@@ -47,7 +47,7 @@ pub struct ContextDesc<'a> {
     /// Optional features that are needed: only devices that have them all are considered.
     pub required_features: &'a [OptionalFeature],
     /// Extensions and features of the caller's own; only devices that have the extensions are considered.
-    pub extra: ExtraExtensions<'a>,
+    pub user_extensions: UserExtensions<'a>,
     /// A window that the device must be able to show pictures in; swapchains without a window of their own take it, see
     /// [`Context::create_swapchain`](crate::Context::create_swapchain). `None` for contexts without windows, which use no
     /// extension of any window system.
@@ -107,7 +107,7 @@ impl Default for ContextDesc<'_> {
             application_name: "lvk",
             vulkan_library: None,
             device: None,
-            validation: Validation::Off,
+            validation: ValidationMode::Off,
             validation_sink: None,
             debug_names: None,
             check_indices: false,
@@ -115,7 +115,7 @@ impl Default for ContextDesc<'_> {
             ray_query: RayQueryRequest::default(),
             queues: QueueRequest::default(),
             required_features: &[],
-            extra: ExtraExtensions::default(),
+            user_extensions: UserExtensions::default(),
             window: None,
             profile: None,
             frames_in_flight: 2,

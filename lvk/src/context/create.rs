@@ -17,7 +17,7 @@ use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::resource::query::QueryPoolDesc;
 use crate::resource::sampler::SamplerDesc;
 use crate::resource::{Buffer, QueryPool, Sampler};
-use crate::shader::{ShaderCache, ShaderCacheCounts, ShaderModuleDesc, raw_hit_number};
+use crate::shader::{ShaderCache, ShaderCacheStats, ShaderModuleDesc, raw_hit_number};
 
 /// Objects that take no bindless slot.
 pub(super) const NO_SLOT: u32 = 0;
@@ -66,7 +66,7 @@ impl Context {
 
     /// How many modules made from GLSL were found in the folder of
     /// [`ContextDesc::shader_cache`](crate::ContextDesc::shader_cache), and how many were not; zeros without a folder.
-    pub fn shader_cache_counts(&self) -> ShaderCacheCounts {
+    pub fn shader_cache_stats(&self) -> ShaderCacheStats {
         self.shared().shader_cache.as_ref().map(ShaderCache::counts).unwrap_or_default()
     }
 

@@ -70,8 +70,8 @@ impl Context {
     /// it, and never the image.
     ///
     /// Barriers follow it like any other texture, from the layout it is said to be in. To give it back,
-    /// [`CommandBuffer::hand_over_texture`] brings it into a layout; after others have used it,
-    /// [`texture_came_back`](Self::texture_came_back) says in which one it is.
+    /// [`CommandBuffer::release_texture`] brings it into a layout; after others have used it,
+    /// [`acquire_texture`](Self::acquire_texture) says in which one it is.
     ///
     /// # Safety
     /// The image belongs to this device and the graphics queue's family, or was made for concurrent use, is as described, and lives
@@ -141,7 +141,7 @@ impl Context {
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for a layout that is not in the list of
     /// [`ImportedTexture::layout`].
-    pub unsafe fn texture_came_back(&self, texture: TextureHandle, layout: vk::ImageLayout) -> Result<()> {
+    pub unsafe fn acquire_texture(&self, texture: TextureHandle, layout: vk::ImageLayout) -> Result<()> {
         let texture = self.shared().store.textures.get(texture)?;
         let layout = known_layout(layout).map_err(|why| Error::usage(&texture.name, why))?;
         self.shared().submitter.import_texture(texture.image.id, texture.image.shape, layout);

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::Context;
 use crate::error::Result;
-use crate::gpu::clock::ClockPair;
+use crate::gpu::clock::CalibratedTimestamps;
 use crate::handle::QueryPoolHandle;
 use crate::resource::query::PipelineStatistics;
 
@@ -49,11 +49,11 @@ impl Context {
     /// [`Unsupported`](crate::Error::Unsupported) without
     /// [`Capabilities::calibrated_timestamps`](crate::Capabilities::calibrated_timestamps), and where the driver knows
     /// no `CLOCK_MONOTONIC`.
-    pub fn clock_pair(&self) -> Result<ClockPair> {
+    pub fn calibrated_timestamps(&self) -> Result<CalibratedTimestamps> {
         let gpu = &self.shared().gpu;
         let clock = gpu.host_clock.as_ref().ok_or_else(|| gpu.lacks("clocks of device and host together"))?;
         let (ticks, host, deviation) = clock.read()?;
-        Ok(ClockPair {
+        Ok(CalibratedTimestamps {
             gpu_ms: gpu.milliseconds(ticks),
             host: Duration::from_nanos(host),
             deviation: Duration::from_nanos(deviation),

@@ -19,7 +19,7 @@ use crate::command::SpareNotes;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::{Capabilities, PhysicalDevice};
-use crate::gpu::debug::{Validation, ValidationSink};
+use crate::gpu::debug::{ValidationMode, ValidationSink};
 use crate::gpu::device::DeviceRequest;
 use crate::gpu::instance::{Instance, InstanceDesc};
 use crate::gpu::queues::QueueRequest;
@@ -49,7 +49,7 @@ impl Context {
             application_name: desc.application_name,
             library: desc.vulkan_library,
             validation: desc.validation,
-            extra: desc.extra.of_instance(),
+            extra: desc.user_extensions.of_instance(),
             window: desc.window.as_deref(),
             sink,
         })?;
@@ -60,7 +60,7 @@ impl Context {
             query: desc.ray_query,
             required: desc.required_features,
             profile: desc.profile,
-            extra: desc.extra,
+            extra: desc.user_extensions,
             debug_names: desc.debug_names,
             queues: requested_queues(desc),
             window: desc.window.as_deref(),
@@ -91,7 +91,7 @@ impl Context {
         let instance = Instance::new(&InstanceDesc {
             application_name: "lvk",
             library: vulkan_library,
-            validation: Validation::Off,
+            validation: ValidationMode::Off,
             extra: &[],
             window: None,
             sink: ValidationSink::default(),

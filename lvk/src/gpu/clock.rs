@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 
 /// One moment on the clock of the GPU and on that of the host.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ClockPair {
+pub struct CalibratedTimestamps {
     /// Milliseconds on the scale of [`Context::timestamps_ms`](crate::Context::timestamps_ms).
     pub gpu_ms: f64,
     /// Time of the host's `CLOCK_MONOTONIC`, which [`Instant`](std::time::Instant) counts on Linux.
@@ -19,7 +19,7 @@ pub struct ClockPair {
     pub deviation: Duration,
 }
 
-impl ClockPair {
+impl CalibratedTimestamps {
     /// When the host's clock showed what the GPU's showed at `gpu_ms`; zero for times before the host's clock began or
     /// that are no time. The clocks drift apart: take pairs anew every second or so.
     pub fn host_at(&self, gpu_ms: f64) -> Duration {
@@ -85,7 +85,8 @@ mod tests {
 
     #[test]
     fn times_are_carried_over_in_both_directions() {
-        let pair = ClockPair { gpu_ms: 500.0, host: Duration::from_millis(7), deviation: Duration::ZERO };
+        let pair =
+            CalibratedTimestamps { gpu_ms: 500.0, host: Duration::from_millis(7), deviation: Duration::ZERO };
         assert_eq!(pair.host_at(502.5), Duration::from_micros(9_500));
         assert_eq!(pair.host_at(499.0), Duration::from_millis(6));
         assert_eq!(pair.host_at(0.0), Duration::ZERO);

@@ -8,15 +8,15 @@ use ash::vk;
 
 use crate::lock::{Guard, Mutex, Rank};
 
-/// How much the validation layer checks. The layer must be installed; see [`Validation::Standard`].
+/// How much the validation layer checks. The layer must be installed; see [`ValidationMode::Standard`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Validation {
+pub enum ValidationMode {
     /// No layer is loaded.
     #[default]
     Off,
     /// Core checks, and synchronization validation with the shader-access heuristic.
     Standard,
-    /// As [`Standard`](Validation::Standard), and shaders are instrumented to check their accesses on the GPU.
+    /// As [`Standard`](ValidationMode::Standard), and shaders are instrumented to check their accesses on the GPU.
     /// About half as slow again; meant as a run of its own.
     GpuAssisted,
 }

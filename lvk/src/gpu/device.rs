@@ -10,7 +10,7 @@ use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
 use super::clock::HostClock;
 use super::descriptor_limits::DescriptorLimits;
 use super::device_changes::change_devices;
-use super::extra::ExtraExtensions;
+use super::extra::UserExtensions;
 use super::features::Features;
 use super::foreign::RawContext;
 use super::format_features::FormatAnswers;
@@ -39,7 +39,7 @@ pub(crate) struct DeviceRequest<'a> {
     /// Optional features that only devices which have them all will do for.
     pub(crate) required: &'a [OptionalFeature],
     pub(crate) profile: Option<&'a DeviceProfile>,
-    pub(crate) extra: ExtraExtensions<'a>,
+    pub(crate) extra: UserExtensions<'a>,
     /// Whether objects get names for debuggers; where somebody reads them without it.
     pub(crate) debug_names: Option<bool>,
     pub(crate) queues: QueueRequest,
@@ -412,7 +412,7 @@ fn create(
     instance: &Instance,
     chosen: &PhysicalDevice,
     caps: &Capabilities,
-    extra: &ExtraExtensions<'_>,
+    extra: &UserExtensions<'_>,
 ) -> Result<(ash::Device, Features), vk::Result> {
     let features = enabled(instance, chosen, caps);
     let extensions = extensions(&features, caps, extra);
@@ -462,7 +462,7 @@ fn enabled(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) ->
 }
 
 /// Each once.
-fn extensions<'a>(features: &Features, caps: &Capabilities, extra: &ExtraExtensions<'a>) -> Vec<&'a CStr> {
+fn extensions<'a>(features: &Features, caps: &Capabilities, extra: &UserExtensions<'a>) -> Vec<&'a CStr> {
     let libraries = caps.pipeline_libraries.then_some(ash::khr::pipeline_library::NAME);
     let own = features.extensions().chain(caps.optional.extensions()).chain(libraries);
     let mut names: Vec<&'a CStr> = own.map(|name| -> &'a CStr { name }).collect();

@@ -10,14 +10,14 @@ use ash::vk;
 ///
 /// Empty by default. What the library turns on itself may be named again among the extensions, not among the features.
 #[derive(Clone, Copy, Default)]
-pub struct ExtraExtensions<'a> {
+pub struct UserExtensions<'a> {
     instance: &'a [&'a CStr],
     device: &'a [&'a CStr],
     capabilities: &'a [u32],
     features: Option<&'a (dyn vk::ExtendsDeviceCreateInfo + Sync)>,
 }
 
-impl<'a> ExtraExtensions<'a> {
+impl<'a> UserExtensions<'a> {
     /// Extensions of the instance, extensions of the device, a chain of feature structures to put behind
     /// `VkDeviceCreateInfo` with `pNext` set between them and null at its end, and the numbers of SPIR-V capabilities
     /// that they allow.
@@ -55,9 +55,9 @@ impl<'a> ExtraExtensions<'a> {
     }
 }
 
-impl fmt::Debug for ExtraExtensions<'_> {
+impl fmt::Debug for UserExtensions<'_> {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        out.debug_struct("ExtraExtensions")
+        out.debug_struct("UserExtensions")
             .field("instance", &self.instance)
             .field("device", &self.device)
             .field("capabilities", &self.capabilities)

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use ash::vk;
 
-use super::debug::{Messenger, Validation, ValidationSink, c_name};
+use super::debug::{Messenger, ValidationMode, ValidationSink, c_name};
 use super::window::{WindowExtensions, WindowHandles};
 use crate::error::{Error, Result};
 
@@ -32,7 +32,7 @@ pub(crate) struct InstanceDesc<'a> {
     pub(crate) application_name: &'a str,
     /// The loader to open.
     pub(crate) library: Option<&'a Path>,
-    pub(crate) validation: Validation,
+    pub(crate) validation: ValidationMode,
     /// Extensions of the caller's own.
     pub(crate) extra: &'a [&'a CStr],
     /// A window that the instance has to know.
@@ -56,7 +56,7 @@ impl Instance {
             unsafe { raw.destroy_instance(None) };
             return Err(Error::vulkan("vkCreateDebugUtilsMessengerEXT")(result));
         }
-        let gpu_assisted = desc.validation == Validation::GpuAssisted;
+        let gpu_assisted = desc.validation == ValidationMode::GpuAssisted;
         let validated = layer.is_some();
         let Extensions { debug_utils, windows, .. } = extensions;
         Ok(Self { entry, raw, debug_utils, validated, gpu_assisted, windows, messenger, is_foreign: false })
@@ -123,8 +123,8 @@ fn check_version(entry: &ash::Entry) -> Result<()> {
     Err(Error::NoVulkan { reason: format!("the loader offers Vulkan {major}.{minor}, 1.3 is needed") })
 }
 
-fn find_layer(entry: &ash::Entry, validation: Validation) -> Result<Option<&'static CStr>> {
-    if validation == Validation::Off {
+fn find_layer(entry: &ash::Entry, validation: ValidationMode) -> Result<Option<&'static CStr>> {
+    if validation == ValidationMode::Off {
         return Ok(None);
     }
     // SAFETY: no preconditions.
@@ -220,8 +220,8 @@ fn create(
 }
 
 /// The switches of the layer, by its own setting names.
-fn switches(validation: Validation) -> Vec<(CString, bool)> {
-    let gpu = validation == Validation::GpuAssisted;
+fn switches(validation: ValidationMode) -> Vec<(CString, bool)> {
+    let gpu = validation == ValidationMode::GpuAssisted;
     [
         ("validate_core", true),
         ("validate_sync", true),

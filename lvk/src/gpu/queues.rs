@@ -46,7 +46,7 @@ pub enum QueueRequest {
     Shared,
     /// Always: those that share a queue of the device wait for each other, and move what they own, as if each had its own.
     /// It shows on any device, and to its validation layer, what several queues do; it makes nothing faster.
-    Rehearsed,
+    Emulated,
 }
 
 /// What counts of timestamps of several queues, which have so many bits each: the bits that all have that have any.
@@ -166,7 +166,7 @@ impl Queues {
             })
         });
         let families = raw.map(|(_, family)| family);
-        let rehearsed = request == QueueRequest::Rehearsed;
+        let rehearsed = request == QueueRequest::Emulated;
         let apart = [0, 1, 2].map(|lane: usize| lane > 0 && (rehearsed || places[lane] != places[0]));
         let mut distinct = families.to_vec();
         distinct.sort_unstable();
@@ -279,7 +279,7 @@ mod tests {
             (Queue::ALL.map(|queue| queues.lane(queue)), queues.has_domains(), queues.families().to_vec())
         };
         assert_eq!(lanes(one, QueueRequest::OwnHardware), ([0; 3], false, vec![0]));
-        assert_eq!(lanes(one, QueueRequest::Rehearsed), ([0, 1, 2], true, vec![0]));
+        assert_eq!(lanes(one, QueueRequest::Emulated), ([0, 1, 2], true, vec![0]));
         assert_eq!(lanes(three, QueueRequest::OwnHardware), ([0, 1, 2], true, vec![0, 2, 4]));
         assert_eq!(lanes(three, QueueRequest::Shared), ([0; 3], false, vec![0]));
         let one_family = [raw(1, 0), raw(2, 0), raw(1, 0)];

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 /// How two rates become one (`VkFragmentShadingRateCombinerOpKHR`), width and height each for itself. All but
 /// [`Keep`](Self::Keep) and [`Replace`](Self::Replace) need [`ShadingRateLimits::combines`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum RateCombine {
+pub enum ShadingRateCombiner {
     /// The first.
     #[default]
     Keep,
@@ -25,7 +25,7 @@ pub enum RateCombine {
     Multiply,
 }
 
-impl RateCombine {
+impl ShadingRateCombiner {
     pub(crate) fn raw(self) -> vk::FragmentShadingRateCombinerOpKHR {
         use vk::FragmentShadingRateCombinerOpKHR as Raw;
         match self {
@@ -48,9 +48,9 @@ pub struct ShadingRate {
     /// Width and height in pixels, each 1, 2 or 4: one of [`Context::shading_rates`](crate::Context::shading_rates).
     pub size: [u32; 2],
     /// How the primitive's rate comes in.
-    pub primitive: RateCombine,
+    pub primitive: ShadingRateCombiner,
     /// How the attachment's rate comes in then.
-    pub attachment: RateCombine,
+    pub attachment: ShadingRateCombiner,
 }
 
 impl Default for ShadingRate {
@@ -62,17 +62,17 @@ impl Default for ShadingRate {
 impl ShadingRate {
     /// Fragments of this size, whatever primitives and attachments say.
     pub const fn of(size: [u32; 2]) -> Self {
-        Self { size, primitive: RateCombine::Keep, attachment: RateCombine::Keep }
+        Self { size, primitive: ShadingRateCombiner::Keep, attachment: ShadingRateCombiner::Keep }
     }
 
     /// Fragments of the sizes that the pass's attachment says.
     pub const fn by_attachment() -> Self {
-        Self { attachment: RateCombine::Replace, ..Self::of([1, 1]) }
+        Self { attachment: ShadingRateCombiner::Replace, ..Self::of([1, 1]) }
     }
 
     /// Fragments of the sizes that primitives say.
     pub const fn by_primitive() -> Self {
-        Self { primitive: RateCombine::Replace, ..Self::of([1, 1]) }
+        Self { primitive: ShadingRateCombiner::Replace, ..Self::of([1, 1]) }
     }
 
     /// A texel of an attachment, and a `gl_PrimitiveShadingRateEXT`, that stands for this size; `None` for sides other than 1,
@@ -120,8 +120,8 @@ pub struct ShadingRateLimits {
     pub max_texel: [u32; 2],
     /// How much longer than the other one side of such a texel may be.
     pub max_texel_aspect: u32,
-    /// Rates can be put together by [`RateCombine::Min`], [`Max`](RateCombine::Max) and
-    /// [`Multiply`](RateCombine::Multiply).
+    /// Rates can be put together by [`ShadingRateCombiner::Min`], [`Max`](ShadingRateCombiner::Max) and
+    /// [`Multiply`](ShadingRateCombiner::Multiply).
     pub combines: bool,
     /// Products are products.
     pub multiplies: bool,
@@ -181,7 +181,8 @@ fn check(rate: &ShadingRate, samples: u32, sizes: &[FragmentSize], combines: boo
     if rate.size != [1, 1] && !there.contains(&rate.size) {
         return Err(Refusal::Lacks(format!("with {samples} samples a pixel it has {there:?}")));
     }
-    let simple = |by: RateCombine| matches!(by, RateCombine::Keep | RateCombine::Replace);
+    let simple =
+        |by: ShadingRateCombiner| matches!(by, ShadingRateCombiner::Keep | ShadingRateCombiner::Replace);
     if combines || [rate.primitive, rate.attachment].into_iter().all(simple) {
         return Ok(());
     }
@@ -240,10 +241,10 @@ impl Gpu {
     pub(crate) fn check_shading_rate(&self, name: &str, rate: &ShadingRate, samples: u32) -> Result<()> {
         let what = format!("the shading rate {:?} of '{name}'", rate.size);
         self.require(OptionalFeature::PipelineShadingRate, &what)?;
-        if rate.primitive != RateCombine::Keep {
+        if rate.primitive != ShadingRateCombiner::Keep {
             self.require(OptionalFeature::PrimitiveShadingRate, &format!("primitives in {what}"))?;
         }
-        if rate.attachment != RateCombine::Keep {
+        if rate.attachment != ShadingRateCombiner::Keep {
             self.require(OptionalFeature::AttachmentShadingRate, &format!("the attachment in {what}"))?;
         }
         let sizes = self.shading_rates.as_ref().map_or(&[][..], |rates| &rates.sizes);
@@ -296,7 +297,7 @@ mod tests {
 
     #[test]
     fn only_some_devices_compare_rates() {
-        use RateCombine::{Keep, Max, Min, Multiply, Replace};
+        use ShadingRateCombiner::{Keep, Max, Min, Multiply, Replace};
         for (by, simple) in [(Keep, true), (Replace, true), (Min, false), (Max, false), (Multiply, false)] {
             for rate in [
                 ShadingRate { primitive: by, ..ShadingRate::default() },

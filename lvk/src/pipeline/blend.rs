@@ -12,40 +12,40 @@ pub enum BlendFactor {
     /// 1.
     One,
     /// The source's own channels.
-    Source,
+    SrcColor,
     /// 1 minus the source's own channels.
-    OneMinusSource,
+    OneMinusSrcColor,
     /// The target's own channels.
-    Target,
+    DstColor,
     /// 1 minus the target's own channels.
-    OneMinusTarget,
+    OneMinusDstColor,
     /// The source's alpha.
-    SourceAlpha,
+    SrcAlpha,
     /// 1 minus the source's alpha.
-    OneMinusSourceAlpha,
+    OneMinusSrcAlpha,
     /// The target's alpha.
-    TargetAlpha,
+    DstAlpha,
     /// 1 minus the target's alpha.
-    OneMinusTargetAlpha,
+    OneMinusDstAlpha,
     /// The channels of [`RenderPass::blend_constants`](crate::RenderPass::blend_constants).
-    Constant,
+    ConstantColor,
     /// 1 minus those.
-    OneMinusConstant,
+    OneMinusConstantColor,
     /// The alpha of [`RenderPass::blend_constants`](crate::RenderPass::blend_constants).
     ConstantAlpha,
     /// 1 minus that.
     OneMinusConstantAlpha,
     /// The lesser of the source's alpha and 1 minus the target's; 1 for alpha.
-    SourceAlphaSaturate,
+    SrcAlphaSaturate,
     /// The channels of the shader's second output, `layout(location = 0, index = 1)`
     /// ([`OptionalFeature::DualSourceBlend`](crate::OptionalFeature::DualSourceBlend)).
-    Second,
+    Src1Color,
     /// 1 minus those.
-    OneMinusSecond,
+    OneMinusSrc1Color,
     /// The alpha of that output.
-    SecondAlpha,
+    Src1Alpha,
     /// 1 minus that.
-    OneMinusSecondAlpha,
+    OneMinusSrc1Alpha,
 }
 
 impl BlendFactor {
@@ -53,33 +53,33 @@ impl BlendFactor {
         match self {
             Self::Zero => vk::BlendFactor::ZERO,
             Self::One => vk::BlendFactor::ONE,
-            Self::Source => vk::BlendFactor::SRC_COLOR,
-            Self::OneMinusSource => vk::BlendFactor::ONE_MINUS_SRC_COLOR,
-            Self::Target => vk::BlendFactor::DST_COLOR,
-            Self::OneMinusTarget => vk::BlendFactor::ONE_MINUS_DST_COLOR,
-            Self::SourceAlpha => vk::BlendFactor::SRC_ALPHA,
-            Self::OneMinusSourceAlpha => vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
-            Self::TargetAlpha => vk::BlendFactor::DST_ALPHA,
-            Self::OneMinusTargetAlpha => vk::BlendFactor::ONE_MINUS_DST_ALPHA,
-            Self::Constant => vk::BlendFactor::CONSTANT_COLOR,
-            Self::OneMinusConstant => vk::BlendFactor::ONE_MINUS_CONSTANT_COLOR,
+            Self::SrcColor => vk::BlendFactor::SRC_COLOR,
+            Self::OneMinusSrcColor => vk::BlendFactor::ONE_MINUS_SRC_COLOR,
+            Self::DstColor => vk::BlendFactor::DST_COLOR,
+            Self::OneMinusDstColor => vk::BlendFactor::ONE_MINUS_DST_COLOR,
+            Self::SrcAlpha => vk::BlendFactor::SRC_ALPHA,
+            Self::OneMinusSrcAlpha => vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
+            Self::DstAlpha => vk::BlendFactor::DST_ALPHA,
+            Self::OneMinusDstAlpha => vk::BlendFactor::ONE_MINUS_DST_ALPHA,
+            Self::ConstantColor => vk::BlendFactor::CONSTANT_COLOR,
+            Self::OneMinusConstantColor => vk::BlendFactor::ONE_MINUS_CONSTANT_COLOR,
             Self::ConstantAlpha => vk::BlendFactor::CONSTANT_ALPHA,
             Self::OneMinusConstantAlpha => vk::BlendFactor::ONE_MINUS_CONSTANT_ALPHA,
-            Self::SourceAlphaSaturate => vk::BlendFactor::SRC_ALPHA_SATURATE,
-            Self::Second => vk::BlendFactor::SRC1_COLOR,
-            Self::OneMinusSecond => vk::BlendFactor::ONE_MINUS_SRC1_COLOR,
-            Self::SecondAlpha => vk::BlendFactor::SRC1_ALPHA,
-            Self::OneMinusSecondAlpha => vk::BlendFactor::ONE_MINUS_SRC1_ALPHA,
+            Self::SrcAlphaSaturate => vk::BlendFactor::SRC_ALPHA_SATURATE,
+            Self::Src1Color => vk::BlendFactor::SRC1_COLOR,
+            Self::OneMinusSrc1Color => vk::BlendFactor::ONE_MINUS_SRC1_COLOR,
+            Self::Src1Alpha => vk::BlendFactor::SRC1_ALPHA,
+            Self::OneMinusSrc1Alpha => vk::BlendFactor::ONE_MINUS_SRC1_ALPHA,
         }
     }
 
     fn is_second(self) -> bool {
-        matches!(self, Self::Second | Self::OneMinusSecond | Self::SecondAlpha | Self::OneMinusSecondAlpha)
+        matches!(self, Self::Src1Color | Self::OneMinusSrc1Color | Self::Src1Alpha | Self::OneMinusSrc1Alpha)
     }
 
     fn is_constant(self) -> bool {
-        use BlendFactor::{Constant, ConstantAlpha, OneMinusConstant, OneMinusConstantAlpha};
-        matches!(self, Constant | OneMinusConstant | ConstantAlpha | OneMinusConstantAlpha)
+        use BlendFactor::{ConstantAlpha, ConstantColor, OneMinusConstantAlpha, OneMinusConstantColor};
+        matches!(self, ConstantColor | OneMinusConstantColor | ConstantAlpha | OneMinusConstantAlpha)
     }
 }
 
@@ -113,7 +113,7 @@ impl BlendOp {
 
 /// How some of the channels are combined: `source * factor op target * factor`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub struct BlendPart {
+pub struct BlendComponent {
     /// Factor of the source.
     pub source: BlendFactor,
     /// Factor of the target.
@@ -122,7 +122,7 @@ pub struct BlendPart {
     pub op: BlendOp,
 }
 
-impl BlendPart {
+impl BlendComponent {
     /// The sum of both, multiplied by their factors.
     pub const fn sum(source: BlendFactor, target: BlendFactor) -> Self {
         Self { source, target, op: BlendOp::Add }
@@ -133,25 +133,25 @@ impl BlendPart {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Blend {
     /// Red, green and blue.
-    pub color: BlendPart,
+    pub color: BlendComponent,
     /// Alpha.
-    pub alpha: BlendPart,
+    pub alpha: BlendComponent,
 }
 
 impl Blend {
     /// `source * alpha + target * (1 - alpha)`.
     pub const ALPHA: Self = Self {
-        color: BlendPart::sum(BlendFactor::SourceAlpha, BlendFactor::OneMinusSourceAlpha),
-        alpha: BlendPart::sum(BlendFactor::One, BlendFactor::OneMinusSourceAlpha),
+        color: BlendComponent::sum(BlendFactor::SrcAlpha, BlendFactor::OneMinusSrcAlpha),
+        alpha: BlendComponent::sum(BlendFactor::One, BlendFactor::OneMinusSrcAlpha),
     };
     /// `source + target * (1 - alpha)`.
     pub const PREMULTIPLIED_ALPHA: Self =
-        Self::both(BlendPart::sum(BlendFactor::One, BlendFactor::OneMinusSourceAlpha));
+        Self::both(BlendComponent::sum(BlendFactor::One, BlendFactor::OneMinusSrcAlpha));
     /// `source + target`.
-    pub const ADDITIVE: Self = Self::both(BlendPart::sum(BlendFactor::One, BlendFactor::One));
+    pub const ADDITIVE: Self = Self::both(BlendComponent::sum(BlendFactor::One, BlendFactor::One));
 
     /// Colour and alpha alike.
-    pub const fn both(part: BlendPart) -> Self {
+    pub const fn both(part: BlendComponent) -> Self {
         Self { color: part, alpha: part }
     }
 
@@ -173,7 +173,7 @@ impl Blend {
 bitflags! {
     /// Channels of a target.
     #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-    pub struct ColorWrites: u32 {
+    pub struct ColorWriteMask: u32 {
         /// Red.
         const RED = 1 << 0;
         /// Green.
@@ -185,8 +185,11 @@ bitflags! {
     }
 }
 
-/// What Vulkan takes for one target. Vulkan's bits of channels are those of [`ColorWrites`].
-pub(super) fn blend_state(blend: Option<Blend>, write: ColorWrites) -> vk::PipelineColorBlendAttachmentState {
+/// What Vulkan takes for one target. Vulkan's bits of channels are those of [`ColorWriteMask`].
+pub(super) fn blend_state(
+    blend: Option<Blend>,
+    write: ColorWriteMask,
+) -> vk::PipelineColorBlendAttachmentState {
     let state = vk::PipelineColorBlendAttachmentState::default()
         .color_write_mask(vk::ColorComponentFlags::from_raw(write.bits()));
     let Some(Blend { color, alpha }) = blend else { return state };
@@ -207,10 +210,10 @@ mod tests {
     #[test]
     fn channels_are_those_of_vulkan() {
         for (own, raw) in [
-            (ColorWrites::RED, vk::ColorComponentFlags::R),
-            (ColorWrites::GREEN, vk::ColorComponentFlags::G),
-            (ColorWrites::BLUE, vk::ColorComponentFlags::B),
-            (ColorWrites::ALPHA, vk::ColorComponentFlags::A),
+            (ColorWriteMask::RED, vk::ColorComponentFlags::R),
+            (ColorWriteMask::GREEN, vk::ColorComponentFlags::G),
+            (ColorWriteMask::BLUE, vk::ColorComponentFlags::B),
+            (ColorWriteMask::ALPHA, vk::ColorComponentFlags::A),
         ] {
             assert_eq!(blend_state(None, own).color_write_mask, raw);
         }
@@ -218,8 +221,8 @@ mod tests {
 
     #[test]
     fn what_a_factor_takes_is_known_wherever_it_stands() {
-        let sum = BlendPart::sum;
-        let (one, second, constant) = (BlendFactor::One, BlendFactor::SecondAlpha, BlendFactor::Constant);
+        let sum = BlendComponent::sum;
+        let (one, second, constant) = (BlendFactor::One, BlendFactor::Src1Alpha, BlendFactor::ConstantColor);
         assert!(!Blend::ALPHA.takes_second() && !Blend::ADDITIVE.takes_constants());
         let alpha = Blend { alpha: sum(one, second), ..Blend::ALPHA };
         assert!(alpha.takes_second() && !alpha.takes_constants());

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::blend::{Blend, ColorWrites, blend_state};
+use super::blend::{Blend, ColorWriteMask, blend_state};
 use super::depth_stencil::{DepthState, DepthTest, depth_stencil_state};
 use super::graphics_check::{check, check_stages};
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute};
@@ -272,7 +272,7 @@ fn blend_states(
     modules: &RenderModules,
 ) -> Vec<vk::PipelineColorBlendAttachmentState> {
     let write = |place, target: &ColorTarget| {
-        if writes_color(modules, place, target) { target.write } else { ColorWrites::empty() }
+        if writes_color(modules, place, target) { target.write } else { ColorWriteMask::empty() }
     };
     let targets = (0..).zip(desc.color);
     targets.map(|(place, target)| blend_state(target.blend, write(place, target))).collect()

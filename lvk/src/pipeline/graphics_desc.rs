@@ -1,6 +1,6 @@
 //! What a caller says about a graphics pipeline.
 
-use super::blend::{Blend, ColorWrites};
+use super::blend::{Blend, ColorWriteMask};
 use super::depth_stencil::{DepthTest, StencilTest};
 use super::raster::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
 use super::shape::PassShape;
@@ -39,18 +39,18 @@ pub struct ColorTarget {
     /// How colours are combined; `None` replaces.
     pub blend: Option<Blend>,
     /// Channels that are written.
-    pub write: ColorWrites,
+    pub write: ColorWriteMask,
 }
 
 impl ColorTarget {
     /// Replaced in all channels.
     pub const fn new(format: Format) -> Self {
-        Self { format, blend: None, write: ColorWrites::all() }
+        Self { format, blend: None, write: ColorWriteMask::all() }
     }
 
     /// Combined with what is there, in all channels.
     pub const fn blended(format: Format, blend: Blend) -> Self {
-        Self { format, blend: Some(blend), write: ColorWrites::all() }
+        Self { format, blend: Some(blend), write: ColorWriteMask::all() }
     }
 }
 

@@ -95,7 +95,7 @@ impl BorderColor {
 
 /// What becomes of the texels that a filter reads (`VkSamplerReductionMode`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum Reduction {
+pub enum SamplerReductionMode {
     /// Their weighted mean.
     #[default]
     Mean,
@@ -106,7 +106,7 @@ pub enum Reduction {
     Max,
 }
 
-impl Reduction {
+impl SamplerReductionMode {
     fn raw(self) -> vk::SamplerReductionMode {
         match self {
             Self::Mean => vk::SamplerReductionMode::WEIGHTED_AVERAGE,
@@ -171,7 +171,7 @@ pub struct SamplerDesc<'a> {
     /// What lies beyond the edge where an address clamps to the border.
     pub border: BorderColor,
     /// What becomes of the texels that are read; not beside a comparison.
-    pub reduction: Reduction,
+    pub reduction: SamplerReductionMode,
     /// Added to the level of detail; at most [`Limits::max_lod_bias`](crate::Limits), in either direction.
     pub lod_bias: f32,
     /// Smallest and largest level of detail.
@@ -190,7 +190,7 @@ impl Default for SamplerDesc<'_> {
             max_anisotropy: 1.0,
             compare: None,
             border: BorderColor::TransparentBlack,
-            reduction: Reduction::Mean,
+            reduction: SamplerReductionMode::Mean,
             lod_bias: 0.0,
             lod_range: [0.0, vk::LOD_CLAMP_NONE],
             debug_name: "sampler",
@@ -221,7 +221,7 @@ impl Sampler {
         if custom_border.is_some() {
             info = info.push_next(&mut border);
         }
-        if desc.reduction != Reduction::Mean {
+        if desc.reduction != SamplerReductionMode::Mean {
             info = info.push_next(&mut reduction);
         }
         // SAFETY: the description is valid, and the features it needs are on.
@@ -272,12 +272,12 @@ fn check(gpu: &Gpu, desc: &SamplerDesc<'_>) -> Result<()> {
     if desc.lod_bias.abs() > limit {
         return wrong(&format!("the level of detail can be biased by {limit}, not by {}", desc.lod_bias));
     }
-    if desc.compare.is_some() && desc.reduction != Reduction::Mean {
+    if desc.compare.is_some() && desc.reduction != SamplerReductionMode::Mean {
         return wrong("what comparisons answer is only averaged; leave the reduction at Mean");
     }
     let needed = [
         (desc.address.contains(&AddressMode::MirrorClampToEdge), OptionalFeature::MirrorClampToEdge),
-        (desc.reduction != Reduction::Mean, OptionalFeature::FilterMinMax),
+        (desc.reduction != SamplerReductionMode::Mean, OptionalFeature::FilterMinMax),
         (desc.border.custom().is_some(), OptionalFeature::CustomBorderColors),
         (desc.border.custom().is_some(), OptionalFeature::CustomBorderColorWithoutFormat),
     ];

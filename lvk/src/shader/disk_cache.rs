@@ -17,7 +17,7 @@ const KEY_DIGITS: usize = 32;
 
 /// How often modules made from GLSL were found compiled ([`ContextDesc::shader_cache`](crate::ContextDesc::shader_cache)).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct ShaderCacheCounts {
+pub struct ShaderCacheStats {
     /// Modules whose words were found.
     pub found: u64,
     /// Modules that were compiled and kept.
@@ -46,9 +46,9 @@ impl ShaderCache {
         }
     }
 
-    pub(crate) fn counts(&self) -> ShaderCacheCounts {
+    pub(crate) fn counts(&self) -> ShaderCacheStats {
         let load = |count: &AtomicU64| count.load(Ordering::Relaxed);
-        ShaderCacheCounts { found: load(&self.found), compiled: load(&self.compiled) }
+        ShaderCacheStats { found: load(&self.found), compiled: load(&self.compiled) }
     }
 
     /// The words of an earlier compilation, if `is_same` says that what it included is still the same.
@@ -202,7 +202,7 @@ mod tests {
         let found: Vec<u32> = (0..9).filter(|number| cache.find(key(*number), |_| true).is_some()).collect();
         assert_eq!(found, [0, 4, 5, 6, 7, 8], "three quarters of eight are left");
         assert!(folder.join("mine.spirv").exists());
-        assert_eq!(cache.counts(), ShaderCacheCounts { found: 7, compiled: 9 });
+        assert_eq!(cache.counts(), ShaderCacheStats { found: 7, compiled: 9 });
         std::fs::remove_dir_all(&folder).unwrap();
     }
 

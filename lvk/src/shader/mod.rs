@@ -41,7 +41,7 @@ mod unused;
 pub(crate) use capability::{check_capabilities, check_stage};
 pub(crate) use compile::{CompileOptions, compile};
 pub(crate) use disk_cache::ShaderCache;
-pub use disk_cache::ShaderCacheCounts;
+pub use disk_cache::ShaderCacheStats;
 pub(crate) use hit_numbers::raw_hit_number;
 pub(crate) use input_read::InputRead;
 pub(crate) use instrument::with_checked_indices;

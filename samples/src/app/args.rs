@@ -158,7 +158,7 @@ mod tests {
     use super::*;
     use crate::app::frames::Frames;
     use crate::app::ray_args::RayTracing;
-    use crate::app::run_args::Validation;
+    use crate::app::run_args::ValidationArg;
 
     fn parsed(line: &str) -> Result<HybridArgs, clap::Error> {
         HybridArgs::try_parse_from(std::iter::once("hybrid").chain(line.split_whitespace()))
@@ -191,9 +191,9 @@ mod tests {
 
     #[test]
     fn validation_has_a_plain_and_a_deep_kind() {
-        assert_eq!(parsed("--validate").unwrap().run.validate, Some(Validation::Core));
-        assert_eq!(parsed("--validate gpu --camera 2").unwrap().run.validate, Some(Validation::Gpu));
-        assert_eq!(parsed("--validate --camera 2").unwrap().run.validate, Some(Validation::Core));
+        assert_eq!(parsed("--validate").unwrap().run.validate, Some(ValidationArg::Core));
+        assert_eq!(parsed("--validate gpu --camera 2").unwrap().run.validate, Some(ValidationArg::Gpu));
+        assert_eq!(parsed("--validate --camera 2").unwrap().run.validate, Some(ValidationArg::Core));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use lvk::{
 
 use super::caches::Caches;
 use super::ray_args::RayTracing;
-use super::run_args::{RunArgs, Validation};
+use super::run_args::{RunArgs, ValidationArg};
 use super::run_error::RunError;
 use super::say;
 use crate::driver::{self, Driver, DriverRequest};
@@ -155,11 +155,11 @@ pub(super) fn report_validation(sink: &ValidationSink) -> Result<(), RunError> {
     if messages.is_empty() { Ok(()) } else { Err(RunError::Validation(messages.len())) }
 }
 
-fn validation(wish: Option<Validation>) -> lvk::Validation {
+fn validation(wish: Option<ValidationArg>) -> lvk::ValidationMode {
     match wish {
-        None => lvk::Validation::Off,
-        Some(Validation::Core) => lvk::Validation::Standard,
-        Some(Validation::Gpu) => lvk::Validation::GpuAssisted,
+        None => lvk::ValidationMode::Off,
+        Some(ValidationArg::Core) => lvk::ValidationMode::Standard,
+        Some(ValidationArg::Gpu) => lvk::ValidationMode::GpuAssisted,
     }
 }
 

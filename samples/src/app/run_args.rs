@@ -107,7 +107,7 @@ pub struct RunArgs {
         default_missing_value = "core",
         help_heading = "Device"
     )]
-    pub validate: Option<Validation>,
+    pub validate: Option<ValidationArg>,
 }
 
 impl RunArgs {
@@ -128,7 +128,7 @@ impl RunArgs {
 
 /// What Vulkan validation checks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Validation {
+pub enum ValidationArg {
     /// Correct use and synchronisation.
     Core,
     /// The same, and what shaders do on the device; slow.

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use lvk::{Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryRequest, Validation, ValidationSink};
+use lvk::{
+    Context, ContextDesc, DeviceProfile, FeatureRequest, RayQueryRequest, ValidationMode, ValidationSink,
+};
 
 use super::args::{BenchArgs, Benchmark, PictureArgs};
 use super::error::BenchError;
@@ -100,7 +102,7 @@ impl Setup {
             device: self.device.as_deref(),
             ray_query: self.ray_query,
             ray_tracing_pipeline: self.pipeline(),
-            validation: if self.sink.is_some() { Validation::Standard } else { Validation::Off },
+            validation: if self.sink.is_some() { ValidationMode::Standard } else { ValidationMode::Off },
             validation_sink: self.sink.clone(),
             profile: Some(profile).filter(|profile| **profile != DeviceProfile::default()),
             ..ContextDesc::default()

@@ -137,7 +137,7 @@ impl Bench {
         let blas = [*self.blas];
         let instances =
             DeviceInstances { buffer: *self.on_device, offset: 0, count: self.count(), blas: &blas };
-        cmd.update_tlas_from(tlas, &instances, mode)
+        cmd.update_tlas_from_buffer(tlas, &instances, mode)
     }
 
     fn rebuilds(&self, runs: u32, table: &mut Table) -> Result<(), BenchError> {

@@ -193,7 +193,7 @@ impl Tracer {
             Pipelines::Tracing(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
                 cmd.push_constants(&picture.view)?;
-                cmd.trace_rays_from(rays as u32, [width, height, 1], &dependencies)
+                cmd.trace_rays_with(rays as u32, [width, height, 1], &dependencies)
             }
             Pipelines::Compute { primary, shadow } => {
                 cmd.bind_compute_pipeline(if rays == Rays::Primary { **primary } else { **shadow })?;

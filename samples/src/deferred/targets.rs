@@ -1,8 +1,8 @@
 //! What the sample draws to.
 
 use lvk::{
-    ColorAttachment, ColorLoad, Context, DepthAttachment, Holder, TextureDesc, TextureHandle, TextureMemory,
-    TextureUsage,
+    ColorAttachment, ColorLoadOp, Context, DepthAttachment, Holder, TextureDesc, TextureHandle,
+    TextureMemory, TextureUsage,
 };
 
 use super::Passes;
@@ -53,7 +53,7 @@ impl Targets {
         let attachment = |place: usize| {
             let cleared = ColorAttachment::clear(*self.colors[place], [0.0; 4]);
             match place {
-                3 => ColorAttachment { load: ColorLoad::DontCare, ..cleared },
+                3 => ColorAttachment { load: ColorLoadOp::DontCare, ..cleared },
                 _ => ColorAttachment { store: !self.one_pass, ..cleared },
             }
         };
@@ -62,7 +62,7 @@ impl Targets {
 
     /// The light of surfaces so far.
     pub(super) fn light(&self) -> ColorAttachment {
-        ColorAttachment { load: ColorLoad::Load, ..ColorAttachment::clear(*self.colors[2], [0.0; 4]) }
+        ColorAttachment { load: ColorLoadOp::Load, ..ColorAttachment::clear(*self.colors[2], [0.0; 4]) }
     }
 
     /// Depth as the first pass begins.

@@ -2,8 +2,8 @@
 //! and 5). It is the reference that the visibility pass is measured against.
 
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoad, ColorTarget, CommandBuffer, CompareOp,
-    Context, CullMode, DepthAttachment, DepthTest, Format, Holder, IndexFormat, RenderPassDesc,
+    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoadOp, ColorTarget, CommandBuffer,
+    CompareOp, Context, CullMode, DepthAttachment, DepthTest, Format, Holder, IndexFormat, RenderPassDesc,
     RenderPipelineDesc, RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle, TextureUsage,
 };
 
@@ -78,9 +78,9 @@ impl GBuffer {
             resolve: None,
         };
         [
-            target(&self.position, ColorLoad::DontCare),
-            target(&self.surface, ColorLoad::ClearUint([NO_TRIANGLE; 4])),
-            target(&self.albedo, ColorLoad::DontCare),
+            target(&self.position, ColorLoadOp::DontCare),
+            target(&self.surface, ColorLoadOp::ClearUint([NO_TRIANGLE; 4])),
+            target(&self.albedo, ColorLoadOp::DontCare),
         ]
     }
 }

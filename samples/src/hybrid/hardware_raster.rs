@@ -2,10 +2,10 @@
 //! others drawn by one indirect draw into a target of triangle numbers.
 
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoad, ColorTarget, CommandBuffer, CompareOp,
-    ComputePipelineDesc, ComputePipelineHandle, Context, CullMode, Dependencies, DepthAttachment, DepthTest,
-    Format, Holder, IndexFormat, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, ShaderStage,
-    TextureDesc, TextureHandle, TextureUsage,
+    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoadOp, ColorTarget, CommandBuffer,
+    CompareOp, ComputePipelineDesc, ComputePipelineHandle, Context, CullMode, Dependencies, DepthAttachment,
+    DepthTest, Format, Holder, IndexFormat, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle,
+    ShaderStage, TextureDesc, TextureHandle, TextureUsage,
 };
 
 use super::compute_raster::groups_for;
@@ -100,7 +100,7 @@ impl HardwareRaster {
             texture: self.image.handle(),
             mip: 0,
             layer: 0,
-            load: ColorLoad::ClearUint([NO_TRIANGLE; 4]),
+            load: ColorLoadOp::ClearUint([NO_TRIANGLE; 4]),
             store: true,
             resolve: None,
         };

@@ -94,7 +94,7 @@ impl RayPass {
             Pipeline::Tracing(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
                 cmd.push_constants(push)?;
-                cmd.trace_rays_from(RENDER, launch, &dependencies)?;
+                cmd.trace_rays_with(RENDER, launch, &dependencies)?;
                 if let Some(queue) = &self.queue {
                     cmd.trace_rays_indirect(BOUNCES, queue.head(), BounceQueue::RAYS, &dependencies)?;
                 }

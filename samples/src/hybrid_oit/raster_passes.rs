@@ -1,8 +1,8 @@
 //! What the rasteriser does: depth and G-buffer of what is opaque, and the lists of glass.
 
 use lvk::{
-    ColorAttachment, ColorLoad, ColorTarget, CommandBuffer, CompareOp, Context, Dependencies,
-    DepthAttachment, DepthLoad, DepthTest, Holder, RenderPass, RenderPassDesc, RenderPipelineDesc,
+    ColorAttachment, ColorLoadOp, ColorTarget, CommandBuffer, CompareOp, Context, Dependencies,
+    DepthAttachment, DepthLoadOp, DepthTest, Holder, RenderPass, RenderPassDesc, RenderPipelineDesc,
     RenderPipelineHandle,
 };
 
@@ -73,7 +73,7 @@ impl RasterPasses {
         push: &Push,
     ) -> lvk::Result<()> {
         let surface = ColorAttachment {
-            load: ColorLoad::ClearUint([0; 4]),
+            load: ColorLoadOp::ClearUint([0; 4]),
             ..ColorAttachment::clear(*targets.surface, [0.0; 4])
         };
         let pass = cmd.begin_rendering(&RenderPassDesc {
@@ -129,7 +129,7 @@ impl RasterPasses {
 }
 
 fn kept_depth(targets: &Targets) -> DepthAttachment {
-    DepthAttachment { load: DepthLoad::Load, ..DepthAttachment::clear(*targets.depth, 0.0) }
+    DepthAttachment { load: DepthLoadOp::Load, ..DepthAttachment::clear(*targets.depth, 0.0) }
 }
 
 fn depth_test(compare: CompareOp, write: bool) -> DepthTest {

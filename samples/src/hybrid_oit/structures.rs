@@ -56,7 +56,7 @@ impl Structures {
             count: self.instance_count,
             blas: &[*self.solids, *self.glass, *self.ball],
         };
-        cmd.update_tlas_from(*self.tlas, &instances, BuildMode::Rebuild)
+        cmd.update_tlas_from_buffer(*self.tlas, &instances, BuildMode::Rebuild)
     }
 }
 

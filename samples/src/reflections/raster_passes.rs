@@ -1,7 +1,7 @@
 //! The passes of the rasteriser: both g-buffers, and the transparent surfaces over the lit picture.
 
 use lvk::{
-    Blend, BufferHandle, ColorAttachment, ColorLoad, ColorTarget, CommandBuffer, CompareOp, Context,
+    Blend, BufferHandle, ColorAttachment, ColorLoadOp, ColorTarget, CommandBuffer, CompareOp, Context,
     Dependencies, DepthAttachment, DepthTest, Holder, IndexFormat, RenderPass, RenderPassDesc,
     RenderPipelineDesc, RenderPipelineHandle, TextureHandle,
 };
@@ -69,8 +69,10 @@ impl RasterPasses {
         drawn: Drawn<'_>,
     ) -> lvk::Result<()> {
         let read = [*targets.opaque_depth, *targets.glass_depth, *targets.glass_reflection];
-        let composite =
-            ColorAttachment { load: ColorLoad::Load, ..ColorAttachment::clear(*targets.composite, [0.0; 4]) };
+        let composite = ColorAttachment {
+            load: ColorLoadOp::Load,
+            ..ColorAttachment::clear(*targets.composite, [0.0; 4])
+        };
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
             color: &[composite],
             dependencies: Dependencies { sampled_images: &read, ..Dependencies::default() },
@@ -91,7 +93,7 @@ fn begin_surfaces<'a>(
         texture: surface,
         mip: 0,
         layer: 0,
-        load: ColorLoad::ClearUint([0; 4]),
+        load: ColorLoadOp::ClearUint([0; 4]),
         store: true,
         resolve: None,
     };

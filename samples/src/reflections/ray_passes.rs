@@ -69,7 +69,7 @@ impl RayPasses {
             Self::Pipeline(pipeline) => {
                 cmd.bind_ray_tracing_pipeline(**pipeline)?;
                 cmd.push_constants(&push)?;
-                cmd.trace_rays_from(surfaces as u32, [extent[0], extent[1], 1], &dependencies)
+                cmd.trace_rays_with(surfaces as u32, [extent[0], extent[1], 1], &dependencies)
             }
             Self::Query(pipelines) => {
                 cmd.bind_compute_pipeline(*pipelines[surfaces as usize])?;

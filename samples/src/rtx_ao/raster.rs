@@ -1,7 +1,7 @@
 //! The passes of the rasteriser: depth alone, then the surfaces that are nearest, with their rays where those are queries.
 
 use lvk::{
-    ColorAttachment, ColorTarget, CommandBuffer, CompareOp, Context, DepthAttachment, DepthLoad, DepthTest,
+    ColorAttachment, ColorTarget, CommandBuffer, CompareOp, Context, DepthAttachment, DepthLoadOp, DepthTest,
     Holder, RenderPass, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle,
 };
 
@@ -69,7 +69,8 @@ impl Raster {
     ) -> lvk::Result<()> {
         let colors: Vec<_> =
             targets.colors().into_iter().map(|target| ColorAttachment::clear(target, [0.0; 4])).collect();
-        let depth = DepthAttachment { load: DepthLoad::Load, ..DepthAttachment::clear(*targets.depth, 0.0) };
+        let depth =
+            DepthAttachment { load: DepthLoadOp::Load, ..DepthAttachment::clear(*targets.depth, 0.0) };
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
             color: &colors,
             depth: Some(depth),

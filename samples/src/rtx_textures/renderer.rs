@@ -165,7 +165,7 @@ impl RtxTextures {
     fn build_tlas(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
         let count = self.constants.count;
         let instances = DeviceInstances { buffer: *self.records, offset: 0, count, blas: &self.blas };
-        cmd.update_tlas_from(*self.tlas, &instances, BuildMode::Rebuild)
+        cmd.update_tlas_from_buffer(*self.tlas, &instances, BuildMode::Rebuild)
     }
 
     fn trace(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {

@@ -1,8 +1,8 @@
 //! Culling by a compute shader, and the draws that it leaves.
 
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, CommandBuffer, ComputePipelineHandle, Context, CountedDraws,
-    Dependencies, Holder, RenderPass,
+    BufferDesc, BufferHandle, BufferUsage, CommandBuffer, ComputePipelineHandle, Context, Dependencies,
+    Holder, IndirectCount, RenderPass,
 };
 
 use super::config::DrawPath;
@@ -78,7 +78,7 @@ impl Culling {
     pub(super) fn draw(&self, pass: &mut RenderPass<'_>, view: usize, path: DrawPath) -> lvk::Result<()> {
         let arguments = self.arguments[view].handle();
         match path {
-            DrawPath::Counted => pass.draw_indirect_count(&CountedDraws {
+            DrawPath::Counted => pass.draw_indirect_count(&IndirectCount {
                 arguments,
                 offset: 0,
                 stride: STRIDE,

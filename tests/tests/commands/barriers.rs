@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoad, Context, Dependencies, Error, Format,
-    Holder, IndexFormat, MemoryKind, RenderPassDesc, RenderPipelineDesc, TextureDesc, TextureRegion,
+    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoadOp, Context, Dependencies, Error,
+    Format, Holder, IndexFormat, MemoryKind, RenderPassDesc, RenderPipelineDesc, TextureDesc, TextureRegion,
     TextureUsage,
 };
 use lvk_tests::compute::{Evaluator, compute_pipeline, read_vec4, read_words, vec4_buffer, words_buffer};
@@ -265,7 +265,7 @@ fn textures_keep_their_layout_when_recorded_and_submitted_in_different_orders() 
     fetch.record(&ctx, &mut sampling, [texture.index(), 0, 0], (*result, 4), &reads);
     let writes = Dependencies { storage_images: &[*texture], ..Default::default() };
     store.record(&ctx, &mut storing, [texture.index(), 50, 0], (*ones, 4), &writes);
-    let load = ColorLoad::Clear([1.0; 4]);
+    let load = ColorLoadOp::Clear([1.0; 4]);
     let color = [ColorAttachment { texture: *texture, mip: 1, layer: 0, load, store: true, resolve: None }];
     drop(clearing.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap());
     for cmd in [clearing, storing, sampling] {

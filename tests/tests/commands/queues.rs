@@ -337,7 +337,7 @@ fn structures_built_on_one_queue_are_traced_on_another() {
 
 #[test]
 fn structures_of_software_are_built_on_one_queue_and_traced_on_another() {
-    for queues in [QueueRequest::OwnHardware, QueueRequest::Rehearsed] {
+    for queues in [QueueRequest::OwnHardware, QueueRequest::Emulated] {
         let software = device_with(|desc| {
             desc.queues = queues;
             desc.ray_query = RayQueryRequest::Software;

@@ -371,7 +371,7 @@ fn exchange() {
             });
             if round > 1 {
                 // SAFETY: the clear leaves it so.
-                unsafe { ctx.texture_came_back(*texture, vk::ImageLayout::TRANSFER_DST_OPTIMAL).unwrap() };
+                unsafe { ctx.acquire_texture(*texture, vk::ImageLayout::TRANSFER_DST_OPTIMAL).unwrap() };
             }
             let mut cmd = ctx.acquire_command_buffer().unwrap();
             cmd.bind_compute_pipeline(*pipeline).unwrap();
@@ -379,7 +379,7 @@ fn exchange() {
             cmd.push_constants(&[address as u32, (address >> 32) as u32, texture.index()]).unwrap();
             let uses = Dependencies { buffers: &[*words], sampled_images: &[*texture], ..Default::default() };
             cmd.dispatch([1, 1, 1], &uses).unwrap();
-            cmd.hand_over_texture(*texture, vk::ImageLayout::TRANSFER_SRC_OPTIMAL).unwrap();
+            cmd.release_texture(*texture, vk::ImageLayout::TRANSFER_SRC_OPTIMAL).unwrap();
             let wait = RawWait { semaphore: binary, value: 0, stages: ALL };
             let signal = RawSignal { semaphore: timeline, value: 10 * round };
             // SAFETY: the binary semaphore has its signal under way, and the timeline rises.
@@ -416,7 +416,7 @@ fn exchange() {
         }
         let refused = {
             let mut cmd = ctx.acquire_command_buffer().unwrap();
-            cmd.hand_over_texture(*texture, vk::ImageLayout::UNDEFINED)
+            cmd.release_texture(*texture, vk::ImageLayout::UNDEFINED)
         };
         assert!(matches!(refused, Err(Error::InvalidUsage { .. })));
     }

@@ -95,12 +95,12 @@ fn commands(ctx: &Context) {
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     assert!(cmd.bind_ray_tracing_pipeline(nothing::<RayTracingPipelineHandle>()).is_err());
     assert!(cmd.trace_rays([1, 1, 1], &none).is_err());
-    assert!(cmd.trace_rays_from(3, [1, 1, 1], &none).is_err());
+    assert!(cmd.trace_rays_with(3, [1, 1, 1], &none).is_err());
     refusal("trace_rays_indirect", cmd.trace_rays_indirect(0, *buffer, 0, &none));
     assert!(cmd.build_blas(&[structure], BuildMode::Rebuild).is_err());
     assert!(cmd.update_tlas(structure, &[], BuildMode::Rebuild).is_err());
     let instances = DeviceInstances { buffer: *buffer, offset: 0, count: 1, blas: &[] };
-    assert!(cmd.update_tlas_from(structure, &instances, BuildMode::Rebuild).is_err());
+    assert!(cmd.update_tlas_from_buffer(structure, &instances, BuildMode::Rebuild).is_err());
     refusal("build_blas", cmd.build_blas(&[], BuildMode::Rebuild));
     ctx.submit(cmd).unwrap();
     assert!(ctx.compact(&[structure]).is_err() && ctx.accel_struct_info(structure).is_err());

@@ -6,9 +6,9 @@ use std::ffi::CStr;
 use lvk::ash::{self, vk};
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Capabilities, ColorAttachment, Context, ContextDesc,
-    Dependencies, DeviceProfile, Error, ExtraExtensions, FeatureRequest, FeatureSet, Format, Holder,
-    OptionalFeature, RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc, ShaderSource,
-    ShaderStage, TlasDesc, Triangles,
+    Dependencies, DeviceProfile, Error, FeatureRequest, FeatureSet, Format, Holder, OptionalFeature,
+    RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc, ShaderSource, ShaderStage,
+    TlasDesc, Triangles, UserExtensions,
 };
 use lvk_tests::compute::Evaluator;
 use lvk_tests::device::vulkan;
@@ -355,8 +355,8 @@ fn extensions_of_the_callers_own_are_on() {
     let extensions = [name, ash::khr::external_memory_fd::NAME, ash::khr::external_memory_fd::NAME];
     // SAFETY: the chain is one structure of an extension that the device has, which allows this capability; devices
     // that have the extension have the feature.
-    let extra = unsafe { ExtraExtensions::new(&[], &extensions, Some(&features), &[PIXEL_INTERLOCK]) };
-    let Some(ctx) = device_with(|desc| desc.extra = extra) else { return };
+    let extra = unsafe { UserExtensions::new(&[], &extensions, Some(&features), &[PIXEL_INTERLOCK]) };
+    let Some(ctx) = device_with(|desc| desc.user_extensions = extra) else { return };
     assert!(module(&ctx).is_ok());
     let device = ctx.raw_device().handle();
     // SAFETY: the device is alive.
@@ -371,8 +371,9 @@ fn extensions_that_nobody_has_are_named() {
     for (instance, device) in [(true, false), (false, true)] {
         let list = |on: bool| if on { &nowhere[..] } else { &[] };
         // SAFETY: there is no chain and there are no capabilities.
-        let extra = unsafe { ExtraExtensions::new(list(instance), list(device), None, &[]) };
-        let desc = ContextDesc { vulkan_library: vulkan().flatten(), extra, ..Default::default() };
+        let extra = unsafe { UserExtensions::new(list(instance), list(device), None, &[]) };
+        let desc =
+            ContextDesc { vulkan_library: vulkan().flatten(), user_extensions: extra, ..Default::default() };
         let error = Context::new(&desc).map(drop).unwrap_err();
         assert_eq!(matches!(error, Error::Unsupported { .. }), instance, "{error}");
         assert_eq!(matches!(error, Error::NoDevice { .. }), device, "{error}");

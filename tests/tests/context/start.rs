@@ -8,7 +8,7 @@ use lvk::ash::vk;
 use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferUsage, ColorAttachment, Context, ContextDesc, Dependencies,
     Error, FeatureRequest, Format, RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc,
-    ShaderSource, ShaderStage, TlasDesc, Triangles, Validation,
+    ShaderSource, ShaderStage, TlasDesc, Triangles, ValidationMode,
 };
 use lvk_tests::child::{in_child, without_ray_tracing};
 use lvk_tests::compute::{Evaluator, words_buffer};
@@ -259,7 +259,7 @@ fn validation_hears_a_missing_barrier_between_submissions() {
 #[test]
 fn a_context_without_validation_is_silent() {
     let Some(_) = vulkan() else { return };
-    let ctx = start(|desc| desc.validation = Validation::Off).unwrap();
+    let ctx = start(|desc| desc.validation = ValidationMode::Off).unwrap();
     expect_drawing(&ctx);
     assert!(ctx.validation().is_empty());
 }

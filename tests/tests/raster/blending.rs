@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    Blend, BlendFactor, BlendOp, BlendPart, ColorAttachment, ColorLoad, ColorTarget, ColorWrites, Context,
-    DeviceProfile, Format, Holder, OptionalFeature, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle,
-    ShaderStage,
+    Blend, BlendComponent, BlendFactor, BlendOp, ColorAttachment, ColorLoadOp, ColorTarget, ColorWriteMask,
+    Context, DeviceProfile, Format, Holder, OptionalFeature, RenderPassDesc, RenderPipelineDesc,
+    RenderPipelineHandle, ShaderStage,
 };
 use lvk_tests::raster::{
     COVER, PAINT, has, paint, pixels, run_pass, staged_pipeline, target, unsupported, usage_error,
@@ -27,47 +27,47 @@ const PAINT_TWO: &str = "
 const FACTORS: [BlendFactor; 19] = [
     BlendFactor::Zero,
     BlendFactor::One,
-    BlendFactor::Source,
-    BlendFactor::OneMinusSource,
-    BlendFactor::Target,
-    BlendFactor::OneMinusTarget,
-    BlendFactor::SourceAlpha,
-    BlendFactor::OneMinusSourceAlpha,
-    BlendFactor::TargetAlpha,
-    BlendFactor::OneMinusTargetAlpha,
-    BlendFactor::Constant,
-    BlendFactor::OneMinusConstant,
+    BlendFactor::SrcColor,
+    BlendFactor::OneMinusSrcColor,
+    BlendFactor::DstColor,
+    BlendFactor::OneMinusDstColor,
+    BlendFactor::SrcAlpha,
+    BlendFactor::OneMinusSrcAlpha,
+    BlendFactor::DstAlpha,
+    BlendFactor::OneMinusDstAlpha,
+    BlendFactor::ConstantColor,
+    BlendFactor::OneMinusConstantColor,
     BlendFactor::ConstantAlpha,
     BlendFactor::OneMinusConstantAlpha,
-    BlendFactor::SourceAlphaSaturate,
-    BlendFactor::Second,
-    BlendFactor::OneMinusSecond,
-    BlendFactor::SecondAlpha,
-    BlendFactor::OneMinusSecondAlpha,
+    BlendFactor::SrcAlphaSaturate,
+    BlendFactor::Src1Color,
+    BlendFactor::OneMinusSrc1Color,
+    BlendFactor::Src1Alpha,
+    BlendFactor::OneMinusSrc1Alpha,
 ];
 
 fn factor(factor: BlendFactor, channel: usize) -> f32 {
     match factor {
         BlendFactor::Zero => 0.0,
         BlendFactor::One => 1.0,
-        BlendFactor::Source => SOURCE[channel],
-        BlendFactor::OneMinusSource => 1.0 - SOURCE[channel],
-        BlendFactor::Target => TARGET[channel],
-        BlendFactor::OneMinusTarget => 1.0 - TARGET[channel],
-        BlendFactor::SourceAlpha => SOURCE[3],
-        BlendFactor::OneMinusSourceAlpha => 1.0 - SOURCE[3],
-        BlendFactor::TargetAlpha => TARGET[3],
-        BlendFactor::OneMinusTargetAlpha => 1.0 - TARGET[3],
-        BlendFactor::Constant => CONSTANTS[channel],
-        BlendFactor::OneMinusConstant => 1.0 - CONSTANTS[channel],
+        BlendFactor::SrcColor => SOURCE[channel],
+        BlendFactor::OneMinusSrcColor => 1.0 - SOURCE[channel],
+        BlendFactor::DstColor => TARGET[channel],
+        BlendFactor::OneMinusDstColor => 1.0 - TARGET[channel],
+        BlendFactor::SrcAlpha => SOURCE[3],
+        BlendFactor::OneMinusSrcAlpha => 1.0 - SOURCE[3],
+        BlendFactor::DstAlpha => TARGET[3],
+        BlendFactor::OneMinusDstAlpha => 1.0 - TARGET[3],
+        BlendFactor::ConstantColor => CONSTANTS[channel],
+        BlendFactor::OneMinusConstantColor => 1.0 - CONSTANTS[channel],
         BlendFactor::ConstantAlpha => CONSTANTS[3],
         BlendFactor::OneMinusConstantAlpha => 1.0 - CONSTANTS[3],
-        BlendFactor::SourceAlphaSaturate if channel == 3 => 1.0,
-        BlendFactor::SourceAlphaSaturate => SOURCE[3].min(1.0 - TARGET[3]),
-        BlendFactor::Second => SECOND[channel],
-        BlendFactor::OneMinusSecond => 1.0 - SECOND[channel],
-        BlendFactor::SecondAlpha => SECOND[3],
-        BlendFactor::OneMinusSecondAlpha => 1.0 - SECOND[3],
+        BlendFactor::SrcAlphaSaturate if channel == 3 => 1.0,
+        BlendFactor::SrcAlphaSaturate => SOURCE[3].min(1.0 - TARGET[3]),
+        BlendFactor::Src1Color => SECOND[channel],
+        BlendFactor::OneMinusSrc1Color => 1.0 - SECOND[channel],
+        BlendFactor::Src1Alpha => SECOND[3],
+        BlendFactor::OneMinusSrc1Alpha => 1.0 - SECOND[3],
     }
 }
 
@@ -86,8 +86,8 @@ fn expected(blend: Blend, channel: usize) -> f32 {
 }
 
 fn is_second(factor: BlendFactor) -> bool {
-    use BlendFactor::{OneMinusSecond, OneMinusSecondAlpha, Second, SecondAlpha};
-    matches!(factor, Second | OneMinusSecond | SecondAlpha | OneMinusSecondAlpha)
+    use BlendFactor::{OneMinusSrc1Alpha, OneMinusSrc1Color, Src1Alpha, Src1Color};
+    matches!(factor, Src1Color | OneMinusSrc1Color | Src1Alpha | OneMinusSrc1Alpha)
 }
 
 fn pipeline(ctx: &Context, fragment: &str, color: &[ColorTarget]) -> Holder<RenderPipelineHandle> {
@@ -129,13 +129,13 @@ fn every_factor_and_operation_is_what_its_formula_says() {
         }
         let op = ops[index % 3];
         let blend = Blend {
-            color: BlendPart { source: first, target: other, op },
-            alpha: BlendPart { source: other, target: first, op: ops[(index + 1) % 3] },
+            color: BlendComponent { source: first, target: other, op },
+            alpha: BlendComponent { source: other, target: first, op: ops[(index + 1) % 3] },
         };
         expect_blend(&ctx, blend, if two { PAINT_TWO } else { PAINT });
     }
     for op in [BlendOp::Min, BlendOp::Max] {
-        let part = BlendPart { source: BlendFactor::Zero, target: BlendFactor::One, op };
+        let part = BlendComponent { source: BlendFactor::Zero, target: BlendFactor::One, op };
         expect_blend(&ctx, Blend::both(part), PAINT);
     }
 }
@@ -143,7 +143,7 @@ fn every_factor_and_operation_is_what_its_formula_says() {
 #[test]
 fn constants_are_those_set_last_and_survive_other_pipelines() {
     let Some(ctx) = device() else { return };
-    let part = BlendPart::sum(BlendFactor::Constant, BlendFactor::Zero);
+    let part = BlendComponent::sum(BlendFactor::ConstantColor, BlendFactor::Zero);
     let scaled = pipeline(&ctx, PAINT, &[ColorTarget::blended(FORMAT, Blend::both(part))]);
     let plain = pipeline(&ctx, PAINT, &[FORMAT.into()]);
     let drawn = target(&ctx, FORMAT, [4, 1]);
@@ -170,7 +170,7 @@ fn constants_are_those_set_last_and_survive_other_pipelines() {
 #[test]
 fn masks_choose_the_channels_that_are_written() {
     let Some(ctx) = device() else { return };
-    for mask in [ColorWrites::empty(), ColorWrites::RED | ColorWrites::BLUE, ColorWrites::ALPHA] {
+    for mask in [ColorWriteMask::empty(), ColorWriteMask::RED | ColorWriteMask::BLUE, ColorWriteMask::ALPHA] {
         let color = [ColorTarget { write: mask, ..ColorTarget::new(FORMAT) }];
         let pipeline = pipeline(&ctx, PAINT, &color);
         let drawn = target(&ctx, FORMAT, [1, 1]);
@@ -203,7 +203,7 @@ fn eight_targets_get_what_is_theirs() {
     let targets: Vec<ColorTarget> = (0..8)
         .map(|i| match i {
             2 => ColorTarget::blended(formats[2], Blend::ADDITIVE),
-            3 => ColorTarget { write: ColorWrites::GREEN, ..ColorTarget::new(formats[3]) },
+            3 => ColorTarget { write: ColorWriteMask::GREEN, ..ColorTarget::new(formats[3]) },
             _ => formats[i].into(),
         })
         .collect();
@@ -231,7 +231,7 @@ fn eight_targets_get_what_is_theirs() {
 #[test]
 fn second_sources_are_refused_where_they_cannot_be() {
     let Some(ctx) = device() else { return };
-    let part = BlendPart::sum(BlendFactor::Second, BlendFactor::One);
+    let part = BlendComponent::sum(BlendFactor::Src1Color, BlendFactor::One);
     let two = ColorTarget::blended(Format::Rgba8Unorm, Blend { color: part, ..Blend::ALPHA });
     let make = |ctx: &Context, fragment, color: &[ColorTarget]| {
         let stages = [(ShaderStage::Vertex, COVER), (ShaderStage::Fragment, fragment)];
@@ -261,7 +261,7 @@ fn blending_goes_on_in_the_next_pass() {
             pass.bind_render_pipeline(*adding)?;
             paint(pass, [1.0, 2.0, 0.0, 0.5], 0.0)
         });
-        color[0].load = ColorLoad::Load;
+        color[0].load = ColorLoadOp::Load;
     }
     assert_eq!(pixels::<[f32; 4]>(&ctx, *drawn), [[3.0, 6.0, 0.0, 1.5]]);
 }

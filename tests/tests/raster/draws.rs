@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    Blend, BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoad, ColorTarget, CompareOp,
-    Context, CullMode, Dependencies, DepthAttachment, DepthLoad, DepthTest, Format, FrontFace, Holder,
+    Blend, BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoadOp, ColorTarget, CompareOp,
+    Context, CullMode, Dependencies, DepthAttachment, DepthLoadOp, DepthTest, Format, FrontFace, Holder,
     IndexFormat, RenderPass, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, TextureDesc,
     TextureHandle, TextureKind, TextureRegion, TextureUsage, Topology, VertexAttribute, VertexBinding,
     VertexFormat,
@@ -16,7 +16,7 @@ const SIZE: [u32; 2] = [16, 16];
 const CORNERS: [[f64; 2]; 3] = [[1.43, 0.55], [14.06, 4.16], [5.05, 15.43]];
 const RED: [u8; 4] = [255, 0, 0, 255];
 const BLUE: [u8; 4] = [0, 0, 255, 255];
-const CLEAR_BLUE: ColorLoad = ColorLoad::Clear([0.0, 0.0, 1.0, 1.0]);
+const CLEAR_BLUE: ColorLoadOp = ColorLoadOp::Clear([0.0, 0.0, 1.0, 1.0]);
 
 fn color(format: Format) -> [ColorTarget; 1] {
     [format.into()]
@@ -27,7 +27,7 @@ fn buffer<T: bytemuck::NoUninit>(ctx: &Context, usage: BufferUsage, data: &[T]) 
     ctx.create_buffer(&desc).unwrap()
 }
 
-fn attachment(texture: TextureHandle, load: ColorLoad) -> ColorAttachment {
+fn attachment(texture: TextureHandle, load: ColorLoadOp) -> ColorAttachment {
     ColorAttachment { texture, mip: 0, layer: 0, load, store: true, resolve: None }
 }
 
@@ -183,7 +183,7 @@ fn instances_step_their_own_binding() {
     let pipeline = render_pipeline(&ctx, vertex, FLAT, &desc);
     let target = target(&ctx, Format::R32Float, [4, 2]);
     let columns = buffer(&ctx, BufferUsage::VERTEX, &[9.0_f32, 3.0, 1.0, 2.0]);
-    draw(&ctx, &[attachment(*target, ColorLoad::Clear([7.0; 4]))], None, |pass| {
+    draw(&ctx, &[attachment(*target, ColorLoadOp::Clear([7.0; 4]))], None, |pass| {
         pass.bind_render_pipeline(*pipeline)?;
         pass.bind_vertex_buffer(0, *columns, 0)?;
         pass.draw(0..4, 1..4)
@@ -216,7 +216,7 @@ fn arguments_of_draws_come_from_buffers() {
     // The same by index: indices, instances, first index, vertex offset, first instance.
     let indexed = buffer(&ctx, BufferUsage::INDIRECT, &[6, 1, 6, 0, 0, 12, 1, 0, 24, 0, 6, 1, 18, 24, 0_u32]);
     let expected = [0.0, 2.0, 0.0, 0.0, 5.0, 6.0, 0.0, 8.0];
-    let clear = [attachment(*target, ColorLoad::Clear([0.0; 4]))];
+    let clear = [attachment(*target, ColorLoadOp::Clear([0.0; 4]))];
     draw(&ctx, &clear, None, |pass| {
         pass.bind_render_pipeline(*pipeline)?;
         pass.draw_indirect(*direct, 4, 3, 20)?;
@@ -249,7 +249,7 @@ fn several_targets_take_their_own_outputs_and_clears() {
     let pipeline = render_pipeline(&ctx, COVER, fragment, &desc);
     let targets = formats.map(|format| target(&ctx, format, [4, 2]));
     let loads =
-        [CLEAR_BLUE, ColorLoad::ClearUint([7, u32::MAX, 0, 0]), ColorLoad::Clear([0.25, -2.0, 0.0, 1.0])];
+        [CLEAR_BLUE, ColorLoadOp::ClearUint([7, u32::MAX, 0, 0]), ColorLoadOp::Clear([0.25, -2.0, 0.0, 1.0])];
     let color = [0, 1, 2].map(|i| attachment(*targets[i], loads[i]));
     draw(&ctx, &color, None, |pass| {
         assert_eq!(pass.extent(), [4, 2]);
@@ -305,13 +305,13 @@ fn depth_decides_what_is_seen() {
             let (first, second) = (pipeline(CompareOp::Less), pipeline(compare));
             let target = target(&ctx, Format::R32Float, [3, 1]);
             let clear = DepthAttachment::clear(*depth, 1.0);
-            draw(&ctx, &[attachment(*target, ColorLoad::Clear([0.0; 4]))], Some(clear), |pass| {
+            draw(&ctx, &[attachment(*target, ColorLoadOp::Clear([0.0; 4]))], Some(clear), |pass| {
                 pass.bind_render_pipeline(*first)?;
                 paint(pass, [1.0; 4], 0.5)
             });
             // The second pass goes on with the depth that the first one stored.
-            let load = DepthAttachment { load: DepthLoad::Load, ..clear };
-            draw(&ctx, &[attachment(*target, ColorLoad::Load)], Some(load), |pass| {
+            let load = DepthAttachment { load: DepthLoadOp::Load, ..clear };
+            draw(&ctx, &[attachment(*target, ColorLoadOp::Load)], Some(load), |pass| {
                 pass.bind_render_pipeline(*second)?;
                 for (column, depth) in (0..).zip([0.25, 0.5, 0.75]) {
                     pass.scissor([column, 0], [1, 1])?;
@@ -365,7 +365,7 @@ fn blending_combines_source_and_target() {
         let color = [ColorTarget { blend, ..ColorTarget::new(Format::Rgba32Float) }];
         let pipeline =
             render_pipeline(&ctx, COVER, PAINT, &RenderPipelineDesc { color: &color, ..Default::default() });
-        draw(&ctx, &[attachment(*target, ColorLoad::Clear(behind))], None, |pass| {
+        draw(&ctx, &[attachment(*target, ColorLoadOp::Clear(behind))], None, |pass| {
             pass.bind_render_pipeline(*pipeline)?;
             paint(pass, over, 0.0)
         });
@@ -383,7 +383,7 @@ fn a_pass_loads_what_the_one_before_stored() {
     let target = target(&ctx, Format::R32Float, [4, 1]);
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     for column in 0..4 {
-        let load = if column == 0 { ColorLoad::Clear([9.0; 4]) } else { ColorLoad::Load };
+        let load = if column == 0 { ColorLoadOp::Clear([9.0; 4]) } else { ColorLoadOp::Load };
         let color = [attachment(*target, load)];
         let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
         pass.bind_render_pipeline(*pipeline).unwrap();
@@ -394,7 +394,7 @@ fn a_pass_loads_what_the_one_before_stored() {
     }
     ctx.submit(cmd).unwrap();
     assert_eq!(pixels::<f32>(&ctx, *target), [0.0, 1.0, 9.0, 3.0]);
-    draw(&ctx, &[attachment(*target, ColorLoad::DontCare)], None, |pass| {
+    draw(&ctx, &[attachment(*target, ColorLoadOp::DontCare)], None, |pass| {
         pass.bind_render_pipeline(*pipeline)?;
         paint(pass, [5.0; 4], 0.0)
     });
@@ -432,7 +432,7 @@ fn mips_layers_and_faces_are_drawn_to_and_sampled() {
         };
         let texture = ctx.create_texture(&desc).unwrap();
         for (layer, mip) in (0..layers).flat_map(|layer| (0..3).map(move |mip| (layer, mip))) {
-            let load = ColorLoad::Clear([-1.0; 4]);
+            let load = ColorLoadOp::Clear([-1.0; 4]);
             let attachment =
                 ColorAttachment { texture: *texture, mip, layer, load, store: true, resolve: None };
             draw(&ctx, &[attachment], None, |pass| {
@@ -459,7 +459,7 @@ fn viewport_and_scissor_place_and_cut() {
     let desc = RenderPipelineDesc { color: &color(Format::R32Float), ..Default::default() };
     let pipeline = render_pipeline(&ctx, COVER, fragment, &desc);
     let target = target(&ctx, Format::R32Float, [4, 3]);
-    draw(&ctx, &[attachment(*target, ColorLoad::Clear([0.0; 4]))], None, |pass| {
+    draw(&ctx, &[attachment(*target, ColorLoadOp::Clear([0.0; 4]))], None, |pass| {
         pass.bind_render_pipeline(*pipeline)?;
         pass.viewport([1.0, 0.0, 2.0, 3.0], [0.5, 0.75])?;
         paint(pass, [0.0; 4], 0.0)?;
@@ -534,7 +534,7 @@ fn points_fill_their_pixel() {
     let desc = RenderPipelineDesc { topology, color: &color(Format::R32Float), ..Default::default() };
     let pipeline = render_pipeline(&ctx, vertex, FLAT, &desc);
     let target = target(&ctx, Format::R32Float, [8, 1]);
-    draw(&ctx, &[attachment(*target, ColorLoad::Clear([0.0; 4]))], None, |pass| {
+    draw(&ctx, &[attachment(*target, ColorLoadOp::Clear([0.0; 4]))], None, |pass| {
         pass.bind_render_pipeline(*pipeline)?;
         pass.draw(0..3, 0..1)
     });
@@ -563,7 +563,7 @@ fn fragments_choose_the_mip_by_their_derivatives() {
     let pipeline = render_pipeline(&ctx, COVER, fragment, &desc);
     for (side, mip) in [(16, 0.0), (8, 1.0), (4, 2.0)] {
         let target = target(&ctx, Format::R32Float, [side; 2]);
-        draw(&ctx, &[attachment(*target, ColorLoad::DontCare)], None, |pass| {
+        draw(&ctx, &[attachment(*target, ColorLoadOp::DontCare)], None, |pass| {
             pass.bind_render_pipeline(*pipeline)?;
             let indices = [texture.index(), sampler.index()].map(f32::from_bits);
             paint(pass, [indices[0], indices[1], side as f32, 0.0], 0.0)

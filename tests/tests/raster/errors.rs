@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    BufferDesc, BufferUsage, ColorAttachment, ColorLoad, ColorTarget, CompareOp, Context, Dependencies,
-    DepthAttachment, DepthLoad, DepthTest, Error, Format, IndexFormat, RenderPassDesc, RenderPipelineDesc,
+    BufferDesc, BufferUsage, ColorAttachment, ColorLoadOp, ColorTarget, CompareOp, Context, Dependencies,
+    DepthAttachment, DepthLoadOp, DepthTest, Error, Format, IndexFormat, RenderPassDesc, RenderPipelineDesc,
     ShaderStage, TextureDesc, TextureUsage, VertexAttribute, VertexBinding, VertexFormat,
 };
 use lvk_tests::compute::module;
@@ -41,7 +41,7 @@ fn passes_with_unfit_targets_are_refused() {
     begin(&[clear(*color)], Some(DepthAttachment::clear(*color, 1.0)), "depth format");
     begin(&[clear(*depth)], None, "depth format");
     begin(&[clear(*ids)], None, "ClearUint");
-    begin(&[attach(*color, ColorLoad::ClearUint([0; 4]))], None, "ColorLoad::Clear");
+    begin(&[attach(*color, ColorLoadOp::ClearUint([0; 4]))], None, "ColorLoadOp::Clear");
     begin(&[clear(*sampled)], None, "TARGET");
     begin(&[ColorAttachment { mip: 1, ..clear(*color) }], None, "mip 1");
     begin(&[ColorAttachment { layer: 1, ..clear(*color) }], None, "layer 1");
@@ -49,7 +49,7 @@ fn passes_with_unfit_targets_are_refused() {
     begin(&[], Some(DepthAttachment::clear(*depth, 1.5)), "1.5");
     begin(
         &[],
-        Some(DepthAttachment { load: DepthLoad::Clear(f32::NAN), ..DepthAttachment::clear(*depth, 0.0) }),
+        Some(DepthAttachment { load: DepthLoadOp::Clear(f32::NAN), ..DepthAttachment::clear(*depth, 0.0) }),
         "NaN",
     );
     let reads = Dependencies { sampled_images: &[*color], ..Default::default() };

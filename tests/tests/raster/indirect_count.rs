@@ -2,8 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ComputePipelineDesc, Context, CountedDraws,
-    Dependencies, DeviceProfile, Error, Format, Holder, IndexFormat, OptionalFeature, RenderPassDesc,
+    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ComputePipelineDesc, Context, Dependencies,
+    DeviceProfile, Error, Format, Holder, IndexFormat, IndirectCount, OptionalFeature, RenderPassDesc,
     RenderPipelineDesc, ShaderStage, SpecializationConstant, SpecializationValue,
 };
 use lvk_tests::compute::{compute_pipeline, module, read_words, words_buffer};
@@ -88,7 +88,7 @@ fn a_dispatch_decides_how_many_draws_there_are() {
             let arguments = buffer(&ctx, BufferUsage::INDIRECT, &words);
             let drawn = target(&ctx, Format::R32Float, [8, 1]);
             let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
-            let draws = CountedDraws {
+            let draws = IndirectCount {
                 arguments: *arguments,
                 offset: 0,
                 stride: 20,
@@ -136,7 +136,7 @@ fn a_number_written_in_the_same_command_buffer_is_declared() {
     let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let count = count_written_by_a_dispatch(&ctx, &mut cmd);
-    let draws = CountedDraws {
+    let draws = IndirectCount {
         arguments: *arguments,
         offset: 0,
         stride: 16,
@@ -154,14 +154,14 @@ fn a_number_written_in_the_same_command_buffer_is_declared() {
     usage_error(pass.draw_indirect_count(&draws), "bind a render pipeline first");
     pass.bind_render_pipeline(*pipeline).unwrap();
     for (wrong, words) in [
-        (CountedDraws { count_offset: 2, ..draws }, "multiple of 4"),
-        (CountedDraws { count_offset: 8, ..draws }, "arguments"),
-        (CountedDraws { stride: 12, ..draws }, "at least 16"),
-        (CountedDraws { max_draws: 6, ..draws }, "arguments"),
+        (IndirectCount { count_offset: 2, ..draws }, "multiple of 4"),
+        (IndirectCount { count_offset: 8, ..draws }, "arguments"),
+        (IndirectCount { stride: 12, ..draws }, "at least 16"),
+        (IndirectCount { max_draws: 6, ..draws }, "arguments"),
     ] {
         usage_error(pass.draw_indirect_count(&wrong), words);
     }
-    let too_many = CountedDraws { max_draws: u32::MAX, ..draws };
+    let too_many = IndirectCount { max_draws: u32::MAX, ..draws };
     match pass.draw_indirect_count(&too_many) {
         Err(Error::LimitExceeded { .. } | Error::InvalidUsage { .. }) => {}
         other => unreachable!("{other:?}"),
@@ -183,7 +183,7 @@ fn a_number_written_in_the_same_command_buffer_is_declared() {
     let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
     run_pass(&bare, &RenderPassDesc { color: &color, ..Default::default() }, |pass| {
         pass.bind_render_pipeline(*pipeline)?;
-        let draws = CountedDraws { arguments: *arguments, count: *count, count_offset: 0, ..draws };
+        let draws = IndirectCount { arguments: *arguments, count: *count, count_offset: 0, ..draws };
         unsupported(pass.draw_indirect_count(&draws), "drawIndirectCount");
         Ok(())
     });

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    ColorAttachment, ColorLoad, ColorTarget, CompareOp, Context, Dependencies, DepthAttachment, DepthState,
+    ColorAttachment, ColorLoadOp, ColorTarget, CompareOp, Context, Dependencies, DepthAttachment, DepthState,
     DeviceProfile, Error, Format, OptionalFeature, RenderPassDesc, RenderPipelineDesc, Resolve, ShaderStage,
     StencilFace, StencilOp, StencilTest, TextureDesc, TextureHandle, TextureKind, TextureMemory,
     TextureRegion, TextureUsage,
@@ -51,7 +51,7 @@ const BY_TEXTURES: &str = "
 
 fn cleared(texture: TextureHandle, format: Format) -> ColorAttachment {
     let load =
-        if format == Format::R32Uint { ColorLoad::ClearUint([9; 4]) } else { ColorLoad::Clear([0.5; 4]) };
+        if format == Format::R32Uint { ColorLoadOp::ClearUint([9; 4]) } else { ColorLoadOp::Clear([0.5; 4]) };
     ColorAttachment { load, ..ColorAttachment::clear(texture, [0.0; 4]) }
 }
 
@@ -204,12 +204,12 @@ fn draws_see_those_before_them() {
     let pipeline = staged_pipeline(&ctx, &stages, &desc).unwrap();
     let drawn = input(&ctx, Format::Rgba32Float);
     let mut expected = [1.0_f32, 2.0, 3.0, 4.0];
-    let mut load = ColorLoad::Clear(expected);
+    let mut load = ColorLoadOp::Clear(expected);
     for round in 0..3 {
         let mut cmd = ctx.acquire_command_buffer().unwrap();
         for step in 0..5 {
             let color = [ColorAttachment { load, ..ColorAttachment::clear(*drawn, [0.0; 4]) }];
-            load = ColorLoad::Load;
+            load = ColorLoadOp::Load;
             let desc = RenderPassDesc { color: &color, local_read: true, ..Default::default() };
             let mut pass = cmd.begin_rendering(&desc).unwrap();
             pass.bind_render_pipeline(*pipeline).unwrap();
@@ -246,7 +246,7 @@ fn pipelines_wait_for_each_other() {
     let textures = [input(&ctx, Format::Rgba32Float), input(&ctx, Format::Rgba32Float)];
     let color = [0, 1].map(|place| ColorAttachment::clear(*textures[place], [place as f32, 1.0, 2.0, 3.0]));
     let mut expected = color.map(|attachment| match attachment.load {
-        ColorLoad::Clear(color) => color,
+        ColorLoadOp::Clear(color) => color,
         _ => unreachable!("the targets are cleared"),
     });
     run_pass(&ctx, &RenderPassDesc { color: &color, local_read: true, ..Default::default() }, |pass| {
@@ -431,7 +431,7 @@ fn what_is_loaded_is_read() {
     cmd.clear_texture(*loaded, lvk::ClearValue::Color([1.0, 2.0, 3.0, 4.0]), &Default::default()).unwrap();
     cmd.clear_texture(*deep, lvk::ClearValue::Depth(0.25), &Default::default()).unwrap();
     for _ in 0..2 {
-        let kept = ColorAttachment { load: ColorLoad::Load, ..ColorAttachment::clear(*loaded, [0.0; 4]) };
+        let kept = ColorAttachment { load: ColorLoadOp::Load, ..ColorAttachment::clear(*loaded, [0.0; 4]) };
         let color = [kept, ColorAttachment::clear(*drawn, [9.0; 4])];
         let depth = Some(DepthAttachment::read_only(*deep));
         let desc = RenderPassDesc { color: &color, depth, local_read: true, ..Default::default() };

@@ -5,7 +5,7 @@
 use lvk::{
     ColorAttachment, CompareOp, Context, Dependencies, DepthAttachment, DepthResolve, DepthTest,
     DeviceProfile, Error, Format, Holder, OptionalFeature, RenderPassDesc, RenderPipelineDesc,
-    RenderPipelineHandle, Resolve, ResolveMode, ResolveModes, ShaderStage, StencilFace, StencilLoad,
+    RenderPipelineHandle, Resolve, ResolveMode, ResolveModes, ShaderStage, StencilFace, StencilLoadOp,
     StencilOp, StencilTest, TextureDesc, TextureHandle, TextureUsage,
 };
 use lvk_tests::compute::Evaluator;
@@ -207,7 +207,7 @@ fn colour_depth_and_stencil_are_resolved_by_their_modes() {
         let resolve = DepthResolve { texture: *depth_one, mip: 0, layer: 0, depth: Some(mode), stencil };
         let color = [resolved(*drawn, *one)];
         let depth = DepthAttachment {
-            stencil: StencilLoad::Clear(1),
+            stencil: StencilLoadOp::Clear(1),
             resolve: Some(resolve),
             ..DepthAttachment::clear(*tested, 0.0)
         };
@@ -279,7 +279,7 @@ fn integers_are_resolved_to_one_of_their_samples() {
     let desc = RenderPipelineDesc { color: &color, samples: SAMPLES, ..Default::default() };
     let pipeline = staged_pipeline(&ctx, &stages, &desc).unwrap();
     let one = target(&ctx, format, [1, 1]);
-    let color = [ColorAttachment { load: lvk::ColorLoad::ClearUint([0; 4]), ..resolved(*drawn, *one) }];
+    let color = [ColorAttachment { load: lvk::ColorLoadOp::ClearUint([0; 4]), ..resolved(*drawn, *one) }];
     run_pass(&ctx, &RenderPassDesc { color: &color, ..Default::default() }, |pass| {
         pass.bind_render_pipeline(*pipeline)?;
         pass.draw(0..3, 0..1)

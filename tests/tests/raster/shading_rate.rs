@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    ColorAttachment, Context, DeviceProfile, Format, Holder, OptionalFeature, RateCombine, RenderPass,
-    RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, ShaderModuleDesc, ShaderSource, ShaderStage,
-    ShadingRate, ShadingRateAttachment, ShadingRateLimits, TextureDesc, TextureHandle, TextureKind,
+    ColorAttachment, Context, DeviceProfile, Format, Holder, OptionalFeature, RenderPass, RenderPassDesc,
+    RenderPipelineDesc, RenderPipelineHandle, ShaderModuleDesc, ShaderSource, ShaderStage, ShadingRate,
+    ShadingRateAttachment, ShadingRateCombiner, ShadingRateLimits, TextureDesc, TextureHandle, TextureKind,
     TextureUsage,
 };
 use lvk_tests::raster::{
@@ -139,16 +139,16 @@ fn attachments_and_primitives_come_in_by_their_formulas() {
         })
         .unwrap();
     let attachment = ShadingRateAttachment::new(*rates, texel);
-    let combine = |by: RateCombine, first: [u32; 2], second: [u32; 2]| {
+    let combine = |by: ShadingRateCombiner, first: [u32; 2], second: [u32; 2]| {
         std::array::from_fn(|axis| match by {
-            RateCombine::Keep => first[axis],
-            RateCombine::Replace => second[axis],
-            RateCombine::Min => first[axis].min(second[axis]),
-            RateCombine::Max => first[axis].max(second[axis]),
-            RateCombine::Multiply => (first[axis] * second[axis]).min(4),
+            ShadingRateCombiner::Keep => first[axis],
+            ShadingRateCombiner::Replace => second[axis],
+            ShadingRateCombiner::Min => first[axis].min(second[axis]),
+            ShadingRateCombiner::Max => first[axis].max(second[axis]),
+            ShadingRateCombiner::Multiply => (first[axis] * second[axis]).min(4),
         })
     };
-    use RateCombine::{Keep, Max, Min, Multiply, Replace};
+    use ShadingRateCombiner::{Keep, Max, Min, Multiply, Replace};
     let kinds = if limits.combines { &[Keep, Replace, Min, Max, Multiply][..] } else { &[Keep, Replace] };
     let by_draw = [1, 2];
     let by_primitive = [2, 1];

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    ColorAttachment, ColorLoad, CompareOp, Context, DepthAttachment, DepthBias, DepthTest, DeviceProfile,
+    ColorAttachment, ColorLoadOp, CompareOp, Context, DepthAttachment, DepthBias, DepthTest, DeviceProfile,
     Format, Holder, OptionalFeature, PolygonMode, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle,
     ShaderStage, Topology,
 };
@@ -211,7 +211,7 @@ fn a_pass_touches_its_area_alone() {
         pass.scissor([2, 0], [1, 1])?;
         paint(pass, [3.0; 4], 0.0)
     });
-    let load = [ColorAttachment { load: ColorLoad::Load, ..clear(0.0)[0] }];
+    let load = [ColorAttachment { load: ColorLoadOp::Load, ..clear(0.0)[0] }];
     let part = RenderPassDesc { color: &load, area: Some([3, 1, 1, 1]), ..Default::default() };
     run_pass(&ctx, &part, |pass| {
         pass.bind_render_pipeline(*pipeline)?;

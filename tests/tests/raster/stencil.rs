@@ -2,9 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    ColorAttachment, ColorLoad, CompareOp, Context, CullMode, Dependencies, DepthAttachment, DepthLoad,
+    ColorAttachment, ColorLoadOp, CompareOp, Context, CullMode, Dependencies, DepthAttachment, DepthLoadOp,
     DepthState, DepthTest, Format, Holder, RenderPass, RenderPassDesc, RenderPipelineDesc,
-    RenderPipelineHandle, ShaderStage, StencilFace, StencilLoad, StencilOp, StencilTest, TextureHandle,
+    RenderPipelineHandle, ShaderStage, StencilFace, StencilLoadOp, StencilOp, StencilTest, TextureHandle,
 };
 use lvk_tests::device;
 use lvk_tests::raster::{COVER, PAINT, paint, pixels, run_pass, staged_pipeline, target, usage_error};
@@ -48,7 +48,7 @@ fn pass_over(
 ) {
     let color = [ColorAttachment::clear(drawn, [0.0; 4])];
     let depth =
-        DepthAttachment { stencil: StencilLoad::Clear(stencil), ..DepthAttachment::clear(tested, 0.5) };
+        DepthAttachment { stencil: StencilLoadOp::Clear(stencil), ..DepthAttachment::clear(tested, 0.5) };
     run_pass(ctx, &RenderPassDesc { color: &color, depth: Some(depth), ..Default::default() }, record);
 }
 
@@ -176,16 +176,16 @@ fn stencil_is_loaded_cleared_and_stored_apart_from_depth() {
         let stencil = stencil_values(&ctx, *tested, [1, 1], &[0, 3, 200])[0];
         (pixels::<f32>(&ctx, *tested)[0], stencil)
     };
-    assert_eq!(run(clear(StencilLoad::Clear(200))), (0.25, 200.0));
+    assert_eq!(run(clear(StencilLoadOp::Clear(200))), (0.25, 200.0));
     assert_eq!(
-        run(DepthAttachment { load: DepthLoad::Clear(0.75), ..clear(StencilLoad::Load) }),
+        run(DepthAttachment { load: DepthLoadOp::Clear(0.75), ..clear(StencilLoadOp::Load) }),
         (0.75, 200.0)
     );
-    let stencil_alone = DepthAttachment { load: DepthLoad::Load, ..clear(StencilLoad::Clear(3)) };
+    let stencil_alone = DepthAttachment { load: DepthLoadOp::Load, ..clear(StencilLoadOp::Clear(3)) };
     assert_eq!(run(stencil_alone), (0.75, 3.0));
     assert_eq!(run(DepthAttachment::load(*tested)), (0.75, 3.0));
     // Of depth alone what is dropped may be anything; the stencil stays.
-    let dropped = DepthAttachment { load: DepthLoad::DontCare, store: false, ..clear(StencilLoad::Load) };
+    let dropped = DepthAttachment { load: DepthLoadOp::DontCare, store: false, ..clear(StencilLoadOp::Load) };
     assert_eq!(run(dropped).1, 3.0);
 }
 
@@ -278,9 +278,9 @@ fn what_does_not_go_together_is_refused() {
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let only = DepthAttachment::read_only(*tested);
     for depth in [
-        DepthAttachment { load: DepthLoad::Clear(0.0), ..only },
-        DepthAttachment { stencil: StencilLoad::Clear(0), ..only },
-        DepthAttachment { stencil: StencilLoad::DontCare, ..only },
+        DepthAttachment { load: DepthLoadOp::Clear(0.0), ..only },
+        DepthAttachment { stencil: StencilLoadOp::Clear(0), ..only },
+        DepthAttachment { stencil: StencilLoadOp::DontCare, ..only },
     ] {
         let desc = RenderPassDesc { depth: Some(depth), ..Default::default() };
         usage_error(cmd.begin_rendering(&desc), "DepthAttachment::read_only");
@@ -289,7 +289,7 @@ fn what_does_not_go_together_is_refused() {
     let [writes_depth, writes_stencil, reads] =
         [(writes, KEEP), (NO_DEPTH, StencilFace { fail: StencilOp::Zero, ..KEEP }), (NO_DEPTH, KEEP)]
             .map(|(depth, face)| pipeline(&ctx, depth, both(face)));
-    let color = [ColorAttachment { load: ColorLoad::DontCare, ..ColorAttachment::clear(*drawn, [0.0; 4]) }];
+    let color = [ColorAttachment { load: ColorLoadOp::DontCare, ..ColorAttachment::clear(*drawn, [0.0; 4]) }];
     let desc = RenderPassDesc { color: &color, depth: Some(only), ..Default::default() };
     let mut pass = cmd.begin_rendering(&desc).unwrap();
     usage_error(pass.depth_state(NO_DEPTH_STATE), "bind a render pipeline first");

@@ -69,7 +69,7 @@ impl Writer {
         let writes = Dependencies { buffers: &[*self.records], ..Default::default() };
         cmd.dispatch([count.div_ceil(64), 1, 1], &writes)?;
         let instances = DeviceInstances { buffer: *self.records, offset: OFFSET, count, blas: &blas };
-        cmd.update_tlas_from(*gpu.tlas, &instances, mode)
+        cmd.update_tlas_from_buffer(*gpu.tlas, &instances, mode)
     }
 }
 
@@ -207,7 +207,7 @@ fn mistakes_with_device_instances_are_refused() -> Result<()> {
     ];
     for (words, instances) in cases {
         let mut cmd = ctx.acquire_command_buffer()?;
-        let error = cmd.update_tlas_from(*gpu.tlas, &instances, BuildMode::Rebuild).err();
+        let error = cmd.update_tlas_from_buffer(*gpu.tlas, &instances, BuildMode::Rebuild).err();
         let of_caller = matches!(
             error,
             Some(Error::InvalidUsage { .. } | Error::StaleHandle { .. } | Error::LimitExceeded { .. })
@@ -220,7 +220,8 @@ fn mistakes_with_device_instances_are_refused() -> Result<()> {
     let mut cmd = ctx.acquire_command_buffer()?;
     writer.update(&mut cmd, &gpu, 8, 0.1, BuildMode::Rebuild)?;
     assert!(
-        cmd.update_tlas_from(*gpu.tlas, &DeviceInstances { count: 5, ..good }, BuildMode::Refit).is_err()
+        cmd.update_tlas_from_buffer(*gpu.tlas, &DeviceInstances { count: 5, ..good }, BuildMode::Refit)
+            .is_err()
     );
     ctx.submit(cmd)?;
     HitCheck::new(&ctx)?.scene("afterwards", &gpu.tlas, &scene(&models(), 8, 0.1))
@@ -238,7 +239,7 @@ fn none_and_homeless_instances_are_missed() -> Result<()> {
         let mut cmd = ctx.acquire_command_buffer()?;
         writer.update(&mut cmd, &gpu, 8, 0.0, BuildMode::Rebuild)?;
         let instances = DeviceInstances { buffer: *writer.records, offset: OFFSET, count, blas: &blas };
-        cmd.update_tlas_from(*gpu.tlas, &instances, BuildMode::Rebuild)?;
+        cmd.update_tlas_from_buffer(*gpu.tlas, &instances, BuildMode::Rebuild)?;
         ctx.submit(cmd)?;
         for (method, tracer) in check.tracers() {
             let records = tracer.trace(&gpu.tlas, &rays, How::default())?;

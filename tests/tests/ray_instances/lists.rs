@@ -54,7 +54,7 @@ fn show(
     mode: BuildMode,
 ) -> Result<()> {
     let mut cmd = ctx.acquire_command_buffer()?;
-    cmd.update_tlas_from(tlas, &DeviceInstances { buffer, offset: 0, count, blas }, mode)?;
+    cmd.update_tlas_from_buffer(tlas, &DeviceInstances { buffer, offset: 0, count, blas }, mode)?;
     ctx.submit(cmd).map(drop)
 }
 
@@ -102,7 +102,7 @@ fn an_update_that_is_overtaken_by_compaction_is_mended() -> Result<()> {
     let tlas = ctx.create_tlas(&TlasDesc { capacity: 6, ..Default::default() })?;
     let mut cmd = ctx.acquire_command_buffer()?;
     let source = DeviceInstances { buffer: *buffer, offset: 0, count: 6, blas: &blas };
-    cmd.update_tlas_from(*tlas, &source, BuildMode::Rebuild)?;
+    cmd.update_tlas_from_buffer(*tlas, &source, BuildMode::Rebuild)?;
     ctx.compact(&blas)?;
     (0..3).try_for_each(|_| ctx.wait_idle())?;
     assert!(matches!(ctx.accel_struct_info(blas[0])?.compaction, Compaction::Done { .. }));

@@ -3,7 +3,8 @@
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
     AccelMemory, AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage,
-    BuildFlags, BuildMode, Context, DeviceProfile, Error, Holder, Result, TlasDesc, Triangles, Validation,
+    BuildFlags, BuildMode, Context, DeviceProfile, Error, Holder, Result, TlasDesc, Triangles,
+    ValidationMode,
 };
 use lvk_tests::agreement::Agreement;
 use lvk_tests::hit_check::HitCheck;
@@ -179,7 +180,7 @@ fn small_structures_share_buffers() -> Result<()> {
     const COUNT: usize = 100;
     // Under validation in shaders each has its own.
     let shared = |validation| match validation {
-        Validation::GpuAssisted => Validation::Standard,
+        ValidationMode::GpuAssisted => ValidationMode::Standard,
         other => other,
     };
     let Some(ctx) = device_with(|desc| desc.validation = shared(desc.validation)) else { return Ok(()) };

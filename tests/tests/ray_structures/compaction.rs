@@ -161,7 +161,7 @@ fn top_level_structures_of_before_show_the_copies() -> Result<()> {
     let blas = handles(&gpu);
     let mut cmd = ctx.acquire_command_buffer()?;
     let source = DeviceInstances { buffer: *records, offset: 0, count: 6, blas: &blas };
-    cmd.update_tlas_from(*from_buffer, &source, BuildMode::Rebuild)?;
+    cmd.update_tlas_from_buffer(*from_buffer, &source, BuildMode::Rebuild)?;
     ctx.submit(cmd)?;
     ctx.compact(&blas)?;
     ctx.upload_buffer(*records, 0, &vec![0xff; words.len() * 4])?;

@@ -370,7 +370,7 @@ fn traces_that_cannot_run_are_refused() -> Result<()> {
     };
     intact.refuse("ray generation shader 1 does not exist", |cmd| {
         pushed(cmd)?;
-        cmd.trace_rays_from(1, [1, 1, 1], &none)
+        cmd.trace_rays_with(1, [1, 1, 1], &none)
     })?;
     for size in [[u32::MAX; 3], [u32::MAX, 2, 1]] {
         intact.refuse("number of rays", |cmd| {

@@ -73,7 +73,7 @@ fn a_refused_update_from_a_buffer_leaves_the_command_buffer_usable() -> Result<(
     ctx.wait_idle()?;
     let mut cmd = ctx.acquire_command_buffer()?;
     let from = DeviceInstances { buffer: *records, offset: 0, count: 1, blas: &[*blas] };
-    let error = cmd.update_tlas_from(*tlas, &from, BuildMode::Refit).expect_err("no ALLOW_UPDATE");
+    let error = cmd.update_tlas_from_buffer(*tlas, &from, BuildMode::Refit).expect_err("no ALLOW_UPDATE");
     assert!(error.to_string().contains("ALLOW_UPDATE"), "{error}");
     ctx.wait(ctx.submit(cmd)?)
 }

@@ -271,7 +271,7 @@ fn instances_written_by_the_gpu_may_show_split_meshes() -> Result<()> {
             let instances = ctx.buffer_address(*buffer)? + 32;
             cmd.push_constants(&WritePush { instances, count: COUNT, shift })?;
             cmd.dispatch([1, 1, 1], &Dependencies { buffers: &[*buffer], ..Default::default() })?;
-            cmd.update_tlas_from(*tlas, &source, mode)?;
+            cmd.update_tlas_from_buffer(*tlas, &source, mode)?;
             ctx.submit(cmd)?;
             check.scene(&format!("{mode:?} of written instances"), &tlas, &written(COUNT, shift))?;
         }
@@ -310,7 +310,7 @@ fn more_parts_than_there_is_room_for_are_refused() -> Result<()> {
     let mut cmd = ctx.acquire_command_buffer()?;
     let updates = [
         cmd.update_tlas(*tight, &shown, BuildMode::Rebuild),
-        cmd.update_tlas_from(*tight, &source, BuildMode::Rebuild),
+        cmd.update_tlas_from_buffer(*tight, &source, BuildMode::Rebuild),
     ];
     for updated in updates {
         if !has_own_structures(&ctx) {

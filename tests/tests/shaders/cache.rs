@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use lvk::{
-    ComputePipelineDesc, Context, Dependencies, Error, ShaderCacheCounts, ShaderModuleDesc, ShaderSource,
+    ComputePipelineDesc, Context, Dependencies, Error, ShaderCacheStats, ShaderModuleDesc, ShaderSource,
     ShaderStage,
 };
 use lvk_samples::pipelines;
@@ -22,8 +22,8 @@ fn start(folder: &Path) -> Option<TestDevice> {
     device_with(|desc| desc.shader_cache = Some(folder))
 }
 
-fn counts(found: u64, compiled: u64) -> ShaderCacheCounts {
-    ShaderCacheCounts { found, compiled }
+fn counts(found: u64, compiled: u64) -> ShaderCacheStats {
+    ShaderCacheStats { found, compiled }
 }
 
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -70,17 +70,17 @@ fn a_second_run_finds_what_the_first_has_compiled() {
     let place = folder.path().join("made").join("when needed");
     let Some(ctx) = start(&place) else { return };
     let seven = desc(&[("value.glsl", "const uint VALUE = 7;")], &[("ADDED", "1")]);
-    assert_eq!((answer(&ctx, &seven), ctx.shader_cache_counts()), (8, counts(0, 1)));
-    assert_eq!((answer(&ctx, &seven), ctx.shader_cache_counts()), (8, counts(1, 1)), "in the same run too");
+    assert_eq!((answer(&ctx, &seven), ctx.shader_cache_stats()), (8, counts(0, 1)));
+    assert_eq!((answer(&ctx, &seven), ctx.shader_cache_stats()), (8, counts(1, 1)), "in the same run too");
     drop(ctx);
     let ctx = start(&place).unwrap();
-    assert_eq!((answer(&ctx, &seven), ctx.shader_cache_counts()), (8, counts(1, 0)));
+    assert_eq!((answer(&ctx, &seven), ctx.shader_cache_stats()), (8, counts(1, 0)));
     let named = ShaderModuleDesc { debug_name: "another name", ..seven };
-    assert_eq!((answer(&ctx, &named), ctx.shader_cache_counts()), (8, counts(2, 0)));
+    assert_eq!((answer(&ctx, &named), ctx.shader_cache_stats()), (8, counts(2, 0)));
     assert_eq!(files(&place).len(), 1);
     assert_eq!(take_warnings(place.to_str().unwrap()), [""; 0]);
     let Some(plain) = device() else { return };
-    assert_eq!((answer(&plain, &seven), plain.shader_cache_counts()), (8, counts(0, 0)), "without a folder");
+    assert_eq!((answer(&plain, &seven), plain.shader_cache_stats()), (8, counts(0, 0)), "without a folder");
 }
 
 #[test]
@@ -100,11 +100,11 @@ fn nothing_outdated_is_taken() {
     for (desc, expected) in cases {
         assert_eq!(answer(&ctx, &desc), expected);
     }
-    assert_eq!(ctx.shader_cache_counts(), counts(0, 4));
+    assert_eq!(ctx.shader_cache_stats(), counts(0, 4));
     let (found, _) = (answer(&ctx, &cases[3].0), answer(&ctx, &cases[0].0));
-    assert_eq!((found, ctx.shader_cache_counts()), (31, counts(2, 4)));
+    assert_eq!((found, ctx.shader_cache_stats()), (31, counts(2, 4)));
     let with_text = ShaderModuleDesc { debug_info: true, ..cases[0].0 };
-    assert_eq!((answer(&ctx, &with_text), ctx.shader_cache_counts()), (11, counts(2, 5)));
+    assert_eq!((answer(&ctx, &with_text), ctx.shader_cache_stats()), (11, counts(2, 5)));
 }
 
 #[test]
@@ -130,7 +130,7 @@ fn files_that_were_changed_or_put_in_front_are_noticed() {
     std::fs::remove_file(dirs[1].join("value.glsl")).unwrap();
     let gone = ctx.create_shader_module(&desc);
     assert!(matches!(&gone, Err(Error::Shader { log, .. }) if log.contains("value.glsl")), "{gone:?}");
-    assert_eq!(ctx.shader_cache_counts(), counts(3, 4));
+    assert_eq!(ctx.shader_cache_stats(), counts(3, 4));
 }
 
 #[test]
@@ -157,11 +157,11 @@ fn damaged_and_foreign_files_are_dropped_and_replaced() {
     ];
     for (bytes, words) in cases {
         std::fs::write(&file, bytes).unwrap();
-        let before = ctx.shader_cache_counts();
+        let before = ctx.shader_cache_stats();
         assert_eq!(answer(&ctx, &desc(&listed, &a)), 8);
         let warnings = take_warnings(path.to_str().unwrap());
         assert!(warnings.len() == 1 && warnings[0].contains(words), "{words}: {warnings:?}");
-        assert_eq!(ctx.shader_cache_counts().compiled, before.compiled + 1, "{words}");
+        assert_eq!(ctx.shader_cache_stats().compiled, before.compiled + 1, "{words}");
         assert_eq!(std::fs::read(&file).unwrap(), good, "{words}");
     }
 }
@@ -179,7 +179,7 @@ fn errors_stay_errors_and_a_file_in_the_folders_place_only_warns() {
         let log = ctx.create_shader_module(&wrong).unwrap_err().to_string();
         assert!(log.contains("line 2") && log.contains("nothing"), "{log}");
     }
-    assert_eq!((ctx.shader_cache_counts(), files(folder.path()).len()), (counts(0, 0), 0));
+    assert_eq!((ctx.shader_cache_stats(), files(folder.path()).len()), (counts(0, 0), 0));
     let file = folder.path().join("a file");
     std::fs::write(&file, "mine").unwrap();
     let ctx = start(&file).unwrap();
@@ -210,7 +210,7 @@ fn contexts_side_by_side_share_a_folder() {
             });
         }
     });
-    let (a, b) = (first.shader_cache_counts(), second.shader_cache_counts());
+    let (a, b) = (first.shader_cache_stats(), second.shader_cache_stats());
     assert!(a.found + b.found + a.compiled + b.compiled == 60 && a.found.min(b.found) >= 20, "{a:?} {b:?}");
     assert_eq!(files(folder.path()).len(), 10);
     assert_eq!(take_warnings(folder.path().to_str().unwrap()), [""; 0]);
@@ -229,10 +229,10 @@ fn every_module_of_the_samples_is_found_again() {
     };
     let (made, first) = make_all(&ctx);
     // A few are compiled and then refused for what the device lacks.
-    let ShaderCacheCounts { found, compiled } = ctx.shader_cache_counts();
+    let ShaderCacheStats { found, compiled } = ctx.shader_cache_stats();
     assert!(made >= 60 && compiled >= 50 && found + compiled >= made, "{made} {found} {compiled}");
     let again = start(folder.path()).unwrap();
     let (made_again, second) = make_all(&again);
-    assert_eq!((made_again, again.shader_cache_counts()), (made, counts(found + compiled, 0)));
+    assert_eq!((made_again, again.shader_cache_stats()), (made, counts(found + compiled, 0)));
     eprintln!("{made} modules: {first:?} without, {second:?} with what was kept");
 }

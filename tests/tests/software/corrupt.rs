@@ -482,7 +482,7 @@ fn update_from(
 ) -> Result<()> {
     let mut cmd = ctx.acquire_command_buffer()?;
     let source = DeviceInstances { buffer, offset: 0, count, blas };
-    cmd.update_tlas_from(tlas, &source, BuildMode::Rebuild)?;
+    cmd.update_tlas_from_buffer(tlas, &source, BuildMode::Rebuild)?;
     ctx.submit(cmd).map(drop)
 }
 

@@ -48,7 +48,7 @@ fn update_from(ctx: &Context, gpu: &GpuScene, placed: &[Placed]) -> Result<()> {
     let count = placed.len() as u32;
     let mut cmd = ctx.acquire_command_buffer()?;
     let source = DeviceInstances { buffer: *records, offset: 0, count, blas: &[*gpu.models[0]] };
-    cmd.update_tlas_from(*gpu.tlas, &source, BuildMode::Rebuild)?;
+    cmd.update_tlas_from_buffer(*gpu.tlas, &source, BuildMode::Rebuild)?;
     ctx.submit(cmd).map(drop)
 }
 

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    ClearValue, ColorAttachment, ColorLoad, Context, Dependencies, DepthAttachment, Error, Filter, Format,
+    ClearValue, ColorAttachment, ColorLoadOp, Context, Dependencies, DepthAttachment, Error, Filter, Format,
     Holder, RenderPassDesc, TextureDesc, TextureHandle, TextureKind, TextureMemory, TextureRange,
     TextureRegion, TextureUsage, TextureViewDesc,
 };
@@ -541,7 +541,7 @@ fn transient_targets_live_in_their_pass_only() {
     let whole = TextureRegion::default();
     let stored =
         RenderPassDesc { color: &[ColorAttachment { store: true, ..cleared }], ..Default::default() };
-    let loaded = ColorAttachment { load: ColorLoad::Load, ..cleared };
+    let loaded = ColorAttachment { load: ColorLoadOp::Load, ..cleared };
     let loaded = RenderPassDesc { color: &[loaded], ..Default::default() };
     let kept = RenderPassDesc { depth: Some(DepthAttachment { store: true, ..deep }), ..Default::default() };
     let other = texture(&ctx, &TextureDesc { extent: [4, 4], ..Default::default() });

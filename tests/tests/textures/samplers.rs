@@ -3,7 +3,8 @@
 
 use lvk::{
     AddressMode, BorderColor, CompareOp, Context, Dependencies, Error, Filter, Format, Holder,
-    OptionalFeature, Reduction, SamplerDesc, TextureDesc, TextureHandle, TextureKind, TextureRegion,
+    OptionalFeature, SamplerDesc, SamplerReductionMode, TextureDesc, TextureHandle, TextureKind,
+    TextureRegion,
 };
 use lvk_tests::compute::Evaluator;
 use lvk_tests::device;
@@ -154,8 +155,11 @@ fn odd_numbers_are_errors_or_clamped() {
     for lod_bias in [limit, -limit] {
         drop(ctx.create_sampler(&SamplerDesc { lod_bias, ..Default::default() }).unwrap());
     }
-    let compared =
-        SamplerDesc { compare: Some(CompareOp::Less), reduction: Reduction::Min, ..Default::default() };
+    let compared = SamplerDesc {
+        compare: Some(CompareOp::Less),
+        reduction: SamplerReductionMode::Min,
+        ..Default::default()
+    };
     for desc in [
         SamplerDesc { lod_bias: limit + 0.5, ..Default::default() },
         SamplerDesc { lod_bias: f32::NEG_INFINITY, ..Default::default() },
@@ -231,7 +235,7 @@ fn without_optional_features_samplers_are_refused_by_name() {
     let Some(ctx) = lvk_tests::device::device_with(|desc| desc.profile = Some(&hidden)) else { return };
     let refused = [
         (nearest(AddressMode::MirrorClampToEdge), "samplerMirrorClampToEdge"),
-        (SamplerDesc { reduction: Reduction::Max, ..Default::default() }, "samplerFilterMinmax"),
+        (SamplerDesc { reduction: SamplerReductionMode::Max, ..Default::default() }, "samplerFilterMinmax"),
         (SamplerDesc { border: BorderColor::Custom([0.0; 4]), ..Default::default() }, "customBorderColors"),
     ];
     for (desc, feature) in refused {
@@ -261,7 +265,9 @@ fn mirrors_and_reductions_take_the_texels_they_name() {
         assert_eq!(found, [4.0, 4.0, 4.0, 3.0, 2.0, 1.0, 1.0, 2.0, 3.0, 4.0, 4.0, 4.0]);
     }
     if optional(OptionalFeature::FilterMinMax) && ctx.format_support(Format::R32Float).min_max {
-        for (reduction, expected) in [(Reduction::Min, [1.0, 2.0, 3.0]), (Reduction::Max, [2.0, 3.0, 4.0])] {
+        for (reduction, expected) in
+            [(SamplerReductionMode::Min, [1.0, 2.0, 3.0]), (SamplerReductionMode::Max, [2.0, 3.0, 4.0])]
+        {
             let address = [AddressMode::ClampToEdge; 3];
             let desc = SamplerDesc { reduction, address, ..Default::default() };
             assert_eq!(sample(&ctx, texture.index(), &desc, "(0.9 + i) / 4.0", 3), expected, "{reduction:?}");

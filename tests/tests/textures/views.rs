@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    Channel, ClearValue, ColorAttachment, ColorLoad, Context, Dependencies, Error, Filter, Format, Holder,
+    Channel, ClearValue, ColorAttachment, ColorLoadOp, Context, Dependencies, Error, Filter, Format, Holder,
     RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, Swizzle, TextureDesc, TextureHandle,
     TextureKind, TextureRange, TextureRegion, TextureUsage, TextureViewDesc,
 };
@@ -251,12 +251,12 @@ fn a_target_is_encoded_in_the_format_of_its_view() {
         ctx.submit(cmd).unwrap();
         ctx.download_texture(*base, &TextureRegion::default()).unwrap()[..4].to_vec()
     };
-    let gray = ColorLoad::Clear([0.5, 0.5, 0.5, 0.5]);
+    let gray = ColorLoadOp::Clear([0.5, 0.5, 0.5, 0.5]);
     let srgb = clear(*formatted(Format::Rgba8Srgb), gray);
     assert!(srgb[..3].iter().all(|byte| (187..=188).contains(byte)), "{srgb:?}");
     assert!((127..=128).contains(&srgb[3]), "{srgb:?}");
     assert!(clear(*base, gray).iter().all(|byte| (127..=128).contains(byte)));
-    let word = ColorLoad::ClearUint([0x0403_0201; 4]);
+    let word = ColorLoadOp::ClearUint([0x0403_0201; 4]);
     assert_eq!(clear(*formatted(Format::R32Uint), word), [1, 2, 3, 4]);
 }
 

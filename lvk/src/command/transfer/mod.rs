@@ -3,7 +3,7 @@
 mod blit;
 mod buffer;
 mod clear;
-mod hand_over;
+mod release_texture;
 mod resolve;
 mod settle;
 mod texture;

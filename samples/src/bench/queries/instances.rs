@@ -47,7 +47,8 @@ impl Instances {
     pub(super) fn rebuild(&self, stopwatch: &Stopwatch) -> Result<f64, BenchError> {
         let blas = [*self.blas];
         let instances = DeviceInstances { buffer: *self.records, offset: 0, count: COUNT, blas: &blas };
-        let timed = stopwatch.time(|cmd| cmd.update_tlas_from(*self.tlas, &instances, BuildMode::Rebuild))?;
+        let timed =
+            stopwatch.time(|cmd| cmd.update_tlas_from_buffer(*self.tlas, &instances, BuildMode::Rebuild))?;
         Ok(timed.gpu)
     }
 }

@@ -16,7 +16,7 @@ impl CommandBuffer {
     ///
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) for another layout.
-    pub fn hand_over_texture(&mut self, texture: TextureHandle, layout: vk::ImageLayout) -> Result<()> {
+    pub fn release_texture(&mut self, texture: TextureHandle, layout: vk::ImageLayout) -> Result<()> {
         let texture = self.shared.store.textures.get(texture)?;
         let known = known_layout(layout).map_err(|why| Error::usage(&texture.name, why))?;
         if layout == vk::ImageLayout::UNDEFINED {

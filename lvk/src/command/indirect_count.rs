@@ -15,7 +15,7 @@ use crate::resource::Buffer;
 /// Where the arguments of draws are, and where their number is. Both buffers have
 /// [`BufferUsage::INDIRECT`](crate::BufferUsage::INDIRECT), and all offsets are multiples of 4.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct CountedDraws {
+pub struct IndirectCount {
     /// The arguments.
     pub arguments: BufferHandle,
     /// Where the first are, in bytes.
@@ -37,7 +37,7 @@ impl RenderPass<'_> {
     /// Those of [`draw_indirect`](Self::draw_indirect); [`Unsupported`](crate::Error::Unsupported) without
     /// [`OptionalFeature::DrawIndirectCount`](crate::OptionalFeature::DrawIndirectCount): leave draws without vertices at
     /// the end there.
-    pub fn draw_indirect_count(&mut self, draws: &CountedDraws) -> Result<()> {
+    pub fn draw_indirect_count(&mut self, draws: &IndirectCount) -> Result<()> {
         self.check_draw()?;
         let command = self.cmd.shared.gpu.device.fp_v1_2().cmd_draw_indirect_count;
         self.draw_counted(draws, size_of::<vk::DrawIndirectCommand>(), command)
@@ -49,7 +49,7 @@ impl RenderPass<'_> {
     /// # Errors
     /// Those of both [`draw_indexed_indirect`](Self::draw_indexed_indirect) and
     /// [`draw_indirect_count`](Self::draw_indirect_count).
-    pub fn draw_indexed_indirect_count(&mut self, draws: &CountedDraws) -> Result<()> {
+    pub fn draw_indexed_indirect_count(&mut self, draws: &IndirectCount) -> Result<()> {
         self.check_draw()?;
         self.bound_indices()?;
         let command = self.cmd.shared.gpu.device.fp_v1_2().cmd_draw_indexed_indirect_count;
@@ -62,7 +62,7 @@ impl RenderPass<'_> {
     /// # Errors
     /// Those of both [`draw_mesh_tasks_indirect`](Self::draw_mesh_tasks_indirect) and
     /// [`draw_indirect_count`](Self::draw_indirect_count).
-    pub fn draw_mesh_tasks_indirect_count(&mut self, draws: &CountedDraws) -> Result<()> {
+    pub fn draw_mesh_tasks_indirect_count(&mut self, draws: &IndirectCount) -> Result<()> {
         self.ready_mesh()?;
         let command = self.cmd.shared.gpu.mesh()?.fp().cmd_draw_mesh_tasks_indirect_count_ext;
         self.draw_counted(draws, size_of::<vk::DrawMeshTasksIndirectCommandEXT>(), command)
@@ -71,12 +71,12 @@ impl RenderPass<'_> {
     /// Records one of the three, which all take the same, for arguments of `size` bytes a draw.
     fn draw_counted(
         &mut self,
-        draws: &CountedDraws,
+        draws: &IndirectCount,
         size: usize,
         command: vk::PFN_vkCmdDrawIndirectCount,
     ) -> Result<()> {
         let [arguments, count] = self.counted(draws, size as u64)?;
-        let CountedDraws { offset, stride, count_offset, max_draws, .. } = *draws;
+        let IndirectCount { offset, stride, count_offset, max_draws, .. } = *draws;
         // SAFETY: the pass is ready for such a draw, as in `draw`, and the arguments and their number lie inside the buffers.
         unsafe {
             command(self.cmd.raw(), arguments.raw, offset, count.raw, count_offset, max_draws, stride);
@@ -85,14 +85,14 @@ impl RenderPass<'_> {
     }
 
     /// The buffers of arguments and of their number, which the pass reads.
-    fn counted(&mut self, draws: &CountedDraws, size: u64) -> Result<[Arc<Buffer>; 2]> {
+    fn counted(&mut self, draws: &IndirectCount, size: u64) -> Result<[Arc<Buffer>; 2]> {
         let gpu = &self.cmd.shared.gpu;
         gpu.require(OptionalFeature::DrawIndirectCount, "a number of draws from a buffer")?;
         let most = gpu.caps.limits.max_indirect_draws;
         let count = self.cmd.shared.store.buffers.get(draws.count)?;
         check_limit(&count.name, "draw count", draws.max_draws.into(), most.into())?;
         check_arguments(&count, draws.count_offset, size_of::<u32>() as u64)?;
-        let CountedDraws { arguments, offset, max_draws, stride, .. } = *draws;
+        let IndirectCount { arguments, offset, max_draws, stride, .. } = *draws;
         let arguments = self.indirect(arguments, offset, max_draws, stride, size)?;
         self.read_inside(&count, Use::indirect())?;
         Ok([arguments, count])
