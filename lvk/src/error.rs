@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::gpu::fault::DeviceFault;
-use crate::gpu::queues::Queue;
+use crate::gpu::caps::queues::Queue;
+use crate::gpu::debug::device_fault::DeviceFault;
 
 /// Result of every fallible call of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;

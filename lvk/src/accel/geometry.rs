@@ -8,7 +8,7 @@ use bitflags::bitflags;
 use crate::error::{Error, Result, check_limit};
 use crate::format::{IndexFormat, VertexFormat};
 use crate::gpu::Gpu;
-use crate::gpu::limits::Limits;
+use crate::gpu::caps::limits::Limits;
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;
 use crate::resource::buffer::BufferUsage;

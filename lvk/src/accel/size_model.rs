@@ -1,7 +1,7 @@
 //! What a bottom-level build takes under a device profile, which may ask for more than the driver at hand does.
 
 use super::flags::AccelStructSizes;
-use crate::gpu::profile::DeviceProfile;
+use crate::gpu::start::profile::DeviceProfile;
 
 impl DeviceProfile {
     /// The larger of what the `driver` answered for a bottom-level build and what the profile says of that many

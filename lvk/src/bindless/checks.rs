@@ -12,7 +12,7 @@ use ash::vk;
 
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::gpu::memory::MemoryKind;
+use crate::gpu::memory::allocator::MemoryKind;
 use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};

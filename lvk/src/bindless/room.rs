@@ -1,7 +1,7 @@
 //! What the bindless set holds beside textures and samplers.
 
 use crate::gpu::Gpu;
-use crate::gpu::descriptor_limits::OtherDescriptors;
+use crate::gpu::caps::descriptor_limits::OtherDescriptors;
 
 /// Top-level structures there may be, of either form.
 pub(super) fn slot_count(gpu: &Gpu) -> u32 {

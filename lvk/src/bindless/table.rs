@@ -13,7 +13,7 @@ use super::yuv::{YuvPlace, YuvSlots};
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
-use crate::gpu::descriptor_limits::fitting;
+use crate::gpu::caps::descriptor_limits::fitting;
 use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::ycbcr::YuvConversion;
 

@@ -8,7 +8,7 @@ use super::array::Array;
 use super::room;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::descriptor_limits::YuvWish;
+use crate::gpu::caps::descriptor_limits::YuvWish;
 use crate::resource::ycbcr::{YuvConversion, YuvSampler};
 
 /// Conversions of a context, each with its textures.

@@ -1,6 +1,6 @@
 //! Targets of a render pass, as callers describe them.
 
-use crate::gpu::resolve_modes::ResolveMode;
+use crate::gpu::caps::resolve_modes::ResolveMode;
 use crate::handle::TextureHandle;
 
 /// What a colour target holds when the pass begins.

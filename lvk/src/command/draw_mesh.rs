@@ -4,7 +4,7 @@ use ash::vk;
 
 use super::render::RenderPass;
 use crate::error::{Result, check_limit};
-use crate::gpu::mesh_limits::MeshLimits;
+use crate::gpu::caps::mesh_limits::MeshLimits;
 use crate::handle::BufferHandle;
 use crate::pipeline::FrontEnd;
 

@@ -4,8 +4,8 @@ use ash::vk;
 
 use super::render::RenderPass;
 use crate::error::{Error, Result};
-use crate::gpu::optional::OptionalFeature;
-use crate::gpu::shading_rate::ShadingRate;
+use crate::gpu::caps::optional_features::OptionalFeature;
+use crate::gpu::caps::shading_rate::ShadingRate;
 use crate::pipeline::PassState;
 use crate::pipeline::depth_stencil::DepthState;
 use crate::pipeline::raster::DepthBias;

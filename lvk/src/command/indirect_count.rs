@@ -8,7 +8,7 @@ use super::compute::check_arguments;
 use super::render::RenderPass;
 use crate::barrier::Use;
 use crate::error::{Result, check_limit};
-use crate::gpu::optional::OptionalFeature;
+use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;
 

@@ -11,7 +11,7 @@ use crate::bindless::inputs::{Input, InputMask};
 use crate::bindless::layout::INPUT_SET;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::optional::OptionalFeature;
+use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::pipeline::RenderPipeline;
 use crate::pipeline::local_read::{InputIndices, READS_WRITTEN, default_indices};
 use crate::resource::texture_desc::TextureUsage;

@@ -41,7 +41,7 @@ use ash::vk;
 
 use crate::barrier::Use;
 use crate::error::Result;
-use crate::gpu::queues::Queue;
+use crate::gpu::caps::queues::Queue;
 use crate::pipeline::{ComputePipeline, RayTracingPipeline};
 use crate::shared::Shared;
 use crate::submit::Recording;

@@ -8,7 +8,7 @@ use super::targets::Target;
 use crate::barrier::{Layout, Use};
 use crate::error::{Error, Result};
 use crate::format::{Format, Numbers};
-use crate::gpu::resolve_modes::ResolveMode;
+use crate::gpu::caps::resolve_modes::ResolveMode;
 use crate::submit::emit::layout;
 
 impl CommandBuffer {

@@ -9,7 +9,7 @@ use super::render::RenderPass;
 use super::render_pass::RenderPassDesc;
 use crate::barrier::Use;
 use crate::error::{Error, Result};
-use crate::gpu::shading_rate::ShadingRate;
+use crate::gpu::caps::shading_rate::ShadingRate;
 use crate::pipeline::RenderPipeline;
 use crate::resource::texture_desc::TextureUsage;
 use crate::submit::emit::layout;

@@ -9,7 +9,7 @@ use super::compute::check_arguments;
 use super::dependencies::Dependencies;
 use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result, check_limit};
-use crate::gpu::limits::Limits;
+use crate::gpu::caps::limits::Limits;
 use crate::handle::{BufferHandle, RayTracingPipelineHandle};
 use crate::pipeline::RayTracingPipeline;
 use crate::pipeline::ray_tracing::TraceRegions;

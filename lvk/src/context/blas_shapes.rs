@@ -12,7 +12,7 @@ use crate::accel::software::blas::most_sizes;
 use crate::accel::split::{PartLimits, PartPlan, PartSizes, plan_split};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::gpu::limits::Limits;
+use crate::gpu::caps::limits::Limits;
 use crate::shared::Shared;
 
 /// Meshes of fewer primitives are built as given: no order makes them slow.

@@ -3,13 +3,13 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::gpu::caps::FeatureRequest;
-use crate::gpu::debug::{ValidationMode, ValidationSink};
-use crate::gpu::extra::UserExtensions;
-use crate::gpu::optional::OptionalFeature;
-use crate::gpu::profile::DeviceProfile;
-use crate::gpu::queues::QueueRequest;
-use crate::gpu::ray_query_path::RayQueryRequest;
+use crate::gpu::caps::capabilities::FeatureRequest;
+use crate::gpu::caps::optional_features::OptionalFeature;
+use crate::gpu::caps::queues::QueueRequest;
+use crate::gpu::caps::ray_query_path::RayQueryRequest;
+use crate::gpu::debug::messenger::{ValidationMode, ValidationSink};
+use crate::gpu::start::profile::DeviceProfile;
+use crate::gpu::start::user_extensions::UserExtensions;
 use crate::gpu::window::WindowHandles;
 use crate::resource::ycbcr::YuvConversion;
 

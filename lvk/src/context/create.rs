@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::Context;
 use super::holder::Holder;
 use crate::error::{Error, Result};
-use crate::gpu::caps::Capabilities;
+use crate::gpu::caps::capabilities::Capabilities;
 use crate::handle::{
     BufferHandle, ComputePipelineHandle, QueryPoolHandle, RenderPipelineHandle, SamplerHandle,
     ShaderModuleHandle,

@@ -7,7 +7,7 @@ use super::config::ContextDesc;
 use super::start::requested_queues;
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::gpu::foreign::RawContext;
+use crate::gpu::start::external::RawContext;
 
 impl Context {
     /// Makes a context on an instance, device and queues of the caller's own, which stay the caller's: nothing of them is

@@ -6,7 +6,7 @@ use super::Context;
 use super::holder::Holder;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
-use crate::gpu::queues::Queue;
+use crate::gpu::caps::queues::Queue;
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::buffer::BufferUsage;
 use crate::resource::texture_desc::TextureDesc;

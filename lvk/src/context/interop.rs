@@ -5,7 +5,7 @@ use ash::vk;
 use super::Context;
 use crate::accel::structure::AccelKind;
 use crate::error::Result;
-use crate::gpu::queues::Queue;
+use crate::gpu::caps::queues::Queue;
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, RayTracingPipelineHandle, RenderPipelineHandle,
     SamplerHandle, TextureHandle,

@@ -37,9 +37,9 @@ use std::sync::Arc;
 
 use crate::accel::compaction::Compactions;
 use crate::command::SpareNotes;
-use crate::gpu::budget::MemoryBudget;
-use crate::gpu::caps::Capabilities;
-use crate::gpu::debug::ValidationSink;
+use crate::gpu::caps::capabilities::Capabilities;
+use crate::gpu::debug::messenger::ValidationSink;
+use crate::gpu::memory::budget::MemoryBudget;
 use crate::gpu::window::WindowHandles;
 use crate::lock::Mutex;
 use crate::shared::Shared;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::Context;
 use crate::command::CommandBuffer;
 use crate::error::Result;
-use crate::gpu::queues::Queue;
+use crate::gpu::caps::queues::Queue;
 use crate::lock::Guard;
 use crate::resource::region::{Region, TextureRegion};
 use crate::resource::{Buffer, Texture};

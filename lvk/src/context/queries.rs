@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::Context;
 use crate::error::Result;
-use crate::gpu::clock::CalibratedTimestamps;
+use crate::gpu::calibrated_timestamps::CalibratedTimestamps;
 use crate::handle::QueryPoolHandle;
 use crate::resource::query::PipelineStatistics;
 

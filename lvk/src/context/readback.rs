@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::Context;
 use crate::command::transfer::BufferCopy;
 use crate::error::Result;
-use crate::gpu::memory::MemoryKind;
+use crate::gpu::memory::allocator::MemoryKind;
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};

@@ -4,7 +4,7 @@ use super::Context;
 use super::create_texture::check_data;
 use crate::error::Result;
 use crate::format::Format;
-use crate::gpu::shading_rate::FragmentSize;
+use crate::gpu::caps::shading_rate::FragmentSize;
 use crate::resource::check_image;
 use crate::resource::format_support::FormatSupport;
 use crate::resource::texture_desc::TextureDesc;

@@ -5,26 +5,26 @@ use std::sync::atomic::AtomicU32;
 
 use ash::vk;
 
-use super::budget::HeapUse;
-use super::caps::{Capabilities, FeatureRequest, PhysicalDevice};
-use super::clock::HostClock;
-use super::descriptor_limits::DescriptorLimits;
-use super::device_changes::change_devices;
-use super::extra::UserExtensions;
-use super::features::Features;
-use super::foreign::RawContext;
-use super::format_features::FormatAnswers;
-use super::host_copy::HostCopies;
-use super::image_limits::ImageLimits;
-use super::instance::Instance;
-use super::memory::DeviceMemory;
-use super::naming;
-use super::optional::{FeatureSet, OF_WINDOWS, OptionalFeature};
-use super::profile::DeviceProfile;
-use super::queues::{Queue, QueuePlace, QueueRequest, Queues, shared_ticks};
-use super::ray_query_path::RayQueryRequest;
-use super::select::{Candidate, choose};
-use super::shading_rate::ShadingRates;
+use super::calibrated_timestamps::HostClock;
+use super::caps::capabilities::{Capabilities, FeatureRequest, PhysicalDevice};
+use super::caps::descriptor_limits::DescriptorLimits;
+use super::caps::format_features::FormatAnswers;
+use super::caps::host_image_copy::HostCopies;
+use super::caps::image_limits::ImageLimits;
+use super::caps::optional_features::{FeatureSet, OF_WINDOWS, OptionalFeature};
+use super::caps::queues::{Queue, QueuePlace, QueueRequest, Queues, shared_ticks};
+use super::caps::ray_query_path::RayQueryRequest;
+use super::caps::shading_rate::ShadingRates;
+use super::debug::object_names;
+use super::memory::allocator::DeviceMemory;
+use super::memory::budget::HeapUse;
+use super::start::driver_workarounds::change_devices;
+use super::start::external::RawContext;
+use super::start::features::Features;
+use super::start::instance::Instance;
+use super::start::profile::DeviceProfile;
+use super::start::select::{Candidate, choose};
+use super::start::user_extensions::UserExtensions;
 use super::window::{Probe, WindowFunctions, WindowHandles};
 use crate::error::{Error, Result, check_limit};
 use crate::lock::{Guard, Mutex, Rank};
@@ -168,7 +168,7 @@ impl Gpu {
             host_copies,
             host_clock: HostClock::new(&instance, &device, physical, features.calibration),
             windows: WindowFunctions::new(&instance, &device, |feature| caps.has(feature)),
-            debug_utils: naming::is_wanted(&instance, physical, debug_names)
+            debug_utils: object_names::is_wanted(&instance, physical, debug_names)
                 .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             device_fault: (features.ext.fault.device_fault == vk::TRUE)
                 .then(|| ash::ext::device_fault::Device::new(raw, &device)),

@@ -6,9 +6,9 @@ use std::fmt;
 use ash::vk;
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle, RawWindowHandle};
 
+use super::caps::optional_features::OptionalFeature;
 use super::device::Gpu;
-use super::instance::Instance;
-use super::optional::OptionalFeature;
+use super::start::instance::Instance;
 use crate::error::{Error, Result};
 
 /// A window, of whatever library made it: everything with the handles of the crate `raw-window-handle` is one.

@@ -18,8 +18,8 @@ use crate::barrier::Stages;
 use crate::bindless::inputs::InputMask;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::optional::OptionalFeature;
-use crate::gpu::shading_rate::ShadingRate;
+use crate::gpu::caps::optional_features::OptionalFeature;
+use crate::gpu::caps::shading_rate::ShadingRate;
 use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;
 

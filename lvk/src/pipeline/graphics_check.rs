@@ -12,8 +12,8 @@ use super::state_check::check_state;
 use crate::error::{Error, Result, check_limit};
 use crate::format::Format;
 use crate::gpu::Gpu;
-use crate::gpu::mesh_limits::MeshLimits;
-use crate::gpu::optional::OptionalFeature;
+use crate::gpu::caps::mesh_limits::MeshLimits;
+use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::shader::{Primitive, ShaderStage};
 
 /// Fails unless the description names stages that go together.

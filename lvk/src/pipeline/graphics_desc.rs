@@ -6,7 +6,7 @@ use super::raster::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
 use super::shape::PassShape;
 use super::stage::SpecializationConstant;
 use crate::format::{Format, VertexFormat};
-use crate::gpu::shading_rate::ShadingRate;
+use crate::gpu::caps::shading_rate::ShadingRate;
 use crate::handle::ShaderModuleHandle;
 
 /// A buffer slot of vertex attributes.

@@ -11,7 +11,7 @@ use super::shader_module::ShaderModule;
 use super::stage::SpecializationConstant;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::device_changes::beside_devices;
+use crate::gpu::start::driver_workarounds::beside_devices;
 use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;
 

@@ -8,7 +8,7 @@ use super::graphics_desc::RenderPipelineDesc;
 use super::raster::PolygonMode;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::optional::OptionalFeature;
+use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::shader::ShaderStage;
 
 /// Fails unless the device has what the state asks for.

@@ -9,7 +9,7 @@ use bitflags::bitflags;
 use crate::barrier::ResourceId;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
-use crate::gpu::memory::{Mapping, MemoryKind, ObjectMemory};
+use crate::gpu::memory::allocator::{Mapping, MemoryKind, ObjectMemory};
 use crate::lock::{Mutex, Rank};
 
 bitflags! {

@@ -13,7 +13,7 @@ use crate::barrier::{ResourceId, Subresources, TextureShape};
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
-use crate::gpu::memory::{MemoryKind, ObjectMemory};
+use crate::gpu::memory::allocator::{MemoryKind, ObjectMemory};
 use crate::handle::{Handle, TextureHandle};
 
 /// An image with memory, destroyed on drop. The tracker knows it by `id`, whichever texture names it.

@@ -8,8 +8,8 @@ use super::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage}
 use crate::error::{Error, Result, check_limit};
 use crate::format::Format;
 use crate::gpu::Gpu;
-use crate::gpu::limits::Limits;
-use crate::gpu::optional::OptionalFeature;
+use crate::gpu::caps::limits::Limits;
+use crate::gpu::caps::optional_features::OptionalFeature;
 
 /// What follows from a description that the device can make an image of.
 pub(crate) struct ImagePlan {

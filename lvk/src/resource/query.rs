@@ -9,7 +9,7 @@ use super::query_marks::QueryMarks;
 use crate::barrier::ResourceId;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
-use crate::gpu::optional::OptionalFeature;
+use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::lock::{Guard, Mutex, Rank};
 
 /// What the queries of a pool measure.

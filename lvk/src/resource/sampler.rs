@@ -7,7 +7,7 @@ use ash::vk;
 
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
-use crate::gpu::optional::OptionalFeature;
+use crate::gpu::caps::optional_features::OptionalFeature;
 
 /// How texels are interpolated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

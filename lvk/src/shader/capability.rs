@@ -6,7 +6,7 @@ use ash::vk;
 use super::atomics::{Atomic, Place};
 use super::{Reflection, ShaderStage};
 use crate::error::{Error, Result};
-use crate::gpu::features::Features;
+use crate::gpu::start::features::Features;
 
 /// Allowed on every device the library takes: without a feature, or by one the library cannot do without.
 const FREE: [C; 18] = [
@@ -289,7 +289,7 @@ fn float_add(features: &Features) -> vk::Bool32 {
 mod tests {
     #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
     use super::*;
-    use crate::gpu::optional::FeatureSet;
+    use crate::gpu::caps::optional_features::FeatureSet;
 
     fn module(capabilities: &[C]) -> Reflection {
         let capabilities = capabilities.iter().map(|c| *c as u32).collect();

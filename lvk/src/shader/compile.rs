@@ -5,8 +5,8 @@ use super::front_end::glsl;
 use super::idle_culling::without_idle_culling;
 use super::{ShaderCache, ShaderModuleDesc, ShaderSource, spirv};
 use crate::error::{Error, Result};
-use crate::gpu::caps::Capabilities;
-use crate::gpu::ray_query_path::RayQueryPath;
+use crate::gpu::caps::capabilities::Capabilities;
+use crate::gpu::caps::ray_query_path::RayQueryPath;
 
 /// What the preamble must know of the device.
 #[derive(Debug, Clone, Copy, Default)]

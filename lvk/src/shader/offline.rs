@@ -3,7 +3,7 @@
 use super::compile::{CompileOptions, compile};
 use super::{ShaderModuleDesc, reflect};
 use crate::error::Result;
-use crate::gpu::caps::Capabilities;
+use crate::gpu::caps::capabilities::Capabilities;
 
 /// The SPIR-V that a context on a device with `capabilities` would make of `desc`, for caches and tools that compile
 /// ahead of time; no device is opened. [`ShaderSource::Spirv`](super::ShaderSource::Spirv) takes it.

@@ -8,7 +8,7 @@ use super::ownership::{Access, Clock, LANES};
 use super::queue::stages_of;
 use crate::barrier::model::{Cell, Command, Event, Op};
 use crate::barrier::{Barriers, Layout, ResourceId, Stages, Subresources, TextureShape, Tracker, Use};
-use crate::gpu::queues::Queue;
+use crate::gpu::caps::queues::Queue;
 
 const ONE: TextureShape = TextureShape { mips: 1, layers: 1 };
 /// Two buffers, one that is written side by side, and three textures. Of these the last two belong to one domain at a time.

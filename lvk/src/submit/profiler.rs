@@ -9,7 +9,7 @@ use ash::vk;
 use super::scope_tree::{GpuProfile, Stamps, scope_tree};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::gpu::queues::Queue;
+use crate::gpu::caps::queues::Queue;
 use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::QueryPool;
 use crate::resource::query::QueryPoolDesc;

@@ -16,7 +16,7 @@ use super::timeline::Timeline;
 use crate::barrier::{IdMap, Layout, ResourceId, Stages, TextureShape, Tracker};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::queues::Queue;
+use crate::gpu::caps::queues::Queue;
 use crate::lock::{Guard, Mutex, Rank};
 
 /// What goes to a queue at once.

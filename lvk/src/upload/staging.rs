@@ -7,7 +7,7 @@ use ash::vk;
 use super::page_set::PageSet;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::memory::{Mapping, MemoryKind};
+use crate::gpu::memory::allocator::{Mapping, MemoryKind};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::device::Gpu;
 use crate::error::Error;
+use crate::gpu::device::Gpu;
 
 /// Lists longer than this are taken for nonsense of a driver that has just failed.
 const MOST_ENTRIES: u32 = 1 << 16;

@@ -10,7 +10,7 @@ use crate::lock::{Rank, RwLock};
 static DEVICE_CHANGES: RwLock<()> = RwLock::new(Rank::DeviceChanges, ());
 
 /// Makes or destroys a device of this driver.
-pub(super) fn change_devices<R>(driver: vk::DriverId, change: impl FnOnce() -> R) -> R {
+pub(crate) fn change_devices<R>(driver: vk::DriverId, change: impl FnOnce() -> R) -> R {
     let _alone = needs_turns(driver).then(|| DEVICE_CHANGES.write());
     change()
 }

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use ash::vk;
 
-use super::debug::{Messenger, ValidationMode, ValidationSink, c_name};
-use super::window::{WindowExtensions, WindowHandles};
 use crate::error::{Error, Result};
+use crate::gpu::debug::messenger::{Messenger, ValidationMode, ValidationSink, c_name};
+use crate::gpu::window::{WindowExtensions, WindowHandles};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -63,7 +63,7 @@ impl Instance {
     }
 
     /// Of somebody else's.
-    pub(super) fn foreign(entry: ash::Entry, raw: ash::Instance, extensions: &[&CStr]) -> Self {
+    pub(crate) fn foreign(entry: ash::Entry, raw: ash::Instance, extensions: &[&CStr]) -> Self {
         Self {
             entry,
             raw,
@@ -215,7 +215,7 @@ fn create(
     // SAFETY: every pointer in `info` lives until the end of this function.
     let made = unsafe { entry.create_instance(&info, None) };
     #[cfg(feature = "test-hooks")]
-    let made = made.map(super::silent::silenced).map(super::failing::fallible);
+    let made = made.map(crate::gpu::silent::silenced).map(crate::gpu::failing::fallible);
     made.map_err(|result| Error::NoVulkan { reason: format!("vkCreateInstance answered {result}") })
 }
 

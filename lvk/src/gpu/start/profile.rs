@@ -2,10 +2,10 @@
 
 use std::borrow::Cow;
 
-use super::caps::Capabilities;
-use super::mesh_limits::MeshLimits;
-use super::optional::FeatureSet;
 use crate::error::{Error, Result};
+use crate::gpu::caps::capabilities::Capabilities;
+use crate::gpu::caps::mesh_limits::MeshLimits;
+use crate::gpu::caps::optional_features::FeatureSet;
 
 /// Clamps what the real device reports, so that the path of another one runs on it.
 ///
@@ -227,8 +227,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::gpu::limits::Limits;
-    use crate::gpu::optional::OptionalFeature;
+    use crate::gpu::caps::limits::Limits;
+    use crate::gpu::caps::optional_features::OptionalFeature;
 
     fn device() -> Capabilities {
         Capabilities {

@@ -6,7 +6,7 @@
 use slotmap::{DefaultKey, SlotMap};
 
 /// Slots of one size. `B` is the memory of a block of them.
-pub(super) struct Slab<B> {
+pub(crate) struct Slab<B> {
     blocks: SlotMap<DefaultKey, Block<B>>,
     /// The blocks that have both taken and free slots.
     open: Vec<DefaultKey>,
@@ -24,10 +24,10 @@ struct Block<B> {
 
 /// A slot that is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Slot {
+pub(crate) struct Slot {
     block: DefaultKey,
     /// Its place in the block, below [`Slab::SLOTS`].
-    pub(super) number: u32,
+    pub(crate) number: u32,
 }
 
 impl<B> Default for Slab<B> {
@@ -38,10 +38,10 @@ impl<B> Default for Slab<B> {
 
 impl<B> Slab<B> {
     /// Slots of a block.
-    pub(super) const SLOTS: u64 = u64::BITS as u64;
+    pub(crate) const SLOTS: u64 = u64::BITS as u64;
 
     /// Takes a slot, with the memory of its block; `new` makes that of another block where all slots are taken.
-    pub(super) fn take<E>(&mut self, new: impl FnOnce() -> Result<B, E>) -> Result<(Slot, &B), E> {
+    pub(crate) fn take<E>(&mut self, new: impl FnOnce() -> Result<B, E>) -> Result<(Slot, &B), E> {
         let key = match self.open.last() {
             Some(key) => *key,
             None => {
@@ -63,7 +63,7 @@ impl<B> Slab<B> {
     }
 
     /// Gives a slot back, once; answers the memory of a block that is not needed any more.
-    pub(super) fn give(&mut self, slot: Slot) -> Option<B> {
+    pub(crate) fn give(&mut self, slot: Slot) -> Option<B> {
         let block = self.blocks.get_mut(slot.block)?;
         let was_full = block.free == 0;
         block.free |= 1 << slot.number;

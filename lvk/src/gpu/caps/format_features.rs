@@ -4,12 +4,12 @@ use std::sync::OnceLock;
 
 use ash::vk;
 
-use super::device::Gpu;
-use super::optional::OptionalFeature;
+use super::optional_features::OptionalFeature;
 use crate::format::Format;
+use crate::gpu::device::Gpu;
 
 /// The answers so far, by [`Format::ALL`].
-pub(super) struct FormatAnswers([OnceLock<vk::FormatFeatureFlags>; Format::ALL.len()]);
+pub(crate) struct FormatAnswers([OnceLock<vk::FormatFeatureFlags>; Format::ALL.len()]);
 
 impl Default for FormatAnswers {
     fn default() -> Self {

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use ash::vk;
 
-use super::device::Gpu;
+use crate::gpu::device::Gpu;
 use crate::lock::{Rank, RwLock};
 
 /// What the limits of an image depend on.
@@ -22,10 +22,10 @@ struct ImageKind {
 type Answer = Result<vk::ImageFormatProperties, vk::Result>;
 
 /// The answers so far.
-pub(super) struct ImageLimits(RwLock<HashMap<ImageKind, Answer>>);
+pub(crate) struct ImageLimits(RwLock<HashMap<ImageKind, Answer>>);
 
 impl ImageLimits {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self(RwLock::new(Rank::ImageLimits, HashMap::new()))
     }
 

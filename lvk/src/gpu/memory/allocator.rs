@@ -8,10 +8,10 @@ use gpu_allocator::vulkan::{
 };
 use gpu_allocator::{AllocationError, AllocationSizes, AllocatorDebugSettings, MemoryLocation};
 
-use super::device::Gpu;
-use super::instance::Instance;
 use super::slab::{Slab, Slot};
 use crate::error::{Error, Result, check_limit};
+use crate::gpu::device::Gpu;
+use crate::gpu::start::instance::Instance;
 
 /// Where a buffer lives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -46,7 +46,7 @@ pub(crate) struct ObjectMemory {
     /// Where the object's part of it begins, in bytes.
     pub(crate) offset: u64,
     /// Of the object's part, in bytes.
-    pub(super) size: u64,
+    pub(crate) size: u64,
     pub(crate) properties: vk::MemoryPropertyFlags,
     mapped: Option<Mapping>,
     source: Source,
@@ -120,7 +120,7 @@ impl Place {
 }
 
 /// The memory of a device: large objects have pieces of their own from the allocator, small ones share blocks.
-pub(super) struct DeviceMemory {
+pub(crate) struct DeviceMemory {
     allocator: Allocator,
     shelves: Vec<Shelf>,
 }
@@ -172,7 +172,7 @@ impl ShelfKind {
 type Allocated<T> = Result<T, AllocationError>;
 
 impl DeviceMemory {
-    pub(super) fn new(
+    pub(crate) fn new(
         instance: &Instance,
         device: &ash::Device,
         physical_device: vk::PhysicalDevice,

@@ -5,7 +5,7 @@ use std::ffi::CStr;
 use ash::vk;
 
 use super::extensions::ExtensionFeatures;
-use super::optional::{FeatureSet, OptionalFeature};
+use crate::gpu::caps::optional_features::{FeatureSet, OptionalFeature};
 
 /// Features of a device: as found, or those of them that the library turns on.
 #[derive(Debug, Clone, Copy, Default)]

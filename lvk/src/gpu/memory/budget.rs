@@ -4,10 +4,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use ash::vk;
 
-use super::device::Gpu;
-use super::instance::Instance;
-use super::memory::ObjectMemory;
-use super::optional::OptionalFeature;
+use super::allocator::ObjectMemory;
+use crate::gpu::caps::optional_features::OptionalFeature;
+use crate::gpu::device::Gpu;
+use crate::gpu::start::instance::Instance;
 
 /// The memory of a device, from [`Context::memory_budget`](crate::Context::memory_budget).
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,14 +36,14 @@ pub struct MemoryHeap {
 }
 
 /// Bytes of objects in each heap.
-pub(super) struct HeapUse {
+pub(crate) struct HeapUse {
     types: Vec<vk::MemoryType>,
     bytes: [AtomicU64; vk::MAX_MEMORY_HEAPS],
 }
 
 impl HeapUse {
     /// Nothing yet.
-    pub(super) fn new(instance: &Instance, device: vk::PhysicalDevice) -> Self {
+    pub(crate) fn new(instance: &Instance, device: vk::PhysicalDevice) -> Self {
         // SAFETY: the physical device belongs to the instance.
         let memory = unsafe { instance.raw.get_physical_device_memory_properties(device) };
         let types = memory.memory_types_as_slice().to_vec();
@@ -51,14 +51,14 @@ impl HeapUse {
     }
 
     /// An object was allocated.
-    pub(super) fn add(&self, allocated: &ObjectMemory) {
+    pub(crate) fn add(&self, allocated: &ObjectMemory) {
         if let Some(heap) = heap_of(&self.types, allocated.properties) {
             self.bytes[heap].fetch_add(allocated.size, Ordering::Relaxed);
         }
     }
 
     /// An object goes.
-    pub(super) fn remove(&self, allocated: &ObjectMemory) {
+    pub(crate) fn remove(&self, allocated: &ObjectMemory) {
         if let Some(heap) = heap_of(&self.types, allocated.properties) {
             self.bytes[heap].fetch_sub(allocated.size, Ordering::Relaxed);
         }

@@ -4,10 +4,10 @@ use std::ffi::CStr;
 
 use ash::vk;
 
-use super::caps::PhysicalDevice;
-use super::optional::{FeatureSet, OptionalFeature};
-use super::queues::{QueueFamily, QueuePlace};
 use crate::error::{Error, Result};
+use crate::gpu::caps::capabilities::PhysicalDevice;
+use crate::gpu::caps::optional_features::{FeatureSet, OptionalFeature};
+use crate::gpu::caps::queues::{QueueFamily, QueuePlace};
 
 /// An instance, a device and a queue of the caller's own, and what was turned on when they were made.
 #[derive(Clone)]
@@ -45,7 +45,7 @@ pub struct RawContext<'a> {
 
 impl RawContext<'_> {
     /// What the device can do as far as was told; fails where that cannot be true.
-    pub(super) fn physical(&self) -> Result<PhysicalDevice> {
+    pub(crate) fn physical(&self) -> Result<PhysicalDevice> {
         let mut found = PhysicalDevice::query(&self.instance, self.physical_device)?;
         if !found.missing.is_empty() {
             let name = &found.capabilities.device_name;
@@ -64,12 +64,12 @@ impl RawContext<'_> {
         Ok(found)
     }
 
-    pub(super) fn has(&self, extension: &CStr) -> bool {
+    pub(crate) fn has(&self, extension: &CStr) -> bool {
         self.device_extensions.contains(&extension)
     }
 
     /// The queue of each, and its family.
-    pub(super) fn queues(&self) -> [(vk::Queue, u32); 3] {
+    pub(crate) fn queues(&self) -> [(vk::Queue, u32); 3] {
         let first = (self.queue, self.queue_family);
         [first, self.compute_queue.unwrap_or(first), self.transfer_queue.unwrap_or(first)]
     }

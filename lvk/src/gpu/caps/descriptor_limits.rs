@@ -16,14 +16,14 @@ const OBJECT: &str = "bindless set";
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct DescriptorLimits {
     /// Samplers, those of combined ones included.
-    pub(super) samplers: u32,
+    pub(crate) samplers: u32,
     /// Sampled images, those of combined ones included.
-    pub(super) sampled_images: u32,
-    pub(super) storage_images: u32,
+    pub(crate) sampled_images: u32,
+    pub(crate) storage_images: u32,
     /// What one stage reaches, colour targets included.
-    pub(super) resources: u32,
+    pub(crate) resources: u32,
     /// All kinds in all pools.
-    pub(super) in_pools: u32,
+    pub(crate) in_pools: u32,
 }
 
 /// What a context has beside textures, samplers and conversions of Y'CbCr.
@@ -53,7 +53,7 @@ pub(crate) struct DescriptorRoom {
 }
 
 impl DescriptorLimits {
-    pub(super) fn of(v12: &vk::PhysicalDeviceVulkan12Properties<'_>) -> Self {
+    pub(crate) fn of(v12: &vk::PhysicalDeviceVulkan12Properties<'_>) -> Self {
         Self {
             samplers: v12
                 .max_per_stage_descriptor_update_after_bind_samplers
@@ -70,7 +70,7 @@ impl DescriptorLimits {
     }
 
     /// Those of a device.
-    pub(super) fn query(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
+    pub(crate) fn query(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut v12 = vk::PhysicalDeviceVulkan12Properties::default();
         let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut v12);
         // SAFETY: the device was enumerated from the instance, and knows the structure, which lives until the call returns.

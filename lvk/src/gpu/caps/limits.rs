@@ -120,7 +120,7 @@ pub struct Limits {
 
 impl Limits {
     /// As the device says them.
-    pub(super) fn of(
+    pub(crate) fn of(
         plain: &vk::PhysicalDeviceLimits,
         v12: &vk::PhysicalDeviceVulkan12Properties<'_>,
         v13: &vk::PhysicalDeviceVulkan13Properties<'_>,
@@ -191,7 +191,7 @@ impl Limits {
     }
 
     /// Of structures the library builds itself; without any of the device's own they are the only ones.
-    pub(super) fn allow_software(&mut self, beside_hardware: bool) {
+    pub(crate) fn allow_software(&mut self, beside_hardware: bool) {
         if beside_hardware {
             return;
         }
@@ -206,8 +206,8 @@ impl Limits {
 
 /// Bounds of what references to nodes and leaves can name; see `accel::software::layout`.
 mod software {
-    pub(super) const MOST_GEOMETRIES: u64 = 1 << 24;
-    pub(super) const MOST_PRIMITIVES: u64 = 1 << 27;
+    pub(crate) const MOST_GEOMETRIES: u64 = 1 << 24;
+    pub(crate) const MOST_PRIMITIVES: u64 = 1 << 27;
 }
 
 /// Most bytes of an acceleration structure or of its scratch. Builds on Arm's own driver fail where either is beyond

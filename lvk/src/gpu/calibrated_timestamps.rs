@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use ash::vk;
 
-use super::features::Calibration;
-use super::instance::Instance;
+use super::start::features::Calibration;
+use super::start::instance::Instance;
 use crate::error::{Error, Result};
 
 /// One moment on the clock of the GPU and on that of the host.

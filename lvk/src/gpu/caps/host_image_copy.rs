@@ -2,10 +2,10 @@
 
 use ash::vk;
 
-use super::caps::Capabilities;
-use super::device::Gpu;
-use super::instance::Instance;
+use super::capabilities::Capabilities;
 use crate::error::{Error, Result};
+use crate::gpu::device::Gpu;
+use crate::gpu::start::instance::Instance;
 
 /// The layout that images are written in and stay in: what shaders sample.
 const LAYOUT: vk::ImageLayout = vk::ImageLayout::READ_ONLY_OPTIMAL;
@@ -18,7 +18,7 @@ pub(crate) struct HostCopies {
 impl HostCopies {
     /// `None` where the device has none, where staging is the faster way, or where it does not write images in the layout that
     /// shaders sample.
-    pub(super) fn new(
+    pub(crate) fn new(
         instance: &Instance,
         device: &ash::Device,
         physical: vk::PhysicalDevice,

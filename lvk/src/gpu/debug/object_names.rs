@@ -2,9 +2,9 @@
 
 use ash::vk;
 
-use super::debug::c_name;
-use super::device::Gpu;
-use super::instance::Instance;
+use super::messenger::c_name;
+use crate::gpu::device::Gpu;
+use crate::gpu::start::instance::Instance;
 
 impl Gpu {
     /// Whether names and labels reach anybody.
@@ -49,7 +49,7 @@ impl Gpu {
 }
 
 /// Whether to name objects: as the caller says, or where somebody reads names.
-pub(super) fn is_wanted(instance: &Instance, device: vk::PhysicalDevice, wish: Option<bool>) -> bool {
+pub(crate) fn is_wanted(instance: &Instance, device: vk::PhysicalDevice, wish: Option<bool>) -> bool {
     instance.debug_utils && wish.unwrap_or_else(|| instance.validated || is_watched(instance, device))
 }
 

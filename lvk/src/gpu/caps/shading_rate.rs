@@ -2,11 +2,11 @@
 
 use ash::vk;
 
-use super::Gpu;
-use super::caps::Capabilities;
-use super::instance::Instance;
-use super::optional::OptionalFeature;
+use super::capabilities::Capabilities;
+use super::optional_features::OptionalFeature;
 use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::gpu::start::instance::Instance;
 
 /// How two rates become one (`VkFragmentShadingRateCombinerOpKHR`), width and height each for itself. All but
 /// [`Keep`](Self::Keep) and [`Replace`](Self::Replace) need [`ShadingRateLimits::combines`].

@@ -4,18 +4,18 @@ use std::ffi::{CStr, CString};
 
 use ash::vk;
 
-use super::features::{Calibration, Features, Subgroups, missing};
 use super::limits::Limits;
 use super::mesh_limits::MeshLimits;
-use super::optional::{FeatureSet, OF_MESH_SHADERS, OptionalFeature};
+use super::optional_features::{FeatureSet, OF_MESH_SHADERS, OptionalFeature};
 use super::queues::{
     Queue, QueueFamily, QueueInfo, QueuePlace, describe_queues, place_queues, queue_families,
 };
 use super::ray_query_path::{RayQueryPath, RayQueryRequest};
-use super::select::DeviceKind;
 use super::shading_rate::ShadingRateLimits;
-use super::window::Probe;
 use crate::error::{Error, Result};
+use crate::gpu::start::features::{Calibration, Features, Subgroups, missing};
+use crate::gpu::start::select::DeviceKind;
+use crate::gpu::window::Probe;
 
 /// Whether the caller needs a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

@@ -1,0 +1,5 @@
+//! Device memory: the allocator, its slabs and the budget of each heap.
+
+pub(crate) mod allocator;
+pub(crate) mod budget;
+pub(crate) mod slab;
