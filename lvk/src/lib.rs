@@ -136,7 +136,7 @@ pub use accel::desc::{BlasDesc, PrimitiveOrder, TlasDesc};
 pub use accel::flags::{AccelStructSizes, BuildFlags, BuildMode};
 pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, GeometryTransform, Indices, Triangles};
 pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, transform_rows};
-pub use bindless::checks::{BindlessArray, IndexFault, SlotState};
+pub use bindless::index_checks::{BindlessArray, IndexFault, SlotState};
 pub use command::CommandBuffer;
 pub use command::attachment::{
     ColorAttachment, ColorLoadOp, DepthAttachment, DepthLoadOp, DepthResolve, Resolve, ShadingRateAttachment,
@@ -190,7 +190,7 @@ pub use pipeline::ray_tracing::{HitGroup, RayTracingPipelineDesc, record_bytes};
 pub use pipeline::stage::{SpecializationConstant, SpecializationValue};
 pub use resource::buffer::{BufferDesc, BufferUsage};
 pub use resource::format_support::FormatSupport;
-pub use resource::query::{PipelineStatistics, QueryKind, QueryPoolDesc};
+pub use resource::query_pool::{PipelineStatistics, QueryKind, QueryPoolDesc};
 pub use resource::region::{TextureRange, TextureRegion};
 pub use resource::sampler::{AddressMode, BorderColor, CompareOp, Filter, SamplerDesc, SamplerReductionMode};
 pub use resource::swizzle::{Channel, Swizzle};

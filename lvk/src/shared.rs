@@ -16,7 +16,7 @@ use crate::accel::structure::AccelKind;
 use crate::accel::tlas::TlasContents;
 use crate::accel::tlas_updates::TlasUpdates;
 use crate::barrier::{QueryStages, ResourceId};
-use crate::bindless::checks::BindlessArray;
+use crate::bindless::index_checks::BindlessArray;
 use crate::bindless::{Bindless, TEXTURE_ARRAYS};
 use crate::error::Result;
 use crate::gpu::Gpu;

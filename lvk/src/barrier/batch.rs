@@ -2,7 +2,7 @@
 
 use super::access::{Access, Stages};
 use super::resource_id::ResourceId;
-use super::state::Scopes;
+use super::resource_state::Scopes;
 use super::subresource::Subresources;
 
 /// A global memory barrier.

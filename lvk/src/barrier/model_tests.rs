@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use proptest::prelude::*;
 
 use super::model::{Cell, Command, Event, Op, any_violation, edges};
-use super::state::Scopes;
+use super::resource_state::Scopes;
 use super::*;
 
 const BUFFERS: u64 = 2;

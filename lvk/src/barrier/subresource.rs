@@ -1,6 +1,6 @@
 //! Values kept for each mip level and array layer of a texture, stored once while they are all equal.
 
-use super::state::Scopes;
+use super::resource_state::Scopes;
 
 /// Mip levels and array layers of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

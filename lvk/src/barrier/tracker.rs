@@ -3,12 +3,12 @@
 use super::access::{Layout, StageAccess, Stages, Use};
 use super::batch::Barriers;
 use super::resource_id::{IdMap, ResourceId};
-use super::state::{Scopes, State, accumulate, transition};
+use super::resource_state::{Scopes, State, accumulate, transition};
 use super::subresource::{Cells, Subresources, TextureShape};
 
 /// How a command buffer uses a (sub)resource before anything in it must wait for anything else in it.
 ///
-/// This is all that the queue has to prepare; see [`States::submit`](super::states::States::submit).
+/// This is all that the queue has to prepare; see [`States::submit`](super::queue_state::States::submit).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Prefix {
     /// Not used at all.
@@ -156,7 +156,7 @@ impl<T> Default for Table<T> {
 /// The uses of all resources by one command buffer, while it is recorded.
 ///
 /// Barriers returned here only concern what the same command buffer did earlier. What it needs from the queue is kept
-/// for [`States::submit`](super::states::States::submit), so that command buffers can be recorded side by side and
+/// for [`States::submit`](super::queue_state::States::submit), so that command buffers can be recorded side by side and
 /// submitted in any order.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tracker {

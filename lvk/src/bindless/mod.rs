@@ -1,13 +1,13 @@
 //! The one bindless descriptor set.
 
-mod array;
-pub(crate) mod checks;
-pub(crate) mod inputs;
+pub(crate) mod index_checks;
+pub(crate) mod input_attachments;
 pub(crate) mod layout;
 mod room;
-pub(crate) mod slots;
+pub(crate) mod slot_allocator;
+mod slot_array;
 pub(crate) mod table;
-mod yuv;
+mod yuv_slots;
 
 pub(crate) use table::{Bindless, Dummies, TEXTURE_ARRAYS, TextureViews};
-pub(crate) use yuv::YuvSlots;
+pub(crate) use yuv_slots::YuvSlots;

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::array::{Array, Shown};
-use super::checks::{BindlessArray, CheckPlan, IndexChecks};
+use super::index_checks::{BindlessArray, CheckPlan, IndexChecks};
 use super::layout;
 use super::room;
-use super::slots::Slots;
-use super::yuv::{YuvPlace, YuvSlots};
+use super::slot_allocator::Slots;
+use super::slot_array::{Array, Shown};
+use super::yuv_slots::{YuvPlace, YuvSlots};
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;

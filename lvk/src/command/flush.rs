@@ -13,7 +13,7 @@ use crate::resource::texture_desc::TextureUsage;
 use crate::resource::{Buffer, Texture};
 use crate::shared::Shared;
 use crate::submit::Recording;
-use crate::submit::emit::emit;
+use crate::submit::emit_barriers::emit;
 
 impl CommandBuffer {
     /// The next command uses a buffer.

@@ -7,7 +7,7 @@ use super::render::RenderPass;
 use super::render_pass::RenderPassDesc;
 use super::targets::{Target, Targets};
 use crate::barrier::{Layout, Use};
-use crate::bindless::inputs::{Input, InputMask};
+use crate::bindless::input_attachments::{Input, InputMask};
 use crate::bindless::layout::INPUT_SET;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -15,7 +15,7 @@ use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::pipeline::RenderPipeline;
 use crate::pipeline::local_read::{InputIndices, READS_WRITTEN, default_indices};
 use crate::resource::texture_desc::TextureUsage;
-use crate::submit::emit::layout as raw_layout;
+use crate::submit::emit_barriers::layout as raw_layout;
 
 /// The targets of a pass that its own fragment shaders can read.
 #[derive(Default)]

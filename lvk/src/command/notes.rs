@@ -20,7 +20,7 @@ use crate::handle::{BufferHandle, TextureHandle};
 use crate::lock::{Mutex, Rank};
 use crate::resource::{Buffer, Texture};
 use crate::shared::Shared;
-use crate::submit::emit::LastBarrier;
+use crate::submit::emit_barriers::LastBarrier;
 
 /// Lists and maps of one command buffer.
 #[derive(Default)]

@@ -10,7 +10,7 @@ use super::render::RenderPass;
 use crate::error::{Error, Result};
 use crate::handle::QueryPoolHandle;
 use crate::resource::QueryPool;
-use crate::resource::query::QueryKind;
+use crate::resource::query_pool::QueryKind;
 use crate::submit::ownership::Access;
 
 impl CommandBuffer {

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use crate::barrier::ResourceId;
 use crate::error::{Error, Result};
 use crate::resource::QueryPool;
-use crate::resource::query::QueryKind;
-use crate::resource::query_marks::QueryMarks;
+use crate::resource::query_pool::QueryKind;
+use crate::resource::query_reset_state::QueryMarks;
 
 /// The queries a command buffer writes and resets, and those it has begun.
 #[derive(Default)]

@@ -9,7 +9,7 @@ use crate::barrier::{Layout, Use};
 use crate::error::{Error, Result};
 use crate::format::{Format, Numbers};
 use crate::gpu::caps::resolve_modes::ResolveMode;
-use crate::submit::emit::layout;
+use crate::submit::emit_barriers::layout;
 
 impl CommandBuffer {
     /// A multisampled colour target and what it is resolved to: the pass uses both.

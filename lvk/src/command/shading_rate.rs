@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::gpu::caps::shading_rate::ShadingRate;
 use crate::pipeline::RenderPipeline;
 use crate::resource::texture_desc::TextureUsage;
-use crate::submit::emit::layout;
+use crate::submit::emit_barriers::layout;
 
 impl CommandBuffer {
     /// Finds and checks where a pass takes its rates from; the pass uses it.

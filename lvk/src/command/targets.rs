@@ -16,7 +16,7 @@ use crate::handle::TextureHandle;
 use crate::pipeline::shape::PassShape;
 use crate::resource::Texture;
 use crate::resource::texture_desc::TextureUsage;
-use crate::submit::emit::layout;
+use crate::submit::emit_barriers::layout;
 
 /// The targets of a pass, found and checked.
 pub(super) struct Targets {

@@ -10,8 +10,8 @@ use crate::barrier::Use;
 use crate::error::Result;
 use crate::shared::Garbage;
 use crate::upload::PendingUploads;
+use crate::upload::copy_regions::Piece;
 use crate::upload::pending::{BufferUploads, TextureUpload, UsedPage, round_ends};
-use crate::upload::pieces::Piece;
 
 impl CommandBuffer {
     /// Records what was waiting: buffers with one barrier for all and one copy for each page of each, textures with one

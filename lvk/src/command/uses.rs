@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::found::Found;
 use crate::handle::TextureHandle;
 use crate::resource::{Buffer, Texture};
-use crate::submit::emit::Images;
+use crate::submit::emit_barriers::Images;
 
 /// So many are searched one by one, which is faster than a map. Builds of many structures use more.
 const FEW: usize = 16;

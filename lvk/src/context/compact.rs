@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::lock::Guard;
 use crate::resource::QueryPool;
-use crate::resource::query::QueryPoolDesc;
+use crate::resource::query_pool::QueryPoolDesc;
 use crate::shared::Garbage;
 
 impl Context {

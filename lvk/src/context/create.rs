@@ -14,7 +14,7 @@ use crate::pipeline::compute::ComputePipelineDesc;
 use crate::pipeline::graphics_desc::RenderPipelineDesc;
 use crate::pipeline::{ComputePipeline, RenderPipeline, ShaderModule};
 use crate::resource::buffer::{BufferDesc, InternalUsage};
-use crate::resource::query::QueryPoolDesc;
+use crate::resource::query_pool::QueryPoolDesc;
 use crate::resource::sampler::SamplerDesc;
 use crate::resource::{Buffer, QueryPool, Sampler};
 use crate::shader::{ShaderCache, ShaderCacheStats, ShaderModuleDesc, raw_hit_number};

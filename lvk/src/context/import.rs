@@ -11,7 +11,7 @@ use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::buffer::BufferUsage;
 use crate::resource::texture_desc::TextureDesc;
 use crate::resource::{Buffer, Texture};
-use crate::submit::emit::known_layout;
+use crate::submit::emit_barriers::known_layout;
 use crate::submit::{Submission, SubmitHandle};
 
 /// Describes an image of somebody else's.

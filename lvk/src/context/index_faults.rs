@@ -1,7 +1,7 @@
 //! The wrong indices that shaders have used.
 
 use super::Context;
-use crate::bindless::checks::{IndexChecks, IndexFault};
+use crate::bindless::index_checks::{IndexChecks, IndexFault};
 use crate::command::transfer::BufferCopy;
 use crate::error::{Error, Result};
 

@@ -6,7 +6,7 @@ use super::Context;
 use crate::error::Result;
 use crate::gpu::calibrated_timestamps::CalibratedTimestamps;
 use crate::handle::QueryPoolHandle;
-use crate::resource::query::PipelineStatistics;
+use crate::resource::query_pool::PipelineStatistics;
 
 impl Context {
     /// Milliseconds of `count` timestamps since an arbitrary start that all share; `None` where none was written yet

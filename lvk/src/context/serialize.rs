@@ -23,7 +23,7 @@ use crate::error::{Error, Result};
 use crate::format::IndexFormat;
 use crate::handle::AccelStructHandle;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
-use crate::resource::query::QueryPoolDesc;
+use crate::resource::query_pool::QueryPoolDesc;
 use crate::resource::{Buffer, QueryPool};
 use crate::shared::Garbage;
 

@@ -25,7 +25,7 @@ pub use crate::software::gpu_build::collapse::{
     Below, BinaryChild, BinaryTree, WideChild, WideTree, any_tree,
 };
 use crate::submit::interruption;
-use crate::swapchain::decide::Failure;
+use crate::swapchain::choose::Failure;
 
 const ALIGNMENT: u64 = 256;
 

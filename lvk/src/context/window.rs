@@ -17,9 +17,9 @@ use crate::resource::texture_desc::TextureDesc;
 use crate::shared::Garbage;
 use crate::submit::{Submission, SubmitHandle};
 use crate::swapchain::chain::{Chain, ChainPlan, PresentSync};
-use crate::swapchain::course::{Acquired, Engine};
-use crate::swapchain::decide::{self, Failure};
+use crate::swapchain::choose::{self, Failure};
 use crate::swapchain::desc::{PresentMode, SwapchainDesc, SwapchainImage, SwapchainInfo};
+use crate::swapchain::lifecycle::{Acquired, Engine};
 use crate::swapchain::state::{ChainImage, Current, Parts, State, Swapchain, Wishes};
 use crate::swapchain::surface::{Surface, SurfaceState};
 
@@ -155,7 +155,7 @@ impl Context {
         let State { course, parts } = &mut *state;
         parts.wishes.present_modes = wishes.to_vec();
         if let Some(current) = &mut parts.current {
-            let mode = decide::present_mode(wishes, &current.offered_modes);
+            let mode = choose::present_mode(wishes, &current.offered_modes);
             if current.plan.modes.contains(&mode) {
                 current.mode = mode;
             } else {
@@ -226,7 +226,7 @@ struct Live<'a> {
 impl Engine for Live<'_> {
     fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure> {
         let state = self.surface()?.state()?;
-        Ok(decide::extent(&state.limits, self.parts.wishes.extent))
+        Ok(choose::extent(&state.limits, self.parts.wishes.extent))
     }
 
     /// A lost surface is rare, and its swapchains have to be gone before the window can have another: here the GPU is
@@ -308,7 +308,7 @@ impl Live<'_> {
         let refused = |why: String| Error::unsupported(format!("swapchain '{}'", self.name), why);
         let usable = |format: Format| usage_of(gpu.format_features(format)).contains(wishes.usage);
         let offered = surface.formats()?;
-        let (format, color_space) = decide::surface_format(&wishes.color_spaces, &offered, usable)
+        let (format, color_space) = choose::surface_format(&wishes.color_spaces, &offered, usable)
             .ok_or_else(|| {
                 refused(format!("the window takes no format that can be used for {:?}", wishes.usage))
             })?;
@@ -319,7 +319,7 @@ impl Live<'_> {
             return Err(refused(why).into());
         }
         let modes = surface.present_modes()?;
-        let mode = decide::present_mode(&wishes.present_modes, &modes);
+        let mode = choose::present_mode(&wishes.present_modes, &modes);
         let identity = vk::SurfaceTransformFlagsKHR::IDENTITY;
         let can_stay = state.raw.supported_transforms.contains(identity);
         let plan = ChainPlan {
@@ -327,10 +327,10 @@ impl Live<'_> {
             format,
             color_space,
             modes: surface.compatible_modes(mode)?,
-            image_count: decide::image_count(&state.limits, wishes.image_count, mode),
+            image_count: choose::image_count(&state.limits, wishes.image_count, mode),
             usage,
             transform: if can_stay { identity } else { state.raw.current_transform },
-            alpha: decide::composite_alpha(state.raw.supported_composite_alpha),
+            alpha: choose::composite_alpha(state.raw.supported_composite_alpha),
         };
         Ok((modes, plan))
     }

@@ -15,7 +15,7 @@ use super::shader_module::ShaderModule;
 use super::shape::PassShape;
 use super::stage::{Specialization, stage};
 use crate::barrier::Stages;
-use crate::bindless::inputs::InputMask;
+use crate::bindless::input_attachments::InputMask;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::bindless::inputs::InputLayout;
+use crate::bindless::input_attachments::InputLayout;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 

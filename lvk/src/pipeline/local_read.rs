@@ -4,7 +4,7 @@ use ash::vk;
 
 use super::graphics::RenderModules;
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
-use crate::bindless::inputs::{Input, InputMask};
+use crate::bindless::input_attachments::{Input, InputMask};
 use crate::error::{Error, Result};
 use crate::format::{Format, Numbers};
 use crate::shader::InputRead;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::bindless::Bindless;
-use crate::bindless::checks::CheckPlan;
+use crate::bindless::index_checks::CheckPlan;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::shader::{CompileOptions, Reflection, ShaderCache, ShaderModuleDesc, ShaderStage};

@@ -5,8 +5,8 @@ pub(crate) mod format_support;
 pub(crate) mod host_copy;
 pub(crate) mod image;
 mod image_check;
-pub(crate) mod query;
-pub(crate) mod query_marks;
+pub(crate) mod query_pool;
+pub(crate) mod query_reset_state;
 pub(crate) mod region;
 pub(crate) mod sampler;
 pub(crate) mod swizzle;
@@ -17,6 +17,6 @@ pub(crate) mod ycbcr;
 
 pub(crate) use buffer::Buffer;
 pub(crate) use image_check::check as check_image;
-pub(crate) use query::QueryPool;
+pub(crate) use query_pool::QueryPool;
 pub(crate) use sampler::Sampler;
 pub(crate) use texture::Texture;

@@ -3,7 +3,7 @@
 use ::spirv::{Decoration, StorageClass};
 
 use super::module::{Module, Type, Variable};
-use crate::bindless::inputs::Input;
+use crate::bindless::input_attachments::Input;
 use crate::bindless::layout;
 use crate::format::Numbers;
 

@@ -7,7 +7,7 @@ use ::spirv::{AddressingModel, Capability, Decoration, Op, StorageClass};
 use super::import::{Imported, Sections, push};
 use super::module::{Module, Type};
 use super::spirv::{self, Instruction, instructions};
-use crate::bindless::checks::{BindlessArray, CheckPlan};
+use crate::bindless::index_checks::{BindlessArray, CheckPlan};
 use crate::bindless::layout;
 
 /// `glsl/checked_index.glsl` as words.
@@ -230,7 +230,7 @@ fn is_type(i: &Instruction<'_>) -> bool {
 mod tests {
     #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
     use super::*;
-    use crate::bindless::checks::{self, Range};
+    use crate::bindless::index_checks::{self, Range};
     use crate::shader::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile, reflect};
 
     fn compiled(stage: ShaderStage, text: &str) -> Vec<u32> {
@@ -271,7 +271,7 @@ mod tests {
         } else {
             assert!(bytes == DONOR, "set LVK_UPDATE_KERNELS=1 once");
         }
-        assert!(text.contains(&format!("ENTRY_COUNT = {}u", checks::ENTRY_COUNT)));
+        assert!(text.contains(&format!("ENTRY_COUNT = {}u", index_checks::ENTRY_COUNT)));
     }
 
     #[test]

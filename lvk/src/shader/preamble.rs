@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{CompileOptions, ShaderStage};
-use crate::bindless::inputs::Input;
+use crate::bindless::input_attachments::Input;
 use crate::bindless::layout;
 
 /// Helpers and resource arrays for every stage.

@@ -1,21 +1,21 @@
 //! Submission to queues: command buffers, the timeline, barriers between command buffers, deferred destruction.
 
 mod batches;
-pub(crate) mod command_ring;
-pub(crate) mod deferred;
-pub(crate) mod emit;
-pub(crate) mod input_sets;
+pub(crate) mod command_pool;
+pub(crate) mod deferred_free;
+pub(crate) mod emit_barriers;
+pub(crate) mod input_attachment_sets;
 #[cfg(feature = "test-hooks")]
 pub(crate) mod interruption;
-pub(crate) mod lanes;
-#[cfg(test)]
-mod lanes_model;
-#[cfg(test)]
-mod lanes_tests;
 pub(crate) mod ownership;
 pub(crate) mod presentable;
 pub(crate) mod profiler;
 pub(crate) mod queue;
+pub(crate) mod queue_sync;
+#[cfg(test)]
+mod queue_sync_model;
+#[cfg(test)]
+mod queue_sync_tests;
 pub(crate) mod recording;
 pub(crate) mod scope_tree;
 pub(crate) mod timeline;

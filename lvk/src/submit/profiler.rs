@@ -12,7 +12,7 @@ use crate::gpu::Gpu;
 use crate::gpu::caps::queues::Queue;
 use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::QueryPool;
-use crate::resource::query::QueryPoolDesc;
+use crate::resource::query_pool::QueryPoolDesc;
 
 /// The stamps of one command buffer.
 #[derive(Default)]

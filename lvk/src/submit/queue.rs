@@ -5,12 +5,12 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::batches::Batches;
-use super::command_ring::{self, CommandRing, Ticket};
-use super::deferred::Deferred;
-use super::emit::{Images, LastBarrier, Side, emit, emit_moves, stages};
-use super::lanes::{Departure, Lanes, Sent, Site, Step};
+use super::command_pool::{self, CommandRing, Ticket};
+use super::deferred_free::Deferred;
+use super::emit_barriers::{Images, LastBarrier, Side, emit, emit_moves, stages};
 use super::ownership::{Clock, LANES, PerLane};
 use super::presentable::{AcquireWait, Presentables};
+use super::queue_sync::{Departure, Lanes, Sent, Site, Step};
 use super::recording::{Recording, begin, end};
 use super::timeline::Timeline;
 use crate::barrier::{IdMap, Layout, ResourceId, Stages, TextureShape, Tracker};
@@ -135,7 +135,7 @@ impl<T> Submitter<T> {
         let free = inner.ring.take_free(lane);
         drop(inner);
         // Where that fails, whoever acquires one begins another.
-        if let Ok(begun) = command_ring::begin(&self.gpu, lane, free) {
+        if let Ok(begun) = command_pool::begin(&self.gpu, lane, free) {
             self.lock().ring.give_begun(begun);
         }
     }

@@ -2,8 +2,8 @@
 
 use ash::vk;
 
-use super::emit::Images;
-use super::input_sets::InputSets;
+use super::emit_barriers::Images;
+use super::input_attachment_sets::InputSets;
 use super::ownership::{Access, Clock};
 use crate::barrier::{ResourceId, Tracker};
 use crate::error::{Error, Result};

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::course::Acquired;
-use super::decide::Failure;
+use super::choose::Failure;
 use super::desc::{ColorSpace, HdrMetadata, PresentMode};
-use super::patience::PATIENCE_NS;
+use super::lifecycle::Acquired;
+use super::present_wait::PATIENCE_NS;
 use super::surface::Surface;
 use crate::error::{Error, Result};
 use crate::format::Format;

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::chain::{Chain, ChainPlan, PresentSync, new_semaphore};
-use super::course::Course;
 use super::desc::{ColorSpace, HdrMetadata, PresentMode};
-use super::patience::wait_for_all;
+use super::lifecycle::Course;
+use super::present_wait::wait_for_all;
 use super::surface::Surface;
 use crate::barrier::ResourceId;
 use crate::error::{Error, Result};

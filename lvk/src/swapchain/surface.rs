@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::decide::{Failure, SurfaceLimits};
+use super::choose::{Failure, SurfaceLimits};
 use super::desc::PresentMode;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;

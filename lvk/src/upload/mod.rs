@@ -1,12 +1,12 @@
 //! From host memory to the GPU.
 
-mod page_set;
-mod pages;
+pub(crate) mod buffer_recycler;
+pub(crate) mod copy_regions;
+mod page_allocator;
 pub(crate) mod pending;
-pub(crate) mod pieces;
-pub(crate) mod spare;
 pub(crate) mod staging;
+mod staging_pool;
 
+pub(crate) use buffer_recycler::SpareBuffers;
 pub(crate) use pending::PendingUploads;
-pub(crate) use spare::SpareBuffers;
 pub(crate) use staging::Staging;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::pieces::{Piece, Pieces};
+use super::copy_regions::{Piece, Pieces};
 use super::staging::StagingRegion;
 use crate::barrier::{IdMap, ResourceId, Subresources};
 use crate::resource::region::Region;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::page_set::PageSet;
+use super::staging_pool::PageSet;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::memory::allocator::{Mapping, MemoryKind};

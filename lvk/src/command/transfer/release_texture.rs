@@ -6,7 +6,7 @@ use crate::barrier::Use;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
-use crate::submit::emit::known_layout;
+use crate::submit::emit_barriers::known_layout;
 use crate::submit::ownership::Access;
 
 impl CommandBuffer {

@@ -9,7 +9,7 @@ use crate::command::queue_check::on_lane;
 use crate::resource::texture_desc::TextureUsage;
 use crate::resource::{Buffer, Texture};
 use crate::submit::Recording;
-use crate::submit::emit::emit;
+use crate::submit::emit_barriers::emit;
 
 /// A resource a copy wrote, or read in a layout of its own, to be made readable everywhere before shaders run.
 pub(in crate::command) enum Settle {

@@ -1,6 +1,6 @@
 //! Slots of one array with their owners.
 
-use super::slots::Slots;
+use super::slot_allocator::Slots;
 use crate::error::{Error, Result};
 
 /// Slots of one kind and who owns them.

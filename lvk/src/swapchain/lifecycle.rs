@@ -1,7 +1,7 @@
 //! The course of a swapchain: when it is made anew, and which image the application has. Knows no device; the
 //! presentation engine is an [`Engine`], so that a scripted one can take its place.
 
-use super::decide::Failure;
+use super::choose::Failure;
 use crate::error::Result;
 
 /// What a swapchain lives on.

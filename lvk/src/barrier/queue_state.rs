@@ -3,7 +3,7 @@
 use super::access::{Layout, StageAccess, Stages, Use};
 use super::batch::Barriers;
 use super::resource_id::{IdMap, ResourceId};
-use super::state::{Scopes, State, accumulate, transition};
+use super::resource_state::{Scopes, State, accumulate, transition};
 use super::subresource::{Cells, Subresources, TextureShape};
 use super::tracker::{Arrived, Local, Prefix, Tracker, Used};
 

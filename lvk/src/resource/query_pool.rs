@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
-use super::query_marks::QueryMarks;
+use super::query_reset_state::QueryMarks;
 use crate::barrier::ResourceId;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;

@@ -1,11 +1,11 @@
-//! Lanes against the naive [`model`](super::lanes_model), over random programs on one to three queues of made-up families.
+//! Lanes against the naive [`model`](super::queue_sync_model), over random programs on one to three queues of made-up families.
 
 use proptest::prelude::*;
 
-use super::lanes::{Lanes, Sent, Site};
-use super::lanes_model::{History, Sent as Logged, foreign_stages, weaker};
 use super::ownership::{Access, Clock, LANES};
 use super::queue::stages_of;
+use super::queue_sync::{Lanes, Sent, Site};
+use super::queue_sync_model::{History, Sent as Logged, foreign_stages, weaker};
 use crate::barrier::model::{Cell, Command, Event, Op};
 use crate::barrier::{Barriers, Layout, ResourceId, Stages, Subresources, TextureShape, Tracker, Use};
 use crate::gpu::caps::queues::Queue;
@@ -350,7 +350,7 @@ fn what_others_wrote_or_will_write_is_waited_for_as_if_it_were_written() {
     let (id, all) = (ResourceId(3), ONE);
     let reader = |stages| record(&[texture_op(3, Use::shader_read(stages))]).0;
     let (computed, drawn) = (reader(Stages::COMPUTE), reader(Stages::FRAGMENT));
-    let waits = |step: super::lanes::Step| step.waits.values().collect::<Vec<_>>();
+    let waits = |step: super::queue_sync::Step| step.waits.values().collect::<Vec<_>>();
     let fresh = || {
         let mut lanes = Lanes::new([site(0), site(1), site(2)], true);
         lanes.begin_several();

@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use super::lanes::MovedPart;
+use super::queue_sync::MovedPart;
 use crate::barrier::{Access, Barriers, IdMap, ImageBarrier, Layout, MemoryBarrier, Stages};
 use crate::gpu::Gpu;
 use crate::resource::image::BarrierImage;

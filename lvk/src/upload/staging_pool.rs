@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::pages::{Found, Pages, Place};
+use super::page_allocator::{Found, Pages, Place};
 use crate::error::{Error, Result};
 use crate::lock::{Guard, Mutex, Rank};
 

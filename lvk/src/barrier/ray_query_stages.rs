@@ -36,8 +36,8 @@ impl QueryStages {
 
 #[cfg(test)]
 mod tests {
-    use super::super::batch::Barriers;
     use super::*;
+    use crate::barrier::batch::Barriers;
 
     const GRAPHICS: Stages = Stages::PRE_RASTER.union(Stages::FRAGMENT);
 

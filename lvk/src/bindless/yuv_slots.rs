@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::array::Array;
 use super::room;
+use super::slot_array::Array;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::descriptor_limits::YuvWish;

@@ -5,8 +5,8 @@
 
 use std::collections::BTreeMap;
 
-use super::lanes::{MovedPart, Site};
 use super::ownership::LANES;
+use super::queue_sync::{MovedPart, Site};
 use crate::barrier::model::{Cell, Edge, Event, Wait, edges, may_follow};
 use crate::barrier::{Layout, Stages, Use};
 
