@@ -8,8 +8,9 @@ use crate::bindless::Bindless;
 use crate::bindless::index_checks::CheckPlan;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
+use crate::shader::spirv::reflect::reflect;
 use crate::shader::{CompileOptions, Reflection, ShaderCache, ShaderModuleDesc, ShaderStage};
-use crate::shader::{check_capabilities, check_stage, compile, reflect, with_checked_indices};
+use crate::shader::{check_capabilities, check_stage, compile, with_checked_indices};
 
 /// A compiled module, destroyed on drop.
 pub(crate) struct ShaderModule {

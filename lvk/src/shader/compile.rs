@@ -2,8 +2,9 @@
 
 #[cfg(feature = "glsl")]
 use super::front_end::glsl;
-use super::idle_culling::without_idle_culling;
-use super::{ShaderCache, ShaderModuleDesc, ShaderSource, spirv};
+use super::spirv::passes::strip_primitive_culling::without_idle_culling;
+use super::spirv::words;
+use super::{ShaderCache, ShaderModuleDesc, ShaderSource};
 use crate::error::{Error, Result};
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::caps::ray_query_path::RayQueryPath;
@@ -58,7 +59,7 @@ pub(crate) fn compile(
         }
         ShaderSource::Glsl(text) => glsl(desc, text, options, cache),
         ShaderSource::Spirv(words) => {
-            spirv::check(words).map_err(|log| failed(desc.debug_name, log))?;
+            words::check(words).map_err(|log| failed(desc.debug_name, log))?;
             Ok(words.to_vec())
         }
     }

@@ -9,10 +9,10 @@ use glslang::{Compiler, CompilerOptions, ShaderInput, ShaderMessage, SpirvVersio
 use super::compile::{CompileOptions, failed};
 use super::disk_file::{Entry, Fingerprint};
 use super::include::Includes;
-use super::sampled_copies::without_sampled_copies;
-use super::source::{self, Complaint};
-use super::source_text::with_texts;
-use super::unused::without_unused_resources;
+use super::sanitize::{self, Complaint};
+use super::spirv::debug_source::with_texts;
+use super::spirv::passes::fold_sampled_image::without_sampled_copies;
+use super::spirv::passes::strip_unused_bindings::without_unused_resources;
 use super::{ShaderCache, ShaderModuleDesc, ShaderStage, diagnostics, preamble};
 use crate::error::Result;
 
@@ -25,7 +25,8 @@ pub(super) fn glsl(
 ) -> Result<Vec<u32>> {
     let name = desc.debug_name;
     let complain = |c: Complaint| failed(name, format!("line {}: {}", c.line, c.message));
-    let text = source::to_ascii(text).and_then(|text| source::without_version(&text)).map_err(complain)?;
+    let text =
+        sanitize::to_ascii(text).and_then(|text| sanitize::without_version(&text)).map_err(complain)?;
     check_defines(desc)?;
     let preamble = preamble::preamble(desc.stage, options, desc.defines);
     let Some(cache) = cache else { return Ok(translate(desc, &preamble, &text)?.words) };

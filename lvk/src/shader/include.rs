@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 use glslang::include::{IncludeHandler, IncludeResult, IncludeType};
 
 use super::disk_file::{Fingerprint, Included};
-use super::{preamble, source};
+use super::preamble;
+use super::sanitize;
 
 /// Deeper nesting is taken for a mistake; the compiler recurses on it.
 const MAX_DEPTH: usize = 64;
@@ -78,7 +79,7 @@ impl<'a> Includes<'a> {
             self.open.push(place);
             return Ok(IncludeResult { name: shown, data: String::new() });
         }
-        let text = source::to_ascii(&text).map_err(|c| format!("{shown}:{}: {}", c.line, c.message))?;
+        let text = sanitize::to_ascii(&text).map_err(|c| format!("{shown}:{}: {}", c.line, c.message))?;
         let (data, once) = without_pragma_once(&text);
         if once {
             self.once.insert(place.clone());

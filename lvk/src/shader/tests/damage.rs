@@ -4,6 +4,7 @@ use ::spirv::Op;
 use proptest::prelude::*;
 
 use super::*;
+use crate::shader::spirv::passes::strip_unused_bindings;
 
 #[test]
 fn damaged_text_is_an_error() {
@@ -50,7 +51,7 @@ proptest! {
         for stage in ShaderStage::ALL {
             prop_assert!(reflect("test", stage, &words).is_err());
         }
-        _ = unused::without_unused_resources(words);
+        _ = strip_unused_bindings::without_unused_resources(words);
     }
 
     #[test]
@@ -63,9 +64,9 @@ proptest! {
             words.extend(operands);
         }
         _ = reflect("test", ShaderStage::Compute, &words);
-        let sound = spirv::check(&words).is_ok();
-        let kept = unused::without_unused_resources(words);
-        prop_assert_eq!(spirv::check(&kept).is_ok(), sound);
+        let sound = words::check(&words).is_ok();
+        let kept = strip_unused_bindings::without_unused_resources(words);
+        prop_assert_eq!(words::check(&kept).is_ok(), sound);
     }
 
     #[test]
@@ -77,7 +78,7 @@ proptest! {
             words[at] ^= 1 << bit;
         }
         _ = reflect("test", ShaderStage::Compute, &words);
-        _ = unused::without_unused_resources(words.clone());
+        _ = strip_unused_bindings::without_unused_resources(words.clone());
         words.truncate(cut.index(whole.len()));
         _ = reflect("test", ShaderStage::Compute, &words);
     }

@@ -9,6 +9,8 @@ mod sources;
 
 use ::spirv::Op;
 
+use super::spirv::reflect::reflect;
+use super::spirv::words;
 use super::*;
 use crate::error::{Error, Result};
 
@@ -49,12 +51,12 @@ fn error(stage: ShaderStage, text: &str) -> String {
 }
 
 fn capabilities(words: &[u32]) -> Vec<u32> {
-    let instructions = spirv::instructions(words).map(|i| i.unwrap());
+    let instructions = words::instructions(words).map(|i| i.unwrap());
     instructions.filter(|i| i.op == Some(Op::Capability)).map(|i| i.operand(0)).collect()
 }
 
 fn declares(words: &[u32], name: &str) -> bool {
-    spirv::instructions(words).map(|i| i.unwrap()).any(|i| i.op == Some(Op::Name) && i.string(1).0 == name)
+    words::instructions(words).map(|i| i.unwrap()).any(|i| i.op == Some(Op::Name) && i.string(1).0 == name)
 }
 
 /// A whole shader of `stage` around a body; `globals` stand in front of `main`.

@@ -19,7 +19,7 @@ fn used_arrays_survive_the_removal_of_unused_ones() {
 fn removal_leaves_no_loose_ends() {
     for stage in ShaderStage::ALL {
         let words = words(stage, &shader(stage, GLOBALS, HELPERS));
-        let all: Vec<_> = spirv::instructions(&words).map(|i| i.unwrap()).collect();
+        let all: Vec<_> = words::instructions(&words).map(|i| i.unwrap()).collect();
         let variables: Vec<u32> =
             all.iter().filter(|i| i.op == Some(Op::Variable)).map(|i| i.operand(1)).collect();
         let entry = all.iter().find(|i| i.op == Some(Op::EntryPoint)).unwrap();
@@ -38,9 +38,9 @@ fn sampled_operands_are_marked_non_uniform() {
     let text = shader(ShaderStage::Compute, "", "uint i = gl_LocalInvocationIndex;
         imageStore(kImages2D[0], ivec2(0), textureBindless2D(i, i, vec2(0)) + textureBindlessFetch2D(i, ivec2(0), 0));");
     let words = words(ShaderStage::Compute, &text);
-    let all: Vec<_> = spirv::instructions(&words).map(|i| i.unwrap()).collect();
+    let all: Vec<_> = words::instructions(&words).map(|i| i.unwrap()).collect();
     let non_uniform = |id: u32| {
-        let marks = |i: &&spirv::Instruction<'_>| {
+        let marks = |i: &&words::Instruction<'_>| {
             i.op == Some(Op::Decorate) && i.operand(1) == Decoration::NonUniform as u32
         };
         all.iter().filter(marks).any(|i| i.operand(0) == id)
@@ -49,7 +49,7 @@ fn sampled_operands_are_marked_non_uniform() {
         let image = all.iter().find(|i| i.op == Some(op)).unwrap().operand(2);
         assert!(non_uniform(image), "{op:?}");
         // Not by a copy of what was loaded or combined: SwiftShader misses the mark there.
-        let is_maker = |i: &&spirv::Instruction<'_>| matches!(i.op, Some(Op::SampledImage | Op::Load));
+        let is_maker = |i: &&words::Instruction<'_>| matches!(i.op, Some(Op::SampledImage | Op::Load));
         assert!(all.iter().filter(is_maker).any(|i| i.operand(1) == image), "{op:?}");
     }
 }

@@ -20,7 +20,7 @@ fn implicit_level_is_used_only_where_derivatives_exist() {
     let body = "vec4 c = textureBindless2D(1, 2, vec2(0.5)); imageStore(kImages2D[0], ivec2(0), c);";
     let implicit = |stage| {
         let words = words(stage, &shader(stage, "", body));
-        spirv::instructions(&words).any(|i| i.unwrap().op == Some(Op::ImageSampleImplicitLod))
+        words::instructions(&words).any(|i| i.unwrap().op == Some(Op::ImageSampleImplicitLod))
     };
     for stage in ShaderStage::ALL {
         assert_eq!(implicit(stage), stage == ShaderStage::Fragment, "{stage:?}");

@@ -71,10 +71,10 @@ fn debug_info_holds_the_texts_as_written() {
         ..desc(ShaderStage::Vertex, text)
     };
     let words = build(&desc).unwrap();
-    let code: Vec<_> = spirv::instructions(&words).map(Result::unwrap).collect();
+    let code: Vec<_> = words::instructions(&words).map(Result::unwrap).collect();
     let sources: Vec<_> = code.iter().filter(|i| i.op == Some(Op::Source)).collect();
     let name = |id: u32| {
-        let is_named = |i: &&spirv::Instruction<'_>| i.op == Some(Op::String) && i.operand(0) == id;
+        let is_named = |i: &&words::Instruction<'_>| i.op == Some(Op::String) && i.operand(0) == id;
         code.iter().find(is_named).unwrap().string(1).0
     };
     let found: Vec<_> = sources.iter().map(|i| (name(i.operand(2)), i.string(3).0)).collect();

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use ::spirv::StorageClass;
 
-use super::module::{MAX_NESTING, Module, Type};
+use super::parsed::{MAX_NESTING, Module, Type};
 
 /// Sizes in bytes, 0 where a module has none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -17,7 +17,7 @@ pub(crate) struct RayInterface {
 
 impl RayInterface {
     /// What the module declares. A size that cannot be known counts as the largest.
-    pub(super) fn of(module: &Module) -> Self {
+    pub(crate) fn of(module: &Module) -> Self {
         let largest = |classes: &[StorageClass]| {
             let variables = module.variables.iter();
             let ours =
@@ -86,8 +86,9 @@ fn extent(
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-    use super::super::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile, reflect};
     use super::*;
+    use crate::shader::spirv::reflect::reflect;
+    use crate::shader::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile};
 
     fn sizes(stage: ShaderStage, text: &str) -> RayInterface {
         let desc = ShaderModuleDesc { stage, source: ShaderSource::Glsl(text), ..Default::default() };

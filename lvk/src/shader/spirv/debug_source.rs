@@ -2,7 +2,7 @@
 
 use ::spirv::Op;
 
-use super::spirv::{HEADER_WORDS, instructions};
+use super::words::{HEADER_WORDS, instructions};
 
 /// Words of an instruction at most.
 const MOST_WORDS: usize = 0xFFFF;
@@ -10,7 +10,7 @@ const MOST_WORDS: usize = 0xFFFF;
 const BOUND: usize = 3;
 
 /// `words` with `OpSource` naming each text and holding it; the first is the module's own. The texts are ASCII.
-pub(super) fn with_texts(words: &[u32], texts: &[(String, String)]) -> Vec<u32> {
+pub(crate) fn with_texts(words: &[u32], texts: &[(String, String)]) -> Vec<u32> {
     let mut out = words.get(..HEADER_WORDS).unwrap_or(words).to_vec();
     for instruction in instructions(words).flatten() {
         match instruction.op {

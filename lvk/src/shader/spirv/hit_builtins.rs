@@ -1,7 +1,7 @@
 //! Whether a hit shader reads Vulkan's own numbers of what was hit, which are not the caller's where meshes were split or
 //! reordered.
 
-use super::{ShaderModuleDesc, ShaderSource, ShaderStage};
+use crate::shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
 
 /// The built-ins, each with the helper to use instead.
 const NUMBERS: [(&str, &str); 2] =

@@ -4,14 +4,14 @@ use std::collections::{HashMap, HashSet};
 
 use ::spirv::{AddressingModel, Capability, Decoration, Op, StorageClass};
 
-use super::import::{Imported, Sections, push};
-use super::module::{Module, Type};
-use super::spirv::{self, Instruction, instructions};
 use crate::bindless::index_checks::{BindlessArray, CheckPlan};
 use crate::bindless::layout;
+use crate::shader::spirv::link::{Imported, Sections, push};
+use crate::shader::spirv::parsed::{Module, Type};
+use crate::shader::spirv::words::{self, Instruction, instructions};
 
 /// `glsl/checked_index.glsl` as words.
-const DONOR: &[u8] = include_bytes!("glsl/checked_index.spv");
+const DONOR: &[u8] = include_bytes!("../../glsl/checked_index.spv");
 const FUNCTION: &str = "lvkCheckedIndex(";
 /// Casts of addresses to pointers are part of it.
 const VERSION_1_5: u32 = 0x0001_0500;
@@ -24,7 +24,7 @@ pub(crate) fn with_checked_indices(words: &[u32], plan: &CheckPlan) -> Result<Ve
     if arrays.is_empty() {
         return Ok(words.to_vec());
     }
-    if spirv::version(words) < VERSION_1_5 {
+    if words::version(words) < VERSION_1_5 {
         return Err("its SPIR-V is older than version 1.5".to_owned());
     }
     if module.has(Capability::VulkanMemoryModel) {
@@ -43,7 +43,7 @@ pub(crate) fn with_checked_indices(words: &[u32], plan: &CheckPlan) -> Result<Ve
 
 /// A variable that is an array of the set, or the table beside `kTLAS`: which, and where the index stands in an access.
 fn arrays(module: &Module) -> HashMap<u32, (BindlessArray, usize)> {
-    let found = |variable: &super::module::Variable| {
+    let found = |variable: &crate::shader::spirv::parsed::Variable| {
         let set = module.decoration(variable.id, Decoration::DescriptorSet)?;
         let binding = module.decoration(variable.id, Decoration::Binding)?;
         let Type::Pointer { target } = module.types.get(&variable.ty)? else { return None };
@@ -231,7 +231,8 @@ mod tests {
     #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
     use super::*;
     use crate::bindless::index_checks::{self, Range};
-    use crate::shader::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile, reflect};
+    use crate::shader::spirv::reflect::reflect;
+    use crate::shader::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile};
 
     fn compiled(stage: ShaderStage, text: &str) -> Vec<u32> {
         let desc = ShaderModuleDesc { stage, source: ShaderSource::Glsl(text), ..Default::default() };

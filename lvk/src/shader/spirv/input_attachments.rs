@@ -2,7 +2,7 @@
 
 use ::spirv::{Decoration, StorageClass};
 
-use super::module::{Module, Type, Variable};
+use super::parsed::{Module, Type, Variable};
 use crate::bindless::input_attachments::Input;
 use crate::bindless::layout;
 use crate::format::Numbers;
@@ -16,7 +16,7 @@ pub(crate) struct InputRead {
 }
 
 /// What a variable reads of the targets; `None` where it is something else.
-pub(super) fn input_read(module: &Module, variable: &Variable) -> Result<Option<InputRead>, String> {
+pub(crate) fn input_read(module: &Module, variable: &Variable) -> Result<Option<InputRead>, String> {
     if variable.storage != StorageClass::UniformConstant as u32 {
         return Ok(None);
     }
@@ -52,7 +52,7 @@ fn place(module: &Module, variable: &Variable) -> Option<Input> {
 }
 
 /// The locations of an output, a bit for each; arrays take several.
-pub(super) fn outputs(module: &Module, variable: &Variable) -> u32 {
+pub(crate) fn outputs(module: &Module, variable: &Variable) -> u32 {
     let Some(first) = module.decoration(variable.id, Decoration::Location) else { return 0 };
     let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else { return 0 };
     let count = match module.types.get(target) {

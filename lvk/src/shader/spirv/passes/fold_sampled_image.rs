@@ -4,13 +4,13 @@ use std::collections::HashSet;
 
 use ::spirv::Op;
 
-use super::spirv::{HEADER_WORDS, Instruction, instructions};
+use crate::shader::spirv::words::{HEADER_WORDS, Instruction, instructions};
 
 /// `words` without copies of `OpSampledImage`, which GLSL's compiler makes of `nonuniformEXT(sampler2D(...))`.
 ///
 /// The combination takes the name and so the decorations of its copy. SPIR-V has combinations used by sampling instructions
 /// alone, and SwiftShader looks at nothing but the combination to know that lanes may differ.
-pub(super) fn without_sampled_copies(words: Vec<u32>) -> Vec<u32> {
+pub(crate) fn without_sampled_copies(words: Vec<u32>) -> Vec<u32> {
     let Ok(code) = instructions(&words).collect::<Result<Vec<_>, _>>() else {
         return words;
     };

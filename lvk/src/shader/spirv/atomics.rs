@@ -4,7 +4,7 @@ use std::collections::{BTreeSet, HashMap};
 
 use ::spirv::{Op, StorageClass};
 
-use super::spirv::{Instruction, instructions};
+use super::words::{Instruction, instructions};
 
 /// Atomic operations that a device feature of their own allows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -25,7 +25,7 @@ pub(crate) enum Place {
 }
 
 /// The atomic operations on floats and on integers of other than 32 bits, each kind once.
-pub(super) fn atomics(words: &[u32]) -> Result<Vec<Atomic>, String> {
+pub(crate) fn atomics(words: &[u32]) -> Result<Vec<Atomic>, String> {
     let mut ids = Ids::default();
     let mut found = BTreeSet::new();
     for instruction in instructions(words) {

@@ -4,9 +4,9 @@ use ::spirv::Capability as C;
 use ash::vk;
 
 use super::atomics::{Atomic, Place};
-use super::{Reflection, ShaderStage};
 use crate::error::{Error, Result};
 use crate::gpu::start::features::Features;
+use crate::shader::{Reflection, ShaderStage};
 
 /// Allowed on every device the library takes: without a feature, or by one the library cannot do without.
 const FREE: [C; 18] = [

@@ -2,32 +2,32 @@
 
 use ::spirv::{MAGIC_NUMBER, Op};
 
-pub(super) const HEADER_WORDS: usize = 5;
+pub(crate) const HEADER_WORDS: usize = 5;
 /// SPIR-V 1.6, what Vulkan 1.3 takes.
 const MAX_VERSION: u32 = 0x0001_0600;
-pub(super) const VERSION_1_4: u32 = 0x0001_0400;
+pub(crate) const VERSION_1_4: u32 = 0x0001_0400;
 
 /// One instruction of a module.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Instruction<'a> {
+pub(crate) struct Instruction<'a> {
     /// None for an instruction that this library does not know.
-    pub(super) op: Option<Op>,
+    pub(crate) op: Option<Op>,
     /// All words, the first included.
-    pub(super) words: &'a [u32],
+    pub(crate) words: &'a [u32],
 }
 
 impl<'a> Instruction<'a> {
     /// Operand `index`, counted from the word after the opcode; zero, which is no id, where there is none.
-    pub(super) fn operand(&self, index: usize) -> u32 {
+    pub(crate) fn operand(&self, index: usize) -> u32 {
         self.operands().get(index).copied().unwrap_or(0)
     }
 
-    pub(super) fn operands(&self) -> &'a [u32] {
+    pub(crate) fn operands(&self) -> &'a [u32] {
         self.words.get(1..).unwrap_or(&[])
     }
 
     /// The string that starts at operand `index`, and how many words it takes.
-    pub(super) fn string(&self, index: usize) -> (String, usize) {
+    pub(crate) fn string(&self, index: usize) -> (String, usize) {
         let words = self.operands().get(index..).unwrap_or(&[]);
         let bytes: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
         let len = bytes.iter().position(|byte| *byte == 0).unwrap_or(bytes.len());
@@ -36,7 +36,7 @@ impl<'a> Instruction<'a> {
 }
 
 /// Checks the header and that whole instructions and functions fill `words`.
-pub(super) fn check(words: &[u32]) -> Result<(), String> {
+pub(crate) fn check(words: &[u32]) -> Result<(), String> {
     match words.first() {
         Some(&MAGIC_NUMBER) => {}
         Some(&word) if word == MAGIC_NUMBER.swap_bytes() => {
@@ -62,12 +62,12 @@ pub(super) fn check(words: &[u32]) -> Result<(), String> {
 }
 
 /// The version word: `0x0001_0600` for 1.6.
-pub(super) fn version(words: &[u32]) -> u32 {
+pub(crate) fn version(words: &[u32]) -> u32 {
     words.get(1).copied().unwrap_or(0)
 }
 
 /// The instructions behind the header; ends after the first error.
-pub(super) fn instructions(words: &[u32]) -> impl Iterator<Item = Result<Instruction<'_>, String>> {
+pub(crate) fn instructions(words: &[u32]) -> impl Iterator<Item = Result<Instruction<'_>, String>> {
     let mut rest = words.get(HEADER_WORDS..).unwrap_or(&[]);
     std::iter::from_fn(move || {
         let first = *rest.first()?;

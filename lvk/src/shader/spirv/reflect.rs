@@ -3,13 +3,14 @@
 use ::spirv::{Capability, Decoration, ExecutionMode, ExecutionModel, Op, StorageClass};
 
 use super::atomics::{Atomic, atomics};
-use super::input_read::{InputRead, input_read, outputs};
-use super::module::{Mode, Module, Type, Variable};
+use super::input_attachments::{InputRead, input_read, outputs};
+use super::parsed::{Mode, Module, Type, Variable};
 use super::ray_interface::RayInterface;
-use super::shared_memory::SharedMemory;
-use super::{ShaderStage, spirv};
+use super::words;
+use super::workgroup_memory::SharedMemory;
 use crate::bindless::layout;
 use crate::error::{Error, Result};
+use crate::shader::ShaderStage;
 
 /// What a primitive is, as geometry shaders take it and tessellation makes it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -70,7 +71,7 @@ pub(crate) fn reflect(name: &str, stage: ShaderStage, words: &[u32]) -> Result<R
 }
 
 fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
-    spirv::check(words)?;
+    words::check(words)?;
     let module = Module::read(words)?;
     let entry = entry_point(&module, stage)?;
     let function = module.entries[entry].function;
@@ -135,7 +136,7 @@ fn entry_point(module: &Module, stage: ShaderStage) -> Result<usize, String> {
 
 /// Fails unless the entry point's function is there: drivers take it for granted.
 fn check_function(words: &[u32], function: u32) -> Result<(), String> {
-    for instruction in spirv::instructions(words) {
+    for instruction in words::instructions(words) {
         let instruction = instruction?;
         if instruction.op == Some(Op::Function) && instruction.operand(1) == function {
             return Ok(());

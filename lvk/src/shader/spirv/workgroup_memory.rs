@@ -7,8 +7,8 @@ use std::collections::HashMap;
 
 use ::spirv::{Decoration, Op, StorageClass};
 
-use super::module::{MAX_NESTING, Module, Type, Variable};
-use super::spirv;
+use super::parsed::{MAX_NESTING, Module, Type, Variable};
+use super::words;
 
 /// Declarations of a module with such memory, whose arrays every pipeline may size by its own constants.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -32,7 +32,7 @@ pub(crate) struct SharedBytes {
 type Room = (u64, u64);
 
 impl SharedMemory {
-    pub(super) fn of(words: &[u32], module: &Module, entry: usize) -> Self {
+    pub(crate) fn of(words: &[u32], module: &Module, entry: usize) -> Self {
         let shares = |variable: &Variable| is_of(variable, SHARED) || is_of(variable, PAYLOAD);
         let any = module.variables.iter().any(|it| shares(it) && module.in_interface(entry, it));
         let declarations = if any { declarations(words).to_vec() } else { Vec::new() };
@@ -62,11 +62,11 @@ fn is_of(variable: &Variable, storage: StorageClass) -> bool {
 
 /// All before the first function.
 fn declarations(words: &[u32]) -> &[u32] {
-    let before = spirv::instructions(words)
+    let before = words::instructions(words)
         .map_while(Result::ok)
         .take_while(|instruction| instruction.op != Some(Op::Function));
     let length: usize = before.map(|instruction| instruction.words.len()).sum();
-    words.get(..spirv::HEADER_WORDS + length).unwrap_or(words)
+    words.get(..words::HEADER_WORDS + length).unwrap_or(words)
 }
 
 /// Sizes of the types of a module; each is worked out once.

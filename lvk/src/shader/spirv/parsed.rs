@@ -4,53 +4,53 @@ use std::collections::{HashMap, HashSet};
 
 use ::spirv::{BuiltIn, Capability, Decoration, Dim, Op, StorageClass};
 
-use super::fold::fold;
-use super::spirv::{self, Instruction};
+use super::const_eval::fold;
+use super::words::{self, Instruction};
 use crate::format::Numbers;
 
 /// A buffer address in a push-constant block.
 const ADDRESS_BYTES: u64 = 8;
 /// Types nested deeper than this are taken for damage.
-pub(super) const MAX_NESTING: u32 = 64;
+pub(crate) const MAX_NESTING: u32 = 64;
 
 /// Declarations by id; ids may point anywhere, so every look-up can fail.
 #[derive(Debug, Default)]
-pub(super) struct Module {
+pub(crate) struct Module {
     version: u32,
     capabilities: HashSet<u32>,
-    pub(super) entries: Vec<Entry>,
-    pub(super) modes: Vec<Mode>,
-    pub(super) names: HashMap<u32, String>,
-    pub(super) types: HashMap<u32, Type>,
-    pub(super) constants: HashMap<u32, Constant>,
+    pub(crate) entries: Vec<Entry>,
+    pub(crate) modes: Vec<Mode>,
+    pub(crate) names: HashMap<u32, String>,
+    pub(crate) types: HashMap<u32, Type>,
+    pub(crate) constants: HashMap<u32, Constant>,
     /// What operations on constants come to.
     folded: HashMap<u32, u32>,
     composites: HashMap<u32, [u32; 3]>,
-    pub(super) variables: Vec<Variable>,
+    pub(crate) variables: Vec<Variable>,
     decorations: HashMap<(u32, u32), u32>,
     member_decorations: HashMap<(u32, u32, u32), u32>,
 }
 
 /// An entry point.
 #[derive(Debug)]
-pub(super) struct Entry {
-    pub(super) model: u32,
-    pub(super) function: u32,
-    pub(super) name: String,
+pub(crate) struct Entry {
+    pub(crate) model: u32,
+    pub(crate) function: u32,
+    pub(crate) name: String,
     interface: HashSet<u32>,
 }
 
 /// An execution mode with up to three operands.
 #[derive(Debug)]
-pub(super) struct Mode {
-    pub(super) function: u32,
-    pub(super) mode: u32,
-    pub(super) operands: [u32; 3],
+pub(crate) struct Mode {
+    pub(crate) function: u32,
+    pub(crate) mode: u32,
+    pub(crate) operands: [u32; 3],
 }
 
 /// A type, as far as sizes and descriptor kinds need it.
 #[derive(Debug)]
-pub(super) enum Type {
+pub(crate) enum Type {
     Bool,
     Number {
         bytes: u32,
@@ -90,29 +90,29 @@ pub(super) enum Type {
 
 /// A scalar constant; its low word.
 #[derive(Debug)]
-pub(super) struct Constant {
-    pub(super) ty: u32,
-    pub(super) value: u32,
-    pub(super) is_spec: bool,
+pub(crate) struct Constant {
+    pub(crate) ty: u32,
+    pub(crate) value: u32,
+    pub(crate) is_spec: bool,
 }
 
 /// A variable at global scope.
 #[derive(Debug)]
-pub(super) struct Variable {
-    pub(super) id: u32,
-    pub(super) ty: u32,
-    pub(super) storage: u32,
+pub(crate) struct Variable {
+    pub(crate) id: u32,
+    pub(crate) ty: u32,
+    pub(crate) storage: u32,
 }
 
 impl Module {
-    pub(super) fn read(words: &[u32]) -> Result<Self, String> {
+    pub(crate) fn read(words: &[u32]) -> Result<Self, String> {
         Self::specialized(words, &HashMap::new())
     }
 
     /// As [`read`](Self::read), with these values of specialization constants, by their ids.
-    pub(super) fn specialized(words: &[u32], values: &HashMap<u32, u32>) -> Result<Self, String> {
-        let mut module = Self { version: spirv::version(words), ..Self::default() };
-        for instruction in spirv::instructions(words) {
+    pub(crate) fn specialized(words: &[u32], values: &HashMap<u32, u32>) -> Result<Self, String> {
+        let mut module = Self { version: words::version(words), ..Self::default() };
+        for instruction in words::instructions(words) {
             let instruction = instruction?;
             match instruction.op {
                 Some(Op::Function) => break,
@@ -123,33 +123,33 @@ impl Module {
         Ok(module)
     }
 
-    pub(super) fn has(&self, capability: Capability) -> bool {
+    pub(crate) fn has(&self, capability: Capability) -> bool {
         self.capabilities.contains(&(capability as u32))
     }
 
     /// The numbers of all capabilities, sorted.
-    pub(super) fn capabilities(&self) -> Vec<u32> {
+    pub(crate) fn capabilities(&self) -> Vec<u32> {
         let mut all: Vec<u32> = self.capabilities.iter().copied().collect();
         all.sort_unstable();
         all
     }
 
-    pub(super) fn decoration(&self, id: u32, decoration: Decoration) -> Option<u32> {
+    pub(crate) fn decoration(&self, id: u32, decoration: Decoration) -> Option<u32> {
         self.decorations.get(&(id, decoration as u32)).copied()
     }
 
-    pub(super) fn member_decoration(&self, ty: u32, member: u32, decoration: Decoration) -> Option<u32> {
+    pub(crate) fn member_decoration(&self, ty: u32, member: u32, decoration: Decoration) -> Option<u32> {
         self.member_decorations.get(&(ty, member, decoration as u32)).copied()
     }
 
     /// Whether `variable` belongs to the entry point; before SPIR-V 1.4 interfaces do not list resources.
-    pub(super) fn in_interface(&self, entry: usize, variable: &Variable) -> bool {
-        self.version < spirv::VERSION_1_4
+    pub(crate) fn in_interface(&self, entry: usize, variable: &Variable) -> bool {
+        self.version < words::VERSION_1_4
             || self.entries.get(entry).is_some_and(|entry| entry.interface.contains(&variable.id))
     }
 
     /// Whether an output of the entry point, or a member of one, is the built-in `Layer`.
-    pub(super) fn writes_layer(&self, entry: usize) -> bool {
+    pub(crate) fn writes_layer(&self, entry: usize) -> bool {
         let (builtin, layer) = (Decoration::BuiltIn as u32, BuiltIn::Layer as u32);
         let members: HashSet<u32> = self
             .member_decorations
@@ -176,14 +176,14 @@ impl Module {
     }
 
     /// The three constants of the `WorkgroupSize` built-in.
-    pub(super) fn workgroup_size(&self) -> Option<[u32; 3]> {
+    pub(crate) fn workgroup_size(&self) -> Option<[u32; 3]> {
         let is_size =
             |id: &u32| self.decoration(*id, Decoration::BuiltIn) == Some(BuiltIn::WorkgroupSize as u32);
         self.composites.iter().find(|(id, _)| is_size(id)).map(|(_, parts)| *parts)
     }
 
     /// Bytes of a type laid out by its offset and stride decorations.
-    pub(super) fn size_of(&self, ty: u32) -> Result<u64, String> {
+    pub(crate) fn size_of(&self, ty: u32) -> Result<u64, String> {
         let mut known = HashMap::new();
         self.size(ty, None, MAX_NESTING, &mut known)
     }
@@ -264,7 +264,7 @@ impl Module {
         Ok(end)
     }
 
-    pub(super) fn length(&self, id: u32) -> Result<u64, String> {
+    pub(crate) fn length(&self, id: u32) -> Result<u64, String> {
         let constant = self.constants.get(&id).ok_or("an array's length is not a plain constant")?;
         Ok(u64::from(constant.value))
     }
@@ -331,7 +331,7 @@ impl Module {
     }
 
     /// The low word of a constant, or what an operation on constants comes to.
-    pub(super) fn value(&self, id: u32) -> Option<u32> {
+    pub(crate) fn value(&self, id: u32) -> Option<u32> {
         let plain = self.constants.get(&id).map(|constant| constant.value);
         plain.or_else(|| self.folded.get(&id).copied())
     }

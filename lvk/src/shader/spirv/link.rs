@@ -4,26 +4,26 @@ use std::collections::{HashMap, HashSet};
 
 use ::spirv::Op;
 
-use super::spirv::{HEADER_WORDS, Instruction, instructions};
+use super::words::{HEADER_WORDS, Instruction, instructions};
 
 /// Word of the header that is above every id.
 const BOUND: usize = 3;
 
 /// A module in its sections, to which something is added.
-pub(super) struct Sections {
+pub(crate) struct Sections {
     /// The header.
-    pub(super) header: Vec<u32>,
-    pub(super) capabilities: Vec<u32>,
+    pub(crate) header: Vec<u32>,
+    pub(crate) capabilities: Vec<u32>,
     /// Everything up to the decorations, those included.
-    pub(super) annotations: Vec<u32>,
+    pub(crate) annotations: Vec<u32>,
     /// Types, constants and variables.
-    pub(super) globals: Vec<u32>,
-    pub(super) functions: Vec<u32>,
+    pub(crate) globals: Vec<u32>,
+    pub(crate) functions: Vec<u32>,
 }
 
 impl Sections {
     /// Fails where an instruction is cut off.
-    pub(super) fn of(words: &[u32]) -> Result<Self, String> {
+    pub(crate) fn of(words: &[u32]) -> Result<Self, String> {
         let header = words.get(..HEADER_WORDS).ok_or("the header is cut off")?.to_vec();
         let mut all = Self {
             header,
@@ -46,18 +46,18 @@ impl Sections {
         Ok(all)
     }
 
-    pub(super) fn words(self) -> Vec<u32> {
+    pub(crate) fn words(self) -> Vec<u32> {
         [self.header, self.capabilities, self.annotations, self.globals, self.functions].concat()
     }
 
-    pub(super) fn new_id(&mut self) -> u32 {
+    pub(crate) fn new_id(&mut self) -> u32 {
         let id = self.header[BOUND];
         self.header[BOUND] = id.wrapping_add(1);
         id
     }
 
     /// The id of a new constant of one word.
-    pub(super) fn constant(&mut self, ty: u32, value: u32) -> u32 {
+    pub(crate) fn constant(&mut self, ty: u32, value: u32) -> u32 {
         let id = self.new_id();
         push(&mut self.globals, Op::Constant, &[ty, id, value]);
         id
@@ -66,7 +66,7 @@ impl Sections {
     /// Adds the function of this name with the types, constants and decorations that it needs; answers its id.
     ///
     /// Types that may be declared only once are shared with what is there.
-    pub(super) fn import(&mut self, donor: &[u32], name: &str) -> Result<Imported, String> {
+    pub(crate) fn import(&mut self, donor: &[u32], name: &str) -> Result<Imported, String> {
         let code: Vec<_> = instructions(donor).collect::<Result<_, _>>()?;
         let wanted = |i: &&Instruction<'_>| i.op == Some(Op::Name) && i.string(1).0.starts_with(name);
         let function = code.iter().find(wanted).ok_or("the function is missing")?.operand(0);
@@ -149,14 +149,14 @@ impl Sections {
 }
 
 /// What was imported.
-pub(super) struct Imported {
-    pub(super) function: u32,
+pub(crate) struct Imported {
+    pub(crate) function: u32,
     /// Type of what it answers.
-    pub(super) result: u32,
+    pub(crate) result: u32,
     /// Type of its first parameter.
-    pub(super) address: u32,
+    pub(crate) address: u32,
     /// Type of its second.
-    pub(super) word: u32,
+    pub(crate) word: u32,
 }
 
 struct Ids {
@@ -174,7 +174,7 @@ impl Known {
 }
 
 /// Adds an instruction.
-pub(super) fn push(section: &mut Vec<u32>, op: Op, operands: &[u32]) {
+pub(crate) fn push(section: &mut Vec<u32>, op: Op, operands: &[u32]) {
     section.push((operands.len() as u32 + 1) << 16 | op as u32);
     section.extend(operands);
 }

@@ -1,0 +1,16 @@
+//! Reads SPIR-V modules: words, reflection, capabilities, constants, and the passes that rewrite modules.
+
+pub(crate) mod atomics;
+pub(crate) mod capabilities;
+pub(crate) mod const_eval;
+#[cfg(feature = "glsl")]
+pub(crate) mod debug_source;
+pub(crate) mod hit_builtins;
+pub(crate) mod input_attachments;
+pub(crate) mod link;
+pub(crate) mod parsed;
+pub(crate) mod passes;
+pub(crate) mod ray_interface;
+pub(crate) mod reflect;
+pub(crate) mod words;
+pub(crate) mod workgroup_memory;

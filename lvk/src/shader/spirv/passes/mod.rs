@@ -1,0 +1,8 @@
+//! Passes that rewrite a SPIR-V module.
+
+pub(crate) mod check_indices;
+#[cfg(feature = "glsl")]
+pub(crate) mod fold_sampled_image;
+pub(crate) mod strip_primitive_culling;
+#[cfg(feature = "glsl")]
+pub(crate) mod strip_unused_bindings;
