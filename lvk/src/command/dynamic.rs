@@ -8,7 +8,7 @@ use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::gpu::caps::shading_rate::ShadingRate;
 use crate::pipeline::PassState;
 use crate::pipeline::depth_stencil::DepthState;
-use crate::pipeline::raster::DepthBias;
+use crate::pipeline::rasterization::DepthBias;
 
 /// What the pass wants, and what Vulkan's command buffer holds.
 #[derive(Debug, Clone, Copy, Default)]

@@ -13,7 +13,7 @@ use crate::barrier::{Subresources, Use};
 use crate::error::{Error, Result, check_limit};
 use crate::format::{Format, Numbers};
 use crate::handle::TextureHandle;
-use crate::pipeline::shape::PassShape;
+use crate::pipeline::rendering_formats::PassShape;
 use crate::resource::Texture;
 use crate::resource::texture_desc::TextureUsage;
 use crate::submit::emit_barriers::layout;

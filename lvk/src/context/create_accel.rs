@@ -5,8 +5,8 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::Context;
-use super::blas_shapes::part_limits;
 use super::holder::Holder;
+use super::plan_blas::part_limits;
 use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasBody, PartShape};
 use crate::accel::build::{BuildInput, transforms};

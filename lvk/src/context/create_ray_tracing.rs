@@ -7,8 +7,8 @@ use super::create::NO_SLOT;
 use super::holder::Holder;
 use crate::error::{Error, Result};
 use crate::handle::{RayTracingLibraryHandle, RayTracingPipelineHandle};
-use crate::pipeline::library::RayTracingLibraryDesc;
 use crate::pipeline::ray_tracing::RayTracingPipelineDesc;
+use crate::pipeline::ray_tracing_library::RayTracingLibraryDesc;
 use crate::pipeline::{RayTracingLibrary, RayTracingPipeline};
 
 impl Context {

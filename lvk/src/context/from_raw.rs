@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Context;
 use super::config::ContextDesc;
-use super::start::requested_queues;
+use super::new::requested_queues;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::start::external::RawContext;

@@ -1,7 +1,6 @@
 //! The facade users hold: a context creates objects, moves data, hands out command buffers and submits them.
 
 pub(crate) mod accel_info;
-mod blas_shapes;
 mod compact;
 pub(crate) mod config;
 mod create;
@@ -9,9 +8,9 @@ mod create_accel;
 mod create_pipelines;
 mod create_ray_tracing;
 mod create_texture;
-mod data;
+mod default_descriptors;
 pub(crate) mod destroy;
-mod dummy;
+mod format_queries;
 pub(crate) mod frame;
 mod from_raw;
 pub(crate) mod holder;
@@ -19,18 +18,19 @@ pub(crate) mod import;
 mod index_faults;
 mod interop;
 mod live_objects;
-mod pending;
-mod profile;
-mod queries;
+mod new;
+mod plan_blas;
+mod profiling;
+mod prologue;
+mod query_results;
 mod read_bounds;
 pub(crate) mod readback;
 pub(crate) mod serialize;
 mod software_blas;
-mod start;
 mod submit;
-mod support;
 #[cfg(feature = "test-hooks")]
 pub mod test_hooks;
+mod transfer;
 mod window;
 
 use std::sync::Arc;
@@ -45,7 +45,7 @@ use crate::lock::Mutex;
 use crate::shared::Shared;
 
 use frame::FrameRing;
-use pending::Pending;
+use prologue::Pending;
 
 /// A Vulkan device with everything made from it.
 ///

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::Context;
-use super::blas_shapes::input;
 use super::create_accel::blas_object;
 use super::holder::Holder;
+use super::plan_blas::input;
 use crate::accel::AccelStruct;
 use crate::accel::blas::{BlasBody, PartShape};
 use crate::accel::blob::{Blob, BlobGeometry, BlobGeometryKind, BlobIndices, BlobPart, decode, encode};

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::Context;
-use super::blas_shapes::input;
 use super::create_accel::blas_object;
 use super::holder::Holder;
+use super::plan_blas::input;
 use super::read_bounds::geometry_bytes;
 use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasBody};

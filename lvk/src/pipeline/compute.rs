@@ -4,11 +4,11 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::group_memory::{MemoryLimits, check_group_memory};
-use super::group_size::{GroupLimits, check_group_size};
-use super::layout::PipelineBase;
+use super::pipeline_layout::PipelineBase;
 use super::shader_module::ShaderModule;
 use super::stage::{Specialization, SpecializationConstant, stage};
+use super::workgroup_memory::{MemoryLimits, check_group_memory};
+use super::workgroup_size::{GroupLimits, check_group_size};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::handle::ShaderModuleHandle;

@@ -4,11 +4,11 @@ use ash::vk;
 
 use super::graphics::RenderModules;
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
-use super::group_memory::{MemoryLimits, check_group_memory};
-use super::group_size::{GroupLimits, check_group_size};
 use super::local_read::check_inputs;
-use super::raster::Topology;
+use super::rasterization::Topology;
 use super::state_check::check_state;
+use super::workgroup_memory::{MemoryLimits, check_group_memory};
+use super::workgroup_size::{GroupLimits, check_group_size};
 use crate::error::{Error, Result, check_limit};
 use crate::format::Format;
 use crate::gpu::Gpu;

@@ -2,8 +2,8 @@
 
 use super::blend::{Blend, ColorWriteMask};
 use super::depth_stencil::{DepthTest, StencilTest};
-use super::raster::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
-use super::shape::PassShape;
+use super::rasterization::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
+use super::rendering_formats::PassShape;
 use super::stage::SpecializationConstant;
 use crate::format::{Format, VertexFormat};
 use crate::gpu::caps::shading_rate::ShadingRate;

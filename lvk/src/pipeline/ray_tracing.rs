@@ -4,15 +4,15 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::deferred::compile;
-use super::groups::{Find, GroupList, Groups};
-use super::layout::PipelineBase;
-use super::library::RayTracingLibrary;
+use super::deferred_operation::compile;
+use super::pipeline_layout::PipelineBase;
+use super::ray_tracing_library::RayTracingLibrary;
+use super::ray_tracing_stack::StackSizes;
 use super::sbt::{GroupHandles, SbtLimits, SbtPlan, SbtRegion, plan_sbt, sbt_buffer_bytes, write_sbt};
+use super::sbt_order::{PerRegion, table_order};
+use super::shader_groups::{Find, GroupList, Groups};
 use super::shader_module::ShaderModule;
-use super::stack::StackSizes;
 use super::stage::{Specialization, SpecializationConstant, stage};
-use super::table_order::{PerRegion, table_order};
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::caps::limits::Limits;

@@ -1,6 +1,6 @@
 //! Layout of a shader binding table, as plain arithmetic.
 
-use super::table_order::PerRegion;
+use super::sbt_order::PerRegion;
 use crate::error::{Result, check_limit};
 
 /// What a device asks of shader binding tables (`VkPhysicalDeviceRayTracingPipelinePropertiesKHR`), in bytes.
@@ -20,7 +20,7 @@ pub(crate) struct SbtLimits {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GroupHandles<'a> {
     pub(crate) bytes: &'a [u8],
-    /// See [`table_order`](super::table_order::table_order).
+    /// See [`table_order`](super::sbt_order::table_order).
     pub(crate) order: &'a [usize],
 }
 

@@ -5,7 +5,7 @@ use spirv::Capability;
 
 use super::graphics::RenderModules;
 use super::graphics_desc::RenderPipelineDesc;
-use super::raster::PolygonMode;
+use super::rasterization::PolygonMode;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;

@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, OnceLock};
 
 use super::config::ContextDesc;
-use super::dummy::fill_dummies;
+use super::default_descriptors::fill_dummies;
 use super::frame::FrameRing;
-use super::pending::Pending;
+use super::prologue::Pending;
 use super::{Context, Inner};
 use crate::accel::compaction::Compactions;
 use crate::accel::scratch_buffer::ScratchBuffer;

@@ -6,8 +6,8 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::ray_tracing::{HitGroup, RayTracingPipelineDesc};
+use super::sbt_order::PerRegion;
 use super::shader_module::ShaderModule;
-use super::table_order::PerRegion;
 use crate::error::{Error, Result};
 use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::groups::{Find, GroupList, Groups};
-use super::layout::PipelineBase;
+use super::pipeline_layout::PipelineBase;
 use super::ray_tracing::{HitGroup, RayTracingPipelineDesc, check_interface, compile_groups};
+use super::shader_groups::{Find, GroupList, Groups};
 use super::shader_module::ShaderModule;
 use super::stage::SpecializationConstant;
 use crate::error::{Error, Result};
