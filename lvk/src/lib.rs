@@ -138,14 +138,14 @@ pub use accel::geometry::{Aabbs, BlasGeometry, GeometryFlags, GeometryTransform,
 pub use accel::instance::{DeviceInstances, InstanceFlags, TlasInstance, transform_rows};
 pub use bindless::index_checks::{BindlessArray, IndexFault, SlotState};
 pub use command::CommandBuffer;
-pub use command::attachment::{
+pub use command::attachment_desc::{
     ColorAttachment, ColorLoadOp, DepthAttachment, DepthLoadOp, DepthResolve, Resolve, ShadingRateAttachment,
     StencilLoadOp,
 };
 pub use command::dependencies::Dependencies;
 pub use command::indirect_count::IndirectCount;
-pub use command::render::RenderPass;
-pub use command::render_pass::RenderPassDesc;
+pub use command::render_pass::RenderPass;
+pub use command::render_pass_desc::RenderPassDesc;
 pub use command::transfer::{BufferCopy, ClearValue};
 pub use context::Context;
 pub use context::accel_info::{AccelMemory, AccelStructInfo, BuildProgress, Compaction};

@@ -6,15 +6,15 @@ use std::sync::{Arc, OnceLock};
 use ash::vk;
 
 use crate::accel::AccelStruct;
+use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::BlasBody;
+use crate::accel::blas_refs::Revision;
 use crate::accel::compaction::SizeQuery;
 use crate::accel::scratch_buffer::ScratchBuffer;
-use crate::accel::shown::Revision;
 use crate::accel::software::body::SoftwareBody;
 use crate::accel::storage::AccelStorage;
-use crate::accel::structure::AccelKind;
 use crate::accel::tlas::TlasContents;
-use crate::accel::tlas_updates::TlasUpdates;
+use crate::accel::tlas_tracker::TlasUpdates;
 use crate::barrier::{QueryStages, ResourceId};
 use crate::bindless::index_checks::BindlessArray;
 use crate::bindless::{Bindless, TEXTURE_ARRAYS};

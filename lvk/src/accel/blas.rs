@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::flags::AccelStructSizes;
 use super::geometry::BlasGeometry;
 use super::primitive_map::PrimitiveMap;
-use super::raw_structure::RawStructure;
+use super::raw_accel_struct::RawStructure;
 use crate::accel::software::blas::SoftwareBlas;
 use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::Buffer;

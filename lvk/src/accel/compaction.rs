@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, Weak};
 
+use super::accel_struct::AccelStruct;
 use super::blas::BlasBody;
-use super::structure::AccelStruct;
 use crate::error::{Error, Result};
 use crate::lock::{Mutex, Rank};
 use crate::resource::QueryPool;

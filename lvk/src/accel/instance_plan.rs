@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
+use super::blas_refs::{Find, Gather, Marks, Shown, ShownSet};
 use super::instance::{INSTANCE_BYTES, TlasInstance, check, is_right, pack};
-use super::shown::{Find, Gather, Marks, Shown, ShownSet};
 use crate::error::{Result, check_limit};
 use crate::threads::{cores, share_out};
 
@@ -261,9 +261,9 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::accel::accel_struct::{AccelKind, AccelStruct};
     use crate::accel::blas::{Blas, BlasBody};
     use crate::accel::flags::{AccelStructSizes, BuildFlags};
-    use crate::accel::structure::{AccelKind, AccelStruct};
     use crate::handle::AccelStructHandle;
     use crate::store::Pool;
 

@@ -1,31 +1,31 @@
 //! Acceleration structures: checked, sized and planned here, recorded by the command layer.
 
+pub(crate) mod accel_struct;
 pub(crate) mod blas;
-pub(crate) mod blob;
-pub(crate) mod bounds;
+pub(crate) mod blas_file;
+pub(crate) mod blas_refs;
 pub(crate) mod build;
-pub(crate) mod build_run;
+pub(crate) mod build_overlap;
 pub(crate) mod compaction;
 pub(crate) mod culling;
-pub(crate) mod cut;
 pub(crate) mod desc;
 pub(crate) mod flags;
 pub(crate) mod geometry;
 pub(crate) mod instance;
 pub(crate) mod instance_plan;
-pub(crate) mod order;
+pub(crate) mod partition;
+pub(crate) mod primitive_bounds;
 pub(crate) mod primitive_map;
-pub(crate) mod ranges;
-pub(crate) mod raw_structure;
+pub(crate) mod range_allocator;
+pub(crate) mod raw_accel_struct;
+pub(crate) mod reorder;
 pub(crate) mod scratch;
 pub(crate) mod scratch_buffer;
-pub(crate) mod shown;
 mod size_model;
 pub(crate) mod software;
 pub(crate) mod split;
 pub(crate) mod storage;
-pub(crate) mod structure;
 pub(crate) mod tlas;
-pub(crate) mod tlas_updates;
+pub(crate) mod tlas_tracker;
 
-pub(crate) use structure::AccelStruct;
+pub(crate) use accel_struct::AccelStruct;

@@ -1,7 +1,7 @@
 //! How a mesh too large for the device is cut into parts that each fit.
 
-use super::bounds::Bounds;
-use super::cut::{Item, cut_freely, items, union};
+use super::partition::{Item, cut_freely, items, union};
+use super::primitive_bounds::Bounds;
 use crate::error::{Error, Result, check_limit};
 
 /// Most that one structure may take.

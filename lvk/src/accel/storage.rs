@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::ranges::Ranges;
+use super::range_allocator::Ranges;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::lock::{Mutex, Rank};

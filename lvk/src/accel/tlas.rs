@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::raw_structure::RawStructure;
-use super::shown::{Revision, ShownSet};
+use super::blas_refs::{Revision, ShownSet};
+use super::raw_accel_struct::RawStructure;
 use crate::accel::software::tlas::SoftwareTlas;
 use crate::error::{Result, check_limit};
 use crate::lock::{Guard, Mutex, Rank};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::compute::check_arguments;
-use super::render::RenderPass;
+use super::render_pass::RenderPass;
 use crate::barrier::Use;
 use crate::error::{Result, check_limit};
 use crate::gpu::caps::optional_features::OptionalFeature;

@@ -3,9 +3,9 @@
 use ash::vk;
 
 use super::CommandBuffer;
-use super::render::RenderPass;
-use super::render_pass::RenderPassDesc;
-use super::targets::{Target, Targets};
+use super::attachments::{Target, Targets};
+use super::render_pass::RenderPass;
+use super::render_pass_desc::RenderPassDesc;
 use crate::barrier::{Layout, Use};
 use crate::bindless::input_attachments::{Input, InputMask};
 use crate::bindless::layout::INPUT_SET;

@@ -1,38 +1,38 @@
 //! Command buffers. Every command checks its arguments, places the barriers it needs and records itself.
 
-pub(crate) mod accel;
-mod accel_copy;
-pub(crate) mod attachment;
+pub(crate) mod accesses;
+pub(crate) mod attachment_desc;
+mod attachments;
+pub(crate) mod barriers;
 pub(crate) mod bind;
+pub(crate) mod build_blas;
 pub(crate) mod compute;
+mod copy_accel;
 pub(crate) mod dependencies;
 mod draw_mesh;
-mod dynamic;
-pub(crate) mod flush;
+mod dynamic_state;
 pub(crate) mod gpu_build;
 pub(crate) mod indirect_count;
-mod instances;
-mod kernel;
+mod kernel_dispatch;
 mod label;
 mod local_read;
-mod notes;
-mod part_uses;
 mod pass_area;
 mod present;
 pub(crate) mod query;
-mod query_log;
-pub(crate) mod queue_check;
-pub(crate) mod render;
+mod query_usage;
+pub(crate) mod queue_support;
+mod recording_state;
 pub(crate) mod render_pass;
+pub(crate) mod render_pass_desc;
 mod resolve;
 mod shading_rate;
 mod software;
-mod targets;
-pub(crate) mod tlas;
+mod subresource_accesses;
 pub(crate) mod trace;
 pub(crate) mod transfer;
+pub(crate) mod update_tlas;
 mod upload;
-pub(crate) mod uses;
+mod write_instances;
 
 use std::mem::ManuallyDrop;
 use std::sync::Arc;
@@ -48,8 +48,8 @@ use crate::submit::Recording;
 use crate::submit::profiler::Scopes;
 use crate::upload::staging::StagingChunk;
 
-use notes::Notes;
-pub(crate) use notes::SpareNotes;
+use recording_state::Notes;
+pub(crate) use recording_state::SpareNotes;
 
 /// Records commands for one submission.
 ///

@@ -3,8 +3,8 @@
 use ash::vk;
 
 use super::CommandBuffer;
-use super::attachment::DepthResolve;
-use super::targets::Target;
+use super::attachment_desc::DepthResolve;
+use super::attachments::Target;
 use crate::barrier::{Layout, Use};
 use crate::error::{Error, Result};
 use crate::format::{Format, Numbers};

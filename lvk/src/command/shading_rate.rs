@@ -3,10 +3,10 @@
 use ash::vk;
 
 use super::CommandBuffer;
-use super::attachment::ShadingRateAttachment;
+use super::attachment_desc::ShadingRateAttachment;
 use super::pass_area::PassArea;
-use super::render::RenderPass;
-use super::render_pass::RenderPassDesc;
+use super::render_pass::RenderPass;
+use super::render_pass_desc::RenderPassDesc;
 use crate::barrier::Use;
 use crate::error::{Error, Result};
 use crate::gpu::caps::shading_rate::ShadingRate;

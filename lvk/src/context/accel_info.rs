@@ -2,10 +2,10 @@
 
 use super::Context;
 use crate::accel::AccelStruct;
+use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::CompactionWish;
 use crate::accel::flags::AccelStructSizes;
 use crate::accel::scratch_buffer::ScratchBuffer;
-use crate::accel::structure::AccelKind;
 use crate::error::Result;
 use crate::handle::AccelStructHandle;
 

@@ -9,7 +9,7 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::{BlasBody, CompactionWish};
 use crate::accel::compaction::{Compactions, PlannedCopy, Refusal, SizeQuery};
 use crate::accel::flags::BuildFlags;
-use crate::accel::raw_structure::RawStructure;
+use crate::accel::raw_accel_struct::RawStructure;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::lock::Guard;

@@ -3,7 +3,7 @@
 use ash::vk;
 
 use super::Context;
-use crate::accel::structure::AccelKind;
+use crate::accel::accel_struct::AccelKind;
 use crate::error::Result;
 use crate::gpu::caps::queues::Queue;
 use crate::handle::{

@@ -2,12 +2,12 @@
 
 use super::Context;
 use crate::accel::blas::PartShape;
-use crate::accel::bounds::Bounds;
 use crate::accel::build::BuildInput;
 use crate::accel::desc::{BlasDesc, PrimitiveOrder};
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
-use crate::accel::order::{spatial_order, worth_ordering};
+use crate::accel::primitive_bounds::Bounds;
 use crate::accel::primitive_map::{PrimitiveMap, table_words};
+use crate::accel::reorder::{spatial_order, worth_ordering};
 use crate::accel::software::blas::most_sizes;
 use crate::accel::split::{PartLimits, PartPlan, PartSizes, plan_split};
 use crate::error::Result;

@@ -5,9 +5,9 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::Context;
-use crate::accel::bounds::{Bounds, BoxBytes, IndexBytes, TriangleBytes, VertexBytes};
 use crate::accel::desc::BlasDesc;
 use crate::accel::geometry::{BlasGeometry, GeometryTransform, Triangles};
+use crate::accel::primitive_bounds::{Bounds, BoxBytes, IndexBytes, TriangleBytes, VertexBytes};
 use crate::command::transfer::BufferCopy;
 use crate::error::Result;
 use crate::format::IndexFormat;

@@ -9,7 +9,7 @@ use super::plan_blas::input;
 use super::read_bounds::geometry_bytes;
 use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasBody};
-use crate::accel::blob::Blob;
+use crate::accel::blas_file::Blob;
 use crate::accel::desc::BlasDesc;
 use crate::accel::software::blas::{Origin, SoftwareBlas, body_bytes, builds_on_gpu, gpu_plan, refit_plan};
 use crate::accel::software::body::SoftwareBody;

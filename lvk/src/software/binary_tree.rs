@@ -1,7 +1,7 @@
 //! Binary trees by binned surface area, never deeper than the walk's stack.
 
 use super::tree::{Nodes, Tree};
-use crate::accel::bounds::Bounds;
+use crate::accel::primitive_bounds::Bounds;
 use crate::accel::software::layout::{BinaryNode, DEEPEST_BINARY, LARGEST_LEAF, LEAF, NONE, leaf};
 
 const BINS: usize = 16;

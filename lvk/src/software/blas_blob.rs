@@ -6,8 +6,8 @@ use super::mesh::{Mesh, Primitives};
 use super::quality::Quality;
 use super::tree::{Nodes, Tree};
 use super::vertices::{Indexed, indexed};
-use crate::accel::bounds::Bounds;
 use crate::accel::geometry::GeometryFlags;
+use crate::accel::primitive_bounds::Bounds;
 use crate::accel::software::layout::LeafKind;
 use crate::accel::software::layout::{
     BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafIndexed, LeafPacked, LeafTriangle, WIDE,

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec3, Vec3, Vec3Swizzles};
 
-use crate::accel::bounds::Bounds;
 use crate::accel::instance::TlasInstance;
+use crate::accel::primitive_bounds::Bounds;
 use crate::accel::software::layout::Instance;
 use crate::accel::software::parts::Parts;
 

@@ -3,8 +3,8 @@
 use glam::Vec3;
 
 use super::quality::Quality;
-use crate::accel::bounds::{Bounds, BoxBytes, TriangleBytes};
 use crate::accel::geometry::GeometryFlags;
+use crate::accel::primitive_bounds::{Bounds, BoxBytes, TriangleBytes};
 use crate::accel::software::layout::{LeafBox, LeafTriangle};
 
 /// Bounds end here: the sums of areas that a build compares still are numbers. Kernels have it in `build/box.glsl`.
@@ -106,7 +106,7 @@ fn clamped(corner: Vec3) -> Vec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::accel::bounds::{IndexBytes, VertexBytes};
+    use crate::accel::primitive_bounds::{IndexBytes, VertexBytes};
     use crate::format::VertexFormat;
 
     /// Vertices of which the fourth is none.

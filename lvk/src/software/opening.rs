@@ -5,7 +5,7 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
 use super::instances::{PlacedInstance, moved_bounds};
-use crate::accel::bounds::Bounds;
+use crate::accel::primitive_bounds::Bounds;
 use crate::accel::software::parts::Part;
 
 /// More instances are shown whole: to look at them in pairs would take too long.

@@ -8,7 +8,7 @@ use obvhs::cwbvh::node::CwBvhNode;
 
 use super::blas_blob::BlasBlob;
 use super::wide_tree::children;
-use crate::accel::bounds::Bounds;
+use crate::accel::primitive_bounds::Bounds;
 use crate::accel::software::layout::{BLOCK_BYTES, WIDE, leaf};
 use crate::accel::software::parts::{Part, Parts};
 

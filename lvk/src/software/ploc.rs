@@ -11,7 +11,7 @@ use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
 
 use super::threads::Build;
-use crate::accel::bounds::Bounds;
+use crate::accel::primitive_bounds::Bounds;
 use crate::threads::share_out;
 
 /// Rounds that look at the next neighbours only: most of what is small is paired by them.

@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use super::mesh::{Mesh, Primitives};
 use super::{binary_tree, wide_tree};
-use crate::accel::bounds::Bounds;
 use crate::accel::desc::BlasDesc;
 use crate::accel::geometry::BlasGeometry;
+use crate::accel::primitive_bounds::Bounds;
 use crate::accel::software::layout::LeafKind;
 use crate::accel::software::layout::{
     BINARY, BLOCK_BYTES, BinaryNode, Header, LeafBox, LeafIndexed, LeafPacked, NONE, WIDE,

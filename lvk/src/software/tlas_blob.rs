@@ -4,7 +4,7 @@ use super::binary_tree;
 use super::instances::PlacedInstance;
 use super::opening::open;
 use super::tree::Nodes;
-use crate::accel::bounds::Bounds;
+use crate::accel::primitive_bounds::Bounds;
 use crate::accel::software::layout::LeafKind;
 use crate::accel::software::layout::{BINARY, BLOCK_BYTES, BinaryNode, Header, Instance, NONE};
 

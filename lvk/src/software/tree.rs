@@ -4,7 +4,7 @@ use obvhs::cwbvh::node::CwBvhNode;
 
 use super::binary_tree;
 use super::wide_tree;
-use crate::accel::bounds::Bounds;
+use crate::accel::primitive_bounds::Bounds;
 use crate::accel::software::layout::{BinaryNode, NONE, leaf};
 
 /// Nodes of either form.

@@ -8,7 +8,7 @@ use obvhs::cwbvh::node::CwBvhNode;
 
 use super::ploc;
 use super::tree::{Nodes, Tree};
-use crate::accel::bounds::Bounds;
+use crate::accel::primitive_bounds::Bounds;
 use crate::accel::software::layout::{BinaryNode, DEEPEST_WIDE};
 
 /// Most primitives of a leaf: they are counted in three bits, one by one.

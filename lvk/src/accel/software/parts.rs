@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use crate::accel::bounds::Bounds;
+use crate::accel::primitive_bounds::Bounds;
 
 /// What is below one node or leaf.
 #[derive(Debug, Clone, PartialEq)]

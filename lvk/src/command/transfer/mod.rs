@@ -3,9 +3,9 @@
 mod blit;
 mod buffer;
 mod clear;
+mod make_visible;
 mod release_texture;
 mod resolve;
-mod settle;
 mod texture;
 
 use std::sync::Arc;
@@ -20,7 +20,7 @@ use crate::resource::region::Region;
 
 pub use buffer::BufferCopy;
 pub use clear::ClearValue;
-pub(super) use settle::Settle;
+pub(super) use make_visible::Settle;
 
 /// Layout of an image that is copied from.
 const SOURCE: vk::ImageLayout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;

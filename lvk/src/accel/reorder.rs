@@ -4,8 +4,8 @@
 //! on: the tree is as good as the order. So the order is made by that very tree, top down, each node by its cheapest
 //! cut. Builders that sort gain nothing.
 
-use super::bounds::Bounds;
-use super::cut::{Item, cut, items};
+use super::partition::{Item, cut, items};
+use super::primitive_bounds::Bounds;
 use crate::threads::{cores, share_out};
 
 /// Another order is worth its number map and its time if its tree costs this many times less than the given one.

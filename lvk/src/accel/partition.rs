@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use super::bounds::Bounds;
+use super::primitive_bounds::Bounds;
 
 /// A primitive on its way through the cuts.
 #[derive(Debug, Clone, Copy)]

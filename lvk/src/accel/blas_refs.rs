@@ -4,9 +4,9 @@ use std::collections::HashMap;
 use std::hash::BuildHasherDefault;
 use std::sync::Arc;
 
+use super::accel_struct::AccelStruct;
 use super::blas::BlasBody;
 use super::flags::BuildFlags;
-use super::structure::AccelStruct;
 use crate::barrier::IdHasher;
 use crate::error::Result;
 use crate::handle::AccelStructHandle;
@@ -306,9 +306,9 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::accel::accel_struct::AccelKind;
     use crate::accel::blas::Blas;
     use crate::accel::flags::AccelStructSizes;
-    use crate::accel::structure::AccelKind;
     use crate::store::Pool;
 
     type Structures = Pool<AccelStructHandle, AccelStruct>;

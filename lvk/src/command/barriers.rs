@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::CommandBuffer;
+use super::accesses::Uses;
 use super::dependencies::Dependencies;
-use super::notes::Notes;
-use super::uses::Uses;
+use super::recording_state::Notes;
 use crate::barrier::{ResourceId, Stages, Subresources, Use};
 use crate::error::Result;
 use crate::handle::{BufferHandle, TextureHandle};

@@ -7,14 +7,14 @@ use ash::khr::acceleration_structure::Device as ExtDevice;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::queue_check::BUILD;
+use super::queue_support::BUILD;
 use super::software::{SoftwareWork, check_placed};
 use crate::accel::AccelStruct;
+use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::{Blas, BlasBody, PartShape};
 use crate::accel::build::BuildInput;
 use crate::accel::flags::BuildMode;
 use crate::accel::scratch::{ScratchBatch, aligned_scratch_address, plan_scratch};
-use crate::accel::structure::AccelKind;
 use crate::barrier::Use;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;

@@ -5,10 +5,12 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::attachment::{ColorAttachment, ColorLoadOp, DepthAttachment, DepthLoadOp, Resolve, StencilLoadOp};
+use super::attachment_desc::{
+    ColorAttachment, ColorLoadOp, DepthAttachment, DepthLoadOp, Resolve, StencilLoadOp,
+};
 use super::local_read::PassInputs;
 use super::pass_area::{PassArea, PassLayers};
-use super::render_pass::RenderPassDesc;
+use super::render_pass_desc::RenderPassDesc;
 use crate::barrier::{Subresources, Use};
 use crate::error::{Error, Result, check_limit};
 use crate::format::{Format, Numbers};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::part_uses::{PartUse, PartUses};
+use super::subresource_accesses::{PartUse, PartUses};
 use crate::barrier::{Barriers, IdMap, ResourceId, Subresources, Tracker, Use};
 use crate::error::{Error, Result};
 use crate::found::Found;

@@ -6,15 +6,15 @@ use std::sync::{Arc, OnceLock};
 use super::CommandBuffer;
 use super::transfer::BufferCopy;
 use crate::accel::AccelStruct;
+use crate::accel::blas_refs::{Marks, Shown, ShownSet};
 use crate::accel::build::instance_bytes;
 use crate::accel::flags::BuildFlags;
 use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance};
 use crate::accel::instance_plan::{
     Addresses, InstancePlan, PlanMemory, starts_plain, write_addresses, write_alike,
 };
-use crate::accel::shown::{Marks, Shown, ShownSet};
 use crate::accel::tlas::{InstanceSource, Numbers, SourceBytes, Tlas};
-use crate::accel::tlas_updates::Change;
+use crate::accel::tlas_tracker::Change;
 use crate::barrier::{Stages, Use};
 use crate::error::{Error, Result};
 use crate::kernel::{InstancesPush, Kernel};

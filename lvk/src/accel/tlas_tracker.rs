@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::AccelStruct;
+use super::blas_refs::{Revision, ShownSet};
 use super::instance_plan::PlanMemory;
-use super::shown::{Revision, ShownSet};
 use super::tlas::{InstanceSource, Tlas, TlasContents};
 use crate::error::{Error, Result};
 use crate::found::Found;
@@ -262,9 +262,9 @@ impl TlasUpdates {
 mod tests {
     use std::sync::Weak;
 
-    use super::super::flags::{AccelStructSizes, BuildFlags, BuildMode};
-    use super::super::structure::AccelKind;
     use super::*;
+    use crate::accel::accel_struct::AccelKind;
+    use crate::accel::flags::{AccelStructSizes, BuildFlags, BuildMode};
 
     fn structure() -> Arc<AccelStruct> {
         let kind = AccelKind::Tlas(Tlas::new(0, 4, 4, None, None));

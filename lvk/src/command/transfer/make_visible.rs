@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use crate::barrier::{Layout, Stages, Use};
 use crate::command::CommandBuffer;
-use crate::command::notes::Notes;
-use crate::command::queue_check::on_lane;
+use crate::command::queue_support::on_lane;
+use crate::command::recording_state::Notes;
 use crate::resource::texture_desc::TextureUsage;
 use crate::resource::{Buffer, Texture};
 use crate::submit::Recording;

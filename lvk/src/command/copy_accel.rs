@@ -9,7 +9,7 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::BlasBody;
 use crate::accel::compaction::SizeQuery;
 use crate::accel::primitive_map::PrimitiveMap;
-use crate::accel::raw_structure::RawStructure;
+use crate::accel::raw_accel_struct::RawStructure;
 use crate::barrier::{Stages, Use};
 use crate::error::Result;
 use crate::resource::{Buffer, QueryPool};

@@ -5,15 +5,15 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::accel::OpenBuild;
+use super::accesses::Uses;
 use super::bind::PushConstants;
-use super::query_log::QueryLog;
+use super::build_blas::OpenBuild;
+use super::query_usage::QueryLog;
 use super::transfer::Settle;
-use super::uses::Uses;
 use crate::accel::AccelStruct;
-use crate::accel::build_run::BuildRun;
+use crate::accel::build_overlap::BuildRun;
 use crate::accel::compaction::SizeQuery;
-use crate::accel::tlas_updates::TlasUpdates;
+use crate::accel::tlas_tracker::TlasUpdates;
 use crate::barrier::{Barriers, ResourceId};
 use crate::found::Found;
 use crate::handle::{BufferHandle, TextureHandle};

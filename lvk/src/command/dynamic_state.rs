@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use super::render::RenderPass;
+use super::render_pass::RenderPass;
 use crate::error::{Error, Result};
 use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::gpu::caps::shading_rate::ShadingRate;
