@@ -116,7 +116,7 @@ mod pipeline;
 mod resource;
 mod shader;
 mod shared;
-mod software;
+pub(crate) mod software_ray_query;
 mod store;
 mod submit;
 mod swapchain;

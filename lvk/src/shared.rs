@@ -11,7 +11,6 @@ use crate::accel::blas::BlasBody;
 use crate::accel::blas_refs::Revision;
 use crate::accel::compaction::SizeQuery;
 use crate::accel::scratch_buffer::ScratchBuffer;
-use crate::accel::software::body::SoftwareBody;
 use crate::accel::storage::AccelStorage;
 use crate::accel::tlas::TlasContents;
 use crate::accel::tlas_tracker::TlasUpdates;
@@ -28,7 +27,8 @@ use crate::pipeline::{
 };
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::shader::ShaderCache;
-use crate::software::tree_cache::TreeCache;
+use crate::software_ray_query::bvh_cache::TreeCache;
+use crate::software_ray_query::storage::SoftwareBody;
 use crate::store::Store;
 use crate::submit::profiler::Profiler;
 use crate::submit::{Finished, Submitter};

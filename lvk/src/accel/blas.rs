@@ -6,9 +6,9 @@ use super::flags::AccelStructSizes;
 use super::geometry::BlasGeometry;
 use super::primitive_map::PrimitiveMap;
 use super::raw_accel_struct::RawStructure;
-use crate::accel::software::blas::SoftwareBlas;
 use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
+use crate::software_ray_query::blas::SoftwareBlas;
 
 /// What a bottom-level structure is built from, and what was built.
 pub(crate) struct Blas {

@@ -22,7 +22,6 @@ pub(crate) mod reorder;
 pub(crate) mod scratch;
 pub(crate) mod scratch_buffer;
 mod size_model;
-pub(crate) mod software;
 pub(crate) mod split;
 pub(crate) mod storage;
 pub(crate) mod tlas;

@@ -4,10 +4,10 @@ use std::sync::{Arc, OnceLock};
 
 use super::blas_refs::{Revision, ShownSet};
 use super::raw_accel_struct::RawStructure;
-use crate::accel::software::tlas::SoftwareTlas;
 use crate::error::{Result, check_limit};
 use crate::lock::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
+use crate::software_ray_query::tlas::SoftwareTlas;
 
 /// A top-level structure.
 pub(crate) struct Tlas {

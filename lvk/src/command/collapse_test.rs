@@ -2,15 +2,15 @@
 
 use std::sync::Arc;
 
-use crate::accel::software::layout::LeafKind;
-use crate::accel::software::plan::{BlasShape, BuildSource, GpuBuildPlan};
 use crate::barrier::{Stages, Use};
 use crate::command::CommandBuffer;
 use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::resource::Buffer;
-use crate::software::gpu_build::collapse::{Below, BinaryTree, WideChild, WideTree};
-use crate::software::gpu_build::steps::wide_steps;
+use crate::software_ray_query::gpu_build::collapse::{Below, BinaryTree, WideChild, WideTree};
+use crate::software_ray_query::gpu_build::layout::{BlasShape, BuildSource, GpuBuildPlan};
+use crate::software_ray_query::gpu_build::steps::wide_steps;
+use crate::software_ray_query::layout::LeafKind;
 
 /// Words of the state, as `kernel/build/job.glsl` numbers them.
 const ACTIVE: usize = 6;

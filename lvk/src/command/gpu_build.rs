@@ -6,15 +6,15 @@ use ash::vk;
 
 use super::CommandBuffer;
 use crate::accel::scratch::{aligned_scratch_address, plan_scratch};
-use crate::accel::software::geometry::GpuGeometry;
-use crate::accel::software::job::{BuildPush, Job};
-use crate::accel::software::plan::{BuildSource, GpuBuildPlan};
-use crate::accel::software::refit_plan::GpuRefitPlan;
 use crate::barrier::{Stages, Use};
 use crate::error::Result;
 use crate::kernel::spread;
 use crate::resource::Buffer;
-use crate::software::gpu_build::steps::{Step, build_steps, refit_steps};
+use crate::software_ray_query::gpu_build::geometry::GpuGeometry;
+use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan};
+use crate::software_ray_query::gpu_build::params::{BuildPush, Job};
+use crate::software_ray_query::gpu_build::refit_layout::GpuRefitPlan;
+use crate::software_ray_query::gpu_build::steps::{Step, build_steps, refit_steps};
 
 #[cfg(feature = "test-hooks")]
 #[path = "collapse_test.rs"]

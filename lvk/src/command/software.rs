@@ -11,20 +11,20 @@ use crate::accel::blas::Blas;
 use crate::accel::blas_refs::{Shown, ShownSet};
 use crate::accel::build::instance_bytes;
 use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance, check, pack};
-use crate::accel::software::blas::{Origin, SoftwareBlas};
-use crate::accel::software::body::SoftwareBody;
-use crate::accel::software::geometry::{GpuGeometry, gpu_geometries};
-use crate::accel::software::layout::{MOVED, MovedHeader};
-use crate::accel::software::plan::{BuildSource, GpuBuildPlan};
-use crate::accel::software::refit_plan::GpuRefitPlan;
-use crate::accel::software::tlas::SoftwareTlas;
+use crate::software_ray_query::blas::{Origin, SoftwareBlas};
+use crate::software_ray_query::gpu_build::geometry::{GpuGeometry, gpu_geometries};
+use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan};
+use crate::software_ray_query::gpu_build::refit_layout::GpuRefitPlan;
+use crate::software_ray_query::layout::{MOVED, MovedHeader};
+use crate::software_ray_query::storage::SoftwareBody;
+use crate::software_ray_query::tlas::SoftwareTlas;
 
 use crate::barrier::{ResourceId, Stages, Use};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
-use crate::software::instances::{PlacedInstance, ShownStructure, place};
-use crate::software::tlas_blob;
+use crate::software_ray_query::bvh::encode_instances::{PlacedInstance, ShownStructure, place};
+use crate::software_ray_query::bvh::encode_tlas;
 
 /// So many instances the CPU builds a tree over that is worth more than its time. A driver that runs on the CPU has no
 /// faster builds.
@@ -237,7 +237,7 @@ impl CommandBuffer {
         if (shared.gpu.caps.is_cpu || instances.len() <= MOST_ON_CPU)
             && let Some(placed) = self.place_instances(target, instances)?
         {
-            let bytes = tlas_blob::build(&placed, software.room);
+            let bytes = encode_tlas::build(&placed, software.room);
             self.rely_on_places(instances)?;
             return self.fill_software(target, shared.all_tlas, &software.body, &bytes);
         }

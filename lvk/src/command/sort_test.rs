@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::accel::software::job::Job;
 use crate::barrier::{Stages, Use};
 use crate::command::CommandBuffer;
 use crate::error::Result;
 use crate::resource::Buffer;
-use crate::software::gpu_build::steps::sort_steps;
+use crate::software_ray_query::gpu_build::params::Job;
+use crate::software_ray_query::gpu_build::steps::sort_steps;
 
 /// Keys on their way through the kernels, in memory that starts where a build has its scratch memory.
 pub(crate) struct Sorter<'a> {

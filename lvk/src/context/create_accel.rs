@@ -15,10 +15,6 @@ use crate::accel::desc::{BlasDesc, TlasDesc};
 use crate::accel::flags::{AccelStructSizes, BuildMode};
 use crate::accel::instance_plan::{InstancePlan, PlanMemory};
 use crate::accel::raw_accel_struct::RawStructure;
-use crate::accel::software::blas::SoftwareBlas;
-use crate::accel::software::body::SoftwareBody;
-use crate::accel::software::plan::GpuBuildPlan;
-use crate::accel::software::tlas::SoftwareTlas;
 use crate::accel::split::PartLimits;
 use crate::accel::tlas::Tlas;
 use crate::command::queue_support::{BUILD, needs_compute};
@@ -29,7 +25,11 @@ use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::shared::Shared;
-use crate::software::opening::room;
+use crate::software_ray_query::blas::SoftwareBlas;
+use crate::software_ray_query::bvh::rebraid::room;
+use crate::software_ray_query::gpu_build::layout::GpuBuildPlan;
+use crate::software_ray_query::storage::SoftwareBody;
+use crate::software_ray_query::tlas::SoftwareTlas;
 use crate::submit::SubmitHandle;
 
 impl Context {

@@ -30,7 +30,7 @@ use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::shader::ShaderCache;
 use crate::shared::Shared;
-use crate::software::tree_cache::TreeCache;
+use crate::software_ray_query::bvh_cache::TreeCache;
 use crate::store::Store;
 use crate::submit::Submitter;
 use crate::submit::profiler::Profiler;

@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::format::IndexFormat;
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;
-use crate::software::mesh::GeometryBytes;
+use crate::software_ray_query::bvh::primitives::GeometryBytes;
 
 /// Most bytes read back at once: inputs of a whole scene may be more than there is readback memory for.
 const READ_AT_ONCE: u64 = 64 << 20;

@@ -11,19 +11,21 @@ use crate::accel::AccelStruct;
 use crate::accel::blas::{Blas, BlasBody};
 use crate::accel::blas_file::Blob;
 use crate::accel::desc::BlasDesc;
-use crate::accel::software::blas::{Origin, SoftwareBlas, body_bytes, builds_on_gpu, gpu_plan, refit_plan};
-use crate::accel::software::body::SoftwareBody;
-use crate::accel::software::parts::Parts;
 use crate::command::transfer::BufferCopy;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::shared::Garbage;
-use crate::software::blas_blob::{self, BlasBlob};
-use crate::software::mesh::Mesh;
-use crate::software::parts::parts;
-use crate::software::quality::Quality;
-use crate::software::sound::{self, Expected};
-use crate::software::tree_cache::TreeKey;
+use crate::software_ray_query::blas::{
+    Origin, SoftwareBlas, body_bytes, builds_on_gpu, gpu_plan, refit_plan,
+};
+use crate::software_ray_query::bvh::encode_blas::{self, BlasBlob};
+use crate::software_ray_query::bvh::primitives::Mesh;
+use crate::software_ray_query::bvh::settings::Quality;
+use crate::software_ray_query::bvh::subtrees::parts;
+use crate::software_ray_query::bvh_cache::TreeKey;
+use crate::software_ray_query::rebraid_parts::Parts;
+use crate::software_ray_query::storage::SoftwareBody;
+use crate::software_ray_query::validate_blob::{self, Expected};
 use crate::threads::make_all;
 
 /// Stands in front of structures that no driver wrote; as long as what drivers begin with.
@@ -50,7 +52,7 @@ impl Context {
 
     /// The structure of a mesh, of an earlier run where trees are kept.
     fn built(&self, mesh: &Mesh, quality: Quality) -> BlasBlob {
-        let build = || blas_blob::build(mesh, quality);
+        let build = || encode_blas::build(mesh, quality);
         match &self.shared().tree_cache {
             Some(cache) => {
                 let expected = Expected::of_mesh(mesh);
@@ -119,7 +121,7 @@ impl Context {
             _ => None,
         };
         let bytes = bytes.ok_or_else(|| reject("a driver or another version of the library wrote it"))?;
-        let sound = sound::check(bytes, &Expected::of_desc(desc)).map_err(reject)?;
+        let sound = validate_blob::check(bytes, &Expected::of_desc(desc)).map_err(reject)?;
         let built = BlasBlob { bytes: bytes.to_vec(), bounds: sound.bounds };
         let software = self.software_blas(desc, Some(&built))?;
         let body = BlasBody { structures: Vec::new(), compacted_from: None, rebuildable: true };

@@ -6,10 +6,6 @@ use std::sync::Arc;
 
 use super::Context;
 use crate::accel::geometry::BlasGeometry;
-use crate::accel::software::geometry::gpu_geometries;
-use crate::accel::software::layout::{DEEPEST_WIDE, LeafKind};
-use crate::accel::software::plan::{BlasShape, BlobPlaces, BuildSource, GpuBuildPlan};
-use crate::accel::software::refit_plan::{GpuRefitPlan, NodeFormat};
 use crate::command::gpu_build::{GpuBuild, GpuRefit};
 use crate::context::config::ContextDesc;
 use crate::context::holder::Holder;
@@ -20,10 +16,14 @@ use crate::handle::{BufferHandle, SwapchainHandle};
 use crate::kernel::Kernel;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage};
-pub use crate::software::gpu_build::check::{Bounds, EMPTY, Facts, check_structure};
-pub use crate::software::gpu_build::collapse::{
+pub use crate::software_ray_query::gpu_build::check::{Bounds, EMPTY, Facts, check_structure};
+pub use crate::software_ray_query::gpu_build::collapse::{
     Below, BinaryChild, BinaryTree, WideChild, WideTree, any_tree,
 };
+use crate::software_ray_query::gpu_build::geometry::gpu_geometries;
+use crate::software_ray_query::gpu_build::layout::{BlasShape, BlobPlaces, BuildSource, GpuBuildPlan};
+use crate::software_ray_query::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
+use crate::software_ray_query::layout::{DEEPEST_WIDE, LeafKind};
 use crate::submit::interruption;
 use crate::swapchain::choose::Failure;
 
@@ -290,7 +290,7 @@ fn room(ctx: &Context, plan: &GpuBuildPlan) -> Result<(GpuStructure, Arc<Buffer>
 fn read_geometries(
     ctx: &Context,
     geometries: &[BlasGeometry],
-) -> Result<Vec<crate::accel::software::geometry::GpuGeometry>> {
+) -> Result<Vec<crate::software_ray_query::gpu_build::geometry::GpuGeometry>> {
     gpu_geometries("test", geometries, &|handle| ctx.shared().store.buffers.get(handle), None)
 }
 

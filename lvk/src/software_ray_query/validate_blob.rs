@@ -3,13 +3,14 @@
 
 use std::ops::Range;
 
-use super::mesh::{Mesh, Primitives};
-use super::{binary_tree, wide_tree};
+use super::bvh::bvh2;
+use super::bvh::bvh8;
+use super::bvh::primitives::{Mesh, Primitives};
 use crate::accel::desc::BlasDesc;
 use crate::accel::geometry::BlasGeometry;
 use crate::accel::primitive_bounds::Bounds;
-use crate::accel::software::layout::LeafKind;
-use crate::accel::software::layout::{
+use crate::software_ray_query::layout::LeafKind;
+use crate::software_ray_query::layout::{
     BINARY, BLOCK_BYTES, BinaryNode, Header, LeafBox, LeafIndexed, LeafPacked, NONE, WIDE,
 };
 
@@ -156,9 +157,9 @@ fn tree_is_sound(parts: &Parts<'_>, header: &Header) -> bool {
     let primitives = header.primitive_count as usize;
     match (header.root, header.node_count) {
         (NONE, 0) => primitives == 0,
-        (root, 0) => binary_tree::names_primitives(root, primitives),
-        (0, _) if header.format == WIDE => wide_tree::is_sound(&parts.nodes(), primitives),
-        (0, _) => binary_tree::is_sound(&parts.nodes(), primitives),
+        (root, 0) => bvh2::names_primitives(root, primitives),
+        (0, _) if header.format == WIDE => bvh8::is_sound(&parts.nodes(), primitives),
+        (0, _) => bvh2::is_sound(&parts.nodes(), primitives),
         _ => false,
     }
 }
@@ -217,11 +218,11 @@ mod tests {
     use glam::Vec3;
     use proptest::prelude::*;
 
-    use super::super::blas_blob;
-    use super::super::quality::Quality;
     use super::*;
     use crate::accel::geometry::GeometryFlags;
-    use crate::accel::software::layout::{LEAF, LeafTriangle, MOVED, leaf};
+    use crate::software_ray_query::bvh::encode_blas;
+    use crate::software_ray_query::bvh::settings::Quality;
+    use crate::software_ray_query::layout::{LEAF, LeafTriangle, MOVED, leaf};
 
     const SMALL: Quality = Quality { low_memory: true, refit: false };
     const MOVING: Quality = Quality { low_memory: false, refit: true };
@@ -268,7 +269,7 @@ mod tests {
     fn built_binary(mesh: &Mesh, quality: Quality) -> (Vec<u8>, Expected) {
         let bounds = mesh.bounds();
         let whole = bounds.iter().fold(Bounds::EMPTY, |all, one| all.union(*one));
-        let bytes = blas_blob::pack(&told(mesh, quality), &binary_tree::build(&bounds, 3), quality, whole);
+        let bytes = encode_blas::pack(&told(mesh, quality), &bvh2::build(&bounds, 3), quality, whole);
         let expected = Expected::of_mesh(mesh);
         check(&bytes, &expected).unwrap();
         (bytes, expected)
@@ -280,7 +281,7 @@ mod tests {
 
     /// A sound structure with what it is to be of.
     fn built(mesh: &Mesh, quality: Quality) -> (Vec<u8>, Expected) {
-        let blob = blas_blob::build(&told(mesh, quality), quality);
+        let blob = encode_blas::build(&told(mesh, quality), quality);
         let expected = Expected::of_mesh(mesh);
         check(&blob.bytes, &expected).unwrap();
         (blob.bytes, expected)
@@ -332,8 +333,8 @@ mod tests {
     /// anything else.
     fn walk(bytes: &[u8]) -> usize {
         let bounds = Bounds { low: Vec3::splat(-9.0), high: Vec3::splat(9.0) };
-        let blob = blas_blob::BlasBlob { bytes: bytes.to_vec(), bounds };
-        for part in &super::super::parts::parts(&blob).parts {
+        let blob = encode_blas::BlasBlob { bytes: bytes.to_vec(), bounds };
+        for part in &crate::software_ray_query::bvh::subtrees::parts(&blob).parts {
             walk_from(bytes, part.reference);
         }
         walk_from(bytes, header(bytes).root)

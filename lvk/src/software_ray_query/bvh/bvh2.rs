@@ -1,8 +1,8 @@
 //! Binary trees by binned surface area, never deeper than the walk's stack.
 
-use super::tree::{Nodes, Tree};
+use super::mesh_bvh::{Nodes, Tree};
 use crate::accel::primitive_bounds::Bounds;
-use crate::accel::software::layout::{BinaryNode, DEEPEST_BINARY, LARGEST_LEAF, LEAF, NONE, leaf};
+use crate::software_ray_query::layout::{BinaryNode, DEEPEST_BINARY, LARGEST_LEAF, LEAF, NONE, leaf};
 
 const BINS: usize = 16;
 /// From here on halves have the same number of primitives, so that at most 27 levels follow.
@@ -166,7 +166,7 @@ fn partition(numbers: &mut [u32], first: impl Fn(&u32) -> bool) -> usize {
 
 /// Whether every path from the first node ends in primitives that exist, none is too long, no two meet, and all nodes are
 /// on one. Nodes stand in any order.
-pub(super) fn is_sound(nodes: &[BinaryNode], primitives: usize) -> bool {
+pub(crate) fn is_sound(nodes: &[BinaryNode], primitives: usize) -> bool {
     let mut seen = vec![false; nodes.len()];
     let mut open = vec![(0_u32, 1_usize)];
     while let Some((place, depth)) = open.pop() {
@@ -186,7 +186,7 @@ pub(super) fn is_sound(nodes: &[BinaryNode], primitives: usize) -> bool {
 }
 
 /// Whether a reference to a leaf names primitives that exist.
-pub(super) fn names_primitives(reference: u32, primitives: usize) -> bool {
+pub(crate) fn names_primitives(reference: u32, primitives: usize) -> bool {
     let (first, count) = (reference & 0x07ff_ffff, (reference >> 27 & 15) + 1);
     reference & LEAF != 0 && first as usize + count as usize <= primitives
 }

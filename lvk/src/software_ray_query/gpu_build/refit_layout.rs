@@ -2,9 +2,9 @@
 
 use bytemuck::Zeroable;
 
-use super::job::Job;
-use super::layout::{BLOCK_BYTES, LeafKind};
-use super::plan::{BlobPlaces, GpuBuildPlan};
+use super::layout::{BlobPlaces, GpuBuildPlan};
+use super::params::Job;
+use crate::software_ray_query::layout::{BLOCK_BYTES, LeafKind};
 
 const ARRIVAL_BYTES: u64 = 4;
 const PARENT_BYTES: u64 = 4;

@@ -6,11 +6,11 @@ use std::collections::BinaryHeap;
 use glam::{UVec3, Vec3};
 use obvhs::cwbvh::node::CwBvhNode;
 
-use super::blas_blob::BlasBlob;
-use super::wide_tree::children;
+use super::bvh8::children;
+use super::encode_blas::BlasBlob;
 use crate::accel::primitive_bounds::Bounds;
-use crate::accel::software::layout::{BLOCK_BYTES, WIDE, leaf};
-use crate::accel::software::parts::{Part, Parts};
+use crate::software_ray_query::layout::{BLOCK_BYTES, WIDE, leaf};
+use crate::software_ray_query::rebraid_parts::{Part, Parts};
 
 /// Parts that are kept of a structure, 36 bytes each.
 const MOST_PARTS: usize = 64;
@@ -78,13 +78,13 @@ fn child_bounds(node: &CwBvhNode, child: usize) -> Bounds {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
-    use super::super::blas_blob;
-    use super::super::mesh::{Mesh, Primitives};
-    use super::super::quality::Quality;
+pub(crate) mod tests {
     use super::*;
     use crate::accel::geometry::GeometryFlags;
-    use crate::accel::software::layout::{Header, LEAF, LeafBox};
+    use crate::software_ray_query::bvh::encode_blas;
+    use crate::software_ray_query::bvh::primitives::{Mesh, Primitives};
+    use crate::software_ray_query::bvh::settings::Quality;
+    use crate::software_ray_query::layout::{Header, LEAF, LeafBox};
 
     const QUALITY: Quality = Quality { low_memory: false, refit: false };
 
@@ -94,7 +94,7 @@ pub(super) mod tests {
             |(primitive, of): (u32, &Bounds)| LeafBox { low: of.low, primitive, high: of.high, geometry: 0 };
         let primitives = Primitives::Boxes((0..).zip(boxes).map(place).collect());
         let mesh = Mesh { primitives, vertices: Vec::new(), flags: vec![GeometryFlags::empty()] };
-        let blob = blas_blob::build(&mesh, QUALITY);
+        let blob = encode_blas::build(&mesh, QUALITY);
         let parts = parts(&blob);
         (blob.bytes, parts)
     }

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::body::SoftwareBody;
-use super::plan::GpuBuildPlan;
+use super::gpu_build::layout::GpuBuildPlan;
+use super::storage::SoftwareBody;
 use crate::accel::flags::AccelStructSizes;
 
 /// What stands behind the handle of a top-level structure for software to trace. Every update is a build.

@@ -1,7 +1,7 @@
 //! How a binary tree becomes a wide one, as `kernel/build/collapse.glsl` does it: what tests hold the kernel against.
 
 use super::check::Bounds;
-use crate::accel::software::layout::DEEPEST_WIDE;
+use crate::software_ray_query::layout::DEEPEST_WIDE;
 
 const CHILDREN: u32 = 8;
 const MOST_OF_GROUP: u32 = 3;

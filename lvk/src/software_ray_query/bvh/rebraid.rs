@@ -4,9 +4,9 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::instances::{PlacedInstance, moved_bounds};
+use super::encode_instances::{PlacedInstance, moved_bounds};
 use crate::accel::primitive_bounds::Bounds;
-use crate::accel::software::parts::Part;
+use crate::software_ray_query::rebraid_parts::Part;
 
 /// More instances are shown whole: to look at them in pairs would take too long.
 const MOST_INSTANCES: u32 = 512;
@@ -29,8 +29,8 @@ struct Shown<'a> {
 
 /// Takes the largest of what overlaps others apart, where its parts leave room empty, until there are as many records as
 /// these instances may make, or the next would make more than `room`.
-pub(super) fn open<'a>(instances: &'a [PlacedInstance], room: usize) -> Vec<PlacedInstance> {
-    let most = room.min(self::room(instances.len() as u32) as usize);
+pub(crate) fn open<'a>(instances: &'a [PlacedInstance], room: usize) -> Vec<PlacedInstance> {
+    let most = room.min(crate::software_ray_query::bvh::rebraid::room(instances.len() as u32) as usize);
     if most <= instances.len() {
         return instances.to_vec();
     }
@@ -104,11 +104,11 @@ mod tests {
     use glam::{Affine3A, Quat, Vec3};
     use proptest::prelude::*;
 
-    use super::super::instances::{ShownStructure, place};
-    use super::super::parts::tests::{primitives, row, structure};
     use super::*;
     use crate::accel::instance::{TlasInstance, transform_rows};
     use crate::handle::{AccelStructHandle, Handle};
+    use crate::software_ray_query::bvh::encode_instances::{ShownStructure, place};
+    use crate::software_ray_query::bvh::subtrees::tests::{primitives, row, structure};
 
     /// Instances of one structure of 300 boxes.
     fn placed(transforms: &[Affine3A]) -> (Vec<u8>, Vec<PlacedInstance>) {

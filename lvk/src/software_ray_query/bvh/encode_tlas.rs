@@ -1,12 +1,12 @@
 //! The bytes of a top-level structure that the CPU builds. They fit wherever a build on the GPU of as many records would.
 
-use super::binary_tree;
-use super::instances::PlacedInstance;
-use super::opening::open;
-use super::tree::Nodes;
+use super::bvh2;
+use super::encode_instances::PlacedInstance;
+use super::mesh_bvh::Nodes;
+use super::rebraid::open;
 use crate::accel::primitive_bounds::Bounds;
-use crate::accel::software::layout::LeafKind;
-use crate::accel::software::layout::{BINARY, BLOCK_BYTES, BinaryNode, Header, Instance, NONE};
+use crate::software_ray_query::layout::LeafKind;
+use crate::software_ray_query::layout::{BINARY, BLOCK_BYTES, BinaryNode, Header, Instance, NONE};
 
 /// Builds a tree over the instances, or parts of them where there is room for so many records, and packs it.
 pub(crate) fn build(instances: &[PlacedInstance], room: u32) -> Vec<u8> {
@@ -23,7 +23,7 @@ pub(crate) fn build(instances: &[PlacedInstance], room: u32) -> Vec<u8> {
     }
     let records = open(instances, room as usize);
     let bounds: Vec<Bounds> = records.iter().map(|placed| placed.bounds).collect();
-    let tree = binary_tree::build(&bounds, 1);
+    let tree = bvh2::build(&bounds, 1);
     let whole = bounds.into_iter().fold(Bounds::EMPTY, Bounds::union);
     let nodes: &[BinaryNode] = match &tree.nodes {
         Nodes::Binary(nodes) => nodes,

@@ -20,7 +20,7 @@ impl Quality {
     }
 
     /// Whether leaves may only share what the caller does: a refit may move each of its vertices elsewhere.
-    pub(super) fn shares_as_given(self) -> bool {
+    pub(crate) fn shares_as_given(self) -> bool {
         self.low_memory && self.refit
     }
 }

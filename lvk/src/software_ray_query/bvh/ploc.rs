@@ -10,7 +10,7 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
 
-use super::threads::Build;
+use super::thread_budget::Build;
 use crate::accel::primitive_bounds::Bounds;
 use crate::threads::share_out;
 
@@ -24,7 +24,7 @@ const FEWEST: usize = 32;
 const LAST: usize = 32;
 
 /// A tree of boxes, at least one, with one in each leaf.
-pub(super) fn build(boxes: &[Bounds]) -> Bvh2 {
+pub(crate) fn build(boxes: &[Bounds]) -> Bvh2 {
     cluster(boxes).0
 }
 

@@ -3,13 +3,13 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
-use super::body::SoftwareBody;
-use super::geometry::vertex_count;
+use super::gpu_build::geometry::vertex_count;
+use super::gpu_build::layout::{BlasShape, BlobPlaces, GpuBuildPlan, VERTEX_BYTES};
+use super::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
 use super::layout::Header;
 use super::layout::LeafKind;
-use super::parts::Parts;
-use super::plan::{BlasShape, BlobPlaces, GpuBuildPlan, VERTEX_BYTES};
-use super::refit_plan::{GpuRefitPlan, NodeFormat};
+use super::rebraid_parts::Parts;
+use super::storage::SoftwareBody;
 use crate::accel::desc::BlasDesc;
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
 use crate::accel::geometry::BlasGeometry;

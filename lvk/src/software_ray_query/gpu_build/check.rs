@@ -2,7 +2,7 @@
 
 use std::fmt::Debug;
 
-use crate::software::mesh::FARTHEST;
+use crate::software_ray_query::bvh::primitives::FARTHEST;
 
 /// Smallest corner, largest corner.
 pub type Bounds = [[f32; 3]; 2];

@@ -6,8 +6,8 @@ use glam::{DAffine3, DMat3, DVec3, Vec3, Vec3Swizzles};
 
 use crate::accel::instance::TlasInstance;
 use crate::accel::primitive_bounds::Bounds;
-use crate::accel::software::layout::Instance;
-use crate::accel::software::parts::Parts;
+use crate::software_ray_query::layout::Instance;
+use crate::software_ray_query::rebraid_parts::Parts;
 
 /// What an instance shows.
 #[derive(Debug, Clone, PartialEq)]
@@ -59,7 +59,7 @@ fn is_singular(matrix: &DMat3) -> bool {
 }
 
 /// Around a box of the object as rows of a matrix move it, as [`place`] does it for the whole.
-pub(super) fn moved_bounds(object_to_world: &[f32; 12], bounds: Bounds) -> Bounds {
+pub(crate) fn moved_bounds(object_to_world: &[f32; 12], bounds: Bounds) -> Bounds {
     moved(&matrix(object_to_world), bounds)
 }
 

@@ -1,9 +1,9 @@
 //! Which kernels run in which order, and which of them side by side.
 
-use crate::accel::software::layout::{DEEPEST_WIDE, LeafKind};
-use crate::accel::software::plan::{BuildSource, GpuBuildPlan, SORT_BLOCK};
-use crate::accel::software::refit_plan::{GpuRefitPlan, NodeFormat};
 use crate::kernel::Kernel;
+use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan, SORT_BLOCK};
+use crate::software_ray_query::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
+use crate::software_ray_query::layout::{DEEPEST_WIDE, LeafKind};
 
 /// Invocations of a workgroup, `kGroup` of `kernel/build/job.glsl`.
 const GROUP: u32 = 128;
@@ -147,7 +147,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::accel::software::plan::BlasShape;
+    use crate::software_ray_query::gpu_build::layout::BlasShape;
 
     fn plan(primitive_count: u32) -> GpuBuildPlan {
         let shape = BlasShape {

@@ -5,14 +5,14 @@ use std::hash::BuildHasherDefault;
 
 use glam::Vec3;
 
-use super::mesh::Mesh;
-use crate::accel::software::layout::{LeafIndexed, LeafTriangle};
+use super::primitives::Mesh;
 use crate::barrier::IdHasher;
+use crate::software_ray_query::layout::{LeafIndexed, LeafTriangle};
 
 /// Triangles and the vertices they name.
-pub(super) struct Indexed {
-    pub(super) triangles: Vec<LeafIndexed>,
-    pub(super) vertices: Vec<Vec3>,
+pub(crate) struct Indexed {
+    pub(crate) triangles: Vec<LeafIndexed>,
+    pub(crate) vertices: Vec<Vec3>,
 }
 
 /// Most geometries whose numbers fit beside those of primitives.
@@ -22,7 +22,7 @@ const MOST_PRIMITIVES: u32 = 1 << 24;
 
 /// The triangles in this order; `None` where their numbers do not fit. Each position is there once, or each vertex if the mesh
 /// says which are named, and none that is not.
-pub(super) fn indexed(mesh: &Mesh, triangles: &[LeafTriangle], order: &[u32]) -> Option<Indexed> {
+pub(crate) fn indexed(mesh: &Mesh, triangles: &[LeafTriangle], order: &[u32]) -> Option<Indexed> {
     let several = mesh.flags.len() > 1;
     if several
         && (mesh.flags.len() > MOST_GEOMETRIES || triangles.iter().any(|of| of.primitive >= MOST_PRIMITIVES))
@@ -56,9 +56,9 @@ pub(super) fn indexed(mesh: &Mesh, triangles: &[LeafTriangle], order: &[u32]) ->
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::mesh::Primitives;
     use super::*;
     use crate::accel::geometry::GeometryFlags;
+    use crate::software_ray_query::bvh::primitives::Primitives;
 
     /// Triangles of two geometries in turn, each with vertices of its own, some of them in one place.
     fn mesh(named: &[[u8; 3]]) -> Mesh {

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use super::blas_blob::BlasBlob;
-use super::mesh::{Mesh, Primitives};
-use super::quality::Quality;
-use super::sound::{self, Expected};
+use super::bvh::encode_blas::BlasBlob;
+use super::bvh::primitives::{Mesh, Primitives};
+use super::bvh::settings::Quality;
+use super::validate_blob::{self, Expected};
 use crate::disk::{fingerprint, read, replace};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
@@ -94,7 +94,7 @@ fn open(file: &[u8], expected: &Expected) -> Result<BlasBlob, &'static str> {
     if !whole || header[24..] != fingerprint(bytes, 0).to_le_bytes() {
         return Err("it is damaged or cut off");
     }
-    let sound = sound::check(bytes, expected)?;
+    let sound = validate_blob::check(bytes, expected)?;
     Ok(BlasBlob { bytes: bytes.to_vec(), bounds: sound.bounds })
 }
 
@@ -102,10 +102,10 @@ fn open(file: &[u8], expected: &Expected) -> Result<BlasBlob, &'static str> {
 mod tests {
     use glam::Vec3;
 
-    use super::super::blas_blob;
     use super::*;
     use crate::accel::geometry::GeometryFlags;
-    use crate::accel::software::layout::LeafBox;
+    use crate::software_ray_query::bvh::encode_blas;
+    use crate::software_ray_query::layout::LeafBox;
 
     const QUALITY: Quality = Quality { low_memory: false, refit: false };
 
@@ -126,7 +126,7 @@ mod tests {
         let folder = std::env::temp_dir().join(format!("lvk-trees-{}", std::process::id()));
         let cache = TreeCache::new(&folder);
         let (mesh, key) = (mesh(50), TreeKey::of(&mesh(50), QUALITY));
-        let built = blas_blob::build(&mesh, QUALITY);
+        let built = encode_blas::build(&mesh, QUALITY);
         let mut builds = 0;
         let expected = Expected::of_mesh(&mesh);
         let mut get = || {

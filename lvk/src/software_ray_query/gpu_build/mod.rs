@@ -10,4 +10,8 @@ pub(crate) mod check;
 #[cfg(any(test, feature = "test-hooks"))]
 #[cfg_attr(not(feature = "test-hooks"), expect(dead_code, reason = "tests of the workspace ask for more"))]
 pub(crate) mod collapse;
+pub(crate) mod geometry;
+pub(crate) mod layout;
+pub(crate) mod params;
+pub(crate) mod refit_layout;
 pub(crate) mod steps;

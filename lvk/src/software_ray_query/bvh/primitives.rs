@@ -2,10 +2,10 @@
 
 use glam::Vec3;
 
-use super::quality::Quality;
+use super::settings::Quality;
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::primitive_bounds::{Bounds, BoxBytes, TriangleBytes};
-use crate::accel::software::layout::{LeafBox, LeafTriangle};
+use crate::software_ray_query::layout::{LeafBox, LeafTriangle};
 
 /// Bounds end here: the sums of areas that a build compares still are numbers. Kernels have it in `build/box.glsl`.
 pub(crate) const FARTHEST: f32 = 1e15;

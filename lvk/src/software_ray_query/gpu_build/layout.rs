@@ -1,10 +1,10 @@
 //! How much memory a build on the GPU takes, and where in it everything lies.
 
 use super::geometry::GpuGeometry;
-use super::job::Job;
-use super::layout::{BLOCK_BYTES, LeafKind};
+use super::params::Job;
 use crate::accel::geometry::GeometryFlags;
 use crate::error::{Result, check_limit};
+use crate::software_ray_query::layout::{BLOCK_BYTES, LeafKind};
 
 /// Bytes of the header of a structure.
 pub(crate) const HEADER_BYTES: u64 = 128;

@@ -2,14 +2,14 @@
 
 use glam::Vec3;
 
-use super::mesh::{Mesh, Primitives};
-use super::quality::Quality;
-use super::tree::{Nodes, Tree};
-use super::vertices::{Indexed, indexed};
+use super::indexed_triangles::{Indexed, indexed};
+use super::mesh_bvh::{Nodes, Tree};
+use super::primitives::{Mesh, Primitives};
+use super::settings::Quality;
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::primitive_bounds::Bounds;
-use crate::accel::software::layout::LeafKind;
-use crate::accel::software::layout::{
+use crate::software_ray_query::layout::LeafKind;
+use crate::software_ray_query::layout::{
     BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafIndexed, LeafPacked, LeafTriangle, WIDE,
 };
 
@@ -88,7 +88,7 @@ pub(crate) fn build(mesh: &Mesh, quality: Quality) -> BlasBlob {
     BlasBlob { bytes: pack(mesh, &tree, quality, whole), bounds: whole }
 }
 
-pub(super) fn pack(mesh: &Mesh, tree: &Tree, quality: Quality, bounds: Bounds) -> Vec<u8> {
+pub(crate) fn pack(mesh: &Mesh, tree: &Tree, quality: Quality, bounds: Bounds) -> Vec<u8> {
     let (format, nodes, node_count): (_, &[u8], _) = match &tree.nodes {
         Nodes::Wide(nodes) => (WIDE, bytemuck::cast_slice(nodes), nodes.len()),
         Nodes::Binary(nodes) => (BINARY, bytemuck::cast_slice(nodes), nodes.len()),

@@ -2,10 +2,10 @@
 
 use obvhs::cwbvh::node::CwBvhNode;
 
-use super::binary_tree;
-use super::wide_tree;
+use super::bvh2;
+use super::bvh8;
 use crate::accel::primitive_bounds::Bounds;
-use crate::accel::software::layout::{BinaryNode, NONE, leaf};
+use crate::software_ray_query::layout::{BinaryNode, NONE, leaf};
 
 /// Nodes of either form.
 pub(crate) enum Nodes {
@@ -32,7 +32,7 @@ impl Tree {
                 let order = (0..count as u32).collect();
                 Self { nodes: Nodes::Wide(Vec::new()), root: leaf(0, count), order }
             }
-            _ => wide_tree::build(bounds).unwrap_or_else(|| binary_tree::build(bounds, ONE_LEAF)),
+            _ => bvh8::build(bounds).unwrap_or_else(|| bvh2::build(bounds, ONE_LEAF)),
         }
     }
 }

@@ -8,16 +8,16 @@ use crate::threads::cores;
 static BUILDS: AtomicUsize = AtomicUsize::new(0);
 
 /// A build under way: all of them share the cores.
-pub(super) struct Build(());
+pub(crate) struct Build(());
 
 impl Build {
-    pub(super) fn begin() -> Self {
+    pub(crate) fn begin() -> Self {
         BUILDS.fetch_add(1, Ordering::Relaxed);
         Self(())
     }
 
     /// Threads that so much work is for, the one that has it included.
-    pub(super) fn threads(&self, boxes: usize) -> usize {
+    pub(crate) fn threads(&self, boxes: usize) -> usize {
         /// So many boxes are worth a thread.
         const PER_THREAD: usize = 16_384;
         let worth = boxes / PER_THREAD;

@@ -6,10 +6,10 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::cwbvh::node::CwBvhNode;
 
+use super::mesh_bvh::{Nodes, Tree};
 use super::ploc;
-use super::tree::{Nodes, Tree};
 use crate::accel::primitive_bounds::Bounds;
-use crate::accel::software::layout::{BinaryNode, DEEPEST_WIDE};
+use crate::software_ray_query::layout::{BinaryNode, DEEPEST_WIDE};
 
 /// Most primitives of a leaf: they are counted in three bits, one by one.
 const LARGEST_LEAF: u32 = 3;
@@ -22,7 +22,7 @@ const LEVELS: usize = 7;
 const LOOKS: f32 = 100.0;
 
 /// A wide tree of primitives, at least two; `None` where it would be too deep, or larger than one of two children.
-pub(super) fn build(bounds: &[Bounds]) -> Option<Tree> {
+pub(crate) fn build(bounds: &[Bounds]) -> Option<Tree> {
     let mut binary = ploc::build(bounds);
     let moved = share_moved(&binary);
     ReinsertionOptimizer::default().run(&mut binary, moved, None);
@@ -102,13 +102,13 @@ fn depth(nodes: &[CwBvhNode]) -> usize {
 }
 
 /// The numbers of a node's inner children.
-pub(super) fn children(node: &CwBvhNode) -> std::ops::Range<u32> {
+pub(crate) fn children(node: &CwBvhNode) -> std::ops::Range<u32> {
     node.child_base_idx..node.child_base_idx.saturating_add(node.imask.count_ones())
 }
 
 /// Whether all children and primitives exist, children behind their parents and each below but one, and no path is too
 /// long.
-pub(super) fn is_sound(nodes: &[CwBvhNode], primitives: usize) -> bool {
+pub(crate) fn is_sound(nodes: &[CwBvhNode], primitives: usize) -> bool {
     let sound = |(index, node): (usize, &CwBvhNode)| {
         let children = children(node);
         let has_children = !children.is_empty();
