@@ -100,27 +100,27 @@
 mod accel;
 mod barrier;
 mod bindless;
+mod cache_file;
 mod command;
 mod context;
-mod disk;
+mod device_state;
 mod error;
 mod format;
-mod found;
 mod gpu;
 mod handle;
-mod kernel;
-mod leaks;
-mod lock;
+mod handle_cache;
+mod kernels;
+mod leak_report;
+mod lock_order;
 pub mod manual;
+mod parallel;
 mod pipeline;
 mod resource;
 mod shader;
-mod shared;
 pub(crate) mod software_ray_query;
 mod store;
 mod submit;
 mod swapchain;
-mod threads;
 mod upload;
 
 #[cfg(feature = "test-hooks")]

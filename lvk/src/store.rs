@@ -13,7 +13,7 @@ use crate::handle::{
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, SwapchainHandle,
     TextureHandle,
 };
-use crate::lock::{Rank, RwLock};
+use crate::lock_order::{Rank, RwLock};
 use crate::pipeline::{ComputePipeline, RayTracingLibrary, RayTracingPipeline, RenderPipeline, ShaderModule};
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::swapchain::state::Swapchain;

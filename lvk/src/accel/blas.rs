@@ -6,7 +6,7 @@ use super::flags::AccelStructSizes;
 use super::geometry::BlasGeometry;
 use super::primitive_map::PrimitiveMap;
 use super::raw_accel_struct::RawStructure;
-use crate::lock::{Guard, Mutex, Rank};
+use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 use crate::software_ray_query::blas::SoftwareBlas;
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, Weak};
 use super::accel_struct::AccelStruct;
 use super::blas::BlasBody;
 use crate::error::{Error, Result};
-use crate::lock::{Mutex, Rank};
+use crate::lock_order::{Mutex, Rank};
 use crate::resource::QueryPool;
 
 /// All compactions of a context.

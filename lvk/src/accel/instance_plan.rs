@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::blas_refs::{Find, Gather, Marks, Shown, ShownSet};
 use super::instance::{INSTANCE_BYTES, TlasInstance, check, is_right, pack};
 use crate::error::{Result, check_limit};
-use crate::threads::{cores, share_out};
+use crate::parallel::{cores, share_out};
 
 /// A thread gets at least so many instances: one converts 200 of them in a microsecond, and takes tens of microseconds to
 /// start.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::error::{Result, check_limit};
 use crate::gpu::Gpu;
-use crate::lock::{Mutex, Rank};
+use crate::lock_order::{Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 

@@ -6,7 +6,7 @@
 
 use super::partition::{Item, cut, items};
 use super::primitive_bounds::Bounds;
-use crate::threads::{cores, share_out};
+use crate::parallel::{cores, share_out};
 
 /// Another order is worth its number map and its time if its tree costs this many times less than the given one.
 pub(crate) const WORTH_GAIN: f64 = 1.1;

@@ -6,7 +6,7 @@ use super::scratch::{ScratchTiers, scratch_buffer_bytes};
 use crate::barrier::ResourceId;
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::lock::{Mutex, Rank};
+use crate::lock_order::{Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use super::blas_refs::{Revision, ShownSet};
 use super::raw_accel_struct::RawStructure;
 use crate::error::{Result, check_limit};
-use crate::lock::{Guard, Mutex, Rank};
+use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 use crate::software_ray_query::tlas::SoftwareTlas;
 

@@ -7,8 +7,8 @@ use super::blas_refs::{Revision, ShownSet};
 use super::instance_plan::PlanMemory;
 use super::tlas::{InstanceSource, Tlas, TlasContents};
 use crate::error::{Error, Result};
-use crate::found::Found;
 use crate::handle::AccelStructHandle;
+use crate::handle_cache::Found;
 use crate::store::Pool;
 
 /// What a command buffer makes of one top-level structure.

@@ -13,7 +13,7 @@ use ash::vk;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::memory::allocator::MemoryKind;
-use crate::lock::{Guard, Mutex, Rank};
+use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
 use crate::gpu::caps::descriptor_limits::fitting;
-use crate::lock::{Guard, Mutex, Rank};
+use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::ycbcr::YuvConversion;
 
 /// What a texture's slot shows to shaders.

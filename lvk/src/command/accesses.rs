@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::subresource_accesses::{PartUse, PartUses};
 use crate::barrier::{Barriers, IdMap, ResourceId, Subresources, Tracker, Use};
 use crate::error::{Error, Result};
-use crate::found::Found;
 use crate::handle::TextureHandle;
+use crate::handle_cache::Found;
 use crate::resource::{Buffer, Texture};
 use crate::submit::emit_barriers::Images;
 

@@ -7,11 +7,11 @@ use super::accesses::Uses;
 use super::dependencies::Dependencies;
 use super::recording_state::Notes;
 use crate::barrier::{ResourceId, Stages, Subresources, Use};
+use crate::device_state::Shared;
 use crate::error::Result;
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::texture_desc::TextureUsage;
 use crate::resource::{Buffer, Texture};
-use crate::shared::Shared;
 use crate::submit::Recording;
 use crate::submit::emit_barriers::emit;
 

@@ -16,10 +16,10 @@ use crate::accel::build::BuildInput;
 use crate::accel::flags::BuildMode;
 use crate::accel::scratch::{ScratchBatch, aligned_scratch_address, plan_scratch};
 use crate::barrier::Use;
+use crate::device_state::Garbage;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
-use crate::shared::Garbage;
 
 /// Plans the builds or refits of what software traces.
 type PlanSoftware = fn(&CommandBuffer, &[Arc<AccelStruct>], &[bool]) -> Result<SoftwareWork>;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::barrier::{Stages, Use};
 use crate::command::CommandBuffer;
 use crate::error::Result;
-use crate::kernel::Kernel;
+use crate::kernels::Kernel;
 use crate::resource::Buffer;
 use crate::software_ray_query::gpu_build::collapse::{Below, BinaryTree, WideChild, WideTree};
 use crate::software_ray_query::gpu_build::layout::{BlasShape, BuildSource, GpuBuildPlan};

@@ -11,9 +11,9 @@ use crate::accel::compaction::SizeQuery;
 use crate::accel::primitive_map::PrimitiveMap;
 use crate::accel::raw_accel_struct::RawStructure;
 use crate::barrier::{Stages, Use};
+use crate::device_state::Garbage;
 use crate::error::Result;
 use crate::resource::{Buffer, QueryPool};
-use crate::shared::Garbage;
 
 impl CommandBuffer {
     /// Asks how large each target would be, compacted. Answers arrive in the query's pool.

@@ -8,7 +8,7 @@ use super::CommandBuffer;
 use crate::accel::scratch::{aligned_scratch_address, plan_scratch};
 use crate::barrier::{Stages, Use};
 use crate::error::Result;
-use crate::kernel::spread;
+use crate::kernels::spread;
 use crate::resource::Buffer;
 use crate::software_ray_query::gpu_build::geometry::GpuGeometry;
 use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan};

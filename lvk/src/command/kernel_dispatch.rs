@@ -12,7 +12,7 @@ use crate::accel::primitive_map::PrimitiveMap;
 use crate::barrier::{Stages, Use};
 use crate::error::Result;
 use crate::format::IndexFormat;
-use crate::kernel::{GatherPush, Kernel, groups};
+use crate::kernels::{GatherPush, Kernel, groups};
 use crate::pipeline::ComputePipeline;
 
 const KIND_NO_INDICES: u32 = 0;

@@ -40,10 +40,10 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::barrier::Use;
+use crate::device_state::Shared;
 use crate::error::Result;
 use crate::gpu::caps::queues::Queue;
 use crate::pipeline::{ComputePipeline, RayTracingPipeline};
-use crate::shared::Shared;
 use crate::submit::Recording;
 use crate::submit::profiler::Scopes;
 use crate::upload::staging::StagingChunk;

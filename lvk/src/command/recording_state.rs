@@ -15,11 +15,11 @@ use crate::accel::build_overlap::BuildRun;
 use crate::accel::compaction::SizeQuery;
 use crate::accel::tlas_tracker::TlasUpdates;
 use crate::barrier::{Barriers, ResourceId};
-use crate::found::Found;
+use crate::device_state::Shared;
 use crate::handle::{BufferHandle, TextureHandle};
-use crate::lock::{Mutex, Rank};
+use crate::handle_cache::Found;
+use crate::lock_order::{Mutex, Rank};
 use crate::resource::{Buffer, Texture};
-use crate::shared::Shared;
 use crate::submit::emit_barriers::LastBarrier;
 
 /// Lists and maps of one command buffer.

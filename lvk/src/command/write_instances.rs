@@ -16,11 +16,11 @@ use crate::accel::instance_plan::{
 use crate::accel::tlas::{InstanceSource, Numbers, SourceBytes, Tlas};
 use crate::accel::tlas_tracker::Change;
 use crate::barrier::{Stages, Use};
+use crate::device_state::Garbage;
 use crate::error::{Error, Result};
-use crate::kernel::{InstancesPush, Kernel};
+use crate::kernels::{InstancesPush, Kernel};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
-use crate::shared::Garbage;
 use crate::upload::staging::StagingChunk;
 
 /// Addresses of instances must be a multiple of this.

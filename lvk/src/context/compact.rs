@@ -10,12 +10,12 @@ use crate::accel::blas::{BlasBody, CompactionWish};
 use crate::accel::compaction::{Compactions, PlannedCopy, Refusal, SizeQuery};
 use crate::accel::flags::BuildFlags;
 use crate::accel::raw_accel_struct::RawStructure;
+use crate::device_state::Garbage;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
-use crate::lock::Guard;
+use crate::lock_order::Guard;
 use crate::resource::QueryPool;
 use crate::resource::query_pool::QueryPoolDesc;
-use crate::shared::Garbage;
 
 impl Context {
     /// Asks for bottom-level structures to be copied into as little memory as they need. Nothing waits.

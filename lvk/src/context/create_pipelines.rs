@@ -4,9 +4,9 @@ use super::Context;
 use super::holder::Holder;
 use crate::error::Result;
 use crate::handle::{ComputePipelineHandle, RenderPipelineHandle};
+use crate::parallel::make_all;
 use crate::pipeline::compute::ComputePipelineDesc;
 use crate::pipeline::graphics_desc::RenderPipelineDesc;
-use crate::threads::make_all;
 
 impl Context {
     /// [`create_render_pipeline`](Self::create_render_pipeline) for each description, on all cores of the CPU. Answers in

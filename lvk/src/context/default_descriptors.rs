@@ -8,12 +8,12 @@ use crate::accel::AccelStruct;
 use crate::accel::desc::TlasDesc;
 use crate::accel::flags::BuildMode;
 use crate::bindless::Dummies;
+use crate::device_state::DummyObjects;
 use crate::error::Result;
 use crate::resource::region::TextureRegion;
 use crate::resource::sampler::SamplerDesc;
 use crate::resource::texture_desc::{TextureDesc, TextureUsage};
 use crate::resource::{Sampler, Texture};
-use crate::shared::DummyObjects;
 
 /// The slot of the dummies.
 const SLOT: u32 = 0;

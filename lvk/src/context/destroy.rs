@@ -1,12 +1,12 @@
 //! Destroys objects, once the GPU is done with them.
 
 use super::Context;
+use crate::device_state::{Garbage, Shared};
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, SwapchainHandle,
     TextureHandle,
 };
-use crate::shared::{Garbage, Shared};
 
 /// Handles whose objects a context can destroy: all of them.
 pub trait Destroy: Handle {

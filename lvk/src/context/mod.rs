@@ -37,12 +37,12 @@ use std::sync::Arc;
 
 use crate::accel::compaction::Compactions;
 use crate::command::SpareNotes;
+use crate::device_state::Shared;
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::debug::messenger::ValidationSink;
 use crate::gpu::memory::budget::MemoryBudget;
 use crate::gpu::window::WindowHandles;
-use crate::lock::Mutex;
-use crate::shared::Shared;
+use crate::lock_order::Mutex;
 
 use frame::FrameRing;
 use prologue::Pending;

@@ -9,10 +9,10 @@ use crate::accel::primitive_bounds::Bounds;
 use crate::accel::primitive_map::{PrimitiveMap, table_words};
 use crate::accel::reorder::{spatial_order, worth_ordering};
 use crate::accel::split::{PartLimits, PartPlan, PartSizes, plan_split};
+use crate::device_state::Shared;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::limits::Limits;
-use crate::shared::Shared;
 use crate::software_ray_query::blas::most_sizes;
 
 /// Meshes of fewer primitives are built as given: no order makes them slow.

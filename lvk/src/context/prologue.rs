@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use super::Context;
 use crate::command::CommandBuffer;
+use crate::device_state::Garbage;
 use crate::error::Result;
 use crate::gpu::caps::queues::Queue;
-use crate::lock::Guard;
+use crate::lock_order::Guard;
 use crate::resource::region::{Region, TextureRegion};
 use crate::resource::{Buffer, Texture};
-use crate::shared::Garbage;
 use crate::submit::SubmitHandle;
 use crate::upload::PendingUploads;
 

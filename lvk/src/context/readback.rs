@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use super::Context;
 use crate::command::transfer::BufferCopy;
+use crate::device_state::Garbage;
 use crate::error::Result;
 use crate::gpu::memory::allocator::MemoryKind;
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::resource::region::TextureRegion;
-use crate::shared::Garbage;
 use crate::submit::SubmitHandle;
 
 /// Bytes that the GPU copies for the host, from [`Context::read_buffer_later`] and [`Context::read_texture_later`].

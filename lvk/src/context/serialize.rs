@@ -19,13 +19,13 @@ use crate::accel::primitive_map::{cover_mesh, table_lists};
 use crate::accel::raw_accel_struct::RawStructure;
 use crate::accel::split::PartPlan;
 use crate::command::transfer::BufferCopy;
+use crate::device_state::Garbage;
 use crate::error::{Error, Result};
 use crate::format::IndexFormat;
 use crate::handle::AccelStructHandle;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::resource::query_pool::QueryPoolDesc;
 use crate::resource::{Buffer, QueryPool};
-use crate::shared::Garbage;
 
 /// Addresses of serialised structures are multiples of this.
 const ALIGNMENT: u64 = 256;

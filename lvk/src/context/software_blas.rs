@@ -12,9 +12,10 @@ use crate::accel::blas::{Blas, BlasBody};
 use crate::accel::blas_file::Blob;
 use crate::accel::desc::BlasDesc;
 use crate::command::transfer::BufferCopy;
+use crate::device_state::Garbage;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
-use crate::shared::Garbage;
+use crate::parallel::make_all;
 use crate::software_ray_query::blas::{
     Origin, SoftwareBlas, body_bytes, builds_on_gpu, gpu_plan, refit_plan,
 };
@@ -26,7 +27,6 @@ use crate::software_ray_query::bvh_cache::TreeKey;
 use crate::software_ray_query::rebraid_parts::Parts;
 use crate::software_ray_query::storage::SoftwareBody;
 use crate::software_ray_query::validate_blob::{self, Expected};
-use crate::threads::make_all;
 
 /// Stands in front of structures that no driver wrote; as long as what drivers begin with.
 const MARK: [u8; 32] = *b"lvk software structure, form 3\0\0";

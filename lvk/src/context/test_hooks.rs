@@ -13,7 +13,7 @@ use crate::error::Result;
 use crate::gpu::failing;
 use crate::gpu::silent::silently;
 use crate::handle::{BufferHandle, SwapchainHandle};
-use crate::kernel::Kernel;
+use crate::kernels::Kernel;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage};
 pub use crate::software_ray_query::gpu_build::check::{Bounds, EMPTY, Facts, check_structure};

@@ -27,7 +27,7 @@ use super::start::select::{Candidate, choose};
 use super::start::user_extensions::UserExtensions;
 use super::window::{Probe, WindowFunctions, WindowHandles};
 use crate::error::{Error, Result, check_limit};
-use crate::lock::{Guard, Mutex, Rank};
+use crate::lock_order::{Guard, Mutex, Rank};
 
 /// What the caller asks of a device.
 #[derive(Debug, Clone, Copy)]

@@ -7,10 +7,10 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::cache_file::{CacheOwner, seal, unseal};
-use crate::disk::{MOST_BYTES, checksum, read, replace};
+use crate::cache_file::{MOST_BYTES, checksum, read, replace};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::lock::{Mutex, Rank};
+use crate::lock_order::{Mutex, Rank};
 
 /// The cache of a context that was given a file. Written and destroyed on drop.
 pub(crate) struct PipelineCache {

@@ -1,6 +1,6 @@
 //! The file that keeps compiled pipelines: who wrote it, and whether it is whole.
 
-use crate::disk::checksum;
+use crate::cache_file::checksum;
 
 /// The device and the driver whose compiled shaders a file holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

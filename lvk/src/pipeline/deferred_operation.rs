@@ -8,7 +8,7 @@ use ash::vk;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::start::driver_workarounds::beside_devices;
-use crate::threads::{cores, run_on};
+use crate::parallel::{cores, run_on};
 
 /// Creates the pipeline (`vkCreateRayTracingPipelinesKHR`), with as many threads as the driver and the machine have
 /// use for.

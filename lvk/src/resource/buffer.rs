@@ -10,7 +10,7 @@ use crate::barrier::ResourceId;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::memory::allocator::{Mapping, MemoryKind, ObjectMemory};
-use crate::lock::{Mutex, Rank};
+use crate::lock_order::{Mutex, Rank};
 
 bitflags! {
     /// What a buffer is used for, besides copies and access by address, which are always allowed.

@@ -10,7 +10,7 @@ use crate::barrier::ResourceId;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;
-use crate::lock::{Guard, Mutex, Rank};
+use crate::lock_order::{Guard, Mutex, Rank};
 
 /// What the queries of a pool measure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::format::{Aspect, Format};
 use crate::gpu::Gpu;
 use crate::handle::TextureHandle;
-use crate::lock::{Mutex, Rank};
+use crate::lock_order::{Mutex, Rank};
 
 /// Describes a view: a texture that shows mips and layers of another one, perhaps as another kind or format.
 #[derive(Debug, Clone, Copy, Default)]

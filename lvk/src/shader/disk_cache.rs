@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::SystemTime;
 
 use super::disk_file::{Entry, Fingerprint, Included, open, seal};
-use crate::disk::{read, replace};
-use crate::lock::{Mutex, Rank};
+use crate::cache_file::{read, replace};
+use crate::lock_order::{Mutex, Rank};
 
 /// A folder holds at most this; beyond it what was not used for longest goes until three quarters are left.
 const MOST_BYTES: u64 = 64 << 20;

@@ -1,6 +1,6 @@
 //! The file of a compiled module: what it was compiled from, what it included, and its words.
 
-use crate::disk::fingerprint;
+use crate::cache_file::fingerprint;
 
 const MAGIC: [u8; 8] = *b"lvkspirv";
 /// Changes with the passes behind the compiler and with the form of files.

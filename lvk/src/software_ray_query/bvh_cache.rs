@@ -6,7 +6,7 @@ use super::bvh::encode_blas::BlasBlob;
 use super::bvh::primitives::{Mesh, Primitives};
 use super::bvh::settings::Quality;
 use super::validate_blob::{self, Expected};
-use crate::disk::{fingerprint, read, replace};
+use crate::cache_file::{fingerprint, read, replace};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
 /// Changes with the builders and with the form of structures.

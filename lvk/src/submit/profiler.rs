@@ -10,7 +10,7 @@ use super::scope_tree::{GpuProfile, Stamps, scope_tree};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::queues::Queue;
-use crate::lock::{Guard, Mutex, Rank};
+use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::QueryPool;
 use crate::resource::query_pool::QueryPoolDesc;
 

@@ -17,7 +17,7 @@ use crate::barrier::{IdMap, Layout, ResourceId, Stages, TextureShape, Tracker};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::queues::Queue;
-use crate::lock::{Guard, Mutex, Rank};
+use crate::lock_order::{Guard, Mutex, Rank};
 
 /// What goes to a queue at once.
 #[derive(Default)]

@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::window::WindowHandles;
 use crate::handle::TextureHandle;
-use crate::lock::{Guard, Mutex, Rank};
+use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Texture;
 use crate::resource::texture_desc::TextureUsage;
 

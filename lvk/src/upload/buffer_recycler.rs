@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::memory::allocator::MemoryKind;
-use crate::lock::{Mutex, Rank};
+use crate::lock_order::{Mutex, Rank};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::page_allocator::{Found, Pages, Place};
 use crate::error::{Error, Result};
-use crate::lock::{Guard, Mutex, Rank};
+use crate::lock_order::{Guard, Mutex, Rank};
 
 /// Pages of one kind of memory; `P` is such a page.
 pub(super) struct PageSet<P> {

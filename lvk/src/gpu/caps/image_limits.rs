@@ -6,7 +6,7 @@ use std::collections::HashMap;
 use ash::vk;
 
 use crate::gpu::device::Gpu;
-use crate::lock::{Rank, RwLock};
+use crate::lock_order::{Rank, RwLock};
 
 /// What the limits of an image depend on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use crate::lock::{Guard, Mutex, Rank};
+use crate::lock_order::{Guard, Mutex, Rank};
 
 /// Where command buffers run. All three exist on every device and refuse the same commands everywhere, but for what
 /// [`QueueInfo`] says of timestamps and copies; those without hardware of their own share it.

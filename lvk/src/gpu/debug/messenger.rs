@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::lock::{Guard, Mutex, Rank};
+use crate::lock_order::{Guard, Mutex, Rank};
 
 /// How much the validation layer checks. The layer must be installed; see [`ValidationMode::Standard`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

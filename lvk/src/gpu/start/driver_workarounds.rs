@@ -5,7 +5,7 @@
 
 use ash::vk;
 
-use crate::lock::{Rank, RwLock};
+use crate::lock_order::{Rank, RwLock};
 
 static DEVICE_CHANGES: RwLock<()> = RwLock::new(Rank::DeviceChanges, ());
 

@@ -12,7 +12,7 @@ use obvhs::ploc::morton::morton_encode_u64_unorm;
 
 use super::thread_budget::Build;
 use crate::accel::primitive_bounds::Bounds;
-use crate::threads::share_out;
+use crate::parallel::share_out;
 
 /// Rounds that look at the next neighbours only: most of what is small is paired by them.
 const NEAR_ROUNDS: usize = 2;

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::threads::cores;
+use crate::parallel::cores;
 
 /// Builds under way in the process.
 static BUILDS: AtomicUsize = AtomicUsize::new(0);

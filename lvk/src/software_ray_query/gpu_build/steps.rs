@@ -1,6 +1,6 @@
 //! Which kernels run in which order, and which of them side by side.
 
-use crate::kernel::Kernel;
+use crate::kernels::Kernel;
 use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan, SORT_BLOCK};
 use crate::software_ray_query::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
 use crate::software_ray_query::layout::{DEEPEST_WIDE, LeafKind};

@@ -10,7 +10,7 @@ mod checked {
     use std::cell::Cell;
     use std::fmt;
 
-    use crate::lock::Rank;
+    use crate::lock_order::Rank;
 
     thread_local! {
         // Without a destructor, so that objects of other thread-local variables can still be destroyed.
@@ -19,26 +19,26 @@ mod checked {
 
     /// The place of one lock in the order.
     #[derive(Debug, Clone, Copy)]
-    pub(in crate::lock) struct Place(Rank);
+    pub(in crate::lock_order) struct Place(Rank);
 
     impl Place {
-        pub(in crate::lock) const fn new(rank: Rank) -> Self {
+        pub(in crate::lock_order) const fn new(rank: Rank) -> Self {
             Self(rank)
         }
     }
 
     /// A set of ranks, a bit for each.
     #[derive(Clone, Copy, PartialEq, Eq)]
-    pub(in crate::lock) struct Ranks(u64);
+    pub(in crate::lock_order) struct Ranks(u64);
 
     impl Ranks {
-        pub(in crate::lock) const NONE: Self = Self(0);
+        pub(in crate::lock_order) const NONE: Self = Self(0);
 
-        pub(in crate::lock) const fn of(rank: Rank) -> Self {
+        pub(in crate::lock_order) const fn of(rank: Rank) -> Self {
             Self(1 << rank as u8)
         }
 
-        pub(in crate::lock) const fn and(self, other: Self) -> Self {
+        pub(in crate::lock_order) const fn and(self, other: Self) -> Self {
             Self(self.0 | other.0)
         }
 
@@ -47,7 +47,7 @@ mod checked {
         }
 
         /// Whether a thread that has these may wait for another one.
-        pub(in crate::lock) const fn may_take(self, next: Rank) -> bool {
+        pub(in crate::lock_order) const fn may_take(self, next: Rank) -> bool {
             self.0 >> next.first_in_the_way() == 0
         }
     }
@@ -59,10 +59,10 @@ mod checked {
     }
 
     /// A lock that this thread has, or waits for.
-    pub(in crate::lock) struct Held(Ranks);
+    pub(in crate::lock_order) struct Held(Ranks);
 
     impl Held {
-        pub(in crate::lock) fn new(Place(rank): Place) -> Self {
+        pub(in crate::lock_order) fn new(Place(rank): Place) -> Self {
             let held = HELD.get();
             assert!(held.may_take(rank), "the lock of {rank:?} is taken while {held:?} are held");
             HELD.set(held.and(Ranks::of(rank)));
@@ -79,21 +79,21 @@ mod checked {
 
     /// What a thread holds that waits for others.
     #[derive(Debug, Clone, Copy)]
-    pub(in crate::lock) struct Waiting(Ranks);
+    pub(in crate::lock_order) struct Waiting(Ranks);
 
     impl Waiting {
-        pub(in crate::lock) fn here() -> Self {
+        pub(in crate::lock_order) fn here() -> Self {
             Self(HELD.get())
         }
 
         /// As long as the answer lives, this thread is taken to hold it, too.
-        pub(in crate::lock) fn assume(self) -> Assumed {
+        pub(in crate::lock_order) fn assume(self) -> Assumed {
             Assumed { before: HELD.replace(HELD.get().and(self.0)) }
         }
     }
 
     /// Locks that somebody else holds.
-    pub(in crate::lock) struct Assumed {
+    pub(in crate::lock_order) struct Assumed {
         before: Ranks,
     }
 
@@ -106,40 +106,40 @@ mod checked {
 
 #[cfg(not(debug_assertions))]
 mod unchecked {
-    use crate::lock::Rank;
+    use crate::lock_order::Rank;
 
     #[derive(Debug, Clone, Copy)]
-    pub(in crate::lock) struct Place;
+    pub(in crate::lock_order) struct Place;
 
     impl Place {
         #[inline]
-        pub(in crate::lock) const fn new(_: Rank) -> Self {
+        pub(in crate::lock_order) const fn new(_: Rank) -> Self {
             Self
         }
     }
 
-    pub(in crate::lock) struct Held;
+    pub(in crate::lock_order) struct Held;
 
     impl Held {
         #[inline]
-        pub(in crate::lock) fn new(_: Place) -> Self {
+        pub(in crate::lock_order) fn new(_: Place) -> Self {
             Self
         }
     }
 
-    pub(in crate::lock) struct Assumed;
+    pub(in crate::lock_order) struct Assumed;
 
     #[derive(Debug, Clone, Copy)]
-    pub(in crate::lock) struct Waiting;
+    pub(in crate::lock_order) struct Waiting;
 
     impl Waiting {
         #[inline]
-        pub(in crate::lock) fn here() -> Self {
+        pub(in crate::lock_order) fn here() -> Self {
             Self
         }
 
         #[inline]
-        pub(in crate::lock) fn assume(self) -> Assumed {
+        pub(in crate::lock_order) fn assume(self) -> Assumed {
             Assumed
         }
     }

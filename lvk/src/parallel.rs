@@ -3,7 +3,7 @@
 use std::num::NonZero;
 use std::thread::{Builder, available_parallelism, scope};
 
-use crate::lock::{Mutex, Rank, Waiting};
+use crate::lock_order::{Mutex, Rank, Waiting};
 
 /// Threads that are worth having for work of any number of pieces.
 pub(crate) fn cores() -> usize {

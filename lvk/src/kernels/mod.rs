@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::lock::{Mutex, Rank};
+use crate::lock_order::{Mutex, Rank};
 use crate::pipeline::compute::ComputePipelineDesc;
 use crate::pipeline::{ComputePipeline, PipelineBase, PipelineLayout, ShaderModule};
 use crate::shader::{ShaderModuleDesc, ShaderSource, ShaderStage};

@@ -19,9 +19,9 @@ use crate::bindless::index_checks::BindlessArray;
 use crate::bindless::{Bindless, TEXTURE_ARRAYS};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::kernel::Kernels;
-use crate::leaks;
-use crate::lock::{Guard, Mutex};
+use crate::kernels::Kernels;
+use crate::leak_report;
+use crate::lock_order::{Guard, Mutex};
 use crate::pipeline::{
     ComputePipeline, PipelineBase, PipelineCache, PipelineLayout, RayTracingPipeline, RenderPipeline,
 };
@@ -214,7 +214,7 @@ impl Shared {
 
     /// Takes every object out that is still alive and reports it by name.
     fn drain_store(&mut self) {
-        if let Some(report) = leaks::report(&self.store.live()) {
+        if let Some(report) = leak_report::report(&self.store.live()) {
             log::warn!("{report}");
         }
         self.store.drain();
