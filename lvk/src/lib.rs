@@ -121,11 +121,13 @@ pub(crate) mod software_ray_query;
 mod store;
 mod submit;
 mod swapchain;
+#[cfg(any(test, feature = "test-hooks"))]
+mod test_support;
 mod upload;
 
-#[cfg(feature = "test-hooks")]
+#[cfg(any(test, feature = "test-hooks"))]
 #[doc(hidden)]
-pub use context::test_hooks;
+pub use test_support::hooks as test_hooks;
 
 pub use ash;
 pub use glam;

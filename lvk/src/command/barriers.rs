@@ -17,7 +17,7 @@ use crate::submit::emit_barriers::emit;
 
 impl CommandBuffer {
     /// The next command uses a buffer.
-    pub(super) fn use_buffer(&mut self, buffer: &Buffer, next: Use) {
+    pub(crate) fn use_buffer(&mut self, buffer: &Buffer, next: Use) {
         let Notes { uses, host_reads, .. } = &mut **self.notes;
         use_buffer(uses, host_reads, buffer, next);
     }

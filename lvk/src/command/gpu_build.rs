@@ -16,13 +16,6 @@ use crate::software_ray_query::gpu_build::params::{BuildPush, Job};
 use crate::software_ray_query::gpu_build::refit_layout::GpuRefitPlan;
 use crate::software_ray_query::gpu_build::steps::{Step, build_steps, refit_steps};
 
-#[cfg(feature = "test-hooks")]
-#[path = "collapse_test.rs"]
-pub(crate) mod collapse_test;
-#[cfg(feature = "test-hooks")]
-#[path = "sort_test.rs"]
-pub(crate) mod sort_test;
-
 /// Parts of the scratch memory are aligned to their widest accesses.
 const SCRATCH_ALIGNMENT: u64 = 256;
 const TABLE_ALIGNMENT: u64 = 16;
@@ -116,7 +109,7 @@ impl CommandBuffer {
     }
 
     /// Runs the steps of some jobs, with barriers between phases; the scratch buffer is among the uses.
-    fn record_jobs<'a>(
+    pub(crate) fn record_jobs<'a>(
         &mut self,
         jobs: &[Job],
         steps: &[Step],

@@ -28,8 +28,6 @@ pub(crate) mod readback;
 pub(crate) mod serialize;
 mod software_blas;
 mod submit;
-#[cfg(feature = "test-hooks")]
-pub mod test_hooks;
 mod transfer;
 mod window;
 
@@ -86,7 +84,7 @@ impl Context {
         self.shared().gpu.instance.sink()
     }
 
-    fn shared(&self) -> &Arc<Shared> {
+    pub(crate) fn shared(&self) -> &Arc<Shared> {
         &self.inner.shared
     }
 }

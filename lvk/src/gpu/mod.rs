@@ -4,11 +4,7 @@ pub(crate) mod calibrated_timestamps;
 pub(crate) mod caps;
 pub(crate) mod debug;
 pub(crate) mod device;
-#[cfg(feature = "test-hooks")]
-pub(crate) mod failing;
 pub(crate) mod memory;
-#[cfg(feature = "test-hooks")]
-pub(crate) mod silent;
 pub(crate) mod start;
 pub(crate) mod window;
 

@@ -5,8 +5,6 @@ pub(crate) mod command_pool;
 pub(crate) mod deferred_free;
 pub(crate) mod emit_barriers;
 pub(crate) mod input_attachment_sets;
-#[cfg(feature = "test-hooks")]
-pub(crate) mod interruption;
 pub(crate) mod ownership;
 pub(crate) mod presentable;
 pub(crate) mod profiler;

@@ -108,16 +108,16 @@ impl<T> Submitter<T> {
 
     /// Starts recording a command buffer.
     pub(crate) fn acquire(&self, queue: Queue) -> Result<Box<Recording>> {
-        #[cfg(feature = "test-hooks")]
-        super::interruption::interrupt();
+        #[cfg(any(test, feature = "test-hooks"))]
+        crate::test_support::submit_hook::interrupt();
         let ticket = self.lock().take(self.gpu.queues.lane(queue));
         self.begin(ticket)
     }
 
     /// As [`acquire`](Self::acquire), and takes out what the GPU has finished with.
     pub(crate) fn collect_and_acquire(&self, queue: Queue) -> Result<(Finished<T>, Result<Box<Recording>>)> {
-        #[cfg(feature = "test-hooks")]
-        super::interruption::interrupt();
+        #[cfg(any(test, feature = "test-hooks"))]
+        crate::test_support::submit_hook::interrupt();
         let completed = self.completed()?;
         let mut inner = self.lock();
         let finished = inner.take_finished(&completed);
@@ -341,7 +341,7 @@ impl<T> Submitter<T> {
     }
 
     /// How many values there were.
-    #[cfg(feature = "test-hooks")]
+    #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn count(&self) -> u64 {
         self.lock().lanes.sent()
     }
@@ -400,7 +400,7 @@ impl<T> Submitter<T> {
     }
 
     /// How many items wait to be destroyed.
-    #[cfg(feature = "test-hooks")]
+    #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn waiting(&self) -> usize {
         self.lock().deferred.len()
     }

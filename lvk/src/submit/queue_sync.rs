@@ -132,7 +132,7 @@ impl Lanes {
     }
 
     /// How many values there were.
-    #[cfg(feature = "test-hooks")]
+    #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn sent(&self) -> u64 {
         self.sent
     }

@@ -141,7 +141,7 @@ pub(crate) struct PresentSync {
     /// Whether it was presented since it was made.
     pub(crate) presented: bool,
     /// Whether the engine never ends its presents, as far as the library is told.
-    #[cfg(feature = "test-hooks")]
+    #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) stalls: bool,
     gpu: Arc<Gpu>,
 }
@@ -153,7 +153,7 @@ impl PresentSync {
             drawn,
             shown: None,
             presented: false,
-            #[cfg(feature = "test-hooks")]
+            #[cfg(any(test, feature = "test-hooks"))]
             stalls: false,
             gpu: Arc::clone(gpu),
         };
@@ -189,7 +189,7 @@ impl PresentSync {
         let Some(fence) = self.shown.filter(|_| self.presented) else { return Ok(true) };
         // SAFETY: the fence is alive and belongs to a present.
         match unsafe { self.gpu.device.wait_for_fences(&[fence], true, patience_ns) } {
-            #[cfg(feature = "test-hooks")]
+            #[cfg(any(test, feature = "test-hooks"))]
             Ok(()) if self.stalls => Ok(false),
             Ok(()) => Ok(true),
             Err(vk::Result::TIMEOUT) => Ok(false),

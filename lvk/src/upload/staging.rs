@@ -162,7 +162,7 @@ impl Staging {
     }
 
     /// Bytes of all pages.
-    #[cfg(feature = "test-hooks")]
+    #[cfg(any(test, feature = "test-hooks"))]
     pub(crate) fn total_bytes(&self) -> u64 {
         self.pages.total_bytes() + self.cached.total_bytes()
     }

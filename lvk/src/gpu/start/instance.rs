@@ -214,8 +214,10 @@ fn create(
     }
     // SAFETY: every pointer in `info` lives until the end of this function.
     let made = unsafe { entry.create_instance(&info, None) };
-    #[cfg(feature = "test-hooks")]
-    let made = made.map(crate::gpu::silent::silenced).map(crate::gpu::failing::fallible);
+    #[cfg(any(test, feature = "test-hooks"))]
+    let made = made
+        .map(crate::test_support::null_commands::silenced)
+        .map(crate::test_support::fault_injection::fallible);
     made.map_err(|result| Error::NoVulkan { reason: format!("vkCreateInstance answered {result}") })
 }
 

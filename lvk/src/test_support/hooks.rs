@@ -4,28 +4,28 @@
 
 use std::sync::Arc;
 
-use super::Context;
 use crate::accel::geometry::BlasGeometry;
 use crate::command::gpu_build::{GpuBuild, GpuRefit};
+use crate::context::Context;
 use crate::context::config::ContextDesc;
 use crate::context::holder::Holder;
 use crate::error::Result;
-use crate::gpu::failing;
-use crate::gpu::silent::silently;
 use crate::handle::{BufferHandle, SwapchainHandle};
 use crate::kernels::Kernel;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage};
-pub use crate::software_ray_query::gpu_build::check::{Bounds, EMPTY, Facts, check_structure};
-pub use crate::software_ray_query::gpu_build::collapse::{
-    Below, BinaryChild, BinaryTree, WideChild, WideTree, any_tree,
-};
 use crate::software_ray_query::gpu_build::geometry::gpu_geometries;
 use crate::software_ray_query::gpu_build::layout::{BlasShape, BlobPlaces, BuildSource, GpuBuildPlan};
 use crate::software_ray_query::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
 use crate::software_ray_query::layout::{DEEPEST_WIDE, LeafKind};
-use crate::submit::interruption;
 use crate::swapchain::choose::Failure;
+pub use crate::test_support::collapse_model::{
+    Below, BinaryChild, BinaryTree, WideChild, WideTree, any_tree,
+};
+use crate::test_support::fault_injection;
+pub use crate::test_support::gpu_build_check::{Bounds, EMPTY, Facts, check_structure};
+use crate::test_support::null_commands::silently;
+use crate::test_support::submit_hook;
 
 const ALIGNMENT: u64 = 256;
 
@@ -47,18 +47,18 @@ pub fn silent_context(desc: &ContextDesc<'_>) -> Result<Context> {
 
 /// The context that `make` makes and uses on this thread can have submissions fail.
 pub fn fallibly<T>(make: impl FnOnce() -> T) -> T {
-    failing::fallibly(make)
+    fault_injection::fallibly(make)
 }
 
 /// After so many submissions to queues, one that this thread makes of a context made [`fallibly`] is refused.
 pub fn fail_submission_after(submissions: u32) {
-    failing::fail_after(submissions);
+    fault_injection::fail_after(submissions);
 }
 
 /// This thread does something that another might do, right before it takes its next command buffer. Locks may be held then:
 /// objects may be destroyed, and nothing submitted.
 pub fn before_next_command_buffer(deed: impl FnOnce() + 'static) {
-    interruption::before_next_command_buffer(Box::new(deed));
+    submit_hook::before_next_command_buffer(Box::new(deed));
 }
 
 /// The presentation engine has lost the surface of a window, as far as the library is told.
@@ -217,7 +217,7 @@ pub fn place(ctx: &Context, words: &[u32]) -> Result<GpuStructure> {
 /// Sorts keys by the kernels of large builds: the sorted keys, each with its number among those given. Keys have 32 bits,
 /// with `low_bits` in a second word below them.
 pub fn sort(ctx: &Context, keys: &[u64], low_bits: u32) -> Result<Vec<(u64, u32)>> {
-    let sorter = crate::command::gpu_build::sort_test::Sorter::new(keys, low_bits);
+    let sorter = crate::test_support::sort_kernels::Sorter::new(keys, low_bits);
     let words = run_on(ctx, &sorter.words(), |cmd, target, address| sorter.record(cmd, target, address))?;
     Ok(sorter.sorted(&words))
 }
@@ -225,7 +225,7 @@ pub fn sort(ctx: &Context, keys: &[u64], low_bits: u32) -> Result<Vec<(u64, u32)
 /// The wide tree that the kernels make of a binary one of more than three primitives, `None` where it had no room; and how many
 /// nodes have.
 pub fn collapse(ctx: &Context, tree: &BinaryTree) -> Result<(Option<WideTree>, usize)> {
-    let collapser = crate::command::gpu_build::collapse_test::Collapser::new(tree)?;
+    let collapser = crate::test_support::collapse_kernels::Collapser::new(tree)?;
     let words =
         run_on(ctx, &collapser.words(), |cmd, target, address| collapser.record(cmd, target, address))?;
     Ok((collapser.collapsed(&words), collapser.room()))

@@ -1,6 +1,6 @@
 //! How a binary tree becomes a wide one, as `kernel/build/collapse.glsl` does it: what tests hold the kernel against.
 
-use super::check::Bounds;
+use super::gpu_build_check::Bounds;
 use crate::software_ray_query::layout::DEEPEST_WIDE;
 
 const CHILDREN: u32 = 8;
@@ -277,7 +277,7 @@ fn grow(
         return BinaryChild { bounds, below: Below::Leaf(*number) };
     }
     let node = tree.nodes.len();
-    let empty = BinaryChild { bounds: super::check::EMPTY, below: Below::Leaf(0) };
+    let empty = BinaryChild { bounds: super::gpu_build_check::EMPTY, below: Below::Leaf(0) };
     tree.nodes.push([empty; 2]);
     let most = 1_usize.checked_shl(height - 1).unwrap_or(usize::MAX);
     let half = leaves.len() / 2;

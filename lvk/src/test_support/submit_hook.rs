@@ -14,7 +14,7 @@ pub(crate) fn before_next_command_buffer(deed: Deed) {
 }
 
 /// This thread is about to take a command buffer.
-pub(super) fn interrupt() {
+pub(crate) fn interrupt() {
     if let Some(deed) = NEXT.take() {
         deed();
     }

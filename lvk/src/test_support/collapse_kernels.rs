@@ -7,10 +7,10 @@ use crate::command::CommandBuffer;
 use crate::error::Result;
 use crate::kernels::Kernel;
 use crate::resource::Buffer;
-use crate::software_ray_query::gpu_build::collapse::{Below, BinaryTree, WideChild, WideTree};
 use crate::software_ray_query::gpu_build::layout::{BlasShape, BuildSource, GpuBuildPlan};
 use crate::software_ray_query::gpu_build::steps::wide_steps;
 use crate::software_ray_query::layout::LeafKind;
+use crate::test_support::collapse_model::{Below, BinaryTree, WideChild, WideTree};
 
 /// Words of the state, as `kernel/build/job.glsl` numbers them.
 const ACTIVE: usize = 6;
