@@ -15,7 +15,8 @@ use crate::shader::{ShaderModuleDesc, ShaderSource, ShaderStage};
 /// Invocations of a workgroup of the kernels that prepare inputs.
 pub(crate) const GROUP_SIZE: u32 = 64;
 
-/// Every kernel: its name, the stem of its SPIR-V, and the pieces of its GLSL, which are read one behind the other.
+/// Every kernel: its name, the path of its SPIR-V below `src` without the ending, and the GLSL files of the same folder
+/// that are concatenated to its source.
 macro_rules! kernels {
     ($($(#[$doc:meta])* $name:ident = $file:literal, [$($piece:literal),*];)*) => {
         /// Which of the library's compute shaders.
@@ -29,13 +30,13 @@ macro_rules! kernels {
 
             pub(crate) fn name(self) -> &'static str {
                 match self {
-                    $(Self::$name => concat!("lvk kernel ", $file),)*
+                    $(Self::$name => concat!("lvk ", $file),)*
                 }
             }
 
             fn bytes(self) -> &'static [u8] {
                 match self {
-                    $(Self::$name => include_bytes!(concat!($file, ".comp.spv")),)*
+                    $(Self::$name => include_bytes!(concat!("../", $file, ".comp.spv")),)*
                 }
             }
 
@@ -52,78 +53,78 @@ macro_rules! kernels {
 
 kernels! {
     /// Gathers the indices or boxes of a part of a mesh.
-    Gather = "gather", ["gather.comp.glsl"];
+    Gather = "kernels/gather", ["gather.comp.glsl"];
     /// Puts addresses into instances and writes their rows.
-    Instances = "instances", ["instances.comp.glsl"];
+    Instances = "kernels/instances", ["instances.comp.glsl"];
     /// Forgets what an earlier build left in the scratch memory.
-    BuildReset = "build/reset", ["build/job.glsl", "build/reset.comp.glsl"];
+    BuildReset = "software_ray_query/kernels/reset", ["job.glsl", "reset.comp.glsl"];
     /// Boxes of triangles and boxes.
-    BuildPrimitives = "build/primitives",
-        ["build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/input.glsl", "build/primitives.comp.glsl"];
+    BuildPrimitives = "software_ray_query/kernels/primitives",
+        ["job.glsl", "box.glsl", "bounds.glsl", "input.glsl", "primitives.comp.glsl"];
     /// Boxes of instances, and the instances as the structure keeps them.
-    BuildInstances = "build/instances",
-        ["build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/instance.glsl", "build/instances.comp.glsl"];
+    BuildInstances = "software_ray_query/kernels/instances",
+        ["job.glsl", "box.glsl", "bounds.glsl", "instance.glsl", "instances.comp.glsl"];
     /// Codes of places.
-    BuildCodes = "build/codes", ["build/job.glsl", "build/box.glsl", "build/code.glsl", "build/codes.comp.glsl"];
+    BuildCodes = "software_ray_query/kernels/codes", ["job.glsl", "box.glsl", "code.glsl", "codes.comp.glsl"];
     /// Counts digits of codes.
-    SortCount = "build/sort_count", ["build/job.glsl", "build/rank.glsl", "build/sort_count.comp.glsl"];
+    SortCount = "software_ray_query/kernels/sort_count", ["job.glsl", "rank.glsl", "sort_count.comp.glsl"];
     /// Sums the counts.
-    SortScan = "build/sort_scan", ["build/job.glsl", "build/rank.glsl", "build/sort_scan.comp.glsl"];
+    SortScan = "software_ray_query/kernels/sort_scan", ["job.glsl", "rank.glsl", "sort_scan.comp.glsl"];
     /// Moves codes to where they belong.
-    SortScatter = "build/sort_scatter", ["build/job.glsl", "build/rank.glsl", "build/sort_scatter.comp.glsl"];
+    SortScatter = "software_ray_query/kernels/sort_scatter", ["job.glsl", "rank.glsl", "sort_scatter.comp.glsl"];
     /// The hierarchy.
-    BuildTree = "build/tree",
-        ["build/job.glsl", "build/arrivals.glsl", "build/tree.glsl", "build/tree.comp.glsl"];
+    BuildTree = "software_ray_query/kernels/tree",
+        ["job.glsl", "arrivals.glsl", "tree.glsl", "tree.comp.glsl"];
     /// No child has arrived at any node.
-    ResetArrivals = "build/arrivals", ["build/job.glsl", "build/arrivals.glsl", "build/arrivals.comp.glsl"];
+    ResetArrivals = "software_ray_query/kernels/arrivals", ["job.glsl", "arrivals.glsl", "arrivals.comp.glsl"];
     /// Boxes of binary nodes, and better places for them.
-    BuildImprove = "build/improve",
-        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_input.glsl",
-         "build/arrivals.glsl", "build/node.glsl", "build/rotate.glsl", "build/fit.glsl", "build/improve.comp.glsl"];
+    BuildImprove = "software_ray_query/kernels/improve",
+        ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_input.glsl",
+         "arrivals.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "improve.comp.glsl"];
     /// A level of wide nodes, of binary ones.
-    Collapse = "build/collapse",
-        ["build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_input.glsl", "build/node.glsl",
-         "build/wide.glsl", "build/encode.glsl", "build/collapse.glsl", "build/collapse.comp.glsl"];
+    Collapse = "software_ray_query/kernels/collapse",
+        ["job.glsl", "box.glsl", "leaf.glsl", "kept_input.glsl", "node.glsl",
+         "wide.glsl", "encode.glsl", "collapse.glsl", "collapse.comp.glsl"];
     /// Everything of a bottom-level structure but its nodes.
-    Place = "build/place",
-        ["build/job.glsl", "build/box.glsl", "build/input.glsl", "build/leaf.glsl", "build/leaf_write.glsl",
-         "build/arrivals.glsl", "build/node.glsl", "build/wide.glsl", "build/packed.glsl", "build/place.glsl",
-         "build/place.comp.glsl"];
+    Place = "software_ray_query/kernels/place",
+        ["job.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
+         "arrivals.glsl", "node.glsl", "wide.glsl", "packed.glsl", "place.glsl",
+         "place.comp.glsl"];
     /// Boxes of wide nodes, where there was no room for those made of binary ones.
-    FitPacked = "build/fit_packed",
-        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
-         "build/arrivals.glsl", "build/node.glsl", "build/wide.glsl", "build/encode.glsl", "build/packed.glsl",
-         "build/fit_wide.glsl", "build/fit_packed.comp.glsl"];
+    FitPacked = "software_ray_query/kernels/fit_packed",
+        ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
+         "arrivals.glsl", "node.glsl", "wide.glsl", "encode.glsl", "packed.glsl",
+         "fit_wide.glsl", "fit_packed.comp.glsl"];
     /// Boxes of binary nodes.
-    FitBinary = "build/fit",
-        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
-         "build/arrivals.glsl", "build/node.glsl", "build/no_rotation.glsl", "build/fit.glsl", "build/fit.comp.glsl"];
+    FitBinary = "software_ray_query/kernels/fit",
+        ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
+         "arrivals.glsl", "node.glsl", "no_rotation.glsl", "fit.glsl", "fit.comp.glsl"];
     /// Boxes of wide nodes.
-    FitWide = "build/fit_wide",
-        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/leaf.glsl", "build/kept_any.glsl",
-         "build/wide.glsl", "build/encode.glsl", "build/fit_wide.glsl", "build/fit_wide.comp.glsl"];
+    FitWide = "software_ray_query/kernels/fit_wide",
+        ["shared.glsl", "job.glsl", "box.glsl", "leaf.glsl", "kept_any.glsl",
+         "wide.glsl", "encode.glsl", "fit_wide.glsl", "fit_wide.comp.glsl"];
     /// Primitives of leaves from inputs that moved.
-    RefitLeaves = "build/refit",
-        ["build/job.glsl", "build/box.glsl", "build/input.glsl", "build/leaf.glsl", "build/leaf_write.glsl",
-         "build/arrivals.glsl", "build/wide.glsl", "build/refit.glsl", "build/refit.comp.glsl"];
+    RefitLeaves = "software_ray_query/kernels/refit",
+        ["job.glsl", "box.glsl", "input.glsl", "leaf.glsl", "leaf_write.glsl",
+         "arrivals.glsl", "wide.glsl", "refit.glsl", "refit.comp.glsl"];
     /// The binary tree of a whole bottom-level structure by one workgroup.
-    BuildSmallBlas = "build/small_blas",
-        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/input.glsl",
-         "build/code.glsl", "build/rank.glsl", "build/leaf.glsl", "build/kept_input.glsl", "build/arrivals.glsl",
-         "build/tree.glsl", "build/node.glsl", "build/rotate.glsl", "build/fit.glsl", "build/meet.glsl",
-         "build/small_blas.comp.glsl", "build/small.glsl"];
+    BuildSmallBlas = "software_ray_query/kernels/small_blas",
+        ["shared.glsl", "job.glsl", "box.glsl", "bounds.glsl", "input.glsl",
+         "code.glsl", "rank.glsl", "leaf.glsl", "kept_input.glsl", "arrivals.glsl",
+         "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "meet.glsl",
+         "small_blas.comp.glsl", "small.glsl"];
     /// The rest of such a structure by one workgroup.
-    BuildSmallWide = "build/small_wide",
-        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/input.glsl", "build/leaf.glsl",
-         "build/kept_any.glsl", "build/leaf_write.glsl", "build/arrivals.glsl", "build/node.glsl", "build/wide.glsl",
-         "build/encode.glsl", "build/collapse.glsl", "build/packed.glsl", "build/place.glsl", "build/fit_wide.glsl",
-         "build/meet.glsl", "build/small_wide.comp.glsl"];
+    BuildSmallWide = "software_ray_query/kernels/small_wide",
+        ["shared.glsl", "job.glsl", "box.glsl", "input.glsl", "leaf.glsl",
+         "kept_any.glsl", "leaf_write.glsl", "arrivals.glsl", "node.glsl", "wide.glsl",
+         "encode.glsl", "collapse.glsl", "packed.glsl", "place.glsl", "fit_wide.glsl",
+         "meet.glsl", "small_wide.comp.glsl"];
     /// A whole top-level structure by one workgroup.
-    BuildSmallTlas = "build/small_tlas",
-        ["build/shared.glsl", "build/job.glsl", "build/box.glsl", "build/bounds.glsl", "build/instance.glsl",
-         "build/code.glsl", "build/rank.glsl", "build/leaf.glsl", "build/kept_input.glsl", "build/arrivals.glsl",
-         "build/tree.glsl", "build/node.glsl", "build/rotate.glsl", "build/fit.glsl", "build/meet.glsl",
-         "build/small_tlas.comp.glsl", "build/small.glsl"];
+    BuildSmallTlas = "software_ray_query/kernels/small_tlas",
+        ["shared.glsl", "job.glsl", "box.glsl", "bounds.glsl", "instance.glsl",
+         "code.glsl", "rank.glsl", "leaf.glsl", "kept_input.glsl", "arrivals.glsl",
+         "tree.glsl", "node.glsl", "rotate.glsl", "fit.glsl", "meet.glsl",
+         "small_tlas.comp.glsl", "small.glsl"];
 }
 
 /// Push constants of [`Kernel::Gather`].
@@ -262,12 +263,13 @@ mod tests {
     #[test]
     fn the_words_are_those_of_the_source() {
         let crate_folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-        let folder = crate_folder.join("src/kernel");
+        let sources = crate_folder.join("src");
         let read = |path: &std::path::Path| std::fs::read_to_string(path).unwrap();
         for kernel in Kernel::ALL {
             let (file, pieces) = kernel.source();
-            let text: String = pieces.iter().map(|piece| read(&folder.join(piece))).collect();
-            expect_words(&folder.join(format!("{file}.comp.spv")), &text);
+            let words = sources.join(format!("{file}.comp.spv"));
+            let text: String = pieces.iter().map(|piece| read(&words.with_file_name(piece))).collect();
+            expect_words(&words, &text);
         }
         let tests = crate_folder.join("tests");
         expect_words(&tests.join("spirv_only.comp.spv"), &read(&tests.join("spirv_only.comp.glsl")));

@@ -1,4 +1,4 @@
-//! How a structure lies in memory; the same numbers as in `shader/glsl/software_layout.glsl`.
+//! How a structure lies in memory; the same numbers as in `software_ray_query/glsl/software_layout.glsl`.
 //!
 //! A structure is one range of a buffer. Its header says by numbers of 16-byte blocks from its own start where its parts
 //! lie, so that it may be copied as it is.

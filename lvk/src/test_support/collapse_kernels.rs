@@ -12,7 +12,7 @@ use crate::software_ray_query::gpu_build::steps::wide_steps;
 use crate::software_ray_query::layout::LeafKind;
 use crate::test_support::collapse_model::{Below, BinaryTree, WideChild, WideTree};
 
-/// Words of the state, as `kernel/build/job.glsl` numbers them.
+/// Words of the state, as `software_ray_query/kernels/job.glsl` numbers them.
 const ACTIVE: usize = 6;
 const WIDE_NODES: usize = 8;
 const ENDS: usize = 9;

@@ -1,4 +1,4 @@
-//! How a binary tree becomes a wide one, as `kernel/build/collapse.glsl` does it: what tests hold the kernel against.
+//! How a binary tree becomes a wide one, as `software_ray_query/kernels/collapse.glsl` does it: what tests hold the kernel against.
 
 use super::gpu_build_check::Bounds;
 use crate::software_ray_query::layout::DEEPEST_WIDE;

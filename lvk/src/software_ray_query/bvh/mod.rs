@@ -1,7 +1,7 @@
 //! Trees for devices without ray tracing: how the CPU builds them and keeps them on disk, which kernels build them on
 //! the GPU, and whether a tree from a file is sound. What they are made for is in [`crate::software_ray_query`].
 //!
-//! Shaders walk them with `shader/glsl/software_*.glsl`.
+//! Shaders walk them with `software_ray_query/glsl/software_*.glsl`.
 
 pub(crate) mod bvh2;
 pub(crate) mod bvh8;

@@ -14,7 +14,7 @@ use crate::resource::Buffer;
 const MATRIX_BYTES: u64 = 48;
 const BOX_BYTES: u64 = 24;
 
-/// `Geometry` of `kernel/build/input.glsl`.
+/// `Geometry` of `software_ray_query/kernels/input.glsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub(crate) struct GpuGeometry {
@@ -108,7 +108,7 @@ fn triangles_of(
     })
 }
 
-/// The number of a format that structures are built from, in `positionAt` of `kernel/build/input.glsl`.
+/// The number of a format that structures are built from, in `positionAt` of `software_ray_query/kernels/input.glsl`.
 fn format_number(format: VertexFormat) -> Option<u32> {
     Some(match format {
         VertexFormat::F32 => 0,

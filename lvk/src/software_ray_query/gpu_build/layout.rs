@@ -24,7 +24,7 @@ const BLOB_ALIGNMENT: u64 = 256;
 const MOST_PRIMITIVES: u64 = 1 << 27;
 /// Up to so many primitives one workgroup makes the whole build.
 const MOST_SMALL: u32 = 2048;
-/// Keys that a workgroup sorts, `kBlock` of `kernel/build/job.glsl`.
+/// Keys that a workgroup sorts, `kBlock` of `software_ray_query/kernels/job.glsl`.
 pub(crate) const SORT_BLOCK: u32 = 1024;
 const DIGITS: u32 = 16;
 /// Nodes on a path that traversal has room for.
@@ -34,7 +34,7 @@ const CODE_BITS: u32 = 30;
 const MOST_IMPROVEMENTS: u32 = 8;
 /// Of top-level structures.
 const TLAS_IMPROVEMENTS: u32 = 1;
-/// Words that say how far a build is, `kStateWords` of `kernel/build/job.glsl`.
+/// Words that say how far a build is, `kStateWords` of `software_ray_query/kernels/job.glsl`.
 pub(crate) const STATE_WORDS: u64 = 48;
 const BOX_WORDS: u64 = 6;
 

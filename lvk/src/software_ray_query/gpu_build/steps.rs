@@ -5,7 +5,7 @@ use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan, SO
 use crate::software_ray_query::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
 use crate::software_ray_query::layout::{DEEPEST_WIDE, LeafKind};
 
-/// Invocations of a workgroup, `kGroup` of `kernel/build/job.glsl`.
+/// Invocations of a workgroup, `kGroup` of `software_ray_query/kernels/job.glsl`.
 const GROUP: u32 = 128;
 /// Passes over the first word of codes, four bits each, and at most over both words.
 const FIRST_WORD_PASSES: u32 = 8;
