@@ -14,7 +14,7 @@ use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
 use crate::accel::tlas::TlasContents;
 use crate::accel::tlas_tracker::TlasUpdates;
-use crate::barrier::{QueryStages, ResourceId};
+use crate::barrier::{RayQueryStages, ResourceId};
 use crate::bindless::index_checks::BindlessArray;
 use crate::bindless::{Bindless, TEXTURE_ARRAYS};
 use crate::error::Result;
@@ -41,7 +41,7 @@ pub(crate) struct Shared {
     pub(crate) dummies: OnceLock<DummyObjects>,
     pub(crate) store: Store,
     pub(crate) staging: Staging,
-    /// One for each lane, so that builds on one queue do not wait for those on another.
+    /// One for each queue, so that builds on one queue do not wait for those on another.
     pub(crate) scratch: [ScratchBuffer; 3],
     pub(crate) accel_storage: AccelStorage,
     pub(crate) kernels: Kernels,
@@ -60,7 +60,7 @@ pub(crate) struct Shared {
     pub(crate) submitter: Submitter<Garbage>,
     pub(crate) profiler: Profiler,
     /// Where graphics pipelines query rays.
-    pub(crate) graphics_queries: QueryStages,
+    pub(crate) graphics_queries: RayQueryStages,
     /// Stands for every bottom-level structure at once: their builds add to it; builds of top levels, traces and
     /// queries read it.
     pub(crate) all_blas: ResourceId,
@@ -104,7 +104,7 @@ pub(crate) enum Garbage {
     Body(#[expect(dead_code, reason = "held only to be dropped")] Arc<BlasBody>),
     /// A buffer that a command buffer uses, whoever else holds it: its owner may fail to come into being.
     Held(Arc<Buffer>),
-    /// As [`Held`](Self::Held), one of those who [share](crate::resource::image::Image::share) the image.
+    /// As [`Held`](Self::Held), one of those who [share](crate::resource::image::Image::add_texture) the image.
     HeldTexture(Arc<Texture>),
     /// A structure of the library's own that a command buffer fills, whoever else holds it.
     Software(#[expect(dead_code, reason = "held only to be dropped")] Arc<SoftwareBody>),
@@ -133,17 +133,17 @@ impl Shared {
 
     /// The slot of the object may be reached no longer by what is recorded from now on.
     fn note_retired(&self, garbage: &Garbage) {
-        let newest = || self.submitter.newest();
+        let newest = || self.submitter.newest_sequence();
         match garbage {
             // Indices of textures in Y'CbCr are constants, which nobody checks.
             Garbage::Texture(texture) if texture.is_yuv() => {}
-            Garbage::Texture(texture) => self.bindless.note_retired(&TEXTURE_ARRAYS, texture.slot, newest),
+            Garbage::Texture(texture) => self.bindless.record_retired(&TEXTURE_ARRAYS, texture.slot, newest),
             Garbage::Sampler(sampler) => {
-                self.bindless.note_retired(&[BindlessArray::Samplers], sampler.slot, newest);
+                self.bindless.record_retired(&[BindlessArray::Samplers], sampler.slot, newest);
             }
             Garbage::AccelStruct(object) => {
                 if let AccelKind::Tlas(tlas) = &object.kind {
-                    self.bindless.note_retired(&[BindlessArray::AccelStructs], tlas.slot, newest);
+                    self.bindless.record_retired(&[BindlessArray::AccelStructs], tlas.slot, newest);
                 }
             }
             _ => {}
@@ -180,7 +180,7 @@ impl Shared {
             Garbage::Buffer(buffer) => self.submitter.forget(buffer.id),
             Garbage::QueryPool(pool) => self.submitter.forget(pool.id),
             Garbage::Texture(texture) => {
-                if texture.image.release() {
+                if texture.image.remove_texture() {
                     self.submitter.forget(texture.image.id);
                 }
                 if texture.is_yuv() {
@@ -199,7 +199,7 @@ impl Shared {
                 }
             }
             Garbage::HeldTexture(texture) => {
-                if texture.image.release() {
+                if texture.image.remove_texture() {
                     self.submitter.forget(texture.image.id);
                 }
             }

@@ -71,7 +71,7 @@ pub enum Error {
         message: String,
     },
     /// The queue of a command buffer does not take a command.
-    #[error("{command} cannot be recorded for the {} queue; acquire a command buffer on {remedy}", queue.words())]
+    #[error("{command} cannot be recorded for the {} queue; acquire a command buffer on {remedy}", queue.label())]
     WrongQueue {
         /// The command.
         command: &'static str,
@@ -149,7 +149,7 @@ pub enum Error {
         call: &'static str,
     },
     /// The device was lost; the context cannot be used any more.
-    #[error("the device was lost in {call}{}; create a new context", of_fault(fault))]
+    #[error("the device was lost in {call}{}; create a new context", fault_suffix(fault))]
     DeviceLost {
         /// The Vulkan command that reported the loss.
         call: &'static str,
@@ -191,7 +191,7 @@ impl Error {
     }
 }
 
-fn of_fault(fault: &Option<Arc<DeviceFault>>) -> String {
+fn fault_suffix(fault: &Option<Arc<DeviceFault>>) -> String {
     fault.as_ref().map(|fault| format!(" ({fault})")).unwrap_or_default()
 }
 

@@ -3,7 +3,7 @@
 use std::num::NonZero;
 use std::thread::{Builder, available_parallelism, scope};
 
-use crate::lock_order::{Mutex, Rank, Waiting};
+use crate::lock_order::{HeldLocks, Mutex, Rank};
 
 /// Threads that are worth having for work of any number of pieces.
 pub(crate) fn cores() -> usize {
@@ -17,10 +17,10 @@ pub(crate) fn run_on(threads: usize, work: impl Fn() + Sync) {
 
 /// The others are made as `thread` says.
 fn run_on_made(threads: usize, thread: impl Fn() -> Builder, work: impl Fn() + Sync) {
-    let waiting = Waiting::here();
+    let waiting = HeldLocks::of_current_thread();
     scope(|scope| {
         for _ in 1..threads {
-            if thread().spawn_scoped(scope, || waiting.work(&work)).is_err() {
+            if thread().spawn_scoped(scope, || waiting.run_with(&work)).is_err() {
                 break;
             }
         }

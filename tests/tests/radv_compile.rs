@@ -11,8 +11,8 @@ use lvk_tests::radv::Radv;
 
 /// The compute shaders that the library runs by itself.
 const KERNELS: [(&str, &str); 2] = [
-    ("gather", include_str!("../../lvk/src/kernel/gather.comp.glsl")),
-    ("instances", include_str!("../../lvk/src/kernel/instances.comp.glsl")),
+    ("gather", include_str!("../../lvk/src/kernels/gather.comp.glsl")),
+    ("instances", include_str!("../../lvk/src/kernels/instances.comp.glsl")),
 ];
 
 fn kernels() -> impl Iterator<Item = SamplePipeline> {

@@ -94,7 +94,7 @@ impl BuildInput {
         let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
         // SAFETY: one count for each geometry; addresses are not read by a size query.
         unsafe {
-            gpu.accel()?.get_acceleration_structure_build_sizes(
+            gpu.accel_functions()?.get_acceleration_structure_build_sizes(
                 vk::AccelerationStructureBuildTypeKHR::DEVICE,
                 &self.info(false),
                 &counts,

@@ -26,7 +26,7 @@ impl RawStructure {
         ty: vk::AccelerationStructureTypeKHR,
         bytes: u64,
     ) -> Result<Self> {
-        let ext = gpu.accel()?.clone();
+        let ext = gpu.accel_functions()?.clone();
         let storage = storage.alloc(gpu, name, bytes)?;
         let info = vk::AccelerationStructureCreateInfoKHR::default()
             .buffer(storage.buffer.raw)

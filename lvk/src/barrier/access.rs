@@ -112,17 +112,17 @@ impl Stages {
 
     /// The accesses that any of these stages can perform.
     pub(crate) fn possible_accesses(self) -> Access {
-        self.rows().fold(Access::empty(), |all, row| all | POSSIBLE[row])
+        self.indices().fold(Access::empty(), |all, row| all | POSSIBLE[row])
     }
 
     /// Position of a single stage in a table of [`Stages::COUNT`] rows.
     #[cfg(test)]
-    fn row(self) -> usize {
+    fn index(self) -> usize {
         (self.bits().trailing_zeros() as usize).min(Self::COUNT - 1)
     }
 
     /// The rows of all of them, in rising order.
-    fn rows(self) -> impl Iterator<Item = usize> {
+    fn indices(self) -> impl Iterator<Item = usize> {
         let mut left = self.bits();
         std::iter::from_fn(move || {
             let row = left.trailing_zeros() as usize;
@@ -262,7 +262,7 @@ impl Use {
     }
 
     /// Structures that shaders of `stages` walk themselves, or have walked for them.
-    pub(crate) const fn structure_walk(stages: Stages) -> Self {
+    pub(crate) const fn software_traversal(stages: Stages) -> Self {
         Self::new(stages, Access::ACCEL_READ.union(Access::SHADER_READ), Layout::Undefined)
     }
 
@@ -347,7 +347,7 @@ impl StageAccess {
     /// Adds what `touch` does at each of its stages.
     #[inline(never)]
     pub(crate) fn insert(&mut self, touch: Use) {
-        for row in touch.stages.rows() {
+        for row in touch.stages.indices() {
             self.0[row] |= touch.access & POSSIBLE[row];
         }
     }
@@ -360,7 +360,7 @@ impl StageAccess {
     /// Accesses of a single stage.
     #[cfg(test)]
     pub(crate) fn at(&self, stage: Stages) -> Access {
-        self.0[stage.row()]
+        self.0[stage.index()]
     }
 
     /// Stages with at least one access.
@@ -389,7 +389,7 @@ mod tests {
 
     #[test]
     fn every_single_stage_has_a_row_and_an_access() {
-        let rows: Vec<usize> = Stages::all().iter().map(Stages::row).collect();
+        let rows: Vec<usize> = Stages::all().iter().map(Stages::index).collect();
         assert_eq!(rows, (0..Stages::COUNT).collect::<Vec<_>>());
         assert!(Stages::all().iter().all(|stage| !stage.possible_access().is_empty()));
     }

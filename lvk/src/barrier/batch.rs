@@ -2,7 +2,7 @@
 
 use super::access::{Access, Stages};
 use super::resource_id::ResourceId;
-use super::resource_state::Scopes;
+use super::resource_state::BarrierScopes;
 use super::subresource::Subresources;
 
 /// A global memory barrier.
@@ -40,7 +40,7 @@ pub(crate) struct ImageBarrier {
     /// Which part of it.
     pub(crate) subresources: Subresources,
     /// Both sides; the layouts differ.
-    pub(crate) scopes: Scopes,
+    pub(crate) scopes: BarrierScopes,
 }
 
 /// All barriers in front of one command.
@@ -68,7 +68,7 @@ impl Barriers {
 
     /// Adds a barrier without a layout transition.
     #[inline]
-    pub(crate) fn push_memory(&mut self, scopes: &Scopes) {
+    pub(crate) fn push_memory(&mut self, scopes: &BarrierScopes) {
         let memory = self.memory.get_or_insert_default();
         memory.src_stages |= scopes.src_stages;
         memory.src_access |= scopes.src_access;
@@ -78,7 +78,7 @@ impl Barriers {
 
     /// Adds a barrier of a part of a texture.
     #[inline]
-    pub(crate) fn push_image(&mut self, id: ResourceId, subresources: Subresources, scopes: &Scopes) {
+    pub(crate) fn push_image(&mut self, id: ResourceId, subresources: Subresources, scopes: &BarrierScopes) {
         if scopes.old_layout == scopes.new_layout {
             self.push_memory(scopes);
         } else {

@@ -1,7 +1,7 @@
 //! Hidden barriers, decided without a Vulkan device.
 //!
-//! A [`Tracker`] follows one command buffer while it is recorded; [`States`] follows the queue. Both advance the
-//! `State` of each buffer and each subresource of a texture by one rule, `resource_state::transition`.
+//! A [`Tracker`] follows one command buffer while it is recorded; [`QueueState`] follows the queue. Both advance the
+//! `ResourceState` of each buffer and each subresource of a texture by one rule, `resource_state::transition`.
 
 mod access;
 mod batch;
@@ -19,8 +19,8 @@ mod model_tests;
 
 pub(crate) use access::{Access, Layout, Stages, Use};
 pub(crate) use batch::{Barriers, ImageBarrier, MemoryBarrier};
-pub(crate) use queue_state::States;
-pub(crate) use ray_query_stages::QueryStages;
+pub(crate) use queue_state::QueueState;
+pub(crate) use ray_query_stages::RayQueryStages;
 pub(crate) use resource_id::{IdHasher, IdMap, ResourceId};
 pub(crate) use subresource::{Subresources, TextureShape};
-pub(crate) use tracker::{Tracker, Used};
+pub(crate) use tracker::{TrackedUse, Tracker};

@@ -39,7 +39,7 @@ pub(crate) type Command = Vec<Op>;
 
 /// What the queue executes.
 #[derive(Debug, Clone)]
-pub(crate) enum Event {
+pub(crate) enum ModelEvent {
     Barriers(Barriers),
     Command(Command),
 }
@@ -81,20 +81,21 @@ pub(crate) fn edges(barriers: &Barriers, cell: Cell) -> Vec<Edge> {
 
 /// What happens to one cell, in the order of the queue.
 #[derive(Debug, Clone)]
-enum Step {
+enum CellStep {
     Barrier(Vec<Edge>),
     Access { touch: Use, accumulated: bool },
 }
 
-fn steps(log: &[Event], cell: Cell) -> Vec<Step> {
+fn steps(log: &[ModelEvent], cell: Cell) -> Vec<CellStep> {
     let mut steps = Vec::new();
     for event in log {
         match event {
-            Event::Barriers(barriers) => steps.push(Step::Barrier(edges(barriers, cell))),
-            Event::Command(command) => {
+            ModelEvent::Barriers(barriers) => steps.push(CellStep::Barrier(edges(barriers, cell))),
+            ModelEvent::Command(command) => {
                 let touching = command.iter().filter(|op| op.covers(cell));
-                steps
-                    .extend(touching.map(|op| Step::Access { touch: op.touch, accumulated: op.accumulated }));
+                steps.extend(
+                    touching.map(|op| CellStep::Access { touch: op.touch, accumulated: op.accumulated }),
+                );
             }
         }
     }
@@ -138,11 +139,11 @@ impl Wait {
     pub(crate) fn for_transition(edge: &Edge) -> Self {
         let mut wait = Self::for_access(Stages::empty(), Access::empty());
         wait.chain = edge.dst_stages;
-        wait.see(edge);
+        wait.apply_edge(edge);
         wait
     }
 
-    fn see(&mut self, edge: &Edge) {
+    fn apply_edge(&mut self, edge: &Edge) {
         self.flushed |= edge.dst_stages;
         self.visible.insert(Use {
             stages: edge.dst_stages,
@@ -161,12 +162,12 @@ impl Wait {
     }
 
     /// Passes one place with barriers: they run side by side and do not chain with each other.
-    pub(crate) fn pass(&mut self, edges: &[Edge]) {
+    pub(crate) fn apply_edges(&mut self, edges: &[Edge]) {
         let before = self.clone();
         for edge in edges.iter().filter(|edge| before.is_waited_by(edge)) {
             self.chain |= edge.dst_stages;
             if before.is_flushed_by(edge) {
-                self.see(edge);
+                self.apply_edge(edge);
             }
         }
     }
@@ -188,15 +189,15 @@ impl Wait {
 }
 
 /// The first violation of Vulkan's rules in what happens to one cell.
-fn violation(steps: &[Step]) -> Option<String> {
+fn violation(steps: &[CellStep]) -> Option<String> {
     wrong_layout(steps).or_else(|| (0..steps.len()).find_map(|at| violation_after(steps, at)))
 }
 
-fn wrong_layout(steps: &[Step]) -> Option<String> {
+fn wrong_layout(steps: &[CellStep]) -> Option<String> {
     let mut layout = Layout::Undefined;
     for (at, step) in steps.iter().enumerate() {
         match step {
-            Step::Barrier(edges) => {
+            CellStep::Barrier(edges) => {
                 for (old, new) in edges.iter().filter_map(|edge| edge.relayout) {
                     if old != layout || old == new {
                         return Some(format!("{at}: transition {old:?} to {new:?} finds {layout:?}"));
@@ -204,42 +205,42 @@ fn wrong_layout(steps: &[Step]) -> Option<String> {
                     layout = new;
                 }
             }
-            Step::Access { touch, .. } if touch.layout != Layout::Undefined && touch.layout != layout => {
+            CellStep::Access { touch, .. } if touch.layout != Layout::Undefined && touch.layout != layout => {
                 return Some(format!("{at}: {touch:?} finds {layout:?}"));
             }
-            Step::Access { .. } => {}
+            CellStep::Access { .. } => {}
         }
     }
     None
 }
 
-fn violation_after(steps: &[Step], at: usize) -> Option<String> {
+fn violation_after(steps: &[CellStep], at: usize) -> Option<String> {
     match &steps[at] {
-        Step::Access { touch, accumulated } => touch.stages.iter().find_map(|origin| {
+        CellStep::Access { touch, accumulated } => touch.stages.iter().find_map(|origin| {
             let wait = Wait::for_access(origin, touch.access);
             let writes = !wait.written.is_empty();
             first_unordered(&steps[at + 1..], wait, *accumulated, writes)
                 .map(|later| format!("{touch:?} at {at} conflicts with {}", at + 1 + later))
         }),
-        Step::Barrier(edges) => edges.iter().filter(|edge| edge.relayout.is_some()).find_map(|edge| {
+        CellStep::Barrier(edges) => edges.iter().filter(|edge| edge.relayout.is_some()).find_map(|edge| {
             first_unordered(&steps[at + 1..], Wait::for_transition(edge), false, true)
                 .map(|later| format!("transition at {at} conflicts with {}", at + 1 + later))
         }),
     }
 }
 
-fn first_unordered(steps: &[Step], mut wait: Wait, independent: bool, writes: bool) -> Option<usize> {
+fn first_unordered(steps: &[CellStep], mut wait: Wait, independent: bool, writes: bool) -> Option<usize> {
     for (at, step) in steps.iter().enumerate() {
         match step {
-            Step::Barrier(edges) => {
+            CellStep::Barrier(edges) => {
                 let mut transitions = edges.iter().filter(|edge| edge.relayout.is_some());
                 if transitions.any(|edge| !wait.allows_transition(edge)) {
                     return Some(at);
                 }
-                wait.pass(edges);
+                wait.apply_edges(edges);
             }
-            Step::Access { accumulated: true, .. } if independent => {}
-            Step::Access { touch, .. } => {
+            CellStep::Access { accumulated: true, .. } if independent => {}
+            CellStep::Access { touch, .. } => {
                 if touch.stages.iter().any(|stage| !may_follow(&wait, writes, stage, touch.access)) {
                     return Some(at);
                 }
@@ -258,11 +259,11 @@ pub(crate) fn may_follow(wait: &Wait, earlier_writes: bool, stage: Stages, acces
     }
 }
 
-fn cells_of(log: &[Event]) -> Vec<Cell> {
+fn cells_of(log: &[ModelEvent]) -> Vec<Cell> {
     let mut cells = BTreeSet::new();
     let commands = log.iter().filter_map(|event| match event {
-        Event::Command(command) => Some(command),
-        Event::Barriers(_) => None,
+        ModelEvent::Command(command) => Some(command),
+        ModelEvent::Barriers(_) => None,
     });
     for op in commands.flatten() {
         let shape = op.texture.map_or(TextureShape { mips: 1, layers: 1 }, |(shape, _)| shape);
@@ -276,7 +277,7 @@ fn cells_of(log: &[Event]) -> Vec<Cell> {
 }
 
 /// The first violation in a queue's log, with what happens to the cell concerned.
-pub(crate) fn any_violation(log: &[Event]) -> Option<String> {
+pub(crate) fn any_violation(log: &[ModelEvent]) -> Option<String> {
     cells_of(log).into_iter().find_map(|cell| {
         violation(&steps(log, cell)).map(|what| format!("{cell:?}: {what}\n{:#?}", steps(log, cell)))
     })

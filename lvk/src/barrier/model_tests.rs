@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use proptest::prelude::*;
 
-use super::model::{Cell, Command, Event, Op, any_violation, edges};
-use super::resource_state::Scopes;
+use super::model::{Cell, Command, ModelEvent, Op, any_violation, edges};
+use super::resource_state::BarrierScopes;
 use super::*;
 
 const BUFFERS: u64 = 2;
@@ -36,9 +36,9 @@ impl Program {
     }
 
     /// Records with the tracker, interleaved, and submits.
-    fn run(&self) -> Vec<Event> {
+    fn run(&self) -> Vec<ModelEvent> {
         let mut trackers = vec![Tracker::default(); self.commands.len()];
-        let mut recorded: Vec<Vec<Event>> = vec![Vec::new(); self.commands.len()];
+        let mut recorded: Vec<Vec<ModelEvent>> = vec![Vec::new(); self.commands.len()];
         let mut next = vec![0; self.commands.len()];
         for &buffer in &self.recording_order {
             if let Some(command) = self.commands[buffer].get(next[buffer]) {
@@ -46,10 +46,10 @@ impl Program {
                 next[buffer] += 1;
             }
         }
-        let mut queue = States::default();
+        let mut queue = QueueState::default();
         let mut log = Vec::new();
         for &buffer in &self.submission_order {
-            log.push(Event::Barriers(queue.submit(&trackers[buffer])));
+            log.push(ModelEvent::Barriers(queue.submit(&trackers[buffer])));
             log.append(&mut recorded[buffer]);
         }
         log
@@ -64,7 +64,7 @@ fn record_op(op: &Op, tracker: &mut Tracker, out: &mut Barriers) {
     }
 }
 
-fn record(tracker: &mut Tracker, command: &Command, log: &mut Vec<Event>) {
+fn record(tracker: &mut Tracker, command: &Command, log: &mut Vec<ModelEvent>) {
     let mut out = Barriers::default();
     let before = tracker.clone();
     for op in command {
@@ -76,15 +76,15 @@ fn record(tracker: &mut Tracker, command: &Command, log: &mut Vec<Event>) {
     });
     let surprising = command.iter().any(|op| op.accumulated);
     assert!(predicted != out.is_empty() || surprising, "needs_barrier disagrees with the barriers issued");
-    log.push(Event::Barriers(out));
-    log.push(Event::Command(command.clone()));
+    log.push(ModelEvent::Barriers(out));
+    log.push(ModelEvent::Command(command.clone()));
 }
 
 /// Every log that lacks one barrier of `log`, with the words for it.
-fn logs_without_one(log: &[Event]) -> Vec<(String, Vec<Event>)> {
+fn logs_without_one(log: &[ModelEvent]) -> Vec<(String, Vec<ModelEvent>)> {
     let mut weaker = Vec::new();
     for (at, event) in log.iter().enumerate() {
-        let Event::Barriers(barriers) = event else { continue };
+        let ModelEvent::Barriers(barriers) = event else { continue };
         let mut variants = Vec::new();
         if barriers.memory.is_some() {
             variants.push(Barriers { memory: None, ..barriers.clone() });
@@ -100,10 +100,10 @@ fn logs_without_one(log: &[Event]) -> Vec<(String, Vec<Event>)> {
 }
 
 /// Every log in which one bit of one barrier of `log` is missing.
-fn logs_without_one_bit(log: &[Event]) -> Vec<(String, Vec<Event>)> {
+fn logs_without_one_bit(log: &[ModelEvent]) -> Vec<(String, Vec<ModelEvent>)> {
     let mut weaker = Vec::new();
     for (at, event) in log.iter().enumerate() {
-        let Event::Barriers(barriers) = event else { continue };
+        let ModelEvent::Barriers(barriers) = event else { continue };
         let mut variants = Vec::new();
         if let Some(memory) = barriers.memory {
             for memory in weaker_memory(memory) {
@@ -128,10 +128,10 @@ fn weaker_memory(memory: MemoryBarrier) -> Vec<MemoryBarrier> {
     src.chain(dst).chain(flush).chain(see.filter(move |_| flushes)).collect()
 }
 
-fn replaced(log: &[Event], at: usize, old: &Barriers, new: Barriers) -> (String, Vec<Event>) {
+fn replaced(log: &[ModelEvent], at: usize, old: &Barriers, new: Barriers) -> (String, Vec<ModelEvent>) {
     let words = format!("at {at}, {new:?} does as well as {old:?}");
     let mut weaker = log.to_vec();
-    weaker[at] = Event::Barriers(new);
+    weaker[at] = ModelEvent::Barriers(new);
     (words, weaker)
 }
 
@@ -215,7 +215,7 @@ fn texture_op() -> impl Strategy<Value = Op> {
             base_layer,
             layer_count: layers.min(shape.layers - base_layer),
         };
-        let range = if whole { shape.whole() } else { part };
+        let range = if whole { shape.all_subresources() } else { part };
         Op { id: ResourceId(id), texture: Some((shape, range)), touch, accumulated: false }
     })
 }
@@ -306,16 +306,16 @@ proptest! {
     #[test]
     fn barriers_are_the_sum_over_cells(program in program()) {
         let cells: Vec<Cell> = buffer_cells().chain(texture_cells()).collect();
-        let alone: Vec<Vec<Event>> = cells.iter().map(|cell| program.only(*cell).run()).collect();
+        let alone: Vec<Vec<ModelEvent>> = cells.iter().map(|cell| program.only(*cell).run()).collect();
         for (at, event) in program.run().iter().enumerate() {
-            let Event::Barriers(barriers) = event else { continue };
+            let ModelEvent::Barriers(barriers) = event else { continue };
             let mut sum = Barriers::default();
             for (cell, log) in cells.iter().zip(&alone) {
-                let Event::Barriers(part) = &log[at] else { panic!("logs differ in shape") };
+                let ModelEvent::Barriers(part) = &log[at] else { panic!("logs differ in shape") };
                 prop_assert_eq!(relayouts(barriers, *cell), relayouts(part, *cell));
                 if let Some(MemoryBarrier { src_stages, src_access, dst_stages, dst_access }) = part.memory {
                     let (old_layout, new_layout) = (Layout::General, Layout::General);
-                    sum.push_memory(&Scopes { src_stages, src_access, dst_stages, dst_access, old_layout, new_layout });
+                    sum.push_memory(&BarrierScopes { src_stages, src_access, dst_stages, dst_access, old_layout, new_layout });
                 }
             }
             prop_assert_eq!(barriers.memory, sum.memory);
@@ -327,7 +327,7 @@ fn buffer(touch: Use) -> Op {
     Op { id: ResourceId(0), texture: None, touch: touch.with_layout(Layout::Undefined), accumulated: false }
 }
 
-fn log_of(ops: &[Op]) -> Vec<Event> {
+fn log_of(ops: &[Op]) -> Vec<ModelEvent> {
     let commands = vec![ops.iter().map(|op| vec![*op]).collect()];
     Program { commands, recording_order: vec![0; ops.len()], submission_order: vec![0] }.run()
 }
@@ -340,10 +340,11 @@ fn model_finds_a_missing_barrier_of_each_kind() {
     for pair in [[write, read], [read, write], [write, write]] {
         let log = log_of(&pair);
         assert_eq!(any_violation(&log), None);
-        let bare: Vec<Event> = log.into_iter().filter(|event| matches!(event, Event::Command(_))).collect();
+        let bare: Vec<ModelEvent> =
+            log.into_iter().filter(|event| matches!(event, ModelEvent::Command(_))).collect();
         assert!(any_violation(&bare).is_some(), "{pair:?}");
     }
-    assert_eq!(any_violation(&[Event::Command(vec![read]), Event::Command(vec![read])]), None);
+    assert_eq!(any_violation(&[ModelEvent::Command(vec![read]), ModelEvent::Command(vec![read])]), None);
 }
 
 /// Reads of an earlier command buffer in another stage than the reads in front of a write: the write waits for both.
@@ -357,7 +358,7 @@ fn write_behind_reads_waits_for_readers_of_earlier_command_buffers() {
     let program = Program { commands, recording_order: vec![0, 1, 1], submission_order: vec![0, 1] };
     let log = program.run();
     assert_eq!(any_violation(&log), None);
-    let Event::Barriers(before_second) = &log[3] else { panic!("a submission starts with barriers") };
+    let ModelEvent::Barriers(before_second) = &log[3] else { panic!("a submission starts with barriers") };
     assert_eq!(before_second.memory.unwrap().src_stages, Stages::FRAGMENT);
 }
 
@@ -366,19 +367,19 @@ fn whole_texture_is_one_barrier_and_parts_join_into_ranges() {
     let (id, shape) = (ResourceId(9), TextureShape { mips: 4, layers: 6 });
     let mut tracker = Tracker::default();
     let mut out = Barriers::default();
-    tracker.use_texture(id, shape, shape.whole(), Use::transfer_write(), &mut out);
+    tracker.use_texture(id, shape, shape.all_subresources(), Use::transfer_write(), &mut out);
     assert!(out.is_empty());
-    let upper = Subresources { base_mip: 1, mip_count: 3, ..shape.whole() };
+    let upper = Subresources { base_mip: 1, mip_count: 3, ..shape.all_subresources() };
     tracker.use_texture(id, shape, upper, Use::shader_read(Stages::FRAGMENT), &mut out);
     assert_eq!(out.images.iter().map(|image| image.subresources).collect::<Vec<_>>(), [upper]);
     out.clear();
-    tracker.use_texture(id, shape, shape.whole(), Use::transfer_read(), &mut out);
+    tracker.use_texture(id, shape, shape.all_subresources(), Use::transfer_read(), &mut out);
     let ranges: Vec<_> = out.images.iter().map(|image| image.subresources).collect();
-    assert_eq!(ranges, [Subresources { mip_count: 1, ..shape.whole() }, upper]);
+    assert_eq!(ranges, [Subresources { mip_count: 1, ..shape.all_subresources() }, upper]);
     out.clear();
-    tracker.use_texture(id, shape, shape.whole(), Use::color_target(true), &mut out);
+    tracker.use_texture(id, shape, shape.all_subresources(), Use::color_target(true), &mut out);
     assert_eq!(out.images.len(), 1);
-    assert_eq!(out.images[0].subresources, shape.whole());
+    assert_eq!(out.images[0].subresources, shape.all_subresources());
 }
 
 #[test]
@@ -389,7 +390,7 @@ fn ranges_outside_a_texture_are_ignored() {
     let mut out = Barriers::default();
     tracker.use_texture(ResourceId(1), shape, huge, Use::transfer_write(), &mut out);
     assert!(!tracker.needs_barrier_texture(ResourceId(1), huge, Use::transfer_read()));
-    assert!(out.is_empty() && States::default().submit(&tracker).is_empty());
+    assert!(out.is_empty() && QueueState::default().submit(&tracker).is_empty());
 }
 
 #[test]
@@ -398,7 +399,7 @@ fn forgotten_resource_is_fresh_again() {
     let mut tracker = Tracker::default();
     let mut out = Barriers::default();
     tracker.use_buffer(id, Use::shader_write(Stages::COMPUTE), &mut out);
-    let mut states = States::default();
+    let mut states = QueueState::default();
     assert!(states.submit(&tracker).is_empty());
     assert!(!states.submit(&tracker).is_empty());
     states.forget(id);

@@ -3,38 +3,38 @@
 use super::access::{Layout, StageAccess, Stages, Use};
 use super::batch::Barriers;
 use super::resource_id::{IdMap, ResourceId};
-use super::resource_state::{Scopes, State, accumulate, transition};
-use super::subresource::{Cells, Subresources, TextureShape};
-use super::tracker::{Arrived, Local, Prefix, Tracker, Used};
+use super::resource_state::{BarrierScopes, ResourceState, accumulate, transition};
+use super::subresource::{PerSubresource, Subresources, TextureShape};
+use super::tracker::{LocalState, Prefix, TrackedUse, Tracker, TransferredState};
 
 /// State of every resource after everything submitted to one queue so far.
 #[derive(Debug, Default)]
-pub(crate) struct States {
-    buffers: IdMap<State>,
-    textures: IdMap<Cells<State>>,
+pub(crate) struct QueueState {
+    buffers: IdMap<ResourceState>,
+    textures: IdMap<PerSubresource<ResourceState>>,
 }
 
-impl States {
+impl QueueState {
     /// Appends a recorded command buffer. The barriers returned must be recorded in front of it, after everything
     /// submitted before.
     pub(crate) fn submit(&mut self, local: &Tracker) -> Barriers {
         let mut out = Barriers::default();
         for (id, local) in local.buffers() {
-            if let Some(scopes) = settle(self.buffers.entry(*id).or_default(), local) {
+            if let Some(scopes) = apply_local(self.buffers.entry(*id).or_default(), local) {
                 out.push_memory(&scopes);
             }
         }
         for (id, local) in local.textures() {
-            let fresh = || Cells::new(local.shape(), State::default());
+            let fresh = || PerSubresource::new(local.shape(), ResourceState::default());
             let queue = self.textures.entry(*id).or_insert_with(fresh);
-            let whole = local.shape().whole();
-            if let (Some(local), Some(state)) = (local.uniform(), queue.whole(whole)) {
-                if let Some(scopes) = settle(state, local) {
+            let whole = local.shape().all_subresources();
+            if let (Some(local), Some(state)) = (local.uniform(), queue.uniform_mut(whole)) {
+                if let Some(scopes) = apply_local(state, local) {
                     out.push_image(*id, whole, &scopes);
                 }
                 continue;
             }
-            for (range, scopes) in settle_texture(queue, local) {
+            for (range, scopes) in apply_texture(queue, local) {
                 out.push_image(*id, range, &scopes);
             }
         }
@@ -43,30 +43,35 @@ impl States {
 
     /// An image comes from the presentation engine. The next submission waits for its semaphore at `stages`, so that the
     /// first barrier has to start there.
-    pub(crate) fn acquired(&mut self, id: ResourceId, shape: TextureShape, stages: Stages) {
-        self.textures.insert(id, Cells::new(shape, State::acquired(stages)));
+    pub(crate) fn mark_acquired(&mut self, id: ResourceId, shape: TextureShape, stages: Stages) {
+        self.textures.insert(id, PerSubresource::new(shape, ResourceState::acquired(stages)));
     }
 
     /// An image comes from somebody else, in this layout. Whatever the next submission waits for, the first barrier starts
     /// there.
-    pub(crate) fn imported(&mut self, id: ResourceId, shape: TextureShape, layout: Layout) {
+    pub(crate) fn mark_imported(&mut self, id: ResourceId, shape: TextureShape, layout: Layout) {
         let stages = Stages::all() - Stages::HOST - Stages::SHADING_RATE;
-        self.textures.insert(id, Cells::new(shape, State::imported(layout, stages)));
+        self.textures.insert(id, PerSubresource::new(shape, ResourceState::imported(layout, stages)));
     }
 
     /// The layouts that a texture is in; none for buffers, and for what was never used.
-    pub(crate) fn layouts(&self, id: ResourceId) -> Option<Cells<Layout>> {
-        self.textures.get(&id).map(|cells| cells.map(State::layout))
+    pub(crate) fn layouts(&self, id: ResourceId) -> Option<PerSubresource<Layout>> {
+        self.textures.get(&id).map(|cells| cells.map(ResourceState::layout))
     }
 
     /// The next submission takes a resource over from another queue, which left it in these layouts, and waits for a semaphore
     /// at `stages`.
-    pub(crate) fn take_over(&mut self, used: Used<'_>, before: Option<&Cells<Layout>>, stages: Stages) {
-        match used.arrived(before, stages) {
-            Arrived::Buffer => {
-                self.buffers.insert(used.id, State::default());
+    pub(crate) fn take_ownership(
+        &mut self,
+        used: TrackedUse<'_>,
+        before: Option<&PerSubresource<Layout>>,
+        stages: Stages,
+    ) {
+        match used.transferred_state(before, stages) {
+            TransferredState::Buffer => {
+                self.buffers.insert(used.id, ResourceState::default());
             }
-            Arrived::Texture(cells) => {
+            TransferredState::Texture(cells) => {
                 self.textures.insert(used.id, cells);
             }
         }
@@ -78,8 +83,8 @@ impl States {
     }
 
     /// The host has written a new image, and left it in the layout that shaders sample: nothing is pending.
-    pub(crate) fn filled(&mut self, id: ResourceId, shape: TextureShape) {
-        self.textures.insert(id, Cells::new(shape, State::untouched_in(Layout::ShaderRead)));
+    pub(crate) fn mark_host_written(&mut self, id: ResourceId, shape: TextureShape) {
+        self.textures.insert(id, PerSubresource::new(shape, ResourceState::untouched_in(Layout::ShaderRead)));
     }
 
     /// Drops what is known about a destroyed resource.
@@ -89,20 +94,23 @@ impl States {
     }
 }
 
-fn settle_texture(queue: &mut Cells<State>, local: &Cells<Local>) -> Vec<(Subresources, Scopes)> {
-    let whole = local.shape().whole();
+fn apply_texture(
+    queue: &mut PerSubresource<ResourceState>,
+    local: &PerSubresource<LocalState>,
+) -> Vec<(Subresources, BarrierScopes)> {
+    let whole = local.shape().all_subresources();
     match local.uniform() {
-        Some(local) => queue.step(whole, |state| settle(state, local)),
-        None => queue.step_each(whole, |state, mip, layer| settle(state, local.at(mip, layer))),
+        Some(local) => queue.update(whole, |state| apply_local(state, local)),
+        None => queue.update_each(whole, |state, mip, layer| apply_local(state, local.at(mip, layer))),
     }
 }
 
 /// Advances `queue` by all that a command buffer does, and returns the barrier in front of the command buffer.
-fn settle(queue: &mut State, local: &Local) -> Option<Scopes> {
+fn apply_local(queue: &mut ResourceState, local: &LocalState) -> Option<BarrierScopes> {
     let scopes = match &local.prefix {
         Prefix::Unused => return None,
         Prefix::Write(write) => transition(queue, *write),
-        Prefix::Accumulated(writes) => settle_accumulated(queue, writes, local.past_prefix),
+        Prefix::Accumulated(writes) => apply_accumulated(queue, writes, local.past_prefix),
         Prefix::Reads(layout, reads) if *layout != queue.layout() => {
             transition(queue, Use { stages: reads.stages(), access: reads.access(), layout: *layout })
         }
@@ -117,7 +125,11 @@ fn settle(queue: &mut State, local: &Local) -> Option<Scopes> {
 
 /// What follows inside the command buffer waits for these writes only, but with them for the same scope of everything
 /// submitted before. An earlier accumulated write outside that scope must be chained to these.
-fn settle_accumulated(queue: &mut State, writes: &StageAccess, past_prefix: bool) -> Option<Scopes> {
+fn apply_accumulated(
+    queue: &mut ResourceState,
+    writes: &StageAccess,
+    past_prefix: bool,
+) -> Option<BarrierScopes> {
     let all = Use { stages: writes.stages(), access: writes.access(), layout: Layout::Undefined };
     let chained = queue.is_read() || queue.write_is_within(all.stages, all.access);
     if past_prefix && !chained { transition(queue, all) } else { accumulate(queue, writes) }

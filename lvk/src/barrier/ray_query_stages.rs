@@ -10,9 +10,9 @@ use super::tracker::Tracker;
 ///
 /// A pipeline that is gone still counts, which costs a barrier and nothing else.
 #[derive(Debug, Default)]
-pub(crate) struct QueryStages(AtomicU16);
+pub(crate) struct RayQueryStages(AtomicU16);
 
-impl QueryStages {
+impl RayQueryStages {
     /// A pipeline was made that queries rays in `stages`.
     pub(crate) fn insert(&self, stages: Stages) {
         self.0.fetch_or(stages.bits(), Ordering::Relaxed);
@@ -23,7 +23,7 @@ impl QueryStages {
     /// queue's business, once a pipeline is bound that queries rays.
     ///
     /// `reads` lists everything that queries read in the given stages.
-    pub(crate) fn waiting<const N: usize>(
+    pub(crate) fn waiting_stages<const N: usize>(
         &self,
         tracker: &Tracker,
         reads: impl FnOnce(Stages) -> [(ResourceId, Use); N],
@@ -41,12 +41,12 @@ mod tests {
 
     const GRAPHICS: Stages = Stages::PRE_RASTER.union(Stages::FRAGMENT);
 
-    struct Recorded {
+    struct RecordedCommands {
         tracker: Tracker,
         structures: [ResourceId; 2],
     }
 
-    impl Recorded {
+    impl RecordedCommands {
         fn new() -> Self {
             Self { tracker: Tracker::default(), structures: [ResourceId::next(), ResourceId::next()] }
         }
@@ -63,20 +63,22 @@ mod tests {
         }
 
         fn waiting(&self, of_pipelines: Stages) -> Option<Stages> {
-            let stages = QueryStages::default();
+            let stages = RayQueryStages::default();
             stages.insert(of_pipelines);
             self.waiting_for(&stages)
         }
 
-        fn waiting_for(&self, pipelines: &QueryStages) -> Option<Stages> {
-            pipelines.waiting(&self.tracker, |stages| self.structures.map(|id| (id, Use::accel_read(stages))))
+        fn waiting_for(&self, pipelines: &RayQueryStages) -> Option<Stages> {
+            pipelines.waiting_stages(&self.tracker, |stages| {
+                self.structures.map(|id| (id, Use::accel_read(stages)))
+            })
         }
     }
 
     #[test]
     fn a_pass_waits_for_builds_of_either_level_before_it() {
         for level in [0, 1] {
-            let mut recorded = Recorded::new();
+            let mut recorded = RecordedCommands::new();
             assert_eq!(recorded.waiting(GRAPHICS), None, "nothing was built");
             recorded.build(level);
             assert_eq!(recorded.waiting(GRAPHICS), Some(GRAPHICS));
@@ -90,14 +92,14 @@ mod tests {
 
     #[test]
     fn a_pass_waits_for_nothing_where_no_pipeline_queries() {
-        let mut recorded = Recorded::new();
+        let mut recorded = RecordedCommands::new();
         recorded.build(0);
         assert_eq!(recorded.waiting(Stages::empty()), None);
     }
 
     #[test]
     fn queries_of_other_stages_do_not_wait_for_a_pass() {
-        let mut recorded = Recorded::new();
+        let mut recorded = RecordedCommands::new();
         recorded.build(1);
         recorded.query(Stages::COMPUTE);
         assert_eq!(recorded.waiting(Stages::PRE_RASTER), Some(Stages::PRE_RASTER));
@@ -108,18 +110,18 @@ mod tests {
 
     #[test]
     fn structures_of_earlier_submissions_need_no_barrier_in_front_of_a_pass() {
-        let mut recorded = Recorded::new();
+        let mut recorded = RecordedCommands::new();
         recorded.query(Stages::COMPUTE);
         assert_eq!(recorded.waiting(GRAPHICS), None);
     }
 
     #[test]
     fn stages_of_all_pipelines_add_up() {
-        let stages = QueryStages::default();
+        let stages = RayQueryStages::default();
         stages.insert(Stages::FRAGMENT);
         stages.insert(Stages::empty());
         stages.insert(Stages::PRE_RASTER);
-        let mut recorded = Recorded::new();
+        let mut recorded = RecordedCommands::new();
         recorded.build(0);
         assert_eq!(recorded.waiting_for(&stages), Some(GRAPHICS));
     }

@@ -4,7 +4,7 @@ use super::access::{Access, Layout, StageAccess, Stages, Use};
 
 /// Both sides of one barrier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Scopes {
+pub(crate) struct BarrierScopes {
     /// Stages that must have finished.
     pub(crate) src_stages: Stages,
     /// Writes of those stages that must be flushed.
@@ -21,18 +21,18 @@ pub(crate) struct Scopes {
 
 /// Stages together with their accesses: one side of a barrier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-struct Scope {
+struct BarrierScope {
     stages: Stages,
     access: Access,
 }
 
-impl Scope {
-    fn of(table: &StageAccess) -> Self {
+impl BarrierScope {
+    fn from_accesses(table: &StageAccess) -> Self {
         Self { stages: table.stages(), access: table.access() }
     }
 
     /// Stages alone, where nothing has to be flushed or seen.
-    fn waiting(stages: Stages) -> Self {
+    fn execution_only(stages: Stages) -> Self {
         Self { stages, access: Access::empty() }
     }
 
@@ -46,18 +46,18 @@ impl Scope {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Epoch {
     /// What every one of them waits for.
-    before: Scope,
+    before: BarrierScope,
     /// Which of them already do.
     waited: StageAccess,
 }
 
 /// Everything later uses of one (sub)resource may have to wait for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct State {
+pub(crate) struct ResourceState {
     layout: Layout,
     /// The last write, or the last layout transition: then the stages that waited for it, and no access, since Vulkan
     /// flushes its own transitions.
-    write: Scope,
+    write: BarrierScope,
     /// Stages that read since, less those that another reading stage has waited for.
     readers: Stages,
     /// Reads that already see the last write.
@@ -66,7 +66,7 @@ pub(crate) struct State {
     epoch: Option<Epoch>,
 }
 
-impl State {
+impl ResourceState {
     /// Untouched so far, with the layout that the first use will find.
     pub(crate) fn untouched_in(layout: Layout) -> Self {
         Self { layout, ..Self::default() }
@@ -74,12 +74,12 @@ impl State {
 
     /// Image that the presentation engine has let go of: contents are unknown, and a semaphore is waited for at `stages`.
     pub(crate) fn acquired(stages: Stages) -> Self {
-        Self { write: Scope::waiting(stages), ..Self::default() }
+        Self { write: BarrierScope::execution_only(stages), ..Self::default() }
     }
 
     /// Image of somebody else's, or of another queue's, for which a semaphore is waited for at `stages`.
     pub(crate) fn imported(layout: Layout, stages: Stages) -> Self {
-        Self { layout, write: Scope::waiting(stages), ..Self::default() }
+        Self { layout, write: BarrierScope::execution_only(stages), ..Self::default() }
     }
 
     /// Layout after the last use.
@@ -106,23 +106,24 @@ impl State {
     /// The barrier in front of a use that writes as the last one did, with nothing between, after which all stands as before.
     /// `None` for every other use.
     #[inline(always)]
-    pub(crate) fn repeated(&self, next: Use) -> Option<Scopes> {
-        let write = Scope { stages: next.stages, access: next.access & Access::WRITES };
+    pub(crate) fn repeated(&self, next: Use) -> Option<BarrierScopes> {
+        let write = BarrierScope { stages: next.stages, access: next.access & Access::WRITES };
         let is_last = self.write == write && self.layout == next.layout && self.readers.is_empty();
         let is_repeated = is_last && !write.access.is_empty() && self.epoch.is_none();
-        is_repeated
-            .then(|| self.scopes(write, Scope { stages: next.stages, access: next.access }, self.layout))
+        is_repeated.then(|| {
+            self.scopes(write, BarrierScope { stages: next.stages, access: next.access }, self.layout)
+        })
     }
 
     /// Adds a read in the current layout.
-    pub(crate) fn read_by(&mut self, next: Use) -> Option<Scopes> {
+    pub(crate) fn read_by(&mut self, next: Use) -> Option<BarrierScopes> {
         self.read(&next.into())
     }
 
     /// Adds reads in the current layout; a barrier is needed for those that do not see the last write yet.
-    pub(crate) fn read(&mut self, reads: &StageAccess) -> Option<Scopes> {
+    pub(crate) fn read(&mut self, reads: &StageAccess) -> Option<BarrierScopes> {
         let src = self.flushed_write();
-        let dst = Scope::of(&self.visible.missing(reads));
+        let dst = BarrierScope::from_accesses(&self.visible.missing(reads));
         let needed = !src.stages.is_empty() && !dst.stages.is_empty();
         if needed {
             self.visible.insert(dst.as_use());
@@ -135,14 +136,14 @@ impl State {
 
     /// Reads in the current layout that a write follows which waits for them alone: chains to them those earlier
     /// readers whom the write would miss.
-    pub(crate) fn read_for_all(&mut self, reads: &StageAccess) -> Option<Scopes> {
+    pub(crate) fn read_for_all(&mut self, reads: &StageAccess) -> Option<BarrierScopes> {
         let loose = self.readers - reads.stages();
         if loose.is_empty() {
             return self.read(reads);
         }
-        let unseen = Scope::of(&self.visible.missing(reads));
+        let unseen = BarrierScope::from_accesses(&self.visible.missing(reads));
         let nothing_new = self.write.stages.is_empty() || unseen.stages.is_empty();
-        let dst = if nothing_new { Scope::waiting(last_of(reads.stages())) } else { unseen };
+        let dst = if nothing_new { BarrierScope::execution_only(last_stage(reads.stages())) } else { unseen };
         let src = self.through_readers(loose);
         self.readers = reads.stages();
         self.visible.insert(dst.as_use());
@@ -151,20 +152,20 @@ impl State {
 
     /// What a read has to wait for. Where a stage that wrote has also read since, it has waited for the whole write and
     /// its flush: then that stage is enough.
-    fn flushed_write(&self) -> Scope {
-        let seen = last_of(self.write.stages & self.visible.stages());
-        if seen.is_empty() { self.write } else { Scope::waiting(seen) }
+    fn flushed_write(&self) -> BarrierScope {
+        let seen = last_stage(self.write.stages & self.visible.stages());
+        if seen.is_empty() { self.write } else { BarrierScope::execution_only(seen) }
     }
 
     /// A use that waits for everything before it.
     #[inline]
-    pub(crate) fn overwrite(&mut self, next: Use) -> Option<Scopes> {
+    pub(crate) fn overwrite(&mut self, next: Use) -> Option<BarrierScopes> {
         let src = self.unfinished();
         let new_layout = if next.layout == Layout::Undefined { self.layout } else { next.layout };
         let needed = !src.stages.is_empty() || new_layout != self.layout;
-        let dst = Scope { stages: next.stages, access: next.access };
+        let dst = BarrierScope { stages: next.stages, access: next.access };
         let scopes = self.scopes(src, dst, new_layout);
-        let write = Scope { stages: next.stages, access: next.access & Access::WRITES };
+        let write = BarrierScope { stages: next.stages, access: next.access & Access::WRITES };
         // One by one, so that no state is put together elsewhere and moved here.
         self.layout = new_layout;
         self.write = write;
@@ -178,15 +179,15 @@ impl State {
         needed.then_some(scopes)
     }
 
-    fn start_epoch(&mut self, writes: &StageAccess) -> Option<Scopes> {
+    fn start_epoch(&mut self, writes: &StageAccess) -> Option<BarrierScopes> {
         let before = self.unfinished();
-        let scopes = self.overwrite(Scope::of(writes).as_use());
+        let scopes = self.overwrite(BarrierScope::from_accesses(writes).as_use());
         self.epoch = Some(Epoch { before, waited: *writes });
         scopes
     }
 
-    fn continue_epoch(&mut self, mut epoch: Epoch, writes: &StageAccess) -> Option<Scopes> {
-        let dst = Scope::of(&epoch.waited.missing(writes));
+    fn continue_epoch(&mut self, mut epoch: Epoch, writes: &StageAccess) -> Option<BarrierScopes> {
+        let dst = BarrierScope::from_accesses(&epoch.waited.missing(writes));
         epoch.waited.insert(dst.as_use());
         self.write.stages |= writes.stages();
         self.write.access |= writes.access() & Access::WRITES;
@@ -197,23 +198,23 @@ impl State {
 
     /// What a write has to wait for.
     #[inline]
-    fn unfinished(&self) -> Scope {
+    fn unfinished(&self) -> BarrierScope {
         if self.readers.is_empty() { self.write } else { self.through_readers(self.readers) }
     }
 
     /// Waits for `readers`, who have waited for the last write and its flush, so that waiting for them is enough. The
     /// host is the exception: no stage of the device waits for it.
     #[inline]
-    fn through_readers(&self, readers: Stages) -> Scope {
+    fn through_readers(&self, readers: Stages) -> BarrierScope {
         if readers.contains(Stages::HOST) {
-            return Scope { stages: readers | self.write.stages, access: self.write.access };
+            return BarrierScope { stages: readers | self.write.stages, access: self.write.access };
         }
-        Scope::waiting(readers)
+        BarrierScope::execution_only(readers)
     }
 
     #[inline]
-    fn scopes(&self, src: Scope, dst: Scope, new_layout: Layout) -> Scopes {
-        Scopes {
+    fn scopes(&self, src: BarrierScope, dst: BarrierScope, new_layout: Layout) -> BarrierScopes {
+        BarrierScopes {
             src_stages: src.stages,
             src_access: src.access,
             dst_stages: dst.stages,
@@ -232,13 +233,13 @@ impl State {
 ///
 /// `next.layout` of [`Layout::Undefined`] asks for no layout.
 #[inline]
-pub(crate) fn transition(state: &mut State, next: Use) -> Option<Scopes> {
+pub(crate) fn transition(state: &mut ResourceState, next: Use) -> Option<BarrierScopes> {
     if state.is_changed_by(next) { state.overwrite(next) } else { state.read_by(next) }
 }
 
 /// Advances `state` by some of several writes that touch disjoint parts of the resource, so that they need not wait for
 /// each other, only for what came before the first of them: readers, or an ordinary write.
-pub(crate) fn accumulate(state: &mut State, writes: &StageAccess) -> Option<Scopes> {
+pub(crate) fn accumulate(state: &mut ResourceState, writes: &StageAccess) -> Option<BarrierScopes> {
     match state.epoch {
         Some(epoch) if state.readers.is_empty() => state.continue_epoch(epoch, writes),
         _ => state.start_epoch(writes),
@@ -246,7 +247,7 @@ pub(crate) fn accumulate(state: &mut State, writes: &StageAccess) -> Option<Scop
 }
 
 /// Where one stage is enough to wait for or to chain through, the last one holds up the least.
-fn last_of(stages: Stages) -> Stages {
+fn last_stage(stages: Stages) -> Stages {
     Stages::from_bits_retain(stages.bits().checked_ilog2().map_or(0, |last| 1 << last))
 }
 
@@ -283,7 +284,7 @@ mod tests {
         fn a_repeated_use_has_the_barrier_of_any_other_and_changes_nothing(
             before in prop::collection::vec((uses(), any::<bool>()), 0..5), next in uses()
         ) {
-            let mut state = State::default();
+            let mut state = ResourceState::default();
             for (touch, accumulated) in before {
                 let _ = match accumulated {
                     true => accumulate(&mut state, &touch.into()),
@@ -303,20 +304,20 @@ mod tests {
 
     #[test]
     fn fresh_buffer_needs_no_barrier() {
-        assert_eq!(transition(&mut State::default(), FRAGMENT_READ), None);
-        assert_eq!(transition(&mut State::default(), COMPUTE_WRITE), None);
+        assert_eq!(transition(&mut ResourceState::default(), FRAGMENT_READ), None);
+        assert_eq!(transition(&mut ResourceState::default(), COMPUTE_WRITE), None);
     }
 
     #[test]
     fn fresh_texture_waits_for_nothing_but_changes_its_layout() {
-        let scopes = transition(&mut State::default(), Use::color_target(false)).unwrap();
+        let scopes = transition(&mut ResourceState::default(), Use::color_target(false)).unwrap();
         assert_eq!((scopes.src_stages, scopes.src_access), (Stages::empty(), Access::empty()));
         assert_eq!((scopes.old_layout, scopes.new_layout), (Layout::Undefined, Layout::ColorTarget));
     }
 
     #[test]
     fn second_reader_of_another_stage_only_waits_for_itself() {
-        let mut state = State::default();
+        let mut state = ResourceState::default();
         transition(&mut state, COMPUTE_WRITE);
         transition(&mut state, FRAGMENT_READ);
         let both = on_buffer(Use::shader_read(Stages::FRAGMENT | Stages::RAY_TRACING));
@@ -328,7 +329,7 @@ mod tests {
 
     #[test]
     fn write_after_reads_waits_for_all_readers_without_a_flush() {
-        let mut state = State::default();
+        let mut state = ResourceState::default();
         transition(&mut state, COMPUTE_WRITE);
         transition(&mut state, FRAGMENT_READ);
         transition(&mut state, Use::index());
@@ -339,7 +340,7 @@ mod tests {
 
     #[test]
     fn write_only_waits_for_the_last_of_readers_that_waited_for_each_other() {
-        let mut state = State::default();
+        let mut state = ResourceState::default();
         transition(&mut state, on_buffer(Use::transfer_write()));
         transition(&mut state, on_buffer(Use::transfer_read()));
         let scopes = transition(&mut state, FRAGMENT_READ).unwrap();
@@ -349,7 +350,7 @@ mod tests {
 
     #[test]
     fn write_after_a_host_read_still_waits_for_the_device() {
-        let mut state = State::default();
+        let mut state = ResourceState::default();
         transition(&mut state, COMPUTE_WRITE);
         transition(&mut state, on_buffer(Use::host_read()));
         let scopes = transition(&mut state, COMPUTE_WRITE).unwrap();
@@ -358,7 +359,7 @@ mod tests {
 
     #[test]
     fn reader_after_a_layout_change_chains_from_the_stages_that_waited_for_it() {
-        let mut state = State::default();
+        let mut state = ResourceState::default();
         transition(&mut state, Use::color_target(false));
         transition(&mut state, Use::shader_read(Stages::FRAGMENT));
         let scopes = transition(&mut state, Use::shader_read(Stages::COMPUTE)).unwrap();
@@ -368,7 +369,7 @@ mod tests {
 
     #[test]
     fn accumulated_writers_wait_for_readers_once_per_stage_and_never_for_each_other() {
-        let mut state = State::default();
+        let mut state = ResourceState::default();
         let build = &Use::accel_build_write().into();
         assert_eq!(accumulate(&mut state, build), None);
         assert_eq!(accumulate(&mut state, build), None);

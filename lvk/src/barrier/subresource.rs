@@ -1,6 +1,6 @@
 //! Values kept for each mip level and array layer of a texture, stored once while they are all equal.
 
-use super::resource_state::Scopes;
+use super::resource_state::BarrierScopes;
 
 /// Mip levels and array layers of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,7 +14,7 @@ pub(crate) struct TextureShape {
 impl TextureShape {
     /// All mips of all layers.
     #[inline]
-    pub(crate) fn whole(self) -> Subresources {
+    pub(crate) fn all_subresources(self) -> Subresources {
         Subresources { base_mip: 0, mip_count: self.mips, base_layer: 0, layer_count: self.layers }
     }
 
@@ -53,9 +53,9 @@ impl Subresources {
     #[inline]
     pub(crate) fn intersection(self, other: Self) -> Option<Self> {
         let (base_mip, mip_count) =
-            common((self.base_mip, self.mip_count), (other.base_mip, other.mip_count))?;
+            range_intersection((self.base_mip, self.mip_count), (other.base_mip, other.mip_count))?;
         let (base_layer, layer_count) =
-            common((self.base_layer, self.layer_count), (other.base_layer, other.layer_count))?;
+            range_intersection((self.base_layer, self.layer_count), (other.base_layer, other.layer_count))?;
         Some(Self { base_mip, mip_count, base_layer, layer_count })
     }
 
@@ -98,56 +98,58 @@ impl Subresources {
 const EMPTY: Subresources = Subresources { base_mip: 0, mip_count: 0, base_layer: 0, layer_count: 0 };
 
 /// First and count of what two ranges, each its first and count, have in common.
-fn common((a, a_count): (u32, u32), (b, b_count): (u32, u32)) -> Option<(u32, u32)> {
+fn range_intersection((a, a_count): (u32, u32), (b, b_count): (u32, u32)) -> Option<(u32, u32)> {
     let (start, end) = (a.max(b), (a + a_count).min(b + b_count));
     (start < end).then(|| (start, end - start))
 }
 
 /// One `T` for each subresource.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Cells<T> {
+pub(crate) struct PerSubresource<T> {
     shape: TextureShape,
-    values: Values<T>,
+    values: PerSubresourceValues<T>,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Values<T> {
+enum PerSubresourceValues<T> {
     /// One for all.
     Same(T),
     /// One for each subresource, layer by layer; not all are equal.
     Each(Vec<T>),
 }
 
-impl<T: Copy + PartialEq> Cells<T> {
+impl<T: Copy + PartialEq> PerSubresource<T> {
     /// The same value everywhere. A shape of zero counts as one.
     pub(crate) fn new(shape: TextureShape, value: T) -> Self {
         let shape = TextureShape { mips: shape.mips.max(1), layers: shape.layers.max(1) };
-        Self { shape, values: Values::Same(value) }
+        Self { shape, values: PerSubresourceValues::Same(value) }
     }
 
     /// A value for each mip and layer.
     pub(crate) fn from_fn(shape: TextureShape, value: impl Fn(u32, u32) -> T) -> Self {
         let mut cells = Self::new(shape, value(0, 0));
-        let each = positions(cells.shape.whole()).map(|(mip, layer)| value(mip, layer)).collect();
-        cells.values = Values::of(each);
+        let each = positions(cells.shape.all_subresources()).map(|(mip, layer)| value(mip, layer)).collect();
+        cells.values = PerSubresourceValues::from_each(each);
         cells
     }
 
     /// Another value for each of them.
-    pub(crate) fn map<U: Copy + PartialEq>(&self, value: impl Fn(&T) -> U) -> Cells<U> {
+    pub(crate) fn map<U: Copy + PartialEq>(&self, value: impl Fn(&T) -> U) -> PerSubresource<U> {
         let values = match &self.values {
-            Values::Same(same) => Values::Same(value(same)),
-            Values::Each(each) => Values::of(each.iter().map(value).collect()),
+            PerSubresourceValues::Same(same) => PerSubresourceValues::Same(value(same)),
+            PerSubresourceValues::Each(each) => {
+                PerSubresourceValues::from_each(each.iter().map(value).collect())
+            }
         };
-        Cells { shape: self.shape, values }
+        PerSubresource { shape: self.shape, values }
     }
 
     /// Parts of one value each.
-    pub(crate) fn runs(&self) -> Vec<(Subresources, T)> {
+    pub(crate) fn uniform_ranges(&self) -> Vec<(Subresources, T)> {
         let mut runs = Vec::new();
         match self.uniform() {
-            Some(value) => return vec![(self.shape.whole(), *value)],
-            None => positions(self.shape.whole())
+            Some(value) => return vec![(self.shape.all_subresources(), *value)],
+            None => positions(self.shape.all_subresources())
                 .for_each(|(mip, layer)| push_single(&mut runs, mip, layer, *self.at(mip, layer))),
         }
         join_layers(runs)
@@ -161,16 +163,16 @@ impl<T: Copy + PartialEq> Cells<T> {
     /// The value all subresources share, if they do.
     pub(crate) fn uniform(&self) -> Option<&T> {
         match &self.values {
-            Values::Same(value) => Some(value),
-            Values::Each(_) => None,
+            PerSubresourceValues::Same(value) => Some(value),
+            PerSubresourceValues::Each(_) => None,
         }
     }
 
     /// Value of one subresource; positions outside the texture read its last one.
     pub(crate) fn at(&self, mip: u32, layer: u32) -> &T {
         match &self.values {
-            Values::Same(value) => value,
-            Values::Each(each) => &each[index(self.shape, mip, layer)],
+            PerSubresourceValues::Same(value) => value,
+            PerSubresourceValues::Each(each) => &each[index(self.shape, mip, layer)],
         }
     }
 
@@ -185,33 +187,33 @@ impl<T: Copy + PartialEq> Cells<T> {
 
     /// Steps all subresources of `range` alike and returns the barriers, those of neighbours joined where they are
     /// equal.
-    pub(crate) fn step(
+    pub(crate) fn update(
         &mut self,
         range: Subresources,
-        mut step: impl FnMut(&mut T) -> Option<Scopes>,
-    ) -> Vec<(Subresources, Scopes)> {
-        let (whole, range) = (self.shape.whole(), self.shape.clamp(range));
-        match self.whole(range) {
+        mut step: impl FnMut(&mut T) -> Option<BarrierScopes>,
+    ) -> Vec<(Subresources, BarrierScopes)> {
+        let (whole, range) = (self.shape.all_subresources(), self.shape.clamp(range));
+        match self.uniform_mut(range) {
             Some(value) => step(value).map(|scopes| (whole, scopes)).into_iter().collect(),
-            None => self.step_each(range, |value, _, _| step(value)),
+            None => self.update_each(range, |value, _, _| step(value)),
         }
     }
 
     /// The one value of all subresources, where `range` names them all and no others.
     #[inline]
-    pub(crate) fn whole(&mut self, range: Subresources) -> Option<&mut T> {
+    pub(crate) fn uniform_mut(&mut self, range: Subresources) -> Option<&mut T> {
         match &mut self.values {
-            Values::Same(value) if range == self.shape.whole() => Some(value),
+            PerSubresourceValues::Same(value) if range == self.shape.all_subresources() => Some(value),
             _ => None,
         }
     }
 
-    /// Like [`Cells::step`], where a step also depends on the mip and the layer.
-    pub(crate) fn step_each(
+    /// Like [`PerSubresource::update`], where a step also depends on the mip and the layer.
+    pub(crate) fn update_each(
         &mut self,
         range: Subresources,
-        mut step: impl FnMut(&mut T, u32, u32) -> Option<Scopes>,
-    ) -> Vec<(Subresources, Scopes)> {
+        mut step: impl FnMut(&mut T, u32, u32) -> Option<BarrierScopes>,
+    ) -> Vec<(Subresources, BarrierScopes)> {
         let (shape, range) = (self.shape, self.shape.clamp(range));
         if range.is_empty() {
             return Vec::new();
@@ -223,22 +225,24 @@ impl<T: Copy + PartialEq> Cells<T> {
                 push_single(&mut runs, mip, layer, scopes);
             }
         }
-        self.values = Values::of(each);
+        self.values = PerSubresourceValues::from_each(each);
         join_layers(runs)
     }
 
     /// A value for every subresource.
     fn split(&mut self) -> Vec<T> {
         match &mut self.values {
-            Values::Same(value) => vec![*value; self.shape.mips as usize * self.shape.layers as usize],
-            Values::Each(each) => std::mem::take(each),
+            PerSubresourceValues::Same(value) => {
+                vec![*value; self.shape.mips as usize * self.shape.layers as usize]
+            }
+            PerSubresourceValues::Each(each) => std::mem::take(each),
         }
     }
 }
 
-impl<T: Copy + PartialEq> Values<T> {
+impl<T: Copy + PartialEq> PerSubresourceValues<T> {
     /// As one where all are equal. There is at least one.
-    fn of(each: Vec<T>) -> Self {
+    fn from_each(each: Vec<T>) -> Self {
         if each.windows(2).all(|pair| pair[0] == pair[1]) { Self::Same(each[0]) } else { Self::Each(each) }
     }
 }

@@ -3,12 +3,12 @@
 use super::access::{Layout, StageAccess, Stages, Use};
 use super::batch::Barriers;
 use super::resource_id::{IdMap, ResourceId};
-use super::resource_state::{Scopes, State, accumulate, transition};
-use super::subresource::{Cells, Subresources, TextureShape};
+use super::resource_state::{BarrierScopes, ResourceState, accumulate, transition};
+use super::subresource::{PerSubresource, Subresources, TextureShape};
 
 /// How a command buffer uses a (sub)resource before anything in it must wait for anything else in it.
 ///
-/// This is all that the queue has to prepare; see [`States::submit`](super::queue_state::States::submit).
+/// This is all that the queue has to prepare; see [`QueueState::submit`](super::queue_state::QueueState::submit).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum Prefix {
     /// Not used at all.
@@ -44,40 +44,40 @@ impl Prefix {
 
 /// One (sub)resource inside one command buffer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Local {
+pub(super) struct LocalState {
     pub(super) prefix: Prefix,
     /// Whether the command buffer has used it beyond the prefix, so that `state` depends on nothing before it.
     pub(super) past_prefix: bool,
-    pub(super) state: State,
+    pub(super) state: ResourceState,
 }
 
-impl Local {
+impl LocalState {
     /// The barrier in front of a use that is the last one again, and changes nothing here; `None` for every other use.
     #[inline(always)]
-    fn repeated(&self, next: Use) -> Option<Scopes> {
+    fn repeated(&self, next: Use) -> Option<BarrierScopes> {
         if self.past_prefix { self.state.repeated(next) } else { None }
     }
 
     /// Adds a use; answers the barrier in front of it, if one is needed.
     #[inline(never)]
-    fn step(&mut self, next: Use) -> Option<Scopes> {
+    fn apply(&mut self, next: Use) -> Option<BarrierScopes> {
         if !self.past_prefix {
-            self.step_prefix(next);
+            self.apply_to_prefix(next);
         }
         transition(&mut self.state, next)
     }
 
     /// A use that may wait for nothing in the command buffer.
-    fn step_prefix(&mut self, next: Use) {
+    fn apply_to_prefix(&mut self, next: Use) {
         match &mut self.prefix {
-            Prefix::Unused => self.begin(next),
+            Prefix::Unused => self.end_prefix(next),
             Prefix::Reads(layout, reads) if !next.is_write() && *layout == next.layout => reads.insert(next),
             _ => self.past_prefix = true,
         }
     }
 
-    fn begin(&mut self, next: Use) {
-        self.state = State::untouched_in(next.layout);
+    fn end_prefix(&mut self, next: Use) {
+        self.state = ResourceState::untouched_in(next.layout);
         self.past_prefix = next.is_write();
         self.prefix =
             if next.is_write() { Prefix::Write(next) } else { Prefix::Reads(next.layout, next.into()) };
@@ -92,7 +92,7 @@ impl Local {
         }
     }
 
-    fn accumulate(&mut self, write: Use) -> Option<Scopes> {
+    fn accumulate(&mut self, write: Use) -> Option<BarrierScopes> {
         match &mut self.prefix {
             Prefix::Unused => self.prefix = Prefix::Accumulated(write.into()),
             Prefix::Accumulated(all) if !self.past_prefix => {
@@ -105,36 +105,36 @@ impl Local {
 }
 
 /// How many rows of a table are kept in reach; a power of two.
-const PLACES: usize = 8;
+const INDEX_SIZE: usize = 8;
 
 /// Values in the order of their first use, found by id.
 #[derive(Debug, Clone)]
-struct Table<T> {
+struct IdTable<T> {
     rows: IdMap<usize>,
     values: Vec<(ResourceId, T)>,
     /// Rows asked for lately, each at a place that follows from the id: commands use the same few resources again and again.
     /// What stands in the row tells whether it is the one.
-    lately: [usize; PLACES],
+    lately: [usize; INDEX_SIZE],
 }
 
-impl<T> Table<T> {
+impl<T> IdTable<T> {
     fn get(&self, id: ResourceId) -> Option<&T> {
         self.rows.get(&id).map(|&row| &self.values[row].1)
     }
 
     #[inline]
     fn entry(&mut self, id: ResourceId, fresh: impl FnOnce() -> T) -> &mut T {
-        let place = id.0 as usize % PLACES;
+        let place = id.0 as usize % INDEX_SIZE;
         let mut row = self.lately[place];
         if self.values.get(row).is_none_or(|(known, _)| *known != id) {
-            row = self.look_up(id, fresh);
+            row = self.position_or_insert(id, fresh);
             self.lately[place] = row;
         }
         &mut self.values[row].1
     }
 
     #[inline(never)]
-    fn look_up(&mut self, id: ResourceId, fresh: impl FnOnce() -> T) -> usize {
+    fn position_or_insert(&mut self, id: ResourceId, fresh: impl FnOnce() -> T) -> usize {
         *self.rows.entry(id).or_insert_with(|| {
             self.values.push((id, fresh()));
             self.values.len() - 1
@@ -147,21 +147,21 @@ impl<T> Table<T> {
     }
 }
 
-impl<T> Default for Table<T> {
+impl<T> Default for IdTable<T> {
     fn default() -> Self {
-        Self { rows: IdMap::default(), values: Vec::new(), lately: [0; PLACES] }
+        Self { rows: IdMap::default(), values: Vec::new(), lately: [0; INDEX_SIZE] }
     }
 }
 
 /// The uses of all resources by one command buffer, while it is recorded.
 ///
 /// Barriers returned here only concern what the same command buffer did earlier. What it needs from the queue is kept
-/// for [`States::submit`](super::queue_state::States::submit), so that command buffers can be recorded side by side and
+/// for [`QueueState::submit`](super::queue_state::QueueState::submit), so that command buffers can be recorded side by side and
 /// submitted in any order.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Tracker {
-    buffers: Table<Local>,
-    textures: Table<Cells<Local>>,
+    buffers: IdTable<LocalState>,
+    textures: IdTable<PerSubresource<LocalState>>,
 }
 
 impl Tracker {
@@ -175,8 +175,8 @@ impl Tracker {
     #[inline(always)]
     pub(crate) fn use_buffer(&mut self, id: ResourceId, next: Use, out: &mut Barriers) {
         let next = next.with_layout(Layout::Undefined);
-        let local = self.buffers.entry(id, Local::default);
-        if let Some(scopes) = local.repeated(next).or_else(|| local.step(next)) {
+        let local = self.buffers.entry(id, LocalState::default);
+        if let Some(scopes) = local.repeated(next).or_else(|| local.apply(next)) {
             out.push_memory(&scopes);
         }
     }
@@ -185,7 +185,7 @@ impl Tracker {
     /// builds of different acceleration structures, which are tracked as one resource.
     pub(crate) fn accumulate_buffer(&mut self, id: ResourceId, write: Use, out: &mut Barriers) {
         let write = write.with_layout(Layout::Undefined);
-        if let Some(scopes) = self.buffers.entry(id, Local::default).accumulate(write) {
+        if let Some(scopes) = self.buffers.entry(id, LocalState::default).accumulate(write) {
             out.push_memory(&scopes);
         }
     }
@@ -203,10 +203,10 @@ impl Tracker {
         out: &mut Barriers,
     ) {
         let next = with_some_layout(next);
-        let cells = self.textures.entry(id, || Cells::new(shape, Local::default()));
-        match cells.whole(subresources).and_then(|local| local.repeated(next)) {
+        let cells = self.textures.entry(id, || PerSubresource::new(shape, LocalState::default()));
+        match cells.uniform_mut(subresources).and_then(|local| local.repeated(next)) {
             Some(scopes) => out.push_memory(&scopes),
-            None => use_parts(id, cells, subresources, next, out),
+            None => use_subresources(id, cells, subresources, next, out),
         }
     }
 
@@ -233,51 +233,57 @@ impl Tracker {
     }
 
     /// Buffers in the order of their first use.
-    pub(super) fn buffers(&self) -> &[(ResourceId, Local)] {
+    pub(super) fn buffers(&self) -> &[(ResourceId, LocalState)] {
         &self.buffers.values
     }
 
     /// Textures in the order of their first use.
-    pub(super) fn textures(&self) -> &[(ResourceId, Cells<Local>)] {
+    pub(super) fn textures(&self) -> &[(ResourceId, PerSubresource<LocalState>)] {
         &self.textures.values
     }
 }
 
 /// A resource that a command buffer uses, as queues hand it to each other.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Used<'a> {
+pub(crate) struct TrackedUse<'a> {
     pub(crate) id: ResourceId,
-    parts: UsedParts<'a>,
+    parts: TrackedUseKind<'a>,
 }
 
 #[derive(Debug, Clone, Copy)]
-enum UsedParts<'a> {
-    Buffer(&'a Local),
-    Texture(&'a Cells<Local>),
+enum TrackedUseKind<'a> {
+    Buffer(&'a LocalState),
+    Texture(&'a PerSubresource<LocalState>),
 }
 
 impl Tracker {
     /// Everything the command buffer uses.
-    pub(crate) fn used(&self) -> impl Iterator<Item = Used<'_>> {
-        let buffers =
-            self.buffers.values.iter().map(|(id, local)| Used { id: *id, parts: UsedParts::Buffer(local) });
-        let textures =
-            self.textures.values.iter().map(|(id, cells)| Used { id: *id, parts: UsedParts::Texture(cells) });
+    pub(crate) fn tracked_uses(&self) -> impl Iterator<Item = TrackedUse<'_>> {
+        let buffers = self
+            .buffers
+            .values
+            .iter()
+            .map(|(id, local)| TrackedUse { id: *id, parts: TrackedUseKind::Buffer(local) });
+        let textures = self
+            .textures
+            .values
+            .iter()
+            .map(|(id, cells)| TrackedUse { id: *id, parts: TrackedUseKind::Texture(cells) });
         buffers.chain(textures)
     }
 
     /// Whether the command buffer uses a resource.
-    pub(crate) fn uses(&self, id: ResourceId) -> bool {
+    pub(crate) fn uses_resource(&self, id: ResourceId) -> bool {
         self.buffers.get(id).is_some() || self.textures.get(id).is_some()
     }
 }
 
-impl Used<'_> {
+impl TrackedUse<'_> {
     /// Whether contents or layouts change, where a texture is in these layouts before.
-    pub(crate) fn changes(&self, before: Option<&Cells<Layout>>) -> bool {
+    pub(crate) fn changes(&self, before: Option<&PerSubresource<Layout>>) -> bool {
         match self.parts {
-            UsedParts::Buffer(local) => local.changes(Layout::Undefined),
-            UsedParts::Texture(cells) => {
+            TrackedUseKind::Buffer(local) => local.changes(Layout::Undefined),
+            TrackedUseKind::Texture(cells) => {
                 let layout = |mip, layer| before.map_or(Layout::Undefined, |cells| *cells.at(mip, layer));
                 let alike =
                     cells.uniform().is_some() && before.is_none_or(|before| before.uniform().is_some());
@@ -289,23 +295,27 @@ impl Used<'_> {
 
     /// The state in which another queue, which waits for a semaphore at `stages`, finds a buffer, or a texture in these
     /// layouts. Only what changes its layout first has to be told of the semaphore: everything else begins behind it.
-    pub(super) fn arrived(&self, before: Option<&Cells<Layout>>, stages: Stages) -> Arrived {
-        let UsedParts::Texture(cells) = self.parts else { return Arrived::Buffer };
+    pub(super) fn transferred_state(
+        &self,
+        before: Option<&PerSubresource<Layout>>,
+        stages: Stages,
+    ) -> TransferredState {
+        let TrackedUseKind::Texture(cells) = self.parts else { return TransferredState::Buffer };
         let state = |mip, layer| {
             let layout = before.map_or(Layout::Undefined, |before| *before.at(mip, layer));
             match cells.at(mip, layer).prefix.layout() {
-                Some(first) if first == layout => State::untouched_in(layout),
-                _ => State::imported(layout, stages),
+                Some(first) if first == layout => ResourceState::untouched_in(layout),
+                _ => ResourceState::imported(layout, stages),
             }
         };
-        Arrived::Texture(Cells::from_fn(cells.shape(), state))
+        TransferredState::Texture(PerSubresource::from_fn(cells.shape(), state))
     }
 }
 
 /// What another queue finds.
-pub(super) enum Arrived {
+pub(super) enum TransferredState {
     Buffer,
-    Texture(Cells<State>),
+    Texture(PerSubresource<ResourceState>),
 }
 
 fn positions(shape: TextureShape) -> impl Iterator<Item = (u32, u32)> {
@@ -314,19 +324,25 @@ fn positions(shape: TextureShape) -> impl Iterator<Item = (u32, u32)> {
 
 /// Uses a part of a texture otherwise than the last time.
 #[inline(never)]
-fn use_parts(id: ResourceId, cells: &mut Cells<Local>, part: Subresources, next: Use, out: &mut Barriers) {
-    match cells.whole(part) {
-        Some(local) => local.step(next).iter().for_each(|scopes| out.push_image(id, part, scopes)),
+fn use_subresources(
+    id: ResourceId,
+    cells: &mut PerSubresource<LocalState>,
+    part: Subresources,
+    next: Use,
+    out: &mut Barriers,
+) {
+    match cells.uniform_mut(part) {
+        Some(local) => local.apply(next).iter().for_each(|scopes| out.push_image(id, part, scopes)),
         None => cells
-            .step(part, |local| local.step(next))
+            .update(part, |local| local.apply(next))
             .iter()
             .for_each(|(part, scopes)| out.push_image(id, *part, scopes)),
     }
 }
 
-fn would_wait(local: &Local, next: Use) -> bool {
+fn would_wait(local: &LocalState, next: Use) -> bool {
     let mut after = *local;
-    after.step(next).is_some()
+    after.apply(next).is_some()
 }
 
 /// A texture always needs a layout; one that every access allows stands in for none.

@@ -70,12 +70,12 @@ const ENTRIES: u32 = 16;
 pub(crate) const ENTRY_COUNT: u32 = 4096;
 const ENTRY_WORDS: u32 = 8;
 const STATES: u32 = ENTRIES + ENTRY_COUNT * ENTRY_WORDS;
-const NOBODY: u32 = 0;
+const FREE: u32 = 0;
 const ALIVE: u32 = u32::MAX;
 
 /// Where the words of an array lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Range {
+pub(crate) struct WordRange {
     pub(crate) first: u32,
     pub(crate) count: u32,
 }
@@ -87,18 +87,18 @@ pub(crate) struct CheckPlan {
     /// The number its faults are written down under.
     pub(crate) shader: u32,
     /// By [`BindlessArray::ALL`].
-    pub(crate) arrays: [Range; 4],
+    pub(crate) arrays: [WordRange; 4],
 }
 
 /// The buffer, and who has and had which slot.
 pub(crate) struct IndexChecks {
     pub(crate) buffer: Arc<Buffer>,
-    arrays: [Range; 4],
-    known: Mutex<Known>,
+    arrays: [WordRange; 4],
+    known: Mutex<SlotOwners>,
 }
 
 #[derive(Default)]
-struct Known {
+struct SlotOwners {
     /// Who has or last had a slot.
     owners: HashMap<(BindlessArray, u32), String>,
     shaders: Vec<String>,
@@ -110,7 +110,7 @@ impl IndexChecks {
         let mut first = STATES;
         let arrays = counts.map(|count| {
             first += count;
-            Range { first: first - count, count }
+            WordRange { first: first - count, count }
         });
         let desc = BufferDesc {
             size_bytes: u64::from(first) * 4,
@@ -119,15 +119,15 @@ impl IndexChecks {
             ..Default::default()
         };
         let buffer = Arc::new(Buffer::new(gpu, &desc, InternalUsage::NONE)?);
-        buffer.fill(|bytes| bytes.fill(0));
-        let checks = Self { buffer, arrays, known: Mutex::new(Rank::SlotOwners, Known::default()) };
+        buffer.fill_with(|bytes| bytes.fill(0));
+        let checks = Self { buffer, arrays, known: Mutex::new(Rank::SlotOwners, SlotOwners::default()) };
         BindlessArray::ALL.into_iter().for_each(|array| checks.write(array, 0, ALIVE));
         Ok(checks)
     }
 
     /// What a module of this name needs.
     pub(crate) fn plan(&self, shader: &str) -> CheckPlan {
-        let mut known = self.known();
+        let mut known = self.lock();
         known.shaders.push(shader.to_owned());
         CheckPlan {
             address: self.buffer.address,
@@ -138,29 +138,29 @@ impl IndexChecks {
 
     /// Somebody has a slot from now on; of a texture both arrays are told.
     pub(super) fn reserve(&self, arrays: &[BindlessArray], slot: u32, name: &str) {
-        let mut known = self.known();
+        let mut known = self.lock();
         arrays.iter().for_each(|array| _ = known.owners.insert((*array, slot), name.to_owned()));
     }
 
     /// The owner can be reached.
-    pub(super) fn set(&self, array: BindlessArray, slot: u32) {
+    pub(super) fn mark_alive(&self, array: BindlessArray, slot: u32) {
         self.write(array, slot, ALIVE);
     }
 
     /// The owner's handle is gone; command buffers up to `newest` may still reach it.
-    pub(super) fn retire(&self, array: BindlessArray, slot: u32, newest: u64) {
+    pub(super) fn mark_retired(&self, array: BindlessArray, slot: u32, newest: u64) {
         self.write(array, slot, (newest as u32).clamp(1, ALIVE - 1));
     }
 
     /// The slot goes back. An owner that never came into being is forgotten.
-    pub(super) fn free(&self, array: BindlessArray, slot: u32) {
+    pub(super) fn mark_free(&self, array: BindlessArray, slot: u32) {
         if self.read(array, slot) == ALIVE {
-            self.write(array, slot, NOBODY);
+            self.write(array, slot, FREE);
         }
     }
 
     /// Records that the command buffer of this number begins, behind everything before it.
-    pub(crate) fn begin(&self, gpu: &Gpu, commands: vk::CommandBuffer, sequence: u64) {
+    pub(crate) fn record_begin(&self, gpu: &Gpu, commands: vk::CommandBuffer, sequence: u64) {
         use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
         let all = (Stage::ALL_COMMANDS, Access::MEMORY_READ | Access::MEMORY_WRITE);
         let transfer = (Stage::ALL_TRANSFER, Access::TRANSFER_READ | Access::TRANSFER_WRITE);
@@ -181,10 +181,10 @@ impl IndexChecks {
         let lost = words.get(LOST).copied().unwrap_or(0);
         if lost > 0 {
             log::warn!(
-                "{lost} accesses by wrong indices are not told apart: there are too many kinds of them"
+                "{lost} accesses by wrong indices are not listed one by one: there are too many kinds of them"
             );
         }
-        let mut faults: Vec<_> = entries.iter().filter_map(|entry| self.fault(entry)).collect();
+        let mut faults: Vec<_> = entries.iter().filter_map(|entry| self.decode_fault(entry)).collect();
         faults.sort_by(|a, b| (a.array, a.index, &a.shader).cmp(&(b.array, b.index, &b.shader)));
         faults
     }
@@ -195,14 +195,14 @@ impl IndexChecks {
     }
 
     /// Key, shader, array, index, the word found, and the count.
-    fn fault(&self, entry: &[u32; ENTRY_WORDS as usize]) -> Option<IndexFault> {
+    fn decode_fault(&self, entry: &[u32; ENTRY_WORDS as usize]) -> Option<IndexFault> {
         let [key, shader, array, index, word, count, ..] = *entry;
         let array = BindlessArray::ALL.get(array as usize).copied().filter(|_| key != 0)?;
-        let known = self.known();
+        let known = self.lock();
         let object = known.owners.get(&(array, index)).cloned();
         let state = match word {
-            NOBODY if object.is_some() => SlotState::OtherUsage,
-            NOBODY => SlotState::NeverCreated,
+            FREE if object.is_some() => SlotState::OtherUsage,
+            FREE => SlotState::NeverCreated,
             _ => SlotState::Freed,
         };
         let shader = known.shaders.get(shader as usize).cloned().unwrap_or_default();
@@ -210,31 +210,31 @@ impl IndexChecks {
     }
 
     fn write(&self, array: BindlessArray, slot: u32, word: u32) {
-        if let Some(place) = self.place(array, slot) {
+        if let Some(place) = self.word_offset(array, slot) {
             self.buffer.write(place, &word.to_ne_bytes());
         }
     }
 
     fn read(&self, array: BindlessArray, slot: u32) -> u32 {
         let mut word = [0; 4];
-        self.place(array, slot).map(|place| self.buffer.read(place, &mut word));
+        self.word_offset(array, slot).map(|place| self.buffer.read(place, &mut word));
         u32::from_ne_bytes(word)
     }
 
-    fn place(&self, array: BindlessArray, slot: u32) -> Option<u64> {
-        let Range { first, count } = self.arrays[array as usize];
+    fn word_offset(&self, array: BindlessArray, slot: u32) -> Option<u64> {
+        let WordRange { first, count } = self.arrays[array as usize];
         (slot < count).then(|| u64::from(first + slot) * 4)
     }
 
-    fn known(&self) -> Guard<'_, Known> {
+    fn lock(&self) -> Guard<'_, SlotOwners> {
         self.known.lock()
     }
 }
 
-type Scope = (vk::PipelineStageFlags2, vk::AccessFlags2);
+type SyncScope = (vk::PipelineStageFlags2, vk::AccessFlags2);
 
 /// Outside of the trackers, which do not know of the buffer: shaders reach it in every command.
-fn barrier(gpu: &Gpu, commands: vk::CommandBuffer, from: Scope, to: Scope) {
+fn barrier(gpu: &Gpu, commands: vk::CommandBuffer, from: SyncScope, to: SyncScope) {
     let barrier = [vk::MemoryBarrier2::default()
         .src_stage_mask(from.0)
         .src_access_mask(from.1)

@@ -10,21 +10,21 @@ use crate::gpu::Gpu;
 
 /// A target of a pass that fragment shaders read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Input {
+pub(crate) enum InputAttachment {
     Depth,
     /// By its place among the colour targets.
     Color(u32),
     Stencil,
 }
 
-impl Input {
+impl InputAttachment {
     /// Colour targets of a pass.
     const COLORS: u32 = 8;
     /// Places of the set on devices that allow so many.
     pub(crate) const COUNT: u32 = Self::COLORS + 2;
 
     /// What is at a place. Depth and the first colours come first, as some devices have four inputs in all.
-    pub(crate) fn at(place: u32) -> Option<Self> {
+    pub(crate) fn from_index(place: u32) -> Option<Self> {
         match place {
             0 => Some(Self::Depth),
             color if color <= Self::COLORS => Some(Self::Color(color - 1)),
@@ -34,7 +34,7 @@ impl Input {
     }
 
     /// Its place: its binding in the set, and its `input_attachment_index`, which has the same limit.
-    pub(crate) fn place(self) -> u32 {
+    pub(crate) fn index(self) -> u32 {
         match self {
             Self::Depth => 0,
             Self::Color(target) => target + 1,
@@ -43,7 +43,7 @@ impl Input {
     }
 }
 
-impl fmt::Display for Input {
+impl fmt::Display for InputAttachment {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Depth => write!(out, "the depth target"),
@@ -55,15 +55,15 @@ impl fmt::Display for Input {
 
 /// Some targets of a pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct InputMask(u16);
+pub(crate) struct InputAttachmentMask(u16);
 
-impl InputMask {
-    pub(crate) fn insert(&mut self, input: Input) {
-        self.0 |= 1 << input.place();
+impl InputAttachmentMask {
+    pub(crate) fn insert(&mut self, input: InputAttachment) {
+        self.0 |= 1 << input.index();
     }
 
-    pub(crate) fn contains(self, input: Input) -> bool {
-        self.0 & (1 << input.place()) != 0
+    pub(crate) fn contains(self, input: InputAttachment) -> bool {
+        self.0 & (1 << input.index()) != 0
     }
 
     pub(crate) fn is_empty(self) -> bool {
@@ -85,17 +85,19 @@ impl InputMask {
 
     /// Whether depth or stencil is among them.
     pub(crate) fn has_depth(self) -> bool {
-        self.contains(Input::Depth) || self.contains(Input::Stencil)
+        self.contains(InputAttachment::Depth) || self.contains(InputAttachment::Stencil)
     }
 
     /// By their places.
-    pub(crate) fn iter(self) -> impl Iterator<Item = Input> {
-        (0..Input::COUNT).filter_map(Input::at).filter(move |input| self.contains(*input))
+    pub(crate) fn iter(self) -> impl Iterator<Item = InputAttachment> {
+        (0..InputAttachment::COUNT)
+            .filter_map(InputAttachment::from_index)
+            .filter(move |input| self.contains(*input))
     }
 }
 
-impl FromIterator<Input> for InputMask {
-    fn from_iter<I: IntoIterator<Item = Input>>(inputs: I) -> Self {
+impl FromIterator<InputAttachment> for InputAttachmentMask {
+    fn from_iter<I: IntoIterator<Item = InputAttachment>>(inputs: I) -> Self {
         let mut mask = Self::default();
         inputs.into_iter().for_each(|input| mask.insert(input));
         mask
@@ -103,14 +105,14 @@ impl FromIterator<Input> for InputMask {
 }
 
 /// The layout of the set, destroyed on drop. Its descriptors are never updated after they are bound.
-pub(crate) struct InputLayout {
+pub(crate) struct InputAttachmentLayout {
     pub(crate) raw: vk::DescriptorSetLayout,
     /// Bindings it has.
     pub(crate) count: u32,
     gpu: Arc<Gpu>,
 }
 
-impl InputLayout {
+impl InputAttachmentLayout {
     /// `None` for devices whose shaders cannot read what their pass draws.
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Option<Self>> {
         let count = gpu.caps.limits.max_input_attachments;
@@ -134,7 +136,7 @@ impl InputLayout {
     }
 }
 
-impl Drop for InputLayout {
+impl Drop for InputAttachmentLayout {
     fn drop(&mut self) {
         // SAFETY: the context has waited for the GPU before its parts are dropped.
         unsafe { self.gpu.device.destroy_descriptor_set_layout(self.raw, None) };
@@ -148,19 +150,25 @@ mod tests {
 
     #[test]
     fn every_place_is_one_target() {
-        let all: Vec<Input> = (0..Input::COUNT).map(|place| Input::at(place).unwrap()).collect();
-        assert!(all.iter().zip(0..).all(|(input, place)| input.place() == place));
-        assert_eq!(Input::at(Input::COUNT), None);
+        let all: Vec<InputAttachment> =
+            (0..InputAttachment::COUNT).map(|place| InputAttachment::from_index(place).unwrap()).collect();
+        assert!(all.iter().zip(0..).all(|(input, place)| input.index() == place));
+        assert_eq!(InputAttachment::from_index(InputAttachment::COUNT), None);
         assert_eq!(all.len(), 10);
     }
 
     #[test]
     fn masks_are_sets() {
-        let some: InputMask = [Input::Color(2), Input::Depth].into_iter().collect();
-        assert!(some.contains(Input::Depth) && some.has_depth() && !some.contains(Input::Color(1)));
-        assert_eq!(some.iter().collect::<Vec<_>>(), [Input::Depth, Input::Color(2)]);
-        let depth: InputMask = [Input::Depth].into_iter().collect();
-        assert_eq!(some.without(depth).iter().collect::<Vec<_>>(), [Input::Color(2)]);
+        let some: InputAttachmentMask =
+            [InputAttachment::Color(2), InputAttachment::Depth].into_iter().collect();
+        assert!(
+            some.contains(InputAttachment::Depth)
+                && some.has_depth()
+                && !some.contains(InputAttachment::Color(1))
+        );
+        assert_eq!(some.iter().collect::<Vec<_>>(), [InputAttachment::Depth, InputAttachment::Color(2)]);
+        let depth: InputAttachmentMask = [InputAttachment::Depth].into_iter().collect();
+        assert_eq!(some.without(depth).iter().collect::<Vec<_>>(), [InputAttachment::Color(2)]);
         assert!(some.intersects(depth) && !some.without(depth).intersects(depth));
         assert_eq!(some.union(depth), some);
         assert!(some.without(some).is_empty());

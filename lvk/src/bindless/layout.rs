@@ -5,7 +5,7 @@
 /// The descriptor set that holds everything.
 pub(crate) const SET: u32 = 0;
 /// The set of the pass's own targets as fragment shaders read them; its bindings are
-/// [`Input`](super::input_attachments::Input)s.
+/// [`InputAttachment`](super::input_attachments::InputAttachment)s.
 pub(crate) const INPUT_SET: u32 = 1;
 /// Sampled images: every texture, seen as 2D, array, 3D or cube through aliased declarations.
 pub(crate) const SAMPLED_IMAGES: u32 = 0;

@@ -9,5 +9,5 @@ mod slot_array;
 pub(crate) mod table;
 mod yuv_slots;
 
-pub(crate) use table::{Bindless, Dummies, TEXTURE_ARRAYS, TextureViews};
+pub(crate) use table::{Bindless, DefaultDescriptors, TEXTURE_ARRAYS, TextureViews};
 pub(crate) use yuv_slots::YuvSlots;

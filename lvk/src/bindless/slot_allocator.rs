@@ -2,7 +2,7 @@
 
 /// Whether a slot is taken, and whether it is already on the list of slots to write.
 #[derive(Debug, Clone, Copy, Default)]
-struct Mark {
+struct SlotMark {
     taken: bool,
     dirty: bool,
 }
@@ -12,7 +12,7 @@ struct Mark {
 pub(crate) struct Slots {
     capacity: u32,
     /// One for each slot ever used, the dummy first.
-    marks: Vec<Mark>,
+    marks: Vec<SlotMark>,
     free: Vec<u32>,
     dirty: Vec<u32>,
 }
@@ -22,8 +22,8 @@ impl Slots {
     pub(crate) fn new(capacity: u32) -> Self {
         let mut slots = Self { capacity, marks: Vec::new(), free: Vec::new(), dirty: Vec::new() };
         if capacity > 0 {
-            slots.marks.push(Mark { taken: true, dirty: false });
-            slots.dirty(0);
+            slots.marks.push(SlotMark { taken: true, dirty: false });
+            slots.mark_dirty(0);
         }
         slots
     }
@@ -35,7 +35,7 @@ impl Slots {
             None => self.grow()?,
         };
         self.marks[slot as usize].taken = true;
-        self.dirty(slot);
+        self.mark_dirty(slot);
         Some(slot)
     }
 
@@ -45,13 +45,13 @@ impl Slots {
         if slot == 0 || !self.is_taken(slot) {
             return;
         }
-        self.dirty(slot);
+        self.mark_dirty(slot);
         self.marks[slot as usize].taken = false;
         self.free.push(slot);
     }
 
     /// Notes that a taken slot has to be written again.
-    pub(crate) fn dirty(&mut self, slot: u32) {
+    pub(crate) fn mark_dirty(&mut self, slot: u32) {
         match self.marks.get_mut(slot as usize) {
             Some(mark) if mark.taken && !mark.dirty => mark.dirty = true,
             _ => return,
@@ -86,7 +86,7 @@ impl Slots {
 
     fn grow(&mut self) -> Option<u32> {
         let slot = u32::try_from(self.marks.len()).ok().filter(|slot| *slot < self.capacity)?;
-        self.marks.push(Mark::default());
+        self.marks.push(SlotMark::default());
         Some(slot)
     }
 }
@@ -100,20 +100,20 @@ mod tests {
     use super::*;
 
     #[derive(Debug, Clone)]
-    enum Op {
+    enum SlotOp {
         Alloc,
         Free(u32),
         Dirty(u32),
         Take,
     }
 
-    fn op() -> impl Strategy<Value = Op> {
+    fn op() -> impl Strategy<Value = SlotOp> {
         let slot = || prop_oneof![9 => 0..14_u32, 1 => Just(u32::MAX)];
         prop_oneof![
-            4 => Just(Op::Alloc),
-            2 => slot().prop_map(Op::Free),
-            2 => slot().prop_map(Op::Dirty),
-            1 => Just(Op::Take),
+            4 => Just(SlotOp::Alloc),
+            2 => slot().prop_map(SlotOp::Free),
+            2 => slot().prop_map(SlotOp::Dirty),
+            1 => Just(SlotOp::Take),
         ]
     }
 
@@ -127,7 +127,7 @@ mod tests {
             let mut dirty: BTreeSet<u32> = (0..capacity.min(1)).collect();
             for op in ops {
                 match op {
-                    Op::Alloc => match slots.alloc() {
+                    SlotOp::Alloc => match slots.alloc() {
                         Some(slot) => {
                             prop_assert!(slot > 0 && slot < capacity);
                             prop_assert!(taken.insert(slot), "slot {} handed out twice", slot);
@@ -135,19 +135,19 @@ mod tests {
                         }
                         None => prop_assert_eq!(taken.len() as u32, capacity.saturating_sub(1)),
                     },
-                    Op::Free(slot) => {
+                    SlotOp::Free(slot) => {
                         slots.free(slot);
                         if taken.remove(&slot) {
                             dirty.insert(slot);
                         }
                     }
-                    Op::Dirty(slot) => {
-                        slots.dirty(slot);
+                    SlotOp::Dirty(slot) => {
+                        slots.mark_dirty(slot);
                         if taken.contains(&slot) || (slot == 0 && capacity > 0) {
                             dirty.insert(slot);
                         }
                     }
-                    Op::Take => {
+                    SlotOp::Take => {
                         prop_assert_eq!(slots.take_dirty(), dirty.iter().copied().collect::<Vec<_>>());
                         dirty.clear();
                     }

@@ -4,13 +4,13 @@ use super::slot_allocator::Slots;
 use crate::error::{Error, Result};
 
 /// Slots of one kind and who owns them.
-pub(super) struct Array<T> {
+pub(super) struct SlotArray<T> {
     kind: &'static str,
     pub(super) slots: Slots,
     pub(super) owners: Vec<Option<T>>,
 }
 
-impl<T: Copy> Array<T> {
+impl<T: Copy> SlotArray<T> {
     pub(super) fn new(kind: &'static str, capacity: u32) -> Self {
         Self { kind, slots: Slots::new(capacity), owners: vec![None; capacity as usize] }
     }
@@ -28,7 +28,7 @@ impl<T: Copy> Array<T> {
     pub(super) fn set(&mut self, slot: u32, owner: Option<T>) {
         if let Some(entry) = self.owners.get_mut(slot as usize) {
             *entry = owner;
-            self.slots.dirty(slot);
+            self.slots.mark_dirty(slot);
         }
     }
 
@@ -39,9 +39,9 @@ impl<T: Copy> Array<T> {
 }
 
 /// Which descriptors of an array show an owner, and not the dummy that all were filled with.
-pub(super) struct Shown(Vec<bool>);
+pub(super) struct WrittenDescriptors(Vec<bool>);
 
-impl Shown {
+impl WrittenDescriptors {
     pub(super) fn new(capacity: u32) -> Self {
         Self(vec![false; capacity as usize])
     }
@@ -68,7 +68,7 @@ mod tests {
             changes in prop::collection::vec((0..6_u32, prop::option::of(1..4_u32)), 0..60)
         ) {
             const DUMMY: u32 = 0;
-            let (mut shown, mut descriptors) = (Shown::new(5), [DUMMY; 5]);
+            let (mut shown, mut descriptors) = (WrittenDescriptors::new(5), [DUMMY; 5]);
             for (slot, owner) in changes {
                 let must_write = shown.must_write(slot, owner.is_some());
                 let Some(descriptor) = descriptors.get_mut(slot as usize) else {

@@ -8,12 +8,12 @@ use super::index_checks::{BindlessArray, CheckPlan, IndexChecks};
 use super::layout;
 use super::room;
 use super::slot_allocator::Slots;
-use super::slot_array::{Array, Shown};
-use super::yuv_slots::{YuvPlace, YuvSlots};
+use super::slot_array::{SlotArray, WrittenDescriptors};
+use super::yuv_slots::{YuvSlot, YuvSlots};
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::gpu::Gpu;
-use crate::gpu::caps::descriptor_limits::fitting;
+use crate::gpu::caps::descriptor_limits::largest_fitting;
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::ycbcr::YuvConversion;
 
@@ -26,7 +26,7 @@ pub(crate) struct TextureViews {
 
 /// Objects that stand in every slot nobody owns.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Dummies {
+pub(crate) struct DefaultDescriptors {
     pub(crate) sampled: vk::ImageView,
     pub(crate) storage: vk::ImageView,
     pub(crate) sampler: vk::Sampler,
@@ -40,23 +40,23 @@ pub(crate) struct Bindless {
     pub(crate) set_layout: vk::DescriptorSetLayout,
     pub(crate) set: vk::DescriptorSet,
     pool: vk::DescriptorPool,
-    entries: Mutex<Entries>,
+    entries: Mutex<BindlessState>,
     /// Present where shaders look their indices up.
     pub(crate) checks: Option<IndexChecks>,
     gpu: Arc<Gpu>,
 }
 
-struct Entries {
-    dummies: Option<Dummies>,
-    textures: Array<TextureViews>,
+struct BindlessState {
+    defaults: Option<DefaultDescriptors>,
+    textures: SlotArray<TextureViews>,
     /// Of sampled and of storage images: most textures are only one of both.
-    shown: [Shown; 2],
-    samplers: Array<vk::Sampler>,
-    tlas: Array<vk::AccelerationStructureKHR>,
+    shown: [WrittenDescriptors; 2],
+    samplers: SlotArray<vk::Sampler>,
+    tlas: SlotArray<vk::AccelerationStructureKHR>,
     yuv: YuvSlots,
 }
 
-impl Entries {
+impl BindlessState {
     /// Whether nothing is to be written, as before most submissions.
     fn is_clean(&self) -> bool {
         let arrays = [&self.textures.slots, &self.samplers.slots, &self.tlas.slots];
@@ -69,13 +69,13 @@ pub(crate) const TEXTURE_ARRAYS: [BindlessArray; 2] = [BindlessArray::Textures, 
 
 impl Bindless {
     pub(crate) fn new(gpu: &Arc<Gpu>, max_textures: u32, yuv: YuvSlots, check_indices: bool) -> Result<Self> {
-        let left = gpu.descriptor_limits().room(&room::others(gpu), yuv.descriptors());
+        let left = gpu.descriptor_limits().budget(&room::reserved_descriptors(gpu), yuv.descriptors());
         let conversions = yuv.samplers();
-        let textures = fitting(left.textures_of(max_textures)?, |textures| {
-            is_supported(gpu, &counts(gpu, textures, left.samplers), &conversions)
+        let textures = largest_fitting(left.texture_count(max_textures)?, |textures| {
+            is_supported(gpu, &binding_counts(gpu, textures, left.samplers), &conversions)
         })?;
-        let slots = room::slot_count(gpu);
-        let counts = counts(gpu, textures, left.samplers);
+        let slots = room::tlas_slot_count(gpu);
+        let counts = binding_counts(gpu, textures, left.samplers);
         let capacities = [textures, left.samplers, textures, slots];
         let checks = if check_indices { Some(IndexChecks::new(gpu, capacities)?) } else { None };
         let set_layout = create_layout(gpu, &counts, &conversions)?;
@@ -87,12 +87,12 @@ impl Bindless {
                 return Err(error);
             }
         };
-        let entries = Entries {
-            dummies: None,
-            textures: Array::new("number of textures", textures),
-            shown: [Shown::new(textures), Shown::new(textures)],
-            samplers: Array::new("number of samplers", left.samplers),
-            tlas: Array::new("number of top-level acceleration structures", slots),
+        let entries = BindlessState {
+            defaults: None,
+            textures: SlotArray::new("number of textures", textures),
+            shown: [WrittenDescriptors::new(textures), WrittenDescriptors::new(textures)],
+            samplers: SlotArray::new("number of samplers", left.samplers),
+            tlas: SlotArray::new("number of top-level acceleration structures", slots),
             yuv,
         };
         let entries = Mutex::new(Rank::Bindless, entries);
@@ -100,28 +100,28 @@ impl Bindless {
     }
 
     /// Puts the dummies into every slot. Nothing has been submitted yet.
-    pub(crate) fn fill(&self, dummies: Dummies) {
+    pub(crate) fn write_defaults(&self, defaults: DefaultDescriptors) {
         let mut entries = self.lock();
-        entries.dummies = Some(dummies);
-        self.fill_textures(dummies, entries.textures.owners.len() as u32);
+        entries.defaults = Some(defaults);
+        self.write_default_textures(defaults, entries.textures.owners.len() as u32);
         let samplers = (0..entries.samplers.owners.len() as u32).map(|slot| (slot, None));
-        self.write_samplers(dummies, samplers);
+        self.write_samplers(defaults, samplers);
         let tlas = (0..entries.tlas.owners.len() as u32).map(|slot| (slot, None));
-        self.write_tlas(dummies, tlas);
-        if let Some(table) = dummies.tlas_table {
+        self.write_tlas(defaults, tlas);
+        if let Some(table) = defaults.tlas_table {
             self.write_tlas_table(table);
         }
-        self.write_yuv(entries.yuv.all());
+        self.write_yuv(entries.yuv.all_views());
     }
 
-    /// What stands in the slots of a conversion that nobody owns; before [`fill`](Self::fill).
-    pub(crate) fn set_yuv_dummy(&self, conversion: usize, view: vk::ImageView) {
-        self.lock().yuv.set_dummy(conversion, view);
+    /// What stands in the slots of a conversion that nobody owns; before [`write_defaults`](Self::write_defaults).
+    pub(crate) fn set_yuv_default(&self, conversion: usize, view: vk::ImageView) {
+        self.lock().yuv.set_default(conversion, view);
     }
 
     /// The conversions that the device has.
-    pub(crate) fn yuv(&self) -> Vec<(usize, YuvConversion, vk::SamplerYcbcrConversion)> {
-        self.lock().yuv.made()
+    pub(crate) fn yuv_conversions(&self) -> Vec<(usize, YuvConversion, vk::SamplerYcbcrConversion)> {
+        self.lock().yuv.conversions()
     }
 
     /// A slot for a texture in Y'CbCr, by this conversion or the first of its format.
@@ -130,7 +130,7 @@ impl Bindless {
         format: Format,
         conversion: Option<usize>,
         name: &str,
-    ) -> Result<YuvPlace> {
+    ) -> Result<YuvSlot> {
         self.lock().yuv.reserve(format, conversion, name)
     }
 
@@ -145,21 +145,21 @@ impl Bindless {
 
     pub(crate) fn reserve_texture(&self, name: &str) -> Result<u32> {
         let slot = self.lock().textures.reserve(name)?;
-        self.note_reserved(&TEXTURE_ARRAYS, slot, name);
+        self.record_reserved(&TEXTURE_ARRAYS, slot, name);
         Ok(slot)
     }
 
     pub(crate) fn reserve_sampler(&self, name: &str) -> Result<u32> {
         let slot = self.lock().samplers.reserve(name)?;
-        self.note_reserved(&[BindlessArray::Samplers], slot, name);
-        self.note_set(BindlessArray::Samplers, slot);
+        self.record_reserved(&[BindlessArray::Samplers], slot, name);
+        self.record_set(BindlessArray::Samplers, slot);
         Ok(slot)
     }
 
     pub(crate) fn reserve_tlas(&self, name: &str) -> Result<u32> {
         let slot = self.lock().tlas.reserve(name)?;
-        self.note_reserved(&[BindlessArray::AccelStructs], slot, name);
-        self.note_set(BindlessArray::AccelStructs, slot);
+        self.record_reserved(&[BindlessArray::AccelStructs], slot, name);
+        self.record_set(BindlessArray::AccelStructs, slot);
         Ok(slot)
     }
 
@@ -167,7 +167,7 @@ impl Bindless {
         self.lock().textures.set(slot, Some(views));
         for (array, view) in TEXTURE_ARRAYS.into_iter().zip([views.sampled, views.storage]) {
             if view.is_some() {
-                self.note_set(array, slot);
+                self.record_set(array, slot);
             }
         }
     }
@@ -185,7 +185,7 @@ impl Bindless {
         let mut entries = self.lock();
         entries.textures.set(slot, None);
         entries.textures.slots.free(slot);
-        self.note_free(&TEXTURE_ARRAYS, slot);
+        self.record_free(&TEXTURE_ARRAYS, slot);
     }
 
     /// As [`free_texture`](Self::free_texture).
@@ -193,7 +193,7 @@ impl Bindless {
         let mut entries = self.lock();
         entries.samplers.set(slot, None);
         entries.samplers.slots.free(slot);
-        self.note_free(&[BindlessArray::Samplers], slot);
+        self.record_free(&[BindlessArray::Samplers], slot);
     }
 
     /// As [`free_texture`](Self::free_texture).
@@ -201,14 +201,14 @@ impl Bindless {
         let mut entries = self.lock();
         entries.tlas.set(slot, None);
         entries.tlas.slots.free(slot);
-        self.note_free(&[BindlessArray::AccelStructs], slot);
+        self.record_free(&[BindlessArray::AccelStructs], slot);
     }
 
     /// The handle of the owner of a slot is gone, and command buffers up to number `newest` were begun before.
-    pub(crate) fn note_retired(&self, arrays: &[BindlessArray], slot: u32, newest: impl FnOnce() -> u64) {
+    pub(crate) fn record_retired(&self, arrays: &[BindlessArray], slot: u32, newest: impl FnOnce() -> u64) {
         if let Some(checks) = &self.checks {
             let newest = newest();
-            arrays.iter().for_each(|array| checks.retire(*array, slot, newest));
+            arrays.iter().for_each(|array| checks.mark_retired(*array, slot, newest));
         }
     }
 
@@ -217,61 +217,61 @@ impl Bindless {
         self.checks.as_ref().map(|checks| checks.plan(shader))
     }
 
-    fn note_reserved(&self, arrays: &[BindlessArray], slot: u32, name: &str) {
+    fn record_reserved(&self, arrays: &[BindlessArray], slot: u32, name: &str) {
         if let Some(checks) = &self.checks {
             checks.reserve(arrays, slot, name);
         }
     }
 
-    fn note_set(&self, array: BindlessArray, slot: u32) {
+    fn record_set(&self, array: BindlessArray, slot: u32) {
         if let Some(checks) = &self.checks {
-            checks.set(array, slot);
+            checks.mark_alive(array, slot);
         }
     }
 
-    fn note_free(&self, arrays: &[BindlessArray], slot: u32) {
+    fn record_free(&self, arrays: &[BindlessArray], slot: u32) {
         if let Some(checks) = &self.checks {
-            arrays.iter().for_each(|array| checks.free(*array, slot));
+            arrays.iter().for_each(|array| checks.mark_free(*array, slot));
         }
     }
 
     /// Writes the dirty slots. Called before every submission.
     pub(crate) fn flush(&self) {
         let mut entries = self.lock();
-        let Some(dummies) = entries.dummies.filter(|_| !entries.is_clean()) else { return };
-        self.write_textures(dummies, &mut entries);
-        self.write_samplers(dummies, entries.samplers.take_dirty().into_iter());
-        self.write_tlas(dummies, entries.tlas.take_dirty().into_iter());
+        let Some(defaults) = entries.defaults.filter(|_| !entries.is_clean()) else { return };
+        self.write_textures(defaults, &mut entries);
+        self.write_samplers(defaults, entries.samplers.take_dirty().into_iter());
+        self.write_tlas(defaults, entries.tlas.take_dirty().into_iter());
         self.write_yuv(entries.yuv.take_dirty());
     }
 
     fn write_yuv(&self, slots: Vec<(u32, vk::ImageView)>) {
         let mut views = Runs::default();
         for (slot, view) in slots {
-            views.push(slot, image(view, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL));
+            views.push(slot, image_info(view, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL));
         }
         self.write(&views, layout::YCBCR, vk::DescriptorType::COMBINED_IMAGE_SAMPLER);
     }
 
-    fn fill_textures(&self, dummies: Dummies, count: u32) {
+    fn write_default_textures(&self, defaults: DefaultDescriptors, count: u32) {
         let (mut sampled, mut storage) = (Runs::default(), Runs::default());
         for slot in 0..count {
-            sampled.push(slot, sampled_image(dummies.sampled));
-            storage.push(slot, storage_image(dummies.storage));
+            sampled.push(slot, sampled_image(defaults.sampled));
+            storage.push(slot, storage_image(defaults.storage));
         }
         self.write_images(&sampled, &storage);
     }
 
-    fn write_textures(&self, dummies: Dummies, entries: &mut Entries) {
+    fn write_textures(&self, defaults: DefaultDescriptors, entries: &mut BindlessState) {
         let (mut sampled, mut storage) = (Runs::default(), Runs::default());
         let [shown_sampled, shown_storage] = &mut entries.shown;
         for (slot, views) in entries.textures.take_dirty() {
             let (read, written) = views.map_or((None, None), |views| (views.sampled, views.storage));
             if shown_sampled.must_write(slot, read.is_some()) {
-                sampled.push(slot, sampled_image(read.unwrap_or(dummies.sampled)));
+                sampled.push(slot, sampled_image(read.unwrap_or(defaults.sampled)));
             }
             if shown_storage.must_write(slot, written.is_some()) {
-                storage.push(slot, storage_image(written.unwrap_or(dummies.storage)));
+                storage.push(slot, storage_image(written.unwrap_or(defaults.storage)));
             }
         }
         self.write_images(&sampled, &storage);
@@ -282,10 +282,14 @@ impl Bindless {
         self.write(storage, layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE);
     }
 
-    fn write_samplers(&self, dummies: Dummies, slots: impl Iterator<Item = (u32, Option<vk::Sampler>)>) {
+    fn write_samplers(
+        &self,
+        defaults: DefaultDescriptors,
+        slots: impl Iterator<Item = (u32, Option<vk::Sampler>)>,
+    ) {
         let mut samplers = Runs::default();
         for (slot, owner) in slots {
-            let sampler = owner.unwrap_or(dummies.sampler);
+            let sampler = owner.unwrap_or(defaults.sampler);
             samplers.push(slot, vk::DescriptorImageInfo::default().sampler(sampler));
         }
         self.write(&samplers, layout::SAMPLERS, vk::DescriptorType::SAMPLER);
@@ -294,7 +298,7 @@ impl Bindless {
     fn write(&self, runs: &Runs<vk::DescriptorImageInfo>, binding: u32, ty: vk::DescriptorType) {
         let writes: Vec<_> = runs
             .iter()
-            .map(|(first, infos)| self.write_at(binding, first).descriptor_type(ty).image_info(infos))
+            .map(|(first, infos)| self.descriptor_write(binding, first).descriptor_type(ty).image_info(infos))
             .collect();
         if !writes.is_empty() {
             // SAFETY: the views and samplers are alive; slots in use by the GPU are not among the dirty ones, as
@@ -305,12 +309,12 @@ impl Bindless {
 
     fn write_tlas(
         &self,
-        dummies: Dummies,
+        defaults: DefaultDescriptors,
         slots: impl Iterator<Item = (u32, Option<vk::AccelerationStructureKHR>)>,
     ) {
         let mut runs = Runs::default();
         for (slot, owner) in slots {
-            if let Some(raw) = owner.or(dummies.tlas) {
+            if let Some(raw) = owner.or(defaults.tlas) {
                 runs.push(slot, raw);
             }
         }
@@ -318,7 +322,7 @@ impl Bindless {
             let mut structures =
                 vk::WriteDescriptorSetAccelerationStructureKHR::default().acceleration_structures(raw);
             let mut write = self
-                .write_at(layout::ACCEL_STRUCTS, first)
+                .descriptor_write(layout::ACCEL_STRUCTS, first)
                 .descriptor_type(vk::DescriptorType::ACCELERATION_STRUCTURE_KHR)
                 .push_next(&mut structures);
             write.descriptor_count = raw.len() as u32;
@@ -329,17 +333,17 @@ impl Bindless {
 
     fn write_tlas_table(&self, table: vk::Buffer) {
         let info = [vk::DescriptorBufferInfo::default().buffer(table).range(vk::WHOLE_SIZE)];
-        let write = self.write_at(layout::TLAS_TABLE, 0);
+        let write = self.descriptor_write(layout::TLAS_TABLE, 0);
         let write = write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(&info);
         // SAFETY: the buffer lives as long as the set, and nothing has been submitted yet.
         unsafe { self.gpu.device.update_descriptor_sets(&[write], &[]) };
     }
 
-    fn write_at<'a>(&self, binding: u32, first: u32) -> vk::WriteDescriptorSet<'a> {
+    fn descriptor_write<'a>(&self, binding: u32, first: u32) -> vk::WriteDescriptorSet<'a> {
         vk::WriteDescriptorSet::default().dst_set(self.set).dst_binding(binding).dst_array_element(first)
     }
 
-    fn lock(&self) -> Guard<'_, Entries> {
+    fn lock(&self) -> Guard<'_, BindlessState> {
         self.entries.lock()
     }
 }
@@ -384,33 +388,37 @@ impl<T> Runs<T> {
 }
 
 fn sampled_image(view: vk::ImageView) -> vk::DescriptorImageInfo {
-    image(view, vk::ImageLayout::READ_ONLY_OPTIMAL)
+    image_info(view, vk::ImageLayout::READ_ONLY_OPTIMAL)
 }
 
 fn storage_image(view: vk::ImageView) -> vk::DescriptorImageInfo {
-    image(view, vk::ImageLayout::GENERAL)
+    image_info(view, vk::ImageLayout::GENERAL)
 }
 
-fn image(view: vk::ImageView, layout: vk::ImageLayout) -> vk::DescriptorImageInfo {
+fn image_info(view: vk::ImageView, layout: vk::ImageLayout) -> vk::DescriptorImageInfo {
     vk::DescriptorImageInfo::default().image_view(view).image_layout(layout)
 }
 
-type Count = (u32, vk::DescriptorType, u32);
+type BindingCount = (u32, vk::DescriptorType, u32);
 
 /// The bindings with so many textures and samplers, without those of Y'CbCr.
-fn counts(gpu: &Gpu, textures: u32, samplers: u32) -> [Count; 5] {
+fn binding_counts(gpu: &Gpu, textures: u32, samplers: u32) -> [BindingCount; 5] {
     [
         (layout::SAMPLED_IMAGES, vk::DescriptorType::SAMPLED_IMAGE, textures),
         (layout::SAMPLERS, vk::DescriptorType::SAMPLER, samplers),
         (layout::STORAGE_IMAGES, vk::DescriptorType::STORAGE_IMAGE, textures),
-        (layout::ACCEL_STRUCTS, vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, room::tlas_count(gpu)),
-        (layout::TLAS_TABLE, vk::DescriptorType::STORAGE_BUFFER, room::table_count(gpu)),
+        (
+            layout::ACCEL_STRUCTS,
+            vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
+            room::hardware_tlas_count(gpu),
+        ),
+        (layout::TLAS_TABLE, vk::DescriptorType::STORAGE_BUFFER, room::tlas_table_count(gpu)),
     ]
 }
 
 /// Whether the device takes a set of this size: its limits of descriptors say nothing of their bytes.
-fn is_supported(gpu: &Gpu, counts: &[Count], yuv: &[vk::Sampler]) -> bool {
-    with_layout(counts, yuv, |info| {
+fn is_supported(gpu: &Gpu, counts: &[BindingCount], yuv: &[vk::Sampler]) -> bool {
+    with_layout_info(counts, yuv, |info| {
         let mut support = vk::DescriptorSetLayoutSupport::default();
         // SAFETY: the counts are within the limits of descriptors, and the samplers are alive.
         unsafe { gpu.device.get_descriptor_set_layout_support(info, &mut support) };
@@ -418,16 +426,16 @@ fn is_supported(gpu: &Gpu, counts: &[Count], yuv: &[vk::Sampler]) -> bool {
     })
 }
 
-fn create_layout(gpu: &Gpu, counts: &[Count], yuv: &[vk::Sampler]) -> Result<vk::DescriptorSetLayout> {
+fn create_layout(gpu: &Gpu, counts: &[BindingCount], yuv: &[vk::Sampler]) -> Result<vk::DescriptorSetLayout> {
     // SAFETY: the counts are within the limits of descriptors beside everything else that they count for (`room`), and the
     // device was asked whether it supports the layout.
-    with_layout(counts, yuv, |info| unsafe { gpu.device.create_descriptor_set_layout(info, None) })
+    with_layout_info(counts, yuv, |info| unsafe { gpu.device.create_descriptor_set_layout(info, None) })
         .map_err(Error::vulkan("vkCreateDescriptorSetLayout"))
 }
 
 /// Hands the description of the layout on.
-fn with_layout<T>(
-    counts: &[Count],
+fn with_layout_info<T>(
+    counts: &[BindingCount],
     yuv: &[vk::Sampler],
     then: impl FnOnce(&vk::DescriptorSetLayoutCreateInfo<'_>) -> T,
 ) -> T {
@@ -472,7 +480,7 @@ fn binding_flags(binding: u32) -> vk::DescriptorBindingFlags {
 fn create_set(
     gpu: &Gpu,
     layout: vk::DescriptorSetLayout,
-    counts: &[Count],
+    counts: &[BindingCount],
     yuv: u32,
 ) -> Result<(vk::DescriptorPool, vk::DescriptorSet)> {
     let yuv = (layout::YCBCR, vk::DescriptorType::COMBINED_IMAGE_SAMPLER, yuv);

@@ -5,39 +5,39 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::room;
-use super::slot_array::Array;
+use super::slot_array::SlotArray;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::caps::descriptor_limits::YuvWish;
+use crate::gpu::caps::descriptor_limits::YuvRequest;
 use crate::resource::ycbcr::{YuvConversion, YuvSampler};
 
 /// Conversions of a context, each with its textures.
 pub(crate) struct YuvSlots {
-    ranges: Vec<Range>,
+    ranges: Vec<ConversionRange>,
     /// Slots of each conversion that the device has, its dummy included.
     room: u32,
     /// Descriptors that all slots take: each as many as one of the conversion that takes most.
     descriptors: u32,
 }
 
-struct Range {
+struct ConversionRange {
     desc: YuvConversion,
     /// The conversion, or what the device lacks for it.
     sampler: Result<Arc<YuvSampler>, &'static str>,
     /// First slot in the binding.
     first: u32,
-    textures: Array<vk::ImageView>,
-    dummy: Option<vk::ImageView>,
+    textures: SlotArray<vk::ImageView>,
+    default_view: Option<vk::ImageView>,
 }
 
 /// Where a texture goes, and how it is converted.
-pub(crate) struct YuvPlace {
+pub(crate) struct YuvSlot {
     pub(crate) slot: u32,
     pub(crate) conversion: vk::SamplerYcbcrConversion,
 }
 
 impl YuvSlots {
-    const MOST_TEXTURES: u32 = 1_024;
+    const MAX_TEXTURES: u32 = 1_024;
 
     /// Makes the conversions that the device has, each with room for so many textures, or for as many as the device
     /// allows.
@@ -50,17 +50,17 @@ impl YuvSlots {
             samplers.push((*desc, YuvSampler::new(gpu, desc)?.map(Arc::new)));
         }
         let made = || samplers.iter().filter_map(|(_, sampler)| sampler.as_ref().ok());
-        let wish = YuvWish {
+        let wish = YuvRequest {
             conversions: made().count() as u32,
-            textures: textures.min(Self::MOST_TEXTURES) + 1,
+            textures: textures.min(Self::MAX_TEXTURES) + 1,
             descriptors: made().map(|sampler| sampler.descriptors).max().unwrap_or(1),
         };
-        let room = gpu.descriptor_limits().yuv_textures(&room::others(gpu), &wish)?;
+        let room = gpu.descriptor_limits().yuv_textures(&room::reserved_descriptors(gpu), &wish)?;
         let (mut ranges, mut first) = (Vec::with_capacity(descs.len()), 0);
         for (desc, sampler) in samplers {
             let own = if sampler.is_ok() { room } else { 0 };
-            let textures = Array::new("number of textures of a conversion", own);
-            ranges.push(Range { desc, sampler, first, textures, dummy: None });
+            let textures = SlotArray::new("number of textures of a conversion", own);
+            ranges.push(ConversionRange { desc, sampler, first, textures, default_view: None });
             first += own;
         }
         Ok(Self { ranges, room, descriptors: wish.descriptors * first })
@@ -78,8 +78,8 @@ impl YuvSlots {
     }
 
     /// The conversions that need a dummy, by their numbers.
-    pub(crate) fn made(&self) -> Vec<(usize, YuvConversion, vk::SamplerYcbcrConversion)> {
-        let made = |(number, range): (usize, &Range)| {
+    pub(crate) fn conversions(&self) -> Vec<(usize, YuvConversion, vk::SamplerYcbcrConversion)> {
+        let made = |(number, range): (usize, &ConversionRange)| {
             let sampler = range.sampler.as_ref().ok()?;
             Some((number, range.desc, sampler.conversion))
         };
@@ -92,7 +92,7 @@ impl YuvSlots {
         format: crate::Format,
         conversion: Option<usize>,
         name: &str,
-    ) -> Result<YuvPlace> {
+    ) -> Result<YuvSlot> {
         let first = self.ranges.iter().position(|range| range.desc.format == format);
         let chosen = conversion.or(first).and_then(|number| self.ranges.get_mut(number));
         let Some(range) = chosen.filter(|range| range.desc.format == format) else {
@@ -105,7 +105,7 @@ impl YuvSlots {
         })?;
         let conversion = sampler.conversion;
         let slot = range.first + range.textures.reserve(name)?;
-        Ok(YuvPlace { slot, conversion })
+        Ok(YuvSlot { slot, conversion })
     }
 
     pub(super) fn set(&mut self, slot: u32, view: vk::ImageView) {
@@ -121,19 +121,20 @@ impl YuvSlots {
         }
     }
 
-    pub(super) fn set_dummy(&mut self, conversion: usize, view: vk::ImageView) {
+    pub(super) fn set_default(&mut self, conversion: usize, view: vk::ImageView) {
         if let Some(range) = self.ranges.get_mut(conversion) {
-            range.dummy = Some(view);
+            range.default_view = Some(view);
         }
     }
 
     /// All slots with what stands in them, in rising order.
-    pub(super) fn all(&self) -> Vec<(u32, vk::ImageView)> {
-        let slots = |range: &Range| {
-            let slots = range.dummy.map(|dummy| (range.first..range.first + self.room, dummy));
+    pub(super) fn all_views(&self) -> Vec<(u32, vk::ImageView)> {
+        let slots = |range: &ConversionRange| {
+            let slots =
+                range.default_view.map(|default_view| (range.first..range.first + self.room, default_view));
             slots
                 .into_iter()
-                .flat_map(|(slots, dummy)| slots.map(move |slot| (slot, dummy)))
+                .flat_map(|(slots, default_view)| slots.map(move |slot| (slot, default_view)))
                 .collect::<Vec<_>>()
         };
         self.ranges.iter().flat_map(slots).collect()
@@ -148,14 +149,16 @@ impl YuvSlots {
     pub(super) fn take_dirty(&mut self) -> Vec<(u32, vk::ImageView)> {
         let mut dirty = Vec::new();
         for range in &mut self.ranges {
-            let (first, dummy) = (range.first, range.dummy);
+            let (first, default_view) = (range.first, range.default_view);
             let own = range.textures.take_dirty();
-            dirty.extend(own.into_iter().filter_map(|(slot, view)| Some((first + slot, view.or(dummy)?))));
+            dirty.extend(
+                own.into_iter().filter_map(|(slot, view)| Some((first + slot, view.or(default_view)?))),
+            );
         }
         dirty
     }
 
-    fn range(&mut self, slot: u32) -> Option<(&mut Range, u32)> {
+    fn range(&mut self, slot: u32) -> Option<(&mut ConversionRange, u32)> {
         let range = self
             .ranges
             .iter_mut()

@@ -142,7 +142,7 @@ impl Uses {
     #[inline(never)]
     fn learn_images(&mut self, found: &Textures, images: &mut Images) {
         for texture in found.from(self.known_images) {
-            images.insert(texture.image.id, texture.image.for_barriers());
+            images.insert(texture.image.id, texture.image.barrier_image());
         }
         self.known_images = found.count();
     }

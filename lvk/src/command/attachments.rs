@@ -13,19 +13,19 @@ use super::pass_area::{PassArea, PassLayers};
 use super::render_pass_desc::RenderPassDesc;
 use crate::barrier::{Subresources, Use};
 use crate::error::{Error, Result, check_limit};
-use crate::format::{Format, Numbers};
+use crate::format::{Format, NumericFormat};
 use crate::handle::TextureHandle;
-use crate::pipeline::rendering_formats::PassShape;
+use crate::pipeline::rendering_formats::RenderingFormats;
 use crate::resource::Texture;
 use crate::resource::texture_desc::TextureUsage;
-use crate::submit::emit_barriers::layout;
+use crate::submit::emit_barriers::vulkan_layout;
 
 /// The targets of a pass, found and checked.
 pub(super) struct Targets {
     pub(super) extent: [u32; 2],
     pub(super) area: PassArea,
     pub(super) layers: PassLayers,
-    pub(super) shape: PassShape,
+    pub(super) shape: RenderingFormats,
     pub(super) read_only_depth: bool,
     pub(super) inputs: PassInputs,
     pub(super) rates: Option<vk::RenderingFragmentShadingRateAttachmentInfoKHR<'static>>,
@@ -57,7 +57,7 @@ impl Target {
 
     /// Mip and layers, or slices.
     fn texels(&self) -> Subresources {
-        let part = self.texture.part(self.mip, self.layer);
+        let part = self.texture.subresource(self.mip, self.layer);
         Subresources { layer_count: self.layers.count(), ..part }
     }
 
@@ -68,7 +68,7 @@ impl Target {
 
     /// The same as barriers know it.
     pub(super) fn part(&self) -> Subresources {
-        self.texture.drawn_part(self.mip, self.layer, self.layers.count())
+        self.texture.attachment_subresources(self.mip, self.layer, self.layers.count())
     }
 }
 
@@ -88,7 +88,7 @@ impl CommandBuffer {
             let target = self.target(texture, mip, layer, layers, &mut size)?;
             check_color(&target.texture, attachment.load)?;
             if attachment.store || attachment.load == ColorLoadOp::Load {
-                target.texture.check_kept()?;
+                target.texture.check_not_transient()?;
             }
             check_apart(&target, &mut drawn)?;
             let used = inputs.target_use(&target, Use::color_target(attachment.load == ColorLoadOp::Load));
@@ -107,7 +107,7 @@ impl CommandBuffer {
             extent: [0, 0],
             area: PassArea::default(),
             layers,
-            shape: PassShape::default(),
+            shape: RenderingFormats::default(),
             read_only_depth: false,
             inputs,
             rates: None,
@@ -125,7 +125,7 @@ impl CommandBuffer {
         let (extent, samples) =
             size.ok_or_else(|| Error::usage("begin_rendering", "give the pass a colour or a depth target"))?;
         targets.extent = extent;
-        targets.shape = PassShape::new(formats, depth_format, samples, desc.view_mask);
+        targets.shape = RenderingFormats::new(formats, depth_format, samples, desc.view_mask);
         targets.area = PassArea::of(desc.area, extent)?;
         targets.inputs.check(desc)?;
         targets.rates = self.use_rates(desc, targets.area)?;
@@ -141,15 +141,15 @@ impl CommandBuffer {
         let texture = &target.texture;
         check_depth(texture, attachment)?;
         if is_kept(texture, attachment) {
-            texture.check_kept()?;
+            texture.check_not_transient()?;
         }
         let plain = if attachment.read_only { Use::depth_read() } else { Use::depth_target() };
         let used = targets.inputs.target_use(target, plain);
         self.use_texture(texture, target.part(), used)?;
         targets.inputs.add_depth(target)?;
         let view = target.view()?;
-        targets.depth = Some(depth_info(view, attachment).image_layout(layout(used.layout)));
-        let stencil = || stencil_info(view, attachment).image_layout(layout(used.layout));
+        targets.depth = Some(depth_info(view, attachment).image_layout(vulkan_layout(used.layout)));
+        let stencil = || stencil_info(view, attachment).image_layout(vulkan_layout(used.layout));
         targets.stencil = texture.format.has_stencil().then(stencil);
         targets.read_only_depth = attachment.read_only;
         let Some(resolve) = &attachment.resolve else { return Ok(()) };
@@ -196,11 +196,11 @@ fn check_color(texture: &Texture, load: ColorLoadOp) -> Result<()> {
     if !texture.format.is_color() {
         return Err(Error::usage(&texture.name, "a depth format cannot be a colour target"));
     }
-    let numbers = texture.format.numbers();
+    let numbers = texture.format.numeric_format();
     let fits = match load {
-        ColorLoadOp::Clear(_) => numbers == Numbers::Float,
-        ColorLoadOp::ClearUint(_) => numbers == Numbers::Uint,
-        ColorLoadOp::ClearSint(_) => numbers == Numbers::Sint,
+        ColorLoadOp::Clear(_) => numbers == NumericFormat::Float,
+        ColorLoadOp::ClearUint(_) => numbers == NumericFormat::Uint,
+        ColorLoadOp::ClearSint(_) => numbers == NumericFormat::Sint,
         ColorLoadOp::Load | ColorLoadOp::DontCare => true,
     };
     if fits {
@@ -211,10 +211,10 @@ fn check_color(texture: &Texture, load: ColorLoadOp) -> Result<()> {
 }
 
 fn clear_name(format: Format) -> &'static str {
-    match format.numbers() {
-        Numbers::Float => "Clear",
-        Numbers::Uint => "ClearUint",
-        Numbers::Sint => "ClearSint",
+    match format.numeric_format() {
+        NumericFormat::Float => "Clear",
+        NumericFormat::Uint => "ClearUint",
+        NumericFormat::Sint => "ClearSint",
     }
 }
 
@@ -256,7 +256,7 @@ fn color_info(
     };
     Ok(vk::RenderingAttachmentInfo::default()
         .image_view(target.view()?)
-        .image_layout(layout(used.layout))
+        .image_layout(vulkan_layout(used.layout))
         .load_op(op)
         .store_op(store_op(attachment.store))
         .clear_value(vk::ClearValue { color }))

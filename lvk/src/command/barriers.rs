@@ -36,15 +36,15 @@ impl CommandBuffer {
 
     /// The next command's shaders trace rays in these stages.
     pub(super) fn use_structures(&mut self, stages: Stages) {
-        let reads = structure_reads(&self.shared, self.recording.lane, stages);
+        let reads = structure_reads(&self.shared, self.recording.queue_index, stages);
         reads.into_iter().for_each(|(id, read)| self.notes.uses.id(id, read));
     }
 
     /// The pass that begins sees what this command buffer has built: no barrier can be placed once it is open, and only
     /// then is a pipeline bound that may query rays.
     pub(super) fn use_built_structures(&mut self) {
-        let reads = |stages| structure_reads(&self.shared, self.recording.lane, stages);
-        if let Some(stages) = self.shared.graphics_queries.waiting(&self.recording.tracker, reads) {
+        let reads = |stages| structure_reads(&self.shared, self.recording.queue_index, stages);
+        if let Some(stages) = self.shared.graphics_queries.waiting_stages(&self.recording.tracker, reads) {
             self.use_structures(stages);
         }
     }
@@ -144,11 +144,11 @@ fn use_buffer(uses: &mut Uses, host_reads: &mut Vec<ResourceId>, buffer: &Buffer
 }
 
 /// Everything that shaders of `stages` read when they trace rays.
-fn structure_reads(shared: &Shared, lane: usize, stages: Stages) -> [(ResourceId, Use); 4] {
+fn structure_reads(shared: &Shared, queue_index: usize, stages: Stages) -> [(ResourceId, Use); 4] {
     let read = match shared.gpu.caps.software_ray_query() {
-        true => Use::structure_walk(stages),
+        true => Use::software_traversal(stages),
         false => Use::accel_read(stages),
     };
     let tables = (shared.tlas_tables, Use::shader_read(stages));
-    [(shared.all_blas, read), (shared.new_blas[lane], read), (shared.all_tlas, read), tables]
+    [(shared.all_blas, read), (shared.new_blas[queue_index], read), (shared.all_tlas, read), tables]
 }

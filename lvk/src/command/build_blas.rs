@@ -134,7 +134,7 @@ impl CommandBuffer {
 
     /// As [`build_blas`](Self::build_blas), by object.
     pub(crate) fn build_all(&mut self, structures: &[Arc<AccelStruct>], mode: BuildMode) -> Result<()> {
-        self.shared.gpu.check_structures()?;
+        self.shared.gpu.check_acceleration_structures()?;
         self.build_form(structures, mode, Self::plan_software)
     }
 
@@ -254,10 +254,10 @@ impl CommandBuffer {
         let shared = Arc::clone(&self.shared);
         let alignment = shared.gpu.caps.limits.scratch_alignment.into();
         let sizes: Vec<_> = builds.iter().map(|build| build.scratch_bytes).collect();
-        let own = &shared.scratch[self.recording.lane];
+        let own = &shared.scratch[self.recording.queue_index];
         let batches = plan_scratch(&sizes, alignment, own.tiers.batch_bytes());
         let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
-        let ext = shared.gpu.accel()?;
+        let ext = shared.gpu.accel_functions()?;
         let (scratch, replaced) = own.get(&shared.gpu, most)?;
         self.retire_replaced(replaced);
         for batch in batches {
@@ -296,7 +296,7 @@ impl CommandBuffer {
     /// The next command reads bottom-level structures, whichever it may be.
     pub(super) fn use_shown(&mut self, read: Use) {
         self.notes.uses.id(self.shared.all_blas, read);
-        self.notes.uses.id(self.shared.new_blas[self.recording.lane], read);
+        self.notes.uses.id(self.shared.new_blas[self.recording.queue_index], read);
     }
 
     /// Keeps a scratch buffer that a larger one has replaced until the GPU is done with it.

@@ -37,7 +37,7 @@ impl CommandBuffer {
         ty: vk::QueryType,
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
-        let ext = shared.gpu.accel()?;
+        let ext = shared.gpu.accel_functions()?;
         pool.check_range(first, body.structures.len() as u32)?;
         let structures: Vec<_> = body.structures.iter().map(|part| part.raw).collect();
         self.notes.uses.id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
@@ -57,7 +57,7 @@ impl CommandBuffer {
         to: &BlasBody,
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
-        let ext = shared.gpu.accel()?;
+        let ext = shared.gpu.accel_functions()?;
         self.use_copy(target);
         self.flush();
         for (source, copy) in from.structures.iter().zip(&to.structures) {
@@ -84,7 +84,7 @@ impl CommandBuffer {
         addresses: &[u64],
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
-        let ext = shared.gpu.accel()?;
+        let ext = shared.gpu.accel_functions()?;
         self.notes.uses.id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
         self.use_buffer(buffer, Use::accel_to_memory());
         self.flush();
@@ -112,7 +112,7 @@ impl CommandBuffer {
         addresses: &[u64],
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
-        let ext = shared.gpu.accel()?;
+        let ext = shared.gpu.accel_functions()?;
         let body = target.blas()?.body();
         self.use_copy(target);
         self.use_buffer(buffer, Use::accel_from_memory());

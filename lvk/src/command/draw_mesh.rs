@@ -20,7 +20,7 @@ impl RenderPass<'_> {
         self.ready_mesh()?;
         let pipeline = self.bound("draw_mesh_tasks")?;
         check_groups(&pipeline.name, groups, pipeline.front_end, &self.cmd.shared.gpu.caps.limits.mesh)?;
-        let (ext, [x, y, z]) = (self.cmd.shared.gpu.mesh()?, groups);
+        let (ext, [x, y, z]) = (self.cmd.shared.gpu.mesh_functions()?, groups);
         // SAFETY: a mesh pipeline is bound with its push constants, and the counts are within the limits.
         unsafe { ext.cmd_draw_mesh_tasks(self.cmd.raw(), x, y, z) };
         Ok(())
@@ -40,7 +40,7 @@ impl RenderPass<'_> {
         self.ready_mesh()?;
         let size = size_of::<vk::DrawMeshTasksIndirectCommandEXT>() as u64;
         let buffer = self.indirect(arguments, offset, draw_count, stride, size)?;
-        let (ext, raw) = (self.cmd.shared.gpu.mesh()?, self.cmd.raw());
+        let (ext, raw) = (self.cmd.shared.gpu.mesh_functions()?, self.cmd.raw());
         for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
             // SAFETY: as in `draw_mesh_tasks`, and the arguments lie inside the buffer.
             unsafe { ext.cmd_draw_mesh_tasks_indirect(raw, buffer.raw, offset, count, stride) };

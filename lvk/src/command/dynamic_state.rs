@@ -185,7 +185,7 @@ mod tests {
         let rate = prop::option::of(0..2_u32);
         let flags = (any::<bool>(), any::<bool>());
         (depth, bias, flags, rate).prop_map(|(depth, bias, (stencil, blend_constants), rate)| PassState {
-            shading_rate: rate.map(|exponent| ShadingRate::of([1 << exponent, 1])),
+            shading_rate: rate.map(|exponent| ShadingRate::new([1 << exponent, 1])),
             depth: depth.map(|write| DepthState { compare: CompareOp::Less, write }),
             bias: bias.map(|constant| DepthBias { constant: constant.into(), ..Default::default() }),
             stencil,

@@ -93,7 +93,7 @@ impl CommandBuffer {
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
         let alignment = u64::from(shared.gpu.caps.limits.scratch_alignment).max(SCRATCH_ALIGNMENT);
-        let own = &shared.scratch[self.recording.lane];
+        let own = &shared.scratch[self.recording.queue_index];
         let budget = own.tiers.batch_bytes().saturating_sub(alignment);
         let batches = plan_scratch(sizes, alignment, budget);
         let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);

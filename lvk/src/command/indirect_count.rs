@@ -64,7 +64,7 @@ impl RenderPass<'_> {
     /// [`draw_indirect_count`](Self::draw_indirect_count).
     pub fn draw_mesh_tasks_indirect_count(&mut self, draws: &IndirectCount) -> Result<()> {
         self.ready_mesh()?;
-        let command = self.cmd.shared.gpu.mesh()?.fp().cmd_draw_mesh_tasks_indirect_count_ext;
+        let command = self.cmd.shared.gpu.mesh_functions()?.fp().cmd_draw_mesh_tasks_indirect_count_ext;
         self.draw_counted(draws, size_of::<vk::DrawMeshTasksIndirectCommandEXT>(), command)
     }
 

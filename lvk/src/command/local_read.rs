@@ -7,7 +7,7 @@ use super::attachments::{Target, Targets};
 use super::render_pass::RenderPass;
 use super::render_pass_desc::RenderPassDesc;
 use crate::barrier::{Layout, Use};
-use crate::bindless::input_attachments::{Input, InputMask};
+use crate::bindless::input_attachments::{InputAttachment, InputAttachmentMask};
 use crate::bindless::layout::INPUT_SET;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -15,15 +15,15 @@ use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::pipeline::RenderPipeline;
 use crate::pipeline::local_read::{InputIndices, READS_WRITTEN, default_indices};
 use crate::resource::texture_desc::TextureUsage;
-use crate::submit::emit_barriers::layout as raw_layout;
+use crate::submit::emit_barriers::vulkan_layout as raw_layout;
 
 /// The targets of a pass that its own fragment shaders can read.
 #[derive(Default)]
 pub(super) struct PassInputs {
     /// Whether the pass was begun for it.
     pub(super) on: bool,
-    views: Vec<(Input, vk::ImageView)>,
-    mask: InputMask,
+    views: Vec<(InputAttachment, vk::ImageView)>,
+    mask: InputAttachmentMask,
 }
 
 impl PassInputs {
@@ -53,7 +53,7 @@ impl PassInputs {
     /// The pass draws to this colour target.
     pub(super) fn add_color(&mut self, place: u32, target: &Target) -> Result<()> {
         if self.includes(target) {
-            self.add(Input::Color(place), target.view()?);
+            self.add(InputAttachment::Color(place), target.view()?);
         }
         Ok(())
     }
@@ -63,14 +63,14 @@ impl PassInputs {
         if !self.includes(target) {
             return Ok(());
         }
-        self.add(Input::Depth, target.input_view(vk::ImageAspectFlags::DEPTH)?);
+        self.add(InputAttachment::Depth, target.input_view(vk::ImageAspectFlags::DEPTH)?);
         if target.texture.format.has_stencil() {
-            self.add(Input::Stencil, target.input_view(vk::ImageAspectFlags::STENCIL)?);
+            self.add(InputAttachment::Stencil, target.input_view(vk::ImageAspectFlags::STENCIL)?);
         }
         Ok(())
     }
 
-    fn add(&mut self, input: Input, view: vk::ImageView) {
+    fn add(&mut self, input: InputAttachment, view: vk::ImageView) {
         self.views.push((input, view));
         self.mask.insert(input);
     }
@@ -93,7 +93,7 @@ impl PassInputs {
     }
 
     #[cold]
-    fn explain(&self, pipeline: &RenderPipeline, missing: InputMask) -> Result<()> {
+    fn explain(&self, pipeline: &RenderPipeline, missing: InputAttachmentMask) -> Result<()> {
         let Some(input) = missing.iter().next() else { return Ok(()) };
         let remedy = if self.on {
             "whose texture lacks TextureUsage::INPUT"
@@ -107,8 +107,8 @@ impl PassInputs {
 /// What draws of the pass have done to its targets since the last barrier.
 #[derive(Default)]
 pub(super) struct TargetHazards {
-    read: InputMask,
-    written: InputMask,
+    read: InputAttachmentMask,
+    written: InputAttachmentMask,
     /// Whether there was a draw since the bound pipeline was bound, or since the last barrier.
     pub(super) drawn: bool,
     /// Vulkan knows the library's places of targets.
@@ -122,14 +122,14 @@ impl TargetHazards {
             self.read = self.read.union(pipeline.reads);
             self.written = self.written.union(pipeline.writes);
             if writes_depth {
-                self.written.insert(Input::Depth);
+                self.written.insert(InputAttachment::Depth);
             }
         }
         self.drawn = false;
     }
 
     /// Whether draws that read and write these have to wait for those before.
-    fn hold_up(&self, reads: InputMask, writes: InputMask) -> bool {
+    fn hold_up(&self, reads: InputAttachmentMask, writes: InputAttachmentMask) -> bool {
         self.written.intersects(reads) || self.read.intersects(writes)
     }
 }
@@ -143,12 +143,12 @@ impl CommandBuffer {
         let raw = raw_layout(Layout::LocalRead);
         let infos: Vec<_> =
             targets.inputs.views.iter().map(|(input, view)| (*input, image(*view, raw))).collect();
-        let within = infos.iter().filter(|(input, _)| input.place() < layout.count);
+        let within = infos.iter().filter(|(input, _)| input.index() < layout.count);
         let writes: Vec<_> = within
             .map(|(input, info)| {
                 vk::WriteDescriptorSet::default()
                     .dst_set(set)
-                    .dst_binding(input.place())
+                    .dst_binding(input.index())
                     .descriptor_type(vk::DescriptorType::INPUT_ATTACHMENT)
                     .image_info(info)
             })
@@ -205,16 +205,17 @@ impl RenderPass<'_> {
 
     /// Depth is written from here on, other than the bound pipeline says.
     pub(super) fn write_depth(&mut self) -> Result<()> {
-        let reader = self.pipeline.as_ref().filter(|pipeline| pipeline.reads.contains(Input::Depth));
+        let reader =
+            self.pipeline.as_ref().filter(|pipeline| pipeline.reads.contains(InputAttachment::Depth));
         if let Some(pipeline) = reader {
-            let message = format!("its fragment shader reads {}, {READS_WRITTEN}", Input::Depth);
+            let message = format!("its fragment shader reads {}, {READS_WRITTEN}", InputAttachment::Depth);
             return Err(Error::usage(&*pipeline.name, message));
         }
-        let depth = [Input::Depth].into_iter().collect();
-        if self.hazards.hold_up(InputMask::default(), depth) {
+        let depth = [InputAttachment::Depth].into_iter().collect();
+        if self.hazards.hold_up(InputAttachmentMask::default(), depth) {
             self.wait_for_targets();
         }
-        self.hazards.written.insert(Input::Depth);
+        self.hazards.written.insert(InputAttachment::Depth);
         Ok(())
     }
 
@@ -246,7 +247,7 @@ impl RenderPass<'_> {
 }
 
 /// Orders draws before and behind, at each pixel, by what they read and write of these targets.
-fn between_draws(inputs: InputMask) -> vk::MemoryBarrier2<'static> {
+fn between_draws(inputs: InputAttachmentMask) -> vk::MemoryBarrier2<'static> {
     use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
     let mut stages = Stage::FRAGMENT_SHADER;
     let (mut writes, mut reads) = (Access::NONE, Access::INPUT_ATTACHMENT_READ);
@@ -255,7 +256,7 @@ fn between_draws(inputs: InputMask) -> vk::MemoryBarrier2<'static> {
         writes |= Access::DEPTH_STENCIL_ATTACHMENT_WRITE;
         reads |= Access::DEPTH_STENCIL_ATTACHMENT_READ;
     }
-    if inputs.iter().any(|input| matches!(input, Input::Color(_))) {
+    if inputs.iter().any(|input| matches!(input, InputAttachment::Color(_))) {
         stages |= Stage::COLOR_ATTACHMENT_OUTPUT;
         writes |= Access::COLOR_ATTACHMENT_WRITE;
         reads |= Access::COLOR_ATTACHMENT_READ;
@@ -275,29 +276,33 @@ fn image(view: vk::ImageView, layout: vk::ImageLayout) -> [vk::DescriptorImageIn
 mod tests {
     use super::*;
 
-    fn mask(inputs: &[Input]) -> InputMask {
+    fn mask(inputs: &[InputAttachment]) -> InputAttachmentMask {
         inputs.iter().copied().collect()
     }
 
     #[test]
     fn draws_wait_where_one_reads_what_another_writes() {
-        let (albedo, lit) = (mask(&[Input::Color(0), Input::Depth]), mask(&[Input::Color(1)]));
+        let (albedo, lit) =
+            (mask(&[InputAttachment::Color(0), InputAttachment::Depth]), mask(&[InputAttachment::Color(1)]));
         let drawn = TargetHazards { written: albedo, ..Default::default() };
-        assert!(drawn.hold_up(albedo, lit) && drawn.hold_up(mask(&[Input::Depth]), lit));
-        assert!(!drawn.hold_up(InputMask::default(), albedo), "the order of blending is Vulkan's");
+        assert!(drawn.hold_up(albedo, lit) && drawn.hold_up(mask(&[InputAttachment::Depth]), lit));
+        assert!(!drawn.hold_up(InputAttachmentMask::default(), albedo), "the order of blending is Vulkan's");
         let lights = TargetHazards { read: albedo, written: lit, ..Default::default() };
         assert!(!lights.hold_up(albedo, lit), "further lights need not wait");
-        assert!(lights.hold_up(InputMask::default(), albedo), "nor is changed what they still read");
-        assert!(!lights.hold_up(InputMask::default(), mask(&[Input::Color(2)])));
+        assert!(
+            lights.hold_up(InputAttachmentMask::default(), albedo),
+            "nor is changed what they still read"
+        );
+        assert!(!lights.hold_up(InputAttachmentMask::default(), mask(&[InputAttachment::Color(2)])));
     }
 
     #[test]
     fn barriers_name_the_stages_of_what_can_be_read() {
         use vk::PipelineStageFlags2 as Stage;
-        let color = between_draws(mask(&[Input::Color(3)]));
+        let color = between_draws(mask(&[InputAttachment::Color(3)]));
         assert_eq!(color.src_stage_mask, Stage::FRAGMENT_SHADER | Stage::COLOR_ATTACHMENT_OUTPUT);
         assert_eq!(color.src_access_mask, vk::AccessFlags2::COLOR_ATTACHMENT_WRITE);
-        let depth = between_draws(mask(&[Input::Stencil]));
+        let depth = between_draws(mask(&[InputAttachment::Stencil]));
         assert!(depth.src_stage_mask.contains(Stage::LATE_FRAGMENT_TESTS));
         assert!(depth.dst_access_mask.contains(vk::AccessFlags2::INPUT_ATTACHMENT_READ));
         assert!(!depth.dst_access_mask.contains(vk::AccessFlags2::COLOR_ATTACHMENT_READ));

@@ -100,10 +100,10 @@ impl CommandBuffer {
         notes: Box<Notes>,
     ) -> Self {
         if let Some(checks) = &shared.bindless.checks {
-            checks.begin(&shared.gpu, recording.commands, recording.sequence);
+            checks.record_begin(&shared.gpu, recording.commands, recording.sequence);
         }
         Self {
-            scopes: shared.profiler.begin(recording.commands, queue),
+            scopes: shared.profiler.begin_command_buffer(recording.commands, queue),
             shared: Arc::clone(shared),
             queue,
             finished: false,
@@ -141,7 +141,7 @@ impl CommandBuffer {
         if self.queue != Queue::Graphics {
             self.shared.submitter.check_queue(&self.recording.tracker)?;
         }
-        self.shared.submitter.check(&self.recording.tracker)
+        self.shared.submitter.check_presentables(&self.recording.tracker)
     }
 
     /// Ends the recording.

@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::handle::QueryPoolHandle;
 use crate::resource::QueryPool;
 use crate::resource::query_pool::QueryKind;
-use crate::submit::ownership::Access;
+use crate::submit::ownership::QueueAccess;
 
 impl CommandBuffer {
     /// Makes queries ready to be written again (`vkCmdResetQueryPool`).
@@ -91,7 +91,7 @@ impl CommandBuffer {
         // SAFETY: the query exists and is ready, and none of its type is open.
         unsafe {
             let device = &self.shared.gpu.device;
-            device.cmd_begin_query(self.raw(), pool.raw, query, pool.kind.control());
+            device.cmd_begin_query(self.raw(), pool.raw, query, pool.kind.control_flags());
         }
         self.notes.queries.begin(pool, query, self.views, self.rendering);
         Ok(())
@@ -137,8 +137,8 @@ impl CommandBuffer {
 
     /// Other queues wait for what this one does to pools.
     pub(super) fn refer_to_queries(&mut self) {
-        if self.shared.gpu.queues.several_lanes() {
-            self.recording.references.extend(self.notes.queries.pools().map(|id| (id, Access::Write)));
+        if self.shared.gpu.queues.has_several() {
+            self.recording.references.extend(self.notes.queries.pools().map(|id| (id, QueueAccess::Write)));
         }
     }
 

@@ -6,12 +6,12 @@ use crate::barrier::ResourceId;
 use crate::error::{Error, Result};
 use crate::resource::QueryPool;
 use crate::resource::query_pool::QueryKind;
-use crate::resource::query_reset_state::QueryMarks;
+use crate::resource::query_reset_state::QueryResetState;
 
 /// The queries a command buffer writes and resets, and those it has begun.
 #[derive(Default)]
 pub(super) struct QueryLog {
-    pools: Vec<(Arc<QueryPool>, QueryMarks)>,
+    pools: Vec<(Arc<QueryPool>, QueryResetState)>,
     open: Vec<OpenQuery>,
     /// A query that was begun in a render pass and left open at its end.
     left_open: Option<Error>,
@@ -31,7 +31,7 @@ impl QueryLog {
         let marks = self.marks(pool);
         match (query..query + count).find(|query| !marks.is_ready(*query)) {
             None => Ok(()),
-            Some(query) => Err(pool.not_reset(query)),
+            Some(query) => Err(pool.not_reset_error(query)),
         }
     }
 
@@ -64,7 +64,7 @@ impl QueryLog {
         match self.open.iter().find(|open| open.pool.kind.raw() == pool.kind.raw()) {
             None => Ok(()),
             Some(open) => {
-                let (query, name, kind) = (open.query, &open.pool.name, pool.kind.words());
+                let (query, name, kind) = (open.query, &open.pool.name, pool.kind.label());
                 let message = format!(
                     "queries of {kind} cannot be nested: query {query} of '{name}' is open, end it first"
                 );
@@ -133,7 +133,7 @@ impl QueryLog {
 
     /// The command buffer was submitted.
     pub(super) fn submit(&self) {
-        self.pools.iter().for_each(|(pool, marks)| pool.submit(marks));
+        self.pools.iter().for_each(|(pool, marks)| pool.mark_submitted(marks));
     }
 
     /// Forgets everything; keeps the memory.
@@ -148,11 +148,11 @@ impl QueryLog {
         self.pools.iter().map(|(pool, _)| pool.id)
     }
 
-    fn marks(&mut self, pool: &Arc<QueryPool>) -> &mut QueryMarks {
+    fn marks(&mut self, pool: &Arc<QueryPool>) -> &mut QueryResetState {
         let known = self.pools.iter().position(|(known, _)| Arc::ptr_eq(known, pool));
         let place = known.unwrap_or(self.pools.len());
         if known.is_none() {
-            self.pools.push((Arc::clone(pool), QueryMarks::new(pool.count)));
+            self.pools.push((Arc::clone(pool), QueryResetState::new(pool.count)));
         }
         &mut self.pools[place].1
     }

@@ -10,7 +10,7 @@ use crate::gpu::caps::queues::Queue;
 use crate::resource::Texture;
 use crate::resource::region::Region;
 use crate::submit::SubmitHandle;
-use crate::submit::ownership::Access;
+use crate::submit::ownership::QueueAccess;
 use crate::submit::queue::stages_of;
 
 /// What builds are called.
@@ -22,9 +22,9 @@ impl CommandBuffer {
         self.queue
     }
 
-    /// Its queue's. What is on lane 0 runs in order with what the graphics queue gets.
-    pub(crate) fn lane(&self) -> usize {
-        self.recording.lane
+    /// Its queue's. What is on queue 0 runs in order with what the graphics queue gets.
+    pub(crate) fn queue_index(&self) -> usize {
+        self.recording.queue_index
     }
 
     /// Fails unless this is for the graphics queue.
@@ -46,7 +46,7 @@ impl CommandBuffer {
         if self.shared.gpu.caps.queue(self.queue).timestamp_bits > 0 {
             return Ok(());
         }
-        Err(self.shared.gpu.lacks(&format!("timestamps on the {} queue", self.queue.words())))
+        Err(self.shared.gpu.unsupported(&format!("timestamps on the {} queue", self.queue.label())))
     }
 
     /// Fails where copies on this queue cannot have such a region.
@@ -58,7 +58,7 @@ impl CommandBuffer {
             return self.needs_graphics("a copy of depth or stencil");
         }
         let granularity = self.shared.gpu.caps.queue(self.queue).copy_granularity;
-        let mip = region.part.shrunk(texture.image.mip_extent(region.mip));
+        let mip = region.part.aspect_extent(texture.image.mip_extent(region.mip));
         let [width, height] = region.part.block;
         let side = |axis: usize| (region.offset[axis], region.extent[axis], mip[axis]);
         let blocks = [width, height, 1];
@@ -68,7 +68,7 @@ impl CommandBuffer {
         let message = format!(
             "copies on the {} queue of this device begin and end at multiples of {granularity:?} texels or blocks (0: whole \
              mips), not at {:?} + {:?}; take another queue",
-            self.queue.words(),
+            self.queue.label(),
             region.offset,
             region.extent
         );
@@ -81,28 +81,32 @@ impl CommandBuffer {
             if submission.context != self.shared.store.context_id {
                 return Err(Error::usage("wait_for", "the submission belongs to another context"));
             }
-            let lane = self.shared.submitter.lane_of(submission.value);
-            self.recording.after.raise(lane, submission.value);
+            let queue_index = self.shared.submitter.queue_of(submission.value);
+            self.recording.after.max_with_value(queue_index, submission.value);
         }
         Ok(())
     }
 
-    /// The command buffer begins after a submission of the first lane.
+    /// The command buffer begins after a submission of the first queue.
     pub(crate) fn begin_after(&mut self, value: u64) {
-        self.recording.after.raise(0, value);
+        self.recording.after.max_with_value(0, value);
     }
 
     /// The command buffer uses something that needs no barriers within a queue.
     #[inline]
-    pub(crate) fn refer(&mut self, id: ResourceId, access: Access) {
-        if self.shared.gpu.queues.several_lanes() {
+    pub(crate) fn refer(&mut self, id: ResourceId, access: QueueAccess) {
+        if self.shared.gpu.queues.has_several() {
             self.recording.references.push((id, access));
         }
     }
 
     /// What stands for bottom-level structures that are built now: all of them, or the new ones, which nothing shows.
     pub(super) fn built_group(&self) -> ResourceId {
-        if self.first_builds { self.shared.new_blas[self.recording.lane] } else { self.shared.all_blas }
+        if self.first_builds {
+            self.shared.new_blas[self.recording.queue_index]
+        } else {
+            self.shared.all_blas
+        }
     }
 }
 
@@ -118,11 +122,11 @@ pub(crate) fn needs_compute(queue: Queue, command: &'static str) -> Result<()> {
 }
 
 /// Copies leave things readable everywhere: by what the queue can name, and on others by a semaphore.
-pub(super) fn on_lane(lane: usize, read: Use) -> Use {
-    if lane == 0 {
+pub(super) fn limited_to_queue(queue_index: usize, read: Use) -> Use {
+    if queue_index == 0 {
         return read;
     }
-    let own = read.limited_to(stages_of(Queue::ALL[lane]));
+    let own = read.limited_to(stages_of(Queue::ALL[queue_index]));
     // A queue that runs no shaders reads in its own way.
     if own.stages.is_empty() { Use::transfer_read().with_layout(read.layout) } else { own }
 }

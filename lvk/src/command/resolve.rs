@@ -7,9 +7,9 @@ use super::attachment_desc::DepthResolve;
 use super::attachments::Target;
 use crate::barrier::{Layout, Use};
 use crate::error::{Error, Result};
-use crate::format::{Format, Numbers};
+use crate::format::{Format, NumericFormat};
 use crate::gpu::caps::resolve_modes::ResolveMode;
-use crate::submit::emit_barriers::layout;
+use crate::submit::emit_barriers::vulkan_layout;
 
 impl CommandBuffer {
     /// A multisampled colour target and what it is resolved to: the pass uses both.
@@ -26,7 +26,7 @@ impl CommandBuffer {
         Ok(info
             .resolve_mode(mode)
             .resolve_image_view(to.view()?)
-            .resolve_image_layout(layout(Use::resolve_target().layout)))
+            .resolve_image_layout(vulkan_layout(Use::resolve_target().layout)))
     }
 
     /// The same of a depth target, whose depth and stencil are resolved each by its mode.
@@ -48,7 +48,7 @@ impl CommandBuffer {
             if let (Some(info), Some(mode)) = (info, mode) {
                 info.resolve_mode = vk::ResolveModeFlags::from_raw(mode.bit().bits());
                 info.resolve_image_view = view;
-                info.resolve_image_layout = layout(written.layout);
+                info.resolve_image_layout = vulkan_layout(written.layout);
             }
         }
         Ok(())
@@ -67,7 +67,7 @@ impl CommandBuffer {
         }
         // Without stencil there is nothing to go together with.
         let allowed = match format.has_stencil() {
-            true => limits.allow(depth, stencil),
+            true => limits.supports(depth, stencil),
             false => depth.is_none_or(|mode| limits.depth.contains(mode.bit())),
         };
         if allowed {
@@ -79,7 +79,7 @@ impl CommandBuffer {
 }
 
 fn check_resolve(source: &Target, to: &Target) -> Result<()> {
-    to.texture.check_kept()?;
+    to.texture.check_not_transient()?;
     let name = &to.texture.name;
     let from = &source.texture;
     if from.image.samples == 1 || to.texture.image.samples != 1 {
@@ -102,7 +102,7 @@ fn check_resolve(source: &Target, to: &Target) -> Result<()> {
 
 /// Vulkan leaves no choice.
 fn color_mode(format: Format) -> vk::ResolveModeFlags {
-    if format.numbers() != Numbers::Float {
+    if format.numeric_format() != NumericFormat::Float {
         vk::ResolveModeFlags::SAMPLE_ZERO
     } else {
         vk::ResolveModeFlags::AVERAGE

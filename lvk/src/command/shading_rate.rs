@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::gpu::caps::shading_rate::ShadingRate;
 use crate::pipeline::RenderPipeline;
 use crate::resource::texture_desc::TextureUsage;
-use crate::submit::emit_barriers::layout;
+use crate::submit::emit_barriers::vulkan_layout;
 
 impl CommandBuffer {
     /// Finds and checks where a pass takes its rates from; the pass uses it.
@@ -31,12 +31,12 @@ impl CommandBuffer {
         self.shared.gpu.caps.limits.shading_rate.check_texel(texel).map_err(wrong)?;
         check_cover(texture.mip_extent(mip), texel, area).map_err(wrong)?;
         let used = Use::shading_rate();
-        self.use_texture(&texture, texture.part(mip, layer), used)?;
+        self.use_texture(&texture, texture.subresource(mip, layer), used)?;
         let [width, height] = texel;
         Ok(Some(
             vk::RenderingFragmentShadingRateAttachmentInfoKHR::default()
                 .image_view(texture.rate_view(mip, layer)?)
-                .image_layout(layout(used.layout))
+                .image_layout(vulkan_layout(used.layout))
                 .shading_rate_attachment_texel_size(vk::Extent2D { width, height }),
         ))
     }

@@ -56,7 +56,7 @@ impl CommandBuffer {
         body: &SoftwareBody,
         bytes: &[u8],
     ) -> Result<()> {
-        self.fill_software(target, self.shared.new_blas[self.recording.lane], body, bytes)
+        self.fill_software(target, self.shared.new_blas[self.recording.queue_index], body, bytes)
     }
 
     /// The next command copies what software traces.

@@ -24,7 +24,7 @@ impl CommandBuffer {
         let pipeline = self.shared.store.ray_tracing_pipelines.get(pipeline)?;
         let point = vk::PipelineBindPoint::RAY_TRACING_KHR;
         self.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
-        let ext = self.shared.gpu.ray_tracing()?;
+        let ext = self.shared.gpu.ray_tracing_functions()?;
         // SAFETY: the command buffer is being recorded, and the size is that of the pipeline just bound.
         unsafe { ext.cmd_set_ray_tracing_pipeline_stack_size(self.raw(), pipeline.stack_bytes) };
         self.ray_tracing = Some(pipeline);
@@ -49,7 +49,7 @@ impl CommandBuffer {
             return Ok(());
         }
         self.flush_after(|cmd| cmd.use_trace(&pipeline, dependencies))?;
-        let ext = self.shared.gpu.ray_tracing()?;
+        let ext = self.shared.gpu.ray_tracing_functions()?;
         // SAFETY: a ray tracing pipeline is bound, the regions are its own, and the size is within the limit.
         unsafe {
             ext.cmd_trace_rays(
@@ -84,7 +84,7 @@ impl CommandBuffer {
     ) -> Result<()> {
         const ARGUMENT_BYTES: u64 = 12;
         if !self.shared.gpu.caps.trace_rays_indirect {
-            return Err(self.shared.gpu.lacks("trace_rays_indirect: indirect traces"));
+            return Err(self.shared.gpu.unsupported("trace_rays_indirect: indirect traces"));
         }
         let (pipeline, regions) = self.ready_trace(ray_gen)?;
         let buffer = self.shared.store.buffers.get(arguments)?;
@@ -93,7 +93,7 @@ impl CommandBuffer {
             cmd.use_buffer(&buffer, Use::indirect());
             cmd.use_trace(&pipeline, dependencies)
         })?;
-        let ext = self.shared.gpu.ray_tracing()?;
+        let ext = self.shared.gpu.ray_tracing_functions()?;
         // SAFETY: a ray tracing pipeline is bound, the regions are its own, and the arguments lie inside the buffer.
         unsafe {
             ext.cmd_trace_rays_indirect(
@@ -114,7 +114,7 @@ impl CommandBuffer {
         let pipeline =
             pipeline.ok_or_else(|| Error::usage("trace_rays", "bind a ray tracing pipeline first"))?;
         self.check_pushed(&pipeline.name, pipeline.push_constant_bytes)?;
-        let regions = pipeline.regions(ray_gen)?;
+        let regions = pipeline.trace_regions(ray_gen)?;
         Ok((pipeline, regions))
     }
 

@@ -22,7 +22,7 @@ use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::error::{Error, Result, check_limit};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
-use crate::submit::ownership::Access;
+use crate::submit::ownership::QueueAccess;
 
 /// What is known of a structure before the next command.
 struct Before<'a> {
@@ -354,9 +354,9 @@ impl CommandBuffer {
         };
         // SAFETY: instances, structure and scratch memory are alive, checked, aligned and large enough; barriers keep them
         // apart from other commands.
-        unsafe { build.record(self.shared.gpu.accel()?, self.raw()) };
+        unsafe { build.record(self.shared.gpu.accel_functions()?, self.raw()) };
         if is_first {
-            self.refer(target.id, Access::Write);
+            self.refer(target.id, QueueAccess::Write);
         }
         Ok(())
     }
@@ -384,7 +384,7 @@ impl CommandBuffer {
         records: Option<&Buffer>,
     ) -> Result<u64> {
         let shared = &self.shared;
-        let own = &shared.scratch[self.recording.lane];
+        let own = &shared.scratch[self.recording.queue_index];
         let (buffer, replaced) = own.get(&shared.gpu, bytes)?;
         self.retire_replaced(replaced);
         self.notes.uses.id(own.id, Use::accel_build_write());
@@ -420,8 +420,8 @@ impl CommandBuffer {
 
     /// Has other queues be done with what is shown, which may come from them.
     fn refer_to(&mut self, shown: &ShownSet) {
-        if self.shared.gpu.queues.several_lanes() {
-            shown.list().iter().for_each(|shown| self.refer(shown.blas.id, Access::Read));
+        if self.shared.gpu.queues.has_several() {
+            shown.list().iter().for_each(|shown| self.refer(shown.blas.id, QueueAccess::Read));
         }
     }
 

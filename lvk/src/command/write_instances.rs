@@ -175,7 +175,7 @@ impl CommandBuffer {
         }
         let size_bytes = size_bytes.max(INSTANCE_ALIGNMENT);
         let buffer = self.shared.instance_buffers.take(&self.shared.gpu, name, size_bytes)?;
-        buffer.fill(fill);
+        buffer.fill_with(fill);
         self.shared.retire(Garbage::Held(Arc::clone(&buffer)));
         Ok(SourceBytes { address: buffer.address, buffer: Some(buffer) })
     }

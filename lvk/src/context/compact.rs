@@ -76,7 +76,7 @@ impl Context {
         }
         let desc = QueryPoolDesc { count, debug_name: "compacted sizes", ..Default::default() };
         let ty = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
-        let pool = QueryPool::of(&self.shared().gpu, &desc, ty)?;
+        let pool = QueryPool::with_type(&self.shared().gpu, &desc, ty)?;
         let query = Arc::new(SizeQuery::new(pool, targets));
         let asked = self.before_next_submission(|cmd| cmd.query_compacted_sizes(&query));
         self.shared().retire(Garbage::SizeQuery(Arc::clone(&query)));
@@ -102,7 +102,7 @@ impl Context {
     /// Copies that have no room wait for those that have, which give memory back.
     fn advance(&self, compactions: &mut Compactions) -> Result<()> {
         let shared = self.shared();
-        let (submitted, completed) = (shared.submitter.submitted(), shared.submitter.passed()?);
+        let (submitted, completed) = (shared.submitter.last_submitted(), shared.submitter.completed_up_to()?);
         shared.collect()?;
         compactions.forget_freed();
         for query in std::mem::take(&mut compactions.asked) {

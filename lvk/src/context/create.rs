@@ -17,7 +17,7 @@ use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::resource::query_pool::QueryPoolDesc;
 use crate::resource::sampler::SamplerDesc;
 use crate::resource::{Buffer, QueryPool, Sampler};
-use crate::shader::{ShaderCache, ShaderCacheStats, ShaderModuleDesc, raw_hit_number};
+use crate::shader::{ShaderCache, ShaderCacheStats, ShaderModuleDesc, find_raw_hit_builtin};
 
 /// Objects that take no bindless slot.
 pub(super) const NO_SLOT: u32 = 0;
@@ -26,7 +26,7 @@ impl Context {
     /// Creates a buffer (`vkCreateBuffer`). Its first contents are there for every command submitted afterwards.
     pub fn create_buffer(&self, desc: &BufferDesc<'_>) -> Result<Holder<BufferHandle>> {
         let buffer = Buffer::new(&self.shared().gpu, desc, InternalUsage::NONE)?;
-        let staged = desc.data.filter(|data| !buffer.write_first(data));
+        let staged = desc.data.filter(|data| !buffer.write_initial(data));
         let handle = self.shared().store.buffers.insert(buffer);
         let holder = Holder::new(self, handle, NO_SLOT);
         if let Some(data) = staged {
@@ -125,7 +125,7 @@ fn warn_of_raw_numbers(caps: &Capabilities, desc: &ShaderModuleDesc<'_>) {
     if !(caps.prefers_spatial_order || caps.profile.is_some()) {
         return;
     }
-    if let Some((number, helper)) = raw_hit_number(desc) {
+    if let Some((number, helper)) = find_raw_hit_builtin(desc) {
         let name = desc.debug_name;
         log::warn!("shader '{name}': {number} counts parts of split and reordered meshes here; use {helper}");
     }

@@ -141,7 +141,7 @@ impl Context {
     /// memory would be larger than it takes.
     pub fn create_tlas(&self, desc: &TlasDesc<'_>) -> Result<Holder<AccelStructHandle>> {
         let shared = self.shared();
-        shared.gpu.check_structures()?;
+        shared.gpu.check_acceleration_structures()?;
         let slot = shared.reserve(|| shared.bindless.reserve_tlas(desc.debug_name))?;
         let limits = part_limits(&shared.gpu.caps.limits);
         let tlas =

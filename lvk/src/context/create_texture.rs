@@ -71,7 +71,7 @@ impl Context {
         let slot = shared.reserve(|| shared.bindless.reserve_texture(desc.debug_name))?;
         let made = shown.view(desc, slot).and_then(|texture| {
             let views = views(&texture)?;
-            texture.image.share()?;
+            texture.image.add_texture()?;
             Ok((texture, views))
         });
         let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
@@ -82,8 +82,8 @@ impl Context {
     /// Writes the first contents at once, which nothing has to wait for then.
     fn fill_by_host(&self, texture: &Texture, contents: &[(Region, &[u8])]) -> Result<()> {
         let (shared, image) = (self.shared(), &texture.image);
-        host_copy::fill(&shared.gpu, image, contents)?;
-        shared.submitter.filled_texture(image.id, image.shape);
+        host_copy::fill_from_host(&shared.gpu, image, contents)?;
+        shared.submitter.mark_host_written(image.id, image.shape);
         Ok(())
     }
 
@@ -97,7 +97,7 @@ impl Context {
         let mut regions = Vec::with_capacity(mips as usize);
         let mut rest = data;
         for mip in 0..mips {
-            for aspect in desc.format.uploaded() {
+            for aspect in desc.format.uploaded_aspects() {
                 let region = TextureRegion { mip, layers: 0, aspect, ..Default::default() };
                 let region = texture.resolve_region(&region)?;
                 let (bytes, behind) = rest.split_at(region.bytes() as usize);

@@ -7,7 +7,7 @@ use super::create_accel::new_tlas;
 use crate::accel::AccelStruct;
 use crate::accel::desc::TlasDesc;
 use crate::accel::flags::BuildMode;
-use crate::bindless::Dummies;
+use crate::bindless::DefaultDescriptors;
 use crate::device_state::DummyObjects;
 use crate::error::Result;
 use crate::resource::region::TextureRegion;
@@ -31,9 +31,9 @@ pub(super) fn fill_dummies(ctx: &Context) -> Result<()> {
         cmd.clear_tlas_table();
         Ok(())
     })?;
-    let tlas = if shared.gpu.has_structures() { Some(empty_tlas(ctx)?) } else { None };
+    let tlas = if shared.gpu.has_acceleration_structures() { Some(empty_tlas(ctx)?) } else { None };
     let mut textures = yuv_dummies(ctx)?;
-    shared.bindless.fill(Dummies {
+    shared.bindless.write_defaults(DefaultDescriptors {
         sampled: sampled.sampled_view()?,
         storage: storage.storage_view()?,
         sampler: sampler.raw,
@@ -59,20 +59,20 @@ fn checker(ctx: &Context, usage: TextureUsage) -> Result<Arc<Texture>> {
 /// A black picture for each conversion.
 fn yuv_dummies(ctx: &Context) -> Result<Vec<Arc<Texture>>> {
     let shared = ctx.shared();
-    let mut dummies = Vec::new();
-    for (number, conversion, raw) in shared.bindless.yuv() {
+    let mut defaults = Vec::new();
+    for (number, conversion, raw) in shared.bindless.yuv_conversions() {
         let format = conversion.format;
         let desc = TextureDesc { format, extent: [2, 2], debug_name: "dummy texture", ..Default::default() };
         let texture = Arc::new(Texture::with_conversion(&shared.gpu, &desc, SLOT, raw)?);
-        for aspect in format.uploaded() {
+        for aspect in format.uploaded_aspects() {
             let region = TextureRegion { aspect, ..Default::default() };
             let bytes = vec![0; texture.resolve_region(&region)?.bytes() as usize];
             ctx.upload_texture_object(&texture, &region, &bytes)?;
         }
-        shared.bindless.set_yuv_dummy(number, texture.sampled_view()?);
-        dummies.push(texture);
+        shared.bindless.set_yuv_default(number, texture.sampled_view()?);
+        defaults.push(texture);
     }
-    Ok(dummies)
+    Ok(defaults)
 }
 
 fn empty_tlas(ctx: &Context) -> Result<Arc<AccelStruct>> {

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use super::Context;
 use crate::error::Result;
-use crate::submit::ownership::PerLane;
+use crate::submit::ownership::PerQueue;
 
 /// A frame about to be recorded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,7 +20,7 @@ pub struct Frame {
 pub(super) struct FrameRing {
     in_flight: usize,
     next: u64,
-    ends: VecDeque<PerLane<u64>>,
+    ends: VecDeque<PerQueue<u64>>,
 }
 
 impl FrameRing {
@@ -31,9 +31,9 @@ impl FrameRing {
         Self { in_flight, next: 0, ends: VecDeque::with_capacity(in_flight) }
     }
 
-    /// Starts a frame, with `submitted` the last submissions before it, one for each lane. Answers the frame and the
+    /// Starts a frame, with `submitted` the last submissions before it, one for each queue. Answers the frame and the
     /// submissions to wait for: the last ones of the frame that used its index before.
-    fn start(&mut self, submitted: PerLane<u64>) -> (Frame, PerLane<u64>) {
+    fn start(&mut self, submitted: PerQueue<u64>) -> (Frame, PerQueue<u64>) {
         if self.next > 0 {
             self.ends.push_back(submitted);
         }
@@ -50,13 +50,13 @@ impl Context {
     /// per-frame buffers for each index is enough. On other queues that is so for what was [submitted](Self::submit), not for
     /// what was [in the background](Self::submit_in_background).
     pub fn next_frame(&self) -> Result<Frame> {
-        let submitted = self.shared().submitter.foreground();
+        let submitted = self.shared().submitter.foreground_values();
         let (frame, wait_for) = {
             let mut frames = self.inner.frames.lock();
             frames.start(submitted)
         };
         self.shared().profiler.begin_frame(frame.number);
-        self.shared().submitter.wait_for_lanes(&wait_for)?;
+        self.shared().submitter.wait_for_queues(&wait_for)?;
         self.shared().collect_known()?;
         self.advance_compactions();
         Ok(frame)

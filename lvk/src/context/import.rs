@@ -11,7 +11,7 @@ use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::buffer::BufferUsage;
 use crate::resource::texture_desc::TextureDesc;
 use crate::resource::{Buffer, Texture};
-use crate::submit::emit_barriers::known_layout;
+use crate::submit::emit_barriers::layout_from_vulkan;
 use crate::submit::{Submission, SubmitHandle};
 
 /// Describes an image of somebody else's.
@@ -95,14 +95,14 @@ impl Context {
             let message = "an imported texture has its contents; upload others by upload_texture";
             return Err(Error::usage(desc.debug_name, message));
         }
-        let layout = known_layout(import.layout).map_err(|why| Error::usage(desc.debug_name, why))?;
+        let layout = layout_from_vulkan(import.layout).map_err(|why| Error::usage(desc.debug_name, why))?;
         let slot = shared.reserve(|| shared.bindless.reserve_texture(desc.debug_name))?;
         let made = Texture::import(&shared.gpu, desc, import.image, slot)
             .and_then(|texture| super::create_texture::views(&texture).map(|views| (texture, views)));
         let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
         shared.submitter.import_texture(texture.image.id, texture.image.shape, layout);
         if !import.concurrent {
-            shared.submitter.keep_to_graphics(texture.image.id, desc.debug_name);
+            shared.submitter.restrict_to_graphics(texture.image.id, desc.debug_name);
         }
         shared.bindless.set_texture(slot, views);
         Ok(Holder::new(self, shared.store.textures.insert(texture), slot))
@@ -127,7 +127,7 @@ impl Context {
             Buffer::import(&self.shared().gpu, import.buffer, import.size_bytes, import.usage, name)
         };
         if !import.concurrent {
-            self.shared().submitter.keep_to_graphics(buffer.id, name);
+            self.shared().submitter.restrict_to_graphics(buffer.id, name);
         }
         let handle = self.shared().store.buffers.insert(buffer);
         Ok(Holder::new(self, handle, super::create::NO_SLOT))
@@ -143,7 +143,7 @@ impl Context {
     /// [`ImportedTexture::layout`].
     pub unsafe fn acquire_texture(&self, texture: TextureHandle, layout: vk::ImageLayout) -> Result<()> {
         let texture = self.shared().store.textures.get(texture)?;
-        let layout = known_layout(layout).map_err(|why| Error::usage(&texture.name, why))?;
+        let layout = layout_from_vulkan(layout).map_err(|why| Error::usage(&texture.name, why))?;
         self.shared().submitter.import_texture(texture.image.id, texture.image.shape, layout);
         Ok(())
     }
@@ -181,6 +181,6 @@ impl Context {
     /// As [`raw_timeline`](Self::raw_timeline), of another queue; queues that share hardware share it too.
     pub fn raw_timeline_of(&self, queue: Queue) -> vk::Semaphore {
         let shared = self.shared();
-        shared.submitter.timeline(shared.gpu.queues.lane(queue)).raw
+        shared.submitter.timeline(shared.gpu.queues.queue_index(queue)).raw
     }
 }

@@ -12,7 +12,7 @@ use super::{Context, Inner};
 use crate::accel::compaction::Compactions;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
-use crate::barrier::{QueryStages, ResourceId};
+use crate::barrier::{RayQueryStages, ResourceId};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::bindless::{Bindless, YuvSlots};
 use crate::command::SpareNotes;
@@ -49,7 +49,7 @@ impl Context {
             application_name: desc.application_name,
             library: desc.vulkan_library,
             validation: desc.validation,
-            extra: desc.user_extensions.of_instance(),
+            extra: desc.user_extensions.instance_extensions(),
             window: desc.window.as_deref(),
             sink,
         })?;
@@ -108,7 +108,7 @@ pub(super) fn requested_queues(desc: &ContextDesc<'_>) -> QueueRequest {
 
 fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
     let yuv = YuvSlots::new(&gpu, desc.yuv, desc.max_yuv_textures)?;
-    let (several, all_blas) = (gpu.queues.several_lanes(), ResourceId::next());
+    let (several, all_blas) = (gpu.queues.has_several(), ResourceId::next());
     let bindless = Bindless::new(&gpu, desc.max_textures, yuv, desc.check_indices)?;
     Ok(Shared {
         dummies: OnceLock::new(),
@@ -116,7 +116,7 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         staging: Staging::new(&gpu, desc.staging_bytes),
         scratch: std::array::from_fn(|_| new_scratch(&gpu, desc.scratch_budget_bytes)),
         accel_storage: AccelStorage::new(desc.accel_budget_bytes),
-        graphics_queries: QueryStages::default(),
+        graphics_queries: RayQueryStages::default(),
         kernels: Kernels::new(),
         instance_buffers: SpareBuffers::new(),
         tlas_table: new_tlas_table(&gpu)?,
@@ -140,7 +140,7 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
 
 /// An entry for each element of `kTLAS[]`.
 fn new_tlas_table(gpu: &Arc<Gpu>) -> Result<Option<Arc<Buffer>>> {
-    if !gpu.has_structures() {
+    if !gpu.has_acceleration_structures() {
         return Ok(None);
     }
     let desc = BufferDesc {

@@ -106,7 +106,7 @@ impl Context {
 /// The checked input of the mesh as a whole. Addresses of matrices do not matter to size queries, but for being null.
 pub(super) fn input(shared: &Shared, desc: &BlasDesc<'_>) -> Result<BuildInput> {
     const SOME_ADDRESS: u64 = 16;
-    shared.gpu.check_structures()?;
+    shared.gpu.check_acceleration_structures()?;
     desc.flags.check_blas(&shared.gpu, desc.debug_name)?;
     let find = |handle| shared.store.buffers.get(handle);
     let name = desc.debug_name;

@@ -16,7 +16,7 @@ impl Context {
     /// # Errors
     /// [`Unsupported`](crate::Error::Unsupported) where the queue has no timestamps.
     pub fn set_profiling(&self, on: bool) -> Result<()> {
-        self.shared().profiler.set(on)
+        self.shared().profiler.set_enabled(on)
     }
 
     /// What the GPU took for the latest frame it has finished, or the latest submission where

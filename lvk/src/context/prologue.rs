@@ -102,10 +102,10 @@ impl Context {
     pub(super) fn upload_region(&self, target: &Arc<Texture>, region: Region, bytes: &[u8]) -> Result<()> {
         // A multiple of 16 suits texels and blocks of every size.
         const ALIGNMENT: u64 = 16;
-        target.image.share()?;
+        target.image.add_texture()?;
         let staged = self.shared().staging.keep(bytes, ALIGNMENT);
         let staged = staged.inspect_err(|_| {
-            target.image.release();
+            target.image.remove_texture();
         })?;
         let mut pending = self.pending();
         pending.uploads.texture(Arc::clone(target), region, bytes.len() as u64, staged);
@@ -114,7 +114,7 @@ impl Context {
 
     /// Lets shaders read a new texture that has no contents.
     pub(super) fn settle_texture(&self, texture: &Arc<Texture>) -> Result<()> {
-        texture.image.share()?;
+        texture.image.add_texture()?;
         self.pending().uploads.fresh_texture(Arc::clone(texture));
         Ok(())
     }

@@ -51,7 +51,8 @@ impl Context {
     /// no `CLOCK_MONOTONIC`.
     pub fn calibrated_timestamps(&self) -> Result<CalibratedTimestamps> {
         let gpu = &self.shared().gpu;
-        let clock = gpu.host_clock.as_ref().ok_or_else(|| gpu.lacks("clocks of device and host together"))?;
+        let clock =
+            gpu.host_clock.as_ref().ok_or_else(|| gpu.unsupported("clocks of device and host together"))?;
         let (ticks, host, deviation) = clock.read()?;
         Ok(CalibratedTimestamps {
             gpu_ms: gpu.milliseconds(ticks),

@@ -81,7 +81,7 @@ impl Context {
     /// Where only software traces, made-up contents are refused or harmless too: every place, count and reference is
     /// checked before a shader follows it.
     pub unsafe fn load_blas(&self, desc: &BlasDesc<'_>, bytes: &[u8]) -> Result<Holder<AccelStructHandle>> {
-        self.shared().gpu.check_structures()?;
+        self.shared().gpu.check_acceleration_structures()?;
         let blob = decode(bytes).map_err(|error| rejected(desc, error.to_string()))?;
         check_same_mesh(desc, &blob).map_err(|reason| rejected(desc, reason))?;
         if self.shared().gpu.accel.is_none() {
@@ -122,7 +122,7 @@ impl Context {
         let count = body.structures.len() as u32;
         let desc = QueryPoolDesc { count, debug_name: "serialised sizes", ..Default::default() };
         let ty = vk::QueryType::ACCELERATION_STRUCTURE_SERIALIZATION_SIZE_KHR;
-        let pool = Arc::new(QueryPool::of(&self.shared().gpu, &desc, ty)?);
+        let pool = Arc::new(QueryPool::with_type(&self.shared().gpu, &desc, ty)?);
         let mut cmd = self.acquire_command_buffer()?;
         cmd.write_sizes(object, body, &pool, 0, ty)?;
         self.shared().retire(Garbage::QueryPool(Arc::clone(&pool)));
@@ -202,7 +202,7 @@ impl Context {
         let ((written, structure), handles) = head.ok_or_else(damaged)?;
         let info = vk::AccelerationStructureVersionInfoKHR::default().version_data(version);
         let gpu = &self.shared().gpu;
-        let ext = gpu.accel().map_err(|error| error.to_string())?;
+        let ext = gpu.accel_functions().map_err(|error| error.to_string())?;
         // SAFETY: the version data has the 32 bytes Vulkan reads.
         let answer = unsafe { ext.get_device_acceleration_structure_compatibility(&info) };
         if answer != vk::AccelerationStructureCompatibilityKHR::COMPATIBLE {

@@ -58,10 +58,10 @@ impl Context {
     /// As [`submit`](Self::submit), with what `more` has besides recordings.
     pub(super) fn submit_between(&self, cmd: CommandBuffer, more: Submission) -> Result<SubmitHandle> {
         self.check_own(&cmd)?;
-        let lane = cmd.lane();
+        let queue_index = cmd.queue_index();
         self.advance_compactions();
         let submitted = self.submit_behind_pending(cmd, more)?;
-        self.shared().submitter.begin_ahead(lane);
+        self.shared().submitter.begin_ahead(queue_index);
         Ok(submitted)
     }
 
@@ -81,7 +81,7 @@ impl Context {
             let all = vk::PipelineStageFlags2::ALL_COMMANDS;
             more.waits.iter_mut().for_each(|wait| wait.stage_mask = all);
         }
-        if cmd.lane() == 0 {
+        if cmd.queue_index() == 0 {
             return self.send(prelude, Some(cmd), more);
         }
         if prelude.is_some() {
@@ -134,7 +134,7 @@ impl Context {
         self.shared().collect_known()?;
         let mut pending = self.pending();
         let Some(cmd) = self.take_pending(&mut pending)? else {
-            return Ok(self.submission(self.shared().submitter.last_of_lanes()[0]));
+            return Ok(self.submission(self.shared().submitter.last_of_queues()[0]));
         };
         let flushed = self.send(Some(cmd), None, Submission::default())?;
         // Command buffers that are acquired ask how far the GPU is; this one was not.
@@ -167,7 +167,7 @@ impl Context {
     /// Waits for everything submitted so far, on all queues.
     pub(super) fn wait_submitted(&self) -> Result<()> {
         let submitter = &self.shared().submitter;
-        submitter.wait_for_lanes(&submitter.last_of_lanes())?;
+        submitter.wait_for_queues(&submitter.last_of_queues())?;
         self.shared().collect_known()
     }
 

@@ -13,14 +13,16 @@ use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::handle::SwapchainHandle;
 use crate::resource::Texture;
-use crate::resource::image::{Image, raw_usage, usage_of};
+use crate::resource::image::{Image, raw_usage, usage_from_features};
 use crate::resource::texture_desc::TextureDesc;
 use crate::submit::{Submission, SubmitHandle};
 use crate::swapchain::chain::{Chain, ChainPlan, PresentSync};
 use crate::swapchain::choose::{self, Failure};
 use crate::swapchain::desc::{PresentMode, SwapchainDesc, SwapchainImage, SwapchainInfo};
-use crate::swapchain::lifecycle::{Acquired, Engine};
-use crate::swapchain::state::{ChainImage, Current, Parts, State, Swapchain, Wishes};
+use crate::swapchain::lifecycle::{Acquired, PresentBackend};
+use crate::swapchain::state::{
+    ChainImage, Current, Swapchain, SwapchainConfig, SwapchainInner, SwapchainResources,
+};
 use crate::swapchain::surface::{Surface, SurfaceState};
 
 impl Context {
@@ -40,7 +42,7 @@ impl Context {
         if desc.usage.is_empty() {
             return Err(Error::usage(name, "give its images at least one usage"));
         }
-        let wishes = Wishes {
+        let wishes = SwapchainConfig {
             extent: desc.extent,
             present_modes: desc.present_modes.to_vec(),
             color_spaces: desc.color_spaces.to_vec(),
@@ -53,8 +55,8 @@ impl Context {
         let holder = Holder::new(self, handle, 0);
         let swapchain = shared.store.swapchains.get(handle)?;
         let mut guard = swapchain.lock();
-        let State { course, parts } = &mut *guard;
-        course.prepare(name, &mut Live { ctx: self, name: &swapchain.name, parts })?;
+        let SwapchainInner { lifecycle, resources } = &mut *guard;
+        lifecycle.prepare(name, &mut Live { ctx: self, name: &swapchain.name, resources })?;
         drop(guard);
         Ok(holder)
     }
@@ -71,19 +73,19 @@ impl Context {
     pub fn next_image(&self, swapchain: SwapchainHandle) -> Result<Option<SwapchainImage>> {
         let object = self.shared().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
-        let State { course, parts } = &mut *guard;
+        let SwapchainInner { lifecycle, resources } = &mut *guard;
         self.check_alive(swapchain)?;
-        let mut live = Live { ctx: self, name: &object.name, parts };
-        let Some(taken) = course.next(&object.name, &mut live)? else { return Ok(None) };
-        let image = parts.current.as_ref().and_then(|current| {
-            let image = current.images.get(taken.index as usize)?;
+        let mut live = Live { ctx: self, name: &object.name, resources };
+        let Some(acquired) = lifecycle.acquire_image(&object.name, &mut live)? else { return Ok(None) };
+        let image = resources.current.as_ref().and_then(|current| {
+            let image = current.images.get(acquired.index as usize)?;
             Some(SwapchainImage {
                 swapchain,
                 texture: image.texture,
                 index: image.object.slot,
                 extent: current.plan.extent,
                 format: current.plan.format,
-                ticket: taken.ticket,
+                ticket: acquired.ticket,
             })
         });
         Ok(image)
@@ -102,14 +104,14 @@ impl Context {
         self.check_own(&cmd)?;
         let swapchain = shared.store.swapchains.get(image.swapchain)?;
         let mut guard = swapchain.lock();
-        let State { course, parts } = &mut *guard;
+        let SwapchainInner { lifecycle, resources } = &mut *guard;
         let outdated = || {
             let message = "the image was given out again, or the swapchain was made anew; present what next_image \
                            answered last";
             Error::usage(&*swapchain.name, message)
         };
-        let index = course.taken(image.ticket).ok_or_else(outdated)?;
-        let current = parts.current.as_mut().ok_or_else(outdated)?;
+        let index = lifecycle.acquired_index(image.ticket).ok_or_else(outdated)?;
+        let current = resources.current.as_mut().ok_or_else(outdated)?;
         let mode = current.mode;
         let shown = current.images.get_mut(index as usize).ok_or_else(outdated)?;
         cmd.release_image(&shown.object)?;
@@ -125,12 +127,12 @@ impl Context {
         // Whatever the window has come to, the engine waits for the semaphore and signals the fence.
         shown.sync.presented = !matches!(answer, Err(Failure::Other(_)));
         if came_back {
-            parts.presents_are_over_at(submission.value);
+            resources.set_presents_done_at(submission.value);
         }
-        if let Some(semaphore) = parts.signalled.take() {
-            parts.give_semaphore(semaphore, submission.value);
+        if let Some(semaphore) = resources.signalled.take() {
+            resources.recycle_semaphore(semaphore, submission.value);
         }
-        course.presented(answer)?;
+        lifecycle.record_present(answer)?;
         Ok(submission)
     }
 
@@ -139,9 +141,9 @@ impl Context {
     pub fn resize_swapchain(&self, swapchain: SwapchainHandle, extent: [u32; 2]) -> Result<()> {
         let object = self.shared().store.swapchains.get(swapchain)?;
         let mut state = object.lock();
-        let before = std::mem::replace(&mut state.parts.wishes.extent, extent);
+        let before = std::mem::replace(&mut state.resources.config.extent, extent);
         if before != extent {
-            state.course.outdate();
+            state.lifecycle.mark_out_of_date();
         }
         Ok(())
     }
@@ -152,14 +154,14 @@ impl Context {
     pub fn set_present_mode(&self, swapchain: SwapchainHandle, wishes: &[PresentMode]) -> Result<()> {
         let object = self.shared().store.swapchains.get(swapchain)?;
         let mut state = object.lock();
-        let State { course, parts } = &mut *state;
-        parts.wishes.present_modes = wishes.to_vec();
-        if let Some(current) = &mut parts.current {
-            let mode = choose::present_mode(wishes, &current.offered_modes);
+        let SwapchainInner { lifecycle, resources } = &mut *state;
+        resources.config.present_modes = wishes.to_vec();
+        if let Some(current) = &mut resources.current {
+            let mode = choose::choose_present_mode(wishes, &current.offered_modes);
             if current.plan.modes.contains(&mode) {
                 current.mode = mode;
             } else {
-                course.outdate();
+                lifecycle.mark_out_of_date();
             }
         }
         Ok(())
@@ -173,11 +175,11 @@ impl Context {
     pub fn swapchain_info(&self, swapchain: SwapchainHandle) -> Result<SwapchainInfo> {
         let object = self.shared().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
-        let State { course, parts } = &mut *guard;
-        let rebuilds = parts.rebuilds.saturating_sub(1);
-        if let Some(current) = &parts.current {
+        let SwapchainInner { lifecycle, resources } = &mut *guard;
+        let rebuilds = resources.rebuilds.saturating_sub(1);
+        if let Some(current) = &resources.current {
             return Ok(SwapchainInfo {
-                extent: course.extent().unwrap_or_default(),
+                extent: lifecycle.extent().unwrap_or_default(),
                 format: current.plan.format,
                 color_space: current.plan.color_space,
                 present_mode: current.mode,
@@ -186,7 +188,7 @@ impl Context {
                 rebuilds,
             });
         }
-        let mut live = Live { ctx: self, name: &object.name, parts };
+        let mut live = Live { ctx: self, name: &object.name, resources };
         let planned = live.surface().and_then(|surface| live.plan(&surface, &surface.state()?, [0; 2]));
         let (present_modes, plan) = planned.map_err(|failure| failure.into_error(&object.name))?;
         Ok(SwapchainInfo {
@@ -203,9 +205,9 @@ impl Context {
     /// Gives up the images of a swapchain, and what its handle named.
     pub(super) fn retire_swapchain(&self, swapchain: Arc<Swapchain>) {
         let mut guard = swapchain.lock();
-        let State { course, parts } = &mut *guard;
-        course.outdate();
-        Live { ctx: self, name: &swapchain.name, parts }.retire_current();
+        let SwapchainInner { lifecycle, resources } = &mut *guard;
+        lifecycle.mark_out_of_date();
+        Live { ctx: self, name: &swapchain.name, resources }.retire_current();
         drop(guard);
         self.shared().retire(Garbage::Swapchain(swapchain));
     }
@@ -220,23 +222,23 @@ impl Context {
 struct Live<'a> {
     ctx: &'a Context,
     name: &'a Arc<str>,
-    parts: &'a mut Parts,
+    resources: &'a mut SwapchainResources,
 }
 
-impl Engine for Live<'_> {
+impl PresentBackend for Live<'_> {
     fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure> {
         let state = self.surface()?.state()?;
-        Ok(choose::extent(&state.limits, self.parts.wishes.extent))
+        Ok(choose::choose_extent(&state.limits, self.resources.config.extent))
     }
 
     /// A lost surface is rare, and its swapchains have to be gone before the window can have another: here the GPU is
     /// waited for.
-    fn renew_surface(&mut self) -> Result<(), Failure> {
-        self.parts.wait_for_presents()?;
+    fn recreate_surface(&mut self) -> Result<(), Failure> {
+        self.resources.wait_for_presents()?;
         self.retire_current();
         self.ctx.wait_idle()?;
-        self.parts.clear_retired();
-        self.parts.surface = None;
+        self.resources.clear_retired();
+        self.resources.surface = None;
         self.surface().map(drop).map_err(|failure| match failure {
             Failure::Other(error) => {
                 log::warn!("{}: its window takes no other surface: {error}", self.name);
@@ -246,42 +248,42 @@ impl Engine for Live<'_> {
         })
     }
 
-    fn rebuild(&mut self, extent: [u32; 2]) -> Result<(), Failure> {
+    fn recreate_swapchain(&mut self, extent: [u32; 2]) -> Result<(), Failure> {
         let surface = self.surface()?;
         let (offered_modes, plan) = self.plan(&surface, &surface.state()?, extent)?;
-        let old = self.parts.current.as_ref().map(|current| Arc::clone(&current.chain));
+        let old = self.resources.current.as_ref().map(|current| Arc::clone(&current.chain));
         let made = Chain::new(&surface, &plan, old.as_deref(), self.name);
         self.retire_current();
         let chain = Arc::new(made?);
-        if let Some(hdr) = &self.parts.wishes.hdr {
+        if let Some(hdr) = &self.resources.config.hdr {
             chain.set_hdr(hdr)?;
         }
         let mode = plan.modes.first().copied().unwrap_or_default();
         let images = self.images(&chain, &plan)?;
-        self.parts.current = Some(Current { images, plan, mode, offered_modes, chain });
-        self.parts.rebuilds += 1;
+        self.resources.current = Some(Current { images, plan, mode, offered_modes, chain });
+        self.resources.rebuilds += 1;
         Ok(())
     }
 
     fn acquire(&mut self) -> Result<Acquired, Failure> {
         let submitter = &self.ctx.shared().submitter;
         // Only the graphics queue has anything of windows, so work of others in the background holds nothing up.
-        let completed = submitter.timeline(0).completed()?;
-        self.parts.collect(completed);
-        let Some(current) = &self.parts.current else { return Err(Failure::OutOfDate) };
+        let completed = submitter.timeline(0).query_completed()?;
+        self.resources.destroy_finished(completed);
+        let Some(current) = &self.resources.current else { return Err(Failure::OutOfDate) };
         let (chain, ids) = (Arc::clone(&current.chain), current.ids());
-        let semaphore = self.parts.take_semaphore(completed, self.name)?;
+        let semaphore = self.resources.take_semaphore(completed, self.name)?;
         let answer = chain.acquire(semaphore);
-        let taken = match answer {
+        let acquired = match answer {
             Ok(Acquired::Image { index, .. }) => ids.get(index as usize),
             _ => None,
         };
-        match taken {
+        match acquired {
             Some(id) => {
                 submitter.with_presentables(|images| images.acquire(*id, semaphore));
-                self.parts.signalled = Some(semaphore);
+                self.resources.signalled = Some(semaphore);
             }
-            None => self.parts.give_semaphore(semaphore, 0),
+            None => self.resources.recycle_semaphore(semaphore, 0),
         }
         answer
     }
@@ -290,11 +292,11 @@ impl Engine for Live<'_> {
 impl Live<'_> {
     /// The surface; another one where the last was lost.
     fn surface(&mut self) -> Result<Arc<Surface>, Failure> {
-        if let Some(surface) = &self.parts.surface {
+        if let Some(surface) = &self.resources.surface {
             return Ok(Arc::clone(surface));
         }
-        let surface = Arc::new(Surface::new(&self.parts.gpu, &self.parts.window, self.name)?);
-        Ok(Arc::clone(self.parts.surface.insert(surface)))
+        let surface = Arc::new(Surface::new(&self.resources.gpu, &self.resources.window, self.name)?);
+        Ok(Arc::clone(self.resources.surface.insert(surface)))
     }
 
     /// What the Vulkan swapchain is to be like, and the modes there are.
@@ -304,11 +306,11 @@ impl Live<'_> {
         state: &SurfaceState,
         extent: [u32; 2],
     ) -> Result<(Vec<PresentMode>, ChainPlan), Failure> {
-        let (gpu, wishes) = (&self.parts.gpu, &self.parts.wishes);
+        let (gpu, wishes) = (&self.resources.gpu, &self.resources.config);
         let refused = |why: String| Error::unsupported(format!("swapchain '{}'", self.name), why);
-        let usable = |format: Format| usage_of(gpu.format_features(format)).contains(wishes.usage);
+        let usable = |format: Format| usage_from_features(gpu.format_features(format)).contains(wishes.usage);
         let offered = surface.formats()?;
-        let (format, color_space) = choose::surface_format(&wishes.color_spaces, &offered, usable)
+        let (format, color_space) = choose::choose_surface_format(&wishes.color_spaces, &offered, usable)
             .ok_or_else(|| {
                 refused(format!("the window takes no format that can be used for {:?}", wishes.usage))
             })?;
@@ -319,7 +321,7 @@ impl Live<'_> {
             return Err(refused(why).into());
         }
         let modes = surface.present_modes()?;
-        let mode = choose::present_mode(&wishes.present_modes, &modes);
+        let mode = choose::choose_present_mode(&wishes.present_modes, &modes);
         let identity = vk::SurfaceTransformFlagsKHR::IDENTITY;
         let can_stay = state.raw.supported_transforms.contains(identity);
         let plan = ChainPlan {
@@ -327,10 +329,10 @@ impl Live<'_> {
             format,
             color_space,
             modes: surface.compatible_modes(mode)?,
-            image_count: choose::image_count(&state.limits, wishes.image_count, mode),
+            image_count: choose::choose_image_count(&state.limits, wishes.image_count, mode),
             usage,
             transform: if can_stay { identity } else { state.raw.current_transform },
-            alpha: choose::composite_alpha(state.raw.supported_composite_alpha),
+            alpha: choose::choose_composite_alpha(state.raw.supported_composite_alpha),
         };
         Ok((modes, plan))
     }
@@ -357,28 +359,29 @@ impl Live<'_> {
         let desc = TextureDesc {
             format: plan.format,
             extent: plan.extent,
-            usage: self.parts.wishes.usage,
+            usage: self.resources.config.usage,
             debug_name: self.name,
             ..Default::default()
         };
         let image =
             Image::import(&shared.gpu, &desc, raw).inspect_err(|_| shared.bindless.free_texture(slot))?;
-        let texture = Texture::of(&shared.gpu, &desc, image.lent_by(Arc::clone(chain) as _), slot);
+        let texture =
+            Texture::from_image(&shared.gpu, &desc, image.with_external_owner(Arc::clone(chain) as _), slot);
         let views = views(&texture).inspect_err(|_| shared.bindless.free_texture(slot))?;
         shared.bindless.set_texture(slot, views);
         shared.submitter.with_presentables(|images| images.insert(texture.image.id, self.name));
-        shared.submitter.keep_to_graphics(texture.image.id, self.name);
+        shared.submitter.restrict_to_graphics(texture.image.id, self.name);
         let handle = shared.store.textures.insert(texture);
         Ok(ChainImage { texture: handle, object: shared.store.textures.get(handle)?, sync })
     }
 
     /// Gives up the Vulkan swapchain. Its images and presents live on until nothing uses them.
     fn retire_current(&mut self) {
-        let Some(current) = self.parts.current.take() else { return };
+        let Some(current) = self.resources.current.take() else { return };
         let syncs = self.retire_images(current.images);
-        self.parts.retire(current.chain, syncs);
-        if let Some(semaphore) = self.parts.signalled.take() {
-            self.parts.give_semaphore(semaphore, self.ctx.shared().submitter.last_of_lanes()[0]);
+        self.resources.retire(current.chain, syncs);
+        if let Some(semaphore) = self.resources.signalled.take() {
+            self.resources.recycle_semaphore(semaphore, self.ctx.shared().submitter.last_of_queues()[0]);
         }
     }
 

@@ -8,7 +8,7 @@ use ash::vk;
 pub use table::Format;
 pub use vertex::{IndexFormat, VertexFormat};
 
-use table::Class;
+use table::CompatibilityClass;
 
 /// Which part of the texels a transfer moves or a view shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -25,7 +25,7 @@ pub enum Aspect {
 
 /// How shaders read colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Numbers {
+pub(crate) enum NumericFormat {
     Float,
     Uint,
     Sint,
@@ -33,7 +33,7 @@ pub(crate) enum Numbers {
 
 /// One aspect of a format, as copies name and pack it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Part {
+pub(crate) struct CopyAspect {
     pub(crate) aspect: vk::ImageAspectFlags,
     /// Width and height of the smallest piece that can be copied, in texels.
     pub(crate) block: [u32; 2],
@@ -42,21 +42,21 @@ pub(crate) struct Part {
     pub(crate) shrink: u32,
 }
 
-impl Part {
+impl CopyAspect {
     /// Bytes of a box of texels, tightly packed; what is not a whole block counts as one.
     pub(crate) fn bytes(&self, [width, height, depth]: [u32; 3]) -> u64 {
-        let blocks = self.blocks([width, height]).map(u64::from);
+        let blocks = self.block_count([width, height]).map(u64::from);
         let layers = [depth.into(), self.block_bytes.into()];
         layers.into_iter().chain(blocks).fold(1, u64::saturating_mul)
     }
 
     /// Width, height and depth of the aspect where the image has these.
-    pub(crate) fn shrunk(&self, [width, height, depth]: [u32; 3]) -> [u32; 3] {
+    pub(crate) fn aspect_extent(&self, [width, height, depth]: [u32; 3]) -> [u32; 3] {
         [width.div_ceil(self.shrink), height.div_ceil(self.shrink), depth]
     }
 
     /// Columns and rows of blocks that cover so many texels.
-    pub(crate) fn blocks(&self, extent: [u32; 2]) -> [u32; 2] {
+    pub(crate) fn block_count(&self, extent: [u32; 2]) -> [u32; 2] {
         [extent[0].div_ceil(self.block[0]), extent[1].div_ceil(self.block[1])]
     }
 }
@@ -65,8 +65,8 @@ impl Format {
     /// Bytes of a box of texels, width x height x depth, as uploads and downloads move it, tightly packed: the colour, or
     /// the depth without its stencil, or all planes one after the other. Compressed formats round up to whole [blocks](Self::block_extent).
     pub fn bytes(self, extent: [u32; 3]) -> u64 {
-        let Some(main) = self.part(Aspect::Main) else {
-            return self.planes().map(|plane| plane.bytes(plane.shrunk(extent))).sum();
+        let Some(main) = self.copy_aspect(Aspect::Main) else {
+            return self.planes().map(|plane| plane.bytes(plane.aspect_extent(extent))).sum();
         };
         main.bytes(extent)
     }
@@ -79,12 +79,12 @@ impl Format {
 
     /// Whether texels are compressed in blocks.
     pub fn is_compressed(self) -> bool {
-        self.class() == Class::Block
+        self.class() == CompatibilityClass::TexelBlock
     }
 
     /// Whether texels are in Y'CbCr, in several planes.
     pub fn is_yuv(self) -> bool {
-        matches!(self.class(), Class::TwoPlanes | Class::ThreePlanes)
+        matches!(self.class(), CompatibilityClass::TwoPlanes | CompatibilityClass::ThreePlanes)
     }
 
     /// The format in which a plane is seen by itself: numbers of 16 bits where 10 of them count. `None` where there is no such
@@ -92,22 +92,23 @@ impl Format {
     pub fn plane_format(self, plane: u8) -> Option<Self> {
         let wide = self.block().bytes == 2;
         match (self.class(), plane) {
-            (Class::TwoPlanes | Class::ThreePlanes, 0) | (Class::ThreePlanes, 1 | 2) => {
+            (CompatibilityClass::TwoPlanes | CompatibilityClass::ThreePlanes, 0)
+            | (CompatibilityClass::ThreePlanes, 1 | 2) => {
                 Some(if wide { Self::R16Unorm } else { Self::R8Unorm })
             }
-            (Class::TwoPlanes, 1) => Some(if wide { Self::Rg16Unorm } else { Self::Rg8Unorm }),
+            (CompatibilityClass::TwoPlanes, 1) => Some(if wide { Self::Rg16Unorm } else { Self::Rg8Unorm }),
             _ => None,
         }
     }
 
     /// Whether texels hold depth, with or without stencil.
     pub fn is_depth(self) -> bool {
-        matches!(self.class(), Class::Depth | Class::DepthStencil)
+        matches!(self.class(), CompatibilityClass::Depth | CompatibilityClass::DepthStencil)
     }
 
     /// Whether texels hold stencil.
     pub fn has_stencil(self) -> bool {
-        matches!(self.class(), Class::Stencil | Class::DepthStencil)
+        matches!(self.class(), CompatibilityClass::Stencil | CompatibilityClass::DepthStencil)
     }
 
     /// Whether texels hold colour: neither depth nor stencil.
@@ -117,38 +118,38 @@ impl Format {
 
     /// Whether shaders read texels as unsigned integers.
     pub fn is_uint(self) -> bool {
-        matches!(self.class(), Class::Uint | Class::Stencil)
+        matches!(self.class(), CompatibilityClass::Uint | CompatibilityClass::Stencil)
     }
 
     /// Whether shaders read texels as signed integers.
     pub fn is_sint(self) -> bool {
-        self.class() == Class::Sint
+        self.class() == CompatibilityClass::Sint
     }
 
-    pub(crate) fn numbers(self) -> Numbers {
+    pub(crate) fn numeric_format(self) -> NumericFormat {
         match self.class() {
-            Class::Uint | Class::Stencil => Numbers::Uint,
-            Class::Sint => Numbers::Sint,
-            _ => Numbers::Float,
+            CompatibilityClass::Uint | CompatibilityClass::Stencil => NumericFormat::Uint,
+            CompatibilityClass::Sint => NumericFormat::Sint,
+            _ => NumericFormat::Float,
         }
     }
 
     /// All aspects, as barriers name them.
     pub(crate) fn aspects(self) -> vk::ImageAspectFlags {
         match self.class() {
-            Class::Depth => vk::ImageAspectFlags::DEPTH,
-            Class::Stencil => vk::ImageAspectFlags::STENCIL,
-            Class::DepthStencil => vk::ImageAspectFlags::DEPTH | vk::ImageAspectFlags::STENCIL,
+            CompatibilityClass::Depth => vk::ImageAspectFlags::DEPTH,
+            CompatibilityClass::Stencil => vk::ImageAspectFlags::STENCIL,
+            CompatibilityClass::DepthStencil => vk::ImageAspectFlags::DEPTH | vk::ImageAspectFlags::STENCIL,
             _ => vk::ImageAspectFlags::COLOR,
         }
     }
 
     /// An aspect as copies move it, `None` where the format lacks it.
-    pub(crate) fn part(self, aspect: Aspect) -> Option<Part> {
+    pub(crate) fn copy_aspect(self, aspect: Aspect) -> Option<CopyAspect> {
         match aspect {
-            Aspect::Main => (!self.is_yuv()).then(|| self.main()),
+            Aspect::Main => (!self.is_yuv()).then(|| self.main_aspect()),
             Aspect::Plane(plane) => self.plane(plane),
-            Aspect::Stencil => self.has_stencil().then_some(Part {
+            Aspect::Stencil => self.has_stencil().then_some(CopyAspect {
                 aspect: vk::ImageAspectFlags::STENCIL,
                 block: [1, 1],
                 block_bytes: 1,
@@ -157,29 +158,29 @@ impl Format {
         }
     }
 
-    fn main(self) -> Part {
+    fn main_aspect(self) -> CopyAspect {
         let block = self.block();
         let depth = vk::ImageAspectFlags::DEPTH;
         let aspect = if self.is_depth() { depth } else { self.aspects() };
-        Part { aspect, block: block.texels, block_bytes: block.bytes, shrink: 1 }
+        CopyAspect { aspect, block: block.texels, block_bytes: block.bytes, shrink: 1 }
     }
 
     /// A plane as copies name it.
-    fn plane(self, plane: u8) -> Option<Part> {
+    fn plane(self, plane: u8) -> Option<CopyAspect> {
         const ASPECTS: [vk::ImageAspectFlags; 3] =
             [vk::ImageAspectFlags::PLANE_0, vk::ImageAspectFlags::PLANE_1, vk::ImageAspectFlags::PLANE_2];
         let seen = self.plane_format(plane)?;
         let aspect = *ASPECTS.get(usize::from(plane))?;
         let shrink = if plane == 0 { 1 } else { 2 };
-        Some(Part { aspect, block: [1, 1], block_bytes: seen.block().bytes, shrink })
+        Some(CopyAspect { aspect, block: [1, 1], block_bytes: seen.block().bytes, shrink })
     }
 
-    fn planes(self) -> impl Iterator<Item = Part> {
+    fn planes(self) -> impl Iterator<Item = CopyAspect> {
         (0..3).filter_map(move |plane| self.plane(plane))
     }
 
     /// The aspects that together are all of the texels that uploads move.
-    pub(crate) fn uploaded(self) -> impl Iterator<Item = Aspect> {
+    pub(crate) fn uploaded_aspects(self) -> impl Iterator<Item = Aspect> {
         let planes = (0..3).filter(move |plane| self.plane_format(*plane).is_some()).map(Aspect::Plane);
         (!self.is_yuv()).then_some(Aspect::Main).into_iter().chain(planes)
     }
@@ -188,7 +189,8 @@ impl Format {
     /// ones the same compression.
     pub(crate) fn is_viewable_as(self, other: Self) -> bool {
         if self.is_compressed() || other.is_compressed() {
-            return self == other || self.compression().is_some_and(|own| other.compression() == Some(own));
+            return self == other
+                || self.compression_family().is_some_and(|own| other.compression_family() == Some(own));
         }
         self.is_color()
             && other.is_color()
@@ -199,7 +201,7 @@ impl Format {
     }
 
     /// Vulkan counts the two forms of each compression, linear or unsigned and the other, one after the other.
-    fn compression(self) -> Option<i32> {
+    fn compression_family(self) -> Option<i32> {
         const FIRST: i32 = vk::Format::BC1_RGB_UNORM_BLOCK.as_raw();
         self.is_compressed().then(|| (self.raw().as_raw() - FIRST) / 2)
     }
@@ -221,9 +223,12 @@ mod tests {
         assert_eq!(Format::Bc7Srgb.bytes([1, 1, 3]), 48);
         assert_eq!(Format::Astc10x6Unorm.bytes([20, 13, 1]), 2 * 3 * 16);
         assert_eq!(Format::D32FloatS8.bytes([2, 2, 1]), 16);
-        assert_eq!(Format::D32FloatS8.part(Aspect::Stencil).map(|part| part.bytes([2, 2, 1])), Some(4));
-        assert_eq!(Format::D32Float.part(Aspect::Stencil), None);
-        assert_eq!(Format::S8Uint.part(Aspect::Main), Format::S8Uint.part(Aspect::Stencil));
+        assert_eq!(
+            Format::D32FloatS8.copy_aspect(Aspect::Stencil).map(|part| part.bytes([2, 2, 1])),
+            Some(4)
+        );
+        assert_eq!(Format::D32Float.copy_aspect(Aspect::Stencil), None);
+        assert_eq!(Format::S8Uint.copy_aspect(Aspect::Main), Format::S8Uint.copy_aspect(Aspect::Stencil));
         assert_eq!(Format::Rgba32Float.bytes([u32::MAX; 3]), u64::MAX);
     }
 
@@ -232,14 +237,14 @@ mod tests {
         assert_eq!(Format::Nv12.bytes([8, 4, 1]), 32 + 16);
         assert_eq!(Format::Yuv420p10.bytes([8, 4, 1]), 2 * (32 + 8 + 8));
         assert_eq!(
-            Format::P010.part(Aspect::Plane(1)).map(|part| (part.block_bytes, part.shrink)),
+            Format::P010.copy_aspect(Aspect::Plane(1)).map(|part| (part.block_bytes, part.shrink)),
             Some((4, 2))
         );
-        assert_eq!(Format::Nv12.part(Aspect::Plane(2)), None);
-        assert_eq!(Format::Nv12.part(Aspect::Main), None);
-        assert_eq!(Format::Rgba8Unorm.part(Aspect::Plane(0)), None);
-        assert_eq!(Format::Yuv420p8.uploaded().count(), 3);
-        assert_eq!(Format::D32FloatS8.uploaded().collect::<Vec<_>>(), [Aspect::Main]);
+        assert_eq!(Format::Nv12.copy_aspect(Aspect::Plane(2)), None);
+        assert_eq!(Format::Nv12.copy_aspect(Aspect::Main), None);
+        assert_eq!(Format::Rgba8Unorm.copy_aspect(Aspect::Plane(0)), None);
+        assert_eq!(Format::Yuv420p8.uploaded_aspects().count(), 3);
+        assert_eq!(Format::D32FloatS8.uploaded_aspects().collect::<Vec<_>>(), [Aspect::Main]);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use ash::vk;
 
 /// The smallest piece of a format that can be copied.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Block {
+pub(super) struct TexelBlock {
     /// Width and height in texels: 1 for formats that are not compressed.
     pub(super) texels: [u32; 2],
     /// Of depth with stencil those of the depth alone, of planes those of Y.
@@ -13,12 +13,12 @@ pub(super) struct Block {
 
 /// What texels hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Class {
+pub(super) enum CompatibilityClass {
     Float,
     Uint,
     Sint,
     /// Compressed colours, which shaders see as floats.
-    Block,
+    TexelBlock,
     Depth,
     Stencil,
     DepthStencil,
@@ -28,12 +28,12 @@ pub(super) enum Class {
     ThreePlanes,
 }
 
-const fn texel(bytes: u32) -> Block {
+const fn texel(bytes: u32) -> TexelBlock {
     block([1, 1], bytes)
 }
 
-const fn block(texels: [u32; 2], bytes: u32) -> Block {
-    Block { texels, bytes }
+const fn block(texels: [u32; 2], bytes: u32) -> TexelBlock {
+    TexelBlock { texels, bytes }
 }
 
 macro_rules! formats {
@@ -56,15 +56,15 @@ macro_rules! formats {
                 }
             }
 
-            pub(super) fn block(self) -> Block {
+            pub(super) fn block(self) -> TexelBlock {
                 match self {
                     $(Self::$name => $block,)*
                 }
             }
 
-            pub(super) fn class(self) -> Class {
+            pub(super) fn class(self) -> CompatibilityClass {
                 match self {
-                    $(Self::$name => Class::$class,)*
+                    $(Self::$name => CompatibilityClass::$class,)*
                 }
             }
         }
@@ -182,113 +182,113 @@ formats! {
     /// Float depth and 8-bit stencil.
     D32FloatS8 = D32_SFLOAT_S8_UINT, texel(4), DepthStencil;
     /// BC1 without alpha: blocks of 4 x 4 texels in 8 bytes.
-    Bc1RgbUnorm = BC1_RGB_UNORM_BLOCK, block([4, 4], 8), Block;
+    Bc1RgbUnorm = BC1_RGB_UNORM_BLOCK, block([4, 4], 8), TexelBlock;
     /// BC1 without alpha: blocks of 4 x 4 texels in 8 bytes, colour encoded as sRGB.
-    Bc1RgbSrgb = BC1_RGB_SRGB_BLOCK, block([4, 4], 8), Block;
+    Bc1RgbSrgb = BC1_RGB_SRGB_BLOCK, block([4, 4], 8), TexelBlock;
     /// BC1 with 1 bit of alpha: blocks of 4 x 4 texels in 8 bytes.
-    Bc1RgbaUnorm = BC1_RGBA_UNORM_BLOCK, block([4, 4], 8), Block;
+    Bc1RgbaUnorm = BC1_RGBA_UNORM_BLOCK, block([4, 4], 8), TexelBlock;
     /// BC1 with 1 bit of alpha: blocks of 4 x 4 texels in 8 bytes, colour encoded as sRGB.
-    Bc1RgbaSrgb = BC1_RGBA_SRGB_BLOCK, block([4, 4], 8), Block;
+    Bc1RgbaSrgb = BC1_RGBA_SRGB_BLOCK, block([4, 4], 8), TexelBlock;
     /// BC2, alpha of 4 bits: blocks of 4 x 4 texels in 16 bytes.
-    Bc2Unorm = BC2_UNORM_BLOCK, block([4, 4], 16), Block;
+    Bc2Unorm = BC2_UNORM_BLOCK, block([4, 4], 16), TexelBlock;
     /// BC2, alpha of 4 bits: blocks of 4 x 4 texels in 16 bytes, colour encoded as sRGB.
-    Bc2Srgb = BC2_SRGB_BLOCK, block([4, 4], 16), Block;
+    Bc2Srgb = BC2_SRGB_BLOCK, block([4, 4], 16), TexelBlock;
     /// BC3, alpha interpolated: blocks of 4 x 4 texels in 16 bytes.
-    Bc3Unorm = BC3_UNORM_BLOCK, block([4, 4], 16), Block;
+    Bc3Unorm = BC3_UNORM_BLOCK, block([4, 4], 16), TexelBlock;
     /// BC3, alpha interpolated: blocks of 4 x 4 texels in 16 bytes, colour encoded as sRGB.
-    Bc3Srgb = BC3_SRGB_BLOCK, block([4, 4], 16), Block;
+    Bc3Srgb = BC3_SRGB_BLOCK, block([4, 4], 16), TexelBlock;
     /// BC4, one channel: blocks of 4 x 4 texels in 8 bytes.
-    Bc4Unorm = BC4_UNORM_BLOCK, block([4, 4], 8), Block;
+    Bc4Unorm = BC4_UNORM_BLOCK, block([4, 4], 8), TexelBlock;
     /// BC4, one channel, signed.
-    Bc4Snorm = BC4_SNORM_BLOCK, block([4, 4], 8), Block;
+    Bc4Snorm = BC4_SNORM_BLOCK, block([4, 4], 8), TexelBlock;
     /// BC5, two channels: blocks of 4 x 4 texels in 16 bytes.
-    Bc5Unorm = BC5_UNORM_BLOCK, block([4, 4], 16), Block;
+    Bc5Unorm = BC5_UNORM_BLOCK, block([4, 4], 16), TexelBlock;
     /// BC5, two channels, signed.
-    Bc5Snorm = BC5_SNORM_BLOCK, block([4, 4], 16), Block;
+    Bc5Snorm = BC5_SNORM_BLOCK, block([4, 4], 16), TexelBlock;
     /// BC6H, unsigned half floats: blocks of 4 x 4 texels in 16 bytes.
-    Bc6hUfloat = BC6H_UFLOAT_BLOCK, block([4, 4], 16), Block;
+    Bc6hUfloat = BC6H_UFLOAT_BLOCK, block([4, 4], 16), TexelBlock;
     /// BC6H, signed half floats.
-    Bc6hFloat = BC6H_SFLOAT_BLOCK, block([4, 4], 16), Block;
+    Bc6hFloat = BC6H_SFLOAT_BLOCK, block([4, 4], 16), TexelBlock;
     /// BC7: blocks of 4 x 4 texels in 16 bytes.
-    Bc7Unorm = BC7_UNORM_BLOCK, block([4, 4], 16), Block;
+    Bc7Unorm = BC7_UNORM_BLOCK, block([4, 4], 16), TexelBlock;
     /// BC7: blocks of 4 x 4 texels in 16 bytes, colour encoded as sRGB.
-    Bc7Srgb = BC7_SRGB_BLOCK, block([4, 4], 16), Block;
+    Bc7Srgb = BC7_SRGB_BLOCK, block([4, 4], 16), TexelBlock;
     /// ETC2 without alpha: blocks of 4 x 4 texels in 8 bytes.
-    Etc2Rgb8Unorm = ETC2_R8G8B8_UNORM_BLOCK, block([4, 4], 8), Block;
+    Etc2Rgb8Unorm = ETC2_R8G8B8_UNORM_BLOCK, block([4, 4], 8), TexelBlock;
     /// ETC2 without alpha: blocks of 4 x 4 texels in 8 bytes, colour encoded as sRGB.
-    Etc2Rgb8Srgb = ETC2_R8G8B8_SRGB_BLOCK, block([4, 4], 8), Block;
+    Etc2Rgb8Srgb = ETC2_R8G8B8_SRGB_BLOCK, block([4, 4], 8), TexelBlock;
     /// ETC2 with 1 bit of alpha: blocks of 4 x 4 texels in 8 bytes.
-    Etc2Rgb8A1Unorm = ETC2_R8G8B8A1_UNORM_BLOCK, block([4, 4], 8), Block;
+    Etc2Rgb8A1Unorm = ETC2_R8G8B8A1_UNORM_BLOCK, block([4, 4], 8), TexelBlock;
     /// ETC2 with 1 bit of alpha: blocks of 4 x 4 texels in 8 bytes, colour encoded as sRGB.
-    Etc2Rgb8A1Srgb = ETC2_R8G8B8A1_SRGB_BLOCK, block([4, 4], 8), Block;
+    Etc2Rgb8A1Srgb = ETC2_R8G8B8A1_SRGB_BLOCK, block([4, 4], 8), TexelBlock;
     /// ETC2 with EAC alpha: blocks of 4 x 4 texels in 16 bytes.
-    Etc2Rgba8Unorm = ETC2_R8G8B8A8_UNORM_BLOCK, block([4, 4], 16), Block;
+    Etc2Rgba8Unorm = ETC2_R8G8B8A8_UNORM_BLOCK, block([4, 4], 16), TexelBlock;
     /// ETC2 with EAC alpha: blocks of 4 x 4 texels in 16 bytes, colour encoded as sRGB.
-    Etc2Rgba8Srgb = ETC2_R8G8B8A8_SRGB_BLOCK, block([4, 4], 16), Block;
+    Etc2Rgba8Srgb = ETC2_R8G8B8A8_SRGB_BLOCK, block([4, 4], 16), TexelBlock;
     /// EAC, one channel: blocks of 4 x 4 texels in 8 bytes.
-    EacR11Unorm = EAC_R11_UNORM_BLOCK, block([4, 4], 8), Block;
+    EacR11Unorm = EAC_R11_UNORM_BLOCK, block([4, 4], 8), TexelBlock;
     /// EAC, one channel, signed.
-    EacR11Snorm = EAC_R11_SNORM_BLOCK, block([4, 4], 8), Block;
+    EacR11Snorm = EAC_R11_SNORM_BLOCK, block([4, 4], 8), TexelBlock;
     /// EAC, two channels: blocks of 4 x 4 texels in 16 bytes.
-    EacRg11Unorm = EAC_R11G11_UNORM_BLOCK, block([4, 4], 16), Block;
+    EacRg11Unorm = EAC_R11G11_UNORM_BLOCK, block([4, 4], 16), TexelBlock;
     /// EAC, two channels, signed.
-    EacRg11Snorm = EAC_R11G11_SNORM_BLOCK, block([4, 4], 16), Block;
+    EacRg11Snorm = EAC_R11G11_SNORM_BLOCK, block([4, 4], 16), TexelBlock;
     /// ASTC: blocks of 4 x 4 texels in 16 bytes.
-    Astc4x4Unorm = ASTC_4X4_UNORM_BLOCK, block([4, 4], 16), Block;
+    Astc4x4Unorm = ASTC_4X4_UNORM_BLOCK, block([4, 4], 16), TexelBlock;
     /// ASTC: blocks of 4 x 4 texels in 16 bytes, colour encoded as sRGB.
-    Astc4x4Srgb = ASTC_4X4_SRGB_BLOCK, block([4, 4], 16), Block;
+    Astc4x4Srgb = ASTC_4X4_SRGB_BLOCK, block([4, 4], 16), TexelBlock;
     /// ASTC: blocks of 5 x 4 texels in 16 bytes.
-    Astc5x4Unorm = ASTC_5X4_UNORM_BLOCK, block([5, 4], 16), Block;
+    Astc5x4Unorm = ASTC_5X4_UNORM_BLOCK, block([5, 4], 16), TexelBlock;
     /// ASTC: blocks of 5 x 4 texels in 16 bytes, colour encoded as sRGB.
-    Astc5x4Srgb = ASTC_5X4_SRGB_BLOCK, block([5, 4], 16), Block;
+    Astc5x4Srgb = ASTC_5X4_SRGB_BLOCK, block([5, 4], 16), TexelBlock;
     /// ASTC: blocks of 5 x 5 texels in 16 bytes.
-    Astc5x5Unorm = ASTC_5X5_UNORM_BLOCK, block([5, 5], 16), Block;
+    Astc5x5Unorm = ASTC_5X5_UNORM_BLOCK, block([5, 5], 16), TexelBlock;
     /// ASTC: blocks of 5 x 5 texels in 16 bytes, colour encoded as sRGB.
-    Astc5x5Srgb = ASTC_5X5_SRGB_BLOCK, block([5, 5], 16), Block;
+    Astc5x5Srgb = ASTC_5X5_SRGB_BLOCK, block([5, 5], 16), TexelBlock;
     /// ASTC: blocks of 6 x 5 texels in 16 bytes.
-    Astc6x5Unorm = ASTC_6X5_UNORM_BLOCK, block([6, 5], 16), Block;
+    Astc6x5Unorm = ASTC_6X5_UNORM_BLOCK, block([6, 5], 16), TexelBlock;
     /// ASTC: blocks of 6 x 5 texels in 16 bytes, colour encoded as sRGB.
-    Astc6x5Srgb = ASTC_6X5_SRGB_BLOCK, block([6, 5], 16), Block;
+    Astc6x5Srgb = ASTC_6X5_SRGB_BLOCK, block([6, 5], 16), TexelBlock;
     /// ASTC: blocks of 6 x 6 texels in 16 bytes.
-    Astc6x6Unorm = ASTC_6X6_UNORM_BLOCK, block([6, 6], 16), Block;
+    Astc6x6Unorm = ASTC_6X6_UNORM_BLOCK, block([6, 6], 16), TexelBlock;
     /// ASTC: blocks of 6 x 6 texels in 16 bytes, colour encoded as sRGB.
-    Astc6x6Srgb = ASTC_6X6_SRGB_BLOCK, block([6, 6], 16), Block;
+    Astc6x6Srgb = ASTC_6X6_SRGB_BLOCK, block([6, 6], 16), TexelBlock;
     /// ASTC: blocks of 8 x 5 texels in 16 bytes.
-    Astc8x5Unorm = ASTC_8X5_UNORM_BLOCK, block([8, 5], 16), Block;
+    Astc8x5Unorm = ASTC_8X5_UNORM_BLOCK, block([8, 5], 16), TexelBlock;
     /// ASTC: blocks of 8 x 5 texels in 16 bytes, colour encoded as sRGB.
-    Astc8x5Srgb = ASTC_8X5_SRGB_BLOCK, block([8, 5], 16), Block;
+    Astc8x5Srgb = ASTC_8X5_SRGB_BLOCK, block([8, 5], 16), TexelBlock;
     /// ASTC: blocks of 8 x 6 texels in 16 bytes.
-    Astc8x6Unorm = ASTC_8X6_UNORM_BLOCK, block([8, 6], 16), Block;
+    Astc8x6Unorm = ASTC_8X6_UNORM_BLOCK, block([8, 6], 16), TexelBlock;
     /// ASTC: blocks of 8 x 6 texels in 16 bytes, colour encoded as sRGB.
-    Astc8x6Srgb = ASTC_8X6_SRGB_BLOCK, block([8, 6], 16), Block;
+    Astc8x6Srgb = ASTC_8X6_SRGB_BLOCK, block([8, 6], 16), TexelBlock;
     /// ASTC: blocks of 8 x 8 texels in 16 bytes.
-    Astc8x8Unorm = ASTC_8X8_UNORM_BLOCK, block([8, 8], 16), Block;
+    Astc8x8Unorm = ASTC_8X8_UNORM_BLOCK, block([8, 8], 16), TexelBlock;
     /// ASTC: blocks of 8 x 8 texels in 16 bytes, colour encoded as sRGB.
-    Astc8x8Srgb = ASTC_8X8_SRGB_BLOCK, block([8, 8], 16), Block;
+    Astc8x8Srgb = ASTC_8X8_SRGB_BLOCK, block([8, 8], 16), TexelBlock;
     /// ASTC: blocks of 10 x 5 texels in 16 bytes.
-    Astc10x5Unorm = ASTC_10X5_UNORM_BLOCK, block([10, 5], 16), Block;
+    Astc10x5Unorm = ASTC_10X5_UNORM_BLOCK, block([10, 5], 16), TexelBlock;
     /// ASTC: blocks of 10 x 5 texels in 16 bytes, colour encoded as sRGB.
-    Astc10x5Srgb = ASTC_10X5_SRGB_BLOCK, block([10, 5], 16), Block;
+    Astc10x5Srgb = ASTC_10X5_SRGB_BLOCK, block([10, 5], 16), TexelBlock;
     /// ASTC: blocks of 10 x 6 texels in 16 bytes.
-    Astc10x6Unorm = ASTC_10X6_UNORM_BLOCK, block([10, 6], 16), Block;
+    Astc10x6Unorm = ASTC_10X6_UNORM_BLOCK, block([10, 6], 16), TexelBlock;
     /// ASTC: blocks of 10 x 6 texels in 16 bytes, colour encoded as sRGB.
-    Astc10x6Srgb = ASTC_10X6_SRGB_BLOCK, block([10, 6], 16), Block;
+    Astc10x6Srgb = ASTC_10X6_SRGB_BLOCK, block([10, 6], 16), TexelBlock;
     /// ASTC: blocks of 10 x 8 texels in 16 bytes.
-    Astc10x8Unorm = ASTC_10X8_UNORM_BLOCK, block([10, 8], 16), Block;
+    Astc10x8Unorm = ASTC_10X8_UNORM_BLOCK, block([10, 8], 16), TexelBlock;
     /// ASTC: blocks of 10 x 8 texels in 16 bytes, colour encoded as sRGB.
-    Astc10x8Srgb = ASTC_10X8_SRGB_BLOCK, block([10, 8], 16), Block;
+    Astc10x8Srgb = ASTC_10X8_SRGB_BLOCK, block([10, 8], 16), TexelBlock;
     /// ASTC: blocks of 10 x 10 texels in 16 bytes.
-    Astc10x10Unorm = ASTC_10X10_UNORM_BLOCK, block([10, 10], 16), Block;
+    Astc10x10Unorm = ASTC_10X10_UNORM_BLOCK, block([10, 10], 16), TexelBlock;
     /// ASTC: blocks of 10 x 10 texels in 16 bytes, colour encoded as sRGB.
-    Astc10x10Srgb = ASTC_10X10_SRGB_BLOCK, block([10, 10], 16), Block;
+    Astc10x10Srgb = ASTC_10X10_SRGB_BLOCK, block([10, 10], 16), TexelBlock;
     /// ASTC: blocks of 12 x 10 texels in 16 bytes.
-    Astc12x10Unorm = ASTC_12X10_UNORM_BLOCK, block([12, 10], 16), Block;
+    Astc12x10Unorm = ASTC_12X10_UNORM_BLOCK, block([12, 10], 16), TexelBlock;
     /// ASTC: blocks of 12 x 10 texels in 16 bytes, colour encoded as sRGB.
-    Astc12x10Srgb = ASTC_12X10_SRGB_BLOCK, block([12, 10], 16), Block;
+    Astc12x10Srgb = ASTC_12X10_SRGB_BLOCK, block([12, 10], 16), TexelBlock;
     /// ASTC: blocks of 12 x 12 texels in 16 bytes.
-    Astc12x12Unorm = ASTC_12X12_UNORM_BLOCK, block([12, 12], 16), Block;
+    Astc12x12Unorm = ASTC_12X12_UNORM_BLOCK, block([12, 12], 16), TexelBlock;
     /// ASTC: blocks of 12 x 12 texels in 16 bytes, colour encoded as sRGB.
-    Astc12x12Srgb = ASTC_12X12_SRGB_BLOCK, block([12, 12], 16), Block;
+    Astc12x12Srgb = ASTC_12X12_SRGB_BLOCK, block([12, 12], 16), TexelBlock;
     /// Y'CbCr, 8 bits: a plane of Y, and one of Cb and Cr with half the width and height.
     Nv12 = G8_B8R8_2PLANE_420_UNORM, texel(1), TwoPlanes;
     /// Y'CbCr, 8 bits: planes of Y, Cb and Cr, the last two with half the width and height.

@@ -8,24 +8,24 @@ use ash::vk;
 use super::calibrated_timestamps::HostClock;
 use super::caps::capabilities::{Capabilities, FeatureRequest, PhysicalDevice};
 use super::caps::descriptor_limits::DescriptorLimits;
-use super::caps::format_features::FormatAnswers;
-use super::caps::host_image_copy::HostCopies;
-use super::caps::image_limits::ImageLimits;
+use super::caps::format_features::FormatFeatureCache;
+use super::caps::host_image_copy::HostImageCopy;
+use super::caps::image_limits::ImageLimitCache;
 use super::caps::optional_features::{FeatureSet, OF_WINDOWS, OptionalFeature};
-use super::caps::queues::{Queue, QueuePlace, QueueRequest, Queues, shared_ticks};
+use super::caps::queues::{Queue, QueueLocation, QueueRequest, Queues, shared_timestamp_bits};
 use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::shading_rate::ShadingRates;
 use super::debug::object_names;
 use super::memory::allocator::DeviceMemory;
 use super::memory::budget::HeapUse;
-use super::start::driver_workarounds::change_devices;
+use super::start::driver_workarounds::with_exclusive_device_lock;
 use super::start::external::RawContext;
 use super::start::features::Features;
 use super::start::instance::Instance;
 use super::start::profile::DeviceProfile;
 use super::start::select::{Candidate, choose};
 use super::start::user_extensions::UserExtensions;
-use super::window::{Probe, WindowFunctions, WindowHandles};
+use super::window::{SurfaceProbe, WindowFunctions, WindowHandles};
 use crate::error::{Error, Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
 
@@ -64,7 +64,7 @@ pub(crate) struct Gpu {
     pub(crate) shading_rates: Option<ShadingRates>,
     pub(crate) local_read: Option<ash::khr::dynamic_rendering_local_read::Device>,
     /// Writes first contents of images, where that is the faster way.
-    pub(crate) host_copies: Option<HostCopies>,
+    pub(crate) host_copies: Option<HostImageCopy>,
     /// Reads the clocks of device and host together.
     pub(crate) host_clock: Option<HostClock>,
     /// Samplers alive with a border colour of their own, of which a device has few.
@@ -77,8 +77,8 @@ pub(crate) struct Gpu {
     pub(super) device_fault: Option<ash::ext::device_fault::Device>,
     memory: Mutex<Option<DeviceMemory>>,
     pub(super) heap_use: HeapUse,
-    pub(super) format_answers: FormatAnswers,
-    pub(super) image_limits: ImageLimits,
+    pub(super) format_answers: FormatFeatureCache,
+    pub(super) image_limits: ImageLimitCache,
     /// Somebody else made the device, and destroys it.
     is_foreign: bool,
     /// Declared last: destroyed after the device.
@@ -86,7 +86,7 @@ pub(crate) struct Gpu {
 }
 
 /// What was made, or given.
-struct Made {
+struct DeviceParts {
     device: ash::Device,
     caps: Capabilities,
     features: Features,
@@ -103,17 +103,17 @@ impl Gpu {
             Ok(memory) => memory,
             Err(error) => {
                 // SAFETY: nothing was made from the device yet.
-                change_devices(caps.driver_id, || unsafe { device.destroy_device(None) });
+                with_exclusive_device_lock(caps.driver_id, || unsafe { device.destroy_device(None) });
                 return Err(error);
             }
         };
-        let raw = chosen.places.map(|QueuePlace { family, index }| {
+        let raw = chosen.places.map(|QueueLocation { family, index }| {
             // SAFETY: the device was created with this queue of the family.
             (unsafe { device.get_device_queue(family, index) }, family)
         });
         let queues = Queues::new(raw, request.queues);
-        let made = Made { device, caps, features, memory, queues, is_foreign: false };
-        let mut gpu = Self::of(instance, chosen.raw, made, request.debug_names);
+        let made = DeviceParts { device, caps, features, memory, queues, is_foreign: false };
+        let mut gpu = Self::from_parts(instance, chosen.raw, made, request.debug_names);
         gpu.profile = request.profile.cloned().unwrap_or_default();
         gpu.extra_capabilities = request.extra.capabilities().to_vec();
         Ok(gpu)
@@ -131,13 +131,13 @@ impl Gpu {
         queues: QueueRequest,
     ) -> Result<Self> {
         let mut chosen = raw.physical()?;
-        share_queues(&mut chosen, queues);
+        use_single_queue(&mut chosen, queues);
         let mut caps = chosen.capabilities.clone();
         caps.choose_ray_tracing(pipeline, query);
         let given = raw.queues();
-        let instance = Instance::foreign(raw.entry, raw.instance, raw.instance_extensions);
-        let features = enabled(&instance, &chosen, &caps);
-        let made = Made {
+        let instance = Instance::external(raw.entry, raw.instance, raw.instance_extensions);
+        let features = enabled_features(&instance, &chosen, &caps);
+        let made = DeviceParts {
             memory: DeviceMemory::new(&instance, &raw.device, chosen.raw)?,
             device: raw.device,
             caps,
@@ -145,14 +145,19 @@ impl Gpu {
             queues: Queues::new(given, queues),
             is_foreign: true,
         };
-        Ok(Self::of(instance, chosen.raw, made, debug_names))
+        Ok(Self::from_parts(instance, chosen.raw, made, debug_names))
     }
 
-    fn of(instance: Instance, physical: vk::PhysicalDevice, made: Made, debug_names: Option<bool>) -> Self {
-        let Made { device, mut caps, features, memory, queues, is_foreign } = made;
+    fn from_parts(
+        instance: Instance,
+        physical: vk::PhysicalDevice,
+        made: DeviceParts,
+        debug_names: Option<bool>,
+    ) -> Self {
+        let DeviceParts { device, mut caps, features, memory, queues, is_foreign } = made;
         let raw = &instance.raw;
-        let structures = caps.hardware_structures();
-        let host_copies = HostCopies::new(&instance, &device, physical, &caps);
+        let structures = caps.hardware_acceleration_structures();
+        let host_copies = HostImageCopy::new(&instance, &device, physical, &caps);
         caps.host_image_copy = host_copies.is_some();
         Self {
             queues,
@@ -168,14 +173,14 @@ impl Gpu {
             host_copies,
             host_clock: HostClock::new(&instance, &device, physical, features.calibration),
             windows: WindowFunctions::new(&instance, &device, |feature| caps.has(feature)),
-            debug_utils: object_names::is_wanted(&instance, physical, debug_names)
+            debug_utils: object_names::should_name_objects(&instance, physical, debug_names)
                 .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             device_fault: (features.ext.fault.device_fault == vk::TRUE)
                 .then(|| ash::ext::device_fault::Device::new(raw, &device)),
             memory: Mutex::new(Rank::Memory, Some(memory)),
             heap_use: HeapUse::new(&instance, physical),
-            format_answers: FormatAnswers::default(),
-            image_limits: ImageLimits::new(),
+            format_answers: FormatFeatureCache::default(),
+            image_limits: ImageLimitCache::new(),
             custom_borders: AtomicU32::new(0),
             physical,
             device,
@@ -189,7 +194,7 @@ impl Gpu {
     }
 
     /// The queue for everything; Vulkan wants one thread at a time on it.
-    pub(crate) fn queue(&self) -> Guard<'_, vk::Queue> {
+    pub(crate) fn graphics_queue(&self) -> Guard<'_, vk::Queue> {
         self.queues.raw(0)
     }
 
@@ -204,33 +209,37 @@ impl Gpu {
     }
 
     /// The functions of `VK_KHR_acceleration_structure`, or the error that says what the device lacks.
-    pub(crate) fn accel(&self) -> Result<&ash::khr::acceleration_structure::Device> {
-        self.accel.as_ref().ok_or_else(|| self.lacks("acceleration structures"))
+    pub(crate) fn accel_functions(&self) -> Result<&ash::khr::acceleration_structure::Device> {
+        self.accel.as_ref().ok_or_else(|| self.unsupported("acceleration structures"))
     }
 
     /// Whether there are acceleration structures, the device's or the library's own.
-    pub(crate) fn has_structures(&self) -> bool {
+    pub(crate) fn has_acceleration_structures(&self) -> bool {
         self.accel.is_some() || self.caps.software_ray_query()
     }
 
     /// Fails unless there are acceleration structures of either form.
-    pub(crate) fn check_structures(&self) -> Result<()> {
-        if self.has_structures() { Ok(()) } else { Err(self.lacks("acceleration structures")) }
+    pub(crate) fn check_acceleration_structures(&self) -> Result<()> {
+        if self.has_acceleration_structures() {
+            Ok(())
+        } else {
+            Err(self.unsupported("acceleration structures"))
+        }
     }
 
     /// The functions of `VK_KHR_ray_tracing_pipeline`, or the error that says what the device lacks.
-    pub(crate) fn ray_tracing(&self) -> Result<&ash::khr::ray_tracing_pipeline::Device> {
-        self.ray_tracing.as_ref().ok_or_else(|| self.lacks("ray tracing pipelines"))
+    pub(crate) fn ray_tracing_functions(&self) -> Result<&ash::khr::ray_tracing_pipeline::Device> {
+        self.ray_tracing.as_ref().ok_or_else(|| self.unsupported("ray tracing pipelines"))
     }
 
     /// The functions of `VK_EXT_mesh_shader`, or the error that says what the device lacks.
-    pub(crate) fn mesh(&self) -> Result<&ash::ext::mesh_shader::Device> {
-        self.mesh.as_ref().ok_or_else(|| self.lacks("mesh shaders"))
+    pub(crate) fn mesh_functions(&self) -> Result<&ash::ext::mesh_shader::Device> {
+        self.mesh.as_ref().ok_or_else(|| self.unsupported("mesh shaders"))
     }
 
     /// An [`Error::Unsupported`] that names the device.
-    pub(crate) fn lacks(&self, what: &str) -> Error {
-        let profile = Some(&self.profile).filter(|profile| profile.hides());
+    pub(crate) fn unsupported(&self, what: &str) -> Error {
+        let profile = Some(&self.profile).filter(|profile| profile.has_restrictions());
         let profile = profile.map(|profile| format!("the device profile '{}' hides it, ", profile.name));
         let reason = self.caps.ray_tracing_fallback.clone().unwrap_or_else(|| {
             format!("{}its driver does not offer it, or it was turned off", profile.unwrap_or_default())
@@ -270,7 +279,7 @@ impl Gpu {
     /// How many ticks `later` is behind `earlier`, of whatever queues both are; the clock begins anew in between.
     pub(crate) fn ticks_since(&self, earlier: u64, later: u64) -> u64 {
         let bits = Queue::ALL.map(|queue| self.caps.queue(queue).timestamp_bits);
-        later.wrapping_sub(earlier) & shared_ticks(bits)
+        later.wrapping_sub(earlier) & shared_timestamp_bits(bits)
     }
 
     /// How many ticks `earlier` is before `later`, of whatever queues both are; `None` where it is not.
@@ -293,7 +302,7 @@ impl Drop for Gpu {
         }
         // SAFETY: everything made from the device is gone: the context destroys its objects before its `Gpu`.
         let destroy = || unsafe { self.device.destroy_device(None) };
-        change_devices(self.caps.driver_id, destroy);
+        with_exclusive_device_lock(self.caps.driver_id, destroy);
     }
 }
 
@@ -305,30 +314,30 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
     if devices.is_empty() {
         return Err(Error::NoVulkan { reason: "the loader found no device".to_owned() });
     }
-    let probe = request.window.map(|window| Probe::new(instance, window)).transpose()?;
-    let unknown = unknown_of_windows(instance);
+    let probe = request.window.map(|window| SurfaceProbe::new(instance, window)).transpose()?;
+    let unknown = unavailable_window_features(instance);
     for device in &mut devices {
-        device.capabilities.hide(unknown);
+        device.capabilities.remove_features(unknown);
         if let Some(probe) = &probe {
-            device.present_to(probe);
+            device.select_present_queue(probe);
         }
     }
     let candidates: Vec<_> = devices.iter_mut().map(|device| candidate(device, request)).collect();
     let index = choose(&candidates, request.wish)?;
     let mut chosen = devices.swap_remove(index);
-    share_queues(&mut chosen, request.queues);
+    use_single_queue(&mut chosen, request.queues);
     Ok(chosen)
 }
 
 /// Has one queue for all where that is asked for.
-fn share_queues(device: &mut PhysicalDevice, request: QueueRequest) {
+fn use_single_queue(device: &mut PhysicalDevice, request: QueueRequest) {
     if request == QueueRequest::Shared {
-        device.place([device.places[0]; 3]);
+        device.set_queues([device.places[0]; 3]);
     }
 }
 
 /// What devices have for windows and cannot be turned on for want of an extension of the instance.
-fn unknown_of_windows(instance: &Instance) -> FeatureSet {
+fn unavailable_window_features(instance: &Instance) -> FeatureSet {
     match &instance.windows {
         None => OF_WINDOWS.into_iter().collect(),
         Some(windows) if windows.maintenance => FeatureSet::NONE,
@@ -346,7 +355,7 @@ fn candidate(device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candid
     let mut missing = device.missing.clone();
     let mut demand = |name: &str, found: bool, left: bool| {
         if !left {
-            missing.push(lack(name, request.profile.filter(|_| found)));
+            missing.push(missing_requirement(name, request.profile.filter(|_| found)));
         }
     };
     if request.pipeline == FeatureRequest::Required {
@@ -359,11 +368,11 @@ fn candidate(device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candid
     for feature in request.required.iter().chain(&swapchain) {
         demand(feature.vulkan_name(), found.has(*feature), left.has(*feature));
     }
-    for name in request.extra.of_device() {
+    for name in request.extra.device_extensions() {
         demand(&name.to_string_lossy(), false, device.has_extension(name));
     }
     let wanted = [
-        request.pipeline.wants() && left.ray_tracing_pipeline,
+        request.pipeline.is_requested() && left.ray_tracing_pipeline,
         request.query.prefers_hardware() && left.ray_query,
     ];
     Candidate {
@@ -375,7 +384,7 @@ fn candidate(device: &mut PhysicalDevice, request: &DeviceRequest<'_>) -> Candid
     }
 }
 
-fn lack(name: &str, hidden_by: Option<&DeviceProfile>) -> String {
+fn missing_requirement(name: &str, hidden_by: Option<&DeviceProfile>) -> String {
     match hidden_by {
         Some(profile) => format!("{name} (hidden by the device profile '{}')", profile.name),
         None => name.to_owned(),
@@ -395,7 +404,7 @@ fn create_with_fallback(
         Err(error) => error,
     };
     let required = request.pipeline == FeatureRequest::Required || request.query.requires_hardware();
-    if required || !caps.hardware_structures() {
+    if required || !caps.hardware_acceleration_structures() {
         return Err(Error::vulkan("vkCreateDevice")(first));
     }
     caps.limits.max_bindless_tlas = 0;
@@ -414,14 +423,14 @@ fn create(
     caps: &Capabilities,
     extra: &UserExtensions<'_>,
 ) -> Result<(ash::Device, Features), vk::Result> {
-    let features = enabled(instance, chosen, caps);
-    let extensions = extensions(&features, caps, extra);
+    let features = enabled_features(instance, chosen, caps);
+    let extensions = device_extensions(&features, caps, extra);
     let mut chain = features;
     let mut all = vk::PhysicalDeviceFeatures2::default().features(chain.core);
     // What is pushed below goes in front of the caller's chain, which stays as it is.
-    all.p_next = extra.chain();
+    all.p_next = extra.feature_chain();
     let all = all.push_next(&mut chain.v11).push_next(&mut chain.v12).push_next(&mut chain.v13);
-    let mut all = chain.ext.chain(all, &|name| extensions.contains(&name));
+    let mut all = chain.ext.append_to_chain(all, &|name| extensions.contains(&name));
     let priorities = [1.0; 3];
     let queues = queue_infos(&chosen.places, &priorities);
     let names: Vec<_> = extensions.iter().map(|name| name.as_ptr()).collect();
@@ -431,12 +440,15 @@ fn create(
         .push_next(&mut all);
     // SAFETY: every pointer in `info` lives until the end of this function; the caller vouches for its own chain.
     let make = || unsafe { instance.raw.create_device(chosen.raw, &info, None) };
-    let device = change_devices(caps.driver_id, make)?;
+    let device = with_exclusive_device_lock(caps.driver_id, make)?;
     Ok((device, features))
 }
 
 /// Each family once, with as many queues as are needed to have the last one.
-fn queue_infos<'a>(places: &[QueuePlace; 3], priorities: &'a [f32; 3]) -> Vec<vk::DeviceQueueCreateInfo<'a>> {
+fn queue_infos<'a>(
+    places: &[QueueLocation; 3],
+    priorities: &'a [f32; 3],
+) -> Vec<vk::DeviceQueueCreateInfo<'a>> {
     let mut lasts = std::collections::BTreeMap::new();
     for place in places {
         let last = lasts.entry(place.family).or_insert(0);
@@ -450,8 +462,8 @@ fn queue_infos<'a>(places: &[QueuePlace; 3], priorities: &'a [f32; 3]) -> Vec<vk
 }
 
 /// GPU-assisted validation finds no access out of bounds where the driver has to make it harmless.
-fn enabled(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) -> Features {
-    let mut features = Features::wanted(&chosen.features, caps.optional);
+fn enabled_features(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) -> Features {
+    let mut features = Features::supported_subset(&chosen.features, caps.optional);
     features.limit_ray_tracing(caps.ray_tracing_pipeline, caps.hardware_ray_query());
     features.ext.position_fetch.ray_tracing_position_fetch &= vk::Bool32::from(caps.position_fetch);
     features.limit_mesh_shaders(caps.mesh_shader);
@@ -462,11 +474,15 @@ fn enabled(instance: &Instance, chosen: &PhysicalDevice, caps: &Capabilities) ->
 }
 
 /// Each once.
-fn extensions<'a>(features: &Features, caps: &Capabilities, extra: &UserExtensions<'a>) -> Vec<&'a CStr> {
+fn device_extensions<'a>(
+    features: &Features,
+    caps: &Capabilities,
+    extra: &UserExtensions<'a>,
+) -> Vec<&'a CStr> {
     let libraries = caps.pipeline_libraries.then_some(ash::khr::pipeline_library::NAME);
     let own = features.extensions().chain(caps.optional.extensions()).chain(libraries);
     let mut names: Vec<&'a CStr> = own.map(|name| -> &'a CStr { name }).collect();
-    names.extend_from_slice(extra.of_device());
+    names.extend_from_slice(extra.device_extensions());
     names.sort_unstable();
     names.dedup();
     names

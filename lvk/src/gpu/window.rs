@@ -38,8 +38,8 @@ pub(crate) struct WindowExtensions {
 
 impl WindowExtensions {
     /// Those for windows like `window`, of which `has` says what there is.
-    pub(crate) fn of(window: &dyn WindowHandles, has: &dyn Fn(&CStr) -> bool) -> Result<Self> {
-        let system = needed(display(window)?)?;
+    pub(crate) fn query(window: &dyn WindowHandles, has: &dyn Fn(&CStr) -> bool) -> Result<Self> {
+        let system = required_extensions(display(window)?)?;
         if let Some(name) = system.iter().find(|name| !has(name)) {
             let what = format!("the instance extension {}", name.to_string_lossy());
             return Err(Error::unsupported(what, "no Vulkan driver here can draw to this kind of window"));
@@ -94,7 +94,7 @@ impl WindowFunctions {
 
 impl Gpu {
     /// The functions of windows, or the error that says how to get them.
-    pub(crate) fn windows(&self) -> Result<&WindowFunctions> {
+    pub(crate) fn window_functions(&self) -> Result<&WindowFunctions> {
         self.windows.as_ref().ok_or_else(|| {
             Error::unsupported(
                 "a swapchain",
@@ -105,13 +105,13 @@ impl Gpu {
 }
 
 /// A window while a device is chosen, destroyed on drop.
-pub(crate) struct Probe<'a> {
+pub(crate) struct SurfaceProbe<'a> {
     functions: ash::khr::surface::Instance,
     raw: vk::SurfaceKHR,
     instance: &'a ash::Instance,
 }
 
-impl<'a> Probe<'a> {
+impl<'a> SurfaceProbe<'a> {
     pub(crate) fn new(instance: &'a Instance, window: &dyn WindowHandles) -> Result<Self> {
         Ok(Self {
             raw: create_surface(instance, window)?,
@@ -137,7 +137,7 @@ impl<'a> Probe<'a> {
     }
 }
 
-impl Drop for Probe<'_> {
+impl Drop for SurfaceProbe<'_> {
     fn drop(&mut self) {
         // SAFETY: nothing was made from the surface.
         unsafe { self.functions.destroy_surface(self.raw, None) };
@@ -148,7 +148,7 @@ impl Drop for Probe<'_> {
 pub(crate) fn create_surface(instance: &Instance, window: &dyn WindowHandles) -> Result<vk::SurfaceKHR> {
     let (display, window) = (display(window)?, raw_window(window)?);
     let enabled = instance.windows.as_ref().map_or(&[][..], |windows| &windows.system);
-    if needed(display)?.iter().any(|name| !enabled.contains(name)) {
+    if required_extensions(display)?.iter().any(|name| !enabled.contains(name)) {
         let why =
             "the context was made for windows of another window system, or for none; set ContextDesc::window";
         return Err(Error::unsupported("this kind of window", why));
@@ -170,7 +170,7 @@ fn no_handle(error: raw_window_handle::HandleError) -> Error {
     Error::usage("window", format!("it gives no handle: {error}"))
 }
 
-fn needed(display: RawDisplayHandle) -> Result<Vec<&'static CStr>> {
+fn required_extensions(display: RawDisplayHandle) -> Result<Vec<&'static CStr>> {
     let names = ash_window::enumerate_required_extensions(display).map_err(|_| {
         Error::unsupported("this kind of window", "Vulkan has no surfaces for its window system")
     })?;

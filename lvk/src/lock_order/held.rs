@@ -19,9 +19,9 @@ mod checked {
 
     /// The place of one lock in the order.
     #[derive(Debug, Clone, Copy)]
-    pub(in crate::lock_order) struct Place(Rank);
+    pub(in crate::lock_order) struct LockPlace(Rank);
 
-    impl Place {
+    impl LockPlace {
         pub(in crate::lock_order) const fn new(rank: Rank) -> Self {
             Self(rank)
         }
@@ -34,11 +34,11 @@ mod checked {
     impl Ranks {
         pub(in crate::lock_order) const NONE: Self = Self(0);
 
-        pub(in crate::lock_order) const fn of(rank: Rank) -> Self {
+        pub(in crate::lock_order) const fn from_rank(rank: Rank) -> Self {
             Self(1 << rank as u8)
         }
 
-        pub(in crate::lock_order) const fn and(self, other: Self) -> Self {
+        pub(in crate::lock_order) const fn union(self, other: Self) -> Self {
             Self(self.0 | other.0)
         }
 
@@ -59,18 +59,18 @@ mod checked {
     }
 
     /// A lock that this thread has, or waits for.
-    pub(in crate::lock_order) struct Held(Ranks);
+    pub(in crate::lock_order) struct HeldLock(Ranks);
 
-    impl Held {
-        pub(in crate::lock_order) fn new(Place(rank): Place) -> Self {
+    impl HeldLock {
+        pub(in crate::lock_order) fn new(LockPlace(rank): LockPlace) -> Self {
             let held = HELD.get();
             assert!(held.may_take(rank), "the lock of {rank:?} is taken while {held:?} are held");
-            HELD.set(held.and(Ranks::of(rank)));
-            Self(Ranks::of(rank))
+            HELD.set(held.union(Ranks::from_rank(rank)));
+            Self(Ranks::from_rank(rank))
         }
     }
 
-    impl Drop for Held {
+    impl Drop for HeldLock {
         fn drop(&mut self) {
             // Guards need not go in the order in which they came.
             HELD.set(HELD.get().without(self.0));
@@ -79,16 +79,16 @@ mod checked {
 
     /// What a thread holds that waits for others.
     #[derive(Debug, Clone, Copy)]
-    pub(in crate::lock_order) struct Waiting(Ranks);
+    pub(in crate::lock_order) struct HeldLocks(Ranks);
 
-    impl Waiting {
-        pub(in crate::lock_order) fn here() -> Self {
+    impl HeldLocks {
+        pub(in crate::lock_order) fn of_current_thread() -> Self {
             Self(HELD.get())
         }
 
         /// As long as the answer lives, this thread is taken to hold it, too.
         pub(in crate::lock_order) fn assume(self) -> Assumed {
-            Assumed { before: HELD.replace(HELD.get().and(self.0)) }
+            Assumed { before: HELD.replace(HELD.get().union(self.0)) }
         }
     }
 
@@ -109,20 +109,20 @@ mod unchecked {
     use crate::lock_order::Rank;
 
     #[derive(Debug, Clone, Copy)]
-    pub(in crate::lock_order) struct Place;
+    pub(in crate::lock_order) struct LockPlace;
 
-    impl Place {
+    impl LockPlace {
         #[inline]
         pub(in crate::lock_order) const fn new(_: Rank) -> Self {
             Self
         }
     }
 
-    pub(in crate::lock_order) struct Held;
+    pub(in crate::lock_order) struct HeldLock;
 
-    impl Held {
+    impl HeldLock {
         #[inline]
-        pub(in crate::lock_order) fn new(_: Place) -> Self {
+        pub(in crate::lock_order) fn new(_: LockPlace) -> Self {
             Self
         }
     }
@@ -130,11 +130,11 @@ mod unchecked {
     pub(in crate::lock_order) struct Assumed;
 
     #[derive(Debug, Clone, Copy)]
-    pub(in crate::lock_order) struct Waiting;
+    pub(in crate::lock_order) struct HeldLocks;
 
-    impl Waiting {
+    impl HeldLocks {
         #[inline]
-        pub(in crate::lock_order) fn here() -> Self {
+        pub(in crate::lock_order) fn of_current_thread() -> Self {
             Self
         }
 

@@ -15,7 +15,7 @@ mod tests;
 use std::ops::{Deref, DerefMut};
 use std::sync::{MutexGuard, PoisonError, RwLockReadGuard, RwLockWriteGuard};
 
-use held::{Held, Place};
+use held::{HeldLock, LockPlace};
 
 pub(crate) use rank::Rank;
 
@@ -23,24 +23,24 @@ pub(crate) use rank::Rank;
 #[derive(Debug)]
 pub(crate) struct Mutex<T> {
     inner: std::sync::Mutex<T>,
-    place: Place,
+    rank: LockPlace,
 }
 
 /// Access to what a [`Mutex`] holds.
 pub(crate) struct Guard<'a, T> {
     inner: MutexGuard<'a, T>,
-    _held: Held,
+    _held: HeldLock,
 }
 
 impl<T> Mutex<T> {
     pub(crate) const fn new(rank: Rank, value: T) -> Self {
-        Self { inner: std::sync::Mutex::new(value), place: Place::new(rank) }
+        Self { inner: std::sync::Mutex::new(value), rank: LockPlace::new(rank) }
     }
 
     /// Waits for the lock.
     #[inline]
     pub(crate) fn lock(&self) -> Guard<'_, T> {
-        let _held = Held::new(self.place);
+        let _held = HeldLock::new(self.rank);
         Guard { inner: self.inner.lock().unwrap_or_else(PoisonError::into_inner), _held }
     }
 
@@ -71,37 +71,37 @@ impl<T> DerefMut for Guard<'_, T> {
 #[derive(Debug)]
 pub(crate) struct RwLock<T> {
     inner: std::sync::RwLock<T>,
-    place: Place,
+    rank: LockPlace,
 }
 
 /// Shared access to what an [`RwLock`] holds.
 pub(crate) struct ReadGuard<'a, T> {
     inner: RwLockReadGuard<'a, T>,
-    _held: Held,
+    _held: HeldLock,
 }
 
 /// Access to what an [`RwLock`] holds.
 pub(crate) struct WriteGuard<'a, T> {
     inner: RwLockWriteGuard<'a, T>,
-    _held: Held,
+    _held: HeldLock,
 }
 
 impl<T> RwLock<T> {
     pub(crate) const fn new(rank: Rank, value: T) -> Self {
-        Self { inner: std::sync::RwLock::new(value), place: Place::new(rank) }
+        Self { inner: std::sync::RwLock::new(value), rank: LockPlace::new(rank) }
     }
 
     /// Waits until nobody writes.
     #[inline]
     pub(crate) fn read(&self) -> ReadGuard<'_, T> {
-        let _held = Held::new(self.place);
+        let _held = HeldLock::new(self.rank);
         ReadGuard { inner: self.inner.read().unwrap_or_else(PoisonError::into_inner), _held }
     }
 
     /// Waits until nobody reads or writes.
     #[inline]
     pub(crate) fn write(&self) -> WriteGuard<'_, T> {
-        let _held = Held::new(self.place);
+        let _held = HeldLock::new(self.rank);
         WriteGuard { inner: self.inner.write().unwrap_or_else(PoisonError::into_inner), _held }
     }
 }
@@ -133,18 +133,18 @@ impl<T> DerefMut for WriteGuard<'_, T> {
 
 /// What a thread holds while it waits for threads that work for it: locks that these must not wait for.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Waiting(held::Waiting);
+pub(crate) struct HeldLocks(held::HeldLocks);
 
-impl Waiting {
+impl HeldLocks {
     /// Of this thread.
     #[inline]
-    pub(crate) fn here() -> Self {
-        Self(held::Waiting::here())
+    pub(crate) fn of_current_thread() -> Self {
+        Self(held::HeldLocks::of_current_thread())
     }
 
     /// Works for the one who waits.
     #[inline]
-    pub(crate) fn work<R>(self, work: impl FnOnce() -> R) -> R {
+    pub(crate) fn run_with<R>(self, work: impl FnOnce() -> R) -> R {
         let _assumed = self.0.assume();
         work()
     }
@@ -160,5 +160,5 @@ const _: () = {
     assert!(size_of::<Guard<'_, u64>>() == size_of::<MutexGuard<'_, u64>>());
     assert!(size_of::<ReadGuard<'_, u64>>() == size_of::<RwLockReadGuard<'_, u64>>());
     assert!(size_of::<WriteGuard<'_, u64>>() == size_of::<RwLockWriteGuard<'_, u64>>());
-    assert!(size_of::<Waiting>() == 0 && !needs_drop::<Held>() && !needs_drop::<Waiting>());
+    assert!(size_of::<HeldLocks>() == 0 && !needs_drop::<HeldLock>() && !needs_drop::<HeldLocks>());
 };

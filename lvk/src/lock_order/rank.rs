@@ -44,7 +44,7 @@ pub(crate) enum Rank {
     /// The views of a texture.
     Views,
     /// Which queries of a pool are written.
-    QueryMarks,
+    QueryResetState,
     /// The bytes of a mapped buffer.
     BufferBytes,
     /// A pipeline of the library's own, which is made under the lock.
@@ -58,7 +58,7 @@ pub(crate) enum Rank {
     /// Notes that no command buffer has.
     SpareNotes,
     /// What the device allows for images.
-    ImageLimits,
+    ImageLimitCache,
     /// Who has which bindless slot, where indices are checked.
     SlotOwners,
     /// Work that threads share.
@@ -68,7 +68,7 @@ pub(crate) enum Rank {
     /// Device memory.
     Memory,
     /// Devices that come and go, beside ray tracing pipelines that do: of a driver that locks up over them.
-    DeviceChanges,
+    DeviceLifetime,
     /// Messages of the validation layer, which come while Vulkan is called: under any other lock.
     ValidationMessages,
 }
@@ -94,19 +94,19 @@ impl Rank {
         Self::GatheredInputs,
         Self::FreedTlas,
         Self::Views,
-        Self::QueryMarks,
+        Self::QueryResetState,
         Self::BufferBytes,
         Self::Kernels,
         Self::PipelineCacheFile,
         Self::ShaderCacheFolder,
         Self::Profiler,
         Self::SpareNotes,
-        Self::ImageLimits,
+        Self::ImageLimitCache,
         Self::SlotOwners,
         Self::SharedWork,
         Self::Queue,
         Self::Memory,
-        Self::DeviceChanges,
+        Self::DeviceLifetime,
         Self::ValidationMessages,
     ];
 

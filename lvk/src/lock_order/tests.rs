@@ -25,7 +25,7 @@ struct Locks {
 }
 
 /// Whichever guard there is.
-enum Taken<'a> {
+enum TakenLock<'a> {
     Lock { _guard: Guard<'a, ()> },
     Read { _guard: ReadGuard<'a, ()> },
     Write { _guard: WriteGuard<'a, ()> },
@@ -36,11 +36,11 @@ impl Locks {
         Self { mutex: Mutex::new(rank, ()), shared: RwLock::new(rank, ()) }
     }
 
-    fn take(&self, way: Way) -> Taken<'_> {
+    fn take(&self, way: Way) -> TakenLock<'_> {
         match way {
-            Way::Lock => Taken::Lock { _guard: self.mutex.lock() },
-            Way::Read => Taken::Read { _guard: self.shared.read() },
-            Way::Write => Taken::Write { _guard: self.shared.write() },
+            Way::Lock => TakenLock::Lock { _guard: self.mutex.lock() },
+            Way::Read => TakenLock::Read { _guard: self.shared.read() },
+            Way::Write => TakenLock::Write { _guard: self.shared.write() },
         }
     }
 }
@@ -126,14 +126,14 @@ fn a_thread_that_panicked_leaves_its_locks_open() {
 fn threads_that_work_for_another_do_not_take_what_it_holds() {
     let (store, memory) = (Locks::new(Rank::Store), Locks::new(Rank::ValidationMessages));
     let _held = store.take(Way::Read);
-    let waiting = Waiting::here();
+    let waiting = HeldLocks::of_current_thread();
     let other =
         |work: &(dyn Fn() + Sync)| std::thread::scope(|scope| scope.spawn(|| panics(work)).join().unwrap());
     assert!(!other(&|| drop(store.take(Way::Read))), "what is not waited for is free");
-    assert!(other(&|| waiting.work(|| drop(store.take(Way::Read)))));
-    assert!(!other(&|| waiting.work(|| drop(memory.take(Way::Lock)))));
+    assert!(other(&|| waiting.run_with(|| drop(store.take(Way::Read)))));
+    assert!(!other(&|| waiting.run_with(|| drop(memory.take(Way::Lock)))));
     assert!(!other(&|| {
-        waiting.work(|| {});
+        waiting.run_with(|| {});
         drop(store.take(Way::Read));
     }));
 }
@@ -156,13 +156,13 @@ fn locks_are_free_of_the_check_where_a_thread_ends() {
 }
 
 /// One step of a made-up thread: which lock it takes, and how.
-type Step = (usize, Way);
+type LockStep = (usize, Way);
 
 /// What each thread is still to take and has. A writer that waits keeps readers out, as real locks may.
 struct Threads {
-    wanted: Vec<Vec<Step>>,
-    held: Vec<Vec<Step>>,
-    waiting: Vec<Option<Step>>,
+    wanted: Vec<Vec<LockStep>>,
+    held: Vec<Vec<LockStep>>,
+    waiting: Vec<Option<LockStep>>,
 }
 
 impl Threads {
@@ -182,7 +182,7 @@ impl Threads {
         true
     }
 
-    fn is_free(&self, thread: usize, (lock, way): Step) -> bool {
+    fn is_free(&self, thread: usize, (lock, way): LockStep) -> bool {
         let taken = self.held.iter().flatten().filter(|(other, _)| *other == lock);
         let mut queue = self.waiting.iter().enumerate().filter(|(other, _)| *other != thread);
         match way {
@@ -200,18 +200,18 @@ impl Threads {
 }
 
 /// Whether the check lets a thread take all these, one under the other.
-fn is_allowed(list: &[Step]) -> bool {
+fn is_allowed(list: &[LockStep]) -> bool {
     let mut held = Ranks::NONE;
     list.iter().all(|(place, _)| {
         let rank = Rank::ALL[*place];
         let may = held.may_take(rank);
-        held = held.and(Ranks::of(rank));
+        held = held.union(Ranks::from_rank(rank));
         may
     })
 }
 
 /// Lists in which most pairs are in order, as those of random places hardly ever are.
-fn lists() -> impl Strategy<Value = Vec<Vec<Step>>> {
+fn lists() -> impl Strategy<Value = Vec<Vec<LockStep>>> {
     let way = prop::sample::select(&WAYS[..]);
     let step = (0..Rank::ALL.len(), way);
     let list = (prop::collection::vec(step, 0..6), prop::bool::weighted(0.9));

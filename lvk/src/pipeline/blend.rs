@@ -73,7 +73,7 @@ impl BlendFactor {
         }
     }
 
-    fn is_second(self) -> bool {
+    fn is_src1(self) -> bool {
         matches!(self, Self::Src1Color | Self::OneMinusSrc1Color | Self::Src1Alpha | Self::OneMinusSrc1Alpha)
     }
 
@@ -160,12 +160,12 @@ impl Blend {
     }
 
     /// Whether the fragment shader's second output counts.
-    pub(super) fn takes_second(self) -> bool {
-        self.factors().into_iter().any(BlendFactor::is_second)
+    pub(super) fn is_dual_source(self) -> bool {
+        self.factors().into_iter().any(BlendFactor::is_src1)
     }
 
     /// Whether the pass's constants count.
-    pub(super) fn takes_constants(self) -> bool {
+    pub(super) fn uses_constants(self) -> bool {
         self.factors().into_iter().any(BlendFactor::is_constant)
     }
 }
@@ -223,10 +223,10 @@ mod tests {
     fn what_a_factor_takes_is_known_wherever_it_stands() {
         let sum = BlendComponent::sum;
         let (one, second, constant) = (BlendFactor::One, BlendFactor::Src1Alpha, BlendFactor::ConstantColor);
-        assert!(!Blend::ALPHA.takes_second() && !Blend::ADDITIVE.takes_constants());
+        assert!(!Blend::ALPHA.is_dual_source() && !Blend::ADDITIVE.uses_constants());
         let alpha = Blend { alpha: sum(one, second), ..Blend::ALPHA };
-        assert!(alpha.takes_second() && !alpha.takes_constants());
+        assert!(alpha.is_dual_source() && !alpha.uses_constants());
         let color = Blend { color: sum(constant, one), ..Blend::ALPHA };
-        assert!(color.takes_constants() && !color.takes_second());
+        assert!(color.uses_constants() && !color.is_dual_source());
     }
 }

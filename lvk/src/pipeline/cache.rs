@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::cache_file::{CacheOwner, seal, unseal};
+use super::cache_file::{CacheOwner, decode_file, encode_file};
 use crate::cache_file::{MOST_BYTES, checksum, read, replace};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -27,9 +27,9 @@ pub(crate) struct PipelineCache {
 impl PipelineCache {
     /// Starts from the file. Where there is none, or it cannot be used, starts empty and says so to the `log` crate.
     pub(crate) fn new(gpu: &Arc<Gpu>, path: &Path) -> Result<Self> {
-        let owner = owner(gpu);
-        let file = load(path);
-        let data = file.as_deref().and_then(|file| match unseal(&owner, file) {
+        let owner = cache_owner(gpu);
+        let file = read_file(path);
+        let data = file.as_deref().and_then(|file| match decode_file(&owner, file) {
             Ok(data) => Some(data),
             Err(refusal) => {
                 log::warn!("the pipeline cache '{}' is dropped: {refusal}", path.display());
@@ -64,7 +64,7 @@ impl PipelineCache {
         if !always && *on_disk == Some(sum) && self.path.exists() {
             return Ok(());
         }
-        replace(&self.path, &seal(&self.owner, &data)).map_err(|error| Error::File {
+        replace(&self.path, &encode_file(&self.owner, &data)).map_err(|error| Error::File {
             path: self.path.clone(),
             message: format!("the pipeline cache cannot be written: {error}"),
         })?;
@@ -84,7 +84,7 @@ impl Drop for PipelineCache {
 }
 
 /// The bytes of the file, if it can be read. A first run has none.
-fn load(path: &Path) -> Option<Vec<u8>> {
+fn read_file(path: &Path) -> Option<Vec<u8>> {
     let error = match read(path, MOST_BYTES) {
         Ok(file) => return Some(file),
         Err(error) => error,
@@ -100,24 +100,24 @@ fn load(path: &Path) -> Option<Vec<u8>> {
 
 /// A cache that starts from `data`, or empty where the driver does not take it.
 fn create_from<'a>(gpu: &Gpu, path: &Path, data: &'a [u8]) -> Result<(vk::PipelineCache, &'a [u8])> {
-    match create(gpu, data) {
+    match create_cache(gpu, data) {
         Ok(raw) => Ok((raw, data)),
         Err(result) if data.is_empty() => Err(Error::vulkan("vkCreatePipelineCache")(result)),
         Err(result) => {
             log::warn!("the pipeline cache '{}' is dropped: the driver answers {result}", path.display());
-            let raw = create(gpu, &[]).map_err(Error::vulkan("vkCreatePipelineCache"))?;
+            let raw = create_cache(gpu, &[]).map_err(Error::vulkan("vkCreatePipelineCache"))?;
             Ok((raw, &[]))
         }
     }
 }
 
-fn create(gpu: &Gpu, data: &[u8]) -> Result<vk::PipelineCache, vk::Result> {
+fn create_cache(gpu: &Gpu, data: &[u8]) -> Result<vk::PipelineCache, vk::Result> {
     let info = vk::PipelineCacheCreateInfo::default().initial_data(data);
     // SAFETY: the data is empty, or was written by this driver for this device.
     unsafe { gpu.device.create_pipeline_cache(&info, None) }
 }
 
-fn owner(gpu: &Gpu) -> CacheOwner {
+fn cache_owner(gpu: &Gpu) -> CacheOwner {
     let mut ids = vk::PhysicalDeviceIDProperties::default();
     let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut ids);
     // SAFETY: the physical device belongs to the instance.

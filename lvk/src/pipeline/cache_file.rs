@@ -15,7 +15,7 @@ pub(crate) struct CacheOwner {
 
 /// Why a file is not used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum Refusal {
+pub(crate) enum CacheRejection {
     #[error("it is no pipeline cache")]
     NoCache,
     #[error("it was written by another version of the library")]
@@ -38,7 +38,7 @@ const VULKAN_HEADER_BYTES: usize = 32;
 const VULKAN_HEADER_VERSION: u32 = 1;
 
 /// The file for Vulkan's `data`.
-pub(crate) fn seal(owner: &CacheOwner, data: &[u8]) -> Vec<u8> {
+pub(crate) fn encode_file(owner: &CacheOwner, data: &[u8]) -> Vec<u8> {
     let mut file = Vec::with_capacity(HEADER_BYTES + data.len());
     file.extend(MAGIC);
     file.extend(FORMAT.to_le_bytes());
@@ -52,43 +52,46 @@ pub(crate) fn seal(owner: &CacheOwner, data: &[u8]) -> Vec<u8> {
 }
 
 /// Vulkan's data in a file that is whole and was written by `owner`.
-pub(crate) fn unseal<'a>(owner: &CacheOwner, file: &'a [u8]) -> Result<&'a [u8], Refusal> {
+pub(crate) fn decode_file<'a>(owner: &CacheOwner, file: &'a [u8]) -> Result<&'a [u8], CacheRejection> {
     if !file.starts_with(&MAGIC) {
-        return Err(Refusal::NoCache);
+        return Err(CacheRejection::NoCache);
     }
     if file.len() < HEADER_BYTES {
-        return Err(Refusal::Damaged);
+        return Err(CacheRejection::Damaged);
     }
     let (header, data) = file.split_at(HEADER_BYTES);
-    if word(header, 8) != Some(FORMAT) {
-        return Err(Refusal::OtherFormat);
+    if read_word(header, 8) != Some(FORMAT) {
+        return Err(CacheRejection::OtherFormat);
     }
     let (covered, sum) = header.split_at(CHECKSUM_AT);
     if covered[32..] != (data.len() as u64).to_le_bytes() || *sum != checksum(&[covered, data]).to_le_bytes()
     {
-        return Err(Refusal::Damaged);
+        return Err(CacheRejection::Damaged);
     }
-    if word(header, 12) != Some(owner.driver_version) || header[16..32] != owner.driver_uuid {
-        return Err(Refusal::OtherDriver);
+    if read_word(header, 12) != Some(owner.driver_version) || header[16..32] != owner.driver_uuid {
+        return Err(CacheRejection::OtherDriver);
     }
     check_vulkan_header(owner, data)?;
     Ok(data)
 }
 
 /// Fails unless the driver would take the data. It has to ignore foreign data by itself; not every driver does.
-fn check_vulkan_header(owner: &CacheOwner, data: &[u8]) -> Result<(), Refusal> {
-    let Some(header) = data.get(..VULKAN_HEADER_BYTES) else { return Err(Refusal::Damaged) };
-    let length = word(header, 0).map_or(0, |length| length as usize);
-    if length < VULKAN_HEADER_BYTES || length > data.len() || word(header, 4) != Some(VULKAN_HEADER_VERSION) {
-        return Err(Refusal::Damaged);
+fn check_vulkan_header(owner: &CacheOwner, data: &[u8]) -> Result<(), CacheRejection> {
+    let Some(header) = data.get(..VULKAN_HEADER_BYTES) else { return Err(CacheRejection::Damaged) };
+    let length = read_word(header, 0).map_or(0, |length| length as usize);
+    if length < VULKAN_HEADER_BYTES
+        || length > data.len()
+        || read_word(header, 4) != Some(VULKAN_HEADER_VERSION)
+    {
+        return Err(CacheRejection::Damaged);
     }
-    let same = word(header, 8) == Some(owner.vendor)
-        && word(header, 12) == Some(owner.device)
+    let same = read_word(header, 8) == Some(owner.vendor)
+        && read_word(header, 12) == Some(owner.device)
         && header[16..32] == owner.cache_uuid;
-    if same { Ok(()) } else { Err(Refusal::OtherDevice) }
+    if same { Ok(()) } else { Err(CacheRejection::OtherDevice) }
 }
 
-fn word(bytes: &[u8], at: usize) -> Option<u32> {
+fn read_word(bytes: &[u8], at: usize) -> Option<u32> {
     let word = bytes.get(at..at + 4)?;
     Some(u32::from_le_bytes(word.try_into().ok()?))
 }
@@ -118,18 +121,18 @@ mod tests {
         #[test]
         fn what_was_sealed_is_found_again(body in prop::collection::vec(any::<u8>(), 0..300)) {
             let data = data_of(&OWNER, &body);
-            let file = seal(&OWNER, &data);
-            prop_assert_eq!(unseal(&OWNER, &file), Ok(&data[..]));
+            let file = encode_file(&OWNER, &data);
+            prop_assert_eq!(decode_file(&OWNER, &file), Ok(&data[..]));
         }
 
         #[test]
         fn every_change_of_a_bit_is_seen(
             body in prop::collection::vec(any::<u8>(), 0..100), at in any::<prop::sample::Index>(), bit in 0..8_u32
         ) {
-            let mut file = seal(&OWNER, &data_of(&OWNER, &body));
+            let mut file = encode_file(&OWNER, &data_of(&OWNER, &body));
             let at = at.index(file.len());
             file[at] ^= 1 << bit;
-            prop_assert!(unseal(&OWNER, &file).is_err());
+            prop_assert!(decode_file(&OWNER, &file).is_err());
         }
 
         #[test]
@@ -137,10 +140,10 @@ mod tests {
             body in prop::collection::vec(any::<u8>(), 0..100),
             more in prop::collection::vec(any::<u8>(), 1..50), cut in any::<prop::sample::Index>()
         ) {
-            let file = seal(&OWNER, &data_of(&OWNER, &body));
-            prop_assert!(unseal(&OWNER, &file[..cut.index(file.len())]).is_err());
+            let file = encode_file(&OWNER, &data_of(&OWNER, &body));
+            prop_assert!(decode_file(&OWNER, &file[..cut.index(file.len())]).is_err());
             let longer = [&file[..], &more].concat();
-            prop_assert_eq!(unseal(&OWNER, &longer), Err(Refusal::Damaged));
+            prop_assert_eq!(decode_file(&OWNER, &longer), Err(CacheRejection::Damaged));
         }
 
         #[test]
@@ -148,32 +151,32 @@ mod tests {
             if named {
                 bytes.splice(0..0, [&MAGIC[..], &FORMAT.to_le_bytes()].concat());
             }
-            prop_assert!(unseal(&OWNER, &bytes).is_err());
+            prop_assert!(decode_file(&OWNER, &bytes).is_err());
         }
 
         #[test]
         fn random_data_of_the_driver_is_refused(data in prop::collection::vec(any::<u8>(), 0..100)) {
-            prop_assert!(unseal(&OWNER, &seal(&OWNER, &data)).is_err());
+            prop_assert!(decode_file(&OWNER, &encode_file(&OWNER, &data)).is_err());
         }
     }
 
     #[test]
     fn another_device_or_driver_is_named() {
-        let file = seal(&OWNER, &data_of(&OWNER, &[1; 40]));
+        let file = encode_file(&OWNER, &data_of(&OWNER, &[1; 40]));
         let others = [
-            (CacheOwner { vendor: 1, ..OWNER }, Refusal::OtherDevice),
-            (CacheOwner { device: 1, ..OWNER }, Refusal::OtherDevice),
-            (CacheOwner { cache_uuid: [1; 16], ..OWNER }, Refusal::OtherDevice),
-            (CacheOwner { driver_version: 1, ..OWNER }, Refusal::OtherDriver),
-            (CacheOwner { driver_uuid: [1; 16], ..OWNER }, Refusal::OtherDriver),
+            (CacheOwner { vendor: 1, ..OWNER }, CacheRejection::OtherDevice),
+            (CacheOwner { device: 1, ..OWNER }, CacheRejection::OtherDevice),
+            (CacheOwner { cache_uuid: [1; 16], ..OWNER }, CacheRejection::OtherDevice),
+            (CacheOwner { driver_version: 1, ..OWNER }, CacheRejection::OtherDriver),
+            (CacheOwner { driver_uuid: [1; 16], ..OWNER }, CacheRejection::OtherDriver),
         ];
         for (owner, refusal) in others {
-            assert_eq!(unseal(&owner, &file), Err(refusal), "{owner:?}");
+            assert_eq!(decode_file(&owner, &file), Err(refusal), "{owner:?}");
         }
-        assert_eq!(unseal(&OWNER, b"\x7fELF and so on"), Err(Refusal::NoCache));
+        assert_eq!(decode_file(&OWNER, b"\x7fELF and so on"), Err(CacheRejection::NoCache));
         let mut newer = file;
         newer[8] = 2;
-        assert_eq!(unseal(&OWNER, &newer), Err(Refusal::OtherFormat));
+        assert_eq!(decode_file(&OWNER, &newer), Err(CacheRejection::OtherFormat));
     }
 
     #[test]
@@ -181,7 +184,7 @@ mod tests {
         for length in [0_u32, 31, 73, u32::MAX] {
             let mut data = data_of(&OWNER, &[1; 40]);
             data[..4].copy_from_slice(&length.to_le_bytes());
-            assert_eq!(unseal(&OWNER, &seal(&OWNER, &data)), Err(Refusal::Damaged));
+            assert_eq!(decode_file(&OWNER, &encode_file(&OWNER, &data)), Err(CacheRejection::Damaged));
         }
     }
 }

@@ -6,9 +6,9 @@ use ash::vk;
 
 use super::pipeline_layout::PipelineBase;
 use super::shader_module::ShaderModule;
-use super::stage::{Specialization, SpecializationConstant, stage};
-use super::workgroup_memory::{MemoryLimits, check_group_memory};
-use super::workgroup_size::{GroupLimits, check_group_size};
+use super::stage::{Specialization, SpecializationConstant, stage_info};
+use super::workgroup_memory::{WorkgroupMemoryLimits, check_workgroup_memory};
+use super::workgroup_size::{WorkgroupLimits, check_workgroup_size};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::handle::ShaderModuleHandle;
@@ -50,15 +50,17 @@ impl ComputePipeline {
         module.check_stage(ShaderStage::Compute)?;
         let name = desc.debug_name;
         let limits = &gpu.caps.limits;
-        let largest = GroupLimits { size: limits.max_group_size, invocations: limits.max_group_invocations };
-        check_group_size(name, module, desc.specialization, &largest)?;
+        let largest =
+            WorkgroupLimits { size: limits.max_group_size, invocations: limits.max_group_invocations };
+        check_workgroup_size(name, module, desc.specialization, &largest)?;
         let shared = limits.max_shared_bytes;
-        let most = MemoryLimits { shared, payload: 0, together: shared };
-        check_group_memory(name, module, desc.specialization, &most)?;
+        let most = WorkgroupMemoryLimits { shared, payload: 0, together: shared };
+        check_workgroup_memory(name, module, desc.specialization, &most)?;
         let constants = Specialization::new(name, desc.specialization, std::iter::once(module))?;
         let constants = constants.info();
-        let info =
-            vk::ComputePipelineCreateInfo::default().layout(base.layout).stage(stage(module, &constants));
+        let info = vk::ComputePipelineCreateInfo::default()
+            .layout(base.layout)
+            .stage(stage_info(module, &constants));
         // SAFETY: the module and the layout are alive and fit each other.
         let made = unsafe { gpu.device.create_compute_pipelines(base.cache, &[info], None) };
         let raw = made.map_err(|(_, result)| Error::vulkan("vkCreateComputePipelines")(result))?[0];

@@ -7,7 +7,7 @@ use ash::vk;
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::start::driver_workarounds::beside_devices;
+use crate::gpu::start::driver_workarounds::with_shared_device_lock;
 use crate::parallel::{cores, run_on};
 
 /// Creates the pipeline (`vkCreateRayTracingPipelinesKHR`), with as many threads as the driver and the machine have
@@ -21,16 +21,16 @@ pub(crate) unsafe fn compile(
     info: &vk::RayTracingPipelineCreateInfoKHR<'_>,
 ) -> Result<vk::Pipeline> {
     // NVIDIA's driver 580 crashes after deferring what has nothing to compile, only libraries to link.
-    let operation = if info.stage_count > 0 { Some(Operation::new(gpu)?) } else { None };
+    let operation = if info.stage_count > 0 { Some(DeferredOperation::new(gpu)?) } else { None };
     let deferred = operation.as_ref().map_or(vk::DeferredOperationKHR::null(), |operation| operation.raw);
-    let ext = gpu.ray_tracing()?;
+    let ext = gpu.ray_tracing_functions()?;
     let create = ext.fp().create_ray_tracing_pipelines_khr;
     let mut raw = vk::Pipeline::null();
     // SAFETY: the caller vouches for the description. It and `raw` stay where they are until the driver is done with
     // them, since `finish` returns no sooner.
     let mut start =
         || unsafe { create(ext.device(), deferred, cache, 1, info, std::ptr::null(), &raw mut raw) };
-    let result = beside_devices(gpu.caps.driver_id, || match (start(), &operation) {
+    let result = with_shared_device_lock(gpu.caps.driver_id, || match (start(), &operation) {
         (vk::Result::OPERATION_DEFERRED_KHR, Some(operation)) => operation.finish(),
         (vk::Result::OPERATION_NOT_DEFERRED_KHR, _) => vk::Result::SUCCESS,
         (result, _) => result,
@@ -40,12 +40,12 @@ pub(crate) unsafe fn compile(
 }
 
 /// A deferred operation, destroyed on drop. What was deferred to it must be finished by then.
-struct Operation {
+struct DeferredOperation {
     raw: vk::DeferredOperationKHR,
     ext: Device,
 }
 
-impl Operation {
+impl DeferredOperation {
     fn new(gpu: &Gpu) -> Result<Self> {
         let ext = Device::new(&gpu.instance.raw, &gpu.device);
         // SAFETY: the extension is on wherever ray tracing is.
@@ -60,24 +60,24 @@ impl Operation {
         let useful = unsafe { self.ext.get_deferred_operation_max_concurrency(self.raw) };
         let join = || {
             // SAFETY: as above; any number of threads may join.
-            code(unsafe { self.ext.deferred_operation_join(self.raw) })
+            result_code(unsafe { self.ext.deferred_operation_join(self.raw) })
         };
         let result = || {
             // SAFETY: as above.
-            code(unsafe { self.ext.get_deferred_operation_result(self.raw) })
+            result_code(unsafe { self.ext.get_deferred_operation_result(self.raw) })
         };
-        complete(cores().min(useful as usize), &join, &result)
+        join_with_threads(cores().min(useful as usize), &join, &result)
     }
 }
 
-impl Drop for Operation {
+impl Drop for DeferredOperation {
     fn drop(&mut self) {
         // SAFETY: nothing was deferred, or `finish` has seen its end.
         unsafe { self.ext.destroy_deferred_operation(self.raw, None) };
     }
 }
 
-fn code(outcome: Result<(), vk::Result>) -> vk::Result {
+fn result_code(outcome: Result<(), vk::Result>) -> vk::Result {
     outcome.err().unwrap_or(vk::Result::SUCCESS)
 }
 
@@ -85,15 +85,15 @@ fn code(outcome: Result<(), vk::Result>) -> vk::Result {
 ///
 /// A thread that cannot be started is done without. A join that fails, for lack of memory, is tried again: the driver
 /// still holds what the operation was given, so there is no way back before its end.
-fn complete(
+fn join_with_threads(
     threads: usize,
     join: &(impl Fn() -> vk::Result + Sync),
     result: &impl Fn() -> vk::Result,
 ) -> vk::Result {
-    run_on(threads, || work(join));
+    run_on(threads, || join_until_done(join));
     loop {
         match result() {
-            vk::Result::NOT_READY => work(join),
+            vk::Result::NOT_READY => join_until_done(join),
             result => return result,
         }
         thread::yield_now();
@@ -101,7 +101,7 @@ fn complete(
 }
 
 /// Works on an operation until nothing is left for this thread.
-fn work(join: &impl Fn() -> vk::Result) {
+fn join_until_done(join: &impl Fn() -> vk::Result) {
     while join() == vk::Result::THREAD_IDLE_KHR {
         thread::yield_now();
     }
@@ -160,7 +160,7 @@ mod tests {
         }
 
         fn run(&self, threads: usize) -> vk::Result {
-            complete(threads, &|| self.join(), &|| self.result())
+            join_with_threads(threads, &|| self.join(), &|| self.result())
         }
     }
 

@@ -18,7 +18,7 @@ pub struct DepthTest {
 
 impl DepthTest {
     /// The part that a pass may replace.
-    pub(crate) fn state(&self) -> DepthState {
+    pub(crate) fn dynamic_state(&self) -> DepthState {
         DepthState { compare: self.compare, write: self.write }
     }
 }

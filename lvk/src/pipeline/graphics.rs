@@ -6,16 +6,16 @@ use ash::vk;
 
 use super::blend::{Blend, ColorWriteMask, blend_state};
 use super::depth_stencil::{DepthState, DepthTest, depth_stencil_state};
-use super::graphics_check::{check, check_stages};
+use super::graphics_check::{check_modules, check_stages};
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute};
-use super::local_read::{InputIndices, reads, writes, writes_color};
+use super::local_read::{InputIndices, inputs_read, inputs_written, writes_color};
 use super::pipeline_layout::PipelineBase;
 use super::rasterization::{DepthBias, multisampling, rasterization};
-use super::rendering_formats::PassShape;
+use super::rendering_formats::RenderingFormats;
 use super::shader_module::ShaderModule;
-use super::stage::{Specialization, stage};
+use super::stage::{Specialization, stage_info};
 use crate::barrier::Stages;
-use crate::bindless::input_attachments::InputMask;
+use crate::bindless::input_attachments::InputAttachmentMask;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::caps::optional_features::OptionalFeature;
@@ -35,7 +35,7 @@ pub(super) struct RenderModules {
 }
 
 impl RenderModules {
-    fn find(desc: &RenderPipelineDesc<'_>, find: FindModule<'_>) -> Result<Self> {
+    fn resolve(desc: &RenderPipelineDesc<'_>, find: FindModule<'_>) -> Result<Self> {
         let find = |handle: Option<ShaderModuleHandle>| handle.map(find).transpose();
         Ok(Self {
             vertex: find(desc.vertex)?,
@@ -93,13 +93,13 @@ pub(crate) struct PassState {
 }
 
 impl PassState {
-    fn of(desc: &RenderPipelineDesc<'_>) -> Self {
+    fn from_desc(desc: &RenderPipelineDesc<'_>) -> Self {
         let blends = desc.color.iter().filter_map(|target| target.blend);
         Self {
-            depth: desc.depth.map(|depth| depth.state()),
+            depth: desc.depth.map(|depth| depth.dynamic_state()),
             bias: desc.depth_bias,
             stencil: desc.stencil.is_some(),
-            blend_constants: blends.into_iter().any(Blend::takes_constants),
+            blend_constants: blends.into_iter().any(Blend::uses_constants),
             shading_rate: desc.shading_rate,
         }
     }
@@ -128,15 +128,15 @@ pub(crate) struct RenderPipeline {
     /// Stages in which rays are queried.
     pub(crate) query_stages: Stages,
     pub(crate) front_end: FrontEnd,
-    pub(crate) shape: PassShape,
+    pub(crate) shape: RenderingFormats,
     pub(crate) pass_state: PassState,
     /// Stencil values may change.
     pub(crate) writes_stencil: bool,
     pub(crate) vertex_binding_count: u32,
     /// Targets that the fragment shader reads.
-    pub(crate) reads: InputMask,
+    pub(crate) reads: InputAttachmentMask,
     /// Targets that draws may change.
-    pub(crate) writes: InputMask,
+    pub(crate) writes: InputAttachmentMask,
     pub(crate) name: Arc<str>,
     gpu: Arc<Gpu>,
 }
@@ -149,9 +149,9 @@ impl RenderPipeline {
         find: FindModule<'_>,
     ) -> Result<Self> {
         check_stages(gpu, desc)?;
-        let modules = RenderModules::find(desc, find)?;
-        check(gpu, desc, &modules)?;
-        let raw = create(gpu, base, desc, &modules)?;
+        let modules = RenderModules::resolve(desc, find)?;
+        check_modules(gpu, desc, &modules)?;
+        let raw = create_pipeline(gpu, base, desc, &modules)?;
         gpu.name(raw, desc.debug_name);
         let push_constant_bytes = modules.iter().map(|m| m.reflection.push_constant_bytes).max();
         Ok(Self {
@@ -163,12 +163,12 @@ impl RenderPipeline {
                 (Some(_), None) => FrontEnd::Mesh,
                 (Some(_), Some(_)) => FrontEnd::TaskAndMesh,
             },
-            shape: desc.shape(),
-            pass_state: PassState::of(desc),
+            shape: desc.rendering_formats(),
+            pass_state: PassState::from_desc(desc),
             writes_stencil: desc.stencil.is_some_and(|test| test.writes()),
             vertex_binding_count: desc.vertex_bindings.len() as u32,
-            reads: reads(&modules),
-            writes: writes(desc, &modules),
+            reads: inputs_read(&modules),
+            writes: inputs_written(desc, &modules),
             name: desc.debug_name.into(),
             gpu: Arc::clone(gpu),
         })
@@ -182,7 +182,7 @@ impl Drop for RenderPipeline {
     }
 }
 
-fn create(
+fn create_pipeline(
     gpu: &Gpu,
     base: PipelineBase,
     desc: &RenderPipelineDesc<'_>,
@@ -190,7 +190,7 @@ fn create(
 ) -> Result<vk::Pipeline> {
     let constants = Specialization::new(desc.debug_name, desc.specialization, modules.iter())?;
     let constants = constants.info();
-    let stages: Vec<_> = modules.iter().map(|module| stage(module, &constants)).collect();
+    let stages: Vec<_> = modules.iter().map(|module| stage_info(module, &constants)).collect();
     let (bindings, attributes) = (vertex_bindings(desc), vertex_attributes(desc));
     let input = vk::PipelineVertexInputStateCreateInfo::default()
         .vertex_binding_descriptions(&bindings)
@@ -204,7 +204,7 @@ fn create(
     let depth = depth_stencil_state(desc.depth, desc.stencil);
     let blends = blend_states(desc, modules);
     let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
-    let dynamic = PassState::of(desc).dynamic_states();
+    let dynamic = PassState::from_desc(desc).dynamic_states();
     let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
     let colors: Vec<_> = desc.color.iter().map(|target| target.format.raw()).collect();
     let mut rendering = rendering_info(&colors, desc);
@@ -222,9 +222,9 @@ fn create(
         .color_blend_state(&blend)
         .dynamic_state(&dynamic)
         .layout(base.layout)
-        .flags(flags(gpu, desc))
+        .flags(create_flags(gpu, desc))
         .push_next(&mut rendering);
-    if !reads(modules).is_empty() {
+    if !inputs_read(modules).is_empty() {
         info = info.push_next(&mut indices);
     }
     // SAFETY: the modules and the layout are alive; everything `info` points to lives until the call returns.
@@ -233,7 +233,7 @@ fn create(
 }
 
 /// Pipelines with a rate draw in passes that have rates too.
-fn flags(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> vk::PipelineCreateFlags {
+fn create_flags(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> vk::PipelineCreateFlags {
     let rates = desc.shading_rate.is_some() && gpu.caps.has(OptionalFeature::AttachmentShadingRate);
     match rates {
         true => vk::PipelineCreateFlags::RENDERING_FRAGMENT_SHADING_RATE_ATTACHMENT_KHR,

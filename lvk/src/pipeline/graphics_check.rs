@@ -7,8 +7,8 @@ use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
 use super::local_read::check_inputs;
 use super::rasterization::Topology;
 use super::state_check::check_state;
-use super::workgroup_memory::{MemoryLimits, check_group_memory};
-use super::workgroup_size::{GroupLimits, check_group_size};
+use super::workgroup_memory::{WorkgroupMemoryLimits, check_workgroup_memory};
+use super::workgroup_size::{WorkgroupLimits, check_workgroup_size};
 use crate::error::{Error, Result, check_limit};
 use crate::format::Format;
 use crate::gpu::Gpu;
@@ -42,7 +42,7 @@ pub(super) fn check_stages(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<(
         _ => {
             let lacking = desc.mesh.is_some() && !gpu.caps.mesh_shader;
             return if lacking {
-                Err(gpu.lacks(&format!("pipeline '{name}': mesh shaders")))
+                Err(gpu.unsupported(&format!("pipeline '{name}': mesh shaders")))
             } else {
                 check_optional_stages(gpu, desc)
             };
@@ -68,7 +68,7 @@ fn check_optional_stages(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()>
 }
 
 /// Fails unless the modules are of their stages and everything fits the device.
-pub(super) fn check(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
+pub(super) fn check_modules(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
     let name = desc.debug_name;
     let stages = [
         (&modules.vertex, ShaderStage::Vertex),
@@ -123,14 +123,15 @@ fn check_depth(gpu: &Gpu, name: &str, format: Format) -> Result<()> {
 fn check_mesh(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
     let (name, limits) = (desc.debug_name, &gpu.caps.limits.mesh);
     if let Some(task) = &modules.task {
-        let most = GroupLimits { size: limits.max_task_group_size, invocations: limits.max_task_invocations };
-        check_group_size(name, task, desc.specialization, &most)?;
-        check_group_memory(name, task, desc.specialization, &task_memory(limits))?;
+        let most =
+            WorkgroupLimits { size: limits.max_task_group_size, invocations: limits.max_task_invocations };
+        check_workgroup_size(name, task, desc.specialization, &most)?;
+        check_workgroup_memory(name, task, desc.specialization, &task_memory(limits))?;
     }
     let Some(mesh) = &modules.mesh else { return Ok(()) };
-    let most = GroupLimits { size: limits.max_mesh_group_size, invocations: limits.max_mesh_invocations };
-    check_group_size(name, mesh, desc.specialization, &most)?;
-    check_group_memory(name, mesh, desc.specialization, &mesh_memory(limits))?;
+    let most = WorkgroupLimits { size: limits.max_mesh_group_size, invocations: limits.max_mesh_invocations };
+    check_workgroup_size(name, mesh, desc.specialization, &most)?;
+    check_workgroup_memory(name, mesh, desc.specialization, &mesh_memory(limits))?;
     let [vertices, primitives] = mesh.reflection.mesh_outputs;
     let most = limits.max_output_vertices;
     check_limit(name, "count of vertices of a mesh workgroup", vertices.into(), most.into())?;
@@ -138,8 +139,8 @@ fn check_mesh(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules)
     check_limit(name, "count of primitives of a mesh workgroup", primitives.into(), most.into())
 }
 
-fn task_memory(limits: &MeshLimits) -> MemoryLimits {
-    MemoryLimits {
+fn task_memory(limits: &MeshLimits) -> WorkgroupMemoryLimits {
+    WorkgroupMemoryLimits {
         shared: limits.max_task_shared_bytes,
         payload: limits.max_task_payload_bytes,
         together: limits.max_task_payload_and_shared_bytes,
@@ -147,8 +148,8 @@ fn task_memory(limits: &MeshLimits) -> MemoryLimits {
 }
 
 /// A mesh workgroup has the payload of its task workgroup.
-fn mesh_memory(limits: &MeshLimits) -> MemoryLimits {
-    MemoryLimits {
+fn mesh_memory(limits: &MeshLimits) -> WorkgroupMemoryLimits {
+    WorkgroupMemoryLimits {
         shared: limits.max_mesh_shared_bytes,
         payload: limits.max_task_payload_bytes,
         together: limits.max_mesh_payload_and_shared_bytes,

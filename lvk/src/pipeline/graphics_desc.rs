@@ -3,7 +3,7 @@
 use super::blend::{Blend, ColorWriteMask};
 use super::depth_stencil::{DepthTest, StencilTest};
 use super::rasterization::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
-use super::rendering_formats::PassShape;
+use super::rendering_formats::RenderingFormats;
 use super::stage::SpecializationConstant;
 use crate::format::{Format, VertexFormat};
 use crate::gpu::caps::shading_rate::ShadingRate;
@@ -129,9 +129,9 @@ pub struct RenderPipelineDesc<'a> {
 
 impl RenderPipelineDesc<'_> {
     /// What its passes have to be like.
-    pub(super) fn shape(&self) -> PassShape {
+    pub(super) fn rendering_formats(&self) -> RenderingFormats {
         let colors = self.color.iter().map(|target| target.format);
-        PassShape::new(colors, self.depth.map(|depth| depth.format), self.samples, self.view_mask)
+        RenderingFormats::new(colors, self.depth.map(|depth| depth.format), self.samples, self.view_mask)
     }
 }
 

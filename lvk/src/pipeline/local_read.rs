@@ -4,9 +4,9 @@ use ash::vk;
 
 use super::graphics::RenderModules;
 use super::graphics_desc::{ColorTarget, RenderPipelineDesc};
-use crate::bindless::input_attachments::{Input, InputMask};
+use crate::bindless::input_attachments::{InputAttachment, InputAttachmentMask};
 use crate::error::{Error, Result};
-use crate::format::{Format, Numbers};
+use crate::format::{Format, NumericFormat};
 use crate::shader::InputRead;
 
 /// Fails unless the pipeline has the targets that its fragment shader reads, as it reads them.
@@ -21,7 +21,7 @@ pub(super) fn check_inputs(desc: &RenderPipelineDesc<'_>, modules: &RenderModule
         writes_stencil: desc.stencil.is_some_and(|stencil| stencil.writes()),
     };
     fragment.reflection.input_reads.iter().try_for_each(|read| {
-        targets.check(read).map_err(|why| {
+        targets.check_read(read).map_err(|why| {
             let message = format!("its fragment shader '{}' reads {}, {why}", fragment.name, read.input);
             Error::usage(desc.debug_name, message)
         })
@@ -38,8 +38,8 @@ struct InputTargets<'a> {
 }
 
 impl InputTargets<'_> {
-    fn check(&self, read: &InputRead) -> Result<(), String> {
-        let numbers = self.numbers(read.input)?;
+    fn check_read(&self, read: &InputRead) -> Result<(), String> {
+        let numbers = self.numeric_format(read.input)?;
         if numbers != read.numbers {
             let (has, is) = (subpass_input(numbers), subpass_input(read.numbers));
             return Err(format!("which is a {has}, as a {is}"));
@@ -49,27 +49,27 @@ impl InputTargets<'_> {
             return Err(format!("which has {} samples a pixel: take a type {ending}", self.samples));
         }
         let written = match read.input {
-            Input::Color(_) => false,
-            Input::Depth => self.writes_depth,
-            Input::Stencil => self.writes_stencil,
+            InputAttachment::Color(_) => false,
+            InputAttachment::Depth => self.writes_depth,
+            InputAttachment::Stencil => self.writes_stencil,
         };
         if written { Err(READS_WRITTEN.to_owned()) } else { Ok(()) }
     }
 
     /// How shaders read the target.
-    fn numbers(&self, input: Input) -> Result<Numbers, String> {
+    fn numeric_format(&self, input: InputAttachment) -> Result<NumericFormat, String> {
         let lacking = |what: &str| format!("but it draws to {what}");
         let depth = self.depth.ok_or_else(|| lacking("no depth target"));
         match input {
-            Input::Color(target) => {
+            InputAttachment::Color(target) => {
                 let format = self.colors.get(target as usize);
                 let format =
                     format.ok_or_else(|| lacking(&format!("{} colour targets", self.colors.len())))?;
-                Ok(format.numbers())
+                Ok(format.numeric_format())
             }
-            Input::Depth => depth.map(|_| Numbers::Float),
-            Input::Stencil if depth?.has_stencil() => Ok(Numbers::Uint),
-            Input::Stencil => Err(lacking("a depth target without stencil")),
+            InputAttachment::Depth => depth.map(|_| NumericFormat::Float),
+            InputAttachment::Stencil if depth?.has_stencil() => Ok(NumericFormat::Uint),
+            InputAttachment::Stencil => Err(lacking("a depth target without stencil")),
         }
     }
 }
@@ -77,26 +77,26 @@ impl InputTargets<'_> {
 /// Depth tests run before or beside fragments, so that nobody could say what they read.
 pub(crate) const READS_WRITTEN: &str = "which the pipeline also writes; turn the writes off";
 
-fn subpass_input(numbers: Numbers) -> &'static str {
+fn subpass_input(numbers: NumericFormat) -> &'static str {
     match numbers {
-        Numbers::Float => "subpassInput",
-        Numbers::Uint => "usubpassInput",
-        Numbers::Sint => "isubpassInput",
+        NumericFormat::Float => "subpassInput",
+        NumericFormat::Uint => "usubpassInput",
+        NumericFormat::Sint => "isubpassInput",
     }
 }
 
 /// The targets that the fragment shader reads.
-pub(super) fn reads(modules: &RenderModules) -> InputMask {
+pub(super) fn inputs_read(modules: &RenderModules) -> InputAttachmentMask {
     let fragment = modules.fragment.iter();
     fragment.flat_map(|module| module.reflection.input_reads.iter().map(|read| read.input)).collect()
 }
 
 /// The targets that draws may change.
-pub(super) fn writes(desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> InputMask {
+pub(super) fn inputs_written(desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> InputAttachmentMask {
     let colors = (0..).zip(desc.color).filter(|(place, target)| writes_color(modules, *place, target));
-    let depth = desc.depth.filter(|depth| depth.write).map(|_| Input::Depth);
-    let stencil = desc.stencil.filter(|stencil| stencil.writes()).map(|_| Input::Stencil);
-    colors.map(|(place, _)| Input::Color(place)).chain(depth).chain(stencil).collect()
+    let depth = desc.depth.filter(|depth| depth.write).map(|_| InputAttachment::Depth);
+    let stencil = desc.stencil.filter(|stencil| stencil.writes()).map(|_| InputAttachment::Stencil);
+    colors.map(|(place, _)| InputAttachment::Color(place)).chain(depth).chain(stencil).collect()
 }
 
 /// Whether draws may change the colour target: where the shader puts nothing out, Vulkan leaves open what would be written.
@@ -117,14 +117,14 @@ pub(crate) struct InputIndices {
 impl InputIndices {
     /// For pipelines that read targets, and passes with so many colour targets, on devices with `limit` places.
     pub(crate) fn new(colors: u32, limit: u32) -> Self {
-        let within = |input: Input| {
-            let place = input.place();
+        let within = |input: InputAttachment| {
+            let place = input.index();
             if place < limit { place } else { vk::ATTACHMENT_UNUSED }
         };
         Self {
-            colors: (0..colors).map(|target| within(Input::Color(target))).collect(),
-            depth: within(Input::Depth),
-            stencil: within(Input::Stencil),
+            colors: (0..colors).map(|target| within(InputAttachment::Color(target))).collect(),
+            depth: within(InputAttachment::Depth),
+            stencil: within(InputAttachment::Stencil),
         }
     }
 
@@ -155,19 +155,19 @@ mod tests {
         writes_stencil: false,
     };
 
-    fn read(input: Input, numbers: Numbers) -> InputRead {
+    fn read(input: InputAttachment, numbers: NumericFormat) -> InputRead {
         InputRead { input, numbers, multisampled: false }
     }
 
     #[test]
     fn targets_are_read_as_what_they_are() {
         for (input, numbers) in [
-            (Input::Color(0), Numbers::Float),
-            (Input::Color(1), Numbers::Uint),
-            (Input::Depth, Numbers::Float),
+            (InputAttachment::Color(0), NumericFormat::Float),
+            (InputAttachment::Color(1), NumericFormat::Uint),
+            (InputAttachment::Depth, NumericFormat::Float),
         ] {
-            assert_eq!(PLAIN.check(&read(input, numbers)), Ok(()));
-            let why = PLAIN.check(&read(input, Numbers::Sint)).unwrap_err();
+            assert_eq!(PLAIN.check_read(&read(input, numbers)), Ok(()));
+            let why = PLAIN.check_read(&read(input, NumericFormat::Sint)).unwrap_err();
             assert!(why.ends_with("as a isubpassInput"), "{why}");
         }
     }
@@ -183,21 +183,25 @@ mod tests {
 
     #[test]
     fn what_a_pipeline_lacks_is_said() {
-        let lacks =
-            |targets: &InputTargets<'_>, input| targets.check(&read(input, Numbers::Float)).unwrap_err();
-        assert_eq!(lacks(&PLAIN, Input::Color(2)), "but it draws to 2 colour targets");
-        assert_eq!(lacks(&PLAIN, Input::Stencil), "but it draws to a depth target without stencil");
+        let lacks = |targets: &InputTargets<'_>, input| {
+            targets.check_read(&read(input, NumericFormat::Float)).unwrap_err()
+        };
+        assert_eq!(lacks(&PLAIN, InputAttachment::Color(2)), "but it draws to 2 colour targets");
+        assert_eq!(lacks(&PLAIN, InputAttachment::Stencil), "but it draws to a depth target without stencil");
         let none = InputTargets { depth: None, ..PLAIN };
-        assert_eq!(lacks(&none, Input::Depth), "but it draws to no depth target");
-        assert_eq!(lacks(&none, Input::Stencil), "but it draws to no depth target");
+        assert_eq!(lacks(&none, InputAttachment::Depth), "but it draws to no depth target");
+        assert_eq!(lacks(&none, InputAttachment::Stencil), "but it draws to no depth target");
         let several = InputTargets { samples: 4, ..PLAIN };
-        assert!(lacks(&several, Input::Color(0)).ends_with("take a type with MS"));
-        let one = InputRead { multisampled: true, ..read(Input::Color(0), Numbers::Float) };
-        assert!(PLAIN.check(&one).unwrap_err().ends_with("take a type without MS"));
+        assert!(lacks(&several, InputAttachment::Color(0)).ends_with("take a type with MS"));
+        let one = InputRead { multisampled: true, ..read(InputAttachment::Color(0), NumericFormat::Float) };
+        assert!(PLAIN.check_read(&one).unwrap_err().ends_with("take a type without MS"));
         let written = InputTargets { writes_depth: true, ..PLAIN };
-        assert_eq!(lacks(&written, Input::Depth), READS_WRITTEN);
+        assert_eq!(lacks(&written, InputAttachment::Depth), READS_WRITTEN);
         let stencil = InputTargets { depth: Some(Format::D32FloatS8), writes_stencil: true, ..PLAIN };
-        assert_eq!(stencil.check(&read(Input::Stencil, Numbers::Uint)).unwrap_err(), READS_WRITTEN);
-        assert_eq!(stencil.check(&read(Input::Depth, Numbers::Float)), Ok(()));
+        assert_eq!(
+            stencil.check_read(&read(InputAttachment::Stencil, NumericFormat::Uint)).unwrap_err(),
+            READS_WRITTEN
+        );
+        assert_eq!(stencil.check_read(&read(InputAttachment::Depth, NumericFormat::Float)), Ok(()));
     }
 }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::bindless::input_attachments::InputLayout;
+use crate::bindless::input_attachments::InputAttachmentLayout;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
@@ -24,7 +24,7 @@ pub(crate) struct PipelineLayout {
     pub(crate) raw: vk::PipelineLayout,
     pub(crate) push_constant_bytes: u32,
     /// Of the second set; none on devices whose shaders cannot read what their pass draws.
-    pub(crate) inputs: Option<InputLayout>,
+    pub(crate) inputs: Option<InputAttachmentLayout>,
     gpu: Arc<Gpu>,
 }
 
@@ -34,7 +34,7 @@ impl PipelineLayout {
 
     pub(crate) fn new(gpu: &Arc<Gpu>, set: vk::DescriptorSetLayout) -> Result<Self> {
         let bytes = gpu.caps.limits.max_push_constant_bytes.min(Self::MAX_PUSH_CONSTANT_BYTES);
-        let inputs = InputLayout::new(gpu)?;
+        let inputs = InputAttachmentLayout::new(gpu)?;
         let sets: Vec<_> = [set].into_iter().chain(inputs.as_ref().map(|inputs| inputs.raw)).collect();
         let ranges =
             [vk::PushConstantRange { stage_flags: vk::ShaderStageFlags::ALL, offset: 0, size: bytes }];

@@ -9,14 +9,14 @@ use super::pipeline_layout::PipelineBase;
 use super::ray_tracing_library::RayTracingLibrary;
 use super::ray_tracing_stack::StackSizes;
 use super::sbt::{GroupHandles, SbtLimits, SbtPlan, SbtRegion, plan_sbt, sbt_buffer_bytes, write_sbt};
-use super::sbt_order::{PerRegion, table_order};
-use super::shader_groups::{Find, GroupList, Groups};
+use super::sbt_order::{PerRegion, sbt_order};
+use super::shader_groups::{CompiledGroups, ModuleLookup, ShaderGroups};
 use super::shader_module::ShaderModule;
-use super::stage::{Specialization, SpecializationConstant, stage};
+use super::stage::{Specialization, SpecializationConstant, stage_info};
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 use crate::gpu::caps::limits::Limits;
-use crate::gpu::start::driver_workarounds::beside_devices;
+use crate::gpu::start::driver_workarounds::with_shared_device_lock;
 use crate::handle::{RayTracingLibraryHandle, ShaderModuleHandle};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
@@ -127,7 +127,7 @@ pub(crate) struct TraceRegions {
 }
 
 /// The bytes to put into a new pipeline's table, and where.
-pub(crate) struct TableContents {
+pub(crate) struct SbtContents {
     pub(crate) offset: u64,
     pub(crate) bytes: Vec<u8>,
 }
@@ -138,15 +138,15 @@ impl RayTracingPipeline {
         gpu: &Arc<Gpu>,
         base: PipelineBase,
         desc: &RayTracingPipelineDesc<'_>,
-        find: Find<'_>,
+        find: ModuleLookup<'_>,
         libraries: &[Arc<RayTracingLibrary>],
-    ) -> Result<(Self, TableContents)> {
+    ) -> Result<(Self, SbtContents)> {
         let name = desc.debug_name;
-        let ext = gpu.ray_tracing()?;
+        let ext = gpu.ray_tracing_functions()?;
         check_interface(gpu, desc)?;
-        libraries.iter().try_for_each(|library| library.check(desc))?;
-        let groups = Groups::collect(desc, find)?;
-        let parts: Vec<&GroupList> =
+        libraries.iter().try_for_each(|library| library.check_interface(desc))?;
+        let groups = ShaderGroups::collect(desc, find)?;
+        let parts: Vec<&CompiledGroups> =
             std::iter::once(&groups.list).chain(libraries.iter().map(|library| &library.groups)).collect();
         let counts: Vec<PerRegion<usize>> = parts.iter().map(|part| part.counts()).collect();
         if counts.iter().all(|counts| counts.ray_gen == 0) {
@@ -156,7 +156,7 @@ impl RayTracingPipeline {
         let limits = sbt_limits(&gpu.caps.limits);
         let records = linked_records(&parts);
         let plan = plan_sbt(name, &limits, &records)?;
-        let table = new_table(gpu, name, sbt_buffer_bytes(&plan, limits.base_alignment))?;
+        let table = create_sbt_buffer(gpu, name, sbt_buffer_bytes(&plan, limits.base_alignment))?;
         let raw = compile_groups(gpu, base, desc, &groups, libraries, vk::PipelineCreateFlags::empty())?;
         gpu.name(raw, name);
         let pipeline = Self {
@@ -171,26 +171,31 @@ impl RayTracingPipeline {
             gpu: Arc::clone(gpu),
             _libraries: libraries.to_vec(),
         };
-        let order = table_order(&counts);
+        let order = sbt_order(&counts);
         let handles = pipeline.handles(order.len() as u32, limits.handle_bytes)?;
         let mut bytes = vec![0; pipeline.plan.bytes as usize];
         let handles = GroupHandles { bytes: &handles, order: &order };
         write_sbt(&pipeline.plan, &limits, &handles, &records, &mut bytes);
         let offset = pipeline.base - pipeline.table.address;
-        Ok((pipeline, TableContents { offset, bytes }))
+        Ok((pipeline, SbtContents { offset, bytes }))
     }
 
     fn handles(&self, group_count: u32, handle_bytes: u32) -> Result<Vec<u8>> {
         let bytes = group_count as usize * handle_bytes as usize;
         // SAFETY: the pipeline has these groups and the size is theirs.
         unsafe {
-            self.gpu.ray_tracing()?.get_ray_tracing_shader_group_handles(self.raw, 0, group_count, bytes)
+            self.gpu.ray_tracing_functions()?.get_ray_tracing_shader_group_handles(
+                self.raw,
+                0,
+                group_count,
+                bytes,
+            )
         }
         .map_err(Error::vulkan("vkGetRayTracingShaderGroupHandlesKHR"))
     }
 
     /// The table as a trace from ray generation shader `index` sees it.
-    pub(crate) fn regions(&self, index: u32) -> Result<TraceRegions> {
+    pub(crate) fn trace_regions(&self, index: u32) -> Result<TraceRegions> {
         let region = |region: &SbtRegion| vk::StridedDeviceAddressRegionKHR {
             device_address: if region.size == 0 { 0 } else { self.base + region.offset },
             stride: region.stride,
@@ -214,7 +219,7 @@ impl Drop for RayTracingPipeline {
     fn drop(&mut self) {
         // SAFETY: the owner has waited until the GPU is done with the pipeline.
         let destroy = || unsafe { self.gpu.device.destroy_pipeline(self.raw, None) };
-        beside_devices(self.gpu.caps.driver_id, destroy);
+        with_shared_device_lock(self.gpu.caps.driver_id, destroy);
     }
 }
 
@@ -234,16 +239,16 @@ pub(super) fn compile_groups(
     gpu: &Gpu,
     base: PipelineBase,
     desc: &RayTracingPipelineDesc<'_>,
-    groups: &Groups,
+    groups: &ShaderGroups,
     libraries: &[Arc<RayTracingLibrary>],
     flags: vk::PipelineCreateFlags,
 ) -> Result<vk::Pipeline> {
     let modules = groups.modules.iter().map(|module| &**module);
     let constants = Specialization::new(desc.debug_name, desc.specialization, modules.clone())?;
     let constants = constants.info();
-    let stand_in = stand_in(gpu, groups, libraries);
+    let stand_in = placeholder_stage(gpu, groups, libraries);
     let modules = modules.chain(stand_in.as_deref());
-    let stages: Vec<_> = modules.map(|module| stage(module, &constants)).collect();
+    let stages: Vec<_> = modules.map(|module| stage_info(module, &constants)).collect();
     let dynamic = [vk::DynamicState::RAY_TRACING_PIPELINE_STACK_SIZE_KHR];
     let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&dynamic);
     let libraries: Vec<_> = libraries.iter().map(|library| library.raw).collect();
@@ -269,7 +274,11 @@ pub(super) fn compile_groups(
 
 /// A stage in no group, for lavapipe: it hands push constants only to pipelines that were given a ray generation shader
 /// outside of their libraries.
-fn stand_in(gpu: &Gpu, groups: &Groups, libraries: &[Arc<RayTracingLibrary>]) -> Option<Arc<ShaderModule>> {
+fn placeholder_stage(
+    gpu: &Gpu,
+    groups: &ShaderGroups,
+    libraries: &[Arc<RayTracingLibrary>],
+) -> Option<Arc<ShaderModule>> {
     if gpu.caps.driver_name != "llvmpipe" || groups.list.counts().ray_gen > 0 {
         return None;
     }
@@ -277,8 +286,8 @@ fn stand_in(gpu: &Gpu, groups: &Groups, libraries: &[Arc<RayTracingLibrary>]) ->
 }
 
 /// The records of all parts of a pipeline, as its table has them.
-fn linked_records<'a>(parts: &[&'a GroupList]) -> PerRegion<Vec<&'a [u8]>> {
-    let of = |region: fn(&GroupList) -> &Vec<Box<[u8]>>| {
+fn linked_records<'a>(parts: &[&'a CompiledGroups]) -> PerRegion<Vec<&'a [u8]>> {
+    let of = |region: fn(&CompiledGroups) -> &Vec<Box<[u8]>>| {
         parts.iter().flat_map(|part| region(part)).map(|record| &**record).collect()
     };
     PerRegion {
@@ -293,7 +302,7 @@ fn linked_records<'a>(parts: &[&'a GroupList]) -> PerRegion<Vec<&'a [u8]>> {
 fn stack_sizes(
     ext: &ash::khr::ray_tracing_pipeline::Device,
     pipeline: vk::Pipeline,
-    parts: &[&GroupList],
+    parts: &[&CompiledGroups],
 ) -> StackSizes {
     let mut sizes = StackSizes::default();
     let mut first = 0;
@@ -324,7 +333,7 @@ fn sbt_limits(limits: &Limits) -> SbtLimits {
     }
 }
 
-fn new_table(gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Buffer> {
+fn create_sbt_buffer(gpu: &Arc<Gpu>, name: &str, bytes: u64) -> Result<Buffer> {
     let desc = BufferDesc {
         size_bytes: bytes.max(1),
         usage: BufferUsage::empty(),

@@ -6,12 +6,12 @@ use ash::vk;
 
 use super::pipeline_layout::PipelineBase;
 use super::ray_tracing::{HitGroup, RayTracingPipelineDesc, check_interface, compile_groups};
-use super::shader_groups::{Find, GroupList, Groups};
+use super::shader_groups::{CompiledGroups, ModuleLookup, ShaderGroups};
 use super::shader_module::ShaderModule;
 use super::stage::SpecializationConstant;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::start::driver_workarounds::beside_devices;
+use crate::gpu::start::driver_workarounds::with_shared_device_lock;
 use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;
 
@@ -91,24 +91,24 @@ impl<'a> RayTracingLibraryDesc<'a> {
 /// A library, destroyed on drop.
 pub(crate) struct RayTracingLibrary {
     pub(crate) raw: vk::Pipeline,
-    pub(crate) groups: GroupList,
+    pub(crate) groups: CompiledGroups,
     /// One of its ray generation shaders.
     pub(super) ray_gen: Option<Arc<ShaderModule>>,
     pub(crate) name: Arc<str>,
-    interface: Interface,
+    interface: LibraryInterface,
     gpu: Arc<Gpu>,
 }
 
 /// What libraries and the pipelines linked from them must have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Interface {
+struct LibraryInterface {
     recursion: u32,
     payload_bytes: u32,
     hit_attribute_bytes: u32,
 }
 
-impl Interface {
-    fn of(desc: &RayTracingPipelineDesc<'_>) -> Self {
+impl LibraryInterface {
+    fn from_desc(desc: &RayTracingPipelineDesc<'_>) -> Self {
         Self {
             recursion: desc.max_recursion,
             payload_bytes: desc.max_payload_bytes,
@@ -132,16 +132,16 @@ impl RayTracingLibrary {
         gpu: &Arc<Gpu>,
         base: PipelineBase,
         desc: &RayTracingLibraryDesc<'_>,
-        find: Find<'_>,
+        find: ModuleLookup<'_>,
     ) -> Result<Self> {
         let name = desc.debug_name;
-        gpu.ray_tracing()?;
+        gpu.ray_tracing_functions()?;
         if !gpu.caps.pipeline_libraries {
-            return Err(gpu.lacks(&format!("ray tracing library '{name}': pipeline libraries")));
+            return Err(gpu.unsupported(&format!("ray tracing library '{name}': pipeline libraries")));
         }
         let desc = &desc.as_pipeline();
         check_interface(gpu, desc)?;
-        let groups = Groups::collect(desc, find)?;
+        let groups = ShaderGroups::collect(desc, find)?;
         if groups.infos.is_empty() {
             return Err(Error::usage(name, "a library needs at least one shader or hit group"));
         }
@@ -153,14 +153,15 @@ impl RayTracingLibrary {
             groups: groups.list,
             ray_gen,
             name: name.into(),
-            interface: Interface::of(desc),
+            interface: LibraryInterface::from_desc(desc),
             gpu: Arc::clone(gpu),
         })
     }
 
     /// Fails unless the pipeline agrees with the library.
-    pub(crate) fn check(&self, pipeline: &RayTracingPipelineDesc<'_>) -> Result<()> {
-        let Some((field, wanted, own)) = self.interface.difference(&Interface::of(pipeline)) else {
+    pub(crate) fn check_interface(&self, pipeline: &RayTracingPipelineDesc<'_>) -> Result<()> {
+        let Some((field, wanted, own)) = self.interface.difference(&LibraryInterface::from_desc(pipeline))
+        else {
             return Ok(());
         };
         let message =
@@ -173,6 +174,6 @@ impl Drop for RayTracingLibrary {
     fn drop(&mut self) {
         // SAFETY: pipelines linked from the library hold it.
         let destroy = || unsafe { self.gpu.device.destroy_pipeline(self.raw, None) };
-        beside_devices(self.gpu.caps.driver_id, destroy);
+        with_shared_device_lock(self.gpu.caps.driver_id, destroy);
     }
 }

@@ -6,9 +6,9 @@ use crate::format::Format;
 
 /// Formats, samples and views of targets. Compared at each bind, so it is plain data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct PassShape {
+pub(crate) struct RenderingFormats {
     /// From the first on, without gaps.
-    colors: [Option<Format>; Self::MOST_COLORS],
+    colors: [Option<Format>; Self::MAX_COLORS],
     pub(crate) depth: Option<Format>,
     /// Samples a pixel.
     pub(crate) samples: u32,
@@ -16,9 +16,9 @@ pub(crate) struct PassShape {
     pub(crate) view_mask: u32,
 }
 
-impl PassShape {
+impl RenderingFormats {
     /// As [`Limits::max_color_targets`](crate::Limits::max_color_targets) at most.
-    pub(crate) const MOST_COLORS: usize = 8;
+    pub(crate) const MAX_COLORS: usize = 8;
 
     /// Further colours than the most are left out: both sides have checked their number.
     pub(crate) fn new(
@@ -35,7 +35,7 @@ impl PassShape {
     }
 }
 
-impl fmt::Display for PassShape {
+impl fmt::Display for RenderingFormats {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let colors: Vec<Format> = self.colors.iter().flatten().copied().collect();
         write!(out, "{colors:?} and depth {:?}", self.depth)?;
@@ -56,17 +56,17 @@ mod tests {
     #[test]
     fn shapes_differ_in_each_part_and_say_so() {
         let (color, depth) = (Format::Rgba8Unorm, Format::D32Float);
-        let plain = PassShape::new([color], Some(depth), 1, 0);
-        assert_eq!(plain, PassShape::new([color], Some(depth), 1, 0));
+        let plain = RenderingFormats::new([color], Some(depth), 1, 0);
+        assert_eq!(plain, RenderingFormats::new([color], Some(depth), 1, 0));
         for (other, text) in [
             (
-                PassShape::new([color, color], Some(depth), 1, 0),
+                RenderingFormats::new([color, color], Some(depth), 1, 0),
                 "[Rgba8Unorm, Rgba8Unorm] and depth Some(D32Float)",
             ),
-            (PassShape::new([], Some(depth), 1, 0), "[] and depth Some(D32Float)"),
-            (PassShape::new([color], None, 1, 0), "[Rgba8Unorm] and depth None"),
+            (RenderingFormats::new([], Some(depth), 1, 0), "[] and depth Some(D32Float)"),
+            (RenderingFormats::new([color], None, 1, 0), "[Rgba8Unorm] and depth None"),
             (
-                PassShape::new([color], None, 4, 5),
+                RenderingFormats::new([color], None, 4, 5),
                 "[Rgba8Unorm] and depth None with 4 samples a pixel with the views 0b101",
             ),
         ] {

@@ -20,7 +20,7 @@ pub(crate) struct SbtLimits {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct GroupHandles<'a> {
     pub(crate) bytes: &'a [u8],
-    /// See [`table_order`](super::sbt_order::table_order).
+    /// See [`sbt_order`](super::sbt_order::sbt_order).
     pub(crate) order: &'a [usize],
 }
 

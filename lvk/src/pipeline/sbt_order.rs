@@ -33,7 +33,7 @@ impl<T> PerRegion<T> {
 ///
 /// `parts` are the numbers of groups of the pipeline itself and of each library. Vulkan numbers the groups part by
 /// part; the table has them region by region, and within a region part by part.
-pub(crate) fn table_order(parts: &[PerRegion<usize>]) -> Vec<usize> {
+pub(crate) fn sbt_order(parts: &[PerRegion<usize>]) -> Vec<usize> {
     let mut order: PerRegion<Vec<usize>> = PerRegion::default();
     let mut next = 0;
     for part in parts {
@@ -67,7 +67,7 @@ mod tests {
                     labels.extend((0..count).map(|place| (region, part, place)));
                 }
             }
-            let table: Vec<_> = table_order(&parts).into_iter().map(|group| labels[group]).collect();
+            let table: Vec<_> = sbt_order(&parts).into_iter().map(|group| labels[group]).collect();
             labels.sort_unstable();
             prop_assert_eq!(table, labels);
         }
@@ -77,7 +77,7 @@ mod tests {
     fn a_library_stands_behind_the_pipelines_own() {
         let own = PerRegion { ray_gen: 1, miss: 2, hit: 1, callable: 0 };
         let library = PerRegion { ray_gen: 0, miss: 1, hit: 2, callable: 1 };
-        assert_eq!(table_order(&[own]), [0, 1, 2, 3]);
-        assert_eq!(table_order(&[own, library]), [0, 1, 2, 4, 3, 5, 6, 7]);
+        assert_eq!(sbt_order(&[own]), [0, 1, 2, 3]);
+        assert_eq!(sbt_order(&[own, library]), [0, 1, 2, 4, 3, 5, 6, 7]);
     }
 }

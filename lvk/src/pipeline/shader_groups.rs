@@ -13,11 +13,11 @@ use crate::handle::ShaderModuleHandle;
 use crate::shader::ShaderStage;
 
 /// Finds the module of a handle.
-pub(crate) type Find<'a> = &'a dyn Fn(ShaderModuleHandle) -> Result<Arc<ShaderModule>>;
+pub(crate) type ModuleLookup<'a> = &'a dyn Fn(ShaderModuleHandle) -> Result<Arc<ShaderModule>>;
 
 /// What a pipeline needs to know of shader groups once they are compiled, its own or a library's.
 #[derive(Debug, Default)]
-pub(crate) struct GroupList {
+pub(crate) struct CompiledGroups {
     /// The user's bytes of each group.
     pub(crate) records: PerRegion<Vec<Box<[u8]>>>,
     /// Every shader of every group, with the group's number.
@@ -25,7 +25,7 @@ pub(crate) struct GroupList {
     pub(crate) push_constant_bytes: u32,
 }
 
-impl GroupList {
+impl CompiledGroups {
     /// Number of groups of each region.
     pub(crate) fn counts(&self) -> PerRegion<usize> {
         self.records.as_ref().map(Vec::len)
@@ -39,33 +39,33 @@ impl GroupList {
 
 /// Shader groups about to be compiled.
 #[derive(Default)]
-pub(crate) struct Groups {
+pub(crate) struct ShaderGroups {
     /// Each module once.
     pub(crate) modules: Vec<Arc<ShaderModule>>,
     pub(crate) infos: Vec<vk::RayTracingShaderGroupCreateInfoKHR<'static>>,
-    pub(crate) list: GroupList,
+    pub(crate) list: CompiledGroups,
     places: HashMap<ShaderModuleHandle, u32>,
 }
 
-impl Groups {
+impl ShaderGroups {
     /// Groups in the order of a table: ray generation, miss, hit, callable.
-    pub(crate) fn collect(desc: &RayTracingPipelineDesc<'_>, find: Find<'_>) -> Result<Self> {
+    pub(crate) fn collect(desc: &RayTracingPipelineDesc<'_>, find: ModuleLookup<'_>) -> Result<Self> {
         let mut groups = Self::default();
         for handle in desc.ray_gen {
-            groups.general(*handle, ShaderStage::RayGen, find)?;
+            groups.add_general_group(*handle, ShaderStage::RayGen, find)?;
         }
         for handle in desc.miss {
-            groups.general(*handle, ShaderStage::Miss, find)?;
+            groups.add_general_group(*handle, ShaderStage::Miss, find)?;
         }
         for group in desc.hit_groups {
-            groups.hit_group(group, find)?;
+            groups.add_hit_group(group, find)?;
         }
         for handle in desc.callable {
-            groups.general(*handle, ShaderStage::Callable, find)?;
+            groups.add_general_group(*handle, ShaderStage::Callable, find)?;
         }
         let bytes = groups.modules.iter().map(|module| module.reflection.push_constant_bytes);
         groups.list.push_constant_bytes = bytes.max().unwrap_or(0);
-        groups.list.records = records(desc)?;
+        groups.list.records = collect_records(desc)?;
         Ok(groups)
     }
 
@@ -94,31 +94,36 @@ impl Groups {
         Ok(())
     }
 
-    fn general(&mut self, handle: ShaderModuleHandle, stage: ShaderStage, find: Find<'_>) -> Result<()> {
-        let place = self.place(Some(handle), stage, find)?;
-        self.infos.push(group(vk::RayTracingShaderGroupTypeKHR::GENERAL).general_shader(place));
+    fn add_general_group(
+        &mut self,
+        handle: ShaderModuleHandle,
+        stage: ShaderStage,
+        find: ModuleLookup<'_>,
+    ) -> Result<()> {
+        let place = self.stage_index(Some(handle), stage, find)?;
+        self.infos.push(group_info(vk::RayTracingShaderGroupTypeKHR::GENERAL).general_shader(place));
         Ok(())
     }
 
-    fn hit_group(&mut self, desc: &HitGroup<'_>, find: Find<'_>) -> Result<()> {
+    fn add_hit_group(&mut self, desc: &HitGroup<'_>, find: ModuleLookup<'_>) -> Result<()> {
         let kind = match desc.intersection {
             Some(_) => vk::RayTracingShaderGroupTypeKHR::PROCEDURAL_HIT_GROUP,
             None => vk::RayTracingShaderGroupTypeKHR::TRIANGLES_HIT_GROUP,
         };
-        let hit = group(kind)
-            .closest_hit_shader(self.place(desc.closest_hit, ShaderStage::ClosestHit, find)?)
-            .any_hit_shader(self.place(desc.any_hit, ShaderStage::AnyHit, find)?)
-            .intersection_shader(self.place(desc.intersection, ShaderStage::Intersection, find)?);
+        let hit = group_info(kind)
+            .closest_hit_shader(self.stage_index(desc.closest_hit, ShaderStage::ClosestHit, find)?)
+            .any_hit_shader(self.stage_index(desc.any_hit, ShaderStage::AnyHit, find)?)
+            .intersection_shader(self.stage_index(desc.intersection, ShaderStage::Intersection, find)?);
         self.infos.push(hit);
         Ok(())
     }
 
     /// The place among the stages of a module of the group at hand; the same module takes one place.
-    fn place(
+    fn stage_index(
         &mut self,
         handle: Option<ShaderModuleHandle>,
         stage: ShaderStage,
-        find: Find<'_>,
+        find: ModuleLookup<'_>,
     ) -> Result<u32> {
         let Some(handle) = handle else { return Ok(vk::SHADER_UNUSED_KHR) };
         let module = find(handle)?;
@@ -133,7 +138,7 @@ impl Groups {
     }
 }
 
-fn group(kind: vk::RayTracingShaderGroupTypeKHR) -> vk::RayTracingShaderGroupCreateInfoKHR<'static> {
+fn group_info(kind: vk::RayTracingShaderGroupTypeKHR) -> vk::RayTracingShaderGroupCreateInfoKHR<'static> {
     vk::RayTracingShaderGroupCreateInfoKHR::default()
         .ty(kind)
         .general_shader(vk::SHADER_UNUSED_KHR)
@@ -142,18 +147,18 @@ fn group(kind: vk::RayTracingShaderGroupTypeKHR) -> vk::RayTracingShaderGroupCre
         .intersection_shader(vk::SHADER_UNUSED_KHR)
 }
 
-fn records(desc: &RayTracingPipelineDesc<'_>) -> Result<PerRegion<Vec<Box<[u8]>>>> {
+fn collect_records(desc: &RayTracingPipelineDesc<'_>) -> Result<PerRegion<Vec<Box<[u8]>>>> {
     let name = desc.debug_name;
     Ok(PerRegion {
-        ray_gen: padded(name, "ray generation", desc.ray_gen.len(), desc.ray_gen_records)?,
-        miss: padded(name, "miss", desc.miss.len(), desc.miss_records)?,
+        ray_gen: pad_records(name, "ray generation", desc.ray_gen.len(), desc.ray_gen_records)?,
+        miss: pad_records(name, "miss", desc.miss.len(), desc.miss_records)?,
         hit: desc.hit_groups.iter().map(|group| group.record.into()).collect(),
-        callable: padded(name, "callable", desc.callable.len(), desc.callable_records)?,
+        callable: pad_records(name, "callable", desc.callable.len(), desc.callable_records)?,
     })
 }
 
 /// One record for each shader: those that are left out are empty.
-fn padded(pipeline: &str, kind: &str, shaders: usize, records: &[&[u8]]) -> Result<Vec<Box<[u8]>>> {
+fn pad_records(pipeline: &str, kind: &str, shaders: usize, records: &[&[u8]]) -> Result<Vec<Box<[u8]>>> {
     if records.len() > shaders {
         let message =
             format!("{} records for {shaders} {kind} shaders; give each at most one", records.len());

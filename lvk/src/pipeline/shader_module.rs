@@ -31,14 +31,14 @@ impl ShaderModule {
         max_push_bytes: u32,
     ) -> Result<Self> {
         check_stage(desc.debug_name, desc.stage, &gpu.features)?;
-        let words = compile(desc, &CompileOptions::of(&gpu.caps), cache)?;
+        let words = compile(desc, &CompileOptions::from_capabilities(&gpu.caps), cache)?;
         let reflection = reflect(desc.debug_name, desc.stage, &words)?;
         check_features(gpu, desc.debug_name, &reflection)?;
         let extra = &gpu.extra_capabilities;
         check_capabilities(desc.debug_name, desc.stage, &reflection, &gpu.features, extra)?;
         if let Some(last) = reflection.input_reads.last() {
             let (what, limit) = ("place of an input attachment", gpu.caps.limits.max_input_attachments);
-            check_limit(desc.debug_name, what, u64::from(last.input.place()) + 1, limit.into())?;
+            check_limit(desc.debug_name, what, u64::from(last.input.index()) + 1, limit.into())?;
         }
         if reflection.push_constant_bytes > max_push_bytes {
             return Err(Error::LimitExceeded {
@@ -49,7 +49,7 @@ impl ShaderModule {
             });
         }
         let words = match bindless.and_then(|bindless| bindless.check_plan(desc.debug_name)) {
-            Some(plan) => checked(gpu, desc, words, &plan),
+            Some(plan) => with_index_checks(gpu, desc, words, &plan),
             None => words,
         };
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
@@ -79,7 +79,7 @@ impl Drop for ShaderModule {
 }
 
 /// The module with its indices checked; as it is, with a warning, where that cannot be.
-fn checked(gpu: &Gpu, desc: &ShaderModuleDesc<'_>, words: Vec<u32>, plan: &CheckPlan) -> Vec<u32> {
+fn with_index_checks(gpu: &Gpu, desc: &ShaderModuleDesc<'_>, words: Vec<u32>, plan: &CheckPlan) -> Vec<u32> {
     use ShaderStage::{Geometry, TessControl, TessEval, Vertex};
     let writes = match desc.stage {
         Vertex | TessControl | TessEval | Geometry => gpu.features.core.vertex_pipeline_stores_and_atomics,
@@ -98,18 +98,20 @@ fn checked(gpu: &Gpu, desc: &ShaderModuleDesc<'_>, words: Vec<u32>, plan: &Check
 
 fn check_features(gpu: &Gpu, name: &str, reflection: &Reflection) -> Result<()> {
     if reflection.ray_query && !gpu.caps.ray_query {
-        return Err(gpu.lacks(&format!("shader '{name}' uses ray queries: they")));
+        return Err(gpu.unsupported(&format!("shader '{name}' uses ray queries: they")));
     }
     if reflection.ray_query && reflection.hardware_ray_query != gpu.caps.hardware_ray_query() {
-        let made_for = if reflection.hardware_ray_query { "the device" } else { "the library itself" };
+        let traversal_by = if reflection.hardware_ray_query { "the device" } else { "the library itself" };
         let message = format!(
-            "its ray queries were compiled for {made_for} to walk; this context takes {:?}",
+            "its ray queries were compiled for traversal by {traversal_by}; this context uses {:?}",
             gpu.caps.ray_query_path
         );
         return Err(Error::usage(name, message));
     }
     if reflection.ray_tracing && !gpu.caps.ray_tracing_pipeline {
-        return Err(gpu.lacks(&format!("shader '{name}' is of a ray tracing stage: ray tracing pipelines")));
+        return Err(
+            gpu.unsupported(&format!("shader '{name}' is of a ray tracing stage: ray tracing pipelines"))
+        );
     }
     Ok(())
 }

@@ -50,7 +50,7 @@ impl SpecializationValue {
         }
     }
 
-    fn bytes(self) -> usize {
+    fn size_bytes(self) -> usize {
         match self {
             Self::U32(_) | Self::I32(_) | Self::F32(_) | Self::Bool(_) => 4,
             Self::U64(_) | Self::I64(_) | Self::F64(_) => 8,
@@ -83,7 +83,7 @@ impl Specialization {
                 let message = format!("no shader declares the specialization constant {}", constant.id);
                 return Err(Error::usage(pipeline, message));
             }
-            let given = constant.value.bytes();
+            let given = constant.value.size_bytes();
             if let Some(bytes) = sizes.iter().find(|bytes| **bytes as usize != given) {
                 let message = format!(
                     "specialization constant {} has {} bits in a shader, and {} were given",
@@ -94,13 +94,13 @@ impl Specialization {
                 return Err(Error::usage(pipeline, message));
             }
         }
-        Ok(Self::of(constants))
+        Ok(Self::from_constants(constants))
     }
 
-    fn of(constants: &[SpecializationConstant]) -> Self {
+    fn from_constants(constants: &[SpecializationConstant]) -> Self {
         let mut made = Self { entries: Vec::new(), data: Vec::new() };
         for constant in constants {
-            let (offset, size) = (made.data.len() as u32, constant.value.bytes());
+            let (offset, size) = (made.data.len() as u32, constant.value.size_bytes());
             made.entries.push(vk::SpecializationMapEntry { constant_id: constant.id, offset, size });
             match size {
                 8 => made.data.extend(constant.value.bits().to_ne_bytes()),
@@ -116,7 +116,7 @@ impl Specialization {
 }
 
 /// The stage of a module.
-pub(crate) fn stage<'a>(
+pub(crate) fn stage_info<'a>(
     module: &ShaderModule,
     specialization: &'a vk::SpecializationInfo<'a>,
 ) -> vk::PipelineShaderStageCreateInfo<'a> {

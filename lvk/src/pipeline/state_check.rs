@@ -18,7 +18,7 @@ pub(super) fn check_state(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &Re
     check_stencil(desc)?;
     check_views(gpu, desc, modules)?;
     check_rates(gpu, desc, modules)?;
-    check_second_source(gpu, desc, modules)
+    check_dual_source_blend(gpu, desc, modules)
 }
 
 fn check_raster(gpu: &Gpu, desc: &RenderPipelineDesc<'_>) -> Result<()> {
@@ -128,9 +128,9 @@ fn check_rates(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules
 }
 
 /// A second source stands in one target alone, and the fragment shader has to put it out.
-fn check_second_source(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
+fn check_dual_source_blend(gpu: &Gpu, desc: &RenderPipelineDesc<'_>, modules: &RenderModules) -> Result<()> {
     let name = desc.debug_name;
-    if !desc.color.iter().filter_map(|target| target.blend).any(|blend| blend.takes_second()) {
+    if !desc.color.iter().filter_map(|target| target.blend).any(|blend| blend.is_dual_source()) {
         return Ok(());
     }
     gpu.require(OptionalFeature::DualSourceBlend, &format!("a second blend source in pipeline '{name}'"))?;

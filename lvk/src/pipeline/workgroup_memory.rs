@@ -7,7 +7,7 @@ use crate::shader::SharedBytes;
 
 /// The most bytes of a workgroup of a stage.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct MemoryLimits {
+pub(super) struct WorkgroupMemoryLimits {
     /// What its invocations share.
     pub(super) shared: u32,
     /// What goes from a task to its mesh workgroups.
@@ -17,17 +17,17 @@ pub(super) struct MemoryLimits {
 }
 
 /// Fails if a workgroup of `module` shares more than `limits` allow.
-pub(super) fn check_group_memory(
+pub(super) fn check_workgroup_memory(
     pipeline: &str,
     module: &ShaderModule,
     specialization: &[SpecializationConstant],
-    limits: &MemoryLimits,
+    limits: &WorkgroupMemoryLimits,
 ) -> Result<()> {
     let given = specialization.iter().map(|constant| (constant.id, constant.value.bits() as u32));
-    check(pipeline, module.reflection.shared_memory.bytes(&given.collect()), limits)
+    check_shared_bytes(pipeline, module.reflection.shared_memory.bytes(&given.collect()), limits)
 }
 
-fn check(pipeline: &str, found: SharedBytes, limits: &MemoryLimits) -> Result<()> {
+fn check_shared_bytes(pipeline: &str, found: SharedBytes, limits: &WorkgroupMemoryLimits) -> Result<()> {
     let SharedBytes { shared, payload } = found;
     check_limit(pipeline, "shared memory of a workgroup in bytes", shared, limits.shared.into())?;
     check_limit(pipeline, "payload of a task workgroup in bytes", payload, limits.payload.into())?;
@@ -41,8 +41,8 @@ mod tests {
 
     #[test]
     fn each_limit_counts_and_both_together() {
-        let limits = MemoryLimits { shared: 100, payload: 50, together: 120 };
-        for (shared, payload, told) in [
+        let limits = WorkgroupMemoryLimits { shared: 100, payload: 50, together: 120 };
+        for (shared, payload, expected) in [
             (100, 20, None),
             (70, 50, None),
             (101, 0, Some("shared memory of a workgroup")),
@@ -50,10 +50,14 @@ mod tests {
             (100, 21, Some("shared memory and payload")),
             (u64::MAX, u64::MAX, Some("shared memory of a workgroup")),
         ] {
-            let found =
-                check("p", SharedBytes { shared, payload }, &limits).err().map(|error| error.to_string());
-            assert!(found.is_some() == told.is_some(), "{found:?}");
-            assert!(told.is_none_or(|told| found.is_some_and(|found| found.contains(told))), "{told:?}");
+            let found = check_shared_bytes("p", SharedBytes { shared, payload }, &limits)
+                .err()
+                .map(|error| error.to_string());
+            assert!(found.is_some() == expected.is_some(), "{found:?}");
+            assert!(
+                expected.is_none_or(|expected| found.is_some_and(|found| found.contains(expected))),
+                "{expected:?}"
+            );
         }
     }
 }

@@ -5,7 +5,7 @@ use super::stage::SpecializationConstant;
 use crate::error::{Error, Result, check_limit};
 
 /// The largest workgroup of a stage.
-pub(super) struct GroupLimits {
+pub(super) struct WorkgroupLimits {
     /// Most invocations for each axis.
     pub(super) size: [u32; 3],
     /// Most invocations altogether.
@@ -13,11 +13,11 @@ pub(super) struct GroupLimits {
 }
 
 /// Fails if a workgroup of `module` is empty or larger than `limits`.
-pub(super) fn check_group_size(
+pub(super) fn check_workgroup_size(
     pipeline: &str,
     module: &ShaderModule,
     specialization: &[SpecializationConstant],
-    limits: &GroupLimits,
+    limits: &WorkgroupLimits,
 ) -> Result<()> {
     let mut invocations = 1_u64;
     for axis in 0..3 {

@@ -210,7 +210,7 @@ impl Buffer {
 
     /// Writes the first contents of a buffer that nothing has used yet, where its memory happens to be in reach of the host,
     /// as device memory is on some devices. `false` if it is not; the bytes fit the buffer.
-    pub(crate) fn write_first(&self, bytes: &[u8]) -> bool {
+    pub(crate) fn write_initial(&self, bytes: &[u8]) -> bool {
         let coherent = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
         let reached = self.allocation.as_ref().filter(|own| own.properties.contains(coherent));
         let Some(start) = reached.and_then(ObjectMemory::mapped) else { return false };
@@ -221,7 +221,7 @@ impl Buffer {
     }
 
     /// Has `fill` write all of the mapped memory. `false` if the buffer is not mapped.
-    pub(crate) fn fill(&self, fill: impl FnOnce(&mut [u8])) -> bool {
+    pub(crate) fn fill_with(&self, fill: impl FnOnce(&mut [u8])) -> bool {
         let Some(start) = self.mapped() else { return false };
         let _copying = self.copying.lock();
         // SAFETY: the mapping has the buffer's size and lives as long as `self`; other threads wait.
@@ -282,8 +282,8 @@ fn check_size(gpu: &Gpu, desc: &BufferDesc<'_>) -> Result<u64> {
 }
 
 fn raw_usage(gpu: &Gpu, usage: BufferUsage, name: &str) -> Result<vk::BufferUsageFlags> {
-    if usage.contains(BufferUsage::ACCEL_INPUT) && !gpu.has_structures() {
-        return Err(gpu.lacks(&format!("buffer '{name}' with ACCEL_INPUT: acceleration structures")));
+    if usage.contains(BufferUsage::ACCEL_INPUT) && !gpu.has_acceleration_structures() {
+        return Err(gpu.unsupported(&format!("buffer '{name}' with ACCEL_INPUT: acceleration structures")));
     }
     // The library's own builders read inputs as any shader does.
     let accel_input = match gpu.accel {

@@ -10,17 +10,17 @@ use crate::gpu::Gpu;
 
 /// Most bytes that are written by the host: with up to so many llvmpipe 25.0 is done in a half to an eighth of the time that a
 /// copy out of staging memory takes, with four times as many it takes longer.
-const MOST_BYTES: usize = 256 << 10;
+const MAX_BYTES: usize = 256 << 10;
 
 /// Whether an image of this description is to be filled by the host: it is only ever sampled, and loses nothing by it.
-pub(super) fn suits(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_>) -> bool {
+pub(super) fn can_fill_from_host(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_>) -> bool {
     gpu.host_copies.is_some() && is_plain(desc) && gpu.host_copies_stay_optimal(info)
 }
 
 /// Whether a texture has contents from the start, not too many, and is sampled, in its own format and no other way.
 fn is_plain(desc: &TextureDesc<'_>) -> bool {
     let planes = desc.format.aspects().as_raw().count_ones();
-    desc.data.is_some_and(|data| data.len() <= MOST_BYTES)
+    desc.data.is_some_and(|data| data.len() <= MAX_BYTES)
         && !desc.generate_mips
         && desc.usage == TextureUsage::SAMPLED
         && desc.memory == TextureMemory::Device
@@ -30,8 +30,8 @@ fn is_plain(desc: &TextureDesc<'_>) -> bool {
         && planes == 1
 }
 
-/// Writes the first contents of a new image that [`suits`], region by region, each with all of its bytes.
-pub(crate) fn fill(gpu: &Gpu, image: &Image, contents: &[(Region, &[u8])]) -> Result<()> {
+/// Writes the first contents of a new image that [`can_fill_from_host`], region by region, each with all of its bytes.
+pub(crate) fn fill_from_host(gpu: &Gpu, image: &Image, contents: &[(Region, &[u8])]) -> Result<()> {
     let Some(copies) = &gpu.host_copies else { return Ok(()) };
     let copy = |(region, bytes): &(Region, &[u8])| {
         debug_assert_eq!(region.bytes(), bytes.len() as u64);
@@ -43,9 +43,9 @@ pub(crate) fn fill(gpu: &Gpu, image: &Image, contents: &[(Region, &[u8])]) -> Re
         copy
     };
     let copies_to_make: Vec<_> = contents.iter().map(copy).collect();
-    let range = image.for_barriers().range(image.shape.whole());
+    let range = image.barrier_image().range(image.shape.all_subresources());
     // SAFETY: the image is new and made for it; the regions are different mips of it and have all their bytes.
-    unsafe { copies.fill(image.raw, range, &copies_to_make) }
+    unsafe { copies.write_image(image.raw, range, &copies_to_make) }
 }
 
 #[cfg(test)]
@@ -60,7 +60,7 @@ mod tests {
         assert!(is_plain(&TextureDesc { format: Format::D32Float, ..plain }));
         for other in [
             TextureDesc { data: None, ..plain },
-            TextureDesc { data: Some(&[0; MOST_BYTES + 1]), ..plain },
+            TextureDesc { data: Some(&[0; MAX_BYTES + 1]), ..plain },
             TextureDesc { generate_mips: true, ..plain },
             TextureDesc { usage: TextureUsage::SAMPLED | TextureUsage::STORAGE, ..plain },
             TextureDesc { usage: TextureUsage::TARGET, ..plain },

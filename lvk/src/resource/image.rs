@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use ash::vk;
 
 use super::host_copy;
-use super::image_check::{ImagePlan, check};
+use super::image_check::{ImagePlan, check_image};
 use super::texture_desc::{TextureDesc, TextureMemory, TextureUsage};
 use crate::barrier::{ResourceId, Subresources, TextureShape};
 use crate::error::{Error, Result};
@@ -78,7 +78,7 @@ impl BarrierImage {
 impl Image {
     /// An image for one texture.
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>) -> Result<Self> {
-        let plan = check(gpu, desc)?;
+        let plan = check_image(gpu, desc)?;
         let formats: Vec<_> = [desc.format].iter().chain(desc.view_formats).map(|f| f.raw()).collect();
         let mut list = vk::ImageFormatListCreateInfo::default().view_formats(&formats);
         let mut info = plan.info(desc);
@@ -89,13 +89,13 @@ impl Image {
         if !desc.view_formats.is_empty() {
             info = info.push_next(&mut list);
         }
-        let host_filled = host_copy::suits(gpu, desc, &info);
+        let host_filled = host_copy::can_fill_from_host(gpu, desc, &info);
         if host_filled {
             info.usage |= vk::ImageUsageFlags::HOST_TRANSFER_EXT;
         }
         // SAFETY: the description is checked against the limits of its format.
         let raw = unsafe { gpu.device.create_image(&info, None) }.map_err(Error::vulkan("vkCreateImage"))?;
-        let mut image = Self::of(gpu, desc, &plan, raw, false);
+        let mut image = Self::from_raw(gpu, desc, &plan, raw, false);
         image.host_filled = host_filled;
         image.bind_memory(desc.debug_name)?;
         gpu.name(raw, desc.debug_name);
@@ -104,10 +104,10 @@ impl Image {
 
     /// An image of somebody else's, which is as described, for one texture.
     pub(crate) fn import(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, raw: vk::Image) -> Result<Self> {
-        Ok(Self::of(gpu, desc, &check(gpu, desc)?, raw, true))
+        Ok(Self::from_raw(gpu, desc, &check_image(gpu, desc)?, raw, true))
     }
 
-    fn of(
+    fn from_raw(
         gpu: &Arc<Gpu>,
         desc: &TextureDesc<'_>,
         plan: &ImagePlan,
@@ -129,7 +129,7 @@ impl Image {
             handles: AtomicU32::new(1),
             transient: desc.memory == TextureMemory::Transient,
             memory: None,
-            is_exclusive: !is_foreign && gpu.queues.has_domains() && !is_shared(desc),
+            is_exclusive: !is_foreign && gpu.queues.has_several_domains() && !is_shared(desc),
             host_filled: false,
             is_foreign,
             owner: None,
@@ -138,13 +138,13 @@ impl Image {
     }
 
     /// The same, which keeps its owner as long as it is used.
-    pub(crate) fn lent_by(mut self, owner: Arc<dyn Any + Send + Sync>) -> Self {
+    pub(crate) fn with_external_owner(mut self, owner: Arc<dyn Any + Send + Sync>) -> Self {
         self.owner = Some(owner);
         self
     }
 
     /// Whether it comes and goes with its owner, which decides when it can be used.
-    pub(crate) fn is_lent(&self) -> bool {
+    pub(crate) fn has_external_owner(&self) -> bool {
         self.owner.is_some()
     }
 
@@ -168,7 +168,7 @@ impl Image {
     }
 
     /// One more texture shows the image. Fails where the last one is already gone.
-    pub(crate) fn share(&self) -> Result<()> {
+    pub(crate) fn add_texture(&self) -> Result<()> {
         let more = |count: u32| (count > 0).then_some(count + 1);
         match self.handles.fetch_update(Ordering::AcqRel, Ordering::Acquire, more) {
             Ok(_) => Ok(()),
@@ -177,7 +177,7 @@ impl Image {
     }
 
     /// A texture of the image is gone; answers whether it was the last.
-    pub(crate) fn release(&self) -> bool {
+    pub(crate) fn remove_texture(&self) -> bool {
         self.handles.fetch_sub(1, Ordering::AcqRel) == 1
     }
 
@@ -186,7 +186,7 @@ impl Image {
         if self.view_formats.is_empty() {
             return self.usage;
         }
-        self.usage & usage_of(self.gpu.format_features(format))
+        self.usage & usage_from_features(self.gpu.format_features(format))
     }
 
     /// Width, height and slices of a mip.
@@ -201,7 +201,7 @@ impl Image {
     }
 
     /// What barriers have to know of the image.
-    pub(crate) fn for_barriers(&self) -> BarrierImage {
+    pub(crate) fn barrier_image(&self) -> BarrierImage {
         BarrierImage {
             raw: self.raw,
             is_exclusive: self.is_exclusive,
@@ -266,7 +266,7 @@ pub(crate) fn raw_usage(usage: TextureUsage, format: Format) -> vk::ImageUsageFl
 }
 
 /// What a format with these features can be used for.
-pub(crate) fn usage_of(features: vk::FormatFeatureFlags) -> TextureUsage {
+pub(crate) fn usage_from_features(features: vk::FormatFeatureFlags) -> TextureUsage {
     use vk::FormatFeatureFlags as Features;
     let attachment = Features::COLOR_ATTACHMENT | Features::DEPTH_STENCIL_ATTACHMENT;
     let pairs = [

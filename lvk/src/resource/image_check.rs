@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use super::image::{raw_usage, usage_of};
+use super::image::{raw_usage, usage_from_features};
 use super::swizzle::Swizzle;
 use super::texture_desc::{TextureDesc, TextureKind, TextureMemory, TextureUsage};
 use crate::error::{Error, Result, check_limit};
@@ -18,7 +18,7 @@ pub(crate) struct ImagePlan {
 }
 
 /// Checks a description against the device.
-pub(crate) fn check(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<ImagePlan> {
+pub(crate) fn check_image(gpu: &Gpu, desc: &TextureDesc<'_>) -> Result<ImagePlan> {
     let mips = check_shape(gpu, desc)?;
     check_view_formats(desc)?;
     let plan = ImagePlan { mips, flags: flags(gpu, desc, mips) };
@@ -192,7 +192,7 @@ fn check_target_size(desc: &TextureDesc<'_>, limits: &Limits) -> Result<()> {
 
 /// Fails unless the device has arrays of cubes.
 pub(crate) fn check_cube_arrays(gpu: &Gpu) -> Result<()> {
-    if gpu.caps.cube_arrays { Ok(()) } else { Err(gpu.lacks("arrays of cubes (imageCubeArray)")) }
+    if gpu.caps.cube_arrays { Ok(()) } else { Err(gpu.unsupported("arrays of cubes (imageCubeArray)")) }
 }
 
 /// Fails unless all formats are colours of texels of one size, or of one compression.
@@ -279,7 +279,8 @@ fn check_format(gpu: &Gpu, desc: &TextureDesc<'_>, info: &vk::ImageCreateInfo<'_
     }
     let limits = gpu.image_limits(info).map_err(|_| refused())?;
     let formats = [desc.format].into_iter().chain(desc.view_formats.iter().copied());
-    let usages: TextureUsage = formats.map(|format| usage_of(gpu.format_features(format))).collect();
+    let usages: TextureUsage =
+        formats.map(|format| usage_from_features(gpu.format_features(format))).collect();
     if !desc.view_formats.is_empty() && !usages.contains(desc.usage) {
         return Err(refused());
     }

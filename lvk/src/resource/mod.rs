@@ -16,7 +16,7 @@ pub(crate) mod view;
 pub(crate) mod ycbcr;
 
 pub(crate) use buffer::Buffer;
-pub(crate) use image_check::check as check_image;
+pub(crate) use image_check::check_image;
 pub(crate) use query_pool::QueryPool;
 pub(crate) use sampler::Sampler;
 pub(crate) use texture::Texture;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 use bytemuck::{Pod, Zeroable};
 
-use super::query_reset_state::QueryMarks;
+use super::query_reset_state::QueryResetState;
 use crate::barrier::ResourceId;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
@@ -43,7 +43,7 @@ impl QueryKind {
         }
     }
 
-    pub(crate) fn control(self) -> vk::QueryControlFlags {
+    pub(crate) fn control_flags(self) -> vk::QueryControlFlags {
         match self {
             Self::Occlusion { precise: true } => vk::QueryControlFlags::PRECISE,
             _ => vk::QueryControlFlags::empty(),
@@ -51,7 +51,7 @@ impl QueryKind {
     }
 
     /// As error messages say it.
-    pub(crate) fn words(self) -> &'static str {
+    pub(crate) fn label(self) -> &'static str {
         match self {
             Self::Timestamps => "timestamps",
             Self::Occlusion { .. } => "occlusion",
@@ -73,7 +73,7 @@ impl QueryKind {
     fn check_supported(self, gpu: &Gpu) -> Result<()> {
         match self {
             Self::Timestamps if gpu.caps.limits.timestamp_bits == 0 => {
-                Err(gpu.lacks("timestamps on the queue"))
+                Err(gpu.unsupported("timestamps on the queue"))
             }
             Self::Occlusion { precise: true } => {
                 gpu.require(OptionalFeature::OcclusionQueryPrecise, "an exact occlusion query")
@@ -149,7 +149,7 @@ impl PipelineStatistics {
     const MESH_BITS: u32 = 1 << 7 | 0b111 << 10;
 
     /// From the numbers of these bits, the lowest first.
-    fn of(bits: u32, numbers: &[u64]) -> Self {
+    fn from_values(bits: u32, numbers: &[u64]) -> Self {
         let mut fields = [0; Self::FIELDS];
         let counted = fields.iter_mut().enumerate().filter(|(bit, _)| bits >> bit & 1 != 0);
         counted.zip(numbers).for_each(|((_, field), number)| *field = *number);
@@ -166,7 +166,7 @@ pub(crate) struct QueryPool {
     pub(crate) count: u32,
     pub(crate) name: String,
     /// What everything submitted so far does to the queries.
-    marks: Mutex<QueryMarks>,
+    reset_state: Mutex<QueryResetState>,
     gpu: Arc<Gpu>,
 }
 
@@ -179,11 +179,11 @@ impl QueryPool {
             return Err(Error::usage(desc.debug_name, "a query pool needs at least one query"));
         }
         check_limit(desc.debug_name, "query count", desc.count.into(), Self::MAX_COUNT.into())?;
-        Self::of(gpu, desc, desc.kind.raw())
+        Self::with_type(gpu, desc, desc.kind.raw())
     }
 
     /// A pool whose queries are of type `ty`, which the description need not know.
-    pub(crate) fn of(gpu: &Arc<Gpu>, desc: &QueryPoolDesc<'_>, ty: vk::QueryType) -> Result<Self> {
+    pub(crate) fn with_type(gpu: &Arc<Gpu>, desc: &QueryPoolDesc<'_>, ty: vk::QueryType) -> Result<Self> {
         let mut info = vk::QueryPoolCreateInfo::default().query_type(ty).query_count(desc.count);
         if ty == vk::QueryType::PIPELINE_STATISTICS {
             info = info.pipeline_statistics(desc.kind.statistics());
@@ -200,7 +200,7 @@ impl QueryPool {
             kind: desc.kind,
             count: desc.count,
             name: desc.debug_name.to_owned(),
-            marks: Mutex::new(Rank::QueryMarks, QueryMarks::new(desc.count)),
+            reset_state: Mutex::new(Rank::QueryResetState, QueryResetState::new(desc.count)),
             gpu: Arc::clone(gpu),
         })
     }
@@ -219,26 +219,26 @@ impl QueryPool {
         if fits {
             return Ok(());
         }
-        Err(Error::usage(&self.name, format!("its queries are {}; {call}", self.kind.words())))
+        Err(Error::usage(&self.name, format!("its queries are {}; {call}", self.kind.label())))
     }
 
     /// Fails where a command buffer that does `next` writes a query twice without a reset in between.
-    pub(crate) fn check_submit(&self, next: &QueryMarks) -> Result<()> {
-        match self.marks().first_conflict(next) {
+    pub(crate) fn check_submit(&self, next: &QueryResetState) -> Result<()> {
+        match self.reset_state().first_conflict(next) {
             None => Ok(()),
-            Some(query) => Err(self.not_reset(query)),
+            Some(query) => Err(self.not_reset_error(query)),
         }
     }
 
     /// Says that a query would be written twice.
-    pub(crate) fn not_reset(&self, query: u32) -> Error {
+    pub(crate) fn not_reset_error(&self, query: u32) -> Error {
         let message = format!("query {query} was written before; reset it first with reset_queries");
         Error::usage(&self.name, message)
     }
 
     /// A command buffer that does `next` was submitted.
-    pub(crate) fn submit(&self, next: &QueryMarks) {
-        self.marks().append(next);
+    pub(crate) fn mark_submitted(&self, next: &QueryResetState) {
+        self.reset_state().append(next);
     }
 
     /// Milliseconds of each timestamp since an arbitrary start; `None` where none was written yet.
@@ -287,7 +287,7 @@ impl QueryPool {
         let mut raw = [[0_u64; N]];
         self.results(query, &mut raw)?;
         let [(ready, numbers)] = raw.each_ref().map(|row| row.split_last().unwrap_or((&0, &[])));
-        Ok((*ready != 0).then(|| PipelineStatistics::of(bits, numbers)))
+        Ok((*ready != 0).then(|| PipelineStatistics::from_values(bits, numbers)))
     }
 
     /// Numbers with their availability behind them, for queries of the pool.
@@ -300,8 +300,8 @@ impl QueryPool {
         }
     }
 
-    fn marks(&self) -> Guard<'_, QueryMarks> {
-        self.marks.lock()
+    fn reset_state(&self) -> Guard<'_, QueryResetState> {
+        self.reset_state.lock()
     }
 }
 
@@ -321,7 +321,7 @@ mod tests {
         type Flags = vk::QueryPipelineStatisticFlags;
         let of = |kind: QueryKind, numbers: &[u64]| {
             assert_eq!(kind.statistics().as_raw().count_ones() as usize, numbers.len(), "{kind:?}");
-            PipelineStatistics::of(kind.statistics().as_raw(), numbers)
+            PipelineStatistics::from_values(kind.statistics().as_raw(), numbers)
         };
         let mesh = of(QueryKind::MeshStatistics, &[1, 2, 3, 4]);
         let expected = PipelineStatistics {

@@ -9,9 +9,9 @@ const WRITTEN: u8 = 4;
 
 /// What one command buffer does to the queries of one pool, or what all submitted ones have done.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct QueryMarks(Vec<u8>);
+pub(crate) struct QueryResetState(Vec<u8>);
 
-impl QueryMarks {
+impl QueryResetState {
     /// Nothing was done to `count` queries.
     pub(crate) fn new(count: u32) -> Self {
         Self(vec![0; count as usize])
@@ -65,10 +65,10 @@ mod tests {
         fn split_over_command_buffers_or_not_the_rule_is_one(
             buffers in prop::collection::vec(prop::collection::vec((0..4_u32, any::<bool>()), 0..12), 0..6)
         ) {
-            let mut queue = QueryMarks::new(4);
+            let mut queue = QueryResetState::new(4);
             let mut written = [false; 4];
             for steps in buffers {
-                let (mut local, mut after) = (QueryMarks::new(4), written);
+                let (mut local, mut after) = (QueryResetState::new(4), written);
                 let (mut refused, mut conflict) = (false, None);
                 for (query, reset) in steps {
                     let place = query as usize;
@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn what_is_outside_of_the_pool_is_never_ready() {
-        let mut marks = QueryMarks::new(2);
+        let mut marks = QueryResetState::new(2);
         marks.write(7);
         assert!(marks.is_ready(1) && !marks.is_ready(2));
         marks.write(1);

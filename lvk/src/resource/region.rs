@@ -3,7 +3,7 @@
 use ash::vk;
 
 use crate::barrier::Subresources;
-use crate::format::{Aspect, Part};
+use crate::format::{Aspect, CopyAspect};
 
 /// Part of a texture: a rectangle of one mip of some layers, or a box of one mip of a volume.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -57,9 +57,9 @@ pub struct TextureRange {
 
 /// What regions lie in: the part of an image that a texture shows.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Bounds {
+pub(crate) struct TextureBounds {
     /// Mips and layers, as part of the image.
-    pub(crate) shown: Subresources,
+    pub(crate) view_range: Subresources,
     /// Width, height and slices of mip 0 of the image.
     pub(crate) extent: [u32; 3],
 }
@@ -72,24 +72,24 @@ pub(crate) struct Region {
     pub(crate) layers: u32,
     pub(crate) offset: [u32; 3],
     pub(crate) extent: [u32; 3],
-    pub(crate) part: Part,
+    pub(crate) part: CopyAspect,
 }
 
-impl Bounds {
+impl TextureBounds {
     /// Width, height and slices of a mip, counted from the first that is shown.
     pub(crate) fn mip_extent(&self, mip: u32) -> [u32; 3] {
-        let mip = self.shown.base_mip.saturating_add(mip).min(31);
+        let mip = self.view_range.base_mip.saturating_add(mip).min(31);
         self.extent.map(|side| (side >> mip).max(1))
     }
 
     /// Makes a region of an aspect, `part` of the texels, definite; or says what is wrong with it.
-    pub(crate) fn resolve(&self, region: &TextureRegion, part: Part) -> Result<Region, String> {
-        let shown = self.shown;
-        let layers = span(region.layer, region.layers, shown.layer_count);
-        let (Some(layers), true) = (layers, region.mip < shown.mip_count) else {
-            return Err(missing(region.mip, region.layer, region.layers, shown));
+    pub(crate) fn resolve(&self, region: &TextureRegion, part: CopyAspect) -> Result<Region, String> {
+        let view_range = self.view_range;
+        let layers = resolve_count(region.layer, region.layers, view_range.layer_count);
+        let (Some(layers), true) = (layers, region.mip < view_range.mip_count) else {
+            return Err(missing_message(region.mip, region.layer, region.layers, view_range));
         };
-        let whole @ [width, height, slices] = part.shrunk(self.mip_extent(region.mip));
+        let whole @ [width, height, slices] = part.aspect_extent(self.mip_extent(region.mip));
         let outside = || {
             format!("region {region:?} does not lie inside the mip's {width} x {height} x {slices} texels")
         };
@@ -100,7 +100,7 @@ impl Bounds {
         let wanted = [region.extent[0], region.extent[1], region.depth];
         let mut extent = [0; 3];
         for axis in 0..3 {
-            extent[axis] = span(offset[axis], wanted[axis], whole[axis]).ok_or_else(outside)?;
+            extent[axis] = resolve_count(offset[axis], wanted[axis], whole[axis]).ok_or_else(outside)?;
         }
         let in_blocks = (0..2).all(|axis| {
             let (block, end) = (part.block[axis], offset[axis] + extent[axis]);
@@ -110,20 +110,21 @@ impl Bounds {
             let [columns, rows] = part.block;
             return Err(format!("region {region:?} cuts through blocks of {columns} x {rows} texels"));
         }
-        let (mip, layer) = (shown.base_mip + region.mip, shown.base_layer + region.layer);
+        let (mip, layer) = (view_range.base_mip + region.mip, view_range.base_layer + region.layer);
         Ok(Region { mip, layer, layers, offset, extent, part })
     }
 
     /// Makes a range definite, as part of the image.
     pub(crate) fn resolve_range(&self, range: &TextureRange) -> Result<Subresources, String> {
-        let shown = self.shown;
-        let mips = span(range.base_mip, range.mips, shown.mip_count);
-        let layers = span(range.base_layer, range.layers, shown.layer_count);
+        let view_range = self.view_range;
+        let mips = resolve_count(range.base_mip, range.mips, view_range.mip_count);
+        let layers = resolve_count(range.base_layer, range.layers, view_range.layer_count);
         let Some((mip_count, layer_count)) = mips.zip(layers) else {
-            let (mips, layers) = (shown.mip_count, shown.layer_count);
+            let (mips, layers) = (view_range.mip_count, view_range.layer_count);
             return Err(format!("{range:?} does not exist: it has {mips} mips and {layers} layers"));
         };
-        let (base_mip, base_layer) = (shown.base_mip + range.base_mip, shown.base_layer + range.base_layer);
+        let (base_mip, base_layer) =
+            (view_range.base_mip + range.base_mip, view_range.base_layer + range.base_layer);
         Ok(Subresources { base_mip, mip_count, base_layer, layer_count })
     }
 }
@@ -189,7 +190,7 @@ impl Region {
 
 /// How many of `whole` things from `first` on are meant, all of them where `count` is 0; `None` where there are not so
 /// many.
-fn span(first: u32, count: u32, whole: u32) -> Option<u32> {
+fn resolve_count(first: u32, count: u32, whole: u32) -> Option<u32> {
     let rest = whole.checked_sub(first).filter(|rest| *rest > 0)?;
     match count {
         0 => Some(rest),
@@ -197,8 +198,8 @@ fn span(first: u32, count: u32, whole: u32) -> Option<u32> {
     }
 }
 
-fn missing(mip: u32, layer: u32, count: u32, shown: Subresources) -> String {
-    let (mips, layers) = (shown.mip_count, shown.layer_count);
+fn missing_message(mip: u32, layer: u32, count: u32, view_range: Subresources) -> String {
+    let (mips, layers) = (view_range.mip_count, view_range.layer_count);
     let which = match count {
         0 | 1 => format!("layer {layer}"),
         count => format!("{count} layers from {layer} on"),
@@ -213,12 +214,12 @@ mod tests {
     use super::*;
     use crate::format::Format;
 
-    fn bounds() -> impl Strategy<Value = (Bounds, Format)> {
+    fn bounds() -> impl Strategy<Value = (TextureBounds, Format)> {
         let formats = [Format::R8Unorm, Format::Bc1RgbUnorm, Format::Astc10x6Srgb, Format::D32FloatS8];
         (1..70_u32, 1..70_u32, 1..9_u32, 1..9_u32, 0..3_u32, 0..3_u32, 0..4_usize).prop_map(
             move |(width, height, slices, layers, base_mip, base_layer, format)| {
-                let shown = Subresources { base_mip, mip_count: 3, base_layer, layer_count: layers };
-                (Bounds { shown, extent: [width, height, slices] }, formats[format])
+                let view_range = Subresources { base_mip, mip_count: 3, base_layer, layer_count: layers };
+                (TextureBounds { view_range, extent: [width, height, slices] }, formats[format])
             },
         )
     }
@@ -242,18 +243,18 @@ mod tests {
     proptest! {
         #[test]
         fn what_is_resolved_lies_inside_in_whole_blocks((bounds, format) in bounds(), region in region()) {
-            let part = format.part(Aspect::Main).unwrap();
+            let part = format.copy_aspect(Aspect::Main).unwrap();
             let Ok(found) = bounds.resolve(&region, part) else { return Ok(()) };
             let whole = bounds.mip_extent(region.mip);
-            let shown = bounds.shown;
-            prop_assert!(found.mip >= shown.base_mip && found.mip < shown.base_mip + shown.mip_count);
-            prop_assert!(found.layer >= shown.base_layer && found.layers > 0);
-            prop_assert!(found.layer + found.layers <= shown.base_layer + shown.layer_count);
+            let view_range = bounds.view_range;
+            prop_assert!(found.mip >= view_range.base_mip && found.mip < view_range.base_mip + view_range.mip_count);
+            prop_assert!(found.layer >= view_range.base_layer && found.layers > 0);
+            prop_assert!(found.layer + found.layers <= view_range.base_layer + view_range.layer_count);
             for (axis, side) in whole.into_iter().enumerate() {
                 prop_assert!(found.extent[axis] > 0);
                 prop_assert!(found.offset[axis] + found.extent[axis] <= side);
             }
-            let blocks = part.blocks([found.extent[0], found.extent[1]]);
+            let blocks = part.block_count([found.extent[0], found.extent[1]]);
             let count = u64::from(blocks[0]) * u64::from(blocks[1]) * u64::from(found.extent[2] * found.layers);
             prop_assert_eq!(found.bytes(), count * u64::from(part.block_bytes));
         }
@@ -261,10 +262,10 @@ mod tests {
         /// The whole of a mip always exists, and naming its sizes says the same as leaving them out.
         #[test]
         fn zero_is_all_there_is((bounds, format) in bounds(), mip in 0..3_u32) {
-            let part = format.part(Aspect::Main).unwrap();
+            let part = format.copy_aspect(Aspect::Main).unwrap();
             let open = TextureRegion { mip, layers: 0, ..Default::default() };
             let [width, height, depth] = bounds.mip_extent(mip);
-            let layers = bounds.shown.layer_count;
+            let layers = bounds.view_range.layer_count;
             let named = TextureRegion { layers, extent: [width, height], depth, ..open };
             prop_assert_eq!(bounds.resolve(&open, part).unwrap(), bounds.resolve(&named, part).unwrap());
             let more = TextureRegion { layers: layers + 1, ..open };

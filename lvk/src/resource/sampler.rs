@@ -84,7 +84,7 @@ impl BorderColor {
     }
 
     /// The colour, where it is the caller's own.
-    fn custom(self) -> Option<vk::ClearColorValue> {
+    fn custom_color(self) -> Option<vk::ClearColorValue> {
         match self {
             Self::Custom(float32) => Some(vk::ClearColorValue { float32 }),
             Self::CustomInteger(uint32) => Some(vk::ClearColorValue { uint32 }),
@@ -210,14 +210,14 @@ pub(crate) struct Sampler {
 
 impl Sampler {
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &SamplerDesc<'_>, slot: u32) -> Result<Self> {
-        check(gpu, desc)?;
-        let custom = desc.border.custom();
-        let custom_border = custom.map(|_| CustomBorder::take(gpu, desc.debug_name)).transpose()?;
+        check_sampler(gpu, desc)?;
+        let custom = desc.border.custom_color();
+        let custom_border = custom.map(|_| CustomBorder::acquire(gpu, desc.debug_name)).transpose()?;
         let mut border = vk::SamplerCustomBorderColorCreateInfoEXT::default()
             .custom_border_color(custom.unwrap_or_default());
         let mut reduction =
             vk::SamplerReductionModeCreateInfo::default().reduction_mode(desc.reduction.raw());
-        let mut info = info(desc, gpu.caps.max_anisotropy);
+        let mut info = create_info(desc, gpu.caps.max_anisotropy);
         if custom_border.is_some() {
             info = info.push_next(&mut border);
         }
@@ -244,7 +244,7 @@ impl Drop for Sampler {
 struct CustomBorder(Arc<Gpu>);
 
 impl CustomBorder {
-    fn take(gpu: &Arc<Gpu>, name: &str) -> Result<Self> {
+    fn acquire(gpu: &Arc<Gpu>, name: &str) -> Result<Self> {
         let limit = gpu.caps.limits.max_custom_borders;
         let taken = gpu.custom_borders.fetch_add(1, Ordering::Relaxed);
         let own = Self(Arc::clone(gpu));
@@ -261,7 +261,7 @@ impl Drop for CustomBorder {
 }
 
 /// Fails unless the device can make the sampler.
-fn check(gpu: &Gpu, desc: &SamplerDesc<'_>) -> Result<()> {
+fn check_sampler(gpu: &Gpu, desc: &SamplerDesc<'_>) -> Result<()> {
     let wrong = |message: &str| Err(Error::usage(desc.debug_name, message));
     let [min_lod, max_lod] = desc.lod_range;
     let numbers = [min_lod, max_lod, desc.lod_bias, desc.max_anisotropy];
@@ -278,26 +278,26 @@ fn check(gpu: &Gpu, desc: &SamplerDesc<'_>) -> Result<()> {
     let needed = [
         (desc.address.contains(&AddressMode::MirrorClampToEdge), OptionalFeature::MirrorClampToEdge),
         (desc.reduction != SamplerReductionMode::Mean, OptionalFeature::FilterMinMax),
-        (desc.border.custom().is_some(), OptionalFeature::CustomBorderColors),
-        (desc.border.custom().is_some(), OptionalFeature::CustomBorderColorWithoutFormat),
+        (desc.border.custom_color().is_some(), OptionalFeature::CustomBorderColors),
+        (desc.border.custom_color().is_some(), OptionalFeature::CustomBorderColorWithoutFormat),
     ];
     match needed.into_iter().find(|(needs, feature)| *needs && !gpu.caps.has(*feature)) {
         None => Ok(()),
         Some((_, feature)) => {
-            Err(gpu.lacks(&format!("sampler '{}': {}", desc.debug_name, feature.vulkan_name())))
+            Err(gpu.unsupported(&format!("sampler '{}': {}", desc.debug_name, feature.vulkan_name())))
         }
     }
 }
 
-fn info(desc: &SamplerDesc<'_>, max_anisotropy: f32) -> vk::SamplerCreateInfo<'static> {
+fn create_info(desc: &SamplerDesc<'_>, max_anisotropy: f32) -> vk::SamplerCreateInfo<'static> {
     let anisotropy = desc.max_anisotropy.clamp(1.0, max_anisotropy);
     vk::SamplerCreateInfo::default()
         .mag_filter(desc.mag_filter.raw())
         .min_filter(desc.min_filter.raw())
-        .mipmap_mode(mip_mode(desc.mip_filter))
-        .address_mode_u(address(desc.address[0]))
-        .address_mode_v(address(desc.address[1]))
-        .address_mode_w(address(desc.address[2]))
+        .mipmap_mode(raw_mip_mode(desc.mip_filter))
+        .address_mode_u(raw_address_mode(desc.address[0]))
+        .address_mode_v(raw_address_mode(desc.address[1]))
+        .address_mode_w(raw_address_mode(desc.address[2]))
         .anisotropy_enable(anisotropy > 1.0)
         .max_anisotropy(anisotropy)
         .compare_enable(desc.compare.is_some())
@@ -308,14 +308,14 @@ fn info(desc: &SamplerDesc<'_>, max_anisotropy: f32) -> vk::SamplerCreateInfo<'s
         .max_lod(desc.lod_range[1])
 }
 
-fn mip_mode(filter: Filter) -> vk::SamplerMipmapMode {
+fn raw_mip_mode(filter: Filter) -> vk::SamplerMipmapMode {
     match filter {
         Filter::Nearest => vk::SamplerMipmapMode::NEAREST,
         Filter::Linear => vk::SamplerMipmapMode::LINEAR,
     }
 }
 
-fn address(mode: AddressMode) -> vk::SamplerAddressMode {
+fn raw_address_mode(mode: AddressMode) -> vk::SamplerAddressMode {
     match mode {
         AddressMode::Repeat => vk::SamplerAddressMode::REPEAT,
         AddressMode::MirroredRepeat => vk::SamplerAddressMode::MIRRORED_REPEAT,

@@ -38,7 +38,7 @@ impl Swizzle {
         Self { red: Channel::Red, green: Channel::Green, blue: Channel::Blue, alpha: Channel::Alpha };
 
     /// What a view with this swizzle of a view with the `first` one shows.
-    pub(crate) fn after(self, first: Self) -> Self {
+    pub(crate) fn compose(self, first: Self) -> Self {
         let through = |channel| match channel {
             Channel::Zero | Channel::One => channel,
             Channel::Red => first.red,
@@ -91,10 +91,10 @@ mod tests {
     #[test]
     fn swizzles_are_taken_one_after_the_other() {
         let ones = Swizzle { red: Channel::One, green: Channel::Red, ..Swizzle::IDENTITY };
-        assert_eq!(REVERSED.after(REVERSED), Swizzle::IDENTITY);
-        assert_eq!(ones.after(Swizzle::IDENTITY), ones);
+        assert_eq!(REVERSED.compose(REVERSED), Swizzle::IDENTITY);
+        assert_eq!(ones.compose(Swizzle::IDENTITY), ones);
         let both =
             Swizzle { red: Channel::One, green: Channel::Alpha, blue: Channel::Green, alpha: Channel::Red };
-        assert_eq!(ones.after(REVERSED), both);
+        assert_eq!(ones.compose(REVERSED), both);
     }
 }

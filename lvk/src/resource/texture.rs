@@ -6,13 +6,13 @@ use ash::vk;
 
 use super::image::{Image, raw_usage};
 use super::image_check::check_cube_arrays;
-use super::region::{Bounds, Region, TextureRange, TextureRegion};
+use super::region::{Region, TextureBounds, TextureRange, TextureRegion};
 use super::swizzle::Swizzle;
 use super::texture_desc::{TextureDesc, TextureKind, TextureUsage};
 use super::view::{TextureViewDesc, ViewCache, ViewInfo, raw_kind};
 use crate::barrier::Subresources;
 use crate::error::{Error, Result};
-use crate::format::{Aspect, Format, Part};
+use crate::format::{Aspect, CopyAspect, Format};
 use crate::gpu::Gpu;
 
 /// Mips and layers of an image as one kind and format. Several textures may show the same image.
@@ -51,48 +51,48 @@ impl Texture {
         slot: u32,
         conversion: vk::SamplerYcbcrConversion,
     ) -> Result<Self> {
-        Ok(Self { conversion, ..Self::of(gpu, desc, Image::new(gpu, desc)?, slot) })
+        Ok(Self { conversion, ..Self::from_image(gpu, desc, Image::new(gpu, desc)?, slot) })
     }
 
     /// A texture with an image of somebody else's, which is as described.
     pub(crate) fn import(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, raw: vk::Image, slot: u32) -> Result<Self> {
-        Ok(Self::of(gpu, desc, Image::import(gpu, desc, raw)?, slot))
+        Ok(Self::from_image(gpu, desc, Image::import(gpu, desc, raw)?, slot))
     }
 
     /// The texture of an image, which is as described.
-    pub(crate) fn of(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, image: Image, slot: u32) -> Self {
+    pub(crate) fn from_image(gpu: &Arc<Gpu>, desc: &TextureDesc<'_>, image: Image, slot: u32) -> Self {
         Self {
             views: ViewCache::new(gpu),
             kind: desc.kind,
             format: desc.format,
-            range: image.shape.whole(),
-            stored_part: one_mip(image.shape.whole()),
+            range: image.shape.all_subresources(),
+            stored_part: one_mip(image.shape.all_subresources()),
             usage: image.usage_in(desc.format),
             slot,
             name: desc.debug_name.to_owned(),
             aspect: Aspect::Main,
             swizzle: desc.swizzle,
             conversion: vk::SamplerYcbcrConversion::null(),
-            lent: image.is_lent(),
+            lent: image.has_external_owner(),
             image: Arc::new(image),
         }
     }
 
-    /// A texture that shows part of this one. The caller has the image [shared](Image::share) before it is used.
+    /// A texture that shows part of this one. The caller has the image [shared](Image::add_texture) before it is used.
     pub(crate) fn view(&self, desc: &TextureViewDesc<'_>, slot: u32) -> Result<Self> {
-        let shown = self.check_view(desc)?;
+        let view_range = self.check_view(desc)?;
         Ok(Self {
             views: ViewCache::new(self.image.gpu()),
             image: Arc::clone(&self.image),
-            kind: shown.kind,
-            format: shown.format,
-            range: shown.range,
-            stored_part: one_mip(shown.range),
-            usage: shown.usage,
+            kind: view_range.kind,
+            format: view_range.format,
+            range: view_range.range,
+            stored_part: one_mip(view_range.range),
+            usage: view_range.usage,
             slot,
             name: desc.debug_name.to_owned(),
-            aspect: shown.aspect,
-            swizzle: desc.swizzle.after(self.swizzle),
+            aspect: view_range.aspect,
+            swizzle: desc.swizzle.compose(self.swizzle),
             conversion: vk::SamplerYcbcrConversion::null(),
             lent: false,
         })
@@ -114,18 +114,18 @@ impl Texture {
 
     /// The view a render pass draws to: a mip of a layer, or of a slice.
     pub(crate) fn target_view(&self, mip: u32, layer: u32) -> Result<vk::ImageView> {
-        self.raw_view(self.part(mip, layer), vk::ImageViewType::TYPE_2D, self.target_usage())
+        self.raw_view(self.subresource(mip, layer), vk::ImageViewType::TYPE_2D, self.target_usage())
     }
 
     /// The view a render pass draws several layers or slices to.
     pub(crate) fn layered_target_view(&self, mip: u32, layer: u32, count: u32) -> Result<vk::ImageView> {
-        let range = Subresources { layer_count: count, ..self.part(mip, layer) };
+        let range = Subresources { layer_count: count, ..self.subresource(mip, layer) };
         self.raw_view(range, vk::ImageViewType::TYPE_2D_ARRAY, self.target_usage())
     }
 
     /// The view a render pass takes its shading rates from.
     pub(crate) fn rate_view(&self, mip: u32, layer: u32) -> Result<vk::ImageView> {
-        self.raw_view(self.part(mip, layer), vk::ImageViewType::TYPE_2D, TextureUsage::SHADING_RATE)
+        self.raw_view(self.subresource(mip, layer), vk::ImageViewType::TYPE_2D, TextureUsage::SHADING_RATE)
     }
 
     /// One view serves both as a target and as what shaders read of it.
@@ -149,7 +149,7 @@ impl Texture {
             swizzle: Swizzle::IDENTITY,
             usage: raw_usage(self.target_usage(), self.format),
         };
-        self.views.get(&self.image, info, &self.name)
+        self.views.get_or_create(&self.image, info, &self.name)
     }
 
     /// Fails unless a pass can draw to the mip of `count` layers, or slices, from `layer` on.
@@ -167,11 +167,11 @@ impl Texture {
     }
 
     /// The part of the image that a pass uses which draws to the mip of the layers or slices: slices are not tracked.
-    pub(crate) fn drawn_part(&self, mip: u32, layer: u32, count: u32) -> Subresources {
+    pub(crate) fn attachment_subresources(&self, mip: u32, layer: u32, count: u32) -> Subresources {
         if self.kind.is_3d() {
-            return self.part(mip, 0);
+            return self.subresource(mip, 0);
         }
-        Subresources { layer_count: count, ..self.part(mip, layer) }
+        Subresources { layer_count: count, ..self.subresource(mip, layer) }
     }
 
     fn raw_view(
@@ -186,16 +186,16 @@ impl Texture {
             kind,
             format: self.format,
             aspect: if drawn || self.is_yuv() {
-                self.shown_aspects()
+                self.view_aspects()
             } else {
-                self.part_of(Aspect::Main)?.aspect
+                self.copy_aspect(Aspect::Main)?.aspect
             },
             conversion: self.conversion,
             range,
             swizzle: if sampled { self.swizzle } else { Swizzle::IDENTITY },
             usage: raw_usage(usage, self.format),
         };
-        self.views.get(&self.image, info, &self.name)
+        self.views.get_or_create(&self.image, info, &self.name)
     }
 
     /// Number of mips.
@@ -209,7 +209,7 @@ impl Texture {
     }
 
     /// One mip of one layer, counted from the texture's own first ones, as part of the image.
-    pub(crate) fn part(&self, mip: u32, layer: u32) -> Subresources {
+    pub(crate) fn subresource(&self, mip: u32, layer: u32) -> Subresources {
         let Subresources { base_mip, base_layer, .. } = self.range;
         Subresources {
             base_mip: base_mip + mip,
@@ -231,9 +231,9 @@ impl Texture {
     }
 
     /// What regions lie in.
-    pub(crate) fn bounds(&self) -> Bounds {
+    pub(crate) fn bounds(&self) -> TextureBounds {
         let [width, height] = self.image.extent;
-        Bounds { shown: self.range, extent: [width, height, self.image.depth] }
+        TextureBounds { view_range: self.range, extent: [width, height, self.image.depth] }
     }
 
     /// Whether shaders reach it through the sampler of its conversion.
@@ -242,7 +242,7 @@ impl Texture {
     }
 
     /// All aspects that the texture shows; none of planes, which are only copied and sampled.
-    pub(crate) fn shown_aspects(&self) -> vk::ImageAspectFlags {
+    pub(crate) fn view_aspects(&self) -> vk::ImageAspectFlags {
         match self.aspect {
             Aspect::Main => self.image.format.aspects(),
             Aspect::Stencil => vk::ImageAspectFlags::STENCIL,
@@ -251,10 +251,10 @@ impl Texture {
     }
 
     /// An aspect of what the texture shows, as copies move it.
-    pub(crate) fn part_of(&self, aspect: Aspect) -> Result<Part> {
+    pub(crate) fn copy_aspect(&self, aspect: Aspect) -> Result<CopyAspect> {
         let own = if self.aspect == Aspect::Main { aspect } else { self.aspect };
-        let shown = aspect == Aspect::Main || aspect == own;
-        self.image.format.part(own).filter(|_| shown).ok_or_else(|| {
+        let view_range = aspect == Aspect::Main || aspect == own;
+        self.image.format.copy_aspect(own).filter(|_| view_range).ok_or_else(|| {
             let message =
                 format!("{:?} with the aspect {:?} has no {aspect:?}", self.image.format, self.aspect);
             Error::usage(&self.name, message)
@@ -262,7 +262,7 @@ impl Texture {
     }
 
     /// Fails for textures that live in passes only.
-    pub(crate) fn check_kept(&self) -> Result<()> {
+    pub(crate) fn check_not_transient(&self) -> Result<()> {
         if !self.image.transient {
             return Ok(());
         }
@@ -273,14 +273,14 @@ impl Texture {
 
     /// Checks a region and resolves its sizes.
     pub(crate) fn resolve_region(&self, region: &TextureRegion) -> Result<Region> {
-        self.check_kept()?;
-        let part = self.part_of(region.aspect)?;
+        self.check_not_transient()?;
+        let part = self.copy_aspect(region.aspect)?;
         self.bounds().resolve(region, part).map_err(|message| Error::usage(&self.name, message))
     }
 
     /// Checks a range of mips and layers and resolves it.
     pub(crate) fn resolve_range(&self, range: &TextureRange) -> Result<Subresources> {
-        self.check_kept()?;
+        self.check_not_transient()?;
         self.bounds().resolve_range(range).map_err(|message| Error::usage(&self.name, message))
     }
 
@@ -335,7 +335,7 @@ impl Texture {
     }
 
     /// Decides what a view of the texture shows.
-    fn check_view(&self, desc: &TextureViewDesc<'_>) -> Result<Shown> {
+    fn check_view(&self, desc: &TextureViewDesc<'_>) -> Result<ResolvedView> {
         let kind = desc.kind.unwrap_or_else(|| match self.kind {
             TextureKind::D2Array { layers } => {
                 TextureKind::D2Array { layers: layers.saturating_sub(desc.base_layer) }
@@ -358,7 +358,7 @@ impl Texture {
         let volume = TextureKind::D3 { depth: self.mip_depth(desc.base_mip) };
         if (kind.is_3d() || self.kind.is_3d()) && (kind != volume || !self.kind.is_3d()) {
             return wrong(format!(
-                "'{}' is {:?}, whose mip cannot be shown as {kind:?}",
+                "'{}' is {:?}, whose mip cannot be viewed as {kind:?}",
                 self.name, self.kind
             ));
         }
@@ -374,10 +374,10 @@ impl Texture {
         if !self.image.has_format(format) && plane != Some(format) {
             return wrong(format!("list {format:?} in the view_formats of the texture of '{}'", self.name));
         }
-        if self.image.format.part(aspect).is_none() {
+        if self.image.format.copy_aspect(aspect).is_none() {
             return wrong(format!("'{}' is {:?}, which has no {aspect:?}", self.name, self.image.format));
         }
-        let shows_all = aspect == Aspect::Main && desc.swizzle.after(self.swizzle) == Swizzle::IDENTITY;
+        let shows_all = aspect == Aspect::Main && desc.swizzle.compose(self.swizzle) == Swizzle::IDENTITY;
         let changes_nothing = aspect == self.aspect && desc.swizzle == Swizzle::IDENTITY;
         let allowed = match (shows_all, changes_nothing) {
             (true, _) => allowed,
@@ -392,7 +392,7 @@ impl Texture {
                 self.name
             ));
         }
-        Ok(Shown { kind, format, range, usage, aspect })
+        Ok(ResolvedView { kind, format, range, usage, aspect })
     }
 
     /// The mips and layers of a view, as part of the image.
@@ -423,7 +423,7 @@ impl Texture {
 }
 
 /// What a view shows.
-struct Shown {
+struct ResolvedView {
     kind: TextureKind,
     format: Format,
     range: Subresources,

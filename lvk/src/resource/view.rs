@@ -75,27 +75,27 @@ impl ViewCache {
     }
 
     /// The view of this description, of the image that all views of the cache are of.
-    pub(crate) fn get(&self, image: &Image, info: ViewInfo, name: &str) -> Result<vk::ImageView> {
-        if let Some(view) = self.first(&info) {
+    pub(crate) fn get_or_create(&self, image: &Image, info: ViewInfo, name: &str) -> Result<vk::ImageView> {
+        if let Some(view) = self.find_cached(&info) {
             return Ok(view);
         }
         let mut others = self.others.lock();
         // Another thread may have made it while this one waited.
-        if let Some(view) = self.first(&info).or_else(|| others.get(&info).copied()) {
+        if let Some(view) = self.find_cached(&info).or_else(|| others.get(&info).copied()) {
             return Ok(view);
         }
-        let view = self.make(image, info, name)?;
+        let view = self.create(image, info, name)?;
         if self.first.set((info, view)).is_err() {
             others.insert(info, view);
         }
         Ok(view)
     }
 
-    fn first(&self, info: &ViewInfo) -> Option<vk::ImageView> {
+    fn find_cached(&self, info: &ViewInfo) -> Option<vk::ImageView> {
         self.first.get().filter(|(known, _)| known == info).map(|(_, view)| *view)
     }
 
-    fn make(&self, image: &Image, info: ViewInfo, name: &str) -> Result<vk::ImageView> {
+    fn create(&self, image: &Image, info: ViewInfo, name: &str) -> Result<vk::ImageView> {
         let mut usage = vk::ImageViewUsageCreateInfo::default().usage(info.usage);
         let mut conversion = vk::SamplerYcbcrConversionInfo::default().conversion(info.conversion);
         let mut create = vk::ImageViewCreateInfo::default()

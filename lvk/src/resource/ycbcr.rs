@@ -60,14 +60,14 @@ pub struct YuvConversion {
 impl YuvConversion {
     /// What a context has unless it is told otherwise: every format by BT.709 with the narrow range.
     pub const DEFAULT: [Self; 4] = [
-        Self::of(Format::Nv12),
-        Self::of(Format::Yuv420p8),
-        Self::of(Format::P010),
-        Self::of(Format::Yuv420p10),
+        Self::new(Format::Nv12),
+        Self::new(Format::Yuv420p8),
+        Self::new(Format::P010),
+        Self::new(Format::Yuv420p10),
     ];
 
     /// A format by BT.709 with the narrow range.
-    pub const fn of(format: Format) -> Self {
+    pub const fn new(format: Format) -> Self {
         let chroma = [ChromaSite::Cosited; 2];
         Self { format, model: YuvModel::Bt709, range: YuvRange::Narrow, chroma, filter: Filter::Linear }
     }
@@ -90,7 +90,7 @@ impl YuvConversion {
     }
 
     /// What a device with these features of the format lacks for the conversion.
-    fn lack(&self, features: vk::FormatFeatureFlags) -> Option<&'static str> {
+    fn missing_feature(&self, features: vk::FormatFeatureFlags) -> Option<&'static str> {
         use vk::FormatFeatureFlags as Features;
         let linear =
             Features::SAMPLED_IMAGE_FILTER_LINEAR | Features::SAMPLED_IMAGE_YCBCR_CONVERSION_LINEAR_FILTER;
@@ -126,14 +126,14 @@ pub(crate) struct YuvSampler {
 impl YuvSampler {
     /// The sampler, or what the device lacks for it.
     pub(crate) fn new(gpu: &Arc<Gpu>, desc: &YuvConversion) -> Result<Result<Self, &'static str>> {
-        if let Some(lack) = desc.lack(gpu.format_features(desc.format)) {
+        if let Some(lack) = desc.missing_feature(gpu.format_features(desc.format)) {
             return Ok(Err(lack));
         }
         let device = &gpu.device;
         // SAFETY: the device has the format with this filter and these sites, and the feature is on.
         let conversion = unsafe { device.create_sampler_ycbcr_conversion(&desc.info(), None) }
             .map_err(Error::vulkan("vkCreateSamplerYcbcrConversion"))?;
-        let descriptors = descriptors(gpu, desc.format);
+        let descriptors = descriptor_count(gpu, desc.format);
         let mut made = Self { conversion, sampler: vk::Sampler::null(), descriptors, gpu: Arc::clone(gpu) };
         let mut chain = vk::SamplerYcbcrConversionInfo::default().conversion(conversion);
         let edge = vk::SamplerAddressMode::CLAMP_TO_EDGE;
@@ -164,7 +164,7 @@ impl Drop for YuvSampler {
 }
 
 /// Descriptors that a texture of the format takes (`combinedImageSamplerDescriptorCount`).
-fn descriptors(gpu: &Gpu, format: Format) -> u32 {
+fn descriptor_count(gpu: &Gpu, format: Format) -> u32 {
     let info = vk::PhysicalDeviceImageFormatInfo2::default()
         .format(format.raw())
         .ty(vk::ImageType::TYPE_2D)
@@ -195,8 +195,8 @@ mod tests {
     fn what_a_conversion_lacks_is_named() {
         use vk::FormatFeatureFlags as F;
         let linear = F::SAMPLED_IMAGE_FILTER_LINEAR | F::SAMPLED_IMAGE_YCBCR_CONVERSION_LINEAR_FILTER;
-        let plain = YuvConversion::of(Format::Nv12);
-        let lack = |desc: YuvConversion, features| desc.lack(features).unwrap_or("nothing");
+        let plain = YuvConversion::new(Format::Nv12);
+        let lack = |desc: YuvConversion, features| desc.missing_feature(features).unwrap_or("nothing");
         assert_eq!(lack(plain, F::SAMPLED_IMAGE | F::COSITED_CHROMA_SAMPLES | linear), "nothing");
         assert!(lack(plain, F::empty()).contains("sample"));
         assert!(lack(plain, F::SAMPLED_IMAGE | F::MIDPOINT_CHROMA_SAMPLES | linear).contains("Midpoint"));

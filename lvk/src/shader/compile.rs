@@ -1,8 +1,8 @@
 //! Gets SPIR-V words out of what the caller gave.
 
 #[cfg(feature = "glsl")]
-use super::front_end::glsl;
-use super::spirv::passes::strip_primitive_culling::without_idle_culling;
+use super::front_end::compile_cached;
+use super::spirv::passes::strip_primitive_culling::strip_primitive_culling;
 use super::spirv::words;
 use super::{ShaderCache, ShaderModuleDesc, ShaderSource};
 use crate::error::{Error, Result};
@@ -33,7 +33,7 @@ pub(crate) struct CompileOptions {
 
 impl CompileOptions {
     /// For a device with these capabilities.
-    pub(crate) fn of(device: &Capabilities) -> Self {
+    pub(crate) fn from_capabilities(device: &Capabilities) -> Self {
         Self {
             formatless_read: device.formatless_storage_read,
             position_fetch: device.position_fetch,
@@ -55,22 +55,22 @@ pub(crate) fn compile(
 ) -> Result<Vec<u32>> {
     match desc.source {
         ShaderSource::Glsl(text) if options.software_ray_query => {
-            glsl(desc, text, options, cache).map(|words| without_idle_culling(&words))
+            compile_cached(desc, text, options, cache).map(|words| strip_primitive_culling(&words))
         }
-        ShaderSource::Glsl(text) => glsl(desc, text, options, cache),
+        ShaderSource::Glsl(text) => compile_cached(desc, text, options, cache),
         ShaderSource::Spirv(words) => {
-            words::check(words).map_err(|log| failed(desc.debug_name, log))?;
+            words::validate(words).map_err(|log| compile_error(desc.debug_name, log))?;
             Ok(words.to_vec())
         }
     }
 }
 
-pub(super) fn failed(name: &str, log: impl Into<String>) -> Error {
+pub(super) fn compile_error(name: &str, log: impl Into<String>) -> Error {
     Error::Shader { name: name.to_owned(), log: log.into() }
 }
 
 #[cfg(not(feature = "glsl"))]
-fn glsl(
+fn compile_cached(
     desc: &ShaderModuleDesc<'_>,
     _: &str,
     _: &CompileOptions,

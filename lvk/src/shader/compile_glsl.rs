@@ -17,7 +17,7 @@ use crate::gpu::caps::capabilities::Capabilities;
 /// [`Error::Shader`](crate::Error::Shader) with the compiler's text, or when the module declares resources outside of
 /// the bindless set.
 pub fn compile_glsl(desc: &ShaderModuleDesc<'_>, capabilities: &Capabilities) -> Result<Vec<u32>> {
-    let words = compile(desc, &CompileOptions::of(capabilities), None)?;
+    let words = compile(desc, &CompileOptions::from_capabilities(capabilities), None)?;
     reflect(desc.debug_name, desc.stage, &words)?;
     Ok(words)
 }

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::SystemTime;
 
-use super::disk_file::{Entry, Fingerprint, Included, open, seal};
+use super::disk_file::{CachedModule, Fingerprint, Included, decode_file, encode_file};
 use crate::cache_file::{read, replace};
 use crate::lock_order::{Mutex, Rank};
 
 /// A folder holds at most this; beyond it what was not used for longest goes until three quarters are left.
-const MOST_BYTES: u64 = 64 << 20;
+const MAX_BYTES: u64 = 64 << 20;
 const EXTENSION: &str = ".spirv";
 /// Digits of a key in a file's name.
 const KEY_DIGITS: usize = 32;
@@ -39,7 +39,7 @@ impl ShaderCache {
     pub(crate) fn new(folder: &Path) -> Self {
         Self {
             folder: folder.to_owned(),
-            most_bytes: MOST_BYTES,
+            most_bytes: MAX_BYTES,
             bytes: Mutex::new(Rank::ShaderCacheFolder, None),
             found: AtomicU64::new(0),
             compiled: AtomicU64::new(0),
@@ -52,13 +52,13 @@ impl ShaderCache {
     }
 
     /// The words of an earlier compilation, if `is_same` says that what it included is still the same.
-    pub(super) fn find(
+    pub(super) fn load(
         &self,
         key: Fingerprint,
         is_same: impl FnOnce(&[Included]) -> bool,
     ) -> Option<Vec<u32>> {
         let path = self.path(key);
-        let file = match read(&path, MOST_BYTES) {
+        let file = match read(&path, MAX_BYTES) {
             Ok(file) => file,
             Err(error) => {
                 if error.kind() != ErrorKind::NotFound {
@@ -67,7 +67,7 @@ impl ShaderCache {
                 return None;
             }
         };
-        let entry = match open(key, &file) {
+        let entry = match decode_file(key, &file) {
             Ok(entry) => entry,
             Err(reason) => {
                 log::warn!("the compiled shader '{}' is dropped: {reason}", path.display());
@@ -77,34 +77,34 @@ impl ShaderCache {
         if !is_same(&entry.included) {
             return None;
         }
-        touch(&path);
+        mark_used(&path);
         self.found.fetch_add(1, Ordering::Relaxed);
         Some(entry.words)
     }
 
     /// Keeps the words of a compilation. No trouble with files is an error.
-    pub(super) fn keep(&self, key: Fingerprint, entry: &Entry) {
+    pub(super) fn store(&self, key: Fingerprint, entry: &CachedModule) {
         self.compiled.fetch_add(1, Ordering::Relaxed);
         let path = self.path(key);
-        let file = seal(key, entry);
+        let file = encode_file(key, entry);
         let written = std::fs::create_dir_all(&self.folder).and_then(|()| replace(&path, &file));
         if let Err(error) = written {
             log::warn!("the compiled shader '{}' cannot be kept: {error}", path.display());
             return;
         }
-        self.grow(file.len() as u64);
+        self.count_bytes(file.len() as u64);
     }
 
     /// Counts a new file, and removes old ones where there are too many.
-    fn grow(&self, bytes: u64) {
+    fn count_bytes(&self, bytes: u64) {
         let mut total = self.bytes.lock();
         let now = match *total {
             Some(known) => known + bytes,
-            None => files_of(&self.folder).iter().map(|file| file.bytes).sum(),
+            None => cache_files(&self.folder).iter().map(|file| file.bytes).sum(),
         };
         *total = Some(now);
         if now > self.most_bytes {
-            *total = Some(trim(files_of(&self.folder), self.most_bytes / 4 * 3));
+            *total = Some(trim(cache_files(&self.folder), self.most_bytes / 4 * 3));
         }
     }
 
@@ -115,18 +115,18 @@ impl ShaderCache {
 
 /// A file of the cache.
 #[derive(Debug, Clone)]
-struct Kept {
+struct CacheFile {
     path: PathBuf,
     used: SystemTime,
     bytes: u64,
 }
 
 /// The files of the cache in a folder; others are left alone.
-fn files_of(folder: &Path) -> Vec<Kept> {
+fn cache_files(folder: &Path) -> Vec<CacheFile> {
     let Ok(entries) = std::fs::read_dir(folder) else { return Vec::new() };
     let kept = |entry: std::fs::DirEntry| {
         let data = entry.metadata().ok().filter(|data| data.is_file() && is_ours(&entry.file_name()))?;
-        Some(Kept { path: entry.path(), used: data.modified().ok()?, bytes: data.len() })
+        Some(CacheFile { path: entry.path(), used: data.modified().ok()?, bytes: data.len() })
     };
     entries.flatten().filter_map(kept).collect()
 }
@@ -141,7 +141,7 @@ fn is_ours(name: &std::ffi::OsStr) -> bool {
 }
 
 /// Removes what was not used for longest until at most `target` bytes are left; answers how many are.
-fn trim(mut files: Vec<Kept>, target: u64) -> u64 {
+fn trim(mut files: Vec<CacheFile>, target: u64) -> u64 {
     files.sort_by_key(|file| file.used);
     let mut left: u64 = files.iter().map(|file| file.bytes).sum();
     for file in files {
@@ -156,7 +156,7 @@ fn trim(mut files: Vec<Kept>, target: u64) -> u64 {
 }
 
 /// Notes that a file was used; where the folder cannot be written, its age decides instead.
-fn touch(path: &Path) {
+fn mark_used(path: &Path) {
     let file = std::fs::File::options().append(true).open(path);
     let _ = file.and_then(|file| file.set_modified(SystemTime::now()));
 }
@@ -173,8 +173,8 @@ mod tests {
         ShaderCache { most_bytes: files * WORDS * 4 + files * 100, ..ShaderCache::new(folder) }
     }
 
-    fn entry(number: u32) -> Entry {
-        Entry { included: Vec::new(), words: vec![number; WORDS as usize] }
+    fn entry(number: u32) -> CachedModule {
+        CachedModule { included: Vec::new(), words: vec![number; WORDS as usize] }
     }
 
     fn key(number: u32) -> Fingerprint {
@@ -193,13 +193,13 @@ mod tests {
         std::fs::write(folder.join("mine.spirv"), vec![0; 1 << 16]).unwrap();
         let cache = cache(&folder, 8);
         for number in 0..8 {
-            cache.keep(key(number), &entry(number));
+            cache.store(key(number), &entry(number));
             age(&cache, number, 1000 - u64::from(number));
         }
-        assert_eq!(cache.find(key(0), |_| true), Some(entry(0).words), "and so it is the newest");
-        assert_eq!(cache.find(key(1), |_| false), None, "other includes");
-        cache.keep(key(8), &entry(8));
-        let found: Vec<u32> = (0..9).filter(|number| cache.find(key(*number), |_| true).is_some()).collect();
+        assert_eq!(cache.load(key(0), |_| true), Some(entry(0).words), "and so it is the newest");
+        assert_eq!(cache.load(key(1), |_| false), None, "other includes");
+        cache.store(key(8), &entry(8));
+        let found: Vec<u32> = (0..9).filter(|number| cache.load(key(*number), |_| true).is_some()).collect();
         assert_eq!(found, [0, 4, 5, 6, 7, 8], "three quarters of eight are left");
         assert!(folder.join("mine.spirv").exists());
         assert_eq!(cache.counts(), ShaderCacheStats { found: 7, compiled: 9 });

@@ -9,26 +9,26 @@ const VERSION: u32 = 1;
 const COMPILER: &str = "glslang 0.9.1, glslang-sys 0.9.2+e1b562a";
 /// Magic, version, reserved, key, checksum of everything behind it.
 const HEADER_BYTES: usize = 40;
-const MOST_NAME_BYTES: usize = 1 << 16;
+const MAX_NAME_BYTES: usize = 1 << 16;
 
 /// Two checksums: what is told apart by both is taken for different.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub(super) struct Fingerprint(pub(super) [u64; 2]);
 
 impl Fingerprint {
-    pub(super) fn of(bytes: &[u8]) -> Self {
+    pub(super) fn from_bytes(bytes: &[u8]) -> Self {
         Self([1, 2].map(|seed| fingerprint(bytes, seed)))
     }
 
     /// Of the compiler and of everything a compilation is given; `parts` are kept apart by their lengths.
-    pub(super) fn of_input<'a>(numbers: &[u32], parts: impl Iterator<Item = &'a [u8]>) -> Self {
+    pub(super) fn from_input<'a>(numbers: &[u32], parts: impl Iterator<Item = &'a [u8]>) -> Self {
         let mut all = Vec::new();
         all.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
         for part in std::iter::once(COMPILER.as_bytes()).chain(parts) {
             all.extend((part.len() as u64).to_le_bytes());
             all.extend(part);
         }
-        Self::of(&all)
+        Self::from_bytes(&all)
     }
 }
 
@@ -47,15 +47,15 @@ pub(super) struct Included {
 
 /// What a file holds.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(super) struct Entry {
+pub(super) struct CachedModule {
     /// In the order in which the compiler asked.
     pub(super) included: Vec<Included>,
     pub(super) words: Vec<u32>,
 }
 
 /// The file for a module that was compiled from `key`.
-pub(super) fn seal(key: Fingerprint, entry: &Entry) -> Vec<u8> {
-    let body = encode(entry);
+pub(super) fn encode_file(key: Fingerprint, entry: &CachedModule) -> Vec<u8> {
+    let body = encode_body(entry);
     let mut file = Vec::with_capacity(HEADER_BYTES + body.len());
     file.extend(MAGIC);
     file.extend(VERSION.to_le_bytes());
@@ -67,7 +67,7 @@ pub(super) fn seal(key: Fingerprint, entry: &Entry) -> Vec<u8> {
 }
 
 /// What the file holds, if it is whole and was compiled from `key`.
-pub(super) fn open(key: Fingerprint, file: &[u8]) -> Result<Entry, &'static str> {
+pub(super) fn decode_file(key: Fingerprint, file: &[u8]) -> Result<CachedModule, &'static str> {
     if !file.starts_with(&MAGIC) {
         return Err("it is no compiled shader");
     }
@@ -82,7 +82,7 @@ pub(super) fn open(key: Fingerprint, file: &[u8]) -> Result<Entry, &'static str>
     if header[12..16] != [0; 4] || header[32..] != checksum(key, body).to_le_bytes() {
         return Err(DAMAGED);
     }
-    decode(body).ok_or(DAMAGED)
+    decode_body(body).ok_or(DAMAGED)
 }
 
 const DAMAGED: &str = "it is damaged or cut off";
@@ -91,7 +91,7 @@ fn checksum(key: Fingerprint, body: &[u8]) -> u64 {
     fingerprint(body, key.0[0])
 }
 
-fn encode(entry: &Entry) -> Vec<u8> {
+fn encode_body(entry: &CachedModule) -> Vec<u8> {
     let mut out = (entry.included.len() as u32).to_le_bytes().to_vec();
     for included in &entry.included {
         out.push(included.local.into());
@@ -104,24 +104,28 @@ fn encode(entry: &Entry) -> Vec<u8> {
     out
 }
 
-fn decode(body: &[u8]) -> Option<Entry> {
+fn decode_body(body: &[u8]) -> Option<CachedModule> {
     let mut rest = body;
     let mut included = Vec::new();
-    for _ in 0..u32::from_le_bytes(take(&mut rest)?) {
-        let [local] = take(&mut rest)?;
-        let depth = u32::from_le_bytes(take(&mut rest)?);
-        let text = Fingerprint([u64::from_le_bytes(take(&mut rest)?), u64::from_le_bytes(take(&mut rest)?)]);
-        let len = u32::from_le_bytes(take(&mut rest)?) as usize;
-        let (name, behind) = rest.split_at_checked(len).filter(|_| len <= MOST_NAME_BYTES)?;
+    for _ in 0..u32::from_le_bytes(take_array(&mut rest)?) {
+        let [local] = take_array(&mut rest)?;
+        let depth = u32::from_le_bytes(take_array(&mut rest)?);
+        let text = Fingerprint([
+            u64::from_le_bytes(take_array(&mut rest)?),
+            u64::from_le_bytes(take_array(&mut rest)?),
+        ]);
+        let len = u32::from_le_bytes(take_array(&mut rest)?) as usize;
+        let (name, behind) = rest.split_at_checked(len).filter(|_| len <= MAX_NAME_BYTES)?;
         rest = behind;
         let name = std::str::from_utf8(name).ok()?.to_owned();
         included.push(Included { local: local != 0, depth, name, text });
     }
     let (words, odd) = rest.as_chunks::<4>();
-    odd.is_empty().then(|| Entry { included, words: words.iter().map(|w| u32::from_le_bytes(*w)).collect() })
+    odd.is_empty()
+        .then(|| CachedModule { included, words: words.iter().map(|w| u32::from_le_bytes(*w)).collect() })
 }
 
-fn take<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
+fn take_array<const N: usize>(rest: &mut &[u8]) -> Option<[u8; N]> {
     let (head, tail) = rest.split_first_chunk::<N>()?;
     *rest = tail;
     Some(*head)
@@ -135,52 +139,55 @@ mod tests {
 
     const KEY: Fingerprint = Fingerprint([3, 4]);
 
-    fn entries() -> impl Strategy<Value = Entry> {
+    fn entries() -> impl Strategy<Value = CachedModule> {
         let included = (any::<bool>(), any::<u32>(), ".{0,20}", any::<[u64; 2]>())
             .prop_map(|(local, depth, name, text)| Included { local, depth, name, text: Fingerprint(text) });
         (prop::collection::vec(included, 0..4), prop::collection::vec(any::<u32>(), 0..40))
-            .prop_map(|(included, words)| Entry { included, words })
+            .prop_map(|(included, words)| CachedModule { included, words })
     }
 
     proptest! {
         #[test]
         fn what_was_sealed_is_found_again(entry in entries()) {
-            prop_assert_eq!(open(KEY, &seal(KEY, &entry)), Ok(entry));
+            prop_assert_eq!(decode_file(KEY, &encode_file(KEY, &entry)), Ok(entry));
         }
 
         #[test]
         fn every_change_of_a_bit_and_every_cut_is_seen(
             entry in entries(), at in any::<prop::sample::Index>(), bit in 0..8_u32
         ) {
-            let mut file = seal(KEY, &entry);
+            let mut file = encode_file(KEY, &entry);
             let at = at.index(file.len());
-            prop_assert!(open(KEY, &file[..at]).is_err());
+            prop_assert!(decode_file(KEY, &file[..at]).is_err());
             file[at] ^= 1 << bit;
-            prop_assert!(open(KEY, &file).is_err());
+            prop_assert!(decode_file(KEY, &file).is_err());
         }
 
         #[test]
         fn random_bodies_are_read_or_refused(body in prop::collection::vec(any::<u8>(), 0..200)) {
-            let _ = decode(&body);
+            let _ = decode_body(&body);
         }
     }
 
     #[test]
     fn files_of_others_are_named() {
-        let file = seal(KEY, &Entry::default());
-        assert_eq!(open(Fingerprint([3, 5]), &file), Err("it was compiled from something else"));
-        assert_eq!(open(KEY, b"#version 460"), Err("it is no compiled shader"));
+        let file = encode_file(KEY, &CachedModule::default());
+        assert_eq!(decode_file(Fingerprint([3, 5]), &file), Err("it was compiled from something else"));
+        assert_eq!(decode_file(KEY, b"#version 460"), Err("it is no compiled shader"));
         let mut newer = file;
         newer[8] += 1;
-        assert_eq!(open(KEY, &newer), Err("another version of the library wrote it"));
+        assert_eq!(decode_file(KEY, &newer), Err("another version of the library wrote it"));
     }
 
     #[test]
     fn parts_of_the_input_are_kept_apart() {
-        let of = |parts: &[&str]| Fingerprint::of_input(&[1], parts.iter().map(|part| part.as_bytes()));
+        let of = |parts: &[&str]| Fingerprint::from_input(&[1], parts.iter().map(|part| part.as_bytes()));
         assert_ne!(of(&["ab", "c"]), of(&["a", "bc"]));
         assert_ne!(of(&["ab"]), of(&["ab", ""]));
-        assert_ne!(Fingerprint::of_input(&[1], [].into_iter()), Fingerprint::of_input(&[2], [].into_iter()));
+        assert_ne!(
+            Fingerprint::from_input(&[1], [].into_iter()),
+            Fingerprint::from_input(&[2], [].into_iter())
+        );
     }
 
     #[test]

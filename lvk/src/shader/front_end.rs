@@ -6,37 +6,38 @@ use glslang::error::GlslangError;
 use glslang::limits::ResourceLimits;
 use glslang::{Compiler, CompilerOptions, ShaderInput, ShaderMessage, SpirvVersion, Target, VulkanVersion};
 
-use super::compile::{CompileOptions, failed};
-use super::disk_file::{Entry, Fingerprint};
+use super::compile::{CompileOptions, compile_error};
+use super::disk_file::{CachedModule, Fingerprint};
 use super::include::Includes;
-use super::sanitize::{self, Complaint};
-use super::spirv::debug_source::with_texts;
-use super::spirv::passes::fold_sampled_image::without_sampled_copies;
-use super::spirv::passes::strip_unused_bindings::without_unused_resources;
+use super::sanitize::{self, SourceError};
+use super::spirv::debug_source::embed_source;
+use super::spirv::passes::fold_sampled_image::fold_sampled_images;
+use super::spirv::passes::strip_unused_bindings::strip_unused_bindings;
 use super::{ShaderCache, ShaderModuleDesc, ShaderStage, diagnostics, preamble};
 use crate::error::Result;
 
 /// The words of `text`: those of an earlier run where `cache` has them.
-pub(super) fn glsl(
+pub(super) fn compile_cached(
     desc: &ShaderModuleDesc<'_>,
     text: &str,
     options: &CompileOptions,
     cache: Option<&ShaderCache>,
 ) -> Result<Vec<u32>> {
     let name = desc.debug_name;
-    let complain = |c: Complaint| failed(name, format!("line {}: {}", c.line, c.message));
+    let complain = |c: SourceError| compile_error(name, format!("line {}: {}", c.line, c.message));
     let text =
         sanitize::to_ascii(text).and_then(|text| sanitize::without_version(&text)).map_err(complain)?;
     check_defines(desc)?;
     let preamble = preamble::preamble(desc.stage, options, desc.defines);
     let Some(cache) = cache else { return Ok(translate(desc, &preamble, &text)?.words) };
     let key = fingerprint(desc, &preamble, &text);
-    let found = cache.find(key, |included| Includes::new(desc.includes, desc.include_dirs).finds(included));
+    let found =
+        cache.load(key, |included| Includes::new(desc.includes, desc.include_dirs).finds_unchanged(included));
     if let Some(words) = found {
         return Ok(words);
     }
     let entry = translate(desc, &preamble, &text)?;
-    cache.keep(key, &entry);
+    cache.store(key, &entry);
     Ok(entry.words)
 }
 
@@ -47,26 +48,29 @@ fn fingerprint(desc: &ShaderModuleDesc<'_>, preamble: &str, text: &str) -> Finge
     let parts = [preamble, text, name].into_iter().chain(desc.includes.iter().map(|(name, _)| *name));
     let dirs = desc.include_dirs.iter().map(|dir| dir.as_os_str().as_encoded_bytes());
     let numbers = [desc.stage as u32, desc.debug_info.into(), desc.includes.len() as u32];
-    Fingerprint::of_input(&numbers, parts.map(str::as_bytes).chain(dirs))
+    Fingerprint::from_input(&numbers, parts.map(str::as_bytes).chain(dirs))
 }
 
 /// Compiles, and tells what was included.
-fn translate(desc: &ShaderModuleDesc<'_>, preamble: &str, text: &str) -> Result<Entry> {
+fn translate(desc: &ShaderModuleDesc<'_>, preamble: &str, text: &str) -> Result<CachedModule> {
     let name = desc.debug_name;
     let mut includes = Includes::new(desc.includes, desc.include_dirs);
     let words = match to_spirv(name, desc.stage, format!("{preamble}{text}"), &mut includes) {
-        Ok(words) => without_sampled_copies(without_unused_resources(words)),
+        Ok(words) => fold_sampled_images(strip_unused_bindings(words)),
         Err(error) => {
-            return Err(failed(name, diagnostics::errors(&log_of(error), includes.into_failures())));
+            return Err(compile_error(
+                name,
+                diagnostics::errors(&error_log(error), includes.into_failures()),
+            ));
         }
     };
     let (included, texts) = includes.into_found();
     if !desc.debug_info {
-        return Ok(Entry { included, words });
+        return Ok(CachedModule { included, words });
     }
     let own = (name.replace(|c: char| !c.is_ascii() || c == '\0', "?"), text.to_owned());
     let texts: Vec<_> = std::iter::once(own).chain(texts).collect();
-    Ok(Entry { included, words: with_texts(&words, &texts) })
+    Ok(CachedModule { included, words: embed_source(&words, &texts) })
 }
 
 fn to_spirv(
@@ -115,17 +119,20 @@ fn check_defines(desc: &ShaderModuleDesc<'_>) -> Result<()> {
     for (name, value) in desc.defines {
         let starts_well = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');
         if !starts_well || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_') {
-            return Err(failed(desc.debug_name, format!("define '{name}': the name is not an identifier")));
+            return Err(compile_error(
+                desc.debug_name,
+                format!("define '{name}': the name is not an identifier"),
+            ));
         }
         if !value.chars().all(|c| c.is_ascii_graphic() || c == ' ' || c == '\t') || value.ends_with('\\') {
             let log = format!("define '{name}': the value must be one line of printable ASCII");
-            return Err(failed(desc.debug_name, log));
+            return Err(compile_error(desc.debug_name, log));
         }
     }
     Ok(())
 }
 
-fn log_of(error: GlslangError) -> String {
+fn error_log(error: GlslangError) -> String {
     match error {
         GlslangError::PreprocessError(log)
         | GlslangError::ParseError(log)

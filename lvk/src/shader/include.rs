@@ -16,8 +16,8 @@ const MAX_DEPTH: usize = 64;
 pub(super) struct Includes<'a> {
     listed: &'a [(&'a str, &'a str)],
     dirs: &'a [&'a Path],
-    open: Vec<Place>,
-    once: HashSet<Place>,
+    open: Vec<IncludeOrigin>,
+    once: HashSet<IncludeOrigin>,
     /// Why each directive failed, in the order the compiler met them.
     failures: Vec<String>,
     /// What was answered, in order, and the texts with their names, each once.
@@ -29,7 +29,7 @@ pub(super) struct Includes<'a> {
 
 /// Where an included text came from; equal for equal files.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-enum Place {
+enum IncludeOrigin {
     Library(&'static str),
     Listed(String),
     File(PathBuf),
@@ -51,7 +51,7 @@ impl<'a> Includes<'a> {
 
     /// Whether directives like those of an earlier compilation find the same texts still. The compiler asks the same again
     /// as long as it is given the same.
-    pub(super) fn finds(mut self, earlier: &[Included]) -> bool {
+    pub(super) fn finds_unchanged(mut self, earlier: &[Included]) -> bool {
         earlier.iter().enumerate().all(|(index, earlier)| {
             let ty = if earlier.local { IncludeType::Local } else { IncludeType::System };
             self.include(ty, &earlier.name, "", earlier.depth as usize);
@@ -69,12 +69,12 @@ impl<'a> Includes<'a> {
         self.failures
     }
 
-    fn open(&mut self, local: bool, name: &str) -> Result<IncludeResult, String> {
+    fn include_text(&mut self, local: bool, name: &str) -> Result<IncludeResult, String> {
         if self.open.len() >= MAX_DEPTH {
             return Err(format!("includes are nested deeper than {MAX_DEPTH} files"));
         }
-        let (place, text) = self.find(local, name)?;
-        let shown = place.shown();
+        let (place, text) = self.resolve(local, name)?;
+        let shown = place.display_path();
         if self.once.contains(&place) {
             self.open.push(place);
             return Ok(IncludeResult { name: shown, data: String::new() });
@@ -92,35 +92,37 @@ impl<'a> Includes<'a> {
         Ok(IncludeResult { name: shown, data })
     }
 
-    fn find(&self, local: bool, name: &str) -> Result<(Place, String), String> {
+    fn resolve(&self, local: bool, name: &str) -> Result<(IncludeOrigin, String), String> {
         if let Some((name, text)) = preamble::LIBRARY.into_iter().find(|(known, _)| *known == name) {
-            return Ok((Place::Library(name), text.to_owned()));
+            return Ok((IncludeOrigin::Library(name), text.to_owned()));
         }
-        if let Some(found) = self.find_listed(local, name) {
+        if let Some(found) = self.resolve_listed(local, name) {
             return Ok(found);
         }
         let beside = match self.open.last() {
-            Some(Place::File(path)) if local => path.parent(),
+            Some(IncludeOrigin::File(path)) if local => path.parent(),
             _ => None,
         };
         for dir in beside.into_iter().chain(self.dirs.iter().copied()) {
             let path = dir.join(name);
             if path.is_file() {
-                return read(&path).map(|text| (Place::File(canonical(path)), text));
+                return read_text(&path).map(|text| (IncludeOrigin::File(canonicalize(path)), text));
             }
         }
         Err(self.not_found(name, beside))
     }
 
-    fn find_listed(&self, local: bool, name: &str) -> Option<(Place, String)> {
+    fn resolve_listed(&self, local: bool, name: &str) -> Option<(IncludeOrigin, String)> {
         let beside = match self.open.last() {
-            Some(Place::Listed(includer)) if local => normal(&format!("{includer}/../{name}")),
+            Some(IncludeOrigin::Listed(includer)) if local => {
+                normalize_path(&format!("{includer}/../{name}"))
+            }
             _ => None,
         };
-        [normal(name), beside].into_iter().flatten().find_map(|wanted| {
-            let same = |listed: &&(&str, &str)| normal(listed.0).as_deref() == Some(wanted.as_str());
+        [normalize_path(name), beside].into_iter().flatten().find_map(|wanted| {
+            let same = |listed: &&(&str, &str)| normalize_path(listed.0).as_deref() == Some(wanted.as_str());
             let text = self.listed.iter().find(same)?.1.to_owned();
-            Some((Place::Listed(wanted), text))
+            Some((IncludeOrigin::Listed(wanted), text))
         })
     }
 
@@ -143,8 +145,8 @@ impl<'a> Includes<'a> {
         format!("include '{name}' not found in {}", places.join(", "))
     }
 
-    fn note(&mut self, local: bool, name: &str, depth: usize, found: &IncludeResult) {
-        let text = Fingerprint::of(found.data.as_bytes());
+    fn record_include(&mut self, local: bool, name: &str, depth: usize, found: &IncludeResult) {
+        let text = Fingerprint::from_bytes(found.data.as_bytes());
         self.included.push(Included { local, depth: depth as u32, name: name.to_owned(), text });
         if !self.texts.iter().any(|(known, _)| *known == found.name) {
             self.texts.push((found.name.clone(), found.data.clone()));
@@ -152,12 +154,12 @@ impl<'a> Includes<'a> {
     }
 
     /// ` (included by b.glsl, included by a.glsl)`, innermost first.
-    fn chain(&self) -> String {
+    fn include_chain(&self) -> String {
         if self.open.is_empty() {
             return String::new();
         }
         let chain: Vec<_> =
-            self.open.iter().rev().map(|place| format!("included by {}", place.shown())).collect();
+            self.open.iter().rev().map(|place| format!("included by {}", place.display_path())).collect();
         format!(" ({})", chain.join(", "))
     }
 }
@@ -170,13 +172,13 @@ impl IncludeHandler for Includes<'_> {
             return None;
         }
         self.open.truncate(depth.saturating_sub(1));
-        match self.open(local, name) {
+        match self.include_text(local, name) {
             Ok(result) => {
-                self.note(local, name, depth, &result);
+                self.record_include(local, name, depth, &result);
                 Some(result)
             }
             Err(reason) => {
-                self.failures.push(reason + &self.chain());
+                self.failures.push(reason + &self.include_chain());
                 self.refused = local.then(|| (depth, name.to_owned()));
                 None
             }
@@ -184,8 +186,8 @@ impl IncludeHandler for Includes<'_> {
     }
 }
 
-impl Place {
-    fn shown(&self) -> String {
+impl IncludeOrigin {
+    fn display_path(&self) -> String {
         match self {
             Self::Library(name) => (*name).to_owned(),
             Self::Listed(name) => name.clone(),
@@ -200,17 +202,17 @@ impl Place {
     }
 }
 
-fn read(path: &Path) -> Result<String, String> {
+fn read_text(path: &Path) -> Result<String, String> {
     std::fs::read_to_string(path)
         .map_err(|error| format!("include '{}' cannot be read: {error}", path.display()))
 }
 
-fn canonical(path: PathBuf) -> PathBuf {
+fn canonicalize(path: PathBuf) -> PathBuf {
     path.canonicalize().unwrap_or(path)
 }
 
 /// `a/./b/../c` as `a/c`; none if it leaves the root.
-fn normal(path: &str) -> Option<String> {
+fn normalize_path(path: &str) -> Option<String> {
     let mut parts: Vec<&str> = Vec::new();
     for part in path.split('/') {
         match part {

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{CompileOptions, ShaderStage};
-use crate::bindless::input_attachments::Input;
+use crate::bindless::input_attachments::InputAttachment;
 use crate::bindless::layout;
 
 /// Helpers and resource arrays for every stage.
@@ -62,62 +62,66 @@ const EXTENSIONS: [&str; 25] = [
 pub(super) fn preamble(stage: ShaderStage, options: &CompileOptions, defines: &[(&str, &str)]) -> String {
     let mut text = String::from("#version 460\n");
     for extension in EXTENSIONS.into_iter().chain(stage_extensions(stage)) {
-        require(&mut text, extension);
+        push_extension(&mut text, extension);
     }
-    define(&mut text, stage_macro(stage), "1");
-    define(&mut text, "LVK_SET", &layout::SET.to_string());
-    inputs(&mut text);
+    push_define(&mut text, stage_macro(stage), "1");
+    push_define(&mut text, "LVK_SET", &layout::SET.to_string());
+    declare_input_attachments(&mut text);
     for (binding, name, _) in layout::BINDINGS {
-        define(&mut text, name, &binding.to_string());
+        push_define(&mut text, name, &binding.to_string());
     }
     if options.formatless_read {
-        require(&mut text, "GL_EXT_shader_image_load_formatted");
-        define(&mut text, "LVK_FORMATLESS_READ", "1");
+        push_extension(&mut text, "GL_EXT_shader_image_load_formatted");
+        push_define(&mut text, "LVK_FORMATLESS_READ", "1");
     }
     if options.position_fetch {
-        define(&mut text, "LVK_POSITION_FETCH", "1");
+        push_define(&mut text, "LVK_POSITION_FETCH", "1");
         if stage.is_ray_tracing() {
-            require(&mut text, "GL_EXT_ray_tracing_position_fetch");
+            push_extension(&mut text, "GL_EXT_ray_tracing_position_fetch");
         }
     }
     if options.software_ray_query {
-        define(&mut text, "LVK_SOFTWARE_RAY_QUERY", "1");
+        push_define(&mut text, "LVK_SOFTWARE_RAY_QUERY", "1");
     }
     if options.is_cpu {
-        define(&mut text, "LVK_DEVICE_IS_CPU", "1");
+        push_define(&mut text, "LVK_DEVICE_IS_CPU", "1");
     }
     if options.gathers_pairs {
-        define(&mut text, "LVK_GATHERS_PAIRS", "1");
+        push_define(&mut text, "LVK_GATHERS_PAIRS", "1");
     }
     if options.helpers_lose_arrays {
-        define(&mut text, "LVK_HELPERS_LOSE_ARRAYS", "1");
+        push_define(&mut text, "LVK_HELPERS_LOSE_ARRAYS", "1");
     }
     text.push_str(BINDLESS);
     if stage.is_ray_tracing() {
-        define(&mut text, "LVK_STAGE_RAY_TRACING", "1");
+        push_define(&mut text, "LVK_STAGE_RAY_TRACING", "1");
         text.push_str("#include <lvk/ray_tracing.glsl>\n");
     }
     for (name, value) in defines {
-        define(&mut text, name, value);
+        push_define(&mut text, name, value);
     }
     text.push_str("#line 1 0\n");
     text
 }
 
 /// How fragment shaders declare the targets of their pass that they read.
-fn inputs(text: &mut String) {
-    define(text, "LVK_INPUT_SET", &layout::INPUT_SET.to_string());
-    for (name, input) in [("COLOR", Input::Color(0)), ("DEPTH", Input::Depth), ("STENCIL", Input::Stencil)] {
-        define(text, &format!("LVK_PLACE_OF_{name}"), &input.place().to_string());
+fn declare_input_attachments(text: &mut String) {
+    push_define(text, "LVK_INPUT_SET", &layout::INPUT_SET.to_string());
+    for (name, input) in [
+        ("COLOR", InputAttachment::Color(0)),
+        ("DEPTH", InputAttachment::Depth),
+        ("STENCIL", InputAttachment::Stencil),
+    ] {
+        push_define(text, &format!("LVK_PLACE_OF_{name}"), &input.index().to_string());
     }
 }
 
-fn require(text: &mut String, extension: &str) {
+fn push_extension(text: &mut String, extension: &str) {
     // Writing to a String cannot fail.
     let _ = writeln!(text, "#extension {extension} : require");
 }
 
-fn define(text: &mut String, name: &str, value: &str) {
+fn push_define(text: &mut String, name: &str, value: &str) {
     let _ = writeln!(text, "#define {name} {value}");
 }
 

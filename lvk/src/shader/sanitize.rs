@@ -2,13 +2,13 @@
 
 /// What is wrong with a text, and on which of its lines (from 1).
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct Complaint {
+pub(super) struct SourceError {
     pub(super) line: usize,
     pub(super) message: String,
 }
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum State {
+enum ScanState {
     Code,
     Text,
     LineComment,
@@ -18,18 +18,18 @@ enum State {
 /// The text with every character of a comment that is not ASCII replaced, one for one in lines.
 ///
 /// The compiler cuts messages at bytes, so that other characters could reach us as broken UTF-8.
-pub(super) fn to_ascii(text: &str) -> Result<String, Complaint> {
+pub(super) fn to_ascii(text: &str) -> Result<String, SourceError> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut out = String::with_capacity(text.len());
-    let (mut state, mut previous, mut line) = (State::Code, ' ', 1);
+    let (mut state, mut previous, mut line) = (ScanState::Code, ' ', 1);
     for c in text.chars() {
         if c == '\0' {
-            return Err(Complaint { line, message: "a NUL character; GLSL is plain text".to_owned() });
+            return Err(SourceError { line, message: "a NUL character; GLSL is plain text".to_owned() });
         }
-        let in_comment = matches!(state, State::LineComment | State::BlockComment);
+        let in_comment = matches!(state, ScanState::LineComment | ScanState::BlockComment);
         if !c.is_ascii() && !in_comment {
             let message = format!("the character '{}' is only allowed in comments", c.escape_debug());
-            return Err(Complaint { line, message });
+            return Err(SourceError { line, message });
         }
         out.push(if c.is_ascii() { c } else { '?' });
         let next = next_state(state, previous, c);
@@ -44,21 +44,21 @@ pub(super) fn to_ascii(text: &str) -> Result<String, Complaint> {
     Ok(out)
 }
 
-fn next_state(state: State, previous: char, c: char) -> State {
+fn next_state(state: ScanState, previous: char, c: char) -> ScanState {
     match (state, previous, c) {
-        (State::Code, '/', '/') => State::LineComment,
-        (State::Code, '/', '*') => State::BlockComment,
-        (State::Code, _, '"') => State::Text,
-        (State::Text, _, '"' | '\n') => State::Code,
-        (State::LineComment, '\\', '\n') => State::LineComment,
-        (State::LineComment, _, '\n') => State::Code,
-        (State::BlockComment, '*', '/') => State::Code,
+        (ScanState::Code, '/', '/') => ScanState::LineComment,
+        (ScanState::Code, '/', '*') => ScanState::BlockComment,
+        (ScanState::Code, _, '"') => ScanState::Text,
+        (ScanState::Text, _, '"' | '\n') => ScanState::Code,
+        (ScanState::LineComment, '\\', '\n') => ScanState::LineComment,
+        (ScanState::LineComment, _, '\n') => ScanState::Code,
+        (ScanState::BlockComment, '*', '/') => ScanState::Code,
         _ => state,
     }
 }
 
 /// Takes out a leading `#version 450` or `#version 460` and keeps its line.
-pub(super) fn without_version(text: &str) -> Result<String, Complaint> {
+pub(super) fn without_version(text: &str) -> Result<String, SourceError> {
     let start = first_code(text);
     let Some(directive) = version_directive(&text[start..]) else {
         return Ok(text.to_owned());
@@ -72,7 +72,7 @@ pub(super) fn without_version(text: &str) -> Result<String, Complaint> {
             "#version {} is not supported: shaders are GLSL 460 for Vulkan; write #version 460 or leave the line out",
             number.join(" ")
         );
-        return Err(Complaint { line, message });
+        return Err(SourceError { line, message });
     }
     Ok(format!("{}{}", &text[..start], &text[start + directive.len()..]))
 }

@@ -46,7 +46,7 @@ impl Batches {
     }
 
     /// Hands everything to a queue.
-    pub(super) fn submit(&self, gpu: &Gpu, lane: usize) -> Result<()> {
+    pub(super) fn submit(&self, gpu: &Gpu, queue_index: usize) -> Result<()> {
         let (waits, commands) = self.second.unwrap_or_default();
         let first = vk::SubmitInfo2::default()
             .wait_semaphore_infos(&self.waits[..waits])
@@ -57,9 +57,9 @@ impl Batches {
             .signal_semaphore_infos(&self.signals);
         let both = [first, last];
         let submits = if self.second.is_some() { &both[..] } else { &both[1..] };
-        let queue = gpu.queues.raw(lane);
+        let queue = gpu.queues.raw(queue_index);
         // SAFETY: the command buffers are complete and used once; the queue is locked.
         unsafe { gpu.device.queue_submit2(*queue, submits, vk::Fence::null()) }
-            .map_err(gpu.failed("vkQueueSubmit2"))
+            .map_err(gpu.vulkan_error("vkQueueSubmit2"))
     }
 }

@@ -8,20 +8,20 @@ use std::collections::VecDeque;
 /// buffer is submitted or dropped. From then on nothing new can use it, and what was submitted so far bounds how long
 /// the GPU may.
 #[derive(Debug)]
-pub(crate) struct Deferred<T> {
+pub(crate) struct DeferredFree<T> {
     /// Waiting for open command buffers, with the newest of them.
     open: Vec<(T, Option<u64>)>,
     /// Waiting for the GPU, with the timeline value it must reach; values never fall from front to back.
     stamped: VecDeque<(T, u64)>,
 }
 
-impl<T> Default for Deferred<T> {
+impl<T> Default for DeferredFree<T> {
     fn default() -> Self {
         Self { open: Vec::new(), stamped: VecDeque::new() }
     }
 }
 
-impl<T> Deferred<T> {
+impl<T> DeferredFree<T> {
     /// Queues `item`. `newest_open` is the newest sequence number handed out to a command buffer so far; `None` if no
     /// command buffer can use the item.
     pub(crate) fn push(&mut self, item: T, newest_open: Option<u64>) {
@@ -37,7 +37,12 @@ impl<T> Deferred<T> {
     ///
     /// `oldest_open` is the sequence number of the oldest command buffer still being recorded, `submitted` the timeline
     /// value of the last submission and `completed` the one the GPU has reached.
-    pub(crate) fn collect(&mut self, oldest_open: Option<u64>, submitted: u64, completed: u64) -> Vec<T> {
+    pub(crate) fn take_completed(
+        &mut self,
+        oldest_open: Option<u64>,
+        submitted: u64,
+        completed: u64,
+    ) -> Vec<T> {
         if self.len() == 0 {
             return Vec::new();
         }
@@ -66,7 +71,7 @@ mod tests {
     use super::*;
 
     #[derive(Debug, Clone)]
-    enum Op {
+    enum DeferredOp {
         Open,
         /// Submits or drops one of the open command buffers.
         Close {
@@ -78,33 +83,33 @@ mod tests {
         Collect,
     }
 
-    fn op() -> impl Strategy<Value = Op> {
+    fn op() -> impl Strategy<Value = DeferredOp> {
         prop_oneof![
-            Just(Op::Open),
+            Just(DeferredOp::Open),
             (any::<prop::sample::Index>(), any::<bool>())
-                .prop_map(|(which, submit)| Op::Close { which, submit }),
-            Just(Op::Destroy),
-            Just(Op::Complete),
-            Just(Op::Collect),
+                .prop_map(|(which, submit)| DeferredOp::Close { which, submit }),
+            Just(DeferredOp::Destroy),
+            Just(DeferredOp::Complete),
+            Just(DeferredOp::Collect),
         ]
     }
 
     /// Which command buffers may use a destroyed item, and the last submission of any of them.
-    struct Item {
+    struct DeferredItem {
         users: BTreeSet<u64>,
         last_use: u64,
     }
 
     #[derive(Default)]
-    struct Model {
+    struct DeferredModel {
         next: u64,
         open: BTreeSet<u64>,
         submitted: u64,
         completed: u64,
-        items: Vec<Option<Item>>,
+        items: Vec<Option<DeferredItem>>,
     }
 
-    impl Model {
+    impl DeferredModel {
         fn close(&mut self, which: &prop::sample::Index, submit: bool) {
             if self.open.is_empty() {
                 return;
@@ -124,24 +129,24 @@ mod tests {
     proptest! {
         #[test]
         fn nothing_in_use_is_returned_and_nothing_is_kept_or_lost(ops in prop::collection::vec(op(), 0..120)) {
-            let mut deferred = Deferred::default();
-            let mut model = Model::default();
+            let mut deferred = DeferredFree::default();
+            let mut model = DeferredModel::default();
             for op in ops {
                 match op {
-                    Op::Open => {
+                    DeferredOp::Open => {
                         model.open.insert(model.next);
                         model.next += 1;
                     }
-                    Op::Close { which, submit } => model.close(&which, submit),
-                    Op::Destroy => {
+                    DeferredOp::Close { which, submit } => model.close(&which, submit),
+                    DeferredOp::Destroy => {
                         deferred.push(model.items.len(), model.next.checked_sub(1));
-                        let item = Item { users: model.open.clone(), last_use: model.submitted };
+                        let item = DeferredItem { users: model.open.clone(), last_use: model.submitted };
                         model.items.push(Some(item));
                     }
-                    Op::Complete => model.completed = (model.completed + 1).min(model.submitted),
-                    Op::Collect => {
+                    DeferredOp::Complete => model.completed = (model.completed + 1).min(model.submitted),
+                    DeferredOp::Collect => {
                         let oldest = model.open.first().copied();
-                        for index in deferred.collect(oldest, model.submitted, model.completed) {
+                        for index in deferred.take_completed(oldest, model.submitted, model.completed) {
                             let item = model.items[index].take();
                             prop_assert!(item.is_some(), "returned twice");
                             let item = item.unwrap();
@@ -151,8 +156,8 @@ mod tests {
                 }
             }
             model.submitted += 1;
-            deferred.collect(None, model.submitted, 0).into_iter().for_each(|index| model.items[index] = None);
-            let rest = deferred.collect(None, model.submitted, model.submitted);
+            deferred.take_completed(None, model.submitted, 0).into_iter().for_each(|index| model.items[index] = None);
+            let rest = deferred.take_completed(None, model.submitted, model.submitted);
             let kept: Vec<usize> =
                 model.items.iter().enumerate().filter(|(_, item)| item.is_some()).map(|(at, _)| at).collect();
             let mut sorted = rest;
@@ -164,27 +169,27 @@ mod tests {
 
     #[test]
     fn item_waits_for_the_command_buffer_and_then_for_the_gpu() {
-        let mut deferred = Deferred::default();
+        let mut deferred = DeferredFree::default();
         deferred.push("texture", Some(7));
-        assert!(deferred.collect(Some(7), 3, 3).is_empty());
-        assert!(deferred.collect(Some(8), 4, 3).is_empty());
-        assert!(deferred.collect(Some(8), 9, 3).is_empty());
-        assert_eq!(deferred.collect(Some(8), 9, 4), ["texture"]);
+        assert!(deferred.take_completed(Some(7), 3, 3).is_empty());
+        assert!(deferred.take_completed(Some(8), 4, 3).is_empty());
+        assert!(deferred.take_completed(Some(8), 9, 3).is_empty());
+        assert_eq!(deferred.take_completed(Some(8), 9, 4), ["texture"]);
     }
 
     #[test]
     fn unused_item_of_an_idle_queue_goes_at_once() {
-        let mut deferred = Deferred::default();
+        let mut deferred = DeferredFree::default();
         deferred.push("buffer", None);
-        assert_eq!(deferred.collect(Some(0), 0, 0), ["buffer"]);
+        assert_eq!(deferred.take_completed(Some(0), 0, 0), ["buffer"]);
     }
 
     #[test]
     fn draining_returns_every_item() {
-        let mut deferred = Deferred::default();
+        let mut deferred = DeferredFree::default();
         deferred.push(1, Some(1));
         deferred.push(2, None);
-        assert!(deferred.collect(Some(1), 5, 0).is_empty());
+        assert!(deferred.take_completed(Some(1), 5, 0).is_empty());
         assert_eq!(deferred.drain_all(), [2, 1]);
     }
 }

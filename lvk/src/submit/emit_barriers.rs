@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use super::queue_sync::MovedPart;
+use super::queue_sync::OwnershipTransfer;
 use crate::barrier::{Access, Barriers, IdMap, ImageBarrier, Layout, MemoryBarrier, Stages};
 use crate::gpu::Gpu;
 use crate::resource::image::BarrierImage;
@@ -20,7 +20,7 @@ pub(crate) struct LastBarrier {
 impl LastBarrier {
     /// A barrier by its Vulkan names, as `translate` finds them where it is another than the last one.
     #[inline]
-    fn named(
+    fn get_or_translate(
         &mut self,
         barrier: &MemoryBarrier,
         translate: impl FnOnce(&MemoryBarrier) -> vk::MemoryBarrier2<'static>,
@@ -44,8 +44,8 @@ pub(crate) fn emit(
     match &barriers.memory {
         None if barriers.images.is_empty() => {}
         Some(memory) if barriers.images.is_empty() && is_whole(gpu, memory) => {
-            let named = last.named(memory, |barrier| memory_barrier(gpu, barrier));
-            record(gpu, commands, std::slice::from_ref(named), &[]);
+            let named = last.get_or_translate(memory, |barrier| memory_barrier(gpu, barrier));
+            record_barriers(gpu, commands, std::slice::from_ref(named), &[]);
         }
         memory => emit_all(gpu, commands, memory.as_ref(), &barriers.images, images),
     }
@@ -61,13 +61,13 @@ fn emit_all(
 ) {
     let images: Vec<_> = barriers.iter().filter_map(|barrier| image_barrier(gpu, barrier, images)).collect();
     match memory {
-        None => record(gpu, commands, &[], &images),
+        None => record_barriers(gpu, commands, &[], &images),
         Some(memory) if is_whole(gpu, memory) => {
-            record(gpu, commands, &[memory_barrier(gpu, memory)], &images);
+            record_barriers(gpu, commands, &[memory_barrier(gpu, memory)], &images);
         }
         Some(memory) => {
             let parts: Vec<_> = memory.without_ray_queries().map(|part| memory_barrier(gpu, &part)).collect();
-            record(gpu, commands, &parts, &images);
+            record_barriers(gpu, commands, &parts, &images);
         }
     }
 }
@@ -79,7 +79,7 @@ fn is_whole(gpu: &Gpu, memory: &MemoryBarrier) -> bool {
 }
 
 #[inline]
-fn record(
+fn record_barriers(
     gpu: &Gpu,
     commands: vk::CommandBuffer,
     memory: &[vk::MemoryBarrier2<'_>],
@@ -103,17 +103,17 @@ fn record(
 /// Which side of a change of owner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Side {
-    /// The lane gives away, behind everything it has got.
+    /// The queue gives away, behind everything it has got.
     Release,
-    /// The lane takes, in front of everything it gets.
+    /// The queue takes, in front of everything it gets.
     Acquire,
 }
 
 /// Records one side of changes of owner; the layouts stay, and a semaphore stands between both sides.
-pub(crate) fn emit_moves(
+pub(crate) fn emit_ownership_transfers(
     gpu: &Gpu,
     commands: vk::CommandBuffer,
-    parts: &[MovedPart],
+    parts: &[OwnershipTransfer],
     images: &Images,
     side: Side,
 ) {
@@ -122,21 +122,21 @@ pub(crate) fn emit_moves(
         Side::Release => (Access::MEMORY_WRITE, Stage::NONE, Access::NONE),
         Side::Acquire => (Access::NONE, Stage::ALL_COMMANDS, Access::MEMORY_READ | Access::MEMORY_WRITE),
     };
-    let barrier = |moved: &MovedPart| {
-        let image = images.get(&moved.id)?;
-        let families = [moved.from, moved.to].map(|lane| gpu.queues.family(lane));
+    let barrier = |transfer: &OwnershipTransfer| {
+        let image = images.get(&transfer.id)?;
+        let families = [transfer.from, transfer.to].map(|queue_index| gpu.queues.family(queue_index));
         let [from, to] = if families[0] == families[1] { [vk::QUEUE_FAMILY_IGNORED; 2] } else { families };
         let barrier = vk::ImageMemoryBarrier2::default()
             .src_stage_mask(Stage::ALL_COMMANDS)
             .src_access_mask(src_access)
             .dst_stage_mask(dst_stages)
             .dst_access_mask(dst_access)
-            .old_layout(layout(moved.layout))
-            .new_layout(layout(moved.layout))
+            .old_layout(vulkan_layout(transfer.layout))
+            .new_layout(vulkan_layout(transfer.layout))
             .src_queue_family_index(from)
             .dst_queue_family_index(to)
             .image(image.raw)
-            .subresource_range(image.range(moved.part));
+            .subresource_range(image.range(transfer.part));
         Some(barrier)
     };
     let barriers: Vec<_> = parts.iter().filter_map(barrier).collect();
@@ -147,8 +147,8 @@ pub(crate) fn emit_moves(
 
 #[inline(never)]
 fn memory_barrier(gpu: &Gpu, barrier: &MemoryBarrier) -> vk::MemoryBarrier2<'static> {
-    let (src_stages, src_access) = scope(gpu, barrier.src_stages, barrier.src_access);
-    let (dst_stages, dst_access) = scope(gpu, barrier.dst_stages, barrier.dst_access);
+    let (src_stages, src_access) = vulkan_scope(gpu, barrier.src_stages, barrier.src_access);
+    let (dst_stages, dst_access) = vulkan_scope(gpu, barrier.dst_stages, barrier.dst_access);
     vk::MemoryBarrier2::default()
         .src_stage_mask(src_stages)
         .src_access_mask(src_access)
@@ -163,15 +163,15 @@ fn image_barrier(
 ) -> Option<vk::ImageMemoryBarrier2<'static>> {
     let image = images.get(&barrier.id)?;
     let scopes = &barrier.scopes;
-    let (src_stages, src_access) = scope(gpu, scopes.src_stages, scopes.src_access);
-    let (dst_stages, dst_access) = scope(gpu, scopes.dst_stages, scopes.dst_access);
+    let (src_stages, src_access) = vulkan_scope(gpu, scopes.src_stages, scopes.src_access);
+    let (dst_stages, dst_access) = vulkan_scope(gpu, scopes.dst_stages, scopes.dst_access);
     let barrier = vk::ImageMemoryBarrier2::default()
         .src_stage_mask(src_stages)
         .src_access_mask(src_access)
         .dst_stage_mask(dst_stages)
         .dst_access_mask(dst_access)
-        .old_layout(layout(scopes.old_layout))
-        .new_layout(layout(scopes.new_layout))
+        .old_layout(vulkan_layout(scopes.old_layout))
+        .new_layout(vulkan_layout(scopes.new_layout))
         .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
         .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
         .image(image.raw)
@@ -228,10 +228,10 @@ const AT_ONCE: usize = 6;
 /// What each set of so many neighbouring bits is called in Vulkan.
 type Names<const N: usize> = [[u64; 1 << AT_ONCE]; N];
 
-static STAGE_NAMES: Names<2> = names(&STAGES);
-static ACCESS_NAMES: Names<3> = names(&ACCESSES);
+static STAGE_NAMES: Names<2> = flag_table(&STAGES);
+static ACCESS_NAMES: Names<3> = flag_table(&ACCESSES);
 
-const fn names<const N: usize>(single: &[u64]) -> Names<N> {
+const fn flag_table<const N: usize>(single: &[u64]) -> Names<N> {
     let mut names = [[0; 1 << AT_ONCE]; N];
     let mut bit = 0;
     while bit < single.len() {
@@ -248,7 +248,7 @@ const fn names<const N: usize>(single: &[u64]) -> Names<N> {
 }
 
 #[inline]
-fn named<const N: usize>(names: &Names<N>, bits: u32) -> u64 {
+fn combine_flags<const N: usize>(names: &Names<N>, bits: u32) -> u64 {
     let mut all = 0;
     for (group, names) in names.iter().enumerate() {
         all |= names[(bits >> (group * AT_ONCE)) as usize % names.len()];
@@ -258,22 +258,22 @@ fn named<const N: usize>(names: &Names<N>, bits: u32) -> u64 {
 
 /// Stages by their Vulkan names, without those whose feature is off.
 #[inline]
-pub(super) fn stages(gpu: &Gpu, stages: Stages) -> vk::PipelineStageFlags2 {
-    stage_names(stages - stages_off(gpu))
+pub(super) fn vulkan_stages(gpu: &Gpu, stages: Stages) -> vk::PipelineStageFlags2 {
+    stage_names(stages - disabled_stages(gpu))
 }
 
 /// One side of a barrier by its Vulkan names, without what features that are off would do.
 #[inline]
-fn scope(gpu: &Gpu, stages: Stages, access: Access) -> (vk::PipelineStageFlags2, vk::AccessFlags2) {
+fn vulkan_scope(gpu: &Gpu, stages: Stages, access: Access) -> (vk::PipelineStageFlags2, vk::AccessFlags2) {
     let mut off = Access::empty();
     off.set(Access::ACCEL_READ | Access::ACCEL_WRITE, gpu.accel.is_none());
-    let (stages, access) = without_stages(stages, access - off, stages_off(gpu));
-    (stage_names(stages), vk::AccessFlags2::from_raw(named(&ACCESS_NAMES, access.bits())))
+    let (stages, access) = without_stages(stages, access - off, disabled_stages(gpu));
+    (stage_names(stages), vk::AccessFlags2::from_raw(combine_flags(&ACCESS_NAMES, access.bits())))
 }
 
 /// Stages whose feature is off.
 #[inline]
-fn stages_off(gpu: &Gpu) -> Stages {
+fn disabled_stages(gpu: &Gpu) -> Stages {
     let mut off = Stages::empty();
     off.set(Stages::RAY_TRACING, gpu.ray_tracing.is_none());
     off.set(Stages::ACCEL_BUILD, gpu.accel.is_none());
@@ -288,21 +288,21 @@ fn without_stages(stages: Stages, access: Access, off: Stages) -> (Stages, Acces
 }
 
 fn stage_names(stages: Stages) -> vk::PipelineStageFlags2 {
-    vk::PipelineStageFlags2::from_raw(named(&STAGE_NAMES, stages.bits().into()))
+    vk::PipelineStageFlags2::from_raw(combine_flags(&STAGE_NAMES, stages.bits().into()))
 }
 
 /// The layout of this name in Vulkan, where it can be that of an image of somebody else's.
-pub(crate) fn known_layout(raw: vk::ImageLayout) -> Result<Layout, String> {
+pub(crate) fn layout_from_vulkan(raw: vk::ImageLayout) -> Result<Layout, String> {
     use Layout::{ColorTarget, DepthTarget, General, ShaderRead, TransferDst, TransferSrc, Undefined};
     let all = [Undefined, General, ShaderRead, ColorTarget, DepthTarget, TransferSrc, TransferDst];
-    all.into_iter().find(|known| layout(*known) == raw).ok_or_else(|| {
-        let names: Vec<_> = all.into_iter().map(|known| format!("{:?}", layout(known))).collect();
+    all.into_iter().find(|known| vulkan_layout(*known) == raw).ok_or_else(|| {
+        let names: Vec<_> = all.into_iter().map(|known| format!("{:?}", vulkan_layout(known))).collect();
         format!("the layout {raw:?} cannot be exchanged; take one of {}", names.join(", "))
     })
 }
 
 /// A layout by its Vulkan name.
-pub(crate) fn layout(layout: Layout) -> vk::ImageLayout {
+pub(crate) fn vulkan_layout(layout: Layout) -> vk::ImageLayout {
     match layout {
         Layout::Undefined => vk::ImageLayout::UNDEFINED,
         Layout::General => vk::ImageLayout::GENERAL,
@@ -328,14 +328,15 @@ mod tests {
         use vk::{AccessFlags2, PipelineStageFlags2};
         assert_eq!(Stages::all().bits(), (1 << STAGES.len()) - 1);
         assert_eq!(Access::all().bits(), (1 << ACCESSES.len()) - 1);
-        let stage = |stages: Stages| PipelineStageFlags2::from_raw(named(&STAGE_NAMES, stages.bits().into()));
+        let stage =
+            |stages: Stages| PipelineStageFlags2::from_raw(combine_flags(&STAGE_NAMES, stages.bits().into()));
         assert_eq!(
             stage(Stages::COMPUTE | Stages::HOST),
             PipelineStageFlags2::HOST | PipelineStageFlags2::COMPUTE_SHADER
         );
         assert_eq!(stage(Stages::COLOR), PipelineStageFlags2::COLOR_ATTACHMENT_OUTPUT);
         assert_eq!(stage(Stages::ACCEL_BUILD), PipelineStageFlags2::ACCELERATION_STRUCTURE_BUILD_KHR);
-        let access = |access: Access| AccessFlags2::from_raw(named(&ACCESS_NAMES, access.bits()));
+        let access = |access: Access| AccessFlags2::from_raw(combine_flags(&ACCESS_NAMES, access.bits()));
         assert_eq!(access(Access::SHADER_WRITE), AccessFlags2::SHADER_WRITE);
         assert_eq!(access(Access::DEPTH_WRITE), AccessFlags2::DEPTH_STENCIL_ATTACHMENT_WRITE);
         assert_eq!(access(Access::ACCEL_READ), AccessFlags2::ACCELERATION_STRUCTURE_READ_KHR);
@@ -376,9 +377,10 @@ mod tests {
 
     /// As [`memory_barrier`], where the device has everything.
     fn all_named(barrier: &MemoryBarrier) -> vk::MemoryBarrier2<'static> {
-        let stages =
-            |stages: Stages| vk::PipelineStageFlags2::from_raw(named(&STAGE_NAMES, stages.bits().into()));
-        let access = |access: Access| vk::AccessFlags2::from_raw(named(&ACCESS_NAMES, access.bits()));
+        let stages = |stages: Stages| {
+            vk::PipelineStageFlags2::from_raw(combine_flags(&STAGE_NAMES, stages.bits().into()))
+        };
+        let access = |access: Access| vk::AccessFlags2::from_raw(combine_flags(&ACCESS_NAMES, access.bits()));
         vk::MemoryBarrier2::default()
             .src_stage_mask(stages(barrier.src_stages))
             .src_access_mask(access(barrier.src_access))
@@ -399,7 +401,7 @@ mod tests {
         ) {
             let mut last = LastBarrier::default();
             for barrier in barriers {
-                prop_assert_eq!(masks(last.named(&barrier, all_named)), masks(&all_named(&barrier)));
+                prop_assert_eq!(masks(last.get_or_translate(&barrier, all_named)), masks(&all_named(&barrier)));
             }
         }
 
@@ -409,8 +411,8 @@ mod tests {
                 let set = single.iter().enumerate().filter(|(bit, _)| bits >> bit & 1 == 1);
                 set.fold(0, |all, (_, name)| all | name)
             };
-            prop_assert_eq!(named(&ACCESS_NAMES, bits), of(&ACCESSES));
-            prop_assert_eq!(named(&STAGE_NAMES, bits % (1 << STAGES.len())), of(&STAGES));
+            prop_assert_eq!(combine_flags(&ACCESS_NAMES, bits), of(&ACCESSES));
+            prop_assert_eq!(combine_flags(&STAGE_NAMES, bits % (1 << STAGES.len())), of(&STAGES));
         }
     }
 }

@@ -19,7 +19,7 @@ impl InputSets {
     const BATCH: usize = 8;
 
     /// A set of `count` input attachments that nobody uses.
-    pub(crate) fn take(
+    pub(crate) fn acquire(
         &mut self,
         gpu: &Gpu,
         layout: vk::DescriptorSetLayout,

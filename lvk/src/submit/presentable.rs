@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use crate::barrier::{IdMap, ResourceId, Stages, States, TextureShape, Tracker};
+use crate::barrier::{IdMap, QueueState, ResourceId, Stages, TextureShape, Tracker};
 use crate::error::{Error, Result};
 
 /// Every image of a swapchain, until its texture is gone.
@@ -14,12 +14,12 @@ pub(crate) struct Presentables(IdMap<Presentable>);
 #[derive(Debug)]
 struct Presentable {
     name: Arc<str>,
-    held: Held,
+    held: PresentableOwner,
 }
 
 /// Who has an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Held {
+enum PresentableOwner {
     /// The presentation engine.
     Engine,
     /// The application. The semaphore is signalled when the engine has really let go; the first submission that uses the
@@ -39,23 +39,23 @@ pub(crate) struct AcquireWait {
 impl Presentables {
     /// A new image, which the engine has.
     pub(crate) fn insert(&mut self, id: ResourceId, name: &Arc<str>) {
-        self.0.insert(id, Presentable { name: Arc::clone(name), held: Held::Engine });
+        self.0.insert(id, Presentable { name: Arc::clone(name), held: PresentableOwner::Engine });
     }
 
     /// The engine gives an image away and signals `semaphore` once it is done with it.
     pub(crate) fn acquire(&mut self, id: ResourceId, semaphore: vk::Semaphore) {
-        self.hold(id, Held::Application(Some(semaphore)));
+        self.set_owner(id, PresentableOwner::Application(Some(semaphore)));
     }
 
     /// The image went back to the engine.
     pub(crate) fn present(&mut self, id: ResourceId) {
-        self.hold(id, Held::Engine);
+        self.set_owner(id, PresentableOwner::Engine);
     }
 
     /// Nothing may use the image any more. Answers the semaphore that nobody has waited for.
     pub(crate) fn retire(&mut self, id: ResourceId) -> Option<vk::Semaphore> {
-        match self.hold(id, Held::Retired) {
-            Some(Held::Application(unwaited)) => unwaited,
+        match self.set_owner(id, PresentableOwner::Retired) {
+            Some(PresentableOwner::Application(unwaited)) => unwaited,
             _ => None,
         }
     }
@@ -66,17 +66,17 @@ impl Presentables {
     }
 
     /// Fails where a command buffer uses an image that the application does not have.
-    pub(crate) fn check(&self, tracker: &Tracker) -> Result<()> {
+    pub(crate) fn check_acquired(&self, tracker: &Tracker) -> Result<()> {
         for (id, image) in &self.0 {
             if tracker.first_stages(*id).is_none() {
                 continue;
             }
             let message = match image.held {
-                Held::Application(_) => continue,
-                Held::Engine => {
+                PresentableOwner::Application(_) => continue,
+                PresentableOwner::Engine => {
                     "its image is with the presentation engine; use it between next_image and present"
                 }
-                Held::Retired => {
+                PresentableOwner::Retired => {
                     "the swapchain was made anew since the image was taken; take one with next_image again"
                 }
             };
@@ -86,21 +86,21 @@ impl Presentables {
     }
 
     /// Takes out the waits for images that `tracker` is the first to use. Their contents are undefined from then on.
-    pub(crate) fn take_waits(&mut self, tracker: &Tracker, states: &mut States) -> Vec<AcquireWait> {
+    pub(crate) fn take_waits(&mut self, tracker: &Tracker, states: &mut QueueState) -> Vec<AcquireWait> {
         let mut waits = Vec::new();
         for (id, image) in &mut self.0 {
-            let Held::Application(pending) = &mut image.held else { continue };
+            let PresentableOwner::Application(pending) = &mut image.held else { continue };
             let Some(first) = tracker.first_stages(*id) else { continue };
             let Some(semaphore) = pending.take() else { continue };
             // A command buffer that only presents has no stage of its own.
             let stages = if first.is_empty() { Stages::COLOR } else { first };
-            states.acquired(*id, TextureShape { mips: 1, layers: 1 }, stages);
+            states.mark_acquired(*id, TextureShape { mips: 1, layers: 1 }, stages);
             waits.push(AcquireWait { semaphore, stages });
         }
         waits
     }
 
-    fn hold(&mut self, id: ResourceId, held: Held) -> Option<Held> {
+    fn set_owner(&mut self, id: ResourceId, held: PresentableOwner) -> Option<PresentableOwner> {
         self.0.get_mut(&id).map(|image| std::mem::replace(&mut image.held, held))
     }
 }
@@ -116,8 +116,9 @@ mod tests {
 
     fn tracker(id: ResourceId, uses: &[Use]) -> Tracker {
         let mut tracker = Tracker::default();
-        uses.iter()
-            .for_each(|next| tracker.use_texture(id, ONE, ONE.whole(), *next, &mut Barriers::default()));
+        uses.iter().for_each(|next| {
+            tracker.use_texture(id, ONE, ONE.all_subresources(), *next, &mut Barriers::default())
+        });
         tracker
     }
 
@@ -132,23 +133,23 @@ mod tests {
         let (id, semaphore) = (ResourceId(1), vk::Semaphore::from_raw(7));
         let drawing = tracker(id, &[Use::color_target(false), Use::present()]);
         let mut images = presentables(id);
-        let refusal = |images: &Presentables| images.check(&drawing).unwrap_err().to_string();
+        let refusal = |images: &Presentables| images.check_acquired(&drawing).unwrap_err().to_string();
         assert!(refusal(&images).contains("presentation engine"));
         images.acquire(id, semaphore);
-        images.check(&drawing).unwrap();
+        images.check_acquired(&drawing).unwrap();
         images.present(id);
         assert!(refusal(&images).contains("presentation engine"));
         assert_eq!(images.retire(id), None);
         assert!(refusal(&images).contains("made anew"));
-        images.check(&tracker(ResourceId(2), &[Use::color_target(false)])).unwrap();
+        images.check_acquired(&tracker(ResourceId(2), &[Use::color_target(false)])).unwrap();
         images.forget(id);
-        images.check(&drawing).unwrap();
+        images.check_acquired(&drawing).unwrap();
     }
 
     #[test]
     fn only_the_first_user_waits_and_its_barrier_chains_with_the_wait() {
         let (id, semaphore) = (ResourceId(1), vk::Semaphore::from_raw(7));
-        let (mut images, mut states) = (presentables(id), States::default());
+        let (mut images, mut states) = (presentables(id), QueueState::default());
         for (first, stages) in [
             (Use::color_target(false), Stages::COLOR),
             (Use::transfer_write(), Stages::TRANSFER),
@@ -173,7 +174,7 @@ mod tests {
         assert_eq!(images.retire(id), None);
         let mut images = presentables(id);
         images.acquire(id, semaphore);
-        images.take_waits(&tracker(id, &[Use::color_target(false)]), &mut States::default());
+        images.take_waits(&tracker(id, &[Use::color_target(false)]), &mut QueueState::default());
         assert_eq!(images.retire(id), None);
     }
 }

@@ -21,7 +21,7 @@ pub(crate) struct Scopes {
     pools: Vec<QueryPool>,
     stamps: Stamps,
     /// Where each stamp is, counted through all pools.
-    places: Vec<usize>,
+    query_indices: Vec<usize>,
     /// The first place that is free.
     next: usize,
     /// There was no pool for a stamp: nothing of the command buffer counts.
@@ -35,29 +35,29 @@ pub(crate) struct Profiler {
     busy: AtomicBool,
     /// How many frames have begun.
     frames: AtomicU64,
-    inner: Mutex<Inner>,
+    inner: Mutex<ProfilerState>,
     gpu: Arc<Gpu>,
 }
 
 #[derive(Default)]
-struct Inner {
+struct ProfilerState {
     spare: Vec<QueryPool>,
-    in_flight: VecDeque<Measured>,
+    in_flight: VecDeque<MeasuredSubmission>,
     /// The profile that is being put together: which, its first tick, and what is known.
-    open: Option<(Part, u64, GpuProfile)>,
+    open: Option<(ProfilePart, u64, GpuProfile)>,
     last: Option<Arc<GpuProfile>>,
 }
 
 /// Command buffers of one submission.
-struct Measured {
+struct MeasuredSubmission {
     value: u64,
-    part: Part,
+    part: ProfilePart,
     scopes: Vec<Scopes>,
 }
 
 /// What a submission belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Part {
+enum ProfilePart {
     Frame(u64),
     Submission(u64),
 }
@@ -70,15 +70,15 @@ impl Profiler {
             on: AtomicBool::new(false),
             busy: AtomicBool::new(false),
             frames: AtomicU64::new(0),
-            inner: Mutex::new(Rank::Profiler, Inner::default()),
+            inner: Mutex::new(Rank::Profiler, ProfilerState::default()),
             gpu: Arc::clone(gpu),
         }
     }
 
     /// Measures command buffers begun from now on, or not.
-    pub(crate) fn set(&self, on: bool) -> Result<()> {
+    pub(crate) fn set_enabled(&self, on: bool) -> Result<()> {
         if on && self.gpu.caps.limits.timestamp_bits == 0 {
-            return Err(self.gpu.lacks("timestamps on the queue"));
+            return Err(self.gpu.unsupported("timestamps on the queue"));
         }
         self.on.store(on, Ordering::Relaxed);
         Ok(())
@@ -90,7 +90,11 @@ impl Profiler {
     }
 
     /// Begins to measure a command buffer, if that is wanted.
-    pub(crate) fn begin(&self, commands: vk::CommandBuffer, queue: Queue) -> Option<Box<Scopes>> {
+    pub(crate) fn begin_command_buffer(
+        &self,
+        commands: vk::CommandBuffer,
+        queue: Queue,
+    ) -> Option<Box<Scopes>> {
         if !self.on.load(Ordering::Relaxed) || self.gpu.caps.queue(queue).timestamp_bits == 0 {
             return None;
         }
@@ -111,7 +115,7 @@ impl Profiler {
         if scopes.broken {
             return;
         }
-        let place = scopes.take(views as usize);
+        let place = scopes.reserve_queries(views as usize);
         if scopes.pools.len() * Self::STAMPS <= place {
             match self.pool() {
                 Ok(pool) => scopes.pools.push(pool),
@@ -128,7 +132,7 @@ impl Profiler {
         // SAFETY: the queries exist, are reset, and are written once.
         unsafe { self.gpu.device.cmd_write_timestamp2(commands, stage, pool.raw, query) };
         scopes.stamps.push(name.map(Into::into));
-        scopes.places.push(place);
+        scopes.query_indices.push(place);
     }
 
     /// A pool of stamps that are ready.
@@ -140,7 +144,7 @@ impl Profiler {
                 debug_name: "profiler stamps",
                 ..Default::default()
             };
-            return QueryPool::of(&self.gpu, &desc, vk::QueryType::TIMESTAMP);
+            return QueryPool::with_type(&self.gpu, &desc, vk::QueryType::TIMESTAMP);
         };
         // SAFETY: `hostQueryReset` is on, and the GPU is done with the pool.
         unsafe { self.gpu.device.reset_query_pool(pool.raw, 0, pool.count) };
@@ -158,13 +162,13 @@ impl Profiler {
             return;
         }
         let part = match self.frames.load(Ordering::Acquire) {
-            0 => Part::Submission(value),
-            begun => Part::Frame(begun - 1),
+            0 => ProfilePart::Submission(value),
+            begun => ProfilePart::Frame(begun - 1),
         };
         let mut inner = self.lock();
         // Threads may get here in another order than to the queue.
         let place = inner.in_flight.partition_point(|other| other.value < value);
-        inner.in_flight.insert(place, Measured { value, part, scopes });
+        inner.in_flight.insert(place, MeasuredSubmission { value, part, scopes });
         self.busy.store(true, Ordering::Release);
     }
 
@@ -190,19 +194,19 @@ impl Profiler {
         self.lock().last.clone()
     }
 
-    fn lock(&self) -> Guard<'_, Inner> {
+    fn lock(&self) -> Guard<'_, ProfilerState> {
         self.inner.lock()
     }
 }
 
-impl Inner {
-    fn read(&mut self, gpu: &Gpu, measured: Measured) -> Result<()> {
+impl ProfilerState {
+    fn read(&mut self, gpu: &Gpu, measured: MeasuredSubmission) -> Result<()> {
         if self.open.as_ref().is_some_and(|(part, ..)| *part != measured.part) {
-            self.close();
+            self.close_profile();
         }
         for scopes in measured.scopes {
             if let Some(ticks) = scopes.ticks()? {
-                self.add(gpu, measured.part, &scopes.stamps, &ticks);
+                self.add_command_buffer(gpu, measured.part, &scopes.stamps, &ticks);
             }
             self.spare.extend(scopes.pools);
         }
@@ -210,9 +214,15 @@ impl Inner {
     }
 
     /// Adds a command buffer to the profile.
-    fn add(&mut self, gpu: &Gpu, part: Part, stamps: &[Option<Box<str>>], ticks: &[u64]) {
+    fn add_command_buffer(
+        &mut self,
+        gpu: &Gpu,
+        part: ProfilePart,
+        stamps: &[Option<Box<str>>],
+        ticks: &[u64],
+    ) {
         let Some(&begin) = ticks.first() else { return };
-        let frame = if let Part::Frame(number) = part { Some(number) } else { None };
+        let frame = if let ProfilePart::Frame(number) = part { Some(number) } else { None };
         let fresh = || (part, begin, GpuProfile { frame, ..Default::default() });
         let (_, first, profile) = self.open.get_or_insert_with(fresh);
         // What another queue has begun before all that is known.
@@ -232,17 +242,17 @@ impl Inner {
     fn close_finished(&mut self, begun: u64) {
         let Some((part, ..)) = self.open else { return };
         let expected = match part {
-            Part::Frame(number) => {
+            ProfilePart::Frame(number) => {
                 number + 1 >= begun || self.in_flight.iter().any(|measured| measured.part == part)
             }
-            Part::Submission(_) => false,
+            ProfilePart::Submission(_) => false,
         };
         if !expected {
-            self.close();
+            self.close_profile();
         }
     }
 
-    fn close(&mut self) {
+    fn close_profile(&mut self) {
         if let Some((.., profile)) = self.open.take() {
             self.last = Some(Arc::new(profile));
         }
@@ -256,11 +266,11 @@ impl Scopes {
         for (pool, part) in self.pools.iter().zip(ticks.chunks_mut(Profiler::STAMPS)) {
             pool.read(0, part)?;
         }
-        Ok(if self.broken { None } else { self.places.iter().map(|place| ticks[*place]).collect() })
+        Ok(if self.broken { None } else { self.query_indices.iter().map(|place| ticks[*place]).collect() })
     }
 
     /// The first of `count` places of one pool.
-    fn take(&mut self, count: usize) -> usize {
+    fn reserve_queries(&mut self, count: usize) -> usize {
         let left = Profiler::STAMPS - self.next % Profiler::STAMPS;
         let place = if count <= left { self.next } else { self.next + left };
         self.next = place + count;
@@ -280,7 +290,7 @@ mod tests {
         fn stamps_lie_apart_and_each_in_one_pool(counts in prop::collection::vec(1..33_usize, 0..40)) {
             let (mut scopes, mut end) = (Scopes::default(), 0);
             for count in counts {
-                let place = scopes.take(count);
+                let place = scopes.reserve_queries(count);
                 prop_assert!(place >= end && place < end + Profiler::STAMPS);
                 end = place + count;
                 prop_assert_eq!(place / Profiler::STAMPS, (end - 1) / Profiler::STAMPS);

@@ -6,12 +6,12 @@ use ash::vk;
 
 use super::batches::Batches;
 use super::command_pool::{self, CommandRing, Ticket};
-use super::deferred_free::Deferred;
-use super::emit_barriers::{Images, LastBarrier, Side, emit, emit_moves, stages};
-use super::ownership::{Clock, LANES, PerLane};
+use super::deferred_free::DeferredFree;
+use super::emit_barriers::{Images, LastBarrier, Side, emit, emit_ownership_transfers, vulkan_stages};
+use super::ownership::{PerQueue, QUEUE_COUNT, TimelineVector};
 use super::presentable::{AcquireWait, Presentables};
-use super::queue_sync::{Departure, Lanes, Sent, Site, Step};
-use super::recording::{Recording, begin, end};
+use super::queue_sync::{OwnershipRelease, QueueCaps, QueueSync, SubmitPlan, SubmitRequest};
+use super::recording::{Recording, begin_commands, end_commands};
 use super::timeline::Timeline;
 use crate::barrier::{IdMap, Layout, ResourceId, Stages, TextureShape, Tracker};
 use crate::error::{Error, Result};
@@ -24,7 +24,7 @@ use crate::lock_order::{Guard, Mutex, Rank};
 pub(crate) struct Submission {
     /// What everything submitted later relies on.
     pub(crate) prelude: Option<Box<Recording>>,
-    /// Runs behind the prelude, on the same lane if there is one.
+    /// Runs behind the prelude, on the same queue if there is one.
     pub(crate) main: Option<Box<Recording>>,
     /// What the first of both waits for, besides images that the presentation engine still has.
     pub(crate) waits: Vec<vk::SemaphoreSubmitInfo<'static>>,
@@ -40,12 +40,12 @@ pub(crate) struct Submission {
 
 /// Values of the timeline at which the parts of a submission are done; 0 for what no queue got.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Values {
+pub(crate) struct SubmitValues {
     pub(crate) prelude: u64,
     pub(crate) main: u64,
 }
 
-impl Values {
+impl SubmitValues {
     /// The value at which everything is done.
     pub(crate) fn last(self) -> u64 {
         self.prelude.max(self.main)
@@ -54,23 +54,23 @@ impl Values {
 
 /// The queues with everything that changes when something is submitted. `T` is what is destroyed later.
 pub(crate) struct Submitter<T> {
-    /// One for each lane: one or all.
+    /// One for each queue: one or all.
     timelines: Vec<Timeline>,
-    inner: Mutex<Inner<T>>,
+    inner: Mutex<SubmitterState<T>>,
     gpu: Arc<Gpu>,
 }
 
-struct Inner<T> {
-    lanes: Lanes,
+struct SubmitterState<T> {
+    queue_sync: QueueSync,
     /// What goes to a queue next; empty between submissions.
     batches: Batches,
     presentables: Presentables,
     /// What only the graphics queue may use, with names for messages.
     graphics_only: IdMap<Box<str>>,
     ring: CommandRing,
-    deferred: Deferred<T>,
-    /// The last value of each lane that frames wait for.
-    foreground: PerLane<u64>,
+    deferred: DeferredFree<T>,
+    /// The last value of each queue that frames wait for.
+    foreground: PerQueue<u64>,
     /// Why a submission failed: what the states say has not happened on the GPU, so nothing more is submitted.
     broken: Option<Error>,
 }
@@ -87,20 +87,24 @@ pub(crate) struct Finished<T> {
 
 impl<T> Submitter<T> {
     pub(crate) fn new(gpu: &Arc<Gpu>) -> Result<Self> {
-        const NAMES: [&str; LANES] = ["queue timeline", "compute queue timeline", "transfer queue timeline"];
-        let has_several = gpu.queues.several_lanes();
-        let count = if has_several { LANES } else { 1 };
+        const NAMES: [&str; QUEUE_COUNT] =
+            ["queue timeline", "compute queue timeline", "transfer queue timeline"];
+        let has_several = gpu.queues.has_several();
+        let count = if has_several { QUEUE_COUNT } else { 1 };
         let timelines =
             NAMES.iter().take(count).map(|name| Timeline::new(gpu, name)).collect::<Result<_>>()?;
-        let site = |lane| Site { domain: gpu.queues.domain(lane), stages: Queue::ALL.map(stages_of)[lane] };
-        let inner = Inner {
-            lanes: Lanes::new([site(0), site(1), site(2)], has_several),
+        let queue_caps_of = |queue_index| QueueCaps {
+            domain: gpu.queues.domain(queue_index),
+            stages: Queue::ALL.map(stages_of)[queue_index],
+        };
+        let inner = SubmitterState {
+            queue_sync: QueueSync::new([queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)], has_several),
             batches: Batches::default(),
             presentables: Presentables::default(),
             graphics_only: IdMap::default(),
             ring: CommandRing::default(),
-            deferred: Deferred::default(),
-            foreground: [0; LANES],
+            deferred: DeferredFree::default(),
+            foreground: [0; QUEUE_COUNT],
             broken: None,
         };
         Ok(Self { timelines, inner: Mutex::new(Rank::Submitter, inner), gpu: Arc::clone(gpu) })
@@ -109,40 +113,40 @@ impl<T> Submitter<T> {
     /// Starts recording a command buffer.
     pub(crate) fn acquire(&self, queue: Queue) -> Result<Box<Recording>> {
         #[cfg(any(test, feature = "test-hooks"))]
-        crate::test_support::submit_hook::interrupt();
-        let ticket = self.lock().take(self.gpu.queues.lane(queue));
+        crate::test_support::submit_hook::run_submit_hook();
+        let ticket = self.lock().take_ticket(self.gpu.queues.queue_index(queue));
         self.begin(ticket)
     }
 
     /// As [`acquire`](Self::acquire), and takes out what the GPU has finished with.
     pub(crate) fn collect_and_acquire(&self, queue: Queue) -> Result<(Finished<T>, Result<Box<Recording>>)> {
         #[cfg(any(test, feature = "test-hooks"))]
-        crate::test_support::submit_hook::interrupt();
-        let completed = self.completed()?;
+        crate::test_support::submit_hook::run_submit_hook();
+        let completed = self.completed_values()?;
         let mut inner = self.lock();
         let finished = inner.take_finished(&completed);
-        let ticket = inner.take(self.gpu.queues.lane(queue));
+        let ticket = inner.take_ticket(self.gpu.queues.queue_index(queue));
         drop(inner);
         Ok((finished, self.begin(ticket)))
     }
 
     /// Begins the command buffer that somebody will acquire next, while the GPU is at work.
-    pub(crate) fn begin_ahead(&self, lane: usize) {
+    pub(crate) fn begin_ahead(&self, queue_index: usize) {
         let mut inner = self.lock();
-        if inner.ring.has_begun(lane) {
+        if inner.ring.has_begun(queue_index) {
             return;
         }
-        let free = inner.ring.take_free(lane);
+        let free = inner.ring.take_free(queue_index);
         drop(inner);
         // Where that fails, whoever acquires one begins another.
-        if let Ok(begun) = command_pool::begin(&self.gpu, lane, free) {
-            self.lock().ring.give_begun(begun);
+        if let Ok(begun) = command_pool::begin_recording(&self.gpu, queue_index, free) {
+            self.lock().ring.store_begun(begun);
         }
     }
 
     fn begin(&self, ticket: Ticket) -> Result<Box<Recording>> {
         let sequence = ticket.sequence;
-        ticket.begin(&self.gpu).inspect_err(|_| self.lock().ring.close(sequence))
+        ticket.begin(&self.gpu).inspect_err(|_| self.lock().ring.end_recording(sequence))
     }
 
     /// Gives a command buffer up.
@@ -151,14 +155,14 @@ impl<T> Submitter<T> {
     }
 
     /// Only the graphics queue may use a resource from now on.
-    pub(crate) fn keep_to_graphics(&self, id: ResourceId, name: &str) {
+    pub(crate) fn restrict_to_graphics(&self, id: ResourceId, name: &str) {
         self.lock().graphics_only.insert(id, name.into());
     }
 
     /// Fails where a command buffer, for another queue, uses what only the graphics queue may.
     pub(crate) fn check_queue(&self, tracker: &Tracker) -> Result<()> {
         let inner = self.lock();
-        match inner.graphics_only.iter().find(|(id, _)| tracker.uses(**id)) {
+        match inner.graphics_only.iter().find(|(id, _)| tracker.uses_resource(**id)) {
             None => Ok(()),
             Some((_, name)) => {
                 let message = "images of windows, and what was imported without being concurrent, belong to the graphics queue; \
@@ -171,13 +175,17 @@ impl<T> Submitter<T> {
     /// Fails where a command buffer uses an image of a swapchain that the application does not have. That is to be known
     /// before anything is submitted, as a failed submission breaks the queue. The caller keeps other submissions off until
     /// its own is made.
-    pub(crate) fn check(&self, tracker: &Tracker) -> Result<()> {
-        self.lock().presentables.check(tracker)
+    pub(crate) fn check_presentables(&self, tracker: &Tracker) -> Result<()> {
+        self.lock().presentables.check_acquired(tracker)
     }
 
     /// Submits command buffers in order. `prepare` runs under the lock, right before. Where that fails halfway, queues may have
     /// got the first of them, as the values tell.
-    pub(crate) fn submit(&self, mut submission: Submission, prepare: impl FnOnce()) -> (Values, Result<()>) {
+    pub(crate) fn submit(
+        &self,
+        mut submission: Submission,
+        prepare: impl FnOnce(),
+    ) -> (SubmitValues, Result<()>) {
         let mut guard = self.lock();
         let inner = &mut *guard;
         let sent = match inner.broken.clone() {
@@ -186,47 +194,47 @@ impl<T> Submitter<T> {
         };
         inner.batches.clear();
         match &sent {
-            Ok(last) => inner.note(&submission, *last),
+            Ok(last) => inner.record_submission(&submission, *last),
             Err(error) => inner.broken = Some(error.clone()),
         }
-        let mut put_away = |part: Option<Box<Recording>>| part.map_or(0, |part| inner.put_away(part));
-        let values = Values { prelude: put_away(submission.prelude), main: put_away(submission.main) };
+        let mut put_away = |part: Option<Box<Recording>>| part.map_or(0, |part| inner.file_recording(part));
+        let values = SubmitValues { prelude: put_away(submission.prelude), main: put_away(submission.main) };
         (values, sent.map(drop))
     }
 
     /// Answers the value of the last.
     fn submit_all(
         &self,
-        inner: &mut Inner<T>,
+        inner: &mut SubmitterState<T>,
         submission: &mut Submission,
         prepare: impl FnOnce(),
     ) -> Result<u64> {
-        submission.parts().try_for_each(|part| end(&self.gpu, part.commands))?;
-        if inner.lanes.are_several() && submission.parts().next().is_some() {
+        submission.recordings().try_for_each(|part| end_commands(&self.gpu, part.commands))?;
+        if inner.queue_sync.is_multi_queue() && submission.recordings().next().is_some() {
             prepare();
             return self.submit_to_several(inner, submission);
         }
         self.fill_batches(inner, submission)?;
         prepare();
-        let value = inner.lanes.signal();
-        self.send(inner, 0, value)?;
-        submission.parts().for_each(|part| part.value = value);
+        let value = inner.queue_sync.next_signal_value();
+        self.submit_batches(inner, 0, value)?;
+        submission.recordings().for_each(|part| part.value = value);
         Ok(value)
     }
 
     /// Puts the barriers from the queue's state in front of each command buffer.
-    fn fill_batches(&self, inner: &mut Inner<T>, submission: &mut Submission) -> Result<()> {
+    fn fill_batches(&self, inner: &mut SubmitterState<T>, submission: &mut Submission) -> Result<()> {
         inner.batches.wait(submission.waits.drain(..));
         inner.batches.signal(submission.signals.drain(..));
-        for recording in submission.parts() {
+        for recording in submission.recordings() {
             let images = inner.image_waits(recording);
             inner.batches.wait(images.iter().map(|image| self.image_wait(image)));
-            let barriers = inner.lanes.submit_alone(&recording.tracker);
+            let barriers = inner.queue_sync.submit_single_queue(&recording.tracker);
             if !barriers.is_empty() {
                 let prologue = recording.prologue(&self.gpu)?;
-                begin(&self.gpu, prologue)?;
+                begin_commands(&self.gpu, prologue)?;
                 emit(&self.gpu, prologue, &barriers, &recording.images, &mut LastBarrier::default());
-                end(&self.gpu, prologue)?;
+                end_commands(&self.gpu, prologue)?;
                 inner.batches.push(prologue);
             }
             inner.batches.push(recording.commands);
@@ -235,153 +243,159 @@ impl<T> Submitter<T> {
     }
 
     /// Each command buffer with its own waits, and a value of its own that others may wait for. Answers the last.
-    fn submit_to_several(&self, inner: &mut Inner<T>, submission: &mut Submission) -> Result<u64> {
+    fn submit_to_several(&self, inner: &mut SubmitterState<T>, submission: &mut Submission) -> Result<u64> {
         let (has_prelude, exchanges) = (submission.prelude.is_some(), submission.exchanges);
         let mut waits = std::mem::take(&mut submission.waits);
         let mut signals = std::mem::take(&mut submission.signals);
-        let (mut last, count) = (0, submission.parts().count());
-        for (place, recording) in submission.parts().enumerate() {
+        let (mut last, count) = (0, submission.recordings().count());
+        for (place, recording) in submission.recordings().enumerate() {
             waits.extend(inner.image_waits(recording).iter().map(|image| self.image_wait(image)));
-            let step = inner.step(recording, has_prelude && place == 0, exchanges);
-            for departure in &step.departures {
-                self.depart(inner, departure, &recording.images)?;
+            let plan = inner.plan_submission(recording, has_prelude && place == 0, exchanges);
+            for release in &plan.releases {
+                self.submit_release(inner, release, &recording.images)?;
             }
-            inner.batches.wait(waits.drain(..).chain(self.lane_waits(&step.waits)));
-            if !step.arrivals.is_empty() || !step.barriers.is_empty() {
-                inner.batches.push(self.record_prologue(recording, &step)?);
+            inner.batches.wait(waits.drain(..).chain(self.queue_waits(&plan.waits)));
+            if !plan.acquires.is_empty() || !plan.barriers.is_empty() {
+                inner.batches.push(self.record_prologue(recording, &plan)?);
             }
             inner.batches.push(recording.commands);
             if place + 1 == count {
                 inner.batches.signal(signals.drain(..));
             }
-            self.send(inner, recording.lane, step.value)?;
-            (recording.value, last) = (step.value, step.value);
+            self.submit_batches(inner, recording.queue_index, plan.value)?;
+            (recording.value, last) = (plan.value, plan.value);
         }
         Ok(last)
     }
 
-    fn record_prologue(&self, recording: &mut Recording, step: &Step) -> Result<vk::CommandBuffer> {
+    fn record_prologue(&self, recording: &mut Recording, plan: &SubmitPlan) -> Result<vk::CommandBuffer> {
         let commands = recording.prologue(&self.gpu)?;
         let images = &recording.images;
-        begin(&self.gpu, commands)?;
-        if !step.arrivals.is_empty() {
-            emit_moves(&self.gpu, commands, &step.arrivals, images, Side::Acquire);
+        begin_commands(&self.gpu, commands)?;
+        if !plan.acquires.is_empty() {
+            emit_ownership_transfers(&self.gpu, commands, &plan.acquires, images, Side::Acquire);
         }
-        emit(&self.gpu, commands, &step.barriers, images, &mut LastBarrier::default());
-        end(&self.gpu, commands)?;
+        emit(&self.gpu, commands, &plan.barriers, images, &mut LastBarrier::default());
+        end_commands(&self.gpu, commands)?;
         Ok(commands)
     }
 
-    /// Has a lane give images away.
-    fn depart(&self, inner: &mut Inner<T>, departure: &Departure, images: &Images) -> Result<()> {
-        let ticket = inner.ring.take(departure.lane);
+    /// Has a queue give images away.
+    fn submit_release(
+        &self,
+        inner: &mut SubmitterState<T>,
+        release: &OwnershipRelease,
+        images: &Images,
+    ) -> Result<()> {
+        let ticket = inner.ring.take_ticket(release.queue_index);
         let sequence = ticket.sequence;
-        let mut recording = ticket.begin(&self.gpu).inspect_err(|_| inner.ring.close(sequence))?;
-        let sent = self.send_moves(inner, departure, recording.commands, images);
-        recording.value = if sent.is_ok() { departure.value } else { 0 };
-        inner.put_away(recording);
+        let mut recording = ticket.begin(&self.gpu).inspect_err(|_| inner.ring.end_recording(sequence))?;
+        let sent = self.record_transfers(inner, release, recording.commands, images);
+        recording.value = if sent.is_ok() { release.value } else { 0 };
+        inner.file_recording(recording);
         sent
     }
 
-    fn send_moves(
+    fn record_transfers(
         &self,
-        inner: &mut Inner<T>,
-        departure: &Departure,
+        inner: &mut SubmitterState<T>,
+        release: &OwnershipRelease,
         commands: vk::CommandBuffer,
         images: &Images,
     ) -> Result<()> {
-        emit_moves(&self.gpu, commands, &departure.parts, images, Side::Release);
-        end(&self.gpu, commands)?;
-        inner.batches.wait(self.lane_waits(&departure.waits));
+        emit_ownership_transfers(&self.gpu, commands, &release.parts, images, Side::Release);
+        end_commands(&self.gpu, commands)?;
+        inner.batches.wait(self.queue_waits(&release.waits));
         inner.batches.push(commands);
-        self.send(inner, departure.lane, departure.value)
+        self.submit_batches(inner, release.queue_index, release.value)
     }
 
     /// Waits for an image that the presentation engine still has.
     fn image_wait(&self, wait: &AcquireWait) -> vk::SemaphoreSubmitInfo<'static> {
-        let stages = stages(&self.gpu, wait.stages);
+        let stages = vulkan_stages(&self.gpu, wait.stages);
         vk::SemaphoreSubmitInfo::default().semaphore(wait.semaphore).stage_mask(stages)
     }
 
-    /// Waits for other lanes, at every stage: everything the lane gets later stands behind them too.
-    fn lane_waits(&self, clock: &Clock) -> impl Iterator<Item = vk::SemaphoreSubmitInfo<'static>> {
-        clock.values().map(|(lane, value)| {
+    /// Waits for other queues, at every stage: everything the queue gets later stands behind them too.
+    fn queue_waits(&self, vector: &TimelineVector) -> impl Iterator<Item = vk::SemaphoreSubmitInfo<'static>> {
+        vector.values().map(|(queue_index, value)| {
             vk::SemaphoreSubmitInfo::default()
-                .semaphore(self.timelines[lane].raw)
+                .semaphore(self.timelines[queue_index].raw)
                 .value(value)
                 .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)
         })
     }
 
-    /// Hands the batches to a lane, which signals `value` behind them. A value that the queue did not take is not one of those
+    /// Hands the batches to a queue, which signals `value` behind them. A value that the queue did not take is not one of those
     /// that come.
-    fn send(&self, inner: &mut Inner<T>, lane: usize, value: u64) -> Result<()> {
-        let timeline = vk::SemaphoreSubmitInfo::default().semaphore(self.timelines[lane].raw).value(value);
+    fn submit_batches(&self, inner: &mut SubmitterState<T>, queue_index: usize, value: u64) -> Result<()> {
+        let timeline =
+            vk::SemaphoreSubmitInfo::default().semaphore(self.timelines[queue_index].raw).value(value);
         inner.batches.signal([timeline.stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS)]);
-        inner.batches.submit(&self.gpu, lane)?;
+        inner.batches.submit(&self.gpu, queue_index)?;
         inner.batches.clear();
-        inner.lanes.submitted(lane, value);
-        self.timelines[lane].submitted(value);
+        inner.queue_sync.mark_submitted(queue_index, value);
+        self.timelines[queue_index].mark_submitted(value);
         Ok(())
     }
 
     /// The value of the last submission of all.
-    pub(crate) fn submitted(&self) -> u64 {
-        self.lock().lanes.last().iter().copied().max().unwrap_or_default()
+    pub(crate) fn last_submitted(&self) -> u64 {
+        self.lock().queue_sync.last_values().iter().copied().max().unwrap_or_default()
     }
 
-    /// The values of the last submission of each lane.
-    pub(crate) fn last_of_lanes(&self) -> PerLane<u64> {
-        *self.lock().lanes.last()
+    /// The values of the last submission of each queue.
+    pub(crate) fn last_of_queues(&self) -> PerQueue<u64> {
+        *self.lock().queue_sync.last_values()
     }
 
     /// The same, of those that frames wait for.
-    pub(crate) fn foreground(&self) -> PerLane<u64> {
+    pub(crate) fn foreground_values(&self) -> PerQueue<u64> {
         self.lock().foreground
     }
 
     /// How many values there were.
     #[cfg(any(test, feature = "test-hooks"))]
-    pub(crate) fn count(&self) -> u64 {
-        self.lock().lanes.sent()
+    pub(crate) fn value_count(&self) -> u64 {
+        self.lock().queue_sync.value_count()
     }
 
-    /// The lane of a value.
-    pub(crate) fn lane_of(&self, value: u64) -> usize {
-        Lanes::lane_of(value, self.timelines.len() > 1)
+    /// The queue of a value.
+    pub(crate) fn queue_of(&self, value: u64) -> usize {
+        QueueSync::queue_of(value, self.timelines.len() > 1)
     }
 
-    /// The timeline of a lane.
-    pub(crate) fn timeline(&self, lane: usize) -> &Timeline {
-        &self.timelines[lane.min(self.timelines.len() - 1)]
+    /// The timeline of a queue.
+    pub(crate) fn timeline(&self, queue_index: usize) -> &Timeline {
+        &self.timelines[queue_index.min(self.timelines.len() - 1)]
     }
 
     /// Blocks until the submission of this value is done.
     pub(crate) fn wait(&self, value: u64) -> Result<()> {
-        self.timeline(self.lane_of(value)).wait(value)
+        self.timeline(self.queue_of(value)).wait(value)
     }
 
     /// Blocks until all these are done.
-    pub(crate) fn wait_for_lanes(&self, values: &PerLane<u64>) -> Result<()> {
+    pub(crate) fn wait_for_queues(&self, values: &PerQueue<u64>) -> Result<()> {
         self.timelines.iter().zip(values).try_for_each(|(timeline, value)| timeline.wait(*value))
     }
 
     /// Whether the submission of this value is done.
     pub(crate) fn is_done(&self, value: u64) -> Result<bool> {
-        Ok(self.timeline(self.lane_of(value)).completed()? >= value)
+        Ok(self.timeline(self.queue_of(value)).query_completed()? >= value)
     }
 
     /// Up to which value everything is done.
-    pub(crate) fn passed(&self) -> Result<u64> {
-        let completed = self.completed()?;
-        Ok(self.lock().lanes.passed(&completed))
+    pub(crate) fn completed_up_to(&self) -> Result<u64> {
+        let completed = self.completed_values()?;
+        Ok(self.lock().queue_sync.completed_up_to(&completed))
     }
 
-    /// Asks how far the lanes are.
-    fn completed(&self) -> Result<PerLane<u64>> {
-        let mut completed = [0; LANES];
+    /// Asks how far the queues are.
+    fn completed_values(&self) -> Result<PerQueue<u64>> {
+        let mut completed = [0; QUEUE_COUNT];
         for (timeline, completed) in self.timelines.iter().zip(&mut completed) {
-            *completed = timeline.completed()?;
+            *completed = timeline.query_completed()?;
         }
         Ok(completed)
     }
@@ -395,27 +409,27 @@ impl<T> Submitter<T> {
     }
 
     /// Number of the command buffer that was last given out to record.
-    pub(crate) fn newest(&self) -> u64 {
-        self.lock().ring.newest()
+    pub(crate) fn newest_sequence(&self) -> u64 {
+        self.lock().ring.newest_sequence()
     }
 
     /// How many items wait to be destroyed.
     #[cfg(any(test, feature = "test-hooks"))]
-    pub(crate) fn waiting(&self) -> usize {
+    pub(crate) fn deferred_count(&self) -> usize {
         self.lock().deferred.len()
     }
 
     /// Takes out what the GPU has finished with.
     pub(crate) fn collect(&self) -> Result<Finished<T>> {
-        let completed = self.completed()?;
+        let completed = self.completed_values()?;
         Ok(self.lock().take_finished(&completed))
     }
 
     /// As [`collect`](Self::collect), as far as is known without asking the GPU: all that was waited for, at least.
     pub(crate) fn collect_known(&self) -> Finished<T> {
-        let mut completed = [0; LANES];
+        let mut completed = [0; QUEUE_COUNT];
         for (timeline, completed) in self.timelines.iter().zip(&mut completed) {
-            *completed = timeline.seen();
+            *completed = timeline.last_seen();
         }
         self.lock().take_finished(&completed)
     }
@@ -427,18 +441,18 @@ impl<T> Submitter<T> {
 
     /// An image of somebody else's is in this layout now.
     pub(crate) fn import_texture(&self, id: ResourceId, shape: TextureShape, layout: Layout) {
-        self.lock().lanes.import(id, shape, layout);
+        self.lock().queue_sync.import_image(id, shape, layout);
     }
 
     /// The host has written a new image, which is ready to be sampled.
-    pub(crate) fn filled_texture(&self, id: ResourceId, shape: TextureShape) {
-        self.lock().lanes.fill(id, shape);
+    pub(crate) fn mark_host_written(&self, id: ResourceId, shape: TextureShape) {
+        self.lock().queue_sync.mark_host_written(id, shape);
     }
 
     /// Forgets the state of a destroyed resource.
     pub(crate) fn forget(&self, id: ResourceId) {
         let mut inner = self.lock();
-        inner.lanes.forget(id);
+        inner.queue_sync.forget(id);
         inner.presentables.forget(id);
         if !inner.graphics_only.is_empty() {
             inner.graphics_only.remove(&id);
@@ -452,54 +466,54 @@ impl<T> Submitter<T> {
         inner.deferred.drain_all()
     }
 
-    fn lock(&self) -> Guard<'_, Inner<T>> {
+    fn lock(&self) -> Guard<'_, SubmitterState<T>> {
         self.inner.lock()
     }
 }
 
 impl Submission {
-    fn parts(&mut self) -> impl Iterator<Item = &mut Recording> {
+    fn recordings(&mut self) -> impl Iterator<Item = &mut Recording> {
         self.prelude.iter_mut().chain(&mut self.main).map(|part| &mut **part)
     }
 }
 
-impl<T> Inner<T> {
-    /// A command buffer of a lane is about to be recorded.
-    fn take(&mut self, lane: usize) -> Ticket {
-        if lane != 0 {
-            self.lanes.begin_several();
+impl<T> SubmitterState<T> {
+    /// A command buffer of a queue is about to be recorded.
+    fn take_ticket(&mut self, queue_index: usize) -> Ticket {
+        if queue_index != 0 {
+            self.queue_sync.begin_multi_queue();
         }
-        self.ring.take(lane)
+        self.ring.take_ticket(queue_index)
     }
 
     /// Keeps what a queue got until that is done with it, and takes back what none got. Answers the value.
-    fn put_away(&mut self, recording: Box<Recording>) -> u64 {
+    fn file_recording(&mut self, recording: Box<Recording>) -> u64 {
         let value = recording.value;
         match value {
             0 => self.ring.discard(recording),
-            _ => self.ring.submitted(recording),
+            _ => self.ring.mark_submitted(recording),
         }
         value
     }
 
-    fn take_finished(&mut self, completed: &PerLane<u64>) -> Finished<T> {
-        self.lanes.reached(completed);
+    fn take_finished(&mut self, completed: &PerQueue<u64>) -> Finished<T> {
+        self.queue_sync.mark_completed(completed);
         let staged = self.ring.collect(completed);
         let oldest = self.ring.oldest_open();
-        let submitted = self.lanes.last().iter().copied().max().unwrap_or_default();
-        let passed = self.lanes.passed(completed);
-        let garbage = self.deferred.collect(oldest, submitted, passed);
+        let submitted = self.queue_sync.last_values().iter().copied().max().unwrap_or_default();
+        let passed = self.queue_sync.completed_up_to(completed);
+        let garbage = self.deferred.take_completed(oldest, submitted, passed);
         Finished { staged, garbage, passed }
     }
 
     /// Images that the presentation engine still has and a command buffer is the first to use.
     fn image_waits(&mut self, recording: &Recording) -> Vec<AcquireWait> {
-        self.presentables.take_waits(&recording.tracker, self.lanes.first_states())
+        self.presentables.take_waits(&recording.tracker, self.queue_sync.graphics_state())
     }
 
-    fn step(&mut self, recording: &Recording, is_prelude: bool, exchanges: bool) -> Step {
-        let sent = Sent {
-            lane: recording.lane,
+    fn plan_submission(&mut self, recording: &Recording, is_prelude: bool, exchanges: bool) -> SubmitPlan {
+        let sent = SubmitRequest {
+            queue_index: recording.queue_index,
             tracker: &recording.tracker,
             references: &recording.references,
             after: recording.after,
@@ -507,15 +521,15 @@ impl<T> Inner<T> {
             exchanges,
         };
         let images = &recording.images;
-        self.lanes.submit(&sent, |id| images.get(&id).is_some_and(|image| image.is_exclusive))
+        self.queue_sync.submit(&sent, |id| images.get(&id).is_some_and(|image| image.is_exclusive))
     }
 
     /// All of a submission went to its queue.
-    fn note(&mut self, submission: &Submission, last: u64) {
+    fn record_submission(&mut self, submission: &Submission, last: u64) {
         submission.presented.into_iter().for_each(|id| self.presentables.present(id));
         if !submission.in_background {
             let part = submission.main.as_ref().or(submission.prelude.as_ref());
-            self.foreground[part.map_or(0, |part| part.lane)] = last;
+            self.foreground[part.map_or(0, |part| part.queue_index)] = last;
         }
     }
 }

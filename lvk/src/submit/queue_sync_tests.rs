@@ -1,12 +1,12 @@
-//! Lanes against the naive [`model`](super::queue_sync_model), over random programs on one to three queues of made-up families.
+//! Queues against the naive [`model`](super::queue_sync_model), over random programs on one to three queues of made-up families.
 
 use proptest::prelude::*;
 
-use super::ownership::{Access, Clock, LANES};
+use super::ownership::{QUEUE_COUNT, QueueAccess, TimelineVector};
 use super::queue::stages_of;
-use super::queue_sync::{Lanes, Sent, Site};
-use super::queue_sync_model::{History, Sent as Logged, foreign_stages, weaker};
-use crate::barrier::model::{Cell, Command, Event, Op};
+use super::queue_sync::{QueueCaps, QueueSync, SubmitRequest};
+use super::queue_sync_model::{History, SubmittedWork as Logged, external_stages, weaker};
+use crate::barrier::model::{Cell, Command, ModelEvent, Op};
 use crate::barrier::{Barriers, Layout, ResourceId, Stages, Subresources, TextureShape, Tracker, Use};
 use crate::gpu::caps::queues::Queue;
 
@@ -20,52 +20,65 @@ fn is_exclusive(id: ResourceId) -> bool {
 }
 
 #[derive(Debug, Clone)]
-struct Program {
-    domains: [u32; LANES],
-    /// Lane and commands of each command buffer, in the order of submission.
+struct QueueProgram {
+    domains: [u32; QUEUE_COUNT],
+    /// Queue and commands of each command buffer, in the order of submission.
     buffers: Vec<(usize, Vec<Command>)>,
 }
 
-impl Program {
+impl QueueProgram {
     fn run(&self) -> History {
-        let site = |lane: usize| Site { domain: self.domains[lane], stages: stages_of(Queue::ALL[lane]) };
-        let sites = [site(0), site(1), site(2)];
-        let mut lanes = Lanes::new(sites, true);
+        let queue_caps_of = |queue_index: usize| QueueCaps {
+            domain: self.domains[queue_index],
+            stages: stages_of(Queue::ALL[queue_index]),
+        };
+        let queue_caps = [queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)];
+        let mut queue_sync = QueueSync::new(queue_caps, true);
         let mut sent = Vec::new();
-        for (lane, commands) in &self.buffers {
+        for (queue_index, commands) in &self.buffers {
             let (tracker, mut recorded) = record(commands);
-            if *lane != 0 {
-                lanes.begin_several();
+            if *queue_index != 0 {
+                queue_sync.begin_multi_queue();
             }
-            if !lanes.are_several() {
-                let barriers = lanes.submit_alone(&tracker);
-                recorded.insert(0, Event::Barriers(barriers));
-                let value = lanes.signal();
-                lanes.submitted(0, value);
-                sent.push(logged(0, value, Clock::default(), recorded));
+            if !queue_sync.is_multi_queue() {
+                let barriers = queue_sync.submit_single_queue(&tracker);
+                recorded.insert(0, ModelEvent::Barriers(barriers));
+                let value = queue_sync.next_signal_value();
+                queue_sync.mark_submitted(0, value);
+                sent.push(logged(0, value, TimelineVector::default(), recorded));
                 continue;
             }
-            let step = lanes.submit(&plain(*lane, &tracker), is_exclusive);
-            lanes.submitted(*lane, step.value);
-            for departure in step.departures {
-                let releases = departure.parts;
-                let log = logged(departure.lane, departure.value, departure.waits, Vec::new());
+            let step = queue_sync.submit(&plain(*queue_index, &tracker), is_exclusive);
+            queue_sync.mark_submitted(*queue_index, step.value);
+            for release in step.releases {
+                let releases = release.parts;
+                let log = logged(release.queue_index, release.value, release.waits, Vec::new());
                 sent.push(Logged { releases, ..log });
             }
-            recorded.insert(0, Event::Barriers(step.barriers));
-            sent.push(Logged { acquires: step.arrivals, ..logged(*lane, step.value, step.waits, recorded) });
+            recorded.insert(0, ModelEvent::Barriers(step.barriers));
+            sent.push(Logged {
+                acquires: step.acquires,
+                ..logged(*queue_index, step.value, step.waits, recorded)
+            });
         }
-        History { sites, sent }
+        History { queue_caps, sent }
     }
 }
 
-fn plain(lane: usize, tracker: &Tracker) -> Sent<'_> {
-    Sent { lane, tracker, references: &[], after: Clock::default(), is_prelude: false, exchanges: false }
+fn plain(queue_index: usize, tracker: &Tracker) -> SubmitRequest<'_> {
+    SubmitRequest {
+        queue_index,
+        tracker,
+        references: &[],
+        after: TimelineVector::default(),
+        is_prelude: false,
+        exchanges: false,
+    }
 }
 
-fn logged(lane: usize, value: u64, waits: Clock, events: Vec<Event>) -> Logged {
+fn logged(queue_index: usize, value: u64, waits: TimelineVector, events: Vec<ModelEvent>) -> Logged {
     Logged {
-        lane,
+        queue_index,
         value,
         waits: waits.values().collect(),
         releases: Vec::new(),
@@ -74,7 +87,7 @@ fn logged(lane: usize, value: u64, waits: Clock, events: Vec<Event>) -> Logged {
     }
 }
 
-fn record(commands: &[Command]) -> (Tracker, Vec<Event>) {
+fn record(commands: &[Command]) -> (Tracker, Vec<ModelEvent>) {
     let (mut tracker, mut log) = (Tracker::default(), Vec::new());
     for command in commands {
         let mut out = Barriers::default();
@@ -85,8 +98,8 @@ fn record(commands: &[Command]) -> (Tracker, Vec<Event>) {
                 None => tracker.use_buffer(op.id, op.touch, &mut out),
             }
         }
-        log.push(Event::Barriers(out));
-        log.push(Event::Command(command.clone()));
+        log.push(ModelEvent::Barriers(out));
+        log.push(ModelEvent::Command(command.clone()));
     }
     (tracker, log)
 }
@@ -99,20 +112,20 @@ fn cells() -> Vec<Cell> {
     (0..3).map(|id| cell(id, 0, 0)).chain(textures).collect()
 }
 
-/// Stages of shaders on a lane.
-fn shaders(lane: usize) -> impl Strategy<Value = Stages> {
+/// Stages of shaders on a queue.
+fn shaders(queue_index: usize) -> impl Strategy<Value = Stages> {
     let of_lane = [
         vec![Stages::COMPUTE, Stages::FRAGMENT, Stages::FRAGMENT | Stages::PRE_RASTER],
         vec![Stages::COMPUTE, Stages::RAY_TRACING, Stages::COMPUTE | Stages::RAY_TRACING],
         vec![Stages::TRANSFER],
     ];
-    prop::sample::select(of_lane[lane].clone())
+    prop::sample::select(of_lane[queue_index].clone())
 }
 
-/// What commands of a lane do to a buffer or a texture.
-fn touch(lane: usize, texture: bool) -> BoxedStrategy<Use> {
+/// What commands of a queue do to a buffer or a texture.
+fn touch(queue_index: usize, texture: bool) -> BoxedStrategy<Use> {
     let copies = prop_oneof![Just(Use::transfer_read()), Just(Use::transfer_write())];
-    let uses = match (lane, texture) {
+    let uses = match (queue_index, texture) {
         (2, _) => copies.boxed(),
         (0, true) => prop_oneof![
             2 => copies,
@@ -121,24 +134,25 @@ fn touch(lane: usize, texture: bool) -> BoxedStrategy<Use> {
             1 => any::<bool>().prop_map(Use::color_target),
         ]
         .boxed(),
-        (lane, _) => prop_oneof![
+        (queue_index, _) => prop_oneof![
             2 => copies,
-            3 => shaders(lane).prop_map(Use::shader_read),
-            2 => shaders(lane).prop_map(Use::shader_write),
+            3 => shaders(queue_index).prop_map(Use::shader_read),
+            2 => shaders(queue_index).prop_map(Use::shader_write),
         ]
         .boxed(),
     };
     uses.prop_map(move |touch| if texture { touch } else { touch.with_layout(Layout::Undefined) }).boxed()
 }
 
-fn op(lane: usize, simple: bool) -> BoxedStrategy<Op> {
-    let buffer = (0..2_u64, touch(lane, false)).prop_map(|(id, touch)| Op {
+fn op(queue_index: usize, simple: bool) -> BoxedStrategy<Op> {
+    let buffer = (0..2_u64, touch(queue_index, false)).prop_map(|(id, touch)| Op {
         id: ResourceId(id),
         texture: None,
         touch,
         accumulated: false,
     });
-    let texture = (0..if simple { 2 } else { 3_usize }, touch(lane, true), 0..2_u32, 0..2_u32, any::<bool>());
+    let texture =
+        (0..if simple { 2 } else { 3_usize }, touch(queue_index, true), 0..2_u32, 0..2_u32, any::<bool>());
     let texture = texture.prop_map(|(which, touch, mip, layer, whole)| {
         let (id, shape) = TEXTURES[which];
         let part = Subresources {
@@ -147,10 +161,10 @@ fn op(lane: usize, simple: bool) -> BoxedStrategy<Op> {
             base_layer: layer.min(shape.layers - 1),
             layer_count: 1,
         };
-        let part = if whole { shape.whole() } else { part };
+        let part = if whole { shape.all_subresources() } else { part };
         Op { id: ResourceId(id), texture: Some((shape, part)), touch, accumulated: false }
     });
-    if simple || lane == 2 {
+    if simple || queue_index == 2 {
         return prop_oneof![buffer, texture].boxed();
     }
     let write = Use::shader_write(Stages::COMPUTE).with_layout(Layout::Undefined);
@@ -163,25 +177,25 @@ fn op(lane: usize, simple: bool) -> BoxedStrategy<Op> {
     prop_oneof![2 => buffer, 2 => texture, 1 => accumulated].boxed()
 }
 
-fn command_buffer(lane: usize, simple: bool) -> impl Strategy<Value = (usize, Vec<Command>)> {
+fn command_buffer(queue_index: usize, simple: bool) -> impl Strategy<Value = (usize, Vec<Command>)> {
     // At most one thing to a resource.
-    let command = prop::collection::vec(op(lane, simple), 1..3).prop_map(|mut ops| {
+    let command = prop::collection::vec(op(queue_index, simple), 1..3).prop_map(|mut ops| {
         ops.sort_by_key(|op| op.id);
         ops.dedup_by_key(|op| op.id);
         ops
     });
-    prop::collection::vec(command, 1..4).prop_map(move |commands| (lane, commands))
+    prop::collection::vec(command, 1..4).prop_map(move |commands| (queue_index, commands))
 }
 
 /// Families: all alike, one beside two, three.
-fn domains() -> impl Strategy<Value = [u32; LANES]> {
+fn domains() -> impl Strategy<Value = [u32; QUEUE_COUNT]> {
     prop::sample::select(vec![[0, 0, 0], [0, 1, 1], [0, 1, 0], [0, 0, 2], [0, 1, 2]])
 }
 
-fn program(simple: bool) -> impl Strategy<Value = Program> {
-    (domains(), 1..=LANES).prop_flat_map(move |(domains, lanes)| {
-        let buffer = (0..lanes).prop_flat_map(move |lane| command_buffer(lane, simple));
-        prop::collection::vec(buffer, 0..9).prop_map(move |buffers| Program { domains, buffers })
+fn program(simple: bool) -> impl Strategy<Value = QueueProgram> {
+    (domains(), 1..=QUEUE_COUNT).prop_flat_map(move |(domains, queue_sync)| {
+        let buffer = (0..queue_sync).prop_flat_map(move |queue_index| command_buffer(queue_index, simple));
+        prop::collection::vec(buffer, 0..9).prop_map(move |buffers| QueueProgram { domains, buffers })
     })
 }
 
@@ -195,7 +209,7 @@ proptest! {
         let history = program.run();
         prop_assert_eq!(history.violation(&cells(), &|cell| is_exclusive(cell.id)), None);
         for sent in &history.sent {
-            prop_assert_eq!(foreign_stages(&history.sites, sent), Stages::empty());
+            prop_assert_eq!(external_stages(&history.queue_caps, sent), Stages::empty());
         }
     }
 
@@ -216,7 +230,7 @@ proptest! {
     #[test]
     fn one_queue_waits_for_nothing(program in program(false)) {
         let mut program = program;
-        program.buffers.retain(|(lane, _)| *lane == 0);
+        program.buffers.retain(|(queue_index, _)| *queue_index == 0);
         let history = program.run();
         prop_assert!(history.sent.iter().all(|sent| sent.waits.is_empty() && sent.releases.is_empty()));
         let values: Vec<_> = history.sent.iter().map(|sent| sent.value).collect();
@@ -230,13 +244,13 @@ fn buffer_op(id: u64, touch: Use) -> Command {
 }
 
 fn texture_op(id: u64, touch: Use) -> Command {
-    let texture = Some((ONE, ONE.whole()));
+    let texture = Some((ONE, ONE.all_subresources()));
     vec![Op { id: ResourceId(id), texture, touch, accumulated: false }]
 }
 
 fn run(buffers: Vec<(usize, Command)>) -> History {
-    let buffers = buffers.into_iter().map(|(lane, command)| (lane, vec![command])).collect();
-    Program { domains: [0, 1, 2], buffers }.run()
+    let buffers = buffers.into_iter().map(|(queue_index, command)| (queue_index, vec![command])).collect();
+    QueueProgram { domains: [0, 1, 2], buffers }.run()
 }
 
 /// The model must be able to fail, in each of its ways.
@@ -261,7 +275,7 @@ fn the_model_finds_what_is_wrong() {
     assert!(violation(&bad).unwrap().contains("waits for"));
     let mut bad = good;
     bad.sent[last].waits[0].0 = 0;
-    assert!(violation(&bad).is_some(), "a lane waits for itself");
+    assert!(violation(&bad).is_some(), "a queue waits for itself");
 }
 
 #[test]
@@ -282,7 +296,7 @@ fn compute_waits_for_what_it_reads_and_not_for_the_latest_of_graphics() {
 #[test]
 fn what_is_only_read_is_read_side_by_side() {
     let (write, read) = (Use::transfer_write(), Use::transfer_read());
-    let readers = |lane| (lane, buffer_op(0, read));
+    let readers = |queue_index| (queue_index, buffer_op(0, read));
     let mut order = vec![(2, Vec::new()), (0, buffer_op(0, write)), readers(1), readers(2), readers(0)];
     order.extend([readers(1), readers(2), (1, buffer_op(0, write))]);
     let history = run(order);
@@ -301,7 +315,7 @@ fn images_of_one_domain_move_once_and_keep_their_layout() {
     let history =
         run(vec![(1, texture_op(4, store)), (0, texture_op(4, sample)), (0, texture_op(4, sample))]);
     let [writer, release, reader, again] = &history.sent[..] else { panic!("four submissions") };
-    assert_eq!((release.lane, release.releases.len()), (1, 1));
+    assert_eq!((release.queue_index, release.releases.len()), (1, 1));
     assert_eq!(release.releases, reader.acquires);
     assert_eq!(release.releases[0].layout, Layout::General);
     assert_eq!(reader.waits, [(1, release.value)]);
@@ -312,112 +326,120 @@ fn images_of_one_domain_move_once_and_keep_their_layout() {
 
 #[test]
 fn what_everybody_relies_on_is_waited_for_where_shaders_run() {
-    let site = |lane: usize| Site { domain: 0, stages: stages_of(Queue::ALL[lane]) };
-    let mut lanes = Lanes::new([site(0), site(1), site(2)], true);
-    lanes.begin_several();
+    let queue_caps_of =
+        |queue_index: usize| QueueCaps { domain: 0, stages: stages_of(Queue::ALL[queue_index]) };
+    let mut queue_sync = QueueSync::new([queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)], true);
+    queue_sync.begin_multi_queue();
     let nothing = Tracker::default();
-    let prelude = lanes.submit(&Sent { is_prelude: true, ..plain(0, &nothing) }, |_| false).value;
-    let latest = lanes.submit(&plain(0, &nothing), |_| false).value;
-    let waits = |lanes: &mut Lanes, lane| lanes.submit(&plain(lane, &nothing), |_| false).waits;
-    assert_eq!(waits(&mut lanes, 1).values().collect::<Vec<_>>(), [(0, prelude)]);
-    assert_eq!(waits(&mut lanes, 1).values().count(), 0);
-    assert_eq!(waits(&mut lanes, 2).values().count(), 0);
-    let mut after = Clock::default();
-    after.raise(0, latest);
-    let told = lanes.submit(&Sent { after, ..plain(1, &nothing) }, |_| false);
+    let prelude =
+        queue_sync.submit(&SubmitRequest { is_prelude: true, ..plain(0, &nothing) }, |_| false).value;
+    let latest = queue_sync.submit(&plain(0, &nothing), |_| false).value;
+    let waits = |queue_sync: &mut QueueSync, queue_index| {
+        queue_sync.submit(&plain(queue_index, &nothing), |_| false).waits
+    };
+    assert_eq!(waits(&mut queue_sync, 1).values().collect::<Vec<_>>(), [(0, prelude)]);
+    assert_eq!(waits(&mut queue_sync, 1).values().count(), 0);
+    assert_eq!(waits(&mut queue_sync, 2).values().count(), 0);
+    let mut after = TimelineVector::default();
+    after.max_with_value(0, latest);
+    let told = queue_sync.submit(&SubmitRequest { after, ..plain(1, &nothing) }, |_| false);
     assert_eq!(told.waits.values().collect::<Vec<_>>(), [(0, latest)]);
 }
 
 #[test]
 fn references_are_waited_for_without_barriers() {
-    let site = |lane: usize| Site { domain: 0, stages: stages_of(Queue::ALL[lane]) };
-    let mut lanes = Lanes::new([site(0), site(1), site(2)], true);
-    lanes.begin_several();
+    let queue_caps_of =
+        |queue_index: usize| QueueCaps { domain: 0, stages: stages_of(Queue::ALL[queue_index]) };
+    let mut queue_sync = QueueSync::new([queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)], true);
+    queue_sync.begin_multi_queue();
     let id = ResourceId(9);
     let (built, _) = record(&[buffer_op(9, Use::accel_build_write())]);
-    let built = lanes.submit(&plain(1, &built), |_| false).value;
+    let built = queue_sync.submit(&plain(1, &built), |_| false).value;
     let nothing = Tracker::default();
-    let sent = Sent { references: &[(id, Access::Read)], ..plain(0, &nothing) };
-    let step = lanes.submit(&sent, |_| false);
+    let sent = SubmitRequest { references: &[(id, QueueAccess::Read)], ..plain(0, &nothing) };
+    let step = queue_sync.submit(&sent, |_| false);
     assert_eq!(step.waits.values().collect::<Vec<_>>(), [(1, built)]);
     assert!(step.barriers.is_empty());
-    assert_eq!(lanes.submit(&sent, |_| false).waits.values().count(), 0);
+    assert_eq!(queue_sync.submit(&sent, |_| false).waits.values().count(), 0);
 }
 
 #[test]
 fn what_others_wrote_or_will_write_is_waited_for_as_if_it_were_written() {
-    let site = |lane: usize| Site { domain: 0, stages: stages_of(Queue::ALL[lane]) };
+    let queue_caps_of =
+        |queue_index: usize| QueueCaps { domain: 0, stages: stages_of(Queue::ALL[queue_index]) };
     let (id, all) = (ResourceId(3), ONE);
     let reader = |stages| record(&[texture_op(3, Use::shader_read(stages))]).0;
     let (computed, drawn) = (reader(Stages::COMPUTE), reader(Stages::FRAGMENT));
-    let waits = |step: super::queue_sync::Step| step.waits.values().collect::<Vec<_>>();
+    let waits = |step: super::queue_sync::SubmitPlan| step.waits.values().collect::<Vec<_>>();
     let fresh = || {
-        let mut lanes = Lanes::new([site(0), site(1), site(2)], true);
-        lanes.begin_several();
-        lanes.import(id, all, Layout::ShaderRead);
-        lanes
+        let mut queue_sync = QueueSync::new([queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)], true);
+        queue_sync.begin_multi_queue();
+        queue_sync.import_image(id, all, Layout::ShaderRead);
+        queue_sync
     };
     // Others signal the first reader, on another queue; the next reader knows nothing of their semaphore.
-    let mut lanes = fresh();
-    let taken = lanes.submit(&Sent { exchanges: true, ..plain(1, &computed) }, |_| false).value;
-    assert_eq!(waits(lanes.submit(&plain(0, &drawn), |_| false)), [(1, taken)]);
+    let mut queue_sync = fresh();
+    let taken = queue_sync.submit(&SubmitRequest { exchanges: true, ..plain(1, &computed) }, |_| false).value;
+    assert_eq!(waits(queue_sync.submit(&plain(0, &drawn), |_| false)), [(1, taken)]);
     // Others write once the last reader signals, or once what was handed over to them is there.
-    let given: [&[_]; 2] = [&[], &[(id, Access::Write)]];
+    let given: [&[_]; 2] = [&[], &[(id, QueueAccess::Write)]];
     for references in given {
-        let mut lanes = fresh();
-        let read = lanes.submit(&plain(1, &computed), |_| false).value;
-        let sent = Sent { exchanges: references.is_empty(), references, ..plain(0, &drawn) };
-        assert_eq!(waits(lanes.submit(&sent, |_| false)), [(1, read)]);
+        let mut queue_sync = fresh();
+        let read = queue_sync.submit(&plain(1, &computed), |_| false).value;
+        let sent = SubmitRequest { exchanges: references.is_empty(), references, ..plain(0, &drawn) };
+        assert_eq!(waits(queue_sync.submit(&sent, |_| false)), [(1, read)]);
     }
     // Nobody else is told of it: reads go side by side.
-    let mut lanes = fresh();
-    lanes.submit(&plain(1, &computed), |_| false);
-    assert_eq!(waits(lanes.submit(&plain(0, &drawn), |_| false)), []);
+    let mut queue_sync = fresh();
+    queue_sync.submit(&plain(1, &computed), |_| false);
+    assert_eq!(waits(queue_sync.submit(&plain(0, &drawn), |_| false)), []);
 }
 
 #[test]
 fn garbage_waits_for_every_queue_that_is_busy_and_for_nothing_before() {
-    let site = |lane: usize| Site { domain: 0, stages: stages_of(Queue::ALL[lane]) };
-    let mut lanes = Lanes::new([site(0), site(1), site(2)], true);
+    let queue_caps_of =
+        |queue_index: usize| QueueCaps { domain: 0, stages: stages_of(Queue::ALL[queue_index]) };
+    let mut queue_sync = QueueSync::new([queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)], true);
     let nothing = Tracker::default();
-    let alone = [(); 2].map(|()| lanes.signal());
-    lanes.submitted(0, alone[1]);
-    lanes.begin_several();
-    let send = |lanes: &mut Lanes, lane| {
-        let value = lanes.submit(&plain(lane, &nothing), |_| false).value;
-        lanes.submitted(lane, value);
+    let alone = [(); 2].map(|()| queue_sync.next_signal_value());
+    queue_sync.mark_submitted(0, alone[1]);
+    queue_sync.begin_multi_queue();
+    let send = |queue_sync: &mut QueueSync, queue_index| {
+        let value = queue_sync.submit(&plain(queue_index, &nothing), |_| false).value;
+        queue_sync.mark_submitted(queue_index, value);
         value
     };
-    let [a, b, c] = [0, 1, 0].map(|lane| send(&mut lanes, lane));
+    let [a, b, c] = [0, 1, 0].map(|queue_index| send(&mut queue_sync, queue_index));
     assert!(alone[1] < a && a < b && b < c);
-    assert_eq!([a, b, c].map(|value| Lanes::lane_of(value, true)), [0, 1, 0]);
-    // What was sent before lanes were kept apart is not noted one by one.
-    assert_eq!(lanes.passed(&[0, 0, 0]), 0);
-    assert_eq!(lanes.passed(&[alone[0], b, 0]), alone[0]);
+    assert_eq!([a, b, c].map(|value| QueueSync::queue_of(value, true)), [0, 1, 0]);
+    // What was sent before queues were kept apart is not noted one by one.
+    assert_eq!(queue_sync.completed_up_to(&[0, 0, 0]), 0);
+    assert_eq!(queue_sync.completed_up_to(&[alone[0], b, 0]), alone[0]);
     // Up to right before the first that is not done, however long the other queue has done nothing.
-    assert_eq!(lanes.passed(&[alone[1], 0, 0]), a - 1);
-    assert_eq!(lanes.passed(&[a, 0, 0]), b - 1);
-    assert_eq!(lanes.passed(&[c, 0, 0]), b - 1);
-    assert_eq!(lanes.passed(&[a, b, 0]), c - 1);
-    assert_eq!(lanes.passed(&[c, b, 0]), c);
-    lanes.reached(&[c, 0, 0]);
-    assert_eq!(lanes.passed(&[c, 0, 0]), b - 1);
-    let mut one = Lanes::new([site(0), site(1), site(2)], false);
+    assert_eq!(queue_sync.completed_up_to(&[alone[1], 0, 0]), a - 1);
+    assert_eq!(queue_sync.completed_up_to(&[a, 0, 0]), b - 1);
+    assert_eq!(queue_sync.completed_up_to(&[c, 0, 0]), b - 1);
+    assert_eq!(queue_sync.completed_up_to(&[a, b, 0]), c - 1);
+    assert_eq!(queue_sync.completed_up_to(&[c, b, 0]), c);
+    queue_sync.mark_completed(&[c, 0, 0]);
+    assert_eq!(queue_sync.completed_up_to(&[c, 0, 0]), b - 1);
+    let mut one = QueueSync::new([queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)], false);
     assert_eq!([one.next_value(0), one.next_value(0)], [1, 2]);
-    one.submitted(0, 2);
-    assert_eq!((one.passed(&[1, 0, 0]), Lanes::lane_of(2, false)), (1, 0));
+    one.mark_submitted(0, 2);
+    assert_eq!((one.completed_up_to(&[1, 0, 0]), QueueSync::queue_of(2, false)), (1, 0));
 }
 
 /// A value whose submission failed never comes, so nothing waits for it.
 #[test]
 fn what_no_queue_got_is_not_among_what_comes() {
-    let site = |lane: usize| Site { domain: 0, stages: stages_of(Queue::ALL[lane]) };
-    let mut lanes = Lanes::new([site(0), site(1), site(2)], true);
-    lanes.begin_several();
+    let queue_caps_of =
+        |queue_index: usize| QueueCaps { domain: 0, stages: stages_of(Queue::ALL[queue_index]) };
+    let mut queue_sync = QueueSync::new([queue_caps_of(0), queue_caps_of(1), queue_caps_of(2)], true);
+    queue_sync.begin_multi_queue();
     let nothing = Tracker::default();
-    let sent = lanes.submit(&plain(1, &nothing), |_| false).value;
-    lanes.submitted(1, sent);
-    let refused = lanes.submit(&plain(1, &nothing), |_| false).value;
+    let sent = queue_sync.submit(&plain(1, &nothing), |_| false).value;
+    queue_sync.mark_submitted(1, sent);
+    let refused = queue_sync.submit(&plain(1, &nothing), |_| false).value;
     assert!(refused > sent);
-    assert_eq!((*lanes.last(), lanes.passed(&[0, sent, 0])), ([0, sent, 0], sent));
+    assert_eq!((*queue_sync.last_values(), queue_sync.completed_up_to(&[0, sent, 0])), ([0, sent, 0], sent));
 }

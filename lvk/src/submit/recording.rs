@@ -4,7 +4,7 @@ use ash::vk;
 
 use super::emit_barriers::Images;
 use super::input_attachment_sets::InputSets;
-use super::ownership::{Access, Clock};
+use super::ownership::{QueueAccess, TimelineVector};
 use crate::barrier::{ResourceId, Tracker};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -18,11 +18,11 @@ pub(crate) struct Recording {
     pub(crate) tracker: Tracker,
     pub(crate) images: Images,
     /// What it uses that needs no barriers on one queue, and waits between several.
-    pub(crate) references: Vec<(ResourceId, Access)>,
+    pub(crate) references: Vec<(ResourceId, QueueAccess)>,
     /// What the caller has it wait for on other queues.
-    pub(crate) after: Clock,
+    pub(crate) after: TimelineVector,
     /// The queue's.
-    pub(crate) lane: usize,
+    pub(crate) queue_index: usize,
     /// Of the timeline, once the queue has it; 0 before.
     pub(super) value: u64,
     /// Whether staging memory is kept for it.
@@ -36,10 +36,10 @@ pub(crate) struct Recording {
 }
 
 impl Recording {
-    pub(super) fn new(gpu: &Gpu, lane: usize) -> Result<Box<Self>> {
+    pub(super) fn new(gpu: &Gpu, queue_index: usize) -> Result<Box<Self>> {
         let info = vk::CommandPoolCreateInfo::default()
             .flags(vk::CommandPoolCreateFlags::TRANSIENT)
-            .queue_family_index(gpu.queues.family(lane));
+            .queue_family_index(gpu.queues.family(queue_index));
         // SAFETY: the queue family is the device's own.
         let pool = unsafe { gpu.device.create_command_pool(&info, None) }
             .map_err(Error::vulkan("vkCreateCommandPool"))?;
@@ -53,8 +53,8 @@ impl Recording {
             tracker: Tracker::default(),
             images: Images::default(),
             references: Vec::new(),
-            after: Clock::default(),
-            lane,
+            after: TimelineVector::default(),
+            queue_index,
             value: 0,
             is_staged: false,
             pool,
@@ -65,7 +65,7 @@ impl Recording {
 
     /// Begins anew. Neither the GPU nor anybody else has the command buffer, and where that fails it is gone.
     pub(super) fn begin(mut self: Box<Self>, gpu: &Gpu) -> Result<Box<Self>> {
-        match self.reset(gpu).and_then(|()| begin(gpu, self.commands)) {
+        match self.reset(gpu).and_then(|()| begin_commands(gpu, self.commands)) {
             Ok(()) => Ok(self),
             Err(error) => {
                 self.destroy(gpu);
@@ -76,7 +76,7 @@ impl Recording {
 
     fn reset(&mut self, gpu: &Gpu) -> Result<()> {
         (self.value, self.is_staged) = (0, false);
-        self.after = Clock::default();
+        self.after = TimelineVector::default();
         self.tracker.clear();
         self.images.clear();
         self.references.clear();
@@ -100,7 +100,7 @@ impl Recording {
         layout: vk::DescriptorSetLayout,
         count: u32,
     ) -> Result<vk::DescriptorSet> {
-        self.inputs.take(gpu, layout, count)
+        self.inputs.acquire(gpu, layout, count)
     }
 
     /// Runs before the caller's commands and holds the barriers between the queue's state and the first uses there.
@@ -132,13 +132,13 @@ fn allocate(gpu: &Gpu, pool: vk::CommandPool) -> Result<vk::CommandBuffer> {
     made.map(|buffers| buffers[0]).map_err(Error::vulkan("vkAllocateCommandBuffers"))
 }
 
-pub(super) fn begin(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {
+pub(super) fn begin_commands(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {
     let info = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
     // SAFETY: the command buffer is new or was reset with its pool.
     unsafe { gpu.device.begin_command_buffer(commands, &info) }.map_err(Error::vulkan("vkBeginCommandBuffer"))
 }
 
-pub(super) fn end(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {
+pub(super) fn end_commands(gpu: &Gpu, commands: vk::CommandBuffer) -> Result<()> {
     // SAFETY: the command buffer is being recorded, outside of a render pass.
     unsafe { gpu.device.end_command_buffer(commands) }.map_err(Error::vulkan("vkEndCommandBuffer"))
 }

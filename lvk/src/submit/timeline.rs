@@ -1,4 +1,4 @@
-//! Timeline semaphores: one for each lane, a rising number for everything submitted to it.
+//! Timeline semaphores: one for each queue, a rising number for everything submitted to it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -48,38 +48,38 @@ impl Timeline {
     }
 
     /// The last value the GPU reached, as far as is known without asking.
-    pub(crate) fn seen(&self) -> u64 {
+    pub(crate) fn last_seen(&self) -> u64 {
         self.seen.load(Ordering::Acquire)
     }
 
     /// A queue got what signals this value.
-    pub(crate) fn submitted(&self, value: u64) {
+    pub(crate) fn mark_submitted(&self, value: u64) {
         self.sent.fetch_max(value, Ordering::AcqRel);
     }
 
     /// Asks how far the GPU is, unless it has nothing left to do.
-    pub(crate) fn completed(&self) -> Result<u64> {
-        let seen = self.seen();
+    pub(crate) fn query_completed(&self) -> Result<u64> {
+        let seen = self.last_seen();
         if seen == self.sent.load(Ordering::Acquire) {
             return Ok(seen);
         }
         // SAFETY: the semaphore is alive and a timeline.
         let value = unsafe { self.gpu.device.get_semaphore_counter_value(self.raw) }
-            .map_err(self.gpu.failed("vkGetSemaphoreCounterValue"))?;
+            .map_err(self.gpu.vulkan_error("vkGetSemaphoreCounterValue"))?;
         self.seen.fetch_max(value, Ordering::AcqRel);
         Ok(value)
     }
 
     /// Blocks until the GPU reaches `value`.
     pub(crate) fn wait(&self, value: u64) -> Result<()> {
-        if self.seen() >= value {
+        if self.last_seen() >= value {
             return Ok(());
         }
         let (semaphores, values) = ([self.raw], [value]);
         let info = vk::SemaphoreWaitInfo::default().semaphores(&semaphores).values(&values);
         // SAFETY: the semaphore is alive and a timeline; `value` was submitted, so the wait ends.
         unsafe { self.gpu.device.wait_semaphores(&info, u64::MAX) }
-            .map_err(self.gpu.failed("vkWaitSemaphores"))?;
+            .map_err(self.gpu.vulkan_error("vkWaitSemaphores"))?;
         self.seen.fetch_max(value, Ordering::AcqRel);
         Ok(())
     }

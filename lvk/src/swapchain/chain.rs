@@ -7,7 +7,7 @@ use ash::vk;
 use super::choose::Failure;
 use super::desc::{ColorSpace, HdrMetadata, PresentMode};
 use super::lifecycle::Acquired;
-use super::present_wait::PATIENCE_NS;
+use super::present_wait::PRESENT_TIMEOUT_NS;
 use super::surface::Surface;
 use crate::error::{Error, Result};
 use crate::format::Format;
@@ -42,7 +42,7 @@ impl Chain {
         name: &str,
     ) -> Result<Self, Failure> {
         let gpu = &surface.gpu;
-        let functions = gpu.windows()?;
+        let functions = gpu.window_functions()?;
         let [width, height] = plan.extent;
         let modes: Vec<_> = plan.modes.iter().map(|mode| mode.raw()).collect();
         let mut changing = vk::SwapchainPresentModesCreateInfoEXT::default().present_modes(&modes);
@@ -65,21 +65,22 @@ impl Chain {
         }
         // SAFETY: the plan is made from what the surface says it takes; the old swapchain is of the same surface and locked.
         let raw = unsafe { functions.swapchain.create_swapchain(&info, None) }
-            .map_err(Failure::of("vkCreateSwapchainKHR"))?;
+            .map_err(Failure::from_result("vkCreateSwapchainKHR"))?;
         gpu.name(raw, name);
         Ok(Self { raw, surface: Arc::clone(surface) })
     }
 
     /// Its images, which it owns.
     pub(crate) fn images(&self) -> Result<Vec<vk::Image>, Failure> {
-        let functions = &self.gpu().windows()?.swapchain;
+        let functions = &self.gpu().window_functions()?.swapchain;
         // SAFETY: the swapchain is alive.
-        unsafe { functions.get_swapchain_images(self.raw) }.map_err(Failure::of("vkGetSwapchainImagesKHR"))
+        unsafe { functions.get_swapchain_images(self.raw) }
+            .map_err(Failure::from_result("vkGetSwapchainImagesKHR"))
     }
 
     /// Tells the display what the pictures are like, where it can be told.
     pub(crate) fn set_hdr(&self, hdr: &HdrMetadata) -> Result<(), Failure> {
-        if let Some(functions) = &self.gpu().windows()?.hdr {
+        if let Some(functions) = &self.gpu().window_functions()?.hdr {
             // SAFETY: the swapchain is alive and locked.
             unsafe { functions.set_hdr_metadata(&[self.raw], &[hdr.raw()]) };
         }
@@ -88,21 +89,22 @@ impl Chain {
 
     /// Takes the next image, and signals `semaphore` when the engine has let go of it.
     pub(crate) fn acquire(&self, semaphore: vk::Semaphore) -> Result<Acquired, Failure> {
-        let functions = &self.gpu().windows()?.swapchain;
+        let functions = &self.gpu().window_functions()?.swapchain;
         // SAFETY: the swapchain is alive and locked, no other image of it is taken, and nothing else uses the semaphore.
-        let answer =
-            unsafe { functions.acquire_next_image(self.raw, PATIENCE_NS, semaphore, vk::Fence::null()) };
+        let answer = unsafe {
+            functions.acquire_next_image(self.raw, PRESENT_TIMEOUT_NS, semaphore, vk::Fence::null())
+        };
         match answer {
             Ok((index, suboptimal)) => Ok(Acquired::Image { index, suboptimal }),
             Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => Ok(Acquired::NotYet),
-            Err(result) => Err(Failure::of("vkAcquireNextImageKHR")(result)),
+            Err(result) => Err(Failure::from_result("vkAcquireNextImageKHR")(result)),
         }
     }
 
     /// Hands an image to the engine, which waits for its [`PresentSync`]. Answers whether the swapchain could be better.
     pub(crate) fn present(&self, index: u32, mode: PresentMode, sync: &PresentSync) -> Result<bool, Failure> {
         let gpu = self.gpu();
-        let functions = gpu.windows()?;
+        let functions = gpu.window_functions()?;
         let (chains, indices, waits) = ([self.raw], [index], [sync.drawn]);
         let (modes, fences) = ([mode.raw()], [sync.shown.unwrap_or_default()]);
         let mut mode = vk::SwapchainPresentModeInfoEXT::default().present_modes(&modes);
@@ -112,10 +114,11 @@ impl Chain {
         if sync.shown.is_some() {
             info = info.push_next(&mut mode).push_next(&mut fence);
         }
-        let queue = gpu.queue();
+        let queue = gpu.graphics_queue();
         // SAFETY: the image was acquired, a submission that signals the semaphore is on its way, the fence is not in use,
         // and swapchain and queue are locked.
-        unsafe { functions.swapchain.queue_present(*queue, &info) }.map_err(Failure::of("vkQueuePresentKHR"))
+        unsafe { functions.swapchain.queue_present(*queue, &info) }
+            .map_err(Failure::from_result("vkQueuePresentKHR"))
     }
 
     fn gpu(&self) -> &Arc<Gpu> {
@@ -125,7 +128,7 @@ impl Chain {
 
 impl Drop for Chain {
     fn drop(&mut self) {
-        if let Ok(functions) = self.gpu().windows() {
+        if let Ok(functions) = self.gpu().window_functions() {
             // SAFETY: textures and command buffers that use its images are gone, and so are its presents.
             unsafe { functions.swapchain.destroy_swapchain(self.raw, None) };
         }
@@ -157,7 +160,7 @@ impl PresentSync {
             stalls: false,
             gpu: Arc::clone(gpu),
         };
-        if gpu.windows()?.maintenance.is_some() {
+        if gpu.window_functions()?.maintenance.is_some() {
             // SAFETY: no preconditions.
             let fence = unsafe { gpu.device.create_fence(&vk::FenceCreateInfo::default(), None) };
             sync.shown = Some(fence.map_err(Error::vulkan("vkCreateFence"))?);
@@ -168,7 +171,7 @@ impl PresentSync {
     /// Readies it for the next present. The engine has given the image back since the last one, so nothing is waited for.
     pub(crate) fn reset(&self) -> Result<()> {
         let Some(fence) = self.shown.filter(|_| self.presented) else { return Ok(()) };
-        if !self.wait(PATIENCE_NS)? {
+        if !self.wait(PRESENT_TIMEOUT_NS)? {
             return Err(Error::vulkan("vkWaitForFences")(vk::Result::TIMEOUT));
         }
         // SAFETY: the fence is alive and no longer in use.
@@ -176,7 +179,7 @@ impl PresentSync {
     }
 
     /// Whether its presents are over; `None` where nobody can tell.
-    pub(crate) fn is_over(&self) -> Option<bool> {
+    pub(crate) fn is_done(&self) -> Option<bool> {
         if !self.presented {
             return Some(true);
         }
@@ -185,10 +188,10 @@ impl PresentSync {
     }
 
     /// Waits until its presents are over, where the device can tell, so many nanoseconds at most. Answers whether they are.
-    pub(crate) fn wait(&self, patience_ns: u64) -> Result<bool> {
+    pub(crate) fn wait(&self, timeout_ns: u64) -> Result<bool> {
         let Some(fence) = self.shown.filter(|_| self.presented) else { return Ok(true) };
         // SAFETY: the fence is alive and belongs to a present.
-        match unsafe { self.gpu.device.wait_for_fences(&[fence], true, patience_ns) } {
+        match unsafe { self.gpu.device.wait_for_fences(&[fence], true, timeout_ns) } {
             #[cfg(any(test, feature = "test-hooks"))]
             Ok(()) if self.stalls => Ok(false),
             Ok(()) => Ok(true),

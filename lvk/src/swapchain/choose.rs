@@ -22,13 +22,13 @@ pub(crate) struct SurfaceLimits {
 pub(crate) const ANY_EXTENT: [u32; 2] = [u32::MAX; 2];
 
 /// Size of the images; `None` where nothing can be shown.
-pub(crate) fn extent(limits: &SurfaceLimits, wished: [u32; 2]) -> Option<[u32; 2]> {
-    if wished.contains(&0) || limits.largest.contains(&0) {
+pub(crate) fn choose_extent(limits: &SurfaceLimits, requested: [u32; 2]) -> Option<[u32; 2]> {
+    if requested.contains(&0) || limits.largest.contains(&0) {
         return None;
     }
     let size = match limits.current {
         ANY_EXTENT => {
-            std::array::from_fn(|side| wished[side].max(limits.smallest[side]).min(limits.largest[side]))
+            std::array::from_fn(|side| requested[side].max(limits.smallest[side]).min(limits.largest[side]))
         }
         current => current,
     };
@@ -36,36 +36,36 @@ pub(crate) fn extent(limits: &SurfaceLimits, wished: [u32; 2]) -> Option<[u32; 2
 }
 
 /// Number of images.
-pub(crate) fn image_count(limits: &SurfaceLimits, wished: u32, mode: PresentMode) -> u32 {
+pub(crate) fn choose_image_count(limits: &SurfaceLimits, requested: u32, mode: PresentMode) -> u32 {
     let least = if mode == PresentMode::Mailbox { 3 } else { 0 };
-    let wished = if wished == 0 { limits.min_images.saturating_add(1).max(least) } else { wished };
+    let requested = if requested == 0 { limits.min_images.saturating_add(1).max(least) } else { requested };
     let most = if limits.max_images == 0 { u32::MAX } else { limits.max_images };
-    wished.max(limits.min_images).min(most)
+    requested.max(limits.min_images).min(most)
 }
 
 /// The first of the wishes that is offered.
-pub(crate) fn present_mode(wishes: &[PresentMode], offered: &[PresentMode]) -> PresentMode {
-    wishes.iter().copied().find(|wish| offered.contains(wish)).unwrap_or_default()
+pub(crate) fn choose_present_mode(requested: &[PresentMode], offered: &[PresentMode]) -> PresentMode {
+    requested.iter().copied().find(|wish| offered.contains(wish)).unwrap_or_default()
 }
 
 /// Format and colour space of the first wish that there is in a `usable` format.
-pub(crate) fn surface_format(
-    wishes: &[ColorSpace],
+pub(crate) fn choose_surface_format(
+    requested: &[ColorSpace],
     offered: &[vk::SurfaceFormatKHR],
     usable: impl Fn(Format) -> bool,
 ) -> Option<(Format, ColorSpace)> {
     let is_offered = |format: Format, space: ColorSpace| {
         offered.iter().any(|pair| pair.format == format.raw() && pair.color_space == space.raw())
     };
-    wishes.iter().chain(&[ColorSpace::Srgb, ColorSpace::SrgbEncoded]).find_map(|space| {
+    requested.iter().chain(&[ColorSpace::Srgb, ColorSpace::SrgbEncoded]).find_map(|space| {
         let mut formats = space.formats().iter().copied();
         let found = formats.find(|format| is_offered(*format, *space) && usable(*format));
         found.map(|format| (format, *space))
     })
 }
 
-/// The one bit of `offered` to use: the first of `wishes`, or the lowest.
-pub(crate) fn composite_alpha(offered: vk::CompositeAlphaFlagsKHR) -> vk::CompositeAlphaFlagsKHR {
+/// The one bit of `offered` to use: the first of `requested`, or the lowest.
+pub(crate) fn choose_composite_alpha(offered: vk::CompositeAlphaFlagsKHR) -> vk::CompositeAlphaFlagsKHR {
     if offered.contains(vk::CompositeAlphaFlagsKHR::OPAQUE) {
         return vk::CompositeAlphaFlagsKHR::OPAQUE;
     }
@@ -86,7 +86,7 @@ pub(crate) enum Failure {
 
 impl Failure {
     /// What an answer to `call` means.
-    pub(crate) fn of(call: &'static str) -> impl FnOnce(vk::Result) -> Self {
+    pub(crate) fn from_result(call: &'static str) -> impl FnOnce(vk::Result) -> Self {
         move |result| match result {
             vk::Result::ERROR_OUT_OF_DATE_KHR | vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT => {
                 Self::OutOfDate
@@ -150,19 +150,19 @@ mod tests {
 
     proptest! {
         #[test]
-        fn images_have_the_size_of_the_window_or_one_it_takes(limits in limits(), wished in [0..6000_u32, 0..6000]) {
-            match extent(&limits, wished) {
+        fn images_have_the_size_of_the_window_or_one_it_takes(limits in limits(), requested in [0..6000_u32, 0..6000]) {
+            match choose_extent(&limits, requested) {
                 Some(size) if limits.current == ANY_EXTENT => {
                     for side in 0..2 {
                         prop_assert!(size[side] >= limits.smallest[side] && size[side] <= limits.largest[side]);
-                        let inside = wished[side] >= limits.smallest[side] && wished[side] <= limits.largest[side];
-                        prop_assert!(!inside || size[side] == wished[side]);
+                        let inside = requested[side] >= limits.smallest[side] && requested[side] <= limits.largest[side];
+                        prop_assert!(!inside || size[side] == requested[side]);
                     }
                     prop_assert!(!size.contains(&0));
                 }
                 Some(size) => prop_assert!(size == limits.current && !size.contains(&0)),
                 None => {
-                    let sizes = [wished, limits.current, limits.largest];
+                    let sizes = [requested, limits.current, limits.largest];
                     prop_assert!(sizes.iter().any(|size| size.contains(&0)));
                 }
             }
@@ -170,30 +170,30 @@ mod tests {
 
         #[test]
         fn there_are_as_many_images_as_wished_where_there_can_be(
-            limits in limits(), wished in 0..20_u32, mode in modes()
+            limits in limits(), requested in 0..20_u32, mode in modes()
         ) {
-            let mode = present_mode(&mode, &mode);
-            let count = image_count(&limits, wished, mode);
+            let mode = choose_present_mode(&mode, &mode);
+            let count = choose_image_count(&limits, requested, mode);
             prop_assert!(count >= limits.min_images && (limits.max_images == 0 || count <= limits.max_images));
             let free = limits.max_images == 0 || limits.max_images > limits.min_images + 3;
-            if wished == 0 && free {
+            if requested == 0 && free {
                 prop_assert!(count > limits.min_images && (mode != PresentMode::Mailbox || count >= 3));
             }
-            if wished >= limits.min_images && (limits.max_images == 0 || wished <= limits.max_images) && wished > 0 {
-                prop_assert_eq!(count, wished);
+            if requested >= limits.min_images && (limits.max_images == 0 || requested <= limits.max_images) && requested > 0 {
+                prop_assert_eq!(count, requested);
             }
         }
 
         #[test]
-        fn the_mode_is_the_first_wish_there_is(wishes in modes(), offered in modes()) {
-            let chosen = present_mode(&wishes, &offered);
-            let first = wishes.iter().find(|wish| offered.contains(wish));
+        fn the_mode_is_the_first_wish_there_is(requested in modes(), offered in modes()) {
+            let chosen = choose_present_mode(&requested, &offered);
+            let first = requested.iter().find(|wish| offered.contains(wish));
             prop_assert_eq!(chosen, first.copied().unwrap_or(PresentMode::Fifo));
         }
 
         #[test]
         fn the_format_is_offered_and_usable_and_of_the_first_space_that_can_be(
-            wishes in prop::collection::vec(prop::sample::select(SPACES.to_vec()), 0..4),
+            requested in prop::collection::vec(prop::sample::select(SPACES.to_vec()), 0..4),
             offered in prop::collection::vec((prop::sample::select(SPACES.to_vec()), 0..3_usize), 0..6),
             unusable in prop::sample::select(Format::ALL),
         ) {
@@ -207,8 +207,8 @@ mod tests {
                 let pair = vk::SurfaceFormatKHR { format: format.raw(), color_space: space.raw() };
                 *format != unusable && offered.contains(&pair)
             });
-            let found = surface_format(&wishes, &offered, |format| format != unusable);
-            let expected = wishes.iter().chain(&[ColorSpace::Srgb, ColorSpace::SrgbEncoded]).find(|space| can_be(space));
+            let found = choose_surface_format(&requested, &offered, |format| format != unusable);
+            let expected = requested.iter().chain(&[ColorSpace::Srgb, ColorSpace::SrgbEncoded]).find(|space| can_be(space));
             prop_assert_eq!(found.map(|(_, space)| space), expected.copied());
             if let Some((format, space)) = found {
                 let pair = vk::SurfaceFormatKHR { format: format.raw(), color_space: space.raw() };
@@ -228,13 +228,13 @@ mod tests {
     #[test]
     fn one_way_of_blending_with_the_desktop_is_taken() {
         use vk::CompositeAlphaFlagsKHR as Alpha;
-        assert_eq!(composite_alpha(Alpha::INHERIT | Alpha::OPAQUE), Alpha::OPAQUE);
-        assert_eq!(composite_alpha(Alpha::INHERIT | Alpha::PRE_MULTIPLIED), Alpha::PRE_MULTIPLIED);
+        assert_eq!(choose_composite_alpha(Alpha::INHERIT | Alpha::OPAQUE), Alpha::OPAQUE);
+        assert_eq!(choose_composite_alpha(Alpha::INHERIT | Alpha::PRE_MULTIPLIED), Alpha::PRE_MULTIPLIED);
     }
 
     #[test]
     fn answers_mean_another_swapchain_another_surface_or_an_error() {
-        let of = |result| Failure::of("vkAcquireNextImageKHR")(result);
+        let of = |result| Failure::from_result("vkAcquireNextImageKHR")(result);
         assert!(matches!(of(vk::Result::ERROR_OUT_OF_DATE_KHR), Failure::OutOfDate));
         assert!(matches!(of(vk::Result::ERROR_FULL_SCREEN_EXCLUSIVE_MODE_LOST_EXT), Failure::OutOfDate));
         assert!(matches!(of(vk::Result::ERROR_SURFACE_LOST_KHR), Failure::SurfaceLost));

@@ -36,7 +36,7 @@ impl PresentMode {
     }
 
     /// `None` for modes the library does not have, such as shared ones.
-    pub(crate) fn of(raw: vk::PresentModeKHR) -> Option<Self> {
+    pub(crate) fn from_raw(raw: vk::PresentModeKHR) -> Option<Self> {
         Self::ALL.into_iter().find(|mode| mode.raw() == raw)
     }
 }

@@ -1,19 +1,19 @@
 //! The course of a swapchain: when it is made anew, and which image the application has. Knows no device; the
-//! presentation engine is an [`Engine`], so that a scripted one can take its place.
+//! presentation engine is an [`PresentBackend`], so that a scripted one can take its place.
 
 use super::choose::Failure;
 use crate::error::Result;
 
 /// What a swapchain lives on.
-pub(crate) trait Engine {
+pub(crate) trait PresentBackend {
     /// Size that images would have now; `None` where nothing can be shown.
     fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure>;
 
     /// Gives the window another surface, and the swapchain up.
-    fn renew_surface(&mut self) -> Result<(), Failure>;
+    fn recreate_surface(&mut self) -> Result<(), Failure>;
 
     /// Makes the swapchain anew. Where that fails, there is none.
-    fn rebuild(&mut self, extent: [u32; 2]) -> Result<(), Failure>;
+    fn recreate_swapchain(&mut self, extent: [u32; 2]) -> Result<(), Failure>;
 
     /// Takes the next image of the swapchain.
     fn acquire(&mut self) -> Result<Acquired, Failure>;
@@ -33,7 +33,7 @@ pub(crate) enum Acquired {
 
 /// What is known of the swapchain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Condition {
+enum SwapchainStatus {
     Good,
     /// Some say so for as long as they live, so that only another size is a reason to make it anew.
     Suboptimal,
@@ -43,7 +43,7 @@ enum Condition {
 
 /// An image that the application has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Taken {
+pub(crate) struct AcquiredImage {
     pub(crate) index: u32,
     /// Another one each time the image is given out.
     pub(crate) ticket: u64,
@@ -51,62 +51,66 @@ pub(crate) struct Taken {
 
 /// Where a swapchain stands.
 #[derive(Debug)]
-pub(crate) struct Course {
-    condition: Condition,
+pub(crate) struct SwapchainState {
+    status: SwapchainStatus,
     /// Size of the images.
     extent: Option<[u32; 2]>,
-    taken: Option<u32>,
+    acquired: Option<u32>,
     tickets: u64,
 }
 
 /// A window that changes faster than swapchains are made is left for the next frame.
 const ATTEMPTS: u32 = 4;
 
-impl Course {
+impl SwapchainState {
     /// There is no swapchain yet.
     pub(crate) fn new() -> Self {
-        Self { condition: Condition::OutOfDate, extent: None, taken: None, tickets: 0 }
+        Self { status: SwapchainStatus::OutOfDate, extent: None, acquired: None, tickets: 0 }
     }
 
     /// The image to draw into; `None` where nothing can be shown for now. What was taken and not presented comes again.
-    pub(crate) fn next(&mut self, name: &str, engine: &mut impl Engine) -> Result<Option<Taken>> {
-        let index = self.drive(name, engine, |course, engine| match course.taken {
+    pub(crate) fn acquire_image(
+        &mut self,
+        name: &str,
+        backend: &mut impl PresentBackend,
+    ) -> Result<Option<AcquiredImage>> {
+        let index = self.run_recreating(name, backend, |state, backend| match state.acquired {
             Some(index) => Ok(Some(index)),
-            None => course.acquire(engine),
+            None => state.acquire(backend),
         })?;
         Ok(index.flatten().map(|index| {
             self.tickets += 1;
-            Taken { index, ticket: self.tickets }
+            AcquiredImage { index, ticket: self.tickets }
         }))
     }
 
     /// Makes the swapchain, if its window has a size.
-    pub(crate) fn prepare(&mut self, name: &str, engine: &mut impl Engine) -> Result<()> {
-        self.drive(name, engine, |_, _| Ok(())).map(drop)
+    pub(crate) fn prepare(&mut self, name: &str, backend: &mut impl PresentBackend) -> Result<()> {
+        self.run_recreating(name, backend, |_, _| Ok(())).map(drop)
     }
 
     /// Gets the swapchain in order and runs `last`; `None` where nothing can be shown for now.
-    fn drive<E: Engine, T>(
+    fn run_recreating<E: PresentBackend, T>(
         &mut self,
         name: &str,
-        engine: &mut E,
+        backend: &mut E,
         last: impl Fn(&mut Self, &mut E) -> Result<T, Failure>,
     ) -> Result<Option<T>> {
         let mut lost = false;
         for _ in 0..ATTEMPTS {
-            let step = match self.condition {
-                Condition::Good => last(self, engine).map(Step::Done),
-                _ => self.mend(engine),
+            let step = match self.status {
+                SwapchainStatus::Good => last(self, backend).map(RecreateStep::Done),
+                _ => self.recreate(backend),
             };
             match step {
-                Ok(Step::Again) => {}
-                Ok(Step::Nothing) => return Ok(None),
-                Ok(Step::Done(done)) => return Ok(Some(done)),
-                Err(Failure::OutOfDate) => self.condition = Condition::OutOfDate,
+                Ok(RecreateStep::Again) => {}
+                Ok(RecreateStep::Nothing) => return Ok(None),
+                Ok(RecreateStep::Done(done)) => return Ok(Some(done)),
+                Err(Failure::OutOfDate) => self.status = SwapchainStatus::OutOfDate,
                 Err(Failure::SurfaceLost) if lost => return Err(Failure::SurfaceLost.into_error(name)),
                 Err(Failure::SurfaceLost) => {
                     lost = true;
-                    self.condition = Condition::SurfaceLost;
+                    self.status = SwapchainStatus::SurfaceLost;
                 }
                 Err(Failure::Other(error)) => return Err(error),
             }
@@ -115,67 +119,67 @@ impl Course {
     }
 
     /// One step towards a good swapchain.
-    fn mend<T>(&mut self, engine: &mut impl Engine) -> Result<Step<T>, Failure> {
-        match self.condition {
-            Condition::SurfaceLost => {
-                self.taken = None;
-                engine.renew_surface()?;
-                self.condition = Condition::OutOfDate;
+    fn recreate<T>(&mut self, backend: &mut impl PresentBackend) -> Result<RecreateStep<T>, Failure> {
+        match self.status {
+            SwapchainStatus::SurfaceLost => {
+                self.acquired = None;
+                backend.recreate_surface()?;
+                self.status = SwapchainStatus::OutOfDate;
             }
-            Condition::OutOfDate => {
-                let Some(extent) = engine.extent()? else { return Ok(Step::Nothing) };
-                (self.taken, self.extent) = (None, None);
-                engine.rebuild(extent)?;
+            SwapchainStatus::OutOfDate => {
+                let Some(extent) = backend.extent()? else { return Ok(RecreateStep::Nothing) };
+                (self.acquired, self.extent) = (None, None);
+                backend.recreate_swapchain(extent)?;
                 self.extent = Some(extent);
-                self.condition = Condition::Good;
+                self.status = SwapchainStatus::Good;
             }
-            Condition::Suboptimal => {
-                let fits = engine.extent()? == self.extent;
-                self.condition = if fits { Condition::Good } else { Condition::OutOfDate };
+            SwapchainStatus::Suboptimal => {
+                let fits = backend.extent()? == self.extent;
+                self.status = if fits { SwapchainStatus::Good } else { SwapchainStatus::OutOfDate };
             }
-            Condition::Good => {}
+            SwapchainStatus::Good => {}
         }
-        Ok(Step::Again)
+        Ok(RecreateStep::Again)
     }
 
-    fn acquire(&mut self, engine: &mut impl Engine) -> Result<Option<u32>, Failure> {
-        let Acquired::Image { index, suboptimal } = engine.acquire()? else { return Ok(None) };
-        self.taken = Some(index);
+    fn acquire(&mut self, backend: &mut impl PresentBackend) -> Result<Option<u32>, Failure> {
+        let Acquired::Image { index, suboptimal } = backend.acquire()? else { return Ok(None) };
+        self.acquired = Some(index);
         if suboptimal {
-            self.condition = Condition::Suboptimal;
+            self.status = SwapchainStatus::Suboptimal;
         }
         Ok(Some(index))
     }
 
     /// The image that the holder of this ticket has; `None` where it was given out again, presented, or is gone.
-    pub(crate) fn taken(&self, ticket: u64) -> Option<u32> {
-        self.taken.filter(|_| ticket == self.tickets)
+    pub(crate) fn acquired_index(&self, ticket: u64) -> Option<u32> {
+        self.acquired.filter(|_| ticket == self.tickets)
     }
 
     /// The image was handed to the engine, which answered whether the swapchain could be better.
-    pub(crate) fn presented(&mut self, answer: Result<bool, Failure>) -> Result<()> {
-        self.taken = None;
-        match (self.condition, answer) {
+    pub(crate) fn record_present(&mut self, answer: Result<bool, Failure>) -> Result<()> {
+        self.acquired = None;
+        match (self.status, answer) {
             (_, Err(Failure::Other(error))) => {
-                self.condition = Condition::OutOfDate;
+                self.status = SwapchainStatus::OutOfDate;
                 return Err(error);
             }
-            (Condition::SurfaceLost, _) | (_, Err(Failure::SurfaceLost)) => {
-                self.condition = Condition::SurfaceLost;
+            (SwapchainStatus::SurfaceLost, _) | (_, Err(Failure::SurfaceLost)) => {
+                self.status = SwapchainStatus::SurfaceLost;
             }
-            (Condition::OutOfDate, _) | (_, Err(Failure::OutOfDate)) => {
-                self.condition = Condition::OutOfDate;
+            (SwapchainStatus::OutOfDate, _) | (_, Err(Failure::OutOfDate)) => {
+                self.status = SwapchainStatus::OutOfDate;
             }
-            (_, Ok(true)) => self.condition = Condition::Suboptimal,
+            (_, Ok(true)) => self.status = SwapchainStatus::Suboptimal,
             (_, Ok(false)) => {}
         }
         Ok(())
     }
 
     /// The swapchain is to be made anew before its next image.
-    pub(crate) fn outdate(&mut self) {
-        if self.condition != Condition::SurfaceLost {
-            self.condition = Condition::OutOfDate;
+    pub(crate) fn mark_out_of_date(&mut self) {
+        if self.status != SwapchainStatus::SurfaceLost {
+            self.status = SwapchainStatus::OutOfDate;
         }
     }
 
@@ -185,7 +189,7 @@ impl Course {
     }
 }
 
-enum Step<T> {
+enum RecreateStep<T> {
     Again,
     Nothing,
     Done(T),
@@ -202,7 +206,7 @@ mod tests {
 
     /// What happens to a scripted engine at one call.
     #[derive(Debug, Clone, Copy)]
-    enum Event {
+    enum SurfaceEvent {
         Calm,
         Resize([u32; 2]),
         Lose,
@@ -215,21 +219,21 @@ mod tests {
     /// A window that follows a script and asserts that it is treated as Vulkan demands.
     #[derive(Debug)]
     struct Scripted {
-        script: VecDeque<Event>,
+        script: VecDeque<SurfaceEvent>,
         window: [u32; 2],
         images: Option<[u32; 2]>,
         lost: bool,
         /// The images no longer fit, and the application was told.
         told: bool,
         asked: bool,
-        taken: Option<u32>,
+        acquired: Option<u32>,
         next: u32,
         grumbles: bool,
         rebuilds: u32,
     }
 
     impl Scripted {
-        fn new(script: Vec<Event>) -> Self {
+        fn new(script: Vec<SurfaceEvent>) -> Self {
             Self {
                 script: script.into(),
                 window: [8, 8],
@@ -237,20 +241,20 @@ mod tests {
                 lost: false,
                 told: true,
                 asked: false,
-                taken: None,
+                acquired: None,
                 next: 0,
                 grumbles: false,
                 rebuilds: 0,
             }
         }
 
-        fn happen(&mut self) -> Event {
-            let event = self.script.pop_front().unwrap_or(Event::Calm);
+        fn happen(&mut self) -> SurfaceEvent {
+            let event = self.script.pop_front().unwrap_or(SurfaceEvent::Calm);
             match event {
-                Event::Resize(size) => self.window = size,
-                Event::Lose => self.lost = true,
-                Event::Grumble => self.grumbles = true,
-                Event::Calm | Event::Busy => {}
+                SurfaceEvent::Resize(size) => self.window = size,
+                SurfaceEvent::Lose => self.lost = true,
+                SurfaceEvent::Grumble => self.grumbles = true,
+                SurfaceEvent::Calm | SurfaceEvent::Busy => {}
             }
             event
         }
@@ -269,13 +273,13 @@ mod tests {
         }
 
         fn present(&mut self, index: u32) -> Result<bool, Failure> {
-            assert_eq!(self.taken.take(), Some(index));
+            assert_eq!(self.acquired.take(), Some(index));
             self.happen();
             self.misfit()
         }
     }
 
-    impl Engine for Scripted {
+    impl PresentBackend for Scripted {
         fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure> {
             self.happen();
             if self.lost {
@@ -285,17 +289,17 @@ mod tests {
             Ok((!self.window.contains(&0)).then_some(self.window))
         }
 
-        fn renew_surface(&mut self) -> Result<(), Failure> {
+        fn recreate_surface(&mut self) -> Result<(), Failure> {
             assert!(self.lost, "a surface that is there is not to be renewed");
-            (self.lost, self.images, self.taken, self.told) = (false, None, None, true);
+            (self.lost, self.images, self.acquired, self.told) = (false, None, None, true);
             self.happen();
             Ok(())
         }
 
-        fn rebuild(&mut self, extent: [u32; 2]) -> Result<(), Failure> {
+        fn recreate_swapchain(&mut self, extent: [u32; 2]) -> Result<(), Failure> {
             assert!(!extent.contains(&0), "images have texels");
             assert!(self.told || self.asked, "a swapchain that fits is not made anew");
-            (self.images, self.taken, self.told, self.asked) = (None, None, false, false);
+            (self.images, self.acquired, self.told, self.asked) = (None, None, false, false);
             self.rebuilds += 1;
             if self.lost {
                 return Err(Failure::SurfaceLost);
@@ -306,56 +310,56 @@ mod tests {
 
         fn acquire(&mut self) -> Result<Acquired, Failure> {
             assert!(self.images.is_some(), "there is no swapchain");
-            assert_eq!(self.taken, None, "one image at a time is sure to come");
-            if matches!(self.happen(), Event::Busy) {
+            assert_eq!(self.acquired, None, "one image at a time is sure to come");
+            if matches!(self.happen(), SurfaceEvent::Busy) {
                 return Ok(Acquired::NotYet);
             }
             let suboptimal = self.misfit()?;
             self.next += 1;
-            self.taken = Some(self.next % 3);
+            self.acquired = Some(self.next % 3);
             Ok(Acquired::Image { index: self.next % 3, suboptimal })
         }
     }
 
     /// What an application does in a frame.
     #[derive(Debug, Clone, Copy)]
-    enum Frame {
+    enum ScriptedFrame {
         Present,
         Drop,
         Resize,
     }
 
-    fn event() -> impl Strategy<Value = Event> {
+    fn event() -> impl Strategy<Value = SurfaceEvent> {
         let side = || prop_oneof![1 => Just(0_u32), 5 => 1..100_u32];
         prop_oneof![
-            8 => Just(Event::Calm),
-            4 => [side(), side()].prop_map(Event::Resize),
-            1 => Just(Event::Lose),
-            1 => Just(Event::Busy),
-            1 => Just(Event::Grumble),
+            8 => Just(SurfaceEvent::Calm),
+            4 => [side(), side()].prop_map(SurfaceEvent::Resize),
+            1 => Just(SurfaceEvent::Lose),
+            1 => Just(SurfaceEvent::Busy),
+            1 => Just(SurfaceEvent::Grumble),
         ]
     }
 
-    fn frames() -> impl Strategy<Value = Vec<Frame>> {
-        let frame = prop_oneof![5 => Just(Frame::Present), 1 => Just(Frame::Drop), 1 => Just(Frame::Resize)];
+    fn frames() -> impl Strategy<Value = Vec<ScriptedFrame>> {
+        let frame = prop_oneof![5 => Just(ScriptedFrame::Present), 1 => Just(ScriptedFrame::Drop), 1 => Just(ScriptedFrame::Resize)];
         prop::collection::vec(frame, 1..40)
     }
 
-    fn play(course: &mut Course, engine: &mut Scripted, frames: &[Frame]) {
+    fn play(state: &mut SwapchainState, backend: &mut Scripted, frames: &[ScriptedFrame]) {
         for frame in frames {
-            if matches!(frame, Frame::Resize) {
-                course.outdate();
-                engine.asked = true;
+            if matches!(frame, ScriptedFrame::Resize) {
+                state.mark_out_of_date();
+                backend.asked = true;
             }
             // A window lost twice in one frame counts as gone.
-            let Ok(Some(taken)) = course.next("window", engine) else { continue };
-            assert_eq!(engine.taken, Some(taken.index));
-            assert_eq!(course.taken(taken.ticket), Some(taken.index));
-            assert_eq!(course.taken(taken.ticket - 1), None, "an older ticket is worth nothing");
-            if matches!(frame, Frame::Present) {
-                let answer = engine.present(taken.index);
-                course.presented(answer).unwrap();
-                assert_eq!(course.taken(taken.ticket), None);
+            let Ok(Some(acquired)) = state.acquire_image("window", backend) else { continue };
+            assert_eq!(backend.acquired, Some(acquired.index));
+            assert_eq!(state.acquired_index(acquired.ticket), Some(acquired.index));
+            assert_eq!(state.acquired_index(acquired.ticket - 1), None, "an older ticket is worth nothing");
+            if matches!(frame, ScriptedFrame::Present) {
+                let answer = backend.present(acquired.index);
+                state.record_present(answer).unwrap();
+                assert_eq!(state.acquired_index(acquired.ticket), None);
             }
         }
     }
@@ -369,58 +373,61 @@ mod tests {
         fn every_window_is_followed_and_a_calm_one_is_left_alone(
             script in prop::collection::vec(event(), 0..80), frames in frames()
         ) {
-            let (mut course, mut engine) = (Course::new(), Scripted::new(script));
-            play(&mut course, &mut engine, &frames);
-            engine.script.clear();
-            engine.window = engine.window.map(|side| side.max(1));
-            play(&mut course, &mut engine, &[Frame::Present; 4]);
-            let rebuilds = engine.rebuilds;
+            let (mut state, mut backend) = (SwapchainState::new(), Scripted::new(script));
+            play(&mut state, &mut backend, &frames);
+            backend.script.clear();
+            backend.window = backend.window.map(|side| side.max(1));
+            play(&mut state, &mut backend, &[ScriptedFrame::Present; 4]);
+            let rebuilds = backend.rebuilds;
             for _ in 0..6 {
-                let taken = course.next("window", &mut engine).unwrap().unwrap();
-                prop_assert_eq!(course.extent(), Some(engine.window));
-                prop_assert_eq!(engine.images, Some(engine.window));
-                let answer = engine.present(taken.index);
-                course.presented(answer).unwrap();
+                let acquired = state.acquire_image("window", &mut backend).unwrap().unwrap();
+                prop_assert_eq!(state.extent(), Some(backend.window));
+                prop_assert_eq!(backend.images, Some(backend.window));
+                let answer = backend.present(acquired.index);
+                state.record_present(answer).unwrap();
             }
-            prop_assert_eq!(engine.rebuilds, rebuilds);
+            prop_assert_eq!(backend.rebuilds, rebuilds);
         }
     }
 
     #[test]
     fn a_minimised_window_costs_no_swapchain_and_comes_back() {
-        let (mut course, mut engine) = (Course::new(), Scripted::new(vec![Event::Resize([0, 0])]));
+        let (mut state, mut backend) =
+            (SwapchainState::new(), Scripted::new(vec![SurfaceEvent::Resize([0, 0])]));
         for _ in 0..3 {
-            assert_eq!(course.next("window", &mut engine).unwrap(), None);
+            assert_eq!(state.acquire_image("window", &mut backend).unwrap(), None);
         }
-        assert_eq!((engine.rebuilds, course.extent()), (0, None));
-        engine.window = [4, 4];
-        assert!(course.next("window", &mut engine).unwrap().is_some());
-        assert_eq!((engine.rebuilds, course.extent()), (1, Some([4, 4])));
+        assert_eq!((backend.rebuilds, state.extent()), (0, None));
+        backend.window = [4, 4];
+        assert!(state.acquire_image("window", &mut backend).unwrap().is_some());
+        assert_eq!((backend.rebuilds, state.extent()), (1, Some([4, 4])));
     }
 
     #[test]
     fn an_image_that_is_not_presented_comes_again_under_another_ticket() {
-        let (mut course, mut engine) = (Course::new(), Scripted::new(Vec::new()));
-        let first = course.next("window", &mut engine).unwrap().unwrap();
-        let second = course.next("window", &mut engine).unwrap().unwrap();
+        let (mut state, mut backend) = (SwapchainState::new(), Scripted::new(Vec::new()));
+        let first = state.acquire_image("window", &mut backend).unwrap().unwrap();
+        let second = state.acquire_image("window", &mut backend).unwrap().unwrap();
         assert_eq!(first.index, second.index);
-        assert_eq!(course.taken(first.ticket), None);
-        assert_eq!(course.taken(second.ticket), Some(second.index));
+        assert_eq!(state.acquired_index(first.ticket), None);
+        assert_eq!(state.acquired_index(second.ticket), Some(second.index));
     }
 
     #[test]
     fn a_window_that_is_lost_again_and_again_is_gone() {
-        let (mut course, mut engine) =
-            (Course::new(), Scripted::new(vec![Event::Lose, Event::Calm, Event::Lose]));
-        let error = course.next("main window", &mut engine).unwrap_err().to_string();
+        let (mut state, mut backend) = (
+            SwapchainState::new(),
+            Scripted::new(vec![SurfaceEvent::Lose, SurfaceEvent::Calm, SurfaceEvent::Lose]),
+        );
+        let error = state.acquire_image("main window", &mut backend).unwrap_err().to_string();
         assert!(error.contains("main window") && error.contains("gone"), "{error}");
     }
 
     #[test]
     fn a_failure_that_no_swapchain_helps_with_is_answered_once() {
-        let (mut course, mut engine) = (Course::new(), Scripted::new(Vec::new()));
-        course.next("window", &mut engine).unwrap();
+        let (mut state, mut backend) = (SwapchainState::new(), Scripted::new(Vec::new()));
+        state.acquire_image("window", &mut backend).unwrap();
         let lost = Error::DeviceLost { call: "vkQueuePresentKHR", fault: None };
-        assert!(matches!(course.presented(Err(Failure::Other(lost))), Err(Error::DeviceLost { .. })));
+        assert!(matches!(state.record_present(Err(Failure::Other(lost))), Err(Error::DeviceLost { .. })));
     }
 }

@@ -4,7 +4,7 @@ use crate::error::Result;
 
 /// A hidden window may never have an image free, and an engine that is gone never ends a present: the application is not to
 /// stand still for them.
-pub(super) const PATIENCE_NS: u64 = 1_000_000_000;
+pub(super) const PRESENT_TIMEOUT_NS: u64 = 1_000_000_000;
 
 /// Has `wait` wait for each present, so many nanoseconds at most; it answers whether the present is over. Once one has taken all the
 /// patience, the others, which had as much time, are only asked. Answers how many are given up; a failure only when all were
@@ -13,12 +13,12 @@ pub(super) fn wait_for_all<T>(
     presents: impl Iterator<Item = T>,
     mut wait: impl FnMut(T, u64) -> Result<bool>,
 ) -> Result<usize> {
-    let (mut patience_ns, mut given_up, mut all) = (PATIENCE_NS, 0, Ok(()));
+    let (mut timeout_ns, mut given_up, mut all) = (PRESENT_TIMEOUT_NS, 0, Ok(()));
     for present in presents {
-        match wait(present, patience_ns) {
+        match wait(present, timeout_ns) {
             Ok(true) => {}
             Ok(false) => {
-                patience_ns = 0;
+                timeout_ns = 0;
                 given_up += 1;
             }
             Err(error) => all = all.and(Err(error)),
@@ -35,12 +35,12 @@ mod tests {
     #[test]
     fn a_present_that_never_ends_is_given_up_and_the_others_are_asked() {
         let mut asked = Vec::new();
-        let given_up = wait_for_all(0..5, |present, patience_ns| {
-            asked.push((present, patience_ns));
+        let given_up = wait_for_all(0..5, |present, timeout_ns| {
+            asked.push((present, timeout_ns));
             Ok(present != 1 && present != 3)
         });
         assert_eq!(given_up.unwrap(), 2);
-        let expected = [(0, PATIENCE_NS), (1, PATIENCE_NS), (2, 0), (3, 0), (4, 0)];
+        let expected = [(0, PRESENT_TIMEOUT_NS), (1, PRESENT_TIMEOUT_NS), (2, 0), (3, 0), (4, 0)];
         assert_eq!(asked, expected);
         assert_eq!(wait_for_all(0..0, |_: u32, _| Ok(false)).unwrap(), 0);
     }

@@ -6,7 +6,7 @@ use ash::vk;
 
 use super::chain::{Chain, ChainPlan, PresentSync, new_semaphore};
 use super::desc::{ColorSpace, HdrMetadata, PresentMode};
-use super::lifecycle::Course;
+use super::lifecycle::SwapchainState;
 use super::present_wait::wait_for_all;
 use super::surface::Surface;
 use crate::barrier::ResourceId;
@@ -20,7 +20,7 @@ use crate::resource::texture_desc::TextureUsage;
 
 /// What the caller wants of every Vulkan swapchain that is made for this one.
 #[derive(Debug, Clone)]
-pub(crate) struct Wishes {
+pub(crate) struct SwapchainConfig {
     pub(crate) extent: [u32; 2],
     pub(crate) present_modes: Vec<PresentMode>,
     pub(crate) color_spaces: Vec<ColorSpace>,
@@ -32,19 +32,19 @@ pub(crate) struct Wishes {
 /// A swapchain.
 pub(crate) struct Swapchain {
     pub(crate) name: Arc<str>,
-    state: Mutex<State>,
+    state: Mutex<SwapchainInner>,
 }
 
 /// What is locked together.
-pub(crate) struct State {
-    pub(crate) course: Course,
-    pub(crate) parts: Parts,
+pub(crate) struct SwapchainInner {
+    pub(crate) lifecycle: SwapchainState,
+    pub(crate) resources: SwapchainResources,
 }
 
 /// What the course is about.
-pub(crate) struct Parts {
+pub(crate) struct SwapchainResources {
     name: Arc<str>,
-    pub(crate) wishes: Wishes,
+    pub(crate) config: SwapchainConfig,
     pub(crate) window: Arc<dyn WindowHandles>,
     /// `None` only after a surface was lost and no other could be made.
     pub(crate) surface: Option<Arc<Surface>>,
@@ -54,7 +54,7 @@ pub(crate) struct Parts {
     semaphores: Vec<(vk::Semaphore, u64)>,
     /// The one that was signalled for the image that is taken.
     pub(crate) signalled: Option<vk::Semaphore>,
-    retired: Vec<Retired>,
+    retired: Vec<RetiredChain>,
     pub(crate) rebuilds: u64,
     pub(crate) gpu: Arc<Gpu>,
 }
@@ -77,7 +77,7 @@ pub(crate) struct ChainImage {
 }
 
 /// A Vulkan swapchain that another has replaced, until its presents are over.
-struct Retired {
+struct RetiredChain {
     syncs: Vec<PresentSync>,
     /// Value of the timeline from which on its presents are over, where fences do not tell.
     over_at: Option<u64>,
@@ -85,11 +85,11 @@ struct Retired {
 }
 
 impl Swapchain {
-    pub(crate) fn new(name: &str, surface: Surface, wishes: Wishes, gpu: &Arc<Gpu>) -> Self {
+    pub(crate) fn new(name: &str, surface: Surface, config: SwapchainConfig, gpu: &Arc<Gpu>) -> Self {
         let name: Arc<str> = Arc::from(name);
-        let parts = Parts {
+        let resources = SwapchainResources {
             name: Arc::clone(&name),
-            wishes,
+            config,
             window: Arc::clone(&surface.window),
             surface: Some(Arc::new(surface)),
             current: None,
@@ -99,11 +99,12 @@ impl Swapchain {
             rebuilds: 0,
             gpu: Arc::clone(gpu),
         };
-        let state = Mutex::new(Rank::Swapchain, State { course: Course::new(), parts });
+        let state =
+            Mutex::new(Rank::Swapchain, SwapchainInner { lifecycle: SwapchainState::new(), resources });
         Self { name, state }
     }
 
-    pub(crate) fn lock(&self) -> Guard<'_, State> {
+    pub(crate) fn lock(&self) -> Guard<'_, SwapchainInner> {
         self.state.lock()
     }
 }
@@ -115,7 +116,7 @@ impl Current {
     }
 }
 
-impl Parts {
+impl SwapchainResources {
     /// A semaphore that nothing uses, as far as the timeline has come.
     pub(crate) fn take_semaphore(&mut self, completed: u64, name: &str) -> Result<vk::Semaphore> {
         match self.semaphores.iter().position(|(_, free_at)| *free_at <= completed) {
@@ -125,26 +126,26 @@ impl Parts {
     }
 
     /// Gives a semaphore back, which is free when the timeline reaches `free_at`.
-    pub(crate) fn give_semaphore(&mut self, semaphore: vk::Semaphore, free_at: u64) {
+    pub(crate) fn recycle_semaphore(&mut self, semaphore: vk::Semaphore, free_at: u64) {
         self.semaphores.push((semaphore, free_at));
     }
 
     /// Keeps the parts of a swapchain that was replaced until its presents are over.
     pub(crate) fn retire(&mut self, chain: Arc<Chain>, syncs: Vec<PresentSync>) {
-        self.retired.push(Retired { syncs, over_at: None, _chain: chain });
+        self.retired.push(RetiredChain { syncs, over_at: None, _chain: chain });
     }
 
     /// An image that was presented is back, and the submission of this value waits for that: presents of the queue before
     /// that one are over.
-    pub(crate) fn presents_are_over_at(&mut self, value: u64) {
+    pub(crate) fn set_presents_done_at(&mut self, value: u64) {
         for retired in &mut self.retired {
             retired.over_at.get_or_insert(value);
         }
     }
 
     /// Destroys what was replaced and is no longer presented.
-    pub(crate) fn collect(&mut self, completed: u64) {
-        self.retired.retain(|retired| !retired.is_over(completed));
+    pub(crate) fn destroy_finished(&mut self, completed: u64) {
+        self.retired.retain(|retired| !retired.is_done(completed));
     }
 
     /// Waits until all presents are over, but not for an engine that never answers.
@@ -152,16 +153,19 @@ impl Parts {
         let current = self.current.iter().flat_map(|current| &current.images).map(|image| &image.sync);
         let retired = self.retired.iter().flat_map(|retired| &retired.syncs);
         let mut told = true;
-        let given_up = wait_for_all(current.chain(retired), |sync, patience_ns| {
-            told &= sync.is_over().is_some();
-            sync.wait(patience_ns)
+        let given_up = wait_for_all(current.chain(retired), |sync, timeout_ns| {
+            told &= sync.is_done().is_some();
+            sync.wait(timeout_ns)
         })?;
         if given_up > 0 {
-            log::warn!("{}: presents that the window system never ends are given up: {given_up}", self.name);
+            log::warn!(
+                "{}: presents that do not end within the timeout are abandoned: {given_up}",
+                self.name
+            );
         } else if told {
             return Ok(());
         }
-        let queue = self.gpu.queue();
+        let queue = self.gpu.graphics_queue();
         // SAFETY: the queue is locked.
         unsafe { self.gpu.device.queue_wait_idle(*queue) }.map_err(Error::vulkan("vkQueueWaitIdle"))
     }
@@ -172,9 +176,9 @@ impl Parts {
     }
 }
 
-impl Retired {
-    fn is_over(&self, completed: u64) -> bool {
-        let fences: Option<Vec<bool>> = self.syncs.iter().map(PresentSync::is_over).collect();
+impl RetiredChain {
+    fn is_done(&self, completed: u64) -> bool {
+        let fences: Option<Vec<bool>> = self.syncs.iter().map(PresentSync::is_done).collect();
         match fences {
             Some(over) => over.into_iter().all(|over| over),
             None => self.over_at.is_some_and(|value| value <= completed),
@@ -182,10 +186,10 @@ impl Retired {
     }
 }
 
-impl Drop for Parts {
+impl Drop for SwapchainResources {
     fn drop(&mut self) {
         if let Err(error) = self.wait_for_presents() {
-            log::error!("{}: it ends before its last pictures were shown: {error}", self.name);
+            log::error!("{}: it is destroyed before its last images were presented: {error}", self.name);
         }
         let all = self.semaphores.drain(..).map(|(semaphore, _)| semaphore).chain(self.signalled.take());
         for semaphore in all {

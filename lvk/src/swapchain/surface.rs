@@ -26,7 +26,7 @@ pub(crate) struct SurfaceState {
 impl Surface {
     /// The surface of a window that the context's queue can present to.
     pub(crate) fn new(gpu: &Arc<Gpu>, window: &Arc<dyn WindowHandles>, name: &str) -> Result<Self> {
-        let functions = gpu.windows()?;
+        let functions = gpu.window_functions()?;
         let raw = create_surface(&gpu.instance, window.as_ref())?;
         let surface = Self { raw, gpu: Arc::clone(gpu), window: Arc::clone(window) };
         // SAFETY: the surface belongs to the instance of the device.
@@ -37,7 +37,7 @@ impl Surface {
             gpu.name(raw, name);
             return Ok(surface);
         }
-        Err(gpu.lacks("presentation to this window"))
+        Err(gpu.unsupported("presentation to this window"))
     }
 
     /// Size and number of images.
@@ -46,7 +46,7 @@ impl Surface {
         // SAFETY: the surface belongs to the instance of the device.
         let raw =
             unsafe { functions.get_physical_device_surface_capabilities(self.gpu.physical(), self.raw) }
-                .map_err(Failure::of("vkGetPhysicalDeviceSurfaceCapabilitiesKHR"))?;
+                .map_err(Failure::from_result("vkGetPhysicalDeviceSurfaceCapabilitiesKHR"))?;
         let size = |extent: vk::Extent2D| [extent.width, extent.height];
         let limits = SurfaceLimits {
             min_images: raw.min_image_count,
@@ -63,7 +63,7 @@ impl Surface {
         let functions = &self.functions()?.surface;
         // SAFETY: as above.
         unsafe { functions.get_physical_device_surface_formats(self.gpu.physical(), self.raw) }
-            .map_err(Failure::of("vkGetPhysicalDeviceSurfaceFormatsKHR"))
+            .map_err(Failure::from_result("vkGetPhysicalDeviceSurfaceFormatsKHR"))
     }
 
     /// Modes that the library knows.
@@ -72,8 +72,8 @@ impl Surface {
         // SAFETY: as above.
         let modes =
             unsafe { functions.get_physical_device_surface_present_modes(self.gpu.physical(), self.raw) }
-                .map_err(Failure::of("vkGetPhysicalDeviceSurfacePresentModesKHR"))?;
-        Ok(modes.into_iter().filter_map(PresentMode::of).collect())
+                .map_err(Failure::from_result("vkGetPhysicalDeviceSurfacePresentModesKHR"))?;
+        Ok(modes.into_iter().filter_map(PresentMode::from_raw).collect())
     }
 
     /// Modes that a swapchain in `mode` can change to without being made anew, `mode` first; nothing else where the device
@@ -89,20 +89,20 @@ impl Surface {
         unsafe {
             functions.get_physical_device_surface_capabilities2(self.gpu.physical(), &info, &mut capabilities)
         }
-        .map_err(Failure::of("vkGetPhysicalDeviceSurfaceCapabilities2KHR"))?;
+        .map_err(Failure::from_result("vkGetPhysicalDeviceSurfaceCapabilities2KHR"))?;
         let count = (compatible.present_mode_count as usize).min(raw.len());
-        let others = raw[..count].iter().filter_map(|raw| PresentMode::of(*raw));
+        let others = raw[..count].iter().filter_map(|raw| PresentMode::from_raw(*raw));
         Ok([mode].into_iter().chain(others.filter(|other| *other != mode)).collect())
     }
 
     fn functions(&self) -> Result<&WindowFunctions, Failure> {
-        Ok(self.gpu.windows()?)
+        Ok(self.gpu.window_functions()?)
     }
 }
 
 impl Drop for Surface {
     fn drop(&mut self) {
-        if let Ok(functions) = self.gpu.windows() {
+        if let Ok(functions) = self.gpu.window_functions() {
             // SAFETY: its swapchains keep it, so they are gone; the window is still there.
             unsafe { functions.surface.destroy_surface(self.raw, None) };
         }

@@ -6,29 +6,29 @@ use std::ffi::{CStr, c_char};
 use ash::vk;
 
 thread_local! {
-    static FALLIBLE: Cell<bool> = const { Cell::new(false) };
+    static INJECT_FAULTS: Cell<bool> = const { Cell::new(false) };
     static REAL: Cell<Option<vk::PFN_vkGetDeviceProcAddr>> = const { Cell::new(None) };
     static SUBMIT: Cell<Option<vk::PFN_vkQueueSubmit2>> = const { Cell::new(None) };
     /// Submissions of this thread until one fails.
-    static LEFT: Cell<Option<u32>> = const { Cell::new(None) };
+    static SUBMITS_LEFT: Cell<Option<u32>> = const { Cell::new(None) };
 }
 
 /// The queues of the device that `make` makes can fail on this thread, until another device is made so.
-pub(crate) fn fallibly<T>(make: impl FnOnce() -> T) -> T {
-    FALLIBLE.set(true);
+pub(crate) fn with_failing_queues<T>(make: impl FnOnce() -> T) -> T {
+    INJECT_FAULTS.set(true);
     let made = make();
-    FALLIBLE.set(false);
+    INJECT_FAULTS.set(false);
     made
 }
 
 /// After so many submissions of this thread one fails.
 pub(crate) fn fail_after(submissions: u32) {
-    LEFT.set(Some(submissions));
+    SUBMITS_LEFT.set(Some(submissions));
 }
 
 /// The instance as it is, or one whose devices can fail.
-pub(crate) fn fallible(raw: ash::Instance) -> ash::Instance {
-    if !FALLIBLE.get() {
+pub(crate) fn wrap_fault_injection(raw: ash::Instance) -> ash::Instance {
+    if !INJECT_FAULTS.get() {
         return raw;
     }
     let mut functions = raw.fp_v1_0().clone();
@@ -61,11 +61,11 @@ unsafe extern "system" fn submit(
     infos: *const vk::SubmitInfo2<'_>,
     fence: vk::Fence,
 ) -> vk::Result {
-    let left = LEFT.get();
-    LEFT.set(left.and_then(|left| left.checked_sub(1)));
+    let submits_left = SUBMITS_LEFT.get();
+    SUBMITS_LEFT.set(submits_left.and_then(|submits_left| submits_left.checked_sub(1)));
     match SUBMIT.get() {
         // SAFETY: the caller's.
-        Some(real) if left != Some(0) => unsafe { real(queue, count, infos, fence) },
+        Some(real) if submits_left != Some(0) => unsafe { real(queue, count, infos, fence) },
         _ => vk::Result::ERROR_OUT_OF_DEVICE_MEMORY,
     }
 }

@@ -24,7 +24,7 @@ pub use crate::test_support::collapse_model::{
 };
 use crate::test_support::fault_injection;
 pub use crate::test_support::gpu_build_check::{Bounds, EMPTY, Facts, check_structure};
-use crate::test_support::null_commands::silently;
+use crate::test_support::null_commands::with_null_commands;
 use crate::test_support::submit_hook;
 
 const ALIGNMENT: u64 = 256;
@@ -42,12 +42,12 @@ pub enum Leaves {
 
 /// A context whose recorded commands do nothing, to measure what the library takes to record them.
 pub fn silent_context(desc: &ContextDesc<'_>) -> Result<Context> {
-    silently(|| Context::new(desc))
+    with_null_commands(|| Context::new(desc))
 }
 
 /// The context that `make` makes and uses on this thread can have submissions fail.
 pub fn fallibly<T>(make: impl FnOnce() -> T) -> T {
-    fault_injection::fallibly(make)
+    fault_injection::with_failing_queues(make)
 }
 
 /// After so many submissions to queues, one that this thread makes of a context made [`fallibly`] is refused.
@@ -64,7 +64,7 @@ pub fn before_next_command_buffer(deed: impl FnOnce() + 'static) {
 /// The presentation engine has lost the surface of a window, as far as the library is told.
 pub fn lose_surface(ctx: &Context, swapchain: SwapchainHandle) -> Result<()> {
     let swapchain = ctx.shared().store.swapchains.get(swapchain)?;
-    swapchain.lock().course.presented(Err(Failure::SurfaceLost))
+    swapchain.lock().lifecycle.record_present(Err(Failure::SurfaceLost))
 }
 
 /// The presentation engine never says that one of the pictures that were presented last is shown, as far as the library is told.
@@ -72,17 +72,17 @@ pub fn lose_surface(ctx: &Context, swapchain: SwapchainHandle) -> Result<()> {
 pub fn stall_present(ctx: &Context, swapchain: SwapchainHandle) -> Result<bool> {
     let swapchain = ctx.shared().store.swapchains.get(swapchain)?;
     let mut state = swapchain.lock();
-    let images = state.parts.current.iter_mut().flat_map(|current| &mut current.images);
+    let images = state.resources.current.iter_mut().flat_map(|current| &mut current.images);
     let presented = images.map(|image| &mut image.sync).find(|sync| sync.presented);
     Ok(presented.is_some_and(|sync| {
         sync.stalls = true;
-        sync.is_over().is_some()
+        sync.is_done().is_some()
     }))
 }
 
 /// How many submissions there were.
 pub fn submissions(ctx: &Context) -> u64 {
-    ctx.shared().submitter.count()
+    ctx.shared().submitter.value_count()
 }
 
 /// Bytes of the staging memory there is.
@@ -93,7 +93,7 @@ pub fn staging_bytes(ctx: &Context) -> u64 {
 /// Objects that wait to be destroyed.
 pub fn waiting_objects(ctx: &Context) -> Result<usize> {
     ctx.shared().collect()?;
-    Ok(ctx.shared().submitter.waiting())
+    Ok(ctx.shared().submitter.deferred_count())
 }
 
 /// A bottom-level structure to build.

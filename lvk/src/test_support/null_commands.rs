@@ -7,22 +7,22 @@ use std::sync::OnceLock;
 use ash::vk;
 
 thread_local! {
-    static SILENT: Cell<bool> = const { Cell::new(false) };
+    static NULL_COMMANDS: Cell<bool> = const { Cell::new(false) };
 }
 
 static REAL: OnceLock<vk::PFN_vkGetDeviceProcAddr> = OnceLock::new();
 
 /// Devices made by `make` on this thread record nothing.
-pub(crate) fn silently<T>(make: impl FnOnce() -> T) -> T {
-    SILENT.set(true);
+pub(crate) fn with_null_commands<T>(make: impl FnOnce() -> T) -> T {
+    NULL_COMMANDS.set(true);
     let made = make();
-    SILENT.set(false);
+    NULL_COMMANDS.set(false);
     made
 }
 
 /// The instance as it is, or one whose devices find empty functions for all commands that are recorded.
-pub(crate) fn silenced(raw: ash::Instance) -> ash::Instance {
-    if !SILENT.get() {
+pub(crate) fn wrap_null_commands(raw: ash::Instance) -> ash::Instance {
+    if !NULL_COMMANDS.get() {
         return raw;
     }
     let mut functions = raw.fp_v1_0().clone();

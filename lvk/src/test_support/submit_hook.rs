@@ -2,20 +2,20 @@
 
 use std::cell::Cell;
 
-type Deed = Box<dyn FnOnce()>;
+type SubmitHook = Box<dyn FnOnce()>;
 
 thread_local! {
-    static NEXT: Cell<Option<Deed>> = const { Cell::new(None) };
+    static NEXT: Cell<Option<SubmitHook>> = const { Cell::new(None) };
 }
 
 /// Runs once, on this thread, right before it takes its next command buffer, under whatever locks it has then.
-pub(crate) fn before_next_command_buffer(deed: Deed) {
-    NEXT.set(Some(deed));
+pub(crate) fn before_next_command_buffer(hook: SubmitHook) {
+    NEXT.set(Some(hook));
 }
 
 /// This thread is about to take a command buffer.
-pub(crate) fn interrupt() {
-    if let Some(deed) = NEXT.take() {
-        deed();
+pub(crate) fn run_submit_hook() {
+    if let Some(hook) = NEXT.take() {
+        hook();
     }
 }

@@ -38,7 +38,7 @@ pub enum YuvRange {
 
 /// All conversions of the sample: what its context is made with ([`lvk::ContextDesc::yuv`]).
 pub const CONVERSIONS: [YuvConversion; 24] = {
-    let mut all = [YuvConversion::of(Format::Nv12); 24];
+    let mut all = [YuvConversion::new(Format::Nv12); 24];
     let mut number = 0;
     while number < all.len() {
         all[number].format = YuvFormat::ALL[number / 6].raw();

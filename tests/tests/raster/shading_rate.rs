@@ -93,7 +93,7 @@ fn pipelines_and_draws_have_a_rate() {
         return;
     }
     for known in ctx.shading_rates().iter().filter(|known| known.samples & 1 != 0) {
-        let pipeline = pipeline(&ctx, COVER, ShadingRate::of(known.size));
+        let pipeline = pipeline(&ctx, COVER, ShadingRate::new(known.size));
         let found = drawn(&ctx, None, |pass| {
             pass.bind_render_pipeline(*pipeline)?;
             paint(pass, [0.0; 4], 0.0)
@@ -103,7 +103,7 @@ fn pipelines_and_draws_have_a_rate() {
     let (fine, coarse) = (pipeline(&ctx, COVER, ShadingRate::default()), [2, 2]);
     let found = drawn(&ctx, None, |pass| {
         pass.bind_render_pipeline(*fine)?;
-        pass.shading_rate(ShadingRate::of(coarse))?;
+        pass.shading_rate(ShadingRate::new(coarse))?;
         pass.scissor([0, 0], [32, SIZE[1]])?;
         paint(pass, [0.0; 4], 0.0)?;
         pass.bind_render_pipeline(*fine)?;
@@ -152,7 +152,7 @@ fn attachments_and_primitives_come_in_by_their_formulas() {
     let kinds = if limits.combines { &[Keep, Replace, Min, Max, Multiply][..] } else { &[Keep, Replace] };
     let by_draw = [1, 2];
     let by_primitive = [2, 1];
-    let pipeline = pipeline(&ctx, BY_PRIMITIVE, ShadingRate::of(by_draw));
+    let pipeline = pipeline(&ctx, BY_PRIMITIVE, ShadingRate::new(by_draw));
     for (primitive, attached) in kinds.iter().flat_map(|a| kinds.iter().map(move |b| (*a, *b))) {
         let found = drawn(&ctx, Some(attachment), |pass| {
             pass.bind_render_pipeline(*pipeline)?;
@@ -219,21 +219,21 @@ fn wrong_rates_are_refused() {
     let plain = RenderPipelineDesc { color: &color, debug_name: "coarse", ..Default::default() };
     let plain_pipeline = staged_pipeline(&ctx, &stages, &plain).unwrap();
     drawn(&ctx, None, |pass| {
-        usage_error(pass.shading_rate(ShadingRate::of([2, 2])), "bind a render pipeline first");
+        usage_error(pass.shading_rate(ShadingRate::new([2, 2])), "bind a render pipeline first");
         pass.bind_render_pipeline(*plain_pipeline)?;
-        usage_error(pass.shading_rate(ShadingRate::of([2, 2])), "coarse: it has no shading rate to replace");
+        usage_error(pass.shading_rate(ShadingRate::new([2, 2])), "coarse: it has no shading rate to replace");
         Ok(())
     });
     if !has(&ctx, OptionalFeature::PipelineShadingRate) {
         return;
     }
-    let of = |size| RenderPipelineDesc { shading_rate: Some(ShadingRate::of(size)), ..plain };
+    let of = |size| RenderPipelineDesc { shading_rate: Some(ShadingRate::new(size)), ..plain };
     usage_error(staged_pipeline(&ctx, &stages, &of([3, 1])), "coarse: fragments are 1, 2 or 4 pixels");
     let made = staged_pipeline(&ctx, &stages, &of([2, 2])).unwrap();
     drawn(&ctx, None, |pass| {
         pass.bind_render_pipeline(*made)?;
-        usage_error(pass.shading_rate(ShadingRate::of([1, 8])), "not [1, 8]");
-        pass.shading_rate(ShadingRate::of([1, 1]))
+        usage_error(pass.shading_rate(ShadingRate::new([1, 8])), "not [1, 8]");
+        pass.shading_rate(ShadingRate::new([1, 1]))
     });
 }
 
@@ -245,7 +245,7 @@ fn devices_without_rates_say_so() {
     assert_eq!((ctx.shading_rates().len(), ctx.capabilities().limits.shading_rate), (0, Default::default()));
     let color = [Format::Rgba32Float.into()];
     let stages = [(ShaderStage::Vertex, COVER), (ShaderStage::Fragment, PAINT)];
-    let rate = Some(ShadingRate::of([2, 2]));
+    let rate = Some(ShadingRate::new([2, 2]));
     let desc =
         RenderPipelineDesc { color: &color, shading_rate: rate, debug_name: "coarse", ..Default::default() };
     unsupported(staged_pipeline(&ctx, &stages, &desc), "the shading rate [2, 2] of 'coarse'");

@@ -89,12 +89,12 @@ fn yuv_device() -> Option<(TestDevice, Vec<YuvConversion>)> {
                     model,
                     range,
                     filter: Filter::Nearest,
-                    ..YuvConversion::of(format)
+                    ..YuvConversion::new(format)
                 });
             }
         }
     }
-    all.push(YuvConversion::of(Format::Nv12));
+    all.push(YuvConversion::new(Format::Nv12));
     let ctx = device_with(|desc| desc.yuv = &all)?;
     Some((ctx, all))
 }
@@ -258,7 +258,7 @@ fn slots_run_out_and_come_back_and_empty_ones_are_black() {
 
 #[test]
 fn what_textures_in_ycbcr_cannot_be_is_an_error() {
-    let conversions = [YuvConversion::of(Format::Nv12), YuvConversion::of(Format::R8Unorm)];
+    let conversions = [YuvConversion::new(Format::Nv12), YuvConversion::new(Format::R8Unorm)];
     let Some(ctx) = device_with(|desc| desc.yuv = &conversions) else { return };
     let data = [0; 48];
     let plain = desc(Format::Nv12, &data);

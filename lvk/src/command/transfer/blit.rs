@@ -125,7 +125,7 @@ fn scales(from: Format, to: Format, filter: Filter) -> bool {
         return false;
     }
     if from.is_color() && to.is_color() {
-        return from.numbers() == to.numbers();
+        return from.numeric_format() == to.numeric_format();
     }
     from == to && filter == Filter::Nearest
 }

@@ -6,7 +6,7 @@ use super::{Settle, TARGET};
 use crate::barrier::Use;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
-use crate::format::Numbers;
+use crate::format::NumericFormat;
 use crate::handle::TextureHandle;
 use crate::resource::Texture;
 use crate::resource::region::TextureRange;
@@ -53,7 +53,7 @@ impl CommandBuffer {
         self.use_texture(&texture, part, Use::transfer_write())?;
         self.flush();
         let range =
-            vk::ImageSubresourceRange { aspect_mask: aspects, ..texture.image.for_barriers().range(part) };
+            vk::ImageSubresourceRange { aspect_mask: aspects, ..texture.image.barrier_image().range(part) };
         let (device, image) = (&self.shared.gpu.device, texture.image.raw);
         // SAFETY: the range lies inside the image, whose format holds such a value.
         unsafe {
@@ -96,9 +96,9 @@ fn check_value(texture: &Texture, value: ClearValue) -> Result<vk::ImageAspectFl
         Err(Error::usage(&texture.name, format!("{format:?} cannot be cleared to {value:?}: {why}")))
     };
     let (wanted, numbers) = match value {
-        ClearValue::Color(_) => (Aspects::COLOR, Some(Numbers::Float)),
-        ClearValue::Uint(_) => (Aspects::COLOR, Some(Numbers::Uint)),
-        ClearValue::Sint(_) => (Aspects::COLOR, Some(Numbers::Sint)),
+        ClearValue::Color(_) => (Aspects::COLOR, Some(NumericFormat::Float)),
+        ClearValue::Uint(_) => (Aspects::COLOR, Some(NumericFormat::Uint)),
+        ClearValue::Sint(_) => (Aspects::COLOR, Some(NumericFormat::Sint)),
         ClearValue::Depth(_) => (Aspects::DEPTH, None),
         ClearValue::Stencil(_) => (Aspects::STENCIL, None),
         ClearValue::DepthStencil(..) => (Aspects::DEPTH | Aspects::STENCIL, None),
@@ -107,13 +107,13 @@ fn check_value(texture: &Texture, value: ClearValue) -> Result<vk::ImageAspectFl
         Raw::Color(_) => (0.0, 0),
         Raw::DepthStencil(value) => (value.depth, value.stencil),
     };
-    if !texture.shown_aspects().contains(wanted) {
+    if !texture.view_aspects().contains(wanted) {
         return wrong("it does not hold that");
     }
     if format.is_compressed() || format.is_yuv() {
         return wrong("its texels are only copied");
     }
-    if numbers.is_some_and(|numbers| numbers != format.numbers()) {
+    if numbers.is_some_and(|numbers| numbers != format.numeric_format()) {
         return wrong("its numbers are of another kind");
     }
     if !(0.0..=1.0).contains(&depth) || stencil > 0xFF {

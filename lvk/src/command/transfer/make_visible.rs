@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::barrier::{Layout, Stages, Use};
 use crate::command::CommandBuffer;
-use crate::command::queue_support::on_lane;
+use crate::command::queue_support::limited_to_queue;
 use crate::command::recording_state::Notes;
 use crate::resource::texture_desc::TextureUsage;
 use crate::resource::{Buffer, Texture};
@@ -27,7 +27,7 @@ impl CommandBuffer {
     }
 
     fn settle_all(&mut self) {
-        let lane = self.recording.lane;
+        let queue_index = self.recording.queue_index;
         let Recording { tracker, images, commands, .. } = &mut **self.recording;
         let Notes { settle, barriers, last_barrier, .. } = &mut **self.notes;
         barriers.clear();
@@ -35,13 +35,17 @@ impl CommandBuffer {
         for written in settle.drain(..) {
             match written {
                 Settle::Buffer(buffer) => {
-                    tracker.use_buffer(buffer.id, on_lane(lane, Use::everything_read()), barriers);
+                    tracker.use_buffer(
+                        buffer.id,
+                        limited_to_queue(queue_index, Use::everything_read()),
+                        barriers,
+                    );
                 }
                 Settle::Texture(texture) => {
                     let Some(read) = resting_use(texture.image.usage) else { continue };
-                    let read = on_lane(lane, read);
+                    let read = limited_to_queue(queue_index, read);
                     let image = &texture.image;
-                    images.insert(image.id, image.for_barriers());
+                    images.insert(image.id, image.barrier_image());
                     tracker.use_texture(image.id, image.shape, texture.range, read, barriers);
                 }
             }

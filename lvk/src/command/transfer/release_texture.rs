@@ -6,8 +6,8 @@ use crate::barrier::Use;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
-use crate::submit::emit_barriers::known_layout;
-use crate::submit::ownership::Access;
+use crate::submit::emit_barriers::layout_from_vulkan;
+use crate::submit::ownership::QueueAccess;
 
 impl CommandBuffer {
     /// Brings all of a texture into a layout that others want it in, after everything recorded so far
@@ -18,7 +18,7 @@ impl CommandBuffer {
     /// [`InvalidUsage`](Error::InvalidUsage) for another layout.
     pub fn release_texture(&mut self, texture: TextureHandle, layout: vk::ImageLayout) -> Result<()> {
         let texture = self.shared.store.textures.get(texture)?;
-        let known = known_layout(layout).map_err(|why| Error::usage(&texture.name, why))?;
+        let known = layout_from_vulkan(layout).map_err(|why| Error::usage(&texture.name, why))?;
         if layout == vk::ImageLayout::UNDEFINED {
             return Err(Error::usage(
                 &texture.name,
@@ -30,7 +30,7 @@ impl CommandBuffer {
         self.use_texture(&texture, texture.range, Use::transfer_read().with_layout(known))?;
         self.flush();
         // Others may write it, so it waits for those who read it on other queues.
-        self.refer(texture.image.id, Access::Write);
+        self.refer(texture.image.id, QueueAccess::Write);
         Ok(())
     }
 }

@@ -166,7 +166,7 @@ fn check_packed(buffer: &Buffer, offset: u64, texture: &Texture, region: &Textur
 
 /// The region of `target` at the place of `to` that can take what `from` has.
 fn counterpart(source: &Texture, from: &Region, target: &Texture, to: &TextureRegion) -> Result<Region> {
-    let part = target.part_of(to.aspect)?;
+    let part = target.copy_aspect(to.aspect)?;
     check_copyable(source, from, target, part.aspect, part.block_bytes)?;
     let [width, height, _] = target.bounds().mip_extent(to.mip);
     let room = [width.saturating_sub(to.offset[0]), height.saturating_sub(to.offset[1])];
@@ -174,7 +174,7 @@ fn counterpart(source: &Texture, from: &Region, target: &Texture, to: &TextureRe
     let extent = if part.block == from.part.block {
         [width, height]
     } else {
-        let blocks = from.part.blocks([width, height]);
+        let blocks = from.part.block_count([width, height]);
         // The last block may reach over the edge.
         [0, 1].map(|axis| match blocks[axis].saturating_mul(part.block[axis]) {
             side if side - part.block[axis] < room[axis] => side.min(room[axis]),

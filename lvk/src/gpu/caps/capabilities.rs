@@ -8,14 +8,14 @@ use super::limits::Limits;
 use super::mesh_limits::MeshLimits;
 use super::optional_features::{FeatureSet, OF_MESH_SHADERS, OptionalFeature};
 use super::queues::{
-    Queue, QueueFamily, QueueInfo, QueuePlace, describe_queues, place_queues, queue_families,
+    Queue, QueueFamily, QueueInfo, QueueLocation, describe_queues, locate_queues, queue_families,
 };
 use super::ray_query_path::{RayQueryPath, RayQueryRequest};
 use super::shading_rate::ShadingRateLimits;
 use crate::error::{Error, Result};
-use crate::gpu::start::features::{Calibration, Features, Subgroups, missing};
+use crate::gpu::start::features::{Calibration, Features, Subgroups, missing_required};
 use crate::gpu::start::select::DeviceKind;
-use crate::gpu::window::Probe;
+use crate::gpu::window::SurfaceProbe;
 
 /// Whether the caller needs a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -30,7 +30,7 @@ pub enum FeatureRequest {
 }
 
 impl FeatureRequest {
-    pub(crate) fn wants(self) -> bool {
+    pub(crate) fn is_requested(self) -> bool {
         self != Self::Off
     }
 }
@@ -123,12 +123,12 @@ impl Capabilities {
     }
 
     /// Without the optional features of `hidden` and those that cannot be without them.
-    pub(crate) fn hide(&mut self, hidden: FeatureSet) {
+    pub(crate) fn remove_features(&mut self, hidden: FeatureSet) {
         let mut left = self.optional.without(hidden);
         if !self.mesh_shader {
             left = left.without(OF_MESH_SHADERS.into_iter().collect());
         }
-        self.optional = left.whole();
+        self.optional = left.without_unmet_requirements();
         self.primitive_id = self.has(OptionalFeature::GeometryShader);
         self.formatless_storage_read = self.has(OptionalFeature::StorageImageReadWithoutFormat);
         self.cube_arrays = self.has(OptionalFeature::CubeArrays);
@@ -173,20 +173,20 @@ impl Capabilities {
     }
 
     /// Whether the device builds acceleration structures, for either use of them.
-    pub(crate) fn hardware_structures(&self) -> bool {
+    pub(crate) fn hardware_acceleration_structures(&self) -> bool {
         self.ray_tracing_pipeline || self.hardware_ray_query()
     }
 
     /// Turns on what is asked for of what the device has.
     pub(crate) fn choose_ray_tracing(&mut self, pipeline: FeatureRequest, query: RayQueryRequest) {
         let choice = query.choose(self.ray_query, self.is_cpu);
-        self.limit_ray_tracing(pipeline.wants(), choice.path == RayQueryPath::Hardware);
+        self.limit_ray_tracing(pipeline.is_requested(), choice.path == RayQueryPath::Hardware);
         self.ray_query_path = choice.path;
         self.ray_query_reason = choice.reason;
         if self.software_ray_query() {
             self.ray_query = true;
-            self.limits.allow_software(self.hardware_structures());
-            self.position_fetch |= !self.hardware_structures();
+            self.limits.enable_software_structures(self.hardware_acceleration_structures());
+            self.position_fetch |= !self.hardware_acceleration_structures();
         }
     }
 }
@@ -201,7 +201,7 @@ pub(crate) struct PhysicalDevice {
     pub(crate) queue_family: Option<u32>,
     pub(crate) families: Vec<QueueFamily>,
     /// The queue of the device for each of the library's.
-    pub(crate) places: [QueuePlace; 3],
+    pub(crate) places: [QueueLocation; 3],
     /// Core features the library cannot do without and the device lacks.
     pub(crate) missing: Vec<String>,
     /// As found.
@@ -223,12 +223,12 @@ impl PhysicalDevice {
         let mut found = Self {
             raw,
             capabilities: Capabilities {
-                device_name: name_of(&plain),
+                device_name: device_name(&plain),
                 api_version: version(plain.api_version),
                 is_cpu: plain.device_type == vk::PhysicalDeviceType::CPU,
                 ..Default::default()
             },
-            kind: kind(plain.device_type),
+            kind: device_kind(plain.device_type),
             local_memory_bytes: local_memory(instance, raw),
             queue_family: None,
             families,
@@ -244,21 +244,21 @@ impl PhysicalDevice {
         let ray_tracing = found.read_features(instance);
         found.read_properties(instance, &plain, ray_tracing);
         match queue {
-            Some(family) => found.take_family(family as u32),
+            Some(family) => found.use_single_family(family as u32),
             None => found.missing.push("a queue for graphics and compute".to_owned()),
         }
-        found.capabilities.hide(FeatureSet::NONE);
+        found.capabilities.remove_features(FeatureSet::NONE);
         Ok(found)
     }
 
     /// Has this family for everything, and others beside it.
-    pub(crate) fn take_family(&mut self, family: u32) {
+    pub(crate) fn use_single_family(&mut self, family: u32) {
         self.queue_family = Some(family);
-        self.place(place_queues(&self.families, family));
+        self.set_queues(locate_queues(&self.families, family));
     }
 
     /// Has these queues.
-    pub(crate) fn place(&mut self, places: [QueuePlace; 3]) {
+    pub(crate) fn set_queues(&mut self, places: [QueueLocation; 3]) {
         self.places = places;
         self.capabilities.queues = describe_queues(&self.families, &places);
         self.capabilities.limits.timestamp_bits = self.capabilities.queues[0].timestamp_bits;
@@ -271,7 +271,7 @@ impl PhysicalDevice {
 
     /// Fills the features and what is missing; answers whether acceleration structures may be asked about.
     fn read_features(&mut self, instance: &ash::Instance) -> bool {
-        let mut found = found_features(instance, self.raw, &|name| self.has_extension(name));
+        let mut found = query_features(instance, self.raw, &|name| self.has_extension(name));
         let accel = &found.ext.structures;
         let usable = accel.acceleration_structure
             & accel.descriptor_binding_acceleration_structure_update_after_bind
@@ -289,8 +289,8 @@ impl PhysicalDevice {
         caps.ray_query_path = if caps.ray_query { RayQueryPath::Hardware } else { RayQueryPath::None };
         caps.position_fetch = found.ext.position_fetch.ray_tracing_position_fetch == vk::TRUE;
         caps.mesh_shader = found.ext.mesh.mesh_shader == vk::TRUE;
-        caps.optional = FeatureSet::of(&found);
-        self.missing.extend(missing(&found));
+        caps.optional = FeatureSet::from_features(&found);
+        self.missing.extend(missing_required(&found));
         self.features = found;
         usable
     }
@@ -342,9 +342,9 @@ impl PhysicalDevice {
         caps.prefers_spatial_order = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
         caps.driver_id = v12.driver_id;
         caps.helpers_lose_arrays = v12.driver_id == vk::DriverId::MESA_LLVMPIPE;
-        caps.limits = Limits::of(&plain.limits, &v12, &v13, &accel, &pipeline);
-        caps.limits.mesh = MeshLimits::of(&mesh);
-        caps.limits.shading_rate = ShadingRateLimits::of(&rates);
+        caps.limits = Limits::from_properties(&plain.limits, &v12, &v13, &accel, &pipeline);
+        caps.limits.mesh = MeshLimits::from_properties(&mesh);
+        caps.limits.shading_rate = ShadingRateLimits::from_properties(&rates);
         caps.limits.max_allocation_bytes = v11.max_memory_allocation_size;
         caps.limits.max_custom_borders = borders.max_custom_border_color_samplers;
         caps.limits.max_views = v11.max_multiview_view_count;
@@ -352,7 +352,7 @@ impl PhysicalDevice {
 }
 
 /// What the device offers.
-fn found_features(
+fn query_features(
     instance: &ash::Instance,
     raw: vk::PhysicalDevice,
     has: &dyn Fn(&CStr) -> bool,
@@ -362,16 +362,16 @@ fn found_features(
         .push_next(&mut found.v11)
         .push_next(&mut found.v12)
         .push_next(&mut found.v13);
-    let mut all = found.ext.chain(all, has);
+    let mut all = found.ext.append_to_chain(all, has);
     // SAFETY: the chain holds only structures the device knows, and lives until the call returns.
     unsafe { instance.get_physical_device_features2(raw, &mut all) };
     found.core = all.features;
-    found.ext.note_present(has);
-    found.calibration = calibration(has);
+    found.ext.set_featureless_extensions(has);
+    found.calibration = calibration_extension(has);
     found
 }
 
-fn calibration(has: &dyn Fn(&CStr) -> bool) -> Calibration {
+fn calibration_extension(has: &dyn Fn(&CStr) -> bool) -> Calibration {
     if has(ash::khr::calibrated_timestamps::NAME) {
         Calibration::Khr
     } else if has(ash::ext::calibrated_timestamps::NAME) {
@@ -383,9 +383,9 @@ fn calibration(has: &dyn Fn(&CStr) -> bool) -> Calibration {
 
 impl PhysicalDevice {
     /// Takes a queue that presents to the window, or says that there is none.
-    pub(crate) fn present_to(&mut self, window: &Probe<'_>) {
+    pub(crate) fn select_present_queue(&mut self, window: &SurfaceProbe<'_>) {
         match window.queue_family(self.raw) {
-            Some(family) => self.take_family(family),
+            Some(family) => self.use_single_family(family),
             None => {
                 self.missing.push("a queue for graphics and compute that presents to the window".to_owned())
             }
@@ -400,7 +400,7 @@ fn local_memory(instance: &ash::Instance, raw: vk::PhysicalDevice) -> u64 {
     heaps.filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)).map(|heap| heap.size).sum()
 }
 
-fn name_of(properties: &vk::PhysicalDeviceProperties) -> String {
+fn device_name(properties: &vk::PhysicalDeviceProperties) -> String {
     properties.device_name_as_c_str().map(to_string).unwrap_or_default()
 }
 
@@ -412,7 +412,7 @@ fn version(packed: u32) -> (u32, u32, u32) {
     (vk::api_version_major(packed), vk::api_version_minor(packed), vk::api_version_patch(packed))
 }
 
-fn kind(raw: vk::PhysicalDeviceType) -> DeviceKind {
+fn device_kind(raw: vk::PhysicalDeviceType) -> DeviceKind {
     match raw {
         vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
         vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,

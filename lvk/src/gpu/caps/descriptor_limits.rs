@@ -7,9 +7,9 @@ use crate::error::{Result, check_limit};
 /// Samplers the library asks for where the device allows more.
 const WANTED_SAMPLERS: u32 = 1_024;
 /// Textures at most, whatever the device allows: the library keeps a row for each.
-const MOST_TEXTURES: u32 = 1 << 20;
+const MAX_TEXTURES: u32 = 1 << 20;
 /// The dummy and one texture.
-const FEWEST_TEXTURES: u32 = 2;
+const MIN_TEXTURES: u32 = 2;
 const OBJECT: &str = "bindless set";
 
 /// Most descriptors of a layout and a pool whose descriptors change while they are bound, in all stages.
@@ -28,7 +28,7 @@ pub(crate) struct DescriptorLimits {
 
 /// What a context has beside textures, samplers and conversions of Y'CbCr.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct OtherDescriptors {
+pub(crate) struct ReservedDescriptors {
     /// Top-level structures and the buffers that describe them.
     pub(crate) in_set: u32,
     /// Targets that shaders of a pass read, and those that it draws.
@@ -37,7 +37,7 @@ pub(crate) struct OtherDescriptors {
 
 /// Textures in Y'CbCr.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct YuvWish {
+pub(crate) struct YuvRequest {
     pub(crate) conversions: u32,
     /// Textures of each, the dummy included.
     pub(crate) textures: u32,
@@ -47,13 +47,13 @@ pub(crate) struct YuvWish {
 
 /// What is left for the two arrays that take it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct DescriptorRoom {
+pub(crate) struct DescriptorBudget {
     pub(crate) textures: u32,
     pub(crate) samplers: u32,
 }
 
 impl DescriptorLimits {
-    pub(crate) fn of(v12: &vk::PhysicalDeviceVulkan12Properties<'_>) -> Self {
+    pub(crate) fn from_properties(v12: &vk::PhysicalDeviceVulkan12Properties<'_>) -> Self {
         Self {
             samplers: v12
                 .max_per_stage_descriptor_update_after_bind_samplers
@@ -75,7 +75,7 @@ impl DescriptorLimits {
         let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut v12);
         // SAFETY: the device was enumerated from the instance, and knows the structure, which lives until the call returns.
         unsafe { instance.get_physical_device_properties2(device, &mut all) };
-        Self::of(&v12)
+        Self::from_properties(&v12)
     }
 
     /// Textures that each conversion has room for. They take at most half of what there is, as the other textures need
@@ -83,41 +83,41 @@ impl DescriptorLimits {
     ///
     /// # Errors
     /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where there are too many conversions.
-    pub(crate) fn yuv_textures(&self, others: &OtherDescriptors, wish: &YuvWish) -> Result<u32> {
-        let each = wish.descriptors.max(1);
-        let most = self.samplers.min(self.sampled_images).min(self.left(others)) / 2 / each;
-        check_limit("ContextDesc::yuv", "number of conversions", wish.conversions.into(), most.into())?;
-        Ok(wish.textures.min(most / wish.conversions.max(1)))
+    pub(crate) fn yuv_textures(&self, reserved: &ReservedDescriptors, request: &YuvRequest) -> Result<u32> {
+        let each = request.descriptors.max(1);
+        let most = self.samplers.min(self.sampled_images).min(self.remaining(reserved)) / 2 / each;
+        check_limit("ContextDesc::yuv", "number of conversions", request.conversions.into(), most.into())?;
+        Ok(request.textures.min(most / request.conversions.max(1)))
     }
 
     /// Room beside `yuv` descriptors of textures in Y'CbCr. A texture takes a sampled and a storage slot.
-    pub(crate) fn room(&self, others: &OtherDescriptors, yuv: u32) -> DescriptorRoom {
-        let left = self.left(others).saturating_sub(yuv);
+    pub(crate) fn budget(&self, reserved: &ReservedDescriptors, yuv: u32) -> DescriptorBudget {
+        let left = self.remaining(reserved).saturating_sub(yuv);
         let samplers = WANTED_SAMPLERS.min(self.samplers.saturating_sub(yuv)).min(left / 2);
         let textures = self
             .sampled_images
             .saturating_sub(yuv)
             .min(self.storage_images)
             .min((left - samplers) / 2)
-            .min(MOST_TEXTURES);
-        DescriptorRoom { textures, samplers }
+            .min(MAX_TEXTURES);
+        DescriptorBudget { textures, samplers }
     }
 
     /// Descriptors of any kind beside the others, both of a stage and of the pools.
-    fn left(&self, others: &OtherDescriptors) -> u32 {
-        let in_stage = self.resources.saturating_sub(others.in_set).saturating_sub(others.targets);
-        in_stage.min(self.in_pools.saturating_sub(others.in_set))
+    fn remaining(&self, reserved: &ReservedDescriptors) -> u32 {
+        let in_stage = self.resources.saturating_sub(reserved.in_set).saturating_sub(reserved.targets);
+        in_stage.min(self.in_pools.saturating_sub(reserved.in_set))
     }
 }
 
-impl DescriptorRoom {
+impl DescriptorBudget {
     /// The textures that a context gets of those it wants.
     ///
     /// # Errors
     /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where not even one texture fits beside the dummy.
-    pub(crate) fn textures_of(&self, wanted: u32) -> Result<u32> {
-        check_limit(OBJECT, "number of textures", FEWEST_TEXTURES.into(), self.textures.into())?;
-        Ok(wanted.clamp(FEWEST_TEXTURES, self.textures))
+    pub(crate) fn texture_count(&self, wanted: u32) -> Result<u32> {
+        check_limit(OBJECT, "number of textures", MIN_TEXTURES.into(), self.textures.into())?;
+        Ok(wanted.clamp(MIN_TEXTURES, self.textures))
     }
 }
 
@@ -125,10 +125,10 @@ impl DescriptorRoom {
 ///
 /// # Errors
 /// [`Error::LimitExceeded`](crate::Error::LimitExceeded) where not even one texture fits beside the dummy.
-pub(crate) fn fitting(wanted: u32, fits: impl Fn(u32) -> bool) -> Result<u32> {
-    let half = |textures: &u32| (*textures > FEWEST_TEXTURES).then(|| (textures / 2).max(FEWEST_TEXTURES));
+pub(crate) fn largest_fitting(wanted: u32, fits: impl Fn(u32) -> bool) -> Result<u32> {
+    let half = |textures: &u32| (*textures > MIN_TEXTURES).then(|| (textures / 2).max(MIN_TEXTURES));
     let found = std::iter::successors(Some(wanted), half).find(|textures| fits(*textures)).unwrap_or(0);
-    check_limit(OBJECT, "number of textures", FEWEST_TEXTURES.into(), found.into())?;
+    check_limit(OBJECT, "number of textures", MIN_TEXTURES.into(), found.into())?;
     Ok(found)
 }
 
@@ -151,62 +151,67 @@ mod tests {
     }
 
     prop_compose! {
-        fn others()(in_set in 0..300_u32, targets in 0..19_u32) -> OtherDescriptors {
-            OtherDescriptors { in_set, targets }
+        fn reserved()(in_set in 0..300_u32, targets in 0..19_u32) -> ReservedDescriptors {
+            ReservedDescriptors { in_set, targets }
         }
     }
 
     prop_compose! {
-        fn wish()(
+        fn request()(
             conversions in prop_oneof![0..6_u32, 0..2_000_u32], textures in 1..1_026_u32, descriptors in 1..4_u32
-        ) -> YuvWish {
-            YuvWish { conversions, textures, descriptors }
+        ) -> YuvRequest {
+            YuvRequest { conversions, textures, descriptors }
         }
     }
 
     /// Whether Vulkan takes a layout and a pool with these descriptors.
-    fn holds(limits: &DescriptorLimits, others: &OtherDescriptors, yuv: u32, room: &DescriptorRoom) -> bool {
-        let [textures, samplers, yuv] = [room.textures, room.samplers, yuv].map(u64::from);
-        let all = 2 * textures + samplers + yuv + u64::from(others.in_set);
+    fn holds(
+        limits: &DescriptorLimits,
+        reserved: &ReservedDescriptors,
+        yuv: u32,
+        budget: &DescriptorBudget,
+    ) -> bool {
+        let [textures, samplers, yuv] = [budget.textures, budget.samplers, yuv].map(u64::from);
+        let all = 2 * textures + samplers + yuv + u64::from(reserved.in_set);
         samplers + yuv <= limits.samplers.into()
             && textures + yuv <= limits.sampled_images.into()
             && textures <= limits.storage_images.into()
-            && all + u64::from(others.targets) <= limits.resources.into()
+            && all + u64::from(reserved.targets) <= limits.resources.into()
             && all <= limits.in_pools.into()
     }
 
     proptest! {
         #[test]
-        fn everything_a_context_gets_is_within_every_limit(limits in limits(), others in others(), wish in wish()) {
-            let Ok(each) = limits.yuv_textures(&others, &wish) else { return Ok(()) };
-            prop_assert!(each <= wish.textures);
-            let yuv = each * wish.conversions * wish.descriptors;
-            let room = limits.room(&others, yuv);
-            if let Ok(textures) = room.textures_of(u32::MAX) {
-                let all = DescriptorRoom { textures, ..room };
-                prop_assert!(holds(&limits, &others, yuv, &all));
-                let more = DescriptorRoom { textures: textures + 1, ..room };
-                prop_assert!(textures == MOST_TEXTURES || !holds(&limits, &others, yuv, &more));
+        fn everything_a_context_gets_is_within_every_limit(limits in limits(), reserved in reserved(), request in request()) {
+            let Ok(each) = limits.yuv_textures(&reserved, &request) else { return Ok(()) };
+            prop_assert!(each <= request.textures);
+            let yuv = each * request.conversions * request.descriptors;
+            let budget = limits.budget(&reserved, yuv);
+            if let Ok(textures) = budget.texture_count(u32::MAX) {
+                let all = DescriptorBudget { textures, ..budget };
+                prop_assert!(holds(&limits, &reserved, yuv, &all));
+                let more = DescriptorBudget { textures: textures + 1, ..budget };
+                prop_assert!(textures == MAX_TEXTURES || !holds(&limits, &reserved, yuv, &more));
             }
         }
 
         #[test]
-        fn a_context_gets_what_it_wants_where_that_fits(wish in wish(), wanted in 2..400_000_u32) {
-            let wish = YuvWish { conversions: wish.conversions.min(8), ..wish };
+        fn a_context_gets_what_it_wants_where_that_fits(request in request(), wanted in 2..400_000_u32) {
+            let request = YuvRequest { conversions: request.conversions.min(8), ..request };
             let limits = promised();
-            let others = OtherDescriptors { in_set: 257, targets: 18 };
-            prop_assert_eq!(limits.yuv_textures(&others, &wish).unwrap(), wish.textures);
-            let yuv = wish.textures * wish.conversions * wish.descriptors;
-            let room = limits.room(&others, yuv);
-            prop_assert_eq!(room.samplers, WANTED_SAMPLERS);
+            let reserved = ReservedDescriptors { in_set: 257, targets: 18 };
+            prop_assert_eq!(limits.yuv_textures(&reserved, &request).unwrap(), request.textures);
+            let yuv = request.textures * request.conversions * request.descriptors;
+            let budget = limits.budget(&reserved, yuv);
+            prop_assert_eq!(budget.samplers, WANTED_SAMPLERS);
             let fits = wanted <= 200_000;
-            prop_assert!(!fits || room.textures_of(wanted).unwrap() == wanted);
+            prop_assert!(!fits || budget.texture_count(wanted).unwrap() == wanted);
         }
 
         #[test]
         fn halving_ends_at_what_fits(wanted in 2..=u32::MAX, most in number()) {
-            let found = fitting(wanted, |textures| textures <= most).ok();
-            prop_assert_eq!(found.is_some(), most >= FEWEST_TEXTURES);
+            let found = largest_fitting(wanted, |textures| textures <= most).ok();
+            prop_assert_eq!(found.is_some(), most >= MIN_TEXTURES);
             prop_assert!(found.is_none_or(|found| found <= most && (found == wanted || found > most / 2 - 1)));
         }
     }
@@ -225,26 +230,29 @@ mod tests {
 
     #[test]
     fn conversions_and_pools_leave_less_for_textures() {
-        let (limits, others) = (promised(), OtherDescriptors { in_set: 257, targets: 18 });
-        assert_eq!(limits.room(&others, 0).textures, (500_000 - 257 - 18 - 1_024) / 2);
-        assert_eq!(limits.room(&others, 4 * 1_025 * 3).textures, (500_000 - 257 - 18 - 1_024 - 12_300) / 2);
+        let (limits, reserved) = (promised(), ReservedDescriptors { in_set: 257, targets: 18 });
+        assert_eq!(limits.budget(&reserved, 0).textures, (500_000 - 257 - 18 - 1_024) / 2);
+        assert_eq!(
+            limits.budget(&reserved, 4 * 1_025 * 3).textures,
+            (500_000 - 257 - 18 - 1_024 - 12_300) / 2
+        );
         let small_pools = DescriptorLimits { in_pools: 20_000, ..limits };
-        assert_eq!(small_pools.room(&others, 36).textures, (20_000 - 257 - 1_024 - 36) / 2);
+        assert_eq!(small_pools.budget(&reserved, 36).textures, (20_000 - 257 - 1_024 - 36) / 2);
     }
 
     #[test]
     fn too_many_conversions_are_refused() {
-        let wish = YuvWish { conversions: 83_334, textures: 2, descriptors: 3 };
-        let refused = promised().yuv_textures(&OtherDescriptors::default(), &wish);
+        let request = YuvRequest { conversions: 83_334, textures: 2, descriptors: 3 };
+        let refused = promised().yuv_textures(&ReservedDescriptors::default(), &request);
         assert!(refused.unwrap_err().to_string().contains("ContextDesc::yuv"));
-        let less = YuvWish { conversions: 83_333, ..wish };
-        assert_eq!(promised().yuv_textures(&OtherDescriptors::default(), &less).unwrap(), 1);
+        let less = YuvRequest { conversions: 83_333, ..request };
+        assert_eq!(promised().yuv_textures(&ReservedDescriptors::default(), &less).unwrap(), 1);
     }
 
     #[test]
     fn a_device_without_room_for_a_texture_is_refused() {
-        let room = DescriptorRoom { textures: 1, samplers: 1 };
-        assert!(room.textures_of(5).is_err());
-        assert!(fitting(9, |_| false).is_err());
+        let budget = DescriptorBudget { textures: 1, samplers: 1 };
+        assert!(budget.texture_count(5).is_err());
+        assert!(largest_fitting(9, |_| false).is_err());
     }
 }

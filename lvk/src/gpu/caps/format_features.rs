@@ -9,9 +9,9 @@ use crate::format::Format;
 use crate::gpu::device::Gpu;
 
 /// The answers so far, by [`Format::ALL`].
-pub(crate) struct FormatAnswers([OnceLock<vk::FormatFeatureFlags>; Format::ALL.len()]);
+pub(crate) struct FormatFeatureCache([OnceLock<vk::FormatFeatureFlags>; Format::ALL.len()]);
 
-impl Default for FormatAnswers {
+impl Default for FormatFeatureCache {
     fn default() -> Self {
         Self([const { OnceLock::new() }; Format::ALL.len()])
     }
@@ -21,7 +21,7 @@ impl Gpu {
     /// What the device can do with images of `format` in optimal tiling; nothing where a feature that the format needs is
     /// off.
     pub(crate) fn format_features(&self, format: Format) -> vk::FormatFeatureFlags {
-        *self.format_answers.0[format as usize].get_or_init(|| match needed(format) {
+        *self.format_answers.0[format as usize].get_or_init(|| match required_feature(format) {
             Some(feature) if !self.caps.has(feature) => vk::FormatFeatureFlags::empty(),
             _ => self.format_properties(format.raw()).optimal_tiling_features,
         })
@@ -39,7 +39,7 @@ impl Gpu {
 }
 
 /// The feature by which there is the format, beyond what Vulkan has anyway.
-fn needed(format: Format) -> Option<OptionalFeature> {
+fn required_feature(format: Format) -> Option<OptionalFeature> {
     let name = format.raw().as_raw();
     let between = |first: vk::Format, last: vk::Format| (first.as_raw()..=last.as_raw()).contains(&name);
     if between(vk::Format::BC1_RGB_UNORM_BLOCK, vk::Format::BC7_SRGB_BLOCK) {
@@ -72,7 +72,7 @@ mod tests {
     fn compressed_formats_need_features_of_their_own() {
         for format in Format::ALL {
             let other = [Some(OptionalFeature::Maintenance5), Some(OptionalFeature::YcbcrConversion), None];
-            assert_eq!(!other.contains(&needed(*format)), format.is_compressed(), "{format:?}");
+            assert_eq!(!other.contains(&required_feature(*format)), format.is_compressed(), "{format:?}");
         }
     }
 }

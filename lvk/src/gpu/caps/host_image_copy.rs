@@ -11,11 +11,11 @@ use crate::gpu::start::instance::Instance;
 const LAYOUT: vk::ImageLayout = vk::ImageLayout::READ_ONLY_OPTIMAL;
 
 /// The functions of the extension, where first contents go by them.
-pub(crate) struct HostCopies {
+pub(crate) struct HostImageCopy {
     device: ash::ext::host_image_copy::Device,
 }
 
-impl HostCopies {
+impl HostImageCopy {
     /// `None` where the device has none, where staging is the faster way, or where it does not write images in the layout that
     /// shaders sample.
     pub(crate) fn new(
@@ -24,7 +24,7 @@ impl HostCopies {
         physical: vk::PhysicalDevice,
         caps: &Capabilities,
     ) -> Option<Self> {
-        let is_wanted = caps.host_image_copy && written_layouts(instance, physical).contains(&LAYOUT);
+        let is_wanted = caps.host_image_copy && host_copy_layouts(instance, physical).contains(&LAYOUT);
         is_wanted.then(|| Self { device: ash::ext::host_image_copy::Device::new(&instance.raw, device) })
     }
 
@@ -33,7 +33,7 @@ impl HostCopies {
     /// # Safety
     /// The image is new, was made with [`vk::ImageUsageFlags::HOST_TRANSFER_EXT`], and `range` is all of it. The regions lie
     /// inside of it, do not overlap, and each points to as many bytes as it has.
-    pub(crate) unsafe fn fill(
+    pub(crate) unsafe fn write_image(
         &self,
         image: vk::Image,
         range: vk::ImageSubresourceRange,
@@ -91,7 +91,7 @@ impl Gpu {
 }
 
 /// Layouts in which the host writes images.
-fn written_layouts(instance: &Instance, physical: vk::PhysicalDevice) -> Vec<vk::ImageLayout> {
+fn host_copy_layouts(instance: &Instance, physical: vk::PhysicalDevice) -> Vec<vk::ImageLayout> {
     let mut count = vk::PhysicalDeviceHostImageCopyPropertiesEXT::default();
     let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut count);
     // SAFETY: the physical device belongs to the instance and has the extension; without arrays the counts are written.

@@ -19,21 +19,21 @@ struct ImageKind {
 }
 
 /// The limits of a kind, or why there are no such images.
-type Answer = Result<vk::ImageFormatProperties, vk::Result>;
+type ImageLimitsResult = Result<vk::ImageFormatProperties, vk::Result>;
 
 /// The answers so far.
-pub(crate) struct ImageLimits(RwLock<HashMap<ImageKind, Answer>>);
+pub(crate) struct ImageLimitCache(RwLock<HashMap<ImageKind, ImageLimitsResult>>);
 
-impl ImageLimits {
+impl ImageLimitCache {
     pub(crate) fn new() -> Self {
-        Self(RwLock::new(Rank::ImageLimits, HashMap::new()))
+        Self(RwLock::new(Rank::ImageLimitCache, HashMap::new()))
     }
 
-    fn get(&self, kind: ImageKind, ask: impl FnOnce() -> Answer) -> Answer {
+    fn get_or_query(&self, kind: ImageKind, query: impl FnOnce() -> ImageLimitsResult) -> ImageLimitsResult {
         let known = self.0.read().get(&kind).copied();
         known.unwrap_or_else(|| {
-            let answer = ask();
-            if lasts(&answer) {
+            let answer = query();
+            if is_permanent(&answer) {
                 self.0.write().insert(kind, answer);
             }
             answer
@@ -42,13 +42,13 @@ impl ImageLimits {
 }
 
 /// Whether the device will answer the same again: it may also have been short of memory.
-fn lasts(answer: &Answer) -> bool {
+fn is_permanent(answer: &ImageLimitsResult) -> bool {
     matches!(answer, Ok(_) | Err(vk::Result::ERROR_FORMAT_NOT_SUPPORTED))
 }
 
 impl Gpu {
     /// What the device allows for an image of this description, or the driver's refusal.
-    pub(crate) fn image_limits(&self, info: &vk::ImageCreateInfo<'_>) -> Answer {
+    pub(crate) fn image_limits(&self, info: &vk::ImageCreateInfo<'_>) -> ImageLimitsResult {
         let kind = ImageKind {
             format: info.format,
             ty: info.image_type,
@@ -56,7 +56,7 @@ impl Gpu {
             usage: info.usage,
             flags: info.flags,
         };
-        self.image_limits.get(kind, || {
+        self.image_limits.get_or_query(kind, || {
             let instance = &self.instance.raw;
             // SAFETY: the physical device belongs to the instance.
             unsafe {
@@ -100,15 +100,15 @@ mod tests {
     };
 
     /// What is known of each kind after each was asked for twice, and how often the device was.
-    fn ask_twice(kinds: &[ImageKind], answer: impl Fn(&ImageKind) -> Answer) -> (Vec<bool>, u32) {
-        let (limits, mut asked) = (ImageLimits::new(), 0);
+    fn ask_twice(kinds: &[ImageKind], answer: impl Fn(&ImageKind) -> ImageLimitsResult) -> (Vec<bool>, u32) {
+        let (limits, mut asked) = (ImageLimitCache::new(), 0);
         let mut get = |kind: &ImageKind| {
-            limits.get(*kind, || {
+            limits.get_or_query(*kind, || {
                 asked += 1;
                 answer(kind)
             })
         };
-        let size = |answer: Answer| answer.map(|limits| limits.max_resource_size);
+        let size = |answer: ImageLimitsResult| answer.map(|limits| limits.max_resource_size);
         let right =
             [kinds, kinds].concat().iter().map(|kind| size(get(kind)) == size(answer(kind))).collect();
         (right, asked)

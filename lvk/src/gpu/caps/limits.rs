@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use super::descriptor_limits::{DescriptorLimits, OtherDescriptors};
+use super::descriptor_limits::{DescriptorLimits, ReservedDescriptors};
 use super::mesh_limits::MeshLimits;
 use super::resolve_modes::{DepthResolveLimits, ResolveModes};
 use super::shading_rate::ShadingRateLimits;
@@ -120,14 +120,14 @@ pub struct Limits {
 
 impl Limits {
     /// As the device says them.
-    pub(crate) fn of(
+    pub(crate) fn from_properties(
         plain: &vk::PhysicalDeviceLimits,
         v12: &vk::PhysicalDeviceVulkan12Properties<'_>,
         v13: &vk::PhysicalDeviceVulkan13Properties<'_>,
         accel: &vk::PhysicalDeviceAccelerationStructurePropertiesKHR<'_>,
         pipeline: &vk::PhysicalDeviceRayTracingPipelinePropertiesKHR<'_>,
     ) -> Self {
-        let accel_bytes = accel_bytes(v12.driver_id, plain.max_storage_buffer_range, v13.max_buffer_size);
+        let accel_bytes = max_accel_bytes(v12.driver_id, plain.max_storage_buffer_range, v13.max_buffer_size);
         let mut limits = Self {
             max_lod_bias: plain.max_sampler_lod_bias,
             max_custom_borders: 0,
@@ -191,14 +191,14 @@ impl Limits {
     }
 
     /// Of structures the library builds itself; without any of the device's own they are the only ones.
-    pub(crate) fn allow_software(&mut self, beside_hardware: bool) {
+    pub(crate) fn enable_software_structures(&mut self, beside_hardware: bool) {
         if beside_hardware {
             return;
         }
         self.max_bindless_tlas = WANTED_TLAS;
-        self.max_blas_geometries = software::MOST_GEOMETRIES;
-        self.max_blas_primitives = software::MOST_PRIMITIVES;
-        self.max_tlas_instances = software::MOST_PRIMITIVES;
+        self.max_blas_geometries = software::MAX_GEOMETRIES;
+        self.max_blas_primitives = software::MAX_PRIMITIVES;
+        self.max_tlas_instances = software::MAX_PRIMITIVES;
         self.max_accel_structure_bytes = self.max_buffer_bytes;
         self.max_accel_scratch_bytes = self.max_buffer_bytes;
     }
@@ -206,13 +206,13 @@ impl Limits {
 
 /// Bounds of what references to nodes and leaves can name; see `accel::software::layout`.
 mod software {
-    pub(crate) const MOST_GEOMETRIES: u64 = 1 << 24;
-    pub(crate) const MOST_PRIMITIVES: u64 = 1 << 27;
+    pub(crate) const MAX_GEOMETRIES: u64 = 1 << 24;
+    pub(crate) const MAX_PRIMITIVES: u64 = 1 << 27;
 }
 
 /// Most bytes of an acceleration structure or of its scratch. Builds on Arm's own driver fail where either is beyond
 /// the range of a storage buffer, though Vulkan knows no such limit.
-fn accel_bytes(driver: vk::DriverId, storage_range: u32, buffer_bytes: u64) -> u64 {
+fn max_accel_bytes(driver: vk::DriverId, storage_range: u32, buffer_bytes: u64) -> u64 {
     if driver == vk::DriverId::ARM_PROPRIETARY {
         buffer_bytes.min(storage_range.into())
     } else {
@@ -229,11 +229,11 @@ fn size_bindless(
     limits.max_bindless_tlas = WANTED_TLAS
         .min(accel.max_per_stage_descriptor_update_after_bind_acceleration_structures)
         .min(accel.max_descriptor_set_update_after_bind_acceleration_structures);
-    let others = OtherDescriptors {
+    let others = ReservedDescriptors {
         in_set: limits.max_bindless_tlas + 1,
         targets: limits.max_color_targets + limits.max_input_attachments,
     };
-    let room = DescriptorLimits::of(v12).room(&others, 0);
+    let room = DescriptorLimits::from_properties(v12).budget(&others, 0);
     limits.max_bindless_samplers = room.samplers;
     limits.max_bindless_textures = room.textures;
 }
@@ -245,9 +245,9 @@ mod tests {
     #[test]
     fn only_arms_driver_bounds_structures_by_the_storage_range() {
         let (range, buffer) = (1 << 28, 1 << 40);
-        assert_eq!(accel_bytes(vk::DriverId::ARM_PROPRIETARY, range, buffer), 1 << 28);
-        assert_eq!(accel_bytes(vk::DriverId::ARM_PROPRIETARY, range, 1 << 20), 1 << 20);
-        assert_eq!(accel_bytes(vk::DriverId::NVIDIA_PROPRIETARY, range, buffer), buffer);
-        assert_eq!(accel_bytes(vk::DriverId::MESA_PANVK, range, buffer), buffer);
+        assert_eq!(max_accel_bytes(vk::DriverId::ARM_PROPRIETARY, range, buffer), 1 << 28);
+        assert_eq!(max_accel_bytes(vk::DriverId::ARM_PROPRIETARY, range, 1 << 20), 1 << 20);
+        assert_eq!(max_accel_bytes(vk::DriverId::NVIDIA_PROPRIETARY, range, buffer), buffer);
+        assert_eq!(max_accel_bytes(vk::DriverId::MESA_PANVK, range, buffer), buffer);
     }
 }

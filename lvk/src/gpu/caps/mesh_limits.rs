@@ -39,7 +39,7 @@ pub struct MeshLimits {
 
 impl MeshLimits {
     /// Those of `found`, which is all 0 unless the device was asked.
-    pub(crate) fn of(found: &vk::PhysicalDeviceMeshShaderPropertiesEXT<'_>) -> Self {
+    pub(crate) fn from_properties(found: &vk::PhysicalDeviceMeshShaderPropertiesEXT<'_>) -> Self {
         Self {
             max_task_groups: found.max_task_work_group_count,
             max_task_groups_total: found.max_task_work_group_total_count,

@@ -187,10 +187,10 @@ impl OptionalFeature {
 
     /// Its name in Vulkan: that of the member of a feature structure, or of the extension where that has no features.
     pub fn vulkan_name(self) -> &'static str {
-        self.row().name
+        self.table_row().name
     }
 
-    fn row(self) -> &'static Row {
+    fn table_row(self) -> &'static FeatureRow {
         &ROWS[self as usize]
     }
 
@@ -232,30 +232,30 @@ impl FeatureSet {
     }
 
     /// Those of `features` that are on and can be used without the others.
-    pub(crate) fn of(features: &Features) -> Self {
+    pub(crate) fn from_features(features: &Features) -> Self {
         let mut features = *features;
-        let on = ROWS.iter().filter(|row| *(row.place)(&mut features) == vk::TRUE);
-        on.map(|row| row.feature).collect::<Self>().whole()
+        let on = ROWS.iter().filter(|row| *(row.field)(&mut features) == vk::TRUE);
+        on.map(|row| row.feature).collect::<Self>().without_unmet_requirements()
     }
 
     /// Without those whose own requirement is not among them, which Vulkan forbids to turn on.
     #[must_use]
-    pub(crate) fn whole(self) -> Self {
+    pub(crate) fn without_unmet_requirements(self) -> Self {
         let orphans = REQUIREMENTS.into_iter().filter(|(_, needs)| !self.contains(*needs));
         self.without(orphans.map(|(feature, _)| feature).collect())
     }
 
     /// Copies those of the set that `found` has to `wanted`.
-    pub(crate) fn turn_on(self, wanted: &mut Features, found: &Features) {
+    pub(crate) fn enable(self, wanted: &mut Features, found: &Features) {
         let mut found = *found;
-        for row in self.iter().map(OptionalFeature::row) {
-            *(row.place)(wanted) = *(row.place)(&mut found);
+        for row in self.iter().map(OptionalFeature::table_row) {
+            *(row.field)(wanted) = *(row.field)(&mut found);
         }
     }
 
     /// The extensions of them, some several times.
     pub(crate) fn extensions(self) -> impl Iterator<Item = &'static CStr> {
-        self.iter().filter_map(|feature| feature.row().extension)
+        self.iter().filter_map(|feature| feature.table_row().extension)
     }
 }
 
@@ -291,94 +291,94 @@ const REQUIREMENTS: [(OptionalFeature, OptionalFeature); 9] = [
     (F::VariablePointers, F::VariablePointersStorageBuffer),
 ];
 
-struct Row {
+struct FeatureRow {
     feature: OptionalFeature,
     name: &'static str,
     extension: Option<&'static CStr>,
-    place: fn(&mut Features) -> &mut vk::Bool32,
+    field: fn(&mut Features) -> &mut vk::Bool32,
 }
 
 #[rustfmt::skip]
-const ROWS: [Row; 79] = [
-    Row { feature: F::FullDrawIndex, name: "fullDrawIndexUint32", extension: None, place: |f| &mut f.core.full_draw_index_uint32 },
-    Row { feature: F::CubeArrays, name: "imageCubeArray", extension: None, place: |f| &mut f.core.image_cube_array },
-    Row { feature: F::GeometryShader, name: "geometryShader", extension: None, place: |f| &mut f.core.geometry_shader },
-    Row { feature: F::TessellationShader, name: "tessellationShader", extension: None, place: |f| &mut f.core.tessellation_shader },
-    Row { feature: F::SampleRateShading, name: "sampleRateShading", extension: None, place: |f| &mut f.core.sample_rate_shading },
-    Row { feature: F::DualSourceBlend, name: "dualSrcBlend", extension: None, place: |f| &mut f.core.dual_src_blend },
-    Row { feature: F::MultiDrawIndirect, name: "multiDrawIndirect", extension: None, place: |f| &mut f.core.multi_draw_indirect },
-    Row { feature: F::DrawIndirectFirstInstance, name: "drawIndirectFirstInstance", extension: None, place: |f| &mut f.core.draw_indirect_first_instance },
-    Row { feature: F::DrawIndirectCount, name: "drawIndirectCount", extension: None, place: |f| &mut f.v12.draw_indirect_count },
-    Row { feature: F::DepthClamp, name: "depthClamp", extension: None, place: |f| &mut f.core.depth_clamp },
-    Row { feature: F::DepthBiasClamp, name: "depthBiasClamp", extension: None, place: |f| &mut f.core.depth_bias_clamp },
-    Row { feature: F::FillModeNonSolid, name: "fillModeNonSolid", extension: None, place: |f| &mut f.core.fill_mode_non_solid },
-    Row { feature: F::WideLines, name: "wideLines", extension: None, place: |f| &mut f.core.wide_lines },
-    Row { feature: F::LargePoints, name: "largePoints", extension: None, place: |f| &mut f.core.large_points },
-    Row { feature: F::SamplerAnisotropy, name: "samplerAnisotropy", extension: None, place: |f| &mut f.core.sampler_anisotropy },
-    Row { feature: F::TextureCompressionBc, name: "textureCompressionBC", extension: None, place: |f| &mut f.core.texture_compression_bc },
-    Row { feature: F::TextureCompressionEtc2, name: "textureCompressionETC2", extension: None, place: |f| &mut f.core.texture_compression_etc2 },
-    Row { feature: F::TextureCompressionAstcLdr, name: "textureCompressionASTC_LDR", extension: None, place: |f| &mut f.core.texture_compression_astc_ldr },
-    Row { feature: F::TextureCompressionAstcHdr, name: "textureCompressionASTC_HDR", extension: None, place: |f| &mut f.v13.texture_compression_astc_hdr },
-    Row { feature: F::OcclusionQueryPrecise, name: "occlusionQueryPrecise", extension: None, place: |f| &mut f.core.occlusion_query_precise },
-    Row { feature: F::PipelineStatisticsQuery, name: "pipelineStatisticsQuery", extension: None, place: |f| &mut f.core.pipeline_statistics_query },
-    Row { feature: F::VertexStoresAndAtomics, name: "vertexPipelineStoresAndAtomics", extension: None, place: |f| &mut f.core.vertex_pipeline_stores_and_atomics },
-    Row { feature: F::TessellationAndGeometryPointSize, name: "shaderTessellationAndGeometryPointSize", extension: None, place: |f| &mut f.core.shader_tessellation_and_geometry_point_size },
-    Row { feature: F::ImageGatherExtended, name: "shaderImageGatherExtended", extension: None, place: |f| &mut f.core.shader_image_gather_extended },
-    Row { feature: F::StorageImageExtendedFormats, name: "shaderStorageImageExtendedFormats", extension: None, place: |f| &mut f.core.shader_storage_image_extended_formats },
-    Row { feature: F::StorageImageMultisample, name: "shaderStorageImageMultisample", extension: None, place: |f| &mut f.core.shader_storage_image_multisample },
-    Row { feature: F::StorageImageReadWithoutFormat, name: "shaderStorageImageReadWithoutFormat", extension: None, place: |f| &mut f.core.shader_storage_image_read_without_format },
-    Row { feature: F::ClipDistance, name: "shaderClipDistance", extension: None, place: |f| &mut f.core.shader_clip_distance },
-    Row { feature: F::CullDistance, name: "shaderCullDistance", extension: None, place: |f| &mut f.core.shader_cull_distance },
-    Row { feature: F::Float64, name: "shaderFloat64", extension: None, place: |f| &mut f.core.shader_float64 },
-    Row { feature: F::Int64, name: "shaderInt64", extension: None, place: |f| &mut f.core.shader_int64 },
-    Row { feature: F::Int16, name: "shaderInt16", extension: None, place: |f| &mut f.core.shader_int16 },
-    Row { feature: F::Float16, name: "shaderFloat16", extension: None, place: |f| &mut f.v12.shader_float16 },
-    Row { feature: F::Int8, name: "shaderInt8", extension: None, place: |f| &mut f.v12.shader_int8 },
-    Row { feature: F::MinLod, name: "shaderResourceMinLod", extension: None, place: |f| &mut f.core.shader_resource_min_lod },
-    Row { feature: F::StorageBuffer16Bit, name: "storageBuffer16BitAccess", extension: None, place: |f| &mut f.v11.storage_buffer16_bit_access },
-    Row { feature: F::UniformBuffer16Bit, name: "uniformAndStorageBuffer16BitAccess", extension: None, place: |f| &mut f.v11.uniform_and_storage_buffer16_bit_access },
-    Row { feature: F::PushConstant16Bit, name: "storagePushConstant16", extension: None, place: |f| &mut f.v11.storage_push_constant16 },
-    Row { feature: F::InputOutput16Bit, name: "storageInputOutput16", extension: None, place: |f| &mut f.v11.storage_input_output16 },
-    Row { feature: F::StorageBuffer8Bit, name: "storageBuffer8BitAccess", extension: None, place: |f| &mut f.v12.storage_buffer8_bit_access },
-    Row { feature: F::UniformBuffer8Bit, name: "uniformAndStorageBuffer8BitAccess", extension: None, place: |f| &mut f.v12.uniform_and_storage_buffer8_bit_access },
-    Row { feature: F::PushConstant8Bit, name: "storagePushConstant8", extension: None, place: |f| &mut f.v12.storage_push_constant8 },
-    Row { feature: F::VariablePointersStorageBuffer, name: "variablePointersStorageBuffer", extension: None, place: |f| &mut f.v11.variable_pointers_storage_buffer },
-    Row { feature: F::VariablePointers, name: "variablePointers", extension: None, place: |f| &mut f.v11.variable_pointers },
-    Row { feature: F::DrawParameters, name: "shaderDrawParameters", extension: None, place: |f| &mut f.v11.shader_draw_parameters },
-    Row { feature: F::Multiview, name: "multiview", extension: None, place: |f| &mut f.v11.multiview },
-    Row { feature: F::MultiviewGeometry, name: "multiviewGeometryShader", extension: None, place: |f| &mut f.v11.multiview_geometry_shader },
-    Row { feature: F::MultiviewTessellation, name: "multiviewTessellationShader", extension: None, place: |f| &mut f.v11.multiview_tessellation_shader },
-    Row { feature: F::MultiviewMesh, name: "multiviewMeshShader", extension: Some(ash::ext::mesh_shader::NAME), place: |f| &mut f.ext.mesh.multiview_mesh_shader },
-    Row { feature: F::MeshShaderQueries, name: "meshShaderQueries", extension: Some(ash::ext::mesh_shader::NAME), place: |f| &mut f.ext.mesh.mesh_shader_queries },
-    Row { feature: F::YcbcrConversion, name: "samplerYcbcrConversion", extension: None, place: |f| &mut f.v11.sampler_ycbcr_conversion },
-    Row { feature: F::MirrorClampToEdge, name: "samplerMirrorClampToEdge", extension: None, place: |f| &mut f.v12.sampler_mirror_clamp_to_edge },
-    Row { feature: F::FilterMinMax, name: "samplerFilterMinmax", extension: None, place: |f| &mut f.v12.sampler_filter_minmax },
-    Row { feature: F::BufferInt64Atomics, name: "shaderBufferInt64Atomics", extension: None, place: |f| &mut f.v12.shader_buffer_int64_atomics },
-    Row { feature: F::SharedInt64Atomics, name: "shaderSharedInt64Atomics", extension: None, place: |f| &mut f.v12.shader_shared_int64_atomics },
-    Row { feature: F::ShaderOutputLayer, name: "shaderOutputLayer", extension: None, place: |f| &mut f.v12.shader_output_layer },
-    Row { feature: F::BufferFloatAtomics, name: "shaderBufferFloat32Atomics", extension: Some(ash::ext::shader_atomic_float::NAME), place: |f| &mut f.ext.float_atomics.shader_buffer_float32_atomics },
-    Row { feature: F::BufferFloatAtomicAdd, name: "shaderBufferFloat32AtomicAdd", extension: Some(ash::ext::shader_atomic_float::NAME), place: |f| &mut f.ext.float_atomics.shader_buffer_float32_atomic_add },
-    Row { feature: F::SharedFloatAtomics, name: "shaderSharedFloat32Atomics", extension: Some(ash::ext::shader_atomic_float::NAME), place: |f| &mut f.ext.float_atomics.shader_shared_float32_atomics },
-    Row { feature: F::SharedFloatAtomicAdd, name: "shaderSharedFloat32AtomicAdd", extension: Some(ash::ext::shader_atomic_float::NAME), place: |f| &mut f.ext.float_atomics.shader_shared_float32_atomic_add },
-    Row { feature: F::ImageFloatAtomics, name: "shaderImageFloat32Atomics", extension: Some(ash::ext::shader_atomic_float::NAME), place: |f| &mut f.ext.float_atomics.shader_image_float32_atomics },
-    Row { feature: F::ImageFloatAtomicAdd, name: "shaderImageFloat32AtomicAdd", extension: Some(ash::ext::shader_atomic_float::NAME), place: |f| &mut f.ext.float_atomics.shader_image_float32_atomic_add },
-    Row { feature: F::LocalRead, name: "dynamicRenderingLocalRead", extension: Some(ash::khr::dynamic_rendering_local_read::NAME), place: |f| &mut f.ext.local_read.dynamic_rendering_local_read },
-    Row { feature: F::PipelineShadingRate, name: "pipelineFragmentShadingRate", extension: Some(ash::khr::fragment_shading_rate::NAME), place: |f| &mut f.ext.shading_rate.pipeline_fragment_shading_rate },
-    Row { feature: F::PrimitiveShadingRate, name: "primitiveFragmentShadingRate", extension: Some(ash::khr::fragment_shading_rate::NAME), place: |f| &mut f.ext.shading_rate.primitive_fragment_shading_rate },
-    Row { feature: F::AttachmentShadingRate, name: "attachmentFragmentShadingRate", extension: Some(ash::khr::fragment_shading_rate::NAME), place: |f| &mut f.ext.shading_rate.attachment_fragment_shading_rate },
-    Row { feature: F::MeshPrimitiveShadingRate, name: "primitiveFragmentShadingRateMeshShader", extension: Some(ash::ext::mesh_shader::NAME), place: |f| &mut f.ext.mesh.primitive_fragment_shading_rate_mesh_shader },
-    Row { feature: F::Barycentrics, name: "fragmentShaderBarycentric", extension: Some(ash::khr::fragment_shader_barycentric::NAME), place: |f| &mut f.ext.barycentrics.fragment_shader_barycentric },
-    Row { feature: F::IndexTypeUint8, name: "indexTypeUint8", extension: Some(ash::khr::index_type_uint8::NAME), place: |f| &mut f.ext.index_uint8.index_type_uint8 },
-    Row { feature: F::CustomBorderColors, name: "customBorderColors", extension: Some(ash::ext::custom_border_color::NAME), place: |f| &mut f.ext.border_color.custom_border_colors },
-    Row { feature: F::CustomBorderColorWithoutFormat, name: "customBorderColorWithoutFormat", extension: Some(ash::ext::custom_border_color::NAME), place: |f| &mut f.ext.border_color.custom_border_color_without_format },
-    Row { feature: F::HostImageCopy, name: "hostImageCopy", extension: Some(ash::ext::host_image_copy::NAME), place: |f| &mut f.ext.host_image_copy.host_image_copy },
-    Row { feature: F::Maintenance5, name: "maintenance5", extension: Some(ash::khr::maintenance5::NAME), place: |f| &mut f.ext.maintenance5.maintenance5 },
-    Row { feature: F::CalibratedTimestamps, name: "VK_KHR_calibrated_timestamps", extension: None, place: |f| &mut f.ext.calibrated_timestamps },
-    Row { feature: F::MemoryBudget, name: "VK_EXT_memory_budget", extension: Some(ash::ext::memory_budget::NAME), place: |f| &mut f.ext.memory_budget },
-    Row { feature: F::DeviceFault, name: "deviceFault", extension: Some(ash::ext::device_fault::NAME), place: |f| &mut f.ext.fault.device_fault },
-    Row { feature: F::Swapchain, name: "VK_KHR_swapchain", extension: Some(ash::khr::swapchain::NAME), place: |f| &mut f.ext.swapchain },
-    Row { feature: F::SwapchainMaintenance1, name: "swapchainMaintenance1", extension: Some(ash::ext::swapchain_maintenance1::NAME), place: |f| &mut f.ext.swapchain_maintenance1.swapchain_maintenance1 },
-    Row { feature: F::HdrMetadata, name: "VK_EXT_hdr_metadata", extension: Some(ash::ext::hdr_metadata::NAME), place: |f| &mut f.ext.hdr_metadata },
+const ROWS: [FeatureRow; 79] = [
+    FeatureRow { feature: F::FullDrawIndex, name: "fullDrawIndexUint32", extension: None, field: |f| &mut f.core.full_draw_index_uint32 },
+    FeatureRow { feature: F::CubeArrays, name: "imageCubeArray", extension: None, field: |f| &mut f.core.image_cube_array },
+    FeatureRow { feature: F::GeometryShader, name: "geometryShader", extension: None, field: |f| &mut f.core.geometry_shader },
+    FeatureRow { feature: F::TessellationShader, name: "tessellationShader", extension: None, field: |f| &mut f.core.tessellation_shader },
+    FeatureRow { feature: F::SampleRateShading, name: "sampleRateShading", extension: None, field: |f| &mut f.core.sample_rate_shading },
+    FeatureRow { feature: F::DualSourceBlend, name: "dualSrcBlend", extension: None, field: |f| &mut f.core.dual_src_blend },
+    FeatureRow { feature: F::MultiDrawIndirect, name: "multiDrawIndirect", extension: None, field: |f| &mut f.core.multi_draw_indirect },
+    FeatureRow { feature: F::DrawIndirectFirstInstance, name: "drawIndirectFirstInstance", extension: None, field: |f| &mut f.core.draw_indirect_first_instance },
+    FeatureRow { feature: F::DrawIndirectCount, name: "drawIndirectCount", extension: None, field: |f| &mut f.v12.draw_indirect_count },
+    FeatureRow { feature: F::DepthClamp, name: "depthClamp", extension: None, field: |f| &mut f.core.depth_clamp },
+    FeatureRow { feature: F::DepthBiasClamp, name: "depthBiasClamp", extension: None, field: |f| &mut f.core.depth_bias_clamp },
+    FeatureRow { feature: F::FillModeNonSolid, name: "fillModeNonSolid", extension: None, field: |f| &mut f.core.fill_mode_non_solid },
+    FeatureRow { feature: F::WideLines, name: "wideLines", extension: None, field: |f| &mut f.core.wide_lines },
+    FeatureRow { feature: F::LargePoints, name: "largePoints", extension: None, field: |f| &mut f.core.large_points },
+    FeatureRow { feature: F::SamplerAnisotropy, name: "samplerAnisotropy", extension: None, field: |f| &mut f.core.sampler_anisotropy },
+    FeatureRow { feature: F::TextureCompressionBc, name: "textureCompressionBC", extension: None, field: |f| &mut f.core.texture_compression_bc },
+    FeatureRow { feature: F::TextureCompressionEtc2, name: "textureCompressionETC2", extension: None, field: |f| &mut f.core.texture_compression_etc2 },
+    FeatureRow { feature: F::TextureCompressionAstcLdr, name: "textureCompressionASTC_LDR", extension: None, field: |f| &mut f.core.texture_compression_astc_ldr },
+    FeatureRow { feature: F::TextureCompressionAstcHdr, name: "textureCompressionASTC_HDR", extension: None, field: |f| &mut f.v13.texture_compression_astc_hdr },
+    FeatureRow { feature: F::OcclusionQueryPrecise, name: "occlusionQueryPrecise", extension: None, field: |f| &mut f.core.occlusion_query_precise },
+    FeatureRow { feature: F::PipelineStatisticsQuery, name: "pipelineStatisticsQuery", extension: None, field: |f| &mut f.core.pipeline_statistics_query },
+    FeatureRow { feature: F::VertexStoresAndAtomics, name: "vertexPipelineStoresAndAtomics", extension: None, field: |f| &mut f.core.vertex_pipeline_stores_and_atomics },
+    FeatureRow { feature: F::TessellationAndGeometryPointSize, name: "shaderTessellationAndGeometryPointSize", extension: None, field: |f| &mut f.core.shader_tessellation_and_geometry_point_size },
+    FeatureRow { feature: F::ImageGatherExtended, name: "shaderImageGatherExtended", extension: None, field: |f| &mut f.core.shader_image_gather_extended },
+    FeatureRow { feature: F::StorageImageExtendedFormats, name: "shaderStorageImageExtendedFormats", extension: None, field: |f| &mut f.core.shader_storage_image_extended_formats },
+    FeatureRow { feature: F::StorageImageMultisample, name: "shaderStorageImageMultisample", extension: None, field: |f| &mut f.core.shader_storage_image_multisample },
+    FeatureRow { feature: F::StorageImageReadWithoutFormat, name: "shaderStorageImageReadWithoutFormat", extension: None, field: |f| &mut f.core.shader_storage_image_read_without_format },
+    FeatureRow { feature: F::ClipDistance, name: "shaderClipDistance", extension: None, field: |f| &mut f.core.shader_clip_distance },
+    FeatureRow { feature: F::CullDistance, name: "shaderCullDistance", extension: None, field: |f| &mut f.core.shader_cull_distance },
+    FeatureRow { feature: F::Float64, name: "shaderFloat64", extension: None, field: |f| &mut f.core.shader_float64 },
+    FeatureRow { feature: F::Int64, name: "shaderInt64", extension: None, field: |f| &mut f.core.shader_int64 },
+    FeatureRow { feature: F::Int16, name: "shaderInt16", extension: None, field: |f| &mut f.core.shader_int16 },
+    FeatureRow { feature: F::Float16, name: "shaderFloat16", extension: None, field: |f| &mut f.v12.shader_float16 },
+    FeatureRow { feature: F::Int8, name: "shaderInt8", extension: None, field: |f| &mut f.v12.shader_int8 },
+    FeatureRow { feature: F::MinLod, name: "shaderResourceMinLod", extension: None, field: |f| &mut f.core.shader_resource_min_lod },
+    FeatureRow { feature: F::StorageBuffer16Bit, name: "storageBuffer16BitAccess", extension: None, field: |f| &mut f.v11.storage_buffer16_bit_access },
+    FeatureRow { feature: F::UniformBuffer16Bit, name: "uniformAndStorageBuffer16BitAccess", extension: None, field: |f| &mut f.v11.uniform_and_storage_buffer16_bit_access },
+    FeatureRow { feature: F::PushConstant16Bit, name: "storagePushConstant16", extension: None, field: |f| &mut f.v11.storage_push_constant16 },
+    FeatureRow { feature: F::InputOutput16Bit, name: "storageInputOutput16", extension: None, field: |f| &mut f.v11.storage_input_output16 },
+    FeatureRow { feature: F::StorageBuffer8Bit, name: "storageBuffer8BitAccess", extension: None, field: |f| &mut f.v12.storage_buffer8_bit_access },
+    FeatureRow { feature: F::UniformBuffer8Bit, name: "uniformAndStorageBuffer8BitAccess", extension: None, field: |f| &mut f.v12.uniform_and_storage_buffer8_bit_access },
+    FeatureRow { feature: F::PushConstant8Bit, name: "storagePushConstant8", extension: None, field: |f| &mut f.v12.storage_push_constant8 },
+    FeatureRow { feature: F::VariablePointersStorageBuffer, name: "variablePointersStorageBuffer", extension: None, field: |f| &mut f.v11.variable_pointers_storage_buffer },
+    FeatureRow { feature: F::VariablePointers, name: "variablePointers", extension: None, field: |f| &mut f.v11.variable_pointers },
+    FeatureRow { feature: F::DrawParameters, name: "shaderDrawParameters", extension: None, field: |f| &mut f.v11.shader_draw_parameters },
+    FeatureRow { feature: F::Multiview, name: "multiview", extension: None, field: |f| &mut f.v11.multiview },
+    FeatureRow { feature: F::MultiviewGeometry, name: "multiviewGeometryShader", extension: None, field: |f| &mut f.v11.multiview_geometry_shader },
+    FeatureRow { feature: F::MultiviewTessellation, name: "multiviewTessellationShader", extension: None, field: |f| &mut f.v11.multiview_tessellation_shader },
+    FeatureRow { feature: F::MultiviewMesh, name: "multiviewMeshShader", extension: Some(ash::ext::mesh_shader::NAME), field: |f| &mut f.ext.mesh.multiview_mesh_shader },
+    FeatureRow { feature: F::MeshShaderQueries, name: "meshShaderQueries", extension: Some(ash::ext::mesh_shader::NAME), field: |f| &mut f.ext.mesh.mesh_shader_queries },
+    FeatureRow { feature: F::YcbcrConversion, name: "samplerYcbcrConversion", extension: None, field: |f| &mut f.v11.sampler_ycbcr_conversion },
+    FeatureRow { feature: F::MirrorClampToEdge, name: "samplerMirrorClampToEdge", extension: None, field: |f| &mut f.v12.sampler_mirror_clamp_to_edge },
+    FeatureRow { feature: F::FilterMinMax, name: "samplerFilterMinmax", extension: None, field: |f| &mut f.v12.sampler_filter_minmax },
+    FeatureRow { feature: F::BufferInt64Atomics, name: "shaderBufferInt64Atomics", extension: None, field: |f| &mut f.v12.shader_buffer_int64_atomics },
+    FeatureRow { feature: F::SharedInt64Atomics, name: "shaderSharedInt64Atomics", extension: None, field: |f| &mut f.v12.shader_shared_int64_atomics },
+    FeatureRow { feature: F::ShaderOutputLayer, name: "shaderOutputLayer", extension: None, field: |f| &mut f.v12.shader_output_layer },
+    FeatureRow { feature: F::BufferFloatAtomics, name: "shaderBufferFloat32Atomics", extension: Some(ash::ext::shader_atomic_float::NAME), field: |f| &mut f.ext.float_atomics.shader_buffer_float32_atomics },
+    FeatureRow { feature: F::BufferFloatAtomicAdd, name: "shaderBufferFloat32AtomicAdd", extension: Some(ash::ext::shader_atomic_float::NAME), field: |f| &mut f.ext.float_atomics.shader_buffer_float32_atomic_add },
+    FeatureRow { feature: F::SharedFloatAtomics, name: "shaderSharedFloat32Atomics", extension: Some(ash::ext::shader_atomic_float::NAME), field: |f| &mut f.ext.float_atomics.shader_shared_float32_atomics },
+    FeatureRow { feature: F::SharedFloatAtomicAdd, name: "shaderSharedFloat32AtomicAdd", extension: Some(ash::ext::shader_atomic_float::NAME), field: |f| &mut f.ext.float_atomics.shader_shared_float32_atomic_add },
+    FeatureRow { feature: F::ImageFloatAtomics, name: "shaderImageFloat32Atomics", extension: Some(ash::ext::shader_atomic_float::NAME), field: |f| &mut f.ext.float_atomics.shader_image_float32_atomics },
+    FeatureRow { feature: F::ImageFloatAtomicAdd, name: "shaderImageFloat32AtomicAdd", extension: Some(ash::ext::shader_atomic_float::NAME), field: |f| &mut f.ext.float_atomics.shader_image_float32_atomic_add },
+    FeatureRow { feature: F::LocalRead, name: "dynamicRenderingLocalRead", extension: Some(ash::khr::dynamic_rendering_local_read::NAME), field: |f| &mut f.ext.local_read.dynamic_rendering_local_read },
+    FeatureRow { feature: F::PipelineShadingRate, name: "pipelineFragmentShadingRate", extension: Some(ash::khr::fragment_shading_rate::NAME), field: |f| &mut f.ext.shading_rate.pipeline_fragment_shading_rate },
+    FeatureRow { feature: F::PrimitiveShadingRate, name: "primitiveFragmentShadingRate", extension: Some(ash::khr::fragment_shading_rate::NAME), field: |f| &mut f.ext.shading_rate.primitive_fragment_shading_rate },
+    FeatureRow { feature: F::AttachmentShadingRate, name: "attachmentFragmentShadingRate", extension: Some(ash::khr::fragment_shading_rate::NAME), field: |f| &mut f.ext.shading_rate.attachment_fragment_shading_rate },
+    FeatureRow { feature: F::MeshPrimitiveShadingRate, name: "primitiveFragmentShadingRateMeshShader", extension: Some(ash::ext::mesh_shader::NAME), field: |f| &mut f.ext.mesh.primitive_fragment_shading_rate_mesh_shader },
+    FeatureRow { feature: F::Barycentrics, name: "fragmentShaderBarycentric", extension: Some(ash::khr::fragment_shader_barycentric::NAME), field: |f| &mut f.ext.barycentrics.fragment_shader_barycentric },
+    FeatureRow { feature: F::IndexTypeUint8, name: "indexTypeUint8", extension: Some(ash::khr::index_type_uint8::NAME), field: |f| &mut f.ext.index_uint8.index_type_uint8 },
+    FeatureRow { feature: F::CustomBorderColors, name: "customBorderColors", extension: Some(ash::ext::custom_border_color::NAME), field: |f| &mut f.ext.border_color.custom_border_colors },
+    FeatureRow { feature: F::CustomBorderColorWithoutFormat, name: "customBorderColorWithoutFormat", extension: Some(ash::ext::custom_border_color::NAME), field: |f| &mut f.ext.border_color.custom_border_color_without_format },
+    FeatureRow { feature: F::HostImageCopy, name: "hostImageCopy", extension: Some(ash::ext::host_image_copy::NAME), field: |f| &mut f.ext.host_image_copy.host_image_copy },
+    FeatureRow { feature: F::Maintenance5, name: "maintenance5", extension: Some(ash::khr::maintenance5::NAME), field: |f| &mut f.ext.maintenance5.maintenance5 },
+    FeatureRow { feature: F::CalibratedTimestamps, name: "VK_KHR_calibrated_timestamps", extension: None, field: |f| &mut f.ext.calibrated_timestamps },
+    FeatureRow { feature: F::MemoryBudget, name: "VK_EXT_memory_budget", extension: Some(ash::ext::memory_budget::NAME), field: |f| &mut f.ext.memory_budget },
+    FeatureRow { feature: F::DeviceFault, name: "deviceFault", extension: Some(ash::ext::device_fault::NAME), field: |f| &mut f.ext.fault.device_fault },
+    FeatureRow { feature: F::Swapchain, name: "VK_KHR_swapchain", extension: Some(ash::khr::swapchain::NAME), field: |f| &mut f.ext.swapchain },
+    FeatureRow { feature: F::SwapchainMaintenance1, name: "swapchainMaintenance1", extension: Some(ash::ext::swapchain_maintenance1::NAME), field: |f| &mut f.ext.swapchain_maintenance1.swapchain_maintenance1 },
+    FeatureRow { feature: F::HdrMetadata, name: "VK_EXT_hdr_metadata", extension: Some(ash::ext::hdr_metadata::NAME), field: |f| &mut f.ext.hdr_metadata },
 ];
 
 #[cfg(test)]
@@ -399,10 +399,10 @@ mod tests {
     fn each_row_has_a_place_and_a_name_of_its_own() {
         for row in &ROWS {
             let mut features = Features::default();
-            *(row.place)(&mut features) = vk::TRUE;
+            *(row.field)(&mut features) = vk::TRUE;
             for other in &ROWS {
                 let same = row.feature == other.feature;
-                assert_eq!(*(other.place)(&mut features) == vk::TRUE, same, "{} {}", row.name, other.name);
+                assert_eq!(*(other.field)(&mut features) == vk::TRUE, same, "{} {}", row.name, other.name);
                 assert_eq!(row.name == other.name, same);
             }
         }
@@ -411,9 +411,9 @@ mod tests {
     #[test]
     fn a_feature_is_not_on_without_what_it_needs() {
         let queries = FeatureSet::NONE.with(F::MeshShaderQueries);
-        assert_eq!(queries.whole(), FeatureSet::NONE);
+        assert_eq!(queries.without_unmet_requirements(), FeatureSet::NONE);
         let both = queries.with(F::PipelineStatisticsQuery);
-        assert_eq!(both.whole(), both);
+        assert_eq!(both.without_unmet_requirements(), both);
     }
 
     proptest! {
@@ -421,14 +421,14 @@ mod tests {
         fn what_is_on_is_found_and_in_the_set(found in any::<u128>(), set in any::<u128>()) {
             let (found, set) = (FeatureSet(found), FeatureSet(set));
             let mut device = Features::default();
-            for row in found.iter().map(OptionalFeature::row) {
-                *(row.place)(&mut device) = vk::TRUE;
+            for row in found.iter().map(OptionalFeature::table_row) {
+                *(row.field)(&mut device) = vk::TRUE;
             }
             let mut wanted = Features::default();
-            set.whole().turn_on(&mut wanted, &device);
+            set.without_unmet_requirements().enable(&mut wanted, &device);
             for feature in OptionalFeature::all() {
-                let on = *(feature.row().place)(&mut wanted) == vk::TRUE;
-                prop_assert_eq!(on, found.contains(feature) && set.whole().contains(feature));
+                let on = *(feature.table_row().field)(&mut wanted) == vk::TRUE;
+                prop_assert_eq!(on, found.contains(feature) && set.without_unmet_requirements().contains(feature));
             }
         }
     }

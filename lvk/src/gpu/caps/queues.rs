@@ -27,7 +27,7 @@ impl Queue {
     }
 
     /// As messages say it.
-    pub(crate) fn words(self) -> &'static str {
+    pub(crate) fn label(self) -> &'static str {
         match self {
             Self::Graphics => "graphics",
             Self::Compute => "compute",
@@ -50,7 +50,7 @@ pub enum QueueRequest {
 }
 
 /// What counts of timestamps of several queues, which have so many bits each: the bits that all have that have any.
-pub(crate) fn shared_ticks(bits: [u32; 3]) -> u64 {
+pub(crate) fn shared_timestamp_bits(bits: [u32; 3]) -> u64 {
     let least = bits.into_iter().filter(|bits| *bits > 0).min().unwrap_or(1);
     u64::MAX >> (64 - least.min(64))
 }
@@ -80,7 +80,7 @@ pub(crate) struct QueueFamily {
 
 /// A queue of the device.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct QueuePlace {
+pub(crate) struct QueueLocation {
     pub(crate) family: u32,
     pub(crate) index: u32,
 }
@@ -103,16 +103,16 @@ pub(crate) fn queue_families(instance: &ash::Instance, raw: vk::PhysicalDevice) 
 
 /// A queue of the device for each of the library's, where `graphics` is the family for everything. Families that can do
 /// least else come first; then further queues of the families in use; then the graphics queue itself.
-pub(crate) fn place_queues(families: &[QueueFamily], graphics: u32) -> [QueuePlace; 3] {
+pub(crate) fn locate_queues(families: &[QueueFamily], graphics: u32) -> [QueueLocation; 3] {
     use vk::QueueFlags as Flags;
-    let first = QueuePlace { family: graphics, index: 0 };
+    let first = QueueLocation { family: graphics, index: 0 };
     let find = |fits: &dyn Fn(Flags) -> bool| {
         let found = families.iter().position(|family| family.count > 0 && fits(family.flags));
-        found.map(|family| QueuePlace { family: family as u32, index: 0 })
+        found.map(|family| QueueLocation { family: family as u32, index: 0 })
     };
     let spare = |family: u32, index: u32| {
         let count = families.get(family as usize).map_or(0, |family| family.count);
-        (index < count).then_some(QueuePlace { family, index })
+        (index < count).then_some(QueueLocation { family, index })
     };
     let compute = find(&|flags| flags.contains(Flags::COMPUTE) && !flags.contains(Flags::GRAPHICS));
     let compute = compute.or_else(|| spare(graphics, 1)).unwrap_or(first);
@@ -123,7 +123,7 @@ pub(crate) fn place_queues(families: &[QueueFamily], graphics: u32) -> [QueuePla
 }
 
 /// What is told of queues at these places.
-pub(crate) fn describe_queues(families: &[QueueFamily], places: &[QueuePlace; 3]) -> [QueueInfo; 3] {
+pub(crate) fn describe_queues(families: &[QueueFamily], places: &[QueueLocation; 3]) -> [QueueInfo; 3] {
     let info = |queue: Queue| {
         let place = places[queue.index()];
         let alone = places.iter().filter(|other| **other == place).count() == 1;
@@ -140,14 +140,14 @@ pub(crate) fn describe_queues(families: &[QueueFamily], places: &[QueuePlace; 3]
 
 /// The queues of a device that are in use.
 ///
-/// Command buffers that are kept in one order run in a *lane*: lane 0 is that of the graphics queue, and a queue that is kept
-/// apart has the lane of its own number.
+/// Command buffers that are kept in one order run in a *queue*: queue 0 is that of the graphics queue, and a queue that is kept
+/// apart has the queue of its own number.
 pub(crate) struct Queues {
     raw: Vec<Mutex<vk::Queue>>,
-    /// Which of `raw` each lane submits to.
+    /// Which of `raw` each queue submits to.
     places: [usize; 3],
     families: [u32; 3],
-    /// Whether a queue has a lane of its own.
+    /// Whether a queue has a queue of its own.
     apart: [bool; 3],
     rehearsed: bool,
     /// Each once.
@@ -167,7 +167,8 @@ impl Queues {
         });
         let families = raw.map(|(_, family)| family);
         let rehearsed = request == QueueRequest::Emulated;
-        let apart = [0, 1, 2].map(|lane: usize| lane > 0 && (rehearsed || places[lane] != places[0]));
+        let apart = [0, 1, 2]
+            .map(|queue_index: usize| queue_index > 0 && (rehearsed || places[queue_index] != places[0]));
         let mut distinct = families.to_vec();
         distinct.sort_unstable();
         distinct.dedup();
@@ -175,24 +176,24 @@ impl Queues {
         Self { raw, places, families, apart, rehearsed, distinct }
     }
 
-    /// The lane of a queue.
-    pub(crate) fn lane(&self, queue: Queue) -> usize {
+    /// The queue of a queue.
+    pub(crate) fn queue_index(&self, queue: Queue) -> usize {
         if self.apart[queue.index()] { queue.index() } else { 0 }
     }
 
-    /// Whether there is more than one lane.
-    pub(crate) fn several_lanes(&self) -> bool {
+    /// Whether there is more than one queue.
+    pub(crate) fn has_several(&self) -> bool {
         self.apart.contains(&true)
     }
 
-    /// The device's queue of a lane; Vulkan wants one thread at a time on it.
-    pub(crate) fn raw(&self, lane: usize) -> Guard<'_, vk::Queue> {
-        self.raw[self.places[lane]].lock()
+    /// The device's queue of a queue; Vulkan wants one thread at a time on it.
+    pub(crate) fn raw(&self, queue_index: usize) -> Guard<'_, vk::Queue> {
+        self.raw[self.places[queue_index]].lock()
     }
 
-    /// The family of a lane.
-    pub(crate) fn family(&self, lane: usize) -> u32 {
-        self.families[lane]
+    /// The family of a queue.
+    pub(crate) fn family(&self, queue_index: usize) -> u32 {
+        self.families[queue_index]
     }
 
     /// All families in use, each once.
@@ -200,14 +201,14 @@ impl Queues {
         &self.distinct
     }
 
-    /// Lanes of one domain own images together.
-    pub(crate) fn domain(&self, lane: usize) -> u32 {
-        if self.rehearsed { lane as u32 } else { self.families[lane] }
+    /// Queues of one domain own images together.
+    pub(crate) fn domain(&self, queue_index: usize) -> u32 {
+        if self.rehearsed { queue_index as u32 } else { self.families[queue_index] }
     }
 
-    /// Whether images can belong to one lane and not to another.
-    pub(crate) fn has_domains(&self) -> bool {
-        (1..3).any(|lane| self.apart[lane] && self.domain(lane) != self.domain(0))
+    /// Whether images can belong to one queue and not to another.
+    pub(crate) fn has_several_domains(&self) -> bool {
+        (1..3).any(|queue_index| self.apart[queue_index] && self.domain(queue_index) != self.domain(0))
     }
 }
 
@@ -230,7 +231,7 @@ mod tests {
             copy_granularity: [1; 3],
         };
         let families: Vec<_> = list.iter().map(family).collect();
-        place_queues(&families, graphics).map(|place| (place.family, place.index))
+        locate_queues(&families, graphics).map(|place| (place.family, place.index))
     }
 
     #[test]
@@ -254,7 +255,7 @@ mod tests {
     #[test]
     fn own_hardware_is_shared_with_nobody() {
         let own = |places: [u32; 3]| {
-            let places = places.map(|index| QueuePlace { family: 0, index });
+            let places = places.map(|index| QueueLocation { family: 0, index });
             describe_queues(&[], &places).map(|info| info.own_hardware)
         };
         assert_eq!(own([0, 1, 2]), [true; 3]);
@@ -264,9 +265,9 @@ mod tests {
 
     #[test]
     fn timestamps_are_compared_in_the_bits_that_all_have() {
-        assert_eq!(shared_ticks([64, 64, 64]), u64::MAX);
-        assert_eq!(shared_ticks([64, 36, 0]), (1 << 36) - 1);
-        assert_eq!(shared_ticks([32, 64, 48]), u64::from(u32::MAX));
+        assert_eq!(shared_timestamp_bits([64, 64, 64]), u64::MAX);
+        assert_eq!(shared_timestamp_bits([64, 36, 0]), (1 << 36) - 1);
+        assert_eq!(shared_timestamp_bits([32, 64, 48]), u64::from(u32::MAX));
     }
 
     #[test]
@@ -274,15 +275,19 @@ mod tests {
         let raw = |number: u64, family| (vk::Queue::from_raw(number), family);
         let one = [raw(1, 0); 3];
         let three = [raw(1, 0), raw(2, 4), raw(3, 2)];
-        let lanes = |raw, request| {
+        let queues = |raw, request| {
             let queues = Queues::new(raw, request);
-            (Queue::ALL.map(|queue| queues.lane(queue)), queues.has_domains(), queues.families().to_vec())
+            (
+                Queue::ALL.map(|queue| queues.queue_index(queue)),
+                queues.has_several_domains(),
+                queues.families().to_vec(),
+            )
         };
-        assert_eq!(lanes(one, QueueRequest::OwnHardware), ([0; 3], false, vec![0]));
-        assert_eq!(lanes(one, QueueRequest::Emulated), ([0, 1, 2], true, vec![0]));
-        assert_eq!(lanes(three, QueueRequest::OwnHardware), ([0, 1, 2], true, vec![0, 2, 4]));
-        assert_eq!(lanes(three, QueueRequest::Shared), ([0; 3], false, vec![0]));
+        assert_eq!(queues(one, QueueRequest::OwnHardware), ([0; 3], false, vec![0]));
+        assert_eq!(queues(one, QueueRequest::Emulated), ([0, 1, 2], true, vec![0]));
+        assert_eq!(queues(three, QueueRequest::OwnHardware), ([0, 1, 2], true, vec![0, 2, 4]));
+        assert_eq!(queues(three, QueueRequest::Shared), ([0; 3], false, vec![0]));
         let one_family = [raw(1, 0), raw(2, 0), raw(1, 0)];
-        assert_eq!(lanes(one_family, QueueRequest::OwnHardware), ([0, 1, 0], false, vec![0]));
+        assert_eq!(queues(one_family, QueueRequest::OwnHardware), ([0, 1, 0], false, vec![0]));
     }
 }

@@ -59,7 +59,7 @@ impl RayQueryRequest {
             Self::Software => (Software, "software was asked for"),
             Self::Auto if !has => (Software, "the device has no ray queries of its own"),
             Self::Auto if is_cpu => {
-                (Software, "the device is a CPU, on which the library's own walk is faster")
+                (Software, "the device is a CPU, on which the library's own traversal is faster")
             }
             Self::Auto => (Hardware, "the device has ray queries"),
             Self::Hardware | Self::HardwareIfPresent if has => (Hardware, "hardware was asked for"),

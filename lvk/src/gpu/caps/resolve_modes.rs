@@ -58,7 +58,7 @@ pub struct DepthResolveLimits {
 
 impl DepthResolveLimits {
     /// Whether the device resolves a target with both parts this way.
-    pub(crate) fn allow(&self, depth: Option<ResolveMode>, stencil: Option<ResolveMode>) -> bool {
+    pub(crate) fn supports(&self, depth: Option<ResolveMode>, stencil: Option<ResolveMode>) -> bool {
         let known = |mode: Option<ResolveMode>, modes: ResolveModes| {
             mode.is_none_or(|mode| modes.contains(mode.bit()))
         };
@@ -104,7 +104,7 @@ mod tests {
             (Some(Min), zero, [false, false, true]),
             (zero, Some(Min), [false, false, false]),
         ] {
-            let found = [plain, alone, different].map(|limits| limits.allow(depth, stencil));
+            let found = [plain, alone, different].map(|limits| limits.supports(depth, stencil));
             assert_eq!(found, expected, "{depth:?} {stencil:?}");
         }
     }

@@ -55,24 +55,24 @@ pub struct ShadingRate {
 
 impl Default for ShadingRate {
     fn default() -> Self {
-        Self::of([1, 1])
+        Self::new([1, 1])
     }
 }
 
 impl ShadingRate {
     /// Fragments of this size, whatever primitives and attachments say.
-    pub const fn of(size: [u32; 2]) -> Self {
+    pub const fn new(size: [u32; 2]) -> Self {
         Self { size, primitive: ShadingRateCombiner::Keep, attachment: ShadingRateCombiner::Keep }
     }
 
     /// Fragments of the sizes that the pass's attachment says.
     pub const fn by_attachment() -> Self {
-        Self { attachment: ShadingRateCombiner::Replace, ..Self::of([1, 1]) }
+        Self { attachment: ShadingRateCombiner::Replace, ..Self::new([1, 1]) }
     }
 
     /// Fragments of the sizes that primitives say.
     pub const fn by_primitive() -> Self {
-        Self { primitive: ShadingRateCombiner::Replace, ..Self::of([1, 1]) }
+        Self { primitive: ShadingRateCombiner::Replace, ..Self::new([1, 1]) }
     }
 
     /// A texel of an attachment, and a `gl_PrimitiveShadingRateEXT`, that stands for this size; `None` for sides other than 1,
@@ -130,7 +130,7 @@ pub struct ShadingRateLimits {
 }
 
 impl ShadingRateLimits {
-    pub(crate) fn of(raw: &vk::PhysicalDeviceFragmentShadingRatePropertiesKHR<'_>) -> Self {
+    pub(crate) fn from_properties(raw: &vk::PhysicalDeviceFragmentShadingRatePropertiesKHR<'_>) -> Self {
         let size = |extent: vk::Extent2D| [extent.width, extent.height];
         Self {
             max_size: size(raw.max_fragment_size),
@@ -163,7 +163,7 @@ impl ShadingRateLimits {
 
 /// Why a rate cannot be.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum Refusal {
+enum ShadingRateError {
     /// Nowhere.
     Wrong(String),
     /// Not here.
@@ -171,22 +171,27 @@ enum Refusal {
 }
 
 /// Fails unless the device has the rate's size for so many samples, and puts rates together this way.
-fn check(rate: &ShadingRate, samples: u32, sizes: &[FragmentSize], combines: bool) -> Result<(), Refusal> {
+fn check_rate(
+    rate: &ShadingRate,
+    samples: u32,
+    sizes: &[FragmentSize],
+    combines: bool,
+) -> Result<(), ShadingRateError> {
     if ShadingRate::texel(rate.size).is_none() {
         let message = format!("fragments are 1, 2 or 4 pixels wide and high, not {:?}", rate.size);
-        return Err(Refusal::Wrong(message));
+        return Err(ShadingRateError::Wrong(message));
     }
     let fits = |known: &&FragmentSize| known.samples & samples != 0 || known.size == [1, 1];
     let there: Vec<[u32; 2]> = sizes.iter().filter(fits).map(|known| known.size).collect();
     if rate.size != [1, 1] && !there.contains(&rate.size) {
-        return Err(Refusal::Lacks(format!("with {samples} samples a pixel it has {there:?}")));
+        return Err(ShadingRateError::Lacks(format!("with {samples} samples a pixel it has {there:?}")));
     }
     let simple =
         |by: ShadingRateCombiner| matches!(by, ShadingRateCombiner::Keep | ShadingRateCombiner::Replace);
     if combines || [rate.primitive, rate.attachment].into_iter().all(simple) {
         return Ok(());
     }
-    Err(Refusal::Lacks(
+    Err(ShadingRateError::Lacks(
         "it only keeps or replaces rates (fragmentShadingRateNonTrivialCombinerOps)".to_owned(),
     ))
 }
@@ -209,12 +214,12 @@ impl ShadingRates {
             return None;
         }
         let functions = ash::khr::fragment_shading_rate::Device::new(&instance.raw, device);
-        Some(Self { functions, sizes: sizes(instance, physical) })
+        Some(Self { functions, sizes: query_sizes(instance, physical) })
     }
 }
 
 /// None where the driver does not answer.
-fn sizes(instance: &Instance, physical: vk::PhysicalDevice) -> Vec<FragmentSize> {
+fn query_sizes(instance: &Instance, physical: vk::PhysicalDevice) -> Vec<FragmentSize> {
     let functions = ash::khr::fragment_shading_rate::Instance::new(&instance.entry, &instance.raw);
     let ask = functions.fp().get_physical_device_fragment_shading_rates_khr;
     let mut count = 0;
@@ -248,10 +253,10 @@ impl Gpu {
             self.require(OptionalFeature::AttachmentShadingRate, &format!("the attachment in {what}"))?;
         }
         let sizes = self.shading_rates.as_ref().map_or(&[][..], |rates| &rates.sizes);
-        match check(rate, samples, sizes, self.caps.limits.shading_rate.combines) {
+        match check_rate(rate, samples, sizes, self.caps.limits.shading_rate.combines) {
             Ok(()) => Ok(()),
-            Err(Refusal::Wrong(message)) => Err(Error::usage(name, message)),
-            Err(Refusal::Lacks(why)) => {
+            Err(ShadingRateError::Wrong(message)) => Err(Error::usage(name, message)),
+            Err(ShadingRateError::Lacks(why)) => {
                 Err(Error::unsupported(what, format!("the device '{}': {why}", self.caps.device_name)))
             }
         }
@@ -284,15 +289,19 @@ mod tests {
 
     #[test]
     fn sizes_are_those_of_the_device_for_the_samples() {
-        let of = |size, samples| check(&ShadingRate::of(size), samples, &SIZES, true);
+        let of = |size, samples| check_rate(&ShadingRate::new(size), samples, &SIZES, true);
         assert_eq!(of([4, 4], 1), Ok(()));
         assert_eq!(of([2, 2], 4), Ok(()));
         assert_eq!(of([1, 1], 64), Ok(()));
         let lacks = "with 4 samples a pixel it has [[2, 2], [1, 2], [1, 1]]".to_owned();
-        assert_eq!(of([4, 4], 4), Err(Refusal::Lacks(lacks)));
-        assert!(matches!(of([2, 1], 1), Err(Refusal::Lacks(_))));
-        assert!(matches!(of([3, 1], 1), Err(Refusal::Wrong(why)) if why.ends_with("not [3, 1]")));
-        assert_eq!(check(&ShadingRate::default(), 1, &[], false), Ok(()), "single pixels are everywhere");
+        assert_eq!(of([4, 4], 4), Err(ShadingRateError::Lacks(lacks)));
+        assert!(matches!(of([2, 1], 1), Err(ShadingRateError::Lacks(_))));
+        assert!(matches!(of([3, 1], 1), Err(ShadingRateError::Wrong(why)) if why.ends_with("not [3, 1]")));
+        assert_eq!(
+            check_rate(&ShadingRate::default(), 1, &[], false),
+            Ok(()),
+            "single pixels are everywhere"
+        );
     }
 
     #[test]
@@ -303,8 +312,8 @@ mod tests {
                 ShadingRate { primitive: by, ..ShadingRate::default() },
                 ShadingRate { attachment: by, ..ShadingRate::default() },
             ] {
-                assert_eq!(check(&rate, 1, &SIZES, false).is_ok(), simple, "{by:?}");
-                assert_eq!(check(&rate, 1, &SIZES, true), Ok(()));
+                assert_eq!(check_rate(&rate, 1, &SIZES, false).is_ok(), simple, "{by:?}");
+                assert_eq!(check_rate(&rate, 1, &SIZES, true), Ok(()));
             }
         }
     }

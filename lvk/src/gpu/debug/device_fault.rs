@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::gpu::device::Gpu;
 
 /// Lists longer than this are taken for nonsense of a driver that has just failed.
-const MOST_ENTRIES: u32 = 1 << 16;
+const MAX_ENTRIES: u32 = 1 << 16;
 
 /// What a driver with `VK_EXT_device_fault` ([`OptionalFeature::DeviceFault`](crate::OptionalFeature)) says of the fault
 /// that lost the device.
@@ -69,24 +69,26 @@ pub struct VendorFault {
 
 impl Gpu {
     /// As [`Error::vulkan`], with what the device says of its fault where it is lost.
-    pub(crate) fn failed(&self, call: &'static str) -> impl FnOnce(vk::Result) -> Error + '_ {
+    pub(crate) fn vulkan_error(&self, call: &'static str) -> impl FnOnce(vk::Result) -> Error + '_ {
         move |result| match result {
-            vk::Result::ERROR_DEVICE_LOST => Error::DeviceLost { call, fault: self.fault().map(Arc::new) },
+            vk::Result::ERROR_DEVICE_LOST => {
+                Error::DeviceLost { call, fault: self.query_fault().map(Arc::new) }
+            }
             other => Error::vulkan(call)(other),
         }
     }
 
     /// Asks a lost device; `None` where it cannot say.
-    fn fault(&self) -> Option<DeviceFault> {
+    fn query_fault(&self) -> Option<DeviceFault> {
         let functions = self.device_fault.as_ref()?.fp();
         let raw = self.device.handle();
         // SAFETY: the device is lost, as its last answer was, and the lists have the lengths that the counts say.
-        read(|counts, info| unsafe { (functions.get_device_fault_info_ext)(raw, counts, info) })
+        read_fault(|counts, info| unsafe { (functions.get_device_fault_info_ext)(raw, counts, info) })
     }
 }
 
 /// Reads by a function that works like `vkGetDeviceFaultInfoEXT`: counts first, then lists of that length.
-fn read(
+fn read_fault(
     ask: impl Fn(*mut vk::DeviceFaultCountsEXT<'_>, *mut vk::DeviceFaultInfoEXT<'_>) -> vk::Result,
 ) -> Option<DeviceFault> {
     let mut counts = vk::DeviceFaultCountsEXT::default();
@@ -94,8 +96,8 @@ fn read(
         return None;
     }
     counts.vendor_binary_size = 0; // only drivers' own tools read it, and it has a feature of its own
-    counts.address_info_count = counts.address_info_count.min(MOST_ENTRIES);
-    counts.vendor_info_count = counts.vendor_info_count.min(MOST_ENTRIES);
+    counts.address_info_count = counts.address_info_count.min(MAX_ENTRIES);
+    counts.vendor_info_count = counts.vendor_info_count.min(MAX_ENTRIES);
     let mut addresses = vec![vk::DeviceFaultAddressInfoEXT::default(); counts.address_info_count as usize];
     let mut vendor = vec![vk::DeviceFaultVendorInfoEXT::default(); counts.vendor_info_count as usize];
     let mut info = vk::DeviceFaultInfoEXT {
@@ -119,29 +121,29 @@ fn decode(
     vendor: &[vk::DeviceFaultVendorInfoEXT],
 ) -> DeviceFault {
     let vendor_fault = |info: &vk::DeviceFaultVendorInfoEXT| VendorFault {
-        description: text(&info.description),
+        description: decode_text(&info.description),
         code: info.vendor_fault_code,
         data: info.vendor_fault_data,
     };
     DeviceFault {
-        description: text(description),
-        addresses: addresses.iter().map(address).collect(),
+        description: decode_text(description),
+        addresses: addresses.iter().map(decode_address).collect(),
         vendor: vendor.iter().map(vendor_fault).collect(),
     }
 }
 
 /// The precision is a power of two: the true address has the same multiple of it below.
-fn address(info: &vk::DeviceFaultAddressInfoEXT) -> FaultAddress {
+fn decode_address(info: &vk::DeviceFaultAddressInfoEXT) -> FaultAddress {
     let precision = info.address_precision.max(1);
     let start = info.reported_address / precision * precision;
     FaultAddress {
-        kind: kind(info.address_type),
+        kind: decode_kind(info.address_type),
         address: info.reported_address,
         range: start..start.saturating_add(precision),
     }
 }
 
-fn kind(raw: vk::DeviceFaultAddressTypeEXT) -> FaultKind {
+fn decode_kind(raw: vk::DeviceFaultAddressTypeEXT) -> FaultKind {
     use vk::DeviceFaultAddressTypeEXT as Raw;
     match raw {
         Raw::READ_INVALID => FaultKind::InvalidRead,
@@ -155,7 +157,7 @@ fn kind(raw: vk::DeviceFaultAddressTypeEXT) -> FaultKind {
 }
 
 /// The text of an array of characters, whether it ends in a zero or not.
-fn text(chars: &[c_char]) -> String {
+fn decode_text(chars: &[c_char]) -> String {
     let mut bytes: Vec<u8> = chars.iter().map(|c| c.cast_unsigned()).collect();
     bytes.push(0);
     CStr::from_bytes_until_nul(&bytes).map(|text| text.to_string_lossy().into_owned()).unwrap_or_default()
@@ -227,7 +229,7 @@ mod tests {
 
     #[test]
     fn a_fault_is_read_as_the_driver_says_it() {
-        let fault = read(driver).unwrap();
+        let fault = read_fault(driver).unwrap();
         let read =
             FaultAddress { kind: FaultKind::InvalidRead, address: 0x1_2345, range: 0x1_2000..0x1_3000 };
         let at = FaultAddress { kind: FaultKind::FaultingInstruction, address: 0x77, range: 0x77..0x78 };
@@ -245,34 +247,34 @@ mod tests {
 
     #[test]
     fn drivers_that_cannot_say_are_no_second_error() {
-        assert_eq!(read(|_, _| vk::Result::ERROR_UNKNOWN), None);
+        assert_eq!(read_fault(|_, _| vk::Result::ERROR_UNKNOWN), None);
         let second_fails = |_: *mut vk::DeviceFaultCountsEXT<'_>, info: *mut vk::DeviceFaultInfoEXT<'_>| {
             if info.is_null() { vk::Result::SUCCESS } else { vk::Result::ERROR_OUT_OF_HOST_MEMORY }
         };
-        assert_eq!(read(second_fails), None);
-        assert_eq!(read(|_, _| vk::Result::SUCCESS), Some(DeviceFault::default()));
+        assert_eq!(read_fault(second_fails), None);
+        assert_eq!(read_fault(|_, _| vk::Result::SUCCESS), Some(DeviceFault::default()));
         // Counts that no list has, and fewer entries than were announced.
         let boasts = |counts: *mut vk::DeviceFaultCountsEXT<'_>, info: *mut vk::DeviceFaultInfoEXT<'_>| {
             // SAFETY: as in `driver`.
             unsafe { (*counts).address_info_count = if info.is_null() { u32::MAX } else { 1 } };
             vk::Result::INCOMPLETE
         };
-        assert_eq!(read(boasts), None, "asked for counts alone, nothing is incomplete");
+        assert_eq!(read_fault(boasts), None, "asked for counts alone, nothing is incomplete");
         let fewer = |counts: *mut vk::DeviceFaultCountsEXT<'_>, info: *mut vk::DeviceFaultInfoEXT<'_>| {
             // SAFETY: as in `driver`.
             unsafe { (*counts).address_info_count = if info.is_null() { u32::MAX } else { 1 } };
             if info.is_null() { vk::Result::SUCCESS } else { vk::Result::INCOMPLETE }
         };
-        let fault = read(fewer).unwrap();
+        let fault = read_fault(fewer).unwrap();
         assert_eq!((fault.addresses.len(), fault.addresses[0].kind), (1, FaultKind::Other(0)));
     }
 
     #[test]
     fn odd_precisions_and_texts_do_no_harm() {
-        assert_eq!(address(&address_info(2, 9, 0)).range, 9..10);
-        let last = address(&address_info(2, u64::MAX, 1 << 20)).range;
+        assert_eq!(decode_address(&address_info(2, 9, 0)).range, 9..10);
+        let last = decode_address(&address_info(2, u64::MAX, 1 << 20)).range;
         assert!(last.start < last.end);
-        assert_eq!(text(&chars::<4>("four")), "four");
-        assert_eq!(text(&[]), "");
+        assert_eq!(decode_text(&chars::<4>("four")), "four");
+        assert_eq!(decode_text(&[]), "");
     }
 }

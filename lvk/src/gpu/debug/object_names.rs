@@ -49,12 +49,16 @@ impl Gpu {
 }
 
 /// Whether to name objects: as the caller says, or where somebody reads names.
-pub(crate) fn is_wanted(instance: &Instance, device: vk::PhysicalDevice, wish: Option<bool>) -> bool {
-    instance.debug_utils && wish.unwrap_or_else(|| instance.validated || is_watched(instance, device))
+pub(crate) fn should_name_objects(
+    instance: &Instance,
+    device: vk::PhysicalDevice,
+    requested: Option<bool>,
+) -> bool {
+    instance.debug_utils && requested.unwrap_or_else(|| instance.validated || has_debugger(instance, device))
 }
 
 /// Whether a debugger or profiler has told the loader that it is there (`vkGetPhysicalDeviceToolProperties`).
-fn is_watched(instance: &Instance, device: vk::PhysicalDevice) -> bool {
+fn has_debugger(instance: &Instance, device: vk::PhysicalDevice) -> bool {
     // SAFETY: the physical device belongs to the instance, whose version is 1.3.
     let count = unsafe { instance.raw.get_physical_device_tool_properties_len(device) }.unwrap_or(0);
     let mut tools = vec![vk::PhysicalDeviceToolProperties::default(); count];

@@ -55,7 +55,7 @@ pub(crate) struct ObjectMemory {
 /// Where memory came from and goes back to.
 enum Source {
     Own(Box<Allocation>),
-    /// A slot of a [`Shelf`], by its number.
+    /// A slot of a [`SlabPool`], by its number.
     Shared(usize, Slot),
 }
 
@@ -69,13 +69,13 @@ unsafe impl Send for Mapping {}
 unsafe impl Sync for Mapping {}
 
 impl ObjectMemory {
-    fn own(allocation: Allocation) -> Self {
-        let place = Place::of(&allocation);
-        Self::at(place, allocation.size(), Source::Own(Box::new(allocation)))
+    fn dedicated(allocation: Allocation) -> Self {
+        let place = MemoryPlacement::from_allocation(&allocation);
+        Self::from_placement(place, allocation.size(), Source::Own(Box::new(allocation)))
     }
 
-    fn at(place: Place, size: u64, source: Source) -> Self {
-        let Place { raw, offset, properties, mapped } = place;
+    fn from_placement(place: MemoryPlacement, size: u64, source: Source) -> Self {
+        let MemoryPlacement { raw, offset, properties, mapped } = place;
         Self { raw, offset, size, properties, mapped, source }
     }
 
@@ -91,15 +91,15 @@ impl ObjectMemory {
 }
 
 /// Where a piece of memory lies.
-struct Place {
+struct MemoryPlacement {
     raw: vk::DeviceMemory,
     offset: u64,
     properties: vk::MemoryPropertyFlags,
     mapped: Option<Mapping>,
 }
 
-impl Place {
-    fn of(allocation: &Allocation) -> Self {
+impl MemoryPlacement {
+    fn from_allocation(allocation: &Allocation) -> Self {
         Self {
             // SAFETY: the memory is only named here; it lives until the allocation is freed.
             raw: unsafe { allocation.memory() },
@@ -110,8 +110,8 @@ impl Place {
     }
 
     /// A slot of a block.
-    fn in_block(block: &Allocation, slot: Slot, slot_bytes: u64) -> Self {
-        let whole = Self::of(block);
+    fn from_slot(block: &Allocation, slot: Slot, slot_bytes: u64) -> Self {
+        let whole = Self::from_allocation(block);
         let offset = u64::from(slot.number) * slot_bytes;
         // SAFETY: the slot lies inside the block, all of which is mapped.
         let inside = |start: Mapping| Mapping(unsafe { start.0.add(offset as usize) });
@@ -122,18 +122,18 @@ impl Place {
 /// The memory of a device: large objects have pieces of their own from the allocator, small ones share blocks.
 pub(crate) struct DeviceMemory {
     allocator: Allocator,
-    shelves: Vec<Shelf>,
+    slab_pools: Vec<SlabPool>,
 }
 
 /// Slots for objects that are alike.
-struct Shelf {
-    kind: ShelfKind,
+struct SlabPool {
+    kind: SlabClass,
     slab: Slab<Allocation>,
 }
 
 /// What objects that share blocks have in common.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct ShelfKind {
+struct SlabClass {
     slot_bytes: u64,
     /// Kinds of memory that will do.
     type_bits: u32,
@@ -141,14 +141,18 @@ struct ShelfKind {
     linear: bool,
 }
 
-impl ShelfKind {
+impl SlabClass {
     /// The least and the most bytes of a slot; with these a block has 16 KiB to 1 MiB.
     const LEAST: u64 = 256;
     const MOST: u64 = 16 << 10;
 
     /// For an object with these requirements; `None` if it is large enough for memory of its own. Slots are powers of two, so
     /// that each lies as it has to in a block that does.
-    fn of(requirements: &vk::MemoryRequirements, memory: MemoryKind, linear: bool) -> Option<Self> {
+    fn from_requirements(
+        requirements: &vk::MemoryRequirements,
+        memory: MemoryKind,
+        linear: bool,
+    ) -> Option<Self> {
         let bytes = requirements.size.max(requirements.alignment).max(Self::LEAST);
         (bytes <= Self::MOST).then(|| Self {
             slot_bytes: bytes.next_power_of_two(),
@@ -159,7 +163,7 @@ impl ShelfKind {
     }
 
     /// What a block of slots requires.
-    fn block(&self) -> vk::MemoryRequirements {
+    fn block_requirements(&self) -> vk::MemoryRequirements {
         vk::MemoryRequirements {
             size: self.slot_bytes * Slab::<Allocation>::SLOTS,
             alignment: self.slot_bytes,
@@ -189,7 +193,7 @@ impl DeviceMemory {
             allocation_sizes: AllocationSizes::default(),
         })
         .map_err(|error| Error::unsupported("memory allocation", error.to_string()))?;
-        Ok(Self { allocator, shelves: Vec::new() })
+        Ok(Self { allocator, slab_pools: Vec::new() })
     }
 
     /// Memory for one object; where a block for small ones cannot be had, a piece of its own.
@@ -200,37 +204,46 @@ impl DeviceMemory {
         memory: MemoryKind,
         linear: bool,
     ) -> Allocated<ObjectMemory> {
-        if let Some(kind) = ShelfKind::of(&requirements, memory, linear)
-            && let Ok(shared) = self.share(name, kind, requirements.size)
+        if let Some(kind) = SlabClass::from_requirements(&requirements, memory, linear)
+            && let Ok(shared) = self.allocate_slot(name, kind, requirements.size)
         {
             return Ok(shared);
         }
-        Ok(ObjectMemory::own(piece(&mut self.allocator, name, requirements, memory, linear)?))
+        Ok(ObjectMemory::dedicated(allocate_dedicated(
+            &mut self.allocator,
+            name,
+            requirements,
+            memory,
+            linear,
+        )?))
     }
 
     /// A slot of a block.
-    fn share(&mut self, name: &str, kind: ShelfKind, size: u64) -> Allocated<ObjectMemory> {
-        let number = self.shelves.iter().position(|shelf| shelf.kind == kind).unwrap_or_else(|| {
-            self.shelves.push(Shelf { kind, slab: Slab::default() });
-            self.shelves.len() - 1
-        });
-        let new = || piece(&mut self.allocator, name, kind.block(), kind.memory, kind.linear);
-        let (slot, block) = self.shelves[number].slab.take(new)?;
-        let place = Place::in_block(block, slot, kind.slot_bytes);
-        Ok(ObjectMemory::at(place, size, Source::Shared(number, slot)))
+    fn allocate_slot(&mut self, name: &str, kind: SlabClass, size: u64) -> Allocated<ObjectMemory> {
+        let number =
+            self.slab_pools.iter().position(|slab_pool| slab_pool.kind == kind).unwrap_or_else(|| {
+                self.slab_pools.push(SlabPool { kind, slab: Slab::default() });
+                self.slab_pools.len() - 1
+            });
+        let new = || {
+            allocate_dedicated(&mut self.allocator, name, kind.block_requirements(), kind.memory, kind.linear)
+        };
+        let (slot, block) = self.slab_pools[number].slab.allocate(new)?;
+        let place = MemoryPlacement::from_slot(block, slot, kind.slot_bytes);
+        Ok(ObjectMemory::from_placement(place, size, Source::Shared(number, slot)))
     }
 
     fn free(&mut self, memory: ObjectMemory) -> Allocated<()> {
         let unused = match memory.source {
             Source::Own(allocation) => Some(*allocation),
-            Source::Shared(shelf, slot) => self.shelves[shelf].slab.give(slot),
+            Source::Shared(slab_pool, slot) => self.slab_pools[slab_pool].slab.free(slot),
         };
         unused.map_or(Ok(()), |allocation| self.allocator.free(allocation))
     }
 }
 
 /// A piece of memory from the allocator, which keeps a copy of the name that only its own reports show.
-fn piece(
+fn allocate_dedicated(
     allocator: &mut Allocator,
     name: &str,
     requirements: vk::MemoryRequirements,
@@ -333,11 +346,11 @@ mod tests {
             size in 1..40_000_u64, alignment in 0..17_u32, start in 0..8_u64, number in 0..64_u64
         ) {
             let requirements = vk::MemoryRequirements { size, alignment: 1 << alignment, memory_type_bits: 5 };
-            let large = size.max(requirements.alignment) > ShelfKind::MOST;
-            let kind = ShelfKind::of(&requirements, MemoryKind::Readback, true);
+            let large = size.max(requirements.alignment) > SlabClass::MOST;
+            let kind = SlabClass::from_requirements(&requirements, MemoryKind::Readback, true);
             prop_assert_eq!(kind.is_none(), large);
             if let Some(kind) = kind {
-                let block = kind.block();
+                let block = kind.block_requirements();
                 let offset = start * block.alignment + number * kind.slot_bytes;
                 prop_assert!(offset.is_multiple_of(requirements.alignment));
                 prop_assert!(kind.slot_bytes >= size && (number + 1) * kind.slot_bytes <= block.size);
@@ -351,7 +364,7 @@ mod tests {
         fn objects_of_different_kinds_share_nothing(bits in 1..4_u32, other_bits in 1..4_u32, linear: bool) {
             let of = |memory_type_bits, memory, linear| {
                 let requirements = vk::MemoryRequirements { size: 300, alignment: 16, memory_type_bits };
-                ShelfKind::of(&requirements, memory, linear)
+                SlabClass::from_requirements(&requirements, memory, linear)
             };
             let kind = of(bits, MemoryKind::Device, linear);
             prop_assert_eq!(kind == of(other_bits, MemoryKind::Device, linear), bits == other_bits);

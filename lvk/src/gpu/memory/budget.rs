@@ -52,14 +52,14 @@ impl HeapUse {
 
     /// An object was allocated.
     pub(crate) fn add(&self, allocated: &ObjectMemory) {
-        if let Some(heap) = heap_of(&self.types, allocated.properties) {
+        if let Some(heap) = heap_index(&self.types, allocated.properties) {
             self.bytes[heap].fetch_add(allocated.size, Ordering::Relaxed);
         }
     }
 
     /// An object goes.
     pub(crate) fn remove(&self, allocated: &ObjectMemory) {
-        if let Some(heap) = heap_of(&self.types, allocated.properties) {
+        if let Some(heap) = heap_index(&self.types, allocated.properties) {
             self.bytes[heap].fetch_sub(allocated.size, Ordering::Relaxed);
         }
     }
@@ -91,7 +91,7 @@ impl Gpu {
 }
 
 /// The heap of memory with these properties: the first, where several have the same.
-fn heap_of(types: &[vk::MemoryType], properties: vk::MemoryPropertyFlags) -> Option<usize> {
+fn heap_index(types: &[vk::MemoryType], properties: vk::MemoryPropertyFlags) -> Option<usize> {
     types.iter().find(|of| of.property_flags == properties).map(|of| of.heap_index as usize)
 }
 
@@ -105,8 +105,8 @@ mod tests {
         let of = |property_flags, heap_index| vk::MemoryType { property_flags, heap_index };
         let host = Flags::HOST_VISIBLE | Flags::HOST_COHERENT;
         let types = [of(Flags::empty(), 1), of(Flags::DEVICE_LOCAL, 0), of(host, 1), of(host, 2)];
-        assert_eq!(heap_of(&types, Flags::DEVICE_LOCAL), Some(0));
-        assert_eq!(heap_of(&types, host), Some(1));
-        assert_eq!(heap_of(&types, Flags::LAZILY_ALLOCATED), None);
+        assert_eq!(heap_index(&types, Flags::DEVICE_LOCAL), Some(0));
+        assert_eq!(heap_index(&types, host), Some(1));
+        assert_eq!(heap_index(&types, Flags::LAZILY_ALLOCATED), None);
     }
 }

@@ -7,14 +7,14 @@ use slotmap::{DefaultKey, SlotMap};
 
 /// Slots of one size. `B` is the memory of a block of them.
 pub(crate) struct Slab<B> {
-    blocks: SlotMap<DefaultKey, Block<B>>,
+    blocks: SlotMap<DefaultKey, SlabBlock<B>>,
     /// The blocks that have both taken and free slots.
     open: Vec<DefaultKey>,
     /// A block that has no taken slot, kept for the next one.
     spare: Option<DefaultKey>,
 }
 
-struct Block<B> {
+struct SlabBlock<B> {
     memory: B,
     /// A bit for each free slot.
     free: u64,
@@ -41,15 +41,15 @@ impl<B> Slab<B> {
     pub(crate) const SLOTS: u64 = u64::BITS as u64;
 
     /// Takes a slot, with the memory of its block; `new` makes that of another block where all slots are taken.
-    pub(crate) fn take<E>(&mut self, new: impl FnOnce() -> Result<B, E>) -> Result<(Slot, &B), E> {
+    pub(crate) fn allocate<E>(&mut self, new: impl FnOnce() -> Result<B, E>) -> Result<(Slot, &B), E> {
         let key = match self.open.last() {
             Some(key) => *key,
             None => {
                 let key = match self.spare.take() {
                     Some(key) => key,
-                    None => self.blocks.insert(Block { memory: new()?, free: u64::MAX, place: 0 }),
+                    None => self.blocks.insert(SlabBlock { memory: new()?, free: u64::MAX, place: 0 }),
                 };
-                self.open(key);
+                self.link_free_block(key);
                 key
             }
         };
@@ -63,18 +63,18 @@ impl<B> Slab<B> {
     }
 
     /// Gives a slot back, once; answers the memory of a block that is not needed any more.
-    pub(crate) fn give(&mut self, slot: Slot) -> Option<B> {
+    pub(crate) fn free(&mut self, slot: Slot) -> Option<B> {
         let block = self.blocks.get_mut(slot.block)?;
         let was_full = block.free == 0;
         block.free |= 1 << slot.number;
         let is_empty = block.free == u64::MAX;
         if was_full {
-            self.open(slot.block);
+            self.link_free_block(slot.block);
         }
         if !is_empty {
             return None;
         }
-        self.close(slot.block);
+        self.unlink_full_block(slot.block);
         if self.spare.is_none() {
             self.spare = Some(slot.block);
             return None;
@@ -82,12 +82,12 @@ impl<B> Slab<B> {
         self.blocks.remove(slot.block).map(|block| block.memory)
     }
 
-    fn open(&mut self, key: DefaultKey) {
+    fn link_free_block(&mut self, key: DefaultKey) {
         self.blocks[key].place = self.open.len();
         self.open.push(key);
     }
 
-    fn close(&mut self, key: DefaultKey) {
+    fn unlink_full_block(&mut self, key: DefaultKey) {
         let place = self.blocks[key].place;
         self.open.swap_remove(place);
         if let Some(moved) = self.open.get(place) {
@@ -106,31 +106,31 @@ mod tests {
     use super::*;
 
     #[derive(Debug, Clone)]
-    enum Op {
+    enum SlabOp {
         Take(usize),
         Give(Vec<prop::sample::Index>),
         GiveAll,
     }
 
-    fn op() -> impl Strategy<Value = Op> {
+    fn op() -> impl Strategy<Value = SlabOp> {
         let index = any::<prop::sample::Index>;
         prop_oneof![
-            3 => (1..200_usize).prop_map(Op::Take),
-            3 => prop::collection::vec(index(), 1..150).prop_map(Op::Give),
-            1 => Just(Op::GiveAll),
+            3 => (1..200_usize).prop_map(SlabOp::Take),
+            3 => prop::collection::vec(index(), 1..150).prop_map(SlabOp::Give),
+            1 => Just(SlabOp::GiveAll),
         ]
     }
 
     /// A slab whose blocks are numbers, with all that it should have.
     #[derive(Default)]
-    struct Model {
+    struct SlabModel {
         slab: Slab<u32>,
         blocks: BTreeSet<u32>,
         last: u32,
         taken: Vec<(Slot, u32)>,
     }
 
-    impl Model {
+    impl SlabModel {
         fn take(&mut self) {
             let has_room = (self.blocks.len() * 64) > self.taken.len();
             let mut is_new = false;
@@ -139,7 +139,7 @@ mod tests {
                 self.last += 1;
                 Ok(self.last)
             };
-            let (slot, block) = self.slab.take(new).unwrap();
+            let (slot, block) = self.slab.allocate(new).unwrap();
             let block = *block;
             assert_eq!(is_new, !has_room, "a block is made where all slots are taken, and only there");
             assert_eq!(is_new, self.blocks.insert(block));
@@ -154,7 +154,7 @@ mod tests {
 
         fn give(&mut self, place: usize) {
             let (slot, block) = self.taken.swap_remove(place);
-            if let Some(gone) = self.slab.give(slot) {
+            if let Some(gone) = self.slab.free(slot) {
                 assert_eq!(gone, block);
                 assert!(self.places().all(|(other, _)| other != gone), "block {gone} is still used");
                 assert!(self.blocks.remove(&gone));
@@ -172,18 +172,18 @@ mod tests {
         fn no_slot_is_taken_twice_and_one_empty_block_at_most_is_kept(
             ops in prop::collection::vec(op(), 0..30)
         ) {
-            let mut model = Model::default();
+            let mut model = SlabModel::default();
             for op in ops {
                 match op {
-                    Op::Take(count) => (0..count).for_each(|_| model.take()),
-                    Op::Give(which) => {
+                    SlabOp::Take(count) => (0..count).for_each(|_| model.take()),
+                    SlabOp::Give(which) => {
                         for index in which {
                             if !model.taken.is_empty() {
                                 model.give(index.index(model.taken.len()));
                             }
                         }
                     }
-                    Op::GiveAll => (0..model.taken.len()).rev().for_each(|place| model.give(place)),
+                    SlabOp::GiveAll => (0..model.taken.len()).rev().for_each(|place| model.give(place)),
                 }
                 prop_assert!(model.empty_blocks() <= 1);
             }
@@ -193,8 +193,8 @@ mod tests {
     #[test]
     fn a_block_that_cannot_be_made_changes_nothing() {
         let mut slab = Slab::default();
-        assert_eq!(slab.take(|| Err::<u32, _>("full")).unwrap_err(), "full");
-        let (slot, block) = slab.take(|| Ok::<_, &str>(7)).unwrap();
+        assert_eq!(slab.allocate(|| Err::<u32, _>("full")).unwrap_err(), "full");
+        let (slot, block) = slab.allocate(|| Ok::<_, &str>(7)).unwrap();
         assert_eq!((slot.number, *block), (0, 7));
     }
 }

@@ -7,22 +7,22 @@ use ash::vk;
 
 use crate::lock_order::{Rank, RwLock};
 
-static DEVICE_CHANGES: RwLock<()> = RwLock::new(Rank::DeviceChanges, ());
+static DEVICE_LIFETIME: RwLock<()> = RwLock::new(Rank::DeviceLifetime, ());
 
 /// Makes or destroys a device of this driver.
-pub(crate) fn change_devices<R>(driver: vk::DriverId, change: impl FnOnce() -> R) -> R {
-    let _alone = needs_turns(driver).then(|| DEVICE_CHANGES.write());
+pub(crate) fn with_exclusive_device_lock<R>(driver: vk::DriverId, change: impl FnOnce() -> R) -> R {
+    let _alone = needs_device_lock(driver).then(|| DEVICE_LIFETIME.write());
     change()
 }
 
 /// Makes or destroys a ray tracing pipeline of this driver.
-pub(crate) fn beside_devices<R>(driver: vk::DriverId, change: impl FnOnce() -> R) -> R {
-    let _beside_others = needs_turns(driver).then(|| DEVICE_CHANGES.read());
+pub(crate) fn with_shared_device_lock<R>(driver: vk::DriverId, change: impl FnOnce() -> R) -> R {
+    let _beside_others = needs_device_lock(driver).then(|| DEVICE_LIFETIME.read());
     change()
 }
 
 /// Where debug assertions are on, any driver: so tests see on each that the lock is taken in its order.
-fn needs_turns(driver: vk::DriverId) -> bool {
+fn needs_device_lock(driver: vk::DriverId) -> bool {
     cfg!(debug_assertions) || driver == vk::DriverId::NVIDIA_PROPRIETARY
 }
 
@@ -41,7 +41,7 @@ mod tests {
         let together = Barrier::new(2);
         thread::scope(|scope| {
             for _ in 0..2 {
-                scope.spawn(|| beside_devices(NVIDIA, || together.wait()));
+                scope.spawn(|| with_shared_device_lock(NVIDIA, || together.wait()));
             }
         });
     }
@@ -56,10 +56,10 @@ mod tests {
         };
         thread::scope(|scope| {
             for _ in 0..3 {
-                scope.spawn(|| (0..500).for_each(|_| beside_devices(NVIDIA, make)));
+                scope.spawn(|| (0..500).for_each(|_| with_shared_device_lock(NVIDIA, make)));
             }
             for _ in 0..500 {
-                assert_eq!(change_devices(NVIDIA, || made.load(Ordering::SeqCst)), 0);
+                assert_eq!(with_exclusive_device_lock(NVIDIA, || made.load(Ordering::SeqCst)), 0);
             }
         });
     }

@@ -31,7 +31,7 @@ pub(crate) struct ExtensionFeatures {
 
 impl ExtensionFeatures {
     /// Hangs those structures behind `all` whose extension `has` knows: Vulkan forbids any other.
-    pub(crate) fn chain<'a>(
+    pub(crate) fn append_to_chain<'a>(
         &'a mut self,
         mut all: vk::PhysicalDeviceFeatures2<'a>,
         has: &dyn Fn(&CStr) -> bool,
@@ -85,7 +85,7 @@ impl ExtensionFeatures {
     }
 
     /// Notes the extensions without features.
-    pub(crate) fn note_present(&mut self, has: &dyn Fn(&CStr) -> bool) {
+    pub(crate) fn set_featureless_extensions(&mut self, has: &dyn Fn(&CStr) -> bool) {
         let clocks = has(ash::khr::calibrated_timestamps::NAME) || has(ash::ext::calibrated_timestamps::NAME);
         self.calibrated_timestamps = clocks.into();
         self.memory_budget = has(ash::ext::memory_budget::NAME).into();

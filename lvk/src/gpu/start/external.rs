@@ -7,7 +7,7 @@ use ash::vk;
 use crate::error::{Error, Result};
 use crate::gpu::caps::capabilities::PhysicalDevice;
 use crate::gpu::caps::optional_features::{FeatureSet, OptionalFeature};
-use crate::gpu::caps::queues::{QueueFamily, QueuePlace};
+use crate::gpu::caps::queues::{QueueFamily, QueueLocation};
 
 /// An instance, a device and a queue of the caller's own, and what was turned on when they were made.
 #[derive(Clone)]
@@ -56,15 +56,15 @@ impl RawContext<'_> {
         let caps = &mut found.capabilities;
         caps.mesh_shader &= self.mesh_shader;
         caps.position_fetch = false;
-        caps.pipeline_libraries &= self.has(ash::khr::pipeline_library::NAME);
+        caps.pipeline_libraries &= self.has_extension(ash::khr::pipeline_library::NAME);
         caps.limit_ray_tracing(self.ray_tracing_pipeline, self.ray_query);
-        caps.hide(FeatureSet::ALL.without(self.features));
+        caps.remove_features(FeatureSet::ALL.without(self.features));
         found.queue_family = Some(self.queue_family);
-        found.place(self.places());
+        found.set_queues(self.queue_locations());
         Ok(found)
     }
 
-    pub(crate) fn has(&self, extension: &CStr) -> bool {
+    pub(crate) fn has_extension(&self, extension: &CStr) -> bool {
         self.device_extensions.contains(&extension)
     }
 
@@ -75,10 +75,10 @@ impl RawContext<'_> {
     }
 
     /// Where they are; their numbers in their families are not known, and only tell whether they are the same.
-    fn places(&self) -> [QueuePlace; 3] {
+    fn queue_locations(&self) -> [QueueLocation; 3] {
         let queues = self.queues();
         let number = |raw| queues.iter().position(|(queue, _)| *queue == raw).unwrap_or_default();
-        queues.map(|(queue, family)| QueuePlace { family, index: number(queue) as u32 })
+        queues.map(|(queue, family)| QueueLocation { family, index: number(queue) as u32 })
     }
 
     fn check_queues(&self, families: &[QueueFamily]) -> Result<()> {
@@ -98,7 +98,7 @@ impl RawContext<'_> {
         let absent = known.without(found.capabilities.optional);
         if let Some(feature) = absent.iter().next() {
             let name = feature.vulkan_name();
-            return Err(wrong(format!("feature {name} cannot be on: the device does not have it")));
+            return Err(invalid(format!("feature {name} cannot be on: the device does not have it")));
         }
         let mut extensions: Vec<&CStr> = known.extensions().collect();
         if self.ray_tracing_pipeline || self.ray_query {
@@ -111,10 +111,10 @@ impl RawContext<'_> {
             (self.mesh_shader, ash::ext::mesh_shader::NAME),
         ];
         extensions.extend(flags.iter().filter(|(on, _)| *on).map(|(_, name)| *name));
-        match extensions.into_iter().find(|name| !self.has(name)) {
+        match extensions.into_iter().find(|name| !self.has_extension(name)) {
             Some(name) => {
                 let name = name.to_string_lossy();
-                Err(wrong(format!(
+                Err(invalid(format!(
                     "a feature is said to be on whose extension {name} is not among device_extensions"
                 )))
             }
@@ -131,11 +131,11 @@ fn check_family(
 ) -> Result<()> {
     match families.get(number as usize) {
         Some(family) if fits(family.flags) => Ok(()),
-        Some(_) => Err(wrong(format!("family {number} has no {lacks}"))),
-        None => Err(wrong(format!("the device has no queue family {number}"))),
+        Some(_) => Err(invalid(format!("family {number} has no {lacks}"))),
+        None => Err(invalid(format!("the device has no queue family {number}"))),
     }
 }
 
-fn wrong(message: String) -> Error {
+fn invalid(message: String) -> Error {
     Error::usage("from_raw", message)
 }

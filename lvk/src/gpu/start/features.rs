@@ -43,16 +43,16 @@ pub(crate) struct Subgroups {
 impl Features {
     /// Those of the features found that the library turns on: what it needs, what Vulkan 1.3 promises, the optional
     /// ones of the set, ray tracing and mesh shaders.
-    pub(crate) fn wanted(found: &Self, optional: FeatureSet) -> Self {
+    pub(crate) fn supported_subset(found: &Self, optional: FeatureSet) -> Self {
         let mut wanted = Self { subgroups: found.subgroups, ..Self::default() };
         if optional.contains(OptionalFeature::CalibratedTimestamps) {
             wanted.calibration = found.calibration;
         }
         let mut source = *found;
-        for place in NEEDED.iter().map(|(place, _)| place).chain(&PROMISED).chain(&APART) {
-            *place(&mut wanted) = *place(&mut source);
+        for field in NEEDED.iter().map(|(field, _)| field).chain(&PROMISED).chain(&APART) {
+            *field(&mut wanted) = *field(&mut source);
         }
-        optional.turn_on(&mut wanted, found);
+        optional.enable(&mut wanted, found);
         wanted
     }
 
@@ -97,11 +97,11 @@ impl Features {
     }
 }
 
-type Place = fn(&mut Features) -> &mut vk::Bool32;
+type FeatureField = fn(&mut Features) -> &mut vk::Bool32;
 
 /// What the library cannot do without.
 #[rustfmt::skip]
-const NEEDED: [(Place, &str); 19] = [
+const NEEDED: [(FeatureField, &str); 19] = [
     (|f| &mut f.core.shader_storage_image_write_without_format, "shaderStorageImageWriteWithoutFormat"),
     (|f| &mut f.core.shader_sampled_image_array_dynamic_indexing, "shaderSampledImageArrayDynamicIndexing"),
     (|f| &mut f.core.shader_storage_image_array_dynamic_indexing, "shaderStorageImageArrayDynamicIndexing"),
@@ -125,7 +125,7 @@ const NEEDED: [(Place, &str); 19] = [
 
 /// What every device of Vulkan 1.3 has. Shaders of SPIR-V 1.6 end an invocation by `OpTerminateInvocation`, which no
 /// capability announces.
-const PROMISED: [Place; 9] = [
+const PROMISED: [FeatureField; 9] = [
     |f| &mut f.core.robust_buffer_access,
     |f| &mut f.v12.descriptor_indexing,
     |f| &mut f.v12.shader_subgroup_extended_types,
@@ -138,7 +138,7 @@ const PROMISED: [Place; 9] = [
 ];
 
 /// Ray tracing and mesh shaders, which have switches of their own.
-const APART: [Place; 9] = [
+const APART: [FeatureField; 9] = [
     |f| &mut f.ext.structures.acceleration_structure,
     |f| &mut f.ext.structures.descriptor_binding_acceleration_structure_update_after_bind,
     |f| &mut f.ext.ray_tracing.ray_tracing_pipeline,
@@ -151,9 +151,9 @@ const APART: [Place; 9] = [
 ];
 
 /// The names of features that the library cannot do without and the device lacks.
-pub(crate) fn missing(found: &Features) -> Vec<String> {
+pub(crate) fn missing_required(found: &Features) -> Vec<String> {
     let mut found = *found;
-    let lacking = NEEDED.iter().filter(|(place, _)| *place(&mut found) == vk::FALSE);
+    let lacking = NEEDED.iter().filter(|(field, _)| *field(&mut found) == vk::FALSE);
     lacking.map(|(_, name)| (*name).to_owned()).collect()
 }
 
@@ -200,12 +200,12 @@ mod tests {
         found.core.sparse_binding = vk::TRUE;
         found.v12.shader_float16 = vk::TRUE;
         found.v13.dynamic_rendering = vk::TRUE;
-        let wanted = Features::wanted(&found, FeatureSet::ALL);
+        let wanted = Features::supported_subset(&found, FeatureSet::ALL);
         assert_eq!((wanted.core.shader_int64, wanted.core.sparse_binding), (vk::TRUE, vk::FALSE));
         assert_eq!((wanted.v12.shader_float16, wanted.v12.shader_int8), (vk::TRUE, vk::FALSE));
         let without = FeatureSet::ALL.without([OptionalFeature::Int64].into_iter().collect());
-        let wanted = Features::wanted(&found, without);
+        let wanted = Features::supported_subset(&found, without);
         assert_eq!((wanted.core.shader_int64, wanted.v13.dynamic_rendering), (vk::FALSE, vk::TRUE));
-        assert!(missing(&found).contains(&"bufferDeviceAddress".to_owned()));
+        assert!(missing_required(&found).contains(&"bufferDeviceAddress".to_owned()));
     }
 }

@@ -45,9 +45,9 @@ impl Instance {
         let entry = load_entry(desc.library)?;
         check_version(&entry)?;
         let layer = find_layer(&entry, desc.validation)?;
-        let extensions = Extensions::of(&entry, layer, desc)?;
+        let extensions = Extensions::query(&entry, layer, desc)?;
         let mut messenger = Messenger::new(desc.sink.clone());
-        let raw = create(&entry, desc, layer, &extensions, &messenger)?;
+        let raw = create_instance(&entry, desc, layer, &extensions, &messenger)?;
         if extensions.debug_utils
             && layer.is_some()
             && let Err(result) = messenger.install(&entry, &raw)
@@ -63,7 +63,7 @@ impl Instance {
     }
 
     /// Of somebody else's.
-    pub(crate) fn foreign(entry: ash::Entry, raw: ash::Instance, extensions: &[&CStr]) -> Self {
+    pub(crate) fn external(entry: ash::Entry, raw: ash::Instance, extensions: &[&CStr]) -> Self {
         Self {
             entry,
             raw,
@@ -148,7 +148,7 @@ struct Extensions<'a> {
 }
 
 impl<'a> Extensions<'a> {
-    fn of(entry: &ash::Entry, layer: Option<&CStr>, desc: &InstanceDesc<'a>) -> Result<Self> {
+    fn query(entry: &ash::Entry, layer: Option<&CStr>, desc: &InstanceDesc<'a>) -> Result<Self> {
         let mut found = Self { debug_utils: false, layer_settings: false, extra: desc.extra, windows: None };
         let mut missing = desc.extra.to_vec();
         for source in [None, layer].into_iter().take(if layer.is_some() { 2 } else { 1 }) {
@@ -160,7 +160,8 @@ impl<'a> Extensions<'a> {
             found.layer_settings |= has(ash::ext::layer_settings::NAME);
             missing.retain(|name| !has(name));
             if source.is_none() {
-                found.windows = desc.window.map(|window| WindowExtensions::of(window, &has)).transpose()?;
+                found.windows =
+                    desc.window.map(|window| WindowExtensions::query(window, &has)).transpose()?;
             }
         }
         if let Some(name) = missing.first() {
@@ -182,7 +183,7 @@ impl<'a> Extensions<'a> {
     }
 }
 
-fn create(
+fn create_instance(
     entry: &ash::Entry,
     desc: &InstanceDesc<'_>,
     layer: Option<&CStr>,
@@ -196,10 +197,10 @@ fn create(
         .api_version(vk::API_VERSION_1_3);
     let layers: Vec<_> = layer.iter().map(|layer| layer.as_ptr()).collect();
     let extension_names = extensions.names();
-    let switches = switches(desc.validation);
+    let switches = layer_switches(desc.validation);
     let values: Vec<[vk::Bool32; 1]> = switches.iter().map(|(_, on)| [vk::Bool32::from(*on)]).collect();
     let settings: Vec<_> =
-        switches.iter().zip(&values).map(|((key, _), value)| setting(key, value)).collect();
+        switches.iter().zip(&values).map(|((key, _), value)| layer_setting(key, value)).collect();
     let mut settings = vk::LayerSettingsCreateInfoEXT::default().settings(&settings);
     let mut messages = messenger.create_info();
     let mut info = vk::InstanceCreateInfo::default()
@@ -216,13 +217,13 @@ fn create(
     let made = unsafe { entry.create_instance(&info, None) };
     #[cfg(any(test, feature = "test-hooks"))]
     let made = made
-        .map(crate::test_support::null_commands::silenced)
-        .map(crate::test_support::fault_injection::fallible);
+        .map(crate::test_support::null_commands::wrap_null_commands)
+        .map(crate::test_support::fault_injection::wrap_fault_injection);
     made.map_err(|result| Error::NoVulkan { reason: format!("vkCreateInstance answered {result}") })
 }
 
 /// The switches of the layer, by its own setting names.
-fn switches(validation: ValidationMode) -> Vec<(CString, bool)> {
+fn layer_switches(validation: ValidationMode) -> Vec<(CString, bool)> {
     let gpu = validation == ValidationMode::GpuAssisted;
     [
         ("validate_core", true),
@@ -236,7 +237,7 @@ fn switches(validation: ValidationMode) -> Vec<(CString, bool)> {
     .into()
 }
 
-fn setting<'a>(key: &'a CStr, value: &'a [vk::Bool32; 1]) -> vk::LayerSettingEXT<'a> {
+fn layer_setting<'a>(key: &'a CStr, value: &'a [vk::Bool32; 1]) -> vk::LayerSettingEXT<'a> {
     let bytes = bytemuck::cast_slice(value);
     let setting = vk::LayerSettingEXT::default()
         .layer_name(VALIDATION_LAYER)

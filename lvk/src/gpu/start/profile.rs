@@ -182,7 +182,7 @@ impl DeviceProfile {
     }
 
     /// Whether anything may not be used.
-    pub(crate) fn hides(&self) -> bool {
+    pub(crate) fn has_restrictions(&self) -> bool {
         !(self.ray_tracing_pipeline && self.ray_query && self.position_fetch && self.mesh_shader)
     }
 
@@ -192,7 +192,7 @@ impl DeviceProfile {
         capabilities.limit_ray_tracing(self.ray_tracing_pipeline, self.ray_query);
         capabilities.position_fetch &= self.position_fetch;
         capabilities.mesh_shader &= self.mesh_shader;
-        capabilities.hide(self.hidden);
+        capabilities.remove_features(self.hidden);
         let limits = &mut capabilities.limits;
         limits.scratch_alignment = stricter_alignment(limits.scratch_alignment, self.min_scratch_alignment);
         let range = self.max_storage_buffer_range;
@@ -332,7 +332,7 @@ mod tests {
     #[test]
     fn core_only_leaves_nothing_optional() {
         let mut capabilities = Capabilities { optional: FeatureSet::ALL, ..device() };
-        capabilities.hide(FeatureSet::NONE);
+        capabilities.remove_features(FeatureSet::NONE);
         assert!(capabilities.cube_arrays && capabilities.has(OptionalFeature::MeshShaderQueries));
         DeviceProfile::core_only().apply(&mut capabilities);
         assert_eq!(capabilities.optional, FeatureSet::NONE);

@@ -48,7 +48,7 @@ pub(crate) struct Candidate {
 }
 
 impl Candidate {
-    fn line(&self, index: usize) -> String {
+    fn describe(&self, index: usize) -> String {
         let verdict = if self.missing.is_empty() {
             "usable".to_owned()
         } else {
@@ -64,15 +64,15 @@ impl Candidate {
 
 /// Position of the device to use.
 ///
-/// `wish` is an index or a part of a name in any case. Without one, the best usable device: by kind, then by optional
+/// `requested` is an index or a part of a name in any case. Without one, the best usable device: by kind, then by optional
 /// features, then by memory, then the first.
 ///
 /// # Errors
 /// [`Error::NoDevice`], which names every device, if none is usable, or if the wish names no device, several
 /// devices, or one that lacks something.
-pub(crate) fn choose(candidates: &[Candidate], wish: Option<&str>) -> Result<usize> {
-    match wish.map(str::trim).filter(|wish| !wish.is_empty()) {
-        Some(wish) => choose_named(candidates, wish),
+pub(crate) fn choose(candidates: &[Candidate], requested: Option<&str>) -> Result<usize> {
+    match requested.map(str::trim).filter(|requested| !requested.is_empty()) {
+        Some(requested) => choose_named(candidates, requested),
         None => choose_best(candidates),
     }
 }
@@ -84,30 +84,31 @@ fn choose_best(candidates: &[Candidate]) -> Result<usize> {
     best.map(|(index, _)| index).ok_or_else(|| no_device(candidates, None))
 }
 
-fn choose_named(candidates: &[Candidate], wish: &str) -> Result<usize> {
-    match matches(candidates, wish).as_slice() {
+fn choose_named(candidates: &[Candidate], requested: &str) -> Result<usize> {
+    match matches(candidates, requested).as_slice() {
         [index] if candidates[*index].missing.is_empty() => Ok(*index),
-        [index] => {
-            Err(no_device(candidates, Some(format!("'{wish}' names device {index}, which cannot be used"))))
-        }
-        [] => Err(no_device(candidates, Some(format!("'{wish}' names no device")))),
-        _ => Err(no_device(candidates, Some(format!("'{wish}' names several devices, give an index")))),
+        [index] => Err(no_device(
+            candidates,
+            Some(format!("'{requested}' names device {index}, which cannot be used")),
+        )),
+        [] => Err(no_device(candidates, Some(format!("'{requested}' names no device")))),
+        _ => Err(no_device(candidates, Some(format!("'{requested}' names several devices, give an index")))),
     }
 }
 
 /// A number in range is an index; a name may contain numbers too, so any other number is part of a name.
-fn matches(candidates: &[Candidate], wish: &str) -> Vec<usize> {
-    if let Some(index) = wish.parse().ok().filter(|index| *index < candidates.len()) {
+fn matches(candidates: &[Candidate], requested: &str) -> Vec<usize> {
+    if let Some(index) = requested.parse().ok().filter(|index| *index < candidates.len()) {
         return vec![index];
     }
-    let wish = wish.to_lowercase();
-    let named = |candidate: &Candidate| candidate.name.to_lowercase().contains(&wish);
+    let requested = requested.to_lowercase();
+    let named = |candidate: &Candidate| candidate.name.to_lowercase().contains(&requested);
     (0..candidates.len()).filter(|index| named(&candidates[*index])).collect()
 }
 
 fn no_device(candidates: &[Candidate], headline: Option<String>) -> Error {
     let none = candidates.is_empty().then(|| "the driver reports no device".to_owned());
-    let lines = candidates.iter().enumerate().map(|(index, candidate)| candidate.line(index));
+    let lines = candidates.iter().enumerate().map(|(index, candidate)| candidate.describe(index));
     let reasons: Vec<String> = headline.into_iter().chain(none).chain(lines).collect();
     Error::NoDevice { reasons: reasons.join("; ") }
 }
@@ -163,13 +164,13 @@ mod tests {
 
     #[test]
     fn wish_that_cannot_be_met_lists_every_device() {
-        for (wish, headline) in [
+        for (requested, headline) in [
             ("voodoo", "'voodoo' names no device"),
             ("radeon", "'radeon' names several devices, give an index"),
             ("2", "'2' names device 2, which cannot be used"),
             ("580", "'580' names device 2, which cannot be used"),
         ] {
-            let text = reasons(choose(&machine(), Some(wish)));
+            let text = reasons(choose(&machine(), Some(requested)));
             let parts: Vec<&str> = text.split("; ").collect();
             assert_eq!(parts[0], headline);
             assert_eq!(parts[1], "[0] llvmpipe (CPU): usable");
@@ -200,21 +201,21 @@ mod tests {
     proptest! {
         #[test]
         fn chosen_device_lacks_nothing_and_none_is_better(
-            list in prop::collection::vec(candidate(), 0..6), wish in prop::option::of("[abAB0-9]{0,2}")
+            list in prop::collection::vec(candidate(), 0..6), requested in prop::option::of("[abAB0-9]{0,2}")
         ) {
-            match choose(&list, wish.as_deref()) {
+            match choose(&list, requested.as_deref()) {
                 Ok(index) => {
                     prop_assert!(list[index].missing.is_empty());
                     let better = |other: &&Candidate| other.missing.is_empty() && other.rank() > list[index].rank();
-                    prop_assert!(wish.is_some_and(|wish| !wish.is_empty()) || !list.iter().any(|c| better(&c)));
+                    prop_assert!(requested.is_some_and(|requested| !requested.is_empty()) || !list.iter().any(|c| better(&c)));
                 }
                 Err(error) => {
                     let text = error.to_string();
                     prop_assert!(!text.contains('\n'));
                     for (index, candidate) in list.iter().enumerate() {
-                        prop_assert!(text.contains(&candidate.line(index)));
+                        prop_assert!(text.contains(&candidate.describe(index)));
                     }
-                    let open = wish.is_none_or(|wish| wish.is_empty());
+                    let open = requested.is_none_or(|requested| requested.is_empty());
                     prop_assert!(!open || list.iter().all(|candidate| !candidate.missing.is_empty()));
                 }
             }

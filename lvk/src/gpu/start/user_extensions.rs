@@ -37,11 +37,11 @@ impl<'a> UserExtensions<'a> {
         Self { instance, device, capabilities, features }
     }
 
-    pub(crate) fn of_instance(&self) -> &'a [&'a CStr] {
+    pub(crate) fn instance_extensions(&self) -> &'a [&'a CStr] {
         self.instance
     }
 
-    pub(crate) fn of_device(&self) -> &'a [&'a CStr] {
+    pub(crate) fn device_extensions(&self) -> &'a [&'a CStr] {
         self.device
     }
 
@@ -50,7 +50,7 @@ impl<'a> UserExtensions<'a> {
     }
 
     /// The head of the chain, or null. Vulkan only reads it.
-    pub(crate) fn chain(&self) -> *mut c_void {
+    pub(crate) fn feature_chain(&self) -> *mut c_void {
         self.features.map_or(ptr::null_mut(), |head| ptr::from_ref(head).cast::<c_void>().cast_mut())
     }
 }

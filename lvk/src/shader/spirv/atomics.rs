@@ -13,32 +13,32 @@ pub(crate) struct Atomic {
     pub(crate) bits: u32,
     /// An addition, not merely an exchange, a load or a store. Integers have only one feature for both.
     pub(crate) is_add: bool,
-    pub(crate) place: Place,
+    pub(crate) place: AtomicStorage,
 }
 
 /// Where the changed value lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Place {
+pub(crate) enum AtomicStorage {
     Buffer,
     Shared,
     Image,
 }
 
 /// The atomic operations on floats and on integers of other than 32 bits, each kind once.
-pub(crate) fn atomics(words: &[u32]) -> Result<Vec<Atomic>, String> {
-    let mut ids = Ids::default();
+pub(crate) fn find_atomics(words: &[u32]) -> Result<Vec<Atomic>, String> {
+    let mut ids = AtomicIds::default();
     let mut found = BTreeSet::new();
     for instruction in instructions(words) {
         let instruction = instruction?;
         ids.collect(&instruction);
-        found.extend(ids.atomic(&instruction));
+        found.extend(ids.find_atomic(&instruction));
     }
     Ok(found.into_iter().collect())
 }
 
 /// What is known of ids so far; definitions come before uses wherever it matters here.
 #[derive(Default)]
-struct Ids {
+struct AtomicIds {
     /// Scalar types: whether they are floats, and their bits.
     scalars: HashMap<u32, (bool, u32)>,
     /// Pointer types: storage class and target type.
@@ -47,7 +47,7 @@ struct Ids {
     pointers: HashMap<u32, u32>,
 }
 
-impl Ids {
+impl AtomicIds {
     fn collect(&mut self, i: &Instruction<'_>) {
         match i.op {
             Some(Op::TypeInt) => _ = self.scalars.insert(i.operand(0), (false, i.operand(1))),
@@ -62,24 +62,24 @@ impl Ids {
         }
     }
 
-    fn atomic(&self, i: &Instruction<'_>) -> Option<Atomic> {
+    fn find_atomic(&self, i: &Instruction<'_>) -> Option<Atomic> {
         let op = i.op.filter(|op| is_atomic(*op))?;
         let pointer = if op == Op::AtomicStore { i.operand(0) } else { i.operand(2) };
         let (storage, target) = self.pointer_types.get(self.pointers.get(&pointer)?)?;
         let (is_float, bits) = *self.scalars.get(target)?;
         let is_add = is_float && !matches!(op, Op::AtomicLoad | Op::AtomicStore | Op::AtomicExchange);
-        let place = place(*storage)?;
+        let place = atomic_storage(*storage)?;
         (is_float || bits != 32).then_some(Atomic { is_float, bits, is_add, place })
     }
 }
 
-fn place(storage: u32) -> Option<Place> {
+fn atomic_storage(storage: u32) -> Option<AtomicStorage> {
     use StorageClass::{Image, PhysicalStorageBuffer, StorageBuffer, Workgroup};
     let places = [
-        (StorageBuffer, Place::Buffer),
-        (PhysicalStorageBuffer, Place::Buffer),
-        (Workgroup, Place::Shared),
-        (Image, Place::Image),
+        (StorageBuffer, AtomicStorage::Buffer),
+        (PhysicalStorageBuffer, AtomicStorage::Buffer),
+        (Workgroup, AtomicStorage::Shared),
+        (Image, AtomicStorage::Image),
     ];
     places.into_iter().find(|(class, _)| *class as u32 == storage).map(|(_, place)| place)
 }
@@ -134,20 +134,23 @@ mod tests {
             source: ShaderSource::Glsl(&text),
             ..Default::default()
         };
-        atomics(&compile(&desc, &CompileOptions::default(), None).unwrap()).unwrap()
+        find_atomics(&compile(&desc, &CompileOptions::default(), None).unwrap()).unwrap()
     }
 
     #[test]
     fn atomics_are_told_by_value_and_place() {
         let one = |is_float, bits, is_add, place| vec![Atomic { is_float, bits, is_add, place }];
         assert_eq!(found("atomicAdd(data.u, 1u); data.f = 1.0;"), []);
-        assert_eq!(found("atomicMax(data.l, 1ul);"), one(false, 64, false, Place::Buffer));
-        assert_eq!(found("atomicExchange(sl, 1ul);"), one(false, 64, false, Place::Shared));
-        assert_eq!(found("atomicAdd(data.f, 1.0);"), one(true, 32, true, Place::Buffer));
-        assert_eq!(found("atomicExchange(data.f, 1.0);"), one(true, 32, false, Place::Buffer));
-        assert_eq!(found("atomicExchange(sf, 1.0);"), one(true, 32, false, Place::Shared));
-        assert_eq!(found("imageAtomicAdd(kFloats[0], ivec2(0), 1.0);"), one(true, 32, true, Place::Image));
-        assert_eq!(found("atomicAdd(data.d, 1.0);"), one(true, 64, true, Place::Buffer));
+        assert_eq!(found("atomicMax(data.l, 1ul);"), one(false, 64, false, AtomicStorage::Buffer));
+        assert_eq!(found("atomicExchange(sl, 1ul);"), one(false, 64, false, AtomicStorage::Shared));
+        assert_eq!(found("atomicAdd(data.f, 1.0);"), one(true, 32, true, AtomicStorage::Buffer));
+        assert_eq!(found("atomicExchange(data.f, 1.0);"), one(true, 32, false, AtomicStorage::Buffer));
+        assert_eq!(found("atomicExchange(sf, 1.0);"), one(true, 32, false, AtomicStorage::Shared));
+        assert_eq!(
+            found("imageAtomicAdd(kFloats[0], ivec2(0), 1.0);"),
+            one(true, 32, true, AtomicStorage::Image)
+        );
+        assert_eq!(found("atomicAdd(data.d, 1.0);"), one(true, 64, true, AtomicStorage::Buffer));
         assert_eq!(found("atomicAdd(sf, 1.0); atomicAdd(sf, 2.0); atomicAdd(data.f, 1.0);").len(), 2);
     }
 }

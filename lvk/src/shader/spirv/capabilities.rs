@@ -3,7 +3,7 @@
 use ::spirv::Capability as C;
 use ash::vk;
 
-use super::atomics::{Atomic, Place};
+use super::atomics::{Atomic, AtomicStorage};
 use crate::error::{Error, Result};
 use crate::gpu::start::features::Features;
 use crate::shader::{Reflection, ShaderStage};
@@ -31,9 +31,9 @@ const FREE: [C; 18] = [
 ];
 
 /// A capability, whether it is allowed, and the feature that allows it.
-type Row = (C, fn(&Features) -> vk::Bool32, &'static str);
+type CapabilityRow = (C, fn(&Features) -> vk::Bool32, &'static str);
 
-const BY_FEATURE: [Row; 51] = [
+const BY_FEATURE: [CapabilityRow; 51] = [
     (C::Geometry, |f| f.core.geometry_shader, "geometryShader"),
     (C::Tessellation, |f| f.core.tessellation_shader, "tessellationShader"),
     (C::GeometryPointSize, point_size, "shaderTessellationAndGeometryPointSize"),
@@ -145,7 +145,7 @@ const BY_SUBGROUP: [(C, vk::SubgroupFeatureFlags); 7] = [
 pub(crate) fn check_stage(name: &str, stage: ShaderStage, features: &Features) -> Result<()> {
     if matches!(stage, ShaderStage::Task | ShaderStage::Mesh) && features.ext.mesh.mesh_shader == vk::FALSE {
         let what = format!("the {} stage of shader '{name}'", stage.name());
-        return Err(Error::unsupported(what, lacks_feature("meshShader")));
+        return Err(Error::unsupported(what, feature_message("meshShader")));
     }
     Ok(())
 }
@@ -158,15 +158,15 @@ pub(crate) fn check_capabilities(
     features: &Features,
     extra: &[u32],
 ) -> Result<()> {
-    let subgroup = |c: &u32| subgroup_lack(*c, stage, features);
+    let subgroup = |c: &u32| missing_subgroup_support(*c, stage, features);
     for capability in module.capabilities.iter().filter(|capability| !extra.contains(capability)) {
-        if let Some(why) = subgroup(capability).or_else(|| lack(*capability, features)) {
+        if let Some(why) = subgroup(capability).or_else(|| missing_capability(*capability, features)) {
             let what = format!("capability {} of shader '{name}'", capability_name(*capability));
             return Err(Error::unsupported(what, why));
         }
     }
     for atomic in &module.atomics {
-        if let Some(why) = atomic_lack(*atomic, features) {
+        if let Some(why) = missing_atomic_support(*atomic, features) {
             return Err(Error::unsupported(format!("{} in shader '{name}'", atomic_name(*atomic)), why));
         }
     }
@@ -174,19 +174,19 @@ pub(crate) fn check_capabilities(
 }
 
 /// Why the capability is not allowed.
-fn lack(capability: u32, features: &Features) -> Option<String> {
+fn missing_capability(capability: u32, features: &Features) -> Option<String> {
     let is = |known: C| known as u32 == capability;
     if FREE.into_iter().any(is) || BY_SUBGROUP.iter().any(|row| is(row.0)) {
         return None;
     }
     match BY_FEATURE.iter().find(|row| is(row.0)) {
         Some((_, allowed, _)) if allowed(features) == vk::TRUE => None,
-        Some((_, _, feature)) => Some(lacks_feature(feature)),
+        Some((_, _, feature)) => Some(feature_message(feature)),
         None => Some("lvk turns on no device feature or extension that allows it".to_owned()),
     }
 }
 
-fn subgroup_lack(capability: u32, stage: ShaderStage, features: &Features) -> Option<String> {
+fn missing_subgroup_support(capability: u32, stage: ShaderStage, features: &Features) -> Option<String> {
     let row = BY_SUBGROUP.iter().find(|row| row.0 as u32 == capability);
     let operation = match row {
         Some((_, operation)) => *operation,
@@ -213,31 +213,39 @@ fn subgroup_lack(capability: u32, stage: ShaderStage, features: &Features) -> Op
     }
 }
 
-fn atomic_lack(atomic: Atomic, features: &Features) -> Option<String> {
+fn missing_atomic_support(atomic: Atomic, features: &Features) -> Option<String> {
     let on = &features.ext.float_atomics;
     let (allowed, feature) = match (atomic.is_float, atomic.bits, atomic.place, atomic.is_add) {
-        (false, 64, Place::Buffer, _) => {
+        (false, 64, AtomicStorage::Buffer, _) => {
             (features.v12.shader_buffer_int64_atomics, "shaderBufferInt64Atomics")
         }
-        (false, 64, Place::Shared, _) => {
+        (false, 64, AtomicStorage::Shared, _) => {
             (features.v12.shader_shared_int64_atomics, "shaderSharedInt64Atomics")
         }
-        (true, 32, Place::Buffer, false) => (on.shader_buffer_float32_atomics, "shaderBufferFloat32Atomics"),
-        (true, 32, Place::Buffer, true) => {
+        (true, 32, AtomicStorage::Buffer, false) => {
+            (on.shader_buffer_float32_atomics, "shaderBufferFloat32Atomics")
+        }
+        (true, 32, AtomicStorage::Buffer, true) => {
             (on.shader_buffer_float32_atomic_add, "shaderBufferFloat32AtomicAdd")
         }
-        (true, 32, Place::Shared, false) => (on.shader_shared_float32_atomics, "shaderSharedFloat32Atomics"),
-        (true, 32, Place::Shared, true) => {
+        (true, 32, AtomicStorage::Shared, false) => {
+            (on.shader_shared_float32_atomics, "shaderSharedFloat32Atomics")
+        }
+        (true, 32, AtomicStorage::Shared, true) => {
             (on.shader_shared_float32_atomic_add, "shaderSharedFloat32AtomicAdd")
         }
-        (true, 32, Place::Image, false) => (on.shader_image_float32_atomics, "shaderImageFloat32Atomics"),
-        (true, 32, Place::Image, true) => (on.shader_image_float32_atomic_add, "shaderImageFloat32AtomicAdd"),
+        (true, 32, AtomicStorage::Image, false) => {
+            (on.shader_image_float32_atomics, "shaderImageFloat32Atomics")
+        }
+        (true, 32, AtomicStorage::Image, true) => {
+            (on.shader_image_float32_atomic_add, "shaderImageFloat32AtomicAdd")
+        }
         _ => return Some("lvk turns on no device feature that allows them".to_owned()),
     };
-    (allowed == vk::FALSE).then(|| lacks_feature(feature))
+    (allowed == vk::FALSE).then(|| feature_message(feature))
 }
 
-fn lacks_feature(feature: &str) -> String {
+fn feature_message(feature: &str) -> String {
     format!("the device lacks the feature {feature}, or it was turned off")
 }
 
@@ -248,9 +256,9 @@ fn capability_name(capability: u32) -> String {
 fn atomic_name(atomic: Atomic) -> String {
     let kind = if atomic.is_float { "float" } else { "integer" };
     let place = match atomic.place {
-        Place::Buffer => "buffers",
-        Place::Shared => "shared memory",
-        Place::Image => "images",
+        AtomicStorage::Buffer => "buffers",
+        AtomicStorage::Shared => "shared memory",
+        AtomicStorage::Image => "images",
     };
     format!("atomic operations on {}-bit {kind}s in {place}", atomic.bits)
 }
@@ -352,7 +360,7 @@ mod tests {
         let mut all = all_subgroups();
         all.core.multi_viewport = vk::TRUE;
         all.core.shader_resource_residency = vk::TRUE;
-        let features = Features::wanted(&all, FeatureSet::ALL);
+        let features = Features::supported_subset(&all, FeatureSet::ALL);
         for capability in [C::Kernel, C::MultiViewport, C::SparseResidency, C::Linkage] {
             let found = refusal(ShaderStage::Compute, &module(&[capability]), &features).unwrap();
             assert!(found.contains("lvk turns on no device feature"), "{found}");
@@ -410,15 +418,15 @@ mod tests {
             ..Reflection::default()
         };
         let lacks = |module: &Reflection| refusal(ShaderStage::Compute, module, &features);
-        assert_eq!(lacks(&one(false, 64, false, Place::Buffer)), None);
-        assert_eq!(lacks(&one(true, 32, false, Place::Shared)), None);
-        let found = lacks(&one(false, 64, false, Place::Shared)).unwrap();
+        assert_eq!(lacks(&one(false, 64, false, AtomicStorage::Buffer)), None);
+        assert_eq!(lacks(&one(true, 32, false, AtomicStorage::Shared)), None);
+        let found = lacks(&one(false, 64, false, AtomicStorage::Shared)).unwrap();
         assert!(
             found.contains("64-bit integers in shared memory") && found.contains("SharedInt64"),
             "{found}"
         );
-        let found = lacks(&one(true, 32, true, Place::Shared)).unwrap();
+        let found = lacks(&one(true, 32, true, AtomicStorage::Shared)).unwrap();
         assert!(found.contains("shaderSharedFloat32AtomicAdd"), "{found}");
-        assert!(lacks(&one(true, 64, false, Place::Buffer)).unwrap().contains("lvk turns on no"));
+        assert!(lacks(&one(true, 64, false, AtomicStorage::Buffer)).unwrap().contains("lvk turns on no"));
     }
 }

@@ -3,7 +3,7 @@
 use ::spirv::Op;
 
 /// The value of an operation on 32-bit integers and booleans, `None` for other operations and where it has none.
-pub(crate) fn fold(op: Op, operands: &[u32]) -> Option<u32> {
+pub(crate) fn evaluate_spec_constant_op(op: Op, operands: &[u32]) -> Option<u32> {
     let operand = |index: usize| operands.get(index).copied();
     let (a, b) = (operand(0)?, operand(1).unwrap_or(0));
     let (signed_a, signed_b) = (a.cast_signed(), b.cast_signed());
@@ -83,7 +83,7 @@ mod tests {
             (Op::FAdd, &[1, 1], None),
             (Op::Not, &[], None),
         ] {
-            assert_eq!(fold(op, operands), value, "{op:?} of {operands:?}");
+            assert_eq!(evaluate_spec_constant_op(op, operands), value, "{op:?} of {operands:?}");
         }
     }
 }

@@ -5,12 +5,12 @@ use ::spirv::Op;
 use super::words::{HEADER_WORDS, instructions};
 
 /// Words of an instruction at most.
-const MOST_WORDS: usize = 0xFFFF;
+const MAX_WORDS: usize = 0xFFFF;
 /// Word of the header that is above every id.
 const BOUND: usize = 3;
 
 /// `words` with `OpSource` naming each text and holding it; the first is the module's own. The texts are ASCII.
-pub(crate) fn with_texts(words: &[u32], texts: &[(String, String)]) -> Vec<u32> {
+pub(crate) fn embed_source(words: &[u32], texts: &[(String, String)]) -> Vec<u32> {
     let mut out = words.get(..HEADER_WORDS).unwrap_or(words).to_vec();
     for instruction in instructions(words).flatten() {
         match instruction.op {
@@ -29,22 +29,22 @@ fn push_texts(out: &mut Vec<u32>, language: [u32; 2], texts: &[(String, String)]
     let first = out[BOUND];
     out[BOUND] += texts.len() as u32;
     for (id, (name, _)) in (first..).zip(texts) {
-        push(out, Op::String, &[id], name);
+        push_text(out, Op::String, &[id], name);
     }
     for (id, (_, text)) in (first..).zip(texts) {
-        let most = (MOST_WORDS - 5) * 4;
+        let most = (MAX_WORDS - 5) * 4;
         let (head, mut rest) = text.split_at(text.len().min(most));
-        push(out, Op::Source, &[language[0], language[1], id], head);
+        push_text(out, Op::Source, &[language[0], language[1], id], head);
         while !rest.is_empty() {
             let (head, tail) = rest.split_at(rest.len().min(most));
-            push(out, Op::SourceContinued, &[], head);
+            push_text(out, Op::SourceContinued, &[], head);
             rest = tail;
         }
     }
 }
 
 /// An instruction that ends in a string.
-fn push(out: &mut Vec<u32>, op: Op, operands: &[u32], text: &str) {
+fn push_text(out: &mut Vec<u32>, op: Op, operands: &[u32], text: &str) {
     let mut bytes = text.as_bytes().to_vec();
     bytes.resize((bytes.len() / 4 + 1) * 4, 0);
     let len = 1 + operands.len() + bytes.len() / 4;
@@ -62,7 +62,7 @@ mod tests {
         let words = [0x0723_0203, 0x0001_0600, 0, 7, 0, 3 << 16 | Op::Source as u32, 2, 460];
         let long: String = (0..600_000).map(|i| char::from(b'a' + (i % 23) as u8)).collect();
         let texts = [("main.glsl".to_owned(), long.clone()), ("b".to_owned(), "short".to_owned())];
-        let out = with_texts(&words, &texts);
+        let out = embed_source(&words, &texts);
         assert_eq!(out[BOUND], 9);
         let code: Vec<_> = instructions(&out).map(Result::unwrap).collect();
         let ops: Vec<_> = code.iter().map(|i| i.op.unwrap()).collect();

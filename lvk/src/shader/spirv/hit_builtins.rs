@@ -8,7 +8,7 @@ const NUMBERS: [(&str, &str); 2] =
     [("gl_InstanceID", "lvkInstanceId(tlas)"), ("gl_PrimitiveID", "lvkPrimitiveIndex(tlas)")];
 
 /// The first such built-in in the caller's text, with the helper to use instead.
-pub(crate) fn raw_hit_number(desc: &ShaderModuleDesc<'_>) -> Option<(&'static str, &'static str)> {
+pub(crate) fn find_raw_hit_builtin(desc: &ShaderModuleDesc<'_>) -> Option<(&'static str, &'static str)> {
     use ShaderStage::{AnyHit, ClosestHit, Intersection};
     let ShaderSource::Glsl(text) = desc.source else { return None };
     if !matches!(desc.stage, ClosestHit | AnyHit | Intersection) {
@@ -25,7 +25,7 @@ mod tests {
 
     fn found(stage: ShaderStage, text: &str) -> Option<&'static str> {
         let source = ShaderSource::Glsl(text);
-        raw_hit_number(&ShaderModuleDesc { stage, source, ..Default::default() }).map(|(name, _)| name)
+        find_raw_hit_builtin(&ShaderModuleDesc { stage, source, ..Default::default() }).map(|(name, _)| name)
     }
 
     #[test]

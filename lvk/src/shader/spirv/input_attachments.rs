@@ -2,21 +2,24 @@
 
 use ::spirv::{Decoration, StorageClass};
 
-use super::parsed::{Module, Type, Variable};
-use crate::bindless::input_attachments::Input;
+use super::parsed::{ParsedModule, Type, Variable};
+use crate::bindless::input_attachments::InputAttachment;
 use crate::bindless::layout;
-use crate::format::Numbers;
+use crate::format::NumericFormat;
 
 /// A target of the pass that a module reads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct InputRead {
-    pub(crate) input: Input,
-    pub(crate) numbers: Numbers,
+    pub(crate) input: InputAttachment,
+    pub(crate) numbers: NumericFormat,
     pub(crate) multisampled: bool,
 }
 
 /// What a variable reads of the targets; `None` where it is something else.
-pub(crate) fn input_read(module: &Module, variable: &Variable) -> Result<Option<InputRead>, String> {
+pub(crate) fn read_input_attachment(
+    module: &ParsedModule,
+    variable: &Variable,
+) -> Result<Option<InputRead>, String> {
     if variable.storage != StorageClass::UniformConstant as u32 {
         return Ok(None);
     }
@@ -24,7 +27,7 @@ pub(crate) fn input_read(module: &Module, variable: &Variable) -> Result<Option<
     let what = module.names.get(&variable.id).map_or("an input".to_owned(), |name| format!("'{name}'"));
     match module.types.get(target) {
         Some(Type::SubpassInput { texel, multisampled }) => {
-            let input = place(module, variable).ok_or_else(|| format!("{what} {MISPLACED}"))?;
+            let input = attachment_of(module, variable).ok_or_else(|| format!("{what} {MISPLACED}"))?;
             let Some(Type::Number { numbers, .. }) = module.types.get(texel) else {
                 return Err(format!("{what} has texels of no numbers"));
             };
@@ -43,20 +46,20 @@ const MISPLACED: &str = "reads a target of the pass, but not at its place; decla
                          LVK_STENCIL_INPUT";
 
 /// The target that set, binding and index agree on.
-fn place(module: &Module, variable: &Variable) -> Option<Input> {
+fn attachment_of(module: &ParsedModule, variable: &Variable) -> Option<InputAttachment> {
     let get = |decoration| module.decoration(variable.id, decoration);
-    let input = Input::at(get(Decoration::Binding)?)?;
+    let input = InputAttachment::from_index(get(Decoration::Binding)?)?;
     let agrees = get(Decoration::DescriptorSet) == Some(layout::INPUT_SET)
-        && get(Decoration::InputAttachmentIndex) == Some(input.place());
+        && get(Decoration::InputAttachmentIndex) == Some(input.index());
     agrees.then_some(input)
 }
 
 /// The locations of an output, a bit for each; arrays take several.
-pub(crate) fn outputs(module: &Module, variable: &Variable) -> u32 {
+pub(crate) fn output_locations(module: &ParsedModule, variable: &Variable) -> u32 {
     let Some(first) = module.decoration(variable.id, Decoration::Location) else { return 0 };
     let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else { return 0 };
     let count = match module.types.get(target) {
-        Some(Type::Array { length, .. }) => module.length(*length).unwrap_or(1),
+        Some(Type::Array { length, .. }) => module.array_length(*length).unwrap_or(1),
         _ => 1,
     };
     let last = u64::from(first).saturating_add(count);

@@ -10,7 +10,7 @@ use super::words::{HEADER_WORDS, Instruction, instructions};
 const BOUND: usize = 3;
 
 /// A module in its sections, to which something is added.
-pub(crate) struct Sections {
+pub(crate) struct ModuleSections {
     /// The header.
     pub(crate) header: Vec<u32>,
     pub(crate) capabilities: Vec<u32>,
@@ -21,9 +21,9 @@ pub(crate) struct Sections {
     pub(crate) functions: Vec<u32>,
 }
 
-impl Sections {
+impl ModuleSections {
     /// Fails where an instruction is cut off.
-    pub(crate) fn of(words: &[u32]) -> Result<Self, String> {
+    pub(crate) fn parse(words: &[u32]) -> Result<Self, String> {
         let header = words.get(..HEADER_WORDS).ok_or("the header is cut off")?.to_vec();
         let mut all = Self {
             header,
@@ -57,27 +57,27 @@ impl Sections {
     }
 
     /// The id of a new constant of one word.
-    pub(crate) fn constant(&mut self, ty: u32, value: u32) -> u32 {
+    pub(crate) fn add_constant(&mut self, ty: u32, value: u32) -> u32 {
         let id = self.new_id();
-        push(&mut self.globals, Op::Constant, &[ty, id, value]);
+        push_instruction(&mut self.globals, Op::Constant, &[ty, id, value]);
         id
     }
 
     /// Adds the function of this name with the types, constants and decorations that it needs; answers its id.
     ///
     /// Types that may be declared only once are shared with what is there.
-    pub(crate) fn import(&mut self, donor: &[u32], name: &str) -> Result<Imported, String> {
+    pub(crate) fn link_function(&mut self, donor: &[u32], name: &str) -> Result<LinkedFunction, String> {
         let code: Vec<_> = instructions(donor).collect::<Result<_, _>>()?;
         let wanted = |i: &&Instruction<'_>| i.op == Some(Op::Name) && i.string(1).0.starts_with(name);
         let function = code.iter().find(wanted).ok_or("the function is missing")?.operand(0);
-        let mut ids = Ids { known: self.types()?, mapped: HashMap::new() };
-        let body = body_of(&code, function);
-        for instruction in needed(&code, body) {
-            self.import_global(instruction, &mut ids);
+        let mut ids = IdRemap { known: self.unique_types()?, mapped: HashMap::new() };
+        let body = function_body(&code, function);
+        for instruction in required_globals(&code, body) {
+            self.link_global(instruction, &mut ids);
         }
         let mut functions = std::mem::take(&mut self.functions);
         for instruction in body {
-            let words = self.mapped(instruction, &mut ids);
+            let words = self.remap_operands(instruction, &mut ids);
             functions.extend(words);
         }
         self.functions = functions;
@@ -96,7 +96,7 @@ impl Sections {
             parameters.map(|i| i.operand(0)).nth(index).map_or(Err("a parameter is missing"), id)
         };
         let result = body.first().map_or(Err("the function is empty"), |first| id(first.operand(0)))?;
-        Ok(Imported {
+        Ok(LinkedFunction {
             function: id(function)?,
             result,
             address: parameter_type(0)?,
@@ -104,8 +104,8 @@ impl Sections {
         })
     }
 
-    fn import_global(&mut self, instruction: &Instruction<'_>, ids: &mut Ids) {
-        let result = result_of(instruction);
+    fn link_global(&mut self, instruction: &Instruction<'_>, ids: &mut IdRemap) {
+        let result = result_operand(instruction);
         let mut shape: Vec<u32> = instruction.words.to_vec();
         for (index, word) in shape.iter_mut().enumerate().skip(1) {
             if index != result + 1 && is_id(instruction, index - 1) {
@@ -123,7 +123,7 @@ impl Sections {
         self.globals.extend(shape);
     }
 
-    fn mapped(&mut self, instruction: &Instruction<'_>, ids: &mut Ids) -> Vec<u32> {
+    fn remap_operands(&mut self, instruction: &Instruction<'_>, ids: &mut IdRemap) -> Vec<u32> {
         let mut words = instruction.words.to_vec();
         for (index, word) in words.iter_mut().enumerate().skip(1) {
             if is_id(instruction, index - 1) {
@@ -134,7 +134,7 @@ impl Sections {
     }
 
     /// The types that may be declared once only, by their words without the result.
-    fn types(&self) -> Result<Known, String> {
+    fn unique_types(&self) -> Result<DefinedIds, String> {
         let mut known = HashMap::new();
         for instruction in instructions(&[self.header.clone(), self.globals.clone()].concat()) {
             let instruction = instruction?;
@@ -144,12 +144,12 @@ impl Sections {
                 known.insert(shape, instruction.operand(0));
             }
         }
-        Ok(Known(known))
+        Ok(DefinedIds(known))
     }
 }
 
 /// What was imported.
-pub(crate) struct Imported {
+pub(crate) struct LinkedFunction {
     pub(crate) function: u32,
     /// Type of what it answers.
     pub(crate) result: u32,
@@ -159,28 +159,31 @@ pub(crate) struct Imported {
     pub(crate) word: u32,
 }
 
-struct Ids {
-    known: Known,
+struct IdRemap {
+    known: DefinedIds,
     /// Ids of the donor and what they became.
     mapped: HashMap<u32, u32>,
 }
 
-struct Known(HashMap<Vec<u32>, u32>);
+struct DefinedIds(HashMap<Vec<u32>, u32>);
 
-impl Known {
+impl DefinedIds {
     fn contains(&self, id: u32) -> bool {
         self.0.values().any(|known| *known == id)
     }
 }
 
 /// Adds an instruction.
-pub(crate) fn push(section: &mut Vec<u32>, op: Op, operands: &[u32]) {
+pub(crate) fn push_instruction(section: &mut Vec<u32>, op: Op, operands: &[u32]) {
     section.push((operands.len() as u32 + 1) << 16 | op as u32);
     section.extend(operands);
 }
 
 /// The types and constants that `body` needs, in their order.
-fn needed<'a, 'b>(code: &'a [Instruction<'b>], body: &[Instruction<'b>]) -> Vec<&'a Instruction<'b>> {
+fn required_globals<'a, 'b>(
+    code: &'a [Instruction<'b>],
+    body: &[Instruction<'b>],
+) -> Vec<&'a Instruction<'b>> {
     let ids_of = |i: &Instruction<'b>| {
         let is_id = |(index, word): (usize, &u32)| is_id(i, index).then_some(*word);
         i.operands().iter().enumerate().filter_map(is_id).collect::<Vec<_>>()
@@ -188,7 +191,7 @@ fn needed<'a, 'b>(code: &'a [Instruction<'b>], body: &[Instruction<'b>]) -> Vec<
     let mut wanted: HashSet<u32> = body.iter().flat_map(ids_of).collect();
     let mut found = Vec::new();
     for global in code.iter().rev().filter(|i| i.op.is_some_and(is_type_or_constant)) {
-        if wanted.contains(&global.operand(result_of(global))) {
+        if wanted.contains(&global.operand(result_operand(global))) {
             wanted.extend(ids_of(global));
             found.push(global);
         }
@@ -198,11 +201,11 @@ fn needed<'a, 'b>(code: &'a [Instruction<'b>], body: &[Instruction<'b>]) -> Vec<
 }
 
 /// Which operand of a type or constant is its own id.
-fn result_of(instruction: &Instruction<'_>) -> usize {
+fn result_operand(instruction: &Instruction<'_>) -> usize {
     if instruction.op.is_some_and(is_type) { 0 } else { 1 }
 }
 
-fn body_of<'a, 'b>(code: &'a [Instruction<'b>], function: u32) -> &'a [Instruction<'b>] {
+fn function_body<'a, 'b>(code: &'a [Instruction<'b>], function: u32) -> &'a [Instruction<'b>] {
     let start = code.iter().position(|i| i.op == Some(Op::Function) && i.operand(1) == function);
     let rest = &code[start.unwrap_or(code.len())..];
     let end = rest.iter().position(|i| i.op == Some(Op::FunctionEnd));

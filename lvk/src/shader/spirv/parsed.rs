@@ -4,9 +4,9 @@ use std::collections::{HashMap, HashSet};
 
 use ::spirv::{BuiltIn, Capability, Decoration, Dim, Op, StorageClass};
 
-use super::const_eval::fold;
+use super::const_eval::evaluate_spec_constant_op;
 use super::words::{self, Instruction};
-use crate::format::Numbers;
+use crate::format::NumericFormat;
 
 /// A buffer address in a push-constant block.
 const ADDRESS_BYTES: u64 = 8;
@@ -15,10 +15,10 @@ pub(crate) const MAX_NESTING: u32 = 64;
 
 /// Declarations by id; ids may point anywhere, so every look-up can fail.
 #[derive(Debug, Default)]
-pub(crate) struct Module {
+pub(crate) struct ParsedModule {
     version: u32,
     capabilities: HashSet<u32>,
-    pub(crate) entries: Vec<Entry>,
+    pub(crate) entries: Vec<EntryPoint>,
     pub(crate) modes: Vec<Mode>,
     pub(crate) names: HashMap<u32, String>,
     pub(crate) types: HashMap<u32, Type>,
@@ -33,7 +33,7 @@ pub(crate) struct Module {
 
 /// An entry point.
 #[derive(Debug)]
-pub(crate) struct Entry {
+pub(crate) struct EntryPoint {
     pub(crate) model: u32,
     pub(crate) function: u32,
     pub(crate) name: String,
@@ -54,7 +54,7 @@ pub(crate) enum Type {
     Bool,
     Number {
         bytes: u32,
-        numbers: Numbers,
+        numbers: NumericFormat,
     },
     Vector {
         element: u32,
@@ -104,12 +104,12 @@ pub(crate) struct Variable {
     pub(crate) storage: u32,
 }
 
-impl Module {
-    pub(crate) fn read(words: &[u32]) -> Result<Self, String> {
+impl ParsedModule {
+    pub(crate) fn parse(words: &[u32]) -> Result<Self, String> {
         Self::specialized(words, &HashMap::new())
     }
 
-    /// As [`read`](Self::read), with these values of specialization constants, by their ids.
+    /// As [`parse`](Self::parse), with these values of specialization constants, by their ids.
     pub(crate) fn specialized(words: &[u32], values: &HashMap<u32, u32>) -> Result<Self, String> {
         let mut module = Self { version: words::version(words), ..Self::default() };
         for instruction in words::instructions(words) {
@@ -123,7 +123,7 @@ impl Module {
         Ok(module)
     }
 
-    pub(crate) fn has(&self, capability: Capability) -> bool {
+    pub(crate) fn has_capability(&self, capability: Capability) -> bool {
         self.capabilities.contains(&(capability as u32))
     }
 
@@ -212,7 +212,7 @@ impl Module {
                     Some(stride) => u64::from(stride),
                     None => self.size(*element, matrix, nesting, known)?,
                 };
-                stride.saturating_mul(self.length(*length)?)
+                stride.saturating_mul(self.array_length(*length)?)
             }
             Type::Struct { members } => self.struct_size(ty, members, nesting, known)?,
             Type::RuntimeArray { .. } => return Err("an array has no length".to_owned()),
@@ -264,7 +264,7 @@ impl Module {
         Ok(end)
     }
 
-    pub(crate) fn length(&self, id: u32) -> Result<u64, String> {
+    pub(crate) fn array_length(&self, id: u32) -> Result<u64, String> {
         let constant = self.constants.get(&id).ok_or("an array's length is not a plain constant")?;
         Ok(u64::from(constant.value))
     }
@@ -272,7 +272,7 @@ impl Module {
     fn collect(&mut self, op: Op, i: &Instruction<'_>, values: &HashMap<u32, u32>) {
         match op {
             Op::Capability => _ = self.capabilities.insert(i.operand(0)),
-            Op::EntryPoint => self.entries.push(entry(i)),
+            Op::EntryPoint => self.entries.push(parse_entry_point(i)),
             Op::ExecutionMode | Op::ExecutionModeId => self.modes.push(Mode {
                 function: i.operand(0),
                 mode: i.operand(1),
@@ -287,16 +287,16 @@ impl Module {
             Op::Variable => {
                 self.variables.push(Variable { ty: i.operand(0), id: i.operand(1), storage: i.operand(2) });
             }
-            Op::Constant => self.constant(i, i.operand(2), false),
-            Op::ConstantTrue => self.constant(i, 1, false),
-            Op::ConstantFalse => self.constant(i, 0, false),
+            Op::Constant => self.add_constant(i, i.operand(2), false),
+            Op::ConstantTrue => self.add_constant(i, 1, false),
+            Op::ConstantFalse => self.add_constant(i, 0, false),
             Op::SpecConstant | Op::SpecConstantTrue | Op::SpecConstantFalse => {
                 let own =
                     if op == Op::SpecConstant { i.operand(2) } else { (op == Op::SpecConstantTrue).into() };
                 let given = self.decoration(i.operand(1), Decoration::SpecId).and_then(|id| values.get(&id));
-                self.constant(i, given.copied().unwrap_or(own), true);
+                self.add_constant(i, given.copied().unwrap_or(own), true);
             }
-            Op::SpecConstantOp => self.fold(i),
+            Op::SpecConstantOp => self.evaluate_spec_op(i),
             Op::ConstantComposite | Op::SpecConstantComposite => {
                 self.composites.insert(i.operand(1), [i.operand(2), i.operand(3), i.operand(4)]);
             }
@@ -304,18 +304,18 @@ impl Module {
         }
     }
 
-    fn constant(&mut self, i: &Instruction<'_>, value: u32, is_spec: bool) {
+    fn add_constant(&mut self, i: &Instruction<'_>, value: u32, is_spec: bool) {
         self.constants.insert(i.operand(1), Constant { ty: i.operand(0), value, is_spec });
     }
 
     /// What it is made of stands before it.
-    fn fold(&mut self, i: &Instruction<'_>) {
+    fn evaluate_spec_op(&mut self, i: &Instruction<'_>) {
         let operands = i.operands().get(3..).unwrap_or(&[]);
         let value = match Op::from_u32(i.operand(2)) {
-            Some(Op::CompositeExtract) => self.part(i.operand(3), i.operand(4)),
+            Some(Op::CompositeExtract) => self.constituent(i.operand(3), i.operand(4)),
             Some(op) => {
-                let values: Option<Vec<u32>> = operands.iter().map(|id| self.value(*id)).collect();
-                values.and_then(|values| fold(op, &values))
+                let values: Option<Vec<u32>> = operands.iter().map(|id| self.constant_value(*id)).collect();
+                values.and_then(|values| evaluate_spec_constant_op(op, &values))
             }
             None => None,
         };
@@ -325,13 +325,13 @@ impl Module {
     }
 
     /// One of the first three parts of a composite constant.
-    fn part(&self, composite: u32, index: u32) -> Option<u32> {
+    fn constituent(&self, composite: u32, index: u32) -> Option<u32> {
         let part = self.composites.get(&composite)?.get(index as usize)?;
-        self.value(*part)
+        self.constant_value(*part)
     }
 
     /// The low word of a constant, or what an operation on constants comes to.
-    pub(crate) fn value(&self, id: u32) -> Option<u32> {
+    pub(crate) fn constant_value(&self, id: u32) -> Option<u32> {
         let plain = self.constants.get(&id).map(|constant| constant.value);
         plain.or_else(|| self.folded.get(&id).copied())
     }
@@ -339,10 +339,10 @@ impl Module {
     fn collect_type(&mut self, op: Op, i: &Instruction<'_>) {
         let ty = match op {
             Op::TypeBool => Type::Bool,
-            Op::TypeFloat => Type::Number { bytes: i.operand(1).div_ceil(8), numbers: Numbers::Float },
+            Op::TypeFloat => Type::Number { bytes: i.operand(1).div_ceil(8), numbers: NumericFormat::Float },
             Op::TypeInt => Type::Number {
                 bytes: i.operand(1).div_ceil(8),
-                numbers: if i.operand(2) == 0 { Numbers::Uint } else { Numbers::Sint },
+                numbers: if i.operand(2) == 0 { NumericFormat::Uint } else { NumericFormat::Sint },
             },
             Op::TypeVector => Type::Vector { element: i.operand(1), count: i.operand(2) },
             Op::TypeMatrix => Type::Matrix { column: i.operand(1), count: i.operand(2) },
@@ -350,7 +350,7 @@ impl Module {
             Op::TypeRuntimeArray => Type::RuntimeArray { element: i.operand(1) },
             Op::TypeStruct => Type::Struct { members: i.operands().get(1..).unwrap_or(&[]).to_vec() },
             Op::TypePointer => Type::Pointer { target: i.operand(2) },
-            Op::TypeImage => image(i),
+            Op::TypeImage => parse_image_type(i),
             Op::TypeSampler | Op::TypeSampledImage | Op::TypeAccelerationStructureKHR => Type::Opaque(op),
             _ => return,
         };
@@ -358,14 +358,14 @@ impl Module {
     }
 }
 
-fn entry(i: &Instruction<'_>) -> Entry {
+fn parse_entry_point(i: &Instruction<'_>) -> EntryPoint {
     let (name, name_words) = i.string(2);
     let interface = i.operands().get(2 + name_words..).unwrap_or(&[]).iter().copied().collect();
-    Entry { model: i.operand(0), function: i.operand(1), name, interface }
+    EntryPoint { model: i.operand(0), function: i.operand(1), name, interface }
 }
 
 /// Texel buffers have no binding in the library.
-fn image(i: &Instruction<'_>) -> Type {
+fn parse_image_type(i: &Instruction<'_>) -> Type {
     const SAMPLED: u32 = 1;
     const STORAGE: u32 = 2;
     let dim = i.operand(2);

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use ::spirv::StorageClass;
 
-use super::parsed::{MAX_NESTING, Module, Type};
+use super::parsed::{MAX_NESTING, ParsedModule, Type};
 
 /// Sizes in bytes, 0 where a module has none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -17,13 +17,13 @@ pub(crate) struct RayInterface {
 
 impl RayInterface {
     /// What the module declares. A size that cannot be known counts as the largest.
-    pub(crate) fn of(module: &Module) -> Self {
+    pub(crate) fn from_module(module: &ParsedModule) -> Self {
         let largest = |classes: &[StorageClass]| {
             let variables = module.variables.iter();
             let ours =
                 variables.filter(|variable| classes.iter().any(|class| *class as u32 == variable.storage));
             let bytes = ours.map(|variable| match module.types.get(&variable.ty) {
-                Some(Type::Pointer { target }) => bytes(module, *target),
+                Some(Type::Pointer { target }) => type_bytes(module, *target),
                 _ => u32::MAX,
             });
             bytes.max().unwrap_or(0)
@@ -40,15 +40,17 @@ type Extent = (u64, u64);
 
 /// The size as Vulkan counts it, where no offset is given: every member is aligned to the type's largest scalar
 /// (`VkRayTracingPipelineInterfaceCreateInfoKHR`).
-fn bytes(module: &Module, ty: u32) -> u32 {
-    let Some((_, scalar)) = extent(module, ty, 1, MAX_NESTING, &mut HashMap::new()) else { return u32::MAX };
-    let whole = extent(module, ty, scalar, MAX_NESTING, &mut HashMap::new());
+fn type_bytes(module: &ParsedModule, ty: u32) -> u32 {
+    let Some((_, scalar)) = type_extent(module, ty, 1, MAX_NESTING, &mut HashMap::new()) else {
+        return u32::MAX;
+    };
+    let whole = type_extent(module, ty, scalar, MAX_NESTING, &mut HashMap::new());
     whole.and_then(|(bytes, _)| u32::try_from(bytes).ok()).unwrap_or(u32::MAX)
 }
 
 /// The extent with members aligned to `alignment`; `None` for what has none.
-fn extent(
-    module: &Module,
+fn type_extent(
+    module: &ParsedModule,
     ty: u32,
     alignment: u64,
     nesting: u32,
@@ -60,7 +62,7 @@ fn extent(
         return Some(*extent);
     }
     let nesting = nesting.checked_sub(1)?;
-    let mut of = |ty: u32| extent(module, ty, alignment, nesting, known);
+    let mut of = |ty: u32| type_extent(module, ty, alignment, nesting, known);
     let times = |(bytes, scalar): Extent, count: u32| (bytes.saturating_mul(count.into()), scalar);
     let found = match module.types.get(&ty)? {
         Type::Bool => (BOOL_BYTES, BOOL_BYTES),
@@ -126,9 +128,9 @@ mod tests {
 
     #[test]
     fn a_type_that_contains_itself_counts_as_the_largest() {
-        let mut module = Module::default();
+        let mut module = ParsedModule::default();
         module.types.insert(1, Type::Struct { members: vec![1, 1] });
-        assert_eq!(bytes(&module, 1), u32::MAX);
-        assert_eq!(bytes(&module, 2), u32::MAX);
+        assert_eq!(type_bytes(&module, 1), u32::MAX);
+        assert_eq!(type_bytes(&module, 2), u32::MAX);
     }
 }

@@ -2,9 +2,9 @@
 
 use ::spirv::{Capability, Decoration, ExecutionMode, ExecutionModel, Op, StorageClass};
 
-use super::atomics::{Atomic, atomics};
-use super::input_attachments::{InputRead, input_read, outputs};
-use super::parsed::{Mode, Module, Type, Variable};
+use super::atomics::{Atomic, find_atomics};
+use super::input_attachments::{InputRead, output_locations, read_input_attachment};
+use super::parsed::{Mode, ParsedModule, Type, Variable};
 use super::ray_interface::RayInterface;
 use super::words;
 use super::workgroup_memory::SharedMemory;
@@ -67,12 +67,12 @@ pub(crate) struct Reflection {
 
 /// Reads `words`, made for `stage` with the entry point `main`; never trusts them.
 pub(crate) fn reflect(name: &str, stage: ShaderStage, words: &[u32]) -> Result<Reflection> {
-    read(stage, words).map_err(|log| Error::Shader { name: name.to_owned(), log })
+    reflect_words(stage, words).map_err(|log| Error::Shader { name: name.to_owned(), log })
 }
 
-fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
-    words::check(words)?;
-    let module = Module::read(words)?;
+fn reflect_words(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
+    words::validate(words)?;
+    let module = ParsedModule::parse(words)?;
     let entry = entry_point(&module, stage)?;
     let function = module.entries[entry].function;
     check_function(words, function)?;
@@ -82,7 +82,7 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
     for variable in module.variables.iter().filter(|variable| module.in_interface(entry, variable)) {
         if variable.storage == StorageClass::PushConstant as u32 {
             push_constant_bytes = push_constant_bytes.max(block_bytes(&module, variable)?);
-        } else if let Some(read) = input_read(&module, variable)? {
+        } else if let Some(read) = read_input_attachment(&module, variable)? {
             input_reads.push(read);
         } else if is_descriptor(variable) {
             bindings.push(binding(&module, variable)?);
@@ -90,14 +90,14 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
             inputs.extend(module.decoration(variable.id, Decoration::Location));
         } else if variable.storage == StorageClass::Output as u32 {
             second_output |= module.decoration(variable.id, Decoration::Index) == Some(1);
-            colors |= outputs(&module, variable);
+            colors |= output_locations(&module, variable);
         }
     }
-    input_reads.sort_unstable_by_key(|read| read.input.place());
+    input_reads.sort_unstable_by_key(|read| read.input.index());
     bindings.sort_unstable();
     bindings.dedup();
-    let hardware_ray_query = module.has(Capability::RayQueryKHR);
-    let ray_tracing = stage.is_ray_tracing() || module.has(Capability::RayTracingKHR);
+    let hardware_ray_query = module.has_capability(Capability::RayQueryKHR);
+    let ray_tracing = stage.is_ray_tracing() || module.has_capability(Capability::RayTracingKHR);
     // Only what traces rays itself has any business with the table.
     let software_ray_query = !hardware_ray_query && !ray_tracing && bindings.contains(&layout::TLAS_TABLE);
     Ok(Reflection {
@@ -105,25 +105,25 @@ fn read(stage: ShaderStage, words: &[u32]) -> Result<Reflection, String> {
         ray_query: hardware_ray_query || software_ray_query,
         hardware_ray_query,
         ray_tracing,
-        ray_interface: RayInterface::of(&module),
+        ray_interface: RayInterface::from_module(&module),
         local_size,
         local_size_ids,
         primitive: primitive(&module, stage, function),
         writes_layer: module.writes_layer(entry),
         second_output,
         mesh_outputs: if stage == ShaderStage::Mesh { mesh_outputs(&module, function) } else { [0; 2] },
-        shared_memory: SharedMemory::of(words, &module, entry),
+        shared_memory: SharedMemory::from_module(words, &module, entry),
         specialization: specialization(&module),
         bindings,
         capabilities: module.capabilities(),
-        atomics: atomics(words)?,
+        atomics: find_atomics(words)?,
         input_reads,
         outputs: if stage == ShaderStage::Fragment { colors } else { 0 },
         inputs,
     })
 }
 
-fn entry_point(module: &Module, stage: ShaderStage) -> Result<usize, String> {
+fn entry_point(module: &ParsedModule, stage: ShaderStage) -> Result<usize, String> {
     let model = execution_model(stage) as u32;
     let found = module.entries.iter().position(|entry| entry.name == "main" && entry.model == model);
     found.ok_or_else(|| {
@@ -170,7 +170,7 @@ fn model_name(model: u32) -> String {
 }
 
 /// The `WorkgroupSize` built-in outranks both execution modes.
-fn local_size(module: &Module, function: u32) -> ([u32; 3], [Option<u32>; 3]) {
+fn local_size(module: &ParsedModule, function: u32) -> ([u32; 3], [Option<u32>; 3]) {
     if let Some(parts) = module.workgroup_size() {
         return parts_of(module, parts);
     }
@@ -186,7 +186,7 @@ fn local_size(module: &Module, function: u32) -> ([u32; 3], [Option<u32>; 3]) {
     ([0; 3], [None; 3])
 }
 
-fn mesh_outputs(module: &Module, function: u32) -> [u32; 2] {
+fn mesh_outputs(module: &ParsedModule, function: u32) -> [u32; 2] {
     [ExecutionMode::OutputVertices, ExecutionMode::OutputPrimitivesEXT].map(|wanted| {
         let of_function = |mode: &&Mode| mode.function == function && mode.mode == wanted as u32;
         module.modes.iter().find(of_function).map_or(0, |mode| mode.operands[0])
@@ -194,7 +194,7 @@ fn mesh_outputs(module: &Module, function: u32) -> [u32; 2] {
 }
 
 /// Stages before rasterisation name their primitives by execution modes.
-fn primitive(module: &Module, stage: ShaderStage, function: u32) -> Option<Primitive> {
+fn primitive(module: &ParsedModule, stage: ShaderStage, function: u32) -> Option<Primitive> {
     use ExecutionMode as Mode;
     let has = |wanted: ExecutionMode| {
         module.modes.iter().any(|mode| mode.function == function && mode.mode == wanted as u32)
@@ -218,12 +218,12 @@ fn primitive(module: &Module, stage: ShaderStage, function: u32) -> Option<Primi
     table.iter().find(|(mode, _)| has(*mode)).map(|(_, primitive)| *primitive)
 }
 
-fn parts_of(module: &Module, ids: [u32; 3]) -> ([u32; 3], [Option<u32>; 3]) {
+fn parts_of(module: &ParsedModule, ids: [u32; 3]) -> ([u32; 3], [Option<u32>; 3]) {
     let size = ids.map(|id| module.constants.get(&id).map_or(1, |constant| constant.value));
     (size, ids.map(|id| module.decoration(id, Decoration::SpecId)))
 }
 
-fn specialization(module: &Module) -> Vec<(u32, u32)> {
+fn specialization(module: &ParsedModule) -> Vec<(u32, u32)> {
     let spec = module.constants.iter().filter(|(_, constant)| constant.is_spec);
     let mut found: Vec<(u32, u32)> = spec
         .filter_map(|(id, constant)| {
@@ -240,7 +240,7 @@ fn specialization(module: &Module) -> Vec<(u32, u32)> {
     found
 }
 
-fn block_bytes(module: &Module, variable: &Variable) -> Result<u32, String> {
+fn block_bytes(module: &ParsedModule, variable: &Variable) -> Result<u32, String> {
     let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else {
         return Err("the push constants have no pointer type".to_owned());
     };
@@ -256,7 +256,7 @@ fn is_descriptor(variable: &Variable) -> bool {
 }
 
 /// The binding of a descriptor variable, if it is one of the library's and of its kind.
-fn binding(module: &Module, variable: &Variable) -> Result<u32, String> {
+fn binding(module: &ParsedModule, variable: &Variable) -> Result<u32, String> {
     let what = module.names.get(&variable.id).map_or("a resource".to_owned(), |name| format!("'{name}'"));
     let (Some(set), Some(binding)) = (
         module.decoration(variable.id, Decoration::DescriptorSet),
@@ -276,7 +276,7 @@ fn binding(module: &Module, variable: &Variable) -> Result<u32, String> {
     if set != layout::SET {
         return Err(format!("{what} is in set {set}, binding {binding}; {}", remedy()));
     }
-    let wanted = kind(module, variable.ty);
+    let wanted = descriptor_kind(module, variable.ty);
     match layout::BINDINGS.iter().find(|known| known.0 == binding) {
         Some(_) if wanted == Some(binding) => Ok(binding),
         Some((_, _, holds)) => {
@@ -290,7 +290,7 @@ fn binding(module: &Module, variable: &Variable) -> Result<u32, String> {
 const TLAS_TABLE: (u32, u32) = (layout::SET, layout::TLAS_TABLE);
 
 /// The binding that takes resources of this type.
-fn kind(module: &Module, pointer: u32) -> Option<u32> {
+fn descriptor_kind(module: &ParsedModule, pointer: u32) -> Option<u32> {
     let Type::Pointer { target } = module.types.get(&pointer)? else { return None };
     let element = match module.types.get(target)? {
         Type::Array { element, .. } | Type::RuntimeArray { element } => element,

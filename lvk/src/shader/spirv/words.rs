@@ -36,7 +36,7 @@ impl<'a> Instruction<'a> {
 }
 
 /// Checks the header and that whole instructions and functions fill `words`.
-pub(crate) fn check(words: &[u32]) -> Result<(), String> {
+pub(crate) fn validate(words: &[u32]) -> Result<(), String> {
     match words.first() {
         Some(&MAGIC_NUMBER) => {}
         Some(&word) if word == MAGIC_NUMBER.swap_bytes() => {

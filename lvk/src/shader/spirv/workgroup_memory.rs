@@ -7,7 +7,7 @@ use std::collections::HashMap;
 
 use ::spirv::{Decoration, Op, StorageClass};
 
-use super::parsed::{MAX_NESTING, Module, Type, Variable};
+use super::parsed::{MAX_NESTING, ParsedModule, Type, Variable};
 use super::words;
 
 /// Declarations of a module with such memory, whose arrays every pipeline may size by its own constants.
@@ -29,11 +29,12 @@ pub(crate) struct SharedBytes {
 }
 
 /// Size and alignment in bytes.
-type Room = (u64, u64);
+type SizeAlign = (u64, u64);
 
 impl SharedMemory {
-    pub(crate) fn of(words: &[u32], module: &Module, entry: usize) -> Self {
-        let shares = |variable: &Variable| is_of(variable, SHARED) || is_of(variable, PAYLOAD);
+    pub(crate) fn from_module(words: &[u32], module: &ParsedModule, entry: usize) -> Self {
+        let shares =
+            |variable: &Variable| has_storage_class(variable, SHARED) || has_storage_class(variable, PAYLOAD);
         let any = module.variables.iter().any(|it| shares(it) && module.in_interface(entry, it));
         let declarations = if any { declarations(words).to_vec() } else { Vec::new() };
         Self { declarations, entry }
@@ -45,10 +46,10 @@ impl SharedMemory {
         if self.declarations.is_empty() {
             return SharedBytes::default();
         }
-        let Ok(module) = Module::specialized(&self.declarations, constants) else {
+        let Ok(module) = ParsedModule::specialized(&self.declarations, constants) else {
             return SharedBytes::default();
         };
-        let of = |storage| Sizes { module: &module, known: HashMap::new() }.of_all(self.entry, storage);
+        let of = |storage| TypeSizes { module: &module, known: HashMap::new() }.of_all(self.entry, storage);
         SharedBytes { shared: of(SHARED), payload: of(PAYLOAD) }
     }
 }
@@ -56,7 +57,7 @@ impl SharedMemory {
 const SHARED: StorageClass = StorageClass::Workgroup;
 const PAYLOAD: StorageClass = StorageClass::TaskPayloadWorkgroupEXT;
 
-fn is_of(variable: &Variable, storage: StorageClass) -> bool {
+fn has_storage_class(variable: &Variable, storage: StorageClass) -> bool {
     variable.storage == storage as u32
 }
 
@@ -70,87 +71,89 @@ fn declarations(words: &[u32]) -> &[u32] {
 }
 
 /// Sizes of the types of a module; each is worked out once.
-struct Sizes<'a> {
-    module: &'a Module,
-    known: HashMap<u32, Option<Room>>,
+struct TypeSizes<'a> {
+    module: &'a ParsedModule,
+    known: HashMap<u32, Option<SizeAlign>>,
 }
 
-impl Sizes<'_> {
+impl TypeSizes<'_> {
     /// Blocks lie in one another, everything else one after the other.
     fn of_all(&mut self, entry: usize, storage: StorageClass) -> u64 {
         let (mut end, mut blocks) = (0, 0);
         let module = self.module;
-        for variable in
-            module.variables.iter().filter(|it| is_of(it, storage) && module.in_interface(entry, it))
+        for variable in module
+            .variables
+            .iter()
+            .filter(|it| has_storage_class(it, storage) && module.in_interface(entry, it))
         {
             let Some(Type::Pointer { target }) = module.types.get(&variable.ty) else { continue };
-            let Some(room) = self.of(*target, MAX_NESTING) else { continue };
+            let Some(room) = self.size_of(*target, MAX_NESTING) else { continue };
             if module.decoration(*target, Decoration::Block).is_some() {
                 blocks = room.0.max(blocks);
             } else {
-                end = behind(end, room);
+                end = place_after(end, room);
             }
         }
         end.max(blocks)
     }
 
-    fn of(&mut self, ty: u32, nesting: u32) -> Option<Room> {
+    fn size_of(&mut self, ty: u32, nesting: u32) -> Option<SizeAlign> {
         if let Some(known) = self.known.get(&ty) {
             return *known;
         }
         let nesting = nesting.checked_sub(1)?;
-        let found = self.work_out(ty, nesting);
+        let found = self.compute_size(ty, nesting);
         self.known.insert(ty, found);
         found
     }
 
-    fn work_out(&mut self, ty: u32, nesting: u32) -> Option<Room> {
+    fn compute_size(&mut self, ty: u32, nesting: u32) -> Option<SizeAlign> {
         match self.module.types.get(&ty)? {
             Type::Bool => Some((4, 4)),
             Type::Number { bytes, .. } => Some(((*bytes).into(), (*bytes).max(1).into())),
             Type::Pointer { .. } => Some((8, 8)),
             Type::Vector { element, count } => {
-                let (bytes, _) = self.of(*element, nesting)?;
+                let (bytes, _) = self.size_of(*element, nesting)?;
                 let count = u64::from(*count);
                 Some((bytes.saturating_mul(count), bytes.saturating_mul(count.next_power_of_two()).max(1)))
             }
             Type::Matrix { column, count } => {
-                let column = self.of(*column, nesting)?;
-                Some((padded(column).saturating_mul((*count).into()), column.1))
+                let column = self.size_of(*column, nesting)?;
+                Some((align_size(column).saturating_mul((*count).into()), column.1))
             }
             Type::Array { element, length } => {
-                let element = self.of(*element, nesting)?;
+                let element = self.size_of(*element, nesting)?;
                 let stride = self.module.decoration(ty, Decoration::ArrayStride).map(u64::from);
-                let stride = stride.unwrap_or_else(|| padded(element));
-                Some((stride.saturating_mul(self.module.value(*length)?.into()), element.1))
+                let stride = stride.unwrap_or_else(|| align_size(element));
+                Some((stride.saturating_mul(self.module.constant_value(*length)?.into()), element.1))
             }
-            Type::Struct { members } => self.of_struct(ty, members, nesting),
+            Type::Struct { members } => self.struct_size(ty, members, nesting),
             Type::RuntimeArray { .. } | Type::Image { .. } | Type::SubpassInput { .. } | Type::Opaque(_) => {
                 None
             }
         }
     }
 
-    fn of_struct(&mut self, ty: u32, members: &[u32], nesting: u32) -> Option<Room> {
+    fn struct_size(&mut self, ty: u32, members: &[u32], nesting: u32) -> Option<SizeAlign> {
         let (mut end, mut align) = (0, 1);
         for (index, member) in (0..).zip(members) {
-            let room = self.of(*member, nesting)?;
+            let room = self.size_of(*member, nesting)?;
             end = match self.module.member_decoration(ty, index, Decoration::Offset) {
                 Some(offset) => room.0.saturating_add(offset.into()).max(end),
-                None => behind(end, room),
+                None => place_after(end, room),
             };
             align = room.1.max(align);
         }
-        Some((padded((end, align)), align))
+        Some((align_size((end, align)), align))
     }
 }
 
 /// The end of what lies as soon behind `end` as its alignment allows.
-fn behind(end: u64, room: Room) -> u64 {
-    padded((end, room.1)).saturating_add(room.0)
+fn place_after(end: u64, room: SizeAlign) -> u64 {
+    align_size((end, room.1)).saturating_add(room.0)
 }
 
 /// The size as a multiple of the alignment.
-fn padded((bytes, align): Room) -> u64 {
+fn align_size((bytes, align): SizeAlign) -> u64 {
     bytes.checked_next_multiple_of(align).unwrap_or(u64::MAX)
 }

@@ -51,7 +51,7 @@ proptest! {
         for stage in ShaderStage::ALL {
             prop_assert!(reflect("test", stage, &words).is_err());
         }
-        _ = strip_unused_bindings::without_unused_resources(words);
+        _ = strip_unused_bindings::strip_unused_bindings(words);
     }
 
     #[test]
@@ -64,9 +64,9 @@ proptest! {
             words.extend(operands);
         }
         _ = reflect("test", ShaderStage::Compute, &words);
-        let sound = words::check(&words).is_ok();
-        let kept = strip_unused_bindings::without_unused_resources(words);
-        prop_assert_eq!(words::check(&kept).is_ok(), sound);
+        let sound = words::validate(&words).is_ok();
+        let kept = strip_unused_bindings::strip_unused_bindings(words);
+        prop_assert_eq!(words::validate(&kept).is_ok(), sound);
     }
 
     #[test]
@@ -78,7 +78,7 @@ proptest! {
             words[at] ^= 1 << bit;
         }
         _ = reflect("test", ShaderStage::Compute, &words);
-        _ = strip_unused_bindings::without_unused_resources(words.clone());
+        _ = strip_unused_bindings::strip_unused_bindings(words.clone());
         words.truncate(cut.index(whole.len()));
         _ = reflect("test", ShaderStage::Compute, &words);
     }

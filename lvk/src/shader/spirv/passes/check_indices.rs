@@ -6,8 +6,8 @@ use ::spirv::{AddressingModel, Capability, Decoration, Op, StorageClass};
 
 use crate::bindless::index_checks::{BindlessArray, CheckPlan};
 use crate::bindless::layout;
-use crate::shader::spirv::link::{Imported, Sections, push};
-use crate::shader::spirv::parsed::{Module, Type};
+use crate::shader::spirv::link::{LinkedFunction, ModuleSections, push_instruction};
+use crate::shader::spirv::parsed::{ParsedModule, Type};
 use crate::shader::spirv::words::{self, Instruction, instructions};
 
 /// `glsl/checked_index.glsl` as words.
@@ -19,30 +19,30 @@ const VERSION_1_5: u32 = 0x0001_0500;
 /// The module with every index of a bindless array checked; why not where it cannot be. Arrays of Y'CbCr samplers take
 /// constants alone, and are left as they are.
 pub(crate) fn with_checked_indices(words: &[u32], plan: &CheckPlan) -> Result<Vec<u32>, String> {
-    let module = Module::read(words)?;
-    let arrays = arrays(&module);
+    let module = ParsedModule::parse(words)?;
+    let arrays = find_bindless_arrays(&module);
     if arrays.is_empty() {
         return Ok(words.to_vec());
     }
     if words::version(words) < VERSION_1_5 {
         return Err("its SPIR-V is older than version 1.5".to_owned());
     }
-    if module.has(Capability::VulkanMemoryModel) {
+    if module.has_capability(Capability::VulkanMemoryModel) {
         return Err("it uses Vulkan's own memory model".to_owned());
     }
-    let mut sections = Sections::of(words)?;
+    let mut sections = ModuleSections::parse(words)?;
     let body = std::mem::take(&mut sections.functions);
     let donor: Vec<u32> = DONOR.as_chunks::<4>().0.iter().map(|word| u32::from_le_bytes(*word)).collect();
-    let imported = sections.import(&donor, FUNCTION)?;
+    let imported = sections.link_function(&donor, FUNCTION)?;
     let helper = std::mem::take(&mut sections.functions);
-    let checked = Checker::new(&mut sections, words, plan, &imported)?.check(&arrays, &body)?;
+    let checked = Checker::new(&mut sections, words, plan, &imported)?.rewrite_access(&arrays, &body)?;
     sections.functions = [checked, helper].concat();
-    allow_addresses(&mut sections, &module);
+    enable_buffer_addresses(&mut sections, &module);
     Ok(sections.words())
 }
 
 /// A variable that is an array of the set, or the table beside `kTLAS`: which, and where the index stands in an access.
-fn arrays(module: &Module) -> HashMap<u32, (BindlessArray, usize)> {
+fn find_bindless_arrays(module: &ParsedModule) -> HashMap<u32, (BindlessArray, usize)> {
     let found = |variable: &crate::shader::spirv::parsed::Variable| {
         let set = module.decoration(variable.id, Decoration::DescriptorSet)?;
         let binding = module.decoration(variable.id, Decoration::Binding)?;
@@ -65,10 +65,10 @@ fn arrays(module: &Module) -> HashMap<u32, (BindlessArray, usize)> {
 }
 
 /// Declares that the module has addresses.
-fn allow_addresses(sections: &mut Sections, module: &Module) {
-    if !module.has(Capability::PhysicalStorageBufferAddresses) {
+fn enable_buffer_addresses(sections: &mut ModuleSections, module: &ParsedModule) {
+    if !module.has_capability(Capability::PhysicalStorageBufferAddresses) {
         let capability = Capability::PhysicalStorageBufferAddresses as u32;
-        push(&mut sections.capabilities, Op::Capability, &[capability]);
+        push_instruction(&mut sections.capabilities, Op::Capability, &[capability]);
     }
     let mut at = 0;
     while let Some(&first) = sections.annotations.get(at) {
@@ -84,8 +84,8 @@ fn allow_addresses(sections: &mut Sections, module: &Module) {
 
 /// Rewrites the bodies of functions.
 struct Checker<'a> {
-    sections: &'a mut Sections,
-    imported: &'a Imported,
+    sections: &'a mut ModuleSections,
+    imported: &'a LinkedFunction,
     address: u32,
     shader: u32,
     /// For each array its number, the place of its first word and its length.
@@ -100,25 +100,25 @@ struct Checker<'a> {
 
 impl<'a> Checker<'a> {
     fn new(
-        sections: &'a mut Sections,
+        sections: &'a mut ModuleSections,
         words: &[u32],
         plan: &CheckPlan,
-        imported: &'a Imported,
+        imported: &'a LinkedFunction,
     ) -> Result<Self, String> {
         let word = imported.word;
         let halves =
-            [plan.address as u32, (plan.address >> 32) as u32].map(|half| sections.constant(word, half));
+            [plan.address as u32, (plan.address >> 32) as u32].map(|half| sections.add_constant(word, half));
         let address = sections.new_id();
-        push(
+        push_instruction(
             &mut sections.globals,
             Op::ConstantComposite,
             &[imported.address, address, halves[0], halves[1]],
         );
-        let shader = sections.constant(word, plan.shader);
+        let shader = sections.add_constant(word, plan.shader);
         let arrays = (0..).zip(plan.arrays);
         let arrays = arrays
             .map(|(number, range)| {
-                [number, range.first, range.count].map(|value| sections.constant(word, value))
+                [number, range.first, range.count].map(|value| sections.add_constant(word, value))
             })
             .collect();
         let mut checker = Self {
@@ -158,7 +158,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    fn check(
+    fn rewrite_access(
         mut self,
         arrays: &HashMap<u32, (BindlessArray, usize)>,
         body: &[u32],
@@ -174,7 +174,7 @@ impl<'a> Checker<'a> {
             let index = array.map(|(_, position)| 3 + position);
             match (array, index.filter(|index| *index < instruction.operands().len())) {
                 (Some((array, _)), Some(index)) => {
-                    let checked = self.call(&mut out, *array, &instruction, index)?;
+                    let checked = self.emit_check_call(&mut out, *array, &instruction, index)?;
                     let at = out.len();
                     out.extend(instruction.words);
                     out[at + 1 + index] = checked;
@@ -186,7 +186,7 @@ impl<'a> Checker<'a> {
     }
 
     /// Calls the function for one index; answers what it answers.
-    fn call(
+    fn emit_check_call(
         &mut self,
         out: &mut Vec<u32>,
         array: BindlessArray,
@@ -203,7 +203,7 @@ impl<'a> Checker<'a> {
             false => {
                 let id = self.sections.new_id();
                 let op = if bits == 32 { Op::Bitcast } else { Op::UConvert };
-                push(out, op, &[word, id, index]);
+                push_instruction(out, op, &[word, id, index]);
                 id
             }
         };
@@ -211,9 +211,13 @@ impl<'a> Checker<'a> {
         let [number, first, count] = self.arrays[array as usize];
         let call =
             [result, checked, self.imported.function, self.address, self.shader, number, first, count, plain];
-        push(out, Op::FunctionCall, &call);
+        push_instruction(out, Op::FunctionCall, &call);
         if marked {
-            push(&mut self.sections.annotations, Op::Decorate, &[checked, Decoration::NonUniform as u32]);
+            push_instruction(
+                &mut self.sections.annotations,
+                Op::Decorate,
+                &[checked, Decoration::NonUniform as u32],
+            );
         }
         Ok(checked)
     }
@@ -230,7 +234,7 @@ fn is_type(i: &Instruction<'_>) -> bool {
 mod tests {
     #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic, reason = "a test")]
     use super::*;
-    use crate::bindless::index_checks::{self, Range};
+    use crate::bindless::index_checks::{self, WordRange};
     use crate::shader::spirv::reflect::reflect;
     use crate::shader::{CompileOptions, ShaderModuleDesc, ShaderSource, ShaderStage, compile};
 
@@ -240,7 +244,7 @@ mod tests {
     }
 
     fn plan() -> CheckPlan {
-        let arrays = [7, 17, 27, 37].map(|first| Range { first, count: 5 });
+        let arrays = [7, 17, 27, 37].map(|first| WordRange { first, count: 5 });
         CheckPlan { address: 0x1234_5678_9abc_def0, shader: 3, arrays }
     }
 

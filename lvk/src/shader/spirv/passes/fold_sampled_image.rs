@@ -10,7 +10,7 @@ use crate::shader::spirv::words::{HEADER_WORDS, Instruction, instructions};
 ///
 /// The combination takes the name and so the decorations of its copy. SPIR-V has combinations used by sampling instructions
 /// alone, and SwiftShader looks at nothing but the combination to know that lanes may differ.
-pub(crate) fn without_sampled_copies(words: Vec<u32>) -> Vec<u32> {
+pub(crate) fn fold_sampled_images(words: Vec<u32>) -> Vec<u32> {
     let Ok(code) = instructions(&words).collect::<Result<Vec<_>, _>>() else {
         return words;
     };

@@ -6,7 +6,7 @@ use crate::shader::spirv::words::{HEADER_WORDS, instructions};
 
 /// The module without the capability that `layout(primitive_culling)` asks for, where nothing in it traces by the device:
 /// software skips kinds of primitives without a word of permission, and Vulkan refuses the capability alone.
-pub(crate) fn without_idle_culling(words: &[u32]) -> Vec<u32> {
+pub(crate) fn strip_primitive_culling(words: &[u32]) -> Vec<u32> {
     let declares = |capability: Capability| {
         let is = |words: &[u32]| words.len() == 2 && words[1] == capability as u32;
         instructions(words).flatten().any(|found| found.op == Some(Op::Capability) && is(found.words))

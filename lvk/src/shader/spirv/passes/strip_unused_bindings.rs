@@ -10,7 +10,7 @@ use crate::shader::spirv::words::{Instruction, instructions};
 ///
 /// A device feature may be asked for by the mere presence of a variable (a writable image in a vertex shader), so an
 /// unused one must go. A number that happens to equal an id keeps the variable, which does no harm.
-pub(crate) fn without_unused_resources(words: Vec<u32>) -> Vec<u32> {
+pub(crate) fn strip_unused_bindings(words: Vec<u32>) -> Vec<u32> {
     let Ok(code) = instructions(&words).collect::<Result<Vec<_>, _>>() else {
         return words;
     };
