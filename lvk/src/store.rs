@@ -22,35 +22,35 @@ use crate::swapchain::state::Swapchain;
 pub(crate) struct Store {
     /// A number no other context of the process has.
     pub(crate) context_id: u64,
-    pub(crate) buffers: Pool<BufferHandle, Buffer>,
-    pub(crate) textures: Pool<TextureHandle, Texture>,
-    pub(crate) samplers: Pool<SamplerHandle, Sampler>,
-    pub(crate) shader_modules: Pool<ShaderModuleHandle, ShaderModule>,
-    pub(crate) render_pipelines: Pool<RenderPipelineHandle, RenderPipeline>,
-    pub(crate) compute_pipelines: Pool<ComputePipelineHandle, ComputePipeline>,
-    pub(crate) ray_tracing_pipelines: Pool<RayTracingPipelineHandle, RayTracingPipeline>,
-    pub(crate) ray_tracing_libraries: Pool<RayTracingLibraryHandle, RayTracingLibrary>,
-    pub(crate) query_pools: Pool<QueryPoolHandle, QueryPool>,
-    pub(crate) accel_structs: Pool<AccelStructHandle, AccelStruct>,
-    pub(crate) swapchains: Pool<SwapchainHandle, Swapchain>,
+    pub(crate) buffers: HandlePool<BufferHandle, Buffer>,
+    pub(crate) textures: HandlePool<TextureHandle, Texture>,
+    pub(crate) samplers: HandlePool<SamplerHandle, Sampler>,
+    pub(crate) shader_modules: HandlePool<ShaderModuleHandle, ShaderModule>,
+    pub(crate) render_pipelines: HandlePool<RenderPipelineHandle, RenderPipeline>,
+    pub(crate) compute_pipelines: HandlePool<ComputePipelineHandle, ComputePipeline>,
+    pub(crate) ray_tracing_pipelines: HandlePool<RayTracingPipelineHandle, RayTracingPipeline>,
+    pub(crate) ray_tracing_libraries: HandlePool<RayTracingLibraryHandle, RayTracingLibrary>,
+    pub(crate) query_pools: HandlePool<QueryPoolHandle, QueryPool>,
+    pub(crate) accel_structs: HandlePool<AccelStructHandle, AccelStruct>,
+    pub(crate) swapchains: HandlePool<SwapchainHandle, Swapchain>,
 }
 
 impl Store {
     pub(crate) fn new() -> Self {
-        let mask = next_mask();
+        let mask = next_context_mask();
         Self {
             context_id: mask,
-            buffers: Pool::new(mask),
-            textures: Pool::new(mask),
-            samplers: Pool::new(mask),
-            shader_modules: Pool::new(mask),
-            render_pipelines: Pool::new(mask),
-            compute_pipelines: Pool::new(mask),
-            ray_tracing_pipelines: Pool::new(mask),
-            ray_tracing_libraries: Pool::new(mask),
-            query_pools: Pool::new(mask),
-            accel_structs: Pool::new(mask),
-            swapchains: Pool::new(mask),
+            buffers: HandlePool::new(mask),
+            textures: HandlePool::new(mask),
+            samplers: HandlePool::new(mask),
+            shader_modules: HandlePool::new(mask),
+            render_pipelines: HandlePool::new(mask),
+            compute_pipelines: HandlePool::new(mask),
+            ray_tracing_pipelines: HandlePool::new(mask),
+            ray_tracing_libraries: HandlePool::new(mask),
+            query_pools: HandlePool::new(mask),
+            accel_structs: HandlePool::new(mask),
+            swapchains: HandlePool::new(mask),
         }
     }
 
@@ -120,7 +120,7 @@ named! {
 /// Objects of one kind.
 ///
 /// Keys leave the pool combined with a mask of the context, so that a handle of another context finds nothing.
-pub(crate) struct Pool<H, T> {
+pub(crate) struct HandlePool<H, T> {
     objects: RwLock<SlotMap<DefaultKey, Arc<T>>>,
     /// How many objects were taken out. While it stays the same, whatever was found is still there.
     removals: AtomicU64,
@@ -128,7 +128,7 @@ pub(crate) struct Pool<H, T> {
     handle: PhantomData<fn() -> H>,
 }
 
-impl<H: Handle, T> Pool<H, T> {
+impl<H: Handle, T> HandlePool<H, T> {
     pub(crate) fn new(mask: u64) -> Self {
         let objects = RwLock::new(Rank::Store, SlotMap::new());
         Self { objects, removals: AtomicU64::new(0), mask, handle: PhantomData }
@@ -162,11 +162,11 @@ impl<H: Handle, T> Pool<H, T> {
         T: Named,
     {
         let of = |object: &Arc<T>| LiveObject { kind: H::KIND, name: object.name().to_owned() };
-        self.all().iter().map(of).collect()
+        self.all_objects().iter().map(of).collect()
     }
 
     /// Everything there is.
-    pub(crate) fn all(&self) -> Vec<Arc<T>> {
+    pub(crate) fn all_objects(&self) -> Vec<Arc<T>> {
         let objects = self.objects.read();
         objects.values().cloned().collect()
     }
@@ -183,7 +183,7 @@ impl<H: Handle, T> Pool<H, T> {
 }
 
 /// A different mask for each context of the process: odd multiples spread over all bits.
-fn next_mask() -> u64 {
+fn next_context_mask() -> u64 {
     static CONTEXTS: AtomicU64 = AtomicU64::new(1);
     CONTEXTS.fetch_add(1, Ordering::Relaxed).wrapping_mul(0x9e37_79b9_7f4a_7c15)
 }
@@ -194,7 +194,7 @@ mod tests {
 
     #[test]
     fn a_removed_object_is_stale_even_when_its_place_is_taken_again() {
-        let pool = Pool::<BufferHandle, u32>::new(next_mask());
+        let pool = HandlePool::<BufferHandle, u32>::new(next_context_mask());
         let first = pool.insert(1);
         assert_eq!(*pool.remove(first).unwrap(), 1);
         let second = pool.insert(2);
@@ -205,7 +205,8 @@ mod tests {
 
     #[test]
     fn a_handle_of_another_context_finds_nothing() {
-        let pools: Vec<_> = (0..64).map(|_| Pool::<BufferHandle, usize>::new(next_mask())).collect();
+        let pools: Vec<_> =
+            (0..64).map(|_| HandlePool::<BufferHandle, usize>::new(next_context_mask())).collect();
         let handles: Vec<Vec<_>> =
             pools.iter().map(|pool| (0..100).map(|value| pool.insert(value)).collect()).collect();
         for (owner, handles) in handles.iter().enumerate() {

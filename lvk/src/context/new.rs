@@ -5,18 +5,18 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, OnceLock};
 
 use super::config::ContextDesc;
-use super::default_descriptors::fill_dummies;
+use super::default_descriptors::fill_default_descriptors;
 use super::frame::FrameRing;
-use super::prologue::Pending;
-use super::{Context, Inner};
+use super::prologue::Prologue;
+use super::{Context, ContextInner};
 use crate::accel::compaction::Compactions;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
 use crate::barrier::{RayQueryStages, ResourceId};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::bindless::{Bindless, YuvSlots};
-use crate::command::SpareNotes;
-use crate::device_state::Shared;
+use crate::command::RecordingStatePool;
+use crate::device_state::DeviceState;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::gpu::caps::capabilities::{Capabilities, PhysicalDevice};
@@ -30,11 +30,11 @@ use crate::pipeline::{PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::shader::ShaderCache;
-use crate::software_ray_query::bvh_cache::TreeCache;
+use crate::software_ray_query::bvh_cache::BvhCache;
 use crate::store::Store;
 use crate::submit::Submitter;
 use crate::submit::profiler::Profiler;
-use crate::upload::{SpareBuffers, Staging};
+use crate::upload::{BufferRecycler, Staging};
 
 impl Context {
     /// Opens Vulkan and makes a device that has what `desc` requires.
@@ -65,22 +65,22 @@ impl Context {
             queues: requested_queues(desc),
             window: desc.window.as_deref(),
         };
-        Self::on(Arc::new(Gpu::new(instance, &request)?), desc)
+        Self::with_gpu(Arc::new(Gpu::new(instance, &request)?), desc)
     }
 
     /// Of `desc` what does not belong to the making of devices.
-    pub(super) fn on(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Self> {
-        let shared = Arc::new(new_shared(gpu, desc)?);
-        let inner = Inner {
-            pending: Mutex::new(Rank::Pending, Pending::default()),
+    pub(super) fn with_gpu(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Self> {
+        let shared = Arc::new(new_device_state(gpu, desc)?);
+        let inner = ContextInner {
+            prologue: Mutex::new(Rank::Pending, Prologue::default()),
             compactions: Mutex::new(Rank::Compactions, Compactions::default()),
             frames: Mutex::new(Rank::Frames, FrameRing::new(desc.frames_in_flight)),
-            spare_notes: SpareNotes::new(),
+            recording_states: RecordingStatePool::new(),
             window: desc.window.clone(),
             shared,
         };
         let context = Self { inner: Arc::new(inner) };
-        fill_dummies(&context)?;
+        fill_default_descriptors(&context)?;
         Ok(context)
     }
 
@@ -106,34 +106,34 @@ pub(super) fn requested_queues(desc: &ContextDesc<'_>) -> QueueRequest {
     if desc.check_indices { QueueRequest::Shared } else { desc.queues }
 }
 
-fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
+fn new_device_state(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<DeviceState> {
     let yuv = YuvSlots::new(&gpu, desc.yuv, desc.max_yuv_textures)?;
     let (several, all_blas) = (gpu.queues.has_several(), ResourceId::next());
     let bindless = Bindless::new(&gpu, desc.max_textures, yuv, desc.check_indices)?;
-    Ok(Shared {
-        dummies: OnceLock::new(),
+    Ok(DeviceState {
+        default_objects: OnceLock::new(),
         store: Store::new(),
         staging: Staging::new(&gpu, desc.staging_bytes),
         scratch: std::array::from_fn(|_| new_scratch(&gpu, desc.scratch_budget_bytes)),
         accel_storage: AccelStorage::new(desc.accel_budget_bytes),
         graphics_queries: RayQueryStages::default(),
         kernels: Kernels::new(),
-        instance_buffers: SpareBuffers::new(),
+        instance_buffers: BufferRecycler::new(),
         tlas_table: new_tlas_table(&gpu)?,
         layout: PipelineLayout::new(&gpu, bindless.set_layout)?,
         pipeline_cache: desc.pipeline_cache.map(|path| PipelineCache::new(&gpu, path)).transpose()?,
         shader_cache: desc.shader_cache.map(ShaderCache::new),
-        tree_cache: desc.tree_cache.map(TreeCache::new),
+        tree_cache: desc.tree_cache.map(BvhCache::new),
         bindless,
         submitter: Submitter::new(&gpu)?,
         profiler: Profiler::new(&gpu),
         all_blas,
         new_blas: std::array::from_fn(|_| if several { ResourceId::next() } else { all_blas }),
         all_tlas: ResourceId::next(),
-        tlas_tables: ResourceId::next(),
+        hit_tables_id: ResourceId::next(),
         outdated_tlas: AtomicBool::new(false),
-        moves: AtomicU64::new(0),
-        freed_tlas: Mutex::new(Rank::FreedTlas, Vec::new()),
+        blas_moves: AtomicU64::new(0),
+        freed_tlas_slots: Mutex::new(Rank::FreedTlas, Vec::new()),
         gpu,
     })
 }

@@ -3,22 +3,22 @@
 use std::sync::Arc;
 
 use super::gpu_build::layout::GpuBuildPlan;
-use super::storage::SoftwareBody;
+use super::storage::SoftwareAccelStorage;
 use crate::accel::flags::AccelStructSizes;
 
 /// What stands behind the handle of a top-level structure for software to trace. Every update is a build.
 pub(crate) struct SoftwareTlas {
-    pub(crate) body: Arc<SoftwareBody>,
+    pub(crate) storage: Arc<SoftwareAccelStorage>,
     pub(crate) plan: GpuBuildPlan,
     /// Records that the body has room for: more than instances, as some may be shown in parts.
-    pub(crate) room: u32,
+    pub(crate) record_capacity: u32,
 }
 
 impl SoftwareTlas {
     /// What it takes and its builds take.
     pub(crate) fn sizes(&self) -> AccelStructSizes {
         AccelStructSizes {
-            structure_bytes: self.body.memory_bytes(),
+            structure_bytes: self.storage.memory_bytes(),
             build_scratch_bytes: self.plan.scratch_bytes,
             update_scratch_bytes: self.plan.scratch_bytes,
         }
