@@ -42,7 +42,7 @@ impl Context {
     /// # Errors
     /// [`NoVulkan`](crate::Error::NoVulkan) without a loader or driver; [`NoDevice`](crate::Error::NoDevice) with the
     /// reason for each device when none will do; [`Unsupported`](crate::Error::Unsupported) when validation is wanted
-    /// and its layer is missing, or the instance has no extension of [`ContextDesc::extra`].
+    /// and its layer is missing, or the instance has no extension of [`ContextDesc::user_extensions`].
     pub fn new(desc: &ContextDesc<'_>) -> Result<Self> {
         let sink = desc.validation_sink.clone().unwrap_or_default();
         let instance = Instance::new(&InstanceDesc {

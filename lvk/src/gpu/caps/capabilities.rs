@@ -89,7 +89,7 @@ pub struct Capabilities {
     /// Queries may count what the stages of pipelines do (`pipelineStatisticsQuery`).
     pub pipeline_statistics: bool,
     /// The clocks of device and host can be read together (`VK_KHR_calibrated_timestamps` or
-    /// `VK_EXT_calibrated_timestamps`): see [`Context::clock_pair`](crate::Context::clock_pair).
+    /// `VK_EXT_calibrated_timestamps`): see [`Context::calibrated_timestamps`](crate::Context::calibrated_timestamps).
     pub calibrated_timestamps: bool,
     /// First contents of small textures that are only sampled are written by the host itself (`VK_EXT_host_image_copy`),
     /// past staging memory and queue, where the device samples them as fast as others. So it is on devices that are CPUs,
