@@ -68,7 +68,7 @@ impl DrawRequirements {
 /// The index buffer bound last.
 pub(super) struct BoundIndexBuffer {
     buffer: Arc<Buffer>,
-    layer_count: u64,
+    count: u64,
 }
 
 impl<'a> RenderPass<'a> {
@@ -217,7 +217,7 @@ impl<'a> RenderPass<'a> {
             let device = &self.cmd.shared.gpu.device;
             device.cmd_bind_index_buffer(self.cmd.raw(), buffer.raw, offset, format.raw());
         }
-        self.indices = Some(BoundIndexBuffer { layer_count: (buffer.size_bytes - offset) / size, buffer });
+        self.indices = Some(BoundIndexBuffer { count: (buffer.size_bytes - offset) / size, buffer });
         Ok(())
     }
 
@@ -225,11 +225,11 @@ impl<'a> RenderPass<'a> {
     #[inline]
     pub fn draw(&mut self, vertices: Range<u32>, instances: Range<u32>) -> Result<()> {
         self.check_draw()?;
-        let (layer_count, instance_count) = (range_length(&vertices), range_length(&instances));
+        let (count, instance_count) = (range_length(&vertices), range_length(&instances));
         // SAFETY: a pipeline is bound with all its vertex buffers and push constants.
         unsafe {
             let device = &self.cmd.shared.gpu.device;
-            device.cmd_draw(self.cmd.raw(), layer_count, instance_count, vertices.start, instances.start);
+            device.cmd_draw(self.cmd.raw(), count, instance_count, vertices.start, instances.start);
         }
         Ok(())
     }
@@ -243,23 +243,16 @@ impl<'a> RenderPass<'a> {
     ) -> Result<()> {
         self.check_draw()?;
         let bound = self.bound_index_buffer()?;
-        if u64::from(indices.end) > bound.layer_count {
-            let message = format!("indices {indices:?} are drawn, but {} are bound", bound.layer_count);
+        if u64::from(indices.end) > bound.count {
+            let message = format!("indices {indices:?} are drawn, but {} are bound", bound.count);
             return Err(Error::usage(&bound.buffer.name, message));
         }
-        let (layer_count, instance_count) = (range_length(&indices), range_length(&instances));
+        let (count, instance_count) = (range_length(&indices), range_length(&instances));
         // SAFETY: as in `draw`, and the indices lie inside the bound buffer.
         unsafe {
             let device = &self.cmd.shared.gpu.device;
             let raw = self.cmd.raw();
-            device.cmd_draw_indexed(
-                raw,
-                layer_count,
-                instance_count,
-                indices.start,
-                base_vertex,
-                instances.start,
-            );
+            device.cmd_draw_indexed(raw, count, instance_count, indices.start, base_vertex, instances.start);
         }
         Ok(())
     }
@@ -277,9 +270,9 @@ impl<'a> RenderPass<'a> {
         let size = size_of::<vk::DrawIndirectCommand>() as u64;
         let buffer = self.indirect_buffer(arguments, offset, draw_count, stride, size)?;
         let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
-        for (offset, layer_count) in self.indirect_calls(offset, draw_count, stride) {
+        for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
             // SAFETY: as in `draw`, and the arguments lie inside the buffer.
-            unsafe { device.cmd_draw_indirect(raw, buffer.raw, offset, layer_count, stride) };
+            unsafe { device.cmd_draw_indirect(raw, buffer.raw, offset, count, stride) };
         }
         Ok(())
     }
@@ -298,9 +291,9 @@ impl<'a> RenderPass<'a> {
         let size = size_of::<vk::DrawIndexedIndirectCommand>() as u64;
         let buffer = self.indirect_buffer(arguments, offset, draw_count, stride, size)?;
         let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
-        for (offset, layer_count) in self.indirect_calls(offset, draw_count, stride) {
+        for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
             // SAFETY: as in `draw`, and the arguments lie inside the buffer.
-            unsafe { device.cmd_draw_indexed_indirect(raw, buffer.raw, offset, layer_count, stride) };
+            unsafe { device.cmd_draw_indexed_indirect(raw, buffer.raw, offset, count, stride) };
         }
         Ok(())
     }
@@ -332,12 +325,7 @@ impl<'a> RenderPass<'a> {
         }
         let limits = &self.cmd.shared.gpu.caps.limits;
         if self.cmd.shared.gpu.caps.multi_draw_indirect {
-            check_limit(
-                &buffer.name,
-                "draw layer_count",
-                draw_count.into(),
-                limits.max_indirect_draws.into(),
-            )?;
+            check_limit(&buffer.name, "draw count", draw_count.into(), limits.max_indirect_draws.into())?;
         }
         let bytes = u64::from(draw_count.saturating_sub(1)) * u64::from(stride) + size;
         check_arguments(&buffer, offset, bytes)?;
