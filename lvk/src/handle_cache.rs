@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::barrier::{IdMap, ResourceId};
 use crate::error::Result;
 use crate::handle::Handle;
-use crate::store::HandlePool;
+use crate::pool::HandlePool;
 
 /// Every object that a command buffer has used, once, in a row of its own. Commands name rows, and count no references.
 ///

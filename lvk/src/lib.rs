@@ -127,6 +127,7 @@ mod lock_order;
 pub mod manual;
 mod parallel;
 mod pipeline;
+mod pool;
 mod resource;
 mod shader;
 pub(crate) mod software_ray_query;

@@ -309,7 +309,7 @@ mod tests {
     use crate::accel::accel_struct::AccelKind;
     use crate::accel::blas::Blas;
     use crate::accel::flags::AccelStructSizes;
-    use crate::store::HandlePool;
+    use crate::pool::HandlePool;
 
     type Structures = HandlePool<AccelStructHandle, AccelStruct>;
 

@@ -273,7 +273,7 @@ mod tests {
     use crate::accel::blas::{Blas, BlasStructures};
     use crate::accel::flags::{AccelStructSizes, BuildFlags};
     use crate::handle::AccelStructHandle;
-    use crate::store::HandlePool;
+    use crate::pool::HandlePool;
 
     fn blas() -> AccelStruct {
         let body = BlasStructures { structures: Vec::new(), compacted_from: None, rebuildable: true };

@@ -9,7 +9,7 @@ use super::tlas::{InstanceSource, Tlas, TlasContents};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::handle_cache::HandleCache;
-use crate::store::HandlePool;
+use crate::pool::HandlePool;
 
 /// What a command buffer makes of one top-level structure.
 #[derive(Default)]
