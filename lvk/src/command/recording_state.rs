@@ -6,10 +6,10 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::accesses::CommandAccesses;
-use super::bind::PushConstants;
-use super::build_blas::OpenBuild;
+use super::open_build::OpenBuild;
+use super::pending_visibility::PendingVisibility;
+use super::push_constants::PushConstants;
 use super::query_usage::QueryUsage;
-use super::transfer::PendingVisibility;
 use crate::accel::AccelStruct;
 use crate::accel::build_overlap::ConcurrentBuilds;
 use crate::accel::compaction::CompactedSizeQuery;

@@ -7,11 +7,11 @@ use ash::vk;
 
 use super::CommandBuffer;
 use super::attachments::PassTargets;
-use super::bind::word_mask;
 use super::compute::check_arguments;
 use super::dynamic_state::{DynamicState, READ_ONLY_DEPTH_ERROR};
 use super::local_read::TargetHazards;
 use super::pass_area::PassArea;
+use super::push_constants::word_mask;
 use super::recording_state::RecordingState;
 use crate::barrier::Use;
 use crate::error::{Error, Result, check_limit};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::build_blas::OpenBuild;
+use super::open_build::OpenBuild;
 use super::recording_state::RecordingState;
 use super::write_instances::{KernelInstances, StagedInstances, VulkanInstances};
 use crate::accel::AccelStruct;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::transfer::PendingVisibility;
+use super::pending_visibility::PendingVisibility;
 use crate::barrier::Use;
 use crate::device_state::DeferredFree;
 use crate::error::Result;

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::{PendingVisibility, SOURCE_LAYOUT, TARGET_LAYOUT};
+use super::{SOURCE_LAYOUT, TARGET_LAYOUT};
 use crate::command::CommandBuffer;
+use crate::command::pending_visibility::PendingVisibility;
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::handle::TextureHandle;

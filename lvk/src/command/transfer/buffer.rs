@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::PendingVisibility;
 use crate::barrier::Use;
 use crate::command::CommandBuffer;
+use crate::command::pending_visibility::PendingVisibility;
 use crate::error::{Error, Result};
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;

@@ -2,9 +2,10 @@
 
 use ash::vk;
 
-use super::{PendingVisibility, TARGET_LAYOUT};
+use super::TARGET_LAYOUT;
 use crate::barrier::Use;
 use crate::command::CommandBuffer;
+use crate::command::pending_visibility::PendingVisibility;
 use crate::error::{Error, Result};
 use crate::format::NumericFormat;
 use crate::handle::TextureHandle;

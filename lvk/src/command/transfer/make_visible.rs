@@ -1,21 +1,13 @@
 //! What copies leave behind is made readable everywhere before shaders run.
 
-use std::sync::Arc;
-
 use crate::barrier::{Layout, Stages, Use};
 use crate::command::CommandBuffer;
+use crate::command::pending_visibility::PendingVisibility;
 use crate::command::queue_support::limited_to_queue;
 use crate::command::recording_state::RecordingState;
 use crate::resource::texture_desc::TextureUsage;
-use crate::resource::{Buffer, Texture};
 use crate::submit::Recording;
 use crate::submit::emit_barriers::emit;
-
-/// A resource a copy wrote, or read in a layout of its own, to be made readable everywhere before shaders run.
-pub(in crate::command) enum PendingVisibility {
-    Buffer(Arc<Buffer>),
-    Texture(Arc<Texture>),
-}
 
 impl CommandBuffer {
     /// Makes what copies touched readable by every shader and every input, with one barrier for all.

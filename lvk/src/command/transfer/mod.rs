@@ -13,6 +13,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
+use super::pending_visibility::PendingVisibility;
 use crate::barrier::Use;
 use crate::error::Result;
 use crate::resource::Texture;
@@ -20,7 +21,6 @@ use crate::resource::region::Region;
 
 pub use buffer::BufferCopy;
 pub use clear::ClearValue;
-pub(super) use make_visible::PendingVisibility;
 
 /// Layout of an image that is copied from.
 const SOURCE_LAYOUT: vk::ImageLayout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::{PendingVisibility, SOURCE_LAYOUT, TARGET_LAYOUT};
+use super::{SOURCE_LAYOUT, TARGET_LAYOUT};
 use crate::barrier::Use;
 use crate::command::CommandBuffer;
+use crate::command::pending_visibility::PendingVisibility;
 use crate::error::{Error, Result};
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::region::{Region, TextureRegion};
