@@ -6,7 +6,7 @@ use ash::vk;
 use super::CommandBuffer;
 use crate::barrier::{ResourceId, Use};
 use crate::error::{Error, Result};
-use crate::gpu::caps::queues::Queue;
+use crate::queue::Queue;
 use crate::resource::Texture;
 use crate::resource::region::Region;
 use crate::submit::SubmitHandle;

@@ -5,11 +5,11 @@ use ash::vk;
 use super::Context;
 use crate::accel::accel_struct::AccelKind;
 use crate::error::Result;
-use crate::gpu::caps::queues::Queue;
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, RayTracingPipelineHandle, RenderPipelineHandle,
     SamplerHandle, TextureHandle,
 };
+use crate::queue::Queue;
 use crate::resource::texture_desc::TextureUsage;
 
 impl Context {

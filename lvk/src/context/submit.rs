@@ -5,7 +5,7 @@ use ash::vk;
 use super::Context;
 use crate::command::{CommandBuffer, FinishedRecording};
 use crate::error::{Error, Result};
-use crate::gpu::caps::queues::Queue;
+use crate::queue::Queue;
 use crate::submit::{Recording, Submission, SubmitHandle};
 
 impl Context {

@@ -12,7 +12,7 @@ use super::caps::format_features::FormatFeatureCache;
 use super::caps::host_image_copy::HostImageCopy;
 use super::caps::image_limits::ImageLimitCache;
 use super::caps::optional_features::{FeatureSet, OF_WINDOWS, OptionalFeature};
-use super::caps::queues::{Queue, QueueLocation, QueueRequest, Queues, shared_timestamp_bits};
+use super::caps::queues::{QueueLocation, QueueRequest, Queues, shared_timestamp_bits};
 use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::shading_rate::ShadingRates;
 use super::debug::object_names;
@@ -28,6 +28,7 @@ use super::start::user_extensions::UserExtensions;
 use super::window::{SurfaceProbe, WindowFunctions, WindowHandles};
 use crate::error::{Error, Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
+use crate::queue::Queue;
 
 /// What the caller asks of a device.
 #[derive(Debug, Clone, Copy)]

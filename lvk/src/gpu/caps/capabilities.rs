@@ -7,15 +7,14 @@ use ash::vk;
 use super::limits::Limits;
 use super::mesh_limits::MeshLimits;
 use super::optional_features::{FeatureSet, OF_MESH_SHADERS, OptionalFeature};
-use super::queues::{
-    Queue, QueueFamily, QueueInfo, QueueLocation, describe_queues, locate_queues, queue_families,
-};
+use super::queues::{QueueFamily, QueueInfo, QueueLocation, describe_queues, locate_queues, queue_families};
 use super::ray_query_path::{RayQueryPath, RayQueryRequest};
 use super::shading_rate::ShadingRateLimits;
 use crate::error::{Error, Result};
 use crate::gpu::start::features::{Calibration, Features, Subgroups, missing_required};
 use crate::gpu::start::select::DeviceKind;
 use crate::gpu::window::SurfaceProbe;
+use crate::queue::Queue;
 
 /// Whether the caller needs a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
