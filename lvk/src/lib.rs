@@ -190,7 +190,7 @@ pub use gpu::memory::budget::{MemoryBudget, MemoryHeap};
 pub use gpu::start::external::RawContext;
 pub use gpu::start::profile::DeviceProfile;
 pub use gpu::start::user_extensions::UserExtensions;
-pub use gpu::window::WindowHandles;
+pub use gpu::start::window::WindowHandles;
 pub use handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, SwapchainHandle,

@@ -10,7 +10,7 @@ use crate::gpu::caps::ray_query_path::RayQueryRequest;
 use crate::gpu::debug::messenger::{ValidationMode, ValidationSink};
 use crate::gpu::start::profile::DeviceProfile;
 use crate::gpu::start::user_extensions::UserExtensions;
-use crate::gpu::window::WindowHandles;
+use crate::gpu::start::window::WindowHandles;
 use crate::resource::ycbcr::YuvConversion;
 
 /// Describes a context.

@@ -39,7 +39,7 @@ use crate::device_state::DeviceState;
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::debug::messenger::ValidationSink;
 use crate::gpu::memory::budget::MemoryBudget;
-use crate::gpu::window::WindowHandles;
+use crate::gpu::start::window::WindowHandles;
 use crate::lock_order::Mutex;
 
 use frame::FrameRing;

@@ -6,8 +6,9 @@ use std::sync::atomic::AtomicU32;
 use ash::vk;
 
 use super::calibrated_timestamps::HostClock;
-use super::caps::capabilities::{Capabilities, FeatureRequest, PhysicalDevice};
+use super::caps::capabilities::{Capabilities, FeatureRequest};
 use super::caps::descriptor_limits::DescriptorLimits;
+use super::caps::features::Features;
 use super::caps::format_features::FormatFeatureCache;
 use super::caps::host_image_copy::HostImageCopy;
 use super::caps::image_limits::ImageLimitCache;
@@ -15,17 +16,18 @@ use super::caps::optional_features::{FeatureSet, OF_WINDOWS, OptionalFeature};
 use super::caps::queues::{QueueLocation, QueueRequest, Queues, shared_timestamp_bits};
 use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::shading_rate::ShadingRates;
-use super::debug::object_names;
+use super::debug::debugger::has_debugger;
 use super::memory::allocator::DeviceMemory;
 use super::memory::budget::HeapUse;
 use super::start::driver_workarounds::with_exclusive_device_lock;
 use super::start::external::RawContext;
-use super::start::features::Features;
 use super::start::instance::Instance;
+use super::start::physical_device::PhysicalDevice;
 use super::start::profile::DeviceProfile;
 use super::start::select::{Candidate, choose};
+use super::start::surface::{SurfaceProbe, WindowFunctions};
 use super::start::user_extensions::UserExtensions;
-use super::window::{SurfaceProbe, WindowFunctions, WindowHandles};
+use super::start::window::WindowHandles;
 use crate::error::{Error, Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::queue::Queue;
@@ -100,7 +102,7 @@ impl Gpu {
     pub(crate) fn new(instance: Instance, request: &DeviceRequest<'_>) -> Result<Self> {
         let chosen = choose_device(&instance, request)?;
         let (device, caps, features) = create_with_fallback(&instance, &chosen, request)?;
-        let memory = match DeviceMemory::new(&instance, &device, chosen.raw) {
+        let memory = match DeviceMemory::new(&instance.raw, &device, chosen.raw) {
             Ok(memory) => memory,
             Err(error) => {
                 // SAFETY: nothing was made from the device yet.
@@ -139,7 +141,7 @@ impl Gpu {
         let instance = Instance::external(raw.entry, raw.instance, raw.instance_extensions);
         let features = enabled_features(&instance, &chosen, &caps);
         let made = DeviceParts {
-            memory: DeviceMemory::new(&instance, &raw.device, chosen.raw)?,
+            memory: DeviceMemory::new(&instance.raw, &raw.device, chosen.raw)?,
             device: raw.device,
             caps,
             features,
@@ -158,7 +160,7 @@ impl Gpu {
         let DeviceParts { device, mut caps, features, memory, queues, is_foreign } = made;
         let raw = &instance.raw;
         let structures = caps.hardware_acceleration_structures();
-        let host_copies = HostImageCopy::new(&instance, &device, physical, &caps);
+        let host_copies = HostImageCopy::new(raw, &device, physical, &caps);
         caps.host_image_copy = host_copies.is_some();
         Self {
             queues,
@@ -167,19 +169,21 @@ impl Gpu {
                 .ray_tracing_pipeline
                 .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
             mesh: caps.mesh_shader.then(|| ash::ext::mesh_shader::Device::new(raw, &device)),
-            shading_rates: ShadingRates::new(&instance, &device, physical, &caps),
+            shading_rates: caps
+                .has(OptionalFeature::PipelineShadingRate)
+                .then(|| ShadingRates::new(&instance.entry, raw, &device, physical)),
             local_read: caps
                 .has(OptionalFeature::LocalRead)
                 .then(|| ash::khr::dynamic_rendering_local_read::Device::new(raw, &device)),
             host_copies,
             host_clock: HostClock::new(&instance, &device, physical, features.calibration),
             windows: WindowFunctions::new(&instance, &device, |feature| caps.has(feature)),
-            debug_utils: object_names::should_name_objects(&instance, physical, debug_names)
+            debug_utils: should_name_objects(&instance, physical, debug_names)
                 .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             device_fault: (features.ext.fault.device_fault == vk::TRUE)
                 .then(|| ash::ext::device_fault::Device::new(raw, &device)),
             memory: Mutex::new(Rank::Memory, Some(memory)),
-            heap_use: HeapUse::new(&instance, physical),
+            heap_use: HeapUse::new(raw, physical),
             format_answers: FormatFeatureCache::default(),
             image_limits: ImageLimitCache::new(),
             custom_borders: AtomicU32::new(0),
@@ -236,6 +240,16 @@ impl Gpu {
     /// The functions of `VK_EXT_mesh_shader`, or the error that says what the device lacks.
     pub(crate) fn mesh_functions(&self) -> Result<&ash::ext::mesh_shader::Device> {
         self.mesh.as_ref().ok_or_else(|| self.unsupported("mesh shaders"))
+    }
+
+    /// The functions of windows, or the error that says how to get them.
+    pub(crate) fn window_functions(&self) -> Result<&WindowFunctions> {
+        self.windows.as_ref().ok_or_else(|| {
+            Error::unsupported(
+                "a swapchain",
+                "the context was made without a window; set ContextDesc::window",
+            )
+        })
     }
 
     /// An [`Error::Unsupported`] that names the device.
@@ -305,6 +319,12 @@ impl Drop for Gpu {
         let destroy = || unsafe { self.device.destroy_device(None) };
         with_exclusive_device_lock(self.caps.driver_id, destroy);
     }
+}
+
+/// True if objects get names: as the caller says, or where the layer or a debugger reads them.
+fn should_name_objects(instance: &Instance, device: vk::PhysicalDevice, requested: Option<bool>) -> bool {
+    instance.debug_utils
+        && requested.unwrap_or_else(|| instance.validated || has_debugger(&instance.raw, device))
 }
 
 fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<PhysicalDevice> {

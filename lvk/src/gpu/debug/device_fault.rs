@@ -1,35 +1,22 @@
-//! What a lost device says of its fault (`VK_EXT_device_fault`).
+//! Reads the fault of a lost device (`vkGetDeviceFaultInfoEXT`).
 
 use std::ffi::{CStr, c_char};
-use std::sync::Arc;
 
 use ash::vk;
 
-use crate::error::Error;
 use crate::error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
-use crate::gpu::device::Gpu;
 
 /// Lists longer than this are taken for nonsense of a driver that has just failed.
 const MAX_ENTRIES: u32 = 1 << 16;
 
-impl Gpu {
-    /// As [`Error::vulkan`], with what the device says of its fault where it is lost.
-    pub(crate) fn vulkan_error(&self, call: &'static str) -> impl FnOnce(vk::Result) -> Error + '_ {
-        move |result| match result {
-            vk::Result::ERROR_DEVICE_LOST => {
-                Error::DeviceLost { call, fault: self.query_fault().map(Arc::new) }
-            }
-            other => Error::vulkan(call)(other),
-        }
-    }
-
-    /// Asks a lost device; `None` where it cannot say.
-    fn query_fault(&self) -> Option<DeviceFault> {
-        let functions = self.device_fault.as_ref()?.fp();
-        let raw = self.device.handle();
-        // SAFETY: the device is lost, as its last answer was, and the lists have the lengths that the counts say.
-        read_fault(|counts, info| unsafe { (functions.get_device_fault_info_ext)(raw, counts, info) })
-    }
+/// Asks a lost device; `None` where it cannot say.
+pub(crate) fn query_fault(
+    functions: &ash::ext::device_fault::Device,
+    device: vk::Device,
+) -> Option<DeviceFault> {
+    let functions = functions.fp();
+    // SAFETY: the device is lost, as its last answer was, and the lists have the lengths that the counts say.
+    read_fault(|counts, info| unsafe { (functions.get_device_fault_info_ext)(device, counts, info) })
 }
 
 /// Reads by a function that works like `vkGetDeviceFaultInfoEXT`: counts first, then lists of that length.
@@ -110,7 +97,10 @@ fn decode_text(chars: &[c_char]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::error::Error;
 
     fn chars<const N: usize>(text: &str) -> [c_char; N] {
         let mut all = [0; N];
