@@ -10,8 +10,8 @@ use image::RgbaImage;
 use lvk::{ClearValue, Context, TextureHandle, TextureRange};
 use lvk_samples::shader_folder::VARIABLE;
 
-use crate::child::in_child;
-use crate::picture::{Likeness, Tolerance};
+use crate::image_comparison::{ImageSimilarity, Tolerance};
+use crate::subprocess::in_subprocess;
 
 /// A change that breaks a shader.
 #[derive(Debug, Clone, Copy)]
@@ -43,12 +43,12 @@ pub struct BrokenShaders {
 }
 
 impl BrokenShaders {
-    /// Runs `body` in a process of its own with a copy of the shaders; `test` as for [`in_child`]. Most of the time goes
+    /// Runs `body` in a process of its own with a copy of the shaders; `test` as for [`in_subprocess`]. Most of the time goes
     /// into compiling, so lavapipe is told not to optimise, and keeps what it compiles apart from what is optimised.
     ///
     /// # Panics
-    /// As [`in_child`], and when the files cannot be copied.
-    pub fn in_child(test: impl Fn(), body: impl FnOnce(&Self)) {
+    /// As [`in_subprocess`], and when the files cannot be copied.
+    pub fn in_subprocess(test: impl Fn(), body: impl FnOnce(&Self)) {
         let folder = tempfile::tempdir().expect("temporary folders can be made");
         let [shaders, compiled] = ["shaders", "compiled"].map(|name| folder.path().join(name));
         copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../shaders"), &shaders)
@@ -58,7 +58,7 @@ impl BrokenShaders {
             ("MESA_SHADER_CACHE_DIR", Some(compiled.as_os_str())),
             ("GALLIVM_PERF", Some(OsStr::new("nopt"))),
         ];
-        in_child(test, &variables, || {
+        in_subprocess(test, &variables, || {
             let folder = std::env::var_os(VARIABLE).expect("the parent has named the folder");
             body(&Self { folder: PathBuf::from(folder) });
         });
@@ -69,7 +69,7 @@ impl BrokenShaders {
     ///
     /// # Panics
     /// When a mistake goes unnoticed, or does not fit its file.
-    pub fn assert_each_shows(
+    pub fn assert_each_changes_image(
         &self,
         by: &str,
         expected: &RgbaImage,
@@ -77,7 +77,7 @@ impl BrokenShaders {
         mistakes: &[Mistake],
         picture: impl Fn() -> RgbaImage,
     ) {
-        let whole = Likeness::of(&picture(), expected);
+        let whole = ImageSimilarity::measure(&picture(), expected);
         eprintln!("{by}, whole: {whole}");
         assert!(whole.is_within(tolerance), "{by}: whole shaders give another picture: {whole}");
         let mut complaints = Vec::new();
@@ -89,10 +89,10 @@ impl BrokenShaders {
                     continue;
                 }
             };
-            let likeness = Likeness::of(&broken, expected);
-            eprintln!("{by}, {}: {likeness}", mistake.what);
-            if likeness.is_within(tolerance) {
-                complaints.push(format!("unnoticed: {}: {likeness}", mistake.what));
+            let similarity = ImageSimilarity::measure(&broken, expected);
+            eprintln!("{by}, {}: {similarity}", mistake.what);
+            if similarity.is_within(tolerance) {
+                complaints.push(format!("unnoticed: {}: {similarity}", mistake.what));
             }
         }
         assert!(complaints.is_empty(), "{by}:\n{}", complaints.join("\n"));

@@ -178,7 +178,7 @@ fn loader() -> Result<&'static Option<PathBuf>, &'static str> {
     static LOADER: OnceLock<Result<Option<PathBuf>, String>> = OnceLock::new();
     let found = LOADER.get_or_init(|| {
         let driver = prepare(&DriverRequest { validation: true }).map_err(|error| error.to_string())?;
-        keep_driver(driver.loader.as_deref());
+        set_driver_variables(driver.loader.as_deref());
         Ok(driver.loader)
     });
     found.as_ref().map_err(String::as_str)
@@ -186,7 +186,7 @@ fn loader() -> Result<&'static Option<PathBuf>, &'static str> {
 
 /// Keeps the driver loaded as long as the process runs, by an instance that is never destroyed: NVIDIA's can be loaded some
 /// thirty times by one, and no more. Where there is no driver, contexts say so.
-fn keep_driver(library: Option<&Path>) {
+fn set_driver_variables(library: Option<&Path>) {
     // SAFETY: the library is a Vulkan loader, and stays open.
     let entry = unsafe { library.map_or_else(|| Entry::load(), |path| Entry::load_from(path)) };
     let Ok(entry) = entry else { return };

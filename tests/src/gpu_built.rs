@@ -12,7 +12,7 @@ use crate::random::Random;
 pub type Content = ((u32, u32), Vec<[f32; 3]>);
 
 /// A buffer that builds read.
-pub fn input<T: bytemuck::NoUninit>(ctx: &Context, data: &[T]) -> Holder<BufferHandle> {
+pub fn build_input_buffer<T: bytemuck::NoUninit>(ctx: &Context, data: &[T]) -> Holder<BufferHandle> {
     let bytes: &[u8] = bytemuck::cast_slice(data);
     let device = ctx.capabilities();
     let traces = device.ray_tracing_pipeline || device.ray_query;
@@ -28,7 +28,7 @@ pub fn input<T: bytemuck::NoUninit>(ctx: &Context, data: &[T]) -> Holder<BufferH
 }
 
 /// Corners of small triangles all over a room, the same for the same seed.
-pub fn scattered(count: usize, seed: u64) -> Vec<[[f32; 3]; 3]> {
+pub fn scattered_triangles(count: usize, seed: u64) -> Vec<[[f32; 3]; 3]> {
     let mut random = Random::new(seed);
     let mut point = |reach: f32| [(); 3].map(|()| random.between(-reach, reach));
     let mut triangle = || {
@@ -43,7 +43,7 @@ pub fn scattered(count: usize, seed: u64) -> Vec<[[f32; 3]; 3]> {
 
 /// Triangles whose codes make a tree of paths that lose one at a time: wide nodes of it have only eight triangles, for which
 /// there is no room.
-pub fn uneven(side: u16) -> Vec<[[f32; 3]; 3]> {
+pub fn uneven_triangles(side: u16) -> Vec<[[f32; 3]; 3]> {
     const LONG: u16 = 24;
     const SIZE: f32 = 0.25;
     let mut triangles = Vec::new();
@@ -60,12 +60,12 @@ pub fn uneven(side: u16) -> Vec<[[f32; 3]; 3]> {
 }
 
 /// One geometry of triangles without indices.
-pub fn triangles(vertices: BufferHandle, count: usize) -> BlasGeometry {
+pub fn triangle_geometry(vertices: BufferHandle, count: usize) -> BlasGeometry {
     BlasGeometry::Triangles(Triangles::packed(vertices, count as u32 * 3))
 }
 
 /// One geometry of boxes.
-pub fn boxes(buffer: BufferHandle, count: usize) -> BlasGeometry {
+pub fn aabb_geometry(buffer: BufferHandle, count: usize) -> BlasGeometry {
     let flags = GeometryFlags::default();
     BlasGeometry::Aabbs(Aabbs { buffer, offset: 0, stride: 0, count: count as u32, flags })
 }
@@ -80,7 +80,7 @@ pub fn build(ctx: &Context, geometries: &[BlasGeometry]) -> GpuStructure {
 ///
 /// # Panics
 /// When it is not sound, or higher than its plan says.
-pub fn facts(ctx: &Context, structure: &GpuStructure) -> Facts {
+pub fn check_and_summarize(ctx: &Context, structure: &GpuStructure) -> Facts {
     let words = read(ctx, structure).expect("the structure can be read");
     let facts =
         check_structure(&words, &|_| panic!("no instances here")).unwrap_or_else(|what| panic!("{what}"));
@@ -106,6 +106,6 @@ pub fn check_contents(facts: &Facts, expected: &[Content]) {
 }
 
 /// The triangles of geometry 0 as [`check_contents`] takes them.
-pub fn numbered(triangles: &[[[f32; 3]; 3]]) -> Vec<Content> {
+pub fn with_primitive_numbers(triangles: &[[[f32; 3]; 3]]) -> Vec<Content> {
     (0..).zip(triangles).map(|(index, corners)| ((0, index), corners.to_vec())).collect()
 }

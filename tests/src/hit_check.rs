@@ -2,7 +2,7 @@
 
 use lvk::{AccelStructHandle, Context, Holder, Result};
 
-use crate::agreement::Agreement;
+use crate::hit_comparison::HitComparison;
 use crate::ray_scene::RayScene;
 use crate::ray_tracer::{CULL_NO_OPAQUE, CULL_OPAQUE, HitRecord, How, MISSED, Method, NO_OPAQUE, RayTracer};
 use crate::rays::{Ray, random_rays};
@@ -31,8 +31,8 @@ impl HitCheck {
     }
 
     /// Looks through triangles with odd numbers, where they are not opaque.
-    pub fn keeping_even(ctx: &Context) -> Result<Self> {
-        Self::with(ctx, RayTracer::keeping_even)
+    pub fn with_even_primitives(ctx: &Context) -> Result<Self> {
+        Self::with(ctx, RayTracer::with_even_primitives)
     }
 
     /// Traces with what `make` answers for every method.
@@ -77,11 +77,12 @@ impl HitCheck {
     ) -> Result<()> {
         for (method, tracer) in self.tracers() {
             let records = tracer.trace(tlas, rays, how)?;
-            Agreement::of_triangles(rays, &records, &answer).assert(&format!("{what}, by {method:?}"));
+            HitComparison::of_triangles(rays, &records, &answer).assert(&format!("{what}, by {method:?}"));
         }
         if let Some(tracer) = self.opaque_tracer(how.flags) {
             let records = tracer.trace(tlas, rays, how)?;
-            Agreement::of_triangles(rays, &records, &answer).assert(&format!("{what}, all taken for opaque"));
+            HitComparison::of_triangles(rays, &records, &answer)
+                .assert(&format!("{what}, all taken for opaque"));
         }
         Ok(())
     }

@@ -7,14 +7,14 @@ use lvk_samples::hybrid::{HybridConfig, HybridRenderer, Method, RayPath};
 use lvk_samples::scene::{Camera, Scene};
 
 /// The sample with one configuration, ready to take pictures of a scene.
-pub struct Studio {
+pub struct HybridHarness {
     /// The sample.
     pub renderer: HybridRenderer,
     size: [u32; 2],
 }
 
-impl Studio {
-    /// A studio for pictures of `size` pixels and rays of up to `max_depth` bounces.
+impl HybridHarness {
+    /// A harness for pictures of `size` pixels and rays of up to `max_depth` bounces.
     ///
     /// # Panics
     /// When the sample refuses.
@@ -30,7 +30,7 @@ impl Studio {
         Self::with(ctx, scene, &config)
     }
 
-    /// A studio for pictures as `config` has them.
+    /// A harness for pictures as `config` has them.
     ///
     /// # Panics
     /// When the sample refuses.
@@ -43,7 +43,7 @@ impl Studio {
     ///
     /// # Panics
     /// When rendering fails.
-    pub fn picture(&mut self, camera: &Camera) -> RgbaImage {
+    pub fn render(&mut self, camera: &Camera) -> RgbaImage {
         self.renderer.render(camera).expect("the sample renders");
         let pixels = self.renderer.read_image().expect("the picture can be read");
         RgbaImage::from_raw(self.size[0], self.size[1], pixels).expect("a picture has four bytes a pixel")

@@ -16,7 +16,7 @@ pub const REQUESTS: [QueueRequest; 3] =
 pub const WORDS: usize = 64;
 
 /// Runs a test with each request, and says what stands behind the queues.
-pub fn each(test: impl Fn(&TestDevice)) {
+pub fn for_each_queue_request(test: impl Fn(&TestDevice)) {
     for queues in REQUESTS {
         let Some(ctx) = device_with(|desc| desc.queues = queues) else { return };
         describe(&ctx, queues);
@@ -37,7 +37,7 @@ fn describe(ctx: &Context, queues: QueueRequest) {
 ///
 /// # Panics
 /// When anything is refused.
-pub fn on(ctx: &Context, queue: Queue, record: impl FnOnce(&mut CommandBuffer)) -> SubmitHandle {
+pub fn submit_on(ctx: &Context, queue: Queue, record: impl FnOnce(&mut CommandBuffer)) -> SubmitHandle {
     let mut cmd = ctx.acquire_command_buffer_on(queue).unwrap();
     assert_eq!(cmd.queue(), queue);
     record(&mut cmd);

@@ -16,17 +16,17 @@ pub const ROUND: u32 = 100;
 ///
 /// # Panics
 /// When it fails.
-pub fn picture_of<S: Sample>(sample: &mut S, frame: u32) -> RgbaImage {
+pub fn image_of<S: Sample>(sample: &mut S, frame: u32) -> RgbaImage {
     let moved = sample.update(Moment::of_frame(frame, ROUND));
     moved.map_err(|error| -> RunError { error.into() }).expect("the sample has that moment");
-    picture_now(sample)
+    image_now(sample)
 }
 
 /// What `sample`, made for pictures of [`SIZE`], shows as it is.
 ///
 /// # Panics
 /// When it fails.
-pub fn picture_now<S: Sample>(sample: &mut S) -> RgbaImage {
+pub fn image_now<S: Sample>(sample: &mut S) -> RgbaImage {
     let rendered = headless::picture(sample);
     let pixels = rendered.map_err(|error| -> RunError { error.into() }).expect("the sample renders");
     RgbaImage::from_raw(SIZE[0], SIZE[1], pixels).expect("the picture has the size that was asked for")

@@ -151,7 +151,7 @@ impl RayTracer {
     }
 
     /// Looks through triangles with odd numbers, where they are not opaque.
-    pub fn keeping_even(ctx: &Context, method: Method) -> Result<Self> {
+    pub fn with_even_primitives(ctx: &Context, method: Method) -> Result<Self> {
         Self::with(ctx, method, true)
     }
 

@@ -33,7 +33,7 @@ impl SphereModel {
     }
 
     /// The boxes, and the buffers they lie in. The second list starts late and has gaps.
-    pub fn boxes(&self, ctx: &Context) -> Result<(Vec<Holder<BufferHandle>>, Vec<BlasGeometry>)> {
+    pub fn aabb_geometries(&self, ctx: &Context) -> Result<(Vec<Holder<BufferHandle>>, Vec<BlasGeometry>)> {
         let mut buffers = Vec::new();
         let mut geometries = Vec::new();
         for (geometry, offset, stride) in [(0, 0, 0), (1, 16, 32)] {

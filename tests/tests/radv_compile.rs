@@ -5,9 +5,9 @@ use std::path::Path;
 
 use lvk::{Context, ContextDesc, ShaderStage};
 use lvk_samples::pipelines::{self, SamplePipeline, SampleStage};
-use lvk_tests::child::on_radv;
 use lvk_tests::device::vulkan;
 use lvk_tests::radv::Radv;
+use lvk_tests::subprocess::on_radv;
 
 /// The compute shaders that the library runs by itself.
 const KERNELS: [(&str, &str); 2] = [

@@ -155,7 +155,7 @@ fn draws_take_nothing_from_the_heap_and_frames_leave_nothing_there() {
 
 /// Top-level structures that show the same meshes in every frame, by instances of the host or from a buffer.
 #[test]
-fn refits_that_show_the_same_take_nothing_from_the_heap() {
+fn refits_of_unchanged_references_take_nothing_from_the_heap() {
     const MESHES: usize = 100;
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(vulkan_library) = vulkan() else { return };
@@ -290,7 +290,7 @@ fn frames_that_run_grow_neither_the_process_nor_what_the_driver_counts() {
 }
 
 #[test]
-fn the_memory_of_objects_is_counted_in_their_heap_until_they_are_gone() {
+fn the_memory_of_objects_is_counted_in_their_heap_until_they_are_freed() {
     const SIZE: u64 = 3 << 20;
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let profile = lvk::DeviceProfile::core_only();
@@ -319,7 +319,7 @@ fn the_memory_of_objects_is_counted_in_their_heap_until_they_are_gone() {
 
 /// Also where the instances are kept for the time when a mesh has moved.
 #[test]
-fn top_level_structures_leave_nothing_on_the_heap() {
+fn tlases_leave_nothing_on_the_heap() {
     const EACH: usize = 300;
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let Some(ctx) = device() else { return };

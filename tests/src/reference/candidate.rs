@@ -70,7 +70,7 @@ impl Candidate {
     ) -> Option<Self> {
         let grazes = crossing.cosine.abs() < GRAZE;
         let blur = if grazes { GRAZE_EDGE } else { EDGE };
-        let in_range = Range::of(crossing.t, range);
+        let in_range = Range::locate(crossing.t, range);
         let margin = crossing.margin();
         if margin < -blur || in_range == Range::Outside {
             return None;
@@ -97,7 +97,7 @@ pub(super) enum Range {
 }
 
 impl Range {
-    pub(super) fn of(t: f64, range: (f64, f64)) -> Self {
+    pub(super) fn locate(t: f64, range: (f64, f64)) -> Self {
         if same_distance(t, range.0) || same_distance(t, range.1) {
             Self::AtAnEnd
         } else if range.0 < t && t < range.1 {

@@ -47,7 +47,7 @@ impl Sphere {
         let half = (self.radius.powi(2) - passing.powi(2)).max(0.0).sqrt() / direction.length();
         let range = (f64::from(ray.t_min), f64::from(ray.t_max));
         let ends = [middle - half, middle + half];
-        let places = ends.map(|t| Range::of(t, range));
+        let places = ends.map(|t| Range::locate(t, range));
         let first = *sides.iter().find(|side| places[**side] != Range::Outside)?;
         let t = ends[first];
         let cosine = (1.0 - (passing / self.radius).powi(2)).max(0.0).sqrt();

@@ -278,7 +278,7 @@ fn textures_keep_their_layout_when_recorded_and_submitted_in_different_orders() 
 }
 
 #[test]
-fn one_command_cannot_use_a_texture_in_two_ways() {
+fn one_command_cannot_use_a_texture_in_two_layouts() {
     let Some(ctx) = device() else { return };
     let desc = TextureDesc {
         format: Format::R32Float,
@@ -316,7 +316,7 @@ fn one_command_cannot_use_a_texture_in_two_ways() {
 }
 
 #[test]
-fn mapped_memory_shows_what_shaders_wrote() {
+fn mapped_memory_contains_what_shaders_wrote() {
     let Some(ctx) = device() else { return };
     let pipeline = step_pipeline(&ctx);
     let first: Vec<u32> = (0..64).collect();

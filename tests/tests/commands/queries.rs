@@ -121,7 +121,7 @@ fn samples_of_rectangles_are_counted() {
 }
 
 #[test]
-fn more_queries_than_are_read_at_once_keep_their_places() {
+fn more_queries_than_are_read_at_once_keep_their_order() {
     let Some(ctx) = device() else { return };
     let (canvas, pool) = (Canvas::new(&ctx), occlusion(&ctx, 70));
     let mut cmd = ctx.acquire_command_buffer().unwrap();

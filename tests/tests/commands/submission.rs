@@ -48,7 +48,7 @@ fn flushing_runs_uploads_and_is_idle_without_any() {
 }
 
 #[test]
-fn textures_that_are_gone_submit_nothing() {
+fn destroyed_textures_submit_nothing() {
     let Some(ctx) = device() else { return };
     let come_and_go = || {
         let desc = TextureDesc {

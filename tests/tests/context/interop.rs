@@ -539,7 +539,7 @@ fn refusals() {
 
 /// One after the other, as the messages of the layer are those of the process.
 #[test]
-fn images_buffers_and_semaphores_go_both_ways_and_wrong_descriptions_are_refused() {
+fn images_buffers_and_semaphores_are_exported_and_imported_and_wrong_descriptions_are_refused() {
     exchange();
     local_reads();
     refusals();

@@ -10,8 +10,8 @@ use lvk::{
     RayTracingPipelineHandle, ShaderModuleDesc, ShaderModuleHandle, ShaderSource, ShaderStage, TlasDesc,
     TlasInstance, Triangles,
 };
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::compute::words_buffer;
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::without_software;
 
 const QUERY: &str = "
@@ -111,7 +111,7 @@ fn commands(ctx: &Context) {
 
 #[test]
 fn a_driver_without_ray_tracing_refuses_clearly() {
-    without_ray_tracing(a_driver_without_ray_tracing_refuses_clearly, || {
+    on_swiftshader(a_driver_without_ray_tracing_refuses_clearly, || {
         let Some(ctx) = without_software(|_| ()) else { return };
         let name = ctx.capabilities().device_name.clone();
         for text in creations(&ctx).into_iter().chain(shaders(&ctx)).chain(pipelines(&ctx)) {

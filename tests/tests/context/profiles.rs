@@ -10,10 +10,10 @@ use lvk::{
     RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc, ShaderSource, ShaderStage,
     TlasDesc, Triangles, UserExtensions,
 };
+use lvk_tests::accel_backend::requires_device_accel_structs;
 use lvk_tests::compute::Evaluator;
 use lvk_tests::device::vulkan;
 use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, target};
-use lvk_tests::structures::tests_own_structures;
 use lvk_tests::{TestDevice, device, device_with, without_software};
 
 fn under(profile: &DeviceProfile) -> Option<TestDevice> {
@@ -76,7 +76,7 @@ fn the_device_is_made_without_what_is_hidden() {
 }
 
 #[test]
-fn what_a_profile_hides_is_not_there_for_those_who_require_it() {
+fn what_a_profile_hides_cannot_be_required() {
     let Some(ctx) = without_software(|_| ()) else { return };
     let real: Capabilities = ctx.capabilities().clone();
     for (profile, pipeline, query, had, lack) in [
@@ -130,7 +130,7 @@ fn sizes_are_those_of_the_phone_where_it_needs_more() {
         ctx.blas_sizes(&BlasDesc { geometries: &geometries, ..Default::default() }).unwrap()
     };
     let Some(real) = without_software(|_| ()) else { return };
-    if !tests_own_structures(&real, "sizes that a profile raises") {
+    if !requires_device_accel_structs(&real, "sizes that a profile raises") {
         return;
     }
     let own = sizes(&real);
@@ -147,7 +147,7 @@ fn a_profile_limits_top_levels() {
     const INSTANCES: u32 = 20_000;
     let desc = TlasDesc { capacity: INSTANCES, debug_name: "the world", ..Default::default() };
     let Some(real) = without_software(|_| ()) else { return };
-    if !tests_own_structures(&real, "limits of a profile") {
+    if !requires_device_accel_structs(&real, "limits of a profile") {
         return;
     }
     let sizes = real.accel_struct_sizes(*real.create_tlas(&desc).unwrap()).unwrap();
@@ -365,7 +365,7 @@ fn extensions_of_the_callers_own_are_on() {
 }
 
 #[test]
-fn extensions_that_nobody_has_are_named() {
+fn unknown_extensions_are_named() {
     let Some(_) = device() else { return };
     let nowhere = [c"VK_LVK_nowhere"];
     for (instance, device) in [(true, false), (false, true)] {

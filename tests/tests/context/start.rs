@@ -10,10 +10,10 @@ use lvk::{
     Error, FeatureRequest, Format, RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc,
     ShaderSource, ShaderStage, TlasDesc, Triangles, ValidationMode,
 };
-use lvk_tests::child::{in_child, without_ray_tracing};
 use lvk_tests::compute::{Evaluator, words_buffer};
 use lvk_tests::device::vulkan;
 use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, target};
+use lvk_tests::subprocess::{in_subprocess, on_swiftshader};
 use lvk_tests::{device, device_with, without_software};
 
 /// A context with the loader of the tests and nothing else asked for.
@@ -53,7 +53,7 @@ fn a_wrong_library_is_no_vulkan() {
 
 #[test]
 fn the_device_can_be_chosen_by_number_and_name() {
-    in_child(the_device_can_be_chosen_by_number_and_name, &[("LVK_DEVICE", None)], || {
+    in_subprocess(the_device_can_be_chosen_by_number_and_name, &[("LVK_DEVICE", None)], || {
         let Some(ctx) = device() else { return };
         let name = ctx.capabilities().device_name.clone();
         let chosen = start(|desc| desc.device = Some("0")).unwrap();
@@ -78,10 +78,10 @@ fn the_device_can_be_chosen_by_number_and_name() {
 }
 
 #[test]
-fn the_environment_goes_before_the_description() {
+fn the_environment_overrides_the_description() {
     let Some(_) = vulkan() else { return };
     let wish = Some(OsStr::new("somewhere else"));
-    in_child(the_environment_goes_before_the_description, &[("LVK_DEVICE", wish)], || {
+    in_subprocess(the_environment_overrides_the_description, &[("LVK_DEVICE", wish)], || {
         match start(|desc| desc.device = Some("0")) {
             Err(Error::NoDevice { reasons }) => assert!(reasons.contains("'somewhere else'"), "{reasons}"),
             other => unreachable!("{other:?}"),
@@ -174,7 +174,7 @@ fn everything_else_works_with_ray_tracing_turned_off() {
 
 #[test]
 fn a_device_without_ray_tracing_does_everything_else() {
-    without_ray_tracing(a_device_without_ray_tracing_does_everything_else, || {
+    on_swiftshader(a_device_without_ray_tracing_does_everything_else, || {
         let Some(ctx) = without_software(|_| ()) else { return };
         assert!(ctx.capabilities().device_name.contains("SwiftShader"), "{:?}", ctx.capabilities());
         expect_no_ray_tracing(&ctx);

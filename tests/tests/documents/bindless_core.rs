@@ -34,7 +34,7 @@ fn page_complaint(left_out: &str) -> Option<String> {
 }
 
 #[test]
-fn every_row_is_held_by_tests_and_tells_where_reasons_stand() {
+fn every_row_names_its_tests_and_the_page_of_its_reasons() {
     let rows = rows();
     assert!(rows.len() > 60, "{} rows", rows.len());
     let wrong: Vec<_> = rows.iter().filter_map(|row| complaint(row).map(|why| (row[0], why))).collect();

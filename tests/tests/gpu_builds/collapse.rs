@@ -33,7 +33,7 @@ fn wide_nodes_are_those_of_the_model() {
 }
 
 #[test]
-fn paths_are_no_longer_than_walks_have_room_for() {
+fn paths_fit_the_traversal_stack() {
     let Some(ctx) = device() else { return };
     for seed in 0..8 {
         check(&ctx, &tree(600, 0, 64, seed), &format!("{seed}"));

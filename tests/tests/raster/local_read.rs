@@ -8,9 +8,9 @@ use lvk::{
     StencilFace, StencilOp, StencilTest, TextureDesc, TextureHandle, TextureKind, TextureMemory,
     TextureRegion, TextureUsage,
 };
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::local_read::{READ, SIZE, color_pipeline, depth_test, input};
 use lvk_tests::raster::{COVER, has, paint, pixels, run_pass, staged_pipeline, target};
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
 /// A colour, a number and a depth that differ from pixel to pixel.
@@ -152,7 +152,7 @@ fn one_pass_has_the_bits_of_two() {
 /// Another driver, which has fewer inputs at least than ten or is right in another way.
 #[test]
 fn one_pass_has_the_bits_of_two_on_another_driver() {
-    without_ray_tracing(one_pass_has_the_bits_of_two_on_another_driver, || {
+    on_swiftshader(one_pass_has_the_bits_of_two_on_another_driver, || {
         let Some(ctx) = device() else { return };
         one_pass_is_two(&ctx);
         assert_places_are_limited(&ctx);

@@ -71,7 +71,7 @@ fn granted(ctx: &Context, wish: [u32; 2]) -> [u32; 2] {
 }
 
 #[test]
-fn the_sizes_of_a_device_are_told_from_large_to_small() {
+fn the_sizes_of_a_device_are_listed_from_large_to_small() {
     let Some(ctx) = device() else { return };
     let (sizes, limits) = (ctx.shading_rates(), ctx.capabilities().limits.shading_rate);
     if !ctx.capabilities().has(OptionalFeature::PipelineShadingRate) {
@@ -116,7 +116,7 @@ fn pipelines_and_draws_have_a_rate() {
 
 /// The rate of a texel for the left half of the picture and single pixels for the right one, and all combinations.
 #[test]
-fn attachments_and_primitives_come_in_by_their_formulas() {
+fn attachment_and_primitive_rates_are_combined_by_their_formulas() {
     let Some(ctx) = device() else { return };
     if !has(&ctx, OptionalFeature::AttachmentShadingRate) || !has(&ctx, OptionalFeature::PrimitiveShadingRate)
     {

@@ -70,10 +70,10 @@ fn scene(flags: GeometryFlags) -> RayScene {
         vec![part(Mesh::sphere(7), Layout::Interleaved, flags)],
         vec![Part { transform: Some(moved), ..part(Mesh::terrain(6), Layout::Indexed32, flags) }],
     ];
-    RayScene { models, placed: (0..6).map(place).collect() }
+    RayScene { models, placed: (0..6).map(instance_at).collect() }
 }
 
-fn place(index: u32) -> Placed {
+fn instance_at(index: u32) -> Placed {
     let turn = Quat::from_rotation_y(index as f32);
     let to = Vec3::new((index % 3) as f32 * 3.0, (index / 3) as f32 * 3.0, 0.3);
     let scale = Vec3::new(1.0, 0.7, if index % 3 == 2 { -1.0 } else { 1.0 });
@@ -81,7 +81,7 @@ fn place(index: u32) -> Placed {
 }
 
 /// The corner of a hit triangle in object space.
-fn corner(scene: &RayScene, ids: &HitIds, corner: usize) -> Vec3 {
+fn expected_vertex(scene: &RayScene, ids: &HitIds, corner: usize) -> Vec3 {
     let part = &scene.models[scene.placed[ids.instance as usize].model][ids.geometry as usize];
     let vertex = part.mesh.triangles[ids.primitive as usize][corner];
     let position = Vec3::from(part.mesh.positions[vertex as usize]);
@@ -91,7 +91,8 @@ fn corner(scene: &RayScene, ids: &HitIds, corner: usize) -> Vec3 {
 fn check(ctx: &TestDevice, what: &str, gpu: &GpuScene, scene: &RayScene) -> Result<()> {
     let reference = scene.reference();
     let rays = rays_for(&reference);
-    let is_kept = |ids: &HitIds| (0..3).map(|number| corner(scene, ids, number).x).sum::<f32>() >= 0.0;
+    let is_kept =
+        |ids: &HitIds| (0..3).map(|number| expected_vertex(scene, ids, number).x).sum::<f32>() >= 0.0;
     for method in Method::available(ctx) {
         for number in 0..3 {
             let records = tracer(ctx, method, number)?.trace(&gpu.tlas, &rays, How::default())?;
@@ -100,7 +101,7 @@ fn check(ctx: &TestDevice, what: &str, gpu: &GpuScene, scene: &RayScene) -> Resu
                 let how = How::default();
                 let answer = reference.closest_by_where(ray, how, |hit| hit.is_opaque || is_kept(&hit.ids));
                 if answer.is_certain {
-                    let expected = answer.hit.map(|hit| (hit.ids, corner(scene, &hit.ids, number)));
+                    let expected = answer.hit.map(|hit| (hit.ids, expected_vertex(scene, &hit.ids, number)));
                     hits += usize::from(expected.is_some());
                     assert!(
                         is_same(record, expected),
@@ -125,7 +126,7 @@ fn is_same(record: &HitRecord, expected: Option<(HitIds, Vec3)>) -> bool {
 }
 
 #[test]
-fn corners_are_those_of_the_mesh() -> Result<()> {
+fn fetched_vertices_are_those_of_the_mesh() -> Result<()> {
     for ctx in devices() {
         for flags in [GeometryFlags::OPAQUE, GeometryFlags::empty()] {
             let scene = scene(flags);
@@ -138,14 +139,14 @@ fn corners_are_those_of_the_mesh() -> Result<()> {
 
 /// lavapipe 25.0 answers the corners of the first geometry for all.
 #[test]
-fn corners_of_every_geometry_are_its_own() -> Result<()> {
+fn fetched_vertices_of_every_geometry_are_its_own() -> Result<()> {
     for ctx in devices() {
         if ctx.capabilities().device_name.contains("llvmpipe") {
             eprintln!("NOT TESTED, {} knows the first geometry only", ctx.capabilities().device_name);
             continue;
         }
         let parts = scene(GeometryFlags::OPAQUE).models.concat();
-        let scene = RayScene { models: vec![parts; 4], placed: (0..2).map(place).collect() };
+        let scene = RayScene { models: vec![parts; 4], placed: (0..2).map(instance_at).collect() };
         let gpu = scene.upload_with(&ctx, FETCH, BuildFlags::default(), 0)?;
         check(&ctx, "several geometries", &gpu, &scene)?;
     }
@@ -153,7 +154,7 @@ fn corners_of_every_geometry_are_its_own() -> Result<()> {
 }
 
 #[test]
-fn corners_move_with_a_refit() -> Result<()> {
+fn fetched_vertices_move_with_a_refit() -> Result<()> {
     for ctx in devices() {
         let mut scene = scene(GeometryFlags::OPAQUE);
         let gpu = scene.upload_with(&ctx, FETCH | BuildFlags::ALLOW_UPDATE, BuildFlags::default(), 0)?;
@@ -202,7 +203,7 @@ fn without_the_capability_only_software_can_fetch() -> Result<()> {
 }
 
 #[test]
-fn a_top_level_structure_has_no_corners() -> Result<()> {
+fn a_tlas_has_no_vertices_to_fetch() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let outcome = ctx.create_tlas(&TlasDesc { flags: FETCH, ..Default::default() }).map(drop);
     assert!(matches!(outcome, Err(Error::InvalidUsage { .. })), "{outcome:?}");

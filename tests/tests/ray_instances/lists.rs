@@ -46,7 +46,7 @@ fn models(ctx: &Context, flags: BuildFlags) -> Result<Vec<Holder<AccelStructHand
     Ok(scene(1, 0.0).upload_with(ctx, flags, BuildFlags::default(), 0)?.models)
 }
 
-fn show(
+fn update_tlas(
     ctx: &Context,
     tlas: AccelStructHandle,
     (buffer, count): (BufferHandle, u32),
@@ -60,7 +60,7 @@ fn show(
 
 /// More, fewer, moved; from a buffer and from the host in turn.
 #[test]
-fn a_structure_takes_instances_from_anywhere() -> Result<()> {
+fn an_accel_struct_takes_instances_from_anywhere() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
     for flags in [BuildFlags::default(), BuildFlags::FAST_BUILD, COMPACTABLE] {
@@ -77,7 +77,7 @@ fn a_structure_takes_instances_from_anywhere() -> Result<()> {
         ] {
             let of_count = scene(count, turn);
             let buffer = words_buffer(&ctx, &records(&of_count, [1, 2]));
-            show(&ctx, *tlas, (*buffer, count), &blas, mode)?;
+            update_tlas(&ctx, *tlas, (*buffer, count), &blas, mode)?;
             drop(buffer);
             check.scene(&format!("{count} from a buffer, {flags:?}"), &tlas, &of_count)?;
             let mut cmd = ctx.acquire_command_buffer()?;

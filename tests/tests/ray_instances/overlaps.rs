@@ -2,9 +2,9 @@
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{BuildFlags, GeometryFlags, InstanceFlags, Result};
-use lvk_tests::agreement::Agreement;
 use lvk_tests::device;
 use lvk_tests::hit_check::HitCheck;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene};
@@ -96,7 +96,7 @@ fn check(check: &HitCheck, what: &str, scene: &RayScene, gpu: &GpuScene) -> Resu
     for (by, tracer) in tracers.chain(opaque) {
         let records = tracer.trace(&gpu.tlas, &rays, how)?;
         let what = format!("{what}, shadows {by}");
-        Agreement::of_occlusion(&rays, &records, |ray| reference.occluded(ray, how.mask)).assert(&what);
+        HitComparison::of_occlusion(&rays, &records, |ray| reference.occluded(ray, how.mask)).assert(&what);
     }
     Ok(())
 }

@@ -5,7 +5,8 @@ use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
     ComputePipelineDesc, Context, GeometryFlags, HitGroup, RayTracingPipelineDesc, Result, ShaderStage,
 };
-use lvk_tests::agreement::Agreement;
+use lvk_tests::accel_backend::whole_and_split;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene};
@@ -14,7 +15,6 @@ use lvk_tests::ray_tracer::{
 };
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::reference::{Hit, HitIds, Reference};
-use lvk_tests::structures::whole_and_split;
 
 /// What the shaders do with a candidate.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -172,7 +172,7 @@ fn accepted_candidates_leave_the_closest() -> Result<()> {
             for flags in [0, OPAQUE] {
                 let how = How { flags, ..How::default() };
                 let records = counter(&ctx, method, Verdict::Accept)?.trace(&gpu.tlas, &rays, how)?;
-                Agreement::of_shapes(&rays, &records, |ray| reference.closest_by(ray, how))
+                HitComparison::of_shapes(&rays, &records, |ray| reference.closest_by(ray, how))
                     .assert(&format!("all accepted by {method:?}, flags {flags}"));
                 for (record, hits) in certain(&reference, &rays, &records, how) {
                     let least = hits.first().is_some_and(|hit| !hit.is_opaque);
@@ -228,7 +228,7 @@ fn what_is_ignored_hides_nothing() -> Result<()> {
         for method in Method::available(&ctx) {
             let how = How::default();
             let records = counter(&ctx, method, Verdict::Ignore)?.trace(&gpu.tlas, &rays, how)?;
-            Agreement::of_shapes(&rays, &records, |ray| {
+            HitComparison::of_shapes(&rays, &records, |ray| {
                 reference.closest_by_where(ray, how, |hit| hit.is_opaque)
             })
             .assert(&format!("behind the ignored by {method:?}"));

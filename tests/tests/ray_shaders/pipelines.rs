@@ -365,7 +365,7 @@ fn without_pipelines_everything_about_them_is_unsupported() -> Result<()> {
 /// Each list has the pipeline's own shaders first, then those of each library, each with its own record; and the
 /// libraries may go before the pipeline runs.
 #[test]
-fn libraries_stand_behind_the_pipelines_own_shaders() -> Result<()> {
+fn groups_of_libraries_follow_the_pipelines_own_shaders() -> Result<()> {
     let Some(ctx) = library_device() else { return Ok(()) };
     let scene = GroupScene::new(&ctx)?;
     let shader = |stage| answering(&ctx, stage, Tag::BLOCK, Tag::SUM);

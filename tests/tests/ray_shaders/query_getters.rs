@@ -6,7 +6,7 @@ use lvk::{
     BufferDesc, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, DeviceProfile,
     GeometryFlags, Holder, InstanceFlags, RayQueryRequest, Result, ShaderStage,
 };
-use lvk_tests::agreement::Agreement;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene};
 use lvk_tests::ray_tracer::{
@@ -94,11 +94,11 @@ fn scene() -> RayScene {
         ],
         vec![glass(Mesh::sphere(6), Layout::Interleaved), Part::new(Mesh::terrain(5), Layout::Indexed32)],
     ];
-    RayScene { models, placed: (0..12).map(place).collect() }
+    RayScene { models, placed: (0..12).map(instance_at).collect() }
 }
 
 /// Sheared, since it is stretched between two turns; mirrored on no, one, two and three axes.
-fn place(index: u32) -> Placed {
+fn instance_at(index: u32) -> Placed {
     let number = index as f32;
     let sign = |axis: u32| if (index / 2) >> axis & 1 == 0 { 1.0 } else { -1.0 };
     let scale = Vec3::new(0.6 * sign(0), 1.3 * sign(1), (0.8 + 0.05 * number) * sign(2));
@@ -200,17 +200,17 @@ fn check_hits(reference: &Reference, rays: &[Ray], all_told: &[Told], flags: u32
     let how = How { flags, ..How::default() };
     let committed: Vec<_> = all_told.iter().map(|told| told.committed.hit).collect();
     let counts = |ids: &HitIds| ids.primitive.is_multiple_of(2);
-    Agreement::of_triangles(rays, &committed, |ray| {
+    HitComparison::of_triangles(rays, &committed, |ray| {
         reference.closest_by_where(ray, how, |hit| hit.is_opaque || counts(&hit.ids))
     })
     .assert(&format!("{what}, committed"));
-    let mut candidates = Agreement::default();
+    let mut candidates = HitComparison::default();
     for (ray, told) in rays.iter().zip(all_told).filter(|(_, told)| told.candidate.hit.kind != MISSED) {
         let HitRecord { instance, custom_index, geometry, primitive, .. } = told.candidate.hit;
         let ids = HitIds { instance, custom_index, geometry, primitive };
         let is_met = |ray: &Ray| reference.closest_by_where(ray, how, |hit| !hit.is_opaque && hit.ids == ids);
         let one = std::slice::from_ref(ray);
-        candidates.add(Agreement::of_triangles(one, &[told.candidate.hit], is_met));
+        candidates.add(HitComparison::of_triangles(one, &[told.candidate.hit], is_met));
     }
     let count = candidates.rays;
     if count > 0 {
@@ -220,7 +220,7 @@ fn check_hits(reference: &Reference, rays: &[Ray], all_told: &[Told], flags: u32
 }
 
 #[test]
-fn queries_tell_the_ray_the_hit_and_the_instance() -> Result<()> {
+fn queries_report_the_ray_the_hit_and_the_instance() -> Result<()> {
     let scene = scene();
     let reference = scene.reference();
     let (low, high) = reference.bounds();
@@ -261,7 +261,7 @@ fn queries_tell_the_ray_the_hit_and_the_instance() -> Result<()> {
 
 /// What nobody may rely on is defined where the library walks itself: it reads no memory that is not there.
 #[test]
-fn misses_are_told_as_zeros_in_software() -> Result<()> {
+fn misses_are_reported_as_zeros_in_software() -> Result<()> {
     let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return Ok(()) };
     let gpu = scene().upload(&ctx)?;
     let empty = RayScene { placed: Vec::new(), ..scene() }.upload(&ctx)?;

@@ -6,7 +6,7 @@ use lvk::{
     BlasDesc, Context, HitGroup, Holder, RayTracingPipelineDesc, Result, ShaderModuleHandle, ShaderStage,
     TlasDesc,
 };
-use lvk_tests::agreement::Agreement;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances};
 use lvk_tests::ray_tracer::{How, Method, RayTracer, shader, shader_with};
@@ -93,7 +93,7 @@ fn instance_ray_and_geometry_choose_the_hit_group() -> Result<()> {
     let tracer = RayTracer::of_pipeline(&ctx, pipeline);
     for (ray_gen, (offset, stride)) in (0..).zip(strides) {
         let records = tracer.trace(&gpu.tlas, &rays, How { ray_gen, ..How::default() })?;
-        Agreement::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("hit groups");
+        HitComparison::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("hit groups");
         let hits: Vec<_> = records.iter().filter(|record| record.kind != 0).collect();
         for hit in hits {
             let group = scene.placed[hit.instance as usize].hit_group_offset + offset + stride * hit.geometry;
@@ -132,7 +132,8 @@ fn the_miss_index_chooses_the_miss_shader() -> Result<()> {
     let tracer = RayTracer::of_pipeline(&ctx, pipeline);
     for (ray_gen, t) in [(0, -7.0), (2, -9.0), (1, -8.0)] {
         let records = tracer.trace(&gpu.tlas, &rays, How { ray_gen, ..How::default() })?;
-        Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("miss shaders");
+        HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
+            .assert("miss shaders");
         let misses: Vec<_> = records.iter().filter(|record| record.kind == 0).collect();
         assert!(!misses.is_empty() && misses.iter().all(|record| record.t == t));
     }
@@ -175,7 +176,7 @@ fn a_hit_shader_calls_the_callable_it_names() -> Result<()> {
     let reference = scene.reference();
     let rays = rays_for(&reference);
     let records = RayTracer::of_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
-    Agreement::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("callables");
+    HitComparison::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("callables");
     for hit in records.iter().filter(|record| record.kind != 0) {
         let value = hit.primitive;
         let changed = [value * 5, value + 70_000, value ^ 0x3ff][value as usize % 3];
@@ -240,17 +241,17 @@ fn a_hit_shader_traces_a_ray_of_its_own() -> Result<()> {
         })
         .unzip();
     assert!(behind.len() > 200);
-    Agreement::of_shapes(&behind, &records, |ray| reference.closest(ray, 0xff))
+    HitComparison::of_shapes(&behind, &records, |ray| reference.closest(ray, 0xff))
         .assert("behind the first hit");
     Ok(())
 }
 
 /// Five spheres each in two geometries of boxes; two instances with radii of their own.
 #[test]
-fn an_intersection_shader_hits_spheres_in_boxes() -> Result<()> {
+fn an_intersection_shader_hits_spheres_in_aabbs() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let spheres = SphereModel::new(5);
-    let (_buffers, geometries) = spheres.boxes(&ctx)?;
+    let (_buffers, geometries) = spheres.aabb_geometries(&ctx)?;
     let model = [ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })?];
     let turn = Quat::from_rotation_y(0.7);
     let places = [
@@ -273,7 +274,7 @@ fn an_intersection_shader_hits_spheres_in_boxes() -> Result<()> {
     for method in Method::available(&ctx) {
         let tracer = spheres.tracer(&ctx, method)?;
         let records = tracer.trace(&tlas, &rays, How::default())?;
-        Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
+        HitComparison::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
             .assert(&format!("spheres by {method:?}"));
         for hit in records.iter().filter(|record| record.kind != 0) {
             let (radius, tag) = GROUPS[1 - hit.instance as usize];

@@ -4,9 +4,9 @@ use lvk::{
     BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, BuildFlags, BuildMode, Context, Holder,
     IndexFormat, Indices, Result, TlasDesc, TlasInstance, Triangles,
 };
+use lvk_tests::accel_backend::software_alone;
 use lvk_tests::ray_tracer::{How, MISSED, Method, RayTracer};
 use lvk_tests::rays::Ray;
-use lvk_tests::structures::software_alone;
 
 struct Shared {
     vertices: Holder<BufferHandle>,

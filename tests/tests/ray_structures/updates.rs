@@ -6,16 +6,16 @@ use lvk::{
     BlasDesc, BlasGeometry, BuildFlags, BuildMode, Context, Error, PrimitiveOrder, Result, TlasDesc,
     Triangles,
 };
-use lvk_tests::agreement::Agreement;
-use lvk_tests::bender::{Bender, bent};
+use lvk_tests::accel_backend::{requires_device_accel_structs, software_alone};
 use lvk_tests::device;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{
     GpuScene, Layout, Part, Placed, RayScene, instances, upload_geometries, vertex_bytes,
 };
 use lvk_tests::ray_tracer::{How, Method, RayTracer};
 use lvk_tests::rays::{Ray, random_rays};
-use lvk_tests::structures::{software_alone, tests_own_structures};
+use lvk_tests::vertex_deform::{VertexDeformer, deformed};
 
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
 
@@ -32,7 +32,7 @@ fn check(what: &str, tracer: &RayTracer, gpu: &GpuScene, scene: &RayScene) -> Re
 
 fn agree(what: &str, rays: &[Ray], records: &[lvk_tests::ray_tracer::HitRecord], scene: &RayScene) {
     let reference = scene.reference();
-    Agreement::of_triangles(rays, records, |ray| reference.closest(ray, 0xff)).assert(what);
+    HitComparison::of_triangles(rays, records, |ray| reference.closest(ray, 0xff)).assert(what);
 }
 
 /// `count` small models on a spiral that `turn` turns.
@@ -97,7 +97,7 @@ fn a_refit_moves_instances() -> Result<()> {
 /// Refits that need not wait for each other, and two of one structure, which must; what they show before and after that
 /// is built, traced and destroyed in between.
 #[test]
-fn many_structures_are_refitted_in_one_command_buffer() -> Result<()> {
+fn many_accel_structs_are_refitted_in_one_command_buffer() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     for method in Method::available(&ctx) {
         let tracer = RayTracer::new(&ctx, method)?;
@@ -145,9 +145,9 @@ fn many_structures_are_refitted_in_one_command_buffer() -> Result<()> {
 }
 
 #[test]
-fn a_structure_is_refitted_to_vertices_written_by_a_dispatch() -> Result<()> {
+fn an_accel_struct_is_refitted_to_vertices_written_by_a_dispatch() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let bender = Bender::new(&ctx)?;
+    let deformer = VertexDeformer::new(&ctx)?;
     for method in Method::available(&ctx) {
         let tracer = RayTracer::new(&ctx, method)?;
         let mut scene = deformable();
@@ -157,27 +157,27 @@ fn a_structure_is_refitted_to_vertices_written_by_a_dispatch() -> Result<()> {
         for (amount, mode) in [(0.3, BuildMode::Refit), (-0.5, BuildMode::Refit), (0.4, BuildMode::Rebuild)] {
             let mesh = &scene.models[0][0].mesh;
             let mut cmd = ctx.acquire_command_buffer()?;
-            bender.record(&mut cmd, *gpu.buffers[0].vertices, mesh, amount)?;
+            deformer.record(&mut cmd, *gpu.buffers[0].vertices, mesh, amount)?;
             cmd.build_blas(&[*gpu.models[0]], mode)?;
             cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
             tracer.record(&mut cmd, &gpu.tlas, &job, How::default())?;
             ctx.submit(cmd)?;
-            scene.models[0][0].mesh = bent(mesh, amount);
-            agree(&format!("bent by {amount}, {method:?}"), &rays, &tracer.read(&job)?, &scene);
+            scene.models[0][0].mesh = deformed(mesh, amount);
+            agree(&format!("deformed by {amount}, {method:?}"), &rays, &tracer.read(&job)?, &scene);
         }
     }
     Ok(())
 }
 
 #[test]
-fn a_structure_is_rebuilt_from_uploaded_vertices() -> Result<()> {
+fn an_accel_struct_is_rebuilt_from_uploaded_vertices() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     for method in Method::available(&ctx) {
         let tracer = RayTracer::new(&ctx, method)?;
         let mut scene = deformable();
         let gpu = scene.upload(&ctx)?;
         check(&format!("before, by {method:?}"), &tracer, &gpu, &scene)?;
-        scene.models[0][0].mesh = bent(&scene.models[0][0].mesh, 0.6);
+        scene.models[0][0].mesh = deformed(&scene.models[0][0].mesh, 0.6);
         let bytes = vertex_bytes(&scene.models[0][0].mesh, Layout::Indexed16);
         ctx.upload_buffer(*gpu.buffers[0].vertices, 0, &bytes)?;
         let mut cmd = ctx.acquire_command_buffer()?;
@@ -193,7 +193,7 @@ fn a_structure_is_rebuilt_from_uploaded_vertices() -> Result<()> {
 #[test]
 fn every_frame_in_flight_sees_its_own_state() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let bender = Bender::new(&ctx)?;
+    let deformer = VertexDeformer::new(&ctx)?;
     for method in Method::available(&ctx) {
         let tracer = RayTracer::new(&ctx, method)?;
         let mut scene = deformable();
@@ -206,9 +206,9 @@ fn every_frame_in_flight_sees_its_own_state() -> Result<()> {
                 if number % 3 == 2 { (-0.35, BuildMode::Rebuild) } else { (0.2, BuildMode::Refit) };
             let job = tracer.job(&rays)?;
             let mut cmd = ctx.acquire_command_buffer()?;
-            bender.record(&mut cmd, *gpu.buffers[0].vertices, &scene.models[0][0].mesh, amount)?;
+            deformer.record(&mut cmd, *gpu.buffers[0].vertices, &scene.models[0][0].mesh, amount)?;
             cmd.build_blas(&[*gpu.models[0]], mode)?;
-            scene.models[0][0].mesh = bent(&scene.models[0][0].mesh, amount);
+            scene.models[0][0].mesh = deformed(&scene.models[0][0].mesh, amount);
             scene.placed[0].transform = Affine3A::from_rotation_z(number as f32);
             scene.placed[0].custom_index = number;
             cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
@@ -225,7 +225,7 @@ fn every_frame_in_flight_sees_its_own_state() -> Result<()> {
 
 /// Structures that the top level still shows outlive their holders.
 #[test]
-fn a_destroyed_model_is_shown_until_the_next_update() -> Result<()> {
+fn a_destroyed_blas_is_referenced_until_the_next_update() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     for method in Method::available(&ctx) {
         let tracer = RayTracer::new(&ctx, method)?;
@@ -297,7 +297,7 @@ fn a_refit_overtaken_by_a_rebuild_of_another_count_is_refused() -> Result<()> {
 #[test]
 fn builds_given_up_do_not_count_as_wear() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    if !tests_own_structures(&ctx, "indices that a refit does not read") {
+    if !requires_device_accel_structs(&ctx, "indices that a refit does not read") {
         return Ok(());
     }
     let tracer = RayTracer::new(&ctx, Method::available(&ctx)[0])?;

@@ -5,11 +5,11 @@ use lvk::{
     Context, Dependencies, DeviceProfile, Format, OptionalFeature, Queue, TextureDesc, TextureKind,
     TextureRegion, TextureUsage,
 };
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::compute::Evaluator;
 use lvk_tests::device::TestDevice;
 use lvk_tests::noise::noise;
-use lvk_tests::queues::{each, on};
+use lvk_tests::queues::{for_each_queue_request, submit_on};
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
 /// The device with host copies, and without; `None`, loudly, where it does not use them.
@@ -105,15 +105,15 @@ fn compare([by_host, staged]: &[TestDevice; 2]) -> usize {
 }
 
 #[test]
-fn every_format_and_kind_is_filled_alike() {
+fn every_format_and_kind_is_filled_the_same() {
     let Some(pair) = both() else { return };
     let compared = compare(&pair);
     assert!(compared > 200, "{compared}");
 }
 
 #[test]
-fn another_driver_fills_alike() {
-    without_ray_tracing(another_driver_fills_alike, || {
+fn another_driver_fills_the_same() {
+    on_swiftshader(another_driver_fills_the_same, || {
         let Some(pair) = both() else { return };
         let compared = compare(&pair);
         assert!(compared > 200, "{compared}");
@@ -147,13 +147,13 @@ fn every_queue_takes_them_over() {
     if both().is_none() {
         return;
     }
-    each(|ctx| {
+    for_each_queue_request(|ctx| {
         let (data, whole) = (noise(5, 4 * 64), TextureRegion::default());
         let desc = TextureDesc { extent: [8, 8], data: Some(&data), ..TextureDesc::default() };
         for queue in Queue::ALL {
             let from = ctx.create_texture(&desc).unwrap();
             let to = ctx.create_texture(&TextureDesc { data: None, ..desc }).unwrap();
-            on(ctx, queue, |cmd| cmd.copy_texture(*from, &whole, *to, &whole).unwrap());
+            submit_on(ctx, queue, |cmd| cmd.copy_texture(*from, &whole, *to, &whole).unwrap());
             let fetch = Evaluator::new(ctx, "textureBindlessFetch2D(a, ivec2(0, 0), 0)");
             let seen = fetch.run(ctx, [from.index(), 0, 0], 1, &Dependencies::default())[0][0];
             assert!((seen - f32::from(data[0]) / 255.0).abs() < 1e-4, "{queue:?}: {seen}");
@@ -164,7 +164,7 @@ fn every_queue_takes_them_over() {
 
 /// They can be uploaded to, copied from and sampled again like all others.
 #[test]
-fn such_textures_are_like_all_others_afterwards() {
+fn such_textures_are_like_any_texture_afterwards() {
     let Some(pair) = both() else { return };
     let [data, more] = [1, 2].map(|seed| noise(seed, 4 * 64));
     let [first, second] = pair.each_ref().map(|ctx| {

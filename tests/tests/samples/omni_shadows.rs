@@ -12,11 +12,11 @@ use lvk_samples::app::sample::Sample;
 use lvk_samples::omni_shadows::{Faces, OmniShadows, OmniShadowsConfig, ShadowFilter};
 use lvk_samples::raster::RasterError;
 use lvk_samples::scene::Camera;
-use lvk_tests::child::without_ray_tracing;
-use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
-use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, picture_now, picture_of};
+use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
+use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, image_now, image_of};
 use lvk_tests::ray_tracer::{FRONT, How, MISSED, Method, RayTracer};
 use lvk_tests::rays::Ray;
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
 /// On SwiftShader: its samples lie elsewhere in a pixel, and its comparisons are filtered with fewer bits.
@@ -31,12 +31,12 @@ fn lamp(ctx: &Context, config: &OmniShadowsConfig) -> OmniShadows {
 }
 
 #[test]
-fn one_pass_and_six_give_the_same_picture() {
+fn one_pass_and_six_give_the_same_image() {
     let Some(ctx) = device() else { return };
     let picture = |faces| {
         let mut sample = lamp(&ctx, &OmniShadowsConfig { faces, shows_cube: true, ..usual() });
         assert_eq!(sample.is_multiview(), faces == Faces::Multiview);
-        picture_of(&mut sample, 21)
+        image_of(&mut sample, 21)
     };
     assert!(picture(Faces::Multiview) == picture(Faces::Single));
 }
@@ -50,11 +50,11 @@ fn devices_without_multiview_draw_face_by_face() {
     assert!(matches!(asked, Some(RasterError::Missing { .. })), "{asked:?}");
     let mut sample = lamp(&bare, &usual());
     assert!(!sample.is_multiview());
-    assert!(picture_of(&mut sample, 0) == picture_of(&mut lamp(&ctx, &usual()), 0));
+    assert!(image_of(&mut sample, 0) == image_of(&mut lamp(&ctx, &usual()), 0));
 }
 
 /// Triangles as a structure of their own.
-fn structure(
+fn accel_structs(
     ctx: &Context,
     triangles: &[[[f32; 3]; 3]],
 ) -> (Holder<AccelStructHandle>, Holder<AccelStructHandle>) {
@@ -87,8 +87,8 @@ fn pixel_rays(camera: &Camera) -> Vec<Ray> {
 fn traced_shadows(ctx: &Context, sample: &OmniShadows) -> Vec<Option<bool>> {
     let [casters, others] = sample.triangles();
     let everything = [&casters[..], &others[..]].concat();
-    let (all, _all_blas) = structure(ctx, &everything);
-    let (blockers, _blockers_blas) = structure(ctx, &casters);
+    let (all, _all_blas) = accel_structs(ctx, &everything);
+    let (blockers, _blockers_blas) = accel_structs(ctx, &casters);
     let tracer = RayTracer::new(ctx, Method::available(ctx)[0]).unwrap();
     let rays = pixel_rays(&sample.view().unwrap());
     let lamp = Vec3::from(sample.lamp());
@@ -115,7 +115,7 @@ fn check_shadows(ctx: &Context, view: &Camera) -> [usize; 2] {
         [ShadowFilter::Off, ShadowFilter::Hard].map(|filter| lamp(ctx, &config(filter)));
     let pictures = [&mut lit, &mut shadowed].map(|sample| {
         sample.set_view(view);
-        picture_now(sample)
+        image_now(sample)
     });
     let expected = traced_shadows(ctx, &shadowed);
     let (width, mut counts, mut wrong) = (SIZE[0] as usize, [0, 0], Vec::new());
@@ -168,7 +168,7 @@ fn shadows_are_those_that_rays_find() {
 fn a_larger_lamp_makes_softer_edges_and_no_other_light() {
     let Some(ctx) = device() else { return };
     let picture = |filter, lamp_radius| {
-        picture_of(&mut lamp(&ctx, &OmniShadowsConfig { filter, lamp_radius, haze: 0.0, ..usual() }), 0)
+        image_of(&mut lamp(&ctx, &OmniShadowsConfig { filter, lamp_radius, haze: 0.0, ..usual() }), 0)
     };
     let hard = picture(ShadowFilter::Linear, 0.0);
     let [sharp, soft] = [0.002, 0.05].map(|radius| picture(ShadowFilter::Soft, radius));
@@ -193,28 +193,28 @@ fn mean(picture: &RgbaImage) -> f64 {
 fn a_round_has_no_seam() {
     let Some(ctx) = device() else { return };
     let mut sample = lamp(&ctx, &usual());
-    let first = picture_of(&mut sample, 0);
-    assert_ne!(picture_of(&mut sample, 33), first, "it swings");
-    assert_eq!(picture_of(&mut sample, ROUND), first);
+    let first = image_of(&mut sample, 0);
+    assert_ne!(image_of(&mut sample, 33), first, "it swings");
+    assert_eq!(image_of(&mut sample, ROUND), first);
 }
 
 #[test]
 fn the_lamp_looks_as_it_always_did() {
     let Some(ctx) = device() else { return };
-    assert_as_ever("omni_shadows_small", &picture_of(&mut lamp(&ctx, &usual()), 0));
+    assert_matches_reference("omni_shadows_small", &image_of(&mut lamp(&ctx, &usual()), 0));
 }
 
 #[test]
-fn another_driver_shows_it() {
-    without_ray_tracing(another_driver_shows_it, || {
+fn another_driver_renders_it() {
+    on_swiftshader(another_driver_renders_it, || {
         let Some(ctx) = device() else { return };
-        let picture = picture_of(&mut lamp(&ctx, &usual()), 0);
-        assert_alike("SwiftShader lamp", &picture, &reference("omni_shadows_small"), &OTHER_DRIVER);
+        let picture = image_of(&mut lamp(&ctx, &usual()), 0);
+        assert_similar("SwiftShader lamp", &picture, &reference_image("omni_shadows_small"), &OTHER_DRIVER);
     });
 }
 
 #[test]
-fn impossible_pictures_are_refused() {
+fn impossible_images_are_refused() {
     let Some(ctx) = device() else { return };
     assert_refuses_impossible_sizes(|extent| {
         OmniShadows::new(&ctx, &OmniShadowsConfig { extent, ..usual() })

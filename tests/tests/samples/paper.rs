@@ -10,7 +10,7 @@ use lvk_samples::bench::paper::{
 };
 use lvk_tests::device;
 use lvk_tests::hybrid::paths;
-use lvk_tests::still_life::still_life;
+use lvk_tests::scene_obj::obj_scene;
 
 const SIZE: [u32; 2] = [96, 54];
 const FRAMES: u32 = 3;
@@ -18,7 +18,7 @@ const FRAMES: u32 = 3;
 /// The experiment on a scene that bears the name of one of the paper's.
 fn experiment(folder: &Path) -> Option<Experiment> {
     let ctx = device()?;
-    let mut scene = still_life();
+    let mut scene = obj_scene();
     scene.name = "conference".to_owned();
     let paths = paths(&ctx).into_iter().map(|path| TracePath::of(path, ctx.capabilities())).collect();
     let plan = Plan { size: SIZE, frames: FRAMES, runs: 1, warm_up: 0, compared: 2, max_depth: 2, paths };
@@ -81,7 +81,7 @@ fn the_experiment_measures_everything_and_reports_it() {
         }
     }
     assert_report_is_whole(folder.path(), &experiment);
-    assert_pictures_are_alike(folder.path(), &experiment);
+    assert_images_are_similar(folder.path(), &experiment);
 }
 
 /// A span is at least as long as its passes, up to rounding.
@@ -119,7 +119,7 @@ fn assert_report_is_whole(folder: &Path, experiment: &Experiment) {
     assert_eq!(linked, 1 + path_count * 3);
 }
 
-fn assert_pictures_are_alike(folder: &Path, experiment: &Experiment) {
+fn assert_images_are_similar(folder: &Path, experiment: &Experiment) {
     let scene = &experiment.scenes[0];
     for cell in &scene.cells {
         let alike = &cell.likeness;

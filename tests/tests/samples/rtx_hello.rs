@@ -8,9 +8,9 @@ use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
 use lvk_samples::rtx_hello::{Following, RtxHello};
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::hybrid::paths;
-use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
+use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
 /// No multiple of a work group.
@@ -23,7 +23,7 @@ fn hello(ctx: &Context, path: RayPath) -> RtxHello {
     RtxHello::new(ctx, &RtxConfig { path, width: SIZE[0], height: SIZE[1] }).unwrap()
 }
 
-fn picture_of(hello: &mut RtxHello, frame: u32) -> RgbaImage {
+fn image_of(hello: &mut RtxHello, frame: u32) -> RgbaImage {
     hello.update(Moment::of_frame(frame, ROUND)).unwrap();
     RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(hello).unwrap()).unwrap()
 }
@@ -37,34 +37,34 @@ fn all_paths_follow_the_triangles() {
     let mut all: Vec<_> = paths(&ctx).into_iter().map(|path| hello(&ctx, path)).collect();
     all.extend(software.as_deref().map(|ctx| hello(ctx, RayPath::Query)));
     for frame in [0, 17, 50] {
-        let pictures: Vec<_> = all.iter_mut().map(|hello| picture_of(hello, frame)).collect();
+        let pictures: Vec<_> = all.iter_mut().map(|hello| image_of(hello, frame)).collect();
         for other in &pictures[1..] {
-            assert_alike(&format!("triangles in frame {frame}"), other, &pictures[0], &SAME_RAYS);
+            assert_similar(&format!("triangles in frame {frame}"), other, &pictures[0], &SAME_RAYS);
         }
     }
 }
 
 /// More frames than refits between two rebuilds.
 #[test]
-fn a_frame_depends_on_its_moment_alone() {
+fn a_frame_depends_on_its_time_alone() {
     let Some(ctx) = device() else { return };
     let mut sequence = hello(&ctx, paths(&ctx)[0]);
-    let first = picture_of(&mut sequence, 0);
+    let first = image_of(&mut sequence, 0);
     for frame in 1..40 {
-        assert_ne!(picture_of(&mut sequence, frame), first, "something moves");
+        assert_ne!(image_of(&mut sequence, frame), first, "something moves");
     }
-    assert_eq!(picture_of(&mut hello(&ctx, paths(&ctx)[0]), 40), picture_of(&mut sequence, 40), "alone");
-    assert_eq!(picture_of(&mut sequence, ROUND), first, "a round has no seam");
+    assert_eq!(image_of(&mut hello(&ctx, paths(&ctx)[0]), 40), image_of(&mut sequence, 40), "alone");
+    assert_eq!(image_of(&mut sequence, ROUND), first, "a round has no seam");
 }
 
 #[test]
 fn switches_of_the_panel_hide_triangles_and_choose_the_update() {
     let Some(ctx) = device() else { return };
     let mut sample = hello(&ctx, paths(&ctx)[0]);
-    let all = picture_of(&mut sample, 40);
+    let all = image_of(&mut sample, 40);
     let without = [0, 1, 2].map(|group| {
         sample.switches().is_seen[group] = false;
-        let picture = picture_of(&mut sample, 40);
+        let picture = image_of(&mut sample, 40);
         sample.switches().is_seen[group] = true;
         picture
     });
@@ -72,27 +72,27 @@ fn switches_of_the_panel_hide_triangles_and_choose_the_update() {
     assert!(without[0] != without[1] && without[1] != without[2] && without[2] != without[0]);
     for following in [Following::Refits, Following::Rebuilds, Following::Both] {
         sample.switches().following = following;
-        assert_eq!(picture_of(&mut sample, 40), all, "{following:?}");
+        assert_eq!(image_of(&mut sample, 40), all, "{following:?}");
     }
 }
 
 #[test]
 fn the_triangles_look_as_they_always_did() {
     let Some(ctx) = device() else { return };
-    assert_as_ever("rtx_hello_small", &picture_of(&mut hello(&ctx, paths(&ctx)[0]), 0));
+    assert_matches_reference("rtx_hello_small", &image_of(&mut hello(&ctx, paths(&ctx)[0]), 0));
 }
 
 #[test]
-fn a_driver_without_ray_tracing_shows_the_triangles() {
-    without_ray_tracing(a_driver_without_ray_tracing_shows_the_triangles, || {
+fn a_driver_without_ray_tracing_renders_the_triangles() {
+    on_swiftshader(a_driver_without_ray_tracing_renders_the_triangles, || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
-        let picture = picture_of(&mut hello(&ctx, RayPath::Query), 0);
-        assert_alike("SwiftShader triangles", &picture, &reference("rtx_hello_small"), &SAME_RAYS);
+        let picture = image_of(&mut hello(&ctx, RayPath::Query), 0);
+        assert_similar("SwiftShader triangles", &picture, &reference_image("rtx_hello_small"), &SAME_RAYS);
     });
 }
 
 #[test]
-fn impossible_pictures_are_refused() {
+fn impossible_images_are_refused() {
     let Some(ctx) = device() else { return };
     let path = paths(&ctx)[0];
     for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {

@@ -10,11 +10,11 @@ use lvk::{
 };
 use lvk_samples::pipelines;
 use lvk_tests::compute::{read_words, words_buffer};
-use lvk_tests::warnings::{listen, take_warnings};
+use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::{TestDevice, device, device_with};
 
 fn folder() -> tempfile::TempDir {
-    listen();
+    capture_warnings();
     tempfile::tempdir().unwrap()
 }
 

@@ -5,14 +5,14 @@ use lvk::{
     BlasDesc, BuildFlags, BuildMode, ComputePipelineDesc, Context, DeviceProfile, Error, GeometryFlags,
     RayQueryPath, RayQueryRequest, Result, ShaderStage, TlasDesc, TlasInstance,
 };
-use lvk_tests::agreement::Agreement;
-use lvk_tests::child::without_ray_tracing;
-use lvk_tests::gpu_built::uneven;
+use lvk_tests::gpu_built::uneven_triangles;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
 use lvk_tests::ray_scene::{BUILD_FLAGS, Layout, Part, Placed, RayScene, instances, upload_geometries};
 use lvk_tests::ray_tracer::{HitRecord, How, MISSED, Method, OPAQUE, RayTracer, shader};
 use lvk_tests::rays::{Ray, random_rays};
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{TestDevice, device, device_with};
 
 fn software() -> Option<TestDevice> {
@@ -44,10 +44,10 @@ fn check_crowd(ctx: &Context, flags: BuildFlags, rays: usize) -> Result<()> {
     let reference = scene.reference();
     let rays = random_rays(5, rays, Vec3::splat(-2.0), Vec3::splat(2.0));
     let records = RayTracer::new(ctx, Method::Query)?.trace(&gpu.tlas, &rays, How::default())?;
-    Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
+    HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
         .assert(&format!("a crowd with {flags:?}"));
     let shadows = RayTracer::new(ctx, Method::Query)?.trace(&gpu.tlas, &rays, How::shadows())?;
-    Agreement::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, 0xff))
+    HitComparison::of_occlusion(&rays, &shadows, |ray| reference.occluded(ray, 0xff))
         .assert(&format!("shadows of a crowd with {flags:?}"));
     Ok(())
 }
@@ -69,7 +69,7 @@ fn every_kind_of_build_is_hit_as_the_reference_says() -> Result<()> {
 }
 
 #[test]
-fn a_device_without_structures_of_its_own_has_everything() -> Result<()> {
+fn a_device_without_accel_structs_of_its_own_has_everything() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Auto) else { return Ok(()) };
     let caps = ctx.capabilities();
     assert!(caps.ray_query && !caps.ray_tracing_pipeline && !caps.ray_query_reason.is_empty());
@@ -79,7 +79,7 @@ fn a_device_without_structures_of_its_own_has_everything() -> Result<()> {
 
 #[test]
 fn a_driver_without_ray_tracing_traces() {
-    without_ray_tracing(a_driver_without_ray_tracing_traces, || {
+    on_swiftshader(a_driver_without_ray_tracing_traces, || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
         assert!(ctx.capabilities().device_name.contains("SwiftShader"));
         for flags in BUILD_FLAGS {
@@ -91,7 +91,7 @@ fn a_driver_without_ray_tracing_traces() {
 }
 
 #[test]
-fn software_and_the_device_answer_alike() -> Result<()> {
+fn software_and_the_device_give_the_same_hits() -> Result<()> {
     let (Some(one), Some(other)) = (device(), software()) else { return Ok(()) };
     if one.capabilities().ray_query_path != RayQueryPath::Hardware {
         eprintln!("NOT TESTED, {} has no ray queries", one.capabilities().device_name);
@@ -250,7 +250,7 @@ fn a_query_may_begin_anew_wherever_it_was() -> Result<()> {
 }
 
 #[test]
-fn a_structure_is_the_same_after_a_file() -> Result<()> {
+fn an_accel_struct_is_the_same_after_a_file() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
     let parts = [Part::new(Mesh::torus(12), Layout::Indexed16)];
     let (_buffers, geometries) = upload_geometries(&ctx, &parts)?;
@@ -281,7 +281,7 @@ fn a_structure_is_the_same_after_a_file() -> Result<()> {
 #[test]
 fn uneven_trees_are_hit_as_even_ones() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
-    let positions: Vec<_> = uneven(8).into_iter().flatten().collect();
+    let positions: Vec<_> = uneven_triangles(8).into_iter().flatten().collect();
     let triangles =
         (0..positions.len() as u32 / 3).map(|number| [0, 1, 2].map(|step| number * 3 + step)).collect();
     let parts = [Part::new(Mesh { positions, triangles }, Layout::Indexed32)];
@@ -385,7 +385,7 @@ fn rebuilds_below_parts_of_instances_are_seen() -> Result<()> {
     let tracer = RayTracer::new(&ctx, Method::Query)?;
     let agrees = |what: &str| -> Result<()> {
         let records = tracer.trace(&gpu.tlas, &rays, How::default())?;
-        Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(what);
+        HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(what);
         Ok(())
     };
     agrees("parts")?;
@@ -478,7 +478,7 @@ fn low_memory_is_low_with_updates_too() -> Result<()> {
 
 /// What the GPU builds takes no more than what the CPU does, though nobody knows beforehand how many nodes there will be.
 #[test]
-fn structures_of_the_gpu_are_small() -> Result<()> {
+fn accel_structs_of_the_gpu_are_small() -> Result<()> {
     const FIRST: u64 = 1024;
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
     let mesh = Mesh::terrain(90);
@@ -492,7 +492,7 @@ fn structures_of_the_gpu_are_small() -> Result<()> {
 
 /// Where it may be refitted, and so is never shown in parts.
 #[test]
-fn what_the_cpu_built_is_rebuilt_in_its_place() -> Result<()> {
+fn what_the_cpu_built_is_rebuilt_in_the_same_memory() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
     let mesh = Mesh::terrain(90);
     let count = mesh.triangles.len() as u64;

@@ -52,7 +52,7 @@ fn every_usage_of_every_format_works_or_is_unsupported() {
 }
 
 #[test]
-fn every_mip_layer_and_region_is_a_place_of_its_own() {
+fn every_mip_layer_and_region_is_distinct() {
     let Some(ctx) = device() else { return };
     for kind in KINDS {
         let extent = if kind == TextureKind::Cube { [13, 13] } else { [13, 7] };

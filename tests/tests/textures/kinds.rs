@@ -54,7 +54,7 @@ fn values(seed: u32, count: usize) -> Vec<f32> {
 }
 
 #[test]
-fn every_box_of_every_mip_of_a_volume_is_a_place_of_its_own() {
+fn every_box_of_every_mip_of_a_volume_is_a_region_of_its_own() {
     let Some(ctx) = device() else { return };
     let sizes = [[13_u32, 7, 9], [6, 3, 4], [3, 1, 2], [1, 1, 1]];
     let kind = TextureKind::D3 { depth: 9 };

@@ -6,10 +6,10 @@ use lvk::{
     SpecializationConstant, SpecializationValue, TextureDesc, TextureHandle, TextureKind, TextureRegion,
     TextureUsage, TextureViewDesc, YuvConversion, YuvModel, YuvRange,
 };
-use lvk_tests::child::without_ray_tracing;
 use lvk_tests::compute::{Evaluator, module, read_vec4, vec4_buffer};
 use lvk_tests::device::{TestDevice, device_with};
 use lvk_tests::noise::noise;
+use lvk_tests::subprocess::on_swiftshader;
 
 const WIDTH: u32 = 8;
 const HEIGHT: u32 = 4;
@@ -191,7 +191,7 @@ fn colours_are_those_of_the_standards() {
 
 #[test]
 fn colours_are_those_of_the_standards_on_another_driver() {
-    without_ray_tracing(colours_are_those_of_the_standards_on_another_driver, || {
+    on_swiftshader(colours_are_those_of_the_standards_on_another_driver, || {
         let Some((ctx, all)) = yuv_device() else { return };
         check_conversions(&ctx, &all[..12]);
     });
@@ -234,7 +234,7 @@ fn planes_are_moved_and_seen_one_by_one() {
 }
 
 #[test]
-fn slots_run_out_and_come_back_and_empty_ones_are_black() {
+fn slots_run_out_and_are_freed_and_empty_ones_are_black() {
     let Some(ctx) = device_with(|desc| desc.max_yuv_textures = 2) else { return };
     let data = [128; 48];
     let make = || ctx.create_texture(&desc(Format::Nv12, &data));

@@ -9,8 +9,8 @@ use lvk::{
 use crate::meshes::Mesh;
 use crate::ray_tracer::shader;
 
-/// Moves every vertex by its own amount, which [`bent`] repeats.
-const BEND: &str = r"
+/// Moves every vertex by its own amount, which [`deformed`] repeats.
+const DEFORM: &str = r"
     layout(local_size_x = 64) in;
     layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Positions { vec3 at[]; };
     layout(push_constant, scalar) uniform Push { Positions positions; uint count; float amount; };
@@ -31,15 +31,15 @@ struct Push {
 }
 
 /// Moves packed vertices on the GPU.
-pub struct Bender {
+pub struct VertexDeformer {
     ctx: Context,
     pipeline: Holder<ComputePipelineHandle>,
 }
 
-impl Bender {
+impl VertexDeformer {
     /// Compiles the shader.
     pub fn new(ctx: &Context) -> Result<Self> {
-        let module = shader(ctx, ShaderStage::Compute, BEND)?;
+        let module = shader(ctx, ShaderStage::Compute, DEFORM)?;
         let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
         Ok(Self { ctx: ctx.clone(), pipeline: ctx.create_compute_pipeline(&desc)? })
     }
@@ -60,8 +60,8 @@ impl Bender {
     }
 }
 
-/// The mesh as a [`Bender`] leaves it.
-pub fn bent(mesh: &Mesh, amount: f32) -> Mesh {
+/// The mesh as a [`VertexDeformer`] leaves it.
+pub fn deformed(mesh: &Mesh, amount: f32) -> Mesh {
     let positions =
         mesh.positions.iter().map(|[x, y, z]| [x + amount * y, y + amount, z + 0.5 * amount * x]).collect();
     Mesh { positions, triangles: mesh.triangles.clone() }

@@ -3,7 +3,7 @@
 use lvk::glam::Vec3;
 use lvk::{BuildFlags, BuildMode, Context, RayQueryRequest, Result};
 use lvk_tests::device_with;
-use lvk_tests::gpu_built::scattered;
+use lvk_tests::gpu_built::scattered_triangles;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
 use lvk_tests::ray_scene::{GpuScene, Layout, RayScene, instances};
@@ -36,19 +36,19 @@ impl Pieces {
     }
 
     /// The corners of one of these three.
-    fn corners(self, [a, b, c]: [[f32; 3]; 3]) -> Vec<[f32; 3]> {
+    fn move_vertices(self, [a, b, c]: [[f32; 3]; 3]) -> Vec<[f32; 3]> {
         let opposite = (Vec3::from(a) + Vec3::from(b) - Vec3::from(c)).to_array();
         if self == Self::Quads { vec![a, b, c, opposite] } else { vec![a, b, c] }
     }
 
     /// All vertices, with those that leave so far out on one side or the other.
     fn moved(self, reach: f32) -> Vec<[f32; 3]> {
-        let mut triangles = scattered(COUNT, 1);
+        let mut triangles = scattered_triangles(COUNT, 1);
         for (number, triangle) in triangles.iter_mut().enumerate().step_by(3) {
             let way = if number % 2 == 0 { reach } else { -reach };
             triangle.iter_mut().for_each(|corner| corner[number / 6 % 3] += way);
         }
-        triangles.into_iter().flat_map(|triangle| self.corners(triangle)).collect()
+        triangles.into_iter().flat_map(|triangle| self.move_vertices(triangle)).collect()
     }
 
     fn scene(self) -> RayScene {
@@ -69,7 +69,7 @@ fn rays() -> Vec<Ray> {
         let way = random.direction();
         Ray::new(middle - way * random.between(5.0, 150.0), way)
     };
-    scattered(COUNT, 1).into_iter().map(towards).collect()
+    scattered_triangles(COUNT, 1).into_iter().map(towards).collect()
 }
 
 fn refit(ctx: &Context, gpu: &GpuScene, scene: &RayScene, vertices: &[[f32; 3]]) -> Result<()> {
@@ -124,7 +124,7 @@ fn what_stays_is_hit_while_neighbours_move_far_out() -> Result<()> {
 }
 
 /// Eight triangles side by side, as large as `size`, and rays down on their middles from as far.
-fn row(size: f32) -> (RayScene, Vec<Ray>) {
+fn triangles_in_a_row(size: f32) -> (RayScene, Vec<Ray>) {
     let corner = |number: u32, x: f32, y: f32| [(number as f32 * 1.5 + x) * size, y * size, 0.25 * size];
     let positions = (0..8).flat_map(|at| [corner(at, 0.0, 0.0), corner(at, 1.0, 0.0), corner(at, 0.0, 1.0)]);
     let triangles = (0..8).map(|at| [0, 1, 2].map(|of| at * 3 + of));
@@ -142,7 +142,7 @@ fn hits_are_as_far_as_triangles_are_large() -> Result<()> {
     let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return Ok(()) };
     let tracers = [RayTracer::new(&ctx, Method::Query)?, RayTracer::for_opaque_triangles(&ctx)?];
     for size in [1e-15, 1e-12, 1e-6, 1.0, 1e6, 1e12, 1e13, 5e13] {
-        let (scene, rays) = row(size);
+        let (scene, rays) = triangles_in_a_row(size);
         for flags in FLAGS {
             let gpu = scene.upload_with(&ctx, flags, BuildFlags::default(), 0)?;
             for tracer in &tracers {

@@ -7,7 +7,7 @@ use lvk::glam::{DVec3, Vec3};
 use lvk_samples::hybrid_oit::{GlassNode, HybridOit, HybridOitConfig, Motion, OitScene};
 
 /// The sample with one configuration, ready to take pictures of a scene.
-pub struct GlassRoom {
+pub struct OitRenderer {
     /// The sample.
     pub sample: HybridOit,
     size: [u32; 2],
@@ -39,7 +39,7 @@ pub struct Found {
     pub is_doubtful: bool,
 }
 
-impl GlassRoom {
+impl OitRenderer {
     /// A room for pictures with `config`.
     ///
     /// # Panics
@@ -53,10 +53,10 @@ impl GlassRoom {
     ///
     /// # Panics
     /// When rendering fails.
-    pub fn picture(&mut self, seconds: f64) -> RgbaImage {
+    pub fn render(&mut self, seconds: f64) -> RgbaImage {
         self.sample.update(seconds);
         self.sample.render().expect("the sample renders");
-        let pixels = self.sample.picture().expect("the picture can be read");
+        let pixels = self.sample.picture().expect("the image can be read");
         RgbaImage::from_raw(self.size[0], self.size[1], pixels).expect("a picture has four bytes a pixel")
     }
 }
@@ -65,12 +65,12 @@ impl HostScene {
     /// The scene at `seconds`.
     pub fn new(scene: &OitScene, seconds: f64) -> Self {
         let balls = scene.balls.iter().map(|ball| Sphere {
-            center: place(&ball.motion, false, seconds),
+            center: center_at(&ball.motion, false, seconds),
             radius: f64::from(ball.radius),
             absorption: None,
         });
         let glass = scene.glass.iter().map(|glass| Sphere {
-            center: place(&glass.motion, true, seconds),
+            center: center_at(&glass.motion, true, seconds),
             radius: f64::from(glass.radius),
             absorption: Some(glass.absorption().as_dvec3()),
         });
@@ -161,14 +161,14 @@ impl Sphere {
 }
 
 /// What is seen of `background` through nodes, by sorting them here.
-pub fn through_sorted(nodes: &[GlassNode], background: [f64; 3]) -> [f64; 3] {
+pub fn composite_sorted(nodes: &[GlassNode], background: [f64; 3]) -> [f64; 3] {
     let mut sorted = nodes.to_vec();
     sorted.sort_by(|a, b| b.distance.total_cmp(&a.distance));
-    through(&sorted, background)
+    composite(&sorted, background)
 }
 
 /// The same in the order as given, the first one taken for the farthest.
-pub fn through(nodes: &[GlassNode], background: [f64; 3]) -> [f64; 3] {
+pub fn composite(nodes: &[GlassNode], background: [f64; 3]) -> [f64; 3] {
     nodes.iter().fold(background, |behind, node| {
         let channel = |c: usize| f64::from(node.radiance[c]) + f64::from(node.transmittance[c]) * behind[c];
         [0, 1, 2].map(channel)
@@ -193,7 +193,7 @@ pub fn decode(value: u8) -> f64 {
 }
 
 /// Where a sphere's centre is at a moment.
-fn place(motion: &Motion, is_glass: bool, seconds: f64) -> DVec3 {
+fn center_at(motion: &Motion, is_glass: bool, seconds: f64) -> DVec3 {
     let turn = std::f64::consts::TAU;
     let along = |rate: f32, phase: f32| (seconds * f64::from(rate) + f64::from(phase)).rem_euclid(1.0);
     let (angle, cycle) =

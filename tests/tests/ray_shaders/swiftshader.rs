@@ -1,10 +1,10 @@
 //! What shaders see of ray queries on a device that has no ray tracing at all.
 
-use lvk_tests::child::program_without_ray_tracing;
+use lvk_tests::subprocess::rerun_on_swiftshader;
 
 /// But for pipelines, which there are none of.
 #[test]
 #[ignore = "a minute, of the step swiftshader of .ci/run"]
-fn queries_tell_the_same_without_ray_tracing() {
-    program_without_ray_tracing(&["pipelines::"]);
+fn queries_report_the_same_without_ray_tracing() {
+    rerun_on_swiftshader(&["pipelines::"]);
 }

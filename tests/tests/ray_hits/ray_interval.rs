@@ -3,9 +3,9 @@
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{GeometryFlags, Result};
-use lvk_tests::agreement::Agreement;
 use lvk_tests::device;
 use lvk_tests::hit_check::{HitCheck, rays_for};
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene};
 use lvk_tests::ray_tracer::{How, MISSED, Method, RayTracer};
@@ -116,7 +116,8 @@ fn directions_may_be_very_short() -> Result<()> {
                 let mut records = tracer.trace(&gpu.tlas, &shortened(&rays, length), How::default())?;
                 records.iter_mut().for_each(|record| record.t *= length);
                 let what = format!("directions of {length:e}, scaled by {scale:e}, by {method:?}");
-                Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(&what);
+                HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
+                    .assert(&what);
             }
         }
     }

@@ -22,7 +22,7 @@ pub struct Tolerance {
 
 impl Tolerance {
     /// Of a picture and the same one by another driver, years ago.
-    pub const SAME_AS_EVER: Self = Self { psnr: 46.0, ssim: 0.995, differing_share: 0.03, flip: 0.012 };
+    pub const ACROSS_DRIVERS: Self = Self { psnr: 46.0, ssim: 0.995, differing_share: 0.03, flip: 0.012 };
 }
 
 impl Default for Tolerance {
@@ -33,19 +33,19 @@ impl Default for Tolerance {
 
 /// What was measured of two pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Likeness {
+pub struct ImageSimilarity {
     /// Pixel by pixel.
     pub difference: Difference,
     /// Mean of NVIDIA's FLIP error: 0 for pictures that look the same, 1 for black beside white.
     pub flip: f32,
 }
 
-impl Likeness {
+impl ImageSimilarity {
     /// Measures two pictures.
     ///
     /// # Panics
     /// When their sizes differ.
-    pub fn of(actual: &RgbaImage, expected: &RgbaImage) -> Self {
+    pub fn measure(actual: &RgbaImage, expected: &RgbaImage) -> Self {
         assert_eq!(actual.dimensions(), expected.dimensions(), "pictures of different sizes");
         let (width, height) = actual.dimensions();
         let difference = metrics::compare(actual.as_raw(), expected.as_raw(), width, height);
@@ -63,7 +63,7 @@ impl Likeness {
     }
 }
 
-impl std::fmt::Display for Likeness {
+impl std::fmt::Display for ImageSimilarity {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}, mean FLIP error {:.5}", self.difference, self.flip)
     }
@@ -74,26 +74,26 @@ impl std::fmt::Display for Likeness {
 ///
 /// # Panics
 /// As said.
-pub fn assert_alike(what: &str, actual: &RgbaImage, expected: &RgbaImage, tolerance: &Tolerance) {
-    let likeness = Likeness::of(actual, expected);
-    eprintln!("{what}: {likeness}");
-    if likeness.is_within(tolerance) {
+pub fn assert_similar(what: &str, actual: &RgbaImage, expected: &RgbaImage, tolerance: &Tolerance) {
+    let similarity = ImageSimilarity::measure(actual, expected);
+    eprintln!("{what}: {similarity}");
+    if similarity.is_within(tolerance) {
         return;
     }
     let files = [
-        keep(&format!("{what} actual"), actual),
-        keep(&format!("{what} expected"), expected),
-        keep(&format!("{what} difference"), &difference_picture(actual, expected)),
+        write_test_image(&format!("{what} actual"), actual),
+        write_test_image(&format!("{what} expected"), expected),
+        write_test_image(&format!("{what} difference"), &difference_image(actual, expected)),
     ];
     let files = files.map(|path| path.display().to_string()).join("\n  ");
-    assert!(likeness.is_within(tolerance), "{what}: {likeness}; wanted {tolerance:?}; see\n  {files}");
+    assert!(similarity.is_within(tolerance), "{what}: {similarity}; wanted {tolerance:?}; see\n  {files}");
 }
 
 /// Writes a picture to `target/test-images` and returns its path.
 ///
 /// # Panics
 /// When it cannot be written.
-pub fn keep(name: &str, picture: &RgbaImage) -> PathBuf {
+pub fn write_test_image(name: &str, picture: &RgbaImage) -> PathBuf {
     let project = Path::new(env!("CARGO_MANIFEST_DIR")).parent().expect("the package lies in the project");
     let folder = project.join("target/test-images");
     std::fs::create_dir_all(&folder).expect("the folder for test images can be made");
@@ -106,7 +106,7 @@ pub fn keep(name: &str, picture: &RgbaImage) -> PathBuf {
 ///
 /// # Panics
 /// When it cannot be read.
-pub fn reference(name: &str) -> RgbaImage {
+pub fn reference_image(name: &str) -> RgbaImage {
     image::open(reference_path(name)).expect("the reference picture can be read").into_rgba8()
 }
 
@@ -115,11 +115,11 @@ pub fn reference(name: &str) -> RgbaImage {
 ///
 /// # Panics
 /// As said.
-pub fn assert_as_ever(name: &str, picture: &RgbaImage) {
+pub fn assert_matches_reference(name: &str, picture: &RgbaImage) {
     let path = reference_path(name);
-    let kept = (!path.is_file()).then(|| keep(&format!("{name} actual"), picture));
+    let kept = (!path.is_file()).then(|| write_test_image(&format!("{name} actual"), picture));
     assert_eq!(kept, None, "{} is not there", path.display());
-    assert_alike(name, picture, &reference(name), &Tolerance::SAME_AS_EVER);
+    assert_similar(name, picture, &reference_image(name), &Tolerance::ACROSS_DRIVERS);
 }
 
 fn reference_path(name: &str) -> PathBuf {
@@ -127,7 +127,7 @@ fn reference_path(name: &str) -> PathBuf {
 }
 
 /// FLIP's error of each pixel, from black over purple to light yellow.
-fn difference_picture(actual: &RgbaImage, expected: &RgbaImage) -> RgbaImage {
+fn difference_image(actual: &RgbaImage, expected: &RgbaImage) -> RgbaImage {
     let (width, height) = actual.dimensions();
     let colors = nv_flip::FlipImageFloat::with_data(width, height, &flip_errors(actual, expected))
         .apply_color_lut(&nv_flip::magma_lut())
@@ -156,9 +156,9 @@ mod tests {
 
     #[test]
     fn equal_pictures_are_as_alike_as_can_be() {
-        let likeness = Likeness::of(&ramp(9), &ramp(9));
-        assert_eq!((likeness.flip, likeness.difference.max_difference), (0.0, 0));
-        assert!(likeness.is_within(&Tolerance {
+        let similarity = ImageSimilarity::measure(&ramp(9), &ramp(9));
+        assert_eq!((similarity.flip, similarity.difference.max_difference), (0.0, 0));
+        assert!(similarity.is_within(&Tolerance {
             psnr: f64::INFINITY,
             ssim: 0.9999,
             differing_share: 0.0,
@@ -168,22 +168,22 @@ mod tests {
 
     #[test]
     fn every_measure_can_refuse() {
-        let likeness = Likeness::of(&ramp(0), &ramp(200));
-        assert!(likeness.is_within(&Tolerance::default()), "{likeness}");
+        let similarity = ImageSimilarity::measure(&ramp(0), &ramp(200));
+        assert!(similarity.is_within(&Tolerance::default()), "{similarity}");
         for tolerance in [
             Tolerance { psnr: 30.0, ..Tolerance::default() },
             Tolerance { ssim: 0.9999, ..Tolerance::default() },
             Tolerance { differing_share: 0.5, ..Tolerance::default() },
             Tolerance { flip: 0.1, ..Tolerance::default() },
         ] {
-            assert!(!likeness.is_within(&tolerance), "{likeness} within {tolerance:?}");
+            assert!(!similarity.is_within(&tolerance), "{similarity} within {tolerance:?}");
         }
     }
 
     #[test]
     #[should_panic(expected = "test-images/a_test_of_the_harness_actual.png")]
     fn pictures_that_differ_are_kept() {
-        assert_alike(
+        assert_similar(
             "a test of the harness",
             &ramp(0),
             &ramp(200),

@@ -26,20 +26,21 @@ pub fn whole_and_split(primitives: u64) -> Vec<TestDevice> {
         max_blas_primitives: primitives,
         ..DeviceProfile::default()
     };
-    let split = device_with(|desc| desc.profile = Some(&profile)).filter(|ctx| has_own_structures(ctx));
+    let split =
+        device_with(|desc| desc.profile = Some(&profile)).filter(|ctx| builds_device_accel_structs(ctx));
     device_with(|_| ()).into_iter().chain(split).collect()
 }
 
 /// Whether the device builds structures of its own, whoever walks ray queries.
-pub fn has_own_structures(ctx: &Context) -> bool {
+pub fn builds_device_accel_structs(ctx: &Context) -> bool {
     let caps = ctx.capabilities();
     caps.ray_tracing_pipeline || caps.ray_query_path == RayQueryPath::Hardware
 }
 
-/// As [`has_own_structures`], for tests of what only the device's own are subject to; says what is not tested where there are
+/// As [`builds_device_accel_structs`], for tests of what only the device's own are subject to; says what is not tested where there are
 /// none.
-pub fn tests_own_structures(ctx: &Context, what: &str) -> bool {
-    let has = has_own_structures(ctx);
+pub fn requires_device_accel_structs(ctx: &Context, what: &str) -> bool {
+    let has = builds_device_accel_structs(ctx);
     if !has {
         eprintln!("NOT TESTED, {what}: {} has no structures of its own", ctx.capabilities().device_name);
     }
@@ -57,7 +58,7 @@ pub fn expect_parts(
     expected: impl RangeBounds<u32> + Debug,
 ) -> Result<u32> {
     let parts = ctx.accel_struct_info(handle)?.parts;
-    if has_own_structures(ctx) {
+    if builds_device_accel_structs(ctx) {
         assert!(expected.contains(&parts), "{parts} parts, not {expected:?}");
     } else {
         assert_eq!(parts, 1, "what software traces is never split");

@@ -7,9 +7,9 @@ use lvk::{
     Context, DeviceInstances, DeviceProfile, Error, GeometryFlags, Holder, RayQueryRequest, Result, TlasDesc,
     TlasInstance, transform_rows,
 };
-use lvk_tests::agreement::Agreement;
 use lvk_tests::compute::words_buffer;
 use lvk_tests::hit_check::{HitCheck, rays_for};
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances, upload_geometries, vertex_bytes};
@@ -41,7 +41,7 @@ fn rays() -> Vec<Ray> {
     random_rays(19, 800, Vec3::splat(-1.5), Vec3::splat(1.5))
 }
 
-fn show(ctx: &Context, blas: AccelStructHandle) -> Result<Holder<AccelStructHandle>> {
+fn tlas_of(ctx: &Context, blas: AccelStructHandle) -> Result<Holder<AccelStructHandle>> {
     let instances = [TlasInstance::new(blas)];
     ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() })
 }
@@ -173,10 +173,10 @@ fn garbage_in_files_is_refused_or_harmless() -> Result<()> {
                 Err(error) => return Err(error),
             };
             accepted += 1;
-            tracer.trace(&show(&ctx, *blas)?, &rays, How::default())?;
+            tracer.trace(&tlas_of(&ctx, *blas)?, &rays, How::default())?;
             if flags.contains(BuildFlags::ALLOW_UPDATE) {
                 build(&ctx, *blas, BuildMode::Refit)?;
-                tracer.trace(&show(&ctx, *blas)?, &rays, How::default())?;
+                tracer.trace(&tlas_of(&ctx, *blas)?, &rays, How::default())?;
             }
             build(&ctx, *blas, BuildMode::Rebuild)?;
         }
@@ -243,7 +243,7 @@ fn with_bad_vertices() -> [Mesh; 2] {
 }
 
 #[test]
-fn triangles_of_nothing_are_not_hit_and_take_nobody_along() -> Result<()> {
+fn degenerate_triangles_are_not_hit_and_change_no_other_hit() -> Result<()> {
     let Some(ctx) = bare() else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
     for flags in FLAGS {
@@ -269,7 +269,7 @@ fn triangles_of_nothing_are_not_hit_and_take_nobody_along() -> Result<()> {
 
 /// Vertices go and come back between refits, some of them or all.
 #[test]
-fn vertices_may_go_and_come_back() -> Result<()> {
+fn vertices_may_become_nan_and_finite_again() -> Result<()> {
     let Some(ctx) = bare() else { return Ok(()) };
     let (check, rays) = (HitCheck::new(&ctx)?, rays());
     let tracer = RayTracer::new(&ctx, Method::Query)?;
@@ -328,15 +328,15 @@ fn nothing_is_not_hit() -> Result<()> {
                 let (_buffers, geometries) = upload_geometries(&ctx, &parts)?;
                 let desc = BlasDesc { geometries: &geometries, flags, ..Default::default() };
                 let blas = ctx.create_blas(&desc)?;
-                expect_nothing(&tracer, &show(&ctx, *blas)?, &rays, "nothing")?;
+                expect_nothing(&tracer, &tlas_of(&ctx, *blas)?, &rays, "nothing")?;
                 // SAFETY: nobody made the bytes up.
                 let loaded = unsafe { ctx.load_blas(&desc, &ctx.serialize_blas(*blas)?) }?;
                 if flags.contains(BuildFlags::ALLOW_UPDATE) {
                     build(&ctx, *loaded, BuildMode::Refit)?;
                 }
-                expect_nothing(&tracer, &show(&ctx, *loaded)?, &rays, "nothing from a file")?;
+                expect_nothing(&tracer, &tlas_of(&ctx, *loaded)?, &rays, "nothing from a file")?;
                 build(&ctx, *loaded, BuildMode::Rebuild)?;
-                expect_nothing(&tracer, &show(&ctx, *loaded)?, &rays, "nothing built again")?;
+                expect_nothing(&tracer, &tlas_of(&ctx, *loaded)?, &rays, "nothing built again")?;
             }
         }
     }
@@ -345,7 +345,7 @@ fn nothing_is_not_hit() -> Result<()> {
 
 /// Boxes that are inverted, not numbers, or without end.
 #[test]
-fn boxes_of_nothing_are_not_hit() -> Result<()> {
+fn aabbs_of_nothing_are_not_hit() -> Result<()> {
     let Some(ctx) = bare() else { return Ok(()) };
     let tracer = RayTracer::new(&ctx, Method::Query)?;
     let boxes = [
@@ -366,7 +366,7 @@ fn boxes_of_nothing_are_not_hit() -> Result<()> {
     })];
     for flags in FLAGS {
         let blas = ctx.create_blas(&BlasDesc { geometries: &geometries, flags, ..Default::default() })?;
-        expect_nothing(&tracer, &show(&ctx, *blas)?, &rays(), "boxes")?;
+        expect_nothing(&tracer, &tlas_of(&ctx, *blas)?, &rays(), "boxes")?;
     }
     Ok(())
 }
@@ -442,7 +442,7 @@ fn garbage(number: u32) -> Vec<u32> {
 
 /// Few, which one workgroup builds, and many.
 #[test]
-fn garbage_in_buffers_of_instances_is_not_hit_and_takes_nobody_along() -> Result<()> {
+fn garbage_in_buffers_of_instances_is_not_hit_and_changes_no_other_hit() -> Result<()> {
     let Some(ctx) = bare() else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
     // Far from its own origin, so that the largest matrix makes more of it than numbers can say.
@@ -488,7 +488,7 @@ fn update_from(
 
 /// What an instance shows lives as long as it is shown; who is gone cannot be shown anew, by host or buffer.
 #[test]
-fn structures_that_are_gone_are_refused() -> Result<()> {
+fn destroyed_accel_structs_are_refused() -> Result<()> {
     let Some(ctx) = bare() else { return Ok(()) };
     let scene = RayScene { models: vec![shapes()], placed: vec![Placed::new(0, Affine3A::IDENTITY)] };
     let mut gpu = scene.upload(&ctx)?;
@@ -511,7 +511,7 @@ fn structures_that_are_gone_are_refused() -> Result<()> {
 
 /// A slot whose structure is gone shows the empty one, and then whoever takes it, whatever lies where it was.
 #[test]
-fn a_top_level_structure_that_is_gone_shows_nothing() -> Result<()> {
+fn a_destroyed_tlas_is_never_hit() -> Result<()> {
     for ctx in [bare(), device(), device_with(|desc| desc.ray_query = RayQueryRequest::Software)] {
         let Some(ctx) = ctx else { return Ok(()) };
         for method in Method::available(&ctx) {
@@ -528,7 +528,8 @@ fn a_top_level_structure_that_is_gone_shows_nothing() -> Result<()> {
                 tracer.read(&job)
             };
             let hits = |what: &str| -> Result<()> {
-                Agreement::of_triangles(&rays, &trace()?, |ray| reference.closest(ray, 0xff)).assert(what);
+                HitComparison::of_triangles(&rays, &trace()?, |ray| reference.closest(ray, 0xff))
+                    .assert(what);
                 Ok(())
             };
             hits("as long as it is there")?;

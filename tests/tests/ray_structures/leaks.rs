@@ -33,7 +33,7 @@ fn model(
 }
 
 #[test]
-fn a_slot_of_split_meshes_is_clean_for_the_next_structure() -> Result<()> {
+fn a_slot_of_split_meshes_is_clean_for_the_next_accel_struct() -> Result<()> {
     let Some(ctx) = split_device(u64::MAX) else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
     let split = RayScene::single(Mesh::torus(14), Layout::Indexed16);
@@ -80,7 +80,7 @@ fn a_refused_update_from_a_buffer_leaves_the_command_buffer_usable() -> Result<(
 
 /// Lists that are kept until structures are compacted lie in buffers that are used again.
 #[test]
-fn frames_of_structures_that_may_be_compacted_go_on() -> Result<()> {
+fn frames_of_accel_structs_that_may_be_compacted_go_on() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
     let scene = RayScene::single(Mesh::torus(14), Layout::Indexed16);

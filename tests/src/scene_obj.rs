@@ -57,7 +57,7 @@ dir -0.2 0.5 1.8 0.2 0 -1 70
 ///
 /// # Panics
 /// When the files cannot be written or read, or are not taken as they are.
-pub fn still_life() -> Scene {
+pub fn obj_scene() -> Scene {
     let folder = tempfile::tempdir().expect("temporary folders can be made");
     let (obj, cameras) = write_files(folder.path()).expect("files can be written to a temporary folder");
     let options = ObjOptions { cameras: Some(cameras), ..ObjOptions::default() };

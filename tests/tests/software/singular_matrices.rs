@@ -53,7 +53,7 @@ fn update_from(ctx: &Context, gpu: &GpuScene, placed: &[Placed]) -> Result<()> {
 }
 
 #[test]
-fn matrices_without_an_inverse_show_nothing_whoever_builds() -> Result<()> {
+fn singular_matrices_are_never_hit() -> Result<()> {
     let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return Ok(()) };
     let tracer = RayTracer::new(&ctx, Method::Query)?;
     let rows = Mat3::from_cols_array(&[1.0, 4.0, 7.0, 2.0, 5.0, 8.0, 3.0, 6.0, 9.0]);

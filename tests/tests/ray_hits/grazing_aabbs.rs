@@ -135,7 +135,7 @@ fn floats(corners: &[Vec3]) -> Vec<f32> {
 
 /// A device's own walk is told of, but it need not be right.
 #[test]
-fn a_ray_that_touches_a_box_meets_it() -> Result<()> {
+fn a_ray_that_touches_an_aabb_has_it_as_a_candidate() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     if !ctx.capabilities().ray_query {
         eprintln!("NOT TESTED, {} has no ray queries", ctx.capabilities().device_name);

@@ -220,7 +220,7 @@ fn no_ray_slips_through_a_seam() -> Result<()> {
 #[test]
 fn no_ray_that_is_interrupted_at_a_seam_slips_through() -> Result<()> {
     let Some(ctx) = software() else { return Ok(()) };
-    let tracers = [RayTracer::keeping_even(&ctx, Method::Query)?];
+    let tracers = [RayTracer::with_even_primitives(&ctx, Method::Query)?];
     for (name, mesh) in closed_meshes() {
         for flags in BUILD_FLAGS {
             assert_eq!(leaks(&tracers, of_candidates, &mesh, 0, 10_000, flags)?, [0], "{name}, {flags:?}");

@@ -5,10 +5,10 @@ use lvk::{
     BlasDesc, BuildFlags, BuildMode, Context, Error, RayQueryPath, RayQueryRequest, Result, TlasDesc,
     TlasInstance,
 };
-use lvk_tests::bender::bent;
 use lvk_tests::hit_check::HitCheck;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, PartBuffers, RayScene, upload_geometries, vertex_bytes};
+use lvk_tests::vertex_deform::deformed;
 use lvk_tests::{device, device_with};
 
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
@@ -21,12 +21,12 @@ fn ring() -> RayScene {
 /// Bends the mesh, on the GPU too.
 fn bend(ctx: &Context, scene: &mut RayScene, buffers: &[PartBuffers], amount: f32) -> Result<()> {
     let part = &mut scene.models[0][0];
-    part.mesh = bent(&part.mesh, amount);
+    part.mesh = deformed(&part.mesh, amount);
     ctx.upload_buffer(*buffers[0].vertices, 0, &vertex_bytes(&part.mesh, Layout::Indexed16))
 }
 
 #[test]
-fn a_loaded_structure_is_refitted_where_it_was_rebuilt() -> Result<()> {
+fn a_loaded_accel_struct_is_refitted_where_it_was_rebuilt() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let mut scene = ring();
     let gpu = scene.upload_with(&ctx, UPDATABLE, UPDATABLE, 0)?;
@@ -46,7 +46,7 @@ fn a_loaded_structure_is_refitted_where_it_was_rebuilt() -> Result<()> {
         cmd.build_blas(&[*loaded], mode)?;
         cmd.update_tlas(*tlas, &shown, mode)?;
         ctx.submit(cmd)?;
-        check.scene(&format!("loaded, then {mode:?} and bent by {amount}"), &tlas, &scene)?;
+        check.scene(&format!("loaded, then {mode:?} and deformed by {amount}"), &tlas, &scene)?;
     }
     Ok(())
 }
@@ -112,7 +112,7 @@ fn an_update_overtaken_by_the_first_rebuild_is_refused_by_software() -> Result<(
 
 /// Room for the tree is made before anything is recorded, of the device's own structures too.
 #[test]
-fn a_rebuild_without_room_leaves_what_is_recorded_around_it() -> Result<()> {
+fn a_rebuild_out_of_memory_leaves_what_is_recorded_around_it() -> Result<()> {
     let of_budget = |bytes| {
         device_with(|desc| (desc.ray_query, desc.accel_budget_bytes) = (RayQueryRequest::Software, bytes))
     };

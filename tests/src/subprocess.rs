@@ -15,20 +15,20 @@ const MARK: &str = "LVK_TEST_CHILD";
 ///
 /// # Panics
 /// When the process fails, with what it wrote.
-pub fn in_child(test: impl Fn(), variables: &[(&str, Option<&OsStr>)], body: impl FnOnce()) {
-    said_in_child(test, variables, body);
+pub fn in_subprocess(test: impl Fn(), variables: &[(&str, Option<&OsStr>)], body: impl FnOnce()) {
+    output_of_subprocess(test, variables, body);
 }
 
-/// As [`in_child`]; answers what the new process wrote to standard output, and in that process nothing.
+/// As [`in_subprocess`]; answers what the new process wrote to standard output, and in that process nothing.
 ///
 /// # Panics
-/// As [`in_child`].
-pub fn said_in_child(
+/// As [`in_subprocess`].
+pub fn output_of_subprocess(
     test: impl Fn(),
     variables: &[(&str, Option<&OsStr>)],
     body: impl FnOnce(),
 ) -> Option<String> {
-    let test = path_in_program(&test);
+    let test = test_path(&test);
     if std::env::var_os(MARK).is_some_and(|name| name == test) {
         body();
         return None;
@@ -42,13 +42,13 @@ pub fn said_in_child(
     Some(out)
 }
 
-/// As [`in_child`], on the device without ray tracing; skipped loudly where that cannot be had.
+/// As [`in_subprocess`], on the device without ray tracing; skipped loudly where that cannot be had.
 ///
 /// # Panics
-/// As [`in_child`] and [`swiftshader`].
-pub fn without_ray_tracing(test: impl Fn(), body: impl FnOnce()) {
+/// As [`in_subprocess`] and [`swiftshader`].
+pub fn on_swiftshader(test: impl Fn(), body: impl FnOnce()) {
     let Some(icd) = swiftshader() else { return };
-    in_child(test, &only_driver(&icd), body);
+    in_subprocess(test, &only_driver(&icd), body);
 }
 
 /// Runs the program's tests, but for those that are ignored or have one of `skipped` in their names, in a process that has no
@@ -56,7 +56,7 @@ pub fn without_ray_tracing(test: impl Fn(), body: impl FnOnce()) {
 ///
 /// # Panics
 /// When one of them fails, and as [`swiftshader`].
-pub fn program_without_ray_tracing(skipped: &[&str]) {
+pub fn rerun_on_swiftshader(skipped: &[&str]) {
     let Some(icd) = swiftshader() else { return };
     let mut command = program(&only_driver(&icd));
     command.env("LVK_TEST_RAY_QUERY", "software");
@@ -65,27 +65,27 @@ pub fn program_without_ray_tracing(skipped: &[&str]) {
     assert!(status.success(), "tests fail on the device without ray tracing, see above");
 }
 
-/// As [`in_child`], with no device but an AMD chip of this `family` (`RADV_FORCE_FAMILY`), which compiles and does nothing
+/// As [`in_subprocess`], with no device but an AMD chip of this `family` (`RADV_FORCE_FAMILY`), which compiles and does nothing
 /// else; skipped loudly where its driver cannot be had.
 ///
 /// # Panics
-/// As [`in_child`] and [`radv`].
+/// As [`in_subprocess`] and [`radv`].
 pub fn on_radv(test: impl Fn(), family: &str, body: impl FnOnce()) {
     let Some(icd) = radv() else { return };
     let mut variables = only_driver(&icd).to_vec();
     variables.push(("RADV_FORCE_FAMILY", Some(OsStr::new(family))));
     // What was compiled before is to be compiled again.
     variables.push(("MESA_SHADER_CACHE_DISABLE", Some(OsStr::new("true"))));
-    in_child(test, &variables, body);
+    in_subprocess(test, &variables, body);
 }
 
 /// The path by which the program of a test runs it alone: its modules and its name, without the program's.
-pub fn path_in_program<T: Fn()>(_: &T) -> &'static str {
+pub fn test_path<T: Fn()>(_: &T) -> &'static str {
     let path = std::any::type_name::<T>();
     path.split_once("::").map_or(path, |(_, inside)| inside)
 }
 
-/// The program of the tests, to be started again with `variables` as [`in_child`] takes them.
+/// The program of the tests, to be started again with `variables` as [`in_subprocess`] takes them.
 fn program(variables: &[(&str, Option<&OsStr>)]) -> Command {
     let mut command = Command::new(std::env::current_exe().expect("the program of the test has a path"));
     for (name, value) in variables {

@@ -8,7 +8,7 @@ const HEADER_WORDS: usize = 32;
 
 /// The words of a structure of `count` triangles of one geometry, in their own order. Most nodes have both nodes and
 /// leaves below them, and some children that are missing.
-pub fn wide_structure(count: usize) -> Vec<u32> {
+pub fn bvh8_blob(count: usize) -> Vec<u32> {
     let mut nodes: Vec<[u32; NODE_WORDS]> = Vec::new();
     let mut open = std::collections::VecDeque::from([(0, count)]);
     while let Some((first, count)) = open.pop_front() {

@@ -46,7 +46,7 @@ dir 0 9 0 0.0001 -1 0 60
 /// # Panics
 /// When its files cannot be written or read, or are not taken as they are.
 #[must_use]
-pub fn board() -> Scene {
+pub fn shadow_mask_scene() -> Scene {
     let folder = tempfile::tempdir().expect("temporary folders can be made");
     write_files(folder.path()).expect("files can be written");
     let options = ObjOptions { cameras: Some(folder.path().join("views.txt")), ..ObjOptions::default() };

@@ -18,7 +18,7 @@ pub enum Tilt {
     /// A normal map.
     Map,
     /// Normals of the corners.
-    Corners,
+    Vertices,
 }
 
 /// How an image lies on a tile: where it goes to the right and up, along x and z.
@@ -36,7 +36,7 @@ const WAYS: [[[f32; 2]; 2]; 4] = [
 /// # Panics
 /// When its files cannot be written or read, or are not taken as they are.
 #[must_use]
-pub fn tiles(tilt: Tilt) -> Scene {
+pub fn normal_map_scene(tilt: Tilt) -> Scene {
     let folder = tempfile::tempdir().expect("temporary folders can be made");
     write_files(folder.path(), tilt).expect("files can be written");
     let options = ObjOptions {
@@ -71,7 +71,7 @@ fn add_tile(obj: &mut String, number: usize, [right, up]: [[f32; 2]; 2], tilt: T
     let [x, y, z] = STORED.map(|stored| f32::from(stored) / 127.5 - 1.0);
     let normal = match tilt {
         Tilt::Map => [0.0, 1.0, 0.0],
-        Tilt::Corners => [x * right[0] + y * up[0], z, x * right[1] + y * up[1]],
+        Tilt::Vertices => [x * right[0] + y * up[0], z, x * right[1] + y * up[1]],
     };
     let _ = writeln!(obj, "vn {} {} {}", normal[0], normal[1], normal[2]);
     let corner = |place: usize| format!("{0}/{0}/{1}", 4 * number + place, number + 1);

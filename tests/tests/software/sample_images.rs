@@ -7,11 +7,11 @@ use lvk_samples::app::headless;
 use lvk_samples::hybrid::{Bounces, HybridConfig, HybridError, HybridRenderer, Method, RayPath};
 use lvk_samples::hybrid_oit::{HybridOitConfig, OitScene};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
-use lvk_tests::child::without_ray_tracing;
-use lvk_tests::glass_room::GlassRoom;
-use lvk_tests::hybrid::Studio;
-use lvk_tests::picture::{Tolerance, assert_alike, reference};
-use lvk_tests::still_life::still_life;
+use lvk_tests::hybrid::HybridHarness;
+use lvk_tests::image_comparison::{Tolerance, assert_similar, reference_image};
+use lvk_tests::oit_reference::OitRenderer;
+use lvk_tests::scene_obj::obj_scene;
+use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{TestDevice, device_with};
 
 const SIZE: [u32; 2] = [160, 90];
@@ -33,7 +33,7 @@ fn queries(request: RayQueryRequest) -> Option<TestDevice> {
 }
 
 #[test]
-fn software_and_the_device_make_the_same_picture() {
+fn software_and_the_device_make_the_same_image() {
     let (Some(one), Some(other)) =
         (queries(RayQueryRequest::HardwareIfPresent), queries(RayQueryRequest::Software))
     else {
@@ -43,27 +43,27 @@ fn software_and_the_device_make_the_same_picture() {
     if one.capabilities().ray_query_path != RayQueryPath::Hardware {
         return eprintln!("NOT TESTED, {} has no ray queries", one.capabilities().device_name);
     }
-    let scene = still_life();
+    let scene = obj_scene();
     for method in [Method::Standalone, Method::Hybrid] {
-        let studio = |ctx| Studio::new(ctx, &scene, (method, RayPath::Query), SIZE, DEPTH);
-        let (mut expected, mut actual) = (studio(&*one), studio(&*other));
+        let harness = |ctx| HybridHarness::new(ctx, &scene, (method, RayPath::Query), SIZE, DEPTH);
+        let (mut expected, mut actual) = (harness(&*one), harness(&*other));
         for number in [0, 2] {
             let camera = &scene.cameras[number];
             let what = format!("{method:?} in software, camera {}", number + 1);
-            assert_alike(&what, &actual.picture(camera), &expected.picture(camera), &SAME_RAYS);
+            assert_similar(&what, &actual.render(camera), &expected.render(camera), &SAME_RAYS);
         }
     }
 }
 
 /// The pictures that are kept were made by the device's own tracing.
 #[test]
-fn software_shows_the_room_of_glass_and_the_hall_that_the_device_shows() {
+fn software_and_the_device_render_the_same_glass_and_hall() {
     let Some(ctx) = queries(RayQueryRequest::Software) else { return };
-    let glass = reference("hybrid_oit_small");
-    assert_alike("glass in software", &room_of_glass(&ctx, &glass), &glass, &SAME_RAYS);
-    let expected = reference("reflections_small");
+    let glass = reference_image("hybrid_oit_small");
+    assert_similar("glass in software", &glass_scene(&ctx, &glass), &glass, &SAME_RAYS);
+    let expected = reference_image("reflections_small");
     let picture = hall(&ctx, [expected.width(), expected.height()]);
-    assert_alike("hall in software", &picture, &expected, &SAME_FILTERED);
+    assert_similar("hall in software", &picture, &expected, &SAME_FILTERED);
 }
 
 /// A device without any ray tracing, whose queries are the library's.
@@ -74,10 +74,10 @@ fn without() -> Option<TestDevice> {
 }
 
 #[test]
-fn a_driver_without_ray_tracing_shows_the_still_life() {
-    without_ray_tracing(a_driver_without_ray_tracing_shows_the_still_life, || {
+fn a_driver_without_ray_tracing_renders_the_obj_scene() {
+    on_swiftshader(a_driver_without_ray_tracing_renders_the_obj_scene, || {
         let Some(ctx) = without() else { return };
-        let (scene, expected) = (still_life(), reference("hybrid_small"));
+        let (scene, expected) = (obj_scene(), reference_image("hybrid_small"));
         let plain = HybridConfig { path: RayPath::Query, ..sized(&expected) };
         let refused = HybridRenderer::new(&ctx, &scene, &plain).err();
         assert!(matches!(refused, Some(HybridError::NoRasteriser { .. })), "{refused:?}");
@@ -85,28 +85,28 @@ fn a_driver_without_ray_tracing_shows_the_still_life() {
         assert_eq!(method, Method::Standalone);
         for bounces in [Bounces::Inline, Bounces::Queued] {
             let config = HybridConfig { method, bounces: Some(bounces), ..plain };
-            let picture = Studio::with(&ctx, &scene, &config).picture(&scene.cameras[0]);
-            assert_alike(&format!("SwiftShader {bounces:?}"), &picture, &expected, &OTHER_FILTERS);
+            let picture = HybridHarness::with(&ctx, &scene, &config).render(&scene.cameras[0]);
+            assert_similar(&format!("SwiftShader {bounces:?}"), &picture, &expected, &OTHER_FILTERS);
         }
     });
 }
 
 #[test]
-fn a_driver_without_ray_tracing_shows_the_room_of_glass() {
-    without_ray_tracing(a_driver_without_ray_tracing_shows_the_room_of_glass, || {
+fn a_driver_without_ray_tracing_renders_the_glass() {
+    on_swiftshader(a_driver_without_ray_tracing_renders_the_glass, || {
         let Some(ctx) = without() else { return };
-        let expected = reference("hybrid_oit_small");
-        assert_alike("SwiftShader glass", &room_of_glass(&ctx, &expected), &expected, &OTHER_EDGES);
+        let expected = reference_image("hybrid_oit_small");
+        assert_similar("SwiftShader glass", &glass_scene(&ctx, &expected), &expected, &OTHER_EDGES);
     });
 }
 
 #[test]
-fn a_driver_without_ray_tracing_shows_the_hall() {
-    without_ray_tracing(a_driver_without_ray_tracing_shows_the_hall, || {
+fn a_driver_without_ray_tracing_renders_the_hall() {
+    on_swiftshader(a_driver_without_ray_tracing_renders_the_hall, || {
         let Some(ctx) = without() else { return };
-        let expected = reference("reflections_small");
+        let expected = reference_image("reflections_small");
         let picture = hall(&ctx, [expected.width(), expected.height()]);
-        assert_alike("SwiftShader hall", &picture, &expected, &OTHER_REFLECTIONS);
+        assert_similar("SwiftShader hall", &picture, &expected, &OTHER_REFLECTIONS);
     });
 }
 
@@ -116,9 +116,9 @@ fn sized(picture: &RgbaImage) -> HybridConfig {
 }
 
 /// The room of glass in the size of a picture.
-fn room_of_glass(ctx: &Context, like: &RgbaImage) -> RgbaImage {
+fn glass_scene(ctx: &Context, like: &RgbaImage) -> RgbaImage {
     let config = HybridOitConfig::new(RayPath::Query, like.width(), like.height());
-    GlassRoom::new(ctx, &OitScene::default(), &config).picture(MOMENT)
+    OitRenderer::new(ctx, &OitScene::default(), &config).render(MOMENT)
 }
 
 fn hall(ctx: &Context, [width, height]: [u32; 2]) -> RgbaImage {

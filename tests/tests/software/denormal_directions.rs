@@ -2,8 +2,8 @@
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{Context, RayQueryRequest, Result};
-use lvk_tests::agreement::Agreement;
 use lvk_tests::device_with;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Placed, RayScene};
 use lvk_tests::ray_tracer::{How, Method, RayTracer};
@@ -50,7 +50,7 @@ fn check(ctx: &Context, tracers: &[RayTracer], case: [f32; 3]) -> Result<()> {
         let mut records = tracer.trace(&gpu.tlas, &shortened, How::default())?;
         records.iter_mut().for_each(|record| record.t *= length);
         let what = format!("instances {scale:e}, meshes {size:e}, directions {length:e}");
-        Agreement::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(&what);
+        HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff)).assert(&what);
     }
     Ok(())
 }

@@ -5,17 +5,17 @@ use lvk::{
     AccelStructInfo, BlasDesc, BuildFlags, BuildMode, Context, GeometryFlags, PrimitiveOrder, Result,
     TlasDesc,
 };
-use lvk_tests::agreement::Agreement;
-use lvk_tests::bender::{Bender, bent};
+use lvk_tests::accel_backend::builds_device_accel_structs;
 use lvk_tests::device;
 use lvk_tests::hit_check::{HitCheck, rays_for};
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances, upload_geometries};
 use lvk_tests::ray_tracer::{How, MISSED};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::reference::Sphere;
 use lvk_tests::sphere_scene::{GROUPS, SphereModel};
-use lvk_tests::structures::has_own_structures;
+use lvk_tests::vertex_deform::{VertexDeformer, deformed};
 
 /// As the mesh, but neighbours in space are far from each other in the list.
 fn shuffled(mesh: &Mesh) -> Mesh {
@@ -84,13 +84,13 @@ fn info_of(ctx: &Context, mesh: &Mesh, flags: BuildFlags, order: PrimitiveOrder)
 #[test]
 fn primitives_in_another_order_keep_their_numbers() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let (check, keeping_even) = (HitCheck::new(&ctx)?, HitCheck::keeping_even(&ctx)?);
+    let (check, with_even_primitives) = (HitCheck::new(&ctx)?, HitCheck::with_even_primitives(&ctx)?);
     let scene = scene();
     let reference = scene.reference();
     let rays = rays_for(&reference);
     for (order, remapped) in [
-        (PrimitiveOrder::Spatial, has_own_structures(&ctx)),
-        (PrimitiveOrder::Auto, has_own_structures(&ctx) && ctx.capabilities().prefers_spatial_order),
+        (PrimitiveOrder::Spatial, builds_device_accel_structs(&ctx)),
+        (PrimitiveOrder::Auto, builds_device_accel_structs(&ctx) && ctx.capabilities().prefers_spatial_order),
         (PrimitiveOrder::Given, false),
     ] {
         let gpu = upload(&ctx, &scene, BuildFlags::FAST_TRACE, order)?;
@@ -101,26 +101,32 @@ fn primitives_in_another_order_keep_their_numbers() -> Result<()> {
             reference
                 .closest_where(ray, 0xff, |hit| hit.ids.geometry == 0 || hit.ids.primitive.is_multiple_of(2))
         };
-        keeping_even.closest(&format!("holes, {order:?}"), &gpu.tlas, &rays, How::default(), answer)?;
+        with_even_primitives.closest(
+            &format!("holes, {order:?}"),
+            &gpu.tlas,
+            &rays,
+            How::default(),
+            answer,
+        )?;
     }
     Ok(())
 }
 
 #[test]
-fn boxes_in_another_order_keep_their_numbers() -> Result<()> {
+fn aabbs_in_another_order_keep_their_numbers() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let spheres = SphereModel { count: 48, step: 29 };
-    let (_buffers, geometries) = spheres.boxes(&ctx)?;
+    let (_buffers, geometries) = spheres.aabb_geometries(&ctx)?;
     let order = PrimitiveOrder::Spatial;
     let model = [ctx.create_blas(&BlasDesc { geometries: &geometries, order, ..Default::default() })?];
-    assert_eq!(ctx.accel_struct_info(*model[0])?.is_remapped, has_own_structures(&ctx));
+    assert_eq!(ctx.accel_struct_info(*model[0])?.is_remapped, builds_device_accel_structs(&ctx));
     let placed = [Placed::new(0, Affine3A::from_rotation_y(0.4))];
     let tlas = ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
     let expected = spheres.spheres(&placed);
     let rays = random_rays(52, 1_200, Vec3::new(-2.0, -1.0, -3.0), Vec3::new(6.0, 31.0, 4.0));
     for (method, tracer) in HitCheck::with(&ctx, |ctx, method| spheres.tracer(ctx, method))?.tracers() {
         let records = tracer.trace(&tlas, &rays, How::default())?;
-        Agreement::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
+        HitComparison::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
             .assert(&format!("boxes in order by {method:?}"));
         let (radius, tag) = GROUPS[0];
         let hits = records.iter().filter(|record| record.kind != MISSED);
@@ -146,7 +152,7 @@ fn meshes_are_left_alone_where_order_gains_nothing() -> Result<()> {
         (&small, BuildFlags::FAST_TRACE, PrimitiveOrder::Spatial, false),
     ] {
         let info = info_of(&ctx, mesh, flags, order)?;
-        let (count, remapped) = (mesh.triangles.len(), remapped && has_own_structures(&ctx));
+        let (count, remapped) = (mesh.triangles.len(), remapped && builds_device_accel_structs(&ctx));
         assert_eq!(info.is_remapped, remapped, "{count} triangles, {flags:?}, {order:?}");
         assert_eq!(info.table_bytes > 0, remapped, "{count} triangles, {flags:?}, {order:?}");
     }
@@ -157,19 +163,19 @@ fn meshes_are_left_alone_where_order_gains_nothing() -> Result<()> {
 #[test]
 fn an_ordered_mesh_is_refitted_and_rebuilt() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let (bender, check) = (Bender::new(&ctx)?, HitCheck::new(&ctx)?);
+    let (deformer, check) = (VertexDeformer::new(&ctx)?, HitCheck::new(&ctx)?);
     let mut scene = scene();
     let gpu =
         upload(&ctx, &scene, BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE, PrimitiveOrder::Spatial)?;
-    assert_eq!(ctx.accel_struct_info(*gpu.models[0])?.is_remapped, has_own_structures(&ctx));
+    assert_eq!(ctx.accel_struct_info(*gpu.models[0])?.is_remapped, builds_device_accel_structs(&ctx));
     for (amount, mode) in [(0.3, BuildMode::Refit), (-0.4, BuildMode::Rebuild), (0.2, BuildMode::Refit)] {
         let mesh = scene.models[0][0].mesh.clone();
         let mut cmd = ctx.acquire_command_buffer()?;
-        bender.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, amount)?;
+        deformer.record(&mut cmd, *gpu.buffers[0].vertices, &mesh, amount)?;
         cmd.build_blas(&[*gpu.models[0]], mode)?;
         cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), mode)?;
         ctx.submit(cmd)?;
-        scene.models[0][0].mesh = bent(&mesh, amount);
+        scene.models[0][0].mesh = deformed(&mesh, amount);
         check.scene(&format!("{mode:?} by {amount}"), &gpu.tlas, &scene)?;
     }
     scene.models[0][0].mesh.triangles.reverse();
@@ -186,7 +192,7 @@ fn an_ordered_mesh_is_refitted_and_rebuilt() -> Result<()> {
 
 /// One structure with a map beside one without, and then none with a map: the way back to the numbers is the TLAS's.
 #[test]
-fn a_tlas_shows_meshes_in_order_and_as_given_in_turn() -> Result<()> {
+fn a_tlas_references_ordered_and_unordered_meshes_in_turn() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let check = HitCheck::new(&ctx)?;
     let scene = scene();

@@ -7,9 +7,9 @@ use lvk::{
     DeviceProfile, Error, GeometryFlags, HitGroup, Holder, InstanceFlags, RayTracingPipelineDesc, Result,
     ShaderStage, TlasDesc,
 };
-use lvk_tests::agreement::Agreement;
 use lvk_tests::device::loses_neighbours_of_inactive;
 use lvk_tests::hit_check::HitCheck;
+use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Placed, RayScene, instances};
 use lvk_tests::ray_tracer::{
@@ -82,7 +82,11 @@ fn around(geometry: u32, primitive: u32) -> [Vec3; 2] {
     [center - 1.0, center + 1.0]
 }
 
-fn boxes(ctx: &Context, lists: &[Vec<[Vec3; 2]>], flags: GeometryFlags) -> Result<Holder<AccelStructHandle>> {
+fn tlas_of_aabbs(
+    ctx: &Context,
+    lists: &[Vec<[Vec3; 2]>],
+    flags: GeometryFlags,
+) -> Result<Holder<AccelStructHandle>> {
     let mut buffers = Vec::new();
     let mut geometries = Vec::new();
     for list in lists {
@@ -97,7 +101,7 @@ fn boxes(ctx: &Context, lists: &[Vec<[Vec3; 2]>], flags: GeometryFlags) -> Resul
     ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() })
 }
 
-fn all_boxes() -> Vec<Vec<[Vec3; 2]>> {
+fn all_aabbs() -> Vec<Vec<[Vec3; 2]>> {
     (0..2).map(|geometry| (0..COUNT).map(|primitive| around(geometry, primitive)).collect()).collect()
 }
 
@@ -133,7 +137,7 @@ fn rays() -> Vec<Ray> {
 
 /// Compares ids, distances and kinds, and attributes where the near sides count.
 fn agree(what: &str, rays: &[Ray], records: &[HitRecord], answer: impl Fn(&Ray) -> Answer) {
-    Agreement::of_shapes(rays, records, &answer).assert(what);
+    HitComparison::of_shapes(rays, records, &answer).assert(what);
     for (ray, record) in rays.iter().zip(records) {
         let answer = answer(ray);
         let (Some(hit), true) = (answer.hit, answer.is_certain) else { continue };
@@ -148,7 +152,7 @@ fn agree(what: &str, rays: &[Ray], records: &[HitRecord], answer: impl Fn(&Ray) 
 #[test]
 fn the_closest_of_several_reports_is_the_hit() -> Result<()> {
     for ctx in devices() {
-        let model = [boxes(&ctx, &all_boxes(), GeometryFlags::OPAQUE)?];
+        let model = [tlas_of_aabbs(&ctx, &all_aabbs(), GeometryFlags::OPAQUE)?];
         let placed = placed();
         let desc = TlasDesc { instances: &instances(&placed, &model), ..Default::default() };
         let tlas = ctx.create_tlas(&TlasDesc { parts_per_instance: 8, ..desc })?;
@@ -164,7 +168,7 @@ fn the_closest_of_several_reports_is_the_hit() -> Result<()> {
 
 /// Where boxes are not opaque their any-hit shader ignores the near sides.
 #[test]
-fn flags_of_ray_instance_and_geometry_reach_boxes() -> Result<()> {
+fn flags_of_ray_instance_and_geometry_reach_aabbs() -> Result<()> {
     let (none, solid, open) =
         (InstanceFlags::NO_CULL, InstanceFlags::FORCE_OPAQUE, InstanceFlags::FORCE_NO_OPAQUE);
     for ctx in devices() {
@@ -178,7 +182,7 @@ fn flags_of_ray_instance_and_geometry_reach_boxes() -> Result<()> {
             (GeometryFlags::empty(), open, OPAQUE, true),
             (GeometryFlags::OPAQUE, solid, NO_OPAQUE, false),
         ] {
-            let model = [boxes(&ctx, &all_boxes(), geometry)?];
+            let model = [tlas_of_aabbs(&ctx, &all_aabbs(), geometry)?];
             let placed: Vec<_> =
                 placed().into_iter().map(|placed| Placed { flags: instance, ..placed }).collect();
             let instances = instances(&placed, &model);
@@ -204,7 +208,7 @@ fn flags_of_ray_instance_and_geometry_reach_boxes() -> Result<()> {
 
 /// Traces what is left of boxes, the lists of which `change` has changed.
 fn check_lists(ctx: &Context, lists: &[Vec<[Vec3; 2]>], is_there: impl Fn(&HitIds) -> bool) -> Result<()> {
-    let model = [boxes(ctx, lists, GeometryFlags::OPAQUE)?];
+    let model = [tlas_of_aabbs(ctx, lists, GeometryFlags::OPAQUE)?];
     let placed = placed();
     let instances = instances(&placed, &model);
     let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() })?;
@@ -220,9 +224,9 @@ fn check_lists(ctx: &Context, lists: &[Vec<[Vec3; 2]>], is_there: impl Fn(&HitId
 }
 
 #[test]
-fn an_empty_list_of_boxes_keeps_its_number() -> Result<()> {
+fn an_empty_list_of_aabbs_keeps_its_number() -> Result<()> {
     for ctx in devices() {
-        let [first, second] = [0, 1].map(|geometry| all_boxes().swap_remove(geometry));
+        let [first, second] = [0, 1].map(|geometry| all_aabbs().swap_remove(geometry));
         check_lists(&ctx, &[Vec::new(), second, Vec::new()], |ids| ids.geometry == 1)?;
         check_lists(&ctx, &[first, Vec::new()], |ids| ids.geometry == 0)?;
     }
@@ -231,12 +235,12 @@ fn an_empty_list_of_boxes_keeps_its_number() -> Result<()> {
 
 /// A box with a NaN for its smallest x coordinate is none.
 #[test]
-fn inactive_boxes_disturb_no_others() -> Result<()> {
+fn inactive_aabbs_disturb_no_other_aabbs() -> Result<()> {
     for ctx in devices() {
         if loses_neighbours_of_inactive(&ctx) {
             continue;
         }
-        let mut lists = all_boxes();
+        let mut lists = all_aabbs();
         for corners in lists.iter_mut().flatten().skip(1).step_by(3) {
             corners[0].x = f32::NAN;
         }
@@ -247,11 +251,11 @@ fn inactive_boxes_disturb_no_others() -> Result<()> {
 
 /// A box without thickness is crossed by rays through it, as a triangle is.
 #[test]
-fn a_flat_box_can_be_hit() -> Result<()> {
+fn a_flat_aabb_can_be_hit() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let mut corners = around(0, 0);
     corners.iter_mut().for_each(|corner| corner.z = 0.0);
-    let model = [boxes(&ctx, &[vec![corners]], GeometryFlags::OPAQUE)?];
+    let model = [tlas_of_aabbs(&ctx, &[vec![corners]], GeometryFlags::OPAQUE)?];
     let placed = [Placed::new(0, Affine3A::IDENTITY)];
     let tlas = ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
     let sphere =
@@ -296,7 +300,7 @@ fn a_report_at_an_end_of_the_ray_is_accepted() -> Result<()> {
         ..Default::default()
     })?;
     let wide = [Vec3::new(-1.0, -1.0, 0.0), Vec3::new(1.0, 1.0, 20.0)];
-    let model = [boxes(&ctx, &[vec![wide]], GeometryFlags::OPAQUE)?];
+    let model = [tlas_of_aabbs(&ctx, &[vec![wide]], GeometryFlags::OPAQUE)?];
     let placed = [Placed::new(0, Affine3A::IDENTITY)];
     let tlas = ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
     let (before, after) = (4.0_f32.next_down(), 4.0_f32.next_up());
@@ -317,7 +321,7 @@ fn a_report_at_an_end_of_the_ray_is_accepted() -> Result<()> {
 
 /// A sphere in a box within a mesh of a sphere, by turns without the one and the other.
 #[test]
-fn a_ray_skips_triangles_or_boxes() -> Result<()> {
+fn a_ray_skips_triangles_or_aabbs() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let balls = RayScene::single(Mesh::sphere(8), Layout::Indexed16);
     let gpu = balls.upload(&ctx)?;
@@ -325,7 +329,7 @@ fn a_ray_skips_triangles_or_boxes() -> Result<()> {
     let beside = Affine3A::from_translation(Vec3::X * 1.2);
     let of_triangles = Placed { hit_group_offset: 1, ..Placed::new(0, beside) };
     let of_boxes = Placed::new(1, Affine3A::IDENTITY);
-    let model = [boxes(&ctx, &[vec![corners]], GeometryFlags::OPAQUE)?];
+    let model = [tlas_of_aabbs(&ctx, &[vec![corners]], GeometryFlags::OPAQUE)?];
     let mut list = instances(&[of_triangles], &gpu.models);
     list.extend(instances(&[Placed { model: 0, ..of_boxes }], &model));
     let tlas = ctx.create_tlas(&TlasDesc { instances: &list, ..Default::default() })?;
@@ -347,10 +351,10 @@ fn a_ray_skips_triangles_or_boxes() -> Result<()> {
             made => made?,
         };
         let trace = |flags| tracer.trace(&tlas, &rays, How { flags, ..How::default() });
-        Agreement::of_shapes(&rays, &trace(SKIP_AABBS)?, triangle).assert("triangles alone");
+        HitComparison::of_shapes(&rays, &trace(SKIP_AABBS)?, triangle).assert("triangles alone");
         agree("boxes alone", &rays, &trace(SKIP_TRIANGLES)?, shell);
         let records = trace(0)?;
-        Agreement::of_shapes(&rays, &records, |ray| nearer(triangle(ray), shell(ray))).assert("both");
+        HitComparison::of_shapes(&rays, &records, |ray| nearer(triangle(ray), shell(ray))).assert("both");
         let kinds = [FRONT, BACK, NEAR[1], FAR];
         assert!(kinds.iter().all(|kind| records.iter().any(|record| record.kind == *kind)));
     }

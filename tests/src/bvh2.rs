@@ -1,29 +1,29 @@
 //! A tree of nodes of two children without boxes, as a refit finds it: order and ids are there, places are not.
 
-use crate::wide_tree::assemble;
+use crate::bvh8::assemble;
 
 /// Primitives of a leaf.
 const LEAF: usize = 3;
 const NODE_WORDS: usize = 16;
 
 /// The words of a structure of `count` triangles of one geometry, at least one, in their own order.
-pub fn binary_structure(count: usize) -> Vec<u32> {
+pub fn bvh2_blob(count: usize) -> Vec<u32> {
     let mut nodes = Vec::new();
-    let root = place(0, count, &mut nodes);
+    let root = append_subtree(0, count, &mut nodes);
     let mut words = assemble(count, &nodes);
     (words[0], words[2]) = (1, root);
     words
 }
 
 /// The reference to a range of triangles: a leaf, or a node that is made.
-fn place(first: usize, count: usize, nodes: &mut Vec<[u32; NODE_WORDS]>) -> u32 {
+fn append_subtree(first: usize, count: usize, nodes: &mut Vec<[u32; NODE_WORDS]>) -> u32 {
     if count <= LEAF {
         return 1 << 31 | (count as u32 - 1) << 27 | first as u32;
     }
     let own = nodes.len();
     nodes.push([0; NODE_WORDS]);
     let left = count / 3;
-    nodes[own][3] = place(first, left, nodes);
-    nodes[own][7] = place(first + left, count - left, nodes);
+    nodes[own][3] = append_subtree(first, left, nodes);
+    nodes[own][7] = append_subtree(first + left, count - left, nodes);
     own as u32
 }

@@ -10,7 +10,7 @@ use lvk_tests::{device, device_with};
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
 
 /// So many instances of one of two meshes in a row.
-fn row(count: u32, model: usize, shift: f32) -> RayScene {
+fn instances_in_a_row(count: u32, model: usize, shift: f32) -> RayScene {
     let mesh = |mesh| vec![Part::new(mesh, Layout::Indexed32)];
     let at = |index: u32| Affine3A::from_translation(Vec3::new(3.5 * index as f32 + shift, shift, 0.0));
     let place = |index| Placed { custom_index: index, ..Placed::new(model, at(index)) };
@@ -23,8 +23,8 @@ fn row(count: u32, model: usize, shift: f32) -> RayScene {
 #[test]
 fn a_refit_may_follow_a_rebuild_to_another_count() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let gpu = row(3, 0, 0.0).upload_with(&ctx, UPDATABLE, UPDATABLE, 8)?;
-    let (five, moved) = (row(5, 0, 0.0), row(5, 0, 0.7));
+    let gpu = instances_in_a_row(3, 0, 0.0).upload_with(&ctx, UPDATABLE, UPDATABLE, 8)?;
+    let (five, moved) = (instances_in_a_row(5, 0, 0.0), instances_in_a_row(5, 0, 0.7));
     let mut cmd = ctx.acquire_command_buffer()?;
     cmd.update_tlas(*gpu.tlas, &instances(&five.placed, &gpu.models), BuildMode::Rebuild)?;
     cmd.update_tlas(*gpu.tlas, &instances(&moved.placed, &gpu.models), BuildMode::Refit)?;
@@ -36,8 +36,8 @@ fn a_refit_may_follow_a_rebuild_to_another_count() -> Result<()> {
 #[test]
 fn a_refused_update_leaves_nothing_behind() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
-    let mut gpu = row(3, 0, 0.0).upload_with(&ctx, UPDATABLE, UPDATABLE, 8)?;
-    let (two, four) = (row(2, 0, 0.3), row(4, 1, 0.4));
+    let mut gpu = instances_in_a_row(3, 0, 0.0).upload_with(&ctx, UPDATABLE, UPDATABLE, 8)?;
+    let (two, four) = (instances_in_a_row(2, 0, 0.3), instances_in_a_row(4, 1, 0.4));
     let mut cmd = ctx.acquire_command_buffer()?;
     let shown = instances(&two.placed, &gpu.models);
     assert!(cmd.update_tlas(*gpu.tlas, &shown, BuildMode::Refit).is_err(), "three became two");
@@ -55,7 +55,7 @@ fn a_refused_update_leaves_nothing_behind() -> Result<()> {
 fn hits_of_a_plain_mesh_are_its_own_whatever_was_submitted_since_it_was_recorded() -> Result<()> {
     let profile = DeviceProfile { name: "small".into(), max_blas_primitives: 40, ..DeviceProfile::default() };
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
-    let (split, plain) = (row(2, 0, 0.0), row(2, 1, 0.0));
+    let (split, plain) = (instances_in_a_row(2, 0, 0.0), instances_in_a_row(2, 1, 0.0));
     let gpu = split.upload_with(&ctx, BuildFlags::default(), BuildFlags::default(), 0)?;
     let shown = instances(&plain.placed, &gpu.models);
     let parts_per_instance = ctx.accel_struct_info(*gpu.models[0])?.parts;

@@ -12,11 +12,11 @@ const PLACE: f64 = 1e-6;
 const BARYCENTRICS: f64 = 2e-4;
 /// Most of the rays may not be left out: one in so many.
 const EXCLUDED_SHARE: usize = 50;
-const SHOWN: usize = 5;
+const MISTAKES_PRINTED: usize = 5;
 
 /// The outcome of a comparison.
 #[derive(Debug, Clone, Default)]
-pub struct Agreement {
+pub struct HitComparison {
     /// Rays compared or left out.
     pub rays: usize,
     /// Rays the reference is not certain about.
@@ -27,10 +27,10 @@ pub struct Agreement {
     pub mistakes: Vec<String>,
 }
 
-impl Agreement {
+impl HitComparison {
     /// Compares closest hits of triangles.
     pub fn of_triangles(rays: &[Ray], records: &[HitRecord], answer: impl Fn(&Ray) -> Answer) -> Self {
-        Self::of(rays, records, |ray, record| {
+        Self::compare(rays, records, |ray, record| {
             let answer = answer(ray);
             answer.is_certain.then(|| (answer.hit.is_some(), triangle_mistake(ray, record, &answer)))
         })
@@ -38,7 +38,7 @@ impl Agreement {
 
     /// Compares closest hits by distance and ids only.
     pub fn of_shapes(rays: &[Ray], records: &[HitRecord], answer: impl Fn(&Ray) -> Answer) -> Self {
-        Self::of(rays, records, |ray, record| {
+        Self::compare(rays, records, |ray, record| {
             let answer = answer(ray);
             answer.is_certain.then(|| (answer.hit.is_some(), mistake(ray, record, &answer)))
         })
@@ -50,14 +50,14 @@ impl Agreement {
         records: &[HitRecord],
         occluded: impl Fn(&Ray) -> Option<bool>,
     ) -> Self {
-        Self::of(rays, records, |ray, record| {
+        Self::compare(rays, records, |ray, record| {
             let expected = occluded(ray)?;
             let found = record.kind != MISSED;
             Some((expected, (found != expected).then(|| format!("occluded: {found}, must be {expected}"))))
         })
     }
 
-    fn of(
+    fn compare(
         rays: &[Ray],
         records: &[HitRecord],
         judge: impl Fn(&Ray, &HitRecord) -> Option<(bool, Option<String>)>,
@@ -90,7 +90,8 @@ impl Agreement {
     /// # Panics
     /// As said.
     pub fn assert(&self, what: &str) {
-        let shown = self.mistakes.iter().take(SHOWN).map(String::as_str).collect::<Vec<_>>().join("\n  ");
+        let shown =
+            self.mistakes.iter().take(MISTAKES_PRINTED).map(String::as_str).collect::<Vec<_>>().join("\n  ");
         let (count, rays) = (self.mistakes.len(), self.rays);
         assert!(count == 0, "{what}: {count} of {rays} rays are wrong:\n  {shown}");
         let excluded = self.excluded;

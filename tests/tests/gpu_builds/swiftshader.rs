@@ -1,0 +1,9 @@
+//! What the library builds on a device that has no ray tracing at all.
+
+use lvk_tests::subprocess::rerun_on_swiftshader;
+
+#[test]
+#[ignore = "a minute, of the step swiftshader of .ci/run"]
+fn accel_structs_are_built_the_same_without_ray_tracing() {
+    rerun_on_swiftshader(&[]);
+}
