@@ -4,19 +4,11 @@
 #extension GL_EXT_ray_flags_primitive_culling : require
 layout(primitive_culling);
 #endif
-#include "ray_records.glsl"
+#include "ray_query_start.glsl"
 #include "sphere_object.glsl"
 
-layout(local_size_x = 64) in;
-
 void main() {
-    uint index = gl_GlobalInvocationID.x;
-    if (index >= count) {
-        return;
-    }
-    Ray ray = rays.at[index];
-    LvkRayQuery rq;
-    lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
+    START_RAY_QUERY;
     float end = ray.tMax;
     HitRecord record = kNoHit;
     while (lvkRayQueryProceed(rq)) {

@@ -20,6 +20,22 @@ pub fn compute_pipeline(ctx: &Context, text: &str) -> Holder<ComputePipelineHand
     ctx.create_compute_pipeline(&desc).expect("the pipeline of a test can be made")
 }
 
+/// A pipeline that keeps the GPU busy: each invocation iterates a random number generator, and runs the GLSL statement `store`
+/// with the result, `sum`, and the words at the address in its push constants, `words.at`.
+pub fn busy_pipeline(ctx: &Context, iterations: u32, store: &str) -> Holder<ComputePipelineHandle> {
+    let text = format!(
+        "layout(local_size_x = 64) in;
+         layout(buffer_reference, scalar) buffer Words {{ uint at[]; }};
+         layout(push_constant, scalar) uniform Push {{ Words words; }};
+         void main() {{
+             uint sum = gl_GlobalInvocationID.x;
+             for (uint i = 0; i < {iterations}; ++i) sum = sum * 1664525 + 1013904223;
+             {store}
+         }}"
+    );
+    compute_pipeline(ctx, &text)
+}
+
 /// A buffer in device memory that holds `words`.
 pub fn words_buffer(ctx: &Context, words: &[u32]) -> Holder<BufferHandle> {
     let desc =

@@ -1,11 +1,16 @@
 //! Pictures that tests render: how alike two are, and what to look at when they are not.
 #![expect(clippy::expect_used, reason = "a test that cannot compare pictures has failed")]
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use image::RgbaImage;
+use lvk::{Context, RayQueryRequest};
 use lvk_samples::app::metrics::{self, Difference};
 use nv_flip::FlipImageRgb8;
+
+use crate::device_with;
+use crate::subprocess::on_swiftshader;
 
 /// How much two pictures may differ; the defaults ask for nothing.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,6 +125,34 @@ pub fn assert_matches_reference(name: &str, picture: &RgbaImage) {
     let kept = (!path.is_file()).then(|| write_test_image(&format!("{name} actual"), picture));
     assert_eq!(kept, None, "{} is not there", path.display());
     assert_similar(name, picture, &reference_image(name), &Tolerance::ACROSS_DRIVERS);
+}
+
+/// Runs `render` on SwiftShader, in a process of its own that `test` starts, and asserts that its image is similar to the one of
+/// that name in `tests/reference`. The context queries rays in software, as the device cannot.
+///
+/// # Panics
+/// As [`on_swiftshader`] and [`assert_similar`].
+pub fn assert_swiftshader_matches(
+    test: impl Fn(),
+    name: &str,
+    tolerance: &Tolerance,
+    render: impl FnOnce(&Context) -> RgbaImage,
+) {
+    on_swiftshader(test, || {
+        let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
+        assert_similar(&format!("SwiftShader {name}"), &render(&ctx), &reference_image(name), tolerance);
+    });
+}
+
+/// Asserts that a rendered image has more than `most` colours and no pixel that nothing was drawn to: two empty images would
+/// be similar too.
+///
+/// # Panics
+/// As said.
+pub fn assert_not_empty(image: &RgbaImage, most: usize) {
+    let colors: HashSet<[u8; 4]> = image.pixels().map(|pixel| pixel.0).collect();
+    assert!(colors.len() > most, "{} colours", colors.len());
+    assert!(image.pixels().all(|pixel| pixel[3] == 255), "a pixel was left out");
 }
 
 fn reference_path(name: &str) -> PathBuf {

@@ -25,6 +25,7 @@ pub mod ray_scene;
 pub mod ray_tracer;
 pub mod rays;
 pub mod reference;
+pub mod rtx_sample;
 pub mod scene_normal_map;
 pub mod scene_obj;
 pub mod scene_shadow_mask;

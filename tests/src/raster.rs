@@ -2,11 +2,12 @@
 #![expect(clippy::expect_used, reason = "a test whose set-up fails has failed")]
 
 use lvk::{
-    Context, Error, Format, Holder, OptionalFeature, RenderPass, RenderPassDesc, RenderPipelineDesc,
-    RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle, TextureRegion, TextureUsage,
+    ColorAttachment, Context, Dependencies, Error, Format, Holder, OptionalFeature, RenderPass,
+    RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle,
+    TextureRegion, TextureUsage,
 };
 
-use crate::compute::module;
+use crate::compute::{Evaluator, module};
 
 /// A triangle over all pixels, at the depth behind the colour in the push constants.
 pub const COVER: &str = "
@@ -110,6 +111,32 @@ pub fn run_pass(
     let mut cmd = ctx.acquire_command_buffer().expect("a command buffer can be had");
     record(&mut cmd.begin_rendering(desc).expect("the pass begins")).expect("the draws are taken");
     ctx.submit(cmd).expect("the commands are taken");
+}
+
+/// Asserts that compute, textures and draws work: draws a colour, samples it, and reads both back.
+///
+/// # Panics
+/// When anything is refused, or a colour is another one.
+pub fn expect_drawing(ctx: &Context) {
+    let drawn = target(ctx, Format::Rgba8Unorm, [4, 4]);
+    let desc = RenderPipelineDesc { color: &[Format::Rgba8Unorm.into()], ..Default::default() };
+    let pipeline = render_pipeline(ctx, COVER, PAINT, &desc);
+    let mut cmd = ctx.acquire_command_buffer().expect("the device can draw and sample");
+    let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
+    let mut pass = cmd
+        .begin_rendering(&RenderPassDesc { color: &color, ..Default::default() })
+        .expect("the device can draw and sample");
+    pass.bind_render_pipeline(*pipeline).expect("the device can draw and sample");
+    pass.push_constants(&[0.0, 1.0, 0.0, 1.0, 0.5_f32]).expect("the device can draw and sample");
+    pass.draw(0..3, 0..1).expect("the device can draw and sample");
+    drop(pass);
+    ctx.submit(cmd).expect("the device can draw and sample");
+    assert_eq!(pixels::<[u8; 4]>(ctx, *drawn), [[0, 255, 0, 255]; 16]);
+    let sampler = ctx.create_sampler(&Default::default()).expect("the device can draw and sample");
+    let sample = Evaluator::new(ctx, "textureBindless2D(a, b, vec2(0.5)) * float(i + 1)");
+    let reads = Dependencies { sampled_images: &[*drawn], ..Default::default() };
+    let found = sample.run(ctx, [drawn.index(), sampler.index(), 0], 2, &reads);
+    assert_eq!(found, [[0.0, 1.0, 0.0, 1.0], [0.0, 2.0, 0.0, 2.0]]);
 }
 
 /// The pushed colour and depth of [`COVER`] and [`PAINT`], drawn over the scissor.

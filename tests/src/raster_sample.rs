@@ -32,6 +32,16 @@ pub fn image_now<S: Sample>(sample: &mut S) -> RgbaImage {
     RgbaImage::from_raw(SIZE[0], SIZE[1], pixels).expect("the picture has the size that was asked for")
 }
 
+/// Asserts that the animation changes within a round and ends where it began.
+///
+/// # Panics
+/// As said, and when rendering fails.
+pub fn assert_loops_without_seam<S: Sample>(sample: &mut S) {
+    let first = image_of(sample, 0);
+    assert_ne!(image_of(sample, 33), first, "something moves");
+    assert_eq!(image_of(sample, ROUND), first);
+}
+
 /// Asks `make` for pictures of sizes that no device has.
 ///
 /// # Panics

@@ -8,6 +8,7 @@ use lvk::{
 };
 
 use crate::rays::Ray;
+use crate::{TestDevice, device};
 
 /// [`HitRecord::kind`] of a ray that hit nothing.
 pub const MISSED: u32 = 0;
@@ -36,8 +37,9 @@ pub const SKIP_TRIANGLES: u32 = 0x100;
 pub const SKIP_AABBS: u32 = 0x200;
 
 /// The files that shaders may include; `ray_records.glsl` has the push constants.
-pub const INCLUDES: [(&str, &str); 3] = [
+pub const INCLUDES: [(&str, &str); 4] = [
     ("any_hit_payload.glsl", include_str!("../shaders/any_hit_payload.glsl")),
+    ("ray_query_start.glsl", include_str!("../shaders/ray_query_start.glsl")),
     ("ray_records.glsl", include_str!("../shaders/ray_records.glsl")),
     ("sphere_object.glsl", include_str!("../shaders/sphere_object.glsl")),
 ];
@@ -89,6 +91,15 @@ impl Method {
         assert!(!found.is_empty(), "{} cannot trace rays", caps.device_name);
         found
     }
+}
+
+/// True if shaders can query rays. Prints what is not tested if they cannot.
+pub fn requires_ray_queries(ctx: &Context) -> bool {
+    let has = ctx.capabilities().ray_query;
+    if !has {
+        eprintln!("NOT TESTED, {} has no ray queries", ctx.capabilities().device_name);
+    }
+    has
 }
 
 /// How rays are traced.
@@ -163,13 +174,36 @@ impl RayTracer {
 
     /// Traces with a pipeline of the caller's own, whose ray generation shaders take the push constants of
     /// `ray_records.glsl`.
-    pub fn of_pipeline(ctx: &Context, pipeline: Holder<RayTracingPipelineHandle>) -> Self {
+    pub fn from_pipeline(ctx: &Context, pipeline: Holder<RayTracingPipelineHandle>) -> Self {
         Self { ctx: ctx.clone(), pipeline: AnyPipeline::RayTracing(pipeline) }
     }
 
-    /// As [`of_pipeline`](Self::of_pipeline), with a compute shader of 64 threads that traces by query.
-    pub fn of_query(ctx: &Context, pipeline: Holder<ComputePipelineHandle>) -> Self {
+    /// As [`from_pipeline`](Self::from_pipeline), with a compute shader of 64 threads that traces by query.
+    pub fn from_query(ctx: &Context, pipeline: Holder<ComputePipelineHandle>) -> Self {
         Self { ctx: ctx.clone(), pipeline: AnyPipeline::Compute(pipeline) }
+    }
+
+    /// As [`from_query`](Self::from_query), of GLSL text with macros.
+    pub fn from_query_text(ctx: &Context, text: &str, defines: &[(&str, &str)]) -> Result<Self> {
+        let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
+        let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
+        Ok(Self::from_query(ctx, ctx.create_compute_pipeline(&desc)?))
+    }
+
+    /// As [`from_pipeline`](Self::from_pipeline), of a pipeline with these hit groups.
+    pub fn from_groups(
+        ctx: &Context,
+        ray_gen: ShaderModuleHandle,
+        miss: ShaderModuleHandle,
+        hit_groups: &[HitGroup<'_>],
+    ) -> Result<Self> {
+        let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
+            ray_gen: &[ray_gen],
+            miss: &[miss],
+            hit_groups,
+            ..Default::default()
+        })?;
+        Ok(Self::from_pipeline(ctx, pipeline))
     }
 
     fn with(ctx: &Context, method: Method, keep_even: bool) -> Result<Self> {
@@ -251,6 +285,18 @@ impl RayTracer {
         self.ctx.submit(cmd)?;
         self.read(&job)
     }
+}
+
+/// Runs a test on the usual device by each of its methods, with a tracer of closest hits.
+///
+/// # Errors
+/// Those of the test and of the tracer.
+pub fn for_each_method(mut test: impl FnMut(&TestDevice, Method, &RayTracer) -> Result<()>) -> Result<()> {
+    let Some(ctx) = device() else { return Ok(()) };
+    for method in Method::available(&ctx) {
+        test(&ctx, method, &RayTracer::new(&ctx, method)?)?;
+    }
+    Ok(())
 }
 
 /// Compiles a shader that may include [`INCLUDES`].

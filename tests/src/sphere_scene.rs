@@ -2,12 +2,15 @@
 
 use lvk::glam::Vec3;
 use lvk::{
-    Aabbs, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, ComputePipelineDesc, Context, GeometryFlags,
-    HitGroup, Holder, RayTracingPipelineDesc, Result, ShaderStage,
+    Aabbs, AccelStructHandle, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, Context, GeometryFlags,
+    HitGroup, Holder, Result, ShaderStage,
 };
 
+use crate::hit_check::HitCheck;
+use crate::hit_comparison::HitComparison;
 use crate::ray_scene::Placed;
-use crate::ray_tracer::{Method, RayTracer, shader, shader_with};
+use crate::ray_tracer::{HitRecord, How, Method, RayTracer, shader, shader_with};
+use crate::rays::Ray;
 use crate::reference::{HitIds, Sphere};
 
 /// Radius in object space and tag of each hit group of spheres; an instance's hit-group offset chooses one.
@@ -79,6 +82,27 @@ impl SphereModel {
     }
 
     /// Where the shaders look for a sphere, in object space.
+    /// Traces rays through a TLAS of this model by each method, asserts that they hit what the reference says, and calls `check`
+    /// with their records.
+    pub fn check_hits(
+        &self,
+        ctx: &Context,
+        tlas: &Holder<AccelStructHandle>,
+        placed: &[Placed],
+        rays: &[Ray],
+        what: &str,
+        check: impl Fn(&[HitRecord]),
+    ) -> Result<()> {
+        let expected = self.spheres(placed);
+        for (method, tracer) in HitCheck::with(ctx, |ctx, method| self.tracer(ctx, method))?.tracers() {
+            let records = tracer.trace(tlas, rays, How::default())?;
+            HitComparison::of_shapes(rays, &records, |ray| Sphere::closest(&expected, ray))
+                .assert(&format!("{what} by {method:?}"));
+            check(&records);
+        }
+        Ok(())
+    }
+
     fn center(&self, geometry: u32, primitive: u32) -> Vec3 {
         let place = primitive * self.step % self.count;
         Vec3::new((place % 3) as f32, (place / 3) as f32, geometry as f32) * 2.0
@@ -98,18 +122,10 @@ fn sphere_pipeline(ctx: &Context, defines: &[(&str, &str)]) -> Result<RayTracer>
         record,
         ..Default::default()
     });
-    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &[*ray_gen],
-        miss: &[*miss],
-        hit_groups: &groups,
-        ..Default::default()
-    })?;
-    Ok(RayTracer::of_pipeline(ctx, pipeline))
+    RayTracer::from_groups(ctx, *ray_gen, *miss, &groups)
 }
 
 fn sphere_query(ctx: &Context, defines: &[(&str, &str)]) -> Result<RayTracer> {
     let text = include_str!("../shaders/sphere_query.comp.glsl");
-    let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
-    let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-    Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?))
+    RayTracer::from_query_text(ctx, text, defines)
 }

@@ -11,11 +11,12 @@ use lvk::{
     AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferHandle, BuildFlags, BuildMode,
     ColorAttachment, ComputePipelineHandle, Context, ContextDesc, Dependencies, DeviceInstances, Format,
     Holder, OptionalFeature, PrimitiveOrder, RayQueryRequest, RenderPassDesc, RenderPipelineDesc,
-    RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle, TextureUsage, TlasDesc, TlasInstance,
-    Triangles, ValidationMode,
+    RenderPipelineHandle, TextureDesc, TextureHandle, TextureUsage, TlasDesc, TlasInstance, Triangles,
+    ValidationMode,
 };
-use lvk_tests::compute::{compute_pipeline, module};
+use lvk_tests::compute::compute_pipeline;
 use lvk_tests::device::vulkan;
+use lvk_tests::raster::render_pipeline;
 use lvk_tests::{device, device_with};
 
 static COUNT: AtomicU64 = AtomicU64::new(0);
@@ -61,29 +62,15 @@ impl Frame {
             let format = Format::Rgba8Unorm;
             ctx.create_texture(&TextureDesc { format, extent: [8, 8], usage, ..Default::default() }).unwrap()
         };
-        let vertex = module(
-            ctx,
-            ShaderStage::Vertex,
-            "layout(push_constant) uniform Push { uint words[2]; };
-             void main() { gl_Position = vec4(words[gl_VertexIndex & 1]); }",
-        );
-        let fragment = module(
-            ctx,
-            ShaderStage::Fragment,
-            "layout(location = 0) out vec4 color; void main() { color = vec4(1.0); }",
-        );
-        let color = [Format::Rgba8Unorm.into()];
-        let desc = RenderPipelineDesc {
-            vertex: Some(*vertex),
-            fragment: Some(*fragment),
-            color: &color,
-            ..Default::default()
-        };
+        let vertex = "layout(push_constant) uniform Push { uint words[2]; };
+             void main() { gl_Position = vec4(words[gl_VertexIndex & 1]); }";
+        let fragment = "layout(location = 0) out vec4 color; void main() { color = vec4(1.0); }";
+        let desc = RenderPipelineDesc { color: &[Format::Rgba8Unorm.into()], ..Default::default() };
         Self {
             target: texture(TextureUsage::TARGET | TextureUsage::SAMPLED),
             image: texture(TextureUsage::STORAGE | TextureUsage::SAMPLED),
             uploaded: ctx.create_buffer(&BufferDesc { size_bytes: 4096, ..Default::default() }).unwrap(),
-            draw: ctx.create_render_pipeline(&desc).unwrap(),
+            draw: render_pipeline(ctx, vertex, fragment, &desc),
             compute: compute_pipeline(
                 ctx,
                 "layout(local_size_x = 8, local_size_y = 8) in;

@@ -65,6 +65,21 @@ struct Triangle {
     surface: Surface,
 }
 
+impl<'a> Instance<'a> {
+    /// Places geometries where they are, with a full mask and no flags.
+    pub fn new(geometries: &'a [Geometry]) -> Self {
+        Self {
+            geometries,
+            transform: DAffine3::IDENTITY,
+            custom_index: 0,
+            mask: 0xff,
+            flip_facing: false,
+            no_cull: false,
+            force_opaque: None,
+        }
+    }
+}
+
 impl Reference {
     /// Flattens instances; their order gives the instance indices.
     pub fn new(instances: &[Instance<'_>]) -> Self {
@@ -209,23 +224,11 @@ mod tests {
         Geometry { positions, triangles, transform: DAffine3::IDENTITY, is_opaque: true }
     }
 
-    fn instance(geometries: &[Geometry]) -> Instance<'_> {
-        Instance {
-            geometries,
-            transform: DAffine3::IDENTITY,
-            custom_index: 0,
-            mask: 0xff,
-            flip_facing: false,
-            no_cull: false,
-            force_opaque: None,
-        }
-    }
-
     #[test]
     fn the_tree_finds_what_trying_all_triangles_finds() {
         for seed in 0..8 {
             let geometry = [soup(seed, 20 + 60 * seed as u32)];
-            let reference = Reference::new(&[instance(&geometry)]);
+            let reference = Reference::new(&[Instance::new(&geometry)]);
             assert!(reference.tree.is_some());
             let mut hits = 0;
             for ray in random_rays(seed, 500, Vec3::NEG_ONE, Vec3::ONE) {
@@ -252,12 +255,12 @@ mod tests {
             transform: DAffine3::from_translation(DVec3::Z),
             is_opaque: true,
         }];
-        let near = Instance { custom_index: 7, mask: 1, ..instance(&square) };
+        let near = Instance { custom_index: 7, mask: 1, ..Instance::new(&square) };
         let far = Instance {
             transform: DAffine3::from_translation(DVec3::Z)
                 * DAffine3::from_scale(DVec3::new(1.0, 1.0, -1.0)),
             mask: 2,
-            ..instance(&square)
+            ..Instance::new(&square)
         };
         let reference = Reference::new(&[near, far]);
         let ray = Ray::new(Vec3::new(0.1, 0.1, -2.0), Vec3::Z);

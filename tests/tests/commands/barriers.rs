@@ -3,8 +3,8 @@
 
 use lvk::{
     BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoadOp, Context, Dependencies, Error,
-    Format, Holder, IndexFormat, MemoryKind, RenderPassDesc, RenderPipelineDesc, TextureDesc, TextureRegion,
-    TextureUsage,
+    Format, Holder, IndexFormat, MemoryKind, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle,
+    TextureDesc, TextureRegion, TextureUsage,
 };
 use lvk_tests::compute::{Evaluator, compute_pipeline, read_vec4, read_words, vec4_buffer, words_buffer};
 use lvk_tests::device;
@@ -90,12 +90,8 @@ const DRAW_WRITTEN: &str = "
     void main() { gl_Position = vec4(corner, 0, 1); }";
 const SEVEN: &str = "layout(location = 0) out vec4 result; void main() { result = vec4(7); }";
 
-#[test]
-fn draws_take_everything_from_a_dispatch_they_declare() {
-    let Some(ctx) = device() else { return };
-    let usage = BufferUsage::INDEX | BufferUsage::VERTEX | BufferUsage::INDIRECT;
-    let draw = buffer(&ctx, usage, 64);
-    let write = compute_pipeline(&ctx, WRITE_DRAW);
+/// A pipeline that draws vertices of a buffer, two floats each, and writes 7 to every pixel.
+fn sevens_pipeline(ctx: &Context) -> Holder<RenderPipelineHandle> {
     let attribute = lvk::VertexAttribute { format: lvk::VertexFormat::F32x2, ..Default::default() };
     let desc = RenderPipelineDesc {
         vertex_bindings: &[lvk::VertexBinding { stride: 8, per_instance: false }],
@@ -103,7 +99,16 @@ fn draws_take_everything_from_a_dispatch_they_declare() {
         color: &[Format::R32Float.into()],
         ..Default::default()
     };
-    let pipeline = render_pipeline(&ctx, DRAW_WRITTEN, SEVEN, &desc);
+    render_pipeline(ctx, DRAW_WRITTEN, SEVEN, &desc)
+}
+
+#[test]
+fn draws_take_everything_from_a_dispatch_they_declare() {
+    let Some(ctx) = device() else { return };
+    let usage = BufferUsage::INDEX | BufferUsage::VERTEX | BufferUsage::INDIRECT;
+    let draw = buffer(&ctx, usage, 64);
+    let write = compute_pipeline(&ctx, WRITE_DRAW);
+    let pipeline = sevens_pipeline(&ctx);
     let target = target(&ctx, Format::R32Float, [4, 4]);
     let color = [ColorAttachment::clear(*target, [0.0; 4])];
     let declared = Dependencies { read_buffers: &[*draw], ..Default::default() };
@@ -152,14 +157,7 @@ fn what_a_copy_wrote_is_read_by_draws_without_being_declared() {
     };
     let source = ctx.create_buffer(&source).unwrap();
     let vertices = buffer(&ctx, BufferUsage::VERTEX, 24);
-    let attribute = lvk::VertexAttribute { format: lvk::VertexFormat::F32x2, ..Default::default() };
-    let desc = RenderPipelineDesc {
-        vertex_bindings: &[lvk::VertexBinding { stride: 8, per_instance: false }],
-        vertex_attributes: &[attribute],
-        color: &[Format::R32Float.into()],
-        ..Default::default()
-    };
-    let pipeline = render_pipeline(&ctx, DRAW_WRITTEN, SEVEN, &desc);
+    let pipeline = sevens_pipeline(&ctx);
     let target = target(&ctx, Format::R32Float, [2, 2]);
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     for round in 0..2 {

@@ -5,15 +5,13 @@ use std::ffi::CStr;
 
 use lvk::ash::{self, vk};
 use lvk::{
-    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Capabilities, ColorAttachment, Context, ContextDesc,
-    Dependencies, DeviceProfile, Error, FeatureRequest, FeatureSet, Format, Holder, OptionalFeature,
-    RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc, ShaderSource, ShaderStage,
-    TlasDesc, Triangles, UserExtensions,
+    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Capabilities, Context, ContextDesc, DeviceProfile,
+    Error, FeatureRequest, FeatureSet, Holder, OptionalFeature, RayQueryRequest, ShaderModuleDesc,
+    ShaderSource, ShaderStage, TlasDesc, Triangles, UserExtensions,
 };
 use lvk_tests::accel_backend::requires_device_accel_structs;
-use lvk_tests::compute::Evaluator;
 use lvk_tests::device::vulkan;
-use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, target};
+use lvk_tests::raster::expect_drawing;
 use lvk_tests::{TestDevice, device, device_with, without_software};
 
 fn under(profile: &DeviceProfile) -> Option<TestDevice> {
@@ -247,23 +245,7 @@ fn core_only_devices_draw_and_compute() {
     assert_eq!(caps.optional, FeatureSet::NONE);
     assert!(!(caps.cube_arrays || caps.multi_draw_indirect || caps.shader_int64 || caps.mesh_shader));
     assert!((caps.max_anisotropy - 1.0).abs() < f32::EPSILON);
-    let drawn = target(&ctx, Format::Rgba8Unorm, [4, 4]);
-    let desc = RenderPipelineDesc { color: &[Format::Rgba8Unorm.into()], ..Default::default() };
-    let pipeline = render_pipeline(&ctx, COVER, PAINT, &desc);
-    let mut cmd = ctx.acquire_command_buffer().unwrap();
-    let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
-    let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
-    pass.bind_render_pipeline(*pipeline).unwrap();
-    pass.push_constants(&[0.0, 1.0, 0.0, 1.0, 0.5_f32]).unwrap();
-    pass.draw(0..3, 0..1).unwrap();
-    drop(pass);
-    ctx.submit(cmd).unwrap();
-    assert_eq!(pixels::<[u8; 4]>(&ctx, *drawn), [[0, 255, 0, 255]; 16]);
-    let sampler = ctx.create_sampler(&Default::default()).unwrap();
-    let sample = Evaluator::new(&ctx, "textureBindless2D(a, b, vec2(0.5)) * float(i + 1)");
-    let reads = Dependencies { sampled_images: &[*drawn], ..Default::default() };
-    let found = sample.run(&ctx, [drawn.index(), sampler.index(), 0], 2, &reads);
-    assert_eq!(found, [[0.0, 1.0, 0.0, 1.0], [0.0, 2.0, 0.0, 2.0]]);
+    expect_drawing(&ctx);
 }
 
 /// A shader that needs a hidden feature is refused by its name.

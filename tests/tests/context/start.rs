@@ -6,13 +6,12 @@ use std::path::Path;
 
 use lvk::ash::vk;
 use lvk::{
-    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, ColorAttachment, Context, ContextDesc, Dependencies,
-    Error, FeatureRequest, Format, RayQueryRequest, RenderPassDesc, RenderPipelineDesc, ShaderModuleDesc,
-    ShaderSource, ShaderStage, TlasDesc, Triangles, ValidationMode,
+    BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Context, ContextDesc, Error, FeatureRequest,
+    RayQueryRequest, ShaderModuleDesc, ShaderSource, ShaderStage, TlasDesc, Triangles, ValidationMode,
 };
-use lvk_tests::compute::{Evaluator, words_buffer};
+use lvk_tests::compute::words_buffer;
 use lvk_tests::device::vulkan;
-use lvk_tests::raster::{COVER, PAINT, pixels, render_pipeline, target};
+use lvk_tests::raster::expect_drawing;
 use lvk_tests::subprocess::{in_subprocess, on_swiftshader};
 use lvk_tests::{device, device_with, without_software};
 
@@ -137,27 +136,6 @@ fn expect_no_ray_tracing(ctx: &Context) {
     let vertices = words_buffer(ctx, &[0; 9]);
     let geometries = [BlasGeometry::Triangles(Triangles::packed(*vertices, 3))];
     unsupported(ctx.create_blas(&BlasDesc { geometries: &geometries, ..Default::default() }));
-}
-
-/// Compute, textures and draws in one: a colour is drawn, sampled and read back.
-fn expect_drawing(ctx: &Context) {
-    let drawn = target(ctx, Format::Rgba8Unorm, [4, 4]);
-    let desc = RenderPipelineDesc { color: &[Format::Rgba8Unorm.into()], ..Default::default() };
-    let pipeline = render_pipeline(ctx, COVER, PAINT, &desc);
-    let mut cmd = ctx.acquire_command_buffer().unwrap();
-    let color = [ColorAttachment::clear(*drawn, [0.0; 4])];
-    let mut pass = cmd.begin_rendering(&RenderPassDesc { color: &color, ..Default::default() }).unwrap();
-    pass.bind_render_pipeline(*pipeline).unwrap();
-    pass.push_constants(&[0.0, 1.0, 0.0, 1.0, 0.5_f32]).unwrap();
-    pass.draw(0..3, 0..1).unwrap();
-    drop(pass);
-    ctx.submit(cmd).unwrap();
-    assert_eq!(pixels::<[u8; 4]>(ctx, *drawn), [[0, 255, 0, 255]; 16]);
-    let sampler = ctx.create_sampler(&Default::default()).unwrap();
-    let sample = Evaluator::new(ctx, "textureBindless2D(a, b, vec2(0.5)) * float(i + 1)");
-    let reads = Dependencies { sampled_images: &[*drawn], ..Default::default() };
-    let found = sample.run(ctx, [drawn.index(), sampler.index(), 0], 2, &reads);
-    assert_eq!(found, [[0.0, 1.0, 0.0, 1.0], [0.0, 2.0, 0.0, 2.0]]);
 }
 
 #[test]

@@ -189,10 +189,7 @@ fn one_pass_has_the_bits_of_two_where_indices_are_checked() {
 /// ready at once, in several command buffers.
 #[test]
 fn draws_see_those_before_them() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::LocalRead) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::LocalRead)) else { return };
     let fragment = "
         LVK_INPUT(0, subpassInput, gBefore);
         layout(push_constant, scalar) uniform Push { vec4 color; float depth; };
@@ -229,10 +226,7 @@ fn draws_see_those_before_them() {
 /// Two pipelines in turns, each of which reads what the other writes: nobody says when to wait.
 #[test]
 fn pipelines_wait_for_each_other() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::LocalRead) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::LocalRead)) else { return };
     let text = |from: u32, to: u32| {
         format!(
             "LVK_INPUT({from}, subpassInput, gOther);
@@ -412,10 +406,7 @@ fn stencil_is_read() {
 /// What another command wrote before the pass is read in it too, and a target that is only tested.
 #[test]
 fn what_is_loaded_is_read() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::LocalRead) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::LocalRead)) else { return };
     let read = "
         LVK_INPUT(0, subpassInput, gLoaded);
         LVK_DEPTH_INPUT(subpassInput, gDepth);

@@ -88,10 +88,7 @@ const BY_SAMPLE: &str = "
 
 #[test]
 fn fragments_run_for_each_sample_that_they_ask_for() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::SampleRateShading) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::SampleRateShading)) else { return };
     let count = "
         layout(buffer_reference, scalar) buffer Count { uint value; };
         layout(push_constant, scalar) uniform Push { Count count; };
@@ -178,10 +175,7 @@ fn coverage_grows_with_alpha_where_it_is_asked_for() {
 
 #[test]
 fn colour_depth_and_stencil_are_resolved_by_their_modes() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::SampleRateShading) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::SampleRateShading)) else { return };
     let format = Format::D32FloatS8;
     let limits = ctx.capabilities().limits.depth_resolve;
     assert!(limits.depth.contains(ResolveModes::SAMPLE_ZERO));
@@ -258,10 +252,7 @@ fn equal_to(ctx: &Context, tested: TextureHandle, value: u8) -> Vec<f32> {
 /// Integers have no mean. Vulkan asks for the first sample; NVIDIA's driver (580.159.04) takes another one.
 #[test]
 fn integers_are_resolved_to_one_of_their_samples() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::SampleRateShading) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::SampleRateShading)) else { return };
     let usage = TextureUsage::TARGET;
     let format = Format::R32Uint;
     let desc = TextureDesc { format, extent: [1, 1], usage, samples: SAMPLES, ..Default::default() };

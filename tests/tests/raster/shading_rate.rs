@@ -88,10 +88,7 @@ fn the_sizes_of_a_device_are_listed_from_large_to_small() {
 
 #[test]
 fn pipelines_and_draws_have_a_rate() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::PipelineShadingRate) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::PipelineShadingRate)) else { return };
     for known in ctx.shading_rates().iter().filter(|known| known.samples & 1 != 0) {
         let pipeline = pipeline(&ctx, COVER, ShadingRate::of(known.size));
         let found = drawn(&ctx, None, |pass| {
@@ -168,10 +165,7 @@ fn attachment_and_primitive_rates_are_combined_by_their_formulas() {
 
 #[test]
 fn wrong_attachments_are_refused() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::AttachmentShadingRate) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::AttachmentShadingRate)) else { return };
     let plain = TextureDesc {
         format: Format::R8Uint,
         extent: [1, 1],

@@ -68,10 +68,7 @@ fn make(
 
 #[test]
 fn a_divided_triangle_covers_what_the_whole_one_covers() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::TessellationShader) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::TessellationShader)) else { return };
     let stages = [
         (ShaderStage::Vertex, VERTEX),
         (ShaderStage::TessControl, CONTROL),
@@ -93,10 +90,7 @@ fn a_divided_triangle_covers_what_the_whole_one_covers() {
 /// Points of a quad divided in four by four, by the levels that the control stage sets.
 #[test]
 fn levels_decide_how_many_points_there_are() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::TessellationShader) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::TessellationShader)) else { return };
     let control = "
         layout(vertices = 1) out;
         void main() {

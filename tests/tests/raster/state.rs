@@ -50,10 +50,7 @@ fn drawn(ctx: &Context, desc: &RenderPipelineDesc<'_>, at: &[[u32; 2]]) -> Vec<V
 
 #[test]
 fn polygons_are_filled_outlined_or_dotted() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::FillModeNonSolid) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::FillModeNonSolid)) else { return };
     let corners = [[1, 1], [6, 1], [1, 6]];
     let with = |polygon| drawn(&ctx, &RenderPipelineDesc { polygon, ..Default::default() }, &corners);
     let (lines, dots) = (with(PolygonMode::Line), with(PolygonMode::Point));
@@ -87,10 +84,7 @@ fn a_fan_turns_around_its_first_vertex() {
 
 #[test]
 fn wide_lines_cover_their_width() {
-    let Some(ctx) = device() else { return };
-    if !has(&ctx, OptionalFeature::WideLines) {
-        return;
-    }
+    let Some(ctx) = device().filter(|ctx| has(ctx, OptionalFeature::WideLines)) else { return };
     let desc = RenderPipelineDesc { topology: Topology::Lines, ..Default::default() };
     for (line_width, rows) in [(1.0, 3..4), (3.0, 2..5)] {
         let found = drawn(&ctx, &RenderPipelineDesc { line_width, ..desc }, &[[1, 3], [6, 3]]);

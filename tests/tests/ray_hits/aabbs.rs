@@ -3,9 +3,8 @@
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
-    Aabbs, AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferUsage, ComputePipelineDesc, Context,
-    DeviceProfile, Error, GeometryFlags, HitGroup, Holder, InstanceFlags, RayTracingPipelineDesc, Result,
-    ShaderStage, TlasDesc,
+    Aabbs, AccelStructHandle, BlasDesc, BlasGeometry, BufferDesc, BufferUsage, Context, DeviceProfile, Error,
+    GeometryFlags, HitGroup, Holder, InstanceFlags, RayTracingPipelineDesc, Result, ShaderStage, TlasDesc,
 };
 use lvk_tests::device::loses_neighbours_of_inactive;
 use lvk_tests::hit_check::HitCheck;
@@ -43,9 +42,7 @@ fn tracer(ctx: &Context, method: Method, culling: bool) -> Result<RayTracer> {
     }
     if method == Method::Query {
         let text = include_str!("../../shaders/shell_query.comp.glsl");
-        let module = shader_with(ctx, ShaderStage::Compute, text, &defines)?;
-        let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-        return Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?));
+        return RayTracer::from_query_text(ctx, text, &defines);
     }
     let text = include_str!("../../shaders/closest.rgen.glsl");
     let ray_gen = shader_with(ctx, ShaderStage::RayGen, text, &defines)?;
@@ -62,13 +59,7 @@ fn tracer(ctx: &Context, method: Method, culling: bool) -> Result<RayTracer> {
         ..Default::default()
     };
     let triangles = HitGroup { closest_hit: Some(*of_triangles), ..Default::default() };
-    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &[*ray_gen],
-        miss: &[*miss],
-        hit_groups: &[boxes, triangles],
-        ..Default::default()
-    })?;
-    Ok(RayTracer::of_pipeline(ctx, pipeline))
+    RayTracer::from_groups(ctx, *ray_gen, *miss, &[boxes, triangles])
 }
 
 /// Where the shaders look for a sphere, in object space.
@@ -313,7 +304,7 @@ fn a_report_at_an_end_of_the_ray_is_accepted() -> Result<()> {
         (before, after, true),
     ];
     let ray = |(t_min, t_max, _)| Ray { t_min, t_max, ..Ray::new(Vec3::new(0.25, 0.5, -1.0), Vec3::Z) };
-    let records = RayTracer::of_pipeline(&ctx, pipeline).trace(&tlas, &cases.map(ray), How::default())?;
+    let records = RayTracer::from_pipeline(&ctx, pipeline).trace(&tlas, &cases.map(ray), How::default())?;
     let found: Vec<_> = records.iter().map(|record| record.kind).collect();
     assert_eq!(found, cases.map(|(_, _, accepted)| if accepted { 5 } else { MISSED }));
     Ok(())

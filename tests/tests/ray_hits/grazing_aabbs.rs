@@ -3,12 +3,12 @@
 
 use lvk::glam::{Affine3A, Mat3, Vec3};
 use lvk::{
-    Aabbs, BlasDesc, BlasGeometry, BufferDesc, BufferUsage, BuildFlags, BuildMode, ComputePipelineDesc,
-    Context, GeometryFlags, RayQueryPath, Result, ShaderStage, TlasDesc,
+    Aabbs, BlasDesc, BlasGeometry, BufferDesc, BufferUsage, BuildFlags, BuildMode, Context, GeometryFlags,
+    RayQueryPath, Result, TlasDesc,
 };
 use lvk_tests::device;
 use lvk_tests::ray_scene::{Placed, instances};
-use lvk_tests::ray_tracer::{How, RayTracer, shader};
+use lvk_tests::ray_tracer::{How, RayTracer, requires_ray_queries};
 use lvk_tests::rays::Ray;
 
 type Corners = [Vec3; 2];
@@ -26,9 +26,7 @@ const FLAGS: [BuildFlags; 4] = [
 
 fn tracer(ctx: &Context) -> Result<RayTracer> {
     let text = include_str!("../../shaders/touched_query.comp.glsl");
-    let module = shader(ctx, ShaderStage::Compute, text)?;
-    let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-    Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?))
+    RayTracer::from_query_text(ctx, text, &[])
 }
 
 /// Boxes of one size on a grid.
@@ -136,11 +134,7 @@ fn floats(corners: &[Vec3]) -> Vec<f32> {
 /// A device's own walk is told of, but it need not be right.
 #[test]
 fn a_ray_that_touches_an_aabb_has_it_as_a_candidate() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    if !ctx.capabilities().ray_query {
-        eprintln!("NOT TESTED, {} has no ray queries", ctx.capabilities().device_name);
-        return Ok(());
-    }
+    let Some(ctx) = device().filter(|ctx| requires_ray_queries(ctx)) else { return Ok(()) };
     let is_ours = ctx.capabilities().ray_query_path == RayQueryPath::Software;
     let tracer = tracer(&ctx)?;
     let mut all = Vec::new();

@@ -2,8 +2,8 @@
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
-    BuildFlags, BuildMode, ComputePipelineDesc, Context, DeviceProfile, Error, GeometryFlags, HitGroup,
-    RayQueryPath, RayTracingPipelineDesc, Result, ShaderStage, TlasDesc,
+    BuildFlags, BuildMode, Context, DeviceProfile, Error, GeometryFlags, HitGroup, RayQueryPath, Result,
+    ShaderStage, TlasDesc,
 };
 use lvk_tests::hit_check::rays_for;
 use lvk_tests::meshes::Mesh;
@@ -20,22 +20,19 @@ fn tracer(ctx: &Context, method: Method, corner: usize) -> Result<RayTracer> {
     let defines: &[_] = &[("CORNER", number.as_str())];
     if method == Method::Query {
         let text = include_str!("../../shaders/corner_query.comp.glsl");
-        let module = shader_with(ctx, ShaderStage::Compute, text, defines)?;
-        let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-        return Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?));
+        return RayTracer::from_query_text(ctx, text, defines);
     }
     let ray_gen = shader(ctx, ShaderStage::RayGen, include_str!("../../shaders/closest.rgen.glsl"))?;
     let miss = shader(ctx, ShaderStage::Miss, include_str!("../../shaders/record.rmiss.glsl"))?;
     let text = include_str!("../../shaders/corner.rchit.glsl");
     let hit = shader_with(ctx, ShaderStage::ClosestHit, text, defines)?;
     let any_hit = shader(ctx, ShaderStage::AnyHit, include_str!("../../shaders/corner.rahit.glsl"))?;
-    let pipeline = ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
-        ray_gen: &[*ray_gen],
-        miss: &[*miss],
-        hit_groups: &[HitGroup { closest_hit: Some(*hit), any_hit: Some(*any_hit), ..Default::default() }],
-        ..Default::default()
-    })?;
-    Ok(RayTracer::of_pipeline(ctx, pipeline))
+    RayTracer::from_groups(
+        ctx,
+        *ray_gen,
+        *miss,
+        &[HitGroup { closest_hit: Some(*hit), any_hit: Some(*any_hit), ..Default::default() }],
+    )
 }
 
 /// Whole meshes, and such as are cut into many parts; none where the device cannot fetch.

@@ -7,22 +7,14 @@ use lvk::{
 };
 use lvk_tests::device;
 use lvk_tests::ray_scene::{Placed, instances};
-use lvk_tests::ray_tracer::{How, MISSED, RayTracer, shader_with};
+use lvk_tests::ray_tracer::{How, MISSED, RayTracer, requires_ray_queries, shader_with};
 use lvk_tests::rays::Ray;
 
 /// Generates hits at two distances in turn.
 const TEXT: &str = r#"
-    #include <lvk/ray_query.glsl>
-    #include "ray_records.glsl"
-    layout(local_size_x = 64) in;
+    #include "ray_query_start.glsl"
     void main() {
-        uint index = gl_GlobalInvocationID.x;
-        if (index >= count) {
-            return;
-        }
-        Ray ray = rays.at[index];
-        LvkRayQuery rq;
-        lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
+        START_RAY_QUERY;
         while (lvkRayQueryProceed(rq)) {
             lvkRayQueryGenerateIntersection(rq, FIRST);
             lvkRayQueryGenerateIntersection(rq, SECOND);
@@ -40,7 +32,7 @@ fn hits(ctx: &Context, reports: [f32; 2], ends: &[(f32, f32)]) -> Result<Vec<Opt
     let [first, second] = reports.map(|t| format!("{t:?}"));
     let module = shader_with(ctx, ShaderStage::Compute, TEXT, &[("FIRST", &first), ("SECOND", &second)])?;
     let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-    let tracer = RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?);
+    let tracer = RayTracer::from_query(ctx, ctx.create_compute_pipeline(&desc)?);
     let corners = [[-1.0, -1.0, 0.0], [1.0, 1.0, 20.0_f32]];
     let (data, usage) = (Some(bytemuck::cast_slice(&corners)), BufferUsage::ACCEL_INPUT);
     let buffer = ctx.create_buffer(&BufferDesc { data, usage, ..Default::default() })?;
@@ -60,11 +52,7 @@ fn hits(ctx: &Context, reports: [f32; 2], ends: &[(f32, f32)]) -> Result<Vec<Opt
 
 #[test]
 fn a_generated_hit_within_the_ray_counts_its_ends_included() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    if !ctx.capabilities().ray_query {
-        eprintln!("NOT TESTED, {} has no ray queries", ctx.capabilities().device_name);
-        return Ok(());
-    }
+    let Some(ctx) = device().filter(|ctx| requires_ray_queries(ctx)) else { return Ok(()) };
     let (before, after) = (4.0_f32.next_down(), 4.0_f32.next_up());
     let around = [(4.0, 10.0), (0.0, 4.0), (4.0, 4.0), (before, after)];
     assert_eq!(hits(&ctx, [4.0, 4.0], &around)?, [Some(4.0); 4]);

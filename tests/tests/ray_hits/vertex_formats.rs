@@ -299,16 +299,7 @@ fn a_model_may_mix_formats() -> Result<()> {
         let placed = [Placed::new(0, Affine3A::IDENTITY)];
         let tlas =
             ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
-        let instance = Instance {
-            geometries: &decoded,
-            transform: DAffine3::IDENTITY,
-            custom_index: 0,
-            mask: 0xff,
-            flip_facing: false,
-            no_cull: false,
-            force_opaque: None,
-        };
-        let reference = Reference::new(&[instance]);
+        let reference = Reference::new(&[Instance::new(&decoded)]);
         let how = How::default();
         // The flat ones lie in one plane, so only rays that meet a hill first have one answer.
         let rays: Vec<_> = rays_for(&reference)

@@ -3,16 +3,13 @@
 
 use bytemuck::Zeroable;
 use lvk::glam::{Affine3A, Vec3};
-use lvk::{
-    BuildFlags, BuildMode, ComputePipelineDesc, Context, DeviceProfile, InstanceFlags, Result, ShaderStage,
-    TlasDesc,
-};
+use lvk::{BuildFlags, BuildMode, Context, DeviceProfile, InstanceFlags, Result, TlasDesc};
 use lvk_tests::accel_backend::expect_parts;
 use lvk_tests::hit_check::HitCheck;
 use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances};
-use lvk_tests::ray_tracer::{BACK, FRONT, HitRecord, How, MISSED, Method, RayTracer, shader};
+use lvk_tests::ray_tracer::{BACK, FRONT, HitRecord, How, MISSED, Method, RayTracer, requires_ray_queries};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::{device, device_with};
 
@@ -172,15 +169,9 @@ fn an_automatic_update_is_never_refused() -> Result<()> {
 /// Records the offset into the shader binding table where others record the tag of a sphere.
 fn offset_query(ctx: &Context) -> Result<RayTracer> {
     const OFFSETS: &str = r#"
-        #include <lvk/ray_query.glsl>
-        #include "ray_records.glsl"
-        layout(local_size_x = 64) in;
+        #include "ray_query_start.glsl"
         void main() {
-            uint index = gl_GlobalInvocationID.x;
-            if (index >= count) { return; }
-            Ray ray = rays.at[index];
-            LvkRayQuery rq;
-            lvkRayQueryInitialize(rq, tlas, flags, mask, ray.origin, ray.tMin, ray.direction, ray.tMax);
+            START_RAY_QUERY;
             while (lvkRayQueryProceed(rq)) {}
             HitRecord record = kNoHit;
             if (lvkRayQueryType(rq, LVK_COMMITTED) == LVK_COMMITTED_TRIANGLE) {
@@ -191,9 +182,7 @@ fn offset_query(ctx: &Context) -> Result<RayTracer> {
             }
             hits.at[index] = record;
         }"#;
-    let module = shader(ctx, ShaderStage::Compute, OFFSETS)?;
-    let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-    Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?))
+    RayTracer::from_query_text(ctx, OFFSETS, &[])
 }
 
 /// Numbers at the ends of their ranges, side by side, so that none spills into another.
@@ -222,11 +211,7 @@ fn at_limits() -> RayScene {
 
 #[test]
 fn numbers_at_their_limits_are_reported() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    if !ctx.capabilities().ray_query {
-        eprintln!("NOT TESTED, {} has no ray queries", ctx.capabilities().device_name);
-        return Ok(());
-    }
+    let Some(ctx) = device().filter(|ctx| requires_ray_queries(ctx)) else { return Ok(()) };
     let scene = at_limits();
     let gpu = scene.upload(&ctx)?;
     let above = |index: usize| Ray::new(Vec3::new(index as f32 + 0.3, 1.0, 0.3), Vec3::NEG_Y);

@@ -90,7 +90,7 @@ fn instance_ray_and_geometry_choose_the_hit_group() -> Result<()> {
     let gpu = scene.upload(&ctx)?;
     let reference = scene.reference();
     let rays = rays_for(&reference);
-    let tracer = RayTracer::of_pipeline(&ctx, pipeline);
+    let tracer = RayTracer::from_pipeline(&ctx, pipeline);
     for (ray_gen, (offset, stride)) in (0..).zip(strides) {
         let records = tracer.trace(&gpu.tlas, &rays, How { ray_gen, ..How::default() })?;
         HitComparison::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("hit groups");
@@ -129,7 +129,7 @@ fn the_miss_index_chooses_the_miss_shader() -> Result<()> {
     let gpu = scene.upload(&ctx)?;
     let reference = scene.reference();
     let rays = rays_for(&reference);
-    let tracer = RayTracer::of_pipeline(&ctx, pipeline);
+    let tracer = RayTracer::from_pipeline(&ctx, pipeline);
     for (ray_gen, t) in [(0, -7.0), (2, -9.0), (1, -8.0)] {
         let records = tracer.trace(&gpu.tlas, &rays, How { ray_gen, ..How::default() })?;
         HitComparison::of_triangles(&rays, &records, |ray| reference.closest(ray, 0xff))
@@ -175,7 +175,7 @@ fn a_hit_shader_calls_the_callable_it_names() -> Result<()> {
     let gpu = scene.upload(&ctx)?;
     let reference = scene.reference();
     let rays = rays_for(&reference);
-    let records = RayTracer::of_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
+    let records = RayTracer::from_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
     HitComparison::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("callables");
     for hit in records.iter().filter(|record| record.kind != 0) {
         let value = hit.primitive;
@@ -232,7 +232,7 @@ fn a_hit_shader_traces_a_ray_of_its_own() -> Result<()> {
     let gpu = scene.upload(&ctx)?;
     let reference = scene.reference();
     let rays = rays_for(&reference);
-    let records = RayTracer::of_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
+    let records = RayTracer::from_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
     let first = rays.iter().zip(&records).filter(|(_, record)| record.barycentrics[0] > 0.0);
     let (behind, records): (Vec<_>, Vec<_>) = first
         .map(|(ray, record)| {

@@ -8,12 +8,10 @@ use lvk::{
 use lvk_tests::accel_backend::builds_device_accel_structs;
 use lvk_tests::device;
 use lvk_tests::hit_check::{HitCheck, rays_for};
-use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances, upload_geometries};
 use lvk_tests::ray_tracer::{How, MISSED};
 use lvk_tests::rays::{Ray, random_rays};
-use lvk_tests::reference::Sphere;
 use lvk_tests::sphere_scene::{GROUPS, SphereModel};
 use lvk_tests::vertex_deform::{VertexDeformer, deformed};
 
@@ -122,16 +120,12 @@ fn aabbs_in_another_order_keep_their_numbers() -> Result<()> {
     assert_eq!(ctx.accel_struct_info(*model[0])?.is_remapped, builds_device_accel_structs(&ctx));
     let placed = [Placed::new(0, Affine3A::from_rotation_y(0.4))];
     let tlas = ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
-    let expected = spheres.spheres(&placed);
     let rays = random_rays(52, 1_200, Vec3::new(-2.0, -1.0, -3.0), Vec3::new(6.0, 31.0, 4.0));
-    for (method, tracer) in HitCheck::with(&ctx, |ctx, method| spheres.tracer(ctx, method))?.tracers() {
-        let records = tracer.trace(&tlas, &rays, How::default())?;
-        HitComparison::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
-            .assert(&format!("boxes in order by {method:?}"));
+    spheres.check_hits(&ctx, &tlas, &placed, &rays, "boxes in order", |records| {
         let (radius, tag) = GROUPS[0];
         let hits = records.iter().filter(|record| record.kind != MISSED);
         assert!(hits.into_iter().all(|hit| (hit.kind, hit.barycentrics) == (tag, [radius, tag as f32])));
-    }
+    })?;
     Ok(())
 }
 

@@ -8,12 +8,9 @@ use lvk::{
 };
 use lvk_tests::accel_backend::{builds_device_accel_structs, whole_and_split};
 use lvk_tests::hit_check::HitCheck;
-use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, PartBuffers, Placed, RayScene, instances, upload_geometries};
-use lvk_tests::ray_tracer::How;
 use lvk_tests::rays::random_rays;
-use lvk_tests::reference::Sphere;
 use lvk_tests::sphere_scene::SphereModel;
 use lvk_tests::vertex_deform::{VertexDeformer, deformed};
 use lvk_tests::warnings::{capture_warnings, take_warnings};
@@ -188,10 +185,7 @@ fn what_is_loaded_may_be_compacted_at_once() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let mine = Mine::new(&ctx)?;
     let desc = mine.desc(MOVING, PrimitiveOrder::Spatial);
-    let bytes = {
-        let built = ctx.create_blas(&desc)?;
-        ctx.serialize_blas(*built)?
-    };
+    let bytes = serialized(&ctx, &desc)?;
     let loaded = load(&ctx, &desc, &bytes)?;
     ctx.compact(&[*loaded])?;
     let tlas = mine.tlas_of(&ctx, &loaded)?;
@@ -245,13 +239,8 @@ fn aabbs_are_saved_too() -> Result<()> {
         let placed = [Placed::new(0, Affine3A::IDENTITY)];
         let instances = instances(&placed, &model);
         let tlas = ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() })?;
-        let expected = spheres.spheres(&placed);
         let rays = random_rays(53, 800, Vec3::new(-1.0, -1.0, -1.0), Vec3::new(5.0, 27.0, 3.0));
-        for (method, tracer) in HitCheck::with(&ctx, |ctx, method| spheres.tracer(ctx, method))?.tracers() {
-            let records = tracer.trace(&tlas, &rays, How::default())?;
-            HitComparison::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
-                .assert(&format!("loaded boxes by {method:?}"));
-        }
+        spheres.check_hits(&ctx, &tlas, &placed, &rays, "loaded AABBs", |_| ())?;
     }
     Ok(())
 }
@@ -261,10 +250,7 @@ fn damaged_bytes_are_refused_and_leave_nothing_behind() -> Result<()> {
     for ctx in whole_and_split(MOST_PRIMITIVES) {
         let mine = Mine::new(&ctx)?;
         let desc = mine.desc(MOVING, PrimitiveOrder::Spatial);
-        let bytes = {
-            let built = ctx.create_blas(&desc)?;
-            ctx.serialize_blas(*built)?
-        };
+        let bytes = serialized(&ctx, &desc)?;
         wait_for_compaction(&ctx)?;
         let before = ctx.accel_memory();
         for length in [0, 1, 7, 8, 11, 27, 28, 60, bytes.len() / 2, bytes.len() - 1] {
@@ -380,10 +366,7 @@ fn parts_that_do_not_make_up_the_mesh_are_refused() -> Result<()> {
         let Some(ctx) = ctx else { return Ok(()) };
         let mine = Mine::new(&ctx)?;
         let desc = mine.desc(BuildFlags::FAST_TRACE, order);
-        let bytes = {
-            let built = ctx.create_blas(&desc)?;
-            ctx.serialize_blas(*built)?
-        };
+        let bytes = serialized(&ctx, &desc)?;
         let good = parts(&bytes, &mine.geometries);
         let with = |parts: &[&[u8]]| {
             let mut made = bytes[..parts_start(&mine.geometries)].to_vec();
@@ -409,16 +392,19 @@ fn parts_that_do_not_make_up_the_mesh_are_refused() -> Result<()> {
     Ok(())
 }
 
+/// Returns the bytes of a BLAS that is built for them and destroyed.
+fn serialized(ctx: &Context, desc: &BlasDesc<'_>) -> Result<Vec<u8>> {
+    let built = ctx.create_blas(desc)?;
+    ctx.serialize_blas(*built)
+}
+
 /// Sizes and counts in the head of the driver's own bytes that cannot be.
 #[test]
 fn absurd_sizes_are_refused_and_built_instead() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let mine = Mine::new(&ctx)?;
     let desc = mine.desc(BuildFlags::FAST_TRACE, PrimitiveOrder::Given);
-    let bytes = {
-        let built = ctx.create_blas(&desc)?;
-        ctx.serialize_blas(*built)?
-    };
+    let bytes = serialized(&ctx, &desc)?;
     wait_for_compaction(&ctx)?;
     let before = ctx.accel_memory();
     let most = ctx.blas_sizes(&desc)?.structure_bytes;
@@ -443,10 +429,7 @@ fn bytes_of_another_driver_are_refused_and_built_instead() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
     let mine = Mine::new(&ctx)?;
     let desc = mine.desc(BuildFlags::FAST_TRACE, PrimitiveOrder::Given);
-    let bytes = {
-        let built = ctx.create_blas(&desc)?;
-        ctx.serialize_blas(*built)?
-    };
+    let bytes = serialized(&ctx, &desc)?;
     assert_eq!(resealed(bytes.clone()), bytes, "the checksum is the library's");
     let uuid = driver_start(&mine.geometries);
     let own = builds_device_accel_structs(&ctx);

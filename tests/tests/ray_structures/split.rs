@@ -13,7 +13,7 @@ use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances, upload_geometries};
 use lvk_tests::ray_tracer::{CULL_BACK, CULL_FRONT, How, MISSED, Method, RayTracer, shader, shader_with};
 use lvk_tests::rays::{Ray, random_rays};
-use lvk_tests::reference::{Hit, Sphere};
+use lvk_tests::reference::Hit;
 use lvk_tests::sphere_scene::{GROUPS, SphereModel};
 use lvk_tests::{TestDevice, device, device_with, without_software};
 
@@ -210,7 +210,7 @@ fn parts_keep_hit_groups() -> Result<()> {
     expect_parts(&ctx, *gpu.models[0], 5..)?;
     let reference = scene.reference();
     let rays = rays_for(&reference);
-    let records = RayTracer::of_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
+    let records = RayTracer::from_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
     HitComparison::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("hit groups");
     let mut tags: Vec<_> =
         records.iter().filter(|hit| hit.kind != MISSED).map(|hit| (hit.kind, hit)).collect();
@@ -267,17 +267,13 @@ fn intersection_shaders_know_the_aabbs_of_split_meshes() -> Result<()> {
     };
     let placed = [place(0), place(1)];
     let tlas = ctx.create_tlas(&TlasDesc { instances: &instances(&placed, &model), ..Default::default() })?;
-    let expected = spheres.spheres(&placed);
     let rays = random_rays(51, 1_500, Vec3::new(-4.0, -2.0, -6.0), Vec3::new(14.0, 14.0, 8.0));
-    for (method, tracer) in HitCheck::with(&ctx, |ctx, method| spheres.tracer(ctx, method))?.tracers() {
-        let records = tracer.trace(&tlas, &rays, How::default())?;
-        HitComparison::of_shapes(&rays, &records, |ray| Sphere::closest(&expected, ray))
-            .assert(&format!("split boxes by {method:?}"));
+    spheres.check_hits(&ctx, &tlas, &placed, &rays, "split boxes", |records| {
         for hit in records.iter().filter(|record| record.kind != MISSED) {
             let (radius, tag) = GROUPS[1 - hit.instance as usize];
             assert_eq!((hit.kind, hit.barycentrics), (tag, [radius, tag as f32]));
         }
-    }
+    })?;
     Ok(())
 }
 

@@ -362,10 +362,11 @@ fn a_triangle_that_does_not_fit_is_an_error() -> Result<()> {
 /// Indices gathered for the parts are of no use once nothing can build them again.
 #[test]
 fn compaction_frees_what_only_builds_read() -> Result<()> {
-    let Some(ctx) = split_device() else { return Ok(()) };
-    if !requires_device_accel_structs(&ctx, "inputs that are gathered for parts") {
+    let Some(ctx) =
+        split_device().filter(|ctx| requires_device_accel_structs(ctx, "inputs that are gathered for parts"))
+    else {
         return Ok(());
-    }
+    };
     let (scene, check) = (scene(), HitCheck::new(&ctx)?);
     for (flags, freed) in [(BuildFlags::FAST_TRACE, true), (UPDATABLE, false)] {
         let gpu = scene.upload_with(&ctx, flags | BuildFlags::ALLOW_COMPACTION, UPDATABLE, 0)?;

@@ -13,7 +13,7 @@ use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{
     GpuScene, Layout, Part, Placed, RayScene, instances, upload_geometries, vertex_bytes,
 };
-use lvk_tests::ray_tracer::{How, Method, RayTracer};
+use lvk_tests::ray_tracer::{How, Method, RayTracer, for_each_method};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::vertex_deform::{VertexDeformer, deformed};
 
@@ -62,46 +62,40 @@ fn update(ctx: &Context, gpu: &GpuScene, scene: &RayScene, mode: BuildMode) -> R
 
 #[test]
 fn a_rebuild_takes_more_and_fewer_instances() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
-        let gpu = spiral(5, 0.0).upload_with(&ctx, BuildFlags::default(), BuildFlags::FAST_BUILD, 12)?;
+    for_each_method(|ctx, method, tracer| {
+        let gpu = spiral(5, 0.0).upload_with(ctx, BuildFlags::default(), BuildFlags::FAST_BUILD, 12)?;
         for (count, turn) in [(5, 0.0), (12, 0.5), (2, 1.0), (9, 1.5)] {
             let scene = spiral(count, turn);
-            update(&ctx, &gpu, &scene, BuildMode::Rebuild)?;
-            check(&format!("{count} instances by {method:?}"), &tracer, &gpu, &scene)?;
+            update(ctx, &gpu, &scene, BuildMode::Rebuild)?;
+            check(&format!("{count} instances by {method:?}"), tracer, &gpu, &scene)?;
         }
         let none = RayScene { placed: Vec::new(), ..spiral(2, 0.0) };
-        update(&ctx, &gpu, &none, BuildMode::Rebuild)?;
+        update(ctx, &gpu, &none, BuildMode::Rebuild)?;
         let records = tracer.trace(&gpu.tlas, &rays(), How::default())?;
         assert!(records.iter().all(|record| record.kind == 0), "there is nothing left to hit");
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 #[test]
 fn a_refit_moves_instances() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
-        let gpu = spiral(8, 0.0).upload_with(&ctx, BuildFlags::default(), UPDATABLE, 0)?;
+    for_each_method(|ctx, method, tracer| {
+        let gpu = spiral(8, 0.0).upload_with(ctx, BuildFlags::default(), UPDATABLE, 0)?;
         for turn in [0.4, 1.9] {
             let scene = spiral(8, turn);
-            update(&ctx, &gpu, &scene, BuildMode::Refit)?;
-            check(&format!("turned by {turn}, {method:?}"), &tracer, &gpu, &scene)?;
+            update(ctx, &gpu, &scene, BuildMode::Refit)?;
+            check(&format!("turned by {turn}, {method:?}"), tracer, &gpu, &scene)?;
         }
-    }
-    Ok(())
+        Ok(())
+    })
 }
 
 /// Refits that need not wait for each other, and two of one structure, which must; what they show before and after that
 /// is built, traced and destroyed in between.
 #[test]
 fn many_accel_structs_are_refitted_in_one_command_buffer() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
-        let upload = |turn| spiral(8, turn).upload_with(&ctx, UPDATABLE, UPDATABLE, 0);
+    for_each_method(|ctx, method, tracer| {
+        let upload = |turn| spiral(8, turn).upload_with(ctx, UPDATABLE, UPDATABLE, 0);
         let all = [0.0, 0.3, 0.6].into_iter().map(upload).collect::<Result<Vec<_>>>()?;
         let rays = rays();
         let jobs = all.iter().map(|_| tracer.job(&rays)).collect::<Result<Vec<_>>>()?;
@@ -131,7 +125,7 @@ fn many_accel_structs_are_refitted_in_one_command_buffer() -> Result<()> {
         let mut cmd = ctx.acquire_command_buffer()?;
         cmd.update_tlas(*all[1].tlas, &shown, BuildMode::Refit)?;
         ctx.submit(cmd)?;
-        check("shown by another", &tracer, &all[1], &spiral(8, 0.0))?;
+        check("shown by another", tracer, &all[1], &spiral(8, 0.0))?;
         let mut all = all;
         all[0].models.clear();
         let mut cmd = ctx.acquire_command_buffer()?;
@@ -139,9 +133,9 @@ fn many_accel_structs_are_refitted_in_one_command_buffer() -> Result<()> {
         assert!(matches!(refused, Err(lvk::Error::StaleHandle { .. })), "{refused:?}");
         cmd.update_tlas(*all[1].tlas, &instances(&spiral(8, 0.4).placed, &all[1].models), BuildMode::Refit)?;
         ctx.submit(cmd)?;
-        check("after its models are gone", &tracer, &all[1], &spiral(8, 0.4))?;
-    }
-    Ok(())
+        check("after its models are gone", tracer, &all[1], &spiral(8, 0.4))?;
+        Ok(())
+    })
 }
 
 #[test]
@@ -171,12 +165,10 @@ fn an_accel_struct_is_refitted_to_vertices_written_by_a_dispatch() -> Result<()>
 
 #[test]
 fn an_accel_struct_is_rebuilt_from_uploaded_vertices() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
+    for_each_method(|ctx, method, tracer| {
         let mut scene = deformable();
-        let gpu = scene.upload(&ctx)?;
-        check(&format!("before, by {method:?}"), &tracer, &gpu, &scene)?;
+        let gpu = scene.upload(ctx)?;
+        check(&format!("before, by {method:?}"), tracer, &gpu, &scene)?;
         scene.models[0][0].mesh = deformed(&scene.models[0][0].mesh, 0.6);
         let bytes = vertex_bytes(&scene.models[0][0].mesh, Layout::Indexed16);
         ctx.upload_buffer(*gpu.buffers[0].vertices, 0, &bytes)?;
@@ -184,9 +176,9 @@ fn an_accel_struct_is_rebuilt_from_uploaded_vertices() -> Result<()> {
         cmd.build_blas(&[*gpu.models[0]], BuildMode::Rebuild)?;
         cmd.update_tlas(*gpu.tlas, &instances(&scene.placed, &gpu.models), BuildMode::Rebuild)?;
         ctx.submit(cmd)?;
-        check(&format!("after, by {method:?}"), &tracer, &gpu, &scene)?;
-    }
-    Ok(())
+        check(&format!("after, by {method:?}"), tracer, &gpu, &scene)?;
+        Ok(())
+    })
 }
 
 /// One TLAS, one deforming BLAS and one vertex buffer for all frames, none of which waits for the frame before.
@@ -226,30 +218,26 @@ fn every_frame_in_flight_sees_its_own_state() -> Result<()> {
 /// Structures that the top level still shows outlive their holders.
 #[test]
 fn a_destroyed_blas_is_referenced_until_the_next_update() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
+    for_each_method(|ctx, method, tracer| {
         let scene = spiral(6, 0.2);
-        let mut gpu = scene.upload(&ctx)?;
+        let mut gpu = scene.upload(ctx)?;
         gpu.models.clear();
         gpu.buffers.clear();
         ctx.wait_idle()?;
-        check(&format!("destroyed models by {method:?}"), &tracer, &gpu, &scene)?;
-    }
-    Ok(())
+        check(&format!("destroyed models by {method:?}"), tracer, &gpu, &scene)?;
+        Ok(())
+    })
 }
 
 /// What a dropped command buffer would have shown is not shown, and what is shown stays alive.
 #[test]
 fn a_command_buffer_given_up_changes_nothing() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
+    for_each_method(|ctx, method, tracer| {
         let scene = deformable();
-        let mut gpu = scene.upload_with(&ctx, BuildFlags::default(), UPDATABLE, 4)?;
+        let mut gpu = scene.upload_with(ctx, BuildFlags::default(), UPDATABLE, 4)?;
         ctx.wait_idle()?;
         let other = spiral(3, 0.0);
-        let other_gpu = other.upload(&ctx)?;
+        let other_gpu = other.upload(ctx)?;
         let mut cmd = ctx.acquire_command_buffer()?;
         let others = instances(&other.placed, &other_gpu.models);
         cmd.update_tlas(*gpu.tlas, &others, BuildMode::Rebuild)?;
@@ -266,19 +254,17 @@ fn a_command_buffer_given_up_changes_nothing() -> Result<()> {
         drop(cmd);
         gpu.models.clear();
         ctx.wait_idle()?;
-        let _takes_its_place = scene.upload(&ctx)?;
-        check(&format!("given up, {method:?}"), &tracer, &gpu, &scene)?;
-    }
-    Ok(())
+        let _takes_its_place = scene.upload(ctx)?;
+        check(&format!("given up, {method:?}"), tracer, &gpu, &scene)?;
+        Ok(())
+    })
 }
 
 /// Two command buffers are recorded side by side; the first submitted changes how many instances the second refits.
 #[test]
 fn a_refit_overtaken_by_a_rebuild_of_another_count_is_refused() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    for method in Method::available(&ctx) {
-        let tracer = RayTracer::new(&ctx, method)?;
-        let gpu = spiral(3, 0.0).upload_with(&ctx, BuildFlags::default(), UPDATABLE, 4)?;
+    for_each_method(|ctx, method, tracer| {
+        let gpu = spiral(3, 0.0).upload_with(ctx, BuildFlags::default(), UPDATABLE, 4)?;
         let three = instances(&spiral(3, 0.0).placed, &gpu.models);
         let two = spiral(2, 1.0);
         let mut rebuild = ctx.acquire_command_buffer()?;
@@ -287,19 +273,20 @@ fn a_refit_overtaken_by_a_rebuild_of_another_count_is_refused() -> Result<()> {
         refit.update_tlas(*gpu.tlas, &three, BuildMode::Refit)?;
         ctx.submit(rebuild)?;
         assert!(matches!(ctx.submit(refit), Err(lvk::Error::InvalidUsage { .. })));
-        check(&format!("two are shown, {method:?}"), &tracer, &gpu, &two)?;
-    }
-    Ok(())
+        check(&format!("two are shown, {method:?}"), tracer, &gpu, &two)?;
+        Ok(())
+    })
 }
 
 /// A rebuild reads the indices again and a refit does not, where the library has put the triangles into an order: so
 /// empty triangles tell the two apart.
 #[test]
 fn builds_given_up_do_not_count_as_wear() -> Result<()> {
-    let Some(ctx) = device() else { return Ok(()) };
-    if !requires_device_accel_structs(&ctx, "indices that a refit does not read") {
+    let Some(ctx) =
+        device().filter(|ctx| requires_device_accel_structs(ctx, "indices that a refit does not read"))
+    else {
         return Ok(());
-    }
+    };
     let tracer = RayTracer::new(&ctx, Method::available(&ctx)[0])?;
     let ring = Mesh::torus(10);
     let count = ring.triangles.len();

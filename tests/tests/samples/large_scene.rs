@@ -7,24 +7,22 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
 
 use image::RgbaImage;
-use lvk::{Context, DeviceProfile, FeatureRequest, RayQueryRequest};
-use lvk_samples::app::headless;
+use lvk::{Context, DeviceProfile};
 use lvk_samples::app::progress::Progress;
-use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::app::scene_list::{self, FoundScene};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, LargeSceneError, Origin, Show, World};
 use lvk_samples::rtx::{RtxConfig, RtxError};
 use lvk_samples::scene::{ObjOptions, Scene};
 use lvk_tests::hybrid::paths;
-use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
+use lvk_tests::image_comparison::{
+    Tolerance, assert_matches_reference, assert_similar, assert_swiftshader_matches,
+};
+use lvk_tests::rtx_sample::{SIZE, contexts_and_paths, image_of, software_device};
 use lvk_tests::scene_obj::obj_scene;
-use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::warnings::{capture_warnings, take_warnings};
-use lvk_tests::{TestDevice, device, device_with};
+use lvk_tests::{device, device_with};
 
-/// No multiple of a work group.
-const SIZE: [u32; 2] = [158, 89];
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.999, differing_share: 0.01, flip: 2e-3 };
 /// On SwiftShader: its textures are filtered with fewer bits.
 const OTHER_FILTERS: Tolerance = Tolerance { psnr: 40.0, ssim: 0.99, differing_share: 0.4, flip: 0.05 };
@@ -37,11 +35,6 @@ fn make(ctx: &Context, world: &World, config: &LargeSceneConfig) -> LargeScene {
     LargeScene::new(ctx, world, config, &mut Progress::hidden()).unwrap()
 }
 
-fn image_of(sample: &mut LargeScene, frame: u32) -> RgbaImage {
-    sample.update(Moment::of_frame(frame, 100)).unwrap();
-    RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(sample).unwrap()).unwrap()
-}
-
 fn valley() -> World {
     World::valley(12_000, 40, &mut Progress::hidden()).unwrap()
 }
@@ -51,22 +44,10 @@ fn street() -> World {
     World::street(vec![obj_scene()], 2).unwrap()
 }
 
-fn software() -> Option<TestDevice> {
-    device_with(|desc| {
-        (desc.ray_tracing_pipeline, desc.ray_query) = (FeatureRequest::Off, RayQueryRequest::Software);
-    })
-}
-
-/// Every device and path there is here.
-fn contexts_and_paths<'a>(ctx: &'a Context, software: Option<&'a Context>) -> Vec<(&'a Context, RayPath)> {
-    let own = paths(ctx).into_iter().map(|path| (ctx, path));
-    own.chain(software.map(|ctx| (ctx, RayPath::Query))).collect()
-}
-
 #[test]
 fn instances_and_one_mesh_render_the_same_on_every_path() {
     let Some(ctx) = device() else { return };
-    let software = software();
+    let software = software_device();
     for world in [valley(), street()] {
         let combined = world.combined().unwrap();
         let mut first = None;
@@ -153,7 +134,7 @@ fn starts_build_once(ctx: &Context, path: RayPath, world: &World) {
 fn a_second_start_builds_nothing_and_damaged_files_are_dropped_with_a_warning() {
     capture_warnings();
     let Some(ctx) = device() else { return };
-    let software = software();
+    let software = software_device();
     for (ctx, path) in contexts_and_paths(&ctx, software.as_deref()) {
         starts_build_once(ctx, path, &valley());
     }
@@ -203,7 +184,7 @@ fn figures_say_what_compaction_saves() {
 #[test]
 fn numbers_are_rendered_the_same_on_every_path() {
     let Some(ctx) = device() else { return };
-    let software = software();
+    let software = software_device();
     for show in [Show::Instances, Show::Triangles] {
         let mut first: Option<RgbaImage> = None;
         for (ctx, path) in contexts_and_paths(&ctx, software.as_deref()) {
@@ -295,7 +276,7 @@ fn the_archives_make_a_street() {
     assert!(!small.is_empty(), "no small OBJ in {}", folder.display());
     let load = |path: &Path| Scene::from_obj(path, &ObjOptions::default(), &mut Progress::hidden()).unwrap();
     let world = World::street(small.iter().map(|scene| load(&scene.path)).collect(), 2).unwrap();
-    let software = software();
+    let software = software_device();
     let mut first = None;
     for (ctx, path) in contexts_and_paths(&ctx, software.as_deref()) {
         for world in [&world, &world.combined().unwrap()] {
@@ -308,16 +289,12 @@ fn the_archives_make_a_street() {
 
 #[test]
 fn a_driver_without_ray_tracing_renders_the_street() {
-    on_swiftshader(a_driver_without_ray_tracing_renders_the_street, || {
-        let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
-        let picture = image_of(&mut make(&ctx, &street(), &config(RayPath::Query)), 0);
-        assert_similar(
-            "SwiftShader street",
-            &picture,
-            &reference_image("large_scene_street"),
-            &OTHER_FILTERS,
-        );
-    });
+    assert_swiftshader_matches(
+        a_driver_without_ray_tracing_renders_the_street,
+        "large_scene_street",
+        &OTHER_FILTERS,
+        |ctx| image_of(&mut make(ctx, &street(), &config(RayPath::Query)), 0),
+    );
 }
 
 #[test]

@@ -5,7 +5,7 @@
 use image::RgbaImage;
 use image::imageops::{FilterType, resize};
 use lvk::glam::{DAffine3, DVec3, Vec3};
-use lvk::{Context, FeatureRequest, RayQueryRequest};
+use lvk::{Context, RayQueryRequest};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hybrid::RayPath;
@@ -18,8 +18,9 @@ use lvk_tests::image_comparison::{
 };
 use lvk_tests::rays::Ray;
 use lvk_tests::reference::{Geometry, Hit, Instance, Reference};
+use lvk_tests::rtx_sample::software_device;
 use lvk_tests::subprocess::on_swiftshader;
-use lvk_tests::{TestDevice, device, device_with};
+use lvk_tests::{device, device_with};
 
 /// No multiple of a work group.
 const SIZE: [u32; 2] = [158, 89];
@@ -38,15 +39,9 @@ fn render_image(town: &mut RtxAo) -> RgbaImage {
     RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(town).unwrap()).unwrap()
 }
 
-fn software() -> Option<TestDevice> {
-    device_with(|desc| {
-        (desc.ray_tracing_pipeline, desc.ray_query) = (FeatureRequest::Off, RayQueryRequest::Software);
-    })
-}
-
 #[test]
 fn all_paths_render_the_town() {
-    let (Some(ctx), Some(other)) = (device(), software()) else { return };
+    let (Some(ctx), Some(other)) = (device(), software_device()) else { return };
     let mut all: Vec<_> = paths(&ctx).into_iter().map(|path| town(&ctx, path, 2, 1)).collect();
     all.push(town(&other, RayPath::Query, 2, 1));
     for phase in [0, 3] {
@@ -63,7 +58,7 @@ fn all_paths_render_the_town() {
 
 #[test]
 fn the_cache_forgets_what_has_moved() {
-    let Some(ctx) = software() else { return };
+    let Some(ctx) = software_device() else { return };
     let mut town = town(&ctx, RayPath::Query, 2, 1);
     let start = *town.shown();
     let first = render_image(&mut town);
@@ -179,7 +174,7 @@ fn mean_error(openness: &[f32], expected: &[([u32; 2], f64)]) -> f64 {
 
 #[test]
 fn it_converges_to_the_reference() {
-    let Some(ctx) = software() else { return };
+    let Some(ctx) = software_device() else { return };
     let mut town = town(&ctx, RayPath::Query, 6, 4);
     let mut shown = None;
     let mut after = |passes: u32| {
@@ -219,7 +214,7 @@ fn small(picture: &RgbaImage) -> RgbaImage {
 /// What the next test asks of another driver.
 #[test]
 fn few_passes_render_the_same_but_for_noise_and_nothing_else_does() {
-    let Some(ctx) = software() else { return };
+    let Some(ctx) = software_device() else { return };
     let expected = small(&reference_image("rtx_ao_small"));
     let noisy = small(&render_image(&mut town(&ctx, RayPath::Query, 2, 2)));
     assert_similar("town by few passes", &noisy, &expected, &OTHER_NOISE);

@@ -1,47 +1,26 @@
 //! The pictures of the `rtx_hello` sample: its ways of tracing agree, its triangles turn, and they look as ever.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use image::RgbaImage;
-use lvk::{Context, FeatureRequest, RayQueryRequest};
-use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk::Context;
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
 use lvk_samples::rtx_hello::{Following, RtxHello};
+use lvk_tests::device;
 use lvk_tests::hybrid::paths;
-use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
-use lvk_tests::subprocess::on_swiftshader;
-use lvk_tests::{device, device_with};
+use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_swiftshader_matches};
+use lvk_tests::raster_sample::ROUND;
+use lvk_tests::rtx_sample::{SIZE, assert_paths_agree, image_of};
 
-/// No multiple of a work group.
-const SIZE: [u32; 2] = [158, 89];
 const SAME_RAYS: Tolerance = Tolerance { psnr: 55.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
-/// Frames of a round of the animation.
-const ROUND: u32 = 100;
 
 fn hello(ctx: &Context, path: RayPath) -> RtxHello {
     RtxHello::new(ctx, &RtxConfig { path, width: SIZE[0], height: SIZE[1] }).unwrap()
 }
 
-fn image_of(hello: &mut RtxHello, frame: u32) -> RgbaImage {
-    hello.update(Moment::of_frame(frame, ROUND)).unwrap();
-    RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(hello).unwrap()).unwrap()
-}
-
 #[test]
 fn all_paths_follow_the_triangles() {
     let Some(ctx) = device() else { return };
-    let software = device_with(|desc| {
-        (desc.ray_tracing_pipeline, desc.ray_query) = (FeatureRequest::Off, RayQueryRequest::Software);
-    });
-    let mut all: Vec<_> = paths(&ctx).into_iter().map(|path| hello(&ctx, path)).collect();
-    all.extend(software.as_deref().map(|ctx| hello(ctx, RayPath::Query)));
-    for frame in [0, 17, 50] {
-        let pictures: Vec<_> = all.iter_mut().map(|hello| image_of(hello, frame)).collect();
-        for other in &pictures[1..] {
-            assert_similar(&format!("triangles in frame {frame}"), other, &pictures[0], &SAME_RAYS);
-        }
-    }
+    assert_paths_agree("triangles", &ctx, &[0, 17, 50], &SAME_RAYS, hello);
 }
 
 /// More frames than refits between two rebuilds.
@@ -84,11 +63,12 @@ fn the_triangles_look_as_they_always_did() {
 
 #[test]
 fn a_driver_without_ray_tracing_renders_the_triangles() {
-    on_swiftshader(a_driver_without_ray_tracing_renders_the_triangles, || {
-        let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
-        let picture = image_of(&mut hello(&ctx, RayPath::Query), 0);
-        assert_similar("SwiftShader triangles", &picture, &reference_image("rtx_hello_small"), &SAME_RAYS);
-    });
+    assert_swiftshader_matches(
+        a_driver_without_ray_tracing_renders_the_triangles,
+        "rtx_hello_small",
+        &SAME_RAYS,
+        |ctx| image_of(&mut hello(ctx, RayPath::Query), 0),
+    );
 }
 
 #[test]

@@ -2,21 +2,18 @@
 //! too, and they look as ever.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use image::RgbaImage;
-use lvk::{Context, DeviceProfile, FeatureRequest, RayQueryRequest};
-use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk::{Context, DeviceProfile};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
 use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig, RtxPipelineSwitches};
 use lvk_tests::hybrid::paths;
-use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
+use lvk_tests::image_comparison::{
+    Tolerance, assert_matches_reference, assert_similar, assert_swiftshader_matches,
+};
+use lvk_tests::rtx_sample::{SIZE, assert_paths_agree, image_of};
 use lvk_tests::scene_obj::obj_scene;
-use lvk_tests::subprocess::on_swiftshader;
 use lvk_tests::{device, device_with};
 
-/// No multiple of a work group.
-const SIZE: [u32; 2] = [158, 89];
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.999, differing_share: 3e-3, flip: 2e-3 };
 /// On SwiftShader: its textures are filtered with fewer bits.
 const OTHER_FILTERS: Tolerance = Tolerance { psnr: 40.0, ssim: 0.99, differing_share: 0.4, flip: 0.05 };
@@ -26,24 +23,12 @@ fn still(ctx: &Context, path: RayPath, depth: u32) -> RtxPipeline {
     RtxPipeline::new(ctx, &obj_scene(), &RtxPipelineConfig { rtx, depth }).unwrap()
 }
 
-fn image_of(sample: &mut RtxPipeline, frame: u32) -> RgbaImage {
-    sample.update(Moment::of_frame(frame, 100)).unwrap();
-    RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(sample).unwrap()).unwrap()
-}
-
 #[test]
 fn recursion_and_loops_render_the_same() {
     let Some(ctx) = device() else { return };
-    let software = device_with(|desc| {
-        (desc.ray_tracing_pipeline, desc.ray_query) = (FeatureRequest::Off, RayQueryRequest::Software);
-    });
     for depth in [0, 3] {
-        let mut all: Vec<_> = paths(&ctx).into_iter().map(|path| still(&ctx, path, depth)).collect();
-        all.extend(software.as_deref().map(|ctx| still(ctx, RayPath::Query, depth)));
-        let pictures: Vec<_> = all.iter_mut().map(|sample| image_of(sample, 20)).collect();
-        for other in &pictures[1..] {
-            assert_similar(&format!("still life at depth {depth}"), other, &pictures[0], &SAME_RAYS);
-        }
+        let what = format!("still life at depth {depth}");
+        assert_paths_agree(&what, &ctx, &[20], &SAME_RAYS, |ctx, path| still(ctx, path, depth));
     }
 }
 
@@ -103,16 +88,12 @@ fn no_deeper_than_the_device_can() {
 
 #[test]
 fn a_driver_without_ray_tracing_renders_the_obj_scene() {
-    on_swiftshader(a_driver_without_ray_tracing_renders_the_obj_scene, || {
-        let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
-        let picture = image_of(&mut still(&ctx, RayPath::Query, 4), 0);
-        assert_similar(
-            "SwiftShader still life",
-            &picture,
-            &reference_image("rtx_pipeline_small"),
-            &OTHER_FILTERS,
-        );
-    });
+    assert_swiftshader_matches(
+        a_driver_without_ray_tracing_renders_the_obj_scene,
+        "rtx_pipeline_small",
+        &OTHER_FILTERS,
+        |ctx| image_of(&mut still(ctx, RayPath::Query, 4), 0),
+    );
 }
 
 #[test]

@@ -1,49 +1,28 @@
 //! The pictures of the `rtx_textures` sample: its ways of tracing agree, its instances move, and they look as ever.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
-use image::RgbaImage;
-use lvk::{Context, FeatureRequest, RayQueryRequest};
-use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk::Context;
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
 use lvk_samples::rtx_textures::{RtxTextures, RtxTexturesSwitches};
+use lvk_tests::device;
 use lvk_tests::hybrid::paths;
-use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
-use lvk_tests::subprocess::on_swiftshader;
-use lvk_tests::{device, device_with};
+use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_swiftshader_matches};
+use lvk_tests::raster_sample::ROUND;
+use lvk_tests::rtx_sample::{SIZE, assert_paths_agree, image_of};
 
-/// No multiple of a work group.
-const SIZE: [u32; 2] = [158, 89];
 const SAME_RAYS: Tolerance = Tolerance { psnr: 55.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
 /// On SwiftShader: its textures are filtered with fewer bits.
 const OTHER_FILTERS: Tolerance = Tolerance { psnr: 42.0, ssim: 0.998, differing_share: 0.35, flip: 0.05 };
-/// Frames of a round of the animation.
-const ROUND: u32 = 100;
 
 fn waves(ctx: &Context, path: RayPath) -> RtxTextures {
     RtxTextures::new(ctx, &RtxConfig { path, width: SIZE[0], height: SIZE[1] }).unwrap()
 }
 
-fn image_of(waves: &mut RtxTextures, frame: u32) -> RgbaImage {
-    waves.update(Moment::of_frame(frame, ROUND)).unwrap();
-    RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(waves).unwrap()).unwrap()
-}
-
 #[test]
 fn all_paths_render_the_waves() {
     let Some(ctx) = device() else { return };
-    let software = device_with(|desc| {
-        (desc.ray_tracing_pipeline, desc.ray_query) = (FeatureRequest::Off, RayQueryRequest::Software);
-    });
-    let mut all: Vec<_> = paths(&ctx).into_iter().map(|path| waves(&ctx, path)).collect();
-    all.extend(software.as_deref().map(|ctx| waves(ctx, RayPath::Query)));
-    for frame in [0, 30] {
-        let pictures: Vec<_> = all.iter_mut().map(|waves| image_of(waves, frame)).collect();
-        for other in &pictures[1..] {
-            assert_similar(&format!("waves in frame {frame}"), other, &pictures[0], &SAME_RAYS);
-        }
-    }
+    assert_paths_agree("waves", &ctx, &[0, 30], &SAME_RAYS, waves);
 }
 
 #[test]
@@ -90,11 +69,12 @@ fn the_waves_look_as_they_always_did() {
 
 #[test]
 fn a_driver_without_ray_tracing_renders_the_waves() {
-    on_swiftshader(a_driver_without_ray_tracing_renders_the_waves, || {
-        let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
-        let picture = image_of(&mut waves(&ctx, RayPath::Query), 0);
-        assert_similar("SwiftShader waves", &picture, &reference_image("rtx_textures_small"), &OTHER_FILTERS);
-    });
+    assert_swiftshader_matches(
+        a_driver_without_ray_tracing_renders_the_waves,
+        "rtx_textures_small",
+        &OTHER_FILTERS,
+        |ctx| image_of(&mut waves(ctx, RayPath::Query), 0),
+    );
 }
 
 #[test]

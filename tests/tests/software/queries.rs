@@ -182,7 +182,7 @@ fn queries_that_take_turns_do_not_disturb_each_other() -> Result<()> {
         let text = TURNS.replace("ALTERNATE(index)", when);
         let module = shader(&ctx, ShaderStage::Compute, &text)?;
         let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-        let tracer = RayTracer::of_query(&ctx, ctx.create_compute_pipeline(&desc)?);
+        let tracer = RayTracer::from_query(&ctx, ctx.create_compute_pipeline(&desc)?);
         tracer.trace(&gpu.tlas, &rays, How::default())
     };
     let (in_turns, one_after_the_other) = (records("true")?, records("!goesA")?);
@@ -239,7 +239,7 @@ fn a_query_may_begin_anew_wherever_it_was() -> Result<()> {
     let records = |turns: &str| -> Result<Vec<HitRecord>> {
         let module = shader(&ctx, ShaderStage::Compute, &ANEW.replace("TURNS(index)", turns))?;
         let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-        let tracer = RayTracer::of_query(&ctx, ctx.create_compute_pipeline(&desc)?);
+        let tracer = RayTracer::from_query(&ctx, ctx.create_compute_pipeline(&desc)?);
         tracer.trace(&gpu.tlas, &rays, How::default())
     };
     let fresh = records("0u")?;

@@ -3,11 +3,11 @@
 use std::collections::HashMap;
 
 use lvk::glam::{Affine3A, Quat, Vec3};
-use lvk::{BuildFlags, ComputePipelineDesc, Context, GeometryFlags, RayQueryRequest, Result, ShaderStage};
+use lvk::{BuildFlags, Context, GeometryFlags, RayQueryRequest, Result};
 use lvk_tests::meshes::Mesh;
 use lvk_tests::random::Random;
 use lvk_tests::ray_scene::{BUILD_FLAGS, GpuScene, Layout, Part, Placed, RayScene};
-use lvk_tests::ray_tracer::{How, MISSED, Method, RayTracer, shader};
+use lvk_tests::ray_tracer::{How, MISSED, Method, RayTracer};
 use lvk_tests::rays::Ray;
 use lvk_tests::{TestDevice, device_with};
 
@@ -264,9 +264,7 @@ fn records_counter(ctx: &Context) -> Result<RayTracer> {
                 hits.at[gl_GlobalInvocationID.x] = record;
             }
         }"#;
-    let module = shader(ctx, ShaderStage::Compute, TEXT)?;
-    let desc = ComputePipelineDesc { module: Some(*module), ..Default::default() };
-    Ok(RayTracer::of_query(ctx, ctx.create_compute_pipeline(&desc)?))
+    RayTracer::from_query_text(ctx, TEXT, &[])
 }
 
 /// A third of the rays goes to insides of triangles, and a third to edges, where rounding decides on which side they leave.
