@@ -1,5 +1,5 @@
-//! What stands behind the handles of acceleration structures. Where the device has none of its own, that is what software
-//! traces alone: one part in the order given, of the size it needs.
+//! Backends of acceleration structures. On a device without ray tracing an acceleration structure is a software BVH
+//! alone: one part, in the given order, of the size that it needs.
 
 use std::fmt::Debug;
 use std::ops::RangeBounds;
@@ -8,7 +8,7 @@ use lvk::{AccelStructHandle, Context, ContextDesc, DeviceProfile, RayQueryPath, 
 
 use crate::{TestDevice, device_with};
 
-/// A context without structures of the device's own, whatever the device has: software traces them.
+/// Creates a context whose acceleration structures are software BVHs alone, on any device.
 pub fn software_alone(adjust: impl FnOnce(&mut ContextDesc<'_>)) -> Option<TestDevice> {
     let profile = DeviceProfile::no_ray_tracing();
     device_with(|desc| {
@@ -18,8 +18,8 @@ pub fn software_alone(adjust: impl FnOnce(&mut ContextDesc<'_>)) -> Option<TestD
     })
 }
 
-/// A context as others, and one that takes so many primitives in a structure, where that makes a difference: what software
-/// traces alone is never split.
+/// Creates a context, and one whose BLASes take at most `primitives` primitives, where the device builds acceleration
+/// acceleration structures: a software BVH is never split.
 pub fn whole_and_split(primitives: u64) -> Vec<TestDevice> {
     let profile = DeviceProfile {
         name: "small structures".into(),
@@ -31,14 +31,13 @@ pub fn whole_and_split(primitives: u64) -> Vec<TestDevice> {
     device_with(|_| ()).into_iter().chain(split).collect()
 }
 
-/// Whether the device builds structures of its own, whoever walks ray queries.
+/// True if the device builds acceleration structures, whether or not its own ray queries are used.
 pub fn builds_device_accel_structs(ctx: &Context) -> bool {
     let caps = ctx.capabilities();
     caps.ray_tracing_pipeline || caps.ray_query_path == RayQueryPath::Hardware
 }
 
-/// As [`builds_device_accel_structs`], for tests of what only the device's own are subject to; says what is not tested where there are
-/// none.
+/// As [`builds_device_accel_structs`], for tests that need such a device. Prints what is not tested if it is none.
 pub fn requires_device_accel_structs(ctx: &Context, what: &str) -> bool {
     let has = builds_device_accel_structs(ctx);
     if !has {
@@ -47,10 +46,10 @@ pub fn requires_device_accel_structs(ctx: &Context, what: &str) -> bool {
     has
 }
 
-/// Answers of how many parts a structure consists.
+/// Returns the number of parts of a BLAS.
 ///
 /// # Panics
-/// When that is not `expected`, or not one where there are no structures of the device's own.
+/// When the number is not in `expected`, or not 1 on a device that builds no acceleration structures.
 #[track_caller]
 pub fn expect_parts(
     ctx: &Context,

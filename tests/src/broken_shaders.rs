@@ -1,5 +1,5 @@
-//! Shaders broken on purpose, to show that somebody would notice: in a process of its own, whose samples take their GLSL
-//! from a copy of `shaders/` that is changed and mended again (`LVK_SHADERS`).
+//! Shaders broken on purpose, to show that a test would notice. The test runs in a process of its own, whose samples
+//! take their GLSL from a copy of `shaders/` that is changed and restored (`LVK_SHADERS`).
 #![expect(clippy::expect_used, reason = "a test that cannot change its shaders has failed")]
 
 use std::ffi::OsStr;
@@ -16,17 +16,17 @@ use crate::subprocess::in_subprocess;
 /// A change that breaks a shader.
 #[derive(Debug, Clone, Copy)]
 pub struct Mistake {
-    /// What is wrong then.
+    /// Description of the mistake.
     pub what: &'static str,
-    /// The file below `shaders/`.
+    /// File below `shaders/`.
     pub file: &'static str,
-    /// What the file says, once.
+    /// Text to replace, which the file has once.
     pub right: &'static str,
-    /// What it says instead.
+    /// Replacement.
     pub wrong: &'static str,
 }
 
-/// Shorter than naming all fields.
+/// Creates a [`Mistake`].
 #[must_use]
 pub const fn mistake(
     what: &'static str,
@@ -37,14 +37,14 @@ pub const fn mistake(
     Mistake { what, file, right, wrong }
 }
 
-/// The copy of `shaders/`.
+/// Copy of `shaders/`.
 pub struct BrokenShaders {
     folder: PathBuf,
 }
 
 impl BrokenShaders {
-    /// Runs `body` in a process of its own with a copy of the shaders; `test` as for [`in_subprocess`]. Most of the time goes
-    /// into compiling, so lavapipe is told not to optimise, and keeps what it compiles apart from what is optimised.
+    /// Runs `body` in a process of its own with a copy of the shaders; `test` as for [`in_subprocess`]. Compiling
+    /// takes most of the time, so lavapipe is told not to optimise, and has a shader cache of its own.
     ///
     /// # Panics
     /// As [`in_subprocess`], and when the files cannot be copied.
@@ -64,8 +64,8 @@ impl BrokenShaders {
         });
     }
 
-    /// Breaks the shaders in each way, one after the other, and takes a picture that must not be within `tolerance` of
-    /// the expected one, as the first picture, by whole shaders, must.
+    /// Breaks the shaders in each way, one after the other, and renders an image that must not be within `tolerance`
+    /// of the expected one. The first image, by whole shaders, must be.
     ///
     /// # Panics
     /// When a mistake goes unnoticed, or does not fit its file.
@@ -75,14 +75,14 @@ impl BrokenShaders {
         expected: &RgbaImage,
         tolerance: &Tolerance,
         mistakes: &[Mistake],
-        picture: impl Fn() -> RgbaImage,
+        image: impl Fn() -> RgbaImage,
     ) {
-        let whole = ImageSimilarity::measure(&picture(), expected);
+        let whole = ImageSimilarity::measure(&image(), expected);
         eprintln!("{by}, whole: {whole}");
-        assert!(whole.is_within(tolerance), "{by}: whole shaders give another picture: {whole}");
+        assert!(whole.is_within(tolerance), "{by}: whole shaders give another image: {whole}");
         let mut complaints = Vec::new();
         for mistake in mistakes {
-            let broken = match self.with(mistake, &picture) {
+            let broken = match self.with(mistake, &image) {
                 Ok(broken) => broken,
                 Err(misfit) => {
                     complaints.push(misfit);
@@ -98,8 +98,8 @@ impl BrokenShaders {
         assert!(complaints.is_empty(), "{by}:\n{}", complaints.join("\n"));
     }
 
-    /// The picture by shaders with that mistake, or why it does not fit its file.
-    fn with(&self, mistake: &Mistake, picture: &impl Fn() -> RgbaImage) -> Result<RgbaImage, String> {
+    /// Renders the image by shaders with that mistake, or returns why the mistake does not fit its file.
+    fn with(&self, mistake: &Mistake, image: &impl Fn() -> RgbaImage) -> Result<RgbaImage, String> {
         let Mistake { what, file, right, wrong } = mistake;
         let path = self.folder.join(file);
         let text = fs::read_to_string(&path).expect("the file of a mistake is there");
@@ -108,20 +108,20 @@ impl BrokenShaders {
             return Err(format!("{what}: {right} is {count} times in {file}"));
         }
         fs::write(&path, text.replace(right, wrong)).expect("the copy can be written");
-        let broken = picture();
+        let broken = image();
         fs::write(&path, text).expect("the copy can be written");
         Ok(broken)
     }
 }
 
-/// Fills a picture with a colour that no sample shows. Memory keeps what was there before, and a pixel that a broken shader
-/// leaves out would else be right where the picture before was.
+/// Fills an image with a colour that no sample renders. Memory keeps its contents, so a pixel that a broken shader
+/// leaves out could have the colour of an earlier image.
 ///
 /// # Panics
 /// When the device fails.
-pub fn paint_over(ctx: &Context, picture: TextureHandle) {
+pub fn paint_over(ctx: &Context, image: TextureHandle) {
     let mut cmd = ctx.acquire_command_buffer().expect("a command buffer can be had");
-    cmd.clear_texture(picture, ClearValue::Color([1.0, 0.0, 1.0, 1.0]), &TextureRange::default())
+    cmd.clear_texture(image, ClearValue::Color([1.0, 0.0, 1.0, 1.0]), &TextureRange::default())
         .expect("pictures can be cleared");
     let submitted = ctx.submit(cmd).expect("the device works");
     ctx.wait(submitted).expect("the device works");

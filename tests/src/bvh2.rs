@@ -1,12 +1,12 @@
-//! A tree of nodes of two children without boxes, as a refit finds it: order and ids are there, places are not.
+//! A BVH2 blob before a refit: its order and ids are valid, its bounds are not.
 
 use crate::bvh8::assemble;
 
-/// Primitives of a leaf.
+/// Number of primitives of a leaf.
 const LEAF: usize = 3;
 const NODE_WORDS: usize = 16;
 
-/// The words of a structure of `count` triangles of one geometry, at least one, in their own order.
+/// Returns the words of a BLAS blob of `count` triangles of one geometry, at least one, in their own order.
 pub fn bvh2_blob(count: usize) -> Vec<u32> {
     let mut nodes = Vec::new();
     let root = append_subtree(0, count, &mut nodes);
@@ -15,7 +15,7 @@ pub fn bvh2_blob(count: usize) -> Vec<u32> {
     words
 }
 
-/// The reference to a range of triangles: a leaf, or a node that is made.
+/// Appends the nodes of a range of triangles, and returns the reference to their root or leaf.
 fn append_subtree(first: usize, count: usize, nodes: &mut Vec<[u32; NODE_WORDS]>) -> u32 {
     if count <= LEAF {
         return 1 << 31 | (count as u32 - 1) << 27 | first as u32;

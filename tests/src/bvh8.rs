@@ -1,13 +1,13 @@
-//! A tree of wide nodes without boxes, as a refit finds it: order and ids are there, places are not.
+//! A BVH8 blob before a refit: its order and ids are valid, its bounds are not.
 
-/// Primitives of a leaf.
+/// Number of primitives of a leaf.
 const LEAF: usize = 3;
 const CHILDREN: usize = 8;
 const NODE_WORDS: usize = 20;
 const HEADER_WORDS: usize = 32;
 
-/// The words of a structure of `count` triangles of one geometry, in their own order. Most nodes have both nodes and
-/// leaves below them, and some children that are missing.
+/// Returns the words of a BLAS blob of `count` triangles of one geometry, in their own order. Most nodes have nodes,
+/// leaves and missing children.
 pub fn bvh8_blob(count: usize) -> Vec<u32> {
     let mut nodes: Vec<[u32; NODE_WORDS]> = Vec::new();
     let mut open = std::collections::VecDeque::from([(0, count)]);
@@ -37,7 +37,8 @@ pub fn bvh8_blob(count: usize) -> Vec<u32> {
     assemble(count, &nodes)
 }
 
-/// Leaves only where all fits into them, else six nodes and two leaves behind them, as far as there are triangles.
+/// Returns the sizes of a node's children: leaves alone if they hold all triangles, else six nodes and two leaves, as
+/// far as there are triangles.
 fn child_sizes(count: usize) -> [usize; CHILDREN] {
     let mut left = count;
     let mut take = |size: usize| {
@@ -52,7 +53,7 @@ fn child_sizes(count: usize) -> [usize; CHILDREN] {
     std::array::from_fn(|child| take(if child < CHILDREN - 2 { share.min(count) } else { LEAF }))
 }
 
-/// A structure of these nodes, the root of which is the first.
+/// Returns the blob of these nodes. The first one is the root.
 pub(crate) fn assemble<const WORDS: usize>(count: usize, nodes: &[[u32; WORDS]]) -> Vec<u32> {
     let mut words = vec![0; HEADER_WORDS];
     let mut add = |part: &mut dyn Iterator<Item = u32>| -> u32 {

@@ -1,20 +1,21 @@
-//! Whether hit records say what the reference says.
+//! Comparison of hit records with the reference.
 
 use crate::ray_tracer::{BACK, FRONT, HitRecord, MISSED};
 use crate::rays::Ray;
 use crate::reference::{Answer, Hit, HitIds};
 
-/// Relative to the distance, or to 1, or to an eighth of the largest coordinate the ray starts at, whichever is most: far
-/// from the origin the device's floats are no finer.
+/// Tolerance of distances, relative to the largest of the distance, 1, and an eighth of the largest coordinate of the
+/// ray's origin: far from the origin f32 is no finer.
 const DISTANCE: f64 = 1e-5;
-/// Relative to the largest coordinate the ray starts at: rounding of a ray that is taken to an instance's space.
+/// Tolerance relative to the largest coordinate of the ray's origin: rounding when a ray is transformed to object
+/// space.
 const PLACE: f64 = 1e-6;
 const BARYCENTRICS: f64 = 2e-4;
-/// Most of the rays may not be left out: one in so many.
+/// The reference may leave out one of this many rays.
 const EXCLUDED_SHARE: usize = 50;
 const MISTAKES_PRINTED: usize = 5;
 
-/// The outcome of a comparison.
+/// Result of a comparison.
 #[derive(Debug, Clone, Default)]
 pub struct HitComparison {
     /// Rays compared or left out.
@@ -23,7 +24,7 @@ pub struct HitComparison {
     pub excluded: usize,
     /// Compared rays that hit something, by the reference.
     pub hits: usize,
-    /// What is wrong, a line each.
+    /// Differences, a line each.
     pub mistakes: Vec<String>,
 }
 
@@ -44,7 +45,7 @@ impl HitComparison {
         })
     }
 
-    /// Compares whether there is a hit.
+    /// Compares whether rays hit anything.
     pub fn of_occlusion(
         rays: &[Ray],
         records: &[HitRecord],
@@ -77,7 +78,7 @@ impl HitComparison {
         agreement
     }
 
-    /// Takes in another comparison.
+    /// Adds the results of another comparison.
     pub fn add(&mut self, other: Self) {
         self.rays += other.rays;
         self.excluded += other.excluded;
@@ -85,7 +86,7 @@ impl HitComparison {
         self.mistakes.extend(other.mistakes);
     }
 
-    /// Fails the test unless nothing is wrong, few rays were left out, and at least a twentieth hit something.
+    /// Asserts that nothing differs, few rays were left out, and at least a twentieth hit something.
     ///
     /// # Panics
     /// As said.
@@ -133,7 +134,7 @@ fn triangle_mistake(ray: &Ray, record: &HitRecord, answer: &Answer) -> Option<St
     (record.kind != kind).then(|| format!("hit kind {:#x}, must be {kind:#x}", record.kind))
 }
 
-/// `false` for anything that is not a number.
+/// Returns `false` for NaN.
 fn within(found: f64, expected: f64, tolerance: f64) -> bool {
     (found - expected).abs() <= tolerance
 }

@@ -1,12 +1,12 @@
-//! Pictures by the `hybrid` sample.
-#![expect(clippy::expect_used, reason = "a test without its picture has failed")]
+//! Images of the `hybrid` sample.
+#![expect(clippy::expect_used, reason = "a test without its image has failed")]
 
 use image::RgbaImage;
 use lvk::Context;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, Method, RayPath};
 use lvk_samples::scene::{Camera, Scene};
 
-/// The sample with one configuration, ready to take pictures of a scene.
+/// The sample with one configuration of a scene.
 pub struct HybridHarness {
     /// The sample.
     pub renderer: HybridRenderer,
@@ -14,10 +14,10 @@ pub struct HybridHarness {
 }
 
 impl HybridHarness {
-    /// A harness for pictures of `size` pixels and rays of up to `max_depth` bounces.
+    /// Creates the sample for images of `size` pixels and rays of up to `max_depth` bounces.
     ///
     /// # Panics
-    /// When the sample refuses.
+    /// When the sample cannot be created.
     pub fn new(
         ctx: &Context,
         scene: &Scene,
@@ -30,27 +30,27 @@ impl HybridHarness {
         Self::with(ctx, scene, &config)
     }
 
-    /// A harness for pictures as `config` has them.
+    /// Creates the sample with `config`.
     ///
     /// # Panics
-    /// When the sample refuses.
+    /// When the sample cannot be created.
     pub fn with(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Self {
         let renderer = HybridRenderer::new(ctx, scene, config).expect("the sample can be set up");
         Self { renderer, size: [config.width, config.height] }
     }
 
-    /// Takes a picture.
+    /// Renders an image.
     ///
     /// # Panics
     /// When rendering fails.
     pub fn render(&mut self, camera: &Camera) -> RgbaImage {
         self.renderer.render(camera).expect("the sample renders");
-        let pixels = self.renderer.read_image().expect("the picture can be read");
-        RgbaImage::from_raw(self.size[0], self.size[1], pixels).expect("a picture has four bytes a pixel")
+        let pixels = self.renderer.read_image().expect("the image can be read");
+        RgbaImage::from_raw(self.size[0], self.size[1], pixels).expect("an image has four bytes a pixel")
     }
 }
 
-/// The paths the device has; says loudly which one is not tested.
+/// Returns the ray paths of the device. Prints which one is not tested.
 ///
 /// # Panics
 /// When it has none.

@@ -1,4 +1,4 @@
-//! Pictures that tests render: how alike two are, and what to look at when they are not.
+//! Comparison of rendered images, and files that show where they differ.
 #![expect(clippy::expect_used, reason = "a test that cannot compare pictures has failed")]
 
 use std::collections::HashSet;
@@ -12,7 +12,7 @@ use nv_flip::FlipImageRgb8;
 use crate::device_with;
 use crate::subprocess::on_swiftshader;
 
-/// How much two pictures may differ; the defaults ask for nothing.
+/// Largest difference of two images; the default allows any.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance {
     /// Least peak signal-to-noise ratio in dB.
@@ -26,7 +26,7 @@ pub struct Tolerance {
 }
 
 impl Tolerance {
-    /// Of a picture and the same one by another driver, years ago.
+    /// An image and its reference by another driver.
     pub const ACROSS_DRIVERS: Self = Self { psnr: 46.0, ssim: 0.995, differing_share: 0.03, flip: 0.012 };
 }
 
@@ -36,17 +36,17 @@ impl Default for Tolerance {
     }
 }
 
-/// What was measured of two pictures.
+/// Measured similarity of two images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImageSimilarity {
     /// Pixel by pixel.
     pub difference: Difference,
-    /// Mean of NVIDIA's FLIP error: 0 for pictures that look the same, 1 for black beside white.
+    /// Mean of NVIDIA's FLIP error: 0 for images that look the same, 1 for black beside white.
     pub flip: f32,
 }
 
 impl ImageSimilarity {
-    /// Measures two pictures.
+    /// Measures two images.
     ///
     /// # Panics
     /// When their sizes differ.
@@ -59,7 +59,7 @@ impl ImageSimilarity {
         Self { difference, flip: errors.iter().sum::<f32>() / errors.len() as f32 }
     }
 
-    /// Whether the pictures are as alike as `tolerance` asks.
+    /// True if the images are within `tolerance`.
     pub fn is_within(&self, tolerance: &Tolerance) -> bool {
         self.difference.psnr >= tolerance.psnr
             && self.difference.ssim >= tolerance.ssim
@@ -74,7 +74,7 @@ impl std::fmt::Display for ImageSimilarity {
     }
 }
 
-/// Fails the test unless the pictures are as alike as `tolerance` asks. Both and their differences are then left in
+/// Asserts that two images are within `tolerance`. If not, both and their difference are written to
 /// `target/test-images`, under names that begin with `what`.
 ///
 /// # Panics
@@ -94,7 +94,7 @@ pub fn assert_similar(what: &str, actual: &RgbaImage, expected: &RgbaImage, tole
     assert!(similarity.is_within(tolerance), "{what}: {similarity}; wanted {tolerance:?}; see\n  {files}");
 }
 
-/// Writes a picture to `target/test-images` and returns its path.
+/// Writes an image to `target/test-images` and returns its path.
 ///
 /// # Panics
 /// When it cannot be written.
@@ -107,7 +107,7 @@ pub fn write_test_image(name: &str, picture: &RgbaImage) -> PathBuf {
     path
 }
 
-/// The picture of that name in `tests/reference`.
+/// Returns the image of that name in `tests/reference`.
 ///
 /// # Panics
 /// When it cannot be read.
@@ -115,8 +115,8 @@ pub fn reference_image(name: &str) -> RgbaImage {
     image::open(reference_path(name)).expect("the reference picture can be read").into_rgba8()
 }
 
-/// Fails the test unless the picture looks as it always did: as the one of that name in `tests/reference`. Where a change
-/// is meant, look at the new picture and copy it there.
+/// Asserts that an image is similar to the one of that name in `tests/reference`. After an intended change, look at
+/// the new image and copy it there.
 ///
 /// # Panics
 /// As said.
@@ -127,8 +127,8 @@ pub fn assert_matches_reference(name: &str, picture: &RgbaImage) {
     assert_similar(name, picture, &reference_image(name), &Tolerance::ACROSS_DRIVERS);
 }
 
-/// Runs `render` on SwiftShader, in a process of its own that `test` starts, and asserts that its image is similar to the one of
-/// that name in `tests/reference`. The context queries rays in software, as the device cannot.
+/// Renders an image on SwiftShader, in a process of its own that `test` starts, and asserts that it is similar to the
+/// one of that name in `tests/reference`. The context queries rays in software.
 ///
 /// # Panics
 /// As [`on_swiftshader`] and [`assert_similar`].
@@ -159,7 +159,7 @@ fn reference_path(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("reference/{name}.png"))
 }
 
-/// FLIP's error of each pixel, from black over purple to light yellow.
+/// Returns FLIP's error of each pixel, from black over purple to light yellow.
 fn difference_image(actual: &RgbaImage, expected: &RgbaImage) -> RgbaImage {
     let (width, height) = actual.dimensions();
     let colors = nv_flip::FlipImageFloat::with_data(width, height, &flip_errors(actual, expected))

@@ -1,4 +1,4 @@
-//! Harness of the tests: a device with silent validation, or a loud failure.
+//! Harness of the tests: contexts under validation, scenes, reference ray tracers and image comparison.
 
 pub mod accel_backend;
 pub mod broken_shaders;

@@ -1,4 +1,4 @@
-//! Pictures by the `hybrid_oit` sample, and what the host computes of the same scene.
+//! Images of the `hybrid_oit` sample, and a reference on the host for the same scene.
 #![expect(clippy::expect_used, reason = "a test without its picture has failed")]
 
 use image::RgbaImage;
@@ -6,50 +6,50 @@ use lvk::Context;
 use lvk::glam::{DVec3, Vec3};
 use lvk_samples::hybrid_oit::{GlassNode, HybridOit, HybridOitConfig, Motion, OitScene};
 
-/// The sample with one configuration, ready to take pictures of a scene.
+/// The sample with one configuration of a scene.
 pub struct OitRenderer {
     /// The sample.
     pub sample: HybridOit,
     size: [u32; 2],
 }
 
-/// A sphere at a moment.
+/// A sphere at one time.
 #[derive(Debug, Clone, Copy)]
 pub struct Sphere {
     /// Its centre.
     pub center: DVec3,
     /// Its radius.
     pub radius: f64,
-    /// What glass absorbs in a unit of length; `None` for balls.
+    /// Absorption of glass in a unit of length; `None` for balls.
     pub absorption: Option<DVec3>,
 }
 
-/// The scene at a moment, for rays on the host.
+/// The scene at one time, for rays on the host.
 pub struct HostScene {
     /// Balls and glass.
     pub spheres: Vec<Sphere>,
     scene: OitScene,
 }
 
-/// What the host finds along a ray.
+/// Light along a ray, computed on the host.
 pub struct Found {
-    /// Of the light that starts at the end of the ray, what arrives at its origin.
+    /// Share of the light at the end of the ray that arrives at its origin.
     pub light: DVec3,
-    /// Whether the ray passes an edge or silhouette so closely that rounding decides.
+    /// True if the ray passes an edge or silhouette so closely that rounding decides.
     pub is_doubtful: bool,
 }
 
 impl OitRenderer {
-    /// A room for pictures with `config`.
+    /// Creates the sample with `config`.
     ///
     /// # Panics
-    /// When the sample refuses.
+    /// When the sample cannot be created.
     pub fn new(ctx: &Context, scene: &OitScene, config: &HybridOitConfig) -> Self {
         let sample = HybridOit::new(ctx, scene, config).expect("the sample can be set up");
         Self { sample, size: [config.width, config.height] }
     }
 
-    /// Takes a picture at a moment.
+    /// Renders an image at a time.
     ///
     /// # Panics
     /// When rendering fails.
@@ -62,7 +62,7 @@ impl OitRenderer {
 }
 
 impl HostScene {
-    /// The scene at `seconds`.
+    /// Returns the scene at `seconds`.
     pub fn new(scene: &OitScene, seconds: f64) -> Self {
         let balls = scene.balls.iter().map(|ball| Sphere {
             center: center_at(&ball.motion, false, seconds),
@@ -77,7 +77,7 @@ impl HostScene {
         Self { spheres: balls.chain(glass).collect(), scene: scene.clone() }
     }
 
-    /// The direction of a pixel's ray, of unit length, and its origin.
+    /// Returns the origin of a pixel's ray, and its direction of unit length.
     pub fn camera_ray(&self, pixel: [u32; 2], size: [u32; 2]) -> (DVec3, DVec3) {
         let camera = &self.scene.camera;
         let [right, up, forward] = camera.frame().map(|axis| Vec3::from(axis).as_dvec3());
@@ -88,7 +88,7 @@ impl HostScene {
         (Vec3::from(camera.eye).as_dvec3(), direction.normalize())
     }
 
-    /// The outer normal of the surface at a point on the floor, a block or a ball.
+    /// Returns the outer normal of the surface at a point on the floor, a block or a ball.
     pub fn normal_at(&self, point: DVec3) -> DVec3 {
         let mut best = (point.y.abs(), DVec3::Y);
         let mut offer = |distance: f64, normal: DVec3| {
@@ -114,7 +114,7 @@ impl HostScene {
         best.1
     }
 
-    /// The sun's light that arrives at `origin`, a point a little outside of a surface.
+    /// Returns the sunlight that arrives at `origin`, a point a little outside of a surface.
     pub fn sunlight(&self, origin: DVec3) -> Found {
         let direction = self.scene.sun.direction.as_dvec3().normalize();
         let mut found = Found { light: DVec3::ONE, is_doubtful: false };
@@ -142,7 +142,8 @@ impl HostScene {
 }
 
 impl Sphere {
-    /// Where a ray enters and leaves the sphere, if any of it lies ahead. Sets `is_doubtful` on the silhouette.
+    /// Returns the distances where a ray enters and leaves the sphere, if any of it lies ahead. Sets `is_doubtful` on
+    /// the silhouette.
     pub fn crossing(&self, origin: DVec3, direction: DVec3, is_doubtful: &mut bool) -> Option<[f64; 2]> {
         let to_center = self.center - origin;
         let middle = to_center.dot(direction);
@@ -160,14 +161,14 @@ impl Sphere {
     }
 }
 
-/// What is seen of `background` through nodes, by sorting them here.
+/// Returns the light of `background` behind nodes, which are sorted here.
 pub fn composite_sorted(nodes: &[GlassNode], background: [f64; 3]) -> [f64; 3] {
     let mut sorted = nodes.to_vec();
     sorted.sort_by(|a, b| b.distance.total_cmp(&a.distance));
     composite(&sorted, background)
 }
 
-/// The same in the order as given, the first one taken for the farthest.
+/// As [`composite_sorted`], in the given order. The first node is the farthest.
 pub fn composite(nodes: &[GlassNode], background: [f64; 3]) -> [f64; 3] {
     nodes.iter().fold(background, |behind, node| {
         let channel = |c: usize| f64::from(node.radiance[c]) + f64::from(node.transmittance[c]) * behind[c];
@@ -175,24 +176,24 @@ pub fn composite(nodes: &[GlassNode], background: [f64; 3]) -> [f64; 3] {
     })
 }
 
-/// From linear light to a film's share of white, as `shaders/common/tonemap.glsl` does.
+/// Converts linear light to a film's share of white, as `shaders/common/tonemap.glsl` does.
 pub fn expose(radiance: f64) -> f64 {
     1.0 - (-radiance.max(0.0)).exp()
 }
 
-/// From there to 8 bits, as it does too.
+/// Converts a film's share of white to 8 bits, as `shaders/common/tonemap.glsl` does.
 pub fn encode(exposed: f64) -> f64 {
     255.0 * if exposed <= 0.003_130_8 { 12.92 * exposed } else { 1.055 * exposed.powf(1.0 / 2.4) - 0.055 }
 }
 
-/// The linear light of 8 bits.
+/// Returns the linear light of 8 bits.
 pub fn decode(value: u8) -> f64 {
     let encoded = f64::from(value) / 255.0;
     let exposed = if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) };
     -(1.0 - exposed.min(0.999)).ln()
 }
 
-/// Where a sphere's centre is at a moment.
+/// Returns the centre of a sphere at a time.
 fn center_at(motion: &Motion, is_glass: bool, seconds: f64) -> DVec3 {
     let turn = std::f64::consts::TAU;
     let along = |rate: f32, phase: f32| (seconds * f64::from(rate) + f64::from(phase)).rem_euclid(1.0);
@@ -208,7 +209,7 @@ fn reflectance(cosine: f64) -> f64 {
     0.04 + 0.96 * (1.0 - cosine).powi(5)
 }
 
-/// Whether a ray meets a block ahead, and whether it passes its edges closely.
+/// Returns whether a ray hits a block ahead, and whether it passes the block's edges closely.
 fn cross_block(low: DVec3, high: DVec3, origin: DVec3, direction: DVec3) -> (bool, bool) {
     let (a, b) = ((low - origin) / direction, (high - origin) / direction);
     let (entry, exit) = (a.min(b).max_element(), a.max(b).min_element());

@@ -17,23 +17,23 @@ pub const FRONT: u32 = 0xfe;
 /// [`HitRecord::kind`] of a hit from the back of a triangle.
 pub const BACK: u32 = 0xff;
 
-/// Ray flag: every hit counts, without any-hit shader.
+/// Ray flag: every geometry is opaque, so that no any-hit shader runs.
 pub const OPAQUE: u32 = 1;
-/// Ray flag: nothing is opaque.
+/// Ray flag: no geometry is opaque.
 pub const NO_OPAQUE: u32 = 2;
 /// Ray flag: the first hit found ends the ray.
 pub const TERMINATE_ON_FIRST_HIT: u32 = 4;
-/// Ray flag: hits from behind do not count.
+/// Ray flag: back faces are culled.
 pub const CULL_BACK: u32 = 0x10;
-/// Ray flag: hits from the front do not count.
+/// Ray flag: front faces are culled.
 pub const CULL_FRONT: u32 = 0x20;
-/// Ray flag: what is opaque is not hit.
+/// Ray flag: opaque geometries are culled.
 pub const CULL_OPAQUE: u32 = 0x40;
-/// Ray flag: what is not opaque is not hit.
+/// Ray flag: geometries that are not opaque are culled.
 pub const CULL_NO_OPAQUE: u32 = 0x80;
-/// Ray flag: triangles are not hit. Shaders declare `primitive_culling`.
+/// Ray flag: triangles are skipped. Shaders declare `primitive_culling`.
 pub const SKIP_TRIANGLES: u32 = 0x100;
-/// Ray flag: boxes are not hit. Shaders declare `primitive_culling`.
+/// Ray flag: AABBs are skipped. Shaders declare `primitive_culling`.
 pub const SKIP_AABBS: u32 = 0x200;
 
 /// The files that shaders may include; `ray_records.glsl` has the push constants.
@@ -47,27 +47,27 @@ pub const INCLUDES: [(&str, &str); 4] = [
 const THREADS: u32 = 64;
 const LAUNCH_WIDTH: u32 = 48;
 
-/// What a ray hit, as the shaders write it.
+/// Hit of a ray, as shaders write it.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 pub struct HitRecord {
-    /// Multiple of the ray's direction.
+    /// Distance as a multiple of the ray's direction.
     pub t: f32,
-    /// Weights of a triangle's second and third corner.
+    /// Weights of a triangle's second and third vertex.
     pub barycentrics: [f32; 2],
     /// [`MISSED`], [`FRONT`], [`BACK`], or what an intersection shader reported.
     pub kind: u32,
-    /// Place in the list of instances.
+    /// Instance number.
     pub instance: u32,
     /// The instance's custom index.
     pub custom_index: u32,
-    /// Place in the list of geometries.
+    /// Geometry number.
     pub geometry: u32,
-    /// Place in the list of primitives.
+    /// Primitive number.
     pub primitive: u32,
 }
 
-/// Who walks the tree.
+/// Vulkan's way to trace rays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Method {
     /// A ray tracing pipeline.
@@ -77,10 +77,10 @@ pub enum Method {
 }
 
 impl Method {
-    /// What the device can do, never nothing. Says on standard error what it cannot.
+    /// Returns the methods of the device, at least one. Prints which one is not tested.
     ///
     /// # Panics
-    /// If the device can do neither.
+    /// When the device has neither.
     pub fn available(ctx: &Context) -> Vec<Self> {
         let caps = ctx.capabilities();
         let pairs = [(Self::Pipeline, caps.ray_tracing_pipeline), (Self::Query, caps.ray_query)];
@@ -102,19 +102,19 @@ pub fn requires_ray_queries(ctx: &Context) -> bool {
     has
 }
 
-/// How rays are traced.
+/// Parameters of a trace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct How {
     /// Cull mask.
     pub mask: u8,
     /// Ray flags.
     pub flags: u32,
-    /// Place of the ray generation shader; queries have none.
+    /// Number of the ray generation shader; queries have none.
     pub ray_gen: u32,
 }
 
 impl How {
-    /// Asks whether there is any hit: of the record only `kind` means something.
+    /// Returns parameters of shadow rays: only `kind` of the records is valid.
     pub fn shadows() -> Self {
         Self { flags: TERMINATE_ON_FIRST_HIT, ray_gen: 1, ..Self::default() }
     }
@@ -126,7 +126,7 @@ impl Default for How {
     }
 }
 
-/// The pipeline of one method.
+/// A pipeline that traces rays by one method.
 pub struct RayTracer {
     ctx: Context,
     pipeline: AnyPipeline,
@@ -137,7 +137,7 @@ enum AnyPipeline {
     Compute(Holder<ComputePipelineHandle>),
 }
 
-/// Rays on the GPU and room for their records.
+/// Rays on the GPU, and the buffer of their hit records.
 pub struct Job {
     rays: Holder<BufferHandle>,
     hits: Holder<BufferHandle>,
@@ -156,29 +156,29 @@ struct Push {
 }
 
 impl RayTracer {
-    /// Hits count as the geometry and the ray say.
+    /// Creates a tracer whose opacity is that of geometry and ray.
     pub fn new(ctx: &Context, method: Method) -> Result<Self> {
         Self::with(ctx, method, false)
     }
 
-    /// Looks through triangles with odd numbers, where they are not opaque.
+    /// Creates a tracer that ignores triangles with odd numbers, unless they are opaque.
     pub fn with_even_primitives(ctx: &Context, method: Method) -> Result<Self> {
         Self::with(ctx, method, true)
     }
 
-    /// By query, in a module without candidates: all triangles are opaque.
+    /// Creates a tracer by query, in a module without candidates: all triangles are opaque.
     pub fn for_opaque_triangles(ctx: &Context) -> Result<Self> {
         let pipeline = AnyPipeline::Compute(compute(ctx, &[("LVK_OPAQUE_TRIANGLES_ONLY", "")])?);
         Ok(Self { ctx: ctx.clone(), pipeline })
     }
 
-    /// Traces with a pipeline of the caller's own, whose ray generation shaders take the push constants of
+    /// Creates a tracer with a given pipeline, whose ray generation shaders have the push constants of
     /// `ray_records.glsl`.
     pub fn from_pipeline(ctx: &Context, pipeline: Holder<RayTracingPipelineHandle>) -> Self {
         Self { ctx: ctx.clone(), pipeline: AnyPipeline::RayTracing(pipeline) }
     }
 
-    /// As [`from_pipeline`](Self::from_pipeline), with a compute shader of 64 threads that traces by query.
+    /// As [`from_pipeline`](Self::from_pipeline), with a compute shader of 64 invocations that traces by query.
     pub fn from_query(ctx: &Context, pipeline: Holder<ComputePipelineHandle>) -> Self {
         Self { ctx: ctx.clone(), pipeline: AnyPipeline::Compute(pipeline) }
     }
@@ -216,7 +216,7 @@ impl RayTracer {
         Ok(Self { ctx: ctx.clone(), pipeline })
     }
 
-    /// Where it traces.
+    /// Returns the context.
     pub fn context(&self) -> &Context {
         &self.ctx
     }
@@ -244,7 +244,7 @@ impl RayTracer {
         self.record_at(cmd, tlas.index(), job, how)
     }
 
-    /// As [`record`](Self::record), whoever is at this index.
+    /// As [`record`](Self::record), for the TLAS of a bindless index.
     pub fn record_at(&self, cmd: &mut CommandBuffer, tlas: u32, job: &Job, how: How) -> Result<()> {
         let push = Push {
             rays: self.ctx.buffer_address(*job.rays)?,
@@ -270,7 +270,7 @@ impl RayTracer {
         }
     }
 
-    /// Waits, and reads the records of a job that was submitted.
+    /// Waits for a submitted job and reads its records.
     pub fn read(&self, job: &Job) -> Result<Vec<HitRecord>> {
         let mut records = vec![HitRecord::zeroed(); job.count as usize];
         self.ctx.download_buffer(*job.hits, 0, bytemuck::cast_slice_mut(&mut records))?;

@@ -7,6 +7,7 @@ use lvk_samples::app::headless;
 use lvk_samples::app::run_error::RunError;
 use lvk_samples::app::sample::{Moment, Sample};
 use lvk_samples::hybrid::RayPath;
+use lvk_samples::rtx::{RtxConfig, RtxError};
 
 use crate::hybrid::paths;
 use crate::image_comparison::{Tolerance, assert_similar};
@@ -63,5 +64,17 @@ pub fn assert_paths_agree<S: Sample>(
         for other in &images[1..] {
             assert_similar(&format!("{what} in frame {frame}"), other, &images[0], tolerance);
         }
+    }
+}
+
+/// Asserts that `make` refuses image sizes that no device supports.
+///
+/// # Panics
+/// When it does not.
+pub fn assert_refuses_impossible_sizes(ctx: &Context, make: impl Fn(&RtxConfig) -> Option<RtxError>) {
+    let path = paths(ctx)[0];
+    for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {
+        let error = make(&RtxConfig { path, width, height });
+        assert!(matches!(error, Some(RtxError::BadSize { .. })), "{error:?}");
     }
 }

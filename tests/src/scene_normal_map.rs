@@ -1,5 +1,5 @@
-//! A scene for normal maps: four floor tiles whose images lie in different ways, tilted by a map, or by the normals of their
-//! corners, which is to look the same.
+//! A scene for normal maps: four floor tiles with differently oriented texture coordinates, tilted by a map or by
+//! vertex normals. Both must look the same.
 #![expect(clippy::expect_used, reason = "a test whose scene cannot be made has failed")]
 
 use std::fmt::Write as _;
@@ -9,19 +9,19 @@ use image::{ImageResult, Rgb, RgbImage};
 use lvk_samples::app::progress::Progress;
 use lvk_samples::scene::{ObjOptions, Scene};
 
-/// The direction that the map has everywhere, as it is stored: to the right, up and off the surface.
+/// Normal of every texel of the map, as stored: to the right, up and off the surface.
 const STORED: [u8; 3] = [192, 90, 226];
 
-/// What tilts the tiles.
+/// Source of the tiles' normals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Tilt {
     /// A normal map.
     Map,
-    /// Normals of the corners.
+    /// Vertex normals.
     Vertices,
 }
 
-/// How an image lies on a tile: where it goes to the right and up, along x and z.
+/// Directions of u and v on each tile, along x and z.
 const WAYS: [[[f32; 2]; 2]; 4] = [
     [[1.0, 0.0], [0.0, -1.0]],
     // Turned,
@@ -31,7 +31,7 @@ const WAYS: [[[f32; 2]; 2]; 4] = [
     [[1.0, 0.0], [0.0, 1.0]],
 ];
 
-/// Tiles of 2 units a side beside each other along x, with the sun at the right.
+/// Loads tiles of 2 units a side beside each other along x, with the sun at the right.
 ///
 /// # Panics
 /// When its files cannot be written or read, or are not taken as they are.

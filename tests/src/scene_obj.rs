@@ -1,5 +1,5 @@
-//! A small scene from a Wavefront OBJ file in lamplight and sunshine: a tiled floor, a mirror wall, a red box, and balls of plastic, gold and
-//! glass.
+//! A small scene from a Wavefront OBJ file with a lamp and the sun: a tiled floor, a mirror wall, a red AABB, and
+//! balls of plastic, gold and glass.
 #![expect(clippy::expect_used, reason = "a test without its scene has failed")]
 
 use std::fmt::Write as _;
@@ -53,7 +53,7 @@ at 0.2 3.8 1.2 0.2 0.3 0 60
 dir -0.2 0.5 1.8 0.2 0 -1 70
 ";
 
-/// The scene, loaded from files in a folder that is gone afterwards. It has some 1,600 triangles.
+/// Loads the scene from files in a temporary folder. It has some 1,600 triangles.
 ///
 /// # Panics
 /// When the files cannot be written or read, or are not taken as they are.
@@ -95,7 +95,7 @@ fn obj_text() -> String {
     text
 }
 
-// Indices count back from the last vertex, so that nobody has to count forward.
+// Indices count back from the last vertex, so that no vertex count is needed.
 fn add_quad(text: &mut String, material: &str, corners: [[f32; 3]; 4]) {
     for [x, y, z] in corners {
         let _ = writeln!(text, "v {x} {y} {z}");
@@ -119,7 +119,7 @@ fn add_ball(text: &mut String, material: &str, center: Vec3, radius: f32) {
     }
 }
 
-/// Faces that look outwards.
+/// Returns the faces of a cube, with outer normals.
 fn box_faces(center: Vec3, half: f32) -> [[[f32; 3]; 4]; 6] {
     let turned = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     std::array::from_fn(|side| {

@@ -1,4 +1,4 @@
-//! A scene for shadows and masks: a board with a hole over a floor, seen from above, with the sun at one side.
+//! A scene for shadows and alpha masks: a board with a hole over a floor, seen from above, with the sun at one side.
 #![expect(clippy::expect_used, reason = "a test whose scene cannot be made has failed")]
 
 use std::path::Path;
@@ -40,8 +40,8 @@ sun 0.6 0.8 0
 dir 0 9 0 0.0001 -1 0 60
 ";
 
-/// A white floor of 8 units a side, and 2 above it a red board of 2 a side with a hole of half a unit in the middle of it; the
-/// first camera looks down from 9 above the floor.
+/// Loads a white floor of 8 units a side, and 2 above it a red board of 2 a side with a hole of half a unit in its
+/// middle. The first camera looks down from 9 above the floor.
 ///
 /// # Panics
 /// When its files cannot be written or read, or are not taken as they are.

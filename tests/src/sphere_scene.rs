@@ -1,4 +1,4 @@
-//! Spheres in boxes, which `sphere.rint.glsl` and `sphere_query.comp.glsl` know how to hit.
+//! Spheres in AABBs, which `sphere.rint.glsl` and `sphere_query.comp.glsl` intersect.
 
 use lvk::glam::Vec3;
 use lvk::{
@@ -16,26 +16,26 @@ use crate::reference::{HitIds, Sphere};
 /// Radius in object space and tag of each hit group of spheres; an instance's hit-group offset chooses one.
 pub const GROUPS: [(f32, u32); 2] = [(0.9, 17), (0.5, 99)];
 
-/// Geometries of a model of spheres.
+/// Number of geometries of a model.
 const GEOMETRIES: u32 = 2;
 
-/// A model of two geometries of boxes with a sphere in each.
+/// A model of two geometries of AABBs with a sphere in each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SphereModel {
-    /// Boxes of a geometry.
+    /// AABBs of a geometry.
     pub count: u32,
-    /// From one box of the list to the next, round and round the places; 1 is neighbour after neighbour. Shares no
-    /// divisor with `count`.
+    /// Step between AABBs of the list, cyclic over the positions; 1 gives neighbours. It has no common divisor with
+    /// `count`.
     pub step: u32,
 }
 
 impl SphereModel {
-    /// Neighbour after neighbour.
+    /// Returns a model whose list has neighbours after each other.
     pub fn new(count: u32) -> Self {
         Self { count, step: 1 }
     }
 
-    /// The boxes, and the buffers they lie in. The second list starts late and has gaps.
+    /// Uploads the AABBs and returns their buffers. The second list has an offset and a stride.
     pub fn aabb_geometries(&self, ctx: &Context) -> Result<(Vec<Holder<BufferHandle>>, Vec<BlasGeometry>)> {
         let mut buffers = Vec::new();
         let mut geometries = Vec::new();
@@ -55,7 +55,7 @@ impl SphereModel {
         Ok((buffers, geometries))
     }
 
-    /// The spheres of instances of the model, for the reference.
+    /// Returns the spheres of instances of the model, for the reference.
     pub fn spheres(&self, placed: &[Placed]) -> Vec<Sphere> {
         let mut spheres = Vec::new();
         for (instance, placed) in (0..).zip(placed) {
@@ -71,7 +71,7 @@ impl SphereModel {
         spheres
     }
 
-    /// Hits spheres by either method.
+    /// Creates a tracer of spheres.
     pub fn tracer(&self, ctx: &Context, method: Method) -> Result<RayTracer> {
         let numbers = [self.step, self.count].map(|number| number.to_string());
         let defines = [("SPHERE_STEP", &numbers[0][..]), ("SPHERE_COUNT", &numbers[1][..])];
@@ -81,9 +81,8 @@ impl SphereModel {
         }
     }
 
-    /// Where the shaders look for a sphere, in object space.
-    /// Traces rays through a TLAS of this model by each method, asserts that they hit what the reference says, and calls `check`
-    /// with their records.
+    /// Traces rays through a TLAS of this model by each method, asserts that their hits equal the reference, and calls
+    /// `check` with their records.
     pub fn check_hits(
         &self,
         ctx: &Context,
@@ -103,6 +102,7 @@ impl SphereModel {
         Ok(())
     }
 
+    /// Returns the centre of a sphere in object space, as the shaders compute it.
     fn center(&self, geometry: u32, primitive: u32) -> Vec3 {
         let place = primitive * self.step % self.count;
         Vec3::new((place % 3) as f32, (place / 3) as f32, geometry as f32) * 2.0

@@ -1,4 +1,4 @@
-//! Runs a test in a process of its own, because environment variables count once for each process.
+//! Runs a test in a process of its own, because a process reads some environment variables once.
 #![expect(clippy::expect_used, reason = "a test whose process cannot be started has failed")]
 
 use std::ffi::OsStr;
@@ -9,17 +9,18 @@ use crate::device::{radv, swiftshader};
 
 const MARK: &str = "LVK_TEST_CHILD";
 
-/// Runs `body` in a new process with `variables` set, or taken away where there is no value.
+/// Runs `body` in a new process with `variables` set, or removed if they have no value.
 ///
-/// `test` is the calling test itself: the new process runs it alone, which calls this function again and gets to `body`.
+/// `test` is the calling test itself: the new process runs it alone, and it calls this function again, which then
+/// runs `body`.
 ///
 /// # Panics
-/// When the process fails, with what it wrote.
+/// When the process fails; the message has its output.
 pub fn in_subprocess(test: impl Fn(), variables: &[(&str, Option<&OsStr>)], body: impl FnOnce()) {
     output_of_subprocess(test, variables, body);
 }
 
-/// As [`in_subprocess`]; answers what the new process wrote to standard output, and in that process nothing.
+/// As [`in_subprocess`]. Returns the standard output of the new process, and `None` in that process.
 ///
 /// # Panics
 /// As [`in_subprocess`].
@@ -42,7 +43,8 @@ pub fn output_of_subprocess(
     Some(out)
 }
 
-/// As [`in_subprocess`], on the device without ray tracing; skipped loudly where that cannot be had.
+/// As [`in_subprocess`], on SwiftShader, a device without ray tracing. Prints a line and skips the test where
+/// SwiftShader cannot be fetched.
 ///
 /// # Panics
 /// As [`in_subprocess`] and [`swiftshader`].
@@ -51,8 +53,9 @@ pub fn on_swiftshader(test: impl Fn(), body: impl FnOnce()) {
     in_subprocess(test, &only_driver(&icd), body);
 }
 
-/// Runs the program's tests, but for those that are ignored or have one of `skipped` in their names, in a process that has no
-/// device but the one without ray tracing, by ray queries in software; skipped loudly where that cannot be had.
+/// Runs the program's tests, without those that are ignored or have one of `skipped` in their names, in a process
+/// that has no device but SwiftShader, by ray queries in software. Prints a line and runs nothing where SwiftShader
+/// cannot be fetched.
 ///
 /// # Panics
 /// When one of them fails, and as [`swiftshader`].
@@ -65,8 +68,8 @@ pub fn rerun_on_swiftshader(skipped: &[&str]) {
     assert!(status.success(), "tests fail on the device without ray tracing, see above");
 }
 
-/// As [`in_subprocess`], with no device but an AMD chip of this `family` (`RADV_FORCE_FAMILY`), which compiles and does nothing
-/// else; skipped loudly where its driver cannot be had.
+/// As [`in_subprocess`], with no device but RADV's null device for an AMD chip of this `family`
+/// (`RADV_FORCE_FAMILY`), which only compiles. Prints a line and skips the test where the driver cannot be fetched.
 ///
 /// # Panics
 /// As [`in_subprocess`] and [`radv`].
@@ -74,18 +77,18 @@ pub fn on_radv(test: impl Fn(), family: &str, body: impl FnOnce()) {
     let Some(icd) = radv() else { return };
     let mut variables = only_driver(&icd).to_vec();
     variables.push(("RADV_FORCE_FAMILY", Some(OsStr::new(family))));
-    // What was compiled before is to be compiled again.
+    // A cached program would not be compiled again.
     variables.push(("MESA_SHADER_CACHE_DISABLE", Some(OsStr::new("true"))));
     in_subprocess(test, &variables, body);
 }
 
-/// The path by which the program of a test runs it alone: its modules and its name, without the program's.
+/// Returns the path of a test within its program: modules and name, without the program's name.
 pub fn test_path<T: Fn()>(_: &T) -> &'static str {
     let path = std::any::type_name::<T>();
     path.split_once("::").map_or(path, |(_, inside)| inside)
 }
 
-/// The program of the tests, to be started again with `variables` as [`in_subprocess`] takes them.
+/// Returns a command that starts the test program again with `variables`, as for [`in_subprocess`].
 fn program(variables: &[(&str, Option<&OsStr>)]) -> Command {
     let mut command = Command::new(std::env::current_exe().expect("the program of the test has a path"));
     for (name, value) in variables {

@@ -1,4 +1,4 @@
-//! A compute shader that moves the vertices of a mesh, and the same movement on the CPU.
+//! A compute shader that deforms the vertices of a mesh, and the same deformation on the CPU.
 
 use bytemuck::NoUninit;
 use lvk::{
@@ -9,7 +9,7 @@ use lvk::{
 use crate::meshes::Mesh;
 use crate::ray_tracer::shader;
 
-/// Moves every vertex by its own amount, which [`deformed`] repeats.
+/// Moves every vertex by its own amount, as [`deformed`] does.
 const DEFORM: &str = r"
     layout(local_size_x = 64) in;
     layout(buffer_reference, scalar, buffer_reference_align = 4) buffer Positions { vec3 at[]; };
@@ -44,7 +44,7 @@ impl VertexDeformer {
         Ok(Self { ctx: ctx.clone(), pipeline: ctx.create_compute_pipeline(&desc)? })
     }
 
-    /// Records the movement of the vertices of `mesh`, which lie packed in `buffer`.
+    /// Records the deformation of the vertices of `mesh`, which are packed in `buffer`.
     pub fn record(
         &self,
         cmd: &mut CommandBuffer,
@@ -60,7 +60,7 @@ impl VertexDeformer {
     }
 }
 
-/// The mesh as a [`VertexDeformer`] leaves it.
+/// Returns the mesh as a [`VertexDeformer`] deforms it.
 pub fn deformed(mesh: &Mesh, amount: f32) -> Mesh {
     let positions =
         mesh.positions.iter().map(|[x, y, z]| [x + amount * y, y + amount, z + 0.5 * amount * x]).collect();

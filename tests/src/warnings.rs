@@ -1,10 +1,10 @@
-//! Hears what the library warns of.
+//! Warnings of the library.
 
 use std::sync::{Mutex, Once, PoisonError};
 
 use log::{LevelFilter, Log, Metadata, Record};
 
-/// Keeps every warning of the process.
+/// Collects every warning of the process.
 struct WarningLog;
 
 static LOG: WarningLog = WarningLog;
@@ -24,10 +24,10 @@ impl Log for WarningLog {
     fn flush(&self) {}
 }
 
-/// Starts listening. Warnings from before are lost.
+/// Starts to collect warnings. Earlier warnings are lost.
 ///
 /// # Panics
-/// When another logger listens already.
+/// When another logger is installed.
 #[expect(clippy::expect_used, reason = "a test that cannot hear has failed")]
 pub fn capture_warnings() {
     static ONCE: Once = Once::new();
@@ -37,7 +37,8 @@ pub fn capture_warnings() {
     });
 }
 
-/// Takes the warnings so far that contain `words`; those of other tests in the process do not, if the words are rare.
+/// Removes and returns the collected warnings that contain `words`. Rare words leave out those of other tests in the
+/// process.
 pub fn take_warnings(words: &str) -> Vec<String> {
     let mut heard = WARNINGS.lock().unwrap_or_else(PoisonError::into_inner);
     heard.extract_if(.., |warning| warning.contains(words)).collect()

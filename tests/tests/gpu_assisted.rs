@@ -1,5 +1,5 @@
-//! Whether validation in shaders sees anything: its silence elsewhere says nothing where it does not. And whether it shows what
-//! shaders print.
+//! GPU-assisted validation: it reports an access out of bounds, so that its silence in other tests means something.
+//! It also prints what shaders print.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::ffi::OsStr;

@@ -1,4 +1,4 @@
-//! Every pipeline of the library and of the samples compiles for AMD cards, with no card in the machine.
+//! Every pipeline of the library and of the samples compiles for AMD GPUs, without such a GPU in the machine.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::Path;

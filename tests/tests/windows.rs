@@ -115,7 +115,7 @@ fn resize_often(window: &TestWindow, ctx: &Context, times: u32) {
     let swapchain = ctx.create_swapchain(&SwapchainDesc { image_count: 3, ..Default::default() }).unwrap();
     let mut random = Random::new(7);
     let (mut resized, mut shown) = (0, 0);
-    // How many sizes a driver notices of those that follow each other fast depends on what else the machine does.
+    // The number of sizes that a driver notices of a fast sequence depends on the load of the machine.
     while resized < times || ctx.swapchain_info(*swapchain).unwrap().rebuilds <= u64::from(times) / 3 {
         assert!(resized < 20 * times, "{:?}", ctx.swapchain_info(*swapchain));
         resized += 1;
@@ -127,7 +127,7 @@ fn resize_often(window: &TestWindow, ctx: &Context, times: u32) {
     }
     assert!(shown > times / 2, "{shown} of {resized}");
     window.resize([33, 21]);
-    // Drivers may notice one picture too late.
+    // Drivers may notice one image too late.
     let fits = |_: &u32| {
         present_color(ctx, *swapchain, BLUE).unwrap();
         ctx.swapchain_info(*swapchain).unwrap().extent == [33, 21]

@@ -1,4 +1,4 @@
-//! Instances flattened to world space, with a tree over their triangles.
+//! Instances flattened to world space, with a BVH over their triangles.
 
 use std::time::Duration;
 
@@ -13,9 +13,9 @@ use super::rules::{Rules, Surface};
 use super::triangle::cross;
 use crate::rays::Ray;
 
-/// Fewer triangles than this need no tree.
+/// Fewer triangles than this need no BVH.
 const TREE_TRIANGLES: usize = 16;
-/// Boxes are larger than their triangles by this share, so that near hits are found and rounding does not matter.
+/// Bounds are larger than their triangles by this share, so that near hits are found and rounding does not matter.
 const BOX_SLACK: f64 = 2e-3;
 
 /// Triangles of one geometry.
@@ -25,28 +25,28 @@ pub struct Geometry {
     pub positions: Vec<DVec3>,
     /// Three vertices for each triangle.
     pub triangles: Vec<[u32; 3]>,
-    /// Moves the vertices into object space; mirrored ones change their front.
+    /// Transform to object space; a mirroring one flips the front faces.
     pub transform: DAffine3,
-    /// Hits count without an any-hit shader.
+    /// True if hits need no any-hit shader.
     pub is_opaque: bool,
 }
 
-/// Geometries placed in the world.
+/// An instance of geometries.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instance<'a> {
-    /// What is placed.
+    /// Geometries.
     pub geometries: &'a [Geometry],
-    /// Object space to world.
+    /// Transform from object space to world space.
     pub transform: DAffine3,
-    /// What hits of it report.
+    /// Custom index that hits report.
     pub custom_index: u32,
-    /// Rays see the instance if this and their mask have a bit in common.
+    /// Mask: rays see the instance if their mask has one of its bits.
     pub mask: u8,
-    /// The other side is the front.
+    /// True if front and back faces are swapped.
     pub flip_facing: bool,
-    /// Rays that cull a side do not cull its triangles.
+    /// True if face culling is disabled.
     pub no_cull: bool,
-    /// Every geometry is opaque, or none.
+    /// Opacity forced on every geometry.
     pub force_opaque: Option<bool>,
 }
 
@@ -60,13 +60,13 @@ struct Triangle {
     corners: [DVec3; 3],
     ids: HitIds,
     mask: u8,
-    /// World space winds the other way round than object space, or the front is flipped, but not both.
+    /// True if exactly one of a mirroring transform and swapped faces applies.
     mirrored: bool,
     surface: Surface,
 }
 
 impl<'a> Instance<'a> {
-    /// Places geometries where they are, with a full mask and no flags.
+    /// Creates an instance without a transform, with a full mask and no flags.
     pub fn new(geometries: &'a [Geometry]) -> Self {
         Self {
             geometries,
@@ -81,7 +81,7 @@ impl<'a> Instance<'a> {
 }
 
 impl Reference {
-    /// Flattens instances; their order gives the instance indices.
+    /// Flattens instances. Their order gives the instance numbers.
     pub fn new(instances: &[Instance<'_>]) -> Self {
         let all = (0..).zip(instances).flat_map(|(index, item)| flatten(index, item));
         let triangles: Vec<_> = all.filter(Triangle::can_be_hit).collect();
@@ -91,14 +91,14 @@ impl Reference {
         Self { triangles, tree }
     }
 
-    /// Smallest and largest corner of everything.
+    /// Returns the bounds of all triangles.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let corners = self.triangles.iter().flat_map(|triangle| triangle.corners);
         let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         corners.fold(empty, |(low, high), corner| (low.min(corner), high.max(corner)))
     }
 
-    /// What a ray hits first, among instances that have a bit of `mask`.
+    /// Returns the closest hit of a ray, among instances that have a bit of `mask`.
     pub fn closest(&self, ray: &Ray, mask: u8) -> Answer {
         self.closest_where(ray, mask, |_| true)
     }
@@ -108,12 +108,12 @@ impl Reference {
         self.closest_by_where(ray, rules, |_| true)
     }
 
-    /// As [`closest`](Self::closest), as if only the hits that `accept` likes existed.
+    /// As [`closest`](Self::closest), of the hits that `accept` returns `true` for.
     pub fn closest_where(&self, ray: &Ray, mask: u8, accept: impl Fn(&Hit) -> bool) -> Answer {
         self.closest_by_where(ray, Rules::of_mask(mask), accept)
     }
 
-    /// As [`closest_by`](Self::closest_by), as if only the hits that `accept` likes existed.
+    /// As [`closest_by`](Self::closest_by), of the hits that `accept` returns `true` for.
     pub fn closest_by_where(
         &self,
         ray: &Ray,
@@ -125,12 +125,12 @@ impl Reference {
         closest(candidates.iter().copied())
     }
 
-    /// Whether a ray hits anything; `None` where that is in doubt.
+    /// Returns whether a ray hits anything; `None` if that is uncertain.
     pub fn occluded(&self, ray: &Ray, mask: u8) -> Option<bool> {
         any(self.candidates(ray, Rules::of_mask(mask)).iter().copied())
     }
 
-    /// Everything a ray hits, the closest first; `None` where any of it is in doubt.
+    /// Returns all hits of a ray, the closest first; `None` if any is uncertain.
     pub fn all_hits(&self, ray: &Ray, rules: impl Into<Rules>) -> Option<Vec<Hit>> {
         all(self.candidates(ray, rules.into()).iter().copied())
     }

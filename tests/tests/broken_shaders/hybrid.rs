@@ -1,5 +1,5 @@
-//! Tests of the tests: the pictures of the samples fail to be what they were when a shader is broken on purpose, each
-//! stage and each technique once.
+//! Tests of the image tests of `hybrid` and `hybrid_oit`: a shader broken on purpose changes the image, once for each
+//! stage and technique.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -17,7 +17,7 @@ use lvk_tests::oit_reference::OitRenderer;
 use lvk_tests::scene_obj::obj_scene;
 
 const ACROSS_DRIVERS: Tolerance = Tolerance::ACROSS_DRIVERS;
-/// Of a picture and itself.
+/// Of an image and itself.
 const THE_SAME: Tolerance = Tolerance { psnr: f64::INFINITY, ssim: 0.9999, differing_share: 0.0, flip: 0.0 };
 const MAIN: &str = "void main() {";
 const NOTHING: &str = "void main() {\n    return;";
@@ -125,7 +125,7 @@ const HYBRID_QUERY: [Mistake; 4] = [
 ];
 const QUEUED_PIPELINE: [Mistake; 1] = [mistake("no bounces", "hybrid/bounces.rgen.glsl", MAIN, NOTHING)];
 const QUEUED_QUERY: [Mistake; 1] = [mistake("no bounces", "hybrid/bounces.comp.glsl", MAIN, NOTHING)];
-/// One picture, whatever the order of its pixels: these are asked for the very same one.
+/// One image, whatever the order of its pixels: these are asked for the very same one.
 const ORDERED: [Mistake; 3] = [
     mistake(
         "a pixel left out",
@@ -133,14 +133,14 @@ const ORDERED: [Mistake; 3] = [
         "= pixel.x | ",
         "= pixel.x + uint(pixel == uvec2(80u, 45u)) | ",
     ),
-    // Not left unwritten: its words lead to pixels, and what memory held before may lie outside of the picture.
+    // Not left unwritten: its words lead to pixels, and what memory held before may lie outside of the image.
     mistake("no order", "hybrid/order.comp.glsl", "= pixel.x | pixel.y << 16;", "= 0u;"),
     mistake("others left out", "hybrid/pixel.glsl", "isFirst ? before : firsts + ", "isFirst ? before : "),
 ];
 const ORDERED_QUERY: [Mistake; 1] =
     [mistake("no rays", "hybrid/render.comp.glsl", "    uint group = ", "    return;\n    uint group = ")];
 
-/// What is broken, who notices, and what is asked of the device's paths.
+/// Name of the broken part, its mistakes, and the configuration whose image must change.
 type HybridWay<'a> = (&'a str, &'a [Mistake], HybridConfig);
 
 fn hybrid_methods() -> [HybridWay<'static>; 9] {
@@ -173,7 +173,7 @@ fn hybrid_notices() {
         let (scene, paths) = (obj_scene(), paths(&ctx));
         assert_eq!(HybridConfig::default().method, Method::Hybrid);
         for (by, mistakes, config) in hybrid_methods().iter().filter(|way| paths.contains(&way.2.path)) {
-            let picture = || {
+            let image = || {
                 let mut harness = HybridHarness::with(&ctx, &scene, config);
                 paint_over(&ctx, harness.renderer.picture());
                 harness.render(&scene.cameras[0])
@@ -184,15 +184,15 @@ fn hybrid_notices() {
                     (HybridHarness::with(&ctx, &scene, &inline).render(&scene.cameras[0]), THE_SAME)
                 }
                 // The paper's edges are not those of rays.
-                (Geometry::Paper, _) => (picture(), ACROSS_DRIVERS),
+                (Geometry::Paper, _) => (image(), ACROSS_DRIVERS),
                 _ => (reference_image("hybrid_small"), ACROSS_DRIVERS),
             };
-            shaders.assert_each_changes_image(by, &expected, &tolerance, mistakes, picture);
+            shaders.assert_each_changes_image(by, &expected, &tolerance, mistakes, image);
         }
     });
 }
 
-// Passes write all the same, as the picture is to follow from the shaders and not from what memory held before.
+// Passes write all the same, as the image is to follow from the shaders and not from what memory held before.
 const OIT_RAYS: &str = "#include \"hybrid_oit/shadow.glsl\"";
 const NO_OIT_RAYS: &str =
     "#define traceSunlight(origin, direction) vec3(0.0)\n#include \"hybrid_oit/shadow.glsl\"";
@@ -248,7 +248,7 @@ const OIT_QUERY: [Mistake; 3] = [
     mistake("no shadow rays", "hybrid_oit/shadow.comp.glsl", OIT_RAYS, NO_OIT_RAYS),
 ];
 
-/// Seen from close to a dark ball, as the picture of the whole room has few pixels of balls, most of them behind glass.
+/// Seen from close to a dark ball, as the image of the whole room has few pixels of balls, most of them behind glass.
 const VARNISH: [Mistake; 2] = [
     mistake("no varnish", "hybrid_oit/composite.comp.glsl", "surface.gloss * reflectance", "0.0"),
     mistake(
@@ -277,13 +277,13 @@ fn hybrid_oit_notices() {
                 RayPath::Query => OIT_QUERY.to_vec(),
             };
             let by = format!("oit by {path:?}");
-            let picture = || render_oit(&ctx, path, [240, 135], &scene);
-            shaders.assert_each_changes_image(&by, &expected, &ACROSS_DRIVERS, &mistakes, picture);
+            let image = || render_oit(&ctx, path, [240, 135], &scene);
+            shaders.assert_each_changes_image(&by, &expected, &ACROSS_DRIVERS, &mistakes, image);
         }
         let camera = Camera::looking_at([0.7, 1.7, 2.6], [0.25, 1.32, 0.95], 17.0);
         let scene = OitScene { camera, ..scene };
-        let picture = || render_oit(&ctx, paths(&ctx)[0], [160, 90], &scene);
-        shaders.assert_each_changes_image("varnish", &picture(), &ACROSS_DRIVERS, &VARNISH, picture);
+        let image = || render_oit(&ctx, paths(&ctx)[0], [160, 90], &scene);
+        shaders.assert_each_changes_image("varnish", &image(), &ACROSS_DRIVERS, &VARNISH, image);
     });
 }
 
@@ -410,7 +410,7 @@ fn hall_of(ctx: &Context, config: &ReflectionsConfig, view: Option<&Camera>) -> 
 fn reflections_notices() {
     BrokenShaders::in_subprocess(reflections_notices, |shaders| {
         let Some(ctx) = device() else { return };
-        // Smaller than the picture that is as ever: there are many.
+        // Smaller than the image that is as ever: there are many.
         let expected = hall(&ctx, paths(&ctx)[0], None);
         for path in paths(&ctx) {
             let mistakes: &[Mistake] = match path {
@@ -429,7 +429,7 @@ fn reflections_notices() {
         shaders.assert_each_changes_image("leaves", &expected, &ACROSS_DRIVERS, mistakes, || {
             hall(&ctx, path, Some(&view))
         });
-        // The picture of the test that the hall looks as it always did.
+        // The image of the test that the hall looks as it always did.
         let config = ReflectionsConfig { samples: 4, ..ReflectionsConfig::new(path, 162, 91) };
         let expected = reference_image("reflections_small");
         shaders.assert_each_changes_image("as ever", &expected, &ACROSS_DRIVERS, &REFLECTIONS_EVER, || {

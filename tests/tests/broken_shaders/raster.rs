@@ -1,4 +1,4 @@
-//! Tests of the tests: the pictures of the samples that only rasterise change when a shader is broken on purpose.
+//! Tests of the image tests of the samples that only rasterise: a shader broken on purpose changes the image.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{Context, OptionalFeature};
@@ -243,15 +243,15 @@ const STILL_LIFE: [Mistake; 2] = [
     ),
     mistake("no mirror", "sponza/surface.frag.glsl", "material.reflectivity)", "0.0)"),
 ];
-/// Where no sun shines.
+/// Mistakes in a scene without the sun.
 const STILL_LIFE_BY_LAMP: [Mistake; 1] =
     [mistake("no lamp", "sponza/surface.frag.glsl", "albedo * lamplight", "0.0 * lamplight")];
 
-/// Breaks each shader, and takes a picture of a sample made anew.
+/// Breaks each shader, and takes an image of a sample made anew.
 fn check<S: Sample>(shaders: &BrokenShaders, by: &str, mistakes: &[Mistake], make: impl Fn() -> S) {
     let expected = image_of(&mut make(), FRAME);
-    let picture = || image_of(&mut make(), FRAME);
-    shaders.assert_each_changes_image(by, &expected, &Tolerance::ACROSS_DRIVERS, mistakes, picture);
+    let image = || image_of(&mut make(), FRAME);
+    shaders.assert_each_changes_image(by, &expected, &Tolerance::ACROSS_DRIVERS, mistakes, image);
 }
 
 fn cube_map(ctx: &Context, faces: Faces) -> RenderToCubeMap {

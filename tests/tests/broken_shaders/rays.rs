@@ -1,4 +1,4 @@
-//! Tests of the tests: the pictures of the small samples that trace rays change when a shader is broken on purpose.
+//! Tests of the image tests of the small ray tracing samples: a shader broken on purpose changes the image.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -23,7 +23,7 @@ use lvk_tests::scene_obj::obj_scene;
 /// A moment at which everything has moved.
 const FRAME: u32 = 20;
 
-// Each writes all pixels all the same, as the picture is to follow from the shaders and not from what memory held before.
+// Each writes all pixels all the same, as the image is to follow from the shaders and not from what memory held before.
 const HELLO: [Mistake; 7] = [
     mistake("mirrored", "rtx_hello/view.glsl", "vec3(0.55 * seen.x", "vec3(-0.55 * seen.x"),
     mistake("white triangles", "rtx_hello/view.glsl", "sqrt(corners)", "vec3(1.0)"),
@@ -214,13 +214,13 @@ const VALLEY_QUERY: [Mistake; 4] = [
     ),
 ];
 
-/// Breaks each shader of a path, and takes a picture, of a sample made anew.
+/// Breaks each shader of a path, and takes an image, of a sample made anew.
 fn check(
     shaders: &BrokenShaders,
     by: &str,
     ctx: &Context,
     mistakes: [&[Mistake]; 2],
-    picture: impl Fn(&RtxConfig) -> RgbaImage,
+    image: impl Fn(&RtxConfig) -> RgbaImage,
 ) {
     let [width, height] = SIZE;
     for path in paths(ctx) {
@@ -229,9 +229,9 @@ fn check(
             RayPath::Pipeline => mistakes[0],
             RayPath::Query => mistakes[1],
         };
-        let picture = || picture(&config);
+        let image = || image(&config);
         let by = format!("{by} by {path:?}");
-        shaders.assert_each_changes_image(&by, &picture(), &Tolerance::ACROSS_DRIVERS, mistakes, picture);
+        shaders.assert_each_changes_image(&by, &image(), &Tolerance::ACROSS_DRIVERS, mistakes, image);
     }
 }
 

@@ -1,10 +1,11 @@
-//! Hidden barriers: chains of commands give the results of running one after the other, and validation stays silent.
+//! Automatic barriers: a chain of commands gives the same results as running one command after the other, without
+//! validation messages.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
-    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoadOp, Context, Dependencies, Error,
-    Format, Holder, IndexFormat, MemoryKind, RenderPassDesc, RenderPipelineDesc, RenderPipelineHandle,
-    TextureDesc, TextureRegion, TextureUsage,
+    BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoadOp, CommandBuffer, Context,
+    Dependencies, Error, Format, Holder, IndexFormat, MemoryKind, RenderPassDesc, RenderPipelineDesc,
+    RenderPipelineHandle, TextureDesc, TextureRegion, TextureUsage,
 };
 use lvk_tests::compute::{Evaluator, compute_pipeline, read_vec4, read_words, vec4_buffer, words_buffer};
 use lvk_tests::device;
@@ -112,6 +113,13 @@ fn draws_take_everything_from_a_dispatch_they_declare() {
     let target = target(&ctx, Format::R32Float, [4, 4]);
     let color = [ColorAttachment::clear(*target, [0.0; 4])];
     let declared = Dependencies { read_buffers: &[*draw], ..Default::default() };
+    let draw_all = |cmd: &mut CommandBuffer, desc: &RenderPassDesc<'_>| {
+        let mut pass = cmd.begin_rendering(desc).unwrap();
+        pass.bind_render_pipeline(*pipeline).unwrap();
+        pass.bind_index_buffer(*draw, 0, IndexFormat::U32).unwrap();
+        pass.bind_vertex_buffer(0, *draw, 32).unwrap();
+        pass.draw_indexed_indirect(*draw, 12, 1, 20).unwrap();
+    };
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     cmd.bind_compute_pipeline(*write).unwrap();
     cmd.push_constants(&ctx.buffer_address(*draw).unwrap()).unwrap();
@@ -126,22 +134,12 @@ fn draws_take_everything_from_a_dispatch_they_declare() {
         );
     }
     drop(pass);
-    let mut pass = cmd.begin_rendering(&RenderPassDesc { dependencies: declared, ..silent }).unwrap();
-    pass.bind_render_pipeline(*pipeline).unwrap();
-    pass.bind_index_buffer(*draw, 0, IndexFormat::U32).unwrap();
-    pass.bind_vertex_buffer(0, *draw, 32).unwrap();
-    pass.draw_indexed_indirect(*draw, 12, 1, 20).unwrap();
-    drop(pass);
+    draw_all(&mut cmd, &RenderPassDesc { dependencies: declared, ..silent });
     ctx.submit(cmd).unwrap();
     assert_eq!(pixels::<f32>(&ctx, *target), [7.0; 16]);
     // In a later command buffer the library knows without being told.
     let mut cmd = ctx.acquire_command_buffer().unwrap();
-    let mut pass = cmd.begin_rendering(&silent).unwrap();
-    pass.bind_render_pipeline(*pipeline).unwrap();
-    pass.bind_index_buffer(*draw, 0, IndexFormat::U32).unwrap();
-    pass.bind_vertex_buffer(0, *draw, 32).unwrap();
-    pass.draw_indexed_indirect(*draw, 12, 1, 20).unwrap();
-    drop(pass);
+    draw_all(&mut cmd, &silent);
     ctx.submit(cmd).unwrap();
     assert_eq!(pixels::<f32>(&ctx, *target), [7.0; 16]);
 }

@@ -1,4 +1,4 @@
-//! The profiler: its tree is what was recorded, and nothing waits for it.
+//! The profiler: its tree equals the recorded scopes, and it never waits.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::time::Instant;

@@ -1,4 +1,5 @@
-//! Queries: samples that pass, what the stages do, times inside of passes, clocks; and what must be refused.
+//! Query pools: occlusion, pipeline statistics, timestamps inside of passes, calibrated timestamps, and refused
+//! calls.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::time::{Duration, Instant};

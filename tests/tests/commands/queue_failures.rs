@@ -1,5 +1,5 @@
-//! Submissions that a driver refuses: what was submitted before is waited for, what was not is not, and nothing that the GPU
-//! still uses is taken back; the validation layer would see it.
+//! Submissions that the driver refuses: the library waits for what was submitted before, does not wait for the rest,
+//! and frees nothing that the GPU still uses. The validation layer would report it.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What queues refuse, alike everywhere, and what they measure.
+//! Commands that a queue does not support: the same errors on every device; and profiling on queues.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -74,7 +74,7 @@ fn check_foreign(ctx: &Context, words: &Holder<BufferHandle>) {
             concurrent,
             debug_name: "somebody else's",
         };
-        // SAFETY: the buffer is this context's own, outlives the handle, and nobody else uses it meanwhile.
+        // SAFETY: the buffer is this context's own, outlives the handle, and is not used otherwise meanwhile.
         unsafe { ctx.import_buffer(&import) }.unwrap()
     };
     for queue in [Queue::Compute, Queue::Transfer] {

@@ -1,6 +1,6 @@
-//! Queues: results are those of one command buffer after the other, whichever queues they run on, and validation stays
-//! silent. No test places a barrier or waits before it reads; every test runs with queues of the device's own where it has
-//! them, with queues that are only rehearsed, and with one for all.
+//! Several queues: results equal those of one command buffer after the other, on any queue, without validation
+//! messages. No test records a barrier or waits before it reads. Every test runs with the device's own queues where
+//! it has them, with emulated queues, and with one queue for all.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::ash::vk;
@@ -408,7 +408,8 @@ fn threads_submit_to_several_queues_at_once() {
     });
 }
 
-/// What one queue still uses lives on, whichever queue is idle, and everything goes in the end.
+/// An object that one queue still uses stays alive although another queue is idle, and every object is freed in the
+/// end.
 #[test]
 fn what_is_destroyed_lives_until_every_queue_is_done() {
     for_each_queue_request(|ctx| {
@@ -467,7 +468,7 @@ fn the_host_reads_what_any_queue_wrote() {
     });
 }
 
-/// A frame loop as programs have it: compute prepares the next picture while graphics draws the last.
+/// A frame loop as programs have it: compute prepares the next image while graphics draws the last.
 #[test]
 fn a_loop_of_frames_alternates_between_two_images() {
     for_each_queue_request(|ctx| {

@@ -1,4 +1,4 @@
-//! Submission: waiting, asking whether something is done, and frames in flight.
+//! Submission: waiting, polling, and frames in flight.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{Dependencies, Error, Format, SubmitHandle, TextureDesc, TextureUsage};

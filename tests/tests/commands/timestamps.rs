@@ -1,4 +1,4 @@
-//! Timestamps: they rise, they are plausible, and there is none before one was written.
+//! Timestamps: they rise, they are plausible, and a timestamp that was not written is absent.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::time::Instant;

@@ -1,5 +1,5 @@
-//! Without ray tracing every entry point that needs it says so, and nothing panics: on a driver that has none, and on
-//! one that hides it behind a profile.
+//! Devices without ray tracing: every entry point that needs it returns an error and none panics, on a driver without
+//! ray tracing and under a profile that hides it.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::fmt::Debug;

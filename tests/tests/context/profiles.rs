@@ -1,4 +1,4 @@
-//! Device profiles: what they hide is not there, what they tighten is tight, and refusals say whose doing it is.
+//! Device profiles: hidden features are absent, tightened limits hold, and errors name the profile.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::ffi::CStr;
@@ -118,7 +118,7 @@ fn vertices(ctx: &Context, triangles: u32) -> Holder<lvk::BufferHandle> {
     ctx.create_buffer(&BufferDesc { usage: BufferUsage::ACCEL_INPUT, data, ..Default::default() }).unwrap()
 }
 
-/// What the driver itself would answer for one build is less: the phone's figures count.
+/// The driver's own size for one build is smaller: the size of the phone counts.
 #[test]
 fn sizes_are_those_of_the_phone_where_it_needs_more() {
     const TRIANGLES: u64 = 1_000;
@@ -139,7 +139,7 @@ fn sizes_are_those_of_the_phone_where_it_needs_more() {
     assert_eq!(mali.structure_bytes, own.structure_bytes.max(219 * TRIANGLES));
 }
 
-/// A top-level structure cannot be split: it is refused by name, whichever of its sizes is over.
+/// A TLAS cannot be split: it is refused by name, whichever of its sizes is over.
 #[test]
 fn a_profile_limits_top_levels() {
     const INSTANCES: u32 = 20_000;
@@ -222,7 +222,7 @@ fn optional_features_are_those_of_the_device() {
             has(&ctx, command) || !there || feature == OptionalFeature::CalibratedTimestamps,
             "{feature:?}"
         );
-        // Where the device has others of its extension, that stays on for them.
+        // Other features of the same extension stay enabled.
         let others = match feature {
             OptionalFeature::PipelineShadingRate => {
                 &[OptionalFeature::PrimitiveShadingRate, OptionalFeature::AttachmentShadingRate][..]

@@ -1,4 +1,4 @@
-//! How a context starts: devices are listed, what is missing is named, and devices without ray tracing work.
+//! Creation of contexts: the device list, errors that name what is missing, and devices without ray tracing.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::ffi::OsStr;
@@ -125,7 +125,7 @@ fn features_turned_off_are_missing() {
     assert_eq!(ray_query_shader(&ctx).is_ok(), ctx.capabilities().ray_query);
 }
 
-/// What every context without ray tracing answers.
+/// Asserts the errors of every context without ray tracing.
 fn expect_no_ray_tracing(ctx: &Context) {
     assert!(!ctx.capabilities().ray_query && !ctx.capabilities().ray_tracing_pipeline);
     unsupported(ray_query_shader(ctx));
@@ -195,7 +195,7 @@ fn validation_hears_a_missing_barrier_and_a_wrong_call() {
     let info = vk::BufferCreateInfo::default().size(0).usage(vk::BufferUsageFlags::TRANSFER_SRC);
     // SAFETY: the driver takes any size; the layer complains.
     if let Ok(odd) = unsafe { ctx.raw_device().create_buffer(&info, None) } {
-        // SAFETY: created above and used by nobody.
+        // SAFETY: created above and not used.
         unsafe { ctx.raw_device().destroy_buffer(odd, None) };
     }
     let messages = ctx.take_messages();

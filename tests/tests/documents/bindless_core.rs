@@ -1,5 +1,4 @@
-//! The document on the bindless core: each row is held by tests that are there, and what it leaves out stands on a page of the
-//! manual.
+//! `docs/bindless-core.md`: each row names tests that exist, and the manual page that explains what is left out.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use crate::held_by::{self, cells, project};

@@ -1,4 +1,4 @@
-//! The README shows the code that is there.
+//! The code in the README equals the code of the samples.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::Path;

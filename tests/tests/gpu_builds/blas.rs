@@ -1,4 +1,4 @@
-//! Bottom-level structures built on the GPU: every primitive once, boxes that fit, heights within the bound.
+//! BLAS builds on the GPU: every primitive once, bounds that fit, heights within the limit.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use lvk::test_hooks::{EMPTY, GpuBlasDesc, Leaves, build_blas};
@@ -53,7 +53,7 @@ fn equal_triangles_make_a_low_tree() {
     }
 }
 
-/// How many nodes it takes if all of them are full.
+/// Returns the number of nodes if all of them are full.
 fn full_nodes(count: usize) -> u32 {
     let mut level = count.div_ceil(24);
     let mut all = level;

@@ -1,4 +1,4 @@
-//! All kernels of builds and refits, one after the other.
+//! All kernels of builds and refits, in order.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use lvk::test_hooks::{build_tlas, check_structure, compile_kernels, place, read, refit};
@@ -10,7 +10,7 @@ use lvk_tests::gpu_built::{
     with_primitive_numbers,
 };
 
-/// 3 rows, custom index and mask, offset and flags, structure.
+/// 3 rows, custom index and mask, offset and flags, acceleration structure.
 fn record(x: f32, structure: u64) -> [u32; 16] {
     let rows = [1.0, 0.0, 0.0, x, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0].map(f32::to_bits);
     let mut words = [0; 16];

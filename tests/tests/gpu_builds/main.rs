@@ -1,4 +1,4 @@
-//! Structures that the library builds and refits itself, on the GPU.
+//! Acceleration acceleration structures that the library's own kernels build and refit on the GPU.
 
 mod blas;
 mod collapse;

@@ -1,4 +1,5 @@
-//! Refits on the GPU, whoever built the tree: new places in the old tree, with boxes as a fresh fit has them.
+//! Refits on the GPU of trees built by the CPU or the GPU: the tree keeps its nodes, and its bounds equal those of a
+//! new fit.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use lvk::test_hooks::{EMPTY, GpuBlasDesc, Leaves, build_blas, place, read, refit};
@@ -42,7 +43,7 @@ fn trees_of_the_gpu_follow_moved_triangles() {
     }
 }
 
-/// Collapsed ones are encoded by the kernel that refits them, from boxes that came another way.
+/// Collapsed ones are encoded by the kernel that refits them, from AABBs that came another way.
 #[test]
 fn a_refit_of_what_did_not_move_changes_nothing() {
     let Some(ctx) = device() else { return };
@@ -88,7 +89,8 @@ fn triangles_that_are_lost_are_in_no_aabb() {
     assert_eq!(check_and_summarize(&ctx, &structure).bounds, EMPTY);
 }
 
-/// What holds nothing has the box of [`EMPTY`], which rays in every direction miss, so that they visit nothing below it.
+/// A node without primitives has the AABB of [`EMPTY`], which rays in every direction miss, so that they visit no
+/// child of it.
 #[test]
 fn no_ray_enters_an_empty_aabb() {
     let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return };
@@ -226,7 +228,7 @@ fn aabbs_of_what_lies_far_out_end_as_those_of_the_cpu_do() {
     }
 }
 
-/// Boxes themselves end there, as those that the CPU reads do.
+/// AABBs themselves end there, as those that the CPU reads do.
 #[test]
 fn aabbs_far_out_end_too() {
     let Some(ctx) = device() else { return };

@@ -1,4 +1,4 @@
-//! The sort of the builds on the GPU: a stable permutation, whatever the keys.
+//! The radix sort of builds on the GPU: a stable permutation for any keys.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use lvk::test_hooks::sort;

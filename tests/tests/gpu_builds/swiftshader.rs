@@ -1,4 +1,4 @@
-//! What the library builds on a device that has no ray tracing at all.
+//! Builds on a device without ray tracing.
 
 use lvk_tests::subprocess::rerun_on_swiftshader;
 

@@ -1,4 +1,4 @@
-//! Top-level structures built on the GPU, from records that name structures by address or by place.
+//! TLAS builds on the GPU, from instance descriptors that name BLASes by address or by number.
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use lvk::glam::{Affine3A, EulerRot, Mat3, Quat, Vec3};
@@ -20,7 +20,7 @@ struct Record {
     structure: u64,
 }
 
-/// Structures to show, with their bounds.
+/// Acceleration structures to show, with their bounds.
 struct Shown {
     structures: Vec<(GpuStructure, Bounds)>,
 }
@@ -59,7 +59,7 @@ impl Shown {
             .collect()
     }
 
-    /// What an instance needs at least, in 64 bits.
+    /// Returns the least bounds of an instance, in 64 bits.
     fn world(&self, record: &Record, place: usize) -> Option<Bounds> {
         let shown = self.structures[place].1;
         let m = record.rows.map(f64::from);

@@ -1,4 +1,4 @@
-//! Draws: coverage, targets, depth, blending and views of targets, compared with what the CPU expects of each pixel.
+//! Draws: coverage, targets, depth, blending and views of targets, against the pixels that the CPU expects.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{

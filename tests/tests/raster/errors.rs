@@ -1,4 +1,5 @@
-//! What a render pass refuses: wrong targets, missing inputs, places outside. Refused calls record nothing.
+//! Calls that a render pass refuses: wrong targets, missing bindings, areas outside of the targets. A refused call
+//! records nothing.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -238,7 +239,7 @@ fn unfit_pipelines_are_refused() {
     }
 }
 
-/// What the shader reads must be among the attributes, each location once.
+/// Every location that the shader reads must be an attribute, and no location may be one twice.
 #[test]
 fn shaders_get_every_attribute_they_read() {
     let Some(ctx) = device() else { return };

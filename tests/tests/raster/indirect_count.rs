@@ -1,4 +1,4 @@
-//! Draws whose number a dispatch has written: of vertices, by index, and of meshes; and many pipelines made at once.
+//! Draws whose count a dispatch writes: of vertices, of indices and of meshes; and many pipelines created at once.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{

@@ -1,4 +1,4 @@
-//! Layered targets and several views at once: where draws land, and how queries and the profiler count them.
+//! Layered targets and multiview: the layers that draws write, and the counts of queries and of the profiler.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{

@@ -1,5 +1,5 @@
-//! Fragment shaders that read what their own pass has drawn: what is refused, by modules, pipelines, passes and textures, and
-//! what devices without local reads say.
+//! Fragment shaders that read input attachments of their own pass: errors of modules, pipelines, passes and textures,
+//! and of devices without local reads.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{

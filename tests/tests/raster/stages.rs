@@ -1,4 +1,4 @@
-//! Tessellation and geometry stages: what they make of patches and primitives, and what is refused.
+//! Tessellation and geometry stages: their output for patches and primitives, and refused pipelines.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{

@@ -1,4 +1,4 @@
-//! Raster state: polygon modes, line widths, depth bias and clamp, fans, and areas of passes.
+//! Raster state: polygon modes, line widths, depth bias and clamp, triangle fans, and render areas.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -33,7 +33,7 @@ fn make(
     staged_pipeline(ctx, &[(ShaderStage::Vertex, vertex), (ShaderStage::Fragment, ONE)], &desc)
 }
 
-/// What is drawn of vertices at these pixels, by row.
+/// Returns the values that draws leave at these pixels, by row.
 fn drawn(ctx: &Context, desc: &RenderPipelineDesc<'_>, at: &[[u32; 2]]) -> Vec<Vec<bool>> {
     let pipeline = make(ctx, CENTRES, desc).unwrap();
     let drawn = target(ctx, Format::R32Float, [8, 8]);
@@ -139,7 +139,7 @@ fn depth_bias_moves_depths_by_units() {
     let plain = found[1];
     assert!((plain - 16384).abs() <= 1, "{plain}");
     let moved: Vec<i32> = found.iter().map(|depth| depth - plain).collect();
-    // What a unit is, is the device's to say: at most two steps of the format.
+    // The device defines the unit: at most two steps of the format.
     let unit = if moved[0] > 7 { 2 } else { 1 };
     let expected = [5 * unit, 0, -8 * unit, if bounded.is_some() { 3 } else { 5 * unit }, 5 * unit];
     assert!(moved.iter().zip(expected).all(|(found, expected)| (found - expected).abs() <= 1), "{moved:?}");

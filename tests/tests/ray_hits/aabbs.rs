@@ -1,5 +1,5 @@
-//! Boxes: intersection shaders with several reports and kinds, any-hit shaders of boxes, flags, boxes that cannot be hit,
-//! and boxes beside triangles.
+//! AABBs: intersection shaders with several reports and kinds, any-hit shaders, flags, inactive AABBs, and AABBs
+//! beside triangles.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
@@ -23,7 +23,7 @@ use lvk_tests::{TestDevice, device, device_with};
 const FAR: u32 = 2;
 /// Kinds of the near side: before a far side that was not accepted, and before one that was.
 const NEAR: [u32; 2] = [126, 127];
-/// Boxes of a geometry.
+/// AABBs of a geometry.
 const COUNT: u32 = 24;
 /// Of every sphere, in object space.
 const RADIUS: f32 = 0.9;
@@ -62,12 +62,12 @@ fn tracer(ctx: &Context, method: Method, culling: bool) -> Result<RayTracer> {
     RayTracer::from_groups(ctx, *ray_gen, *miss, &[boxes, triangles])
 }
 
-/// Where the shaders look for a sphere, in object space.
+/// Returns the centre of a sphere in object space, as the shaders compute it.
 fn center(geometry: u32, primitive: u32) -> Vec3 {
     Vec3::new((primitive % 3) as f32, (primitive / 3) as f32, geometry as f32) * 2.0
 }
 
-/// The box of a sphere.
+/// The AABB of a sphere.
 fn around(geometry: u32, primitive: u32) -> [Vec3; 2] {
     let center = center(geometry, primitive);
     [center - 1.0, center + 1.0]
@@ -96,7 +96,7 @@ fn all_aabbs() -> Vec<Vec<[Vec3; 2]>> {
     (0..2).map(|geometry| (0..COUNT).map(|primitive| around(geometry, primitive)).collect()).collect()
 }
 
-/// Three instances of the boxes.
+/// Three instances of the AABBs.
 fn placed() -> Vec<Placed> {
     let place = |index: u32| {
         let turn = Quat::from_rotation_y(0.5 + index as f32);
@@ -108,7 +108,7 @@ fn placed() -> Vec<Placed> {
     (0..3).map(place).collect()
 }
 
-/// What the shaders find in two full lists of boxes.
+/// Returns the spheres of two full lists of AABBs.
 fn spheres(placed: &[Placed]) -> Vec<Sphere> {
     let mut spheres = Vec::new();
     for (instance, placed) in (0..).zip(placed) {
@@ -157,7 +157,7 @@ fn the_closest_of_several_reports_is_the_hit() -> Result<()> {
     Ok(())
 }
 
-/// Where boxes are not opaque their any-hit shader ignores the near sides.
+/// The any-hit shader of AABBs that are not opaque ignores the near sides.
 #[test]
 fn flags_of_ray_instance_and_geometry_reach_aabbs() -> Result<()> {
     let (none, solid, open) =
@@ -197,7 +197,7 @@ fn flags_of_ray_instance_and_geometry_reach_aabbs() -> Result<()> {
     Ok(())
 }
 
-/// Traces what is left of boxes, the lists of which `change` has changed.
+/// Traces what is left of AABBs, the lists of which `change` has changed.
 fn check_lists(ctx: &Context, lists: &[Vec<[Vec3; 2]>], is_there: impl Fn(&HitIds) -> bool) -> Result<()> {
     let model = [tlas_of_aabbs(ctx, lists, GeometryFlags::OPAQUE)?];
     let placed = placed();
@@ -224,7 +224,7 @@ fn an_empty_list_of_aabbs_keeps_its_number() -> Result<()> {
     Ok(())
 }
 
-/// A box with a NaN for its smallest x coordinate is none.
+/// An AABB with a NaN for its smallest x coordinate is none.
 #[test]
 fn inactive_aabbs_disturb_no_other_aabbs() -> Result<()> {
     for ctx in devices() {
@@ -240,7 +240,7 @@ fn inactive_aabbs_disturb_no_other_aabbs() -> Result<()> {
     Ok(())
 }
 
-/// A box without thickness is crossed by rays through it, as a triangle is.
+/// An AABB without thickness is crossed by rays through it, as a triangle is.
 #[test]
 fn a_flat_aabb_can_be_hit() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
@@ -264,7 +264,7 @@ fn a_flat_aabb_can_be_hit() -> Result<()> {
     Ok(())
 }
 
-/// What an intersection shader reports at the very ends of a ray counts, other than hits of triangles. A query's shader
+/// Reports of an intersection shader at the very ends of a ray count, unlike hits of triangles. The shader of a query
 /// decides for itself.
 #[test]
 fn a_report_at_an_end_of_the_ray_is_accepted() -> Result<()> {
@@ -310,7 +310,7 @@ fn a_report_at_an_end_of_the_ray_is_accepted() -> Result<()> {
     Ok(())
 }
 
-/// A sphere in a box within a mesh of a sphere, by turns without the one and the other.
+/// A sphere in an AABB within a mesh of a sphere, by turns without the one and the other.
 #[test]
 fn a_ray_skips_triangles_or_aabbs() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };

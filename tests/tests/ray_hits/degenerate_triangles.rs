@@ -1,5 +1,5 @@
-//! Triangles that no ray can hit (without area, with vertices that are not numbers), and models of nothing: they
-//! disturb nothing beside them, and nobody else's numbers.
+//! Triangles that no ray can hit (without area, or with NaN vertices) and empty geometries: they change no other hit
+//! and no other number.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{BuildFlags, BuildMode, DeviceProfile, Result};
@@ -86,7 +86,7 @@ fn inactive_triangles_are_not_hit() -> Result<()> {
     Ok(())
 }
 
-/// Whatever is found is there: its numbers, its distance, and that it is among the hits of the ray.
+/// Asserts that every hit is among the hits of the reference, by its numbers and its distance.
 fn check_found(check: &HitCheck, gpu: &GpuScene, scene: &RayScene) -> Result<()> {
     let reference = scene.reference();
     let rays = rays_for(&reference);
@@ -169,7 +169,7 @@ fn build(ctx: &TestDevice, gpu: &GpuScene, scene: &RayScene, mode: BuildMode) ->
     Ok(())
 }
 
-/// Whether a triangle is folded up, by an x coordinate of its.
+/// True if a triangle is folded up, by an x coordinate of its.
 type Folded = fn(f32) -> bool;
 
 /// The number of primitives stays, but which of them have an area changes from build to build.

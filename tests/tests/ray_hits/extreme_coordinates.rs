@@ -1,4 +1,4 @@
-//! Triangles that refits move as far out as numbers go, and back: those that stay are hit as before.
+//! Triangles that refits move to the limits of f32 and back: hits of the other triangles stay the same.
 
 use lvk::glam::Vec3;
 use lvk::{BuildFlags, BuildMode, Context, RayQueryRequest, Result};
@@ -20,7 +20,7 @@ const FLAGS: [BuildFlags; 4] = [
     BuildFlags::LOW_MEMORY.union(BuildFlags::FAST_BUILD).union(BuildFlags::ALLOW_UPDATE),
 ];
 
-/// What the triangles make up.
+/// Shape that the triangles form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Pieces {
     /// Each by itself.
@@ -81,7 +81,8 @@ fn refit(ctx: &Context, gpu: &GpuScene, scene: &RayScene, vertices: &[[f32; 3]])
     Ok(())
 }
 
-/// What hit a triangle that stays hits it still, to the bit; what hit another may hit one behind it.
+/// Asserts that a ray that hit an unmoved triangle hits it still, bit for bit. A ray that hit another triangle may
+/// hit one behind it.
 fn check_near(what: &str, pieces: Pieces, before: &[HitRecord], after: &[HitRecord]) {
     for (number, (before, after)) in before.iter().zip(after).enumerate() {
         if pieces.leaves(before.primitive) {

@@ -1,4 +1,4 @@
-//! Masks, ray flags, instance flags and geometry flags in all their combinations, against the f64 reference.
+//! Masks, ray flags, instance flags and geometry flags in all combinations, against the f64 reference.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{DeviceProfile, GeometryFlags, InstanceFlags, Result};

@@ -1,5 +1,6 @@
-//! Rays along the faces of boxes and in the planes of flat ones. Whatever touches a box is a candidate ("Ray Intersection Candidate
-//! Determination": bounds may be larger than the box, never smaller). Every number is exact in f32.
+//! Rays along the faces of AABBs and in the planes of flat ones. Every AABB that a ray touches is a candidate
+//! (Vulkan, "Ray Intersection Candidate Determination": bounds may be larger than the AABB, never smaller). Every
+//! number is exact in f32.
 
 use lvk::glam::{Affine3A, Mat3, Vec3};
 use lvk::{
@@ -13,7 +14,7 @@ use lvk_tests::rays::Ray;
 
 type Corners = [Vec3; 2];
 
-/// How far beside a box a ray must pass to miss it.
+/// Distance from an AABB at which a ray must miss it.
 const BESIDE: f32 = 0.25;
 
 /// Trees of the CPU and of the GPU, and such as are refitted.
@@ -29,7 +30,7 @@ fn tracer(ctx: &Context) -> Result<RayTracer> {
     RayTracer::from_query_text(ctx, text, &[])
 }
 
-/// Boxes of one size on a grid.
+/// AABBs of one size on a grid.
 fn grid(counts: [u16; 3], size: Vec3) -> Vec<Corners> {
     let [x, y, z] = counts;
     let places = (0..x).flat_map(|i| (0..y).flat_map(move |j| (0..z).map(move |k| [i, j, k])));
@@ -55,7 +56,7 @@ fn transforms() -> [Affine3A; 2] {
     [Affine3A::IDENTITY, Affine3A::from_mat3_translation(turned, Vec3::new(16.0, -8.0, 4.0))]
 }
 
-/// Rays along every axis through corners, edges, faces and the middle of each box, and beside it.
+/// Rays along every axis through corners, edges, faces and the middle of each AABB, and beside it.
 fn rays(boxes: &[Corners]) -> Vec<Ray> {
     let mut rays = Vec::new();
     for [low, high] in boxes {
@@ -76,7 +77,7 @@ fn rays(boxes: &[Corners]) -> Vec<Ray> {
     rays
 }
 
-/// The boxes that a ray along an axis touches.
+/// The AABBs that a ray along an axis touches.
 fn touched(ray: &Ray, boxes: &[Corners]) -> u32 {
     let (origin, direction) = (Vec3::from(ray.origin), Vec3::from(ray.direction));
     let touches = |[low, high]: &Corners| {
@@ -88,7 +89,7 @@ fn touched(ray: &Ray, boxes: &[Corners]) -> u32 {
     (0..).zip(boxes).filter(|(_, corners)| touches(corners)).fold(0, |all, (number, _)| all | 1 << number)
 }
 
-/// How many of the rays miss a box that they touch, or meet one that is elsewhere.
+/// Returns the number of rays that miss an AABB that they touch, and the number that have a candidate elsewhere.
 fn wrong(
     tracer: &RayTracer,
     boxes: &[Corners],
@@ -131,7 +132,7 @@ fn floats(corners: &[Vec3]) -> Vec<f32> {
     corners.iter().flat_map(Vec3::to_array).collect()
 }
 
-/// A device's own walk is told of, but it need not be right.
+/// Differences of a device's own traversal are printed, but do not fail the test.
 #[test]
 fn a_ray_that_touches_an_aabb_has_it_as_a_candidate() -> Result<()> {
     let Some(ctx) = device().filter(|ctx| requires_ray_queries(ctx)) else { return Ok(()) };

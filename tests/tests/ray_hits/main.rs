@@ -1,4 +1,4 @@
-//! What rays hit: triangles and boxes in every format, at every place, with every flag.
+//! Hits of rays: triangles and AABBs in every format, at every position, with every flag.
 
 mod aabbs;
 mod degenerate_triangles;

@@ -15,7 +15,7 @@ use lvk_tests::reference::Reference;
 
 type Outcome = Result<(), Box<dyn Error>>;
 
-/// What a camera sees, and rays from everywhere.
+/// Returns rays of a camera, and rays from everywhere.
 fn rays_for(reference: &Reference, seed: u64) -> Vec<Ray> {
     let (low, high) = reference.bounds();
     let (low, high) = (low.as_vec3(), high.as_vec3());

@@ -1,4 +1,5 @@
-//! The corners of what was hit, fetched from the structure: those of the mesh, in its own order and in object space.
+//! Vertices of the hit triangle, fetched from the acceleration structure: those of the mesh, in its own order and in
+//! object space.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
@@ -175,7 +176,7 @@ fn without_the_capability_only_software_can_fetch() -> Result<()> {
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return Ok(()) };
     let scene = scene(GeometryFlags::OPAQUE);
     let device = ctx.capabilities();
-    // Structures of the library have positions whatever the device has.
+    // Acceleration structures of the library have positions whatever the device has.
     let is_software = device.ray_query_path == RayQueryPath::Software && !device.ray_tracing_pipeline;
     assert_eq!(device.position_fetch, is_software);
     if is_software {

@@ -1,4 +1,5 @@
-//! Hits of boxes that shaders generate by query: at the ends of the ray, and beside them, which only the library's own walk answers.
+//! Hits of AABBs that ray queries generate: at the ends of the ray interval, and outside of it, which only the
+//! library's own traversal rejects.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
@@ -27,7 +28,8 @@ const TEXT: &str = r#"
         hits.at[index] = record;
     }"#;
 
-/// Where rays with these ends hit a box in which hits are generated at `reports` in turn.
+/// Returns the hits of rays with these intervals, in an AABB in which hits are generated at `reports`, one after the
+/// other.
 fn hits(ctx: &Context, reports: [f32; 2], ends: &[(f32, f32)]) -> Result<Vec<Option<f32>>> {
     let [first, second] = reports.map(|t| format!("{t:?}"));
     let module = shader_with(ctx, ShaderStage::Compute, TEXT, &[("FIRST", &first), ("SECOND", &second)])?;

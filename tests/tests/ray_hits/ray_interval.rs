@@ -1,5 +1,5 @@
-//! Where a ray starts and ends: hits at its ends, a hair beside them, and rays without length. Every number is exact in
-//! f32.
+//! Ray intervals (Tmin, Tmax): hits at their ends, just beside them, and rays without length. Every number is exact
+//! in f32.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{GeometryFlags, Result};

@@ -1,5 +1,5 @@
-//! Refits of trees whose leaves name vertices that triangles share: all of them follow, whichever geometry they are of, and
-//! nobody beside a vertex that is lost goes with it.
+//! Refits of trees whose leaves index vertices that triangles share: every triangle of a moved vertex follows, in
+//! every geometry, and a NaN vertex removes only its own triangles.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{BuildFlags, BuildMode, Context, DeviceProfile, RayQueryRequest, Result, transform_rows};
@@ -67,7 +67,7 @@ fn upload(ctx: &Context, part: &Part, buffers: &PartBuffers) -> Result<()> {
     ctx.upload_buffer(**buffer, MATRIX_OFFSET, bytemuck::bytes_of(&transform_rows(matrix)))
 }
 
-/// Has the structures follow the scene.
+/// Has the acceleration structures follow the scene.
 fn follow(ctx: &Context, gpu: &GpuScene, scene: &RayScene, mode: BuildMode) -> Result<()> {
     let parts = scene.models.iter().flatten();
     parts.zip(&gpu.buffers).try_for_each(|(part, buffers)| upload(ctx, part, buffers))?;

@@ -1,4 +1,4 @@
-//! Instances chosen by the culling helper before an update: rays of the camera see the same as without it.
+//! Instances that the culling helper chooses before an update: rays of the camera hit the same as without culling.
 
 use lvk::glam::camera::rh::{proj::vulkan, view};
 use lvk::glam::{Affine3A, Quat, Vec3};
@@ -31,7 +31,7 @@ fn scene() -> RayScene {
     RayScene { models, placed: (0..600).map(&mut place).collect() }
 }
 
-/// Where the camera stands and looks.
+/// Position and direction of the camera.
 #[derive(Clone, Copy)]
 struct View {
     eye: Vec3,
@@ -45,7 +45,7 @@ impl View {
         InstanceCulling::from_view_projection(self.eye, projection * view)
     }
 
-    /// Rays through the pixels of a square picture, from the near to the far plane.
+    /// Rays through the pixels of a square image, from the near to the far plane.
     fn rays(&self, side: u32) -> Vec<Ray> {
         let right = self.forward.cross(Vec3::Y).normalize();
         let up = right.cross(self.forward);
@@ -68,7 +68,7 @@ fn views() -> [View; 4] {
     ]
 }
 
-/// Boxes of the models in object space.
+/// AABBs of the models in object space.
 fn instance_bounds(scene: &RayScene) -> Vec<(Vec3, Vec3)> {
     let of_model = |parts: &Vec<Part>| {
         let points = parts[0].mesh.positions.iter().copied().map(Vec3::from);
@@ -169,7 +169,7 @@ fn a_margin_keeps_what_rays_beside_the_frustum_meet() -> Result<()> {
     Ok(())
 }
 
-/// What is too small to matter is gone, and nothing else.
+/// Only instances that look too small are culled.
 #[test]
 fn only_small_instances_are_culled() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! Instances that a compute shader writes in the command buffer that builds and traces them.
+//! Instances that a compute shader writes in the command buffer that builds and traces their TLAS.
 
 use bytemuck::NoUninit;
 use lvk::glam::{Affine3A, Vec3};
@@ -20,7 +20,7 @@ const WIDTH: u32 = 6;
 /// Bytes before the first record.
 const OFFSET: u64 = 48;
 
-/// What `instances.comp.glsl` is pushed.
+/// Push constants of `instances.comp.glsl`.
 #[repr(C)]
 #[derive(Clone, Copy, NoUninit)]
 struct Push {
@@ -51,7 +51,7 @@ impl Writer {
         Ok(Self { pipeline, records, address })
     }
 
-    /// Records the writing of records and the update of the structure.
+    /// Records the writing of records and the update of the acceleration structure.
     fn update(
         &self,
         cmd: &mut CommandBuffer,
@@ -73,7 +73,7 @@ impl Writer {
     }
 }
 
-/// The same instances. The reference has no instance for a structure that is not there, so it gets one that no ray sees.
+/// The same instances. The reference has no instance for an acceleration structure that is not there, so it gets one that no ray sees.
 fn scene(models: &[Vec<Part>], count: u32, turn: f32) -> RayScene {
     let place = |i: u32| {
         let to = Vec3::new((i % WIDTH) as f32, (i / WIDTH) as f32, (i % 3) as f32) * 3.0;
@@ -96,7 +96,7 @@ fn models() -> Vec<Vec<Part>> {
     ]
 }
 
-/// Plain structures; where the device has its own, some that are cut into many parts, with room for them all, and some that may
+/// Plain acceleration structures; where the device has its own, some that are cut into many parts, with room for them all, and some that may
 /// move.
 fn devices() -> Vec<(TestDevice, BuildFlags, u32)> {
     let profile = DeviceProfile { max_blas_primitives: 32, ..DeviceProfile::default() };

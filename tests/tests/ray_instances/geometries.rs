@@ -1,4 +1,4 @@
-//! Several geometries and instances, transforms of both, masks and fronts, against the f64 reference.
+//! Several geometries and instances, transforms of both, masks and front faces, against the f64 reference.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{GeometryFlags, InstanceFlags, Result};

@@ -1,4 +1,4 @@
-//! Instances in top-level structures: from the host, from lists, by shaders, in great numbers.
+//! Instances of a TLAS: from the host, from buffers, written by shaders, in large numbers.
 
 mod culling;
 mod from_shaders;

@@ -1,5 +1,5 @@
-//! Top-level structures: more than a hundred thousand instances, numbers at the limits of their bits, and updates that
-//! refit or rebuild as they may.
+//! TLASes of more than a hundred thousand instances, numbers at the limits of their bits, and updates that choose
+//! between refit and rebuild.
 
 use bytemuck::Zeroable;
 use lvk::glam::{Affine3A, Vec3};
@@ -239,7 +239,7 @@ fn numbers_at_their_limits_are_reported() -> Result<()> {
     Ok(())
 }
 
-/// A structure with room for more shows what it was given, however much of the room that is.
+/// An acceleration structure with room for more shows what it was given, however much of the room that is.
 #[test]
 fn capacity_above_the_count_adds_no_hits() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };

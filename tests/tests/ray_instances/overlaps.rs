@@ -1,4 +1,4 @@
-//! Random instances that reach into one another: of every size, turned, mirrored, flat, of different masks and structures.
+//! Random overlapping instances: of every size, rotated, mirrored, flat, with different masks and BLASes.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{BuildFlags, GeometryFlags, InstanceFlags, Result};
@@ -11,7 +11,7 @@ use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene};
 use lvk_tests::ray_tracer::{CULL_BACK, CULL_OPAQUE, How};
 use lvk_tests::rays::random_rays;
 
-/// Of meshes with room inside of them or between their parts, so that boxes say little about what lies in them.
+/// Of meshes with room inside of them or between their parts, so that AABBs say little about what lies in them.
 fn models() -> Vec<Vec<Part>> {
     let apart = |mesh: Mesh, to: [f32; 3], flags| Part {
         flags,
@@ -101,7 +101,7 @@ fn check(check: &HitCheck, what: &str, scene: &RayScene, gpu: &GpuScene) -> Resu
     Ok(())
 }
 
-/// Few instances and thousands, top-level structures of the CPU, which shows overlapping ones in parts, and of the GPU.
+/// Few instances and thousands, TLASes of the CPU, which shows overlapping ones in parts, and of the GPU.
 #[test]
 fn random_instances_that_overlap_are_hit() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! Instances on a device that has no ray tracing at all.
+//! Instances on a device without ray tracing.
 
 use lvk_tests::subprocess::rerun_on_swiftshader;
 

@@ -1,5 +1,5 @@
-//! What any-hit shaders and query candidates see and decide: in whatever order the driver finds them, the set of hits
-//! and what becomes of the ray are the same.
+//! Candidates that any-hit shaders and ray queries see and judge: the set of hits and the result of the ray do not
+//! depend on the order of the driver's traversal.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{Context, GeometryFlags, HitGroup, Result, ShaderStage};
@@ -14,7 +14,7 @@ use lvk_tests::ray_tracer::{
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::reference::{Hit, HitIds, Reference};
 
-/// What the shaders do with a candidate.
+/// The shaders' decision about a candidate.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Verdict {
     Ignore,
@@ -189,7 +189,7 @@ fn accepted_candidates_leave_the_closest() -> Result<()> {
     })
 }
 
-/// Which hit ends the ray is the driver's choice, but it is one of the hits, and there is none after it.
+/// The driver chooses the hit that ends the ray, but it is one of the hits, and no hit follows it.
 #[test]
 fn a_terminated_ray_keeps_one_of_its_hits() -> Result<()> {
     for_each_case([GeometryFlags::empty(); 2], |case| {

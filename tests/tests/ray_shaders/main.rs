@@ -1,4 +1,5 @@
-//! Shaders that rays run and that run rays: pipelines and their records, any-hit shaders, queries in every stage.
+//! Shaders that trace rays and shaders that rays run: pipelines and their records, any-hit shaders, queries in every
+//! stage.
 
 mod any_hit;
 mod pipelines;

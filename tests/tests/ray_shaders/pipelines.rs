@@ -1,4 +1,4 @@
-//! Ray tracing pipelines: the order of their shaders, records, stacks, libraries, indirect traces, and mistakes.
+//! Ray tracing pipelines: shader order, records, stacks, libraries, indirect traces, and errors.
 
 use lvk::{
     BufferDesc, BufferUsage, Context, Dependencies, Error, FeatureRequest, HitGroup, Holder,
@@ -87,7 +87,7 @@ fn shaders_stand_in_the_order_of_their_lists() -> Result<()> {
     Ok(())
 }
 
-/// What the shaders of the tests read from their records.
+/// Shader record of the tests.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::NoUninit)]
 struct Tag {
@@ -105,7 +105,7 @@ impl Tag {
         Self { number, weight: number as f32 * 0.25, more: [0, 0, number * 100] }
     }
 
-    /// What [`SUM`](Self::SUM) is.
+    /// Returns the value of [`SUM`](Self::SUM).
     fn sum(number: u32) -> u32 {
         number * 102
     }
@@ -537,7 +537,7 @@ fn libraries_that_do_not_fit_are_refused() -> Result<()> {
     Ok(())
 }
 
-/// A library that nobody destroyed goes with the context, quietly but for the report.
+/// A library that is still alive is destroyed with the context, with a report and without another message.
 #[test]
 fn a_library_may_outlive_everything_but_the_context() -> Result<()> {
     let Some(ctx) = library_device() else { return Ok(()) };

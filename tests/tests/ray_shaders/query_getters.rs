@@ -1,4 +1,5 @@
-//! What ray queries tell of their ray, of the closest hit and of candidates, against matrices and hits computed in f64.
+//! Values that ray queries report of their ray, of the closest hit and of candidates, against matrices and hits
+//! computed in f64.
 
 use bytemuck::{NoUninit, Pod, Zeroable};
 use lvk::glam::{Affine3A, DAffine3, DVec3, Quat, Vec3};
@@ -26,7 +27,7 @@ const RAYS: usize = 600;
 /// Relative to the terms that are added up.
 const ROUNDING: f64 = 1e-5;
 
-/// What `getters_query.comp.glsl` writes of a hit.
+/// Values of a hit, as `getters_query.comp.glsl` writes them.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Found {
@@ -39,7 +40,7 @@ struct Found {
     world_to_object: [f32; 12],
 }
 
-/// What it writes of a query.
+/// Values of a query, as it writes them.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 struct Told {
@@ -158,7 +159,7 @@ fn check(name: &str, found: &[f32], expected: &[f64], tolerance: f64) {
     assert!(same, "{name} is {found:?}, must be {expected:?} within {tolerance}");
 }
 
-/// What the instance alone decides: its numbers and matrices, and the ray in its space.
+/// Checks the values that the instance alone decides: its numbers and matrices, and the ray in its object space.
 fn check_instance(scene: &RayScene, ray: &Ray, found: &Found, what: &str) {
     let placed = &scene.placed[found.hit.instance as usize];
     let object_to_world = DAffine3::from_cols_array(&placed.transform.to_cols_array().map(f64::from));
@@ -184,7 +185,7 @@ fn largest(values: &[f64]) -> f64 {
     values.iter().fold(1.0, |most, value| most.max(value.abs()))
 }
 
-/// What of the ray is told, which no walk may change.
+/// Checks the values of the ray, which no traversal may change.
 fn check_ray(ray: &Ray, flags: u32, told: &Told, what: &str) {
     assert_eq!(told.flags, flags, "{what}: Flags");
     let found = (told.t_min, told.origin, told.direction);
@@ -259,7 +260,7 @@ fn queries_report_the_ray_the_hit_and_the_instance() -> Result<()> {
     Ok(())
 }
 
-/// What nobody may rely on is defined where the library walks itself: it reads no memory that is not there.
+/// Undefined values are defined in the library's own traversal: it reads no memory out of bounds.
 #[test]
 fn misses_are_reported_as_zeros_in_software() -> Result<()> {
     let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Software) else { return Ok(()) };

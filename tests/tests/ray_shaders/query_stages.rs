@@ -1,5 +1,6 @@
-//! Ray queries in every stage of graphics and compute pipelines. Each sees what was built, refitted and shown before it,
-//! in earlier submissions and in its own command buffer, without a barrier or a declared structure.
+//! Ray queries in every stage of graphics and compute pipelines. Each sees the builds, refits and TLAS updates before
+//! it, of earlier submissions and of its own command buffer, without a barrier and without a declared acceleration
+//! acceleration structure.
 
 use bytemuck::NoUninit;
 use lvk::glam::{Affine3A, Vec3};
@@ -21,11 +22,11 @@ use lvk_tests::{TestDevice, device};
 /// One ray for each pixel of a square.
 const SIDE: u32 = 32;
 const COUNT: u32 = SIDE * SIDE;
-/// Invocations of a workgroup; so many rays a group.
+/// Invocations of a workgroup; each traces one ray.
 const GROUP: u32 = 32;
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
 
-/// What every stage shares: `found` traces a ray and packs the hit into a texel.
+/// Code of every stage: `found` traces a ray and packs the hit into a texel.
 const TRACE: &str = r"
     #include <lvk/ray_query.glsl>
     struct Ray { vec3 origin; float tMin; vec3 direction; float tMax; };
@@ -135,7 +136,7 @@ enum Pipeline {
     Render(Holder<RenderPipelineHandle>),
 }
 
-/// Where one trace of all rays leaves its texels.
+/// Memory of the texels of one trace of all rays.
 enum Texels {
     Buffer(Holder<BufferHandle>),
     Target(Holder<TextureHandle>),
@@ -273,7 +274,7 @@ fn unpacked([t, u, v, code]: [f32; 4]) -> HitRecord {
     }
 }
 
-/// What the texels have no room for counts as 0.
+/// Values that the texels do not store count as 0.
 fn without_places(answer: Answer) -> Answer {
     let hit = answer.hit.map(|hit| {
         let ids = HitIds { instance: 0, geometry: 0, primitive: 0, custom_index: hit.ids.custom_index };
@@ -414,7 +415,7 @@ fn queries_of_the_task_stage_see_what_was_built() -> Result<()> {
     Stage::everything_is_seen(ShaderStage::Task)
 }
 
-/// No pipeline queries rays when the pass begins behind a build, so that only a declared structure is waited for.
+/// No pipeline queries rays when the pass begins behind a build, so that only a declared acceleration structure is waited for.
 #[test]
 fn a_pipeline_made_inside_of_a_pass_needs_the_accel_struct_declared() -> Result<()> {
     for is_declared in [false, true] {

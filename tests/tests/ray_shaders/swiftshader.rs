@@ -1,4 +1,4 @@
-//! What shaders see of ray queries on a device that has no ray tracing at all.
+//! Ray queries in shaders on a device without ray tracing.
 
 use lvk_tests::subprocess::rerun_on_swiftshader;
 

@@ -1,5 +1,5 @@
-//! Which shader runs: hit groups, miss shaders, callables, intersection shaders, ray generation shaders, and the bytes
-//! of their records.
+//! Shader selection: hit groups, miss shaders, callables, intersection shaders, ray generation shaders, and the bytes
+//! of their shader records.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
@@ -8,7 +8,7 @@ use lvk::{
 };
 use lvk_tests::hit_comparison::HitComparison;
 use lvk_tests::meshes::Mesh;
-use lvk_tests::ray_scene::{Layout, Part, Placed, RayScene, instances};
+use lvk_tests::ray_scene::{GpuScene, Layout, Part, Placed, RayScene, instances};
 use lvk_tests::ray_tracer::{How, Method, RayTracer, shader, shader_with};
 use lvk_tests::rays::{Ray, random_rays};
 use lvk_tests::reference::{Reference, Sphere};
@@ -55,6 +55,22 @@ fn rays_for(reference: &Reference) -> Vec<Ray> {
     random_rays(41, 1_000, low.as_vec3(), high.as_vec3())
 }
 
+/// A scene on the GPU, its reference, and rays to trace.
+struct Traced {
+    scene: RayScene,
+    gpu: GpuScene,
+    reference: Reference,
+    rays: Vec<Ray>,
+}
+
+impl Traced {
+    fn new(ctx: &Context, scene: RayScene) -> Result<Self> {
+        let (gpu, reference) = (scene.upload(ctx)?, scene.reference());
+        let rays = rays_for(&reference);
+        Ok(Self { scene, gpu, reference, rays })
+    }
+}
+
 fn ray_gens(ctx: &Context, all: &[&[(&str, &str)]]) -> Result<Vec<Holder<ShaderModuleHandle>>> {
     all.iter().map(|defines| shader_with(ctx, ShaderStage::RayGen, RAY_GEN, defines)).collect()
 }
@@ -86,10 +102,7 @@ fn instance_ray_and_geometry_choose_the_hit_group() -> Result<()> {
         hit_groups: &groups,
         ..Default::default()
     })?;
-    let scene = scene();
-    let gpu = scene.upload(&ctx)?;
-    let reference = scene.reference();
-    let rays = rays_for(&reference);
+    let Traced { scene, gpu, reference, rays } = Traced::new(&ctx, scene())?;
     let tracer = RayTracer::from_pipeline(&ctx, pipeline);
     for (ray_gen, (offset, stride)) in (0..).zip(strides) {
         let records = tracer.trace(&gpu.tlas, &rays, How { ray_gen, ..How::default() })?;
@@ -125,10 +138,7 @@ fn the_miss_index_chooses_the_miss_shader() -> Result<()> {
         hit_groups: &[HitGroup { closest_hit: Some(*hit), ..Default::default() }; 5],
         ..Default::default()
     })?;
-    let scene = scene();
-    let gpu = scene.upload(&ctx)?;
-    let reference = scene.reference();
-    let rays = rays_for(&reference);
+    let Traced { gpu, reference, rays, .. } = Traced::new(&ctx, scene())?;
     let tracer = RayTracer::from_pipeline(&ctx, pipeline);
     for (ray_gen, t) in [(0, -7.0), (2, -9.0), (1, -8.0)] {
         let records = tracer.trace(&gpu.tlas, &rays, How { ray_gen, ..How::default() })?;
@@ -171,10 +181,7 @@ fn a_hit_shader_calls_the_callable_it_names() -> Result<()> {
         callable: &callables.iter().map(|module| **module).collect::<Vec<_>>(),
         ..Default::default()
     })?;
-    let scene = scene();
-    let gpu = scene.upload(&ctx)?;
-    let reference = scene.reference();
-    let rays = rays_for(&reference);
+    let Traced { gpu, reference, rays, .. } = Traced::new(&ctx, scene())?;
     let records = RayTracer::from_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
     HitComparison::of_shapes(&rays, &records, |ray| reference.closest(ray, 0xff)).assert("callables");
     for hit in records.iter().filter(|record| record.kind != 0) {
@@ -228,10 +235,8 @@ fn a_hit_shader_traces_a_ray_of_its_own() -> Result<()> {
         max_recursion: 2,
         ..Default::default()
     })?;
-    let scene = RayScene::single(Mesh::torus(10), Layout::Indexed16);
-    let gpu = scene.upload(&ctx)?;
-    let reference = scene.reference();
-    let rays = rays_for(&reference);
+    let single = RayScene::single(Mesh::torus(10), Layout::Indexed16);
+    let Traced { gpu, reference, rays, .. } = Traced::new(&ctx, single)?;
     let records = RayTracer::from_pipeline(&ctx, pipeline).trace(&gpu.tlas, &rays, How::default())?;
     let first = rays.iter().zip(&records).filter(|(_, record)| record.barycentrics[0] > 0.0);
     let (behind, records): (Vec<_>, Vec<_>) = first
@@ -246,7 +251,7 @@ fn a_hit_shader_traces_a_ray_of_its_own() -> Result<()> {
     Ok(())
 }
 
-/// Five spheres each in two geometries of boxes; two instances with radii of their own.
+/// Five spheres each in two geometries of AABBs; two instances with radii of their own.
 #[test]
 fn an_intersection_shader_hits_spheres_in_aabbs() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };

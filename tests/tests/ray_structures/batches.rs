@@ -1,4 +1,4 @@
-//! Many structures at once: scratch and memory budgets, progress, shared buffers, and what the statistics say.
+//! Batches of acceleration structures: scratch and memory budgets, progress, shared buffers, and statistics.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
@@ -18,7 +18,7 @@ use lvk_tests::rays::random_rays;
 use lvk_tests::warnings::{capture_warnings, take_warnings};
 use lvk_tests::{TestDevice, device, device_with};
 
-/// Fits a block of the memory of small structures many times.
+/// Fits a block of the memory of small acceleration structures many times.
 const SMALL_STRUCTURE: u64 = 64 << 10;
 
 /// Many little cubes in one vertex buffer, each half as large again as the one before the last five.
@@ -198,7 +198,7 @@ fn small_accel_structs_share_buffers() -> Result<()> {
     let grown = after.structure_bytes - before.structure_bytes;
     assert!(after.structures.iter().map(|info| info.structure_bytes).sum::<u64>() >= grown);
     assert_eq!(grown, each * COUNT as u64);
-    // What they take comes out of a buffer that was there; not one was added for it.
+    // Their memory comes from a buffer that existed; none was added.
     assert_eq!(before.spare_bytes, after.spare_bytes + grown);
     drop(made);
     ctx.wait_idle()?;
@@ -331,7 +331,7 @@ fn failed_creations_leave_nothing_behind() -> Result<()> {
     Ok(())
 }
 
-/// What lies between the vertices is read back too, in several pieces that end anywhere.
+/// Bytes between the vertices are read back too, in several copies that end anywhere.
 #[test]
 fn inputs_may_be_larger_than_what_is_read_back_at_once() -> Result<()> {
     const STRIDE: u64 = (1 << 20) + 12;

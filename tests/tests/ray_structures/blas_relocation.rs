@@ -1,5 +1,5 @@
-//! What software traces lies elsewhere once a structure that the CPU built is rebuilt: refits follow it there, whatever came
-//! before. Where the device traces, the same commands do the same.
+//! Rebuilds that move the software tree of a BLAS that the CPU built: later refits use the new memory. Where the
+//! device traces, the same commands give the same hits.
 
 use lvk::{
     BlasDesc, BuildFlags, BuildMode, Context, Error, RayQueryPath, RayQueryRequest, Result, TlasDesc,
@@ -80,7 +80,7 @@ fn a_refit_overtaken_by_the_first_rebuild_is_refused_by_software() -> Result<()>
     HitCheck::new(&ctx)?.scene("refitted after all", &gpu.tlas, &scene)
 }
 
-/// The CPU builds a top-level structure from where it knows its structures to lie, which a rebuild may change.
+/// The CPU builds a TLAS from where it knows its acceleration structures to lie, which a rebuild may change.
 #[test]
 fn an_update_overtaken_by_the_first_rebuild_is_refused_by_software() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
@@ -110,7 +110,7 @@ fn an_update_overtaken_by_the_first_rebuild_is_refused_by_software() -> Result<(
     HitCheck::new(&ctx)?.scene("rebuilt, then shown anew", &gpu.tlas, &scene)
 }
 
-/// Room for the tree is made before anything is recorded, of the device's own structures too.
+/// Room for the tree is made before anything is recorded, of the device's own acceleration structures too.
 #[test]
 fn a_rebuild_out_of_memory_leaves_what_is_recorded_around_it() -> Result<()> {
     let of_budget = |bytes| {

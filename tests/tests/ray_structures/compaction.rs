@@ -1,4 +1,4 @@
-//! Compaction: an asynchronous second step that keeps the handle and what shows it, and gives memory back.
+//! Compaction: an asynchronous second step that keeps the handle and its references, and frees memory.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::test_hooks::{before_next_command_buffer, waiting_objects};
@@ -50,7 +50,7 @@ fn done(ctx: &Context, handle: AccelStructHandle) -> Result<(u64, u64)> {
     }
 }
 
-/// Fails unless a structure that is asked for waits for the GPU; what software traces has the size it needs, and is done at
+/// Fails unless an acceleration structure that is asked for waits for the GPU; what software traces has the size it needs, and is done at
 /// once.
 fn expect_pending(ctx: &Context, handle: AccelStructHandle) -> Result<()> {
     if builds_device_accel_structs(ctx) {
@@ -61,7 +61,7 @@ fn expect_pending(ctx: &Context, handle: AccelStructHandle) -> Result<()> {
     Ok(())
 }
 
-/// Fails unless a structure is done, and takes what it took before.
+/// Fails unless an acceleration structure is done, and takes what it took before.
 fn expect_unchanged(ctx: &Context, handle: AccelStructHandle) -> Result<()> {
     let (before_bytes, after_bytes) = done(ctx, handle)?;
     assert_eq!((before_bytes, after_bytes), (after_bytes, ctx.accel_struct_info(handle)?.structure_bytes));
@@ -73,7 +73,7 @@ fn wait_for_compaction(ctx: &Context) -> Result<()> {
     (0..3).try_for_each(|_| ctx.wait_idle())
 }
 
-/// Bytes of structures, the library's own included, and the sum of those with a handle.
+/// Bytes of acceleration structures, the library's own included, and the sum of those with a handle.
 fn memory(ctx: &Context) -> (u64, u64) {
     let memory = ctx.accel_memory();
     (memory.structure_bytes, memory.structures.iter().map(|info| info.structure_bytes).sum())
@@ -114,7 +114,7 @@ fn memory_goes_back_to_the_byte() -> Result<()> {
     Ok(())
 }
 
-/// An update that was recorded before the copies is submitted behind them. Another thread destroys the top-level structure
+/// An update that was recorded before the copies is submitted behind them. Another thread destroys the TLAS
 /// just when it is to be written again.
 #[test]
 fn an_accel_struct_destroyed_while_rewritten_is_left_alone() -> Result<()> {
@@ -171,13 +171,13 @@ fn older_tlases_reference_the_copies() -> Result<()> {
     for handle in &blas {
         done(&ctx, *handle)?;
     }
-    // What the copies replaced is overwritten by others.
+    // The replaced memory is overwritten by other acceleration structures.
     let _others = upload(&ctx, &scene, BuildFlags::default())?;
     check.scene("host instances", &gpu.tlas, &scene)?;
     check.scene("device instances", &from_buffer, &scene)
 }
 
-/// The update was recorded for the old structures and is submitted when they are replaced.
+/// The update was recorded for the old acceleration structures and is submitted when they are replaced.
 #[test]
 fn an_update_that_is_overtaken_by_compaction_is_mended() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
@@ -468,7 +468,7 @@ fn threads_compact_side_by_side() -> Result<()> {
 /// Bytes before and after compaction.
 type Sizes = (u64, u64);
 
-/// Bytes of all structures, and of each of the [`scene`]'s; nothing, loudly, where there are no copies.
+/// Bytes of all acceleration structures, and of each of the [`scene`]'s; nothing, loudly, where there are no copies.
 fn measured(ctx: Option<TestDevice>) -> Result<Option<(u64, Vec<Sizes>)>> {
     let Some(ctx) = ctx else { return Ok(None) };
     if !requires_device_accel_structs(&ctx, "copies that need room") {
@@ -483,7 +483,7 @@ fn measured(ctx: Option<TestDevice>) -> Result<Option<(u64, Vec<Sizes>)>> {
     Ok(Some((needed, sizes.collect::<Result<_>>()?)))
 }
 
-/// What software traces is not copied, so a budget for the structures themselves is enough.
+/// Software BVHs are not copied, so a budget for the acceleration structures themselves is enough.
 #[test]
 fn software_accel_structs_are_compacted_without_memory_for_copies() -> Result<()> {
     let scene = scene();
@@ -522,7 +522,7 @@ fn compaction_fails_where_the_budget_has_no_memory_for_copies() -> Result<()> {
     warnings.retain(|warning| warning.contains(&format!("budget of {}", needed + 256)));
     assert_eq!(warnings.len(), 3, "{warnings:?}");
     HitCheck::new(&ctx)?.scene("not compacted", &gpu.tlas, &scene)?;
-    // What is asked for again, when others have gone, is done.
+    // A second request succeeds after other objects were destroyed.
     let GpuScene { mut models, tlas, .. } = gpu;
     drop((tlas, models.pop(), models.pop()));
     ctx.wait_idle()?;
@@ -533,7 +533,7 @@ fn compaction_fails_where_the_budget_has_no_memory_for_copies() -> Result<()> {
     Ok(())
 }
 
-/// There is room for the smallest copy only; more is made of what memory comes back, and the rest fails alone.
+/// Memory suffices for the smallest copy only. Freed memory is used for more copies, and the rest fails alone.
 #[test]
 fn what_fits_is_compacted_whatever_becomes_of_the_rest() -> Result<()> {
     let Some((needed, sizes)) = measured(without_software(|_| ()))? else { return Ok(()) };

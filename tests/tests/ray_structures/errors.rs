@@ -1,4 +1,4 @@
-//! Mistakes around ray tracing: each is a typed error that names the object, and the context goes on working.
+//! Wrong use of ray tracing: each call returns a typed error that names the object, and the context stays usable.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
@@ -35,7 +35,7 @@ impl Intact {
         Ok(Self { ctx: ctx.clone(), scene, gpu, tracers: tracers? })
     }
 
-    /// Fails unless structures can still be built and traced, the old ones too.
+    /// Fails unless acceleration structures can still be built and traced, the old ones too.
     fn check(&self) -> Result<()> {
         let rays = random_rays(61, 60, Vec3::NEG_ONE, Vec3::ONE);
         let reference = self.scene.reference();

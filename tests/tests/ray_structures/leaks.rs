@@ -1,4 +1,4 @@
-//! What failed calls and destroyed structures leave behind for those that come after: nothing.
+//! Memory and slots after failed calls and destroyed acceleration structures: nothing is left.
 
 use lvk::{
     AccelStructHandle, BlasDesc, BufferDesc, BuildFlags, BuildMode, DeviceInstances, DeviceProfile, Holder,
@@ -9,7 +9,7 @@ use lvk_tests::meshes::Mesh;
 use lvk_tests::ray_scene::{Layout, Part, PartBuffers, RayScene, upload_geometries};
 use lvk_tests::{TestDevice, device, device_with};
 
-/// A device that splits meshes of more than 60 triangles, with so much memory for structures.
+/// A device that splits meshes of more than 60 triangles, with so much memory for acceleration structures.
 fn split_device(accel_budget_bytes: u64) -> Option<TestDevice> {
     let profile = DeviceProfile {
         name: "small structures".into(),
@@ -78,7 +78,7 @@ fn a_refused_update_from_a_buffer_leaves_the_command_buffer_usable() -> Result<(
     ctx.wait(ctx.submit(cmd)?)
 }
 
-/// Lists that are kept until structures are compacted lie in buffers that are used again.
+/// Lists that are kept until acceleration structures are compacted lie in buffers that are used again.
 #[test]
 fn frames_of_accel_structs_that_may_be_compacted_go_on() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };

@@ -1,4 +1,4 @@
-//! Acceleration structures: built, ordered, split, changed, compacted and kept as bytes; what goes wrong, and what is left.
+//! Acceleration acceleration structures: builds, reordering, splits, updates, compaction, serialization, errors and leaks.
 
 mod batches;
 mod blas_relocation;

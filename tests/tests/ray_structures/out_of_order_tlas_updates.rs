@@ -1,4 +1,4 @@
-//! Several updates of one top-level structure: in one command buffer, and in some that are submitted in another order.
+//! Several updates of one TLAS: in one command buffer, and in command buffers that are submitted in another order.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{BuildFlags, BuildMode, DeviceProfile, Result, TlasDesc};
@@ -9,7 +9,7 @@ use lvk_tests::{device, device_with};
 
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
 
-/// So many instances of one of two meshes in a row.
+/// Returns `count` instances of one of two meshes in a row.
 fn instances_in_a_row(count: u32, model: usize, shift: f32) -> RayScene {
     let mesh = |mesh| vec![Part::new(mesh, Layout::Indexed32)];
     let at = |index: u32| Affine3A::from_translation(Vec3::new(3.5 * index as f32 + shift, shift, 0.0));
@@ -32,7 +32,8 @@ fn a_refit_may_follow_a_rebuild_to_another_count() -> Result<()> {
     HitCheck::new(&ctx)?.scene("rebuilt and refitted", &gpu.tlas, &moved)
 }
 
-/// What a refused command saw is not what the next one sees, and what earlier commands show stays until they have run.
+/// A command that was refused has no effect on the next one, and BLASes that earlier commands reference stay alive
+/// until those commands have run.
 #[test]
 fn a_refused_update_leaves_nothing_behind() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };

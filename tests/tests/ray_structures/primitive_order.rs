@@ -1,4 +1,4 @@
-//! Meshes whose primitives the library builds in another order: shaders see the numbers of the given one.
+//! Meshes whose primitives the library reorders: shaders see the original primitive numbers.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
@@ -129,7 +129,7 @@ fn aabbs_in_another_order_keep_their_numbers() -> Result<()> {
     Ok(())
 }
 
-/// A map of numbers costs memory and a look-up at every hit: nobody gets one for nothing.
+/// A primitive map costs memory and a look-up at every hit, so a mesh that gains nothing has none.
 #[test]
 fn meshes_are_left_alone_where_order_gains_nothing() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
@@ -184,7 +184,7 @@ fn an_ordered_mesh_is_refitted_and_rebuilt() -> Result<()> {
     check.scene("other indices", &gpu.tlas, &scene)
 }
 
-/// One structure with a map beside one without, and then none with a map: the way back to the numbers is the TLAS's.
+/// One acceleration structure with a map beside one without, and then none with a map: the way back to the numbers is the TLAS's.
 #[test]
 fn a_tlas_references_ordered_and_unordered_meshes_in_turn() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };

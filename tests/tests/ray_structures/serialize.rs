@@ -1,4 +1,4 @@
-//! Structures as bytes: what was loaded is hit like what was built, and bytes that cannot be used are refused.
+//! Serialized BLASes: a loaded BLAS gives the hits of a built one, and unusable bytes are refused.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
@@ -19,10 +19,10 @@ use lvk_tests::{TestDevice, device, device_with};
 const MOVING: BuildFlags =
     BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE).union(BuildFlags::ALLOW_COMPACTION);
 
-/// Of a structure of the devices that split.
+/// Of an acceleration structure of the devices that split.
 const MOST_PRIMITIVES: u64 = 60;
 
-/// A device that takes so many primitives in a structure.
+/// Creates a context that splits BLASes of more primitives.
 fn split_device() -> Option<TestDevice> {
     let profile = DeviceProfile {
         name: "small structures".into(),
@@ -81,7 +81,7 @@ impl Mine {
 }
 
 fn load(ctx: &Context, desc: &BlasDesc<'_>, bytes: &[u8]) -> Result<Holder<AccelStructHandle>> {
-    // SAFETY: what the driver once wrote of a structure is as it was, or its head tells that it is not.
+    // SAFETY: what the driver once wrote of an acceleration structure is as it was, or its head tells that it is not.
     unsafe { ctx.load_blas(desc, bytes) }
 }
 
@@ -113,7 +113,7 @@ fn what_is_loaded_is_hit_like_what_was_built() -> Result<()> {
         let Some(ctx) = (if split { split_device() } else { device() }) else { return Ok(()) };
         let remapped = order != PrimitiveOrder::Given;
         if remapped && !builds_device_accel_structs(&ctx) {
-            // What software traces is neither split nor ordered.
+            // Software BVHs are neither split nor reordered.
             continue;
         }
         let check = HitCheck::new(&ctx)?;
@@ -195,7 +195,7 @@ fn what_is_loaded_may_be_compacted_at_once() -> Result<()> {
     HitCheck::new(&ctx)?.scene("compacted at once", &tlas, &mine.scene)
 }
 
-/// A structure from a larger allocation is loaded into what its bytes say: no more may be built in it than fits.
+/// An acceleration structure from a larger allocation is loaded into what its bytes say: no more may be built in it than fits.
 #[test]
 fn what_was_compacted_before_it_was_saved_is_refitted() -> Result<()> {
     let Some(ctx) = device() else { return Ok(()) };
@@ -309,7 +309,7 @@ fn bytes_of_another_mesh_or_of_other_flags_are_refused() -> Result<()> {
         let refused = reason(load(&ctx, &desc, &bytes));
         assert!(refused.contains("other geometries"), "{other:?}: {refused}");
     }
-    // Where the inputs lie is not part of the mesh.
+    // The addresses of the inputs are no part of the mesh.
     let moved = with(Triangles { vertex_stride: 12, ..ring });
     drop(load(&ctx, &BlasDesc { geometries: &moved, ..mine.desc(MOVING, order) }, &bytes)?);
     let stale = *ctx.create_blas(&mine.desc(MOVING, order))?;
@@ -331,12 +331,12 @@ fn resealed(mut bytes: Vec<u8>) -> Vec<u8> {
     bytes
 }
 
-/// Where the number of parts lies: behind the head, flags and geometries.
+/// Returns the offset of the number of parts: behind the header, flags and geometries.
 fn parts_start(geometries: &[BlasGeometry]) -> usize {
     28 + 8 + 28 * geometries.len()
 }
 
-/// Where the driver's own bytes start in the first part: behind the number of parts and two lengths.
+/// Returns the offset of the driver's bytes in the first part: behind the number of parts and two lengths.
 fn driver_start(geometries: &[BlasGeometry]) -> usize {
     parts_start(geometries) + 4 + 16
 }
@@ -375,7 +375,7 @@ fn parts_that_do_not_make_up_the_mesh_are_refused() -> Result<()> {
             resealed(made)
         };
         assert_eq!(with(&good), bytes);
-        // What software traces is one part always: others are of a driver.
+        // A software BVH is always one part: other bytes are a driver's.
         let words = if builds_device_accel_structs(&ctx) { "parts" } else { "a driver" };
         let (all_but_one, last) = (&good[..good.len() - 1], &good[good.len() - 1..]);
         for wrong in [

@@ -1,4 +1,5 @@
-//! Meshes cut into parts because the device takes no larger ones: hits, shaders and numbers are as with the whole mesh.
+//! Meshes that are split because the device takes no larger ones: hits, shaders and numbers equal those of the whole
+//! mesh.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
@@ -17,7 +18,7 @@ use lvk_tests::reference::Hit;
 use lvk_tests::sphere_scene::{GROUPS, SphereModel};
 use lvk_tests::{TestDevice, device, device_with, without_software};
 
-/// A device that takes so many primitives in a structure.
+/// Creates a context whose BLASes take at most `primitives` primitives.
 fn device_of(primitives: u64) -> Option<TestDevice> {
     let profile = DeviceProfile {
         name: "small structures".into(),
@@ -252,7 +253,7 @@ fn a_transform_in_a_buffer_is_one_by_value() -> Result<()> {
     HitCheck::new(&ctx)?.scene("matrices in a buffer", &tlas, &scene)
 }
 
-/// Intersection shaders find their sphere by the number of the box.
+/// Intersection shaders find their sphere by the number of the AABB.
 #[test]
 fn intersection_shaders_know_the_aabbs_of_split_meshes() -> Result<()> {
     let Some(ctx) = device_of(5) else { return Ok(()) };
@@ -317,7 +318,7 @@ fn short_indices_are_gathered_to_the_last_byte() -> Result<()> {
     Ok(())
 }
 
-/// What a hit of one of many parts says does not depend on how many there are: from one triangle a part on.
+/// A hit reports the same for any number of parts, down to one triangle a part.
 #[test]
 fn a_part_may_be_a_single_triangle() -> Result<()> {
     let Some(ctx) = device_of(1) else { return Ok(()) };

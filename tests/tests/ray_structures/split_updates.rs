@@ -1,4 +1,4 @@
-//! Split meshes that change: refits, rebuilds, compaction, instances written by the GPU. No test places a barrier.
+//! Updates of split meshes: refits, rebuilds, compaction, instances written by the GPU. No test records a barrier.
 
 use bytemuck::NoUninit;
 use lvk::glam::{Affine3A, Quat, Vec3};
@@ -17,7 +17,7 @@ use lvk_tests::{TestDevice, device_with};
 
 const UPDATABLE: BuildFlags = BuildFlags::FAST_TRACE.union(BuildFlags::ALLOW_UPDATE);
 
-/// A device that takes 40 primitives in a structure.
+/// A device that takes 40 primitives in an acceleration structure.
 fn split_device() -> Option<TestDevice> {
     let profile = DeviceProfile {
         name: "small structures".into(),
@@ -155,7 +155,7 @@ fn refits_that_are_not_allowed_are_refused() -> Result<()> {
             "{refitted:?}"
         );
     } else {
-        // Every structure is one part.
+        // Every acceleration structure is one part.
         refitted?;
         scene.placed = placed;
     }
@@ -213,7 +213,7 @@ fn refitted_instances_of_split_meshes_move_with_all_their_parts() -> Result<()> 
     Ok(())
 }
 
-/// Instances in two columns, every third of a structure that does not exist.
+/// Instances in two columns, every third of an acceleration structure that does not exist.
 const WRITE_INSTANCES: &str = "
     layout(local_size_x = 32) in;
     struct Instance { vec4 rows[3]; uint customAndMask; uint offsetAndFlags; uvec2 place; };
@@ -236,7 +236,7 @@ struct WritePush {
     shift: f32,
 }
 
-/// What [`WRITE_INSTANCES`] writes; instances of nothing are of a model without triangles.
+/// Returns the scene that [`WRITE_INSTANCES`] writes. Empty instances are of a model without triangles.
 fn written(count: u32, shift: f32) -> RayScene {
     let nothing = Mesh { positions: Vec::new(), triangles: Vec::new() };
     let mut models = scene().models;
@@ -288,7 +288,7 @@ fn instances_written_by_the_gpu_may_reference_split_meshes() -> Result<()> {
     Ok(())
 }
 
-/// Room for parts is asked for when the structure is made.
+/// Room for parts is asked for when the acceleration structure is made.
 #[test]
 fn more_parts_than_the_capacity_are_refused() -> Result<()> {
     let Some(ctx) = split_device() else { return Ok(()) };
@@ -345,7 +345,7 @@ fn a_triangle_that_does_not_fit_is_an_error() -> Result<()> {
         let desc = |geometries| BlasDesc { geometries, debug_name: "huge", ..Default::default() };
         let made = ctx.create_blas_batch(&[desc(&geometries), desc(&geometries)]);
         if !builds_device_accel_structs(&ctx) {
-            // The limits of a profile are those of the device's structures.
+            // The limits of a profile are those of the device's acceleration structures.
             assert_eq!(made?.len(), 2);
             continue;
         }
@@ -397,7 +397,7 @@ fn compaction_frees_what_only_builds_read() -> Result<()> {
         let mut cmd = ctx.acquire_command_buffer()?;
         let rebuilt = cmd.build_blas(&[*loaded], BuildMode::Rebuild).is_ok();
         ctx.submit(cmd)?;
-        // A loaded structure for which compaction saved nothing has room for a build.
+        // A loaded acceleration structure for which compaction saved nothing has room for a build.
         let needed = if rebuilt { before } else { info.table_bytes };
         assert_eq!(ctx.accel_struct_info(*loaded)?.table_bytes, needed);
         let models = [loaded];

@@ -1,4 +1,4 @@
-//! Structures on a device that has no ray tracing at all.
+//! Acceleration acceleration structures on a device without ray tracing.
 
 use lvk_tests::subprocess::rerun_on_swiftshader;
 

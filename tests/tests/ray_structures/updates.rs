@@ -1,5 +1,5 @@
-//! Structures that change: rebuilt, refitted, in the same command buffer and with frames in flight. No test places a
-//! barrier or waits before its last line.
+//! Rebuilds and refits, in the same command buffer and with frames in flight. No test records a barrier, or waits
+//! before its last line.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
@@ -90,7 +90,7 @@ fn a_refit_moves_instances() -> Result<()> {
     })
 }
 
-/// Refits that need not wait for each other, and two of one structure, which must; what they show before and after that
+/// Refits that need not wait for each other, and two of one acceleration structure, which must; what they show before and after that
 /// is built, traced and destroyed in between.
 #[test]
 fn many_accel_structs_are_refitted_in_one_command_buffer() -> Result<()> {
@@ -121,7 +121,7 @@ fn many_accel_structs_are_refitted_in_one_command_buffer() -> Result<()> {
                 agree(&what, &rays, &tracer.read(job)?, &scene(number, 0.2));
             }
         }
-        // The same structures shown by another one, and then no longer there.
+        // The same acceleration structures shown by another one, and then no longer there.
         let mut cmd = ctx.acquire_command_buffer()?;
         cmd.update_tlas(*all[1].tlas, &shown, BuildMode::Refit)?;
         ctx.submit(cmd)?;
@@ -215,7 +215,7 @@ fn every_frame_in_flight_sees_its_own_state() -> Result<()> {
     Ok(())
 }
 
-/// Structures that the top level still shows outlive their holders.
+/// Acceleration structures that the top level still shows outlive their holders.
 #[test]
 fn a_destroyed_blas_is_referenced_until_the_next_update() -> Result<()> {
     for_each_method(|ctx, method, tracer| {
@@ -229,7 +229,7 @@ fn a_destroyed_blas_is_referenced_until_the_next_update() -> Result<()> {
     })
 }
 
-/// What a dropped command buffer would have shown is not shown, and what is shown stays alive.
+/// An update of a dropped command buffer has no effect, and the BLASes of the TLAS stay alive.
 #[test]
 fn a_command_buffer_given_up_changes_nothing() -> Result<()> {
     for_each_method(|ctx, method, tracer| {
@@ -334,8 +334,8 @@ fn builds_given_up_do_not_count_as_wear() -> Result<()> {
     Ok(())
 }
 
-/// What software traces becomes another tree with its first rebuild, so its bytes tell the two apart. Refits of what did not move
-/// change nothing but boxes, and these by the first alone.
+/// The first rebuild gives a software BVH another tree, so its bytes tell a rebuild from a refit. Refits of unmoved
+/// vertices change nothing but AABBs, and these by the first refit alone.
 #[test]
 fn builds_of_software_given_up_do_not_count_as_wear() -> Result<()> {
     let Some(ctx) = software_alone(|_| ()) else { return Ok(()) };

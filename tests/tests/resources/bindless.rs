@@ -1,4 +1,4 @@
-//! The bindless set: indices are stable, slots are not taken again too early, and running out is an error.
+//! The bindless descriptor set: indices are stable, slots are not reused too early, and full arrays return an error.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{

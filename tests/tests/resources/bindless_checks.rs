@@ -1,4 +1,4 @@
-//! Indices of bindless arrays checked in shaders: every array and stage, by name, and nothing said of what is right.
+//! Bindless index checks in shaders: every array and stage, by name, and no report of a valid index.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -69,8 +69,8 @@ fn freed_and_unknown_textures_are_named_and_replaced() {
     assert_eq!(ctx.index_faults().unwrap().len(), 3);
 }
 
-/// What was recorded while the owner was alive may reach it, whenever it runs; what is recorded later may not, even while
-/// the slot still shows the texture.
+/// Commands that were recorded while the owner was alive may read its slot, whenever they run. Later commands may
+/// not, even while the slot still holds the texture.
 #[test]
 fn an_index_ends_with_its_handle_for_command_buffers_begun_later() {
     let Some(ctx) = checking() else { return };
@@ -160,7 +160,7 @@ const TRACE: &str = "
         result.at = hit ? lvkRayQueryT(rq, LVK_COMMITTED) : -1.0;
     }";
 
-/// How far a ray gets, or -1.
+/// Returns the distance of a ray's hit, or -1.
 fn trace(ctx: &Context, pipeline: ComputePipelineHandle, tlas: u32) -> f32 {
     let result = words_buffer(ctx, &[0]);
     let address = ctx.buffer_address(*result).unwrap();
@@ -202,7 +202,7 @@ fn ray_queries_check_their_accel_structs() {
     }
 }
 
-/// A module that looks at texture 60, which nobody has; its name is that of its stage.
+/// Creates a module that reads texture 60, which does not exist. Its name is that of its stage.
 fn astray(ctx: &Context, stage: ShaderStage, text: &str) -> Holder<ShaderModuleHandle> {
     let text = text.replace("ASTRAY", "textureBindlessFetch2D(60u, ivec2(0), 0)");
     let name = format!("{stage:?}");

@@ -1,4 +1,4 @@
-//! Buffers: what is uploaded, copied, filled and written by shaders is what is downloaded, and misuse is an error.
+//! Buffers: downloads equal what was uploaded, copied, filled or written by shaders, and wrong use returns an error.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{BufferCopy, BufferDesc, BufferUsage, Context, Dependencies, Error, Holder, MemoryKind};

@@ -1,4 +1,4 @@
-//! Handles and their owners: stale and foreign handles are errors, and nothing dies while it is in use.
+//! Handles: stale and foreign handles return errors, and no object is destroyed while it is in use.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::fmt::Debug;

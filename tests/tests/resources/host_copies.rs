@@ -1,4 +1,4 @@
-//! First contents that the host writes itself are those that the GPU copies, bit for bit, and nothing waits for them.
+//! Initial texture contents by host image copies: bit for bit those of GPU copies, without a wait.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -62,7 +62,7 @@ fn compare([by_host, staged]: &[TestDevice; 2]) -> usize {
     let mut compared = 0;
     for (seed, format) in (0..).zip(Format::ALL.iter().copied().filter(|format| !format.is_yuv())) {
         for (number, (kind, extent)) in (0..).zip(kinds()) {
-            // Plain pictures in all ways, other kinds in turn.
+            // Plain images in all ways, other kinds in turn.
             let ways: &[(u32, u32)] = match kind {
                 TextureKind::D2 => &[(1, 0), (3, 0), (3, 2)],
                 _ if (seed + number) % 3 == 0 => &[(3, 0)],
@@ -184,7 +184,7 @@ fn such_textures_are_like_any_texture_afterwards() {
     assert!(first.0 != data && first.1 != data);
 }
 
-/// What the GPU writes too, or whose texels others may see in other formats, goes by staging memory as ever.
+/// Textures that the GPU also writes, or whose texels may be viewed in other formats, go through staging memory.
 #[test]
 fn other_textures_are_filled_as_ever() {
     let Some([ctx, _]) = both() else { return };

@@ -1,4 +1,4 @@
-//! Push constants and specialization constants: what is given is what the shader reads, and misfits are errors.
+//! Push constants and specialization constants: shaders read the given values, and mismatches return errors.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{

@@ -1,5 +1,5 @@
-//! Pictures of the `deferred` sample: the same by one pass and by several, as ever, with few lights and many, on devices with
-//! and without shaders that read their own targets.
+//! Images of the `deferred` sample: equal by one pass and by several, equal to the reference, with few lights and
+//! many, on devices with and without local reads.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -25,7 +25,7 @@ fn render_image(ctx: &Context, config: &DeferredConfig, frame: u32) -> RgbaImage
     image_of(&mut Deferred::new(ctx, config).unwrap(), frame)
 }
 
-/// Whether the device has both; says so where it has not.
+/// True if the device has both; says so where it has not.
 fn has_both(ctx: &Context) -> bool {
     let both = Passes::of(ctx).len() == 2;
     if !both {
@@ -46,8 +46,8 @@ fn assert_same_images(ctx: &Context, moments: &[(u32, View)]) {
 fn one_pass_renders_what_several_do() {
     let Some(ctx) = device() else { return };
     if has_both(&ctx) {
-        let pictures = [(0, View::Picture), (37, View::Picture)];
-        assert_same_images(&ctx, &pictures);
+        let images = [(0, View::Picture), (37, View::Picture)];
+        assert_same_images(&ctx, &images);
         let others = [View::Albedo, View::Normals, View::Roughness, View::Depth];
         assert_same_images(&ctx, &others.map(|view| (0, view)));
     }
@@ -64,8 +64,8 @@ fn the_hall_looks_as_it_always_did() {
 fn another_driver_renders_it() {
     on_swiftshader(another_driver_renders_it, || {
         let Some(ctx) = device() else { return };
-        let picture = render_image(&ctx, &DeferredConfig::new(SIZE), 0);
-        assert_similar("SwiftShader hall", &picture, &reference_image("deferred_small"), &OTHER_DRIVER);
+        let image = render_image(&ctx, &DeferredConfig::new(SIZE), 0);
+        assert_similar("SwiftShader hall", &image, &reference_image("deferred_small"), &OTHER_DRIVER);
         if has_both(&ctx) {
             assert_same_images(&ctx, &[(0, View::Picture)]);
         }
@@ -73,8 +73,8 @@ fn another_driver_renders_it() {
 }
 
 /// Sum of all channels of all pixels.
-fn light_of(picture: &RgbaImage) -> u64 {
-    picture.pixels().map(|pixel| pixel.0[..3].iter().map(|channel| u64::from(*channel)).sum::<u64>()).sum()
+fn light_of(image: &RgbaImage) -> u64 {
+    image.pixels().map(|pixel| pixel.0[..3].iter().map(|channel| u64::from(*channel)).sum::<u64>()).sum()
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn every_light_adds_to_the_image() {
     assert!(light.is_sorted_by(|fewer, more| fewer < more), "{light:?}");
 }
 
-/// Each time behind a frame of the other way that nobody has waited for.
+/// Each change follows a frame of the other path without a wait.
 #[test]
 fn paths_are_changed_in_a_sample_that_runs() {
     let Some(ctx) = device() else { return };
@@ -107,7 +107,7 @@ fn paths_are_changed_in_a_sample_that_runs() {
     }
 }
 
-/// Submits a frame that nobody waits for.
+/// Submits a frame without waiting for it.
 fn send(sample: &mut Deferred, frame: u32) {
     sample.update(Moment::of_frame(frame, ROUND)).unwrap();
     let mut frame = Frame::free(&sample.context().clone()).unwrap();

@@ -1,5 +1,5 @@
-//! Frames of samples: pictures are the same whether frames are waited for or not, and after changes of size, view and
-//! shaders they are those of a sample made so. Shaders that are changed show, and wrong ones leave the old in use.
+//! Frames of samples: images do not depend on waits between frames, and after a change of size, view or shader they
+//! equal those of a new sample. A changed shader takes effect; a wrong one leaves the old one in use.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::fs;
@@ -42,7 +42,7 @@ fn frame_time(frame: u32) -> Moment {
     Moment::of_frame(frame, 10)
 }
 
-/// What a sample shows at some moments; each frame is waited for.
+/// Renders a sample at some times, and waits for each frame.
 fn one_by_one<S: Sample>(sample: &mut S) -> Vec<Vec<u8>> {
     let mut at = |frame| {
         sample.update(frame_time(frame)).map_err(Into::into).unwrap();
@@ -58,9 +58,9 @@ fn at_once<S: Sample>(sample: &mut S, size: [u32; 2]) -> Vec<Vec<u8>> {
         let copy = texture(&ctx, size);
         sample.update(frame_time(frame)).map_err(Into::into).unwrap();
         let mut frame = Frame::free(&ctx).unwrap();
-        let picture = sample.record(&mut frame).map_err(Into::into).unwrap();
+        let image = sample.record(&mut frame).map_err(Into::into).unwrap();
         let region = TextureRegion::default();
-        frame.cmd.copy_texture(picture, &region, *copy, &region).unwrap();
+        frame.cmd.copy_texture(image, &region, *copy, &region).unwrap();
         assert!(frame.finish().unwrap().is_empty(), "nobody waited");
         copy
     });
@@ -72,11 +72,11 @@ fn texture(ctx: &Context, extent: [u32; 2]) -> Holder<TextureHandle> {
     ctx.create_texture(&TextureDesc { format, extent, usage, ..TextureDesc::default() }).unwrap()
 }
 
-/// Whether a sample can be looked at from elsewhere.
+/// True if a sample can be looked at from elsewhere.
 #[derive(PartialEq)]
 enum Seen {
     FromAnywhere,
-    /// What it shows is flat.
+    /// Flat images.
     Flat,
 }
 
@@ -96,7 +96,7 @@ fn check<S: Sample>(seen: Seen, make: impl Fn([u32; 2]) -> S) {
     check_panel(&mut sample, &expected[0]);
 }
 
-/// What `sample` shows at the first of the moments.
+/// Renders `sample` at the first of the times.
 fn first<S: Sample>(sample: &mut S) -> Vec<u8> {
     sample.update(frame_time(MOMENTS[0])).map_err(Into::into).unwrap();
     headless::picture(sample).map_err(Into::into).unwrap()

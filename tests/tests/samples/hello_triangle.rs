@@ -1,5 +1,5 @@
-//! The pictures of the `hello_triangle` sample: every pixel has the colour that arithmetic gives it, on a device with every
-//! feature and on one with hardly any.
+//! Images of the `hello_triangle` sample: every pixel has the computed colour, with every optional feature and with
+//! hardly any.
 
 use std::f32::consts::TAU;
 
@@ -42,12 +42,12 @@ fn vertices_at(phase: f32) -> [Vec2; 3] {
 }
 
 /// Fails unless all pixels that no edge touches have the colour they should. Answers how many lie in the triangle.
-fn assert_painted(picture: &RgbaImage, phase: f32) -> u32 {
+fn assert_painted(image: &RgbaImage, phase: f32) -> u32 {
     let [a, b, c] = vertices_at(phase);
     let area = (b - a).perp_dot(c - a);
     let pixel_share = a.distance(b) / area.abs();
     let mut inside = 0;
-    for (x, y, pixel) in picture.enumerate_pixels() {
+    for (x, y, pixel) in image.enumerate_pixels() {
         let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
         let shares = [(b, c), (c, a), (a, b)].map(|(from, to)| (to - from).perp_dot(at - from) / area);
         let least = shares.into_iter().fold(f32::INFINITY, f32::min);
@@ -96,11 +96,11 @@ fn a_device_without_optional_features_renders_it() {
 fn another_driver_renders_it() {
     on_swiftshader(another_driver_renders_it, || {
         let Some(ctx) = device() else { return };
-        let picture = image_of(&mut triangle(&ctx), 0);
-        assert_painted(&picture, 0.0);
+        let image = image_of(&mut triangle(&ctx), 0);
+        assert_painted(&image, 0.0);
         assert_similar(
             "SwiftShader triangle",
-            &picture,
+            &image,
             &reference_image("hello_triangle_small"),
             &OTHER_DRIVER,
         );

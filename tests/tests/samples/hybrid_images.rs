@@ -1,4 +1,4 @@
-//! The pictures of the `hybrid` sample: all its ways of rendering agree, and they show what they should.
+//! Images of the `hybrid` sample: all its rendering methods agree, and the images are right.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -14,10 +14,10 @@ use lvk_tests::{device, device_with};
 
 /// No multiple of a workgroup or a band of rows.
 const SIZE: [u32; 2] = [163, 91];
-/// Nor these, for pictures of many samples.
+/// Nor these, for images of many samples.
 const SMALL: [u32; 2] = [99, 55];
 
-/// Drivers compile the shaders anew for each depth, which takes longer than the pictures: tests that need no other take
+/// Drivers compile the shaders anew for each depth, which takes longer than the images: tests that need no other take
 /// this one, and shadows alone and one bounce have one test each.
 const DEPTH: u32 = 4;
 
@@ -76,7 +76,7 @@ fn all_methods_agree_on_the_courtyard() {
 
 const HYBRID_BY_PIPELINE: (Method, RayPath) = (Method::Hybrid, RayPath::Pipeline);
 
-/// Were it not for this, a picture without mirrors would agree with itself.
+/// Were it not for this, an image without mirrors would agree with itself.
 #[test]
 fn bounces_change_mirrors_and_glass_only() {
     let Some(ctx) = device() else { return };
@@ -91,7 +91,7 @@ fn bounces_change_mirrors_and_glass_only() {
     assert!(first.difference.psnr < 25.0 && first.flip > 0.05, "the first bounce: {first}");
     let further = ImageSimilarity::measure(&four, &one);
     assert!(further.difference.psnr < 40.0 && further.flip > 0.005, "further bounces: {further}");
-    let bottom = |picture: &RgbaImage| image::imageops::crop_imm(picture, 0, SIZE[1] - 4, 40, 4).to_image();
+    let bottom = |image: &RgbaImage| image::imageops::crop_imm(image, 0, SIZE[1] - 4, 40, 4).to_image();
     assert_eq!(bottom(&none), bottom(&four), "the floor is no mirror");
 }
 
@@ -116,7 +116,7 @@ fn a_device_with_one_path_renders_by_it_and_names_the_other() {
     use FeatureRequest::{Off, Optional};
     use RayQueryRequest::{HardwareIfPresent, Off as NoQuery};
     let scene = obj_scene();
-    let mut pictures = Vec::new();
+    let mut images = Vec::new();
     for (pipeline, query, path, missing) in [
         (Optional, NoQuery, RayPath::Pipeline, RayPath::Query),
         (Off, HardwareIfPresent, RayPath::Query, RayPath::Pipeline),
@@ -130,15 +130,15 @@ fn a_device_with_one_path_renders_by_it_and_names_the_other() {
             continue;
         };
         assert_eq!(chosen, path);
-        pictures.push(
+        images.push(
             HybridHarness::new(&ctx, &scene, (Method::Hybrid, path), SIZE, DEPTH).render(&scene.cameras[2]),
         );
         let config = HybridConfig { path: missing, ..sized(SIZE) };
         let refused = HybridRenderer::new(&ctx, &scene, &config).err();
         assert!(matches!(refused, Some(HybridError::PathMissing { .. })), "{refused:?}");
     }
-    for other in &pictures[1..] {
-        assert_similar("the only path", other, &pictures[0], &SAME_RAYS);
+    for other in &images[1..] {
+        assert_similar("the only path", other, &images[0], &SAME_RAYS);
     }
 }
 
@@ -154,9 +154,9 @@ fn with_samples(
 }
 
 /// Neighbours, left and right, whose green differs by more than a third of the range.
-fn hard_steps(picture: &RgbaImage) -> usize {
-    let pairs = (0..picture.height()).flat_map(|y| (1..picture.width()).map(move |x| (x, y)));
-    pairs.filter(|(x, y)| picture.get_pixel(*x, *y)[1].abs_diff(picture.get_pixel(x - 1, *y)[1]) > 85).count()
+fn hard_steps(image: &RgbaImage) -> usize {
+    let pairs = (0..image.height()).flat_map(|y| (1..image.width()).map(move |x| (x, y)));
+    pairs.filter(|(x, y)| image.get_pixel(*x, *y)[1].abs_diff(image.get_pixel(x - 1, *y)[1]) > 85).count()
 }
 
 #[test]
@@ -184,7 +184,7 @@ fn samples_smooth_edges_and_all_methods_take_the_same_ones() {
     assert!(before > 50 && after * 3 < before * 2, "{before} hard steps, {after} with 16 samples");
 }
 
-/// The middles of a pixel's samples lie evenly in it: their mean is that of a picture four times as large, shrunk.
+/// The middles of a pixel's samples lie evenly in it: their mean is that of an image four times as large, shrunk.
 #[test]
 fn samples_are_spread_over_their_pixel() {
     let Some(ctx) = device() else { return };
@@ -194,9 +194,8 @@ fn samples_are_spread_over_their_pixel() {
     let smooth = with_samples(&ctx, &scene, SIZE, HYBRID_BY_PIPELINE, 16);
     let shrunk = shrunk(&large);
     let one = with_samples(&ctx, &scene, SIZE, HYBRID_BY_PIPELINE, 1);
-    let [near, far] =
-        [&smooth, &one].map(|picture| ImageSimilarity::measure(picture, &shrunk).difference.psnr);
-    eprintln!("{near:.1} dB from the shrunk picture, {far:.1} dB with one sample");
+    let [near, far] = [&smooth, &one].map(|image| ImageSimilarity::measure(image, &shrunk).difference.psnr);
+    eprintln!("{near:.1} dB from the shrunk image, {far:.1} dB with one sample");
     assert!(near > 36.0 && near > far + 6.0, "{near:.1} dB, {far:.1} dB with one sample");
 }
 
@@ -236,16 +235,16 @@ fn queued_bounces_give_the_very_same_image() {
         let alone = is(RayPath::Pipeline).then_some((Method::Standalone, Geometry::default(), 1));
         let ways = [1, 3].map(|samples| (Method::Hybrid, Geometry::default(), samples));
         for (method, geometry, samples) in ways.into_iter().chain(paper).chain(alone) {
-            let picture = |bounces| {
+            let image = |bounces| {
                 let bounces = Some(bounces);
                 let config = HybridConfig { method, path, geometry, samples, bounces, ..sized(SIZE) };
                 HybridHarness::with(&ctx, &scene, &config).render(&scene.cameras[1])
             };
             let what = format!("{method:?} {path:?} {geometry:?}, {samples} samples");
-            let inline = picture(Bounces::Inline);
-            assert!(picture(Bounces::Queued) == inline, "{what}, queued");
+            let inline = image(Bounces::Inline);
+            assert!(image(Bounces::Queued) == inline, "{what}, queued");
             if method == Method::Hybrid && geometry != Geometry::Paper {
-                assert!(picture(Bounces::First) == inline, "{what}, first");
+                assert!(image(Bounces::First) == inline, "{what}, first");
                 continue;
             }
             let config =
@@ -282,14 +281,14 @@ fn a_phone_with_split_meshes_renders_the_same() {
 #[test]
 fn the_still_life_looks_as_it_always_did() {
     let Some(ctx) = device() else { return };
-    let picture = small_image(&ctx, &obj_scene());
-    assert_matches_reference("hybrid_small", &picture);
+    let image = small_image(&ctx, &obj_scene());
+    assert_matches_reference("hybrid_small", &image);
 }
 
-/// What it is, and how a scene shows it.
+/// Name of a mistake, and the change of the scene that makes it.
 type Mistake<'a> = (&'a str, &'a dyn Fn(&mut Scene));
 
-/// What a shader forgets or gets wrong must not pass for another driver's rounding.
+/// A mistake in a shader differs from the reference by more than another driver's rounding.
 #[test]
 fn the_reference_image_detects_small_mistakes() {
     let Some(ctx) = device() else { return };

@@ -1,4 +1,4 @@
-//! The `hybrid_oit` sample: its lists, its shadows and its pictures against what the host computes.
+//! The `hybrid_oit` sample: its node lists, shadows and images against a reference on the host.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -17,11 +17,11 @@ use lvk_tests::{device, device_with};
 const SIZE: [u32; 2] = [163, 91];
 const MOMENT: f64 = 1.9;
 
-/// Of the same picture by pipeline and by query.
+/// Of the same image by pipeline and by query.
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
 /// Of the same lists sorted by the device and by the host.
 const SAME_GLASS: Tolerance = Tolerance { psnr: 60.0, ssim: 0.999, differing_share: 2e-4, flip: 0.01 };
-/// Of a picture and the same one on a lesser device.
+/// Of an image and the same one on a lesser device.
 const SAME_DEVICE: Tolerance = Tolerance { psnr: 60.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
 const ACROSS_DRIVERS: Tolerance = Tolerance::ACROSS_DRIVERS;
 
@@ -57,7 +57,7 @@ fn crowd() -> OitScene {
 #[test]
 fn both_paths_give_the_same_image() {
     let Some(ctx) = device() else { return };
-    let pictures = |seconds| -> Vec<RgbaImage> {
+    let images = |seconds| -> Vec<RgbaImage> {
         let take = |path| {
             let config = HybridOitConfig::new(path, SIZE[0], SIZE[1]);
             OitRenderer::new(&ctx, &OitScene::default(), &config).render(seconds)
@@ -65,9 +65,9 @@ fn both_paths_give_the_same_image() {
         paths(&ctx).into_iter().map(take).collect()
     };
     for seconds in [0.0, 5.3] {
-        let pictures = pictures(seconds);
-        for other in &pictures[1..] {
-            assert_similar("oit query", other, &pictures[0], &SAME_RAYS);
+        let images = images(seconds);
+        for other in &images[1..] {
+            assert_similar("oit query", other, &images[0], &SAME_RAYS);
         }
     }
 }
@@ -120,8 +120,8 @@ fn crossings(host: &HostScene, pixel: [u32; 2], opaque: f32) -> Option<Vec<f64>>
     (!is_doubtful).then_some(all)
 }
 
-/// A pool without nodes gives the picture behind the glass; what the host sees of it through the lists that it sorts is
-/// the picture with glass. Lists taken as they come give another.
+/// A pool without nodes gives the image behind the glass; what the host sees of it through the lists that it sorts is
+/// the image with glass. Lists taken as they come give another.
 #[test]
 fn the_image_equals_one_of_sorted_lists() {
     let Some(ctx) = device() else { return };
@@ -130,10 +130,10 @@ fn the_image_equals_one_of_sorted_lists() {
             let config = HybridOitConfig { supersampling: side, ..plain(&ctx) };
             let mut room =
                 OitRenderer::new(&ctx, &scene, &HybridOitConfig { node_capacity: Some(1 << 19), ..config });
-            let picture = room.render(MOMENT);
+            let image = room.render(MOMENT);
             let lists = room.sample.glass_lists().unwrap();
             let behind = image_behind_glass(&ctx, &scene, side, 1);
-            // Where there is no glass nothing is sorted, and the samples' 8 bits would only add their rounding.
+            // Without glass nothing is sorted, and the 8 bits of samples would only add their rounding.
             let without = image_behind_glass(&ctx, &scene, 1, side);
             let has_glass = |[x, y]: [u32; 2]| {
                 let samples =
@@ -153,30 +153,30 @@ fn the_image_equals_one_of_sorted_lists() {
                     nodes.reverse();
                     composite(&nodes, background)
                 };
-                let mut picture = averaged(side, radiance);
-                for (x, y, pixel) in picture.enumerate_pixels_mut().filter(|(x, y, _)| !has_glass([*x, *y])) {
+                let mut image = averaged(side, radiance);
+                for (x, y, pixel) in image.enumerate_pixels_mut().filter(|(x, y, _)| !has_glass([*x, *y])) {
                     *pixel = *without.get_pixel(x, y);
                 }
-                picture
+                image
             };
             let (sorted, as_they_came) = (seen(true), seen(false));
             let what = format!("{name}, {side} x {side} samples");
-            assert_similar(&what, &picture, &sorted, &SAME_GLASS);
-            let unsorted = ImageSimilarity::measure(&picture, &as_they_came).difference.psnr;
+            assert_similar(&what, &image, &sorted, &SAME_GLASS);
+            let unsorted = ImageSimilarity::measure(&image, &as_they_came).difference.psnr;
             assert!(unsorted < 45.0, "{what}: order makes no difference, so nothing was tested: {unsorted}");
             assert!(found_longest >= longest, "the longest list has {found_longest} nodes");
         }
     }
 }
 
-/// What is seen without glass, in a picture `times` as large.
+/// Renders the scene without glass, in an image `times` as large.
 fn image_behind_glass(ctx: &Context, scene: &OitScene, times: u32, supersampling: u32) -> RgbaImage {
     let [width, height] = SIZE.map(|pixels| times * pixels);
     let config = HybridOitConfig { width, height, supersampling, node_capacity: Some(0), ..plain(ctx) };
     OitRenderer::new(ctx, scene, &config).render(MOMENT)
 }
 
-/// The picture of samples, `side` a pixel along each side.
+/// The image of samples, `side` a pixel along each side.
 fn averaged(side: u32, mut radiance: impl FnMut([u32; 2]) -> [f64; 3]) -> RgbaImage {
     RgbaImage::from_fn(SIZE[0], SIZE[1], |x, y| {
         let mut sum = [0.0; 3];
@@ -189,7 +189,7 @@ fn averaged(side: u32, mut radiance: impl FnMut([u32; 2]) -> [f64; 3]) -> RgbaIm
     })
 }
 
-/// What does not fit is counted, and the lists use every node of the pool once and none beside it.
+/// Nodes that do not fit are counted, and the lists use every node of the pool once and no other memory.
 #[test]
 fn a_pool_that_runs_out_is_counted_and_safe() {
     let Some(ctx) = device() else { return };
@@ -203,12 +203,12 @@ fn a_pool_that_runs_out_is_counted_and_safe() {
     for capacity in [0, 1, 1000, asked.asked] {
         let config = HybridOitConfig { node_capacity: Some(capacity), ..config };
         let mut room = OitRenderer::new(&ctx, &scene, &config);
-        let picture = room.render(MOMENT);
+        let image = room.render(MOMENT);
         let nodes = room.sample.node_use().unwrap();
         assert_eq!((nodes.asked, nodes.capacity), (asked.asked, capacity));
         assert_eq!(nodes.lost(), asked.asked - capacity);
         assert_eq!(room.sample.glass_lists().unwrap().linked_count(), capacity as usize);
-        assert_eq!(picture == complete, capacity == asked.asked, "{capacity} nodes");
+        assert_eq!(image == complete, capacity == asked.asked, "{capacity} nodes");
     }
 }
 
@@ -244,7 +244,7 @@ fn shadows_are_those_the_host_computes() {
     }
 }
 
-/// How many points were compared.
+/// Numbers of compared points.
 #[derive(Debug, Default)]
 struct ShadowCounts {
     lit: u32,
@@ -298,12 +298,12 @@ fn a_frame_is_the_same_alone_and_in_a_sequence() {
 fn a_phone_would_render_the_same() {
     let Some(ctx) = device() else { return };
     let scene = OitScene::default();
-    let picture = |ctx: &Context| OitRenderer::new(ctx, &scene, &plain(ctx)).render(MOMENT);
-    let expected = picture(&ctx);
+    let image = |ctx: &Context| OitRenderer::new(ctx, &scene, &plain(ctx)).render(MOMENT);
+    let expected = image(&ctx);
     let profile = DeviceProfile::mali_g715();
     let Some(phone) = device_with(|desc| desc.profile = Some(&profile)) else { return };
     assert_eq!(paths(&phone), [RayPath::Query]);
-    assert_similar("oit as on a phone", &picture(&phone), &expected, &SAME_DEVICE);
+    assert_similar("oit as on a phone", &image(&phone), &expected, &SAME_DEVICE);
 }
 
 #[test]
@@ -327,14 +327,14 @@ fn scenes_without_sense_are_refused() {
 #[test]
 fn the_image_matches_the_reference() {
     let Some(ctx) = device() else { return };
-    let picture = small_image(&ctx, &OitScene::default());
-    assert_matches_reference("hybrid_oit_small", &picture);
+    let image = small_image(&ctx, &OitScene::default());
+    assert_matches_reference("hybrid_oit_small", &image);
 }
 
-/// What it is, and how a scene shows it.
+/// Name of a mistake, and the change of the scene that makes it.
 type Mistake = (&'static str, fn(&mut OitScene));
 
-/// What a shader forgets or gets wrong must not pass for another driver's rounding.
+/// A mistake in a shader differs from the reference by more than another driver's rounding.
 #[test]
 fn the_reference_image_detects_small_mistakes() {
     let Some(ctx) = device() else { return };

@@ -1,4 +1,4 @@
-//! What the `hybrid` sample sees and what is in shadow, pixel by pixel, against the reference in f64.
+//! Visibility and shadows of the `hybrid` sample, pixel by pixel, against the f64 reference.
 
 use image::RgbaImage;
 use lvk::glam::{DAffine3, DVec3, Vec3};
@@ -53,13 +53,13 @@ fn ray_through(camera: &Camera, [x, y]: [u32; 2]) -> Ray {
     Ray::new(camera.eye.into(), direction.as_vec3())
 }
 
-/// Whether a ray hits anything; `None` where that is in doubt.
+/// True if a ray hits anything; `None` where that is in doubt.
 fn is_hit(reference: &Reference, ray: &Ray) -> Option<bool> {
     let answer = reference.closest(ray, OPAQUE | REFRACTIVE);
     answer.is_certain.then_some(answer.hit.is_some())
 }
 
-/// Whether a ray hits nothing, or something that is lit by the scene's sun, or else by its lamp; `None` where that is in doubt.
+/// True if a ray hits nothing, or something that is lit by the scene's sun, or else by its lamp; `None` where that is in doubt.
 fn is_lit(scene: &Scene, reference: &Reference, ray: &Ray) -> Option<bool> {
     let answer = reference.closest(ray, OPAQUE | REFRACTIVE);
     let Some(hit) = answer.hit.filter(|_| answer.is_certain) else {
@@ -121,8 +121,8 @@ fn assert_mask(what: &str, scene: &Scene, expected: impl Fn(&Ray) -> Option<bool
     }
 }
 
-fn compare_mask(what: &str, picture: &RgbaImage, mask: &[Option<bool>], allowed: usize) {
-    let found = picture.pixels().map(|pixel| pixel.0[..3] != [0; 3]);
+fn compare_mask(what: &str, image: &RgbaImage, mask: &[Option<bool>], allowed: usize) {
+    let found = image.pixels().map(|pixel| pixel.0[..3] != [0; 3]);
     let judged = || found.clone().zip(mask).filter_map(|(found, expected)| Some((found, (*expected)?)));
     let (count, bright) = (judged().count(), judged().filter(|(_, expected)| *expected).count());
     let wrong: Vec<String> = found
@@ -138,9 +138,9 @@ fn compare_mask(what: &str, picture: &RgbaImage, mask: &[Option<bool>], allowed:
     assert!(count * 20 > mask.len() * 19, "{what}: too few pixels are certain");
     assert!(
         bright * 200 > count && (count - bright) * 200 > count,
-        "{what}: an even picture would test nothing"
+        "{what}: an even image would test nothing"
     );
-    let kept = (wrong.len() > allowed).then(|| write_test_image(what, picture));
+    let kept = (wrong.len() > allowed).then(|| write_test_image(what, image));
     assert_eq!(kept, None, "{what}: {} pixels are wrong, {:?}", wrong.len(), &wrong[..wrong.len().min(5)]);
 }
 

@@ -1,4 +1,4 @@
-//! What the `hybrid` sample's geometry passes find is what rays find, also where triangles are awkward.
+//! Geometry passes of the `hybrid` sample: they find the surfaces that rays find, also of degenerate triangles.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -116,7 +116,7 @@ fn awkward_triangles_are_seen_as_rays_see_them() {
     }
 }
 
-/// Who rasterises a triangle, and whether lists have room for it and its tiles, must not show.
+/// The rasteriser of a triangle, and lists too short for it and its tiles, must not change the image.
 #[test]
 fn tuning_and_full_lists_do_not_change_the_image() {
     let Some(ctx) = device() else { return };

@@ -1,5 +1,5 @@
-//! The pictures of the `large_scene` sample: instanced and combined worlds agree on every path and under the profiles of
-//! phones, structures are built once and loaded afterwards, and the valley looks as ever.
+//! Images of the `large_scene` sample: instanced and combined worlds agree on every path and under the profiles of
+//! phones, acceleration structures are built once and loaded later, and the valley equals the reference.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::cmp::Reverse;
@@ -60,9 +60,9 @@ fn instances_and_one_mesh_render_the_same_on_every_path() {
                     (figures.structures.len(), figures.instances),
                     (world.pieces().len(), world.instances().len())
                 );
-                let picture = image_of(&mut sample, 0);
-                let expected = first.get_or_insert_with(|| picture.clone());
-                assert_similar(&format!("{} by {path:?}", world.name()), &picture, expected, &SAME_RAYS);
+                let image = image_of(&mut sample, 0);
+                let expected = first.get_or_insert_with(|| image.clone());
+                assert_similar(&format!("{} by {path:?}", world.name()), &image, expected, &SAME_RAYS);
             }
         }
     }
@@ -93,7 +93,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Structures that were loaded, built, and built anew in place of damaged files; and the picture.
+/// Structures that were loaded, built, and built anew in place of damaged files; and the image.
 fn start(ctx: &Context, path: RayPath, world: &World, folder: &Path) -> ([usize; 3], RgbaImage) {
     let config = LargeSceneConfig { cache: Some(folder.to_owned()), ..config(path) };
     let mut sample = make(ctx, world, &config);
@@ -189,9 +189,9 @@ fn numbers_are_rendered_the_same_on_every_path() {
         let mut first: Option<RgbaImage> = None;
         for (ctx, path) in contexts_and_paths(&ctx, software.as_deref()) {
             let mut sample = make(ctx, &street(), &LargeSceneConfig { show, ..config(path) });
-            let picture = image_of(&mut sample, 0);
-            let expected = first.get_or_insert_with(|| picture.clone());
-            assert_similar(&format!("{show:?}"), &picture, expected, &SAME_RAYS);
+            let image = image_of(&mut sample, 0);
+            let expected = first.get_or_insert_with(|| image.clone());
+            assert_similar(&format!("{show:?}"), &image, expected, &SAME_RAYS);
         }
         let plain = image_of(&mut make(&ctx, &street(), &config(paths(&ctx)[0])), 0);
         assert!(first.is_some_and(|first| first != plain), "{show:?} shows the picture");
@@ -280,9 +280,9 @@ fn the_archives_make_a_street() {
     let mut first = None;
     for (ctx, path) in contexts_and_paths(&ctx, software.as_deref()) {
         for world in [&world, &world.combined().unwrap()] {
-            let picture = image_of(&mut make(ctx, world, &config(path)), 0);
-            let expected = first.get_or_insert_with(|| picture.clone());
-            assert_similar(&format!("archives by {path:?}"), &picture, expected, &SAME_RAYS);
+            let image = image_of(&mut make(ctx, world, &config(path)), 0);
+            let expected = first.get_or_insert_with(|| image.clone());
+            assert_similar(&format!("archives by {path:?}"), &image, expected, &SAME_RAYS);
         }
     }
 }

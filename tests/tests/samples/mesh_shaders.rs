@@ -1,5 +1,5 @@
-//! The pictures of the `mesh_shaders` sample: meshlets that are left out are not missed, and what task and mesh shaders draw is
-//! what a vertex shader draws.
+//! Images of the `mesh_shaders` sample: culled meshlets change no pixel, and task and mesh shaders draw what a vertex
+//! shader draws.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -69,7 +69,7 @@ fn knot(ctx: &Context, culls: bool) -> MeshShaders {
     MeshShaders::new(ctx, SIZE, culls).unwrap()
 }
 
-/// What a vertex shader draws of the frame that `sample` has drawn last.
+/// Draws, by a vertex shader, the frame that `sample` has drawn last.
 fn by_vertex_shader(ctx: &Context, sample: &MeshShaders) -> RgbaImage {
     let canvas = Canvas::with_depth(ctx, SIZE).unwrap();
     let state = RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() };
@@ -128,8 +128,8 @@ fn a_vertex_shader_draws_the_same() {
     let Some(ctx) = mesh_device() else { return };
     let mut sample = knot(&ctx, true);
     for frame in [0, 55] {
-        let picture = image_of(&mut sample, frame);
-        assert_similar("knot by vertex shader", &by_vertex_shader(&ctx, &sample), &picture, &SAME_TRIANGLES);
+        let image = image_of(&mut sample, frame);
+        assert_similar("knot by vertex shader", &by_vertex_shader(&ctx, &sample), &image, &SAME_TRIANGLES);
     }
 }
 

@@ -1,5 +1,5 @@
-//! The pictures of the `omni_shadows` sample: its shadows are those that rays find, in whatever way the cube map of them is
-//! drawn, and they look as ever.
+//! Images of the `omni_shadows` sample: shadows equal those that rays find, for every method to draw the cube map,
+//! and equal the reference.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -35,12 +35,12 @@ fn lamp(ctx: &Context, config: &OmniShadowsConfig) -> OmniShadows {
 #[test]
 fn one_pass_and_six_give_the_same_image() {
     let Some(ctx) = device() else { return };
-    let picture = |faces| {
+    let image = |faces| {
         let mut sample = lamp(&ctx, &OmniShadowsConfig { faces, shows_cube: true, ..usual() });
         assert_eq!(sample.is_multiview(), faces == Faces::Multiview);
         image_of(&mut sample, 21)
     };
-    assert!(picture(Faces::Multiview) == picture(Faces::Single));
+    assert!(image(Faces::Multiview) == image(Faces::Single));
 }
 
 #[test]
@@ -85,7 +85,7 @@ fn pixel_rays(camera: &Camera) -> Vec<Ray> {
     (0..SIZE[0] * SIZE[1]).map(through).collect()
 }
 
-/// Whether each pixel lies in shadow as rays find it; `None` where that cannot be told, or the lamp is behind the surface.
+/// True if each pixel lies in shadow as rays find it; `None` where that cannot be told, or the lamp is behind the surface.
 fn traced_shadows(ctx: &Context, sample: &OmniShadows) -> Vec<Option<bool>> {
     let [casters, others] = sample.triangles();
     let everything = [&casters[..], &others[..]].concat();
@@ -115,13 +115,13 @@ fn check_shadows(ctx: &Context, view: &Camera) -> [usize; 2] {
     let config = |filter| OmniShadowsConfig { filter, haze: 0.0, shadow_size: 2048, ..usual() };
     let [mut lit, mut shadowed] =
         [ShadowFilter::Off, ShadowFilter::Hard].map(|filter| lamp(ctx, &config(filter)));
-    let pictures = [&mut lit, &mut shadowed].map(|sample| {
+    let images = [&mut lit, &mut shadowed].map(|sample| {
         sample.set_view(view);
         image_now(sample)
     });
     let expected = traced_shadows(ctx, &shadowed);
     let (width, mut counts, mut wrong) = (SIZE[0] as usize, [0, 0], Vec::new());
-    for (x, y, pixel) in pictures[0].enumerate_pixels() {
+    for (x, y, pixel) in images[0].enumerate_pixels() {
         let (x, y) = (x as usize, y as usize);
         if x == 0 || y == 0 || x + 1 == width || y + 1 == SIZE[1] as usize {
             continue;
@@ -132,7 +132,7 @@ fn check_shadows(ctx: &Context, view: &Camera) -> [usize; 2] {
             continue;
         }
         counts[usize::from(is_dark)] += 1;
-        let other = pictures[1].get_pixel(x as u32, y as u32);
+        let other = images[1].get_pixel(x as u32, y as u32);
         if is_dark != (pixel != other) {
             wrong.push((x, y));
         }
@@ -169,11 +169,11 @@ fn shadows_are_those_that_rays_find() {
 #[test]
 fn a_larger_lamp_makes_softer_edges_and_no_other_light() {
     let Some(ctx) = device() else { return };
-    let picture = |filter, lamp_radius| {
+    let image = |filter, lamp_radius| {
         image_of(&mut lamp(&ctx, &OmniShadowsConfig { filter, lamp_radius, haze: 0.0, ..usual() }), 0)
     };
-    let hard = picture(ShadowFilter::Linear, 0.0);
-    let [sharp, soft] = [0.002, 0.05].map(|radius| picture(ShadowFilter::Soft, radius));
+    let hard = image(ShadowFilter::Linear, 0.0);
+    let [sharp, soft] = [0.002, 0.05].map(|radius| image(ShadowFilter::Soft, radius));
     let [near, far] = [&sharp, &soft].map(edges);
     assert!(far < 0.8 * near, "edges of {far} are no softer than of {near}");
     let [dim, bright] = [&hard, &soft].map(mean);
@@ -181,14 +181,14 @@ fn a_larger_lamp_makes_softer_edges_and_no_other_light() {
 }
 
 /// Mean difference of pixels side by side.
-fn edges(picture: &RgbaImage) -> f64 {
-    let rows = picture.rows().map(|row| row.map(|pixel| f64::from(pixel[1])).collect::<Vec<_>>());
+fn edges(image: &RgbaImage) -> f64 {
+    let rows = image.rows().map(|row| row.map(|pixel| f64::from(pixel[1])).collect::<Vec<_>>());
     let steps = rows.flat_map(|row| row.windows(2).map(|pair| (pair[0] - pair[1]).abs()).collect::<Vec<_>>());
     steps.sum::<f64>() / f64::from(SIZE[0] * SIZE[1])
 }
 
-fn mean(picture: &RgbaImage) -> f64 {
-    picture.pixels().map(|pixel| f64::from(pixel[1])).sum::<f64>() / f64::from(SIZE[0] * SIZE[1])
+fn mean(image: &RgbaImage) -> f64 {
+    image.pixels().map(|pixel| f64::from(pixel[1])).sum::<f64>() / f64::from(SIZE[0] * SIZE[1])
 }
 
 #[test]
@@ -207,8 +207,8 @@ fn the_lamp_looks_as_it_always_did() {
 fn another_driver_renders_it() {
     on_swiftshader(another_driver_renders_it, || {
         let Some(ctx) = device() else { return };
-        let picture = image_of(&mut lamp(&ctx, &usual()), 0);
-        assert_similar("SwiftShader lamp", &picture, &reference_image("omni_shadows_small"), &OTHER_DRIVER);
+        let image = image_of(&mut lamp(&ctx, &usual()), 0);
+        assert_similar("SwiftShader lamp", &image, &reference_image("omni_shadows_small"), &OTHER_DRIVER);
     });
 }
 

@@ -1,4 +1,4 @@
-//! Panels of samples that make targets and pipelines anew for what is asked of them: the picture is then that of a sample made so.
+//! Panels of samples that recreate targets and pipelines: after a change the image equals that of a new sample.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::fmt::Debug;

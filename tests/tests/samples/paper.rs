@@ -1,4 +1,4 @@
-//! The paper's experiment on a tiny scene: it measures everything, and its report is whole and consistent.
+//! The paper's experiment on a tiny scene: it measures everything, and its report is complete and consistent.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::collections::HashMap;
@@ -22,8 +22,8 @@ fn experiment(folder: &Path) -> Option<Experiment> {
     scene.name = "conference".to_owned();
     let paths = paths(&ctx).into_iter().map(|path| TracePath::of(path, ctx.capabilities())).collect();
     let plan = Plan { size: SIZE, frames: FRAMES, runs: 1, warm_up: 0, compared: 2, max_depth: 2, paths };
-    let pictures = Pictures::new(&folder.join(PICTURES), SIZE).unwrap();
-    let found = measure(&ctx, &scene, &plan, &pictures, &mut Progress::hidden()).unwrap();
+    let images = Pictures::new(&folder.join(PICTURES), SIZE).unwrap();
+    let found = measure(&ctx, &scene, &plan, &images, &mut Progress::hidden()).unwrap();
     let mut experiment = Experiment::new(ctx.capabilities(), "bench paper".to_owned(), plan);
     experiment.scenes.push(found);
     experiment.write(folder).unwrap();
@@ -138,8 +138,8 @@ fn assert_images_are_similar(folder: &Path, experiment: &Experiment) {
     for path in &experiment.plan.paths {
         let name = path.file_name();
         let file = |what: &str| folder.join(PICTURES).join(format!("conference_{name}_cam3_{what}.png"));
-        let picture = |what: &str| image::open(file(what)).unwrap().into_rgba8();
-        let (standalone, difference) = (picture("standalone"), picture("difference"));
+        let image = |what: &str| image::open(file(what)).unwrap().into_rgba8();
+        let (standalone, difference) = (image("standalone"), image("difference"));
         assert_eq!((standalone.dimensions(), difference.dimensions()), ((96, 54), (98, 56)));
         let white = difference.pixels().filter(|pixel| pixel.0 == [255; 4]).count();
         assert!(white > 96 * 54 / 2, "only {white} pixels are equal");

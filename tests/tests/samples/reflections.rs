@@ -1,4 +1,4 @@
-//! The pictures of the `reflections` sample: its ways of rendering agree, and they show what they should.
+//! Images of the `reflections` sample: its rendering paths agree, and the images are right.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -20,7 +20,7 @@ use lvk_tests::{device, device_with};
 
 /// No multiple of a work group.
 const SIZE: [u32; 2] = [162, 91];
-/// Of one picture by two paths.
+/// Of one image by two paths.
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.999, differing_share: 2e-3, flip: 2e-3 };
 
 fn config(path: RayPath) -> ReflectionsConfig {
@@ -116,7 +116,7 @@ fn the_refitted_serpent_is_the_one_built_anew() {
             render_image(&mut hall)
         };
         let moved = ImageSimilarity::measure(&refitted, &elsewhere);
-        assert!(moved.difference.psnr < 28.0, "the serpent is large in the picture, and swims: {moved}");
+        assert!(moved.difference.psnr < 28.0, "the serpent is large in the image, and swims: {moved}");
         let what = format!("refitted serpent {path:?}");
         assert_similar(
             &what,
@@ -133,8 +133,8 @@ fn culling_leaves_out_small_things_and_nothing_else() {
     let path = paths(&ctx)[0];
     let with = |min_angle| {
         let mut hall = hall(&ctx, &ReflectionsConfig { min_angle, ..config(path) });
-        let picture = image_at(&mut hall, 0.0);
-        (hall.instance_count(), picture)
+        let image = image_at(&mut hall, 0.0);
+        (hall.instance_count(), image)
     };
     let (all, whole) = with(0.0);
     let (usual, culled) = with(ReflectionsConfig::DEFAULT_MIN_ANGLE);
@@ -211,8 +211,8 @@ fn a_phone_renders_the_same() {
         return;
     }
     let expected = image_at(&mut hall(&ctx, &config(path)), 1.0);
-    let picture = image_at(&mut hall(&rehearsal, &config(path)), 1.0);
-    assert_similar("hall on a phone", &picture, &expected, &Tolerance { psnr: 60.0, ..SAME_RAYS });
+    let image = image_at(&mut hall(&rehearsal, &config(path)), 1.0);
+    assert_similar("hall on a phone", &image, &expected, &Tolerance { psnr: 60.0, ..SAME_RAYS });
 }
 
 #[test]
@@ -234,6 +234,6 @@ fn impossible_images_are_refused() {
 fn the_hall_looks_as_it_always_did() {
     let Some(ctx) = device() else { return };
     let config = ReflectionsConfig { samples: 4, ..config(paths(&ctx)[0]) };
-    let picture = image_at(&mut hall(&ctx, &config), 0.0);
-    assert_matches_reference("reflections_small", &picture);
+    let image = image_at(&mut hall(&ctx, &config), 0.0);
+    assert_matches_reference("reflections_small", &image);
 }

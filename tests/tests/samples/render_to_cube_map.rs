@@ -1,5 +1,5 @@
-//! The pictures of the `render_to_cube_map` sample: both ways to draw the faces agree, and every texel of a face shows what a
-//! ray in its direction meets.
+//! Images of the `render_to_cube_map` sample: both methods to draw the faces agree, and every texel of a face has
+//! what a ray in its direction hits.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use glam::{Mat3, Vec3};
@@ -93,7 +93,7 @@ fn lit(albedo: Vec3, at: Vec3, normal: Vec3) -> Vec3 {
     (albedo * light).lerp(HORIZON, 1.0 - (-0.0003 * at.length_squared()).exp())
 }
 
-/// What a ray from the middle of the drop meets.
+/// Returns the radiance along a ray from the middle of the drop.
 fn radiance(blocks: &[Block], direction: Vec3) -> Vec3 {
     let entries = blocks.iter().filter_map(|block| Some((block, entry(block, direction)?)));
     let nearest = entries.min_by(|(_, (a, _)), (_, (b, _))| a.total_cmp(b));
@@ -171,10 +171,10 @@ fn six_passes_need_no_feature_and_one_pass_says_which() {
     let Some(error @ RasterError::Missing { .. }) = refused else { unreachable!("{refused:?}") };
     let text = error.to_string();
     assert!(text.contains("six views") && text.contains("--faces six-passes"), "{text}");
-    let picture = image_of(&mut sample(&ctx, Faces::SixPasses), 0);
+    let image = image_of(&mut sample(&ctx, Faces::SixPasses), 0);
     assert_similar(
         "cube map without features",
-        &picture,
+        &image,
         &reference_image("render_to_cube_map_small"),
         &Tolerance::ACROSS_DRIVERS,
     );
@@ -185,10 +185,10 @@ fn another_driver_renders_it_by_both_paths() {
     on_swiftshader(another_driver_renders_it_by_both_paths, || {
         let Some(ctx) = device() else { return };
         assert_one_pass_equals_six(&ctx);
-        let picture = image_of(&mut sample(&ctx, Faces::OnePass), 0);
+        let image = image_of(&mut sample(&ctx, Faces::OnePass), 0);
         assert_similar(
             "SwiftShader cube map",
-            &picture,
+            &image,
             &reference_image("render_to_cube_map_small"),
             &OTHER_DRIVER,
         );

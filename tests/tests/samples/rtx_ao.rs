@@ -1,5 +1,5 @@
-//! The pictures of the `rtx_ao` sample: its paths agree, it converges to what a reference in f64 finds, and its cache
-//! forgets what has moved.
+//! Images of the `rtx_ao` sample: its paths agree, it converges to a reference in f64, and its cache drops what has
+//! moved.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -49,9 +49,9 @@ fn all_paths_render_the_town() {
             town.update(Moment::of_frame(phase, 20)).unwrap();
             render_image(town)
         };
-        let pictures: Vec<_> = all.iter_mut().map(&mut show).collect();
-        for other in &pictures[1..] {
-            assert_similar(&format!("town in frame {phase}"), other, &pictures[0], &SAME_RAYS);
+        let images: Vec<_> = all.iter_mut().map(&mut show).collect();
+        for other in &images[1..] {
+            assert_similar(&format!("town in frame {phase}"), other, &images[0], &SAME_RAYS);
         }
     }
 }
@@ -109,7 +109,7 @@ impl World {
         Self { scenes, reference }
     }
 
-    /// Where a ray ends, and the geometric and the shading normal there, towards its origin.
+    /// Returns the end of a ray, and the geometric and the shading normal there, towards its origin.
     fn surface(&self, ray: &Ray, hit: &Hit) -> [DVec3; 3] {
         let scene = &self.scenes[hit.ids.custom_index as usize];
         let corners = scene.triangles[hit.ids.primitive as usize].map(|corner| corner as usize);
@@ -207,11 +207,11 @@ fn the_town_looks_as_it_always_did() {
     assert_matches_reference("rtx_ao_small", &render_image(&mut town(&ctx, paths(&ctx)[0], 16, 2)));
 }
 
-fn small(picture: &RgbaImage) -> RgbaImage {
-    resize(picture, SIZE[0] / 4, SIZE[1] / 4, FilterType::Triangle)
+fn small(image: &RgbaImage) -> RgbaImage {
+    resize(image, SIZE[0] / 4, SIZE[1] / 4, FilterType::Triangle)
 }
 
-/// What the next test asks of another driver.
+/// The next test, on the usual driver.
 #[test]
 fn few_passes_render_the_same_but_for_noise_and_nothing_else_does() {
     let Some(ctx) = software_device() else { return };
@@ -231,10 +231,10 @@ fn few_passes_render_the_same_but_for_noise_and_nothing_else_does() {
 fn a_driver_without_ray_tracing_renders_the_town() {
     on_swiftshader(a_driver_without_ray_tracing_renders_the_town, || {
         let Some(ctx) = device_with(|desc| desc.ray_query = RayQueryRequest::Auto) else { return };
-        let picture = render_image(&mut town(&ctx, RayPath::Query, 2, 2));
+        let image = render_image(&mut town(&ctx, RayPath::Query, 2, 2));
         assert_similar(
             "SwiftShader town",
-            &small(&picture),
+            &small(&image),
             &small(&reference_image("rtx_ao_small")),
             &OTHER_NOISE,
         );

@@ -1,15 +1,15 @@
-//! The pictures of the `rtx_hello` sample: its ways of tracing agree, its triangles turn, and they look as ever.
+//! Images of the `rtx_hello` sample: its paths agree, its triangles turn, and they equal the reference.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::Context;
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::rtx::{RtxConfig, RtxError};
+use lvk_samples::rtx::RtxConfig;
 use lvk_samples::rtx_hello::{Following, RtxHello};
 use lvk_tests::device;
 use lvk_tests::hybrid::paths;
 use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_swiftshader_matches};
 use lvk_tests::raster_sample::ROUND;
-use lvk_tests::rtx_sample::{SIZE, assert_paths_agree, image_of};
+use lvk_tests::rtx_sample::{SIZE, assert_paths_agree, assert_refuses_impossible_sizes, image_of};
 
 const SAME_RAYS: Tolerance = Tolerance { psnr: 55.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
 
@@ -43,11 +43,11 @@ fn switches_of_the_panel_hide_triangles_and_choose_the_update() {
     let all = image_of(&mut sample, 40);
     let without = [0, 1, 2].map(|group| {
         sample.switches().is_seen[group] = false;
-        let picture = image_of(&mut sample, 40);
+        let image = image_of(&mut sample, 40);
         sample.switches().is_seen[group] = true;
-        picture
+        image
     });
-    assert!(without.iter().all(|picture| *picture != all), "each hides something");
+    assert!(without.iter().all(|image| *image != all), "each hides something");
     assert!(without[0] != without[1] && without[1] != without[2] && without[2] != without[0]);
     for following in [Following::Refits, Following::Rebuilds, Following::Both] {
         sample.switches().following = following;
@@ -74,9 +74,5 @@ fn a_driver_without_ray_tracing_renders_the_triangles() {
 #[test]
 fn impossible_images_are_refused() {
     let Some(ctx) = device() else { return };
-    let path = paths(&ctx)[0];
-    for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {
-        let error = RtxHello::new(&ctx, &RtxConfig { path, width, height }).err();
-        assert!(matches!(error, Some(RtxError::BadSize { .. })), "{error:?}");
-    }
+    assert_refuses_impossible_sizes(&ctx, |rtx| RtxHello::new(&ctx, rtx).err());
 }

@@ -1,4 +1,4 @@
-//! Sequences of pictures: frame N depends on N alone, and Ctrl-C leaves whole pictures.
+//! Image sequences: frame N depends on N alone, and Ctrl-C leaves complete images.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::Path;
@@ -92,7 +92,7 @@ mod interrupted {
     const OBJ: &str = "v -2 -2 0\nv 2 -2 0\nv 0 2 0\nv -9 -9 -3\nv 9 -9 -3\nv 9 9 -3\nv -9 9 -3\n\
                        f 1 2 3\nf 4 5 6 7\n";
 
-    /// What the program of the sample does, in this process.
+    /// Runs the program of the sample in this process.
     fn program(folder: &Path) -> ! {
         std::fs::write(folder.join("scene.obj"), OBJ).unwrap();
         let out = folder.join("frames/frame_######.png");
@@ -141,8 +141,8 @@ mod interrupted {
         assert!(written.len() >= 3);
         for (name, content) in written {
             assert!(name.starts_with("frame_") && name.ends_with(".png"), "{name} was left behind");
-            let picture = image::load_from_memory(&content).unwrap();
-            assert_eq!((picture.width(), picture.height()), (48, 27), "{name}");
+            let image = image::load_from_memory(&content).unwrap();
+            assert_eq!((image.width(), image.height()), (48, 27), "{name}");
         }
     }
 }

@@ -1,5 +1,6 @@
-//! The pictures of the `sponza` sample: culling leaves what a reference on the CPU leaves and changes no pixel, with one and with
-//! four samples a pixel, by counted and by padded draws; shadows, holes and relief are where they belong, and the atrium looks as ever.
+//! Images of the `sponza` sample: GPU culling keeps what a reference on the CPU keeps and changes no pixel, with one
+//! and with four samples a pixel, by counted and by padded draws; shadows, holes and normal maps are right, and the
+//! atrium equals the reference.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::sync::LazyLock;
@@ -62,13 +63,13 @@ fn culling_changes_no_pixel() {
             let mut culled = make(&ctx, &TOWN, &SponzaConfig { draws: Some(path), ..town });
             assert_eq!(culled.draw_path(), path);
             for frame in [0, 20, 33, 60] {
-                let (picture, expected) = (image_of(&mut culled, frame), image_of(&mut whole, frame));
+                let (image, expected) = (image_of(&mut culled, frame), image_of(&mut whole, frame));
                 let all = whole.draws().len() as u32;
                 assert_eq!(whole.counts().unwrap(), [all; 2], "nothing is culled");
                 let [camera, sun] = culled.counts().unwrap();
                 assert!(camera > 0 && camera < all, "{camera} of {all} draws in frame {frame}");
                 assert_eq!(sun, all, "the shadow map shows the whole scene");
-                assert!(picture == expected, "frame {frame}, {samples} samples, {path:?}");
+                assert!(image == expected, "frame {frame}, {samples} samples, {path:?}");
             }
         }
     }
@@ -131,15 +132,15 @@ fn shadows_and_holes_are_where_they_belong() {
     let Some(ctx) = device() else { return };
     let scene = shadow_mask_scene();
     let mut sample = make(&ctx, &scene, &config(1));
-    let picture = image_of(&mut sample, 0);
-    // Where a point in the plane at this height is seen, from 9 above.
+    let image = image_of(&mut sample, 0);
+    // Pixel of a point in the plane at this height, seen from 9 above.
     let camera = scene.cameras[0];
     let pixel = |x: f32, y: f32, z: f32| -> Rgba<u8> {
         let clip =
             camera.clip_from_view(SIZE[0] as f32 / SIZE[1] as f32, 0.1, 100.0) * camera.view_from_world();
         let at = clip.project_point3(lvk::glam::Vec3::new(x, y, z));
         let place = |ndc: f32, size: u32| ((0.5 + 0.5 * ndc) * size as f32) as u32;
-        *picture.get_pixel(place(at.x, SIZE[0]), place(at.y, SIZE[1]))
+        *image.get_pixel(place(at.x, SIZE[0]), place(at.y, SIZE[1]))
     };
     let is_red = |found: Rgba<u8>| found[0] / 2 > found[1];
     assert!(is_red(pixel(0.7, 2.0, 0.0)) && is_red(pixel(0.0, 2.0, 0.7)), "the board");

@@ -1,5 +1,5 @@
-//! The pictures of the `triplanar` sample: textures go and come while frames are on their way, what shows them changes and nothing
-//! else, and nothing is left behind.
+//! Images of the `triplanar` sample: textures are loaded and freed with frames in flight, only the bodies that sample
+//! them change, and no memory is left.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -27,7 +27,7 @@ fn all() -> std::ops::Range<usize> {
     0..Triplanar::texture_names().len()
 }
 
-/// Submits a frame that nobody waits for.
+/// Submits a frame without waiting for it.
 fn send(sample: &mut Triplanar, frame: u32) {
     sample.update(Moment::of_frame(frame, ROUND)).unwrap();
     let mut frame = Frame::free(&sample.context().clone()).unwrap();
@@ -80,10 +80,10 @@ fn a_frame_on_its_way_keeps_the_textures_it_samples() {
     let whole = image_of(&mut sample, 0);
     sample.update(Moment::of_frame(0, ROUND)).unwrap();
     let mut frame = Frame::free(&ctx).unwrap();
-    let picture = sample.record(&mut frame).unwrap();
+    let image = sample.record(&mut frame).unwrap();
     frame.finish().unwrap();
     all().for_each(|number| sample.unload(number));
-    let pixels = ctx.download_texture(picture, &lvk::TextureRegion::default()).unwrap();
+    let pixels = ctx.download_texture(image, &lvk::TextureRegion::default()).unwrap();
     assert!(pixels == *whole.as_raw());
 }
 
@@ -143,8 +143,8 @@ fn bodies_look_as_they_always_did() {
 fn a_device_without_optional_features_renders_them() {
     let profile = DeviceProfile::core_only();
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
-    let picture = image_of(&mut sample(&ctx), 0);
-    assert_similar("bodies without features", &picture, &reference_image("triplanar_small"), &OTHER_DRIVER);
+    let image = image_of(&mut sample(&ctx), 0);
+    assert_similar("bodies without features", &image, &reference_image("triplanar_small"), &OTHER_DRIVER);
 }
 
 #[test]
@@ -152,14 +152,14 @@ fn another_driver_renders_them() {
     on_swiftshader(another_driver_renders_them, || {
         let Some(ctx) = device() else { return };
         let mut sample = sample(&ctx);
-        let picture = image_of(&mut sample, 0);
+        let image = image_of(&mut sample, 0);
         all().for_each(|number| sample.unload(number));
         send(&mut sample, 5);
         all().for_each(|number| sample.load(number));
         send(&mut sample, 6);
         sample.wait_for_textures().unwrap();
-        assert!(image_of(&mut sample, 0) == picture);
-        assert_similar("SwiftShader bodies", &picture, &reference_image("triplanar_small"), &OTHER_DRIVER);
+        assert!(image_of(&mut sample, 0) == image);
+        assert_similar("SwiftShader bodies", &image, &reference_image("triplanar_small"), &OTHER_DRIVER);
     });
 }
 

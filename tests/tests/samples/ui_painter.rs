@@ -42,7 +42,7 @@ impl Easel {
         Self { ctx: ctx.clone(), ui, painter, target: ctx.create_texture(&desc).unwrap() }
     }
 
-    /// What `paint` puts on the ground, in pixels.
+    /// Returns the pixels after `paint` has drawn over the ground.
     fn paint(&mut self, shown: &[TextureHandle], paint: impl Fn(&egui::Painter)) -> RgbaImage {
         self.paint_with(1.0, shown, paint)
     }
@@ -84,7 +84,7 @@ fn rect(low: [f32; 2], high: [f32; 2]) -> Rect {
     Rect { min: low.into(), max: high.into() }
 }
 
-/// Which pixels are not the ground.
+/// Returns the pixels that differ from the ground.
 fn touched(picture: &RgbaImage) -> Vec<(u32, u32)> {
     picture.enumerate_pixels().filter(|(.., pixel)| pixel.0 != GROUND).map(|(x, y, _)| (x, y)).collect()
 }

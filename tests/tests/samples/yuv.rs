@@ -1,5 +1,5 @@
-//! The pictures of the `yuv` sample: what shaders sample is what arithmetic makes of the planes, in every format and by every
-//! conversion, and it looks as ever.
+//! Images of the `yuv` sample: sampled colours equal those computed from the planes, in every format and by every
+//! conversion, and the image equals the reference.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -19,7 +19,7 @@ use lvk_tests::subprocess::on_swiftshader;
 
 /// As computed: but for the weights of colour differences between texels, which drivers round.
 const AS_COMPUTED: Tolerance = Tolerance { psnr: 46.0, ssim: 0.998, differing_share: 0.2, flip: 0.025 };
-/// As it was before it was encoded, when colour differences had the same size as the picture.
+/// As it was before it was encoded, when colour differences had the same size as the image.
 const AS_FILMED: Tolerance = Tolerance { psnr: 24.0, ssim: 0.9, differing_share: 1.0, flip: 0.1 };
 const FRAME: u32 = 30;
 
@@ -44,7 +44,7 @@ fn decode_plane(plane: &[u8], format: YuvFormat) -> Vec<f64> {
     }
 }
 
-/// What the planes show: colour differences lie at every second texel of every second row.
+/// Returns the colours of the planes: chroma samples are at every second texel of every second row.
 fn computed(planes: &[Vec<u8>], config: &YuvConfig, format: YuvFormat) -> RgbaImage {
     let all: Vec<_> = planes.iter().map(|plane| decode_plane(plane, format)).collect();
     let [width, height] = config.film.map(|side| side as usize);
@@ -108,10 +108,10 @@ fn every_format_and_conversion_is_as_computed() {
             for range in [YuvRange::Narrow, YuvRange::Full] {
                 let config = YuvConfig { format: Some(format), model, range, ..usual() };
                 let mut sample = sample(&ctx, &config);
-                let picture = image_of(&mut sample, FRAME);
+                let image = image_of(&mut sample, FRAME);
                 let what = format!("{format:?} {model:?} {range:?}");
-                assert_similar(&what, &picture, &computed(&sample.planes(), &config, format), &AS_COMPUTED);
-                assert_similar(&format!("{what} filmed"), &picture, &filmed, &AS_FILMED);
+                assert_similar(&what, &image, &computed(&sample.planes(), &config, format), &AS_COMPUTED);
+                assert_similar(&format!("{what} filmed"), &image, &filmed, &AS_FILMED);
             }
         }
     }
@@ -122,14 +122,14 @@ fn every_format_and_conversion_is_as_computed() {
 fn other_conversions_render_other_images() {
     let Some(ctx) = yuv_device() else { return };
     let mut sample = sample(&ctx, &usual());
-    let (picture, planes, format) = (image_of(&mut sample, FRAME), sample.planes(), sample.format());
+    let (image, planes, format) = (image_of(&mut sample, FRAME), sample.planes(), sample.format());
     for (model, range) in [
         (YuvModel::Bt601, YuvRange::Narrow),
         (YuvModel::Bt2020, YuvRange::Narrow),
         (YuvModel::Bt709, YuvRange::Full),
     ] {
         let other = computed(&planes, &YuvConfig { model, range, ..usual() }, format);
-        let similarity = ImageSimilarity::measure(&picture, &other);
+        let similarity = ImageSimilarity::measure(&image, &other);
         assert!(!similarity.is_within(&AS_COMPUTED), "{model:?} {range:?}: {similarity}");
     }
 }
@@ -142,23 +142,23 @@ fn the_next_format_follows_and_the_first_comes_again() {
     let first = image_of(&mut sample, FRAME);
     for number in 1..=formats.len() {
         sample.next();
-        let picture = image_now(&mut sample);
+        let image = image_now(&mut sample);
         assert_eq!(sample.format(), formats[number % formats.len()]);
-        assert_similar("the next format", &picture, &filmed(), &AS_FILMED);
+        assert_similar("the next format", &image, &filmed(), &AS_FILMED);
     }
     assert!(image_now(&mut sample) == first);
 }
 
-/// Where the planes are shown, the picture is covered by greys.
+/// Pixels that show planes are grey.
 #[test]
 fn planes_are_shown_as_greys() {
     let Some(ctx) = yuv_device() else { return };
-    let picture = image_of(&mut sample(&ctx, &YuvConfig { shows_planes: true, ..usual() }), FRAME);
-    write_test_image("yuv planes", &picture);
+    let image = image_of(&mut sample(&ctx, &YuvConfig { shows_planes: true, ..usual() }), FRAME);
+    write_test_image("yuv planes", &image);
     let place = |share: f32, side: u32| (share * side as f32) as u32;
     for which in [0.1, 0.4, 0.7] {
         for across in [0.06, 0.15, 0.25] {
-            let pixel = picture.get_pixel(place(across, SIZE[0]), place(which, SIZE[1]));
+            let pixel = image.get_pixel(place(across, SIZE[0]), place(which, SIZE[1]));
             let [red, green, blue, _] = pixel.0;
             assert!(red.abs_diff(green) <= 1 && green.abs_diff(blue) <= 1, "{which} {across}: {pixel:?}");
         }
@@ -183,8 +183,8 @@ fn another_driver_renders_it() {
     on_swiftshader(another_driver_renders_it, || {
         let Some(ctx) = yuv_device() else { return };
         let mut sample = sample(&ctx, &YuvConfig { shows_planes: true, ..usual() });
-        let picture = image_of(&mut sample, FRAME);
-        assert_similar("SwiftShader card", &picture, &reference_image("yuv_small"), &AS_COMPUTED);
+        let image = image_of(&mut sample, FRAME);
+        assert_similar("SwiftShader card", &image, &reference_image("yuv_small"), &AS_COMPUTED);
     });
 }
 

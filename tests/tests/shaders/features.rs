@@ -1,4 +1,5 @@
-//! Shaders that use a device feature work where the device has it and are refused, by its name, where it has not.
+//! Shaders that use a device feature: they work where the device has it, and are refused with the feature's name
+//! where it has not.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::ash::vk;
@@ -14,7 +15,7 @@ use lvk_tests::subprocess::on_swiftshader;
 /// A device feature by name, and whether it was found.
 type Feature = (&'static str, fn(&Found) -> vk::Bool32);
 
-/// What the device offers.
+/// Features of the device.
 #[derive(Default)]
 struct Found {
     core: vk::PhysicalDeviceFeatures,
@@ -46,7 +47,7 @@ impl Found {
     }
 }
 
-/// Which of `features` the device lacks.
+/// Returns those of `features` that the device lacks.
 fn missing(found: &Found, features: &[Feature]) -> Vec<&'static str> {
     features.iter().filter(|(_, is_on)| is_on(found) == vk::FALSE).map(|(name, _)| *name).collect()
 }

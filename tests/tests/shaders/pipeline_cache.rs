@@ -1,4 +1,4 @@
-//! The file of compiled pipelines: it is written, found again, and dropped with a warning when it does not fit.
+//! The file of the pipeline cache: it is written, loaded again, and dropped with a warning when it is damaged.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use std::path::{Path, PathBuf};

@@ -1,5 +1,5 @@
-//! What is damaged, made up, empty, garbage or gone: software queries answer with an error or with a miss. Nothing is read
-//! beyond its end, no walk goes on for ever, and nobody beside it is lost.
+//! Damaged, invented, empty or destroyed input of software ray queries: each gives an error or a miss. No shader
+//! reads out of bounds, no traversal runs for ever, and other objects stay valid.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{
@@ -46,10 +46,10 @@ fn tlas_of(ctx: &Context, blas: AccelStructHandle) -> Result<Holder<AccelStructH
     ctx.create_tlas(&TlasDesc { instances: &instances, ..Default::default() })
 }
 
-/// A file of a structure, taken apart.
+/// A file of an acceleration structure, taken apart.
 struct File {
     bytes: Vec<u8>,
-    /// Where the structure begins.
+    /// Offset of the blob.
     start: usize,
 }
 
@@ -145,12 +145,12 @@ fn made_up_numbers_in_files_are_refused() -> Result<()> {
     Ok(())
 }
 
-/// Where the structure of a file ends.
+/// Returns the end of the blob in a file, in blocks.
 fn file_blocks(bytes: &[u8]) -> u32 {
     File::new(bytes).words() as u32 / 4
 }
 
-/// Whatever is accepted is walked, refitted and rebuilt to an end.
+/// Traversals, refits and rebuilds of every accepted blob end.
 #[test]
 fn garbage_in_files_is_refused_or_harmless() -> Result<()> {
     let Some(ctx) = bare() else { return Ok(()) };
@@ -191,7 +191,7 @@ fn build(ctx: &Context, blas: AccelStructHandle, mode: BuildMode) -> Result<()> 
     ctx.submit(cmd).map(drop)
 }
 
-/// A folder of trees whose files were written by somebody else.
+/// A cache folder whose files were written by another program.
 #[test]
 fn made_up_trees_of_a_cache_are_built_again() -> Result<()> {
     let folder = std::env::temp_dir().join(format!("lvk-made-up-trees-{}", std::process::id()));
@@ -329,7 +329,7 @@ fn nothing_is_not_hit() -> Result<()> {
                 let desc = BlasDesc { geometries: &geometries, flags, ..Default::default() };
                 let blas = ctx.create_blas(&desc)?;
                 expect_nothing(&tracer, &tlas_of(&ctx, *blas)?, &rays, "nothing")?;
-                // SAFETY: nobody made the bytes up.
+                // SAFETY: `serialize_blas` returned the bytes.
                 let loaded = unsafe { ctx.load_blas(&desc, &ctx.serialize_blas(*blas)?) }?;
                 if flags.contains(BuildFlags::ALLOW_UPDATE) {
                     build(&ctx, *loaded, BuildMode::Refit)?;
@@ -343,7 +343,7 @@ fn nothing_is_not_hit() -> Result<()> {
     Ok(())
 }
 
-/// Boxes that are inverted, not numbers, or without end.
+/// AABBs that are inverted, not numbers, or without end.
 #[test]
 fn aabbs_of_nothing_are_not_hit() -> Result<()> {
     let Some(ctx) = bare() else { return Ok(()) };
@@ -406,15 +406,15 @@ fn rays_of_garbage_come_to_an_end() -> Result<()> {
 
 const RECORD_WORDS: usize = 16;
 
-/// A record that shows a structure by its place in the list.
+/// A record that shows an acceleration structure by its place in the list.
 fn record(placed: &Placed, place: [u32; 2]) -> Vec<u32> {
     let rows = transform_rows(&placed.transform).map(f32::to_bits);
     let numbers = [placed.custom_index | u32::from(placed.mask) << 24, 0, place[0], place[1]];
     [&rows[..], &numbers].concat()
 }
 
-/// What nobody can show: zeros, ones, places that do not exist, matrices that are none or have no inverse, and one whose
-/// box has no numbers.
+/// Returns invalid instances: zeros, ones, BLAS numbers out of range, singular and NaN matrices, and one with a NaN
+/// AABB.
 fn garbage(number: u32) -> Vec<u32> {
     let whole = Placed::new(0, Affine3A::IDENTITY);
     let mut words = record(&whole, [0, 0]);
@@ -486,7 +486,8 @@ fn update_from(
     ctx.submit(cmd).map(drop)
 }
 
-/// What an instance shows lives as long as it is shown; who is gone cannot be shown anew, by host or buffer.
+/// A BLAS lives as long as a TLAS references it. A destroyed BLAS cannot be referenced again, by the host or by a
+/// buffer.
 #[test]
 fn destroyed_accel_structs_are_refused() -> Result<()> {
     let Some(ctx) = bare() else { return Ok(()) };
@@ -509,7 +510,8 @@ fn destroyed_accel_structs_are_refused() -> Result<()> {
     expect_nothing(&RayTracer::new(&ctx, Method::Query)?, &gpu.tlas, &rays(), "an empty list")
 }
 
-/// A slot whose structure is gone shows the empty one, and then whoever takes it, whatever lies where it was.
+/// The slot of a destroyed acceleration structure holds the empty one, and then that of its next owner, whatever the
+/// memory contains.
 #[test]
 fn a_destroyed_tlas_is_never_hit() -> Result<()> {
     for ctx in [bare(), device(), device_with(|desc| desc.ray_query = RayQueryRequest::Software)] {

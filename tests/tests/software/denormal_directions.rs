@@ -1,4 +1,5 @@
-//! Short directions in large scenes: rays along an axis, whose times to the planes of boxes come near the end of what f32 holds.
+//! Short ray directions in large scenes: rays along an axis whose distances to the planes of AABBs come near the
+//! limits of f32.
 
 use lvk::glam::{Affine3A, Vec3};
 use lvk::{Context, RayQueryRequest, Result};

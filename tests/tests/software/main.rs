@@ -1,4 +1,4 @@
-//! Ray queries that the library walks itself.
+//! Ray queries by the library's own traversal.
 
 mod corrupt_blobs;
 mod denormal_directions;

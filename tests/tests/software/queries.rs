@@ -1,4 +1,4 @@
-//! Ray queries that the library walks itself: on devices without ray tracing, and beside those that have it.
+//! Ray queries by the library's own traversal: on devices without ray tracing, and beside the device's own.
 
 use lvk::glam::{Affine3A, Quat, Vec3};
 use lvk::{
@@ -109,7 +109,7 @@ fn software_and_the_device_give_the_same_hits() -> Result<()> {
     Ok(())
 }
 
-/// Where a module promises to meet opaque triangles alone, by the library and by the device.
+/// Modules that declare opaque triangles alone, by the library and by the device.
 #[test]
 fn modules_without_candidates_see_the_same() -> Result<()> {
     let (Some(one), Some(other)) = (device(), software()) else { return Ok(()) };
@@ -260,7 +260,7 @@ fn an_accel_struct_is_the_same_after_a_file() -> Result<()> {
         let desc = BlasDesc { geometries: &geometries, flags, ..Default::default() };
         let built = ctx.create_blas(&desc)?;
         let bytes = ctx.serialize_blas(*built)?;
-        // SAFETY: nobody made the bytes up.
+        // SAFETY: `serialize_blas` returned the bytes.
         let loaded = unsafe { ctx.load_blas(&desc, &bytes) }?;
         let trace = |blas| {
             let instances = [TlasInstance::new(blas)];
@@ -277,7 +277,7 @@ fn an_accel_struct_is_the_same_after_a_file() -> Result<()> {
     Ok(())
 }
 
-/// What has no room for its own nodes gets full ones: rays hit the same, from a file too.
+/// A BLAS without memory for compact nodes gets full ones: rays hit the same, from a file too.
 #[test]
 fn uneven_trees_are_hit_as_even_ones() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
@@ -303,14 +303,15 @@ fn uneven_trees_are_hit_as_even_ones() -> Result<()> {
         let built = ctx.create_blas(&desc)?;
         assert!(close(&trace(*built)?), "{more:?}");
         let bytes = ctx.serialize_blas(*built)?;
-        // SAFETY: nobody made the bytes up.
+        // SAFETY: `serialize_blas` returned the bytes.
         let loaded = unsafe { ctx.load_blas(&desc, &bytes) }?;
         assert!(close(&trace(*loaded)?), "{more:?}, from a file");
     }
     Ok(())
 }
 
-/// Three triangles side by side whose corners lie far apart in a list of so many vertices, and so many more that are points.
+/// Returns three triangles side by side, whose vertices are far apart in a list of `count` vertices, and `points`
+/// degenerate ones.
 fn among_many(count: usize, points: u32) -> Mesh {
     let named = [[0, 1 << 11, count - 1], [count - 2, 5, 1 << 20], [count / 2 + 1, count - 3, (1 << 11) - 1]];
     let mut positions = vec![[0.0; 3]; count];
@@ -372,7 +373,7 @@ fn compaction_has_nothing_to_do_and_says_so() -> Result<()> {
     ctx.wait_idle()
 }
 
-/// A top-level structure may show parts of trees that a rebuild has replaced: what it sees then stays within them, and is
+/// A TLAS may show parts of trees that a rebuild has replaced: what it sees then stays within them, and is
 /// the same where nothing moved.
 #[test]
 fn rebuilds_below_parts_of_instances_are_seen() -> Result<()> {
@@ -400,7 +401,7 @@ fn rebuilds_below_parts_of_instances_are_seen() -> Result<()> {
     agrees("rebuilt above")
 }
 
-/// What builds take of the scratch buffer, which has no more than the largest needs where the budget is nothing.
+/// Scratch memory of builds: the buffer has no more than the largest build needs if the budget is 0.
 #[test]
 fn scratch_memory_is_what_the_sizes_say() -> Result<()> {
     const ALIGNMENTS: u64 = 1024;
@@ -444,7 +445,7 @@ fn scratch_memory_is_what_the_sizes_say() -> Result<()> {
     Ok(())
 }
 
-/// Bytes of the structure of a mesh, by `accel_struct_sizes`.
+/// Bytes of the acceleration structure of a mesh, by `accel_struct_sizes`.
 fn bytes_of(ctx: &Context, mesh: &Mesh, layout: Layout, flags: BuildFlags) -> Result<u64> {
     let (_buffers, geometries) = upload_geometries(ctx, &[Part::new(mesh.clone(), layout)])?;
     let desc = BlasDesc { geometries: &geometries, flags, ..Default::default() };
@@ -454,7 +455,7 @@ fn bytes_of(ctx: &Context, mesh: &Mesh, layout: Layout, flags: BuildFlags) -> Re
     Ok(bytes)
 }
 
-/// What may be refitted shares the vertices that its indices share, and keeps none that nobody names.
+/// A BLAS that may be refitted shares vertices as its indices do, and stores no unused vertex.
 #[test]
 fn low_memory_is_low_with_updates_too() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };
@@ -476,7 +477,7 @@ fn low_memory_is_low_with_updates_too() -> Result<()> {
     Ok(())
 }
 
-/// What the GPU builds takes no more than what the CPU does, though nobody knows beforehand how many nodes there will be.
+/// Builds on the GPU take no more memory than those on the CPU, though the number of nodes is not known before.
 #[test]
 fn accel_structs_of_the_gpu_are_small() -> Result<()> {
     const FIRST: u64 = 1024;
@@ -490,7 +491,7 @@ fn accel_structs_of_the_gpu_are_small() -> Result<()> {
     Ok(())
 }
 
-/// Where it may be refitted, and so is never shown in parts.
+/// Flags that allow refits, so that re-braiding never opens it.
 #[test]
 fn what_the_cpu_built_is_rebuilt_in_the_same_memory() -> Result<()> {
     let Some(ctx) = bare_device(RayQueryRequest::Software) else { return Ok(()) };

@@ -1,4 +1,5 @@
-//! The pictures of the samples by software ray queries are those of a device's own, on a device without ray tracing too.
+//! Images of the samples by software ray queries: equal to those by the device's own, on a device without ray tracing
+//! too.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use image::RgbaImage;
@@ -16,14 +17,14 @@ use lvk_tests::{TestDevice, device_with};
 
 const SIZE: [u32; 2] = [160, 90];
 const DEPTH: u32 = 3;
-/// Of the picture of the room of glass that is kept.
+/// Of the image of the room of glass that is kept.
 const MOMENT: f64 = 1.9;
 const SAME_RAYS: Tolerance = Tolerance { psnr: 50.0, ssim: 0.9999, differing_share: 1e-3, flip: 1e-3 };
 /// The same rays, but filters spread what a ray at an edge finds elsewhere.
 const SAME_FILTERED: Tolerance = Tolerance { psnr: 55.0, ssim: 0.9999, differing_share: 0.01, flip: 0.004 };
 /// Of what rays alone find, on SwiftShader: its textures are filtered with fewer bits.
 const OTHER_FILTERS: Tolerance = Tolerance { psnr: 46.0, ssim: 0.999, differing_share: 0.2, flip: 0.012 };
-/// Where it rasterises too: its corners lie on a grid of 4 bits of a pixel in place of 8, so edges differ.
+/// Tolerance where it rasterises too: vertices are snapped to 4 bits of a pixel in place of 8, so edges differ.
 const OTHER_EDGES: Tolerance = Tolerance { psnr: 38.0, ssim: 0.99, differing_share: 0.1, flip: 0.012 };
 /// Reflected and lit edges, on top of those that are seen.
 const OTHER_REFLECTIONS: Tolerance = Tolerance { psnr: 33.0, ssim: 0.975, differing_share: 0.3, flip: 0.05 };
@@ -55,15 +56,15 @@ fn software_and_the_device_make_the_same_image() {
     }
 }
 
-/// The pictures that are kept were made by the device's own tracing.
+/// The images that are kept were made by the device's own tracing.
 #[test]
 fn software_and_the_device_render_the_same_glass_and_hall() {
     let Some(ctx) = queries(RayQueryRequest::Software) else { return };
     let glass = reference_image("hybrid_oit_small");
     assert_similar("glass in software", &glass_scene(&ctx, &glass), &glass, &SAME_RAYS);
     let expected = reference_image("reflections_small");
-    let picture = hall(&ctx, [expected.width(), expected.height()]);
-    assert_similar("hall in software", &picture, &expected, &SAME_FILTERED);
+    let image = hall(&ctx, [expected.width(), expected.height()]);
+    assert_similar("hall in software", &image, &expected, &SAME_FILTERED);
 }
 
 /// A device without any ray tracing, whose queries are the library's.
@@ -85,8 +86,8 @@ fn a_driver_without_ray_tracing_renders_the_obj_scene() {
         assert_eq!(method, Method::Standalone);
         for bounces in [Bounces::Inline, Bounces::Queued] {
             let config = HybridConfig { method, bounces: Some(bounces), ..plain };
-            let picture = HybridHarness::with(&ctx, &scene, &config).render(&scene.cameras[0]);
-            assert_similar(&format!("SwiftShader {bounces:?}"), &picture, &expected, &OTHER_FILTERS);
+            let image = HybridHarness::with(&ctx, &scene, &config).render(&scene.cameras[0]);
+            assert_similar(&format!("SwiftShader {bounces:?}"), &image, &expected, &OTHER_FILTERS);
         }
     });
 }
@@ -105,17 +106,17 @@ fn a_driver_without_ray_tracing_renders_the_hall() {
     on_swiftshader(a_driver_without_ray_tracing_renders_the_hall, || {
         let Some(ctx) = without() else { return };
         let expected = reference_image("reflections_small");
-        let picture = hall(&ctx, [expected.width(), expected.height()]);
-        assert_similar("SwiftShader hall", &picture, &expected, &OTHER_REFLECTIONS);
+        let image = hall(&ctx, [expected.width(), expected.height()]);
+        assert_similar("SwiftShader hall", &image, &expected, &OTHER_REFLECTIONS);
     });
 }
 
-fn sized(picture: &RgbaImage) -> HybridConfig {
-    let (width, height) = picture.dimensions();
+fn sized(image: &RgbaImage) -> HybridConfig {
+    let (width, height) = image.dimensions();
     HybridConfig { width, height, max_depth: 4, ..HybridConfig::default() }
 }
 
-/// The room of glass in the size of a picture.
+/// The room of glass in the size of an image.
 fn glass_scene(ctx: &Context, like: &RgbaImage) -> RgbaImage {
     let config = HybridOitConfig::new(RayPath::Query, like.width(), like.height());
     OitRenderer::new(ctx, &OitScene::default(), &config).render(MOMENT)

@@ -1,4 +1,5 @@
-//! Matrices of instances without an inverse show nothing, whoever builds the structure; small and large ones show all.
+//! Instances with singular matrices: no ray hits them, for every builder; instances with very small and very large
+//! scales are hit.
 
 use lvk::glam::{Affine3A, Mat3, Vec3};
 use lvk::{BuildFlags, BuildMode, Context, DeviceInstances, RayQueryRequest, Result, transform_rows};
@@ -9,10 +10,11 @@ use lvk_tests::ray_scene::{GpuScene, Layout, Placed, RayScene};
 use lvk_tests::ray_tracer::{How, MISSED, Method, RayTracer};
 use lvk_tests::rays::Ray;
 
-/// So many instances, of which one workgroup builds a structure, or many do.
+/// Numbers of instances: one workgroup builds the first TLAS, many build the second.
 const COUNTS: [usize; 2] = [3, 3_000];
 
-/// How many of the rays hit something, shown by the CPU and by the GPU, from a list and from a buffer.
+/// Returns the number of rays that hit something, for builds by the CPU and by the GPU, from a list and from a
+/// buffer.
 fn hits(tracer: &RayTracer, transform: Affine3A, count: usize) -> Result<[usize; 3]> {
     let ctx = tracer.context();
     let mut scene = RayScene::single(Mesh::sphere(8), Layout::Indexed16);

@@ -1,4 +1,4 @@
-//! Seams of closed meshes, which no ray may slip through where the library walks itself.
+//! Watertightness: no ray passes through the edges of closed meshes in the library's own traversal.
 
 use std::collections::HashMap;
 
@@ -119,7 +119,7 @@ fn moved(mut mesh: Mesh, place: impl Fn(usize, Vec3) -> Vec3) -> Mesh {
     mesh
 }
 
-/// By modules that may meet candidates, and by such that see opaque triangles alone, which walk in ways of their own.
+/// Creates tracers of a module with candidates, and of one with opaque triangles alone, whose traversals differ.
 fn tracers(ctx: &Context) -> Result<[RayTracer; 2]> {
     Ok([RayTracer::new(ctx, Method::Query)?, RayTracer::for_opaque_triangles(ctx)?])
 }
@@ -160,8 +160,9 @@ fn overlapped(mesh: Mesh, transform: Affine3A) -> RayScene {
 /// The mask of rays.
 const SEEN: u8 = 1;
 
-/// How many of `count` rays from inside of a closed mesh leave it without a hit, by each of the tracers, as it is and turned
-/// and stretched. So many of its last triangles are `absent`, but rays go there too.
+/// Returns the number of `count` rays from inside of a closed mesh that leave it without a hit, by each of the
+/// tracers, for the mesh as it is and rotated and stretched. The last `absent` triangles are left out, but rays go
+/// there too.
 fn leaks<const TRACERS: usize>(
     tracers: &[RayTracer; TRACERS],
     show: fn(Mesh, Affine3A) -> RayScene,
@@ -200,7 +201,7 @@ fn leaks<const TRACERS: usize>(
 
 const CHUNK: usize = 1 << 20;
 
-/// So many rays in each of the meshes, built with each of the flags.
+/// Traces `count` rays in each of the meshes, built with each of the flags.
 fn check_seams(count: usize) -> Result<()> {
     let Some(ctx) = software() else { return Ok(()) };
     let tracers = tracers(&ctx)?;
@@ -229,8 +230,8 @@ fn no_ray_that_is_interrupted_at_a_seam_slips_through() -> Result<()> {
     Ok(())
 }
 
-/// What the CPU builds and does not refit is taken apart where it overlaps others and leaves room empty: a ball that is drawn
-/// out along a diagonal.
+/// A BLAS that the CPU builds without refits is opened by re-braiding where it overlaps others and has empty space: a
+/// ball stretched along a diagonal.
 #[test]
 fn no_ray_slips_through_a_seam_between_parts() -> Result<()> {
     let Some(ctx) = software() else { return Ok(()) };
@@ -251,7 +252,7 @@ fn no_ray_slips_through_a_seam_between_parts() -> Result<()> {
     Ok(())
 }
 
-/// Tells how many records a top-level structure has, each of an instance or a part of one, as the number of a primitive.
+/// Tells how many records a TLAS has, each of an instance or a part of one, as the number of a primitive.
 fn records_counter(ctx: &Context) -> Result<RayTracer> {
     const TEXT: &str = r#"
         #include <lvk/ray_query.glsl>

@@ -1,4 +1,5 @@
-//! Formats: every one keeps its texels, blocks included, is cleared, copied, scaled and seen as Vulkan says.
+//! Formats: every one keeps its texels, compressed blocks included, and is cleared, copied, blitted and sampled as
+//! Vulkan defines.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
@@ -37,7 +38,7 @@ fn texels(format: Format, seed: u32, count: u64) -> Vec<u8> {
     }
 }
 
-/// What a download of `format` answers, without bits that mean nothing.
+/// Returns a download of `format` without undefined bits.
 fn meaningful(format: Format, mut bytes: Vec<u8>) -> Vec<u8> {
     if matches!(format, Format::D24UnormS8 | Format::X8D24Unorm) {
         bytes.chunks_mut(4).for_each(|texel| texel[3] = 0);

@@ -1,4 +1,4 @@
-//! Volumes and arrays of cubes: moved, sampled, stored to, drawn to, seen in parts.
+//! Volumes and cube arrays: copied, sampled, stored to, drawn to, and viewed in parts.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{

@@ -185,7 +185,7 @@ fn samplers_run_out_and_are_freed() {
     assert_eq!(found, [1.0, 2.0, 3.0, 4.0]);
 }
 
-/// What a shader sees of one texel of 0.5 beyond its edge.
+/// Returns the sampled colour beyond the edge of one texel of 0.5.
 fn beyond(ctx: &Context, border: BorderColor) -> [f32; 4] {
     let data = Some(&[128; 4][..]);
     let texture = ctx.create_texture(&TextureDesc { data, ..Default::default() }).unwrap();
@@ -206,7 +206,7 @@ fn borders_have_the_colour_asked_for() {
     for (border, expected) in colors {
         assert_eq!(beyond(&ctx, border), expected, "{border:?}");
     }
-    // What the texels can be: some devices round to that.
+    // Colours that texels can store: some devices round to them.
     let color = [64.0, 127.0, 191.0, 32.0].map(|byte: f32| byte / 255.0);
     let own = SamplerDesc { border: BorderColor::Custom(color), ..Default::default() };
     if !ctx.capabilities().has(OptionalFeature::CustomBorderColorWithoutFormat) {

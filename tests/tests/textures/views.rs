@@ -1,4 +1,4 @@
-//! Views: parts of a texture, as another kind, format or order of channels, are textures like any other.
+//! Texture views: parts of a texture with another kind, format or swizzle behave as textures.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
 use lvk::{
