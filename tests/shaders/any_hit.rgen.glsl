@@ -1,4 +1,4 @@
-// Counts what the any-hit shader sees, and reports what was committed: weights are the count and the sum of tags.
+// Counts the candidates of the any-hit shader, and reports the committed hit: weights are the count and the sum of tags.
 #include "any_hit_payload.glsl"
 
 layout(location = 0) rayPayloadEXT Seen seen;

@@ -1,4 +1,4 @@
-// The same counts by ray query.
+// The counts of candidates by ray query.
 #include "ray_query_start.glsl"
 #include "any_hit_payload.glsl"
 

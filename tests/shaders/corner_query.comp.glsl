@@ -1,4 +1,4 @@
-// The same by ray query.
+// Reports a vertex of the hit triangle by ray query.
 #include "ray_query_start.glsl"
 
 void main() {

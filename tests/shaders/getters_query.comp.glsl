@@ -1,6 +1,6 @@
-// Everything a query tells of its ray, of the closest hit and of the last candidate. Triangles with odd numbers are looked
-// through where they are not opaque. OPAQUE_ONLY is a module without candidates. OF_MISSES asks of a hit whether there is one or
-// not, and takes the corners of the triangle, added up, for the origin in the candidate's space.
+// Every value that a query reports of its ray, of the closest hit and of the last candidate. Triangles with odd numbers are
+// ignored unless they are opaque. OPAQUE_ONLY is a module without candidates. OF_MISSES reads the values of a hit whether
+// there is one or not, and stores the sum of the triangle's vertices as the origin in the candidate's space.
 #ifdef OPAQUE_ONLY
 #define LVK_OPAQUE_TRIANGLES_ONLY
 #endif

@@ -1,4 +1,4 @@
-// The second ray generation shader, which traces to the second miss shader: seen unless that one ran.
+// The second ray generation shader, which traces to the second miss shader: occluded unless that one ran.
 #include "ray_records.glsl"
 
 layout(location = 1) rayPayloadEXT uint occluded;

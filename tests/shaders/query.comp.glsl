@@ -1,4 +1,4 @@
-// The same records by ray query. KEEP_EVEN looks through every second primitive.
+// Hit records by ray query. KEEP_EVEN ignores every second primitive.
 #include "ray_query_start.glsl"
 
 void main() {

@@ -1,4 +1,4 @@
-// Rays in, hit records out.
+// Push constants of all tests: rays in, hit records out.
 #ifndef RAY_RECORDS
 #define RAY_RECORDS
 

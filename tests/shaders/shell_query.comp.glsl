@@ -1,4 +1,5 @@
-// The same by ray query, which knows no kinds and no attributes of boxes: the shader keeps them. Triangles count too.
+// Both sides of spheres by ray query. Queries have no kinds and no attributes of AABBs, so the shader stores them. Triangles
+// count too.
 #include <lvk/ray_query.glsl>
 #ifdef PRIMITIVE_CULLING
 #extension GL_EXT_ray_flags_primitive_culling : require

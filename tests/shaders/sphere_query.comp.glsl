@@ -1,4 +1,4 @@
-// The instance's offset into the shader binding table, which queries do not use otherwise, chooses the radius.
+// Spheres by ray query. The instance's hit group offset, which queries do not use otherwise, chooses the radius.
 #include "ray_query_start.glsl"
 #include "sphere_object.glsl"
 

@@ -1,4 +1,4 @@
-// Which boxes a ray meets: a bit for each of up to 32, as the number of the primitive.
+// Candidates of a ray: a bit for each of up to 32 AABBs, as the primitive number.
 #include "ray_query_start.glsl"
 
 void main() {

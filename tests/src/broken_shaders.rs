@@ -82,7 +82,7 @@ impl BrokenShaders {
         assert!(whole.is_within(tolerance), "{by}: whole shaders give another image: {whole}");
         let mut complaints = Vec::new();
         for mistake in mistakes {
-            let broken = match self.with(mistake, &image) {
+            let broken = match self.image_with(mistake, &image) {
                 Ok(broken) => broken,
                 Err(misfit) => {
                     complaints.push(misfit);
@@ -99,7 +99,7 @@ impl BrokenShaders {
     }
 
     /// Renders the image by shaders with that mistake, or returns why the mistake does not fit its file.
-    fn with(&self, mistake: &Mistake, image: &impl Fn() -> RgbaImage) -> Result<RgbaImage, String> {
+    fn image_with(&self, mistake: &Mistake, image: &impl Fn() -> RgbaImage) -> Result<RgbaImage, String> {
         let Mistake { what, file, right, wrong } = mistake;
         let path = self.folder.join(file);
         let text = fs::read_to_string(&path).expect("the file of a mistake is there");

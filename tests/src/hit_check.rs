@@ -27,16 +27,16 @@ impl HitCheck {
     pub fn new(ctx: &Context) -> Result<Self> {
         let opaque =
             ctx.capabilities().ray_query.then(|| RayTracer::for_opaque_triangles(ctx)).transpose()?;
-        Ok(Self { opaque, ..Self::with(ctx, RayTracer::new)? })
+        Ok(Self { opaque, ..Self::with_tracers(ctx, RayTracer::new)? })
     }
 
     /// Creates pipelines that ignore triangles with odd numbers, unless they are opaque.
     pub fn with_even_primitives(ctx: &Context) -> Result<Self> {
-        Self::with(ctx, RayTracer::with_even_primitives)
+        Self::with_tracers(ctx, RayTracer::with_even_primitives)
     }
 
     /// Creates pipelines by `make`, for every method.
-    pub fn with(ctx: &Context, make: impl Fn(&Context, Method) -> Result<RayTracer>) -> Result<Self> {
+    pub fn with_tracers(ctx: &Context, make: impl Fn(&Context, Method) -> Result<RayTracer>) -> Result<Self> {
         let tracer = |method| Ok((method, make(ctx, method)?));
         let tracers = Method::available(ctx).into_iter().map(tracer).collect::<Result<_>>()?;
         Ok(Self { tracers, opaque: None })

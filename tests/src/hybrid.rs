@@ -6,6 +6,8 @@ use lvk::Context;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, Method, RayPath};
 use lvk_samples::scene::{Camera, Scene};
 
+use crate::ray_tracer::Method as TraceMethod;
+
 /// The sample with one configuration of a scene.
 pub struct HybridHarness {
     /// The sample.
@@ -27,14 +29,14 @@ impl HybridHarness {
     ) -> Self {
         let [width, height] = size;
         let config = HybridConfig { method, path, width, height, max_depth, ..HybridConfig::default() };
-        Self::with(ctx, scene, &config)
+        Self::with_config(ctx, scene, &config)
     }
 
     /// Creates the sample with `config`.
     ///
     /// # Panics
     /// When the sample cannot be created.
-    pub fn with(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Self {
+    pub fn with_config(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Self {
         let renderer = HybridRenderer::new(ctx, scene, config).expect("the sample can be set up");
         Self { renderer, size: [config.width, config.height] }
     }
@@ -55,12 +57,9 @@ impl HybridHarness {
 /// # Panics
 /// When it has none.
 pub fn paths(ctx: &Context) -> Vec<RayPath> {
-    let caps = ctx.capabilities();
-    let all = [(RayPath::Pipeline, caps.ray_tracing_pipeline), (RayPath::Query, caps.ray_query)];
-    for (path, _) in all.iter().filter(|(_, available)| !available) {
-        eprintln!("NOT TESTED, {} cannot trace by {path:?}", caps.device_name);
-    }
-    let found: Vec<_> = all.iter().filter(|(_, available)| *available).map(|(path, _)| *path).collect();
-    assert!(!found.is_empty(), "{} cannot trace rays", caps.device_name);
-    found
+    let path = |method| match method {
+        TraceMethod::Pipeline => RayPath::Pipeline,
+        TraceMethod::Query => RayPath::Query,
+    };
+    TraceMethod::available(ctx).into_iter().map(path).collect()
 }

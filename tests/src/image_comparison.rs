@@ -188,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_pictures_are_as_alike_as_can_be() {
+    fn equal_images_have_the_greatest_similarity() {
         let similarity = ImageSimilarity::measure(&ramp(9), &ramp(9));
         assert_eq!((similarity.flip, similarity.difference.max_difference), (0.0, 0));
         assert!(similarity.is_within(&Tolerance {
@@ -215,7 +215,7 @@ mod tests {
 
     #[test]
     #[should_panic(expected = "test-images/a_test_of_the_harness_actual.png")]
-    fn pictures_that_differ_are_kept() {
+    fn images_that_differ_are_written() {
         assert_similar(
             "a test of the harness",
             &ramp(0),

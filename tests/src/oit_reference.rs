@@ -32,7 +32,7 @@ pub struct HostScene {
 }
 
 /// Light along a ray, computed on the host.
-pub struct Found {
+pub struct Sunlight {
     /// Share of the light at the end of the ray that arrives at its origin.
     pub light: DVec3,
     /// True if the ray passes an edge or silhouette so closely that rounding decides.
@@ -115,9 +115,9 @@ impl HostScene {
     }
 
     /// Returns the sunlight that arrives at `origin`, a point a little outside of a surface.
-    pub fn sunlight(&self, origin: DVec3) -> Found {
+    pub fn sunlight(&self, origin: DVec3) -> Sunlight {
         let direction = self.scene.sun.direction.as_dvec3().normalize();
-        let mut found = Found { light: DVec3::ONE, is_doubtful: false };
+        let mut found = Sunlight { light: DVec3::ONE, is_doubtful: false };
         for block in &self.scene.blocks {
             let (is_hit, is_doubtful) =
                 cross_block(block.low.as_dvec3(), block.high.as_dvec3(), origin, direction);

@@ -158,12 +158,12 @@ struct Push {
 impl RayTracer {
     /// Creates a tracer whose opacity is that of geometry and ray.
     pub fn new(ctx: &Context, method: Method) -> Result<Self> {
-        Self::with(ctx, method, false)
+        Self::with_shaders(ctx, method, false)
     }
 
     /// Creates a tracer that ignores triangles with odd numbers, unless they are opaque.
     pub fn with_even_primitives(ctx: &Context, method: Method) -> Result<Self> {
-        Self::with(ctx, method, true)
+        Self::with_shaders(ctx, method, true)
     }
 
     /// Creates a tracer by query, in a module without candidates: all triangles are opaque.
@@ -206,7 +206,7 @@ impl RayTracer {
         Ok(Self::from_pipeline(ctx, pipeline))
     }
 
-    fn with(ctx: &Context, method: Method, keep_even: bool) -> Result<Self> {
+    fn with_shaders(ctx: &Context, method: Method, keep_even: bool) -> Result<Self> {
         let pipeline = match method {
             Method::Pipeline => AnyPipeline::RayTracing(ray_tracing(ctx, keep_even)?),
             Method::Query => {

@@ -86,7 +86,7 @@ fn obj_text() -> String {
     let wall = [[-2.5, 0.1, -2.0], [2.5, 0.1, -2.0], [2.5, 2.4, -2.0], [-2.5, 2.4, -2.0]];
     add_quad(&mut text, "floor", floor);
     add_quad(&mut text, "wall", wall);
-    for face in box_faces(Vec3::new(-1.3, 0.5, 0.3), 0.4) {
+    for face in cube_faces(Vec3::new(-1.3, 0.5, 0.3), 0.4) {
         add_quad(&mut text, "red", face);
     }
     add_ball(&mut text, "plastic", Vec3::new(-0.25, 0.4, 1.0), 0.38);
@@ -120,7 +120,7 @@ fn add_ball(text: &mut String, material: &str, center: Vec3, radius: f32) {
 }
 
 /// Returns the faces of a cube, with outer normals.
-fn box_faces(center: Vec3, half: f32) -> [[[f32; 3]; 4]; 6] {
+fn cube_faces(center: Vec3, half: f32) -> [[[f32; 3]; 4]; 6] {
     let turned = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     std::array::from_fn(|side| {
         let (axis, sign) = (side / 2, if side % 2 == 0 { -1.0 } else { 1.0 });

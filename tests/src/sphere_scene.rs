@@ -93,7 +93,8 @@ impl SphereModel {
         check: impl Fn(&[HitRecord]),
     ) -> Result<()> {
         let expected = self.spheres(placed);
-        for (method, tracer) in HitCheck::with(ctx, |ctx, method| self.tracer(ctx, method))?.tracers() {
+        for (method, tracer) in HitCheck::with_tracers(ctx, |ctx, method| self.tracer(ctx, method))?.tracers()
+        {
             let records = tracer.trace(tlas, rays, How::default())?;
             HitComparison::of_shapes(rays, &records, |ray| Sphere::closest(&expected, ray))
                 .assert(&format!("{what} by {method:?}"));

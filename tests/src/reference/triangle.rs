@@ -66,7 +66,7 @@ mod tests {
     }
 
     #[test]
-    fn a_point_of_the_triangle_is_found_again() {
+    fn a_point_of_the_triangle_is_hit() {
         let mut random = Random::new(1);
         for _ in 0..2_000 {
             let corners = [vector(&mut random), vector(&mut random), vector(&mut random)];

@@ -174,14 +174,14 @@ fn hybrid_notices() {
         assert_eq!(HybridConfig::default().method, Method::Hybrid);
         for (by, mistakes, config) in hybrid_methods().iter().filter(|way| paths.contains(&way.2.path)) {
             let image = || {
-                let mut harness = HybridHarness::with(&ctx, &scene, config);
+                let mut harness = HybridHarness::with_config(&ctx, &scene, config);
                 paint_over(&ctx, harness.renderer.picture());
                 harness.render(&scene.cameras[0])
             };
             let inline = HybridConfig { bounces: Some(Bounces::Inline), ..*config };
             let (expected, tolerance) = match (config.geometry, config.bounces) {
                 (_, Some(Bounces::First)) => {
-                    (HybridHarness::with(&ctx, &scene, &inline).render(&scene.cameras[0]), THE_SAME)
+                    (HybridHarness::with_config(&ctx, &scene, &inline).render(&scene.cameras[0]), THE_SAME)
                 }
                 // The paper's edges are not those of rays.
                 (Geometry::Paper, _) => (image(), ACROSS_DRIVERS),

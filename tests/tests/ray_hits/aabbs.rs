@@ -163,7 +163,7 @@ fn flags_of_ray_instance_and_geometry_reach_aabbs() -> Result<()> {
     let (none, solid, open) =
         (InstanceFlags::NO_CULL, InstanceFlags::FORCE_OPAQUE, InstanceFlags::FORCE_NO_OPAQUE);
     for ctx in devices() {
-        let check = HitCheck::with(&ctx, |ctx, method| tracer(ctx, method, false))?;
+        let check = HitCheck::with_tracers(&ctx, |ctx, method| tracer(ctx, method, false))?;
         for (geometry, instance, ray, opaque) in [
             (GeometryFlags::empty(), none, 0, false),
             (GeometryFlags::NO_DUPLICATE_ANY_HIT, none, CULL_BACK, false),

@@ -150,7 +150,7 @@ fn with_samples(
     samples: u32,
 ) -> RgbaImage {
     let config = HybridConfig { method, path, samples, ..sized(size) };
-    HybridHarness::with(ctx, scene, &config).render(&scene.cameras[0])
+    HybridHarness::with_config(ctx, scene, &config).render(&scene.cameras[0])
 }
 
 /// Neighbours, left and right, whose green differs by more than a third of the range.
@@ -165,7 +165,7 @@ fn samples_smooth_edges_and_all_methods_take_the_same_ones() {
     let scene = obj_scene();
     let one = with_samples(&ctx, &scene, SMALL, HYBRID_BY_PIPELINE, 1);
     assert_eq!(
-        HybridHarness::with(&ctx, &scene, &sized(SMALL)).render(&scene.cameras[0]),
+        HybridHarness::with_config(&ctx, &scene, &sized(SMALL)).render(&scene.cameras[0]),
         one,
         "one sample is the default"
     );
@@ -190,7 +190,7 @@ fn samples_are_spread_over_their_pixel() {
     let Some(ctx) = device() else { return };
     let scene = obj_scene();
     let large =
-        HybridHarness::with(&ctx, &scene, &sized(SIZE.map(|side| 4 * side))).render(&scene.cameras[0]);
+        HybridHarness::with_config(&ctx, &scene, &sized(SIZE.map(|side| 4 * side))).render(&scene.cameras[0]);
     let smooth = with_samples(&ctx, &scene, SIZE, HYBRID_BY_PIPELINE, 16);
     let shrunk = shrunk(&large);
     let one = with_samples(&ctx, &scene, SIZE, HYBRID_BY_PIPELINE, 1);
@@ -238,7 +238,7 @@ fn queued_bounces_give_the_very_same_image() {
             let image = |bounces| {
                 let bounces = Some(bounces);
                 let config = HybridConfig { method, path, geometry, samples, bounces, ..sized(SIZE) };
-                HybridHarness::with(&ctx, &scene, &config).render(&scene.cameras[1])
+                HybridHarness::with_config(&ctx, &scene, &config).render(&scene.cameras[1])
             };
             let what = format!("{method:?} {path:?} {geometry:?}, {samples} samples");
             let inline = image(Bounces::Inline);
@@ -268,9 +268,9 @@ fn a_phone_with_split_meshes_renders_the_same() {
         let renderer = HybridRenderer::new(&rehearsal, &scene, &config).unwrap();
         let (parts, structures) = (renderer.blas_part_count() as usize, renderer.blas_count());
         assert!(parts >= 2 * structures, "{structures} structures in {parts} parts");
-        let mut split = HybridHarness::with(&rehearsal, &scene, &config);
+        let mut split = HybridHarness::with_config(&rehearsal, &scene, &config);
         let whole = HybridConfig { path: paths(&ctx)[0], ..config };
-        let mut whole = HybridHarness::with(&ctx, &scene, &whole);
+        let mut whole = HybridHarness::with_config(&ctx, &scene, &whole);
         for (number, camera) in scene.cameras.iter().enumerate().take(2) {
             let what = format!("{method:?} on a phone, camera {}", number + 1);
             assert_similar(&what, &split.render(camera), &whole.render(camera), &SAME_VIEW);

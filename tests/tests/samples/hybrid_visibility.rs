@@ -27,7 +27,7 @@ fn config(path: RayPath, geometry: Geometry) -> HybridConfig {
 }
 
 fn render_images(ctx: &Context, scene: &Scene, config: &HybridConfig, cameras: &[Camera]) -> Vec<RgbaImage> {
-    let mut harness = HybridHarness::with(ctx, scene, config);
+    let mut harness = HybridHarness::with_config(ctx, scene, config);
     cameras.iter().map(|camera| harness.render(camera)).collect()
 }
 

@@ -86,7 +86,7 @@ fn a_driver_without_ray_tracing_renders_the_obj_scene() {
         assert_eq!(method, Method::Standalone);
         for bounces in [Bounces::Inline, Bounces::Queued] {
             let config = HybridConfig { method, bounces: Some(bounces), ..plain };
-            let image = HybridHarness::with(&ctx, &scene, &config).render(&scene.cameras[0]);
+            let image = HybridHarness::with_config(&ctx, &scene, &config).render(&scene.cameras[0]);
             assert_similar(&format!("SwiftShader {bounces:?}"), &image, &expected, &OTHER_FILTERS);
         }
     });
