@@ -63,7 +63,7 @@ fn words_run_and_texts_are_refused() {
 
 /// Builds by kernels, which come as words.
 #[test]
-fn structures_are_built_by_kernels() {
+fn accel_structs_are_built_by_kernels() {
     let Some(ctx) = context() else { return };
     let corners: Vec<f32> = (0..900).map(|number| (number * number % 89) as f32).collect();
     let desc = BufferDesc {

@@ -4,7 +4,7 @@
 use std::ffi::OsStr;
 use std::path::Path;
 
-use lvk_tests::child::in_child;
+use lvk_tests::subprocess::in_child;
 use lvk_tests::device::vulkan;
 
 #[path = "../../../lvk/examples/triangle.rs"]
