@@ -200,7 +200,7 @@ pub use pipeline::compute::ComputePipelineDesc;
 pub use pipeline::depth_stencil::{DepthState, DepthTest, StencilFace, StencilOp, StencilTest};
 pub use pipeline::graphics_desc::{ColorTarget, RenderPipelineDesc, VertexAttribute, VertexBinding};
 pub use pipeline::rasterization::{CullMode, DepthBias, FrontFace, PolygonMode, Topology};
-pub use pipeline::ray_tracing::{HitGroup, RayTracingPipelineDesc, record_bytes};
+pub use pipeline::ray_tracing_desc::{HitGroup, RayTracingPipelineDesc, record_bytes};
 pub use pipeline::ray_tracing_library::RayTracingLibraryDesc;
 pub use pipeline::stage::{SpecializationConstant, SpecializationValue};
 pub use queue::Queue;
