@@ -2,12 +2,12 @@
 
 use ash::vk;
 
-use super::CommandBuffer;
-use super::attachment_desc::ShadingRateAttachment;
-use super::pass_area::PassArea;
-use super::render_pass::RenderPass;
-use super::render_pass_desc::RenderPassDesc;
+use super::area::PassArea;
+use super::desc::RenderPassDesc;
+use super::desc::ShadingRateAttachment;
+use super::pass::RenderPass;
 use crate::barrier::Use;
+use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::gpu::caps::shading_rate::ShadingRate;
 use crate::pipeline::RenderPipeline;

@@ -1,17 +1,15 @@
 //! Targets of a render pass: found, checked, and turned into what Vulkan takes.
 
-use std::sync::Arc;
-
 use ash::vk;
 
-use super::CommandBuffer;
-use super::attachment_desc::{
-    ColorAttachment, ColorLoadOp, DepthAttachment, DepthLoadOp, Resolve, StencilLoadOp,
+use super::area::{PassArea, PassLayers};
+use super::desc::{
+    ColorAttachment, ColorLoadOp, DepthAttachment, DepthLoadOp, RenderPassDesc, Resolve, StencilLoadOp,
 };
-use super::local_read::PassInputAttachments;
-use super::pass_area::{PassArea, PassLayers};
-use super::render_pass_desc::RenderPassDesc;
+use super::input_attachments::PassInputAttachments;
+use super::target::PassTarget;
 use crate::barrier::{Subresources, Use};
+use crate::command::CommandBuffer;
 use crate::error::{Error, Result, check_limit};
 use crate::format::{Format, NumericFormat};
 use crate::handle::TextureHandle;
@@ -32,44 +30,6 @@ pub(super) struct PassTargets {
     pub(super) colors: Vec<vk::RenderingAttachmentInfo<'static>>,
     pub(super) depth: Option<vk::RenderingAttachmentInfo<'static>>,
     pub(super) stencil: Option<vk::RenderingAttachmentInfo<'static>>,
-}
-
-/// A mip of some layers of a texture.
-pub(super) struct PassTarget {
-    pub(super) texture: Arc<Texture>,
-    mip: u32,
-    layer: u32,
-    layers: PassLayers,
-}
-
-impl PassTarget {
-    pub(super) fn view(&self) -> Result<vk::ImageView> {
-        match self.layers.is_layered() {
-            false => self.texture.target_view(self.mip, self.layer),
-            true => self.texture.layered_target_view(self.mip, self.layer, self.layers.layer_count()),
-        }
-    }
-
-    /// One aspect of what the pass draws to.
-    pub(super) fn input_view(&self, aspect: vk::ImageAspectFlags) -> Result<vk::ImageView> {
-        self.texture.input_view(self.subresources(), self.layers.is_layered(), aspect)
-    }
-
-    /// Mip and layers, or slices.
-    fn subresource_texels(&self) -> Subresources {
-        let part = self.texture.subresource(self.mip, self.layer);
-        Subresources { layer_count: self.layers.layer_count(), ..part }
-    }
-
-    /// Width and height.
-    pub(super) fn extent(&self) -> [u32; 2] {
-        self.texture.mip_extent(self.mip)
-    }
-
-    /// The same as barriers know it.
-    pub(super) fn subresources(&self) -> Subresources {
-        self.texture.attachment_subresources(self.mip, self.layer, self.layers.layer_count())
-    }
 }
 
 impl CommandBuffer {

@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use super::render_pass::RenderPass;
+use super::pass::RenderPass;
 use crate::error::{Result, check_limit};
 use crate::gpu::caps::mesh_limits::MeshLimits;
 use crate::handle::BufferHandle;

@@ -1,5 +1,6 @@
 //! Targets of a render pass, as callers describe them.
 
+use crate::command::dependencies::Dependencies;
 use crate::gpu::caps::resolve_modes::ResolveMode;
 use crate::handle::TextureHandle;
 
@@ -166,4 +167,36 @@ impl DepthAttachment {
     pub fn read_only(texture: TextureHandle) -> Self {
         Self { read_only: true, ..Self::load(texture) }
     }
+}
+
+/// Describes a render pass.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct RenderPassDesc<'a> {
+    /// Colour targets, in the order of the shaders' outputs.
+    pub color: &'a [ColorAttachment],
+    /// Depth and stencil target.
+    pub depth: Option<DepthAttachment>,
+    /// How many layers each target has, from its own first on; 0 and 1 are one. Draws choose theirs by `gl_Layer`, in the
+    /// geometry and mesh stages, and with
+    /// [`OptionalFeature::ShaderOutputLayer`](crate::OptionalFeature::ShaderOutputLayer) in the vertex stage.
+    pub layers: u32,
+    /// Views that each draw makes at once, a bit for each: bit `i` draws to the layer `i` of each target, counted from the
+    /// target's own first, and shaders know it by `gl_ViewIndex` (`#extension GL_EXT_multiview`). 0 for one picture.
+    /// Needs [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview); at most
+    /// [`Limits::max_views`](crate::Limits::max_views).
+    pub view_mask: u32,
+    /// The pixels that are loaded, cleared, drawn and stored: x, y, width and height. `None` for all.
+    pub area: Option<[u32; 4]>,
+    /// Fragment shaders read those targets that have [`TextureUsage::INPUT`](crate::TextureUsage::INPUT), each at its own
+    /// pixel: what earlier draws of the pass have put there (`LVK_INPUT`, `LVK_DEPTH_INPUT`, `LVK_STENCIL_INPUT` and
+    /// `subpassLoad`). Needs [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
+    pub local_read: bool,
+    /// Where pipelines take the sizes of fragments from that combine their
+    /// [`shading_rate`](crate::RenderPipelineDesc::shading_rate) with it.
+    pub shading_rate: Option<ShadingRateAttachment>,
+    /// What the pass's shaders reach bindlessly, and what its draws read that was written earlier in the same command
+    /// buffer: no barrier can be placed inside a pass. Acceleration structures need not be listed.
+    pub dependencies: Dependencies<'a>,
+    /// Name of the pass in debuggers; empty for none.
+    pub debug_name: &'a str,
 }

@@ -1,15 +1,15 @@
-//! Begins a render pass, with the barriers in front.
+//! Begin and end of a render pass, with the barriers in front of it.
 
 use std::sync::Arc;
 
 use ash::vk;
 
-use super::CommandBuffer;
-use super::attachment_desc::{ColorAttachment, DepthAttachment, ShadingRateAttachment};
 use super::attachments::PassTargets;
-use super::dependencies::Dependencies;
-use super::render_pass::RenderPass;
+use super::desc::RenderPassDesc;
+use super::pass::RenderPass;
 use crate::barrier::{Stages, Use};
+use crate::command::CommandBuffer;
+use crate::command::dependencies::Dependencies;
 use crate::error::{Error, Result};
 use crate::resource::buffer::BufferUsage;
 
@@ -19,38 +19,6 @@ const DRAW_INPUTS: [(BufferUsage, fn() -> Use); 3] = [
     (BufferUsage::VERTEX, Use::vertex),
     (BufferUsage::INDIRECT, Use::indirect),
 ];
-
-/// Describes a render pass.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct RenderPassDesc<'a> {
-    /// Colour targets, in the order of the shaders' outputs.
-    pub color: &'a [ColorAttachment],
-    /// Depth and stencil target.
-    pub depth: Option<DepthAttachment>,
-    /// How many layers each target has, from its own first on; 0 and 1 are one. Draws choose theirs by `gl_Layer`, in the
-    /// geometry and mesh stages, and with
-    /// [`OptionalFeature::ShaderOutputLayer`](crate::OptionalFeature::ShaderOutputLayer) in the vertex stage.
-    pub layers: u32,
-    /// Views that each draw makes at once, a bit for each: bit `i` draws to the layer `i` of each target, counted from the
-    /// target's own first, and shaders know it by `gl_ViewIndex` (`#extension GL_EXT_multiview`). 0 for one picture.
-    /// Needs [`OptionalFeature::Multiview`](crate::OptionalFeature::Multiview); at most
-    /// [`Limits::max_views`](crate::Limits::max_views).
-    pub view_mask: u32,
-    /// The pixels that are loaded, cleared, drawn and stored: x, y, width and height. `None` for all.
-    pub area: Option<[u32; 4]>,
-    /// Fragment shaders read those targets that have [`TextureUsage::INPUT`](crate::TextureUsage::INPUT), each at its own
-    /// pixel: what earlier draws of the pass have put there (`LVK_INPUT`, `LVK_DEPTH_INPUT`, `LVK_STENCIL_INPUT` and
-    /// `subpassLoad`). Needs [`OptionalFeature::LocalRead`](crate::OptionalFeature::LocalRead).
-    pub local_read: bool,
-    /// Where pipelines take the sizes of fragments from that combine their
-    /// [`shading_rate`](crate::RenderPipelineDesc::shading_rate) with it.
-    pub shading_rate: Option<ShadingRateAttachment>,
-    /// What the pass's shaders reach bindlessly, and what its draws read that was written earlier in the same command
-    /// buffer: no barrier can be placed inside a pass. Acceleration structures need not be listed.
-    pub dependencies: Dependencies<'a>,
-    /// Name of the pass in debuggers; empty for none.
-    pub debug_name: &'a str,
-}
 
 impl CommandBuffer {
     /// Begins a render pass (`vkCmdBeginRendering`), which ends when the value is dropped. The viewport covers the targets,
@@ -108,7 +76,7 @@ impl CommandBuffer {
 
     /// Ends the pass that is open, if any: everything but draws happens outside of passes.
     #[inline]
-    pub(super) fn end_rendering(&mut self) {
+    pub(in crate::command) fn end_rendering(&mut self) {
         if self.rendering {
             self.end_pass();
         }

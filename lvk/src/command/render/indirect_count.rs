@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::compute::check_arguments;
-use super::render_pass::RenderPass;
+use super::pass::RenderPass;
 use crate::barrier::Use;
+use crate::command::compute::check_arguments;
 use crate::error::{Result, check_limit};
 use crate::gpu::caps::optional_features::OptionalFeature;
 use crate::handle::BufferHandle;

@@ -2,10 +2,10 @@
 
 use ash::vk;
 
-use super::CommandBuffer;
-use super::attachment_desc::DepthResolve;
-use super::attachments::PassTarget;
+use super::desc::DepthResolve;
+use super::target::PassTarget;
 use crate::barrier::{Layout, Use};
+use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::format::{Format, NumericFormat};
 use crate::gpu::caps::resolve_modes::ResolveMode;

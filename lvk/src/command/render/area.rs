@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use super::render_pass_desc::RenderPassDesc;
+use super::desc::RenderPassDesc;
 use crate::error::{Error, Result, check_limit};
 use crate::gpu::Gpu;
 
