@@ -14,7 +14,7 @@ pub const VARIABLE: &str = "LVK_SHADERS";
 static TAKEN: OnceLock<PathBuf> = OnceLock::new();
 
 /// Takes texts from `folder` from now on. Answers the folder where it is none.
-pub(crate) fn take(folder: &Path) -> Result<(), PathBuf> {
+pub(crate) fn set_folder(folder: &Path) -> Result<(), PathBuf> {
     if !folder.is_dir() {
         return Err(folder.to_owned());
     }

@@ -4,7 +4,7 @@
 use image::RgbaImage;
 use lvk_samples::app::headless;
 use lvk_samples::app::run_error::RunError;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::raster::RasterError;
 
 /// Size of their pictures in tests.
@@ -17,7 +17,7 @@ pub const ROUND: u32 = 100;
 /// # Panics
 /// When it fails.
 pub fn picture_of<S: Sample>(sample: &mut S, frame: u32) -> RgbaImage {
-    let moved = sample.update(Moment::of_frame(frame, ROUND));
+    let moved = sample.update(FrameTime::from_frame(frame, ROUND));
     moved.map_err(|error| -> RunError { error.into() }).expect("the sample has that moment");
     picture_now(sample)
 }

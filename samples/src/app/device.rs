@@ -8,10 +8,10 @@ use lvk::{
 };
 
 use super::caches::Caches;
+use super::print_line;
 use super::ray_args::RayTracing;
 use super::run_args::{RunArgs, ValidationArg};
 use super::run_error::RunError;
-use super::say;
 use crate::driver::{self, Driver, DriverRequest};
 
 /// What a sample needs beyond the part of the command line that all share.
@@ -111,7 +111,7 @@ pub(crate) fn list(profile: Option<&DeviceProfile>) -> Result<(), RunError> {
         if let Some(profile) = profile {
             profile.apply(&mut device);
         }
-        say(&device_line(number, &device));
+        print_line(&device_line(number, &device));
     }
     Ok(())
 }
@@ -151,7 +151,7 @@ pub(super) fn report_validation(sink: &ValidationSink) -> Result<(), RunError> {
     for message in &messages {
         eprintln!("validation: {message}");
     }
-    say(&format!("validation messages: {}", messages.len()));
+    print_line(&format!("validation messages: {}", messages.len()));
     if messages.is_empty() { Ok(()) } else { Err(RunError::Validation(messages.len())) }
 }
 

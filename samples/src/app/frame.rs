@@ -31,7 +31,7 @@ impl<'a> Frame<'a> {
     /// What Vulkan answers.
     pub fn waited(ctx: &Context, after_step: &'a mut dyn FnMut(u64)) -> lvk::Result<Self> {
         ctx.set_profiling(ctx.capabilities().limits.timestamp_bits > 0)?;
-        Self::of(ctx, Pace::Waited { done: 0, after_step, times: PassTimes::default() })
+        Self::with_pace(ctx, Pace::Waited { done: 0, after_step, times: PassTimes::default() })
     }
 
     /// A frame that nobody waits for.
@@ -39,10 +39,10 @@ impl<'a> Frame<'a> {
     /// # Errors
     /// What Vulkan answers.
     pub fn free(ctx: &Context) -> lvk::Result<Self> {
-        Self::of(ctx, Pace::Free)
+        Self::with_pace(ctx, Pace::Free)
     }
 
-    fn of(ctx: &Context, pace: Pace<'a>) -> lvk::Result<Self> {
+    fn with_pace(ctx: &Context, pace: Pace<'a>) -> lvk::Result<Self> {
         Ok(Self { cmd: ctx.acquire_command_buffer()?, ctx: ctx.clone(), pace })
     }
 

@@ -2,9 +2,9 @@
 //!
 //! [`sample`] tells what a sample is and how its program is written.
 
-pub mod args;
 pub(crate) mod array_buffer;
 pub mod caches;
+pub mod cli;
 pub mod device;
 pub mod fly_camera;
 pub mod frame;
@@ -17,11 +17,9 @@ pub(crate) mod library_warnings;
 pub mod loading;
 pub mod metrics;
 pub mod pass_times;
-pub mod play;
 pub mod png;
 pub mod progress;
 pub mod ray_args;
-pub mod run;
 pub mod run_args;
 pub mod run_error;
 pub mod sample;
@@ -29,6 +27,7 @@ pub mod scene_args;
 pub mod scene_list;
 pub(crate) mod scene_textures;
 pub mod screenshot;
+pub mod sequence;
 pub mod timings;
 pub mod ui;
 mod window;
@@ -36,6 +35,6 @@ mod window;
 use std::io::Write as _;
 
 /// Prints to standard output. A reader that has gone, as that of `hybrid | head -1`, does not cost the picture.
-pub(crate) fn say(text: &str) {
+pub(crate) fn print_line(text: &str) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }

@@ -84,7 +84,7 @@ impl Progress {
             status.begin(name, total);
         }
         if let Some(line) = self.lines.as_mut().map(|lines| lines.begin(name, total)) {
-            self.say(&line);
+            self.print_line(&line);
         }
         if !self.is_seen {
             return;
@@ -103,7 +103,7 @@ impl Progress {
             status.set(done);
         }
         if let Some(line) = self.lines.as_mut().and_then(|lines| lines.set(done, Instant::now())) {
-            self.say(&line);
+            self.print_line(&line);
         }
         if let Some(Shown { bar, .. }) = &self.shown {
             bar.set_position(done);
@@ -117,7 +117,7 @@ impl Progress {
     }
 
     /// Prints a line, with the seconds since the beginning.
-    fn say(&self, line: &str) {
+    fn print_line(&self, line: &str) {
         eprintln!("[{:6.1} s] {line}", self.timing.start.elapsed().as_secs_f32());
     }
 }

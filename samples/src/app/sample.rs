@@ -2,21 +2,21 @@
 //!
 //! - **new** is the sample's own: from a context, a scene and a configuration. All that is slow happens here: uploads,
 //!   acceleration structures, every pipeline.
-//! - [`Sample::update`] puts it at a [`Moment`] of its animation: cameras, lights, bones. What it shows afterwards
+//! - [`Sample::update`] puts it at a [`FrameTime`] of its animation: cameras, lights, bones. What it shows afterwards
 //!   depends on the moment alone and not on the moments before, so that a sequence can be cut into ranges that several
 //!   processes share. Something that has to be simulated step by step is evaluated in closed form, or from frame 0.
 //! - [`Sample::record`] uploads what the frame needs, records it, and answers the texture that shows it. It neither
 //!   submits nor waits; [`Frame::next_step`](super::frame::Frame::next_step) cuts frames that take long.
 //!
-//! [`run`](super::run::run) does all the rest: device, validation, `--frames`, pictures, progress, Ctrl-C, timings. A
+//! [`run`](super::cli::run_with) does all the rest: device, validation, `--frames`, pictures, progress, Ctrl-C, timings. A
 //! sample's `run.rs` is then
 //!
 //! ```ignore
 //! pub fn run(args: &CloudArgs) -> ExitCode {
-//!     app::run::run("cloud", &args.run, |opening| {
-//!         let ctx = opening.device(&DeviceNeeds::default())?;
+//!     app::cli::run_with("cloud", &args.run, |setup| {
+//!         let ctx = setup.device(&DeviceNeeds::default())?;
 //!         let cloud = Cloud::new(&ctx, &args.config(&ctx)?)?;
-//!         Ok(Opened { headline: cloud.headline(), sample: cloud })
+//!         Ok(ReadySample { summary: cloud.summary(), sample: cloud })
 //!     })
 //! }
 //! ```
@@ -33,8 +33,8 @@
 //!         &self.ctx
 //!     }
 //!
-//!     fn update(&mut self, moment: Moment) -> Result<(), CloudError> {
-//!         self.constants.phase = moment.phase();
+//!     fn update(&mut self, time: FrameTime) -> Result<(), CloudError> {
+//!         self.constants.phase = time.phase();
 //!         Ok(())
 //!     }
 //!
@@ -62,7 +62,7 @@ pub const FRAMES_PER_SECOND: u32 = 30;
 
 /// A moment of an animation that repeats itself after some frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Moment {
+pub struct FrameTime {
     /// Number of the frame, from 0.
     pub frame: u32,
     /// Frames of one round of whatever goes round; at least 1.
@@ -71,16 +71,16 @@ pub struct Moment {
     pub frames_per_second: u32,
 }
 
-impl Moment {
+impl FrameTime {
     /// Frame `frame` of a sequence, whose time step is fixed.
     #[must_use]
-    pub fn of_frame(frame: u32, frames_per_round: u32) -> Self {
+    pub fn from_frame(frame: u32, frames_per_round: u32) -> Self {
         Self { frame, frames_per_round, frames_per_second: FRAMES_PER_SECOND }
     }
 
     /// So many milliseconds after frame 0 of a sequence with rounds of `frames_per_round` frames.
     #[must_use]
-    pub fn after(milliseconds: u32, frames_per_round: u32) -> Self {
+    pub fn from_millis(milliseconds: u32, frames_per_round: u32) -> Self {
         let round = u64::from(frames_per_round) * 1000 / u64::from(FRAMES_PER_SECOND);
         let frames_per_round = u32::try_from(round).unwrap_or(u32::MAX);
         Self { frame: milliseconds, frames_per_round, frames_per_second: 1000 }
@@ -112,7 +112,7 @@ pub trait Sample {
     ///
     /// # Errors
     /// The sample's own.
-    fn update(&mut self, moment: Moment) -> Result<(), Self::Error>;
+    fn update(&mut self, time: FrameTime) -> Result<(), Self::Error>;
 
     /// Records a frame, and answers the texture that shows it: red, green, blue and alpha of each pixel, 8 bits each, sRGB. It
     /// can be sampled, which gives the numbers as they are encoded: its format is `Rgba8Unorm`, or it is a view of that format.
@@ -195,22 +195,23 @@ mod tests {
 
     #[test]
     fn a_round_ends_where_it_began() {
-        let at = |frame| Moment::of_frame(frame, 240);
+        let at = |frame| FrameTime::from_frame(frame, 240);
         assert_eq!(at(0).phase(), 0.0);
         assert_eq!(at(60).phase(), 0.25);
         assert_eq!(at(240).phase(), 0.0);
         assert_eq!(at(u32::MAX - 15).phase(), at((u32::MAX - 15) % 240).phase());
         assert_eq!(at(240).seconds(), 8.0);
-        assert_eq!(Moment::of_frame(3, 0).phase(), 0.0);
+        assert_eq!(FrameTime::from_frame(3, 0).phase(), 0.0);
     }
 
     #[test]
     fn frames_are_moments_by_the_clock() {
         for (milliseconds, frame) in [(0, 0), (1000, 30), (2500, 75), (9000, 270)] {
-            let (by_clock, by_frame) = (Moment::after(milliseconds, 240), Moment::of_frame(frame, 240));
+            let (by_clock, by_frame) =
+                (FrameTime::from_millis(milliseconds, 240), FrameTime::from_frame(frame, 240));
             assert_eq!(by_clock.seconds(), by_frame.seconds());
             assert_eq!(by_clock.phase(), by_frame.phase());
         }
-        assert_eq!(Moment::after(5, 0).phase(), 0.0);
+        assert_eq!(FrameTime::from_millis(5, 0).phase(), 0.0);
     }
 }

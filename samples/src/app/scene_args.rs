@@ -119,7 +119,7 @@ impl SceneArgs {
 impl CameraArgs {
     /// Place of the camera among the scene's five, 0 to 4.
     #[must_use]
-    pub fn place(&self) -> usize {
+    pub fn index(&self) -> usize {
         self.number.clamp(1, 5) as usize - 1
     }
 }

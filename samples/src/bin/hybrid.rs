@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use lvk_samples::app::args::HybridArgs;
+use lvk_samples::hybrid::HybridArgs;
 
 fn main() -> ExitCode {
     lvk_samples::hybrid::run(&HybridArgs::parse())

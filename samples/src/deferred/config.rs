@@ -17,17 +17,17 @@ pub enum Passes {
 impl Passes {
     /// All of them that a device can do, the best first.
     #[must_use]
-    pub fn of(ctx: &Context) -> &'static [Self] {
+    pub fn supported(ctx: &Context) -> &'static [Self] {
         let one = ctx.capabilities().has(OptionalFeature::LocalRead);
         if one { &[Self::One, Self::Several] } else { &[Self::Several] }
     }
 
     /// What was asked for, or the best.
     pub(super) fn choose(asked: Option<Self>, ctx: &Context) -> Result<Self, RasterError> {
-        let there = Self::of(ctx);
+        let there = Self::supported(ctx);
         let passes = asked.unwrap_or(there[0]);
         let what = "shaders that read what their own pass has drawn (dynamicRenderingLocalRead)";
-        RasterError::unless(there.contains(&passes), ctx, what, "--passes several shows the same picture")?;
+        RasterError::require(there.contains(&passes), ctx, what, "--passes several shows the same picture")?;
         Ok(passes)
     }
 }

@@ -165,7 +165,7 @@ impl Pipelines {
         Ok(Self([surfaces?, orbs?, ambient?, lights?, glow?, resolve?]))
     }
 
-    pub(super) fn of(&self, draw: Draw) -> RenderPipelineHandle {
+    pub(super) fn get(&self, draw: Draw) -> RenderPipelineHandle {
         *self.0[draw as usize]
     }
 }

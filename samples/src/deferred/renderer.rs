@@ -1,4 +1,4 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
 use std::f32::consts::TAU;
 
@@ -14,7 +14,7 @@ use super::targets::Targets;
 use super::{DeferredConfig, Passes, View};
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::raster::RasterError;
 use crate::scene::{Camera, GpuCamera};
 
@@ -25,7 +25,7 @@ const NEAR: f32 = 0.1;
 pub struct Deferred {
     ctx: Context,
     config: DeferredConfig,
-    way: Way,
+    resources: PassResources,
     vertices: Holder<BufferHandle>,
     materials: Holder<BufferHandle>,
     triangles: Holder<BufferHandle>,
@@ -40,13 +40,13 @@ pub struct Deferred {
 }
 
 /// What is different by [`Passes`].
-struct Way {
+struct PassResources {
     passes: Passes,
     targets: Targets,
     pipelines: Pipelines,
 }
 
-impl Way {
+impl PassResources {
     fn new(ctx: &Context, passes: Passes, extent: [u32; 2]) -> Result<Self, RasterError> {
         let targets = Targets::new(ctx, passes, extent)?;
         Ok(Self { passes, targets, pipelines: Pipelines::new(ctx, passes)? })
@@ -88,7 +88,7 @@ impl Deferred {
         Ok(Self {
             ctx: ctx.clone(),
             config: *config,
-            way: Way::new(ctx, passes, config.extent)?,
+            resources: PassResources::new(ctx, passes, config.extent)?,
             vertices: array(ctx, "vertices", BufferUsage::STORAGE, &hall.vertices)?,
             materials: array(ctx, "materials", BufferUsage::STORAGE, &MATERIALS)?,
             triangles: array(ctx, "triangles", BufferUsage::INDEX, &hall.triangles)?,
@@ -105,7 +105,7 @@ impl Deferred {
 
     /// How surfaces come to those who light them: in the last frame, or in the first where there was none yet.
     pub fn passes(&self) -> Passes {
-        self.way.passes
+        self.resources.passes
     }
 
     /// The next frames go by `passes`, or by what the device has.
@@ -120,7 +120,7 @@ impl Deferred {
 
     fn constants(&self) -> lvk::Result<FrameConstants> {
         let [width, height] = self.config.extent;
-        let Targets { colors: [albedo, normal, light, _], depth, .. } = &self.way.targets;
+        let Targets { colors: [albedo, normal, light, _], depth, .. } = &self.resources.targets;
         Ok(FrameConstants {
             camera: GpuCamera::new(&self.camera, width, height, NEAR),
             vertices: self.ctx.buffer_address(*self.vertices)?,
@@ -139,8 +139,8 @@ impl Deferred {
     /// All of it in one pass: nothing but the picture is kept.
     fn draw_at_once(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
-            color: &self.way.targets.begun(0..4),
-            depth: Some(self.way.targets.far_away()),
+            color: &self.resources.targets.begun(0..4),
+            depth: Some(self.resources.targets.far_away()),
             local_read: true,
             debug_name: "deferred",
             ..RenderPassDesc::default()
@@ -152,17 +152,17 @@ impl Deferred {
 
     fn surfaces_pass(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
-            color: &self.way.targets.begun(0..3),
-            depth: Some(self.way.targets.far_away()),
+            color: &self.resources.targets.begun(0..3),
+            depth: Some(self.resources.targets.far_away()),
             ..RenderPassDesc::default()
         })?;
         self.draw_solid(&mut pass)
     }
 
     fn light_pass(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
-        let Targets { colors: [albedo, normal, ..], depth, .. } = &self.way.targets;
+        let Targets { colors: [albedo, normal, ..], depth, .. } = &self.resources.targets;
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
-            color: &[self.way.targets.light()],
+            color: &[self.resources.targets.light()],
             depth: Some(DepthAttachment::read_only(**depth)),
             dependencies: Dependencies {
                 sampled_images: &[**albedo, **normal, **depth],
@@ -174,10 +174,10 @@ impl Deferred {
     }
 
     fn picture_pass(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
-        let Targets { colors: [albedo, normal, light, _], depth, .. } = &self.way.targets;
+        let Targets { colors: [albedo, normal, light, _], depth, .. } = &self.resources.targets;
         let sampled = [**albedo, **normal, **light, **depth];
         let mut pass = cmd.begin_rendering(&RenderPassDesc {
-            color: &self.way.targets.begun(3..4),
+            color: &self.resources.targets.begun(3..4),
             dependencies: Dependencies { sampled_images: &sampled, ..Dependencies::default() },
             ..RenderPassDesc::default()
         })?;
@@ -185,7 +185,7 @@ impl Deferred {
     }
 
     fn draw_solid(&self, pass: &mut RenderPass<'_>) -> lvk::Result<()> {
-        pass.bind_render_pipeline(self.way.pipelines.of(Draw::Surfaces))?;
+        pass.bind_render_pipeline(self.resources.pipelines.get(Draw::Surfaces))?;
         pass.push_constants(&self.frame_address)?;
         pass.bind_index_buffer(*self.triangles, 0, IndexFormat::U32)?;
         pass.draw_indexed(0..3 * self.triangle_count, 0, 0..1)?;
@@ -199,7 +199,7 @@ impl Deferred {
     }
 
     fn draw(&self, pass: &mut RenderPass<'_>, draw: Draw, vertices: u32, instances: u32) -> lvk::Result<()> {
-        pass.bind_render_pipeline(self.way.pipelines.of(draw))?;
+        pass.bind_render_pipeline(self.resources.pipelines.get(draw))?;
         pass.push_constants(&self.frame_address)?;
         pass.draw(0..vertices, 0..instances)
     }
@@ -212,16 +212,16 @@ impl Sample for Deferred {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.phase = moment.phase();
+    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+        self.phase = time.phase();
         self.camera = camera(self.phase);
         Ok(())
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
         let passes = Passes::choose(self.config.passes, &self.ctx)?;
-        if passes != self.way.passes {
-            self.way = Way::new(&self.ctx, passes, self.config.extent)?;
+        if passes != self.resources.passes {
+            self.resources = PassResources::new(&self.ctx, passes, self.config.extent)?;
         }
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants()?))?;
         match passes {
@@ -232,11 +232,11 @@ impl Sample for Deferred {
                 frame.pass("picture", |cmd| self.picture_pass(cmd))?;
             }
         }
-        Ok(self.way.targets.picture())
+        Ok(self.resources.targets.picture())
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.way.targets = Targets::new(&self.ctx, self.way.passes, extent)?;
+        self.resources.targets = Targets::new(&self.ctx, self.resources.passes, extent)?;
         self.config.extent = extent;
         Ok(())
     }
@@ -250,7 +250,7 @@ impl Sample for Deferred {
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
-        let there = Passes::of(&self.ctx);
+        let there = Passes::supported(&self.ctx);
         if there.len() > 1 {
             let mut passes = self.config.passes.unwrap_or(there[0]);
             ui.horizontal(|ui| {
@@ -271,7 +271,7 @@ impl Sample for Deferred {
     }
 
     fn reload(&mut self) -> Result<(), RasterError> {
-        self.way.pipelines = Pipelines::new(&self.ctx, self.way.passes)?;
+        self.resources.pipelines = Pipelines::new(&self.ctx, self.resources.passes)?;
         Ok(())
     }
 }

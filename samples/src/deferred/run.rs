@@ -3,10 +3,10 @@
 use std::process::ExitCode;
 
 use super::{Deferred, DeferredArgs, Passes};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::DeviceNeeds;
-use crate::app::run::{self, Opened, Opening};
 use crate::app::run_error::RunError;
-use crate::raster::headline;
+use crate::raster::summary;
 
 /// What the sample and its pictures are called.
 const NAME: &str = "deferred";
@@ -15,16 +15,16 @@ const NAME: &str = "deferred";
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &DeferredArgs) -> ExitCode {
-    run::run(NAME, &args.run, |opening| open(args, opening))
+    cli::run_with(NAME, &args.run, |setup| open(args, setup))
 }
 
-fn open(args: &DeferredArgs, opening: &mut Opening<'_>) -> Result<Opened<Deferred>, RunError> {
-    let context = opening.device(&DeviceNeeds::default())?;
+fn open(args: &DeferredArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Deferred>, RunError> {
+    let context = setup.device(&DeviceNeeds::default())?;
     let sample = Deferred::new(&context, &args.config())?;
     let passes = match sample.passes() {
         Passes::One => "one pass reads its own targets",
         Passes::Several => "passes read what those before have drawn",
     };
     let scene = format!("{} lights, {} triangles; {passes}", args.lights, sample.triangle_count());
-    Ok(Opened { headline: headline(context.capabilities(), &scene), sample })
+    Ok(ReadySample { summary: summary(context.capabilities(), &scene), sample })
 }

@@ -1,10 +1,10 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
 use lvk::{Context, Dependencies, Holder, RenderPipelineHandle, TextureHandle};
 
 use super::pipelines::TRIANGLE;
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::raster::{Canvas, RasterError};
 
 /// Draws the triangle.
@@ -39,8 +39,8 @@ impl Sample for HelloTriangle {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.turn = moment.phase();
+    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+        self.turn = time.phase();
         Ok(())
     }
 

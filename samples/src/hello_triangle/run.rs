@@ -3,10 +3,10 @@
 use std::process::ExitCode;
 
 use super::{HelloTriangle, HelloTriangleArgs};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::DeviceNeeds;
-use crate::app::run::{self, Opened, Opening};
 use crate::app::run_error::RunError;
-use crate::raster::headline;
+use crate::raster::summary;
 
 /// What the sample and its pictures are called.
 const NAME: &str = "hello_triangle";
@@ -15,12 +15,15 @@ const NAME: &str = "hello_triangle";
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &HelloTriangleArgs) -> ExitCode {
-    run::run(NAME, &args.run, |opening| open(args, opening))
+    cli::run_with(NAME, &args.run, |setup| open(args, setup))
 }
 
-fn open(args: &HelloTriangleArgs, opening: &mut Opening<'_>) -> Result<Opened<HelloTriangle>, RunError> {
-    let context = opening.device(&DeviceNeeds::default())?;
+fn open(
+    args: &HelloTriangleArgs,
+    setup: &mut SampleSetup<'_>,
+) -> Result<ReadySample<HelloTriangle>, RunError> {
+    let context = setup.device(&DeviceNeeds::default())?;
     let sample = HelloTriangle::new(&context, args.run.extent())?;
-    let headline = headline(context.capabilities(), "a turning triangle");
-    Ok(Opened { sample, headline })
+    let summary = summary(context.capabilities(), "a turning triangle");
+    Ok(ReadySample { sample, summary })
 }

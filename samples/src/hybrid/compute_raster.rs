@@ -8,7 +8,7 @@ use lvk::{
 };
 
 use super::config::RasterTuning;
-use super::frame::{Push, VisibilityPlaces};
+use super::frame::{Push, VisibilityAddresses};
 use super::shader_module::module;
 use crate::app::array_buffer::buffer;
 use crate::shaders::hybrid as texts;
@@ -81,7 +81,7 @@ impl ComputeRaster {
     }
 
     /// Tells the shaders where its buffers are.
-    pub(super) fn name_in(&self, ctx: &Context, places: &mut VisibilityPlaces) -> lvk::Result<()> {
+    pub(super) fn name_in(&self, ctx: &Context, places: &mut VisibilityAddresses) -> lvk::Result<()> {
         places.words = ctx.buffer_address(*self.words)?;
         places.set_triangles = ctx.buffer_address(*self.set_triangles)?;
         places.set_capacity = self.set_capacity;

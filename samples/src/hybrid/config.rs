@@ -3,7 +3,7 @@
 use lvk::{Capabilities, RayQueryPath};
 
 use super::HybridError;
-use crate::app::args;
+use super::args;
 use crate::app::ray_args::RayTracing;
 
 /// How primary visibility is found.
@@ -185,7 +185,7 @@ impl Method {
 impl RayPath {
     /// The path that the command line names, if it does.
     #[must_use]
-    pub fn wished(wish: RayTracing) -> Option<Self> {
+    pub fn from_args(wish: RayTracing) -> Option<Self> {
         match wish {
             RayTracing::Auto => None,
             RayTracing::Pipeline => Some(Self::Pipeline),

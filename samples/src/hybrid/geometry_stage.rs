@@ -3,7 +3,7 @@
 use lvk::{CommandBuffer, Context};
 
 use super::config::{Geometry, HybridConfig, Method};
-use super::frame::{Indices, Push, VisibilityPlaces};
+use super::frame::{Indices, Push, VisibilityAddresses};
 use super::geometry_pass::GeometryPass;
 use super::gpu_scene::GpuScene;
 use super::raster_choice::RasterChoice;
@@ -52,9 +52,9 @@ impl GeometryStage {
     }
 
     /// Where the shaders find everything.
-    pub(super) fn places(&self) -> VisibilityPlaces {
+    pub(super) fn addresses(&self) -> VisibilityAddresses {
         match self {
-            Self::Visibility(pass) => pass.places(),
+            Self::Visibility(pass) => pass.addresses(),
             _ => bytemuck::Zeroable::zeroed(),
         }
     }

@@ -9,7 +9,7 @@ use lvk::{
 };
 
 use super::compute_raster::groups_for;
-use super::frame::{Push, VisibilityPlaces};
+use super::frame::{Push, VisibilityAddresses};
 use super::geometry_pass::NO_TRIANGLE;
 use super::shader_module::module;
 use crate::shaders::hybrid as texts;
@@ -63,7 +63,7 @@ impl HardwareRaster {
     }
 
     /// Tells the shaders where its buffers are.
-    pub(super) fn name_in(&self, ctx: &Context, places: &mut VisibilityPlaces) -> lvk::Result<()> {
+    pub(super) fn name_in(&self, ctx: &Context, places: &mut VisibilityAddresses) -> lvk::Result<()> {
         let left = &self.survivors;
         places.survivor_bits = ctx.buffer_address(*left.bits)?;
         places.survivor_counts = ctx.buffer_address(*left.counts)?;

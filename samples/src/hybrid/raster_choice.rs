@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::config::Raster;
 
-/// A rasteriser and the reason for it; displayed as part of the headline.
+/// A rasteriser and the reason for it; displayed as part of the summary.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RasterChoice {
     /// The rasteriser.

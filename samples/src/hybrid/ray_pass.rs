@@ -7,11 +7,11 @@ use lvk::{
     SpecializationValue, TextureHandle,
 };
 
-use super::bounce_queue::BounceQueue;
+use super::accumulation::Accumulation;
 use super::compute_raster::groups_for;
 use super::config::{Bounces, Geometry, HybridConfig, Method, RayPath};
-use super::film::Film;
-use super::frame::{BouncePlaces, Push};
+use super::frame::{Push, ReflectivePixelAddresses};
+use super::reflective_pixels::ReflectivePixels;
 use super::shader_module::module;
 use crate::shaders::hybrid as texts;
 
@@ -26,7 +26,7 @@ const BOUNCES: u32 = 1;
 /// The pass: its pipelines and all they touch.
 pub(super) struct RayPass {
     pipeline: Pipeline,
-    queue: Option<BounceQueue>,
+    queue: Option<ReflectivePixels>,
     /// Whether pixels are taken in their order and not by rows.
     ordered: bool,
 }
@@ -44,7 +44,7 @@ enum Pipeline {
 }
 
 impl RayPass {
-    /// The pass that `config` asks for, of bands of `band_pixels` pixels.
+    /// The pass that `config` asks for, of launch_tiles of `band_pixels` pixels.
     pub(super) fn new(ctx: &Context, config: &HybridConfig, band_pixels: u32) -> lvk::Result<Self> {
         let bounces = config.bounces.filter(|_| config.max_depth > 0);
         let (queued, ordered) = (bounces == Some(Bounces::Queued), bounces == Some(Bounces::First));
@@ -58,26 +58,26 @@ impl RayPass {
                     .transpose()?,
             },
         };
-        let queue = queued.then(|| BounceQueue::new(ctx, band_pixels)).transpose()?;
+        let queue = queued.then(|| ReflectivePixels::new(ctx, band_pixels)).transpose()?;
         Ok(Self { pipeline, queue, ordered })
     }
 
     /// Where the shaders find the queue.
-    pub(super) fn bounce_places(&self, ctx: &Context) -> lvk::Result<BouncePlaces> {
-        self.queue.as_ref().map_or(Ok(bytemuck::Zeroable::zeroed()), |queue| queue.places(ctx))
+    pub(super) fn reflective_pixel_addresses(&self, ctx: &Context) -> lvk::Result<ReflectivePixelAddresses> {
+        self.queue.as_ref().map_or(Ok(bytemuck::Zeroable::zeroed()), |queue| queue.addresses(ctx))
     }
 
-    /// Records the rows that `push` names, in an image `width` pixels wide, from what the geometry pass left onto `film`.
+    /// Records the rows that `push` names, in an image `width` pixels wide, from what the geometry pass left onto `accumulation`.
     pub(super) fn record(
         &self,
         cmd: &mut CommandBuffer,
         width: u32,
         push: &Push,
         left: &GeometryLeft,
-        film: &Film,
+        accumulation: &Accumulation,
     ) -> lvk::Result<()> {
         let (push, launch) = self.launch(width, push);
-        let mut buffers: Vec<_> = film.sums().into_iter().collect();
+        let mut buffers: Vec<_> = accumulation.sums().into_iter().collect();
         if let Some(queue) = &self.queue {
             queue.record_reset(cmd)?;
             buffers.extend(queue.buffers());
@@ -85,7 +85,7 @@ impl RayPass {
         let dependencies = Dependencies {
             sampled_images: &left.textures,
             read_buffers: &left.buffers,
-            storage_images: &[*film.picture],
+            storage_images: &[*accumulation.picture],
             buffers: &buffers,
             ..Dependencies::default()
         };
@@ -96,7 +96,7 @@ impl RayPass {
                 cmd.push_constants(push)?;
                 cmd.trace_rays_with(RENDER, launch, &dependencies)?;
                 if let Some(queue) = &self.queue {
-                    cmd.trace_rays_indirect(BOUNCES, queue.head(), BounceQueue::RAYS, &dependencies)?;
+                    cmd.trace_rays_indirect(BOUNCES, queue.head(), ReflectivePixels::RAYS, &dependencies)?;
                 }
             }
             Pipeline::Compute { render, bounces } => {
@@ -106,7 +106,7 @@ impl RayPass {
                 if let (Some(queue), Some(bounces)) = (&self.queue, bounces) {
                     cmd.bind_compute_pipeline(**bounces)?;
                     cmd.push_constants(push)?;
-                    cmd.dispatch_indirect(queue.head(), BounceQueue::GROUPS, &dependencies)?;
+                    cmd.dispatch_indirect(queue.head(), ReflectivePixels::GROUPS, &dependencies)?;
                 }
             }
         }

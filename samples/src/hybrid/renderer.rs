@@ -5,9 +5,9 @@ use lvk::{Capabilities, Context, TextureHandle, TextureRegion};
 use super::HybridError;
 use super::config::{Bounces, HybridConfig, Method, Raster, RayPath};
 use super::frame::{Lighting, near_plane};
+use super::frame_passes::FramePasses;
 use super::frame_timings::{FrameTimings, GEOMETRY, RAYS};
 use super::gpu_scene::{GpuScene, HitGroups};
-use super::passes::Passes;
 use super::raster_choice::RasterChoice;
 use crate::app::frame::Frame;
 use crate::scene::{Camera, GpuCamera, Scene};
@@ -20,7 +20,7 @@ pub struct HybridRenderer {
     ctx: Context,
     config: HybridConfig,
     scene: GpuScene,
-    passes: Passes,
+    passes: FramePasses,
     lighting: Lighting,
     near_plane: f32,
 }
@@ -35,7 +35,7 @@ impl HybridRenderer {
         let config = suited(config, scene, ctx.capabilities());
         let gpu_scene = GpuScene::new(ctx, scene, HitGroups::default())?;
         Ok(Self {
-            passes: Passes::new(ctx, &gpu_scene, &config)?,
+            passes: FramePasses::new(ctx, &gpu_scene, &config)?,
             lighting: Lighting::new(scene),
             near_plane: near_plane(scene),
             ctx: ctx.clone(),
@@ -57,10 +57,10 @@ impl HybridRenderer {
         let mut ignore = |_| {};
         let mut frame = Frame::waited(&self.ctx, &mut ignore)?;
         self.record(&mut frame, camera)?;
-        Ok(FrameTimings::of(&frame.finish()?))
+        Ok(FrameTimings::from_pass_times(&frame.finish()?))
     }
 
-    /// Records a frame, a step for each band of rows of each sample, and answers the texture that shows it: 8 bits a
+    /// Records a frame, a step for each tile of rows of each sample, and answers the texture that shows it: 8 bits a
     /// channel, sRGB.
     ///
     /// # Errors
@@ -68,17 +68,17 @@ impl HybridRenderer {
     pub fn record(&mut self, frame: &mut Frame<'_>, camera: &Camera) -> Result<TextureHandle, HybridError> {
         self.upload_constants(camera)?;
         for sample in 0..self.config.samples {
-            for band in 0..self.passes.bands.len() {
-                if (sample, band) != (0, 0) {
+            for tile in 0..self.passes.launch_tiles.len() {
+                if (sample, tile) != (0, 0) {
                     frame.next_step()?;
                 }
-                if band == 0 && self.config.method == Method::Hybrid {
+                if tile == 0 && self.config.method == Method::Hybrid {
                     frame.pass(GEOMETRY, |cmd| self.passes.record_geometry(cmd, sample))?;
                 }
-                frame.pass(RAYS, |cmd| self.passes.record_band(cmd, sample, band))?;
+                frame.pass(RAYS, |cmd| self.passes.record_tile(cmd, sample, tile))?;
             }
         }
-        Ok(*self.passes.film.picture)
+        Ok(*self.passes.accumulation.picture)
     }
 
     /// Renders pictures of `extent` pixels from now on.
@@ -112,7 +112,7 @@ impl HybridRenderer {
     }
 
     fn make_passes(&mut self, config: HybridConfig) -> Result<(), HybridError> {
-        let mut passes = Passes::new(&self.ctx, &self.scene, &config)?;
+        let mut passes = FramePasses::new(&self.ctx, &self.scene, &config)?;
         if let Some(choice) = self.passes.geometry.choice() {
             passes.geometry.choose(choice);
         }
@@ -151,7 +151,7 @@ impl HybridRenderer {
 
     /// The texture that shows the last frame.
     pub fn picture(&self) -> TextureHandle {
-        *self.passes.film.picture
+        *self.passes.accumulation.picture
     }
 
     /// The last frame: red, green, blue and alpha of each pixel, 8 bits each, sRGB, rows from the top.
@@ -159,12 +159,12 @@ impl HybridRenderer {
     /// # Errors
     /// [`HybridError::Device`].
     pub fn read_image(&self) -> Result<Vec<u8>, HybridError> {
-        Ok(self.ctx.download_texture(*self.passes.film.picture, &TextureRegion::default())?)
+        Ok(self.ctx.download_texture(*self.passes.accumulation.picture, &TextureRegion::default())?)
     }
 
-    /// How many bands a frame is rendered in, those of all samples counted.
+    /// How many launch_tiles a frame is rendered in, those of all samples counted.
     pub fn band_count(&self) -> u64 {
-        self.passes.bands.len() as u64 * u64::from(self.config.samples)
+        self.passes.launch_tiles.len() as u64 * u64::from(self.config.samples)
     }
 
     /// Milliseconds that building the bottom-level acceleration structures took, submission and wait included.

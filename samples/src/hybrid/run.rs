@@ -5,17 +5,17 @@ use std::process::ExitCode;
 
 use lvk::{Capabilities, Context};
 
+use super::args::{self, HybridArgs};
 use super::sequence::HybridSequence;
 use super::texture_fit::{fit_textures, textures_needed};
 use super::{
     Bounces, Geometry, HybridConfig, HybridError, HybridRenderer, Method, Raster, RasterTuning, RayPath,
 };
-use crate::app::args::{self, HybridArgs};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::{DeviceNeeds, device_text, query_text};
 use crate::app::frames::Frames;
-use crate::app::run::{self, Opened, Opening};
+use crate::app::print_line;
 use crate::app::run_error::RunError;
-use crate::app::say;
 use crate::scene::Scene;
 
 /// What the sample and its pictures are called.
@@ -42,40 +42,40 @@ impl From<HybridError> for RunError {
 pub fn run(args: &HybridArgs) -> ExitCode {
     match args.scene.list.listing() {
         Some(listing) => {
-            say(&listing);
+            print_line(&listing);
             ExitCode::SUCCESS
         }
-        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+        None => cli::run_with(NAME, &args.run, |setup| open(args, setup)),
     }
 }
 
-fn open(args: &HybridArgs, opening: &mut Opening<'_>) -> Result<Opened<HybridSequence>, RunError> {
+fn open(args: &HybridArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<HybridSequence>, RunError> {
     args.scene.check_out(&args.run.out_or(NAME))?;
-    let mut scene = args.scene.load(&mut opening.progress)?;
-    opening.warn(&scene.warnings);
+    let mut scene = args.scene.load(&mut setup.progress)?;
+    setup.warn(&scene.warnings);
     let tracing = DeviceNeeds::tracing(args.tracing.rt);
-    let context = opening.device(&DeviceNeeds { textures: textures_needed(&scene), ..tracing })?;
-    let path = RayPath::choose(RayPath::wished(args.tracing.rt), context.capabilities())?;
+    let context = setup.device(&DeviceNeeds { textures: textures_needed(&scene), ..tracing })?;
+    let path = RayPath::choose(RayPath::from_args(args.tracing.rt), context.capabilities())?;
     let wish = wished_method(args);
     let method = Method::choose(wish, context.capabilities());
     if wish.is_none() && method == Method::Standalone {
-        opening.warn(&[stand_in(context.capabilities())]);
+        setup.warn(&[stand_in(context.capabilities())]);
     }
     let config = config(args, method, path);
     let warnings = fit_textures(&mut scene, &context.capabilities().limits)?;
-    opening.warn(&warnings);
-    opening.progress.stage("uploading the scene and building acceleration structures", 0);
+    setup.warn(&warnings);
+    setup.progress.stage("uploading the scene and building acceleration structures", 0);
     let mut renderer = HybridRenderer::new(&context, &scene, &config)?;
-    let mut headline = headline(&context, &scene, &config, &renderer);
-    let first = args.scene.camera.place();
+    let mut summary = summary(&context, &scene, &config, &renderer);
+    let first = args.scene.camera.index();
     // A sequence needs no telling which rasteriser would be faster.
     if !matches!(args.run.frames, Some(Frames::Sequence(_)))
         && let Some(choice) = renderer.choose_raster(&scene.cameras[first])?
     {
-        let _ = write!(headline, "\ngeometry  {choice}");
+        let _ = write!(summary, "\ngeometry  {choice}");
     }
     let sample = HybridSequence::new(renderer, &scene, first, args.lamp == args::Lamp::Circle);
-    Ok(Opened { sample, headline })
+    Ok(ReadySample { sample, summary })
 }
 
 /// The method that is named, if only by something that it alone has.
@@ -122,7 +122,7 @@ fn config(args: &HybridArgs, method: Method, path: RayPath) -> HybridConfig {
     HybridConfig { method, path, width, height, max_depth, bounces, samples, geometry, tuning }
 }
 
-fn headline(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &HybridRenderer) -> String {
+fn summary(ctx: &Context, scene: &Scene, config: &HybridConfig, renderer: &HybridRenderer) -> String {
     let capabilities = ctx.capabilities();
     let refractive = scene.triangles.len() - scene.opaque_triangle_count as usize;
     let method = match config.method {

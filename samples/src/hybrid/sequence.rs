@@ -4,10 +4,10 @@ use glam::Vec3;
 use lvk::{Context, TextureHandle};
 
 use super::renderer::goes_on;
-use super::{HybridConfig, HybridError, HybridRenderer, Raster, switches};
+use super::{HybridConfig, HybridError, HybridRenderer, Raster, panel};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
-use crate::app::ui::Wanted;
+use crate::app::sample::{FrameTime, Sample};
+use crate::app::ui::PendingSettings;
 use crate::scene::{Camera, CameraPath, Scene};
 
 /// Radius of the lamp's circle, as a share of the diagonal of the scene's bounding box.
@@ -20,7 +20,7 @@ pub struct HybridSequence {
     lamp: LampCircle,
     lamp_moves: bool,
     camera: Camera,
-    wanted: Wanted<HybridConfig>,
+    wanted: PendingSettings<HybridConfig>,
     goes_on: bool,
     /// Which scene it is, as the panel tells.
     scene: String,
@@ -40,13 +40,13 @@ impl HybridSequence {
     pub fn new(renderer: HybridRenderer, scene: &Scene, first: usize, lamp_moves: bool) -> Self {
         let path = CameraPath::tour(scene, first);
         Self {
-            wanted: Wanted::new(*renderer.config()),
+            wanted: PendingSettings::new(*renderer.config()),
             goes_on: goes_on(scene),
             scene: format!("{}: {} triangles", scene.name, scene.triangles.len()),
             renderer,
             camera: path.at(0.0),
             path,
-            lamp: LampCircle::of(scene),
+            lamp: LampCircle::from_scene(scene),
             lamp_moves,
         }
     }
@@ -76,10 +76,10 @@ impl Sample for HybridSequence {
         self.renderer.context()
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), HybridError> {
-        self.camera = self.path.at(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), HybridError> {
+        self.camera = self.path.at(time.phase());
         if self.lamp_moves {
-            self.renderer.move_lamp(self.lamp.at(moment.phase()));
+            self.renderer.move_lamp(self.lamp.at(time.phase()));
         }
         Ok(())
     }
@@ -89,9 +89,9 @@ impl Sample for HybridSequence {
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, HybridError> {
-        if let Some(config) = self.wanted.news(*self.renderer.config()) {
+        if let Some(config) = self.wanted.changed_from(*self.renderer.config()) {
             let done = self.renderer.change(&config);
-            self.wanted.settle(done, *self.renderer.config());
+            self.wanted.finish(done, *self.renderer.config());
         }
         self.renderer.record(frame, &self.camera)
     }
@@ -115,7 +115,7 @@ impl Sample for HybridSequence {
             self.renderer.move_lamp(self.lamp.at(0.0));
         }
         let capabilities = self.renderer.context().capabilities();
-        self.wanted.show(ui, |ui, config| switches::show(ui, config, capabilities, self.goes_on));
+        self.wanted.show(ui, |ui, config| panel::show_settings(ui, config, capabilities, self.goes_on));
         if let Some(raster) = self.renderer.raster() {
             self.show_rasters(ui, raster);
         }
@@ -128,7 +128,7 @@ impl Sample for HybridSequence {
 }
 
 impl LampCircle {
-    fn of(scene: &Scene) -> Self {
+    fn from_scene(scene: &Scene) -> Self {
         let (low, high) = scene.bounds();
         let radius = LAMP_SHARE * Vec3::from(low).distance(Vec3::from(high));
         Self { place: Vec3::from(scene.light.position), radius }

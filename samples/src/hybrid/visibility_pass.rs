@@ -5,7 +5,7 @@ use lvk::{BufferHandle, CommandBuffer, Context, Error, Holder, TextureHandle};
 
 use super::compute_raster::ComputeRaster;
 use super::config::{HybridConfig, Raster};
-use super::frame::{Push, VisibilityPlaces};
+use super::frame::{Push, VisibilityAddresses};
 use super::hardware_raster::HardwareRaster;
 use super::raster_choice::RasterChoice;
 use crate::shaders::hybrid::NO_IMAGE;
@@ -16,7 +16,7 @@ pub(super) struct VisibilityPass {
     hardware: Option<HardwareRaster>,
     chosen: Raster,
     why: String,
-    places: VisibilityPlaces,
+    places: VisibilityAddresses,
 }
 
 impl VisibilityPass {
@@ -54,7 +54,8 @@ impl VisibilityPass {
             (None, _, None) => "the device cannot number triangles in fragment shaders",
             (None, Some(_), Some(_)) => "not measured",
         };
-        let mut places = VisibilityPlaces { triangle_count, image: NO_IMAGE, ..bytemuck::Zeroable::zeroed() };
+        let mut places =
+            VisibilityAddresses { triangle_count, image: NO_IMAGE, ..bytemuck::Zeroable::zeroed() };
         if let Some(compute) = &compute {
             compute.name_in(ctx, &mut places)?;
         }
@@ -65,9 +66,9 @@ impl VisibilityPass {
     }
 
     /// Where the shaders find everything, for the chosen rasteriser.
-    pub(super) fn places(&self) -> VisibilityPlaces {
+    pub(super) fn addresses(&self) -> VisibilityAddresses {
         let image = self.target().map_or(NO_IMAGE, Holder::index);
-        VisibilityPlaces { image, ..self.places }
+        VisibilityAddresses { image, ..self.places }
     }
 
     /// The textures that the ray pass reads.

@@ -7,7 +7,7 @@ use crate::app::ray_args::RayArgs;
 use crate::app::run_args::RunArgs;
 use crate::app::scene_args::BuiltInSceneArgs;
 
-/// Moment in seconds at which the built-in animation begins: one that shows every colour of shadow.
+/// FrameTime in seconds at which the built-in animation begins: one that shows every colour of shadow.
 const SHOWN_MOMENT: f64 = 1.9;
 
 /// Renders blocks and drifting spheres of tinted glass, by the rasteriser with order-independent transparency and with
@@ -40,7 +40,7 @@ pub struct HybridOitArgs {
     #[arg(long, value_name = "N", help_heading = "Rendering")]
     pub nodes: Option<u32>,
 
-    /// Moment of the animation that frame 0 shows, in seconds
+    /// FrameTime of the animation that frame 0 shows, in seconds
     #[arg(
         long,
         value_name = "SECONDS",

@@ -6,10 +6,10 @@ use std::process::ExitCode;
 use lvk::Context;
 
 use super::{HybridOit, HybridOitArgs, HybridOitConfig, HybridOitError, HybridOitSequence, OitScene};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::{DeviceNeeds, device_text, query_text};
-use crate::app::run::{self, Opened, Opening};
+use crate::app::print_line;
 use crate::app::run_error::RunError;
-use crate::app::say;
 use crate::hybrid::RayPath;
 
 /// What the sample and its pictures are called.
@@ -31,16 +31,19 @@ impl From<HybridOitError> for RunError {
 pub fn run(args: &HybridOitArgs) -> ExitCode {
     match args.scene.listing("room", "blocks and drifting spheres of tinted glass") {
         Some(listing) => {
-            say(&listing);
+            print_line(&listing);
             ExitCode::SUCCESS
         }
-        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+        None => cli::run_with(NAME, &args.run, |setup| open(args, setup)),
     }
 }
 
-fn open(args: &HybridOitArgs, opening: &mut Opening<'_>) -> Result<Opened<HybridOitSequence>, RunError> {
-    let context = opening.device(&DeviceNeeds::tracing(args.tracing.rt))?;
-    let path = RayPath::choose(RayPath::wished(args.tracing.rt), context.capabilities())?;
+fn open(
+    args: &HybridOitArgs,
+    setup: &mut SampleSetup<'_>,
+) -> Result<ReadySample<HybridOitSequence>, RunError> {
+    let context = setup.device(&DeviceNeeds::tracing(args.tracing.rt))?;
+    let path = RayPath::choose(RayPath::from_args(args.tracing.rt), context.capabilities())?;
     let scene = OitScene::default();
     let config = HybridOitConfig {
         supersampling: args.supersampling,
@@ -48,14 +51,14 @@ fn open(args: &HybridOitArgs, opening: &mut Opening<'_>) -> Result<Opened<Hybrid
         node_capacity: args.nodes,
         ..HybridOitConfig::new(path, args.run.width, args.run.height)
     };
-    opening.progress.stage("making the scene and its pipelines", 0);
+    setup.progress.stage("making the scene and its pipelines", 0);
     let sample = HybridOit::new(&context, &scene, &config)?;
-    let headline = headline(&context, &scene, &config);
+    let summary = summary(&context, &scene, &config);
     let sample = HybridOitSequence::new(sample, args.time);
-    Ok(Opened { sample, headline })
+    Ok(ReadySample { sample, summary })
 }
 
-fn headline(ctx: &Context, scene: &OitScene, config: &HybridOitConfig) -> String {
+fn summary(ctx: &Context, scene: &OitScene, config: &HybridOitConfig) -> String {
     let capabilities = ctx.capabilities();
     let mut text = device_text(capabilities);
     let path = match config.path {

@@ -70,7 +70,7 @@ impl HybridOit {
     }
 
     /// Looks at the scene from elsewhere than it says.
-    pub fn look(&mut self, camera: &Camera) {
+    pub fn set_camera(&mut self, camera: &Camera) {
         self.scene.camera = *camera;
     }
 

@@ -5,9 +5,9 @@ use lvk::{Context, TextureHandle};
 
 use super::{HybridOit, HybridOitConfig, HybridOitError, NodeUse, PERIOD_SECONDS};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
-use crate::app::ui::Wanted;
-use crate::hybrid::show_path;
+use crate::app::sample::{FrameTime, Sample};
+use crate::app::ui::PendingSettings;
+use crate::hybrid::path_switch;
 use crate::scene::Camera;
 
 /// The sample in an animation.
@@ -21,7 +21,7 @@ pub struct HybridOitSequence {
     camera: Camera,
     /// Of the frame that asked for most.
     nodes: NodeUse,
-    wanted: Wanted<HybridOitConfig>,
+    wanted: PendingSettings<HybridOitConfig>,
 }
 
 impl HybridOitSequence {
@@ -30,7 +30,7 @@ impl HybridOitSequence {
     pub fn new(sample: HybridOit, start: f64) -> Self {
         Self {
             camera: *sample.camera(),
-            wanted: Wanted::new(*sample.config()),
+            wanted: PendingSettings::new(*sample.config()),
             sample,
             start: if start.is_finite() { start.rem_euclid(PERIOD_SECONDS) } else { 0.0 },
             gone: 0.0,
@@ -55,17 +55,17 @@ impl Sample for HybridOitSequence {
         self.sample.context()
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), HybridOitError> {
-        self.gone = PERIOD_SECONDS * f64::from(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), HybridOitError> {
+        self.gone = PERIOD_SECONDS * f64::from(time.phase());
         self.pose();
-        self.sample.look(&self.camera);
+        self.sample.set_camera(&self.camera);
         Ok(())
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, HybridOitError> {
-        if let Some(config) = self.wanted.news(*self.sample.config()) {
+        if let Some(config) = self.wanted.changed_from(*self.sample.config()) {
             let done = self.sample.change(&config);
-            self.wanted.settle(done, *self.sample.config());
+            self.wanted.finish(done, *self.sample.config());
         }
         self.sample.record(frame)
     }
@@ -87,7 +87,7 @@ impl Sample for HybridOitSequence {
     }
 
     fn set_view(&mut self, camera: &Camera) {
-        self.sample.look(camera);
+        self.sample.set_camera(camera);
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
@@ -110,7 +110,7 @@ impl Sample for HybridOitSequence {
 
 fn show_switches(ui: &mut egui::Ui, config: &mut HybridOitConfig, can_be: impl Fn(&HybridOitConfig) -> bool) {
     let before = *config;
-    show_path(ui, &mut config.path, |path| can_be(&HybridOitConfig { path, ..before }));
+    path_switch(ui, &mut config.path, |path| can_be(&HybridOitConfig { path, ..before }));
     let most = HybridOitConfig::MAX_SUPERSAMPLING;
     ui.add(Slider::new(&mut config.supersampling, 1..=most).text("samples a side of a pixel"));
     let most = HybridOitConfig::MAX_SHADOW_RAYS;

@@ -1,4 +1,4 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{BufferHandle, Context, Dependencies, Holder, TextureHandle};
@@ -11,7 +11,7 @@ use super::{LargeSceneConfig, LargeSceneError, Show};
 use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
 use crate::app::progress::Progress;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::hybrid::{Lighting, SceneAddresses};
 use crate::rtx::{Canvas, Tracer};
 use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, Scene};
@@ -140,8 +140,8 @@ impl Sample for LargeScene {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), LargeSceneError> {
-        self.camera = self.path.at(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), LargeSceneError> {
+        self.camera = self.path.at(time.phase());
         Ok(())
     }
 

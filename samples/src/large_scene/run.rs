@@ -5,12 +5,12 @@ use std::process::ExitCode;
 
 use super::load::Load;
 use super::{LargeScene, LargeSceneArgs, LargeSceneError};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::DeviceNeeds;
 use crate::app::loading::Loading;
 use crate::app::progress::Progress;
-use crate::app::run::{self, Opened, Opening};
 use crate::app::run_error::RunError;
-use crate::app::{png, say, scene_list};
+use crate::app::{png, print_line, scene_list};
 
 /// What the sample and its pictures are called.
 const NAME: &str = "large_scene";
@@ -24,40 +24,46 @@ pub fn run(args: &LargeSceneArgs) -> ExitCode {
     match args.list.listing() {
         Some(listing) => {
             let others = listing.split_once('\n').map_or("", |(_, others)| others);
-            say(&format!("valley  built in: a wooded valley made by code; the default\n{others}"));
+            print_line(&format!("valley  built in: a wooded valley made by code; the default\n{others}"));
             ExitCode::SUCCESS
         }
-        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+        None => cli::run_with(NAME, &args.run, |setup| open(args, setup)),
     }
 }
 
-fn open(args: &LargeSceneArgs, opening: &mut Opening<'_>) -> Result<Opened<Loading<LargeScene>>, RunError> {
-    let load = Load { args: args.clone(), files: files(args)?, cache: opening.structure_cache() };
-    if opening.is_for_window() { in_background(load, opening) } else { at_once(&load, opening) }
+fn open(
+    args: &LargeSceneArgs,
+    setup: &mut SampleSetup<'_>,
+) -> Result<ReadySample<Loading<LargeScene>>, RunError> {
+    let load = Load { args: args.clone(), files: files(args)?, cache: setup.structure_cache() };
+    if setup.is_for_window() { in_background(load, setup) } else { at_once(&load, setup) }
 }
 
 /// A window is there before the world: a thread loads that while frames show how far it is.
-fn in_background(load: Load, opening: &mut Opening<'_>) -> Result<Opened<Loading<LargeScene>>, RunError> {
+fn in_background(
+    load: Load,
+    setup: &mut SampleSetup<'_>,
+) -> Result<ReadySample<Loading<LargeScene>>, RunError> {
     let tracing = DeviceNeeds::tracing(load.args.tracing.rt);
-    let context = opening.device(&DeviceNeeds { textures: ROOM, ..tracing })?;
-    opening.progress.pause();
+    let context = setup.device(&DeviceNeeds { textures: ROOM, ..tracing })?;
+    setup.progress.pause();
     let ctx = context.clone();
     let sample = Loading::start(&context, move |progress| {
         let world = load.world(progress)?;
         load.sample(&ctx, world, ROOM, progress)
     })?;
-    Ok(Opened { sample, headline: String::new() })
+    Ok(ReadySample { sample, summary: String::new() })
 }
 
 /// The device is opened when it is known how many textures it is to have room for.
-fn at_once(load: &Load, opening: &mut Opening<'_>) -> Result<Opened<Loading<LargeScene>>, RunError> {
-    opening.progress = Progress::spoken();
-    let world = load.world(&mut opening.progress)?;
+fn at_once(load: &Load, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Loading<LargeScene>>, RunError> {
+    setup.progress = Progress::spoken();
+    let world = load.world(&mut setup.progress)?;
     let textures = world.textures_needed();
     let tracing = DeviceNeeds::tracing(load.args.tracing.rt);
-    let context = opening.device(&DeviceNeeds { textures, ..tracing })?;
-    let Opened { sample, headline } = load.sample(&context, world, textures, &mut opening.progress)?;
-    Ok(Opened { sample: Loading::ready(sample), headline })
+    let context = setup.device(&DeviceNeeds { textures, ..tracing })?;
+    let ReadySample { sample, summary } = load.sample(&context, world, textures, &mut setup.progress)?;
+    Ok(ReadySample { sample: Loading::ready(sample), summary })
 }
 
 /// The OBJ files that are named, by themselves or by their folder.

@@ -70,7 +70,7 @@ impl Structures {
         }
         let mut blas = plan.build_missing(&descs, found, progress)?;
         plan.compact(&mut blas, progress)?;
-        plan.keep(&blas, &keys, progress)?;
+        plan.store_built(&blas, &keys, progress)?;
         Ok(Self { tlas: plan.top_level(&blas)?, blas })
     }
 
@@ -107,7 +107,7 @@ impl Plan<'_> {
 
     /// Of the files, where there are any.
     fn keys(&self) -> Vec<StructureKey> {
-        let key = |piece| StructureKey::of(self.world, piece, self.ctx.capabilities(), self.flags());
+        let key = |piece| StructureKey::from_piece(self.world, piece, self.ctx.capabilities(), self.flags());
         self.cache.iter().flat_map(|_| self.world.pieces.iter().map(key)).collect()
     }
 
@@ -186,7 +186,7 @@ impl Plan<'_> {
     }
 
     /// Keeps what was built for the next start.
-    fn keep(
+    fn store_built(
         &self,
         blas: &[Blas],
         keys: &[StructureKey],
@@ -198,7 +198,7 @@ impl Plan<'_> {
         for (done, (blas, key)) in (1..).zip(built) {
             progress.go_on()?;
             match self.ctx.serialize_blas(*blas.holder) {
-                Ok(bytes) => cache.keep(*key, &bytes),
+                Ok(bytes) => cache.store(*key, &bytes),
                 Err(error) if is_of_file(&error) => {
                     log::warn!("the structure '{}' cannot be kept: {error}", cache.path(*key).display());
                 }

@@ -54,7 +54,7 @@ impl World {
         let Valley { ground, trees, places } = Valley::new(triangles, copies, progress)?;
         let mut placed = vec![(0, Affine3A::IDENTITY)];
         placed.extend(places.into_iter().map(|(kind, place)| (kind + 1, place)));
-        Ok(Self::of(std::iter::once(ground).chain(trees).collect(), &placed))
+        Ok(Self::from_scenes(std::iter::once(ground).chain(trees).collect(), &placed))
     }
 
     /// Rows of plots along streets, in each a scene, turned to another side from plot to plot; `copies` of each scene. Scenes
@@ -67,11 +67,11 @@ impl World {
             return Err(LargeSceneError::NoScenes);
         }
         let street::Street { scenes, places } = street::Street::new(scenes, copies);
-        Ok(Self::of(scenes, &places))
+        Ok(Self::from_scenes(scenes, &places))
     }
 
     /// Scenes of which the first has the lights and cameras, and the index and place of each that is shown.
-    pub(super) fn of(scenes: Vec<Scene>, places: &[(usize, Affine3A)]) -> Self {
+    pub(super) fn from_scenes(scenes: Vec<Scene>, places: &[(usize, Affine3A)]) -> Self {
         let (scene, pieces) = merge(scenes);
         let of_scene = |number: usize| pieces.iter().enumerate().filter(move |(_, (of, _))| *of == number);
         let stand = |(scene, place): &(usize, Affine3A)| {

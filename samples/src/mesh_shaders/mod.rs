@@ -14,5 +14,5 @@ mod run;
 pub use args::MeshShadersArgs;
 pub use meshlets::{Meshlet, Meshlets};
 pub use pipelines::pipelines;
-pub use renderer::{Corner, MeshShaders};
+pub use renderer::{MeshShaders, Vertex};
 pub use run::run;

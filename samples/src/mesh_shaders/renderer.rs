@@ -1,4 +1,4 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
 use std::f32::consts::TAU;
 
@@ -15,7 +15,7 @@ use super::meshlets::Meshlets;
 use super::pipelines::MESHLETS;
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::raster::{Canvas, RasterError};
 use crate::scene::{Camera, GpuCamera};
 
@@ -29,7 +29,7 @@ pub struct MeshShaders {
     ctx: Context,
     canvas: Canvas,
     pipeline: Holder<RenderPipelineHandle>,
-    corners: Vec<Corner>,
+    vertices: Vec<Vertex>,
     meshlets: Meshlets,
     counter: Counter,
     frame: Holder<BufferHandle>,
@@ -43,7 +43,7 @@ pub struct MeshShaders {
 /// A corner of the knot's triangles (`Vertex` in `shaders/mesh_shaders/frame.glsl`).
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub struct Corner {
+pub struct Vertex {
     /// Where it is.
     pub position: [f32; 3],
     /// Outwards, of length 1.
@@ -76,15 +76,15 @@ impl MeshShaders {
     /// device fails.
     pub fn new(ctx: &Context, extent: [u32; 2], culls: bool) -> Result<Self, RasterError> {
         let remedy = "take another device by --device; --list-devices says which there are";
-        RasterError::unless(ctx.capabilities().mesh_shader, ctx, "mesh shaders", remedy)?;
+        RasterError::require(ctx.capabilities().mesh_shader, ctx, "mesh shaders", remedy)?;
         let canvas = Canvas::with_depth(ctx, extent)?;
-        let (corners, meshlets) = model();
+        let (vertices, meshlets) = model();
         let counter = Counter::new(ctx)?;
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         let usage = BufferUsage::STORAGE;
         let buffers = [
             array(ctx, "meshlets", usage, &meshlets.meshlets)?,
-            array(ctx, "vertices", usage, &corners)?,
+            array(ctx, "vertices", usage, &vertices)?,
             array(ctx, "vertex numbers", usage, &meshlets.vertices)?,
             array(ctx, "triangles", usage, &meshlets.triangles)?,
         ];
@@ -105,7 +105,7 @@ impl MeshShaders {
             ctx: ctx.clone(),
             canvas,
             pipeline: pipeline(ctx)?,
-            corners,
+            vertices,
             meshlets,
             counter,
             frame,
@@ -116,7 +116,7 @@ impl MeshShaders {
         })
     }
 
-    /// The knot in pieces, whose vertices are [`corners`](Self::corners).
+    /// The knot in pieces, whose vertices are [`vertices`](Self::vertices).
     #[must_use]
     pub fn meshlets(&self) -> &Meshlets {
         &self.meshlets
@@ -124,8 +124,8 @@ impl MeshShaders {
 
     /// Corners of the knot, at rest.
     #[must_use]
-    pub fn corners(&self) -> &[Corner] {
-        &self.corners
+    pub fn vertices(&self) -> &[Vertex] {
+        &self.vertices
     }
 
     /// How many meshlets the last frame drew that is known.
@@ -134,7 +134,7 @@ impl MeshShaders {
         self.counter.latest()
     }
 
-    /// The buffer that all stages are told of (`Frame` in `shaders/mesh_shaders/frame.glsl`).
+    /// The buffer that all stages are culling_text of (`Frame` in `shaders/mesh_shaders/frame.glsl`).
     #[must_use]
     pub fn frame_buffer(&self) -> BufferHandle {
         *self.frame
@@ -148,7 +148,7 @@ impl MeshShaders {
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))
     }
 
-    fn told(&self) -> String {
+    fn culling_text(&self) -> String {
         let count = self.meshlets.meshlets.len();
         match self.drawn() {
             Some(drawn) => format!("{drawn} of {count} meshlets drawn"),
@@ -164,9 +164,9 @@ impl Sample for MeshShaders {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.constants.phase = moment.phase();
-        self.camera = camera(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+        self.constants.phase = time.phase();
+        self.camera = camera(time.phase());
         Ok(())
     }
 
@@ -186,7 +186,7 @@ impl Sample for MeshShaders {
     }
 
     fn remark(&self) -> Option<String> {
-        Some(format!("culling   {}", self.told()))
+        Some(format!("culling   {}", self.culling_text()))
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
@@ -203,7 +203,7 @@ impl Sample for MeshShaders {
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {
-        ui.label(self.told());
+        ui.label(self.culling_text());
         let (mut culls, mut is_held) = (self.constants.culls == 1, self.held.is_some());
         ui.checkbox(&mut culls, "leave out what cannot be seen");
         if ui.checkbox(&mut is_held, "from here, wherever the camera goes").changed() {
@@ -219,16 +219,16 @@ impl Sample for MeshShaders {
     }
 }
 
-/// The knot's corners, and its pieces.
-fn model() -> (Vec<Corner>, Meshlets) {
+/// The knot's vertices, and its pieces.
+fn model() -> (Vec<Vertex>, Meshlets) {
     let knot = knot();
-    let corners = knot
+    let vertices = knot
         .vertices
         .iter()
-        .map(|vertex| Corner { position: vertex.position.into(), normal: vertex.normal.into() });
+        .map(|vertex| Vertex { position: vertex.position.into(), normal: vertex.normal.into() });
     let positions: Vec<Vec3> = knot.vertices.iter().map(|vertex| vertex.position).collect();
-    let triangles: Vec<_> = knot.triangles.iter().map(|corners| corners.map(u32::from)).collect();
-    (corners.collect(), Meshlets::cut(&positions, &triangles))
+    let triangles: Vec<_> = knot.triangles.iter().map(|vertices| vertices.map(u32::from)).collect();
+    (vertices.collect(), Meshlets::cut(&positions, &triangles))
 }
 
 fn pipeline(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {

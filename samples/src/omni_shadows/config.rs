@@ -93,7 +93,7 @@ impl Faces {
         let can = Self::can_be_one_pass(ctx);
         if self == Self::Multiview {
             let remedy = "--faces single draws one face after the other";
-            RasterError::unless(can, ctx, "multiview of six views", remedy)?;
+            RasterError::require(can, ctx, "multiview of six views", remedy)?;
         }
         Ok(can && self != Self::Single)
     }

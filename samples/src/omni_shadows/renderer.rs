@@ -1,4 +1,4 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
 use bytemuck::Zeroable;
 use lvk::{BufferHandle, BufferUsage, Context, Holder, SamplerHandle, TextureHandle};
@@ -10,7 +10,7 @@ use super::scene_pass::ScenePass;
 use super::shadow_cube::{CubePass, ShadowCube, samplers};
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::raster::{Canvas, RasterError};
 use crate::scene::{Camera, GpuCamera};
 
@@ -149,8 +149,8 @@ impl Sample for OmniShadows {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.show(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+        self.show(time.phase());
         Ok(())
     }
 

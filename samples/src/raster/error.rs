@@ -46,7 +46,7 @@ impl RasterError {
     ///
     /// # Errors
     /// [`RasterError::Missing`].
-    pub fn unless(has: bool, ctx: &Context, what: &'static str, remedy: &'static str) -> Result<(), Self> {
+    pub fn require(has: bool, ctx: &Context, what: &'static str, remedy: &'static str) -> Result<(), Self> {
         let device = || ctx.capabilities().device_name.clone();
         if has { Ok(()) } else { Err(Self::Missing { device: device(), what, remedy }) }
     }

@@ -3,11 +3,11 @@
 
 mod canvas;
 mod error;
-mod headline;
 mod pipeline;
+mod summary;
 
 pub use canvas::Canvas;
 pub(crate) use canvas::check_size;
 pub use error::RasterError;
-pub use headline::headline;
 pub use pipeline::{RasterPipeline, fragment_stage, vertex_stage};
+pub use summary::summary;

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::world::Light;
+use super::scene::Light;
 use crate::scene::GpuCamera;
 
 /// Lights that the shaders have room for: channels of a texture, beside the one for openness.
@@ -20,7 +20,7 @@ pub(super) struct LightConstants {
     spread: f32,
 }
 
-/// The tables of the world, and its light: the same in every frame.
+/// The gpu_scene of the world, and its light: the same in every frame.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct WorldConstants {

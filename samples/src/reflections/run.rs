@@ -6,10 +6,10 @@ use std::process::ExitCode;
 use lvk::Context;
 
 use super::{CullingCost, Reflections, ReflectionsArgs, ReflectionsConfig, ReflectionsError};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::{DeviceNeeds, device_text, query_text};
-use crate::app::run::{self, Opened, Opening};
+use crate::app::print_line;
 use crate::app::run_error::RunError;
-use crate::app::say;
 use crate::hybrid::RayPath;
 
 /// What the sample and its pictures are called.
@@ -35,35 +35,35 @@ impl From<ReflectionsError> for RunError {
 pub fn run(args: &ReflectionsArgs) -> ExitCode {
     match args.scene.listing("hall", "polished floors, water, glass, a serpent and drifting leaves") {
         Some(listing) => {
-            say(&listing);
+            print_line(&listing);
             ExitCode::SUCCESS
         }
-        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+        None => cli::run_with(NAME, &args.run, |setup| open(args, setup)),
     }
 }
 
-fn open(args: &ReflectionsArgs, opening: &mut Opening<'_>) -> Result<Opened<Reflections>, RunError> {
-    let context = opening.device(&DeviceNeeds::tracing(args.tracing.rt))?;
-    let path = RayPath::choose(RayPath::wished(args.tracing.rt), context.capabilities())?;
+fn open(args: &ReflectionsArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Reflections>, RunError> {
+    let context = setup.device(&DeviceNeeds::tracing(args.tracing.rt))?;
+    let path = RayPath::choose(RayPath::from_args(args.tracing.rt), context.capabilities())?;
     let config = ReflectionsConfig {
         samples: args.samples,
         min_angle: args.min_angle,
         ..ReflectionsConfig::new(path, args.run.width, args.run.height)
     };
-    opening.progress.stage("making the hall and its pipelines", 0);
+    setup.progress.stage("making the hall and its pipelines", 0);
     let sample = Reflections::new(&context, &config)?;
-    let mut headline = headline(&context, &sample);
+    let mut summary = summary(&context, &sample);
     if args.compare_culling {
-        opening.progress.stage("measuring what culling saves", 0);
+        setup.progress.stage("measuring what culling saves", 0);
         let rounds = if context.capabilities().is_cpu { CPU_ROUNDS } else { GPU_ROUNDS };
         if let Some(cost) = CullingCost::measure(&sample, rounds)? {
-            let _ = write!(headline, "\n          {cost}");
+            let _ = write!(summary, "\n          {cost}");
         }
     }
-    Ok(Opened { sample, headline })
+    Ok(ReadySample { sample, summary })
 }
 
-fn headline(ctx: &Context, sample: &Reflections) -> String {
+fn summary(ctx: &Context, sample: &Reflections) -> String {
     let capabilities = ctx.capabilities();
     let mut text = device_text(capabilities);
     let path = match sample.config().path {

@@ -41,7 +41,7 @@ impl RenderToCubeMapConfig {
 
 impl Faces {
     /// What the command line asks for.
-    pub(super) fn wished(wish: FacesArg, capabilities: &Capabilities) -> Self {
+    pub(super) fn from_args(wish: FacesArg, capabilities: &Capabilities) -> Self {
         match wish {
             FacesArg::SixPasses => Self::SixPasses,
             FacesArg::OnePass => Self::OnePass,
@@ -53,7 +53,7 @@ impl Faces {
     /// Fails where the device cannot.
     pub(super) fn check(self, ctx: &Context) -> Result<(), RasterError> {
         let can = self == Self::SixPasses || has_six_views(ctx.capabilities());
-        RasterError::unless(can, ctx, "passes of six views", "draw the faces by --faces six-passes")
+        RasterError::require(can, ctx, "passes of six views", "draw the faces by --faces six-passes")
     }
 }
 

@@ -1,4 +1,4 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
@@ -12,7 +12,7 @@ use super::pipelines::{self, IN_PICTURE, ON_ALL_FACES, ON_FACE};
 use super::surroundings::{Block, DROP, blocks, camera};
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::raster::{Canvas, RasterError};
 use crate::scene::{Camera, GpuCamera};
 
@@ -155,8 +155,8 @@ impl Sample for RenderToCubeMap {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.phase = moment.phase();
+    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+        self.phase = time.phase();
         self.blocks = blocks(self.phase);
         self.camera = camera(self.phase);
         Ok(())

@@ -3,10 +3,10 @@
 use std::process::ExitCode;
 
 use super::{Faces, RenderToCubeMap, RenderToCubeMapArgs, RenderToCubeMapConfig};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::DeviceNeeds;
-use crate::app::run::{self, Opened, Opening};
 use crate::app::run_error::RunError;
-use crate::raster::headline;
+use crate::raster::summary;
 
 /// What the sample and its pictures are called.
 const NAME: &str = "render_to_cube_map";
@@ -15,12 +15,15 @@ const NAME: &str = "render_to_cube_map";
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &RenderToCubeMapArgs) -> ExitCode {
-    run::run(NAME, &args.run, |opening| open(args, opening))
+    cli::run_with(NAME, &args.run, |setup| open(args, setup))
 }
 
-fn open(args: &RenderToCubeMapArgs, opening: &mut Opening<'_>) -> Result<Opened<RenderToCubeMap>, RunError> {
-    let context = opening.device(&DeviceNeeds::default())?;
-    let faces = Faces::wished(args.faces, context.capabilities());
+fn open(
+    args: &RenderToCubeMapArgs,
+    setup: &mut SampleSetup<'_>,
+) -> Result<ReadySample<RenderToCubeMap>, RunError> {
+    let context = setup.device(&DeviceNeeds::default())?;
+    let faces = Faces::from_args(args.faces, context.capabilities());
     let config = RenderToCubeMapConfig {
         face_size: args.face_size,
         roughness: args.roughness,
@@ -34,5 +37,5 @@ fn open(args: &RenderToCubeMapArgs, opening: &mut Opening<'_>) -> Result<Opened<
     let (count, size) = (sample.blocks().len() - 1, config.face_size);
     let scene =
         format!("{count} blocks around a drop; a cube map of 6 x {size} x {size} pixels, drawn in {by}");
-    Ok(Opened { headline: headline(context.capabilities(), &scene), sample })
+    Ok(ReadySample { summary: summary(context.capabilities(), &scene), sample })
 }

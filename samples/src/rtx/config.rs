@@ -19,12 +19,12 @@ pub struct RtxConfig {
 
 impl RtxConfig {
     /// What the command line asks for.
-    pub(crate) fn of(
+    pub(crate) fn from_args(
         wish: RayTracing,
         [width, height]: [u32; 2],
         capabilities: &Capabilities,
     ) -> Result<Self, RtxError> {
-        let path = RayPath::choose(RayPath::wished(wish), capabilities)?;
+        let path = RayPath::choose(RayPath::from_args(wish), capabilities)?;
         Ok(Self { path, width, height })
     }
 

@@ -4,11 +4,11 @@
 mod canvas;
 mod config;
 mod error;
-mod headline;
+mod summary;
 mod tracer;
 
 pub(crate) use canvas::Canvas;
 pub use config::RtxConfig;
 pub use error::RtxError;
-pub(crate) use headline::headline;
+pub(crate) use summary::summary;
 pub(crate) use tracer::{RayStages, Tracer, compute_pipeline, groups};

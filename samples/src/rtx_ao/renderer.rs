@@ -14,7 +14,7 @@ use super::raster::Raster;
 use super::targets::Targets;
 use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::hybrid::RayPath;
 use crate::rtx::{Canvas, RtxError};
 use crate::scene::{Camera, CameraPath, GpuCamera, Scene};
@@ -214,8 +214,8 @@ impl Sample for RtxAo {
     }
 
     /// Begins anew even where nothing moved, so that a frame does not depend on those before.
-    fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
-        let phase = moment.phase();
+    fn update(&mut self, time: FrameTime) -> Result<(), RtxError> {
+        let phase = time.phase();
         self.show(&View { camera: self.path.at(phase), turns: phase });
         self.passes = 0;
         Ok(())

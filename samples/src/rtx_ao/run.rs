@@ -3,11 +3,11 @@
 use std::process::ExitCode;
 
 use super::{RtxAo, RtxAoArgs, RtxAoConfig};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::DeviceNeeds;
-use crate::app::run::{self, Opened, Opening};
+use crate::app::print_line;
 use crate::app::run_error::RunError;
-use crate::app::say;
-use crate::rtx::{RtxConfig, headline};
+use crate::rtx::{RtxConfig, summary};
 use crate::scene::Scene;
 
 /// What the sample and its pictures are called.
@@ -22,43 +22,43 @@ pub fn run(args: &RtxAoArgs) -> ExitCode {
     match args.scene.list.listing() {
         Some(listing) => {
             let others = listing.replace("; the default", "");
-            say(&format!("town  built in: paper houses around a carousel; the default\n{others}"));
+            print_line(&format!("town  built in: paper houses around a carousel; the default\n{others}"));
             ExitCode::SUCCESS
         }
-        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+        None => cli::run_with(NAME, &args.run, |setup| open(args, setup)),
     }
 }
 
-fn open(args: &RtxAoArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxAo>, RunError> {
+fn open(args: &RtxAoArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<RtxAo>, RunError> {
     args.scene.check_out(&args.run.out_or(NAME))?;
-    let (scene, turning) = load(args, opening)?;
-    opening.warn(&scene.warnings);
+    let (scene, turning) = load(args, setup)?;
+    setup.warn(&scene.warnings);
     let textures = scene.textures.len() as u32 + 16;
     let needs = DeviceNeeds { textures, ..DeviceNeeds::tracing(args.tracing.rt) };
-    let context = opening.device(&needs)?;
+    let context = setup.device(&needs)?;
     let capabilities = context.capabilities();
     let radius = args.radius.or(turning.is_some().then_some(TOWN_RADIUS));
     let (passes, rays) = (args.passes, args.rays);
     let config = RtxAoConfig {
-        rtx: RtxConfig::of(args.tracing.rt, args.run.extent(), capabilities)?,
+        rtx: RtxConfig::from_args(args.tracing.rt, args.run.extent(), capabilities)?,
         passes,
         rays,
         radius,
     };
-    opening.progress.stage("uploading the scene and building acceleration structures", 0);
+    setup.progress.stage("uploading the scene and building acceleration structures", 0);
     let sample = RtxAo::new(&context, &scene, turning.as_ref(), &config)?;
-    let sample = sample.from_camera(&scene, args.scene.camera.place());
+    let sample = sample.from_camera(&scene, args.scene.camera.index());
     let (name, count, radius) = (&scene.name, sample.triangle_count(), sample.radius());
     let told =
         format!("{name}: {count} triangles; {passes} passes a frame, {rays} rays within {radius:.2} units");
-    let headline = headline(capabilities, config.rtx.path, "a fragment shader", &told);
-    Ok(Opened { sample, headline })
+    let summary = summary(capabilities, config.rtx.path, "a fragment shader", &told);
+    Ok(ReadySample { sample, summary })
 }
 
 /// The scene, and what turns in it.
-fn load(args: &RtxAoArgs, opening: &mut Opening<'_>) -> Result<(Scene, Option<Scene>), RunError> {
+fn load(args: &RtxAoArgs, setup: &mut SampleSetup<'_>) -> Result<(Scene, Option<Scene>), RunError> {
     if args.scene.scene.as_deref().is_none_or(|name| name.as_os_str() == "town") {
         return Ok((Scene::town(), Some(Scene::carousel())));
     }
-    Ok((args.scene.load(&mut opening.progress)?, None))
+    Ok((args.scene.load(&mut setup.progress)?, None))
 }

@@ -1,4 +1,4 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
@@ -11,7 +11,7 @@ use super::pipelines::RAYS;
 use super::switches::RtxHelloSwitches;
 use crate::app::array_buffer::array;
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::rtx::{Canvas, RtxConfig, RtxError, Tracer};
 use crate::scene::{Camera, GpuCamera};
 
@@ -92,8 +92,8 @@ impl Sample for RtxHello {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
-        self.phase = moment.phase();
+    fn update(&mut self, time: FrameTime) -> Result<(), RtxError> {
+        self.phase = time.phase();
         self.camera = camera();
         Ok(())
     }

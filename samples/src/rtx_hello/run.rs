@@ -3,11 +3,11 @@
 use std::process::ExitCode;
 
 use super::{RtxHello, RtxHelloArgs};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::DeviceNeeds;
-use crate::app::run::{self, Opened, Opening};
+use crate::app::print_line;
 use crate::app::run_error::RunError;
-use crate::app::say;
-use crate::rtx::{RtxConfig, headline};
+use crate::rtx::{RtxConfig, summary};
 
 /// What the sample and its pictures are called.
 const NAME: &str = "rtx_hello";
@@ -18,19 +18,19 @@ const NAME: &str = "rtx_hello";
 pub fn run(args: &RtxHelloArgs) -> ExitCode {
     match args.scene.listing("triangles", "a turning triangle and two rings of smaller ones") {
         Some(listing) => {
-            say(&listing);
+            print_line(&listing);
             ExitCode::SUCCESS
         }
-        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+        None => cli::run_with(NAME, &args.run, |setup| open(args, setup)),
     }
 }
 
-fn open(args: &RtxHelloArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxHello>, RunError> {
-    let context = opening.device(&DeviceNeeds::tracing(args.tracing.rt))?;
+fn open(args: &RtxHelloArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<RtxHello>, RunError> {
+    let context = setup.device(&DeviceNeeds::tracing(args.tracing.rt))?;
     let capabilities = context.capabilities();
-    let config = RtxConfig::of(args.tracing.rt, args.run.extent(), capabilities)?;
+    let config = RtxConfig::from_args(args.tracing.rt, args.run.extent(), capabilities)?;
     let sample = RtxHello::new(&context, &config)?;
     let scene = format!("{} triangles, each an instance of the same one", sample.triangle_count());
-    let headline = headline(capabilities, config.path, "a compute shader", &scene);
-    Ok(Opened { sample, headline })
+    let summary = summary(capabilities, config.path, "a compute shader", &scene);
+    Ok(ReadySample { sample, summary })
 }

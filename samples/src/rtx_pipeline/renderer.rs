@@ -1,4 +1,4 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{BufferHandle, Context, Dependencies, Holder, TextureHandle};
@@ -8,7 +8,7 @@ use super::pipelines::RAYS;
 use super::switches::RtxPipelineSwitches;
 use crate::app::array_buffer::buffer;
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::hybrid::{GpuScene, HitGroups, Lighting, SceneAddresses, near_plane};
 use crate::rtx::{Canvas, RayStages, RtxError, Tracer};
 use crate::scene::{Camera, CameraPath, GpuCamera, Scene};
@@ -129,8 +129,8 @@ impl Sample for RtxPipeline {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
-        self.camera = self.path.at(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), RtxError> {
+        self.camera = self.path.at(time.phase());
         Ok(())
     }
 

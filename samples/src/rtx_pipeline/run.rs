@@ -3,12 +3,12 @@
 use std::process::ExitCode;
 
 use super::{RtxPipeline, RtxPipelineArgs, RtxPipelineConfig};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::DeviceNeeds;
-use crate::app::run::{self, Opened, Opening};
+use crate::app::print_line;
 use crate::app::run_error::RunError;
-use crate::app::say;
 use crate::hybrid::{fit_textures, textures_needed};
-use crate::rtx::{RtxConfig, headline};
+use crate::rtx::{RtxConfig, summary};
 
 /// What the sample and its pictures are called.
 const NAME: &str = "rtx_pipeline";
@@ -19,28 +19,28 @@ const NAME: &str = "rtx_pipeline";
 pub fn run(args: &RtxPipelineArgs) -> ExitCode {
     match args.scene.list.listing() {
         Some(listing) => {
-            say(&listing);
+            print_line(&listing);
             ExitCode::SUCCESS
         }
-        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+        None => cli::run_with(NAME, &args.run, |setup| open(args, setup)),
     }
 }
 
-fn open(args: &RtxPipelineArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxPipeline>, RunError> {
+fn open(args: &RtxPipelineArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<RtxPipeline>, RunError> {
     args.scene.check_out(&args.run.out_or(NAME))?;
-    let mut scene = args.scene.load(&mut opening.progress)?;
-    opening.warn(&scene.warnings);
+    let mut scene = args.scene.load(&mut setup.progress)?;
+    setup.warn(&scene.warnings);
     let tracing = DeviceNeeds::tracing(args.tracing.rt);
-    let context = opening.device(&DeviceNeeds { textures: textures_needed(&scene), ..tracing })?;
+    let context = setup.device(&DeviceNeeds { textures: textures_needed(&scene), ..tracing })?;
     let capabilities = context.capabilities();
-    opening.warn(&fit_textures(&mut scene, &capabilities.limits)?);
+    setup.warn(&fit_textures(&mut scene, &capabilities.limits)?);
     let config = RtxPipelineConfig {
-        rtx: RtxConfig::of(args.tracing.rt, args.run.extent(), capabilities)?,
+        rtx: RtxConfig::from_args(args.tracing.rt, args.run.extent(), capabilities)?,
         depth: args.depth,
     };
-    opening.progress.stage("uploading the scene and building acceleration structures", 0);
+    setup.progress.stage("uploading the scene and building acceleration structures", 0);
     let sample = RtxPipeline::new(&context, &scene, &config)?;
-    let sample = sample.from_camera(&scene, args.scene.camera.place());
+    let sample = sample.from_camera(&scene, args.scene.camera.index());
     let (count, parts) = (sample.triangle_count(), sample.blas_part_count());
     let RtxPipelineConfig { rtx, depth } = *sample.config();
     let told = format!(
@@ -48,6 +48,6 @@ fn open(args: &RtxPipelineArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxP
         scene.name,
         scene.textures.len()
     );
-    let headline = headline(capabilities, rtx.path, "a compute shader", &told);
-    Ok(Opened { sample, headline })
+    let summary = summary(capabilities, rtx.path, "a compute shader", &told);
+    Ok(ReadySample { sample, summary })
 }

@@ -1,4 +1,4 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
 use std::f32::consts::TAU;
 
@@ -14,7 +14,7 @@ use super::pipelines::{INSTANCES, RAYS};
 use super::switches::RtxTexturesSwitches;
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::app::scene_textures;
 use crate::rtx::{Canvas, RtxConfig, RtxError, Tracer, compute_pipeline};
 use crate::scene::{Camera, GpuCamera, painted_textures};
@@ -181,8 +181,8 @@ impl Sample for RtxTextures {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RtxError> {
-        self.show(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), RtxError> {
+        self.show(time.phase());
         Ok(())
     }
 

@@ -3,11 +3,11 @@
 use std::process::ExitCode;
 
 use super::{RtxTextures, RtxTexturesArgs};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::DeviceNeeds;
-use crate::app::run::{self, Opened, Opening};
+use crate::app::print_line;
 use crate::app::run_error::RunError;
-use crate::app::say;
-use crate::rtx::{RtxConfig, headline};
+use crate::rtx::{RtxConfig, summary};
 
 /// What the sample and its pictures are called.
 const NAME: &str = "rtx_textures";
@@ -18,19 +18,19 @@ const NAME: &str = "rtx_textures";
 pub fn run(args: &RtxTexturesArgs) -> ExitCode {
     match args.scene.listing("waves", "crates and rings with textures, on paving") {
         Some(listing) => {
-            say(&listing);
+            print_line(&listing);
             ExitCode::SUCCESS
         }
-        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+        None => cli::run_with(NAME, &args.run, |setup| open(args, setup)),
     }
 }
 
-fn open(args: &RtxTexturesArgs, opening: &mut Opening<'_>) -> Result<Opened<RtxTextures>, RunError> {
-    let context = opening.device(&DeviceNeeds::tracing(args.tracing.rt))?;
+fn open(args: &RtxTexturesArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<RtxTextures>, RunError> {
+    let context = setup.device(&DeviceNeeds::tracing(args.tracing.rt))?;
     let capabilities = context.capabilities();
-    let config = RtxConfig::of(args.tracing.rt, args.run.extent(), capabilities)?;
+    let config = RtxConfig::from_args(args.tracing.rt, args.run.extent(), capabilities)?;
     let sample = RtxTextures::new(&context, &config)?;
     let scene = format!("{} instances, {} textures", sample.instance_count(), sample.texture_count());
-    let headline = headline(capabilities, config.path, "a compute shader", &scene);
-    Ok(Opened { sample, headline })
+    let summary = summary(capabilities, config.path, "a compute shader", &scene);
+    Ok(ReadySample { sample, summary })
 }

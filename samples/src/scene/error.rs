@@ -107,7 +107,7 @@ pub enum SceneError {
 }
 
 impl SceneError {
-    /// Turns an error of opening or reading `path` into the matching variant.
+    /// Turns an error of setup or reading `path` into the matching variant.
     pub(super) fn from_io(path: &std::path::Path, source: std::io::Error) -> Self {
         match source.kind() {
             std::io::ErrorKind::NotFound => SceneError::NotFound { path: path.into() },

@@ -186,14 +186,12 @@ impl Grid {
 
     /// Mean distance to surfaces around and below `place`; openings count little.
     fn openness(&self, place: Vec3) -> f32 {
-        let opening = 0.1 * self.high.distance(self.low);
+        let setup = 0.1 * self.high.distance(self.low);
         let directions = (0..32).map(|i| {
             let (turn, drop) = ((i % 16) as f32 * std::f32::consts::TAU / 16.0, (i / 16) as f32);
             Vec3::new(turn.sin(), -0.2 - drop, turn.cos()).normalize()
         });
-        directions
-            .map(|direction| self.hit(place, direction).map_or(opening, |(depth, _)| depth))
-            .sum::<f32>()
+        directions.map(|direction| self.hit(place, direction).map_or(setup, |(depth, _)| depth)).sum::<f32>()
             / 32.0
     }
 }

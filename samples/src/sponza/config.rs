@@ -66,9 +66,9 @@ impl SponzaConfig {
         let best = if has_counts { DrawPath::Counted } else { DrawPath::Padded };
         let draws = self.draws.unwrap_or(best);
         let what = "draws whose number is in a buffer (drawIndirectCount)";
-        RasterError::unless(draws == DrawPath::Padded || has_counts, ctx, what, "use --draws padded")?;
+        RasterError::require(draws == DrawPath::Padded || has_counts, ctx, what, "use --draws padded")?;
         let what = "pictures of this many samples a pixel";
-        RasterError::unless(matches!(self.samples, 1 | 4), ctx, what, "use --msaa 1 or 4")?;
+        RasterError::require(matches!(self.samples, 1 | 4), ctx, what, "use --msaa 1 or 4")?;
         let limit = Self::MAX_SHADOW_SIZE.min(ctx.capabilities().limits.max_texture_2d);
         Ok(Self {
             draws: Some(draws),

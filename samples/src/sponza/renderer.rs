@@ -1,4 +1,4 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
 use glam::{Quat, Vec3};
 use lvk::{
@@ -16,7 +16,7 @@ use super::shadow::Shadow;
 use super::sun_view::SunView;
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::app::scene_textures;
 use crate::hybrid::{SceneArrays, check_promises, near_plane};
 use crate::raster::{Canvas, RasterError, RasterPipeline};
@@ -48,7 +48,7 @@ pub struct Sponza {
     /// The frustum of a view that is kept while the camera goes on, to look at what was culled.
     kept: Option<Frustum>,
     turn: f32,
-    told: Told,
+    draw_counts: DrawCounts,
 }
 
 /// What shaders reach of the scene.
@@ -70,7 +70,7 @@ struct Light {
 
 /// What is known of how many draws were left.
 #[derive(Default)]
-struct Told {
+struct DrawCounts {
     counts: Option<[u32; VIEWS]>,
     coming: Option<Readback>,
 }
@@ -96,7 +96,7 @@ impl Sponza {
             scene: OnDevice::new(ctx, &scene)?,
             draws,
             bounds: scene.bounds(),
-            light: Light::of(&scene),
+            light: Light::from_scene(&scene),
             frame,
             camera: path.at(0.0),
             path,
@@ -106,7 +106,7 @@ impl Sponza {
             config,
             kept: None,
             turn: 0.0,
-            told: Told::default(),
+            draw_counts: DrawCounts::default(),
         })
     }
 
@@ -225,20 +225,20 @@ impl Sponza {
     }
 
     /// Keeps the last counts that have arrived, and asks for the next.
-    fn listen(&mut self) -> lvk::Result<()> {
-        if let Some(coming) = self.told.coming.take() {
+    fn poll_counts(&mut self) -> lvk::Result<()> {
+        if let Some(coming) = self.draw_counts.coming.take() {
             if !coming.is_ready()? {
-                self.told.coming = Some(coming);
+                self.draw_counts.coming = Some(coming);
                 return Ok(());
             }
-            self.told.counts = bytemuck::try_pod_read_unaligned(&coming.wait()?).ok();
+            self.draw_counts.counts = bytemuck::try_pod_read_unaligned(&coming.wait()?).ok();
         }
         let range = 0..(VIEWS * size_of::<u32>()) as u64;
-        self.told.coming = Some(self.ctx.read_buffer_later(self.culling.counts_buffer(), range)?);
+        self.draw_counts.coming = Some(self.ctx.read_buffer_later(self.culling.counts_buffer(), range)?);
         Ok(())
     }
 
-    fn told(&self, counts: [u32; VIEWS]) -> String {
+    fn draw_counts_text(&self, counts: [u32; VIEWS]) -> String {
         let all = self.culling.draw_count();
         format!("{} of {all} draws in the picture, {} in the shadow map", counts[0], counts[1])
     }
@@ -251,8 +251,8 @@ impl Sample for Sponza {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.camera = self.path.at(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+        self.camera = self.path.at(time.phase());
         Ok(())
     }
 
@@ -266,12 +266,12 @@ impl Sample for Sponza {
     }
 
     fn after_frame(&mut self) -> Result<(), RasterError> {
-        self.told.counts = Some(self.counts()?);
+        self.draw_counts.counts = Some(self.counts()?);
         Ok(())
     }
 
     fn remark(&self) -> Option<String> {
-        self.told.counts.map(|counts| format!("culling   {}", self.told(counts)))
+        self.draw_counts.counts.map(|counts| format!("culling   {}", self.draw_counts_text(counts)))
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
@@ -304,8 +304,8 @@ impl Sample for Sponza {
         ui.add(egui::Slider::new(&mut self.shadow.bias.slope, 0.0..=10.0).text("slope bias"));
         ui.add(egui::Slider::new(&mut self.turn, -180.0..=180.0).text("turn of the sun"));
         // The figures are those of a frame some time ago; without them the panel tells nothing.
-        if self.listen().is_ok()
-            && let Some(counts) = self.told.counts
+        if self.poll_counts().is_ok()
+            && let Some(counts) = self.draw_counts.counts
         {
             let all = self.culling.draw_count();
             ui.label(format!("{} of {all} draws in the picture", counts[0]));
@@ -360,7 +360,7 @@ fn pipeline(ctx: &Context, data: &RasterPipeline, samples: u32) -> lvk::Result<H
 
 impl Light {
     /// The lights of a scene: its sun, or the usual one and the lamp.
-    fn of(scene: &Scene) -> Self {
+    fn from_scene(scene: &Scene) -> Self {
         let (direction, color) = USUAL_SUN;
         let usual = DirectionalLight { direction: Vec3::from(direction).normalize().into(), color };
         let dark = PointLight { color: [0.0; 3], ..scene.light };

@@ -3,12 +3,12 @@
 use std::process::ExitCode;
 
 use super::{DrawPath, Sponza, SponzaArgs};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::DeviceNeeds;
-use crate::app::run::{self, Opened, Opening};
+use crate::app::print_line;
 use crate::app::run_error::RunError;
-use crate::app::say;
 use crate::hybrid::{fit_textures, textures_needed};
-use crate::raster::headline;
+use crate::raster::summary;
 use crate::scene::Scene;
 
 /// What the sample and its pictures are called.
@@ -21,44 +21,44 @@ pub fn run(args: &SponzaArgs) -> ExitCode {
     match args.scene.list.listing() {
         Some(listing) => {
             let others = listing.replace("; the default", "");
-            say(&format!("atrium  built in: a columned atrium made by code; the default\n{others}"));
+            print_line(&format!("atrium  built in: a columned atrium made by code; the default\n{others}"));
             ExitCode::SUCCESS
         }
-        None => run::run(NAME, &args.run, |opening| open(args, opening)),
+        None => cli::run_with(NAME, &args.run, |setup| open(args, setup)),
     }
 }
 
-fn open(args: &SponzaArgs, opening: &mut Opening<'_>) -> Result<Opened<Sponza>, RunError> {
+fn open(args: &SponzaArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Sponza>, RunError> {
     args.scene.check_out(&args.run.out_or(NAME))?;
-    let mut scene = load(args, opening)?;
-    opening.warn(&scene.warnings);
+    let mut scene = load(args, setup)?;
+    setup.warn(&scene.warnings);
     let context =
-        opening.device(&DeviceNeeds { textures: textures_needed(&scene), ..DeviceNeeds::default() })?;
+        setup.device(&DeviceNeeds { textures: textures_needed(&scene), ..DeviceNeeds::default() })?;
     let capabilities = context.capabilities();
-    opening.warn(&fit_textures(&mut scene, &capabilities.limits)?);
-    opening.progress.stage("uploading the scene", 0);
+    setup.warn(&fit_textures(&mut scene, &capabilities.limits)?);
+    setup.progress.stage("uploading the scene", 0);
     let (triangles, textures, maps) = (scene.triangles.len(), scene.textures.len(), scene.normal_maps.len());
     let told = format!("{}: {triangles} triangles, {textures} textures, {maps} normal maps", scene.name);
     let cameras = Scene { cameras: scene.cameras, ..Scene::empty() };
     let sample = Sponza::new(&context, scene, &args.config())?;
-    let sample = sample.from_camera(&cameras, args.scene.camera.place());
+    let sample = sample.from_camera(&cameras, args.scene.camera.index());
     let path = match sample.draw_path() {
         DrawPath::Counted => "as many as the GPU has counted",
         DrawPath::Padded => "those that are culled without vertices",
     };
     let draws =
         format!("draws     {}, {path}; {} samples a pixel", sample.draws().len(), sample.config().samples);
-    let headline = format!("{}\n{draws}", headline(capabilities, &told));
-    Ok(Opened { sample, headline })
+    let summary = format!("{}\n{draws}", summary(capabilities, &told));
+    Ok(ReadySample { sample, summary })
 }
 
-fn load(args: &SponzaArgs, opening: &mut Opening<'_>) -> Result<Scene, RunError> {
+fn load(args: &SponzaArgs, setup: &mut SampleSetup<'_>) -> Result<Scene, RunError> {
     if args.scene.scene.is_some() {
         return Ok(match args.no_normal_maps {
-            true => args.scene.load(&mut opening.progress)?,
-            false => args.scene.load_with_normal_maps(&mut opening.progress)?,
+            true => args.scene.load(&mut setup.progress)?,
+            false => args.scene.load_with_normal_maps(&mut setup.progress)?,
         });
     }
-    opening.progress.stage("making the atrium", 0);
+    setup.progress.stage("making the atrium", 0);
     Ok(Scene::atrium())
 }

@@ -4,8 +4,8 @@
 //! [`Triplanar`] is the sample for programs and tests, [`run`] the one for the command line.
 
 mod args;
-mod bodies;
 mod loader;
+mod models;
 mod pipelines;
 mod renderer;
 mod run;
@@ -15,4 +15,4 @@ pub use args::TriplanarArgs;
 pub use pipelines::pipelines;
 pub use renderer::Triplanar;
 pub use run::run;
-pub use streamed::Presence;
+pub use streamed::Residency;

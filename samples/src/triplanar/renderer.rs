@@ -1,4 +1,4 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
 use std::f32::consts::TAU;
 
@@ -8,12 +8,12 @@ use lvk::{
     RenderPipelineHandle, SamplerDesc, SamplerHandle, TextureHandle,
 };
 
-use super::bodies::Bodies;
+use super::models::Models;
 use super::pipelines::BODIES;
-use super::streamed::{COUNT, Presence, Streamed};
+use super::streamed::{COUNT, Residency, Streamed};
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::raster::{Canvas, RasterError};
 use crate::scene::{Camera, GpuCamera, PAINTED};
 
@@ -29,7 +29,7 @@ pub struct Triplanar {
     canvas: Canvas,
     pipeline: Holder<RenderPipelineHandle>,
     textures: Streamed,
-    bodies: Bodies,
+    bodies: Models,
     triangles: Holder<BufferHandle>,
     frame: Holder<BufferHandle>,
     constants: FrameConstants,
@@ -63,7 +63,7 @@ impl Triplanar {
         let canvas = Canvas::with_depth(ctx, extent)?;
         let mut textures = Streamed::new(ctx)?;
         (0..COUNT).for_each(|number| textures.load(number));
-        let bodies = Bodies::new();
+        let bodies = Models::new();
         let vertices = array(ctx, "vertices", BufferUsage::STORAGE, &bodies.vertices)?;
         let placed = array(ctx, "bodies", BufferUsage::STORAGE, &bodies.bodies)?;
         let sampler = ctx.create_sampler(&SamplerDesc { max_anisotropy: 8.0, ..SamplerDesc::default() })?;
@@ -100,8 +100,8 @@ impl Triplanar {
 
     /// Where the texture with this number is; there is none of a number that is too large.
     #[must_use]
-    pub fn presence(&self, number: usize) -> Presence {
-        self.textures.presence(number)
+    pub fn residency(&self, number: usize) -> Residency {
+        self.textures.residency(number)
     }
 
     /// Gives a texture up at once, whatever frames are on their way; from the next frame on the placeholder is shown.
@@ -142,11 +142,11 @@ impl Triplanar {
     }
 
     fn texture_switch(&mut self, ui: &mut egui::Ui, number: usize) {
-        let presence = self.textures.presence(number);
-        ui.horizontal(|ui| match presence {
-            Presence::There if ui.button("unload").clicked() => self.textures.unload(number),
-            Presence::Away if ui.button("load").clicked() => self.textures.load(number),
-            Presence::Coming => drop(ui.spinner()),
+        let residency = self.textures.residency(number);
+        ui.horizontal(|ui| match residency {
+            Residency::Resident if ui.button("unload").clicked() => self.textures.unload(number),
+            Residency::Unloaded if ui.button("load").clicked() => self.textures.load(number),
+            Residency::Loading => drop(ui.spinner()),
             _ => {}
         });
     }
@@ -159,9 +159,9 @@ impl Sample for Triplanar {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.constants.phase = moment.phase();
-        self.camera = camera(moment.phase());
+    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+        self.constants.phase = time.phase();
+        self.camera = camera(time.phase());
         Ok(())
     }
 

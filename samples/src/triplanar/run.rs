@@ -3,10 +3,10 @@
 use std::process::ExitCode;
 
 use super::{Triplanar, TriplanarArgs};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::DeviceNeeds;
-use crate::app::run::{self, Opened, Opening};
 use crate::app::run_error::RunError;
-use crate::raster::headline;
+use crate::raster::summary;
 
 /// What the sample and its pictures are called.
 const NAME: &str = "triplanar";
@@ -15,12 +15,12 @@ const NAME: &str = "triplanar";
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &TriplanarArgs) -> ExitCode {
-    run::run(NAME, &args.run, |opening| open(args, opening))
+    cli::run_with(NAME, &args.run, |setup| open(args, setup))
 }
 
-fn open(args: &TriplanarArgs, opening: &mut Opening<'_>) -> Result<Opened<Triplanar>, RunError> {
-    let context = opening.device(&DeviceNeeds::default())?;
-    opening.progress.stage("painting textures", 0);
+fn open(args: &TriplanarArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Triplanar>, RunError> {
+    let context = setup.device(&DeviceNeeds::default())?;
+    setup.progress.stage("painting textures", 0);
     let mut sample = Triplanar::new(&context, args.run.extent())?;
     args.unloaded().for_each(|number| sample.unload(number));
     let count = Triplanar::texture_names().len();
@@ -28,5 +28,5 @@ fn open(args: &TriplanarArgs, opening: &mut Opening<'_>) -> Result<Opened<Tripla
         "bodies without texture coordinates; {count} textures, {} of them unloaded",
         args.unload.len()
     );
-    Ok(Opened { headline: headline(context.capabilities(), &scene), sample })
+    Ok(ReadySample { summary: summary(context.capabilities(), &scene), sample })
 }

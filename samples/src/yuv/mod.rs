@@ -11,7 +11,7 @@ mod film;
 mod pipelines;
 mod renderer;
 mod run;
-mod shown;
+mod video_texture;
 
 pub use args::YuvArgs;
 pub use config::{CONVERSIONS, YuvConfig, YuvFormat, YuvModel, YuvRange};

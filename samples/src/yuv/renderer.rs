@@ -1,4 +1,4 @@
-//! The sample as a type: say the moment, get a picture.
+//! Renders the sample at a frame time.
 
 use bytemuck::{Pod, Zeroable};
 use lvk::{
@@ -8,9 +8,9 @@ use lvk::{
 
 use super::config::{YuvConfig, YuvFormat, YuvModel, YuvRange};
 use super::pipelines::PLANES;
-use super::shown::{Choice, Shown, supported};
+use super::video_texture::{VideoFormat, VideoTexture, supported};
 use crate::app::frame::Frame;
-use crate::app::sample::{Moment, Sample};
+use crate::app::sample::{FrameTime, Sample};
 use crate::raster::{Canvas, RasterError};
 
 /// Beside and above the picture.
@@ -22,7 +22,7 @@ pub struct Yuv {
     config: YuvConfig,
     canvas: Canvas,
     formats: Vec<YuvFormat>,
-    shown: Shown,
+    video: VideoTexture,
     planes: Holder<RenderPipelineHandle>,
     sampler: Holder<SamplerHandle>,
     phase: f32,
@@ -50,13 +50,13 @@ impl Yuv {
     pub fn new(ctx: &Context, config: &YuvConfig) -> Result<Self, RasterError> {
         let mut config = config.clamped();
         let canvas = Canvas::flat(ctx, config.extent)?;
-        let choice = choice(&config, config.format.unwrap_or(YuvFormat::Nv12));
-        let formats = supported(ctx, choice)?;
-        let format = config.format.or(formats.first().copied()).unwrap_or(choice.format);
+        let video_format = video_format(&config, config.format.unwrap_or(YuvFormat::Nv12));
+        let formats = supported(ctx, video_format)?;
+        let format = config.format.or(formats.first().copied()).unwrap_or(video_format.format);
         config.format = Some(format);
         Ok(Self {
             canvas,
-            shown: Shown::new(ctx, Choice { format, ..choice })?,
+            video: VideoTexture::new(ctx, VideoFormat { format, ..video_format })?,
             planes: planes(ctx)?,
             sampler: ctx.create_sampler(&SamplerDesc {
                 address: [AddressMode::ClampToEdge; 3],
@@ -74,21 +74,21 @@ impl Yuv {
         &self.formats
     }
 
-    /// The format that is shown.
+    /// The format that is video.
     pub fn format(&self) -> YuvFormat {
-        self.shown.choice.format
+        self.video.video_format.format
     }
 
     /// The planes of the moment, as they were uploaded.
     pub fn planes(&self) -> Vec<Vec<u8>> {
-        self.shown.encode(self.phase)
+        self.video.encode(self.phase)
     }
 
     /// Takes over what the panel or a key has chosen.
     fn apply(&mut self) -> Result<(), RasterError> {
-        let wanted = choice(&self.config, self.config.format.unwrap_or(self.shown.choice.format));
-        if wanted != self.shown.choice {
-            self.shown = Shown::new(&self.ctx, wanted)?;
+        let wanted = video_format(&self.config, self.config.format.unwrap_or(self.video.video_format.format));
+        if wanted != self.video.video_format {
+            self.video = VideoTexture::new(&self.ctx, wanted)?;
         }
         Ok(())
     }
@@ -96,7 +96,7 @@ impl Yuv {
     fn push(&self) -> Push {
         let film = self.config.film;
         let relative = film[0] as f32 / film[1] as f32 / self.canvas.aspect();
-        let planes = &self.shown.planes;
+        let planes = &self.video.planes;
         let [y, cb] = [planes[0].index(), planes[1].index()];
         let (cr, channel) = planes.get(2).map_or((cb, 1), |plane| (plane.index(), 0));
         Push {
@@ -115,18 +115,18 @@ impl Sample for Yuv {
         &self.ctx
     }
 
-    fn update(&mut self, moment: Moment) -> Result<(), RasterError> {
-        self.phase = moment.phase();
+    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+        self.phase = time.phase();
         Ok(())
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
         self.apply()?;
-        self.shown.upload(&self.ctx, self.phase)?;
-        let sampled = [*self.shown.texture];
+        self.video.upload(&self.ctx, self.phase)?;
+        let sampled = [*self.video.texture];
         let reads = Dependencies { sampled_images: &sampled, ..Dependencies::default() };
         let mut pass = self.canvas.begin(&mut frame.cmd, "picture", BACKDROP, &reads)?;
-        pass.bind_render_pipeline(*self.shown.pipeline)?;
+        pass.bind_render_pipeline(*self.video.pipeline)?;
         pass.push_constants(&self.push())?;
         pass.draw(0..4, 0..1)?;
         if self.config.shows_planes {
@@ -174,14 +174,14 @@ impl Sample for Yuv {
 
     fn reload(&mut self) -> Result<(), RasterError> {
         let planes = planes(&self.ctx)?;
-        self.shown.reload(&self.ctx)?;
+        self.video.reload(&self.ctx)?;
         self.planes = planes;
         Ok(())
     }
 }
 
-fn choice(config: &YuvConfig, format: YuvFormat) -> Choice {
-    Choice { format, model: config.model, range: config.range, size: config.film }
+fn video_format(config: &YuvConfig, format: YuvFormat) -> VideoFormat {
+    VideoFormat { format, model: config.model, range: config.range, size: config.film }
 }
 
 fn planes(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {

@@ -3,10 +3,10 @@
 use std::process::ExitCode;
 
 use super::{CONVERSIONS, Yuv, YuvArgs};
+use crate::app::cli::{self, ReadySample, SampleSetup};
 use crate::app::device::DeviceNeeds;
-use crate::app::run::{self, Opened, Opening};
 use crate::app::run_error::RunError;
-use crate::raster::headline;
+use crate::raster::summary;
 
 /// What the sample and its pictures are called.
 const NAME: &str = "yuv";
@@ -15,11 +15,11 @@ const NAME: &str = "yuv";
 /// is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
 #[must_use]
 pub fn run(args: &YuvArgs) -> ExitCode {
-    run::run(NAME, &args.run, |opening| open(args, opening))
+    cli::run_with(NAME, &args.run, |setup| open(args, setup))
 }
 
-fn open(args: &YuvArgs, opening: &mut Opening<'_>) -> Result<Opened<Yuv>, RunError> {
-    let context = opening.device(&DeviceNeeds { yuv: &CONVERSIONS, ..DeviceNeeds::default() })?;
+fn open(args: &YuvArgs, setup: &mut SampleSetup<'_>) -> Result<ReadySample<Yuv>, RunError> {
+    let context = setup.device(&DeviceNeeds { yuv: &CONVERSIONS, ..DeviceNeeds::default() })?;
     let config = args.config();
     let sample = Yuv::new(&context, &config)?;
     let (format, [width, height]) = (sample.format(), config.film);
@@ -27,5 +27,5 @@ fn open(args: &YuvArgs, opening: &mut Opening<'_>) -> Result<Opened<Yuv>, RunErr
     let scene = format!(
         "a moving picture of {width}x{height} as {format:?}, {model:?}, {range:?} range; the device has {all:?}"
     );
-    Ok(Opened { headline: headline(context.capabilities(), &scene), sample })
+    Ok(ReadySample { summary: summary(context.capabilities(), &scene), sample })
 }

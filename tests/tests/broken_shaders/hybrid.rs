@@ -399,7 +399,7 @@ fn hall_of(ctx: &Context, config: &ReflectionsConfig, view: Option<&Camera>) -> 
     let mut hall = Reflections::new(ctx, config).unwrap();
     hall.show(0.0);
     if let Some(view) = view {
-        hall.look(view);
+        hall.set_camera(view);
     }
     paint_over(ctx, hall.picture());
     RgbaImage::from_raw(config.width, config.height, headless::picture(&mut hall).unwrap()).unwrap()

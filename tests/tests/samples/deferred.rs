@@ -5,7 +5,7 @@
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile};
 use lvk_samples::app::frame::Frame;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::deferred::{Deferred, DeferredConfig, Passes, View};
 use lvk_samples::raster::RasterError;
 use lvk_tests::child::without_ray_tracing;
@@ -27,7 +27,7 @@ fn picture(ctx: &Context, config: &DeferredConfig, frame: u32) -> RgbaImage {
 
 /// Whether the device has both; says so where it has not.
 fn has_both(ctx: &Context) -> bool {
-    let both = Passes::of(ctx).len() == 2;
+    let both = Passes::supported(ctx).len() == 2;
     if !both {
         eprintln!("NOT TESTED, {} lacks dynamicRenderingLocalRead", ctx.capabilities().device_name);
     }
@@ -56,7 +56,7 @@ fn one_pass_shows_what_several_do() {
 #[test]
 fn the_hall_looks_as_it_always_did() {
     let Some(ctx) = device() else { return };
-    let passes = Passes::of(&ctx)[0];
+    let passes = Passes::supported(&ctx)[0];
     assert_as_ever("deferred_small", &picture(&ctx, &config(passes), 0));
 }
 
@@ -108,7 +108,7 @@ fn ways_are_changed_in_a_sample_that_runs() {
 
 /// Submits a frame that nobody waits for.
 fn send(sample: &mut Deferred, frame: u32) {
-    sample.update(Moment::of_frame(frame, ROUND)).unwrap();
+    sample.update(FrameTime::from_frame(frame, ROUND)).unwrap();
     let mut frame = Frame::free(&sample.context().clone()).unwrap();
     sample.record(&mut frame).unwrap();
     frame.finish().unwrap();

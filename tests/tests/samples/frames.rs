@@ -9,7 +9,7 @@ use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureRegion, Te
 use lvk_samples::app::frame::Frame;
 use lvk_samples::app::headless;
 use lvk_samples::app::progress::Progress;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::deferred::{Deferred, DeferredConfig};
 use lvk_samples::hello_triangle::HelloTriangle;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence, Method};
@@ -38,8 +38,8 @@ const SIZE: [u32; 2] = [40, 24];
 const OTHER_SIZE: [u32; 2] = [24, 40];
 const MOMENTS: [u32; 3] = [0, 3, 7];
 
-fn moment(frame: u32) -> Moment {
-    Moment::of_frame(frame, 10)
+fn moment(frame: u32) -> FrameTime {
+    FrameTime::from_frame(frame, 10)
 }
 
 /// What a sample shows at some moments; each frame is waited for.

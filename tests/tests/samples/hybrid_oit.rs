@@ -86,7 +86,8 @@ fn lists_hold_every_crossing_in_front() {
                 doubtful += 1;
                 continue;
             };
-            let mut found: Vec<f64> = lists.of(sample).iter().map(|node| f64::from(node.distance)).collect();
+            let mut found: Vec<f64> =
+                lists.nodes_of(sample).iter().map(|node| f64::from(node.distance)).collect();
             found.sort_by(f64::total_cmp);
             assert_eq!(found.len(), expected.len(), "pixel {pixel:?}: {found:?}, must be {expected:?}");
             for (found, expected) in found.iter().zip(&expected) {
@@ -136,12 +137,12 @@ fn the_picture_is_what_sorted_lists_show() {
             let has_glass = |[x, y]: [u32; 2]| {
                 let samples =
                     (0..side * side).map(|i| (side * y + i / side) * side * SIZE[0] + side * x + i % side);
-                samples.into_iter().any(|sample| !lists.of(sample as usize).is_empty())
+                samples.into_iter().any(|sample| !lists.nodes_of(sample as usize).is_empty())
             };
             let mut found_longest = 0;
             let mut seen = |is_sorted: bool| {
                 let radiance = |sample: [u32; 2]| {
-                    let mut nodes = lists.of((sample[1] * side * SIZE[0] + sample[0]) as usize);
+                    let mut nodes = lists.nodes_of((sample[1] * side * SIZE[0] + sample[0]) as usize);
                     found_longest = found_longest.max(nodes.len());
                     let background = behind.get_pixel(sample[0], sample[1]);
                     let background = [0, 1, 2].map(|channel| decode(background[channel]));

@@ -10,7 +10,7 @@ use image::RgbaImage;
 use lvk::{Context, DeviceProfile, FeatureRequest, RayQueryRequest};
 use lvk_samples::app::headless;
 use lvk_samples::app::progress::Progress;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::app::scene_list::{self, FoundScene};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, LargeSceneError, Origin, Show, World};
@@ -38,7 +38,7 @@ fn make(ctx: &Context, world: &World, config: &LargeSceneConfig) -> LargeScene {
 }
 
 fn picture_of(sample: &mut LargeScene, frame: u32) -> RgbaImage {
-    sample.update(Moment::of_frame(frame, 100)).unwrap();
+    sample.update(FrameTime::from_frame(frame, 100)).unwrap();
     RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(sample).unwrap()).unwrap()
 }
 

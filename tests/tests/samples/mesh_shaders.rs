@@ -5,7 +5,7 @@
 use image::RgbaImage;
 use lvk::{Context, CullMode, Dependencies, DeviceProfile, RenderPipelineDesc, TextureRegion};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::mesh_shaders::MeshShaders;
 use lvk_samples::pipelines::SampleStage;
 use lvk_samples::raster::{Canvas, RasterError, RasterPipeline, fragment_stage, vertex_stage};
@@ -114,7 +114,7 @@ fn what_lies_beside_the_picture_is_left_out() {
         (behind, 0),
     ] {
         let [whole, culled] = [&mut all, &mut some].map(|sample| {
-            sample.update(Moment::of_frame(10, ROUND)).unwrap();
+            sample.update(FrameTime::from_frame(10, ROUND)).unwrap();
             sample.set_view(&view);
             headless::picture(sample).unwrap()
         });

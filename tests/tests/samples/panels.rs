@@ -5,7 +5,7 @@ use std::fmt::Debug;
 
 use lvk::Context;
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::hybrid::{Bounces, Geometry, HybridConfig, HybridRenderer, HybridSequence, Method, RayPath};
 use lvk_samples::hybrid_oit::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig, SkinUpdate};
@@ -16,7 +16,7 @@ use lvk_tests::still_life::still_life;
 const SIZE: [u32; 2] = [40, 24];
 
 fn picture<S: Sample>(sample: &mut S) -> Vec<u8> {
-    sample.update(Moment::of_frame(3, 10)).map_err(Into::into).unwrap();
+    sample.update(FrameTime::from_frame(3, 10)).map_err(Into::into).unwrap();
     headless::picture(sample).map_err(Into::into).unwrap()
 }
 

@@ -4,7 +4,7 @@
 use image::RgbaImage;
 use lvk::{Context, Dependencies, DeviceProfile};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::reflections::{
     CullingCost, FAR, RayCost, Reflections, ReflectionsConfig, ReflectionsError, SkinUpdate, reflection_range,
@@ -79,7 +79,7 @@ fn a_round_ends_where_it_began_without_a_seam() {
     let Some(ctx) = device() else { return };
     let mut hall = hall(&ctx, &config(paths(&ctx)[0]));
     let mut frame = |frame, frames_per_round| {
-        hall.update(Moment::of_frame(frame, frames_per_round)).unwrap();
+        hall.update(FrameTime::from_frame(frame, frames_per_round)).unwrap();
         picture(&mut hall)
     };
     let first = frame(0, 240);
@@ -96,7 +96,7 @@ fn a_round_ends_where_it_began_without_a_seam() {
 /// From close by the basin.
 fn look_at_serpent(hall: &mut Reflections, phase: f32) {
     hall.show(phase);
-    hall.look(&Camera::looking_at([-3.6, 1.0, -9.5], [2.0, 1.1, -9.5], 70.0));
+    hall.set_camera(&Camera::looking_at([-3.6, 1.0, -9.5], [2.0, 1.1, -9.5], 70.0));
 }
 
 #[test]

@@ -7,7 +7,7 @@ use image::imageops::{FilterType, resize};
 use lvk::glam::{DAffine3, DVec3, Vec3};
 use lvk::{Context, FeatureRequest, RayQueryRequest};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
 use lvk_samples::rtx_ao::{RtxAo, RtxAoConfig, View};
@@ -49,7 +49,7 @@ fn all_paths_show_the_town() {
     all.push(town(&other, RayPath::Query, 2, 1));
     for phase in [0, 3] {
         let mut show = |town: &mut RtxAo| {
-            town.update(Moment::of_frame(phase, 20)).unwrap();
+            town.update(FrameTime::from_frame(phase, 20)).unwrap();
             picture(town)
         };
         let pictures: Vec<_> = all.iter_mut().map(&mut show).collect();
@@ -77,7 +77,7 @@ fn the_cache_forgets_what_has_moved() {
         town.show(&start);
         assert_eq!(picture(&mut town), first, "back from {view:?}");
     }
-    town.update(Moment::of_frame(0, 9)).unwrap();
+    town.update(FrameTime::from_frame(0, 9)).unwrap();
     assert_eq!(picture(&mut town), first, "a frame depends on its moment alone");
 }
 

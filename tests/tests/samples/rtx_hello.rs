@@ -4,7 +4,7 @@
 use image::RgbaImage;
 use lvk::{Context, FeatureRequest, RayQueryRequest};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
 use lvk_samples::rtx_hello::{Following, RtxHello};
@@ -24,7 +24,7 @@ fn hello(ctx: &Context, path: RayPath) -> RtxHello {
 }
 
 fn picture_of(hello: &mut RtxHello, frame: u32) -> RgbaImage {
-    hello.update(Moment::of_frame(frame, ROUND)).unwrap();
+    hello.update(FrameTime::from_frame(frame, ROUND)).unwrap();
     RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(hello).unwrap()).unwrap()
 }
 

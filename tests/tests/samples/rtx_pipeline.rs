@@ -5,7 +5,7 @@
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile, FeatureRequest, RayQueryRequest};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
 use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig, RtxPipelineSwitches};
@@ -27,7 +27,7 @@ fn still(ctx: &Context, path: RayPath, depth: u32) -> RtxPipeline {
 }
 
 fn picture_of(sample: &mut RtxPipeline, frame: u32) -> RgbaImage {
-    sample.update(Moment::of_frame(frame, 100)).unwrap();
+    sample.update(FrameTime::from_frame(frame, 100)).unwrap();
     RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(sample).unwrap()).unwrap()
 }
 

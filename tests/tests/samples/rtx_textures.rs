@@ -4,7 +4,7 @@
 use image::RgbaImage;
 use lvk::{Context, FeatureRequest, RayQueryRequest};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::rtx::{RtxConfig, RtxError};
 use lvk_samples::rtx_textures::{RtxTextures, RtxTexturesSwitches};
@@ -26,7 +26,7 @@ fn waves(ctx: &Context, path: RayPath) -> RtxTextures {
 }
 
 fn picture_of(waves: &mut RtxTextures, frame: u32) -> RgbaImage {
-    waves.update(Moment::of_frame(frame, ROUND)).unwrap();
+    waves.update(FrameTime::from_frame(frame, ROUND)).unwrap();
     RgbaImage::from_raw(SIZE[0], SIZE[1], headless::picture(waves).unwrap()).unwrap()
 }
 

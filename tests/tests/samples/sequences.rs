@@ -7,8 +7,8 @@ use lvk::Context;
 use lvk_samples::app::frame_name::FrameName;
 use lvk_samples::app::headless::Headless;
 use lvk_samples::app::interrupt::Interrupt;
-use lvk_samples::app::play::{Job, Played, play};
 use lvk_samples::app::progress::Progress;
+use lvk_samples::app::sequence::{RenderJob, RenderReport, render_frames};
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence, Method};
 use lvk_tests::device;
 use lvk_tests::hybrid::{Studio, paths};
@@ -17,14 +17,14 @@ use lvk_tests::still_life::still_life;
 const SIZE: [u32; 2] = [64, 36];
 
 /// The sample, set up anew as by a process of its own, plays some frames into a folder.
-fn played(ctx: &Context, frames: &str, folder: &Path) -> Played {
+fn played(ctx: &Context, frames: &str, folder: &Path) -> RenderReport {
     let scene = still_life();
     let path = paths(ctx)[0];
     let config =
         HybridConfig { path, width: SIZE[0], height: SIZE[1], max_depth: 2, ..HybridConfig::default() };
     let renderer = HybridRenderer::new(ctx, &scene, &config).unwrap();
     let mut sequence = HybridSequence::new(renderer, &scene, 0, true);
-    let job = Job {
+    let job = RenderJob {
         frames: frames.parse().unwrap(),
         warm_up: 0,
         frames_per_round: 7,
@@ -33,7 +33,8 @@ fn played(ctx: &Context, frames: &str, folder: &Path) -> Played {
         resume: false,
     };
     job.check().unwrap();
-    play(&mut Headless::new(&mut sequence), &job, &mut Progress::hidden(), &Interrupt::deaf()).unwrap()
+    render_frames(&mut Headless::new(&mut sequence), &job, &mut Progress::hidden(), &Interrupt::deaf())
+        .unwrap()
 }
 
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
@@ -80,7 +81,7 @@ mod interrupted {
     use std::time::{Duration, Instant};
 
     use clap::Parser as _;
-    use lvk_samples::app::args::HybridArgs;
+    use lvk_samples::hybrid::HybridArgs;
     use lvk_tests::child::path_in_program;
     use rustix::process::{Pid, Signal, kill_process};
 

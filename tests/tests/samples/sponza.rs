@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 use image::{Rgba, RgbaImage};
 use lvk::{Context, DeviceProfile, FeatureSet, OptionalFeature};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::raster::RasterError;
 use lvk_samples::scene::{Camera, Scene};
 use lvk_samples::sponza::{DrawPath, Frustum, Sponza, SponzaConfig};
@@ -36,7 +36,7 @@ fn make(ctx: &Context, scene: &Scene, config: &SponzaConfig) -> Sponza {
 }
 
 fn picture_of(sample: &mut Sponza, frame: u32) -> RgbaImage {
-    sample.update(Moment::of_frame(frame, 100)).unwrap();
+    sample.update(FrameTime::from_frame(frame, 100)).unwrap();
     picture_now(sample)
 }
 

@@ -5,8 +5,8 @@
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile};
 use lvk_samples::app::frame::Frame;
-use lvk_samples::app::sample::{Moment, Sample};
-use lvk_samples::triplanar::{Presence, Triplanar};
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::triplanar::{Residency, Triplanar};
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
 use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, picture_of};
@@ -29,7 +29,7 @@ fn all() -> std::ops::Range<usize> {
 
 /// Submits a frame that nobody waits for.
 fn send(sample: &mut Triplanar, frame: u32) {
-    sample.update(Moment::of_frame(frame, ROUND)).unwrap();
+    sample.update(FrameTime::from_frame(frame, ROUND)).unwrap();
     let mut frame = Frame::free(&sample.context().clone()).unwrap();
     sample.record(&mut frame).unwrap();
     frame.finish().unwrap();
@@ -59,7 +59,7 @@ fn textures_go_and_come_while_frames_are_on_their_way() {
         send(&mut sample, round);
         assert_eq!(textures(&ctx), count - all().len(), "all but the targets and the placeholder");
         all().for_each(|number| sample.load(number));
-        assert!(all().all(|number| sample.presence(number) == Presence::Coming));
+        assert!(all().all(|number| sample.residency(number) == Residency::Loading));
         send(&mut sample, round);
         // One that is given up before it has come, and asked for again.
         sample.unload(1);
@@ -68,7 +68,7 @@ fn textures_go_and_come_while_frames_are_on_their_way() {
         sample.wait_for_textures().unwrap();
         send(&mut sample, round);
     }
-    assert!(all().all(|number| sample.presence(number) == Presence::There));
+    assert!(all().all(|number| sample.residency(number) == Residency::Resident));
     assert!(picture_of(&mut sample, 0) == first, "what came back is what had gone");
     assert_eq!(textures(&ctx), count);
 }
@@ -78,7 +78,7 @@ fn a_frame_on_its_way_keeps_the_textures_it_shows() {
     let Some(ctx) = device() else { return };
     let mut sample = sample(&ctx);
     let whole = picture_of(&mut sample, 0);
-    sample.update(Moment::of_frame(0, ROUND)).unwrap();
+    sample.update(FrameTime::from_frame(0, ROUND)).unwrap();
     let mut frame = Frame::free(&ctx).unwrap();
     let picture = sample.record(&mut frame).unwrap();
     frame.finish().unwrap();
@@ -99,7 +99,7 @@ fn only_what_a_texture_is_on_shows_the_placeholder() {
         let without = picture_of(&mut sample, 0);
         assert!(differing(&whole, &without, on) > 0.1 && differing(&whole, &without, off) == 0.0, "{name}");
         sample.load(number_of(name));
-        assert_eq!(sample.presence(number_of(name)), Presence::Coming);
+        assert_eq!(sample.residency(number_of(name)), Residency::Loading);
         sample.wait_for_textures().unwrap();
         assert!(picture_of(&mut sample, 0) == whole, "{name} is back");
     }
@@ -119,12 +119,12 @@ fn what_comes_too_late_is_dropped() {
     sample.load(wood);
     sample.wait_for_textures().unwrap();
     picture_of(&mut sample, 0);
-    assert_eq!((sample.presence(brick), sample.presence(wood)), (Presence::Away, Presence::There));
+    assert_eq!((sample.residency(brick), sample.residency(wood)), (Residency::Unloaded, Residency::Resident));
     assert_eq!(textures(&ctx), count - 1);
     sample.load(brick);
     sample.load(999);
     sample.unload(999);
-    assert_eq!(sample.presence(999), Presence::Away);
+    assert_eq!(sample.residency(999), Residency::Unloaded);
     // The thread ends with the sample, whatever it is at.
     drop(sample);
     assert_eq!(textures(&ctx), 0);

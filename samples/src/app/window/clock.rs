@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::app::sample::Moment;
+use crate::app::sample::FrameTime;
 
 /// What time it is in the animation.
 #[derive(Debug)]
@@ -34,10 +34,10 @@ impl Clock {
     }
 
     /// The moment in rounds of so many frames: by the clock, or frame by frame, so that each run shows the same ones.
-    pub(super) fn moment(&self, by_frame: bool, frames_per_round: u32) -> Moment {
+    pub(super) fn frame_time(&self, by_frame: bool, frames_per_round: u32) -> FrameTime {
         match by_frame {
-            true => Moment::of_frame(self.frames, frames_per_round),
-            false => Moment::after(self.animation.as_millis() as u32, frames_per_round),
+            true => FrameTime::from_frame(self.frames, frames_per_round),
+            false => FrameTime::from_millis(self.animation.as_millis() as u32, frames_per_round),
         }
     }
 
@@ -68,8 +68,8 @@ mod tests {
     fn an_animation_that_stands_shows_its_moment_however_that_is_counted() {
         let (all, some) = (after(&[true; 6]), after(&[true, false, false, true, false, true]));
         for (by_frame, six, three) in [(true, 6, 3), (false, 1500, 750)] {
-            assert_eq!(all.moment(by_frame, 240).frame, six);
-            assert_eq!(some.moment(by_frame, 240).frame, three);
+            assert_eq!(all.frame_time(by_frame, 240).frame, six);
+            assert_eq!(some.frame_time(by_frame, 240).frame, three);
         }
         assert_eq!(some.seconds(), 1.5, "the window's own time goes on");
     }

@@ -43,7 +43,7 @@ impl UiInput {
     }
 
     /// What happened since the last time, and the keys that modify others.
-    pub(super) fn take(&mut self) -> (Vec<Event>, Modifiers) {
+    pub(super) fn take_events(&mut self) -> (Vec<Event>, Modifiers) {
         (std::mem::take(&mut self.events), self.modifiers)
     }
 
@@ -125,12 +125,12 @@ mod tests {
         input.push(&WindowEvent::CursorMoved { device_id, position: PhysicalPosition::new(30.0, 50.0) }, 2.0);
         let (state, button) = (ElementState::Pressed, MouseButton::Left);
         input.push(&WindowEvent::MouseInput { device_id, state, button }, 2.0);
-        let (events, _) = input.take();
+        let (events, _) = input.take_events();
         assert_eq!(events[0], Event::PointerMoved(pos2(15.0, 25.0)));
         assert!(
             matches!(events[1], Event::PointerButton { pos, pressed: true, .. } if pos == pos2(15.0, 25.0))
         );
-        assert!(input.take().0.is_empty());
+        assert!(input.take_events().0.is_empty());
     }
 
     #[test]
@@ -139,7 +139,7 @@ mod tests {
         input.key(KeyCode::Digit4, ElementState::Pressed, false, Some("4"));
         input.key(KeyCode::Backspace, ElementState::Pressed, true, Some("\u{8}"));
         input.key(KeyCode::Digit4, ElementState::Released, false, Some("4"));
-        let (events, _) = input.take();
+        let (events, _) = input.take_events();
         assert_eq!(events[0], Event::Text("4".to_owned()));
         assert!(matches!(events[1], Event::Key { key: Key::Backspace, repeat: true, .. }));
         assert_eq!(events.len(), 2);

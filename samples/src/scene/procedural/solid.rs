@@ -31,7 +31,7 @@ impl Solids {
     }
 
     /// Makes the next solids of `material`.
-    pub fn of(&mut self, material: u32) -> &mut Self {
+    pub fn material(&mut self, material: u32) -> &mut Self {
         self.material = material;
         self
     }

@@ -13,22 +13,22 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop};
 use winit::keyboard::PhysicalKey;
 use winit::window::{Window, WindowId};
 
+use super::camera_controller::CameraController;
 use super::clock::Clock;
 use super::controls::{Action, Controls, help};
-use super::pilot::Pilot;
-use super::resize::Follower;
-use super::screen::Screen;
+use super::present_pass::PresentPass;
+use super::resize::ResizeDebounce;
 use super::ui_input::{UiInput, notches};
+use crate::app::cli::{ReadySample, SampleSetup};
 use crate::app::frame::Frame;
 use crate::app::frames::Frames;
 use crate::app::hot_reload::{ShaderWatch, reload};
-use crate::app::run::{Opened, Opening};
+use crate::app::print_line;
 use crate::app::run_args::RunArgs;
 use crate::app::run_error::RunError;
-use crate::app::sample::{Moment, Sample};
-use crate::app::say;
+use crate::app::sample::{FrameTime, Sample};
 use crate::app::screenshot::{Screenshot, free_name};
-use crate::app::ui::{Panel, Told};
+use crate::app::ui::{Panel, PanelInfo};
 use crate::shader_folder;
 
 /// Time between two looks at a window that shows nothing.
@@ -44,20 +44,20 @@ pub(in crate::app) fn run<S, M>(
 ) -> Result<(), RunError>
 where
     S: Sample,
-    M: FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
+    M: FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
 {
     let event_loop = EventLoop::new().map_err(|error| RunError::window(&error))?;
     let mut program =
-        Program { name, args, sink, make: Some(make), running: None, rests_until: None, ended: Ok(()) };
+        WindowApp { name, args, sink, make: Some(make), running: None, rests_until: None, ended: Ok(()) };
     event_loop.run_app(&mut program).map_err(|error| RunError::window(&error))?;
-    let Program { running, ended, .. } = program;
+    let WindowApp { running, ended, .. } = program;
     let closed = running.map_or(Ok(()), Running::close);
     ended?;
     closed
 }
 
 /// What answers events.
-struct Program<'a, S, M> {
+struct WindowApp<'a, S, M> {
     name: &'a str,
     args: &'a RunArgs,
     sink: &'a ValidationSink,
@@ -68,10 +68,10 @@ struct Program<'a, S, M> {
     ended: Result<(), RunError>,
 }
 
-impl<S, M> ApplicationHandler for Program<'_, S, M>
+impl<S, M> ApplicationHandler for WindowApp<'_, S, M>
 where
     S: Sample,
-    M: FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
+    M: FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
 {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
         if let Some(make) = self.make.take() {
@@ -113,20 +113,20 @@ where
     }
 }
 
-impl<S: Sample, M> Program<'_, S, M>
+impl<S: Sample, M> WindowApp<'_, S, M>
 where
-    M: FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
+    M: FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
 {
     fn open(&self, event_loop: &ActiveEventLoop, make: M) -> Result<Running<S>, RunError> {
         let size = PhysicalSize::new(self.args.width, self.args.height);
         let look = Window::default_attributes().with_title(self.name).with_inner_size(size);
         let window = Arc::new(event_loop.create_window(look).map_err(|error| RunError::window(&error))?);
-        let mut opening = Opening::new(self.name, self.args, self.sink);
-        opening.window = Some(Arc::clone(&window) as Arc<_>);
-        let Opened { sample, headline } = make(&mut opening)?;
-        drop(opening);
-        if !headline.is_empty() {
-            say(&headline);
+        let mut setup = SampleSetup::new(self.name, self.args, self.sink);
+        setup.window = Some(Arc::clone(&window) as Arc<_>);
+        let ReadySample { sample, summary } = make(&mut setup)?;
+        drop(setup);
+        if !summary.is_empty() {
+            print_line(&summary);
         }
         Running::new(window, sample, self.args)
     }
@@ -135,7 +135,7 @@ where
         if self.ended.is_ok() {
             self.ended = ended;
         }
-        // What is still being loaded may take a moment to end.
+        // What is still being loaded may take a time to end.
         self.running.iter().for_each(|running| running.window.set_visible(false));
         event_loop.exit();
     }
@@ -154,16 +154,16 @@ enum Next {
 /// A sample in its window.
 struct Running<S> {
     sample: S,
-    screen: Screen,
+    present_pass: PresentPass,
     panel: Panel,
     controls: Controls,
     ui_input: UiInput,
-    follower: Follower,
+    resize: ResizeDebounce,
     watch: Option<ShaderWatch>,
-    pilot: Pilot,
+    camera_controller: CameraController,
     clock: Clock,
-    /// The moment that the sample shows.
-    at: Option<Moment>,
+    /// The time that the sample shows.
+    at: Option<FrameTime>,
     shown: u32,
     wants_screenshot: bool,
     /// The latest frame.
@@ -175,21 +175,21 @@ struct Running<S> {
 impl<S: Sample> Running<S> {
     fn new(window: Arc<Window>, sample: S, args: &RunArgs) -> Result<Self, RunError> {
         let ctx = sample.context().clone();
-        let screen = Screen::new(&ctx, extent(&window))?;
-        let (mode, _) = screen.present_modes()?;
+        let present_pass = PresentPass::new(&ctx, extent(&window))?;
+        let (mode, _) = present_pass.present_modes()?;
         ctx.set_profiling(ctx.capabilities().limits.timestamp_bits > 0)?;
         let mut panel = Panel::new(mode);
         // Frames that are counted are those of the animation.
         panel.animates = args.frames.is_some() || !sample.stands_at_first();
         Ok(Self {
             sample,
-            screen,
+            present_pass,
             panel,
             controls: Controls::default(),
             ui_input: UiInput::default(),
-            follower: Follower::new([args.width, args.height]),
+            resize: ResizeDebounce::new([args.width, args.height]),
             watch: shader_folder::folder().map(|folder| ShaderWatch::new(&folder)),
-            pilot: Pilot::new(),
+            camera_controller: CameraController::new(),
             clock: Clock::new(Instant::now()),
             at: None,
             shown: 0,
@@ -202,10 +202,10 @@ impl<S: Sample> Running<S> {
 
     fn event(&mut self, event: &WindowEvent) -> Result<Next, RunError> {
         self.ui_input.push(event, self.per_point());
-        let ui = self.screen.ui();
+        let ui = self.present_pass.ui();
         match event {
-            WindowEvent::Resized(size) => self.screen.resize([size.width, size.height])?,
-            WindowEvent::Focused(false) => self.controls.let_go(),
+            WindowEvent::Resized(size) => self.present_pass.resize([size.width, size.height])?,
+            WindowEvent::Focused(false) => self.controls.release_all(),
             WindowEvent::CursorMoved { position, .. } => {
                 self.controls.pointer([position.x as f32, position.y as f32]);
             }
@@ -234,8 +234,8 @@ impl<S: Sample> Running<S> {
     fn act(&mut self, action: Action) -> Next {
         match action {
             Action::Pause => self.panel.animates = !self.panel.animates,
-            Action::GiveBack => {
-                self.pilot.give_back();
+            Action::ReleaseCamera => {
+                self.camera_controller.release();
                 self.at = None;
             }
             Action::Panel => self.panel.is_open = !self.panel.is_open,
@@ -249,7 +249,7 @@ impl<S: Sample> Running<S> {
 
     /// Compiles all shaders again. Where one is wrong, all old pipelines stay.
     fn reload(&mut self) {
-        let done = reload(&mut self.sample, self.screen.painter());
+        let done = reload(&mut self.sample, self.present_pass.painter());
         self.panel.shader_error = done.err().map(|error| error.to_string());
         match &self.panel.shader_error {
             Some(error) => eprintln!("error: {error}\nthe shaders from before stay in use"),
@@ -271,15 +271,15 @@ impl<S: Sample> Running<S> {
         self.ctx.next_frame()?;
         let seconds = self.clock.tick(Instant::now(), self.panel.animates);
         self.follow(args, seconds)?;
-        let Some(image) = self.screen.next_image()? else { return Ok(Next::Nap) };
+        let Some(image) = self.present_pass.next_image()? else { return Ok(Next::Nap) };
         self.panel.count_frame(seconds);
         let mut frame = Frame::free(&self.ctx)?;
         let picture = self.sample.record(&mut frame).map_err(Into::into)?;
         let mut cmd = frame.into_commands();
         let (input, profile) = (self.input(image.extent()), self.ctx.last_profile()?);
-        let (_, modes) = self.screen.present_modes()?;
+        let (_, modes) = self.present_pass.present_modes()?;
         let before = self.panel.present_mode;
-        let told = Told {
+        let info = PanelInfo {
             device: &self.ctx.capabilities().device_name,
             extent: image.extent(),
             present_modes: &modes,
@@ -287,8 +287,8 @@ impl<S: Sample> Running<S> {
             keys: help(self.sample.view().is_some()),
         };
         let (panel, sample) = (&mut self.panel, &mut self.sample);
-        self.screen.record(&mut cmd, &image, picture, input, |ui| {
-            panel.show(ui, name, &told, |ui| sample.panel(ui));
+        self.present_pass.record(&mut cmd, &image, picture, input, |ui| {
+            panel.show(ui, name, &info, |ui| sample.panel(ui));
             sample.overlay(ui);
         })?;
         let last = self.is_last(args);
@@ -302,7 +302,7 @@ impl<S: Sample> Running<S> {
             self.save(shot, file, name)?;
         }
         if before != self.panel.present_mode {
-            self.screen.set_present_mode(self.panel.present_mode)?;
+            self.present_pass.set_present_mode(self.panel.present_mode)?;
         }
         Ok(if last { Next::Close } else { Next::Frame })
     }
@@ -315,7 +315,7 @@ impl<S: Sample> Running<S> {
             return Ok(Next::Nap);
         }
         self.ctx.next_frame()?;
-        let Some(image) = self.screen.next_image()? else { return Ok(Next::Nap) };
+        let Some(image) = self.present_pass.next_image()? else { return Ok(Next::Nap) };
         // The animation begins with the picture.
         self.clock.tick(Instant::now(), false);
         let mut frame = Frame::free(&self.ctx)?;
@@ -323,7 +323,7 @@ impl<S: Sample> Running<S> {
         let mut cmd = frame.into_commands();
         let input = self.input(image.extent());
         let sample = &mut self.sample;
-        self.screen.record(&mut cmd, &image, picture, input, |ui| sample.overlay(ui))?;
+        self.present_pass.record(&mut cmd, &image, picture, input, |ui| sample.overlay(ui))?;
         let shot = self.wants_screenshot.then(|| Screenshot::record(&self.ctx, &mut cmd, &image));
         self.latest = self.ctx.present(cmd, image)?;
         if let Some(shot) = shot {
@@ -334,7 +334,7 @@ impl<S: Sample> Running<S> {
 
     /// Gives pictures the size that the window has had for a while.
     fn follow_size(&mut self) {
-        if let Some(size) = self.follower.next(extent(&self.window), Instant::now())
+        if let Some(size) = self.resize.next(extent(&self.window), Instant::now())
             && let Err(error) = self.sample.resize(size).map_err(Into::into)
         {
             eprintln!("warning: pictures keep their size: {error}");
@@ -347,15 +347,15 @@ impl<S: Sample> Running<S> {
         if self.watch.as_mut().is_some_and(|watch| watch.poll(Instant::now())) {
             self.reload();
         }
-        let steering = self.controls.take();
-        let is_steered = self.pilot.steer(self.sample.view().as_ref(), &steering, seconds);
-        let moment = self.clock.moment(args.frames.is_some(), args.round);
-        let is_later = self.at != Some(moment);
+        let steering = self.controls.take_steering();
+        let is_steered = self.camera_controller.steer(self.sample.view().as_ref(), &steering, seconds);
+        let time = self.clock.frame_time(args.frames.is_some(), args.round);
+        let is_later = self.at != Some(time);
         if is_later {
-            self.sample.update(moment).map_err(Into::into)?;
-            self.at = Some(moment);
+            self.sample.update(time).map_err(Into::into)?;
+            self.at = Some(time);
         }
-        if let (true, Some(camera)) = (is_steered || is_later, self.pilot.camera()) {
+        if let (true, Some(camera)) = (is_steered || is_later, self.camera_controller.camera()) {
             self.sample.set_view(&camera);
         }
         Ok(())
@@ -375,7 +375,7 @@ impl<S: Sample> Running<S> {
         self.wants_screenshot = false;
         let path = file.map_or_else(|| free_name(Path::new(""), name), Path::to_owned);
         match shot.and_then(|shot| shot.write(&self.ctx, &path)) {
-            Ok(()) => say(&format!("wrote {}", path.display())),
+            Ok(()) => print_line(&format!("wrote {}", path.display())),
             Err(error) if file.is_some() => return Err(error),
             Err(error) => eprintln!("error: {error}"),
         }
@@ -383,7 +383,7 @@ impl<S: Sample> Running<S> {
     }
 
     fn input(&mut self, [width, height]: [u32; 2]) -> egui::RawInput {
-        let (events, modifiers) = self.ui_input.take();
+        let (events, modifiers) = self.ui_input.take_events();
         let per_point = self.per_point();
         let size = vec2(width as f32, height as f32) / per_point;
         let viewport = ViewportInfo { native_pixels_per_point: Some(per_point), ..ViewportInfo::default() };

@@ -12,12 +12,12 @@ use super::frame_name::FrameName;
 use super::frames::Frames;
 use super::headless::Headless;
 use super::interrupt::Interrupt;
-use super::play::{Job, Played, play};
 use super::progress::Progress;
 use super::run_args::RunArgs;
 use super::run_error::RunError;
 use super::sample::Sample;
-use super::{library_warnings, png, say, window};
+use super::sequence::{RenderJob, RenderReport, render_frames};
+use super::{library_warnings, png, print_line, window};
 use crate::driver::{DriverRequest, prepare};
 use crate::shader_folder;
 
@@ -27,7 +27,7 @@ const GPU_FRAMES: u32 = 60;
 const WARM_UP_FRAMES: u32 = 5;
 
 /// What a sample is made with.
-pub struct Opening<'a> {
+pub struct SampleSetup<'a> {
     /// Shows which slow thing is under way.
     pub progress: Progress,
     /// What the device must be able to show pictures in.
@@ -38,14 +38,14 @@ pub struct Opening<'a> {
 }
 
 /// A sample that is ready to render.
-pub struct Opened<S> {
+pub struct ReadySample<S> {
     /// The sample.
     pub sample: S,
     /// What is said about it, in a line or several; nothing where it says that itself.
-    pub headline: String,
+    pub summary: String,
 }
 
-impl<'a> Opening<'a> {
+impl<'a> SampleSetup<'a> {
     pub(super) fn new(name: &'a str, args: &'a RunArgs, sink: &'a ValidationSink) -> Self {
         Self { progress: Progress::visible(), window: None, name, args, sink }
     }
@@ -57,7 +57,7 @@ impl<'a> Opening<'a> {
     pub fn device(&mut self, needs: &DeviceNeeds) -> Result<Context, RunError> {
         self.progress.pause();
         let driver = prepare(&DriverRequest { validation: self.args.validate.is_some() })?;
-        self.progress.stage("opening the device", 0);
+        self.progress.stage("setup the device", 0);
         device::open(self.name, self.args, &driver, self.sink, needs, self.window.clone())
     }
 
@@ -95,10 +95,10 @@ pub(crate) fn warn(warnings: &[String]) {
 /// line to standard error; the status is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong
 /// input, 130 after Ctrl-C.
 #[must_use]
-pub fn run<S: Sample>(
+pub fn run_with<S: Sample>(
     name: &str,
     args: &RunArgs,
-    make: impl FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
+    make: impl FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
 ) -> ExitCode {
     library_warnings::print();
     match attempt(name, args, make) {
@@ -113,7 +113,7 @@ pub fn run<S: Sample>(
 fn attempt<S: Sample>(
     name: &str,
     args: &RunArgs,
-    make: impl FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
+    make: impl FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
 ) -> Result<(), RunError> {
     if args.list_devices {
         return device::list(args.profile.as_ref());
@@ -122,7 +122,7 @@ fn attempt<S: Sample>(
         return show(name, args, make);
     }
     let out = args.out_or(name);
-    let mut job = Job {
+    let mut job = RenderJob {
         frames: args.frames.clone().unwrap_or(Frames::Still(GPU_FRAMES)),
         warm_up: WARM_UP_FRAMES,
         frames_per_round: args.round,
@@ -132,16 +132,17 @@ fn attempt<S: Sample>(
     };
     job.check()?;
     let sink = ValidationSink::default();
-    let mut opening = Opening::new(name, args, &sink);
-    let Opened { mut sample, headline } = make(&mut opening)?;
+    let mut setup = SampleSetup::new(name, args, &sink);
+    let ReadySample { mut sample, summary } = make(&mut setup)?;
     let context = sample.context().clone();
-    drop(opening);
-    say(&headline);
+    drop(setup);
+    print_line(&summary);
     if context.capabilities().is_cpu {
         job.warm_up = 0;
         job.frames = args.frames.clone().unwrap_or(Frames::Still(1));
     }
-    let played = play(&mut Headless::new(&mut sample), &job, &mut Progress::visible(), &Interrupt::listen());
+    let played =
+        render_frames(&mut Headless::new(&mut sample), &job, &mut Progress::visible(), &Interrupt::listen());
     let remark = sample.remark();
     drop(sample);
     context.wait_idle()?;
@@ -149,14 +150,14 @@ fn attempt<S: Sample>(
     if args.validate.is_some() {
         device::report_validation(&sink)?;
     }
-    say(&summary(&job, &played?, remark));
+    print_line(&closing_lines(&job, &played?, remark));
     Ok(())
 }
 
 fn show<S: Sample>(
     name: &str,
     args: &RunArgs,
-    make: impl FnOnce(&mut Opening<'_>) -> Result<Opened<S>, RunError>,
+    make: impl FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
 ) -> Result<(), RunError> {
     if matches!(args.frames, Some(Frames::Sequence(_))) {
         return Err(RunError::SequenceInWindow);
@@ -165,15 +166,15 @@ fn show<S: Sample>(
         png::check_writable(out)?;
     }
     if let Some(folder) = &args.hot_reload {
-        shader_folder::take(folder).map_err(|folder| RunError::NoShaders { folder })?;
+        shader_folder::set_folder(folder).map_err(|folder| RunError::NoShaders { folder })?;
     }
     let sink = ValidationSink::default();
     window::run(name, args, &sink, make)?;
     args.validate.map_or(Ok(()), |_| device::report_validation(&sink))
 }
 
-fn summary(job: &Job, played: &Played, remark: Option<String>) -> String {
-    let Played { timings, written, skipped } = played;
+fn closing_lines(job: &RenderJob, played: &RenderReport, remark: Option<String>) -> String {
+    let RenderReport { timings, written, skipped } = played;
     let remark = remark.map_or_else(String::new, |remark| format!("\n{remark}"));
     let out = job.out.path().display();
     match (&job.frames, skipped) {

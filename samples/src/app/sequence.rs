@@ -9,16 +9,16 @@ use super::pass_times::PassTimes;
 use super::png;
 use super::progress::Progress;
 use super::run_error::RunError;
-use super::sample::Moment;
+use super::sample::FrameTime;
 use super::timings::Timings;
 
 /// What can be played: [`Headless`](super::headless::Headless) does it for samples.
-pub trait Player {
+pub trait FrameSource {
     /// Goes to a moment.
     ///
     /// # Errors
     /// Its own.
-    fn update(&mut self, moment: Moment) -> Result<(), RunError>;
+    fn update(&mut self, time: FrameTime) -> Result<(), RunError>;
 
     /// Into how many steps a frame is cut, for the progress bar.
     fn steps_per_frame(&self) -> u64;
@@ -38,7 +38,7 @@ pub trait Player {
 
 /// What to render and where to.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Job {
+pub struct RenderJob {
     /// Which frames.
     pub frames: Frames,
     /// Frames that are rendered first and not timed, so that clocks are up.
@@ -55,7 +55,7 @@ pub struct Job {
 
 /// What was done.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Played {
+pub struct RenderReport {
     /// What the passes took.
     pub timings: Timings,
     /// Pictures written.
@@ -64,7 +64,7 @@ pub struct Played {
     pub skipped: u32,
 }
 
-impl Job {
+impl RenderJob {
     /// Checks that the frames can be written, without leaving anything behind but the folder of a sequence, which is made.
     ///
     /// # Errors
@@ -74,9 +74,9 @@ impl Job {
             (Frames::Still(_), true) => return Err(RunError::NoSequence { name: self.name() }),
             (Frames::Sequence(_), false) => return Err(RunError::NoNumber { name: self.name() }),
             (Frames::Still(_), false) if self.resume => return Err(RunError::NothingToResume),
-            (Frames::Still(_), false) => self.out.of(0),
+            (Frames::Still(_), false) => self.out.path_for(0),
             (Frames::Sequence(range), true) => {
-                let first = self.out.of(range.start);
+                let first = self.out.path_for(range.start);
                 make_folder(&first)?;
                 first
             }
@@ -88,8 +88,8 @@ impl Job {
         self.out.path().display().to_string()
     }
 
-    fn moment(&self, frame: u32) -> Moment {
-        Moment::of_frame(frame, self.frames_per_round)
+    fn frame_time(&self, frame: u32) -> FrameTime {
+        FrameTime::from_frame(frame, self.frames_per_round)
     }
 }
 
@@ -97,79 +97,79 @@ impl Job {
 /// raised, the frame under way is the last.
 ///
 /// # Errors
-/// [`RunError::Interrupted`], [`RunError::Png`] and those of the player.
-pub fn play(
-    player: &mut impl Player,
-    job: &Job,
+/// [`RunError::Interrupted`], [`RunError::Png`] and those of the source.
+pub fn render_frames(
+    source: &mut impl FrameSource,
+    job: &RenderJob,
     progress: &mut Progress,
     interrupt: &Interrupt,
-) -> Result<Played, RunError> {
+) -> Result<RenderReport, RunError> {
     match &job.frames {
-        Frames::Still(count) => still(player, job, *count, progress, interrupt),
-        Frames::Sequence(range) => sequence(player, job, range.clone(), progress, interrupt),
+        Frames::Still(count) => still(source, job, *count, progress, interrupt),
+        Frames::Sequence(range) => sequence(source, job, range.clone(), progress, interrupt),
     }
 }
 
 fn still(
-    player: &mut impl Player,
-    job: &Job,
+    source: &mut impl FrameSource,
+    job: &RenderJob,
     count: u32,
     progress: &mut Progress,
     interrupt: &Interrupt,
-) -> Result<Played, RunError> {
-    let steps = player.steps_per_frame();
+) -> Result<RenderReport, RunError> {
+    let steps = source.steps_per_frame();
     let all = u64::from(job.warm_up) + u64::from(count);
     progress.stage("rendering", all * steps);
     let mut timings = Timings::new();
-    player.update(job.moment(0))?;
+    source.update(job.frame_time(0))?;
     for round in 0..all {
         if interrupt.is_raised() {
             let done = round.saturating_sub(u64::from(job.warm_up)) as u32;
             return Err(RunError::Interrupted { done, count, hint: "" });
         }
-        let times = player.render(&mut |step| progress.set(round * steps + step))?;
+        let times = source.render(&mut |step| progress.set(round * steps + step))?;
         if let Some(counted) = round.checked_sub(u64::from(job.warm_up)) {
             times.passes().for_each(|(pass, milliseconds)| timings.push(counted, pass, milliseconds));
         }
     }
-    write(player, job, 0)?;
-    Ok(Played { timings, written: 1, skipped: 0 })
+    write(source, job, 0)?;
+    Ok(RenderReport { timings, written: 1, skipped: 0 })
 }
 
 fn sequence(
-    player: &mut impl Player,
-    job: &Job,
+    source: &mut impl FrameSource,
+    job: &RenderJob,
     range: std::ops::Range<u32>,
     progress: &mut Progress,
     interrupt: &Interrupt,
-) -> Result<Played, RunError> {
-    let steps = player.steps_per_frame();
+) -> Result<RenderReport, RunError> {
+    let steps = source.steps_per_frame();
     let count = range.end - range.start;
     progress.stage("rendering", u64::from(count) * steps);
-    let mut played = Played::default();
+    let mut played = RenderReport::default();
     for (done, frame) in (0_u32..).zip(range) {
         if interrupt.is_raised() {
             let hint = "; the same command with --resume does the rest";
             return Err(RunError::Interrupted { done, count, hint });
         }
         let before = u64::from(done) * steps;
-        if job.resume && job.out.of(frame).is_file() {
+        if job.resume && job.out.path_for(frame).is_file() {
             played.skipped += 1;
             progress.set(before + steps);
             continue;
         }
-        player.update(job.moment(frame))?;
-        let times = player.render(&mut |step| progress.set(before + step))?;
+        source.update(job.frame_time(frame))?;
+        let times = source.render(&mut |step| progress.set(before + step))?;
         times.passes().for_each(|(pass, milliseconds)| played.timings.push(frame.into(), pass, milliseconds));
-        write(player, job, frame)?;
+        write(source, job, frame)?;
         played.written += 1;
     }
     Ok(played)
 }
 
-fn write(player: &impl Player, job: &Job, frame: u32) -> Result<(), RunError> {
-    let picture = player.picture()?;
-    Ok(png::write(&job.out.of(frame), job.size[0], job.size[1], &picture)?)
+fn write(source: &impl FrameSource, job: &RenderJob, frame: u32) -> Result<(), RunError> {
+    let picture = source.picture()?;
+    Ok(png::write(&job.out.path_for(frame), job.size[0], job.size[1], &picture)?)
 }
 
 fn make_folder(picture: &Path) -> Result<(), RunError> {
@@ -197,15 +197,15 @@ mod tests {
             Self { frame: 0, rendered: Vec::new(), raise_in, interrupt: Interrupt::deaf() }
         }
 
-        fn play(&mut self, job: &Job) -> Result<Played, RunError> {
+        fn render_frames(&mut self, job: &RenderJob) -> Result<RenderReport, RunError> {
             let interrupt = self.interrupt.clone();
-            play(self, job, &mut Progress::hidden(), &interrupt)
+            render_frames(self, job, &mut Progress::hidden(), &interrupt)
         }
     }
 
-    impl Player for Counter {
-        fn update(&mut self, moment: Moment) -> Result<(), RunError> {
-            self.frame = moment.frame;
+    impl FrameSource for Counter {
+        fn update(&mut self, time: FrameTime) -> Result<(), RunError> {
+            self.frame = time.frame;
             Ok(())
         }
 
@@ -227,8 +227,8 @@ mod tests {
         }
     }
 
-    fn job(folder: &Path, frames: &str) -> Job {
-        Job {
+    fn job(folder: &Path, frames: &str) -> RenderJob {
+        RenderJob {
             frames: frames.parse().unwrap(),
             warm_up: 2,
             frames_per_round: 10,
@@ -251,10 +251,10 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let job = job(folder.path(), "8..11");
         job.check().unwrap();
-        let played = Counter::new(99).play(&job).unwrap();
+        let played = Counter::new(99).render_frames(&job).unwrap();
         assert_eq!((played.written, played.skipped), (3, 0));
         assert_eq!(names(folder.path()), ["frame_08.png", "frame_09.png", "frame_10.png"]);
-        let picture = image::open(job.out.of(9)).unwrap().into_rgba8();
+        let picture = image::open(job.out.path_for(9)).unwrap().into_rgba8();
         assert_eq!(picture.as_raw(), &[9, 0, 0, 255]);
     }
 
@@ -263,13 +263,13 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut job = job(folder.path(), "0..6");
         job.check().unwrap();
-        let error = Counter::new(2).play(&job).unwrap_err();
+        let error = Counter::new(2).render_frames(&job).unwrap_err();
         assert!(matches!(error, RunError::Interrupted { done: 3, count: 6, .. }), "{error}");
         assert_eq!((error.status(), names(folder.path()).len()), (130, 3));
-        std::fs::remove_file(job.out.of(1)).unwrap();
+        std::fs::remove_file(job.out.path_for(1)).unwrap();
         job.resume = true;
         let mut counter = Counter::new(99);
-        let played = counter.play(&job).unwrap();
+        let played = counter.render_frames(&job).unwrap();
         assert_eq!((played.written, played.skipped), (4, 2));
         assert_eq!(counter.rendered, [1, 3, 4, 5]);
     }
@@ -278,12 +278,12 @@ mod tests {
     fn a_still_is_one_picture_of_frame_0_and_its_warm_up_does_not_count() {
         let folder = tempfile::tempdir().unwrap();
         let out = FrameName::new(&folder.path().join("a.png"));
-        let job = Job { out, ..job(folder.path(), "4") };
+        let job = RenderJob { out, ..job(folder.path(), "4") };
         job.check().unwrap();
         let mut counter = Counter::new(99);
-        let played = counter.play(&job).unwrap();
+        let played = counter.render_frames(&job).unwrap();
         assert_eq!((counter.rendered.len(), played.written), (6, 1));
-        assert!(job.out.of(0).is_file());
+        assert!(job.out.path_for(0).is_file());
     }
 
     #[test]
@@ -292,9 +292,9 @@ mod tests {
         let still = job(folder.path(), "4");
         assert!(matches!(still.check(), Err(RunError::NoSequence { .. })));
         let plain = FrameName::new(&folder.path().join("a.png"));
-        let unnumbered = Job { out: plain.clone(), ..job(folder.path(), "0..4") };
+        let unnumbered = RenderJob { out: plain.clone(), ..job(folder.path(), "0..4") };
         assert!(matches!(unnumbered.check(), Err(RunError::NoNumber { .. })));
-        let resumed = Job { out: plain, resume: true, ..still };
+        let resumed = RenderJob { out: plain, resume: true, ..still };
         assert!(matches!(resumed.check(), Err(RunError::NothingToResume)));
         assert!(!folder.path().join("made").exists(), "nothing is left behind");
     }

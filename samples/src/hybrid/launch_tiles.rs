@@ -2,12 +2,12 @@
 
 use std::ops::Range;
 
-/// Rows of an image of `height` rows in bands of at most `rows` (0 counts as 1), from top to bottom.
-pub(super) fn bands(height: u32, rows: u32) -> Vec<Range<u32>> {
+/// Rows of an image of `height` rows in launch_tiles of at most `rows` (0 counts as 1), from top to bottom.
+pub(super) fn launch_tiles(height: u32, rows: u32) -> Vec<Range<u32>> {
     let rows = rows.max(1);
     (0..height.div_ceil(rows))
-        .map(|band| {
-            let first = band * rows;
+        .map(|tile| {
+            let first = tile * rows;
             first..first.saturating_add(rows).min(height)
         })
         .collect()
@@ -22,7 +22,7 @@ mod tests {
     #[test]
     fn a_short_image_is_one_band() {
         for rows in [5, 64, u32::MAX] {
-            let all = bands(5, rows);
+            let all = launch_tiles(5, rows);
             assert_eq!((all.len(), all[0].clone()), (1, 0..5));
         }
     }
@@ -30,10 +30,10 @@ mod tests {
     proptest! {
         #[test]
         fn bands_cover_every_row_once(height in 0_u32..5000, rows in 0_u32..400) {
-            let all = bands(height, rows);
+            let all = launch_tiles(height, rows);
             let covered: Vec<u32> = all.iter().cloned().flatten().collect();
             prop_assert_eq!(covered, (0..height).collect::<Vec<_>>());
-            prop_assert!(all.iter().all(|band| !band.is_empty() && band.len() as u32 <= rows.max(1)));
+            prop_assert!(all.iter().all(|tile| !tile.is_empty() && tile.len() as u32 <= rows.max(1)));
         }
     }
 }

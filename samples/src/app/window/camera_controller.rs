@@ -5,14 +5,14 @@ use crate::scene::Camera;
 
 /// A person at mouse and keys. The first way flown or turned takes the camera over; how fast it flies can be chosen before.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Pilot {
+pub(super) struct CameraController {
     /// Where the camera is that was taken over.
     fly: Option<FlyCamera>,
     /// How fast it flies, as a multiple of the usual speed. It outlasts a camera that is given back.
     pace: f32,
 }
 
-impl Pilot {
+impl CameraController {
     /// One who has done nothing yet.
     pub(super) fn new() -> Self {
         Self { fly: None, pace: 1.0 }
@@ -35,7 +35,7 @@ impl Pilot {
     }
 
     /// Gives the camera back to the animation.
-    pub(super) fn give_back(&mut self) {
+    pub(super) fn release(&mut self) {
         self.fly = None;
     }
 }
@@ -51,52 +51,52 @@ mod tests {
     const TEN_NOTCHES: Steering = Steering { faster: 10.0, ..STANDING };
 
     /// How far a tenth of a second leads forward.
-    fn step(pilot: &mut Pilot) -> f32 {
-        let before = pilot.camera().unwrap_or(SEEN_FROM).eye[2];
-        assert!(pilot.steer(Some(&SEEN_FROM), &FORWARD, 0.1));
-        before - pilot.camera().unwrap().eye[2]
+    fn step(camera_controller: &mut CameraController) -> f32 {
+        let before = camera_controller.camera().unwrap_or(SEEN_FROM).eye[2];
+        assert!(camera_controller.steer(Some(&SEEN_FROM), &FORWARD, 0.1));
+        before - camera_controller.camera().unwrap().eye[2]
     }
 
     #[test]
     fn the_wheel_counts_before_the_first_step_and_between_two() {
-        let usual = step(&mut Pilot::new());
-        let mut pilot = Pilot::new();
-        assert!(!pilot.steer(Some(&SEEN_FROM), &TEN_NOTCHES, 0.1));
-        assert!(!pilot.steer(Some(&SEEN_FROM), &STANDING, 0.1));
-        let fast = step(&mut pilot);
+        let usual = step(&mut CameraController::new());
+        let mut camera_controller = CameraController::new();
+        assert!(!camera_controller.steer(Some(&SEEN_FROM), &TEN_NOTCHES, 0.1));
+        assert!(!camera_controller.steer(Some(&SEEN_FROM), &STANDING, 0.1));
+        let fast = step(&mut camera_controller);
         assert!((fast / usual - 1.2_f32.powi(10)).abs() < 0.01, "{usual} {fast}");
-        assert!(!pilot.steer(Some(&SEEN_FROM), &TEN_NOTCHES, 0.1), "it stands");
-        let faster = step(&mut pilot);
+        assert!(!camera_controller.steer(Some(&SEEN_FROM), &TEN_NOTCHES, 0.1), "it stands");
+        let faster = step(&mut camera_controller);
         assert!((faster / fast - 1.2_f32.powi(10)).abs() < 0.01, "{fast} {faster}");
     }
 
     #[test]
     fn the_wheel_alone_leaves_the_camera_to_the_animation() {
-        let mut pilot = Pilot::new();
+        let mut camera_controller = CameraController::new();
         for steering in [TEN_NOTCHES, Steering { hurry: true, ..STANDING }] {
-            assert!(!pilot.steer(Some(&SEEN_FROM), &steering, 0.1));
-            assert_eq!(pilot.camera(), None);
+            assert!(!camera_controller.steer(Some(&SEEN_FROM), &steering, 0.1));
+            assert_eq!(camera_controller.camera(), None);
         }
     }
 
     #[test]
     fn a_camera_is_kept_until_it_is_given_back_and_its_speed_beyond() {
-        let mut pilot = Pilot::new();
-        pilot.steer(Some(&SEEN_FROM), &TEN_NOTCHES, 0.1);
-        let fast = step(&mut pilot);
-        let there = pilot.camera();
+        let mut camera_controller = CameraController::new();
+        camera_controller.steer(Some(&SEEN_FROM), &TEN_NOTCHES, 0.1);
+        let fast = step(&mut camera_controller);
+        let there = camera_controller.camera();
         let elsewhere = Camera { eye: [9.0; 3], ..SEEN_FROM };
-        assert!(!pilot.steer(Some(&elsewhere), &STANDING, 0.1));
-        assert_eq!(pilot.camera(), there, "the animation goes on without it");
-        pilot.give_back();
-        assert_eq!(pilot.camera(), None);
-        assert!((step(&mut pilot) / fast - 1.0).abs() < 0.01);
+        assert!(!camera_controller.steer(Some(&elsewhere), &STANDING, 0.1));
+        assert_eq!(camera_controller.camera(), there, "the animation goes on without it");
+        camera_controller.release();
+        assert_eq!(camera_controller.camera(), None);
+        assert!((step(&mut camera_controller) / fast - 1.0).abs() < 0.01);
     }
 
     #[test]
     fn what_has_no_camera_is_not_flown() {
-        let mut pilot = Pilot::new();
-        assert!(!pilot.steer(None, &FORWARD, 0.1));
-        assert_eq!(pilot.camera(), None);
+        let mut camera_controller = CameraController::new();
+        assert!(!camera_controller.steer(None, &FORWARD, 0.1));
+        assert_eq!(camera_controller.camera(), None);
     }
 }

@@ -12,7 +12,7 @@ use super::pipelines::PICTURE;
 
 /// What a texture and its conversion are chosen by.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Choice {
+pub(super) struct VideoFormat {
     pub(super) format: YuvFormat,
     pub(super) model: YuvModel,
     pub(super) range: YuvRange,
@@ -20,8 +20,8 @@ pub(super) struct Choice {
 }
 
 /// A texture with its conversion.
-pub(super) struct Shown {
-    pub(super) choice: Choice,
+pub(super) struct VideoTexture {
+    pub(super) video_format: VideoFormat,
     pub(super) texture: Holder<TextureHandle>,
     /// Its planes, as textures of one or two channels.
     pub(super) planes: Vec<Holder<TextureHandle>>,
@@ -29,10 +29,10 @@ pub(super) struct Shown {
     pub(super) pipeline: Holder<RenderPipelineHandle>,
 }
 
-impl Shown {
+impl VideoTexture {
     /// Fails with [`lvk::Error::Unsupported`] where the device lacks the format or the conversion.
-    pub(super) fn new(ctx: &Context, choice: Choice) -> lvk::Result<Self> {
-        let texture = texture(ctx, choice)?;
+    pub(super) fn new(ctx: &Context, video_format: VideoFormat) -> lvk::Result<Self> {
+        let texture = texture(ctx, video_format)?;
         let plane = |number: usize| {
             ctx.create_texture_view(&TextureViewDesc {
                 texture: Some(*texture),
@@ -41,10 +41,10 @@ impl Shown {
                 ..TextureViewDesc::default()
             })
         };
-        let count = if choice.format.has_two_planes() { 2 } else { 3 };
+        let count = if video_format.format.has_two_planes() { 2 } else { 3 };
         let planes = (0..count).map(plane).collect::<lvk::Result<_>>()?;
         let pipeline = pipeline(ctx, texture.index())?;
-        Ok(Self { choice, texture, planes, pipeline })
+        Ok(Self { video_format, texture, planes, pipeline })
     }
 
     /// Compiles the pipeline again.
@@ -55,7 +55,7 @@ impl Shown {
 
     /// The planes of the moment, as they lie in memory.
     pub(super) fn encode(&self, phase: f32) -> Vec<Vec<u8>> {
-        let Choice { format, model, range, size } = self.choice;
+        let VideoFormat { format, model, range, size } = self.video_format;
         encode::planes(&Film { size, phase }, format, model, range)
     }
 
@@ -70,10 +70,10 @@ impl Shown {
 }
 
 /// Which formats the device has, with this matrix and range.
-pub(super) fn supported(ctx: &Context, choice: Choice) -> lvk::Result<Vec<YuvFormat>> {
+pub(super) fn supported(ctx: &Context, video_format: VideoFormat) -> lvk::Result<Vec<YuvFormat>> {
     let mut found = Vec::new();
     for format in YuvFormat::ALL {
-        match texture(ctx, Choice { format, size: [2, 2], ..choice }) {
+        match texture(ctx, VideoFormat { format, size: [2, 2], ..video_format }) {
             Ok(_) => found.push(format),
             Err(lvk::Error::Unsupported { .. }) => {}
             Err(error) => return Err(error),
@@ -82,8 +82,8 @@ pub(super) fn supported(ctx: &Context, choice: Choice) -> lvk::Result<Vec<YuvFor
     Ok(found)
 }
 
-fn texture(ctx: &Context, choice: Choice) -> lvk::Result<Holder<TextureHandle>> {
-    let Choice { format, model, range, size } = choice;
+fn texture(ctx: &Context, video_format: VideoFormat) -> lvk::Result<Holder<TextureHandle>> {
+    let VideoFormat { format, model, range, size } = video_format;
     ctx.create_texture(&TextureDesc {
         format: format.raw(),
         extent: size,

@@ -5,13 +5,13 @@ use lvk::{BufferHandle, Context, Format, Holder, TextureDesc, TextureHandle, Tex
 use crate::app::array_buffer::buffer;
 
 /// The picture, and a colour a pixel where it has several samples.
-pub(super) struct Film {
+pub(super) struct Accumulation {
     pub(super) picture: Holder<TextureHandle>,
     sums: Option<Holder<BufferHandle>>,
 }
 
-impl Film {
-    /// A film of `extent` pixels.
+impl Accumulation {
+    /// A accumulation of `extent` pixels.
     pub(super) fn new(ctx: &Context, extent: [u32; 2], samples: u32) -> lvk::Result<Self> {
         let picture = ctx.create_texture(&TextureDesc {
             format: Format::Rgba8Unorm,

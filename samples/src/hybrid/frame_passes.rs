@@ -4,31 +4,31 @@ use std::ops::Range;
 
 use lvk::{BufferHandle, CommandBuffer, Context, Holder};
 
-use super::bands::bands;
+use super::accumulation::Accumulation;
 use super::config::{Bounces, HybridConfig};
-use super::film::Film;
-use super::frame::{BouncePlaces, FRAME_BYTES, FrameConstants, Indices, Lighting, Push};
+use super::frame::{FRAME_BYTES, FrameConstants, Indices, Lighting, Push, ReflectivePixelAddresses};
 use super::geometry_stage::GeometryStage;
 use super::gpu_scene::GpuScene;
+use super::launch_tiles::launch_tiles;
 use super::pixel_order::PixelOrder;
 use super::ray_pass::{GeometryLeft, RayPass};
 use crate::app::array_buffer::buffer;
 use crate::scene::GpuCamera;
 
 /// Rows that a CPU renders in one go: short enough to show progress, long enough to keep every core busy.
-const CPU_BAND_ROWS: u32 = 48;
+const CPU_TILE_ROWS: u32 = 48;
 /// Pixels that a GPU renders in one go: so few that no driver takes it for hung.
-const GPU_BAND_PIXELS: u32 = 1 << 23;
+const GPU_TILE_PIXELS: u32 = 1 << 23;
 
 /// The passes of a frame and what lies between them.
-pub(super) struct Passes {
+pub(super) struct FramePasses {
     pub(super) geometry: GeometryStage,
-    pub(super) film: Film,
+    pub(super) accumulation: Accumulation,
     /// The rows of each launch of rays.
-    pub(super) bands: Vec<Range<u32>>,
+    pub(super) launch_tiles: Vec<Range<u32>>,
     order: Option<PixelOrder>,
     rays: RayPass,
-    places: Places,
+    addresses: Addresses,
     indices: Indices,
     /// A block for each sample.
     frame_buffer: Holder<BufferHandle>,
@@ -38,38 +38,38 @@ pub(super) struct Passes {
 }
 
 /// Addresses of buffers.
-struct Places {
+struct Addresses {
     frame: u64,
     sums: u64,
-    bounces: BouncePlaces,
+    bounces: ReflectivePixelAddresses,
     order: u64,
 }
 
-impl Passes {
+impl FramePasses {
     pub(super) fn new(ctx: &Context, scene: &GpuScene, config: &HybridConfig) -> lvk::Result<Self> {
         let HybridConfig { width, height, samples, .. } = *config;
         let frame_buffer = buffer(ctx, "frame constants", FRAME_BYTES * u64::from(samples))?;
-        let film = Film::new(ctx, [width, height], samples)?;
+        let accumulation = Accumulation::new(ctx, [width, height], samples)?;
         let geometry = GeometryStage::new(ctx, scene, config)?;
         let is_ordered = config.bounces == Some(Bounces::First) && config.max_depth > 0;
         let order = is_ordered.then(|| PixelOrder::new(ctx, [width, height])).transpose()?;
-        let band_rows = band_rows(config, ctx.capabilities().is_cpu).min(height);
-        let rays = RayPass::new(ctx, config, width * band_rows)?;
-        let places = Places {
+        let tile_rows = tile_rows(config, ctx.capabilities().is_cpu).min(height);
+        let rays = RayPass::new(ctx, config, width * tile_rows)?;
+        let addresses = Addresses {
             frame: ctx.buffer_address(*frame_buffer)?,
-            sums: film.sums_address(ctx)?,
-            bounces: rays.bounce_places(ctx)?,
+            sums: accumulation.sums_address(ctx)?,
+            bounces: rays.reflective_pixel_addresses(ctx)?,
             order: order.as_ref().map_or(Ok(0), |order| order.address(ctx))?,
         };
         Ok(Self {
-            indices: indices(scene, &geometry, film.picture.index()),
+            indices: indices(scene, &geometry, accumulation.picture.index()),
             uploaded: Vec::new(),
-            bands: bands(height, band_rows),
+            launch_tiles: launch_tiles(height, tile_rows),
             geometry,
-            film,
+            accumulation,
             order,
             rays,
-            places,
+            addresses,
             frame_buffer,
             width,
             height,
@@ -91,10 +91,10 @@ impl Passes {
                 scene: scene.addresses(),
                 lighting,
                 indices: self.indices,
-                visibility: self.geometry.places(),
-                bounces: self.places.bounces,
-                order: self.places.order,
-                sums: self.places.sums,
+                visibility: self.geometry.addresses(),
+                bounces: self.addresses.bounces,
+                order: self.addresses.order,
+                sums: self.addresses.sums,
                 sample_number,
                 sample_count,
                 padding: [0; 2],
@@ -114,10 +114,10 @@ impl Passes {
         self.order.as_ref().map_or(Ok(()), |order| order.record(cmd, &push, &self.geometry.left()))
     }
 
-    /// Records the rays of a band of a sample.
-    pub(super) fn record_band(&self, cmd: &mut CommandBuffer, sample: u32, band: usize) -> lvk::Result<()> {
-        let push = self.push(sample, self.bands[band].clone());
-        self.rays.record(cmd, self.width, &push, &self.left(), &self.film)
+    /// Records the rays of a tile of a sample.
+    pub(super) fn record_tile(&self, cmd: &mut CommandBuffer, sample: u32, tile: usize) -> lvk::Result<()> {
+        let push = self.push(sample, self.launch_tiles[tile].clone());
+        self.rays.record(cmd, self.width, &push, &self.left(), &self.accumulation)
     }
 
     /// What the geometry pass and the order of pixels left.
@@ -128,13 +128,13 @@ impl Passes {
     }
 
     fn push(&self, sample: u32, rows: Range<u32>) -> Push {
-        let frame = self.places.frame + FRAME_BYTES * u64::from(sample);
+        let frame = self.addresses.frame + FRAME_BYTES * u64::from(sample);
         Push { frame, first: rows.start, end: rows.end }
     }
 }
 
-fn band_rows(config: &HybridConfig, is_cpu: bool) -> u32 {
-    if is_cpu { CPU_BAND_ROWS } else { GPU_BAND_PIXELS / config.width }
+fn tile_rows(config: &HybridConfig, is_cpu: bool) -> u32 {
+    if is_cpu { CPU_TILE_ROWS } else { GPU_TILE_PIXELS / config.width }
 }
 
 fn indices(scene: &GpuScene, geometry: &GeometryStage, output: u32) -> Indices {

@@ -4,8 +4,8 @@ use std::f32::consts::TAU;
 
 use glam::{Affine3A, Quat, Vec3};
 
-use super::models;
-use super::paint::Picture;
+use super::meshes;
+use super::procedural_textures::Picture;
 use crate::scene::{Camera, Sky};
 use crate::shapes::Mesh;
 
@@ -19,7 +19,7 @@ pub(super) struct Material {
     pub(super) emission: [f32; 3],
     /// 0 to 1.
     pub(super) metalness: f32,
-    /// A place in [`World::textures`], and the units of length that it covers.
+    /// A place in [`HallScene::textures`], and the units of length that it covers.
     pub(super) texture: Option<(usize, f32)>,
     /// 1 for opaque surfaces.
     pub(super) opacity: f32,
@@ -30,7 +30,7 @@ pub(super) struct Material {
 /// One mesh for each material: they become the geometries of one bottom-level structure.
 pub(super) struct Model {
     pub(super) name: &'static str,
-    /// Meshes and places in [`World::materials`].
+    /// Meshes and places in [`HallScene::materials`].
     pub(super) parts: Vec<(Mesh, u32)>,
     /// Light passes through it.
     pub(super) is_transparent: bool,
@@ -39,7 +39,7 @@ pub(super) struct Model {
 /// A model that stands somewhere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Placed {
-    /// A place in [`World::models`].
+    /// A place in [`HallScene::models`].
     pub(super) model: usize,
     /// Rotation, scale that is the same along all axes, and translation.
     pub(super) to_world: Affine3A,
@@ -57,8 +57,8 @@ pub(super) struct Light {
     pub(super) spread: f32,
 }
 
-/// Everything static, and what the moving things are made of.
-pub(super) struct World {
+/// Everything static, and what the animation things are made of.
+pub(super) struct HallScene {
     pub(super) models: Vec<Model>,
     /// Those of one model stand together.
     pub(super) placed: Vec<Placed>,
@@ -72,7 +72,7 @@ pub(super) struct World {
     pub(super) leaf_count: u32,
 }
 
-/// Places in [`World::materials`].
+/// Places in [`HallScene::materials`].
 pub(super) mod material {
     pub(in super::super) const FLOOR: u32 = 0;
     pub(in super::super) const STONE: u32 = 1;
@@ -94,7 +94,7 @@ pub(super) mod material {
     pub(in super::super) const HILLS: u32 = 17;
 }
 
-impl World {
+impl HallScene {
     pub(super) fn new() -> Self {
         let (models, placed) = furnish();
         Self {
@@ -134,17 +134,17 @@ fn furnish() -> (Vec<Model>, Vec<Placed>) {
     let studs = [both(2.15, 0.0, along(4.5, 0.25, 146)), both(3.6, 0.0, along(4.5, 0.25, 146))].concat();
     let lamps = [both(5.75, 0.0, along(4.2, 0.75, 48)), both(1.72, 0.1, along(-4.9, 1.15, 10))].concat();
     let list: Vec<(Model, Vec<Affine3A>)> = vec![
-        (models::hall(), here.clone()),
-        (models::ground(), here.clone()),
-        (models::column(), both(4.6, 0.0, along(1.0, 4.0, 9))),
-        (models::mirror_ball(), vec![upright(-3.1, 0.0, -4.2), upright(3.1, 0.0, -16.8)]),
-        (models::knot(), vec![upright(-3.2, 0.0, -9.0), upright(-3.1, 0.0, -16.8)]),
-        (models::lantern(), both(3.1, 3.1, vec![-7.0, -15.0])),
-        (models::screen_frame(), screens.clone()),
-        (models::lamp(), lamps),
-        (models::stud(), studs),
-        (models::pane(), screens),
-        (models::water(), here),
+        (meshes::hall(), here.clone()),
+        (meshes::ground(), here.clone()),
+        (meshes::column(), both(4.6, 0.0, along(1.0, 4.0, 9))),
+        (meshes::mirror_ball(), vec![upright(-3.1, 0.0, -4.2), upright(3.1, 0.0, -16.8)]),
+        (meshes::knot(), vec![upright(-3.2, 0.0, -9.0), upright(-3.1, 0.0, -16.8)]),
+        (meshes::lantern(), both(3.1, 3.1, vec![-7.0, -15.0])),
+        (meshes::screen_frame(), screens.clone()),
+        (meshes::lamp(), lamps),
+        (meshes::stud(), studs),
+        (meshes::pane(), screens),
+        (meshes::water(), here),
     ];
     let mut placed = Vec::new();
     let mut models = Vec::new();
@@ -230,7 +230,7 @@ mod tests {
 
     #[test]
     fn the_tables_fit_together() {
-        let world = World::new();
+        let world = HallScene::new();
         assert!(world.lights.len() <= 3, "the shaders have room for three");
         assert!(world.materials.iter().all(|m| m.texture.is_none_or(|(t, _)| t < world.textures.len())));
         for model in &world.models {

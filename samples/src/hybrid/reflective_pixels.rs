@@ -3,13 +3,13 @@
 use bytemuck::{Pod, Zeroable};
 use lvk::{BufferDesc, BufferHandle, BufferUsage, CommandBuffer, Context, Holder};
 
-use super::frame::BouncePlaces;
+use super::frame::ReflectivePixelAddresses;
 use crate::app::array_buffer::buffer;
 
-/// Bytes of `BouncePixel` in `shaders/hybrid/bounce_queue.glsl`.
+/// Bytes of `BouncePixel` in `shaders/hybrid/reflective_pixels.glsl`.
 const PIXEL_BYTES: u64 = 28;
 
-/// `BounceHead` in `shaders/hybrid/bounce_queue.glsl`: how many pixels wait, as arguments of both kinds of launches.
+/// `BounceHead` in `shaders/hybrid/reflective_pixels.glsl`: how many pixels wait, as arguments of both kinds of launches.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Head {
@@ -17,13 +17,13 @@ struct Head {
     groups: [u32; 3],
 }
 
-/// The queue of a band of the picture.
-pub(super) struct BounceQueue {
+/// The queue of a tile of the picture.
+pub(super) struct ReflectivePixels {
     head: Holder<BufferHandle>,
     pixels: Holder<BufferHandle>,
 }
 
-impl BounceQueue {
+impl ReflectivePixels {
     /// Where the size of an indirect trace stands in [`head`](Self::head).
     pub(super) const RAYS: u64 = std::mem::offset_of!(Head, rays) as u64;
     /// Where the groups of an indirect dispatch stand.
@@ -46,8 +46,11 @@ impl BounceQueue {
     }
 
     /// Tells the shaders where it is.
-    pub(super) fn places(&self, ctx: &Context) -> lvk::Result<BouncePlaces> {
-        Ok(BouncePlaces { head: ctx.buffer_address(*self.head)?, pixels: ctx.buffer_address(*self.pixels)? })
+    pub(super) fn addresses(&self, ctx: &Context) -> lvk::Result<ReflectivePixelAddresses> {
+        Ok(ReflectivePixelAddresses {
+            head: ctx.buffer_address(*self.head)?,
+            pixels: ctx.buffer_address(*self.pixels)?,
+        })
     }
 
     /// Records that nobody waits.

@@ -6,6 +6,6 @@ use crate::app::device::device_text;
 
 /// The device, and what the picture shows.
 #[must_use]
-pub fn headline(capabilities: &Capabilities, scene: &str) -> String {
+pub fn summary(capabilities: &Capabilities, scene: &str) -> String {
     format!("{}scene     {scene}", device_text(capabilities))
 }

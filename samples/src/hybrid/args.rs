@@ -2,9 +2,9 @@
 
 use clap::{Parser, ValueEnum};
 
-use super::ray_args::RayArgs;
-use super::run_args::RunArgs;
-use super::scene_args::SceneArgs;
+use crate::app::ray_args::RayArgs;
+use crate::app::run_args::RunArgs;
+use crate::app::scene_args::SceneArgs;
 
 /// Largest number of bounces.
 pub const MAX_DEPTH: u32 = 16;
@@ -144,7 +144,7 @@ Examples:
   hybrid --frames 0..240 --out dir/frame_####.png --resume    what is missing of them
 
 Frame N of a sequence depends on N alone, so any number of processes may share one. Ctrl-C ends after the frame under way;
-pictures get their names when they are complete. A film of them: ffmpeg -framerate 30 -i dir/frame_%04d.png film.mp4
+pictures get their names when they are complete. A accumulation of them: ffmpeg -framerate 30 -i dir/frame_%04d.png accumulation.mp4
 
 Exit status: 0 when the pictures were written, 1 for trouble with the device, 2 for wrong arguments or input, 130 after
 Ctrl-C.";

@@ -4,7 +4,7 @@ use std::f32::consts::TAU;
 
 use glam::{Vec2, Vec3};
 
-use super::world::{Model, material};
+use super::scene::{Model, material};
 use crate::scene::noise;
 use crate::shapes::Mesh;
 

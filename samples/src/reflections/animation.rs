@@ -12,10 +12,10 @@ use lvk::{
 
 use super::config::SkinUpdate;
 use super::frame::{Push, words};
+use super::gpu_scene::{GeometryArena, index_range};
 use super::pipelines::{LEAVES, SKIN};
 use super::quantise::pack_normal;
 use super::serpent::{self, BONE_COUNT, Skin};
-use super::tables::{Arena, index_range};
 use crate::app::array_buffer::{array, buffer};
 use crate::pipelines::SampleStage;
 
@@ -41,8 +41,8 @@ pub(super) struct SkinPart {
     pub(super) indices: Range<u32>,
 }
 
-/// The buffers of moving things.
-pub(super) struct Moving {
+/// The buffers of animation things.
+pub(super) struct Animation {
     pub(super) skin_parts: Vec<SkinPart>,
     pub(super) skin_positions: u64,
     pub(super) skin_normals: u64,
@@ -58,7 +58,7 @@ pub(super) struct Moving {
 }
 
 /// The passes that move them, and their structures.
-pub(super) struct MovingPasses {
+pub(super) struct AnimationPasses {
     skin: Holder<ComputePipelineHandle>,
     turn: Holder<ComputePipelineHandle>,
     pub(super) serpent: Holder<AccelStructHandle>,
@@ -66,9 +66,9 @@ pub(super) struct MovingPasses {
     skin_mode: BuildMode,
 }
 
-impl Moving {
+impl Animation {
     /// Buffers with the serpent at rest; its indices, and those of the leaves, go into `arena`.
-    pub(super) fn new(ctx: &Context, arena: &mut Arena, leaf_count: u32) -> lvk::Result<Self> {
+    pub(super) fn new(ctx: &Context, arena: &mut GeometryArena, leaf_count: u32) -> lvk::Result<Self> {
         let skin = Skin::new();
         let rest = skin.rest_vertices();
         let mut first_vertex = 0;
@@ -109,7 +109,7 @@ impl Moving {
     }
 
     /// Moves the bones to where they are at `phase` of the round, 0 to 1.
-    pub(super) fn pose(&self, ctx: &Context, phase: f32) -> lvk::Result<()> {
+    pub(super) fn upload_pose(&self, ctx: &Context, phase: f32) -> lvk::Result<()> {
         ctx.upload_buffer(*self.bones, 0, bytemuck::cast_slice(&serpent::bones(phase)))
     }
 
@@ -141,21 +141,21 @@ impl Moving {
     }
 }
 
-impl MovingPasses {
+impl AnimationPasses {
     pub(super) fn new(
         ctx: &Context,
-        moving: &Moving,
+        animation: &Animation,
         indices: BufferHandle,
         update: SkinUpdate,
     ) -> lvk::Result<Self> {
         let serpent = ctx.create_blas(&BlasDesc {
-            geometries: &moving.skin_geometries(indices),
+            geometries: &animation.skin_geometries(indices),
             flags: BuildFlags::FAST_TRACE | BuildFlags::ALLOW_UPDATE,
             debug_name: "serpent",
             ..BlasDesc::default()
         })?;
         let leaves = ctx.create_blas(&BlasDesc {
-            geometries: &[moving.leaf_geometry(indices)],
+            geometries: &[animation.leaf_geometry(indices)],
             flags: BuildFlags::FAST_BUILD,
             order: PrimitiveOrder::Given,
             debug_name: "leaves",
@@ -165,7 +165,7 @@ impl MovingPasses {
     }
 
     /// Has the serpent's structure follow its skin so from now on.
-    pub(super) fn follow(&mut self, update: SkinUpdate) {
+    pub(super) fn set_skin_update(&mut self, update: SkinUpdate) {
         self.skin_mode = mode(update);
     }
 
@@ -180,28 +180,28 @@ impl MovingPasses {
         &self,
         ctx: &Context,
         cmd: &mut CommandBuffer,
-        moving: &Moving,
+        animation: &Animation,
         frame: u64,
     ) -> lvk::Result<()> {
         cmd.push_label("skinning");
         cmd.bind_compute_pipeline(*self.skin)?;
         cmd.push_constants(&SkinPush {
-            rest: ctx.buffer_address(*moving.rest)?,
-            bones: ctx.buffer_address(*moving.bones)?,
-            positions: moving.skin_positions,
-            normals: moving.skin_normals,
-            vertex_count: moving.skin_vertex_count.into(),
+            rest: ctx.buffer_address(*animation.rest)?,
+            bones: ctx.buffer_address(*animation.bones)?,
+            positions: animation.skin_positions,
+            normals: animation.skin_normals,
+            vertex_count: animation.skin_vertex_count.into(),
         })?;
-        let buffers = [*moving.positions, *moving.normals];
+        let buffers = [*animation.positions, *animation.normals];
         let writes = Dependencies { buffers: &buffers, ..Dependencies::default() };
-        cmd.dispatch([moving.skin_vertex_count.div_ceil(GROUP), 1, 1], &writes)?;
+        cmd.dispatch([animation.skin_vertex_count.div_ceil(GROUP), 1, 1], &writes)?;
         cmd.pop_label();
         cmd.push_label("leaves");
         cmd.bind_compute_pipeline(*self.turn)?;
-        let [low, high] = words(moving.leaf_positions);
-        cmd.push_constants(&Push { frame, arguments: [low, high, moving.leaf_count, 0] })?;
-        let writes = Dependencies { buffers: &[*moving.leaves], ..Dependencies::default() };
-        cmd.dispatch([moving.leaf_count.div_ceil(GROUP), 1, 1], &writes)?;
+        let [low, high] = words(animation.leaf_positions);
+        cmd.push_constants(&Push { frame, arguments: [low, high, animation.leaf_count, 0] })?;
+        let writes = Dependencies { buffers: &[*animation.leaves], ..Dependencies::default() };
+        cmd.dispatch([animation.leaf_count.div_ceil(GROUP), 1, 1], &writes)?;
         cmd.pop_label();
         cmd.build_blas(&[*self.serpent], self.skin_mode)?;
         cmd.build_blas(&[*self.leaves], BuildMode::Rebuild)

@@ -1,4 +1,4 @@
-//! The world on the GPU: vertices and indices of everything, and the tables that lead a hit to its surface.
+//! The world on the GPU: vertices and indices of everything, and the gpu_scene that lead a hit to its surface.
 
 use std::ops::Range;
 
@@ -9,10 +9,10 @@ use lvk::{
     TextureHandle, Triangles, VertexFormat, transform_rows,
 };
 
-use super::layers::{Layer, farthest_first};
-use super::moving::Moving;
+use super::animation::Animation;
 use super::quantise::{Grid, PackedVertex};
-use super::world::{Material, Model, Placed, World};
+use super::scene::{HallScene, Material, Model, Placed};
+use super::transparency_sort::{SortBounds, farthest_first};
 use crate::app::array_buffer::array;
 use crate::shapes::Mesh;
 
@@ -70,7 +70,7 @@ pub(super) struct Draw {
 
 /// Vertices and indices while they are collected, and where the parts of each model came to lie.
 #[derive(Default)]
-pub(super) struct Arena {
+pub(super) struct GeometryArena {
     vertices: Vec<PackedVertex>,
     indices: Vec<u16>,
     models: Vec<PackedModel>,
@@ -88,8 +88,8 @@ struct Part {
     material: u32,
 }
 
-/// Buffers and tables; the static models' geometries for the builds, and what to draw.
-pub(super) struct Tables {
+/// Buffers and gpu_scene; the static models' geometries for the builds, and what to draw.
+pub(super) struct GpuScene {
     pub(super) indices: Holder<BufferHandle>,
     pub(super) materials: u64,
     pub(super) geometries: u64,
@@ -97,13 +97,13 @@ pub(super) struct Tables {
     pub(super) opaque: Vec<Draw>,
     transparent: Vec<Draw>,
     /// Where those are, one each.
-    layers: Vec<Layer>,
+    layers: Vec<SortBounds>,
     _held: [Holder<BufferHandle>; 4],
 }
 
-impl Arena {
+impl GeometryArena {
     /// Puts all models on grids of their own.
-    pub(super) fn of(models: &[Model]) -> Self {
+    pub(super) fn from_models(models: &[Model]) -> Self {
         let mut arena = Self::default();
         for model in models {
             let bounds = model.parts.iter().map(|(mesh, _)| mesh.bounds());
@@ -175,13 +175,13 @@ pub(super) fn index_range(buffer: BufferHandle, places: &Range<u32>) -> Indices 
     Indices { buffer, offset: 2 * u64::from(places.start), format: IndexFormat::U16 }
 }
 
-impl Tables {
+impl GpuScene {
     pub(super) fn new(
         ctx: &Context,
-        world: &World,
-        arena: &Arena,
+        world: &HallScene,
+        arena: &GeometryArena,
         [vertices, indices]: [Holder<BufferHandle>; 2],
-        moving: &Moving,
+        animation: &Animation,
         textures: &[Holder<TextureHandle>],
     ) -> lvk::Result<Self> {
         let mut lists = Lists { vertices: ctx.buffer_address(*vertices)?, ..Lists::default() };
@@ -189,7 +189,7 @@ impl Tables {
         for (number, model) in world.models.iter().enumerate() {
             lists.add_model(world, arena, number, model);
         }
-        lists.add_moving(world, moving);
+        lists.add_moving(world, animation);
         let materials: Vec<_> =
             world.materials.iter().map(|material| gpu_material(material, world, textures)).collect();
         let read = BufferUsage::STORAGE;
@@ -209,7 +209,7 @@ impl Tables {
     }
 }
 
-impl Tables {
+impl GpuScene {
     /// The transparent surfaces, one instance each, farthest first as seen from `eye`.
     pub(super) fn transparent(&self, eye: Vec3) -> Vec<Draw> {
         farthest_first(&self.layers, eye).into_iter().map(|place| self.transparent[place].clone()).collect()
@@ -224,11 +224,11 @@ struct Lists {
     instances: Vec<GpuInstance>,
     opaque: Vec<Draw>,
     transparent: Vec<Draw>,
-    layers: Vec<Layer>,
+    layers: Vec<SortBounds>,
 }
 
 impl Lists {
-    fn add_model(&mut self, world: &World, arena: &Arena, number: usize, model: &Model) {
+    fn add_model(&mut self, world: &HallScene, arena: &GeometryArena, number: usize, model: &Model) {
         let PackedModel { grid, parts } = &arena.models[number];
         let (first_geometry, first) = (self.geometries.len() as u32, self.instances.len() as u32);
         for placed in world.placed.iter().filter(|placed| placed.model == number) {
@@ -264,20 +264,20 @@ impl Lists {
         self.geometries.push(geometry);
         let (low, high) = mesh.bounds();
         for (instance, placed) in (first..).zip(places) {
-            self.layers.push(Layer::new(low, high, &placed.to_world));
+            self.layers.push(SortBounds::new(low, high, &placed.to_world));
             let (indices, instances) = (indices.clone(), instance..instance + 1);
             self.transparent.push(Draw { geometry: number, indices, instances });
         }
     }
 
     /// The serpent, then the leaves: an instance each.
-    fn add_moving(&mut self, world: &World, moving: &Moving) {
+    fn add_moving(&mut self, world: &HallScene, animation: &Animation) {
         let serpent = self.add_identity();
-        let parts = moving.skin_parts.iter().zip(world.serpent_materials);
+        let parts = animation.skin_parts.iter().zip(world.serpent_materials);
         for (part, material) in parts {
             let geometry = GpuGeometry {
-                vertices: moving.skin_positions + 12 * u64::from(part.first_vertex),
-                normals: moving.skin_normals + 4 * u64::from(part.first_vertex),
+                vertices: animation.skin_positions + 12 * u64::from(part.first_vertex),
+                normals: animation.skin_normals + 4 * u64::from(part.first_vertex),
                 indices: self.indices + 2 * u64::from(part.indices.start),
                 material,
                 kind: KIND_SKINNED,
@@ -286,13 +286,13 @@ impl Lists {
         }
         let leaves = self.add_identity();
         let geometry = GpuGeometry {
-            vertices: moving.leaf_positions,
+            vertices: animation.leaf_positions,
             normals: 0,
-            indices: self.indices + 2 * u64::from(moving.leaf_indices.start),
+            indices: self.indices + 2 * u64::from(animation.leaf_indices.start),
             material: world.leaf_material,
             kind: KIND_LEAF,
         };
-        self.add_geometry(geometry, moving.leaf_indices.clone(), leaves);
+        self.add_geometry(geometry, animation.leaf_indices.clone(), leaves);
     }
 
     fn add_identity(&mut self) -> u32 {
@@ -316,7 +316,7 @@ fn gpu_instance(to_world: Affine3A, grid: Grid, first_geometry: u32) -> GpuInsta
     GpuInstance { rows, normal_columns: normals.to_cols_array(), first_geometry }
 }
 
-fn gpu_material(material: &Material, world: &World, textures: &[Holder<TextureHandle>]) -> GpuMaterial {
+fn gpu_material(material: &Material, world: &HallScene, textures: &[Holder<TextureHandle>]) -> GpuMaterial {
     let texture = material
         .texture
         .map(|(place, extent)| (textures[place].index(), world.textures[place].size as f32 / extent));

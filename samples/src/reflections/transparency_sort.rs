@@ -4,13 +4,13 @@ use glam::{Affine3A, Vec3};
 
 /// A flat transparent surface in the world: a pane, or a body of water seen from above.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Layer {
+pub(super) struct SortBounds {
     corners: [Vec3; 8],
     centre: Vec3,
     normal: Vec3,
 }
 
-impl Layer {
+impl SortBounds {
     /// What a model between `low` and `high`, thinnest across its plane, becomes by `to_world`.
     pub(super) fn new(low: Vec3, high: Vec3, to_world: &Affine3A) -> Self {
         let axis = Vec3::AXES[(high - low).min_position()];
@@ -46,7 +46,7 @@ const EPSILON: f32 = 1e-4;
 /// Numbers of the layers, farthest first as seen from `eye`: none can hide one that comes after it. So the order is
 /// right for every pixel, unless layers pass through each other or hide each other in a ring; those follow the distance
 /// of their middles.
-pub(super) fn farthest_first(layers: &[Layer], eye: Vec3) -> Vec<usize> {
+pub(super) fn farthest_first(layers: &[SortBounds], eye: Vec3) -> Vec<usize> {
     let distance = |number: &usize| layers[*number].centre.distance_squared(eye);
     let mut left: Vec<usize> = (0..layers.len()).collect();
     left.sort_by(|a, b| distance(b).total_cmp(&distance(a)));
@@ -66,15 +66,15 @@ mod tests {
     use super::*;
 
     /// A pane of two by two units that faces z, around `centre`.
-    fn pane(centre: [f32; 3]) -> Layer {
+    fn pane(centre: [f32; 3]) -> SortBounds {
         let half = Vec3::new(1.0, 1.0, 0.0);
-        Layer::new(-half, half, &Affine3A::from_translation(centre.into()))
+        SortBounds::new(-half, half, &Affine3A::from_translation(centre.into()))
     }
 
     /// Water of ten by ten units at height 0 around `x`, `z`.
-    fn water(x: f32, z: f32) -> Layer {
+    fn water(x: f32, z: f32) -> SortBounds {
         let half = Vec3::new(5.0, 0.0, 5.0);
-        Layer::new(-half, half, &Affine3A::from_translation(Vec3::new(x, 0.0, z)))
+        SortBounds::new(-half, half, &Affine3A::from_translation(Vec3::new(x, 0.0, z)))
     }
 
     #[test]
@@ -113,7 +113,7 @@ mod tests {
     fn layers_that_cannot_be_ordered_all_come() {
         let quarter = |centre: [f32; 3]| {
             let half = Vec3::new(0.0, 1.0, 1.0);
-            Layer::new(-half, half, &Affine3A::from_translation(centre.into()))
+            SortBounds::new(-half, half, &Affine3A::from_translation(centre.into()))
         };
         let crossing = [pane([0.0, 0.0, -3.0]), quarter([0.0, 0.0, -3.1])];
         let mut order = farthest_first(&crossing, Vec3::new(2.0, 0.0, 3.0));

@@ -4,16 +4,21 @@ use egui::{Slider, Ui};
 use lvk::Capabilities;
 
 use super::config::{Bounces, Geometry, HybridConfig, Method, RayPath};
-use crate::app::ui::option;
+use crate::app::ui::option_button;
 
 /// Most samples that the slider offers: they are rendered one after the other, while a person waits.
 const MOST_SAMPLES: u32 = 16;
 
 /// Lays out the switches of `config`. Without `goes_on` nothing in the scene mirrors or refracts.
-pub(super) fn show(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabilities, goes_on: bool) {
+pub(super) fn show_settings(
+    ui: &mut Ui,
+    config: &mut HybridConfig,
+    capabilities: &Capabilities,
+    goes_on: bool,
+) {
     show_method(ui, config, capabilities);
     let before = *config;
-    show_path(ui, &mut config.path, |path| can_be(&HybridConfig { path, ..before }, capabilities));
+    path_switch(ui, &mut config.path, |path| can_be(&HybridConfig { path, ..before }, capabilities));
     if goes_on {
         show_bounces(ui, config, capabilities);
         ui.add(Slider::new(&mut config.max_depth, 0..=HybridConfig::MAX_DEPTH).text("mirrored or bent"));
@@ -25,11 +30,11 @@ pub(super) fn show(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabi
 }
 
 /// Lays out the ways of tracing rays, those that `can_be` to choose from.
-pub(crate) fn show_path(ui: &mut Ui, path: &mut RayPath, can_be: impl Fn(RayPath) -> bool) {
+pub(crate) fn path_switch(ui: &mut Ui, path: &mut RayPath, can_be: impl Fn(RayPath) -> bool) {
     ui.horizontal(|ui| {
         ui.label("rays");
-        option(ui, path, "by pipeline", |_| RayPath::Pipeline, |path| can_be(*path));
-        option(ui, path, "by query", |_| RayPath::Query, |path| can_be(*path));
+        option_button(ui, path, "by pipeline", |_| RayPath::Pipeline, |path| can_be(*path));
+        option_button(ui, path, "by query", |_| RayPath::Query, |path| can_be(*path));
     });
 }
 
@@ -38,8 +43,8 @@ fn show_method(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabiliti
     ui.horizontal(|ui| {
         ui.label("seen");
         let by = |method| move |config| mended(HybridConfig { method, ..config });
-        option(ui, config, "by rays", by(Method::Standalone), can_be);
-        option(ui, config, "by rasteriser", by(Method::Hybrid), can_be);
+        option_button(ui, config, "by rays", by(Method::Standalone), can_be);
+        option_button(ui, config, "by rasteriser", by(Method::Hybrid), can_be);
     });
     if config.method == Method::Standalone {
         return;
@@ -50,9 +55,15 @@ fn show_method(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabiliti
     };
     ui.horizontal(|ui| {
         ui.label("G-buffer");
-        option(ui, config, "triangles", |config| HybridConfig { geometry: triangles, ..config }, can_be);
+        option_button(
+            ui,
+            config,
+            "triangles",
+            |config| HybridConfig { geometry: triangles, ..config },
+            can_be,
+        );
         let of_paper = |config| mended(HybridConfig { geometry: Geometry::Paper, ..config });
-        option(ui, config, "the paper's", of_paper, can_be);
+        option_button(ui, config, "the paper's", of_paper, can_be);
     });
 }
 
@@ -63,7 +74,13 @@ fn show_bounces(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabilit
         for (text, bounces) in
             [("inline", Bounces::Inline), ("queued", Bounces::Queued), ("first", Bounces::First)]
         {
-            option(ui, config, text, |config| HybridConfig { bounces: Some(bounces), ..config }, can_be);
+            option_button(
+                ui,
+                config,
+                text,
+                |config| HybridConfig { bounces: Some(bounces), ..config },
+                can_be,
+            );
         }
     });
 }

@@ -6,7 +6,7 @@ use egui::{Color32, RichText, Ui};
 
 /// A configuration that a panel edits and a sample takes over between two frames.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Wanted<C> {
+pub struct PendingSettings<C> {
     /// What is wanted.
     pub config: C,
     /// Whether a slider is under way, so that it may be something else in a moment.
@@ -15,7 +15,7 @@ pub struct Wanted<C> {
     refused: Option<String>,
 }
 
-impl<C: Copy + PartialEq> Wanted<C> {
+impl<C: Copy + PartialEq> PendingSettings<C> {
     /// What there is.
     #[must_use]
     pub fn new(config: C) -> Self {
@@ -33,19 +33,19 @@ impl<C: Copy + PartialEq> Wanted<C> {
 
     /// What is to be taken over from `current`, if it is something else and nobody is about to change it further.
     #[must_use]
-    pub fn news(&self, current: C) -> Option<C> {
+    pub fn changed_from(&self, current: C) -> Option<C> {
         (!self.is_held && self.config != current).then_some(self.config)
     }
 
     /// What became of it, and what there is now. What was refused is wanted no more.
-    pub fn settle<E: Display>(&mut self, done: Result<(), E>, current: C) {
+    pub fn finish<E: Display>(&mut self, done: Result<(), E>, current: C) {
         self.refused = done.err().map(|error| error.to_string());
         self.config = current;
     }
 }
 
 /// A button for one of several values. It can be pressed where `can_be` holds of the configuration that `set` makes.
-pub(crate) fn option<C: Copy + PartialEq>(
+pub(crate) fn option_button<C: Copy + PartialEq>(
     ui: &mut Ui,
     config: &mut C,
     text: &str,
@@ -65,24 +65,24 @@ mod tests {
 
     #[test]
     fn what_is_new_is_taken_over_once_and_what_is_refused_is_dropped() {
-        let mut wanted = Wanted::new(3);
-        assert_eq!(wanted.news(3), None);
+        let mut wanted = PendingSettings::new(3);
+        assert_eq!(wanted.changed_from(3), None);
         wanted.config = 99;
-        assert_eq!(wanted.news(3), Some(99));
-        wanted.settle(Err("99 is too much"), 3);
-        assert_eq!((wanted.news(3), wanted.refused.as_deref()), (None, Some("99 is too much")));
+        assert_eq!(wanted.changed_from(3), Some(99));
+        wanted.finish(Err("99 is too much"), 3);
+        assert_eq!((wanted.changed_from(3), wanted.refused.as_deref()), (None, Some("99 is too much")));
         wanted.config = 5;
-        assert_eq!(wanted.news(3), Some(5));
-        wanted.settle(Ok::<_, String>(()), 5);
-        assert_eq!((wanted.news(5), &wanted.refused), (None, &None));
+        assert_eq!(wanted.changed_from(3), Some(5));
+        wanted.finish(Ok::<_, String>(()), 5);
+        assert_eq!((wanted.changed_from(5), &wanted.refused), (None, &None));
     }
 
     #[test]
     fn a_slider_under_way_is_waited_for() {
-        let mut wanted = Wanted { is_held: true, ..Wanted::new(1) };
+        let mut wanted = PendingSettings { is_held: true, ..PendingSettings::new(1) };
         wanted.config = 2;
-        assert_eq!(wanted.news(1), None);
+        assert_eq!(wanted.changed_from(1), None);
         wanted.is_held = false;
-        assert_eq!(wanted.news(1), Some(2));
+        assert_eq!(wanted.changed_from(1), Some(2));
     }
 }

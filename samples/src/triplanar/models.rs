@@ -30,7 +30,7 @@ pub(super) struct Body {
 }
 
 /// Triangles of all models in one list, and the bodies.
-pub(super) struct Bodies {
+pub(super) struct Models {
     pub(super) vertices: Vec<Vertex>,
     pub(super) triangles: Vec<[u32; 3]>,
     pub(super) bodies: Vec<Body>,
@@ -38,7 +38,7 @@ pub(super) struct Bodies {
     pub(super) corners: Vec<Range<u32>>,
 }
 
-impl Bodies {
+impl Models {
     pub(super) fn new() -> Self {
         let mut all =
             Self { vertices: Vec::new(), triangles: Vec::new(), bodies: Vec::new(), corners: Vec::new() };
@@ -50,12 +50,12 @@ impl Bodies {
         let block = all.add(&Mesh::default().grid(96, 64, |u, v| block(on_ball(u, v))));
         let ring = all.add(&Mesh::default().grid(96, 48, ring));
         let ball = all.add(&Mesh::default().grid(64, 32, on_ball));
-        all.show(&ground, [0.0, 0.0, 0.0], 1.0, 0.0, 0.0, ["paving", "paving"]);
-        all.show(&rock, [0.0, 1.02, -0.6], 1.25, 1.0, 1.0, ["sandstone", "leaves"]);
-        all.show(&block, [-2.35, 0.8, 0.35], 0.8, -1.0, 0.9, ["brick", "paving"]);
-        all.show(&ring, [2.5, 0.98, 0.3], 1.0, 1.0, 0.75, ["marble", "marble"]);
-        all.show(&ball, [0.95, 0.45, 1.45], 0.45, -2.0, 0.45, ["mosaic", "mosaic"]);
-        all.show(&block, [-0.85, 0.36, 1.55], 0.36, 1.0, 0.4, ["wood", "wood"]);
+        all.add_instance(&ground, [0.0, 0.0, 0.0], 1.0, 0.0, 0.0, ["paving", "paving"]);
+        all.add_instance(&rock, [0.0, 1.02, -0.6], 1.25, 1.0, 1.0, ["sandstone", "leaves"]);
+        all.add_instance(&block, [-2.35, 0.8, 0.35], 0.8, -1.0, 0.9, ["brick", "paving"]);
+        all.add_instance(&ring, [2.5, 0.98, 0.3], 1.0, 1.0, 0.75, ["marble", "marble"]);
+        all.add_instance(&ball, [0.95, 0.45, 1.45], 0.45, -2.0, 0.45, ["mosaic", "mosaic"]);
+        all.add_instance(&block, [-0.85, 0.36, 1.55], 0.36, 1.0, 0.4, ["wood", "wood"]);
         all
     }
 
@@ -72,7 +72,7 @@ impl Bodies {
         first..3 * self.triangles.len() as u32
     }
 
-    fn show(
+    fn add_instance(
         &mut self,
         model: &Range<u32>,
         place: [f32; 3],
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn triangles_turn_with_their_normals_and_bodies_stand_in_or_on_the_ground() {
-        let Bodies { vertices, triangles, bodies, corners } = Bodies::new();
+        let Models { vertices, triangles, bodies, corners } = Models::new();
         let position = |number: u32| Vec3::from(vertices[number as usize].position);
         for [a, b, c] in &triangles {
             let turned = (position(*b) - position(*a)).cross(position(*c) - position(*a));

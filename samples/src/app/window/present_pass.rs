@@ -9,7 +9,7 @@ use lvk::{
 use crate::app::ui::Painter;
 
 /// A swapchain and what is painted on it.
-pub(super) struct Screen {
+pub(super) struct PresentPass {
     ctx: Context,
     swapchain: Holder<SwapchainHandle>,
     painter: Painter,
@@ -18,7 +18,7 @@ pub(super) struct Screen {
     shown: Option<(TextureHandle, Holder<TextureHandle>)>,
 }
 
-impl Screen {
+impl PresentPass {
     /// On the window of the context, `extent` pixels large.
     pub(super) fn new(ctx: &Context, extent: [u32; 2]) -> lvk::Result<Self> {
         let swapchain = ctx.create_swapchain(&SwapchainDesc {
