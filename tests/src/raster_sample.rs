@@ -5,7 +5,7 @@ use image::RgbaImage;
 use lvk_samples::app::headless;
 use lvk_samples::app::run_error::RunError;
 use lvk_samples::app::sample::{FrameTime, Sample};
-use lvk_samples::raster::RasterError;
+use lvk_samples::app::sample_error::SampleError;
 
 /// Size of their pictures in tests.
 pub const SIZE: [u32; 2] = [160, 90];
@@ -36,10 +36,10 @@ pub fn picture_now<S: Sample>(sample: &mut S) -> RgbaImage {
 ///
 /// # Panics
 /// When it does not refuse them as it should.
-pub fn assert_refuses_impossible_sizes<S>(make: impl Fn([u32; 2]) -> Result<S, RasterError>) {
+pub fn assert_refuses_impossible_sizes<S>(make: impl Fn([u32; 2]) -> Result<S, SampleError>) {
     for size in [[0, 8], [8, 0], [1 << 30, 8], [8, u32::MAX]] {
         match make(size).err() {
-            Some(RasterError::BadSize { width, height, .. }) => assert_eq!([width, height], size),
+            Some(SampleError::BadSize { width, height, .. }) => assert_eq!([width, height], size),
             other => panic!("{size:?}: {other:?}"),
         }
     }

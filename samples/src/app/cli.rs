@@ -1,9 +1,13 @@
-//! The program of every sample: device, frames, pictures, timings and what is said about them.
+//! The program of every sample, made from its [`SampleInfo`]: command line, device, frames, images, timings and log lines.
 
+use super::sample_info::SampleInfo;
+use super::summary::{raster_summary, ray_summary};
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 use lvk::{Context, ValidationSink, WindowHandles};
 
 use super::caches::Caches;
@@ -13,12 +17,16 @@ use super::frames::Frames;
 use super::headless::Headless;
 use super::interrupt::Interrupt;
 use super::progress::Progress;
+use super::ray_args::RayTracing;
 use super::run_args::RunArgs;
 use super::run_error::RunError;
 use super::sample::Sample;
 use super::sequence::{RenderJob, RenderReport, render_frames};
 use super::{library_warnings, png, print_line, window};
 use crate::driver::{DriverRequest, prepare};
+use crate::hybrid::{RayPath, fit_textures, textures_needed};
+use crate::rtx::RtxConfig;
+use crate::scene::Scene;
 use crate::shader_folder;
 
 /// Frames to time where none are asked for, on a GPU.
@@ -26,14 +34,92 @@ const GPU_FRAMES: u32 = 60;
 /// Frames that a GPU renders before any is timed, so that its clocks are up.
 const WARM_UP_FRAMES: u32 = 5;
 
-/// What a sample is made with.
+/// Width of the commands in the examples of a help.
+const EXAMPLE_WIDTH: usize = 55;
+/// Exit statuses of every sample, as the help tells them.
+const EXIT_STATUS: &str = "\
+Exit status: 0 when the pictures were written, 1 for trouble with the device, 2 for wrong arguments or input, 130 after
+Ctrl-C.";
+
+/// The command line of a sample: its own arguments, and those of every sample.
+#[derive(Debug, Clone, PartialEq, Parser)]
+#[command(version)]
+pub struct CommandLine<A: clap::Args> {
+    /// Arguments of the sample.
+    #[command(flatten)]
+    pub sample: A,
+    /// Frames, images and device.
+    #[command(flatten)]
+    pub run: RunArgs,
+}
+
+/// Returns the description of the sample's command line.
+#[must_use]
+pub fn command<S: SampleInfo>() -> clap::Command {
+    let paragraphs = |texts: &[&str]| {
+        texts.iter().filter(|text| !text.is_empty()).copied().collect::<Vec<_>>().join("\n\n")
+    };
+    let example = |(args, meaning): &(&str, &str)| {
+        let command = format!("{} {args}", S::NAME);
+        format!("\n  {:EXAMPLE_WIDTH$} {meaning}", command.trim_end())
+    };
+    let examples = S::EXAMPLES.iter().map(example).collect::<String>();
+    let command = CommandLine::<S::Args>::command().name(S::NAME).about(S::ABOUT);
+    let command = match S::DETAILS {
+        "" => command,
+        details => command.long_about(format!("{}.\n\n{details}", S::ABOUT)),
+    };
+    command.after_help(paragraphs(&[&format!("Examples:{examples}"), S::NOTES, EXIT_STATUS]))
+}
+
+/// Reads the command line of a sample, of which the first word is the name of the program.
+///
+/// # Errors
+/// Those of the command line, the request for help among them.
+pub fn parse<S: SampleInfo>(
+    words: impl IntoIterator<Item = impl Into<OsString> + Clone>,
+) -> Result<CommandLine<S::Args>, clap::Error> {
+    let mut command = command::<S>();
+    let mut matches = command.try_get_matches_from_mut(words)?;
+    CommandLine::from_arg_matches_mut(&mut matches).map_err(|error| error.format(&mut command))
+}
+
+/// Runs the program of a sample with the arguments of the process.
+#[must_use]
+pub fn main<S: SampleInfo>() -> ExitCode {
+    match parse::<S>(std::env::args_os()) {
+        Ok(args) => run::<S>(&args),
+        Err(error) => error.exit(),
+    }
+}
+
+/// Does what the command line says. Prints to standard output, errors in one line to standard error. The status is 0 when
+/// the images were written, 1 for trouble with the device, 2 for wrong input, 130 after Ctrl-C.
+#[must_use]
+pub fn run<S: SampleInfo>(args: &CommandLine<S::Args>) -> ExitCode {
+    if let Some(listing) = S::listing(&args.sample) {
+        print_line(&listing);
+        return ExitCode::SUCCESS;
+    }
+    library_warnings::print();
+    match attempt(S::NAME, &args.run, |setup| S::open(&args.sample, setup)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(error.status())
+        }
+    }
+}
+
+/// The means to create a sample: device, progress and the common arguments.
 pub struct SampleSetup<'a> {
-    /// Shows which slow thing is under way.
+    /// Shows which slow stage is under way.
     pub progress: Progress,
-    /// What the device must be able to show pictures in.
+    /// Arguments of every sample.
+    pub args: &'a RunArgs,
+    /// The window that the device must be able to present to.
     pub(super) window: Option<Arc<dyn WindowHandles>>,
     name: &'a str,
-    args: &'a RunArgs,
     sink: &'a ValidationSink,
 }
 
@@ -41,13 +127,33 @@ pub struct SampleSetup<'a> {
 pub struct ReadySample<S> {
     /// The sample.
     pub sample: S,
-    /// What is said about it, in a line or several; nothing where it says that itself.
+    /// First lines of the log; empty where the sample prints them itself.
     pub summary: String,
+}
+
+impl<S: Sample> ReadySample<S> {
+    /// A sample that only rasterises; `scene` says what it shows.
+    #[must_use]
+    pub fn raster(sample: S, scene: &str) -> Self {
+        Self { summary: raster_summary(sample.context().capabilities(), scene), sample }
+    }
+
+    /// A sample that traces rays by `path`, in `stages` where by queries; `scene` says what it shows.
+    #[must_use]
+    pub fn ray_traced(sample: S, path: RayPath, stages: &str, scene: &str) -> Self {
+        Self { summary: ray_summary(sample.context().capabilities(), path, stages, scene), sample }
+    }
 }
 
 impl<'a> SampleSetup<'a> {
     pub(super) fn new(name: &'a str, args: &'a RunArgs, sink: &'a ValidationSink) -> Self {
-        Self { progress: Progress::visible(), window: None, name, args, sink }
+        Self { progress: Progress::visible(), args, window: None, name, sink }
+    }
+
+    /// Width and height of the images in pixels.
+    #[must_use]
+    pub fn extent(&self) -> [u32; 2] {
+        self.args.extent()
     }
 
     /// Opens the device that the command line names, or the best.
@@ -59,6 +165,31 @@ impl<'a> SampleSetup<'a> {
         let driver = prepare(&DriverRequest { validation: self.args.validate.is_some() })?;
         self.progress.stage("setup the device", 0);
         device::open(self.name, self.args, &driver, self.sink, needs, self.window.clone())
+    }
+
+    /// Prints the warnings of `scene`, opens a device with descriptor slots for its textures, and fits these to its limits.
+    ///
+    /// # Errors
+    /// Those of [`SampleSetup::device`], and textures that the device has no room for.
+    pub(crate) fn device_for_scene(
+        &mut self,
+        mut scene: Scene,
+        needs: &DeviceNeeds,
+    ) -> Result<(Context, Scene), RunError> {
+        self.warn(&scene.warnings);
+        let context = self.device(&DeviceNeeds { textures: textures_needed(&scene), ..*needs })?;
+        self.warn(&fit_textures(&mut scene, &context.capabilities().limits)?);
+        Ok((context, scene))
+    }
+
+    /// Opens a device that traces rays, and chooses path and size.
+    ///
+    /// # Errors
+    /// Those of [`SampleSetup::device`], and rays that the device cannot trace as asked.
+    pub(crate) fn ray_device(&mut self, wish: RayTracing) -> Result<(Context, RtxConfig), RunError> {
+        let context = self.device(&DeviceNeeds::tracing(wish))?;
+        let config = RtxConfig::from_args(wish, self.extent(), context.capabilities())?;
+        Ok((context, config))
     }
 
     /// Whether the sample is for a window, where it may be [loading](super::loading::Loading) while others are shown.
@@ -88,25 +219,6 @@ impl<'a> SampleSetup<'a> {
 pub(crate) fn warn(warnings: &[String]) {
     for warning in warnings {
         eprintln!("warning: {warning}");
-    }
-}
-
-/// Does what the command line of the sample called `name` says; `make` makes it. Prints to standard output, errors in one
-/// line to standard error; the status is 0 when the pictures were written, 1 for trouble with the device, 2 for wrong
-/// input, 130 after Ctrl-C.
-#[must_use]
-pub fn run_with<S: Sample>(
-    name: &str,
-    args: &RunArgs,
-    make: impl FnOnce(&mut SampleSetup<'_>) -> Result<ReadySample<S>, RunError>,
-) -> ExitCode {
-    library_warnings::print();
-    match attempt(name, args, make) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            eprintln!("error: {error}");
-            ExitCode::from(error.status())
-        }
     }
 }
 
@@ -181,5 +293,20 @@ fn closing_lines(job: &RenderJob, played: &RenderReport, remark: Option<String>)
         (Frames::Still(_), _) => format!("{timings}{remark}\nwrote {out}"),
         (Frames::Sequence(_), 0) => format!("{timings}{remark}\nwrote {written} frames to {out}"),
         _ => format!("{timings}{remark}\nwrote {written} frames to {out}; {skipped} were there"),
+    }
+}
+
+/// Reads the arguments of a sample from one line.
+#[cfg(test)]
+pub(crate) fn parse_line<S: SampleInfo>(line: &str) -> Result<CommandLine<S::Args>, clap::Error> {
+    parse::<S>(std::iter::once(S::NAME).chain(line.split_whitespace()))
+}
+
+/// Asserts that the sample refuses each line with exit status 2.
+#[cfg(test)]
+pub(crate) fn assert_refuses<S: SampleInfo>(lines: &[&str]) {
+    for line in lines {
+        let status = parse_line::<S>(line).map(|_| ()).map_err(|error| error.exit_code());
+        assert_eq!(status, Err(2), "{line}");
     }
 }

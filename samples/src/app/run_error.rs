@@ -2,6 +2,7 @@
 
 use super::interrupt;
 use super::png::PngError;
+use super::sample_error::SampleError;
 use crate::driver::DriverError;
 use crate::scene::SceneError;
 
@@ -23,7 +24,10 @@ pub enum RunError {
         /// Each device with what it lacks.
         reasons: String,
     },
-    /// Nobody waits for the sample any more.
+    /// The sample cannot render.
+    #[error(transparent)]
+    Sample(#[from] SampleError),
+    /// Loading was stopped before the sample was ready.
     #[error(transparent)]
     Stopped(#[from] super::loading::Stopped),
     /// The scene could not be loaded.
@@ -112,6 +116,7 @@ impl RunError {
             Self::Input(_) | Self::Scene(_) | Self::Png(_) | Self::Driver(DriverError::Variable { .. }) => 2,
             Self::NoNumber { .. } | Self::NoSequence { .. } | Self::NothingToResume => 2,
             Self::SequenceInWindow | Self::NoShaders { .. } => 2,
+            Self::Sample(error) => error.status(),
             Self::Interrupted { .. } | Self::Stopped(_) => interrupt::STATUS,
             Self::Device(_) | Self::NoRayQueries { .. } | Self::NoWindow { .. } => 1,
             Self::NoScreenshot { .. } => 1,

@@ -1,9 +1,8 @@
 //! What to render, and how.
 
+use crate::app::sample_error::SampleError;
 use clap::ValueEnum;
 use lvk::{Context, OptionalFeature};
-
-use crate::raster::RasterError;
 
 /// How surfaces come to those who light them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -23,11 +22,11 @@ impl Passes {
     }
 
     /// What was asked for, or the best.
-    pub(super) fn choose(asked: Option<Self>, ctx: &Context) -> Result<Self, RasterError> {
+    pub(super) fn choose(asked: Option<Self>, ctx: &Context) -> Result<Self, SampleError> {
         let there = Self::supported(ctx);
         let passes = asked.unwrap_or(there[0]);
         let what = "shaders that read what their own pass has drawn (dynamicRenderingLocalRead)";
-        RasterError::require(there.contains(&passes), ctx, what, "--passes several shows the same picture")?;
+        SampleError::require(there.contains(&passes), ctx, what, "--passes several shows the same picture")?;
         Ok(passes)
     }
 }

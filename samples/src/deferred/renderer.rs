@@ -1,5 +1,6 @@
 //! Renders the sample at a frame time.
 
+use crate::app::sample_error::SampleError;
 use std::f32::consts::TAU;
 
 use bytemuck::{Pod, Zeroable};
@@ -15,7 +16,6 @@ use super::{DeferredConfig, Passes, View};
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
-use crate::raster::RasterError;
 use crate::scene::{Camera, GpuCamera};
 
 /// Distance of the near plane.
@@ -47,7 +47,7 @@ struct PassResources {
 }
 
 impl PassResources {
-    fn new(ctx: &Context, passes: Passes, extent: [u32; 2]) -> Result<Self, RasterError> {
+    fn new(ctx: &Context, passes: Passes, extent: [u32; 2]) -> Result<Self, SampleError> {
         let targets = Targets::new(ctx, passes, extent)?;
         Ok(Self { passes, targets, pipelines: Pipelines::new(ctx, passes)? })
     }
@@ -75,8 +75,8 @@ impl Deferred {
     /// Makes the hall, targets and pipelines. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`RasterError`] when the configuration is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, config: &DeferredConfig) -> Result<Self, RasterError> {
+    /// [`SampleError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, config: &DeferredConfig) -> Result<Self, SampleError> {
         let passes = Passes::choose(config.passes, ctx)?;
         let hall = Hall::new();
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
@@ -206,19 +206,19 @@ impl Deferred {
 }
 
 impl Sample for Deferred {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
         self.phase = time.phase();
         self.camera = camera(self.phase);
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         let passes = Passes::choose(self.config.passes, &self.ctx)?;
         if passes != self.resources.passes {
             self.resources = PassResources::new(&self.ctx, passes, self.config.extent)?;
@@ -235,7 +235,7 @@ impl Sample for Deferred {
         Ok(self.resources.targets.picture())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
         self.resources.targets = Targets::new(&self.ctx, self.resources.passes, extent)?;
         self.config.extent = extent;
         Ok(())
@@ -270,7 +270,7 @@ impl Sample for Deferred {
         ui.add(egui::Slider::new(&mut self.exposure, 0.1..=8.0).logarithmic(true).text("exposure"));
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.resources.pipelines = Pipelines::new(&self.ctx, self.resources.passes)?;
         Ok(())
     }

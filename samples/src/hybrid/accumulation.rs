@@ -1,8 +1,9 @@
 //! Where the light of pixels ends: the picture, and the sums of samples on the way to it.
 
-use lvk::{BufferHandle, Context, Format, Holder, TextureDesc, TextureHandle, TextureUsage};
+use lvk::{BufferHandle, Context, Holder, TextureHandle};
 
 use crate::app::array_buffer::buffer;
+use crate::app::render_target::storage_image;
 
 /// The picture, and a colour a pixel where it has several samples.
 pub(super) struct Accumulation {
@@ -13,13 +14,7 @@ pub(super) struct Accumulation {
 impl Accumulation {
     /// A accumulation of `extent` pixels.
     pub(super) fn new(ctx: &Context, extent: [u32; 2], samples: u32) -> lvk::Result<Self> {
-        let picture = ctx.create_texture(&TextureDesc {
-            format: Format::Rgba8Unorm,
-            extent,
-            usage: TextureUsage::STORAGE | TextureUsage::SAMPLED,
-            debug_name: "picture",
-            ..TextureDesc::default()
-        })?;
+        let picture = storage_image(ctx, extent)?;
         let size_bytes = u64::from(extent[0]) * u64::from(extent[1]) * size_of::<[f32; 3]>() as u64;
         let sums = (samples > 1).then(|| buffer(ctx, "sums of samples", size_bytes)).transpose()?;
         Ok(Self { picture, sums })

@@ -1,16 +1,16 @@
 //! The geometry pass as the paper has it: every triangle once through the rasteriser into a G-buffer (algorithms 4
 //! and 5). It is the reference that the visibility pass is measured against.
 
+use super::pipelines;
 use lvk::{
     BufferDesc, BufferHandle, BufferUsage, ColorAttachment, ColorLoadOp, ColorTarget, CommandBuffer,
     CompareOp, Context, CullMode, DepthAttachment, DepthTest, Format, Holder, IndexFormat, RenderPassDesc,
-    RenderPipelineDesc, RenderPipelineHandle, ShaderStage, TextureDesc, TextureHandle, TextureUsage,
+    RenderPipelineDesc, RenderPipelineHandle, TextureDesc, TextureHandle, TextureUsage,
 };
 
 use super::frame::{Indices, Push};
 use super::gpu_scene::GpuScene;
 use super::shader_module::module;
-use crate::shaders::hybrid as texts;
 
 /// Triangle number of pixels that show the sky (`kNoTriangle` in `shaders/hybrid/hit.glsl`).
 pub(super) const NO_TRIANGLE: u32 = u32::MAX;
@@ -88,8 +88,8 @@ impl GBuffer {
 impl GeometryPass {
     /// The pass over `scene` for a picture of `extent` pixels.
     pub(super) fn new(ctx: &Context, scene: &GpuScene, extent: [u32; 2]) -> lvk::Result<Self> {
-        let vertex = module(ctx, ShaderStage::Vertex, texts::GEOMETRY_VERT, &[], "geometry.vert")?;
-        let fragment = module(ctx, ShaderStage::Fragment, texts::GEOMETRY_FRAG, &[], "geometry.frag")?;
+        let vertex = module(ctx, &pipelines::GEOMETRY_VERT, &[])?;
+        let fragment = module(ctx, &pipelines::GEOMETRY_FRAG, &[])?;
         let color = GBuffer::COLOR.map(ColorTarget::from);
         let pipeline = ctx.create_render_pipeline(&RenderPipelineDesc {
             vertex: Some(*vertex),

@@ -5,13 +5,12 @@
 //! what a pixel shows with a rasteriser and traces from there ([`Geometry`] says how). Both run by a ray tracing
 //! pipeline and by ray queries ([`RayPath`]), from one text of shading code (`shaders/hybrid/integrator.glsl`).
 //!
-//! [`HybridRenderer`] is the sample for programs and tests, [`run`] the one for the command line.
+//! [`HybridRenderer`] is the sample for programs and tests, `info.rs` describes its program.
 
 mod accumulation;
 mod args;
 mod compute_raster;
 mod config;
-mod error;
 mod frame;
 mod frame_passes;
 mod frame_timings;
@@ -20,6 +19,7 @@ mod geometry_stage;
 mod gpu_scene;
 pub(crate) mod half_float;
 mod hardware_raster;
+mod info;
 mod launch_tiles;
 mod panel;
 mod pipelines;
@@ -28,7 +28,6 @@ mod raster_choice;
 mod ray_pass;
 mod reflective_pixels;
 mod renderer;
-mod run;
 mod scene_arrays;
 mod scene_check;
 mod sequence;
@@ -39,15 +38,12 @@ mod visibility_pass;
 
 pub use args::HybridArgs;
 pub use config::{Bounces, Geometry, HybridConfig, Method, Raster, RasterTuning, RayPath};
-pub use error::HybridError;
 pub(crate) use frame::{Lighting, SceneAddresses, near_plane};
 pub use frame_timings::FrameTimings;
 pub(crate) use gpu_scene::{GpuScene, HitGroups};
 pub(crate) use panel::path_switch;
-pub use pipelines::pipelines;
 pub use raster_choice::RasterChoice;
 pub use renderer::HybridRenderer;
-pub use run::run;
 pub(crate) use scene_arrays::SceneArrays;
 pub(crate) use scene_check::check_promises;
 pub use sequence::HybridSequence;

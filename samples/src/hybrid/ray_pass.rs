@@ -1,10 +1,12 @@
 //! The ray pass: shading, shadows, reflection and refraction of every pixel, by a ray tracing pipeline or by compute
 //! shaders with ray queries; at once, or first surfaces first and mirrors and glass in a launch of their own.
 
+use super::pipelines;
+use crate::pipelines::SampleStage;
 use lvk::{
     BufferHandle, CommandBuffer, ComputePipelineDesc, ComputePipelineHandle, Context, Dependencies, HitGroup,
-    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, ShaderStage, SpecializationConstant,
-    SpecializationValue, TextureHandle,
+    Holder, RayTracingPipelineDesc, RayTracingPipelineHandle, SpecializationConstant, SpecializationValue,
+    TextureHandle,
 };
 
 use super::accumulation::Accumulation;
@@ -13,7 +15,6 @@ use super::config::{Bounces, Geometry, HybridConfig, Method, RayPath};
 use super::frame::{Push, ReflectivePixelAddresses};
 use super::reflective_pixels::ReflectivePixels;
 use super::shader_module::module;
-use crate::shaders::hybrid as texts;
 
 /// Side of a work group in pixels (`shaders/hybrid/render.comp.glsl`).
 const GROUP: u32 = 8;
@@ -44,21 +45,19 @@ enum Pipeline {
 }
 
 impl RayPass {
-    /// The pass that `config` asks for, of launch_tiles of `band_pixels` pixels.
-    pub(super) fn new(ctx: &Context, config: &HybridConfig, band_pixels: u32) -> lvk::Result<Self> {
+    /// The pass that `config` asks for, of launches of `tile_pixels` pixels.
+    pub(super) fn new(ctx: &Context, config: &HybridConfig, tile_pixels: u32) -> lvk::Result<Self> {
         let bounces = config.bounces.filter(|_| config.max_depth > 0);
         let (queued, ordered) = (bounces == Some(Bounces::Queued), bounces == Some(Bounces::First));
-        let stages = Stages::of(config, queued, ordered);
+        let stages = Stages::from_config(config, queued, ordered);
         let pipeline = match config.path {
             RayPath::Pipeline => Pipeline::Tracing(tracing_pipeline(ctx, &stages)?),
             RayPath::Query => Pipeline::Compute {
-                render: stages.compute(ctx, texts::RENDER_COMP, "render.comp")?,
-                bounces: queued
-                    .then(|| stages.compute(ctx, texts::BOUNCES_COMP, "bounces.comp"))
-                    .transpose()?,
+                render: stages.compute(ctx, &pipelines::RENDER_COMP)?,
+                bounces: queued.then(|| stages.compute(ctx, &pipelines::BOUNCES_COMP)).transpose()?,
             },
         };
-        let queue = queued.then(|| ReflectivePixels::new(ctx, band_pixels)).transpose()?;
+        let queue = queued.then(|| ReflectivePixels::new(ctx, tile_pixels)).transpose()?;
         Ok(Self { pipeline, queue, ordered })
     }
 
@@ -140,14 +139,14 @@ struct Stages {
 }
 
 impl Stages {
-    fn of(config: &HybridConfig, queued: bool, ordered: bool) -> Self {
+    fn from_config(config: &HybridConfig, queued: bool, ordered: bool) -> Self {
         let first = match (config.method, config.geometry) {
             (Method::Standalone, _) => &[],
-            (Method::Hybrid, Geometry::Paper) => texts::WITH_GBUFFER,
-            (Method::Hybrid, Geometry::Visibility(_)) if ordered => texts::WITH_VISIBILITY_AND_ORDER,
-            (Method::Hybrid, Geometry::Visibility(_)) => texts::WITH_VISIBILITY,
+            (Method::Hybrid, Geometry::Paper) => pipelines::WITH_GBUFFER,
+            (Method::Hybrid, Geometry::Visibility(_)) if ordered => pipelines::WITH_VISIBILITY_AND_ORDER,
+            (Method::Hybrid, Geometry::Visibility(_)) => pipelines::WITH_VISIBILITY,
         };
-        let queue = if queued { texts::WITH_QUEUE } else { &[] };
+        let queue = if queued { pipelines::WITH_QUEUE } else { &[] };
         let value = SpecializationValue::U32(config.max_depth);
         Self {
             defines: [first, queue].concat(),
@@ -156,24 +155,24 @@ impl Stages {
         }
     }
 
-    fn compute(&self, ctx: &Context, text: &str, name: &str) -> lvk::Result<Holder<ComputePipelineHandle>> {
-        let shader = module(ctx, ShaderStage::Compute, text, &self.defines, name)?;
+    fn compute(&self, ctx: &Context, stage: &SampleStage) -> lvk::Result<Holder<ComputePipelineHandle>> {
+        let shader = module(ctx, stage, &self.defines)?;
         ctx.create_compute_pipeline(&ComputePipelineDesc {
             module: Some(*shader),
             specialization: &self.specialization,
-            debug_name: name,
+            debug_name: stage.name,
         })
     }
 }
 
 fn tracing_pipeline(ctx: &Context, stages: &Stages) -> lvk::Result<Holder<RayTracingPipelineHandle>> {
-    let ray_gen = |text, name| module(ctx, ShaderStage::RayGen, text, &stages.defines, name);
-    let render = ray_gen(texts::RENDER_RGEN, "render.rgen")?;
-    let bounces = stages.queued.then(|| ray_gen(texts::BOUNCES_RGEN, "bounces.rgen")).transpose()?;
+    let ray_gen = |stage| module(ctx, stage, &stages.defines);
+    let render = ray_gen(&pipelines::RENDER_RGEN)?;
+    let bounces = stages.queued.then(|| ray_gen(&pipelines::BOUNCES_RGEN)).transpose()?;
     let ray_gens: Vec<_> = std::iter::once(&render).chain(&bounces).map(Holder::handle).collect();
-    let closest_miss = module(ctx, ShaderStage::Miss, texts::CLOSEST_RMISS, &[], "closest.rmiss")?;
-    let shadow_miss = module(ctx, ShaderStage::Miss, texts::SHADOW_RMISS, &[], "shadow.rmiss")?;
-    let closest_hit = module(ctx, ShaderStage::ClosestHit, texts::CLOSEST_RCHIT, &[], "closest.rchit")?;
+    let closest_miss = module(ctx, &pipelines::CLOSEST_RMISS, &[])?;
+    let shadow_miss = module(ctx, &pipelines::SHADOW_RMISS, &[])?;
+    let closest_hit = module(ctx, &pipelines::CLOSEST_RCHIT, &[])?;
     ctx.create_ray_tracing_pipeline(&RayTracingPipelineDesc {
         ray_gen: &ray_gens,
         miss: &[*closest_miss, *shadow_miss],

@@ -1,8 +1,8 @@
 //! The sample as a type: give it a scene and a camera, get a picture.
 
+use crate::app::sample_error::SampleError;
 use lvk::{Capabilities, Context, TextureHandle, TextureRegion};
 
-use super::HybridError;
 use super::config::{Bounces, HybridConfig, Method, Raster, RayPath};
 use super::frame::{Lighting, near_plane};
 use super::frame_passes::FramePasses;
@@ -29,8 +29,8 @@ impl HybridRenderer {
     /// Uploads `scene`, builds its acceleration structures and compiles the pipelines.
     ///
     /// # Errors
-    /// [`HybridError`] when the configuration or the scene is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Result<Self, HybridError> {
+    /// [`SampleError`] when the configuration or the scene is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, scene: &Scene, config: &HybridConfig) -> Result<Self, SampleError> {
         config.check(ctx.capabilities())?;
         let config = suited(config, scene, ctx.capabilities());
         let gpu_scene = GpuScene::new(ctx, scene, HitGroups::default())?;
@@ -52,8 +52,8 @@ impl HybridRenderer {
     /// Renders one frame and waits for it.
     ///
     /// # Errors
-    /// [`HybridError::Device`].
-    pub fn render(&mut self, camera: &Camera) -> Result<FrameTimings, HybridError> {
+    /// [`SampleError::Device`].
+    pub fn render(&mut self, camera: &Camera) -> Result<FrameTimings, SampleError> {
         let mut ignore = |_| {};
         let mut frame = Frame::waited(&self.ctx, &mut ignore)?;
         self.record(&mut frame, camera)?;
@@ -64,8 +64,8 @@ impl HybridRenderer {
     /// channel, sRGB.
     ///
     /// # Errors
-    /// [`HybridError::Device`].
-    pub fn record(&mut self, frame: &mut Frame<'_>, camera: &Camera) -> Result<TextureHandle, HybridError> {
+    /// [`SampleError::Device`].
+    pub fn record(&mut self, frame: &mut Frame<'_>, camera: &Camera) -> Result<TextureHandle, SampleError> {
         self.upload_constants(camera)?;
         for sample in 0..self.config.samples {
             for tile in 0..self.passes.launch_tiles.len() {
@@ -84,8 +84,8 @@ impl HybridRenderer {
     /// Renders pictures of `extent` pixels from now on.
     ///
     /// # Errors
-    /// [`HybridError`] when that is beyond the device; the extent is then what it was.
-    pub fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), HybridError> {
+    /// [`SampleError`] when that is beyond the device; the extent is then what it was.
+    pub fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), SampleError> {
         self.change(&HybridConfig { width, height, ..self.config })
     }
 
@@ -97,8 +97,8 @@ impl HybridRenderer {
     /// Renders by another configuration from now on.
     ///
     /// # Errors
-    /// [`HybridError`] when that is beyond the device; the configuration is then what it was.
-    pub fn change(&mut self, config: &HybridConfig) -> Result<(), HybridError> {
+    /// [`SampleError`] when that is beyond the device; the configuration is then what it was.
+    pub fn change(&mut self, config: &HybridConfig) -> Result<(), SampleError> {
         config.check(self.ctx.capabilities())?;
         self.make_passes(*config)
     }
@@ -106,12 +106,12 @@ impl HybridRenderer {
     /// Makes all pipelines anew, of shaders that have changed.
     ///
     /// # Errors
-    /// [`HybridError::Device`]; the pipelines are then those that were.
-    pub fn reload(&mut self) -> Result<(), HybridError> {
+    /// [`SampleError::Device`]; the pipelines are then those that were.
+    pub fn reload(&mut self) -> Result<(), SampleError> {
         self.make_passes(self.config)
     }
 
-    fn make_passes(&mut self, config: HybridConfig) -> Result<(), HybridError> {
+    fn make_passes(&mut self, config: HybridConfig) -> Result<(), SampleError> {
         let mut passes = FramePasses::new(&self.ctx, &self.scene, &config)?;
         if let Some(choice) = self.passes.geometry.choice() {
             passes.geometry.choose(choice);
@@ -124,8 +124,8 @@ impl HybridRenderer {
     /// compute then. Returns which one is in use, why, and both times; `None` where no visibility is rasterised.
     ///
     /// # Errors
-    /// [`HybridError::Device`].
-    pub fn choose_raster(&mut self, camera: &Camera) -> Result<Option<RasterChoice>, HybridError> {
+    /// [`SampleError::Device`].
+    pub fn choose_raster(&mut self, camera: &Camera) -> Result<Option<RasterChoice>, SampleError> {
         if self.passes.geometry.has_both() {
             let compute = self.measure_raster(camera, Raster::Compute)?;
             let hardware = self.measure_raster(camera, Raster::Hardware)?;
@@ -157,8 +157,8 @@ impl HybridRenderer {
     /// The last frame: red, green, blue and alpha of each pixel, 8 bits each, sRGB, rows from the top.
     ///
     /// # Errors
-    /// [`HybridError::Device`].
-    pub fn read_image(&self) -> Result<Vec<u8>, HybridError> {
+    /// [`SampleError::Device`].
+    pub fn read_image(&self) -> Result<Vec<u8>, SampleError> {
         Ok(self.ctx.download_texture(*self.passes.accumulation.picture, &TextureRegion::default())?)
     }
 

@@ -1,10 +1,11 @@
 //! The sample as an animation: a tour through the scene's cameras, and a lamp that may move.
 
+use crate::app::sample_error::SampleError;
 use glam::Vec3;
 use lvk::{Context, TextureHandle};
 
 use super::renderer::goes_on;
-use super::{HybridConfig, HybridError, HybridRenderer, Raster, panel};
+use super::{HybridConfig, HybridRenderer, Raster, panel};
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::app::ui::PendingSettings;
@@ -70,13 +71,13 @@ impl HybridSequence {
 }
 
 impl Sample for HybridSequence {
-    type Error = HybridError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         self.renderer.context()
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), HybridError> {
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
         self.camera = self.path.at(time.phase());
         if self.lamp_moves {
             self.renderer.move_lamp(self.lamp.at(time.phase()));
@@ -88,7 +89,7 @@ impl Sample for HybridSequence {
         self.renderer.band_count()
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, HybridError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         if let Some(config) = self.wanted.changed_from(*self.renderer.config()) {
             let done = self.renderer.change(&config);
             self.wanted.finish(done, *self.renderer.config());
@@ -96,7 +97,7 @@ impl Sample for HybridSequence {
         self.renderer.record(frame, &self.camera)
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), HybridError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
         self.renderer.resize(extent)?;
         [self.wanted.config.width, self.wanted.config.height] = extent;
         Ok(())
@@ -122,7 +123,7 @@ impl Sample for HybridSequence {
         ui.label(&self.scene);
     }
 
-    fn reload(&mut self) -> Result<(), HybridError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.renderer.reload()
     }
 }

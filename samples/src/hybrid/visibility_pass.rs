@@ -8,7 +8,9 @@ use super::config::{HybridConfig, Raster};
 use super::frame::{Push, VisibilityAddresses};
 use super::hardware_raster::HardwareRaster;
 use super::raster_choice::RasterChoice;
-use crate::shaders::hybrid::NO_IMAGE;
+
+/// `kNoImage` in `shaders/hybrid/visibility.glsl`.
+const NO_IMAGE: u32 = u32::MAX;
 
 /// The pass with the rasterisers that are to be had, of which one is chosen.
 pub(super) struct VisibilityPass {

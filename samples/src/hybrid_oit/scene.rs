@@ -1,8 +1,8 @@
 //! What is seen: blocks on a floor, balls that bounce between them, spheres of tinted glass that drift above.
 
+use crate::app::sample_error::SampleError;
 use glam::{Vec2, Vec3};
 
-use super::HybridOitError;
 use crate::scene::Camera;
 
 /// Seconds after which the built-in scene's motions repeat themselves.
@@ -132,8 +132,8 @@ impl Motion {
 
 impl OitScene {
     /// Checks that there is something of each kind and that all numbers are sound.
-    pub(super) fn check(&self) -> Result<(), HybridOitError> {
-        let broken = |what| Err(HybridOitError::BrokenScene(what));
+    pub(super) fn check(&self) -> Result<(), SampleError> {
+        let broken = |what| Err(SampleError::BrokenScene(what));
         if self.blocks.is_empty() || self.balls.is_empty() || self.glass.is_empty() {
             return broken("it needs at least one block, one ball and one sphere of glass");
         }

@@ -1,9 +1,10 @@
 //! The sample as an animation.
 
+use crate::app::sample_error::SampleError;
 use egui::Slider;
 use lvk::{Context, TextureHandle};
 
-use super::{HybridOit, HybridOitConfig, HybridOitError, NodeUse, PERIOD_SECONDS};
+use super::{HybridOit, HybridOitConfig, NodeUse, PERIOD_SECONDS};
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::app::ui::PendingSettings;
@@ -49,20 +50,20 @@ impl HybridOitSequence {
 }
 
 impl Sample for HybridOitSequence {
-    type Error = HybridOitError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         self.sample.context()
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), HybridOitError> {
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
         self.gone = PERIOD_SECONDS * f64::from(time.phase());
         self.pose();
         self.sample.set_camera(&self.camera);
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, HybridOitError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         if let Some(config) = self.wanted.changed_from(*self.sample.config()) {
             let done = self.sample.change(&config);
             self.wanted.finish(done, *self.sample.config());
@@ -70,13 +71,13 @@ impl Sample for HybridOitSequence {
         self.sample.record(frame)
     }
 
-    fn after_frame(&mut self) -> Result<(), HybridOitError> {
+    fn after_frame(&mut self) -> Result<(), SampleError> {
         let nodes = self.sample.node_use()?;
         self.nodes = if nodes.asked >= self.nodes.asked { nodes } else { self.nodes };
         Ok(())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), HybridOitError> {
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
         self.sample.resize(extent)?;
         [self.wanted.config.width, self.wanted.config.height] = extent;
         Ok(())
@@ -99,7 +100,7 @@ impl Sample for HybridOitSequence {
         }
     }
 
-    fn reload(&mut self) -> Result<(), HybridOitError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.sample.reload()
     }
 

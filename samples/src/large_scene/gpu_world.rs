@@ -1,15 +1,16 @@
 //! A world on the GPU.
 
+use crate::app::sample_error::SampleError;
 use lvk::{
     AddressMode, BufferHandle, BufferUsage, Context, Holder, SamplerDesc, SamplerHandle, TextureHandle,
     transform_rows,
 };
 
+use super::LargeSceneConfig;
 use super::figures::Figures;
 use super::structure_cache::StructureCache;
 use super::structures::{Plan, Structures};
 use super::world::World;
-use super::{LargeSceneConfig, LargeSceneError};
 use crate::app::array_buffer::array;
 use crate::app::progress::Progress;
 use crate::app::scene_textures;
@@ -37,7 +38,7 @@ impl GpuWorld {
         world: &World,
         config: &LargeSceneConfig,
         progress: &mut Progress,
-    ) -> Result<Self, LargeSceneError> {
+    ) -> Result<Self, SampleError> {
         check_promises(&world.scene)?;
         let textures = textures(ctx, world, progress)?;
         progress.stage("uploading the scene", 0);
@@ -78,7 +79,7 @@ fn textures(
     ctx: &Context,
     world: &World,
     progress: &mut Progress,
-) -> Result<Vec<Holder<TextureHandle>>, LargeSceneError> {
+) -> Result<Vec<Holder<TextureHandle>>, SampleError> {
     let textures = &world.scene.textures;
     progress.stage("uploading textures", textures.len() as u64);
     let mut made = Vec::with_capacity(textures.len());

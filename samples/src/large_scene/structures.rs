@@ -1,5 +1,6 @@
 //! The acceleration structures of a world: from files where they were kept, else built, compacted, and kept.
 
+use crate::app::sample_error::SampleError;
 use std::ops::Range;
 
 use lvk::{
@@ -7,7 +8,6 @@ use lvk::{
     TlasInstance, transform_rows,
 };
 
-use super::LargeSceneError;
 use super::figures::{Origin, StructureFigures};
 use super::structure_cache::{StructureCache, StructureKey};
 use super::world::{Instance, World};
@@ -53,7 +53,7 @@ enum Found {
 
 impl Structures {
     /// Loads, builds, compacts and keeps; `progress` counts pieces.
-    pub(super) fn new(plan: &Plan<'_>, progress: &mut Progress) -> Result<Self, LargeSceneError> {
+    pub(super) fn new(plan: &Plan<'_>, progress: &mut Progress) -> Result<Self, SampleError> {
         let geometries: Vec<_> = plan.world.pieces.iter().map(|piece| [plan.geometry(piece)]).collect();
         let descs: Vec<_> = geometries
             .iter()
@@ -132,7 +132,7 @@ impl Plan<'_> {
         descs: &[BlasDesc<'_>],
         found: Vec<Found>,
         progress: &mut Progress,
-    ) -> Result<Vec<Blas>, LargeSceneError> {
+    ) -> Result<Vec<Blas>, SampleError> {
         let missing: Vec<_> = (0..found.len()).filter(|&i| !matches!(found[i], Found::Loaded(_))).collect();
         let triangles: Vec<_> =
             missing.iter().map(|&index| self.world.pieces[index].triangles.len() as u64).collect();
@@ -163,7 +163,7 @@ impl Plan<'_> {
     }
 
     /// Compacts what was built; what came from a file was compacted before.
-    fn compact(&self, blas: &mut [Blas], progress: &mut Progress) -> Result<(), LargeSceneError> {
+    fn compact(&self, blas: &mut [Blas], progress: &mut Progress) -> Result<(), SampleError> {
         let built: Vec<_> =
             blas.iter().filter(|blas| blas.origin != Origin::Loaded).map(|blas| *blas.holder).collect();
         if !self.compact || built.is_empty() {
@@ -191,7 +191,7 @@ impl Plan<'_> {
         blas: &[Blas],
         keys: &[StructureKey],
         progress: &mut Progress,
-    ) -> Result<(), LargeSceneError> {
+    ) -> Result<(), SampleError> {
         let Some(cache) = &self.cache else { return Ok(()) };
         let built: Vec<_> = blas.iter().zip(keys).filter(|(blas, _)| blas.origin != Origin::Loaded).collect();
         progress.stage("keeping acceleration structures", built.len() as u64);

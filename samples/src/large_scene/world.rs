@@ -1,10 +1,10 @@
 //! What the sample shows: pieces of one large scene, and where instances of them stand.
 
+use crate::app::sample_error::SampleError;
 use std::ops::Range;
 
 use glam::{Affine3A, Vec3, Vec3A};
 
-use super::LargeSceneError;
 use super::merge::{bake, merge};
 use super::street;
 use crate::app::progress::Progress;
@@ -49,8 +49,8 @@ impl World {
     /// are shown, or as many as find room. The same everywhere.
     ///
     /// # Errors
-    /// [`LargeSceneError::Stopped`].
-    pub fn valley(triangles: u32, copies: u32, progress: &mut Progress) -> Result<Self, LargeSceneError> {
+    /// [`SampleError::Stopped`].
+    pub fn valley(triangles: u32, copies: u32, progress: &mut Progress) -> Result<Self, SampleError> {
         let Valley { ground, trees, places } = Valley::new(triangles, copies, progress)?;
         let mut placed = vec![(0, Affine3A::IDENTITY)];
         placed.extend(places.into_iter().map(|(kind, place)| (kind + 1, place)));
@@ -61,10 +61,10 @@ impl World {
     /// are scaled to their plots, and rooms are opened above to let the sun in.
     ///
     /// # Errors
-    /// [`LargeSceneError::NoScenes`].
-    pub fn street(scenes: Vec<Scene>, copies: u32) -> Result<Self, LargeSceneError> {
+    /// [`SampleError::NoScenes`].
+    pub fn street(scenes: Vec<Scene>, copies: u32) -> Result<Self, SampleError> {
         if scenes.is_empty() || copies == 0 {
-            return Err(LargeSceneError::NoScenes);
+            return Err(SampleError::NoScenes);
         }
         let street::Street { scenes, places } = street::Street::new(scenes, copies);
         Ok(Self::from_scenes(scenes, &places))
@@ -86,11 +86,11 @@ impl World {
     /// through some.
     ///
     /// # Errors
-    /// [`LargeSceneError::TooManyTriangles`].
-    pub fn combined(&self) -> Result<Self, LargeSceneError> {
+    /// [`SampleError::MeshTooLarge`].
+    pub fn combined(&self) -> Result<Self, SampleError> {
         let (count, limit) = (self.shown_triangle_count(), MOST_COMBINED);
         if count > limit {
-            return Err(LargeSceneError::TooManyTriangles { count, limit });
+            return Err(SampleError::MeshTooLarge { count, limit });
         }
         Ok(bake(self))
     }

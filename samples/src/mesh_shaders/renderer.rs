@@ -1,5 +1,7 @@
 //! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use std::f32::consts::TAU;
 
 use bytemuck::{Pod, Zeroable};
@@ -16,7 +18,6 @@ use super::pipelines::MESHLETS;
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
-use crate::raster::{Canvas, RasterError};
 use crate::scene::{Camera, GpuCamera};
 
 /// Meshlets that a task workgroup looks at (`kMeshletsPerTask` in `shaders/mesh_shaders/payload.glsl`).
@@ -27,7 +28,7 @@ const NEAR_PLANE: f32 = 0.05;
 /// Draws the knot.
 pub struct MeshShaders {
     ctx: Context,
-    canvas: Canvas,
+    target: RenderTarget,
     pipeline: Holder<RenderPipelineHandle>,
     vertices: Vec<Vertex>,
     meshlets: Meshlets,
@@ -72,12 +73,12 @@ impl MeshShaders {
     /// `culls`. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`RasterError::Missing`] on devices without mesh shaders, and otherwise when the picture is beyond the device, or the
+    /// [`SampleError::Missing`] on devices without mesh shaders, and otherwise when the picture is beyond the device, or the
     /// device fails.
-    pub fn new(ctx: &Context, extent: [u32; 2], culls: bool) -> Result<Self, RasterError> {
+    pub fn new(ctx: &Context, extent: [u32; 2], culls: bool) -> Result<Self, SampleError> {
         let remedy = "take another device by --device; --list-devices says which there are";
-        RasterError::require(ctx.capabilities().mesh_shader, ctx, "mesh shaders", remedy)?;
-        let canvas = Canvas::with_depth(ctx, extent)?;
+        SampleError::require(ctx.capabilities().mesh_shader, ctx, "mesh shaders", remedy)?;
+        let target = RenderTarget::with_depth(ctx, extent)?;
         let (vertices, meshlets) = model();
         let counter = Counter::new(ctx)?;
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
@@ -103,7 +104,7 @@ impl MeshShaders {
         };
         Ok(Self {
             ctx: ctx.clone(),
-            canvas,
+            target,
             pipeline: pipeline(ctx)?,
             vertices,
             meshlets,
@@ -141,7 +142,7 @@ impl MeshShaders {
     }
 
     fn upload(&mut self) -> lvk::Result<()> {
-        let [width, height] = self.canvas.extent();
+        let [width, height] = self.target.extent();
         let seen_by = |camera: &Camera| GpuCamera::new(camera, width, height, NEAR_PLANE);
         self.constants.camera = seen_by(&self.camera);
         self.constants.culling_camera = seen_by(self.held.as_ref().unwrap_or(&self.camera));
@@ -158,30 +159,30 @@ impl MeshShaders {
 }
 
 impl Sample for MeshShaders {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
         self.constants.phase = time.phase();
         self.camera = camera(time.phase());
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.upload()?;
         self.counter.begin(&self.ctx, &mut frame.cmd)?;
         let counts = Dependencies { buffers: &[*self.counter.buffer], ..Dependencies::default() };
-        let mut pass = self.canvas.begin(&mut frame.cmd, "meshlets", BACKDROP, &counts)?;
+        let mut pass = self.target.begin(&mut frame.cmd, "meshlets", BACKDROP, &counts)?;
         pass.bind_render_pipeline(*self.pipeline)?;
         pass.push_constants(&self.ctx.buffer_address(*self.frame)?)?;
         pass.draw_mesh_tasks([self.constants.count.div_ceil(MESHLETS_PER_TASK), 1, 1])?;
-        Ok(self.canvas.picture())
+        Ok(self.target.image())
     }
 
-    fn after_frame(&mut self) -> Result<(), RasterError> {
+    fn after_frame(&mut self) -> Result<(), SampleError> {
         Ok(self.counter.read(&self.ctx)?)
     }
 
@@ -189,8 +190,8 @@ impl Sample for MeshShaders {
         Some(format!("culling   {}", self.culling_text()))
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.canvas = Canvas::with_depth(&self.ctx, extent)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.target = RenderTarget::with_depth(&self.ctx, extent)?;
         Ok(())
     }
 
@@ -213,7 +214,7 @@ impl Sample for MeshShaders {
         ui.add(egui::Slider::new(&mut self.constants.apart, 0.0..=0.6).text("apart"));
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.pipeline = pipeline(&self.ctx)?;
         Ok(())
     }

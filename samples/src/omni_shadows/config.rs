@@ -1,9 +1,8 @@
 //! What to render.
 
+use crate::app::sample_error::SampleError;
 use clap::ValueEnum;
 use lvk::{Context, OptionalFeature};
-
-use crate::raster::RasterError;
 
 /// How the faces of the cube map are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -88,12 +87,12 @@ impl Faces {
     /// Whether all are drawn at once.
     ///
     /// # Errors
-    /// [`RasterError::Missing`] where that is asked for and the device cannot.
-    pub(super) fn are_one_pass(self, ctx: &Context) -> Result<bool, RasterError> {
+    /// [`SampleError::Missing`] where that is asked for and the device cannot.
+    pub(super) fn are_one_pass(self, ctx: &Context) -> Result<bool, SampleError> {
         let can = Self::can_be_one_pass(ctx);
         if self == Self::Multiview {
             let remedy = "--faces single draws one face after the other";
-            RasterError::require(can, ctx, "multiview of six views", remedy)?;
+            SampleError::require(can, ctx, "multiview of six views", remedy)?;
         }
         Ok(can && self != Self::Single)
     }

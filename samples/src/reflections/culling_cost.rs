@@ -1,8 +1,8 @@
 //! What culling by angular size saves.
 
+use crate::app::sample_error::SampleError;
 use std::fmt;
 
-use super::error::ReflectionsError;
 use super::renderer::{RAYS, Reflections, TLAS_BUILD};
 use crate::app::timings;
 
@@ -30,8 +30,8 @@ impl CullingCost {
     /// or for no rounds.
     ///
     /// # Errors
-    /// [`ReflectionsError::Device`].
-    pub fn measure(sample: &Reflections, rounds: u32) -> Result<Option<Self>, ReflectionsError> {
+    /// [`SampleError::Device`].
+    pub fn measure(sample: &Reflections, rounds: u32) -> Result<Option<Self>, SampleError> {
         let angles = [sample.config().min_angle, 0.0];
         let mut times = [const { (Vec::new(), Vec::new()) }; 2];
         for _ in 0..rounds {

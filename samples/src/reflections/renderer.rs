@@ -1,5 +1,6 @@
 //! Renders the sample at a frame time.
 
+use crate::app::sample_error::SampleError;
 use lvk::{
     AddressMode, BufferHandle, Context, Format, Holder, SamplerDesc, SamplerHandle, TextureDesc,
     TextureHandle,
@@ -7,7 +8,6 @@ use lvk::{
 
 use super::animation::{Animation, AnimationPasses};
 use super::config::ReflectionsConfig;
-use super::error::ReflectionsError;
 use super::frame::{FRAME_BYTES, FrameConstants, Indices, NEAR_PLANE, WorldConstants, light_constants};
 use super::gpu_scene::{GeometryArena, GpuScene};
 use super::image_passes::ImagePasses;
@@ -60,8 +60,8 @@ impl Reflections {
     /// Makes the hall, its structures and all pipelines. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`ReflectionsError`] when the configuration is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, config: &ReflectionsConfig) -> Result<Self, ReflectionsError> {
+    /// [`SampleError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, config: &ReflectionsConfig) -> Result<Self, SampleError> {
         config.check(ctx.capabilities())?;
         let extent = [config.width, config.height];
         let world = HallScene::new();
@@ -125,7 +125,7 @@ impl Reflections {
 
     /// What the passes of the first sample take on the GPU, where instances seen under less than `min_angle` are culled;
     /// none where the device has no timestamps.
-    pub(super) fn time_sample(&self, min_angle: f32) -> Result<PassTimes, ReflectionsError> {
+    pub(super) fn time_sample(&self, min_angle: f32) -> Result<PassTimes, SampleError> {
         self.upload_constants()?;
         let mut ignore = |_| {};
         let mut frame = Frame::waited(&self.ctx, &mut ignore)?;
@@ -154,7 +154,7 @@ impl Reflections {
     }
 
     /// Renders by another configuration from now on; by the old one where this fails.
-    fn change(&mut self, config: ReflectionsConfig) -> Result<(), ReflectionsError> {
+    fn change(&mut self, config: ReflectionsConfig) -> Result<(), SampleError> {
         config.check(self.ctx.capabilities())?;
         let (ctx, before, extent) = (&self.ctx, self.config, [config.width, config.height]);
         let rays = (config.path != before.path).then(|| RayPasses::new(ctx, config.path)).transpose()?;
@@ -225,19 +225,19 @@ impl Reflections {
 }
 
 impl Sample for Reflections {
-    type Error = ReflectionsError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), ReflectionsError> {
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
         self.show(time.phase());
         Ok(())
     }
 
     /// A step for each sample.
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, ReflectionsError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         if let Some(config) = self.wanted.changed_from(self.config) {
             let done = self.change(config);
             self.wanted.finish(done, self.config);
@@ -256,7 +256,7 @@ impl Sample for Reflections {
         self.config.samples.into()
     }
 
-    fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), ReflectionsError> {
+    fn resize(&mut self, [width, height]: [u32; 2]) -> Result<(), SampleError> {
         self.change(ReflectionsConfig { width, height, ..self.config })?;
         (self.wanted.config.width, self.wanted.config.height) = (width, height);
         Ok(())
@@ -279,7 +279,7 @@ impl Sample for Reflections {
         ui.label(format!("rays meet {kept} of {total} instances"));
     }
 
-    fn reload(&mut self) -> Result<(), ReflectionsError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         let (raster, images) = (RasterPasses::new(&self.ctx)?, ImagePasses::new(&self.ctx)?);
         let rays = RayPasses::new(&self.ctx, self.config.path)?;
         self.moving_passes.reload(&self.ctx)?;

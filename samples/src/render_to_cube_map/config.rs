@@ -1,10 +1,10 @@
 //! What to render, and how.
 
+use crate::app::sample_error::SampleError;
 use lvk::{Capabilities, Context, OptionalFeature};
 
-use super::args::FacesArg;
 use super::cube_map::FACES;
-use crate::raster::RasterError;
+use super::info::FacesArg;
 
 /// How the faces of the cube map are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,9 +51,9 @@ impl Faces {
     }
 
     /// Fails where the device cannot.
-    pub(super) fn check(self, ctx: &Context) -> Result<(), RasterError> {
+    pub(super) fn check(self, ctx: &Context) -> Result<(), SampleError> {
         let can = self == Self::SixPasses || has_six_views(ctx.capabilities());
-        RasterError::require(can, ctx, "passes of six views", "draw the faces by --faces six-passes")
+        SampleError::require(can, ctx, "passes of six views", "draw the faces by --faces six-passes")
     }
 }
 

@@ -1,5 +1,7 @@
 //! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
     BufferHandle, BufferUsage, Context, CullMode, Dependencies, Holder, RenderPass, RenderPipelineDesc,
@@ -13,7 +15,6 @@ use super::surroundings::{Block, DROP, blocks, camera};
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
-use crate::raster::{Canvas, RasterError};
 use crate::scene::{Camera, GpuCamera};
 
 /// Corners of a block, of the sky, and of the drop (`kGrid` in `shaders/render_to_cube_map/drop.glsl`).
@@ -27,7 +28,7 @@ const NEAR_PLANE: f32 = 0.1;
 /// Draws a drop and what it mirrors.
 pub struct RenderToCubeMap {
     ctx: Context,
-    canvas: Canvas,
+    target: RenderTarget,
     config: RenderToCubeMapConfig,
     cube_map: CubeMap,
     pipelines: Pipelines,
@@ -81,14 +82,14 @@ impl RenderToCubeMap {
     /// Makes the cube map and the pipelines. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`RasterError`] when the configuration is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, config: &RenderToCubeMapConfig) -> Result<Self, RasterError> {
+    /// [`SampleError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, config: &RenderToCubeMapConfig) -> Result<Self, SampleError> {
         config.faces.check(ctx)?;
-        let canvas = Canvas::with_depth(ctx, config.extent)?;
+        let target = RenderTarget::with_depth(ctx, config.extent)?;
         let blocks = blocks(0.0);
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         Ok(Self {
-            canvas,
+            target,
             config: *config,
             cube_map: CubeMap::new(ctx, config.face_size)?,
             pipelines: Pipelines::new(ctx)?,
@@ -149,35 +150,35 @@ impl RenderToCubeMap {
 }
 
 impl Sample for RenderToCubeMap {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
         self.phase = time.phase();
         self.blocks = blocks(self.phase);
         self.camera = camera(self.phase);
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.upload()?;
         let (faces, on_faces) = self.pipelines.faces(self.config.faces);
         frame.pass("cube map", |cmd| {
             self.cube_map.record(cmd, faces, |pass, view| self.draw(pass, on_faces, view))
         })?;
         let reads = Dependencies { sampled_images: &[self.cube_map()], ..Dependencies::default() };
-        let mut pass = self.canvas.begin(&mut frame.cmd, "picture", [0.0; 3], &reads)?;
+        let mut pass = self.target.begin(&mut frame.cmd, "picture", [0.0; 3], &reads)?;
         self.draw(&mut pass, &self.pipelines.in_picture, PICTURE)?;
         pass.bind_render_pipeline(*self.pipelines.drop)?;
         pass.draw(0..DROP_CORNERS, 0..1)?;
-        Ok(self.canvas.picture())
+        Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.canvas = Canvas::with_depth(&self.ctx, extent)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.target = RenderTarget::with_depth(&self.ctx, extent)?;
         self.config.extent = extent;
         Ok(())
     }
@@ -200,7 +201,7 @@ impl Sample for RenderToCubeMap {
         ui.add(egui::Slider::new(&mut self.waves, 0.0..=0.3).text("waves"));
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.pipelines = Pipelines::new(&self.ctx)?;
         Ok(())
     }

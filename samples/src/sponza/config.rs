@@ -1,9 +1,8 @@
 //! What to render, and by which kind of draws.
 
+use crate::app::sample_error::SampleError;
 use clap::ValueEnum;
 use lvk::{Context, OptionalFeature};
-
-use crate::raster::RasterError;
 
 /// What to render.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,15 +59,15 @@ impl SponzaConfig {
     /// Within the bounds of its numbers, with draws that the device has.
     ///
     /// # Errors
-    /// [`RasterError::Missing`] for counted draws on a device without them, and for samples that are neither 1 nor 4.
-    pub(super) fn suited(self, ctx: &Context) -> Result<Self, RasterError> {
+    /// [`SampleError::Missing`] for counted draws on a device without them, and for samples that are neither 1 nor 4.
+    pub(super) fn suited(self, ctx: &Context) -> Result<Self, SampleError> {
         let has_counts = ctx.capabilities().has(OptionalFeature::DrawIndirectCount);
         let best = if has_counts { DrawPath::Counted } else { DrawPath::Padded };
         let draws = self.draws.unwrap_or(best);
         let what = "draws whose number is in a buffer (drawIndirectCount)";
-        RasterError::require(draws == DrawPath::Padded || has_counts, ctx, what, "use --draws padded")?;
+        SampleError::require(draws == DrawPath::Padded || has_counts, ctx, what, "use --draws padded")?;
         let what = "pictures of this many samples a pixel";
-        RasterError::require(matches!(self.samples, 1 | 4), ctx, what, "use --msaa 1 or 4")?;
+        SampleError::require(matches!(self.samples, 1 | 4), ctx, what, "use --msaa 1 or 4")?;
         let limit = Self::MAX_SHADOW_SIZE.min(ctx.capabilities().limits.max_texture_2d);
         Ok(Self {
             draws: Some(draws),

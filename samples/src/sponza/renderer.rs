@@ -1,5 +1,7 @@
 //! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use glam::{Quat, Vec3};
 use lvk::{
     AddressMode, BufferHandle, BufferUsage, Context, Dependencies, Holder, Readback, RenderPipelineHandle,
@@ -19,7 +21,7 @@ use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::app::scene_textures;
 use crate::hybrid::{SceneArrays, check_promises, near_plane};
-use crate::raster::{Canvas, RasterError, RasterPipeline};
+use crate::raster::RasterPipeline;
 use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, Material, PointLight, Scene};
 
 /// Texels on an edge of the sky's cube map.
@@ -32,7 +34,7 @@ pub struct Sponza {
     ctx: Context,
     config: SponzaConfig,
     path_of_draws: DrawPath,
-    canvas: Canvas,
+    target: RenderTarget,
     culling: Culling,
     shadow: Shadow,
     surfaces: Holder<RenderPipelineHandle>,
@@ -79,16 +81,16 @@ impl Sponza {
     /// Uploads `scene`, whose triangles it cuts into draws, and makes all pipelines.
     ///
     /// # Errors
-    /// [`RasterError`] when the configuration is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, mut scene: Scene, config: &SponzaConfig) -> Result<Self, RasterError> {
-        check_promises(&scene).map_err(RasterError::scene)?;
+    /// [`SampleError`] when the configuration is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, mut scene: Scene, config: &SponzaConfig) -> Result<Self, SampleError> {
+        check_promises(&scene)?;
         let config = config.suited(ctx)?;
-        let canvas = Canvas::with_samples(ctx, config.extent, config.samples)?;
+        let target = RenderTarget::with_samples(ctx, config.extent, config.samples)?;
         let draws = cut(&mut scene, config.triangles_per_draw);
         let path = CameraPath::tour(&scene, 0);
         let frame = buffer(ctx, "frame constants", size_of::<FrameConstants>() as u64)?;
         Ok(Self {
-            canvas,
+            target,
             culling: Culling::new(ctx, &draws)?,
             shadow: Shadow::new(ctx, config.shadow_size)?,
             surfaces: pipeline(ctx, &SURFACES, config.samples)?,
@@ -138,23 +140,23 @@ impl Sponza {
         if !self.config.culls {
             return [Frustum::ALL; 2];
         }
-        let seen = || Frustum::of_camera(&self.camera, self.canvas.aspect(), self.near_plane);
+        let seen = || Frustum::of_camera(&self.camera, self.target.aspect(), self.near_plane);
         [self.kept.unwrap_or_else(seen), Frustum::of_rows(self.sun_view().rows)]
     }
 
     /// How many draws of the camera and of the sun the last frame has left. Waits for it.
     ///
     /// # Errors
-    /// [`RasterError::Device`].
-    pub fn counts(&self) -> Result<[u32; 2], RasterError> {
+    /// [`SampleError::Device`].
+    pub fn counts(&self) -> Result<[u32; 2], SampleError> {
         Ok(self.culling.counts(&self.ctx)?)
     }
 
     /// First triangles of the draws that the last frame has left, of the camera (0) or the sun (1). Waits for it.
     ///
     /// # Errors
-    /// [`RasterError::Device`].
-    pub fn survivors(&self, view: usize) -> Result<Vec<u32>, RasterError> {
+    /// [`SampleError::Device`].
+    pub fn survivors(&self, view: usize) -> Result<Vec<u32>, SampleError> {
         Ok(self.culling.survivors(&self.ctx, view.min(VIEWS - 1), self.path_of_draws)?)
     }
 
@@ -188,7 +190,7 @@ impl Sponza {
     }
 
     fn upload_frame(&self) -> lvk::Result<()> {
-        let [width, height] = self.canvas.extent();
+        let [width, height] = self.target.extent();
         let (draws, arguments, counts) = self.culling.addresses(&self.ctx)?;
         let frusta = self.frusta();
         let constants = FrameConstants {
@@ -215,7 +217,7 @@ impl Sponza {
             read_buffers: &self.culling.reads(0),
             ..Dependencies::default()
         };
-        let mut pass = self.canvas.begin(&mut to.cmd, "surfaces", [0.0; 3], &reads)?;
+        let mut pass = self.target.begin(&mut to.cmd, "surfaces", [0.0; 3], &reads)?;
         pass.bind_render_pipeline(*self.surfaces)?;
         pass.push_constants(&address)?;
         self.culling.draw(&mut pass, 0, self.path_of_draws)?;
@@ -245,27 +247,27 @@ impl Sponza {
 }
 
 impl Sample for Sponza {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
         self.camera = self.path.at(time.phase());
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.upload_frame()?;
         let address = self.ctx.buffer_address(*self.frame)?;
         frame.pass("culling", |cmd| self.culling.record(cmd, address))?;
         self.shadow.record(&mut frame.cmd, &self.culling, self.path_of_draws, address)?;
         self.draw_surfaces(frame, address)?;
-        Ok(self.canvas.picture())
+        Ok(self.target.image())
     }
 
-    fn after_frame(&mut self) -> Result<(), RasterError> {
+    fn after_frame(&mut self) -> Result<(), SampleError> {
         self.draw_counts.counts = Some(self.counts()?);
         Ok(())
     }
@@ -274,8 +276,8 @@ impl Sample for Sponza {
         self.draw_counts.counts.map(|counts| format!("culling   {}", self.draw_counts_text(counts)))
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.canvas = Canvas::with_samples(&self.ctx, extent, self.config.samples)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.target = RenderTarget::with_samples(&self.ctx, extent, self.config.samples)?;
         self.config.extent = extent;
         Ok(())
     }
@@ -313,7 +315,7 @@ impl Sample for Sponza {
         }
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         let samples = self.config.samples;
         let (surfaces, sky) = (pipeline(&self.ctx, &SURFACES, samples)?, pipeline(&self.ctx, &SKY, samples)?);
         let (culling, shadow) = (Culling::pipeline(&self.ctx)?, Shadow::pipeline(&self.ctx)?);

@@ -1,5 +1,7 @@
 //! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use std::f32::consts::TAU;
 
 use bytemuck::{Pod, Zeroable};
@@ -9,12 +11,11 @@ use lvk::{
 };
 
 use super::models::Models;
-use super::pipelines::BODIES;
+use super::pipelines::MODELS;
 use super::streamed::{COUNT, Residency, Streamed};
 use crate::app::array_buffer::{array, buffer};
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
-use crate::raster::{Canvas, RasterError};
 use crate::scene::{Camera, GpuCamera, PAINTED};
 
 /// Colour of what is far away, in linear light (`kBackdrop` in `shaders/triplanar/frame.glsl`).
@@ -26,7 +27,7 @@ const FRAMES_PER_TURN: u32 = 30;
 /// Draws bodies by textures along three axes.
 pub struct Triplanar {
     ctx: Context,
-    canvas: Canvas,
+    target: RenderTarget,
     pipeline: Holder<RenderPipelineHandle>,
     textures: Streamed,
     bodies: Models,
@@ -58,9 +59,9 @@ impl Triplanar {
     /// Makes the bodies, all textures and the pipeline, for pictures of `extent` pixels. The animation stands at its beginning.
     ///
     /// # Errors
-    /// [`RasterError`] when the picture is beyond the device, or the device fails.
-    pub fn new(ctx: &Context, extent: [u32; 2]) -> Result<Self, RasterError> {
-        let canvas = Canvas::with_depth(ctx, extent)?;
+    /// [`SampleError`] when the picture is beyond the device, or the device fails.
+    pub fn new(ctx: &Context, extent: [u32; 2]) -> Result<Self, SampleError> {
+        let target = RenderTarget::with_depth(ctx, extent)?;
         let mut textures = Streamed::new(ctx)?;
         (0..COUNT).for_each(|number| textures.load(number));
         let bodies = Models::new();
@@ -79,7 +80,7 @@ impl Triplanar {
         textures.wait()?;
         Ok(Self {
             ctx: ctx.clone(),
-            canvas,
+            target,
             pipeline: pipeline(ctx)?,
             textures,
             triangles: array(ctx, "triangles", BufferUsage::INDEX, &bodies.triangles)?,
@@ -123,7 +124,7 @@ impl Triplanar {
     }
 
     fn upload(&mut self) -> lvk::Result<()> {
-        let [width, height] = self.canvas.extent();
+        let [width, height] = self.target.extent();
         self.constants.camera = GpuCamera::new(&self.camera, width, height, NEAR_PLANE);
         self.constants.textures = self.textures.indices();
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))
@@ -153,35 +154,35 @@ impl Triplanar {
 }
 
 impl Sample for Triplanar {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
         self.constants.phase = time.phase();
         self.camera = camera(time.phase());
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.take_turns();
         self.textures.take_in()?;
         self.upload()?;
         let nothing = Dependencies::default();
-        let mut pass = self.canvas.begin(&mut frame.cmd, "bodies", BACKDROP, &nothing)?;
+        let mut pass = self.target.begin(&mut frame.cmd, "bodies", BACKDROP, &nothing)?;
         pass.bind_render_pipeline(*self.pipeline)?;
         pass.bind_index_buffer(*self.triangles, 0, IndexFormat::U32)?;
         pass.push_constants(&self.ctx.buffer_address(*self.frame)?)?;
         for (number, corners) in (0..).zip(&self.bodies.corners) {
             pass.draw_indexed(corners.clone(), 0, number..number + 1)?;
         }
-        Ok(self.canvas.picture())
+        Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.canvas = Canvas::with_depth(&self.ctx, extent)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.target = RenderTarget::with_depth(&self.ctx, extent)?;
         Ok(())
     }
 
@@ -211,14 +212,14 @@ impl Sample for Triplanar {
         self.constants.by_angles = by_angles.into();
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         self.pipeline = pipeline(&self.ctx)?;
         Ok(())
     }
 }
 
 fn pipeline(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
-    BODIES.create_with(ctx, &RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() })
+    MODELS.create_with(ctx, &RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() })
 }
 
 /// Where the animation looks from.

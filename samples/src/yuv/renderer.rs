@@ -1,5 +1,7 @@
 //! Renders the sample at a frame time.
 
+use crate::app::render_target::RenderTarget;
+use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
     AddressMode, Context, Dependencies, Holder, RenderPipelineDesc, RenderPipelineHandle, SamplerDesc,
@@ -11,7 +13,6 @@ use super::pipelines::PLANES;
 use super::video_texture::{VideoFormat, VideoTexture, supported};
 use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
-use crate::raster::{Canvas, RasterError};
 
 /// Beside and above the picture.
 const BACKDROP: [f32; 3] = [0.006, 0.007, 0.009];
@@ -20,7 +21,7 @@ const BACKDROP: [f32; 3] = [0.006, 0.007, 0.009];
 pub struct Yuv {
     ctx: Context,
     config: YuvConfig,
-    canvas: Canvas,
+    target: RenderTarget,
     formats: Vec<YuvFormat>,
     video: VideoTexture,
     planes: Holder<RenderPipelineHandle>,
@@ -32,7 +33,7 @@ pub struct Yuv {
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Push {
-    /// Of the whole canvas, the part that the picture covers.
+    /// Of the whole target, the part that the picture covers.
     covered: [f32; 2],
     /// Textures of Y, Cb and Cr, and the channels that hold them.
     planes: [u32; 3],
@@ -45,17 +46,17 @@ impl Yuv {
     /// [`CONVERSIONS`](super::CONVERSIONS).
     ///
     /// # Errors
-    /// [`RasterError`] when the picture is beyond the device, the device lacks the format ([`lvk::Error::Unsupported`]), or it
+    /// [`SampleError`] when the picture is beyond the device, the device lacks the format ([`lvk::Error::Unsupported`]), or it
     /// fails.
-    pub fn new(ctx: &Context, config: &YuvConfig) -> Result<Self, RasterError> {
+    pub fn new(ctx: &Context, config: &YuvConfig) -> Result<Self, SampleError> {
         let mut config = config.clamped();
-        let canvas = Canvas::flat(ctx, config.extent)?;
+        let target = RenderTarget::flat(ctx, config.extent)?;
         let video_format = video_format(&config, config.format.unwrap_or(YuvFormat::Nv12));
         let formats = supported(ctx, video_format)?;
         let format = config.format.or(formats.first().copied()).unwrap_or(video_format.format);
         config.format = Some(format);
         Ok(Self {
-            canvas,
+            target,
             video: VideoTexture::new(ctx, VideoFormat { format, ..video_format })?,
             planes: planes(ctx)?,
             sampler: ctx.create_sampler(&SamplerDesc {
@@ -85,7 +86,7 @@ impl Yuv {
     }
 
     /// Takes over what the panel or a key has chosen.
-    fn apply(&mut self) -> Result<(), RasterError> {
+    fn apply(&mut self) -> Result<(), SampleError> {
         let wanted = video_format(&self.config, self.config.format.unwrap_or(self.video.video_format.format));
         if wanted != self.video.video_format {
             self.video = VideoTexture::new(&self.ctx, wanted)?;
@@ -95,7 +96,7 @@ impl Yuv {
 
     fn push(&self) -> Push {
         let film = self.config.film;
-        let relative = film[0] as f32 / film[1] as f32 / self.canvas.aspect();
+        let relative = film[0] as f32 / film[1] as f32 / self.target.aspect();
         let planes = &self.video.planes;
         let [y, cb] = [planes[0].index(), planes[1].index()];
         let (cr, channel) = planes.get(2).map_or((cb, 1), |plane| (plane.index(), 0));
@@ -109,23 +110,23 @@ impl Yuv {
 }
 
 impl Sample for Yuv {
-    type Error = RasterError;
+    type Error = SampleError;
 
     fn context(&self) -> &Context {
         &self.ctx
     }
 
-    fn update(&mut self, time: FrameTime) -> Result<(), RasterError> {
+    fn update(&mut self, time: FrameTime) -> Result<(), SampleError> {
         self.phase = time.phase();
         Ok(())
     }
 
-    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, RasterError> {
+    fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.apply()?;
         self.video.upload(&self.ctx, self.phase)?;
         let sampled = [*self.video.texture];
         let reads = Dependencies { sampled_images: &sampled, ..Dependencies::default() };
-        let mut pass = self.canvas.begin(&mut frame.cmd, "picture", BACKDROP, &reads)?;
+        let mut pass = self.target.begin(&mut frame.cmd, "picture", BACKDROP, &reads)?;
         pass.bind_render_pipeline(*self.video.pipeline)?;
         pass.push_constants(&self.push())?;
         pass.draw(0..4, 0..1)?;
@@ -133,11 +134,11 @@ impl Sample for Yuv {
             pass.bind_render_pipeline(*self.planes)?;
             pass.draw(0..4, 0..3)?;
         }
-        Ok(self.canvas.picture())
+        Ok(self.target.image())
     }
 
-    fn resize(&mut self, extent: [u32; 2]) -> Result<(), RasterError> {
-        self.canvas = Canvas::flat(&self.ctx, extent)?;
+    fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
+        self.target = RenderTarget::flat(&self.ctx, extent)?;
         self.config.extent = extent;
         Ok(())
     }
@@ -172,7 +173,7 @@ impl Sample for Yuv {
         ui.label("N is the next format");
     }
 
-    fn reload(&mut self) -> Result<(), RasterError> {
+    fn reload(&mut self) -> Result<(), SampleError> {
         let planes = planes(&self.ctx)?;
         self.video.reload(&self.ctx)?;
         self.planes = planes;

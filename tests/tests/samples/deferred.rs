@@ -6,8 +6,8 @@ use image::RgbaImage;
 use lvk::{Context, DeviceProfile};
 use lvk_samples::app::frame::Frame;
 use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::deferred::{Deferred, DeferredConfig, Passes, View};
-use lvk_samples::raster::RasterError;
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
 use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, picture_of};
@@ -131,7 +131,7 @@ fn a_device_without_local_reads_goes_by_several_passes() {
     assert_eq!(sample.passes(), Passes::Several);
     let error = Deferred::new(&ctx, &config(Passes::One)).err();
     match error {
-        Some(RasterError::Missing { what, remedy, .. }) => {
+        Some(SampleError::Missing { what, remedy, .. }) => {
             assert!(what.contains("dynamicRenderingLocalRead") && remedy.contains("--passes several"));
         }
         other => unreachable!("{other:?}"),

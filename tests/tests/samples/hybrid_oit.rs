@@ -4,8 +4,9 @@
 use image::RgbaImage;
 use lvk::glam::{DVec3, Vec2, Vec3};
 use lvk::{Context, DeviceProfile};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::hybrid_oit::{Glass, HybridOit, HybridOitConfig, HybridOitError, Motion, OitScene};
+use lvk_samples::hybrid_oit::{Glass, HybridOit, HybridOitConfig, Motion, OitScene};
 use lvk_tests::glass_room::{GlassRoom, HostScene, decode, encode, expose, through, through_sorted};
 use lvk_tests::hybrid::paths;
 use lvk_tests::picture::{Likeness, Tolerance, assert_alike, assert_as_ever, reference};
@@ -319,7 +320,7 @@ fn scenes_without_sense_are_refused() {
         let mut scene = OitScene::default();
         mistake(&mut scene);
         let refused = HybridOit::new(&ctx, &scene, &plain(&ctx)).err();
-        assert!(matches!(refused, Some(HybridOitError::BrokenScene(_))), "{refused:?}");
+        assert!(matches!(refused, Some(SampleError::BrokenScene(_))), "{refused:?}");
     }
 }
 

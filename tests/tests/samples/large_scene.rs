@@ -2,6 +2,7 @@
 //! phones, structures are built once and loaded afterwards, and the valley looks as ever.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use lvk_samples::app::sample_error::SampleError;
 use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
@@ -13,8 +14,8 @@ use lvk_samples::app::progress::Progress;
 use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::app::scene_list::{self, FoundScene};
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, LargeSceneError, Origin, Show, World};
-use lvk_samples::rtx::{RtxConfig, RtxError};
+use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, Origin, Show, World};
+use lvk_samples::rtx::RtxConfig;
 use lvk_samples::scene::{ObjOptions, Scene};
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::hybrid::paths;
@@ -322,6 +323,6 @@ fn impossible_pictures_are_refused() {
     for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {
         let config = LargeSceneConfig::new(RtxConfig { path, width, height });
         let error = LargeScene::new(&ctx, &street(), &config, &mut Progress::hidden()).err();
-        assert!(matches!(error, Some(LargeSceneError::Rtx(RtxError::BadSize { .. }))), "{error:?}");
+        assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
     }
 }

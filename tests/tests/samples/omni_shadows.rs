@@ -9,8 +9,8 @@ use lvk::{
     TlasDesc, TlasInstance, Triangles,
 };
 use lvk_samples::app::sample::Sample;
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::omni_shadows::{Faces, OmniShadows, OmniShadowsConfig, ShadowFilter};
-use lvk_samples::raster::RasterError;
 use lvk_samples::scene::Camera;
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::picture::{Tolerance, assert_alike, assert_as_ever, reference};
@@ -47,7 +47,7 @@ fn devices_without_multiview_draw_face_by_face() {
     let profile = DeviceProfile::core_only();
     let Some(bare) = device_with(|desc| desc.profile = Some(&profile)) else { return };
     let asked = OmniShadows::new(&bare, &OmniShadowsConfig { faces: Faces::Multiview, ..usual() }).err();
-    assert!(matches!(asked, Some(RasterError::Missing { .. })), "{asked:?}");
+    assert!(matches!(asked, Some(SampleError::Missing { .. })), "{asked:?}");
     let mut sample = lamp(&bare, &usual());
     assert!(!sample.is_multiview());
     assert!(picture_of(&mut sample, 0) == picture_of(&mut lamp(&ctx, &usual()), 0));

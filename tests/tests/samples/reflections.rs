@@ -5,9 +5,10 @@ use image::RgbaImage;
 use lvk::{Context, Dependencies, DeviceProfile};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::reflections::{
-    CullingCost, FAR, RayCost, Reflections, ReflectionsConfig, ReflectionsError, SkinUpdate, reflection_range,
+    CullingCost, FAR, RayCost, Reflections, ReflectionsConfig, SkinUpdate, reflection_range,
 };
 use lvk_samples::scene::Camera;
 use lvk_samples::shaders::INCLUDES;
@@ -227,11 +228,11 @@ fn impossible_pictures_are_refused() {
     let refused = |config| Reflections::new(&ctx, &config).err();
     for samples in [0, ReflectionsConfig::MAX_SAMPLES + 1] {
         let error = refused(ReflectionsConfig { samples, ..config });
-        assert!(matches!(error, Some(ReflectionsError::BadSamples { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::OutOfRange { .. })), "{error:?}");
     }
     for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {
         let error = refused(ReflectionsConfig { width, height, ..config });
-        assert!(matches!(error, Some(ReflectionsError::BadSize { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
     }
 }
 

@@ -8,8 +8,9 @@ use lvk::glam::{DAffine3, DVec3, Vec3};
 use lvk::{Context, FeatureRequest, RayQueryRequest};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::rtx::{RtxConfig, RtxError};
+use lvk_samples::rtx::RtxConfig;
 use lvk_samples::rtx_ao::{RtxAo, RtxAoConfig, View};
 use lvk_samples::scene::{Camera, Scene};
 use lvk_tests::child::without_ray_tracing;
@@ -244,5 +245,5 @@ fn impossible_pictures_are_refused() {
     let Some(ctx) = device() else { return };
     let config = RtxAoConfig::new(RtxConfig { path: paths(&ctx)[0], width: 0, height: 8 });
     let error = RtxAo::new(&ctx, &Scene::carousel(), None, &config).err();
-    assert!(matches!(error, Some(RtxError::BadSize { .. })), "{error:?}");
+    assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
 }

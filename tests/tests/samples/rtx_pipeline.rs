@@ -6,8 +6,9 @@ use image::RgbaImage;
 use lvk::{Context, DeviceProfile, FeatureRequest, RayQueryRequest};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::rtx::{RtxConfig, RtxError};
+use lvk_samples::rtx::RtxConfig;
 use lvk_samples::rtx_pipeline::{RtxPipeline, RtxPipelineConfig, RtxPipelineSwitches};
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::hybrid::paths;
@@ -117,6 +118,6 @@ fn impossible_pictures_are_refused() {
     for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {
         let config = RtxPipelineConfig::new(RtxConfig { path, width, height });
         let error = RtxPipeline::new(&ctx, &still_life(), &config).err();
-        assert!(matches!(error, Some(RtxError::BadSize { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
     }
 }

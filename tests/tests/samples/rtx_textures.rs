@@ -5,8 +5,9 @@ use image::RgbaImage;
 use lvk::{Context, FeatureRequest, RayQueryRequest};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::rtx::{RtxConfig, RtxError};
+use lvk_samples::rtx::RtxConfig;
 use lvk_samples::rtx_textures::{RtxTextures, RtxTexturesSwitches};
 use lvk_tests::child::without_ray_tracing;
 use lvk_tests::hybrid::paths;
@@ -103,6 +104,6 @@ fn impossible_pictures_are_refused() {
     let path = paths(&ctx)[0];
     for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {
         let error = RtxTextures::new(&ctx, &RtxConfig { path, width, height }).err();
-        assert!(matches!(error, Some(RtxError::BadSize { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
     }
 }

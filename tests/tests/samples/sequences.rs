@@ -80,8 +80,7 @@ mod interrupted {
     use std::process::{Command, Stdio};
     use std::time::{Duration, Instant};
 
-    use clap::Parser as _;
-    use lvk_samples::hybrid::HybridArgs;
+    use lvk_samples::app::cli;
     use lvk_tests::child::path_in_program;
     use rustix::process::{Pid, Signal, kill_process};
 
@@ -106,7 +105,7 @@ mod interrupted {
             "--out".to_owned(),
             out.display().to_string(),
         ]);
-        let status = lvk_samples::hybrid::run(&HybridArgs::parse_from(words));
+        let status = cli::run::<HybridSequence>(&cli::parse::<HybridSequence>(words).unwrap());
         let is_interrupted = status == std::process::ExitCode::from(130);
         std::process::exit(if is_interrupted { 42 } else { 1 });
     }

@@ -2,13 +2,13 @@
 //! four samples a pixel, by counted and by padded draws; shadows, holes and relief are where they belong, and the atrium looks as ever.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use lvk_samples::app::sample_error::SampleError;
 use std::sync::LazyLock;
 
 use image::{Rgba, RgbaImage};
 use lvk::{Context, DeviceProfile, FeatureSet, OptionalFeature};
 use lvk_samples::app::headless;
 use lvk_samples::app::sample::{FrameTime, Sample};
-use lvk_samples::raster::RasterError;
 use lvk_samples::scene::{Camera, Scene};
 use lvk_samples::sponza::{DrawPath, Frustum, Sponza, SponzaConfig};
 use lvk_tests::board::board;
@@ -214,7 +214,7 @@ fn devices_without_counts_pad_their_draws_and_refuse_to_count() {
     assert!(picture_of(&mut sample, 0) == picture_of(&mut make(&other, &TOWN, &config(4)), 0));
     let counted = SponzaConfig { draws: Some(DrawPath::Counted), ..config(4) };
     let error = Sponza::new(&ctx, still_life(), &counted).err().unwrap();
-    assert!(matches!(error, RasterError::Missing { .. }), "{error}");
+    assert!(matches!(error, SampleError::Missing { .. }), "{error}");
     let text = error.to_string();
     assert!(text.contains(&ctx.capabilities().device_name) && text.contains("--draws padded"), "{text}");
 }
@@ -243,14 +243,14 @@ fn impossible_pictures_are_refused() {
     let Some(ctx) = device() else { return };
     for extent in [[0, 8], [8, 0], [1 << 30, 8]] {
         let error = Sponza::new(&ctx, still_life(), &SponzaConfig::new(extent)).err();
-        assert!(matches!(error, Some(RasterError::BadSize { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
     }
     for samples in [0, 2, 3, 64] {
         let error = Sponza::new(&ctx, still_life(), &config(samples)).err();
-        assert!(matches!(error, Some(RasterError::Missing { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::Missing { .. })), "{error:?}");
     }
     let mut broken = still_life();
     broken.triangles[3][1] = u32::MAX;
     let error = Sponza::new(&ctx, broken, &config(1)).err();
-    assert!(matches!(error, Some(RasterError::Scene(_))), "{error:?}");
+    assert!(matches!(error, Some(SampleError::BrokenScene(_))), "{error:?}");
 }

@@ -4,7 +4,8 @@
 use image::RgbaImage;
 use lvk::{Context, FeatureRequest, RayQueryPath, RayQueryRequest};
 use lvk_samples::app::headless;
-use lvk_samples::hybrid::{Bounces, HybridConfig, HybridError, HybridRenderer, Method, RayPath};
+use lvk_samples::app::sample_error::SampleError;
+use lvk_samples::hybrid::{Bounces, HybridConfig, HybridRenderer, Method, RayPath};
 use lvk_samples::hybrid_oit::{HybridOitConfig, OitScene};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
 use lvk_tests::child::without_ray_tracing;
@@ -80,7 +81,7 @@ fn a_driver_without_ray_tracing_shows_the_still_life() {
         let (scene, expected) = (still_life(), reference("hybrid_small"));
         let plain = HybridConfig { path: RayPath::Query, ..sized(&expected) };
         let refused = HybridRenderer::new(&ctx, &scene, &plain).err();
-        assert!(matches!(refused, Some(HybridError::NoRasteriser { .. })), "{refused:?}");
+        assert!(matches!(refused, Some(SampleError::NoRasteriser { .. })), "{refused:?}");
         let method = Method::choose(None, ctx.capabilities());
         assert_eq!(method, Method::Standalone);
         for bounces in [Bounces::Inline, Bounces::Queued] {

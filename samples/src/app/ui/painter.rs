@@ -7,27 +7,23 @@ use egui::epaint::{ClippedPrimitive, Primitive, Vertex};
 use egui::{FullOutput, Rect};
 use lvk::{
     Blend, BufferDesc, BufferHandle, BufferUsage, ColorTarget, Context, CullMode, Format, Holder,
-    IndexFormat, RenderPass, RenderPipelineDesc, RenderPipelineHandle, ShaderStage, TextureHandle,
+    IndexFormat, RenderPass, RenderPipelineDesc, RenderPipelineHandle, TextureHandle,
 };
 
 use super::atlas::Atlas;
-use crate::pipelines::{SamplePipeline, SampleStage};
-use crate::shaders::app as texts;
+use crate::pipelines::{SamplePipeline, SampleStage, shader};
 
 /// Folder of the texts in `shaders/`.
 const FOLDER: &str = "app";
-const VERTEX: SampleStage =
-    SampleStage { stage: ShaderStage::Vertex, text: texts::UI_VERT, defines: &[], name: "ui.vert" };
-const FRAGMENT: SampleStage =
-    SampleStage { stage: ShaderStage::Fragment, text: texts::UI_FRAG, defines: &[], name: "ui.frag" };
+const VERTEX: SampleStage = shader!("app", "ui.vert");
+const FRAGMENT: SampleStage = shader!("app", "ui.frag");
 /// Bytes that buffers have at first.
 const LEAST_BYTES: u64 = 1 << 16;
 
 /// Every pipeline of the user interface.
 #[must_use]
 pub fn pipelines() -> Vec<SamplePipeline> {
-    let (color, depth) = (vec![Format::Rgba8Unorm], None);
-    vec![SamplePipeline { name: "app: user interface", stages: vec![VERTEX, FRAGMENT], color, depth }]
+    vec![SamplePipeline::raster("app: user interface", &[VERTEX, FRAGMENT], &[Format::Rgba8Unorm], None)]
 }
 
 /// Paints a user interface.
