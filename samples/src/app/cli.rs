@@ -59,11 +59,16 @@ pub fn command<S: SampleInfo>() -> clap::Command {
     let paragraphs = |texts: &[&str]| {
         texts.iter().filter(|text| !text.is_empty()).copied().collect::<Vec<_>>().join("\n\n")
     };
-    let example = |(args, meaning): &(&str, &str)| {
-        let command = format!("{} {args}", S::NAME);
-        format!("\n  {:EXAMPLE_WIDTH$} {meaning}", command.trim_end())
+    let example = |args: &str, meaning: &str| {
+        let command = format!("{} {}", S::NAME, args.trim());
+        format!("\n  {:EXAMPLE_WIDTH$} {}", command.trim_end(), meaning.trim())
     };
-    let examples = S::EXAMPLES.iter().map(example).collect::<String>();
+    let lines = S::EXAMPLES.lines().filter_map(|line| line.split_once('|'));
+    let mut examples: String = lines.map(|(args, meaning)| example(args, meaning)).collect();
+    if !S::ROUND.is_empty() {
+        let meaning = format!("{}; ranges can be shared among machines", S::ROUND);
+        examples += &example("--frames 0..240 --out dir/frame_####.png", &meaning);
+    }
     let command = CommandLine::<S::Args>::command().name(S::NAME).about(S::ABOUT);
     let command = match S::DETAILS {
         "" => command,

@@ -2,14 +2,6 @@
 
 use clap::{Args, ValueEnum};
 
-use super::sample_info::Example;
-
-/// The example of ray queries in a compute shader.
-pub(crate) const QUERIES: Example =
-    ("--rt query --validate", "by ray queries in a compute shader, with validation");
-/// The example of the profile of a phone.
-pub(crate) const PROFILE: Example = ("--profile mali-g715", "as on a phone: ray queries");
-
 /// By what rays are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct RayArgs {

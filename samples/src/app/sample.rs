@@ -154,13 +154,22 @@ pub trait Sample {
         false
     }
 
-    /// From where the next frame is seen; `None` where the sample has no camera that could be elsewhere.
-    fn view(&self) -> Option<Camera> {
+    /// The camera of the next frame, which windows move; `None` where the sample has no camera that could be elsewhere.
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
         None
     }
 
-    /// Looks from another place than the animation's, until the next [`update`](Self::update).
-    fn set_view(&mut self, _camera: &Camera) {}
+    /// Returns the camera of the next frame.
+    fn view(&mut self) -> Option<Camera> {
+        self.camera_mut().copied()
+    }
+
+    /// Moves the camera until the next [`update`](Self::update).
+    fn set_view(&mut self, camera: &Camera) {
+        if let Some(own) = self.camera_mut() {
+            *own = *camera;
+        }
+    }
 
     /// Lays out the sample's own switches in the panel of its window.
     fn panel(&mut self, _ui: &mut egui::Ui) {}

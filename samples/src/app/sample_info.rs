@@ -4,12 +4,18 @@
 //! A sample implements [`Sample`] in its `renderer.rs` and describes itself in its `info.rs`:
 //!
 //! ```ignore
+//! use crate::app::sample_info::prelude::*;
+//!
 //! impl SampleInfo for Cloud {
-//!     const NAME: &'static str = "cloud";
-//!     const ABOUT: &'static str = "Draws a cloud, and writes pictures as PNG";
-//!     const EXAMPLES: &'static [Example] = &[("", "a picture, by the best device"), SEQUENCE];
 //!     type Args = NoArgs;
 //!     type Sample = Self;
+//!
+//!     const NAME: &'static str = "cloud";
+//!     const ABOUT: &'static str = "Draws a cloud, and writes pictures as PNG";
+//!     const EXAMPLES: &'static str = "
+//!         | a picture, by the best device
+//!         --validate | with validation
+//!     ";
 //!
 //!     fn pipelines() -> Vec<SamplePipeline> {
 //!         vec![CLOUD.data()]
@@ -26,37 +32,39 @@
 //! its own are a type with `#[derive(clap::Args)]`; samples that trace rays have [`RayArgs`](super::ray_args::RayArgs) among
 //! them and ask for a device by [`DeviceNeeds::tracing`](super::device::DeviceNeeds::tracing).
 
+/// The names that a description needs.
+pub mod prelude {
+    pub use super::{NoArgs, SampleInfo};
+    pub use crate::app::cli::{ReadySample, SampleSetup};
+    pub use crate::app::device::DeviceNeeds;
+    pub use crate::app::run_error::RunError;
+    pub use crate::pipelines::SamplePipeline;
+}
+
 use super::cli::{ReadySample, SampleSetup};
 use super::run_error::RunError;
 use super::sample::Sample;
 use crate::pipelines::SamplePipeline;
 
-/// Arguments after the program's name, and what the command does.
-pub type Example = (&'static str, &'static str);
-
-/// The example of a whole round of the animation.
-pub const SEQUENCE: Example = (
-    "--frames 0..240 --out dir/frame_####.png",
-    "one round of the animation; ranges can be shared among machines",
-);
-
 /// The description of a sample's program.
 pub trait SampleInfo {
+    /// Arguments beside [`RunArgs`](super::run_args::RunArgs), which every sample has.
+    type Args: clap::Args;
+    /// The type that renders.
+    type Sample: Sample;
+
     /// Name of the program, of its images and of its folder below `shaders/`.
     const NAME: &'static str;
     /// First paragraph of the help, without its full stop.
     const ABOUT: &'static str;
     /// Further paragraphs of `--help`.
     const DETAILS: &'static str = "";
-    /// Commands that `--help` shows.
-    const EXAMPLES: &'static [Example];
+    /// Commands that `--help` shows, one a line: arguments, a vertical bar, and what the command does.
+    const EXAMPLES: &'static str;
+    /// A round of the animation, for the example of a sequence; empty where the examples have their own, or none.
+    const ROUND: &'static str = "one round of the animation";
     /// Paragraphs of `--help` after the examples.
     const NOTES: &'static str = "";
-
-    /// Arguments beside [`RunArgs`](super::run_args::RunArgs), which every sample has.
-    type Args: clap::Args;
-    /// What renders.
-    type Sample: Sample;
 
     /// Returns every pipeline that the sample creates.
     fn pipelines() -> Vec<SamplePipeline>;

@@ -8,14 +8,9 @@ use clap::Args;
 use super::png::{self, PngError};
 use super::progress::Progress;
 use super::ray_args::RayArgs;
-use super::sample_info::{Example, SEQUENCE};
 use super::scene_list;
 use super::value_parsers::positive;
 use crate::scene::{ObjOptions, Scene, SceneError};
-
-/// The example of a sequence through the cameras of a scene.
-pub(crate) const CAMERA_TOUR: Example =
-    (SEQUENCE.0, "one round through all cameras; ranges can be shared among machines");
 
 /// Which scene, and from where it is seen.
 #[derive(Debug, Clone, PartialEq, Args)]

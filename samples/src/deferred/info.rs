@@ -3,12 +3,8 @@
 use clap::Args;
 
 use super::{Deferred, DeferredConfig, Passes, View, pipelines};
-use crate::app::cli::{ReadySample, SampleSetup};
-use crate::app::device::DeviceNeeds;
-use crate::app::run_error::RunError;
-use crate::app::sample_info::{Example, SEQUENCE, SampleInfo};
+use crate::app::sample_info::prelude::*;
 use crate::app::value_parsers::whole;
-use crate::pipelines::SamplePipeline;
 
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -33,17 +29,17 @@ pub struct DeferredArgs {
 }
 
 impl SampleInfo for Deferred {
-    const NAME: &'static str = "deferred";
-    const ABOUT: &'static str = "Lights a hall by hundreds of small lights, deferred and in one pass where the device can, and writes pictures as PNG";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "a picture, in one pass where the best device can"),
-        ("--passes several --validate", "the same picture by textures, with validation"),
-        ("--lights 4096 --view normals", "what the lights look at"),
-        ("--window --hot-reload", "in a window, with switches for all of it"),
-        SEQUENCE,
-    ];
     type Args = DeferredArgs;
     type Sample = Self;
+
+    const NAME: &'static str = "deferred";
+    const ABOUT: &'static str = "Lights a hall by hundreds of small lights, deferred and in one pass where the device can, and writes pictures as PNG";
+    const EXAMPLES: &'static str = "
+        | a picture, in one pass where the best device can
+        --passes several --validate | the same picture by textures, with validation
+        --lights 4096 --view normals | what the lights look at
+        --window --hot-reload | in a window, with switches for all of it
+    ";
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

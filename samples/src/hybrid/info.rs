@@ -9,43 +9,36 @@ use super::{
     Bounces, Geometry, HybridConfig, HybridRenderer, HybridSequence, Method, Raster, RasterTuning, RayPath,
     pipelines,
 };
-use crate::app::cli::{ReadySample, SampleSetup};
-use crate::app::device::{DeviceNeeds, device_text};
+use crate::app::device::device_text;
 use crate::app::frames::Frames;
-use crate::app::run_error::RunError;
-use crate::app::sample_info::{Example, SampleInfo};
+use crate::app::sample_info::prelude::*;
 use crate::app::summary::path_text;
-use crate::pipelines::SamplePipeline;
 use crate::scene::Scene;
 
 impl SampleInfo for HybridSequence {
+    type Args = HybridArgs;
+    type Sample = Self;
+
     const NAME: &'static str = "hybrid";
     const ABOUT: &'static str =
         "Renders a scene with ray traced shadows, reflections and refractions, and writes pictures as PNG";
     const DETAILS: &'static str = "Without --scene it shows a courtyard made by code, so that `cargo run --release` alone gives a picture.";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "the courtyard, by the best path of the best device"),
-        ("--scene kitchen.obj --camera 3 --out k3.png", "an OBJ through its third camera"),
-        ("--samples 16 --out smooth.png", "with smooth edges"),
-        ("--method standalone --rt query --frames 1", "everything ray traced in a compute shader, once"),
-        ("--device 1 --validate", "on the second device, with validation"),
-        ("--profile mali-g715", "as on a phone: ray queries, split meshes"),
-        ("--frames 100", "one picture, and how long its passes take over 100 frames"),
-        (
-            "--frames 0..240 --out dir/frame_####.png",
-            "8 seconds through all five cameras, which repeat without a seam",
-        ),
-        (
-            "--frames 120..240 --out dir/frame_####.png",
-            "their second half, on another machine: the same pictures",
-        ),
-        ("--frames 0..240 --out dir/frame_####.png --resume", "   what is missing of them"),
-    ];
+    const EXAMPLES: &'static str = "
+        | the courtyard, by the best path of the best device
+        --scene kitchen.obj --camera 3 --out k3.png | an OBJ through its third camera
+        --samples 16 --out smooth.png | with smooth edges
+        --method standalone --rt query --frames 1 | everything ray traced in a compute shader, once
+        --device 1 --validate | on the second device, with validation
+        --profile mali-g715 | as on a phone: ray queries, split meshes
+        --frames 100 | one picture, and how long its passes take over 100 frames
+        --frames 0..240 --out dir/frame_####.png | 8 seconds through all five cameras, which repeat without a seam
+        --frames 120..240 --out dir/frame_####.png | their second half, on another machine: the same pictures
+        --frames 0..240 --out dir/frame_####.png --resume | what is missing of them
+    ";
+    const ROUND: &'static str = "";
     const NOTES: &'static str = "\
 Frame N of a sequence depends on N alone, so any number of processes may share one. Ctrl-C ends after the frame under way;
 pictures get their names when they are complete. A film of them: ffmpeg -framerate 30 -i dir/frame_%04d.png film.mp4";
-    type Args = HybridArgs;
-    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

@@ -3,15 +3,11 @@
 use clap::Args;
 
 use super::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene, pipelines};
-use crate::app::cli::{ReadySample, SampleSetup};
 use crate::app::device::{device_text, query_text};
-use crate::app::ray_args::PROFILE;
-use crate::app::run_error::RunError;
-use crate::app::sample_info::{Example, SEQUENCE, SampleInfo};
+use crate::app::sample_info::prelude::*;
 use crate::app::scene_args::BuiltInSceneRayArgs;
 use crate::app::value_parsers::whole;
 use crate::hybrid::RayPath;
-use crate::pipelines::SamplePipeline;
 
 /// Time in seconds at which the built-in animation begins: one that shows every colour of shadow.
 const FIRST_SECONDS: f64 = 1.9;
@@ -55,19 +51,19 @@ pub struct HybridOitArgs {
 }
 
 impl SampleInfo for HybridOit {
-    const NAME: &'static str = "hybrid_oit";
-    const ABOUT: &'static str = "Renders blocks and drifting spheres of tinted glass, by the rasteriser with order-independent transparency and with ray traced coloured shadows, and writes pictures as PNG";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "a picture, by the best path of the best device"),
-        ("--supersampling 4 --shadow-rays 16", "a smoother one"),
-        ("--rt query --validate", "shadows by ray queries, under validation"),
-        ("--time 5.5", "another moment"),
-        SEQUENCE,
-        ("--nodes 100000", "too few nodes: see what is lost"),
-        PROFILE,
-    ];
     type Args = HybridOitArgs;
     type Sample = HybridOitSequence;
+
+    const NAME: &'static str = "hybrid_oit";
+    const ABOUT: &'static str = "Renders blocks and drifting spheres of tinted glass, by the rasteriser with order-independent transparency and with ray traced coloured shadows, and writes pictures as PNG";
+    const EXAMPLES: &'static str = "
+        | a picture, by the best path of the best device
+        --supersampling 4 --shadow-rays 16 | a smoother one
+        --rt query --validate | shadows by ray queries, under validation
+        --time 5.5 | another moment
+        --nodes 100000 | too few nodes: see what is lost
+        --profile mali-g715 | as on a phone: ray queries
+    ";
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

@@ -83,7 +83,7 @@ impl Sample for HybridOitSequence {
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
+    fn view(&mut self) -> Option<Camera> {
         Some(*self.sample.camera())
     }
 

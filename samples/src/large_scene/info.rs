@@ -8,18 +8,14 @@ use clap::{Args, ValueEnum};
 use super::load::Load;
 use super::pipelines::RAYS;
 use super::{LargeScene, LargeSceneConfig, Show};
-use crate::app::cli::{ReadySample, SampleSetup};
-use crate::app::device::DeviceNeeds;
 use crate::app::loading::Loading;
 use crate::app::progress::Progress;
 use crate::app::ray_args::RayArgs;
-use crate::app::run_error::RunError;
 use crate::app::sample_error::SampleError;
-use crate::app::sample_info::{Example, SampleInfo};
+use crate::app::sample_info::prelude::*;
 use crate::app::scene_args::{CameraArgs, ListArgs};
 use crate::app::value_parsers::whole;
 use crate::app::{png, scene_list};
-use crate::pipelines::SamplePipeline;
 
 /// Descriptor slots of textures in a window, whose device is opened before the scene is known.
 const WINDOW_TEXTURES: u32 = 1 << 16;
@@ -128,22 +124,24 @@ impl LargeSceneArgs {
 }
 
 impl SampleInfo for LargeScene {
+    type Args = LargeSceneArgs;
+    type Sample = Loading<Self>;
+
     const NAME: &'static str = "large_scene";
     const ABOUT: &'static str = "Renders millions of triangles by rays, and writes pictures as PNG";
     const DETAILS: &'static str = "\
 Without --scene and --archive it shows a wooded valley made by code. Split and compacted structures are kept in the folder of \
 caches, so that the next start builds none.";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "the valley: two million triangles, 180 million with all trees"),
-        ("--triangles 20000000 --copies 5000", "a larger one"),
-        ("--layout combined --copies 20", "every tree's triangles in one mesh"),
-        ("--archive dir", "all OBJ files below dir, four of each, along streets"),
-        ("--scene kitchen --scene bunny.obj", "two of them"),
-        ("--profile mali-g715", "as on a phone: ray queries, meshes split into many parts"),
-        ("--show instances --window", "which instance is where, in a window"),
-    ];
-    type Args = LargeSceneArgs;
-    type Sample = Loading<Self>;
+    const EXAMPLES: &'static str = "
+        | the valley: two million triangles, 180 million with all trees
+        --triangles 20000000 --copies 5000 | a larger one
+        --layout combined --copies 20 | every tree's triangles in one mesh
+        --archive dir | all OBJ files below dir, four of each, along streets
+        --scene kitchen --scene bunny.obj | two of them
+        --profile mali-g715 | as on a phone: ray queries, meshes split into many parts
+        --show instances --window | which instance is where, in a window
+    ";
+    const ROUND: &'static str = "";
 
     fn pipelines() -> Vec<SamplePipeline> {
         RAYS.pipelines()

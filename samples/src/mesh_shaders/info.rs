@@ -4,11 +4,7 @@ use clap::Args;
 
 use super::MeshShaders;
 use super::pipelines::MESHLETS;
-use crate::app::cli::{ReadySample, SampleSetup};
-use crate::app::device::DeviceNeeds;
-use crate::app::run_error::RunError;
-use crate::app::sample_info::{Example, SEQUENCE, SampleInfo};
-use crate::pipelines::SamplePipeline;
+use crate::app::sample_info::prelude::*;
 
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -19,18 +15,18 @@ pub struct MeshShadersArgs {
 }
 
 impl SampleInfo for MeshShaders {
+    type Args = MeshShadersArgs;
+    type Sample = Self;
+
     const NAME: &'static str = "mesh_shaders";
     const ABOUT: &'static str =
         "Draws a knot of meshlets by task and mesh shaders, and writes pictures as PNG";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "a picture, by the best device"),
-        ("--window", "in a window; hold the culling there, and look at it from elsewhere"),
-        ("--no-culling --frames 100", "what culling saves"),
-        ("--validate", "with validation"),
-        SEQUENCE,
-    ];
-    type Args = MeshShadersArgs;
-    type Sample = Self;
+    const EXAMPLES: &'static str = "
+        | a picture, by the best device
+        --window | in a window; hold the culling there, and look at it from elsewhere
+        --no-culling --frames 100 | what culling saves
+        --validate | with validation
+    ";
 
     fn pipelines() -> Vec<SamplePipeline> {
         vec![MESHLETS.data()]

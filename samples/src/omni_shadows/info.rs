@@ -4,12 +4,8 @@ use clap::Args;
 
 use super::config::{Faces, OmniShadowsConfig, ShadowFilter};
 use super::{OmniShadows, pipelines};
-use crate::app::cli::{ReadySample, SampleSetup};
-use crate::app::device::DeviceNeeds;
-use crate::app::run_error::RunError;
-use crate::app::sample_info::{Example, SEQUENCE, SampleInfo};
+use crate::app::sample_info::prelude::*;
 use crate::app::value_parsers::{up_to, whole};
-use crate::pipelines::SamplePipeline;
 
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -54,18 +50,18 @@ impl OmniShadowsArgs {
 }
 
 impl SampleInfo for OmniShadows {
+    type Args = OmniShadowsArgs;
+    type Sample = Self;
+
     const NAME: &'static str = "omni_shadows";
     const ABOUT: &'static str =
         "Rasterises a lamp in a lattice and the shadows all around it, and writes pictures as PNG";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "a picture, by the best device"),
-        ("--window", "in a window with switches for all of the above"),
-        ("--faces single --filter hard", "the cube map face by face, compared with once a pixel"),
-        ("--lamp-radius 0.05 --haze 0", "a larger lamp in clear air"),
-        SEQUENCE,
-    ];
-    type Args = OmniShadowsArgs;
-    type Sample = Self;
+    const EXAMPLES: &'static str = "
+        | a picture, by the best device
+        --window | in a window with switches for all of the above
+        --faces single --filter hard | the cube map face by face, compared with once a pixel
+        --lamp-radius 0.05 --haze 0 | a larger lamp in clear air
+    ";
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::ALL.iter().map(|pipeline| pipeline.data()).collect()

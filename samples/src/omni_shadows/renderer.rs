@@ -171,12 +171,8 @@ impl Sample for OmniShadows {
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
-        Some(self.camera)
-    }
-
-    fn set_view(&mut self, camera: &Camera) {
-        self.camera = *camera;
+    fn camera_mut(&mut self) -> Option<&mut Camera> {
+        Some(&mut self.camera)
     }
 
     fn panel(&mut self, ui: &mut egui::Ui) {

@@ -5,15 +5,12 @@ use std::fmt::Write as _;
 use clap::Args;
 
 use super::{CullingCost, Reflections, ReflectionsConfig, pipelines};
-use crate::app::cli::{ReadySample, SampleSetup};
 use crate::app::device::device_text;
-use crate::app::run_error::RunError;
 use crate::app::sample::Sample as _;
-use crate::app::sample_info::{Example, SEQUENCE, SampleInfo};
+use crate::app::sample_info::prelude::*;
 use crate::app::scene_args::BuiltInSceneRayArgs;
 use crate::app::summary::path_text;
 use crate::app::value_parsers::{up_to, whole};
-use crate::pipelines::SamplePipeline;
 
 /// Frames that measure culling on a GPU, and on a driver that runs on the CPU.
 const GPU_ROUNDS: u32 = 25;
@@ -46,18 +43,18 @@ pub struct ReflectionsArgs {
 }
 
 impl SampleInfo for Reflections {
-    const NAME: &'static str = "reflections";
-    const ABOUT: &'static str = "Renders a hall with polished floors, water, glass, a serpent and drifting leaves, all of them reflected by ray tracing over a rasterised picture, and writes pictures as PNG";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "a picture, by the best path of the best device"),
-        ("--samples 16 --out hall.png", "a smoother one"),
-        SEQUENCE,
-        ("--compare-culling", "what leaving small instances out saves, in milliseconds"),
-        ("--rt query --validate", "by ray queries in compute shaders, with validation"),
-        ("--profile mali-g715", "as on a phone: ray queries, split meshes"),
-    ];
     type Args = ReflectionsArgs;
     type Sample = Self;
+
+    const NAME: &'static str = "reflections";
+    const ABOUT: &'static str = "Renders a hall with polished floors, water, glass, a serpent and drifting leaves, all of them reflected by ray tracing over a rasterised picture, and writes pictures as PNG";
+    const EXAMPLES: &'static str = "
+        | a picture, by the best path of the best device
+        --samples 16 --out hall.png | a smoother one
+        --compare-culling | what leaving small instances out saves, in milliseconds
+        --rt query --validate | by ray queries in compute shaders, with validation
+        --profile mali-g715 | as on a phone: ray queries, split meshes
+    ";
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

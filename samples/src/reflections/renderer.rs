@@ -262,7 +262,7 @@ impl Sample for Reflections {
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
+    fn view(&mut self) -> Option<Camera> {
         Some(self.camera)
     }
 

@@ -4,12 +4,8 @@ use clap::{Args, ValueEnum};
 
 use super::config::{Faces, RenderToCubeMapConfig};
 use super::{RenderToCubeMap, pipelines};
-use crate::app::cli::{ReadySample, SampleSetup};
-use crate::app::device::DeviceNeeds;
-use crate::app::run_error::RunError;
-use crate::app::sample_info::{Example, SEQUENCE, SampleInfo};
+use crate::app::sample_info::prelude::*;
 use crate::app::value_parsers::{up_to, whole};
-use crate::pipelines::SamplePipeline;
 
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -45,17 +41,17 @@ pub enum FacesArg {
 }
 
 impl SampleInfo for RenderToCubeMap {
-    const NAME: &'static str = "render_to_cube_map";
-    const ABOUT: &'static str = "Draws the surroundings of a drop into a cube map, which the drop mirrors, and writes pictures as PNG";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "a picture, by the best device"),
-        ("--window", "in a window, with a switch from six passes to one"),
-        ("--faces six-passes --validate", "a pass for each face, with validation"),
-        ("--roughness 0.6", "as if the drop were of brushed metal"),
-        ("--frames 0..240 --out dir/f_####.png", SEQUENCE.1),
-    ];
     type Args = RenderToCubeMapArgs;
     type Sample = Self;
+
+    const NAME: &'static str = "render_to_cube_map";
+    const ABOUT: &'static str = "Draws the surroundings of a drop into a cube map, which the drop mirrors, and writes pictures as PNG";
+    const EXAMPLES: &'static str = "
+        | a picture, by the best device
+        --window | in a window, with a switch from six passes to one
+        --faces six-passes --validate | a pass for each face, with validation
+        --roughness 0.6 | as if the drop were of brushed metal
+    ";
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

@@ -3,14 +3,10 @@
 use clap::Args;
 
 use super::{RtxAo, RtxAoConfig, pipelines};
-use crate::app::cli::{ReadySample, SampleSetup};
-use crate::app::device::DeviceNeeds;
 use crate::app::ray_args::RayArgs;
-use crate::app::run_error::RunError;
-use crate::app::sample_info::{Example, SEQUENCE, SampleInfo};
+use crate::app::sample_info::prelude::*;
 use crate::app::scene_args::SceneArgs;
 use crate::app::value_parsers::{positive, whole};
-use crate::pipelines::SamplePipeline;
 use crate::rtx::RtxConfig;
 use crate::scene::Scene;
 
@@ -53,20 +49,20 @@ impl RtxAoArgs {
 }
 
 impl SampleInfo for RtxAo {
+    type Args = RtxAoArgs;
+    type Sample = Self;
+
     const NAME: &'static str = "rtx_ao";
     const ABOUT: &'static str = "Renders a rasterised scene with ray traced sunlight and ambient occlusion, and writes pictures as PNG";
     const DETAILS: &'static str =
         "Without --scene it shows a town of paper made by code, around a carousel that turns.";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "a picture, by the best path of the best device"),
-        ("--passes 256", "a cleaner one"),
-        ("--frames 20", "the same passes added up over twenty frames, each of them timed"),
-        ("--scene courtyard --camera 2", "the scene of the hybrid sample"),
-        ("--rt query --validate", "by ray queries in the fragment shader, with validation"),
-        SEQUENCE,
-    ];
-    type Args = RtxAoArgs;
-    type Sample = Self;
+    const EXAMPLES: &'static str = "
+        | a picture, by the best path of the best device
+        --passes 256 | a cleaner one
+        --frames 20 | the same passes added up over twenty frames, each of them timed
+        --scene courtyard --camera 2 | the scene of the hybrid sample
+        --rt query --validate | by ray queries in the fragment shader, with validation
+    ";
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

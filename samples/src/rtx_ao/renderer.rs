@@ -252,7 +252,7 @@ impl Sample for RtxAo {
         Ok(())
     }
 
-    fn view(&self) -> Option<Camera> {
+    fn view(&mut self) -> Option<Camera> {
         Some(self.view.camera)
     }
 

@@ -3,14 +3,10 @@
 use clap::Args;
 
 use super::{RtxPipeline, RtxPipelineConfig, pipelines};
-use crate::app::cli::{ReadySample, SampleSetup};
-use crate::app::device::DeviceNeeds;
-use crate::app::ray_args::{QUERIES, RayArgs};
-use crate::app::run_error::RunError;
-use crate::app::sample_info::{Example, SampleInfo};
-use crate::app::scene_args::{CAMERA_TOUR, SceneArgs};
+use crate::app::ray_args::RayArgs;
+use crate::app::sample_info::prelude::*;
+use crate::app::scene_args::SceneArgs;
 use crate::app::value_parsers::whole;
-use crate::pipelines::SamplePipeline;
 use crate::rtx::RtxConfig;
 
 /// Arguments of the sample.
@@ -36,19 +32,20 @@ pub struct RtxPipelineArgs {
 }
 
 impl SampleInfo for RtxPipeline {
+    type Args = RtxPipelineArgs;
+    type Sample = Self;
+
     const NAME: &'static str = "rtx_pipeline";
     const ABOUT: &'static str = "Renders a textured scene by a ray tracing pipeline whose hit shaders trace on, and writes pictures as PNG";
     const DETAILS: &'static str = "Without --scene it shows a courtyard made by code.";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "the courtyard, by the best path of the best device"),
-        ("--rt pipeline --depth 0", "shadows alone"),
-        ("--scene kitchen.obj --camera 3", "an OBJ through its third camera"),
-        QUERIES,
-        ("--profile mali-g715", "as on a phone: ray queries, split meshes"),
-        CAMERA_TOUR,
-    ];
-    type Args = RtxPipelineArgs;
-    type Sample = Self;
+    const EXAMPLES: &'static str = "
+        | the courtyard, by the best path of the best device
+        --rt pipeline --depth 0 | shadows alone
+        --scene kitchen.obj --camera 3 | an OBJ through its third camera
+        --rt query --validate | by ray queries in a compute shader, with validation
+        --profile mali-g715 | as on a phone: ray queries, split meshes
+    ";
+    const ROUND: &'static str = "one round through all cameras";
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

@@ -1,21 +1,21 @@
 //! The description of the sample's program.
 
 use super::{RtxTextures, pipelines};
-use crate::app::cli::{ReadySample, SampleSetup};
-use crate::app::ray_args::{PROFILE, QUERIES};
-use crate::app::run_error::RunError;
-use crate::app::sample_info::{Example, SEQUENCE, SampleInfo};
+use crate::app::sample_info::prelude::*;
 use crate::app::scene_args::BuiltInSceneRayArgs;
-use crate::pipelines::SamplePipeline;
 
 impl SampleInfo for RtxTextures {
+    type Args = BuiltInSceneRayArgs;
+    type Sample = Self;
+
     const NAME: &'static str = "rtx_textures";
     const ABOUT: &'static str =
         "Renders textured crates and rings that a compute shader moves, and writes pictures as PNG";
-    const EXAMPLES: &'static [Example] =
-        &[("", "a picture, by the best path of the best device"), QUERIES, SEQUENCE, PROFILE];
-    type Args = BuiltInSceneRayArgs;
-    type Sample = Self;
+    const EXAMPLES: &'static str = "
+        | a picture, by the best path of the best device
+        --rt query --validate | by ray queries in a compute shader, with validation
+        --profile mali-g715 | as on a phone: ray queries
+    ";
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

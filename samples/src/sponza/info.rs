@@ -4,13 +4,9 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser as _};
 
 use super::{DrawPath, Sponza, SponzaConfig, pipelines};
-use crate::app::cli::{ReadySample, SampleSetup};
-use crate::app::device::DeviceNeeds;
-use crate::app::run_error::RunError;
-use crate::app::sample_info::{Example, SampleInfo};
-use crate::app::scene_args::{CAMERA_TOUR, SceneArgs};
+use crate::app::sample_info::prelude::*;
+use crate::app::scene_args::SceneArgs;
 use crate::app::value_parsers::whole;
-use crate::pipelines::SamplePipeline;
 use crate::scene::Scene;
 
 /// Arguments of the sample.
@@ -88,19 +84,20 @@ impl SponzaArgs {
 }
 
 impl SampleInfo for Sponza {
+    type Args = SponzaArgs;
+    type Sample = Self;
+
     const NAME: &'static str = "sponza";
     const ABOUT: &'static str =
         "Rasterises a large textured scene with shadows, culled on the GPU, and writes pictures as PNG";
     const DETAILS: &'static str = "Without --scene it shows a columned atrium made by code.";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "the atrium, by the best device"),
-        ("--scene crytek_sponza.obj --camera 2", "an OBJ through its second camera"),
-        ("--msaa 1 --filter 0 --no-culling", "the plainest picture"),
-        ("--window --hot-reload", "in a window, whose shaders can be changed meanwhile"),
-        CAMERA_TOUR,
-    ];
-    type Args = SponzaArgs;
-    type Sample = Self;
+    const EXAMPLES: &'static str = "
+        | the atrium, by the best device
+        --scene crytek_sponza.obj --camera 2 | an OBJ through its second camera
+        --msaa 1 --filter 0 --no-culling | the plainest picture
+        --window --hot-reload | in a window, whose shaders can be changed meanwhile
+    ";
+    const ROUND: &'static str = "one round through all cameras";
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

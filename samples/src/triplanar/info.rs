@@ -5,11 +5,7 @@ use clap::builder::PossibleValuesParser;
 
 use super::Triplanar;
 use super::pipelines::MODELS;
-use crate::app::cli::{ReadySample, SampleSetup};
-use crate::app::device::DeviceNeeds;
-use crate::app::run_error::RunError;
-use crate::app::sample_info::{Example, SEQUENCE, SampleInfo};
-use crate::pipelines::SamplePipeline;
+use crate::app::sample_info::prelude::*;
 use crate::scene::PAINTED;
 
 /// Arguments of the sample.
@@ -34,17 +30,17 @@ impl TriplanarArgs {
 }
 
 impl SampleInfo for Triplanar {
+    type Args = TriplanarArgs;
+    type Sample = Self;
+
     const NAME: &'static str = "triplanar";
     const ABOUT: &'static str =
         "Draws bodies without texture coordinates, by textures along three axes, and writes pictures as PNG";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "a picture, by the best device"),
-        ("--window", "in a window, where textures come and go"),
-        ("--unload brick,leaves --validate", "what a placeholder looks like, with validation"),
-        SEQUENCE,
-    ];
-    type Args = TriplanarArgs;
-    type Sample = Self;
+    const EXAMPLES: &'static str = "
+        | a picture, by the best device
+        --window | in a window, where textures come and go
+        --unload brick,leaves --validate | what a placeholder looks like, with validation
+    ";
 
     fn pipelines() -> Vec<SamplePipeline> {
         vec![MODELS.data()]

@@ -5,11 +5,7 @@ use clap::Args;
 use super::Yuv;
 use super::config::{CONVERSIONS, YuvConfig, YuvFormat, YuvModel, YuvRange};
 use super::pipelines::{PICTURE, PLANES};
-use crate::app::cli::{ReadySample, SampleSetup};
-use crate::app::device::DeviceNeeds;
-use crate::app::run_error::RunError;
-use crate::app::sample_info::{Example, SEQUENCE, SampleInfo};
-use crate::pipelines::SamplePipeline;
+use crate::app::sample_info::prelude::*;
 
 /// Arguments of the sample.
 #[derive(Debug, Clone, PartialEq, Args)]
@@ -41,19 +37,16 @@ impl YuvArgs {
 }
 
 impl SampleInfo for Yuv {
-    const NAME: &'static str = "yuv";
-    const ABOUT: &'static str = "Shows a moving picture in Y'CbCr, and writes pictures as PNG";
-    const EXAMPLES: &'static [Example] = &[
-        ("", "a picture, in the first format that the device has"),
-        ("--window", "in a window, where N goes on to the next format"),
-        (
-            "--format p010 --model bt2020 --show-planes",
-            "ten bits, as of ultra high definition, and the planes beside it",
-        ),
-        SEQUENCE,
-    ];
     type Args = YuvArgs;
     type Sample = Self;
+
+    const NAME: &'static str = "yuv";
+    const ABOUT: &'static str = "Shows a moving picture in Y'CbCr, and writes pictures as PNG";
+    const EXAMPLES: &'static str = "
+        | a picture, in the first format that the device has
+        --window | in a window, where N goes on to the next format
+        --format p010 --model bt2020 --show-planes | ten bits, as of ultra high definition, and the planes beside it
+    ";
 
     fn pipelines() -> Vec<SamplePipeline> {
         vec![PICTURE.data(), PLANES.data()]

@@ -84,7 +84,7 @@ fn pixel_rays(camera: &Camera) -> Vec<Ray> {
 }
 
 /// Whether each pixel lies in shadow as rays find it; `None` where that cannot be told, or the lamp is behind the surface.
-fn traced_shadows(ctx: &Context, sample: &OmniShadows) -> Vec<Option<bool>> {
+fn traced_shadows(ctx: &Context, sample: &mut OmniShadows) -> Vec<Option<bool>> {
     let [casters, others] = sample.triangles();
     let everything = [&casters[..], &others[..]].concat();
     let (all, _all_blas) = structure(ctx, &everything);
@@ -117,7 +117,7 @@ fn check_shadows(ctx: &Context, view: &Camera) -> [usize; 2] {
         sample.set_view(view);
         picture_now(sample)
     });
-    let expected = traced_shadows(ctx, &shadowed);
+    let expected = traced_shadows(ctx, &mut shadowed);
     let (width, mut counts, mut wrong) = (SIZE[0] as usize, [0, 0], Vec::new());
     for (x, y, pixel) in pictures[0].enumerate_pixels() {
         let (x, y) = (x as usize, y as usize);

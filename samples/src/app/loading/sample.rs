@@ -175,8 +175,8 @@ impl<S: Sample> Sample for Loading<S> {
         self.sample().is_some_and(S::stands_at_first)
     }
 
-    fn view(&self) -> Option<Camera> {
-        self.sample().and_then(S::view)
+    fn view(&mut self) -> Option<Camera> {
+        self.sample_mut().and_then(S::view)
     }
 
     fn set_view(&mut self, camera: &Camera) {
