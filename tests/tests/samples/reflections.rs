@@ -172,7 +172,7 @@ fn what_culling_saves_is_measured_and_changes_nothing() {
 
 /// The length of rays for roughness 0, 0.01 and so on to 1, by the shaders' own text.
 fn ranges_by_shader(ctx: &Context) -> Vec<f32> {
-    let (_, rule) = INCLUDES.iter().find(|(name, _)| *name == "reflections/range.glsl").unwrap();
+    let (_, rule) = INCLUDES.iter().find(|(name, _)| *name == "reflections/ray_range.glsl").unwrap();
     let main = "
         layout(local_size_x = 1) in;
         layout(buffer_reference, scalar) writeonly buffer Ranges { float at[]; };

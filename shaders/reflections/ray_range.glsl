@@ -1,4 +1,4 @@
-// How far reflected rays go. A rough surface blurs what is far away beyond recognition, so its rays may end early:
+// The range of reflected rays. A rough surface blurs distant geometry beyond recognition, so its rays may end early:
 // `reflections::range` in Rust has the same rule and says why.
 #ifndef REFLECTIONS_RANGE
 #define REFLECTIONS_RANGE

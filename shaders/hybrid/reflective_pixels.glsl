@@ -6,7 +6,7 @@
 // Threads of a workgroup that follows rays by query.
 const uint kBounceGroup = 64u;
 
-// How many pixels wait, as arguments of the launch that takes them on.
+// Number of queued pixels, as arguments of their launch.
 layout(buffer_reference, scalar, buffer_reference_align = 8) buffer BounceHead {
     uvec3 rays; // of an indirect trace: x pixels
     uvec3 groups; // of an indirect dispatch

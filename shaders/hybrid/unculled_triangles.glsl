@@ -1,4 +1,4 @@
-// How culled triangles are counted.
+// Counts the triangles that culling leaves.
 #ifndef HYBRID_SURVIVORS
 #define HYBRID_SURVIVORS
 
