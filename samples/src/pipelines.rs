@@ -70,6 +70,10 @@ impl SampleStage {
 }
 
 /// The kind of a stage by the end of its name.
+#[expect(
+    clippy::panic,
+    reason = "names are literals in constants, where a panic is an error of the compiler"
+)]
 const fn kind_of(name: &str) -> ShaderStage {
     let bytes = name.as_bytes();
     let mut dot = bytes.len();

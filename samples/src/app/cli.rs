@@ -197,7 +197,7 @@ impl<'a> SampleSetup<'a> {
         Ok((context, config))
     }
 
-    /// Whether the sample is for a window, where it may be [loading](super::loading::Loading) while others are shown.
+    /// True if the sample is for a window, where it may be [loading](super::loading::Loading) while others are shown.
     #[must_use]
     pub fn is_for_window(&self) -> bool {
         self.window.is_some()
@@ -211,7 +211,7 @@ impl<'a> SampleSetup<'a> {
         caches.map(|caches| caches.structures().to_owned())
     }
 
-    /// Prints warnings to standard error, past the progress bar.
+    /// Prints warnings to standard error, after pausing the progress bar.
     pub fn warn(&mut self, warnings: &[String]) {
         if !warnings.is_empty() {
             self.progress.pause();

@@ -33,7 +33,7 @@ impl FrameName {
         Self { path: path.to_owned(), place }
     }
 
-    /// Whether frames have names of their own.
+    /// True if frames have names of their own.
     #[must_use]
     pub fn has_number(&self) -> bool {
         self.place.is_some()

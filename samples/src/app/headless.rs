@@ -13,7 +13,7 @@ use super::sequence::FrameSource;
 pub struct Rendered {
     /// The picture, as [`Sample::record`] has it.
     pub picture: TextureHandle,
-    /// What its passes took.
+    /// GPU times of the passes.
     pub times: PassTimes,
 }
 

@@ -9,7 +9,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use super::loading::{Status, Stopped};
 
-/// How long work may take before anything is shown.
+/// Delay before the progress is displayed.
 const PATIENCE: Duration = Duration::from_secs(2);
 /// Time between two looks at the clock, and two steps of the spinner.
 const TICK: Duration = Duration::from_millis(100);
@@ -57,7 +57,7 @@ impl Progress {
         Self { lines: (!visible.is_seen).then(Lines::default), ..visible }
     }
 
-    /// Progress that nobody sees.
+    /// Progress without output.
     pub fn hidden() -> Self {
         let timing = Timing { start: Instant::now(), patience: PATIENCE, tick: TICK };
         let target = ProgressDrawTarget::stderr;

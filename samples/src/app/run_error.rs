@@ -1,4 +1,4 @@
-//! Why a sample's program ended without its picture.
+//! Errors of a sample's program.
 
 use super::interrupt;
 use super::png::PngError;
@@ -6,11 +6,11 @@ use super::sample_error::SampleError;
 use crate::driver::DriverError;
 use crate::scene::SceneError;
 
-/// Why a sample's program ended without its picture.
+/// Errors of a sample's program.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunError {
-    /// What the user can mend by other arguments or input.
+    /// Wrong arguments or input.
     #[error("{0}")]
     Input(Box<dyn std::error::Error + Send + Sync>),
     /// Trouble with the device.
@@ -63,7 +63,7 @@ pub enum RunError {
     /// There is no window to be had.
     #[error("no window can be opened: {reason}; without --window the sample writes its picture")]
     NoWindow {
-        /// What the window system said.
+        /// Error of the window system.
         reason: String,
     },
     /// The window holds its pixels in a way that no picture is made of.
@@ -87,7 +87,7 @@ pub enum RunError {
         done: u32,
         /// Frames that were asked for.
         count: u32,
-        /// How to go on.
+        /// The command that continues.
         hint: &'static str,
     },
 }

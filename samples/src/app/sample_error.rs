@@ -1,4 +1,4 @@
-//! Why a sample cannot render.
+//! Errors of a sample.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use lvk::{Capabilities, Context};
 use super::interrupt;
 use super::loading::Stopped;
 
-/// Why a sample cannot render.
+/// Errors of a sample.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SampleError {
@@ -61,7 +61,7 @@ pub enum SampleError {
         device: String,
         /// The missing feature.
         what: &'static str,
-        /// How the user can avoid it.
+        /// The remedy for the user.
         remedy: &'static str,
     },
     /// The device cannot trace rays.

@@ -7,15 +7,14 @@
 //! use crate::app::sample_info::prelude::*;
 //!
 //! impl SampleInfo for Cloud {
-//!     type Args = NoArgs;
-//!     type Sample = Self;
-//!
 //!     const NAME: &'static str = "cloud";
 //!     const ABOUT: &'static str = "Draws a cloud, and writes pictures as PNG";
 //!     const EXAMPLES: &'static str = "
 //!         | a picture, by the best device
 //!         --validate | with validation
 //!     ";
+//!     type Args = NoArgs;
+//!     type Sample = Self;
 //!
 //!     fn pipelines() -> Vec<SamplePipeline> {
 //!         vec![CLOUD.data()]

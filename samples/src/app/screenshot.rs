@@ -24,7 +24,7 @@ pub struct Screenshot {
     texels: Texels,
 }
 
-/// How a pixel lies in memory.
+/// Memory layout of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Texels {
     /// A byte a channel, red first.

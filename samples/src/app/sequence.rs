@@ -1,4 +1,4 @@
-//! Renders the frames that are asked for, and writes those of a sequence as they are done.
+//! Renders frames, and writes the images of a sequence as they are done.
 
 use std::path::Path;
 
@@ -12,9 +12,9 @@ use super::run_error::RunError;
 use super::sample::FrameTime;
 use super::timings::Timings;
 
-/// What can be played: [`Headless`](super::headless::Headless) does it for samples.
+/// A source of frames: [`Headless`](super::headless::Headless) is one for samples.
 pub trait FrameSource {
-    /// Goes to a moment.
+    /// Moves the animation to `time`.
     ///
     /// # Errors
     /// Its own.
@@ -36,10 +36,10 @@ pub trait FrameSource {
     fn picture(&self) -> Result<Vec<u8>, RunError>;
 }
 
-/// What to render and where to.
+/// The frames to render and the images to write.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RenderJob {
-    /// Which frames.
+    /// The frames.
     pub frames: Frames,
     /// Frames that are rendered first and not timed, so that clocks are up.
     pub warm_up: u32,
@@ -49,14 +49,14 @@ pub struct RenderJob {
     pub size: [u32; 2],
     /// Names of the pictures.
     pub out: FrameName,
-    /// Whether pictures that are there are left as they are.
+    /// True if pictures that are there are left as they are.
     pub resume: bool,
 }
 
-/// What was done.
+/// The result of a job.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct RenderReport {
-    /// What the passes took.
+    /// GPU times of the passes.
     pub timings: Timings,
     /// Pictures written.
     pub written: u32,

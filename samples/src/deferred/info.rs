@@ -29,9 +29,6 @@ pub struct DeferredArgs {
 }
 
 impl SampleInfo for Deferred {
-    type Args = DeferredArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "deferred";
     const ABOUT: &'static str = "Lights a hall by hundreds of small lights, deferred and in one pass where the device can, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
@@ -40,6 +37,8 @@ impl SampleInfo for Deferred {
         --lights 4096 --view normals | what the lights look at
         --window --hot-reload | in a window, with switches for all of it
     ";
+    type Args = DeferredArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

@@ -20,16 +20,16 @@ const ONE_PASS: &[(&str, &str)] = &[("ONE_PASS", "1")];
 /// The same of the shine around lights.
 const GLOW: &[(&str, &str)] = &[("GLOW", "1")];
 
-/// What a frame is made of, in its order.
+/// The draws of a frame, in order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Draw {
-    /// What everything solid is like.
+    /// Material of all solid surfaces.
     Surfaces,
     /// The lights themselves.
     Orbs,
     /// Light from nowhere in particular.
     Ambient,
-    /// What the lights do to surfaces.
+    /// Light of the lamps on surfaces.
     Lights,
     /// The shine around them.
     Glow,

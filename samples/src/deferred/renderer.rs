@@ -39,7 +39,7 @@ pub struct Deferred {
     exposure: f32,
 }
 
-/// What is different by [`Passes`].
+/// Resources that depend on [`Passes`].
 struct PassResources {
     passes: Passes,
     targets: Targets,
@@ -103,7 +103,7 @@ impl Deferred {
         })
     }
 
-    /// How surfaces come to those who light them: in the last frame, or in the first where there was none yet.
+    /// The passes of the last frame, or of the first where none was rendered yet.
     pub fn passes(&self) -> Passes {
         self.resources.passes
     }
@@ -272,7 +272,7 @@ impl Sample for Deferred {
     }
 }
 
-/// Where the animation looks from.
+/// The camera of the animation at `phase` of the round, 0 to 1.
 fn camera(phase: f32) -> Camera {
     let (sine, cosine) = (TAU * phase).sin_cos();
     Camera::looking_at([1.5 + 0.9 * sine, 1.75, 9.6 + 0.5 * cosine], [-0.55 - 0.5 * sine, 1.95, -12.0], 50.0)

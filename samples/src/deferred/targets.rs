@@ -1,4 +1,4 @@
-//! What the sample draws to.
+//! The render targets of the sample.
 
 use crate::app::sample_error::SampleError;
 use lvk::{

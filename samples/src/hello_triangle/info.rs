@@ -5,9 +5,6 @@ use super::renderer::TRIANGLE;
 use crate::app::sample_info::prelude::*;
 
 impl SampleInfo for HelloTriangle {
-    type Args = NoArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "hello_triangle";
     const ABOUT: &'static str =
         "Rasterises a turning triangle, the first thing to draw, and writes pictures as PNG";
@@ -16,6 +13,8 @@ impl SampleInfo for HelloTriangle {
         --window --hot-reload | in a window, whose shaders can be changed meanwhile
         --validate | with validation
     ";
+    type Args = NoArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         vec![TRIANGLE.data()]

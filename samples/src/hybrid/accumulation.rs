@@ -1,4 +1,4 @@
-//! Where the light of pixels ends: the picture, and the sums of samples on the way to it.
+//! The image and the sums of samples that it is resolved from.
 
 use lvk::{BufferHandle, Context, Holder, TextureHandle};
 

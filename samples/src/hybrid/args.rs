@@ -100,7 +100,7 @@ pub enum Raster {
     Hardware,
 }
 
-/// When the rays of mirrors and glass are followed.
+/// The time at which rays of mirrors and glass are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Bounces {
     /// What suits the device and the method.

@@ -91,7 +91,7 @@ impl ComputeRaster {
         Ok(())
     }
 
-    /// What the ray pass reads.
+    /// Resources that the ray pass reads.
     pub(super) fn words(&self) -> BufferHandle {
         self.words.handle()
     }

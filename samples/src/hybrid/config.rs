@@ -1,4 +1,4 @@
-//! What to render, and by which means of the device.
+//! The configuration of the sample.
 
 use crate::app::sample_error::SampleError;
 use lvk::{Capabilities, RayQueryPath};
@@ -6,7 +6,7 @@ use lvk::{Capabilities, RayQueryPath};
 use super::args;
 use crate::app::ray_args::RayTracing;
 
-/// How primary visibility is found.
+/// The method that finds primary visibility.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Method {
     /// Every pixel's ray is traced.
@@ -16,7 +16,7 @@ pub enum Method {
     Hybrid,
 }
 
-/// What the hybrid method's geometry pass leaves for the ray pass.
+/// The output of the hybrid method's geometry pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Geometry {
     /// Position, normals, albedo and triangle of each pixel, as in the paper.
@@ -68,7 +68,7 @@ impl Default for RasterTuning {
     }
 }
 
-/// When the rays of mirrors and glass are followed.
+/// The time at which rays of mirrors and glass are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Bounces {
     /// At once, by the thread of the pixel.
@@ -89,10 +89,10 @@ pub enum RayPath {
     Query,
 }
 
-/// What to render.
+/// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HybridConfig {
-    /// How primary visibility is found.
+    /// The method that finds primary visibility.
     pub method: Method,
     /// By which part of Vulkan rays are traced.
     pub path: RayPath,
@@ -100,13 +100,13 @@ pub struct HybridConfig {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// How often a ray may be reflected or refracted, 0 to [`HybridConfig::MAX_DEPTH`].
+    /// Largest number of reflections and refractions of a ray, 0 to [`HybridConfig::MAX_DEPTH`].
     pub max_depth: u32,
-    /// When reflected and refracted rays are followed; `None` for what suits the device.
+    /// The time at which reflected and refracted rays are traced; `None` for the one that suits the device.
     pub bounces: Option<Bounces>,
     /// Views of each pixel, evenly spread over it, whose average it shows: 1 to [`HybridConfig::MAX_SAMPLES`].
     pub samples: u32,
-    /// What the geometry pass leaves; nothing where the method has none.
+    /// The output of the geometry pass; unused where the method has none.
     pub geometry: Geometry,
     /// Numbers of the compute rasteriser.
     pub tuning: RasterTuning,
@@ -135,7 +135,7 @@ impl HybridConfig {
     /// The largest number of samples.
     pub const MAX_SAMPLES: u32 = args::MAX_SAMPLES;
 
-    /// Whether the triangles that pixels show are known before any ray is traced.
+    /// True if the triangles that pixels show are known before any ray is traced.
     pub(super) fn knows_triangles(&self) -> bool {
         self.method == Method::Hybrid && matches!(self.geometry, Geometry::Visibility(_))
     }

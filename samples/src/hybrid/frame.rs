@@ -73,7 +73,7 @@ impl Lighting {
         }
     }
 
-    /// How many lights there are.
+    /// Number of lights.
     pub(crate) fn light_count(&self) -> u32 {
         self.light_count
     }

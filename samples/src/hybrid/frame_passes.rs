@@ -120,7 +120,7 @@ impl FramePasses {
         self.rays.record(cmd, self.width, &push, &self.left(), &self.accumulation)
     }
 
-    /// What the geometry pass and the order of pixels left.
+    /// Resources that the geometry pass and the pixel order leave.
     fn left(&self) -> GeometryLeft {
         let mut left = self.geometry.left();
         left.buffers.extend(self.order.as_ref().map(PixelOrder::buffer));

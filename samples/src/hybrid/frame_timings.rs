@@ -1,4 +1,4 @@
-//! What the passes of a frame took on the GPU.
+//! GPU times of the passes of a frame.
 
 use crate::app::pass_times::PassTimes;
 

@@ -15,7 +15,7 @@ use super::shader_module::module;
 /// Triangle number of pixels that show the sky (`kNoTriangle` in `shaders/hybrid/hit.glsl`).
 pub(super) const NO_TRIANGLE: u32 = u32::MAX;
 
-/// What the geometry pass leaves for the ray pass, a texel a pixel.
+/// The output of the geometry pass, a texel a pixel.
 pub(super) struct GBuffer {
     /// Position in scene units, and distance from the eye.
     position: Holder<TextureHandle>,
@@ -56,7 +56,7 @@ impl GBuffer {
         })
     }
 
-    /// What the ray pass reads.
+    /// Resources that the ray pass reads.
     pub(super) fn textures(&self) -> [TextureHandle; 3] {
         [&self.position, &self.surface, &self.albedo].map(Holder::handle)
     }

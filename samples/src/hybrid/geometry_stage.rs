@@ -1,4 +1,4 @@
-//! What comes before the ray pass, if anything does.
+//! The geometry stage, before the ray pass.
 
 use lvk::{CommandBuffer, Context};
 
@@ -10,7 +10,7 @@ use super::raster_choice::RasterChoice;
 use super::ray_pass::GeometryLeft;
 use super::visibility_pass::VisibilityPass;
 
-/// What comes before the ray pass.
+/// The geometry stage, before the ray pass.
 pub(super) enum GeometryStage {
     None,
     Paper(GeometryPass),
@@ -40,7 +40,7 @@ impl GeometryStage {
         }
     }
 
-    /// What it leaves for the ray pass.
+    /// Resources that the stage leaves for the ray pass.
     pub(super) fn left(&self) -> GeometryLeft {
         match self {
             Self::None => GeometryLeft::default(),
@@ -51,7 +51,7 @@ impl GeometryStage {
         }
     }
 
-    /// Where the shaders find everything.
+    /// Addresses and indices for the shaders.
     pub(super) fn addresses(&self) -> VisibilityAddresses {
         match self {
             Self::Visibility(pass) => pass.addresses(),
@@ -66,7 +66,7 @@ impl GeometryStage {
         }
     }
 
-    /// Which rasteriser is in use, and why.
+    /// The rasteriser in use, and the reason.
     pub(super) fn choice(&self) -> Option<RasterChoice> {
         match self {
             Self::Visibility(pass) => Some(pass.choice()),
@@ -74,7 +74,7 @@ impl GeometryStage {
         }
     }
 
-    /// Whether there is a choice of rasterisers.
+    /// True if there is a choice of rasterisers.
     pub(super) fn has_both(&self) -> bool {
         matches!(self, Self::Visibility(pass) if pass.has_both())
     }

@@ -82,7 +82,7 @@ impl GpuScene {
         })
     }
 
-    /// Where the shaders find the arrays.
+    /// Addresses of the arrays.
     pub(crate) fn addresses(&self) -> SceneAddresses {
         self.arrays.addresses()
     }
@@ -92,7 +92,7 @@ impl GpuScene {
         self.arrays.triangles()
     }
 
-    /// How many bottom-level structures there are: one for opaque and one for refractive triangles.
+    /// Number of BLASes: one for opaque and one for refractive triangles.
     pub(crate) fn blas_count(&self) -> usize {
         self.blas.len()
     }

@@ -15,7 +15,7 @@ use super::frame::{Push, VisibilityAddresses};
 use super::geometry_pass::NO_TRIANGLE;
 use super::shader_module::module;
 
-/// Triangles of a workgroup (`kTrianglesPerGroup` in `shaders/hybrid/survivors.glsl`).
+/// Triangles of a workgroup (`kTrianglesPerGroup` in `shaders/hybrid/unculled_triangles.glsl`).
 const GROUP: u32 = 256;
 /// Bytes of the arguments of an indexed draw.
 const DRAW_BYTES: u32 = 20;
@@ -31,7 +31,7 @@ pub(super) struct HardwareRaster {
     groups: [u32; 3],
 }
 
-/// What culling leaves.
+/// Triangles that remain after culling.
 struct Survivors {
     bits: Holder<BufferHandle>,
     counts: Holder<BufferHandle>,
@@ -74,7 +74,7 @@ impl HardwareRaster {
         Ok(())
     }
 
-    /// What the ray pass reads.
+    /// Resources that the ray pass reads.
     pub(super) fn image(&self) -> &Holder<TextureHandle> {
         &self.image
     }

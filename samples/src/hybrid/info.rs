@@ -16,9 +16,6 @@ use crate::app::summary::path_text;
 use crate::scene::Scene;
 
 impl SampleInfo for HybridSequence {
-    type Args = HybridArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "hybrid";
     const ABOUT: &'static str =
         "Renders a scene with ray traced shadows, reflections and refractions, and writes pictures as PNG";
@@ -39,6 +36,8 @@ impl SampleInfo for HybridSequence {
     const NOTES: &'static str = "\
 Frame N of a sequence depends on N alone, so any number of processes may share one. Ctrl-C ends after the frame under way;
 pictures get their names when they are complete. A film of them: ffmpeg -framerate 30 -i dir/frame_%04d.png film.mp4";
+    type Args = HybridArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

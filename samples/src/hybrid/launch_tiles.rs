@@ -1,4 +1,4 @@
-//! How an image is cut into launches.
+//! Splits an image into launches.
 
 use std::ops::Range;
 

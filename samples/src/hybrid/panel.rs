@@ -1,4 +1,4 @@
-//! What the panel of the window changes.
+//! Settings in the panel of the window.
 
 use egui::{Slider, Ui};
 use lvk::Capabilities;
@@ -85,7 +85,7 @@ fn show_bounces(ui: &mut Ui, config: &mut HybridConfig, capabilities: &Capabilit
     });
 }
 
-/// Whether the device can render by `config`.
+/// True if the device can render by `config`.
 fn can_be(config: &HybridConfig, capabilities: &Capabilities) -> bool {
     let can_queue = config.path == RayPath::Query || capabilities.trace_rays_indirect;
     config.check(capabilities).is_ok() && (can_queue || config.bounces != Some(Bounces::Queued))

@@ -39,12 +39,12 @@ impl PixelOrder {
         })
     }
 
-    /// Where the shaders find it.
+    /// Address of the buffer.
     pub(super) fn address(&self, ctx: &Context) -> lvk::Result<u64> {
         ctx.buffer_address(*self.order)
     }
 
-    /// What the ray pass reads.
+    /// Resources that the ray pass reads.
     pub(super) fn buffer(&self) -> BufferHandle {
         *self.order
     }

@@ -1,4 +1,4 @@
-//! Which rasteriser finds the visible triangles.
+//! The choice of the rasteriser that finds visible triangles.
 
 use std::fmt;
 
@@ -9,7 +9,7 @@ use super::config::Raster;
 pub struct RasterChoice {
     /// The rasteriser.
     pub raster: Raster,
-    /// Why it was taken.
+    /// The reason for the choice.
     pub why: String,
 }
 

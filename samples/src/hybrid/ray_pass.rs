@@ -28,11 +28,11 @@ const BOUNCES: u32 = 1;
 pub(super) struct RayPass {
     pipeline: Pipeline,
     queue: Option<ReflectivePixels>,
-    /// Whether pixels are taken in their order and not by rows.
+    /// True if pixels are taken in their order and not by rows.
     ordered: bool,
 }
 
-/// What a geometry pass leaves for the ray pass to read.
+/// The resources that a geometry pass leaves for the ray pass.
 #[derive(Debug, Default)]
 pub(super) struct GeometryLeft {
     pub(super) textures: Vec<TextureHandle>,
@@ -61,7 +61,7 @@ impl RayPass {
         Ok(Self { pipeline, queue, ordered })
     }
 
-    /// Where the shaders find the queue.
+    /// Addresses of the queue.
     pub(super) fn reflective_pixel_addresses(&self, ctx: &Context) -> lvk::Result<ReflectivePixelAddresses> {
         self.queue.as_ref().map_or(Ok(bytemuck::Zeroable::zeroed()), |queue| queue.addresses(ctx))
     }
@@ -112,7 +112,7 @@ impl RayPass {
         Ok(())
     }
 
-    /// What shaders are told of the rows that `push` names, and how many threads that takes along each axis.
+    /// Push constants for the rows that `push` names, and the number of threads along each axis.
     fn launch(&self, width: u32, push: &Push) -> (Push, [u32; 3]) {
         let rows = push.end.saturating_sub(push.first);
         if self.ordered {
@@ -131,7 +131,7 @@ impl RayPass {
     }
 }
 
-/// What all stages are compiled with.
+/// Macros and constants of all stages.
 struct Stages {
     defines: Vec<(&'static str, &'static str)>,
     specialization: [SpecializationConstant; 1],

@@ -24,9 +24,9 @@ pub(super) struct ReflectivePixels {
 }
 
 impl ReflectivePixels {
-    /// Where the size of an indirect trace stands in [`head`](Self::head).
+    /// Offset of the size of an indirect trace in [`head`](Self::head).
     pub(super) const RAYS: u64 = std::mem::offset_of!(Head, rays) as u64;
-    /// Where the groups of an indirect dispatch stand.
+    /// Offset of the workgroup count of an indirect dispatch.
     pub(super) const GROUPS: u64 = std::mem::offset_of!(Head, groups) as u64;
 
     /// A queue with room for `capacity` pixels.
@@ -53,7 +53,7 @@ impl ReflectivePixels {
         })
     }
 
-    /// Records that nobody waits.
+    /// Records the reset of the queue.
     pub(super) fn record_reset(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
         const COUNT_BYTES: u64 = 4;
         cmd.fill_buffer(*self.head, Self::RAYS, COUNT_BYTES, 0)?;

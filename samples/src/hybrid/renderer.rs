@@ -89,7 +89,7 @@ impl HybridRenderer {
         self.change(&HybridConfig { width, height, ..self.config })
     }
 
-    /// What is rendered, with all that the configuration left open decided.
+    /// The configuration with all its open choices decided.
     pub fn config(&self) -> &HybridConfig {
         &self.config
     }
@@ -139,7 +139,7 @@ impl HybridRenderer {
         self.passes.geometry.choice().map(|choice| choice.raster)
     }
 
-    /// Whether another one could be.
+    /// True if another one could be.
     pub(super) fn can_choose_raster(&self) -> bool {
         self.passes.geometry.has_both()
     }
@@ -162,7 +162,7 @@ impl HybridRenderer {
         Ok(self.ctx.download_texture(*self.passes.accumulation.picture, &TextureRegion::default())?)
     }
 
-    /// How many launch_tiles a frame is rendered in, those of all samples counted.
+    /// Number of launches of a frame, over all samples.
     pub fn band_count(&self) -> u64 {
         self.passes.launch_tiles.len() as u64 * u64::from(self.config.samples)
     }
@@ -172,7 +172,7 @@ impl HybridRenderer {
         self.scene.blas_build_ms
     }
 
-    /// How many bottom-level acceleration structures the scene has.
+    /// Number of BLASes of the scene.
     pub fn blas_count(&self) -> usize {
         self.scene.blas_count()
     }
@@ -228,7 +228,7 @@ fn suited(config: &HybridConfig, scene: &Scene, capabilities: &Capabilities) -> 
     }
 }
 
-/// Whether anything in the scene mirrors or refracts.
+/// True if anything in the scene mirrors or refracts.
 pub(super) fn goes_on(scene: &Scene) -> bool {
     scene.materials.iter().any(|material| material.reflectivity > 0.0 || material.is_refractive())
 }

@@ -1,4 +1,4 @@
-//! Whether a scene keeps the promises that the shaders rely on.
+//! True if a scene keeps the promises that the shaders rely on.
 
 use crate::app::sample_error::SampleError;
 use crate::scene::Scene;

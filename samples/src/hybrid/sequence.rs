@@ -23,7 +23,7 @@ pub struct HybridSequence {
     camera: Camera,
     wanted: PendingSettings<HybridConfig>,
     goes_on: bool,
-    /// Which scene it is, as the panel tells.
+    /// Description of the scene for the panel.
     scene: String,
 }
 
@@ -64,7 +64,7 @@ impl HybridSequence {
         }
     }
 
-    /// What its panel changes, from the next frame on.
+    /// Settings of the panel, which take effect with the next frame.
     pub fn wanted(&mut self) -> &mut HybridConfig {
         &mut self.wanted.config
     }

@@ -25,7 +25,7 @@ pub fn fit_textures(scene: &mut Scene, limits: &Limits) -> Result<Vec<String>, S
     Ok(all.filter_map(|texture| fit(texture, side)).collect())
 }
 
-/// How many textures the context for `scene` must have room for.
+/// Number of descriptor slots for textures that `scene` needs.
 pub fn textures_needed(scene: &Scene) -> u32 {
     u32::try_from(scene.textures.len() + scene.normal_maps.len())
         .unwrap_or(u32::MAX)

@@ -67,7 +67,7 @@ impl VisibilityPass {
         Ok(Self { compute, hardware, chosen, why: why.to_owned(), places })
     }
 
-    /// Where the shaders find everything, for the chosen rasteriser.
+    /// Addresses and indices for the shaders, of the chosen rasteriser.
     pub(super) fn addresses(&self) -> VisibilityAddresses {
         let image = self.target().map_or(NO_IMAGE, Holder::index);
         VisibilityAddresses { image, ..self.places }
@@ -84,12 +84,12 @@ impl VisibilityPass {
         compute.map(ComputeRaster::words).into_iter().collect()
     }
 
-    /// Which rasteriser is in use, and why.
+    /// The rasteriser in use, and the reason.
     pub(super) fn choice(&self) -> RasterChoice {
         RasterChoice { raster: self.chosen, why: self.why.clone() }
     }
 
-    /// Whether there is a choice.
+    /// True if there is a choice.
     pub(super) fn has_both(&self) -> bool {
         self.compute.is_some() && self.hardware.is_some()
     }

@@ -20,7 +20,7 @@ pub(super) const OTHER_INSTANCES: u32 = 2;
 /// Everything that shaders reach by address.
 pub(super) struct Buffers {
     pub(super) motions: Holder<BufferHandle>,
-    /// Where the spheres are; written every frame.
+    /// Positions of the spheres, written every frame.
     pub(super) spheres: Holder<BufferHandle>,
     pub(super) faces: Holder<BufferHandle>,
     pub(super) positions: Holder<BufferHandle>,
@@ -85,7 +85,7 @@ impl Buffers {
         Ok(())
     }
 
-    /// Where the shaders find them.
+    /// Addresses of the buffers.
     pub(super) fn addresses(&self, ctx: &Context) -> lvk::Result<Addresses> {
         let of = |buffer: &Holder<BufferHandle>| ctx.buffer_address(**buffer);
         Ok(Addresses {

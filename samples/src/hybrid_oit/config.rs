@@ -1,11 +1,11 @@
-//! What to render, and by which means of the device.
+//! The configuration of the sample.
 
 use crate::app::sample_error::SampleError;
 use lvk::Capabilities;
 
 use crate::hybrid::RayPath;
 
-/// What to render.
+/// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct HybridOitConfig {
     /// By which part of Vulkan rays are traced.

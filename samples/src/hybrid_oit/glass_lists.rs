@@ -18,14 +18,14 @@ pub struct NodeUse {
     pub capacity: u32,
 }
 
-/// What a node says, in any order within its pixel.
+/// A node of a list; nodes of a pixel have no order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GlassNode {
     /// Along the pixel's ray, in scene units.
     pub distance: f32,
-    /// What the surface adds, linear.
+    /// Light that the surface adds, linear.
     pub radiance: [f32; 3],
-    /// What is left of the light from behind, 0 to 1.
+    /// Transmitted share of the light from behind, 0 to 1.
     pub transmittance: [f32; 3],
 }
 

@@ -51,9 +51,6 @@ pub struct HybridOitArgs {
 }
 
 impl SampleInfo for HybridOit {
-    type Args = HybridOitArgs;
-    type Sample = HybridOitSequence;
-
     const NAME: &'static str = "hybrid_oit";
     const ABOUT: &'static str = "Renders blocks and drifting spheres of tinted glass, by the rasteriser with order-independent transparency and with ray traced coloured shadows, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
@@ -64,6 +61,8 @@ impl SampleInfo for HybridOit {
         --nodes 100000 | too few nodes: see what is lost
         --profile mali-g715 | as on a phone: ray queries
     ";
+    type Args = HybridOitArgs;
+    type Sample = HybridOitSequence;
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

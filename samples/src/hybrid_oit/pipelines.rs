@@ -1,4 +1,4 @@
-//! The stages of the sample's pipelines, as its passes use them and as data for those who compile them only.
+//! The stages of the sample's pipelines, for its passes and as data.
 
 use lvk::{Context, Format, Holder, ShaderModuleHandle};
 

@@ -74,19 +74,19 @@ impl HybridOit {
         self.scene.camera = *camera;
     }
 
-    /// From where the scene is seen.
+    /// The camera.
     #[must_use]
     pub fn camera(&self) -> &Camera {
         &self.scene.camera
     }
 
-    /// What is rendered.
+    /// The configuration.
     #[must_use]
     pub fn config(&self) -> &HybridOitConfig {
         &self.config
     }
 
-    /// Whether the device can render by `config`.
+    /// True if the device can render by `config`.
     pub(super) fn can_be(&self, config: &HybridOitConfig) -> bool {
         config.check(self.ctx.capabilities(), self.scene.glass.len()).is_ok()
     }
@@ -180,7 +180,7 @@ impl HybridOit {
         self.download(&self.targets.picture)
     }
 
-    /// How many nodes the glass of the last frame asked for, and how many there are.
+    /// Returns the number of nodes that the glass of the last frame asked for, and the number in the pool.
     ///
     /// # Errors
     /// [`SampleError::Device`].
@@ -200,7 +200,7 @@ impl HybridOit {
         Ok(GlassLists::read(&self.ctx, &self.buffers, count, asked.min(capacity))?)
     }
 
-    /// Where the opaque surface of each sample of the last frame is: x, y, z in scene units, and the distance from the
+    /// Positions of the opaque surface of each sample of the last frame: x, y, z in scene units, and the distance from the
     /// eye, which is 0 where the sky is seen.
     ///
     /// # Errors
@@ -211,7 +211,7 @@ impl HybridOit {
         Ok((0..bytes.len() / 16).map(|texel| [0, 4, 8, 12].map(|at| number(16 * texel + at))).collect())
     }
 
-    /// Which share of the sun's red, green and blue reaches each sample of the last frame (the
+    /// Share of the sun's red, green and blue that reaches each sample of the last frame (the
     /// fourth number is 1).
     ///
     /// # Errors

@@ -14,11 +14,11 @@ use crate::scene::Camera;
 /// The sample in an animation.
 pub struct HybridOitSequence {
     sample: HybridOit,
-    /// What frame 0 shows, in seconds.
+    /// Time that frame 0 shows, in seconds.
     start: f64,
-    /// How far the animation is from there, in seconds.
+    /// Time since then, in seconds.
     gone: f64,
-    /// Where the scene says that it is seen from.
+    /// The camera of the scene.
     camera: Camera,
     /// Of the frame that asked for most.
     nodes: NodeUse,
@@ -39,7 +39,7 @@ impl HybridOitSequence {
         }
     }
 
-    /// What its panel changes, from the next frame on.
+    /// Settings of the panel, which take effect with the next frame.
     pub fn wanted(&mut self) -> &mut HybridOitConfig {
         &mut self.wanted.config
     }

@@ -64,12 +64,12 @@ impl GpuWorld {
         })
     }
 
-    /// Where the shaders find the scene's arrays.
+    /// Addresses of the scene's arrays.
     pub(super) fn scene(&self) -> SceneAddresses {
         self.arrays.addresses()
     }
 
-    /// Where the shaders find places of instances and first triangles of pieces.
+    /// Addresses of the transforms of instances and of the first triangles of pieces.
     pub(super) fn tables(&self, ctx: &Context) -> lvk::Result<[u64; 2]> {
         Ok([ctx.buffer_address(*self.places)?, ctx.buffer_address(*self.firsts)?])
     }

@@ -97,7 +97,7 @@ pub struct LargeSceneArgs {
     pub tracing: RayArgs,
 }
 
-/// What becomes of what is shown more than once.
+/// The layout of scenes that are shown more than once.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Layout {
     /// One structure of each original, and instances of it.
@@ -124,9 +124,6 @@ impl LargeSceneArgs {
 }
 
 impl SampleInfo for LargeScene {
-    type Args = LargeSceneArgs;
-    type Sample = Loading<Self>;
-
     const NAME: &'static str = "large_scene";
     const ABOUT: &'static str = "Renders millions of triangles by rays, and writes pictures as PNG";
     const DETAILS: &'static str = "\
@@ -142,6 +139,8 @@ caches, so that the next start builds none.";
         --show instances --window | which instance is where, in a window
     ";
     const ROUND: &'static str = "";
+    type Args = LargeSceneArgs;
+    type Sample = Loading<Self>;
 
     fn pipelines() -> Vec<SamplePipeline> {
         RAYS.pipelines()

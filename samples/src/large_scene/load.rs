@@ -13,7 +13,7 @@ use crate::hybrid::fit_textures;
 use crate::rtx::RtxConfig;
 use crate::scene::{ObjOptions, Scene};
 
-/// What is to be loaded, on whichever thread.
+/// The parameters of loading, on any thread.
 pub(super) struct Load {
     pub(super) args: LargeSceneArgs,
     /// Width and height of the images in pixels.

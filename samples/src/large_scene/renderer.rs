@@ -3,7 +3,7 @@
 use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
-use lvk::{BufferHandle, Context, Dependencies, Holder, TextureHandle};
+use lvk::{BufferHandle, Context, Holder, TextureHandle};
 
 use super::figures::{Figures, Origin, bytes, number};
 use super::gpu_world::GpuWorld;
@@ -111,12 +111,12 @@ impl LargeScene {
         self
     }
 
-    /// What is rendered.
+    /// The configuration.
     pub fn config(&self) -> &LargeSceneConfig {
         &self.config
     }
 
-    /// What the world takes on the device, and where its structures came from.
+    /// Memory of the world on the device, and the origin of its acceleration structures.
     pub fn figures(&self) -> &Figures {
         &self.world.figures
     }
@@ -149,11 +149,8 @@ impl Sample for LargeScene {
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
         self.upload_frame()?;
-        let (extent, picture) = (self.config.rtx.extent(), self.target.image());
         let push = self.ctx.buffer_address(*self.frame)?;
-        let writes = Dependencies { storage_images: &[picture], ..Dependencies::default() };
-        frame.pass("rays", |cmd| self.tracer.record(cmd, &push, extent, &writes))?;
-        Ok(picture)
+        Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {

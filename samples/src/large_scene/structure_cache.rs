@@ -13,7 +13,7 @@ pub(super) struct StructureCache {
     folder: PathBuf,
 }
 
-/// What a structure is built from: the triangles of a piece, the device and its limits, and the flags.
+/// The key of a cached acceleration structure: the triangles of a piece, the device and its limits, and the flags.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct StructureKey(u64);
 
@@ -44,7 +44,7 @@ impl StructureCache {
         Self { folder: folder.to_owned() }
     }
 
-    /// Where the structure is kept.
+    /// Path of the cached structure.
     pub(super) fn path(&self, StructureKey(key): StructureKey) -> PathBuf {
         self.folder.join(format!("{key:016x}.blas"))
     }

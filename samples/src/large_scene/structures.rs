@@ -35,7 +35,7 @@ struct Blas {
     built_bytes: u64,
 }
 
-/// What structures are made of.
+/// Geometry of the acceleration structures.
 pub(super) struct Plan<'a> {
     pub(super) ctx: &'a Context,
     pub(super) world: &'a World,
@@ -44,7 +44,7 @@ pub(super) struct Plan<'a> {
     pub(super) compact: bool,
 }
 
-/// What became of the file of a piece.
+/// The result of loading the file of a piece.
 enum Found {
     Loaded(Holder<AccelStructHandle>),
     Nothing,
@@ -74,7 +74,7 @@ impl Structures {
         Ok(Self { tlas: plan.top_level(&blas)?, blas })
     }
 
-    /// What is known of each structure now.
+    /// Figures of each acceleration structure so far.
     pub(super) fn figures(&self, ctx: &Context, world: &World) -> lvk::Result<Vec<StructureFigures>> {
         let of_piece = |(blas, piece): (&Blas, &super::Piece)| {
             let info = ctx.accel_struct_info(*blas.holder)?;
@@ -228,7 +228,7 @@ impl Plan<'_> {
     }
 }
 
-/// Whether only the next start is slower for it: what is in a file, or has no room beside the structure.
+/// True if only the next start is slower for it: what is in a file, or has no room beside the structure.
 fn is_of_file(error: &Error) -> bool {
     use Error::{LimitExceeded, OutOfDeviceMemory, Serialized};
     matches!(error, Serialized { .. } | LimitExceeded { .. } | OutOfDeviceMemory { .. })

@@ -1,4 +1,4 @@
-//! What the sample shows: pieces of one large scene, and where instances of them stand.
+//! The scene of the sample: pieces of one large scene, and transforms of their instances.
 
 use crate::app::sample_error::SampleError;
 use std::ops::Range;
@@ -14,7 +14,7 @@ use crate::scene::{Scene, Valley};
 /// Most triangles that are put into one mesh.
 const MOST_COMBINED: u64 = 1 << 25;
 
-/// What the sample shows.
+/// The scene of the sample.
 #[derive(Debug, Clone)]
 pub struct World {
     pub(super) scene: Scene,
@@ -31,7 +31,7 @@ pub struct Piece {
     pub triangles: Range<u32>,
     /// Vertices that they name are in this range.
     pub vertices: Range<u32>,
-    /// Whether light passes through them.
+    /// True if light passes through them.
     pub is_refractive: bool,
 }
 
@@ -95,7 +95,7 @@ impl World {
         Ok(bake(self))
     }
 
-    /// What the world is called.
+    /// Name of the world.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.scene.name
@@ -107,7 +107,7 @@ impl World {
         &self.scene
     }
 
-    /// How many textures a context must have room for.
+    /// Number of descriptor slots for textures that the world needs.
     pub(super) fn textures_needed(&self) -> u32 {
         textures_needed(&self.scene)
     }
@@ -123,7 +123,7 @@ impl World {
         &self.pieces
     }
 
-    /// What is shown.
+    /// The instances.
     #[must_use]
     pub fn instances(&self) -> &[Instance] {
         &self.instances

@@ -15,9 +15,6 @@ pub struct MeshShadersArgs {
 }
 
 impl SampleInfo for MeshShaders {
-    type Args = MeshShadersArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "mesh_shaders";
     const ABOUT: &'static str =
         "Draws a knot of meshlets by task and mesh shaders, and writes pictures as PNG";
@@ -27,6 +24,8 @@ impl SampleInfo for MeshShaders {
         --no-culling --frames 100 | what culling saves
         --validate | with validation
     ";
+    type Args = MeshShadersArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         vec![MESHLETS.data()]

@@ -25,11 +25,11 @@ pub struct Meshlet {
     pub cutoff: f32,
     /// First of its places in [`Meshlets::vertices`].
     pub first_vertex: u32,
-    /// How many there are.
+    /// Their number.
     pub vertex_count: u32,
     /// First of its triangles in [`Meshlets::triangles`].
     pub first_triangle: u32,
-    /// How many there are.
+    /// Their number.
     pub triangle_count: u32,
 }
 

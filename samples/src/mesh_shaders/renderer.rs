@@ -36,7 +36,7 @@ pub struct MeshShaders {
     frame: Holder<BufferHandle>,
     constants: FrameConstants,
     camera: Camera,
-    /// From where meshlets are culled, if not from where they are seen.
+    /// The camera for culling, if it is not the camera of the image.
     held: Option<Camera>,
     _buffers: [Holder<BufferHandle>; 4],
 }
@@ -45,7 +45,7 @@ pub struct MeshShaders {
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Vertex {
-    /// Where it is.
+    /// Its position.
     pub position: [f32; 3],
     /// Outwards, of length 1.
     pub normal: [f32; 3],
@@ -129,7 +129,7 @@ impl MeshShaders {
         &self.vertices
     }
 
-    /// How many meshlets the last frame drew that is known.
+    /// Returns the number of meshlets drawn by the latest frame whose count has arrived.
     #[must_use]
     pub fn drawn(&self) -> Option<u32> {
         self.counter.latest()
@@ -232,7 +232,7 @@ fn pipeline(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
     MESHLETS.create_with(ctx, &RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() })
 }
 
-/// Where the animation looks from.
+/// The camera of the animation at `phase` of the round, 0 to 1.
 fn camera(phase: f32) -> Camera {
     let eye = [0.0, 3.4 + 0.6 * (TAU * phase).sin(), 4.3];
     Camera::looking_at(eye, [0.0, -0.22, 0.0], 43.0)

@@ -50,9 +50,6 @@ impl OmniShadowsArgs {
 }
 
 impl SampleInfo for OmniShadows {
-    type Args = OmniShadowsArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "omni_shadows";
     const ABOUT: &'static str =
         "Rasterises a lamp in a lattice and the shadows all around it, and writes pictures as PNG";
@@ -62,6 +59,8 @@ impl SampleInfo for OmniShadows {
         --faces single --filter hard | the cube map face by face, compared with once a pixel
         --lamp-radius 0.05 --haze 0 | a larger lamp in clear air
     ";
+    type Args = OmniShadowsArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::ALL.iter().map(|pipeline| pipeline.data()).collect()

@@ -21,7 +21,7 @@ const SURFACE: [SampleStage; 2] =
 const CUBE_VIEW: [SampleStage; 2] =
     [shader!("omni_shadows", "cube_view.vert"), shader!("omni_shadows", "cube_view.frag")];
 
-/// What throws shadows, to one face of the cube map.
+/// Shadow casters, to one face of the cube map.
 pub(super) const FACE: RasterPipeline = RasterPipeline {
     sample: SAMPLE,
     name: "omni_shadows: face of the cube",

@@ -15,10 +15,10 @@ use crate::app::frame::Frame;
 use crate::app::sample::{FrameTime, Sample};
 use crate::scene::{Camera, GpuCamera};
 
-/// Where the depth of the lamp's map is 1, in metres.
+/// Distance at which the depth of the lamp's map is 1, in metres.
 const LAMP_NEAR: f32 = 0.05;
 const NEAR_PLANE: f32 = 0.05;
-/// What the lamp sends to a square metre at a distance of one metre.
+/// Irradiance of the lamp at a distance of one metre.
 const INTENSITY: [f32; 3] = [27.0, 18.8, 11.0];
 /// Edges of the cube map that the panel offers.
 const SHADOW_SIZES: [u32; 4] = [256, 512, 1024, 2048];
@@ -96,7 +96,7 @@ impl OmniShadows {
         self.triangle_count
     }
 
-    /// Where the lamp is.
+    /// Position of the lamp.
     pub fn lamp(&self) -> [f32; 3] {
         models::lamp(self.phase).into()
     }
@@ -106,7 +106,7 @@ impl OmniShadows {
         Models::new().triangles(self.phase)
     }
 
-    /// Whether all faces of the cube map are drawn in one pass.
+    /// True if all faces of the cube map are drawn in one pass.
     pub fn is_multiview(&self) -> bool {
         self.cube_pass.is_multiview()
     }

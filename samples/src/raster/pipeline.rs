@@ -1,4 +1,4 @@
-//! Pipelines as data, to be made, made again of shaders that have changed, and compiled by those who run nothing.
+//! Pipelines as data, for creation, hot reload, and compilation without running.
 
 use lvk::{
     ColorTarget, Context, DepthTest, Format, Holder, RenderPipelineDesc, RenderPipelineHandle,
@@ -45,7 +45,7 @@ impl RasterPipeline {
         Self { depth: Some(RenderTarget::NEAREST), ..Self::flat(sample, name, stages) }
     }
 
-    /// The pipeline for those who compile it without running it.
+    /// The pipeline as data, for compilation without a device.
     #[must_use]
     pub fn data(&self) -> SamplePipeline {
         SamplePipeline {

@@ -1,4 +1,4 @@
-//! What moves: the serpent, skinned by compute into the buffer that its structure is refitted from, and the leaves,
+//! The animation: the serpent, skinned by compute into the buffer that its BLAS is refitted from, and the leaves,
 //! turned to the camera by compute and built anew. Both happen in the command buffer that the rays are traced in.
 
 use std::ops::Range;
@@ -135,7 +135,7 @@ impl Animation {
         })
     }
 
-    /// What the compute shaders write: draws and rays read it in the same command buffer.
+    /// Buffers that the compute shaders write; draws and rays read them in the same command buffer.
     pub(super) fn written(&self) -> [BufferHandle; 3] {
         [*self.positions, *self.normals, *self.leaves]
     }

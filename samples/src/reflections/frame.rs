@@ -81,7 +81,7 @@ pub(super) struct Push {
     pub(super) arguments: [u32; 4],
 }
 
-/// What shaders know of the lights; more than they have room for are left out.
+/// The lights for the shaders, without those beyond the capacity.
 pub(super) fn light_constants(lights: &[Light]) -> ([LightConstants; MOST_LIGHTS], u32) {
     let mut all = [LightConstants::zeroed(); MOST_LIGHTS];
     for (constants, light) in all.iter_mut().zip(lights) {

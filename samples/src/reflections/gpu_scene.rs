@@ -96,7 +96,7 @@ pub(super) struct GpuScene {
     pub(super) instances: u64,
     pub(super) opaque: Vec<Draw>,
     transparent: Vec<Draw>,
-    /// Where those are, one each.
+    /// Bounds of each transparent draw.
     layers: Vec<SortBounds>,
     _held: [Holder<BufferHandle>; 4],
 }

@@ -43,9 +43,6 @@ pub struct ReflectionsArgs {
 }
 
 impl SampleInfo for Reflections {
-    type Args = ReflectionsArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "reflections";
     const ABOUT: &'static str = "Renders a hall with polished floors, water, glass, a serpent and drifting leaves, all of them reflected by ray tracing over a rasterised picture, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
@@ -55,6 +52,8 @@ impl SampleInfo for Reflections {
         --rt query --validate | by ray queries in compute shaders, with validation
         --profile mali-g715 | as on a phone: ray queries, split meshes
     ";
+    type Args = ReflectionsArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

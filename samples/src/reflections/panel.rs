@@ -1,4 +1,4 @@
-//! What the panel of the window changes.
+//! Settings in the panel of the window.
 
 use egui::{Slider, Ui};
 use lvk::Capabilities;

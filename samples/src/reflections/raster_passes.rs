@@ -19,7 +19,7 @@ pub(super) struct RasterPasses {
     blend: Holder<RenderPipelineHandle>,
 }
 
-/// What all passes draw.
+/// Geometry that all passes draw.
 #[derive(Clone, Copy)]
 pub(super) struct Drawn<'a> {
     pub(super) indices: BufferHandle,

@@ -24,7 +24,7 @@ pub(super) enum RayPasses {
     Query([Holder<ComputePipelineHandle>; 2]),
 }
 
-/// Which surfaces to trace from.
+/// The surfaces to trace from.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Surfaces {
     Opaque,

@@ -1,4 +1,4 @@
-//! How far reflected rays go.
+//! The range (Tmax) of reflected rays.
 
 /// Rays of a mirror go this far, in scene units: beyond the scene.
 pub const FAR: f32 = 200.0;
@@ -6,7 +6,7 @@ pub const FAR: f32 = 200.0;
 pub const ROUGHEST_TRACED: f32 = 0.7;
 /// Below this roughness a surface is a mirror, whose rays go all the way.
 const MIRROR_ROUGHNESS: f32 = 0.08;
-/// How wide the lobe is at the end of a shortened ray, in scene units.
+/// Width of the lobe at the end of a shortened ray, in scene units.
 const BLURRED_EXTENT: f32 = 2.5;
 
 /// Length of the ray that finds what a surface of `roughness` (0 to 1) reflects, in scene units; 0 where none is
@@ -15,7 +15,7 @@ const BLURRED_EXTENT: f32 = 2.5;
 /// The lobe of the microfacet model is about `roughness * roughness` wide for each unit of length. Where it has become
 /// wider than the things in the scene, what a single ray meets tells nothing about the average, and ambient light
 /// stands in for it: the ray may end there, which saves the traversal of all that is farther away.
-/// `shaders/reflections/range.glsl` has the same rule.
+/// `shaders/reflections/ray_range.glsl` has the same rule.
 #[must_use]
 pub fn reflection_range(roughness: f32) -> f32 {
     match roughness {

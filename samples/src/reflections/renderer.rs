@@ -123,7 +123,7 @@ impl Reflections {
         self.camera = *camera;
     }
 
-    /// What the passes of the first sample take on the GPU, where instances seen under less than `min_angle` are culled;
+    /// GPU times of the passes of the first sample, where instances seen under less than `min_angle` are culled;
     /// none where the device has no timestamps.
     pub(super) fn time_sample(&self, min_angle: f32) -> Result<PassTimes, SampleError> {
         self.upload_constants()?;
@@ -138,17 +138,17 @@ impl Reflections {
         *self.targets.picture
     }
 
-    /// How many instances rays can meet from where the camera is.
+    /// Number of instances in the TLAS at the current camera.
     pub fn instance_count(&self) -> InstanceCount {
         self.top_level.count(self.camera.eye.into(), self.config.min_angle)
     }
 
-    /// What is rendered.
+    /// The configuration.
     pub fn config(&self) -> &ReflectionsConfig {
         &self.config
     }
 
-    /// What its panel changes, from the next frame on.
+    /// Settings of the panel, which take effect with the next frame.
     pub fn wanted(&mut self) -> &mut ReflectionsConfig {
         &mut self.wanted.config
     }

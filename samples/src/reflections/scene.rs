@@ -1,4 +1,4 @@
-//! What the sample shows: models of several materials each, where they stand, lamps and sky.
+//! The scene of the sample: models of several materials each, their transforms, lamps and sky.
 
 use std::f32::consts::TAU;
 
@@ -111,7 +111,7 @@ impl HallScene {
     }
 }
 
-/// Where the picture at `phase` of the round, 0 to 1, is taken from: a slow walk into the hall and back.
+/// The camera at `phase` of the round, 0 to 1: a slow walk into the hall and back.
 pub(super) fn camera(phase: f32) -> Camera {
     let (sway, away) = (TAU * phase).sin_cos();
     let walk = 0.5 - 0.5 * away;

@@ -17,7 +17,7 @@ const MASK_TRANSPARENT: u8 = 2;
 /// The hit group with the any-hit shader of leaves.
 const LEAF_HIT_GROUP: u32 = 1;
 
-/// How many instances a frame's top-level structure shows.
+/// Number of instances in a frame's TLAS.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct InstanceCount {
     /// In the structure.
@@ -86,7 +86,7 @@ impl TopLevel {
         cmd.update_tlas(*self.tlas, &self.shown(eye, min_angle), BuildMode::Rebuild)
     }
 
-    /// How many instances [`record`](Self::record) shows.
+    /// Number of instances that [`record`](Self::record) puts into the TLAS.
     pub(super) fn count(&self, eye: Vec3, min_angle: f32) -> InstanceCount {
         let total = (self.instances.len() + self.animation.len()) as u32;
         InstanceCount { kept: self.shown(eye, min_angle).len() as u32, total }

@@ -1,4 +1,4 @@
-//! In which order transparent surfaces are laid over each other.
+//! Sorts transparent surfaces for blending.
 
 use glam::{Affine3A, Vec3};
 
@@ -11,7 +11,7 @@ pub(super) struct SortBounds {
 }
 
 impl SortBounds {
-    /// What a model between `low` and `high`, thinnest across its plane, becomes by `to_world`.
+    /// Bounds of a model between `low` and `high`, thinnest across its plane, transformed by `to_world`.
     pub(super) fn new(low: Vec3, high: Vec3, to_world: &Affine3A) -> Self {
         let axis = Vec3::AXES[(high - low).min_position()];
         let corner = |number: usize| {
@@ -25,7 +25,7 @@ impl SortBounds {
         }
     }
 
-    /// Whether this layer can lie before `other` for someone at `eye`. It cannot where the plane of one of them parts
+    /// True if this layer can lie before `other` for someone at `eye`. It cannot where the plane of one of them parts
     /// them in the other order.
     fn can_hide(&self, other: &Self, eye: Vec3) -> bool {
         let is_beyond = other.sides(self.corners, eye).all(|side| side <= EPSILON);
@@ -33,7 +33,7 @@ impl SortBounds {
         !is_beyond && !is_nearer
     }
 
-    /// How far points are from the plane, in scene units: above 0 on the side of `eye`.
+    /// Distances of points from the plane, in scene units: above 0 on the side of `eye`.
     fn sides(&self, points: [Vec3; 8], eye: Vec3) -> impl Iterator<Item = f32> {
         let side = self.normal.dot(eye - self.centre).signum();
         points.into_iter().map(move |point| side * self.normal.dot(point - self.centre))

@@ -41,9 +41,6 @@ pub enum FacesArg {
 }
 
 impl SampleInfo for RenderToCubeMap {
-    type Args = RenderToCubeMapArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "render_to_cube_map";
     const ABOUT: &'static str = "Draws the surroundings of a drop into a cube map, which the drop mirrors, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
@@ -52,6 +49,8 @@ impl SampleInfo for RenderToCubeMap {
         --faces six-passes --validate | a pass for each face, with validation
         --roughness 0.6 | as if the drop were of brushed metal
     ";
+    type Args = RenderToCubeMapArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

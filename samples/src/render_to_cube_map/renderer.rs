@@ -49,7 +49,7 @@ struct Pipelines {
     drop: Holder<RenderPipelineHandle>,
 }
 
-/// What stands around the drop, for one kind of target.
+/// Pipelines of the surroundings, for one kind of target.
 struct Surroundings {
     blocks: Holder<RenderPipelineHandle>,
     sky: Holder<RenderPipelineHandle>,
@@ -116,7 +116,7 @@ impl RenderToCubeMap {
         *self.cube_map.texture
     }
 
-    /// What is rendered, and how.
+    /// The configuration.
     #[must_use]
     pub fn config(&self) -> &RenderToCubeMapConfig {
         &self.config
@@ -215,7 +215,7 @@ impl Pipelines {
         })
     }
 
-    /// How faces are drawn where `wish` is possible, and otherwise.
+    /// Returns `wish` where the device supports it, else six passes, with the pipelines.
     fn faces(&self, wish: Faces) -> (Faces, &Surroundings) {
         match (wish, &self.on_all_faces) {
             (Faces::OnePass, Some(all)) => (Faces::OnePass, all),

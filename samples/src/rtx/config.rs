@@ -1,4 +1,4 @@
-//! What to render, and by which means of the device.
+//! The configuration of the sample.
 
 use lvk::{Capabilities, Context};
 
@@ -7,7 +7,7 @@ use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use crate::hybrid::RayPath;
 
-/// What to render.
+/// The configuration of the sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RtxConfig {
     /// By which part of Vulkan rays are traced.
@@ -19,7 +19,7 @@ pub struct RtxConfig {
 }
 
 impl RtxConfig {
-    /// What the command line asks for.
+    /// The choice of the command line.
     pub(crate) fn from_args(
         wish: RayTracing,
         [width, height]: [u32; 2],

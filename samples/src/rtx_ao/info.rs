@@ -10,7 +10,7 @@ use crate::app::value_parsers::{positive, whole};
 use crate::rtx::RtxConfig;
 use crate::scene::Scene;
 
-/// How far surroundings darken in the town, whose ground goes on far beyond its houses.
+/// Radius of the ambient occlusion in the town, whose ground extends far beyond its houses.
 const TOWN_RADIUS: f32 = 1.8;
 
 /// Arguments of the sample.
@@ -49,9 +49,6 @@ impl RtxAoArgs {
 }
 
 impl SampleInfo for RtxAo {
-    type Args = RtxAoArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "rtx_ao";
     const ABOUT: &'static str = "Renders a rasterised scene with ray traced sunlight and ambient occlusion, and writes pictures as PNG";
     const DETAILS: &'static str =
@@ -63,6 +60,8 @@ impl SampleInfo for RtxAo {
         --scene courtyard --camera 2 | the scene of the hybrid sample
         --rt query --validate | by ray queries in the fragment shader, with validation
     ";
+    type Args = RtxAoArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

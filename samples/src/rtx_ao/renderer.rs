@@ -20,14 +20,14 @@ use crate::app::sample::{FrameTime, Sample};
 use crate::hybrid::RayPath;
 use crate::scene::{Camera, CameraPath, GpuCamera, Scene};
 
-/// How far surroundings darken, as a share of the diagonal of the scene's bounding box.
+/// Default radius of the ambient occlusion, as a share of the diagonal of the scene's bounding box.
 const RADIUS_SHARE: f32 = 0.06;
 /// Distance of the near plane as a share of the distance of what the camera looks at.
 const NEAR_SHARE: f32 = 0.01;
-/// How far rays start off a surface, as a share of the radius.
+/// Offset of rays from a surface, as a share of the radius.
 const LIFT_SHARE: f32 = 1e-3;
 
-/// From where the scene is seen, and where what turns in it is.
+/// The camera, and the angle of the turning part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
     /// The camera.
@@ -118,12 +118,12 @@ impl RtxAo {
         &self.view
     }
 
-    /// How many passes the picture is the average of.
+    /// Number of passes that the image averages.
     pub fn passes(&self) -> u32 {
         self.passes
     }
 
-    /// How far surroundings darken a surface, in scene units.
+    /// Radius of the ambient occlusion in scene units.
     pub fn radius(&self) -> f32 {
         self.lighting.radius()
     }

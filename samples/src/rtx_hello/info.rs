@@ -5,9 +5,6 @@ use crate::app::sample_info::prelude::*;
 use crate::app::scene_args::BuiltInSceneRayArgs;
 
 impl SampleInfo for RtxHello {
-    type Args = BuiltInSceneRayArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "rtx_hello";
     const ABOUT: &'static str =
         "Renders turning triangles, the first thing that rays can see, and writes pictures as PNG";
@@ -16,6 +13,8 @@ impl SampleInfo for RtxHello {
         --rt query --validate | by ray queries in a compute shader, with validation
         --profile mali-g715 | as on a phone: ray queries
     ";
+    type Args = BuiltInSceneRayArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

@@ -4,8 +4,8 @@ use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
 use lvk::{
-    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, BuildFlags, Context, Dependencies,
-    Holder, TextureHandle, TlasDesc, TlasInstance, Triangles, transform_rows,
+    AccelStructHandle, BlasDesc, BlasGeometry, BufferHandle, BufferUsage, BuildFlags, Context, Holder,
+    TextureHandle, TlasDesc, TlasInstance, Triangles, transform_rows,
 };
 
 use super::instances::{CORNERS, groups, places};
@@ -76,12 +76,12 @@ impl RtxHello {
         })
     }
 
-    /// How many triangles there are.
+    /// Number of triangles.
     pub fn triangle_count(&self) -> usize {
         groups().count()
     }
 
-    /// What its panel changes, from the next frame on.
+    /// Settings of the panel, which take effect with the next frame.
     pub fn switches(&mut self) -> &mut RtxHelloSwitches {
         &mut self.switches
     }
@@ -101,14 +101,12 @@ impl Sample for RtxHello {
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
-        let (size, image) = (self.config.extent(), self.target.image());
-        let camera = GpuCamera::new(&self.camera, size[0], size[1], 0.0);
+        let [width, height] = self.config.extent();
+        let camera = GpuCamera::new(&self.camera, width, height, 0.0);
         let push = Push { camera, tlas: self.tlas.index(), image: self.target.image_index() };
         let instances = instances(*self.blas, self.phase, &self.switches);
-        let writes = Dependencies { storage_images: &[image], ..Dependencies::default() };
         frame.pass("TLAS update", |cmd| cmd.update_tlas(*self.tlas, &instances, self.switches.mode()))?;
-        frame.pass("rays", |cmd| self.tracer.record(cmd, &push, size, &writes))?;
-        Ok(image)
+        Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
@@ -132,7 +130,7 @@ impl Sample for RtxHello {
     }
 }
 
-/// Where the triangles are seen from until somebody looks from elsewhere.
+/// The camera until the user moves it.
 fn camera() -> Camera {
     Camera::looking_at([0.0, 0.0, 3.2], [0.0; 3], 2.0 * HALF_HEIGHT.atan().to_degrees())
 }

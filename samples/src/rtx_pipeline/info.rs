@@ -32,9 +32,6 @@ pub struct RtxPipelineArgs {
 }
 
 impl SampleInfo for RtxPipeline {
-    type Args = RtxPipelineArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "rtx_pipeline";
     const ABOUT: &'static str = "Renders a textured scene by a ray tracing pipeline whose hit shaders trace on, and writes pictures as PNG";
     const DETAILS: &'static str = "Without --scene it shows a courtyard made by code.";
@@ -46,6 +43,8 @@ impl SampleInfo for RtxPipeline {
         --profile mali-g715 | as on a phone: ray queries, split meshes
     ";
     const ROUND: &'static str = "one round through all cameras";
+    type Args = RtxPipelineArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

@@ -3,7 +3,7 @@
 use crate::app::render_target::RenderTarget;
 use crate::app::sample_error::SampleError;
 use bytemuck::{Pod, Zeroable};
-use lvk::{BufferHandle, Context, Dependencies, Holder, TextureHandle};
+use lvk::{BufferHandle, Context, Holder, TextureHandle};
 
 use super::config::RtxPipelineConfig;
 use super::pipelines::RAYS;
@@ -98,7 +98,7 @@ impl RtxPipeline {
         self
     }
 
-    /// What is rendered, as far as the device can.
+    /// The configuration, limited to what the device supports.
     pub fn config(&self) -> &RtxPipelineConfig {
         &self.config
     }
@@ -108,12 +108,12 @@ impl RtxPipeline {
         self.scene.triangle_count
     }
 
-    /// What its panel changes, from the next frame on.
+    /// Settings of the panel, which take effect with the next frame.
     pub fn switches(&mut self) -> &mut RtxPipelineSwitches {
         &mut self.switches
     }
 
-    /// What the switches begin with, and the most that they can be.
+    /// The initial and largest values of the settings.
     fn all_switches(&self) -> RtxPipelineSwitches {
         RtxPipelineSwitches { depth: self.config.depth, lights: self.lighting.light_count() }
     }
@@ -137,15 +137,13 @@ impl Sample for RtxPipeline {
     }
 
     fn record(&mut self, frame: &mut Frame<'_>) -> Result<TextureHandle, SampleError> {
-        let (extent, picture) = (self.config.rtx.extent(), self.target.image());
+        let [width, height] = self.config.rtx.extent();
         self.constants.depth = self.switches.depth.min(self.config.depth);
         self.constants.lighting = self.lighting.with_lights(self.switches.lights);
-        self.constants.camera = GpuCamera::new(&self.camera, extent[0], extent[1], self.near_plane);
+        self.constants.camera = GpuCamera::new(&self.camera, width, height, self.near_plane);
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
         let push = self.ctx.buffer_address(*self.frame)?;
-        let writes = Dependencies { storage_images: &[picture], ..Dependencies::default() };
-        frame.pass("rays", |cmd| self.tracer.record(cmd, &push, extent, &writes))?;
-        Ok(picture)
+        Ok(self.tracer.record_image(frame, &self.target, &push)?)
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {

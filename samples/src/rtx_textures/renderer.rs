@@ -52,7 +52,7 @@ pub struct RtxTextures {
     _held: Held,
 }
 
-/// What only the GPU reads.
+/// Resources that only the GPU reads.
 struct Held {
     _blas: Vec<Holder<AccelStructHandle>>,
     _buffers: [Holder<BufferHandle>; 2],
@@ -140,7 +140,7 @@ impl RtxTextures {
         INSTANCE_COUNT
     }
 
-    /// What its panel changes, from the next frame on.
+    /// Settings of the panel, which take effect with the next frame.
     pub fn switches(&mut self) -> &mut RtxTexturesSwitches {
         &mut self.switches
     }
@@ -169,11 +169,6 @@ impl RtxTextures {
         let instances = DeviceInstances { buffer: *self.records, offset: 0, count, blas: &self.blas };
         cmd.update_tlas_from_buffer(*self.tlas, &instances, BuildMode::Rebuild)
     }
-
-    fn trace(&self, cmd: &mut CommandBuffer) -> lvk::Result<()> {
-        let writes = Dependencies { storage_images: &[self.target.image()], ..Dependencies::default() };
-        self.tracer.record(cmd, &self.frame_address, self.config.extent(), &writes)
-    }
 }
 
 impl Sample for RtxTextures {
@@ -195,8 +190,7 @@ impl Sample for RtxTextures {
         self.ctx.upload_buffer(*self.frame, 0, bytemuck::bytes_of(&self.constants))?;
         frame.pass("instances", |cmd| self.write_instances(cmd))?;
         frame.pass("TLAS build", |cmd| self.build_tlas(cmd))?;
-        frame.pass("rays", |cmd| self.trace(cmd))?;
-        Ok(self.target.image())
+        Ok(self.tracer.record_image(frame, &self.target, &self.frame_address)?)
     }
 
     fn resize(&mut self, extent: [u32; 2]) -> Result<(), SampleError> {
@@ -233,7 +227,7 @@ fn sampler(ctx: &Context, filter: Filter) -> lvk::Result<Holder<SamplerHandle>> 
     })
 }
 
-/// Where the animation looks from.
+/// The camera of the animation at `phase` of the round, 0 to 1.
 fn camera(phase: f32) -> Camera {
     let sway = 0.35 * (TAU * phase).sin();
     let eye = [9.2 * (0.5 + sway).sin(), 3.7, 9.2 * (0.5 + sway).cos()];

@@ -84,9 +84,6 @@ impl SponzaArgs {
 }
 
 impl SampleInfo for Sponza {
-    type Args = SponzaArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "sponza";
     const ABOUT: &'static str =
         "Rasterises a large textured scene with shadows, culled on the GPU, and writes pictures as PNG";
@@ -98,6 +95,8 @@ impl SampleInfo for Sponza {
         --window --hot-reload | in a window, whose shaders can be changed meanwhile
     ";
     const ROUND: &'static str = "one round through all cameras";
+    type Args = SponzaArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         pipelines::pipelines()

@@ -31,7 +31,7 @@ pub(super) const SHADOW: RasterPipeline = RasterPipeline {
 /// Of four samples a pixel.
 pub(super) const SURFACES: RasterPipeline =
     RasterPipeline::with_depth(SAMPLE, "sponza: surfaces", &SURFACE_STAGES);
-/// What no surface hides, of four samples a pixel.
+/// The sky where no surface hides it, of four samples a pixel.
 pub(super) const SKY: RasterPipeline = RasterPipeline {
     depth: Some(DepthTest { compare: CompareOp::GreaterOrEqual, write: false, ..RenderTarget::NEAREST }),
     ..RasterPipeline::with_depth(SAMPLE, "sponza: sky", &SKY_STAGES)

@@ -26,7 +26,7 @@ use crate::scene::{Ambient, Camera, CameraPath, DirectionalLight, GpuCamera, Mat
 
 /// Texels on an edge of the sky's cube map.
 const SKY_SIZE: u32 = 256;
-/// Where scenes without a sun have one.
+/// The sun of scenes without one: direction and colour.
 const USUAL_SUN: ([f32; 3], [f32; 3]) = ([0.28, 0.9, 0.33], [2.6, 2.35, 1.95]);
 
 /// Renders a scene of many draws.
@@ -53,7 +53,7 @@ pub struct Sponza {
     draw_counts: DrawCounts,
 }
 
-/// What shaders reach of the scene.
+/// The resources of the scene that shaders read.
 struct OnDevice {
     arrays: SceneArrays,
     finishes: Holder<BufferHandle>,
@@ -63,14 +63,14 @@ struct OnDevice {
     _textures: [Vec<Holder<TextureHandle>>; 2],
 }
 
-/// What lights the scene.
+/// The lights of the scene.
 struct Light {
     sun: DirectionalLight,
     ambient: Ambient,
     lamp: PointLight,
 }
 
-/// What is known of how many draws were left.
+/// The latest counts of draws, and the readback of the next.
 #[derive(Default)]
 struct DrawCounts {
     counts: Option<[u32; VIEWS]>,
@@ -120,12 +120,12 @@ impl Sponza {
         self
     }
 
-    /// What is rendered.
+    /// The configuration.
     pub fn config(&self) -> &SponzaConfig {
         &self.config
     }
 
-    /// How draws are taken from the buffers that culling writes.
+    /// Source of the number of draws after culling.
     pub fn draw_path(&self) -> DrawPath {
         self.path_of_draws
     }
@@ -135,7 +135,7 @@ impl Sponza {
         &self.draws
     }
 
-    /// What the next frame culls the draws of the camera and of the sun by.
+    /// The frusta that the next frame culls draws by: of the camera and of the sun.
     pub fn frusta(&self) -> [Frustum; 2] {
         if !self.config.culls {
             return [Frustum::ALL; 2];
@@ -144,7 +144,7 @@ impl Sponza {
         [self.kept.unwrap_or_else(seen), Frustum::of_rows(self.sun_view().rows)]
     }
 
-    /// How many draws of the camera and of the sun the last frame has left. Waits for it.
+    /// Returns the number of draws of the camera and of the sun after culling in the last frame. Waits for the frame.
     ///
     /// # Errors
     /// [`SampleError::Device`].

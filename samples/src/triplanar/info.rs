@@ -30,9 +30,6 @@ impl TriplanarArgs {
 }
 
 impl SampleInfo for Triplanar {
-    type Args = TriplanarArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "triplanar";
     const ABOUT: &'static str =
         "Draws bodies without texture coordinates, by textures along three axes, and writes pictures as PNG";
@@ -41,6 +38,8 @@ impl SampleInfo for Triplanar {
         --window | in a window, where textures come and go
         --unload brick,leaves --validate | what a placeholder looks like, with validation
     ";
+    type Args = TriplanarArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         vec![MODELS.data()]

@@ -1,4 +1,4 @@
-//! What is shown: a few bodies on a ground, of models without texture coordinates.
+//! The scene: a few models without texture coordinates, on a ground.
 
 use std::f32::consts::{PI, TAU};
 use std::ops::Range;

@@ -99,7 +99,7 @@ impl Triplanar {
         PAINTED.map(|painted| painted.name)
     }
 
-    /// Where the texture with this number is; there is none of a number that is too large.
+    /// The state of the texture with this number; textures with larger numbers are unloaded.
     #[must_use]
     pub fn residency(&self, number: usize) -> Residency {
         self.textures.residency(number)
@@ -118,7 +118,7 @@ impl Triplanar {
     /// Waits for the textures that are coming.
     ///
     /// # Errors
-    /// What Vulkan answers.
+    /// Errors of Vulkan.
     pub fn wait_for_textures(&mut self) -> lvk::Result<()> {
         self.textures.wait()
     }
@@ -218,7 +218,7 @@ fn pipeline(ctx: &Context) -> lvk::Result<Holder<RenderPipelineHandle>> {
     MODELS.create_with(ctx, &RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() })
 }
 
-/// Where the animation looks from.
+/// The camera of the animation at `phase` of the round, 0 to 1.
 fn camera(phase: f32) -> Camera {
     let around = 0.25 + 0.35 * (TAU * phase).sin();
     let eye = [6.2 * around.sin(), 2.9, 6.2 * around.cos()];

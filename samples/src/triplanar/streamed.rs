@@ -5,10 +5,10 @@ use lvk::{Context, Format, Holder, TextureDesc, TextureHandle};
 use super::loader::{Loader, Wish};
 use crate::scene::PAINTED;
 
-/// How many textures there are.
+/// Number of textures.
 pub(super) const COUNT: usize = PAINTED.len();
 
-/// Where a texture is.
+/// The state of a texture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Residency {
     /// It is shown.
@@ -49,7 +49,7 @@ impl Streamed {
         }
     }
 
-    /// What shaders know each texture by at the moment.
+    /// Current bindless index of each texture.
     pub(super) fn indices(&self) -> [u32; COUNT] {
         std::array::from_fn(|number| match &self.slots[number] {
             Slot::Resident(texture) => texture.index(),

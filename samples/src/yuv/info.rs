@@ -37,9 +37,6 @@ impl YuvArgs {
 }
 
 impl SampleInfo for Yuv {
-    type Args = YuvArgs;
-    type Sample = Self;
-
     const NAME: &'static str = "yuv";
     const ABOUT: &'static str = "Shows a moving picture in Y'CbCr, and writes pictures as PNG";
     const EXAMPLES: &'static str = "
@@ -47,6 +44,8 @@ impl SampleInfo for Yuv {
         --window | in a window, where N goes on to the next format
         --format p010 --model bt2020 --show-planes | ten bits, as of ultra high definition, and the planes beside it
     ";
+    type Args = YuvArgs;
+    type Sample = Self;
 
     fn pipelines() -> Vec<SamplePipeline> {
         vec![PICTURE.data(), PLANES.data()]

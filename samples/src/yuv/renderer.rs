@@ -80,7 +80,7 @@ impl Yuv {
         self.video.video_format.format
     }
 
-    /// The planes of the moment, as they were uploaded.
+    /// The current planes, as they were uploaded.
     pub fn planes(&self) -> Vec<Vec<u8>> {
         self.video.encode(self.phase)
     }

@@ -10,7 +10,7 @@ use super::encode;
 use super::film::Film;
 use super::pipelines::PICTURE;
 
-/// What a texture and its conversion are chosen by.
+/// The format of a video texture and its conversion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct VideoFormat {
     pub(super) format: YuvFormat,
@@ -53,13 +53,13 @@ impl VideoTexture {
         Ok(())
     }
 
-    /// The planes of the moment, as they lie in memory.
+    /// The planes at `phase`, as bytes.
     pub(super) fn encode(&self, phase: f32) -> Vec<Vec<u8>> {
         let VideoFormat { format, model, range, size } = self.video_format;
         encode::planes(&Film { size, phase }, format, model, range)
     }
 
-    /// Shows the moment.
+    /// Uploads the planes at `phase`.
     pub(super) fn upload(&self, ctx: &Context, phase: f32) -> lvk::Result<()> {
         for (number, plane) in self.encode(phase).iter().enumerate() {
             let region = TextureRegion { aspect: Aspect::Plane(number as u8), ..TextureRegion::default() };
@@ -69,7 +69,7 @@ impl VideoTexture {
     }
 }
 
-/// Which formats the device has, with this matrix and range.
+/// Returns the formats that the device supports with this matrix and range.
 pub(super) fn supported(ctx: &Context, video_format: VideoFormat) -> lvk::Result<Vec<YuvFormat>> {
     let mut found = Vec::new();
     for format in YuvFormat::ALL {

@@ -90,7 +90,7 @@ impl<S: Sample> Loading<S> {
 }
 
 impl<S: Sample> UnderWay<S> {
-    /// What the thread has made, once it has ended.
+    /// Takes the result of the thread, once it has ended.
     fn take(&mut self) -> Option<Made<S>> {
         let thread = self.thread.take_if(|thread| thread.is_finished())?;
         let ReadySample { mut sample, summary } =

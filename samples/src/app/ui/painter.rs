@@ -79,7 +79,7 @@ impl Painter {
     /// A painter that has nothing to paint.
     ///
     /// # Errors
-    /// What Vulkan answers.
+    /// Errors of Vulkan.
     pub fn new(ctx: &Context) -> lvk::Result<Self> {
         Ok(Self {
             ctx: ctx.clone(),
@@ -93,7 +93,7 @@ impl Painter {
         })
     }
 
-    /// What egui calls a texture that is `picture` to shaders: sRGB as it is encoded, so of a format that decodes nothing.
+    /// The egui id of `picture`, which holds encoded sRGB, so a format without decoding.
     #[must_use]
     pub fn texture_id(picture: &Holder<TextureHandle>) -> egui::TextureId {
         egui::TextureId::User(picture.index().into())
@@ -103,7 +103,7 @@ impl Painter {
     /// way, before the next submission.
     ///
     /// # Errors
-    /// What Vulkan answers.
+    /// Errors of Vulkan.
     pub fn upload(&mut self, ui: &egui::Context, output: FullOutput, extent: [u32; 2]) -> lvk::Result<()> {
         self.given_up.drain(..).for_each(|id| self.atlas.free(id));
         for (id, delta) in &output.textures_delta.set {
@@ -146,7 +146,7 @@ impl Painter {
     /// name the pictures of the interface among its dependencies.
     ///
     /// # Errors
-    /// What Vulkan answers.
+    /// Errors of Vulkan.
     pub fn record(&self, pass: &mut RenderPass<'_>) -> lvk::Result<()> {
         let Some((format, pipeline)) = &self.pipeline else { return Ok(()) };
         let linear_target = matches!(format, Format::Rgba8Srgb | Format::Bgra8Srgb).into();

@@ -3,30 +3,30 @@
 use egui::{CollapsingHeader, Color32, Grid, RichText, Ui};
 use lvk::{GpuProfile, GpuScope, PresentMode};
 
-/// What all windows have in their panel.
+/// The panel that all windows have.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Panel {
-    /// Whether it is seen.
+    /// True if it is seen.
     pub is_open: bool,
-    /// Whether the animation goes on.
+    /// True if the animation goes on.
     pub animates: bool,
-    /// How pictures come to the screen.
+    /// The present mode.
     pub present_mode: PresentMode,
-    /// Why the shaders on disk are not in use.
+    /// Error of the shaders on disk, if they do not compile.
     pub shader_error: Option<String>,
     /// Milliseconds from frame to frame, smoothed.
     frame_ms: f32,
 }
 
-/// What a panel tells of the moment.
+/// Values that a panel displays.
 pub struct PanelInfo<'a> {
     /// Name of the device.
     pub device: &'a str,
     /// Size of the window in pixels.
     pub extent: [u32; 2],
-    /// How pictures can come to the screen.
+    /// The present modes that the device supports.
     pub present_modes: &'a [PresentMode],
-    /// What the GPU took.
+    /// GPU times.
     pub profile: Option<&'a GpuProfile>,
     /// Keys and what they do.
     pub keys: &'a [(&'a str, &'a str)],

@@ -1,4 +1,4 @@
-//! What a panel asks for that takes long to change: pipelines and targets are made anew for it.
+//! Settings of a panel that need new pipelines or targets, applied between two frames.
 
 use std::fmt::Display;
 
@@ -7,16 +7,16 @@ use egui::{Color32, RichText, Ui};
 /// A configuration that a panel edits and a sample takes over between two frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PendingSettings<C> {
-    /// What is wanted.
+    /// The configuration that the panel asks for.
     pub config: C,
-    /// Whether a slider is under way, so that it may be something else in a moment.
+    /// True if a slider is under way, so that it may be something else in a moment.
     is_held: bool,
-    /// Why it cannot be had.
+    /// Error of the last change, if it failed.
     refused: Option<String>,
 }
 
 impl<C: Copy + PartialEq> PendingSettings<C> {
-    /// What there is.
+    /// Starts from the current configuration.
     #[must_use]
     pub fn new(config: C) -> Self {
         Self { config, is_held: false, refused: None }
@@ -31,13 +31,13 @@ impl<C: Copy + PartialEq> PendingSettings<C> {
         }
     }
 
-    /// What is to be taken over from `current`, if it is something else and nobody is about to change it further.
+    /// The configuration to apply, if it differs from `current` and no slider is being dragged.
     #[must_use]
     pub fn changed_from(&self, current: C) -> Option<C> {
         (!self.is_held && self.config != current).then_some(self.config)
     }
 
-    /// What became of it, and what there is now. What was refused is wanted no more.
+    /// Ends a change: keeps the error for the panel, and resets the settings to `current`.
     pub fn finish<E: Display>(&mut self, done: Result<(), E>, current: C) {
         self.refused = done.err().map(|error| error.to_string());
         self.config = current;

@@ -1,4 +1,4 @@
-//! Who steers the camera: the animation, or a person who has taken it over.
+//! The camera controller: the camera belongs to the animation until the user steers it.
 
 use crate::app::fly_camera::{FlyCamera, Steering};
 use crate::scene::Camera;
@@ -6,14 +6,14 @@ use crate::scene::Camera;
 /// A person at mouse and keys. The first way flown or turned takes the camera over; how fast it flies can be chosen before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct CameraController {
-    /// Where the camera is that was taken over.
+    /// The camera of the user, if the user has taken it over.
     fly: Option<FlyCamera>,
-    /// How fast it flies, as a multiple of the usual speed. It outlasts a camera that is given back.
+    /// Speed as a multiple of the usual speed. The speed outlasts the released camera.
     pace: f32,
 }
 
 impl CameraController {
-    /// One who has done nothing yet.
+    /// A controller before any input.
     pub(super) fn new() -> Self {
         Self { fly: None, pace: 1.0 }
     }

@@ -1,10 +1,10 @@
-//! What time it is in the animation of a window.
+//! The clock of a window's animation.
 
 use std::time::{Duration, Instant};
 
 use crate::app::sample::FrameTime;
 
-/// What time it is in the animation.
+/// The clock of a window's animation.
 #[derive(Debug)]
 pub(super) struct Clock {
     start: Instant,
@@ -33,7 +33,8 @@ impl Clock {
         self.frames += u32::from(animates);
     }
 
-    /// The moment in rounds of so many frames: by the clock, or frame by frame, so that each run shows the same ones.
+    /// The frame time in rounds of `frames_per_round` frames: by the clock, or frame by frame, so that each run shows the
+    /// same frames.
     pub(super) fn frame_time(&self, by_frame: bool, frames_per_round: u32) -> FrameTime {
         match by_frame {
             true => FrameTime::from_frame(self.frames, frames_per_round),

@@ -1,4 +1,4 @@
-//! What keys and mouse mean to a sample's window.
+//! The mapping of keys and mouse to actions of a window.
 
 use std::collections::HashSet;
 
@@ -9,7 +9,7 @@ use crate::app::fly_camera::Steering;
 /// Radians for each pixel that the mouse is dragged.
 const TURN: f32 = 0.004;
 
-/// What a key asks of the window.
+/// The action of a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Action {
     /// Lets the animation stand or go on.
@@ -41,10 +41,10 @@ const HELP: [(&str, &str); 9] = [
     ("F12, Esc", "screenshot, close"),
 ];
 
-/// How many of them are the camera's.
+/// Number of keys of the camera.
 const CAMERA_KEYS: usize = 5;
 
-/// What keys and mouse do in the window of a sample with a camera, or without one.
+/// Returns the help for keys and mouse, of a sample with or without a camera.
 pub(super) fn help(has_camera: bool) -> &'static [(&'static str, &'static str)] {
     &HELP[if has_camera { 0 } else { CAMERA_KEYS }..]
 }
@@ -102,12 +102,12 @@ impl Controls {
         self.faster += notches;
     }
 
-    /// The window listens no more: nothing is held.
+    /// Releases all keys, as when the window loses the focus.
     pub(super) fn release_all(&mut self) {
         *self = Self { pointer: self.pointer, ..Self::default() };
     }
 
-    /// What was asked of the camera since the last time.
+    /// Takes the steering since the last call.
     pub(super) fn take_steering(&mut self) -> Steering {
         let is_on = |key| self.held.contains(&key) || self.tapped.contains(&key);
         let axis = |plus, minus| f32::from(is_on(plus)) - f32::from(is_on(minus));

@@ -1,4 +1,4 @@
-//! What a window shows: the picture of a sample, and the panel over it.
+//! The pass that draws a sample's image and the panel to the swapchain.
 
 use egui::{Color32, LayerId, Rect, pos2};
 use lvk::{
@@ -32,12 +32,12 @@ impl PresentPass {
         Ok(Self { ctx: ctx.clone(), swapchain, painter, ui, shown: None })
     }
 
-    /// The interface, to ask who is meant by keys and mouse.
+    /// The egui context.
     pub(super) fn ui(&self) -> &egui::Context {
         &self.ui
     }
 
-    /// How pictures come to the screen, and how they could.
+    /// The present mode, and those that the device supports.
     pub(super) fn present_modes(&self) -> lvk::Result<(PresentMode, Vec<PresentMode>)> {
         let info = self.ctx.swapchain_info(*self.swapchain)?;
         Ok((info.present_mode, info.present_modes))
@@ -51,12 +51,12 @@ impl PresentPass {
         self.ctx.resize_swapchain(*self.swapchain, extent)
     }
 
-    /// What paints.
+    /// The painter of the panel.
     pub(super) fn painter(&mut self) -> &mut Painter {
         &mut self.painter
     }
 
-    /// What to draw to; `None` where nothing can be shown for now.
+    /// Acquires the next swapchain image; `None` while nothing can be presented.
     pub(super) fn next_image(&self) -> lvk::Result<Option<SwapchainImage>> {
         self.ctx.next_image(*self.swapchain)
     }
@@ -92,7 +92,7 @@ impl PresentPass {
         self.painter.record(&mut pass)
     }
 
-    /// What egui calls the picture. A view has the number by which shaders reach it, and keeps it while it is shown.
+    /// The egui id of the image. The view of the image keeps its bindless index while the image is displayed.
     fn texture_of(&mut self, picture: TextureHandle) -> lvk::Result<egui::TextureId> {
         let view = TextureViewDesc {
             texture: Some(picture),

@@ -1,11 +1,12 @@
-//! When the pictures of a sample follow the size of its window.
+//! Debounces changes of a window's size.
 
 use std::time::{Duration, Instant};
 
-/// How long a window must keep its size. A picture is stretched meanwhile: samples make much anew for another size.
+/// Time that a window must keep its size. The image is stretched meanwhile, as samples recreate many resources for another
+/// size.
 const REST: Duration = Duration::from_millis(150);
 
-/// Which size pictures have, and which they are to get.
+/// The current size of images, and the latest size of the window.
 #[derive(Debug)]
 pub(super) struct ResizeDebounce {
     pictures: [u32; 2],

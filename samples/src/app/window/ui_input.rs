@@ -1,4 +1,4 @@
-//! What happens to a window, in egui's words.
+//! Translates events of a window for egui.
 
 use egui::{Event, Key, Modifiers, MouseWheelUnit, PointerButton, Pos2, Vec2, pos2, vec2};
 use winit::dpi::PhysicalPosition;
@@ -42,7 +42,7 @@ impl UiInput {
         }
     }
 
-    /// What happened since the last time, and the keys that modify others.
+    /// Takes the events since the last call, and the modifier keys.
     pub(super) fn take_events(&mut self) -> (Vec<Event>, Modifiers) {
         (std::mem::take(&mut self.events), self.modifiers)
     }
@@ -61,7 +61,7 @@ fn in_points(place: PhysicalPosition<f64>, per_point: f32) -> Pos2 {
     pos2(place.x as f32 / per_point, place.y as f32 / per_point)
 }
 
-/// How far the wheel was turned.
+/// The distance of a turn of the wheel.
 fn wheel(delta: MouseScrollDelta, per_point: f32) -> (MouseWheelUnit, Vec2) {
     match delta {
         MouseScrollDelta::LineDelta(x, y) => (MouseWheelUnit::Line, vec2(x, y)),

@@ -56,7 +56,7 @@ where
     closed
 }
 
-/// What answers events.
+/// The handler of events.
 struct WindowApp<'a, S, M> {
     name: &'a str,
     args: &'a RunArgs,
@@ -141,7 +141,7 @@ where
     }
 }
 
-/// What to do next.
+/// The next step of the event loop.
 enum Next {
     /// A frame, at once.
     Frame,
@@ -332,7 +332,7 @@ impl<S: Sample> Running<S> {
         Ok(Next::Nap)
     }
 
-    /// Gives pictures the size that the window has had for a while.
+    /// Resizes the sample once the window keeps its size.
     fn follow_size(&mut self) {
         if let Some(size) = self.resize.next(extent(&self.window), Instant::now())
             && let Err(error) = self.sample.resize(size).map_err(Into::into)
@@ -341,7 +341,7 @@ impl<S: Sample> Running<S> {
         }
     }
 
-    /// Takes note of what has changed: size, shaders, time, camera.
+    /// Applies changes of size, shaders, time and camera.
     fn follow(&mut self, args: &RunArgs, seconds: f32) -> Result<(), RunError> {
         self.follow_size();
         if self.watch.as_mut().is_some_and(|watch| watch.poll(Instant::now())) {

@@ -27,7 +27,7 @@ const STOREYS: u32 = 2;
 const CLOTH: u32 = of::LEAVES + 1;
 const CLOTHS: [[f32; 3]; 3] = [[0.45, 0.05, 0.04], [0.06, 0.20, 0.08], [0.07, 0.10, 0.34]];
 
-/// What [`Scene::atrium`] does.
+/// Implements [`Scene::atrium`].
 pub(in crate::scene) fn atrium() -> Scene {
     let mut solids = Solids::new();
     for storey in 0..STOREYS {

@@ -1,4 +1,4 @@
-//! What stands in the courtyard: statues, mirrors, glass, plants.
+//! Objects in the courtyard: statues, mirrors, glass, plants.
 
 use std::f32::consts::{PI, TAU};
 

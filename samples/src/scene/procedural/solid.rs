@@ -12,7 +12,7 @@ use crate::scene::mesh::Mesh;
 /// Adds solids to a mesh, each placed by `place` and made of `material`.
 pub(super) struct Solids {
     pub mesh: Mesh,
-    /// Where the next solids go.
+    /// Placement of the next solids.
     pub place: Affine3A,
     /// Number of the material of the next solids.
     pub material: u32,

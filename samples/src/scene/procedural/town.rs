@@ -36,7 +36,7 @@ pub(crate) fn town() -> Scene {
     finish("town", solids)
 }
 
-/// What turns around the vertical in the middle of the town.
+/// The carousel, which turns around the vertical in the middle of the town.
 pub(crate) fn carousel() -> Scene {
     let mut solids = Solids::new();
     solids.at([0.0, 0.14, 0.0], 0.0).material(CREAM);
