@@ -4,8 +4,8 @@
 use image::RgbaImage;
 use lvk_samples::app::headless;
 use lvk_samples::app::run_error::RunError;
-use lvk_samples::app::sample::{Moment, Sample};
-use lvk_samples::raster::RasterError;
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 
 /// Size of the images.
 pub const SIZE: [u32; 2] = [160, 90];
@@ -49,7 +49,7 @@ pub fn assert_loops_without_seam<S: Sample>(sample: &mut S) {
 pub fn assert_refuses_impossible_sizes<S>(make: impl Fn([u32; 2]) -> Result<S, RasterError>) {
     for size in [[0, 8], [8, 0], [1 << 30, 8], [8, u32::MAX]] {
         match make(size).err() {
-            Some(RasterError::BadSize { width, height, .. }) => assert_eq!([width, height], size),
+            Some(SampleError::BadSize { width, height, .. }) => assert_eq!([width, height], size),
             other => panic!("{size:?}: {other:?}"),
         }
     }

@@ -294,10 +294,10 @@ const NO_HALL_RAYS: &str = "
 #include \"reflections/reflect.glsl\"";
 
 const REFLECTIONS: [Mistake; 23] = [
-    mistake("mirrors short-sighted", "reflections/range.glsl", "return kFar;", "return 0.5;"),
+    mistake("mirrors short-sighted", "reflections/ray_range.glsl", "return kFar;", "return 0.5;"),
     mistake(
         "rough surfaces not traced",
-        "reflections/range.glsl",
+        "reflections/ray_range.glsl",
         "kRoughestTraced = 0.7",
         "kRoughestTraced = 0.09",
     ),
@@ -380,7 +380,7 @@ const REFLECTIONS_QUERY: [Mistake; 3] = [
 ];
 
 const REFLECTIONS_EVER: [Mistake; 3] = [
-    mistake("mirrors short-sighted", "reflections/range.glsl", "return kFar;", "return 0.5;"),
+    mistake("mirrors short-sighted", "reflections/ray_range.glsl", "return kFar;", "return 0.5;"),
     mistake("no shadows", "reflections/visibility.glsl", "if (blocker >= 0.0)", "if (blocker >= 1e30)"),
     mistake("no blur", "reflections/filter.comp.glsl", "radius > 0.75", "radius > 1e9"),
 ];
@@ -399,7 +399,7 @@ fn hall_of(ctx: &Context, config: &ReflectionsConfig, view: Option<&Camera>) -> 
     let mut hall = Reflections::new(ctx, config).unwrap();
     hall.show(0.0);
     if let Some(view) = view {
-        hall.look(view);
+        hall.set_camera(view);
     }
     paint_over(ctx, hall.picture());
     RgbaImage::from_raw(config.width, config.height, headless::picture(&mut hall).unwrap()).unwrap()

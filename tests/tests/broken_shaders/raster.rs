@@ -224,11 +224,11 @@ const BOARD: [Mistake; 2] = [
 ];
 /// Of tilted tiles.
 const TILES: [Mistake; 3] = [
-    mistake("no relief", "sponza/relief.glsl", "kNoTexture || frame.hasRelief == 0u", "0u || true"),
-    mistake("upside down", "sponza/relief.glsl", "found.y * upwards", "-found.y * upwards"),
+    mistake("no relief", "sponza/normal_mapping.glsl", "kNoTexture || frame.hasRelief == 0u", "0u || true"),
+    mistake("upside down", "sponza/normal_mapping.glsl", "found.y * upwards", "-found.y * upwards"),
     mistake(
         "turned by neighbours",
-        "sponza/relief.glsl",
+        "sponza/normal_mapping.glsl",
         "sign(dot(right, acrossDown))",
         "-1.0 * sign(dot(right, acrossDown))",
     ),

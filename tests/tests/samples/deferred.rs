@@ -5,7 +5,8 @@
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile};
 use lvk_samples::app::frame::Frame;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::deferred::{Deferred, DeferredConfig, Passes, View};
 use lvk_samples::raster::RasterError;
 use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
@@ -27,7 +28,7 @@ fn render_image(ctx: &Context, config: &DeferredConfig, frame: u32) -> RgbaImage
 
 /// True if the device has both; says so where it has not.
 fn has_both(ctx: &Context) -> bool {
-    let both = Passes::of(ctx).len() == 2;
+    let both = Passes::supported(ctx).len() == 2;
     if !both {
         eprintln!("NOT TESTED, {} lacks dynamicRenderingLocalRead", ctx.capabilities().device_name);
     }
@@ -109,7 +110,7 @@ fn paths_are_changed_in_a_sample_that_runs() {
 
 /// Submits a frame without waiting for it.
 fn send(sample: &mut Deferred, frame: u32) {
-    sample.update(Moment::of_frame(frame, ROUND)).unwrap();
+    sample.update(FrameTime::from_frame(frame, ROUND)).unwrap();
     let mut frame = Frame::free(&sample.context().clone()).unwrap();
     sample.record(&mut frame).unwrap();
     frame.finish().unwrap();
@@ -132,7 +133,7 @@ fn a_device_without_local_reads_goes_by_several_passes() {
     assert_eq!(sample.passes(), Passes::Several);
     let error = Deferred::new(&ctx, &config(Passes::One)).err();
     match error {
-        Some(RasterError::Missing { what, remedy, .. }) => {
+        Some(SampleError::Missing { what, remedy, .. }) => {
             assert!(what.contains("dynamicRenderingLocalRead") && remedy.contains("--passes several"));
         }
         other => unreachable!("{other:?}"),

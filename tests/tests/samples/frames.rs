@@ -9,7 +9,7 @@ use lvk::{Context, Format, Holder, TextureDesc, TextureHandle, TextureRegion, Te
 use lvk_samples::app::frame::Frame;
 use lvk_samples::app::headless;
 use lvk_samples::app::progress::Progress;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::deferred::{Deferred, DeferredConfig};
 use lvk_samples::hello_triangle::HelloTriangle;
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence, Method};

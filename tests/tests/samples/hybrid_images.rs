@@ -3,7 +3,8 @@
 
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile, FeatureRequest, RayQueryRequest};
-use lvk_samples::hybrid::{Bounces, Geometry, HybridConfig, HybridError, HybridRenderer, Method, RayPath};
+use lvk_samples::app::sample_error::SampleError;
+use lvk_samples::hybrid::{Bounces, Geometry, HybridConfig, HybridRenderer, Method, RayPath};
 use lvk_samples::scene::Scene;
 use lvk_tests::hybrid::{HybridHarness, paths};
 use lvk_tests::image_comparison::{
@@ -135,7 +136,7 @@ fn a_device_with_one_path_renders_by_it_and_names_the_other() {
         );
         let config = HybridConfig { path: missing, ..sized(SIZE) };
         let refused = HybridRenderer::new(&ctx, &scene, &config).err();
-        assert!(matches!(refused, Some(HybridError::PathMissing { .. })), "{refused:?}");
+        assert!(matches!(refused, Some(SampleError::PathMissing { .. })), "{refused:?}");
     }
     for other in &images[1..] {
         assert_similar("the only path", other, &images[0], &SAME_RAYS);
@@ -250,7 +251,7 @@ fn queued_bounces_give_the_very_same_image() {
             let config =
                 HybridConfig { method, path, geometry, bounces: Some(Bounces::First), ..sized(SIZE) };
             let refused = HybridRenderer::new(&ctx, &scene, &config).err();
-            assert!(matches!(refused, Some(HybridError::NothingFirst)), "{what}, first: {refused:?}");
+            assert!(matches!(refused, Some(SampleError::NothingFirst)), "{what}, first: {refused:?}");
         }
     }
 }

@@ -4,6 +4,7 @@
 use image::RgbaImage;
 use lvk::glam::{DVec3, Vec2, Vec3};
 use lvk::{Context, DeviceProfile};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::hybrid_oit::{Glass, HybridOit, HybridOitConfig, HybridOitError, Motion, OitScene};
 use lvk_tests::hybrid::paths;
@@ -88,7 +89,8 @@ fn lists_hold_every_crossing_in_front() {
                 doubtful += 1;
                 continue;
             };
-            let mut found: Vec<f64> = lists.of(sample).iter().map(|node| f64::from(node.distance)).collect();
+            let mut found: Vec<f64> =
+                lists.nodes_of(sample).iter().map(|node| f64::from(node.distance)).collect();
             found.sort_by(f64::total_cmp);
             assert_eq!(found.len(), expected.len(), "pixel {pixel:?}: {found:?}, must be {expected:?}");
             for (found, expected) in found.iter().zip(&expected) {
@@ -138,12 +140,12 @@ fn the_image_equals_one_of_sorted_lists() {
             let has_glass = |[x, y]: [u32; 2]| {
                 let samples =
                     (0..side * side).map(|i| (side * y + i / side) * side * SIZE[0] + side * x + i % side);
-                samples.into_iter().any(|sample| !lists.of(sample as usize).is_empty())
+                samples.into_iter().any(|sample| !lists.nodes_of(sample as usize).is_empty())
             };
             let mut found_longest = 0;
             let mut seen = |is_sorted: bool| {
                 let radiance = |sample: [u32; 2]| {
-                    let mut nodes = lists.of((sample[1] * side * SIZE[0] + sample[0]) as usize);
+                    let mut nodes = lists.nodes_of((sample[1] * side * SIZE[0] + sample[0]) as usize);
                     found_longest = found_longest.max(nodes.len());
                     let background = behind.get_pixel(sample[0], sample[1]);
                     let background = [0, 1, 2].map(|channel| decode(background[channel]));
@@ -320,7 +322,7 @@ fn scenes_without_sense_are_refused() {
         let mut scene = OitScene::default();
         mistake(&mut scene);
         let refused = HybridOit::new(&ctx, &scene, &plain(&ctx)).err();
-        assert!(matches!(refused, Some(HybridOitError::BrokenScene(_))), "{refused:?}");
+        assert!(matches!(refused, Some(SampleError::BrokenScene(_))), "{refused:?}");
     }
 }
 

@@ -2,6 +2,7 @@
 //! phones, acceleration structures are built once and loaded later, and the valley equals the reference.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use lvk_samples::app::sample_error::SampleError;
 use std::cmp::Reverse;
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus};
@@ -11,8 +12,8 @@ use lvk::{Context, DeviceProfile};
 use lvk_samples::app::progress::Progress;
 use lvk_samples::app::scene_list::{self, FoundScene};
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, LargeSceneError, Origin, Show, World};
-use lvk_samples::rtx::{RtxConfig, RtxError};
+use lvk_samples::large_scene::{LargeScene, LargeSceneConfig, Origin, Show, World};
+use lvk_samples::rtx::RtxConfig;
 use lvk_samples::scene::{ObjOptions, Scene};
 use lvk_tests::hybrid::paths;
 use lvk_tests::image_comparison::{
@@ -304,6 +305,6 @@ fn impossible_images_are_refused() {
     for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {
         let config = LargeSceneConfig::new(RtxConfig { path, width, height });
         let error = LargeScene::new(&ctx, &street(), &config, &mut Progress::hidden()).err();
-        assert!(matches!(error, Some(LargeSceneError::Rtx(RtxError::BadSize { .. }))), "{error:?}");
+        assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
     }
 }

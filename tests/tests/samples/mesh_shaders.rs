@@ -5,10 +5,12 @@
 use image::RgbaImage;
 use lvk::{Context, CullMode, Dependencies, DeviceProfile, RenderPipelineDesc, TextureRegion};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::render_target::RenderTarget;
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::mesh_shaders::MeshShaders;
 use lvk_samples::pipelines::SampleStage;
-use lvk_samples::raster::{Canvas, RasterError, RasterPipeline, fragment_stage, vertex_stage};
+use lvk_samples::raster::RasterPipeline;
 use lvk_samples::scene::Camera;
 use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar};
 use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, image_of};
@@ -21,7 +23,7 @@ const MOST_CORNERS: u32 = 3 * 96;
 
 /// Corners of all meshlets, an instance for each, without task and mesh shaders.
 const STAGES: [SampleStage; 2] = [
-    vertex_stage(
+    SampleStage::from_glsl(
         r#"
         #include "mesh_shaders/frame.glsl"
         layout(location = 0) out vec3 position;
@@ -39,7 +41,7 @@ const STAGES: [SampleStage; 2] = [
         }"#,
         "test.vert",
     ),
-    fragment_stage(
+    SampleStage::from_glsl(
         r#"
         #include "mesh_shaders/frame.glsl"
         #include "mesh_shaders/shade.glsl"
@@ -71,19 +73,19 @@ fn knot(ctx: &Context, culls: bool) -> MeshShaders {
 
 /// Draws, by a vertex shader, the frame that `sample` has drawn last.
 fn by_vertex_shader(ctx: &Context, sample: &MeshShaders) -> RgbaImage {
-    let canvas = Canvas::with_depth(ctx, SIZE).unwrap();
+    let target = RenderTarget::with_depth(ctx, SIZE).unwrap();
     let state = RenderPipelineDesc { cull: CullMode::Back, ..RenderPipelineDesc::default() };
     let pipeline = RasterPipeline::with_depth("mesh_shaders", "by vertex shader", &STAGES);
     let pipeline = pipeline.create_with(ctx, &state).unwrap();
     let mut cmd = ctx.acquire_command_buffer().unwrap();
     let backdrop = [0.010, 0.012, 0.020];
-    let mut pass = canvas.begin(&mut cmd, "by vertex shader", backdrop, &Dependencies::default()).unwrap();
+    let mut pass = target.begin(&mut cmd, "by vertex shader", backdrop, &Dependencies::default()).unwrap();
     pass.bind_render_pipeline(*pipeline).unwrap();
     pass.push_constants(&ctx.buffer_address(sample.frame_buffer()).unwrap()).unwrap();
     pass.draw(0..MOST_CORNERS, 0..sample.meshlets().meshlets.len() as u32).unwrap();
     drop(pass);
     ctx.submit(cmd).unwrap();
-    let pixels = ctx.download_texture(canvas.picture(), &TextureRegion::default()).unwrap();
+    let pixels = ctx.download_texture(target.image(), &TextureRegion::default()).unwrap();
     RgbaImage::from_raw(SIZE[0], SIZE[1], pixels).unwrap()
 }
 
@@ -114,7 +116,7 @@ fn what_lies_outside_the_image_is_left_out() {
         (behind, 0),
     ] {
         let [whole, culled] = [&mut all, &mut some].map(|sample| {
-            sample.update(Moment::of_frame(10, ROUND)).unwrap();
+            sample.update(FrameTime::from_frame(10, ROUND)).unwrap();
             sample.set_view(&view);
             headless::picture(sample).unwrap()
         });
@@ -141,7 +143,7 @@ fn the_knot_looks_as_it_always_did() {
 
 fn assert_missing(ctx: &Context) {
     let refused = MeshShaders::new(ctx, SIZE, true).err();
-    let Some(error @ RasterError::Missing { .. }) = refused else { unreachable!("{refused:?}") };
+    let Some(error @ SampleError::Missing { .. }) = refused else { unreachable!("{refused:?}") };
     let text = error.to_string();
     let device = &ctx.capabilities().device_name;
     assert!(text.contains("no mesh shaders") && text.contains(device) && text.contains("--device"), "{text}");

@@ -9,8 +9,8 @@ use lvk::{
     TlasDesc, TlasInstance, Triangles,
 };
 use lvk_samples::app::sample::Sample;
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::omni_shadows::{Faces, OmniShadows, OmniShadowsConfig, ShadowFilter};
-use lvk_samples::raster::RasterError;
 use lvk_samples::scene::Camera;
 use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
 use lvk_tests::raster_sample::{
@@ -49,7 +49,7 @@ fn devices_without_multiview_draw_face_by_face() {
     let profile = DeviceProfile::core_only();
     let Some(bare) = device_with(|desc| desc.profile = Some(&profile)) else { return };
     let asked = OmniShadows::new(&bare, &OmniShadowsConfig { faces: Faces::Multiview, ..usual() }).err();
-    assert!(matches!(asked, Some(RasterError::Missing { .. })), "{asked:?}");
+    assert!(matches!(asked, Some(SampleError::Missing { .. })), "{asked:?}");
     let mut sample = lamp(&bare, &usual());
     assert!(!sample.is_multiview());
     assert!(image_of(&mut sample, 0) == image_of(&mut lamp(&ctx, &usual()), 0));
@@ -119,7 +119,7 @@ fn check_shadows(ctx: &Context, view: &Camera) -> [usize; 2] {
         sample.set_view(view);
         image_now(sample)
     });
-    let expected = traced_shadows(ctx, &shadowed);
+    let expected = traced_shadows(ctx, &mut shadowed);
     let (width, mut counts, mut wrong) = (SIZE[0] as usize, [0, 0], Vec::new());
     for (x, y, pixel) in images[0].enumerate_pixels() {
         let (x, y) = (x as usize, y as usize);

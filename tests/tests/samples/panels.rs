@@ -5,7 +5,7 @@ use std::fmt::Debug;
 
 use lvk::Context;
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::hybrid::{Bounces, Geometry, HybridConfig, HybridRenderer, HybridSequence, Method, RayPath};
 use lvk_samples::hybrid_oit::{HybridOit, HybridOitConfig, HybridOitSequence, OitScene};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig, SkinUpdate};

@@ -4,10 +4,11 @@
 use image::RgbaImage;
 use lvk::{Context, Dependencies, DeviceProfile};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
 use lvk_samples::reflections::{
-    CullingCost, FAR, RayCost, Reflections, ReflectionsConfig, ReflectionsError, SkinUpdate, reflection_range,
+    CullingCost, FAR, RayCost, Reflections, ReflectionsConfig, SkinUpdate, reflection_range,
 };
 use lvk_samples::scene::Camera;
 use lvk_samples::shaders::INCLUDES;
@@ -91,7 +92,7 @@ fn a_round_ends_where_it_began_without_a_seam() {
 /// From close by the basin.
 fn look_at_serpent(hall: &mut Reflections, phase: f32) {
     hall.show(phase);
-    hall.look(&Camera::looking_at([-3.6, 1.0, -9.5], [2.0, 1.1, -9.5], 70.0));
+    hall.set_camera(&Camera::looking_at([-3.6, 1.0, -9.5], [2.0, 1.1, -9.5], 70.0));
 }
 
 #[test]
@@ -166,7 +167,7 @@ fn what_culling_saves_is_measured_and_changes_nothing() {
 
 /// The length of rays for roughness 0, 0.01 and so on to 1, by the shaders' own text.
 fn ranges_by_shader(ctx: &Context) -> Vec<f32> {
-    let (_, rule) = INCLUDES.iter().find(|(name, _)| *name == "reflections/range.glsl").unwrap();
+    let (_, rule) = INCLUDES.iter().find(|(name, _)| *name == "reflections/ray_range.glsl").unwrap();
     let main = "
         layout(local_size_x = 1) in;
         layout(buffer_reference, scalar) writeonly buffer Ranges { float at[]; };
@@ -222,11 +223,11 @@ fn impossible_images_are_refused() {
     let refused = |config| Reflections::new(&ctx, &config).err();
     for samples in [0, ReflectionsConfig::MAX_SAMPLES + 1] {
         let error = refused(ReflectionsConfig { samples, ..config });
-        assert!(matches!(error, Some(ReflectionsError::BadSamples { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::OutOfRange { .. })), "{error:?}");
     }
     for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {
         let error = refused(ReflectionsConfig { width, height, ..config });
-        assert!(matches!(error, Some(ReflectionsError::BadSize { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
     }
 }
 

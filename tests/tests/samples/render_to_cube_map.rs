@@ -4,7 +4,7 @@
 
 use glam::{Mat3, Vec3};
 use lvk::{Context, DeviceProfile, Error, OptionalFeature, TextureRegion};
-use lvk_samples::raster::RasterError;
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::render_to_cube_map::{Block, Faces, RenderToCubeMap, RenderToCubeMapConfig};
 use lvk_tests::half::from_half;
 use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
@@ -168,7 +168,7 @@ fn six_passes_need_no_feature_and_one_pass_says_which() {
     let profile = DeviceProfile::core_only();
     let Some(ctx) = device_with(|desc| desc.profile = Some(&profile)) else { return };
     let refused = RenderToCubeMap::new(&ctx, &config(Faces::OnePass)).err();
-    let Some(error @ RasterError::Missing { .. }) = refused else { unreachable!("{refused:?}") };
+    let Some(error @ SampleError::Missing { .. }) = refused else { unreachable!("{refused:?}") };
     let text = error.to_string();
     assert!(text.contains("six views") && text.contains("--faces six-passes"), "{text}");
     let image = image_of(&mut sample(&ctx, Faces::SixPasses), 0);
@@ -206,7 +206,7 @@ fn impossible_images_and_faces_are_refused() {
         let refused = RenderToCubeMap::new(&ctx, &wish).err();
         let expected = matches!(
             refused,
-            Some(RasterError::Device(Error::LimitExceeded { .. } | Error::InvalidUsage { .. }))
+            Some(SampleError::Device(Error::LimitExceeded { .. } | Error::InvalidUsage { .. }))
         );
         assert!(expected, "{face_size}: {refused:?}");
     }

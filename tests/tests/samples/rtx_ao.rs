@@ -7,9 +7,10 @@ use image::imageops::{FilterType, resize};
 use lvk::glam::{DAffine3, DVec3, Vec3};
 use lvk::{Context, RayQueryRequest};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::rtx::{RtxConfig, RtxError};
+use lvk_samples::rtx::RtxConfig;
 use lvk_samples::rtx_ao::{RtxAo, RtxAoConfig, View};
 use lvk_samples::scene::{Camera, Scene};
 use lvk_tests::hybrid::paths;
@@ -246,5 +247,5 @@ fn impossible_images_are_refused() {
     let Some(ctx) = device() else { return };
     let config = RtxAoConfig::new(RtxConfig { path: paths(&ctx)[0], width: 0, height: 8 });
     let error = RtxAo::new(&ctx, &Scene::carousel(), None, &config).err();
-    assert!(matches!(error, Some(RtxError::BadSize { .. })), "{error:?}");
+    assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
 }

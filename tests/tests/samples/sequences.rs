@@ -7,8 +7,8 @@ use lvk::Context;
 use lvk_samples::app::frame_name::FrameName;
 use lvk_samples::app::headless::Headless;
 use lvk_samples::app::interrupt::Interrupt;
-use lvk_samples::app::play::{Job, Played, play};
 use lvk_samples::app::progress::Progress;
+use lvk_samples::app::sequence::{RenderJob, RenderReport, render_frames};
 use lvk_samples::hybrid::{HybridConfig, HybridRenderer, HybridSequence, Method};
 use lvk_tests::device;
 use lvk_tests::hybrid::{HybridHarness, paths};
@@ -24,7 +24,7 @@ fn played(ctx: &Context, frames: &str, folder: &Path) -> Played {
         HybridConfig { path, width: SIZE[0], height: SIZE[1], max_depth: 2, ..HybridConfig::default() };
     let renderer = HybridRenderer::new(ctx, &scene, &config).unwrap();
     let mut sequence = HybridSequence::new(renderer, &scene, 0, true);
-    let job = Job {
+    let job = RenderJob {
         frames: frames.parse().unwrap(),
         warm_up: 0,
         frames_per_round: 7,
@@ -33,7 +33,8 @@ fn played(ctx: &Context, frames: &str, folder: &Path) -> Played {
         resume: false,
     };
     job.check().unwrap();
-    play(&mut Headless::new(&mut sequence), &job, &mut Progress::hidden(), &Interrupt::deaf()).unwrap()
+    render_frames(&mut Headless::new(&mut sequence), &job, &mut Progress::hidden(), &Interrupt::deaf())
+        .unwrap()
 }
 
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
@@ -105,7 +106,7 @@ mod interrupted {
             "--out".to_owned(),
             out.display().to_string(),
         ]);
-        let status = lvk_samples::hybrid::run(&HybridArgs::parse_from(words));
+        let status = cli::run::<HybridSequence>(&cli::parse::<HybridSequence>(words).unwrap());
         let is_interrupted = status == std::process::ExitCode::from(130);
         std::process::exit(if is_interrupted { 42 } else { 1 });
     }

@@ -3,13 +3,13 @@
 //! atrium equals the reference.
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on has failed")]
 
+use lvk_samples::app::sample_error::SampleError;
 use std::sync::LazyLock;
 
 use image::{Rgba, RgbaImage};
 use lvk::{Context, DeviceProfile, FeatureSet, OptionalFeature};
 use lvk_samples::app::headless;
-use lvk_samples::app::sample::{Moment, Sample};
-use lvk_samples::raster::RasterError;
+use lvk_samples::app::sample::{FrameTime, Sample};
 use lvk_samples::scene::{Camera, Scene};
 use lvk_samples::sponza::{DrawPath, Frustum, Sponza, SponzaConfig};
 use lvk_tests::image_comparison::{
@@ -255,5 +255,5 @@ fn impossible_images_are_refused() {
     let mut broken = obj_scene();
     broken.triangles[3][1] = u32::MAX;
     let error = Sponza::new(&ctx, broken, &config(1)).err();
-    assert!(matches!(error, Some(RasterError::Scene(_))), "{error:?}");
+    assert!(matches!(error, Some(SampleError::BrokenScene(_))), "{error:?}");
 }

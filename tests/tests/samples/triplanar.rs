@@ -29,7 +29,7 @@ fn all() -> std::ops::Range<usize> {
 
 /// Submits a frame without waiting for it.
 fn send(sample: &mut Triplanar, frame: u32) {
-    sample.update(Moment::of_frame(frame, ROUND)).unwrap();
+    sample.update(FrameTime::from_frame(frame, ROUND)).unwrap();
     let mut frame = Frame::free(&sample.context().clone()).unwrap();
     sample.record(&mut frame).unwrap();
     frame.finish().unwrap();
@@ -59,7 +59,7 @@ fn textures_go_and_come_while_frames_are_on_their_way() {
         send(&mut sample, round);
         assert_eq!(textures(&ctx), count - all().len(), "all but the targets and the placeholder");
         all().for_each(|number| sample.load(number));
-        assert!(all().all(|number| sample.presence(number) == Presence::Coming));
+        assert!(all().all(|number| sample.residency(number) == Residency::Loading));
         send(&mut sample, round);
         // One that is given up before it has come, and asked for again.
         sample.unload(1);
@@ -99,7 +99,7 @@ fn only_textured_surfaces_have_the_placeholder() {
         let without = image_of(&mut sample, 0);
         assert!(differing(&whole, &without, on) > 0.1 && differing(&whole, &without, off) == 0.0, "{name}");
         sample.load(number_of(name));
-        assert_eq!(sample.presence(number_of(name)), Presence::Coming);
+        assert_eq!(sample.residency(number_of(name)), Residency::Loading);
         sample.wait_for_textures().unwrap();
         assert!(image_of(&mut sample, 0) == whole, "{name} is back");
     }
@@ -124,7 +124,7 @@ fn what_comes_too_late_is_dropped() {
     sample.load(brick);
     sample.load(999);
     sample.unload(999);
-    assert_eq!(sample.presence(999), Presence::Away);
+    assert_eq!(sample.residency(999), Residency::Unloaded);
     // The thread ends with the sample, whatever it is at.
     drop(sample);
     assert_eq!(textures(&ctx), 0);

@@ -5,7 +5,7 @@
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile, Error};
 use lvk_samples::app::sample::Sample;
-use lvk_samples::raster::RasterError;
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::yuv::{CONVERSIONS, Film, Yuv, YuvConfig, YuvFormat, YuvModel, YuvRange};
 use lvk_tests::device::TestDevice;
 use lvk_tests::device_with;
@@ -196,7 +196,7 @@ fn devices_without_conversions_are_refused_by_name() {
     };
     for format in [None, Some(YuvFormat::P010)] {
         match Yuv::new(&ctx, &YuvConfig { format, ..usual() }).err() {
-            Some(RasterError::Device(Error::Unsupported { .. })) => {}
+            Some(SampleError::Device(Error::Unsupported { .. })) => {}
             other => unreachable!("{format:?}: {other:?}"),
         }
     }

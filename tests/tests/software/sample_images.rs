@@ -5,7 +5,8 @@
 use image::RgbaImage;
 use lvk::{Context, FeatureRequest, RayQueryPath, RayQueryRequest};
 use lvk_samples::app::headless;
-use lvk_samples::hybrid::{Bounces, HybridConfig, HybridError, HybridRenderer, Method, RayPath};
+use lvk_samples::app::sample_error::SampleError;
+use lvk_samples::hybrid::{Bounces, HybridConfig, HybridRenderer, Method, RayPath};
 use lvk_samples::hybrid_oit::{HybridOitConfig, OitScene};
 use lvk_samples::reflections::{Reflections, ReflectionsConfig};
 use lvk_tests::hybrid::HybridHarness;
@@ -81,7 +82,7 @@ fn a_driver_without_ray_tracing_renders_the_obj_scene() {
         let (scene, expected) = (obj_scene(), reference_image("hybrid_small"));
         let plain = HybridConfig { path: RayPath::Query, ..sized(&expected) };
         let refused = HybridRenderer::new(&ctx, &scene, &plain).err();
-        assert!(matches!(refused, Some(HybridError::NoRasteriser { .. })), "{refused:?}");
+        assert!(matches!(refused, Some(SampleError::NoRasteriser { .. })), "{refused:?}");
         let method = Method::choose(None, ctx.capabilities());
         assert_eq!(method, Method::Standalone);
         for bounces in [Bounces::Inline, Bounces::Queued] {
