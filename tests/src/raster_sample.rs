@@ -17,7 +17,7 @@ pub const ROUND: u32 = 100;
 /// # Panics
 /// When rendering fails.
 pub fn image_of<S: Sample>(sample: &mut S, frame: u32) -> RgbaImage {
-    let moved = sample.update(Moment::of_frame(frame, ROUND));
+    let moved = sample.update(FrameTime::from_frame(frame, ROUND));
     moved.map_err(|error| -> RunError { error.into() }).expect("the sample has that moment");
     image_now(sample)
 }
@@ -46,7 +46,7 @@ pub fn assert_loops_without_seam<S: Sample>(sample: &mut S) {
 ///
 /// # Panics
 /// When it does not.
-pub fn assert_refuses_impossible_sizes<S>(make: impl Fn([u32; 2]) -> Result<S, RasterError>) {
+pub fn assert_refuses_impossible_sizes<S>(make: impl Fn([u32; 2]) -> Result<S, SampleError>) {
     for size in [[0, 8], [8, 0], [1 << 30, 8], [8, u32::MAX]] {
         match make(size).err() {
             Some(SampleError::BadSize { width, height, .. }) => assert_eq!([width, height], size),

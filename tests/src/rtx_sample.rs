@@ -5,9 +5,10 @@ use image::RgbaImage;
 use lvk::{Context, FeatureRequest, RayQueryRequest};
 use lvk_samples::app::headless;
 use lvk_samples::app::run_error::RunError;
-use lvk_samples::app::sample::{Moment, Sample};
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::rtx::{RtxConfig, RtxError};
+use lvk_samples::rtx::RtxConfig;
 
 use crate::hybrid::paths;
 use crate::image_comparison::{Tolerance, assert_similar};
@@ -22,7 +23,7 @@ pub const SIZE: [u32; 2] = [158, 89];
 /// # Panics
 /// When rendering fails.
 pub fn image_of<S: Sample>(sample: &mut S, frame: u32) -> RgbaImage {
-    let moved = sample.update(Moment::of_frame(frame, ROUND));
+    let moved = sample.update(FrameTime::from_frame(frame, ROUND));
     moved.map_err(|error| -> RunError { error.into() }).expect("the sample can be updated");
     let pixels = headless::picture(sample).map_err(|error| -> RunError { error.into() });
     RgbaImage::from_raw(SIZE[0], SIZE[1], pixels.expect("the sample renders"))
@@ -71,10 +72,10 @@ pub fn assert_paths_agree<S: Sample>(
 ///
 /// # Panics
 /// When it does not.
-pub fn assert_refuses_impossible_sizes(ctx: &Context, make: impl Fn(&RtxConfig) -> Option<RtxError>) {
+pub fn assert_refuses_impossible_sizes(ctx: &Context, make: impl Fn(&RtxConfig) -> Option<SampleError>) {
     let path = paths(ctx)[0];
     for (width, height) in [(0, 8), (8, 0), (1 << 30, 8)] {
         let error = make(&RtxConfig { path, width, height });
-        assert!(matches!(error, Some(RtxError::BadSize { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
     }
 }

@@ -4,8 +4,8 @@
 use std::ffi::OsStr;
 use std::path::Path;
 
-use lvk_tests::subprocess::in_subprocess;
 use lvk_tests::device::vulkan;
+use lvk_tests::subprocess::in_subprocess;
 
 #[path = "../../../lvk/examples/triangle.rs"]
 mod triangle;

@@ -38,8 +38,8 @@ const SIZE: [u32; 2] = [40, 24];
 const OTHER_SIZE: [u32; 2] = [24, 40];
 const MOMENTS: [u32; 3] = [0, 3, 7];
 
-fn frame_time(frame: u32) -> Moment {
-    Moment::of_frame(frame, 10)
+fn frame_time(frame: u32) -> FrameTime {
+    FrameTime::from_frame(frame, 10)
 }
 
 /// Renders a sample at some times, and waits for each frame.

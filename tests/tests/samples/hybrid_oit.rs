@@ -6,7 +6,7 @@ use lvk::glam::{DVec3, Vec2, Vec3};
 use lvk::{Context, DeviceProfile};
 use lvk_samples::app::sample_error::SampleError;
 use lvk_samples::hybrid::RayPath;
-use lvk_samples::hybrid_oit::{Glass, HybridOit, HybridOitConfig, HybridOitError, Motion, OitScene};
+use lvk_samples::hybrid_oit::{Glass, HybridOit, HybridOitConfig, Motion, OitScene};
 use lvk_tests::hybrid::paths;
 use lvk_tests::image_comparison::{
     ImageSimilarity, Tolerance, assert_matches_reference, assert_similar, reference_image,

@@ -86,7 +86,7 @@ fn pixel_rays(camera: &Camera) -> Vec<Ray> {
 }
 
 /// True if each pixel lies in shadow as rays find it; `None` where that cannot be told, or the lamp is behind the surface.
-fn traced_shadows(ctx: &Context, sample: &OmniShadows) -> Vec<Option<bool>> {
+fn traced_shadows(ctx: &Context, sample: &mut OmniShadows) -> Vec<Option<bool>> {
     let [casters, others] = sample.triangles();
     let everything = [&casters[..], &others[..]].concat();
     let (all, _all_blas) = accel_structs(ctx, &everything);

@@ -16,7 +16,7 @@ use lvk_tests::scene_obj::obj_scene;
 const SIZE: [u32; 2] = [40, 24];
 
 fn render_image<S: Sample>(sample: &mut S) -> Vec<u8> {
-    sample.update(Moment::of_frame(3, 10)).map_err(Into::into).unwrap();
+    sample.update(FrameTime::from_frame(3, 10)).map_err(Into::into).unwrap();
     headless::picture(sample).map_err(Into::into).unwrap()
 }
 

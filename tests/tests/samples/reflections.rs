@@ -74,7 +74,7 @@ fn a_round_ends_where_it_began_without_a_seam() {
     let Some(ctx) = device() else { return };
     let mut hall = hall(&ctx, &config(paths(&ctx)[0]));
     let mut frame = |frame, frames_per_round| {
-        hall.update(Moment::of_frame(frame, frames_per_round)).unwrap();
+        hall.update(FrameTime::from_frame(frame, frames_per_round)).unwrap();
         render_image(&mut hall)
     };
     let first = frame(0, 240);

@@ -17,7 +17,7 @@ use lvk_tests::scene_obj::obj_scene;
 const SIZE: [u32; 2] = [64, 36];
 
 /// The sample, set up anew as by a process of its own, plays some frames into a folder.
-fn played(ctx: &Context, frames: &str, folder: &Path) -> Played {
+fn played(ctx: &Context, frames: &str, folder: &Path) -> RenderReport {
     let scene = obj_scene();
     let path = paths(ctx)[0];
     let config =
@@ -80,8 +80,7 @@ mod interrupted {
     use std::process::{Command, Stdio};
     use std::time::{Duration, Instant};
 
-    use clap::Parser as _;
-    use lvk_samples::app::args::HybridArgs;
+    use lvk_samples::app::cli;
     use lvk_tests::subprocess::test_path;
     use rustix::process::{Pid, Signal, kill_process};
 

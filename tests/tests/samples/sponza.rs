@@ -39,7 +39,7 @@ fn make(ctx: &Context, scene: &Scene, config: &SponzaConfig) -> Sponza {
 }
 
 fn image_of(sample: &mut Sponza, frame: u32) -> RgbaImage {
-    sample.update(Moment::of_frame(frame, 100)).unwrap();
+    sample.update(FrameTime::from_frame(frame, 100)).unwrap();
     image_now(sample)
 }
 
@@ -217,7 +217,7 @@ fn devices_without_counts_pad_their_draws_and_refuse_to_count() {
     assert!(image_of(&mut sample, 0) == image_of(&mut make(&other, &TOWN, &config(4)), 0));
     let counted = SponzaConfig { draws: Some(DrawPath::Counted), ..config(4) };
     let error = Sponza::new(&ctx, obj_scene(), &counted).err().unwrap();
-    assert!(matches!(error, RasterError::Missing { .. }), "{error}");
+    assert!(matches!(error, SampleError::Missing { .. }), "{error}");
     let text = error.to_string();
     assert!(text.contains(&ctx.capabilities().device_name) && text.contains("--draws padded"), "{text}");
 }
@@ -246,11 +246,11 @@ fn impossible_images_are_refused() {
     let Some(ctx) = device() else { return };
     for extent in [[0, 8], [8, 0], [1 << 30, 8]] {
         let error = Sponza::new(&ctx, obj_scene(), &SponzaConfig::new(extent)).err();
-        assert!(matches!(error, Some(RasterError::BadSize { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::BadSize { .. })), "{error:?}");
     }
     for samples in [0, 2, 3, 64] {
         let error = Sponza::new(&ctx, obj_scene(), &config(samples)).err();
-        assert!(matches!(error, Some(RasterError::Missing { .. })), "{error:?}");
+        assert!(matches!(error, Some(SampleError::Missing { .. })), "{error:?}");
     }
     let mut broken = obj_scene();
     broken.triangles[3][1] = u32::MAX;

@@ -5,8 +5,8 @@
 use image::RgbaImage;
 use lvk::{Context, DeviceProfile};
 use lvk_samples::app::frame::Frame;
-use lvk_samples::app::sample::{Moment, Sample};
-use lvk_samples::triplanar::{Presence, Triplanar};
+use lvk_samples::app::sample::{FrameTime, Sample};
+use lvk_samples::triplanar::{Residency, Triplanar};
 use lvk_tests::image_comparison::{Tolerance, assert_matches_reference, assert_similar, reference_image};
 use lvk_tests::raster_sample::{ROUND, SIZE, assert_refuses_impossible_sizes, image_of};
 use lvk_tests::subprocess::on_swiftshader;
@@ -68,7 +68,7 @@ fn textures_go_and_come_while_frames_are_on_their_way() {
         sample.wait_for_textures().unwrap();
         send(&mut sample, round);
     }
-    assert!(all().all(|number| sample.presence(number) == Presence::There));
+    assert!(all().all(|number| sample.residency(number) == Residency::Resident));
     assert!(image_of(&mut sample, 0) == first, "what came back is what had gone");
     assert_eq!(textures(&ctx), count);
 }
@@ -78,7 +78,7 @@ fn a_frame_on_its_way_keeps_the_textures_it_samples() {
     let Some(ctx) = device() else { return };
     let mut sample = sample(&ctx);
     let whole = image_of(&mut sample, 0);
-    sample.update(Moment::of_frame(0, ROUND)).unwrap();
+    sample.update(FrameTime::from_frame(0, ROUND)).unwrap();
     let mut frame = Frame::free(&ctx).unwrap();
     let image = sample.record(&mut frame).unwrap();
     frame.finish().unwrap();
@@ -119,7 +119,7 @@ fn what_comes_too_late_is_dropped() {
     sample.load(wood);
     sample.wait_for_textures().unwrap();
     image_of(&mut sample, 0);
-    assert_eq!((sample.presence(brick), sample.presence(wood)), (Presence::Away, Presence::There));
+    assert_eq!((sample.residency(brick), sample.residency(wood)), (Residency::Unloaded, Residency::Resident));
     assert_eq!(textures(&ctx), count - 1);
     sample.load(brick);
     sample.load(999);
