@@ -27,8 +27,6 @@ use crate::pipeline::{
 };
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 use crate::shader::ShaderCache;
-use crate::software_ray_query::bvh_cache::TreeCache;
-use crate::software_ray_query::storage::SoftwareBody;
 use crate::store::Store;
 use crate::submit::profiler::Profiler;
 use crate::submit::{Finished, Submitter};
@@ -56,7 +54,8 @@ pub(crate) struct Shared {
     pub(crate) shader_cache: Option<ShaderCache>,
     pub(crate) bindless: Bindless,
     /// Where the context keeps trees that the CPU has built.
-    pub(crate) tree_cache: Option<TreeCache>,
+    #[cfg(feature = "software-ray-query")]
+    pub(crate) tree_cache: Option<crate::software_ray_query::bvh_cache::TreeCache>,
     pub(crate) submitter: Submitter<Garbage>,
     pub(crate) profiler: Profiler,
     /// Where graphics pipelines query rays.
@@ -107,7 +106,11 @@ pub(crate) enum Garbage {
     /// As [`Held`](Self::Held), one of those who [share](crate::resource::image::Image::add_texture) the image.
     HeldTexture(Arc<Texture>),
     /// A structure of the library's own that a command buffer fills, whoever else holds it.
-    Software(#[expect(dead_code, reason = "held only to be dropped")] Arc<SoftwareBody>),
+    #[cfg(feature = "software-ray-query")]
+    Software(
+        #[expect(dead_code, reason = "held only to be dropped")]
+        Arc<crate::software_ray_query::storage::SoftwareBody>,
+    ),
     /// Answered sizes, which may be there before the GPU is done with the command buffer that asked.
     SizeQuery(#[expect(dead_code, reason = "held only to be dropped")] Arc<SizeQuery>),
 }
@@ -207,8 +210,9 @@ impl Shared {
             | Garbage::ComputePipeline(_)
             | Garbage::Swapchain(_)
             | Garbage::Body(_)
-            | Garbage::Software(_)
             | Garbage::SizeQuery(_) => {}
+            #[cfg(feature = "software-ray-query")]
+            Garbage::Software(_) => {}
         }
     }
 

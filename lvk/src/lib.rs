@@ -117,7 +117,8 @@ mod parallel;
 mod pipeline;
 mod resource;
 mod shader;
-pub(crate) mod software_ray_query;
+#[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled.rs")]
+mod software_ray_query;
 mod store;
 mod submit;
 mod swapchain;

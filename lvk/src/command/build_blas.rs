@@ -8,7 +8,7 @@ use ash::vk;
 
 use super::CommandBuffer;
 use super::queue_support::BUILD;
-use super::software::{SoftwareWork, check_placed};
+use super::software_ray_query::{SoftwareWork, check_placed};
 use crate::accel::AccelStruct;
 use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::{Blas, BlasBody, PartShape};

@@ -11,7 +11,6 @@ mod copy_accel;
 pub(crate) mod dependencies;
 mod draw_mesh;
 mod dynamic_state;
-pub(crate) mod gpu_build;
 pub(crate) mod indirect_count;
 mod kernel_dispatch;
 mod label;
@@ -26,7 +25,8 @@ pub(crate) mod render_pass;
 pub(crate) mod render_pass_desc;
 mod resolve;
 mod shading_rate;
-mod software;
+#[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled.rs")]
+pub(crate) mod software_ray_query;
 mod subresource_accesses;
 pub(crate) mod trace;
 pub(crate) mod transfer;

@@ -97,7 +97,8 @@ pub struct ContextDesc<'a> {
     /// checksum of the primitives and settings it was built from. It is made when needed, and never emptied.
     ///
     /// A file that is damaged, or of another version, is dropped with a warning to the `log` crate and made anew, never an
-    /// error. Keep the folder where only the program writes it.
+    /// error. Keep the folder where only the program writes it. Without the feature `software-ray-query` the folder is left
+    /// alone.
     pub tree_cache: Option<&'a Path>,
 }
 

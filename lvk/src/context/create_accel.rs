@@ -7,6 +7,7 @@ use ash::vk;
 use super::Context;
 use super::holder::Holder;
 use super::plan_blas::part_limits;
+use super::software_ray_query::software_tlas;
 use crate::accel::AccelStruct;
 use crate::accel::accel_struct::AccelKind;
 use crate::accel::blas::{Blas, BlasBody, PartShape};
@@ -26,10 +27,6 @@ use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::software_ray_query::blas::SoftwareBlas;
-use crate::software_ray_query::bvh::rebraid::room;
-use crate::software_ray_query::gpu_build::layout::GpuBuildPlan;
-use crate::software_ray_query::storage::SoftwareBody;
-use crate::software_ray_query::tlas::SoftwareTlas;
 use crate::submit::SubmitHandle;
 
 impl Context {
@@ -263,16 +260,4 @@ fn hardware_tlas(
     let bytes = sizes.structure_bytes;
     let structure = RawStructure::new(&shared.gpu, &shared.accel_storage, name, ty, bytes)?;
     Ok((structure, sizes))
-}
-
-/// Room for what software traces, where it does.
-fn software_tlas(shared: &Shared, name: &str, capacity: u32) -> Result<Option<SoftwareTlas>> {
-    if !shared.gpu.caps.software_ray_query() {
-        return Ok(None);
-    }
-    let plan = GpuBuildPlan::tlas(name, capacity)?;
-    let room = room(capacity);
-    let bytes = GpuBuildPlan::tlas(name, room)?.blob_bytes;
-    let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, bytes)?;
-    Ok(Some(SoftwareTlas { body: Arc::new(body), plan, room }))
 }

@@ -26,7 +26,8 @@ mod query_results;
 mod read_bounds;
 pub(crate) mod readback;
 pub(crate) mod serialize;
-mod software_blas;
+#[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled.rs")]
+mod software_ray_query;
 mod submit;
 mod transfer;
 mod window;

@@ -30,7 +30,6 @@ use crate::pipeline::{PipelineCache, PipelineLayout};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, InternalUsage};
 use crate::shader::ShaderCache;
-use crate::software_ray_query::bvh_cache::TreeCache;
 use crate::store::Store;
 use crate::submit::Submitter;
 use crate::submit::profiler::Profiler;
@@ -42,8 +41,10 @@ impl Context {
     /// # Errors
     /// [`NoVulkan`](crate::Error::NoVulkan) without a loader or driver; [`NoDevice`](crate::Error::NoDevice) with the
     /// reason for each device when none will do; [`Unsupported`](crate::Error::Unsupported) when validation is wanted
-    /// and its layer is missing, or the instance has no extension of [`ContextDesc::extra`].
+    /// and its layer is missing, the instance has no extension of [`ContextDesc::extra`], or
+    /// [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) is asked for without the feature `software-ray-query`.
     pub fn new(desc: &ContextDesc<'_>) -> Result<Self> {
+        desc.ray_query.check()?;
         let sink = desc.validation_sink.clone().unwrap_or_default();
         let instance = Instance::new(&InstanceDesc {
             application_name: desc.application_name,
@@ -123,7 +124,8 @@ fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
         layout: PipelineLayout::new(&gpu, bindless.set_layout)?,
         pipeline_cache: desc.pipeline_cache.map(|path| PipelineCache::new(&gpu, path)).transpose()?,
         shader_cache: desc.shader_cache.map(ShaderCache::new),
-        tree_cache: desc.tree_cache.map(TreeCache::new),
+        #[cfg(feature = "software-ray-query")]
+        tree_cache: desc.tree_cache.map(crate::software_ray_query::bvh_cache::TreeCache::new),
         bindless,
         submitter: Submitter::new(&gpu)?,
         profiler: Profiler::new(&gpu),

@@ -1,4 +1,7 @@
-//! Bottom-level structures of the library's own, built by the CPU when they are created.
+//! Structures of the library's own: bottom-level ones are built by the CPU when they are created, but those that the GPU
+//! builds.
+//!
+//! `disabled.rs` has the names that other files use, for builds without the feature `software-ray-query`.
 
 use std::sync::Arc;
 
@@ -12,7 +15,7 @@ use crate::accel::blas::{Blas, BlasBody};
 use crate::accel::blas_file::Blob;
 use crate::accel::desc::BlasDesc;
 use crate::command::transfer::BufferCopy;
-use crate::device_state::Garbage;
+use crate::device_state::{Garbage, Shared};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::parallel::make_all;
@@ -21,11 +24,14 @@ use crate::software_ray_query::blas::{
 };
 use crate::software_ray_query::bvh::encode_blas::{self, BlasBlob};
 use crate::software_ray_query::bvh::primitives::Mesh;
+use crate::software_ray_query::bvh::rebraid::room;
 use crate::software_ray_query::bvh::settings::Quality;
 use crate::software_ray_query::bvh::subtrees::parts;
 use crate::software_ray_query::bvh_cache::TreeKey;
+use crate::software_ray_query::gpu_build::layout::GpuBuildPlan;
 use crate::software_ray_query::rebraid_parts::Parts;
 use crate::software_ray_query::storage::SoftwareBody;
+use crate::software_ray_query::tlas::SoftwareTlas;
 use crate::software_ray_query::validate_blob::{self, Expected};
 
 /// Stands in front of structures that no driver wrote; as long as what drivers begin with.
@@ -143,4 +149,16 @@ impl Context {
             cmd.fill_software_blas(target, body, &blob.bytes)
         })
     }
+}
+
+/// Room for what software traces, where it does.
+pub(super) fn software_tlas(shared: &Shared, name: &str, capacity: u32) -> Result<Option<SoftwareTlas>> {
+    if !shared.gpu.caps.software_ray_query() {
+        return Ok(None);
+    }
+    let plan = GpuBuildPlan::tlas(name, capacity)?;
+    let room = room(capacity);
+    let bytes = GpuBuildPlan::tlas(name, room)?.blob_bytes;
+    let body = SoftwareBody::new(&shared.gpu, &shared.accel_storage, name, bytes)?;
+    Ok(Some(SoftwareTlas { body: Arc::new(body), plan, room }))
 }
