@@ -30,7 +30,6 @@ use crate::shader::ShaderCache;
 use crate::store::Store;
 use crate::submit::profiler::Profiler;
 use crate::submit::{Finished, Submitter};
-use crate::swapchain::state::Swapchain;
 use crate::upload::{SpareBuffers, Staging};
 
 /// The parts of a context below the command layer. Fields are dropped in this order, the device last.
@@ -96,7 +95,10 @@ pub(crate) enum Garbage {
     RayTracingPipeline(Arc<RayTracingPipeline>),
     QueryPool(Arc<QueryPool>),
     AccelStruct(Arc<AccelStruct>),
-    Swapchain(#[expect(dead_code, reason = "held only to be dropped")] Arc<Swapchain>),
+    #[cfg(feature = "window")]
+    Swapchain(
+        #[expect(dead_code, reason = "held only to be dropped")] Arc<crate::swapchain::state::Swapchain>,
+    ),
     /// What a top-level structure showed; handles of it may still be in use.
     Contents(Box<TlasContents>),
     /// What a compacted structure took the place of, or what took its place.
@@ -208,11 +210,12 @@ impl Shared {
             }
             Garbage::RenderPipeline(_)
             | Garbage::ComputePipeline(_)
-            | Garbage::Swapchain(_)
             | Garbage::Body(_)
             | Garbage::SizeQuery(_) => {}
             #[cfg(feature = "software-ray-query")]
             Garbage::Software(_) => {}
+            #[cfg(feature = "window")]
+            Garbage::Swapchain(_) => {}
         }
     }
 

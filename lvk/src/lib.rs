@@ -94,8 +94,13 @@
 //!
 //! # Features
 //!
-//! `glsl` (default): compile GLSL at run time; needs a C++17 compiler when the library is built. Without it modules
-//! take SPIR-V words.
+//! All features are on by default. The code and the crates of a feature that is off are not compiled.
+//!
+//! | Feature | Adds | Without it |
+//! |---|---|---|
+//! | `glsl` | a GLSL compiler; needs a C++17 compiler when the library is built | modules take SPIR-V words; [`ShaderSource::Glsl`] is [`Error::Unsupported`] |
+//! | `software-ray-query` | ray queries and acceleration structures on devices without `VK_KHR_ray_query`: builders on CPU and GPU, and their kernels | [`RayQueryRequest::Auto`] takes hardware or nothing; [`RayQueryRequest::Software`] is [`Error::Unsupported`]; [`ContextDesc::tree_cache`] has no effect |
+//! | `window` | swapchains for the handles of the crate `raw-window-handle` | a context renders to textures; `ContextDesc::window`, `Context::create_swapchain` and their types are not there |
 
 mod accel;
 mod barrier;
@@ -121,6 +126,7 @@ mod shader;
 mod software_ray_query;
 mod store;
 mod submit;
+#[cfg(feature = "window")]
 mod swapchain;
 #[cfg(any(test, feature = "test-hooks"))]
 mod test_support;
@@ -132,7 +138,6 @@ pub use test_support::hooks as test_hooks;
 
 pub use ash;
 pub use glam;
-pub use raw_window_handle;
 
 pub use accel::culling::InstanceCulling;
 pub use accel::desc::{BlasDesc, PrimitiveOrder, TlasDesc};
@@ -177,11 +182,9 @@ pub use gpu::memory::budget::{MemoryBudget, MemoryHeap};
 pub use gpu::start::external::RawContext;
 pub use gpu::start::profile::DeviceProfile;
 pub use gpu::start::user_extensions::UserExtensions;
-pub use gpu::window::WindowHandles;
 pub use handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
-    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, SwapchainHandle,
-    TextureHandle,
+    RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
 };
 pub use pipeline::blend::{Blend, BlendComponent, BlendFactor, BlendOp, ColorWriteMask};
 pub use pipeline::compute::ComputePipelineDesc;
@@ -205,6 +208,10 @@ pub use shader::compile_glsl;
 pub use shader::{ShaderCacheStats, ShaderModuleDesc, ShaderSource, ShaderStage};
 pub use store::LiveObject;
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};
-pub use swapchain::desc::{
-    ColorSpace, HdrMetadata, PresentMode, SwapchainDesc, SwapchainImage, SwapchainInfo,
+#[cfg(feature = "window")]
+pub use {
+    gpu::window::WindowHandles,
+    handle::SwapchainHandle,
+    raw_window_handle,
+    swapchain::desc::{ColorSpace, HdrMetadata, PresentMode, SwapchainDesc, SwapchainImage, SwapchainInfo},
 };

@@ -16,6 +16,7 @@ mod kernel_dispatch;
 mod label;
 mod local_read;
 mod pass_area;
+#[cfg(feature = "window")]
 mod present;
 pub(crate) mod query;
 mod query_usage;

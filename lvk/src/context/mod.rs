@@ -30,6 +30,7 @@ pub(crate) mod serialize;
 mod software_ray_query;
 mod submit;
 mod transfer;
+#[cfg(feature = "window")]
 mod window;
 
 use std::sync::Arc;
@@ -40,7 +41,6 @@ use crate::device_state::Shared;
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::debug::messenger::ValidationSink;
 use crate::gpu::memory::budget::MemoryBudget;
-use crate::gpu::window::WindowHandles;
 use crate::lock_order::Mutex;
 
 use frame::FrameRing;
@@ -64,7 +64,8 @@ struct Inner {
     /// Compactions under way.
     compactions: Mutex<Compactions>,
     /// For swapchains that name none.
-    window: Option<Arc<dyn WindowHandles>>,
+    #[cfg(feature = "window")]
+    window: Option<Arc<dyn crate::gpu::window::WindowHandles>>,
     shared: Arc<Shared>,
 }
 

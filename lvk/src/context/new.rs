@@ -51,7 +51,7 @@ impl Context {
             library: desc.vulkan_library,
             validation: desc.validation,
             extra: desc.user_extensions.instance_extensions(),
-            window: desc.window.as_deref(),
+            window: desc.window_ref(),
             sink,
         })?;
         let wish = std::env::var("LVK_DEVICE").ok().filter(|wish| !wish.is_empty());
@@ -64,7 +64,7 @@ impl Context {
             extra: desc.user_extensions,
             debug_names: desc.debug_names,
             queues: requested_queues(desc),
-            window: desc.window.as_deref(),
+            window: desc.window_ref(),
         };
         Self::on(Arc::new(Gpu::new(instance, &request)?), desc)
     }
@@ -77,6 +77,7 @@ impl Context {
             compactions: Mutex::new(Rank::Compactions, Compactions::default()),
             frames: Mutex::new(Rank::Frames, FrameRing::new(desc.frames_in_flight)),
             spare_notes: SpareNotes::new(),
+            #[cfg(feature = "window")]
             window: desc.window.clone(),
             shared,
         };

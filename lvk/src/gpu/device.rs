@@ -11,7 +11,7 @@ use super::caps::descriptor_limits::DescriptorLimits;
 use super::caps::format_features::FormatFeatureCache;
 use super::caps::host_image_copy::HostImageCopy;
 use super::caps::image_limits::ImageLimitCache;
-use super::caps::optional_features::{FeatureSet, OF_WINDOWS, OptionalFeature};
+use super::caps::optional_features::OptionalFeature;
 use super::caps::queues::{Queue, QueueLocation, QueueRequest, Queues, shared_timestamp_bits};
 use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::shading_rate::ShadingRates;
@@ -25,7 +25,7 @@ use super::start::instance::Instance;
 use super::start::profile::DeviceProfile;
 use super::start::select::{Candidate, choose};
 use super::start::user_extensions::UserExtensions;
-use super::window::{SurfaceProbe, WindowFunctions, WindowHandles};
+use super::window::{SurfaceProbe, WindowRef, unavailable_window_features};
 use crate::error::{Error, Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
 
@@ -44,7 +44,7 @@ pub(crate) struct DeviceRequest<'a> {
     pub(crate) debug_names: Option<bool>,
     pub(crate) queues: QueueRequest,
     /// A window that the device has to present to.
-    pub(crate) window: Option<&'a dyn WindowHandles>,
+    pub(crate) window: Option<WindowRef<'a>>,
 }
 
 /// One logical device with everything made from it that is not a resource. It knows no resource.
@@ -70,7 +70,8 @@ pub(crate) struct Gpu {
     /// Samplers alive with a border colour of their own, of which a device has few.
     pub(crate) custom_borders: AtomicU32,
     /// Present where the context is for windows.
-    pub(crate) windows: Option<WindowFunctions>,
+    #[cfg(feature = "window")]
+    pub(crate) windows: Option<super::window::WindowFunctions>,
     physical: vk::PhysicalDevice,
     /// Takes names and labels; present where somebody reads them, as each name costs as much as a small buffer.
     pub(super) debug_utils: Option<ash::ext::debug_utils::Device>,
@@ -172,7 +173,8 @@ impl Gpu {
                 .then(|| ash::khr::dynamic_rendering_local_read::Device::new(raw, &device)),
             host_copies,
             host_clock: HostClock::new(&instance, &device, physical, features.calibration),
-            windows: WindowFunctions::new(&instance, &device, |feature| caps.has(feature)),
+            #[cfg(feature = "window")]
+            windows: super::window::WindowFunctions::new(&instance, &device, |feature| caps.has(feature)),
             debug_utils: object_names::should_name_objects(&instance, physical, debug_names)
                 .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             device_fault: (features.ext.fault.device_fault == vk::TRUE)
@@ -194,6 +196,7 @@ impl Gpu {
     }
 
     /// The queue for everything; Vulkan wants one thread at a time on it.
+    #[cfg(feature = "window")]
     pub(crate) fn graphics_queue(&self) -> Guard<'_, vk::Queue> {
         self.queues.raw(0)
     }
@@ -319,7 +322,7 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
     for device in &mut devices {
         device.capabilities.remove_features(unknown);
         if let Some(probe) = &probe {
-            device.select_present_queue(probe);
+            device.select_present_queue(probe.queue_family(device.raw));
         }
     }
     let candidates: Vec<_> = devices.iter_mut().map(|device| candidate(device, request)).collect();
@@ -333,15 +336,6 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
 fn use_single_queue(device: &mut PhysicalDevice, request: QueueRequest) {
     if request == QueueRequest::Shared {
         device.set_queues([device.places[0]; 3]);
-    }
-}
-
-/// What devices have for windows and cannot be turned on for want of an extension of the instance.
-fn unavailable_window_features(instance: &Instance) -> FeatureSet {
-    match &instance.windows {
-        None => OF_WINDOWS.into_iter().collect(),
-        Some(windows) if windows.maintenance => FeatureSet::NONE,
-        Some(_) => FeatureSet::NONE.with(OptionalFeature::SwapchainMaintenance1),
     }
 }
 

@@ -6,6 +6,7 @@ pub(crate) mod debug;
 pub(crate) mod device;
 pub(crate) mod memory;
 pub(crate) mod start;
+#[cfg_attr(not(feature = "window"), path = "window_disabled.rs")]
 pub(crate) mod window;
 
 pub(crate) use device::Gpu;

@@ -6,7 +6,7 @@ use std::fmt;
 use ash::vk;
 use raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle, RawWindowHandle};
 
-use super::caps::optional_features::OptionalFeature;
+use super::caps::optional_features::{FeatureSet, OF_WINDOWS, OptionalFeature};
 use super::device::Gpu;
 use super::start::instance::Instance;
 use crate::error::{Error, Result};
@@ -25,20 +25,23 @@ impl fmt::Debug for dyn WindowHandles + '_ {
     }
 }
 
+/// A window while an instance and a device are made.
+pub(crate) type WindowRef<'a> = &'a dyn WindowHandles;
+
 /// The extensions of an instance that knows windows.
 #[derive(Debug, Clone)]
 pub(crate) struct WindowExtensions {
     /// Of the window system, with `VK_KHR_surface`.
     system: Vec<&'static CStr>,
     /// `VK_EXT_surface_maintenance1`, with what it needs.
-    pub(crate) maintenance: bool,
+    maintenance: bool,
     /// `VK_EXT_swapchain_colorspace`.
     color_spaces: bool,
 }
 
 impl WindowExtensions {
     /// Those for windows like `window`, of which `has` says what there is.
-    pub(crate) fn query(window: &dyn WindowHandles, has: &dyn Fn(&CStr) -> bool) -> Result<Self> {
+    pub(crate) fn query(window: WindowRef<'_>, has: &dyn Fn(&CStr) -> bool) -> Result<Self> {
         let system = required_extensions(display(window)?)?;
         if let Some(name) = system.iter().find(|name| !has(name)) {
             let what = format!("the instance extension {}", name.to_string_lossy());
@@ -56,6 +59,15 @@ impl WindowExtensions {
         let maintenance = if self.maintenance { &MAINTENANCE[..] } else { &[] };
         let color_spaces = self.color_spaces.then_some(ash::ext::swapchain_colorspace::NAME);
         self.system.clone().into_iter().chain(maintenance.iter().copied()).chain(color_spaces)
+    }
+}
+
+/// The features of a device for windows that cannot be enabled, for want of an extension of the instance.
+pub(crate) fn unavailable_window_features(instance: &Instance) -> FeatureSet {
+    match &instance.windows {
+        None => OF_WINDOWS.into_iter().collect(),
+        Some(windows) if windows.maintenance => FeatureSet::NONE,
+        Some(_) => FeatureSet::NONE.with(OptionalFeature::SwapchainMaintenance1),
     }
 }
 
@@ -112,7 +124,7 @@ pub(crate) struct SurfaceProbe<'a> {
 }
 
 impl<'a> SurfaceProbe<'a> {
-    pub(crate) fn new(instance: &'a Instance, window: &dyn WindowHandles) -> Result<Self> {
+    pub(crate) fn new(instance: &'a Instance, window: WindowRef<'_>) -> Result<Self> {
         Ok(Self {
             raw: create_surface(instance, window)?,
             functions: ash::khr::surface::Instance::new(&instance.entry, &instance.raw),

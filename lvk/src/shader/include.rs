@@ -128,7 +128,8 @@ impl<'a> Includes<'a> {
 
     fn not_found(&self, name: &str, beside: Option<&Path>) -> String {
         if name.starts_with("lvk/") {
-            let known: Vec<_> = preamble::library().map(|(name, _)| format!("<{name}>")).collect();
+            let mut known: Vec<_> = preamble::library().map(|(name, _)| format!("<{name}>")).collect();
+            known.sort();
             return format!("the library has no <{name}>; it has {}", known.join(", "));
         }
         let mut places: Vec<String> = Vec::new();

@@ -15,7 +15,6 @@ use super::shading_rate::ShadingRateLimits;
 use crate::error::{Error, Result};
 use crate::gpu::start::features::{Calibration, Features, Subgroups, missing_required};
 use crate::gpu::start::select::DeviceKind;
-use crate::gpu::window::SurfaceProbe;
 
 /// Whether the caller needs a feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -382,9 +381,9 @@ fn calibration_extension(has: &dyn Fn(&CStr) -> bool) -> Calibration {
 }
 
 impl PhysicalDevice {
-    /// Takes a queue that presents to the window, or says that there is none.
-    pub(crate) fn select_present_queue(&mut self, window: &SurfaceProbe<'_>) {
-        match window.queue_family(self.raw) {
+    /// Takes a family whose queues present to the window, or says that there is none.
+    pub(crate) fn select_present_queue(&mut self, family: Option<u32>) {
+        match family {
             Some(family) => self.use_single_family(family),
             None => {
                 self.missing.push("a queue for graphics and compute that presents to the window".to_owned())

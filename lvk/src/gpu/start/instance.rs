@@ -7,7 +7,7 @@ use ash::vk;
 
 use crate::error::{Error, Result};
 use crate::gpu::debug::messenger::{Messenger, ValidationMode, ValidationSink, c_name};
-use crate::gpu::window::{WindowExtensions, WindowHandles};
+use crate::gpu::window::{WindowExtensions, WindowRef};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
@@ -36,7 +36,7 @@ pub(crate) struct InstanceDesc<'a> {
     /// Extensions of the caller's own.
     pub(crate) extra: &'a [&'a CStr],
     /// A window that the instance has to know.
-    pub(crate) window: Option<&'a dyn WindowHandles>,
+    pub(crate) window: Option<WindowRef<'a>>,
     pub(crate) sink: ValidationSink,
 }
 
