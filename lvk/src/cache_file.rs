@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Caches beyond this are taken for damage.
-pub(crate) const MOST_BYTES: u64 = 1 << 30;
+pub(crate) const MAX_BYTES: u64 = 1 << 30;
 
 /// FNV-1a with 64 bits: tells damage, not malice.
 pub(crate) fn checksum(parts: &[&[u8]]) -> u64 {
@@ -17,16 +17,16 @@ pub(crate) fn checksum(parts: &[&[u8]]) -> u64 {
 }
 
 /// Reads a file; of one that is larger than it can be only the start, which is then refused as cut off.
-pub(crate) fn read(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
+pub(crate) fn read_file(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     File::open(path)?.take(most_bytes).read_to_end(&mut bytes)?;
     Ok(bytes)
 }
 
 /// Replaces a file at once: whoever reads it, or starts after a crash, finds the old bytes or the new ones.
-pub(crate) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
+pub(crate) fn replace_file(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let temporary = temporary_name(path)?;
-    let written = write(&temporary, bytes).and_then(|()| std::fs::rename(&temporary, path));
+    let written = write_temporary(&temporary, bytes).and_then(|()| std::fs::rename(&temporary, path));
     if written.is_err() {
         // What failed first is reported; a leftover is harmless.
         let _ = std::fs::remove_file(&temporary);
@@ -34,7 +34,7 @@ pub(crate) fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
     written
 }
 
-fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
+fn write_temporary(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut file = File::create_new(path)?;
     file.write_all(bytes)?;
     file.sync_all()

@@ -5,10 +5,10 @@ use std::fmt::Write;
 use crate::store::LiveObject;
 
 /// Names said of each kind; of more only the number.
-const MOST_NAMES: usize = 20;
+const MAX_NAMES: usize = 20;
 
 /// One line a kind, with the names in order, each with how often it occurs; `None` where nothing is alive.
-pub(crate) fn report(live: &[LiveObject]) -> Option<String> {
+pub(crate) fn leak_report(live: &[LiveObject]) -> Option<String> {
     if live.is_empty() {
         return None;
     }
@@ -19,8 +19,8 @@ pub(crate) fn report(live: &[LiveObject]) -> Option<String> {
     for of_kind in live.chunk_by(|a, b| a.kind == b.kind) {
         let mut names: Vec<&str> = of_kind.iter().map(|object| object.name.as_str()).collect();
         names.sort_unstable();
-        let names: Vec<String> = names.chunk_by(|a, b| a == b).map(counted).collect();
-        let (said, rest) = names.split_at(names.len().min(MOST_NAMES));
+        let names: Vec<String> = names.chunk_by(|a, b| a == b).map(count_by_kind).collect();
+        let (said, rest) = names.split_at(names.len().min(MAX_NAMES));
         // Writing to a String cannot fail.
         let _ = write!(text, "\n  {} {}: {}", of_kind.len(), of_kind[0].kind, said.join(", "));
         if !rest.is_empty() {
@@ -30,7 +30,7 @@ pub(crate) fn report(live: &[LiveObject]) -> Option<String> {
     Some(text)
 }
 
-fn counted(same: &[&str]) -> String {
+fn count_by_kind(same: &[&str]) -> String {
     match same.len() {
         1 => format!("'{}'", same[0]),
         count => format!("{count} x '{}'", same[0]),
@@ -41,15 +41,20 @@ fn counted(same: &[&str]) -> String {
 mod tests {
     use super::*;
 
-    fn live(kind: &'static str, name: &str) -> LiveObject {
+    fn live_object(kind: &'static str, name: &str) -> LiveObject {
         LiveObject { kind, name: name.to_owned() }
     }
 
     #[test]
     fn kinds_and_names_are_gathered_and_counted() {
-        assert_eq!(report(&[]), None);
-        let objects = [live("buffer", "b"), live("buffer", "a"), live("buffer", "b"), live("sampler", "s")];
-        let text = report(&objects).unwrap();
+        assert_eq!(leak_report(&[]), None);
+        let objects = [
+            live_object("buffer", "b"),
+            live_object("buffer", "a"),
+            live_object("buffer", "b"),
+            live_object("sampler", "s"),
+        ];
+        let text = leak_report(&objects).unwrap();
         let lines: Vec<_> = text.lines().collect();
         assert!(lines[0].starts_with("4 objects were alive when their context ended"), "{text}");
         assert_eq!(lines[1..], ["  3 buffer: 'a', 2 x 'b'", "  1 sampler: 's'"]);
@@ -57,8 +62,8 @@ mod tests {
 
     #[test]
     fn many_names_are_cut_short() {
-        let objects: Vec<_> = (0..25).map(|number| live("texture", &format!("{number:02}"))).collect();
-        let text = report(&objects).unwrap();
+        let objects: Vec<_> = (0..25).map(|number| live_object("texture", &format!("{number:02}"))).collect();
+        let text = leak_report(&objects).unwrap();
         assert!(
             text.contains("25 texture: '00', '01'") && text.ends_with("'19' and 5 other names"),
             "{text}"

@@ -1,9 +1,9 @@
-//! `lvk` is a bindless, handle-based, lightweight Vulkan library with ray tracing as its headline.
+//! `lvk` is a bindless, handle-based, lightweight Vulkan library with a focus on ray tracing.
 //!
-//! Objects are created from plain descriptions and named by handles. Shaders reach textures, samplers and
-//! acceleration structures by a number ([`Holder::index`]) and buffers by address ([`Context::buffer_address`]).
-//! Descriptor sets, shader binding tables, barriers, image layouts, scratch memory, staging memory and the lifetime of
-//! what the GPU still uses are the library's business.
+//! The application creates objects from plain descriptions and refers to them by handles. Shaders access textures,
+//! samplers and acceleration structures by a bindless index ([`Holder::index`]), and buffers by address
+//! ([`Context::buffer_address`]). The library manages descriptor sets, shader binding tables, barriers, image
+//! layouts, scratch memory and staging memory. It keeps objects alive while the GPU uses them.
 //!
 //! ```no_run
 //! use lvk::*;
@@ -37,70 +37,78 @@
 //!
 //! # Map
 //!
-//! | You want to | Start at |
+//! | Task | Start at |
 //! |---|---|
-//! | open a device, ask what it can do | [`Context::new`], [`ContextDesc`], [`Capabilities`] |
-//! | make objects | `Context::create_*`, each with its `*Desc` |
-//! | show part of a texture, or as another format | [`Context::create_texture_view`], [`TextureViewDesc`] |
-//! | move data | [`manual::queues_and_uploads`], [`Context::upload_buffer`], [`Context::download_texture`], [`Readback`] and their kin |
-//! | record | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
-//! | draw | [`CommandBuffer::begin_rendering`], [`RenderPass`] |
+//! | open a device, query its capabilities | [`Context::new`], [`ContextDesc`], [`Capabilities`] |
+//! | create objects | `Context::create_*`, each with its `*Desc` |
+//! | use part of a texture, or another format of it | [`Context::create_texture_view`], [`TextureViewDesc`] |
+//! | move data | [`manual::queues_and_uploads`], [`Context::upload_buffer`], [`Context::download_texture`], [`Readback`] and similar methods |
+//! | record commands | [`Context::acquire_command_buffer`], [`CommandBuffer`] |
+//! | draw | [`CommandBuffer::begin_rendering`], [`RenderPass`], [`manual::rendering`] |
 //! | read targets in their own pass | [`RenderPassDesc::local_read`], [`TextureUsage::INPUT`], [`RenderPass::read_targets`] |
 //! | shade several pixels at once | [`RenderPipelineDesc::shading_rate`], [`Context::shading_rates`] |
 //! | draw with task and mesh shaders | [`RenderPipelineDesc::mesh`], [`RenderPass::draw_mesh_tasks`] |
-//! | show pictures in windows | [`manual::windows`], [`Context::create_swapchain`], [`Context::present`] |
+//! | present to windows | [`manual::windows`], [`Context::create_swapchain`], [`Context::present`] |
 //! | compute | [`CommandBuffer::dispatch`] |
 //! | trace rays with a pipeline | [`RayTracingPipelineDesc`], [`CommandBuffer::trace_rays`] |
 //! | link compiled shaders into several pipelines | [`RayTracingLibraryDesc`] |
 //! | keep compiled pipelines on disk | [`ContextDesc::pipeline_cache`] |
 //! | keep compiled shaders on disk | [`ContextDesc::shader_cache`] |
 //! | trace rays in any shader | [`ShaderModuleDesc`] with `#include <lvk/ray_query.glsl>` |
-//! | read how it all hangs together | [`manual`] |
-//! | build what rays hit | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
-//! | say what a shader reaches | [`Dependencies`] |
-//! | submit, wait, keep frames apart | [`Context::submit`], [`Context::wait`], [`Context::next_frame`] |
-//! | compute, build and copy beside what is drawn | [`Context::acquire_command_buffer_on`] a [`Queue`], [`Context::create_blas_batch_on`], [`manual::queues_and_uploads`] |
+//! | build acceleration structures | [`BlasDesc`], [`TlasDesc`], [`CommandBuffer::build_blas`], [`CommandBuffer::update_tlas`] |
+//! | declare the resources that a shader accesses | [`Dependencies`] |
+//! | submit, wait, pace frames | [`Context::submit`], [`Context::wait`], [`Context::next_frame`] |
+//! | compute, build and copy while the graphics queue draws | [`Context::acquire_command_buffer_on`] a [`Queue`], [`Context::create_blas_batch_on`], [`manual::queues_and_uploads`] |
 //! | measure | [`manual::measuring`], [`Context::set_profiling`], [`QueryPoolDesc`], [`CommandBuffer::write_timestamp`] |
-//! | find what is wrong | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`] |
-//! | mix in Vulkan calls of your own, or live on another engine's device | [`manual::interop`] |
-//! | see what LightweightVK has and what became of it here | [`manual::parity`] |
+//! | debug | [`manual::debugging`], [`ValidationMode`], [`ValidationSink`] |
+//! | use raw Vulkan calls, or another engine's device | [`manual::interop`] |
+//! | compare with LightweightVK, feature by feature | [`manual::parity`] |
+//! | learn the concepts | [`manual`] |
 //!
 //! # Barriers
 //!
-//! The library tracks every buffer and every mip and layer of every texture. Attachments, copies, uploads, builds and
-//! refits of acceleration structures, traces, and ray queries in any stage need no word from the caller. What a shader
-//! reaches only by number or address is named in [`Dependencies`] when an earlier command *wrote* it, or when this one
-//! writes it; what was only uploaded is readable everywhere. A render pass cannot contain barriers, so what its draws
-//! read and the same command buffer wrote is named in the pass's dependencies; forgetting that is an error for indices,
-//! vertices and indirect arguments, and a hazard for what shaders reach by number or address. Acceleration structures
-//! are the exception: where some graphics pipeline queries rays, a pass waits for the builds recorded before it. Make
-//! such pipelines before their pass begins.
+//! The library tracks every buffer, and every mip and layer of every texture. The caller declares nothing for
+//! attachments, copies, uploads, traces, builds and refits of acceleration structures, and ray queries in any stage.
+//!
+//! Resources that a shader accesses only by index or address are declared in [`Dependencies`] in two cases: an
+//! earlier command *wrote* the resource, or this command writes it. A resource that was only uploaded is readable
+//! everywhere.
+//!
+//! A render pass cannot contain barriers. Resources that its draws read and the same command buffer wrote are
+//! therefore declared in the dependencies of the pass. A missing declaration is an error for indices, vertices and
+//! indirect arguments. It is a hazard for resources that shaders access by index or address.
+//!
+//! Acceleration structures are the exception. If any graphics pipeline queries rays, a render pass waits for the
+//! builds recorded before it. Create such pipelines before their pass begins.
 //!
 //! # What is not checked
 //!
-//! Numbers and addresses inside shaders: a shader that indexes past the arrays, or reads through a wrong address, is
-//! undefined behaviour on the GPU, as in every bindless design; [`ContextDesc::check_indices`] finds the former. Slot 0 of each array and every free slot hold a
-//! visible dummy, a 2D one among the textures. Nor are vertices, which indices and draws may ask for beyond the end of
-//! a vertex buffer.
-//!
-//! Memory of workgroups is checked as far as it is declared: shared variables and task payloads against the limits of their
-//! stage, with the constants of each pipeline, except arrays whose lengths are worked out by more than operations on
-//! 32-bit integers and booleans. What the vertices and primitives of mesh shaders take is not (`maxMeshOutputMemorySize`,
-//! `maxMeshPayloadAndOutputMemorySize`, `maxMeshOutputComponents`), as it hangs on how a driver stores them.
+//! * Indices and addresses inside shaders. A shader that indexes past the arrays, or reads through a wrong address,
+//!   causes undefined behaviour on the GPU, as in every bindless design. [`ContextDesc::check_indices`] finds wrong
+//!   indices. Slot 0 of each array and every free slot hold a visible default descriptor. Among the textures, it is a
+//!   2D texture.
+//! * Vertices. Indices and draws may read beyond the end of a vertex buffer.
+//! * Workgroup memory with unresolved array lengths. The library checks declared shared variables and task payloads
+//!   against the limits of their stage, with the constants of each pipeline. It resolves only array lengths that use
+//!   operations on 32-bit integers and booleans.
+//! * Memory for the vertices and primitives of mesh shaders (`maxMeshOutputMemorySize`,
+//!   `maxMeshPayloadAndOutputMemorySize`, `maxMeshOutputComponents`). It depends on the driver's storage of them.
 //!
 //! # What `lvk` does not do (yet)
 //!
-//! The pages of the [manual] each end with what is left out. `lvk` is no scene graph and no renderer.
+//! Most pages of the [manual] end with a list of unsupported features. `lvk` is neither a scene graph nor a renderer.
 //!
 //! # Features
 //!
-//! All features are on by default. The code and the crates of a feature that is off are not compiled.
+//! All features are enabled by default. The code and the crates of a disabled feature are not compiled.
 //!
-//! | Feature | Adds | Without it |
-//! |---|---|---|
-//! | `glsl` | a GLSL compiler; needs a C++17 compiler when the library is built | modules take SPIR-V words; [`ShaderSource::Glsl`] is [`Error::Unsupported`] |
-//! | `software-ray-query` | ray queries and acceleration structures on devices without `VK_KHR_ray_query`: builders on CPU and GPU, and their kernels | [`RayQueryRequest::Auto`] takes hardware or nothing; [`RayQueryRequest::Software`] is [`Error::Unsupported`]; [`ContextDesc::tree_cache`] has no effect |
-//! | `window` | swapchains for the handles of the crate `raw-window-handle` | a context renders to textures; `ContextDesc::window`, `Context::create_swapchain` and their types are not there |
+//! * `glsl` compiles GLSL at run time. It needs a C++17 compiler when the library is built. Without it, modules take
+//!   only SPIR-V words, and [`ShaderSource::Glsl`] is [`Error::Unsupported`].
+//! * `software-ray-query` contains the library's own BVH builders and traversal, for devices without ray queries.
+//!   Without it, such devices have no ray queries: [`RayQueryRequest::Auto`] selects hardware or nothing,
+//!   [`RayQueryRequest::Software`] is [`Error::Unsupported`], and [`ContextDesc::tree_cache`] has no effect.
+//! * `window` contains swapchains for windows of any library that implements `raw-window-handle`. Without it, a
+//!   context renders only to textures: `ContextDesc::window`, `Context::create_swapchain` and their types do not exist.
 
 mod accel;
 mod barrier;
@@ -120,6 +128,8 @@ mod lock_order;
 pub mod manual;
 mod parallel;
 mod pipeline;
+mod pool;
+mod queue;
 mod resource;
 mod shader;
 #[cfg_attr(not(feature = "software-ray-query"), path = "software_ray_query/disabled.rs")]
@@ -164,6 +174,7 @@ pub use context::holder::Holder;
 pub use context::import::{ImportedBuffer, ImportedTexture, RawSignal, RawWait};
 pub use context::readback::Readback;
 pub use context::serialize::LoadedBlas;
+pub use error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
 pub use error::{Error, Result};
 pub use format::{Aspect, Format, IndexFormat, VertexFormat};
 pub use gpu::calibrated_timestamps::CalibratedTimestamps;
@@ -171,11 +182,10 @@ pub use gpu::caps::capabilities::{Capabilities, FeatureRequest};
 pub use gpu::caps::limits::Limits;
 pub use gpu::caps::mesh_limits::MeshLimits;
 pub use gpu::caps::optional_features::{FeatureSet, OptionalFeature};
-pub use gpu::caps::queues::{Queue, QueueInfo, QueueRequest};
+pub use gpu::caps::queues::{QueueInfo, QueueRequest};
 pub use gpu::caps::ray_query_path::{RayQueryPath, RayQueryRequest};
 pub use gpu::caps::resolve_modes::{DepthResolveLimits, ResolveMode, ResolveModes};
 pub use gpu::caps::shading_rate::{FragmentSize, ShadingRate, ShadingRateCombiner, ShadingRateLimits};
-pub use gpu::debug::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
 pub use gpu::debug::messenger::{ValidationMessage, ValidationMode, ValidationSink};
 pub use gpu::memory::allocator::MemoryKind;
 pub use gpu::memory::budget::{MemoryBudget, MemoryHeap};
@@ -194,6 +204,7 @@ pub use pipeline::rasterization::{CullMode, DepthBias, FrontFace, PolygonMode, T
 pub use pipeline::ray_tracing::{HitGroup, RayTracingPipelineDesc, record_bytes};
 pub use pipeline::ray_tracing_library::RayTracingLibraryDesc;
 pub use pipeline::stage::{SpecializationConstant, SpecializationValue};
+pub use queue::Queue;
 pub use resource::buffer::{BufferDesc, BufferUsage};
 pub use resource::format_support::FormatSupport;
 pub use resource::query_pool::{PipelineStatistics, QueryKind, QueryPoolDesc};
@@ -210,7 +221,7 @@ pub use store::LiveObject;
 pub use submit::{GpuProfile, GpuScope, SubmitHandle};
 #[cfg(feature = "window")]
 pub use {
-    gpu::window::WindowHandles,
+    gpu::start::window::WindowHandles,
     handle::SwapchainHandle,
     raw_window_handle,
     swapchain::desc::{ColorSpace, HdrMetadata, PresentMode, SwapchainDesc, SwapchainImage, SwapchainInfo},

@@ -6,17 +6,17 @@ use std::thread::{Builder, available_parallelism, scope};
 use crate::lock_order::{HeldLocks, Mutex, Rank};
 
 /// Threads that are worth having for work of any number of pieces.
-pub(crate) fn cores() -> usize {
+pub(crate) fn core_count() -> usize {
     available_parallelism().map_or(1, NonZero::get)
 }
 
 /// Has so many threads do the same, this one among them, or as many of them as the system gives.
-pub(crate) fn run_on(threads: usize, work: impl Fn() + Sync) {
-    run_on_made(threads, || Builder::new().name("lvk".to_owned()), work);
+pub(crate) fn run_on_threads(threads: usize, work: impl Fn() + Sync) {
+    run_on_built_threads(threads, || Builder::new().name("lvk".to_owned()), work);
 }
 
 /// The others are made as `thread` says.
-fn run_on_made(threads: usize, thread: impl Fn() -> Builder, work: impl Fn() + Sync) {
+fn run_on_built_threads(threads: usize, thread: impl Fn() -> Builder, work: impl Fn() + Sync) {
     let waiting = HeldLocks::of_current_thread();
     scope(|scope| {
         for _ in 1..threads {
@@ -29,14 +29,14 @@ fn run_on_made(threads: usize, thread: impl Fn() -> Builder, work: impl Fn() + S
 }
 
 /// Has so many threads work on the items until none is left. Who is done takes the next, as items take very different times.
-pub(crate) fn share_out<T: Send>(
+pub(crate) fn parallel_for<T: Send>(
     threads: usize,
     items: impl Iterator<Item = T> + Send,
     work: impl Fn(T) + Sync,
 ) {
     let queue = Mutex::new(Rank::SharedWork, items);
     let next = || queue.lock().next();
-    run_on(threads, || {
+    run_on_threads(threads, || {
         while let Some(item) = next() {
             work(item);
         }
@@ -44,10 +44,10 @@ pub(crate) fn share_out<T: Send>(
 }
 
 /// What `make` makes of each item, in their order, on all cores.
-pub(crate) fn make_all<T: Sync, R: Send>(items: &[T], make: impl Fn(&T) -> R + Sync) -> Vec<R> {
+pub(crate) fn parallel_map<T: Sync, R: Send>(items: &[T], make: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let mut made: Vec<Option<R>> = items.iter().map(|_| None).collect();
     let places = items.iter().zip(&mut made);
-    share_out(cores().min(items.len()), places, |(item, place)| *place = Some(make(item)));
+    parallel_for(core_count().min(items.len()), places, |(item, place)| *place = Some(make(item)));
     made.into_iter().flatten().collect()
 }
 
@@ -65,7 +65,7 @@ mod tests {
             let is_first = asked.fetch_add(1, Ordering::Relaxed) == 0;
             Builder::new().stack_size(if is_first { 64 << 10 } else { TOO_LARGE })
         };
-        run_on_made(7, thread, || {
+        run_on_built_threads(7, thread, || {
             runs.fetch_add(1, Ordering::Relaxed);
         });
         assert_eq!((asked.into_inner(), runs.into_inner()), (2, 2), "one is given, the next is not");
@@ -75,7 +75,7 @@ mod tests {
     fn every_item_is_worked_on_once() {
         for threads in [0, 1, 2, 7] {
             let mut items = vec![0_u32; 1000];
-            share_out(threads, items.chunks_mut(3), |chunk| chunk.iter_mut().for_each(|item| *item += 1));
+            parallel_for(threads, items.chunks_mut(3), |chunk| chunk.iter_mut().for_each(|item| *item += 1));
             assert!(items.iter().all(|item| *item == 1));
         }
     }
@@ -85,7 +85,7 @@ mod tests {
         for count in [0, 1, 2, 1_000_u64] {
             let items: Vec<u64> = (0..count).collect();
             let expected: Vec<u64> = items.iter().map(|item| item * item).collect();
-            assert_eq!(make_all(&items, |item| item * item), expected);
+            assert_eq!(parallel_map(&items, |item| item * item), expected);
         }
     }
 }

@@ -1,43 +1,38 @@
-//! All pools: handle to object, or [`Error::StaleHandle`].
+//! The pools of a context, one for each kind of object.
 
-use std::marker::PhantomData;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-
-use slotmap::{DefaultKey, Key, KeyData, SlotMap};
 
 use crate::accel::AccelStruct;
-use crate::error::{Error, Result};
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
 };
-use crate::lock_order::{Rank, RwLock};
 use crate::pipeline::{ComputePipeline, RayTracingLibrary, RayTracingPipeline, RenderPipeline, ShaderModule};
+use crate::pool::{HandlePool, next_context_mask};
 use crate::resource::{Buffer, QueryPool, Sampler, Texture};
 
-/// The pools, each with its handles and objects.
+/// Makes the store from one list: each pool with its handles and objects.
 macro_rules! pools {
     ($($(#[$attribute:meta])* $pool:ident: $handle:ty => $object:ty;)*) => {
         /// Every object of a context, by handle.
         pub(crate) struct Store {
             /// A number no other context of the process has.
             pub(crate) context_id: u64,
-            $($(#[$attribute])* pub(crate) $pool: Pool<$handle, $object>,)*
+            $($(#[$attribute])* pub(crate) $pool: HandlePool<$handle, $object>,)*
         }
 
         impl Store {
             pub(crate) fn new() -> Self {
-                let mask = next_mask();
+                let mask = next_context_mask();
                 Self {
                     context_id: mask,
-                    $($(#[$attribute])* $pool: Pool::new(mask),)*
+                    $($(#[$attribute])* $pool: HandlePool::new(mask),)*
                 }
             }
 
             /// Every object, kind by kind.
             pub(crate) fn live(&self) -> Vec<LiveObject> {
-                [$($(#[$attribute])* self.$pool.live(),)*].concat()
+                [$($(#[$attribute])* live(&self.$pool),)*].concat()
             }
 
             /// Takes every object out.
@@ -83,104 +78,8 @@ trait Named {
     fn name(&self) -> &str;
 }
 
-/// Objects of one kind.
-///
-/// Keys leave the pool combined with a mask of the context, so that a handle of another context finds nothing.
-pub(crate) struct Pool<H, T> {
-    objects: RwLock<SlotMap<DefaultKey, Arc<T>>>,
-    /// How many objects were taken out. While it stays the same, whatever was found is still there.
-    removals: AtomicU64,
-    mask: u64,
-    handle: PhantomData<fn() -> H>,
-}
-
-impl<H: Handle, T> Pool<H, T> {
-    pub(crate) fn new(mask: u64) -> Self {
-        let objects = RwLock::new(Rank::Store, SlotMap::new());
-        Self { objects, removals: AtomicU64::new(0), mask, handle: PhantomData }
-    }
-
-    pub(crate) fn insert(&self, object: T) -> H {
-        let mut objects = self.objects.write();
-        H::from_bits(objects.insert(Arc::new(object)).data().as_ffi() ^ self.mask)
-    }
-
-    pub(crate) fn get(&self, handle: H) -> Result<Arc<T>> {
-        let objects = self.objects.read();
-        objects.get(self.key(handle)).cloned().ok_or(Error::StaleHandle { kind: H::KIND })
-    }
-
-    pub(crate) fn remove(&self, handle: H) -> Result<Arc<T>> {
-        let mut objects = self.objects.write();
-        let object = objects.remove(self.key(handle)).ok_or(Error::StaleHandle { kind: H::KIND })?;
-        self.removals.fetch_add(1, Ordering::Release);
-        Ok(object)
-    }
-
-    /// Rises whenever an object is taken out.
-    #[inline]
-    pub(crate) fn removals(&self) -> u64 {
-        self.removals.load(Ordering::Acquire)
-    }
-
-    fn live(&self) -> Vec<LiveObject>
-    where
-        T: Named,
-    {
-        let of = |object: &Arc<T>| LiveObject { kind: H::KIND, name: object.name().to_owned() };
-        self.all().iter().map(of).collect()
-    }
-
-    /// Everything there is.
-    pub(crate) fn all(&self) -> Vec<Arc<T>> {
-        let objects = self.objects.read();
-        objects.values().cloned().collect()
-    }
-
-    /// Takes everything out.
-    pub(crate) fn drain(&self) -> Vec<Arc<T>> {
-        let mut objects = self.objects.write();
-        objects.drain().map(|(_, object)| object).collect()
-    }
-
-    fn key(&self, handle: H) -> DefaultKey {
-        KeyData::from_ffi(handle.bits() ^ self.mask).into()
-    }
-}
-
-/// A different mask for each context of the process: odd multiples spread over all bits.
-fn next_mask() -> u64 {
-    static CONTEXTS: AtomicU64 = AtomicU64::new(1);
-    CONTEXTS.fetch_add(1, Ordering::Relaxed).wrapping_mul(0x9e37_79b9_7f4a_7c15)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_removed_object_is_stale_even_when_its_place_is_taken_again() {
-        let pool = Pool::<BufferHandle, u32>::new(next_mask());
-        let first = pool.insert(1);
-        assert_eq!(*pool.remove(first).unwrap(), 1);
-        let second = pool.insert(2);
-        assert!(matches!(pool.get(first), Err(Error::StaleHandle { kind: "buffer" })));
-        assert!(pool.remove(first).is_err());
-        assert_eq!(*pool.get(second).unwrap(), 2);
-    }
-
-    #[test]
-    fn a_handle_of_another_context_finds_nothing() {
-        let pools: Vec<_> = (0..64).map(|_| Pool::<BufferHandle, usize>::new(next_mask())).collect();
-        let handles: Vec<Vec<_>> =
-            pools.iter().map(|pool| (0..100).map(|value| pool.insert(value)).collect()).collect();
-        for (owner, handles) in handles.iter().enumerate() {
-            for (other, pool) in pools.iter().enumerate() {
-                for (value, handle) in handles.iter().enumerate() {
-                    let found = pool.get(*handle).ok().map(|object| *object);
-                    assert_eq!(found, (owner == other).then_some(value));
-                }
-            }
-        }
-    }
+/// Lists every object of a pool.
+fn live<H: Handle, T: Named>(pool: &HandlePool<H, T>) -> Vec<LiveObject> {
+    let describe = |object: &Arc<T>| LiveObject { kind: H::KIND, name: object.name().to_owned() };
+    pool.all_objects().iter().map(describe).collect()
 }

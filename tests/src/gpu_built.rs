@@ -1,7 +1,9 @@
 //! Meshes whose software structures tests build on the GPU, and what the structures then have to hold.
 #![expect(clippy::expect_used, clippy::panic, reason = "a test whose set-up fails has failed")]
 
-use lvk::test_hooks::{Facts, GpuBlasDesc, GpuStructure, Leaves, build_blas, check_structure, read};
+use lvk::test_hooks::{
+    GpuBlasDesc, GpuStructure, LeafEncoding, StructureFacts, build_blas, check_structure, read,
+};
 use lvk::{
     Aabbs, BlasGeometry, BufferDesc, BufferHandle, BufferUsage, Context, GeometryFlags, Holder, Triangles,
 };
@@ -72,7 +74,7 @@ pub fn boxes(buffer: BufferHandle, count: usize) -> BlasGeometry {
 
 /// Builds one structure.
 pub fn build(ctx: &Context, geometries: &[BlasGeometry]) -> GpuStructure {
-    let desc = GpuBlasDesc { geometries, improvements: 1, leaves: Leaves::Corners };
+    let desc = GpuBlasDesc { geometries, improvements: 1, leaves: LeafEncoding::Corners };
     build_blas(ctx, &[desc]).expect("the build is recorded").remove(0)
 }
 
@@ -80,7 +82,7 @@ pub fn build(ctx: &Context, geometries: &[BlasGeometry]) -> GpuStructure {
 ///
 /// # Panics
 /// When it is not sound, or higher than its plan says.
-pub fn facts(ctx: &Context, structure: &GpuStructure) -> Facts {
+pub fn facts(ctx: &Context, structure: &GpuStructure) -> StructureFacts {
     let words = read(ctx, structure).expect("the structure can be read");
     let facts =
         check_structure(&words, &|_| panic!("no instances here")).unwrap_or_else(|what| panic!("{what}"));
@@ -92,10 +94,10 @@ pub fn facts(ctx: &Context, structure: &GpuStructure) -> Facts {
 ///
 /// # Panics
 /// When it does not.
-pub fn check_contents(facts: &Facts, expected: &[Content]) {
+pub fn check_contents(facts: &StructureFacts, expected: &[Content]) {
     let bits = |corners: &[[f32; 3]]| corners.iter().map(|c| c.map(f32::to_bits)).collect::<Vec<_>>();
     let mut found: Vec<_> =
-        facts.primitives.iter().zip(&facts.corners).map(|(ids, corners)| (*ids, bits(corners))).collect();
+        facts.primitives.iter().zip(&facts.vertices).map(|(ids, corners)| (*ids, bits(corners))).collect();
     found.sort_unstable();
     let mut wanted: Vec<_> = expected.iter().map(|(ids, corners)| (*ids, bits(corners))).collect();
     wanted.sort_unstable();

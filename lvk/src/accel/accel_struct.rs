@@ -74,14 +74,14 @@ impl AccelStruct {
 
     /// A build of it went to the GPU with this timeline value.
     #[inline]
-    pub(crate) fn submitted(&self, value: u64) {
+    pub(crate) fn mark_used_by_submission(&self, value: u64) {
         if self.built_by.load(Ordering::Relaxed) == 0 {
             let _ = self.built_by.compare_exchange(0, value, Ordering::Relaxed, Ordering::Relaxed);
         }
     }
 
     /// Timeline value at which it is built, once that is submitted.
-    pub(crate) fn built_by(&self) -> Option<u64> {
+    pub(crate) fn last_build_value(&self) -> Option<u64> {
         Some(self.built_by.load(Ordering::Relaxed)).filter(|value| *value > 0)
     }
 }

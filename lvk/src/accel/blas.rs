@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::flags::AccelStructSizes;
 use super::geometry::BlasGeometry;
 use super::primitive_map::PrimitiveMap;
-use super::raw_accel_struct::RawStructure;
+use super::raw_accel_struct::RawAccelStruct;
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
 use crate::software_ray_query::blas::SoftwareBlas;
@@ -16,7 +16,7 @@ pub(crate) struct Blas {
     /// The matrices of geometries that have one by value, 48 bytes for each geometry.
     pub(crate) transforms: Option<Buffer>,
     /// The parts a mesh was cut into; a single one where it was not.
-    pub(crate) parts: Vec<PartShape>,
+    pub(crate) parts: Vec<BlasPart>,
     /// What software traces, where it does.
     pub(crate) software: Option<SoftwareBlas>,
     state: Mutex<BlasState>,
@@ -24,19 +24,19 @@ pub(crate) struct Blas {
 
 /// What changes with builds and compaction.
 struct BlasState {
-    body: Arc<BlasBody>,
+    structures: Arc<BlasStructures>,
     /// Builds in command buffers that are not submitted yet.
     open_builds: u32,
     /// Builds submitted so far, refits not counted; tells whether a compacted size still holds.
     builds: u64,
     /// Refits submitted since the last rebuild.
     refits: u32,
-    wish: CompactionWish,
+    compaction: CompactionState,
 }
 
 /// What has become of the wish to compact a structure that is not compacted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum CompactionWish {
+pub(crate) enum CompactionState {
     /// Nobody has it.
     None,
     /// It is under way.
@@ -48,7 +48,7 @@ pub(crate) enum CompactionWish {
 }
 
 /// What one part is built from.
-pub(crate) struct PartShape {
+pub(crate) struct BlasPart {
     /// Primitives of each geometry; a part may have none of some.
     pub(crate) counts: Vec<u32>,
     /// Which primitives these are, where they are not all of the mesh in its own order.
@@ -57,18 +57,18 @@ pub(crate) struct PartShape {
 }
 
 /// The Vulkan structures of all parts. Compaction replaces the body; who still uses the old one keeps it alive.
-pub(crate) struct BlasBody {
-    pub(crate) structures: Vec<RawStructure>,
+pub(crate) struct BlasStructures {
+    pub(crate) structures: Vec<RawAccelStruct>,
     /// Bytes of its structures before compaction, for a body that is compacted.
     pub(crate) compacted_from: Option<u64>,
     /// Whether another build from scratch fits.
     pub(crate) rebuildable: bool,
 }
 
-impl BlasBody {
+impl BlasStructures {
     /// Bytes of memory of all parts.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        self.structures.iter().map(RawStructure::memory_bytes).sum()
+        self.structures.iter().map(RawAccelStruct::memory_bytes).sum()
     }
 }
 
@@ -76,31 +76,35 @@ impl Blas {
     pub(crate) fn new(
         geometries: Vec<BlasGeometry>,
         transforms: Option<Buffer>,
-        parts: Vec<PartShape>,
-        body: BlasBody,
+        parts: Vec<BlasPart>,
+        body: BlasStructures,
         software: Option<SoftwareBlas>,
     ) -> Self {
         let state = BlasState {
-            body: Arc::new(body),
+            structures: Arc::new(body),
             open_builds: 0,
             builds: 0,
             refits: 0,
-            wish: CompactionWish::None,
+            compaction: CompactionState::None,
         };
         Self { geometries, transforms, parts, software, state: Mutex::new(Rank::BlasState, state) }
     }
 
     /// What stands for it now.
-    pub(crate) fn body(&self) -> Arc<BlasBody> {
-        Arc::clone(&self.lock().body)
+    pub(crate) fn structures(&self) -> Arc<BlasStructures> {
+        Arc::clone(&self.lock_state().structures)
     }
 
-    /// Puts a compacted body in place of the present one, which is returned, if exactly `builds` builds were
+    /// Puts a compacted body in place of the present one, which is returned, if exactly `build_count` builds were
     /// submitted and none waits for its submission.
-    pub(crate) fn replace_body(&self, body: BlasBody, builds: u64) -> Option<Arc<BlasBody>> {
-        let mut state = self.lock();
+    pub(crate) fn replace_structures(
+        &self,
+        body: BlasStructures,
+        builds: u64,
+    ) -> Option<Arc<BlasStructures>> {
+        let mut state = self.lock_state();
         let settled = state.open_builds == 0 && state.builds == builds;
-        settled.then(|| std::mem::replace(&mut state.body, Arc::new(body)))
+        settled.then(|| std::mem::replace(&mut state.structures, Arc::new(body)))
     }
 
     /// Bytes of memory of what software traces, which compaction leaves alone.
@@ -109,9 +113,9 @@ impl Blas {
     }
 
     /// Scratch bytes of the first builds of all parts and of what software traces.
-    pub(crate) fn first_build_scratch_bytes(&self) -> u64 {
+    pub(crate) fn initial_scratch_bytes(&self) -> u64 {
         let parts: u64 = self.parts.iter().map(|part| part.sizes.build_scratch_bytes).sum();
-        let software = self.software.as_ref().map_or(0, SoftwareBlas::first_build_scratch_bytes);
+        let software = self.software.as_ref().map_or(0, SoftwareBlas::initial_scratch_bytes);
         parts.saturating_add(software)
     }
 
@@ -119,19 +123,19 @@ impl Blas {
     pub(crate) fn table_bytes(&self) -> u64 {
         let maps = self.parts.iter().filter_map(|part| part.map.as_ref());
         let matrices = self.transforms.as_ref().map_or(0, |buffer| buffer.size_bytes);
-        maps.map(PrimitiveMap::bytes).sum::<u64>() + matrices
+        maps.map(PrimitiveMap::table_bytes).sum::<u64>() + matrices
     }
 
     /// A build of the body is about to be recorded; it stays in place until [`close_build`](Self::close_build).
-    pub(crate) fn open_build(&self) -> Arc<BlasBody> {
-        let mut state = self.lock();
+    pub(crate) fn open_build(&self) -> Arc<BlasStructures> {
+        let mut state = self.lock_state();
         state.open_builds += 1;
-        Arc::clone(&state.body)
+        Arc::clone(&state.structures)
     }
 
     /// The command buffer with a recorded build, a refit or not, was submitted, or given up.
     pub(crate) fn close_build(&self, submitted: bool, refit: bool) {
-        let mut state = self.lock();
+        let mut state = self.lock_state();
         state.open_builds = state.open_builds.saturating_sub(1);
         match (submitted, refit) {
             (false, _) => {}
@@ -144,31 +148,31 @@ impl Blas {
     }
 
     /// How many builds were submitted so far, refits not counted.
-    pub(crate) fn builds(&self) -> u64 {
-        self.lock().builds
+    pub(crate) fn build_count(&self) -> u64 {
+        self.lock_state().builds
     }
 
     /// Whether builds wait for their submission.
     pub(crate) fn has_open_builds(&self) -> bool {
-        self.lock().open_builds > 0
+        self.lock_state().open_builds > 0
     }
 
     /// Refits submitted since the last rebuild.
-    pub(crate) fn refits(&self) -> u32 {
-        self.lock().refits
+    pub(crate) fn refit_count(&self) -> u32 {
+        self.lock_state().refits
     }
 
     /// What has become of the wish to compact it.
-    pub(crate) fn wish(&self) -> CompactionWish {
-        self.lock().wish
+    pub(crate) fn compaction_state(&self) -> CompactionState {
+        self.lock_state().compaction
     }
 
     /// Changes that; answers what it was before.
-    pub(crate) fn set_wish(&self, wish: CompactionWish) -> CompactionWish {
-        std::mem::replace(&mut self.lock().wish, wish)
+    pub(crate) fn set_compaction_state(&self, wish: CompactionState) -> CompactionState {
+        std::mem::replace(&mut self.lock_state().compaction, wish)
     }
 
-    fn lock(&self) -> Guard<'_, BlasState> {
+    fn lock_state(&self) -> Guard<'_, BlasState> {
         self.state.lock()
     }
 }
@@ -178,7 +182,7 @@ mod tests {
     use super::*;
 
     fn blas() -> Blas {
-        let body = BlasBody { structures: Vec::new(), compacted_from: None, rebuildable: true };
+        let body = BlasStructures { structures: Vec::new(), compacted_from: None, rebuildable: true };
         Blas::new(Vec::new(), None, Vec::new(), body, None)
     }
 
@@ -196,7 +200,7 @@ mod tests {
             blas.open_build();
             assert!(blas.has_open_builds());
             blas.close_build(submitted, refit);
-            assert_eq!((blas.builds(), blas.refits()), counts);
+            assert_eq!((blas.build_count(), blas.refit_count()), counts);
             assert!(!blas.has_open_builds());
         }
     }
@@ -204,12 +208,12 @@ mod tests {
     #[test]
     fn a_body_is_replaced_only_where_no_build_came_in_between() {
         let blas = blas();
-        let copy = || BlasBody { structures: Vec::new(), compacted_from: Some(1), rebuildable: false };
+        let copy = || BlasStructures { structures: Vec::new(), compacted_from: Some(1), rebuildable: false };
         blas.open_build();
-        assert!(blas.replace_body(copy(), 0).is_none(), "a build waits for its submission");
+        assert!(blas.replace_structures(copy(), 0).is_none(), "a build waits for its submission");
         blas.close_build(true, false);
-        assert!(blas.replace_body(copy(), 0).is_none(), "it was built since");
-        assert!(blas.replace_body(copy(), 1).is_some());
-        assert_eq!(blas.body().compacted_from, Some(1));
+        assert!(blas.replace_structures(copy(), 0).is_none(), "it was built since");
+        assert!(blas.replace_structures(copy(), 1).is_some());
+        assert_eq!(blas.structures().compacted_from, Some(1));
     }
 }

@@ -1,26 +1,26 @@
 //! A bottom-level structure as bytes, to be kept in a file: what the driver wrote of each part, and what the library
 //! must know to put the parts together again.
 //!
-//! All numbers are little-endian: magic (8 bytes), version (`u32`), length of the whole (`u64`), checksum of all that
-//! follows (`u64`); flags, then the number of geometries and each of them (seven `u32`), then the number of parts and
-//! each of them: bytes of the driver's data (`u64`), words in the map plus one, or 0 without a map (`u64`), the data,
+//! All numbers are little-endian: magic (8 bytes), version (`read_u32`), length of the whole (`read_u64`), checksum of all that
+//! follows (`read_u64`); flags, then the number of geometries and each of them (seven `read_u32`), then the number of parts and
+//! each of them: bytes of the driver's data (`read_u64`), words in the map plus one, or 0 without a map (`read_u64`), the data,
 //! the map.
 
 /// A serialised bottom-level structure.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Blob {
+pub(crate) struct BlasFile {
     /// What it was built with, as the caller defines it.
     pub(crate) flags: u32,
     /// The geometries it was built from.
-    pub(crate) geometries: Vec<BlobGeometry>,
+    pub(crate) geometries: Vec<BlasFileGeometry>,
     /// The structures it consists of.
-    pub(crate) parts: Vec<BlobPart>,
+    pub(crate) parts: Vec<BlasFilePart>,
 }
 
 /// One geometry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct BlobGeometry {
-    pub(crate) kind: BlobGeometryKind,
+pub(crate) struct BlasFileGeometry {
+    pub(crate) kind: BlasFileGeometryKind,
     pub(crate) primitive_count: u32,
     /// Flags of the geometry, as the caller defines them.
     pub(crate) flags: u32,
@@ -28,12 +28,12 @@ pub(crate) struct BlobGeometry {
 
 /// What a geometry consists of, as far as a refit must not change it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum BlobGeometryKind {
+pub(crate) enum BlasFileGeometryKind {
     Triangles {
         /// Number of a `VkFormat`.
         vertex_format: u32,
         vertex_count: u32,
-        indices: BlobIndices,
+        indices: BlasFileIndices,
         is_transformed: bool,
     },
     Boxes,
@@ -41,7 +41,7 @@ pub(crate) enum BlobGeometryKind {
 
 /// How triangles are indexed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum BlobIndices {
+pub(crate) enum BlasFileIndices {
     None,
     U16,
     U32,
@@ -49,7 +49,7 @@ pub(crate) enum BlobIndices {
 
 /// One structure.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct BlobPart {
+pub(crate) struct BlasFilePart {
     /// What the driver wrote; at least [`VERSION_DATA_BYTES`].
     pub(crate) driver: Vec<u8>,
     /// The words of the part's table of primitives; `None` where they are in the user's own order.
@@ -59,7 +59,7 @@ pub(crate) struct BlobPart {
 /// Bytes at the start of a driver's data that say which drivers can read it: its UUID and that of the format.
 pub(crate) const VERSION_DATA_BYTES: usize = 32;
 
-impl BlobPart {
+impl BlasFilePart {
     /// What `vkGetDeviceAccelerationStructureCompatibilityKHR` is asked about.
     pub(crate) fn version_data(&self) -> Option<&[u8; VERSION_DATA_BYTES]> {
         self.driver.first_chunk()
@@ -68,7 +68,7 @@ impl BlobPart {
 
 /// Why bytes are not a structure that can be read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub(crate) enum BlobError {
+pub(crate) enum BlasFileError {
     /// The magic is missing.
     #[error("these bytes are not a serialised acceleration structure")]
     NotABlob,
@@ -102,7 +102,7 @@ const HEADER_BYTES: usize = 28;
 const GEOMETRY_WORDS: usize = 7;
 
 /// Writes a structure as bytes.
-pub(crate) fn encode(blob: &Blob) -> Vec<u8> {
+pub(crate) fn encode_blas_file(blob: &BlasFile) -> Vec<u8> {
     let mut body = Vec::with_capacity(encoded_bytes(blob));
     body.extend(MAGIC);
     body.extend(VERSION.to_le_bytes());
@@ -126,128 +126,130 @@ pub(crate) fn encode(blob: &Blob) -> Vec<u8> {
     body
 }
 
-/// Reads what [`encode`] wrote. Any bytes are allowed; none but those are accepted.
-pub(crate) fn decode(bytes: &[u8]) -> Result<Blob, BlobError> {
-    let short = |expected| BlobError::Truncated { found: bytes.len() as u64, expected };
+/// Reads what [`encode_blas_file`] wrote. Any bytes are allowed; none but those are accepted.
+pub(crate) fn decode_blas_file(bytes: &[u8]) -> Result<BlasFile, BlasFileError> {
+    let short = |expected| BlasFileError::Truncated { found: bytes.len() as u64, expected };
     if !MAGIC.starts_with(&bytes[..bytes.len().min(MAGIC.len())]) {
-        return Err(BlobError::NotABlob);
+        return Err(BlasFileError::NotABlob);
     }
-    let mut reader = Reader { rest: bytes.get(MAGIC.len()..).unwrap_or_default() };
-    let found = reader.u32().ok_or(short(HEADER_BYTES as u64))?;
+    let mut reader = BlobReader { rest: bytes.get(MAGIC.len()..).unwrap_or_default() };
+    let found = reader.read_u32().ok_or(short(HEADER_BYTES as u64))?;
     if found != VERSION {
-        return Err(BlobError::Version { found });
+        return Err(BlasFileError::Version { found });
     }
-    let header = reader.u64().zip(reader.u64());
+    let header = reader.read_u64().zip(reader.read_u64());
     let (length, sum) = header.ok_or(short(HEADER_BYTES as u64))?;
     match length.cmp(&(bytes.len() as u64)) {
         std::cmp::Ordering::Greater => return Err(short(length)),
-        std::cmp::Ordering::Less => return Err(BlobError::Malformed("bytes follow its end")),
+        std::cmp::Ordering::Less => return Err(BlasFileError::Malformed("bytes follow its end")),
         std::cmp::Ordering::Equal => {}
     }
     if sum != checksum(reader.rest) {
-        return Err(BlobError::Checksum);
+        return Err(BlasFileError::Checksum);
     }
-    reader.blob()
+    reader.read_blob()
 }
 
 /// Kind, primitives, flags; then of triangles vertex format, vertices, bits of an index, whether there is a matrix.
-fn geometry_words(geometry: &BlobGeometry) -> [u32; GEOMETRY_WORDS] {
+fn geometry_words(geometry: &BlasFileGeometry) -> [u32; GEOMETRY_WORDS] {
     let (count, flags) = (geometry.primitive_count, geometry.flags);
     match geometry.kind {
-        BlobGeometryKind::Triangles { vertex_format, vertex_count, indices, is_transformed } => {
+        BlasFileGeometryKind::Triangles { vertex_format, vertex_count, indices, is_transformed } => {
             let index_bits = match indices {
-                BlobIndices::None => 0,
-                BlobIndices::U16 => 16,
-                BlobIndices::U32 => 32,
+                BlasFileIndices::None => 0,
+                BlasFileIndices::U16 => 16,
+                BlasFileIndices::U32 => 32,
             };
             [0, count, flags, vertex_format, vertex_count, index_bits, is_transformed.into()]
         }
-        BlobGeometryKind::Boxes => [1, count, flags, 0, 0, 0, 0],
+        BlasFileGeometryKind::Boxes => [1, count, flags, 0, 0, 0, 0],
     }
 }
 
 /// Takes numbers from the front of bytes.
-struct Reader<'a> {
+struct BlobReader<'a> {
     rest: &'a [u8],
 }
 
-const SHORT: BlobError = BlobError::Malformed("it promises more than it holds");
+const TOO_SHORT: BlasFileError = BlasFileError::Malformed("it promises more than it holds");
 
-impl<'a> Reader<'a> {
-    fn blob(mut self) -> Result<Blob, BlobError> {
-        let flags = self.u32().ok_or(SHORT)?;
-        let count = self.u32().ok_or(SHORT)?;
-        let geometries = (0..count).map(|_| self.geometry()).collect::<Result<_, _>>()?;
-        let count = self.u32().ok_or(SHORT)?;
-        let parts = (0..count).map(|_| self.part()).collect::<Result<_, _>>()?;
+impl<'a> BlobReader<'a> {
+    fn read_blob(mut self) -> Result<BlasFile, BlasFileError> {
+        let flags = self.read_u32().ok_or(TOO_SHORT)?;
+        let count = self.read_u32().ok_or(TOO_SHORT)?;
+        let geometries = (0..count).map(|_| self.read_geometry()).collect::<Result<_, _>>()?;
+        let count = self.read_u32().ok_or(TOO_SHORT)?;
+        let parts = (0..count).map(|_| self.read_part()).collect::<Result<_, _>>()?;
         if !self.rest.is_empty() {
-            return Err(BlobError::Malformed("bytes follow its last part"));
+            return Err(BlasFileError::Malformed("bytes follow its last part"));
         }
-        Ok(Blob { flags, geometries, parts })
+        Ok(BlasFile { flags, geometries, parts })
     }
 
-    fn geometry(&mut self) -> Result<BlobGeometry, BlobError> {
+    fn read_geometry(&mut self) -> Result<BlasFileGeometry, BlasFileError> {
         let mut words = [0; GEOMETRY_WORDS];
         for word in &mut words {
-            *word = self.u32().ok_or(SHORT)?;
+            *word = self.read_u32().ok_or(TOO_SHORT)?;
         }
         let [kind, primitive_count, flags, vertex_format, vertex_count, index_bits, matrix] = words;
         let indices = match index_bits {
-            0 => Some(BlobIndices::None),
-            16 => Some(BlobIndices::U16),
-            32 => Some(BlobIndices::U32),
+            0 => Some(BlasFileIndices::None),
+            16 => Some(BlasFileIndices::U16),
+            32 => Some(BlasFileIndices::U32),
             _ => None,
         };
         let kind = match (kind, indices, matrix) {
             (0, Some(indices), 0 | 1) => {
                 let is_transformed = matrix == 1;
-                BlobGeometryKind::Triangles { vertex_format, vertex_count, indices, is_transformed }
+                BlasFileGeometryKind::Triangles { vertex_format, vertex_count, indices, is_transformed }
             }
-            (1, ..) if words[3..] == [0; 4] => BlobGeometryKind::Boxes,
-            _ => return Err(BlobError::Malformed("it holds a geometry of an unknown kind")),
+            (1, ..) if words[3..] == [0; 4] => BlasFileGeometryKind::Boxes,
+            _ => return Err(BlasFileError::Malformed("it holds a geometry of an unknown kind")),
         };
-        Ok(BlobGeometry { kind, primitive_count, flags })
+        Ok(BlasFileGeometry { kind, primitive_count, flags })
     }
 
-    fn part(&mut self) -> Result<BlobPart, BlobError> {
-        let (driver, map) = self.u64().zip(self.u64()).ok_or(SHORT)?;
-        let driver = self.take(driver).ok_or(SHORT)?.to_vec();
+    fn read_part(&mut self) -> Result<BlasFilePart, BlasFileError> {
+        let (driver, map) = self.read_u64().zip(self.read_u64()).ok_or(TOO_SHORT)?;
+        let driver = self.read_bytes(driver).ok_or(TOO_SHORT)?.to_vec();
         if driver.len() < VERSION_DATA_BYTES {
-            return Err(BlobError::Malformed("the driver's data of a part is shorter than its header"));
+            return Err(BlasFileError::Malformed("the driver's data of a part is shorter than its header"));
         }
         let map = match map.checked_sub(1) {
             None => None,
             Some(count) => {
-                let numbers = count.checked_mul(4).and_then(|bytes| self.take(bytes)).ok_or(SHORT)?;
+                let numbers =
+                    count.checked_mul(4).and_then(|bytes| self.read_bytes(bytes)).ok_or(TOO_SHORT)?;
                 Some(numbers.as_chunks().0.iter().map(|chunk| u32::from_le_bytes(*chunk)).collect())
             }
         };
-        Ok(BlobPart { driver, map })
+        Ok(BlasFilePart { driver, map })
     }
 
-    fn u32(&mut self) -> Option<u32> {
-        self.array().map(u32::from_le_bytes)
+    fn read_u32(&mut self) -> Option<u32> {
+        self.read_array().map(u32::from_le_bytes)
     }
 
-    fn u64(&mut self) -> Option<u64> {
-        self.array().map(u64::from_le_bytes)
+    fn read_u64(&mut self) -> Option<u64> {
+        self.read_array().map(u64::from_le_bytes)
     }
 
-    fn array<const COUNT: usize>(&mut self) -> Option<[u8; COUNT]> {
+    fn read_array<const COUNT: usize>(&mut self) -> Option<[u8; COUNT]> {
         let (array, rest) = self.rest.split_first_chunk()?;
         self.rest = rest;
         Some(*array)
     }
 
-    fn take(&mut self, count: u64) -> Option<&'a [u8]> {
+    fn read_bytes(&mut self, count: u64) -> Option<&'a [u8]> {
         let (taken, rest) = self.rest.split_at_checked(usize::try_from(count).ok()?)?;
         self.rest = rest;
         Some(taken)
     }
 }
 
-fn encoded_bytes(blob: &Blob) -> usize {
-    let part = |part: &BlobPart| 16 + part.driver.len() + part.map.as_ref().map_or(0, |map| 4 * map.len());
+fn encoded_bytes(blob: &BlasFile) -> usize {
+    let part =
+        |part: &BlasFilePart| 16 + part.driver.len() + part.map.as_ref().map_or(0, |map| 4 * map.len());
     HEADER_BYTES
         + 12
         + 4 * GEOMETRY_WORDS * blob.geometries.len()
@@ -267,24 +269,25 @@ mod tests {
 
     use super::*;
 
-    fn any_blob() -> impl Strategy<Value = Blob> {
-        let indices = prop_oneof![Just(BlobIndices::None), Just(BlobIndices::U16), Just(BlobIndices::U32)];
+    fn any_blob() -> impl Strategy<Value = BlasFile> {
+        let indices =
+            prop_oneof![Just(BlasFileIndices::None), Just(BlasFileIndices::U16), Just(BlasFileIndices::U32)];
         let triangles = (any::<u32>(), any::<u32>(), indices, any::<bool>()).prop_map(
-            |(vertex_format, vertex_count, indices, is_transformed)| BlobGeometryKind::Triangles {
+            |(vertex_format, vertex_count, indices, is_transformed)| BlasFileGeometryKind::Triangles {
                 vertex_format,
                 vertex_count,
                 indices,
                 is_transformed,
             },
         );
-        let kind = prop_oneof![triangles, Just(BlobGeometryKind::Boxes)];
+        let kind = prop_oneof![triangles, Just(BlasFileGeometryKind::Boxes)];
         let geometry = (kind, any::<u32>(), any::<u32>())
-            .prop_map(|(kind, primitive_count, flags)| BlobGeometry { kind, primitive_count, flags });
+            .prop_map(|(kind, primitive_count, flags)| BlasFileGeometry { kind, primitive_count, flags });
         let driver = prop::collection::vec(any::<u8>(), VERSION_DATA_BYTES..100);
         let map = prop::option::of(prop::collection::vec(any::<u32>(), 0..20));
-        let part = (driver, map).prop_map(|(driver, map)| BlobPart { driver, map });
+        let part = (driver, map).prop_map(|(driver, map)| BlasFilePart { driver, map });
         (any::<u32>(), prop::collection::vec(geometry, 0..4), prop::collection::vec(part, 0..4))
-            .prop_map(|(flags, geometries, parts)| Blob { flags, geometries, parts })
+            .prop_map(|(flags, geometries, parts)| BlasFile { flags, geometries, parts })
     }
 
     /// Bytes with a header that is right, around any body.
@@ -309,26 +312,29 @@ mod tests {
     #[test]
     fn each_kind_of_damage_is_told_apart() {
         let driver: Vec<u8> = (0..40).collect();
-        let part = BlobPart { driver, map: Some(vec![2, 0, 1]) };
+        let part = BlasFilePart { driver, map: Some(vec![2, 0, 1]) };
         assert_eq!(part.version_data().map(|data| data[31]), Some(31));
-        let geometry = BlobGeometry { kind: BlobGeometryKind::Boxes, primitive_count: 3, flags: 1 };
-        let good = encode(&Blob { flags: 5, geometries: vec![geometry], parts: vec![part] });
+        let geometry = BlasFileGeometry { kind: BlasFileGeometryKind::Boxes, primitive_count: 3, flags: 1 };
+        let good = encode_blas_file(&BlasFile { flags: 5, geometries: vec![geometry], parts: vec![part] });
         let changed = |at: usize| {
             let mut bytes = good.clone();
             bytes[at] ^= 1;
-            decode(&bytes)
+            decode_blas_file(&bytes)
         };
-        assert_eq!(changed(0), Err(BlobError::NotABlob));
-        assert_eq!(changed(8), Err(BlobError::Version { found: VERSION ^ 1 }));
-        assert_eq!(changed(good.len() - 1), Err(BlobError::Checksum));
-        assert_eq!(decode(b"not at all one"), Err(BlobError::NotABlob));
+        assert_eq!(changed(0), Err(BlasFileError::NotABlob));
+        assert_eq!(changed(8), Err(BlasFileError::Version { found: VERSION ^ 1 }));
+        assert_eq!(changed(good.len() - 1), Err(BlasFileError::Checksum));
+        assert_eq!(decode_blas_file(b"not at all one"), Err(BlasFileError::NotABlob));
         assert_eq!(
-            decode(b"\x89lvkb"),
-            Err(BlobError::Truncated { found: 5, expected: HEADER_BYTES as u64 })
+            decode_blas_file(b"\x89lvkb"),
+            Err(BlasFileError::Truncated { found: 5, expected: HEADER_BYTES as u64 })
         );
         let (found, expected) = (good.len() as u64 - 1, good.len() as u64);
-        assert_eq!(decode(&good[..good.len() - 1]), Err(BlobError::Truncated { found, expected }));
-        assert!(matches!(decode(&[&good[..], &[0]].concat()), Err(BlobError::Malformed(_))));
+        assert_eq!(
+            decode_blas_file(&good[..good.len() - 1]),
+            Err(BlasFileError::Truncated { found, expected })
+        );
+        assert!(matches!(decode_blas_file(&[&good[..], &[0]].concat()), Err(BlasFileError::Malformed(_))));
     }
 
     #[test]
@@ -348,35 +354,35 @@ mod tests {
             words(&[0, 0, 0, 0]),
         ];
         for body in nonsense {
-            assert!(matches!(decode(&sealed(&body)), Err(BlobError::Malformed(_))), "{body:?}");
+            assert!(matches!(decode_blas_file(&sealed(&body)), Err(BlasFileError::Malformed(_))), "{body:?}");
         }
         for body in [words(&[0, 0, 0]), words(&[0, 1, 0, 3, 0, 106, 9, 16, 1, 0])] {
-            assert!(decode(&sealed(&body)).is_ok(), "{body:?}");
+            assert!(decode_blas_file(&sealed(&body)).is_ok(), "{body:?}");
         }
     }
 
     proptest! {
         #[test]
         fn what_is_written_is_read(blob in any_blob()) {
-            let bytes = encode(&blob);
+            let bytes = encode_blas_file(&blob);
             prop_assert_eq!(bytes.len(), encoded_bytes(&blob));
-            prop_assert_eq!(decode(&bytes), Ok(blob));
+            prop_assert_eq!(decode_blas_file(&bytes), Ok(blob));
         }
 
         #[test]
         fn a_cut_or_a_changed_bit_is_an_error(blob in any_blob(), place in any::<prop::sample::Index>(), bit in 0..8_u32) {
-            let mut bytes = encode(&blob);
+            let mut bytes = encode_blas_file(&blob);
             let place = place.index(bytes.len());
-            prop_assert!(decode(&bytes[..place]).is_err());
+            prop_assert!(decode_blas_file(&bytes[..place]).is_err());
             bytes[place] ^= 1_u8 << bit;
-            prop_assert!(decode(&bytes).is_err());
+            prop_assert!(decode_blas_file(&bytes).is_err());
         }
 
         #[test]
         fn arbitrary_bytes_are_read_or_refused(body in prop::collection::vec(prop_oneof![Just(0_u8), Just(1), any::<u8>()], 0..300)) {
-            let _ = decode(&body);
-            if let Ok(blob) = decode(&sealed(&body)) {
-                prop_assert_eq!(encode(&blob), sealed(&body));
+            let _ = decode_blas_file(&body);
+            if let Ok(blob) = decode_blas_file(&sealed(&body)) {
+                prop_assert_eq!(encode_blas_file(&blob), sealed(&body));
             }
         }
     }

@@ -5,182 +5,182 @@ use std::hash::BuildHasherDefault;
 use std::sync::Arc;
 
 use super::accel_struct::AccelStruct;
-use super::blas::BlasBody;
+use super::blas::BlasStructures;
 use super::flags::BuildFlags;
 use crate::barrier::IdHasher;
 use crate::error::Result;
 use crate::handle::AccelStructHandle;
 
 /// Finds the structure of a handle.
-pub(crate) type Find<'a> = &'a (dyn Fn(AccelStructHandle) -> Result<Arc<AccelStruct>> + Sync);
+pub(crate) type ResolveBlas<'a> = &'a (dyn Fn(AccelStructHandle) -> Result<Arc<AccelStruct>> + Sync);
 
 /// Rises with every structure that is destroyed, and with every one that moves: while it stays the same, so does what was
 /// found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Revision {
+pub(crate) struct AccelGeneration {
     pub(crate) removals: u64,
     pub(crate) moves: u64,
 }
 
 /// A bottom-level structure that instances refer to, with the body they refer to.
 #[derive(Clone)]
-pub(crate) struct Shown {
+pub(crate) struct BlasRef {
     pub(crate) handle: AccelStructHandle,
     pub(crate) blas: Arc<AccelStruct>,
-    pub(crate) body: Arc<BlasBody>,
+    pub(crate) structures: Arc<BlasStructures>,
 }
 
-impl Shown {
+impl BlasRef {
     /// A structure as it stands now.
     pub(crate) fn new(handle: AccelStructHandle, blas: Arc<AccelStruct>) -> Result<Self> {
-        let body = blas.blas()?.body();
-        Ok(Self { handle, blas, body })
+        let body = blas.blas()?.structures();
+        Ok(Self { handle, blas, structures: body })
     }
 
     fn is_outdated(&self) -> bool {
-        self.blas.blas().is_ok_and(|blas| !Arc::ptr_eq(&blas.body(), &self.body))
+        self.blas.blas().is_ok_and(|blas| !Arc::ptr_eq(&blas.structures(), &self.structures))
     }
 
     /// Whether it may yet be compacted, which gives it another address.
     fn may_move(&self) -> bool {
-        self.blas.flags.contains(BuildFlags::ALLOW_COMPACTION) && self.body.compacted_from.is_none()
+        self.blas.flags.contains(BuildFlags::ALLOW_COMPACTION) && self.structures.compacted_from.is_none()
     }
 
     /// Whether its address does not do in an instance.
     pub(crate) fn needs_kernel(&self) -> bool {
-        self.may_move() || self.has_rows()
+        self.may_move() || self.needs_hit_remap()
     }
 
     /// Whether its hits need rows to become the caller's numbers.
-    fn has_rows(&self) -> bool {
+    fn needs_hit_remap(&self) -> bool {
         let mapped = self.blas.blas().is_ok_and(|blas| blas.parts.iter().any(|part| part.map.is_some()));
-        mapped || self.body.structures.len() > 1
+        mapped || self.structures.structures.len() > 1
     }
 
     /// What instances refer to, where they refer to an address.
     fn address(&self) -> u64 {
-        self.body.structures.first().map_or(0, |structure| structure.address)
+        self.structures.structures.first().map_or(0, |structure| structure.address)
     }
 }
 
 /// What a list of instances refers to, with all that follows from it. Never changes.
 #[derive(Default)]
-pub(crate) struct ShownSet {
-    list: Vec<Shown>,
+pub(crate) struct BlasRefSet {
+    refs: Vec<BlasRef>,
     handles: Vec<AccelStructHandle>,
-    /// The place of each in `list`, where they are more than a few.
-    places: HashMap<AccelStructHandle, u32, BuildHasherDefault<IdHasher>>,
+    /// The place of each in `refs`, where they are more than a few.
+    index_map: HashMap<AccelStructHandle, u32, BuildHasherDefault<IdHasher>>,
     /// What instances refer to, where they refer to an address.
     addresses: Vec<u64>,
     /// First part and number of parts of each.
-    spans: Vec<[u32; 2]>,
+    part_spans: Vec<[u32; 2]>,
     /// Address of the structure and of its map, for each part.
-    parts: Vec<[u64; 2]>,
+    part_addresses: Vec<[u64; 2]>,
     /// Whether an address does not do for some: it has parts, maps, or may move.
     pub(crate) needs_kernel: bool,
     /// Whether some may yet be compacted.
     pub(crate) may_move: bool,
     /// Whether hits of some need rows.
-    pub(crate) has_rows: bool,
+    pub(crate) needs_hit_remap: bool,
 }
 
-impl ShownSet {
+impl BlasRefSet {
     /// So many are searched one by one, which is faster than a map.
-    const FEW: usize = 8;
+    const LINEAR_SEARCH_MAX: usize = 8;
 
-    pub(crate) fn new(list: Vec<Shown>) -> Self {
-        let places = match list.len() {
-            ..=Self::FEW => HashMap::default(),
-            _ => (0..).zip(&list).map(|(place, shown)| (shown.handle, place)).collect(),
+    pub(crate) fn new(list: Vec<BlasRef>) -> Self {
+        let index_map = match list.len() {
+            ..=Self::LINEAR_SEARCH_MAX => HashMap::default(),
+            _ => (0..).zip(&list).map(|(ref_index, blas_ref)| (blas_ref.handle, ref_index)).collect(),
         };
         let (mut spans, mut parts) = (Vec::with_capacity(list.len()), Vec::with_capacity(list.len()));
-        for shown in &list {
-            spans.push([parts.len() as u32, shown.body.structures.len() as u32]);
-            let shapes = shown.blas.blas().map_or(&[][..], |blas| &blas.parts);
+        for blas_ref in &list {
+            spans.push([parts.len() as u32, blas_ref.structures.structures.len() as u32]);
+            let shapes = blas_ref.blas.blas().map_or(&[][..], |blas| &blas.parts);
             let maps = shapes.iter().map(|part| part.map.as_ref().map_or(0, |map| map.table.address));
-            let structures = shown.body.structures.iter().map(|structure| structure.address);
+            let structures = blas_ref.structures.structures.iter().map(|structure| structure.address);
             parts.extend(structures.zip(maps).map(|(structure, map)| [structure, map]));
         }
         Self {
-            handles: list.iter().map(|shown| shown.handle).collect(),
-            addresses: list.iter().map(Shown::address).collect(),
-            needs_kernel: list.iter().any(Shown::needs_kernel),
-            may_move: list.iter().any(Shown::may_move),
-            has_rows: list.iter().any(Shown::has_rows),
-            spans,
-            parts,
-            places,
-            list,
+            handles: list.iter().map(|blas_ref| blas_ref.handle).collect(),
+            addresses: list.iter().map(BlasRef::address).collect(),
+            needs_kernel: list.iter().any(BlasRef::needs_kernel),
+            may_move: list.iter().any(BlasRef::may_move),
+            needs_hit_remap: list.iter().any(BlasRef::needs_hit_remap),
+            part_spans: spans,
+            part_addresses: parts,
+            index_map,
+            refs: list,
         }
     }
 
     /// Everything shown, each at its place.
-    pub(crate) fn list(&self) -> &[Shown] {
-        &self.list
+    pub(crate) fn refs(&self) -> &[BlasRef] {
+        &self.refs
     }
 
     /// First part and number of parts of everything shown.
-    pub(crate) fn spans(&self) -> &[[u32; 2]] {
-        &self.spans
+    pub(crate) fn part_spans(&self) -> &[[u32; 2]] {
+        &self.part_spans
     }
 
     /// Address of the structure and of its map, for every part of everything shown.
-    pub(crate) fn parts(&self) -> &[[u64; 2]] {
-        &self.parts
+    pub(crate) fn part_addresses(&self) -> &[[u64; 2]] {
+        &self.part_addresses
     }
 
     /// Whether anything shown has moved since.
     pub(crate) fn is_outdated(&self) -> bool {
-        self.list.iter().any(Shown::is_outdated)
+        self.refs.iter().any(BlasRef::is_outdated)
     }
 
     /// Whether everything is still there, where it was.
-    pub(crate) fn stands(&self, find: Find<'_>) -> bool {
-        self.list.iter().all(|shown| find(shown.handle).is_ok() && !shown.is_outdated())
+    pub(crate) fn is_current(&self, resolve: ResolveBlas<'_>) -> bool {
+        self.refs.iter().all(|blas_ref| resolve(blas_ref.handle).is_ok() && !blas_ref.is_outdated())
     }
 
     /// The same structures as they stand now.
-    pub(crate) fn renewed(&self) -> Result<Self> {
-        let renew = |shown: &Shown| Shown::new(shown.handle, Arc::clone(&shown.blas));
-        Ok(Self::new(self.list.iter().map(renew).collect::<Result<_>>()?))
+    pub(crate) fn refreshed(&self) -> Result<Self> {
+        let renew = |blas_ref: &BlasRef| BlasRef::new(blas_ref.handle, Arc::clone(&blas_ref.blas));
+        Ok(Self::new(self.refs.iter().map(renew).collect::<Result<_>>()?))
     }
 
     /// Whether it lists exactly these, in this order.
-    pub(crate) fn is_listed_as(&self, handles: &[AccelStructHandle]) -> bool {
+    pub(crate) fn has_handles(&self, handles: &[AccelStructHandle]) -> bool {
         self.handles == handles
     }
 
     /// The place of a structure, and what an instance of it refers to.
     #[inline]
-    pub(crate) fn address(&self, handle: AccelStructHandle) -> Option<(u32, u64)> {
-        let place = self.place(handle)?;
-        Some((place as u32, self.addresses[place]))
+    pub(crate) fn index_and_address(&self, handle: AccelStructHandle) -> Option<(u32, u64)> {
+        let ref_index = self.index_of(handle)?;
+        Some((ref_index as u32, self.addresses[ref_index]))
     }
 
     #[inline]
-    fn place(&self, handle: AccelStructHandle) -> Option<usize> {
-        if self.handles.len() <= Self::FEW {
+    fn index_of(&self, handle: AccelStructHandle) -> Option<usize> {
+        if self.handles.len() <= Self::LINEAR_SEARCH_MAX {
             return self.handles.iter().position(|known| *known == handle);
         }
-        self.place_among_many(handle)
+        self.index_in_map(handle)
     }
 
     #[inline(never)]
-    fn place_among_many(&self, handle: AccelStructHandle) -> Option<usize> {
-        self.places.get(&handle).map(|place| *place as usize)
+    fn index_in_map(&self, handle: AccelStructHandle) -> Option<usize> {
+        self.index_map.get(&handle).map(|ref_index| *ref_index as usize)
     }
 }
 
 /// Which of those known were met. Kept and emptied, so that it seldom allocates.
 #[derive(Debug, Default)]
-pub(crate) struct Marks {
+pub(crate) struct BitSet {
     first: u64,
     /// Of those behind the first 64.
     more: Vec<u64>,
     count: usize,
 }
 
-impl Marks {
+impl BitSet {
     #[inline]
     fn reset(&mut self, len: usize) {
         self.first = 0;
@@ -192,112 +192,112 @@ impl Marks {
     }
 
     #[inline]
-    fn insert(&mut self, place: usize) {
-        let word = match place / 64 {
+    fn insert(&mut self, ref_index: usize) {
+        let word = match ref_index / 64 {
             0 => &mut self.first,
             word => &mut self.more[word - 1],
         };
-        let bit = 1 << (place % 64);
+        let bit = 1 << (ref_index % 64);
         self.count += usize::from(*word & bit == 0);
         *word |= bit;
     }
 
-    fn contains(&self, place: usize) -> bool {
-        let word = match place / 64 {
+    fn contains(&self, ref_index: usize) -> bool {
+        let word = match ref_index / 64 {
             0 => self.first,
             word => self.more[word - 1],
         };
-        word >> (place % 64) & 1 == 1
+        word >> (ref_index % 64) & 1 == 1
     }
 }
 
 /// Finds what instances refer to, starting from what was shown before.
-pub(crate) struct Gather<'a> {
-    known: &'a ShownSet,
-    marks: &'a mut Marks,
-    find: Find<'a>,
+pub(crate) struct BlasRefCollector<'a> {
+    previous: &'a BlasRefSet,
+    seen: &'a mut BitSet,
+    resolve: ResolveBlas<'a>,
     /// What was not known; mostly nothing.
-    new: Option<Box<New>>,
+    new: Option<Box<NewRefs>>,
     /// Whether an address does not do for some.
     pub(crate) needs_kernel: bool,
 }
 
 /// Structures that were not known, each once.
 #[derive(Default)]
-struct New {
-    list: Vec<Shown>,
-    places: HashMap<AccelStructHandle, usize, BuildHasherDefault<IdHasher>>,
+struct NewRefs {
+    refs: Vec<BlasRef>,
+    index_map: HashMap<AccelStructHandle, usize, BuildHasherDefault<IdHasher>>,
 }
 
-impl<'a> Gather<'a> {
+impl<'a> BlasRefCollector<'a> {
     #[inline]
-    pub(crate) fn new(known: &'a ShownSet, marks: &'a mut Marks, find: Find<'a>) -> Self {
-        marks.reset(known.list.len());
-        Self { known, marks, find, new: None, needs_kernel: known.needs_kernel }
+    pub(crate) fn new(known: &'a BlasRefSet, marks: &'a mut BitSet, resolve: ResolveBlas<'a>) -> Self {
+        marks.reset(known.refs.len());
+        Self { previous: known, seen: marks, resolve, new: None, needs_kernel: known.needs_kernel }
     }
 
     /// The place of a structure: among those known, or behind them.
     #[inline]
-    pub(crate) fn place(&mut self, handle: AccelStructHandle) -> Result<usize> {
-        let Some(place) = self.known.place(handle) else { return self.new_place(handle) };
-        self.marks.insert(place);
-        Ok(place)
+    pub(crate) fn add(&mut self, handle: AccelStructHandle) -> Result<usize> {
+        let Some(ref_index) = self.previous.index_of(handle) else { return self.add_new(handle) };
+        self.seen.insert(ref_index);
+        Ok(ref_index)
     }
 
     /// What an instance of it refers to.
     #[inline]
-    pub(crate) fn address(&mut self, handle: AccelStructHandle) -> Result<u64> {
-        let Some(place) = self.known.place(handle) else { return self.new_address(handle) };
-        self.marks.insert(place);
-        Ok(self.known.addresses[place])
+    pub(crate) fn add_for_address(&mut self, handle: AccelStructHandle) -> Result<u64> {
+        let Some(ref_index) = self.previous.index_of(handle) else { return self.add_new_for_address(handle) };
+        self.seen.insert(ref_index);
+        Ok(self.previous.addresses[ref_index])
     }
 
     #[cold]
-    fn new_address(&mut self, handle: AccelStructHandle) -> Result<u64> {
-        let place = self.new_place(handle)? - self.known.list.len();
-        Ok(self.new.as_ref().and_then(|new| new.list.get(place)).map_or(0, Shown::address))
+    fn add_new_for_address(&mut self, handle: AccelStructHandle) -> Result<u64> {
+        let ref_index = self.add_new(handle)? - self.previous.refs.len();
+        Ok(self.new.as_ref().and_then(|new| new.refs.get(ref_index)).map_or(0, BlasRef::address))
     }
 
     #[cold]
-    fn new_place(&mut self, handle: AccelStructHandle) -> Result<usize> {
-        let before = self.known.list.len();
-        let New { list, places } = &mut **self.new.get_or_insert_default();
-        if let Some(place) = places.get(&handle) {
-            return Ok(before + place);
+    fn add_new(&mut self, handle: AccelStructHandle) -> Result<usize> {
+        let before = self.previous.refs.len();
+        let NewRefs { refs: list, index_map } = &mut **self.new.get_or_insert_default();
+        if let Some(ref_index) = index_map.get(&handle) {
+            return Ok(before + ref_index);
         }
-        let shown = Shown::new(handle, (self.find)(handle)?)?;
-        self.needs_kernel |= shown.needs_kernel();
-        places.insert(handle, list.len());
-        list.push(shown);
+        let blas_ref = BlasRef::new(handle, (self.resolve)(handle)?)?;
+        self.needs_kernel |= blas_ref.needs_kernel();
+        index_map.insert(handle, list.len());
+        list.push(blas_ref);
         Ok(before + list.len() - 1)
     }
 
     /// What was not known.
-    pub(crate) fn into_new(self) -> Vec<Shown> {
-        self.new.map(|new| new.list).unwrap_or_default()
+    pub(crate) fn into_new_refs(self) -> Vec<BlasRef> {
+        self.new.map(|new| new.refs).unwrap_or_default()
     }
 
     /// Whether everything known was met, and nothing else.
     #[inline]
     pub(crate) fn is_unchanged(&self) -> bool {
-        self.new.is_none() && self.marks.count == self.known.list.len()
+        self.new.is_none() && self.seen.count == self.previous.refs.len()
     }
 
     /// What was met, with the place that each of the [places](Self::place) has become.
-    pub(crate) fn finish(self) -> (ShownSet, Vec<u32>) {
-        let Self { known, marks, new, .. } = self;
-        let new = new.map(|new| new.list).unwrap_or_default();
+    pub(crate) fn finish(self) -> (BlasRefSet, Vec<u32>) {
+        let Self { previous: known, seen: marks, new, .. } = self;
+        let new = new.map(|new| new.refs).unwrap_or_default();
         let mut list = Vec::with_capacity(marks.count + new.len());
-        let mut moved = Vec::with_capacity(known.list.len() + new.len());
-        for (place, shown) in known.list.iter().enumerate() {
+        let mut moved = Vec::with_capacity(known.refs.len() + new.len());
+        for (ref_index, blas_ref) in known.refs.iter().enumerate() {
             moved.push(list.len() as u32);
-            if marks.contains(place) {
-                list.push(shown.clone());
+            if marks.contains(ref_index) {
+                list.push(blas_ref.clone());
             }
         }
         moved.extend((list.len() as u32..).take(new.len()));
         list.extend(new);
-        (ShownSet::new(list), moved)
+        (BlasRefSet::new(list), moved)
     }
 }
 
@@ -309,12 +309,12 @@ mod tests {
     use crate::accel::accel_struct::AccelKind;
     use crate::accel::blas::Blas;
     use crate::accel::flags::AccelStructSizes;
-    use crate::store::Pool;
+    use crate::pool::HandlePool;
 
-    type Structures = Pool<AccelStructHandle, AccelStruct>;
+    type Structures = HandlePool<AccelStructHandle, AccelStruct>;
 
     fn blas() -> AccelStruct {
-        let body = BlasBody { structures: Vec::new(), compacted_from: None, rebuildable: true };
+        let body = BlasStructures { structures: Vec::new(), compacted_from: None, rebuildable: true };
         let blas = Blas::new(Vec::new(), None, Vec::new(), body, None);
         AccelStruct::new("mesh", BuildFlags::empty(), AccelStructSizes::default(), AccelKind::Blas(blas))
     }
@@ -334,21 +334,21 @@ mod tests {
         ) {
             let pool = Structures::new(7);
             let handles: Vec<_> = (0..count).map(|_| pool.insert(blas())).collect();
-            let find = |handle| pool.get(handle);
-            let (mut known, mut marks) = (ShownSet::default(), Marks::default());
+            let resolve = |handle| pool.get(handle);
+            let (mut known, mut marks) = (BlasRefSet::default(), BitSet::default());
             for list in lists {
                 let list: Vec<_> = list.iter().map(|index| *index.get(&handles)).collect();
-                let before: Vec<_> = known.list().iter().map(|shown| shown.handle).collect();
-                let mut gather = Gather::new(&known, &mut marks, &find);
-                let places: Vec<_> = list.iter().map(|handle| gather.place(*handle).unwrap()).collect();
-                prop_assert_eq!(gather.is_unchanged(), sorted(before) == sorted(list.clone()));
-                let (found, moved) = gather.finish();
-                let all: Vec<_> = found.list().iter().map(|shown| shown.handle).collect();
+                let before: Vec<_> = known.refs().iter().map(|blas_ref| blas_ref.handle).collect();
+                let mut collector = BlasRefCollector::new(&known, &mut marks, &resolve);
+                let index_map: Vec<_> = list.iter().map(|handle| collector.add(*handle).unwrap()).collect();
+                prop_assert_eq!(collector.is_unchanged(), sorted(before) == sorted(list.clone()));
+                let (found, moved) = collector.finish();
+                let all: Vec<_> = found.refs().iter().map(|blas_ref| blas_ref.handle).collect();
                 prop_assert_eq!(sorted(all.clone()).len(), all.len(), "each once");
                 prop_assert_eq!(sorted(all.clone()), sorted(list.clone()));
-                for (handle, place) in list.iter().zip(places) {
-                    prop_assert_eq!(all[moved[place] as usize], *handle);
-                    prop_assert_eq!(found.place(*handle), Some(moved[place] as usize));
+                for (handle, ref_index) in list.iter().zip(index_map) {
+                    prop_assert_eq!(all[moved[ref_index] as usize], *handle);
+                    prop_assert_eq!(found.index_of(*handle), Some(moved[ref_index] as usize));
                 }
                 known = found;
             }
@@ -359,19 +359,22 @@ mod tests {
     fn a_set_stands_until_something_of_it_is_gone_or_has_moved() {
         let pool = Structures::new(7);
         let handles = [pool.insert(blas()), pool.insert(blas())];
-        let find = |handle| pool.get(handle);
-        let set =
-            || ShownSet::new(handles.map(|handle| Shown::new(handle, find(handle).unwrap()).unwrap()).into());
+        let resolve = |handle| pool.get(handle);
+        let set = || {
+            BlasRefSet::new(
+                handles.map(|handle| BlasRef::new(handle, resolve(handle).unwrap()).unwrap()).into(),
+            )
+        };
         let (first, other) = (set(), pool.insert(blas()));
         pool.remove(other).unwrap();
-        assert!(first.stands(&find) && !first.is_outdated());
-        let body = BlasBody { structures: Vec::new(), compacted_from: Some(1), rebuildable: false };
-        find(handles[1]).unwrap().blas().unwrap().replace_body(body, 0).unwrap();
-        assert!(!first.stands(&find) && first.is_outdated());
-        assert!(!first.renewed().unwrap().is_outdated());
+        assert!(first.is_current(&resolve) && !first.is_outdated());
+        let body = BlasStructures { structures: Vec::new(), compacted_from: Some(1), rebuildable: false };
+        resolve(handles[1]).unwrap().blas().unwrap().replace_structures(body, 0).unwrap();
+        assert!(!first.is_current(&resolve) && first.is_outdated());
+        assert!(!first.refreshed().unwrap().is_outdated());
         let second = set();
-        assert!(second.stands(&find));
+        assert!(second.is_current(&resolve));
         pool.remove(handles[0]).unwrap();
-        assert!(!second.stands(&find) && !second.is_outdated());
+        assert!(!second.is_current(&resolve) && !second.is_outdated());
     }
 }

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use ash::khr::acceleration_structure::Device as ExtDevice;
 use ash::vk;
 
-use super::blas::PartShape;
+use super::blas::BlasPart;
 use super::flags::{AccelStructSizes, BuildFlags};
-use super::geometry::{BlasGeometry, Converted, address, check_list};
+use super::geometry::{BlasGeometry, VulkanGeometry, check_geometries, host_or_device_address};
 use super::instance::INSTANCE_BYTES;
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -23,9 +23,9 @@ pub(crate) struct BuildInput {
 }
 
 impl BuildInput {
-    /// Checks and converts the geometries of a bottom-level structure. `transforms` is the address of the matrices
+    /// Checks and converts the geometries of a bottom-level structure. `transform_matrices` is the address of the matrices
     /// that are given by value, 48 bytes for each geometry, or `None` where there are none.
-    pub(crate) fn blas(
+    pub(crate) fn from_geometries(
         gpu: &Gpu,
         name: &str,
         geometries: &[BlasGeometry],
@@ -33,32 +33,32 @@ impl BuildInput {
         find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>,
         transforms: Option<u64>,
     ) -> Result<Self> {
-        check_list(name, geometries, &gpu.caps.limits)?;
+        check_geometries(name, geometries, &gpu.caps.limits)?;
         let mut converted = Vec::with_capacity(geometries.len());
         for (index, geometry) in geometries.iter().enumerate() {
             let matrix = match (geometry.transform_rows(), transforms) {
                 (Some(_), Some(start)) => start + index as u64 * TRANSFORM_BYTES,
                 _ => 0,
             };
-            converted.push(geometry.convert(gpu, name, find, matrix)?);
+            converted.push(geometry.to_vulkan(gpu, name, find, matrix)?);
         }
         Ok(Self::new(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL, flags, &converted))
     }
 
     /// The same for one part of the mesh: its own primitives, from the inputs gathered for it.
-    pub(crate) fn into_part(mut self, part: &PartShape) -> Self {
+    pub(crate) fn into_part(mut self, part: &BlasPart) -> Self {
         let Some(map) = &part.map else { return self };
         for (index, geometry) in self.geometries.iter_mut().enumerate() {
-            gather_inputs(geometry, map.input_address(index));
+            use_gathered_inputs(geometry, map.input_address(index));
         }
         self.set_counts(&part.counts);
         self
     }
 
     /// As [`into_part`](Self::into_part) for a part that is only planned: good for size queries.
-    pub(crate) fn gathered(mut self) -> Self {
+    pub(crate) fn with_gathered_inputs(mut self) -> Self {
         const NO_ADDRESS: u64 = 0;
-        self.geometries.iter_mut().for_each(|geometry| gather_inputs(geometry, NO_ADDRESS));
+        self.geometries.iter_mut().for_each(|geometry| use_gathered_inputs(geometry, NO_ADDRESS));
         self
     }
 
@@ -70,13 +70,13 @@ impl BuildInput {
     }
 
     /// The input of a top-level structure: `count` instances at `instances`, an address that is a multiple of 16.
-    pub(crate) fn tlas(flags: BuildFlags, instances: u64, count: u32) -> Self {
-        let converted = [Converted { raw: instances_geometry(instances), primitive_count: count }];
+    pub(crate) fn from_instances(flags: BuildFlags, instances: u64, count: u32) -> Self {
+        let converted = [VulkanGeometry { raw: instances_geometry(instances), primitive_count: count }];
         Self::new(vk::AccelerationStructureTypeKHR::TOP_LEVEL, flags, &converted)
     }
 
-    fn new(ty: vk::AccelerationStructureTypeKHR, flags: BuildFlags, converted: &[Converted]) -> Self {
-        let range = |geometry: &Converted| vk::AccelerationStructureBuildRangeInfoKHR {
+    fn new(ty: vk::AccelerationStructureTypeKHR, flags: BuildFlags, converted: &[VulkanGeometry]) -> Self {
+        let range = |geometry: &VulkanGeometry| vk::AccelerationStructureBuildRangeInfoKHR {
             primitive_count: geometry.primitive_count,
             ..Default::default()
         };
@@ -89,7 +89,7 @@ impl BuildInput {
     }
 
     /// Asks how large the structure and its scratch memory are (`vkGetAccelerationStructureBuildSizesKHR`).
-    pub(crate) fn sizes(&self, gpu: &Gpu) -> Result<AccelStructSizes> {
+    pub(crate) fn query_sizes(&self, gpu: &Gpu) -> Result<AccelStructSizes> {
         let counts: Vec<_> = self.ranges.iter().map(|range| range.primitive_count).collect();
         let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
         // SAFETY: one count for each geometry; addresses are not read by a size query.
@@ -109,7 +109,7 @@ impl BuildInput {
         };
         let bottom = self.ty == vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
         let primitives = counts.iter().map(|count| u64::from(*count)).sum();
-        Ok(if bottom { gpu.profile.build_sizes(sizes, primitives) } else { sizes })
+        Ok(if bottom { gpu.profile.query_build_sizes(sizes, primitives) } else { sizes })
     }
 
     /// The build of `target` with scratch memory at this address.
@@ -119,7 +119,7 @@ impl BuildInput {
         refit: bool,
         scratch: u64,
     ) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
-        build_of(self.info(refit), target, refit, scratch)
+        build_command(self.info(refit), target, refit, scratch)
     }
 
     fn info(&self, refit: bool) -> vk::AccelerationStructureBuildGeometryInfoKHR<'_> {
@@ -149,7 +149,7 @@ impl TlasBuild {
     pub(crate) unsafe fn record(&self, ext: &ExtDevice, commands: vk::CommandBuffer) {
         let geometry = [instances_geometry(self.instances)];
         let info = build_info(vk::AccelerationStructureTypeKHR::TOP_LEVEL, self.flags, &geometry, self.refit);
-        let info = build_of(info, self.target, self.refit, self.scratch);
+        let info = build_command(info, self.target, self.refit, self.scratch);
         let range =
             vk::AccelerationStructureBuildRangeInfoKHR { primitive_count: self.count, ..Default::default() };
         let build = ext.fp().cmd_build_acceleration_structures_khr;
@@ -177,7 +177,7 @@ fn build_info<'a>(
 }
 
 #[inline]
-fn build_of(
+fn build_command(
     info: vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
     target: vk::AccelerationStructureKHR,
     refit: bool,
@@ -193,26 +193,27 @@ fn build_of(
 #[inline]
 fn instances_geometry(instances: u64) -> vk::AccelerationStructureGeometryKHR<'static> {
     debug_assert!(instances.is_multiple_of(16));
-    let data = vk::AccelerationStructureGeometryInstancesDataKHR::default().data(address(instances));
+    let data =
+        vk::AccelerationStructureGeometryInstancesDataKHR::default().data(host_or_device_address(instances));
     vk::AccelerationStructureGeometryKHR::default()
         .geometry_type(vk::GeometryTypeKHR::INSTANCES)
         .geometry(vk::AccelerationStructureGeometryDataKHR { instances: data })
 }
 
 /// Makes a geometry read its indices, or its boxes, from where they were gathered.
-fn gather_inputs(geometry: &mut vk::AccelerationStructureGeometryKHR<'_>, inputs: u64) {
+fn use_gathered_inputs(geometry: &mut vk::AccelerationStructureGeometryKHR<'_>, inputs: u64) {
     const BOX_BYTES: u64 = 24;
     match geometry.geometry_type {
         vk::GeometryTypeKHR::TRIANGLES => {
             // SAFETY: the type says which field of the union is in use.
             let triangles = unsafe { &mut geometry.geometry.triangles };
             triangles.index_type = vk::IndexType::UINT32;
-            triangles.index_data = address(inputs);
+            triangles.index_data = host_or_device_address(inputs);
         }
         _ => {
             // SAFETY: as above; bottom levels hold triangles or boxes.
             let boxes = unsafe { &mut geometry.geometry.aabbs };
-            boxes.data = address(inputs);
+            boxes.data = host_or_device_address(inputs);
             boxes.stride = BOX_BYTES;
         }
     }
@@ -222,7 +223,7 @@ fn gather_inputs(geometry: &mut vk::AccelerationStructureGeometryKHR<'_>, inputs
 pub(crate) const TRANSFORM_BYTES: u64 = 48;
 
 /// The matrices given by value, identity for other geometries; `None` if no geometry has one.
-pub(crate) fn transforms(geometries: &[BlasGeometry]) -> Option<Vec<f32>> {
+pub(crate) fn transform_matrices(geometries: &[BlasGeometry]) -> Option<Vec<f32>> {
     const IDENTITY: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
     let any = geometries.iter().any(|geometry| geometry.transform_rows().is_some());
     any.then(|| {

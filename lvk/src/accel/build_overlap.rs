@@ -6,18 +6,18 @@ use crate::barrier::ResourceId;
 
 /// Builds that may run at once: each of another structure, in scratch memory of its own. Alignments are powers of two.
 #[derive(Debug, Default)]
-pub(crate) struct BuildRun {
+pub(crate) struct ConcurrentBuilds {
     /// Where the next build may work.
     next: u64,
     /// Where the memory ends; at `next` or before where no run is under way.
     end: u64,
-    targets: Targets,
+    targets: BuildTargets,
 }
 
-impl BuildRun {
+impl ConcurrentBuilds {
     /// Begins with a build of `target` at the start of `memory`, an aligned address; it waits for everything before.
-    pub(crate) fn begin(&mut self, target: ResourceId, memory: Range<u64>, bytes: u64, alignment: u64) {
-        let after = behind(memory.start, bytes, alignment);
+    pub(crate) fn start(&mut self, target: ResourceId, memory: Range<u64>, bytes: u64, alignment: u64) {
+        let after = aligned_end(memory.start, bytes, alignment);
         (self.next, self.end) = (after.unwrap_or(u64::MAX), memory.end);
         self.targets.clear();
         self.targets.insert(target);
@@ -25,9 +25,9 @@ impl BuildRun {
 
     /// The address at which the next build works, of `target`, unless it has to wait for those before.
     #[inline]
-    pub(crate) fn join(&mut self, target: ResourceId, bytes: u64, alignment: u64) -> Option<u64> {
+    pub(crate) fn try_add(&mut self, target: ResourceId, bytes: u64, alignment: u64) -> Option<u64> {
         let address = self.next;
-        let after = behind(address, bytes, alignment).filter(|after| *after <= self.end)?;
+        let after = aligned_end(address, bytes, alignment).filter(|after| *after <= self.end)?;
         // A build that needs no memory tells nobody whether a run is under way.
         if after == address || !self.targets.insert(target) {
             return None;
@@ -45,15 +45,15 @@ impl BuildRun {
 
 /// What a run builds, each once.
 #[derive(Debug, Default)]
-struct Targets {
+struct BuildTargets {
     /// A bit for each, which several may share.
     bits: u64,
     ids: Vec<ResourceId>,
 }
 
-impl Targets {
+impl BuildTargets {
     /// So many builds keep a device busy; one more waits, so that each is looked for among few.
-    const MOST: usize = 64;
+    const MAX_TARGETS: usize = 64;
 
     fn clear(&mut self) {
         self.bits = 0;
@@ -64,7 +64,7 @@ impl Targets {
     #[inline]
     fn insert(&mut self, id: ResourceId) -> bool {
         let bit = id.bit();
-        if self.ids.len() == Self::MOST || (self.bits & bit != 0 && self.ids.contains(&id)) {
+        if self.ids.len() == Self::MAX_TARGETS || (self.bits & bit != 0 && self.ids.contains(&id)) {
             return false;
         }
         self.bits |= bit;
@@ -75,7 +75,7 @@ impl Targets {
 
 /// The first aligned address behind so many bytes.
 #[inline]
-fn behind(address: u64, bytes: u64, alignment: u64) -> Option<u64> {
+fn aligned_end(address: u64, bytes: u64, alignment: u64) -> Option<u64> {
     let mask = alignment.saturating_sub(1);
     Some(address.checked_add(bytes)?.checked_add(mask)? & !mask)
 }
@@ -87,27 +87,27 @@ mod tests {
     use super::*;
 
     #[derive(Debug, Clone)]
-    enum Command {
+    enum BuildRunCommand {
         /// A build of one of a few structures.
         Build { target: u64, bytes: u64 },
         /// Something else, in front of which there may be a barrier.
         Other,
     }
 
-    fn command() -> impl Strategy<Value = Command> {
+    fn command() -> impl Strategy<Value = BuildRunCommand> {
         let bytes = prop_oneof![9 => 0..900_u64, 1 => Just(u64::MAX)];
         // Some share a bit.
         let target = prop_oneof![0..6_u64, 64..70_u64];
         prop_oneof![
-            9 => (target, bytes).prop_map(|(target, bytes)| Command::Build { target, bytes }),
-            1 => Just(Command::Other),
+            9 => (target, bytes).prop_map(|(target, bytes)| BuildRunCommand::Build { target, bytes }),
+            1 => Just(BuildRunCommand::Other),
         ]
     }
 
     /// What nothing keeps apart: structures, each with its scratch memory.
     type Unordered = Vec<(u64, Range<u64>)>;
 
-    fn clash(unordered: &Unordered, target: u64, memory: &Range<u64>) -> bool {
+    fn need_barrier(unordered: &Unordered, target: u64, memory: &Range<u64>) -> bool {
         unordered
             .iter()
             .any(|(other, taken)| *other == target || (taken.start < memory.end && memory.start < taken.end))
@@ -123,9 +123,9 @@ mod tests {
             alignment in (0..9_u32).prop_map(|bit| 1_u64 << bit),
         ) {
             let start = start.next_multiple_of(alignment);
-            let (mut run, mut unordered) = (BuildRun::default(), None::<Unordered>);
+            let (mut run, mut unordered) = (ConcurrentBuilds::default(), None::<Unordered>);
             for command in commands {
-                let Command::Build { target, bytes } = command else {
+                let BuildRunCommand::Build { target, bytes } = command else {
                     run.stop();
                     unordered = None;
                     continue;
@@ -137,19 +137,19 @@ mod tests {
                     next.checked_add(bytes)?.checked_next_multiple_of(alignment)
                 });
                 let fits = bytes > 0 && end.is_some_and(|end| end <= start + room);
-                match run.join(ResourceId(target), bytes, alignment) {
+                match run.try_add(ResourceId(target), bytes, alignment) {
                     Some(address) => {
                         let memory = address..address + bytes;
                         prop_assert!(fits && address.is_multiple_of(alignment));
                         prop_assert!(unordered.is_some(), "the first waits");
                         let before = unordered.get_or_insert_default();
-                        prop_assert!(!clash(before, target, &memory), "{target} at {memory:?} beside {before:?}");
+                        prop_assert!(!need_barrier(before, target, &memory), "{target} at {memory:?} beside {before:?}");
                         before.push((target, memory));
                     }
                     None => {
                         let is_new = unordered.iter().flatten().all(|(other, _)| *other != target);
                         prop_assert!(!(fits && is_new), "{target} waits for nothing");
-                        run.begin(ResourceId(target), start..start + room, bytes, alignment);
+                        run.start(ResourceId(target), start..start + room, bytes, alignment);
                         unordered = Some(vec![(target, start..start.saturating_add(bytes))]);
                     }
                 }
@@ -160,31 +160,31 @@ mod tests {
     #[test]
     fn a_second_update_of_one_structure_waits_and_one_of_another_does_not() {
         let [first, second] = [ResourceId(1), ResourceId(2)];
-        let mut run = BuildRun::default();
-        assert_eq!(run.join(first, 16, 16), None);
-        run.begin(first, 0..256, 16, 16);
-        assert_eq!(run.join(second, 16, 16), Some(16));
-        assert_eq!(run.join(first, 16, 16), None);
-        run.begin(first, 0..256, 16, 16);
-        assert_eq!(run.join(second, 16, 16), Some(16), "what was before waits already");
+        let mut run = ConcurrentBuilds::default();
+        assert_eq!(run.try_add(first, 16, 16), None);
+        run.start(first, 0..256, 16, 16);
+        assert_eq!(run.try_add(second, 16, 16), Some(16));
+        assert_eq!(run.try_add(first, 16, 16), None);
+        run.start(first, 0..256, 16, 16);
+        assert_eq!(run.try_add(second, 16, 16), Some(16), "what was before waits already");
         run.stop();
-        assert_eq!(run.join(ResourceId(3), 16, 16), None);
+        assert_eq!(run.try_add(ResourceId(3), 16, 16), None);
     }
 
     #[test]
     fn a_build_without_memory_leaves_its_address_to_the_next() {
         let [first, second] = [ResourceId(1), ResourceId(2)];
-        let mut run = BuildRun::default();
-        run.begin(first, 1..2956, 0, 1);
-        assert_eq!(run.join(second, 1, 1), Some(1));
+        let mut run = ConcurrentBuilds::default();
+        run.start(first, 1..2956, 0, 1);
+        assert_eq!(run.try_add(second, 1, 1), Some(1));
     }
 
     #[test]
     fn a_long_run_ends_where_its_targets_are_many() {
-        let mut run = BuildRun::default();
-        run.begin(ResourceId(0), 0..u64::MAX, 16, 16);
-        let most = Targets::MOST as u64;
-        assert!((1..most).all(|id| run.join(ResourceId(id), 16, 16).is_some()));
-        assert_eq!(run.join(ResourceId(most), 16, 16), None);
+        let mut run = ConcurrentBuilds::default();
+        run.start(ResourceId(0), 0..u64::MAX, 16, 16);
+        let most = BuildTargets::MAX_TARGETS as u64;
+        assert!((1..most).all(|id| run.try_add(ResourceId(id), 16, 16).is_some()));
+        assert_eq!(run.try_add(ResourceId(most), 16, 16), None);
     }
 }

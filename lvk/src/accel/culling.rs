@@ -134,8 +134,11 @@ mod tests {
     /// Whether a point is inside by the clip rules of Vulkan, clearly.
     fn is_inside(matrix: Mat4, point: Vec3) -> bool {
         let clip = matrix * point.extend(1.0);
-        let room = clip.w * 0.999;
-        clip.w > 0.0 && clip.xy().abs().max_element() < room && clip.z > 0.001 * clip.w && clip.z < room
+        let available = clip.w * 0.999;
+        clip.w > 0.0
+            && clip.xy().abs().max_element() < available
+            && clip.z > 0.001 * clip.w
+            && clip.z < available
     }
 
     #[test]

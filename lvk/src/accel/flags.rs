@@ -35,7 +35,7 @@ impl Default for BuildFlags {
 
 impl BuildFlags {
     /// Those that only a bottom-level structure can have.
-    const BOTTOM_ONLY: Self = Self::ALLOW_COMPACTION.union(Self::POSITION_FETCH);
+    const BLAS_ONLY: Self = Self::ALLOW_COMPACTION.union(Self::POSITION_FETCH);
 
     pub(crate) fn raw(self) -> vk::BuildAccelerationStructureFlagsKHR {
         use vk::BuildAccelerationStructureFlagsKHR as Raw;
@@ -61,7 +61,7 @@ impl BuildFlags {
 
     /// As [`check_blas`](Self::check_blas), for a top-level structure.
     pub(crate) fn check_tlas(self, name: &str) -> Result<()> {
-        if self.intersects(Self::BOTTOM_ONLY) {
+        if self.intersects(Self::BLAS_ONLY) {
             let message = "ALLOW_COMPACTION and POSITION_FETCH are for bottom-level structures";
             return Err(Error::usage(name, message));
         }
@@ -94,7 +94,7 @@ impl AccelStructSizes {
     }
 
     /// Of several structures that stand for one: their bytes together, and the scratch of the largest.
-    pub(crate) fn join(self, other: Self) -> Self {
+    pub(crate) fn max_with(self, other: Self) -> Self {
         Self {
             structure_bytes: self.structure_bytes.saturating_add(other.structure_bytes),
             build_scratch_bytes: self.build_scratch_bytes.max(other.build_scratch_bytes),

@@ -132,7 +132,7 @@ pub enum BlasGeometry {
 
 /// A geometry as Vulkan takes it, with its number of primitives.
 #[derive(Clone, Copy)]
-pub(crate) struct Converted {
+pub(crate) struct VulkanGeometry {
     pub(crate) raw: vk::AccelerationStructureGeometryKHR<'static>,
     pub(crate) primitive_count: u32,
 }
@@ -174,7 +174,7 @@ impl BlasGeometry {
     }
 
     /// Whether it holds boxes.
-    pub(crate) fn is_boxes(&self) -> bool {
+    pub(crate) fn is_aabbs(&self) -> bool {
         matches!(self, Self::Aabbs(_))
     }
 
@@ -186,13 +186,13 @@ impl BlasGeometry {
     }
 
     /// Checks the geometry and converts it. `matrix` is the address of its matrix if that is given by value, else 0.
-    pub(crate) fn convert(
+    pub(crate) fn to_vulkan(
         &self,
         gpu: &Gpu,
         name: &str,
         find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>,
         matrix: u64,
-    ) -> Result<Converted> {
+    ) -> Result<VulkanGeometry> {
         match self {
             Self::Triangles(triangles) => convert_triangles(triangles, gpu, name, find, matrix),
             Self::Aabbs(aabbs) => convert_aabbs(aabbs, find),
@@ -201,7 +201,7 @@ impl BlasGeometry {
 }
 
 /// Checks what concerns the list as a whole.
-pub(crate) fn check_list(name: &str, geometries: &[BlasGeometry], limits: &Limits) -> Result<()> {
+pub(crate) fn check_geometries(name: &str, geometries: &[BlasGeometry], limits: &Limits) -> Result<()> {
     geometries.iter().try_for_each(|geometry| match geometry {
         BlasGeometry::Triangles(triangles) => check_formats(name, triangles),
         BlasGeometry::Aabbs(_) => Ok(()),
@@ -209,7 +209,7 @@ pub(crate) fn check_list(name: &str, geometries: &[BlasGeometry], limits: &Limit
     if geometries.is_empty() {
         return Err(Error::usage(name, "a bottom-level structure needs at least one geometry"));
     }
-    if geometries.iter().any(|geometry| geometry.is_boxes() != geometries[0].is_boxes()) {
+    if geometries.iter().any(|geometry| geometry.is_aabbs() != geometries[0].is_aabbs()) {
         return Err(Error::usage(name, "triangles and boxes cannot share a structure; make two"));
     }
     check_limit(name, "geometry count", geometries.len() as u64, limits.max_blas_geometries)
@@ -235,7 +235,7 @@ fn convert_triangles(
     name: &str,
     find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>,
     matrix: u64,
-) -> Result<Converted> {
+) -> Result<VulkanGeometry> {
     let format = triangles.vertex_format;
     let vertex_features = vk::FormatFeatureFlags::ACCELERATION_STRUCTURE_VERTEX_BUFFER_KHR;
     if gpu.accel.is_some() && !gpu.buffer_features(format.raw()).contains(vertex_features) {
@@ -247,8 +247,8 @@ fn convert_triangles(
     let packed = u64::from(format.size_bytes());
     let stride = if triangles.vertex_stride == 0 { packed } else { triangles.vertex_stride };
     let unit = u64::from(format.component_bytes());
-    check_multiple(name, "vertex offset", triangles.vertex_offset, unit)?;
-    check_multiple(name, "vertex stride", stride, unit)?;
+    check_alignment(name, "vertex offset", triangles.vertex_offset, unit)?;
+    check_alignment(name, "vertex stride", stride, unit)?;
     check_limit(name, "vertex stride in bytes", stride, u32::MAX.into())?;
     check_elements(&vertices, triangles.vertex_offset, triangles.vertex_count, stride, packed)?;
     let matrix = match triangles.transform {
@@ -257,11 +257,11 @@ fn convert_triangles(
     };
     let mut data = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
         .vertex_format(format.raw())
-        .vertex_data(address(vertices.address + triangles.vertex_offset))
+        .vertex_data(host_or_device_address(vertices.address + triangles.vertex_offset))
         .vertex_stride(stride)
         .max_vertex(triangles.vertex_count.saturating_sub(1))
         .index_type(vk::IndexType::NONE_KHR)
-        .transform_data(address(matrix));
+        .transform_data(host_or_device_address(matrix));
     match triangles.indices {
         Some(indices) => {
             data = data
@@ -274,9 +274,9 @@ fn convert_triangles(
         }
         None => {}
     }
-    let raw = geometry(vk::GeometryTypeKHR::TRIANGLES, triangles.flags)
+    let raw = vulkan_geometry(vk::GeometryTypeKHR::TRIANGLES, triangles.flags)
         .geometry(vk::AccelerationStructureGeometryDataKHR { triangles: data });
-    Ok(Converted { raw, primitive_count: triangles.triangle_count })
+    Ok(VulkanGeometry { raw, primitive_count: triangles.triangle_count })
 }
 
 fn index_address(
@@ -288,9 +288,9 @@ fn index_address(
     let buffer = find(indices.buffer)?;
     buffer.check_usage(BufferUsage::ACCEL_INPUT)?;
     let size = u64::from(indices.format.size_bytes());
-    check_multiple(name, "index offset", indices.offset, size)?;
+    check_alignment(name, "index offset", indices.offset, size)?;
     buffer.check_range(indices.offset, u64::from(triangles.triangle_count) * 3 * size)?;
-    Ok(address(buffer.address + indices.offset))
+    Ok(host_or_device_address(buffer.address + indices.offset))
 }
 
 fn transform_address(
@@ -302,29 +302,32 @@ fn transform_address(
     const MATRIX_BYTES: u64 = 48;
     let buffer = find(buffer)?;
     buffer.check_usage(BufferUsage::ACCEL_INPUT)?;
-    check_multiple(name, "transform offset", offset, 16)?;
+    check_alignment(name, "transform offset", offset, 16)?;
     buffer.check_range(offset, MATRIX_BYTES)?;
     Ok(buffer.address + offset)
 }
 
-fn convert_aabbs(aabbs: &Aabbs, find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>) -> Result<Converted> {
+fn convert_aabbs(
+    aabbs: &Aabbs,
+    find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>,
+) -> Result<VulkanGeometry> {
     const BOX_BYTES: u64 = 24;
     let buffer = find(aabbs.buffer)?;
     buffer.check_usage(BufferUsage::ACCEL_INPUT)?;
     let stride = if aabbs.stride == 0 { BOX_BYTES } else { aabbs.stride };
-    check_multiple(&buffer.name, "box offset", aabbs.offset, 8)?;
-    check_multiple(&buffer.name, "box stride", stride, 8)?;
+    check_alignment(&buffer.name, "box offset", aabbs.offset, 8)?;
+    check_alignment(&buffer.name, "box stride", stride, 8)?;
     check_limit(&buffer.name, "box stride in bytes", stride, u32::MAX.into())?;
     check_elements(&buffer, aabbs.offset, aabbs.count, stride, BOX_BYTES)?;
     let data = vk::AccelerationStructureGeometryAabbsDataKHR::default()
-        .data(address(buffer.address + aabbs.offset))
+        .data(host_or_device_address(buffer.address + aabbs.offset))
         .stride(stride);
-    let raw = geometry(vk::GeometryTypeKHR::AABBS, aabbs.flags)
+    let raw = vulkan_geometry(vk::GeometryTypeKHR::AABBS, aabbs.flags)
         .geometry(vk::AccelerationStructureGeometryDataKHR { aabbs: data });
-    Ok(Converted { raw, primitive_count: aabbs.count })
+    Ok(VulkanGeometry { raw, primitive_count: aabbs.count })
 }
 
-fn geometry(
+fn vulkan_geometry(
     kind: vk::GeometryTypeKHR,
     flags: GeometryFlags,
 ) -> vk::AccelerationStructureGeometryKHR<'static> {
@@ -337,11 +340,11 @@ fn geometry(
     vk::AccelerationStructureGeometryKHR::default().geometry_type(kind).flags(raw)
 }
 
-pub(crate) fn address(device_address: u64) -> vk::DeviceOrHostAddressConstKHR {
+pub(crate) fn host_or_device_address(device_address: u64) -> vk::DeviceOrHostAddressConstKHR {
     vk::DeviceOrHostAddressConstKHR { device_address }
 }
 
-fn check_multiple(name: &str, what: &str, value: u64, unit: u64) -> Result<()> {
+fn check_alignment(name: &str, what: &str, value: u64, unit: u64) -> Result<()> {
     if value.is_multiple_of(unit) {
         return Ok(());
     }

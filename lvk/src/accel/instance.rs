@@ -90,13 +90,13 @@ pub struct DeviceInstances<'a> {
 
 /// Fails unless every number of the instance fits. Quick where it does: there may be millions.
 #[inline]
-pub(crate) fn check(name: &str, index: usize, instance: &TlasInstance) -> Result<()> {
-    if is_right(instance) { Ok(()) } else { Err(complaint(name, index, instance)) }
+pub(crate) fn check_instance(name: &str, index: usize, instance: &TlasInstance) -> Result<()> {
+    if is_valid(instance) { Ok(()) } else { Err(invalid_reason(name, index, instance)) }
 }
 
-/// Whether [`check`] finds nothing wrong.
+/// Whether [`check_instance`] finds nothing wrong.
 #[inline]
-pub(crate) fn is_right(instance: &TlasInstance) -> bool {
+pub(crate) fn is_valid(instance: &TlasInstance) -> bool {
     const BOTH: InstanceFlags = InstanceFlags::FORCE_OPAQUE.union(InstanceFlags::FORCE_NO_OPAQUE);
     let fits = (instance.custom_index | instance.hit_group_offset) >> 24 == 0;
     fits && is_finite(&instance.transform) && !instance.flags.contains(BOTH)
@@ -110,7 +110,7 @@ fn is_finite(transform: &[f32; 12]) -> bool {
 }
 
 #[cold]
-fn complaint(name: &str, index: usize, instance: &TlasInstance) -> Error {
+fn invalid_reason(name: &str, index: usize, instance: &TlasInstance) -> Error {
     const LARGEST: u32 = (1 << 24) - 1;
     if instance.custom_index > LARGEST || instance.hit_group_offset > LARGEST {
         return Error::usage(
@@ -125,7 +125,7 @@ fn complaint(name: &str, index: usize, instance: &TlasInstance) -> Error {
 }
 
 #[inline]
-pub(crate) fn pack(instance: &TlasInstance, blas_address: u64) -> RawInstance {
+pub(crate) fn to_raw(instance: &TlasInstance, blas_address: u64) -> RawInstance {
     RawInstance {
         transform: instance.transform,
         custom_index_and_mask: instance.custom_index | u32::from(instance.mask) << 24,
@@ -148,7 +148,7 @@ mod tests {
             flags: InstanceFlags::FLIP_FACING,
             ..TlasInstance::new(AccelStructHandle::from_bits(1))
         };
-        let raw = pack(&instance, 0x1122_3344_5566_7788);
+        let raw = to_raw(&instance, 0x1122_3344_5566_7788);
         let bytes = bytemuck::bytes_of(&raw);
         assert_eq!(bytes.len(), 64);
         assert_eq!(bytes[48..52], 0xab12_3456_u32.to_le_bytes());
@@ -186,7 +186,7 @@ mod tests {
             TlasInstance { transform: [f32::NAN; 12], ..good },
             TlasInstance { flags: InstanceFlags::FORCE_OPAQUE | InstanceFlags::FORCE_NO_OPAQUE, ..good },
         ];
-        assert!(check("tlas", 0, &good).is_ok());
-        assert!(bad.iter().all(|instance| check("tlas", 0, instance).is_err()));
+        assert!(check_instance("tlas", 0, &good).is_ok());
+        assert!(bad.iter().all(|instance| check_instance("tlas", 0, instance).is_err()));
     }
 }

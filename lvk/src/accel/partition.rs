@@ -6,24 +6,24 @@ use super::primitive_bounds::Bounds;
 
 /// A primitive on its way through the cuts.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Item {
+pub(crate) struct PrimitiveBounds {
     pub(crate) bounds: Bounds,
     pub(crate) index: u32,
 }
 
 /// Numbers boxes from 0.
-pub(crate) fn items<'a>(bounds: impl IntoIterator<Item = &'a Bounds>) -> Vec<Item> {
-    bounds.into_iter().zip(0..).map(|(&bounds, index)| Item { bounds, index }).collect()
+pub(crate) fn primitive_bounds<'a>(bounds: impl IntoIterator<Item = &'a Bounds>) -> Vec<PrimitiveBounds> {
+    bounds.into_iter().zip(0..).map(|(&bounds, index)| PrimitiveBounds { bounds, index }).collect()
 }
 
 /// The union of the boxes.
-pub(crate) fn union(items: &[Item]) -> Bounds {
+pub(crate) fn union_bounds(items: &[PrimitiveBounds]) -> Bounds {
     items.iter().fold(Bounds::EMPTY, |all, item| all.union(item.bounds))
 }
 
 /// Ways to rank primitives: by the low or the high end along x, y or z. Of those that reach across a cut, one end or
 /// the other decides, which gathers the few large ones of a place in one piece and leaves the other one small.
-const WAY_COUNT: usize = 6;
+const AXIS_KEY_COUNT: usize = 6;
 
 /// The cheapest way to cut a long list is found on about this many of its primitives, evenly picked. Fewer miss the
 /// few large ones, whose place matters most.
@@ -31,62 +31,63 @@ const SAMPLE_COUNT: usize = 1 << 14;
 
 /// Moves `left` of the primitives to the front, so that both pieces together cost little by the surface-area measure.
 /// The result depends on the items and their order alone.
-pub(crate) fn cut(items: &mut [Item], left: usize) {
+pub(crate) fn partition_at(items: &mut [PrimitiveBounds], left: usize) {
     if left == 0 || left >= items.len() {
         return;
     }
-    let way = match items.len() / SAMPLE_COUNT {
-        0..2 => cheapest_way(items, left),
+    let key = match items.len() / SAMPLE_COUNT {
+        0..2 => cheapest_key(items, left),
         step => {
             let mut sample: Vec<_> = items.iter().copied().step_by(step).collect();
             let share = (sample.len() as u64 * left as u64 / items.len() as u64) as usize;
-            cheapest_way(&mut sample, share.max(1))
+            cheapest_key(&mut sample, share.max(1))
         }
     };
-    select(items, left, way);
+    select_lowest(items, left, key);
 }
 
 /// Moves some of the primitives to the front, wherever both pieces together cost least when a ray that enters a piece
 /// costs the root of its count; answers how many. At least one goes to either side of a list of two or more.
 ///
-/// Unlike [`cut`] it follows the gaps of the mesh and not a count, so pieces may be of any size.
-pub(crate) fn cut_freely(items: &mut [Item]) -> usize {
+/// Unlike [`partition_at`] it follows the gaps of the mesh and not a count, so pieces may be of any size.
+pub(crate) fn partition_sah(items: &mut [PrimitiveBounds]) -> usize {
     let step = (items.len() / SAMPLE_COUNT).max(1);
     let sample: Vec<_> = items.iter().copied().step_by(step).collect();
-    let best = (0..FREE_WAY_COUNT)
-        .filter_map(|way| cheapest_place(&sample, way))
+    let best = (0..SAH_KEY_COUNT)
+        .filter_map(|key| cheapest_split(&sample, key))
         .reduce(|best, other| if other.cost < best.cost { other } else { best });
-    let left = best.map_or(0, |best| partition(items, |item| free_rank(item, best.way) < best.place));
+    let left =
+        best.map_or(0, |best| partition_by(items, |item| sah_sort_key(item, best.key) < best.threshold));
     if left > 0 && left < items.len() {
         return left;
     }
     let middle = items.len() / 2;
-    cut(items, middle);
+    partition_at(items, middle);
     middle
 }
 
 /// By the low end, by the high end and by the centre along x, y or z.
-const FREE_WAY_COUNT: usize = 9;
+const SAH_KEY_COUNT: usize = 9;
 
-fn free_rank(item: &Item, way: usize) -> f32 {
-    match way {
-        0..WAY_COUNT => rank(item, way),
-        _ => item.bounds.low[way - WAY_COUNT] + item.bounds.high[way - WAY_COUNT],
+fn sah_sort_key(item: &PrimitiveBounds, key: usize) -> f32 {
+    match key {
+        0..AXIS_KEY_COUNT => sort_key(item, key),
+        _ => item.bounds.low[key - AXIS_KEY_COUNT] + item.bounds.high[key - AXIS_KEY_COUNT],
     }
 }
 
 /// Where a list may be cut in two.
-struct Place {
+struct SahSplit {
     cost: f32,
-    way: usize,
+    key: usize,
     /// What ranks below goes left.
-    place: f32,
+    threshold: f32,
 }
 
 /// The cheapest of evenly spaced places along one way; none where all rank alike.
-fn cheapest_place(items: &[Item], way: usize) -> Option<Place> {
+fn cheapest_split(items: &[PrimitiveBounds], key: usize) -> Option<SahSplit> {
     const BIN_COUNT: usize = 64;
-    let ranks = || items.iter().map(|item| free_rank(item, way));
+    let ranks = || items.iter().map(|item| sah_sort_key(item, key));
     let low = ranks().fold(f32::INFINITY, f32::min);
     let high = ranks().fold(f32::NEG_INFINITY, f32::max);
     let width = (high - low) / BIN_COUNT as f32;
@@ -95,7 +96,7 @@ fn cheapest_place(items: &[Item], way: usize) -> Option<Place> {
     }
     let mut bins = [(Bounds::EMPTY, 0_usize); BIN_COUNT];
     for item in items {
-        let bin = &mut bins[(((free_rank(item, way) - low) / width) as usize).min(BIN_COUNT - 1)];
+        let bin = &mut bins[(((sah_sort_key(item, key) - low) / width) as usize).min(BIN_COUNT - 1)];
         *bin = (bin.0.union(item.bounds), bin.1 + 1);
     }
     let join = |a: (Bounds, usize), b: (Bounds, usize)| (a.0.union(b.0), a.1 + b.1);
@@ -103,23 +104,23 @@ fn cheapest_place(items: &[Item], way: usize) -> Option<Place> {
     for bin in (0..BIN_COUNT).rev() {
         behind[bin] = join(behind[bin + 1], bins[bin]);
     }
-    let (mut before, mut best) = ((Bounds::EMPTY, 0), None::<Place>);
+    let (mut before, mut best) = ((Bounds::EMPTY, 0), None::<SahSplit>);
     for bin in 1..BIN_COUNT {
         before = join(before, bins[bin - 1]);
-        let cost = free_cost(before) + free_cost(behind[bin]);
+        let cost = sah_cost(before) + sah_cost(behind[bin]);
         if before.1 > 0 && behind[bin].1 > 0 && best.as_ref().is_none_or(|best| cost < best.cost) {
-            best = Some(Place { cost, way, place: low + width * bin as f32 });
+            best = Some(SahSplit { cost, key, threshold: low + width * bin as f32 });
         }
     }
     best
 }
 
-fn free_cost((bounds, count): (Bounds, usize)) -> f32 {
+fn sah_cost((bounds, count): (Bounds, usize)) -> f32 {
     if count == 0 { 0.0 } else { bounds.half_area() * (count as f32).sqrt() }
 }
 
 /// Moves what goes left to the front, and answers how many that are.
-fn partition(items: &mut [Item], goes_left: impl Fn(&Item) -> bool) -> usize {
+fn partition_by(items: &mut [PrimitiveBounds], goes_left: impl Fn(&PrimitiveBounds) -> bool) -> usize {
     let mut left = 0;
     for index in 0..items.len() {
         if goes_left(&items[index]) {
@@ -130,37 +131,38 @@ fn partition(items: &mut [Item], goes_left: impl Fn(&Item) -> bool) -> usize {
     left
 }
 
-fn cheapest_way(items: &mut [Item], left: usize) -> usize {
+fn cheapest_key(items: &mut [PrimitiveBounds], left: usize) -> usize {
     let mut best = (f32::INFINITY, 0);
-    for way in 0..WAY_COUNT {
-        select(items, left, way);
+    for key in 0..AXIS_KEY_COUNT {
+        select_lowest(items, left, key);
         let (left, right) = items.split_at(left);
         let cost = cost(left) + cost(right);
         if cost < best.0 {
-            best = (cost, way);
+            best = (cost, key);
         }
     }
     best.1
 }
 
-fn cost(items: &[Item]) -> f32 {
-    union(items).half_area() * items.len() as f32
+fn cost(items: &[PrimitiveBounds]) -> f32 {
+    union_bounds(items).half_area() * items.len() as f32
 }
 
 /// Moves the `left` lowest ranked items to the front.
-fn select(items: &mut [Item], left: usize, way: usize) {
-    let compare = |a: &Item, b: &Item| match rank(a, way).total_cmp(&rank(b, way)) {
-        // Equal ranks are told apart, so that the result does not depend on how selection works.
-        Ordering::Equal => a.index.cmp(&b.index),
-        order => order,
-    };
+fn select_lowest(items: &mut [PrimitiveBounds], left: usize, key: usize) {
+    let compare =
+        |a: &PrimitiveBounds, b: &PrimitiveBounds| match sort_key(a, key).total_cmp(&sort_key(b, key)) {
+            // Equal ranks are told apart, so that the result does not depend on how selection works.
+            Ordering::Equal => a.index.cmp(&b.index),
+            order => order,
+        };
     items.select_nth_unstable_by(left - 1, compare);
 }
 
-fn rank(item: &Item, way: usize) -> f32 {
-    match way {
-        0..3 => item.bounds.low[way],
-        _ => item.bounds.high[way - 3],
+fn sort_key(item: &PrimitiveBounds, key: usize) -> f32 {
+    match key {
+        0..3 => item.bounds.low[key],
+        _ => item.bounds.high[key - 3],
     }
 }
 
@@ -185,8 +187,8 @@ mod tests {
             bounds.extend(vec![small_box(far); 10]);
             bounds.swap(3, 35);
             bounds.swap(17, 31);
-            let mut items = items(&bounds);
-            cut(&mut items, 30);
+            let mut items = primitive_bounds(&bounds);
+            partition_at(&mut items, 30);
             assert!(items[..30].iter().all(|item| item.bounds == small_box([0.0; 3])), "axis {axis}");
         }
     }
@@ -198,8 +200,8 @@ mod tests {
         for at in [3, 9, 12, 18] {
             bounds[at] = Bounds { low: Vec3::splat(-100.0), high: Vec3::splat(100.0) };
         }
-        let mut items = items(&bounds);
-        cut(&mut items, 16);
+        let mut items = primitive_bounds(&bounds);
+        partition_at(&mut items, 16);
         let mut large: Vec<_> = items[16..].iter().map(|item| item.index).collect();
         large.sort_unstable();
         assert_eq!(large, [3, 9, 12, 18]);
@@ -214,8 +216,8 @@ mod tests {
                 .iter()
                 .map(|&[a, b, c, d, e, f]| Bounds { low: Vec3::new(a, b, c), high: Vec3::new(d, e, f) })
                 .collect();
-            let mut items = items(&bounds);
-            cut(&mut items, left);
+            let mut items = primitive_bounds(&bounds);
+            partition_at(&mut items, left);
             let mut numbers: Vec<_> = items.iter().map(|item| item.index).collect();
             numbers.sort_unstable();
             prop_assert!(numbers.into_iter().eq(0..bounds.len() as u32));

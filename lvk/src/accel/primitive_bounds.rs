@@ -18,7 +18,7 @@ impl Bounds {
     /// The box of a primitive that no ray can hit.
     pub(crate) const ORIGIN: Self = Self { low: Vec3::ZERO, high: Vec3::ZERO };
 
-    pub(crate) fn of(points: [Vec3; 3]) -> Self {
+    pub(crate) fn from_points(points: [Vec3; 3]) -> Self {
         let [a, b, c] = points;
         Self { low: a.min(b).min(c), high: a.max(b).max(c) }
     }
@@ -28,14 +28,14 @@ impl Bounds {
     }
 
     /// Half of the surface: a ray's chance to meet the box. 0 for one that holds nothing; sides count as at most
-    /// [`LONGEST_SIDE`], so that sums over many boxes stay finite.
+    /// [`MAX_SIDE`], so that sums over many boxes stay finite.
     pub(crate) fn half_area(self) -> f32 {
-        let d = (self.high - self.low).max(Vec3::ZERO).min(Vec3::splat(LONGEST_SIDE));
+        let d = (self.high - self.low).max(Vec3::ZERO).min(Vec3::splat(MAX_SIDE));
         d.x * d.y + d.y * d.z + d.z * d.x
     }
 }
 
-const LONGEST_SIDE: f32 = 1e12;
+const MAX_SIDE: f32 = 1e12;
 
 /// Vertices as they lie in memory.
 pub(crate) struct VertexBytes<'a> {
@@ -56,7 +56,7 @@ impl VertexBytes<'_> {
             return None;
         }
         let packed = self.format.size_bytes() as usize;
-        decode(self.format, element(self.bytes, self.stride, packed, vertex)?)
+        decode_position(self.format, element_bytes(self.bytes, self.stride, packed, vertex)?)
     }
 }
 
@@ -72,16 +72,16 @@ pub(crate) enum IndexBytes<'a> {
 
 impl IndexBytes<'_> {
     /// The vertices of a triangle; `None` beyond the last one.
-    pub(crate) fn corners(&self, triangle: u32) -> Option<[u32; 3]> {
+    pub(crate) fn vertex_indices(&self, triangle: u32) -> Option<[u32; 3]> {
         match self {
             Self::None => {
                 let first = triangle.checked_mul(3)?;
                 Some([first, first.checked_add(1)?, first.checked_add(2)?])
             }
-            Self::U16(bytes) => {
-                Some(numbers(element(bytes, 6, 6, triangle)?, u16::from_le_bytes)?.map(u32::from))
-            }
-            Self::U32(bytes) => numbers(element(bytes, 12, 12, triangle)?, u32::from_le_bytes),
+            Self::U16(bytes) => Some(
+                decode_numbers(element_bytes(bytes, 6, 6, triangle)?, u16::from_le_bytes)?.map(u32::from),
+            ),
+            Self::U32(bytes) => decode_numbers(element_bytes(bytes, 12, 12, triangle)?, u32::from_le_bytes),
         }
     }
 }
@@ -98,19 +98,19 @@ pub(crate) struct TriangleBytes<'a> {
 
 impl TriangleBytes<'_> {
     /// The corners of a triangle; `None` where a coordinate is not a number, or a vertex not there.
-    pub(crate) fn corners(&self, triangle: u32) -> Option<[Vec3; 3]> {
-        let [a, b, c] = self.indices.corners(triangle)?;
-        let corners = [self.corner(a)?, self.corner(b)?, self.corner(c)?];
+    pub(crate) fn vertices(&self, triangle: u32) -> Option<[Vec3; 3]> {
+        let [a, b, c] = self.indices.vertex_indices(triangle)?;
+        let corners = [self.vertex(a)?, self.vertex(b)?, self.vertex(c)?];
         (!corners.iter().any(|corner| corner.is_nan())).then_some(corners)
     }
 
     /// The boxes of all triangles. One without corners lies at the origin.
     pub(crate) fn bounds(&self) -> Vec<Bounds> {
-        let bounds = |triangle| self.corners(triangle).map_or(Bounds::ORIGIN, Bounds::of);
+        let bounds = |triangle| self.vertices(triangle).map_or(Bounds::ORIGIN, Bounds::from_points);
         (0..self.count).map(bounds).collect()
     }
 
-    fn corner(&self, vertex: u32) -> Option<Vec3> {
+    fn vertex(&self, vertex: u32) -> Option<Vec3> {
         let position = self.vertices.position(vertex)?;
         let Some(m) = &self.transform else { return Some(position) };
         let row = |first: usize| Vec4::new(m[first], m[first + 1], m[first + 2], m[first + 3]);
@@ -119,7 +119,7 @@ impl TriangleBytes<'_> {
 }
 
 /// Boxes as they lie in memory, each six floats: smallest corner, largest corner.
-pub(crate) struct BoxBytes<'a> {
+pub(crate) struct AabbListBytes<'a> {
     /// Starts at the first box.
     pub(crate) bytes: &'a [u8],
     /// From one box to the next, in bytes; 0 is tightly packed.
@@ -128,11 +128,11 @@ pub(crate) struct BoxBytes<'a> {
     pub(crate) count: u32,
 }
 
-impl BoxBytes<'_> {
+impl AabbListBytes<'_> {
     /// A box; `None` for one that is inverted, not a number or beyond the bytes.
     pub(crate) fn bounds(&self, index: u32) -> Option<Bounds> {
-        let bytes = element(self.bytes, self.stride, 24, index)?;
-        let [ax, ay, az, bx, by, bz] = numbers(bytes, f32::from_le_bytes)?;
+        let bytes = element_bytes(self.bytes, self.stride, 24, index)?;
+        let [ax, ay, az, bx, by, bz] = decode_numbers(bytes, f32::from_le_bytes)?;
         let (low, high) = (Vec3::new(ax, ay, az), Vec3::new(bx, by, bz));
         low.cmple(high).all().then_some(Bounds { low, high })
     }
@@ -146,11 +146,11 @@ impl BoxBytes<'_> {
 /// A geometry as it was read.
 pub(crate) enum GeometryBytes<'a> {
     Triangles(TriangleBytes<'a>),
-    Boxes(BoxBytes<'a>),
+    Boxes(AabbListBytes<'a>),
 }
 
 /// The bytes of one element; `None` if they are not all there.
-fn element(bytes: &[u8], stride: usize, packed: usize, index: u32) -> Option<&[u8]> {
+fn element_bytes(bytes: &[u8], stride: usize, packed: usize, index: u32) -> Option<&[u8]> {
     let stride = if stride == 0 { packed } else { stride };
     let start = stride.checked_mul(index as usize)?;
     bytes.get(start..start.checked_add(packed)?)
@@ -158,30 +158,34 @@ fn element(bytes: &[u8], stride: usize, packed: usize, index: u32) -> Option<&[u
 
 /// Position in the bytes of one vertex; components a format lacks are 0. `None` if there are too few bytes, and for formats
 /// that structures are not built from.
-fn decode(format: VertexFormat, bytes: &[u8]) -> Option<Vec3> {
+fn decode_position(format: VertexFormat, bytes: &[u8]) -> Option<Vec3> {
     let snorm = |value: u16| (f32::from(value as i16) / 32767.0).max(-1.0);
     Some(match format {
-        VertexFormat::F32 => Vec3::new(numbers::<1, 4, _>(bytes, f32::from_le_bytes)?[0], 0.0, 0.0),
-        VertexFormat::F32x2 => flat(numbers(bytes, f32::from_le_bytes)?),
-        VertexFormat::F32x3 | VertexFormat::F32x4 => Vec3::from_array(numbers(bytes, f32::from_le_bytes)?),
-        VertexFormat::F16x2 => flat(numbers(bytes, u16::from_le_bytes)?.map(half_to_f32)),
-        VertexFormat::F16x4 => Vec3::from_array(numbers(bytes, u16::from_le_bytes)?.map(half_to_f32)),
-        VertexFormat::Snorm16x2 => flat(numbers(bytes, u16::from_le_bytes)?.map(snorm)),
-        VertexFormat::Snorm16x4 => Vec3::from_array(numbers(bytes, u16::from_le_bytes)?.map(snorm)),
+        VertexFormat::F32 => Vec3::new(decode_numbers::<1, 4, _>(bytes, f32::from_le_bytes)?[0], 0.0, 0.0),
+        VertexFormat::F32x2 => with_zero_z(decode_numbers(bytes, f32::from_le_bytes)?),
+        VertexFormat::F32x3 | VertexFormat::F32x4 => {
+            Vec3::from_array(decode_numbers(bytes, f32::from_le_bytes)?)
+        }
+        VertexFormat::F16x2 => with_zero_z(decode_numbers(bytes, u16::from_le_bytes)?.map(half_to_f32)),
+        VertexFormat::F16x4 => Vec3::from_array(decode_numbers(bytes, u16::from_le_bytes)?.map(half_to_f32)),
+        VertexFormat::Snorm16x2 => with_zero_z(decode_numbers(bytes, u16::from_le_bytes)?.map(snorm)),
+        VertexFormat::Snorm16x4 => Vec3::from_array(decode_numbers(bytes, u16::from_le_bytes)?.map(snorm)),
         VertexFormat::Unorm8x4 => Vec3::from_array(
-            numbers::<3, 1, _>(bytes, u8::from_le_bytes)?.map(|value| f32::from(value) / 255.0),
+            decode_numbers::<3, 1, _>(bytes, u8::from_le_bytes)?.map(|value| f32::from(value) / 255.0),
         ),
-        VertexFormat::U32 => Vec3::new(numbers::<1, 4, _>(bytes, u32::from_le_bytes)?[0] as f32, 0.0, 0.0),
+        VertexFormat::U32 => {
+            Vec3::new(decode_numbers::<1, 4, _>(bytes, u32::from_le_bytes)?[0] as f32, 0.0, 0.0)
+        }
         _ => return None,
     })
 }
 
-fn flat([x, y]: [f32; 2]) -> Vec3 {
+fn with_zero_z([x, y]: [f32; 2]) -> Vec3 {
     Vec3::new(x, y, 0.0)
 }
 
 /// The first `COUNT` numbers of `SIZE` bytes each; `None` if there are too few bytes.
-fn numbers<const COUNT: usize, const SIZE: usize, T: Copy + Default>(
+fn decode_numbers<const COUNT: usize, const SIZE: usize, T: Copy + Default>(
     bytes: &[u8],
     read: fn([u8; SIZE]) -> T,
 ) -> Option<[T; COUNT]> {
@@ -224,7 +228,7 @@ mod tests {
     }
 
     fn box_bounds(bytes: &[u8], stride: usize, count: u32) -> Vec<Bounds> {
-        BoxBytes { bytes, stride, count }.all_bounds()
+        AabbListBytes { bytes, stride, count }.all_bounds()
     }
 
     const FORMATS: [VertexFormat; 10] = [
@@ -278,8 +282,8 @@ mod tests {
         ];
         for (format, bytes, expected) in cases {
             assert_eq!(bytes.len(), format.size_bytes() as usize);
-            assert_eq!(decode(format, bytes), Some(Vec3::from(expected)), "{format:?}");
-            assert_eq!(decode(format, &bytes[..1]), None, "{format:?} cut short");
+            assert_eq!(decode_position(format, bytes), Some(Vec3::from(expected)), "{format:?}");
+            assert_eq!(decode_position(format, &bytes[..1]), None, "{format:?} cut short");
         }
     }
 

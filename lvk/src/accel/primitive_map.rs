@@ -22,13 +22,13 @@ pub(crate) struct PrimitiveMap {
     /// The gathered inputs; none once no build can come any more.
     inputs: Mutex<Option<Arc<Buffer>>>,
     inputs_address: u64,
-    /// First primitive of each geometry in `inputs`.
-    firsts: Vec<u32>,
+    /// First primitive of each geometry in `gathered_inputs`.
+    first_primitives: Vec<u32>,
     primitive_bytes: u64,
 }
 
 impl PrimitiveMap {
-    /// Makes the buffers; the caller uploads [`table_words`] and gathers the inputs.
+    /// Makes the buffers; the caller uploads [`encode_table`] and gathers the inputs.
     pub(crate) fn new(gpu: &Arc<Gpu>, name: &str, geometries: &[Vec<u32>], boxes: bool) -> Result<Self> {
         let primitive_bytes = if boxes { BOX_BYTES } else { TRIANGLE_BYTES };
         let total: u64 = geometries.iter().map(|list| list.len() as u64).sum();
@@ -39,49 +39,49 @@ impl PrimitiveMap {
             table: Arc::new(new_buffer(gpu, name, words * 4, BufferUsage::STORAGE)?),
             inputs_address: inputs.address,
             inputs: Mutex::new(Rank::GatheredInputs, Some(inputs)),
-            firsts: firsts(geometries),
+            first_primitives: first_primitives(geometries),
             primitive_bytes,
         })
     }
 
     /// The gathered inputs, unless they were taken.
-    pub(crate) fn inputs(&self) -> Option<Arc<Buffer>> {
+    pub(crate) fn gathered_inputs(&self) -> Option<Arc<Buffer>> {
         self.inputs.lock().clone()
     }
 
     /// Takes the gathered inputs away from a part that is never built again, to be retired.
-    pub(crate) fn take_inputs(&self) -> Option<Arc<Buffer>> {
+    pub(crate) fn take_gathered_inputs(&self) -> Option<Arc<Buffer>> {
         self.inputs.lock().take()
     }
 
     /// Address of the gathered inputs of a geometry.
     pub(crate) fn input_address(&self, geometry: usize) -> u64 {
-        let first = self.firsts.get(geometry).copied().unwrap_or(0);
+        let first = self.first_primitives.get(geometry).copied().unwrap_or(0);
         self.inputs_address + u64::from(first) * self.primitive_bytes
     }
 
     /// Address of the numbers of a geometry's primitives.
-    pub(crate) fn numbers_address(&self, geometry: usize) -> u64 {
-        let first = self.firsts.get(geometry).copied().unwrap_or(0);
-        self.table.address + (self.firsts.len() as u64 + u64::from(first)) * 4
+    pub(crate) fn primitive_ids_address(&self, geometry: usize) -> u64 {
+        let first = self.first_primitives.get(geometry).copied().unwrap_or(0);
+        self.table.address + (self.first_primitives.len() as u64 + u64::from(first)) * 4
     }
 
     /// Bytes of both buffers, of those that are left.
-    pub(crate) fn bytes(&self) -> u64 {
-        self.table.size_bytes + self.inputs().map_or(0, |inputs| inputs.size_bytes)
+    pub(crate) fn table_bytes(&self) -> u64 {
+        self.table.size_bytes + self.gathered_inputs().map_or(0, |inputs| inputs.size_bytes)
     }
 }
 
 /// The words of the table.
-pub(crate) fn table_words(geometries: &[Vec<u32>]) -> Vec<u32> {
+pub(crate) fn encode_table(geometries: &[Vec<u32>]) -> Vec<u32> {
     let head = geometries.len() as u32;
-    let places = firsts(geometries).into_iter().map(|first| head + first);
+    let places = first_primitives(geometries).into_iter().map(|first| head + first);
     places.chain(geometries.iter().flatten().copied()).collect()
 }
 
-/// The lists that [`table_words`] put into `words`, for a mesh with so many primitives in each geometry; `None` if it
+/// The lists that [`encode_table`] put into `words`, for a mesh with so many primitives in each geometry; `None` if it
 /// was not that.
-pub(crate) fn table_lists(words: &[u32], primitive_counts: &[u32]) -> Option<Vec<Vec<u32>>> {
+pub(crate) fn decode_table(words: &[u32], primitive_counts: &[u32]) -> Option<Vec<Vec<u32>>> {
     let head = words.get(..primitive_counts.len())?;
     let ends = head.iter().skip(1).map(|end| *end as usize).chain([words.len()]);
     let list = |((start, end), count): ((&u32, usize), &u32)| {
@@ -89,11 +89,11 @@ pub(crate) fn table_lists(words: &[u32], primitive_counts: &[u32]) -> Option<Vec
         numbers.iter().all(|number| number < count).then(|| numbers.to_vec())
     };
     let lists = head.iter().zip(ends).zip(primitive_counts).map(list).collect::<Option<Vec<_>>>()?;
-    (table_words(&lists) == words).then_some(lists)
+    (encode_table(&lists) == words).then_some(lists)
 }
 
 /// Whether parts of so many primitives of each geometry have every one of the mesh, and none twice.
-pub(crate) fn cover_mesh(parts: &[Vec<Vec<u32>>], primitive_counts: &[u32]) -> bool {
+pub(crate) fn covers_mesh(parts: &[Vec<Vec<u32>>], primitive_counts: &[u32]) -> bool {
     primitive_counts.iter().enumerate().all(|(geometry, count)| {
         let lists = parts.iter().filter_map(|part| part.get(geometry));
         let held: usize = lists.clone().map(Vec::len).sum();
@@ -107,7 +107,7 @@ pub(crate) fn cover_mesh(parts: &[Vec<Vec<u32>>], primitive_counts: &[u32]) -> b
     })
 }
 
-fn firsts(geometries: &[Vec<u32>]) -> Vec<u32> {
+fn first_primitives(geometries: &[Vec<u32>]) -> Vec<u32> {
     let mut next = 0;
     let mut place = |list: &Vec<u32>| {
         let first = next;
@@ -131,7 +131,7 @@ mod tests {
     #[test]
     fn the_table_leads_from_geometry_and_primitive_to_the_mesh() {
         let geometries = [vec![7, 3], vec![], vec![1]];
-        let words = table_words(&geometries);
+        let words = encode_table(&geometries);
         for (geometry, list) in geometries.iter().enumerate() {
             for (primitive, number) in list.iter().enumerate() {
                 assert_eq!(words[words[geometry] as usize + primitive], *number);
@@ -143,28 +143,28 @@ mod tests {
     #[test]
     fn parts_have_each_primitive_once() {
         let whole = [vec![vec![1, 0], vec![]], vec![vec![2], vec![0]]];
-        assert!(cover_mesh(&whole, &[3, 1]));
-        assert!(cover_mesh(&[], &[0, 0]));
-        assert!(!cover_mesh(&[], &[1]));
-        assert!(!cover_mesh(&whole[..1], &[3, 1]), "some are missing");
-        assert!(!cover_mesh(&whole, &[4, 1]), "the last is missing");
-        assert!(!cover_mesh(&whole, &[2, 1]), "there are too many");
-        assert!(!cover_mesh(&[vec![vec![1, 0]], vec![vec![1]]], &[3]), "one is there twice");
-        assert!(!cover_mesh(&[vec![vec![1, 3, 0]]], &[3]), "one is of no mesh");
+        assert!(covers_mesh(&whole, &[3, 1]));
+        assert!(covers_mesh(&[], &[0, 0]));
+        assert!(!covers_mesh(&[], &[1]));
+        assert!(!covers_mesh(&whole[..1], &[3, 1]), "some are missing");
+        assert!(!covers_mesh(&whole, &[4, 1]), "the last is missing");
+        assert!(!covers_mesh(&whole, &[2, 1]), "there are too many");
+        assert!(!covers_mesh(&[vec![vec![1, 0]], vec![vec![1]]], &[3]), "one is there twice");
+        assert!(!covers_mesh(&[vec![vec![1, 3, 0]]], &[3]), "one is of no mesh");
     }
 
     #[test]
     fn lists_come_out_of_their_table_and_of_no_other() {
         let geometries = vec![vec![7, 3], vec![], vec![1]];
-        let (words, counts) = (table_words(&geometries), [8, 0, 2]);
-        assert_eq!(table_lists(&words, &counts), Some(geometries));
-        assert_eq!(table_lists(&words, &[7, 0, 2]), None);
-        assert_eq!(table_lists(&words[..2], &counts), None);
+        let (words, counts) = (encode_table(&geometries), [8, 0, 2]);
+        assert_eq!(decode_table(&words, &counts), Some(geometries));
+        assert_eq!(decode_table(&words, &[7, 0, 2]), None);
+        assert_eq!(decode_table(&words[..2], &counts), None);
         for place in 0..3 {
             for wrong in [0, 1, 4, 6, 7, u32::MAX] {
                 let mut broken = words.clone();
                 broken[place] = wrong;
-                assert!(broken == words || table_lists(&broken, &counts).is_none(), "{place} {wrong}");
+                assert!(broken == words || decode_table(&broken, &counts).is_none(), "{place} {wrong}");
             }
         }
     }

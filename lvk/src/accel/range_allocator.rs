@@ -8,7 +8,7 @@ pub(crate) const RANGE_ALIGNMENT: u64 = 256;
 /// Free ranges of one buffer. Allocation takes the smallest one that is large enough; neighbours are joined when they
 /// are freed. Both take O(log n) time.
 #[derive(Debug)]
-pub(crate) struct Ranges {
+pub(crate) struct RangeAllocator {
     size: u64,
     used: u64,
     /// Start and end of each free range; no two of them touch.
@@ -17,7 +17,7 @@ pub(crate) struct Ranges {
     by_length: BTreeSet<(u64, u64)>,
 }
 
-impl Ranges {
+impl RangeAllocator {
     /// A buffer of so many bytes, all free.
     pub(crate) fn new(size: u64) -> Self {
         let mut ranges = Self { size, used: 0, free: BTreeMap::new(), by_length: BTreeSet::new() };
@@ -32,7 +32,7 @@ impl Ranges {
         let bytes = bytes.max(1);
         let &(_, start) = self.by_length.range((bytes, 0)..).next()?;
         let end = self.remove(start)?;
-        let taken = self.end_of(start, bytes);
+        let taken = self.free_range_end(start, bytes);
         if taken < end {
             self.insert(taken, end);
         }
@@ -43,7 +43,7 @@ impl Ranges {
     /// Gives a range back: what [`alloc`](Self::alloc) answered and was asked. A range that is not in use as a whole
     /// stays as it is.
     pub(crate) fn free(&mut self, offset: u64, bytes: u64) {
-        let (mut start, mut end) = (offset, self.end_of(offset, bytes.max(1)));
+        let (mut start, mut end) = (offset, self.free_range_end(offset, bytes.max(1)));
         let before = self.free.range(..=start).next_back().map(|(&start, &end)| (start, end));
         let behind = self.free.range(start..).next().map(|(&start, &end)| (start, end));
         let overlaps = before.is_some_and(|(_, before_end)| before_end > start)
@@ -74,7 +74,7 @@ impl Ranges {
     }
 
     /// Where a range ends: at a multiple of the alignment, or with the buffer.
-    fn end_of(&self, start: u64, bytes: u64) -> u64 {
+    fn free_range_end(&self, start: u64, bytes: u64) -> u64 {
         let end = start.saturating_add(bytes).checked_next_multiple_of(RANGE_ALIGNMENT);
         end.unwrap_or(u64::MAX).min(self.size)
     }
@@ -99,7 +99,7 @@ mod tests {
 
     #[test]
     fn the_smallest_range_that_fits_is_taken() {
-        let mut ranges = Ranges::new(4096);
+        let mut ranges = RangeAllocator::new(4096);
         let places: Vec<_> = [1024, 256, 512, 256].map(|bytes| ranges.alloc(bytes)).into();
         assert_eq!(places, [Some(0), Some(1024), Some(1280), Some(1792)]);
         ranges.free(0, 1024);
@@ -112,18 +112,18 @@ mod tests {
 
     #[test]
     fn a_buffer_of_any_size_can_be_used_to_its_end() {
-        let mut ranges = Ranges::new(1000);
+        let mut ranges = RangeAllocator::new(1000);
         assert_eq!(ranges.alloc(1000), Some(0));
         assert_eq!(ranges.used_bytes(), 1000);
         ranges.free(0, 1000);
         assert_eq!((ranges.alloc(700), ranges.alloc(232)), (Some(0), Some(768)));
         assert_eq!(ranges.alloc(0), None);
-        assert_eq!(Ranges::new(0).alloc(0), None);
+        assert_eq!(RangeAllocator::new(0).alloc(0), None);
     }
 
     #[test]
     fn freeing_what_is_not_in_use_changes_nothing() {
-        let mut ranges = Ranges::new(1024);
+        let mut ranges = RangeAllocator::new(1024);
         assert_eq!(ranges.alloc(512), Some(0));
         for (offset, bytes) in [(512, 256), (256, 512), (0, 1024), (2048, 256), (u64::MAX, u64::MAX)] {
             ranges.free(offset, bytes);
@@ -140,7 +140,7 @@ mod tests {
             size in 0..20_000_u64,
             steps in prop::collection::vec((any::<bool>(), 0..3_000_u64, any::<prop::sample::Index>()), 0..200),
         ) {
-            let mut ranges = Ranges::new(size);
+            let mut ranges = RangeAllocator::new(size);
             let mut live: Vec<(u64, u64)> = Vec::new();
             for (take, bytes, which) in steps {
                 if take {

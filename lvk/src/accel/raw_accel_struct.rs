@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 
 /// One Vulkan acceleration structure, destroyed on drop.
-pub(crate) struct RawStructure {
+pub(crate) struct RawAccelStruct {
     pub(crate) raw: vk::AccelerationStructureKHR,
     /// What instances refer to.
     pub(crate) address: u64,
@@ -17,7 +17,7 @@ pub(crate) struct RawStructure {
     ext: ash::khr::acceleration_structure::Device,
 }
 
-impl RawStructure {
+impl RawAccelStruct {
     /// Makes the object with its memory; nothing is built yet.
     pub(crate) fn new(
         gpu: &Arc<Gpu>,
@@ -49,7 +49,7 @@ impl RawStructure {
     }
 }
 
-impl Drop for RawStructure {
+impl Drop for RawAccelStruct {
     fn drop(&mut self) {
         // SAFETY: the owner has waited until the GPU is done with the structure.
         unsafe { self.ext.destroy_acceleration_structure(self.raw, None) };

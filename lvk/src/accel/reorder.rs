@@ -4,36 +4,36 @@
 //! on: the tree is as good as the order. So the order is made by that very tree, top down, each node by its cheapest
 //! cut. Builders that sort gain nothing.
 
-use super::partition::{Item, cut, items};
+use super::partition::{PrimitiveBounds, partition_at, primitive_bounds};
 use super::primitive_bounds::Bounds;
-use crate::parallel::{cores, share_out};
+use crate::parallel::{core_count, parallel_for};
 
 /// Another order is worth its number map and its time if its tree costs this many times less than the given one.
-pub(crate) const WORTH_GAIN: f64 = 1.1;
+pub(crate) const MIN_AREA_RATIO: f64 = 1.1;
 
 /// Nodes larger than this are worth a thread of their own.
-const PARALLEL_COUNT: usize = 1 << 16;
+const MIN_PARALLEL_COUNT: usize = 1 << 16;
 
 /// Numbers of the boxes in an order whose tree of halves (the first `ceil(n / 2)` to the left, at every node) has a
 /// small surface. Deterministic; any values are allowed, but those that are not finite get a poor place.
 ///
 /// Takes O(n log n) time.
 pub(crate) fn spatial_order(bounds: &[Bounds]) -> Vec<u32> {
-    let mut items = items(bounds);
-    arrange(&mut items, cores());
+    let mut items = primitive_bounds(bounds);
+    sort_median(&mut items, core_count());
     items.into_iter().map(|item| item.index).collect()
 }
 
 /// Whether building in this order instead of the given one lowers the cost of the tree of halves by more than
-/// [`WORTH_GAIN`].
-pub(crate) fn worth_ordering(bounds: &[Bounds], order: &[u32]) -> bool {
+/// [`MIN_AREA_RATIO`].
+pub(crate) fn is_reorder_worthwhile(bounds: &[Bounds], order: &[u32]) -> bool {
     let given: Vec<u32> = (0..bounds.len() as u32).collect();
-    halves_area(bounds, &given) > WORTH_GAIN * halves_area(bounds, order)
+    median_tree_area(bounds, &given) > MIN_AREA_RATIO * median_tree_area(bounds, order)
 }
 
 /// Cost of the tree of halves of an order: the half areas of all its inner nodes together. Numbers without a box
 /// count as empty.
-pub(crate) fn halves_area(bounds: &[Bounds], order: &[u32]) -> f64 {
+pub(crate) fn median_tree_area(bounds: &[Bounds], order: &[u32]) -> f64 {
     node_area(bounds, order).1
 }
 
@@ -52,18 +52,18 @@ fn node_area(bounds: &[Bounds], order: &[u32]) -> (Bounds, f64) {
     }
 }
 
-/// Arranges `items`, splitting the work over up to `threads` threads.
-fn arrange(mut items: &mut [Item], threads: usize) {
+/// Arranges `primitive_bounds`, splitting the work over up to `threads` threads.
+fn sort_median(mut items: &mut [PrimitiveBounds], threads: usize) {
     while items.len() > 2 {
         let middle = items.len().div_ceil(2);
-        cut(items, middle);
+        partition_at(items, middle);
         let (left, right) = items.split_at_mut(middle);
-        if threads > 1 && left.len() > PARALLEL_COUNT {
+        if threads > 1 && left.len() > MIN_PARALLEL_COUNT {
             let halves = [(left, threads / 2), (right, threads - threads / 2)];
-            share_out(2, halves.into_iter(), |(items, threads)| arrange(items, threads));
+            parallel_for(2, halves.into_iter(), |(items, threads)| sort_median(items, threads));
             return;
         }
-        arrange(left, 1);
+        sort_median(left, 1);
         items = right;
     }
 }
@@ -93,11 +93,11 @@ mod tests {
     #[test]
     fn the_cost_is_that_of_the_tree_of_halves() {
         // ((a b) (c)) : the half areas of [0, 3] and [0, 2], each 1 high and deep.
-        assert_eq!(halves_area(&line(&[0.0, 1.0, 2.0]), &[0, 1, 2]), 7.0 + 5.0);
-        assert_eq!(halves_area(&line(&[0.0, 1.0, 2.0]), &[0, 2, 1]), 7.0 + 7.0);
-        assert_eq!(halves_area(&line(&[0.0]), &[0]), 0.0);
-        assert_eq!(halves_area(&[], &[]), 0.0);
-        assert_eq!(halves_area(&line(&[0.0]), &[7, 9]), 0.0, "no such boxes");
+        assert_eq!(median_tree_area(&line(&[0.0, 1.0, 2.0]), &[0, 1, 2]), 7.0 + 5.0);
+        assert_eq!(median_tree_area(&line(&[0.0, 1.0, 2.0]), &[0, 2, 1]), 7.0 + 7.0);
+        assert_eq!(median_tree_area(&line(&[0.0]), &[0]), 0.0);
+        assert_eq!(median_tree_area(&[], &[]), 0.0);
+        assert_eq!(median_tree_area(&line(&[0.0]), &[7, 9]), 0.0, "no such boxes");
     }
 
     #[test]
@@ -105,9 +105,9 @@ mod tests {
         let bounds = scattered(4096);
         let unsorted: Vec<u32> = (0..4096).collect();
         let order = spatial_order(&bounds);
-        let gain = halves_area(&bounds, &unsorted) / halves_area(&bounds, &order);
+        let gain = median_tree_area(&bounds, &unsorted) / median_tree_area(&bounds, &order);
         assert!(gain > 8.0, "{gain}");
-        assert!(worth_ordering(&bounds, &order));
+        assert!(is_reorder_worthwhile(&bounds, &order));
     }
 
     #[test]
@@ -115,10 +115,10 @@ mod tests {
         let bounds = scattered(4096);
         let sorted: Vec<Bounds> =
             spatial_order(&bounds).into_iter().map(|index| bounds[index as usize]).collect();
-        assert!(!worth_ordering(&sorted, &spatial_order(&sorted)));
-        assert!(!worth_ordering(&[], &[]));
+        assert!(!is_reorder_worthwhile(&sorted, &spatial_order(&sorted)));
+        assert!(!is_reorder_worthwhile(&[], &[]));
         let same = [Bounds::ORIGIN; 9];
-        assert!(!worth_ordering(&same, &spatial_order(&same)));
+        assert!(!is_reorder_worthwhile(&same, &spatial_order(&same)));
     }
 
     #[test]
@@ -141,10 +141,10 @@ mod tests {
 
     #[test]
     fn threads_do_not_change_the_result() {
-        let bounds = scattered(3 * PARALLEL_COUNT as u32);
-        let (mut alone, mut many) = (items(&bounds), items(&bounds));
-        arrange(&mut alone, 1);
-        arrange(&mut many, 5);
+        let bounds = scattered(3 * MIN_PARALLEL_COUNT as u32);
+        let (mut alone, mut many) = (primitive_bounds(&bounds), primitive_bounds(&bounds));
+        sort_median(&mut alone, 1);
+        sort_median(&mut many, 5);
         assert!(alone.iter().map(|item| item.index).eq(many.iter().map(|item| item.index)));
     }
 
@@ -159,7 +159,7 @@ mod tests {
                 .collect();
             let order = spatial_order(&bounds);
             prop_assert_eq!(&order, &spatial_order(&bounds));
-            let area = halves_area(&bounds, &order);
+            let area = median_tree_area(&bounds, &order);
             prop_assert!(area.is_finite() && area >= 0.0);
             let mut sorted = order;
             sorted.sort_unstable();

@@ -37,12 +37,12 @@ pub(crate) fn plan_scratch(sizes: &[u64], alignment: u64, budget: u64) -> Vec<Sc
 /// A buffer that has become too small is freed only when the GPU is done with it, and until then both count. So there
 /// are two sizes that together make the budget, and larger ones only for single builds that need them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct ScratchTiers {
+pub(crate) struct ScratchSizes {
     small: u64,
     large: u64,
 }
 
-impl ScratchTiers {
+impl ScratchSizes {
     /// For buffers that together take at most `budget` bytes, the alignment of their addresses included.
     pub(crate) fn new(budget: u64, alignment: u64) -> Self {
         let small = budget / 8;
@@ -136,7 +136,7 @@ mod tests {
     fn two_buffers_stay_within_the_budget() {
         for budget in [0, 1, 100, 4096, 64 << 20, u64::MAX] {
             for alignment in [1, 128, 256] {
-                let tiers = ScratchTiers::new(budget, alignment);
+                let tiers = ScratchSizes::new(budget, alignment);
                 let bytes = |needed| scratch_buffer_bytes(tiers.buffer_bytes(needed), alignment);
                 assert!(tiers.buffer_bytes(tiers.batch_bytes()) >= tiers.batch_bytes());
                 if budget >= 16 * alignment {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::scratch::{ScratchTiers, scratch_buffer_bytes};
+use super::scratch::{ScratchSizes, scratch_buffer_bytes};
 use crate::barrier::ResourceId;
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -15,7 +15,7 @@ pub(crate) struct ScratchBuffer {
     /// Stands for the memory, whichever buffer it is at present: all builds of a lane use it, so that they come in order
     /// unless they are recorded side by side.
     pub(crate) id: ResourceId,
-    pub(crate) tiers: ScratchTiers,
+    pub(crate) tiers: ScratchSizes,
     current: Mutex<Option<Arc<Buffer>>>,
 }
 
@@ -24,13 +24,17 @@ impl ScratchBuffer {
     pub(crate) fn new(budget: u64, alignment: u64) -> Self {
         Self {
             id: ResourceId::next(),
-            tiers: ScratchTiers::new(budget, alignment),
+            tiers: ScratchSizes::new(budget, alignment),
             current: Mutex::new(Rank::Scratch, None),
         }
     }
 
     /// A buffer with room for `bytes` at an aligned address, and the smaller one it replaces, to be retired.
-    pub(crate) fn get(&self, gpu: &Arc<Gpu>, bytes: u64) -> Result<(Arc<Buffer>, Option<Arc<Buffer>>)> {
+    pub(crate) fn get_or_grow(
+        &self,
+        gpu: &Arc<Gpu>,
+        bytes: u64,
+    ) -> Result<(Arc<Buffer>, Option<Arc<Buffer>>)> {
         let alignment = gpu.caps.limits.scratch_alignment.into();
         let needed = scratch_buffer_bytes(bytes, alignment);
         let mut current = self.current.lock();

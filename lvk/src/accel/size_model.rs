@@ -6,7 +6,7 @@ use crate::gpu::start::profile::DeviceProfile;
 impl DeviceProfile {
     /// The larger of what the `driver` answered for a bottom-level build and what the profile says of that many
     /// `primitives`. The scratch of updates is the driver's own.
-    pub fn build_sizes(&self, driver: AccelStructSizes, primitives: u64) -> AccelStructSizes {
+    pub fn query_build_sizes(&self, driver: AccelStructSizes, primitives: u64) -> AccelStructSizes {
         let model = |bytes_each: u64| primitives.saturating_mul(bytes_each);
         AccelStructSizes {
             structure_bytes: driver.structure_bytes.max(model(self.structure_bytes_per_primitive)),
@@ -35,7 +35,7 @@ mod tests {
             (DeviceProfile::mali_g715(), 7_852_992_128, 612_837_208),
             (DeviceProfile::xclipse_940(), 601_488_316, 461_519_536),
         ] {
-            let sizes = profile.build_sizes(AccelStructSizes::default(), MESH);
+            let sizes = profile.query_build_sizes(AccelStructSizes::default(), MESH);
             assert!(is_near(sizes.build_scratch_bytes, scratch), "{}: {sizes:?}", profile.name);
             assert!(is_near(sizes.structure_bytes, structure), "{}: {sizes:?}", profile.name);
         }
@@ -44,7 +44,7 @@ mod tests {
     #[test]
     fn the_mali_needs_thirty_parts_for_the_scratch_of_the_mesh() {
         let mali = DeviceProfile::mali_g715();
-        let sizes = mali.build_sizes(AccelStructSizes::default(), MESH);
+        let sizes = mali.query_build_sizes(AccelStructSizes::default(), MESH);
         assert_eq!(sizes.build_scratch_bytes.div_ceil(mali.max_accel_scratch_bytes), 30);
     }
 
@@ -60,11 +60,11 @@ mod tests {
                 scratch_bytes_per_primitive: factors[1],
                 ..DeviceProfile::default()
             };
-            let sizes = profile.build_sizes(driver, primitives);
+            let sizes = profile.query_build_sizes(driver, primitives);
             prop_assert!(sizes.structure_bytes >= driver.structure_bytes);
             prop_assert!(sizes.build_scratch_bytes >= driver.build_scratch_bytes);
             prop_assert_eq!(sizes.update_scratch_bytes, driver.update_scratch_bytes);
-            prop_assert_eq!(DeviceProfile::default().build_sizes(driver, primitives), driver);
+            prop_assert_eq!(DeviceProfile::default().query_build_sizes(driver, primitives), driver);
         }
     }
 }

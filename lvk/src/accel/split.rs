@@ -1,6 +1,6 @@
 //! How a mesh too large for the device is cut into parts that each fit.
 
-use super::partition::{Item, cut_freely, items, union};
+use super::partition::{PrimitiveBounds, partition_sah, primitive_bounds, union_bounds};
 use super::primitive_bounds::Bounds;
 use crate::error::{Error, Result, check_limit};
 
@@ -50,12 +50,12 @@ pub(crate) fn plan_split(
         total += geometry.len() as u64;
     }
     check_limit(name, "primitive count of all parts together", total, u32::MAX.into())?;
-    let mut planner = Planner { name, starts, limits, sizes, parts: Vec::new() };
-    planner.plan(&mut items(bounds.iter().flatten()))?;
+    let mut planner = SplitPlanner { name, starts, limits, sizes, parts: Vec::new() };
+    planner.plan_parts(&mut primitive_bounds(bounds.iter().flatten()))?;
     Ok(planner.parts)
 }
 
-struct Planner<'a> {
+struct SplitPlanner<'a> {
     name: &'a str,
     /// Number of each geometry's first primitive when all are counted through.
     starts: Vec<u64>,
@@ -64,11 +64,11 @@ struct Planner<'a> {
     parts: Vec<PartPlan>,
 }
 
-impl Planner<'_> {
-    fn plan(&mut self, items: &mut [Item]) -> Result<()> {
-        let part = self.part(items);
+impl SplitPlanner<'_> {
+    fn plan_parts(&mut self, items: &mut [PrimitiveBounds]) -> Result<()> {
+        let part = self.part_plan(items);
         let counts: Vec<u32> = part.geometries.iter().map(|geometry| geometry.len() as u32).collect();
-        let demand = self.demand(&counts)?;
+        let demand = self.size_demand(&counts)?;
         if demand.parts <= 1 {
             self.parts.push(part);
             return Ok(());
@@ -82,32 +82,32 @@ impl Planner<'_> {
                 limit: demand.limit,
             });
         }
-        let parts = self.least_parts(&counts, demand.parts, items.len() as u64)?;
-        self.cut(items, parts)
+        let parts = self.min_part_count(&counts, demand.parts, items.len() as u64)?;
+        self.split_part(items, parts)
     }
 
     /// Cuts into parts of at most an equal share each, and plans each of them.
-    fn cut(&mut self, items: &mut [Item], parts: u64) -> Result<()> {
+    fn split_part(&mut self, items: &mut [PrimitiveBounds], parts: u64) -> Result<()> {
         let share = (items.len() as u64).div_ceil(parts).max(1) as usize;
-        let leaf = (share / leaves_of_part(parts)).max(1);
+        let leaf = (share / median_leaves_of_part(parts)).max(1);
         let enough = usize::try_from(parts.saturating_mul(2)).unwrap_or(usize::MAX);
-        for mut part in merge(leaves(items, leaf), share, enough) {
-            self.plan(&mut part)?;
+        for mut part in merge_parts(sah_leaves(items, leaf), share, enough) {
+            self.plan_parts(&mut part)?;
         }
         Ok(())
     }
 
     /// Least number of parts, at least `lowest` and at most `highest`, of which an equal share of every geometry fits:
     /// sizes have a fixed base, so the ratio of the whole's size to the limit may be too few.
-    fn least_parts(&mut self, counts: &[u32], lowest: u64, highest: u64) -> Result<u64> {
+    fn min_part_count(&mut self, counts: &[u32], lowest: u64, highest: u64) -> Result<u64> {
         let mut too_few = lowest.min(highest) - 1;
         let mut enough = too_few + 1;
-        while enough < highest && !self.share_fits(counts, enough)? {
+        while enough < highest && !self.equal_share_fits(counts, enough)? {
             (too_few, enough) = (enough, enough.saturating_mul(2).min(highest));
         }
         while enough - too_few > 1 {
             let middle = too_few + (enough - too_few) / 2;
-            if self.share_fits(counts, middle)? {
+            if self.equal_share_fits(counts, middle)? {
                 enough = middle;
             } else {
                 too_few = middle;
@@ -116,26 +116,30 @@ impl Planner<'_> {
         Ok(enough)
     }
 
-    fn share_fits(&mut self, counts: &[u32], parts: u64) -> Result<bool> {
-        Ok(self.demand(&equal_share(counts, parts))?.parts <= 1)
+    fn equal_share_fits(&mut self, counts: &[u32], parts: u64) -> Result<bool> {
+        Ok(self.size_demand(&equal_share(counts, parts))?.parts <= 1)
     }
 
     /// The limit that so many primitives of each geometry exceed most, and how many times.
-    fn demand(&mut self, counts: &[u32]) -> Result<Demand> {
+    fn size_demand(&mut self, counts: &[u32]) -> Result<SizeDemand> {
         let sizes = (self.sizes)(counts)?;
         let primitives = counts.iter().copied().map(u64::from).sum();
         let limits = self.limits;
         let demands = [
-            Demand::new("primitive count of one part", primitives, limits.primitives),
-            Demand::new("scratch size in bytes of one part", sizes.scratch_bytes, limits.scratch_bytes),
-            Demand::new("structure size in bytes of one part", sizes.structure_bytes, limits.structure_bytes),
+            SizeDemand::new("primitive count of one part", primitives, limits.primitives),
+            SizeDemand::new("scratch size in bytes of one part", sizes.scratch_bytes, limits.scratch_bytes),
+            SizeDemand::new(
+                "structure size in bytes of one part",
+                sizes.structure_bytes,
+                limits.structure_bytes,
+            ),
         ];
         let [first, second, third] = demands;
         let worst = if second.parts > first.parts { second } else { first };
         Ok(if third.parts > worst.parts { third } else { worst })
     }
 
-    fn part(&self, items: &[Item]) -> PartPlan {
+    fn part_plan(&self, items: &[PrimitiveBounds]) -> PartPlan {
         let mut numbers: Vec<u32> = items.iter().map(|item| item.index).collect();
         numbers.sort_unstable();
         let mut geometries = Vec::with_capacity(self.starts.len());
@@ -152,19 +156,19 @@ impl Planner<'_> {
 
 /// Into how many leaves a share is cut before they are merged: more give parts that overlap less, but merging looks at
 /// all pairs.
-fn leaves_of_part(parts: u64) -> usize {
+fn median_leaves_of_part(parts: u64) -> usize {
     (1024 / parts.max(1)).clamp(1, 8) as usize
 }
 
 /// Cuts freely until no piece has more than `most` primitives.
-fn leaves(items: &mut [Item], most: usize) -> Vec<&mut [Item]> {
+fn sah_leaves(items: &mut [PrimitiveBounds], most: usize) -> Vec<&mut [PrimitiveBounds]> {
     let (mut open, mut done) = (vec![items], Vec::new());
     while let Some(piece) = open.pop() {
         if piece.len() <= most {
             done.push(piece);
             continue;
         }
-        let left = cut_freely(piece);
+        let left = partition_sah(piece);
         let (left, right) = piece.split_at_mut(left);
         open.extend([right, left]);
     }
@@ -172,33 +176,37 @@ fn leaves(items: &mut [Item], most: usize) -> Vec<&mut [Item]> {
 }
 
 /// A part while it is put together of leaves.
-struct Merged {
-    items: Vec<Item>,
+struct MergeCandidate {
+    items: Vec<PrimitiveBounds>,
     bounds: Bounds,
     /// The part it gains most to be merged with, and the gain.
     partner: Option<(usize, f32)>,
 }
 
-impl Merged {
+impl MergeCandidate {
     /// How much surface a ray is spared when both are one part; none where there is no room.
-    fn gain(&self, other: &Self, most: usize) -> Option<f32> {
+    fn merge_gain(&self, other: &Self, most: usize) -> Option<f32> {
         /// One part is better than two that are a little smaller together: each costs a ray that enters it.
-        const PREFERENCE: f32 = 0.25;
+        const REORDER_PREFERENCE: f32 = 0.25;
         if self.items.len() + other.items.len() > most {
             return None;
         }
-        let together = self.bounds.union(other.bounds).half_area() * (1.0 - PREFERENCE);
+        let together = self.bounds.union(other.bounds).half_area() * (1.0 - REORDER_PREFERENCE);
         Some(self.bounds.half_area() + other.bounds.half_area() - together)
     }
 }
 
 /// Merges pieces, those first that overlap most, as long as they gain or are more than `enough`, and no part has more than
 /// `most` primitives.
-fn merge(pieces: Vec<&mut [Item]>, most: usize, enough: usize) -> Vec<Vec<Item>> {
-    let merged = |piece: &mut [Item]| Merged { items: piece.to_vec(), bounds: union(piece), partner: None };
+fn merge_parts(pieces: Vec<&mut [PrimitiveBounds]>, most: usize, enough: usize) -> Vec<Vec<PrimitiveBounds>> {
+    let merged = |piece: &mut [PrimitiveBounds]| MergeCandidate {
+        items: piece.to_vec(),
+        bounds: union_bounds(piece),
+        partner: None,
+    };
     let mut parts: Vec<_> = pieces.into_iter().map(merged).collect();
-    (0..parts.len()).for_each(|part| find_partner(&mut parts, part, most));
-    while let Some((part, partner)) = best_pair(&parts, parts.len() > enough) {
+    (0..parts.len()).for_each(|part| find_merge_partner(&mut parts, part, most));
+    while let Some((part, partner)) = best_merge(&parts, parts.len() > enough) {
         let (part, partner) = (part.min(partner), part.max(partner));
         let taken = parts.swap_remove(partner);
         let moved = parts.len();
@@ -206,28 +214,30 @@ fn merge(pieces: Vec<&mut [Item]>, most: usize, enough: usize) -> Vec<Vec<Item>>
         parts[part].items.extend(taken.items);
         for other in 0..parts.len() {
             match parts[other].partner {
-                Some((with, _)) if with == part || with == partner => find_partner(&mut parts, other, most),
+                Some((with, _)) if with == part || with == partner => {
+                    find_merge_partner(&mut parts, other, most)
+                }
                 Some((with, gain)) if with == moved => parts[other].partner = Some((partner, gain)),
                 _ => {}
             }
         }
-        find_partner(&mut parts, part, most);
-        (0..parts.len()).for_each(|other| offer(&mut parts, other, part, most));
+        find_merge_partner(&mut parts, part, most);
+        (0..parts.len()).for_each(|other| offer_merge(&mut parts, other, part, most));
     }
     parts.into_iter().map(|part| part.items).collect()
 }
 
-fn find_partner(parts: &mut [Merged], part: usize, most: usize) {
+fn find_merge_partner(parts: &mut [MergeCandidate], part: usize, most: usize) {
     parts[part].partner = None;
-    (0..parts.len()).for_each(|other| offer(parts, part, other, most));
+    (0..parts.len()).for_each(|other| offer_merge(parts, part, other, most));
 }
 
-/// Makes `other` the partner of `part` if it gains more than the present one.
-fn offer(parts: &mut [Merged], part: usize, other: usize, most: usize) {
+/// Makes `other` the partner of `part_plan` if it gains more than the present one.
+fn offer_merge(parts: &mut [MergeCandidate], part: usize, other: usize, most: usize) {
     if part == other {
         return;
     }
-    if let Some(gain) = parts[part].gain(&parts[other], most)
+    if let Some(gain) = parts[part].merge_gain(&parts[other], most)
         && parts[part].partner.is_none_or(|(_, present)| gain > present)
     {
         parts[part].partner = Some((other, gain));
@@ -235,7 +245,7 @@ fn offer(parts: &mut [Merged], part: usize, other: usize, most: usize) {
 }
 
 /// The two parts that gain most together, or lose least where that is better than nothing.
-fn best_pair(parts: &[Merged], at_a_loss: bool) -> Option<(usize, usize)> {
+fn best_merge(parts: &[MergeCandidate], at_a_loss: bool) -> Option<(usize, usize)> {
     let pairs = parts.iter().enumerate().filter_map(|(part, merged)| {
         let (partner, gain) = merged.partner?;
         Some((part, partner, gain))
@@ -259,14 +269,14 @@ fn equal_share(counts: &[u32], parts: u64) -> Vec<u32> {
 
 /// One limit, and into how many parts it asks to cut.
 #[derive(Clone, Copy)]
-struct Demand {
+struct SizeDemand {
     what: &'static str,
     requested: u64,
     limit: u64,
     parts: u64,
 }
 
-impl Demand {
+impl SizeDemand {
     fn new(what: &'static str, requested: u64, limit: u64) -> Self {
         let parts = if limit == 0 && requested > 0 { u64::MAX } else { requested.div_ceil(limit.max(1)) };
         Self { what, requested, limit, parts }

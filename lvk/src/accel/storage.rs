@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::range_allocator::Ranges;
+use super::range_allocator::RangeAllocator;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::lock_order::{Mutex, Rank};
@@ -11,27 +11,27 @@ use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 
 /// Size of a shared buffer.
-const BLOCK_BYTES: u64 = 4 << 20;
+const SHARED_BLOCK_BYTES: u64 = 4 << 20;
 /// Structures larger than this get a buffer of their own, which goes back to the allocator with them.
-const LARGEST_SHARED: u64 = BLOCK_BYTES / 8;
+const MAX_SHARED_BYTES: u64 = SHARED_BLOCK_BYTES / 8;
 /// Vulkan wants structures at multiples of this inside their buffer.
 const ALIGNMENT: u64 = 256;
 
 /// Hands out memory for structures and takes it back.
 pub(crate) struct AccelStorage {
-    pool: Arc<Pool>,
+    pool: Arc<SharedBlocks>,
     budget_bytes: u64,
 }
 
-struct Pool {
-    blocks: Mutex<Vec<Block>>,
+struct SharedBlocks {
+    blocks: Mutex<Vec<SharedBlock>>,
     used_bytes: AtomicU64,
 }
 
 /// A buffer that several structures share.
-struct Block {
+struct SharedBlock {
     buffer: Arc<Buffer>,
-    ranges: Ranges,
+    ranges: RangeAllocator,
 }
 
 /// The bytes of one structure, given back on drop.
@@ -41,14 +41,14 @@ pub(crate) struct StorageRange {
     pub(crate) offset: u64,
     pub(crate) bytes: u64,
     shared: bool,
-    pool: Arc<Pool>,
+    pool: Arc<SharedBlocks>,
 }
 
 impl AccelStorage {
     /// Never holds more than `budget_bytes` at once.
     pub(crate) fn new(budget_bytes: u64) -> Self {
         let blocks = Mutex::new(Rank::AccelBlocks, Vec::new());
-        Self { pool: Arc::new(Pool { blocks, used_bytes: AtomicU64::new(0) }), budget_bytes }
+        Self { pool: Arc::new(SharedBlocks { blocks, used_bytes: AtomicU64::new(0) }), budget_bytes }
     }
 
     /// Memory for the structure `name`.
@@ -56,7 +56,7 @@ impl AccelStorage {
         let bytes = bytes.max(1).checked_next_multiple_of(ALIGNMENT).unwrap_or(u64::MAX);
         self.reserve(name, bytes)?;
         // ValidationMode in shaders knows where buffers end, but not where structures do.
-        let alone = bytes > LARGEST_SHARED || gpu.instance.gpu_assisted;
+        let alone = bytes > MAX_SHARED_BYTES || gpu.instance.gpu_assisted;
         let made = if alone {
             new_buffer(gpu, name, bytes).map(|buffer| (Arc::new(buffer), 0, false))
         } else {
@@ -72,9 +72,9 @@ impl AccelStorage {
     }
 
     /// Bytes of shared buffers that no structure uses.
-    pub(crate) fn spare_bytes(&self) -> u64 {
+    pub(crate) fn free_bytes(&self) -> u64 {
         let blocks = self.pool.blocks.lock();
-        blocks.iter().map(|block| BLOCK_BYTES - block.ranges.used_bytes()).sum()
+        blocks.iter().map(|block| SHARED_BLOCK_BYTES - block.ranges.used_bytes()).sum()
     }
 
     fn reserve(&self, name: &str, bytes: u64) -> Result<()> {
@@ -92,15 +92,16 @@ impl AccelStorage {
                 return Ok((Arc::clone(&block.buffer), offset));
             }
         }
-        let buffer = Arc::new(new_buffer(gpu, "small acceleration structures", BLOCK_BYTES)?);
-        let mut block = Block { buffer: Arc::clone(&buffer), ranges: Ranges::new(BLOCK_BYTES) };
+        let buffer = Arc::new(new_buffer(gpu, "small acceleration structures", SHARED_BLOCK_BYTES)?);
+        let mut block =
+            SharedBlock { buffer: Arc::clone(&buffer), ranges: RangeAllocator::new(SHARED_BLOCK_BYTES) };
         let offset = block.ranges.alloc(bytes).unwrap_or(0);
         blocks.push(block);
         Ok((buffer, offset))
     }
 }
 
-impl Pool {
+impl SharedBlocks {
     fn unreserve(&self, bytes: u64) {
         self.used_bytes.fetch_sub(bytes, Ordering::Relaxed);
     }

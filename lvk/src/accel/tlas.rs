@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, OnceLock};
 
-use super::blas_refs::{Revision, ShownSet};
-use super::raw_accel_struct::RawStructure;
+use super::blas_refs::{AccelGeneration, BlasRefSet};
+use super::raw_accel_struct::RawAccelStruct;
 use crate::error::{Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Buffer;
@@ -16,13 +16,13 @@ pub(crate) struct Tlas {
     /// Instances the caller may show.
     pub(crate) capacity: u32,
     /// Instances Vulkan may be given, those for further parts of split meshes included.
-    pub(crate) room: u32,
+    pub(crate) built_capacity: u32,
     /// What the device traces, where it does.
-    pub(crate) structure: Option<RawStructure>,
+    pub(crate) structure: Option<RawAccelStruct>,
     /// What software traces, where it does.
     pub(crate) software: Option<SoftwareTlas>,
     /// From hits to the caller's numbers: a row for each instance Vulkan is given. Made when first needed.
-    pub(crate) rows: OnceLock<Arc<Buffer>>,
+    pub(crate) hit_table: OnceLock<Arc<Buffer>>,
     /// The instances Vulkan is given, where a kernel writes them. Made when first needed.
     pub(crate) records: OnceLock<Arc<Buffer>>,
     /// Of the last build submitted.
@@ -39,11 +39,11 @@ pub(crate) struct TlasContents {
     /// Refits since the last rebuild.
     pub(crate) refits: u32,
     /// What the instances refer to, kept alive as long as they do.
-    pub(crate) shown: Arc<ShownSet>,
+    pub(crate) blas_refs: Arc<BlasRefSet>,
     /// When that was last known to stand as it is.
-    pub(crate) revision: Revision,
+    pub(crate) generation: AccelGeneration,
     /// The address of the rows that the table of structures names for it; 0 for none.
-    pub(crate) named_rows: u64,
+    pub(crate) hit_table_address: u64,
     /// From what the instances can be written again once a structure they refer to has moved.
     pub(crate) source: Option<Arc<InstanceSource>>,
 }
@@ -52,30 +52,30 @@ pub(crate) struct TlasContents {
 #[derive(Clone)]
 pub(crate) struct InstanceSource {
     /// `VkAccelerationStructureInstanceKHR` with a number in place of the address.
-    pub(crate) instances: SourceBytes,
+    pub(crate) instances: InstanceBytes,
     /// How many there are.
     pub(crate) count: u32,
     /// Of further parts: the caller's instance each belongs to.
-    pub(crate) owners: Option<SourceBytes>,
+    pub(crate) owners: Option<InstanceBytes>,
     /// Instances of the caller.
     pub(crate) user_count: u32,
     /// How often the whole list is written: once for each part that a structure may have.
     pub(crate) copies: u32,
-    pub(crate) numbers: Numbers,
+    pub(crate) indexing: BlasIndexing,
 }
 
 /// What the numbers of an [`InstanceSource`] count.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Numbers {
+pub(crate) enum BlasIndexing {
     /// Parts of everything shown.
-    Parts,
+    ByPart,
     /// Structures shown, with all their parts.
-    Structures,
+    ByBlas,
 }
 
 /// Bytes the kernel reads.
 #[derive(Clone)]
-pub(crate) struct SourceBytes {
+pub(crate) struct InstanceBytes {
     pub(crate) address: u64,
     /// What holds them; `None` for staging memory, which keeps them until the command buffer is done.
     pub(crate) buffer: Option<Arc<Buffer>>,
@@ -86,16 +86,16 @@ impl Tlas {
         slot: u32,
         capacity: u32,
         room: u32,
-        structure: Option<RawStructure>,
+        structure: Option<RawAccelStruct>,
         software: Option<SoftwareTlas>,
     ) -> Self {
         Self {
             slot,
             capacity,
-            room,
+            built_capacity: room,
             structure,
             software,
-            rows: OnceLock::new(),
+            hit_table: OnceLock::new(),
             records: OnceLock::new(),
             contents: Mutex::new(Rank::TlasContents, TlasContents::default()),
         }
@@ -108,13 +108,13 @@ impl Tlas {
 
     /// Bytes of the structure.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        let hardware = self.structure.as_ref().map_or(0, RawStructure::memory_bytes);
+        let hardware = self.structure.as_ref().map_or(0, RawAccelStruct::memory_bytes);
         hardware + self.software.as_ref().map_or(0, SoftwareTlas::memory_bytes)
     }
 
     /// Bytes of buffers the library keeps for it.
     pub(crate) fn table_bytes(&self) -> u64 {
-        let kept = [self.rows.get(), self.records.get()];
+        let kept = [self.hit_table.get(), self.records.get()];
         kept.into_iter().flatten().map(|buffer| buffer.size_bytes).sum()
     }
 }
@@ -122,8 +122,8 @@ impl Tlas {
 impl TlasContents {
     /// The same, but for what the instances can be written from.
     #[inline]
-    pub(crate) fn without_source(&self) -> Self {
-        Self { shown: Arc::clone(&self.shown), source: None, ..*self }
+    pub(crate) fn clone_without_source(&self) -> Self {
+        Self { blas_refs: Arc::clone(&self.blas_refs), source: None, ..*self }
     }
 
     /// Instances of the caller and of Vulkan, `None` before the first build.
@@ -142,20 +142,20 @@ impl InstanceSource {
     }
 }
 
-impl Numbers {
+impl BlasIndexing {
     /// How many numbers mean something.
-    pub(crate) fn count(self, shown: &ShownSet) -> usize {
+    pub(crate) fn entry_count(self, blas_refs: &BlasRefSet) -> usize {
         match self {
-            Self::Parts => shown.parts().len(),
-            Self::Structures => shown.spans().len(),
+            Self::ByPart => blas_refs.part_addresses().len(),
+            Self::ByBlas => blas_refs.part_spans().len(),
         }
     }
 
     /// Writes what they mean: first part and number of parts for each.
-    pub(crate) fn write(self, shown: &ShownSet, out: &mut [u8]) {
+    pub(crate) fn write_entries(self, blas_refs: &BlasRefSet, out: &mut [u8]) {
         match self {
-            Self::Structures => out.copy_from_slice(bytemuck::cast_slice(shown.spans())),
-            Self::Parts => {
+            Self::ByBlas => out.copy_from_slice(bytemuck::cast_slice(blas_refs.part_spans())),
+            Self::ByPart => {
                 for (part, out) in (0_u32..).zip(out.chunks_exact_mut(size_of::<[u32; 2]>())) {
                     out.copy_from_slice(bytemuck::bytes_of(&[part, 1]));
                 }

@@ -2,47 +2,47 @@
 
 use std::sync::Arc;
 
-use super::subresource_accesses::{PartUse, PartUses};
+use super::subresource_accesses::{SubresourceAccess, SubresourceAccesses};
 use crate::barrier::{Barriers, IdMap, ResourceId, Subresources, Tracker, Use};
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
-use crate::handle_cache::Found;
+use crate::handle_cache::HandleCache;
 use crate::resource::{Buffer, Texture};
 use crate::submit::emit_barriers::Images;
 
 /// So many are searched one by one, which is faster than a map. Builds of many structures use more.
-const FEW: usize = 16;
+const LINEAR_SEARCH_MAX: usize = 16;
 
 /// The uses of one command. Kept in the command buffer and emptied, so that recording does not allocate.
 #[derive(Default)]
-pub(crate) struct Uses {
+pub(crate) struct CommandAccesses {
     buffers: Vec<(ResourceId, Use)>,
     /// Where each of `buffers` is, once they are more than a few; empty before.
-    places: IdMap<usize>,
+    index_by_id: IdMap<usize>,
     /// Parts of images, with the rows of their textures.
-    textures: PartUses<usize>,
+    textures: SubresourceAccesses<usize>,
     writers: Vec<(ResourceId, Use)>,
     /// How many of the textures found the images of the command buffer have.
     known_images: usize,
 }
 
 /// Textures that a command buffer has found.
-pub(super) type Textures = Found<TextureHandle, Texture>;
+pub(super) type TextureCache = HandleCache<TextureHandle, Texture>;
 
-impl Uses {
+impl CommandAccesses {
     /// The command uses a buffer, or what stands for one.
     #[inline]
-    pub(crate) fn id(&mut self, id: ResourceId, next: Use) {
-        match self.place(id) {
+    pub(crate) fn add_id(&mut self, id: ResourceId, next: Use) {
+        match self.index_of(id) {
             // Layouts mean nothing to buffers, so their uses always merge.
-            Some(place) => {
-                let (_, present) = &mut self.buffers[place];
+            Some(index) => {
+                let (_, present) = &mut self.buffers[index];
                 present.stages |= next.stages;
                 present.access |= next.access;
             }
             None => {
-                if self.buffers.len() >= FEW {
-                    self.places.insert(id, self.buffers.len());
+                if self.buffers.len() >= LINEAR_SEARCH_MAX {
+                    self.index_by_id.insert(id, self.buffers.len());
                 }
                 self.buffers.push((id, next));
             }
@@ -51,24 +51,25 @@ impl Uses {
 
     /// Where a buffer that the command uses already is in the list.
     #[inline]
-    fn place(&mut self, id: ResourceId) -> Option<usize> {
-        if self.buffers.len() < FEW {
+    fn index_of(&mut self, id: ResourceId) -> Option<usize> {
+        if self.buffers.len() < LINEAR_SEARCH_MAX {
             return self.buffers.iter().position(|(known, _)| *known == id);
         }
-        if self.places.is_empty() {
-            self.places.extend(self.buffers.iter().enumerate().map(|(place, (known, _))| (*known, place)));
+        if self.index_by_id.is_empty() {
+            self.index_by_id
+                .extend(self.buffers.iter().enumerate().map(|(index, (known, _))| (*known, index)));
         }
-        self.places.get(&id).copied()
+        self.index_by_id.get(&id).copied()
     }
 
     /// The command uses a buffer.
     #[inline]
-    pub(crate) fn buffer(&mut self, buffer: &Buffer, next: Use) {
-        self.id(buffer.id, next);
+    pub(crate) fn add_buffer(&mut self, buffer: &Buffer, next: Use) {
+        self.add_id(buffer.id, next);
     }
 
-    /// The command adds to what `id` stands for, next to other writers.
-    pub(crate) fn accumulate(&mut self, id: ResourceId, write: Use) {
+    /// The command adds to what `add_id` stands for, next to other writers.
+    pub(crate) fn add_accumulating(&mut self, id: ResourceId, write: Use) {
         if !self.writers.contains(&(id, write)) {
             self.writers.push((id, write));
         }
@@ -76,21 +77,24 @@ impl Uses {
 
     /// The command uses a part of the image that the texture of a row shows.
     #[inline(always)]
-    pub(super) fn texture(
+    pub(super) fn add_texture(
         &mut self,
-        found: &Textures,
-        row: usize,
+        cache: &TextureCache,
+        index: usize,
         part: Subresources,
         next: Use,
     ) -> Result<()> {
-        let id = found.at(row).image.id;
-        self.textures.add(id, part, next, row).map_err(|other| conflict(found.at(row), found.at(other)))
+        let id = cache.object(index).image.id;
+        self.textures
+            .add(id, part, next, index)
+            .map_err(|other| access_conflict(cache.object(index), cache.object(other)))
     }
 
     /// Whether the command needs a barrier behind earlier commands of the same command buffer.
-    pub(crate) fn need_barriers(&self, tracker: &Tracker) -> bool {
+    pub(crate) fn needs_barriers(&self, tracker: &Tracker) -> bool {
         let buffer = |(id, next): &(ResourceId, Use)| tracker.needs_barrier_buffer(*id, *next);
-        let texture = |used: &PartUse<_>| tracker.needs_barrier_texture(used.id, used.part, used.next);
+        let texture =
+            |used: &SubresourceAccess<_>| tracker.needs_barrier_texture(used.id, used.part, used.next);
         self.buffers.iter().any(buffer) || self.textures.iter().any(texture)
     }
 
@@ -98,7 +102,7 @@ impl Uses {
     #[inline(always)]
     pub(super) fn track(
         &mut self,
-        found: &Textures,
+        cache: &TextureCache,
         tracker: &mut Tracker,
         images: &mut Images,
         out: &mut Barriers,
@@ -107,7 +111,7 @@ impl Uses {
             self.track_buffers(tracker, out);
         }
         if !self.textures.is_empty() {
-            self.track_textures(found, tracker, images, out);
+            self.track_textures(cache, tracker, images, out);
         }
     }
 
@@ -124,27 +128,27 @@ impl Uses {
     #[inline(always)]
     fn track_textures(
         &mut self,
-        found: &Textures,
+        cache: &TextureCache,
         tracker: &mut Tracker,
         images: &mut Images,
         out: &mut Barriers,
     ) {
-        if self.known_images < found.count() {
-            self.learn_images(found, images);
+        if self.known_images < cache.len() {
+            self.sync_image_cache(cache, images);
         }
-        for PartUse { id, part, next, owner } in self.textures.iter() {
-            tracker.use_texture(*id, found.at(*owner).image.shape, *part, *next, out);
+        for SubresourceAccess { id, part, next, owner } in self.textures.iter() {
+            tracker.use_texture(*id, cache.object(*owner).image.shape, *part, *next, out);
         }
         self.textures.clear();
     }
 
     /// Tells the images of textures that were found since. Apart, as most commands find none.
     #[inline(never)]
-    fn learn_images(&mut self, found: &Textures, images: &mut Images) {
-        for texture in found.from(self.known_images) {
+    fn sync_image_cache(&mut self, cache: &TextureCache, images: &mut Images) {
+        for texture in cache.from_index(self.known_images) {
             images.insert(texture.image.id, texture.image.barrier_image());
         }
-        self.known_images = found.count();
+        self.known_images = cache.len();
     }
 
     /// Forgets a command that failed before it was recorded.
@@ -154,7 +158,7 @@ impl Uses {
     }
 
     /// Forgets the command buffer, for the next one.
-    pub(super) fn forget(&mut self) {
+    pub(super) fn reset(&mut self) {
         self.clear();
         self.known_images = 0;
     }
@@ -162,13 +166,13 @@ impl Uses {
     fn clear_buffers(&mut self) {
         self.buffers.clear();
         self.writers.clear();
-        if !self.places.is_empty() {
-            self.places.clear();
+        if !self.index_by_id.is_empty() {
+            self.index_by_id.clear();
         }
     }
 }
 
-fn conflict(texture: &Arc<Texture>, other: &Arc<Texture>) -> Error {
+fn access_conflict(texture: &Arc<Texture>, other: &Arc<Texture>) -> Error {
     let message = if Arc::ptr_eq(texture, other) {
         "one command uses the texture in two ways that exclude each other; use a second texture or two commands"
             .to_owned()
@@ -199,12 +203,12 @@ mod tests {
         fn a_buffer_used_twice_counts_once(
             commands in prop::collection::vec(prop::collection::vec((0..60_u64, 0..3_usize), 0..120), 1..4)
         ) {
-            let mut found = Uses::default();
+            let mut cache = CommandAccesses::default();
             for command in commands {
                 let mut expected: Vec<(ResourceId, Use)> = Vec::new();
                 for (id, kind) in command {
                     let (id, next) = (ResourceId(id), uses()[kind]);
-                    found.id(id, next);
+                    cache.add_id(id, next);
                     match expected.iter_mut().find(|(known, _)| *known == id) {
                         Some((_, present)) => {
                             present.stages |= next.stages;
@@ -213,8 +217,8 @@ mod tests {
                         None => expected.push((id, next)),
                     }
                 }
-                prop_assert_eq!(&found.buffers, &expected);
-                found.clear();
+                prop_assert_eq!(&cache.buffers, &expected);
+                cache.clear();
             }
         }
     }

@@ -8,7 +8,7 @@ use super::CommandBuffer;
 use super::attachment_desc::{
     ColorAttachment, ColorLoadOp, DepthAttachment, DepthLoadOp, Resolve, StencilLoadOp,
 };
-use super::local_read::PassInputs;
+use super::local_read::PassInputAttachments;
 use super::pass_area::{PassArea, PassLayers};
 use super::render_pass_desc::RenderPassDesc;
 use crate::barrier::{Subresources, Use};
@@ -21,13 +21,13 @@ use crate::resource::texture_desc::TextureUsage;
 use crate::submit::emit_barriers::vulkan_layout;
 
 /// The targets of a pass, found and checked.
-pub(super) struct Targets {
+pub(super) struct PassTargets {
     pub(super) extent: [u32; 2],
     pub(super) area: PassArea,
     pub(super) layers: PassLayers,
     pub(super) shape: RenderingFormats,
     pub(super) read_only_depth: bool,
-    pub(super) inputs: PassInputs,
+    pub(super) inputs: PassInputAttachments,
     pub(super) rates: Option<vk::RenderingFragmentShadingRateAttachmentInfoKHR<'static>>,
     pub(super) colors: Vec<vk::RenderingAttachmentInfo<'static>>,
     pub(super) depth: Option<vk::RenderingAttachmentInfo<'static>>,
@@ -35,30 +35,30 @@ pub(super) struct Targets {
 }
 
 /// A mip of some layers of a texture.
-pub(super) struct Target {
+pub(super) struct PassTarget {
     pub(super) texture: Arc<Texture>,
     mip: u32,
     layer: u32,
     layers: PassLayers,
 }
 
-impl Target {
+impl PassTarget {
     pub(super) fn view(&self) -> Result<vk::ImageView> {
         match self.layers.is_layered() {
             false => self.texture.target_view(self.mip, self.layer),
-            true => self.texture.layered_target_view(self.mip, self.layer, self.layers.count()),
+            true => self.texture.layered_target_view(self.mip, self.layer, self.layers.layer_count()),
         }
     }
 
     /// One aspect of what the pass draws to.
     pub(super) fn input_view(&self, aspect: vk::ImageAspectFlags) -> Result<vk::ImageView> {
-        self.texture.input_view(self.part(), self.layers.is_layered(), aspect)
+        self.texture.input_view(self.subresources(), self.layers.is_layered(), aspect)
     }
 
     /// Mip and layers, or slices.
-    fn texels(&self) -> Subresources {
+    fn subresource_texels(&self) -> Subresources {
         let part = self.texture.subresource(self.mip, self.layer);
-        Subresources { layer_count: self.layers.count(), ..part }
+        Subresources { layer_count: self.layers.layer_count(), ..part }
     }
 
     /// Width and height.
@@ -67,43 +67,43 @@ impl Target {
     }
 
     /// The same as barriers know it.
-    pub(super) fn part(&self) -> Subresources {
-        self.texture.attachment_subresources(self.mip, self.layer, self.layers.count())
+    pub(super) fn subresources(&self) -> Subresources {
+        self.texture.attachment_subresources(self.mip, self.layer, self.layers.layer_count())
     }
 }
 
 impl CommandBuffer {
     /// Finds and checks the targets of a pass; the pass uses them.
-    pub(super) fn use_targets(&mut self, desc: &RenderPassDesc<'_>) -> Result<Targets> {
+    pub(super) fn use_targets(&mut self, desc: &RenderPassDesc<'_>) -> Result<PassTargets> {
         let gpu = &self.shared.gpu;
         let limit = gpu.caps.limits.max_color_targets;
         check_limit("begin_rendering", "colour target count", desc.color.len() as u64, limit.into())?;
-        let layers = PassLayers::of(gpu, desc)?;
-        let mut inputs = PassInputs::of(gpu, desc)?;
+        let layers = PassLayers::new(gpu, desc)?;
+        let mut inputs = PassInputAttachments::new(gpu, desc)?;
         let mut size = None;
         let (mut colors, mut formats) = (Vec::new(), Vec::new());
         let mut drawn = Vec::with_capacity(desc.color.len());
         for attachment in desc.color {
             let ColorAttachment { texture, mip, layer, .. } = *attachment;
-            let target = self.target(texture, mip, layer, layers, &mut size)?;
+            let target = self.checked_target(texture, mip, layer, layers, &mut size)?;
             check_color(&target.texture, attachment.load)?;
             if attachment.store || attachment.load == ColorLoadOp::Load {
                 target.texture.check_not_transient()?;
             }
-            check_apart(&target, &mut drawn)?;
+            check_disjoint(&target, &mut drawn)?;
             let used = inputs.target_use(&target, Use::color_target(attachment.load == ColorLoadOp::Load));
-            self.use_texture(&target.texture, target.part(), used)?;
+            self.use_texture(&target.texture, target.subresources(), used)?;
             inputs.add_color(colors.len() as u32, &target)?;
             let mut info = color_info(&target, attachment, used)?;
             if let Some(Resolve { texture, mip, layer }) = attachment.resolve {
-                let to = self.target(texture, mip, layer, layers, &mut None)?;
+                let to = self.checked_target(texture, mip, layer, layers, &mut None)?;
                 info = self.use_color_resolve(&target, &to, info)?;
-                check_apart(&to, &mut drawn)?;
+                check_disjoint(&to, &mut drawn)?;
             }
             colors.push(info);
             formats.push(target.texture.format);
         }
-        let mut targets = Targets {
+        let mut targets = PassTargets {
             extent: [0, 0],
             area: PassArea::default(),
             layers,
@@ -118,34 +118,34 @@ impl CommandBuffer {
         let mut depth_format = None;
         if let Some(attachment) = &desc.depth {
             let target =
-                self.target(attachment.texture, attachment.mip, attachment.layer, layers, &mut size)?;
+                self.checked_target(attachment.texture, attachment.mip, attachment.layer, layers, &mut size)?;
             depth_format = Some(target.texture.format);
-            self.use_depth(&target, attachment, &mut targets)?;
+            self.use_depth_target(&target, attachment, &mut targets)?;
         }
         let (extent, samples) =
             size.ok_or_else(|| Error::usage("begin_rendering", "give the pass a colour or a depth target"))?;
         targets.extent = extent;
         targets.shape = RenderingFormats::new(formats, depth_format, samples, desc.view_mask);
-        targets.area = PassArea::of(desc.area, extent)?;
-        targets.inputs.check(desc)?;
-        targets.rates = self.use_rates(desc, targets.area)?;
+        targets.area = PassArea::new(desc.area, extent)?;
+        targets.inputs.check_desc(desc)?;
+        targets.rates = self.use_shading_rate_attachment(desc, targets.area)?;
         Ok(targets)
     }
 
-    fn use_depth(
+    fn use_depth_target(
         &mut self,
-        target: &Target,
+        target: &PassTarget,
         attachment: &DepthAttachment,
-        targets: &mut Targets,
+        targets: &mut PassTargets,
     ) -> Result<()> {
         let texture = &target.texture;
         check_depth(texture, attachment)?;
-        if is_kept(texture, attachment) {
+        if is_loaded_or_stored(texture, attachment) {
             texture.check_not_transient()?;
         }
         let plain = if attachment.read_only { Use::depth_read() } else { Use::depth_target() };
         let used = targets.inputs.target_use(target, plain);
-        self.use_texture(texture, target.part(), used)?;
+        self.use_texture(texture, target.subresources(), used)?;
         targets.inputs.add_depth(target)?;
         let view = target.view()?;
         targets.depth = Some(depth_info(view, attachment).image_layout(vulkan_layout(used.layout)));
@@ -153,22 +153,23 @@ impl CommandBuffer {
         targets.stencil = texture.format.has_stencil().then(stencil);
         targets.read_only_depth = attachment.read_only;
         let Some(resolve) = &attachment.resolve else { return Ok(()) };
-        let to = self.target(resolve.texture, resolve.mip, resolve.layer, target.layers, &mut None)?;
+        let to =
+            self.checked_target(resolve.texture, resolve.mip, resolve.layer, target.layers, &mut None)?;
         self.use_depth_resolve(target, &to, resolve, [&mut targets.depth, &mut targets.stencil])
     }
 
     /// Finds a target and checks that all targets are equally large, with equally many samples.
-    fn target(
+    fn checked_target(
         &self,
         handle: TextureHandle,
         mip: u32,
         layer: u32,
         layers: PassLayers,
         size: &mut Option<([u32; 2], u32)>,
-    ) -> Result<Target> {
+    ) -> Result<PassTarget> {
         let texture = self.shared.store.textures.get(handle)?;
         texture.check_usage(TextureUsage::TARGET)?;
-        texture.check_target(mip, layer, layers.count())?;
+        texture.check_target(mip, layer, layers.layer_count())?;
         let own = (texture.mip_extent(mip), texture.image.samples);
         let first = *size.get_or_insert(own);
         if first != own {
@@ -178,13 +179,16 @@ impl CommandBuffer {
             );
             return Err(Error::usage(&texture.name, message));
         }
-        Ok(Target { texture, mip, layer, layers })
+        Ok(PassTarget { texture, mip, layer, layers })
     }
 }
 
 /// Fails where texels of the target are drawn to by an earlier one.
-fn check_apart(target: &Target, drawn: &mut Vec<(crate::barrier::ResourceId, Subresources)>) -> Result<()> {
-    let (id, texels) = (target.texture.image.id, target.texels());
+fn check_disjoint(
+    target: &PassTarget,
+    drawn: &mut Vec<(crate::barrier::ResourceId, Subresources)>,
+) -> Result<()> {
+    let (id, texels) = (target.texture.image.id, target.subresource_texels());
     if drawn.iter().any(|(other, part)| *other == id && part.intersection(texels).is_some()) {
         return Err(Error::usage(&target.texture.name, "the pass lists the colour target twice"));
     }
@@ -206,11 +210,12 @@ fn check_color(texture: &Texture, load: ColorLoadOp) -> Result<()> {
     if fits {
         return Ok(());
     }
-    let message = format!("{:?} is cleared with ColorLoadOp::{}", texture.format, clear_name(texture.format));
+    let message =
+        format!("{:?} is cleared with ColorLoadOp::{}", texture.format, clear_op_name(texture.format));
     Err(Error::usage(&texture.name, message))
 }
 
-fn clear_name(format: Format) -> &'static str {
+fn clear_op_name(format: Format) -> &'static str {
     match format.numeric_format() {
         NumericFormat::Float => "Clear",
         NumericFormat::Uint => "ClearUint",
@@ -219,7 +224,7 @@ fn clear_name(format: Format) -> &'static str {
 }
 
 /// Whether the pass needs what was in the target before it, or leaves something for after it.
-fn is_kept(texture: &Texture, attachment: &DepthAttachment) -> bool {
+fn is_loaded_or_stored(texture: &Texture, attachment: &DepthAttachment) -> bool {
     let stencil = attachment.stencil_store || attachment.stencil == StencilLoadOp::Load;
     let depth = attachment.store || attachment.load == DepthLoadOp::Load;
     depth || attachment.read_only || (texture.format.has_stencil() && stencil)
@@ -243,7 +248,7 @@ fn check_depth(texture: &Texture, attachment: &DepthAttachment) -> Result<()> {
 }
 
 fn color_info(
-    target: &Target,
+    target: &PassTarget,
     attachment: &ColorAttachment,
     used: Use,
 ) -> Result<vk::RenderingAttachmentInfo<'static>> {

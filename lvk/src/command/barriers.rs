@@ -3,11 +3,11 @@
 use std::sync::Arc;
 
 use super::CommandBuffer;
-use super::accesses::Uses;
+use super::accesses::CommandAccesses;
 use super::dependencies::Dependencies;
-use super::recording_state::Notes;
+use super::recording_state::RecordingState;
 use crate::barrier::{ResourceId, Stages, Subresources, Use};
-use crate::device_state::Shared;
+use crate::device_state::DeviceState;
 use crate::error::Result;
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::texture_desc::TextureUsage;
@@ -18,8 +18,8 @@ use crate::submit::emit_barriers::emit;
 impl CommandBuffer {
     /// The next command uses a buffer.
     pub(crate) fn use_buffer(&mut self, buffer: &Buffer, next: Use) {
-        let Notes { uses, host_reads, .. } = &mut **self.notes;
-        use_buffer(uses, host_reads, buffer, next);
+        let RecordingState { accesses, host_reads, .. } = &mut **self.state;
+        use_buffer(accesses, host_reads, buffer, next);
     }
 
     /// The next command uses a part of the image that a texture shows.
@@ -29,23 +29,23 @@ impl CommandBuffer {
         part: Subresources,
         next: Use,
     ) -> Result<()> {
-        let Notes { uses, found_textures, .. } = &mut **self.notes;
-        let row = found_textures.row(texture);
-        uses.texture(found_textures, row, part, next)
+        let RecordingState { accesses, texture_cache: found_textures, .. } = &mut **self.state;
+        let row = found_textures.index_of(texture);
+        accesses.add_texture(found_textures, row, part, next)
     }
 
     /// The next command's shaders trace rays in these stages.
-    pub(super) fn use_structures(&mut self, stages: Stages) {
-        let reads = structure_reads(&self.shared, self.recording.queue_index, stages);
-        reads.into_iter().for_each(|(id, read)| self.notes.uses.id(id, read));
+    pub(super) fn use_accel_structs(&mut self, stages: Stages) {
+        let reads = accel_struct_reads(&self.shared, self.recording.queue_index, stages);
+        reads.into_iter().for_each(|(id, read)| self.state.accesses.add_id(id, read));
     }
 
     /// The pass that begins sees what this command buffer has built: no barrier can be placed once it is open, and only
     /// then is a pipeline bound that may query rays.
-    pub(super) fn use_built_structures(&mut self) {
-        let reads = |stages| structure_reads(&self.shared, self.recording.queue_index, stages);
+    pub(super) fn use_built_accel_structs(&mut self) {
+        let reads = |stages| accel_struct_reads(&self.shared, self.recording.queue_index, stages);
         if let Some(stages) = self.shared.graphics_queries.waiting_stages(&self.recording.tracker, reads) {
-            self.use_structures(stages);
+            self.use_accel_structs(stages);
         }
     }
 
@@ -69,9 +69,9 @@ impl CommandBuffer {
         }
         for handle in deps.acceleration_structures {
             self.shared.store.accel_structs.get(*handle)?;
-            self.use_structures(stages);
+            self.use_accel_structs(stages);
         }
-        if deps.wait_for.is_empty() { Ok(()) } else { self.wait_for(deps.wait_for) }
+        if deps.wait_for.is_empty() { Ok(()) } else { self.wait_for_resource(deps.wait_for) }
     }
 
     /// The next command's shaders reach a part of each texture, which must have the usage.
@@ -84,12 +84,12 @@ impl CommandBuffer {
         part: impl Fn(&Texture) -> Subresources,
     ) -> Result<()> {
         let pool = &self.shared.store.textures;
-        let Notes { uses, found_textures: found, .. } = &mut **self.notes;
+        let RecordingState { accesses, texture_cache: found, .. } = &mut **self.state;
         for handle in handles {
-            let row = found.find(pool, *handle)?;
-            let texture = found.at(row);
+            let row = found.index_of_handle(pool, *handle)?;
+            let texture = found.object(row);
             texture.check_usage(usage)?;
-            uses.texture(found, row, part(texture), next)?;
+            accesses.add_texture(found, row, part(texture), next)?;
         }
         Ok(())
     }
@@ -98,37 +98,42 @@ impl CommandBuffer {
     #[inline(never)]
     fn use_buffers(&mut self, handles: &[BufferHandle], next: Use) -> Result<()> {
         let pool = &self.shared.store.buffers;
-        let Notes { uses, host_reads, found_buffers: found, .. } = &mut **self.notes;
+        let RecordingState { accesses, host_reads, buffer_cache: found, .. } = &mut **self.state;
         for handle in handles {
-            let row = found.find(pool, *handle)?;
-            use_buffer(uses, host_reads, found.at(row), next);
+            let row = found.index_of_handle(pool, *handle)?;
+            use_buffer(accesses, host_reads, found.object(row), next);
         }
         Ok(())
     }
 
     /// Records the barriers in front of the next command.
     #[inline(never)]
-    pub(super) fn flush(&mut self) {
+    pub(super) fn flush_barriers(&mut self) {
         self.end_rendering();
         let Recording { commands, tracker, images, .. } = &mut **self.recording;
-        let Notes { uses, found_textures, barriers, last_barrier, build_run, .. } = &mut **self.notes;
+        let RecordingState {
+            accesses, texture_cache: found_textures, barriers, last_barrier, build_run, ..
+        } = &mut **self.state;
         build_run.stop();
         barriers.clear();
-        uses.track(found_textures, tracker, images, barriers);
+        accesses.track(found_textures, tracker, images, barriers);
         emit(&self.shared.gpu, *commands, barriers, images, last_barrier);
     }
 
     /// In front of a command that runs shaders: makes what copies wrote readable, runs `gather`, then records the
     /// barriers; forgets the uses if gathering fails.
-    pub(super) fn flush_after(&mut self, gather: impl FnOnce(&mut Self) -> Result<()>) -> Result<()> {
-        self.settle();
+    pub(super) fn flush_barriers_after(
+        &mut self,
+        gather: impl FnOnce(&mut Self) -> Result<()>,
+    ) -> Result<()> {
+        self.make_visible();
         match gather(self) {
             Ok(()) => {
-                self.flush();
+                self.flush_barriers();
                 Ok(())
             }
             Err(error) => {
-                self.notes.uses.clear();
+                self.state.accesses.clear();
                 Err(error)
             }
         }
@@ -136,19 +141,19 @@ impl CommandBuffer {
 }
 
 /// A command uses a buffer; what it writes in mapped memory is for the host to read afterwards.
-fn use_buffer(uses: &mut Uses, host_reads: &mut Vec<ResourceId>, buffer: &Buffer, next: Use) {
-    uses.buffer(buffer, next);
+fn use_buffer(accesses: &mut CommandAccesses, host_reads: &mut Vec<ResourceId>, buffer: &Buffer, next: Use) {
+    accesses.add_buffer(buffer, next);
     if next.is_write() && buffer.memory.mapped() && !host_reads.contains(&buffer.id) {
         host_reads.push(buffer.id);
     }
 }
 
 /// Everything that shaders of `stages` read when they trace rays.
-fn structure_reads(shared: &Shared, queue_index: usize, stages: Stages) -> [(ResourceId, Use); 4] {
+fn accel_struct_reads(shared: &DeviceState, queue_index: usize, stages: Stages) -> [(ResourceId, Use); 4] {
     let read = match shared.gpu.caps.software_ray_query() {
         true => Use::software_traversal(stages),
         false => Use::accel_read(stages),
     };
-    let tables = (shared.tlas_tables, Use::shader_read(stages));
+    let tables = (shared.hit_tables_id, Use::shader_read(stages));
     [(shared.all_blas, read), (shared.new_blas[queue_index], read), (shared.all_tlas, read), tables]
 }

@@ -1,122 +1,11 @@
-//! The bindless set, pipelines and push constants of a command buffer.
+//! Binds pipelines and the bindless set, and records push constants.
 
-use std::ops::Range;
 use std::sync::Arc;
 
 use ash::vk;
 
 use super::CommandBuffer;
 use crate::error::{Error, Result};
-
-/// What is known of the push constants: which were pushed, and what the last bound pipeline wants.
-#[derive(Debug)]
-pub(super) struct PushConstants {
-    /// A bit for each 4 bytes: enough, as the layout has at most 256 bytes.
-    pushed: u64,
-    /// The bytes themselves, for the library to push again what it overwrote.
-    bytes: [u8; Self::MOST_BYTES],
-    wanted: Option<(Arc<str>, u32)>,
-    /// How many bytes make up the whole block of the last bound pipeline, padding included that the layout has; none where it
-    /// has none.
-    whole: Range<u32>,
-}
-
-impl Default for PushConstants {
-    fn default() -> Self {
-        Self { pushed: 0, bytes: [0; Self::MOST_BYTES], wanted: None, whole: 0..0 }
-    }
-}
-
-impl PushConstants {
-    /// As the layout of all pipelines has at most.
-    const MOST_BYTES: usize = 256;
-
-    /// Rust structs end on their alignment, GLSL blocks on their last member; 16 bytes is the largest alignment.
-    const TAIL_BYTES: u32 = 16;
-
-    /// Nothing is bound, and nothing pushed.
-    pub(super) fn clear(&mut self) {
-        if self.pushed != 0 {
-            self.pushed = 0;
-            self.bytes = [0; Self::MOST_BYTES];
-        }
-        self.wanted = None;
-        self.whole = 0..0;
-    }
-
-    /// A pipeline with a block of so many bytes is bound, of a layout with so many.
-    fn want(&mut self, pipeline: &Arc<str>, expected: u32, room: u32) {
-        self.wanted = Some((Arc::clone(pipeline), expected));
-        let most = expected.next_multiple_of(Self::TAIL_BYTES).min(room);
-        self.whole = if expected > 0 { expected..most + 1 } else { 0..0 };
-    }
-
-    /// Everything pushed so far, zero where nothing was.
-    pub(super) fn pushed_bytes(&self) -> &[u8] {
-        let words = u64::BITS - self.pushed.leading_zeros();
-        &self.bytes[..4 * words as usize]
-    }
-
-    #[inline]
-    fn keep(&mut self, offset: u32, bytes: &[u8]) {
-        let start = offset as usize;
-        let Some(kept) = self.bytes.get_mut(start..start + bytes.len()) else { return };
-        kept.copy_from_slice(bytes);
-        // Written only where it changes: draws ask for it right away.
-        let words = words(offset, bytes.len() as u32);
-        if self.pushed & words != words {
-            self.pushed |= words;
-        }
-    }
-
-    fn check(&self, offset: u32, size: u32) -> Result<()> {
-        let Some((pipeline, expected)) = &self.wanted else {
-            return Err(Error::usage("push_constants", "bind a pipeline first"));
-        };
-        let aligned = offset.is_multiple_of(4) && size.is_multiple_of(4) && size > 0;
-        let end = offset.checked_add(size);
-        let fits = end.is_some_and(|end| end <= expected.next_multiple_of(Self::TAIL_BYTES));
-        if aligned && fits && *expected > 0 {
-            return Ok(());
-        }
-        Err(Error::PushConstants { pipeline: pipeline.to_string(), expected: *expected, offset, size })
-    }
-
-    /// Fails if `bytes` are fewer than the bound pipeline's block.
-    fn check_whole(&self, bytes: usize) -> Result<()> {
-        match &self.wanted {
-            Some((pipeline, expected)) if bytes < *expected as usize => {
-                let size = bytes as u32;
-                Err(Error::PushConstants {
-                    pipeline: pipeline.to_string(),
-                    expected: *expected,
-                    offset: 0,
-                    size,
-                })
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// Fails if the pipeline reads bytes that were never pushed.
-    #[inline]
-    fn check_pushed(&self, pipeline: &str, expected: u32) -> Result<()> {
-        if 4 * self.pushed.trailing_ones() >= expected {
-            Ok(())
-        } else {
-            Err(self.missing(pipeline, expected))
-        }
-    }
-
-    /// Says how many bytes the pipeline reads and how many of them were pushed.
-    #[cold]
-    fn missing(&self, pipeline: &str, expected: u32) -> Error {
-        let pushed = 4 * (self.pushed & words(0, expected)).count_ones();
-        let message =
-            format!("its shaders read {expected} bytes of push constants, but {pushed} were pushed");
-        Error::usage(pipeline, message)
-    }
-}
 
 impl CommandBuffer {
     /// Sets the push constants of the pipeline bound last, for this and later pipelines.
@@ -126,26 +15,26 @@ impl CommandBuffer {
     pub fn push_constants<T: bytemuck::NoUninit>(&mut self, constants: &T) -> Result<()> {
         let bytes = bytemuck::bytes_of(constants);
         let size = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
-        if self.notes.push_constants.whole.contains(&size) && size.is_multiple_of(4) {
+        if self.state.push_constants.is_whole(size) {
             self.record_push(0, bytes);
             return Ok(());
         }
-        self.push_unlike_whole(bytes)
+        self.push_partial_block(bytes)
     }
 
     /// Pushes bytes that are not as many as the bound pipeline's block has, or says what is wrong with them.
     #[cold]
-    fn push_unlike_whole(&mut self, bytes: &[u8]) -> Result<()> {
-        self.notes.push_constants.check_whole(bytes.len())?;
+    fn push_partial_block(&mut self, bytes: &[u8]) -> Result<()> {
+        self.state.push_constants.check_whole(bytes.len())?;
         self.push_constant_bytes(0, bytes)
     }
 
     /// Sets part of the push constants: `bytes` from `offset` on, both multiples of 4.
     pub fn push_constant_bytes(&mut self, offset: u32, bytes: &[u8]) -> Result<()> {
         let size = u32::try_from(bytes.len()).unwrap_or(u32::MAX);
-        self.notes.push_constants.check(offset, size)?;
-        let room = self.shared.layout.push_constant_bytes.saturating_sub(offset) as usize;
-        self.record_push(offset, &bytes[..bytes.len().min(room)]);
+        self.state.push_constants.check_range(offset, size)?;
+        let layout_bytes = self.shared.layout.push_constant_bytes.saturating_sub(offset) as usize;
+        self.record_push(offset, &bytes[..bytes.len().min(layout_bytes)]);
         Ok(())
     }
 
@@ -159,11 +48,11 @@ impl CommandBuffer {
             let stages = vk::ShaderStageFlags::ALL;
             shared.gpu.device.cmd_push_constants(self.raw(), shared.layout.raw, stages, offset, bytes);
         }
-        self.notes.push_constants.keep(offset, bytes);
+        self.state.push_constants.store(offset, bytes);
     }
 
     /// Binds a pipeline, and the bindless set the first time at its bind point.
-    pub(super) fn bind(
+    pub(super) fn bind_pipeline(
         &mut self,
         point: vk::PipelineBindPoint,
         pipeline: vk::Pipeline,
@@ -174,72 +63,33 @@ impl CommandBuffer {
         // SAFETY: the pipeline and the set are alive and share one layout.
         unsafe {
             shared.gpu.device.cmd_bind_pipeline(raw, point, pipeline);
-            if !self.notes.sets_bound.contains(&point) {
+            if !self.state.sets_bound.contains(&point) {
                 let sets = [shared.bindless.set];
                 shared.gpu.device.cmd_bind_descriptor_sets(raw, point, shared.layout.raw, 0, &sets, &[]);
-                self.notes.sets_bound.push(point);
+                self.state.sets_bound.push(point);
             }
         }
-        self.notes.push_constants.want(name, push_constant_bytes, self.shared.layout.push_constant_bytes);
+        self.state.push_constants.expect_block(
+            name,
+            push_constant_bytes,
+            self.shared.layout.push_constant_bytes,
+        );
     }
 
-    /// Whether all these were pushed; see [`words`].
+    /// Whether all these were pushed; see [`word_mask`](super::push_constants::word_mask).
     #[inline]
     pub(super) fn has_pushed(&self, needed: u64) -> bool {
-        self.notes.push_constants.pushed & needed == needed
+        self.state.push_constants.has_pushed(needed)
     }
 
     /// Fails if a pipeline about to run reads bytes that were never pushed.
     #[inline]
     pub(super) fn check_pushed(&self, pipeline: &str, expected: u32) -> Result<()> {
-        self.notes.push_constants.check_pushed(pipeline, expected)
+        self.state.push_constants.check_pushed(pipeline, expected)
     }
 
     /// Says which of them were never pushed.
-    pub(super) fn missing_constants(&self, pipeline: &str, expected: u32) -> Error {
-        self.notes.push_constants.missing(pipeline, expected)
-    }
-}
-
-/// A bit for each 4 bytes of `size` from `offset` on, all multiples of 4.
-#[inline]
-pub(super) fn words(offset: u32, size: u32) -> u64 {
-    let below = |end: u32| u64::MAX.checked_shr(64_u32.saturating_sub(end / 4)).unwrap_or(0);
-    below(offset.saturating_add(size)) & !below(offset)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn bound(expected: u32) -> PushConstants {
-        PushConstants { wanted: Some(("p".into(), expected)), ..Default::default() }
-    }
-
-    #[test]
-    fn a_push_must_match_the_block_up_to_padding() {
-        assert!(bound(40).check(0, 40).is_ok());
-        assert!(bound(40).check(0, 48).is_ok());
-        assert!(bound(40).check(36, 4).is_ok());
-        assert!(bound(40).check(0, 36).is_ok());
-        assert!(matches!(bound(40).check_whole(36), Err(Error::PushConstants { expected: 40, .. })));
-        assert!(bound(40).check_whole(40).is_ok());
-        assert!(bound(40).check(0, 52).is_err());
-        assert!(bound(40).check(48, 4).is_err());
-        assert!(bound(40).check(0, 42).is_err());
-        assert!(bound(40).check(u32::MAX - 3, 4).is_err());
-        assert!(bound(0).check(0, 4).is_err());
-        assert!(PushConstants::default().check(0, 4).is_err());
-    }
-
-    #[test]
-    fn a_pipeline_does_not_run_on_constants_nobody_pushed() {
-        let mut constants = PushConstants { pushed: words(0, 16), ..Default::default() };
-        assert!(constants.check_pushed("p", 16).is_ok());
-        assert!(constants.check_pushed("p", 20).is_err());
-        constants.pushed |= words(20, 236);
-        assert!(constants.check_pushed("p", 256).unwrap_err().to_string().contains("but 252 were"));
-        constants.pushed |= words(16, 4);
-        assert!(constants.check_pushed("p", 256).is_ok());
+    pub(super) fn missing_constants_error(&self, pipeline: &str, expected: u32) -> Error {
+        self.state.push_constants.missing_error(pipeline, expected)
     }
 }

@@ -19,7 +19,7 @@ impl CommandBuffer {
         self.needs_compute("a dispatch")?;
         let pipeline = self.shared.store.compute_pipelines.get(pipeline)?;
         let point = vk::PipelineBindPoint::COMPUTE;
-        self.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
+        self.bind_pipeline(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
         self.compute = Some(pipeline);
         Ok(())
     }
@@ -29,7 +29,7 @@ impl CommandBuffer {
         let pipeline = self.ready_compute()?;
         check_groups(&pipeline.name, groups, self.shared.gpu.caps.limits.max_dispatch_groups)?;
         let ray_query = pipeline.ray_query;
-        self.flush_after(|cmd| cmd.use_compute(ray_query, dependencies))?;
+        self.flush_barriers_after(|cmd| cmd.use_compute(ray_query, dependencies))?;
         // SAFETY: a compute pipeline is bound and the counts are within the limits.
         unsafe { self.shared.gpu.device.cmd_dispatch(self.raw(), groups[0], groups[1], groups[2]) };
         Ok(())
@@ -48,7 +48,7 @@ impl CommandBuffer {
         let ray_query = self.ready_compute()?.ray_query;
         let buffer = self.shared.store.buffers.get(arguments)?;
         check_arguments(&buffer, offset, ARGUMENT_BYTES)?;
-        self.flush_after(|cmd| {
+        self.flush_barriers_after(|cmd| {
             cmd.use_buffer(&buffer, Use::indirect());
             cmd.use_compute(ray_query, dependencies)
         })?;
@@ -69,7 +69,7 @@ impl CommandBuffer {
     #[inline]
     fn use_compute(&mut self, ray_query: bool, dependencies: &Dependencies<'_>) -> Result<()> {
         if ray_query {
-            self.use_structures(Stages::COMPUTE);
+            self.use_accel_structs(Stages::COMPUTE);
         }
         self.use_dependencies(dependencies, Stages::COMPUTE)
     }

@@ -6,32 +6,32 @@ use ash::vk;
 
 use super::CommandBuffer;
 use crate::accel::AccelStruct;
-use crate::accel::blas::BlasBody;
-use crate::accel::compaction::SizeQuery;
+use crate::accel::blas::BlasStructures;
+use crate::accel::compaction::CompactedSizeQuery;
 use crate::accel::primitive_map::PrimitiveMap;
-use crate::accel::raw_accel_struct::RawStructure;
+use crate::accel::raw_accel_struct::RawAccelStruct;
 use crate::barrier::{Stages, Use};
-use crate::device_state::Garbage;
+use crate::device_state::DeferredFree;
 use crate::error::Result;
 use crate::resource::{Buffer, QueryPool};
 
 impl CommandBuffer {
     /// Asks how large each target would be, compacted. Answers arrive in the query's pool.
-    pub(crate) fn query_compacted_sizes(&mut self, query: &Arc<SizeQuery>) -> Result<()> {
+    pub(crate) fn query_compacted_sizes(&mut self, query: &Arc<CompactedSizeQuery>) -> Result<()> {
         for (target, first) in &query.targets {
-            let body = target.blas()?.body();
+            let body = target.blas()?.structures();
             let ty = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
-            self.write_sizes(target, &body, &query.pool, *first, ty)?;
+            self.write_size_properties(target, &body, &query.pool, *first, ty)?;
         }
-        self.notes.size_queries.push(Arc::clone(query));
+        self.state.size_queries.push(Arc::clone(query));
         Ok(())
     }
 
     /// Writes a property of each part into the pool (`vkCmdWriteAccelerationStructuresPropertiesKHR`).
-    pub(crate) fn write_sizes(
+    pub(crate) fn write_size_properties(
         &mut self,
         target: &AccelStruct,
-        body: &BlasBody,
+        body: &BlasStructures,
         pool: &QueryPool,
         first: u32,
         ty: vk::QueryType,
@@ -40,8 +40,8 @@ impl CommandBuffer {
         let ext = shared.gpu.accel_functions()?;
         pool.check_range(first, body.structures.len() as u32)?;
         let structures: Vec<_> = body.structures.iter().map(|part| part.raw).collect();
-        self.notes.uses.id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
-        self.flush();
+        self.state.accesses.add_id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
+        self.flush_barriers();
         // SAFETY: the structures are alive and built; the queries exist and were reset when the pool was made.
         unsafe {
             ext.cmd_write_acceleration_structures_properties(self.raw(), &structures, ty, pool.raw, first);
@@ -53,13 +53,13 @@ impl CommandBuffer {
     pub(crate) fn copy_compacted(
         &mut self,
         target: &AccelStruct,
-        from: &BlasBody,
-        to: &BlasBody,
+        from: &BlasStructures,
+        to: &BlasStructures,
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
         let ext = shared.gpu.accel_functions()?;
-        self.use_copy(target);
-        self.flush();
+        self.use_copied_accel_struct(target);
+        self.flush_barriers();
         for (source, copy) in from.structures.iter().zip(&to.structures) {
             let info = vk::CopyAccelerationStructureInfoKHR::default()
                 .src(source.raw)
@@ -68,8 +68,8 @@ impl CommandBuffer {
             // SAFETY: the source was built to be compacted, and the copy has the size the GPU answered.
             unsafe { ext.cmd_copy_acceleration_structure(self.raw(), &info) };
         }
-        if !is_ever_built(target, to) {
-            self.retire_inputs(target)?;
+        if !may_be_rebuilt(target, to) {
+            self.free_build_inputs(target)?;
         }
         Ok(())
     }
@@ -79,15 +79,15 @@ impl CommandBuffer {
     pub(crate) fn serialize_parts(
         &mut self,
         target: &AccelStruct,
-        structures: &[RawStructure],
+        structures: &[RawAccelStruct],
         buffer: &Buffer,
         addresses: &[u64],
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
         let ext = shared.gpu.accel_functions()?;
-        self.notes.uses.id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
+        self.state.accesses.add_id(target.id, Use::accel_read(Stages::ACCEL_BUILD));
         self.use_buffer(buffer, Use::accel_to_memory());
-        self.flush();
+        self.flush_barriers();
         for (part, address) in structures.iter().zip(addresses) {
             let info = vk::CopyAccelerationStructureToMemoryInfoKHR::default()
                 .src(part.raw)
@@ -113,10 +113,10 @@ impl CommandBuffer {
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
         let ext = shared.gpu.accel_functions()?;
-        let body = target.blas()?.body();
-        self.use_copy(target);
+        let body = target.blas()?.structures();
+        self.use_copied_accel_struct(target);
         self.use_buffer(buffer, Use::accel_from_memory());
-        self.flush();
+        self.flush_barriers();
         for (part, address) in body.structures.iter().skip(first).zip(addresses) {
             let info = vk::CopyMemoryToAccelerationStructureInfoKHR::default()
                 .src(vk::DeviceOrHostAddressConstKHR { device_address: *address })
@@ -130,29 +130,29 @@ impl CommandBuffer {
 
     /// Readies a structure whose parts were all made from bytes for what may come.
     pub(crate) fn prepare_deserialized(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
-        let body = target.blas()?.body();
-        if is_ever_built(target, &body) {
+        let body = target.blas()?.structures();
+        if may_be_rebuilt(target, &body) {
             // A refit reads the same indices as the build did.
             return self.gather_inputs(std::slice::from_ref(target), &[false]);
         }
-        self.retire_inputs(target)
+        self.free_build_inputs(target)
     }
 
     /// Frees what only builds read.
-    fn retire_inputs(&self, target: &AccelStruct) -> Result<()> {
+    fn free_build_inputs(&self, target: &AccelStruct) -> Result<()> {
         let maps = target.blas()?.parts.iter().filter_map(|part| part.map.as_ref());
-        maps.filter_map(PrimitiveMap::take_inputs)
-            .for_each(|inputs| self.shared.retire(Garbage::Buffer(inputs)));
+        maps.filter_map(PrimitiveMap::take_gathered_inputs)
+            .for_each(|inputs| self.shared.free_later(DeferredFree::Buffer(inputs)));
         Ok(())
     }
 
-    fn use_copy(&mut self, target: &AccelStruct) {
-        self.notes.uses.id(target.id, Use::accel_build_write());
-        self.notes.uses.accumulate(self.shared.all_blas, Use::accel_build_write());
+    fn use_copied_accel_struct(&mut self, target: &AccelStruct) {
+        self.state.accesses.add_id(target.id, Use::accel_build_write());
+        self.state.accesses.add_accumulating(self.shared.all_blas, Use::accel_build_write());
     }
 }
 
 /// Whether another build or a refit of the body can come.
-fn is_ever_built(target: &AccelStruct, body: &BlasBody) -> bool {
+fn may_be_rebuilt(target: &AccelStruct, body: &BlasStructures) -> bool {
     body.rebuildable || target.check_refit().is_ok()
 }

@@ -17,8 +17,8 @@ impl RenderPass<'_> {
     /// constants, and while a query of [`PipelineStatistics`](crate::QueryKind::PipelineStatistics) is open;
     /// [`LimitExceeded`](crate::Error::LimitExceeded) for more groups than [`MeshLimits`] allows.
     pub fn draw_mesh_tasks(&mut self, groups: [u32; 3]) -> Result<()> {
-        self.ready_mesh()?;
-        let pipeline = self.bound("draw_mesh_tasks")?;
+        self.check_mesh_draw()?;
+        let pipeline = self.bound_pipeline("draw_mesh_tasks")?;
         check_groups(&pipeline.name, groups, pipeline.front_end, &self.cmd.shared.gpu.caps.limits.mesh)?;
         let (ext, [x, y, z]) = (self.cmd.shared.gpu.mesh_functions()?, groups);
         // SAFETY: a mesh pipeline is bound with its push constants, and the counts are within the limits.
@@ -37,9 +37,9 @@ impl RenderPass<'_> {
         draw_count: u32,
         stride: u32,
     ) -> Result<()> {
-        self.ready_mesh()?;
+        self.check_mesh_draw()?;
         let size = size_of::<vk::DrawMeshTasksIndirectCommandEXT>() as u64;
-        let buffer = self.indirect(arguments, offset, draw_count, stride, size)?;
+        let buffer = self.indirect_buffer(arguments, offset, draw_count, stride, size)?;
         let (ext, raw) = (self.cmd.shared.gpu.mesh_functions()?, self.cmd.raw());
         for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
             // SAFETY: as in `draw_mesh_tasks`, and the arguments lie inside the buffer.

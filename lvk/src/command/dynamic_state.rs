@@ -15,12 +15,12 @@ use crate::pipeline::rasterization::DepthBias;
 pub(super) struct DynamicState {
     stencil_reference: [u8; 2],
     blend_constants: [f32; 4],
-    held: Values,
+    current: DynamicValues,
 }
 
 /// Values by state; `None` for one that is not to be set, or is not known.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Values {
+struct DynamicValues {
     depth: Option<DepthState>,
     bias: Option<DepthBias>,
     stencil_reference: Option<[u8; 2]>,
@@ -31,32 +31,32 @@ struct Values {
 impl DynamicState {
     /// Whether draws write depth as things stand.
     pub(super) fn writes_depth(&self) -> bool {
-        self.held.depth.is_some_and(|state| state.write)
+        self.current.depth.is_some_and(|state| state.write)
     }
 
     /// What has to be set for a pipeline that leaves `state` to the pass. What a pipeline does not leave is its own, and
     /// forgotten behind it.
-    fn bind(&mut self, state: &PassState) -> Values {
-        let wanted = Values {
+    fn values_for_pipeline(&mut self, state: &PassState) -> DynamicValues {
+        let wanted = DynamicValues {
             depth: state.depth,
             bias: state.bias,
             stencil_reference: state.stencil.then_some(self.stencil_reference),
             blend_constants: state.blend_constants.then_some(self.blend_constants),
             shading_rate: state.shading_rate,
         };
-        let held = std::mem::replace(&mut self.held, wanted);
-        Values {
-            depth: changed(wanted.depth, held.depth),
-            bias: changed(wanted.bias, held.bias),
-            stencil_reference: changed(wanted.stencil_reference, held.stencil_reference),
-            blend_constants: changed(wanted.blend_constants, held.blend_constants),
-            shading_rate: changed(wanted.shading_rate, held.shading_rate),
+        let held = std::mem::replace(&mut self.current, wanted);
+        DynamicValues {
+            depth: if_changed(wanted.depth, held.depth),
+            bias: if_changed(wanted.bias, held.bias),
+            stencil_reference: if_changed(wanted.stencil_reference, held.stencil_reference),
+            blend_constants: if_changed(wanted.blend_constants, held.blend_constants),
+            shading_rate: if_changed(wanted.shading_rate, held.shading_rate),
         }
     }
 }
 
 /// The value where it is to be set and another one is held.
-fn changed<T: PartialEq>(wanted: Option<T>, held: Option<T>) -> Option<T> {
+fn if_changed<T: PartialEq>(wanted: Option<T>, held: Option<T>) -> Option<T> {
     if wanted == held { None } else { wanted }
 }
 
@@ -65,9 +65,9 @@ impl RenderPass<'_> {
     /// pipelines of the pass (`vkCmdSetStencilReference`). 0 at the begin of a pass.
     pub fn stencil_reference(&mut self, front: u8, back: u8) {
         self.dynamic.stencil_reference = [front, back];
-        if self.dynamic.held.stencil_reference.is_some() {
-            self.dynamic.held.stencil_reference = Some([front, back]);
-            self.set(&Values { stencil_reference: Some([front, back]), ..Default::default() });
+        if self.dynamic.current.stencil_reference.is_some() {
+            self.dynamic.current.stencil_reference = Some([front, back]);
+            self.set_values(&DynamicValues { stencil_reference: Some([front, back]), ..Default::default() });
         }
     }
 
@@ -75,9 +75,9 @@ impl RenderPass<'_> {
     /// of the pass (`vkCmdSetBlendConstants`). 0 at the begin of a pass.
     pub fn blend_constants(&mut self, constants: [f32; 4]) {
         self.dynamic.blend_constants = constants;
-        if self.dynamic.held.blend_constants.is_some() {
-            self.dynamic.held.blend_constants = Some(constants);
-            self.set(&Values { blend_constants: Some(constants), ..Default::default() });
+        if self.dynamic.current.blend_constants.is_some() {
+            self.dynamic.current.blend_constants = Some(constants);
+            self.set_values(&DynamicValues { blend_constants: Some(constants), ..Default::default() });
         }
     }
 
@@ -88,19 +88,19 @@ impl RenderPass<'_> {
     /// [`InvalidUsage`](Error::InvalidUsage) unless a pipeline with a depth test is bound, and for writes in a pass whose
     /// depth target is read-only.
     pub fn depth_state(&mut self, state: DepthState) -> Result<()> {
-        let pipeline = self.bound("depth_state")?;
+        let pipeline = self.bound_pipeline("depth_state")?;
         if pipeline.pass_state.depth.is_none() {
             return Err(Error::usage(&*pipeline.name, "it has no depth test to replace; create it with one"));
         }
         if state.write && self.targets.read_only_depth {
-            return Err(Error::usage(&*pipeline.name, WRITES_READ_ONLY));
+            return Err(Error::usage(&*pipeline.name, READ_ONLY_DEPTH_ERROR));
         }
         if state.write {
             self.write_depth()?;
         }
-        let values = Values { depth: Some(state), ..Default::default() };
-        self.dynamic.held.depth = values.depth;
-        self.set(&values);
+        let values = DynamicValues { depth: Some(state), ..Default::default() };
+        self.dynamic.current.depth = values.depth;
+        self.set_values(&values);
         Ok(())
     }
 
@@ -111,7 +111,7 @@ impl RenderPass<'_> {
     /// numbers; [`Unsupported`](Error::Unsupported) for a bound without
     /// [`OptionalFeature::DepthBiasClamp`](crate::OptionalFeature::DepthBiasClamp).
     pub fn depth_bias(&mut self, bias: DepthBias) -> Result<()> {
-        let pipeline = self.bound("depth_bias")?;
+        let pipeline = self.bound_pipeline("depth_bias")?;
         if pipeline.pass_state.bias.is_none() || !bias.is_finite() {
             let message =
                 format!("{bias:?} needs a pipeline that was created with a depth bias, and finite numbers");
@@ -120,28 +120,28 @@ impl RenderPass<'_> {
         if bias.clamp != 0.0 {
             self.cmd.shared.gpu.require(OptionalFeature::DepthBiasClamp, "a depth bias with a bound")?;
         }
-        let values = Values { bias: Some(bias), ..Default::default() };
-        self.dynamic.held.bias = values.bias;
-        self.set(&values);
+        let values = DynamicValues { bias: Some(bias), ..Default::default() };
+        self.dynamic.current.bias = values.bias;
+        self.set_values(&values);
         Ok(())
     }
 
     /// The rate of the draws that follow, which the device has.
     pub(super) fn set_shading_rate(&mut self, rate: ShadingRate) {
-        let values = Values { shading_rate: Some(rate), ..Default::default() };
-        self.dynamic.held.shading_rate = values.shading_rate;
-        self.set(&values);
+        let values = DynamicValues { shading_rate: Some(rate), ..Default::default() };
+        self.dynamic.current.shading_rate = values.shading_rate;
+        self.set_values(&values);
     }
 
     /// Sets what the pipeline that was bound now leaves to the pass.
-    pub(super) fn set_state_of(&mut self, state: &PassState) {
-        let values = self.dynamic.bind(state);
-        if values != Values::default() {
-            self.set(&values);
+    pub(super) fn set_pipeline_state(&mut self, state: &PassState) {
+        let values = self.dynamic.values_for_pipeline(state);
+        if values != DynamicValues::default() {
+            self.set_values(&values);
         }
     }
 
-    fn set(&self, values: &Values) {
+    fn set_values(&self, values: &DynamicValues) {
         let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
         // SAFETY: the command buffer is being recorded, and the device has each state: those of depth are core, and what
         // needs a feature was refused without it.
@@ -169,7 +169,7 @@ impl RenderPass<'_> {
 }
 
 /// For pipelines in passes whose depth target is read-only.
-pub(super) const WRITES_READ_ONLY: &str =
+pub(super) const READ_ONLY_DEPTH_ERROR: &str =
     "it writes depth or stencil, but the depth target of the pass is read-only; turn the writes off";
 
 #[cfg(test)]
@@ -199,10 +199,10 @@ mod tests {
         fn every_pipeline_finds_what_it_leaves_to_the_pass(
             binds in prop::collection::vec((state(), 0..3_u8), 1..12)
         ) {
-            let (mut found, mut vulkan) = (DynamicState::default(), Values::default());
+            let (mut found, mut vulkan) = (DynamicState::default(), DynamicValues::default());
             for (state, reference) in binds {
                 found.stencil_reference = [reference; 2];
-                let set = found.bind(&state);
+                let set = found.values_for_pipeline(&state);
                 vulkan.depth = set.depth.or(vulkan.depth.filter(|_| state.depth.is_some()));
                 vulkan.bias = set.bias.or(vulkan.bias.filter(|_| state.bias.is_some()));
                 vulkan.stencil_reference =
@@ -224,9 +224,9 @@ mod tests {
     fn what_is_held_is_not_set_again() {
         let mut dynamic = DynamicState::default();
         let state = PassState { stencil: true, blend_constants: true, ..Default::default() };
-        assert_ne!(dynamic.bind(&state), Values::default());
-        assert_eq!(dynamic.bind(&state), Values::default());
-        dynamic.bind(&PassState::default());
-        assert_ne!(dynamic.bind(&state), Values::default());
+        assert_ne!(dynamic.values_for_pipeline(&state), DynamicValues::default());
+        assert_eq!(dynamic.values_for_pipeline(&state), DynamicValues::default());
+        dynamic.values_for_pipeline(&PassState::default());
+        assert_ne!(dynamic.values_for_pipeline(&state), DynamicValues::default());
     }
 }

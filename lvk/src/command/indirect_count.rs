@@ -40,7 +40,7 @@ impl RenderPass<'_> {
     pub fn draw_indirect_count(&mut self, draws: &IndirectCount) -> Result<()> {
         self.check_draw()?;
         let command = self.cmd.shared.gpu.device.fp_v1_2().cmd_draw_indirect_count;
-        self.draw_counted(draws, size_of::<vk::DrawIndirectCommand>(), command)
+        self.draw_indirect_count_with(draws, size_of::<vk::DrawIndirectCommand>(), command)
     }
 
     /// As [`draw_indexed_indirect`](Self::draw_indexed_indirect), with the number of draws from a buffer
@@ -51,9 +51,9 @@ impl RenderPass<'_> {
     /// [`draw_indirect_count`](Self::draw_indirect_count).
     pub fn draw_indexed_indirect_count(&mut self, draws: &IndirectCount) -> Result<()> {
         self.check_draw()?;
-        self.bound_indices()?;
+        self.bound_index_buffer()?;
         let command = self.cmd.shared.gpu.device.fp_v1_2().cmd_draw_indexed_indirect_count;
-        self.draw_counted(draws, size_of::<vk::DrawIndexedIndirectCommand>(), command)
+        self.draw_indirect_count_with(draws, size_of::<vk::DrawIndexedIndirectCommand>(), command)
     }
 
     /// As [`draw_mesh_tasks_indirect`](Self::draw_mesh_tasks_indirect), with the number of draws from a buffer
@@ -63,19 +63,19 @@ impl RenderPass<'_> {
     /// Those of both [`draw_mesh_tasks_indirect`](Self::draw_mesh_tasks_indirect) and
     /// [`draw_indirect_count`](Self::draw_indirect_count).
     pub fn draw_mesh_tasks_indirect_count(&mut self, draws: &IndirectCount) -> Result<()> {
-        self.ready_mesh()?;
+        self.check_mesh_draw()?;
         let command = self.cmd.shared.gpu.mesh_functions()?.fp().cmd_draw_mesh_tasks_indirect_count_ext;
-        self.draw_counted(draws, size_of::<vk::DrawMeshTasksIndirectCommandEXT>(), command)
+        self.draw_indirect_count_with(draws, size_of::<vk::DrawMeshTasksIndirectCommandEXT>(), command)
     }
 
     /// Records one of the three, which all take the same, for arguments of `size` bytes a draw.
-    fn draw_counted(
+    fn draw_indirect_count_with(
         &mut self,
         draws: &IndirectCount,
         size: usize,
         command: vk::PFN_vkCmdDrawIndirectCount,
     ) -> Result<()> {
-        let [arguments, count] = self.counted(draws, size as u64)?;
+        let [arguments, count] = self.indirect_count_buffers(draws, size as u64)?;
         let IndirectCount { offset, stride, count_offset, max_draws, .. } = *draws;
         // SAFETY: the pass is ready for such a draw, as in `draw`, and the arguments and their number lie inside the buffers.
         unsafe {
@@ -85,7 +85,7 @@ impl RenderPass<'_> {
     }
 
     /// The buffers of arguments and of their number, which the pass reads.
-    fn counted(&mut self, draws: &IndirectCount, size: u64) -> Result<[Arc<Buffer>; 2]> {
+    fn indirect_count_buffers(&mut self, draws: &IndirectCount, size: u64) -> Result<[Arc<Buffer>; 2]> {
         let gpu = &self.cmd.shared.gpu;
         gpu.require(OptionalFeature::DrawIndirectCount, "a number of draws from a buffer")?;
         let most = gpu.caps.limits.max_indirect_draws;
@@ -93,8 +93,8 @@ impl RenderPass<'_> {
         check_limit(&count.name, "draw count", draws.max_draws.into(), most.into())?;
         check_arguments(&count, draws.count_offset, size_of::<u32>() as u64)?;
         let IndirectCount { arguments, offset, max_draws, stride, .. } = *draws;
-        let arguments = self.indirect(arguments, offset, max_draws, stride, size)?;
-        self.read_inside(&count, Use::indirect())?;
+        let arguments = self.indirect_buffer(arguments, offset, max_draws, stride, size)?;
+        self.read_in_pass(&count, Use::indirect())?;
         Ok([arguments, count])
     }
 }

@@ -6,13 +6,13 @@ use ash::vk;
 
 use super::CommandBuffer;
 use crate::accel::AccelStruct;
-use crate::accel::blas::{Blas, PartShape};
+use crate::accel::blas::{Blas, BlasPart};
 use crate::accel::geometry::BlasGeometry;
 use crate::accel::primitive_map::PrimitiveMap;
 use crate::barrier::{Stages, Use};
 use crate::error::Result;
 use crate::format::IndexFormat;
-use crate::kernels::{GatherPush, Kernel, groups};
+use crate::kernels::{GatherPushConstants, Kernel, workgroup_counts};
 use crate::pipeline::ComputePipeline;
 
 const KIND_NO_INDICES: u32 = 0;
@@ -26,16 +26,24 @@ impl CommandBuffer {
     pub(super) fn gather_inputs(&mut self, structures: &[Arc<AccelStruct>], refits: &[bool]) -> Result<()> {
         let mut runs = Vec::new();
         for (target, refit) in structures.iter().zip(refits) {
-            self.plan_gathers(target, *refit, &mut runs).inspect_err(|_| self.notes.uses.clear())?;
+            self.plan_gathers(target, *refit, &mut runs).inspect_err(|_| self.state.accesses.clear())?;
         }
         if runs.is_empty() {
             return Ok(());
         }
-        self.flush();
-        self.run_kernel(Kernel::Gather, runs.iter().map(|push| (bytemuck::bytes_of(push), push.count)))
+        self.flush_barriers();
+        self.dispatch_kernel_runs(
+            Kernel::Gather,
+            runs.iter().map(|push| (bytemuck::bytes_of(push), push.count)),
+        )
     }
 
-    fn plan_gathers(&mut self, target: &AccelStruct, refit: bool, runs: &mut Vec<GatherPush>) -> Result<()> {
+    fn plan_gathers(
+        &mut self,
+        target: &AccelStruct,
+        refit: bool,
+        runs: &mut Vec<GatherPushConstants>,
+    ) -> Result<()> {
         let blas = target.blas()?;
         for part in &blas.parts {
             if let Some(map) = &part.map {
@@ -48,29 +56,29 @@ impl CommandBuffer {
     fn plan_gather(
         &mut self,
         blas: &Blas,
-        part: &PartShape,
+        part: &BlasPart,
         map: &PrimitiveMap,
         refit: bool,
-        runs: &mut Vec<GatherPush>,
+        runs: &mut Vec<GatherPushConstants>,
     ) -> Result<()> {
-        let Some(inputs) = map.inputs() else { return Ok(()) };
+        let Some(inputs) = map.gathered_inputs() else { return Ok(()) };
         let geometries = blas.geometries.iter().zip(&part.counts).enumerate();
         for (index, (geometry, count)) in geometries.filter(|(_, (_, count))| **count > 0) {
-            if refit && !geometry.is_boxes() {
+            if refit && !geometry.is_aabbs() {
                 continue;
             }
             let source = self.gather_source(geometry)?;
             self.use_buffer(&map.table, Use::shader_read(Stages::COMPUTE));
             self.use_buffer(&inputs, Use::shader_write(Stages::COMPUTE));
-            let (numbers, gathered) = (map.numbers_address(index), map.input_address(index));
-            runs.push(GatherPush { numbers, gathered, count: *count, ..source });
+            let (numbers, gathered) = (map.primitive_ids_address(index), map.input_address(index));
+            runs.push(GatherPushConstants { numbers, gathered, count: *count, ..source });
         }
         Ok(())
     }
 
     /// Where the inputs of a geometry lie.
-    fn gather_source(&mut self, geometry: &BlasGeometry) -> Result<GatherPush> {
-        let push = |source: u64, kind, box_stride| GatherPush {
+    fn gather_source(&mut self, geometry: &BlasGeometry) -> Result<GatherPushConstants> {
+        let push = |source: u64, kind, box_stride| GatherPushConstants {
             source: source & !3,
             kind,
             odd_half: u32::from(source & 2 != 0),
@@ -98,7 +106,7 @@ impl CommandBuffer {
 
     /// Runs a kernel several times, each with its push constants and number of invocations; barriers are in place.
     /// Afterwards the caller's pipeline and push constants are as before.
-    pub(super) fn run_kernel<'a>(
+    pub(super) fn dispatch_kernel_runs<'a>(
         &mut self,
         kernel: Kernel,
         runs: impl Iterator<Item = (&'a [u8], u32)>,
@@ -106,7 +114,7 @@ impl CommandBuffer {
         let pipeline = self.kernel_pipeline(kernel)?;
         let mut unbound = Some(&pipeline);
         for (push, invocations) in runs {
-            self.dispatch_kernel(unbound.take(), push, groups(invocations));
+            self.dispatch_kernel(unbound.take(), push, workgroup_counts(invocations));
         }
         self.restore_compute();
         Ok(())
@@ -115,7 +123,7 @@ impl CommandBuffer {
     /// The pipeline of a kernel.
     pub(super) fn kernel_pipeline(&self, kernel: Kernel) -> Result<Arc<ComputePipeline>> {
         let shared = &self.shared;
-        shared.kernels.get(&shared.gpu, &shared.layout, shared.pipeline_base().cache, kernel)
+        shared.kernels.pipeline_of(&shared.gpu, &shared.layout, shared.pipeline_base().cache, kernel)
     }
 
     /// Runs a kernel that is bound, or is to be bound first. Barriers are in place;
@@ -147,7 +155,7 @@ impl CommandBuffer {
             if let Some(own) = &self.compute {
                 device.cmd_bind_pipeline(raw, vk::PipelineBindPoint::COMPUTE, own.raw);
             }
-            let pushed = self.notes.push_constants.pushed_bytes();
+            let pushed = self.state.push_constants.pushed_bytes();
             if !pushed.is_empty() {
                 let stages = vk::ShaderStageFlags::ALL;
                 device.cmd_push_constants(raw, self.shared.layout.raw, stages, 0, pushed);

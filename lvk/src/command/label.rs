@@ -9,7 +9,7 @@ impl CommandBuffer {
     /// is submitted is closed then.
     pub fn push_label(&mut self, name: &str) {
         self.shared.gpu.begin_label(self.raw(), name);
-        self.stamp(Some(name));
+        self.write_label_timestamp(Some(name));
         self.open_labels += 1;
     }
 
@@ -26,14 +26,14 @@ impl CommandBuffer {
     /// Closes labels until so many are open.
     pub(super) fn pop_labels(&mut self, left: u32) {
         while self.open_labels > left {
-            self.stamp(None);
+            self.write_label_timestamp(None);
             self.shared.gpu.end_label(self.raw());
             self.open_labels -= 1;
         }
     }
 
     /// Stamps the begin of a scope or the end of the innermost, if the command buffer is profiled.
-    pub(super) fn stamp(&mut self, name: Option<&str>) {
+    pub(super) fn write_label_timestamp(&mut self, name: Option<&str>) {
         if let Some(scopes) = &mut self.scopes {
             self.shared.profiler.stamp(scopes, self.recording.commands, name, self.views);
         }

@@ -3,7 +3,7 @@
 use ash::vk;
 
 use super::CommandBuffer;
-use super::attachments::{Target, Targets};
+use super::attachments::{PassTarget, PassTargets};
 use super::render_pass::RenderPass;
 use super::render_pass_desc::RenderPassDesc;
 use crate::barrier::{Layout, Use};
@@ -19,25 +19,25 @@ use crate::submit::emit_barriers::vulkan_layout as raw_layout;
 
 /// The targets of a pass that its own fragment shaders can read.
 #[derive(Default)]
-pub(super) struct PassInputs {
+pub(super) struct PassInputAttachments {
     /// Whether the pass was begun for it.
-    pub(super) on: bool,
+    pub(super) is_enabled: bool,
     views: Vec<(InputAttachment, vk::ImageView)>,
     mask: InputAttachmentMask,
 }
 
-impl PassInputs {
+impl PassInputAttachments {
     /// None of them yet.
-    pub(super) fn of(gpu: &Gpu, desc: &RenderPassDesc<'_>) -> Result<Self> {
+    pub(super) fn new(gpu: &Gpu, desc: &RenderPassDesc<'_>) -> Result<Self> {
         if desc.local_read {
             let name = if desc.debug_name.is_empty() { "without a name" } else { desc.debug_name };
             gpu.require(OptionalFeature::LocalRead, &format!("local_read of the pass '{name}'"))?;
         }
-        Ok(Self { on: desc.local_read, ..Self::default() })
+        Ok(Self { is_enabled: desc.local_read, ..Self::default() })
     }
 
     /// How the pass uses a target, where it would use it as `plain` without anybody reading it.
-    pub(super) fn target_use(&self, target: &Target, plain: Use) -> Use {
+    pub(super) fn target_use(&self, target: &PassTarget, plain: Use) -> Use {
         if !self.includes(target) {
             return plain;
         }
@@ -46,38 +46,41 @@ impl PassInputs {
     }
 
     /// Whether shaders can read the target.
-    fn includes(&self, target: &Target) -> bool {
-        self.on && target.texture.usage.contains(TextureUsage::INPUT)
+    fn includes(&self, target: &PassTarget) -> bool {
+        self.is_enabled && target.texture.usage.contains(TextureUsage::INPUT)
     }
 
     /// The pass draws to this colour target.
-    pub(super) fn add_color(&mut self, place: u32, target: &Target) -> Result<()> {
+    pub(super) fn add_color(&mut self, place: u32, target: &PassTarget) -> Result<()> {
         if self.includes(target) {
-            self.add(InputAttachment::Color(place), target.view()?);
+            self.write_descriptor(InputAttachment::Color(place), target.view()?);
         }
         Ok(())
     }
 
     /// The pass draws to this depth target, or only tests it.
-    pub(super) fn add_depth(&mut self, target: &Target) -> Result<()> {
+    pub(super) fn add_depth(&mut self, target: &PassTarget) -> Result<()> {
         if !self.includes(target) {
             return Ok(());
         }
-        self.add(InputAttachment::Depth, target.input_view(vk::ImageAspectFlags::DEPTH)?);
+        self.write_descriptor(InputAttachment::Depth, target.input_view(vk::ImageAspectFlags::DEPTH)?);
         if target.texture.format.has_stencil() {
-            self.add(InputAttachment::Stencil, target.input_view(vk::ImageAspectFlags::STENCIL)?);
+            self.write_descriptor(
+                InputAttachment::Stencil,
+                target.input_view(vk::ImageAspectFlags::STENCIL)?,
+            );
         }
         Ok(())
     }
 
-    fn add(&mut self, input: InputAttachment, view: vk::ImageView) {
+    fn write_descriptor(&mut self, input: InputAttachment, view: vk::ImageView) {
         self.views.push((input, view));
         self.mask.insert(input);
     }
 
     /// Fails where the pass was begun for nothing.
-    pub(super) fn check(&self, desc: &RenderPassDesc<'_>) -> Result<()> {
-        if !self.on || !self.mask.is_empty() {
+    pub(super) fn check_desc(&self, desc: &RenderPassDesc<'_>) -> Result<()> {
+        if !self.is_enabled || !self.mask.is_empty() {
             return Ok(());
         }
         let name = if desc.debug_name.is_empty() { "begin_rendering" } else { desc.debug_name };
@@ -89,13 +92,13 @@ impl PassInputs {
     /// Fails unless the pass has what a pipeline reads.
     pub(super) fn check_reads(&self, pipeline: &RenderPipeline) -> Result<()> {
         let missing = pipeline.reads.without(self.mask);
-        if missing.is_empty() { Ok(()) } else { self.explain(pipeline, missing) }
+        if missing.is_empty() { Ok(()) } else { self.missing_input_error(pipeline, missing) }
     }
 
     #[cold]
-    fn explain(&self, pipeline: &RenderPipeline, missing: InputAttachmentMask) -> Result<()> {
+    fn missing_input_error(&self, pipeline: &RenderPipeline, missing: InputAttachmentMask) -> Result<()> {
         let Some(input) = missing.iter().next() else { return Ok(()) };
-        let remedy = if self.on {
+        let remedy = if self.is_enabled {
             "whose texture lacks TextureUsage::INPUT"
         } else {
             "but the pass was begun without local_read"
@@ -117,7 +120,7 @@ pub(super) struct TargetHazards {
 
 impl TargetHazards {
     /// Counts what `pipeline` has drawn, while depth was written or not.
-    fn settle(&mut self, pipeline: Option<&RenderPipeline>, writes_depth: bool) {
+    fn record_draws(&mut self, pipeline: Option<&RenderPipeline>, writes_depth: bool) {
         if let Some(pipeline) = pipeline.filter(|_| self.drawn) {
             self.read = self.read.union(pipeline.reads);
             self.written = self.written.union(pipeline.writes);
@@ -129,20 +132,22 @@ impl TargetHazards {
     }
 
     /// Whether draws that read and write these have to wait for those before.
-    fn hold_up(&self, reads: InputAttachmentMask, writes: InputAttachmentMask) -> bool {
+    fn needs_barrier(&self, reads: InputAttachmentMask, writes: InputAttachmentMask) -> bool {
         self.written.intersects(reads) || self.read.intersects(writes)
     }
 }
 
 impl CommandBuffer {
     /// Binds the set of the targets that shaders read, whose other places no shader may look at.
-    pub(super) fn bind_inputs(&mut self, targets: &Targets) -> Result<()> {
+    pub(super) fn bind_inputs(&mut self, targets: &PassTargets) -> Result<()> {
         let shared = &self.shared;
-        let Some(layout) = shared.layout.inputs.as_ref().filter(|_| targets.inputs.on) else { return Ok(()) };
+        let Some(layout) = shared.layout.inputs.as_ref().filter(|_| targets.inputs.is_enabled) else {
+            return Ok(());
+        };
         let set = self.recording.input_set(&shared.gpu, layout.raw, layout.count)?;
         let raw = raw_layout(Layout::LocalRead);
         let infos: Vec<_> =
-            targets.inputs.views.iter().map(|(input, view)| (*input, image(*view, raw))).collect();
+            targets.inputs.views.iter().map(|(input, view)| (*input, image_info(*view, raw))).collect();
         let within = infos.iter().filter(|(input, _)| input.index() < layout.count);
         let writes: Vec<_> = within
             .map(|(input, info)| {
@@ -182,25 +187,25 @@ impl RenderPass<'_> {
     /// [`InvalidUsage`](Error::InvalidUsage) in passes that were begun without
     /// [`RenderPassDesc::local_read`](crate::RenderPassDesc::local_read).
     pub fn read_targets(&mut self) -> Result<()> {
-        if !self.targets.inputs.on {
+        if !self.targets.inputs.is_enabled {
             let message =
-                "the pass was begun without RenderPassDesc::local_read, so nobody reads its targets";
+                "the pass was begun without RenderPassDesc::local_read, so no shader may read its targets";
             return Err(Error::usage("read_targets", message));
         }
-        self.wait_for_targets();
+        self.barrier_between_draws();
         Ok(())
     }
 
     /// A pipeline that the pass has the targets for is bound in place of another.
-    pub(super) fn order_targets(&mut self, next: &RenderPipeline) {
-        if !self.targets.inputs.on {
+    pub(super) fn order_target_accesses(&mut self, next: &RenderPipeline) {
+        if !self.targets.inputs.is_enabled {
             return;
         }
-        self.hazards.settle(self.pipeline.as_deref(), self.dynamic.writes_depth());
-        if self.hazards.hold_up(next.reads, next.writes) {
-            self.wait_for_targets();
+        self.hazards.record_draws(self.pipeline.as_deref(), self.dynamic.writes_depth());
+        if self.hazards.needs_barrier(next.reads, next.writes) {
+            self.barrier_between_draws();
         }
-        self.find_inputs(!next.reads.is_empty());
+        self.set_input_indices(!next.reads.is_empty());
     }
 
     /// Depth is written from here on, other than the bound pipeline says.
@@ -212,16 +217,16 @@ impl RenderPass<'_> {
             return Err(Error::usage(&*pipeline.name, message));
         }
         let depth = [InputAttachment::Depth].into_iter().collect();
-        if self.hazards.hold_up(InputAttachmentMask::default(), depth) {
-            self.wait_for_targets();
+        if self.hazards.needs_barrier(InputAttachmentMask::default(), depth) {
+            self.barrier_between_draws();
         }
         self.hazards.written.insert(InputAttachment::Depth);
         Ok(())
     }
 
-    fn wait_for_targets(&mut self) {
+    fn barrier_between_draws(&mut self) {
         self.hazards = TargetHazards { finds_inputs: self.hazards.finds_inputs, ..TargetHazards::default() };
-        let barrier = [between_draws(self.targets.inputs.mask)];
+        let barrier = [draw_barrier(self.targets.inputs.mask)];
         let mut flags = vk::DependencyFlags::BY_REGION;
         if self.targets.layers.view_mask != 0 {
             flags |= vk::DependencyFlags::VIEW_LOCAL;
@@ -232,7 +237,7 @@ impl RenderPass<'_> {
     }
 
     /// Tells Vulkan where shaders find targets, as their pipeline was told, or was not.
-    fn find_inputs(&mut self, wanted: bool) {
+    fn set_input_indices(&mut self, wanted: bool) {
         let gpu = &self.cmd.shared.gpu;
         let Some(ext) = gpu.local_read.as_ref().filter(|_| wanted != self.hazards.finds_inputs) else {
             return;
@@ -247,7 +252,7 @@ impl RenderPass<'_> {
 }
 
 /// Orders draws before and behind, at each pixel, by what they read and write of these targets.
-fn between_draws(inputs: InputAttachmentMask) -> vk::MemoryBarrier2<'static> {
+fn draw_barrier(inputs: InputAttachmentMask) -> vk::MemoryBarrier2<'static> {
     use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
     let mut stages = Stage::FRAGMENT_SHADER;
     let (mut writes, mut reads) = (Access::NONE, Access::INPUT_ATTACHMENT_READ);
@@ -268,7 +273,7 @@ fn between_draws(inputs: InputAttachmentMask) -> vk::MemoryBarrier2<'static> {
         .dst_access_mask(reads | writes)
 }
 
-fn image(view: vk::ImageView, layout: vk::ImageLayout) -> [vk::DescriptorImageInfo; 1] {
+fn image_info(view: vk::ImageView, layout: vk::ImageLayout) -> [vk::DescriptorImageInfo; 1] {
     [vk::DescriptorImageInfo::default().image_view(view).image_layout(layout)]
 }
 
@@ -276,33 +281,43 @@ fn image(view: vk::ImageView, layout: vk::ImageLayout) -> [vk::DescriptorImageIn
 mod tests {
     use super::*;
 
-    fn mask(inputs: &[InputAttachment]) -> InputAttachmentMask {
+    fn input_mask(inputs: &[InputAttachment]) -> InputAttachmentMask {
         inputs.iter().copied().collect()
     }
 
     #[test]
     fn draws_wait_where_one_reads_what_another_writes() {
-        let (albedo, lit) =
-            (mask(&[InputAttachment::Color(0), InputAttachment::Depth]), mask(&[InputAttachment::Color(1)]));
+        let (albedo, lit) = (
+            input_mask(&[InputAttachment::Color(0), InputAttachment::Depth]),
+            input_mask(&[InputAttachment::Color(1)]),
+        );
         let drawn = TargetHazards { written: albedo, ..Default::default() };
-        assert!(drawn.hold_up(albedo, lit) && drawn.hold_up(mask(&[InputAttachment::Depth]), lit));
-        assert!(!drawn.hold_up(InputAttachmentMask::default(), albedo), "the order of blending is Vulkan's");
-        let lights = TargetHazards { read: albedo, written: lit, ..Default::default() };
-        assert!(!lights.hold_up(albedo, lit), "further lights need not wait");
         assert!(
-            lights.hold_up(InputAttachmentMask::default(), albedo),
+            drawn.needs_barrier(albedo, lit)
+                && drawn.needs_barrier(input_mask(&[InputAttachment::Depth]), lit)
+        );
+        assert!(
+            !drawn.needs_barrier(InputAttachmentMask::default(), albedo),
+            "the order of blending is Vulkan's"
+        );
+        let lights = TargetHazards { read: albedo, written: lit, ..Default::default() };
+        assert!(!lights.needs_barrier(albedo, lit), "further lights need not wait");
+        assert!(
+            lights.needs_barrier(InputAttachmentMask::default(), albedo),
             "nor is changed what they still read"
         );
-        assert!(!lights.hold_up(InputAttachmentMask::default(), mask(&[InputAttachment::Color(2)])));
+        assert!(
+            !lights.needs_barrier(InputAttachmentMask::default(), input_mask(&[InputAttachment::Color(2)]))
+        );
     }
 
     #[test]
     fn barriers_name_the_stages_of_what_can_be_read() {
         use vk::PipelineStageFlags2 as Stage;
-        let color = between_draws(mask(&[InputAttachment::Color(3)]));
+        let color = draw_barrier(input_mask(&[InputAttachment::Color(3)]));
         assert_eq!(color.src_stage_mask, Stage::FRAGMENT_SHADER | Stage::COLOR_ATTACHMENT_OUTPUT);
         assert_eq!(color.src_access_mask, vk::AccessFlags2::COLOR_ATTACHMENT_WRITE);
-        let depth = between_draws(mask(&[InputAttachment::Stencil]));
+        let depth = draw_barrier(input_mask(&[InputAttachment::Stencil]));
         assert!(depth.src_stage_mask.contains(Stage::LATE_FRAGMENT_TESTS));
         assert!(depth.dst_access_mask.contains(vk::AccessFlags2::INPUT_ATTACHMENT_READ));
         assert!(!depth.dst_access_mask.contains(vk::AccessFlags2::COLOR_ATTACHMENT_READ));

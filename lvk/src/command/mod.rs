@@ -15,9 +15,12 @@ pub(crate) mod indirect_count;
 mod kernel_dispatch;
 mod label;
 mod local_read;
+mod open_build;
 mod pass_area;
+mod pending_visibility;
 #[cfg(feature = "window")]
 mod present;
+mod push_constants;
 pub(crate) mod query;
 mod query_usage;
 pub(crate) mod queue_support;
@@ -41,16 +44,16 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::barrier::Use;
-use crate::device_state::Shared;
+use crate::device_state::DeviceState;
 use crate::error::Result;
-use crate::gpu::caps::queues::Queue;
 use crate::pipeline::{ComputePipeline, RayTracingPipeline};
+use crate::queue::Queue;
 use crate::submit::Recording;
 use crate::submit::profiler::Scopes;
 use crate::upload::staging::StagingChunk;
 
-use recording_state::Notes;
-pub(crate) use recording_state::SpareNotes;
+use recording_state::RecordingState;
+pub(crate) use recording_state::RecordingStatePool;
 
 /// Records commands for one submission.
 ///
@@ -62,11 +65,11 @@ pub(crate) use recording_state::SpareNotes;
 /// builds that run out of memory half way: they say so, and [`Context::submit`](crate::Context::submit) refuses the command buffer.
 /// Dropping a command buffer gives it up.
 pub struct CommandBuffer {
-    shared: Arc<Shared>,
+    shared: Arc<DeviceState>,
     queue: Queue,
     finished: bool,
     recording: ManuallyDrop<Box<Recording>>,
-    notes: ManuallyDrop<Box<Notes>>,
+    state: ManuallyDrop<Box<RecordingState>>,
     compute: Option<Arc<ComputePipeline>>,
     ray_tracing: Option<Arc<RayTracingPipeline>>,
     open_labels: u32,
@@ -85,20 +88,20 @@ pub struct CommandBuffer {
 }
 
 /// What is left of a command buffer once it is complete.
-pub(crate) struct Outcome {
+pub(crate) struct FinishedRecording {
     /// What becomes true when it is submitted.
-    pub(crate) notes: Box<Notes>,
+    pub(crate) state: Box<RecordingState>,
     /// Present where it was profiled.
     pub(crate) scopes: Option<Box<Scopes>>,
 }
 
 impl CommandBuffer {
-    /// Commands go to `recording`, and what is to be remembered of them to `notes`, which are empty.
+    /// Commands go to `recording`, and what is to be remembered of them to `state`, which are empty.
     pub(crate) fn new(
-        shared: &Arc<Shared>,
+        shared: &Arc<DeviceState>,
         queue: Queue,
         recording: Box<Recording>,
-        notes: Box<Notes>,
+        state: Box<RecordingState>,
     ) -> Self {
         if let Some(checks) = &shared.bindless.checks {
             checks.record_begin(&shared.gpu, recording.commands, recording.sequence);
@@ -109,7 +112,7 @@ impl CommandBuffer {
             queue,
             finished: false,
             recording: ManuallyDrop::new(recording),
-            notes: ManuallyDrop::new(notes),
+            state: ManuallyDrop::new(state),
             compute: None,
             ray_tracing: None,
             open_labels: 0,
@@ -132,7 +135,7 @@ impl CommandBuffer {
     }
 
     /// Whether the command buffer was made by the context with these parts.
-    pub(crate) fn belongs_to(&self, shared: &Arc<Shared>) -> bool {
+    pub(crate) fn belongs_to(&self, shared: &Arc<DeviceState>) -> bool {
         Arc::ptr_eq(&self.shared, shared)
     }
 
@@ -146,25 +149,25 @@ impl CommandBuffer {
     }
 
     /// Ends the recording.
-    pub(crate) fn finish(mut self) -> (Box<Recording>, Outcome) {
+    pub(crate) fn finish(mut self) -> (Box<Recording>, FinishedRecording) {
         self.pop_labels(0);
         self.end_open_queries();
-        self.settle();
-        self.show_host();
-        self.flush();
-        self.stamp(None);
-        self.refer_to_queries();
+        self.make_visible();
+        self.make_visible_to_host();
+        self.flush_barriers();
+        self.write_label_timestamp(None);
+        self.reference_query_pools();
         self.finished = true;
         // SAFETY: `finished` keeps `drop` from taking both again.
-        let (recording, notes) =
-            unsafe { (ManuallyDrop::take(&mut self.recording), ManuallyDrop::take(&mut self.notes)) };
-        (recording, Outcome { notes, scopes: self.scopes.take() })
+        let (recording, state) =
+            unsafe { (ManuallyDrop::take(&mut self.recording), ManuallyDrop::take(&mut self.state)) };
+        (recording, FinishedRecording { state, scopes: self.scopes.take() })
     }
 
     /// The host sees what was written in mapped memory.
-    fn show_host(&mut self) {
-        let Notes { uses, host_reads, .. } = &mut **self.notes;
-        host_reads.drain(..).for_each(|id| uses.id(id, Use::host_read()));
+    fn make_visible_to_host(&mut self) {
+        let RecordingState { accesses: uses, host_reads, .. } = &mut **self.state;
+        host_reads.drain(..).for_each(|id| uses.add_id(id, Use::host_read()));
     }
 }
 
@@ -173,7 +176,7 @@ impl Drop for CommandBuffer {
         if !self.finished {
             // SAFETY: only `finish` takes these too, and it sets `finished`.
             let (recording, _notes) =
-                unsafe { (ManuallyDrop::take(&mut self.recording), ManuallyDrop::take(&mut self.notes)) };
+                unsafe { (ManuallyDrop::take(&mut self.recording), ManuallyDrop::take(&mut self.state)) };
             self.shared.submitter.discard(recording);
             if let Some(scopes) = self.scopes.take() {
                 self.shared.profiler.discard(*scopes);

@@ -15,7 +15,7 @@ pub(super) struct PassArea {
 
 impl PassArea {
     /// The whole targets, or part of them.
-    pub(super) fn of(area: Option<[u32; 4]>, targets: [u32; 2]) -> Result<Self> {
+    pub(super) fn new(area: Option<[u32; 4]>, targets: [u32; 2]) -> Result<Self> {
         let Some([x, y, width, height]) = area else {
             return Ok(Self { offset: [0, 0], extent: targets });
         };
@@ -56,7 +56,7 @@ pub(super) struct PassLayers {
 
 impl PassLayers {
     /// As the pass says: some layers, or the views of a mask.
-    pub(super) fn of(gpu: &Gpu, desc: &RenderPassDesc<'_>) -> Result<Self> {
+    pub(super) fn new(gpu: &Gpu, desc: &RenderPassDesc<'_>) -> Result<Self> {
         let RenderPassDesc { layers, view_mask, .. } = *desc;
         if view_mask == 0 {
             let limit = gpu.caps.limits.max_target_layers;
@@ -71,7 +71,7 @@ impl PassLayers {
         Ok(Self { count: u32::BITS - view_mask.leading_zeros(), view_mask })
     }
 
-    pub(super) fn count(self) -> u32 {
+    pub(super) fn layer_count(self) -> u32 {
         self.count
     }
 
@@ -81,7 +81,7 @@ impl PassLayers {
     }
 
     /// How many queries one takes in the pass: as many as there are views, at least one.
-    pub(super) fn queries(self) -> u32 {
+    pub(super) fn query_count(self) -> u32 {
         self.view_mask.count_ones().max(1)
     }
 }
@@ -93,12 +93,12 @@ mod tests {
 
     #[test]
     fn an_area_lies_inside_the_targets() {
-        let whole = PassArea::of(None, [8, 4]).unwrap();
-        assert_eq!(PassArea::of(Some([0, 0, 8, 4]), [8, 4]).unwrap(), whole);
-        let part = PassArea::of(Some([7, 3, 1, 1]), [8, 4]).unwrap();
+        let whole = PassArea::new(None, [8, 4]).unwrap();
+        assert_eq!(PassArea::new(Some([0, 0, 8, 4]), [8, 4]).unwrap(), whole);
+        let part = PassArea::new(Some([7, 3, 1, 1]), [8, 4]).unwrap();
         assert!(whole.contains(part) && !part.contains(whole));
         for area in [[0, 0, 0, 4], [0, 0, 8, 0], [1, 0, 8, 4], [0, 4, 1, 1], [u32::MAX, 0, 2, 1]] {
-            assert!(PassArea::of(Some(area), [8, 4]).is_err(), "{area:?}");
+            assert!(PassArea::new(Some(area), [8, 4]).is_err(), "{area:?}");
         }
     }
 }

@@ -10,9 +10,9 @@ use crate::resource::Texture;
 impl CommandBuffer {
     /// Readies an image of a swapchain for the presentation engine. Nothing may use it afterwards.
     pub(crate) fn release_image(&mut self, texture: &Arc<Texture>) -> Result<()> {
-        self.settle();
+        self.make_visible();
         self.use_texture(texture, texture.range, Use::present())?;
-        self.flush();
+        self.flush_barriers();
         Ok(())
     }
 }

@@ -24,14 +24,14 @@ impl CommandBuffer {
         let pool = self.shared.store.query_pools.get(pool)?;
         let count = queries.end.saturating_sub(queries.start);
         pool.check_range(queries.start, count)?;
-        self.notes.queries.check_reset(&pool, queries.clone())?;
+        self.state.queries.check_reset(&pool, queries.clone())?;
         if count > 0 {
             self.end_rendering();
             // SAFETY: the queries exist and are not open, and no pass is open.
             unsafe {
                 self.shared.gpu.device.cmd_reset_query_pool(self.raw(), pool.raw, queries.start, count)
             };
-            self.notes.queries.reset(&pool, queries);
+            self.state.queries.record_reset(&pool, queries);
         }
         Ok(())
     }
@@ -49,11 +49,11 @@ impl CommandBuffer {
         pool.check_range(query, self.views)?;
         pool.check_kind(pool.kind == QueryKind::Timestamps, "measure with begin_query and end_query")?;
         self.needs_timestamps()?;
-        self.notes.queries.check_ready(&pool, query, self.views)?;
+        self.state.queries.check_ready(&pool, query, self.views)?;
         let stage = vk::PipelineStageFlags2::ALL_COMMANDS;
         // SAFETY: the query exists and is ready.
         unsafe { self.shared.gpu.device.cmd_write_timestamp2(self.raw(), stage, pool.raw, query) };
-        self.notes.queries.write(&pool, query, self.views);
+        self.state.queries.record_write(&pool, query, self.views);
         Ok(())
     }
 
@@ -68,7 +68,7 @@ impl CommandBuffer {
     /// [`WrongQueue`](Error::WrongQueue) on another queue than the graphics queue.
     pub fn begin_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         self.end_rendering();
-        self.begin_query_here(pool, query)
+        self.begin_query_at(pool, query)
     }
 
     /// Ends what [`begin_query`](Self::begin_query) began (`vkCmdEndQuery`).
@@ -77,23 +77,23 @@ impl CommandBuffer {
     /// [`InvalidUsage`](crate::Error::InvalidUsage) where the query is not open, or was begun in a render pass.
     pub fn end_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         self.end_rendering();
-        self.end_query_here(pool, query)
+        self.end_query_at(pool, query)
     }
 
-    fn begin_query_here(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
+    fn begin_query_at(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         self.needs_graphics("a query of samples or statistics")?;
         let pool = self.shared.store.query_pools.get(pool)?;
         pool.check_range(query, self.views)?;
         pool.check_kind(pool.kind != QueryKind::Timestamps, "write them with write_timestamp")?;
-        self.notes.queries.check_begin(&pool)?;
-        self.notes.queries.check_ready(&pool, query, self.views)?;
+        self.state.queries.check_begin(&pool)?;
+        self.state.queries.check_ready(&pool, query, self.views)?;
         self.check_statistics(pool.kind)?;
         // SAFETY: the query exists and is ready, and none of its type is open.
         unsafe {
             let device = &self.shared.gpu.device;
             device.cmd_begin_query(self.raw(), pool.raw, query, pool.kind.control_flags());
         }
-        self.notes.queries.begin(pool, query, self.views, self.rendering);
+        self.state.queries.record_begin(pool, query, self.views, self.rendering);
         Ok(())
     }
 
@@ -108,16 +108,16 @@ impl CommandBuffer {
         Err(Error::unsupported("beginning pipeline statistics behind a render pass", why))
     }
 
-    fn end_query_here(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
+    fn end_query_at(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
         let pool = self.shared.store.query_pools.get(pool)?;
-        self.notes.queries.end(&pool, query, self.rendering)?;
+        self.state.queries.record_end(&pool, query, self.rendering)?;
         self.record_end_query(&pool, query);
         Ok(())
     }
 
     /// Ends what was begun in the pass that ends now; that it is open is an error of the submission.
     pub(super) fn end_pass_queries(&mut self) {
-        for open in self.notes.queries.take_pass_queries() {
+        for open in self.state.queries.take_pass_queries() {
             self.record_end_query(&open.pool, open.query);
         }
     }
@@ -125,7 +125,7 @@ impl CommandBuffer {
     /// Ends what is still open.
     pub(super) fn end_open_queries(&mut self) {
         self.end_rendering();
-        for open in self.notes.queries.take_open() {
+        for open in self.state.queries.take_open_queries() {
             self.record_end_query(&open.pool, open.query);
         }
     }
@@ -136,15 +136,15 @@ impl CommandBuffer {
     }
 
     /// Other queues wait for what this one does to pools.
-    pub(super) fn refer_to_queries(&mut self) {
+    pub(super) fn reference_query_pools(&mut self) {
         if self.shared.gpu.queues.has_several() {
-            self.recording.references.extend(self.notes.queries.pools().map(|id| (id, QueueAccess::Write)));
+            self.recording.references.extend(self.state.queries.pools().map(|id| (id, QueueAccess::Write)));
         }
     }
 
     /// Fails where a query is open, or is written again without a reset.
     pub(crate) fn check_queries(&self) -> Result<()> {
-        self.notes.queries.check_submit()
+        self.state.queries.check_submit()
     }
 }
 
@@ -158,7 +158,7 @@ impl RenderPass<'_> {
     /// As [`CommandBuffer::begin_query`], to be ended in the same pass. In a pass with a view mask, this and the following
     /// queries are taken, one for each view: the result is their sum, which drivers may put into the first alone.
     pub fn begin_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
-        self.cmd.begin_query_here(pool, query)
+        self.cmd.begin_query_at(pool, query)
     }
 
     /// Ends what [`begin_query`](Self::begin_query) began in this pass (`vkCmdEndQuery`).
@@ -166,6 +166,6 @@ impl RenderPass<'_> {
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) where the query is not open, or was begun before the pass.
     pub fn end_query(&mut self, pool: QueryPoolHandle, query: u32) -> Result<()> {
-        self.cmd.end_query_here(pool, query)
+        self.cmd.end_query_at(pool, query)
     }
 }

@@ -10,11 +10,11 @@ use crate::resource::query_reset_state::QueryResetState;
 
 /// The queries a command buffer writes and resets, and those it has begun.
 #[derive(Default)]
-pub(super) struct QueryLog {
+pub(super) struct QueryUsage {
     pools: Vec<(Arc<QueryPool>, QueryResetState)>,
     open: Vec<OpenQuery>,
     /// A query that was begun in a render pass and left open at its end.
-    left_open: Option<Error>,
+    unended_error: Option<Error>,
 }
 
 /// A query that was begun and not ended.
@@ -25,10 +25,10 @@ pub(super) struct OpenQuery {
     pub(super) in_pass: bool,
 }
 
-impl QueryLog {
+impl QueryUsage {
     /// Fails unless `count` queries from `query` on may be written.
     pub(super) fn check_ready(&mut self, pool: &Arc<QueryPool>, query: u32, count: u32) -> Result<()> {
-        let marks = self.marks(pool);
+        let marks = self.reset_state(pool);
         match (query..query + count).find(|query| !marks.is_ready(*query)) {
             None => Ok(()),
             Some(query) => Err(pool.not_reset_error(query)),
@@ -36,8 +36,8 @@ impl QueryLog {
     }
 
     /// `count` queries from `query` on are written.
-    pub(super) fn write(&mut self, pool: &Arc<QueryPool>, query: u32, count: u32) {
-        let marks = self.marks(pool);
+    pub(super) fn record_write(&mut self, pool: &Arc<QueryPool>, query: u32, count: u32) {
+        let marks = self.reset_state(pool);
         (query..query + count).for_each(|query| marks.write(query));
     }
 
@@ -54,8 +54,8 @@ impl QueryLog {
     }
 
     /// Queries are reset.
-    pub(super) fn reset(&mut self, pool: &Arc<QueryPool>, queries: std::ops::Range<u32>) {
-        let marks = self.marks(pool);
+    pub(super) fn record_reset(&mut self, pool: &Arc<QueryPool>, queries: std::ops::Range<u32>) {
+        let marks = self.reset_state(pool);
         queries.for_each(|query| marks.reset(query));
     }
 
@@ -89,13 +89,13 @@ impl QueryLog {
     }
 
     /// The query is open from now on, and takes `count` of its pool.
-    pub(super) fn begin(&mut self, pool: Arc<QueryPool>, query: u32, count: u32, in_pass: bool) {
-        self.write(&pool, query, count);
+    pub(super) fn record_begin(&mut self, pool: Arc<QueryPool>, query: u32, count: u32, in_pass: bool) {
+        self.record_write(&pool, query, count);
         self.open.push(OpenQuery { pool, query, in_pass });
     }
 
     /// Closes a query.
-    pub(super) fn end(&mut self, pool: &Arc<QueryPool>, query: u32, in_pass: bool) -> Result<()> {
+    pub(super) fn record_end(&mut self, pool: &Arc<QueryPool>, query: u32, in_pass: bool) -> Result<()> {
         let same = |open: &OpenQuery| Arc::ptr_eq(&open.pool, pool) && open.query == query;
         let Some(place) = self.open.iter().position(same) else {
             return Err(Error::usage(&pool.name, format!("query {query} was not begun; begin it first")));
@@ -113,26 +113,26 @@ impl QueryLog {
     pub(super) fn take_pass_queries(&mut self) -> Vec<OpenQuery> {
         let open: Vec<_> = self.open.extract_if(.., |open| open.in_pass).collect();
         if let Some(first) = open.first() {
-            self.left_open.get_or_insert_with(|| not_ended(first));
+            self.unended_error.get_or_insert_with(|| not_ended_error(first));
         }
         open
     }
 
     /// Takes all open queries out.
-    pub(super) fn take_open(&mut self) -> Vec<OpenQuery> {
+    pub(super) fn take_open_queries(&mut self) -> Vec<OpenQuery> {
         std::mem::take(&mut self.open)
     }
 
     /// Fails where the command buffer cannot be submitted after those before it.
     pub(super) fn check_submit(&self) -> Result<()> {
-        if let Some(error) = self.left_open.clone().or_else(|| self.open.first().map(not_ended)) {
+        if let Some(error) = self.unended_error.clone().or_else(|| self.open.first().map(not_ended_error)) {
             return Err(error);
         }
         self.pools.iter().try_for_each(|(pool, marks)| pool.check_submit(marks))
     }
 
     /// The command buffer was submitted.
-    pub(super) fn submit(&self) {
+    pub(super) fn apply_submission(&self) {
         self.pools.iter().for_each(|(pool, marks)| pool.mark_submitted(marks));
     }
 
@@ -140,7 +140,7 @@ impl QueryLog {
     pub(super) fn clear(&mut self) {
         self.pools.clear();
         self.open.clear();
-        self.left_open = None;
+        self.unended_error = None;
     }
 
     /// The pools that the command buffer writes or resets.
@@ -148,7 +148,7 @@ impl QueryLog {
         self.pools.iter().map(|(pool, _)| pool.id)
     }
 
-    fn marks(&mut self, pool: &Arc<QueryPool>) -> &mut QueryResetState {
+    fn reset_state(&mut self, pool: &Arc<QueryPool>) -> &mut QueryResetState {
         let known = self.pools.iter().position(|(known, _)| Arc::ptr_eq(known, pool));
         let place = known.unwrap_or(self.pools.len());
         if known.is_none() {
@@ -158,7 +158,7 @@ impl QueryLog {
     }
 }
 
-fn not_ended(open: &OpenQuery) -> Error {
+fn not_ended_error(open: &OpenQuery) -> Error {
     let place = if open.in_pass { "render pass" } else { "command buffer" };
     let message = format!("query {} was begun and not ended in its {place}", open.query);
     Error::usage(&open.pool.name, message)

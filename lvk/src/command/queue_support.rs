@@ -6,7 +6,7 @@ use ash::vk;
 use super::CommandBuffer;
 use crate::barrier::{ResourceId, Use};
 use crate::error::{Error, Result};
-use crate::gpu::caps::queues::Queue;
+use crate::queue::Queue;
 use crate::resource::Texture;
 use crate::resource::region::Region;
 use crate::submit::SubmitHandle;
@@ -14,7 +14,7 @@ use crate::submit::ownership::QueueAccess;
 use crate::submit::queue::stages_of;
 
 /// What builds are called.
-pub(crate) const BUILD: &str = "a build of acceleration structures";
+pub(crate) const BUILD_ON_QUEUE: &str = "a build of acceleration structures";
 
 impl CommandBuffer {
     /// The queue that the command buffer was acquired for.
@@ -62,7 +62,7 @@ impl CommandBuffer {
         let [width, height] = region.part.block;
         let side = |axis: usize| (region.offset[axis], region.extent[axis], mip[axis]);
         let blocks = [width, height, 1];
-        if (0..3).all(|axis| fits(granularity[axis], blocks[axis], side(axis))) {
+        if (0..3).all(|axis| is_on_granularity(granularity[axis], blocks[axis], side(axis))) {
             return Ok(());
         }
         let message = format!(
@@ -76,7 +76,7 @@ impl CommandBuffer {
     }
 
     /// The command buffer begins after these submissions.
-    pub(super) fn wait_for(&mut self, submissions: &[SubmitHandle]) -> Result<()> {
+    pub(super) fn wait_for_resource(&mut self, submissions: &[SubmitHandle]) -> Result<()> {
         for submission in submissions.iter().filter(|submission| **submission != SubmitHandle::default()) {
             if submission.context != self.shared.store.context_id {
                 return Err(Error::usage("wait_for", "the submission belongs to another context"));
@@ -88,13 +88,13 @@ impl CommandBuffer {
     }
 
     /// The command buffer begins after a submission of the first queue.
-    pub(crate) fn begin_after(&mut self, value: u64) {
+    pub(crate) fn wait_for_all_writes(&mut self, value: u64) {
         self.recording.after.max_with_value(0, value);
     }
 
     /// The command buffer uses something that needs no barriers within a queue.
     #[inline]
-    pub(crate) fn refer(&mut self, id: ResourceId, access: QueueAccess) {
+    pub(crate) fn reference_resource(&mut self, id: ResourceId, access: QueueAccess) {
         if self.shared.gpu.queues.has_several() {
             self.recording.references.push((id, access));
         }
@@ -132,7 +132,7 @@ pub(super) fn limited_to_queue(queue_index: usize, read: Use) -> Use {
 }
 
 /// Whether a copy may have this offset and extent of a mip's side, where a granularity counts blocks of so many texels.
-fn fits(granularity: u32, block: u32, (offset, extent, side): (u32, u32, u32)) -> bool {
+fn is_on_granularity(granularity: u32, block: u32, (offset, extent, side): (u32, u32, u32)) -> bool {
     if granularity == 0 {
         return offset == 0 && extent == side;
     }
@@ -146,10 +146,18 @@ mod tests {
 
     #[test]
     fn regions_of_copies_stand_on_the_granularity_or_reach_the_edge() {
-        assert!(fits(1, 1, (3, 5, 9)));
-        assert!(fits(8, 1, (8, 16, 30)) && fits(8, 1, (24, 6, 30)));
-        assert!(!fits(8, 1, (4, 8, 30)) && !fits(8, 1, (8, 6, 30)));
-        assert!(fits(2, 4, (8, 8, 20)) && fits(2, 4, (16, 4, 20)) && !fits(2, 4, (4, 8, 20)));
-        assert!(fits(0, 1, (0, 30, 30)) && !fits(0, 1, (0, 29, 30)) && !fits(0, 1, (1, 29, 30)));
+        assert!(is_on_granularity(1, 1, (3, 5, 9)));
+        assert!(is_on_granularity(8, 1, (8, 16, 30)) && is_on_granularity(8, 1, (24, 6, 30)));
+        assert!(!is_on_granularity(8, 1, (4, 8, 30)) && !is_on_granularity(8, 1, (8, 6, 30)));
+        assert!(
+            is_on_granularity(2, 4, (8, 8, 20))
+                && is_on_granularity(2, 4, (16, 4, 20))
+                && !is_on_granularity(2, 4, (4, 8, 20))
+        );
+        assert!(
+            is_on_granularity(0, 1, (0, 30, 30))
+                && !is_on_granularity(0, 1, (0, 29, 30))
+                && !is_on_granularity(0, 1, (1, 29, 30))
+        );
     }
 }

@@ -5,129 +5,129 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::accesses::Uses;
-use super::bind::PushConstants;
-use super::build_blas::OpenBuild;
-use super::query_usage::QueryLog;
-use super::transfer::Settle;
+use super::accesses::CommandAccesses;
+use super::open_build::OpenBuild;
+use super::pending_visibility::PendingVisibility;
+use super::push_constants::PushConstants;
+use super::query_usage::QueryUsage;
 use crate::accel::AccelStruct;
-use crate::accel::build_overlap::BuildRun;
-use crate::accel::compaction::SizeQuery;
-use crate::accel::tlas_tracker::TlasUpdates;
+use crate::accel::build_overlap::ConcurrentBuilds;
+use crate::accel::compaction::CompactedSizeQuery;
+use crate::accel::tlas_tracker::TlasTrackers;
 use crate::barrier::{Barriers, ResourceId};
-use crate::device_state::Shared;
+use crate::device_state::DeviceState;
 use crate::handle::{BufferHandle, TextureHandle};
-use crate::handle_cache::Found;
+use crate::handle_cache::HandleCache;
 use crate::lock_order::{Mutex, Rank};
 use crate::resource::{Buffer, Texture};
 use crate::submit::emit_barriers::LastBarrier;
 
 /// Lists and maps of one command buffer.
 #[derive(Default)]
-pub(crate) struct Notes {
-    pub(super) found_buffers: Found<BufferHandle, Buffer>,
-    pub(super) found_textures: Found<TextureHandle, Texture>,
-    pub(super) uses: Uses,
+pub(crate) struct RecordingState {
+    pub(super) buffer_cache: HandleCache<BufferHandle, Buffer>,
+    pub(super) texture_cache: HandleCache<TextureHandle, Texture>,
+    pub(super) accesses: CommandAccesses,
     pub(super) barriers: Barriers,
     pub(super) last_barrier: LastBarrier,
     pub(super) sets_bound: Vec<vk::PipelineBindPoint>,
     pub(super) push_constants: PushConstants,
     pub(super) host_reads: Vec<ResourceId>,
-    pub(super) settle: Vec<Settle>,
+    pub(super) pending_visibility: Vec<PendingVisibility>,
     /// Present once a top-level structure was updated.
-    pub(super) tlas_updates: Option<Box<TlasUpdates>>,
+    pub(super) tlas_trackers: Option<Box<TlasTrackers>>,
     /// Builds of top-level structures that run side by side.
-    pub(super) build_run: BuildRun,
+    pub(super) build_run: ConcurrentBuilds,
     pub(super) open_builds: Vec<OpenBuild>,
     /// Refits since the last rebuild of each bottom-level structure that is built here, by its id.
     pub(super) refits: HashMap<u64, u32>,
-    pub(super) size_queries: Vec<Arc<SizeQuery>>,
-    pub(super) queries: QueryLog,
+    pub(super) size_queries: Vec<Arc<CompactedSizeQuery>>,
+    pub(super) queries: QueryUsage,
     /// Bottom-level structures that are built elsewhere from here on, by their ids.
-    pub(super) moved: HashSet<u64>,
+    pub(super) moved_blas: HashSet<u64>,
     /// Bottom-level structures that the host placed in top-level ones where it knew them to lie, by their ids.
-    pub(super) placed: HashMap<u64, Arc<AccelStruct>>,
+    pub(super) placed_blas: HashMap<u64, Arc<AccelStruct>>,
     /// What a command failed on with only a part of it recorded.
-    pub(super) torn: Option<String>,
+    pub(super) poisoned: Option<String>,
 }
 
-impl Notes {
+impl RecordingState {
     /// The command buffer went to the GPU with this timeline value: what it noted becomes true.
-    pub(crate) fn submitted(&mut self, shared: &Shared, value: u64) {
-        if let Some(updates) = &mut self.tlas_updates {
-            shared.show(updates, |target| target.submitted(value));
+    pub(crate) fn apply_submission(&mut self, shared: &DeviceState, value: u64) {
+        if let Some(updates) = &mut self.tlas_trackers {
+            shared.apply_tlas_updates(updates, |target| target.mark_used_by_submission(value));
         }
-        self.open_builds.drain(..).for_each(|build| build.submit(value));
-        self.size_queries.drain(..).for_each(|query| query.submit());
-        self.queries.submit();
+        self.open_builds.drain(..).for_each(|build| build.mark_submitted(value));
+        self.size_queries.drain(..).for_each(|query| query.mark_submitted());
+        self.queries.apply_submission();
     }
 
     /// Forgets everything, and keeps the memory.
     fn clear(&mut self) {
         let Self {
-            found_buffers,
-            found_textures,
-            uses,
+            buffer_cache,
+            texture_cache,
+            accesses,
             barriers,
             // What barriers are called is the same for every command buffer.
             last_barrier: _,
             sets_bound,
             push_constants,
             host_reads,
-            settle,
-            tlas_updates,
+            pending_visibility,
+            tlas_trackers,
             build_run,
             open_builds,
             refits,
             size_queries,
             queries,
-            moved,
-            placed,
-            torn,
+            moved_blas,
+            placed_blas,
+            poisoned,
         } = self;
-        found_buffers.clear();
-        found_textures.clear();
-        uses.forget();
+        buffer_cache.clear();
+        texture_cache.clear();
+        accesses.reset();
         barriers.clear();
         sets_bound.clear();
         push_constants.clear();
         host_reads.clear();
-        settle.clear();
-        tlas_updates.iter_mut().for_each(|updates| updates.clear());
+        pending_visibility.clear();
+        tlas_trackers.iter_mut().for_each(|updates| updates.clear());
         build_run.stop();
         open_builds.clear();
         refits.clear();
         size_queries.clear();
         queries.clear();
-        moved.clear();
-        placed.clear();
-        *torn = None;
+        moved_blas.clear();
+        placed_blas.clear();
+        *poisoned = None;
     }
 }
 
 /// Notes that no command buffer has at the moment, empty.
 #[expect(clippy::vec_box, reason = "handed on as pointers")]
-pub(crate) struct SpareNotes(Mutex<Vec<Box<Notes>>>);
+pub(crate) struct RecordingStatePool(Mutex<Vec<Box<RecordingState>>>);
 
-impl SpareNotes {
+impl RecordingStatePool {
     /// More than this are let go, and so are those of very many instances.
-    const MOST: usize = 8;
+    const MAX_SPARE: usize = 8;
 
     pub(crate) fn new() -> Self {
         Self(Mutex::new(Rank::SpareNotes, Vec::new()))
     }
 
-    pub(crate) fn take(&self) -> Box<Notes> {
-        let spare = self.0.lock().pop();
-        spare.unwrap_or_default()
+    pub(crate) fn acquire(&self) -> Box<RecordingState> {
+        let pool = self.0.lock().pop();
+        pool.unwrap_or_default()
     }
 
-    pub(crate) fn give(&self, mut notes: Box<Notes>) {
+    pub(crate) fn recycle(&self, mut notes: Box<RecordingState>) {
         notes.clear();
-        let mut spare = self.0.lock();
-        let is_small = notes.tlas_updates.as_ref().is_none_or(|updates| updates.is_worth_keeping());
-        if spare.len() < Self::MOST && is_small {
-            spare.push(notes);
+        let mut pool = self.0.lock();
+        let is_small = notes.tlas_trackers.as_ref().is_none_or(|updates| updates.is_worth_keeping());
+        if pool.len() < Self::MAX_SPARE && is_small {
+            pool.push(notes);
         }
     }
 }

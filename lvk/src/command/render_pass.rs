@@ -6,13 +6,13 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::attachments::Targets;
-use super::bind::words;
+use super::attachments::PassTargets;
 use super::compute::check_arguments;
-use super::dynamic_state::{DynamicState, WRITES_READ_ONLY};
+use super::dynamic_state::{DynamicState, READ_ONLY_DEPTH_ERROR};
 use super::local_read::TargetHazards;
 use super::pass_area::PassArea;
-use super::recording_state::Notes;
+use super::push_constants::word_mask;
+use super::recording_state::RecordingState;
 use crate::barrier::Use;
 use crate::error::{Error, Result, check_limit};
 use crate::format::IndexFormat;
@@ -36,43 +36,43 @@ use crate::submit::Recording;
 /// ```
 pub struct RenderPass<'a> {
     pub(super) cmd: &'a mut CommandBuffer,
-    pub(super) targets: Targets,
+    pub(super) targets: PassTargets,
     pub(super) dynamic: DynamicState,
     pub(super) labelled: bool,
     /// Labels open around the pass.
     pub(super) labels_outside: u32,
     pub(super) hazards: TargetHazards,
     pub(super) pipeline: Option<Arc<RenderPipeline>>,
-    draws: Option<DrawNeeds>,
-    indices: Option<BoundIndices>,
+    draws: Option<DrawRequirements>,
+    indices: Option<BoundIndexBuffer>,
     vertex_slots: u32,
 }
 
 /// What draws with the bound pipeline need, gathered when it is bound so that a draw looks at no more than this.
-struct DrawNeeds {
+struct DrawRequirements {
     vertex_slots: u32,
     /// A bit for each 4 bytes of push constants.
     push_constants: u64,
 }
 
-impl DrawNeeds {
+impl DrawRequirements {
     /// Nothing for a pipeline that has no vertex shader.
-    fn of(pipeline: &RenderPipeline) -> Option<Self> {
+    fn for_pipeline(pipeline: &RenderPipeline) -> Option<Self> {
         (pipeline.front_end == FrontEnd::Vertex).then(|| Self {
             vertex_slots: (1 << pipeline.vertex_binding_count) - 1,
-            push_constants: words(0, pipeline.push_constant_bytes),
+            push_constants: word_mask(0, pipeline.push_constant_bytes),
         })
     }
 }
 
 /// The index buffer bound last.
-pub(super) struct BoundIndices {
+pub(super) struct BoundIndexBuffer {
     buffer: Arc<Buffer>,
     count: u64,
 }
 
 impl<'a> RenderPass<'a> {
-    pub(super) fn new(cmd: &'a mut CommandBuffer, targets: Targets, labelled: bool) -> Self {
+    pub(super) fn new(cmd: &'a mut CommandBuffer, targets: PassTargets, labelled: bool) -> Self {
         let [width, height] = targets.extent;
         let labels_outside = cmd.open_labels - u32::from(labelled);
         let pass = Self {
@@ -108,21 +108,21 @@ impl<'a> RenderPass<'a> {
         }
         let writes = pipeline.writes_stencil || pipeline.pass_state.depth.is_some_and(|depth| depth.write);
         if targets.read_only_depth && writes {
-            return Err(Error::usage(&*pipeline.name, WRITES_READ_ONLY));
+            return Err(Error::usage(&*pipeline.name, READ_ONLY_DEPTH_ERROR));
         }
         targets.inputs.check_reads(&pipeline)?;
-        self.check_rates(&pipeline)?;
+        self.check_shading_rates(&pipeline)?;
         if !pipeline.query_stages.is_empty() {
-            self.cmd.use_structures(pipeline.query_stages);
+            self.cmd.use_accel_structs(pipeline.query_stages);
             let remedy =
                 "create the pipeline before the pass begins, or list a structure in the pass's dependencies";
-            self.track_inside("what the pipeline's ray queries see", &pipeline.name, remedy)?;
+            self.track_in_pass("what the pipeline's ray queries see", &pipeline.name, remedy)?;
         }
-        self.order_targets(&pipeline);
+        self.order_target_accesses(&pipeline);
         let point = vk::PipelineBindPoint::GRAPHICS;
-        self.cmd.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
-        self.draws = DrawNeeds::of(&pipeline);
-        self.set_state_of(&pipeline.pass_state);
+        self.cmd.bind_pipeline(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
+        self.draws = DrawRequirements::for_pipeline(&pipeline);
+        self.set_pipeline_state(&pipeline.pass_state);
         self.pipeline = Some(pipeline);
         Ok(())
     }
@@ -181,7 +181,7 @@ impl<'a> RenderPass<'a> {
                 format!("vertex slot {slot} does not exist, there are {SLOTS}"),
             ));
         }
-        self.read_inside(&buffer, Use::vertex())?;
+        self.read_in_pass(&buffer, Use::vertex())?;
         // SAFETY: the buffer has the usage and the offset lies inside of it.
         unsafe {
             let device = &self.cmd.shared.gpu.device;
@@ -211,13 +211,13 @@ impl<'a> RenderPass<'a> {
             ));
         }
         buffer.check_range(offset, size)?;
-        self.read_inside(&buffer, Use::index())?;
+        self.read_in_pass(&buffer, Use::index())?;
         // SAFETY: the buffer has the usage and the offset is aligned and inside of it.
         unsafe {
             let device = &self.cmd.shared.gpu.device;
             device.cmd_bind_index_buffer(self.cmd.raw(), buffer.raw, offset, format.raw());
         }
-        self.indices = Some(BoundIndices { count: (buffer.size_bytes - offset) / size, buffer });
+        self.indices = Some(BoundIndexBuffer { count: (buffer.size_bytes - offset) / size, buffer });
         Ok(())
     }
 
@@ -225,7 +225,7 @@ impl<'a> RenderPass<'a> {
     #[inline]
     pub fn draw(&mut self, vertices: Range<u32>, instances: Range<u32>) -> Result<()> {
         self.check_draw()?;
-        let (count, instance_count) = (length(&vertices), length(&instances));
+        let (count, instance_count) = (range_length(&vertices), range_length(&instances));
         // SAFETY: a pipeline is bound with all its vertex buffers and push constants.
         unsafe {
             let device = &self.cmd.shared.gpu.device;
@@ -242,12 +242,12 @@ impl<'a> RenderPass<'a> {
         instances: Range<u32>,
     ) -> Result<()> {
         self.check_draw()?;
-        let bound = self.bound_indices()?;
+        let bound = self.bound_index_buffer()?;
         if u64::from(indices.end) > bound.count {
             let message = format!("indices {indices:?} are drawn, but {} are bound", bound.count);
             return Err(Error::usage(&bound.buffer.name, message));
         }
-        let (count, instance_count) = (length(&indices), length(&instances));
+        let (count, instance_count) = (range_length(&indices), range_length(&instances));
         // SAFETY: as in `draw`, and the indices lie inside the bound buffer.
         unsafe {
             let device = &self.cmd.shared.gpu.device;
@@ -268,7 +268,7 @@ impl<'a> RenderPass<'a> {
     ) -> Result<()> {
         self.check_draw()?;
         let size = size_of::<vk::DrawIndirectCommand>() as u64;
-        let buffer = self.indirect(arguments, offset, draw_count, stride, size)?;
+        let buffer = self.indirect_buffer(arguments, offset, draw_count, stride, size)?;
         let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
         for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
             // SAFETY: as in `draw`, and the arguments lie inside the buffer.
@@ -287,9 +287,9 @@ impl<'a> RenderPass<'a> {
         stride: u32,
     ) -> Result<()> {
         self.check_draw()?;
-        self.bound_indices()?;
+        self.bound_index_buffer()?;
         let size = size_of::<vk::DrawIndexedIndirectCommand>() as u64;
-        let buffer = self.indirect(arguments, offset, draw_count, stride, size)?;
+        let buffer = self.indirect_buffer(arguments, offset, draw_count, stride, size)?;
         let (device, raw) = (&self.cmd.shared.gpu.device, self.cmd.raw());
         for (offset, count) in self.indirect_calls(offset, draw_count, stride) {
             // SAFETY: as in `draw`, and the arguments lie inside the buffer.
@@ -310,7 +310,7 @@ impl<'a> RenderPass<'a> {
         (0..calls).map(move |call| (offset + u64::from(call) * u64::from(stride), draws))
     }
 
-    pub(super) fn indirect(
+    pub(super) fn indirect_buffer(
         &mut self,
         arguments: BufferHandle,
         offset: u64,
@@ -329,11 +329,11 @@ impl<'a> RenderPass<'a> {
         }
         let bytes = u64::from(draw_count.saturating_sub(1)) * u64::from(stride) + size;
         check_arguments(&buffer, offset, bytes)?;
-        self.read_inside(&buffer, Use::indirect())?;
+        self.read_in_pass(&buffer, Use::indirect())?;
         Ok(buffer)
     }
 
-    pub(super) fn bound_indices(&self) -> Result<&BoundIndices> {
+    pub(super) fn bound_index_buffer(&self) -> Result<&BoundIndexBuffer> {
         self.indices.as_ref().ok_or_else(|| Error::usage("draw_indexed", "bind an index buffer first"))
     }
 
@@ -348,14 +348,14 @@ impl<'a> RenderPass<'a> {
             {
                 Ok(())
             }
-            _ => Err(self.refuse_draw()),
+            _ => Err(self.draw_error()),
         }
     }
 
     /// What is missing for a draw.
     #[cold]
-    fn refuse_draw(&self) -> Error {
-        let pipeline = match self.bound("draw") {
+    fn draw_error(&self) -> Error {
+        let pipeline = match self.bound_pipeline("draw") {
             Ok(pipeline) => pipeline,
             Err(nothing_bound) => return nothing_bound,
         };
@@ -368,35 +368,36 @@ impl<'a> RenderPass<'a> {
             let message = format!("it reads {} vertex buffers; bind them all", pipeline.vertex_binding_count);
             return Error::usage(&*pipeline.name, message);
         }
-        self.cmd.missing_constants(&pipeline.name, pipeline.push_constant_bytes)
+        self.cmd.missing_constants_error(&pipeline.name, pipeline.push_constant_bytes)
     }
 
     /// Fails unless a pipeline with a mesh shader is bound with all it reads.
-    pub(super) fn ready_mesh(&mut self) -> Result<()> {
+    pub(super) fn check_mesh_draw(&mut self) -> Result<()> {
         self.hazards.drawn = true;
-        let pipeline = self.bound("draw_mesh_tasks")?;
+        let pipeline = self.bound_pipeline("draw_mesh_tasks")?;
         if pipeline.front_end == FrontEnd::Vertex {
             let message = "it has no mesh shader; draw with draw, draw_indexed or their indirect forms";
             return Err(Error::usage(&*pipeline.name, message));
         }
-        self.cmd.notes.queries.check_mesh_draw()?;
+        self.cmd.state.queries.check_mesh_draw()?;
         self.cmd.check_pushed(&pipeline.name, pipeline.push_constant_bytes)
     }
 
-    pub(super) fn bound(&self, call: &str) -> Result<&RenderPipeline> {
+    pub(super) fn bound_pipeline(&self, call: &str) -> Result<&RenderPipeline> {
         self.pipeline.as_deref().ok_or_else(|| Error::usage(call, "bind a render pipeline first"))
     }
 
     /// The pass reads a buffer; no barrier can be placed any more.
-    pub(super) fn read_inside(&mut self, buffer: &Buffer, next: Use) -> Result<()> {
+    pub(super) fn read_in_pass(&mut self, buffer: &Buffer, next: Use) -> Result<()> {
         self.cmd.use_buffer(buffer, next);
-        self.track_inside("the buffer", &buffer.name, "list it in the pass's dependencies")
+        self.track_in_pass("the buffer", &buffer.name, "list it in the pass's dependencies")
     }
 
-    fn track_inside(&mut self, what: &str, name: &str, remedy: &str) -> Result<()> {
+    fn track_in_pass(&mut self, what: &str, name: &str, remedy: &str) -> Result<()> {
         let Recording { tracker, images, .. } = &mut **self.cmd.recording;
-        let Notes { uses, found_textures, barriers, .. } = &mut **self.cmd.notes;
-        if uses.need_barriers(tracker) {
+        let RecordingState { accesses: uses, texture_cache: found_textures, barriers, .. } =
+            &mut **self.cmd.state;
+        if uses.needs_barriers(tracker) {
             uses.clear();
             let message = format!("{what} was written earlier in this command buffer; {remedy}");
             return Err(Error::usage(name, message));
@@ -441,6 +442,6 @@ fn viewport_fits([x, y, width, height]: [f32; 4], limits: &Limits) -> bool {
 }
 
 #[inline]
-fn length(range: &Range<u32>) -> u32 {
+fn range_length(range: &Range<u32>) -> u32 {
     range.end.saturating_sub(range.start)
 }

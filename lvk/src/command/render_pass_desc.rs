@@ -6,7 +6,7 @@ use ash::vk;
 
 use super::CommandBuffer;
 use super::attachment_desc::{ColorAttachment, DepthAttachment, ShadingRateAttachment};
-use super::attachments::Targets;
+use super::attachments::PassTargets;
 use super::dependencies::Dependencies;
 use super::render_pass::RenderPass;
 use crate::barrier::{Stages, Use};
@@ -65,9 +65,9 @@ impl CommandBuffer {
     pub fn begin_rendering(&mut self, desc: &RenderPassDesc<'_>) -> Result<RenderPass<'_>> {
         self.needs_graphics("a render pass")?;
         let mut targets = None;
-        self.flush_after(|cmd| {
+        self.flush_barriers_after(|cmd| {
             targets = Some(cmd.use_targets(desc)?);
-            cmd.use_built_structures();
+            cmd.use_built_accel_structs();
             cmd.use_dependencies(&desc.dependencies, Stages::PRE_RASTER | Stages::FRAGMENT)?;
             cmd.use_draw_inputs(&desc.dependencies)
         })?;
@@ -82,11 +82,11 @@ impl CommandBuffer {
         Ok(RenderPass::new(self, targets, !desc.debug_name.is_empty()))
     }
 
-    fn record_begin(&mut self, targets: &Targets) {
+    fn record_begin(&mut self, targets: &PassTargets) {
         let layers = targets.layers;
         let mut info = vk::RenderingInfo::default()
             .render_area(targets.area.raw())
-            .layer_count(layers.count())
+            .layer_count(layers.layer_count())
             .view_mask(layers.view_mask)
             .color_attachments(&targets.colors);
         if let Some(depth) = &targets.depth {
@@ -102,7 +102,7 @@ impl CommandBuffer {
         // SAFETY: the views are alive and in the layouts named; no other pass is open, as passes borrow `self`.
         unsafe { self.shared.gpu.device.cmd_begin_rendering(self.raw(), &info) };
         self.rendering = true;
-        self.views = layers.queries();
+        self.views = layers.query_count();
         self.had_pass = true;
     }
 

@@ -4,7 +4,7 @@ use ash::vk;
 
 use super::CommandBuffer;
 use super::attachment_desc::DepthResolve;
-use super::attachments::Target;
+use super::attachments::PassTarget;
 use crate::barrier::{Layout, Use};
 use crate::error::{Error, Result};
 use crate::format::{Format, NumericFormat};
@@ -15,14 +15,14 @@ impl CommandBuffer {
     /// A multisampled colour target and what it is resolved to: the pass uses both.
     pub(super) fn use_color_resolve(
         &mut self,
-        source: &Target,
-        to: &Target,
+        source: &PassTarget,
+        to: &PassTarget,
         info: vk::RenderingAttachmentInfo<'static>,
     ) -> Result<vk::RenderingAttachmentInfo<'static>> {
         check_resolve(source, to)?;
-        self.use_texture(&source.texture, source.part(), Use::resolve_source())?;
-        self.use_texture(&to.texture, to.part(), Use::resolve_target())?;
-        let mode = color_mode(source.texture.format);
+        self.use_texture(&source.texture, source.subresources(), Use::resolve_source())?;
+        self.use_texture(&to.texture, to.subresources(), Use::resolve_target())?;
+        let mode = color_resolve_mode(source.texture.format);
         Ok(info
             .resolve_mode(mode)
             .resolve_image_view(to.view()?)
@@ -32,17 +32,17 @@ impl CommandBuffer {
     /// The same of a depth target, whose depth and stencil are resolved each by its mode.
     pub(super) fn use_depth_resolve(
         &mut self,
-        source: &Target,
-        to: &Target,
+        source: &PassTarget,
+        to: &PassTarget,
         resolve: &DepthResolve,
         [depth, stencil]: [&mut Option<vk::RenderingAttachmentInfo<'static>>; 2],
     ) -> Result<()> {
         check_resolve(source, to)?;
         let stencil_mode = resolve.stencil.filter(|_| source.texture.format.has_stencil());
-        self.check_modes(source, resolve.depth, stencil_mode)?;
-        self.use_texture(&source.texture, source.part(), Use::resolve_source())?;
+        self.check_resolve_modes(source, resolve.depth, stencil_mode)?;
+        self.use_texture(&source.texture, source.subresources(), Use::resolve_source())?;
         let written = Use::resolve_target().with_layout(Layout::DepthTarget);
-        self.use_texture(&to.texture, to.part(), written)?;
+        self.use_texture(&to.texture, to.subresources(), written)?;
         let view = to.view()?;
         for (info, mode) in [(depth, resolve.depth), (stencil, stencil_mode)] {
             if let (Some(info), Some(mode)) = (info, mode) {
@@ -54,9 +54,9 @@ impl CommandBuffer {
         Ok(())
     }
 
-    fn check_modes(
+    fn check_resolve_modes(
         &self,
-        source: &Target,
+        source: &PassTarget,
         depth: Option<ResolveMode>,
         stencil: Option<ResolveMode>,
     ) -> Result<()> {
@@ -78,7 +78,7 @@ impl CommandBuffer {
     }
 }
 
-fn check_resolve(source: &Target, to: &Target) -> Result<()> {
+fn check_resolve(source: &PassTarget, to: &PassTarget) -> Result<()> {
     to.texture.check_not_transient()?;
     let name = &to.texture.name;
     let from = &source.texture;
@@ -101,7 +101,7 @@ fn check_resolve(source: &Target, to: &Target) -> Result<()> {
 }
 
 /// Vulkan leaves no choice.
-fn color_mode(format: Format) -> vk::ResolveModeFlags {
+fn color_resolve_mode(format: Format) -> vk::ResolveModeFlags {
     if format.numeric_format() != NumericFormat::Float {
         vk::ResolveModeFlags::SAMPLE_ZERO
     } else {

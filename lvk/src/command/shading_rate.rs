@@ -16,7 +16,7 @@ use crate::submit::emit_barriers::vulkan_layout;
 
 impl CommandBuffer {
     /// Finds and checks where a pass takes its rates from; the pass uses it.
-    pub(super) fn use_rates(
+    pub(super) fn use_shading_rate_attachment(
         &mut self,
         desc: &RenderPassDesc<'_>,
         area: PassArea,
@@ -29,7 +29,7 @@ impl CommandBuffer {
         texture.check_subresource(mip, layer)?;
         let wrong = |message| Error::usage(&texture.name, message);
         self.shared.gpu.caps.limits.shading_rate.check_texel(texel).map_err(wrong)?;
-        check_cover(texture.mip_extent(mip), texel, area).map_err(wrong)?;
+        check_covers_area(texture.mip_extent(mip), texel, area).map_err(wrong)?;
         let used = Use::shading_rate();
         self.use_texture(&texture, texture.subresource(mip, layer), used)?;
         let [width, height] = texel;
@@ -43,7 +43,7 @@ impl CommandBuffer {
 }
 
 /// Fails unless there is a texel for each pixel of the area.
-fn check_cover(texels: [u32; 2], texel: [u32; 2], area: PassArea) -> Result<(), String> {
+fn check_covers_area(texels: [u32; 2], texel: [u32; 2], area: PassArea) -> Result<(), String> {
     let needed = |axis: usize| area.offset[axis].saturating_add(area.extent[axis]).div_ceil(texel[axis]);
     let needed = [needed(0), needed(1)];
     if texels[0] >= needed[0] && texels[1] >= needed[1] {
@@ -61,7 +61,7 @@ impl RenderPass<'_> {
     /// [`shading_rate`](crate::RenderPipelineDesc::shading_rate) is bound;
     /// [`Unsupported`](Error::Unsupported) for sizes and combinations that the device lacks.
     pub fn shading_rate(&mut self, rate: ShadingRate) -> Result<()> {
-        let pipeline = self.bound("shading_rate")?;
+        let pipeline = self.bound_pipeline("shading_rate")?;
         if pipeline.pass_state.shading_rate.is_none() {
             let message = "it has no shading rate to replace; create it with one";
             return Err(Error::usage(&*pipeline.name, message));
@@ -72,7 +72,7 @@ impl RenderPass<'_> {
     }
 
     /// Fails where the pass has rates that the pipeline was not made for.
-    pub(super) fn check_rates(&self, pipeline: &RenderPipeline) -> Result<()> {
+    pub(super) fn check_shading_rates(&self, pipeline: &RenderPipeline) -> Result<()> {
         if self.targets.rates.is_none() || pipeline.pass_state.shading_rate.is_some() {
             return Ok(());
         }
@@ -89,10 +89,10 @@ mod tests {
     #[test]
     fn every_pixel_has_a_texel() {
         let area = PassArea { offset: [16, 0], extent: [17, 32] };
-        assert_eq!(check_cover([3, 2], [16, 16], area), Ok(()));
-        assert_eq!(check_cover([9, 9], [16, 16], area), Ok(()));
-        let message = check_cover([2, 2], [16, 16], area).map_err(|why| why.contains("needs [3, 2]"));
+        assert_eq!(check_covers_area([3, 2], [16, 16], area), Ok(()));
+        assert_eq!(check_covers_area([9, 9], [16, 16], area), Ok(()));
+        let message = check_covers_area([2, 2], [16, 16], area).map_err(|why| why.contains("needs [3, 2]"));
         assert_eq!(message, Err(true));
-        assert!(check_cover([3, 1], [16, 16], area).is_err());
+        assert!(check_covers_area([3, 1], [16, 16], area).is_err());
     }
 }

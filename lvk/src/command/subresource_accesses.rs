@@ -6,86 +6,87 @@ use crate::barrier::{ResourceId, Subresources, Use};
 ///
 /// Parts of one image never overlap: what is used twice counts once, with both uses.
 #[derive(Debug)]
-pub(super) struct PartUses<T> {
-    parts: Vec<PartUse<T>>,
+pub(super) struct SubresourceAccesses<T> {
+    accesses: Vec<SubresourceAccess<T>>,
 }
 
 /// A part of an image and what a command does to it.
 #[derive(Debug, Clone)]
-pub(super) struct PartUse<T> {
+pub(super) struct SubresourceAccess<T> {
     pub(super) id: ResourceId,
     pub(super) part: Subresources,
     pub(super) next: Use,
     pub(super) owner: T,
 }
 
-impl<T: Clone> PartUses<T> {
+impl<T: Clone> SubresourceAccesses<T> {
     /// Adds a use. Fails with the owner of an earlier use of the same texels that excludes this one.
     #[inline]
     pub(super) fn add(&mut self, id: ResourceId, part: Subresources, next: Use, owner: T) -> Result<(), T> {
         // Most commands use one image; what is written here and in the list at once need not wait in memory between.
-        if self.parts.is_empty() {
-            self.parts.push(PartUse { id, part, next, owner });
+        if self.accesses.is_empty() {
+            self.accesses.push(SubresourceAccess { id, part, next, owner });
             return Ok(());
         }
-        self.add_beside(PartUse { id, part, next, owner })
+        self.add_to_others(SubresourceAccess { id, part, next, owner })
     }
 
-    fn add_beside(&mut self, new: PartUse<T>) -> Result<(), T> {
-        let overlaps = |old: &PartUse<T>| old.id == new.id && old.part.intersection(new.part).is_some();
-        match self.parts.iter().position(overlaps) {
+    fn add_to_others(&mut self, new: SubresourceAccess<T>) -> Result<(), T> {
+        let overlaps =
+            |old: &SubresourceAccess<T>| old.id == new.id && old.part.intersection(new.part).is_some();
+        match self.accesses.iter().position(overlaps) {
             None => {
-                self.parts.push(new);
+                self.accesses.push(new);
                 Ok(())
             }
-            Some(place) => self.add_over(place, new),
+            Some(index) => self.merge_at(index, new),
         }
     }
 
     /// Adds a use of texels of which the part at this place is the first to have some.
-    fn add_over(&mut self, place: usize, new: PartUse<T>) -> Result<(), T> {
-        let first = &mut self.parts[place];
+    fn merge_at(&mut self, index: usize, new: SubresourceAccess<T>) -> Result<(), T> {
+        let first = &mut self.accesses[index];
         if first.part == new.part {
             first.next = first.next.merge(new.next).ok_or_else(|| first.owner.clone())?;
             return Ok(());
         }
-        self.add_pieces(place, new)
+        self.split_and_merge(index, new)
     }
 
     /// Adds a use of texels of which some, from the part at `first` on, are used already.
-    fn add_pieces(&mut self, first: usize, new: PartUse<T>) -> Result<(), T> {
+    fn split_and_merge(&mut self, first: usize, new: SubresourceAccess<T>) -> Result<(), T> {
         let mut rest = vec![new.part];
-        for place in first..self.parts.len() {
-            let old = self.parts[place].clone();
+        for index in first..self.accesses.len() {
+            let old = self.accesses[index].clone();
             let Some(both) = old.part.intersection(new.part).filter(|_| old.id == new.id) else { continue };
             let next = old.next.merge(new.next).ok_or_else(|| old.owner.clone())?;
             rest = rest.into_iter().flat_map(|piece| piece.without(both)).collect();
             if next != old.next {
-                let kept = old.part.without(both).map(|part| PartUse { part, ..old.clone() });
-                self.parts.extend(kept);
-                self.parts[place] = PartUse { part: both, next, ..old };
+                let kept = old.part.without(both).map(|part| SubresourceAccess { part, ..old.clone() });
+                self.accesses.extend(kept);
+                self.accesses[index] = SubresourceAccess { part: both, next, ..old };
             }
         }
-        self.parts.extend(rest.into_iter().map(|part| PartUse { part, ..new.clone() }));
+        self.accesses.extend(rest.into_iter().map(|part| SubresourceAccess { part, ..new.clone() }));
         Ok(())
     }
 
     pub(super) fn is_empty(&self) -> bool {
-        self.parts.is_empty()
+        self.accesses.is_empty()
     }
 
-    pub(super) fn iter(&self) -> impl Iterator<Item = &PartUse<T>> {
-        self.parts.iter()
+    pub(super) fn iter(&self) -> impl Iterator<Item = &SubresourceAccess<T>> {
+        self.accesses.iter()
     }
 
     pub(super) fn clear(&mut self) {
-        self.parts.clear();
+        self.accesses.clear();
     }
 }
 
-impl<T> Default for PartUses<T> {
+impl<T> Default for SubresourceAccesses<T> {
     fn default() -> Self {
-        Self { parts: Vec::new() }
+        Self { accesses: Vec::new() }
     }
 }
 
@@ -125,7 +126,7 @@ mod tests {
         fn every_subresource_has_the_merged_use_of_all_who_name_it(
             added in prop::collection::vec((0..2_u64, part(), 0..4_usize), 1..8)
         ) {
-            let mut found = PartUses::default();
+            let mut found = SubresourceAccesses::default();
             let mut expected: BTreeMap<(u64, u32, u32), (Use, usize)> = BTreeMap::new();
             for (owner, (id, part, kind)) in added.into_iter().enumerate() {
                 let next = uses()[kind];
@@ -145,7 +146,7 @@ mod tests {
                 }
             }
             let mut seen = BTreeMap::new();
-            for PartUse { id, part, next, owner } in found.iter().cloned() {
+            for SubresourceAccess { id, part, next, owner } in found.iter().cloned() {
                 for (mip, layer) in cells(part) {
                     prop_assert!(seen.insert((id.0, mip, layer), (next, owner)).is_none(), "parts overlap");
                 }
@@ -158,7 +159,7 @@ mod tests {
     fn a_conflict_names_the_owner_of_the_first_use() {
         let whole = Subresources { base_mip: 0, mip_count: 4, base_layer: 0, layer_count: 1 };
         let tail = Subresources { base_mip: 2, mip_count: 2, ..whole };
-        let mut found = PartUses::default();
+        let mut found = SubresourceAccesses::default();
         let id = ResourceId(1);
         found.add(id, tail, Use::shader_write(Stages::COMPUTE), "tail").unwrap();
         assert_eq!(found.add(id, whole, Use::shader_read(Stages::COMPUTE), "whole"), Err("tail"));

@@ -23,7 +23,7 @@ impl CommandBuffer {
         self.needs_compute("a trace")?;
         let pipeline = self.shared.store.ray_tracing_pipelines.get(pipeline)?;
         let point = vk::PipelineBindPoint::RAY_TRACING_KHR;
-        self.bind(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
+        self.bind_pipeline(point, pipeline.raw, &pipeline.name, pipeline.push_constant_bytes);
         let ext = self.shared.gpu.ray_tracing_functions()?;
         // SAFETY: the command buffer is being recorded, and the size is that of the pipeline just bound.
         unsafe { ext.cmd_set_ray_tracing_pipeline_stack_size(self.raw(), pipeline.stack_bytes) };
@@ -43,12 +43,12 @@ impl CommandBuffer {
         size: [u32; 3],
         dependencies: &Dependencies<'_>,
     ) -> Result<()> {
-        let (pipeline, regions) = self.ready_trace(ray_gen)?;
+        let (pipeline, regions) = self.check_trace(ray_gen)?;
         check_size(&self.shared.gpu.caps.limits, &pipeline.name, size)?;
         if size.contains(&0) {
             return Ok(());
         }
-        self.flush_after(|cmd| cmd.use_trace(&pipeline, dependencies))?;
+        self.flush_barriers_after(|cmd| cmd.use_trace(&pipeline, dependencies))?;
         let ext = self.shared.gpu.ray_tracing_functions()?;
         // SAFETY: a ray tracing pipeline is bound, the regions are its own, and the size is within the limit.
         unsafe {
@@ -86,10 +86,10 @@ impl CommandBuffer {
         if !self.shared.gpu.caps.trace_rays_indirect {
             return Err(self.shared.gpu.unsupported("trace_rays_indirect: indirect traces"));
         }
-        let (pipeline, regions) = self.ready_trace(ray_gen)?;
+        let (pipeline, regions) = self.check_trace(ray_gen)?;
         let buffer = self.shared.store.buffers.get(arguments)?;
         check_arguments(&buffer, offset, ARGUMENT_BYTES)?;
-        self.flush_after(|cmd| {
+        self.flush_barriers_after(|cmd| {
             cmd.use_buffer(&buffer, Use::indirect());
             cmd.use_trace(&pipeline, dependencies)
         })?;
@@ -109,7 +109,7 @@ impl CommandBuffer {
     }
 
     /// The bound pipeline and its table, if everything its shaders need was pushed.
-    fn ready_trace(&self, ray_gen: u32) -> Result<(Arc<RayTracingPipeline>, TraceRegions)> {
+    fn check_trace(&self, ray_gen: u32) -> Result<(Arc<RayTracingPipeline>, TraceRegions)> {
         let pipeline = self.ray_tracing.clone();
         let pipeline =
             pipeline.ok_or_else(|| Error::usage("trace_rays", "bind a ray tracing pipeline first"))?;
@@ -119,7 +119,7 @@ impl CommandBuffer {
     }
 
     fn use_trace(&mut self, pipeline: &RayTracingPipeline, dependencies: &Dependencies<'_>) -> Result<()> {
-        self.use_structures(Stages::RAY_TRACING);
+        self.use_accel_structs(Stages::RAY_TRACING);
         self.use_buffer(&pipeline.table, Use::shader_read(Stages::RAY_TRACING));
         self.use_dependencies(dependencies, Stages::RAY_TRACING)
     }

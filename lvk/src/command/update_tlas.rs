@@ -5,18 +5,18 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::build_blas::OpenBuild;
-use super::recording_state::Notes;
-use super::write_instances::{GivenInstances, Staged, Written};
+use super::open_build::OpenBuild;
+use super::recording_state::RecordingState;
+use super::write_instances::{KernelInstances, StagedInstances, VulkanInstances};
 use crate::accel::AccelStruct;
-use crate::accel::blas_refs::{Revision, ShownSet};
+use crate::accel::blas_refs::{AccelGeneration, BlasRefSet};
 use crate::accel::build::TlasBuild;
 use crate::accel::flags::BuildMode;
 use crate::accel::instance::{DeviceInstances, TlasInstance};
 use crate::accel::instance_plan::PlanMemory;
 use crate::accel::scratch::aligned_scratch_address;
 use crate::accel::tlas::{InstanceSource, Tlas};
-use crate::accel::tlas_tracker::{Change, Recorded, Row, TlasUpdate, TlasUpdates};
+use crate::accel::tlas_tracker::{RecordedTlasBuild, TlasChange, TlasEntry, TlasTracker, TlasTrackers};
 use crate::barrier::{ResourceId, Stages, Use};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::error::{Error, Result, check_limit};
@@ -26,26 +26,26 @@ use crate::software_ray_query::tlas::SoftwareTlas;
 use crate::submit::ownership::QueueAccess;
 
 /// What is known of a structure before the next command.
-struct Before<'a> {
+struct PreviousState<'a> {
     /// Instances of the caller and of Vulkan, `None` before the first build.
     counts: Option<(u32, u32)>,
     refits: u32,
     /// Whether this command buffer has not updated it.
     is_first: bool,
     /// What it shows, or nothing where some of that is gone or has moved.
-    shown: &'a Arc<ShownSet>,
+    blas_refs: &'a Arc<BlasRefSet>,
     /// Whether it shows that.
-    stands: bool,
+    is_current: bool,
     /// When that was looked at.
-    revision: Revision,
+    generation: AccelGeneration,
 }
 
 /// Instances on their way into the build of one structure.
 #[derive(Clone, Copy)]
-struct Update<'a> {
+struct TlasBuildRequest<'a> {
     target: &'a AccelStruct,
     tlas: &'a Tlas,
-    before: &'a Before<'a>,
+    previous: &'a PreviousState<'a>,
     mode: BuildMode,
 }
 
@@ -65,9 +65,9 @@ impl CommandBuffer {
         mode: BuildMode,
     ) -> Result<()> {
         self.needs_compute("an update of a top-level structure")?;
-        self.with_updates(|cmd, updates| {
-            let row = updates.find(&cmd.shared.store.accel_structs, tlas)?;
-            cmd.update_row(updates, row, instances, mode)
+        self.with_tlas_trackers(|cmd, updates| {
+            let index = updates.index_of_handle(&cmd.shared.store.accel_structs, tlas)?;
+            cmd.update_entry(updates, index, instances, mode)
         })
     }
 
@@ -88,9 +88,9 @@ impl CommandBuffer {
         mode: BuildMode,
     ) -> Result<()> {
         self.needs_compute("an update of a top-level structure")?;
-        self.with_updates(|cmd, updates| {
-            let row = updates.find(&cmd.shared.store.accel_structs, tlas)?;
-            cmd.update_row_from(updates, row, instances, mode)
+        self.with_tlas_trackers(|cmd, updates| {
+            let index = updates.index_of_handle(&cmd.shared.store.accel_structs, tlas)?;
+            cmd.update_entry_from_buffer(updates, index, instances, mode)
         })
     }
 
@@ -101,9 +101,9 @@ impl CommandBuffer {
         instances: &[TlasInstance],
         mode: BuildMode,
     ) -> Result<()> {
-        self.with_updates(|cmd, updates| {
-            let row = updates.row(target);
-            cmd.update_row(updates, row, instances, mode)
+        self.with_tlas_trackers(|cmd, updates| {
+            let index = updates.index_of(target);
+            cmd.update_entry(updates, index, instances, mode)
         })
     }
 
@@ -112,223 +112,263 @@ impl CommandBuffer {
         let tlas = target.tlas()?;
         let contents = tlas.contents().clone();
         let (Some(source), Some(count)) = (contents.source, contents.instance_count) else { return Ok(()) };
-        let shown = Arc::new(contents.shown.renewed()?);
+        let blas_refs = Arc::new(contents.blas_refs.refreshed()?);
         let source = InstanceSource::clone(&source);
-        self.with_updates(|cmd, updates| {
-            let row = updates.row(target);
-            let Row { target, update, nothing, .. } = updates.at(row);
-            let before = cmd.before(tlas, update, nothing);
-            let given = cmd.run_instances(target, tlas, shown, source, contents.built_count)?;
-            cmd.build_written(target, tlas, &given, before.is_first, false)?;
-            let (recorded, shown, source) = cmd.tell(tlas, &before, given.change(count, false));
-            updates.record(row, &recorded, shown, source);
+        self.with_tlas_trackers(|cmd, updates| {
+            let index = updates.index_of(target);
+            let TlasEntry { target, tracker: update, no_refs, .. } = updates.entry(index);
+            let previous = cmd.previous_state(tlas, update, no_refs);
+            let kernel_instances =
+                cmd.record_instances(target, tlas, blas_refs, source, contents.built_count)?;
+            cmd.build_from_kernel(target, tlas, &kernel_instances, previous.is_first, false)?;
+            let (recorded, blas_refs, source) =
+                cmd.publish(tlas, &previous, kernel_instances.into_change(count, false));
+            updates.record_build(index, &recorded, blas_refs, source);
             Ok(())
         })
     }
 
-    /// Has `record` keep what it updates.
+    /// Has `record_build` keep what it updates.
     #[inline(always)]
-    fn with_updates(&mut self, record: impl FnOnce(&mut Self, &mut TlasUpdates) -> Result<()>) -> Result<()> {
-        let mut updates = self.notes.tlas_updates.take().unwrap_or_default();
+    fn with_tlas_trackers(
+        &mut self,
+        record: impl FnOnce(&mut Self, &mut TlasTrackers) -> Result<()>,
+    ) -> Result<()> {
+        let mut updates = self.state.tlas_trackers.take().unwrap_or_default();
         let recorded = record(self, &mut updates);
-        self.notes.tlas_updates = Some(updates);
+        self.state.tlas_trackers = Some(updates);
         recorded
     }
 
     /// Shows instances of the host in the structure of a row. Mostly few, and of the same structures as before.
     #[inline(always)]
-    fn update_row(
+    fn update_entry(
         &mut self,
-        updates: &mut TlasUpdates,
-        row: usize,
+        updates: &mut TlasTrackers,
+        index: usize,
         instances: &[TlasInstance],
         mode: BuildMode,
     ) -> Result<()> {
-        let Row { target, update, nothing, .. } = updates.at(row);
+        let TlasEntry { target, tracker: update, no_refs, .. } = updates.entry(index);
         let tlas = target.tlas()?;
         if instances.len() > tlas.capacity as usize {
             return check_capacity(target, tlas, instances.len() as u64);
         }
-        let before = self.before(tlas, update, nothing);
+        let previous = self.previous_state(tlas, update, no_refs);
         if tlas.software.is_none()
-            && let Some(address) = self.stage_alike(instances, before.shown)?
+            && let Some(address) = self.try_stage_unchanged(instances, previous.blas_refs)?
         {
-            let update = Update { target, tlas, before: &before, mode };
-            let recorded = self.build_staged(update, instances.len() as u32, address)?;
-            updates.record_alike(row, &recorded);
+            let update = TlasBuildRequest { target, tlas, previous: &previous, mode };
+            let recorded = self.build_unchanged(update, instances.len() as u32, address)?;
+            updates.record_unchanged(index, &recorded);
             return Ok(());
         }
-        self.update_otherwise(updates, row, instances, mode)
+        self.update_changed(updates, index, instances, mode)
     }
 
     /// Builds from instances that Vulkan can read, of what was shown before.
     #[inline(always)]
-    fn build_staged(&mut self, update: Update<'_>, count: u32, address: u64) -> Result<Recorded> {
-        let Update { tlas, before, .. } = update;
-        let refit = self.build_addressed(update, count, address)?;
-        if before.is_first {
-            self.refer_to(before.shown);
+    fn build_unchanged(
+        &mut self,
+        update: TlasBuildRequest<'_>,
+        count: u32,
+        address: u64,
+    ) -> Result<RecordedTlasBuild> {
+        let TlasBuildRequest { tlas, previous, .. } = update;
+        let refit = self.build_from_addresses(update, count, address)?;
+        if previous.is_first {
+            self.reference_blas(previous.blas_refs);
         }
-        let named_rows = self.tell_rows(tlas, before, before.shown);
-        Ok(Recorded { counts: (count, count), refit, named_rows, revision: before.revision })
+        let hit_table_address = self.write_hit_table_entry(tlas, previous, previous.blas_refs);
+        Ok(RecordedTlasBuild {
+            counts: (count, count),
+            refit,
+            hit_table_address,
+            generation: previous.generation,
+        })
     }
 
     /// Builds from instances that the host has written with addresses. Answers whether it is a refit.
     #[inline(always)]
-    fn build_addressed(&mut self, update: Update<'_>, count: u32, address: u64) -> Result<bool> {
-        let refit = update.check(count, count)?;
-        let instances = GivenInstances { address, count, is_from_kernel: false };
-        self.build_tlas(update.target, update.tlas, instances, update.before.is_first, refit)?;
+    fn build_from_addresses(
+        &mut self,
+        update: TlasBuildRequest<'_>,
+        count: u32,
+        address: u64,
+    ) -> Result<bool> {
+        let refit = update.check_counts(count, count)?;
+        let instances = VulkanInstances { address, count, is_from_kernel: false };
+        self.build_tlas(update.target, update.tlas, instances, update.previous.is_first, refit)?;
         Ok(refit)
     }
 
-    /// As [`update_row`](Self::update_row), of whatever structures.
+    /// As [`update_entry`](Self::update_entry), of whatever structures.
     #[inline(never)]
-    fn update_otherwise(
+    fn update_changed(
         &mut self,
-        updates: &mut TlasUpdates,
-        row: usize,
+        updates: &mut TlasTrackers,
+        index: usize,
         instances: &[TlasInstance],
         mode: BuildMode,
     ) -> Result<()> {
-        let Row { target, update, nothing, memory } = updates.at(row);
+        let TlasEntry { target, tracker: update, no_refs, plan_memory: memory } = updates.entry(index);
         let tlas = target.tlas()?;
-        let before = self.before(tlas, update, nothing);
-        let update = Update { target, tlas, before: &before, mode };
+        let previous = self.previous_state(tlas, update, no_refs);
+        let update = TlasBuildRequest { target, tlas, previous: &previous, mode };
         let count = instances.len() as u32;
         let staged = match tlas.structure {
-            Some(_) => self.stage_instances(&target.name, instances, before.shown, &mut memory.marks)?,
+            Some(_) => self.stage_instances(&target.name, instances, previous.blas_refs, &mut memory.seen)?,
             None => None,
         };
         let change = match staged {
-            Some(Staged { address, shown }) => {
-                let refit = self.build_addressed(update, count, address)?;
-                Change { count, built_count: count, shown, source: None, refit }
+            Some(StagedInstances { address, blas_refs }) => {
+                let refit = self.build_from_addresses(update, count, address)?;
+                TlasChange { count, built_count: count, blas_refs, source: None, refit }
             }
-            None => self.update_by_plan(update, instances, memory)?,
+            None => self.update_with_kernel(update, instances, memory)?,
         };
         if let Some(software) = &tlas.software
             && let Err(error) = self.build_software_tlas(target, software, instances)
         {
-            return Err(self.fail_beside_device(target, tlas, error));
+            return Err(self.fail_after_device_build(target, tlas, error));
         }
-        let (recorded, shown, source) = self.tell(tlas, &before, change);
-        updates.record(row, &recorded, shown, source);
+        let (recorded, blas_refs, source) = self.publish(tlas, &previous, change);
+        updates.record_build(index, &recorded, blas_refs, source);
         Ok(())
     }
 
     /// Builds from instances that a kernel writes; where the device has no structures of its own, only checks.
     #[inline(never)]
-    fn update_by_plan(
+    fn update_with_kernel(
         &mut self,
-        update: Update<'_>,
+        update: TlasBuildRequest<'_>,
         instances: &[TlasInstance],
         memory: &mut PlanMemory,
-    ) -> Result<Change> {
-        let Update { target, tlas, before, .. } = update;
+    ) -> Result<TlasChange> {
+        let TlasBuildRequest { target, tlas, previous, .. } = update;
         let count = instances.len() as u32;
-        let plan = self.plan_instances(&target.name, instances, before.shown, memory)?;
+        let plan = self.plan_instances(&target.name, instances, previous.blas_refs, memory)?;
         if tlas.structure.is_none() {
-            let shown = Some(Arc::clone(&plan.shown));
-            memory.refers = plan.into_refers();
-            let refit = update.check(count, count)?;
-            return Ok(Change { count, built_count: count, shown, source: None, refit });
+            let blas_refs = Some(Arc::clone(&plan.blas_refs));
+            memory.ref_indices = plan.into_ref_indices();
+            let refit = update.check_counts(count, count)?;
+            return Ok(TlasChange { count, built_count: count, blas_refs, source: None, refit });
         }
-        let refit = update.check(count, plan.built_count)?;
-        let (source, shown) = self.host_source(&target.name, instances, plan, memory)?;
+        let refit = update.check_counts(count, plan.built_count)?;
+        let (source, blas_refs) = self.host_source(&target.name, instances, plan, memory)?;
         let built_count = source.built_count(&target.name)?;
-        let given = self.run_instances(target, tlas, shown, source, built_count)?;
-        self.build_written(target, tlas, &given, before.is_first, refit)?;
-        Ok(given.change(count, refit))
+        let kernel_instances = self.record_instances(target, tlas, blas_refs, source, built_count)?;
+        self.build_from_kernel(target, tlas, &kernel_instances, previous.is_first, refit)?;
+        Ok(kernel_instances.into_change(count, refit))
     }
 
     /// Shows instances that lie in a buffer in the structure of a row.
-    fn update_row_from(
+    fn update_entry_from_buffer(
         &mut self,
-        updates: &mut TlasUpdates,
-        row: usize,
+        updates: &mut TlasTrackers,
+        index: usize,
         instances: &DeviceInstances<'_>,
         mode: BuildMode,
     ) -> Result<()> {
-        let Row { target, update, nothing, .. } = updates.at(row);
+        let TlasEntry { target, tracker: update, no_refs, .. } = updates.entry(index);
         let tlas = target.tlas()?;
         let count = instances.count;
         check_capacity(target, tlas, count.into())?;
-        let before = self.before(tlas, update, nothing);
-        let update = Update { target, tlas, before: &before, mode };
-        let (shown, source) = self.device_source(&target.name, instances, before.shown)?;
+        let previous = self.previous_state(tlas, update, no_refs);
+        let update = TlasBuildRequest { target, tlas, previous: &previous, mode };
+        let (blas_refs, source) = self.device_source(&target.name, instances, previous.blas_refs)?;
         let change = match tlas.structure {
-            Some(_) => self.build_from(update, instances, Arc::clone(&shown), source)?,
+            Some(_) => self.build_from_buffer(update, instances, Arc::clone(&blas_refs), source)?,
             None => {
-                let refit = update.check(count, count)?;
-                Change { count, built_count: count, shown: Some(Arc::clone(&shown)), source: None, refit }
+                let refit = update.check_counts(count, count)?;
+                TlasChange {
+                    count,
+                    built_count: count,
+                    blas_refs: Some(Arc::clone(&blas_refs)),
+                    source: None,
+                    refit,
+                }
             }
         };
         if let Some(software) = &tlas.software
-            && let Err(error) = self.build_software_tlas_from(target, software, instances, &shown)
+            && let Err(error) = self.build_software_tlas_from_buffer(target, software, instances, &blas_refs)
         {
-            return Err(self.fail_beside_device(target, tlas, error));
+            return Err(self.fail_after_device_build(target, tlas, error));
         }
-        let (recorded, shown, source) = self.tell(tlas, &before, change);
-        updates.record(row, &recorded, shown, source);
+        let (recorded, blas_refs, source) = self.publish(tlas, &previous, change);
+        updates.record_build(index, &recorded, blas_refs, source);
         Ok(())
     }
 
     /// Builds what the device traces from instances that lie in a buffer.
-    fn build_from(
+    fn build_from_buffer(
         &mut self,
-        update: Update<'_>,
+        update: TlasBuildRequest<'_>,
         instances: &DeviceInstances<'_>,
-        shown: Arc<ShownSet>,
+        blas_refs: Arc<BlasRefSet>,
         mut source: InstanceSource,
-    ) -> Result<Change> {
-        let Update { target, tlas, before, .. } = update;
+    ) -> Result<TlasChange> {
+        let TlasBuildRequest { target, tlas, previous, .. } = update;
         let built_count = source.built_count(&target.name)?;
-        let refit = update.check(instances.count, built_count)?;
-        self.keep_source(&target.name, instances, &shown, &mut source)?;
-        let given = self.run_instances(target, tlas, shown, source, built_count)?;
-        self.build_written(target, tlas, &given, before.is_first, refit)?;
-        Ok(given.change(instances.count, refit))
+        let refit = update.check_counts(instances.count, built_count)?;
+        self.keep_source_copy(&target.name, instances, &blas_refs, &mut source)?;
+        let kernel_instances = self.record_instances(target, tlas, blas_refs, source, built_count)?;
+        self.build_from_kernel(target, tlas, &kernel_instances, previous.is_first, refit)?;
+        Ok(kernel_instances.into_change(instances.count, refit))
     }
 
     /// Takes the updates so far for submitted: for the command buffer that goes before every other one.
     pub(crate) fn apply_tlas_updates(&mut self) {
-        let Notes { tlas_updates, build_run, open_builds, .. } = &mut **self.notes;
+        let RecordingState { tlas_trackers, build_run, open_builds, .. } = &mut **self.state;
         build_run.stop();
-        if let Some(updates) = tlas_updates {
-            self.shared.show(updates, |target| open_builds.push(OpenBuild::of_tlas(Arc::clone(target))));
+        if let Some(updates) = tlas_trackers {
+            self.shared.apply_tlas_updates(updates, |target| {
+                open_builds.push(OpenBuild::for_tlas(Arc::clone(target)))
+            });
         }
     }
 
     /// What is known of a structure before the next command.
     #[inline(always)]
-    fn before<'a>(&self, tlas: &Tlas, update: &'a mut TlasUpdate, nothing: &'a Arc<ShownSet>) -> Before<'a> {
-        let revision = self.shared.accel_revision();
+    fn previous_state<'a>(
+        &self,
+        tlas: &Tlas,
+        update: &'a mut TlasTracker,
+        no_refs: &'a Arc<BlasRefSet>,
+    ) -> PreviousState<'a> {
+        let generation = self.shared.accel_generation();
         let is_first = !update.is_recorded();
-        let contents = update.look(tlas);
+        let contents = update.current(tlas);
         let find = |handle| self.shared.store.accel_structs.get(handle);
-        let stands = contents.revision == revision || contents.shown.stands(&find);
-        let shown = if stands { &contents.shown } else { nothing };
-        Before { counts: contents.counts(), refits: contents.refits, is_first, shown, stands, revision }
+        let is_current = contents.generation == generation || contents.blas_refs.is_current(&find);
+        let blas_refs = if is_current { &contents.blas_refs } else { no_refs };
+        PreviousState {
+            counts: contents.counts(),
+            refits: contents.refits,
+            is_first,
+            blas_refs,
+            is_current,
+            generation,
+        }
     }
 
     /// Builds from what a kernel writes, which is recorded.
-    fn build_written(
+    fn build_from_kernel(
         &mut self,
         target: &AccelStruct,
         tlas: &Tlas,
-        given: &Written,
+        kernel_instances: &KernelInstances,
         is_first: bool,
         refit: bool,
     ) -> Result<()> {
-        let built = self.build_tlas(target, tlas, given.instances(), is_first, refit);
-        built.map_err(|error| self.tear(&target.name, error))
+        let built = self.build_tlas(target, tlas, kernel_instances.build_instances(), is_first, refit);
+        built.map_err(|error| self.poison(&target.name, error))
     }
 
     /// Software's half of an update failed. Where the device has one, that is recorded.
     #[cold]
-    fn fail_beside_device(&mut self, target: &AccelStruct, tlas: &Tlas, error: Error) -> Error {
-        if tlas.structure.is_some() { self.tear(&target.name, error) } else { error }
+    fn fail_after_device_build(&mut self, target: &AccelStruct, tlas: &Tlas, error: Error) -> Error {
+        if tlas.structure.is_some() { self.poison(&target.name, error) } else { error }
     }
 
     /// Records the build of what the device traces.
@@ -337,14 +377,14 @@ impl CommandBuffer {
         &mut self,
         target: &AccelStruct,
         tlas: &Tlas,
-        instances: GivenInstances,
+        instances: VulkanInstances,
         is_first: bool,
         refit: bool,
     ) -> Result<()> {
         let sizes = &target.sizes;
         let scratch_bytes = if refit { sizes.update_scratch_bytes } else { sizes.build_scratch_bytes };
         let records = if instances.is_from_kernel { tlas.records.get() } else { None };
-        let scratch = self.join_builds(target.id, scratch_bytes, records.map(|records| &**records))?;
+        let scratch = self.join_build_run(target.id, scratch_bytes, records.map(|records| &**records))?;
         let build = TlasBuild {
             flags: target.flags,
             instances: instances.address,
@@ -357,7 +397,7 @@ impl CommandBuffer {
         // apart from other commands.
         unsafe { build.record(self.shared.gpu.accel_functions()?, self.raw()) };
         if is_first {
-            self.refer(target.id, QueueAccess::Write);
+            self.reference_resource(target.id, QueueAccess::Write);
         }
         Ok(())
     }
@@ -365,19 +405,19 @@ impl CommandBuffer {
     /// Scratch memory for a build of a top-level structure, behind the barriers it needs. There are none where the commands
     /// before were such builds too, of other structures, and there is memory left beside theirs; then all may run at once.
     #[inline(always)]
-    fn join_builds(&mut self, target: ResourceId, bytes: u64, records: Option<&Buffer>) -> Result<u64> {
+    fn join_build_run(&mut self, target: ResourceId, bytes: u64, records: Option<&Buffer>) -> Result<u64> {
         let alignment = self.shared.gpu.caps.limits.scratch_alignment.into();
         if records.is_none()
-            && let Some(scratch) = self.notes.build_run.join(target, bytes, alignment)
+            && let Some(scratch) = self.state.build_run.try_add(target, bytes, alignment)
         {
             return Ok(scratch);
         }
-        self.begin_builds(target, bytes, alignment, records)
+        self.begin_build_run(target, bytes, alignment, records)
     }
 
     /// The same for a build that waits for those before.
     #[inline(never)]
-    fn begin_builds(
+    fn begin_build_run(
         &mut self,
         target: ResourceId,
         bytes: u64,
@@ -386,71 +426,79 @@ impl CommandBuffer {
     ) -> Result<u64> {
         let shared = &self.shared;
         let own = &shared.scratch[self.recording.queue_index];
-        let (buffer, replaced) = own.get(&shared.gpu, bytes)?;
-        self.retire_replaced(replaced);
-        self.notes.uses.id(own.id, Use::accel_build_write());
-        self.notes.uses.accumulate(shared.all_tlas, Use::accel_build_write());
-        self.use_shown(Use::accel_read(Stages::ACCEL_BUILD));
+        let (buffer, replaced) = own.get_or_grow(&shared.gpu, bytes)?;
+        self.free_replaced_scratch(replaced);
+        self.state.accesses.add_id(own.id, Use::accel_build_write());
+        self.state.accesses.add_accumulating(shared.all_tlas, Use::accel_build_write());
+        self.use_all_blas(Use::accel_read(Stages::ACCEL_BUILD));
         if let Some(records) = records {
             self.use_buffer(records, Use::accel_build_input());
         }
-        self.flush();
+        self.flush_barriers();
         let (start, end) =
             (aligned_scratch_address(buffer.address, alignment), buffer.address + buffer.size_bytes);
-        self.notes.build_run.begin(target, start..end, bytes, alignment);
+        self.state.build_run.start(target, start..end, bytes, alignment);
         Ok(start)
     }
 
     /// Tells queues and shaders what the structure shows from now on; `None` for what is shown the same as before.
-    fn tell(
+    fn publish(
         &mut self,
         tlas: &Tlas,
-        before: &Before<'_>,
-        change: Change,
-    ) -> (Recorded, Option<Arc<ShownSet>>, Option<Arc<InstanceSource>>) {
-        let Change { count, built_count, shown: new, source, refit } = change;
-        let new = new.or_else(|| (!before.stands).then(|| Arc::clone(before.shown)));
-        let shown = new.as_ref().unwrap_or(before.shown);
-        if before.is_first || new.is_some() {
-            self.refer_to(shown);
+        previous: &PreviousState<'_>,
+        change: TlasChange,
+    ) -> (RecordedTlasBuild, Option<Arc<BlasRefSet>>, Option<Arc<InstanceSource>>) {
+        let TlasChange { count, built_count, blas_refs: new, source, refit } = change;
+        let new = new.or_else(|| (!previous.is_current).then(|| Arc::clone(previous.blas_refs)));
+        let blas_refs = new.as_ref().unwrap_or(previous.blas_refs);
+        if previous.is_first || new.is_some() {
+            self.reference_blas(blas_refs);
         }
-        let named_rows = self.tell_rows(tlas, before, shown);
+        let hit_table_address = self.write_hit_table_entry(tlas, previous, blas_refs);
         let counts = (count, built_count);
-        (Recorded { counts, refit, named_rows, revision: before.revision }, new, source)
+        (RecordedTlasBuild { counts, refit, hit_table_address, generation: previous.generation }, new, source)
     }
 
     /// Has other queues be done with what is shown, which may come from them.
-    fn refer_to(&mut self, shown: &ShownSet) {
+    fn reference_blas(&mut self, blas_refs: &BlasRefSet) {
         if self.shared.gpu.queues.has_several() {
-            shown.list().iter().for_each(|shown| self.refer(shown.blas.id, QueueAccess::Read));
+            blas_refs
+                .refs()
+                .iter()
+                .for_each(|blas_refs| self.reference_resource(blas_refs.blas.id, QueueAccess::Read));
         }
     }
 
     /// Tells shaders where the rows of the structure lie, unless they know. Answers what it tells.
     #[inline(always)]
-    fn tell_rows(&mut self, tlas: &Tlas, before: &Before<'_>, shown: &ShownSet) -> Option<u64> {
+    fn write_hit_table_entry(
+        &mut self,
+        tlas: &Tlas,
+        previous: &PreviousState<'_>,
+        blas_refs: &BlasRefSet,
+    ) -> Option<u64> {
         // At first the entry is that of the slot's last owner.
-        if before.counts.is_some() && tlas.rows.get().is_none() {
+        if previous.counts.is_some() && tlas.hit_table.get().is_none() {
             return None;
         }
-        let rows = tlas.rows.get().filter(|_| shown.has_rows).map_or(0, |rows| rows.address);
-        self.write_tlas_table(tlas.slot, entry(tlas, rows));
+        let rows = tlas.hit_table.get().filter(|_| blas_refs.needs_hit_remap).map_or(0, |rows| rows.address);
+        self.write_tlas_table(tlas.slot, tlas_table_entry(tlas, rows));
         Some(rows)
     }
 
     /// Structures that this command buffer takes to have no rows, though a submission since it was recorded has given them some:
     /// their slots, with what the table has to say of them first.
-    pub(crate) fn entries_without_rows(&self) -> Vec<(u32, [u64; 2])> {
-        let Some(updates) = &self.notes.tlas_updates else { return Vec::new() };
-        updates.with_unknown_rows().map(|tlas| (tlas.slot, entry(tlas, 0))).collect()
+    pub(crate) fn entries_without_hit_table(&self) -> Vec<(u32, [u64; 2])> {
+        let Some(updates) = &self.state.tlas_trackers else { return Vec::new() };
+        updates.with_unexpected_hit_table().map(|tlas| (tlas.slot, tlas_table_entry(tlas, 0))).collect()
     }
 
     /// Tells shaders where the rows of a structure lie, and what software traces; 0 where there is nothing.
     pub(crate) fn write_tlas_table(&mut self, slot: u32, entry: [u64; 2]) {
         let shared = Arc::clone(&self.shared);
         let Some(table) = shared.tlas_table.as_ref() else { return };
-        self.notes.uses.id(shared.tlas_tables, Use::transfer_write());
-        self.flush();
+        self.state.accesses.add_id(shared.hit_tables_id, Use::transfer_write());
+        self.flush_barriers();
         let offset = u64::from(slot) * TLAS_TABLE_ENTRY_BYTES;
         // SAFETY: the table has an entry for every slot.
         unsafe {
@@ -459,7 +507,7 @@ impl CommandBuffer {
     }
 
     /// Has shaders see nothing in slots whose structures are gone.
-    pub(crate) fn forget_tlas(&mut self, slots: &[u32]) {
+    pub(crate) fn clear_tlas_entries(&mut self, slots: &[u32]) {
         slots.iter().for_each(|slot| self.write_tlas_table(*slot, [0; 2]));
     }
 
@@ -467,23 +515,23 @@ impl CommandBuffer {
     pub(crate) fn clear_tlas_table(&mut self) {
         let shared = Arc::clone(&self.shared);
         let Some(table) = shared.tlas_table.as_ref() else { return };
-        self.notes.uses.id(shared.tlas_tables, Use::transfer_write());
-        self.flush();
+        self.state.accesses.add_id(shared.hit_tables_id, Use::transfer_write());
+        self.flush_barriers();
         // SAFETY: the whole buffer is filled.
         unsafe { shared.gpu.device.cmd_fill_buffer(self.raw(), table.raw, 0, vk::WHOLE_SIZE, 0) };
     }
 }
 
-impl Update<'_> {
+impl TlasBuildRequest<'_> {
     /// Checks the counts; answers whether it is a refit.
     #[inline(always)]
-    fn check(&self, count: u32, built: u32) -> Result<bool> {
-        let Self { target, tlas, before, mode } = self;
-        if built > tlas.room {
-            return Err(no_room(target, tlas, count, built));
+    fn check_counts(&self, count: u32, built: u32) -> Result<bool> {
+        let Self { target, tlas, previous, mode } = self;
+        if built > tlas.built_capacity {
+            return Err(capacity_error(target, tlas, count, built));
         }
-        let same = before.counts == Some((count, built));
-        let refit = mode.refits(same && target.allows_refit(), before.refits);
+        let same = previous.counts == Some((count, built));
+        let refit = mode.refits(same && target.allows_refit(), previous.refits);
         if refit {
             target.check_refit()?;
         }
@@ -496,7 +544,7 @@ impl Update<'_> {
 }
 
 /// What the table says of a structure with these rows.
-fn entry(tlas: &Tlas, rows: u64) -> [u64; 2] {
+fn tlas_table_entry(tlas: &Tlas, rows: u64) -> [u64; 2] {
     [rows, tlas.software.as_ref().map_or(0, SoftwareTlas::address)]
 }
 
@@ -506,11 +554,11 @@ fn check_capacity(target: &AccelStruct, tlas: &Tlas, count: u64) -> Result<()> {
 }
 
 #[cold]
-fn no_room(target: &AccelStruct, tlas: &Tlas, count: u32, built: u32) -> Error {
+fn capacity_error(target: &AccelStruct, tlas: &Tlas, count: u32, built: u32) -> Error {
     let message = format!(
         "its {count} instances of split meshes stand for {built}, but there is room for {}; create it with a larger \
          capacity or more TlasDesc::parts_per_instance",
-        tlas.room
+        tlas.built_capacity
     );
     Error::usage(&target.name, message)
 }

@@ -5,13 +5,13 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
-use super::transfer::Settle;
+use super::pending_visibility::PendingVisibility;
 use crate::barrier::Use;
-use crate::device_state::Garbage;
+use crate::device_state::DeferredFree;
 use crate::error::Result;
 use crate::upload::PendingUploads;
-use crate::upload::copy_regions::Piece;
-use crate::upload::pending::{BufferUploads, TextureUpload, UsedPage, round_ends};
+use crate::upload::copy_regions::CopyRegion;
+use crate::upload::pending::{BufferUploads, TextureUpload, UsedPage, write_round_ends};
 
 impl CommandBuffer {
     /// Records what was waiting: buffers with one barrier for all and one copy for each page of each, textures with one
@@ -19,7 +19,7 @@ impl CommandBuffer {
     pub(crate) fn record_uploads(&mut self, uploads: PendingUploads) -> Result<()> {
         let PendingUploads { buffers, textures, pages, .. } = uploads;
         for used in &pages {
-            self.shared.staging.hold(used.page, used.count, self.recording.staging_key());
+            self.shared.staging.mark_used(used.page, used.count, self.recording.staging_key());
         }
         self.record_buffer_uploads(buffers, &pages);
         let part = |upload: &TextureUpload| {
@@ -27,39 +27,39 @@ impl CommandBuffer {
             Some((upload.target.image.id, region.subresources()))
         };
         let mut start = 0;
-        for end in round_ends(textures.iter().map(part)) {
+        for end in write_round_ends(textures.iter().map(part)) {
             self.record_texture_uploads(&textures[start..end])?;
             start = end;
         }
         for TextureUpload { target, .. } in textures {
-            self.shared.retire(Garbage::HeldTexture(target));
+            self.shared.free_later(DeferredFree::TextureRef(target));
         }
         Ok(())
     }
 
     fn record_buffer_uploads(&mut self, mut buffers: Vec<BufferUploads>, pages: &[UsedPage]) {
-        buffers.retain(|upload| !upload.is_gone());
+        buffers.retain(|upload| !upload.is_dead());
         if buffers.is_empty() {
             return;
         }
         for BufferUploads { target, .. } in &buffers {
             self.use_buffer(target, Use::transfer_write());
         }
-        self.flush();
-        for BufferUploads { target, pieces } in buffers {
-            for pieces in pieces.by_page().chunk_by(|a, b| a.page == b.page) {
-                self.copy_pieces(pieces, pages, target.raw);
+        self.flush_barriers();
+        for BufferUploads { target, regions: pieces } in buffers {
+            for pieces in pieces.split_by_page().chunk_by(|a, b| a.page == b.page) {
+                self.copy_page_regions(pieces, pages, target.raw);
             }
-            self.notes.settle.push(Settle::Buffer(Arc::clone(&target)));
-            self.shared.retire(Garbage::Held(target));
+            self.state.pending_visibility.push(PendingVisibility::Buffer(Arc::clone(&target)));
+            self.shared.free_later(DeferredFree::BufferRef(target));
         }
     }
 
     /// Copies pieces of one page.
-    fn copy_pieces(&self, pieces: &[Piece], pages: &[UsedPage], target: vk::Buffer) {
+    fn copy_page_regions(&self, pieces: &[CopyRegion], pages: &[UsedPage], target: vk::Buffer) {
         let page = pieces.first().and_then(|first| pages.iter().find(|used| used.page == first.page));
         let Some(page) = page else { return };
-        let copy = |piece: &Piece| vk::BufferCopy {
+        let copy = |piece: &CopyRegion| vk::BufferCopy {
             src_offset: piece.source,
             dst_offset: piece.target,
             size: piece.bytes,
@@ -76,12 +76,12 @@ impl CommandBuffer {
                 self.use_texture(target, region.subresources(), Use::transfer_write())?;
             }
         }
-        self.flush();
+        self.flush_barriers();
         for TextureUpload { target, texels } in uploads {
             if let Some((region, staged)) = texels {
                 self.record_fill_texture(staged.buffer, staged.offset, target, region);
             }
-            self.notes.settle.push(Settle::Texture(Arc::clone(target)));
+            self.state.pending_visibility.push(PendingVisibility::Texture(Arc::clone(target)));
         }
         Ok(())
     }

@@ -6,19 +6,19 @@ use std::sync::{Arc, OnceLock};
 use super::CommandBuffer;
 use super::transfer::BufferCopy;
 use crate::accel::AccelStruct;
-use crate::accel::blas_refs::{Marks, Shown, ShownSet};
+use crate::accel::blas_refs::{BitSet, BlasRef, BlasRefSet};
 use crate::accel::build::instance_bytes;
 use crate::accel::flags::BuildFlags;
 use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance};
 use crate::accel::instance_plan::{
-    Addresses, InstancePlan, PlanMemory, starts_plain, write_addresses, write_alike,
+    InstancePlan, PlanMemory, WrittenRefs, first_needs_only_address, write_addresses, write_unchanged,
 };
-use crate::accel::tlas::{InstanceSource, Numbers, SourceBytes, Tlas};
-use crate::accel::tlas_tracker::Change;
+use crate::accel::tlas::{BlasIndexing, InstanceBytes, InstanceSource, Tlas};
+use crate::accel::tlas_tracker::TlasChange;
 use crate::barrier::{Stages, Use};
-use crate::device_state::Garbage;
+use crate::device_state::DeferredFree;
 use crate::error::{Error, Result};
-use crate::kernels::{InstancesPush, Kernel};
+use crate::kernels::{InstancesPushConstants, Kernel};
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::upload::staging::StagingChunk;
@@ -27,18 +27,18 @@ use crate::upload::staging::StagingChunk;
 const INSTANCE_ALIGNMENT: u64 = 16;
 
 /// Bytes of `LvkTlasRow` in `shader/glsl/hit_numbers.glsl`.
-pub(crate) const ROW_BYTES: u64 = 16;
+pub(crate) const REMAP_ENTRY_BYTES: u64 = 16;
 
 /// Instances that the host has written as Vulkan reads them.
-pub(super) struct Staged {
+pub(super) struct StagedInstances {
     pub(super) address: u64,
     /// What they refer to; `None` for what was known.
-    pub(super) shown: Option<Arc<ShownSet>>,
+    pub(super) blas_refs: Option<Arc<BlasRefSet>>,
 }
 
 /// Instances that Vulkan is given.
 #[derive(Clone, Copy)]
-pub(super) struct GivenInstances {
+pub(super) struct VulkanInstances {
     pub(super) address: u64,
     pub(super) count: u32,
     /// Whether a kernel writes them, into the structure's own records.
@@ -46,73 +46,75 @@ pub(super) struct GivenInstances {
 }
 
 /// Instances that a kernel writes.
-pub(super) struct Written {
+pub(super) struct KernelInstances {
     address: u64,
     built_count: u32,
-    shown: Arc<ShownSet>,
+    blas_refs: Arc<BlasRefSet>,
     /// Kept where they may have to be written again.
     source: Option<Arc<InstanceSource>>,
 }
 
-impl Written {
+impl KernelInstances {
     /// What Vulkan is given.
-    pub(super) fn instances(&self) -> GivenInstances {
-        GivenInstances { address: self.address, count: self.built_count, is_from_kernel: true }
+    pub(super) fn build_instances(&self) -> VulkanInstances {
+        VulkanInstances { address: self.address, count: self.built_count, is_from_kernel: true }
     }
 
     /// What a structure shows with them.
-    pub(super) fn change(self, count: u32, refit: bool) -> Change {
-        let Self { built_count, shown, source, .. } = self;
-        Change { count, built_count, shown: Some(shown), source, refit }
+    pub(super) fn into_change(self, count: u32, refit: bool) -> TlasChange {
+        let Self { built_count, blas_refs, source, .. } = self;
+        TlasChange { count, built_count, blas_refs: Some(blas_refs), source, refit }
     }
 }
 
 /// So many instances are written without a list of what they refer to.
-const FEW_INSTANCES: usize = StagingChunk::MOST_BYTES as usize / INSTANCE_BYTES;
+const MAX_UNCHANGED_INSTANCES: usize = StagingChunk::MAX_BYTES as usize / INSTANCE_BYTES;
 
 impl CommandBuffer {
-    /// Writes a few instances of just what is `known`, which still stands. Answers their address; `None` for any others, wrong
+    /// Writes a few instances of just what is `previous`, which still stands. Answers their address; `None` for any others, wrong
     /// ones among them.
     #[inline(always)]
-    pub(super) fn stage_alike(
+    pub(super) fn try_stage_unchanged(
         &mut self,
         instances: &[TlasInstance],
-        known: &ShownSet,
+        previous: &BlasRefSet,
     ) -> Result<Option<u64>> {
-        if known.needs_kernel || instances.is_empty() || instances.len() > FEW_INSTANCES {
+        if previous.needs_kernel || instances.is_empty() || instances.len() > MAX_UNCHANGED_INSTANCES {
             return Ok(None);
         }
         let sequence = self.recording.staging_key();
         let bytes = (instances.len() * INSTANCE_BYTES) as u64;
         let (address, alike) =
             self.shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, |out| {
-                write_alike(instances, known, out)
+                write_unchanged(instances, previous, out)
             })?;
         Ok(alike.then_some(address))
     }
 
-    /// Writes instances with addresses; `None` where a kernel is needed. `known` is what was shown before, if that still stands.
+    /// Writes instances with addresses; `None` where a kernel is needed. `previous` is what was shown before, if that still stands.
     pub(super) fn stage_instances(
         &mut self,
         name: &str,
         instances: &[TlasInstance],
-        known: &ShownSet,
-        marks: &mut Marks,
-    ) -> Result<Option<Staged>> {
+        previous: &BlasRefSet,
+        seen_refs: &mut BitSet,
+    ) -> Result<Option<StagedInstances>> {
         let (shared, sequence) = (&self.shared, self.recording.staging_key());
         let find = |handle| shared.store.accel_structs.get(handle);
-        if known.needs_kernel || (known.list().is_empty() && !starts_plain(instances, &find)?) {
+        if previous.needs_kernel
+            || (previous.refs().is_empty() && !first_needs_only_address(instances, &find)?)
+        {
             return Ok(None);
         }
         let bytes = instance_bytes(instances.len().max(1) as u32);
         let (address, written) =
             shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, |out| {
-                write_addresses(name, instances, known, marks, &find, out)
+                write_addresses(name, instances, previous, seen_refs, &find, out)
             })?;
         Ok(match written? {
-            Addresses::OfKnown => Some(Staged { address, shown: None }),
-            Addresses::OfOthers(shown) => Some(Staged { address, shown: Some(shown) }),
-            Addresses::Insufficient => None,
+            WrittenRefs::Unchanged => Some(StagedInstances { address, blas_refs: None }),
+            WrittenRefs::Changed(blas_refs) => Some(StagedInstances { address, blas_refs: Some(blas_refs) }),
+            WrittenRefs::NeedsKernel => None,
         })
     }
 
@@ -121,11 +123,11 @@ impl CommandBuffer {
         &self,
         name: &str,
         instances: &[TlasInstance],
-        known: &Arc<ShownSet>,
+        previous: &Arc<BlasRefSet>,
         memory: &mut PlanMemory,
     ) -> Result<InstancePlan> {
         let find = |handle| self.shared.store.accel_structs.get(handle);
-        InstancePlan::new(name, instances, known, memory, &find)
+        InstancePlan::new(name, instances, previous, memory, &find)
     }
 
     /// Instances for the kernel, and the owners of those for further parts.
@@ -135,18 +137,18 @@ impl CommandBuffer {
         instances: &[TlasInstance],
         plan: InstancePlan,
         memory: &mut PlanMemory,
-    ) -> Result<(InstanceSource, Arc<ShownSet>)> {
-        let keep = plan.shown.may_move;
+    ) -> Result<(InstanceSource, Arc<BlasRefSet>)> {
+        let keep = plan.blas_refs.may_move;
         let mut written = Ok(());
         let records = self.source_bytes(name, instance_bytes(plan.built_count), keep, |out| {
-            written = plan.write_numbers(name, instances, out);
+            written = plan.write_part_indices(name, instances, out);
         })?;
         written?;
-        let owners = match plan.further_count() {
+        let owners = match plan.extra_part_count() {
             0 => None,
             count => {
                 let bytes = u64::from(count) * size_of::<u32>() as u64;
-                Some(self.source_bytes(name, bytes, keep, |out| plan.write_owners(out))?)
+                Some(self.source_bytes(name, bytes, keep, |out| plan.write_extra_part_owners(out))?)
             }
         };
         let source = InstanceSource {
@@ -155,11 +157,11 @@ impl CommandBuffer {
             owners,
             user_count: instances.len() as u32,
             copies: 1,
-            numbers: Numbers::Parts,
+            indexing: BlasIndexing::ByPart,
         };
-        let shown = Arc::clone(&plan.shown);
-        memory.refers = plan.into_refers();
-        Ok((source, shown))
+        let blas_refs = Arc::clone(&plan.blas_refs);
+        memory.ref_indices = plan.into_ref_indices();
+        Ok((source, blas_refs))
     }
 
     /// Bytes for the kernel to read: in a buffer of their own if they are to be kept, else in staging memory.
@@ -169,15 +171,15 @@ impl CommandBuffer {
         size_bytes: u64,
         keep: bool,
         fill: impl FnOnce(&mut [u8]),
-    ) -> Result<SourceBytes> {
+    ) -> Result<InstanceBytes> {
         if !keep {
-            return Ok(SourceBytes { address: self.stage(size_bytes, fill)?, buffer: None });
+            return Ok(InstanceBytes { address: self.stage_bytes(size_bytes, fill)?, buffer: None });
         }
         let size_bytes = size_bytes.max(INSTANCE_ALIGNMENT);
-        let buffer = self.shared.instance_buffers.take(&self.shared.gpu, name, size_bytes)?;
+        let buffer = self.shared.instance_buffers.acquire(&self.shared.gpu, name, size_bytes)?;
         buffer.fill_with(fill);
-        self.shared.retire(Garbage::Held(Arc::clone(&buffer)));
-        Ok(SourceBytes { address: buffer.address, buffer: Some(buffer) })
+        self.shared.free_later(DeferredFree::BufferRef(Arc::clone(&buffer)));
+        Ok(InstanceBytes { address: buffer.address, buffer: Some(buffer) })
     }
 
     /// The caller's buffer as a source.
@@ -185,8 +187,8 @@ impl CommandBuffer {
         &self,
         name: &str,
         instances: &DeviceInstances<'_>,
-        known: &Arc<ShownSet>,
-    ) -> Result<(Arc<ShownSet>, InstanceSource)> {
+        previous: &Arc<BlasRefSet>,
+    ) -> Result<(Arc<BlasRefSet>, InstanceSource)> {
         let store = &self.shared.store;
         let buffer = store.buffers.get(instances.buffer)?;
         buffer.check_usage(BufferUsage::STORAGE)?;
@@ -196,34 +198,34 @@ impl CommandBuffer {
         }
         let bytes = instance_bytes(instances.count);
         buffer.check_range(instances.offset, bytes)?;
-        let shown = if known.is_listed_as(instances.blas) {
-            Arc::clone(known)
+        let blas_refs = if previous.has_handles(instances.blas) {
+            Arc::clone(previous)
         } else {
-            let find = |handle: &_| Shown::new(*handle, store.accel_structs.get(*handle)?);
-            Arc::new(ShownSet::new(instances.blas.iter().map(find).collect::<Result<_>>()?))
+            let find = |handle: &_| BlasRef::new(*handle, store.accel_structs.get(*handle)?);
+            Arc::new(BlasRefSet::new(instances.blas.iter().map(find).collect::<Result<_>>()?))
         };
-        let own = SourceBytes { address: buffer.address + instances.offset, buffer: Some(buffer) };
+        let own = InstanceBytes { address: buffer.address + instances.offset, buffer: Some(buffer) };
         let source = InstanceSource {
             instances: own,
             count: instances.count,
             owners: None,
             user_count: instances.count,
-            copies: shown.spans().iter().map(|[_, parts]| *parts).max().unwrap_or(1),
-            numbers: Numbers::Structures,
+            copies: blas_refs.part_spans().iter().map(|[_, parts]| *parts).max().unwrap_or(1),
+            indexing: BlasIndexing::ByBlas,
         };
-        Ok((shown, source))
+        Ok((blas_refs, source))
     }
 
     /// Copies the caller's buffer where structures may move later, since it may have other contents by then.
-    pub(super) fn keep_source(
+    pub(super) fn keep_source_copy(
         &mut self,
         name: &str,
         instances: &DeviceInstances<'_>,
-        shown: &ShownSet,
+        blas_refs: &BlasRefSet,
         source: &mut InstanceSource,
     ) -> Result<()> {
         let bytes = instance_bytes(instances.count);
-        if bytes == 0 || !shown.may_move {
+        if bytes == 0 || !blas_refs.may_move {
             return Ok(());
         }
         let shared = Arc::clone(&self.shared);
@@ -235,47 +237,56 @@ impl CommandBuffer {
             &copy,
             &[BufferCopy { source_offset: instances.offset, target_offset: 0, size: bytes }],
         )?;
-        shared.retire(Garbage::Held(Arc::clone(&copy)));
-        source.instances = SourceBytes { address: copy.address, buffer: Some(copy) };
+        shared.free_later(DeferredFree::BufferRef(Arc::clone(&copy)));
+        source.instances = InstanceBytes { address: copy.address, buffer: Some(copy) };
         Ok(())
     }
 
     /// Has the kernel write the instances and their rows.
-    pub(super) fn run_instances(
+    pub(super) fn record_instances(
         &mut self,
         target: &AccelStruct,
         tlas: &Tlas,
-        shown: Arc<ShownSet>,
+        blas_refs: Arc<BlasRefSet>,
         source: InstanceSource,
         built_count: u32,
-    ) -> Result<Written> {
-        let records = self.kept_buffer(&tlas.records, target, u64::from(tlas.room) * instance_bytes(1))?;
-        let rows = match shown.has_rows || tlas.rows.get().is_some() {
-            true => Some(self.kept_buffer(&tlas.rows, target, u64::from(tlas.room) * ROW_BYTES)?),
+    ) -> Result<KernelInstances> {
+        let records = self.get_or_create_buffer(
+            &tlas.records,
+            target,
+            u64::from(tlas.built_capacity) * instance_bytes(1),
+        )?;
+        let rows = match blas_refs.needs_hit_remap || tlas.hit_table.get().is_some() {
+            true => Some(self.get_or_create_buffer(
+                &tlas.hit_table,
+                target,
+                u64::from(tlas.built_capacity) * REMAP_ENTRY_BYTES,
+            )?),
             false => None,
         };
         // A refit may neither add nor remove instances, but records may come to name meshes of other parts.
         let keep_active = source.copies > 1 && target.flags.contains(BuildFlags::ALLOW_UPDATE);
-        self.record_instances(&source, &shown, &records, rows.as_deref(), keep_active)?;
-        let source = shown.may_move.then(|| Arc::new(source));
-        Ok(Written { address: records.address, built_count, shown, source })
+        self.record_instance_kernel(&source, &blas_refs, &records, rows.as_deref(), keep_active)?;
+        let source = blas_refs.may_move.then(|| Arc::new(source));
+        Ok(KernelInstances { address: records.address, built_count, blas_refs, source })
     }
 
-    fn record_instances(
+    fn record_instance_kernel(
         &mut self,
         source: &InstanceSource,
-        shown: &ShownSet,
+        blas_refs: &BlasRefSet,
         records: &Buffer,
         rows: Option<&Buffer>,
         keep_active: bool,
     ) -> Result<()> {
-        let numbers = source.numbers;
-        let entry_count = numbers.count(shown);
-        let entries =
-            self.stage((entry_count * size_of::<[u32; 2]>()) as u64, |out| numbers.write(shown, out))?;
-        let parts: &[u8] = bytemuck::cast_slice(shown.parts());
-        let parts = self.stage(parts.len() as u64, |out| out.copy_from_slice(parts))?;
-        let push = InstancesPush {
+        let numbers = source.indexing;
+        let entry_count = numbers.entry_count(blas_refs);
+        let entries = self.stage_bytes((entry_count * size_of::<[u32; 2]>()) as u64, |out| {
+            numbers.write_entries(blas_refs, out)
+        })?;
+        let parts: &[u8] = bytemuck::cast_slice(blas_refs.part_addresses());
+        let parts = self.stage_bytes(parts.len() as u64, |out| out.copy_from_slice(parts))?;
+        let push = InstancesPushConstants {
             source: source.instances.address,
             target: records.address,
             rows: rows.map_or(0, |rows| rows.address),
@@ -294,18 +305,21 @@ impl CommandBuffer {
         }
         self.use_buffer(records, Use::shader_write(Stages::COMPUTE));
         if rows.is_some() {
-            self.notes.uses.id(self.shared.tlas_tables, Use::shader_write(Stages::COMPUTE));
+            self.state.accesses.add_id(self.shared.hit_tables_id, Use::shader_write(Stages::COMPUTE));
         }
-        self.flush();
+        self.flush_barriers();
         let invocations = source.count.saturating_mul(source.copies);
         if invocations == 0 {
             return Ok(());
         }
-        self.run_kernel(Kernel::Instances, std::iter::once((bytemuck::bytes_of(&push), invocations)))
+        self.dispatch_kernel_runs(
+            Kernel::Instances,
+            std::iter::once((bytemuck::bytes_of(&push), invocations)),
+        )
     }
 
     /// The address of bytes that the GPU may read until the command buffer is done.
-    fn stage(&mut self, bytes: u64, fill: impl FnOnce(&mut [u8])) -> Result<u64> {
+    fn stage_bytes(&mut self, bytes: u64, fill: impl FnOnce(&mut [u8])) -> Result<u64> {
         let sequence = self.recording.staging_key();
         let (address, ()) =
             self.shared.staging.write_in(&mut self.staged, bytes, INSTANCE_ALIGNMENT, sequence, fill)?;
@@ -313,7 +327,7 @@ impl CommandBuffer {
     }
 
     /// A buffer that lives as long as the structure, made when it is first needed.
-    fn kept_buffer(
+    fn get_or_create_buffer(
         &self,
         place: &OnceLock<Arc<Buffer>>,
         target: &AccelStruct,

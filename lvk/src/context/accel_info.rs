@@ -3,7 +3,7 @@
 use super::Context;
 use crate::accel::AccelStruct;
 use crate::accel::accel_struct::AccelKind;
-use crate::accel::blas::CompactionWish;
+use crate::accel::blas::CompactionState;
 use crate::accel::flags::AccelStructSizes;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::error::Result;
@@ -74,32 +74,38 @@ pub struct BuildProgress {
 impl Context {
     /// Bytes an acceleration structure took when it was created, and takes to build.
     pub fn accel_struct_sizes(&self, handle: AccelStructHandle) -> Result<AccelStructSizes> {
-        Ok(self.shared().store.accel_structs.get(handle)?.sizes)
+        Ok(self.device_state().store.accel_structs.get(handle)?.sizes)
     }
 
     /// What is known of an acceleration structure now.
     pub fn accel_struct_info(&self, handle: AccelStructHandle) -> Result<AccelStructInfo> {
-        Ok(info(&*self.shared().store.accel_structs.get(handle)?))
+        Ok(accel_struct_info_of(&*self.device_state().store.accel_structs.get(handle)?))
     }
 
     /// Memory of all acceleration structures, one by one and together.
     pub fn accel_memory(&self) -> AccelMemory {
-        let shared = self.shared();
+        let shared = self.device_state();
         AccelMemory {
-            structures: shared.store.accel_structs.all().iter().map(|object| info(object)).collect(),
+            structures: shared
+                .store
+                .accel_structs
+                .all_objects()
+                .iter()
+                .map(|object| accel_struct_info_of(object))
+                .collect(),
             structure_bytes: shared.accel_storage.used_bytes(),
-            spare_bytes: shared.accel_storage.spare_bytes(),
+            spare_bytes: shared.accel_storage.free_bytes(),
             scratch_bytes: shared.scratch.iter().map(ScratchBuffer::bytes).sum(),
         }
     }
 
     /// How many of these structures the GPU has built for the first time. Does not wait.
     pub fn build_progress(&self, structures: &[AccelStructHandle]) -> Result<BuildProgress> {
-        let submitter = &self.shared().submitter;
+        let submitter = &self.device_state().submitter;
         let mut built = 0;
         for handle in structures {
-            let object = self.shared().store.accel_structs.get(*handle)?;
-            if let Some(value) = object.built_by() {
+            let object = self.device_state().store.accel_structs.get(*handle)?;
+            if let Some(value) = object.last_build_value() {
                 built += usize::from(submitter.is_done(value)?);
             }
         }
@@ -107,7 +113,7 @@ impl Context {
     }
 }
 
-fn info(object: &AccelStruct) -> AccelStructInfo {
+fn accel_struct_info_of(object: &AccelStruct) -> AccelStructInfo {
     let name = object.name.clone();
     match &object.kind {
         AccelKind::Tlas(tlas) => AccelStructInfo {
@@ -120,15 +126,15 @@ fn info(object: &AccelStruct) -> AccelStructInfo {
             compaction: Compaction::None,
         },
         AccelKind::Blas(blas) => {
-            let (body, kept_bytes) = (blas.body(), blas.software_bytes());
+            let (body, kept_bytes) = (blas.structures(), blas.software_bytes());
             let after_bytes = body.memory_bytes() + kept_bytes;
             let compaction = match body.compacted_from {
                 Some(bytes) => Compaction::Done { before_bytes: bytes + kept_bytes, after_bytes },
-                None => match blas.wish() {
-                    CompactionWish::None => Compaction::None,
-                    CompactionWish::Open => Compaction::Pending,
-                    CompactionWish::Failed => Compaction::Failed,
-                    CompactionWish::Idle => Compaction::Done { before_bytes: after_bytes, after_bytes },
+                None => match blas.compaction_state() {
+                    CompactionState::None => Compaction::None,
+                    CompactionState::Open => Compaction::Pending,
+                    CompactionState::Failed => Compaction::Failed,
+                    CompactionState::Idle => Compaction::Done { before_bytes: after_bytes, after_bytes },
                 },
             };
             AccelStructInfo {

@@ -6,11 +6,11 @@ use ash::vk;
 
 use super::Context;
 use crate::accel::AccelStruct;
-use crate::accel::blas::{BlasBody, CompactionWish};
-use crate::accel::compaction::{Compactions, PlannedCopy, Refusal, SizeQuery};
+use crate::accel::blas::{BlasStructures, CompactionState};
+use crate::accel::compaction::{CompactedSizeQuery, CompactionRefusal, Compactions, PlannedCopy};
 use crate::accel::flags::BuildFlags;
-use crate::accel::raw_accel_struct::RawStructure;
-use crate::device_state::Garbage;
+use crate::accel::raw_accel_struct::RawAccelStruct;
+use crate::device_state::DeferredFree;
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::lock_order::Guard;
@@ -38,7 +38,7 @@ impl Context {
     pub fn compact(&self, structures: &[AccelStructHandle]) -> Result<()> {
         let mut targets = Vec::with_capacity(structures.len());
         for handle in structures {
-            let target = self.shared().store.accel_structs.get(*handle)?;
+            let target = self.device_state().store.accel_structs.get(*handle)?;
             if !target.flags.contains(BuildFlags::ALLOW_COMPACTION) {
                 target.blas()?;
                 let message = "compaction needs BuildFlags::ALLOW_COMPACTION when the structure is created";
@@ -49,22 +49,24 @@ impl Context {
         let mut wanted = Vec::with_capacity(targets.len());
         for target in targets {
             let blas = target.blas()?;
-            let compacted = blas.body().compacted_from.is_some();
-            if self.shared().gpu.accel.is_none() {
+            let compacted = blas.structures().compacted_from.is_some();
+            if self.device_state().gpu.accel.is_none() {
                 // What software traces has the size it needs from the start.
-                blas.set_wish(CompactionWish::Idle);
+                blas.set_compaction_state(CompactionState::Idle);
                 continue;
             }
-            if !compacted && blas.set_wish(CompactionWish::Open) != CompactionWish::Open {
+            if !compacted && blas.set_compaction_state(CompactionState::Open) != CompactionState::Open {
                 wanted.push(target);
             }
         }
-        let query = self.ask_sizes(&wanted).inspect_err(|_| end_wishes(&wanted, CompactionWish::None))?;
-        self.compactions().asked.extend(query);
+        let query = self
+            .query_compacted_sizes(&wanted)
+            .inspect_err(|_| cancel_compactions(&wanted, CompactionState::None))?;
+        self.lock_compactions().queries.extend(query);
         Ok(())
     }
 
-    fn ask_sizes(&self, wanted: &[Arc<AccelStruct>]) -> Result<Option<Arc<SizeQuery>>> {
+    fn query_compacted_sizes(&self, wanted: &[Arc<AccelStruct>]) -> Result<Option<Arc<CompactedSizeQuery>>> {
         if wanted.is_empty() {
             return Ok(None);
         }
@@ -76,140 +78,145 @@ impl Context {
         }
         let desc = QueryPoolDesc { count, debug_name: "compacted sizes", ..Default::default() };
         let ty = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
-        let pool = QueryPool::with_type(&self.shared().gpu, &desc, ty)?;
-        let query = Arc::new(SizeQuery::new(pool, targets));
-        let asked = self.before_next_submission(|cmd| cmd.query_compacted_sizes(&query));
-        self.shared().retire(Garbage::SizeQuery(Arc::clone(&query)));
+        let pool = QueryPool::with_type(&self.device_state().gpu, &desc, ty)?;
+        let query = Arc::new(CompactedSizeQuery::new(pool, targets));
+        let asked = self.record_in_prologue(|cmd| cmd.query_compacted_sizes(&query));
+        self.device_state().free_later(DeferredFree::SizeQuery(Arc::clone(&query)));
         asked.map(|()| Some(query))
     }
 
     /// Carries out compactions whose sizes are known, and builds top-level structures again that refer to what they
     /// replaced. What fails stays as it was, with a warning: no submission of the caller fails for it.
     pub(super) fn advance_compactions(&self) {
-        let mut compactions = self.compactions();
-        let advanced = if compactions.is_empty() { Ok(()) } else { self.advance(&mut compactions) };
+        let mut compactions = self.lock_compactions();
+        let advanced = if compactions.is_empty() { Ok(()) } else { self.advance_all(&mut compactions) };
         drop(compactions);
         if let Err(error) = advanced {
             log::warn!("compaction does not go on: {error}");
         }
-        if self.shared().take_outdated_tlas()
-            && let Err(error) = self.rewrite_outdated()
+        if self.device_state().take_tlas_outdated()
+            && let Err(error) = self.rewrite_outdated_tlas()
         {
             log::warn!("a top-level structure still refers to structures from before compaction: {error}");
         }
     }
 
     /// Copies that have no room wait for those that have, which give memory back.
-    fn advance(&self, compactions: &mut Compactions) -> Result<()> {
-        let shared = self.shared();
+    fn advance_all(&self, compactions: &mut Compactions) -> Result<()> {
+        let shared = self.device_state();
         let (submitted, completed) = (shared.submitter.last_submitted(), shared.submitter.completed_up_to()?);
         shared.collect()?;
-        compactions.forget_freed();
-        for query in std::mem::take(&mut compactions.asked) {
-            match query.answer() {
+        compactions.drop_freed();
+        for query in std::mem::take(&mut compactions.queries) {
+            match query.results() {
                 Ok(Some(copies)) => compactions.copies.extend(copies),
-                Ok(None) => compactions.asked.push(query),
-                Err(error) => query.targets.iter().for_each(|(target, _)| give_up(target, &error)),
+                Ok(None) => compactions.queries.push(query),
+                Err(error) => query.targets.iter().for_each(|(target, _)| abort_compaction(target, &error)),
             }
         }
         let mut again = Vec::new();
         for mut copy in std::mem::take(&mut compactions.copies) {
             let Some(target) = copy.target.upgrade() else { continue };
             let used_bytes = shared.accel_storage.used_bytes();
-            match self.compact_one(&target, &copy, used_bytes) {
-                Ok(Step::Copied(old)) => compactions.replaced.push(old),
-                Ok(Step::Wait) => compactions.copies.push(copy),
-                Ok(Step::AskAgain) => again.push(target),
+            match self.record_compaction(&target, &copy, used_bytes) {
+                Ok(CompactionStep::Copied(old)) => compactions.replaced.push(old),
+                Ok(CompactionStep::Retry) => compactions.copies.push(copy),
+                Ok(CompactionStep::QueryAgain) => again.push(target),
                 Err(error @ (Error::OverBudget { .. } | Error::OutOfDeviceMemory { .. })) => {
-                    copy.refused = Some(Refusal { error, used_bytes, submitted });
+                    copy.refused = Some(CompactionRefusal { error, used_bytes, submitted });
                     compactions.copies.push(copy);
                 }
-                Err(error) => give_up(&target, &error),
+                Err(error) => abort_compaction(&target, &error),
             }
         }
-        match self.ask_sizes(&again) {
-            Ok(query) => compactions.asked.extend(query),
-            Err(error) => again.iter().for_each(|target| give_up(target, &error)),
+        match self.query_compacted_sizes(&again) {
+            Ok(query) => compactions.queries.extend(query),
+            Err(error) => again.iter().for_each(|target| abort_compaction(target, &error)),
         }
-        for PlannedCopy { target, refused, .. } in compactions.take_stuck(completed) {
+        for PlannedCopy { target, refused, .. } in compactions.drain_stuck(completed) {
             if let (Some(target), Some(refusal)) = (target.upgrade(), refused) {
-                give_up(&target, &refusal.error);
+                abort_compaction(&target, &refusal.error);
             }
         }
         Ok(())
     }
 
     /// Copies one structure, unless a build of it was recorded meanwhile.
-    fn compact_one(&self, target: &Arc<AccelStruct>, copy: &PlannedCopy, used_bytes: u64) -> Result<Step> {
-        let (shared, blas) = (self.shared(), target.blas()?);
-        if blas.builds() != copy.builds {
-            return Ok(Step::AskAgain);
+    fn record_compaction(
+        &self,
+        target: &Arc<AccelStruct>,
+        copy: &PlannedCopy,
+        used_bytes: u64,
+    ) -> Result<CompactionStep> {
+        let (shared, blas) = (self.device_state(), target.blas()?);
+        if blas.build_count() != copy.builds {
+            return Ok(CompactionStep::QueryAgain);
         }
-        if blas.has_open_builds() || !copy.is_worth_trying(used_bytes) {
-            return Ok(Step::Wait);
+        if blas.has_open_builds() || !copy.should_retry(used_bytes) {
+            return Ok(CompactionStep::Retry);
         }
         let ty = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
         let structure =
-            |bytes: &u64| RawStructure::new(&shared.gpu, &shared.accel_storage, &target.name, ty, *bytes);
+            |bytes: &u64| RawAccelStruct::new(&shared.gpu, &shared.accel_storage, &target.name, ty, *bytes);
         let structures = copy.sizes.iter().map(structure).collect::<Result<Vec<_>>>()?;
-        let compacted_from = Some(blas.body().memory_bytes());
-        let body = BlasBody { structures, compacted_from, rebuildable: false };
-        let replaced = self.before_next_submission(|cmd| {
-            let Some(old) = blas.replace_body(body, copy.builds) else { return Ok(None) };
-            shared.note_moved();
-            cmd.copy_compacted(target, &old, &blas.body())?;
+        let compacted_from = Some(blas.structures().memory_bytes());
+        let body = BlasStructures { structures, compacted_from, rebuildable: false };
+        let replaced = self.record_in_prologue(|cmd| {
+            let Some(old) = blas.replace_structures(body, copy.builds) else { return Ok(None) };
+            shared.count_blas_move();
+            cmd.copy_compacted(target, &old, &blas.structures())?;
             Ok(Some(old))
         })?;
-        let Some(old) = replaced else { return Ok(Step::Wait) };
-        blas.set_wish(CompactionWish::None);
+        let Some(old) = replaced else { return Ok(CompactionStep::Retry) };
+        blas.set_compaction_state(CompactionState::None);
         let freed = Arc::downgrade(&old);
-        shared.retire(Garbage::Body(old));
+        shared.free_later(DeferredFree::BlasStorage(old));
         // Its handle may be gone, and nobody else keep it until the copy is made.
-        shared.retire(Garbage::Body(blas.body()));
-        shared.note_outdated_tlas();
-        Ok(Step::Copied(freed))
+        shared.free_later(DeferredFree::BlasStorage(blas.structures()));
+        shared.mark_tlas_outdated();
+        Ok(CompactionStep::Copied(freed))
     }
 
     /// Structures are looked for again once the command buffer is open: what another thread destroys before does not wait
     /// for it.
-    fn rewrite_outdated(&self) -> Result<()> {
+    fn rewrite_outdated_tlas(&self) -> Result<()> {
         if self.outdated_tlas().is_empty() {
             return Ok(());
         }
-        self.before_next_submission(|cmd| {
+        self.record_in_prologue(|cmd| {
             self.outdated_tlas().iter().try_for_each(|object| cmd.rewrite_tlas(object))
         })
     }
 
     /// Top-level structures that refer to what compaction has replaced.
     fn outdated_tlas(&self) -> Vec<Arc<AccelStruct>> {
-        let mut all = self.shared().store.accel_structs.all();
-        all.retain(|object| object.tlas().is_ok_and(|tlas| tlas.contents().shown.is_outdated()));
+        let mut all = self.device_state().store.accel_structs.all_objects();
+        all.retain(|object| object.tlas().is_ok_and(|tlas| tlas.contents().blas_refs.is_outdated()));
         all
     }
 
-    fn compactions(&self) -> Guard<'_, Compactions> {
+    fn lock_compactions(&self) -> Guard<'_, Compactions> {
         self.inner.compactions.lock()
     }
 }
 
 /// What became of a copy.
-enum Step {
+enum CompactionStep {
     /// It is recorded; this is what it takes the place of.
-    Copied(Weak<BlasBody>),
+    Copied(Weak<BlasStructures>),
     /// A build is not submitted yet, or there is no more room than before.
-    Wait,
+    Retry,
     /// The sizes are those of an earlier build.
-    AskAgain,
+    QueryAgain,
 }
 
-fn give_up(target: &Arc<AccelStruct>, error: &Error) {
+fn abort_compaction(target: &Arc<AccelStruct>, error: &Error) {
     log::warn!("structure '{}' stays uncompacted: {error}", target.name);
-    end_wishes(std::slice::from_ref(target), CompactionWish::Failed);
+    cancel_compactions(std::slice::from_ref(target), CompactionState::Failed);
 }
 
-fn end_wishes(targets: &[Arc<AccelStruct>], wish: CompactionWish) {
+fn cancel_compactions(targets: &[Arc<AccelStruct>], wish: CompactionState) {
     for blas in targets.iter().filter_map(|target| target.blas().ok()) {
-        blas.set_wish(wish);
+        blas.set_compaction_state(wish);
     }
 }

@@ -9,7 +9,7 @@ use crate::gpu::caps::ray_query_path::RayQueryRequest;
 use crate::gpu::debug::messenger::{ValidationMode, ValidationSink};
 use crate::gpu::start::profile::DeviceProfile;
 use crate::gpu::start::user_extensions::UserExtensions;
-use crate::gpu::window::WindowRef;
+use crate::gpu::start::window::WindowRef;
 use crate::resource::ycbcr::YuvConversion;
 
 /// Describes a context.

@@ -25,9 +25,9 @@ pub(super) const NO_SLOT: u32 = 0;
 impl Context {
     /// Creates a buffer (`vkCreateBuffer`). Its first contents are there for every command submitted afterwards.
     pub fn create_buffer(&self, desc: &BufferDesc<'_>) -> Result<Holder<BufferHandle>> {
-        let buffer = Buffer::new(&self.shared().gpu, desc, InternalUsage::NONE)?;
+        let buffer = Buffer::new(&self.device_state().gpu, desc, InternalUsage::NONE)?;
         let staged = desc.data.filter(|data| !buffer.write_initial(data));
-        let handle = self.shared().store.buffers.insert(buffer);
+        let handle = self.device_state().store.buffers.insert(buffer);
         let holder = Holder::new(self, handle, NO_SLOT);
         if let Some(data) = staged {
             self.upload_buffer(handle, 0, data)?;
@@ -37,8 +37,8 @@ impl Context {
 
     /// Creates a sampler (`vkCreateSampler`). [`Holder::index`] is its element of `kSamplers[]`.
     pub fn create_sampler(&self, desc: &SamplerDesc<'_>) -> Result<Holder<SamplerHandle>> {
-        let shared = self.shared();
-        let slot = shared.reserve(|| shared.bindless.reserve_sampler(desc.debug_name))?;
+        let shared = self.device_state();
+        let slot = shared.reserve_slot(|| shared.bindless.reserve_sampler(desc.debug_name))?;
         let sampler =
             Sampler::new(&shared.gpu, desc, slot).inspect_err(|_| shared.bindless.free_sampler(slot))?;
         shared.bindless.set_sampler(slot, sampler.raw);
@@ -52,7 +52,7 @@ impl Context {
     /// [`Unsupported`](Error::Unsupported) when the module uses a capability whose feature the device lacks, such as
     /// those of the task and mesh stages.
     pub fn create_shader_module(&self, desc: &ShaderModuleDesc<'_>) -> Result<Holder<ShaderModuleHandle>> {
-        let shared = self.shared();
+        let shared = self.device_state();
         let module = ShaderModule::new(
             &shared.gpu,
             desc,
@@ -60,14 +60,14 @@ impl Context {
             Some(&shared.bindless),
             shared.layout.push_constant_bytes,
         )?;
-        warn_of_raw_numbers(&shared.gpu.caps, desc);
+        warn_of_raw_hit_ids(&shared.gpu.caps, desc);
         Ok(Holder::new(self, shared.store.shader_modules.insert(module), NO_SLOT))
     }
 
     /// How many modules made from GLSL were found in the folder of
     /// [`ContextDesc::shader_cache`](crate::ContextDesc::shader_cache), and how many were not; zeros without a folder.
     pub fn shader_cache_stats(&self) -> ShaderCacheStats {
-        self.shared().shader_cache.as_ref().map(ShaderCache::counts).unwrap_or_default()
+        self.device_state().shader_cache.as_ref().map(ShaderCache::counts).unwrap_or_default()
     }
 
     /// Creates a graphics pipeline (`vkCreateGraphicsPipelines`) of a vertex shader, or of a mesh shader with or without
@@ -81,7 +81,7 @@ impl Context {
         &self,
         desc: &RenderPipelineDesc<'_>,
     ) -> Result<Holder<RenderPipelineHandle>> {
-        let shared = self.shared();
+        let shared = self.device_state();
         let find = |handle| shared.store.shader_modules.get(handle);
         let pipeline = RenderPipeline::new(&shared.gpu, shared.pipeline_base(), desc, &find)?;
         shared.graphics_queries.insert(pipeline.query_stages);
@@ -93,7 +93,7 @@ impl Context {
         &self,
         desc: &ComputePipelineDesc<'_>,
     ) -> Result<Holder<ComputePipelineHandle>> {
-        let shared = self.shared();
+        let shared = self.device_state();
         let module = self.required_module(desc.module, desc.debug_name, "compute")?;
         let pipeline = ComputePipeline::new(&shared.gpu, shared.pipeline_base(), desc, &module)?;
         Ok(Holder::new(self, shared.store.compute_pipelines.insert(pipeline), NO_SLOT))
@@ -105,8 +105,8 @@ impl Context {
     /// [`Unsupported`](Error::Unsupported) where the device lacks the kind, [`LimitExceeded`](Error::LimitExceeded) for
     /// more than 65,536 queries, and [`InvalidUsage`](Error::InvalidUsage) for none.
     pub fn create_query_pool(&self, desc: &QueryPoolDesc<'_>) -> Result<Holder<QueryPoolHandle>> {
-        let pool = QueryPool::new(&self.shared().gpu, desc)?;
-        Ok(Holder::new(self, self.shared().store.query_pools.insert(pool), NO_SLOT))
+        let pool = QueryPool::new(&self.device_state().gpu, desc)?;
+        Ok(Holder::new(self, self.device_state().store.query_pools.insert(pool), NO_SLOT))
     }
 
     fn required_module(
@@ -116,12 +116,12 @@ impl Context {
         stage: &str,
     ) -> Result<Arc<ShaderModule>> {
         let missing = || Error::usage(pipeline, format!("give the pipeline a {stage} shader"));
-        self.shared().store.shader_modules.get(handle.ok_or_else(missing)?)
+        self.device_state().store.shader_modules.get(handle.ok_or_else(missing)?)
     }
 }
 
 /// On drivers and profiles whose meshes are split or reordered, hits have other numbers than the caller's.
-fn warn_of_raw_numbers(caps: &Capabilities, desc: &ShaderModuleDesc<'_>) {
+fn warn_of_raw_hit_ids(caps: &Capabilities, desc: &ShaderModuleDesc<'_>) {
     if !(caps.prefers_spatial_order || caps.profile.is_some()) {
         return;
     }

@@ -10,20 +10,20 @@ use super::plan_blas::part_limits;
 use super::software_ray_query::software_tlas;
 use crate::accel::AccelStruct;
 use crate::accel::accel_struct::AccelKind;
-use crate::accel::blas::{Blas, BlasBody, PartShape};
-use crate::accel::build::{BuildInput, transforms};
+use crate::accel::blas::{Blas, BlasPart, BlasStructures};
+use crate::accel::build::{BuildInput, transform_matrices};
 use crate::accel::desc::{BlasDesc, TlasDesc};
 use crate::accel::flags::{AccelStructSizes, BuildMode};
 use crate::accel::instance_plan::{InstancePlan, PlanMemory};
-use crate::accel::raw_accel_struct::RawStructure;
+use crate::accel::raw_accel_struct::RawAccelStruct;
 use crate::accel::split::PartLimits;
 use crate::accel::tlas::Tlas;
-use crate::command::queue_support::{BUILD, needs_compute};
-use crate::device_state::Shared;
+use crate::command::queue_support::{BUILD_ON_QUEUE, needs_compute};
+use crate::device_state::DeviceState;
 use crate::error::{Error, Result, check_limit};
-use crate::gpu::caps::queues::Queue;
 use crate::gpu::memory::allocator::MemoryKind;
 use crate::handle::AccelStructHandle;
+use crate::queue::Queue;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage, InternalUsage};
 use crate::software_ray_query::blas::SoftwareBlas;
@@ -59,7 +59,7 @@ impl Context {
     pub fn create_blas_batch(&self, descs: &[BlasDesc<'_>]) -> Result<Vec<Holder<AccelStructHandle>>> {
         let (holders, objects) = self.new_batch(descs)?;
         self.build_batch(&objects, |chunk, is_last| {
-            self.before_next_submission(|cmd| cmd.build_first(chunk))?;
+            self.record_in_prologue(|cmd| cmd.build_first_time(chunk))?;
             if is_last { Ok(()) } else { self.flush().map(drop) }
         })?;
         Ok(holders)
@@ -79,12 +79,12 @@ impl Context {
         queue: Queue,
         descs: &[BlasDesc<'_>],
     ) -> Result<(Vec<Holder<AccelStructHandle>>, SubmitHandle)> {
-        needs_compute(queue, BUILD)?;
+        needs_compute(queue, BUILD_ON_QUEUE)?;
         let (holders, objects) = self.new_batch(descs)?;
         let mut built = SubmitHandle::default();
         self.build_batch(&objects, |chunk, _| {
             let mut cmd = self.acquire_command_buffer_on(queue)?;
-            cmd.build_first(chunk)?;
+            cmd.build_first_time(chunk)?;
             built = self.submit_in_background(cmd)?;
             Ok(())
         })?;
@@ -93,19 +93,19 @@ impl Context {
 
     /// The structures of a batch, not built yet.
     fn new_batch(&self, descs: &[BlasDesc<'_>]) -> Result<NewBatch> {
-        let shapes = self.blas_shapes(descs)?;
+        let shapes = self.plan_blas_parts(descs)?;
         let blobs = self.software_blobs(descs)?;
         let mut holders = Vec::with_capacity(descs.len());
         let mut objects = Vec::with_capacity(descs.len());
         for ((desc, parts), blob) in descs.iter().zip(shapes).zip(&blobs) {
             let software = self.software_blas(desc, blob.as_ref())?;
-            let object = new_blas(self.shared(), desc, parts, software)?;
-            let handle = self.shared().store.accel_structs.insert(object);
+            let object = new_blas(self.device_state(), desc, parts, software)?;
+            let handle = self.device_state().store.accel_structs.insert(object);
             holders.push(Holder::new(self, handle, 0));
-            objects.push(self.shared().store.accel_structs.get(handle)?);
+            objects.push(self.device_state().store.accel_structs.get(handle)?);
         }
         for (object, blob) in objects.iter().zip(blobs) {
-            blob.map(|blob| self.fill_software(object, &blob)).transpose()?;
+            blob.map(|blob| self.upload_software_blob(object, &blob)).transpose()?;
         }
         Ok((holders, objects))
     }
@@ -116,10 +116,10 @@ impl Context {
         objects: &[Arc<AccelStruct>],
         mut build: impl FnMut(&[Arc<AccelStruct>], bool) -> Result<()>,
     ) -> Result<()> {
-        let budget = self.shared().scratch[0].tiers.batch_bytes();
+        let budget = self.device_state().scratch[0].tiers.batch_bytes();
         let (mut first, mut scratch) = (0, 0_u64);
         for (index, object) in objects.iter().enumerate() {
-            let next = object.blas()?.first_build_scratch_bytes();
+            let next = object.blas()?.initial_scratch_bytes();
             if index > first && scratch.saturating_add(next) > budget {
                 build(&objects[first..index], false)?;
                 (first, scratch) = (index, 0);
@@ -137,18 +137,18 @@ impl Context {
     /// [`LimitExceeded`](Error::LimitExceeded) for more instances than the device takes, or whose structure or scratch
     /// memory would be larger than it takes.
     pub fn create_tlas(&self, desc: &TlasDesc<'_>) -> Result<Holder<AccelStructHandle>> {
-        let shared = self.shared();
+        let shared = self.device_state();
         shared.gpu.check_acceleration_structures()?;
-        let slot = shared.reserve(|| shared.bindless.reserve_tlas(desc.debug_name))?;
+        let slot = shared.reserve_slot(|| shared.bindless.reserve_tlas(desc.debug_name))?;
         let limits = part_limits(&shared.gpu.caps.limits);
-        let tlas =
-            tlas_within(shared, desc, slot, &limits).inspect_err(|_| shared.bindless.free_tlas(slot))?;
+        let tlas = new_tlas_within_limits(shared, desc, slot, &limits)
+            .inspect_err(|_| shared.bindless.free_tlas(slot))?;
         if let AccelKind::Tlas(object) = &tlas.kind {
             object.structure.iter().for_each(|structure| shared.bindless.set_tlas(slot, structure.raw));
         }
         let handle = shared.store.accel_structs.insert(tlas);
         let holder = Holder::new(self, handle, slot);
-        self.before_next_submission(|cmd| cmd.update_tlas(handle, desc.instances, BuildMode::Rebuild))?;
+        self.record_in_prologue(|cmd| cmd.update_tlas(handle, desc.instances, BuildMode::Rebuild))?;
         Ok(holder)
     }
 }
@@ -158,9 +158,9 @@ type NewBatch = (Vec<Holder<AccelStructHandle>>, Vec<Arc<AccelStruct>>);
 
 /// Makes a bottom-level structure of these parts; nothing is built yet.
 fn new_blas(
-    shared: &Shared,
+    shared: &DeviceState,
     desc: &BlasDesc<'_>,
-    parts: Vec<PartShape>,
+    parts: Vec<BlasPart>,
     software: Option<SoftwareBlas>,
 ) -> Result<AccelStruct> {
     let name = desc.debug_name;
@@ -169,33 +169,33 @@ fn new_blas(
         .map(|part| {
             let ty = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
             let bytes = part.sizes.structure_bytes;
-            RawStructure::new(&shared.gpu, &shared.accel_storage, name, ty, bytes)
+            RawAccelStruct::new(&shared.gpu, &shared.accel_storage, name, ty, bytes)
         })
         .collect();
-    let body = BlasBody { structures: structures?, compacted_from: None, rebuildable: true };
-    blas_object(shared, desc, parts, body, software)
+    let body = BlasStructures { structures: structures?, compacted_from: None, rebuildable: true };
+    new_blas_object(shared, desc, parts, body, software)
 }
 
 /// The object behind the handle of a bottom-level structure.
-pub(super) fn blas_object(
-    shared: &Shared,
+pub(super) fn new_blas_object(
+    shared: &DeviceState,
     desc: &BlasDesc<'_>,
-    parts: Vec<PartShape>,
-    body: BlasBody,
+    parts: Vec<BlasPart>,
+    body: BlasStructures,
     software: Option<SoftwareBlas>,
 ) -> Result<AccelStruct> {
-    let transforms = match transforms(desc.geometries) {
+    let transforms = match transform_matrices(desc.geometries) {
         Some(matrices) => Some(new_transforms(shared, desc.debug_name, &matrices)?),
         None => None,
     };
     let hardware = parts.iter().map(|part| part.sizes);
     let all = hardware.chain(software.as_ref().map(|software| software.sizes(desc.flags)));
-    let sizes = all.fold(AccelStructSizes::default(), AccelStructSizes::join);
+    let sizes = all.fold(AccelStructSizes::default(), AccelStructSizes::max_with);
     let blas = Blas::new(desc.geometries.to_vec(), transforms, parts, body, software);
     Ok(AccelStruct::new(desc.debug_name, desc.flags, sizes, AccelKind::Blas(blas)))
 }
 
-fn new_transforms(shared: &Shared, name: &str, matrices: &[f32]) -> Result<Buffer> {
+fn new_transforms(shared: &DeviceState, name: &str, matrices: &[f32]) -> Result<Buffer> {
     let bytes: &[u8] = bytemuck::cast_slice(matrices);
     let desc = BufferDesc {
         size_bytes: bytes.len() as u64,
@@ -210,35 +210,40 @@ fn new_transforms(shared: &Shared, name: &str, matrices: &[f32]) -> Result<Buffe
 }
 
 /// Makes a top-level structure for a slot the caller reserved, whatever it takes; nothing is built yet.
-pub(super) fn new_tlas(shared: &Shared, desc: &TlasDesc<'_>, slot: u32) -> Result<AccelStruct> {
+pub(super) fn new_tlas(shared: &DeviceState, desc: &TlasDesc<'_>, slot: u32) -> Result<AccelStruct> {
     let limits = PartLimits { structure_bytes: u64::MAX, scratch_bytes: u64::MAX, primitives: u64::MAX };
-    tlas_within(shared, desc, slot, &limits)
+    new_tlas_within_limits(shared, desc, slot, &limits)
 }
 
-fn tlas_within(shared: &Shared, desc: &TlasDesc<'_>, slot: u32, limits: &PartLimits) -> Result<AccelStruct> {
+fn new_tlas_within_limits(
+    shared: &DeviceState,
+    desc: &TlasDesc<'_>,
+    slot: u32,
+    limits: &PartLimits,
+) -> Result<AccelStruct> {
     let name = desc.debug_name;
     desc.flags.check_tlas(name)?;
     let count = u32::try_from(desc.instances.len()).unwrap_or(u32::MAX);
     let capacity = desc.capacity.max(count);
     let average = u64::from(built_count(shared, desc)?).div_ceil(u64::from(count.max(1)));
-    let room = u64::from(capacity) * average.max(desc.parts_per_instance.into());
-    check_limit(name, "instance capacity", room, shared.gpu.caps.limits.max_tlas_instances)?;
-    let room = u32::try_from(room).unwrap_or(u32::MAX);
+    let built_capacity = u64::from(capacity) * average.max(desc.parts_per_instance.into());
+    check_limit(name, "instance capacity", built_capacity, shared.gpu.caps.limits.max_tlas_instances)?;
+    let built_capacity = u32::try_from(built_capacity).unwrap_or(u32::MAX);
     let (structure, sizes) = match shared.gpu.accel {
         Some(_) => {
-            let (structure, sizes) = hardware_tlas(shared, desc, room, limits)?;
+            let (structure, sizes) = hardware_tlas(shared, desc, built_capacity, limits)?;
             (Some(structure), sizes)
         }
         None => (None, AccelStructSizes::default()),
     };
     let software = software_tlas(shared, name, capacity)?;
-    let sizes = software.as_ref().map_or(sizes, |software| sizes.join(software.sizes()));
-    let tlas = Tlas::new(slot, capacity, room, structure, software);
+    let sizes = software.as_ref().map_or(sizes, |software| sizes.max_with(software.sizes()));
+    let tlas = Tlas::new(slot, capacity, built_capacity, structure, software);
     Ok(AccelStruct::new(name, desc.flags, sizes, AccelKind::Tlas(tlas)))
 }
 
 /// Instances Vulkan will be given.
-fn built_count(shared: &Shared, desc: &TlasDesc<'_>) -> Result<u32> {
+fn built_count(shared: &DeviceState, desc: &TlasDesc<'_>) -> Result<u32> {
     let find = |handle| shared.store.accel_structs.get(handle);
     let (known, mut memory) = (Arc::default(), PlanMemory::default());
     let plan = InstancePlan::new(desc.debug_name, desc.instances, &known, &mut memory, &find)?;
@@ -247,17 +252,17 @@ fn built_count(shared: &Shared, desc: &TlasDesc<'_>) -> Result<u32> {
 
 /// Room for what the device traces.
 fn hardware_tlas(
-    shared: &Shared,
+    shared: &DeviceState,
     desc: &TlasDesc<'_>,
-    room: u32,
+    built_capacity: u32,
     limits: &PartLimits,
-) -> Result<(RawStructure, AccelStructSizes)> {
+) -> Result<(RawAccelStruct, AccelStructSizes)> {
     let name = desc.debug_name;
-    let sizes = BuildInput::tlas(desc.flags, 0, room).sizes(&shared.gpu)?;
+    let sizes = BuildInput::from_instances(desc.flags, 0, built_capacity).query_sizes(&shared.gpu)?;
     check_limit(name, "size of the structure in bytes", sizes.structure_bytes, limits.structure_bytes)?;
     check_limit(name, "scratch of a build in bytes", sizes.scratch_bytes(), limits.scratch_bytes)?;
     let ty = vk::AccelerationStructureTypeKHR::TOP_LEVEL;
     let bytes = sizes.structure_bytes;
-    let structure = RawStructure::new(&shared.gpu, &shared.accel_storage, name, ty, bytes)?;
+    let structure = RawAccelStruct::new(&shared.gpu, &shared.accel_storage, name, ty, bytes)?;
     Ok((structure, sizes))
 }

@@ -4,7 +4,7 @@ use super::Context;
 use super::holder::Holder;
 use crate::error::Result;
 use crate::handle::{ComputePipelineHandle, RenderPipelineHandle};
-use crate::parallel::make_all;
+use crate::parallel::parallel_map;
 use crate::pipeline::compute::ComputePipelineDesc;
 use crate::pipeline::graphics_desc::RenderPipelineDesc;
 
@@ -15,7 +15,7 @@ impl Context {
         &self,
         descs: &[RenderPipelineDesc<'_>],
     ) -> Vec<Result<Holder<RenderPipelineHandle>>> {
-        make_all(descs, |desc| self.create_render_pipeline(desc))
+        parallel_map(descs, |desc| self.create_render_pipeline(desc))
     }
 
     /// [`create_compute_pipeline`](Self::create_compute_pipeline) for each description, on all cores of the CPU. Answers
@@ -24,6 +24,6 @@ impl Context {
         &self,
         descs: &[ComputePipelineDesc<'_>],
     ) -> Vec<Result<Holder<ComputePipelineHandle>>> {
-        make_all(descs, |desc| self.create_compute_pipeline(desc))
+        parallel_map(descs, |desc| self.create_compute_pipeline(desc))
     }
 }

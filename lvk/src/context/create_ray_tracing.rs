@@ -25,7 +25,7 @@ impl Context {
         &self,
         desc: &RayTracingPipelineDesc<'_>,
     ) -> Result<Holder<RayTracingPipelineHandle>> {
-        let shared = self.shared();
+        let shared = self.device_state();
         let find = |handle| shared.store.shader_modules.get(handle);
         let libraries = desc.libraries.iter().map(|handle| shared.store.ray_tracing_libraries.get(*handle));
         let libraries = libraries.collect::<Result<Vec<_>>>()?;
@@ -33,7 +33,7 @@ impl Context {
         let (pipeline, table) = RayTracingPipeline::new(&shared.gpu, base, desc, &find, &libraries)?;
         let target = Arc::clone(&pipeline.table);
         let holder = Holder::new(self, shared.store.ray_tracing_pipelines.insert(pipeline), NO_SLOT);
-        self.upload_object(&target, table.offset, &table.bytes)?;
+        self.upload_to_buffer(&target, table.offset, &table.bytes)?;
         Ok(holder)
     }
 
@@ -49,7 +49,7 @@ impl Context {
         &self,
         desc: &RayTracingLibraryDesc<'_>,
     ) -> Result<Holder<RayTracingLibraryHandle>> {
-        let shared = self.shared();
+        let shared = self.device_state();
         let find = |handle| shared.store.shader_modules.get(handle);
         let library = RayTracingLibrary::new(&shared.gpu, shared.pipeline_base(), desc, &find)?;
         Ok(Holder::new(self, shared.store.ray_tracing_libraries.insert(library), NO_SLOT))
@@ -58,7 +58,7 @@ impl Context {
     /// Bytes of stack each ray of a pipeline needs, as set when it is bound
     /// (`vkCmdSetRayTracingPipelineStackSizeKHR`). Whoever binds the raw pipeline has to set it too.
     pub fn ray_tracing_stack_bytes(&self, pipeline: RayTracingPipelineHandle) -> Result<u32> {
-        Ok(self.shared().store.ray_tracing_pipelines.get(pipeline)?.stack_bytes)
+        Ok(self.device_state().store.ray_tracing_pipelines.get(pipeline)?.stack_bytes)
     }
 
     /// Writes what was compiled so far to the file of
@@ -70,13 +70,13 @@ impl Context {
     /// be written, for instance because its folder does not exist.
     pub fn save_pipeline_cache(&self) -> Result<()> {
         let message = "name a file in ContextDesc::pipeline_cache to keep compiled pipelines";
-        let cache = self.shared().pipeline_cache.as_ref();
+        let cache = self.device_state().pipeline_cache.as_ref();
         cache.ok_or_else(|| Error::usage("save_pipeline_cache", message))?.save()
     }
 
     /// Bytes of compiled pipelines that the context started with from its file; 0 where it has none, or the file was
     /// dropped because it is damaged or of another device or driver.
     pub fn pipeline_cache_loaded_bytes(&self) -> u64 {
-        self.shared().pipeline_cache.as_ref().map_or(0, |cache| cache.loaded_bytes)
+        self.device_state().pipeline_cache.as_ref().map_or(0, |cache| cache.loaded_bytes)
     }
 }

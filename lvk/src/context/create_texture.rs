@@ -21,11 +21,11 @@ impl Context {
     }
 
     fn new_texture(&self, desc: &TextureDesc<'_>) -> Result<Holder<TextureHandle>> {
-        let shared = self.shared();
-        let slot = shared.reserve(|| shared.bindless.reserve_texture(desc.debug_name))?;
+        let shared = self.device_state();
+        let slot = shared.reserve_slot(|| shared.bindless.reserve_texture(desc.debug_name))?;
         let made = Texture::new(&shared.gpu, desc, slot).and_then(|texture| {
-            check_data(desc, texture.mips())?;
-            let views = views(&texture)?;
+            check_data_size(desc, texture.mips())?;
+            let views = default_views(&texture)?;
             Ok((texture, views))
         });
         let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
@@ -34,7 +34,7 @@ impl Context {
     }
 
     fn new_yuv(&self, desc: &TextureDesc<'_>) -> Result<Holder<TextureHandle>> {
-        let shared = self.shared();
+        let shared = self.device_state();
         let bindless = &shared.bindless;
         let reserve = || bindless.reserve_yuv(desc.format, desc.conversion, desc.debug_name);
         let place = reserve().or_else(|_| {
@@ -43,7 +43,7 @@ impl Context {
         })?;
         let made =
             Texture::with_conversion(&shared.gpu, desc, place.slot, place.conversion).and_then(|texture| {
-                check_data(desc, texture.mips())?;
+                check_data_size(desc, texture.mips())?;
                 let view = texture.sampled_view()?;
                 Ok((texture, view))
             });
@@ -65,12 +65,12 @@ impl Context {
     /// that the texture was not made for or that the format or the swizzle exclude;
     /// [`StaleHandle`](Error::StaleHandle); [`LimitExceeded`](Error::LimitExceeded) when all numbers of textures are taken.
     pub fn create_texture_view(&self, desc: &TextureViewDesc<'_>) -> Result<Holder<TextureHandle>> {
-        let shared = self.shared();
+        let shared = self.device_state();
         let missing = || Error::usage(desc.debug_name, "give the view a texture");
         let shown = shared.store.textures.get(desc.texture.ok_or_else(missing)?)?;
-        let slot = shared.reserve(|| shared.bindless.reserve_texture(desc.debug_name))?;
+        let slot = shared.reserve_slot(|| shared.bindless.reserve_texture(desc.debug_name))?;
         let made = shown.view(desc, slot).and_then(|texture| {
-            let views = views(&texture)?;
+            let views = default_views(&texture)?;
             texture.image.add_texture()?;
             Ok((texture, views))
         });
@@ -80,8 +80,8 @@ impl Context {
     }
 
     /// Writes the first contents at once, which nothing has to wait for then.
-    fn fill_by_host(&self, texture: &Texture, contents: &[(Region, &[u8])]) -> Result<()> {
-        let (shared, image) = (self.shared(), &texture.image);
+    fn fill_with_host_copy(&self, texture: &Texture, contents: &[(Region, &[u8])]) -> Result<()> {
+        let (shared, image) = (self.device_state(), &texture.image);
         host_copy::fill_from_host(&shared.gpu, image, contents)?;
         shared.submitter.mark_host_written(image.id, image.shape);
         Ok(())
@@ -89,11 +89,11 @@ impl Context {
 
     /// Uploads the first contents; without any, shaders may still read what is there.
     fn fill_texture(&self, handle: TextureHandle, desc: &TextureDesc<'_>) -> Result<()> {
-        let texture = self.shared().store.textures.get(handle)?;
+        let texture = self.device_state().store.textures.get(handle)?;
         let Some(data) = desc.data else {
-            return self.settle_texture(&texture);
+            return self.make_texture_visible(&texture);
         };
-        let mips = data_mips(desc, texture.mips());
+        let mips = mips_in_data(desc, texture.mips());
         let mut regions = Vec::with_capacity(mips as usize);
         let mut rest = data;
         for mip in 0..mips {
@@ -106,20 +106,20 @@ impl Context {
             }
         }
         if texture.image.host_filled {
-            return self.fill_by_host(&texture, &regions);
+            return self.fill_with_host_copy(&texture, &regions);
         }
         for (region, bytes) in regions {
             self.upload_region(&texture, region, bytes)?;
         }
         if desc.generate_mips {
-            self.before_next_submission(|cmd| cmd.generate_mipmaps_object(&texture))?;
+            self.record_in_prologue(|cmd| cmd.generate_mipmaps_object(&texture))?;
         }
         Ok(())
     }
 }
 
 /// Fails unless the first contents are as many bytes as they should be. The texture has so many mips.
-pub(super) fn check_data(desc: &TextureDesc<'_>, mips: u32) -> Result<()> {
+pub(super) fn check_data_size(desc: &TextureDesc<'_>, mips: u32) -> Result<()> {
     let wrong = |message: String| Err(Error::usage(desc.debug_name, message));
     let Some(data) = desc.data else {
         return match desc.generate_mips {
@@ -129,7 +129,7 @@ pub(super) fn check_data(desc: &TextureDesc<'_>, mips: u32) -> Result<()> {
             false => Ok(()),
         };
     };
-    let count = data_mips(desc, mips);
+    let count = mips_in_data(desc, mips);
     if count > mips || (desc.generate_mips && count != 1) {
         return wrong(format!(
             "the data has {count} mips; the texture has {mips}, and others are generated from one alone"
@@ -147,12 +147,12 @@ pub(super) fn check_data(desc: &TextureDesc<'_>, mips: u32) -> Result<()> {
     wrong(format!("{count} mips have {expected} bytes in all layers and slices, but {given} were given"))
 }
 
-fn data_mips(desc: &TextureDesc<'_>, mips: u32) -> u32 {
+fn mips_in_data(desc: &TextureDesc<'_>, mips: u32) -> u32 {
     if desc.data_mips == 0 { mips } else { desc.data_mips }
 }
 
 /// What shaders see of a texture.
-pub(super) fn views(texture: &Texture) -> Result<TextureViews> {
+pub(super) fn default_views(texture: &Texture) -> Result<TextureViews> {
     let sampled = texture.usage.contains(TextureUsage::SAMPLED);
     let storage = texture.usage.contains(TextureUsage::STORAGE);
     Ok(TextureViews {

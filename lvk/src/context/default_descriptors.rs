@@ -8,7 +8,7 @@ use crate::accel::AccelStruct;
 use crate::accel::desc::TlasDesc;
 use crate::accel::flags::BuildMode;
 use crate::bindless::DefaultDescriptors;
-use crate::device_state::DummyObjects;
+use crate::device_state::DefaultObjects;
 use crate::error::Result;
 use crate::resource::region::TextureRegion;
 use crate::resource::sampler::SamplerDesc;
@@ -16,23 +16,23 @@ use crate::resource::texture_desc::{TextureDesc, TextureUsage};
 use crate::resource::{Sampler, Texture};
 
 /// The slot of the dummies.
-const SLOT: u32 = 0;
+const DEFAULT_SLOT: u32 = 0;
 const MAGENTA: [u8; 4] = [255, 0, 255, 255];
 const BLACK: [u8; 4] = [0, 0, 0, 255];
 
 /// Makes the dummies and puts them into every slot. They live as long as the context.
-pub(super) fn fill_dummies(ctx: &Context) -> Result<()> {
-    let shared = ctx.shared();
-    let sampled = checker(ctx, TextureUsage::SAMPLED)?;
-    let storage = checker(ctx, TextureUsage::STORAGE)?;
+pub(super) fn fill_default_descriptors(ctx: &Context) -> Result<()> {
+    let shared = ctx.device_state();
+    let sampled = checker_texture(ctx, TextureUsage::SAMPLED)?;
+    let storage = checker_texture(ctx, TextureUsage::STORAGE)?;
     let sampler = SamplerDesc { debug_name: "dummy sampler", ..Default::default() };
-    let sampler = Sampler::new(&shared.gpu, &sampler, SLOT)?;
-    ctx.before_next_submission(|cmd| {
+    let sampler = Sampler::new(&shared.gpu, &sampler, DEFAULT_SLOT)?;
+    ctx.record_in_prologue(|cmd| {
         cmd.clear_tlas_table();
         Ok(())
     })?;
-    let tlas = if shared.gpu.has_acceleration_structures() { Some(empty_tlas(ctx)?) } else { None };
-    let mut textures = yuv_dummies(ctx)?;
+    let tlas = if shared.gpu.has_acceleration_structures() { Some(new_empty_tlas(ctx)?) } else { None };
+    let mut textures = default_yuv_textures(ctx)?;
     shared.bindless.write_defaults(DefaultDescriptors {
         sampled: sampled.sampled_view()?,
         storage: storage.storage_view()?,
@@ -41,29 +41,29 @@ pub(super) fn fill_dummies(ctx: &Context) -> Result<()> {
         tlas_table: shared.tlas_table.as_ref().map(|table| table.raw),
     });
     textures.extend([sampled, storage]);
-    let objects = DummyObjects { _textures: textures, _sampler: sampler, _tlas: tlas };
+    let objects = DefaultObjects { _textures: textures, _sampler: sampler, _tlas: tlas };
     // The cell is empty: this runs once, while the context is made.
-    let _ = shared.dummies.set(objects);
+    let _ = shared.default_objects.set(objects);
     Ok(())
 }
 
 /// Two textures, so that what a shader stores into an empty slot is not seen by those who sample one.
-fn checker(ctx: &Context, usage: TextureUsage) -> Result<Arc<Texture>> {
+fn checker_texture(ctx: &Context, usage: TextureUsage) -> Result<Arc<Texture>> {
     let desc = TextureDesc { extent: [2, 2], usage, debug_name: "dummy texture", ..Default::default() };
-    let texture = Arc::new(Texture::new(&ctx.shared().gpu, &desc, SLOT)?);
+    let texture = Arc::new(Texture::new(&ctx.device_state().gpu, &desc, DEFAULT_SLOT)?);
     let pixels = [MAGENTA, BLACK, BLACK, MAGENTA].concat();
     ctx.upload_texture_object(&texture, &TextureRegion::default(), &pixels)?;
     Ok(texture)
 }
 
 /// A black picture for each conversion.
-fn yuv_dummies(ctx: &Context) -> Result<Vec<Arc<Texture>>> {
-    let shared = ctx.shared();
+fn default_yuv_textures(ctx: &Context) -> Result<Vec<Arc<Texture>>> {
+    let shared = ctx.device_state();
     let mut defaults = Vec::new();
     for (number, conversion, raw) in shared.bindless.yuv_conversions() {
         let format = conversion.format;
         let desc = TextureDesc { format, extent: [2, 2], debug_name: "dummy texture", ..Default::default() };
-        let texture = Arc::new(Texture::with_conversion(&shared.gpu, &desc, SLOT, raw)?);
+        let texture = Arc::new(Texture::with_conversion(&shared.gpu, &desc, DEFAULT_SLOT, raw)?);
         for aspect in format.uploaded_aspects() {
             let region = TextureRegion { aspect, ..Default::default() };
             let bytes = vec![0; texture.resolve_region(&region)?.bytes() as usize];
@@ -75,9 +75,9 @@ fn yuv_dummies(ctx: &Context) -> Result<Vec<Arc<Texture>>> {
     Ok(defaults)
 }
 
-fn empty_tlas(ctx: &Context) -> Result<Arc<AccelStruct>> {
+fn new_empty_tlas(ctx: &Context) -> Result<Arc<AccelStruct>> {
     let desc = TlasDesc { debug_name: "dummy tlas", ..Default::default() };
-    let tlas = Arc::new(new_tlas(ctx.shared(), &desc, SLOT)?);
-    ctx.before_next_submission(|cmd| cmd.update_tlas_object(&tlas, &[], BuildMode::Rebuild))?;
+    let tlas = Arc::new(new_tlas(ctx.device_state(), &desc, DEFAULT_SLOT)?);
+    ctx.record_in_prologue(|cmd| cmd.update_tlas_object(&tlas, &[], BuildMode::Rebuild))?;
     Ok(tlas)
 }

@@ -1,7 +1,7 @@
 //! Destroys objects, once the GPU is done with them.
 
 use super::Context;
-use crate::device_state::{Garbage, Shared};
+use crate::device_state::{DeferredFree, DeviceState};
 use crate::handle::{
     AccelStructHandle, BufferHandle, ComputePipelineHandle, Handle, QueryPoolHandle, RayTracingLibraryHandle,
     RayTracingPipelineHandle, RenderPipelineHandle, SamplerHandle, ShaderModuleHandle, TextureHandle,
@@ -10,24 +10,24 @@ use crate::handle::{
 /// Handles whose objects a context can destroy: all of them.
 pub trait Destroy: Handle {
     #[doc(hidden)]
-    fn take_from(self, ctx: &Context);
+    fn destroy_in(self, ctx: &Context);
 }
 
 impl Context {
     /// Destroys an object. Its handle is stale from now on; its memory goes when the last command buffer that may use
     /// it is done. Does nothing for a stale handle, nor for an image of a swapchain.
     pub fn destroy<H: Destroy>(&self, handle: H) {
-        handle.take_from(self);
+        handle.destroy_in(self);
     }
 }
 
 macro_rules! destroy {
     ($($handle:ident: $pool:ident => $garbage:ident;)*) => {
         $(impl Destroy for $handle {
-            fn take_from(self, ctx: &Context) {
-                let shared: &Shared = ctx.shared();
+            fn destroy_in(self, ctx: &Context) {
+                let shared: &DeviceState = ctx.device_state();
                 if let Ok(object) = shared.store.$pool.remove(self) {
-                    shared.retire(Garbage::$garbage(object));
+                    shared.free_later(DeferredFree::$garbage(object));
                 }
             }
         })*
@@ -46,28 +46,28 @@ destroy! {
 
 impl Destroy for TextureHandle {
     /// Images of a swapchain go with it.
-    fn take_from(self, ctx: &Context) {
-        let shared: &Shared = ctx.shared();
+    fn destroy_in(self, ctx: &Context) {
+        let shared: &DeviceState = ctx.device_state();
         let textures = &shared.store.textures;
         if textures.get(self).is_ok_and(|texture| texture.lent) {
             return;
         }
         if let Ok(texture) = textures.remove(self) {
-            shared.retire(Garbage::Texture(texture));
+            shared.free_later(DeferredFree::Texture(texture));
         }
     }
 }
 
 impl Destroy for ShaderModuleHandle {
     /// Pipelines do not need their modules once they are created.
-    fn take_from(self, ctx: &Context) {
-        drop(ctx.shared().store.shader_modules.remove(self));
+    fn destroy_in(self, ctx: &Context) {
+        drop(ctx.device_state().store.shader_modules.remove(self));
     }
 }
 
 impl Destroy for RayTracingLibraryHandle {
     /// Pipelines linked from the library keep it.
-    fn take_from(self, ctx: &Context) {
-        drop(ctx.shared().store.ray_tracing_libraries.remove(self));
+    fn destroy_in(self, ctx: &Context) {
+        drop(ctx.device_state().store.ray_tracing_libraries.remove(self));
     }
 }

@@ -1,7 +1,7 @@
 //! What textures the device can make.
 
 use super::Context;
-use super::create_texture::check_data;
+use super::create_texture::check_data_size;
 use crate::error::Result;
 use crate::format::Format;
 use crate::gpu::caps::shading_rate::FragmentSize;
@@ -17,7 +17,7 @@ const DEPTH_STENCIL: [Format; 2] = [Format::D32FloatS8, Format::D24UnormS8];
 impl Context {
     /// What the device can do with 2D textures of a format (`vkGetPhysicalDeviceFormatProperties`).
     pub fn format_support(&self, format: Format) -> FormatSupport {
-        FormatSupport::new(&self.shared().gpu, format)
+        FormatSupport::new(&self.device_state().gpu, format)
     }
 
     /// Whether [`create_texture`](Self::create_texture) would take the description, short of memory and of numbers for
@@ -26,15 +26,15 @@ impl Context {
     /// # Errors
     /// Those that it would answer.
     pub fn supports_texture(&self, desc: &TextureDesc<'_>) -> Result<()> {
-        let plan = check_image(&self.shared().gpu, desc)?;
-        check_data(desc, plan.mips)
+        let plan = check_image(&self.device_state().gpu, desc)?;
+        check_data_size(desc, plan.mips)
     }
 
     /// The sizes of fragments that the device has, from large to small; empty where it lacks
     /// [`OptionalFeature::PipelineShadingRate`](crate::OptionalFeature::PipelineShadingRate)
     /// (`vkGetPhysicalDeviceFragmentShadingRatesKHR`).
     pub fn shading_rates(&self) -> &[FragmentSize] {
-        self.shared().gpu.shading_rates.as_ref().map_or(&[], |rates| &rates.sizes)
+        self.device_state().gpu.shading_rates.as_ref().map_or(&[], |rates| &rates.sizes)
     }
 
     /// The best format of depth, with stencil or without, that can be drawn to and sampled here; `None` where there is none.

@@ -24,16 +24,16 @@ pub(super) struct FrameRing {
 }
 
 impl FrameRing {
-    const MOST: u32 = 8;
+    const MAX_FRAMES: u32 = 8;
 
     pub(super) fn new(frames_in_flight: u32) -> Self {
-        let in_flight = frames_in_flight.clamp(1, Self::MOST) as usize;
+        let in_flight = frames_in_flight.clamp(1, Self::MAX_FRAMES) as usize;
         Self { in_flight, next: 0, ends: VecDeque::with_capacity(in_flight) }
     }
 
     /// Starts a frame, with `submitted` the last submissions before it, one for each queue. Answers the frame and the
     /// submissions to wait for: the last ones of the frame that used its index before.
-    fn start(&mut self, submitted: PerQueue<u64>) -> (Frame, PerQueue<u64>) {
+    fn start_frame(&mut self, submitted: PerQueue<u64>) -> (Frame, PerQueue<u64>) {
         if self.next > 0 {
             self.ends.push_back(submitted);
         }
@@ -50,14 +50,14 @@ impl Context {
     /// per-frame buffers for each index is enough. On other queues that is so for what was [submitted](Self::submit), not for
     /// what was [in the background](Self::submit_in_background).
     pub fn next_frame(&self) -> Result<Frame> {
-        let submitted = self.shared().submitter.foreground_values();
+        let submitted = self.device_state().submitter.foreground_values();
         let (frame, wait_for) = {
             let mut frames = self.inner.frames.lock();
-            frames.start(submitted)
+            frames.start_frame(submitted)
         };
-        self.shared().profiler.begin_frame(frame.number);
-        self.shared().submitter.wait_for_queues(&wait_for)?;
-        self.shared().collect_known()?;
+        self.device_state().profiler.begin_frame(frame.number);
+        self.device_state().submitter.wait_for_queues(&wait_for)?;
+        self.device_state().collect_known()?;
         self.advance_compactions();
         Ok(frame)
     }
@@ -75,17 +75,17 @@ mod tests {
     #[test]
     fn a_frame_waits_for_the_last_submission_of_the_frame_with_its_index() {
         let mut ring = FrameRing::new(2);
-        assert_eq!(ring.start([3, 0, 0]), (Frame { number: 0, index: 0 }, [0; 3]));
-        assert_eq!(ring.start([5, 4, 0]), (Frame { number: 1, index: 1 }, [0; 3]));
-        assert_eq!(ring.start([9, 4, 7]), (Frame { number: 2, index: 0 }, [5, 4, 0]));
-        assert_eq!(ring.start([9, 4, 7]), (Frame { number: 3, index: 1 }, [9, 4, 7]));
+        assert_eq!(ring.start_frame([3, 0, 0]), (Frame { number: 0, index: 0 }, [0; 3]));
+        assert_eq!(ring.start_frame([5, 4, 0]), (Frame { number: 1, index: 1 }, [0; 3]));
+        assert_eq!(ring.start_frame([9, 4, 7]), (Frame { number: 2, index: 0 }, [5, 4, 0]));
+        assert_eq!(ring.start_frame([9, 4, 7]), (Frame { number: 3, index: 1 }, [9, 4, 7]));
     }
 
     #[test]
     fn one_frame_in_flight_waits_for_the_frame_before() {
         let mut ring = FrameRing::new(0);
-        assert_eq!(ring.start([0; 3]).1, [0; 3]);
-        assert_eq!(ring.start([7, 0, 0]).1, [7, 0, 0]);
-        assert_eq!(ring.start([8, 0, 0]).1, [8, 0, 0]);
+        assert_eq!(ring.start_frame([0; 3]).1, [0; 3]);
+        assert_eq!(ring.start_frame([7, 0, 0]).1, [7, 0, 0]);
+        assert_eq!(ring.start_frame([8, 0, 0]).1, [8, 0, 0]);
     }
 }

@@ -42,6 +42,6 @@ impl Context {
         let gpu = unsafe {
             Gpu::from_raw(raw, desc.ray_tracing_pipeline, desc.ray_query, desc.debug_names, queues)?
         };
-        Self::on(Arc::new(gpu), desc)
+        Self::with_gpu(Arc::new(gpu), desc)
     }
 }

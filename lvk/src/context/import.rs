@@ -6,8 +6,8 @@ use super::Context;
 use super::holder::Holder;
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
-use crate::gpu::caps::queues::Queue;
 use crate::handle::{BufferHandle, TextureHandle};
+use crate::queue::Queue;
 use crate::resource::buffer::BufferUsage;
 use crate::resource::texture_desc::TextureDesc;
 use crate::resource::{Buffer, Texture};
@@ -83,7 +83,7 @@ impl Context {
     /// [`Unsupported`](Error::Unsupported) and [`LimitExceeded`](Error::LimitExceeded) as of
     /// [`create_texture`](Self::create_texture).
     pub unsafe fn import_texture(&self, import: &ImportedTexture<'_>) -> Result<Holder<TextureHandle>> {
-        let (shared, desc) = (self.shared(), &import.desc);
+        let (shared, desc) = (self.device_state(), &import.desc);
         if desc.format.is_yuv() {
             let message = "textures in Y'CbCr are not imported; create one, and copy the planes to it";
             return Err(Error::usage(desc.debug_name, message));
@@ -96,9 +96,9 @@ impl Context {
             return Err(Error::usage(desc.debug_name, message));
         }
         let layout = layout_from_vulkan(import.layout).map_err(|why| Error::usage(desc.debug_name, why))?;
-        let slot = shared.reserve(|| shared.bindless.reserve_texture(desc.debug_name))?;
+        let slot = shared.reserve_slot(|| shared.bindless.reserve_texture(desc.debug_name))?;
         let made = Texture::import(&shared.gpu, desc, import.image, slot)
-            .and_then(|texture| super::create_texture::views(&texture).map(|views| (texture, views)));
+            .and_then(|texture| super::create_texture::default_views(&texture).map(|views| (texture, views)));
         let (texture, views) = made.inspect_err(|_| shared.bindless.free_texture(slot))?;
         shared.submitter.import_texture(texture.image.id, texture.image.shape, layout);
         if !import.concurrent {
@@ -124,12 +124,12 @@ impl Context {
         let name = import.debug_name;
         // SAFETY: by the caller.
         let buffer = unsafe {
-            Buffer::import(&self.shared().gpu, import.buffer, import.size_bytes, import.usage, name)
+            Buffer::import(&self.device_state().gpu, import.buffer, import.size_bytes, import.usage, name)
         };
         if !import.concurrent {
-            self.shared().submitter.restrict_to_graphics(buffer.id, name);
+            self.device_state().submitter.restrict_to_graphics(buffer.id, name);
         }
-        let handle = self.shared().store.buffers.insert(buffer);
+        let handle = self.device_state().store.buffers.insert(buffer);
         Ok(Holder::new(self, handle, super::create::NO_SLOT))
     }
 
@@ -142,9 +142,9 @@ impl Context {
     /// [`InvalidUsage`](Error::InvalidUsage) for a layout that is not in the list of
     /// [`ImportedTexture::layout`].
     pub unsafe fn acquire_texture(&self, texture: TextureHandle, layout: vk::ImageLayout) -> Result<()> {
-        let texture = self.shared().store.textures.get(texture)?;
+        let texture = self.device_state().store.textures.get(texture)?;
         let layout = layout_from_vulkan(layout).map_err(|why| Error::usage(&texture.name, why))?;
-        self.shared().submitter.import_texture(texture.image.id, texture.image.shape, layout);
+        self.device_state().submitter.import_texture(texture.image.id, texture.image.shape, layout);
         Ok(())
     }
 
@@ -169,7 +169,7 @@ impl Context {
         let signals = signals.iter().map(|signal| info(signal.semaphore, signal.value).stage_mask(all));
         let (waits, signals): (Vec<_>, Vec<_>) = (waits.collect(), signals.collect());
         let exchanges = !waits.is_empty() || !signals.is_empty();
-        self.submit_between(cmd, Submission { waits, signals, exchanges, ..Submission::default() })
+        self.submit_with_semaphores(cmd, Submission { waits, signals, exchanges, ..Submission::default() })
     }
 
     /// The timeline semaphore of what is submitted to the graphics queue; [`SubmitHandle::raw_value`] is the value that a
@@ -180,7 +180,7 @@ impl Context {
 
     /// As [`raw_timeline`](Self::raw_timeline), of another queue; queues that share hardware share it too.
     pub fn raw_timeline_of(&self, queue: Queue) -> vk::Semaphore {
-        let shared = self.shared();
+        let shared = self.device_state();
         shared.submitter.timeline(shared.gpu.queues.queue_index(queue)).raw
     }
 }

@@ -14,7 +14,7 @@ impl Context {
     /// set.
     pub fn index_faults(&self) -> Result<Vec<IndexFault>> {
         let message = "set ContextDesc::check_indices to have indices checked";
-        let checks = self.shared().bindless.checks.as_ref();
+        let checks = self.device_state().bindless.checks.as_ref();
         let checks = checks.ok_or_else(|| Error::usage("index_faults", message))?;
         let bytes = IndexChecks::fault_bytes();
         let mut words = vec![0_u32; bytes as usize / 4];

@@ -6,6 +6,6 @@ use crate::store::LiveObject;
 impl Context {
     /// Every object that has a handle, kind by kind; those that were destroyed and wait for the GPU are not among them.
     pub fn live_objects(&self) -> Vec<LiveObject> {
-        self.shared().store.live()
+        self.device_state().store.live()
     }
 }

@@ -36,15 +36,15 @@ mod window;
 use std::sync::Arc;
 
 use crate::accel::compaction::Compactions;
-use crate::command::SpareNotes;
-use crate::device_state::Shared;
+use crate::command::RecordingStatePool;
+use crate::device_state::DeviceState;
 use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::debug::messenger::ValidationSink;
 use crate::gpu::memory::budget::MemoryBudget;
 use crate::lock_order::Mutex;
 
 use frame::FrameRing;
-use prologue::Pending;
+use prologue::Prologue;
 
 /// A Vulkan device with everything made from it.
 ///
@@ -53,40 +53,40 @@ use prologue::Pending;
 /// `log` crate by name.
 #[derive(Clone)]
 pub struct Context {
-    inner: Arc<Inner>,
+    inner: Arc<ContextInner>,
 }
 
-struct Inner {
+struct ContextInner {
     /// Uploads and builds that run before the next submission.
-    pending: Mutex<Pending>,
+    prologue: Mutex<Prologue>,
     frames: Mutex<FrameRing>,
-    spare_notes: SpareNotes,
+    recording_states: RecordingStatePool,
     /// Compactions under way.
     compactions: Mutex<Compactions>,
     /// For swapchains that name none.
     #[cfg(feature = "window")]
-    window: Option<Arc<dyn crate::gpu::window::WindowHandles>>,
-    shared: Arc<Shared>,
+    window: Option<Arc<dyn crate::gpu::start::window::WindowHandles>>,
+    shared: Arc<DeviceState>,
 }
 
 impl Context {
     /// What the device can do.
     pub fn capabilities(&self) -> &Capabilities {
-        &self.shared().gpu.caps
+        &self.device_state().gpu.caps
     }
 
     /// How much of each heap of memory there is, may be used and is used
     /// (`vkGetPhysicalDeviceMemoryProperties2`, with `VK_EXT_memory_budget` where the device has it).
     pub fn memory_budget(&self) -> MemoryBudget {
-        self.shared().gpu.memory_budget()
+        self.device_state().gpu.memory_budget()
     }
 
     /// The messages of the validation layer so far.
     pub fn validation(&self) -> &ValidationSink {
-        self.shared().gpu.instance.sink()
+        self.device_state().gpu.instance.sink()
     }
 
-    pub(crate) fn shared(&self) -> &Arc<Shared> {
+    pub(crate) fn device_state(&self) -> &Arc<DeviceState> {
         &self.inner.shared
     }
 }

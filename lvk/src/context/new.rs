@@ -5,25 +5,26 @@ use std::sync::atomic::{AtomicBool, AtomicU64};
 use std::sync::{Arc, OnceLock};
 
 use super::config::ContextDesc;
-use super::default_descriptors::fill_dummies;
+use super::default_descriptors::fill_default_descriptors;
 use super::frame::FrameRing;
-use super::prologue::Pending;
-use super::{Context, Inner};
+use super::prologue::Prologue;
+use super::{Context, ContextInner};
 use crate::accel::compaction::Compactions;
 use crate::accel::scratch_buffer::ScratchBuffer;
 use crate::accel::storage::AccelStorage;
 use crate::barrier::{RayQueryStages, ResourceId};
 use crate::bindless::layout::TLAS_TABLE_ENTRY_BYTES;
 use crate::bindless::{Bindless, YuvSlots};
-use crate::command::SpareNotes;
-use crate::device_state::Shared;
+use crate::command::RecordingStatePool;
+use crate::device_state::DeviceState;
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::gpu::caps::capabilities::{Capabilities, PhysicalDevice};
+use crate::gpu::caps::capabilities::Capabilities;
 use crate::gpu::caps::queues::QueueRequest;
 use crate::gpu::debug::messenger::{ValidationMode, ValidationSink};
 use crate::gpu::device::DeviceRequest;
 use crate::gpu::start::instance::{Instance, InstanceDesc};
+use crate::gpu::start::physical_device::PhysicalDevice;
 use crate::kernels::Kernels;
 use crate::lock_order::{Mutex, Rank};
 use crate::pipeline::{PipelineCache, PipelineLayout};
@@ -33,7 +34,7 @@ use crate::shader::ShaderCache;
 use crate::store::Store;
 use crate::submit::Submitter;
 use crate::submit::profiler::Profiler;
-use crate::upload::{SpareBuffers, Staging};
+use crate::upload::{BufferRecycler, Staging};
 
 impl Context {
     /// Opens Vulkan and makes a device that has what `desc` requires.
@@ -41,7 +42,7 @@ impl Context {
     /// # Errors
     /// [`NoVulkan`](crate::Error::NoVulkan) without a loader or driver; [`NoDevice`](crate::Error::NoDevice) with the
     /// reason for each device when none will do; [`Unsupported`](crate::Error::Unsupported) when validation is wanted
-    /// and its layer is missing, the instance has no extension of [`ContextDesc::extra`], or
+    /// and its layer is missing, the instance has no extension of [`ContextDesc::user_extensions`], or
     /// [`RayQueryRequest::Software`](crate::RayQueryRequest::Software) is asked for without the feature `software-ray-query`.
     pub fn new(desc: &ContextDesc<'_>) -> Result<Self> {
         desc.ray_query.check()?;
@@ -66,23 +67,23 @@ impl Context {
             queues: requested_queues(desc),
             window: desc.window_ref(),
         };
-        Self::on(Arc::new(Gpu::new(instance, &request)?), desc)
+        Self::with_gpu(Arc::new(Gpu::new(instance, &request)?), desc)
     }
 
     /// Of `desc` what does not belong to the making of devices.
-    pub(super) fn on(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Self> {
-        let shared = Arc::new(new_shared(gpu, desc)?);
-        let inner = Inner {
-            pending: Mutex::new(Rank::Pending, Pending::default()),
+    pub(super) fn with_gpu(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Self> {
+        let shared = Arc::new(new_device_state(gpu, desc)?);
+        let inner = ContextInner {
+            prologue: Mutex::new(Rank::Pending, Prologue::default()),
             compactions: Mutex::new(Rank::Compactions, Compactions::default()),
             frames: Mutex::new(Rank::Frames, FrameRing::new(desc.frames_in_flight)),
-            spare_notes: SpareNotes::new(),
+            recording_states: RecordingStatePool::new(),
             #[cfg(feature = "window")]
             window: desc.window.clone(),
             shared,
         };
         let context = Self { inner: Arc::new(inner) };
-        fill_dummies(&context)?;
+        fill_default_descriptors(&context)?;
         Ok(context)
     }
 
@@ -108,35 +109,35 @@ pub(super) fn requested_queues(desc: &ContextDesc<'_>) -> QueueRequest {
     if desc.check_indices { QueueRequest::Shared } else { desc.queues }
 }
 
-fn new_shared(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<Shared> {
+fn new_device_state(gpu: Arc<Gpu>, desc: &ContextDesc<'_>) -> Result<DeviceState> {
     let yuv = YuvSlots::new(&gpu, desc.yuv, desc.max_yuv_textures)?;
     let (several, all_blas) = (gpu.queues.has_several(), ResourceId::next());
     let bindless = Bindless::new(&gpu, desc.max_textures, yuv, desc.check_indices)?;
-    Ok(Shared {
-        dummies: OnceLock::new(),
+    Ok(DeviceState {
+        default_objects: OnceLock::new(),
         store: Store::new(),
         staging: Staging::new(&gpu, desc.staging_bytes),
         scratch: std::array::from_fn(|_| new_scratch(&gpu, desc.scratch_budget_bytes)),
         accel_storage: AccelStorage::new(desc.accel_budget_bytes),
         graphics_queries: RayQueryStages::default(),
         kernels: Kernels::new(),
-        instance_buffers: SpareBuffers::new(),
+        instance_buffers: BufferRecycler::new(),
         tlas_table: new_tlas_table(&gpu)?,
         layout: PipelineLayout::new(&gpu, bindless.set_layout)?,
         pipeline_cache: desc.pipeline_cache.map(|path| PipelineCache::new(&gpu, path)).transpose()?,
         shader_cache: desc.shader_cache.map(ShaderCache::new),
         #[cfg(feature = "software-ray-query")]
-        tree_cache: desc.tree_cache.map(crate::software_ray_query::bvh_cache::TreeCache::new),
+        tree_cache: desc.tree_cache.map(crate::software_ray_query::bvh_cache::BvhCache::new),
         bindless,
         submitter: Submitter::new(&gpu)?,
         profiler: Profiler::new(&gpu),
         all_blas,
         new_blas: std::array::from_fn(|_| if several { ResourceId::next() } else { all_blas }),
         all_tlas: ResourceId::next(),
-        tlas_tables: ResourceId::next(),
+        hit_tables_id: ResourceId::next(),
         outdated_tlas: AtomicBool::new(false),
-        moves: AtomicU64::new(0),
-        freed_tlas: Mutex::new(Rank::FreedTlas, Vec::new()),
+        blas_moves: AtomicU64::new(0),
+        freed_tlas_slots: Mutex::new(Rank::FreedTlas, Vec::new()),
         gpu,
     })
 }

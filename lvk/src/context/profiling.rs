@@ -16,7 +16,7 @@ impl Context {
     /// # Errors
     /// [`Unsupported`](crate::Error::Unsupported) where the queue has no timestamps.
     pub fn set_profiling(&self, on: bool) -> Result<()> {
-        self.shared().profiler.set_enabled(on)
+        self.device_state().profiler.set_enabled(on)
     }
 
     /// What the GPU took for the latest frame it has finished, or the latest submission where
@@ -28,7 +28,7 @@ impl Context {
     /// # Errors
     /// What Vulkan answers when it is asked how far the GPU is.
     pub fn last_profile(&self) -> Result<Option<Arc<GpuProfile>>> {
-        self.shared().collect()?;
-        Ok(self.shared().profiler.last())
+        self.device_state().collect()?;
+        Ok(self.device_state().profiler.last())
     }
 }

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::Context;
 use crate::command::CommandBuffer;
-use crate::device_state::Garbage;
+use crate::device_state::DeferredFree;
 use crate::error::Result;
-use crate::gpu::caps::queues::Queue;
 use crate::lock_order::Guard;
+use crate::queue::Queue;
 use crate::resource::region::{Region, TextureRegion};
 use crate::resource::{Buffer, Texture};
 use crate::submit::SubmitHandle;
@@ -15,7 +15,7 @@ use crate::upload::PendingUploads;
 
 /// What runs before the next submission.
 #[derive(Default)]
-pub(super) struct Pending {
+pub(super) struct Prologue {
     /// Run after what `commands` holds.
     uploads: PendingUploads,
     commands: Option<CommandBuffer>,
@@ -25,13 +25,13 @@ pub(super) struct Pending {
 
 impl Context {
     /// Records into the command buffer that runs before the next submission. What it holds stays there whatever
-    /// becomes of `record`.
-    pub(super) fn before_next_submission<T>(
+    /// becomes of `new_command_buffer`.
+    pub(super) fn record_in_prologue<T>(
         &self,
         record: impl FnOnce(&mut CommandBuffer) -> Result<T>,
     ) -> Result<T> {
-        let mut pending = self.pending();
-        let cmd = self.open(&mut pending)?;
+        let mut pending = self.lock_prologue();
+        let cmd = self.prologue_command_buffer(&mut pending)?;
         let result = record(cmd);
         // It goes before whatever is submitted next, so commands recorded from now on may rely on it.
         cmd.apply_tlas_updates();
@@ -40,17 +40,20 @@ impl Context {
 
     /// The command buffer that runs before the next submission, with all uploads so far. What it records next may be for
     /// those who have the slots of structures that are gone.
-    pub(super) fn open<'a>(&self, pending: &'a mut Pending) -> Result<&'a mut CommandBuffer> {
+    pub(super) fn prologue_command_buffer<'a>(
+        &self,
+        pending: &'a mut Prologue,
+    ) -> Result<&'a mut CommandBuffer> {
         let cmd = match &mut pending.commands {
             Some(cmd) => cmd,
             none => {
-                let recording = self.shared().submitter.acquire(Queue::Graphics)?;
-                none.insert(self.record(Queue::Graphics, recording))
+                let recording = self.device_state().submitter.acquire(Queue::Graphics)?;
+                none.insert(self.new_command_buffer(Queue::Graphics, recording))
             }
         };
-        let freed = std::mem::take(&mut *self.shared().freed_tlas());
-        cmd.forget_tlas(&freed);
-        self.forget_gone(&mut pending.uploads);
+        let freed = std::mem::take(&mut *self.device_state().freed_tlas_slots());
+        cmd.clear_tlas_entries(&freed);
+        self.drop_dead_uploads(&mut pending.uploads);
         if !pending.uploads.is_empty() {
             cmd.record_uploads(std::mem::take(&mut pending.uploads))?;
         }
@@ -58,33 +61,33 @@ impl Context {
     }
 
     /// The command buffer that goes before the submission made next, if there is anything to be done.
-    pub(super) fn take_pending(&self, pending: &mut Pending) -> Result<Option<CommandBuffer>> {
-        self.forget_gone(&mut pending.uploads);
+    pub(super) fn take_prologue(&self, pending: &mut Prologue) -> Result<Option<CommandBuffer>> {
+        self.drop_dead_uploads(&mut pending.uploads);
         if !pending.uploads.is_empty() {
-            self.open(pending)?;
+            self.prologue_command_buffer(pending)?;
         }
         Ok(pending.commands.take())
     }
 
     /// Textures that are gone need no contents.
-    fn forget_gone(&self, uploads: &mut PendingUploads) {
-        for gone in uploads.take_gone() {
-            self.shared().dispose(Garbage::HeldTexture(gone));
+    fn drop_dead_uploads(&self, uploads: &mut PendingUploads) {
+        for gone in uploads.drain_dead() {
+            self.device_state().free_now(DeferredFree::TextureRef(gone));
         }
     }
 
     /// Writes bytes of a buffer before the next submission. They are copied before the lock is taken.
-    pub(super) fn upload_object(&self, target: &Arc<Buffer>, offset: u64, bytes: &[u8]) -> Result<()> {
+    pub(super) fn upload_to_buffer(&self, target: &Arc<Buffer>, offset: u64, bytes: &[u8]) -> Result<()> {
         // So that uploads side by side are side by side in staging memory, too, and become one copy.
         const ALIGNMENT: u64 = 4;
         target.check_range(offset, bytes.len() as u64)?;
         if bytes.is_empty() {
             return Ok(());
         }
-        let staged = self.shared().staging.keep(bytes, ALIGNMENT)?;
-        let mut pending = self.pending();
-        pending.uploads.buffer(target, offset, bytes.len() as u64, staged);
-        self.keep_budget(pending)
+        let staged = self.device_state().staging.keep_region(bytes, ALIGNMENT)?;
+        let mut pending = self.lock_prologue();
+        pending.uploads.add_buffer_upload(target, offset, bytes.len() as u64, staged);
+        self.flush_if_over_budget(pending)
     }
 
     /// Writes texels, tightly packed, before the next submission. They are copied before the lock is taken.
@@ -103,35 +106,35 @@ impl Context {
         // A multiple of 16 suits texels and blocks of every size.
         const ALIGNMENT: u64 = 16;
         target.image.add_texture()?;
-        let staged = self.shared().staging.keep(bytes, ALIGNMENT);
+        let staged = self.device_state().staging.keep_region(bytes, ALIGNMENT);
         let staged = staged.inspect_err(|_| {
             target.image.remove_texture();
         })?;
-        let mut pending = self.pending();
-        pending.uploads.texture(Arc::clone(target), region, bytes.len() as u64, staged);
-        self.keep_budget(pending)
+        let mut pending = self.lock_prologue();
+        pending.uploads.add_texture_upload(Arc::clone(target), region, bytes.len() as u64, staged);
+        self.flush_if_over_budget(pending)
     }
 
     /// Lets shaders read a new texture that has no contents.
-    pub(super) fn settle_texture(&self, texture: &Arc<Texture>) -> Result<()> {
+    pub(super) fn make_texture_visible(&self, texture: &Arc<Texture>) -> Result<()> {
         texture.image.add_texture()?;
-        self.pending().uploads.fresh_texture(Arc::clone(texture));
+        self.lock_prologue().uploads.add_new_texture(Arc::clone(texture));
         Ok(())
     }
 
     /// Submits uploads that have come to fill half of the staging memory, so that it comes back while the other half is
     /// filled. Where the GPU does not keep up, waits for the half before.
-    fn keep_budget(&self, pending: Guard<'_, Pending>) -> Result<()> {
-        if pending.uploads.bytes() < self.shared().staging.half_bytes() {
+    fn flush_if_over_budget(&self, pending: Guard<'_, Prologue>) -> Result<()> {
+        if pending.uploads.bytes() < self.device_state().staging.half_bytes() {
             return Ok(());
         }
         drop(pending);
         let submitted = self.flush()?;
-        let before = std::mem::replace(&mut self.pending().made_room, submitted);
+        let before = std::mem::replace(&mut self.lock_prologue().made_room, submitted);
         self.wait(before)
     }
 
-    pub(super) fn pending(&self) -> Guard<'_, Pending> {
-        self.inner.pending.lock()
+    pub(super) fn lock_prologue(&self) -> Guard<'_, Prologue> {
+        self.inner.prologue.lock()
     }
 }

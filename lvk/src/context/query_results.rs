@@ -17,7 +17,7 @@ impl Context {
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for pools of another kind.
     pub fn timestamps_ms(&self, pool: QueryPoolHandle, first: u32, count: u32) -> Result<Vec<Option<f64>>> {
-        self.shared().store.query_pools.get(pool)?.milliseconds(first, count)
+        self.device_state().store.query_pools.get(pool)?.milliseconds(first, count)
     }
 
     /// The numbers of queries from `first` on, as many as `out` has room for: ticks of
@@ -28,7 +28,7 @@ impl Context {
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for queries outside of the pool, and for pools of pipeline
     /// statistics.
     pub fn read_queries(&self, pool: QueryPoolHandle, first: u32, out: &mut [Option<u64>]) -> Result<()> {
-        let pool = self.shared().store.query_pools.get(pool)?;
+        let pool = self.device_state().store.query_pools.get(pool)?;
         pool.check_kind(pool.kind.statistics().is_empty(), "read them with Context::statistics")?;
         pool.read(first, out)
     }
@@ -39,7 +39,7 @@ impl Context {
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for a query outside of the pool, and for pools of another kind.
     pub fn statistics(&self, pool: QueryPoolHandle, query: u32) -> Result<Option<PipelineStatistics>> {
-        self.shared().store.query_pools.get(pool)?.statistics(query)
+        self.device_state().store.query_pools.get(pool)?.statistics(query)
     }
 
     /// Reads the clocks of GPU and host at one moment (`vkGetCalibratedTimestampsKHR`), so that timestamps can be laid
@@ -50,7 +50,7 @@ impl Context {
     /// [`Capabilities::calibrated_timestamps`](crate::Capabilities::calibrated_timestamps), and where the driver knows
     /// no `CLOCK_MONOTONIC`.
     pub fn calibrated_timestamps(&self) -> Result<CalibratedTimestamps> {
-        let gpu = &self.shared().gpu;
+        let gpu = &self.device_state().gpu;
         let clock =
             gpu.host_clock.as_ref().ok_or_else(|| gpu.unsupported("clocks of device and host together"))?;
         let (ticks, host, deviation) = clock.read()?;

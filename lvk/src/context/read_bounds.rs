@@ -8,7 +8,7 @@ use super::Context;
 use crate::accel::desc::BlasDesc;
 use crate::accel::geometry::{BlasGeometry, GeometryTransform, Triangles};
 use crate::accel::primitive_bounds::{
-    Bounds, BoxBytes, GeometryBytes, IndexBytes, TriangleBytes, VertexBytes,
+    AabbListBytes, Bounds, GeometryBytes, IndexBytes, TriangleBytes, VertexBytes,
 };
 use crate::command::transfer::BufferCopy;
 use crate::error::Result;
@@ -17,17 +17,17 @@ use crate::handle::BufferHandle;
 use crate::resource::Buffer;
 
 /// Most bytes read back at once: inputs of a whole scene may be more than there is readback memory for.
-const READ_AT_ONCE: u64 = 64 << 20;
+const MAX_READ_BYTES: u64 = 64 << 20;
 
 /// Bytes of a buffer: its handle, where they start, how many.
-type Piece = (BufferHandle, u64, u64);
+type InputRange = (BufferHandle, u64, u64);
 
 /// Pieces of buffers that are read together, each once.
 #[derive(Default)]
-pub(super) struct Pieces {
-    places: HashMap<Piece, usize>,
+pub(super) struct InputBytes {
+    index_by_range: HashMap<InputRange, usize>,
     /// Buffer and first byte in it.
-    list: Vec<(Arc<Buffer>, u64)>,
+    buffers: Vec<(Arc<Buffer>, u64)>,
     /// Where each piece of the list lies in `bytes`.
     ranges: Vec<Range<u64>>,
     bytes: Vec<u8>,
@@ -37,39 +37,40 @@ impl Context {
     /// The boxes of the primitives of each geometry of each mesh. Waits for the GPU.
     pub(super) fn read_bounds(&self, descs: &[&BlasDesc<'_>]) -> Result<Vec<Vec<Vec<Bounds>>>> {
         let pieces = self.read_inputs(descs)?;
-        let of_mesh = |desc: &&BlasDesc<'_>| desc.geometries.iter().map(|g| bounds(g, &pieces)).collect();
+        let of_mesh =
+            |desc: &&BlasDesc<'_>| desc.geometries.iter().map(|g| geometry_bounds(g, &pieces)).collect();
         Ok(descs.iter().map(of_mesh).collect())
     }
 
     /// The inputs of meshes. Waits for the GPU.
-    pub(super) fn read_inputs(&self, descs: &[&BlasDesc<'_>]) -> Result<Pieces> {
-        let mut pieces = Pieces::default();
+    pub(super) fn read_inputs(&self, descs: &[&BlasDesc<'_>]) -> Result<InputBytes> {
+        let mut pieces = InputBytes::default();
         for geometry in descs.iter().flat_map(|desc| desc.geometries) {
-            for piece in inputs(geometry) {
-                self.add_piece(&mut pieces, piece)?;
+            for piece in input_ranges(geometry) {
+                self.add_input_range(&mut pieces, piece)?;
             }
         }
-        self.read_pieces(&mut pieces)?;
+        self.read_input_ranges(&mut pieces)?;
         Ok(pieces)
     }
 
-    fn add_piece(&self, pieces: &mut Pieces, piece: Piece) -> Result<()> {
+    fn add_input_range(&self, pieces: &mut InputBytes, piece: InputRange) -> Result<()> {
         let (handle, offset, size) = piece;
-        if size == 0 || pieces.places.contains_key(&piece) {
+        if size == 0 || pieces.index_by_range.contains_key(&piece) {
             return Ok(());
         }
-        let buffer = self.shared().store.buffers.get(handle)?;
-        pieces.places.insert(piece, pieces.bytes.len());
+        let buffer = self.device_state().store.buffers.get(handle)?;
+        pieces.index_by_range.insert(piece, pieces.bytes.len());
         pieces.bytes.resize(pieces.bytes.len() + size as usize, 0);
         let start = pieces.ranges.last().map_or(0, |last| last.end);
         pieces.ranges.push(start..start + size);
-        pieces.list.push((buffer, offset));
+        pieces.buffers.push((buffer, offset));
         Ok(())
     }
 
-    fn read_pieces(&self, pieces: &mut Pieces) -> Result<()> {
-        let Pieces { list, ranges, bytes, .. } = pieces;
-        let most = READ_AT_ONCE.min(self.shared().gpu.caps.limits.max_buffer_bytes).max(1);
+    fn read_input_ranges(&self, pieces: &mut InputBytes) -> Result<()> {
+        let InputBytes { buffers: list, ranges, bytes, .. } = pieces;
+        let most = MAX_READ_BYTES.min(self.device_state().gpu.caps.limits.max_buffer_bytes).max(1);
         for (bytes, start) in bytes.chunks_mut(most as usize).zip((0_u64..).step_by(most as usize)) {
             let size = bytes.len() as u64;
             self.read_back(size, bytes, |cmd, target| {
@@ -93,9 +94,9 @@ impl Context {
     }
 }
 
-impl Pieces {
-    fn get(&self, piece: Piece) -> &[u8] {
-        let place = self.places.get(&piece);
+impl InputBytes {
+    fn bytes_of(&self, piece: InputRange) -> &[u8] {
+        let place = self.index_by_range.get(&piece);
         place.and_then(|start| self.bytes.get(*start..*start + piece.2 as usize)).unwrap_or_default()
     }
 }
@@ -109,33 +110,33 @@ fn overlaps(ranges: &[Range<u64>], window: Range<u64>) -> impl Iterator<Item = (
 }
 
 /// What of its buffers a geometry reads.
-fn inputs(geometry: &BlasGeometry) -> impl Iterator<Item = Piece> {
+fn input_ranges(geometry: &BlasGeometry) -> impl Iterator<Item = InputRange> {
     let pieces = match geometry {
         BlasGeometry::Aabbs(boxes) => {
             const BOX_BYTES: u64 = 24;
-            let bytes = span(boxes.count, boxes.stride, BOX_BYTES);
+            let bytes = span_bytes(boxes.count, boxes.stride, BOX_BYTES);
             [Some((boxes.buffer, boxes.offset, bytes)), None, None]
         }
         BlasGeometry::Triangles(triangles) => {
-            [Some(vertices(triangles)), indices(triangles), matrix(triangles)]
+            [Some(vertex_range(triangles)), index_range(triangles), matrix_range(triangles)]
         }
     };
     pieces.into_iter().flatten()
 }
 
-fn vertices(triangles: &Triangles) -> Piece {
+fn vertex_range(triangles: &Triangles) -> InputRange {
     let packed = u64::from(triangles.vertex_format.size_bytes());
-    let bytes = span(triangles.vertex_count, triangles.vertex_stride, packed);
+    let bytes = span_bytes(triangles.vertex_count, triangles.vertex_stride, packed);
     (triangles.vertex_buffer, triangles.vertex_offset, bytes)
 }
 
-fn indices(triangles: &Triangles) -> Option<Piece> {
+fn index_range(triangles: &Triangles) -> Option<InputRange> {
     let indices = triangles.indices?;
     let bytes = u64::from(triangles.triangle_count) * 3 * u64::from(indices.format.size_bytes());
     Some((indices.buffer, indices.offset, bytes))
 }
 
-fn matrix(triangles: &Triangles) -> Option<Piece> {
+fn matrix_range(triangles: &Triangles) -> Option<InputRange> {
     const MATRIX_BYTES: u64 = 48;
     match triangles.transform {
         Some(GeometryTransform::Buffer { buffer, offset }) => Some((buffer, offset, MATRIX_BYTES)),
@@ -144,12 +145,12 @@ fn matrix(triangles: &Triangles) -> Option<Piece> {
 }
 
 /// Bytes from the first to the end of the last element.
-fn span(count: u32, stride: u64, packed: u64) -> u64 {
+fn span_bytes(count: u32, stride: u64, packed: u64) -> u64 {
     let stride = if stride == 0 { packed } else { stride };
     if count == 0 { 0 } else { u64::from(count - 1) * stride + packed }
 }
 
-fn bounds(geometry: &BlasGeometry, pieces: &Pieces) -> Vec<Bounds> {
+fn geometry_bounds(geometry: &BlasGeometry, pieces: &InputBytes) -> Vec<Bounds> {
     match geometry_bytes(geometry, pieces) {
         GeometryBytes::Boxes(boxes) => boxes.all_bounds(),
         GeometryBytes::Triangles(triangles) => triangles.bounds(),
@@ -157,28 +158,28 @@ fn bounds(geometry: &BlasGeometry, pieces: &Pieces) -> Vec<Bounds> {
 }
 
 /// A geometry as it was read.
-pub(super) fn geometry_bytes<'a>(geometry: &BlasGeometry, pieces: &'a Pieces) -> GeometryBytes<'a> {
+pub(super) fn geometry_bytes<'a>(geometry: &BlasGeometry, pieces: &'a InputBytes) -> GeometryBytes<'a> {
     match geometry {
         BlasGeometry::Aabbs(boxes) => {
-            let bytes = inputs(geometry).next().map_or(&[][..], |piece| pieces.get(piece));
-            GeometryBytes::Boxes(BoxBytes { bytes, stride: boxes.stride as usize, count: boxes.count })
+            let bytes = input_ranges(geometry).next().map_or(&[][..], |piece| pieces.bytes_of(piece));
+            GeometryBytes::Boxes(AabbListBytes { bytes, stride: boxes.stride as usize, count: boxes.count })
         }
         BlasGeometry::Triangles(triangles) => {
-            let bytes = pieces.get(vertices(triangles));
+            let bytes = pieces.bytes_of(vertex_range(triangles));
             let vertices = VertexBytes {
                 bytes,
                 stride: triangles.vertex_stride as usize,
                 format: triangles.vertex_format,
                 count: triangles.vertex_count,
             };
-            let of_triangles = indices(triangles).map(|piece| pieces.get(piece)).unwrap_or_default();
+            let of_triangles = index_range(triangles).map(|piece| pieces.bytes_of(piece)).unwrap_or_default();
             let indices = match triangles.indices.map(|indices| indices.format) {
                 // Structures are not built from 8-bit indices.
                 None | Some(IndexFormat::U8) => IndexBytes::None,
                 Some(IndexFormat::U16) => IndexBytes::U16(of_triangles),
                 Some(IndexFormat::U32) => IndexBytes::U32(of_triangles),
             };
-            let transform = transform(triangles, pieces);
+            let transform = geometry_transform(triangles, pieces);
             GeometryBytes::Triangles(TriangleBytes {
                 vertices,
                 indices,
@@ -189,13 +190,13 @@ pub(super) fn geometry_bytes<'a>(geometry: &BlasGeometry, pieces: &'a Pieces) ->
     }
 }
 
-fn transform(triangles: &Triangles, pieces: &Pieces) -> Option<[f32; 12]> {
+fn geometry_transform(triangles: &Triangles, pieces: &InputBytes) -> Option<[f32; 12]> {
     match triangles.transform? {
         GeometryTransform::Rows(rows) => Some(rows),
         GeometryTransform::Buffer { .. } => {
             let mut rows = [0.0; 12];
             let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut rows);
-            let found = pieces.get(matrix(triangles)?);
+            let found = pieces.bytes_of(matrix_range(triangles)?);
             (found.len() == bytes.len()).then(|| bytes.copy_from_slice(found))?;
             Some(rows)
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::Context;
 use crate::command::transfer::BufferCopy;
-use crate::device_state::Garbage;
+use crate::device_state::DeferredFree;
 use crate::error::Result;
 use crate::gpu::memory::allocator::MemoryKind;
 use crate::handle::{BufferHandle, TextureHandle};
@@ -68,7 +68,7 @@ impl Context {
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for a range that ends before it begins or outside of the buffer;
     /// [`StaleHandle`](crate::Error::StaleHandle).
     pub fn read_buffer_later(&self, buffer: BufferHandle, range: Range<u64>) -> Result<Readback> {
-        let find = || self.shared().store.buffers.get(buffer);
+        let find = || self.device_state().store.buffers.get(buffer);
         let size = range.end.checked_sub(range.start).unwrap_or(u64::MAX);
         find()?.check_range(range.start, size)?;
         let copy = BufferCopy { source_offset: range.start, target_offset: 0, size };
@@ -80,7 +80,7 @@ impl Context {
     /// # Errors
     /// As [`download_texture`](Self::download_texture).
     pub fn read_texture_later(&self, texture: TextureHandle, region: &TextureRegion) -> Result<Readback> {
-        let find = || self.shared().store.textures.get(texture);
+        let find = || self.device_state().store.textures.get(texture);
         let size = find()?.resolve_region(region)?.bytes();
         self.read_later(size, |cmd, target| cmd.copy_texture_objects_to_buffer(&find()?, region, target, 0))
     }
@@ -103,11 +103,11 @@ impl Context {
             data: None,
             debug_name: "readback",
         };
-        let target = Arc::new(Buffer::new(&self.shared().gpu, &desc, InternalUsage::NONE)?);
+        let target = Arc::new(Buffer::new(&self.device_state().gpu, &desc, InternalUsage::NONE)?);
         let mut cmd = self.acquire_command_buffer()?;
         record(&mut cmd, &target)?;
         // Before the submission: should that fail half-way, the GPU may yet write the buffer.
-        self.shared().retire(Garbage::Buffer(Arc::clone(&target)));
+        self.device_state().free_later(DeferredFree::Buffer(Arc::clone(&target)));
         let submission = self.submit(cmd)?;
         Ok(Readback { target: Some(target), submission, ctx: self.clone() })
     }

@@ -6,20 +6,23 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::Context;
-use super::create_accel::blas_object;
+use super::create_accel::new_blas_object;
 use super::holder::Holder;
-use super::plan_blas::input;
+use super::plan_blas::build_input;
 use crate::accel::AccelStruct;
-use crate::accel::blas::{BlasBody, PartShape};
-use crate::accel::blas_file::{Blob, BlobGeometry, BlobGeometryKind, BlobIndices, BlobPart, decode, encode};
+use crate::accel::blas::{BlasPart, BlasStructures};
+use crate::accel::blas_file::{
+    BlasFile, BlasFileGeometry, BlasFileGeometryKind, BlasFileIndices, BlasFilePart, decode_blas_file,
+    encode_blas_file,
+};
 use crate::accel::desc::BlasDesc;
 use crate::accel::flags::BuildFlags;
 use crate::accel::geometry::{BlasGeometry, GeometryFlags};
-use crate::accel::primitive_map::{cover_mesh, table_lists};
-use crate::accel::raw_accel_struct::RawStructure;
+use crate::accel::primitive_map::{covers_mesh, decode_table};
+use crate::accel::raw_accel_struct::RawAccelStruct;
 use crate::accel::split::PartPlan;
 use crate::command::transfer::BufferCopy;
-use crate::device_state::Garbage;
+use crate::device_state::DeferredFree;
 use crate::error::{Error, Result};
 use crate::format::IndexFormat;
 use crate::handle::AccelStructHandle;
@@ -30,7 +33,7 @@ use crate::resource::{Buffer, QueryPool};
 /// Addresses of serialised structures are multiples of this.
 const ALIGNMENT: u64 = 256;
 /// Bytes of parts that go through one buffer, which devices bound; a larger part goes alone.
-const MOST_AT_ONCE: u64 = 256 << 20;
+const MAX_GROUP_BYTES: u64 = 256 << 20;
 
 /// A structure from [`Context::load_or_create_blas`].
 pub struct LoadedBlas {
@@ -48,20 +51,20 @@ impl Context {
     ///
     /// Keep the file where only the program writes it: its checksum finds damage, not intent.
     pub fn serialize_blas(&self, handle: AccelStructHandle) -> Result<Vec<u8>> {
-        let object = self.shared().store.accel_structs.get(handle)?;
+        let object = self.device_state().store.accel_structs.get(handle)?;
         let blas = object.blas()?;
-        let body = blas.body();
-        let geometries = blas.geometries.iter().map(blob_geometry).collect();
-        if self.shared().gpu.accel.is_none() {
-            let parts = vec![BlobPart { driver: self.software_bytes(blas)?, map: None }];
-            return Ok(encode(&Blob { flags: object.flags.bits(), geometries, parts }));
+        let body = blas.structures();
+        let geometries = blas.geometries.iter().map(file_geometry).collect();
+        if self.device_state().gpu.accel.is_none() {
+            let parts = vec![BlasFilePart { driver: self.read_software_bytes(blas)?, map: None }];
+            return Ok(encode_blas_file(&BlasFile { flags: object.flags.bits(), geometries, parts }));
         }
         let sizes = self.serialized_sizes(&object, &body)?;
         let mut parts = Vec::with_capacity(sizes.len());
-        for (driver, shape) in self.serialized_parts(&object, &body, &sizes)?.into_iter().zip(&blas.parts) {
-            parts.push(BlobPart { driver, map: self.read_map(shape)? });
+        for (driver, shape) in self.serialize_parts(&object, &body, &sizes)?.into_iter().zip(&blas.parts) {
+            parts.push(BlasFilePart { driver, map: self.read_primitive_map(shape)? });
         }
-        Ok(encode(&Blob { flags: object.flags.bits(), geometries, parts }))
+        Ok(encode_blas_file(&BlasFile { flags: object.flags.bits(), geometries, parts }))
     }
 
     /// Makes a bottom-level structure from what [`serialize_blas`](Self::serialize_blas) wrote
@@ -81,17 +84,17 @@ impl Context {
     /// Where only software traces, made-up contents are refused or harmless too: every place, count and reference is
     /// checked before a shader follows it.
     pub unsafe fn load_blas(&self, desc: &BlasDesc<'_>, bytes: &[u8]) -> Result<Holder<AccelStructHandle>> {
-        self.shared().gpu.check_acceleration_structures()?;
-        let blob = decode(bytes).map_err(|error| rejected(desc, error.to_string()))?;
-        check_same_mesh(desc, &blob).map_err(|reason| rejected(desc, reason))?;
-        if self.shared().gpu.accel.is_none() {
+        self.device_state().gpu.check_acceleration_structures()?;
+        let blob = decode_blas_file(bytes).map_err(|error| rejected_error(desc, error.to_string()))?;
+        check_same_mesh(desc, &blob).map_err(|reason| rejected_error(desc, reason))?;
+        if self.device_state().gpu.accel.is_none() {
             return self.load_software_blas(desc, &blob);
         }
         let mut bytes = Vec::with_capacity(blob.parts.len());
         for part in &blob.parts {
-            bytes.push(self.check_driver(part).map_err(|reason| rejected(desc, reason))?);
+            bytes.push(self.check_driver(part).map_err(|reason| rejected_error(desc, reason))?);
         }
-        let shapes = self.loaded_shapes(desc, &blob, &bytes)?;
+        let shapes = self.loaded_parts(desc, &blob, &bytes)?;
         // SAFETY: the caller vouches for what the driver wrote; all else is checked.
         unsafe { self.deserialize(desc, &blob, shapes, &bytes) }
     }
@@ -118,14 +121,14 @@ impl Context {
         }
     }
 
-    fn serialized_sizes(&self, object: &AccelStruct, body: &BlasBody) -> Result<Vec<u64>> {
+    fn serialized_sizes(&self, object: &AccelStruct, body: &BlasStructures) -> Result<Vec<u64>> {
         let count = body.structures.len() as u32;
         let desc = QueryPoolDesc { count, debug_name: "serialised sizes", ..Default::default() };
         let ty = vk::QueryType::ACCELERATION_STRUCTURE_SERIALIZATION_SIZE_KHR;
-        let pool = Arc::new(QueryPool::with_type(&self.shared().gpu, &desc, ty)?);
+        let pool = Arc::new(QueryPool::with_type(&self.device_state().gpu, &desc, ty)?);
         let mut cmd = self.acquire_command_buffer()?;
-        cmd.write_sizes(object, body, &pool, 0, ty)?;
-        self.shared().retire(Garbage::QueryPool(Arc::clone(&pool)));
+        cmd.write_size_properties(object, body, &pool, 0, ty)?;
+        self.device_state().free_later(DeferredFree::QueryPool(Arc::clone(&pool)));
         self.wait(self.submit(cmd)?)?;
         let sizes: Option<Vec<_>> = pool.values(0, count)?.into_iter().collect();
         sizes.ok_or_else(|| {
@@ -133,29 +136,34 @@ impl Context {
         })
     }
 
-    fn serialized_parts(&self, object: &AccelStruct, body: &BlasBody, sizes: &[u64]) -> Result<Vec<Vec<u8>>> {
+    fn serialize_parts(
+        &self,
+        object: &AccelStruct,
+        body: &BlasStructures,
+        sizes: &[u64],
+    ) -> Result<Vec<Vec<u8>>> {
         let mut all = Vec::with_capacity(sizes.len());
-        for group in groups(sizes, self.most_at_once()) {
+        for group in group_by_bytes(sizes, self.max_group_bytes()) {
             let structures = &body.structures[group.clone()];
-            all.extend(self.serialized_group(object, structures, &sizes[group])?);
+            all.extend(self.serialize_group(object, structures, &sizes[group])?);
         }
         Ok(all)
     }
 
     /// Parts that go through one buffer.
-    fn serialized_group(
+    fn serialize_group(
         &self,
         object: &AccelStruct,
-        structures: &[RawStructure],
+        structures: &[RawAccelStruct],
         sizes: &[u64],
     ) -> Result<Vec<Vec<u8>>> {
-        let places = Places::new(sizes);
+        let places = AlignedOffsets::new(sizes);
         let buffer = self.blob_buffer(&object.name, places.total)?;
         let base = buffer.address.next_multiple_of(ALIGNMENT);
         let addresses: Vec<_> = places.offsets.iter().map(|offset| base + offset).collect();
         let mut bytes = vec![0; places.total as usize];
         self.read_back(places.total, &mut bytes, |cmd, target| {
-            self.shared().retire(Garbage::Buffer(Arc::clone(&buffer)));
+            self.device_state().free_later(DeferredFree::Buffer(Arc::clone(&buffer)));
             cmd.serialize_parts(object, structures, &buffer, &addresses)?;
             cmd.copy_buffer_objects(
                 &buffer,
@@ -168,7 +176,7 @@ impl Context {
     }
 
     /// The words of a part's table.
-    fn read_map(&self, shape: &PartShape) -> Result<Option<Vec<u32>>> {
+    fn read_primitive_map(&self, shape: &BlasPart) -> Result<Option<Vec<u32>>> {
         let Some(map) = &shape.map else { return Ok(None) };
         let count = shape.counts.iter().map(|count| *count as usize).sum::<usize>();
         let mut words = vec![0_u32; shape.counts.len() + count];
@@ -187,11 +195,11 @@ impl Context {
     /// Room for serialised structures, wherever the buffer's address lies.
     fn blob_buffer(&self, name: &str, bytes: u64) -> Result<Arc<Buffer>> {
         let desc = BufferDesc { size_bytes: bytes + ALIGNMENT, debug_name: name, ..Default::default() };
-        Ok(Arc::new(Buffer::new(&self.shared().gpu, &desc, InternalUsage::NONE)?))
+        Ok(Arc::new(Buffer::new(&self.device_state().gpu, &desc, InternalUsage::NONE)?))
     }
 
     /// Whether the driver can read a part, by the head it wrote itself; answers how large the structure will be.
-    fn check_driver(&self, part: &BlobPart) -> Result<u64, String> {
+    fn check_driver(&self, part: &BlasFilePart) -> Result<u64, String> {
         let damaged = || "the driver's head is damaged".to_owned();
         let version = part.version_data().ok_or_else(damaged)?;
         let number = |at: usize| {
@@ -201,7 +209,7 @@ impl Context {
         let head = number(32).zip(number(40)).zip(number(48));
         let ((written, structure), handles) = head.ok_or_else(damaged)?;
         let info = vk::AccelerationStructureVersionInfoKHR::default().version_data(version);
-        let gpu = &self.shared().gpu;
+        let gpu = &self.device_state().gpu;
         let ext = gpu.accel_functions().map_err(|error| error.to_string())?;
         // SAFETY: the version data has the 32 bytes Vulkan reads.
         let answer = unsafe { ext.get_device_acceleration_structure_compatibility(&info) };
@@ -223,32 +231,34 @@ impl Context {
     unsafe fn deserialize(
         &self,
         desc: &BlasDesc<'_>,
-        blob: &Blob,
-        shapes: Vec<PartShape>,
+        blob: &BlasFile,
+        shapes: Vec<BlasPart>,
         bytes: &[u64],
     ) -> Result<Holder<AccelStructHandle>> {
-        let shared = self.shared();
+        let shared = self.device_state();
         let (name, ty) = (desc.debug_name, vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL);
-        let fits = |(shape, bytes): (&PartShape, &u64)| shape.sizes.structure_bytes <= *bytes;
+        let fits = |(shape, bytes): (&BlasPart, &u64)| shape.sizes.structure_bytes <= *bytes;
         let rebuildable = shapes.iter().zip(bytes).all(fits);
-        let structure = |bytes: &u64| RawStructure::new(&shared.gpu, &shared.accel_storage, name, ty, *bytes);
+        let structure =
+            |bytes: &u64| RawAccelStruct::new(&shared.gpu, &shared.accel_storage, name, ty, *bytes);
         let structures = bytes.iter().map(structure).collect::<Result<Vec<_>>>()?;
-        let body = BlasBody { structures, compacted_from: None, rebuildable };
+        let body = BlasStructures { structures, compacted_from: None, rebuildable };
         // What software traces beside it is built anew: the file is the driver's.
         let built = self.software_blobs(std::slice::from_ref(desc))?.pop().flatten();
         let software = self.software_blas(desc, built.as_ref())?;
-        let handle = shared.store.accel_structs.insert(blas_object(shared, desc, shapes, body, software)?);
+        let handle =
+            shared.store.accel_structs.insert(new_blas_object(shared, desc, shapes, body, software)?);
         let holder = Holder::new(self, handle, 0);
         let object = shared.store.accel_structs.get(handle)?;
-        built.map(|built| self.fill_software(&object, &built)).transpose()?;
-        self.before_next_submission(|cmd| cmd.build_software_of(&object))?;
+        built.map(|built| self.upload_software_blob(&object, &built)).transpose()?;
+        self.record_in_prologue(|cmd| cmd.build_software_blas(&object))?;
         let sizes: Vec<_> = blob.parts.iter().map(|part| part.driver.len() as u64).collect();
-        for group in groups(&sizes, self.most_at_once()) {
+        for group in group_by_bytes(&sizes, self.max_group_bytes()) {
             let (first, parts) = (group.start, &blob.parts[group.clone()]);
             // SAFETY: the caller's promise; the structures have the sizes the data says.
             unsafe { self.deserialize_group(&object, first, parts, &sizes[group]) }?;
         }
-        self.before_next_submission(|cmd| cmd.prepare_deserialized(&object))?;
+        self.record_in_prologue(|cmd| cmd.prepare_deserialized(&object))?;
         Ok(holder)
     }
 
@@ -260,49 +270,52 @@ impl Context {
         &self,
         object: &Arc<AccelStruct>,
         first: usize,
-        parts: &[BlobPart],
+        parts: &[BlasFilePart],
         sizes: &[u64],
     ) -> Result<()> {
-        let places = Places::new(sizes);
+        let places = AlignedOffsets::new(sizes);
         let buffer = self.blob_buffer(&object.name, places.total)?;
         let base = buffer.address.next_multiple_of(ALIGNMENT);
         let addresses: Vec<_> = places.offsets.iter().map(|offset| base + offset).collect();
         let start = base - buffer.address;
         let mut drivers = parts.iter().zip(&places.offsets);
-        let uploaded =
-            drivers.try_for_each(|(part, offset)| self.upload_object(&buffer, start + offset, &part.driver));
+        let uploaded = drivers
+            .try_for_each(|(part, offset)| self.upload_to_buffer(&buffer, start + offset, &part.driver));
         let recorded = uploaded.and_then(|()| {
             // SAFETY: the caller's promise; the addresses are those of the parts.
-            self.before_next_submission(|cmd| unsafe {
+            self.record_in_prologue(|cmd| unsafe {
                 cmd.deserialize_parts(object, first, &buffer, &addresses)
             })
         });
-        self.shared().retire(Garbage::Buffer(buffer));
+        self.device_state().free_later(DeferredFree::Buffer(buffer));
         recorded
     }
 
     /// Bytes of parts that go through one buffer.
-    fn most_at_once(&self) -> u64 {
-        MOST_AT_ONCE.min(self.shared().gpu.caps.limits.max_accel_structure_bytes)
+    fn max_group_bytes(&self) -> u64 {
+        MAX_GROUP_BYTES.min(self.device_state().gpu.caps.limits.max_accel_structure_bytes)
     }
 
     /// The shapes of loaded parts, with their tables. `bytes` is how large each part will be.
-    fn loaded_shapes(&self, desc: &BlasDesc<'_>, blob: &Blob, bytes: &[u64]) -> Result<Vec<PartShape>> {
-        let shared = self.shared();
-        let whole = input(shared, desc)?;
+    fn loaded_parts(&self, desc: &BlasDesc<'_>, blob: &BlasFile, bytes: &[u64]) -> Result<Vec<BlasPart>> {
+        let shared = self.device_state();
+        let whole = build_input(shared, desc)?;
         let counts: Vec<_> = desc.geometries.iter().map(BlasGeometry::primitive_count).collect();
-        let plans = loaded_plans(blob, &counts)
-            .ok_or_else(|| rejected(desc, "its parts are not those of the mesh, each primitive once"))?;
+        let plans = part_plans_from_file(blob, &counts).ok_or_else(|| {
+            rejected_error(desc, "its parts are not those of the mesh, each primitive once")
+        })?;
         let mut shapes = Vec::with_capacity(plans.len());
         for (plan, bytes) in plans.iter().zip(bytes) {
             let shape = match plan {
-                None => PartShape { counts: counts.clone(), map: None, sizes: whole.sizes(&shared.gpu)? },
-                Some(plan) => self.part_shape(desc, plan)?,
+                None => {
+                    BlasPart { counts: counts.clone(), map: None, sizes: whole.query_sizes(&shared.gpu)? }
+                }
+                Some(plan) => self.new_part(desc, plan)?,
             };
             let most = shape.sizes.structure_bytes;
             if *bytes > most {
                 let reason = format!("a part is to take {bytes} bytes, where a build takes at most {most}");
-                return Err(rejected(desc, reason));
+                return Err(rejected_error(desc, reason));
             }
             shapes.push(shape);
         }
@@ -311,22 +324,22 @@ impl Context {
 }
 
 /// The primitives of each part, or none for the mesh as it is; `None` where they do not make up the mesh.
-fn loaded_plans(blob: &Blob, counts: &[u32]) -> Option<Vec<Option<PartPlan>>> {
-    if let [BlobPart { map: None, .. }] = &blob.parts[..] {
+fn part_plans_from_file(blob: &BlasFile, counts: &[u32]) -> Option<Vec<Option<PartPlan>>> {
+    if let [BlasFilePart { map: None, .. }] = &blob.parts[..] {
         return Some(vec![None]);
     }
-    let lists = |part: &BlobPart| table_lists(part.map.as_ref()?, counts);
+    let lists = |part: &BlasFilePart| decode_table(part.map.as_ref()?, counts);
     let parts: Vec<_> = blob.parts.iter().map(lists).collect::<Option<_>>()?;
-    let complete = !parts.is_empty() && cover_mesh(&parts, counts);
+    let complete = !parts.is_empty() && covers_mesh(&parts, counts);
     complete.then(|| parts.into_iter().map(|geometries| Some(PartPlan { geometries })).collect())
 }
 
-fn rejected(desc: &BlasDesc<'_>, reason: impl Into<String>) -> Error {
+fn rejected_error(desc: &BlasDesc<'_>, reason: impl Into<String>) -> Error {
     Error::Serialized { object: desc.debug_name.to_owned(), reason: reason.into() }
 }
 
 /// Parts of these sizes in groups of at most so many bytes, or of one part that is larger.
-fn groups(sizes: &[u64], most: u64) -> Vec<Range<usize>> {
+fn group_by_bytes(sizes: &[u64], most: u64) -> Vec<Range<usize>> {
     let (mut groups, mut start, mut sum) = (Vec::new(), 0, 0_u64);
     for (index, size) in sizes.iter().map(|size| size.next_multiple_of(ALIGNMENT)).enumerate() {
         sum = sum.saturating_add(size);
@@ -342,12 +355,12 @@ fn groups(sizes: &[u64], most: u64) -> Vec<Range<usize>> {
 }
 
 /// Where each of several blobs starts.
-struct Places {
+struct AlignedOffsets {
     offsets: Vec<u64>,
     total: u64,
 }
 
-impl Places {
+impl AlignedOffsets {
     fn new(sizes: &[u64]) -> Self {
         let mut total = 0;
         let mut place = |size: &u64| {
@@ -360,31 +373,31 @@ impl Places {
     }
 }
 
-fn blob_geometry(geometry: &BlasGeometry) -> BlobGeometry {
+fn file_geometry(geometry: &BlasGeometry) -> BlasFileGeometry {
     let kind = match geometry {
-        BlasGeometry::Triangles(triangles) => BlobGeometryKind::Triangles {
+        BlasGeometry::Triangles(triangles) => BlasFileGeometryKind::Triangles {
             vertex_format: triangles.vertex_format.raw().as_raw().cast_unsigned(),
             vertex_count: triangles.vertex_count,
             indices: match triangles.indices.map(|indices| indices.format) {
                 // Structures are not built from 8-bit indices.
-                None | Some(IndexFormat::U8) => BlobIndices::None,
-                Some(IndexFormat::U16) => BlobIndices::U16,
-                Some(IndexFormat::U32) => BlobIndices::U32,
+                None | Some(IndexFormat::U8) => BlasFileIndices::None,
+                Some(IndexFormat::U16) => BlasFileIndices::U16,
+                Some(IndexFormat::U32) => BlasFileIndices::U32,
             },
             is_transformed: triangles.transform.is_some(),
         },
-        BlasGeometry::Aabbs(_) => BlobGeometryKind::Boxes,
+        BlasGeometry::Aabbs(_) => BlasFileGeometryKind::Boxes,
     };
     let flags: GeometryFlags = geometry.flags();
-    BlobGeometry { kind, primitive_count: geometry.primitive_count(), flags: flags.bits() }
+    BlasFileGeometry { kind, primitive_count: geometry.primitive_count(), flags: flags.bits() }
 }
 
-fn check_same_mesh(desc: &BlasDesc<'_>, blob: &Blob) -> Result<(), String> {
+fn check_same_mesh(desc: &BlasDesc<'_>, blob: &BlasFile) -> Result<(), String> {
     if blob.flags != desc.flags.bits() {
         let found = BuildFlags::from_bits_retain(blob.flags);
         return Err(format!("it was built with {found:?}, not with {:?}", desc.flags));
     }
-    let wanted: Vec<_> = desc.geometries.iter().map(blob_geometry).collect();
+    let wanted: Vec<_> = desc.geometries.iter().map(file_geometry).collect();
     if blob.geometries != wanted {
         return Err("it was built from other geometries".to_owned());
     }
@@ -404,10 +417,10 @@ mod tests {
             sizes in prop::collection::vec(1..5_000_u64, 0..40),
             most in 256..20_000_u64
         ) {
-            let groups = groups(&sizes, most);
+            let groups = group_by_bytes(&sizes, most);
             let listed: Vec<usize> = groups.iter().cloned().flatten().collect();
             prop_assert_eq!(listed, (0..sizes.len()).collect::<Vec<_>>());
-            let bytes = |group: Range<usize>| Places::new(&sizes[group]).total;
+            let bytes = |group: Range<usize>| AlignedOffsets::new(&sizes[group]).total;
             for group in &groups {
                 prop_assert!(group.len() == 1 || bytes(group.clone()) <= most);
             }

@@ -13,7 +13,7 @@ use crate::resource::region::TextureRegion;
 impl Context {
     /// The address by which shaders reach a buffer (`vkGetBufferDeviceAddress`).
     pub fn buffer_address(&self, buffer: BufferHandle) -> Result<u64> {
-        Ok(self.shared().store.buffers.get(buffer)?.address)
+        Ok(self.device_state().store.buffers.get(buffer)?.address)
     }
 
     /// The address of a byte of a buffer.
@@ -21,7 +21,7 @@ impl Context {
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for bytes behind its end.
     pub fn buffer_address_at(&self, buffer: BufferHandle, offset: u64) -> Result<u64> {
-        let buffer = self.shared().store.buffers.get(buffer)?;
+        let buffer = self.device_state().store.buffers.get(buffer)?;
         buffer.check_range(offset, 1)?;
         Ok(buffer.address + offset)
     }
@@ -38,7 +38,7 @@ impl Context {
     /// # Errors
     /// [`InvalidUsage`](crate::Error::InvalidUsage) for buffers in device memory.
     pub fn map_buffer(&self, buffer: BufferHandle) -> Result<NonNull<[u8]>> {
-        let buffer = self.shared().store.buffers.get(buffer)?;
+        let buffer = self.device_state().store.buffers.get(buffer)?;
         let message =
             "device memory is not mapped; create the buffer with MemoryKind::HostVisible or Readback";
         let start = buffer.mapped().ok_or_else(|| Error::usage(&buffer.name, message))?;
@@ -51,18 +51,18 @@ impl Context {
     /// instance with one buffer for each frame in flight. Device memory is written before the next submission, after
     /// everything submitted so far.
     pub fn upload_buffer(&self, buffer: BufferHandle, offset: u64, bytes: &[u8]) -> Result<()> {
-        let buffers = &self.shared().store.buffers;
+        let buffers = &self.device_state().store.buffers;
         let target = buffers.get(buffer)?;
         target.check_range(offset, bytes.len() as u64)?;
         if target.write(offset, bytes) {
             return Ok(());
         }
-        self.upload_object(&target, offset, bytes)
+        self.upload_to_buffer(&target, offset, bytes)
     }
 
     /// Reads bytes of a buffer in any memory, after everything submitted so far. Waits for the GPU.
     pub fn download_buffer(&self, buffer: BufferHandle, offset: u64, bytes: &mut [u8]) -> Result<()> {
-        let find = || self.shared().store.buffers.get(buffer);
+        let find = || self.device_state().store.buffers.get(buffer);
         let found = find()?;
         found.check_range(offset, bytes.len() as u64)?;
         if found.mapped().is_some() {
@@ -78,7 +78,7 @@ impl Context {
 
     /// Writes texels, tightly packed, row by row and layer by layer, before the next submission.
     pub fn upload_texture(&self, texture: TextureHandle, region: &TextureRegion, bytes: &[u8]) -> Result<()> {
-        let texture = self.shared().store.textures.get(texture)?;
+        let texture = self.device_state().store.textures.get(texture)?;
         if texture.lent {
             let message = "images of windows come and go with frames; copy into it with a command buffer";
             return Err(Error::usage(&texture.name, message));

@@ -5,11 +5,10 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::Context;
-use super::create_texture::views;
-use super::destroy::Destroy;
+use super::create_texture::default_views;
 use super::holder::Holder;
 use crate::command::CommandBuffer;
-use crate::device_state::Garbage;
+use crate::device_state::DeferredFree;
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::handle::SwapchainHandle;
@@ -28,8 +27,8 @@ use crate::swapchain::surface::{Surface, SurfaceState};
 
 impl Destroy for SwapchainHandle {
     /// Its images go too, whoever has one.
-    fn take_from(self, ctx: &Context) {
-        if let Ok(swapchain) = ctx.shared().store.swapchains.remove(self) {
+    fn destroy_in(self, ctx: &Context) {
+        if let Ok(swapchain) = ctx.device_state().store.swapchains.remove(self) {
             ctx.retire_swapchain(swapchain);
         }
     }
@@ -45,7 +44,7 @@ impl Context {
     /// [`Unsupported`](Error::Unsupported) where the context was made without a window, where the device cannot present to
     /// it, and for usages that images of the window cannot have.
     pub fn create_swapchain(&self, desc: &SwapchainDesc<'_>) -> Result<Holder<SwapchainHandle>> {
-        let shared = self.shared();
+        let shared = self.device_state();
         let name = desc.debug_name;
         let no_window = || Error::usage(name, "give it a window, here or in ContextDesc::window");
         let window = desc.window.as_ref().or(self.inner.window.as_ref()).ok_or_else(no_window)?;
@@ -66,7 +65,7 @@ impl Context {
         let swapchain = shared.store.swapchains.get(handle)?;
         let mut guard = swapchain.lock();
         let SwapchainInner { lifecycle, resources } = &mut *guard;
-        lifecycle.prepare(name, &mut Live { ctx: self, name: &swapchain.name, resources })?;
+        lifecycle.prepare(name, &mut LiveBackend { ctx: self, name: &swapchain.name, resources })?;
         drop(guard);
         Ok(holder)
     }
@@ -81,11 +80,11 @@ impl Context {
     /// # Errors
     /// [`InvalidUsage`](Error::InvalidUsage) when the window is gone, [`StaleHandle`](Error::StaleHandle).
     pub fn next_image(&self, swapchain: SwapchainHandle) -> Result<Option<SwapchainImage>> {
-        let object = self.shared().store.swapchains.get(swapchain)?;
+        let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
         let SwapchainInner { lifecycle, resources } = &mut *guard;
         self.check_alive(swapchain)?;
-        let mut live = Live { ctx: self, name: &object.name, resources };
+        let mut live = LiveBackend { ctx: self, name: &object.name, resources };
         let Some(acquired) = lifecycle.acquire_image(&object.name, &mut live)? else { return Ok(None) };
         let image = resources.current.as_ref().and_then(|current| {
             let image = current.images.get(acquired.index as usize)?;
@@ -110,8 +109,8 @@ impl Context {
     /// Those of [`submit`](Self::submit), after which the image is as it was before; [`InvalidUsage`](Error::InvalidUsage)
     /// for an image that was given out again, or whose swapchain was made anew.
     pub fn present(&self, mut cmd: CommandBuffer, image: SwapchainImage) -> Result<SubmitHandle> {
-        let shared = self.shared();
-        self.check_own(&cmd)?;
+        let shared = self.device_state();
+        self.check_same_context(&cmd)?;
         let swapchain = shared.store.swapchains.get(image.swapchain)?;
         let mut guard = swapchain.lock();
         let SwapchainInner { lifecycle, resources } = &mut *guard;
@@ -132,7 +131,7 @@ impl Context {
             .stage_mask(vk::PipelineStageFlags2::ALL_COMMANDS);
         let presented = Some(shown.object.image.id);
         let more = Submission { signals: vec![drawn], presented, ..Submission::default() };
-        let submission = self.submit_between(cmd, more)?;
+        let submission = self.submit_with_semaphores(cmd, more)?;
         let answer = current.chain.present(index, mode, &shown.sync);
         // Whatever the window has come to, the engine waits for the semaphore and signals the fence.
         shown.sync.presented = !matches!(answer, Err(Failure::Other(_)));
@@ -149,7 +148,7 @@ impl Context {
     /// The window has this size in pixels now; a 0 says that it is minimised. Costs nothing where nothing changed. Needed
     /// on Wayland only, and for windows that are minimised without becoming small.
     pub fn resize_swapchain(&self, swapchain: SwapchainHandle, extent: [u32; 2]) -> Result<()> {
-        let object = self.shared().store.swapchains.get(swapchain)?;
+        let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut state = object.lock();
         let before = std::mem::replace(&mut state.resources.config.extent, extent);
         if before != extent {
@@ -162,7 +161,7 @@ impl Context {
     /// device cannot change it for a single picture, the swapchain is made anew by the next
     /// [`next_image`](Self::next_image).
     pub fn set_present_mode(&self, swapchain: SwapchainHandle, wishes: &[PresentMode]) -> Result<()> {
-        let object = self.shared().store.swapchains.get(swapchain)?;
+        let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut state = object.lock();
         let SwapchainInner { lifecycle, resources } = &mut *state;
         resources.config.present_modes = wishes.to_vec();
@@ -183,7 +182,7 @@ impl Context {
     /// [`StaleHandle`](Error::StaleHandle); [`Unsupported`](Error::Unsupported) where it would have no images now, as its
     /// window takes none of the formats.
     pub fn swapchain_info(&self, swapchain: SwapchainHandle) -> Result<SwapchainInfo> {
-        let object = self.shared().store.swapchains.get(swapchain)?;
+        let object = self.device_state().store.swapchains.get(swapchain)?;
         let mut guard = object.lock();
         let SwapchainInner { lifecycle, resources } = &mut *guard;
         let rebuilds = resources.rebuilds.saturating_sub(1);
@@ -198,8 +197,9 @@ impl Context {
                 rebuilds,
             });
         }
-        let mut live = Live { ctx: self, name: &object.name, resources };
-        let planned = live.surface().and_then(|surface| live.plan(&surface, &surface.state()?, [0; 2]));
+        let mut live = LiveBackend { ctx: self, name: &object.name, resources };
+        let planned =
+            live.surface().and_then(|surface| live.choose_chain(&surface, &surface.state()?, [0; 2]));
         let (present_modes, plan) = planned.map_err(|failure| failure.into_error(&object.name))?;
         Ok(SwapchainInfo {
             extent: [0, 0],
@@ -217,25 +217,25 @@ impl Context {
         let mut guard = swapchain.lock();
         let SwapchainInner { lifecycle, resources } = &mut *guard;
         lifecycle.mark_out_of_date();
-        Live { ctx: self, name: &swapchain.name, resources }.retire_current();
+        LiveBackend { ctx: self, name: &swapchain.name, resources }.retire_current();
         drop(guard);
-        self.shared().retire(Garbage::Swapchain(swapchain));
+        self.device_state().free_later(DeferredFree::Swapchain(swapchain));
     }
 
     /// Another thread may have destroyed the swapchain while this one waited for its lock.
     fn check_alive(&self, swapchain: SwapchainHandle) -> Result<()> {
-        self.shared().store.swapchains.get(swapchain).map(drop)
+        self.device_state().store.swapchains.get(swapchain).map(drop)
     }
 }
 
 /// A swapchain under its lock, with what images are made of.
-struct Live<'a> {
+struct LiveBackend<'a> {
     ctx: &'a Context,
     name: &'a Arc<str>,
     resources: &'a mut SwapchainResources,
 }
 
-impl PresentBackend for Live<'_> {
+impl PresentBackend for LiveBackend<'_> {
     fn extent(&mut self) -> Result<Option<[u32; 2]>, Failure> {
         let state = self.surface()?.state()?;
         Ok(choose::choose_extent(&state.limits, self.resources.config.extent))
@@ -260,7 +260,7 @@ impl PresentBackend for Live<'_> {
 
     fn recreate_swapchain(&mut self, extent: [u32; 2]) -> Result<(), Failure> {
         let surface = self.surface()?;
-        let (offered_modes, plan) = self.plan(&surface, &surface.state()?, extent)?;
+        let (offered_modes, plan) = self.choose_chain(&surface, &surface.state()?, extent)?;
         let old = self.resources.current.as_ref().map(|current| Arc::clone(&current.chain));
         let made = Chain::new(&surface, &plan, old.as_deref(), self.name);
         self.retire_current();
@@ -269,14 +269,14 @@ impl PresentBackend for Live<'_> {
             chain.set_hdr(hdr)?;
         }
         let mode = plan.modes.first().copied().unwrap_or_default();
-        let images = self.images(&chain, &plan)?;
+        let images = self.new_images(&chain, &plan)?;
         self.resources.current = Some(Current { images, plan, mode, offered_modes, chain });
         self.resources.rebuilds += 1;
         Ok(())
     }
 
     fn acquire(&mut self) -> Result<Acquired, Failure> {
-        let submitter = &self.ctx.shared().submitter;
+        let submitter = &self.ctx.device_state().submitter;
         // Only the graphics queue has anything of windows, so work of others in the background holds nothing up.
         let completed = submitter.timeline(0).query_completed()?;
         self.resources.destroy_finished(completed);
@@ -299,7 +299,7 @@ impl PresentBackend for Live<'_> {
     }
 }
 
-impl Live<'_> {
+impl LiveBackend<'_> {
     /// The surface; another one where the last was lost.
     fn surface(&mut self) -> Result<Arc<Surface>, Failure> {
         if let Some(surface) = &self.resources.surface {
@@ -310,7 +310,7 @@ impl Live<'_> {
     }
 
     /// What the Vulkan swapchain is to be like, and the modes there are.
-    fn plan(
+    fn choose_chain(
         &self,
         surface: &Surface,
         state: &SurfaceState,
@@ -347,10 +347,10 @@ impl Live<'_> {
         Ok((modes, plan))
     }
 
-    fn images(&mut self, chain: &Arc<Chain>, plan: &ChainPlan) -> Result<Vec<ChainImage>, Failure> {
+    fn new_images(&mut self, chain: &Arc<Chain>, plan: &ChainPlan) -> Result<Vec<ChainImage>, Failure> {
         let mut images = Vec::new();
         for raw in chain.images()? {
-            match self.image(chain, plan, raw) {
+            match self.new_image(chain, plan, raw) {
                 Ok(image) => images.push(image),
                 Err(error) => {
                     self.retire_images(images);
@@ -362,10 +362,10 @@ impl Live<'_> {
     }
 
     /// One image as a texture with a number of its own.
-    fn image(&self, chain: &Arc<Chain>, plan: &ChainPlan, raw: vk::Image) -> Result<ChainImage> {
-        let shared = self.ctx.shared();
+    fn new_image(&self, chain: &Arc<Chain>, plan: &ChainPlan, raw: vk::Image) -> Result<ChainImage> {
+        let shared = self.ctx.device_state();
         let sync = PresentSync::new(&shared.gpu, self.name)?;
-        let slot = shared.reserve(|| shared.bindless.reserve_texture(self.name))?;
+        let slot = shared.reserve_slot(|| shared.bindless.reserve_texture(self.name))?;
         let desc = TextureDesc {
             format: plan.format,
             extent: plan.extent,
@@ -377,7 +377,7 @@ impl Live<'_> {
             Image::import(&shared.gpu, &desc, raw).inspect_err(|_| shared.bindless.free_texture(slot))?;
         let texture =
             Texture::from_image(&shared.gpu, &desc, image.with_external_owner(Arc::clone(chain) as _), slot);
-        let views = views(&texture).inspect_err(|_| shared.bindless.free_texture(slot))?;
+        let views = default_views(&texture).inspect_err(|_| shared.bindless.free_texture(slot))?;
         shared.bindless.set_texture(slot, views);
         shared.submitter.with_presentables(|images| images.insert(texture.image.id, self.name));
         shared.submitter.restrict_to_graphics(texture.image.id, self.name);
@@ -391,31 +391,32 @@ impl Live<'_> {
         let syncs = self.retire_images(current.images);
         self.resources.retire(current.chain, syncs);
         if let Some(semaphore) = self.resources.signalled.take() {
-            self.resources.recycle_semaphore(semaphore, self.ctx.shared().submitter.last_of_queues()[0]);
+            self.resources
+                .recycle_semaphore(semaphore, self.ctx.device_state().submitter.last_of_queues()[0]);
         }
     }
 
     /// Destroys the textures of images, and waits on the GPU for those that were taken and not used.
     fn retire_images(&mut self, images: Vec<ChainImage>) -> Vec<PresentSync> {
-        let shared = self.ctx.shared();
+        let shared = self.ctx.device_state();
         let mut waits = Vec::new();
         let mut syncs = Vec::new();
         for image in images {
             let id = image.object.image.id;
             waits.extend(shared.submitter.with_presentables(|presentables| presentables.retire(id)));
             if shared.store.textures.remove(image.texture).is_ok() {
-                shared.retire(Garbage::Texture(image.object));
+                shared.free_later(DeferredFree::Texture(image.object));
             }
             syncs.push(image.sync);
         }
         if !waits.is_empty() {
-            self.wait_on_gpu(&waits);
+            self.wait_for_semaphores(&waits);
         }
         syncs
     }
 
     /// A semaphore that was signalled can be used again only after a wait.
-    fn wait_on_gpu(&self, semaphores: &[vk::Semaphore]) {
+    fn wait_for_semaphores(&self, semaphores: &[vk::Semaphore]) {
         let wait = |semaphore: &vk::Semaphore| {
             vk::SemaphoreSubmitInfo::default()
                 .semaphore(*semaphore)
@@ -423,7 +424,7 @@ impl Live<'_> {
         };
         let waits = semaphores.iter().map(wait).collect();
         let submission = Submission { waits, ..Submission::default() };
-        if let Err(error) = self.ctx.shared().submitter.submit(submission, || {}).1 {
+        if let Err(error) = self.ctx.device_state().submitter.submit(submission, || {}).1 {
             log::error!("{}: an image that was taken cannot be given back: {error}", self.name);
         }
     }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ash::vk;
 
-use super::start::features::Calibration;
+use super::caps::features::Calibration;
 use super::start::instance::Instance;
 use crate::error::{Error, Result};
 

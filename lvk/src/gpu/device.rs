@@ -6,28 +6,31 @@ use std::sync::atomic::AtomicU32;
 use ash::vk;
 
 use super::calibrated_timestamps::HostClock;
-use super::caps::capabilities::{Capabilities, FeatureRequest, PhysicalDevice};
+use super::caps::capabilities::{Capabilities, FeatureRequest};
 use super::caps::descriptor_limits::DescriptorLimits;
+use super::caps::features::Features;
 use super::caps::format_features::FormatFeatureCache;
 use super::caps::host_image_copy::HostImageCopy;
 use super::caps::image_limits::ImageLimitCache;
 use super::caps::optional_features::OptionalFeature;
-use super::caps::queues::{Queue, QueueLocation, QueueRequest, Queues, shared_timestamp_bits};
+use super::caps::queues::{QueueLocation, QueueRequest, Queues, shared_timestamp_bits};
 use super::caps::ray_query_path::RayQueryRequest;
 use super::caps::shading_rate::ShadingRates;
-use super::debug::object_names;
+use super::debug::debugger::has_debugger;
 use super::memory::allocator::DeviceMemory;
 use super::memory::budget::HeapUse;
 use super::start::driver_workarounds::with_exclusive_device_lock;
 use super::start::external::RawContext;
-use super::start::features::Features;
 use super::start::instance::Instance;
+use super::start::physical_device::PhysicalDevice;
 use super::start::profile::DeviceProfile;
 use super::start::select::{Candidate, choose};
+use super::start::surface::SurfaceProbe;
 use super::start::user_extensions::UserExtensions;
-use super::window::{SurfaceProbe, WindowRef, unavailable_window_features};
+use super::start::window::{WindowExtensions, WindowRef};
 use crate::error::{Error, Result, check_limit};
 use crate::lock_order::{Guard, Mutex, Rank};
+use crate::queue::Queue;
 
 /// What the caller asks of a device.
 #[derive(Debug, Clone, Copy)]
@@ -71,7 +74,7 @@ pub(crate) struct Gpu {
     pub(crate) custom_borders: AtomicU32,
     /// Present where the context is for windows.
     #[cfg(feature = "window")]
-    pub(crate) windows: Option<super::window::WindowFunctions>,
+    pub(crate) windows: Option<super::start::surface::WindowFunctions>,
     physical: vk::PhysicalDevice,
     /// Takes names and labels; present where somebody reads them, as each name costs as much as a small buffer.
     pub(super) debug_utils: Option<ash::ext::debug_utils::Device>,
@@ -100,7 +103,7 @@ impl Gpu {
     pub(crate) fn new(instance: Instance, request: &DeviceRequest<'_>) -> Result<Self> {
         let chosen = choose_device(&instance, request)?;
         let (device, caps, features) = create_with_fallback(&instance, &chosen, request)?;
-        let memory = match DeviceMemory::new(&instance, &device, chosen.raw) {
+        let memory = match DeviceMemory::new(&instance.raw, &device, chosen.raw) {
             Ok(memory) => memory,
             Err(error) => {
                 // SAFETY: nothing was made from the device yet.
@@ -139,7 +142,7 @@ impl Gpu {
         let instance = Instance::external(raw.entry, raw.instance, raw.instance_extensions);
         let features = enabled_features(&instance, &chosen, &caps);
         let made = DeviceParts {
-            memory: DeviceMemory::new(&instance, &raw.device, chosen.raw)?,
+            memory: DeviceMemory::new(&instance.raw, &raw.device, chosen.raw)?,
             device: raw.device,
             caps,
             features,
@@ -158,7 +161,7 @@ impl Gpu {
         let DeviceParts { device, mut caps, features, memory, queues, is_foreign } = made;
         let raw = &instance.raw;
         let structures = caps.hardware_acceleration_structures();
-        let host_copies = HostImageCopy::new(&instance, &device, physical, &caps);
+        let host_copies = HostImageCopy::new(raw, &device, physical, &caps);
         caps.host_image_copy = host_copies.is_some();
         Self {
             queues,
@@ -167,20 +170,24 @@ impl Gpu {
                 .ray_tracing_pipeline
                 .then(|| ash::khr::ray_tracing_pipeline::Device::new(raw, &device)),
             mesh: caps.mesh_shader.then(|| ash::ext::mesh_shader::Device::new(raw, &device)),
-            shading_rates: ShadingRates::new(&instance, &device, physical, &caps),
+            shading_rates: caps
+                .has(OptionalFeature::PipelineShadingRate)
+                .then(|| ShadingRates::new(&instance.entry, raw, &device, physical)),
             local_read: caps
                 .has(OptionalFeature::LocalRead)
                 .then(|| ash::khr::dynamic_rendering_local_read::Device::new(raw, &device)),
             host_copies,
             host_clock: HostClock::new(&instance, &device, physical, features.calibration),
             #[cfg(feature = "window")]
-            windows: super::window::WindowFunctions::new(&instance, &device, |feature| caps.has(feature)),
-            debug_utils: object_names::should_name_objects(&instance, physical, debug_names)
+            windows: super::start::surface::WindowFunctions::new(&instance, &device, |feature| {
+                caps.has(feature)
+            }),
+            debug_utils: should_name_objects(&instance, physical, debug_names)
                 .then(|| ash::ext::debug_utils::Device::new(raw, &device)),
             device_fault: (features.ext.fault.device_fault == vk::TRUE)
                 .then(|| ash::ext::device_fault::Device::new(raw, &device)),
             memory: Mutex::new(Rank::Memory, Some(memory)),
-            heap_use: HeapUse::new(&instance, physical),
+            heap_use: HeapUse::new(raw, physical),
             format_answers: FormatFeatureCache::default(),
             image_limits: ImageLimitCache::new(),
             custom_borders: AtomicU32::new(0),
@@ -238,6 +245,17 @@ impl Gpu {
     /// The functions of `VK_EXT_mesh_shader`, or the error that says what the device lacks.
     pub(crate) fn mesh_functions(&self) -> Result<&ash::ext::mesh_shader::Device> {
         self.mesh.as_ref().ok_or_else(|| self.unsupported("mesh shaders"))
+    }
+
+    /// The functions of windows, or the error that says how to get them.
+    #[cfg(feature = "window")]
+    pub(crate) fn window_functions(&self) -> Result<&super::start::surface::WindowFunctions> {
+        self.windows.as_ref().ok_or_else(|| {
+            Error::unsupported(
+                "a swapchain",
+                "the context was made without a window; set ContextDesc::window",
+            )
+        })
     }
 
     /// An [`Error::Unsupported`] that names the device.
@@ -309,6 +327,12 @@ impl Drop for Gpu {
     }
 }
 
+/// True if objects get names: as the caller says, or where the layer or a debugger reads them.
+fn should_name_objects(instance: &Instance, device: vk::PhysicalDevice, requested: Option<bool>) -> bool {
+    instance.debug_utils
+        && requested.unwrap_or_else(|| instance.validated || has_debugger(&instance.raw, device))
+}
+
 fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<PhysicalDevice> {
     let mut devices = Vec::new();
     for raw in instance.physical_devices()? {
@@ -318,7 +342,7 @@ fn choose_device(instance: &Instance, request: &DeviceRequest<'_>) -> Result<Phy
         return Err(Error::NoVulkan { reason: "the loader found no device".to_owned() });
     }
     let probe = request.window.map(|window| SurfaceProbe::new(instance, window)).transpose()?;
-    let unknown = unavailable_window_features(instance);
+    let unknown = WindowExtensions::unavailable_features(instance.windows.as_ref());
     for device in &mut devices {
         device.capabilities.remove_features(unknown);
         if let Some(probe) = &probe {

@@ -5,8 +5,9 @@ pub(crate) mod caps;
 pub(crate) mod debug;
 pub(crate) mod device;
 pub(crate) mod memory;
+pub(crate) mod object_memory;
+pub(crate) mod object_names;
+pub(crate) mod queries;
 pub(crate) mod start;
-#[cfg_attr(not(feature = "window"), path = "window_disabled.rs")]
-pub(crate) mod window;
 
 pub(crate) use device::Gpu;

@@ -134,7 +134,7 @@ kernels! {
 /// Push constants of [`Kernel::Gather`].
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(crate) struct GatherPush {
+pub(crate) struct GatherPushConstants {
     pub(crate) numbers: u64,
     pub(crate) source: u64,
     pub(crate) gathered: u64,
@@ -148,7 +148,7 @@ pub(crate) struct GatherPush {
 /// Push constants of [`Kernel::Instances`].
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(crate) struct InstancesPush {
+pub(crate) struct InstancesPushConstants {
     pub(crate) source: u64,
     pub(crate) target: u64,
     pub(crate) rows: u64,
@@ -166,23 +166,23 @@ pub(crate) struct InstancesPush {
 
 /// The pipelines, each made when first needed.
 pub(crate) struct Kernels {
-    made: [Mutex<Option<Arc<ComputePipeline>>>; Kernel::ALL.len()],
+    pipelines: [Mutex<Option<Arc<ComputePipeline>>>; Kernel::ALL.len()],
 }
 
 impl Kernels {
     pub(crate) fn new() -> Self {
-        Self { made: [const { Mutex::new(Rank::Kernels, None) }; Kernel::ALL.len()] }
+        Self { pipelines: [const { Mutex::new(Rank::Kernels, None) }; Kernel::ALL.len()] }
     }
 
     /// The pipeline of a kernel.
-    pub(crate) fn get(
+    pub(crate) fn pipeline_of(
         &self,
         gpu: &Arc<Gpu>,
         layout: &PipelineLayout,
         cache: vk::PipelineCache,
         kernel: Kernel,
     ) -> Result<Arc<ComputePipeline>> {
-        let mut place = self.made[kernel as usize].lock();
+        let mut place = self.pipelines[kernel as usize].lock();
         match &*place {
             Some(pipeline) => Ok(Arc::clone(pipeline)),
             None => Ok(Arc::clone(place.insert(Arc::new(kernel.pipeline(gpu, layout, cache)?)))),
@@ -215,17 +215,17 @@ impl Kernel {
     }
 }
 
-/// Workgroups along x and y for so many invocations; see [`spread`].
-pub(crate) fn groups(invocations: u32) -> [u32; 3] {
-    spread(invocations.div_ceil(GROUP_SIZE))
+/// Workgroups along x and y for so many invocations; see [`spread_workgroups`].
+pub(crate) fn workgroup_counts(invocations: u32) -> [u32; 3] {
+    spread_workgroups(invocations.div_ceil(GROUP_SIZE))
 }
 
 /// At least so many workgroups, and one, along x and y, within what every device takes along an axis. The shader finds
 /// its number by both.
-pub(crate) fn spread(groups: u32) -> [u32; 3] {
-    const MOST: u32 = 65_535;
+pub(crate) fn spread_workgroups(groups: u32) -> [u32; 3] {
+    const MAX_GROUPS: u32 = 65_535;
     let groups = groups.max(1);
-    let y = groups.div_ceil(MOST);
+    let y = groups.div_ceil(MAX_GROUPS);
     [groups.div_ceil(y), y, 1]
 }
 
@@ -236,7 +236,7 @@ mod tests {
     #[test]
     fn every_invocation_has_a_group() {
         for invocations in [0, 1, 64, 65, 4_194_240, 4_194_241, 100_000_000, u32::MAX] {
-            let [x, y, z] = groups(invocations);
+            let [x, y, z] = workgroup_counts(invocations);
             assert!(x <= 65_535 && y <= 65_535 && z == 1);
             assert!(u64::from(x) * u64::from(y) * u64::from(GROUP_SIZE) >= u64::from(invocations));
         }

@@ -1,4 +1,4 @@
-//! The manual: one page a topic, for reading from top to bottom. The items' own pages have the details.
+//! The manual: one page per topic, to be read from top to bottom. The API documentation has the details.
 
 #[doc = include_str!("textures.md")]
 pub mod textures {}

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::cache_file::{CacheOwner, decode_file, encode_file};
-use crate::cache_file::{MOST_BYTES, checksum, read, replace};
+use crate::cache_file::{MAX_BYTES, checksum, read_file, replace_file};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::lock_order::{Mutex, Rank};
@@ -28,7 +28,7 @@ impl PipelineCache {
     /// Starts from the file. Where there is none, or it cannot be used, starts empty and says so to the `log` crate.
     pub(crate) fn new(gpu: &Arc<Gpu>, path: &Path) -> Result<Self> {
         let owner = cache_owner(gpu);
-        let file = read_file(path);
+        let file = read_if_present(path);
         let data = file.as_deref().and_then(|file| match decode_file(&owner, file) {
             Ok(data) => Some(data),
             Err(refusal) => {
@@ -64,7 +64,7 @@ impl PipelineCache {
         if !always && *on_disk == Some(sum) && self.path.exists() {
             return Ok(());
         }
-        replace(&self.path, &encode_file(&self.owner, &data)).map_err(|error| Error::File {
+        replace_file(&self.path, &encode_file(&self.owner, &data)).map_err(|error| Error::File {
             path: self.path.clone(),
             message: format!("the pipeline cache cannot be written: {error}"),
         })?;
@@ -84,8 +84,8 @@ impl Drop for PipelineCache {
 }
 
 /// The bytes of the file, if it can be read. A first run has none.
-fn read_file(path: &Path) -> Option<Vec<u8>> {
-    let error = match read(path, MOST_BYTES) {
+fn read_if_present(path: &Path) -> Option<Vec<u8>> {
+    let error = match read_file(path, MAX_BYTES) {
         Ok(file) => return Some(file),
         Err(error) => error,
     };

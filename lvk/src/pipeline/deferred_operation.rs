@@ -8,7 +8,7 @@ use ash::vk;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::start::driver_workarounds::with_shared_device_lock;
-use crate::parallel::{cores, run_on};
+use crate::parallel::{core_count, run_on_threads};
 
 /// Creates the pipeline (`vkCreateRayTracingPipelinesKHR`), with as many threads as the driver and the machine have
 /// use for.
@@ -66,7 +66,7 @@ impl DeferredOperation {
             // SAFETY: as above.
             result_code(unsafe { self.ext.get_deferred_operation_result(self.raw) })
         };
-        join_with_threads(cores().min(useful as usize), &join, &result)
+        join_with_threads(core_count().min(useful as usize), &join, &result)
     }
 }
 
@@ -90,7 +90,7 @@ fn join_with_threads(
     join: &(impl Fn() -> vk::Result + Sync),
     result: &impl Fn() -> vk::Result,
 ) -> vk::Result {
-    run_on(threads, || join_until_done(join));
+    run_on_threads(threads, || join_until_done(join));
     loop {
         match result() {
             vk::Result::NOT_READY => join_until_done(join),

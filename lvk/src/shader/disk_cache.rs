@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::SystemTime;
 
 use super::disk_file::{CachedModule, Fingerprint, Included, decode_file, encode_file};
-use crate::cache_file::{read, replace};
+use crate::cache_file::{read_file, replace_file};
 use crate::lock_order::{Mutex, Rank};
 
 /// A folder holds at most this; beyond it what was not used for longest goes until three quarters are left.
@@ -58,7 +58,7 @@ impl ShaderCache {
         is_same: impl FnOnce(&[Included]) -> bool,
     ) -> Option<Vec<u32>> {
         let path = self.path(key);
-        let file = match read(&path, MAX_BYTES) {
+        let file = match read_file(&path, MAX_BYTES) {
             Ok(file) => file,
             Err(error) => {
                 if error.kind() != ErrorKind::NotFound {
@@ -87,7 +87,7 @@ impl ShaderCache {
         self.compiled.fetch_add(1, Ordering::Relaxed);
         let path = self.path(key);
         let file = encode_file(key, entry);
-        let written = std::fs::create_dir_all(&self.folder).and_then(|()| replace(&path, &file));
+        let written = std::fs::create_dir_all(&self.folder).and_then(|()| replace_file(&path, &file));
         if let Err(error) = written {
             log::warn!("the compiled shader '{}' cannot be kept: {error}", path.display());
             return;

@@ -4,12 +4,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 use super::gpu_build::geometry::vertex_count;
-use super::gpu_build::layout::{BlasShape, BlobPlaces, GpuBuildPlan, VERTEX_BYTES};
+use super::gpu_build::layout::{BlasShape, BlobOffsets, GpuBuildPlan, VERTEX_BYTES};
 use super::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
-use super::layout::Header;
+use super::layout::BlobHeader;
 use super::layout::LeafKind;
-use super::rebraid_parts::Parts;
-use super::storage::SoftwareBody;
+use super::rebraid_parts::RebraidParts;
+use super::storage::SoftwareAccelStorage;
 use crate::accel::desc::BlasDesc;
 use crate::accel::flags::{AccelStructSizes, BuildFlags};
 use crate::accel::geometry::BlasGeometry;
@@ -18,17 +18,17 @@ use crate::error::Result;
 /// What stands behind the handle of a bottom-level structure for software to trace.
 pub(crate) struct SoftwareBlas {
     /// What instances refer to as long as the handle lives.
-    pub(crate) body: Arc<SoftwareBody>,
-    pub(crate) origin: Origin,
+    pub(crate) storage: Arc<SoftwareAccelStorage>,
+    pub(crate) origin: BvhOrigin,
     /// Where a structure that the CPU built is built again on the GPU: its own body where that has room, else another one, to
     /// which the body refers then. Made when first needed.
-    rebuilt: OnceLock<Arc<SoftwareBody>>,
+    rebuilt: OnceLock<Arc<SoftwareAccelStorage>>,
     /// Whether a submission builds it there.
     has_moved: AtomicBool,
 }
 
 /// Who built it first.
-pub(crate) enum Origin {
+pub(crate) enum BvhOrigin {
     /// The CPU, from inputs that were read back: the better trees.
     Cpu {
         /// How it is refitted, where it may be.
@@ -36,87 +36,87 @@ pub(crate) enum Origin {
         /// How it is rebuilt.
         rebuild: GpuBuildPlan,
         /// Where it lies, as long as it is neither refitted nor rebuilt.
-        parts: Arc<Parts>,
+        parts: Arc<RebraidParts>,
     },
     /// The GPU, as every build of it.
     Gpu(GpuBuildPlan),
 }
 
 impl SoftwareBlas {
-    pub(crate) fn new(body: Arc<SoftwareBody>, origin: Origin) -> Self {
-        Self { body, origin, rebuilt: OnceLock::new(), has_moved: AtomicBool::new(false) }
+    pub(crate) fn new(body: Arc<SoftwareAccelStorage>, origin: BvhOrigin) -> Self {
+        Self { storage: body, origin, rebuilt: OnceLock::new(), has_moved: AtomicBool::new(false) }
     }
 
     /// Where it is rebuilt, once a rebuild was recorded.
-    pub(crate) fn rebuilt(&self) -> Option<&Arc<SoftwareBody>> {
+    pub(crate) fn storage_after_rebuild(&self) -> Option<&Arc<SoftwareAccelStorage>> {
         self.rebuilt.get()
     }
 
     /// Where it lies after everything submitted, if it was rebuilt.
-    pub(crate) fn moved(&self) -> Option<&Arc<SoftwareBody>> {
+    pub(crate) fn moved_storage(&self) -> Option<&Arc<SoftwareAccelStorage>> {
         self.rebuilt.get().filter(|_| self.has_moved.load(Ordering::Acquire))
     }
 
     /// A rebuild was submitted.
-    pub(crate) fn set_moved(&self) {
+    pub(crate) fn set_moved_storage(&self) {
         self.has_moved.store(true, Ordering::Release);
     }
 
     /// Whether the CPU has built it first, so that a rebuild puts another tree in its place.
-    pub(crate) fn is_of_cpu(&self) -> bool {
-        matches!(self.origin, Origin::Cpu { .. })
+    pub(crate) fn is_built_on_cpu(&self) -> bool {
+        matches!(self.origin, BvhOrigin::Cpu { .. })
     }
 
     /// Where it is rebuilt; `make` makes room the first time.
-    pub(crate) fn rebuilt_or(
+    pub(crate) fn storage_after_rebuild_or(
         &self,
-        make: impl FnOnce() -> Result<SoftwareBody>,
-    ) -> Result<&Arc<SoftwareBody>> {
+        make: impl FnOnce() -> Result<SoftwareAccelStorage>,
+    ) -> Result<&Arc<SoftwareAccelStorage>> {
         if let Some(rebuilt) = self.rebuilt.get() {
             return Ok(rebuilt);
         }
-        let rebuilt = if self.rebuilds_in_place() { Arc::clone(&self.body) } else { Arc::new(make()?) };
+        let rebuilt = if self.rebuilds_in_place() { Arc::clone(&self.storage) } else { Arc::new(make()?) };
         Ok(self.rebuilt.get_or_init(|| rebuilt))
     }
 
     /// Whether the body has room for what a rebuild makes. Of what may not be refitted, top-level structures may show parts of
     /// the first tree, which must stay what it was.
     fn rebuilds_in_place(&self) -> bool {
-        let room = self.body.memory_bytes();
-        matches!(&self.origin, Origin::Cpu { refit: Some(_), rebuild, .. } if rebuild.blob_bytes <= room)
+        let room = self.storage.memory_bytes();
+        matches!(&self.origin, BvhOrigin::Cpu { refit: Some(_), rebuild, .. } if rebuild.blob_bytes <= room)
     }
 
     /// Where it lies, if the host knows: then it never was nor will be refitted, nor was a rebuild recorded.
-    pub(crate) fn known_parts(&self) -> Option<&Arc<Parts>> {
+    pub(crate) fn rebraid_parts(&self) -> Option<&Arc<RebraidParts>> {
         match &self.origin {
-            Origin::Cpu { refit: None, parts, .. } if self.rebuilt.get().is_none() => Some(parts),
+            BvhOrigin::Cpu { refit: None, parts, .. } if self.rebuilt.get().is_none() => Some(parts),
             _ => None,
         }
     }
 
     /// Bytes of memory.
     pub(crate) fn memory_bytes(&self) -> u64 {
-        let elsewhere = self.rebuilt.get().filter(|rebuilt| !Arc::ptr_eq(rebuilt, &self.body));
+        let elsewhere = self.rebuilt.get().filter(|rebuilt| !Arc::ptr_eq(rebuilt, &self.storage));
         let rebuilt = elsewhere.map_or(0, |rebuilt| rebuilt.memory_bytes());
-        self.body.memory_bytes() + rebuilt
+        self.storage.memory_bytes() + rebuilt
     }
 
     /// Scratch bytes of the first build: none where the CPU has made it.
-    pub(crate) fn first_build_scratch_bytes(&self) -> u64 {
+    pub(crate) fn initial_scratch_bytes(&self) -> u64 {
         match &self.origin {
-            Origin::Cpu { .. } => 0,
-            Origin::Gpu(plan) => plan.scratch_bytes,
+            BvhOrigin::Cpu { .. } => 0,
+            BvhOrigin::Gpu(plan) => plan.scratch_bytes,
         }
     }
 
     /// What it takes and its builds take, with the flags it was made with.
     pub(crate) fn sizes(&self, flags: BuildFlags) -> AccelStructSizes {
         let (rebuild, refit) = match &self.origin {
-            Origin::Cpu { rebuild, refit, .. } => (rebuild, refit.as_ref()),
-            Origin::Gpu(plan) => (plan, None),
+            BvhOrigin::Cpu { rebuild, refit, .. } => (rebuild, refit.as_ref()),
+            BvhOrigin::Gpu(plan) => (plan, None),
         };
         AccelStructSizes {
-            structure_bytes: self.body.memory_bytes(),
+            structure_bytes: self.storage.memory_bytes(),
             build_scratch_bytes: rebuild.scratch_bytes,
             update_scratch_bytes: refit_scratch_bytes(rebuild, flags)
                 .max(refit.map_or(0, GpuRefitPlan::scratch_bytes)),
@@ -126,14 +126,14 @@ impl SoftwareBlas {
 
 /// Bytes for a structure that the CPU built in so many: as many as its rebuild takes, where it may be refitted and that makes
 /// little difference.
-pub(crate) fn body_bytes(blob_bytes: u64, refit: Option<&GpuRefitPlan>, rebuild: &GpuBuildPlan) -> u64 {
-    const SHARE: u64 = 32;
-    let in_place = refit.is_some() && rebuild.blob_bytes <= blob_bytes + blob_bytes / SHARE;
+pub(crate) fn storage_bytes(blob_bytes: u64, refit: Option<&GpuRefitPlan>, rebuild: &GpuBuildPlan) -> u64 {
+    const MAX_REMOVED_SHARE: u64 = 32;
+    let in_place = refit.is_some() && rebuild.blob_bytes <= blob_bytes + blob_bytes / MAX_REMOVED_SHARE;
     if in_place { blob_bytes.max(rebuild.blob_bytes) } else { blob_bytes }
 }
 
 /// What structures of these geometries, which have been checked, take at most.
-pub(crate) fn most_sizes(
+pub(crate) fn max_sizes(
     name: &str,
     geometries: &[BlasGeometry],
     flags: BuildFlags,
@@ -146,12 +146,12 @@ pub(crate) fn most_sizes(
         false => GpuRefitPlan {
             format: NodeFormat::Wide,
             node_count: plan.capacity.saturating_sub(1),
-            ..GpuRefitPlan::of_build(&plan)
+            ..GpuRefitPlan::from_build(&plan)
         }
         .scratch_bytes(),
     };
     Ok(AccelStructSizes {
-        structure_bytes: plan.blob_bytes + if builds_on_gpu(flags) { 0 } else { plan.binary_excess_bytes() },
+        structure_bytes: plan.blob_bytes + if builds_on_gpu(flags) { 0 } else { plan.bvh2_excess_bytes() },
         build_scratch_bytes: plan.scratch_bytes,
         update_scratch_bytes: of_gpu.max(of_cpu),
     })
@@ -159,7 +159,7 @@ pub(crate) fn most_sizes(
 
 /// Scratch bytes of the refit of what the GPU built; 0 where it cannot be refitted.
 fn refit_scratch_bytes(plan: &GpuBuildPlan, flags: BuildFlags) -> u64 {
-    if flags.contains(BuildFlags::ALLOW_UPDATE) { GpuRefitPlan::of_build(plan).scratch_bytes() } else { 0 }
+    if flags.contains(BuildFlags::ALLOW_UPDATE) { GpuRefitPlan::from_build(plan).scratch_bytes() } else { 0 }
 }
 
 /// Whether the GPU makes the first build too.
@@ -170,12 +170,12 @@ pub(crate) fn builds_on_gpu(flags: BuildFlags) -> bool {
 /// A build on the GPU of these geometries, which have been checked.
 pub(crate) fn gpu_plan(name: &str, geometries: &[BlasGeometry], flags: BuildFlags) -> Result<GpuBuildPlan> {
     const IMPROVEMENTS: u32 = 2;
-    let boxes = geometries.first().is_some_and(BlasGeometry::is_boxes);
+    let boxes = geometries.first().is_some_and(BlasGeometry::is_aabbs);
     let sum = |of: fn(&BlasGeometry) -> u32| geometries.iter().map(of).fold(0_u32, u32::saturating_add);
     let (primitive_count, vertex_count) = (sum(BlasGeometry::primitive_count), sum(vertex_count));
-    let naming = LeafKind::naming(vertex_count as usize);
+    let naming = LeafKind::with_vertex_indices(vertex_count as usize);
     let shape = BlasShape {
-        leaf_kind: match (boxes, flags.contains(BuildFlags::LOW_MEMORY) && numbers_fit(geometries)) {
+        leaf_kind: match (boxes, flags.contains(BuildFlags::LOW_MEMORY) && do_ids_fit(geometries)) {
             (true, _) => LeafKind::Boxes,
             (false, true) if saves_memory(naming, primitive_count, vertex_count) => naming,
             (false, _) => LeafKind::Triangles,
@@ -195,15 +195,15 @@ fn saves_memory(naming: LeafKind, primitives: u32, vertices: u32) -> bool {
 }
 
 /// Whether a leaf that names vertices has room for the numbers of geometry and primitive.
-fn numbers_fit(geometries: &[BlasGeometry]) -> bool {
-    const MOST_GEOMETRIES: usize = 1 << 8;
-    const MOST_PRIMITIVES: u32 = 1 << 24;
-    let few = |geometry: &BlasGeometry| geometry.primitive_count() < MOST_PRIMITIVES;
-    geometries.len() <= 1 || (geometries.len() <= MOST_GEOMETRIES && geometries.iter().all(few))
+fn do_ids_fit(geometries: &[BlasGeometry]) -> bool {
+    const MAX_GEOMETRIES: usize = 1 << 8;
+    const MAX_PRIMITIVES: u32 = 1 << 24;
+    let few = |geometry: &BlasGeometry| geometry.primitive_count() < MAX_PRIMITIVES;
+    geometries.len() <= 1 || (geometries.len() <= MAX_GEOMETRIES && geometries.iter().all(few))
 }
 
 /// How a structure with this header, which the CPU built, is refitted; `None` where it may not be.
-pub(crate) fn refit_plan(header: &Header, desc: &BlasDesc<'_>) -> Option<GpuRefitPlan> {
+pub(crate) fn refit_plan(header: &BlobHeader, desc: &BlasDesc<'_>) -> Option<GpuRefitPlan> {
     if !desc.flags.contains(BuildFlags::ALLOW_UPDATE) {
         return None;
     }
@@ -213,7 +213,7 @@ pub(crate) fn refit_plan(header: &Header, desc: &BlasDesc<'_>) -> Option<GpuRefi
     Some(GpuRefitPlan {
         format: if header.format == NodeFormat::Wide as u32 { NodeFormat::Wide } else { NodeFormat::Binary },
         leaf_kind,
-        places: BlobPlaces {
+        offsets: BlobOffsets {
             nodes: header.nodes,
             primitives: header.primitives,
             vertices: header.vertices,

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::bvh::encode_blas::BlasBlob;
-use super::bvh::primitives::{Mesh, Primitives};
-use super::bvh::settings::Quality;
-use super::validate_blob::{self, Expected};
-use crate::cache_file::{fingerprint, read, replace};
+use super::bvh::primitives::{Mesh, MeshPrimitives};
+use super::bvh::settings::BvhSettings;
+use super::validate_blob::{self, ExpectedMesh};
+use crate::cache_file::{fingerprint, read_file, replace_file};
 
 const MAGIC: [u8; 8] = *b"\x89lvktree";
 /// Changes with the builders and with the form of structures.
@@ -15,22 +15,22 @@ const VERSION: u32 = 5;
 const HEADER_BYTES: usize = 32;
 
 /// A folder of built trees, each in a file named after what it was built from.
-pub(crate) struct TreeCache {
+pub(crate) struct BvhCache {
     folder: PathBuf,
 }
 
 /// What a tree is built from: the primitives and the settings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct TreeKey([u64; 2]);
+pub(crate) struct BvhKey([u64; 2]);
 
-impl TreeKey {
-    pub(crate) fn of(mesh: &Mesh, quality: Quality) -> Self {
+impl BvhKey {
+    pub(crate) fn from_mesh(mesh: &Mesh, quality: BvhSettings) -> Self {
         let bytes: &[u8] = match &mesh.primitives {
-            Primitives::Triangles(all) => bytemuck::cast_slice(all),
-            Primitives::Boxes(all) => bytemuck::cast_slice(all),
+            MeshPrimitives::Triangles(all) => bytemuck::cast_slice(all),
+            MeshPrimitives::Boxes(all) => bytemuck::cast_slice(all),
         };
-        let boxes = matches!(mesh.primitives, Primitives::Boxes(_));
-        let bits = [boxes, quality.low_memory, quality.shares_as_given()];
+        let boxes = matches!(mesh.primitives, MeshPrimitives::Boxes(_));
+        let bits = [boxes, quality.low_memory, quality.keeps_given_vertices()];
         let settings = bits.iter().fold(u64::from(VERSION), |all, bit| all << 1 | u64::from(*bit));
         let flags: Vec<u32> = mesh.flags.iter().map(|flags| flags.bits()).collect();
         let vertices = bytemuck::cast_slice(&mesh.vertices);
@@ -42,23 +42,23 @@ impl TreeKey {
     }
 }
 
-impl TreeCache {
+impl BvhCache {
     /// In this folder, which need not exist.
     pub(crate) fn new(folder: &Path) -> Self {
         Self { folder: folder.to_owned() }
     }
 
-    /// The tree of an earlier run if it is what is expected, or what `build` makes, which is kept. No trouble with files
+    /// The tree of an earlier run if it is what is expected, or what `encode_blas` makes, which is kept. No trouble with files
     /// is an error.
-    pub(crate) fn get_or(
+    pub(crate) fn get_or_build(
         &self,
-        key: TreeKey,
-        expected: &Expected,
+        key: BvhKey,
+        expected: &ExpectedMesh,
         build: impl FnOnce() -> BlasBlob,
     ) -> BlasBlob {
         let path = self.folder.join(format!("{:016x}{:016x}.tree", key.0[0], key.0[1]));
-        match read(&path, HEADER_BYTES as u64 + expected.most_bytes()) {
-            Ok(file) => match open(&file, expected) {
+        match read_file(&path, HEADER_BYTES as u64 + expected.max_blob_bytes()) {
+            Ok(file) => match decode_file(&file, expected) {
                 Ok(blob) => return blob,
                 Err(reason) => log::warn!("the tree '{}' is dropped: {reason}", path.display()),
             },
@@ -66,7 +66,8 @@ impl TreeCache {
             Err(error) => log::warn!("the tree '{}' cannot be read: {error}", path.display()),
         }
         let blob = build();
-        let kept = std::fs::create_dir_all(&self.folder).and_then(|()| replace(&path, &seal(&blob)));
+        let kept =
+            std::fs::create_dir_all(&self.folder).and_then(|()| replace_file(&path, &encode_file(&blob)));
         if let Err(error) = kept {
             log::warn!("the tree '{}' cannot be kept: {error}", path.display());
         }
@@ -74,7 +75,7 @@ impl TreeCache {
     }
 }
 
-fn seal(blob: &BlasBlob) -> Vec<u8> {
+fn encode_file(blob: &BlasBlob) -> Vec<u8> {
     let mut file = Vec::with_capacity(HEADER_BYTES + blob.bytes.len());
     file.extend(MAGIC);
     file.extend(VERSION.to_le_bytes());
@@ -85,7 +86,7 @@ fn seal(blob: &BlasBlob) -> Vec<u8> {
     file
 }
 
-fn open(file: &[u8], expected: &Expected) -> Result<BlasBlob, &'static str> {
+fn decode_file(file: &[u8], expected: &ExpectedMesh) -> Result<BlasBlob, &'static str> {
     let (header, bytes) = file.split_at_checked(HEADER_BYTES).ok_or("it is cut off")?;
     if header[..8] != MAGIC || header[8..12] != VERSION.to_le_bytes() {
         return Err("another version of the library wrote it");
@@ -94,8 +95,8 @@ fn open(file: &[u8], expected: &Expected) -> Result<BlasBlob, &'static str> {
     if !whole || header[24..] != fingerprint(bytes, 0).to_le_bytes() {
         return Err("it is damaged or cut off");
     }
-    let sound = validate_blob::check(bytes, expected)?;
-    Ok(BlasBlob { bytes: bytes.to_vec(), bounds: sound.bounds })
+    let validated = validate_blob::validate_blob(bytes, expected)?;
+    Ok(BlasBlob { bytes: bytes.to_vec(), bounds: validated.bounds })
 }
 
 #[cfg(test)]
@@ -107,7 +108,7 @@ mod tests {
     use crate::software_ray_query::bvh::encode_blas;
     use crate::software_ray_query::layout::LeafBox;
 
-    const QUALITY: Quality = Quality { low_memory: false, refit: false };
+    const QUALITY: BvhSettings = BvhSettings { low_memory: false, refit: false };
 
     fn mesh(count: u32) -> Mesh {
         let place = |primitive: u32| {
@@ -115,7 +116,7 @@ mod tests {
             LeafBox { low, primitive, high: low + Vec3::ONE, geometry: 0 }
         };
         Mesh {
-            primitives: Primitives::Boxes((0..count).map(place).collect()),
+            primitives: MeshPrimitives::Boxes((0..count).map(place).collect()),
             vertices: Vec::new(),
             flags: vec![GeometryFlags::empty()],
         }
@@ -124,13 +125,13 @@ mod tests {
     #[test]
     fn a_tree_is_built_once_and_again_where_its_file_is_damaged() {
         let folder = std::env::temp_dir().join(format!("lvk-trees-{}", std::process::id()));
-        let cache = TreeCache::new(&folder);
-        let (mesh, key) = (mesh(50), TreeKey::of(&mesh(50), QUALITY));
-        let built = encode_blas::build(&mesh, QUALITY);
+        let cache = BvhCache::new(&folder);
+        let (mesh, key) = (mesh(50), BvhKey::from_mesh(&mesh(50), QUALITY));
+        let built = encode_blas::encode_blas(&mesh, QUALITY);
         let mut builds = 0;
-        let expected = Expected::of_mesh(&mesh);
+        let expected = ExpectedMesh::from_mesh(&mesh);
         let mut get = || {
-            cache.get_or(key, &expected, || {
+            cache.get_or_build(key, &expected, || {
                 builds += 1;
                 built.clone()
             })
@@ -149,7 +150,7 @@ mod tests {
         circle.bytes[node + 15] = 1;
         circle.bytes[node + 16..node + 20].copy_from_slice(&[0; 4]);
         for nonsense in [BlasBlob { bytes: Vec::new(), ..built.clone() }, circle] {
-            std::fs::write(&path, seal(&nonsense)).unwrap();
+            std::fs::write(&path, encode_file(&nonsense)).unwrap();
             assert_eq!(get(), built);
             assert_eq!(get(), built);
         }
@@ -159,16 +160,16 @@ mod tests {
 
     #[test]
     fn other_contents_and_settings_have_other_keys() {
-        let small = Quality { low_memory: true, ..QUALITY };
-        let moving = Quality { refit: true, ..small };
+        let small = BvhSettings { low_memory: true, ..QUALITY };
+        let moving = BvhSettings { refit: true, ..small };
         let naming = |vertices| Mesh { vertices, ..mesh(5) };
         let keys = [
-            TreeKey::of(&mesh(5), QUALITY),
-            TreeKey::of(&mesh(6), QUALITY),
-            TreeKey::of(&mesh(5), small),
-            TreeKey::of(&mesh(5), moving),
-            TreeKey::of(&naming(vec![[0, 1, 2]; 5]), moving),
-            TreeKey::of(&naming(vec![[0, 2, 1]; 5]), moving),
+            BvhKey::from_mesh(&mesh(5), QUALITY),
+            BvhKey::from_mesh(&mesh(6), QUALITY),
+            BvhKey::from_mesh(&mesh(5), small),
+            BvhKey::from_mesh(&mesh(5), moving),
+            BvhKey::from_mesh(&naming(vec![[0, 1, 2]; 5]), moving),
+            BvhKey::from_mesh(&naming(vec![[0, 2, 1]; 5]), moving),
         ];
         for (number, key) in keys.iter().enumerate() {
             assert!(!keys[..number].contains(key), "key {number}");

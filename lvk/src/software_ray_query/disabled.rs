@@ -16,15 +16,15 @@ pub(crate) mod blas {
     pub(crate) enum SoftwareBlas {}
 
     impl SoftwareBlas {
-        pub(crate) fn moved(&self) -> Option<&Infallible> {
+        pub(crate) fn moved_storage(&self) -> Option<&Infallible> {
             match *self {}
         }
 
-        pub(crate) fn set_moved(&self) {
+        pub(crate) fn set_moved_storage(&self) {
             match *self {}
         }
 
-        pub(crate) fn is_of_cpu(&self) -> bool {
+        pub(crate) fn is_built_on_cpu(&self) -> bool {
             match *self {}
         }
 
@@ -32,7 +32,7 @@ pub(crate) mod blas {
             match *self {}
         }
 
-        pub(crate) fn first_build_scratch_bytes(&self) -> u64 {
+        pub(crate) fn initial_scratch_bytes(&self) -> u64 {
             match *self {}
         }
 
@@ -42,7 +42,7 @@ pub(crate) mod blas {
     }
 
     /// Fails: without acceleration structures of the device there are none.
-    pub(crate) fn most_sizes(name: &str, _: &[BlasGeometry], _: BuildFlags) -> Result<AccelStructSizes> {
+    pub(crate) fn max_sizes(name: &str, _: &[BlasGeometry], _: BuildFlags) -> Result<AccelStructSizes> {
         Err(missing(name))
     }
 

@@ -13,18 +13,18 @@ pub(crate) const NONE: u32 = u32::MAX;
 /// Marks a reference to a leaf.
 pub(crate) const LEAF: u32 = 1 << 31;
 /// Most primitives of a leaf that a reference names.
-pub(crate) const LARGEST_LEAF: usize = 16;
+pub(crate) const MAX_LEAF_PRIMITIVES: usize = 16;
 /// Most nodes on a path of a binary tree: the walk pushes an entry for each.
-pub(crate) const DEEPEST_BINARY: usize = 64;
+pub(crate) const MAX_BVH2_DEPTH: usize = 64;
 /// Most nodes on a path of a wide tree: the walk pushes an entry for each.
-pub(crate) const DEEPEST_WIDE: usize = 32;
+pub(crate) const MAX_BVH8_DEPTH: usize = 32;
 
-/// [`Header::format`]: nodes of eight compressed children.
-pub(crate) const WIDE: u32 = 0;
-/// [`Header::format`]: nodes of two children.
-pub(crate) const BINARY: u32 = 1;
+/// [`BlobHeader::format`]: nodes of eight compressed children.
+pub(crate) const FORMAT_BVH8: u32 = 0;
+/// [`BlobHeader::format`]: nodes of two children.
+pub(crate) const FORMAT_BVH2: u32 = 1;
 /// [`MovedHeader::format`].
-pub(crate) const MOVED: u32 = 2;
+pub(crate) const FORMAT_MOVED: u32 = 2;
 
 /// What leaves hold, by the numbers of the structure's header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,12 +44,12 @@ pub(crate) enum LeafKind {
 
 impl LeafKind {
     /// The smallest kind of triangles that name vertices of a copy of so many.
-    pub(crate) fn naming(vertices: usize) -> Self {
-        if vertices <= LeafPacked::MOST_VERTICES { Self::PackedTriangles } else { Self::IndexedTriangles }
+    pub(crate) fn with_vertex_indices(vertices: usize) -> Self {
+        if vertices <= LeafPacked::MAX_VERTICES { Self::PackedTriangles } else { Self::IndexedTriangles }
     }
 
     /// Whether leaves name vertices of a copy.
-    pub(crate) fn names_vertices(self) -> bool {
+    pub(crate) fn has_vertex_indices(self) -> bool {
         matches!(self, Self::IndexedTriangles | Self::PackedTriangles)
     }
 
@@ -68,7 +68,7 @@ impl LeafKind {
 /// The first 128 bytes of a structure.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(crate) struct Header {
+pub(crate) struct BlobHeader {
     pub(crate) format: u32,
     /// A number of [`LeafKind`].
     pub(crate) leaf_kind: u32,
@@ -83,14 +83,14 @@ pub(crate) struct Header {
     pub(crate) node_count: u32,
     pub(crate) geometry_count: u32,
     pub(crate) reserved0: u32,
-    /// [`Header::ALL_OPAQUE`], [`Header::NONE_OPAQUE`].
+    /// [`BlobHeader::ALL_OPAQUE`], [`BlobHeader::NONE_OPAQUE`].
     pub(crate) marks: u32,
     pub(crate) low: [f32; 3],
     pub(crate) high: [f32; 3],
     pub(crate) reserved: [u32; 14],
 }
 
-impl Header {
+impl BlobHeader {
     /// Every geometry is opaque.
     pub(crate) const ALL_OPAQUE: u32 = 1;
     /// No geometry is.
@@ -129,23 +129,23 @@ pub(crate) struct LeafPacked {
 }
 
 impl LeafPacked {
-    const NAME_BITS: u32 = 21;
-    const REST_BITS: u32 = u32::BITS - Self::NAME_BITS;
+    const VERTEX_BITS: u32 = 21;
+    const ID_BITS: u32 = u32::BITS - Self::VERTEX_BITS;
     /// Most vertices that its bits can name.
-    pub(crate) const MOST_VERTICES: usize = 1 << Self::NAME_BITS;
+    pub(crate) const MAX_VERTICES: usize = 1 << Self::VERTEX_BITS;
 
-    /// Of one that names less than [`MOST_VERTICES`](Self::MOST_VERTICES).
-    pub(crate) fn of(leaf: &LeafIndexed) -> Self {
+    /// Of one that names less than [`MAX_VERTICES`](Self::MAX_VERTICES).
+    pub(crate) fn encode(leaf: &LeafIndexed) -> Self {
         let [a, b, c] = leaf.vertices;
-        let names = [a | c << Self::NAME_BITS, b | c >> Self::REST_BITS << Self::NAME_BITS];
+        let names = [a | c << Self::VERTEX_BITS, b | c >> Self::ID_BITS << Self::VERTEX_BITS];
         Self { names, primitive: leaf.primitive }
     }
 
     /// What it names; as shaders read it, which take the highest bit of the third name for one of it too.
     pub(crate) fn vertices(&self) -> [u32; 3] {
         let [a, b] = self.names;
-        let name = |word| word & (Self::MOST_VERTICES as u32 - 1);
-        [name(a), name(b), a >> Self::NAME_BITS | b >> Self::NAME_BITS << Self::REST_BITS]
+        let name = |word| word & (Self::MAX_VERTICES as u32 - 1);
+        [name(a), name(b), a >> Self::VERTEX_BITS | b >> Self::VERTEX_BITS << Self::ID_BITS]
     }
 }
 
@@ -168,7 +168,7 @@ impl LeafBox {
 /// A node of two children.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(crate) struct BinaryNode {
+pub(crate) struct Bvh2NodeRecord {
     pub(crate) low0: Vec3,
     pub(crate) child0: u32,
     pub(crate) high0: Vec3,
@@ -182,7 +182,7 @@ pub(crate) struct BinaryNode {
 /// A row of the table of geometries.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
-pub(crate) struct GeometryRow {
+pub(crate) struct GeometryRecord {
     /// [`GeometryFlags`](crate::GeometryFlags).
     pub(crate) flags: u32,
     pub(crate) reserved: [u32; 3],
@@ -192,7 +192,7 @@ pub(crate) struct GeometryRow {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 pub(crate) struct MovedHeader {
-    /// [`MOVED`].
+    /// [`FORMAT_MOVED`].
     pub(crate) format: u32,
     pub(crate) leaf_kind: u32,
     /// Of the structure that is meant, which has not moved itself.
@@ -202,7 +202,7 @@ pub(crate) struct MovedHeader {
 /// An instance of a bottom-level structure.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
-pub(crate) struct Instance {
+pub(crate) struct InstanceRecord {
     /// 3 rows of 4 columns.
     pub(crate) world_to_object: [f32; 12],
     /// 3 rows of 4 columns.
@@ -219,7 +219,7 @@ pub(crate) struct Instance {
     pub(crate) reserved: [u32; 2],
 }
 
-/// The reference to `count` primitives of leaves, 1 to [`LARGEST_LEAF`].
+/// The reference to `count` primitives of leaves, 1 to [`MAX_LEAF_PRIMITIVES`].
 pub(crate) fn leaf(first: u32, count: usize) -> u32 {
     LEAF | (count as u32 - 1) << 27 | first
 }
@@ -235,7 +235,7 @@ mod tests {
         for number in 0..some.len().pow(3) {
             let vertices = [0, 1, 2].map(|corner| some[number / some.len().pow(corner) % some.len()]);
             for primitive in [0, 0x0100_0002, u32::MAX] {
-                let packed = LeafPacked::of(&LeafIndexed { vertices, primitive });
+                let packed = LeafPacked::encode(&LeafIndexed { vertices, primitive });
                 assert_eq!((packed.vertices(), packed.primitive), (vertices, primitive));
             }
         }
@@ -243,22 +243,22 @@ mod tests {
 
     #[test]
     fn leaves_are_packed_up_to_two_to_the_21_vertices() {
-        assert_eq!(LeafKind::naming(0), LeafKind::PackedTriangles);
-        assert_eq!(LeafKind::naming(1 << 21), LeafKind::PackedTriangles);
-        assert_eq!(LeafKind::naming((1 << 21) + 1), LeafKind::IndexedTriangles);
+        assert_eq!(LeafKind::with_vertex_indices(0), LeafKind::PackedTriangles);
+        assert_eq!(LeafKind::with_vertex_indices(1 << 21), LeafKind::PackedTriangles);
+        assert_eq!(LeafKind::with_vertex_indices((1 << 21) + 1), LeafKind::IndexedTriangles);
     }
 
     #[test]
     fn everything_has_the_bytes_that_shaders_read() {
-        assert_eq!(size_of::<Header>(), 128);
+        assert_eq!(size_of::<BlobHeader>(), 128);
         assert_eq!(size_of::<LeafTriangle>(), 48);
         assert_eq!(size_of::<LeafIndexed>(), 16);
         assert_eq!(size_of::<LeafPacked>(), 12);
         assert_eq!(size_of::<LeafBox>(), 32);
-        assert_eq!(size_of::<BinaryNode>(), 64);
-        assert_eq!(size_of::<GeometryRow>(), 16);
+        assert_eq!(size_of::<Bvh2NodeRecord>(), 64);
+        assert_eq!(size_of::<GeometryRecord>(), 16);
         assert_eq!(size_of::<MovedHeader>(), 16);
-        assert_eq!(size_of::<Instance>(), 128);
+        assert_eq!(size_of::<InstanceRecord>(), 128);
         assert_eq!(leaf(5, 3), 0x9000_0005);
     }
 }

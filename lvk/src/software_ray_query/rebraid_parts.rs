@@ -6,7 +6,7 @@ use crate::accel::primitive_bounds::Bounds;
 
 /// What is below one node or leaf.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Part {
+pub(crate) struct RebraidPart {
     /// The node or leaf; 0 for the whole.
     pub(crate) reference: u32,
     /// Around all of it, in the structure's own space.
@@ -17,19 +17,19 @@ pub(crate) struct Part {
 
 /// A structure that no GPU changes: the whole of it, and parts of it, each primitive in one of those of a part.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Parts {
-    pub(crate) whole: Part,
-    pub(crate) parts: Vec<Part>,
+pub(crate) struct RebraidParts {
+    pub(crate) whole: RebraidPart,
+    pub(crate) parts: Vec<RebraidPart>,
 }
 
-impl Parts {
+impl RebraidParts {
     /// A structure that is only taken whole.
-    pub(crate) fn whole(bounds: Bounds) -> Self {
-        Self { whole: Part { reference: 0, bounds, below: 0..0 }, parts: Vec::new() }
+    pub(crate) fn single(bounds: Bounds) -> Self {
+        Self { whole: RebraidPart { reference: 0, bounds, below: 0..0 }, parts: Vec::new() }
     }
 
     /// The parts of a part.
-    pub(crate) fn below(&self, part: &Part) -> &[Part] {
+    pub(crate) fn children_of(&self, part: &RebraidPart) -> &[RebraidPart] {
         self.parts.get(part.below.start as usize..part.below.end as usize).unwrap_or_default()
     }
 }

@@ -8,13 +8,13 @@ use crate::gpu::Gpu;
 use crate::resource::Buffer;
 
 /// The memory of a structure of either level.
-pub(crate) struct SoftwareBody {
+pub(crate) struct SoftwareAccelStorage {
     storage: StorageRange,
     /// What instances, or the table of top-level structures, refer to.
     pub(crate) address: u64,
 }
 
-impl SoftwareBody {
+impl SoftwareAccelStorage {
     /// Room for `bytes`; nothing is built yet.
     pub(crate) fn new(gpu: &Arc<Gpu>, storage: &AccelStorage, name: &str, bytes: u64) -> Result<Self> {
         let storage = storage.alloc(gpu, name, bytes)?;

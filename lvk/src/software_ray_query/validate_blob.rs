@@ -5,27 +5,27 @@ use std::ops::Range;
 
 use super::bvh::bvh2;
 use super::bvh::bvh8;
-use super::bvh::primitives::{Mesh, Primitives};
+use super::bvh::primitives::{Mesh, MeshPrimitives};
 use crate::accel::desc::BlasDesc;
 use crate::accel::geometry::BlasGeometry;
 use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::layout::LeafKind;
 use crate::software_ray_query::layout::{
-    BINARY, BLOCK_BYTES, BinaryNode, Header, LeafBox, LeafIndexed, LeafPacked, NONE, WIDE,
+    BLOCK_BYTES, BlobHeader, Bvh2NodeRecord, FORMAT_BVH2, FORMAT_BVH8, LeafBox, LeafIndexed, LeafPacked, NONE,
 };
 
 /// What a structure is to be of.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Expected {
+pub(crate) struct ExpectedMesh {
     /// Boxes, or triangles.
-    pub(crate) boxes: bool,
+    pub(crate) is_aabbs: bool,
     /// Primitives of each geometry.
     pub(crate) counts: Vec<u32>,
 }
 
-impl Expected {
+impl ExpectedMesh {
     /// What a build of this mesh is of.
-    pub(crate) fn of_mesh(mesh: &Mesh) -> Self {
+    pub(crate) fn from_mesh(mesh: &Mesh) -> Self {
         let mut counts = vec![0; mesh.flags.len()];
         let mut add = |geometry: u32, primitive: u32| {
             if let Some(count) = counts.get_mut(geometry as usize) {
@@ -33,59 +33,60 @@ impl Expected {
             }
         };
         let boxes = match &mesh.primitives {
-            Primitives::Triangles(all) => {
+            MeshPrimitives::Triangles(all) => {
                 all.iter().for_each(|of| add(of.geometry, of.primitive));
                 false
             }
-            Primitives::Boxes(all) => {
+            MeshPrimitives::Boxes(all) => {
                 all.iter().for_each(|of| add(of.geometry & !LeafBox::OPAQUE, of.primitive));
                 true
             }
         };
-        Self { boxes, counts }
+        Self { is_aabbs: boxes, counts }
     }
 
     /// What a structure of this description is of.
-    pub(crate) fn of_desc(desc: &BlasDesc<'_>) -> Self {
+    pub(crate) fn from_desc(desc: &BlasDesc<'_>) -> Self {
         Self {
-            boxes: desc.geometries.first().is_some_and(BlasGeometry::is_boxes),
+            is_aabbs: desc.geometries.first().is_some_and(BlasGeometry::is_aabbs),
             counts: desc.geometries.iter().map(BlasGeometry::primitive_count).collect(),
         }
     }
 
     /// More bytes than it has.
-    pub(crate) fn most_bytes(&self) -> u64 {
+    pub(crate) fn max_blob_bytes(&self) -> u64 {
         /// A node of eight children, a leaf and three vertices, or a geometry.
-        const EACH: u64 = 256;
+        const MAX_BYTES_PER_PRIMITIVE: u64 = 256;
         let primitives: u64 = self.counts.iter().map(|count| u64::from(*count)).sum();
-        (primitives + self.counts.len() as u64 + 16) * EACH
+        (primitives + self.counts.len() as u64 + 16) * MAX_BYTES_PER_PRIMITIVE
     }
 }
 
 /// What a sound structure says of itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Sound {
-    pub(crate) header: Header,
+pub(crate) struct ValidatedBlob {
+    pub(crate) header: BlobHeader,
     pub(crate) bounds: Bounds,
 }
 
 /// Checks a bottom-level structure; answers what is wrong with it.
-pub(crate) fn check(bytes: &[u8], expected: &Expected) -> Result<Sound, &'static str> {
-    let head = bytes.get(..size_of::<Header>()).ok_or("its header is cut off")?;
-    let header: Header = bytemuck::pod_read_unaligned(head);
+pub(crate) fn validate_blob(bytes: &[u8], expected: &ExpectedMesh) -> Result<ValidatedBlob, &'static str> {
+    let head = bytes.get(..size_of::<BlobHeader>()).ok_or("its header is cut off")?;
+    let header: BlobHeader = bytemuck::pod_read_unaligned(head);
     let kind = leaf_kind(&header).ok_or("its leaves are of no known kind")?;
-    if (kind == LeafKind::Boxes) != expected.boxes || header.geometry_count as usize != expected.counts.len()
+    if (kind == LeafKind::Boxes) != expected.is_aabbs
+        || header.geometry_count as usize != expected.counts.len()
     {
         return Err("it is of other geometries");
     }
-    let parts = Parts::new(bytes, &header, kind).ok_or("parts of it are cut off")?;
-    if !parts.lie_apart() {
+    let parts = BlobSections::new(bytes, &header, kind).ok_or("parts of it are cut off")?;
+    if !parts.ranges_disjoint() {
         return Err("parts of it lie over each other");
     }
-    if !tree_is_sound(&parts, &header) {
+    if !is_tree_valid(&parts, &header) {
         return Err("its tree is damaged");
     }
-    if !parts.leaves().all(|leaf| names_primitive(leaf, kind, &expected.counts)) {
+    if !parts.leaves().all(|leaf| is_leaf_primitive_valid(leaf, kind, &expected.counts)) {
         return Err("its leaves name primitives that are not there");
     }
     let bounds = Bounds { low: header.low.into(), high: header.high.into() };
@@ -94,17 +95,17 @@ pub(crate) fn check(bytes: &[u8], expected: &Expected) -> Result<Sound, &'static
     if !is_box && !is_empty {
         return Err("it has no bounds");
     }
-    Ok(Sound { header, bounds })
+    Ok(ValidatedBlob { header, bounds })
 }
 
-fn leaf_kind(header: &Header) -> Option<LeafKind> {
+fn leaf_kind(header: &BlobHeader) -> Option<LeafKind> {
     use LeafKind::{Boxes, IndexedTriangles, PackedTriangles, Triangles};
     let kinds = [Triangles, IndexedTriangles, PackedTriangles, Boxes];
     kinds.into_iter().find(|kind| *kind as u32 == header.leaf_kind)
 }
 
 /// The parts of a structure, all of them within its bytes.
-struct Parts<'a> {
+struct BlobSections<'a> {
     bytes: &'a [u8],
     leaf_bytes: usize,
     nodes: Range<usize>,
@@ -113,28 +114,28 @@ struct Parts<'a> {
     geometries: Range<usize>,
 }
 
-impl<'a> Parts<'a> {
-    fn new(bytes: &'a [u8], header: &Header, kind: LeafKind) -> Option<Self> {
+impl<'a> BlobSections<'a> {
+    fn new(bytes: &'a [u8], header: &BlobHeader, kind: LeafKind) -> Option<Self> {
         const VERTEX_BYTES: usize = 12;
         let leaf_bytes = kind.primitive_bytes() as usize;
-        let leaves = part(bytes, header.primitives, header.primitive_count as usize, leaf_bytes)?;
-        let vertices = vertices_named(&bytes[leaves.clone()], kind);
+        let leaves = section_range(bytes, header.primitives, header.primitive_count as usize, leaf_bytes)?;
+        let vertices = named_vertex_count(&bytes[leaves.clone()], kind);
         let nodes = header.node_count as usize;
         Some(Self {
             bytes,
             leaf_bytes,
-            nodes: part(bytes, header.nodes, nodes, node_bytes(header)?)?,
+            nodes: section_range(bytes, header.nodes, nodes, node_bytes(header)?)?,
             leaves,
-            vertices: part(bytes, header.vertices, vertices, VERTEX_BYTES)?,
-            geometries: part(bytes, header.geometries, header.geometry_count as usize, BLOCK_BYTES)?,
+            vertices: section_range(bytes, header.vertices, vertices, VERTEX_BYTES)?,
+            geometries: section_range(bytes, header.geometries, header.geometry_count as usize, BLOCK_BYTES)?,
         })
     }
 
     /// Refits write to one part what they must not find in another.
-    fn lie_apart(&self) -> bool {
+    fn ranges_disjoint(&self) -> bool {
         let mut parts = [&self.nodes, &self.leaves, &self.vertices, &self.geometries];
         parts.sort_by_key(|part| (part.start, part.end));
-        let mut free = size_of::<Header>();
+        let mut free = size_of::<BlobHeader>();
         parts.into_iter().filter(|part| !part.is_empty()).all(|part| {
             let apart = part.start >= free;
             free = part.end;
@@ -153,36 +154,36 @@ impl<'a> Parts<'a> {
 }
 
 /// Whether every path from the root ends in leaves that exist, none is too long and no two meet.
-fn tree_is_sound(parts: &Parts<'_>, header: &Header) -> bool {
+fn is_tree_valid(parts: &BlobSections<'_>, header: &BlobHeader) -> bool {
     let primitives = header.primitive_count as usize;
     match (header.root, header.node_count) {
         (NONE, 0) => primitives == 0,
-        (root, 0) => bvh2::names_primitives(root, primitives),
-        (0, _) if header.format == WIDE => bvh8::is_sound(&parts.nodes(), primitives),
-        (0, _) => bvh2::is_sound(&parts.nodes(), primitives),
+        (root, 0) => bvh2::is_valid_leaf(root, primitives),
+        (0, _) if header.format == FORMAT_BVH8 => bvh8::is_valid_bvh8(&parts.nodes(), primitives),
+        (0, _) => bvh2::is_valid_bvh2(&parts.nodes(), primitives),
         _ => false,
     }
 }
 
 /// Bytes of a node; none for formats that do not exist, and for what has moved to another address.
-fn node_bytes(header: &Header) -> Option<usize> {
+fn node_bytes(header: &BlobHeader) -> Option<usize> {
     const WIDE_BYTES: usize = 80;
     match header.format {
-        WIDE => Some(WIDE_BYTES),
-        BINARY => Some(size_of::<BinaryNode>()),
+        FORMAT_BVH8 => Some(WIDE_BYTES),
+        FORMAT_BVH2 => Some(size_of::<Bvh2NodeRecord>()),
         _ => None,
     }
 }
 
 /// Vertices up to the last that leaves name.
-fn vertices_named(leaves: &[u8], kind: LeafKind) -> usize {
-    let names = |leaf| names(leaf, kind).into_iter().flatten();
+fn named_vertex_count(leaves: &[u8], kind: LeafKind) -> usize {
+    let names = |leaf| leaf_vertices(leaf, kind).into_iter().flatten();
     let all = leaves.chunks_exact(kind.primitive_bytes() as usize).flat_map(names);
     all.max().map_or(0, |last| last as usize + 1)
 }
 
 /// The vertices that a leaf names, if it does.
-fn names(leaf: &[u8], kind: LeafKind) -> Option<[u32; 3]> {
+fn leaf_vertices(leaf: &[u8], kind: LeafKind) -> Option<[u32; 3]> {
     match kind {
         LeafKind::IndexedTriangles => Some(bytemuck::pod_read_unaligned::<LeafIndexed>(leaf).vertices),
         LeafKind::PackedTriangles => Some(bytemuck::pod_read_unaligned::<LeafPacked>(leaf).vertices()),
@@ -191,7 +192,7 @@ fn names(leaf: &[u8], kind: LeafKind) -> Option<[u32; 3]> {
 }
 
 /// Whether a leaf's primitive is one of the geometries'.
-fn names_primitive(leaf: &[u8], kind: LeafKind, counts: &[u32]) -> bool {
+fn is_leaf_primitive_valid(leaf: &[u8], kind: LeafKind, counts: &[u32]) -> bool {
     let word = |at: usize| leaf.get(at..at + 4).map_or(NONE, bytemuck::pod_read_unaligned);
     let shared = |word: u32| if counts.len() > 1 { (word >> 24, word & 0x00ff_ffff) } else { (0, word) };
     let (geometry, primitive) = match kind {
@@ -204,7 +205,7 @@ fn names_primitive(leaf: &[u8], kind: LeafKind, counts: &[u32]) -> bool {
 }
 
 /// Where `count` elements of `size` bytes lie that begin at a place in blocks.
-fn part(bytes: &[u8], place: u32, count: usize, size: usize) -> Option<Range<usize>> {
+fn section_range(bytes: &[u8], place: u32, count: usize, size: usize) -> Option<Range<usize>> {
     if count == 0 {
         return Some(0..0);
     }
@@ -221,12 +222,12 @@ mod tests {
     use super::*;
     use crate::accel::geometry::GeometryFlags;
     use crate::software_ray_query::bvh::encode_blas;
-    use crate::software_ray_query::bvh::settings::Quality;
-    use crate::software_ray_query::layout::{LEAF, LeafTriangle, MOVED, leaf};
+    use crate::software_ray_query::bvh::settings::BvhSettings;
+    use crate::software_ray_query::layout::{FORMAT_MOVED, LEAF, LeafTriangle, leaf};
 
-    const SMALL: Quality = Quality { low_memory: true, refit: false };
-    const MOVING: Quality = Quality { low_memory: false, refit: true };
-    const SMALL_MOVING: Quality = Quality { low_memory: true, refit: true };
+    const SMALL: BvhSettings = BvhSettings { low_memory: true, refit: false };
+    const MOVING: BvhSettings = BvhSettings { low_memory: false, refit: true };
+    const SMALL_MOVING: BvhSettings = BvhSettings { low_memory: true, refit: true };
 
     /// A closed strip through these corners, as triangles of two geometries in turn.
     fn mesh(corners: &[[f32; 3]]) -> Mesh {
@@ -238,12 +239,16 @@ mod tests {
             LeafTriangle { a, primitive: number / 2, b, geometry: number % 2, c, opaque: 1 }
         };
         let triangles = (0..).zip(&vertices).map(triangle).collect();
-        Mesh { primitives: Primitives::Triangles(triangles), vertices, flags: vec![GeometryFlags::OPAQUE; 2] }
+        Mesh {
+            primitives: MeshPrimitives::Triangles(triangles),
+            vertices,
+            flags: vec![GeometryFlags::OPAQUE; 2],
+        }
     }
 
     /// With the vertices that a build of this quality is told.
-    fn told(mesh: &Mesh, quality: Quality) -> Mesh {
-        let vertices = if quality.shares_as_given() { mesh.vertices.clone() } else { Vec::new() };
+    fn primitive_ids(mesh: &Mesh, quality: BvhSettings) -> Mesh {
+        let vertices = if quality.keeps_given_vertices() { mesh.vertices.clone() } else { Vec::new() };
         Mesh { vertices, ..mesh.clone() }
     }
 
@@ -252,7 +257,7 @@ mod tests {
             let low = Vec3::splat(primitive as f32);
             LeafBox { low, primitive, high: low + Vec3::ONE, geometry: LeafBox::OPAQUE }
         };
-        let primitives = Primitives::Boxes((0..count).map(place).collect());
+        let primitives = MeshPrimitives::Boxes((0..count).map(place).collect());
         Mesh { primitives, vertices: Vec::new(), flags: vec![GeometryFlags::OPAQUE] }
     }
 
@@ -266,33 +271,38 @@ mod tests {
     }
 
     /// A sound structure of binary nodes.
-    fn built_binary(mesh: &Mesh, quality: Quality) -> (Vec<u8>, Expected) {
+    fn built_binary(mesh: &Mesh, quality: BvhSettings) -> (Vec<u8>, ExpectedMesh) {
         let bounds = mesh.bounds();
         let whole = bounds.iter().fold(Bounds::EMPTY, |all, one| all.union(*one));
-        let bytes = encode_blas::pack(&told(mesh, quality), &bvh2::build(&bounds, 3), quality, whole);
-        let expected = Expected::of_mesh(mesh);
-        check(&bytes, &expected).unwrap();
+        let bytes = encode_blas::encode_bvh(
+            &primitive_ids(mesh, quality),
+            &bvh2::build_bvh2(&bounds, 3),
+            quality,
+            whole,
+        );
+        let expected = ExpectedMesh::from_mesh(mesh);
+        validate_blob(&bytes, &expected).unwrap();
         (bytes, expected)
     }
 
-    fn quality() -> impl Strategy<Value = Quality> {
-        any::<[bool; 2]>().prop_map(|[low_memory, refit]| Quality { low_memory, refit })
+    fn quality() -> impl Strategy<Value = BvhSettings> {
+        any::<[bool; 2]>().prop_map(|[low_memory, refit]| BvhSettings { low_memory, refit })
     }
 
     /// A sound structure with what it is to be of.
-    fn built(mesh: &Mesh, quality: Quality) -> (Vec<u8>, Expected) {
-        let blob = encode_blas::build(&told(mesh, quality), quality);
-        let expected = Expected::of_mesh(mesh);
-        check(&blob.bytes, &expected).unwrap();
+    fn built(mesh: &Mesh, quality: BvhSettings) -> (Vec<u8>, ExpectedMesh) {
+        let blob = encode_blas::encode_blas(&primitive_ids(mesh, quality), quality);
+        let expected = ExpectedMesh::from_mesh(mesh);
+        validate_blob(&blob.bytes, &expected).unwrap();
         (blob.bytes, expected)
     }
 
     /// The same structure with leaves that have a word for each vertex.
-    fn unpacked((mut bytes, expected): (Vec<u8>, Expected)) -> (Vec<u8>, Expected) {
+    fn unpacked((mut bytes, expected): (Vec<u8>, ExpectedMesh)) -> (Vec<u8>, ExpectedMesh) {
         let mut changed = header(&bytes);
-        let packed = part(&bytes, changed.primitives, changed.primitive_count as usize, 12).unwrap();
+        let packed = section_range(&bytes, changed.primitives, changed.primitive_count as usize, 12).unwrap();
         let leaf = |leaf: &[u8]| {
-            let [a, b, c] = names(leaf, LeafKind::PackedTriangles).unwrap();
+            let [a, b, c] = leaf_vertices(leaf, LeafKind::PackedTriangles).unwrap();
             [a, b, c, bytemuck::pod_read_unaligned(&leaf[8..])]
         };
         let leaves: Vec<[u32; 4]> = bytes[packed].chunks_exact(12).map(leaf).collect();
@@ -300,47 +310,51 @@ mod tests {
         changed.leaf_kind = LeafKind::IndexedTriangles as u32;
         changed.primitives = (bytes.len() / BLOCK_BYTES) as u32;
         bytes.extend_from_slice(bytemuck::cast_slice(&leaves));
-        bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&changed));
-        check(&bytes, &expected).unwrap();
+        bytes[..size_of::<BlobHeader>()].copy_from_slice(bytemuck::bytes_of(&changed));
+        validate_blob(&bytes, &expected).unwrap();
         (bytes, expected)
     }
 
-    fn header(bytes: &[u8]) -> Header {
-        bytemuck::pod_read_unaligned(&bytes[..size_of::<Header>()])
+    fn header(bytes: &[u8]) -> BlobHeader {
+        bytemuck::pod_read_unaligned(&bytes[..size_of::<BlobHeader>()])
     }
 
-    fn refused(mut bytes: Vec<u8>, expected: &Expected, change: impl FnOnce(&mut Header)) -> &'static str {
+    fn refused(
+        mut bytes: Vec<u8>,
+        expected: &ExpectedMesh,
+        change: impl FnOnce(&mut BlobHeader),
+    ) -> &'static str {
         let mut changed = header(&bytes);
         change(&mut changed);
-        bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&changed));
-        check(&bytes, expected).unwrap_err()
+        bytes[..size_of::<BlobHeader>()].copy_from_slice(bytemuck::bytes_of(&changed));
+        validate_blob(&bytes, expected).unwrap_err()
     }
 
     /// As [`refused`], with a word of the part at a place in blocks.
     fn refused_word(
         mut bytes: Vec<u8>,
-        expected: &Expected,
+        expected: &ExpectedMesh,
         place: u32,
         word: usize,
         value: u32,
     ) -> &'static str {
         let at = place as usize * BLOCK_BYTES + word * 4;
         bytes[at..at + 4].copy_from_slice(&value.to_le_bytes());
-        check(&bytes, expected).unwrap_err()
+        validate_blob(&bytes, expected).unwrap_err()
     }
 
     /// Walks every path as shaders do, from the root and from every part that may be shown alone, but fails where these would read
     /// anything else.
-    fn walk(bytes: &[u8]) -> usize {
+    fn traverse(bytes: &[u8]) -> usize {
         let bounds = Bounds { low: Vec3::splat(-9.0), high: Vec3::splat(9.0) };
         let blob = encode_blas::BlasBlob { bytes: bytes.to_vec(), bounds };
-        for part in &crate::software_ray_query::bvh::subtrees::parts(&blob).parts {
-            walk_from(bytes, part.reference);
+        for part in &crate::software_ray_query::bvh::subtrees::subtree_parts(&blob).parts {
+            traverse_from(bytes, part.reference);
         }
-        walk_from(bytes, header(bytes).root)
+        traverse_from(bytes, header(bytes).root)
     }
 
-    fn walk_from(bytes: &[u8], start: u32) -> usize {
+    fn traverse_from(bytes: &[u8], start: u32) -> usize {
         let header = header(bytes);
         let word = |place: u32, word: usize| -> u32 {
             let at = place as usize * BLOCK_BYTES + word * 4;
@@ -351,7 +365,7 @@ mod tests {
                 let kind = leaf_kind(&header).unwrap();
                 let size = kind.primitive_bytes() as usize;
                 let at = header.primitives as usize * BLOCK_BYTES + number * size;
-                for vertex in names(&bytes[at..at + size], kind).into_iter().flatten() {
+                for vertex in leaf_vertices(&bytes[at..at + size], kind).into_iter().flatten() {
                     word(header.vertices, vertex as usize * 3 + 2);
                 }
             }
@@ -363,7 +377,7 @@ mod tests {
             match reference {
                 NONE => {}
                 _ if reference & LEAF != 0 => visit(reference & 0x07ff_ffff, (reference >> 27 & 15) + 1),
-                _ if header.format == BINARY => {
+                _ if header.format == FORMAT_BVH2 => {
                     let node = reference as usize * 16;
                     open.extend([3, 7].map(|child| (word(header.nodes, node + child), pushed + 1)));
                 }
@@ -393,14 +407,14 @@ mod tests {
             let header = header(&bytes);
             prop_assert_eq!(header.primitive_count as usize, corners.len());
             let kind = leaf_kind(&header).unwrap();
-            let parts = Parts::new(&bytes, &header, kind).unwrap();
+            let parts = BlobSections::new(&bytes, &header, kind).unwrap();
             let mut numbers: Vec<(u32, u32)> = parts.leaves().map(|leaf| {
                 let word = |at: usize| -> u32 { bytemuck::pod_read_unaligned(&leaf[at..at + 4]) };
                 if kind == LeafKind::Triangles { (word(28), word(12)) } else { (word(8) >> 24, word(8) & 0xff_ffff) }
             }).collect();
             numbers.sort_unstable_by_key(|(geometry, primitive)| (*primitive, *geometry));
             prop_assert!(numbers.into_iter().eq((0..corners.len() as u32).map(|number| (number % 2, number / 2))));
-            walk(&bytes);
+            traverse(&bytes);
         }
 
         /// As large and as small as numbers are that builds take, many of them in one place.
@@ -412,9 +426,9 @@ mod tests {
             quality in quality(),
         ) {
             let (bytes, _) = built(&mesh(&corners), quality);
-            walk(&bytes);
+            traverse(&bytes);
             let (bytes, _) = built_binary(&mesh(&corners), quality);
-            walk(&bytes);
+            traverse(&bytes);
         }
 
         /// With every length cut off, and words that are wrong by little, by much, or those of others.
@@ -435,7 +449,7 @@ mod tests {
                 (bytes, _) = unpacked((bytes, expected.clone()));
             }
             for (place, value, from) in changes {
-                let words = if in_header { size_of::<Header>() / 4 } else { bytes.len() / 4 };
+                let words = if in_header { size_of::<BlobHeader>() / 4 } else { bytes.len() / 4 };
                 let (at, from) = (place.index(words) * 4, from.index(bytes.len() / 4) * 4);
                 let other: [u8; 4] = bytes[from..from + 4].try_into().unwrap();
                 bytes[at..at + 4].copy_from_slice(&value.map_or(other, u32::to_le_bytes));
@@ -443,8 +457,8 @@ mod tests {
             if let Some(cut) = cut {
                 bytes.truncate(cut.index(bytes.len()));
             }
-            if check(&bytes, &expected).is_ok() {
-                walk(&bytes);
+            if validate_blob(&bytes, &expected).is_ok() {
+                traverse(&bytes);
             }
         }
     }
@@ -457,8 +471,8 @@ mod tests {
         for bit in nodes * 8..(nodes + header.node_count as usize * 80) * 8 {
             let mut damaged = bytes.clone();
             damaged[bit / 8] ^= 1 << (bit % 8);
-            if check(&damaged, &expected).is_ok() {
-                walk(&damaged);
+            if validate_blob(&damaged, &expected).is_ok() {
+                traverse(&damaged);
             }
         }
     }
@@ -482,8 +496,8 @@ mod tests {
             (built(&boxes(50), MOVING), MOVING),
         ];
         for ((bytes, expected), quality) in structures {
-            let refuses = |change: fn(&mut Header)| refused(bytes.clone(), &expected, change);
-            refuses(|header| header.format = MOVED);
+            let refuses = |change: fn(&mut BlobHeader)| refused(bytes.clone(), &expected, change);
+            refuses(|header| header.format = FORMAT_MOVED);
             refuses(|header| header.leaf_kind = LeafKind::Instances as u32);
             refuses(|header| header.leaf_kind = 77);
             refuses(|header| header.root = 1);
@@ -512,8 +526,8 @@ mod tests {
     #[test]
     fn a_leaf_that_says_it_has_moved_is_refused() {
         let (bytes, expected) = built(&row(2), MOVING);
-        let refuses = |change: fn(&mut Header)| refused(bytes.clone(), &expected, change);
-        refuses(|header| header.format = MOVED);
+        let refuses = |change: fn(&mut BlobHeader)| refused(bytes.clone(), &expected, change);
+        refuses(|header| header.format = FORMAT_MOVED);
         refuses(|header| header.node_count = 1);
         refuses(|header| header.node_count = u32::MAX);
         refuses(|header| header.root = leaf(1, 2));
@@ -525,7 +539,7 @@ mod tests {
     fn circles_and_paths_that_meet_are_refused() {
         let (wide, expected) = built(&row(200), MOVING);
         let at = header(&wide);
-        assert_eq!(at.format, WIDE);
+        assert_eq!(at.format, FORMAT_BVH8);
         let nodes = [0, 1, at.node_count - 1, at.node_count, u32::MAX];
         let first =
             |node: u32, value| refused_word(wide.clone(), &expected, at.nodes, node as usize * 20 + 4, value);
@@ -579,10 +593,10 @@ mod tests {
     #[test]
     fn other_meshes_are_refused() {
         let (bytes, expected) = built(&row(200), MOVING);
-        let refuses = |expected: Expected| check(&bytes, &expected).unwrap_err();
-        refuses(Expected { boxes: true, ..expected.clone() });
-        refuses(Expected { counts: vec![200], ..expected.clone() });
-        refuses(Expected { counts: vec![100, 99], ..expected.clone() });
-        refuses(Expected { counts: vec![100, 100, 0], ..expected.clone() });
+        let refuses = |expected: ExpectedMesh| validate_blob(&bytes, &expected).unwrap_err();
+        refuses(ExpectedMesh { is_aabbs: true, ..expected.clone() });
+        refuses(ExpectedMesh { counts: vec![200], ..expected.clone() });
+        refuses(ExpectedMesh { counts: vec![100, 99], ..expected.clone() });
+        refuses(ExpectedMesh { counts: vec![100, 100, 0], ..expected.clone() });
     }
 }

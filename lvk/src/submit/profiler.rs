@@ -9,8 +9,8 @@ use ash::vk;
 use super::scope_tree::{GpuProfile, Stamps, scope_tree};
 use crate::error::Result;
 use crate::gpu::Gpu;
-use crate::gpu::caps::queues::Queue;
 use crate::lock_order::{Guard, Mutex, Rank};
+use crate::queue::Queue;
 use crate::resource::QueryPool;
 use crate::resource::query_pool::QueryPoolDesc;
 

@@ -16,8 +16,8 @@ use super::timeline::Timeline;
 use crate::barrier::{IdMap, Layout, ResourceId, Stages, TextureShape, Tracker};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::caps::queues::Queue;
 use crate::lock_order::{Guard, Mutex, Rank};
+use crate::queue::Queue;
 
 /// What goes to a queue at once.
 #[derive(Default)]

@@ -8,7 +8,7 @@ use super::queue_sync::{QueueCaps, QueueSync, SubmitRequest};
 use super::queue_sync_model::{History, SubmittedWork as Logged, external_stages, weaker};
 use crate::barrier::model::{Cell, Command, ModelEvent, Op};
 use crate::barrier::{Barriers, Layout, ResourceId, Stages, Subresources, TextureShape, Tracker, Use};
-use crate::gpu::caps::queues::Queue;
+use crate::queue::Queue;
 
 const ONE: TextureShape = TextureShape { mips: 1, layers: 1 };
 /// Two buffers, one that is written side by side, and three textures. Of these the last two belong to one domain at a time.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use crate::format::Format;
-use crate::gpu::window::WindowHandles;
+use crate::gpu::start::window::WindowHandles;
 use crate::handle::{SwapchainHandle, TextureHandle};
 use crate::resource::texture_desc::TextureUsage;
 

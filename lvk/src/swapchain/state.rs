@@ -12,7 +12,7 @@ use super::surface::Surface;
 use crate::barrier::ResourceId;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::window::WindowHandles;
+use crate::gpu::start::window::WindowHandles;
 use crate::handle::TextureHandle;
 use crate::lock_order::{Guard, Mutex, Rank};
 use crate::resource::Texture;

@@ -8,7 +8,8 @@ use super::choose::{Failure, SurfaceLimits};
 use super::desc::PresentMode;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
-use crate::gpu::window::{WindowFunctions, WindowHandles, create_surface};
+use crate::gpu::start::surface::{WindowFunctions, create_surface};
+use crate::gpu::start::window::WindowHandles;
 
 /// A surface, destroyed on drop. It keeps its window.
 pub(crate) struct Surface {

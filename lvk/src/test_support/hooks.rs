@@ -20,11 +20,11 @@ pub fn silent_context(desc: &ContextDesc<'_>) -> Result<Context> {
 }
 
 /// The context that `make` makes and uses on this thread can have submissions fail.
-pub fn fallibly<T>(make: impl FnOnce() -> T) -> T {
+pub fn with_fault_injection<T>(make: impl FnOnce() -> T) -> T {
     fault_injection::with_failing_queues(make)
 }
 
-/// After so many submissions to queues, one that this thread makes of a context made [`fallibly`] is refused.
+/// After so many submissions to queues, one that this thread makes of a context made [`with_fault_injection`] is refused.
 pub fn fail_submission_after(submissions: u32) {
     fault_injection::fail_after(submissions);
 }
@@ -37,26 +37,26 @@ pub fn before_next_command_buffer(deed: impl FnOnce() + 'static) {
 
 /// How many submissions there were.
 pub fn submissions(ctx: &Context) -> u64 {
-    ctx.shared().submitter.value_count()
+    ctx.device_state().submitter.value_count()
 }
 
 /// Bytes of the staging memory there is.
 pub fn staging_bytes(ctx: &Context) -> u64 {
-    ctx.shared().staging.total_bytes()
+    ctx.device_state().staging.total_bytes()
 }
 
 /// Objects that wait to be destroyed.
 pub fn waiting_objects(ctx: &Context) -> Result<usize> {
-    ctx.shared().collect()?;
-    Ok(ctx.shared().submitter.deferred_count())
+    ctx.device_state().collect()?;
+    Ok(ctx.device_state().submitter.deferred_count())
 }
 
 /// Compiles every kernel, after telling its name.
 pub fn compile_kernels(ctx: &Context, tell: &mut dyn FnMut(&str)) -> Result<()> {
-    let shared = ctx.shared();
+    let shared = ctx.device_state();
     for kernel in Kernel::ALL {
         tell(kernel.name());
-        shared.kernels.get(&shared.gpu, &shared.layout, shared.pipeline_base().cache, *kernel)?;
+        shared.kernels.pipeline_of(&shared.gpu, &shared.layout, shared.pipeline_base().cache, *kernel)?;
     }
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 /// Neighbouring bytes of a buffer, from neighbouring bytes of one page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Piece {
+pub(crate) struct CopyRegion {
     /// Where in the buffer, in bytes.
     pub(crate) target: u64,
     pub(crate) bytes: u64,
@@ -14,45 +14,45 @@ pub(crate) struct Piece {
     pub(crate) source: u64,
 }
 
-impl Piece {
+impl CopyRegion {
     fn end(&self) -> u64 {
         self.target + self.bytes
     }
 
     /// What of the piece begins at `start`, which lies inside of it.
-    fn from(self, start: u64) -> Self {
+    fn starting_at(self, start: u64) -> Self {
         let cut = start - self.target;
         Self { target: start, bytes: self.bytes - cut, source: self.source + cut, ..self }
     }
 
     /// Whether `next` goes on where this ends, on both sides.
-    fn joins(&self, next: &Self) -> bool {
+    fn is_continued_by(&self, next: &Self) -> bool {
         self.end() == next.target && self.page == next.page && self.source + self.bytes == next.source
     }
 }
 
 /// Pieces of one buffer, none over another, in the order of their targets.
 #[derive(Debug, Default)]
-pub(crate) struct Pieces {
-    by_target: BTreeMap<u64, Piece>,
+pub(crate) struct CopyRegions {
+    by_target: BTreeMap<u64, CopyRegion>,
 }
 
-impl Pieces {
+impl CopyRegions {
     /// Writes over what was written before.
-    pub(crate) fn write(&mut self, new: Piece) {
+    pub(crate) fn add(&mut self, new: CopyRegion) {
         if new.bytes == 0 {
             return;
         }
-        self.cut(new.target, new.end());
+        self.remove_range(new.target, new.end());
         let before = self.by_target.range_mut(..new.target).next_back();
         match before {
-            Some((_, before)) if before.joins(&new) => before.bytes += new.bytes,
+            Some((_, before)) if before.is_continued_by(&new) => before.bytes += new.bytes,
             _ => drop(self.by_target.insert(new.target, new)),
         }
     }
 
     /// Takes `start..end` out of every piece.
-    fn cut(&mut self, start: u64, end: u64) {
+    fn remove_range(&mut self, start: u64, end: u64) {
         let before = self.by_target.range_mut(..start).next_back();
         if let Some((_, before)) = before
             && before.end() > start
@@ -60,20 +60,20 @@ impl Pieces {
             let whole = *before;
             before.bytes = start - before.target;
             if whole.end() > end {
-                self.by_target.insert(end, whole.from(end));
+                self.by_target.insert(end, whole.starting_at(end));
             }
         }
         while let Some((&at, _)) = self.by_target.range(start..end).next() {
             if let Some(old) = self.by_target.remove(&at)
                 && old.end() > end
             {
-                self.by_target.insert(end, old.from(end));
+                self.by_target.insert(end, old.starting_at(end));
             }
         }
     }
 
     /// The pieces, those of one page together.
-    pub(crate) fn by_page(&self) -> Vec<Piece> {
+    pub(crate) fn split_by_page(&self) -> Vec<CopyRegion> {
         let mut pieces: Vec<_> = self.by_target.values().copied().collect();
         pieces.sort_by_key(|piece| piece.page);
         pieces
@@ -92,19 +92,19 @@ mod tests {
         fn every_byte_comes_from_the_last_write(
             writes in prop::collection::vec((0..60_u64, 0..25_u64, 0..3_usize, 0..4_u64), 0..40)
         ) {
-            let mut pieces = Pieces::default();
+            let mut pieces = CopyRegions::default();
             let mut expected: Vec<Option<(usize, u64)>> = vec![None; 100];
             let mut used = [0_u64; 3];
             for (target, bytes, page, gap) in writes {
                 let source = used[page] + gap;
                 used[page] = source + bytes;
-                pieces.write(Piece { target, bytes, page, source });
+                pieces.add(CopyRegion { target, bytes, page, source });
                 for byte in 0..bytes {
                     expected[(target + byte) as usize] = Some((page, source + byte));
                 }
             }
             let mut found: Vec<Option<(usize, u64)>> = vec![None; 100];
-            for piece in pieces.by_page() {
+            for piece in pieces.split_by_page() {
                 prop_assert!(piece.bytes > 0);
                 for byte in 0..piece.bytes {
                     let place = &mut found[(piece.target + byte) as usize];
@@ -112,20 +112,20 @@ mod tests {
                 }
             }
             prop_assert_eq!(found, expected);
-            prop_assert!(pieces.by_page().windows(2).all(|pair| pair[0].page <= pair[1].page));
+            prop_assert!(pieces.split_by_page().windows(2).all(|pair| pair[0].page <= pair[1].page));
         }
     }
 
     #[test]
     fn neighbours_become_one_piece_and_others_do_not() {
-        let mut pieces = Pieces::default();
+        let mut pieces = CopyRegions::default();
         for number in 0..1000 {
-            pieces.write(Piece { target: 64 * number, bytes: 64, page: 0, source: 128 + 64 * number });
+            pieces.add(CopyRegion { target: 64 * number, bytes: 64, page: 0, source: 128 + 64 * number });
         }
-        let whole = Piece { target: 0, bytes: 64_000, page: 0, source: 128 };
-        assert_eq!(pieces.by_page(), [whole]);
-        let elsewhere = Piece { target: 64_000, bytes: 8, page: 1, source: 64_128 };
-        pieces.write(elsewhere);
-        assert_eq!(pieces.by_page(), [whole, elsewhere]);
+        let whole = CopyRegion { target: 0, bytes: 64_000, page: 0, source: 128 };
+        assert_eq!(pieces.split_by_page(), [whole]);
+        let elsewhere = CopyRegion { target: 64_000, bytes: 8, page: 1, source: 64_128 };
+        pieces.add(elsewhere);
+        assert_eq!(pieces.split_by_page(), [whole, elsewhere]);
     }
 }

@@ -7,6 +7,6 @@ pub(crate) mod pending;
 pub(crate) mod staging;
 mod staging_pool;
 
-pub(crate) use buffer_recycler::SpareBuffers;
+pub(crate) use buffer_recycler::BufferRecycler;
 pub(crate) use pending::PendingUploads;
 pub(crate) use staging::Staging;

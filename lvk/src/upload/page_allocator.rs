@@ -2,7 +2,7 @@
 
 /// A place in a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Place {
+pub(crate) struct PageRange {
     pub(crate) page: usize,
     /// In the page, in bytes.
     pub(crate) offset: u64,
@@ -10,18 +10,18 @@ pub(crate) struct Place {
 
 /// What the caller has to do for a place.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Found {
+pub(crate) enum PageAllocation {
     /// The page is there.
-    Here(Place),
-    /// The page is to be made, with so many bytes, and [opened](Pages::open) or [forgotten](Pages::forget).
-    New(Place, u64),
+    Existing(PageRange),
+    /// The page is to be made, with so many bytes, and [opened](PageAllocator::page_created) or [forgotten](PageAllocator::forget).
+    NewPage(PageRange, u64),
 }
 
 /// Pages that are filled from the front, and emptied once nobody reads any of their bytes.
 ///
 /// A place belongs first to who took it; then to a command buffer, by its sequence number; then to nobody.
 #[derive(Debug)]
-pub(crate) struct Pages {
+pub(crate) struct PageAllocator {
     /// Bytes of a page, but for those that hold more in one piece.
     page_bytes: u64,
     /// Empty pages are kept up to so many bytes of all pages.
@@ -31,7 +31,7 @@ pub(crate) struct Pages {
     /// The page that is being filled.
     current: Option<usize>,
     /// Sequence numbers, the page of each, and how many of its places they have.
-    held: Vec<(u64, usize, u32)>,
+    pages_in_use: Vec<(u64, usize, u32)>,
     total_bytes: u64,
 }
 
@@ -40,48 +40,57 @@ struct Page {
     bytes: u64,
     used: u64,
     /// Places that somebody has.
-    taken: u32,
+    allocation_count: u32,
 }
 
-impl Pages {
+impl PageAllocator {
     pub(crate) fn new(page_bytes: u64, keep_bytes: u64) -> Self {
-        Self { page_bytes, keep_bytes, pages: Vec::new(), current: None, held: Vec::new(), total_bytes: 0 }
+        Self {
+            page_bytes,
+            keep_bytes,
+            pages: Vec::new(),
+            current: None,
+            pages_in_use: Vec::new(),
+            total_bytes: 0,
+        }
     }
 
     /// Takes `bytes` whose offset is a multiple of `align`, a power of two.
-    pub(crate) fn take(&mut self, bytes: u64, align: u64) -> Found {
-        let fits = |page: &Page| page.place(bytes, align).map(|offset| (offset, bytes));
+    pub(crate) fn allocate(&mut self, bytes: u64, align: u64) -> PageAllocation {
+        let fits = |page: &Page| page.fit(bytes, align).map(|offset| (offset, bytes));
         let current = self.current.and_then(|page| Some((page, fits(self.pages[page].as_ref()?)?)));
         let empty = || {
             let numbered = self.pages.iter().enumerate();
             let mut empty = numbered.filter_map(|(number, page)| Some((number, page.as_ref()?)));
-            empty.find_map(|(number, page)| (page.taken == 0).then(|| Some((number, fits(page)?)))?)
+            empty.find_map(|(number, page)| {
+                (page.allocation_count == 0).then(|| Some((number, fits(page)?)))?
+            })
         };
         if let Some((number, (offset, _))) = current.or_else(empty) {
             if let Some(page) = &mut self.pages[number] {
                 page.used = offset + bytes;
-                page.taken += 1;
+                page.allocation_count += 1;
             }
-            self.fill_next(number);
-            return Found::Here(Place { page: number, offset });
+            self.choose_current(number);
+            return PageAllocation::Existing(PageRange { page: number, offset });
         }
         let size = bytes.max(self.page_bytes);
         let number = self.pages.iter().position(Option::is_none).unwrap_or(self.pages.len());
         if number == self.pages.len() {
             self.pages.push(None);
         }
-        self.pages[number] = Some(Page { bytes: size, used: bytes, taken: 1 });
+        self.pages[number] = Some(Page { bytes: size, used: bytes, allocation_count: 1 });
         self.total_bytes += size;
-        Found::New(Place { page: number, offset: 0 }, size)
+        PageAllocation::NewPage(PageRange { page: number, offset: 0 }, size)
     }
 
     /// A new page is made: others may have places of it, too.
-    pub(crate) fn open(&mut self, number: usize) {
-        self.fill_next(number);
+    pub(crate) fn page_created(&mut self, number: usize) {
+        self.choose_current(number);
     }
 
     /// The page that has most room left is filled next.
-    fn fill_next(&mut self, number: usize) {
+    fn choose_current(&mut self, number: usize) {
         let room = |number: usize| self.pages[number].as_ref().map_or(0, |page| page.bytes - page.used);
         if self.current.is_none_or(|current| room(current) <= room(number)) {
             self.current = Some(number);
@@ -89,29 +98,29 @@ impl Pages {
     }
 
     /// `count` places of a page are read by the command buffer `sequence` from now on.
-    pub(crate) fn hold(&mut self, page: usize, count: u32, sequence: u64) {
-        match self.held.last_mut() {
+    pub(crate) fn mark_used(&mut self, page: usize, count: u32, sequence: u64) {
+        match self.pages_in_use.last_mut() {
             Some((last, of, held)) if *last == sequence && *of == page => *held += count,
-            _ => self.held.push((sequence, page, count)),
+            _ => self.pages_in_use.push((sequence, page, count)),
         }
     }
 
     /// The command buffer is done. Answers the pages that are no longer wanted.
     pub(crate) fn release(&mut self, sequence: u64) -> Vec<usize> {
-        let mut held = std::mem::take(&mut self.held);
+        let mut held = std::mem::take(&mut self.pages_in_use);
         let mut unwanted = Vec::new();
         held.retain(|(of, page, count)| {
             if *of == sequence {
-                unwanted.extend(self.give_back(*page, *count));
+                unwanted.extend(self.release_ranges(*page, *count));
             }
             *of != sequence
         });
-        self.held = held;
+        self.pages_in_use = held;
         unwanted
     }
 
     /// A page could not be made.
-    pub(crate) fn forget(&mut self, number: usize) {
+    pub(crate) fn remove_page(&mut self, number: usize) {
         if let Some(page) = self.pages.get_mut(number).and_then(Option::take) {
             self.total_bytes -= page.bytes;
             self.current = self.current.filter(|current| *current != number);
@@ -119,17 +128,17 @@ impl Pages {
     }
 
     /// Gives back `count` places of a page. Answers the page if it is no longer wanted.
-    fn give_back(&mut self, number: usize, count: u32) -> Option<usize> {
+    fn release_ranges(&mut self, number: usize, count: u32) -> Option<usize> {
         let page = self.pages.get_mut(number)?.as_mut()?;
-        page.taken -= count;
-        if page.taken > 0 {
+        page.allocation_count -= count;
+        if page.allocation_count > 0 {
             return None;
         }
         page.used = 0;
         if self.total_bytes <= self.keep_bytes {
             return None;
         }
-        self.forget(number);
+        self.remove_page(number);
         Some(number)
     }
 
@@ -141,7 +150,7 @@ impl Pages {
 }
 
 impl Page {
-    fn place(&self, bytes: u64, align: u64) -> Option<u64> {
+    fn fit(&self, bytes: u64, align: u64) -> Option<u64> {
         let offset = self.used.checked_next_multiple_of(align.max(1))?;
         offset.checked_add(bytes).filter(|end| *end <= self.bytes).map(|_| offset)
     }
@@ -156,7 +165,7 @@ mod tests {
     use super::*;
 
     #[derive(Debug, Clone)]
-    enum Op {
+    enum PageOp {
         Take {
             bytes: u64,
             align: u32,
@@ -174,23 +183,23 @@ mod tests {
         },
     }
 
-    fn op() -> impl Strategy<Value = Op> {
+    fn page_op() -> impl Strategy<Value = PageOp> {
         prop_oneof![
             5 => (prop_oneof![9 => 0..70_u64, 1 => 100..300_u64], 0..5_u32)
-                .prop_map(|(bytes, align)| Op::Take { bytes, align }),
+                .prop_map(|(bytes, align)| PageOp::Take { bytes, align }),
             3 => (any::<prop::sample::Index>(), 0..4_u64)
-                .prop_map(|(which, sequence)| Op::Hold { which, sequence }),
-            1 => any::<prop::sample::Index>().prop_map(Op::GiveBack),
-            1 => (0..4_u64).prop_map(Op::Release),
+                .prop_map(|(which, sequence)| PageOp::Hold { which, sequence }),
+            1 => any::<prop::sample::Index>().prop_map(PageOp::GiveBack),
+            1 => (0..4_u64).prop_map(PageOp::Release),
             2 => (any::<prop::sample::Index>(), prop::bool::weighted(0.8))
-                .prop_map(|(which, succeeds)| Op::Made { which, succeeds }),
+                .prop_map(|(which, succeeds)| PageOp::Made { which, succeeds }),
         ]
     }
 
     /// A place that somebody has, and the command buffer if it is one.
     #[derive(Debug, Clone, Copy)]
-    struct Taken {
-        place: Place,
+    struct AllocatedRange {
+        place: PageRange,
         bytes: u64,
         by: Option<u64>,
     }
@@ -201,63 +210,63 @@ mod tests {
 
     proptest! {
         #[test]
-        fn places_are_aligned_inside_and_apart_until_they_are_given_back(ops in prop::collection::vec(op(), 0..120)) {
-            let mut pages = Pages::new(100, 250);
+        fn places_are_aligned_inside_and_apart_until_they_are_given_back(ops in prop::collection::vec(page_op(), 0..120)) {
+            let mut pages = PageAllocator::new(100, 250);
             let mut sizes: BTreeMap<usize, u64> = BTreeMap::new();
-            let mut taken: Vec<Taken> = Vec::new();
+            let mut taken: Vec<AllocatedRange> = Vec::new();
             // Nobody uses their places before they are made.
-            let mut unmade: Vec<Taken> = Vec::new();
+            let mut unmade: Vec<AllocatedRange> = Vec::new();
             for op in ops {
                 match op {
-                    Op::Take { bytes, align } => {
+                    PageOp::Take { bytes, align } => {
                         let align = 1_u64 << align;
-                        let (place, list) = match pages.take(bytes, align) {
-                            Found::Here(place) => (place, &mut taken),
-                            Found::New(place, size) => {
+                        let (place, list) = match pages.allocate(bytes, align) {
+                            PageAllocation::Existing(place) => (place, &mut taken),
+                            PageAllocation::NewPage(place, size) => {
                                 prop_assert!(sizes.insert(place.page, size).is_none(), "two pages of one number");
                                 (place, &mut unmade)
                             }
                         };
                         prop_assert_eq!(place.offset % align, 0);
                         prop_assert!(place.offset + bytes <= sizes[&place.page]);
-                        let apart = |other: &Taken| {
+                        let apart = |other: &AllocatedRange| {
                             other.place.page != place.page
                                 || other.place.offset + other.bytes <= place.offset
                                 || place.offset + bytes <= other.place.offset
                         };
                         prop_assert!(list.iter().all(apart));
-                        list.push(Taken { place, bytes, by: None });
-                        let is_unmade = |used: &Taken| unmade.iter().any(|page| page.place.page == used.place.page);
+                        list.push(AllocatedRange { place, bytes, by: None });
+                        let is_unmade = |used: &AllocatedRange| unmade.iter().any(|page| page.place.page == used.place.page);
                         prop_assert!(!taken.iter().any(is_unmade), "a page is used before it is made");
                     }
-                    Op::Hold { which, sequence } => {
+                    PageOp::Hold { which, sequence } => {
                         let mut free: Vec<_> = taken.iter_mut().filter(|taken| taken.by.is_none()).collect();
                         if !free.is_empty() {
                             let place = which.index(free.len());
                             free[place].by = Some(sequence);
-                            pages.hold(free[place].place.page, 1, sequence);
+                            pages.mark_used(free[place].place.page, 1, sequence);
                         }
                     }
-                    Op::GiveBack(which) => {
+                    PageOp::GiveBack(which) => {
                         let free: Vec<_> = (0..taken.len()).filter(|place| taken[*place].by.is_none()).collect();
                         if !free.is_empty() {
                             let gone = taken.remove(*which.get(&free));
-                            forget(&mut sizes, pages.give_back(gone.place.page, 1));
+                            forget(&mut sizes, pages.release_ranges(gone.place.page, 1));
                         }
                     }
-                    Op::Made { which, succeeds } => {
+                    PageOp::Made { which, succeeds } => {
                         if !unmade.is_empty() {
                             let page = unmade.swap_remove(which.index(unmade.len()));
                             if succeeds {
-                                pages.open(page.place.page);
+                                pages.page_created(page.place.page);
                                 taken.push(page);
                             } else {
-                                pages.forget(page.place.page);
+                                pages.remove_page(page.place.page);
                                 forget(&mut sizes, [page.place.page]);
                             }
                         }
                     }
-                    Op::Release(sequence) => {
+                    PageOp::Release(sequence) => {
                         taken.retain(|taken| taken.by != Some(sequence));
                         forget(&mut sizes, pages.release(sequence));
                     }
@@ -266,12 +275,12 @@ mod tests {
                 prop_assert!(taken.iter().all(|taken| sizes.contains_key(&taken.place.page)));
             }
             for page in unmade {
-                pages.forget(page.place.page);
+                pages.remove_page(page.place.page);
                 forget(&mut sizes, [page.place.page]);
             }
             (0..4).for_each(|sequence| forget(&mut sizes, pages.release(sequence)));
             for left in taken.iter().filter(|taken| taken.by.is_none()) {
-                forget(&mut sizes, pages.give_back(left.place.page, 1));
+                forget(&mut sizes, pages.release_ranges(left.place.page, 1));
             }
             prop_assert!(pages.total_bytes() <= 250, "{} bytes are kept", pages.total_bytes());
         }
@@ -279,16 +288,16 @@ mod tests {
         /// What is filled and emptied again and again needs no more than two rounds take.
         #[test]
         fn steady_use_takes_no_more_pages(bytes in 1..100_u64, count in 1..20_u64, rounds in 3..60_u64) {
-            let mut pages = Pages::new(100, 0);
+            let mut pages = PageAllocator::new(100, 0);
             let mut most = 0;
             for round in 0..rounds {
                 for _ in 0..count {
-                    let found = pages.take(bytes, 4);
-                    let (Found::Here(place) | Found::New(place, _)) = found;
-                    if matches!(found, Found::New(..)) {
-                        pages.open(place.page);
+                    let found = pages.allocate(bytes, 4);
+                    let (PageAllocation::Existing(place) | PageAllocation::NewPage(place, _)) = found;
+                    if matches!(found, PageAllocation::NewPage(..)) {
+                        pages.page_created(place.page);
                     }
-                    pages.hold(place.page, 1, round);
+                    pages.mark_used(place.page, 1, round);
                 }
                 if round == 1 {
                     most = pages.total_bytes() + 100;

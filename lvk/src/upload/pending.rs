@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::copy_regions::{Piece, Pieces};
+use super::copy_regions::{CopyRegion, CopyRegions};
 use super::staging::StagingRegion;
 use crate::barrier::{IdMap, ResourceId, Subresources};
 use crate::resource::region::Region;
@@ -14,7 +14,7 @@ use crate::resource::{Buffer, Texture};
 #[derive(Default)]
 pub(crate) struct PendingUploads {
     pub(crate) buffers: Vec<BufferUploads>,
-    rows: IdMap<usize>,
+    index_by_id: IdMap<usize>,
     pub(crate) textures: Vec<TextureUpload>,
     pub(crate) pages: Vec<UsedPage>,
     bytes: u64,
@@ -23,7 +23,7 @@ pub(crate) struct PendingUploads {
 /// What is to be written to a buffer.
 pub(crate) struct BufferUploads {
     pub(crate) target: Arc<Buffer>,
-    pub(crate) pieces: Pieces,
+    pub(crate) regions: CopyRegions,
 }
 
 /// What is to become of a texture.
@@ -35,14 +35,14 @@ pub(crate) struct TextureUpload {
 
 impl BufferUploads {
     /// Whether the buffer was destroyed, and the GPU is done with it: then nobody else holds it, and nobody can get it.
-    pub(crate) fn is_gone(&self) -> bool {
+    pub(crate) fn is_dead(&self) -> bool {
         Arc::strong_count(&self.target) == 1
     }
 }
 
 impl TextureUpload {
-    /// As [`BufferUploads::is_gone`], with all textures of the image. Listed twice it stays, which does no harm.
-    fn is_gone(&self) -> bool {
+    /// As [`BufferUploads::is_dead`], with all textures of the image. Listed twice it stays, which does no harm.
+    fn is_dead(&self) -> bool {
         Arc::strong_count(&self.target) == 1 && Arc::strong_count(&self.target.image) == 1
     }
 }
@@ -61,8 +61,8 @@ impl PendingUploads {
     }
 
     /// Takes out the textures that are gone.
-    pub(crate) fn take_gone(&mut self) -> impl Iterator<Item = Arc<Texture>> {
-        self.textures.extract_if(.., |upload| upload.is_gone()).map(|upload| upload.target)
+    pub(crate) fn drain_dead(&mut self) -> impl Iterator<Item = Arc<Texture>> {
+        self.textures.extract_if(.., |upload| upload.is_dead()).map(|upload| upload.target)
     }
 
     /// Staged bytes that wait.
@@ -71,18 +71,24 @@ impl PendingUploads {
     }
 
     /// Writes staged bytes to a buffer, over what was to be written there before.
-    pub(crate) fn buffer(&mut self, target: &Arc<Buffer>, offset: u64, bytes: u64, staged: StagingRegion) {
-        let row = *self.rows.entry(target.id).or_insert_with(|| {
-            self.buffers.push(BufferUploads { target: Arc::clone(target), pieces: Pieces::default() });
+    pub(crate) fn add_buffer_upload(
+        &mut self,
+        target: &Arc<Buffer>,
+        offset: u64,
+        bytes: u64,
+        staged: StagingRegion,
+    ) {
+        let row = *self.index_by_id.entry(target.id).or_insert_with(|| {
+            self.buffers.push(BufferUploads { target: Arc::clone(target), regions: CopyRegions::default() });
             self.buffers.len() - 1
         });
-        let piece = Piece { target: offset, bytes, page: staged.page, source: staged.offset };
-        self.buffers[row].pieces.write(piece);
-        self.use_page(staged, bytes);
+        let piece = CopyRegion { target: offset, bytes, page: staged.page, source: staged.offset };
+        self.buffers[row].regions.add(piece);
+        self.count_page_use(staged, bytes);
     }
 
     /// Writes staged bytes to a region of a texture.
-    pub(crate) fn texture(
+    pub(crate) fn add_texture_upload(
         &mut self,
         target: Arc<Texture>,
         region: Region,
@@ -90,15 +96,15 @@ impl PendingUploads {
         staged: StagingRegion,
     ) {
         self.textures.push(TextureUpload { target, texels: Some((region, staged)) });
-        self.use_page(staged, bytes);
+        self.count_page_use(staged, bytes);
     }
 
     /// Makes a new texture readable.
-    pub(crate) fn fresh_texture(&mut self, target: Arc<Texture>) {
+    pub(crate) fn add_new_texture(&mut self, target: Arc<Texture>) {
         self.textures.push(TextureUpload { target, texels: None });
     }
 
-    fn use_page(&mut self, staged: StagingRegion, bytes: u64) {
+    fn count_page_use(&mut self, staged: StagingRegion, bytes: u64) {
         self.bytes += bytes;
         match self.pages.iter_mut().rev().find(|used| used.page == staged.page) {
             Some(used) => used.count += 1,
@@ -108,7 +114,9 @@ impl PendingUploads {
 }
 
 /// Cuts writes of parts of images into rounds, each up to one of the ends, in which no part is written twice.
-pub(crate) fn round_ends(parts: impl IntoIterator<Item = Option<(ResourceId, Subresources)>>) -> Vec<usize> {
+pub(crate) fn write_round_ends(
+    parts: impl IntoIterator<Item = Option<(ResourceId, Subresources)>>,
+) -> Vec<usize> {
     let mut ends = Vec::new();
     let mut written: IdMap<Vec<Subresources>> = IdMap::default();
     let mut count = 0;
@@ -150,7 +158,7 @@ mod tests {
                 (Some((a, x)), Some((b, y))) => a == b && x.intersection(y).is_some(),
                 _ => false,
             };
-            let (mut start, ends) = (0, round_ends(parts.iter().copied()));
+            let (mut start, ends) = (0, write_round_ends(parts.iter().copied()));
             prop_assert_eq!(ends.last(), Some(&parts.len()));
             for end in ends {
                 prop_assert!((start..end).all(|a| (start..a).all(|b| !overlap(a, b))));

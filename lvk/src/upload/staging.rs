@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::staging_pool::PageSet;
+use super::staging_pool::StagingPool;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::gpu::memory::allocator::{Mapping, MemoryKind};
@@ -36,7 +36,7 @@ pub(crate) struct StagingChunk {
 impl StagingChunk {
     const BYTES: u64 = 4 << 10;
     /// Larger regions are taken from pages.
-    pub(crate) const MOST_BYTES: u64 = Self::BYTES / 4;
+    pub(crate) const MAX_BYTES: u64 = Self::BYTES / 4;
 
     /// A chunk that begins at this place of a page.
     fn new(page: Arc<Buffer>, offset: u64) -> Self {
@@ -47,7 +47,7 @@ impl StagingChunk {
 
     /// A region at an address of this alignment, a power of two, as the GPU and the host see it, if the chunk has room for it.
     #[inline(always)]
-    fn cut(&mut self, bytes: u64, align: u64) -> Option<(u64, &mut [u8])> {
+    fn sub_allocate(&mut self, bytes: u64, align: u64) -> Option<(u64, &mut [u8])> {
         let (mapping, start) = self.mapping?;
         let address = self.next.checked_add(align - 1)? & !(align - 1);
         let end = address.checked_add(bytes).filter(|end| *end <= self.end)?;
@@ -63,10 +63,10 @@ impl StagingChunk {
 /// Pages of host-visible memory. A region lives until the command buffer it was taken for is done.
 pub(crate) struct Staging {
     /// As near to the GPU as the host can write.
-    pages: PageSet<Buffer>,
+    pages: StagingPool<Buffer>,
     /// Chunks are cut from these. Small writes beyond the host's caches cost far more than their bytes: the next lock that is
     /// taken waits until they have gone across the bus.
-    cached: PageSet<Buffer>,
+    cached: StagingPool<Buffer>,
     kept_bytes: u64,
     gpu: Arc<Gpu>,
 }
@@ -74,15 +74,15 @@ pub(crate) struct Staging {
 impl Staging {
     /// Larger pieces get a page of their own.
     const PAGE_BYTES: u64 = 4 << 20;
-    const LEAST_PAGE_BYTES: u64 = 64 << 10;
+    const MIN_PAGE_BYTES: u64 = 64 << 10;
     /// Of cached memory.
     const KEPT_CACHED_BYTES: u64 = 1 << 20;
 
     /// Keeps pages of `bytes` altogether.
     pub(crate) fn new(gpu: &Arc<Gpu>, bytes: u64) -> Self {
-        let kept_bytes = bytes.max(Self::LEAST_PAGE_BYTES);
-        let pages = PageSet::new(kept_bytes.min(Self::PAGE_BYTES), kept_bytes);
-        let cached = PageSet::new(Self::LEAST_PAGE_BYTES, Self::KEPT_CACHED_BYTES);
+        let kept_bytes = bytes.max(Self::MIN_PAGE_BYTES);
+        let pages = StagingPool::new(kept_bytes.min(Self::PAGE_BYTES), kept_bytes);
+        let cached = StagingPool::new(Self::MIN_PAGE_BYTES, Self::KEPT_CACHED_BYTES);
         Self { pages, cached, kept_bytes, gpu: Arc::clone(gpu) }
     }
 
@@ -121,38 +121,38 @@ impl Staging {
         sequence: u64,
         fill: impl FnOnce(&mut [u8]) -> R,
     ) -> Result<(u64, R)> {
-        if bytes > StagingChunk::MOST_BYTES || align > StagingChunk::MOST_BYTES {
+        if bytes > StagingChunk::MAX_BYTES || align > StagingChunk::MAX_BYTES {
             let (region, answer) = self.write_with(bytes, align, sequence, fill)?;
             return Ok((region.address, answer));
         }
-        if let Some((address, out)) = chunk.cut(bytes, align) {
+        if let Some((address, out)) = chunk.sub_allocate(bytes, align) {
             return Ok((address, fill(out)));
         }
-        self.renew(chunk, sequence)?;
-        let (address, out) = chunk.cut(bytes, align).ok_or_else(no_room)?;
+        self.renew_chunk(chunk, sequence)?;
+        let (address, out) = chunk.sub_allocate(bytes, align).ok_or_else(out_of_memory_error)?;
         Ok((address, fill(out)))
     }
 
     /// Takes a new chunk in place of a full one.
     #[inline(never)]
-    fn renew(&self, chunk: &mut StagingChunk, sequence: u64) -> Result<()> {
+    fn renew_chunk(&self, chunk: &mut StagingChunk, sequence: u64) -> Result<()> {
         let make = |size| new_page(&self.gpu, size, MemoryKind::Readback);
         let (place, buffer) =
-            self.cached.place(StagingChunk::BYTES, Buffer::ALIGNMENT, Some(sequence), make)?;
+            self.cached.allocate(StagingChunk::BYTES, Buffer::ALIGNMENT, Some(sequence), make)?;
         *chunk = StagingChunk::new(buffer, place.offset);
         Ok(())
     }
 
-    /// Copies `data` to where some command buffer will read it; see [`hold`](Self::hold).
-    pub(crate) fn keep(&self, data: &[u8], align: u64) -> Result<StagingRegion> {
+    /// Copies `data` to where some command buffer will read it; see [`mark_used`](Self::mark_used).
+    pub(crate) fn keep_region(&self, data: &[u8], align: u64) -> Result<StagingRegion> {
         let (region, ()) =
             self.fill(data.len() as u64, align, None, |region| region.copy_from_slice(data))?;
         Ok(region)
     }
 
-    /// `count` regions of a page that were [kept](Self::keep) are read by the command buffer `sequence`.
-    pub(crate) fn hold(&self, page: usize, count: u32, sequence: u64) {
-        self.pages.hold(page, count, sequence);
+    /// `count` regions of a page that were [kept](Self::keep_region) are read by the command buffer `sequence`.
+    pub(crate) fn mark_used(&self, page: usize, count: u32, sequence: u64) {
+        self.pages.mark_used(page, count, sequence);
     }
 
     /// The command buffer is done with its regions.
@@ -178,7 +178,7 @@ impl Staging {
         // Pages begin at addresses that are multiples of less than some alignments.
         let room = bytes + align.saturating_sub(Buffer::ALIGNMENT);
         let make = |size| new_page(&self.gpu, size, MemoryKind::HostVisible);
-        let (place, buffer) = self.pages.place(room, align.min(Buffer::ALIGNMENT), sequence, make)?;
+        let (place, buffer) = self.pages.allocate(room, align.min(Buffer::ALIGNMENT), sequence, make)?;
         let address = (buffer.address + place.offset).next_multiple_of(align.max(1));
         let offset = address - buffer.address;
         let region = StagingRegion { buffer: buffer.raw, offset, address, page: place.page };
@@ -205,7 +205,7 @@ unsafe fn fill_region<R>(
 }
 
 #[cold]
-fn no_room() -> Error {
+fn out_of_memory_error() -> Error {
     Error::usage("staging", "a new chunk has no room")
 }
 

@@ -2,62 +2,62 @@
 
 use std::sync::Arc;
 
-use super::page_allocator::{Found, Pages, Place};
+use super::page_allocator::{PageAllocation, PageAllocator, PageRange};
 use crate::error::{Error, Result};
 use crate::lock_order::{Guard, Mutex, Rank};
 
 /// Pages of one kind of memory; `P` is such a page.
-pub(super) struct PageSet<P> {
-    listed: Mutex<Listed<P>>,
+pub(super) struct StagingPool<P> {
+    page_list: Mutex<PageList<P>>,
 }
 
-struct Listed<P> {
-    pages: Pages,
+struct PageList<P> {
+    pages: PageAllocator,
     /// By their numbers; `None` for those that are gone, or being made.
-    made: Vec<Option<Arc<P>>>,
+    created: Vec<Option<Arc<P>>>,
 }
 
-impl<P> PageSet<P> {
+impl<P> StagingPool<P> {
     pub(super) fn new(page_bytes: u64, kept_bytes: u64) -> Self {
-        let listed = Listed { pages: Pages::new(page_bytes, kept_bytes), made: Vec::new() };
-        Self { listed: Mutex::new(Rank::Staging, listed) }
+        let listed = PageList { pages: PageAllocator::new(page_bytes, kept_bytes), created: Vec::new() };
+        Self { page_list: Mutex::new(Rank::Staging, listed) }
     }
 
-    /// A place, with the page it lies in, for the command buffer `sequence`, or for whoever [holds](Self::hold) it later. Where no
+    /// A place, with the page it lies in, for the command buffer `sequence`, or for whoever [holds](Self::mark_used) it later. Where no
     /// page has room, `make` makes one of so many bytes; other threads take places meanwhile.
-    pub(super) fn place(
+    pub(super) fn allocate(
         &self,
         bytes: u64,
         align: u64,
         sequence: Option<u64>,
         make: impl FnOnce(u64) -> Result<P>,
-    ) -> Result<(Place, Arc<P>)> {
+    ) -> Result<(PageRange, Arc<P>)> {
         let mut listed = self.lock();
-        let place = match listed.pages.take(bytes, align) {
-            Found::Here(place) => place,
-            Found::New(place, size) => {
+        let place = match listed.pages.allocate(bytes, align) {
+            PageAllocation::Existing(place) => place,
+            PageAllocation::NewPage(place, size) => {
                 drop(listed);
                 let made = make(size);
                 listed = self.lock();
-                listed.add(place.page, made)?;
+                listed.add_page(place.page, made)?;
                 place
             }
         };
         if let Some(sequence) = sequence {
-            listed.pages.hold(place.page, 1, sequence);
+            listed.pages.mark_used(place.page, 1, sequence);
         }
-        let page = listed.made.get(place.page).cloned().flatten();
+        let page = listed.created.get(place.page).cloned().flatten();
         Ok((place, page.ok_or_else(|| Error::usage("staging", "the page is gone"))?))
     }
 
     /// `count` places of a page that nobody held yet are read by the command buffer `sequence`.
-    pub(super) fn hold(&self, page: usize, count: u32, sequence: u64) {
-        self.lock().pages.hold(page, count, sequence);
+    pub(super) fn mark_used(&self, page: usize, count: u32, sequence: u64) {
+        self.lock().pages.mark_used(page, count, sequence);
     }
 
     /// The command buffer is done with its places. Answers pages that nobody wants any more.
     pub(super) fn release(&self, sequence: u64) -> Vec<Arc<P>> {
-        let Listed { pages, made } = &mut *self.lock();
+        let PageList { pages, created: made } = &mut *self.lock();
         let unwanted = pages.release(sequence);
         unwanted.into_iter().filter_map(|page| made.get_mut(page)?.take()).collect()
     }
@@ -68,18 +68,18 @@ impl<P> PageSet<P> {
         self.lock().pages.total_bytes()
     }
 
-    fn lock(&self) -> Guard<'_, Listed<P>> {
-        self.listed.lock()
+    fn lock(&self) -> Guard<'_, PageList<P>> {
+        self.page_list.lock()
     }
 }
 
-impl<P> Listed<P> {
+impl<P> PageList<P> {
     /// A page is made, or could not be.
-    fn add(&mut self, number: usize, made: Result<P>) -> Result<()> {
-        let page = made.inspect_err(|_| self.pages.forget(number))?;
-        self.made.resize_with(self.made.len().max(number + 1), || None);
-        self.made[number] = Some(Arc::new(page));
-        self.pages.open(number);
+    fn add_page(&mut self, number: usize, made: Result<P>) -> Result<()> {
+        let page = made.inspect_err(|_| self.pages.remove_page(number))?;
+        self.created.resize_with(self.created.len().max(number + 1), || None);
+        self.created[number] = Some(Arc::new(page));
+        self.pages.page_created(number);
         Ok(())
     }
 }
@@ -94,34 +94,34 @@ mod tests {
 
     #[test]
     fn other_threads_take_places_while_a_page_is_made() {
-        let set = PageSet::new(100, 100);
+        let set = StagingPool::new(100, 100);
         let mut other = None;
         let (first, size) = set
-            .place(60, 1, Some(1), |size| {
-                other = Some(set.place(10, 1, Some(2), Ok)?);
+            .allocate(60, 1, Some(1), |size| {
+                other = Some(set.allocate(10, 1, Some(2), Ok)?);
                 Ok(size)
             })
             .unwrap();
         let (other, _) = other.unwrap();
         assert_ne!(first.page, other.page, "the page that is being made is not there yet");
         assert_eq!((*size, set.total_bytes()), (100, 200));
-        let (next, _) = set.place(60, 1, Some(2), |_| Err(no_memory())).unwrap();
-        assert_eq!(next, Place { page: other.page, offset: 10 }, "the other has more room");
+        let (next, _) = set.allocate(60, 1, Some(2), |_| Err(no_memory())).unwrap();
+        assert_eq!(next, PageRange { page: other.page, offset: 10 }, "the other has more room");
         assert!(set.release(1).len() == 1 && set.release(2).is_empty());
         assert_eq!(set.total_bytes(), 100);
     }
 
     #[test]
     fn a_page_that_cannot_be_made_is_forgotten_and_takes_nobody_elses() {
-        let set = PageSet::new(100, 0);
-        let refused = set.place(60, 1, Some(1), |_| {
-            set.place(60, 1, Some(2), Ok)?;
+        let set = StagingPool::new(100, 0);
+        let refused = set.allocate(60, 1, Some(1), |_| {
+            set.allocate(60, 1, Some(2), Ok)?;
             Err(no_memory())
         });
         assert!(matches!(refused, Err(Error::OutOfDeviceMemory { .. })));
         assert_eq!(set.total_bytes(), 100);
         assert!(set.release(1).is_empty() && set.release(2).len() == 1);
-        let (again, _) = set.place(60, 1, Some(3), Ok).unwrap();
-        assert_eq!((again, set.total_bytes()), (Place { page: 0, offset: 0 }, 100));
+        let (again, _) = set.allocate(60, 1, Some(3), Ok).unwrap();
+        assert_eq!((again, set.total_bytes()), (PageRange { page: 0, offset: 0 }, 100));
     }
 }

@@ -7,7 +7,7 @@ use std::sync::mpsc::channel;
 use std::thread::spawn;
 use std::time::Duration;
 
-use lvk::test_hooks::{fail_submission_after, fallibly, waiting_objects};
+use lvk::test_hooks::{fail_submission_after, waiting_objects, with_fault_injection};
 use lvk::{Context, Error, Queue, SubmitHandle, TextureDesc, TextureUsage};
 use lvk_tests::compute::words_buffer;
 use lvk_tests::queues::{REQUESTS, WORDS, on};
@@ -16,7 +16,7 @@ use lvk_tests::{TestDevice, device_with};
 /// Runs a test with each way to have queues, each kept in a context whose submissions can fail.
 fn each(test: impl Fn(&Arc<TestDevice>)) {
     for queues in REQUESTS {
-        let Some(ctx) = fallibly(|| device_with(|desc| desc.queues = queues)) else { return };
+        let Some(ctx) = with_fault_injection(|| device_with(|desc| desc.queues = queues)) else { return };
         test(&Arc::new(ctx));
     }
 }

@@ -1,7 +1,7 @@
 //! Bottom-level structures built on the GPU: every primitive once, boxes that fit, heights within the bound.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use lvk::test_hooks::{EMPTY, GpuBlasDesc, Leaves, build_blas};
+use lvk::test_hooks::{EMPTY, GpuBlasDesc, LeafEncoding, build_blas};
 use lvk::{BlasGeometry, GeometryFlags, GeometryTransform, IndexFormat, Indices, Triangles, VertexFormat};
 use lvk_tests::device;
 use lvk_tests::gpu_built::{
@@ -32,7 +32,7 @@ fn many_structures_are_built_side_by_side() {
     let vertices: Vec<_> = meshes.iter().map(|corners| input(&ctx, corners)).collect();
     let geometries: Vec<_> =
         vertices.iter().zip(counts).map(|(vertices, count)| [triangles(**vertices, count)]).collect();
-    let leaves = Leaves::Corners;
+    let leaves = LeafEncoding::Corners;
     let desc = |geometries| GpuBlasDesc { geometries, improvements: 1, leaves };
     let descs: Vec<_> = geometries.iter().map(|geometries| desc(&geometries[..])).collect();
     for (structure, corners) in build_blas(&ctx, &descs).unwrap().iter().zip(&meshes) {
@@ -70,7 +70,7 @@ fn trees_that_leave_nodes_empty_are_packed() {
         let corners = uneven(side);
         let vertices = input(&ctx, &corners);
         let geometries = [triangles(*vertices, corners.len())];
-        for leaves in [Leaves::Corners, Leaves::Indexed, Leaves::Packed] {
+        for leaves in [LeafEncoding::Corners, LeafEncoding::Indexed, LeafEncoding::Packed] {
             let desc = GpuBlasDesc { geometries: &geometries, improvements: 0, leaves };
             let found = facts(&ctx, &build_blas(&ctx, &[desc]).unwrap()[0]);
             check_contents(&found, &numbered(&corners));
@@ -264,7 +264,7 @@ fn several_geometries_keep_their_numbers() {
         for (geometry, mesh) in (0..).zip(&meshes) {
             expected.extend(numbered(mesh).into_iter().map(|((_, index), c)| ((geometry, index), c)));
         }
-        for leaves in [Leaves::Corners, Leaves::Indexed, Leaves::Packed] {
+        for leaves in [LeafEncoding::Corners, LeafEncoding::Indexed, LeafEncoding::Packed] {
             let desc = GpuBlasDesc { geometries: &geometries, improvements: 1, leaves };
             let built = build_blas(&ctx, &[desc]).unwrap();
             check_contents(&facts(&ctx, &built[0]), &expected);
@@ -280,7 +280,8 @@ fn better_places_cost_rays_less() {
     corners.iter_mut().step_by(16).for_each(|triangle| triangle[1] = triangle[1].map(|n| n * 0.5));
     let vertices = input(&ctx, &corners);
     let geometries = [triangles(*vertices, corners.len())];
-    let desc = |improvements| GpuBlasDesc { geometries: &geometries, improvements, leaves: Leaves::Corners };
+    let desc =
+        |improvements| GpuBlasDesc { geometries: &geometries, improvements, leaves: LeafEncoding::Corners };
     let built = build_blas(&ctx, &[0, 1, 2].map(desc)).unwrap();
     let costs: Vec<f64> = built.iter().map(|structure| facts(&ctx, structure).cost).collect();
     assert!(costs[1] < costs[0] && costs[2] <= costs[1] * 1.001, "{costs:?}");

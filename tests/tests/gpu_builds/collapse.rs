@@ -2,17 +2,17 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use lvk::Context;
-use lvk::test_hooks::{BinaryTree, any_tree, collapse};
+use lvk::test_hooks::{Bvh2Reference, any_tree, collapse};
 use lvk_tests::device;
 use lvk_tests::random::Random;
 
-fn tree(count: usize, even: usize, height: u32, seed: u64) -> BinaryTree {
+fn tree(count: usize, even: usize, height: u32, seed: u64) -> Bvh2Reference {
     let mut random = Random::new(seed);
     any_tree(count, even, height, &mut |below| (random.bits() >> 32) as usize % below)
 }
 
 /// Whether the nodes had room.
-fn check(ctx: &Context, tree: &BinaryTree, what: &str) -> bool {
+fn check(ctx: &Context, tree: &Bvh2Reference, what: &str) -> bool {
     let expected = tree.collapse();
     let (found, room) = collapse(ctx, tree).unwrap();
     assert_eq!(found.is_some(), expected.node_count() <= room, "{what}: {}", expected.node_count());

@@ -1,7 +1,7 @@
 //! Refits on the GPU, whoever built the tree: new places in the old tree, with boxes as a fresh fit has them.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use lvk::test_hooks::{EMPTY, GpuBlasDesc, Leaves, build_blas, place, read, refit};
+use lvk::test_hooks::{EMPTY, GpuBlasDesc, LeafEncoding, build_blas, place, read, refit};
 use lvk::{
     BlasDesc, BlasGeometry, BuildFlags, Context, Dependencies, DeviceProfile, RayQueryRequest, Result,
 };
@@ -18,7 +18,7 @@ use lvk_tests::{device, device_with};
 fn trees_of_the_gpu_follow_moved_triangles() {
     let Some(ctx) = device() else { return };
     for count in [0, 1, 2, 3, 1000, 20_000] {
-        for leaves in [Leaves::Corners, Leaves::Indexed, Leaves::Packed] {
+        for leaves in [LeafEncoding::Corners, LeafEncoding::Indexed, LeafEncoding::Packed] {
             let vertices = input(&ctx, &scattered(count, 1));
             let geometries = [triangles(*vertices, count)];
             let desc = GpuBlasDesc { geometries: &geometries, improvements: 1, leaves };

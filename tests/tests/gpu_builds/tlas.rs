@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::panic, reason = "tests")]
 
 use lvk::glam::{Affine3A, EulerRot, Mat3, Quat, Vec3};
-use lvk::test_hooks::{Bounds, EMPTY, GpuStructure, build_tlas, check_structure, read};
+use lvk::test_hooks::{CheckBounds, EMPTY, GpuStructure, build_tlas, check_structure, read};
 use lvk::transform_rows;
 use lvk_tests::gpu_built::{build, facts, input, scattered, triangles};
 use lvk_tests::random::Random;
@@ -20,7 +20,7 @@ struct Record {
 
 /// Structures to show, with their bounds.
 struct Shown {
-    structures: Vec<(GpuStructure, Bounds)>,
+    structures: Vec<(GpuStructure, CheckBounds)>,
 }
 
 impl Shown {
@@ -58,7 +58,7 @@ impl Shown {
     }
 
     /// What an instance needs at least, in 64 bits.
-    fn world(&self, record: &Record, place: usize) -> Option<Bounds> {
+    fn world(&self, record: &Record, place: usize) -> Option<CheckBounds> {
         let shown = self.structures[place].1;
         let m = record.rows.map(f64::from);
         let determinant = m[0] * (m[5] * m[10] - m[6] * m[9]) - m[1] * (m[4] * m[10] - m[6] * m[8])

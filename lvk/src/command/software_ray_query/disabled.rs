@@ -5,33 +5,33 @@ use std::sync::Arc;
 
 use super::CommandBuffer;
 use crate::accel::AccelStruct;
-use crate::accel::blas_refs::ShownSet;
+use crate::accel::blas_refs::BlasRefSet;
 use crate::accel::instance::{DeviceInstances, TlasInstance};
 use crate::error::Result;
 use crate::software_ray_query::blas::SoftwareBlas;
 use crate::software_ray_query::tlas::SoftwareTlas;
 
 /// Builds to record: none.
-pub(super) struct SoftwareWork;
+pub(super) struct SoftwareBuilds;
 
 impl CommandBuffer {
-    pub(super) fn plan_software_first(&self, _: &[Arc<AccelStruct>]) -> Result<SoftwareWork> {
-        Ok(SoftwareWork)
+    pub(super) fn plan_first_software_builds(&self, _: &[Arc<AccelStruct>]) -> Result<SoftwareBuilds> {
+        Ok(SoftwareBuilds)
     }
 
-    pub(super) fn plan_software(&self, _: &[Arc<AccelStruct>], _: &[bool]) -> Result<SoftwareWork> {
-        Ok(SoftwareWork)
+    pub(super) fn plan_software_builds(&self, _: &[Arc<AccelStruct>], _: &[bool]) -> Result<SoftwareBuilds> {
+        Ok(SoftwareBuilds)
     }
 
-    pub(super) fn record_software(&mut self, _: SoftwareWork) -> Result<()> {
+    pub(super) fn record_software_builds(&mut self, _: SoftwareBuilds) -> Result<()> {
         Ok(())
     }
 
-    pub(crate) fn build_software_of(&mut self, _: &Arc<AccelStruct>) -> Result<()> {
+    pub(crate) fn build_software_blas(&mut self, _: &Arc<AccelStruct>) -> Result<()> {
         Ok(())
     }
 
-    pub(super) fn moved_tree<'a>(
+    pub(super) fn moved_storage<'a>(
         &self,
         _: &AccelStruct,
         software: &'a SoftwareBlas,
@@ -48,18 +48,18 @@ impl CommandBuffer {
         match *software {}
     }
 
-    pub(super) fn build_software_tlas_from(
+    pub(super) fn build_software_tlas_from_buffer(
         &mut self,
         _: &AccelStruct,
         software: &SoftwareTlas,
         _: &DeviceInstances<'_>,
-        _: &ShownSet,
+        _: &BlasRefSet,
     ) -> Result<()> {
         match *software {}
     }
 }
 
 /// Succeeds: no build moves a tree.
-pub(super) fn check_placed(_: &AccelStruct) -> Result<()> {
+pub(super) fn check_unmoved(_: &AccelStruct) -> Result<()> {
     Ok(())
 }

@@ -8,13 +8,13 @@ use crate::accel::scratch::{aligned_scratch_address, plan_scratch};
 use crate::barrier::{Stages, Use};
 use crate::command::CommandBuffer;
 use crate::error::Result;
-use crate::kernels::spread;
+use crate::kernels::spread_workgroups;
 use crate::resource::Buffer;
 use crate::software_ray_query::gpu_build::geometry::GpuGeometry;
 use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan};
-use crate::software_ray_query::gpu_build::params::{BuildPush, Job};
+use crate::software_ray_query::gpu_build::params::{BuildPushConstants, GpuBuildParams};
 use crate::software_ray_query::gpu_build::refit_layout::GpuRefitPlan;
-use crate::software_ray_query::gpu_build::steps::{Step, build_steps, refit_steps};
+use crate::software_ray_query::gpu_build::steps::{BuildStep, build_steps, refit_steps};
 
 /// Parts of the scratch memory are aligned to their widest accesses.
 const SCRATCH_ALIGNMENT: u64 = 256;
@@ -29,7 +29,7 @@ pub(crate) struct GpuBuild {
     /// The buffer the structure lies in.
     pub(crate) target: Arc<Buffer>,
     /// Buffers the build reads: inputs, and buffers of the structures that instances show.
-    pub(crate) reads: Vec<Arc<Buffer>>,
+    pub(crate) read_buffers: Vec<Arc<Buffer>>,
 }
 
 /// One refit to record.
@@ -42,7 +42,7 @@ pub(crate) struct GpuRefit {
     /// The buffer the structure lies in.
     pub(crate) target: Arc<Buffer>,
     /// Buffers the refit reads.
-    pub(crate) reads: Vec<Arc<Buffer>>,
+    pub(crate) read_buffers: Vec<Arc<Buffer>>,
 }
 
 impl CommandBuffer {
@@ -50,7 +50,7 @@ impl CommandBuffer {
     /// than what it shows. On an error nothing of the batch that failed is recorded, nor of those behind it.
     pub(crate) fn record_gpu_builds(&mut self, builds: &[GpuBuild]) -> Result<()> {
         let sizes: Vec<_> = builds.iter().map(|build| build.plan.scratch_bytes).collect();
-        self.in_scratch_batches(&sizes, |cmd, range, scratch| {
+        self.for_each_scratch_batch(&sizes, |cmd, range, scratch| {
             let builds = &builds[range];
             let parts: Vec<_> = builds.iter().map(|build| (&build.plan, &build.source)).collect();
             let (order, steps) = build_steps(&parts);
@@ -58,13 +58,13 @@ impl CommandBuffer {
             for index in order {
                 let build = &builds[index];
                 let inputs = match &build.source {
-                    BuildSource::Geometries(list) => cmd.stage_table(list)?,
+                    BuildSource::Geometries(list) => cmd.stage_records(list)?,
                     BuildSource::Instances { .. } => 0,
                 };
-                jobs.push(build.plan.job(&build.source, inputs, build.blob, scratch[index]));
+                jobs.push(build.plan.build_params(&build.source, inputs, build.blob, scratch[index]));
             }
-            let uses = builds.iter().map(|build| (&build.target, &build.reads[..]));
-            cmd.record_jobs(&jobs, &steps, uses)
+            let uses = builds.iter().map(|build| (&build.target, &build.read_buffers[..]));
+            cmd.record_build_steps(&jobs, &steps, uses)
         })
     }
 
@@ -72,21 +72,26 @@ impl CommandBuffer {
     /// [`record_gpu_builds`](Self::record_gpu_builds).
     pub(crate) fn record_gpu_refits(&mut self, refits: &[GpuRefit]) -> Result<()> {
         let sizes: Vec<_> = refits.iter().map(|refit| refit.plan.scratch_bytes()).collect();
-        self.in_scratch_batches(&sizes, |cmd, range, scratch| {
+        self.for_each_scratch_batch(&sizes, |cmd, range, scratch| {
             let refits = &refits[range];
             let plans: Vec<_> = refits.iter().map(|refit| refit.plan).collect();
             let mut jobs = Vec::with_capacity(refits.len());
             for (refit, scratch) in refits.iter().zip(scratch) {
-                let inputs = cmd.stage_table(&refit.geometries)?;
-                jobs.push(refit.plan.job(inputs, refit.geometries.len() as u32, refit.blob, *scratch));
+                let inputs = cmd.stage_records(&refit.geometries)?;
+                jobs.push(refit.plan.refit_params(
+                    inputs,
+                    refit.geometries.len() as u32,
+                    refit.blob,
+                    *scratch,
+                ));
             }
-            let uses = refits.iter().map(|refit| (&refit.target, &refit.reads[..]));
-            cmd.record_jobs(&jobs, &refit_steps(&plans), uses)
+            let uses = refits.iter().map(|refit| (&refit.target, &refit.read_buffers[..]));
+            cmd.record_build_steps(&jobs, &refit_steps(&plans), uses)
         })
     }
 
     /// Calls `record` for each batch that shares the scratch buffer, with the addresses of its scratch memory.
-    fn in_scratch_batches(
+    fn for_each_scratch_batch(
         &mut self,
         sizes: &[u64],
         mut record: impl FnMut(&mut Self, std::ops::Range<usize>, &[u64]) -> Result<()>,
@@ -97,47 +102,51 @@ impl CommandBuffer {
         let budget = own.tiers.batch_bytes().saturating_sub(alignment);
         let batches = plan_scratch(sizes, alignment, budget);
         let most = batches.iter().map(|batch| batch.bytes).max().unwrap_or(0);
-        let (scratch, replaced) = own.get(&shared.gpu, most.saturating_add(alignment))?;
-        self.retire_replaced(replaced);
+        let (scratch, replaced) = own.get_or_grow(&shared.gpu, most.saturating_add(alignment))?;
+        self.free_replaced_scratch(replaced);
         let base = aligned_scratch_address(scratch.address, alignment);
         for batch in batches {
             let addresses: Vec<_> = batch.offsets.iter().map(|offset| base + offset).collect();
-            self.notes.uses.id(own.id, Use::shader_write(Stages::COMPUTE));
-            record(self, batch.builds, &addresses).inspect_err(|_| self.notes.uses.clear())?;
+            self.state.accesses.add_id(own.id, Use::shader_write(Stages::COMPUTE));
+            record(self, batch.builds, &addresses).inspect_err(|_| self.state.accesses.clear())?;
         }
         Ok(())
     }
 
     /// Runs the steps of some jobs, with barriers between phases; the scratch buffer is among the uses.
-    pub(crate) fn record_jobs<'a>(
+    pub(crate) fn record_build_steps<'a>(
         &mut self,
-        jobs: &[Job],
-        steps: &[Step],
+        jobs: &[GpuBuildParams],
+        steps: &[BuildStep],
         uses: impl Iterator<Item = (&'a Arc<Buffer>, &'a [Arc<Buffer>])>,
     ) -> Result<()> {
-        let jobs = self.stage_table(jobs)?;
+        let jobs = self.stage_records(jobs)?;
         let pipelines =
             steps.iter().map(|step| self.kernel_pipeline(step.kernel)).collect::<Result<Vec<_>>>()?;
         for (target, reads) in uses {
             self.use_buffer(target, Use::shader_write(Stages::COMPUTE));
             reads.iter().for_each(|buffer| self.use_buffer(buffer, Use::shader_read(Stages::COMPUTE)));
         }
-        self.flush();
+        self.flush_barriers();
         for (place, (step, pipeline)) in steps.iter().zip(pipelines).enumerate() {
             let before = place.checked_sub(1).map(|place| steps[place]);
             if before.is_some_and(|before| before.phase != step.phase) {
-                self.meet_in_compute();
+                self.compute_barrier();
             }
-            let push = BuildPush { jobs, first_job: step.job, pass_or_jobs: step.pass_or_jobs };
+            let push = BuildPushConstants { jobs, first_job: step.job, pass_or_jobs: step.pass_or_jobs };
             let bind = before.is_none_or(|before| before.kernel != step.kernel);
-            self.dispatch_kernel(bind.then_some(&pipeline), bytemuck::bytes_of(&push), spread(step.groups));
+            self.dispatch_kernel(
+                bind.then_some(&pipeline),
+                bytemuck::bytes_of(&push),
+                spread_workgroups(step.groups),
+            );
         }
         self.restore_compute();
         Ok(())
     }
 
     /// Has later dispatches of a build see what earlier ones wrote. The tracker knows the first and the last of them.
-    fn meet_in_compute(&self) {
+    fn compute_barrier(&self) {
         let written = vk::AccessFlags2::SHADER_STORAGE_WRITE;
         let barrier = [vk::MemoryBarrier2::default()
             .src_stage_mask(vk::PipelineStageFlags2::COMPUTE_SHADER)
@@ -150,7 +159,7 @@ impl CommandBuffer {
     }
 
     /// The address of records that the GPU may read until the command buffer is done.
-    fn stage_table<T: bytemuck::NoUninit>(&mut self, records: &[T]) -> Result<u64> {
+    fn stage_records<T: bytemuck::NoUninit>(&mut self, records: &[T]) -> Result<u64> {
         let bytes = bytemuck::cast_slice(records);
         let region = self.shared.staging.write(bytes, TABLE_ALIGNMENT, self.recording.staging_key())?;
         Ok(region.address)

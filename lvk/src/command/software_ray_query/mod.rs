@@ -11,46 +11,46 @@ use ash::vk;
 use super::CommandBuffer;
 use crate::accel::AccelStruct;
 use crate::accel::blas::Blas;
-use crate::accel::blas_refs::{Shown, ShownSet};
+use crate::accel::blas_refs::{BlasRef, BlasRefSet};
 use crate::accel::build::instance_bytes;
-use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance, check, pack};
-use crate::software_ray_query::blas::{Origin, SoftwareBlas};
+use crate::accel::instance::{DeviceInstances, INSTANCE_BYTES, TlasInstance, check_instance, to_raw};
+use crate::software_ray_query::blas::{BvhOrigin, SoftwareBlas};
 use crate::software_ray_query::gpu_build::geometry::{GpuGeometry, gpu_geometries};
 use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan};
 use crate::software_ray_query::gpu_build::refit_layout::GpuRefitPlan;
-use crate::software_ray_query::layout::{MOVED, MovedHeader};
-use crate::software_ray_query::storage::SoftwareBody;
+use crate::software_ray_query::layout::{FORMAT_MOVED, MovedHeader};
+use crate::software_ray_query::storage::SoftwareAccelStorage;
 use crate::software_ray_query::tlas::SoftwareTlas;
 
 use crate::barrier::{ResourceId, Stages, Use};
 use crate::error::{Error, Result};
 use crate::handle::AccelStructHandle;
 use crate::resource::Buffer;
-use crate::software_ray_query::bvh::encode_instances::{PlacedInstance, ShownStructure, place};
+use crate::software_ray_query::bvh::encode_instances::{InstancedBlas, PlacedInstance, place_instance};
 use crate::software_ray_query::bvh::encode_tlas;
 
 use gpu_build::{GpuBuild, GpuRefit};
 
 /// So many instances the CPU builds a tree over that is worth more than its time. A driver that runs on the CPU has no
 /// faster builds.
-const MOST_ON_CPU: usize = 512;
+const MAX_CPU_TLAS_INSTANCES: usize = 512;
 /// Addresses of tables and records.
 const ALIGNMENT: u64 = 16;
 
 /// Builds and refits to record side by side.
 #[derive(Default)]
-pub(super) struct SoftwareWork {
+pub(super) struct SoftwareBuilds {
     targets: Vec<ResourceId>,
     builds: Vec<GpuBuild>,
     refits: Vec<GpuRefit>,
-    moves: Vec<Move>,
+    moves: Vec<BlobMove>,
 }
 
 /// A structure that the CPU built and that has a tree of the GPU from now on.
-struct Move {
+struct BlobMove {
     target: ResourceId,
     /// What it leaves if that lies elsewhere, and what has to be said there.
-    left: Option<(Arc<SoftwareBody>, MovedHeader)>,
+    left: Option<(Arc<SoftwareAccelStorage>, MovedHeader)>,
 }
 
 impl CommandBuffer {
@@ -58,30 +58,30 @@ impl CommandBuffer {
     pub(crate) fn fill_software_blas(
         &mut self,
         target: &AccelStruct,
-        body: &SoftwareBody,
+        body: &SoftwareAccelStorage,
         bytes: &[u8],
     ) -> Result<()> {
-        self.fill_software(target, self.shared.new_blas[self.recording.queue_index], body, bytes)
+        self.fill_software_storage(target, self.shared.new_blas[self.recording.queue_index], body, bytes)
     }
 
     /// The next command copies what software traces.
-    pub(crate) fn read_software_blas(&mut self, body: &SoftwareBody) {
-        self.use_shown(Use::transfer_read());
+    pub(crate) fn read_software_blas(&mut self, body: &SoftwareAccelStorage) {
+        self.use_all_blas(Use::transfer_read());
         self.use_buffer(body.buffer(), Use::transfer_read());
     }
 
-    fn fill_software(
+    fn fill_software_storage(
         &mut self,
         target: &AccelStruct,
         all: ResourceId,
-        body: &SoftwareBody,
+        body: &SoftwareAccelStorage,
         bytes: &[u8],
     ) -> Result<()> {
         let region = self.shared.staging.write(bytes, ALIGNMENT, self.recording.staging_key())?;
-        self.notes.uses.id(target.id, Use::transfer_write());
-        self.notes.uses.accumulate(all, Use::transfer_write());
+        self.state.accesses.add_id(target.id, Use::transfer_write());
+        self.state.accesses.add_accumulating(all, Use::transfer_write());
         self.use_buffer(body.buffer(), Use::transfer_write());
-        self.flush();
+        self.flush_barriers();
         let copy =
             vk::BufferCopy { src_offset: region.offset, dst_offset: body.offset(), size: bytes.len() as u64 };
         // SAFETY: the structure has room for the bytes, which lie in the staging memory.
@@ -92,122 +92,126 @@ impl CommandBuffer {
     }
 
     /// What has to be built on the GPU of structures that have nothing yet; what the CPU built is ready.
-    pub(super) fn plan_software_first(&self, structures: &[Arc<AccelStruct>]) -> Result<SoftwareWork> {
+    pub(super) fn plan_first_software_builds(
+        &self,
+        structures: &[Arc<AccelStruct>],
+    ) -> Result<SoftwareBuilds> {
         let is_of_gpu = |target: &&Arc<AccelStruct>| {
             let software = target.blas().ok().and_then(|blas| blas.software.as_ref());
-            software.is_some_and(|software| matches!(software.origin, Origin::Gpu(_)))
+            software.is_some_and(|software| matches!(software.origin, BvhOrigin::Gpu(_)))
         };
         let structures: Vec<_> = structures.iter().filter(is_of_gpu).cloned().collect();
         let rebuilds = vec![false; structures.len()];
-        self.plan_software(&structures, &rebuilds)
+        self.plan_software_builds(&structures, &rebuilds)
     }
 
     /// Builds what software traces of a structure for the first time.
-    pub(crate) fn build_software_of(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
-        let work = self.plan_software_first(std::slice::from_ref(target))?;
-        self.record_software(work)
+    pub(crate) fn build_software_blas(&mut self, target: &Arc<AccelStruct>) -> Result<()> {
+        let work = self.plan_first_software_builds(std::slice::from_ref(target))?;
+        self.record_software_builds(work)
     }
 
     /// Makes room for builds or refits of what software traces of these structures; records nothing.
-    pub(super) fn plan_software(
+    pub(super) fn plan_software_builds(
         &self,
         structures: &[Arc<AccelStruct>],
         refits: &[bool],
-    ) -> Result<SoftwareWork> {
-        let mut work = SoftwareWork::default();
+    ) -> Result<SoftwareBuilds> {
+        let mut work = SoftwareBuilds::default();
         for (target, refit) in structures.iter().zip(refits) {
             let blas = target.blas()?;
             if let Some(software) = &blas.software {
                 work.targets.push(target.id);
-                self.plan_one(target, blas, software, *refit, &mut work)?;
+                self.plan_software_build(target, blas, software, *refit, &mut work)?;
             }
         }
         Ok(work)
     }
 
     /// Records what was planned.
-    pub(super) fn record_software(&mut self, work: SoftwareWork) -> Result<()> {
-        let SoftwareWork { targets, builds, refits, moves } = work;
+    pub(super) fn record_software_builds(&mut self, work: SoftwareBuilds) -> Result<()> {
+        let SoftwareBuilds { targets, builds, refits, moves } = work;
         if builds.is_empty() && refits.is_empty() {
             return Ok(());
         }
         let write = Use::shader_write(Stages::COMPUTE);
-        targets.into_iter().for_each(|target| self.notes.uses.id(target, write));
+        targets.into_iter().for_each(|target| self.state.accesses.add_id(target, write));
         let group = self.built_group();
-        self.notes.uses.accumulate(group, write);
+        self.state.accesses.add_accumulating(group, write);
         if !builds.is_empty() {
             self.record_gpu_builds(&builds)?;
         }
         if !refits.is_empty() {
             self.record_gpu_refits(&refits)?;
         }
-        moves.iter().for_each(|moved| self.record_move(moved));
+        moves.iter().for_each(|moved| self.record_blob_move(moved));
         Ok(())
     }
 
-    fn plan_one(
+    fn plan_software_build(
         &self,
         target: &Arc<AccelStruct>,
         blas: &Blas,
         software: &SoftwareBlas,
         refit: bool,
-        work: &mut SoftwareWork,
+        work: &mut SoftwareBuilds,
     ) -> Result<()> {
         let geometries = self.gpu_geometries(target, blas)?;
-        let reads = self.reads(blas)?;
-        let moved = self.moved_tree(target, software);
-        let refit_of = |plan: GpuRefitPlan, body: &SoftwareBody| GpuRefit {
+        let reads = self.build_input_buffers(blas)?;
+        let moved = self.moved_storage(target, software);
+        let refit_of = |plan: GpuRefitPlan, body: &SoftwareAccelStorage| GpuRefit {
             plan,
             geometries: geometries.clone(),
             blob: body.address,
             target: Arc::clone(body.buffer()),
-            reads: reads.clone(),
+            read_buffers: reads.clone(),
         };
-        let build_of = |plan: &_, body: &SoftwareBody| GpuBuild {
+        let build_of = |plan: &_, body: &SoftwareAccelStorage| GpuBuild {
             plan: Clone::clone(plan),
             source: BuildSource::Geometries(geometries.clone()),
             blob: body.address,
             target: Arc::clone(body.buffer()),
-            reads: reads.clone(),
+            read_buffers: reads.clone(),
         };
         match (refit, &software.origin, moved) {
-            (true, Origin::Cpu { rebuild, .. }, Some(rebuilt)) => {
-                work.refits.push(refit_of(GpuRefitPlan::of_build(rebuild), rebuilt));
+            (true, BvhOrigin::Cpu { rebuild, .. }, Some(rebuilt)) => {
+                work.refits.push(refit_of(GpuRefitPlan::from_build(rebuild), rebuilt));
             }
-            (true, Origin::Cpu { refit: Some(plan), .. }, None) => {
-                work.refits.push(refit_of(*plan, &software.body))
+            (true, BvhOrigin::Cpu { refit: Some(plan), .. }, None) => {
+                work.refits.push(refit_of(*plan, &software.storage))
             }
-            (true, Origin::Cpu { refit: None, .. }, None) => target.check_refit()?,
-            (true, Origin::Gpu(plan), _) => {
-                work.refits.push(refit_of(GpuRefitPlan::of_build(plan), &software.body));
+            (true, BvhOrigin::Cpu { refit: None, .. }, None) => target.check_refit()?,
+            (true, BvhOrigin::Gpu(plan), _) => {
+                work.refits.push(refit_of(GpuRefitPlan::from_build(plan), &software.storage));
             }
-            (false, Origin::Gpu(plan), _) => work.builds.push(build_of(plan, &software.body)),
-            (false, Origin::Cpu { rebuild, .. }, _) => {
-                let rebuilt = software.rebuilt_or(|| self.room_for(target, rebuild))?;
+            (false, BvhOrigin::Gpu(plan), _) => work.builds.push(build_of(plan, &software.storage)),
+            (false, BvhOrigin::Cpu { rebuild, .. }, _) => {
+                let rebuilt =
+                    software.storage_after_rebuild_or(|| self.storage_for_rebuild(target, rebuild))?;
                 work.builds.push(build_of(rebuild, rebuilt));
-                let is_elsewhere = !Arc::ptr_eq(rebuilt, &software.body);
-                let header = MovedHeader { format: MOVED, leaf_kind: 0, address: rebuilt.address };
-                let left = is_elsewhere.then(|| (Arc::clone(&software.body), header));
-                work.moves.push(Move { target: target.id, left });
+                let is_elsewhere = !Arc::ptr_eq(rebuilt, &software.storage);
+                let header = MovedHeader { format: FORMAT_MOVED, leaf_kind: 0, address: rebuilt.address };
+                let left = is_elsewhere.then(|| (Arc::clone(&software.storage), header));
+                work.moves.push(BlobMove { target: target.id, left });
             }
         }
         Ok(())
     }
 
     /// Where a structure that the CPU built lies at the next command, if it was rebuilt.
-    pub(super) fn moved_tree<'a>(
+    pub(super) fn moved_storage<'a>(
         &self,
         target: &AccelStruct,
         software: &'a SoftwareBlas,
-    ) -> Option<&'a Arc<SoftwareBody>> {
-        let here = software.rebuilt().filter(|_| self.notes.moved.contains(&target.id.0));
-        here.or(software.moved())
+    ) -> Option<&'a Arc<SoftwareAccelStorage>> {
+        let here = software.storage_after_rebuild().filter(|_| self.state.moved_blas.contains(&target.id.0));
+        here.or(software.moved_storage())
     }
 
     /// Room for builds on the GPU of what the CPU built first.
-    fn room_for(&self, target: &AccelStruct, plan: &GpuBuildPlan) -> Result<SoftwareBody> {
+    fn storage_for_rebuild(&self, target: &AccelStruct, plan: &GpuBuildPlan) -> Result<SoftwareAccelStorage> {
         let shared = &self.shared;
-        SoftwareBody::new(&shared.gpu, &shared.accel_storage, &target.name, plan.blob_bytes)
+        SoftwareAccelStorage::new(&shared.gpu, &shared.accel_storage, &target.name, plan.blob_bytes)
     }
 
     fn gpu_geometries(&self, target: &AccelStruct, blas: &Blas) -> Result<Vec<GpuGeometry>> {
@@ -217,12 +221,12 @@ impl CommandBuffer {
     }
 
     /// Has the body that a structure leaves refer to the other one.
-    fn record_move(&mut self, moved: &Move) {
-        self.notes.moved.insert(moved.target.0);
+    fn record_blob_move(&mut self, moved: &BlobMove) {
+        self.state.moved_blas.insert(moved.target.0);
         let Some((body, header)) = &moved.left else { return };
         self.use_buffer(body.buffer(), Use::transfer_write());
-        self.notes.uses.accumulate(self.shared.all_blas, Use::transfer_write());
-        self.flush();
+        self.state.accesses.add_accumulating(self.shared.all_blas, Use::transfer_write());
+        self.flush_barriers();
         let bytes = bytemuck::bytes_of(header);
         // SAFETY: the body begins with a header, at a multiple of 4.
         unsafe {
@@ -239,12 +243,12 @@ impl CommandBuffer {
         instances: &[TlasInstance],
     ) -> Result<()> {
         let shared = Arc::clone(&self.shared);
-        if (shared.gpu.caps.is_cpu || instances.len() <= MOST_ON_CPU)
+        if (shared.gpu.caps.is_cpu || instances.len() <= MAX_CPU_TLAS_INSTANCES)
             && let Some(placed) = self.place_instances(target, instances)?
         {
-            let bytes = encode_tlas::build(&placed, software.room);
-            self.rely_on_places(instances)?;
-            return self.fill_software(target, shared.all_tlas, &software.body, &bytes);
+            let bytes = encode_tlas::encode_tlas(&placed, software.record_capacity);
+            self.expect_unmoved_blas(instances)?;
+            return self.fill_software_storage(target, shared.all_tlas, &software.storage, &bytes);
         }
         let bytes = instance_bytes(instances.len().max(1) as u32);
         let (region, written) =
@@ -258,16 +262,16 @@ impl CommandBuffer {
     }
 
     /// As [`build_software_tlas`](Self::build_software_tlas), from records in a buffer that name structures by place.
-    pub(super) fn build_software_tlas_from(
+    pub(super) fn build_software_tlas_from_buffer(
         &mut self,
         target: &AccelStruct,
         software: &SoftwareTlas,
         instances: &DeviceInstances<'_>,
-        shown: &ShownSet,
+        shown: &BlasRefSet,
     ) -> Result<()> {
         let buffer = self.shared.store.buffers.get(instances.buffer)?;
-        let address = |shown: &Shown| Ok(software_body(&shown.blas)?.address);
-        let mut table = shown.list().iter().map(address).collect::<Result<Vec<u64>>>()?;
+        let address = |shown: &BlasRef| Ok(software_storage(&shown.blas)?.address);
+        let mut table = shown.refs().iter().map(address).collect::<Result<Vec<u64>>>()?;
         let entries = table.len() as u32;
         table.resize(table.len().max(1), 0);
         let bytes = bytemuck::cast_slice(&table);
@@ -287,39 +291,39 @@ impl CommandBuffer {
         instances: &[TlasInstance],
     ) -> Result<Option<Vec<PlacedInstance>>> {
         let mut placed = Vec::with_capacity(instances.len());
-        let mut last: Option<(AccelStructHandle, ShownStructure)> = None;
+        let mut last: Option<(AccelStructHandle, InstancedBlas)> = None;
         for (number, instance) in instances.iter().enumerate() {
-            check(&target.name, number, instance)?;
+            check_instance(&target.name, number, instance)?;
             let shown = match last {
                 Some((handle, shown)) if handle == instance.blas => shown,
-                _ => match self.shown_structure(instance.blas)? {
+                _ => match self.instanced_blas(instance.blas)? {
                     Some(shown) => shown,
                     None => return Ok(None),
                 },
             };
-            placed.extend(place(number as u32, instance, &shown));
+            placed.extend(place_instance(number as u32, instance, &shown));
             last = Some((instance.blas, shown));
         }
         Ok(Some(placed))
     }
 
     /// What the instances show must not be rebuilt before this is submitted.
-    fn rely_on_places(&mut self, instances: &[TlasInstance]) -> Result<()> {
+    fn expect_unmoved_blas(&mut self, instances: &[TlasInstance]) -> Result<()> {
         let mut last = None;
         for handle in instances.iter().map(|instance| instance.blas) {
             if last.replace(handle) != Some(handle) {
                 let blas = self.shared.store.accel_structs.get(handle)?;
-                self.notes.placed.entry(blas.id.0).or_insert(blas);
+                self.state.placed_blas.entry(blas.id.0).or_insert(blas);
             }
         }
         Ok(())
     }
 
-    fn shown_structure(&self, handle: AccelStructHandle) -> Result<Option<ShownStructure>> {
+    fn instanced_blas(&self, handle: AccelStructHandle) -> Result<Option<InstancedBlas>> {
         let blas = self.shared.store.accel_structs.get(handle)?;
-        let address = software_body(&blas)?.address;
-        let parts = blas.blas()?.software.as_ref().and_then(SoftwareBlas::known_parts);
-        Ok(parts.map(|parts| ShownStructure { address, parts: Arc::clone(parts) }))
+        let address = software_storage(&blas)?.address;
+        let parts = blas.blas()?.software.as_ref().and_then(SoftwareBlas::rebraid_parts);
+        Ok(parts.map(|parts| InstancedBlas { address, parts: Arc::clone(parts) }))
     }
 
     fn write_software_instances(
@@ -331,13 +335,13 @@ impl CommandBuffer {
         let mut last: Option<(AccelStructHandle, u64)> = None;
         for (index, (instance, out)) in instances.iter().zip(out.chunks_exact_mut(INSTANCE_BYTES)).enumerate()
         {
-            check(&target.name, index, instance)?;
+            check_instance(&target.name, index, instance)?;
             let address = match last {
                 Some((handle, address)) if handle == instance.blas => address,
-                _ => software_body(&*self.shared.store.accel_structs.get(instance.blas)?)?.address,
+                _ => software_storage(&*self.shared.store.accel_structs.get(instance.blas)?)?.address,
             };
             last = Some((instance.blas, address));
-            out.copy_from_slice(bytemuck::bytes_of(&pack(instance, address)));
+            out.copy_from_slice(bytemuck::bytes_of(&to_raw(instance, address)));
         }
         Ok(())
     }
@@ -350,23 +354,23 @@ impl CommandBuffer {
         reads: Vec<Arc<Buffer>>,
     ) -> Result<()> {
         let write = Use::shader_write(Stages::COMPUTE);
-        self.notes.uses.id(target.id, write);
-        self.use_shown(Use::shader_read(Stages::COMPUTE));
-        self.notes.uses.accumulate(self.shared.all_tlas, write);
+        self.state.accesses.add_id(target.id, write);
+        self.use_all_blas(Use::shader_read(Stages::COMPUTE));
+        self.state.accesses.add_accumulating(self.shared.all_tlas, write);
         self.record_gpu_builds(&[GpuBuild {
             plan: software.plan.clone(),
             source,
-            blob: software.body.address,
-            target: Arc::clone(software.body.buffer()),
-            reads,
+            blob: software.storage.address,
+            target: Arc::clone(software.storage.buffer()),
+            read_buffers: reads,
         }])
     }
 }
 
 /// Fails if a submission has moved the tree of a structure that the host placed when it recorded an update.
-pub(super) fn check_placed(blas: &AccelStruct) -> Result<()> {
+pub(super) fn check_unmoved(blas: &AccelStruct) -> Result<()> {
     let software = blas.blas()?.software.as_ref();
-    if software.is_none_or(|software| software.moved().is_none()) {
+    if software.is_none_or(|software| software.moved_storage().is_none()) {
         return Ok(());
     }
     let message = "a top-level structure was updated to show it, but a submission since then has rebuilt it; record \
@@ -375,7 +379,7 @@ pub(super) fn check_placed(blas: &AccelStruct) -> Result<()> {
 }
 
 /// What software traces of a bottom-level structure.
-fn software_body(blas: &AccelStruct) -> Result<&Arc<SoftwareBody>> {
-    let none = || Error::usage(&blas.name, "the structure has nothing that software could trace");
-    Ok(&blas.blas()?.software.as_ref().ok_or_else(none)?.body)
+fn software_storage(blas: &AccelStruct) -> Result<&Arc<SoftwareAccelStorage>> {
+    let none = || Error::usage(&blas.name, "the acceleration structure has no BVH for software traversal");
+    Ok(&blas.blas()?.software.as_ref().ok_or_else(none)?.storage)
 }

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::{SOURCE, Settle, TARGET};
+use super::{SOURCE_LAYOUT, TARGET_LAYOUT};
 use crate::command::CommandBuffer;
+use crate::command::pending_visibility::PendingVisibility;
 use crate::error::{Error, Result};
 use crate::format::Format;
 use crate::handle::TextureHandle;
@@ -50,7 +51,7 @@ impl CommandBuffer {
         }
         self.use_texture_pair(&source, &from, &target, &to)?;
         self.record_blit((&source, &from), (&target, &to), filter);
-        self.settle_pair(source, target);
+        self.make_pair_visible(source, target);
         Ok(())
     }
 
@@ -74,7 +75,7 @@ impl CommandBuffer {
             self.use_texture_pair(texture, &from, texture, &to)?;
             self.record_blit((texture, &from), (texture, &to), Filter::Linear);
         }
-        self.notes.settle.push(Settle::Texture(Arc::clone(texture)));
+        self.state.pending_visibility.push(PendingVisibility::Texture(Arc::clone(texture)));
         Ok(())
     }
 
@@ -88,7 +89,7 @@ impl CommandBuffer {
             Filter::Linear => vk::FormatFeatureFlags::SAMPLED_IMAGE_FILTER_LINEAR,
         };
         let read = vk::FormatFeatureFlags::BLIT_SRC | linear;
-        let scales = scales(from, to, filter)
+        let scales = is_blit_supported(from, to, filter)
             && gpu.format_features(from).contains(read)
             && gpu.format_features(to).contains(vk::FormatFeatureFlags::BLIT_DST);
         if scales {
@@ -114,13 +115,21 @@ impl CommandBuffer {
         let (from, to, filter) = (source.image.raw, target.image.raw, filter.raw());
         // SAFETY: both regions lie inside their images, and the formats can be blitted.
         unsafe {
-            self.shared.gpu.device.cmd_blit_image(self.raw(), from, SOURCE, to, TARGET, &[blit], filter);
+            self.shared.gpu.device.cmd_blit_image(
+                self.raw(),
+                from,
+                SOURCE_LAYOUT,
+                to,
+                TARGET_LAYOUT,
+                &[blit],
+                filter,
+            );
         }
     }
 }
 
 /// Whether Vulkan scales between the formats at all.
-fn scales(from: Format, to: Format, filter: Filter) -> bool {
+fn is_blit_supported(from: Format, to: Format, filter: Filter) -> bool {
     if from.is_yuv() || to.is_yuv() {
         return false;
     }

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::Settle;
 use crate::barrier::Use;
 use crate::command::CommandBuffer;
+use crate::command::pending_visibility::PendingVisibility;
 use crate::error::{Error, Result};
 use crate::handle::BufferHandle;
 use crate::resource::Buffer;
@@ -74,8 +74,8 @@ impl CommandBuffer {
         }
         self.use_buffer(source, Use::transfer_read());
         self.use_buffer(target, Use::transfer_write());
-        self.flush();
-        self.notes.settle.push(Settle::Buffer(Arc::clone(target)));
+        self.flush_barriers();
+        self.state.pending_visibility.push(PendingVisibility::Buffer(Arc::clone(target)));
         // SAFETY: all ranges lie inside their buffers, and no target overlaps another or a source.
         unsafe { self.shared.gpu.device.cmd_copy_buffer(self.raw(), source.raw, target.raw, &raw) };
         Ok(())
@@ -92,10 +92,10 @@ impl CommandBuffer {
             return Ok(());
         }
         self.use_buffer(&buffer, Use::transfer_write());
-        self.flush();
+        self.flush_barriers();
         // SAFETY: the range lies inside the buffer and is aligned.
         unsafe { self.shared.gpu.device.cmd_fill_buffer(self.raw(), buffer.raw, offset, size, value) };
-        self.notes.settle.push(Settle::Buffer(buffer));
+        self.state.pending_visibility.push(PendingVisibility::Buffer(buffer));
         Ok(())
     }
 
@@ -113,10 +113,10 @@ impl CommandBuffer {
             return Ok(());
         }
         self.use_buffer(&buffer, Use::transfer_write());
-        self.flush();
+        self.flush_barriers();
         // SAFETY: the range lies inside the buffer, is aligned, and not too large.
         unsafe { self.shared.gpu.device.cmd_update_buffer(self.raw(), buffer.raw, offset, bytes) };
-        self.notes.settle.push(Settle::Buffer(buffer));
+        self.state.pending_visibility.push(PendingVisibility::Buffer(buffer));
         Ok(())
     }
 
@@ -128,11 +128,11 @@ impl CommandBuffer {
         }
         let region = self.shared.staging.write(bytes, 16, self.recording.staging_key())?;
         self.use_buffer(target, Use::transfer_write());
-        self.flush();
+        self.flush_barriers();
         let copy = vk::BufferCopy { src_offset: region.offset, dst_offset: offset, size: bytes.len() as u64 };
         // SAFETY: both ranges lie inside their buffers.
         unsafe { self.shared.gpu.device.cmd_copy_buffer(self.raw(), region.buffer, target.raw, &[copy]) };
-        self.notes.settle.push(Settle::Buffer(Arc::clone(target)));
+        self.state.pending_visibility.push(PendingVisibility::Buffer(Arc::clone(target)));
         Ok(())
     }
 }
@@ -143,20 +143,23 @@ fn check_copies(source: &Buffer, target: &Buffer, regions: &[BufferCopy]) -> Res
         source.check_range(region.source_offset, region.size)?;
         target.check_range(region.target_offset, region.size)?;
     }
-    let mut written: Vec<_> = spans(regions, |region| region.target_offset).collect();
+    let mut written: Vec<_> = non_empty_ranges(regions, |region| region.target_offset).collect();
     written.sort_unstable();
     if written.windows(2).any(|pair| pair[0].1 > pair[1].0) {
         return Err(Error::usage(&target.name, "two targets of the copy overlap"));
     }
     let overlaps = |read: (u64, u64)| written.iter().any(|(start, end)| *start < read.1 && read.0 < *end);
-    if source.id == target.id && spans(regions, |region| region.source_offset).any(overlaps) {
+    if source.id == target.id && non_empty_ranges(regions, |region| region.source_offset).any(overlaps) {
         return Err(Error::usage(&source.name, "source and target of the copy overlap"));
     }
     Ok(())
 }
 
 /// First byte of each range that is not empty, and the one behind its last.
-fn spans(regions: &[BufferCopy], start: impl Fn(&BufferCopy) -> u64) -> impl Iterator<Item = (u64, u64)> {
+fn non_empty_ranges(
+    regions: &[BufferCopy],
+    start: impl Fn(&BufferCopy) -> u64,
+) -> impl Iterator<Item = (u64, u64)> {
     let full = regions.iter().filter(|region| region.size > 0);
     full.map(move |region| (start(region), start(region) + region.size))
 }

@@ -2,9 +2,10 @@
 
 use ash::vk;
 
-use super::{Settle, TARGET};
+use super::TARGET_LAYOUT;
 use crate::barrier::Use;
 use crate::command::CommandBuffer;
+use crate::command::pending_visibility::PendingVisibility;
 use crate::error::{Error, Result};
 use crate::format::NumericFormat;
 use crate::handle::TextureHandle;
@@ -51,37 +52,38 @@ impl CommandBuffer {
             self.needs_graphics("a clear of depth or stencil")?;
         }
         self.use_texture(&texture, part, Use::transfer_write())?;
-        self.flush();
+        self.flush_barriers();
         let range =
             vk::ImageSubresourceRange { aspect_mask: aspects, ..texture.image.barrier_image().range(part) };
         let (device, image) = (&self.shared.gpu.device, texture.image.raw);
         // SAFETY: the range lies inside the image, whose format holds such a value.
         unsafe {
             match raw_value(value) {
-                Raw::Color(color) => {
-                    device.cmd_clear_color_image(self.raw(), image, TARGET, &color, &[range])
+                RawClearValue::Color(color) => {
+                    device.cmd_clear_color_image(self.raw(), image, TARGET_LAYOUT, &color, &[range])
                 }
-                Raw::DepthStencil(value) => {
-                    device.cmd_clear_depth_stencil_image(self.raw(), image, TARGET, &value, &[range]);
+                RawClearValue::DepthStencil(value) => {
+                    device.cmd_clear_depth_stencil_image(self.raw(), image, TARGET_LAYOUT, &value, &[range]);
                 }
             }
         }
-        self.notes.settle.push(Settle::Texture(texture));
+        self.state.pending_visibility.push(PendingVisibility::Texture(texture));
         Ok(())
     }
 }
 
-enum Raw {
+enum RawClearValue {
     Color(vk::ClearColorValue),
     DepthStencil(vk::ClearDepthStencilValue),
 }
 
-fn raw_value(value: ClearValue) -> Raw {
-    let depth_stencil = |depth, stencil| Raw::DepthStencil(vk::ClearDepthStencilValue { depth, stencil });
+fn raw_value(value: ClearValue) -> RawClearValue {
+    let depth_stencil =
+        |depth, stencil| RawClearValue::DepthStencil(vk::ClearDepthStencilValue { depth, stencil });
     match value {
-        ClearValue::Color(float32) => Raw::Color(vk::ClearColorValue { float32 }),
-        ClearValue::Uint(uint32) => Raw::Color(vk::ClearColorValue { uint32 }),
-        ClearValue::Sint(int32) => Raw::Color(vk::ClearColorValue { int32 }),
+        ClearValue::Color(float32) => RawClearValue::Color(vk::ClearColorValue { float32 }),
+        ClearValue::Uint(uint32) => RawClearValue::Color(vk::ClearColorValue { uint32 }),
+        ClearValue::Sint(int32) => RawClearValue::Color(vk::ClearColorValue { int32 }),
         ClearValue::Depth(depth) => depth_stencil(depth, 0),
         ClearValue::Stencil(stencil) => depth_stencil(0.0, stencil),
         ClearValue::DepthStencil(depth, stencil) => depth_stencil(depth, stencil),
@@ -104,8 +106,8 @@ fn check_value(texture: &Texture, value: ClearValue) -> Result<vk::ImageAspectFl
         ClearValue::DepthStencil(..) => (Aspects::DEPTH | Aspects::STENCIL, None),
     };
     let (depth, stencil) = match raw_value(value) {
-        Raw::Color(_) => (0.0, 0),
-        Raw::DepthStencil(value) => (value.depth, value.stencil),
+        RawClearValue::Color(_) => (0.0, 0),
+        RawClearValue::DepthStencil(value) => (value.depth, value.stencil),
     };
     if !texture.view_aspects().contains(wanted) {
         return wrong("it does not hold that");

@@ -1,48 +1,40 @@
 //! What copies leave behind is made readable everywhere before shaders run.
 
-use std::sync::Arc;
-
 use crate::barrier::{Layout, Stages, Use};
 use crate::command::CommandBuffer;
+use crate::command::pending_visibility::PendingVisibility;
 use crate::command::queue_support::limited_to_queue;
-use crate::command::recording_state::Notes;
+use crate::command::recording_state::RecordingState;
 use crate::resource::texture_desc::TextureUsage;
-use crate::resource::{Buffer, Texture};
 use crate::submit::Recording;
 use crate::submit::emit_barriers::emit;
-
-/// A resource a copy wrote, or read in a layout of its own, to be made readable everywhere before shaders run.
-pub(in crate::command) enum Settle {
-    Buffer(Arc<Buffer>),
-    Texture(Arc<Texture>),
-}
 
 impl CommandBuffer {
     /// Makes what copies touched readable by every shader and every input, with one barrier for all.
     #[inline]
-    pub(in crate::command) fn settle(&mut self) {
-        if !self.notes.settle.is_empty() {
-            self.settle_all();
+    pub(in crate::command) fn make_visible(&mut self) {
+        if !self.state.pending_visibility.is_empty() {
+            self.make_all_visible();
         }
     }
 
-    fn settle_all(&mut self) {
+    fn make_all_visible(&mut self) {
         let queue_index = self.recording.queue_index;
         let Recording { tracker, images, commands, .. } = &mut **self.recording;
-        let Notes { settle, barriers, last_barrier, .. } = &mut **self.notes;
+        let RecordingState { pending_visibility, barriers, last_barrier, .. } = &mut **self.state;
         barriers.clear();
         // What was written twice is listed twice; the second read needs no barrier any more.
-        for written in settle.drain(..) {
+        for written in pending_visibility.drain(..) {
             match written {
-                Settle::Buffer(buffer) => {
+                PendingVisibility::Buffer(buffer) => {
                     tracker.use_buffer(
                         buffer.id,
                         limited_to_queue(queue_index, Use::everything_read()),
                         barriers,
                     );
                 }
-                Settle::Texture(texture) => {
-                    let Some(read) = resting_use(texture.image.usage) else { continue };
+                PendingVisibility::Texture(texture) => {
+                    let Some(read) = default_use(texture.image.usage) else { continue };
                     let read = limited_to_queue(queue_index, read);
                     let image = &texture.image;
                     images.insert(image.id, image.barrier_image());
@@ -55,7 +47,7 @@ impl CommandBuffer {
 }
 
 /// How shaders read a texture that no command declares; `None` for textures they do not read.
-fn resting_use(usage: TextureUsage) -> Option<Use> {
+fn default_use(usage: TextureUsage) -> Option<Use> {
     let read = Use::shader_read(Stages::SHADERS);
     if usage.contains(TextureUsage::SAMPLED) {
         return Some(read);

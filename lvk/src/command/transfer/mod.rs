@@ -13,6 +13,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::CommandBuffer;
+use super::pending_visibility::PendingVisibility;
 use crate::barrier::Use;
 use crate::error::Result;
 use crate::resource::Texture;
@@ -20,12 +21,11 @@ use crate::resource::region::Region;
 
 pub use buffer::BufferCopy;
 pub use clear::ClearValue;
-pub(super) use make_visible::Settle;
 
 /// Layout of an image that is copied from.
-const SOURCE: vk::ImageLayout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+const SOURCE_LAYOUT: vk::ImageLayout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
 /// Layout of an image that is copied to.
-const TARGET: vk::ImageLayout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+const TARGET_LAYOUT: vk::ImageLayout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
 
 impl CommandBuffer {
     /// The next command reads one region and writes another.
@@ -36,18 +36,18 @@ impl CommandBuffer {
         target: &Arc<Texture>,
         to: &Region,
     ) -> Result<()> {
-        self.notes.uses.clear();
+        self.state.accesses.clear();
         self.use_texture(source, from.subresources(), Use::transfer_read())?;
         if let Err(error) = self.use_texture(target, to.subresources(), Use::transfer_write()) {
-            self.notes.uses.clear();
+            self.state.accesses.clear();
             return Err(error);
         }
-        self.flush();
+        self.flush_barriers();
         Ok(())
     }
 
     /// Both are read by shaders next, where nobody says otherwise.
-    fn settle_pair(&mut self, source: Arc<Texture>, target: Arc<Texture>) {
-        self.notes.settle.extend([source, target].map(Settle::Texture));
+    fn make_pair_visible(&mut self, source: Arc<Texture>, target: Arc<Texture>) {
+        self.state.pending_visibility.extend([source, target].map(PendingVisibility::Texture));
     }
 }

@@ -20,17 +20,14 @@ impl CommandBuffer {
         let texture = self.shared.store.textures.get(texture)?;
         let known = layout_from_vulkan(layout).map_err(|why| Error::usage(&texture.name, why))?;
         if layout == vk::ImageLayout::UNDEFINED {
-            return Err(Error::usage(
-                &texture.name,
-                "nobody can be handed a texture in the layout UNDEFINED",
-            ));
+            return Err(Error::usage(&texture.name, "a texture cannot be released in the layout UNDEFINED"));
         }
         // What copies touched is otherwise made readable by shaders later.
-        self.settle();
+        self.make_visible();
         self.use_texture(&texture, texture.range, Use::transfer_read().with_layout(known))?;
-        self.flush();
+        self.flush_barriers();
         // Others may write it, so it waits for those who read it on other queues.
-        self.refer(texture.image.id, QueueAccess::Write);
+        self.reference_resource(texture.image.id, QueueAccess::Write);
         Ok(())
     }
 }

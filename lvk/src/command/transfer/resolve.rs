@@ -2,7 +2,7 @@
 
 use ash::vk;
 
-use super::{SOURCE, TARGET};
+use super::{SOURCE_LAYOUT, TARGET_LAYOUT};
 use crate::command::CommandBuffer;
 use crate::error::{Error, Result};
 use crate::handle::TextureHandle;
@@ -46,13 +46,13 @@ impl CommandBuffer {
             device.cmd_resolve_image(
                 self.raw(),
                 source.image.raw,
-                SOURCE,
+                SOURCE_LAYOUT,
                 target.image.raw,
-                TARGET,
+                TARGET_LAYOUT,
                 &[resolve],
             );
         }
-        self.settle_pair(source, target);
+        self.make_pair_visible(source, target);
         Ok(())
     }
 

@@ -4,9 +4,10 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::{SOURCE, Settle, TARGET};
+use super::{SOURCE_LAYOUT, TARGET_LAYOUT};
 use crate::barrier::Use;
 use crate::command::CommandBuffer;
+use crate::command::pending_visibility::PendingVisibility;
 use crate::error::{Error, Result};
 use crate::handle::{BufferHandle, TextureHandle};
 use crate::resource::region::{Region, TextureRegion};
@@ -28,9 +29,9 @@ impl CommandBuffer {
         self.check_copy(&target, &region)?;
         self.use_buffer(&source, Use::transfer_read());
         self.use_texture(&target, region.subresources(), Use::transfer_write())?;
-        self.flush();
+        self.flush_barriers();
         self.record_fill_texture(source.raw, offset, &target, &region);
-        self.notes.settle.push(Settle::Texture(target));
+        self.state.pending_visibility.push(PendingVisibility::Texture(target));
         Ok(())
     }
 
@@ -55,9 +56,9 @@ impl CommandBuffer {
         self.check_copy(&target, &region)?;
         let staged = self.shared.staging.write(bytes, ALIGNMENT, self.recording.staging_key())?;
         self.use_texture(&target, region.subresources(), Use::transfer_write())?;
-        self.flush();
+        self.flush_barriers();
         self.record_fill_texture(staged.buffer, staged.offset, &target, &region);
-        self.notes.settle.push(Settle::Texture(target));
+        self.state.pending_visibility.push(PendingVisibility::Texture(target));
         Ok(())
     }
 
@@ -87,15 +88,15 @@ impl CommandBuffer {
         self.check_copy(source, &region)?;
         self.use_texture(source, region.subresources(), Use::transfer_read())?;
         self.use_buffer(target, Use::transfer_write());
-        self.flush();
+        self.flush_barriers();
         let copy = region.buffer_copy(offset);
         // SAFETY: the region lies inside the image and its bytes inside the buffer.
         unsafe {
             let device = &self.shared.gpu.device;
-            device.cmd_copy_image_to_buffer(self.raw(), source.image.raw, SOURCE, target.raw, &[copy]);
+            device.cmd_copy_image_to_buffer(self.raw(), source.image.raw, SOURCE_LAYOUT, target.raw, &[copy]);
         }
-        self.notes.settle.push(Settle::Texture(Arc::clone(source)));
-        self.notes.settle.push(Settle::Buffer(Arc::clone(target)));
+        self.state.pending_visibility.push(PendingVisibility::Texture(Arc::clone(source)));
+        self.state.pending_visibility.push(PendingVisibility::Buffer(Arc::clone(target)));
         Ok(())
     }
 
@@ -113,7 +114,7 @@ impl CommandBuffer {
         let source = self.shared.store.textures.get(source)?;
         let target = self.shared.store.textures.get(target)?;
         let from = source.resolve_region(from)?;
-        let to = counterpart(&source, &from, &target, to)?;
+        let to = matching_region(&source, &from, &target, to)?;
         self.check_copy(&source, &from)?;
         self.check_copy(&target, &to)?;
         self.use_texture_pair(&source, &from, &target, &to)?;
@@ -128,9 +129,16 @@ impl CommandBuffer {
         // SAFETY: both regions lie inside their images, whose texels or blocks are equally large.
         unsafe {
             let device = &self.shared.gpu.device;
-            device.cmd_copy_image(self.raw(), source.image.raw, SOURCE, target.image.raw, TARGET, &[copy]);
+            device.cmd_copy_image(
+                self.raw(),
+                source.image.raw,
+                SOURCE_LAYOUT,
+                target.image.raw,
+                TARGET_LAYOUT,
+                &[copy],
+            );
         }
-        self.settle_pair(source, target);
+        self.make_pair_visible(source, target);
         Ok(())
     }
 
@@ -146,7 +154,7 @@ impl CommandBuffer {
         // SAFETY: the bytes lie inside the buffer and the region inside the image.
         unsafe {
             let device = &self.shared.gpu.device;
-            device.cmd_copy_buffer_to_image(self.raw(), source, target.image.raw, TARGET, &[copy]);
+            device.cmd_copy_buffer_to_image(self.raw(), source, target.image.raw, TARGET_LAYOUT, &[copy]);
         }
     }
 }
@@ -165,7 +173,7 @@ fn check_packed(buffer: &Buffer, offset: u64, texture: &Texture, region: &Textur
 }
 
 /// The region of `target` at the place of `to` that can take what `from` has.
-fn counterpart(source: &Texture, from: &Region, target: &Texture, to: &TextureRegion) -> Result<Region> {
+fn matching_region(source: &Texture, from: &Region, target: &Texture, to: &TextureRegion) -> Result<Region> {
     let part = target.copy_aspect(to.aspect)?;
     check_copyable(source, from, target, part.aspect, part.block_bytes)?;
     let [width, height, _] = target.bounds().mip_extent(to.mip);

@@ -7,9 +7,9 @@ use super::Context;
 use super::holder::Holder;
 use crate::accel::AccelStruct;
 use crate::accel::blas::Blas;
-use crate::accel::blas_file::Blob;
+use crate::accel::blas_file::BlasFile;
 use crate::accel::desc::BlasDesc;
-use crate::device_state::Shared;
+use crate::device_state::DeviceState;
 use crate::error::Result;
 use crate::handle::AccelStructHandle;
 use crate::software_ray_query::blas::{SoftwareBlas, missing};
@@ -28,24 +28,24 @@ impl Context {
         Ok(None)
     }
 
-    pub(super) fn fill_software(&self, _: &Arc<AccelStruct>, blob: &Infallible) -> Result<()> {
+    pub(super) fn upload_software_blob(&self, _: &Arc<AccelStruct>, blob: &Infallible) -> Result<()> {
         match *blob {}
     }
 
-    pub(super) fn software_bytes(&self, _: &Blas) -> Result<Vec<u8>> {
+    pub(super) fn read_software_bytes(&self, _: &Blas) -> Result<Vec<u8>> {
         Ok(Vec::new())
     }
 
     pub(super) fn load_software_blas(
         &self,
         desc: &BlasDesc<'_>,
-        _: &Blob,
+        _: &BlasFile,
     ) -> Result<Holder<AccelStructHandle>> {
         Err(missing(desc.debug_name))
     }
 }
 
 /// The software half of a TLAS: none.
-pub(super) fn software_tlas(_: &Shared, _: &str, _: u32) -> Result<Option<SoftwareTlas>> {
+pub(super) fn software_tlas(_: &DeviceState, _: &str, _: u32) -> Result<Option<SoftwareTlas>> {
     Ok(None)
 }

@@ -4,9 +4,9 @@ use std::sync::OnceLock;
 
 use ash::vk;
 
+use super::capabilities::Capabilities;
 use super::optional_features::OptionalFeature;
 use crate::format::Format;
-use crate::gpu::device::Gpu;
 
 /// The answers so far, by [`Format::ALL`].
 pub(crate) struct FormatFeatureCache([OnceLock<vk::FormatFeatureFlags>; Format::ALL.len()]);
@@ -17,25 +17,30 @@ impl Default for FormatFeatureCache {
     }
 }
 
-impl Gpu {
-    /// What the device can do with images of `format` in optimal tiling; nothing where a feature that the format needs is
-    /// off.
-    pub(crate) fn format_features(&self, format: Format) -> vk::FormatFeatureFlags {
-        *self.format_answers.0[format as usize].get_or_init(|| match required_feature(format) {
-            Some(feature) if !self.caps.has(feature) => vk::FormatFeatureFlags::empty(),
-            _ => self.format_properties(format.raw()).optimal_tiling_features,
+impl FormatFeatureCache {
+    /// Features of images of `format` in optimal tiling; none where a feature that the format needs is off.
+    pub(crate) fn image_features(
+        &self,
+        instance: &ash::Instance,
+        device: vk::PhysicalDevice,
+        caps: &Capabilities,
+        format: Format,
+    ) -> vk::FormatFeatureFlags {
+        *self.0[format as usize].get_or_init(|| match required_feature(format) {
+            Some(feature) if !caps.has(feature) => vk::FormatFeatureFlags::empty(),
+            _ => format_properties(instance, device, format.raw()).optimal_tiling_features,
         })
     }
+}
 
-    /// What the device can do with buffers of `format`.
-    pub(crate) fn buffer_features(&self, format: vk::Format) -> vk::FormatFeatureFlags {
-        self.format_properties(format).buffer_features
-    }
-
-    fn format_properties(&self, format: vk::Format) -> vk::FormatProperties {
-        // SAFETY: the physical device belongs to the instance, and the extension of the format is on.
-        unsafe { self.instance.raw.get_physical_device_format_properties(self.physical(), format) }
-    }
+/// Properties of a format (`vkGetPhysicalDeviceFormatProperties`).
+pub(crate) fn format_properties(
+    instance: &ash::Instance,
+    device: vk::PhysicalDevice,
+    format: vk::Format,
+) -> vk::FormatProperties {
+    // SAFETY: the physical device belongs to the instance, and the extension of the format is on.
+    unsafe { instance.get_physical_device_format_properties(device, format) }
 }
 
 /// The feature by which there is the format, beyond what Vulkan has anyway.

@@ -4,8 +4,6 @@ use ash::vk;
 
 use super::capabilities::Capabilities;
 use crate::error::{Error, Result};
-use crate::gpu::device::Gpu;
-use crate::gpu::start::instance::Instance;
 
 /// The layout that images are written in and stay in: what shaders sample.
 const LAYOUT: vk::ImageLayout = vk::ImageLayout::READ_ONLY_OPTIMAL;
@@ -19,13 +17,13 @@ impl HostImageCopy {
     /// `None` where the device has none, where staging is the faster way, or where it does not write images in the layout that
     /// shaders sample.
     pub(crate) fn new(
-        instance: &Instance,
+        instance: &ash::Instance,
         device: &ash::Device,
         physical: vk::PhysicalDevice,
         caps: &Capabilities,
     ) -> Option<Self> {
         let is_wanted = caps.host_image_copy && host_copy_layouts(instance, physical).contains(&LAYOUT);
-        is_wanted.then(|| Self { device: ash::ext::host_image_copy::Device::new(&instance.raw, device) })
+        is_wanted.then(|| Self { device: ash::ext::host_image_copy::Device::new(instance, device) })
     }
 
     /// Writes the first contents of an image, after which all of `range` is ready to be sampled.
@@ -56,46 +54,43 @@ impl HostImageCopy {
     }
 }
 
-impl Gpu {
-    /// Whether the host can write images of this description, and the device samples them as fast as others.
-    pub(crate) fn host_copies_stay_optimal(&self, info: &vk::ImageCreateInfo<'_>) -> bool {
-        self.has_host_transfer(info.format) && self.is_optimal(info)
-    }
+/// True if the host can write images of this description, and the device samples them as fast as others.
+pub(crate) fn host_copies_stay_optimal(
+    instance: &ash::Instance,
+    device: vk::PhysicalDevice,
+    info: &vk::ImageCreateInfo<'_>,
+) -> bool {
+    has_host_transfer(instance, device, info.format) && is_optimal(instance, device, info)
+}
 
-    fn has_host_transfer(&self, format: vk::Format) -> bool {
-        let mut more = vk::FormatProperties3::default();
-        let mut all = vk::FormatProperties2::default().push_next(&mut more);
-        // SAFETY: the physical device belongs to the instance, and the extension of the format is on.
-        unsafe {
-            self.instance.raw.get_physical_device_format_properties2(self.physical(), format, &mut all);
-        }
-        more.optimal_tiling_features.contains(vk::FormatFeatureFlags2::HOST_IMAGE_TRANSFER_EXT)
-    }
+fn has_host_transfer(instance: &ash::Instance, device: vk::PhysicalDevice, format: vk::Format) -> bool {
+    let mut more = vk::FormatProperties3::default();
+    let mut all = vk::FormatProperties2::default().push_next(&mut more);
+    // SAFETY: the physical device belongs to the instance, and the extension of the format is on.
+    unsafe { instance.get_physical_device_format_properties2(device, format, &mut all) };
+    more.optimal_tiling_features.contains(vk::FormatFeatureFlags2::HOST_IMAGE_TRANSFER_EXT)
+}
 
-    fn is_optimal(&self, info: &vk::ImageCreateInfo<'_>) -> bool {
-        let asked = vk::PhysicalDeviceImageFormatInfo2::default()
-            .format(info.format)
-            .ty(info.image_type)
-            .tiling(info.tiling)
-            .usage(info.usage | vk::ImageUsageFlags::HOST_TRANSFER_EXT)
-            .flags(info.flags);
-        let mut access = vk::HostImageCopyDevicePerformanceQueryEXT::default();
-        let mut all = vk::ImageFormatProperties2::default().push_next(&mut access);
-        // SAFETY: as above; where it refuses, nothing was written.
-        let answer = unsafe {
-            let raw = &self.instance.raw;
-            raw.get_physical_device_image_format_properties2(self.physical(), &asked, &mut all)
-        };
-        answer.is_ok() && access.optimal_device_access == vk::TRUE
-    }
+fn is_optimal(instance: &ash::Instance, device: vk::PhysicalDevice, info: &vk::ImageCreateInfo<'_>) -> bool {
+    let asked = vk::PhysicalDeviceImageFormatInfo2::default()
+        .format(info.format)
+        .ty(info.image_type)
+        .tiling(info.tiling)
+        .usage(info.usage | vk::ImageUsageFlags::HOST_TRANSFER_EXT)
+        .flags(info.flags);
+    let mut access = vk::HostImageCopyDevicePerformanceQueryEXT::default();
+    let mut all = vk::ImageFormatProperties2::default().push_next(&mut access);
+    // SAFETY: as above; where it refuses, nothing was written.
+    let answer = unsafe { instance.get_physical_device_image_format_properties2(device, &asked, &mut all) };
+    answer.is_ok() && access.optimal_device_access == vk::TRUE
 }
 
 /// Layouts in which the host writes images.
-fn host_copy_layouts(instance: &Instance, physical: vk::PhysicalDevice) -> Vec<vk::ImageLayout> {
+fn host_copy_layouts(instance: &ash::Instance, physical: vk::PhysicalDevice) -> Vec<vk::ImageLayout> {
     let mut count = vk::PhysicalDeviceHostImageCopyPropertiesEXT::default();
     let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut count);
     // SAFETY: the physical device belongs to the instance and has the extension; without arrays the counts are written.
-    unsafe { instance.raw.get_physical_device_properties2(physical, &mut all) };
+    unsafe { instance.get_physical_device_properties2(physical, &mut all) };
     let (read, written) = (count.copy_src_layout_count, count.copy_dst_layout_count);
     let mut source = vec![vk::ImageLayout::UNDEFINED; read as usize];
     let mut target = vec![vk::ImageLayout::UNDEFINED; written as usize];
@@ -104,6 +99,6 @@ fn host_copy_layouts(instance: &Instance, physical: vk::PhysicalDevice) -> Vec<v
         .copy_dst_layouts(&mut target);
     let mut all = vk::PhysicalDeviceProperties2::default().push_next(&mut lists);
     // SAFETY: as above, with arrays of the sizes that were answered.
-    unsafe { instance.raw.get_physical_device_properties2(physical, &mut all) };
+    unsafe { instance.get_physical_device_properties2(physical, &mut all) };
     target
 }

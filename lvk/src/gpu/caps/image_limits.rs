@@ -5,7 +5,6 @@ use std::collections::HashMap;
 
 use ash::vk;
 
-use crate::gpu::device::Gpu;
 use crate::lock_order::{Rank, RwLock};
 
 /// What the limits of an image depend on.
@@ -19,7 +18,7 @@ struct ImageKind {
 }
 
 /// The limits of a kind, or why there are no such images.
-type ImageLimitsResult = Result<vk::ImageFormatProperties, vk::Result>;
+pub(crate) type ImageLimitsResult = Result<vk::ImageFormatProperties, vk::Result>;
 
 /// The answers so far.
 pub(crate) struct ImageLimitCache(RwLock<HashMap<ImageKind, ImageLimitsResult>>);
@@ -27,6 +26,35 @@ pub(crate) struct ImageLimitCache(RwLock<HashMap<ImageKind, ImageLimitsResult>>)
 impl ImageLimitCache {
     pub(crate) fn new() -> Self {
         Self(RwLock::new(Rank::ImageLimitCache, HashMap::new()))
+    }
+
+    /// Limits of an image of this description, or the driver's refusal.
+    pub(crate) fn image_limits(
+        &self,
+        instance: &ash::Instance,
+        device: vk::PhysicalDevice,
+        info: &vk::ImageCreateInfo<'_>,
+    ) -> ImageLimitsResult {
+        let kind = ImageKind {
+            format: info.format,
+            ty: info.image_type,
+            tiling: info.tiling,
+            usage: info.usage,
+            flags: info.flags,
+        };
+        self.get_or_query(kind, || {
+            // SAFETY: the physical device belongs to the instance.
+            unsafe {
+                instance.get_physical_device_image_format_properties(
+                    device,
+                    kind.format,
+                    kind.ty,
+                    kind.tiling,
+                    kind.usage,
+                    kind.flags,
+                )
+            }
+        })
     }
 
     fn get_or_query(&self, kind: ImageKind, query: impl FnOnce() -> ImageLimitsResult) -> ImageLimitsResult {
@@ -44,47 +72,6 @@ impl ImageLimitCache {
 /// Whether the device will answer the same again: it may also have been short of memory.
 fn is_permanent(answer: &ImageLimitsResult) -> bool {
     matches!(answer, Ok(_) | Err(vk::Result::ERROR_FORMAT_NOT_SUPPORTED))
-}
-
-impl Gpu {
-    /// What the device allows for an image of this description, or the driver's refusal.
-    pub(crate) fn image_limits(&self, info: &vk::ImageCreateInfo<'_>) -> ImageLimitsResult {
-        let kind = ImageKind {
-            format: info.format,
-            ty: info.image_type,
-            tiling: info.tiling,
-            usage: info.usage,
-            flags: info.flags,
-        };
-        self.image_limits.get_or_query(kind, || {
-            let instance = &self.instance.raw;
-            // SAFETY: the physical device belongs to the instance.
-            unsafe {
-                instance.get_physical_device_image_format_properties(
-                    self.physical(),
-                    kind.format,
-                    kind.ty,
-                    kind.tiling,
-                    kind.usage,
-                    kind.flags,
-                )
-            }
-        })
-    }
-
-    /// How many samples a pixel a plain target of `format` may have; none where it cannot be a target.
-    pub(crate) fn target_samples(
-        &self,
-        format: vk::Format,
-        usage: vk::ImageUsageFlags,
-    ) -> vk::SampleCountFlags {
-        let info = vk::ImageCreateInfo::default()
-            .image_type(vk::ImageType::TYPE_2D)
-            .format(format)
-            .tiling(vk::ImageTiling::OPTIMAL)
-            .usage(usage);
-        self.image_limits(&info).map_or(vk::SampleCountFlags::empty(), |limits| limits.sample_counts)
-    }
 }
 
 #[cfg(test)]

@@ -2,6 +2,9 @@
 
 pub(crate) mod capabilities;
 pub(crate) mod descriptor_limits;
+pub(crate) mod enabled_features;
+pub(crate) mod extension_features;
+pub(crate) mod features;
 pub(crate) mod format_features;
 pub(crate) mod host_image_copy;
 pub(crate) mod image_limits;

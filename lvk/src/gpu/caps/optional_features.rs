@@ -5,7 +5,7 @@ use std::fmt;
 
 use ash::vk;
 
-use crate::gpu::start::features::Features;
+use super::features::Features;
 
 /// A feature that some devices have and the library does not need. It is turned on wherever it is found, unless a
 /// [`DeviceProfile`](crate::DeviceProfile) hides it; [`Capabilities::has`](crate::Capabilities::has) says whether it is

@@ -2,12 +2,6 @@
 
 use ash::vk;
 
-use super::capabilities::Capabilities;
-use super::optional_features::OptionalFeature;
-use crate::error::{Error, Result};
-use crate::gpu::Gpu;
-use crate::gpu::start::instance::Instance;
-
 /// How two rates become one (`VkFragmentShadingRateCombinerOpKHR`), width and height each for itself. All but
 /// [`Keep`](Self::Keep) and [`Replace`](Self::Replace) need [`ShadingRateLimits::combines`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -163,7 +157,7 @@ impl ShadingRateLimits {
 
 /// Why a rate cannot be.
 #[derive(Debug, Clone, PartialEq, Eq)]
-enum ShadingRateError {
+pub(crate) enum ShadingRateError {
     /// Nowhere.
     Wrong(String),
     /// Not here.
@@ -171,7 +165,7 @@ enum ShadingRateError {
 }
 
 /// Fails unless the device has the rate's size for so many samples, and puts rates together this way.
-fn check_rate(
+pub(crate) fn check_rate(
     rate: &ShadingRate,
     samples: u32,
     sizes: &[FragmentSize],
@@ -203,24 +197,25 @@ pub(crate) struct ShadingRates {
 }
 
 impl ShadingRates {
-    /// `None` where the device has no rates, or they are hidden.
+    /// For a device with [`OptionalFeature::PipelineShadingRate`](crate::OptionalFeature::PipelineShadingRate).
     pub(crate) fn new(
-        instance: &Instance,
+        entry: &ash::Entry,
+        instance: &ash::Instance,
         device: &ash::Device,
         physical: vk::PhysicalDevice,
-        caps: &Capabilities,
-    ) -> Option<Self> {
-        if !caps.has(OptionalFeature::PipelineShadingRate) {
-            return None;
-        }
-        let functions = ash::khr::fragment_shading_rate::Device::new(&instance.raw, device);
-        Some(Self { functions, sizes: query_sizes(instance, physical) })
+    ) -> Self {
+        let functions = ash::khr::fragment_shading_rate::Device::new(instance, device);
+        Self { functions, sizes: query_sizes(entry, instance, physical) }
     }
 }
 
 /// None where the driver does not answer.
-fn query_sizes(instance: &Instance, physical: vk::PhysicalDevice) -> Vec<FragmentSize> {
-    let functions = ash::khr::fragment_shading_rate::Instance::new(&instance.entry, &instance.raw);
+fn query_sizes(
+    entry: &ash::Entry,
+    instance: &ash::Instance,
+    physical: vk::PhysicalDevice,
+) -> Vec<FragmentSize> {
+    let functions = ash::khr::fragment_shading_rate::Instance::new(entry, instance);
     let ask = functions.fp().get_physical_device_fragment_shading_rates_khr;
     let mut count = 0;
     // SAFETY: the physical device belongs to the instance and has the extension; without a list the count is answered.
@@ -239,28 +234,6 @@ fn query_sizes(instance: &Instance, physical: vk::PhysicalDevice) -> Vec<Fragmen
         samples: raw.sample_counts.as_raw() & 0x7f,
     };
     found.iter().map(size).collect()
-}
-
-impl Gpu {
-    /// Fails unless the device has the rate with so many samples a pixel; `name` is refused.
-    pub(crate) fn check_shading_rate(&self, name: &str, rate: &ShadingRate, samples: u32) -> Result<()> {
-        let what = format!("the shading rate {:?} of '{name}'", rate.size);
-        self.require(OptionalFeature::PipelineShadingRate, &what)?;
-        if rate.primitive != ShadingRateCombiner::Keep {
-            self.require(OptionalFeature::PrimitiveShadingRate, &format!("primitives in {what}"))?;
-        }
-        if rate.attachment != ShadingRateCombiner::Keep {
-            self.require(OptionalFeature::AttachmentShadingRate, &format!("the attachment in {what}"))?;
-        }
-        let sizes = self.shading_rates.as_ref().map_or(&[][..], |rates| &rates.sizes);
-        match check_rate(rate, samples, sizes, self.caps.limits.shading_rate.combines) {
-            Ok(()) => Ok(()),
-            Err(ShadingRateError::Wrong(message)) => Err(Error::usage(name, message)),
-            Err(ShadingRateError::Lacks(why)) => {
-                Err(Error::unsupported(what, format!("the device '{}': {why}", self.caps.device_name)))
-            }
-        }
-    }
 }
 
 #[cfg(test)]

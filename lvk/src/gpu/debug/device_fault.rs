@@ -1,90 +1,22 @@
-//! What a lost device says of its fault (`VK_EXT_device_fault`).
+//! Reads the fault of a lost device (`vkGetDeviceFaultInfoEXT`).
 
 use std::ffi::{CStr, c_char};
-use std::fmt;
-use std::ops::Range;
-use std::sync::Arc;
 
 use ash::vk;
 
-use crate::error::Error;
-use crate::gpu::device::Gpu;
+use crate::error::device_fault::{DeviceFault, FaultAddress, FaultKind, VendorFault};
 
 /// Lists longer than this are taken for nonsense of a driver that has just failed.
 const MAX_ENTRIES: u32 = 1 << 16;
 
-/// What a driver with `VK_EXT_device_fault` ([`OptionalFeature::DeviceFault`](crate::OptionalFeature)) says of the fault
-/// that lost the device.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct DeviceFault {
-    /// The driver's own words.
-    pub description: String,
-    /// Addresses that have to do with the fault.
-    pub addresses: Vec<FaultAddress>,
-    /// Codes that the vendor's tools understand.
-    pub vendor: Vec<VendorFault>,
-}
-
-/// An address that has to do with a fault.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FaultAddress {
-    /// What happened there.
-    pub kind: FaultKind,
-    /// The address, in the space of [`Context::buffer_address`](crate::Context::buffer_address), as the driver reported it.
-    pub address: u64,
-    /// The addresses among which the true one is.
-    pub range: Range<u64>,
-}
-
-/// What happened at an address.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum FaultKind {
-    /// A read of what nobody has.
-    InvalidRead,
-    /// A write to what nobody has.
-    InvalidWrite,
-    /// An instruction taken from where none is.
-    InvalidExecute,
-    /// Where an instruction stood that may have to do with the fault.
-    Instruction,
-    /// Where an instruction stood that was not valid.
-    InvalidInstruction,
-    /// Where the instruction stood that made the fault.
-    FaultingInstruction,
-    /// Something else, by Vulkan's number.
-    Other(i32),
-}
-
-/// A code of the vendor's.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct VendorFault {
-    /// The driver's own words.
-    pub description: String,
-    /// The code.
-    pub code: u64,
-    /// What belongs to the code.
-    pub data: u64,
-}
-
-impl Gpu {
-    /// As [`Error::vulkan`], with what the device says of its fault where it is lost.
-    pub(crate) fn vulkan_error(&self, call: &'static str) -> impl FnOnce(vk::Result) -> Error + '_ {
-        move |result| match result {
-            vk::Result::ERROR_DEVICE_LOST => {
-                Error::DeviceLost { call, fault: self.query_fault().map(Arc::new) }
-            }
-            other => Error::vulkan(call)(other),
-        }
-    }
-
-    /// Asks a lost device; `None` where it cannot say.
-    fn query_fault(&self) -> Option<DeviceFault> {
-        let functions = self.device_fault.as_ref()?.fp();
-        let raw = self.device.handle();
-        // SAFETY: the device is lost, as its last answer was, and the lists have the lengths that the counts say.
-        read_fault(|counts, info| unsafe { (functions.get_device_fault_info_ext)(raw, counts, info) })
-    }
+/// Asks a lost device; `None` where it cannot say.
+pub(crate) fn query_fault(
+    functions: &ash::ext::device_fault::Device,
+    device: vk::Device,
+) -> Option<DeviceFault> {
+    let functions = functions.fp();
+    // SAFETY: the device is lost, as its last answer was, and the lists have the lengths that the counts say.
+    read_fault(|counts, info| unsafe { (functions.get_device_fault_info_ext)(device, counts, info) })
 }
 
 /// Reads by a function that works like `vkGetDeviceFaultInfoEXT`: counts first, then lists of that length.
@@ -163,23 +95,12 @@ fn decode_text(chars: &[c_char]) -> String {
     CStr::from_bytes_until_nul(&bytes).map(|text| text.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-impl fmt::Display for DeviceFault {
-    /// In one line, for messages.
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{}", self.description)?;
-        for FaultAddress { kind, range, .. } in &self.addresses {
-            write!(out, "; {kind:?} at {:#x} to {:#x}", range.start, range.end - 1)?;
-        }
-        for VendorFault { description, code, data } in &self.vendor {
-            write!(out, "; {description} (code {code:#x}, data {data:#x})")?;
-        }
-        Ok(())
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
+    use crate::error::Error;
 
     fn chars<const N: usize>(text: &str) -> [c_char; N] {
         let mut all = [0; N];

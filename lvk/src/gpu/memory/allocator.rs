@@ -9,9 +9,7 @@ use gpu_allocator::vulkan::{
 use gpu_allocator::{AllocationError, AllocationSizes, AllocatorDebugSettings, MemoryLocation};
 
 use super::slab::{Slab, Slot};
-use crate::error::{Error, Result, check_limit};
-use crate::gpu::device::Gpu;
-use crate::gpu::start::instance::Instance;
+use crate::error::{Error, Result};
 
 /// Where a buffer lives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -173,11 +171,11 @@ impl SlabClass {
 }
 
 /// What the allocator answers.
-type Allocated<T> = Result<T, AllocationError>;
+pub(crate) type Allocated<T> = Result<T, AllocationError>;
 
 impl DeviceMemory {
     pub(crate) fn new(
-        instance: &Instance,
+        instance: &ash::Instance,
         device: &ash::Device,
         physical_device: vk::PhysicalDevice,
     ) -> Result<Self> {
@@ -185,7 +183,7 @@ impl DeviceMemory {
         // The context reports by name what is left over.
         debug_settings.log_leaks_on_shutdown = false;
         let allocator = Allocator::new(&AllocatorCreateDesc {
-            instance: instance.raw.clone(),
+            instance: instance.clone(),
             device: device.clone(),
             physical_device,
             debug_settings,
@@ -197,7 +195,7 @@ impl DeviceMemory {
     }
 
     /// Memory for one object; where a block for small ones cannot be had, a piece of its own.
-    fn allocate(
+    pub(crate) fn allocate(
         &mut self,
         name: &str,
         requirements: vk::MemoryRequirements,
@@ -233,7 +231,7 @@ impl DeviceMemory {
         Ok(ObjectMemory::from_placement(place, size, Source::Shared(number, slot)))
     }
 
-    fn free(&mut self, memory: ObjectMemory) -> Allocated<()> {
+    pub(crate) fn free(&mut self, memory: ObjectMemory) -> Allocated<()> {
         let unused = match memory.source {
             Source::Own(allocation) => Some(*allocation),
             Source::Shared(slab_pool, slot) => self.slab_pools[slab_pool].slab.free(slot),
@@ -257,80 +255,6 @@ fn allocate_dedicated(
         linear,
         allocation_scheme: AllocationScheme::GpuAllocatorManaged,
     })
-}
-
-impl Gpu {
-    /// Allocates memory for a buffer (`linear`) or an image.
-    pub(crate) fn allocate(
-        &self,
-        name: &str,
-        requirements: vk::MemoryRequirements,
-        kind: MemoryKind,
-        linear: bool,
-    ) -> Result<ObjectMemory> {
-        let bytes = requirements.size;
-        let limit = self.caps.limits.max_allocation_bytes;
-        check_limit(name, "memory of one object in bytes", bytes, limit)?;
-        let out_of_memory = || Error::OutOfDeviceMemory { object: name.to_owned(), bytes };
-        let mut memory = self.memory();
-        let memory = memory.as_mut().ok_or_else(out_of_memory)?;
-        let kept_name = if self.names_objects() { name } else { "" };
-        let allocated =
-            memory.allocate(kept_name, requirements, kind, linear).map_err(|error| match error {
-                AllocationError::OutOfMemory => out_of_memory(),
-                other => {
-                    Error::unsupported(format!("memory for '{name}' ({bytes} bytes)"), other.to_string())
-                }
-            })?;
-        self.heap_use.add(&allocated);
-        self.name_block(&allocated, name);
-        Ok(allocated)
-    }
-
-    /// Names a block of memory after what lies at its start.
-    fn name_block(&self, allocated: &ObjectMemory, name: &str) {
-        if self.names_objects() && allocated.offset == 0 {
-            self.name(allocated.raw, &format!("memory from '{name}' on"));
-        }
-    }
-
-    /// Memory that the device has only while a pass needs it; `None` where it has no such kind.
-    pub(crate) fn allocate_lazy(
-        &self,
-        name: &str,
-        requirements: vk::MemoryRequirements,
-    ) -> Result<Option<vk::DeviceMemory>> {
-        // SAFETY: the physical device belongs to the instance.
-        let memory = unsafe { self.instance.raw.get_physical_device_memory_properties(self.physical()) };
-        let Some(kind) = lazy_type(memory.memory_types_as_slice(), requirements.memory_type_bits) else {
-            return Ok(None);
-        };
-        let info =
-            vk::MemoryAllocateInfo::default().allocation_size(requirements.size).memory_type_index(kind);
-        // SAFETY: the type is one of the device's.
-        unsafe { self.device.allocate_memory(&info, None) }.map(Some).map_err(|result| match result {
-            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
-                Error::OutOfDeviceMemory { object: name.to_owned(), bytes: requirements.size }
-            }
-            other => Error::vulkan("vkAllocateMemory")(other),
-        })
-    }
-
-    /// Gives memory back.
-    pub(crate) fn free(&self, memory: ObjectMemory) {
-        self.heap_use.remove(&memory);
-        let freed = self.memory().as_mut().map_or(Ok(()), |all| all.free(memory));
-        if let Err(error) = freed {
-            log::error!("freeing device memory failed: {error}");
-        }
-    }
-}
-
-/// The first of these kinds of memory, of those in `bits`, that is only there when needed.
-fn lazy_type(types: &[vk::MemoryType], bits: u32) -> Option<u32> {
-    let lazy =
-        |kind: &vk::MemoryType| kind.property_flags.contains(vk::MemoryPropertyFlags::LAZILY_ALLOCATED);
-    (0..).zip(types).find(|(index, kind)| bits >> index & 1 == 1 && lazy(kind)).map(|(index, _)| index)
 }
 
 #[cfg(test)]
@@ -371,18 +295,5 @@ mod tests {
             prop_assert_ne!(kind, of(bits, MemoryKind::HostVisible, linear));
             prop_assert_ne!(kind, of(bits, MemoryKind::Device, !linear));
         }
-    }
-
-    #[test]
-    fn lazy_memory_is_found_among_the_kinds_that_will_do() {
-        let kind = |property_flags| vk::MemoryType { property_flags, heap_index: 0 };
-        let (plain, lazy) = (
-            kind(vk::MemoryPropertyFlags::DEVICE_LOCAL),
-            kind(vk::MemoryPropertyFlags::DEVICE_LOCAL | vk::MemoryPropertyFlags::LAZILY_ALLOCATED),
-        );
-        assert_eq!(lazy_type(&[plain, lazy, lazy], 0b111), Some(1));
-        assert_eq!(lazy_type(&[plain, lazy, lazy], 0b101), Some(2));
-        assert_eq!(lazy_type(&[plain, lazy], 0b01), None);
-        assert_eq!(lazy_type(&[], u32::MAX), None);
     }
 }

@@ -5,16 +5,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use ash::vk;
 
 use super::allocator::ObjectMemory;
-use crate::gpu::caps::optional_features::OptionalFeature;
-use crate::gpu::device::Gpu;
-use crate::gpu::start::instance::Instance;
 
 /// The memory of a device, from [`Context::memory_budget`](crate::Context::memory_budget).
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct MemoryBudget {
     /// In the order of Vulkan.
     pub heaps: Vec<MemoryHeap>,
-    /// Whether the driver has told budgets and uses ([`OptionalFeature::MemoryBudget`]); without it the budgets are the
+    /// Whether the driver has told budgets and uses ([`OptionalFeature::MemoryBudget`](crate::OptionalFeature::MemoryBudget)); without it the budgets are the
     /// sizes, and only the objects of this context count as used.
     pub is_measured: bool,
 }
@@ -43,9 +40,9 @@ pub(crate) struct HeapUse {
 
 impl HeapUse {
     /// Nothing yet.
-    pub(crate) fn new(instance: &Instance, device: vk::PhysicalDevice) -> Self {
+    pub(crate) fn new(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         // SAFETY: the physical device belongs to the instance.
-        let memory = unsafe { instance.raw.get_physical_device_memory_properties(device) };
+        let memory = unsafe { instance.get_physical_device_memory_properties(device) };
         let types = memory.memory_types_as_slice().to_vec();
         Self { types, bytes: Default::default() }
     }
@@ -63,22 +60,24 @@ impl HeapUse {
             self.bytes[heap].fetch_sub(allocated.size, Ordering::Relaxed);
         }
     }
-}
 
-impl Gpu {
-    /// Asks the driver (`vkGetPhysicalDeviceMemoryProperties2`).
-    pub(crate) fn memory_budget(&self) -> MemoryBudget {
-        let is_measured = self.caps.has(OptionalFeature::MemoryBudget);
+    /// Queries the heaps of a device (`vkGetPhysicalDeviceMemoryProperties2`); `is_measured` where it has `VK_EXT_memory_budget`.
+    pub(crate) fn query_budget(
+        &self,
+        instance: &ash::Instance,
+        device: vk::PhysicalDevice,
+        is_measured: bool,
+    ) -> MemoryBudget {
         let mut told = vk::PhysicalDeviceMemoryBudgetPropertiesEXT::default();
         let mut properties = vk::PhysicalDeviceMemoryProperties2::default();
         if is_measured {
             properties = properties.push_next(&mut told);
         }
         // SAFETY: the physical device belongs to the instance, and has what is chained.
-        unsafe { self.instance.raw.get_physical_device_memory_properties2(self.physical(), &mut properties) };
+        unsafe { instance.get_physical_device_memory_properties2(device, &mut properties) };
         let memory = properties.memory_properties;
         let heaps = memory.memory_heaps_as_slice().iter().enumerate().map(|(place, heap)| {
-            let object_bytes = self.heap_use.bytes[place].load(Ordering::Relaxed);
+            let object_bytes = self.bytes[place].load(Ordering::Relaxed);
             let (budget_bytes, used_bytes) = match is_measured {
                 true => (told.heap_budget[place], told.heap_usage[place]),
                 false => (heap.size, object_bytes),

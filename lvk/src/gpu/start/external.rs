@@ -4,8 +4,8 @@ use std::ffi::CStr;
 
 use ash::vk;
 
+use super::physical_device::PhysicalDevice;
 use crate::error::{Error, Result};
-use crate::gpu::caps::capabilities::PhysicalDevice;
 use crate::gpu::caps::optional_features::{FeatureSet, OptionalFeature};
 use crate::gpu::caps::queues::{QueueFamily, QueueLocation};
 

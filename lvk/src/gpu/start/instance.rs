@@ -5,9 +5,9 @@ use std::path::Path;
 
 use ash::vk;
 
+use super::window::{WindowExtensions, WindowRef};
 use crate::error::{Error, Result};
 use crate::gpu::debug::messenger::{Messenger, ValidationMode, ValidationSink, c_name};
-use crate::gpu::window::{WindowExtensions, WindowRef};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 

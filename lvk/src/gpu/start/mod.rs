@@ -1,10 +1,13 @@
 //! The steps that create a logical device: instance, choice of a device, extensions, features.
 
 pub(crate) mod driver_workarounds;
-pub(crate) mod extensions;
 pub(crate) mod external;
-pub(crate) mod features;
 pub(crate) mod instance;
+pub(crate) mod physical_device;
 pub(crate) mod profile;
 pub(crate) mod select;
+#[cfg_attr(not(feature = "window"), path = "surface_disabled.rs")]
+pub(crate) mod surface;
 pub(crate) mod user_extensions;
+#[cfg_attr(not(feature = "window"), path = "window_disabled.rs")]
+pub(crate) mod window;

@@ -5,7 +5,7 @@ use ash::vk;
 
 use super::atomics::{Atomic, AtomicStorage};
 use crate::error::{Error, Result};
-use crate::gpu::start::features::Features;
+use crate::gpu::caps::features::Features;
 use crate::shader::{Reflection, ShaderStage};
 
 /// Allowed on every device the library takes: without a feature, or by one the library cannot do without.

@@ -1,16 +1,18 @@
 //! Binary trees by binned surface area, never deeper than the walk's stack.
 
-use super::mesh_bvh::{Nodes, Tree};
+use super::mesh_bvh::{Bvh, BvhNodes};
 use crate::accel::primitive_bounds::Bounds;
-use crate::software_ray_query::layout::{BinaryNode, DEEPEST_BINARY, LARGEST_LEAF, LEAF, NONE, leaf};
+use crate::software_ray_query::layout::{
+    Bvh2NodeRecord, LEAF, MAX_BVH2_DEPTH, MAX_LEAF_PRIMITIVES, NONE, leaf,
+};
 
 const BINS: usize = 16;
 /// From here on halves have the same number of primitives, so that at most 27 levels follow.
-const HALVED_FROM: usize = DEEPEST_BINARY - 28;
+const MEDIAN_SPLIT_DEPTH: usize = MAX_BVH2_DEPTH - 28;
 
 /// A range of the order that becomes a node or a leaf.
 #[derive(Clone, Copy)]
-struct Work {
+struct PendingRange {
     first: usize,
     end: usize,
     depth: usize,
@@ -19,32 +21,32 @@ struct Work {
 struct Builder<'a> {
     bounds: &'a [Bounds],
     order: Vec<u32>,
-    nodes: Vec<BinaryNode>,
+    nodes: Vec<Bvh2NodeRecord>,
     leaf_size: usize,
 }
 
 /// A tree whose leaves hold at most `leaf_size` primitives.
-pub(crate) fn build(bounds: &[Bounds], leaf_size: usize) -> Tree {
-    let leaf_size = leaf_size.clamp(1, LARGEST_LEAF);
+pub(crate) fn build_bvh2(bounds: &[Bounds], leaf_size: usize) -> Bvh {
+    let leaf_size = leaf_size.clamp(1, MAX_LEAF_PRIMITIVES);
     let mut builder =
         Builder { bounds, order: (0..bounds.len() as u32).collect(), nodes: Vec::new(), leaf_size };
-    let root = builder.root();
-    Tree { nodes: Nodes::Binary(builder.nodes), root, order: builder.order }
+    let root = builder.build_root();
+    Bvh { nodes: BvhNodes::Binary(builder.nodes), root, order: builder.order }
 }
 
 impl Builder<'_> {
-    fn root(&mut self) -> u32 {
-        let whole = Work { first: 0, end: self.order.len(), depth: 1 };
+    fn build_root(&mut self) -> u32 {
+        let whole = PendingRange { first: 0, end: self.order.len(), depth: 1 };
         let mut open = Vec::new();
-        let root = self.place(whole, &mut open);
+        let root = self.push_range(whole, &mut open);
         while let Some((node, work)) = open.pop() {
-            self.fill(node, work, &mut open);
+            self.fill_node(node, work, &mut open);
         }
         root
     }
 
     /// The reference to a range: a leaf, or a node that is filled later.
-    fn place(&mut self, work: Work, open: &mut Vec<(usize, Work)>) -> u32 {
+    fn push_range(&mut self, work: PendingRange, open: &mut Vec<(usize, PendingRange)>) -> u32 {
         match work.end - work.first {
             0 => NONE,
             count if count <= self.leaf_size => leaf(work.first as u32, count),
@@ -56,13 +58,13 @@ impl Builder<'_> {
         }
     }
 
-    fn fill(&mut self, node: usize, work: Work, open: &mut Vec<(usize, Work)>) {
-        let middle = self.split(work);
+    fn fill_node(&mut self, node: usize, work: PendingRange, open: &mut Vec<(usize, PendingRange)>) {
+        let middle = self.split_range(work);
         let (one, two) = (self.union(work.first, middle), self.union(middle, work.end));
         let depth = work.depth + 1;
-        let child0 = self.place(Work { end: middle, depth, ..work }, open);
-        let child1 = self.place(Work { first: middle, depth, ..work }, open);
-        self.nodes[node] = BinaryNode {
+        let child0 = self.push_range(PendingRange { end: middle, depth, ..work }, open);
+        let child1 = self.push_range(PendingRange { first: middle, depth, ..work }, open);
+        self.nodes[node] = Bvh2NodeRecord {
             low0: one.low,
             child0,
             high0: one.high,
@@ -80,16 +82,16 @@ impl Builder<'_> {
     }
 
     /// Orders a range so that it falls into two at the place that is answered.
-    fn split(&mut self, work: Work) -> usize {
-        let Work { first, end, depth } = work;
+    fn split_range(&mut self, work: PendingRange) -> usize {
+        let PendingRange { first, end, depth } = work;
         let centers = self.order[first..end].iter().map(|number| center(&self.bounds[*number as usize]));
         let spread = centers.fold(Bounds::EMPTY, |all, at| all.union(Bounds { low: at, high: at }));
-        if depth < HALVED_FROM
+        if depth < MEDIAN_SPLIT_DEPTH
             && let Some((axis, bin)) = self.best_bin(work, &spread)
         {
             let bounds = self.bounds;
             let below = |number: &u32| bin_of(&bounds[*number as usize], &spread, axis) < bin;
-            let middle = first + partition(&mut self.order[first..end], below);
+            let middle = first + partition_primitives(&mut self.order[first..end], below);
             if middle > first && middle < end {
                 return middle;
             }
@@ -105,7 +107,7 @@ impl Builder<'_> {
     }
 
     /// The axis and the first bin of the second half that make the cheapest children.
-    fn best_bin(&self, work: Work, spread: &Bounds) -> Option<(usize, usize)> {
+    fn best_bin(&self, work: PendingRange, spread: &Bounds) -> Option<(usize, usize)> {
         let mut best = None;
         let mut least = f32::INFINITY;
         for axis in 0..3 {
@@ -153,7 +155,7 @@ fn bin_of(bounds: &Bounds, spread: &Bounds, axis: usize) -> usize {
 }
 
 /// Moves those that are `first` to the front; answers how many.
-fn partition(numbers: &mut [u32], first: impl Fn(&u32) -> bool) -> usize {
+fn partition_primitives(numbers: &mut [u32], first: impl Fn(&u32) -> bool) -> usize {
     let mut count = 0;
     for index in 0..numbers.len() {
         if first(&numbers[index]) {
@@ -166,18 +168,18 @@ fn partition(numbers: &mut [u32], first: impl Fn(&u32) -> bool) -> usize {
 
 /// Whether every path from the first node ends in primitives that exist, none is too long, no two meet, and all nodes are
 /// on one. Nodes stand in any order.
-pub(crate) fn is_sound(nodes: &[BinaryNode], primitives: usize) -> bool {
+pub(crate) fn is_valid_bvh2(nodes: &[Bvh2NodeRecord], primitives: usize) -> bool {
     let mut seen = vec![false; nodes.len()];
     let mut open = vec![(0_u32, 1_usize)];
     while let Some((place, depth)) = open.pop() {
         let Some(node) = nodes.get(place as usize) else { return false };
-        if depth > DEEPEST_BINARY || std::mem::replace(&mut seen[place as usize], true) {
+        if depth > MAX_BVH2_DEPTH || std::mem::replace(&mut seen[place as usize], true) {
             return false;
         }
         for child in [node.child0, node.child1].into_iter().filter(|child| *child != NONE) {
             if child & LEAF == 0 {
                 open.push((child, depth + 1));
-            } else if !names_primitives(child, primitives) {
+            } else if !is_valid_leaf(child, primitives) {
                 return false;
             }
         }
@@ -186,7 +188,7 @@ pub(crate) fn is_sound(nodes: &[BinaryNode], primitives: usize) -> bool {
 }
 
 /// Whether a reference to a leaf names primitives that exist.
-pub(crate) fn names_primitives(reference: u32, primitives: usize) -> bool {
+pub(crate) fn is_valid_leaf(reference: u32, primitives: usize) -> bool {
     let (first, count) = (reference & 0x07ff_ffff, (reference >> 27 & 15) + 1);
     reference & LEAF != 0 && first as usize + count as usize <= primitives
 }

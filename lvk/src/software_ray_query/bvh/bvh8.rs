@@ -6,39 +6,39 @@ use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::cwbvh::node::CwBvhNode;
 
-use super::mesh_bvh::{Nodes, Tree};
+use super::mesh_bvh::{Bvh, BvhNodes};
 use super::ploc;
 use crate::accel::primitive_bounds::Bounds;
-use crate::software_ray_query::layout::{BinaryNode, DEEPEST_WIDE};
+use crate::software_ray_query::layout::{Bvh2NodeRecord, MAX_BVH8_DEPTH};
 
 /// Most primitives of a leaf: they are counted in three bits, one by one.
 const LARGEST_LEAF: u32 = 3;
 /// The share of nodes that is moved to better places: on an NVIDIA H200 rays are up to 7 % faster than by half of it, for
 /// a quarter more time.
-const MOVED: f32 = 0.1;
+const REINSERTION_SHARE: f32 = 0.1;
 /// Levels of a binary tree that a node of eight children takes the place of, at most.
 const LEVELS: usize = 7;
 /// Most looks at nodes, for each node of the tree, to find better places.
-const LOOKS: f32 = 100.0;
+const REINSERTION_SEARCH_COST: f32 = 100.0;
 
 /// A wide tree of primitives, at least two; `None` where it would be too deep, or larger than one of two children.
-pub(crate) fn build(bounds: &[Bounds]) -> Option<Tree> {
-    let mut binary = ploc::build(bounds);
-    let moved = share_moved(&binary);
+pub(crate) fn build_bvh8(bounds: &[Bounds]) -> Option<Bvh> {
+    let mut binary = ploc::build_ploc(bounds);
+    let moved = reinsertion_share(&binary);
     ReinsertionOptimizer::default().run(&mut binary, moved, None);
     // What collapses it calls itself for each level, and boxes within each other may have thousands.
-    binary.nodes = in_order_of_walk(&binary, DEEPEST_WIDE * LEVELS)?;
+    binary.nodes = in_traversal_order(&binary, MAX_BVH8_DEPTH * LEVELS)?;
     let mut wide = bvh2_to_cwbvh(&binary, LARGEST_LEAF, true, false);
-    wide.nodes.iter_mut().for_each(widen);
+    wide.nodes.iter_mut().for_each(widen_thin_node);
     // Boxes without area cost nothing, so that nothing is gained by nodes of more than two children.
-    let is_small = size_of_val(&wide.nodes[..]) <= (bounds.len() - 1) * size_of::<BinaryNode>();
-    let is_fit = is_small && depth(&wide.nodes) <= DEEPEST_WIDE;
-    is_fit.then_some(Tree { nodes: Nodes::Wide(wide.nodes), root: 0, order: wide.primitive_indices })
+    let is_small = size_of_val(&wide.nodes[..]) <= (bounds.len() - 1) * size_of::<Bvh2NodeRecord>();
+    let is_fit = is_small && max_depth(&wide.nodes) <= MAX_BVH8_DEPTH;
+    is_fit.then_some(Bvh { nodes: BvhNodes::Wide(wide.nodes), root: 0, order: wide.primitive_indices })
 }
 
 /// Makes steps larger where a node is much thinner than it is wide, so that rays which run along it and touch it take longer to
 /// leave the outermost step than to get there. Kernels have it in `build/encode.glsl`.
-fn widen(node: &mut CwBvhNode) {
+fn widen_thin_node(node: &mut CwBvhNode) {
     const THIN: u8 = 20;
     const OF_POINT: u8 = 87;
     let highs = [node.child_max_x, node.child_max_y, node.child_max_z];
@@ -59,7 +59,7 @@ fn widen(node: &mut CwBvhNode) {
 
 /// The nodes of a binary tree, children behind their parent and what is below the first before what is below the second: what
 /// collapses the tree goes that way, and reads memory in order. `None` where a path has more than `most`.
-fn in_order_of_walk(binary: &Bvh2, most: usize) -> Option<Vec<Bvh2Node>> {
+fn in_traversal_order(binary: &Bvh2, most: usize) -> Option<Vec<Bvh2Node>> {
     let mut nodes: Vec<Bvh2Node> = Vec::with_capacity(binary.nodes.len());
     nodes.push(binary.nodes[0]);
     let mut open = vec![(0, 1)];
@@ -80,15 +80,15 @@ fn in_order_of_walk(binary: &Bvh2, most: usize) -> Option<Vec<Bvh2Node>> {
 
 /// The share of nodes to move. A place is searched for among the nodes that one overlaps: about as many as a ray meets, which
 /// their areas tell. Where boxes lie in one another, that is most of the tree, and fewer nodes are moved.
-fn share_moved(binary: &Bvh2) -> f32 {
+fn reinsertion_share(binary: &Bvh2) -> f32 {
     let area = |node: &Bvh2Node| f64::from(node.aabb().half_area());
     let whole = binary.nodes.first().map_or(0.0, area);
     let met = binary.nodes.iter().map(area).sum::<f64>() / whole;
-    MOVED.min(LOOKS / met as f32)
+    REINSERTION_SHARE.min(REINSERTION_SEARCH_COST / met as f32)
 }
 
 /// Nodes on the longest path. Children stand behind their parents.
-fn depth(nodes: &[CwBvhNode]) -> usize {
+fn max_depth(nodes: &[CwBvhNode]) -> usize {
     let mut depths = vec![1_u32; nodes.len()];
     for index in 0..nodes.len() {
         let below = depths[index] + 1;
@@ -108,22 +108,22 @@ pub(crate) fn children(node: &CwBvhNode) -> std::ops::Range<u32> {
 
 /// Whether all children and primitives exist, children behind their parents and each below but one, and no path is too
 /// long.
-pub(crate) fn is_sound(nodes: &[CwBvhNode], primitives: usize) -> bool {
-    let sound = |(index, node): (usize, &CwBvhNode)| {
+pub(crate) fn is_valid_bvh8(nodes: &[CwBvhNode], primitives: usize) -> bool {
+    let is_node_valid = |(index, node): (usize, &CwBvhNode)| {
         let children = children(node);
         let has_children = !children.is_empty();
         let inner =
             !has_children || (children.start as usize > index && children.end as usize <= nodes.len());
-        inner && (0..8).all(|child| leaf_is_sound(node, child, primitives))
+        inner && (0..8).all(|child| is_valid_leaf(node, child, primitives))
     };
     !nodes.is_empty()
-        && nodes.iter().enumerate().all(sound)
-        && have_one_parent(nodes)
-        && depth(nodes) <= DEEPEST_WIDE
+        && nodes.iter().enumerate().all(is_node_valid)
+        && each_has_one_parent(nodes)
+        && max_depth(nodes) <= MAX_BVH8_DEPTH
 }
 
 /// Whether each node but the first is the child of exactly one: paths that meet would be walked over and over.
-fn have_one_parent(nodes: &[CwBvhNode]) -> bool {
+fn each_has_one_parent(nodes: &[CwBvhNode]) -> bool {
     let mut parents = vec![0_u32; nodes.len()];
     for child in nodes.iter().flat_map(children) {
         if let Some(count) = parents.get_mut(child as usize) {
@@ -133,7 +133,7 @@ fn have_one_parent(nodes: &[CwBvhNode]) -> bool {
     parents.iter().skip(1).all(|count| *count == 1)
 }
 
-fn leaf_is_sound(node: &CwBvhNode, child: usize, primitives: usize) -> bool {
+fn is_valid_leaf(node: &CwBvhNode, child: usize, primitives: usize) -> bool {
     let meta = node.child_meta[child];
     let is_inner = node.imask >> child & 1 == 1;
     if is_inner {
@@ -153,23 +153,23 @@ mod tests {
     use super::*;
 
     fn nodes(bounds: &[Bounds]) -> usize {
-        match build(bounds).expect("a tree").nodes {
-            Nodes::Wide(nodes) => nodes.len(),
-            Nodes::Binary(_) => unreachable!("wide trees were asked for"),
+        match build_bvh8(bounds).expect("a tree").nodes {
+            BvhNodes::Wide(nodes) => nodes.len(),
+            BvhNodes::Binary(_) => unreachable!("wide trees were asked for"),
         }
     }
 
     fn share(bounds: impl Iterator<Item = [f32; 2]>) -> f32 {
         let bounds = bounds.map(|[low, high]| Bounds { low: Vec3::splat(low), high: Vec3::splat(high) });
-        share_moved(&ploc::build(&bounds.collect::<Vec<_>>()))
+        reinsertion_share(&ploc::build_ploc(&bounds.collect::<Vec<_>>()))
     }
 
     #[test]
     fn fewer_nodes_move_where_boxes_lie_in_one_another() {
         let sizes = || (1..10_000_u16).map(f32::from);
-        assert_eq!(share(sizes().map(|at| [at, at + 1.0])), MOVED);
-        assert!(share(sizes().map(|size| [0.0, size])) < 0.5 * MOVED);
-        assert_eq!(share(sizes().map(|_| [7.0, 7.0])), MOVED, "points");
+        assert_eq!(share(sizes().map(|at| [at, at + 1.0])), REINSERTION_SHARE);
+        assert!(share(sizes().map(|size| [0.0, size])) < 0.5 * REINSERTION_SHARE);
+        assert_eq!(share(sizes().map(|_| [7.0, 7.0])), REINSERTION_SHARE, "points");
     }
 
     /// Each box is a little larger than the one before, from hair to continent.
@@ -178,7 +178,8 @@ mod tests {
         let grown = |number: i32| Vec3::splat(1e-12 * 1.003_f32.powi(number));
         let boxes: Vec<_> =
             (0..10_000).map(|number| Bounds { low: Vec3::ZERO, high: grown(number) }).collect();
-        let made = std::thread::Builder::new().stack_size(64 << 10).spawn(move || build(&boxes).is_none());
+        let made =
+            std::thread::Builder::new().stack_size(64 << 10).spawn(move || build_bvh8(&boxes).is_none());
         assert!(made.unwrap().join().unwrap(), "a tree of a thousand levels");
     }
 
@@ -188,11 +189,11 @@ mod tests {
         for place in all {
             let bounds = (0..1024_u16).map(|at| place(f32::from(at))).map(|at| Bounds { low: at, high: at });
             let bounds: Vec<_> = bounds.collect();
-            let bytes = build(&bounds).map_or(0, |tree| match tree.nodes {
-                Nodes::Wide(nodes) => size_of_val(&nodes[..]),
-                Nodes::Binary(_) => unreachable!("wide trees were asked for"),
+            let bytes = build_bvh8(&bounds).map_or(0, |tree| match tree.nodes {
+                BvhNodes::Wide(nodes) => size_of_val(&nodes[..]),
+                BvhNodes::Binary(_) => unreachable!("wide trees were asked for"),
             });
-            assert!(bytes <= 1023 * size_of::<BinaryNode>());
+            assert!(bytes <= 1023 * size_of::<Bvh2NodeRecord>());
         }
     }
 

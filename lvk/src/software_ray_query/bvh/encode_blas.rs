@@ -2,15 +2,16 @@
 
 use glam::Vec3;
 
-use super::indexed_triangles::{Indexed, indexed};
-use super::mesh_bvh::{Nodes, Tree};
-use super::primitives::{Mesh, Primitives};
-use super::settings::Quality;
+use super::indexed_triangles::{IndexedMesh, index_mesh};
+use super::mesh_bvh::{Bvh, BvhNodes};
+use super::primitives::{Mesh, MeshPrimitives};
+use super::settings::BvhSettings;
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::layout::LeafKind;
 use crate::software_ray_query::layout::{
-    BINARY, BLOCK_BYTES, GeometryRow, Header, LeafBox, LeafIndexed, LeafPacked, LeafTriangle, WIDE,
+    BLOCK_BYTES, BlobHeader, FORMAT_BVH2, FORMAT_BVH8, GeometryRecord, LeafBox, LeafIndexed, LeafPacked,
+    LeafTriangle,
 };
 
 /// A structure, ready to be copied to the GPU.
@@ -23,21 +24,21 @@ pub(crate) struct BlasBlob {
 
 impl BlasBlob {
     /// Its header.
-    pub(crate) fn header(&self) -> Header {
-        let bytes = self.bytes.get(..size_of::<Header>());
+    pub(crate) fn header(&self) -> BlobHeader {
+        let bytes = self.bytes.get(..size_of::<BlobHeader>());
         bytes.map_or_else(bytemuck::Zeroable::zeroed, bytemuck::pod_read_unaligned)
     }
 }
 
 /// The leaves of a structure: primitives in the order of the mesh, or, in the order of the tree, what names vertices.
-enum LeafList<'a> {
+enum EncodedLeaves<'a> {
     Boxes(&'a [LeafBox]),
     Triangles(&'a [LeafTriangle]),
     Indexed(Vec<LeafIndexed>),
     Packed(Vec<LeafPacked>),
 }
 
-impl LeafList<'_> {
+impl EncodedLeaves<'_> {
     fn kind(&self) -> LeafKind {
         match self {
             Self::Boxes(_) => LeafKind::Boxes,
@@ -59,8 +60,8 @@ impl LeafList<'_> {
     /// Appends them in the order of the tree, which those that name vertices have already; answers their place in blocks.
     fn append(&self, bytes: &mut Vec<u8>, order: &[u32]) -> u32 {
         match self {
-            Self::Boxes(leaves) => append_ordered(bytes, leaves, order),
-            Self::Triangles(leaves) => append_ordered(bytes, leaves, order),
+            Self::Boxes(leaves) => append_in_order(bytes, leaves, order),
+            Self::Triangles(leaves) => append_in_order(bytes, leaves, order),
             Self::Indexed(leaves) => append(bytes, bytemuck::cast_slice(leaves)),
             Self::Packed(leaves) => append(bytes, bytemuck::cast_slice(leaves)),
         }
@@ -68,54 +69,54 @@ impl LeafList<'_> {
 }
 
 /// Leaves, and the vertices that they name.
-struct Leaves<'a> {
-    list: LeafList<'a>,
+struct LeavesAndVertices<'a> {
+    leaves: EncodedLeaves<'a>,
     vertices: Vec<Vec3>,
 }
 
-impl Leaves<'_> {
+impl LeavesAndVertices<'_> {
     /// Bytes of all parts.
     fn size(&self) -> usize {
-        self.list.size() + size_of_val(&self.vertices[..])
+        self.leaves.size() + size_of_val(&self.vertices[..])
     }
 }
 
 /// Builds a tree over the mesh and packs it.
-pub(crate) fn build(mesh: &Mesh, quality: Quality) -> BlasBlob {
+pub(crate) fn encode_blas(mesh: &Mesh, quality: BvhSettings) -> BlasBlob {
     let bounds = mesh.bounds();
-    let tree = Tree::of_mesh(&bounds);
+    let tree = Bvh::build(&bounds);
     let whole = bounds.into_iter().fold(Bounds::EMPTY, Bounds::union);
-    BlasBlob { bytes: pack(mesh, &tree, quality, whole), bounds: whole }
+    BlasBlob { bytes: encode_bvh(mesh, &tree, quality, whole), bounds: whole }
 }
 
-pub(crate) fn pack(mesh: &Mesh, tree: &Tree, quality: Quality, bounds: Bounds) -> Vec<u8> {
+pub(crate) fn encode_bvh(mesh: &Mesh, tree: &Bvh, quality: BvhSettings, bounds: Bounds) -> Vec<u8> {
     let (format, nodes, node_count): (_, &[u8], _) = match &tree.nodes {
-        Nodes::Wide(nodes) => (WIDE, bytemuck::cast_slice(nodes), nodes.len()),
-        Nodes::Binary(nodes) => (BINARY, bytemuck::cast_slice(nodes), nodes.len()),
+        BvhNodes::Wide(nodes) => (FORMAT_BVH8, bytemuck::cast_slice(nodes), nodes.len()),
+        BvhNodes::Binary(nodes) => (FORMAT_BVH2, bytemuck::cast_slice(nodes), nodes.len()),
     };
-    let leaves = leaves(mesh, &tree.order, quality);
-    let row = |flags: &GeometryFlags| GeometryRow { flags: flags.bits(), reserved: [0; 3] };
+    let leaves = encode_leaves(mesh, &tree.order, quality);
+    let row = |flags: &GeometryFlags| GeometryRecord { flags: flags.bits(), reserved: [0; 3] };
     let geometries: Vec<_> = mesh.flags.iter().map(row).collect();
     let parts = nodes.len() + leaves.size() + size_of_val(&geometries[..]);
-    let mut bytes = Vec::with_capacity(size_of::<Header>() + parts + 4 * BLOCK_BYTES);
-    bytes.resize(size_of::<Header>(), 0);
-    let header = Header {
+    let mut bytes = Vec::with_capacity(size_of::<BlobHeader>() + parts + 4 * BLOCK_BYTES);
+    bytes.resize(size_of::<BlobHeader>(), 0);
+    let header = BlobHeader {
         format,
-        leaf_kind: leaves.list.kind() as u32,
+        leaf_kind: leaves.leaves.kind() as u32,
         root: tree.root,
         primitive_count: tree.order.len() as u32,
         nodes: append(&mut bytes, nodes),
-        primitives: leaves.list.append(&mut bytes, &tree.order),
+        primitives: leaves.leaves.append(&mut bytes, &tree.order),
         vertices: append(&mut bytes, bytemuck::cast_slice(&leaves.vertices)),
         geometries: append(&mut bytes, bytemuck::cast_slice(&geometries)),
         node_count: node_count as u32,
         geometry_count: geometries.len() as u32,
-        marks: marks(&mesh.flags),
+        marks: opacity_flags(&mesh.flags),
         low: bounds.low.to_array(),
         high: bounds.high.to_array(),
         ..bytemuck::Zeroable::zeroed()
     };
-    bytes[..size_of::<Header>()].copy_from_slice(bytemuck::bytes_of(&header));
+    bytes[..size_of::<BlobHeader>()].copy_from_slice(bytemuck::bytes_of(&header));
     bytes
 }
 
@@ -128,7 +129,7 @@ fn append(bytes: &mut Vec<u8>, part: &[u8]) -> u32 {
 }
 
 /// Appends primitives, which are whole blocks, in the order of a tree; answers their place in blocks.
-fn append_ordered<T: bytemuck::NoUninit>(bytes: &mut Vec<u8>, primitives: &[T], order: &[u32]) -> u32 {
+fn append_in_order<T: bytemuck::NoUninit>(bytes: &mut Vec<u8>, primitives: &[T], order: &[u32]) -> u32 {
     const { assert!(size_of::<T>().is_multiple_of(BLOCK_BYTES)) };
     let place = bytes.len() / BLOCK_BYTES;
     for number in order {
@@ -137,33 +138,37 @@ fn append_ordered<T: bytemuck::NoUninit>(bytes: &mut Vec<u8>, primitives: &[T], 
     place as u32
 }
 
-fn leaves<'a>(mesh: &'a Mesh, order: &[u32], quality: Quality) -> Leaves<'a> {
-    let copies = |list| Leaves { list, vertices: Vec::new() };
+fn encode_leaves<'a>(mesh: &'a Mesh, order: &[u32], quality: BvhSettings) -> LeavesAndVertices<'a> {
+    let copies = |list| LeavesAndVertices { leaves: list, vertices: Vec::new() };
     match &mesh.primitives {
-        Primitives::Boxes(boxes) => copies(LeafList::Boxes(boxes)),
-        Primitives::Triangles(triangles) => {
-            let copies = copies(LeafList::Triangles(triangles));
-            let small = quality.low_memory.then(|| indexed(mesh, triangles, order)).flatten().map(naming);
+        MeshPrimitives::Boxes(boxes) => copies(EncodedLeaves::Boxes(boxes)),
+        MeshPrimitives::Triangles(triangles) => {
+            let copies = copies(EncodedLeaves::Triangles(triangles));
+            let small = quality
+                .low_memory
+                .then(|| index_mesh(mesh, triangles, order))
+                .flatten()
+                .map(encode_indexed_leaves);
             small.filter(|small| small.size() < copies.size()).unwrap_or(copies)
         }
     }
 }
 
 /// Leaves that name vertices, as small as their numbers allow.
-fn naming(Indexed { triangles, vertices }: Indexed) -> Leaves<'static> {
-    let list = if LeafKind::naming(vertices.len()) == LeafKind::PackedTriangles {
-        LeafList::Packed(triangles.iter().map(LeafPacked::of).collect())
+fn encode_indexed_leaves(IndexedMesh { triangles, vertices }: IndexedMesh) -> LeavesAndVertices<'static> {
+    let list = if LeafKind::with_vertex_indices(vertices.len()) == LeafKind::PackedTriangles {
+        EncodedLeaves::Packed(triangles.iter().map(LeafPacked::encode).collect())
     } else {
-        LeafList::Indexed(triangles)
+        EncodedLeaves::Indexed(triangles)
     };
-    Leaves { list, vertices }
+    LeavesAndVertices { leaves: list, vertices }
 }
 
-fn marks(flags: &[GeometryFlags]) -> u32 {
+fn opacity_flags(flags: &[GeometryFlags]) -> u32 {
     let opaque = flags.iter().filter(|flags| flags.contains(GeometryFlags::OPAQUE)).count();
     match opaque {
-        0 => Header::NONE_OPAQUE,
-        count if count == flags.len() => Header::ALL_OPAQUE,
+        0 => BlobHeader::NONE_OPAQUE,
+        count if count == flags.len() => BlobHeader::ALL_OPAQUE,
         _ => 0,
     }
 }
@@ -172,8 +177,8 @@ fn marks(flags: &[GeometryFlags]) -> u32 {
 mod tests {
     use super::*;
 
-    const SMALL: Quality = Quality { low_memory: true, refit: false };
-    const SMALL_MOVING: Quality = Quality { low_memory: true, refit: true };
+    const SMALL: BvhSettings = BvhSettings { low_memory: true, refit: false };
+    const SMALL_MOVING: BvhSettings = BvhSettings { low_memory: true, refit: true };
 
     /// Cells of two triangles each that share their vertices, which have so many numbers for each position.
     fn grid(side: u32, numbers: u32) -> Mesh {
@@ -192,12 +197,12 @@ mod tests {
             let [a, b, c] = named.map(position);
             LeafTriangle { a, primitive, b, geometry: 0, c, opaque: 1 }
         };
-        let primitives = Primitives::Triangles((0..).zip(&vertices).map(triangle).collect());
+        let primitives = MeshPrimitives::Triangles((0..).zip(&vertices).map(triangle).collect());
         Mesh { primitives, vertices, flags: vec![GeometryFlags::OPAQUE] }
     }
 
-    fn bytes_each(mesh: &Mesh, quality: Quality) -> (u32, f64) {
-        let blob = build(mesh, quality);
+    fn bytes_each(mesh: &Mesh, quality: BvhSettings) -> (u32, f64) {
+        let blob = encode_blas(mesh, quality);
         (blob.header().leaf_kind, blob.bytes.len() as f64 / f64::from(blob.header().primitive_count))
     }
 
@@ -216,7 +221,7 @@ mod tests {
         let apart = grid(30, 900);
         let (kind, with_updates) = bytes_each(&apart, SMALL_MOVING);
         assert!(kind == LeafKind::PackedTriangles as u32, "four vertices for two triangles");
-        let Primitives::Triangles(all) = &apart.primitives else { unreachable!("triangles") };
+        let MeshPrimitives::Triangles(all) = &apart.primitives else { unreachable!("triangles") };
         let unshared = (0..all.len() as u32).map(|number| [0, 1, 2].map(|step| number * 3 + step)).collect();
         let (kind, copies) = bytes_each(&Mesh { vertices: unshared, ..apart.clone() }, SMALL_MOVING);
         assert!(kind == LeafKind::Triangles as u32 && copies > with_updates, "three for each");
@@ -225,25 +230,31 @@ mod tests {
     }
 
     /// The leaves of one triangle that names the last of so many vertices.
-    fn last_of(count: usize) -> (LeafIndexed, Leaves<'static>) {
+    fn last_of(count: usize) -> (LeafIndexed, LeavesAndVertices<'static>) {
         let vertices = [0, 1, count as u32 - 1];
         let triangle = LeafIndexed { vertices, primitive: 7 };
-        (triangle, naming(Indexed { triangles: vec![triangle], vertices: vec![Vec3::ZERO; count] }))
+        (
+            triangle,
+            encode_indexed_leaves(IndexedMesh {
+                triangles: vec![triangle],
+                vertices: vec![Vec3::ZERO; count],
+            }),
+        )
     }
 
-    fn bytes_of(leaves: &Leaves<'_>) -> Vec<u8> {
+    fn bytes_of(leaves: &LeavesAndVertices<'_>) -> Vec<u8> {
         let mut bytes = Vec::new();
-        leaves.list.append(&mut bytes, &[]);
+        leaves.leaves.append(&mut bytes, &[]);
         bytes
     }
 
     #[test]
     fn leaves_are_packed_where_all_vertices_have_names() {
-        let (triangle, leaves) = last_of(LeafPacked::MOST_VERTICES);
-        assert_eq!(leaves.list.kind(), LeafKind::PackedTriangles);
-        assert!(bytes_of(&leaves).starts_with(bytemuck::bytes_of(&LeafPacked::of(&triangle))));
-        let (triangle, leaves) = last_of(LeafPacked::MOST_VERTICES + 1);
-        assert_eq!(leaves.list.kind(), LeafKind::IndexedTriangles);
+        let (triangle, leaves) = last_of(LeafPacked::MAX_VERTICES);
+        assert_eq!(leaves.leaves.kind(), LeafKind::PackedTriangles);
+        assert!(bytes_of(&leaves).starts_with(bytemuck::bytes_of(&LeafPacked::encode(&triangle))));
+        let (triangle, leaves) = last_of(LeafPacked::MAX_VERTICES + 1);
+        assert_eq!(leaves.leaves.kind(), LeafKind::IndexedTriangles);
         assert_eq!(bytes_of(&leaves), bytemuck::bytes_of(&triangle));
     }
 }

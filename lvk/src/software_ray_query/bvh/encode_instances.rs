@@ -6,36 +6,40 @@ use glam::{DAffine3, DMat3, DVec3, Vec3, Vec3Swizzles};
 
 use crate::accel::instance::TlasInstance;
 use crate::accel::primitive_bounds::Bounds;
-use crate::software_ray_query::layout::Instance;
-use crate::software_ray_query::rebraid_parts::Parts;
+use crate::software_ray_query::layout::InstanceRecord;
+use crate::software_ray_query::rebraid_parts::RebraidParts;
 
 /// What an instance shows.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ShownStructure {
+pub(crate) struct InstancedBlas {
     pub(crate) address: u64,
-    pub(crate) parts: Arc<Parts>,
+    pub(crate) parts: Arc<RebraidParts>,
 }
 
 /// An instance or a part of one, and its box in the world.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PlacedInstance {
-    pub(crate) instance: Instance,
+    pub(crate) instance: InstanceRecord,
     pub(crate) bounds: Bounds,
     /// Of what the instance shows.
-    pub(crate) parts: Arc<Parts>,
+    pub(crate) parts: Arc<RebraidParts>,
 }
 
 /// The instance with this number in the caller's list; `None` where no ray can meet it.
-pub(crate) fn place(number: u32, instance: &TlasInstance, shown: &ShownStructure) -> Option<PlacedInstance> {
-    let matrix = matrix(&instance.transform);
-    let inverse = rows(&matrix.inverse());
+pub(crate) fn place_instance(
+    number: u32,
+    instance: &TlasInstance,
+    shown: &InstancedBlas,
+) -> Option<PlacedInstance> {
+    let matrix = matrix_from_rows(&instance.transform);
+    let inverse = rows_from_matrix(&matrix.inverse());
     let is_finite = inverse.iter().all(|number| number.is_finite());
     let bounds = shown.parts.whole.bounds;
     let is_empty = bounds.low.x > bounds.high.x;
     if instance.mask == 0 || is_empty || !is_finite || is_singular(&matrix.matrix3) {
         return None;
     }
-    let record = Instance {
+    let record = InstanceRecord {
         world_to_object: inverse,
         object_to_world: instance.transform,
         structure: shown.address,
@@ -45,31 +49,31 @@ pub(crate) fn place(number: u32, instance: &TlasInstance, shown: &ShownStructure
         entry: 0,
         reserved: [0; 2],
     };
-    let bounds = moved(&matrix, bounds);
+    let bounds = transform_bounds(&matrix, bounds);
     Some(PlacedInstance { instance: record, bounds, parts: Arc::clone(&shown.parts) })
 }
 
 /// Whether the determinant is nothing but what rounding of the matrix, and of the products that the kernel in
 /// `build/instance.glsl` makes of it, may leave.
 fn is_singular(matrix: &DMat3) -> bool {
-    const NOTHING: f64 = 4.0 * f32::EPSILON as f64;
+    const SINGULAR_EPSILON: f64 = 4.0 * f32::EPSILON as f64;
     let DMat3 { x_axis: x, y_axis: y, z_axis: z } = *matrix;
     let products = x.abs().dot((y.yzx() * z.zxy()).abs() + (y.zxy() * z.yzx()).abs());
-    matrix.determinant().abs() <= products * NOTHING
+    matrix.determinant().abs() <= products * SINGULAR_EPSILON
 }
 
-/// Around a box of the object as rows of a matrix move it, as [`place`] does it for the whole.
-pub(crate) fn moved_bounds(object_to_world: &[f32; 12], bounds: Bounds) -> Bounds {
-    moved(&matrix(object_to_world), bounds)
+/// Around a box of the object as rows of a matrix move it, as [`place_instance`] does it for the whole.
+pub(crate) fn transform_bounds_rows(object_to_world: &[f32; 12], bounds: Bounds) -> Bounds {
+    transform_bounds(&matrix_from_rows(object_to_world), bounds)
 }
 
-fn matrix(rows: &[f32; 12]) -> DAffine3 {
+fn matrix_from_rows(rows: &[f32; 12]) -> DAffine3 {
     let m = rows.map(f64::from);
     let column = |x: usize| DVec3::new(m[x], m[x + 4], m[x + 8]);
     DAffine3 { matrix3: DMat3::from_cols(column(0), column(1), column(2)), translation: column(3) }
 }
 
-fn rows(matrix: &DAffine3) -> [f32; 12] {
+fn rows_from_matrix(matrix: &DAffine3) -> [f32; 12] {
     let (m, t) = (matrix.matrix3.transpose(), matrix.translation);
     let row = |row: DVec3, last: f64| [row.x as f32, row.y as f32, row.z as f32, last as f32];
     let (x, y, z) = (row(m.x_axis, t.x), row(m.y_axis, t.y), row(m.z_axis, t.z));
@@ -77,7 +81,7 @@ fn rows(matrix: &DAffine3) -> [f32; 12] {
 }
 
 /// Around the box as the matrix moves it, with room for what rounding does to the rays.
-fn moved(matrix: &DAffine3, bounds: Bounds) -> Bounds {
+fn transform_bounds(matrix: &DAffine3, bounds: Bounds) -> Bounds {
     const ROUNDING: f64 = 1.0 / (1 << 20) as f64;
     let (low, high) = (bounds.low.as_dvec3(), bounds.high.as_dvec3());
     let center = matrix.transform_point3((low + high) * 0.5);
@@ -101,7 +105,7 @@ mod tests {
     fn a_matrix_is_singular_however_its_numbers_were_rounded() {
         let nine = [1.0, 2.0, 3.0, 0.0, 4.0, 5.0, 6.0, 0.0, 7.0, 8.0, 9.0, 0.0];
         for scale in [1e-6, 0.1, 1.0 / 3.0, 1.0, 7.7, 1e6_f32] {
-            assert!(is_singular(&matrix(&nine.map(|number| number * scale)).matrix3), "{scale}");
+            assert!(is_singular(&matrix_from_rows(&nine.map(|number| number * scale)).matrix3), "{scale}");
         }
         assert!(is_singular(&DMat3::ZERO));
     }
@@ -113,7 +117,7 @@ mod tests {
         {
             for turn in [Quat::IDENTITY, turn] {
                 let of = Affine3A::from_scale_rotation_translation(scale.into(), turn, Vec3::ONE);
-                assert!(!is_singular(&matrix(&transform_rows(&of)).matrix3), "{scale:?}, {turn}");
+                assert!(!is_singular(&matrix_from_rows(&transform_rows(&of)).matrix3), "{scale:?}, {turn}");
             }
         }
     }

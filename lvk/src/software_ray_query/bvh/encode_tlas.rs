@@ -2,17 +2,19 @@
 
 use super::bvh2;
 use super::encode_instances::PlacedInstance;
-use super::mesh_bvh::Nodes;
-use super::rebraid::open;
+use super::mesh_bvh::BvhNodes;
+use super::rebraid::rebraid;
 use crate::accel::primitive_bounds::Bounds;
 use crate::software_ray_query::layout::LeafKind;
-use crate::software_ray_query::layout::{BINARY, BLOCK_BYTES, BinaryNode, Header, Instance, NONE};
+use crate::software_ray_query::layout::{
+    BLOCK_BYTES, BlobHeader, Bvh2NodeRecord, FORMAT_BVH2, InstanceRecord, NONE,
+};
 
 /// Builds a tree over the instances, or parts of them where there is room for so many records, and packs it.
-pub(crate) fn build(instances: &[PlacedInstance], room: u32) -> Vec<u8> {
+pub(crate) fn encode_tlas(instances: &[PlacedInstance], room: u32) -> Vec<u8> {
     if instances.is_empty() {
-        let nothing = Header {
-            format: BINARY,
+        let nothing = BlobHeader {
+            format: FORMAT_BVH2,
             leaf_kind: LeafKind::Instances as u32,
             root: NONE,
             low: [f32::MAX; 3],
@@ -21,18 +23,19 @@ pub(crate) fn build(instances: &[PlacedInstance], room: u32) -> Vec<u8> {
         };
         return bytemuck::bytes_of(&nothing).to_vec();
     }
-    let records = open(instances, room as usize);
+    let records = rebraid(instances, room as usize);
     let bounds: Vec<Bounds> = records.iter().map(|placed| placed.bounds).collect();
-    let tree = bvh2::build(&bounds, 1);
+    let tree = bvh2::build_bvh2(&bounds, 1);
     let whole = bounds.into_iter().fold(Bounds::EMPTY, Bounds::union);
-    let nodes: &[BinaryNode] = match &tree.nodes {
-        Nodes::Binary(nodes) => nodes,
-        Nodes::Wide(_) => &[],
+    let nodes: &[Bvh2NodeRecord] = match &tree.nodes {
+        BvhNodes::Binary(nodes) => nodes,
+        BvhNodes::Wide(_) => &[],
     };
-    let ordered: Vec<Instance> = tree.order.iter().map(|number| records[*number as usize].instance).collect();
-    let places = size_of::<Header>() / BLOCK_BYTES;
-    let header = Header {
-        format: BINARY,
+    let ordered: Vec<InstanceRecord> =
+        tree.order.iter().map(|number| records[*number as usize].instance).collect();
+    let places = size_of::<BlobHeader>() / BLOCK_BYTES;
+    let header = BlobHeader {
+        format: FORMAT_BVH2,
         leaf_kind: LeafKind::Instances as u32,
         root: tree.root,
         primitive_count: ordered.len() as u32,

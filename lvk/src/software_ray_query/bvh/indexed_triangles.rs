@@ -10,22 +10,22 @@ use crate::barrier::IdHasher;
 use crate::software_ray_query::layout::{LeafIndexed, LeafTriangle};
 
 /// Triangles and the vertices they name.
-pub(crate) struct Indexed {
+pub(crate) struct IndexedMesh {
     pub(crate) triangles: Vec<LeafIndexed>,
     pub(crate) vertices: Vec<Vec3>,
 }
 
 /// Most geometries whose numbers fit beside those of primitives.
-const MOST_GEOMETRIES: usize = 1 << 8;
+const MAX_GEOMETRIES: usize = 1 << 8;
 /// Most primitives of a geometry beside its number.
-const MOST_PRIMITIVES: u32 = 1 << 24;
+const MAX_PRIMITIVES: u32 = 1 << 24;
 
 /// The triangles in this order; `None` where their numbers do not fit. Each position is there once, or each vertex if the mesh
 /// says which are named, and none that is not.
-pub(crate) fn indexed(mesh: &Mesh, triangles: &[LeafTriangle], order: &[u32]) -> Option<Indexed> {
+pub(crate) fn index_mesh(mesh: &Mesh, triangles: &[LeafTriangle], order: &[u32]) -> Option<IndexedMesh> {
     let several = mesh.flags.len() > 1;
     if several
-        && (mesh.flags.len() > MOST_GEOMETRIES || triangles.iter().any(|of| of.primitive >= MOST_PRIMITIVES))
+        && (mesh.flags.len() > MAX_GEOMETRIES || triangles.iter().any(|of| of.primitive >= MAX_PRIMITIVES))
     {
         return None;
     }
@@ -49,7 +49,7 @@ pub(crate) fn indexed(mesh: &Mesh, triangles: &[LeafTriangle], order: &[u32]) ->
         LeafIndexed { vertices: [0, 1, 2].map(corner), primitive: of.primitive | geometry }
     };
     let triangles = order.iter().map(leaf).collect();
-    Some(Indexed { triangles, vertices })
+    Some(IndexedMesh { triangles, vertices })
 }
 
 #[cfg(test)]
@@ -58,7 +58,7 @@ mod tests {
 
     use super::*;
     use crate::accel::geometry::GeometryFlags;
-    use crate::software_ray_query::bvh::primitives::Primitives;
+    use crate::software_ray_query::bvh::primitives::MeshPrimitives;
 
     /// Triangles of two geometries in turn, each with vertices of its own, some of them in one place.
     fn mesh(named: &[[u8; 3]]) -> Mesh {
@@ -67,7 +67,7 @@ mod tests {
             let [a, b, c] = named.map(position);
             LeafTriangle { a, primitive: number / 2, b, geometry: number % 2, c, opaque: 0 }
         };
-        let primitives = Primitives::Triangles((0..).zip(named).map(triangle).collect());
+        let primitives = MeshPrimitives::Triangles((0..).zip(named).map(triangle).collect());
         let vertices = named.iter().map(|named| named.map(u32::from)).collect();
         Mesh { primitives, vertices, flags: vec![GeometryFlags::empty(); 2] }
     }
@@ -82,7 +82,7 @@ mod tests {
             named in prop::collection::vec(prop::array::uniform3(0..60_u8), 0..40), moves in any::<bool>()
         ) {
             let mut mesh = mesh(&named);
-            let Primitives::Triangles(triangles) = mesh.primitives.clone() else { unreachable!("triangles") };
+            let MeshPrimitives::Triangles(triangles) = mesh.primitives.clone() else { unreachable!("triangles") };
             let corners = |of: &LeafTriangle| [of.a, of.b, of.c];
             let of_both = mesh.vertices.iter().zip(&triangles);
             let given = distinct(of_both.flat_map(|(named, of)| named.map(|vertex| (of.geometry, vertex))));
@@ -92,7 +92,7 @@ mod tests {
                 mesh.vertices.clear();
             }
             let order: Vec<u32> = (0..triangles.len() as u32).rev().collect();
-            let Indexed { triangles: leaves, vertices } = indexed(&mesh, &triangles, &order).unwrap();
+            let IndexedMesh { triangles: leaves, vertices } = index_mesh(&mesh, &triangles, &order).unwrap();
             prop_assert_eq!(vertices.len(), if moves { given } else { places });
             for (leaf, of) in leaves.iter().zip(triangles.iter().rev()) {
                 prop_assert_eq!(leaf.vertices.map(|vertex| vertices[vertex as usize]), corners(of));
@@ -104,12 +104,14 @@ mod tests {
     #[test]
     fn numbers_that_do_not_fit_are_refused() {
         let mut mesh = mesh(&[[0, 1, 2]; 2]);
-        let Primitives::Triangles(mut triangles) = mesh.primitives.clone() else { unreachable!("triangles") };
-        triangles[1].primitive = MOST_PRIMITIVES;
-        assert!(indexed(&mesh, &triangles, &[0, 1]).is_none());
+        let MeshPrimitives::Triangles(mut triangles) = mesh.primitives.clone() else {
+            unreachable!("triangles")
+        };
+        triangles[1].primitive = MAX_PRIMITIVES;
+        assert!(index_mesh(&mesh, &triangles, &[0, 1]).is_none());
         triangles[1].primitive -= 1;
-        assert!(indexed(&mesh, &triangles, &[0, 1]).is_some());
-        mesh.flags = vec![GeometryFlags::empty(); MOST_GEOMETRIES + 1];
-        assert!(indexed(&mesh, &triangles, &[0, 1]).is_none());
+        assert!(index_mesh(&mesh, &triangles, &[0, 1]).is_some());
+        mesh.flags = vec![GeometryFlags::empty(); MAX_GEOMETRIES + 1];
+        assert!(index_mesh(&mesh, &triangles, &[0, 1]).is_none());
     }
 }

@@ -10,38 +10,43 @@ use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::ploc::morton::morton_encode_u64_unorm;
 
-use super::thread_budget::Build;
+use super::thread_budget::ThreadBudget;
 use crate::accel::primitive_bounds::Bounds;
-use crate::parallel::share_out;
+use crate::parallel::parallel_for;
 
 /// Rounds that look at the next neighbours only: most of what is small is paired by them.
-const NEAR_ROUNDS: usize = 2;
+const SHORT_SEARCH_ROUNDS: usize = 2;
 /// How far later rounds look to either side.
-const FAR: usize = 14;
+const LONG_SEARCH_RADIUS: usize = 14;
 /// A round that pairs less than one in so many pairs those that stand beside each other too.
-const FEWEST: usize = 32;
+const MIN_PAIRED_FRACTION: usize = 32;
 /// The last so many are left to the rule.
-const LAST: usize = 32;
+const FINAL_NODE_COUNT: usize = 32;
 
 /// A tree of boxes, at least one, with one in each leaf.
-pub(crate) fn build(boxes: &[Bounds]) -> Bvh2 {
-    cluster(boxes).0
+pub(crate) fn build_ploc(boxes: &[Bounds]) -> Bvh2 {
+    cluster_counting_searches(boxes).0
 }
 
-/// The tree, and how many boxes looked for a neighbour over all rounds: at most [`FEWEST`] for each.
-fn cluster(boxes: &[Bounds]) -> (Bvh2, usize) {
+/// The tree, and how many boxes looked for a neighbour over all rounds: at most [`MIN_PAIRED_FRACTION`] for each.
+fn cluster_counting_searches(boxes: &[Bounds]) -> (Bvh2, usize) {
     let mut tree = Bvh2::zeroed(boxes.len());
     tree.primitive_indices = (0..boxes.len() as u32).collect();
-    let build = Build::begin();
-    let mut nodes = sorted(&build, boxes);
+    let build = ThreadBudget::new();
+    let mut nodes = morton_sorted_leaves(&build, boxes);
     let mut next = Vec::with_capacity(nodes.len());
     let mut partners = vec![0; nodes.len()];
     let (mut rounds, mut searches, mut free) = (0, 0, tree.nodes.len());
     while nodes.len() > 1 {
         let partners = &mut partners[..nodes.len()];
-        find_partners(&build, &nodes, if rounds < NEAR_ROUNDS { 1 } else { FAR }, partners);
-        pair_more(partners);
-        merge(&nodes, partners, &mut tree.nodes[..free], &mut next);
+        find_partners(
+            &build,
+            &nodes,
+            if rounds < SHORT_SEARCH_ROUNDS { 1 } else { LONG_SEARCH_RADIUS },
+            partners,
+        );
+        pair_neighbours(partners);
+        merge_pairs(&nodes, partners, &mut tree.nodes[..free], &mut next);
         free -= 2 * (nodes.len() - next.len());
         searches += nodes.len();
         rounds += 1;
@@ -58,14 +63,14 @@ fn aabb(bounds: &Bounds) -> Aabb {
 }
 
 /// The leaves along a Morton curve through their centers.
-fn sorted(build: &Build, boxes: &[Bounds]) -> Vec<Bvh2Node> {
+fn morton_sorted_leaves(build: &ThreadBudget, boxes: &[Bounds]) -> Vec<Bvh2Node> {
     let whole = aabb(&boxes.iter().copied().fold(Bounds::EMPTY, Bounds::union));
     let scale = 1.0 / whole.diagonal().as_dvec3().max(DVec3::splat(f64::MIN_POSITIVE));
     let low = whole.min.as_dvec3();
     let mut codes = vec![(0_u64, 0_u32); boxes.len()];
-    let threads = build.threads(boxes.len());
+    let threads = build.thread_count(boxes.len());
     let length = boxes.len().div_ceil(threads).max(1);
-    share_out(threads, codes.chunks_mut(length).enumerate(), |(chunk, codes)| {
+    parallel_for(threads, codes.chunks_mut(length).enumerate(), |(chunk, codes)| {
         for (place, number) in codes.iter_mut().zip((chunk * length) as u32..) {
             let center = aabb(&boxes[number as usize]).center().as_dvec3();
             *place = (morton_encode_u64_unorm((center - low) * scale), number);
@@ -79,24 +84,24 @@ fn sorted(build: &Build, boxes: &[Bounds]) -> Vec<Bvh2Node> {
 
 /// For each node which other, at most `reach` places away, makes the smallest box with it. Of equals the one beside it with
 /// which it makes an even and an odd place, so that boxes that are alike find each other.
-fn find_partners(build: &Build, nodes: &[Bvh2Node], reach: usize, partners: &mut [u32]) {
-    let threads = build.threads(nodes.len());
+fn find_partners(build: &ThreadBudget, nodes: &[Bvh2Node], reach: usize, partners: &mut [u32]) {
+    let threads = build.thread_count(nodes.len());
     // More pieces than threads, as some take longer.
     let pieces = if threads == 1 { 1 } else { threads * 4 };
     let length = nodes.len().div_ceil(pieces);
-    share_out(threads, partners.chunks_mut(length).enumerate(), |(chunk, partners)| {
-        search(nodes, reach, chunk * length, partners);
+    parallel_for(threads, partners.chunks_mut(length).enumerate(), |(chunk, partners)| {
+        find_partners_from(nodes, reach, chunk * length, partners);
     });
 }
 
 /// Of the nodes from `first` on.
-fn search(nodes: &[Bvh2Node], reach: usize, first: usize, partners: &mut [u32]) {
+fn find_partners_from(nodes: &[Bvh2Node], reach: usize, first: usize, partners: &mut [u32]) {
     let end = first + partners.len();
     let mut least = vec![f32::INFINITY; partners.len()];
     for place in first..end {
         let other = if place ^ 1 < nodes.len() { place ^ 1 } else { place - 1 };
         partners[place - first] = other as u32;
-        least[place - first] = cost(&nodes[place], &nodes[other]);
+        least[place - first] = merged_half_area(&nodes[place], &nodes[other]);
     }
     for place in first.saturating_sub(reach)..end {
         let own = nodes[place];
@@ -106,7 +111,7 @@ fn search(nodes: &[Bvh2Node], reach: usize, first: usize, partners: &mut [u32]) 
         };
         let behind = place + 1..(place + reach + 1).min(nodes.len());
         for (other, node) in behind.clone().zip(&nodes[behind]) {
-            let cost = cost(&own, node);
+            let cost = merged_half_area(&own, node);
             if cost < best_cost {
                 (best, best_cost) = (other as u32, cost);
             }
@@ -123,16 +128,16 @@ fn search(nodes: &[Bvh2Node], reach: usize, first: usize, partners: &mut [u32]) 
     }
 }
 
-fn cost(one: &Bvh2Node, other: &Bvh2Node) -> f32 {
+fn merged_half_area(one: &Bvh2Node, other: &Bvh2Node) -> f32 {
     one.aabb().union(other.aabb()).half_area()
 }
 
 /// Pairs those side by side that nobody took, where too few found each other: each looks at one that looks at the next.
-fn pair_more(partners: &mut [u32]) {
+fn pair_neighbours(partners: &mut [u32]) {
     let found = |partners: &[u32], place: usize| partners[partners[place] as usize] as usize == place;
     let count = partners.len();
     let found_one = || (0..count).filter(|place| found(partners, *place)).count();
-    if count <= LAST || found_one() * FEWEST >= 2 * count {
+    if count <= FINAL_NODE_COUNT || found_one() * MIN_PAIRED_FRACTION >= 2 * count {
         return;
     }
     for place in (0..count - 1).step_by(2) {
@@ -144,7 +149,7 @@ fn pair_more(partners: &mut [u32]) {
 }
 
 /// Makes one node of each pair; its children go to the end of `free`.
-fn merge(nodes: &[Bvh2Node], partners: &[u32], free: &mut [Bvh2Node], next: &mut Vec<Bvh2Node>) {
+fn merge_pairs(nodes: &[Bvh2Node], partners: &[u32], free: &mut [Bvh2Node], next: &mut Vec<Bvh2Node>) {
     next.clear();
     let mut end = free.len();
     for (place, node) in nodes.iter().enumerate() {
@@ -174,12 +179,13 @@ mod tests {
     }
 
     /// A number below 1 for each other number.
-    fn share(number: usize) -> f32 {
+    fn paired_share(number: usize) -> f32 {
         (number as u32).wrapping_mul(0x9e37_79b9) as f32 / u32::MAX as f32
     }
 
-    fn somewhere(number: usize) -> Vec3A {
-        vec3a(share(3 * number + 1), share(7 * number + 2), share(11 * number + 5)) * 100.0
+    fn any_position(number: usize) -> Vec3A {
+        vec3a(paired_share(3 * number + 1), paired_share(7 * number + 2), paired_share(11 * number + 5))
+            * 100.0
     }
 
     /// Boxes in which each may look at the next, `kinds` times side by side.
@@ -190,11 +196,11 @@ mod tests {
         };
         let part = |at: f32| 1.0 + at / each as f32;
         [
-            ("equal", make(&|kind, _| place(somewhere(kind), Vec3A::splat(0.1 + share(kind))))),
-            ("from one corner", make(&|kind, at| place(somewhere(kind), Vec3A::splat(part(at))))),
+            ("equal", make(&|kind, _| place(any_position(kind), Vec3A::splat(0.1 + paired_share(kind))))),
+            ("from one corner", make(&|kind, at| place(any_position(kind), Vec3A::splat(part(at))))),
             (
                 "around one point",
-                make(&|kind, at| place(somewhere(kind) - part(at), Vec3A::splat(2.0 * part(at)))),
+                make(&|kind, at| place(any_position(kind) - part(at), Vec3A::splat(2.0 * part(at)))),
             ),
             (
                 "with growing gaps",
@@ -205,7 +211,7 @@ mod tests {
                 (0..COUNT)
                     .map(|number| {
                         let at = if number % 200 < kinds { number % 200 } else { number };
-                        place(somewhere(at), Vec3A::splat(share(at)))
+                        place(any_position(at), Vec3A::splat(paired_share(at)))
                     })
                     .collect(),
             ),
@@ -241,8 +247,8 @@ mod tests {
     fn no_boxes_take_more_searches_than_are_promised() {
         for kinds in [1, 10, 200, 700, 2_000] {
             for (name, boxes) in worst(kinds) {
-                let (tree, searches) = cluster(&boxes);
-                assert!(searches <= FEWEST * boxes.len(), "{kinds} x {name}: {searches}");
+                let (tree, searches) = cluster_counting_searches(&boxes);
+                assert!(searches <= MIN_PAIRED_FRACTION * boxes.len(), "{kinds} x {name}: {searches}");
                 check(&boxes, &tree);
             }
         }
@@ -250,18 +256,19 @@ mod tests {
 
     #[test]
     fn threads_find_what_one_finds() {
-        let boxes: Vec<_> = (0..40_960).map(|it| place(somewhere(it), Vec3A::splat(share(it)))).collect();
-        let nodes = sorted(&Build::begin(), &boxes);
-        for reach in [1, FAR] {
+        let boxes: Vec<_> =
+            (0..40_960).map(|it| place(any_position(it), Vec3A::splat(paired_share(it)))).collect();
+        let nodes = morton_sorted_leaves(&ThreadBudget::new(), &boxes);
+        for reach in [1, LONG_SEARCH_RADIUS] {
             let [mut one, mut many] = [vec![0; nodes.len()], vec![0; nodes.len()]];
-            search(&nodes, reach, 0, &mut one);
+            find_partners_from(&nodes, reach, 0, &mut one);
             let length = nodes.len().div_ceil(7);
             many.chunks_mut(length)
                 .enumerate()
-                .for_each(|(chunk, part)| search(&nodes, reach, chunk * length, part));
+                .for_each(|(chunk, part)| find_partners_from(&nodes, reach, chunk * length, part));
             assert!(one == many, "{reach}");
         }
-        check(&boxes, &build(&boxes));
+        check(&boxes, &build_ploc(&boxes));
     }
 
     proptest! {
@@ -271,8 +278,8 @@ mod tests {
         ) {
             let vec = |of: [u8; 3]| Vec3A::from(of.map(f32::from));
             let boxes: Vec<_> = corners.into_iter().map(|(low, size)| place(vec(low), vec(size))).collect();
-            let (tree, searches) = cluster(&boxes);
-            prop_assert!(searches <= FEWEST * boxes.len());
+            let (tree, searches) = cluster_counting_searches(&boxes);
+            prop_assert!(searches <= MIN_PAIRED_FRACTION * boxes.len());
             check(&boxes, &tree);
         }
     }

@@ -2,17 +2,17 @@
 
 use glam::Vec3;
 
-use super::settings::Quality;
+use super::settings::BvhSettings;
 use crate::accel::geometry::GeometryFlags;
 use crate::accel::primitive_bounds::{Bounds, GeometryBytes};
 use crate::software_ray_query::layout::{LeafBox, LeafTriangle};
 
 /// Bounds end here: the sums of areas that a build compares still are numbers. Kernels have it in `build/box.glsl`.
-pub(crate) const FARTHEST: f32 = 1e15;
+pub(crate) const MAX_COORDINATE: f32 = 1e15;
 
 /// The primitives of all geometries.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Primitives {
+pub(crate) enum MeshPrimitives {
     Triangles(Vec<LeafTriangle>),
     Boxes(Vec<LeafBox>),
 }
@@ -20,7 +20,7 @@ pub(crate) enum Primitives {
 /// The mesh of a bottom-level structure.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Mesh {
-    pub(crate) primitives: Primitives,
+    pub(crate) primitives: MeshPrimitives,
     /// Of each triangle the vertices of its geometry, where leaves share them as they are given; else none.
     pub(crate) vertices: Vec<[u32; 3]>,
     /// Of each geometry.
@@ -29,16 +29,20 @@ pub(crate) struct Mesh {
 
 impl Mesh {
     /// Takes the primitives out of the geometries, which are all of one kind, for a tree of this quality.
-    pub(crate) fn new(geometries: &[(GeometryBytes<'_>, GeometryFlags)], quality: Quality) -> Self {
+    pub(crate) fn new(geometries: &[(GeometryBytes<'_>, GeometryFlags)], quality: BvhSettings) -> Self {
         let flags = geometries.iter().map(|(_, flags)| *flags).collect();
         let boxes = matches!(geometries.first(), Some((GeometryBytes::Boxes(_), _)));
         let mut mesh = Self {
-            primitives: if boxes { Primitives::Boxes(Vec::new()) } else { Primitives::Triangles(Vec::new()) },
+            primitives: if boxes {
+                MeshPrimitives::Boxes(Vec::new())
+            } else {
+                MeshPrimitives::Triangles(Vec::new())
+            },
             vertices: Vec::new(),
             flags,
         };
         for (number, (bytes, flags)) in (0..).zip(geometries) {
-            mesh.add(number, bytes, flags.contains(GeometryFlags::OPAQUE), quality);
+            mesh.add_geometry(number, bytes, flags.contains(GeometryFlags::OPAQUE), quality);
         }
         mesh
     }
@@ -46,29 +50,29 @@ impl Mesh {
     /// The boxes of the primitives.
     pub(crate) fn bounds(&self) -> Vec<Bounds> {
         match &self.primitives {
-            Primitives::Triangles(all) => all
+            MeshPrimitives::Triangles(all) => all
                 .iter()
-                .map(|triangle| Bounds::of([triangle.a, triangle.b, triangle.c].map(clamped)))
+                .map(|triangle| Bounds::from_points([triangle.a, triangle.b, triangle.c].map(clamp_to_max)))
                 .collect(),
-            Primitives::Boxes(all) => {
+            MeshPrimitives::Boxes(all) => {
                 all.iter().map(|place| Bounds { low: place.low, high: place.high }).collect()
             }
         }
     }
 
-    fn add(&mut self, geometry: u32, bytes: &GeometryBytes<'_>, opaque: bool, quality: Quality) {
+    fn add_geometry(&mut self, geometry: u32, bytes: &GeometryBytes<'_>, opaque: bool, quality: BvhSettings) {
         match (&mut self.primitives, bytes) {
-            (Primitives::Triangles(all), GeometryBytes::Triangles(triangles)) => {
-                let leaf = |number| triangle(triangles.corners(number)?, number, geometry, opaque);
+            (MeshPrimitives::Triangles(all), GeometryBytes::Triangles(triangles)) => {
+                let leaf = |number| leaf_triangle(triangles.vertices(number)?, number, geometry, opaque);
                 let first = all.len();
                 all.extend((0..triangles.count).filter_map(leaf));
-                if quality.shares_as_given() {
-                    let vertices = |of: &LeafTriangle| triangles.indices.corners(of.primitive);
+                if quality.keeps_given_vertices() {
+                    let vertices = |of: &LeafTriangle| triangles.indices.vertex_indices(of.primitive);
                     self.vertices.extend(all[first..].iter().filter_map(vertices));
                 }
             }
-            (Primitives::Boxes(all), GeometryBytes::Boxes(boxes)) => {
-                let leaf = |number| place(boxes.bounds(number)?, number, geometry, opaque);
+            (MeshPrimitives::Boxes(all), GeometryBytes::Boxes(boxes)) => {
+                let leaf = |number| leaf_aabb(boxes.bounds(number)?, number, geometry, opaque);
                 all.extend((0..boxes.count).filter_map(leaf));
             }
             // The kinds were checked to be the same.
@@ -77,24 +81,24 @@ impl Mesh {
     }
 }
 
-fn triangle([a, b, c]: [Vec3; 3], primitive: u32, geometry: u32, opaque: bool) -> Option<LeafTriangle> {
+fn leaf_triangle([a, b, c]: [Vec3; 3], primitive: u32, geometry: u32, opaque: bool) -> Option<LeafTriangle> {
     let finite = [a, b, c].iter().all(|corner| corner.is_finite());
     finite.then(|| LeafTriangle { a, primitive, b, geometry, c, opaque: opaque.into() })
 }
 
-fn place(bounds: Bounds, primitive: u32, geometry: u32, opaque: bool) -> Option<LeafBox> {
+fn leaf_aabb(bounds: Bounds, primitive: u32, geometry: u32, opaque: bool) -> Option<LeafBox> {
     let Bounds { low, high } = bounds;
     if low.is_nan() || high.is_nan() {
         return None;
     }
-    let (low, high) = (clamped(low), clamped(high));
+    let (low, high) = (clamp_to_max(low), clamp_to_max(high));
     let geometry = if opaque { geometry | LeafBox::OPAQUE } else { geometry };
     Some(LeafBox { low, primitive, high, geometry })
 }
 
 /// Boxes may reach to infinity; the walk wants numbers.
-fn clamped(corner: Vec3) -> Vec3 {
-    corner.clamp(Vec3::splat(-FARTHEST), Vec3::splat(FARTHEST))
+fn clamp_to_max(corner: Vec3) -> Vec3 {
+    corner.clamp(Vec3::splat(-MAX_COORDINATE), Vec3::splat(MAX_COORDINATE))
 }
 
 #[cfg(test)]
@@ -104,32 +108,33 @@ mod tests {
     use crate::format::VertexFormat;
 
     /// Vertices of which the fourth is none.
-    const PLACES: [[f32; 3]; 5] =
+    const POSITIONS: [[f32; 3]; 5] =
         [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [f32::NAN; 3], [1.0, 1.0, 0.0]];
     /// Triangles of which one names that, and one a vertex that is not there.
     const TRIANGLES: [[u16; 3]; 4] = [[0, 1, 2], [1, 3, 2], [1, 5, 2], [1, 4, 2]];
 
     fn numbers(mesh: &Mesh) -> Vec<(u32, u32)> {
         match &mesh.primitives {
-            Primitives::Triangles(all) => all.iter().map(|of| (of.geometry, of.primitive)).collect(),
-            Primitives::Boxes(_) => Vec::new(),
+            MeshPrimitives::Triangles(all) => all.iter().map(|of| (of.geometry, of.primitive)).collect(),
+            MeshPrimitives::Boxes(_) => Vec::new(),
         }
     }
 
     #[test]
     fn every_triangle_has_its_vertices_where_leaves_share_them_as_given() {
-        let places: Vec<u8> = PLACES.as_flattened().iter().flat_map(|number| number.to_le_bytes()).collect();
+        let places: Vec<u8> =
+            POSITIONS.as_flattened().iter().flat_map(|number| number.to_le_bytes()).collect();
         let indices: Vec<u8> =
             TRIANGLES.as_flattened().iter().flat_map(|number| number.to_le_bytes()).collect();
         let triangles = |indices, count| {
             let (stride, format) = (0, VertexFormat::F32x3);
-            let vertices = VertexBytes { bytes: &places, stride, format, count: PLACES.len() as u32 };
+            let vertices = VertexBytes { bytes: &places, stride, format, count: POSITIONS.len() as u32 };
             let bytes = TriangleBytes { vertices, indices, count, transform: None };
             (GeometryBytes::Triangles(bytes), GeometryFlags::empty())
         };
         let all = [triangles(IndexBytes::U16(&indices), 4), triangles(IndexBytes::None, 1)];
         for (low_memory, refit) in [(false, false), (false, true), (true, false), (true, true)] {
-            let mesh = Mesh::new(&all, Quality { low_memory, refit });
+            let mesh = Mesh::new(&all, BvhSettings { low_memory, refit });
             assert_eq!(numbers(&mesh), [(0, 0), (0, 3), (1, 0)], "without those that no ray can hit");
             let expected: &[_] = if low_memory && refit { &[[0, 1, 2], [1, 4, 2], [0, 1, 2]] } else { &[] };
             assert_eq!(mesh.vertices, expected);

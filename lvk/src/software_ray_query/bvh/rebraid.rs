@@ -4,38 +4,43 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use super::encode_instances::{PlacedInstance, moved_bounds};
+use super::encode_instances::{PlacedInstance, transform_bounds_rows};
 use crate::accel::primitive_bounds::Bounds;
-use crate::software_ray_query::rebraid_parts::Part;
+use crate::software_ray_query::rebraid_parts::RebraidPart;
 
 /// More instances are shown whole: to look at them in pairs would take too long.
-const MOST_INSTANCES: u32 = 512;
+const MAX_INSTANCES: u32 = 512;
 /// Records that may always come to those of the instances, so that a few can be taken apart.
-const LEAST_MORE: u32 = 16;
+const MIN_EXTRA_RECORDS: u32 = 16;
 
 /// Records that so many instances may make, and a structure with room for them has room for.
-pub(crate) fn room(instances: u32) -> u32 {
-    let may_be_apart = (2..=MOST_INSTANCES).contains(&instances);
-    instances + if may_be_apart { instances.max(LEAST_MORE) } else { 0 }
+pub(crate) fn record_capacity(instances: u32) -> u32 {
+    let may_be_apart = (2..=MAX_INSTANCES).contains(&instances);
+    instances + if may_be_apart { instances.max(MIN_EXTRA_RECORDS) } else { 0 }
 }
 
 /// A record that may be taken apart.
-struct Shown<'a> {
-    of: &'a PlacedInstance,
-    part: &'a Part,
+struct RebraidCandidate<'a> {
+    instance: &'a PlacedInstance,
+    part: &'a RebraidPart,
     record: PlacedInstance,
     is_open: bool,
 }
 
 /// Takes the largest of what overlaps others apart, where its parts leave room empty, until there are as many records as
-/// these instances may make, or the next would make more than `room`.
-pub(crate) fn open<'a>(instances: &'a [PlacedInstance], room: usize) -> Vec<PlacedInstance> {
-    let most = room.min(crate::software_ray_query::bvh::rebraid::room(instances.len() as u32) as usize);
+/// these instances may make, or the next would make more than `record_capacity`.
+pub(crate) fn rebraid<'a>(instances: &'a [PlacedInstance], room: usize) -> Vec<PlacedInstance> {
+    let most =
+        room.min(crate::software_ray_query::bvh::rebraid::record_capacity(instances.len() as u32) as usize);
     if most <= instances.len() {
         return instances.to_vec();
     }
-    let whole =
-        |of: &'a PlacedInstance| Shown { of, part: &of.parts.whole, record: of.clone(), is_open: false };
+    let whole = |of: &'a PlacedInstance| RebraidCandidate {
+        instance: of,
+        part: &of.parts.whole,
+        record: of.clone(),
+        is_open: false,
+    };
     let mut shown: Vec<_> = instances.iter().map(whole).collect();
     let mut count = shown.len();
     let area = |bounds: &Bounds| bounds.half_area().to_bits(); // in order, as none is negative
@@ -43,7 +48,7 @@ pub(crate) fn open<'a>(instances: &'a [PlacedInstance], room: usize) -> Vec<Plac
     let mut largest: BinaryHeap<_> =
         overlapping.map(|(number, _)| (area(&shown[number].record.bounds), Reverse(number))).collect();
     while let Some((_, Reverse(number))) = largest.pop() {
-        let parts = parts(&shown[number]);
+        let parts = split_candidate(&shown[number]);
         if count + parts.len() > most + 1 {
             break;
         }
@@ -73,7 +78,7 @@ fn overlapping(instances: &[PlacedInstance]) -> Vec<bool> {
         let near =
             order[place + 1..].iter().take_while(|other| bounds(**other).low[axis] < bounds(*one).high[axis]);
         for other in near {
-            if !(overlap[*one] && overlap[*other]) && meet(bounds(*one), bounds(*other)) {
+            if !(overlap[*one] && overlap[*other]) && bounds_overlap(bounds(*one), bounds(*other)) {
                 (overlap[*one], overlap[*other]) = (true, true);
             }
         }
@@ -81,19 +86,19 @@ fn overlapping(instances: &[PlacedInstance]) -> Vec<bool> {
     overlap
 }
 
-fn meet(one: &Bounds, other: &Bounds) -> bool {
+fn bounds_overlap(one: &Bounds, other: &Bounds) -> bool {
     one.low.cmplt(other.high).all() && other.low.cmplt(one.high).all()
 }
 
 /// A record for each part of what is shown.
-fn parts<'a>(shown: &Shown<'a>) -> Vec<Shown<'a>> {
-    let part = |part: &'a Part| {
-        let mut record = shown.of.clone();
+fn split_candidate<'a>(shown: &RebraidCandidate<'a>) -> Vec<RebraidCandidate<'a>> {
+    let part = |part: &'a RebraidPart| {
+        let mut record = shown.instance.clone();
         record.instance.entry = part.reference;
-        record.bounds = moved_bounds(&record.instance.object_to_world, part.bounds);
-        Shown { of: shown.of, part, record, is_open: false }
+        record.bounds = transform_bounds_rows(&record.instance.object_to_world, part.bounds);
+        RebraidCandidate { instance: shown.instance, part, record, is_open: false }
     };
-    shown.of.parts.below(shown.part).iter().map(part).collect()
+    shown.instance.parts.children_of(shown.part).iter().map(part).collect()
 }
 
 #[cfg(test)]
@@ -107,19 +112,20 @@ mod tests {
     use super::*;
     use crate::accel::instance::{TlasInstance, transform_rows};
     use crate::handle::{AccelStructHandle, Handle};
-    use crate::software_ray_query::bvh::encode_instances::{ShownStructure, place};
+    use crate::software_ray_query::bvh::encode_instances::{InstancedBlas, place_instance};
     use crate::software_ray_query::bvh::subtrees::tests::{primitives, row, structure};
 
     /// Instances of one structure of 300 boxes.
     fn placed(transforms: &[Affine3A]) -> (Vec<u8>, Vec<PlacedInstance>) {
         let boxes = row(300, Vec3::ZERO);
         let (bytes, parts) = structure(&boxes);
-        let shown = ShownStructure { address: 256, parts: Arc::new(parts) };
+        let shown = InstancedBlas { address: 256, parts: Arc::new(parts) };
         let instance = |transform: &Affine3A| TlasInstance {
             transform: transform_rows(transform),
             ..TlasInstance::new(AccelStructHandle::from_bits(1))
         };
-        let all = (0..).zip(transforms).filter_map(|(number, of)| place(number, &instance(of), &shown));
+        let all =
+            (0..).zip(transforms).filter_map(|(number, of)| place_instance(number, &instance(of), &shown));
         (bytes, all.collect())
     }
 
@@ -138,8 +144,8 @@ mod tests {
         #[test]
         fn every_primitive_of_every_instance_is_in_one_record(transforms in transforms(), room in 0..60_usize) {
             let (bytes, instances) = placed(&transforms);
-            let records = open(&instances, room);
-            prop_assert!(records.len() <= instances.len().max(room.min(super::room(instances.len() as u32) as usize)));
+            let records = rebraid(&instances, room);
+            prop_assert!(records.len() <= instances.len().max(room.min(super::record_capacity(instances.len() as u32) as usize)));
             let mut seen = HashMap::new();
             for record in &records {
                 let matrix = transforms[record.instance.number as usize];
@@ -161,9 +167,9 @@ mod tests {
     fn only_instances_that_overlap_are_shown_in_parts() {
         let at = |x: f32| Affine3A::from_translation(Vec3::new(x, 0.0, 0.0));
         let apart = placed(&[at(0.0), at(400.0), at(800.0)]).1;
-        assert_eq!(open(&apart, 60).len(), 3);
-        assert_eq!(open(&placed(&[at(0.0)]).1, 60).len(), 1);
-        let records = open(&placed(&[at(0.0), at(20.0), at(10.0), at(900.0), at(30.0), at(5.0)]).1, 100);
+        assert_eq!(rebraid(&apart, 60).len(), 3);
+        assert_eq!(rebraid(&placed(&[at(0.0)]).1, 60).len(), 1);
+        let records = rebraid(&placed(&[at(0.0), at(20.0), at(10.0), at(900.0), at(30.0), at(5.0)]).1, 100);
         assert!(records.len() > 6 && records.len() <= 22, "{}", records.len());
         assert_eq!(records.iter().filter(|record| record.instance.number == 3).count(), 1);
         assert!(records.iter().any(|record| record.instance.entry != 0));
@@ -182,7 +188,7 @@ mod tests {
 
     #[test]
     fn there_is_room_for_twice_the_instances_where_they_are_few() {
-        let rooms = [0, 1, 2, 128, 512, 513, 1024, 10_000, u32::MAX].map(room);
+        let rooms = [0, 1, 2, 128, 512, 513, 1024, 10_000, u32::MAX].map(record_capacity);
         assert_eq!(rooms, [0, 1, 18, 256, 1024, 513, 1024, 10_000, u32::MAX]);
     }
 }

@@ -9,18 +9,18 @@ use obvhs::cwbvh::node::CwBvhNode;
 use super::bvh8::children;
 use super::encode_blas::BlasBlob;
 use crate::accel::primitive_bounds::Bounds;
-use crate::software_ray_query::layout::{BLOCK_BYTES, WIDE, leaf};
-use crate::software_ray_query::rebraid_parts::{Part, Parts};
+use crate::software_ray_query::layout::{BLOCK_BYTES, FORMAT_BVH8, leaf};
+use crate::software_ray_query::rebraid_parts::{RebraidPart, RebraidParts};
 
 /// Parts that are kept of a structure, 36 bytes each.
-const MOST_PARTS: usize = 64;
+const MAX_PARTS: usize = 64;
 const NODE_BYTES: usize = size_of::<CwBvhNode>();
 
 /// The parts of a sound structure. One of nodes of two children, or of a single leaf, is only taken whole.
-pub(crate) fn parts(blob: &BlasBlob) -> Parts {
-    let mut all = Parts::whole(blob.bounds);
+pub(crate) fn subtree_parts(blob: &BlasBlob) -> RebraidParts {
+    let mut all = RebraidParts::single(blob.bounds);
     let header = blob.header();
-    if header.format != WIDE || header.root != 0 {
+    if header.format != FORMAT_BVH8 || header.root != 0 {
         return all;
     }
     let start = header.nodes as usize * BLOCK_BYTES;
@@ -33,9 +33,9 @@ pub(crate) fn parts(blob: &BlasBlob) -> Parts {
     let mut open = BinaryHeap::from([(area(&blob.bounds), Reverse(None))]);
     while let Some((_, Reverse(number))) = open.pop() {
         let reference = number.map_or(0, |number: usize| all.parts[number].reference);
-        let Some(below) = node(reference).and_then(|node| below(&node)) else { continue };
+        let Some(below) = node(reference).and_then(|node| child_parts(&node)) else { continue };
         let (first, end) = (all.parts.len(), all.parts.len() + below.len());
-        if end > MOST_PARTS {
+        if end > MAX_PARTS {
             break;
         }
         let nodes = (first..).zip(&below).filter(|(_, (_, is_node))| *is_node);
@@ -48,7 +48,7 @@ pub(crate) fn parts(blob: &BlasBlob) -> Parts {
 }
 
 /// The children of a node, and whether each is a node; `None` for one whose boxes are none.
-fn below(node: &CwBvhNode) -> Option<Vec<(Part, bool)>> {
+fn child_parts(node: &CwBvhNode) -> Option<Vec<(RebraidPart, bool)>> {
     let mut inner = children(node);
     let used = (0..8).filter(|child| node.child_meta[*child] != 0);
     let part = |child: usize| {
@@ -61,7 +61,7 @@ fn below(node: &CwBvhNode) -> Option<Vec<(Part, bool)>> {
         };
         let bounds = child_bounds(node, child);
         let is_box = bounds.low.is_finite() && bounds.high.is_finite() && bounds.low.cmple(bounds.high).all();
-        is_box.then_some((Part { reference, bounds, below: 0..0 }, is_node))
+        is_box.then_some((RebraidPart { reference, bounds, below: 0..0 }, is_node))
     };
     used.map(part).collect()
 }
@@ -82,20 +82,20 @@ pub(crate) mod tests {
     use super::*;
     use crate::accel::geometry::GeometryFlags;
     use crate::software_ray_query::bvh::encode_blas;
-    use crate::software_ray_query::bvh::primitives::{Mesh, Primitives};
-    use crate::software_ray_query::bvh::settings::Quality;
-    use crate::software_ray_query::layout::{Header, LEAF, LeafBox};
+    use crate::software_ray_query::bvh::primitives::{Mesh, MeshPrimitives};
+    use crate::software_ray_query::bvh::settings::BvhSettings;
+    use crate::software_ray_query::layout::{BlobHeader, LEAF, LeafBox};
 
-    const QUALITY: Quality = Quality { low_memory: false, refit: false };
+    const QUALITY: BvhSettings = BvhSettings { low_memory: false, refit: false };
 
     /// The structure of these boxes.
-    pub(crate) fn structure(boxes: &[Bounds]) -> (Vec<u8>, Parts) {
+    pub(crate) fn structure(boxes: &[Bounds]) -> (Vec<u8>, RebraidParts) {
         let place =
             |(primitive, of): (u32, &Bounds)| LeafBox { low: of.low, primitive, high: of.high, geometry: 0 };
-        let primitives = Primitives::Boxes((0..).zip(boxes).map(place).collect());
+        let primitives = MeshPrimitives::Boxes((0..).zip(boxes).map(place).collect());
         let mesh = Mesh { primitives, vertices: Vec::new(), flags: vec![GeometryFlags::empty()] };
-        let blob = encode_blas::build(&mesh, QUALITY);
-        let parts = parts(&blob);
+        let blob = encode_blas::encode_blas(&mesh, QUALITY);
+        let parts = subtree_parts(&blob);
         (blob.bytes, parts)
     }
 
@@ -109,7 +109,7 @@ pub(crate) mod tests {
 
     /// The primitives below a reference.
     pub(crate) fn primitives(bytes: &[u8], reference: u32) -> Vec<LeafBox> {
-        let header: Header = bytemuck::pod_read_unaligned(&bytes[..size_of::<Header>()]);
+        let header: BlobHeader = bytemuck::pod_read_unaligned(&bytes[..size_of::<BlobHeader>()]);
         let at = |block: u32, index: u32, size: u32| (block * BLOCK_BYTES as u32 + index * size) as usize;
         if reference & LEAF != 0 {
             let count = (reference >> 27 & 15) + 1;
@@ -121,7 +121,7 @@ pub(crate) mod tests {
         }
         let first = at(header.nodes, reference, NODE_BYTES as u32);
         let node: CwBvhNode = bytemuck::pod_read_unaligned(&bytes[first..first + NODE_BYTES]);
-        let below = below(&node).unwrap();
+        let below = child_parts(&node).unwrap();
         below.into_iter().flat_map(|(part, _)| primitives(bytes, part.reference)).collect()
     }
 
@@ -129,11 +129,11 @@ pub(crate) mod tests {
     fn each_primitive_is_in_one_part_and_its_box_in_that_of_the_part() {
         for (count, away) in [(4, Vec3::ZERO), (30, Vec3::splat(-1e4)), (3_000, Vec3::new(1e6, -5.0, 0.1))] {
             let (bytes, parts) = structure(&row(count, away));
-            assert!(!parts.parts.is_empty() && parts.parts.len() <= MOST_PARTS);
+            assert!(!parts.parts.is_empty() && parts.parts.len() <= MAX_PARTS);
             assert!(parts.parts.iter().all(|part| part.reference != 0), "0 stands for the whole");
             for part in parts.parts.iter().chain([&parts.whole]) {
                 let mut apart = Vec::new();
-                for below in parts.below(part) {
+                for below in parts.children_of(part) {
                     for held in primitives(&bytes, below.reference) {
                         assert!(
                             held.low.cmpge(below.bounds.low).all()

@@ -2,35 +2,35 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use crate::parallel::cores;
+use crate::parallel::core_count;
 
 /// Builds under way in the process.
-static BUILDS: AtomicUsize = AtomicUsize::new(0);
+static RUNNING_BUILDS: AtomicUsize = AtomicUsize::new(0);
 
 /// A build under way: all of them share the cores.
-pub(crate) struct Build(());
+pub(crate) struct ThreadBudget(());
 
-impl Build {
-    pub(crate) fn begin() -> Self {
-        BUILDS.fetch_add(1, Ordering::Relaxed);
+impl ThreadBudget {
+    pub(crate) fn new() -> Self {
+        RUNNING_BUILDS.fetch_add(1, Ordering::Relaxed);
         Self(())
     }
 
     /// Threads that so much work is for, the one that has it included.
-    pub(crate) fn threads(&self, boxes: usize) -> usize {
+    pub(crate) fn thread_count(&self, boxes: usize) -> usize {
         /// So many boxes are worth a thread.
-        const PER_THREAD: usize = 16_384;
-        let worth = boxes / PER_THREAD;
+        const BOXES_PER_THREAD: usize = 16_384;
+        let worth = boxes / BOXES_PER_THREAD;
         if worth < 2 {
             return 1;
         }
-        (cores() / BUILDS.load(Ordering::Relaxed).max(1)).min(worth).max(1)
+        (core_count() / RUNNING_BUILDS.load(Ordering::Relaxed).max(1)).min(worth).max(1)
     }
 }
 
-impl Drop for Build {
+impl Drop for ThreadBudget {
     fn drop(&mut self) {
-        BUILDS.fetch_sub(1, Ordering::Relaxed);
+        RUNNING_BUILDS.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
@@ -41,11 +41,11 @@ mod tests {
     #[test]
     fn builds_share_the_cores() {
         const MANY: usize = 1 << 40;
-        let alone = Build::begin();
-        let before = alone.threads(MANY);
-        assert!(before >= 1 && alone.threads(100) == 1 && alone.threads(40_000) <= 2);
-        let others: Vec<_> = (0..2 * before).map(|_| Build::begin()).collect();
-        assert_eq!(alone.threads(MANY), 1);
+        let alone = ThreadBudget::new();
+        let before = alone.thread_count(MANY);
+        assert!(before >= 1 && alone.thread_count(100) == 1 && alone.thread_count(40_000) <= 2);
+        let others: Vec<_> = (0..2 * before).map(|_| ThreadBudget::new()).collect();
+        assert_eq!(alone.thread_count(MANY), 1);
         drop(others);
     }
 }

@@ -50,7 +50,7 @@ pub(crate) fn gpu_geometries(
             _ => 0,
         };
         let read = match geometry {
-            BlasGeometry::Triangles(triangles) => triangles_of(triangles, find, matrix)?,
+            BlasGeometry::Triangles(triangles) => geometry_triangles(triangles, find, matrix)?,
             BlasGeometry::Aabbs(boxes) => GpuGeometry {
                 data: find(boxes.buffer)?.address + boxes.offset,
                 stride: if boxes.stride == 0 { BOX_BYTES } else { boxes.stride } as u32,
@@ -75,13 +75,13 @@ pub(crate) fn vertex_count(geometry: &BlasGeometry) -> u32 {
     }
 }
 
-fn triangles_of(
+fn geometry_triangles(
     triangles: &Triangles,
     find: &dyn Fn(BufferHandle) -> Result<Arc<Buffer>>,
     matrix: u64,
 ) -> Result<GpuGeometry> {
     let format = triangles.vertex_format;
-    let number = format_number(format).ok_or_else(|| {
+    let number = format_id(format).ok_or_else(|| {
         Error::unsupported(format!("vertex format {format:?} in a build"), "F32x3 always works")
     })?;
     let stride = match triangles.vertex_stride {
@@ -109,7 +109,7 @@ fn triangles_of(
 }
 
 /// The number of a format that structures are built from, in `positionAt` of `software_ray_query/kernels/input.glsl`.
-fn format_number(format: VertexFormat) -> Option<u32> {
+fn format_id(format: VertexFormat) -> Option<u32> {
     Some(match format {
         VertexFormat::F32 => 0,
         VertexFormat::F32x2 => 1,

@@ -1,7 +1,7 @@
 //! How much memory a build on the GPU takes, and where in it everything lies.
 
 use super::geometry::GpuGeometry;
-use super::params::Job;
+use super::params::GpuBuildParams;
 use crate::accel::geometry::GeometryFlags;
 use crate::error::{Result, check_limit};
 use crate::software_ray_query::layout::{BLOCK_BYTES, LeafKind};
@@ -13,25 +13,25 @@ const BINARY_NODE_BYTES: u64 = 64;
 /// Bytes of a wide node.
 const WIDE_NODE_BYTES: u64 = 80;
 /// Up to so many primitives are one leaf, without nodes.
-const ONE_LEAF: u32 = 3;
+const MAX_SINGLE_LEAF: u32 = 3;
 /// Wide nodes that a thousand primitives have room for, besides the first: what a triangle takes is then 56 bytes with the header.
-const WIDE_OF_THOUSAND: u64 = 99;
+const BVH8_NODES_PER_THOUSAND: u64 = 99;
 const GEOMETRY_BYTES: u64 = 16;
 /// Bytes of a vertex that leaves name.
 pub(crate) const VERTEX_BYTES: u64 = 12;
 const BLOB_ALIGNMENT: u64 = 256;
 /// A leaf's first primitive has 27 bits.
-const MOST_PRIMITIVES: u64 = 1 << 27;
+const MAX_PRIMITIVES: u64 = 1 << 27;
 /// Up to so many primitives one workgroup makes the whole build.
-const MOST_SMALL: u32 = 2048;
+const MAX_SMALL_BUILD: u32 = 2048;
 /// Keys that a workgroup sorts, `kBlock` of `software_ray_query/kernels/job.glsl`.
 pub(crate) const SORT_BLOCK: u32 = 1024;
 const DIGITS: u32 = 16;
 /// Nodes on a path that traversal has room for.
-pub(crate) const MOST_HEIGHT: u32 = 64;
+pub(crate) const MAX_HEIGHT: u32 = 64;
 /// Of the first word of a code.
 const CODE_BITS: u32 = 30;
-const MOST_IMPROVEMENTS: u32 = 8;
+const MAX_IMPROVEMENTS: u32 = 8;
 /// Of top-level structures.
 const TLAS_IMPROVEMENTS: u32 = 1;
 /// Words that say how far a build is, `kStateWords` of `software_ray_query/kernels/job.glsl`.
@@ -53,7 +53,7 @@ pub(crate) struct BlasShape {
 
 /// Where the parts of a structure lie, in units of 16 bytes from its start; 0 where there is no such part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct BlobPlaces {
+pub(crate) struct BlobOffsets {
     pub(crate) nodes: u32,
     pub(crate) primitives: u32,
     pub(crate) vertices: u32,
@@ -62,7 +62,7 @@ pub(crate) struct BlobPlaces {
 
 /// Where the parts of the scratch memory of a build lie, in words from its start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct ScratchPlaces {
+pub(crate) struct ScratchOffsets {
     pub(crate) boxes: u32,
     pub(crate) keys: u32,
     pub(crate) spare_keys: u32,
@@ -84,12 +84,12 @@ pub(crate) struct GpuBuildPlan {
     /// Most nodes of a bottom-level structure; 0 for a top-level one, whose nodes stay binary.
     pub(crate) wide_capacity: u32,
     /// Where the parts of the structure lie.
-    pub(crate) places: BlobPlaces,
+    pub(crate) offsets: BlobOffsets,
     /// Bytes of the structure, a multiple of 256.
     pub(crate) blob_bytes: u64,
     /// Bytes of scratch memory of a build, at an address that is a multiple of 16.
     pub(crate) scratch_bytes: u64,
-    pub(crate) scratch: ScratchPlaces,
+    pub(crate) scratch: ScratchOffsets,
     /// Of the second word of a code; 0 where codes have but one.
     pub(crate) low_bits: u32,
     /// How often nodes are given better places.
@@ -139,23 +139,23 @@ impl GpuBuildPlan {
 
     fn new(name: &str, shape: &BlasShape) -> Result<Self> {
         let what = if shape.leaf_kind == LeafKind::Instances { "instance count" } else { "primitive count" };
-        check_limit(name, what, shape.primitive_count.into(), MOST_PRIMITIVES)?;
-        let vertex_count = if shape.leaf_kind.names_vertices() { shape.vertex_count } else { 0 };
-        let (places, blob_bytes) = blob_places(name, shape, vertex_count)?;
-        let low_bits = low_bits(shape);
-        let (scratch, scratch_bytes) = scratch_places(shape, low_bits > 0);
+        check_limit(name, what, shape.primitive_count.into(), MAX_PRIMITIVES)?;
+        let vertex_count = if shape.leaf_kind.has_vertex_indices() { shape.vertex_count } else { 0 };
+        let (places, blob_bytes) = blob_offsets(name, shape, vertex_count)?;
+        let low_bits = low_bit_mask(shape);
+        let (scratch, scratch_bytes) = scratch_offsets(shape, low_bits > 0);
         Ok(Self {
             leaf_kind: shape.leaf_kind,
             capacity: shape.primitive_count,
             vertex_count,
             geometry_count: shape.geometry_count,
-            wide_capacity: wide_capacity(shape),
-            places,
+            wide_capacity: bvh8_node_capacity(shape),
+            offsets: places,
             blob_bytes,
             scratch_bytes,
             scratch,
             low_bits,
-            improvements: shape.improvements.min(MOST_IMPROVEMENTS),
+            improvements: shape.improvements.min(MAX_IMPROVEMENTS),
         })
     }
 
@@ -166,25 +166,31 @@ impl GpuBuildPlan {
 
     /// What a structure has to have room for beyond [`blob_bytes`](Self::blob_bytes), if all its nodes may be binary, as those
     /// of some trees of the CPU are.
-    pub(crate) fn binary_excess_bytes(&self) -> u64 {
+    pub(crate) fn bvh2_excess_bytes(&self) -> u64 {
         let wide = u64::from(self.wide_capacity) * WIDE_NODE_BYTES;
         (u64::from(self.node_capacity()) * BINARY_NODE_BYTES).saturating_sub(wide)
     }
 
-    /// Most binary nodes on a path from the root to a leaf, at most [`MOST_HEIGHT`]: every node splits at a bit of the code, or,
+    /// Most binary nodes on a path from the root to a leaf, at most [`MAX_HEIGHT`]: every node splits at a bit of the code, or,
     /// where codes are equal, of the leaf's number. What a path of a top-level structure really has stands in its header.
     #[cfg(any(test, feature = "test-hooks"))]
-    pub(crate) fn most_height(&self) -> u32 {
+    pub(crate) fn max_height(&self) -> u32 {
         (CODE_BITS + self.low_bits + number_bits(self.capacity)).min(self.node_capacity())
     }
 
-    /// Whether one workgroup makes the whole build of `count` primitives or instances.
+    /// Whether one workgroup makes the whole build of `element_count` primitives or instances.
     pub(crate) fn is_small(&self, count: u32) -> bool {
-        count.max(self.geometry_count) <= MOST_SMALL && self.vertex_count <= 3 * MOST_SMALL
+        count.max(self.geometry_count) <= MAX_SMALL_BUILD && self.vertex_count <= 3 * MAX_SMALL_BUILD
     }
 
     /// What the kernels of one build are told. `inputs` is the address of the geometries; instances have their own.
-    pub(crate) fn job(&self, source: &BuildSource, inputs: u64, blob: u64, scratch: u64) -> Job {
+    pub(crate) fn build_params(
+        &self,
+        source: &BuildSource,
+        inputs: u64,
+        blob: u64,
+        scratch: u64,
+    ) -> GpuBuildParams {
         let (inputs, table, count, input_count) = match source {
             BuildSource::Geometries(list) => (inputs, 0, self.capacity, list.len() as u32),
             BuildSource::Instances { records, count, table } => {
@@ -192,24 +198,24 @@ impl GpuBuildPlan {
                 (*records, table, *count, entries)
             }
         };
-        Job {
+        GpuBuildParams {
             inputs,
             table,
             blob,
             scratch,
             parents: scratch + u64::from(self.scratch.parents) * 4,
             binary: match self.leaf_kind {
-                LeafKind::Instances => blob + u64::from(self.places.nodes) * BLOCK_BYTES as u64,
+                LeafKind::Instances => blob + u64::from(self.offsets.nodes) * BLOCK_BYTES as u64,
                 _ => scratch + u64::from(self.scratch.binary) * 4,
             },
             count,
             input_count,
             leaf_kind: self.leaf_kind as u32,
             low_bits: self.low_bits,
-            nodes: self.places.nodes,
-            primitives: self.places.primitives,
-            vertices: self.places.vertices,
-            geometries: self.places.geometries,
+            nodes: self.offsets.nodes,
+            primitives: self.offsets.primitives,
+            vertices: self.offsets.vertices,
+            geometries: self.offsets.geometries,
             vertex_count: self.vertex_count,
             boxes: self.scratch.boxes,
             keys: self.scratch.keys,
@@ -227,7 +233,7 @@ impl GpuBuildPlan {
 
 impl BuildSource {
     /// Primitives or instances that a build of `plan` looks at.
-    pub(crate) fn count(&self, plan: &GpuBuildPlan) -> u32 {
+    pub(crate) fn element_count(&self, plan: &GpuBuildPlan) -> u32 {
         match self {
             Self::Geometries(_) => plan.capacity,
             Self::Instances { count, .. } => *count,
@@ -236,13 +242,13 @@ impl BuildSource {
 }
 
 /// Lays parts out one behind the other.
-struct Layout {
+struct OffsetAllocator {
     end: u64,
 }
 
-impl Layout {
+impl OffsetAllocator {
     /// The place of a part of `bytes`, in units of `unit` bytes, which the part's alignment is a multiple of.
-    fn add(&mut self, bytes: u64, alignment: u64, unit: u64) -> u64 {
+    fn push(&mut self, bytes: u64, alignment: u64, unit: u64) -> u64 {
         let start = self.end.next_multiple_of(alignment);
         self.end = start + bytes;
         start / unit
@@ -251,12 +257,12 @@ impl Layout {
 
 /// Bits of the second word of a code. Codes of one word have 1024 cells along an axis: fine enough for few primitives,
 /// and sorted in fewer passes. No code has so many bits that the tree could get too high.
-fn low_bits(shape: &BlasShape) -> u32 {
+fn low_bit_mask(shape: &BlasShape) -> u32 {
     let few = if shape.leaf_kind == LeafKind::Instances { 1 << 15 } else { 1 << 12 };
     if shape.primitive_count <= few {
         return 0;
     }
-    MOST_HEIGHT - CODE_BITS - number_bits(shape.primitive_count)
+    MAX_HEIGHT - CODE_BITS - number_bits(shape.primitive_count)
 }
 
 /// Bits that the number of a leaf has.
@@ -276,24 +282,24 @@ fn header_flags(source: &BuildSource) -> u32 {
 }
 
 /// Room for wide nodes: more than most meshes need, and than the full nodes need that any mesh may have in their place.
-fn wide_capacity(shape: &BlasShape) -> u32 {
+fn bvh8_node_capacity(shape: &BlasShape) -> u32 {
     const FIRST: u32 = 2;
     match (shape.leaf_kind, shape.primitive_count) {
-        (LeafKind::Instances, _) | (_, ..=ONE_LEAF) => 0,
-        (_, count) => (u64::from(count) * WIDE_OF_THOUSAND / 1000) as u32 + FIRST,
+        (LeafKind::Instances, _) | (_, ..=MAX_SINGLE_LEAF) => 0,
+        (_, count) => (u64::from(count) * BVH8_NODES_PER_THOUSAND / 1000) as u32 + FIRST,
     }
 }
 
-fn blob_places(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(BlobPlaces, u64)> {
+fn blob_offsets(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(BlobOffsets, u64)> {
     let nodes = match shape.leaf_kind {
         LeafKind::Instances => u64::from(shape.primitive_count.saturating_sub(1)) * BINARY_NODE_BYTES,
-        _ => u64::from(wide_capacity(shape)) * WIDE_NODE_BYTES,
+        _ => u64::from(bvh8_node_capacity(shape)) * WIDE_NODE_BYTES,
     };
     let primitives = u64::from(shape.primitive_count) * shape.leaf_kind.primitive_bytes();
-    let mut layout = Layout { end: HEADER_BYTES };
+    let mut layout = OffsetAllocator { end: HEADER_BYTES };
     let mut part = |bytes: u64, alignment| match bytes {
         0 => 0,
-        bytes => layout.add(bytes, alignment, 16),
+        bytes => layout.push(bytes, alignment, 16),
     };
     let places = [
         part(nodes, 64),
@@ -304,19 +310,19 @@ fn blob_places(name: &str, shape: &BlasShape, vertex_count: u32) -> Result<(Blob
     let bytes = layout.end.next_multiple_of(BLOB_ALIGNMENT);
     check_limit(name, "structure size in bytes", bytes, u64::from(u32::MAX) * 16)?;
     let [nodes, primitives, vertices, geometries] = places.map(|place| place as u32);
-    Ok((BlobPlaces { nodes, primitives, vertices, geometries }, bytes))
+    Ok((BlobOffsets { nodes, primitives, vertices, geometries }, bytes))
 }
 
 /// All of it is below 2^32 words, as kernels number them: a primitive takes at most 30 and a sixty-fourth.
-fn scratch_places(shape: &BlasShape, long_codes: bool) -> (ScratchPlaces, u64) {
+fn scratch_offsets(shape: &BlasShape, long_codes: bool) -> (ScratchOffsets, u64) {
     let count = u64::from(shape.primitive_count);
     let nodes = u64::from(shape.primitive_count.saturating_sub(1));
     let binary = if shape.leaf_kind == LeafKind::Instances { 0 } else { nodes * BINARY_NODE_BYTES / 4 };
     let keys = count * if long_codes { 3 } else { 2 };
     let blocks = u64::from(shape.primitive_count.div_ceil(SORT_BLOCK));
-    let mut layout = Layout { end: STATE_WORDS * 4 };
-    let mut part = |words: u64| layout.add(words * 4, 16, 4) as u32;
-    let places = ScratchPlaces {
+    let mut layout = OffsetAllocator { end: STATE_WORDS * 4 };
+    let mut part = |words: u64| layout.push(words * 4, 16, 4) as u32;
+    let places = ScratchOffsets {
         boxes: part(count * BOX_WORDS),
         keys: part(keys),
         spare_keys: part(keys),
@@ -380,10 +386,10 @@ mod tests {
             let at = |place: u32| u64::from(place) * 16;
             let count = u64::from(shape.primitive_count);
             check_parts(vec![
-                (at(plan.places.nodes), nodes * 80),
-                (at(plan.places.primitives), count * shape.leaf_kind.primitive_bytes()),
-                (at(plan.places.vertices), u64::from(plan.vertex_count) * 12),
-                (at(plan.places.geometries), u64::from(shape.geometry_count) * 16),
+                (at(plan.offsets.nodes), nodes * 80),
+                (at(plan.offsets.primitives), count * shape.leaf_kind.primitive_bytes()),
+                (at(plan.offsets.vertices), u64::from(plan.vertex_count) * 12),
+                (at(plan.offsets.geometries), u64::from(shape.geometry_count) * 16),
             ], HEADER_BYTES, plan.blob_bytes);
             prop_assert_eq!(plan.blob_bytes % 256, 0);
         }
@@ -394,7 +400,7 @@ mod tests {
             let (count, nodes) = (u64::from(shape.primitive_count), u64::from(plan.node_capacity()));
             let at = |place: u32| u64::from(place) * 4;
             let keys = count * if plan.low_bits > 0 { 12 } else { 8 };
-            prop_assert!(plan.most_height() <= MOST_HEIGHT && plan.low_bits <= 30);
+            prop_assert!(plan.max_height() <= MAX_HEIGHT && plan.low_bits <= 30);
             check_parts(vec![
                 (at(plan.scratch.boxes), count * 24),
                 (at(plan.scratch.keys), keys),
@@ -430,7 +436,7 @@ mod tests {
             all
         };
         for primitive_count in (4..100_000).chain([1 << 20, 12_345_678, 1 << 27]) {
-            let room = wide_capacity(&BlasShape { primitive_count, ..MESH });
+            let room = bvh8_node_capacity(&BlasShape { primitive_count, ..MESH });
             assert!(room >= full(primitive_count) && room < primitive_count, "{primitive_count}: {room}");
         }
     }

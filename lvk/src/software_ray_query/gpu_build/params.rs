@@ -2,10 +2,10 @@
 
 use bytemuck::{Pod, Zeroable};
 
-/// `Job` of `software_ray_query/kernels/job.glsl`.
+/// `GpuBuildParams` of `software_ray_query/kernels/job.glsl`.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
-pub(crate) struct Job {
+pub(crate) struct GpuBuildParams {
     pub(crate) inputs: u64,
     pub(crate) table: u64,
     pub(crate) blob: u64,
@@ -37,7 +37,7 @@ pub(crate) struct Job {
 /// Push constants of every kernel of a build.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
-pub(crate) struct BuildPush {
+pub(crate) struct BuildPushConstants {
     pub(crate) jobs: u64,
     pub(crate) first_job: u32,
     pub(crate) pass_or_jobs: u32,

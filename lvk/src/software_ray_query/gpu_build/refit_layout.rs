@@ -2,8 +2,8 @@
 
 use bytemuck::Zeroable;
 
-use super::layout::{BlobPlaces, GpuBuildPlan};
-use super::params::Job;
+use super::layout::{BlobOffsets, GpuBuildPlan};
+use super::params::GpuBuildParams;
 use crate::software_ray_query::layout::{BLOCK_BYTES, LeafKind};
 
 const ARRIVAL_BYTES: u64 = 4;
@@ -25,7 +25,7 @@ pub(crate) enum NodeFormat {
 pub(crate) struct GpuRefitPlan {
     pub(crate) format: NodeFormat,
     pub(crate) leaf_kind: LeafKind,
-    pub(crate) places: BlobPlaces,
+    pub(crate) offsets: BlobOffsets,
     /// Nodes there are, or at most.
     pub(crate) node_count: u32,
     /// Primitives in leaves, or at most.
@@ -34,11 +34,11 @@ pub(crate) struct GpuRefitPlan {
 
 impl GpuRefitPlan {
     /// Of a bottom-level structure that was built on the GPU.
-    pub(crate) fn of_build(plan: &GpuBuildPlan) -> Self {
+    pub(crate) fn from_build(plan: &GpuBuildPlan) -> Self {
         Self {
             format: NodeFormat::Wide,
             leaf_kind: plan.leaf_kind,
-            places: plan.places,
+            offsets: plan.offsets,
             node_count: plan.wide_capacity,
             primitive_count: plan.capacity,
         }
@@ -51,20 +51,26 @@ impl GpuRefitPlan {
     }
 
     /// What the kernels of one refit are told. `inputs` is the address of `input_count` geometries.
-    pub(crate) fn job(&self, inputs: u64, input_count: u32, blob: u64, scratch: u64) -> Job {
-        Job {
+    pub(crate) fn refit_params(
+        &self,
+        inputs: u64,
+        input_count: u32,
+        blob: u64,
+        scratch: u64,
+    ) -> GpuBuildParams {
+        GpuBuildParams {
             inputs,
             blob,
             scratch,
             parents: scratch + u64::from(self.node_count) * ARRIVAL_BYTES,
-            binary: blob + u64::from(self.places.nodes) * BLOCK_BYTES as u64,
+            binary: blob + u64::from(self.offsets.nodes) * BLOCK_BYTES as u64,
             count: self.primitive_count,
             input_count,
             leaf_kind: self.leaf_kind as u32,
-            nodes: self.places.nodes,
-            primitives: self.places.primitives,
-            vertices: self.places.vertices,
-            geometries: self.places.geometries,
+            nodes: self.offsets.nodes,
+            primitives: self.offsets.primitives,
+            vertices: self.offsets.vertices,
+            geometries: self.offsets.geometries,
             boxes: 2 * self.node_count,
             node_capacity: self.node_count,
             ..Zeroable::zeroed()

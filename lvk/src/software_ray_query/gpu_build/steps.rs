@@ -3,17 +3,17 @@
 use crate::kernels::Kernel;
 use crate::software_ray_query::gpu_build::layout::{BuildSource, GpuBuildPlan, SORT_BLOCK};
 use crate::software_ray_query::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
-use crate::software_ray_query::layout::{DEEPEST_WIDE, LeafKind};
+use crate::software_ray_query::layout::{LeafKind, MAX_BVH8_DEPTH};
 
 /// Invocations of a workgroup, `kGroup` of `software_ray_query/kernels/job.glsl`.
-const GROUP: u32 = 128;
+const WORKGROUP_SIZE: u32 = 128;
 /// Passes over the first word of codes, four bits each, and at most over both words.
 const FIRST_WORD_PASSES: u32 = 8;
-const MOST_PASSES: u32 = 16;
+const MAX_PASSES: u32 = 16;
 
 /// One dispatch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Step {
+pub(crate) struct BuildStep {
     /// Steps of a phase run side by side; a phase waits for the one before.
     pub(crate) phase: u32,
     pub(crate) kernel: Kernel,
@@ -26,7 +26,7 @@ pub(crate) struct Step {
 
 /// The steps of builds, by phases. Job `i` is build `order[i]`: those that one workgroup makes come first, by kind, so that
 /// one dispatch has them all.
-pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usize>, Vec<Step>) {
+pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usize>, Vec<BuildStep>) {
     let mut order: Vec<usize> = (0..builds.len()).collect();
     let small = |build: &usize| {
         let (plan, source) = builds[*build];
@@ -34,32 +34,33 @@ pub(crate) fn build_steps(builds: &[(&GpuBuildPlan, &BuildSource)]) -> (Vec<usiz
             LeafKind::Instances => Kernel::BuildSmallTlas,
             _ => Kernel::BuildSmallBlas,
         };
-        plan.is_small(source.count(plan)).then_some(kernel)
+        plan.is_small(source.element_count(plan)).then_some(kernel)
     };
     order.sort_by_key(|build| (small(build).is_none(), small(build)));
-    let mut steps: Vec<Step> = Vec::new();
+    let mut steps: Vec<BuildStep> = Vec::new();
     for (job, build) in (0..).zip(&order) {
         match (small(build), steps.last_mut()) {
             (None, _) => {
                 let (plan, source) = builds[*build];
-                large_build(job, plan, source.count(plan), &mut steps);
+                large_build_steps(job, plan, source.element_count(plan), &mut steps);
             }
             (Some(kernel), Some(last)) if last.kernel == kernel => {
                 last.groups += 1;
                 last.pass_or_jobs += 1;
             }
-            (Some(kernel), _) => steps.push(Step { phase: 0, kernel, job, pass_or_jobs: 1, groups: 1 }),
+            (Some(kernel), _) => steps.push(BuildStep { phase: 0, kernel, job, pass_or_jobs: 1, groups: 1 }),
         }
     }
     let small_blas = steps.iter().find(|step| step.kernel == Kernel::BuildSmallBlas).copied();
-    steps.extend(small_blas.map(|step| Step { phase: 1, kernel: Kernel::BuildSmallWide, ..step }));
+    steps.extend(small_blas.map(|step| BuildStep { phase: 1, kernel: Kernel::BuildSmallWide, ..step }));
     steps.sort_by_key(|step| (step.phase, step.kernel));
     (order, steps)
 }
 
-fn large_build(job: u32, plan: &GpuBuildPlan, count: u32, steps: &mut Vec<Step>) {
-    let groups = |invocations: u32| invocations.div_ceil(GROUP).max(1);
-    let mut add = |phase, kernel, groups| steps.push(Step { phase, kernel, job, pass_or_jobs: 0, groups });
+fn large_build_steps(job: u32, plan: &GpuBuildPlan, count: u32, steps: &mut Vec<BuildStep>) {
+    let groups = |invocations: u32| invocations.div_ceil(WORKGROUP_SIZE).max(1);
+    let mut add =
+        |phase, kernel, groups| steps.push(BuildStep { phase, kernel, job, pass_or_jobs: 0, groups });
     let read = match plan.leaf_kind {
         LeafKind::Instances => Kernel::BuildInstances,
         _ => Kernel::BuildPrimitives,
@@ -67,25 +68,25 @@ fn large_build(job: u32, plan: &GpuBuildPlan, count: u32, steps: &mut Vec<Step>)
     add(0, Kernel::BuildReset, 1);
     add(1, read, groups(count));
     add(2, Kernel::BuildCodes, groups(count));
-    add(3 + MOST_PASSES * 3, Kernel::BuildTree, groups(count));
+    add(3 + MAX_PASSES * 3, Kernel::BuildTree, groups(count));
     let nodes = groups(plan.node_capacity());
     let rounds = plan.improvements.max(1);
     for round in 0..rounds {
         if round > 0 {
-            add(3 + MOST_PASSES * 3 + 2 * round, Kernel::ResetArrivals, nodes);
+            add(3 + MAX_PASSES * 3 + 2 * round, Kernel::ResetArrivals, nodes);
         }
-        add(4 + MOST_PASSES * 3 + 2 * round, Kernel::BuildImprove, nodes);
+        add(4 + MAX_PASSES * 3 + 2 * round, Kernel::BuildImprove, nodes);
     }
     steps.extend(sort_steps(job, count, plan.low_bits));
     if plan.leaf_kind != LeafKind::Instances {
-        steps.extend(wide_steps(3 + MOST_PASSES * 3 + 2 * rounds, job, plan));
+        steps.extend(wide_steps(3 + MAX_PASSES * 3 + 2 * rounds, job, plan));
     }
 }
 
 /// The steps from a binary tree to the structure, from a phase on. Whether wide nodes had room only the last two know.
-pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Step> {
-    let groups = |invocations: u32| invocations.div_ceil(GROUP).max(1);
-    let step = |nth, kernel, level, invocations| Step {
+pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<BuildStep> {
+    let groups = |invocations: u32| invocations.div_ceil(WORKGROUP_SIZE).max(1);
+    let step = |nth, kernel, level, invocations| BuildStep {
         phase: phase + nth,
         kernel,
         job,
@@ -94,7 +95,7 @@ pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Step>
     };
     // Eight times as many nodes as in the level above, as long as there can be so many.
     let nodes = |level: u32| 1_u32.checked_shl(3 * level).unwrap_or(u32::MAX).min(plan.wide_capacity);
-    let levels = if plan.wide_capacity > 0 { DEEPEST_WIDE as u32 } else { 0 };
+    let levels = if plan.wide_capacity > 0 { MAX_BVH8_DEPTH as u32 } else { 0 };
     let written = plan.capacity.max(plan.geometry_count).max(plan.vertex_count);
     let mut steps: Vec<_> =
         (0..levels).map(|level| step(level, Kernel::Collapse, level, nodes(level))).collect();
@@ -104,11 +105,11 @@ pub(crate) fn wide_steps(phase: u32, job: u32, plan: &GpuBuildPlan) -> Vec<Step>
 }
 
 /// The steps that sort the keys of a build, the low words first.
-pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<Step> {
+pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<BuildStep> {
     let blocks = count.div_ceil(SORT_BLOCK).max(1);
     let passes = low_bits.div_ceil(4) + FIRST_WORD_PASSES;
     let pass = |pass_or_jobs| {
-        let step = |nth, kernel, groups| Step {
+        let step = |nth, kernel, groups| BuildStep {
             phase: 3 + pass_or_jobs * 3 + nth,
             kernel,
             job,
@@ -125,7 +126,7 @@ pub(crate) fn sort_steps(job: u32, count: u32, low_bits: u32) -> Vec<Step> {
 }
 
 /// The steps of refits, by phases; job `i` is refit `i`.
-pub(crate) fn refit_steps(refits: &[GpuRefitPlan]) -> Vec<Step> {
+pub(crate) fn refit_steps(refits: &[GpuRefitPlan]) -> Vec<BuildStep> {
     let mut steps = Vec::new();
     for (job, plan) in (0..).zip(refits) {
         let written = plan.primitive_count.max(plan.node_count);
@@ -134,8 +135,8 @@ pub(crate) fn refit_steps(refits: &[GpuRefitPlan]) -> Vec<Step> {
             NodeFormat::Binary => Kernel::FitBinary,
         };
         for (phase, kernel, invocations) in [(0, Kernel::RefitLeaves, written), (1, fit, plan.node_count)] {
-            let groups = invocations.div_ceil(GROUP).max(1);
-            steps.push(Step { phase, kernel, job, pass_or_jobs: 0, groups });
+            let groups = invocations.div_ceil(WORKGROUP_SIZE).max(1);
+            steps.push(BuildStep { phase, kernel, job, pass_or_jobs: 0, groups });
         }
     }
     steps.sort_by_key(|step| (step.phase, step.kernel));
@@ -172,7 +173,7 @@ mod tests {
             prop_assert!(sorted.into_iter().eq(0..counts.len()));
             prop_assert!(steps.is_sorted_by_key(|step| step.phase));
             for (job, build) in order.iter().enumerate() {
-                let covers = |step: &&Step| match step.kernel {
+                let covers = |step: &&BuildStep| match step.kernel {
                     Kernel::BuildSmallBlas | Kernel::BuildSmallWide => job < step.groups as usize,
                     _ => step.job as usize == job,
                 };

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::collapse_model::{Below, BinaryTree, WideChild, WideTree};
+use super::collapse_model::{BelowNode, Bvh2Reference, Bvh8Child, Bvh8Reference};
 use crate::barrier::{Stages, Use};
 use crate::command::CommandBuffer;
 use crate::error::Result;
@@ -15,18 +15,18 @@ use crate::software_ray_query::layout::LeafKind;
 /// Words of the state, as `software_ray_query/kernels/job.glsl` numbers them.
 const ACTIVE: usize = 6;
 const WIDE_NODES: usize = 8;
-const ENDS: usize = 9;
+const END_BYTES: usize = 9;
 const BINARY_WORDS: usize = 16;
 const WIDE_WORDS: usize = 20;
 
 /// A binary tree on its way through the kernels: the structure, and behind it what a build has as its scratch memory.
 pub(crate) struct Collapser<'a> {
-    tree: &'a BinaryTree,
+    tree: &'a Bvh2Reference,
     plan: GpuBuildPlan,
 }
 
 impl<'a> Collapser<'a> {
-    pub(crate) fn new(tree: &'a BinaryTree) -> Result<Self> {
+    pub(crate) fn new(tree: &'a Bvh2Reference) -> Result<Self> {
         let shape = BlasShape {
             leaf_kind: LeafKind::Triangles,
             primitive_count: tree.nodes.len() as u32 + 1,
@@ -42,7 +42,7 @@ impl<'a> Collapser<'a> {
     }
 
     /// Wide nodes that have room.
-    pub(crate) fn room(&self) -> usize {
+    pub(crate) fn buffer_bytes(&self) -> usize {
         self.plan.wide_capacity as usize
     }
 
@@ -51,7 +51,7 @@ impl<'a> Collapser<'a> {
         let mut words = vec![0; (self.bytes() / 4) as usize];
         let scratch = &mut words[(self.plan.blob_bytes / 4) as usize..];
         scratch[ACTIVE] = self.plan.capacity;
-        (scratch[WIDE_NODES], scratch[ENDS]) = (1, 1);
+        (scratch[WIDE_NODES], scratch[END_BYTES]) = (1, 1);
         let nodes = scratch[self.plan.scratch.binary as usize..].chunks_exact_mut(BINARY_WORDS);
         for (words, node) in nodes.zip(&self.tree.nodes) {
             for (which, child) in node.iter().enumerate() {
@@ -59,8 +59,8 @@ impl<'a> Collapser<'a> {
                     words[at..at + 3].copy_from_slice(&corner.map(f32::to_bits));
                 }
                 words[3 + which * 4] = match child.below {
-                    Below::Node(node) => node as u32,
-                    Below::Leaf(number) => 1 << 31 | number,
+                    BelowNode::Node(node) => node as u32,
+                    BelowNode::Leaf(number) => 1 << 31 | number,
                 };
                 words[11 + which * 4] = self.tree.shape(child.below).packed();
             }
@@ -71,22 +71,22 @@ impl<'a> Collapser<'a> {
     pub(crate) fn record(&self, cmd: &mut CommandBuffer, target: &Arc<Buffer>, address: u64) -> Result<()> {
         cmd.use_buffer(target, Use::shader_write(Stages::COMPUTE));
         let source = BuildSource::Geometries(Vec::new());
-        let job = self.plan.job(&source, 0, address, address + self.plan.blob_bytes);
+        let job = self.plan.build_params(&source, 0, address, address + self.plan.blob_bytes);
         let mut steps = wide_steps(0, 0, &self.plan);
         steps.retain(|step| step.kernel == Kernel::Collapse);
-        cmd.record_jobs(&[job], &steps, std::iter::empty())
+        cmd.record_build_steps(&[job], &steps, std::iter::empty())
     }
 
     /// The tree of the memory after; `None` where it had no room.
-    pub(crate) fn collapsed(&self, words: &[u32]) -> Option<WideTree> {
+    pub(crate) fn collapsed(&self, words: &[u32]) -> Option<Bvh8Reference> {
         let scratch = &words[(self.plan.blob_bytes / 4) as usize..];
         let order = &scratch[self.plan.scratch.spare_keys as usize..];
-        let nodes = &words[self.plan.places.nodes as usize * 4..];
+        let nodes = &words[self.plan.offsets.nodes as usize * 4..];
         (scratch[WIDE_NODES] <= self.plan.wide_capacity).then(|| wide(nodes, order, 0))
     }
 }
 
-fn wide(nodes: &[u32], order: &[u32], number: u32) -> WideTree {
+fn wide(nodes: &[u32], order: &[u32], number: u32) -> Bvh8Reference {
     let node = &nodes[number as usize * WIDE_WORDS..][..WIDE_WORDS];
     let inner = node[3] >> 24;
     let child = |child: usize| {
@@ -94,10 +94,10 @@ fn wide(nodes: &[u32], order: &[u32], number: u32) -> WideTree {
         let before = (inner & ((1 << child) - 1)).count_ones();
         let first = (node[5] + (meta & 31)) as usize;
         match (meta, inner >> child & 1) {
-            (0, _) => WideChild::None,
-            (_, 1) => WideChild::Node(Box::new(wide(nodes, order, node[4] + before))),
-            _ => WideChild::Leaf(order[first..][..(meta >> 5).count_ones() as usize].to_vec()),
+            (0, _) => Bvh8Child::None,
+            (_, 1) => Bvh8Child::Node(Box::new(wide(nodes, order, node[4] + before))),
+            _ => Bvh8Child::Leaf(order[first..][..(meta >> 5).count_ones() as usize].to_vec()),
         }
     };
-    WideTree { children: std::array::from_fn(child) }
+    Bvh8Reference { children: std::array::from_fn(child) }
 }

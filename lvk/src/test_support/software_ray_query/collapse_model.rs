@@ -1,32 +1,32 @@
 //! How a binary tree becomes a wide one, as `software_ray_query/kernels/collapse.glsl` does it: what tests hold the kernel against.
 
-use super::gpu_build_check::Bounds;
-use crate::software_ray_query::layout::DEEPEST_WIDE;
+use super::gpu_build_check::CheckBounds;
+use crate::software_ray_query::layout::MAX_BVH8_DEPTH;
 
 const CHILDREN: u32 = 8;
-const MOST_OF_GROUP: u32 = 3;
-const FEW_GROUPS: u32 = 4;
+const MAX_GROUP_PRIMITIVES: u32 = 3;
+const MAX_GROUPS: u32 = 4;
 const GROUP_WORTH: f32 = 0.5;
 
 /// Nodes of two children each, the root first.
 #[derive(Debug, Clone, Default)]
-pub struct BinaryTree {
+pub struct Bvh2Reference {
     /// Both children of each.
-    pub nodes: Vec<[BinaryChild; 2]>,
+    pub nodes: Vec<[Bvh2Child; 2]>,
 }
 
 /// A child of a binary node.
 #[derive(Debug, Clone, Copy)]
-pub struct BinaryChild {
+pub struct Bvh2Child {
     /// Around all below it.
-    pub bounds: Bounds,
+    pub bounds: CheckBounds,
     /// What it is.
-    pub below: Below,
+    pub below: BelowNode,
 }
 
 /// What a child is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Below {
+pub enum BelowNode {
     /// Another node.
     Node(usize),
     /// A primitive, by its number.
@@ -35,42 +35,42 @@ pub enum Below {
 
 /// A wide node with all that is below it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct WideTree {
+pub struct Bvh8Reference {
     /// In the order of the node.
-    pub children: [WideChild; 8],
+    pub children: [Bvh8Child; 8],
 }
 
 /// A child of a wide node.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum WideChild {
+pub enum Bvh8Child {
     /// There is none.
     None,
     /// Another node.
-    Node(Box<WideTree>),
+    Node(Box<Bvh8Reference>),
     /// Numbers of primitives, in the order of their slots.
     Leaf(Vec<u32>),
 }
 
 /// What `Fitted::shape` of the kernels says of a subtree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Shape {
+pub(crate) struct GroupShape {
     pub(crate) height: u32,
     pub(crate) groups: u32,
     pub(crate) count: u32,
 }
 
 #[derive(Clone, Copy)]
-struct Part {
-    child: BinaryChild,
-    shape: Shape,
+struct CollapsePart {
+    child: Bvh2Child,
+    shape: GroupShape,
 }
 
-impl Shape {
+impl GroupShape {
     const LEAF: Self = Self { height: 0, groups: 1, count: 1 };
 
-    fn above(self, other: Self) -> Self {
+    fn is_above(self, other: Self) -> Self {
         let count = (self.count + other.count).min(0xffff);
-        let groups = if count <= MOST_OF_GROUP { 1 } else { (self.groups + other.groups).min(0xff) };
+        let groups = if count <= MAX_GROUP_PRIMITIVES { 1 } else { (self.groups + other.groups).min(0xff) };
         Self { height: self.height.max(other.height) + 1, groups, count }
     }
 
@@ -80,65 +80,65 @@ impl Shape {
     }
 
     fn is_group(self) -> bool {
-        self.count <= MOST_OF_GROUP
+        self.count <= MAX_GROUP_PRIMITIVES
     }
 
     fn least_children(self, is_tall: bool) -> u32 {
-        if is_tall || self.groups > FEW_GROUPS { 1 } else { self.groups }
+        if is_tall || self.groups > MAX_GROUPS { 1 } else { self.groups }
     }
 }
 
-impl BinaryTree {
+impl Bvh2Reference {
     /// The shape of what is below a child.
-    pub(crate) fn shape(&self, below: Below) -> Shape {
+    pub(crate) fn shape(&self, below: BelowNode) -> GroupShape {
         match below {
-            Below::Leaf(_) => Shape::LEAF,
-            Below::Node(node) => {
+            BelowNode::Leaf(_) => GroupShape::LEAF,
+            BelowNode::Node(node) => {
                 let [one, two] = self.nodes[node].map(|child| self.shape(child.below));
-                one.above(two)
+                one.is_above(two)
             }
         }
     }
 
     /// The shape of each node, which its children stand behind.
-    fn shapes(&self) -> Vec<Shape> {
-        let mut shapes = vec![Shape::LEAF; self.nodes.len()];
+    fn shapes(&self) -> Vec<GroupShape> {
+        let mut shapes = vec![GroupShape::LEAF; self.nodes.len()];
         for (index, node) in self.nodes.iter().enumerate().rev() {
-            let [one, two] = node.map(|child| known(&shapes, child.below));
-            shapes[index] = one.above(two);
+            let [one, two] = node.map(|child| node_below(&shapes, child.below));
+            shapes[index] = one.is_above(two);
         }
         shapes
     }
 
     /// The wide tree of a tree of more than three primitives.
-    pub fn collapse(&self) -> WideTree {
-        self.wide(&self.shapes(), 0, 0)
+    pub fn collapse(&self) -> Bvh8Reference {
+        self.is_wide(&self.shapes(), 0, 0)
     }
 
-    fn wide(&self, shapes: &[Shape], node: usize, level: usize) -> WideTree {
-        let cut = self.cut(shapes, node, level);
-        let order = ordered(&cut);
+    fn is_wide(&self, shapes: &[GroupShape], node: usize, level: usize) -> Bvh8Reference {
+        let cut = self.cut_to_groups(shapes, node, level);
+        let order = slot_order(&cut);
         let child = |part: Option<usize>| {
-            let Some(part) = part.map(|part| cut[part]) else { return WideChild::None };
+            let Some(part) = part.map(|part| cut[part]) else { return Bvh8Child::None };
             match part.child.below {
-                Below::Node(below) if !part.shape.is_group() => {
-                    WideChild::Node(Box::new(self.wide(shapes, below, level + 1)))
+                BelowNode::Node(below) if !part.shape.is_group() => {
+                    Bvh8Child::Node(Box::new(self.is_wide(shapes, below, level + 1)))
                 }
-                below => WideChild::Leaf(self.primitives(below)),
+                below => Bvh8Child::Leaf(self.primitives(below)),
             }
         };
-        WideTree { children: order.map(child) }
+        Bvh8Reference { children: order.map(child) }
     }
 
     /// What becomes children of the wide node that stands for a binary one.
-    fn cut(&self, shapes: &[Shape], node: usize, level: usize) -> Vec<Part> {
-        let part = |child: BinaryChild| Part { child, shape: known(shapes, child.below) };
-        let mut cut: Vec<Part> = self.nodes[node].map(part).to_vec();
-        let is_tall = (shapes[node].height as usize + 1) / 3 > DEEPEST_WIDE - 1 - level;
+    fn cut_to_groups(&self, shapes: &[GroupShape], node: usize, level: usize) -> Vec<CollapsePart> {
+        let part = |child: Bvh2Child| CollapsePart { child, shape: node_below(shapes, child.below) };
+        let mut cut: Vec<CollapsePart> = self.nodes[node].map(part).to_vec();
+        let is_tall = (shapes[node].height as usize + 1) / 3 > MAX_BVH8_DEPTH - 1 - level;
         let mut taken: u32 = cut.iter().map(|part| part.shape.least_children(is_tall)).sum();
         let mut closed = [false; CHILDREN as usize];
         while cut.len() < CHILDREN as usize {
-            let Some((next, below)) = next_to_open(&cut, &closed, is_tall) else { break };
+            let Some((next, below)) = next_to_split(&cut, &closed, is_tall) else { break };
             let parts = self.nodes[below].map(part);
             let more: u32 = parts.iter().map(|part| part.shape.least_children(is_tall)).sum();
             let after = taken + more - cut[next].shape.least_children(is_tall);
@@ -153,52 +153,52 @@ impl BinaryTree {
         cut
     }
 
-    fn primitives(&self, below: Below) -> Vec<u32> {
+    fn primitives(&self, below: BelowNode) -> Vec<u32> {
         match below {
-            Below::Leaf(number) => vec![number],
-            Below::Node(node) => {
+            BelowNode::Leaf(number) => vec![number],
+            BelowNode::Node(node) => {
                 self.nodes[node].iter().flat_map(|child| self.primitives(child.below)).collect()
             }
         }
     }
 }
 
-impl WideTree {
+impl Bvh8Reference {
     /// Nodes on the longest path.
     pub fn depth(&self) -> usize {
-        let depth = |child: &WideChild| if let WideChild::Node(below) = child { below.depth() } else { 0 };
+        let depth = |child: &Bvh8Child| if let Bvh8Child::Node(below) = child { below.depth() } else { 0 };
         1 + self.children.iter().map(depth).max().unwrap_or(0)
     }
 
     /// Nodes of all levels.
     pub fn node_count(&self) -> usize {
         let count =
-            |child: &WideChild| if let WideChild::Node(below) = child { below.node_count() } else { 0 };
+            |child: &Bvh8Child| if let Bvh8Child::Node(below) = child { below.node_count() } else { 0 };
         1 + self.children.iter().map(count).sum::<usize>()
     }
 
     /// Numbers of all primitives.
     pub fn primitives(&self) -> Vec<u32> {
-        let below = |child: &WideChild| match child {
-            WideChild::None => Vec::new(),
-            WideChild::Node(below) => below.primitives(),
-            WideChild::Leaf(numbers) => numbers.clone(),
+        let below = |child: &Bvh8Child| match child {
+            Bvh8Child::None => Vec::new(),
+            Bvh8Child::Node(below) => below.primitives(),
+            Bvh8Child::Leaf(numbers) => numbers.clone(),
         };
         self.children.iter().flat_map(below).collect()
     }
 }
 
-fn known(shapes: &[Shape], below: Below) -> Shape {
+fn node_below(shapes: &[GroupShape], below: BelowNode) -> GroupShape {
     match below {
-        Below::Leaf(_) => Shape::LEAF,
-        Below::Node(node) => shapes[node],
+        BelowNode::Leaf(_) => GroupShape::LEAF,
+        BelowNode::Node(node) => shapes[node],
     }
 }
 
-fn next_to_open(cut: &[Part], closed: &[bool], is_tall: bool) -> Option<(usize, usize)> {
+fn next_to_split(cut: &[CollapsePart], closed: &[bool], is_tall: bool) -> Option<(usize, usize)> {
     let (mut next, mut most) = (None, -1.0);
     for (index, part) in cut.iter().enumerate() {
-        let Below::Node(node) = part.child.below else { continue };
+        let BelowNode::Node(node) = part.child.below else { continue };
         let area = half_area(&part.child.bounds) * if part.shape.is_group() { GROUP_WORTH } else { 1.0 };
         let worth = if is_tall { part.shape.height as f32 } else { area };
         if !closed[index] && worth > most {
@@ -209,8 +209,8 @@ fn next_to_open(cut: &[Part], closed: &[bool], is_tall: bool) -> Option<(usize, 
 }
 
 /// Which part each child is.
-fn ordered(cut: &[Part]) -> [Option<usize>; 8] {
-    let centre = |bounds: &Bounds| -> [f32; 3] {
+fn slot_order(cut: &[CollapsePart]) -> [Option<usize>; 8] {
+    let centre = |bounds: &CheckBounds| -> [f32; 3] {
         std::array::from_fn(|axis| bounds[0][axis] * 0.5 + bounds[1][axis] * 0.5)
     };
     let all = |which: usize, best: fn(f32, f32) -> f32| -> [f32; 3] {
@@ -243,7 +243,7 @@ fn ordered(cut: &[Part]) -> [Option<usize>; 8] {
     children
 }
 
-fn half_area(bounds: &Bounds) -> f32 {
+fn half_area(bounds: &CheckBounds) -> f32 {
     let [x, y, z] = std::array::from_fn(|axis| (bounds[1][axis] - bounds[0][axis]).max(0.0));
     x * y + y * z + z * x
 }
@@ -256,28 +256,28 @@ pub fn any_tree(
     even: usize,
     height: u32,
     choose: &mut dyn FnMut(usize) -> usize,
-) -> BinaryTree {
-    let mut tree = BinaryTree::default();
+) -> Bvh2Reference {
+    let mut tree = Bvh2Reference::default();
     let leaves: Vec<u32> = (0..count as u32).collect();
-    grow(&mut tree, &leaves, even, height, choose);
+    add_child(&mut tree, &leaves, even, height, choose);
     tree
 }
 
-fn grow(
-    tree: &mut BinaryTree,
+fn add_child(
+    tree: &mut Bvh2Reference,
     leaves: &[u32],
     even: usize,
     height: u32,
     choose: &mut dyn FnMut(usize) -> usize,
-) -> BinaryChild {
+) -> Bvh2Child {
     if let [number] = leaves {
         let low: [usize; 3] = std::array::from_fn(|_| choose(1000));
         let high: [usize; 3] = std::array::from_fn(|axis| low[axis] + choose(8));
         let bounds = [low, high].map(|corner| corner.map(|number| number as f32));
-        return BinaryChild { bounds, below: Below::Leaf(*number) };
+        return Bvh2Child { bounds, below: BelowNode::Leaf(*number) };
     }
     let node = tree.nodes.len();
-    let empty = BinaryChild { bounds: super::gpu_build_check::EMPTY, below: Below::Leaf(0) };
+    let empty = Bvh2Child { bounds: super::gpu_build_check::EMPTY, below: BelowNode::Leaf(0) };
     tree.nodes.push([empty; 2]);
     let most = 1_usize.checked_shl(height - 1).unwrap_or(usize::MAX);
     let half = leaves.len() / 2;
@@ -288,14 +288,14 @@ fn grow(
     if choose(2) == 0 {
         parts.reverse();
     }
-    let children = parts.map(|part| grow(tree, part, even, height - 1, choose));
+    let children = parts.map(|part| add_child(tree, part, even, height - 1, choose));
     tree.nodes[node] = children;
     let [one, two] = children.map(|child| child.bounds);
     let bounds = [
         std::array::from_fn(|axis| one[0][axis].min(two[0][axis])),
         std::array::from_fn(|axis| one[1][axis].max(two[1][axis])),
     ];
-    BinaryChild { bounds, below: Below::Node(node) }
+    Bvh2Child { bounds, below: BelowNode::Node(node) }
 }
 
 #[cfg(test)]
@@ -304,7 +304,7 @@ mod tests {
 
     use super::*;
 
-    fn tree(count: usize, even: usize, height: u32, seed: u64) -> BinaryTree {
+    fn tree(count: usize, even: usize, height: u32, seed: u64) -> Bvh2Reference {
         let mut state = seed;
         any_tree(count, even, height, &mut |below| {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -313,10 +313,11 @@ mod tests {
     }
 
     /// Fewest children of any node but the root.
-    fn fewest(tree: &WideTree) -> usize {
-        let own = |tree: &WideTree| tree.children.iter().filter(|child| **child != WideChild::None).count();
+    fn min_groups(tree: &Bvh8Reference) -> usize {
+        let own =
+            |tree: &Bvh8Reference| tree.children.iter().filter(|child| **child != Bvh8Child::None).count();
         let below = tree.children.iter().filter_map(|child| match child {
-            WideChild::Node(below) => Some(own(below).min(fewest(below))),
+            Bvh8Child::Node(below) => Some(own(below).min(min_groups(below))),
             _ => None,
         });
         below.min().unwrap_or(8)
@@ -329,14 +330,14 @@ mod tests {
             let mut found = wide.primitives();
             found.sort_unstable();
             prop_assert!(found.into_iter().eq(0..count as u32));
-            prop_assert!(wide.depth() <= DEEPEST_WIDE, "{}", wide.depth());
+            prop_assert!(wide.depth() <= MAX_BVH8_DEPTH, "{}", wide.depth());
         }
 
         #[test]
         fn even_trees_have_room(count in 4..5000_usize, even in 7..=8_usize, seed: u64) {
             let wide = tree(count, even, 64, seed).collapse();
             prop_assert!(wide.node_count() <= count * 99 / 1000 + 2, "{} of {count}", wide.node_count());
-            prop_assert!(fewest(&wide) >= 2);
+            prop_assert!(min_groups(&wide) >= 2);
         }
     }
 
@@ -345,8 +346,8 @@ mod tests {
     fn the_longest_paths_are_short_enough() {
         for seed in 0..200 {
             let deep = tree(4_000, 0, 64, seed);
-            assert_eq!(deep.shape(Below::Node(0)).height, 64);
-            assert!(deep.collapse().depth() <= DEEPEST_WIDE);
+            assert_eq!(deep.shape(BelowNode::Node(0)).height, 64);
+            assert!(deep.collapse().depth() <= MAX_BVH8_DEPTH);
         }
     }
 }

@@ -4,8 +4,8 @@
 
 use std::sync::Arc;
 
-pub use super::collapse_model::{Below, BinaryChild, BinaryTree, WideChild, WideTree, any_tree};
-pub use super::gpu_build_check::{Bounds, EMPTY, Facts, check_structure};
+pub use super::collapse_model::{BelowNode, Bvh2Child, Bvh2Reference, Bvh8Child, Bvh8Reference, any_tree};
+pub use super::gpu_build_check::{CheckBounds, EMPTY, StructureFacts, check_structure};
 use crate::accel::geometry::BlasGeometry;
 use crate::command::software_ray_query::gpu_build::{GpuBuild, GpuRefit};
 use crate::context::Context;
@@ -15,15 +15,15 @@ use crate::handle::BufferHandle;
 use crate::resource::Buffer;
 use crate::resource::buffer::{BufferDesc, BufferUsage};
 use crate::software_ray_query::gpu_build::geometry::gpu_geometries;
-use crate::software_ray_query::gpu_build::layout::{BlasShape, BlobPlaces, BuildSource, GpuBuildPlan};
+use crate::software_ray_query::gpu_build::layout::{BlasShape, BlobOffsets, BuildSource, GpuBuildPlan};
 use crate::software_ray_query::gpu_build::refit_layout::{GpuRefitPlan, NodeFormat};
-use crate::software_ray_query::layout::{DEEPEST_WIDE, LeafKind};
+use crate::software_ray_query::layout::{LeafKind, MAX_BVH8_DEPTH};
 
 const ALIGNMENT: u64 = 256;
 
 /// What leaves of triangles hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Leaves {
+pub enum LeafEncoding {
     /// Corners.
     Corners,
     /// Numbers of vertices, a word each.
@@ -36,7 +36,7 @@ pub enum Leaves {
 pub struct GpuBlasDesc<'a> {
     pub geometries: &'a [BlasGeometry],
     pub improvements: u32,
-    pub leaves: Leaves,
+    pub leaves: LeafEncoding,
 }
 
 /// A structure and the buffer it lies in.
@@ -53,13 +53,13 @@ pub fn build_blas(ctx: &Context, descs: &[GpuBlasDesc<'_>]) -> Result<Vec<GpuStr
     let (mut builds, mut built) = (Vec::new(), Vec::new());
     for desc in descs {
         let geometries = read_geometries(ctx, desc.geometries)?;
-        let boxes = desc.geometries.iter().any(BlasGeometry::is_boxes);
+        let boxes = desc.geometries.iter().any(BlasGeometry::is_aabbs);
         let shape = BlasShape {
             leaf_kind: match desc.leaves {
                 _ if boxes => LeafKind::Boxes,
-                Leaves::Corners => LeafKind::Triangles,
-                Leaves::Indexed => LeafKind::IndexedTriangles,
-                Leaves::Packed => LeafKind::PackedTriangles,
+                LeafEncoding::Corners => LeafKind::Triangles,
+                LeafEncoding::Indexed => LeafKind::IndexedTriangles,
+                LeafEncoding::Packed => LeafKind::PackedTriangles,
             },
             primitive_count: desc.geometries.iter().map(BlasGeometry::primitive_count).sum(),
             vertex_count: geometries.iter().map(|geometry| geometry.vertex_count).sum(),
@@ -67,10 +67,16 @@ pub fn build_blas(ctx: &Context, descs: &[GpuBlasDesc<'_>]) -> Result<Vec<GpuStr
             improvements: desc.improvements,
         };
         let plan = GpuBuildPlan::blas("test", &shape)?;
-        let (structure, target) = room(ctx, &plan)?;
+        let (structure, target) = allocate_structure(ctx, &plan)?;
         let blob = structure.address;
-        let reads = reads(ctx, desc.geometries)?;
-        builds.push(GpuBuild { plan, source: BuildSource::Geometries(geometries), blob, target, reads });
+        let reads = read_buffers(ctx, desc.geometries)?;
+        builds.push(GpuBuild {
+            plan,
+            source: BuildSource::Geometries(geometries),
+            blob,
+            target,
+            read_buffers: reads,
+        });
         built.push(structure);
     }
     record(ctx, |cmd| cmd.record_gpu_builds(&builds))?;
@@ -85,8 +91,8 @@ pub fn refit(ctx: &Context, structures: &[(&GpuStructure, &[BlasGeometry])]) -> 
             plan: structure.plan,
             geometries: read_geometries(ctx, geometries)?,
             blob: structure.address,
-            target: ctx.shared().store.buffers.get(*structure.buffer)?,
-            reads: reads(ctx, geometries)?,
+            target: ctx.device_state().store.buffers.get(*structure.buffer)?,
+            read_buffers: read_buffers(ctx, geometries)?,
         });
     }
     record(ctx, |cmd| cmd.record_gpu_refits(&refits))
@@ -101,8 +107,8 @@ pub fn build_tlas(
     table: Option<(BufferHandle, u32)>,
 ) -> Result<GpuStructure> {
     let plan = GpuBuildPlan::tlas("test", capacity)?;
-    let (structure, target) = room(ctx, &plan)?;
-    let find = |handle| ctx.shared().store.buffers.get(handle);
+    let (structure, target) = allocate_structure(ctx, &plan)?;
+    let find = |handle| ctx.device_state().store.buffers.get(handle);
     let records = find(records)?;
     let mut reads = vec![Arc::clone(&records)];
     let mut addresses = None;
@@ -112,7 +118,7 @@ pub fn build_tlas(
         reads.push(table);
     }
     let source = BuildSource::Instances { records: records.address, count, table: addresses };
-    let build = GpuBuild { plan, source, blob: structure.address, target, reads };
+    let build = GpuBuild { plan, source, blob: structure.address, target, read_buffers: reads };
     record(ctx, |cmd| cmd.record_gpu_builds(&[build]))?;
     Ok(structure)
 }
@@ -138,7 +144,7 @@ pub fn place(ctx: &Context, words: &[u32]) -> Result<GpuStructure> {
             4 => LeafKind::PackedTriangles,
             _ => LeafKind::Boxes,
         },
-        places: BlobPlaces {
+        offsets: BlobOffsets {
             nodes: words[4],
             primitives: words[5],
             vertices: words[6],
@@ -160,11 +166,11 @@ pub fn sort(ctx: &Context, keys: &[u64], low_bits: u32) -> Result<Vec<(u64, u32)
 
 /// The wide tree that the kernels make of a binary one of more than three primitives, `None` where it had no room; and how many
 /// nodes have.
-pub fn collapse(ctx: &Context, tree: &BinaryTree) -> Result<(Option<WideTree>, usize)> {
+pub fn collapse(ctx: &Context, tree: &Bvh2Reference) -> Result<(Option<Bvh8Reference>, usize)> {
     let collapser = super::collapse_kernels::Collapser::new(tree)?;
     let words =
         run_on(ctx, &collapser.words(), |cmd, target, address| collapser.record(cmd, target, address))?;
-    Ok((collapser.collapsed(&words), collapser.room()))
+    Ok((collapser.collapsed(&words), collapser.buffer_bytes()))
 }
 
 fn record(ctx: &Context, record: impl FnOnce(&mut crate::CommandBuffer) -> Result<()>) -> Result<()> {
@@ -183,7 +189,7 @@ fn run_on(
     let (buffer, address) = memory(ctx, size_of_val(words) as u64)?;
     let offset = address - ctx.buffer_address(*buffer)?;
     ctx.upload_buffer(*buffer, offset, bytemuck::cast_slice(words))?;
-    let target = ctx.shared().store.buffers.get(*buffer)?;
+    let target = ctx.device_state().store.buffers.get(*buffer)?;
     record(ctx, |cmd| commands(cmd, &target, address))?;
     let mut after = vec![0_u32; words.len()];
     ctx.download_buffer(*buffer, offset, bytemuck::cast_slice_mut(&mut after))?;
@@ -202,14 +208,14 @@ fn memory(ctx: &Context, bytes: u64) -> Result<(Holder<BufferHandle>, u64)> {
     Ok((buffer, address))
 }
 
-fn room(ctx: &Context, plan: &GpuBuildPlan) -> Result<(GpuStructure, Arc<Buffer>)> {
+fn allocate_structure(ctx: &Context, plan: &GpuBuildPlan) -> Result<(GpuStructure, Arc<Buffer>)> {
     let (buffer, address) = memory(ctx, plan.blob_bytes)?;
-    let target = ctx.shared().store.buffers.get(*buffer)?;
+    let target = ctx.device_state().store.buffers.get(*buffer)?;
     let most_height = match plan.leaf_kind {
-        LeafKind::Instances => plan.most_height(),
-        _ => DEEPEST_WIDE as u32,
+        LeafKind::Instances => plan.max_height(),
+        _ => MAX_BVH8_DEPTH as u32,
     };
-    let refit = GpuRefitPlan::of_build(plan);
+    let refit = GpuRefitPlan::from_build(plan);
     Ok((GpuStructure { buffer, address, most_height, bytes: plan.blob_bytes, plan: refit }, target))
 }
 
@@ -217,10 +223,10 @@ fn read_geometries(
     ctx: &Context,
     geometries: &[BlasGeometry],
 ) -> Result<Vec<crate::software_ray_query::gpu_build::geometry::GpuGeometry>> {
-    gpu_geometries("test", geometries, &|handle| ctx.shared().store.buffers.get(handle), None)
+    gpu_geometries("test", geometries, &|handle| ctx.device_state().store.buffers.get(handle), None)
 }
 
-fn reads(ctx: &Context, geometries: &[BlasGeometry]) -> Result<Vec<Arc<Buffer>>> {
+fn read_buffers(ctx: &Context, geometries: &[BlasGeometry]) -> Result<Vec<Arc<Buffer>>> {
     let handles = geometries.iter().flat_map(BlasGeometry::buffers);
-    handles.map(|handle| ctx.shared().store.buffers.get(handle)).collect()
+    handles.map(|handle| ctx.device_state().store.buffers.get(handle)).collect()
 }

@@ -6,13 +6,13 @@ use crate::barrier::{Stages, Use};
 use crate::command::CommandBuffer;
 use crate::error::Result;
 use crate::resource::Buffer;
-use crate::software_ray_query::gpu_build::params::Job;
+use crate::software_ray_query::gpu_build::params::GpuBuildParams;
 use crate::software_ray_query::gpu_build::steps::sort_steps;
 
 /// Keys on their way through the kernels, in memory that starts where a build has its scratch memory.
 pub(crate) struct Sorter<'a> {
     keys: &'a [u64],
-    job: Job,
+    job: GpuBuildParams,
 }
 
 impl<'a> Sorter<'a> {
@@ -20,7 +20,7 @@ impl<'a> Sorter<'a> {
         let long = low_bits > 0;
         let count = keys.len() as u32;
         let words = count * if long { 3 } else { 2 };
-        let job = Job {
+        let job = GpuBuildParams {
             count,
             low_bits,
             keys: 0,
@@ -49,9 +49,9 @@ impl<'a> Sorter<'a> {
 
     pub(crate) fn record(&self, cmd: &mut CommandBuffer, target: &Arc<Buffer>, address: u64) -> Result<()> {
         cmd.use_buffer(target, Use::shader_write(Stages::COMPUTE));
-        let job = Job { scratch: address, ..self.job };
+        let job = GpuBuildParams { scratch: address, ..self.job };
         let steps = sort_steps(0, job.count, job.low_bits);
-        cmd.record_jobs(&[job], &steps, std::iter::empty())
+        cmd.record_build_steps(&[job], &steps, std::iter::empty())
     }
 
     /// Keys and numbers from the memory after.

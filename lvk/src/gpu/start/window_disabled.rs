@@ -4,11 +4,8 @@ use std::convert::Infallible;
 use std::ffi::CStr;
 use std::iter::Empty;
 
-use ash::vk;
-
-use super::caps::optional_features::{FeatureSet, OF_WINDOWS};
-use super::start::instance::Instance;
 use crate::error::Result;
+use crate::gpu::caps::optional_features::{FeatureSet, OF_WINDOWS};
 
 /// A window while an instance and a device are made: there is none.
 pub(crate) type WindowRef<'a> = &'a Infallible;
@@ -24,24 +21,12 @@ impl WindowExtensions {
     pub(crate) fn names(&self) -> Empty<&'static CStr> {
         match *self {}
     }
-}
 
-/// The features of a device for windows that cannot be enabled: all of them.
-pub(crate) fn unavailable_window_features(instance: &Instance) -> FeatureSet {
-    match instance.windows {
-        None => OF_WINDOWS.into_iter().collect(),
-    }
-}
-
-/// A window while a device is chosen: there is none.
-pub(crate) enum SurfaceProbe {}
-
-impl SurfaceProbe {
-    pub(crate) fn new(_: &Instance, window: WindowRef<'_>) -> Result<Self> {
-        match *window {}
-    }
-
-    pub(crate) fn queue_family(&self, _: vk::PhysicalDevice) -> Option<u32> {
-        match *self {}
+    /// The features of a device for windows that cannot be enabled: all of them.
+    pub(crate) fn unavailable_features(extensions: Option<&Self>) -> FeatureSet {
+        match extensions {
+            None => OF_WINDOWS.into_iter().collect(),
+            Some(extensions) => match *extensions {},
+        }
     }
 }

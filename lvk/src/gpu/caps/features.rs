@@ -4,8 +4,7 @@ use std::ffi::CStr;
 
 use ash::vk;
 
-use super::extensions::ExtensionFeatures;
-use crate::gpu::caps::optional_features::{FeatureSet, OptionalFeature};
+use super::extension_features::ExtensionFeatures;
 
 /// Features of a device: as found, or those of them that the library turns on.
 #[derive(Debug, Clone, Copy, Default)]
@@ -41,21 +40,6 @@ pub(crate) struct Subgroups {
 }
 
 impl Features {
-    /// Those of the features found that the library turns on: what it needs, what Vulkan 1.3 promises, the optional
-    /// ones of the set, ray tracing and mesh shaders.
-    pub(crate) fn supported_subset(found: &Self, optional: FeatureSet) -> Self {
-        let mut wanted = Self { subgroups: found.subgroups, ..Self::default() };
-        if optional.contains(OptionalFeature::CalibratedTimestamps) {
-            wanted.calibration = found.calibration;
-        }
-        let mut source = *found;
-        for field in NEEDED.iter().map(|(field, _)| field).chain(&PROMISED).chain(&APART) {
-            *field(&mut wanted) = *field(&mut source);
-        }
-        optional.enable(&mut wanted, found);
-        wanted
-    }
-
     /// Without the ray tracing that is not to be turned on.
     pub(crate) fn limit_ray_tracing(&mut self, pipeline: bool, query: bool) {
         let ext = &mut self.ext;
@@ -97,11 +81,11 @@ impl Features {
     }
 }
 
-type FeatureField = fn(&mut Features) -> &mut vk::Bool32;
+pub(super) type FeatureField = fn(&mut Features) -> &mut vk::Bool32;
 
 /// What the library cannot do without.
 #[rustfmt::skip]
-const NEEDED: [(FeatureField, &str); 19] = [
+pub(super) const NEEDED: [(FeatureField, &str); 19] = [
     (|f| &mut f.core.shader_storage_image_write_without_format, "shaderStorageImageWriteWithoutFormat"),
     (|f| &mut f.core.shader_sampled_image_array_dynamic_indexing, "shaderSampledImageArrayDynamicIndexing"),
     (|f| &mut f.core.shader_storage_image_array_dynamic_indexing, "shaderStorageImageArrayDynamicIndexing"),
@@ -121,33 +105,6 @@ const NEEDED: [(FeatureField, &str); 19] = [
     (|f| &mut f.v13.synchronization2, "synchronization2"),
     (|f| &mut f.v13.dynamic_rendering, "dynamicRendering"),
     (|f| &mut f.v13.maintenance4, "maintenance4"),
-];
-
-/// What every device of Vulkan 1.3 has. Shaders of SPIR-V 1.6 end an invocation by `OpTerminateInvocation`, which no
-/// capability announces.
-const PROMISED: [FeatureField; 9] = [
-    |f| &mut f.core.robust_buffer_access,
-    |f| &mut f.v12.descriptor_indexing,
-    |f| &mut f.v12.shader_subgroup_extended_types,
-    |f| &mut f.v12.vulkan_memory_model,
-    |f| &mut f.v12.vulkan_memory_model_device_scope,
-    |f| &mut f.v13.shader_demote_to_helper_invocation,
-    |f| &mut f.v13.shader_terminate_invocation,
-    |f| &mut f.v13.shader_zero_initialize_workgroup_memory,
-    |f| &mut f.v13.shader_integer_dot_product,
-];
-
-/// Ray tracing and mesh shaders, which have switches of their own.
-const APART: [FeatureField; 9] = [
-    |f| &mut f.ext.structures.acceleration_structure,
-    |f| &mut f.ext.structures.descriptor_binding_acceleration_structure_update_after_bind,
-    |f| &mut f.ext.ray_tracing.ray_tracing_pipeline,
-    |f| &mut f.ext.ray_tracing.ray_tracing_pipeline_trace_rays_indirect,
-    |f| &mut f.ext.ray_tracing.ray_traversal_primitive_culling,
-    |f| &mut f.ext.ray_query.ray_query,
-    |f| &mut f.ext.position_fetch.ray_tracing_position_fetch,
-    |f| &mut f.ext.mesh.mesh_shader,
-    |f| &mut f.ext.mesh.task_shader,
 ];
 
 /// The names of features that the library cannot do without and the device lacks.
@@ -191,21 +148,5 @@ mod tests {
         (features.ext.mesh.mesh_shader, features.ext.mesh.multiview_mesh_shader) = (vk::TRUE, vk::TRUE);
         features.limit_mesh_shaders(true);
         assert_eq!((features.ext.mesh.mesh_shader, features.ext.mesh.multiview_mesh_shader), (0, 0));
-    }
-
-    #[test]
-    fn only_what_is_found_is_wanted() {
-        let mut found = Features::default();
-        found.core.shader_int64 = vk::TRUE;
-        found.core.sparse_binding = vk::TRUE;
-        found.v12.shader_float16 = vk::TRUE;
-        found.v13.dynamic_rendering = vk::TRUE;
-        let wanted = Features::supported_subset(&found, FeatureSet::ALL);
-        assert_eq!((wanted.core.shader_int64, wanted.core.sparse_binding), (vk::TRUE, vk::FALSE));
-        assert_eq!((wanted.v12.shader_float16, wanted.v12.shader_int8), (vk::TRUE, vk::FALSE));
-        let without = FeatureSet::ALL.without([OptionalFeature::Int64].into_iter().collect());
-        let wanted = Features::supported_subset(&found, without);
-        assert_eq!((wanted.core.shader_int64, wanted.v13.dynamic_rendering), (vk::FALSE, vk::TRUE));
-        assert!(missing_required(&found).contains(&"bufferDeviceAddress".to_owned()));
     }
 }

@@ -1,12 +1,14 @@
 //! The one error type of the library.
 
+pub(crate) mod device_fault;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use ash::vk;
 
-use crate::gpu::caps::queues::Queue;
-use crate::gpu::debug::device_fault::DeviceFault;
+use crate::queue::Queue;
+use device_fault::DeviceFault;
 
 /// Result of every fallible call of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;

@@ -1,0 +1,100 @@
+//! Memory for a device's buffers and images.
+
+use ash::vk;
+use gpu_allocator::AllocationError;
+
+use super::device::Gpu;
+use super::memory::allocator::{MemoryKind, ObjectMemory};
+use crate::error::{Error, Result, check_limit};
+
+impl Gpu {
+    /// Allocates memory for a buffer (`linear`) or an image.
+    pub(crate) fn allocate(
+        &self,
+        name: &str,
+        requirements: vk::MemoryRequirements,
+        kind: MemoryKind,
+        linear: bool,
+    ) -> Result<ObjectMemory> {
+        let bytes = requirements.size;
+        let limit = self.caps.limits.max_allocation_bytes;
+        check_limit(name, "memory of one object in bytes", bytes, limit)?;
+        let out_of_memory = || Error::OutOfDeviceMemory { object: name.to_owned(), bytes };
+        let mut memory = self.memory();
+        let memory = memory.as_mut().ok_or_else(out_of_memory)?;
+        let kept_name = if self.names_objects() { name } else { "" };
+        let allocated =
+            memory.allocate(kept_name, requirements, kind, linear).map_err(|error| match error {
+                AllocationError::OutOfMemory => out_of_memory(),
+                other => {
+                    Error::unsupported(format!("memory for '{name}' ({bytes} bytes)"), other.to_string())
+                }
+            })?;
+        self.heap_use.add(&allocated);
+        self.name_block(&allocated, name);
+        Ok(allocated)
+    }
+
+    /// Names a block of memory after what lies at its start.
+    fn name_block(&self, allocated: &ObjectMemory, name: &str) {
+        if self.names_objects() && allocated.offset == 0 {
+            self.name(allocated.raw, &format!("memory from '{name}' on"));
+        }
+    }
+
+    /// Memory that the device has only while a pass needs it; `None` where it has no such kind.
+    pub(crate) fn allocate_lazy(
+        &self,
+        name: &str,
+        requirements: vk::MemoryRequirements,
+    ) -> Result<Option<vk::DeviceMemory>> {
+        // SAFETY: the physical device belongs to the instance.
+        let memory = unsafe { self.instance.raw.get_physical_device_memory_properties(self.physical()) };
+        let Some(kind) = lazy_type(memory.memory_types_as_slice(), requirements.memory_type_bits) else {
+            return Ok(None);
+        };
+        let info =
+            vk::MemoryAllocateInfo::default().allocation_size(requirements.size).memory_type_index(kind);
+        // SAFETY: the type is one of the device's.
+        unsafe { self.device.allocate_memory(&info, None) }.map(Some).map_err(|result| match result {
+            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
+                Error::OutOfDeviceMemory { object: name.to_owned(), bytes: requirements.size }
+            }
+            other => Error::vulkan("vkAllocateMemory")(other),
+        })
+    }
+
+    /// Gives memory back.
+    pub(crate) fn free(&self, memory: ObjectMemory) {
+        self.heap_use.remove(&memory);
+        let freed = self.memory().as_mut().map_or(Ok(()), |all| all.free(memory));
+        if let Err(error) = freed {
+            log::error!("freeing device memory failed: {error}");
+        }
+    }
+}
+
+/// The first of these kinds of memory, of those in `bits`, that is only there when needed.
+fn lazy_type(types: &[vk::MemoryType], bits: u32) -> Option<u32> {
+    let lazy =
+        |kind: &vk::MemoryType| kind.property_flags.contains(vk::MemoryPropertyFlags::LAZILY_ALLOCATED);
+    (0..).zip(types).find(|(index, kind)| bits >> index & 1 == 1 && lazy(kind)).map(|(index, _)| index)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lazy_memory_is_found_among_the_kinds_that_will_do() {
+        let kind = |property_flags| vk::MemoryType { property_flags, heap_index: 0 };
+        let (plain, lazy) = (
+            kind(vk::MemoryPropertyFlags::DEVICE_LOCAL),
+            kind(vk::MemoryPropertyFlags::DEVICE_LOCAL | vk::MemoryPropertyFlags::LAZILY_ALLOCATED),
+        );
+        assert_eq!(lazy_type(&[plain, lazy, lazy], 0b111), Some(1));
+        assert_eq!(lazy_type(&[plain, lazy, lazy], 0b101), Some(2));
+        assert_eq!(lazy_type(&[plain, lazy], 0b01), None);
+        assert_eq!(lazy_type(&[], u32::MAX), None);
+    }
+}

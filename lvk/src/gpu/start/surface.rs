@@ -1,0 +1,92 @@
+//! Surfaces of windows, and the functions of swapchains.
+
+use ash::vk;
+
+use super::instance::Instance;
+use super::window::{WindowHandles, WindowRef, display, raw_window, required_extensions};
+use crate::error::{Error, Result};
+use crate::gpu::caps::optional_features::OptionalFeature;
+
+/// The functions of windows.
+pub(crate) struct WindowFunctions {
+    pub(crate) surface: ash::khr::surface::Instance,
+    pub(crate) swapchain: ash::khr::swapchain::Device,
+    /// Fences and modes of single presents: `VK_EXT_swapchain_maintenance1`.
+    pub(crate) maintenance: Option<ash::khr::get_surface_capabilities2::Instance>,
+    pub(crate) hdr: Option<ash::ext::hdr_metadata::Device>,
+}
+
+impl WindowFunctions {
+    /// `None` where the device has no swapchains, or the instance no windows.
+    pub(crate) fn new(
+        instance: &Instance,
+        device: &ash::Device,
+        has: impl Fn(OptionalFeature) -> bool,
+    ) -> Option<Self> {
+        if instance.windows.is_none() || !has(OptionalFeature::Swapchain) {
+            return None;
+        }
+        let (entry, raw) = (&instance.entry, &instance.raw);
+        Some(Self {
+            surface: ash::khr::surface::Instance::new(entry, raw),
+            swapchain: ash::khr::swapchain::Device::new(raw, device),
+            maintenance: has(OptionalFeature::SwapchainMaintenance1)
+                .then(|| ash::khr::get_surface_capabilities2::Instance::new(entry, raw)),
+            hdr: has(OptionalFeature::HdrMetadata).then(|| ash::ext::hdr_metadata::Device::new(raw, device)),
+        })
+    }
+}
+
+/// A window while a device is chosen, destroyed on drop.
+pub(crate) struct SurfaceProbe<'a> {
+    functions: ash::khr::surface::Instance,
+    raw: vk::SurfaceKHR,
+    instance: &'a ash::Instance,
+}
+
+impl<'a> SurfaceProbe<'a> {
+    pub(crate) fn new(instance: &'a Instance, window: WindowRef<'_>) -> Result<Self> {
+        Ok(Self {
+            raw: create_surface(instance, window)?,
+            functions: ash::khr::surface::Instance::new(&instance.entry, &instance.raw),
+            instance: &instance.raw,
+        })
+    }
+
+    /// The first queue family of the device for graphics, compute and this window.
+    pub(crate) fn queue_family(&self, device: vk::PhysicalDevice) -> Option<u32> {
+        let needed = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+        // SAFETY: the device belongs to the instance.
+        let families = unsafe { self.instance.get_physical_device_queue_family_properties(device) };
+        let presents = |family| {
+            // SAFETY: as above, and the surface too.
+            unsafe { self.functions.get_physical_device_surface_support(device, family, self.raw) }
+                .unwrap_or(false)
+        };
+        (0..).zip(&families).find_map(|(index, family)| {
+            let fits = family.queue_flags.contains(needed) && presents(index);
+            fits.then_some(index)
+        })
+    }
+}
+
+impl Drop for SurfaceProbe<'_> {
+    fn drop(&mut self) {
+        // SAFETY: nothing was made from the surface.
+        unsafe { self.functions.destroy_surface(self.raw, None) };
+    }
+}
+
+/// Makes a surface (`vkCreateXcbSurfaceKHR` and its kin). The window has to outlive it.
+pub(crate) fn create_surface(instance: &Instance, window: &dyn WindowHandles) -> Result<vk::SurfaceKHR> {
+    let (display, window) = (display(window)?, raw_window(window)?);
+    let enabled = instance.windows.as_ref().map_or(&[][..], |windows| windows.system());
+    if required_extensions(display)?.iter().any(|name| !enabled.contains(name)) {
+        let why =
+            "the context was made for windows of another window system, or for none; set ContextDesc::window";
+        return Err(Error::unsupported("this kind of window", why));
+    }
+    // SAFETY: the extensions of the window system are on, the handles belong together, and the caller keeps the window.
+    unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, window, None) }
+        .map_err(Error::vulkan("vkCreateSurfaceKHR"))
+}

@@ -1,0 +1,97 @@
+//! The window that a context is made for, and the instance extensions it needs.
+
+use std::ffi::CStr;
+use std::fmt;
+
+use raw_window_handle::{HasDisplayHandle, HasWindowHandle, RawDisplayHandle, RawWindowHandle};
+
+use crate::error::{Error, Result};
+use crate::gpu::caps::optional_features::{FeatureSet, OF_WINDOWS, OptionalFeature};
+
+/// A window, of whatever library made it: everything with the handles of the crate `raw-window-handle` is one.
+///
+/// Locks of the library may be held while its handles are asked for, and while the last reference to it goes: neither may use a
+/// context.
+pub trait WindowHandles: HasDisplayHandle + HasWindowHandle + Send + Sync {}
+
+impl<T: HasDisplayHandle + HasWindowHandle + Send + Sync> WindowHandles for T {}
+
+impl fmt::Debug for dyn WindowHandles + '_ {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("window")
+    }
+}
+
+/// A window while an instance and a device are made.
+pub(crate) type WindowRef<'a> = &'a dyn WindowHandles;
+
+/// The extensions of an instance that knows windows.
+#[derive(Debug, Clone)]
+pub(crate) struct WindowExtensions {
+    /// Of the window system, with `VK_KHR_surface`.
+    system: Vec<&'static CStr>,
+    /// `VK_EXT_surface_maintenance1`, with what it needs.
+    maintenance: bool,
+    /// `VK_EXT_swapchain_colorspace`.
+    color_spaces: bool,
+}
+
+impl WindowExtensions {
+    /// Those for windows like `window`, of which `has` says what there is.
+    pub(crate) fn query(window: WindowRef<'_>, has: &dyn Fn(&CStr) -> bool) -> Result<Self> {
+        let system = required_extensions(display(window)?)?;
+        if let Some(name) = system.iter().find(|name| !has(name)) {
+            let what = format!("the instance extension {}", name.to_string_lossy());
+            return Err(Error::unsupported(what, "no Vulkan driver here can draw to this kind of window"));
+        }
+        Ok(Self {
+            system,
+            maintenance: MAINTENANCE.iter().all(|name| has(name)),
+            color_spaces: has(ash::ext::swapchain_colorspace::NAME),
+        })
+    }
+
+    /// Those of the window system.
+    pub(super) fn system(&self) -> &[&'static CStr] {
+        &self.system
+    }
+
+    /// The features of a device for windows that cannot be enabled with these extensions.
+    pub(crate) fn unavailable_features(extensions: Option<&Self>) -> FeatureSet {
+        match extensions {
+            None => OF_WINDOWS.into_iter().collect(),
+            Some(extensions) if extensions.maintenance => FeatureSet::NONE,
+            Some(_) => FeatureSet::NONE.with(OptionalFeature::SwapchainMaintenance1),
+        }
+    }
+
+    /// All of them.
+    pub(crate) fn names(&self) -> impl Iterator<Item = &'static CStr> {
+        let maintenance = if self.maintenance { &MAINTENANCE[..] } else { &[] };
+        let color_spaces = self.color_spaces.then_some(ash::ext::swapchain_colorspace::NAME);
+        self.system.clone().into_iter().chain(maintenance.iter().copied()).chain(color_spaces)
+    }
+}
+
+const MAINTENANCE: [&CStr; 2] =
+    [ash::khr::get_surface_capabilities2::NAME, ash::ext::surface_maintenance1::NAME];
+
+pub(super) fn display(window: &dyn WindowHandles) -> Result<RawDisplayHandle> {
+    window.display_handle().map(|display| display.as_raw()).map_err(no_handle)
+}
+
+pub(super) fn raw_window(window: &dyn WindowHandles) -> Result<RawWindowHandle> {
+    window.window_handle().map(|window| window.as_raw()).map_err(no_handle)
+}
+
+fn no_handle(error: raw_window_handle::HandleError) -> Error {
+    Error::usage("window", format!("it gives no handle: {error}"))
+}
+
+pub(super) fn required_extensions(display: RawDisplayHandle) -> Result<Vec<&'static CStr>> {
+    let names = ash_window::enumerate_required_extensions(display).map_err(|_| {
+        Error::unsupported("this kind of window", "Vulkan has no surfaces for its window system")
+    })?;
+    // SAFETY: the names are constants.
+    Ok(names.iter().map(|name| unsafe { CStr::from_ptr(*name) }).collect())
+}
